@@ -141,7 +141,7 @@ def spread(values, unit=1e3):
 def frames(options):
     """Five processes, lockstep: 0 missing, duplicated or torn frames; the same numbers and states on all facets."""
     count, folder = options.frames, OUT / "frames"
-    said = tumble("cave", "billiards", "--cave", "cube4", "--duration", count / 60, "--no-realtime", "--offscreen", "--quality", options.quality, "--stamp", "--wait", 60,
+    said = tumble("cave", "billiards", "--cave", "cube4", "--duration", count / 60, "--no-realtime", "--offscreen", "--quality", options.quality, "--burn-in", "--connect-timeout", 60,
                   "--log-dir", folder, "--quiet", "--summary", OUT / "frames.json")
     logs = [log(folder, facet) for facet in FACETS]
     numbers = [[line["frame"] for line in lines] for lines in logs]
@@ -159,7 +159,7 @@ def frames(options):
 
 def bowling(options):
     """The pin strike: the worst frame."""
-    tumble("cave", "bowling", "--cave", "cube4", "--duration", 5, "--no-realtime", "--no-pictures", "--wait", 60, "--quiet", "--summary", OUT / "bowling.json")
+    tumble("cave", "bowling", "--cave", "cube4", "--duration", 5, "--no-realtime", "--no-pictures", "--connect-timeout", 60, "--quiet", "--summary", OUT / "bowling.json")
     summary = json.loads((OUT / "bowling.json").read_text())
     for what in ["simulation", "barrier", "frame"]:
         f = summary[what]
@@ -173,7 +173,7 @@ def kills(options, pictures=False):
     folder, rng, back = OUT / name.replace(" ", "_"), random.Random(options.seed), []
     cave = small_cave(name.replace(" ", "_"))
     draw = ["--offscreen", "--quality", "fastest"] if pictures else ["--no-pictures"]
-    run = start("cave", "billiards", "--cave", cave, *draw, "--restart", "--log-dir", folder, "--quiet", "--wait", 60, "--summary", folder.with_suffix(".json"))
+    run = start("cave", "billiards", "--cave", cave, *draw, "--restart", "--log-dir", folder, "--quiet", "--connect-timeout", 60, "--summary", folder.with_suffix(".json"))
     try:
         wait_for(lambda: all(last_line(folder, facet) and last_line(folder, facet)["frame"] > 20 for facet in FACETS))
         for k in range(options.kills):
@@ -233,7 +233,7 @@ def launchers(options):
     cave = small_cave("launchers")
     for k in range(options.kills):
         folder = OUT / f"launchers_{k}"
-        run = start("cave", "billiards", "--cave", cave, "--no-pictures", "--log-dir", folder, "--quiet", "--wait", 60)
+        run = start("cave", "billiards", "--cave", cave, "--no-pictures", "--log-dir", folder, "--quiet", "--connect-timeout", 60)
         wait_for(lambda: all(last_line(folder, facet) for facet in FACETS))
         time.sleep(rng.uniform(0.0, 1.0))
         pids = list(facets_of(run.pid).values())
@@ -255,9 +255,9 @@ def servers(options):
     the new one."""
     folder, rng, back = OUT / "servers", random.Random(options.seed), []
     cave = small_cave("servers", sync='transport = "udp"\nready_timeout_ms = 200\ndrop_timeout_ms = 1000\nconnect_timeout_ms = 60000')
-    serve = lambda: start("serve", "billiards", "--cave", cave, "--quiet", "--listen", "127.0.0.1:47911", "--wait", 60)
+    serve = lambda: start("serve", "billiards", "--cave", cave, "--quiet", "--listen", "127.0.0.1:47911", "--connect-timeout", 60)
     server = serve()
-    facets = [start("facet", "billiards", "--cave", cave, "--facet", facet, "--no-pictures", "--server", "127.0.0.1:47911", "--wait", 60, "--log-dir", folder)
+    facets = [start("facet", "billiards", "--cave", cave, "--facet", facet, "--no-pictures", "--server", "127.0.0.1:47911", "--connect-timeout", 60, "--log-dir", folder)
               for facet in FACETS]
     try:
         for _ in range(options.kills):
@@ -286,7 +286,7 @@ def soak(options):
     folder = OUT / "soak"
     cave = small_cave("soak")
     began = time.time()
-    run = start("cave", options.scene, "--cave", cave, "--no-pictures", "--no-realtime", "--duration", options.soak / 60, "--log-dir", folder, "--quiet", "--wait", 60,
+    run = start("cave", options.scene, "--cave", cave, "--no-pictures", "--no-realtime", "--duration", options.soak / 60, "--log-dir", folder, "--quiet", "--connect-timeout", 60,
                 "--summary", OUT / "soak.json")
     samples = []
     while run.poll() is None:
@@ -317,7 +317,7 @@ def soak(options):
 def minute(options):
     """A recording of a minute, shown twice: the same states and the same pictures, bit by bit."""
     cave, file = small_cave("minute", sync="ready_timeout_ms = 10000\ndrop_timeout_ms = 10000\nconnect_timeout_ms = 60000"), OUT / "minute.mcap"
-    common = ["billiards", "--cave", cave, "--no-realtime", "--offscreen", "--quality", "fastest", "--quiet", "--wait", 60]
+    common = ["billiards", "--cave", cave, "--no-realtime", "--offscreen", "--quality", "fastest", "--quiet", "--connect-timeout", 60]
     tumble("cave", *common, "--duration", options.minute / 60, "--record", file, "--log-dir", OUT / "minute_run")
     counts = []
     for k in range(2):
@@ -362,7 +362,7 @@ def frames_by_chunk(data):
 def cuts(options):
     """A recording cut at every structural boundary, beside it, and at random bytes: all frames of chunks that are whole are saved, and none that is not there."""
     file, cut, mended = OUT / "cuts.mcap", OUT / "cut.mcap", OUT / "mended.mcap"
-    tumble("cave", "billiards", "--cave", small_cave("cuts"), "--no-realtime", "--no-pictures", "--quiet", "--wait", 60, "--duration", 4, "--record", file)
+    tumble("cave", "billiards", "--cave", small_cave("cuts"), "--no-realtime", "--no-pictures", "--quiet", "--connect-timeout", 60, "--duration", 4, "--record", file)
     data, rng = file.read_bytes(), random.Random(options.seed)
     chunks = frames_by_chunk(data)
     points = {p for begin, stop, _ in records(data) for p in (begin, begin + 1, begin + 9, (begin + stop) // 2, stop - 1)}
@@ -410,14 +410,14 @@ def namespace(options):
         ip("-n", space, "address", "add", "10.78.1.2/24", "dev", "far0")
         ip("-n", space, "link", "set", "far0", "up")
         said = subprocess.run([TUMBLE, "cave", "billiards", "--cave", cave, "--duration", str(options.frames / 60), "--no-realtime", "--no-pictures", "--log-dir", folder,
-                               "--listen", "10.78.1.1:47100", "--wait", "60"], capture_output=True, text=True, timeout=600)
+                               "--listen", "10.78.1.1:47100", "--connect-timeout", "60"], capture_output=True, text=True, timeout=600)
         logs = {facet: [(line["frame"], line["state"]) for line in log(folder, facet)] for facet in FACETS}
         same = said.returncode == 0 and all(lines == logs["front"] and len(lines) == options.frames + 1 for lines in logs.values())
         inside = lambda: subprocess.run(["ip", "netns", "pids", space], capture_output=True, text=True).stdout.split()
         after_end = inside()
         # and when the launcher dies
         shutil.rmtree(folder)
-        run = start("cave", "billiards", "--cave", cave, "--no-pictures", "--log-dir", folder, "--listen", "10.78.1.1:47100", "--wait", 60)
+        run = start("cave", "billiards", "--cave", cave, "--no-pictures", "--log-dir", folder, "--listen", "10.78.1.1:47100", "--connect-timeout", 60)
         wait_for(lambda: all(last_line(folder, facet) for facet in FACETS))
         there = inside()
         run.kill()
@@ -436,7 +436,7 @@ def viewers(options):
     from websockets.sync.client import connect
 
     folder = OUT / "viewers"
-    run = start("cave", "billiards", "--cave", small_cave("viewers"), "--no-pictures", "--log-dir", folder, "--quiet", "--wait", 60, "--foxglove", "127.0.0.1:47865",
+    run = start("cave", "billiards", "--cave", small_cave("viewers"), "--no-pictures", "--log-dir", folder, "--quiet", "--connect-timeout", 60, "--foxglove", "127.0.0.1:47865",
                 "--summary", OUT / "viewers.json")
     topics, counts = {}, {}
     try:

@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tumble_net::sync::messages::{Done, FacetCounts, Join, Refusal};
+use tumble_net::sync::messages::{FrameAck, FacetCounts, Join, Refusal};
 use tumble_net::sync::table::Snapshot;
 use tumble_net::sync::wire::{message, open};
 use tumble_net::sync::{Input, Viewer};
@@ -21,7 +21,7 @@ fuzz_target!(|bytes: &[u8]| {
     let _ = Refusal::read(bytes);
     Viewer::read(bytes).into_iter().for_each(|x| assert_eq!(written(|out| x.write(out)), bytes));
     Join::read(bytes).into_iter().for_each(|x| assert_eq!(written(|out| x.write(out)), bytes));
-    Done::read(bytes).into_iter().for_each(|x| assert_eq!(written(|out| x.write(out)), bytes));
+    FrameAck::read(bytes).into_iter().for_each(|x| assert_eq!(written(|out| x.write(out)), bytes));
     FacetCounts::read(bytes).into_iter().for_each(|x| assert_eq!(written(|out| x.write(out)), bytes));
     Input::read(bytes).into_iter().for_each(|x| assert_eq!(written(|out| x.write(out)), bytes));
 });

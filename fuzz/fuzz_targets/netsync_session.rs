@@ -6,23 +6,23 @@ use std::time::Duration;
 use tumble_core::collide::{Pose, Shape};
 use tumble_core::{RigidBody, Settings, World};
 use tumble_net::sync::transport::LinkEvent;
-use tumble_net::sync::wire::{Header, Kind, message, open};
-use tumble_net::sync::{FacetOptions, FacetSession, Seat, ServerOptions, ServerSession, Task, Viewer};
+use tumble_net::sync::wire::{MessageHeader, MessageKind, message, open};
+use tumble_net::sync::{FacetOptions, FacetSession, FacetSlot, ServerOptions, ServerSession, Task, Viewer};
 
-const KINDS: [Kind; 13] = [
-    Kind::Join,
-    Kind::Refused,
-    Kind::Snapshot,
-    Kind::State,
-    Kind::Ready,
-    Kind::Present,
-    Kind::Presented,
-    Kind::Resync,
-    Kind::Rejoin,
-    Kind::Beat,
-    Kind::End,
-    Kind::Leave,
-    Kind::Input,
+const KINDS: [MessageKind; 13] = [
+    MessageKind::Join,
+    MessageKind::Refused,
+    MessageKind::Snapshot,
+    MessageKind::State,
+    MessageKind::Ready,
+    MessageKind::Present,
+    MessageKind::Presented,
+    MessageKind::Resync,
+    MessageKind::Rejoin,
+    MessageKind::Heartbeat,
+    MessageKind::End,
+    MessageKind::Leave,
+    MessageKind::Input,
 ];
 
 fn world() -> World {
@@ -33,8 +33,8 @@ fn world() -> World {
 }
 
 fuzz_target!(|bytes: &[u8]| {
-    let seats = vec![Seat { name: "f".into(), critical: true }];
-    let mut server = ServerSession::new(ServerOptions::new(1, [0; 32], seats), &world());
+    let slots = vec![FacetSlot { name: "f".into(), critical: true }];
+    let mut server = ServerSession::new(ServerOptions::new(1, [0; 32], slots), &world());
     let mut facet = FacetSession::new(FacetOptions::new("f", [0; 32], 1), world());
     let (mut rest, mut now, mut join) = (bytes, Duration::ZERO, 0);
     while let [kind, whose, frame, length, tail @ ..] = rest {
@@ -52,11 +52,11 @@ fuzz_target!(|bytes: &[u8]| {
             join = open(&bytes).map_or(join, |(header, _)| header.join);
             server.on_event(now, 0, LinkEvent::Message, &bytes);
         }
-        if server.idle() && server.complete() {
+        if server.is_idle() && server.all_critical_joined() {
             server.publish(now, &world(), &Viewer::default()).expect("a sound world");
         }
         server.outgoing().iter().for_each(|out| facet.on_event(now, LinkEvent::Message, out.message.to_vec().into()));
-        let header = Header {
+        let header = MessageHeader {
             kind: KINDS[*kind as usize % 13],
             run: (*whose as u64) & 1,
             join: if whose & 2 == 0 { join } else { 0 },

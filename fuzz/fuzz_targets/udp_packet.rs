@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tumble_net::sync::shm::wire::{HEAD, Head};
+use tumble_net::sync::shm::wire::{HEADER_BYTES, SampleHeader};
 use tumble_net::sync::udp::handshake::{Hello, Reply};
 use tumble_net::sync::udp::keys::Handshake;
 use tumble_net::sync::udp::{SharedKey, frames, packet};
@@ -13,17 +13,17 @@ fuzz_target!(|bytes: &[u8]| {
         frames.iter().for_each(|frame| frame.write(&mut written));
         assert_eq!(written, bytes);
     }
-    if let Some(bytes) = bytes.first_chunk::<HEAD>() {
+    if let Some(bytes) = bytes.first_chunk::<HEADER_BYTES>() {
         let words: Vec<u64> = bytes
             .chunks_exact(8)
             .map(|word| word.iter().rev().fold(0, |sum, byte| sum << 8 | u64::from(*byte)))
             .collect();
         let words = [0, 1, 2, 3, 4, 5].map(|k| words[k]);
-        assert!(Head::parse(words).is_ok_and(|head| head.words() == words) || Head::parse(words).is_err());
+        assert!(SampleHeader::parse(words).is_ok_and(|head| head.words() == words) || SampleHeader::parse(words).is_err());
     }
     // a header and a checksum that fit, so that what comes behind them is reached
-    let mut datagram = bytes[..bytes.len().min(packet::MAX_DATAGRAM - packet::TAG)].to_vec();
-    if datagram.len() < packet::HEADER {
+    let mut datagram = bytes[..bytes.len().min(packet::MAX_DATAGRAM - packet::TAG_BYTES)].to_vec();
+    if datagram.len() < packet::HEADER_BYTES {
         assert!(packet::parse(bytes).is_err());
         return;
     }
@@ -32,12 +32,12 @@ fuzz_target!(|bytes: &[u8]| {
     packet::set_length(&mut datagram);
     let tagged = &mut datagram.clone();
     handshake.tag(tagged);
-    packet::finish(&mut datagram, &[0; packet::TAG]);
+    packet::finish(&mut datagram, &[0; packet::TAG_BYTES]);
     for datagram in [&datagram, tagged] {
         if let Ok(header) = packet::parse(datagram) {
             let mut again = Vec::new();
             packet::begin(&mut again, header);
-            assert_eq!((again[..3].to_vec(), &again[9..]), (datagram[..3].to_vec(), &datagram[9..packet::HEADER]));
+            assert_eq!((again[..3].to_vec(), &again[9..]), (datagram[..3].to_vec(), &datagram[9..packet::HEADER_BYTES]));
             let _ = (Hello::read(datagram, &handshake), Reply::read(datagram, &handshake));
         }
     }

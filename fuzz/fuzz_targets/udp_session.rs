@@ -6,10 +6,10 @@ use libfuzzer_sys::fuzz_target;
 use std::net::SocketAddr;
 use std::time::Duration;
 use tumble_net::sync::transport::LinkCounters;
-use tumble_net::sync::udp::facet::FacetSettings;
+use tumble_net::sync::udp::FacetSettings;
 use tumble_net::sync::udp::keys::{Agreement, Seal, Side};
-use tumble_net::sync::udp::server::ServerSettings;
-use tumble_net::sync::udp::session::Session;
+use tumble_net::sync::udp::ServerSettings;
+use tumble_net::sync::udp::Session;
 use tumble_net::sync::udp::{Entropy, FacetMachine, Numbering, ServerMachine, SharedKey, Timing, packet};
 
 fuzz_target!(|bytes: &[u8]| {

@@ -7,7 +7,9 @@
 use std::time::{Duration, Instant};
 use tumble_core::collide::{Pose, Shape};
 use tumble_core::{RigidBody, Settings, World};
-use tumble_net::sync::{Facet, FacetOptions, Hub, Mirror, Publisher, Seat, Server, ServerOptions, Task, Viewer};
+use tumble_net::sync::{
+    Facet, FacetOptions, FacetSlot, LocalTransport, Mirror, Publisher, Server, ServerOptions, Task, Viewer,
+};
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 
@@ -20,8 +22,8 @@ fn scene(bodies: usize) -> Result<World, Failure> {
     Ok(world)
 }
 
-fn facet(hub: &Hub, k: usize, bodies: usize) -> Result<(), Failure> {
-    let link = hub.facet(k as u16).ok_or("at most 64 facets")?;
+fn facet(transport: &LocalTransport, k: usize, bodies: usize) -> Result<(), Failure> {
+    let link = transport.facet(k as u16).ok_or("at most 64 facets")?;
     let mut facet = Facet::new(link, FacetOptions::new(&format!("{k}"), [0; 32], k as u64), scene(bodies)?);
     loop {
         match facet.next(Duration::from_millis(100))? {
@@ -29,7 +31,7 @@ fn facet(hub: &Hub, k: usize, bodies: usize) -> Result<(), Failure> {
             Task::Draw if facet.begin().is_some() => facet.drawn([0; 16])?,
             Task::Draw => {}
             Task::Present(_) => facet.presented()?,
-            Task::Over(_) => return Ok(()),
+            Task::Ended(_) => return Ok(()),
         }
     }
 }
@@ -68,15 +70,15 @@ fn main() -> Result<(), Failure> {
     println!("{bodies} bodies, {size} bytes of state, snapshot {} bytes", publisher.snapshot().len());
     println!("publish  {}\napply    {}\nhash     {}", percentiles(publish), percentiles(apply), percentiles(hash));
 
-    let hub = Hub::new(facets);
+    let transport = LocalTransport::new(facets);
     let workers: Vec<_> = (0..facets)
-        .map(|k| (k, hub.clone()))
-        .map(|(k, hub)| std::thread::spawn(move || facet(&hub, k, bodies)))
+        .map(|k| (k, transport.clone()))
+        .map(|(k, transport)| std::thread::spawn(move || facet(&transport, k, bodies)))
         .collect();
-    let seats = (0..facets).map(|k| Seat { name: format!("{k}"), critical: true }).collect();
+    let slots = (0..facets).map(|k| FacetSlot { name: format!("{k}"), critical: true }).collect();
     let mut server = Server::new(
-        hub.server(),
-        ServerOptions { ready_after: Duration::from_secs(10), ..ServerOptions::new(1, [0; 32], seats) },
+        transport.server(),
+        ServerOptions { ready_timeout: Duration::from_secs(10), ..ServerOptions::new(1, [0; 32], slots) },
         &world,
     );
     server.wait_for_facets(Duration::from_secs(30))?;

@@ -47,7 +47,7 @@ pub enum Command {
 }
 
 /// What is simulated, and how it is stepped.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub struct SceneOptions {
     /// A scene file, a folder that holds a scene.toml, the name of a shipped scene, a robot (.urdf) or a mesh (.obj, .stl, .ply, .dae).
     #[arg(value_name = "SCENE")]
@@ -122,6 +122,21 @@ impl OpeningOptions {
             ..UrdfOptions::default()
         };
         Ok(resolve_scene(name, &[])?.load_with(&LoadOptions { urdf, repair: self.repair })?)
+    }
+
+    /// Returns the options as they are typed, for a process that opens the same file.
+    pub fn to_args(&self) -> Vec<String> {
+        let switches = [("--floating", self.floating), ("--fixed-base", self.fixed_base), ("--repair", self.repair)];
+        let mut args: Vec<String> = switches.iter().filter(|(_, on)| *on).map(|(name, _)| (*name).to_owned()).collect();
+        args.extend(
+            self.packages.iter().flat_map(|(name, dir)| ["--package".into(), format!("{name}={}", dir.display())]),
+        );
+        let missing = self.missing_meshes.map(|missing| match missing {
+            MissingMeshes::Error => "error",
+            MissingMeshes::Skip => "skip",
+        });
+        args.extend(missing.iter().flat_map(|word| ["--missing-meshes".to_owned(), (*word).to_owned()]));
+        args
     }
 
     /// An option that says nothing about a file of this kind is refused.

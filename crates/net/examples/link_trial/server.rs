@@ -5,7 +5,7 @@ use super::options::Options;
 use super::report::{Figures, print};
 use super::{Failure, clock_ns};
 use std::time::{Duration, Instant};
-use tumble_net::sync::awake::Awake;
+use tumble_net::sync::cpu_latency::CpuLatencyRequest;
 use tumble_net::sync::shm::ShmServer;
 use tumble_net::sync::transport::{Delivery, FacetNumber, LinkEvent, ServerLink};
 use tumble_net::sync::udp::{SharedKey, Timing, UdpServer};
@@ -31,7 +31,7 @@ struct Run {
 pub fn run(options: &Options) -> Result<(), Failure> {
     let all: Vec<FacetNumber> = (0..options.facets).collect();
     let mut run = Run { link: serve(options)?, all, message: Vec::new(), figures: Figures::default() };
-    let _awake = options.stay_awake.then(Awake::ask).transpose()?;
+    let _awake = options.stay_awake.then(CpuLatencyRequest::ask).transpose()?;
     run.wait_for_facets()?;
     let before = run.bytes();
     let begin = Instant::now();

@@ -8,7 +8,7 @@
 //! wire type 0: varint, 1: 8 bytes, 2: varint length and bytes, 5: 4 bytes
 //! ```
 
-use super::bytes::{Fault, Fields};
+use super::bytes::{Fields, Problem};
 use super::{MAX_ENTITIES, MAX_SCENE_MEMORY};
 use foxglove::messages as fox;
 
@@ -18,7 +18,7 @@ const LINES: u64 = 11;
 const TRIANGLES: u64 = 12;
 
 /// Refuses a `foxglove.SceneUpdate` that would take more than [`MAX_SCENE_MEMORY`].
-pub(crate) fn check_scene(message: &[u8]) -> Result<(), Fault> {
+pub(crate) fn check_scene(message: &[u8]) -> Result<(), Problem> {
     let mut memory = message.len() as u64;
     each_field(message, |number, entity| {
         memory += size_of::<fox::SceneEntity>() as u64;
@@ -43,7 +43,7 @@ pub(crate) fn check_scene(message: &[u8]) -> Result<(), Fault> {
 }
 
 /// Refuses a `foxglove.FrameTransforms` with more than [`MAX_ENTITIES`] transforms.
-pub(crate) fn check_transforms(message: &[u8]) -> Result<(), Fault> {
+pub(crate) fn check_transforms(message: &[u8]) -> Result<(), Problem> {
     let mut count = 0;
     each_field(message, |_, _| {
         count += 1;
@@ -74,7 +74,10 @@ const LARGEST_PRIMITIVE: u64 = {
 };
 
 /// Calls `visit` with number and content of every length-delimited field.
-fn each_field<'a>(message: &'a [u8], mut visit: impl FnMut(u64, &'a [u8]) -> Result<(), Fault>) -> Result<(), Fault> {
+fn each_field<'a>(
+    message: &'a [u8],
+    mut visit: impl FnMut(u64, &'a [u8]) -> Result<(), Problem>,
+) -> Result<(), Problem> {
     let mut rest = Fields(message);
     while !rest.0.is_empty() {
         let key = varint(&mut rest)?;
@@ -93,7 +96,7 @@ fn each_field<'a>(message: &'a [u8], mut visit: impl FnMut(u64, &'a [u8]) -> Res
 }
 
 /// Seven bits a byte, least first; the top bit says that more follow. At most ten bytes.
-fn varint(rest: &mut Fields) -> Result<u64, Fault> {
+fn varint(rest: &mut Fields) -> Result<u64, Problem> {
     let mut value = 0;
     for k in 0..10 {
         let byte = rest.u8("a protobuf number")?;

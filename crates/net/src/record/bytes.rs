@@ -4,14 +4,14 @@
 use std::collections::BTreeMap;
 
 /// What is missing, for an error message.
-pub(crate) type Fault = String;
+pub(crate) type Problem = String;
 
 /// The unread rest of a record.
 pub(crate) struct Fields<'a>(pub &'a [u8]);
 
 impl<'a> Fields<'a> {
     /// The next `n` bytes.
-    pub fn take(&mut self, n: u64, what: &str) -> Result<&'a [u8], Fault> {
+    pub fn take(&mut self, n: u64, what: &str) -> Result<&'a [u8], Problem> {
         let have = self.0.len();
         let n = usize::try_from(n)
             .ok()
@@ -22,44 +22,44 @@ impl<'a> Fields<'a> {
         Ok(head)
     }
 
-    fn array<const N: usize>(&mut self, what: &str) -> Result<[u8; N], Fault> {
+    fn array<const N: usize>(&mut self, what: &str) -> Result<[u8; N], Problem> {
         let bytes = self.take(N as u64, what)?;
         bytes.try_into().map_err(|_| format!("{what} is cut"))
     }
 
     /// A `u8`.
-    pub fn u8(&mut self, what: &str) -> Result<u8, Fault> {
+    pub fn u8(&mut self, what: &str) -> Result<u8, Problem> {
         self.array::<1>(what).map(|[b]| b)
     }
 
     /// A `u16`.
-    pub fn u16(&mut self, what: &str) -> Result<u16, Fault> {
+    pub fn u16(&mut self, what: &str) -> Result<u16, Problem> {
         self.array(what).map(u16::from_le_bytes)
     }
 
     /// A `u32`.
-    pub fn u32(&mut self, what: &str) -> Result<u32, Fault> {
+    pub fn u32(&mut self, what: &str) -> Result<u32, Problem> {
         self.array(what).map(u32::from_le_bytes)
     }
 
     /// A `u64`.
-    pub fn u64(&mut self, what: &str) -> Result<u64, Fault> {
+    pub fn u64(&mut self, what: &str) -> Result<u64, Problem> {
         self.array(what).map(u64::from_le_bytes)
     }
 
     /// Bytes behind their `u32` length.
-    pub fn sized(&mut self, what: &str) -> Result<&'a [u8], Fault> {
+    pub fn sized(&mut self, what: &str) -> Result<&'a [u8], Problem> {
         let n = self.u32(what)?;
         self.take(n.into(), what)
     }
 
     /// A string behind its `u32` length.
-    pub fn string(&mut self, what: &str) -> Result<&'a str, Fault> {
+    pub fn string(&mut self, what: &str) -> Result<&'a str, Problem> {
         std::str::from_utf8(self.sized(what)?).map_err(|e| format!("{what} is not UTF-8: {e}"))
     }
 
     /// A map of strings behind its `u32` length in bytes.
-    pub fn map(&mut self, what: &str) -> Result<BTreeMap<String, String>, Fault> {
+    pub fn map(&mut self, what: &str) -> Result<BTreeMap<String, String>, Problem> {
         let mut inner = Fields(self.sized(what)?);
         let mut map = BTreeMap::new();
         while !inner.0.is_empty() {
@@ -70,7 +70,7 @@ impl<'a> Fields<'a> {
     }
 
     /// Refuses what is left over.
-    pub fn end(&self, what: &str) -> Result<(), Fault> {
+    pub fn end(&self, what: &str) -> Result<(), Problem> {
         if self.0.is_empty() { Ok(()) } else { Err(format!("{} bytes too many after {what}", self.0.len())) }
     }
 }

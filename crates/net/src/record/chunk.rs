@@ -1,6 +1,6 @@
 //! Chunks: decompression under a bound, checksum, and the records inside (MCAP specification, "Records").
 
-use super::bytes::{Fault, Fields};
+use super::bytes::{Fields, Problem};
 use super::{MAX_CHUNK_BYTES, MAX_DEFINITION_BYTES, MAX_DEFINITIONS};
 use mcap::records::op;
 use std::collections::BTreeMap;
@@ -29,7 +29,7 @@ pub(crate) fn define<T: PartialEq>(
     new: &mut BTreeMap<u16, T>,
     id: u16,
     value: T,
-) -> Result<(), Fault> {
+) -> Result<(), Problem> {
     match known.get(&id).or(new.get(&id)) {
         Some(old) if *old == value => Ok(()),
         Some(_) => Err(format!("schema or channel {id} is defined twice, and differently")),
@@ -60,7 +60,7 @@ pub(crate) enum Inner<'a> {
 }
 
 /// Parses one record by its opcode.
-pub(crate) fn parse_inner(opcode: u8, body: &[u8]) -> Result<Inner<'_>, Fault> {
+pub(crate) fn parse_inner(opcode: u8, body: &[u8]) -> Result<Inner<'_>, Problem> {
     let mut f = Fields(body);
     match opcode {
         op::SCHEMA | op::CHANNEL if body.len() > MAX_DEFINITION_BYTES => {
@@ -97,7 +97,7 @@ pub(crate) fn parse_inner(opcode: u8, body: &[u8]) -> Result<Inner<'_>, Fault> {
 }
 
 /// The next record of a chunk's content, or nothing at its end: opcode and body.
-pub(crate) fn next_inner<'a>(content: &mut Fields<'a>) -> Result<Option<(u8, &'a [u8])>, Fault> {
+pub(crate) fn next_inner<'a>(content: &mut Fields<'a>) -> Result<Option<(u8, &'a [u8])>, Problem> {
     if content.0.is_empty() {
         return Ok(None);
     }
@@ -115,7 +115,7 @@ pub(crate) struct Chunk {
 }
 
 /// Opens the body of a chunk record: sizes, compression and checksum are all checked.
-pub(crate) fn open_chunk(body: &[u8]) -> Result<Chunk, Fault> {
+pub(crate) fn open_chunk(body: &[u8]) -> Result<Chunk, Problem> {
     let mut f = Fields(body);
     let (_start, _end) = (f.u64("chunk start time")?, f.u64("chunk end time")?);
     let size = f.u64("chunk size")?;
@@ -140,7 +140,7 @@ pub(crate) fn open_chunk(body: &[u8]) -> Result<Chunk, Fault> {
 }
 
 /// Decompresses to at most one byte more than `size`; memory grows with the bytes that come out, not with the claim.
-fn decompress(compression: &str, stored: &[u8], size: u64) -> Result<Vec<u8>, Fault> {
+fn decompress(compression: &str, stored: &[u8], size: u64) -> Result<Vec<u8>, Problem> {
     let fault = |e: std::io::Error| format!("{compression} data in the chunk: {e}");
     let mut out = Vec::new();
     match compression {

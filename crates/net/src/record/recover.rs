@@ -1,7 +1,7 @@
 //! Mending: whatever can be read of a cut or damaged file, written out as a complete one.
 
 use super::MAX_DEFINITIONS;
-use super::bytes::{Fault, Fields};
+use super::bytes::{Fields, Problem};
 use super::chunk::{Channel, Inner, Schema, define, next_inner, open_chunk, parse_inner};
 use super::container::{Container, Ending, Next, RawRecord};
 use super::error::{RecordError, Result};
@@ -155,7 +155,7 @@ impl<'a> Mender<'a> {
         }
     }
 
-    fn header(&mut self, body: &[u8]) -> std::result::Result<(), Fault> {
+    fn header(&mut self, body: &[u8]) -> std::result::Result<(), Problem> {
         let mut fields = Fields(body);
         fields.string("profile")?;
         self.library = fields.string("library")?.to_owned();
@@ -163,12 +163,12 @@ impl<'a> Mender<'a> {
     }
 
     /// Takes over a chunk: all of it, or on a fault none of it.
-    fn content(&mut self, content: &[u8], compression: &str) -> std::result::Result<Result<()>, Fault> {
+    fn content(&mut self, content: &[u8], compression: &str) -> std::result::Result<Result<()>, Problem> {
         let parsed = self.parse(content)?;
         Ok(self.put_chunk(parsed, compression))
     }
 
-    fn parse<'b>(&self, content: &'b [u8]) -> std::result::Result<Parsed<'b>, Fault> {
+    fn parse<'b>(&self, content: &'b [u8]) -> std::result::Result<Parsed<'b>, Problem> {
         let mut rest = Fields(content);
         let mut new = Parsed::default();
         while let Some((opcode, body)) = next_inner(&mut rest)? {

@@ -1,7 +1,7 @@
 //! What the user does, on its way to the server (thesis §III.C): where the head is, what the wand points at, which keys are held.
 
 use super::viewer::{MAX_USERS, exact_pose, put_exact_pose};
-use super::wire::{Bytes, Fault};
+use super::wire::{ByteReader, MessageError};
 use tumble_collide::Pose;
 
 /// Most keys held at a time.
@@ -42,12 +42,12 @@ impl Input {
     /// Reads it.
     ///
     /// # Errors
-    /// [`Fault::Malformed`].
-    pub fn read(payload: &[u8]) -> Result<Input, Fault> {
-        let mut rest = Bytes(payload);
+    /// [`MessageError::Malformed`].
+    pub fn read(payload: &[u8]) -> Result<Input, MessageError> {
+        let mut rest = ByteReader(payload);
         let (sequence, user, flags, keys, buttons) = (rest.u64()?, rest.u16()?, rest.u8()?, rest.u8()?, rest.u32()?);
         if flags > 15 || keys as usize > MAX_KEYS || user as usize >= MAX_USERS {
-            return Err(Fault::Malformed("a flag that there is not, too many keys, or no such user"));
+            return Err(MessageError::Malformed("a flag that there is not, too many keys, or no such user"));
         }
         let mut pose = |bit: u8| if flags & bit != 0 { exact_pose(&mut rest).map(Some) } else { Ok(None) };
         let (head, wand, hands) = (pose(1)?, pose(2)?, [pose(4)?, pose(8)?]);

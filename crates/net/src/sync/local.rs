@@ -23,7 +23,7 @@ struct Queue {
 }
 
 #[derive(Default)]
-struct Wires {
+struct Queues {
     /// How many times a server and each facet were made; an end of an earlier making is deaf and dumb.
     server: u64,
     facets: Vec<u64>,
@@ -34,76 +34,76 @@ struct Wires {
 
 #[derive(Default)]
 struct Shared {
-    wires: Mutex<Wires>,
-    bell: Condvar,
+    queues: Mutex<Queues>,
+    wakeup: Condvar,
 }
 
 /// Where ends of links are plugged in. An end that is dropped closes its connections; one that is made again opens new ones.
 #[derive(Clone)]
-pub struct Hub(Arc<Shared>);
+pub struct LocalTransport(Arc<Shared>);
 
 /// The server's end.
 pub struct LocalServer {
     shared: Arc<Shared>,
-    made: u64,
+    generation: u64,
 }
 
 /// A facet's end.
 pub struct LocalFacet {
     shared: Arc<Shared>,
     facet: FacetNumber,
-    made: u64,
+    generation: u64,
 }
 
-impl Hub {
+impl LocalTransport {
     /// For so many facets, at most [`MAX_FACETS`].
-    pub fn new(facets: usize) -> Hub {
+    pub fn new(facets: usize) -> LocalTransport {
         let n = facets.min(MAX_FACETS);
         let counters = || vec![LinkCounters::default(); n];
-        let wires = Wires {
+        let queues = Queues {
             facets: vec![0; n],
             open: vec![false; n],
             up: Queue { items: VecDeque::new(), counters: counters() },
             down: (0..n).map(|_| Queue { items: VecDeque::new(), counters: counters() }).collect(),
             server: 0,
         };
-        Hub(Arc::new(Shared { wires: Mutex::new(wires), bell: Condvar::new() }))
+        LocalTransport(Arc::new(Shared { queues: Mutex::new(queues), wakeup: Condvar::new() }))
     }
 
     /// A server's end; it takes the place of an earlier one.
     pub fn server(&self) -> LocalServer {
-        let mut wires = lock(&self.0);
-        (0..wires.open.len()).for_each(|k| wires.close(k, Closed::Replaced, Closed::ByPeer));
-        wires.up.items.clear();
-        wires.server += 1;
-        (0..wires.open.len()).for_each(|k| wires.try_open(k));
-        self.0.bell.notify_all();
-        LocalServer { made: wires.server, shared: self.0.clone() }
+        let mut queues = lock(&self.0);
+        (0..queues.open.len()).for_each(|k| queues.close(k, Closed::Replaced, Closed::ByPeer));
+        queues.up.items.clear();
+        queues.server += 1;
+        (0..queues.open.len()).for_each(|k| queues.try_open(k));
+        self.0.wakeup.notify_all();
+        LocalServer { generation: queues.server, shared: self.0.clone() }
     }
 
     /// A facet's end; it takes the place of an earlier one. `None`: the hub has no such facet.
     pub fn facet(&self, facet: FacetNumber) -> Option<LocalFacet> {
-        let (mut wires, k) = (lock(&self.0), facet as usize);
-        let made = *wires.facets.get(k)? + 1;
-        wires.close(k, Closed::Replaced, Closed::ByPeer);
-        wires.down[k].items.clear();
-        wires.facets[k] = made;
-        wires.try_open(k);
-        self.0.bell.notify_all();
-        Some(LocalFacet { shared: self.0.clone(), facet, made })
+        let (mut queues, k) = (lock(&self.0), facet as usize);
+        let generation = *queues.facets.get(k)? + 1;
+        queues.close(k, Closed::Replaced, Closed::ByPeer);
+        queues.down[k].items.clear();
+        queues.facets[k] = generation;
+        queues.try_open(k);
+        self.0.wakeup.notify_all();
+        Some(LocalFacet { shared: self.0.clone(), facet, generation })
     }
 }
 
-fn lock(shared: &Shared) -> MutexGuard<'_, Wires> {
-    shared.wires.lock().unwrap_or_else(PoisonError::into_inner) // queues are whole between any two statements
+fn lock(shared: &Shared) -> MutexGuard<'_, Queues> {
+    shared.queues.lock().unwrap_or_else(PoisonError::into_inner) // queues are whole between any two statements
 }
 
-impl Wires {
+impl Queues {
     /// Opens a connection where both ends are there and none is open.
     fn try_open(&mut self, k: usize) {
         if !self.open[k] && self.server > 0 && self.facets[k] > 0 {
             self.open[k] = true;
-            self.tell(k, LinkEvent::Opened, LinkEvent::Opened);
+            self.notify(k, LinkEvent::Opened, LinkEvent::Opened);
             self.up.counters[k].opened += 1;
             self.down[k].counters[k].opened += 1;
         }
@@ -114,11 +114,11 @@ impl Wires {
         if std::mem::take(&mut self.open[k]) {
             self.up.items.retain(|item| item.facet as usize != k || item.event != LinkEvent::Message);
             self.down[k].items.retain(|item| item.event != LinkEvent::Message);
-            self.tell(k, LinkEvent::Closed(to_server), LinkEvent::Closed(to_facet));
+            self.notify(k, LinkEvent::Closed(to_server), LinkEvent::Closed(to_facet));
         }
     }
 
-    fn tell(&mut self, k: usize, server: LinkEvent, facet: LinkEvent) {
+    fn notify(&mut self, k: usize, server: LinkEvent, facet: LinkEvent) {
         let item = |event| Item { facet: k as FacetNumber, event, delivery: Delivery::Reliable, bytes: Vec::new() };
         self.up.items.push_back(item(server));
         self.down[k].items.push_back(item(facet));
@@ -162,18 +162,18 @@ impl Wires {
 }
 
 /// Takes the next item, waiting until `timeout` is over.
-fn wait(shared: &Shared, timeout: Duration, mut next: impl FnMut(&mut Wires) -> Option<Item>) -> Option<Item> {
+fn wait(shared: &Shared, timeout: Duration, mut next: impl FnMut(&mut Queues) -> Option<Item>) -> Option<Item> {
     let until = Instant::now().checked_add(timeout);
-    let mut wires = lock(shared);
+    let mut queues = lock(shared);
     loop {
-        if let Some(item) = next(&mut wires) {
+        if let Some(item) = next(&mut queues) {
             return Some(item);
         }
         let left = until.map_or(Duration::from_secs(1), |until| until.saturating_duration_since(Instant::now()));
         if left.is_zero() {
             return None;
         }
-        wires = shared.bell.wait_timeout(wires, left).unwrap_or_else(PoisonError::into_inner).0;
+        queues = shared.wakeup.wait_timeout(queues, left).unwrap_or_else(PoisonError::into_inner).0;
     }
 }
 
@@ -184,11 +184,11 @@ fn received(counters: &mut LinkCounters, item: &Item) {
 
 impl ServerLink for LocalServer {
     fn send(&mut self, to: FacetNumber, delivery: Delivery, message: &[u8]) -> Result<bool, LinkError> {
-        let mut wires = lock(&self.shared);
-        let sent = wires.server == self.made
-            && (to as usize) < wires.open.len()
-            && wires.post(to as usize, false, delivery, message);
-        self.shared.bell.notify_all();
+        let mut queues = lock(&self.shared);
+        let sent = queues.server == self.generation
+            && (to as usize) < queues.open.len()
+            && queues.post(to as usize, false, delivery, message);
+        self.shared.wakeup.notify_all();
         Ok(sent)
     }
 
@@ -198,9 +198,9 @@ impl ServerLink for LocalServer {
         message: &mut Vec<u8>,
     ) -> Result<Option<(FacetNumber, LinkEvent)>, LinkError> {
         message.clear();
-        let item = wait(&self.shared, timeout, |wires| {
-            let item = if wires.server == self.made { wires.up.items.pop_front()? } else { return None };
-            received(&mut wires.up.counters[item.facet as usize], &item);
+        let item = wait(&self.shared, timeout, |queues| {
+            let item = if queues.server == self.generation { queues.up.items.pop_front()? } else { return None };
+            received(&mut queues.up.counters[item.facet as usize], &item);
             Some(item)
         });
         Ok(item.map(|item| {
@@ -210,11 +210,11 @@ impl ServerLink for LocalServer {
     }
 
     fn close(&mut self, facet: FacetNumber) {
-        let mut wires = lock(&self.shared);
-        if wires.server == self.made && (facet as usize) < wires.open.len() {
-            wires.close(facet as usize, Closed::ByUs, Closed::ByPeer);
-            wires.try_open(facet as usize);
-            self.shared.bell.notify_all();
+        let mut queues = lock(&self.shared);
+        if queues.server == self.generation && (facet as usize) < queues.open.len() {
+            queues.close(facet as usize, Closed::ByUs, Closed::ByPeer);
+            queues.try_open(facet as usize);
+            self.shared.wakeup.notify_all();
         }
     }
 
@@ -225,30 +225,31 @@ impl ServerLink for LocalServer {
 
 impl Drop for LocalServer {
     fn drop(&mut self) {
-        let mut wires = lock(&self.shared);
-        if wires.server == self.made {
-            (0..wires.open.len()).for_each(|k| wires.close(k, Closed::ByUs, Closed::ByPeer));
-            wires.up.items.clear();
-            wires.server = 0;
-            self.shared.bell.notify_all();
+        let mut queues = lock(&self.shared);
+        if queues.server == self.generation {
+            (0..queues.open.len()).for_each(|k| queues.close(k, Closed::ByUs, Closed::ByPeer));
+            queues.up.items.clear();
+            queues.server = 0;
+            self.shared.wakeup.notify_all();
         }
     }
 }
 
 impl FacetLink for LocalFacet {
     fn send(&mut self, delivery: Delivery, message: &[u8]) -> Result<bool, LinkError> {
-        let (mut wires, k) = (lock(&self.shared), self.facet as usize);
-        let sent = wires.facets[k] == self.made && wires.post(k, true, delivery, message);
-        self.shared.bell.notify_all();
+        let (mut queues, k) = (lock(&self.shared), self.facet as usize);
+        let sent = queues.facets[k] == self.generation && queues.post(k, true, delivery, message);
+        self.shared.wakeup.notify_all();
         Ok(sent)
     }
 
     fn recv(&mut self, timeout: Duration, message: &mut Message) -> Result<Option<LinkEvent>, LinkError> {
         message.clear();
         let k = self.facet as usize;
-        let item = wait(&self.shared, timeout, |wires| {
-            let item = if wires.facets[k] == self.made { wires.down[k].items.pop_front()? } else { return None };
-            received(&mut wires.down[k].counters[k], &item);
+        let item = wait(&self.shared, timeout, |queues| {
+            let item =
+                if queues.facets[k] == self.generation { queues.down[k].items.pop_front()? } else { return None };
+            received(&mut queues.down[k].counters[k], &item);
             Some(item)
         });
         Ok(item.map(|item| {
@@ -258,11 +259,11 @@ impl FacetLink for LocalFacet {
     }
 
     fn close(&mut self) {
-        let (mut wires, k) = (lock(&self.shared), self.facet as usize);
-        if wires.facets[k] == self.made {
-            wires.close(k, Closed::ByPeer, Closed::ByUs);
-            wires.try_open(k);
-            self.shared.bell.notify_all();
+        let (mut queues, k) = (lock(&self.shared), self.facet as usize);
+        if queues.facets[k] == self.generation {
+            queues.close(k, Closed::ByPeer, Closed::ByUs);
+            queues.try_open(k);
+            self.shared.wakeup.notify_all();
         }
     }
 
@@ -273,12 +274,12 @@ impl FacetLink for LocalFacet {
 
 impl Drop for LocalFacet {
     fn drop(&mut self) {
-        let (mut wires, k) = (lock(&self.shared), self.facet as usize);
-        if wires.facets[k] == self.made {
-            wires.close(k, Closed::ByPeer, Closed::ByUs);
-            wires.down[k].items.clear();
-            wires.facets[k] = 0;
-            self.shared.bell.notify_all();
+        let (mut queues, k) = (lock(&self.shared), self.facet as usize);
+        if queues.facets[k] == self.generation {
+            queues.close(k, Closed::ByPeer, Closed::ByUs);
+            queues.down[k].items.clear();
+            queues.facets[k] = 0;
+            self.shared.wakeup.notify_all();
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The small messages: payloads of JOIN, REFUSED, READY, PRESENTED and BEAT. PRESENT, REJOIN, RESYNC, END and LEAVE have none.
 
-use super::wire::{Bytes, Fault, Hash, put_name};
+use super::wire::{ByteReader, Hash, MessageError, put_name};
 
 /// Most bytes of a refusal's text.
 const MAX_TEXT: usize = 1024;
@@ -27,13 +27,13 @@ impl Join {
     /// Reads it.
     ///
     /// # Errors
-    /// [`Fault::Malformed`].
-    pub fn read(payload: &[u8]) -> Result<Join, Fault> {
-        let mut rest = Bytes(payload);
+    /// [`MessageError::Malformed`].
+    pub fn read(payload: &[u8]) -> Result<Join, MessageError> {
+        let mut rest = ByteReader(payload);
         let (scene, name) = (rest.array()?, rest.name()?.to_owned());
         let exact = match rest.u8()? {
             exact @ (0 | 1) => exact == 1,
-            _ => return Err(Fault::Malformed("a flag that there is not")),
+            _ => return Err(MessageError::Malformed("a flag that there is not")),
         };
         rest.end()?;
         Ok(Join { scene, name, exact })
@@ -54,17 +54,17 @@ impl Refusal {
     /// Reads it; control characters become spaces, since it will be printed.
     ///
     /// # Errors
-    /// [`Fault::Malformed`].
-    pub fn read(payload: &[u8]) -> Result<Refusal, Fault> {
+    /// [`MessageError::Malformed`].
+    pub fn read(payload: &[u8]) -> Result<Refusal, MessageError> {
         let text = std::str::from_utf8(payload).ok().filter(|t| t.len() <= MAX_TEXT);
-        let text = text.ok_or(Fault::Malformed("a refusal that is no short text"))?;
+        let text = text.ok_or(MessageError::Malformed("a refusal that is no short text"))?;
         Ok(Refusal(text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()))
     }
 }
 
 /// READY and PRESENTED: what a facet has drawn or shown. The frame is in the header.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Done {
+pub struct FrameAck {
     /// Hash of what it applied and drew.
     pub hash: Hash,
     /// First 16 bytes of the BLAKE3 of the picture's pixels; zeros where there are none (null rendering), and in READY.
@@ -74,32 +74,32 @@ pub struct Done {
     /// From when the facet sent the newest of its inputs that the picture is the first to show, to showing it, µs, saturating; `None` in READY, and where there is none.
     pub input_us: Option<u32>,
     /// When the state (READY) or PRESENT (PRESENTED; in `latest` the state) came, µs by the facet's own clock; `None`: something else stood for it.
-    pub heard_us: Option<u64>,
+    pub received_us: Option<u64>,
     /// When the frame was drawn (READY) or shown (PRESENTED), µs by the facet's own clock.
-    pub at_us: u64,
+    pub completed_us: u64,
 }
 
-impl Done {
+impl FrameAck {
     /// Appends it: 56 bytes. What there is not travels as the largest number.
     pub fn write(&self, out: &mut Vec<u8>) {
         out.extend(self.hash);
         out.extend(self.image);
         out.extend(self.took_us.to_le_bytes());
         out.extend(self.input_us.unwrap_or(u32::MAX).to_le_bytes());
-        out.extend(self.heard_us.unwrap_or(u64::MAX).to_le_bytes());
-        out.extend(self.at_us.to_le_bytes());
+        out.extend(self.received_us.unwrap_or(u64::MAX).to_le_bytes());
+        out.extend(self.completed_us.to_le_bytes());
     }
 
     /// Reads it.
     ///
     /// # Errors
-    /// [`Fault::Malformed`].
-    pub fn read(payload: &[u8]) -> Result<Done, Fault> {
-        let mut rest = Bytes(payload);
+    /// [`MessageError::Malformed`].
+    pub fn read(payload: &[u8]) -> Result<FrameAck, MessageError> {
+        let mut rest = ByteReader(payload);
         let (hash, image, took_us) = (rest.array()?, rest.array()?, rest.u32()?);
-        let (input_us, heard_us, at_us) =
+        let (input_us, received_us, completed_us) =
             (Some(rest.u32()?).filter(|us| *us < u32::MAX), Some(rest.u64()?).filter(|us| *us < u64::MAX), rest.u64()?);
-        let done = Done { hash, image, took_us, input_us, heard_us, at_us };
+        let done = FrameAck { hash, image, took_us, input_us, received_us, completed_us };
         rest.end()?;
         Ok(done)
     }
@@ -148,9 +148,9 @@ impl FacetCounts {
     /// Reads them.
     ///
     /// # Errors
-    /// [`Fault::Malformed`].
-    pub fn read(payload: &[u8]) -> Result<FacetCounts, Fault> {
-        let (mut rest, mut counts) = (Bytes(payload), FacetCounts::default());
+    /// [`MessageError::Malformed`].
+    pub fn read(payload: &[u8]) -> Result<FacetCounts, MessageError> {
+        let (mut rest, mut counts) = (ByteReader(payload), FacetCounts::default());
         for n in counts.fields() {
             *n = rest.u64()?;
         }
@@ -160,6 +160,6 @@ impl FacetCounts {
 }
 
 /// Adds one, wrapping.
-pub(crate) fn count(n: &mut u64) {
+pub(crate) fn increment(n: &mut u64) {
     *n = n.wrapping_add(1);
 }

@@ -1,22 +1,22 @@
 //! The client's side of the frame: payloads to a world that is drawn and never stepped.
 
-use super::drawn::Drawn;
-use super::looks::get_looks;
-use super::puppet::Puppet;
-use super::quantise::get_pose;
+use super::frame_hash::FrameHasher;
+use super::quantize::get_pose;
+use super::render_proxy::RenderProxy;
 use super::table::{Entry, EntryKind, Snapshot, parse_state, poses_bytes};
 use super::viewer::{VIEWER_NAME, Viewer};
-use super::wire::{Fault, Hash};
+use super::visuals::get_visuals;
+use super::wire::{Hash, MessageError};
 use std::collections::BTreeSet;
 use tumble_collide::Pose;
 use tumble_core::{Mode, ObjectId, World};
 
 /// What a slot of the list is here.
-struct Slot {
+struct MirroredObject {
     /// `None`: the viewer.
     id: Option<ObjectId>,
     kind: EntryKind,
-    still: bool,
+    stationary: bool,
     parts: u16,
 }
 
@@ -26,7 +26,7 @@ struct Slot {
 pub struct Mirror {
     base: World,
     world: World,
-    slots: Vec<Slot>,
+    slots: Vec<MirroredObject>,
     /// How many of them do not stand still.
     moving: usize,
     /// Memory for the poses of a frame.
@@ -35,7 +35,7 @@ pub struct Mirror {
     viewer: Viewer,
     frame: u64,
     table: Hash,
-    scratch: Drawn,
+    scratch: FrameHasher,
 }
 
 impl Mirror {
@@ -52,7 +52,7 @@ impl Mirror {
             viewer: Viewer::default(),
             frame: 0,
             table: [0; 16],
-            scratch: Drawn::default(),
+            scratch: FrameHasher::default(),
         }
     }
 
@@ -79,21 +79,21 @@ impl Mirror {
     /// Takes the list of objects from a snapshot's payload.
     ///
     /// # Errors
-    /// [`Fault::Malformed`], [`Fault::Unfit`]; nothing has changed then.
-    pub fn apply_snapshot(&mut self, payload: &[u8]) -> Result<(), Fault> {
+    /// [`MessageError::Malformed`], [`MessageError::Unfit`]; nothing has changed then.
+    pub fn apply_snapshot(&mut self, payload: &[u8]) -> Result<(), MessageError> {
         let snapshot = Snapshot::parse(payload)?;
         let (mut world, mut names, mut slots) =
             (self.base.fork(), BTreeSet::new(), Vec::with_capacity(snapshot.entries.len()));
         let mut viewers = 0;
         for entry in &snapshot.entries {
             if !names.insert(entry.name) {
-                return Err(Fault::Malformed("a name twice"));
+                return Err(MessageError::Malformed("a name twice"));
             }
             viewers += usize::from(entry.kind == EntryKind::Viewer);
         }
         if viewers != 1 || snapshot.entries.last().is_none_or(|e| e.kind != EntryKind::Viewer || e.name != VIEWER_NAME)
         {
-            return Err(Fault::Malformed("a list that does not end with its one viewer"));
+            return Err(MessageError::Malformed("a list that does not end with its one viewer"));
         }
         for &id in self.base.ids() {
             let absent = self
@@ -107,33 +107,34 @@ impl Mirror {
         for entry in &snapshot.entries {
             slots.push(self.slot(&mut world, entry)?);
         }
-        self.moving = slots.iter().filter(|slot| !slot.still).count();
+        self.moving = slots.iter().filter(|slot| !slot.stationary).count();
         (self.world, self.slots, self.revision) = (world, slots, Some(snapshot.revision));
         self.hash_table();
         Ok(())
     }
 
     /// Makes sure of one object of a list, and puts a still one where it stands.
-    fn slot(&self, world: &mut World, entry: &Entry<'_>) -> Result<Slot, Fault> {
-        let unfit = |why: &str| Fault::Unfit(format!("'{}' {why}", entry.name));
-        let (still, parts) = (entry.still, entry.parts);
+    fn slot(&self, world: &mut World, entry: &Entry<'_>) -> Result<MirroredObject, MessageError> {
+        let unfit = |why: &str| MessageError::Unfit(format!("'{}' {why}", entry.name));
+        let (stationary, parts) = (entry.stationary, entry.parts);
         if entry.kind == EntryKind::Viewer {
-            return Ok(Slot { id: None, kind: entry.kind, still, parts });
+            return Ok(MirroredObject { id: None, kind: entry.kind, stationary, parts });
         }
-        let still_bytes = if still { poses_bytes(parts) } else { 0 };
-        let (poses, looks) = entry.body.split_at_checked(still_bytes).ok_or(Fault::Malformed("it ends too early"))?;
+        let still_bytes = if stationary { poses_bytes(parts) } else { 0 };
+        let (poses, looks) =
+            entry.body.split_at_checked(still_bytes).ok_or(MessageError::Malformed("it ends too early"))?;
         let id = match (entry.described, world.find(entry.name)) {
             (false, Some(id)) => id,
             (false, None) => return Err(unfit("is not in this scene")),
             (true, old) => {
-                let visuals = get_looks(looks, parts as usize, &self.base)?;
+                let visuals = get_visuals(looks, parts as usize, &self.base)?;
                 let _ = old.map(|id| world.remove(id));
-                let puppet = Puppet { name: entry.name.to_owned(), parts: parts as usize, visuals };
-                world.add_boxed(Box::new(puppet), Mode::Static).map_err(|why| unfit(&why.to_string()))?
+                let render_proxy = RenderProxy { name: entry.name.to_owned(), parts: parts as usize, visuals };
+                world.add_boxed(Box::new(render_proxy), Mode::Static).map_err(|why| unfit(&why.to_string()))?
             }
         };
         if !entry.described && !looks.is_empty() {
-            return Err(Fault::Malformed("it goes on after its end"));
+            return Err(MessageError::Malformed("it goes on after its end"));
         }
         if entry.kind == EntryKind::Exact && world.object(id).is_none_or(|o| o.net_sync().is_none()) {
             return Err(unfit("takes no messages"));
@@ -143,44 +144,44 @@ impl Mirror {
             return Err(unfit(&format!("has {here} parts here and {parts} on the server")));
         }
         let _ = world.set_enabled(id, entry.enabled);
-        if still {
+        if stationary {
             let mut stand = Vec::new();
             read_poses(poses, parts, &mut stand)?;
             world.set_displayed_poses(id, &stand).map_err(|why| unfit(&why.to_string()))?;
         }
-        Ok(Slot { id: Some(id), kind: entry.kind, still, parts })
+        Ok(MirroredObject { id: Some(id), kind: entry.kind, stationary, parts })
     }
 
     /// The revision that a state's payload is for.
     ///
     /// # Errors
-    /// [`Fault::Malformed`].
-    pub fn revision_of(payload: &[u8]) -> Result<u32, Fault> {
+    /// [`MessageError::Malformed`].
+    pub fn revision_of(payload: &[u8]) -> Result<u32, MessageError> {
         parse_state(payload).map(|(revision, ..)| revision)
     }
 
     /// Applies a frame's payload.
     ///
     /// # Errors
-    /// [`Fault::Malformed`], [`Fault::Unfit`]; nothing has changed then.
-    pub fn apply_state(&mut self, frame: u64, time_s: f64, payload: &[u8]) -> Result<(), Fault> {
+    /// [`MessageError::Malformed`], [`MessageError::Unfit`]; nothing has changed then.
+    pub fn apply_state(&mut self, frame: u64, time_s: f64, payload: &[u8]) -> Result<(), MessageError> {
         let (revision, count, mut records) = parse_state(payload)?;
         if Some(revision) != self.revision {
-            return Err(Fault::Unfit(format!("list of objects {revision}; here is {:?}", self.revision)));
+            return Err(MessageError::Unfit(format!("list of objects {revision}; here is {:?}", self.revision)));
         }
         if count as usize != self.moving {
-            return Err(Fault::Malformed("not as many objects as move"));
+            return Err(MessageError::Malformed("not as many objects as move"));
         }
-        let (mut viewer, mut told) = (None, Vec::new());
+        let (mut viewer, mut messages) = (None, Vec::new());
         let (mut poses, mut shown) = (std::mem::take(&mut self.poses), Vec::with_capacity(self.moving));
         poses.clear();
-        for (wanted, slot) in self.slots.iter().enumerate().filter(|(_, slot)| !slot.still) {
-            let (index, body) = records.next().ok_or(Fault::Malformed("it ends too early"))??;
+        for (wanted, slot) in self.slots.iter().enumerate().filter(|(_, slot)| !slot.stationary) {
+            let (index, body) = records.next().ok_or(MessageError::Malformed("it ends too early"))??;
             match (slot.id, slot.kind) {
-                _ if index != wanted => return Err(Fault::Malformed("objects out of order")),
+                _ if index != wanted => return Err(MessageError::Malformed("objects out of order")),
                 (None, _) => viewer = Some(Viewer::read(body)?),
                 (Some(id), _) if body.is_empty() => shown.push((id, 0..0)),
-                (Some(id), EntryKind::Exact) => told.push((id, body)),
+                (Some(id), EntryKind::Exact) => messages.push((id, body)),
                 (Some(id), _) => {
                     let start = poses.len();
                     read_poses(body, slot.parts, &mut poses)?;
@@ -189,8 +190,8 @@ impl Mirror {
             }
         }
         records.next().map_or(Ok(()), |more| more.map(drop))?; // what follows the last
-        let viewer = viewer.ok_or(Fault::Malformed("no viewer"))?;
-        self.tell(&told)?;
+        let viewer = viewer.ok_or(MessageError::Malformed("no viewer"))?;
+        self.apply_messages(&messages)?;
         for (id, range) in shown {
             let enabled = !range.is_empty();
             if self.world.status(id).is_some_and(|s| s.enabled != enabled) {
@@ -206,18 +207,18 @@ impl Mirror {
     }
 
     /// Hands the objects their messages: all of them, or none.
-    fn tell(&mut self, told: &[(ObjectId, &[u8])]) -> Result<(), Fault> {
+    fn apply_messages(&mut self, messages: &[(ObjectId, &[u8])]) -> Result<(), MessageError> {
         let before: Vec<Vec<f64>> =
-            told.iter().map(|(id, _)| self.world.state_of(*id).unwrap_or_default().to_vec()).collect();
-        for (done, (id, data)) in told.iter().enumerate() {
+            messages.iter().map(|(id, _)| self.world.state_of(*id).unwrap_or_default().to_vec()).collect();
+        for (done, (id, data)) in messages.iter().enumerate() {
             if let Err(why) = self.world.read_data(*id, data) {
-                for ((id, _), x) in told[..done].iter().zip(&before) {
+                for ((id, _), x) in messages[..done].iter().zip(&before) {
                     let _ = self.world.write_state_of(*id, x); // it held these numbers before
                 }
-                return Err(Fault::Unfit(why.to_string()));
+                return Err(MessageError::Unfit(why.to_string()));
             }
         }
-        for (id, _) in told {
+        for (id, _) in messages {
             let _ = self.world.set_enabled(*id, true);
         }
         Ok(())
@@ -225,26 +226,26 @@ impl Mirror {
 
     /// The hash of what [`world`](Self::world) shows now, read from the world itself.
     pub fn hash(&mut self) -> Hash {
-        let mut drawn = std::mem::take(&mut self.scratch).frame(self.frame, self.world.time(), self.table);
-        for slot in self.slots.iter().filter(|slot| !slot.still) {
+        let mut hasher = std::mem::take(&mut self.scratch).frame(self.frame, self.world.time(), self.table);
+        for slot in self.slots.iter().filter(|slot| !slot.stationary) {
             let Some(id) = slot.id else {
-                drawn.bytes(|out| self.viewer.write(out));
+                hasher.bytes(|out| self.viewer.write(out));
                 continue;
             };
             let enabled = self.world.status(id).is_some_and(|s| s.enabled);
-            drawn.enabled(enabled);
+            hasher.enabled(enabled);
             if enabled {
-                self.see(id, slot, &mut drawn);
+                self.hash_object(id, slot, &mut hasher);
             }
         }
-        let (hash, scratch) = drawn.hash();
+        let (hash, scratch) = hasher.hash();
         self.scratch = scratch;
         hash
     }
 
-    fn see(&self, id: ObjectId, slot: &Slot, drawn: &mut Drawn) {
+    fn hash_object(&self, id: ObjectId, slot: &MirroredObject, hasher: &mut FrameHasher) {
         if slot.kind == EntryKind::Exact {
-            drawn.bytes(|out| {
+            hasher.bytes(|out| {
                 self.world.get_data(id, out);
             });
             return;
@@ -255,20 +256,20 @@ impl Mirror {
             .state_range(id)
             .and_then(|span| self.world.part_states().get(span.parts.clone()))
             .unwrap_or_default();
-        part_states.iter().for_each(|part_state| drawn.pose(&part_state.pose));
+        part_states.iter().for_each(|part_state| hasher.pose(&part_state.pose));
     }
 
     fn hash_table(&mut self) {
-        let mut drawn = std::mem::take(&mut self.scratch).table();
+        let mut hasher = std::mem::take(&mut self.scratch).table();
         for slot in &self.slots {
             let Some(id) = slot.id else { continue };
-            drawn.name(self.world.object(id).map_or("", |o| o.name()));
-            drawn.enabled(slot.still && self.world.status(id).is_some_and(|s| s.enabled));
-            if slot.still {
-                self.see(id, slot, &mut drawn);
+            hasher.name(self.world.object(id).map_or("", |o| o.name()));
+            hasher.enabled(slot.stationary && self.world.status(id).is_some_and(|s| s.enabled));
+            if slot.stationary {
+                self.hash_object(id, slot, &mut hasher);
             }
         }
-        (self.table, self.scratch) = drawn.hash();
+        (self.table, self.scratch) = hasher.hash();
     }
 }
 
@@ -277,10 +278,10 @@ fn has_parts(world: &World, id: ObjectId) -> bool {
 }
 
 /// Appends as many poses as there are parts.
-fn read_poses(body: &[u8], parts: u16, out: &mut Vec<Pose>) -> Result<(), Fault> {
+fn read_poses(body: &[u8], parts: u16, out: &mut Vec<Pose>) -> Result<(), MessageError> {
     let (poses, rest) = body.as_chunks();
     if poses.len() != parts as usize || !rest.is_empty() {
-        return Err(Fault::Malformed("not as many poses as parts"));
+        return Err(MessageError::Malformed("not as many poses as parts"));
     }
     for pose in poses {
         out.push(get_pose(pose)?);

@@ -6,7 +6,7 @@
 //! ```
 //! use std::time::Duration;
 //! use tumble_core::{RigidBody, Settings, World, collide::{Pose, Shape}};
-//! use tumble_net::sync::{Facet, FacetOptions, Hub, Seat, Server, ServerOptions, Task, Viewer};
+//! use tumble_net::sync::{Facet, FacetOptions, FacetSlot, LocalTransport, Server, ServerOptions, Task, Viewer};
 //!
 //! fn scene() -> World {
 //!     let mut world = World::new(Settings::default()).unwrap();
@@ -15,8 +15,8 @@
 //!     world
 //! }
 //!
-//! let (hub, scene_hash) = (Hub::new(1), [7; 32]);
-//! let link = hub.facet(0).unwrap();
+//! let (transport, scene_hash) = (LocalTransport::new(1), [7; 32]);
+//! let link = transport.facet(0).unwrap();
 //! let facet = std::thread::spawn(move || {
 //!     let mut facet = Facet::new(link, FacetOptions::new("front", scene_hash, 1), scene());
 //!     loop {
@@ -29,14 +29,14 @@
 //!                 }
 //!             }
 //!             Task::Present(_) => facet.presented().unwrap(), // swap the buffers first
-//!             Task::Over(_) => return facet.session().counts().shown,
+//!             Task::Ended(_) => return facet.session().counts().shown,
 //!         }
 //!     }
 //! });
 //!
 //! let mut world = scene();
-//! let seats = vec![Seat { name: "front".into(), critical: true }];
-//! let mut server = Server::new(hub.server(), ServerOptions::new(1, scene_hash, seats), &world);
+//! let slots = vec![FacetSlot { name: "front".into(), critical: true }];
+//! let mut server = Server::new(transport.server(), ServerOptions::new(1, scene_hash, slots), &world);
 //! server.wait_for_facets(Duration::from_secs(10)).unwrap();
 //! for _ in 0..10 {
 //!     world.step().unwrap();
@@ -48,40 +48,60 @@
 //!
 //! # Messages
 //!
-//! [`wire`] has the frame around all of them, [`table`] the snapshot and the state, [`messages`] and [`input`] the small ones, [`quantise`] the poses with
+//! [`wire`] has the frame around all of them, [`table`] the snapshot and the state, [`messages`] and [`input`] the small ones, [`quantize`] the poses with
 //! their stated error. `docs/netsync.md` tells the whole.
 
-pub mod awake;
-mod drawn;
-mod drive;
-pub mod facet;
-pub mod input;
-pub mod local;
-mod looks;
-pub mod messages;
-pub mod mirror;
-pub mod publisher;
-mod puppet;
-pub mod quantise;
-pub mod recording;
+pub mod cpu_latency;
+mod driver;
+mod facet;
+mod frame_hash;
+mod input;
+mod local;
+mod mirror;
+mod publisher;
+mod recording;
+mod render_proxy;
 mod scene_hash;
-pub mod server;
+mod server;
 pub mod shm;
-pub mod simulate;
-pub mod table;
 pub mod transport;
 pub mod udp;
 mod viewer;
-pub mod wire;
+mod visuals;
 
-pub use drive::{Facet, Server, SessionError};
-pub use facet::{FacetOptions, FacetSession, Over, Task, Waiting};
+// Message formats and the simulated network: public for fuzz targets and tests alone.
+#[cfg(feature = "fuzzing")]
+pub mod messages;
+#[cfg(not(feature = "fuzzing"))]
+mod messages;
+#[cfg(feature = "fuzzing")]
+pub mod quantize;
+#[cfg(not(feature = "fuzzing"))]
+mod quantize;
+#[cfg(feature = "fuzzing")]
+pub mod simulated_network;
+#[cfg(feature = "fuzzing")]
+pub mod table;
+#[cfg(not(feature = "fuzzing"))]
+mod table;
+#[cfg(feature = "fuzzing")]
+pub mod wire;
+#[cfg(not(feature = "fuzzing"))]
+mod wire;
+
+pub use driver::{Facet, Server, SessionError};
+pub use facet::{EndReason, FacetOptions, FacetSession, Task, WaitReason};
 pub use input::{Input, MAX_KEYS};
-pub use local::Hub;
-pub use messages::FacetCounts;
+pub use local::{LocalFacet, LocalServer, LocalTransport};
+pub use messages::{FacetCounts, FrameAck};
 pub use mirror::Mirror;
-pub use publisher::{PublishError, Publisher};
-pub use recording::{Recorded, Replay, ReplayError, ReplayFrame, SessionRecorder};
+pub use publisher::{PublishError, Published, Publisher};
+#[cfg(feature = "fuzzing")]
+pub use recording::parse_frame;
+pub use recording::{FrameRecord, RecordedFrame, SessionReadError, SessionReader, SessionRecorder};
 pub use scene_hash::scene_hash;
-pub use server::{FrameTimes, Pace, Seat, SeatCounts, ServerEvent, ServerOptions, ServerSession, Standing};
+pub use server::{
+    FacetSlot, FrameTimes, Membership, ServerEvent, ServerOptions, ServerSession, SlotCounts, SyncMode, ToFacets,
+};
 pub use viewer::{User, VIEWER_NAME, Viewer};
+pub use wire::{Hash, MessageError};

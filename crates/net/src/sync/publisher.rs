@@ -1,11 +1,11 @@
 //! The server's side of the frame: a world to payloads, and the hash that a client which drew them must answer.
 
-use super::drawn::Drawn;
-use super::looks::put_looks;
-use super::quantise::{get_pose, put_pose};
+use super::frame_hash::FrameHasher;
+use super::quantize::{get_pose, put_pose};
 use super::table::{Entry, EntryKind, MAX_OBJECTS, put_record, put_snapshot_head, put_state_head};
 use super::transport::MAX_MESSAGE_BYTES;
 use super::viewer::{VIEWER_NAME, Viewer};
+use super::visuals::put_visuals;
 use super::wire::{HEADER_BYTES, Hash};
 use std::sync::Arc;
 use tumble_collide::Pose;
@@ -23,14 +23,14 @@ pub enum PublishError {
         part: usize,
     },
     /// Too many objects, or one with too many parts.
-    #[error("{what}: {is}, at most {most} can be sent")]
-    TooMuch {
+    #[error("{what}: {count}, at most {max} can be sent")]
+    LimitExceeded {
         /// Of what.
         what: String,
         /// How many.
-        is: usize,
+        count: usize,
         /// Allowed.
-        most: usize,
+        max: usize,
     },
     /// A name that the protocol needs.
     #[error("an object is named '{VIEWER_NAME}', which is the viewer's name; rename it")]
@@ -50,13 +50,13 @@ pub struct Published {
     pub saturated: u32,
 }
 
-struct Row {
+struct TableRow {
     id: ObjectId,
     kind: EntryKind,
     /// Whether its mode is static.
     fixed: bool,
     /// Fixed, and sent as poses: in the list and in no state.
-    still: bool,
+    stationary: bool,
     /// Whether it is alive, of a still one.
     enabled: bool,
     parts: usize,
@@ -70,11 +70,11 @@ pub struct Publisher {
     base: World,
     /// Objects of the world that was listed.
     ids: Vec<ObjectId>,
-    rows: Vec<Row>,
+    rows: Vec<TableRow>,
     revision: u32,
     snapshot: Arc<Vec<u8>>,
     table: Hash,
-    scratch: Drawn,
+    scratch: FrameHasher,
 }
 
 impl Publisher {
@@ -88,7 +88,7 @@ impl Publisher {
             revision,
             snapshot: Arc::default(),
             table: [0; 16],
-            scratch: Drawn::default(),
+            scratch: FrameHasher::default(),
         }
     }
 
@@ -102,48 +102,49 @@ impl Publisher {
     /// # Errors
     /// [`PublishError`]; the list of objects is then made anew by the next call.
     pub fn publish(&mut self, world: &World, viewer: &Viewer, frame: u64) -> Result<Published, PublishError> {
-        let fresh = self.snapshot.is_empty() || !self.still_fits(world);
+        let fresh = self.snapshot.is_empty() || !self.is_current(world);
         if fresh {
             self.snapshot = Arc::default();
-            self.relist(world)?;
+            self.rebuild_table(world)?;
         }
-        let mut drawn = std::mem::take(&mut self.scratch).frame(frame, world.time(), self.table);
-        let moving = self.rows.iter().filter(|row| !row.still).count() + 1;
+        let mut hasher = std::mem::take(&mut self.scratch).frame(frame, world.time(), self.table);
+        let moving = self.rows.iter().filter(|row| !row.stationary).count() + 1;
         let mut state = Vec::with_capacity(1024 + 28 * self.rows.iter().map(|row| row.parts.max(1)).sum::<usize>());
         put_state_head(&mut state, self.revision, moving);
         let mut saturated = 0;
-        for (index, row) in self.rows.iter().enumerate().filter(|(_, row)| !row.still) {
+        for (index, row) in self.rows.iter().enumerate().filter(|(_, row)| !row.stationary) {
             let enabled = world.status(row.id).is_some_and(|s| s.enabled);
-            drawn.enabled(enabled);
+            hasher.enabled(enabled);
             let mut fine = Ok(());
             put_record(&mut state, index, |out| {
                 if enabled {
-                    fine = put_row(out, row, world, &mut drawn, &mut saturated);
+                    fine = put_row(out, row, world, &mut hasher, &mut saturated);
                 }
             });
             fine?;
         }
-        drawn.bytes(|out| viewer.write(out));
+        hasher.bytes(|out| viewer.write(out));
         put_record(&mut state, self.rows.len(), |out| viewer.write(out));
-        let (hash, scratch) = drawn.hash();
+        let (hash, scratch) = hasher.hash();
         self.scratch = scratch;
-        fits("bytes of a frame", state.len() + HEADER_BYTES, MAX_MESSAGE_BYTES)?;
+        check_limit("bytes of a frame", state.len() + HEADER_BYTES, MAX_MESSAGE_BYTES)?;
         Ok(Published { state, hash, fresh, saturated })
     }
 
     /// Whether the list is still that of the world: the same objects, and what stood still stands where it stood.
-    fn still_fits(&self, world: &World) -> bool {
-        let same = |row: &Row| {
+    fn is_current(&self, world: &World) -> bool {
+        let same = |row: &TableRow| {
             let Some(status) = world.status(row.id) else { return false };
             let fixed = status.mode == Mode::Static;
             fixed == row.fixed
-                && (!row.still || status.enabled == row.enabled && poses(world, row.id).eq(row.poses.iter().copied()))
+                && (!row.stationary
+                    || status.enabled == row.enabled && poses(world, row.id).eq(row.poses.iter().copied()))
         };
         world.ids() == self.ids && self.rows.iter().all(same)
     }
 
     /// What of an object travels: kind, whether it is still, whether it is alive, parts. `None`: nothing.
-    fn class(&self, world: &World, id: ObjectId) -> Option<(EntryKind, bool, bool, usize)> {
+    fn classify(&self, world: &World, id: ObjectId) -> Option<(EntryKind, bool, bool, usize)> {
         let (object, status) = (world.object(id)?, world.status(id)?);
         let parts = world.view().state_range(id)?.parts.len();
         let known = self.base.object(id).is_some();
@@ -156,42 +157,42 @@ impl Publisher {
     }
 
     /// Lists the objects anew and writes the snapshot.
-    fn relist(&mut self, world: &World) -> Result<(), PublishError> {
+    fn rebuild_table(&mut self, world: &World) -> Result<(), PublishError> {
         self.revision = self.revision.wrapping_add(1);
         self.rows.clear();
         for &id in world.ids() {
-            if let Some((kind, still, enabled, parts)) = self.class(world, id) {
-                let poses = if still { poses(world, id).collect() } else { Vec::new() };
+            if let Some((kind, stationary, enabled, parts)) = self.classify(world, id) {
+                let poses = if stationary { poses(world, id).collect() } else { Vec::new() };
                 let fixed = world.status(id).is_some_and(|s| s.mode == Mode::Static);
-                self.rows.push(Row { id, kind, fixed, still, enabled, parts, poses });
+                self.rows.push(TableRow { id, kind, fixed, stationary, enabled, parts, poses });
             }
         }
         self.ids = world.ids().to_vec();
-        fits("objects", self.rows.len() + 1, MAX_OBJECTS)?;
+        check_limit("objects", self.rows.len() + 1, MAX_OBJECTS)?;
         let mut out = Vec::new();
         put_snapshot_head(&mut out, self.revision, self.exact, self.rows.len() + 1);
-        let (mut drawn, mut body) = (std::mem::take(&mut self.scratch).table(), Vec::new());
+        let (mut hasher, mut body) = (std::mem::take(&mut self.scratch).table(), Vec::new());
         for row in &self.rows {
             let Some(object) = world.object(row.id) else { continue };
             let (name, described) = (object.name(), self.base.object(row.id).is_none());
             if name == VIEWER_NAME {
                 return Err(PublishError::Name);
             }
-            fits(&format!("parts of '{name}'"), row.parts, u16::MAX as usize)?;
-            drawn.name(name);
-            drawn.enabled(row.still && row.enabled);
+            check_limit(&format!("parts of '{name}'"), row.parts, u16::MAX as usize)?;
+            hasher.name(name);
+            hasher.enabled(row.stationary && row.enabled);
             body.clear();
-            if row.still {
-                put_row(&mut body, row, world, &mut drawn, &mut 0)?;
+            if row.stationary {
+                put_row(&mut body, row, world, &mut hasher, &mut 0)?;
             }
             if described {
-                put_looks(&mut body, object.renderable().map_or(&[], |r| r.visuals()), &self.base);
+                put_visuals(&mut body, object.renderable().map_or(&[], |r| r.visuals()), &self.base);
             }
             let entry = Entry {
                 name,
                 kind: row.kind,
                 enabled: row.enabled,
-                still: row.still,
+                stationary: row.stationary,
                 described,
                 parts: row.parts as u16,
                 body: &body,
@@ -202,14 +203,14 @@ impl Publisher {
             name: VIEWER_NAME,
             kind: EntryKind::Viewer,
             enabled: true,
-            still: false,
+            stationary: false,
             described: false,
             parts: 0,
             body: &[],
         };
         viewer.write(&mut out);
-        fits("bytes of a snapshot", out.len() + HEADER_BYTES, MAX_MESSAGE_BYTES)?;
-        (self.table, self.scratch) = drawn.hash();
+        check_limit("bytes of a snapshot", out.len() + HEADER_BYTES, MAX_MESSAGE_BYTES)?;
+        (self.table, self.scratch) = hasher.hash();
         self.snapshot = Arc::new(out);
         Ok(())
     }
@@ -218,15 +219,15 @@ impl Publisher {
 /// One object's body, and what of it will be seen.
 fn put_row(
     out: &mut Vec<u8>,
-    row: &Row,
+    row: &TableRow,
     world: &World,
-    drawn: &mut Drawn,
+    hasher: &mut FrameHasher,
     saturated: &mut u32,
 ) -> Result<(), PublishError> {
     let start = out.len();
     if row.kind == EntryKind::Exact {
         world.get_data(row.id, out);
-        drawn.bytes(|seen| seen.extend(&out[start..]));
+        hasher.bytes(|seen| seen.extend(&out[start..]));
         return Ok(());
     }
     for (part, pose) in poses(world, row.id).enumerate() {
@@ -237,7 +238,7 @@ fn put_row(
         }
         *saturated += u32::from(!put_pose(out, &pose));
         if let Some(Ok(sent)) = out.last_chunk().map(get_pose) {
-            drawn.pose(&sent);
+            hasher.pose(&sent);
         }
     }
     Ok(())
@@ -249,6 +250,6 @@ fn poses(world: &World, id: ObjectId) -> impl Iterator<Item = Pose> + '_ {
     part_states.iter().map(|part_state| part_state.pose)
 }
 
-fn fits(what: &str, is: usize, most: usize) -> Result<(), PublishError> {
-    if is <= most { Ok(()) } else { Err(PublishError::TooMuch { what: what.to_owned(), is, most }) }
+fn check_limit(what: &str, count: usize, max: usize) -> Result<(), PublishError> {
+    if count <= max { Ok(()) } else { Err(PublishError::LimitExceeded { what: what.to_owned(), count, max }) }
 }

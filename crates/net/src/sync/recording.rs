@@ -13,10 +13,10 @@
 //! | PRESENTED | facet | what facets answered since then, each with its frame in the header |
 
 use super::input::Input;
-use super::messages::{Done, Join};
+use super::messages::{FrameAck, Join};
 use super::server::ServerEvent;
 use super::transport::{FacetNumber, MAX_MESSAGE_BYTES};
-use super::wire::{Bytes, Fault, HEADER_BYTES, Hash, Header, Kind, message, open};
+use super::wire::{ByteReader, HEADER_BYTES, Hash, MessageError, MessageHeader, MessageKind, message, open};
 use crate::record::{MAX_STATE_BYTES, Pose, Reader, RecordError, Recorder, RecorderOptions, Summary, read};
 use crate::world::{entities, names, poses};
 use std::path::Path;
@@ -25,7 +25,7 @@ use tumble_core::World;
 
 /// A frame as it was published.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Recorded {
+pub struct FrameRecord {
     /// Its number.
     pub frame: u64,
     /// Simulated time, s.
@@ -86,7 +86,7 @@ impl SessionRecorder {
     ///
     /// # Errors
     /// As [`Recorder::frame`].
-    pub fn frame(&mut self, world: &World, recorded: Recorded) -> Result<(), RecordError> {
+    pub fn frame(&mut self, world: &World, recorded: FrameRecord) -> Result<(), RecordError> {
         let first = self.count == 0;
         self.list = recorded.snapshot.or(self.list.take());
         self.count += 1;
@@ -99,18 +99,18 @@ impl SessionRecorder {
             self.recorder.set_entities(recorded.time_s, &entities(world))?;
             self.names = names;
         }
-        let head = |kind| Header { kind, run: 0, join: 0, frame: recorded.frame, time_s: recorded.time_s };
+        let head = |kind| MessageHeader { kind, run: 0, join: 0, frame: recorded.frame, time_s: recorded.time_s };
         let mut out = Vec::new();
         if first {
             let join = Join { scene: self.scene, name: "server".into(), exact: false };
-            out.extend(message(&head(Kind::Join), |out| join.write(out)));
+            out.extend(message(&head(MessageKind::Join), |out| join.write(out)));
         }
         if let Some(list) = self.list.take() {
-            out.extend(message(&head(Kind::Snapshot), |out| out.extend(list.iter())));
+            out.extend(message(&head(MessageKind::Snapshot), |out| out.extend(list.iter())));
         }
-        out.extend(message(&head(Kind::State), |out| out.extend(&recorded.state)));
-        let done = Done { hash: recorded.hash, ..Done::default() };
-        out.extend(message(&head(Kind::Ready), |out| done.write(out)));
+        out.extend(message(&head(MessageKind::State), |out| out.extend(&recorded.state)));
+        let done = FrameAck { hash: recorded.hash, ..FrameAck::default() };
+        out.extend(message(&head(MessageKind::Ready), |out| done.write(out)));
         self.waiting = Some((recorded.frame, recorded.time_s, poses(world), out));
         Ok(())
     }
@@ -118,12 +118,19 @@ impl SessionRecorder {
     /// Records what happened: inputs and answers.
     pub fn events(&mut self, events: &[ServerEvent]) {
         for event in events {
-            let head =
-                |kind, facet: FacetNumber, frame| Header { kind, run: 0, join: facet as u64, frame, time_s: 0.0 };
+            let head = |kind, facet: FacetNumber, frame| MessageHeader {
+                kind,
+                run: 0,
+                join: facet as u64,
+                frame,
+                time_s: 0.0,
+            };
             let note = match event {
-                ServerEvent::Input(facet, input) => message(&head(Kind::Input, *facet, 0), |out| input.write(out)),
+                ServerEvent::Input(facet, input) => {
+                    message(&head(MessageKind::Input, *facet, 0), |out| input.write(out))
+                }
                 ServerEvent::Presented(facet, frame, done, _) => {
-                    message(&head(Kind::Presented, *facet, *frame), |out| done.write(out))
+                    message(&head(MessageKind::Presented, *facet, *frame), |out| done.write(out))
                 }
                 _ => continue,
             };
@@ -151,18 +158,18 @@ impl SessionRecorder {
 
 /// One frame of a recorded session.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ReplayFrame {
+pub struct RecordedFrame {
     /// What was published.
-    pub recorded: Recorded,
+    pub recorded: FrameRecord,
     /// What users did.
     pub inputs: Vec<(FacetNumber, Input)>,
     /// What facets answered, each with its frame.
-    pub presented: Vec<(FacetNumber, u64, Done)>,
+    pub presented: Vec<(FacetNumber, u64, FrameAck)>,
 }
 
 /// Why a recording is not replayed.
 #[derive(Debug, thiserror::Error)]
-pub enum ReplayError {
+pub enum SessionReadError {
     /// The file.
     #[error(transparent)]
     Record(#[from] RecordError),
@@ -170,7 +177,7 @@ pub enum ReplayError {
     #[error(
         "frame {0} of the recording is no frame of a session ({1}); record one with `[recording]` in the cave file"
     )]
-    Frame(u64, Fault),
+    Frame(u64, MessageError),
     /// Of another scene.
     #[error("the recording is of a scene with the hash {theirs}; this scene has {ours}")]
     Scene {
@@ -182,19 +189,19 @@ pub enum ReplayError {
 }
 
 /// Reads a session back, frame by frame.
-pub struct Replay {
+pub struct SessionReader {
     reader: Reader,
-    ahead: Option<ReplayFrame>,
+    ahead: Option<RecordedFrame>,
     scene: [u8; 32],
 }
 
-impl Replay {
+impl SessionReader {
     /// Opens a recording, complete or cut.
     ///
     /// # Errors
-    /// [`ReplayError`]: no recording, or not of a session.
-    pub fn open(path: impl AsRef<Path>) -> Result<Replay, ReplayError> {
-        let mut replay = Replay { reader: read(path)?, ahead: None, scene: [0; 32] };
+    /// [`SessionReadError`]: no recording, or not of a session.
+    pub fn open(path: impl AsRef<Path>) -> Result<SessionReader, SessionReadError> {
+        let mut replay = SessionReader { reader: read(path)?, ahead: None, scene: [0; 32] };
         replay.ahead = replay.read_frame()?;
         Ok(replay)
     }
@@ -207,26 +214,31 @@ impl Replay {
     /// Refuses another scene, with both hashes.
     ///
     /// # Errors
-    /// [`ReplayError::Scene`].
-    pub fn check_scene(&self, ours: [u8; 32]) -> Result<(), ReplayError> {
+    /// [`SessionReadError::Scene`].
+    pub fn check_scene(&self, ours: [u8; 32]) -> Result<(), SessionReadError> {
         let hex = super::server::hex;
-        if self.scene == ours { Ok(()) } else { Err(ReplayError::Scene { theirs: hex(&self.scene), ours: hex(&ours) }) }
+        if self.scene == ours {
+            Ok(())
+        } else {
+            Err(SessionReadError::Scene { theirs: hex(&self.scene), ours: hex(&ours) })
+        }
     }
 
     /// The next frame; `None` at the end.
     ///
     /// # Errors
-    /// [`ReplayError`].
-    pub fn next_frame(&mut self) -> Result<Option<ReplayFrame>, ReplayError> {
+    /// [`SessionReadError`].
+    pub fn next_frame(&mut self) -> Result<Option<RecordedFrame>, SessionReadError> {
         match self.ahead.take() {
             Some(frame) => Ok(Some(frame)),
             None => self.read_frame(),
         }
     }
 
-    fn read_frame(&mut self) -> Result<Option<ReplayFrame>, ReplayError> {
+    fn read_frame(&mut self) -> Result<Option<RecordedFrame>, SessionReadError> {
         let Some(frame) = self.reader.next_frame()? else { return Ok(None) };
-        let (replayed, scene) = take_apart(&frame.state).map_err(|fault| ReplayError::Frame(frame.frame, fault))?;
+        let (replayed, scene) =
+            parse_frame(&frame.state).map_err(|fault| SessionReadError::Frame(frame.frame, fault))?;
         self.scene = scene.unwrap_or(self.scene);
         Ok(Some(replayed))
     }
@@ -235,34 +247,35 @@ impl Replay {
 /// A frame's messages, and the scene's hash if it is among them.
 ///
 /// # Errors
-/// [`Fault`].
-pub fn take_apart(mut bytes: &[u8]) -> Result<(ReplayFrame, Option<[u8; 32]>), Fault> {
+/// [`MessageError`].
+pub fn parse_frame(mut bytes: &[u8]) -> Result<(RecordedFrame, Option<[u8; 32]>), MessageError> {
     let (mut state, mut hash, mut snapshot, mut scene) = (None, None, None, None);
     let (mut inputs, mut presented) = (Vec::new(), Vec::new());
     while !bytes.is_empty() {
         let (header, payload, rest) = next_message(bytes)?;
-        let facet = u16::try_from(header.join).map_err(|_| Fault::Malformed("a facet that there is not"))?;
+        let facet = u16::try_from(header.join).map_err(|_| MessageError::Malformed("a facet that there is not"))?;
         match header.kind {
-            Kind::Join => scene = Some(Join::read(payload)?.scene),
-            Kind::Snapshot => snapshot = Some(Arc::new(payload.to_vec())),
-            Kind::State => state = Some((header.frame, header.time_s, payload.to_vec())),
-            Kind::Ready => hash = Some(Done::read(payload)?.hash),
-            Kind::Input => inputs.push((facet, Input::read(payload)?)),
-            Kind::Presented => presented.push((facet, header.frame, Done::read(payload)?)),
-            _ => return Err(Fault::Malformed("a kind that recordings have not")),
+            MessageKind::Join => scene = Some(Join::read(payload)?.scene),
+            MessageKind::Snapshot => snapshot = Some(Arc::new(payload.to_vec())),
+            MessageKind::State => state = Some((header.frame, header.time_s, payload.to_vec())),
+            MessageKind::Ready => hash = Some(FrameAck::read(payload)?.hash),
+            MessageKind::Input => inputs.push((facet, Input::read(payload)?)),
+            MessageKind::Presented => presented.push((facet, header.frame, FrameAck::read(payload)?)),
+            _ => return Err(MessageError::Malformed("a kind that recordings have not")),
         }
         bytes = rest;
     }
-    let ((frame, time_s, state), hash) = state.zip(hash).ok_or(Fault::Malformed("no STATE, or no hash of it"))?;
-    Ok((ReplayFrame { recorded: Recorded { frame, time_s, snapshot, state, hash }, inputs, presented }, scene))
+    let ((frame, time_s, state), hash) =
+        state.zip(hash).ok_or(MessageError::Malformed("no STATE, or no hash of it"))?;
+    Ok((RecordedFrame { recorded: FrameRecord { frame, time_s, snapshot, state, hash }, inputs, presented }, scene))
 }
 
 /// The message at the front, and what follows.
-fn next_message(bytes: &[u8]) -> Result<(Header, &[u8], &[u8]), Fault> {
-    let size = Bytes(bytes.get(64..).unwrap_or_default()).u64()?;
+fn next_message(bytes: &[u8]) -> Result<(MessageHeader, &[u8], &[u8]), MessageError> {
+    let size = ByteReader(bytes.get(64..).unwrap_or_default()).u64()?;
     if size < HEADER_BYTES as u64 || size > MAX_MESSAGE_BYTES as u64 {
-        return Err(Fault::Malformed("a message with a size that cannot be"));
+        return Err(MessageError::Malformed("a message with a size that cannot be"));
     }
-    let (first, rest) = bytes.split_at_checked(size as usize).ok_or(Fault::Malformed("it ends too early"))?;
+    let (first, rest) = bytes.split_at_checked(size as usize).ok_or(MessageError::Malformed("it ends too early"))?;
     open(first).map(|(header, payload)| (header, payload, rest))
 }

@@ -10,8 +10,8 @@
 //! A state has each object of the snapshot that is not still, in order: whole, or refused. Whatever changes the list (an object added, removed, a still
 //! one moved) makes a new revision and a new snapshot.
 
-use super::quantise::POSE_BYTES;
-use super::wire::{Bytes, Fault, put_name};
+use super::quantize::POSE_BYTES;
+use super::wire::{ByteReader, MessageError, put_name};
 
 /// Most objects of a scene.
 pub const MAX_OBJECTS: usize = 100_000;
@@ -29,7 +29,7 @@ pub enum EntryKind {
 
 const KINDS: [EntryKind; 3] = [EntryKind::Poses, EntryKind::Exact, EntryKind::Viewer];
 const ALIVE: u8 = 1;
-const STILL: u8 = 2;
+const STATIONARY: u8 = 2;
 const DESCRIBED: u8 = 4;
 
 /// One object in a snapshot.
@@ -42,7 +42,7 @@ pub struct Entry<'a> {
     /// Whether a still object is there; of others the state says.
     pub enabled: bool,
     /// It does not move: its poses are here and in no state.
-    pub still: bool,
+    pub stationary: bool,
     /// It is not in the scene file: how it looks is here.
     pub described: bool,
     /// Number of its parts.
@@ -58,7 +58,7 @@ impl Entry<'_> {
         out.extend((4 + self.body.len() as u64).to_le_bytes());
         let flag = |on: bool, bit: u8| if on { bit } else { 0 };
         out.push(self.kind as u8);
-        out.push(flag(self.enabled, ALIVE) | flag(self.still, STILL) | flag(self.described, DESCRIBED));
+        out.push(flag(self.enabled, ALIVE) | flag(self.stationary, STATIONARY) | flag(self.described, DESCRIBED));
         out.extend(self.parts.to_le_bytes());
         out.extend(self.body);
     }
@@ -86,21 +86,21 @@ impl<'a> Snapshot<'a> {
     /// The number of its list alone.
     ///
     /// # Errors
-    /// [`Fault::Malformed`].
-    pub fn revision_of(payload: &[u8]) -> Result<u32, Fault> {
-        Bytes(payload).u32()
+    /// [`MessageError::Malformed`].
+    pub fn revision_of(payload: &[u8]) -> Result<u32, MessageError> {
+        ByteReader(payload).u32()
     }
 
     /// Takes a payload apart.
     ///
     /// # Errors
-    /// [`Fault::Malformed`].
-    pub fn parse(payload: &'a [u8]) -> Result<Snapshot<'a>, Fault> {
-        let mut rest = Bytes(payload);
+    /// [`MessageError::Malformed`].
+    pub fn parse(payload: &'a [u8]) -> Result<Snapshot<'a>, MessageError> {
+        let mut rest = ByteReader(payload);
         let (revision, exact) = (rest.u32()?, rest.array()?);
         let count = rest.u32()? as usize;
         if count > MAX_OBJECTS || !matches!(exact, [0 | 1, 0, 0, 0]) {
-            return Err(Fault::Malformed("more than 100000 objects, or a flag that there is not"));
+            return Err(MessageError::Malformed("more than 100000 objects, or a flag that there is not"));
         }
         // a count is believed no further than the bytes go: an entry has 76 at least
         let mut entries = Vec::with_capacity(count.min(payload.len() / 76));
@@ -112,20 +112,20 @@ impl<'a> Snapshot<'a> {
     }
 }
 
-fn entry<'a>(rest: &mut Bytes<'a>) -> Result<Entry<'a>, Fault> {
+fn entry<'a>(rest: &mut ByteReader<'a>) -> Result<Entry<'a>, MessageError> {
     let name = rest.name()?;
     let size = rest.u64()?;
-    let mut body = Bytes(rest.take(size)?);
+    let mut body = ByteReader(rest.take(size)?);
     let (kind, flags, parts) = (body.u8()?, body.u8()?, body.u16()?);
-    let kind = *KINDS.get(kind as usize).ok_or(Fault::Malformed("a kind of object that there is not"))?;
-    if flags & !(ALIVE | STILL | DESCRIBED) != 0 {
-        return Err(Fault::Malformed("a flag that there is not"));
+    let kind = *KINDS.get(kind as usize).ok_or(MessageError::Malformed("a kind of object that there is not"))?;
+    if flags & !(ALIVE | STATIONARY | DESCRIBED) != 0 {
+        return Err(MessageError::Malformed("a flag that there is not"));
     }
-    let [enabled, still, described] = [ALIVE, STILL, DESCRIBED].map(|bit| flags & bit != 0);
-    if (still || described) && kind == EntryKind::Viewer {
-        return Err(Fault::Malformed("a viewer that is still or described"));
+    let [enabled, stationary, described] = [ALIVE, STATIONARY, DESCRIBED].map(|bit| flags & bit != 0);
+    if (stationary || described) && kind == EntryKind::Viewer {
+        return Err(MessageError::Malformed("a viewer that is still or described"));
     }
-    Ok(Entry { name, kind, enabled, still, described, parts, body: body.0 })
+    Ok(Entry { name, kind, enabled, stationary, described, parts, body: body.0 })
 }
 
 /// Appends what stands before the records of a state.
@@ -147,26 +147,26 @@ pub(crate) fn put_record(out: &mut Vec<u8>, index: usize, write: impl FnOnce(&mu
 /// The revision and the records of a state's payload, in order.
 ///
 /// # Errors
-/// [`Fault::Malformed`], of the head here and of a record where it comes.
-pub(crate) fn parse_state(payload: &[u8]) -> Result<(u32, u32, Records<'_>), Fault> {
-    let mut rest = Bytes(payload);
+/// [`MessageError::Malformed`], of the head here and of a record where it comes.
+pub(crate) fn parse_state(payload: &[u8]) -> Result<(u32, u32, Records<'_>), MessageError> {
+    let mut rest = ByteReader(payload);
     let (revision, count) = (rest.u32()?, rest.u32()?);
     Ok((revision, count, Records { rest, left: count }))
 }
 
 /// Records of a state: index and body.
 pub(crate) struct Records<'a> {
-    rest: Bytes<'a>,
+    rest: ByteReader<'a>,
     left: u32,
 }
 
 impl<'a> Iterator for Records<'a> {
-    type Item = Result<(usize, &'a [u8]), Fault>;
+    type Item = Result<(usize, &'a [u8]), MessageError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.left == 0 {
             let end = self.rest.end();
-            self.rest = Bytes(&[]);
+            self.rest = ByteReader(&[]);
             return end.err().map(Err);
         }
         self.left -= 1;
@@ -176,7 +176,7 @@ impl<'a> Iterator for Records<'a> {
         };
         let record = record();
         if record.is_err() {
-            (self.left, self.rest) = (0, Bytes(&[]));
+            (self.left, self.rest) = (0, ByteReader(&[]));
         }
         Some(record)
     }

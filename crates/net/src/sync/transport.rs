@@ -50,7 +50,7 @@ pub enum Closed {
     /// This side said so ([`ServerLink::close`], [`FacetLink::close`]).
     ByUs,
     /// Nothing was heard for too long.
-    Silent,
+    TimedOut,
     /// A new connection of the same facet took its place: it was started again.
     Replaced,
     /// It did not take what was sent to it.
@@ -90,7 +90,7 @@ pub trait ServerLink {
     /// What happened on a facet's connections so far.
     fn counters(&self, facet: FacetNumber) -> LinkCounters;
     /// What was refused and could not be laid to any facet (a stranger's datagram).
-    fn strangers(&self) -> LinkCounters {
+    fn unknown_peers(&self) -> LinkCounters {
         LinkCounters::default()
     }
 }
@@ -111,48 +111,48 @@ pub trait FacetLink {
 
 /// The bytes of a message that arrived: a facet's own, or lent by the transport where they lie (shared memory), until this is dropped.
 #[derive(Default)]
-pub struct Message(Bytes);
+pub struct Message(Storage);
 
-enum Bytes {
-    Own(Vec<u8>),
-    Lent(Box<dyn AsRef<[u8]> + Send>),
+enum Storage {
+    Owned(Vec<u8>),
+    Loaned(Box<dyn AsRef<[u8]> + Send>),
 }
 
 impl Message {
     /// Shows bytes that somebody lends.
-    pub fn lent(bytes: impl AsRef<[u8]> + Send + 'static) -> Message {
-        Message(Bytes::Lent(Box::new(bytes)))
+    pub fn loaned(bytes: impl AsRef<[u8]> + Send + 'static) -> Message {
+        Message(Storage::Loaned(Box::new(bytes)))
     }
 
     /// The bytes as one's own: copied if they are lent.
     pub fn into_vec(self) -> Vec<u8> {
         match self.0 {
-            Bytes::Own(bytes) => bytes,
-            Bytes::Lent(bytes) => (*bytes).as_ref().to_vec(),
+            Storage::Owned(bytes) => bytes,
+            Storage::Loaned(bytes) => (*bytes).as_ref().to_vec(),
         }
     }
 
     /// An empty one, and the buffer that this one had, if it had one of its own.
     pub(crate) fn clear(&mut self) -> Vec<u8> {
         match std::mem::take(&mut self.0) {
-            Bytes::Own(mut buffer) => {
+            Storage::Owned(mut buffer) => {
                 buffer.clear();
                 buffer
             }
-            Bytes::Lent(_) => Vec::new(),
+            Storage::Loaned(_) => Vec::new(),
         }
     }
 }
 
-impl Default for Bytes {
-    fn default() -> Bytes {
-        Bytes::Own(Vec::new())
+impl Default for Storage {
+    fn default() -> Storage {
+        Storage::Owned(Vec::new())
     }
 }
 
 impl From<Vec<u8>> for Message {
     fn from(bytes: Vec<u8>) -> Message {
-        Message(Bytes::Own(bytes))
+        Message(Storage::Owned(bytes))
     }
 }
 
@@ -160,8 +160,8 @@ impl std::ops::Deref for Message {
     type Target = [u8];
     fn deref(&self) -> &[u8] {
         match &self.0 {
-            Bytes::Own(bytes) => bytes,
-            Bytes::Lent(bytes) => (**bytes).as_ref(),
+            Storage::Owned(bytes) => bytes,
+            Storage::Loaned(bytes) => (**bytes).as_ref(),
         }
     }
 }
@@ -184,7 +184,7 @@ pub enum Refused {
     /// Its fragments contradict each other, or its checksum does not fit.
     Torn,
     /// From no facet that this cave has.
-    Stranger,
+    UnknownPeer,
 }
 
 impl Refused {
@@ -197,7 +197,7 @@ impl Refused {
         Refused::Replayed,
         Refused::Stale,
         Refused::Torn,
-        Refused::Stranger,
+        Refused::UnknownPeer,
     ];
 
     /// In lower case, as reports print it.
@@ -210,7 +210,7 @@ impl Refused {
             Refused::Replayed => "replayed",
             Refused::Stale => "stale",
             Refused::Torn => "torn",
-            Refused::Stranger => "stranger",
+            Refused::UnknownPeer => "unknown_peer",
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Who looks, and where the cave stands: the thesis's `SidData` (§IV.C), an object among the others.
 
-use super::wire::{Bytes, Fault, put_f64};
+use super::wire::{ByteReader, MessageError, put_f64};
 use tumble_collide::{Pose, Quat, Vec3};
 
 /// The name it is addressed by.
@@ -53,16 +53,16 @@ impl Viewer {
     /// Reads what [`write`](Self::write) wrote.
     ///
     /// # Errors
-    /// [`Fault::Malformed`].
-    pub fn read(bytes: &[u8]) -> Result<Viewer, Fault> {
-        let mut rest = Bytes(bytes);
+    /// [`MessageError::Malformed`].
+    pub fn read(bytes: &[u8]) -> Result<Viewer, MessageError> {
+        let mut rest = ByteReader(bytes);
         let (cave, scale) = (exact_pose(&mut rest)?, rest.f64()?);
         let count = rest.u16()?;
         if count as usize > MAX_USERS || scale <= 0.0 {
-            return Err(Fault::Malformed("more than 256 users, or a scale that is not above 0"));
+            return Err(MessageError::Malformed("more than 256 users, or a scale that is not above 0"));
         }
         let user = |_| Ok(User { head: exact_pose(&mut rest)?, interpupillary_m: rest.f64()?, input: rest.u64()? });
-        let users = (0..count).map(user).collect::<Result<_, Fault>>()?;
+        let users = (0..count).map(user).collect::<Result<_, MessageError>>()?;
         rest.end()?;
         Ok(Viewer { users, cave, scale })
     }
@@ -74,12 +74,12 @@ pub(crate) fn put_exact_pose(out: &mut Vec<u8>, pose: &Pose) {
     put_f64(out, pose.rotation.coords.as_slice());
 }
 
-pub(crate) fn exact_pose(bytes: &mut Bytes<'_>) -> Result<Pose, Fault> {
+pub(crate) fn exact_pose(bytes: &mut ByteReader<'_>) -> Result<Pose, MessageError> {
     let [x, y, z] = bytes.f64s()?;
     let [i, j, k, w] = bytes.f64s()?;
     let rotation = nalgebra::Quaternion::new(w, i, j, k);
     if (rotation.norm_squared() - 1.0).abs() > 1e-6 {
-        return Err(Fault::Malformed("an orientation that is not of unit length"));
+        return Err(MessageError::Malformed("an orientation that is not of unit length"));
     }
     Ok(Pose::from_parts(Vec3::new(x, y, z).into(), Quat::new_unchecked(rotation)))
 }

@@ -6,7 +6,7 @@
 //! | 64 | size | u64, of the whole message |
 //! | 72 | magic | `NSyn` |
 //! | 76 | version | u16, [`VERSION`] |
-//! | 78 | kind | u8, [`Kind`] |
+//! | 78 | kind | u8, [`MessageKind`] |
 //! | 79 | | zero |
 //! | 80 | run | u64, the server's run; 0 from a facet that knows none |
 //! | 88 | join | u64, the facet's joining that this is about; 0 to all |
@@ -36,7 +36,7 @@ pub type Hash = [u8; 16];
 /// What a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
-pub enum Kind {
+pub enum MessageKind {
     /// Facet: let me in.
     Join = 1,
     /// Server: no, and why.
@@ -56,7 +56,7 @@ pub enum Kind {
     /// Server: I do not know you; join.
     Rejoin = 9,
     /// Both: I live.
-    Beat = 10,
+    Heartbeat = 10,
     /// Server: the run is over.
     End = 11,
     /// Facet: I go.
@@ -65,27 +65,27 @@ pub enum Kind {
     Input = 13,
 }
 
-impl Kind {
-    const ALL: [Kind; 13] = [
-        Kind::Join,
-        Kind::Refused,
-        Kind::Snapshot,
-        Kind::State,
-        Kind::Ready,
-        Kind::Present,
-        Kind::Presented,
-        Kind::Resync,
-        Kind::Rejoin,
-        Kind::Beat,
-        Kind::End,
-        Kind::Leave,
-        Kind::Input,
+impl MessageKind {
+    const ALL: [MessageKind; 13] = [
+        MessageKind::Join,
+        MessageKind::Refused,
+        MessageKind::Snapshot,
+        MessageKind::State,
+        MessageKind::Ready,
+        MessageKind::Present,
+        MessageKind::Presented,
+        MessageKind::Resync,
+        MessageKind::Rejoin,
+        MessageKind::Heartbeat,
+        MessageKind::End,
+        MessageKind::Leave,
+        MessageKind::Input,
     ];
 }
 
 /// Why a message was not taken.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Fault {
+pub enum MessageError {
     /// Shorter than its header or than it says.
     #[error("a message of {got} bytes, {wanted} are wanted")]
     Truncated {
@@ -95,12 +95,12 @@ pub enum Fault {
         wanted: u64,
     },
     /// Longer than allowed or than it says.
-    #[error("a message of {got} bytes, at most {most} are allowed")]
+    #[error("a message of {got} bytes, at most {max} are allowed")]
     Oversize {
         /// Bytes there.
         got: u64,
         /// Bytes allowed.
-        most: u64,
+        max: u64,
     },
     /// Not NetSync.
     #[error("not a NetSync message: {0}")]
@@ -121,9 +121,9 @@ pub enum Fault {
 
 /// What stands before the payload.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Header {
+pub struct MessageHeader {
     /// What it is.
-    pub kind: Kind,
+    pub kind: MessageKind,
     /// The server's run.
     pub run: u64,
     /// The facet's joining.
@@ -135,7 +135,7 @@ pub struct Header {
 }
 
 /// A message: header and the payload that `write` appends.
-pub fn message(header: &Header, write: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
+pub fn message(header: &MessageHeader, write: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     let mut out = Vec::with_capacity(HEADER_BYTES + 64);
     put_name(&mut out, ENGINE);
     out.extend([0; 8]);
@@ -156,46 +156,51 @@ pub fn message(header: &Header, write: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
 /// The header and payload of a message that nothing is known about.
 ///
 /// # Errors
-/// Any [`Fault`] but `Unfit`.
-pub fn open(bytes: &[u8]) -> Result<(Header, &[u8]), Fault> {
+/// Any [`MessageError`] but `Unfit`.
+pub fn open(bytes: &[u8]) -> Result<(MessageHeader, &[u8]), MessageError> {
     if bytes.len() < HEADER_BYTES {
-        return Err(Fault::Truncated { got: bytes.len(), wanted: HEADER_BYTES as u64 });
+        return Err(MessageError::Truncated { got: bytes.len(), wanted: HEADER_BYTES as u64 });
     }
     if bytes.len() > MAX_MESSAGE_BYTES {
-        return Err(Fault::Oversize { got: bytes.len() as u64, most: MAX_MESSAGE_BYTES as u64 });
+        return Err(MessageError::Oversize { got: bytes.len() as u64, max: MAX_MESSAGE_BYTES as u64 });
     }
-    let mut rest = Bytes(bytes);
+    let mut rest = ByteReader(bytes);
     if rest.name()? != ENGINE {
-        return Err(Fault::Foreign("the first name is not Engine"));
+        return Err(MessageError::Foreign("the first name is not Engine"));
     }
     let size = rest.u64()?;
     if rest.array()? != MAGIC {
-        return Err(Fault::Foreign("the magic bytes are others"));
+        return Err(MessageError::Foreign("the magic bytes are others"));
     }
     let version = rest.u16()?;
     if version != VERSION {
-        return Err(Fault::Version(version));
+        return Err(MessageError::Version(version));
     }
     if (bytes.len() as u64) < size {
-        return Err(Fault::Truncated { got: bytes.len(), wanted: size });
+        return Err(MessageError::Truncated { got: bytes.len(), wanted: size });
     }
     if (bytes.len() as u64) > size {
-        return Err(Fault::Oversize { got: bytes.len() as u64, most: size });
+        return Err(MessageError::Oversize { got: bytes.len() as u64, max: size });
     }
     let [kind, zero] = rest.array()?;
     let numbers = [rest.u64()?, rest.u64()?, rest.u64()?, rest.u64()?];
     if rest.array()? != hash_of(bytes) {
-        return Err(Fault::Torn);
+        return Err(MessageError::Torn);
     }
-    let kind = Kind::ALL
+    let kind = MessageKind::ALL
         .into_iter()
         .find(|k| *k as u8 == kind)
         .filter(|_| zero == 0)
-        .ok_or(Fault::Malformed("a kind that there is not"))?;
-    let header =
-        Header { kind, run: numbers[0], join: numbers[1], frame: numbers[2], time_s: f64::from_bits(numbers[3]) };
+        .ok_or(MessageError::Malformed("a kind that there is not"))?;
+    let header = MessageHeader {
+        kind,
+        run: numbers[0],
+        join: numbers[1],
+        frame: numbers[2],
+        time_s: f64::from_bits(numbers[3]),
+    };
     if !header.time_s.is_finite() {
-        return Err(Fault::Malformed("a time that is not finite"));
+        return Err(MessageError::Malformed("a time that is not finite"));
     }
     Ok((header, rest.0))
 }
@@ -217,49 +222,49 @@ pub(crate) fn put_f64(out: &mut Vec<u8>, numbers: &[f64]) {
 }
 
 /// The unread rest of a payload. A length is believed only as far as the bytes go.
-pub(crate) struct Bytes<'a>(pub &'a [u8]);
+pub(crate) struct ByteReader<'a>(pub &'a [u8]);
 
-impl<'a> Bytes<'a> {
+impl<'a> ByteReader<'a> {
     #[inline]
-    pub fn take(&mut self, n: u64) -> Result<&'a [u8], Fault> {
-        let short = Fault::Malformed("it ends too early");
+    pub fn take(&mut self, n: u64) -> Result<&'a [u8], MessageError> {
+        let short = MessageError::Malformed("it ends too early");
         let (head, rest) = usize::try_from(n).ok().and_then(|n| self.0.split_at_checked(n)).ok_or(short)?;
         self.0 = rest;
         Ok(head)
     }
 
     #[inline]
-    pub fn array<const N: usize>(&mut self) -> Result<[u8; N], Fault> {
+    pub fn array<const N: usize>(&mut self) -> Result<[u8; N], MessageError> {
         let mut out = [0; N];
         out.copy_from_slice(self.take(N as u64)?);
         Ok(out)
     }
 
-    pub fn u8(&mut self) -> Result<u8, Fault> {
+    pub fn u8(&mut self) -> Result<u8, MessageError> {
         self.array::<1>().map(|[b]| b)
     }
 
-    pub fn u16(&mut self) -> Result<u16, Fault> {
+    pub fn u16(&mut self) -> Result<u16, MessageError> {
         self.array().map(u16::from_le_bytes)
     }
 
     #[inline]
-    pub fn u32(&mut self) -> Result<u32, Fault> {
+    pub fn u32(&mut self) -> Result<u32, MessageError> {
         self.array().map(u32::from_le_bytes)
     }
 
-    pub fn u64(&mut self) -> Result<u64, Fault> {
+    pub fn u64(&mut self) -> Result<u64, MessageError> {
         self.array().map(u64::from_le_bytes)
     }
 
     /// A finite number.
-    pub fn f64(&mut self) -> Result<f64, Fault> {
+    pub fn f64(&mut self) -> Result<f64, MessageError> {
         let x = f64::from_le_bytes(self.array()?);
-        if x.is_finite() { Ok(x) } else { Err(Fault::Malformed("a number that is not finite")) }
+        if x.is_finite() { Ok(x) } else { Err(MessageError::Malformed("a number that is not finite")) }
     }
 
     /// Finite numbers.
-    pub fn f64s<const N: usize>(&mut self) -> Result<[f64; N], Fault> {
+    pub fn f64s<const N: usize>(&mut self) -> Result<[f64; N], MessageError> {
         let mut out = [0.0; N];
         for x in &mut out {
             *x = self.f64()?;
@@ -268,23 +273,23 @@ impl<'a> Bytes<'a> {
     }
 
     /// A name in its 64 bytes.
-    pub fn name(&mut self) -> Result<&'a str, Fault> {
+    pub fn name(&mut self) -> Result<&'a str, MessageError> {
         let field = self.take(NAME_BYTES as u64)?;
-        let end = field.iter().position(|&b| b == 0).ok_or(Fault::Malformed("a name without an end"))?;
+        let end = field.iter().position(|&b| b == 0).ok_or(MessageError::Malformed("a name without an end"))?;
         let (name, zeros) = field.split_at(end);
         if name.is_empty() || zeros.iter().any(|&b| b != 0) {
-            return Err(Fault::Malformed("an empty name, or something behind a name's end"));
+            return Err(MessageError::Malformed("an empty name, or something behind a name's end"));
         }
-        std::str::from_utf8(name).map_err(|_| Fault::Malformed("a name that is not UTF-8"))
+        std::str::from_utf8(name).map_err(|_| MessageError::Malformed("a name that is not UTF-8"))
     }
 
     /// Nothing may be left.
-    pub fn end(&self) -> Result<(), Fault> {
-        if self.0.is_empty() { Ok(()) } else { Err(Fault::Malformed("it goes on after its end")) }
+    pub fn end(&self) -> Result<(), MessageError> {
+        if self.0.is_empty() { Ok(()) } else { Err(MessageError::Malformed("it goes on after its end")) }
     }
 }
 
 /// Whether frame `a` is later than `b`, where numbers wrap: within half the range.
-pub fn later(a: u64, b: u64) -> bool {
+pub fn is_later(a: u64, b: u64) -> bool {
     a != b && a.wrapping_sub(b) < 1 << 63
 }

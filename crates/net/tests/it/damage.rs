@@ -13,7 +13,7 @@ fn cut_at_every_byte_it_reads_up_to_the_last_flush() {
         let lengths = record(&path, 8, options(compression, 2));
         let file = OpenOptions::new().write(true).open(&path).unwrap();
         let full = file.metadata().unwrap().len();
-        let mut most = 8;
+        let mut max = 8;
         for n in (0..full).rev() {
             file.set_len(n).unwrap();
             let safe =
@@ -24,13 +24,13 @@ fn cut_at_every_byte_it_reads_up_to_the_last_flush() {
                 (frames, Ok(Ending::Cut { offset, .. })) => {
                     assert!(offset <= n);
                     assert!(
-                        frames.len() >= safe && frames.len() <= most,
+                        frames.len() >= safe && frames.len() <= max,
                         "{} frames of {n} bytes, {safe} are safe",
                         frames.len()
                     );
                     assert_eq!(frames.len() % 2, 0, "whole flushes");
                     assert_frames(&frames);
-                    most = frames.len();
+                    max = frames.len();
                 }
                 (_, Ok(Ending::Complete)) => panic!("{n} of {full} bytes pass for a complete file"),
                 (_, Err(error)) => {
@@ -39,7 +39,7 @@ fn cut_at_every_byte_it_reads_up_to_the_last_flush() {
                 }
             }
         }
-        assert_eq!(most, 0);
+        assert_eq!(max, 0);
     }
 }
 

@@ -2,9 +2,9 @@
 
 use crate::udp::frames as count;
 use std::path::Path;
-use tumble_net::sync::messages::{Done, FacetCounts, Join};
-use tumble_net::sync::recording::take_apart;
-use tumble_net::sync::shm::wire::Head;
+use tumble_net::sync::messages::{FacetCounts, FrameAck, Join};
+use tumble_net::sync::parse_frame;
+use tumble_net::sync::shm::wire::SampleHeader;
 use tumble_net::sync::table::Snapshot;
 use tumble_net::sync::udp::frames;
 use tumble_net::sync::udp::network::Random;
@@ -47,19 +47,19 @@ fn seeds_are_of_the_versions_of_today() {
     );
     assert!(Join::read(&seed("netsync_frame/join")).is_ok() && Input::read(&seed("netsync_frame/input")).is_ok());
     assert!(
-        Done::read(&seed("netsync_frame/done")).is_ok() && FacetCounts::read(&seed("netsync_frame/counts")).is_ok()
+        FrameAck::read(&seed("netsync_frame/done")).is_ok() && FacetCounts::read(&seed("netsync_frame/counts")).is_ok()
     );
     assert!(
         Snapshot::parse(&seed("netsync_mirror/snapshot")).is_ok()
             && Snapshot::parse(&seed("netsync_mirror/snapshot_guests")).is_ok()
     );
-    assert!(take_apart(&seed("netsync_recording/frame")).is_ok());
+    assert!(parse_frame(&seed("netsync_recording/frame")).is_ok());
     for name in ["ack", "close", "fragment", "newest", "parity"] {
         assert!(frames::parse(&seed(&format!("udp_packet/{name}"))).is_some_and(|frames| !frames.is_empty()), "{name}");
     }
     let bytes = seed("udp_packet/shm");
     let words: Vec<u64> = bytes.chunks_exact(8).map(|word| u64::from_le_bytes(word.try_into().unwrap())).collect();
-    assert!(Head::parse(words[..6].try_into().unwrap()).is_ok());
+    assert!(SampleHeader::parse(words[..6].try_into().unwrap()).is_ok());
 }
 
 fn seeds(name: &str) -> Vec<Vec<u8>> {

@@ -63,8 +63,9 @@ fn child_records_until_refused() {
     let (k, error) = refused.expect("there was room for 10,000 frames");
     assert!(error.to_string().contains("cannot write: File too large"), "{error}");
     // Going on fails again, when the next flush is due at the latest, and does not panic.
-    let later: Vec<bool> = (k + 1..k + 8).map(|k| recorder.frame(time(k), k, &poses(k), &state(k)).is_ok()).collect();
-    assert!(!later[6], "{later:?}");
+    let is_later: Vec<bool> =
+        (k + 1..k + 8).map(|k| recorder.frame(time(k), k, &poses(k), &state(k)).is_ok()).collect();
+    assert!(!is_later[6], "{is_later:?}");
     println!("safe {}", recorder.flushed_frames());
     assert!(recorder.finish().is_err());
 }

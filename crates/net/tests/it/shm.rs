@@ -140,7 +140,7 @@ fn a_facet_or_server_that_was_stopped_for_long_connects_anew() {
     }
     assert_eq!(
         cave.at_server.pop().map(|(facet, event, _)| (facet, event)),
-        Some((0, LinkEvent::Closed(Closed::Silent)))
+        Some((0, LinkEvent::Closed(Closed::TimedOut)))
     );
     cave.until(|cave| cave.at_server.len() == 1 && cave.at_facet[0].len() == 2);
     let events: Vec<_> = cave.at_facet[0].drain(..).map(|(event, _)| event).collect();
@@ -157,7 +157,7 @@ fn a_facet_or_server_that_was_stopped_for_long_connects_anew() {
     for events in &cave.at_facet {
         assert_eq!(
             events.iter().map(|(event, _)| *event).collect::<Vec<_>>(),
-            [LinkEvent::Closed(Closed::Silent), LinkEvent::Opened]
+            [LinkEvent::Closed(Closed::TimedOut), LinkEvent::Opened]
         );
     }
 }
@@ -166,7 +166,7 @@ fn a_facet_or_server_that_was_stopped_for_long_connects_anew() {
 #[test]
 fn silence_is_as_long_as_was_said() {
     let (mut usual, mut short) = (Cave::new("usual", 1), Cave::new("short", 1));
-    short.server = short.server.silent_after(Duration::from_millis(300));
+    short.server = short.server.with_idle_timeout(Duration::from_millis(300));
     let end = Instant::now() + Duration::from_secs(20);
     while short.at_server.is_empty() {
         short.look_in_on_server();
@@ -175,7 +175,7 @@ fn silence_is_as_long_as_was_said() {
     }
     assert_eq!(
         short.at_server.pop().map(|(facet, event, _)| (facet, event)),
-        Some((0, LinkEvent::Closed(Closed::Silent)))
+        Some((0, LinkEvent::Closed(Closed::TimedOut)))
     );
 }
 
@@ -240,12 +240,12 @@ fn a_killed_facet_comes_back_and_nothing_is_left() {
             server.send(0, Delivery::Reliable, &[7; 100_000]).unwrap();
         }
         assert!(begin.elapsed() < Duration::from_secs(20));
-        assert_eq!(event(&mut server, 20).0, Some(LinkEvent::Closed(Closed::Silent)));
+        assert_eq!(event(&mut server, 20).0, Some(LinkEvent::Closed(Closed::TimedOut)));
     }
     // A server killed in mid-run leaves its facet alive, and the run's next server takes over: `a_server_started_again_in_the_same_run_is_found`.
     drop(server);
     tumble_net::sync::shm::clean_up().unwrap();
-    let (folder, _) = tumble_net::sync::shm::ports::folder().unwrap();
+    let (folder, _) = tumble_net::sync::shm::folder().unwrap();
     let left: Vec<_> = walk(&folder.join("services")).into_iter().filter(|text| text.contains(&run)).collect();
     assert!(left.is_empty(), "{left:?}");
 }

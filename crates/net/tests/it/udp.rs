@@ -4,9 +4,9 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 use tumble_net::sync::transport::*;
-use tumble_net::sync::udp::facet::FacetSettings;
+use tumble_net::sync::udp::FacetSettings;
+use tumble_net::sync::udp::ServerSettings;
 use tumble_net::sync::udp::network::{Faults, Network, Random};
-use tumble_net::sync::udp::server::ServerSettings;
 use tumble_net::sync::udp::*;
 
 pub const SERVER: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::new(10, 0, 0, 1)), 7700);
@@ -215,11 +215,11 @@ fn a_parted_network_closes_and_opens_again() {
     let mut cave = Cave::new(1, 10, BAD, Numbering::default());
     cave.connect();
     assert_eq!(run_for(&mut cave, 60.0), (vec![], vec![]), "an idle connection stays");
-    cave.network.parted = true;
-    let silent = LinkEvent::Closed(Closed::Silent);
+    cave.network.partitioned = true;
+    let silent = LinkEvent::Closed(Closed::TimedOut);
     assert_eq!(run_for(&mut cave, 2.3), (vec![silent], vec![silent]));
     assert_eq!(run_for(&mut cave, 10.0), (vec![], vec![]));
-    cave.network.parted = false;
+    cave.network.partitioned = false;
     assert_eq!(run_for(&mut cave, 1.0), (vec![LinkEvent::Opened], vec![LinkEvent::Opened]));
 }
 

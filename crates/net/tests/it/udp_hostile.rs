@@ -4,12 +4,12 @@ use crate::udp::*;
 use std::sync::Arc;
 use std::time::Duration;
 use tumble_net::sync::transport::*;
+use tumble_net::sync::udp::ServerSettings;
+use tumble_net::sync::udp::Session;
 use tumble_net::sync::udp::handshake::{Hello, Reply};
 use tumble_net::sync::udp::keys::{Agreement, Handshake, Seal, Side};
 use tumble_net::sync::udp::network::{Faults, Random};
-use tumble_net::sync::udp::packet::{self, Header, Kind};
-use tumble_net::sync::udp::server::ServerSettings;
-use tumble_net::sync::udp::session::Session;
+use tumble_net::sync::udp::packet::{self, PacketHeader, PacketKind};
 use tumble_net::sync::udp::*;
 
 const QUIET: Faults =
@@ -81,7 +81,7 @@ fn attacks_change_nothing_and_are_counted_by_reason() {
     let (mut delivered, mut answered) = (0u64, 0u64);
     let mut wanted = [[0u64; Refused::ALL.len()]; 2];
     let base = [cave.server.counters(0), cave.facets[0].counters()];
-    assert_eq!(cave.server.strangers().refused, [0; Refused::ALL.len()]);
+    assert_eq!(cave.server.unknown_peers().refused, [0; Refused::ALL.len()]);
     for k in 0..200u64 {
         assert!(cave.server.send(0, Delivery::Reliable, &Arc::from(message(k, 2500))));
         let until = cave.now + Duration::from_millis(16);
@@ -96,7 +96,11 @@ fn attacks_change_nothing_and_are_counted_by_reason() {
                     false => cave.facets[0].receive(cave.now, from, datagram),
                 };
                 receive(&mut cave, &datagram);
-                assert_eq!(packet::parse(&datagram).unwrap().kind, Kind::Data, "a forged session is not answered");
+                assert_eq!(
+                    packet::parse(&datagram).unwrap().kind,
+                    PacketKind::Data,
+                    "a forged session is not answered"
+                );
                 for (why, attack) in attacks(&datagram, &mut random) {
                     receive(&mut cave, &attack);
                     wanted[usize::from(!to_server)][why as usize] += 1;
@@ -118,10 +122,10 @@ fn attacks_change_nothing_and_are_counted_by_reason() {
     // The facet's: all in one place. The server's: a packet of no known session is a stranger's.
     let facet = cave.facets[0].counters();
     let server = cave.server.counters(0);
-    let strangers = cave.server.strangers();
+    let unknown_peers = cave.server.unknown_peers();
     for why in Refused::ALL {
         assert_eq!(facet.refused_for(why) - base[1].refused_for(why), wanted[1][why as usize], "facet: {why:?}");
-        let at_server = server.refused_for(why) - base[0].refused_for(why) + strangers.refused_for(why);
+        let at_server = server.refused_for(why) - base[0].refused_for(why) + unknown_peers.refused_for(why);
         assert_eq!(at_server, wanted[0][why as usize], "server: {why:?}");
     }
     assert!(wanted.iter().all(|counts| counts[Refused::Forged as usize] >= 200), "{wanted:?}");
@@ -139,8 +143,8 @@ fn a_server_keeps_nothing_for_strangers_and_never_answers_with_more_bytes() {
         let mut nonce = [0; 32];
         nonce[..8].copy_from_slice(&k.to_le_bytes());
         let cookie = [random.next_u64() as u8; 32];
-        Hello { nonce, facet: (k % 6) as u16, cookie, doubted: 0 }.write(
-            if k % 2 == 0 { Kind::Hello } else { Kind::Answer },
+        Hello { nonce, facet: (k % 6) as u16, cookie, suspect_session: 0 }.write(
+            if k % 2 == 0 { PacketKind::Hello } else { PacketKind::Answer },
             &handshake,
             &mut datagram,
         );
@@ -152,7 +156,10 @@ fn a_server_keeps_nothing_for_strangers_and_never_answers_with_more_bytes() {
             answered += reply.len();
         });
         // Data of unknown sessions: the shortest that is taken for a packet.
-        packet::begin(&mut datagram, Header { kind: Kind::Data, session: random.next_u64() as u32 | 1, sequence: 1 });
+        packet::begin(
+            &mut datagram,
+            PacketHeader { kind: PacketKind::Data, session: random.next_u64() as u32 | 1, sequence: 1 },
+        );
         datagram.push(0);
         handshake.tag(&mut datagram);
         server.receive(now, from, &datagram);
@@ -160,18 +167,22 @@ fn a_server_keeps_nothing_for_strangers_and_never_answers_with_more_bytes() {
     }
     assert!(server.wake().is_none(), "a session was prepared");
     assert!(answered * 2 < asked, "{answered} bytes answer {asked}");
-    assert_eq!(server.strangers().refused_for(Refused::Stale), 5_000 + 10_000);
+    assert_eq!(server.unknown_peers().refused_for(Refused::Stale), 5_000 + 10_000);
     // A facet that this cave has not, and one with another key.
-    Hello { nonce: [1; 32], facet: 6, cookie: [0; 32], doubted: 0 }.write(Kind::Hello, &handshake, &mut datagram);
+    Hello { nonce: [1; 32], facet: 6, cookie: [0; 32], suspect_session: 0 }.write(
+        PacketKind::Hello,
+        &handshake,
+        &mut datagram,
+    );
     server.receive(now, SERVER, &datagram);
-    assert_eq!(server.strangers().refused_for(Refused::Stranger), 1);
-    Hello { nonce: [1; 32], facet: 0, cookie: [0; 32], doubted: 0 }.write(
-        Kind::Hello,
+    assert_eq!(server.unknown_peers().refused_for(Refused::UnknownPeer), 1);
+    Hello { nonce: [1; 32], facet: 0, cookie: [0; 32], suspect_session: 0 }.write(
+        PacketKind::Hello,
         &Handshake::new(&SharedKey::new([8; 32])),
         &mut datagram,
     );
     server.receive(now, SERVER, &datagram);
-    assert_eq!(server.strangers().refused_for(Refused::Forged), 1);
+    assert_eq!(server.unknown_peers().refused_for(Refused::Forged), 1);
     server.transmit(now, &mut |_, _| panic!("an answer to a machine without the key"));
 }
 
@@ -218,20 +229,24 @@ fn another_server_with_the_key_ends_no_session() {
     let settings = ServerSettings { facets: 1, timing: Timing::default(), numbering: Numbering::default() };
     let mut other = ServerMachine::new(settings, SharedKey::new(KEY), Entropy::seeded(77));
     let seen = cave.recorded.take().unwrap();
-    let session =
-        seen.iter().filter_map(|d| packet::parse(d).ok()).find(|header| header.kind == Kind::Data).unwrap().session;
+    let session = seen
+        .iter()
+        .filter_map(|d| packet::parse(d).ok())
+        .find(|header| header.kind == PacketKind::Data)
+        .unwrap()
+        .session;
     for datagram in &seen {
         other.receive(cave.now, facet_address(0), datagram);
     }
     let mut answers = Vec::new();
     other.transmit(cave.now, &mut |_, answer| answers.push(answer.to_vec()));
     assert!(
-        answers.iter().all(|answer| packet::parse(answer).unwrap().kind == Kind::Challenge),
+        answers.iter().all(|answer| packet::parse(answer).unwrap().kind == PacketKind::Challenge),
         "Data is not answered"
     );
     // and what a server once said of a session that it does not know: kind 5
     let mut unknown = Vec::new();
-    packet::begin(&mut unknown, Header { kind: Kind::Data, session, sequence: 0 });
+    packet::begin(&mut unknown, PacketHeader { kind: PacketKind::Data, session, sequence: 0 });
     unknown[2] = packet::VERSION << 4 | 5;
     Handshake::new(&SharedKey::new(KEY)).tag(&mut unknown);
     answers.push(unknown);
@@ -241,25 +256,25 @@ fn another_server_with_the_key_ends_no_session() {
     assert_eq!((cave.facets[0].poll(), cave.facets[0].counters().refused_for(Refused::Foreign) > 0), (None, true));
 
     // Nothing comes through for 700 ms; the handshake of the other server does.
-    cave.network.parted = true;
+    cave.network.partitioned = true;
     cave.recorded = Some(Vec::new());
     let (end, mut welcomed) = (cave.now + Duration::from_millis(700), 0);
     while cave.now < end {
         cave.advance(end);
         for datagram in cave.recorded.replace(Vec::new()).unwrap() {
-            if packet::parse(&datagram).unwrap().kind != Kind::Data {
+            if packet::parse(&datagram).unwrap().kind != PacketKind::Data {
                 other.receive(cave.now, facet_address(0), &datagram);
             }
         }
         let mut answers = Vec::new();
         other.transmit(cave.now, &mut |_, answer| answers.push(answer.to_vec()));
         for answer in answers {
-            welcomed += u32::from(packet::parse(&answer).unwrap().kind == Kind::Welcome);
+            welcomed += u32::from(packet::parse(&answer).unwrap().kind == PacketKind::Welcome);
             cave.facets[0].receive(cave.now, SERVER, &answer);
         }
     }
     assert!(welcomed > 0, "the facet has asked, and was answered by the wrong one");
-    cave.network.parted = false;
+    cave.network.partitioned = false;
     let end = cave.now + Duration::from_secs(3);
     while cave.now < end {
         cave.advance(end);
@@ -292,9 +307,9 @@ fn late_packets_of_a_session_that_is_over_are_no_refusals() {
     let receive =
         |cave: &mut Cave| late.iter().for_each(|datagram| cave.server.receive(cave.now, facet_address(0), datagram));
     receive(&mut cave);
-    assert_eq!(cave.server.strangers().refused, [0; Refused::ALL.len()]);
+    assert_eq!(cave.server.unknown_peers().refused, [0; Refused::ALL.len()]);
     receive(&mut cave);
-    assert_eq!(cave.server.strangers().refused_for(Refused::Replayed), late.len() as u64);
+    assert_eq!(cave.server.unknown_peers().refused_for(Refused::Replayed), late.len() as u64);
     assert!(
         std::iter::from_fn(|| cave.server.poll()).all(|(_, event, _)| event == LinkEvent::Closed(Closed::ByUs)),
         "nothing of it is taken"
@@ -372,7 +387,7 @@ fn a_million_random_packets_per_parser_full_length() {
 
 fn shm_head(noise: &[u8]) -> bool {
     let mut words = noise.chunks_exact(8).map(|word| u64::from_le_bytes(word.try_into().unwrap()));
-    tumble_net::sync::shm::wire::Head::parse([(); 6].map(|()| words.next().unwrap_or(0))).is_ok()
+    tumble_net::sync::shm::wire::SampleHeader::parse([(); 6].map(|()| words.next().unwrap_or(0))).is_ok()
 }
 
 #[test]

@@ -42,7 +42,7 @@ fn sockets_on_loopback_carry_long_and_short_messages_both_ways() {
     // The other key: no answer, no connection, and the reason is counted.
     until(|| {
         assert_eq!(stranger.recv(wait, &mut lent).unwrap(), None);
-        server.strangers().refused_for(Refused::Forged) > 0
+        server.unknown_peers().refused_for(Refused::Forged) > 0
     });
     assert_eq!((stranger.counters().bytes_in, stranger.counters().opened), (0, 0));
     // A facet that ends says so.

@@ -1,16 +1,14 @@
 //! What can be typed after `tumble cave`, `tumble serve` and `tumble facet`.
 
+use crate::args::{OpeningOptions, SceneOptions};
 use clap::{Args, ValueEnum};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use tumble::render::Quality;
-use tumble::scene::{Solver, Stepper};
 
-/// What is shown, and in which cave: the server and all facets must mean the same.
+/// The cave, and the surroundings of the scene. The server and all facets must be given the same.
 #[derive(Args, Clone)]
-pub struct Stage {
-    /// A scene file, a folder that holds a scene.toml, or the name of a shipped scene.
-    pub scene: String,
+pub struct CaveSceneOptions {
     /// A cave file or the name of a shipped cave.
     #[arg(long, value_name = "CAVE")]
     pub cave: String,
@@ -22,7 +20,7 @@ pub struct Stage {
 
 /// What carries the frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Carrier {
+pub enum TransportKind {
     /// Memory that processes of one machine share.
     #[value(name = "shared_memory")]
     SharedMemory,
@@ -34,19 +32,12 @@ pub enum Carrier {
 #[derive(Args, Clone)]
 pub struct ServeOptions {
     #[command(flatten)]
-    pub stage: Stage,
+    pub scene: SceneOptions,
+    #[command(flatten)]
+    pub surroundings: CaveSceneOptions,
     /// Simulated time to run for, s (default: until Ctrl-C).
     #[arg(long, value_name = "S", value_parser = crate::args::seconds)]
     pub duration: Option<f64>,
-    /// Length of a frame, s (default: what the scene says).
-    #[arg(long, value_name = "S", value_parser = crate::args::time_step)]
-    pub dt: Option<f64>,
-    /// time_stepping or backtracking.
-    #[arg(long, value_name = "NAME")]
-    pub stepper: Option<Stepper>,
-    /// gauss_seidel, lcp (short for lcp_pyramid), lcp_pyramid or lcp_sliding.
-    #[arg(long, value_name = "NAME", value_parser = crate::args::solver)]
-    pub solver: Option<Solver>,
     /// Frames shown per simulated second, at most; a frame holds as many steps as fit, at least one.
     #[arg(long, value_name = "N", default_value = "60", value_parser = crate::args::rate)]
     pub fps: f64,
@@ -55,13 +46,13 @@ pub struct ServeOptions {
     pub no_realtime: bool,
     /// What carries the frames (default: what the cave says).
     #[arg(long, value_name = "NAME")]
-    pub transport: Option<Carrier>,
+    pub transport: Option<TransportKind>,
     /// Where to listen with --transport udp (default: 127.0.0.1 and a free port, or every address and the cave's port where it has machines elsewhere).
     #[arg(long, value_name = "ADDR:PORT")]
     pub listen: Option<SocketAddr>,
     /// How long the start waits for facets, s (default: connect_timeout_ms of the cave).
     #[arg(long, value_name = "S", value_parser = crate::args::seconds)]
-    pub wait: Option<f64>,
+    pub connect_timeout: Option<f64>,
     /// End the run that is going on in this cave, and take its place.
     #[arg(long)]
     pub replace: bool,
@@ -73,7 +64,7 @@ pub struct ServeOptions {
     pub summary: Option<PathBuf>,
     /// The users' bodies push what they walk into: an upright capsule of 0.25 m around each, and two hands.
     #[arg(long)]
-    pub push: bool,
+    pub user_colliders: bool,
     /// Hear a tracker (OSC over UDP) at this address; the rest is as [tracker] of the cave file says. Its datagrams are not sealed: any address but this machine's own
     /// needs senders.
     #[arg(long, value_name = "ADDR:PORT")]
@@ -87,7 +78,7 @@ pub struct ServeOptions {
     pub foxglove: Option<SocketAddr>,
     /// Do again what users did in a recorded run, in place of what they do now; ends with the recording.
     #[arg(long, value_name = "FILE", conflicts_with = "tracker")]
-    pub input_from: Option<PathBuf>,
+    pub replay_input: Option<PathBuf>,
     /// Keep the cores of this machine from falling asleep while the run goes on, where this user may: frames pass between processes faster, for more electricity.
     #[arg(long)]
     pub stay_awake: bool,
@@ -108,7 +99,7 @@ pub struct DrawOptions {
     pub log_dir: Option<PathBuf>,
     /// Draw the number of the frame into the picture: in figures, and as squares for programs.
     #[arg(long)]
-    pub stamp: bool,
+    pub burn_in: bool,
     /// usual, fast or fastest, or parts of it as for tumble view (default: usual; fast in windows where a software driver draws).
     #[arg(long, value_name = "NAME")]
     pub quality: Option<Quality>,
@@ -116,7 +107,7 @@ pub struct DrawOptions {
     #[arg(long)]
     pub offscreen: bool,
     /// Draw nothing: states are applied and acknowledged.
-    #[arg(long, conflicts_with_all = ["frames_dir", "stamp"])]
+    #[arg(long, conflicts_with_all = ["frames_dir", "burn_in"])]
     pub no_pictures: bool,
 }
 
@@ -157,8 +148,13 @@ pub struct RecoverOptions {
 /// `tumble facet`.
 #[derive(Args, Clone)]
 pub struct FacetOptions {
+    /// The scene, as the server was given it.
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
     #[command(flatten)]
-    pub stage: Stage,
+    pub opening: OpeningOptions,
+    #[command(flatten)]
+    pub surroundings: CaveSceneOptions,
     /// The facet of the cave.
     #[arg(long, value_name = "NAME", required_unless_present = "preview")]
     pub facet: Option<String>,
@@ -173,10 +169,10 @@ pub struct FacetOptions {
     pub run: Option<String>,
     /// How long to wait for a server, at the start and when it is lost, s.
     #[arg(long, value_name = "S", default_value = "10", value_parser = crate::args::seconds)]
-    pub wait: f64,
+    pub connect_timeout: f64,
     #[command(flatten)]
     pub draw: DrawOptions,
     /// Started by a launcher: ends when stdin does, which is when the launcher ends, however that is.
     #[arg(long, hide = true)]
-    pub led: bool,
+    pub parent_watch: bool,
 }

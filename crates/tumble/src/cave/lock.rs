@@ -2,8 +2,8 @@
 //!
 //! The lock is the system's, so it goes with the process however that ends. The text is for people and for facets that are started by hand.
 
-use super::ends::Address;
-use super::stage::Setting;
+use super::address::ServerAddress;
+use super::run_setup::RunSetup;
 use crate::failure::Failure;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions, TryLockError};
@@ -11,74 +11,75 @@ use std::io::{Read, Seek, Write};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
-use tumble::net::sync::shm::ports::folder;
+use tumble::net::sync::shm::folder;
 
 /// How long a run that is to be replaced may take to end by itself, and then to be gone.
-const PATIENCE: Duration = Duration::from_secs(5);
+const REPLACE_TIMEOUT: Duration = Duration::from_secs(5);
 /// Most bytes of the text: a few paths, each as long as the system lets it be, with every byte escaped.
-const MOST: u64 = 1 << 16;
+const MAX_LOCK_BYTES: u64 = 1 << 16;
 
 /// What the file says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Run {
+pub struct RunInfo {
     pub pid: i32,
     pub scene: String,
     pub cave: String,
     /// Seconds since 1970.
     pub since_unix_s: u64,
     /// When the process began, ticks since the machine did: its number may be another's later.
-    pub began: u64,
+    pub start_ticks: u64,
     /// Where facets find it; not there before it can be joined.
-    pub address: Option<Address>,
+    pub address: Option<ServerAddress>,
 }
 
-impl Run {
+impl RunInfo {
     /// This process's run.
-    pub fn here(scene: &str, cave: &str) -> Run {
+    pub fn here(scene: &str, cave: &str) -> RunInfo {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let pid = std::process::id() as i32;
-        Run {
+        RunInfo {
             pid,
             scene: scene.into(),
             cave: cave.into(),
             since_unix_s: since.as_secs(),
-            began: began(pid).unwrap_or(0),
+            start_ticks: start_ticks(pid).unwrap_or(0),
             address: None,
         }
     }
 
     /// Whether the process that it names is the one that wrote it.
-    fn lives(&self) -> bool {
-        began(self.pid) == Some(self.began)
+    fn is_running(&self) -> bool {
+        start_ticks(self.pid) == Some(self.start_ticks)
     }
 
-    fn described(&self) -> String {
+    fn description(&self) -> String {
         format!("process {}, scene {}, since {}", self.pid, self.scene, utc(self.since_unix_s))
     }
 }
 
 /// Held while the run lives; the file goes with it.
-pub struct Lock {
+pub struct RunLock {
     file: File,
     path: PathBuf,
 }
 
-impl Lock {
+impl RunLock {
     /// Takes the cave, or refuses by the name of who has it. With `replace` that run is asked to end, then killed.
-    pub fn take(setting: &Setting, run: &Run, replace: bool) -> Result<Lock, Failure> {
-        let (cave, path) = (&setting.cave, path(&setting.place)?);
-        let until = Instant::now() + 2 * PATIENCE;
+    pub fn take(setup: &RunSetup, run: &RunInfo, replace: bool) -> Result<RunLock, Failure> {
+        let (cave, path) = (&setup.cave, path(&setup.place)?);
+        let until = Instant::now() + 2 * REPLACE_TIMEOUT;
         let (mut asked, mut killed) = (None, false);
         loop {
             if let Some(file) = try_take(&path)? {
-                let mut lock = Lock { file, path };
+                let mut lock = RunLock { file, path };
                 lock.write(run)?;
                 return Ok(lock);
             }
             // the text may still be an earlier run's, and its process another by now
-            let other = read(&path).filter(Run::lives);
-            let name =
-                other.as_ref().map_or("another process, which has not said yet who it is".to_owned(), Run::described);
+            let other = read(&path).filter(RunInfo::is_running);
+            let name = other
+                .as_ref()
+                .map_or("another process, which has not said yet who it is".to_owned(), RunInfo::description);
             if !replace {
                 return Err(Failure::run(
                     "the cave",
@@ -98,7 +99,7 @@ impl Lock {
                     signal(other.pid, rustix::process::Signal::TERM);
                     asked = Some(now);
                 }
-                (Some(other), Some(since)) if !killed && now > since + PATIENCE => {
+                (Some(other), Some(since)) if !killed && now > since + REPLACE_TIMEOUT => {
                     signal(other.pid, rustix::process::Signal::KILL);
                     killed = true;
                 }
@@ -113,7 +114,7 @@ impl Lock {
     }
 
     /// Says which run it is.
-    pub fn write(&mut self, run: &Run) -> Result<(), Failure> {
+    pub fn write(&mut self, run: &RunInfo) -> Result<(), Failure> {
         let failed = |e: std::io::Error| Failure::run("the cave's lock", e);
         let text = serde_json::to_string(run).map_err(|e| Failure::run("the cave's lock", e))?;
         self.file.set_len(0).and_then(|()| self.file.rewind()).map_err(failed)?;
@@ -121,21 +122,21 @@ impl Lock {
     }
 }
 
-impl Drop for Lock {
+impl Drop for RunLock {
     fn drop(&mut self) {
         // while it is still locked: who waits for it then finds that the path is another file's
         let _ = std::fs::remove_file(&self.path);
     }
 }
 
-/// Where the run is that goes on in the cave at `place` ([`Setting::place`]) on this machine, if there is one that can be joined. Nothing is locked for it: a
+/// Where the run is that goes on in the cave at `place` ([`RunSetup::place`]) on this machine, if there is one that can be joined. Nothing is locked for it: a
 /// run that begins at this moment would take that for another.
-pub fn find(place: &str) -> Result<Option<Address>, Failure> {
-    Ok(read(&path(place)?).filter(Run::lives).and_then(|run| run.address))
+pub fn find_run(place: &str) -> Result<Option<ServerAddress>, Failure> {
+    Ok(read(&path(place)?).filter(RunInfo::is_running).and_then(|run| run.address))
 }
 
 /// When a process began, ticks since the machine did; `None`: there is none of this number, or it ended and is only not yet asked for.
-fn began(pid: i32) -> Option<u64> {
+fn start_ticks(pid: i32) -> Option<u64> {
     let about = std::fs::read(format!("/proc/{pid}/stat")).ok()?;
     // the name, in brackets, may hold anything; behind it come the third field and so on, and the beginning is the 22nd
     let behind = String::from_utf8_lossy(&about).rsplit_once(')')?.1.to_owned();
@@ -178,9 +179,9 @@ fn try_take(path: &Path) -> Result<Option<File>, Failure> {
     Ok(None)
 }
 
-fn read(path: &Path) -> Option<Run> {
+fn read(path: &Path) -> Option<RunInfo> {
     let mut text = String::new();
-    File::open(path).ok()?.take(MOST).read_to_string(&mut text).ok()?;
+    File::open(path).ok()?.take(MAX_LOCK_BYTES).read_to_string(&mut text).ok()?;
     serde_json::from_str(&text).ok()
 }
 
@@ -207,12 +208,12 @@ fn utc(unix_s: u64) -> String {
 mod tests {
     #[test]
     fn a_process_is_known_by_its_number_and_beginning() {
-        let mut run = super::Run::here("s", "c");
-        assert!(run.lives());
-        run.began += 1;
-        assert!(!run.lives());
+        let mut run = super::RunInfo::here("s", "c");
+        assert!(run.is_running());
+        run.start_ticks += 1;
+        assert!(!run.is_running());
         // no process has this number
-        assert_eq!(super::began(i32::MAX), None);
+        assert_eq!(super::start_ticks(i32::MAX), None);
     }
 
     #[test]

@@ -11,55 +11,42 @@
 
 /// As the standard one, but a stderr that nobody reads any more ends no run: pictures and recordings go on without it.
 macro_rules! eprintln {
-    ($($told:tt)*) => {{
+    ($($text:tt)*) => {{
         // in one piece: processes of a run share a stderr
-        let told = format!($($told)*) + "\n";
-        let _ = std::io::Write::write_all(&mut std::io::stderr(), told.as_bytes());
+        let text = format!($($text)*) + "\n";
+        let _ = std::io::Write::write_all(&mut std::io::stderr(), text.as_bytes());
     }};
 }
 
 /// The same without the line's end.
 macro_rules! eprint {
-    ($($told:tt)*) => {{
-        let _ = std::io::Write::write_all(&mut std::io::stderr(), format!($($told)*).as_bytes());
+    ($($text:tt)*) => {{
+        let _ = std::io::Write::write_all(&mut std::io::stderr(), format!($($text)*).as_bytes());
     }};
 }
 
+mod address;
 pub mod args;
-mod bodies;
-mod crew;
-mod devices;
-mod ends;
+mod endpoints;
 mod facet;
 mod lock;
-mod log;
-mod measure;
-mod osc;
-mod outputs;
-mod painter;
-mod played;
 mod replay;
-mod serve;
+mod run_setup;
+mod server;
 mod signals;
-mod stage;
-mod stamp;
-mod summary;
 mod tracker;
-mod users;
-mod viewers;
-mod window;
 
 use crate::failure::Failure;
 use args::{CaveOptions, FacetOptions, RecoverOptions, ReplayOptions, ServeOptions};
 
 /// Server and facets of this machine.
 pub fn cave(options: &CaveOptions) -> Result<(), Failure> {
-    serve::run(&options.serve, Some(options), None)
+    server::run(&options.serve, Some(options), None)
 }
 
 /// The server alone.
 pub fn serve(options: &ServeOptions) -> Result<(), Failure> {
-    serve::run(options, None, None)
+    server::run(options, None, None)
 }
 
 /// One facet.
@@ -70,13 +57,16 @@ pub fn facet(options: &FacetOptions) -> Result<(), Failure> {
 /// The facets of a cave, driven from a recording.
 pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
     let serve = &options.cave.serve;
-    let users = serve.push || serve.tracker.is_some() || serve.input_from.is_some();
-    if serve.record.is_some() || users || serve.dt.is_some() || serve.stepper.is_some() || serve.solver.is_some() {
+    let users = serve.user_colliders || serve.tracker.is_some() || serve.replay_input.is_some();
+    let scene = &serve.scene;
+    let stepping =
+        scene.dt.is_some() || scene.stepper.is_some() || scene.solver.is_some() || scene.integrator.is_some();
+    if serve.record.is_some() || users || stepping {
         return Err(Failure::input(
-            "a replay shows what was recorded; --record, --push, --tracker, --input-from, --dt, --stepper and --solver go with tumble cave",
+            "a replay shows what was recorded; --record, --user-colliders, --tracker, --replay-input, --dt, --stepper, --solver and --integrator go with tumble cave",
         ));
     }
-    serve::run(serve, Some(&options.cave), Some(&options.file))
+    server::run(serve, Some(&options.cave), Some(&options.file))
 }
 
 /// A recording, mended.

@@ -10,24 +10,24 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// How often the watching thread looks.
-const LOOK: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Signals within this time are one.
-const SAME: Duration = Duration::from_millis(500);
+const DEBOUNCE: Duration = Duration::from_millis(500);
 /// An end in order takes no longer: well above what facets are given to end.
-const PATIENCE: Duration = Duration::from_secs(10);
+const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(10);
 /// As shells tell Ctrl-C.
-const CODE: i32 = 130;
+const EXIT_CODE: i32 = 130;
 
 /// Whether the end was asked for.
 #[derive(Clone)]
 pub struct Signals {
-    asked: Arc<AtomicBool>,
-    left: Arc<Mutex<Left>>,
+    stop_requested: Arc<AtomicBool>,
+    cleanup: Arc<Mutex<Cleanup>>,
 }
 
 /// What an end out of order must not leave.
 #[derive(Default)]
-struct Left {
+struct Cleanup {
     /// Leaders of process groups.
     processes: Vec<u32>,
     files: Vec<PathBuf>,
@@ -36,64 +36,64 @@ struct Left {
 impl Signals {
     /// From now on.
     pub fn watch() -> Result<Signals, Failure> {
-        let (came, asked) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+        let (came, stop_requested) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
         for signal in [SIGINT, SIGTERM, SIGHUP] {
             signal_hook::flag::register(signal, came.clone()).map_err(|e| Failure::run("signals", e))?;
         }
-        let left = Arc::new(Mutex::new(Left::default()));
-        let (raised, kept) = (asked.clone(), left.clone());
+        let cleanup = Arc::new(Mutex::new(Cleanup::default()));
+        let (raised, kept) = (stop_requested.clone(), cleanup.clone());
         std::thread::Builder::new()
             .name("signals".into())
             .spawn(move || watch(&came, &raised, &kept))
             .map_err(|e| Failure::run("signals", e))?;
-        Ok(Signals { asked, left })
+        Ok(Signals { stop_requested, cleanup })
     }
 
     /// Whether one came.
-    pub fn end(&self) -> bool {
-        self.asked.load(Ordering::Relaxed)
+    pub fn stop_requested(&self) -> bool {
+        self.stop_requested.load(Ordering::Relaxed)
     }
 
     /// A process that leads a group was started.
     pub fn started(&self, process: u32) {
-        lock(&self.left).processes.push(process);
+        lock(&self.cleanup).processes.push(process);
     }
 
     /// It is gone.
     pub fn ended(&self, process: u32) {
-        lock(&self.left).processes.retain(|other| *other != process);
+        lock(&self.cleanup).processes.retain(|other| *other != process);
     }
 
     /// A file that goes with this process.
     pub fn remove_at_the_end(&self, file: PathBuf) {
-        lock(&self.left).files.push(file);
+        lock(&self.cleanup).files.push(file);
     }
 }
 
-fn lock(left: &Mutex<Left>) -> MutexGuard<'_, Left> {
-    left.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock(cleanup: &Mutex<Cleanup>) -> MutexGuard<'_, Cleanup> {
+    cleanup.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn end(left: &Mutex<Left>) -> ! {
-    let left = lock(left);
-    for pid in left.processes.iter().filter_map(|pid| rustix::process::Pid::from_raw(*pid as i32)) {
+fn end(cleanup: &Mutex<Cleanup>) -> ! {
+    let cleanup = lock(cleanup);
+    for pid in cleanup.processes.iter().filter_map(|pid| rustix::process::Pid::from_raw(*pid as i32)) {
         let _ = rustix::process::kill_process_group(pid, rustix::process::Signal::KILL);
     }
-    left.files.iter().for_each(|file| _ = std::fs::remove_file(file));
-    std::process::exit(CODE)
+    cleanup.files.iter().for_each(|file| _ = std::fs::remove_file(file));
+    std::process::exit(EXIT_CODE)
 }
 
-fn watch(came: &AtomicBool, asked: &AtomicBool, left: &Mutex<Left>) {
+fn watch(came: &AtomicBool, stop_requested: &AtomicBool, cleanup: &Mutex<Cleanup>) {
     let mut first: Option<Instant> = None;
     loop {
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
         let came = came.swap(false, Ordering::Relaxed);
         match first {
             None if came => {
-                asked.store(true, Ordering::Relaxed);
+                stop_requested.store(true, Ordering::Relaxed);
                 first = Some(Instant::now());
             }
-            Some(since) if since.elapsed() > PATIENCE || came && since.elapsed() > SAME => end(left),
+            Some(since) if since.elapsed() > SHUTDOWN_TIMEOUT || came && since.elapsed() > DEBOUNCE => end(cleanup),
             _ => {}
         }
     }

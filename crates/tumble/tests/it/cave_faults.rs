@@ -75,8 +75,14 @@ fn without_a_launcher_its_facets_end_and_others_wait_for_a_server_in_vain() {
     drop(run);
     // by hand
     let server = place.start("serve", &["--quiet"]);
-    let l = place.start("facet", &["--facet", "l", "--no-pictures", "--log-dir", &place.path("hand"), "--wait", "10"]);
-    let r = place.start("facet", &["--facet", "r", "--no-pictures", "--log-dir", &place.path("hand"), "--wait", "60"]);
+    let l = place.start(
+        "facet",
+        &["--facet", "l", "--no-pictures", "--log-dir", &place.path("hand"), "--connect-timeout", "10"],
+    );
+    let r = place.start(
+        "facet",
+        &["--facet", "r", "--no-pictures", "--log-dir", &place.path("hand"), "--connect-timeout", "60"],
+    );
     place.wait_for("hand", "r", 5);
     place.wait_for("hand", "l", 5);
     signal(server.pid(), Signal::KILL);
@@ -111,18 +117,26 @@ fn rivals(carrier: &str, joins: std::ops::Range<u64>) {
     let place = Place::new(&format!("cave-rivals-{carrier}"), &wall());
     let server = place.start("serve", &["--transport", carrier, "--summary", &place.path("summary.json")]);
     let [l, r] = ["l", "r"].map(|name| {
-        place.start("facet", &["--facet", name, "--no-pictures", "--log-dir", &place.path("out"), "--wait", "60"])
+        place.start(
+            "facet",
+            &["--facet", name, "--no-pictures", "--log-dir", &place.path("out"), "--connect-timeout", "60"],
+        )
     });
     place.wait_for("out", "r", 5);
     let (code, _, wrong) = place
-        .start("facet", &["--facet", "l", "--no-pictures", "--log-dir", &place.path("second"), "--wait", "60"])
+        .start(
+            "facet",
+            &["--facet", "l", "--no-pictures", "--log-dir", &place.path("second"), "--connect-timeout", "60"],
+        )
         .end();
     assert!(code == Some(2) && wrong.contains("another process shows facet 'l' and answers"), "{code:?}: {wrong}");
     let at = *numbers(&place.log("out", "r")).last().unwrap();
     place.wait_for("out", "l", at);
     signal(l.pid(), Signal::KILL);
-    let again =
-        place.start("facet", &["--facet", "l", "--no-pictures", "--log-dir", &place.path("third"), "--wait", "60"]);
+    let again = place.start(
+        "facet",
+        &["--facet", "l", "--no-pictures", "--log-dir", &place.path("third"), "--connect-timeout", "60"],
+    );
     place.wait_for("third", "l", at + 5);
     signal(server.pid(), Signal::TERM);
     let (code, said, wrong) = server.end();
@@ -189,7 +203,7 @@ fn what_a_killed_start_has_recorded_goes_with_the_next_recording() {
             .count()
     };
     let start = || {
-        let run = place.start("serve", &["--record", &record, "--wait", "60"]);
+        let run = place.start("serve", &["--record", &record, "--connect-timeout", "60"]);
         wait("the recording", || hidden() == 1);
         run
     };
@@ -263,7 +277,7 @@ fn a_node_that_cannot_be_reached_and_a_time_that_is_too_short_are_told() {
     let text = wall().replace("name = \"l\"\nscreen", "name = \"l\"\nnode = \"far\"\nscreen") + &far;
     assert!(text.contains("node = \"far\""));
     std::fs::write(&place.cave, text).unwrap();
-    let (code, _, wrong) = place.start("cave", &["--no-pictures", "--wait", "5"]).end();
+    let (code, _, wrong) = place.start("cave", &["--no-pictures", "--connect-timeout", "5"]).end();
     assert_eq!(code, Some(2), "{wrong}");
     assert!(wrong.contains("node far: ") && wrong.contains(nowhere) && wrong.contains("--listen ADDR:PORT"), "{wrong}");
     place.assert_clean();
@@ -287,11 +301,11 @@ fn a_wrong_key_is_named() {
     };
     let place = Place::new("cave-key", &(wall() + "transport = \"udp\"\n[security]\nkey_file = \"cave.key\"\n"));
     key(&place, "1");
-    let server = place.start("serve", &["--wait", "60", "--listen", "127.0.0.1:0"]);
+    let server = place.start("serve", &["--connect-timeout", "60", "--listen", "127.0.0.1:0"]);
     // the key is read before the lock is taken, and the lock names the address last
     wait("the address", || lines(place.folder.path("run")).contains("127.0.0.1"));
     key(&place, "2");
-    let (code, _, wrong) = place.start("facet", &["--facet", "l", "--no-pictures", "--wait", "1"]).end();
+    let (code, _, wrong) = place.start("facet", &["--facet", "l", "--no-pictures", "--connect-timeout", "1"]).end();
     assert!(code == Some(1) && wrong.contains("no server answers") && wrong.contains("another key file"), "{wrong}");
     signal(server.pid(), Signal::TERM);
     let (code, _, wrong) = server.end();

@@ -23,7 +23,7 @@ fn is_to_present(facet: &mut Facet<UdpFacet>) -> bool {
         }
         Task::Present(_) => true,
         Task::Wait(_) => false,
-        Task::Over(why) => panic!("{why:?}"),
+        Task::Ended(why) => panic!("{why:?}"),
     }
 }
 
@@ -72,7 +72,7 @@ fn the_summary_tells_how_late_a_facet_was_and_what_was_refused() {
     second.leave().unwrap();
     server.end();
     let told = json(&summary);
-    assert_eq!(told["strangers"], serde_json::json!({ "truncated": 3, "oversize": 2, "foreign": 4 }));
+    assert_eq!(told["unknown_peers"], serde_json::json!({ "truncated": 3, "oversize": 2, "foreign": 4 }));
     let ms = |what: &str| told[what]["p50_ms"].as_f64().unwrap();
     // an input of one frame is shown by the next, and both wait for the second facet
     let later = 1e3 * LATER.as_secs_f64();
@@ -89,7 +89,7 @@ fn the_summary_tells_how_late_a_facet_was_and_what_was_refused() {
 fn a_tracker_from_other_machines_is_named_or_not_heard() {
     let (folder, scene, cave) = crate::cave_users::place("cave-tracker-open");
     let run = |more: &[&str]| {
-        let args = ["serve", &scene, "--cave", &cave, "--wait", "0.2", "--tracker"];
+        let args = ["serve", &scene, "--cave", &cave, "--connect-timeout", "0.2", "--tracker"];
         let out = in_place(&folder, &[&args, more].concat()).output().unwrap();
         (out.status.code(), String::from_utf8(out.stderr).unwrap())
     };

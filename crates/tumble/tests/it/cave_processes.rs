@@ -25,7 +25,7 @@ fn all_facets_show_the_same_frames(test: &str, frames: u64) {
                 "--duration",
                 &seconds,
                 "--no-realtime",
-                "--stamp",
+                "--burn-in",
                 "--frames-dir",
                 &place.path("out"),
                 "--summary",
@@ -125,7 +125,11 @@ fn datagrams_carry_the_same_states_as_shared_memory() {
         );
         assert_eq!(summary["frames"], 41);
         assert_eq!(summary["transport"].as_str().unwrap().replace(' ', "_"), transport);
-        assert_eq!(summary["strangers"], serde_json::json!({}), "late packets of facets that left are no strangers'");
+        assert_eq!(
+            summary["unknown_peers"],
+            serde_json::json!({}),
+            "late packets of facets that left are no strangers'"
+        );
         place.assert_clean();
     }
     for facet in ["front", "left", "right", "floor"] {
@@ -178,9 +182,10 @@ fn a_run_that_goes_on_is_refused_by_name_or_replaced() {
 #[test]
 fn a_facet_of_another_scene_is_refused_with_both_hashes() {
     let place = Place::new("cave-refused", &wall());
-    let server = place.start("serve", &["--wait", "60"]);
+    let server = place.start("serve", &["--connect-timeout", "60"]);
     let other = place.folder.write("other.toml", SCENE.replace("radius_m = 0.3", "radius_m = 0.31"));
-    let mut facet = command(&["facet", &other, "--cave", &place.cave, "--facet", "l", "--no-pictures", "--wait", "60"]);
+    let mut facet =
+        command(&["facet", &other, "--cave", &place.cave, "--facet", "l", "--no-pictures", "--connect-timeout", "60"]);
     let out = facet.env("XDG_RUNTIME_DIR", place.folder.path("run")).output().unwrap();
     let wrong = String::from_utf8_lossy(&out.stderr);
     assert_eq!(out.status.code(), Some(2), "{wrong}");
@@ -194,10 +199,10 @@ fn a_facet_of_another_scene_is_refused_with_both_hashes() {
 #[test]
 fn who_is_missing_at_the_start_is_named() {
     let place = Place::new("cave-missing", &wall());
-    let (code, _, wrong) = place.start("serve", &["--wait", "0.3"]).end();
+    let (code, _, wrong) = place.start("serve", &["--connect-timeout", "0.3"]).end();
     assert_eq!(code, Some(1), "{wrong}");
     assert!(wrong.contains("tumble facet") && wrong.contains("l, r did not join within 0.3 s"), "{wrong}");
-    let (code, _, wrong) = place.start("facet", &["--facet", "l", "--no-pictures", "--wait", "0.3"]).end();
+    let (code, _, wrong) = place.start("facet", &["--facet", "l", "--no-pictures", "--connect-timeout", "0.3"]).end();
     assert_eq!(code, Some(1), "{wrong}");
     assert!(wrong.contains("no run goes on"), "{wrong}");
     // a facet that cannot start ends the start, not the patience

@@ -4,7 +4,7 @@ use crate::cave_place::in_place;
 use crate::cave_users::place;
 use crate::common::*;
 use tumble::net::record::recover;
-use tumble::net::sync::{Replay, ReplayFrame};
+use tumble::net::sync::{RecordedFrame, SessionReader};
 
 /// Of an MCAP file: opcode, begin and end of each record. (Magic of 8 bytes, then records of an opcode, a length of 8 bytes, and so many bytes.)
 fn records(bytes: &[u8]) -> Vec<(u8, usize, usize)> {
@@ -40,8 +40,8 @@ fn chunks(bytes: &[u8]) -> Vec<(usize, usize)> {
     chunks
 }
 
-fn frames(path: &std::path::Path) -> Vec<ReplayFrame> {
-    let mut replay = Replay::open(path).unwrap();
+fn frames(path: &std::path::Path) -> Vec<RecordedFrame> {
+    let mut replay = SessionReader::open(path).unwrap();
     std::iter::from_fn(|| replay.next_frame().unwrap()).collect()
 }
 

@@ -8,7 +8,7 @@ use serde_json::{Value, json as value};
 use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 use tumble::collide::Vec3;
-use tumble::net::sync::Replay;
+use tumble::net::sync::SessionReader;
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -61,7 +61,7 @@ fn a_tracker_moves_heads_and_hands_and_what_is_wrong_is_counted() {
         &folder,
         &scene,
         &cave,
-        &["--push", "--tracker", &sender.to.to_string(), "--summary", &text(&summary)],
+        &["--user-colliders", "--tracker", &sender.to.to_string(), "--summary", &text(&summary)],
     );
     server.show_until(5, |_| {});
     assert_eq!(server.facet.viewer().users[0].head.translation.vector, Vec3::new(0.0, 0.0, 1.5));
@@ -145,16 +145,16 @@ fn a_tracker_moves_heads_and_hands_and_what_is_wrong_is_counted() {
     server.end();
     let summary = json(&summary);
     let expected = value!({
-        "out_of_range": 3, "no_rotation": 1, "unknown_user": 1, "unknown_address": 3 + 64, "arguments": 4, "too_long": 1, "malformed": 4, "too_many": 1,
+        "out_of_range": 3, "invalid_rotation": 1, "unknown_user": 1, "unknown_address": 3 + 64, "arguments": 4, "too_long": 1, "malformed": 4, "too_many": 1,
     });
     assert_eq!(summary["tracker"]["dropped"], expected);
-    assert!(summary["heads_refused"].as_u64() >= Some(1), "{summary}");
+    assert!(summary["heads_rejected"].as_u64() >= Some(1), "{summary}");
 }
 
 #[test]
 fn keys_stretch_out_a_hand() {
     let (folder, scene, cave) = place("cave-hands");
-    let mut server = Server::start(&folder, &scene, &cave, &["--push"]);
+    let mut server = Server::start(&folder, &scene, &cave, &["--user-colliders"]);
     let right = |server: &Server| {
         let world = server.facet.world();
         world.part_state(world.find("user 0 right hand").unwrap(), 0).unwrap().position()
@@ -230,7 +230,7 @@ fn what_users_did_is_done_again_bit_by_bit() {
         &folder,
         &scene,
         &cave,
-        &["--push", "--tracker", &sender.to.to_string(), "--record", &path("first.mcap")],
+        &["--user-colliders", "--tracker", &sender.to.to_string(), "--record", &path("first.mcap")],
     );
     server.show_until(150, |input| {
         input.keys = vec![if input.sequence % 40 < 30 { 0x1A } else { 0x04 }];
@@ -252,7 +252,7 @@ fn what_users_did_is_done_again_bit_by_bit() {
             &cave,
             "--no-realtime",
             "--no-pictures",
-            "--input-from",
+            "--replay-input",
             &path("first.mcap"),
             "--record",
             &file,
@@ -260,15 +260,15 @@ fn what_users_did_is_done_again_bit_by_bit() {
             &text(&summary),
         ];
         let out = in_place(&folder, &[&fixed[..], args].concat()).output().unwrap();
-        (json(&summary)["input_from"].clone(), out.status.code(), String::from_utf8_lossy(&out.stderr).into_owned())
+        (json(&summary)["replay_input"].clone(), out.status.code(), String::from_utf8_lossy(&out.stderr).into_owned())
     };
     let frames = |name: &str| {
-        let mut replay = Replay::open(path(name)).unwrap();
+        let mut replay = SessionReader::open(path(name)).unwrap();
         std::iter::from_fn(|| replay.next_frame().unwrap())
             .map(|f| (f.recorded.frame, f.recorded.state, f.inputs))
             .collect::<Vec<_>>()
     };
-    let (counts, code, wrong) = again("second", &["--push"]);
+    let (counts, code, wrong) = again("second", &["--user-colliders"]);
     assert_eq!(code, Some(0), "{wrong}");
     let (first, second) = (frames("first.mcap"), frames("second.mcap"));
     assert!(first.len() > 150);
@@ -294,7 +294,7 @@ fn what_users_did_is_done_again_bit_by_bit() {
             &cave,
             "--no-realtime",
             "--no-pictures",
-            "--input-from",
+            "--replay-input",
             &path("first.mcap"),
             "--dt",
             "0.02",

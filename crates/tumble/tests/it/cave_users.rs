@@ -8,7 +8,7 @@ use std::process::{Child, ChildStderr, Stdio};
 use std::time::{Duration, Instant};
 use tumble::collide::{Pose, Vec3};
 use tumble::net::sync::udp::{Timing, UdpFacet};
-use tumble::net::sync::{Facet, FacetOptions, Input, Over, Task};
+use tumble::net::sync::{EndReason, Facet, FacetOptions, Input, Task};
 
 /// Nothing here waits longer.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -83,7 +83,7 @@ fn joined_hash(folder: &Folder, scene: &str, cave: &str) -> [u8; 32] {
     let start = Instant::now();
     let why = loop {
         assert!(start.elapsed() < PATIENCE, "no answer came");
-        if let Task::Over(Over::Refused(why)) = stranger.next(Duration::from_millis(20)).unwrap() {
+        if let Task::Ended(EndReason::Refused(why)) = stranger.next(Duration::from_millis(20)).unwrap() {
             break why;
         }
     };
@@ -141,7 +141,7 @@ impl Server {
                     }
                 }
                 Task::Wait(_) => {}
-                Task::Over(why) => panic!("{why:?}"),
+                Task::Ended(why) => panic!("{why:?}"),
             }
         }
     }
@@ -232,7 +232,7 @@ fn a_wand_pulls_what_it_points_at() {
 #[test]
 fn a_body_pushes_what_it_walks_into() {
     let (folder, scene, cave) = place("cave-push");
-    let mut server = Server::start(&folder, &scene, &cave, &["--push"]);
+    let mut server = Server::start(&folder, &scene, &cave, &["--user-colliders"]);
     // the capsule of 0.25 m meets the ball of 0.2 m when the cave has gone 1.55 m; at 1.5 m/s after 1.03 s
     server.show_until(90, |input| input.keys = vec![0x1A]);
     assert_eq!(server.ball(), Vec3::new(0.0, 2.0, 1.0));

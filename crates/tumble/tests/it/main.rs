@@ -2,12 +2,12 @@
 
 mod articulated_scenes;
 mod bad_input;
-mod cave_ends;
 mod cave_faults;
 mod cave_figures;
 mod cave_place;
 mod cave_processes;
 mod cave_recordings;
+mod cave_run_ends;
 mod cave_tracker;
 mod cave_users;
 mod cave_windows;

@@ -12,21 +12,21 @@
 mod receiving;
 
 use super::input::Input;
-use super::messages::{Done, FacetCounts, Join, count};
+use super::messages::{FacetCounts, FrameAck, Join, increment};
 use super::mirror::Mirror;
-use super::server::Pace;
+use super::server::SyncMode;
 use super::transport::{Delivery, LinkEvent, Message};
 use super::viewer::Viewer;
-use super::wire::{HEADER_BYTES, Hash, Header, Kind, later, message};
+use super::wire::{HEADER_BYTES, Hash, MessageHeader, MessageKind, is_later, message};
 use std::collections::VecDeque;
 use std::time::Duration;
 use tumble_core::World;
 
 /// Inputs remembered until a picture shows them.
-const MAX_INPUTS: usize = 256;
+const MAX_PENDING_INPUTS: usize = 256;
 
 /// The half of a joining's number that tells the process.
-const PROCESS: u64 = !0 << 32;
+const PROCESS_MASK: u64 = !0 << 32;
 
 /// What a facet is told at the start.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,11 +38,11 @@ pub struct FacetOptions {
     /// Whether it wants exact messages (a replica) and not poses.
     pub exact: bool,
     /// When frames are shown; as the server's.
-    pub pace: Pace,
+    pub mode: SyncMode,
     /// `drop_timeout_ms`: the server is lost when nothing was heard for so long.
-    pub drop_after: Duration,
+    pub drop_timeout: Duration,
     /// How often it asks to be let in.
-    pub join_every: Duration,
+    pub join_interval: Duration,
     /// Where the numbers of its joinings begin: another one at each start of the process. The upper half of all of them tells the process.
     pub seed: u64,
 }
@@ -55,9 +55,9 @@ impl FacetOptions {
             name: name.to_owned(),
             scene,
             exact: false,
-            pace: Pace::Lockstep,
-            drop_after: ms(2000),
-            join_every: ms(250),
+            mode: SyncMode::Lockstep,
+            drop_timeout: ms(2000),
+            join_interval: ms(250),
             seed,
         }
     }
@@ -67,18 +67,18 @@ impl FacetOptions {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Task {
     /// Wait for a message.
-    Wait(Waiting),
+    Wait(WaitReason),
     /// [`begin`](FacetSession::begin), draw [`world`](FacetSession::world), and say [`drawn`](FacetSession::drawn).
     Draw,
     /// Show what was drawn, and say [`presented`](FacetSession::presented).
     Present(u64),
     /// Nothing any more.
-    Over(Over),
+    Ended(EndReason),
 }
 
 /// What a facet waits for: what its screen should say where it has no picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Waiting {
+pub enum WaitReason {
     /// A server, for the first time.
     Server,
     /// A server: the one it had is lost. The last picture is old.
@@ -91,7 +91,7 @@ pub enum Waiting {
 
 /// Why it is over.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Over {
+pub enum EndReason {
     /// The server said that the run is over.
     Ended,
     /// The server does not let it in.
@@ -104,12 +104,12 @@ pub enum Over {
 enum Phase {
     Joining,
     Live,
-    Over(Over),
+    Ended(EndReason),
 }
 
 /// A state that waits to be drawn.
-struct Pending {
-    header: Header,
+struct PendingState {
+    header: MessageHeader,
     message: Message,
     arrived: Duration,
 }
@@ -125,28 +125,28 @@ pub struct FacetSession {
     /// In the upper half of the numbers of its joinings.
     process: u64,
     asked: Option<Duration>,
-    heard: Duration,
-    beaten: Duration,
+    last_received: Duration,
+    last_heartbeat: Duration,
     resynced: Option<Duration>,
     /// Frame of the newest snapshot.
     listed: Option<u64>,
     /// The newest frame that came.
     newest: Option<u64>,
-    pending: Option<Pending>,
+    pending: Option<PendingState>,
     /// Came before its list of objects, or before the answer to JOIN.
-    early: Option<Pending>,
+    early: Option<PendingState>,
     /// A list of objects that came while a frame is being drawn: it waits, since that frame is of the old one.
-    list: Option<Pending>,
+    list: Option<PendingState>,
     /// Applied, and being drawn: frame and when it came.
     drawing: Option<(u64, Duration)>,
     /// Drawn: frame, what READY said, when it was drawn.
-    held: Option<(u64, Done, Duration)>,
+    drawn_frame: Option<(u64, FrameAck, Duration)>,
     show: bool,
     /// When PRESENT came for the frame that is held.
-    told: Option<Duration>,
+    present_received: Option<Duration>,
     /// Inputs that no picture has shown yet: user, number, when they were sent.
     inputs: VecDeque<(u16, u64, Duration)>,
-    shown: Option<(u64, Done)>,
+    shown: Option<(u64, FrameAck)>,
     counts: FacetCounts,
     out: Vec<(Delivery, Vec<u8>)>,
     close: bool,
@@ -156,7 +156,7 @@ impl FacetSession {
     /// `base`: the world as the scene file makes it.
     pub fn new(options: FacetOptions, base: World) -> FacetSession {
         let mut session = FacetSession {
-            process: mixed(options.seed) & PROCESS,
+            process: splitmix64(options.seed) & PROCESS_MASK,
             options,
             mirror: Mirror::new(base),
             phase: Phase::Joining,
@@ -164,8 +164,8 @@ impl FacetSession {
             run: 0,
             join: 0,
             asked: None,
-            heard: Duration::ZERO,
-            beaten: Duration::ZERO,
+            last_received: Duration::ZERO,
+            last_heartbeat: Duration::ZERO,
             resynced: None,
             listed: None,
             newest: None,
@@ -173,16 +173,16 @@ impl FacetSession {
             early: None,
             list: None,
             drawing: None,
-            held: None,
+            drawn_frame: None,
             show: false,
-            told: None,
+            present_received: None,
             inputs: VecDeque::new(),
             shown: None,
             counts: FacetCounts::default(),
             out: Vec::new(),
             close: false,
         };
-        session.join_anew();
+        session.restart_join();
         session
     }
 
@@ -202,7 +202,7 @@ impl FacetSession {
     }
 
     /// The frame shown last since the last joining, and what PRESENTED said of it.
-    pub fn shown(&self) -> Option<(u64, Done)> {
+    pub fn shown(&self) -> Option<(u64, FrameAck)> {
         self.shown
     }
 
@@ -218,22 +218,22 @@ impl FacetSession {
 
     /// What to do next.
     pub fn task(&self) -> Task {
-        match (&self.phase, &self.held, &self.pending) {
-            (Phase::Over(why), ..) => Task::Over(why.clone()),
+        match (&self.phase, &self.drawn_frame, &self.pending) {
+            (Phase::Ended(why), ..) => Task::Ended(why.clone()),
             (_, Some((frame, ..)), _) if self.show => Task::Present(*frame),
-            (Phase::Joining, ..) => Task::Wait(if self.lost { Waiting::Lost } else { Waiting::Server }),
-            (_, Some((frame, ..)), _) => Task::Wait(Waiting::Others(*frame)),
+            (Phase::Joining, ..) => Task::Wait(if self.lost { WaitReason::Lost } else { WaitReason::Server }),
+            (_, Some((frame, ..)), _) => Task::Wait(WaitReason::Others(*frame)),
             (_, None, Some(_)) => Task::Draw,
-            (_, None, None) => Task::Wait(Waiting::Frame),
+            (_, None, None) => Task::Wait(WaitReason::Frame),
         }
     }
 
     /// Applies the frame that waits to be drawn; its number. `None`: there is none, or it does not fit and was refused.
     pub fn begin(&mut self) -> Option<u64> {
-        let Pending { header, message, arrived } = self.pending.take()?;
+        let PendingState { header, message, arrived } = self.pending.take()?;
         let applied = self.mirror.apply_state(header.frame, header.time_s, message.get(HEADER_BYTES..).unwrap_or(&[]));
         if applied.is_err() {
-            count(&mut self.counts.refused);
+            increment(&mut self.counts.refused);
             self.newest = None; // so that it is taken when it comes again
             self.resync(arrived);
             return None;
@@ -246,38 +246,44 @@ impl FacetSession {
     pub fn drawn(&mut self, now: Duration, image: Hash) {
         let Some((frame, arrived)) = self.drawing.take() else { return };
         let took_us = short_micros(now.saturating_sub(arrived));
-        let done = Done {
+        let done = FrameAck {
             hash: self.mirror.hash(),
             image,
             took_us,
             input_us: None,
-            heard_us: Some(micros(arrived)),
-            at_us: micros(now),
+            received_us: Some(micros(arrived)),
+            completed_us: micros(now),
         };
-        self.held = Some((frame, done, now));
-        self.show = self.options.pace == Pace::Latest || self.pending.is_some();
-        self.told = (self.options.pace == Pace::Latest).then_some(arrived);
-        if self.options.pace == Pace::Lockstep {
-            self.answer(Kind::Ready, frame, &done);
+        self.drawn_frame = Some((frame, done, now));
+        self.show = self.options.mode == SyncMode::Latest || self.pending.is_some();
+        self.present_received = (self.options.mode == SyncMode::Latest).then_some(arrived);
+        if self.options.mode == SyncMode::Lockstep {
+            self.answer(MessageKind::Ready, frame, &done);
         }
-        if let Some(Pending { header, message, .. }) = self.list.take()
+        if let Some(PendingState { header, message, .. }) = self.list.take()
             && self.on_snapshot(now, &header, &message[HEADER_BYTES..]).is_err()
         {
-            count(&mut self.counts.refused);
+            increment(&mut self.counts.refused);
         }
     }
 
     /// The frame that was held is on the screen.
     pub fn presented(&mut self, now: Duration) {
-        let Some((frame, done, since)) = self.held.take() else { return };
+        let Some((frame, done, since)) = self.drawn_frame.take() else { return };
         let (took_us, input_us) = (
             short_micros(now.saturating_sub(since)),
             self.take_shown_input().map(|sent| short_micros(now.saturating_sub(sent))),
         );
-        let done = Done { took_us, input_us, heard_us: self.told.take().map(micros), at_us: micros(now), ..done };
+        let done = FrameAck {
+            took_us,
+            input_us,
+            received_us: self.present_received.take().map(micros),
+            completed_us: micros(now),
+            ..done
+        };
         (self.show, self.shown) = (false, Some((frame, done)));
-        count(&mut self.counts.shown);
-        self.answer(Kind::Presented, frame, &done);
+        increment(&mut self.counts.shown);
+        self.answer(MessageKind::Presented, frame, &done);
     }
 
     /// When the newest of our inputs was sent that the picture shows, if it is the first to; all up to it are forgotten.
@@ -290,7 +296,7 @@ impl FacetSession {
             .rev()
             .find(|(user, sequence, _)| shows(*user) == Some(*sequence))
             .map(|(.., sent)| *sent);
-        self.inputs.retain(|(user, sequence, _)| shows(*user).is_none_or(|shown| later(*sequence, shown)));
+        self.inputs.retain(|(user, sequence, _)| shows(*user).is_none_or(|shown| is_later(*sequence, shown)));
         newest
     }
 
@@ -298,11 +304,11 @@ impl FacetSession {
     pub fn send_input(&mut self, now: Duration, input: &Input) -> bool {
         let live = self.phase == Phase::Live;
         if live {
-            if self.inputs.len() == MAX_INPUTS {
+            if self.inputs.len() == MAX_PENDING_INPUTS {
                 self.inputs.pop_front();
             }
             self.inputs.push_back((input.user, input.sequence, now));
-            self.send(Kind::Input, 0, |out| input.write(out));
+            self.send(MessageKind::Input, 0, |out| input.write(out));
         }
         live
     }
@@ -310,9 +316,9 @@ impl FacetSession {
     /// Says good-bye.
     pub fn leave(&mut self) {
         if self.phase == Phase::Live {
-            self.send(Kind::Leave, 0, |_| {});
+            self.send(MessageKind::Leave, 0, |_| {});
         }
-        self.phase = Phase::Over(Over::Left);
+        self.phase = Phase::Ended(EndReason::Left);
     }
 
     /// Takes what the link reports, and the message, if it is one: a state is kept as it came until it is drawn.
@@ -321,9 +327,9 @@ impl FacetSession {
             LinkEvent::Opened => self.asked = None,
             LinkEvent::Message => self.on_message(now, message),
             LinkEvent::Closed(_) => match self.phase {
-                Phase::Live => self.lose(),
-                Phase::Joining => self.join_anew(), // the server may have taken the old number, and takes none twice
-                Phase::Over(_) => {}
+                Phase::Live => self.on_server_lost(),
+                Phase::Joining => self.restart_join(), // the server may have taken the old number, and takes none twice
+                Phase::Ended(_) => {}
             },
         }
         self.advance(now);
@@ -332,52 +338,52 @@ impl FacetSession {
     /// Does what is due by now: call it whenever `recv` returns.
     pub fn advance(&mut self, now: Duration) {
         match self.phase {
-            Phase::Over(_) => {}
+            Phase::Ended(_) => {}
             Phase::Joining => {
-                if self.asked.is_none_or(|asked| now >= asked.saturating_add(self.options.join_every)) {
+                if self.asked.is_none_or(|asked| now >= asked.saturating_add(self.options.join_interval)) {
                     self.asked = Some(now);
                     let join =
                         Join { scene: self.options.scene, name: self.options.name.clone(), exact: self.options.exact };
-                    self.send(Kind::Join, 0, |out| join.write(out));
+                    self.send(MessageKind::Join, 0, |out| join.write(out));
                 }
             }
             Phase::Live => {
-                if now >= self.heard.saturating_add(self.options.drop_after) {
-                    self.lose();
+                if now >= self.last_received.saturating_add(self.options.drop_timeout) {
+                    self.on_server_lost();
                     self.close = true;
-                } else if now >= self.beaten.saturating_add(self.options.drop_after / 4) {
-                    self.beaten = now;
+                } else if now >= self.last_heartbeat.saturating_add(self.options.drop_timeout / 4) {
+                    self.last_heartbeat = now;
                     let counts = self.counts;
-                    self.send(Kind::Beat, 0, |out| counts.write(out));
+                    self.send(MessageKind::Heartbeat, 0, |out| counts.write(out));
                 }
             }
         }
     }
 
-    fn lose(&mut self) {
-        count(&mut self.counts.lost);
+    fn on_server_lost(&mut self) {
+        increment(&mut self.counts.lost);
         self.lost = true;
-        self.join_anew();
+        self.restart_join();
     }
 
-    fn join_anew(&mut self) {
+    fn restart_join(&mut self) {
         self.options.seed = self.options.seed.wrapping_add(1);
         (self.phase, self.run, self.join, self.asked) =
-            (Phase::Joining, 0, self.process | mixed(self.options.seed) & !PROCESS, None);
+            (Phase::Joining, 0, self.process | splitmix64(self.options.seed) & !PROCESS_MASK, None);
         (self.listed, self.newest, self.resynced) = (None, None, None);
-        (self.pending, self.early, self.list, self.drawing, self.held, self.show, self.shown) =
+        (self.pending, self.early, self.list, self.drawing, self.drawn_frame, self.show, self.shown) =
             (None, None, None, None, None, false, None);
-        (self.told, self.inputs) = (None, VecDeque::new());
+        (self.present_received, self.inputs) = (None, VecDeque::new());
     }
 
-    fn answer(&mut self, kind: Kind, frame: u64, done: &Done) {
+    fn answer(&mut self, kind: MessageKind, frame: u64, done: &FrameAck) {
         if self.phase == Phase::Live {
             self.send(kind, frame, |out| done.write(out));
         }
     }
 
-    fn send(&mut self, kind: Kind, frame: u64, write: impl FnOnce(&mut Vec<u8>)) {
-        let header = Header { kind, run: self.run, join: self.join, frame, time_s: 0.0 };
+    fn send(&mut self, kind: MessageKind, frame: u64, write: impl FnOnce(&mut Vec<u8>)) {
+        let header = MessageHeader { kind, run: self.run, join: self.join, frame, time_s: 0.0 };
         self.out.push((Delivery::Reliable, message(&header, write)));
     }
 }
@@ -391,7 +397,7 @@ fn micros(duration: Duration) -> u64 {
 }
 
 /// A number that looks nothing like its neighbours: splitmix64.
-pub(crate) fn mixed(seed: u64) -> u64 {
+pub(crate) fn splitmix64(seed: u64) -> u64 {
     let mut z = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);

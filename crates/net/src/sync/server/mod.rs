@@ -9,33 +9,33 @@
 //!  frame:  idle ──publish──► ready? ──all in step are, or ready_after──► presented? ──all in step have, or ready_after──► idle
 //! ```
 //!
-//! A facet that is *following* gets all messages and nobody waits for it: a wall stands still once, for `ready_after`, when a facet freezes. A facet that
-//! joined before the first frame is waited for from that frame on, for `first_after`.
+//! A facet that is *following* gets all messages and nobody waits for it: a wall stands still once, for `ready_timeout`, when a facet freezes. A facet that
+//! joined before the first frame is waited for from that frame on, for `first_frame_timeout`.
 
-mod answers;
+mod duplicate_facets;
+mod frame_times;
 mod frames;
-mod rivals;
+mod receiving;
 mod sending;
-mod times;
 
-pub use times::FrameTimes;
+pub use frame_times::FrameTimes;
 
 use super::input::Input;
-use super::messages::{Done, FacetCounts};
+use super::messages::{FacetCounts, FrameAck};
 use super::publisher::Publisher;
 use super::transport::{Closed, Delivery, FacetNumber, LinkEvent, MAX_FACETS};
-use super::wire::{Hash, Kind};
-use rivals::Rivals;
-pub(crate) use rivals::process_of;
+use super::wire::{Hash, MessageKind};
+use duplicate_facets::DuplicateFacets;
+pub(crate) use duplicate_facets::process_of;
+use frame_times::{ClockOffset, FrameTimer, RequestTime};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
-use times::{Asked, Clock, Times};
 use tumble_core::World;
 
 /// When a frame is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pace {
+pub enum SyncMode {
     /// When every critical facet has drawn it.
     Lockstep,
     /// By each facet as soon as it has drawn it.
@@ -44,7 +44,7 @@ pub enum Pace {
 
 /// A facet that may join.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Seat {
+pub struct FacetSlot {
     /// Its name in the cave file.
     pub name: String,
     /// Whether the others wait for it.
@@ -59,37 +59,37 @@ pub struct ServerOptions {
     /// BLAKE3 of the scene.
     pub scene: [u8; 32],
     /// The facets, by number; at most [`MAX_FACETS`], the rest cannot join.
-    pub seats: Vec<Seat>,
+    pub slots: Vec<FacetSlot>,
     /// `mode`.
-    pub pace: Pace,
+    pub mode: SyncMode,
     /// `ready_timeout_ms`: how long those who are ready wait for the others.
-    pub ready_after: Duration,
+    pub ready_timeout: Duration,
     /// How long the first frame of who joined before it may take.
-    pub first_after: Duration,
+    pub first_frame_timeout: Duration,
     /// `drop_timeout_ms`.
-    pub drop_after: Duration,
+    pub drop_timeout: Duration,
     /// `history_frames`: frames whose hashes are remembered.
     pub history: usize,
     /// For links that may lose messages, how long to wait before one is sent again; `None` where the link sees to that.
-    pub resend_after: Option<Duration>,
+    pub resend_interval: Option<Duration>,
     /// Number of the first frame.
     pub first_frame: u64,
 }
 
 impl ServerOptions {
     /// The defaults of a cave file.
-    pub fn new(run: u64, scene: [u8; 32], seats: Vec<Seat>) -> ServerOptions {
+    pub fn new(run: u64, scene: [u8; 32], slots: Vec<FacetSlot>) -> ServerOptions {
         let ms = Duration::from_millis;
         ServerOptions {
             run,
             scene,
-            seats,
-            pace: Pace::Lockstep,
-            ready_after: ms(100),
-            first_after: ms(10_000),
-            drop_after: ms(2000),
+            slots,
+            mode: SyncMode::Lockstep,
+            ready_timeout: ms(100),
+            first_frame_timeout: ms(10_000),
+            drop_timeout: ms(2000),
             history: 8,
-            resend_after: None,
+            resend_interval: None,
             first_frame: 0,
         }
     }
@@ -97,7 +97,7 @@ impl ServerOptions {
 
 /// How a facet stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Standing {
+pub enum Membership {
     /// Not there.
     Absent,
     /// There; nobody waits for it.
@@ -108,7 +108,7 @@ pub enum Standing {
 
 /// What the server counted about one facet. Counts wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-pub struct SeatCounts {
+pub struct SlotCounts {
     /// Times it joined.
     pub joined: u64,
     /// Times it was dropped: silent, or its link closed.
@@ -142,9 +142,9 @@ pub enum ServerEvent {
     /// A facet is gone: silent, closed, or by its own word (`true`).
     Gone(FacetNumber, bool),
     /// A facet has drawn a frame; whether it is what was sent.
-    Ready(FacetNumber, u64, Done, bool),
+    Ready(FacetNumber, u64, FrameAck, bool),
     /// A facet has shown a frame; whether it is what was sent.
-    Presented(FacetNumber, u64, Done, bool),
+    Presented(FacetNumber, u64, FrameAck, bool),
     /// A frame went on without a facet.
     Late(FacetNumber, u64),
     /// When a frame was shown, of those who showed it. In lockstep just before `Finished`, in `latest` some frames later.
@@ -169,16 +169,16 @@ pub struct ToFacets {
 /// Events kept for who does not ask for them.
 const MAX_EVENTS: usize = 1 << 16;
 /// Earlier joinings of a facet that are remembered as such.
-const MAX_RETIRED: usize = 8;
+const MAX_FORMER_JOINS: usize = 8;
 
-struct Place {
-    seat: Seat,
-    standing: Standing,
+struct FacetState {
+    slot: FacetSlot,
+    membership: Membership,
     join: u64,
-    retired: VecDeque<u64>,
-    rivals: Rivals,
+    former_joins: VecDeque<u64>,
+    duplicate_facets: DuplicateFacets,
     exact: bool,
-    heard: Duration,
+    last_received: Duration,
     sent: Duration,
     /// It has answered the snapshot with a frame.
     synced: bool,
@@ -187,17 +187,17 @@ struct Place {
     /// While it follows: the frame that it was ready for last, and when it said so.
     answered: Option<(u64, Duration)>,
     /// It is drawing in time again, and is waited for from the next frame on; until it is ready for that one.
-    keeps_up: bool,
-    counts: SeatCounts,
-    told: FacetCounts,
+    caught_up: bool,
+    counts: SlotCounts,
+    reported: FacetCounts,
     inputs: std::collections::BTreeMap<u16, u64>,
-    clock: Clock,
-    asked_state: Asked,
-    asked_present: Asked,
+    clock: ClockOffset,
+    state_requested: RequestTime,
+    present_requested: RequestTime,
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Stage {
+enum FrameStage {
     Idle,
     Ready(Duration),
     Presented(Duration),
@@ -216,50 +216,50 @@ struct Stream {
 /// The server's session.
 pub struct ServerSession {
     options: ServerOptions,
-    places: Vec<Place>,
+    facets: Vec<FacetState>,
     /// Poses, exact.
     streams: [Stream; 2],
     /// The frame published last.
     frame: Option<u64>,
     next: u64,
     time_s: f64,
-    stage: Stage,
+    stage: FrameStage,
     /// When the first of those who are waited for was ready for the frame.
-    first_ready: Option<Duration>,
+    first_ready_at: Option<Duration>,
     out: Vec<ToFacets>,
     events: VecDeque<ServerEvent>,
     close: Vec<FacetNumber>,
     ended: bool,
-    times: Times,
+    frame_times: FrameTimer,
 }
 
 impl ServerSession {
     /// `base`: the world as the scene file makes it, before the first step.
     pub fn new(mut options: ServerOptions, base: &World) -> ServerSession {
-        options.seats.truncate(MAX_FACETS);
+        options.slots.truncate(MAX_FACETS);
         options.history = options.history.clamp(1, 1024);
-        let place = |seat: &Seat| Place {
-            seat: seat.clone(),
-            standing: Standing::Absent,
+        let facet_state = |slot: &FacetSlot| FacetState {
+            slot: slot.clone(),
+            membership: Membership::Absent,
             join: 0,
-            retired: VecDeque::new(),
-            rivals: Rivals::default(),
+            former_joins: VecDeque::new(),
+            duplicate_facets: DuplicateFacets::default(),
             exact: false,
-            heard: Duration::ZERO,
+            last_received: Duration::ZERO,
             sent: Duration::ZERO,
             synced: false,
             ready: None,
             presented: None,
             answered: None,
-            keeps_up: false,
-            counts: SeatCounts::default(),
-            told: FacetCounts::default(),
+            caught_up: false,
+            counts: SlotCounts::default(),
+            reported: FacetCounts::default(),
             inputs: Default::default(),
-            clock: Clock::default(),
-            asked_state: None,
-            asked_present: None,
+            clock: ClockOffset::default(),
+            state_requested: None,
+            present_requested: None,
         };
-        let places = options.seats.iter().map(place).collect();
+        let facets = options.slots.iter().map(facet_state).collect();
         let stream = |exact| Stream {
             publisher: Publisher::new(base, exact, 0),
             snapshot: Arc::default(),
@@ -270,53 +270,53 @@ impl ServerSession {
         let next = options.first_frame;
         ServerSession {
             options,
-            places,
+            facets,
             streams: [stream(false), stream(true)],
             frame: None,
             next,
             time_s: 0.0,
-            stage: Stage::Idle,
-            first_ready: None,
+            stage: FrameStage::Idle,
+            first_ready_at: None,
             out: Vec::new(),
             events: VecDeque::new(),
             close: Vec::new(),
             ended: false,
-            times: Times::default(),
+            frame_times: FrameTimer::default(),
         }
     }
 
     /// How a facet stands.
-    pub fn standing(&self, facet: FacetNumber) -> Standing {
-        self.places.get(facet as usize).map_or(Standing::Absent, |p| p.standing)
+    pub fn membership(&self, facet: FacetNumber) -> Membership {
+        self.facets.get(facet as usize).map_or(Membership::Absent, |p| p.membership)
     }
 
     /// What was counted here about a facet, and what it counted itself by its last beat.
-    pub fn counts(&self, facet: FacetNumber) -> (SeatCounts, FacetCounts) {
-        self.places.get(facet as usize).map_or_else(Default::default, |p| (p.counts, p.told))
+    pub fn counts(&self, facet: FacetNumber) -> (SlotCounts, FacetCounts) {
+        self.facets.get(facet as usize).map_or_else(Default::default, |p| (p.counts, p.reported))
     }
 
     /// Whether any facet is there.
-    pub fn is_anyone_there(&self) -> bool {
-        self.there().next().is_some()
+    pub fn has_facets(&self) -> bool {
+        self.joined().next().is_some()
     }
 
     /// Whether every critical facet is there.
-    pub fn complete(&self) -> bool {
-        self.places.iter().all(|p| !p.seat.critical || p.standing != Standing::Absent)
+    pub fn all_critical_joined(&self) -> bool {
+        self.facets.iter().all(|p| !p.slot.critical || p.membership != Membership::Absent)
     }
 
     /// Names of the critical facets that are not there.
-    pub fn absent(&self) -> Vec<&str> {
-        self.places
+    pub fn missing_facets(&self) -> Vec<&str> {
+        self.facets
             .iter()
-            .filter(|p| p.seat.critical && p.standing == Standing::Absent)
-            .map(|p| p.seat.name.as_str())
+            .filter(|p| p.slot.critical && p.membership == Membership::Absent)
+            .map(|p| p.slot.name.as_str())
             .collect()
     }
 
     /// Whether the next frame may be published: the last one has been shown, or nobody waits for it any more.
-    pub fn idle(&self) -> bool {
-        self.stage == Stage::Idle
+    pub fn is_idle(&self) -> bool {
+        self.stage == FrameStage::Idle
     }
 
     /// The frame published last.
@@ -342,27 +342,30 @@ impl ServerSession {
     /// Tells all facets that the run is over.
     pub fn end(&mut self) {
         // by the number of its joining: who has no frame yet knows no number of the run
-        let to: Vec<(FacetNumber, u64)> = self.there().map(|(k, place)| (k, place.join)).collect();
+        let to: Vec<(FacetNumber, u64)> = self.joined().map(|(k, facet_state)| (k, facet_state.join)).collect();
         let frame = self.frame.unwrap_or(0);
-        to.into_iter().for_each(|(facet, join)| self.send_to(facet, Kind::End, join, frame, |_| {}));
-        (self.ended, self.stage) = (true, Stage::Idle);
+        to.into_iter().for_each(|(facet, join)| self.send_to(facet, MessageKind::End, join, frame, |_| {}));
+        (self.ended, self.stage) = (true, FrameStage::Idle);
     }
 
     /// Takes what a link reports; `bytes` is the message, if it is one.
     pub fn on_event(&mut self, now: Duration, facet: FacetNumber, event: LinkEvent, bytes: &[u8]) {
-        self.places.get_mut(facet as usize).into_iter().for_each(|place| place.rivals.link(event));
+        self.facets
+            .get_mut(facet as usize)
+            .into_iter()
+            .for_each(|facet_state| facet_state.duplicate_facets.link(event));
         match event {
             LinkEvent::Opened => {}
             LinkEvent::Message => self.on_message(now, facet, bytes),
-            LinkEvent::Closed(why) => self.gone(facet, why == Closed::ByPeer),
+            LinkEvent::Closed(why) => self.mark_absent(facet, why == Closed::ByPeer),
         }
         self.advance(now);
     }
 
     /// A facet's process has ended: it is dropped at once, and nobody waits for it.
-    pub fn lose(&mut self, now: Duration, facet: FacetNumber) {
-        if self.standing(facet) != Standing::Absent {
-            self.gone(facet, false);
+    pub fn facet_exited(&mut self, now: Duration, facet: FacetNumber) {
+        if self.membership(facet) != Membership::Absent {
+            self.mark_absent(facet, false);
             self.close.push(facet);
         }
         self.advance(now);
@@ -370,21 +373,21 @@ impl ServerSession {
 
     /// Does what is due by now: call it whenever `recv` returns.
     pub fn advance(&mut self, now: Duration) {
-        self.drop_the_silent(now);
-        if let Some(after) = self.options.resend_after {
+        self.drop_timed_out(now);
+        if let Some(after) = self.options.resend_interval {
             self.resend(now, after);
         }
-        self.beat(now);
+        self.send_heartbeats(now);
         loop {
             let before = self.stage;
-            self.turn(now);
+            self.advance_frame(now);
             if self.stage == before {
                 return;
             }
         }
     }
 
-    fn tell(&mut self, event: ServerEvent) {
+    fn report(&mut self, event: ServerEvent) {
         if self.events.len() == MAX_EVENTS {
             self.events.pop_front();
         }

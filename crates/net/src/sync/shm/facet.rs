@@ -1,9 +1,9 @@
 //! A facet's end of shared memory.
 
-use super::order::{Memory, Order};
 use super::ports::{Ports, Received};
-use super::wire::{HEAD, Head, Kind};
-use super::{ASK, PING, SILENCE, draw};
+use super::reassembly::{Reassembly, SendHistory};
+use super::wire::{HEADER_BYTES, SampleHeader, SampleKind};
+use super::{CONNECT_INTERVAL, IDLE_TIMEOUT, PING_INTERVAL, random_id};
 use crate::sync::transport::{
     Closed, Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES,
     Message,
@@ -12,18 +12,18 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 /// Pieces remembered for a server that missed them: at least one longest message.
-const MEMORY: usize = 2048;
+const HISTORY_PIECES: usize = 2048;
 
 /// How far the connection is.
-enum Stage {
+enum ConnectionState {
     /// Asks, anew at the given time.
-    Looking { next: Duration },
+    Connecting { next: Duration },
     /// Knows its server's number.
-    Connected { reign: u64, order: Order, heard: Duration, sent: Duration },
+    Connected { server_id: u64, reassembly: Reassembly, last_received: Duration, sent: Duration },
 }
 
 /// What waits for the user.
-enum Waiting {
+enum Queued {
     Event(LinkEvent),
     Message(Delivery, Message),
 }
@@ -35,11 +35,11 @@ pub struct ShmFacet {
     ports: Option<Ports>,
     start: Instant,
     connection: u64,
-    stage: Stage,
-    memory: Memory,
-    waiting: VecDeque<Waiting>,
+    state: ConnectionState,
+    history: SendHistory,
+    queued: VecDeque<Queued>,
     counters: LinkCounters,
-    silence: Duration,
+    idle_timeout: Duration,
 }
 
 impl ShmFacet {
@@ -55,155 +55,166 @@ impl ShmFacet {
             facet,
             ports: Ports::join(run)?,
             start: Instant::now(),
-            connection: draw()?,
-            stage: Stage::Looking { next: Duration::ZERO },
-            memory: Memory::default(),
-            waiting: VecDeque::new(),
+            connection: random_id()?,
+            state: ConnectionState::Connecting { next: Duration::ZERO },
+            history: SendHistory::default(),
+            queued: VecDeque::new(),
             counters: LinkCounters::default(),
-            silence: SILENCE,
+            idle_timeout: IDLE_TIMEOUT,
         })
     }
 
-    /// A server of which nothing was heard for so long is given up, in place of [`SILENCE`].
-    pub fn silent_after(mut self, silence: Duration) -> ShmFacet {
-        self.silence = silence;
+    /// A server of which nothing was heard for so long is given up, in place of [`IDLE_TIMEOUT`].
+    pub fn with_idle_timeout(mut self, idle_timeout: Duration) -> ShmFacet {
+        self.idle_timeout = idle_timeout;
         self
     }
 
-    fn head(&self, kind: Kind) -> Head {
-        let (reign, until) = match &self.stage {
-            Stage::Looking { .. } => (0, 0),
-            Stage::Connected { reign, order, .. } => (*reign, order.next()),
+    fn header(&self, kind: SampleKind) -> SampleHeader {
+        let (server_id, until) = match &self.state {
+            ConnectionState::Connecting { .. } => (0, 0),
+            ConnectionState::Connected { server_id, reassembly, .. } => (*server_id, reassembly.next()),
         };
-        Head { facet: self.facet, connection: self.connection, until, ..Head::new(kind, reign) }
+        SampleHeader { facet: self.facet, connection: self.connection, until, ..SampleHeader::new(kind, server_id) }
     }
 
-    fn tell(&mut self, head: Head, data: &[u8]) -> Result<(), LinkError> {
+    fn send_control(&mut self, header: SampleHeader, data: &[u8]) -> Result<(), LinkError> {
         let Some(ports) = &self.ports else { return Ok(()) };
-        ports.publish(head.words(), data)?;
-        let rings = !head.more;
-        self.counters.bytes_out += (HEAD + data.len()) as u64;
+        ports.publish(header.words(), data)?;
+        let rings = !header.more;
+        self.counters.bytes_out += (HEADER_BYTES + data.len()) as u64;
         let now = self.start.elapsed();
-        if let Stage::Connected { sent, .. } = &mut self.stage {
+        if let ConnectionState::Connected { sent, .. } = &mut self.state {
             *sent = now;
         }
         if rings {
-            ports.bell().answer(!matches!(head.kind, Kind::Piece | Kind::Ping));
+            ports.wakeup().notify_server(!matches!(header.kind, SampleKind::Piece | SampleKind::Ping));
         }
         Ok(())
     }
 
     fn take_all(&mut self) -> Result<(), LinkError> {
         let Some(ports) = self.ports.take() else { return Ok(()) };
-        let mut again = Vec::new();
+        let mut resend = Vec::new();
         let result = loop {
             match ports.receive() {
-                Ok(Some(sample)) => again.extend(self.take(&ports, sample)),
+                Ok(Some(sample)) => resend.extend(self.take(&ports, sample)),
                 Ok(None) => break Ok(()),
                 Err(why) => break Err(why),
             }
         };
         self.ports = Some(ports);
         result?;
-        for head in again {
-            self.send_again(&head)?;
+        for header in resend {
+            self.send_missing(&header)?;
         }
         Ok(())
     }
 
     /// Takes a sample; what is asked for again comes back.
-    fn take(&mut self, ports: &Ports, sample: Received) -> Option<Head> {
+    fn take(&mut self, ports: &Ports, sample: Received) -> Option<SampleHeader> {
         let now = self.start.elapsed();
-        let head = match Head::parse(sample.head()) {
-            Ok(head) => head,
+        let header = match SampleHeader::parse(sample.header()) {
+            Ok(header) => header,
             Err(why) => {
                 self.counters.refuse(why);
                 return None;
             }
         };
-        let for_me = head.facet == self.facet && head.connection == self.connection;
-        if let Stage::Looking { .. } = self.stage {
-            if head.kind == Kind::Welcome && for_me {
-                self.stage =
-                    Stage::Connected { reign: head.reign, order: Order::new(head.number), heard: now, sent: now };
+        let for_me = header.facet == self.facet && header.connection == self.connection;
+        if let ConnectionState::Connecting { .. } = self.state {
+            if header.kind == SampleKind::Welcome && for_me {
+                self.state = ConnectionState::Connected {
+                    server_id: header.server_id,
+                    reassembly: Reassembly::new(header.number),
+                    last_received: now,
+                    sent: now,
+                };
                 self.counters.opened += 1;
-                self.waiting.push_back(Waiting::Event(LinkEvent::Opened));
+                self.queued.push_back(Queued::Event(LinkEvent::Opened));
             }
             return None;
         }
-        let Stage::Connected { reign, order, heard, .. } = &mut self.stage else { return None };
-        if *reign != head.reign {
+        let ConnectionState::Connected { server_id, reassembly, last_received, .. } = &mut self.state else {
+            return None;
+        };
+        if *server_id != header.server_id {
             // Another server took the run over.
             self.end(Closed::ByPeer);
             return None;
         }
-        *heard = now;
-        match head.kind {
-            Kind::Piece => {
-                let mine = head.mask >> self.facet & 1 == 1;
-                self.counters.bytes_in += if mine { (HEAD + sample.as_ref().len()) as u64 } else { 0 };
+        *last_received = now;
+        match header.kind {
+            SampleKind::Piece => {
+                let mine = header.mask >> self.facet & 1 == 1;
+                self.counters.bytes_in += if mine { (HEADER_BYTES + sample.as_ref().len()) as u64 } else { 0 };
                 // What is repeated for another facet says nothing to this one, even where it misses the same number.
-                let repeated_for_another = head.connection != 0 && !for_me;
-                let (waiting, superseded) = (&mut self.waiting, &mut self.counters.superseded);
-                let deliver = |delivery, message| *superseded += queue(waiting, delivery, message);
-                let data = if mine && !repeated_for_another { ports.lend(sample) } else { Message::default() };
-                let taken = match (repeated_for_another, head.skip) {
+                let repeated_for_another = header.connection != 0 && !for_me;
+                let (queued, superseded) = (&mut self.queued, &mut self.counters.superseded);
+                let deliver = |delivery, message| *superseded += queue(queued, delivery, message);
+                let data = if mine && !repeated_for_another { ports.loan(sample) } else { Message::default() };
+                let taken = match (repeated_for_another, header.skip) {
                     (true, _) => Ok(()),
-                    (false, true) => order.skip(head.number, head.until, deliver),
-                    (false, false) => order.take(&head, mine, data, deliver),
+                    (false, true) => reassembly.skip(header.number, header.until, deliver),
+                    (false, false) => reassembly.take(&header, mine, data, deliver),
                 };
                 if taken.is_err() {
                     self.end(Closed::Overrun);
                 }
             }
-            Kind::Again if for_me => return Some(head),
-            Kind::Close if for_me => self.end(Closed::ByPeer),
+            SampleKind::ResendRequest if for_me => return Some(header),
+            SampleKind::Close if for_me => self.end(Closed::ByPeer),
             _ => {}
         }
         None
     }
 
-    fn send_again(&mut self, asked: &Head) -> Result<(), LinkError> {
-        let Some(pieces) = self.memory.again(asked) else {
+    fn send_missing(&mut self, asked: &SampleHeader) -> Result<(), LinkError> {
+        let Some(pieces) = self.history.resend(asked) else {
             self.end(Closed::Overrun);
             return Ok(());
         };
-        let base = self.head(Kind::Piece);
-        let pieces: Vec<(Head, Vec<u8>)> = pieces
-            .map(|(number, kept)| (Head { newest: kept.newest, more: kept.more, number, ..base }, kept.data.clone()))
+        let base = self.header(SampleKind::Piece);
+        let pieces: Vec<(SampleHeader, Vec<u8>)> = pieces
+            .map(|(number, sent_piece)| {
+                (
+                    SampleHeader { newest: sent_piece.newest, more: sent_piece.more, number, ..base },
+                    sent_piece.data.clone(),
+                )
+            })
             .collect();
-        for (head, data) in pieces {
+        for (header, data) in pieces {
             self.counters.repeated += 1;
-            self.tell(head, &data)?;
+            self.send_control(header, &data)?;
         }
         Ok(())
     }
 
     /// Asks for the server, or again for what is missing; pings; finds silence.
-    fn keep_house(&mut self) -> Result<(), LinkError> {
+    fn maintain(&mut self) -> Result<(), LinkError> {
         let now = self.start.elapsed();
-        match &mut self.stage {
-            Stage::Looking { next } if now >= *next => {
-                *next = now + ASK;
+        match &mut self.state {
+            ConnectionState::Connecting { next } if now >= *next => {
+                *next = now + CONNECT_INTERVAL;
                 match &mut self.ports {
-                    Some(ports) => ports.look_for_bell(&self.run)?,
+                    Some(ports) => ports.reopen_wakeup(&self.run)?,
                     none => *none = Ports::join(&self.run)?,
                 }
-                let hello = self.head(Kind::Hello);
-                self.tell(hello, &[])?;
+                let hello = self.header(SampleKind::Hello);
+                self.send_control(hello, &[])?;
             }
-            Stage::Looking { .. } => {}
-            Stage::Connected { order, heard, sent, .. } => {
-                if now >= *heard + self.silence {
-                    self.end(Closed::Silent);
+            ConnectionState::Connecting { .. } => {}
+            ConnectionState::Connected { reassembly, last_received, sent, .. } => {
+                if now >= *last_received + self.idle_timeout {
+                    self.end(Closed::TimedOut);
                     // The services may be those of a server that was killed: join anew.
                     self.ports = None;
-                } else if let Some((number, until)) = order.ask(now) {
-                    let head = Head { number, until, ..self.head(Kind::Again) };
-                    self.tell(head, &[])?;
-                } else if now >= *sent + PING.min(self.silence / 4) {
-                    let ping = self.head(Kind::Ping);
-                    self.tell(ping, &[])?;
+                } else if let Some((number, until)) = reassembly.ask(now) {
+                    let header = SampleHeader { number, until, ..self.header(SampleKind::ResendRequest) };
+                    self.send_control(header, &[])?;
+                } else if now >= *sent + PING_INTERVAL.min(self.idle_timeout / 4) {
+                    let ping = self.header(SampleKind::Ping);
+                    self.send_control(ping, &[])?;
                 }
             }
         }
@@ -211,21 +222,21 @@ impl ShmFacet {
     }
 
     fn end(&mut self, why: Closed) {
-        if let Stage::Connected { .. } = self.stage {
-            self.stage = Stage::Looking { next: self.start.elapsed() };
+        if let ConnectionState::Connected { .. } = self.state {
+            self.state = ConnectionState::Connecting { next: self.start.elapsed() };
             self.connection = self.connection.wrapping_add(1);
-            self.memory = Memory::default();
+            self.history = SendHistory::default();
             if why == Closed::ByUs {
-                self.waiting.retain(|what| matches!(what, Waiting::Event(_)));
+                self.queued.retain(|what| matches!(what, Queued::Event(_)));
             }
-            self.waiting.push_back(Waiting::Event(LinkEvent::Closed(why)));
+            self.queued.push_back(Queued::Event(LinkEvent::Closed(why)));
         }
     }
 
     fn next_event(&mut self, message: &mut Message) -> Option<LinkEvent> {
-        match self.waiting.pop_front()? {
-            Waiting::Event(event) => Some(event),
-            Waiting::Message(_, bytes) => {
+        match self.queued.pop_front()? {
+            Queued::Event(event) => Some(event),
+            Queued::Message(_, bytes) => {
                 *message = bytes;
                 self.counters.messages_in += 1;
                 Some(LinkEvent::Message)
@@ -235,20 +246,20 @@ impl ShmFacet {
 }
 
 /// A newest message that still waits is replaced; how many were.
-fn queue(waiting: &mut VecDeque<Waiting>, delivery: Delivery, message: Message) -> u64 {
-    let before = waiting.len();
+fn queue(queued: &mut VecDeque<Queued>, delivery: Delivery, message: Message) -> u64 {
+    let before = queued.len();
     if delivery == Delivery::Newest {
-        waiting.retain(|what| !matches!(what, Waiting::Message(Delivery::Newest, _)));
+        queued.retain(|what| !matches!(what, Queued::Message(Delivery::Newest, _)));
     }
-    let replaced = before - waiting.len();
-    waiting.push_back(Waiting::Message(delivery, message));
+    let replaced = before - queued.len();
+    queued.push_back(Queued::Message(delivery, message));
     replaced as u64
 }
 
 impl FacetLink for ShmFacet {
     fn send(&mut self, delivery: Delivery, message: &[u8]) -> Result<bool, LinkError> {
         let fits = (1..=MAX_MESSAGE_BYTES).contains(&message.len());
-        let (Stage::Connected { .. }, true, Some(ports)) = (&self.stage, fits, &self.ports) else {
+        let (ConnectionState::Connected { .. }, true, Some(ports)) = (&self.state, fits, &self.ports) else {
             self.counters.unsent += 1;
             return Ok(false);
         };
@@ -256,28 +267,28 @@ impl FacetLink for ShmFacet {
         let newest = delivery == Delivery::Newest;
         while let Some(chunk) = chunks.next() {
             let more = chunks.peek().is_some();
-            let head = Head { newest, more, number: self.memory.next(), ..self.head(Kind::Piece) };
-            self.tell(head, chunk)?;
-            self.memory.keep(0, newest, more, chunk);
+            let header = SampleHeader { newest, more, number: self.history.next(), ..self.header(SampleKind::Piece) };
+            self.send_control(header, chunk)?;
+            self.history.keep(0, newest, more, chunk);
         }
-        self.memory.trim(MEMORY);
+        self.history.trim(HISTORY_PIECES);
         self.counters.messages_out += 1;
         Ok(true)
     }
 
     fn recv(&mut self, timeout: Duration, message: &mut Message) -> Result<Option<LinkEvent>, LinkError> {
         let buffer = message.clear();
-        if let Stage::Connected { order, .. } = &mut self.stage {
-            order.lend(buffer);
+        if let ConnectionState::Connected { reassembly, .. } = &mut self.state {
+            reassembly.loan(buffer);
         }
         let end = self.start.elapsed() + timeout;
         loop {
             if let Some(event) = self.next_event(message) {
                 return Ok(Some(event));
             }
-            let seen = self.ports.as_ref().map_or(0, |ports| ports.bell().rung());
+            let seen = self.ports.as_ref().map_or(0, |ports| ports.wakeup().facet_notifications());
             self.take_all()?;
-            self.keep_house()?;
+            self.maintain()?;
             if let Some(event) = self.next_event(message) {
                 return Ok(Some(event));
             }
@@ -285,20 +296,20 @@ impl FacetLink for ShmFacet {
             if left.is_zero() {
                 return Ok(None);
             }
-            let gap = matches!(&self.stage, Stage::Connected { order, .. } if order.has_gap());
-            let wait = left.min(if gap { Duration::from_millis(2) } else { ASK });
+            let gap = matches!(&self.state, ConnectionState::Connected { reassembly, .. } if reassembly.has_gap());
+            let wait = left.min(if gap { Duration::from_millis(2) } else { CONNECT_INTERVAL });
             match &self.ports {
-                Some(ports) => ports.bell().wait_for_ring(seen, wait)?,
+                Some(ports) => ports.wakeup().wait_for_facet_notification(seen, wait)?,
                 None => std::thread::sleep(wait),
             }
         }
     }
 
     fn close(&mut self) {
-        if let Stage::Connected { .. } = self.stage {
-            let close = self.head(Kind::Close);
+        if let ConnectionState::Connected { .. } = self.state {
+            let close = self.header(SampleKind::Close);
             // A server that does not hear it finds the silence.
-            let _ = self.tell(close, &[]);
+            let _ = self.send_control(close, &[]);
             self.end(Closed::ByUs);
         }
     }

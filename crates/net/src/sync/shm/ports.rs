@@ -1,13 +1,13 @@
 //! The ends of iceoryx2 that one process holds, the bell, and where its files lie.
 //!
-//! Two services of samples per run, named by the run: `tumble/RUN/down` and `…/up`, and a [`Bell`]. Files lie in a folder of this user alone, objects in
+//! Two services of samples per run, named by the run: `tumble/RUN/down` and `…/up`, and a [`Wakeup`]. Files lie in a folder of this user alone, objects in
 //! `/dev/shm` carry the user's number and have mode 600: another user's run is neither seen nor disturbed. What a killed process leaves is removed when the next node begins,
-//! or when a server ends; what then still stays, the last process takes along ([`super::alive`]).
+//! or when a server ends; what then still stays, the last process takes along ([`super::node_lock`]).
 
-use super::alive::Alive;
-use super::bell::{self, Bell};
+use super::node_lock::NodeLock;
 use super::service::Private;
-use super::wire::Words;
+use super::wakeup::{self, Wakeup};
+use super::wire::HeaderWords;
 use crate::sync::transport::{FacetNumber, LinkError, Message};
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::port::{publisher::Publisher, subscriber::Subscriber};
@@ -25,17 +25,17 @@ pub const DOWN_BYTES: usize = 128 << 10;
 /// Most bytes of a sample from a facet.
 pub const UP_BYTES: usize = 16 << 10;
 /// Samples that a slow reader's buffer holds.
-const BUFFER: usize = 8;
+const BUFFER_SAMPLES: usize = 8;
 
 /// Samples that a reader may hold while it goes on reading.
-const HELD: usize = 6;
+const MAX_BORROWED: usize = 6;
 
 /// A sample that was received. It lies in shared memory, and nobody writes over it until it is dropped.
-pub struct Received(Sample<Private, [u8], Words>);
+pub struct Received(Sample<Private, [u8], HeaderWords>);
 
 impl Received {
     /// Its head.
-    pub fn head(&self) -> Words {
+    pub fn header(&self) -> HeaderWords {
         *self.0.user_header()
     }
 }
@@ -48,30 +48,32 @@ impl AsRef<[u8]> for Received {
 
 /// The ends.
 pub struct Ports {
-    publisher: Publisher<Private, [u8], Words>,
-    subscriber: Subscriber<Private, [u8], Words>,
+    publisher: Publisher<Private, [u8], HeaderWords>,
+    subscriber: Subscriber<Private, [u8], HeaderWords>,
     /// Held by each sample that was lent.
-    lent: Arc<()>,
-    bell: Bell,
+    loaned: Arc<()>,
+    wakeup: Wakeup,
     sample: usize,
     node: Node<Private>,
-    alive: Alive,
+    node_lock: NodeLock,
 }
 
 impl Ports {
     /// Begins the services of a run, or joins those that an earlier server of it left.
     pub fn serve(run: &str, facets: FacetNumber) -> Result<Ports, LinkError> {
-        let (node, alive) = node("tumble server")?;
+        let (node, node_lock) = node("tumble server")?;
         // Killed processes hold their places until they are cleaned up.
         let places = 2 * usize::from(facets) + 4;
         let data = |name: &str, publishers: usize, subscribers: usize| {
-            let builder =
-                node.service_builder(&service_name(run, name)?).publish_subscribe::<[u8]>().user_header::<Words>();
+            let builder = node
+                .service_builder(&service_name(run, name)?)
+                .publish_subscribe::<[u8]>()
+                .user_header::<HeaderWords>();
             let builder = builder
                 .enable_safe_overflow(true)
-                .subscriber_max_buffer_size(BUFFER)
+                .subscriber_max_buffer_size(BUFFER_SAMPLES)
                 .history_size(0)
-                .subscriber_max_borrowed_samples(HELD);
+                .subscriber_max_borrowed_samples(MAX_BORROWED);
             builder
                 .max_publishers(publishers)
                 .max_subscribers(subscribers)
@@ -80,43 +82,44 @@ impl Ports {
                 .map_err(|why| refused(run, name, why))
         };
         // Before the services: who finds them finds it.
-        let bell = Bell::serve(run, alive.user())?;
+        let wakeup = Wakeup::serve(run, node_lock.user())?;
         let (down, up) = (data("down", 4, places)?, data("up", places, 4)?);
         let ports = Ports {
             publisher: publisher(&down, DOWN_BYTES).map_err(|why| refused(run, "down", why))?,
             subscriber: up.subscriber_builder().create().map_err(|why| refused(run, "up", why))?,
-            lent: Arc::default(),
-            bell,
+            loaned: Arc::default(),
+            wakeup,
             sample: DOWN_BYTES,
             node,
-            alive,
+            node_lock,
         };
         Ok(ports)
     }
 
     /// Joins a run's services as a facet; `None` while there are none.
     pub fn join(run: &str) -> Result<Option<Ports>, LinkError> {
-        let (node, alive) = node("tumble facet")?;
+        let (node, node_lock) = node("tumble facet")?;
         let data = |name: &str| {
             Ok::<_, LinkError>(
                 node.service_builder(&service_name(run, name)?)
                     .publish_subscribe::<[u8]>()
-                    .user_header::<Words>()
+                    .user_header::<HeaderWords>()
                     .open()
                     .ok(),
             )
         };
-        let (Some(down), Some(up), Some(bell)) = (data("down")?, data("up")?, Bell::join(run, alive.user())?) else {
+        let (Some(down), Some(up), Some(wakeup)) = (data("down")?, data("up")?, Wakeup::join(run, node_lock.user())?)
+        else {
             return Ok(None);
         };
         let ports = Ports {
             publisher: publisher(&up, UP_BYTES).map_err(|why| refused(run, "up", why))?,
             subscriber: down.subscriber_builder().create().map_err(|why| refused(run, "down", why))?,
-            lent: Arc::default(),
-            bell,
+            loaned: Arc::default(),
+            wakeup,
             sample: UP_BYTES,
             node,
-            alive,
+            node_lock,
         };
         Ok(Some(ports))
     }
@@ -127,24 +130,24 @@ impl Ports {
     }
 
     /// Publishes a sample. Nobody is woken yet.
-    pub fn publish(&self, head: Words, data: &[u8]) -> Result<(), LinkError> {
+    pub fn publish(&self, header: HeaderWords, data: &[u8]) -> Result<(), LinkError> {
         let mut sample = self.publisher.loan_slice_uninit(data.len()).map_err(|why| failed("loan", why))?;
-        *sample.user_header_mut() = head;
+        *sample.user_header_mut() = header;
         sample.write_from_slice(data).send().map_err(|why| failed("send", why))?;
         Ok(())
     }
 
     /// Looks again for the bell of a run: a new server of it may have another one.
-    pub fn look_for_bell(&mut self, run: &str) -> Result<(), LinkError> {
-        if let Some(bell) = Bell::join(run, self.alive.user())? {
-            self.bell = bell;
+    pub fn reopen_wakeup(&mut self, run: &str) -> Result<(), LinkError> {
+        if let Some(wakeup) = Wakeup::join(run, self.node_lock.user())? {
+            self.wakeup = wakeup;
         }
         Ok(())
     }
 
     /// What wakes the other side.
-    pub fn bell(&self) -> &Bell {
-        &self.bell
+    pub fn wakeup(&self) -> &Wakeup {
+        &self.wakeup
     }
 
     /// The next sample, if there is one.
@@ -153,10 +156,10 @@ impl Ports {
     }
 
     /// The message of a sample: where it lies, or a copy where the reader holds so many already that it could not go on reading.
-    pub fn lend(&self, sample: Received) -> Message {
+    pub fn loan(&self, sample: Received) -> Message {
         // one more is held while it is looked at
-        if Arc::strong_count(&self.lent) + 1 < HELD {
-            Message::lent(Lent { sample, _held: self.lent.clone() })
+        if Arc::strong_count(&self.loaned) + 1 < MAX_BORROWED {
+            Message::loaned(Loaned { sample, _held: self.loaned.clone() })
         } else {
             sample.as_ref().to_vec().into()
         }
@@ -165,17 +168,17 @@ impl Ports {
     /// Removes what killed processes left.
     pub fn clean_up(&self) {
         self.node.try_cleanup_dead_nodes();
-        bell::clean_up(self.alive.user());
+        wakeup::clean_up(self.node_lock.user());
     }
 }
 
 /// A sample that somebody holds.
-struct Lent {
+struct Loaned {
     sample: Received,
     _held: Arc<()>,
 }
 
-impl AsRef<[u8]> for Lent {
+impl AsRef<[u8]> for Loaned {
     fn as_ref(&self) -> &[u8] {
         self.sample.as_ref()
     }
@@ -187,14 +190,14 @@ impl Drop for Ports {
     }
 }
 
-type Samples = iceoryx2::service::port_factory::publish_subscribe::PortFactory<Private, [u8], Words>;
+type Samples = iceoryx2::service::port_factory::publish_subscribe::PortFactory<Private, [u8], HeaderWords>;
 
-fn publisher(service: &Samples, bytes: usize) -> Result<Publisher<Private, [u8], Words>, impl Debug> {
+fn publisher(service: &Samples, bytes: usize) -> Result<Publisher<Private, [u8], HeaderWords>, impl Debug> {
     service.publisher_builder().initial_max_slice_len(bytes).allocation_strategy(AllocationStrategy::Static).create()
 }
 
 /// A node, which removes what is stale as it begins, and the word that it is here.
-fn node(name: &str) -> Result<(Node<Private>, Alive), LinkError> {
+fn node(name: &str) -> Result<(Node<Private>, NodeLock), LinkError> {
     set_log_level(LogLevel::Fatal); // what goes wrong is told by our errors
     let (folder, user) = folder()?;
     let text = folder.display().to_string();
@@ -203,22 +206,22 @@ fn node(name: &str) -> Result<(Node<Private>, Alive), LinkError> {
     let mut config = Config::default();
     // Of another folder another one: nodes that do not see each other draw from different counters.
     let prefix = format!("tumble_{user}_{}_", &blake3::hash(text.as_bytes()).to_hex()[..8]);
-    let alive = Alive::new(&folder, user)?;
+    let node_lock = NodeLock::new(&folder, user)?;
     config.global.prefix = FileName::new(prefix.as_bytes()).map_err(|why| unusable(&why))?;
     config.global.set_root_path(&Path::new(text.as_bytes()).map_err(|why| unusable(&why))?);
     let name = name.try_into().map_err(|why| unusable(&why))?;
     let builder = NodeBuilder::new().name(&name).config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
     let node = builder.create::<Private>().map_err(|why| unusable(&why))?;
-    bell::clean_up(user);
-    Ok((node, alive))
+    wakeup::clean_up(user);
+    Ok((node, node_lock))
 }
 
 /// Removes what killed processes left.
 pub fn clean_up() -> Result<(), LinkError> {
-    let (node, alive) = node("tumble clean-up")?;
+    let (node, node_lock) = node("tumble clean-up")?;
     node.try_cleanup_dead_nodes();
     drop(node);
-    drop(alive);
+    drop(node_lock);
     Ok(())
 }
 

@@ -1,9 +1,9 @@
 //! The server's end of shared memory.
 
-use super::order::{Again, Memory, Order};
 use super::ports::{Ports, Received};
-use super::wire::{HEAD, Head, Kind};
-use super::{PING, SILENCE, draw};
+use super::reassembly::{Reassembly, Resend, SendHistory};
+use super::wire::{HEADER_BYTES, SampleHeader, SampleKind};
+use super::{IDLE_TIMEOUT, PING_INTERVAL, random_id};
 use crate::sync::transport::{
     Closed, Delivery, FacetNumber, LinkCounters, LinkError, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES, Refused,
     ServerLink,
@@ -12,24 +12,24 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 /// Pieces remembered for those who missed them.
-const MEMORY: usize = 16_384;
+const HISTORY_PIECES: usize = 16_384;
 
 /// How long the server sleeps while a piece is missing, before it asks for it again.
-const GAP: Duration = Duration::from_millis(2);
+const GAP_POLL: Duration = Duration::from_millis(2);
 
 /// A facet that is connected.
 struct Connection {
     number: u64,
-    order: Order,
+    reassembly: Reassembly,
     /// The first piece it has not taken.
     taken: u64,
-    heard: Duration,
+    last_received: Duration,
     /// It was sent something since its last message.
-    owes: bool,
+    owes_reply: bool,
 }
 
 /// What waits for the user.
-enum Waiting {
+enum Queued {
     Event(LinkEvent),
     Message(Delivery, Vec<u8>),
 }
@@ -37,15 +37,15 @@ enum Waiting {
 /// The server's end of shared memory.
 pub struct ShmServer {
     ports: Ports,
-    reign: u64,
+    server_id: u64,
     start: Instant,
     connections: Vec<Option<Connection>>,
-    memory: Memory,
-    waiting: VecDeque<(FacetNumber, Waiting)>,
+    history: SendHistory,
+    queued: VecDeque<(FacetNumber, Queued)>,
     counters: Vec<LinkCounters>,
-    strangers: LinkCounters,
+    unknown_peers: LinkCounters,
     sent: Duration,
-    silence: Duration,
+    idle_timeout: Duration,
 }
 
 impl ShmServer {
@@ -57,21 +57,21 @@ impl ShmServer {
         let count = usize::from(facets);
         Ok(ShmServer {
             ports: Ports::serve(run, facets)?,
-            reign: draw()?,
+            server_id: random_id()?,
             start: Instant::now(),
             connections: (0..count).map(|_| None).collect(),
-            memory: Memory::default(),
-            waiting: VecDeque::new(),
+            history: SendHistory::default(),
+            queued: VecDeque::new(),
             counters: vec![LinkCounters::default(); count],
-            strangers: LinkCounters::default(),
+            unknown_peers: LinkCounters::default(),
             sent: Duration::ZERO,
-            silence: SILENCE,
+            idle_timeout: IDLE_TIMEOUT,
         })
     }
 
-    /// A facet of which nothing was heard for so long is given up, in place of [`SILENCE`]. While it draws it says nothing: give it more than a picture takes.
-    pub fn silent_after(mut self, silence: Duration) -> ShmServer {
-        self.silence = silence;
+    /// A facet of which nothing was heard for so long is given up, in place of [`IDLE_TIMEOUT`]. While it draws it says nothing: give it more than a picture takes.
+    pub fn with_idle_timeout(mut self, idle_timeout: Duration) -> ShmServer {
+        self.idle_timeout = idle_timeout;
         self
     }
 
@@ -86,28 +86,34 @@ impl ShmServer {
         let newest = delivery == Delivery::Newest;
         while let Some(chunk) = chunks.next() {
             let more = chunks.peek().is_some();
-            let head = Head { newest, more, mask, number: self.memory.next(), ..Head::new(Kind::Piece, self.reign) };
-            self.ports.publish(head.words(), chunk)?;
+            let header = SampleHeader {
+                newest,
+                more,
+                mask,
+                number: self.history.next(),
+                ..SampleHeader::new(SampleKind::Piece, self.server_id)
+            };
+            self.ports.publish(header.words(), chunk)?;
             if !more {
-                self.ports.bell().ring();
+                self.ports.wakeup().notify_facets();
             }
             for counters in of_mask(&mut self.counters, mask) {
-                counters.bytes_out += (HEAD + chunk.len()) as u64;
+                counters.bytes_out += (HEADER_BYTES + chunk.len()) as u64;
             }
-            self.memory.keep(mask, newest, more, chunk);
+            self.history.keep(mask, newest, more, chunk);
         }
         let here = self.connections.iter_mut().enumerate().filter(|(k, _)| mask >> k & 1 == 1);
-        here.filter_map(|(_, connection)| connection.as_mut()).for_each(|connection| connection.owes = true);
+        here.filter_map(|(_, connection)| connection.as_mut()).for_each(|connection| connection.owes_reply = true);
         self.sent = self.start.elapsed();
-        let first = self.memory.trim(MEMORY);
+        let first = self.history.trim(HISTORY_PIECES);
         self.end_all(Closed::Overrun, |connection| connection.taken < first);
         Ok(())
     }
 
-    fn tell(&mut self, head: Head) -> Result<(), LinkError> {
+    fn send_control(&mut self, header: SampleHeader) -> Result<(), LinkError> {
         self.sent = self.start.elapsed();
-        self.ports.publish(head.words(), &[])?;
-        self.ports.bell().ring();
+        self.ports.publish(header.words(), &[])?;
+        self.ports.wakeup().notify_facets();
         Ok(())
     }
 
@@ -120,133 +126,139 @@ impl ShmServer {
 
     fn take(&mut self, sample: &Received) -> Result<(), LinkError> {
         let data = sample.as_ref();
-        let head = match Head::parse(sample.head()) {
-            Ok(head) => head,
+        let header = match SampleHeader::parse(sample.header()) {
+            Ok(header) => header,
             Err(why) => {
-                self.strangers.refuse(why);
+                self.unknown_peers.refuse(why);
                 return Ok(());
             }
         };
-        let facet = usize::from(head.facet);
+        let facet = usize::from(header.facet);
         if facet >= self.connections.len() {
-            self.strangers.refuse(Refused::Stranger);
+            self.unknown_peers.refuse(Refused::UnknownPeer);
             return Ok(());
         }
-        self.counters[facet].bytes_in += (HEAD + data.len()) as u64;
-        if head.kind == Kind::Hello {
-            return self.welcome(&head);
+        self.counters[facet].bytes_in += (HEADER_BYTES + data.len()) as u64;
+        if header.kind == SampleKind::Hello {
+            return self.welcome(&header);
         }
         let now = self.start.elapsed();
-        let known = |connection: &&mut Connection| connection.number == head.connection && head.reign == self.reign;
+        let known =
+            |connection: &&mut Connection| connection.number == header.connection && header.server_id == self.server_id;
         let Some(connection) = self.connections[facet].as_mut().filter(known) else {
             self.counters[facet].refuse(Refused::Stale);
             // One that was stopped for long and goes on: it does not know yet that it was given up.
-            return self.tell(Head {
-                facet: head.facet,
-                connection: head.connection,
-                ..Head::new(Kind::Close, self.reign)
+            return self.send_control(SampleHeader {
+                facet: header.facet,
+                connection: header.connection,
+                ..SampleHeader::new(SampleKind::Close, self.server_id)
             });
         };
-        connection.heard = now;
-        if head.until > self.memory.next() {
+        connection.last_received = now;
+        if header.until > self.history.next() {
             self.counters[facet].refuse(Refused::Torn);
             return Ok(());
         }
-        match head.kind {
-            Kind::Piece => {
-                connection.taken = connection.taken.max(head.until);
-                connection.owes &= head.more;
-                let waiting = &mut self.waiting;
-                let taken = connection.order.take(&head, true, data.to_vec().into(), |delivery, message| {
-                    queue(waiting, head.facet, delivery, message.into_vec())
+        match header.kind {
+            SampleKind::Piece => {
+                connection.taken = connection.taken.max(header.until);
+                connection.owes_reply &= header.more;
+                let queued = &mut self.queued;
+                let taken = connection.reassembly.take(&header, true, data.to_vec().into(), |delivery, message| {
+                    queue(queued, header.facet, delivery, message.into_vec())
                 });
                 if taken.is_err() {
-                    self.end(head.facet, Closed::Overrun);
+                    self.end(header.facet, Closed::Overrun);
                 }
             }
-            Kind::Ping => connection.taken = connection.taken.max(head.until),
-            Kind::Again => self.send_again(&head)?,
-            Kind::Close => self.end(head.facet, Closed::ByPeer),
-            Kind::Hello | Kind::Welcome => self.counters[facet].refuse(Refused::Foreign),
+            SampleKind::Ping => connection.taken = connection.taken.max(header.until),
+            SampleKind::ResendRequest => self.send_missing(&header)?,
+            SampleKind::Close => self.end(header.facet, Closed::ByPeer),
+            SampleKind::Hello | SampleKind::Welcome => self.counters[facet].refuse(Refused::Foreign),
         }
         Ok(())
     }
 
-    fn welcome(&mut self, hello: &Head) -> Result<(), LinkError> {
+    fn welcome(&mut self, hello: &SampleHeader) -> Result<(), LinkError> {
         let facet = usize::from(hello.facet);
-        let next = self.memory.next();
+        let next = self.history.next();
         let same = self.connections[facet].as_ref().is_some_and(|connection| connection.number == hello.connection);
         if !same {
             self.end(hello.facet, Closed::Replaced);
             let connection = Connection {
                 number: hello.connection,
-                order: Order::new(0),
+                reassembly: Reassembly::new(0),
                 taken: next,
-                heard: self.start.elapsed(),
-                owes: false,
+                last_received: self.start.elapsed(),
+                owes_reply: false,
             };
             self.connections[facet] = Some(connection);
             self.counters[facet].opened += 1;
-            self.waiting.push_back((hello.facet, Waiting::Event(LinkEvent::Opened)));
+            self.queued.push_back((hello.facet, Queued::Event(LinkEvent::Opened)));
         }
         let number = self.connections[facet].as_ref().map_or(next, |connection| connection.taken);
-        self.tell(Head {
+        self.send_control(SampleHeader {
             facet: hello.facet,
             connection: hello.connection,
             number,
-            ..Head::new(Kind::Welcome, self.reign)
+            ..SampleHeader::new(SampleKind::Welcome, self.server_id)
         })
     }
 
     /// Sends again what a slow facet missed and still wants; of the rest, that there is nothing.
-    fn send_again(&mut self, asked: &Head) -> Result<(), LinkError> {
+    fn send_missing(&mut self, asked: &SampleHeader) -> Result<(), LinkError> {
         let bit = 1 << asked.facet;
-        let Some(again) = self.memory.again_to(asked, bit) else {
+        let Some(resend) = self.history.resend_to(asked, bit) else {
             self.end(asked.facet, Closed::Overrun);
             return Ok(());
         };
-        let base =
-            Head { facet: asked.facet, connection: asked.connection, mask: bit, ..Head::new(Kind::Piece, self.reign) };
+        let base = SampleHeader {
+            facet: asked.facet,
+            connection: asked.connection,
+            mask: bit,
+            ..SampleHeader::new(SampleKind::Piece, self.server_id)
+        };
         let counters = &mut self.counters[usize::from(asked.facet)];
-        for again in again {
-            let (head, data) = match again {
-                Again::Piece(number, kept) => {
-                    (Head { newest: kept.newest, more: kept.more, number, ..base }, &kept.data[..])
-                }
-                Again::Nothing(number, until) => (Head { skip: true, number, until, ..base }, &[][..]),
+        for resend in resend {
+            let (header, data) = match resend {
+                Resend::Piece(number, sent_piece) => (
+                    SampleHeader { newest: sent_piece.newest, more: sent_piece.more, number, ..base },
+                    &sent_piece.data[..],
+                ),
+                Resend::Nothing(number, until) => (SampleHeader { skip: true, number, until, ..base }, &[][..]),
             };
-            self.ports.publish(head.words(), data)?;
-            counters.repeated += u64::from(!head.skip);
-            counters.bytes_out += (HEAD + data.len()) as u64;
+            self.ports.publish(header.words(), data)?;
+            counters.repeated += u64::from(!header.skip);
+            counters.bytes_out += (HEADER_BYTES + data.len()) as u64;
         }
-        self.ports.bell().ring();
+        self.ports.wakeup().notify_facets();
         Ok(())
     }
 
     /// Pings, asks again, forgets what all have, and finds who is silent.
-    fn keep_house(&mut self) -> Result<(), LinkError> {
+    fn maintain(&mut self) -> Result<(), LinkError> {
         let now = self.start.elapsed();
         for facet in 0..self.connections.len() {
             let Some(connection) = &mut self.connections[facet] else { continue };
-            if let Some((number, until)) = connection.order.ask(now) {
-                let head = Head {
+            if let Some((number, until)) = connection.reassembly.ask(now) {
+                let header = SampleHeader {
                     facet: facet as u16,
                     connection: connection.number,
                     number,
                     until,
-                    ..Head::new(Kind::Again, self.reign)
+                    ..SampleHeader::new(SampleKind::ResendRequest, self.server_id)
                 };
-                self.tell(head)?;
+                self.send_control(header)?;
             }
         }
-        let silence = self.silence;
-        if now >= self.sent + PING.min(silence / 4) {
-            self.tell(Head::new(Kind::Ping, self.reign))?;
+        let idle_timeout = self.idle_timeout;
+        if now >= self.sent + PING_INTERVAL.min(idle_timeout / 4) {
+            self.send_control(SampleHeader::new(SampleKind::Ping, self.server_id))?;
         }
-        let next = self.memory.next();
+        let next = self.history.next();
         let taken = self.connections.iter().flatten().map(|connection| connection.taken).min().unwrap_or(next);
-        self.memory.forget_before(taken);
-        if self.end_all(Closed::Silent, |connection| now >= connection.heard + silence) {
+        self.history.forget_before(taken);
+        if self.end_all(Closed::TimedOut, |connection| now >= connection.last_received + idle_timeout) {
             self.ports.clean_up();
         }
         Ok(())
@@ -264,9 +276,9 @@ impl ShmServer {
     fn end(&mut self, facet: FacetNumber, why: Closed) {
         if self.connections[usize::from(facet)].take().is_some() {
             if why == Closed::ByUs {
-                self.waiting.retain(|(of, what)| *of != facet || matches!(what, Waiting::Event(_)));
+                self.queued.retain(|(of, what)| *of != facet || matches!(what, Queued::Event(_)));
             }
-            self.waiting.push_back((facet, Waiting::Event(LinkEvent::Closed(why))));
+            self.queued.push_back((facet, Queued::Event(LinkEvent::Closed(why))));
         }
     }
 }
@@ -276,11 +288,11 @@ fn of_mask(counters: &mut [LinkCounters], mask: u64) -> impl Iterator<Item = &mu
 }
 
 /// A newest message that still waits is replaced.
-fn queue(waiting: &mut VecDeque<(FacetNumber, Waiting)>, facet: FacetNumber, delivery: Delivery, message: Vec<u8>) {
+fn queue(queued: &mut VecDeque<(FacetNumber, Queued)>, facet: FacetNumber, delivery: Delivery, message: Vec<u8>) {
     if delivery == Delivery::Newest {
-        waiting.retain(|(of, what)| *of != facet || !matches!(what, Waiting::Message(Delivery::Newest, _)));
+        queued.retain(|(of, what)| *of != facet || !matches!(what, Queued::Message(Delivery::Newest, _)));
     }
-    waiting.push_back((facet, Waiting::Message(delivery, message)));
+    queued.push_back((facet, Queued::Message(delivery, message)));
 }
 
 impl ServerLink for ShmServer {
@@ -312,14 +324,14 @@ impl ServerLink for ShmServer {
         message.clear();
         let end = self.start.elapsed() + timeout;
         loop {
-            let seen = self.ports.bell().answers();
-            if self.waiting.is_empty() {
+            let seen = self.ports.wakeup().server_notifications();
+            if self.queued.is_empty() {
                 self.take_all()?;
-                self.keep_house()?;
+                self.maintain()?;
             }
-            match self.waiting.pop_front() {
-                Some((facet, Waiting::Event(event))) => return Ok(Some((facet, event))),
-                Some((facet, Waiting::Message(_, bytes))) => {
+            match self.queued.pop_front() {
+                Some((facet, Queued::Event(event))) => return Ok(Some((facet, event))),
+                Some((facet, Queued::Message(_, bytes))) => {
                     *message = bytes;
                     self.counters[usize::from(facet)].messages_in += 1;
                     return Ok(Some((facet, LinkEvent::Message)));
@@ -330,17 +342,21 @@ impl ServerLink for ShmServer {
             if left.is_zero() {
                 return Ok(None);
             }
-            let owed = self.connections.iter().flatten().filter(|connection| connection.owes).count() as u32;
-            let gap = self.connections.iter().flatten().any(|connection| connection.order.has_gap());
-            let most = if gap { GAP } else { PING / 4 };
-            self.ports.bell().wait_for_answers(seen, owed, left.min(most))?;
+            let owed = self.connections.iter().flatten().filter(|connection| connection.owes_reply).count() as u32;
+            let gap = self.connections.iter().flatten().any(|connection| connection.reassembly.has_gap());
+            let most = if gap { GAP_POLL } else { PING_INTERVAL / 4 };
+            self.ports.wakeup().wait_for_server_notifications(seen, owed, left.min(most))?;
         }
     }
 
     fn close(&mut self, facet: FacetNumber) {
         let Some(connection) = self.connections.get(usize::from(facet)).and_then(Option::as_ref) else { return };
         // A facet that does not hear it finds the silence.
-        let _ = self.tell(Head { facet, connection: connection.number, ..Head::new(Kind::Close, self.reign) });
+        let _ = self.send_control(SampleHeader {
+            facet,
+            connection: connection.number,
+            ..SampleHeader::new(SampleKind::Close, self.server_id)
+        });
         self.end(facet, Closed::ByUs);
     }
 
@@ -348,8 +364,8 @@ impl ServerLink for ShmServer {
         self.counters.get(usize::from(facet)).copied().unwrap_or_default()
     }
 
-    fn strangers(&self) -> LinkCounters {
-        self.strangers
+    fn unknown_peers(&self) -> LinkCounters {
+        self.unknown_peers
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! | word | bits | what |
 //! |---|---|---|
-//! | 0 | 0 to 7 | [`Kind`] |
+//! | 0 | 0 to 7 | [`SampleKind`] |
 //! | | 8 to 15 | flags: 1 newest, 2 more of this message follows, 4 nothing for you under these numbers |
 //! | | 16 to 31 | facet |
 //! | | 32 to 63 | magic `shm3` |
@@ -15,14 +15,14 @@
 use crate::sync::transport::{FacetNumber, Refused};
 
 /// A head as it lies in shared memory.
-pub type Words = [u64; 6];
+pub type HeaderWords = [u64; 6];
 /// Its bytes.
-pub const HEAD: usize = size_of::<Words>();
+pub const HEADER_BYTES: usize = size_of::<HeaderWords>();
 const MAGIC: u32 = u32::from_le_bytes(*b"shm3");
 
 /// What a sample is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum SampleKind {
     /// Facet: I am here.
     Hello = 1,
     /// Server: you are connected; `number` is the first piece that is for you.
@@ -30,20 +30,27 @@ pub enum Kind {
     /// A piece of a message.
     Piece = 3,
     /// Send these again.
-    Again = 4,
+    ResendRequest = 4,
     /// I live.
     Ping = 5,
     /// The connection is over.
     Close = 6,
 }
 
-const KINDS: [Kind; 6] = [Kind::Hello, Kind::Welcome, Kind::Piece, Kind::Again, Kind::Ping, Kind::Close];
+const SAMPLE_KINDS: [SampleKind; 6] = [
+    SampleKind::Hello,
+    SampleKind::Welcome,
+    SampleKind::Piece,
+    SampleKind::ResendRequest,
+    SampleKind::Ping,
+    SampleKind::Close,
+];
 
 /// The head.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Head {
+pub struct SampleHeader {
     /// What the sample is for.
-    pub kind: Kind,
+    pub kind: SampleKind,
     /// Of a newest message.
     pub newest: bool,
     /// More of this message follows.
@@ -53,7 +60,7 @@ pub struct Head {
     /// From or to which facet.
     pub facet: FacetNumber,
     /// The server's number.
-    pub reign: u64,
+    pub server_id: u64,
     /// The facet's number.
     pub connection: u64,
     /// For whom.
@@ -64,16 +71,16 @@ pub struct Head {
     pub until: u64,
 }
 
-impl Head {
+impl SampleHeader {
     /// A head with zeros behind the kind.
-    pub fn new(kind: Kind, reign: u64) -> Head {
-        Head {
+    pub fn new(kind: SampleKind, server_id: u64) -> SampleHeader {
+        SampleHeader {
             kind,
             newest: false,
             more: false,
             skip: false,
             facet: 0,
-            reign,
+            server_id,
             connection: 0,
             mask: 0,
             number: 0,
@@ -82,27 +89,27 @@ impl Head {
     }
 
     /// As it lies in shared memory.
-    pub fn words(&self) -> Words {
+    pub fn words(&self) -> HeaderWords {
         let flags = u64::from(self.newest) | u64::from(self.more) << 1 | u64::from(self.skip) << 2;
         let first = self.kind as u64 | flags << 8 | u64::from(self.facet) << 16 | u64::from(MAGIC) << 32;
-        [first, self.reign, self.connection, self.mask, self.number, self.until]
+        [first, self.server_id, self.connection, self.mask, self.number, self.until]
     }
 
     /// The head of a sample.
-    pub fn parse([first, reign, connection, mask, number, until]: Words) -> Result<Head, Refused> {
+    pub fn parse([first, server_id, connection, mask, number, until]: HeaderWords) -> Result<SampleHeader, Refused> {
         let [kind, flags, facet @ ..] = (first as u32).to_le_bytes();
-        let kind = KINDS.into_iter().find(|known| *known as u8 == kind).ok_or(Refused::Foreign)?;
+        let kind = SAMPLE_KINDS.into_iter().find(|known| *known as u8 == kind).ok_or(Refused::Foreign)?;
         if (first >> 32) as u32 != MAGIC || flags > 7 {
             return Err(Refused::Foreign);
         }
         let flag = |bit: u8| flags >> bit & 1 == 1;
-        Ok(Head {
+        Ok(SampleHeader {
             kind,
             newest: flag(0),
             more: flag(1),
             skip: flag(2),
             facet: u16::from_le_bytes(facet),
-            reign,
+            server_id,
             connection,
             mask,
             number,

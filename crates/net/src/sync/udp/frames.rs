@@ -16,11 +16,11 @@
 use crate::sync::transport::{Delivery, MAX_MESSAGE_BYTES};
 
 /// Bytes of a whole fragment. With header, seal, an acknowledgement and its own head it stays below 1200.
-pub const FRAGMENT: usize = 1120;
+pub const FRAGMENT_BYTES: usize = 1120;
 /// Most bytes of an acknowledgement.
 pub const ACK_BYTES: usize = 30;
 /// Bytes around the data of a parity frame.
-pub const PARITY_HEAD: usize = 13;
+pub const PARITY_HEADER_BYTES: usize = 13;
 /// Added to a frame's number for the newest messages.
 const NEWEST: u8 = 16;
 /// Most frames in a packet.
@@ -61,7 +61,7 @@ pub struct Ack {
 
 /// Which message, and how long it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Part {
+pub struct MessageInfo {
     /// Its stream.
     pub channel: Channel,
     /// Its number in the stream; wraps.
@@ -70,20 +70,20 @@ pub struct Part {
     pub total: u32,
 }
 
-impl Part {
+impl MessageInfo {
     /// Number of fragments.
     pub fn fragments(&self) -> u16 {
-        (self.total as usize).div_ceil(FRAGMENT) as u16
+        (self.total as usize).div_ceil(FRAGMENT_BYTES) as u16
     }
 
     /// Bytes around the data of a fragment.
-    pub fn head(&self) -> usize {
+    pub fn header_bytes(&self) -> usize {
         if self.fragments() == 1 { 7 } else { 11 }
     }
 
     /// Length of a fragment.
     pub fn length(&self, index: u16) -> usize {
-        (self.total as usize - usize::from(index) * FRAGMENT).min(FRAGMENT)
+        (self.total as usize - usize::from(index) * FRAGMENT_BYTES).min(FRAGMENT_BYTES)
     }
 }
 
@@ -93,9 +93,9 @@ pub enum Frame<'a> {
     /// What has arrived.
     Ack(Ack),
     /// A piece of a message.
-    Fragment(Part, u16, &'a [u8]),
+    Fragment(MessageInfo, u16, &'a [u8]),
     /// Exclusive or of a group of fragments: group, number of groups, bytes.
-    Parity(Part, u16, u16, &'a [u8]),
+    Parity(MessageInfo, u16, u16, &'a [u8]),
     /// Wants an acknowledgement.
     Ping,
     /// The session is over.
@@ -138,7 +138,7 @@ impl Frame<'_> {
     }
 }
 
-fn write_part(kind: u8, part: &Part, out: &mut Vec<u8>) {
+fn write_part(kind: u8, part: &MessageInfo, out: &mut Vec<u8>) {
     out.push(kind + NEWEST * part.channel as u8);
     out.extend_from_slice(&part.message.to_le_bytes());
     out.extend_from_slice(&part.total.to_le_bytes());
@@ -158,8 +158,8 @@ pub fn parse(mut body: &[u8]) -> Option<Vec<Frame<'_>>> {
             (1, _) => Frame::Ack(take_ack(body, channel)?),
             (2, _) => {
                 let (message, total) = (u32::from_le_bytes(take(body)?), u16::from_le_bytes(take(body)?));
-                let part = Part { channel, message, total: total.into() };
-                if !(1..=FRAGMENT).contains(&usize::from(total)) {
+                let part = MessageInfo { channel, message, total: total.into() };
+                if !(1..=FRAGMENT_BYTES).contains(&usize::from(total)) {
                     return None;
                 }
                 Frame::Fragment(part, 0, take_slice(body, total.into())?)
@@ -178,7 +178,7 @@ pub fn parse(mut body: &[u8]) -> Option<Vec<Frame<'_>>> {
                 if group >= groups || groups >= part.fragments() {
                     return None;
                 }
-                Frame::Parity(part, group, groups, take_slice(body, FRAGMENT)?)
+                Frame::Parity(part, group, groups, take_slice(body, FRAGMENT_BYTES)?)
             }
             (5, Channel::Reliable) => Frame::Ping,
             (6, Channel::Reliable) => Frame::Close,
@@ -200,21 +200,22 @@ fn take_ack(body: &mut &[u8], channel: Channel) -> Option<Ack> {
     Some(Ack { reliable, newest, largest, bytes, mask: u128::from_le_bytes(mask) })
 }
 
-fn take_part(body: &mut &[u8], channel: Channel) -> Option<Part> {
-    let part = Part { channel, message: u32::from_le_bytes(take(body)?), total: u32::from_le_bytes(take(body)?) };
+fn take_part(body: &mut &[u8], channel: Channel) -> Option<MessageInfo> {
+    let part =
+        MessageInfo { channel, message: u32::from_le_bytes(take(body)?), total: u32::from_le_bytes(take(body)?) };
     (1..=MAX_MESSAGE_BYTES).contains(&(part.total as usize)).then_some(part)
 }
 
 fn take<const N: usize>(body: &mut &[u8]) -> Option<[u8; N]> {
-    let (head, rest) = body.split_first_chunk::<N>()?;
+    let (header_bytes, rest) = body.split_first_chunk::<N>()?;
     *body = rest;
-    Some(*head)
+    Some(*header_bytes)
 }
 
 fn take_slice<'a>(body: &mut &'a [u8], n: usize) -> Option<&'a [u8]> {
-    let (head, rest) = body.split_at_checked(n)?;
+    let (header_bytes, rest) = body.split_at_checked(n)?;
     *body = rest;
-    Some(head)
+    Some(header_bytes)
 }
 
 /// Whether `a` comes before `b` in numbers that wrap.

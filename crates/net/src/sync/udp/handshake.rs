@@ -19,7 +19,7 @@
 //! the old one before ends the doubt.
 
 use super::keys::Handshake;
-use super::packet::{self, HEADER, Header, Kind, TAG};
+use super::packet::{self, HEADER_BYTES, PacketHeader, PacketKind, TAG_BYTES};
 use crate::sync::transport::{FacetNumber, Refused};
 use std::net::{IpAddr, SocketAddr};
 use std::time::Duration;
@@ -38,7 +38,7 @@ pub struct Hello {
     /// The proof; zeros in a Hello.
     pub cookie: [u8; 32],
     /// The session that it has and doubts, because nothing came for some time; 0 where there is none.
-    pub doubted: u32,
+    pub suspect_session: u32,
 }
 
 /// Server: a nonce of the facet given back, and a cookie or the server's nonce.
@@ -52,12 +52,12 @@ pub struct Reply {
 
 impl Hello {
     /// Writes a Hello or an Answer.
-    pub fn write(&self, kind: Kind, handshake: &Handshake, datagram: &mut Vec<u8>) {
-        packet::begin(datagram, Header { kind, session: self.doubted, sequence: 0 });
+    pub fn write(&self, kind: PacketKind, handshake: &Handshake, datagram: &mut Vec<u8>) {
+        packet::begin(datagram, PacketHeader { kind, session: self.suspect_session, sequence: 0 });
         datagram.extend_from_slice(&self.nonce);
         datagram.extend_from_slice(&self.facet.to_le_bytes());
         datagram.extend_from_slice(&self.cookie);
-        datagram.resize(REQUEST_BYTES - TAG, 0);
+        datagram.resize(REQUEST_BYTES - TAG_BYTES, 0);
         handshake.tag(datagram);
     }
 
@@ -74,15 +74,15 @@ impl Hello {
             nonce: *nonce,
             facet: FacetNumber::from_le_bytes(*facet),
             cookie: *cookie,
-            doubted: packet::session_of(datagram),
+            suspect_session: packet::session_of(datagram),
         })
     }
 }
 
 impl Reply {
     /// Writes a Challenge or a Welcome.
-    pub fn write(&self, kind: Kind, session: u32, handshake: &Handshake, datagram: &mut Vec<u8>) {
-        packet::begin(datagram, Header { kind, session, sequence: 0 });
+    pub fn write(&self, kind: PacketKind, session: u32, handshake: &Handshake, datagram: &mut Vec<u8>) {
+        packet::begin(datagram, PacketHeader { kind, session, sequence: 0 });
         datagram.extend_from_slice(&self.nonce);
         datagram.extend_from_slice(&self.value);
         handshake.tag(datagram);
@@ -90,7 +90,7 @@ impl Reply {
 
     /// Reads one.
     pub fn read(datagram: &[u8], handshake: &Handshake) -> Result<Reply, Refused> {
-        match datagram.len().cmp(&(HEADER + 64 + TAG)) {
+        match datagram.len().cmp(&(HEADER_BYTES + 64 + TAG_BYTES)) {
             std::cmp::Ordering::Less => return Err(Refused::Truncated),
             std::cmp::Ordering::Greater => return Err(Refused::Oversize),
             std::cmp::Ordering::Equal => {}
@@ -112,12 +112,12 @@ impl Cookies {
     }
 
     /// For this Hello from this address, now.
-    pub fn bake(&self, now: Duration, from: SocketAddr, hello: &Hello) -> [u8; 32] {
+    pub fn create(&self, now: Duration, from: SocketAddr, hello: &Hello) -> [u8; 32] {
         *self.of(now.as_secs() / INTERVAL_S, from, hello).as_bytes()
     }
 
     /// Whether the Answer carries a cookie for this address that is at most 20 s old.
-    pub fn fits(&self, now: Duration, from: SocketAddr, answer: &Hello) -> bool {
+    pub fn verify(&self, now: Duration, from: SocketAddr, answer: &Hello) -> bool {
         let interval = now.as_secs() / INTERVAL_S;
         let given = blake3::Hash::from(answer.cookie);
         [Some(interval), interval.checked_sub(1)]

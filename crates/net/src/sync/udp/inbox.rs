@@ -5,20 +5,20 @@
 //!
 //! Memory is taken for bytes that have arrived, never for bytes that were announced.
 
-use super::frames::{Channel, FRAGMENT, Part, before};
+use super::frames::{Channel, FRAGMENT_BYTES, MessageInfo, before};
 use crate::sync::transport::{Delivery, MAX_QUEUED_BYTES};
 use std::collections::{BTreeMap, VecDeque};
 
 /// Reliable messages under way at once; the other side starts no more.
-pub const RELIABLE_AHEAD: u32 = 256;
+pub const MAX_RELIABLE_IN_FLIGHT: u32 = 256;
 /// Newest messages under way at once; the other side starts no more.
-pub const NEWEST_AHEAD: u32 = 4;
+pub const MAX_NEWEST_IN_FLIGHT: u32 = 4;
 /// Bytes of messages under way at once; the other side starts no more, or one message alone.
-pub const BYTES_AHEAD: usize = 32 << 20;
+pub const MAX_BYTES_IN_FLIGHT: usize = 32 << 20;
 
 /// A message in pieces.
 struct Assembly {
-    part: Part,
+    part: MessageInfo,
     fragments: BTreeMap<u16, Box<[u8]>>,
     parity: BTreeMap<u16, Box<[u8]>>,
     groups: u16,
@@ -26,7 +26,7 @@ struct Assembly {
 
 /// A fragment or a parity frame contradicts what was agreed, or what came before.
 #[derive(Debug, PartialEq, Eq)]
-pub struct Contradiction;
+pub struct ConflictingFragment;
 
 /// What has arrived of one connection.
 pub struct Inbox {
@@ -78,7 +78,7 @@ impl Inbox {
     }
 
     /// Takes a fragment. One of a message that is complete is no fault: it was sent again.
-    pub fn fragment(&mut self, part: Part, index: u16, data: &[u8]) -> Result<(), Contradiction> {
+    pub fn fragment(&mut self, part: MessageInfo, index: u16, data: &[u8]) -> Result<(), ConflictingFragment> {
         let Some(assembly) = self.assembly(part)? else { return Ok(()) };
         if assembly.fragments.contains_key(&index) {
             return Ok(());
@@ -86,15 +86,21 @@ impl Inbox {
         assembly.fragments.insert(index, data.into());
         let recovered = if assembly.groups > 0 { assembly.recover(index % assembly.groups) } else { 0 };
         self.held += data.len() + recovered;
-        self.release_if_whole(part);
+        self.release_if_complete(part);
         Ok(())
     }
 
     /// Takes the parity of a group of fragments.
-    pub fn parity(&mut self, part: Part, group: u16, groups: u16, data: &[u8]) -> Result<(), Contradiction> {
+    pub fn parity(
+        &mut self,
+        part: MessageInfo,
+        group: u16,
+        groups: u16,
+        data: &[u8],
+    ) -> Result<(), ConflictingFragment> {
         let Some(assembly) = self.assembly(part)? else { return Ok(()) };
         if assembly.groups != 0 && assembly.groups != groups {
-            return Err(Contradiction);
+            return Err(ConflictingFragment);
         }
         assembly.groups = groups;
         if assembly.parity.insert(group, data.into()).is_some() {
@@ -102,33 +108,33 @@ impl Inbox {
         }
         let recovered = assembly.recover(group);
         self.held += data.len() + recovered;
-        self.release_if_whole(part);
+        self.release_if_complete(part);
         Ok(())
     }
 
     /// The assembly of a message, begun if need be; `None` if the message is already complete.
-    fn assembly(&mut self, part: Part) -> Result<Option<&mut Assembly>, Contradiction> {
+    fn assembly(&mut self, part: MessageInfo) -> Result<Option<&mut Assembly>, ConflictingFragment> {
         let channel = part.channel as usize;
-        let ahead = if part.channel == Channel::Reliable { RELIABLE_AHEAD } else { 1 << 24 };
+        let ahead = if part.channel == Channel::Reliable { MAX_RELIABLE_IN_FLIGHT } else { 1 << 24 };
         if before(part.message, self.next[channel]) {
             return Ok(None);
         }
         // Twice what the other side keeps to, because what it counts as done may still be held here.
-        if part.message.wrapping_sub(self.next[channel]) >= ahead || self.held > 2 * BYTES_AHEAD {
-            return Err(Contradiction);
+        if part.message.wrapping_sub(self.next[channel]) >= ahead || self.held > 2 * MAX_BYTES_IN_FLIGHT {
+            return Err(ConflictingFragment);
         }
         if part.channel == Channel::Newest {
             self.make_room(part.message);
         }
         let begun = || Assembly { part, fragments: BTreeMap::new(), parity: BTreeMap::new(), groups: 0 };
         let assembly = self.assemblies[channel].entry(part.message).or_insert_with(begun);
-        if assembly.part == part { Ok(Some(assembly)) } else { Err(Contradiction) }
+        if assembly.part == part { Ok(Some(assembly)) } else { Err(ConflictingFragment) }
     }
 
     /// Of newest messages under way, forgets the oldest beyond twice what the other side keeps to.
     fn make_room(&mut self, message: u32) {
         let assemblies = &mut self.assemblies[Channel::Newest as usize];
-        while assemblies.len() >= 2 * NEWEST_AHEAD as usize && !assemblies.contains_key(&message) {
+        while assemblies.len() >= 2 * MAX_NEWEST_IN_FLIGHT as usize && !assemblies.contains_key(&message) {
             let next = self.next[Channel::Newest as usize];
             let Some(oldest) = assemblies.keys().copied().min_by_key(|k| k.wrapping_sub(next)) else { return };
             if let Some(gone) = assemblies.remove(&oldest) {
@@ -137,9 +143,9 @@ impl Inbox {
         }
     }
 
-    fn release_if_whole(&mut self, part: Part) {
+    fn release_if_complete(&mut self, part: MessageInfo) {
         let channel = part.channel as usize;
-        if !self.assemblies[channel].get(&part.message).is_some_and(Assembly::whole) {
+        if !self.assemblies[channel].get(&part.message).is_some_and(Assembly::is_complete) {
             return;
         }
         if part.channel == Channel::Newest
@@ -174,7 +180,7 @@ impl Inbox {
     fn release(&mut self) {
         let next = &mut self.next[Channel::Reliable as usize];
         let assemblies = &mut self.assemblies[Channel::Reliable as usize];
-        while self.ready_bytes < MAX_QUEUED_BYTES && assemblies.get(next).is_some_and(Assembly::whole) {
+        while self.ready_bytes < MAX_QUEUED_BYTES && assemblies.get(next).is_some_and(Assembly::is_complete) {
             let Some(assembly) = assemblies.remove(next) else { return };
             self.held -= assembly.held();
             let message = assembly.join();
@@ -186,7 +192,7 @@ impl Inbox {
 }
 
 impl Assembly {
-    fn whole(&self) -> bool {
+    fn is_complete(&self) -> bool {
         self.fragments.len() == usize::from(self.part.fragments())
     }
 
@@ -222,10 +228,10 @@ pub fn xor(into: &mut [u8], other: &[u8]) {
 }
 
 /// The parity of a group of a message's fragments.
-pub fn parity(message: &[u8], group: u16, groups: u16) -> [u8; FRAGMENT] {
-    let mut parity = [0; FRAGMENT];
+pub fn parity(message: &[u8], group: u16, groups: u16) -> [u8; FRAGMENT_BYTES] {
+    let mut parity = [0; FRAGMENT_BYTES];
     message
-        .chunks(FRAGMENT)
+        .chunks(FRAGMENT_BYTES)
         .skip(usize::from(group))
         .step_by(usize::from(groups))
         .for_each(|fragment| xor(&mut parity, fragment));

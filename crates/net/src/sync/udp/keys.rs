@@ -9,7 +9,7 @@
 //! Both sides give a fresh nonce of 32 bytes, so no session ever uses the keys of another one, and a packet of one direction, facet or session is a
 //! forgery in every other. Losing the key file opens the sessions recorded before: there is no forward secrecy, because there is no other secret.
 
-use super::packet::{self, HEADER, Header, MAX_DATAGRAM, TAG};
+use super::packet::{self, HEADER_BYTES, MAX_DATAGRAM, PacketHeader, TAG_BYTES};
 use crate::sync::transport::{FacetNumber, LinkError, Refused};
 use chacha20poly1305::aead::{AeadInOut, Generate, Key, KeyInit};
 use chacha20poly1305::{ChaCha20Poly1305, Nonce, Tag};
@@ -18,7 +18,7 @@ use std::path::Path;
 const HANDSHAKE: &str = "tumble-net udp v2 handshake";
 const TO_SERVER: &str = "tumble-net udp v2 facet to server";
 const TO_FACET: &str = "tumble-net udp v2 server to facet";
-const ENTROPY: &str = "tumble-net udp v1 random numbers of one process";
+const SEEDED: &str = "tumble-net udp v1 random numbers of one process";
 
 /// The key that all machines of a cave share.
 #[derive(Clone)]
@@ -110,7 +110,7 @@ impl Entropy {
 
     /// From a seed: the same numbers each time. For tests alone.
     pub fn seeded(seed: u64) -> Entropy {
-        Entropy { key: blake3::derive_key(ENTROPY, &seed.to_le_bytes()), counter: 0 }
+        Entropy { key: blake3::derive_key(SEEDED, &seed.to_le_bytes()), counter: 0 }
     }
 
     /// The next 32 bytes.
@@ -145,20 +145,24 @@ impl Handshake {
 
     /// The body, if the tag fits.
     pub fn open<'a>(&self, datagram: &'a [u8]) -> Result<&'a [u8], Refused> {
-        let (covered, tag) = datagram.split_at(datagram.len() - TAG);
+        let (covered, tag) = datagram.split_at(datagram.len() - TAG_BYTES);
         // Compared in constant time, as one hash with another.
         let (mut have, mut want) = ([0; 32], [0; 32]);
-        have[..TAG].copy_from_slice(tag);
-        want[..TAG].copy_from_slice(&self.of(covered));
-        if blake3::Hash::from(have) == blake3::Hash::from(want) { Ok(&covered[HEADER..]) } else { Err(Refused::Forged) }
+        have[..TAG_BYTES].copy_from_slice(tag);
+        want[..TAG_BYTES].copy_from_slice(&self.of(covered));
+        if blake3::Hash::from(have) == blake3::Hash::from(want) {
+            Ok(&covered[HEADER_BYTES..])
+        } else {
+            Err(Refused::Forged)
+        }
     }
 
-    fn of(&self, covered: &[u8]) -> [u8; TAG] {
+    fn of(&self, covered: &[u8]) -> [u8; TAG_BYTES] {
         let mut hasher = blake3::Hasher::new_keyed(&self.0);
         hasher.update(&packet::associated(covered));
-        hasher.update(&covered[HEADER..]);
-        let mut tag = [0; TAG];
-        tag.copy_from_slice(&hasher.finalize().as_bytes()[..TAG]);
+        hasher.update(&covered[HEADER_BYTES..]);
+        let mut tag = [0; TAG_BYTES];
+        tag.copy_from_slice(&hasher.finalize().as_bytes()[..TAG_BYTES]);
         tag
     }
 }
@@ -219,15 +223,16 @@ impl Seal {
 
     /// Writes the next packet with this body. `false`: the sequence numbers are used up, or the body is too long; nothing was written.
     pub fn close(&mut self, body: &[u8], datagram: &mut Vec<u8>) -> bool {
-        let Some(sequence) = self.next_sequence().filter(|_| HEADER + body.len() + TAG <= MAX_DATAGRAM) else {
+        let Some(sequence) = self.next_sequence().filter(|_| HEADER_BYTES + body.len() + TAG_BYTES <= MAX_DATAGRAM)
+        else {
             return false;
         };
-        packet::begin(datagram, Header { kind: packet::Kind::Data, session: self.session, sequence });
+        packet::begin(datagram, PacketHeader { kind: packet::PacketKind::Data, session: self.session, sequence });
         datagram.extend_from_slice(body);
         packet::set_length(datagram);
         let covered = packet::associated(datagram);
         let Ok(tag) =
-            self.outgoing.encrypt_inout_detached(&nonce(sequence), &covered, (&mut datagram[HEADER..]).into())
+            self.outgoing.encrypt_inout_detached(&nonce(sequence), &covered, (&mut datagram[HEADER_BYTES..]).into())
         else {
             return false; // only for bodies of gigabytes
         };
@@ -237,10 +242,10 @@ impl Seal {
     }
 
     /// The body of a packet with its whole number, opened into `body`.
-    pub fn open(&self, header: &Header, datagram: &[u8], body: &mut Vec<u8>) -> Result<(), Refused> {
-        let (covered, tag) = datagram.split_at(datagram.len() - TAG);
+    pub fn open(&self, header: &PacketHeader, datagram: &[u8], body: &mut Vec<u8>) -> Result<(), Refused> {
+        let (covered, tag) = datagram.split_at(datagram.len() - TAG_BYTES);
         body.clear();
-        body.extend_from_slice(&covered[HEADER..]);
+        body.extend_from_slice(&covered[HEADER_BYTES..]);
         let tag = Tag::try_from(tag).map_err(|_| Refused::Forged)?;
         self.incoming
             .decrypt_inout_detached(

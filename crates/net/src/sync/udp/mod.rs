@@ -13,24 +13,45 @@
 //!
 //! `docs/transports.md` has the packets, the threats and the figures.
 
-pub mod facet;
-pub mod frames;
-pub mod handshake;
-pub mod inbox;
-pub mod keys;
-pub mod network;
-pub mod outbox;
-pub mod packet;
-pub mod server;
-pub mod session;
-pub mod socket;
-pub mod window;
+mod facet;
+mod inbox;
+mod outbox;
+mod server;
+mod session;
+mod socket;
+mod window;
 
-pub use facet::FacetMachine;
+// Packet formats and the network with faults: public for fuzz targets and tests alone.
+#[cfg(feature = "fuzzing")]
+pub mod frames;
+#[cfg(not(feature = "fuzzing"))]
+mod frames;
+#[cfg(feature = "fuzzing")]
+pub mod handshake;
+#[cfg(not(feature = "fuzzing"))]
+mod handshake;
+#[cfg(feature = "fuzzing")]
+pub mod keys;
+#[cfg(not(feature = "fuzzing"))]
+mod keys;
+#[cfg(feature = "fuzzing")]
+pub mod network;
+#[cfg(feature = "fuzzing")]
+pub mod packet;
+#[cfg(not(feature = "fuzzing"))]
+mod packet;
+
 pub use keys::{Entropy, SharedKey};
-pub use server::ServerMachine;
-pub use session::Numbering;
 pub use socket::{UdpFacet, UdpServer};
+
+#[cfg(not(feature = "fuzzing"))]
+use {facet::FacetMachine, server::ServerMachine, session::Numbering};
+#[cfg(feature = "fuzzing")]
+pub use {
+    facet::{FacetMachine, FacetSettings},
+    server::{ServerMachine, ServerSettings},
+    session::{Numbering, Session},
+};
 
 use std::time::Duration;
 
@@ -38,15 +59,19 @@ use std::time::Duration;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
     /// A side that had nothing to send for so long asks for a sign of life.
-    pub ping: Duration,
+    pub ping_interval: Duration,
     /// A connection of which nothing was heard for so long is closed.
-    pub silence: Duration,
+    pub idle_timeout: Duration,
     /// A facet that looks for its server asks this often.
-    pub ask: Duration,
+    pub connect_interval: Duration,
 }
 
 impl Default for Timing {
     fn default() -> Timing {
-        Timing { ping: Duration::from_millis(200), silence: Duration::from_secs(2), ask: Duration::from_millis(100) }
+        Timing {
+            ping_interval: Duration::from_millis(200),
+            idle_timeout: Duration::from_secs(2),
+            connect_interval: Duration::from_millis(100),
+        }
     }
 }

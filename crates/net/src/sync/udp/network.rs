@@ -61,16 +61,16 @@ impl Random {
 }
 
 /// A datagram under way: from, to, bytes.
-pub type UnderWay = (SocketAddr, SocketAddr, Vec<u8>);
+pub type InFlight = (SocketAddr, SocketAddr, Vec<u8>);
 
 /// Datagrams under way.
 pub struct Network {
     faults: Faults,
     random: Random,
-    under_way: BTreeMap<(Duration, u64), UnderWay>,
+    in_flight: BTreeMap<(Duration, u64), InFlight>,
     count: u64,
     /// While set, everything is lost.
-    pub parted: bool,
+    pub partitioned: bool,
     /// Bytes that were sent, lost ones included.
     pub bytes: u64,
 }
@@ -78,7 +78,14 @@ pub struct Network {
 impl Network {
     /// A quiet network.
     pub fn new(seed: u64, faults: Faults) -> Network {
-        Network { faults, random: Random::new(seed), under_way: BTreeMap::new(), count: 0, parted: false, bytes: 0 }
+        Network {
+            faults,
+            random: Random::new(seed),
+            in_flight: BTreeMap::new(),
+            count: 0,
+            partitioned: false,
+            bytes: 0,
+        }
     }
 
     /// Sends a datagram into it.
@@ -86,30 +93,30 @@ impl Network {
         self.bytes += datagram.len() as u64;
         let copies = 1 + usize::from(self.random.happens(self.faults.duplicate));
         for _ in 0..copies {
-            let lost = self.random.happens(self.faults.loss) || self.parted;
+            let lost = self.random.happens(self.faults.loss) || self.partitioned;
             let overtakes = self.random.happens(self.faults.reorder);
             let delay = if overtakes { 0.0 } else { self.faults.delay_s + self.random.unit() * self.faults.jitter_s };
             let mut datagram = datagram.to_vec();
-            self.damage(&mut datagram);
+            self.corrupt(&mut datagram);
             if !lost {
                 self.count += 1;
-                self.under_way.insert((now + Duration::from_secs_f64(delay), self.count), (from, to, datagram));
+                self.in_flight.insert((now + Duration::from_secs_f64(delay), self.count), (from, to, datagram));
             }
         }
     }
 
     /// The next datagram that has arrived by now.
-    pub fn receive(&mut self, now: Duration) -> Option<UnderWay> {
-        let first = self.under_way.first_entry().filter(|first| first.key().0 <= now)?;
+    pub fn receive(&mut self, now: Duration) -> Option<InFlight> {
+        let first = self.in_flight.first_entry().filter(|first| first.key().0 <= now)?;
         Some(first.remove())
     }
 
     /// When the next datagram arrives.
     pub fn next(&self) -> Option<Duration> {
-        self.under_way.keys().next().map(|(at, _)| *at)
+        self.in_flight.keys().next().map(|(at, _)| *at)
     }
 
-    fn damage(&mut self, datagram: &mut Vec<u8>) {
+    fn corrupt(&mut self, datagram: &mut Vec<u8>) {
         if self.random.happens(self.faults.flip) && !datagram.is_empty() {
             let bit = self.random.below(8 * datagram.len());
             datagram[bit / 8] ^= 1 << (bit % 8);

@@ -3,7 +3,7 @@
 use super::Timing;
 use super::handshake::{Cookies, Hello, Reply};
 use super::keys::{Agreement, Entropy, Handshake, SharedKey, Side};
-use super::packet::{self, Header, Kind};
+use super::packet::{self, PacketHeader, PacketKind};
 use super::session::{Numbering, Session};
 use crate::sync::transport::{
     Closed, Delivery, FacetNumber, LinkCounters, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES, Refused,
@@ -47,7 +47,7 @@ pub struct ServerMachine {
     replies: VecDeque<(SocketAddr, Vec<u8>)>,
     events: VecDeque<(FacetNumber, LinkEvent, Vec<u8>)>,
     counters: Vec<LinkCounters>,
-    strangers: LinkCounters,
+    unknown_peers: LinkCounters,
     /// The facet that is asked first for a message.
     turn: usize,
 }
@@ -69,7 +69,7 @@ impl ServerMachine {
             replies: VecDeque::new(),
             events: VecDeque::new(),
             counters: vec![LinkCounters::default(); facets],
-            strangers: LinkCounters::default(),
+            unknown_peers: LinkCounters::default(),
             turn: 0,
         }
     }
@@ -78,16 +78,16 @@ impl ServerMachine {
     pub fn receive(&mut self, now: Duration, from: SocketAddr, datagram: &[u8]) {
         let header = packet::parse(datagram);
         let facet = match &header {
-            Ok(header) if header.kind == Kind::Data => {
+            Ok(header) if header.kind == PacketKind::Data => {
                 self.sessions.get(&header.session).map(|session| session.agreed.facet)
             }
             _ => self.facet_at(from),
         };
         self.counters_of(facet).bytes_in += datagram.len() as u64;
         let taken = header.and_then(|header| match header.kind {
-            Kind::Data => self.take_data(now, from, &header, datagram),
-            Kind::Hello => self.take_hello(now, from, datagram),
-            Kind::Answer => self.take_answer(now, from, datagram),
+            PacketKind::Data => self.take_data(now, from, &header, datagram),
+            PacketKind::Hello => self.take_hello(now, from, datagram),
+            PacketKind::Answer => self.take_answer(now, from, datagram),
             _ => Err(Refused::Foreign),
         });
         if let Err(why) = taken {
@@ -98,7 +98,7 @@ impl ServerMachine {
     /// Sends what is due by `emit`, and finds what is over.
     pub fn transmit(&mut self, now: Duration, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
         for (to, datagram) in self.replies.drain(..) {
-            self.strangers.bytes_out += datagram.len() as u64;
+            self.unknown_peers.bytes_out += datagram.len() as u64;
             emit(to, &datagram);
         }
         let mut over = Vec::new();
@@ -109,8 +109,8 @@ impl ServerMachine {
             }
             if session.is_closed_by_peer() {
                 over.push((*id, Closed::ByPeer));
-            } else if session.is_silent(now) {
-                over.push((*id, Closed::Silent));
+            } else if session.is_timed_out(now) {
+                over.push((*id, Closed::TimedOut));
             } else if session.is_exhausted() {
                 over.push((*id, Closed::ByUs));
             }
@@ -165,7 +165,7 @@ impl ServerMachine {
     pub fn close(&mut self, now: Duration, facet: FacetNumber, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
         let Some(id) = self.live.get(usize::from(facet)).copied().flatten() else { return };
         if let Some(session) = self.sessions.get_mut(&id) {
-            session.say_close(now, &mut self.counters[usize::from(facet)], emit);
+            session.send_close(now, &mut self.counters[usize::from(facet)], emit);
         }
         self.end(id, Closed::ByUs);
     }
@@ -176,28 +176,34 @@ impl ServerMachine {
     }
 
     /// What could not be laid to any facet.
-    pub fn strangers(&self) -> LinkCounters {
-        self.strangers
+    pub fn unknown_peers(&self) -> LinkCounters {
+        self.unknown_peers
     }
 
-    fn take_data(&mut self, now: Duration, from: SocketAddr, header: &Header, datagram: &[u8]) -> Result<(), Refused> {
+    fn take_data(
+        &mut self,
+        now: Duration,
+        from: SocketAddr,
+        header: &PacketHeader,
+        datagram: &[u8],
+    ) -> Result<(), Refused> {
         let Some(session) = self.sessions.get_mut(&header.session) else {
             return self.take_late(from, header, datagram);
         };
         if session.address != from {
-            return Err(Refused::Stranger);
+            return Err(Refused::UnknownPeer);
         }
         let facet = session.agreed.facet;
         let was_live = session.live;
         let taken = session.receive(now, header, datagram, &mut self.counters[usize::from(facet)]);
         if session.live && !was_live {
-            self.bring_to_life(header.session, facet);
+            self.establish(header.session, facet);
         }
         taken
     }
 
     /// A packet of a session that is not known, or over: not answered, for it proves nothing. Genuine ones that were late do no harm and are no refusal.
-    fn take_late(&mut self, from: SocketAddr, header: &Header, datagram: &[u8]) -> Result<(), Refused> {
+    fn take_late(&mut self, from: SocketAddr, header: &PacketHeader, datagram: &[u8]) -> Result<(), Refused> {
         let over =
             self.over.iter_mut().find(|session| session.agreed.session == header.session && session.address == from);
         over.ok_or(Refused::Stale)?.receive_late(header, datagram)
@@ -207,15 +213,15 @@ impl ServerMachine {
         let hello = self.known(Hello::read(datagram, &self.handshake)?)?;
         let known = self
             .sessions
-            .get_mut(&hello.doubted)
+            .get_mut(&hello.suspect_session)
             .filter(|s| s.live && s.address == from && s.agreed.facet == hello.facet);
         if let Some(session) = known {
             session.ping();
             return Ok(());
         }
         let mut reply = Vec::new();
-        Reply { nonce: hello.nonce, value: self.cookies.bake(now, from, &hello) }.write(
-            Kind::Challenge,
+        Reply { nonce: hello.nonce, value: self.cookies.create(now, from, &hello) }.write(
+            PacketKind::Challenge,
             0,
             &self.handshake,
             &mut reply,
@@ -226,7 +232,7 @@ impl ServerMachine {
 
     fn take_answer(&mut self, now: Duration, from: SocketAddr, datagram: &[u8]) -> Result<(), Refused> {
         let answer = self.known(Hello::read(datagram, &self.handshake)?)?;
-        if !self.cookies.fits(now, from, &answer) {
+        if !self.cookies.verify(now, from, &answer) {
             return Err(Refused::Stale);
         }
         let same = |session: &&Session| {
@@ -240,7 +246,7 @@ impl ServerMachine {
         };
         let mut reply = Vec::new();
         Reply { nonce: agreed.facet_nonce, value: agreed.server_nonce }.write(
-            Kind::Welcome,
+            PacketKind::Welcome,
             agreed.session,
             &self.handshake,
             &mut reply,
@@ -273,7 +279,7 @@ impl ServerMachine {
         agreed
     }
 
-    fn bring_to_life(&mut self, id: u32, facet: FacetNumber) {
+    fn establish(&mut self, id: u32, facet: FacetNumber) {
         self.prepared.retain(|prepared| *prepared != id);
         if let Some(old) = self.live[usize::from(facet)] {
             self.end(old, Closed::Replaced);
@@ -297,7 +303,7 @@ impl ServerMachine {
                 );
             }
             self.events.push_back((facet, LinkEvent::Closed(why), Vec::new()));
-            session.empty();
+            session.clear_messages();
             if self.over.len() == MAX_OVER {
                 self.over.pop_front();
             }
@@ -306,7 +312,7 @@ impl ServerMachine {
     }
 
     fn known(&self, hello: Hello) -> Result<Hello, Refused> {
-        if usize::from(hello.facet) < self.live.len() { Ok(hello) } else { Err(Refused::Stranger) }
+        if usize::from(hello.facet) < self.live.len() { Ok(hello) } else { Err(Refused::UnknownPeer) }
     }
 
     fn live_session(&mut self, facet: FacetNumber) -> Option<&mut Session> {
@@ -324,7 +330,7 @@ impl ServerMachine {
     fn counters_of(&mut self, facet: Option<FacetNumber>) -> &mut LinkCounters {
         match facet {
             Some(facet) => &mut self.counters[usize::from(facet)],
-            None => &mut self.strangers,
+            None => &mut self.unknown_peers,
         }
     }
 

@@ -4,8 +4,8 @@ use super::Timing;
 use super::frames::{self, ACK_BYTES, Ack, Channel, Frame};
 use super::inbox::Inbox;
 use super::keys::{Agreement, Seal, SharedKey, Side};
-use super::outbox::{Full, Outbox};
-use super::packet::{HEADER, Header, MAX_DATAGRAM, TAG, whole};
+use super::outbox::{Outbox, QueueFull};
+use super::packet::{HEADER_BYTES, MAX_DATAGRAM, PacketHeader, TAG_BYTES, full_sequence};
 use super::window::ReplayWindow;
 use crate::sync::transport::{Delivery, LinkCounters, Refused};
 use std::net::SocketAddr;
@@ -17,8 +17,8 @@ const PACKETS_PER_ACK: u32 = 8;
 /// How long an acknowledgement may wait for a message that it can travel with: what is answered at once costs no packet of its own.
 const ACK_DELAY: Duration = Duration::from_micros(500);
 /// Each packet is told by so many acknowledgements, so that one that is lost does no harm.
-const ACKS_THAT_TELL: usize = 4;
-const BODY: usize = MAX_DATAGRAM - HEADER - TAG;
+const ACK_REPEATS: usize = 4;
+const BODY: usize = MAX_DATAGRAM - HEADER_BYTES - TAG_BYTES;
 
 /// Where the counting begins; other than 0 in tests of the wrap.
 #[derive(Clone, Copy, Debug, Default)]
@@ -42,13 +42,13 @@ pub struct Session {
     inbox: Inbox,
     outbox: Outbox,
     timing: Timing,
-    heard: Duration,
+    last_received: Duration,
     sent: Duration,
     /// Packets that want an acknowledgement, and when it is due.
     unacknowledged: u32,
     ack_due: Option<Duration>,
     /// The largest packets that the last acknowledgements told, the oldest first.
-    told: [u64; ACKS_THAT_TELL],
+    acked_largest: [u64; ACK_REPEATS],
     /// Number of the first packet of either side.
     first: u64,
     closed_by_peer: bool,
@@ -77,11 +77,11 @@ impl Session {
             inbox: Inbox::new(from.message),
             outbox: Outbox::new(from.message),
             timing,
-            heard: now,
+            last_received: now,
             sent: now,
             unacknowledged: 0,
             ack_due: None,
-            told: [from.sequence; ACKS_THAT_TELL],
+            acked_largest: [from.sequence; ACK_REPEATS],
             first: from.sequence,
             closed_by_peer: false,
             exhausted: false,
@@ -94,13 +94,13 @@ impl Session {
     pub fn receive(
         &mut self,
         now: Duration,
-        header: &Header,
+        header: &PacketHeader,
         datagram: &[u8],
         counters: &mut LinkCounters,
     ) -> Result<(), Refused> {
         let mut body = std::mem::take(&mut self.body);
         let result = self.open(header, datagram, &mut body).and_then(|()| {
-            self.heard = now;
+            self.last_received = now;
             self.live = true;
             let frames = frames::parse(&body).ok_or(Refused::Torn)?;
             self.take_frames(now, &frames, datagram.len())
@@ -111,7 +111,7 @@ impl Session {
     }
 
     /// Looks at a packet that comes when the session is over: whether the other side sent it before it knew.
-    pub fn receive_late(&mut self, header: &Header, datagram: &[u8]) -> Result<(), Refused> {
+    pub fn receive_late(&mut self, header: &PacketHeader, datagram: &[u8]) -> Result<(), Refused> {
         let mut body = std::mem::take(&mut self.body);
         let result = self.open(header, datagram, &mut body);
         self.body = body;
@@ -119,14 +119,16 @@ impl Session {
     }
 
     /// Lets go of all messages: the session is over.
-    pub fn empty(&mut self) {
+    pub fn clear_messages(&mut self) {
         (self.inbox, self.outbox) = (Inbox::new(0), Outbox::new(0));
     }
 
     /// Window and seal.
-    fn open(&mut self, header: &Header, datagram: &[u8], body: &mut Vec<u8>) -> Result<(), Refused> {
-        let header =
-            Header { sequence: whole(header.sequence as u32, self.window.largest().unwrap_or(self.first)), ..*header };
+    fn open(&mut self, header: &PacketHeader, datagram: &[u8], body: &mut Vec<u8>) -> Result<(), Refused> {
+        let header = PacketHeader {
+            sequence: full_sequence(header.sequence as u32, self.window.largest().unwrap_or(self.first)),
+            ..*header
+        };
         self.window.check(header.sequence)?;
         self.seal.open(&header, datagram, body)?;
         self.window.take(header.sequence);
@@ -134,7 +136,7 @@ impl Session {
     }
 
     fn take_frames(&mut self, now: Duration, frames: &[Frame], bytes: usize) -> Result<(), Refused> {
-        self.outbox.pay(bytes);
+        self.outbox.debit(bytes);
         let mut wants_ack = false;
         for frame in frames {
             match frame {
@@ -162,7 +164,7 @@ impl Session {
     }
 
     /// Takes a message to be sent.
-    pub fn send(&mut self, delivery: Delivery, message: Arc<[u8]>) -> Result<(), Full> {
+    pub fn send(&mut self, delivery: Delivery, message: Arc<[u8]>) -> Result<(), QueueFull> {
         self.outbox.push(Channel::from(delivery), message)
     }
 
@@ -179,7 +181,7 @@ impl Session {
     /// Sends what is due by `emit`.
     pub fn transmit(&mut self, now: Duration, counters: &mut LinkCounters, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
         self.outbox.tick(now);
-        if now >= self.sent + self.timing.ping {
+        if now >= self.sent + self.timing.ping_interval {
             self.outbox.ping();
         }
         while let Some(sequence) = self.seal.next_sequence() {
@@ -193,8 +195,8 @@ impl Session {
                 break;
             }
             if self.unacknowledged > 0 {
-                self.told.rotate_left(1);
-                self.told[ACKS_THAT_TELL - 1] = self.window.largest().unwrap_or(self.first);
+                self.acked_largest.rotate_left(1);
+                self.acked_largest[ACK_REPEATS - 1] = self.window.largest().unwrap_or(self.first);
             }
             self.unacknowledged = 0;
             self.ack_due = None;
@@ -206,7 +208,7 @@ impl Session {
     }
 
     /// Tells the other side that the session is over; three times, because nobody will repeat it.
-    pub fn say_close(&mut self, now: Duration, counters: &mut LinkCounters, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
+    pub fn send_close(&mut self, now: Duration, counters: &mut LinkCounters, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
         for _ in 0..3 {
             self.body.clear();
             Frame::Close.write(&mut self.body);
@@ -216,22 +218,22 @@ impl Session {
 
     /// When [`transmit`](Self::transmit) has something to do, if nothing arrives before.
     pub fn wake(&self) -> Duration {
-        let over = self.heard + self.timing.silence;
+        let over = self.last_received + self.timing.idle_timeout;
         if !self.live {
             return over;
         }
-        let idle = over.min(self.sent + self.timing.ping);
+        let idle = over.min(self.sent + self.timing.ping_interval);
         [self.ack_due, self.outbox.wake()].into_iter().flatten().fold(idle, Duration::min)
     }
 
     /// When something was heard last.
-    pub fn heard(&self) -> Duration {
-        self.heard
+    pub fn last_received(&self) -> Duration {
+        self.last_received
     }
 
     /// Whether nothing was heard for too long.
-    pub fn is_silent(&self, now: Duration) -> bool {
-        now >= self.heard + self.timing.silence
+    pub fn is_timed_out(&self, now: Duration) -> bool {
+        now >= self.last_received + self.timing.idle_timeout
     }
 
     /// Whether the other side closed it.
@@ -246,7 +248,7 @@ impl Session {
 
     fn write_ack(&mut self) {
         if let Some((largest, mask)) = self.window.taken() {
-            let bits = largest.saturating_sub(self.told[0]).clamp(1, 128);
+            let bits = largest.saturating_sub(self.acked_largest[0]).clamp(1, 128);
             let bytes = bits.div_ceil(8) as u8;
             let [reliable, newest] = self.inbox.complete();
             let newest = (newest != self.inbox.first()).then_some(newest);
@@ -258,7 +260,7 @@ impl Session {
     fn seal_and_emit(&mut self, now: Duration, counters: &mut LinkCounters, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
         if self.seal.close(&self.body, &mut self.datagram) {
             self.sent = now;
-            self.outbox.pay(self.datagram.len());
+            self.outbox.debit(self.datagram.len());
             counters.bytes_out += self.datagram.len() as u64;
             emit(self.address, &self.datagram);
         }

@@ -16,7 +16,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// How often the receiving thread looks whether it is to stop.
-const PATIENCE: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Longer than any datagram that is taken, so that a longer one is seen to be longer.
 const BUFFER: usize = 2048;
 
@@ -38,7 +38,7 @@ struct State<M> {
     failed: Option<std::io::Error>,
 }
 
-struct Core<M> {
+struct Shared<M> {
     state: Mutex<State<M>>,
     /// Something may be there for the user.
     arrived: Condvar,
@@ -48,7 +48,7 @@ struct Core<M> {
     start: Instant,
 }
 
-impl<M: Machine> Core<M> {
+impl<M: Machine> Shared<M> {
     fn now(&self) -> Duration {
         self.start.elapsed()
     }
@@ -58,7 +58,7 @@ impl<M: Machine> Core<M> {
     }
 
     /// Sends what is due, and wakes the waiting thread if it would sleep too long.
-    fn settle(&self, state: &mut State<M>) {
+    fn transmit_due(&self, state: &mut State<M>) {
         state.machine.transmit(self.now(), &mut |to, datagram| self.emit(to, datagram));
         if state.machine.wake().is_some_and(|wake| wake < state.asleep_until) {
             self.earlier.notify_one();
@@ -80,10 +80,10 @@ impl<M: Machine> Core<M> {
             match result {
                 Ok((length, from)) => {
                     state.machine.receive(self.now(), from, &buffer[..length]);
-                    self.settle(&mut state);
+                    self.transmit_due(&mut state);
                     self.arrived.notify_one();
                 }
-                Err(error) if is_passing(&error) => {}
+                Err(error) if is_transient(&error) => {}
                 Err(error) => {
                     state.failed = Some(error);
                     self.arrived.notify_one();
@@ -97,14 +97,17 @@ impl<M: Machine> Core<M> {
         let mut state = self.lock();
         while !state.stop {
             let now = self.now();
-            let wake = state.machine.wake().unwrap_or(now + PATIENCE).min(now + PATIENCE);
+            let wake = state.machine.wake().unwrap_or(now + POLL_INTERVAL).min(now + POLL_INTERVAL);
             if wake <= now {
-                self.settle(&mut state);
+                self.transmit_due(&mut state);
                 self.arrived.notify_one();
             }
             // At least a little, so that a fault in a machine cannot make this thread spin.
-            let wake =
-                state.machine.wake().unwrap_or(now + PATIENCE).clamp(now + Duration::from_micros(50), now + PATIENCE);
+            let wake = state
+                .machine
+                .wake()
+                .unwrap_or(now + POLL_INTERVAL)
+                .clamp(now + Duration::from_micros(50), now + POLL_INTERVAL);
             state.asleep_until = wake;
             state = self.earlier.wait_timeout(state, wake - now).unwrap_or_else(PoisonError::into_inner).0;
             state.asleep_until = Duration::ZERO;
@@ -131,7 +134,7 @@ impl<M: Machine> Core<M> {
 }
 
 /// A system's answer that is over with the next call.
-fn is_passing(error: &std::io::Error) -> bool {
+fn is_transient(error: &std::io::Error) -> bool {
     use std::io::ErrorKind::*;
     matches!(
         error.kind(),
@@ -151,31 +154,31 @@ fn name(socket: &UdpSocket) -> String {
 
 /// A core and its threads; all end when this goes.
 struct Running<M: Machine> {
-    core: Arc<Core<M>>,
+    shared: Arc<Shared<M>>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl<M: Machine> Running<M> {
     fn start(socket: UdpSocket, machine: M) -> Result<Running<M>, LinkError> {
         let what = || format!("udp socket {}", name(&socket));
-        socket.set_read_timeout(Some(PATIENCE)).map_err(|why| LinkError::Io { what: what(), why })?;
+        socket.set_read_timeout(Some(POLL_INTERVAL)).map_err(|why| LinkError::Io { what: what(), why })?;
         let state = State { machine, asleep_until: Duration::ZERO, stop: false, failed: None };
-        let core = Arc::new(Core {
+        let shared = Arc::new(Shared {
             state: Mutex::new(state),
             arrived: Condvar::new(),
             earlier: Condvar::new(),
             socket,
             start: Instant::now(),
         });
-        let mut running = Running { core, threads: Vec::new() };
-        running.spawn("udp receive", Core::receive_until_stopped)?;
-        running.spawn("udp wait", Core::wait_until_stopped)?;
+        let mut running = Running { shared, threads: Vec::new() };
+        running.spawn("udp receive", Shared::receive_until_stopped)?;
+        running.spawn("udp wait", Shared::wait_until_stopped)?;
         Ok(running)
     }
 
-    fn spawn(&mut self, name: &str, work: fn(&Core<M>)) -> Result<(), LinkError> {
-        let core = self.core.clone();
-        let thread = std::thread::Builder::new().name(name.into()).spawn(move || work(&core));
+    fn spawn(&mut self, name: &str, work: fn(&Shared<M>)) -> Result<(), LinkError> {
+        let shared = self.shared.clone();
+        let thread = std::thread::Builder::new().name(name.into()).spawn(move || work(&shared));
         self.threads.push(thread.map_err(|why| LinkError::Io { what: format!("thread {name}"), why })?);
         Ok(())
     }
@@ -183,11 +186,11 @@ impl<M: Machine> Running<M> {
 
 impl<M: Machine> Drop for Running<M> {
     fn drop(&mut self) {
-        let mut state = self.core.lock();
-        state.machine.close_all(self.core.now(), &mut |to, datagram| self.core.emit(to, datagram));
+        let mut state = self.shared.lock();
+        state.machine.close_all(self.shared.now(), &mut |to, datagram| self.shared.emit(to, datagram));
         state.stop = true;
         drop(state);
-        self.core.earlier.notify_all();
+        self.shared.earlier.notify_all();
         for thread in self.threads.drain(..) {
             let _ = thread.join();
         }
@@ -245,12 +248,12 @@ impl UdpServer {
     ///
     /// Errors: the system refuses.
     pub fn address(&self) -> Result<SocketAddr, LinkError> {
-        self.running.core.socket.local_addr().map_err(|why| LinkError::Io { what: "udp socket".into(), why })
+        self.running.shared.socket.local_addr().map_err(|why| LinkError::Io { what: "udp socket".into(), why })
     }
 
     /// One line for the user: the address, and whether it is sealed.
     pub fn describe(&self) -> String {
-        describe(&self.running.core.socket, self.sealed)
+        describe(&self.running.shared.socket, self.sealed)
     }
 }
 
@@ -261,9 +264,9 @@ impl ServerLink for UdpServer {
 
     fn send_all(&mut self, to: &[FacetNumber], delivery: Delivery, message: &[u8]) -> Result<usize, LinkError> {
         let message: Arc<[u8]> = message.into();
-        let mut state = self.running.core.lock();
+        let mut state = self.running.shared.lock();
         let sent = to.iter().filter(|facet| state.machine.send(**facet, delivery, &message)).count();
-        self.running.core.settle(&mut state);
+        self.running.shared.transmit_due(&mut state);
         Ok(sent)
     }
 
@@ -273,23 +276,23 @@ impl ServerLink for UdpServer {
         message: &mut Vec<u8>,
     ) -> Result<Option<(FacetNumber, LinkEvent)>, LinkError> {
         message.clear();
-        Ok(self.running.core.next_event(timeout)?.map(|(facet, event, bytes)| {
+        Ok(self.running.shared.next_event(timeout)?.map(|(facet, event, bytes)| {
             *message = bytes;
             (facet, event)
         }))
     }
 
     fn close(&mut self, facet: FacetNumber) {
-        let core = &self.running.core;
-        core.lock().machine.close(core.now(), facet, &mut |to, datagram| core.emit(to, datagram));
+        let shared = &self.running.shared;
+        shared.lock().machine.close(shared.now(), facet, &mut |to, datagram| shared.emit(to, datagram));
     }
 
     fn counters(&self, facet: FacetNumber) -> LinkCounters {
-        self.running.core.lock().machine.counters(facet)
+        self.running.shared.lock().machine.counters(facet)
     }
 
-    fn strangers(&self) -> LinkCounters {
-        self.running.core.lock().machine.strangers()
+    fn unknown_peers(&self) -> LinkCounters {
+        self.running.shared.lock().machine.unknown_peers()
     }
 }
 
@@ -325,34 +328,34 @@ impl UdpFacet {
 
     /// One line for the user: the address, and whether it is sealed.
     pub fn describe(&self) -> String {
-        describe(&self.running.core.socket, self.sealed)
+        describe(&self.running.shared.socket, self.sealed)
     }
 }
 
 impl FacetLink for UdpFacet {
     fn send(&mut self, delivery: Delivery, message: &[u8]) -> Result<bool, LinkError> {
-        let core = &self.running.core;
-        let mut state = core.lock();
-        let sent = state.machine.send(core.now(), delivery, message);
-        core.settle(&mut state);
+        let shared = &self.running.shared;
+        let mut state = shared.lock();
+        let sent = state.machine.send(shared.now(), delivery, message);
+        shared.transmit_due(&mut state);
         Ok(sent)
     }
 
     fn recv(&mut self, timeout: Duration, message: &mut Message) -> Result<Option<LinkEvent>, LinkError> {
         message.clear();
-        Ok(self.running.core.next_event(timeout)?.map(|(event, bytes)| {
+        Ok(self.running.shared.next_event(timeout)?.map(|(event, bytes)| {
             *message = bytes.into();
             event
         }))
     }
 
     fn close(&mut self) {
-        let core = &self.running.core;
-        core.lock().machine.close(core.now(), &mut |to, datagram| core.emit(to, datagram));
+        let shared = &self.running.shared;
+        shared.lock().machine.close(shared.now(), &mut |to, datagram| shared.emit(to, datagram));
     }
 
     fn counters(&self) -> LinkCounters {
-        self.running.core.lock().machine.counters()
+        self.running.shared.lock().machine.counters()
     }
 }
 

@@ -1,18 +1,18 @@
 //! Kill, freeze and restart of a facet and of the server, at each state of the session.
 
 use super::lockstep::STORM;
-use super::stage::*;
+use super::simulated_session::*;
 use std::time::Duration;
-use tumble_net::sync::simulate::Weather;
-use tumble_net::sync::{FacetSession, Pace, ServerEvent, ServerSession, Standing, Task, Waiting};
+use tumble_net::sync::simulated_network::NetworkConditions;
+use tumble_net::sync::{FacetSession, Membership, ServerEvent, ServerSession, SyncMode, Task, WaitReason};
 
 /// States of a session, as the facet that fails is in them.
 const MOMENTS: [fn(&Stage) -> bool; 5] = [
     |s| s.now > Duration::ZERO,                               // joining
     |s| s.facets[1].shown.len() >= 10 && s.facets[1].drawing, // drawing
-    |s| s.facets[1].shown.len() >= 10 && matches!(task(s), Some(Task::Wait(Waiting::Others(_)))), // ready
-    |s| s.facets[1].shown.len() >= 10 && matches!(task(s), Some(Task::Wait(Waiting::Frame))), // shown, between frames
-    |s| s.facets[1].shown.len() >= 10 && s.server.as_ref().is_some_and(|s| !s.idle()) && !s.facets[1].drawing, // within a frame
+    |s| s.facets[1].shown.len() >= 10 && matches!(task(s), Some(Task::Wait(WaitReason::Others(_)))), // ready
+    |s| s.facets[1].shown.len() >= 10 && matches!(task(s), Some(Task::Wait(WaitReason::Frame))), // shown, between frames
+    |s| s.facets[1].shown.len() >= 10 && s.server.as_ref().is_some_and(|s| !s.is_idle()) && !s.facets[1].drawing, // within a frame
 ];
 
 pub fn task(stage: &Stage) -> Option<Task> {
@@ -20,8 +20,8 @@ pub fn task(stage: &Stage) -> Option<Task> {
 }
 
 pub fn at(moment: usize, seed: u64) -> Stage {
-    let weather = if seed.is_multiple_of(2) { Weather::CLEAR } else { STORM };
-    let mut stage = Stage::new(seed, weather, 3, Pace::Lockstep);
+    let conditions = if seed.is_multiple_of(2) { NetworkConditions::PERFECT } else { STORM };
+    let mut stage = Stage::new(seed, conditions, 3, SyncMode::Lockstep);
     stage.facets[0].takes = 4 * MS; // so that the others wait for somebody
     assert!(stage.until(Duration::from_secs(2), MOMENTS[moment]), "moment {moment}");
     stage
@@ -32,7 +32,7 @@ fn shown(stage: &Stage) -> Vec<usize> {
 }
 
 /// From moment and fault to its outcome: the wall stands still for at most the time that a frame waits, goes on with the others, drops the dead one after
-/// `drop_after`, and has it back within a second of its restart.
+/// `drop_timeout`, and has it back within a second of its restart.
 #[test]
 fn a_facet_that_is_killed_is_dropped_and_comes_back() {
     for (moment, seed) in (1..MOMENTS.len()).flat_map(|m| [(m, 10 + 2 * m as u64), (m, 11 + 2 * m as u64)]) {
@@ -45,12 +45,12 @@ fn a_facet_that_is_killed_is_dropped_and_comes_back() {
             after[0] >= before[0] + 40 && after[2] >= before[2] + 40,
             "the wall goes on: {before:?} {after:?} (moment {moment})"
         );
-        assert_eq!(stage.server.as_ref().unwrap().standing(1), Standing::Following);
+        assert_eq!(stage.server.as_ref().unwrap().membership(1), Membership::Following);
         stage.run(1500 * MS);
-        assert_eq!(stage.server.as_ref().unwrap().standing(1), Standing::Absent, "dropped after 2 s");
+        assert_eq!(stage.server.as_ref().unwrap().membership(1), Membership::Absent, "dropped after 2 s");
         assert!(stage.events.iter().any(|e| matches!(e, ServerEvent::Gone(1, false))));
         stage.start_facet(1);
-        let back = |s: &Stage| s.server.as_ref().unwrap().standing(1) == Standing::InStep;
+        let back = |s: &Stage| s.server.as_ref().unwrap().membership(1) == Membership::InStep;
         assert!(stage.until(1000 * MS, back), "back in step within a second (moment {moment}, seed {seed})");
         stage.run(500 * MS);
         let [a, b] = [0, 1].map(|k| stage.numbers(k));
@@ -72,8 +72,8 @@ fn a_facet_whose_process_ended_is_waited_for_no_longer() {
         let before = shown(&stage);
         stage.kill_facet(1);
         let now = stage.now;
-        stage.server.as_mut().unwrap().lose(now, 1);
-        assert_eq!(stage.server.as_ref().unwrap().standing(1), Standing::Absent);
+        stage.server.as_mut().unwrap().facet_exited(now, 1);
+        assert_eq!(stage.server.as_ref().unwrap().membership(1), Membership::Absent);
         stage.run(160 * MS);
         let after = shown(&stage);
         // ten frames of 16 ms, and in a storm some that take longer
@@ -85,7 +85,7 @@ fn a_facet_whose_process_ended_is_waited_for_no_longer() {
         let (counts, _) = stage.server.as_ref().unwrap().counts(1);
         assert_eq!((counts.late, counts.missing, counts.dropped), (0, 0, 1));
         stage.start_facet(1);
-        let back = |s: &Stage| s.server.as_ref().unwrap().standing(1) == Standing::InStep;
+        let back = |s: &Stage| s.server.as_ref().unwrap().membership(1) == Membership::InStep;
         assert!(stage.until(1000 * MS, back), "moment {moment}, seed {seed}");
         stage.assert_true();
     }
@@ -94,11 +94,12 @@ fn a_facet_whose_process_ended_is_waited_for_no_longer() {
 /// A server that sleeps until a message comes or something is due does the same, at the same times, as one that looks ten thousand times a second.
 #[test]
 fn a_server_that_sleeps_until_something_is_due_misses_nothing() {
-    for (seed, weather, resend) in [(120, Weather::CLEAR, None), (121, STORM, Some(5 * MS)), (122, STORM, Some(5 * MS))]
+    for (seed, conditions, resend) in
+        [(120, NetworkConditions::PERFECT, None), (121, STORM, Some(5 * MS)), (122, STORM, Some(5 * MS))]
     {
-        let [awake, asleep] = [false, true].map(|sleeps| {
-            let mut stage = Stage::new(seed, weather, 3, Pace::Lockstep);
-            stage.options.resend_after = resend;
+        let [cpu_latency, asleep] = [false, true].map(|sleeps| {
+            let mut stage = Stage::new(seed, conditions, 3, SyncMode::Lockstep);
+            stage.options.resend_interval = resend;
             (stage.sleeps, stage.server) = (sleeps, Some(ServerSession::new(stage.options.clone(), &stage.base)));
             stage.run(500 * MS);
             stage.kill_facet(1); // late, then dropped
@@ -108,10 +109,10 @@ fn a_server_that_sleeps_until_something_is_due_misses_nothing() {
             (stage.events, stage.facets.iter().map(|f| (f.shown.clone(), f.shown_at.clone())).collect::<Vec<_>>())
         });
         assert!(
-            awake.0.iter().any(|e| matches!(e, ServerEvent::Late(1, _)))
-                && awake.0.iter().any(|e| matches!(e, ServerEvent::Gone(1, false)))
+            cpu_latency.0.iter().any(|e| matches!(e, ServerEvent::Late(1, _)))
+                && cpu_latency.0.iter().any(|e| matches!(e, ServerEvent::Gone(1, false)))
         );
-        assert!(awake == asleep, "seed {seed}");
+        assert!(cpu_latency == asleep, "seed {seed}");
     }
 }
 
@@ -123,12 +124,12 @@ fn a_facet_that_is_started_again_at_once_takes_its_old_place() {
         stage.start_facet(1);
         let count = stage.facets[1].shown.len();
         assert!(stage.until(1000 * MS, |s| s.facets[1].shown.len() >= count + 10), "moment {moment}, seed {seed}");
-        assert_eq!(stage.server.as_ref().unwrap().standing(1), Standing::InStep);
+        assert_eq!(stage.server.as_ref().unwrap().membership(1), Membership::InStep);
         stage.assert_true();
     }
 }
 
-/// Frozen for less than `drop_after` it catches up; for longer, it is dropped, notices, and joins again. What it shows is never old news.
+/// Frozen for less than `drop_timeout` it catches up; for longer, it is dropped, notices, and joins again. What it shows is never old news.
 #[test]
 fn a_facet_that_freezes_catches_up_or_joins_again() {
     for (moment, seed) in (1..MOMENTS.len()).flat_map(|m| [(m, 50 + 2 * m as u64), (m, 51 + 2 * m as u64)]) {
@@ -143,8 +144,8 @@ fn a_facet_that_freezes_catches_up_or_joins_again() {
                 after[0] + lost >= before[0] + (freeze.as_millis() / 17) as usize,
                 "the wall goes on: {before:?} {after:?} (moment {moment})"
             );
-            assert_eq!(stage.server.as_ref().unwrap().standing(1) == Standing::Absent, dropped);
-            let back = |s: &Stage| s.server.as_ref().unwrap().standing(1) == Standing::InStep;
+            assert_eq!(stage.server.as_ref().unwrap().membership(1) == Membership::Absent, dropped);
+            let back = |s: &Stage| s.server.as_ref().unwrap().membership(1) == Membership::InStep;
             assert!(
                 stage.until(1000 * MS, back),
                 "back in step within a second (moment {moment}, seed {seed}, {freeze:?})"
@@ -165,7 +166,7 @@ fn a_server_that_is_killed_is_missed_and_its_successor_found() {
             stage.run(pause);
             if pause > 2500 * MS {
                 let tasks: Vec<Task> = stage.facets.iter().map(|f| f.session.as_ref().unwrap().task()).collect();
-                assert!(tasks.iter().all(|t| *t == Task::Wait(Waiting::Lost)), "{tasks:?}");
+                assert!(tasks.iter().all(|t| *t == Task::Wait(WaitReason::Lost)), "{tasks:?}");
             }
             let before = shown(&stage);
             stage.start_server();
@@ -188,10 +189,10 @@ fn a_server_that_is_killed_is_missed_and_its_successor_found() {
 fn a_partition_heals() {
     for (seed, gap) in [(90, 300 * MS), (91, 300 * MS), (92, 4000 * MS), (93, 4000 * MS)] {
         let mut stage = at(1, seed);
-        stage.net.part(1, true);
+        stage.net.set_partitioned(1, true);
         stage.run(gap);
-        stage.net.part(1, false);
-        let back = |s: &Stage| s.server.as_ref().unwrap().standing(1) == Standing::InStep;
+        stage.net.set_partitioned(1, false);
+        let back = |s: &Stage| s.server.as_ref().unwrap().membership(1) == Membership::InStep;
         assert!(stage.until(1000 * MS, back), "seed {seed}, {gap:?}");
         stage.assert_true();
     }

@@ -1,16 +1,16 @@
 //! Bytes made to hurt: no message changes anything but a good one, and none makes anything grow.
 
-use super::stage::{MS, SCENE, Stage, scene, viewer};
+use super::simulated_session::{MS, SCENE, Stage, scene, viewer};
 use crate::support::Dice;
-use tumble_net::sync::messages::{Done, FacetCounts, Join, Refusal};
-use tumble_net::sync::simulate::Weather;
+use tumble_net::sync::messages::{FacetCounts, FrameAck, Join, Refusal};
+use tumble_net::sync::simulated_network::NetworkConditions;
 use tumble_net::sync::table::Snapshot;
 use tumble_net::sync::transport::LinkEvent;
-use tumble_net::sync::wire::{Fault, HEADER_BYTES, Header, Kind, message, open};
-use tumble_net::sync::{FacetOptions, FacetSession, Input, Mirror, Pace, Publisher, ServerSession, Viewer};
+use tumble_net::sync::wire::{HEADER_BYTES, MessageError, MessageHeader, MessageKind, message, open};
+use tumble_net::sync::{FacetOptions, FacetSession, Input, Mirror, Publisher, ServerSession, SyncMode, Viewer};
 
-fn header(kind: Kind) -> Header {
-    Header { kind, run: 1, join: 2, frame: 3, time_s: 0.5 }
+fn header(kind: MessageKind) -> MessageHeader {
+    MessageHeader { kind, run: 1, join: 2, frame: 3, time_s: 0.5 }
 }
 
 fn slow(short: u64, long: u64) -> u64 {
@@ -38,7 +38,8 @@ fn payloads() -> Vec<Vec<u8>> {
         buttons: 1,
         keys: vec![4, 5],
     };
-    let done = Done { hash: [1; 16], image: [2; 16], took_us: 3, input_us: Some(4), heard_us: None, at_us: 5 };
+    let done =
+        FrameAck { hash: [1; 16], image: [2; 16], took_us: 3, input_us: Some(4), received_us: None, completed_us: 5 };
     let join = Join { scene: SCENE, name: "front".into(), exact: true };
     vec![
         publisher.snapshot().to_vec(),
@@ -59,7 +60,7 @@ fn parse_all(bytes: &[u8], mirror: &mut Mirror) -> bool {
         Snapshot::parse(bytes).is_ok(),
         Viewer::read(bytes).is_ok(),
         Join::read(bytes).is_ok(),
-        Done::read(bytes).is_ok(),
+        FrameAck::read(bytes).is_ok(),
         FacetCounts::read(bytes).is_ok(),
         Input::read(bytes).is_ok(),
         Refusal::read(bytes).is_ok(),
@@ -83,8 +84,8 @@ fn what_is_written_is_read_back() {
     };
     input.write(&mut out);
     assert_eq!(Input::read(&out), Ok(input));
-    let bytes = message(&header(Kind::Input), |m| m.extend(&out));
-    assert_eq!(open(&bytes), Ok((header(Kind::Input), &out[..])));
+    let bytes = message(&header(MessageKind::Input), |m| m.extend(&out));
+    assert_eq!(open(&bytes), Ok((header(MessageKind::Input), &out[..])));
     assert_eq!(&bytes[..7], b"Engine\0");
     assert_eq!(
         u64::from_le_bytes(bytes[64..72].try_into().unwrap()),
@@ -99,19 +100,19 @@ fn what_is_written_is_read_back() {
 /// Any flipped bit, and any cut, is found: nothing of a message is outside of what is checked.
 #[test]
 fn any_damage_to_a_message_is_found() {
-    let good = message(&header(Kind::Ready), |out| out.extend([5; 36]));
+    let good = message(&header(MessageKind::Ready), |out| out.extend([5; 36]));
     for bit in 0..8 * good.len() {
         let mut bad = good.clone();
         bad[bit / 8] ^= 1 << (bit % 8);
         assert!(open(&bad).is_err(), "bit {bit}");
     }
     for length in 0..good.len() {
-        assert!(matches!(open(&good[..length]), Err(Fault::Truncated { .. })), "{length} bytes");
+        assert!(matches!(open(&good[..length]), Err(MessageError::Truncated { .. })), "{length} bytes");
     }
-    assert!(matches!(open(&[&good[..], &[0]].concat()), Err(Fault::Oversize { .. })));
-    let mut not_finite = header(Kind::State);
+    assert!(matches!(open(&[&good[..], &[0]].concat()), Err(MessageError::Oversize { .. })));
+    let mut not_finite = header(MessageKind::State);
     not_finite.time_s = f64::NAN;
-    assert!(matches!(open(&message(&not_finite, |_| {})), Err(Fault::Malformed(_))));
+    assert!(matches!(open(&message(&not_finite, |_| {})), Err(MessageError::Malformed(_))));
 }
 
 /// Counts and lengths that promise more than is there are refused without asking for memory.
@@ -174,28 +175,34 @@ fn a_million_random_packets_full_length() {
 /// A session in the middle of a run is shot at: good frames with damaged payloads, old and foreign ones. The frames that are shown stay right.
 #[test]
 fn a_session_under_fire_stays_true() {
-    let (mut stage, mut dice, payloads) = (Stage::new(8, Weather::CLEAR, 2, Pace::Lockstep), Dice(3), payloads());
+    let (mut stage, mut dice, payloads) =
+        (Stage::new(8, NetworkConditions::PERFECT, 2, SyncMode::Lockstep), Dice(3), payloads());
     let kinds = [
-        Kind::Join,
-        Kind::Refused,
-        Kind::Snapshot,
-        Kind::State,
-        Kind::Ready,
-        Kind::Present,
-        Kind::Presented,
-        Kind::Resync,
-        Kind::Rejoin,
-        Kind::Beat,
-        Kind::End,
-        Kind::Leave,
-        Kind::Input,
+        MessageKind::Join,
+        MessageKind::Refused,
+        MessageKind::Snapshot,
+        MessageKind::State,
+        MessageKind::Ready,
+        MessageKind::Present,
+        MessageKind::Presented,
+        MessageKind::Resync,
+        MessageKind::Rejoin,
+        MessageKind::Heartbeat,
+        MessageKind::End,
+        MessageKind::Leave,
+        MessageKind::Input,
     ];
     stage.run(100 * MS);
     for _ in 0..slow(2000, 50_000) {
         let payload = &payloads[dice.below(payloads.len() as u64) as usize];
         let near = stage.server.as_ref().unwrap().frame().unwrap().wrapping_add(dice.below(5)).wrapping_sub(2);
-        let head =
-            Header { kind: kinds[dice.below(13) as usize], run: 99, join: dice.below(3), frame: near, time_s: 0.0 };
+        let head = MessageHeader {
+            kind: kinds[dice.below(13) as usize],
+            run: 99,
+            join: dice.below(3),
+            frame: near,
+            time_s: 0.0,
+        };
         let bytes = message(&head, |out| out.extend(payload));
         let now = stage.now;
         stage.server.as_mut().unwrap().on_event(now, dice.below(3) as u16, LinkEvent::Message, &bytes);
@@ -216,7 +223,8 @@ fn a_session_under_fire_stays_true() {
 /// The server counts by reason what a joined facet sends that is none of its business.
 #[test]
 fn refusals_are_counted_by_reason() {
-    let mut server = ServerSession::new(Stage::new(1, Weather::CLEAR, 1, Pace::Lockstep).options, &scene());
+    let mut server =
+        ServerSession::new(Stage::new(1, NetworkConditions::PERFECT, 1, SyncMode::Lockstep).options, &scene());
     let mut facet = FacetSession::new(FacetOptions::new("facet 0", SCENE, 1), scene());
     facet.advance(MS);
     let join = facet.outgoing().remove(0).1;
@@ -231,16 +239,21 @@ fn refusals_are_counted_by_reason() {
     flipped[HEADER_BYTES + 1] ^= 1;
     assert_eq!(shoot(&flipped).torn, 1);
     assert_eq!(shoot(&join[..HEADER_BYTES]).refused, 1);
-    assert_eq!(shoot(&message(&Header { run: 1, ..ours }, |_| {})).refused, 2, "JOIN without a payload");
+    assert_eq!(shoot(&message(&MessageHeader { run: 1, ..ours }, |_| {})).refused, 2, "JOIN without a payload");
     assert_eq!(
-        shoot(&message(&Header { kind: Kind::State, run: 1, ..ours }, |_| {})).refused,
+        shoot(&message(&MessageHeader { kind: MessageKind::State, run: 1, ..ours }, |_| {})).refused,
         3,
         "STATE is the server's"
     );
-    assert_eq!(shoot(&message(&Header { kind: Kind::Beat, run: 2, ..ours }, |_| {})).stale, 1, "another run");
-    let done = Done::default();
     assert_eq!(
-        shoot(&message(&Header { kind: Kind::Ready, run: 1, frame: 77, ..ours }, |out| done.write(out))).stale,
+        shoot(&message(&MessageHeader { kind: MessageKind::Heartbeat, run: 2, ..ours }, |_| {})).stale,
+        1,
+        "another run"
+    );
+    let done = FrameAck::default();
+    assert_eq!(
+        shoot(&message(&MessageHeader { kind: MessageKind::Ready, run: 1, frame: 77, ..ours }, |out| done.write(out)))
+            .stale,
         2,
         "a frame that never was"
     );

@@ -1,6 +1,6 @@
 //! The same session over each link: every facet shows every frame once, and the hashes are the same on all of them.
 
-use super::stage::{SCENE, scene, viewer};
+use super::simulated_session::{SCENE, scene, viewer};
 use super::threads::{facet, hashes, options};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -8,7 +8,9 @@ use std::time::Duration;
 use tumble_net::sync::shm::{ShmFacet, ShmServer};
 use tumble_net::sync::transport::{FacetLink, ServerLink};
 use tumble_net::sync::udp::{SharedKey, Timing, UdpFacet, UdpServer};
-use tumble_net::sync::{Facet, FacetCounts, FacetOptions, Hub, Over, Seat, Server, ServerOptions, Task};
+use tumble_net::sync::{
+    EndReason, Facet, FacetCounts, FacetOptions, FacetSlot, LocalTransport, Server, ServerOptions, Task,
+};
 
 type Frames = Vec<(u64, [u8; 16], [u8; 16])>;
 
@@ -46,10 +48,10 @@ fn run<S: ServerLink, F: FacetLink + Send + 'static>(server: S, facets: Vec<F>) 
 
 #[test]
 fn a_session_is_the_same_over_every_link() {
-    let hub = Hub::new(3);
-    let local = run(hub.server(), (0..3).map(|k| hub.facet(k).unwrap()).collect());
+    let transport = LocalTransport::new(3);
+    let local = run(transport.server(), (0..3).map(|k| transport.facet(k).unwrap()).collect());
     let key = || Some(SharedKey::new([3; 32]));
-    let timing = Timing { silence: Duration::from_secs(20), ..Timing::default() };
+    let timing = Timing { idle_timeout: Duration::from_secs(20), ..Timing::default() };
     let server = UdpServer::bind(([127, 0, 0, 1], 0).into(), 3, key(), timing).unwrap();
     let address = server.address().unwrap();
     let udp = run(server, (0..3).map(|k| UdpFacet::connect(address, k, key(), timing).unwrap()).collect());
@@ -64,7 +66,7 @@ fn refused(link: impl FacetLink + Send + 'static) -> std::thread::JoinHandle<Str
     std::thread::spawn(move || {
         let mut facet = Facet::new(link, FacetOptions::new("facet 0", [8; 32], 1), scene());
         for _ in 0..200 {
-            if let Task::Over(Over::Refused(why)) = facet.next(Duration::from_millis(50)).unwrap() {
+            if let Task::Ended(EndReason::Refused(why)) = facet.next(Duration::from_millis(50)).unwrap() {
                 return why;
             }
         }
@@ -73,7 +75,7 @@ fn refused(link: impl FacetLink + Send + 'static) -> std::thread::JoinHandle<Str
 }
 
 fn refuse(link: impl ServerLink) {
-    let options = ServerOptions::new(1, SCENE, vec![Seat { name: "facet 0".into(), critical: true }]);
+    let options = ServerOptions::new(1, SCENE, vec![FacetSlot { name: "facet 0".into(), critical: true }]);
     let mut server = Server::new(link, options, &scene());
     assert!(server.wait_for_facets(Duration::from_secs(3)).unwrap_err().to_string().contains("facet 0 did not join"));
 }

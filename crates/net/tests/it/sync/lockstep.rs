@@ -1,11 +1,11 @@
 //! Frames over a network at its worst: all of them, in order, the same on every facet.
 
-use super::stage::*;
+use super::simulated_session::*;
 use std::time::Duration;
-use tumble_net::sync::simulate::Weather;
-use tumble_net::sync::{Pace, ServerEvent, Standing};
+use tumble_net::sync::simulated_network::NetworkConditions;
+use tumble_net::sync::{Membership, ServerEvent, SyncMode};
 
-pub const STORM: Weather = Weather {
+pub const STORM: NetworkConditions = NetworkConditions {
     loss: 0.05,
     duplication: 0.02,
     reordering: 0.10,
@@ -19,8 +19,8 @@ fn frames(short: u64, long: u64) -> u64 {
 }
 
 /// Runs lockstep until `count` frames are finished, and returns the stage.
-fn run(seed: u64, weather: Weather, count: u64, first: u64) -> Stage {
-    let mut stage = Stage::new(seed, weather, 6, Pace::Lockstep);
+fn run(seed: u64, conditions: NetworkConditions, count: u64, first: u64) -> Stage {
+    let mut stage = Stage::new(seed, conditions, 6, SyncMode::Lockstep);
     stage.options.first_frame = first;
     stage.server = Some(tumble_net::sync::ServerSession::new(stage.options.clone(), &stage.base));
     let last = first.wrapping_add(count - 1);
@@ -54,7 +54,7 @@ fn assert_whole(stage: &Stage, count: u64, first: u64) {
 
 #[test]
 fn in_clear_weather_every_facet_shows_every_frame_once() {
-    let stage = run(1, Weather::CLEAR, 60, 0);
+    let stage = run(1, NetworkConditions::PERFECT, 60, 0);
     assert_whole(&stage, 60, 0);
     for k in 0..6 {
         let counts = stage.facets[k].session.as_ref().unwrap().counts();
@@ -69,13 +69,13 @@ fn in_a_storm_every_facet_shows_every_frame_once_and_in_order_full_length() {
     let count = frames(300, 100_000);
     let stage = run(2, STORM, count, 0);
     assert_whole(&stage, count, 0);
-    let damage = stage.net.damage();
-    assert!(damage.lost > 0 && damage.duplicated > 0 && damage.reordered > 0 && damage.corrupted > 0, "{damage:?}");
+    let stats = stage.net.stats();
+    assert!(stats.lost > 0 && stats.duplicated > 0 && stats.reordered > 0 && stats.corrupted > 0, "{stats:?}");
     let torn: u64 = (0..6).map(|k| stage.server.as_ref().unwrap().counts(k).0).map(|c| c.torn + c.refused).sum();
     let theirs: u64 =
         stage.facets.iter().map(|f| f.session.as_ref().unwrap().counts()).map(|c| c.torn + c.refused).sum();
     assert!(
-        torn + theirs > 0 && torn + theirs <= damage.corrupted,
+        torn + theirs > 0 && torn + theirs <= stats.corrupted,
         "every damaged message that arrived was refused, and nothing else: {torn} + {theirs}"
     );
 }
@@ -92,7 +92,7 @@ fn frame_numbers_wrap() {
 fn the_same_seed_gives_the_same_run_determinism() {
     let log = |seed| {
         let stage = run(seed, STORM, 40, 0);
-        (stage.now, stage.net.damage(), stage.events, stage.facets.into_iter().map(|f| f.shown).collect::<Vec<_>>())
+        (stage.now, stage.net.stats(), stage.events, stage.facets.into_iter().map(|f| f.shown).collect::<Vec<_>>())
     };
     assert!(log(4) == log(4));
     assert!(log(4) != log(5));
@@ -101,7 +101,7 @@ fn the_same_seed_gives_the_same_run_determinism() {
 /// Each facet shows what is newest: numbers rise, and what is shown is true; a slow one leaves frames out and holds nobody up.
 #[test]
 fn latest_leaves_out_what_is_old() {
-    let mut stage = Stage::new(6, STORM, 3, Pace::Latest);
+    let mut stage = Stage::new(6, STORM, 3, SyncMode::Latest);
     stage.facets[2].takes = 50 * MS;
     stage.run(Duration::from_secs(3));
     stage.assert_true();
@@ -121,7 +121,7 @@ fn latest_leaves_out_what_is_old() {
 /// A facet that is slower than the others is waited for, so long as it is within its time.
 #[test]
 fn the_slowest_gives_the_pace() {
-    let mut stage = Stage::new(7, Weather::CLEAR, 6, Pace::Lockstep);
+    let mut stage = Stage::new(7, NetworkConditions::PERFECT, 6, SyncMode::Lockstep);
     stage.facets[4].takes = 40 * MS;
     stage.run(Duration::from_secs(4));
     let shown: Vec<usize> = stage.facets.iter().map(|f| f.shown.len()).collect();
@@ -129,6 +129,6 @@ fn the_slowest_gives_the_pace() {
         shown.iter().all(|&n| (90..=100).contains(&n) && n.abs_diff(shown[0]) <= 1),
         "4 s in frames of 40 ms: {shown:?}"
     );
-    assert_eq!(stage.server.as_ref().unwrap().standing(4), Standing::InStep);
+    assert_eq!(stage.server.as_ref().unwrap().membership(4), Membership::InStep);
     stage.assert_true();
 }

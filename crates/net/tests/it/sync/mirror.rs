@@ -1,12 +1,12 @@
 //! A world and its copy: what is seen is the same, whatever is added, removed, switched off or moved.
 
-use super::stage::{scene, viewer};
+use super::simulated_session::{scene, viewer};
 use std::sync::Arc;
 use tumble_core::collide::TriMesh;
 use tumble_core::collide::{Pose, Quat, Shape, Vec3};
 use tumble_core::{Appearance, Drawn, Mode, Object, RigidBody, Visual, VisualMesh, World};
-use tumble_net::sync::quantise::{POSITION_ERROR_M, ROTATION_ERROR_RAD};
-use tumble_net::sync::wire::Fault;
+use tumble_net::sync::quantize::{POSITION_ERROR_M, ROTATION_ERROR_RAD};
+use tumble_net::sync::wire::MessageError;
 use tumble_net::sync::{Mirror, Publisher, VIEWER_NAME};
 
 /// A server's world and a client's, and what goes between.
@@ -234,7 +234,7 @@ fn a_list_that_does_not_fit_changes_nothing() {
     smaller.remove(ball).unwrap();
     let mut mirror = Mirror::new(smaller);
     let fault = mirror.apply_snapshot(&pair.publisher.snapshot()).unwrap_err();
-    assert!(matches!(&fault, Fault::Unfit(why) if why.contains("'ball 3'")), "{fault}");
+    assert!(matches!(&fault, MessageError::Unfit(why) if why.contains("'ball 3'")), "{fault}");
     assert_eq!(mirror.revision(), None);
 }
 

@@ -1,14 +1,14 @@
 //! Facets that draw slower than frames come.
 
 use super::lockstep::STORM;
-use super::stage::*;
+use super::simulated_session::*;
 use std::time::Duration;
-use tumble_net::sync::simulate::Weather;
-use tumble_net::sync::{Pace, Standing};
+use tumble_net::sync::simulated_network::NetworkConditions;
+use tumble_net::sync::{Membership, SyncMode};
 
 /// Frames come every 16 ms; each facet draws so long.
-fn wall(seed: u64, weather: Weather, takes: Duration) -> Stage {
-    let mut stage = Stage::new(seed, weather, 3, Pace::Lockstep);
+fn wall(seed: u64, conditions: NetworkConditions, takes: Duration) -> Stage {
+    let mut stage = Stage::new(seed, conditions, 3, SyncMode::Lockstep);
     stage.facets.iter_mut().for_each(|facet| facet.takes = takes);
     assert!(stage.until(Duration::from_secs(2), |s| s.facets.iter().all(|f| f.shown.len() >= 5)));
     stage
@@ -20,7 +20,7 @@ fn late(stage: &Stage) -> Vec<u64> {
 }
 
 fn in_step(stage: &Stage) -> bool {
-    (0..3).all(|k| stage.server.as_ref().unwrap().standing(k) == Standing::InStep)
+    (0..3).all(|k| stage.server.as_ref().unwrap().membership(k) == Membership::InStep)
 }
 
 /// From here on all show the same frames, one after the other, each as long as the slowest draws, and nobody is late.
@@ -45,9 +45,9 @@ fn assert_steady(stage: &mut Stage, takes: Duration, storm: bool, what: &str) {
 /// While they are out of step the server goes on with the first, and frames come faster than they draw.
 #[test]
 fn slow_facets_that_stumbled_are_in_step_again() {
-    for (seed, weather) in [(1, Weather::CLEAR), (2, STORM)] {
+    for (seed, conditions) in [(1, NetworkConditions::PERFECT), (2, STORM)] {
         for takes in [30 * MS, 60 * MS, 70 * MS] {
-            let mut stage = wall(seed, weather, takes);
+            let mut stage = wall(seed, conditions, takes);
             stage.facets[0].takes = 2 * MS;
             let until = stage.now + 250 * MS;
             stage.facets[1..].iter_mut().for_each(|facet| facet.frozen_until = until);
@@ -64,8 +64,10 @@ fn slow_facets_that_stumbled_are_in_step_again() {
 /// Nobody is ready, so nobody is held up: all are waited for.
 #[test]
 fn where_all_stumble_nobody_is_late() {
-    for (seed, weather, takes) in [(5, Weather::CLEAR, 20 * MS), (6, STORM, 20 * MS), (7, Weather::CLEAR, 150 * MS)] {
-        let mut stage = wall(seed, weather, takes);
+    for (seed, conditions, takes) in
+        [(5, NetworkConditions::PERFECT, 20 * MS), (6, STORM, 20 * MS), (7, NetworkConditions::PERFECT, 150 * MS)]
+    {
+        let mut stage = wall(seed, conditions, takes);
         let until = stage.now + 400 * MS;
         stage.facets.iter_mut().for_each(|facet| facet.frozen_until = until);
         stage.run(500 * MS);
@@ -74,10 +76,10 @@ fn where_all_stumble_nobody_is_late() {
     }
 }
 
-/// All that were there are gone: the server goes on without them after `drop_after`, and not later.
+/// All that were there are gone: the server goes on without them after `drop_timeout`, and not later.
 #[test]
 fn a_wall_that_is_gone_holds_the_server_up_for_a_while_only() {
-    let mut stage = wall(8, Weather::CLEAR, 2 * MS);
+    let mut stage = wall(8, NetworkConditions::PERFECT, 2 * MS);
     (0..3).for_each(|k| stage.kill_facet(k));
     let frames = |stage: &Stage| stage.server.as_ref().unwrap().frame().unwrap();
     let before = frames(&stage);
@@ -90,9 +92,9 @@ fn a_wall_that_is_gone_holds_the_server_up_for_a_while_only() {
 /// Who draws too long for the others is waited for once, not again and again.
 #[test]
 fn a_facet_that_is_too_slow_holds_the_wall_up_once() {
-    for (seed, weather) in [(3, Weather::CLEAR), (4, STORM)] {
-        let mut stage = wall(seed, weather, 2 * MS);
-        stage.facets[1].takes = 90 * MS; // below the 100 ms of `ready_after`, above three quarters of them
+    for (seed, conditions) in [(3, NetworkConditions::PERFECT), (4, STORM)] {
+        let mut stage = wall(seed, conditions, 2 * MS);
+        stage.facets[1].takes = 90 * MS; // below the 100 ms of `ready_timeout`, above three quarters of them
         stage.facets[1].frozen_until = stage.now + 250 * MS;
         stage.run(1000 * MS);
         let before = stage.facets[0].shown.len();

@@ -1,17 +1,20 @@
 //! What is not accepted: another scene, name or version, another picture, a frame that does not fit.
 
-use super::stage::*;
-use tumble_net::sync::messages::Done;
-use tumble_net::sync::simulate::Weather;
+use super::simulated_session::*;
+use tumble_net::sync::messages::FrameAck;
+use tumble_net::sync::simulated_network::NetworkConditions;
 use tumble_net::sync::transport::LinkEvent;
 use tumble_net::sync::wire;
-use tumble_net::sync::{FacetOptions, FacetSession, Over, Pace, ServerEvent, ServerOptions, ServerSession, Task};
+use tumble_net::sync::{
+    EndReason, FacetOptions, FacetSession, ServerEvent, ServerOptions, ServerSession, SyncMode, Task,
+};
 
 #[test]
 fn other_scenes_names_and_versions_are_refused_by_name() {
     let refusal = |options: FacetOptions, spoil: fn(&mut Vec<u8>)| {
         let mut facet = FacetSession::new(options, scene());
-        let mut server = ServerSession::new(Stage::new(1, Weather::CLEAR, 2, Pace::Lockstep).options, &scene());
+        let mut server =
+            ServerSession::new(Stage::new(1, NetworkConditions::PERFECT, 2, SyncMode::Lockstep).options, &scene());
         facet.advance(MS);
         for (_, mut bytes) in facet.outgoing() {
             spoil(&mut bytes);
@@ -27,7 +30,7 @@ fn other_scenes_names_and_versions_are_refused_by_name() {
         }
         (told, facet.task())
     };
-    let over = |why: &str| Task::Over(Over::Refused(why.to_owned()));
+    let over = |why: &str| Task::Ended(EndReason::Refused(why.to_owned()));
     let (told, task) = refusal(FacetOptions::new("facet 1", [8; 32], 1), |_| {});
     assert!(told.contains(&"07".repeat(32)) && told.contains(&"08".repeat(32)) && told.contains("facet 1"), "{told}");
     assert_eq!(task, over(&told));
@@ -42,7 +45,8 @@ fn other_scenes_names_and_versions_are_refused_by_name() {
 #[test]
 fn a_facet_that_draws_something_else_is_found_out() {
     let base = scene();
-    let mut server = ServerSession::new(Stage::new(1, Weather::CLEAR, 1, Pace::Lockstep).options, &base);
+    let mut server =
+        ServerSession::new(Stage::new(1, NetworkConditions::PERFECT, 1, SyncMode::Lockstep).options, &base);
     let mut facet = FacetSession::new(FacetOptions::new("facet 0", SCENE, 1), scene());
     let (mut wrong, mut shown) = (0, 0);
     for k in 1..400u32 {
@@ -57,15 +61,15 @@ fn a_facet_that_draws_something_else_is_found_out() {
         }
         for (_, mut bytes) in facet.outgoing() {
             let (header, payload) = wire::open(&bytes).unwrap();
-            if header.kind == wire::Kind::Ready && header.frame.is_multiple_of(3) {
-                let mut done = Done::read(payload).unwrap();
+            if header.kind == wire::MessageKind::Ready && header.frame.is_multiple_of(3) {
+                let mut done = FrameAck::read(payload).unwrap();
                 done.hash[5] ^= 1;
                 bytes = wire::message(&header, |out| done.write(out));
                 wrong += 1;
             }
             server.on_event(now, 0, LinkEvent::Message, &bytes);
         }
-        if server.idle() && server.complete() {
+        if server.is_idle() && server.all_critical_joined() {
             server.publish(now, &base, &viewer(0)).unwrap();
         }
         server.outgoing().iter().for_each(|out| facet.on_event(now, LinkEvent::Message, out.message.to_vec().into()));
@@ -84,7 +88,10 @@ fn a_facet_that_draws_something_else_is_found_out() {
 fn a_frame_that_does_not_fit_is_asked_for_again() {
     let base = scene();
     let mut server = ServerSession::new(
-        ServerOptions { resend_after: None, ..Stage::new(1, Weather::CLEAR, 1, Pace::Lockstep).options },
+        ServerOptions {
+            resend_interval: None,
+            ..Stage::new(1, NetworkConditions::PERFECT, 1, SyncMode::Lockstep).options
+        },
         &base,
     );
     let mut facet = FacetSession::new(FacetOptions::new("facet 0", SCENE, 1), scene());
@@ -99,12 +106,12 @@ fn a_frame_that_does_not_fit_is_asked_for_again() {
             facet.presented(now);
         }
         facet.outgoing().iter().for_each(|(_, bytes)| server.on_event(now, 0, LinkEvent::Message, bytes));
-        if server.idle() && server.complete() {
+        if server.is_idle() && server.all_critical_joined() {
             server.publish(now, &base, &viewer(0)).unwrap();
         }
         for out in server.outgoing() {
             let (header, payload) = wire::open(&out.message).unwrap();
-            let spoil = header.kind == wire::Kind::State && header.frame == 5 && spoilt == 0;
+            let spoil = header.kind == wire::MessageKind::State && header.frame == 5 && spoilt == 0;
             let bytes = if spoil {
                 wire::message(&header, |out| out.extend(&payload[..payload.len() - 1]))
             } else {

@@ -1,6 +1,6 @@
 //! Server and facets on threads, over the in-process link, by the clock; recording and replay of it.
 
-use super::stage::{SCENE, scene, viewer};
+use super::simulated_session::{SCENE, scene, viewer};
 use crate::support::Scratch;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -9,12 +9,12 @@ use std::time::Duration;
 use tumble_core::collide::Shape;
 use tumble_core::{RigidBody, World};
 use tumble_net::record::RecorderOptions;
-use tumble_net::sync::messages::Done;
+use tumble_net::sync::messages::FrameAck;
 use tumble_net::sync::transport::{Closed, Delivery, FacetLink, LinkEvent, Message, ServerLink};
 use tumble_net::sync::*;
 
 const SECOND: Duration = Duration::from_secs(1);
-pub type Shown = Vec<(u64, Done)>;
+pub type Shown = Vec<(u64, FrameAck)>;
 
 /// A stand-in for a picture: a hash of what its renderer would read.
 fn picture(world: &World, viewer: &Viewer) -> [u8; 16] {
@@ -54,7 +54,7 @@ pub fn facet(
                         assert!(facet.send_input(&input).unwrap());
                     }
                 }
-                Task::Over(_) => break,
+                Task::Ended(_) => break,
             }
         }
         (shown, facet.session().counts())
@@ -62,8 +62,8 @@ pub fn facet(
 }
 
 pub fn options() -> ServerOptions {
-    let seats = (0..3).map(|k| Seat { name: format!("facet {k}"), critical: true }).collect();
-    ServerOptions { ready_after: 10 * SECOND, drop_after: 60 * SECOND, ..ServerOptions::new(5, SCENE, seats) }
+    let slots = (0..3).map(|k| FacetSlot { name: format!("facet {k}"), critical: true }).collect();
+    ServerOptions { ready_timeout: 10 * SECOND, drop_timeout: 60 * SECOND, ..ServerOptions::new(5, SCENE, slots) }
 }
 
 /// Hashes of the states and of the pictures, frame by frame.
@@ -76,10 +76,10 @@ fn a_run_is_recorded_and_replays_to_the_same_hashes_twice() {
     let (scratch, count) = (Scratch::new("session"), 60);
     let path = scratch.file("run.mcap");
     let stop = Arc::new(AtomicBool::new(false));
-    let hub = Hub::new(3);
-    let facets: Vec<_> = (0..3).map(|k| facet(hub.facet(k).unwrap(), k, &stop)).collect();
+    let transport = LocalTransport::new(3);
+    let facets: Vec<_> = (0..3).map(|k| facet(transport.facet(k).unwrap(), k, &stop)).collect();
     let mut world = scene();
-    let mut server = Server::new(hub.server(), options(), &world);
+    let mut server = Server::new(transport.server(), options(), &world);
     let mut recorder = SessionRecorder::create(&path, "test", SCENE, &world, 1, RecorderOptions::default()).unwrap();
     server.wait_for_facets(10 * SECOND).unwrap();
     for frame in 0..count {
@@ -105,10 +105,10 @@ fn a_run_is_recorded_and_replays_to_the_same_hashes_twice() {
     assert!(shown.iter().all(|s| hashes(s) == hashes(&shown[0]) && s.iter().map(|s| s.0).eq(0..count)));
 
     for run in 0..2 {
-        let hub = Hub::new(3);
-        let facets: Vec<_> = (0..3).map(|k| facet(hub.facet(k).unwrap(), k, &stop)).collect();
-        let mut server = Server::new(hub.server(), options(), &scene());
-        let mut replay = Replay::open(&path).unwrap();
+        let transport = LocalTransport::new(3);
+        let facets: Vec<_> = (0..3).map(|k| facet(transport.facet(k).unwrap(), k, &stop)).collect();
+        let mut server = Server::new(transport.server(), options(), &scene());
+        let mut replay = SessionReader::open(&path).unwrap();
         replay.check_scene(SCENE).unwrap();
         assert!(replay.check_scene([1; 32]).unwrap_err().to_string().contains(&"01".repeat(32)));
         server.wait_for_facets(10 * SECOND).unwrap();
@@ -134,8 +134,8 @@ fn a_run_is_recorded_and_replays_to_the_same_hashes_twice() {
 /// What does not come is named, within the time given.
 #[test]
 fn who_does_not_join_is_named() {
-    let hub = Hub::new(3);
-    let mut server = Server::new(hub.server(), options(), &scene());
+    let transport = LocalTransport::new(3);
+    let mut server = Server::new(transport.server(), options(), &scene());
     let error = server.wait_for_facets(Duration::from_millis(30)).unwrap_err().to_string();
     assert!(error.contains("facet 0, facet 1, facet 2 did not join"), "{error}");
 }
@@ -143,10 +143,11 @@ fn who_does_not_join_is_named() {
 /// The link's own contract: order, newest, closing, and coming back.
 #[test]
 fn the_local_link_keeps_its_contract() {
-    let (hub, mut bytes, mut lent, no_time) = (Hub::new(2), Vec::new(), Message::default(), Duration::ZERO);
-    let mut server = hub.server();
+    let (transport, mut bytes, mut lent, no_time) =
+        (LocalTransport::new(2), Vec::new(), Message::default(), Duration::ZERO);
+    let mut server = transport.server();
     assert!(!server.send(0, Delivery::Reliable, b"x").unwrap(), "nobody is there");
-    let mut facet = hub.facet(0).unwrap();
+    let mut facet = transport.facet(0).unwrap();
     assert_eq!(server.recv(no_time, &mut bytes).unwrap(), Some((0, LinkEvent::Opened)));
     assert_eq!(facet.recv(no_time, &mut lent).unwrap(), Some(LinkEvent::Opened));
     for k in 0..3u8 {
@@ -163,7 +164,7 @@ fn the_local_link_keeps_its_contract() {
     facet.send(Delivery::Reliable, b"lost with the connection").unwrap();
     drop(facet);
     assert_eq!(server.recv(no_time, &mut bytes).unwrap(), Some((0, LinkEvent::Closed(Closed::ByPeer))));
-    let mut facet = hub.facet(0).unwrap();
+    let mut facet = transport.facet(0).unwrap();
     assert_eq!(server.recv(no_time, &mut bytes).unwrap(), Some((0, LinkEvent::Opened)));
     server.close(0);
     let events: Vec<_> = (0..3).map(|_| facet.recv(no_time, &mut lent).unwrap()).collect();
@@ -175,8 +176,8 @@ fn the_local_link_keeps_its_contract() {
 /// A facet that takes nothing loses its connection and not the others': nothing waits for it.
 #[test]
 fn who_does_not_read_is_closed() {
-    let hub = Hub::new(2);
-    let (mut server, _deaf) = (hub.server(), hub.facet(0).unwrap());
+    let transport = LocalTransport::new(2);
+    let (mut server, _deaf) = (transport.server(), transport.facet(0).unwrap());
     let (message, mut bytes) = (vec![1; 8 << 20], Vec::new());
     let sent = (0..20).take_while(|_| server.send(0, Delivery::Reliable, &message).unwrap()).count();
     assert_eq!(sent, 8, "64 MiB in messages of 8");
@@ -190,13 +191,13 @@ fn who_does_not_read_is_closed() {
 /// A server that ends without a word, and another: the facets go over to it by themselves.
 #[test]
 fn facets_find_the_next_server_over_a_link() {
-    let (hub, stop) = (Hub::new(3), Arc::new(AtomicBool::new(false)));
-    let facets: Vec<_> = (0..3).map(|k| facet(hub.facet(k).unwrap(), k, &stop)).collect();
+    let (transport, stop) = (LocalTransport::new(3), Arc::new(AtomicBool::new(false)));
+    let facets: Vec<_> = (0..3).map(|k| facet(transport.facet(k).unwrap(), k, &stop)).collect();
     let world = Mutex::new(scene());
     for run in 0..2 {
         let mut world = world.lock().unwrap();
         let options = ServerOptions { run: 10 + run, first_frame: 1000 * run, ..options() };
-        let mut server = Server::new(hub.server(), options, &scene());
+        let mut server = Server::new(transport.server(), options, &scene());
         server.wait_for_facets(10 * SECOND).unwrap();
         for frame in 0..10 {
             world.step().unwrap();

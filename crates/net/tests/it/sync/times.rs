@@ -1,10 +1,10 @@
 //! When frames are shown, told by clocks that disagree: against the times of the stage's own clock.
 
 use super::lockstep::STORM;
-use super::stage::*;
+use super::simulated_session::*;
 use std::time::Duration;
-use tumble_net::sync::simulate::{To, Weather};
-use tumble_net::sync::{FrameTimes, Input, Pace, ServerEvent};
+use tumble_net::sync::simulated_network::{Destination, NetworkConditions};
+use tumble_net::sync::{FrameTimes, Input, ServerEvent, SyncMode};
 
 const US: Duration = Duration::from_micros(1);
 
@@ -20,8 +20,8 @@ fn truth(stage: &Stage, frame: u64) -> Vec<Duration> {
 }
 
 /// Clocks seconds to weeks apart, screens that show 0, 3 and 7 ms after they are told.
-fn stage(weather: Weather, pace: Pace) -> Stage {
-    let mut stage = Stage::new(11, weather, 3, pace);
+fn stage(conditions: NetworkConditions, mode: SyncMode) -> Stage {
+    let mut stage = Stage::new(11, conditions, 3, mode);
     for (facet, (clock_s, after_ms)) in stage.facets.iter_mut().zip([(0, 3), (1_000_000, 0), (7, 7)]) {
         (facet.clock, facet.shows_after) = (Duration::from_secs(clock_s), after_ms * MS);
     }
@@ -30,7 +30,7 @@ fn stage(weather: Weather, pace: Pace) -> Stage {
 
 #[test]
 fn the_skew_is_that_of_the_screens_whatever_the_clocks_say() {
-    let mut stage = stage(Weather { delay: [500 * US; 2], ..Weather::CLEAR }, Pace::Lockstep);
+    let mut stage = stage(NetworkConditions { delay: [500 * US; 2], ..NetworkConditions::PERFECT }, SyncMode::Lockstep);
     stage.run(Duration::from_secs(1));
     let times = times(&stage);
     assert!(times.len() > 50);
@@ -42,17 +42,17 @@ fn the_skew_is_that_of_the_screens_whatever_the_clocks_say() {
 
 #[test]
 fn over_a_bad_network_the_skew_is_right_within_its_stated_error() {
-    for pace in [Pace::Lockstep, Pace::Latest] {
-        let mut stage = stage(STORM, pace);
+    for mode in [SyncMode::Lockstep, SyncMode::Latest] {
+        let mut stage = stage(STORM, mode);
         stage.run(Duration::from_secs(5));
         let times = times(&stage);
-        assert!(times.len() > 100, "{pace:?}: {}", times.len());
+        assert!(times.len() > 100, "{mode:?}: {}", times.len());
         for t in times.iter().filter(|t| t.facets == 3) {
             let shown = truth(&stage, t.frame);
             let skew = *shown.iter().max().unwrap() - *shown.iter().min().unwrap();
             assert!(
                 t.skew.abs_diff(skew) <= t.error,
-                "{pace:?} frame {}: {:?} and {skew:?}, stated {:?}",
+                "{mode:?} frame {}: {:?} and {skew:?}, stated {:?}",
                 t.frame,
                 t.skew,
                 t.error
@@ -65,7 +65,7 @@ fn over_a_bad_network_the_skew_is_right_within_its_stated_error() {
 /// An input of a facet, and one that comes to the server by itself: each is timed once, to the last screen that shows it.
 #[test]
 fn from_what_a_user_does_to_the_picture_that_shows_it() {
-    let mut stage = stage(Weather { delay: [500 * US; 2], ..Weather::CLEAR }, Pace::Lockstep);
+    let mut stage = stage(NetworkConditions { delay: [500 * US; 2], ..NetworkConditions::PERFECT }, SyncMode::Lockstep);
     stage.run(200 * MS);
     // the stage's viewer carries the number of the world's frame as that of the newest input
     let (by_facet, by_server) = (stage.world.frame() + 5, stage.world.frame() + 10);
@@ -75,7 +75,7 @@ fn from_what_a_user_does_to_the_picture_that_shows_it() {
         Input { sequence: by_facet, user: 0, head: None, wand: None, hands: [None; 2], buttons: 0, keys: Vec::new() };
     let facet = stage.facets[1].session.as_mut().unwrap();
     assert!(facet.send_input(there, &input));
-    facet.outgoing().iter().for_each(|(_, bytes)| stage.net.send(sent, To::Server(1), bytes));
+    facet.outgoing().iter().for_each(|(_, bytes)| stage.net.send(sent, Destination::Server(1), bytes));
     while stage.world.frame() < by_facet + 2 {
         stage.tick();
     }

@@ -20,12 +20,10 @@
 //! Something redundant is sent only while the balance covers it. Ordering over a fixed time rather than over a count of later packets keeps reordering
 //! from looking like loss.
 
-mod fate;
+mod loss_detection;
 mod stream;
 
-pub use fate::Impossible;
-
-use super::frames::{Channel, FRAGMENT, Frame, PARITY_HEAD, Part};
+use super::frames::{Channel, FRAGMENT_BYTES, Frame, MessageInfo, PARITY_HEADER_BYTES};
 use super::inbox::parity;
 use crate::sync::transport::MAX_QUEUED_BYTES;
 use std::collections::VecDeque;
@@ -34,11 +32,11 @@ use std::time::Duration;
 use stream::Stream;
 
 /// Packets under way at once; half of what a socket's default buffer holds.
-const PACKETS_AHEAD: usize = 64;
+const MAX_PACKETS_IN_FLIGHT: usize = 64;
 /// Share of lost packets above which redundancy pays.
-const LOSSY: f64 = 0.005;
+const REDUNDANCY_THRESHOLD: f64 = 0.005;
 /// Bytes by which the balance may run ahead or behind.
-const BALANCE: i64 = 32 << 10;
+const MAX_BUDGET: i64 = 32 << 10;
 
 /// What a packet holds.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -49,28 +47,28 @@ enum Piece {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Fate {
-    UnderWay,
+enum PacketStatus {
+    InFlight,
     Lost,
-    Arrived,
+    Acknowledged,
 }
 
 struct Sent {
     sequence: u64,
     at: Duration,
     pieces: Vec<Piece>,
-    fate: Fate,
+    status: PacketStatus,
 }
 
 /// More waits than may.
 #[derive(Debug, PartialEq, Eq)]
-pub struct Full;
+pub struct QueueFull;
 
 /// What is to be sent of one connection.
 pub struct Outbox {
     streams: [Stream; 2],
     sent: VecDeque<Sent>,
-    under_way: usize,
+    in_flight: usize,
     repairs: VecDeque<Piece>,
     /// Second copies, sent in a packet of their own.
     again: VecDeque<Piece>,
@@ -81,7 +79,7 @@ pub struct Outbox {
     timeouts: u32,
     largest: Option<u64>,
     loss: f64,
-    balance: i64,
+    budget: i64,
     repeated: u64,
     superseded: u64,
 }
@@ -92,7 +90,7 @@ impl Outbox {
         Outbox {
             streams: [(); 2].map(|()| Stream::new(first)),
             sent: VecDeque::new(),
-            under_way: 0,
+            in_flight: 0,
             repairs: VecDeque::new(),
             again: VecDeque::new(),
             ping: false,
@@ -102,22 +100,22 @@ impl Outbox {
             timeouts: 0,
             largest: None,
             loss: 0.0,
-            balance: 0,
+            budget: 0,
             repeated: 0,
             superseded: 0,
         }
     }
 
     /// Takes a message of 1 to [`MAX_MESSAGE_BYTES`](crate::sync::transport::MAX_MESSAGE_BYTES) bytes.
-    pub fn push(&mut self, channel: Channel, message: Arc<[u8]>) -> Result<(), Full> {
-        self.earn(message.len() * 3 / 2);
+    pub fn push(&mut self, channel: Channel, message: Arc<[u8]>) -> Result<(), QueueFull> {
+        self.credit(message.len() * 3 / 2);
         let stream = &mut self.streams[channel as usize];
         if channel == Channel::Newest {
             self.superseded += stream.waiting.len() as u64;
             stream.waiting.clear();
             stream.waiting_bytes = 0;
         } else if stream.waiting_bytes + stream.begun_bytes + message.len() > MAX_QUEUED_BYTES {
-            return Err(Full);
+            return Err(QueueFull);
         }
         stream.waiting_bytes += message.len();
         stream.waiting.push_back(message);
@@ -128,16 +126,6 @@ impl Outbox {
     /// Asks for an acknowledgement although there is nothing to send.
     pub fn ping(&mut self) {
         self.ping = true;
-    }
-
-    /// Smoothed round trip.
-    pub fn round_trip(&self) -> Duration {
-        self.srtt
-    }
-
-    /// Estimated share of lost packets.
-    pub fn loss(&self) -> f64 {
-        self.loss
     }
 
     /// Pieces sent again or for redundancy; counted since this was asked last.
@@ -161,20 +149,20 @@ impl Outbox {
         if pieces.is_empty() {
             return false;
         }
-        self.sent.push_back(Sent { sequence, at: now, pieces, fate: Fate::UnderWay });
-        self.under_way += 1;
+        self.sent.push_back(Sent { sequence, at: now, pieces, status: PacketStatus::InFlight });
+        self.in_flight += 1;
         self.forget();
         true
     }
 
     /// A packet of so many bytes was sent or received: it is paid for.
-    pub fn pay(&mut self, bytes: usize) {
-        self.balance = (self.balance - bytes as i64).max(-BALANCE);
+    pub fn debit(&mut self, bytes: usize) {
+        self.budget = (self.budget - bytes as i64).max(-MAX_BUDGET);
     }
 
-    fn earn(&mut self, bytes: usize) {
+    fn credit(&mut self, bytes: usize) {
         // A long message earns and pays within the same burst, so only what stands idle is cut.
-        self.balance = self.balance.min(BALANCE) + bytes as i64;
+        self.budget = self.budget.min(MAX_BUDGET) + bytes as i64;
     }
 
     /// What to send next: repairs, then what was never sent, then redundancy.
@@ -191,7 +179,7 @@ impl Outbox {
                 None => _ = self.repairs.pop_front(),
             }
         }
-        if self.under_way < PACKETS_AHEAD {
+        if self.in_flight < MAX_PACKETS_IN_FLIGHT {
             if let Some(piece) = self.unsent(room) {
                 return Some(piece);
             }
@@ -207,15 +195,15 @@ impl Outbox {
 
     /// The next piece that was never sent, if it has room.
     fn unsent(&mut self, room: usize) -> Option<Piece> {
-        let (loss, balance) = (self.loss, self.balance);
+        let (loss, budget) = (self.loss, self.budget);
         let outgoing = self
             .streams
             .iter_mut()
             .flat_map(|stream| stream.begun.iter_mut())
             .find(|outgoing| outgoing.has_unsent())?;
-        let Part { channel, message, .. } = outgoing.part;
+        let MessageInfo { channel, message, .. } = outgoing.part;
         if outgoing.unsent == outgoing.part.fragments() {
-            if FRAGMENT + PARITY_HEAD > room {
+            if FRAGMENT_BYTES + PARITY_HEADER_BYTES > room {
                 return None;
             }
             outgoing.unsent_parity += 1;
@@ -223,16 +211,16 @@ impl Outbox {
             return Some(Piece::Parity(channel, message, outgoing.unsent_parity - 1));
         }
         let (index, length) = (outgoing.unsent, outgoing.part.length(outgoing.unsent));
-        let head = outgoing.part.head();
-        if length + head > room {
+        let header_bytes = outgoing.part.header_bytes();
+        if length + header_bytes > room {
             return None;
         }
         outgoing.unsent += 1;
         let piece = Piece::Fragment(channel, message, index);
-        if outgoing.unsent == outgoing.part.fragments() && loss > LOSSY {
-            outgoing.groups = parity_groups(&outgoing.part, balance - length as i64);
+        if outgoing.unsent == outgoing.part.fragments() && loss > REDUNDANCY_THRESHOLD {
+            outgoing.groups = parity_groups(&outgoing.part, budget - length as i64);
             if outgoing.part.fragments() == 1 {
-                self.repeat(piece, length + head);
+                self.repeat(piece, length + header_bytes);
             }
         }
         Some(piece)
@@ -240,7 +228,7 @@ impl Outbox {
 
     /// A second copy in a packet of its own, if the budget covers it.
     fn repeat(&mut self, piece: Piece, size: usize) {
-        if self.balance >= 2 * (size + 64) as i64 && self.again.len() < PACKETS_AHEAD {
+        if self.budget >= 2 * (size + 64) as i64 && self.again.len() < MAX_PACKETS_IN_FLIGHT {
             self.again.push_back(piece);
         }
     }
@@ -249,14 +237,15 @@ impl Outbox {
     fn size(&mut self, piece: Piece) -> Option<usize> {
         let Piece::Fragment(channel, message, index) = piece else { return Some(1) };
         let outgoing = self.streams[channel as usize].find(message)?;
-        (!outgoing.progress[usize::from(index)].arrived).then(|| outgoing.part.length(index) + outgoing.part.head())
+        (!outgoing.progress[usize::from(index)].arrived)
+            .then(|| outgoing.part.length(index) + outgoing.part.header_bytes())
     }
 
     fn write(&mut self, piece: Piece, body: &mut Vec<u8>) {
         match piece {
             Piece::Fragment(channel, message, index) => {
                 if let Some(outgoing) = self.streams[channel as usize].find(message) {
-                    let at = usize::from(index) * FRAGMENT;
+                    let at = usize::from(index) * FRAGMENT_BYTES;
                     let progress = &mut outgoing.progress[usize::from(index)];
                     progress.copies = progress.copies.saturating_add(1);
                     Frame::Fragment(outgoing.part, index, &outgoing.data[at..at + outgoing.part.length(index)])
@@ -290,8 +279,8 @@ impl Outbox {
 }
 
 /// A parity fragment for each four, as far as the balance covers it.
-fn parity_groups(part: &Part, balance: i64) -> u16 {
-    let affordable = balance.max(0) / (FRAGMENT + 100) as i64;
+fn parity_groups(part: &MessageInfo, budget: i64) -> u16 {
+    let affordable = budget.max(0) / (FRAGMENT_BYTES + 100) as i64;
     let fragments = i64::from(part.fragments());
     ((fragments + 3) / 4).min(affordable).min(fragments - 1) as u16
 }

@@ -1,7 +1,7 @@
 //! One stream of messages on its way out: those that wait, those that are begun, and how far each of their fragments is.
 
-use super::super::frames::{Channel, Part, before};
-use super::super::inbox::{BYTES_AHEAD, NEWEST_AHEAD, RELIABLE_AHEAD};
+use super::super::frames::{Channel, MessageInfo, before};
+use super::super::inbox::{MAX_BYTES_IN_FLIGHT, MAX_NEWEST_IN_FLIGHT, MAX_RELIABLE_IN_FLIGHT};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ pub struct Progress {
 
 /// A message under way.
 pub struct Outgoing {
-    pub part: Part,
+    pub part: MessageInfo,
     pub data: Arc<[u8]>,
     pub progress: Vec<Progress>,
     pub missing: u16,
@@ -59,14 +59,14 @@ impl Stream {
     }
 
     pub fn may_begin(&self, channel: Channel) -> bool {
-        let ahead = if channel == Channel::Reliable { RELIABLE_AHEAD } else { NEWEST_AHEAD };
+        let ahead = if channel == Channel::Reliable { MAX_RELIABLE_IN_FLIGHT } else { MAX_NEWEST_IN_FLIGHT };
         let Some(first) = self.waiting.front() else { return false };
         self.begun.is_empty()
-            || (self.next.wrapping_sub(self.done) < ahead && self.begun_bytes + first.len() <= BYTES_AHEAD)
+            || (self.next.wrapping_sub(self.done) < ahead && self.begun_bytes + first.len() <= MAX_BYTES_IN_FLIGHT)
     }
 
     pub fn begin(&mut self, channel: Channel, data: Arc<[u8]>) {
-        let part = Part { channel, message: self.next, total: data.len() as u32 };
+        let part = MessageInfo { channel, message: self.next, total: data.len() as u32 };
         let fragments = part.fragments();
         self.next = self.next.wrapping_add(1);
         self.waiting_bytes -= data.len();

@@ -1,0 +1,202 @@
+//! How an object looks that the scene file does not have: shapes, colours and poses, as bytes.
+//!
+//! A mesh that is drawn anywhere in the scene of the file travels as a reference (object and number of the visual); another one travels whole, once per
+//! snapshot and object, and is drawn as it is on the other side: nothing collides there, so that it need not be a solid.
+
+use super::viewer::{exact_pose, put_exact_pose};
+use super::wire::{ByteReader, MessageError, put_f64, put_name};
+use std::sync::Arc;
+use tumble_collide::{Shape, TriMesh, Vec3};
+use tumble_core::{Appearance, Drawn, Visual, VisualGeometry, VisualMesh, World};
+
+/// Most pictures of one object.
+pub const MAX_VISUALS: usize = 4096;
+/// Most properties of a look.
+const MAX_PROPERTIES: usize = 64;
+/// Most bytes of a shader's or property's name.
+const MAX_TEXT: usize = 255;
+
+/// Appends the pictures. `base` is the world as the scene file makes it.
+pub(crate) fn put_visuals(out: &mut Vec<u8>, visuals: &[Visual], base: &World) {
+    let drawn: Vec<(&Visual, Drawn<'_>)> =
+        visuals.iter().filter_map(|visual| Some((visual, visual.drawn()?))).take(MAX_VISUALS).collect();
+    out.extend((drawn.len() as u32).to_le_bytes());
+    for (visual, drawn) in drawn {
+        out.extend((visual.part as u32).to_le_bytes());
+        put_exact_pose(out, &visual.pose);
+        put_geometry(out, drawn, base);
+        put_appearance(out, &visual.appearance);
+    }
+}
+
+fn put_geometry(out: &mut Vec<u8>, drawn: Drawn<'_>, base: &World) {
+    let shape = match drawn {
+        Drawn::Mesh(mesh) => {
+            return put_triangles(
+                out,
+                mesh,
+                place_of(
+                    base,
+                    |other| matches!(other, VisualGeometry::Mesh(other) if other.triangles().is_ok_and(|other| Arc::ptr_eq(mesh, other))),
+                ),
+            );
+        }
+        Drawn::Shape(shape) => shape,
+    };
+    let mut tagged = |tag: u8, numbers: &[f64]| {
+        out.push(tag);
+        put_f64(out, numbers);
+    };
+    match shape {
+        Shape::HalfSpace => tagged(0, &[]),
+        Shape::Sphere { radius } => tagged(1, &[*radius]),
+        Shape::Box { half_extents: h } => tagged(2, &[h.x, h.y, h.z]),
+        Shape::Capsule { radius, half_length } => tagged(3, &[*radius, *half_length]),
+        Shape::Cylinder(c) => tagged(4, &[c.radius(), c.half_length()]),
+        Shape::Mesh(mesh) => put_triangles(
+            out,
+            mesh.mesh(),
+            place_of(
+                base,
+                |other| matches!(other, VisualGeometry::Shape(Shape::Mesh(other)) if Arc::ptr_eq(mesh, other)),
+            ),
+        ),
+    }
+}
+
+/// Where the scene of the file draws the same: the object's name and the number of the visual.
+fn place_of(base: &World, same: impl Fn(&VisualGeometry) -> bool) -> Option<(&str, usize)> {
+    base.ids().iter().find_map(|&id| {
+        let object = base.object(id)?;
+        Some((object.name(), object.renderable()?.visuals().iter().position(|visual| same(&visual.geometry))?))
+    })
+}
+
+fn put_triangles(out: &mut Vec<u8>, mesh: &TriMesh, place: Option<(&str, usize)>) {
+    match place {
+        Some((name, index)) => {
+            out.push(5);
+            put_name(out, name);
+            out.extend((index as u32).to_le_bytes());
+        }
+        None => {
+            out.push(6);
+            put_mesh(out, mesh);
+        }
+    }
+}
+
+fn put_mesh(out: &mut Vec<u8>, mesh: &TriMesh) {
+    out.extend((mesh.vertices.len() as u32).to_le_bytes());
+    out.extend((mesh.triangles.len() as u32).to_le_bytes());
+    mesh.vertices.iter().for_each(|v| put_f64(out, v.as_slice()));
+    out.extend(mesh.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()));
+}
+
+fn put_appearance(out: &mut Vec<u8>, appearance: &Appearance) {
+    let [r, g, b] = appearance.color;
+    out.extend([r, g, b, appearance.roughness, appearance.metallic].iter().flat_map(|x| x.to_le_bytes()));
+    put_text(out, &appearance.shader);
+    let properties = &appearance.properties[..appearance.properties.len().min(MAX_PROPERTIES)];
+    out.push(properties.len() as u8);
+    for (name, value) in properties {
+        put_text(out, name);
+        put_f64(out, &[*value]);
+    }
+}
+
+fn put_text(out: &mut Vec<u8>, text: &str) {
+    let end = (0..=text.len().min(MAX_TEXT)).rev().find(|&n| text.is_char_boundary(n)).unwrap_or(0);
+    out.push(end as u8);
+    out.extend(&text.as_bytes()[..end]);
+}
+
+/// Reads pictures of an object of `parts` parts; `base` as before.
+pub(crate) fn get_visuals(bytes: &[u8], parts: usize, base: &World) -> Result<Vec<Visual>, MessageError> {
+    let mut rest = ByteReader(bytes);
+    let count = rest.u32()? as usize;
+    if count > MAX_VISUALS {
+        return Err(MessageError::Malformed("more than 4096 pictures of an object"));
+    }
+    let mut visuals = Vec::new();
+    for _ in 0..count {
+        let part = rest.u32()? as usize;
+        if part >= parts {
+            return Err(MessageError::Malformed("a picture of a part that there is not"));
+        }
+        let pose = exact_pose(&mut rest)?;
+        let geometry = get_geometry(&mut rest, base)?;
+        visuals.push(Visual {
+            part,
+            pose,
+            geometry,
+            appearance: get_appearance(&mut rest)?,
+            stands_in_for: Vec::new(),
+        });
+    }
+    rest.end()?;
+    Ok(visuals)
+}
+
+fn get_geometry(rest: &mut ByteReader<'_>, base: &World) -> Result<VisualGeometry, MessageError> {
+    let shape = match rest.u8()? {
+        0 => Ok(Shape::half_space()),
+        1 => Shape::sphere(rest.f64()?),
+        2 => Shape::cuboid(Vec3::from(rest.f64s::<3>()?)),
+        3 => rest.f64s().map(|[radius, half]| Shape::capsule(radius, half))?,
+        4 => rest.f64s().map(|[radius, half]| Shape::cylinder(radius, half))?,
+        5 => return mesh_of(base, rest.name()?, rest.u32()? as usize),
+        6 => {
+            let mesh = get_mesh(rest)?;
+            let (vertices, triangles) = (mesh.vertices.len(), mesh.triangles.len());
+            let mesh = VisualMesh::new("a mesh of the server", mesh).map_err(|why| {
+                MessageError::Unfit(format!("a mesh of {vertices} vertices and {triangles} triangles: {why}"))
+            })?;
+            return Ok(VisualGeometry::Mesh(Arc::new(mesh)));
+        }
+        _ => return Err(MessageError::Malformed("a shape that there is not")),
+    };
+    shape.map(VisualGeometry::Shape).map_err(|_| MessageError::Malformed("a shape with a size that is not above 0"))
+}
+
+fn mesh_of(base: &World, name: &str, index: usize) -> Result<VisualGeometry, MessageError> {
+    let object = base.find(name).and_then(|id| base.object(id));
+    let visual = object.and_then(|o| o.renderable()).and_then(|r| r.visuals().get(index));
+    visual
+        .map(|v| v.geometry.clone())
+        .ok_or_else(|| MessageError::Unfit(format!("picture {index} of '{name}', which the scene has not")))
+}
+
+fn get_mesh(rest: &mut ByteReader<'_>) -> Result<TriMesh, MessageError> {
+    let (vertices, triangles) = (rest.u32()? as u64, rest.u32()? as u64);
+    let mut corners = ByteReader(rest.take(24 * vertices)?); // checked against what is there before anything is kept
+    let mut indices = ByteReader(rest.take(12 * triangles)?);
+    let vertices: Vec<Vec3> = (0..vertices).map(|_| corners.f64s::<3>().map(Vec3::from)).collect::<Result<_, _>>()?;
+    let triangle = |_| Ok([indices.u32()?, indices.u32()?, indices.u32()?]);
+    let triangles: Vec<[u32; 3]> = (0..triangles).map(triangle).collect::<Result<_, MessageError>>()?;
+    if triangles.iter().flatten().any(|&i| i as usize >= vertices.len()) {
+        return Err(MessageError::Malformed("a triangle with a corner that there is not"));
+    }
+    Ok(TriMesh { vertices, triangles })
+}
+
+fn get_appearance(rest: &mut ByteReader<'_>) -> Result<Appearance, MessageError> {
+    let mut shares = [0.0f32; 5];
+    for x in &mut shares {
+        *x = f32::from_le_bytes(rest.array()?);
+        if !(0.0..=1.0).contains(x) {
+            return Err(MessageError::Malformed("a colour or surface that is not within 0 to 1"));
+        }
+    }
+    let [r, g, b, roughness, metallic] = shares;
+    let shader = text(rest)?;
+    let count = rest.u8()?;
+    let properties = (0..count).map(|_| Ok((text(rest)?, rest.f64()?))).collect::<Result<_, MessageError>>()?;
+    Ok(Appearance { color: [r, g, b], roughness, metallic, shader, properties, ..Appearance::default() })
+}
+
+fn text(rest: &mut ByteReader<'_>) -> Result<String, MessageError> {
+    let length = rest.u8()?;
+    let bytes = rest.take(length as u64)?;
+    std::str::from_utf8(bytes).map(str::to_owned).map_err(|_| MessageError::Malformed("a text that is not UTF-8"))
+}

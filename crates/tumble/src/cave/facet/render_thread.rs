@@ -1,0 +1,124 @@
+//! What draws a facet into memory: a thread of its own, so that the session answers the server however long a picture takes.
+
+use super::burn_in::burn_in;
+use crate::cave::run_setup::{PREVIEW, RunSetup, apply_viewer};
+use crate::failure::Failure;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::time::Duration;
+use tumble::dynamics::World;
+use tumble::net::sync::Viewer;
+use tumble::render::{CaveView, DebugDraw, DrawList, Drawing, Image, Quality, RenderError, Renderer};
+use tumble::scene::cave::Facet;
+
+/// Side of the shadow maps where it is the usual one elsewhere, as for pictures of caves.
+const CAVE_SHADOW_MAP_PX: u32 = 4096;
+/// Largest picture of an unfolded cave, pixels.
+pub const PREVIEW_PX: [u32; 2] = [1280, 960];
+
+/// A picture that is wanted.
+struct RenderRequest {
+    list: DrawList,
+    viewer: Viewer,
+    burn_in: Option<u64>,
+}
+
+/// Makes draw lists here, and pictures on its thread.
+pub struct RenderThread {
+    drawing: Drawing,
+    quality: Option<Quality>,
+    requests: SyncSender<RenderRequest>,
+    pictures: Receiver<Result<Image, RenderError>>,
+}
+
+impl RenderThread {
+    /// For a facet; all of them unfolded where there is none.
+    pub fn new(setup: &RunSetup, facet: Option<&Facet>, quality: Option<Quality>) -> Result<RenderThread, Failure> {
+        let (view, facet) = (setup.view()?, facet.cloned());
+        let (requests, incoming) = sync_channel::<RenderRequest>(1);
+        let (done, pictures) = sync_channel(1);
+        let (ready, started) = sync_channel(1);
+        std::thread::Builder::new()
+            .name("painter".into())
+            .spawn(move || {
+                let mut renderer = match Renderer::new() {
+                    Ok(renderer) => renderer,
+                    Err(error) => {
+                        let _ = ready.send(Err(error));
+                        return;
+                    }
+                };
+                let _ = ready.send(Ok(()));
+                render_all(view, facet, &mut renderer, &incoming, &done);
+            })
+            .map_err(|e| Failure::run("drawing", e))?;
+        started.recv().map_err(|e| Failure::run("drawing", e))?.map_err(|e| Failure::run("drawing", e))?;
+        let mut render_thread = RenderThread { drawing: Drawing::new(&setup.scene), quality, requests, pictures };
+        // the first picture takes seconds where pipelines are compiled; nobody waits for it yet
+        render_thread.begin(&setup.world, &setup.viewer()?, None)?;
+        while render_thread.finished(Duration::from_secs(1))?.is_none() {}
+        Ok(render_thread)
+    }
+
+    /// Begins a picture of the world; with the frame's number in it, if it is to be stamped.
+    pub fn begin(&mut self, world: &World, viewer: &Viewer, burn_in: Option<u64>) -> Result<(), Failure> {
+        let list = draw_list(&mut self.drawing, world, self.quality.as_ref())?;
+        self.requests
+            .send(RenderRequest { list, viewer: viewer.clone(), burn_in })
+            .map_err(|_| Failure::run("drawing", "the painter has gone"))
+    }
+
+    /// The picture, if it is finished within `timeout`.
+    pub fn finished(&mut self, timeout: Duration) -> Result<Option<Image>, Failure> {
+        match self.pictures.recv_timeout(timeout) {
+            Ok(image) => image.map(Some).map_err(|e| Failure::run("drawing", e)),
+            Err(RecvTimeoutError::Timeout) => Ok(None),
+            Err(RecvTimeoutError::Disconnected) => Err(Failure::run("drawing", "the painter has gone")),
+        }
+    }
+}
+
+/// As all pictures of caves are drawn.
+pub fn draw_list(drawing: &mut Drawing, world: &World, quality: Option<&Quality>) -> Result<DrawList, Failure> {
+    let mut list = drawing.list(world, &DebugDraw::default()).map_err(|e| Failure::run("drawing", e))?;
+    if let Some(quality) = quality {
+        quality.apply(&mut list.settings);
+    }
+    if list.settings.shadow_map_size == Quality::default().shadow_map_size {
+        list.settings.shadow_map_size = CAVE_SHADOW_MAP_PX;
+    }
+    Ok(list)
+}
+
+fn render_all(
+    mut view: CaveView,
+    facet: Option<Facet>,
+    renderer: &mut Renderer,
+    incoming: &Receiver<RenderRequest>,
+    done: &SyncSender<Result<Image, RenderError>>,
+) {
+    while let Ok(request) = incoming.recv() {
+        apply_viewer(&mut view, &request.viewer);
+        let mut image = match &facet {
+            Some(facet) => view.draw(renderer, &request.list, facet),
+            None => view.draw_unfolded(renderer, &request.list, PREVIEW_PX),
+        };
+        if let (Ok(image), Some(frame)) = (&mut image, request.burn_in) {
+            burn_in(image, frame);
+        }
+        if done.send(image).is_err() {
+            return;
+        }
+    }
+}
+
+/// First 16 bytes of the BLAKE3 of a picture's pixels.
+pub fn image_hash(image: &Image) -> [u8; 16] {
+    let mut hash = [0; 16];
+    hash.copy_from_slice(&blake3::hash(&image.rgba).as_bytes()[..16]);
+    hash
+}
+
+/// The seat's name, as errors and folders have it.
+pub fn slot_name(facet: Option<&Facet>) -> &str {
+    facet.map_or(PREVIEW, |f| &f.name)
+}

@@ -1,0 +1,141 @@
+//! A facet's session with its picture: draws, presents and logs frames, in memory or for a window.
+
+use super::control::{FacetControl, POLL_INTERVAL, ServerWait};
+use super::frame_log::FrameLog;
+use super::render_thread::{RenderThread, image_hash};
+use crate::cave::endpoints::FacetEndpoint;
+use crate::failure::Failure;
+use std::time::Duration;
+use tumble::net::sync::{EndReason, Facet, SessionError, Task};
+use tumble::render::Image;
+
+/// Pause while the frame log has no room for another frame.
+const LOG_FULL_PAUSE: Duration = Duration::from_millis(5);
+
+/// A facet that is connected, or looks for its server.
+pub struct FacetRunner {
+    pub facet: Facet<FacetEndpoint>,
+    render_thread: Option<RenderThread>,
+    pub log: Option<FrameLog>,
+    burn_in: bool,
+    control: FacetControl,
+    server_wait: ServerWait,
+    /// The frame that is being drawn, and its simulated time.
+    drawing: Option<(u64, f64)>,
+    /// The frame that is drawn, and not yet shown.
+    picture: Option<DrawnFrame>,
+}
+
+struct DrawnFrame {
+    frame: u64,
+    time_s: f64,
+    hash: [u8; 16],
+    image: Option<Image>,
+}
+
+/// The link's trouble.
+pub fn failed(error: SessionError) -> Failure {
+    Failure::run("the connection to the server", error)
+}
+
+impl FacetRunner {
+    /// A facet that has drawn nothing yet.
+    pub fn new(
+        facet: Facet<FacetEndpoint>,
+        render_thread: Option<RenderThread>,
+        log: Option<FrameLog>,
+        burn_in: bool,
+        control: FacetControl,
+    ) -> FacetRunner {
+        let server_wait = ServerWait::default();
+        FacetRunner { facet, render_thread, log, burn_in, control, server_wait, drawing: None, picture: None }
+    }
+
+    /// What to do next, after waiting for it for at most `timeout`; `None` when the facet is to end.
+    pub fn next(&mut self, timeout: Duration) -> Result<Option<Task>, Failure> {
+        self.log.as_mut().map_or(Ok(()), FrameLog::check)?;
+        if self.control.is_orphaned() {
+            return Err(Failure::run(&self.control.title(), "its launcher is gone"));
+        }
+        if self.control.signals.stop_requested() {
+            return Ok(None);
+        }
+        let task = self.facet.next(timeout).map_err(failed)?;
+        self.server_wait.update(&task, &self.control)?;
+        match task {
+            Task::Ended(EndReason::Refused(why)) => {
+                Err(Failure::input(format!("facet {}: the server refuses it: {why}", self.control.name)))
+            }
+            Task::Ended(_) => Ok(None),
+            task => Ok(Some(task)),
+        }
+    }
+
+    /// Whether what was shown is written, so far that there is room for more.
+    pub fn has_room(&self) -> bool {
+        self.log.as_ref().is_none_or(FrameLog::has_room)
+    }
+
+    /// For how many whole seconds there has been no server.
+    pub fn server_wait_s(&self) -> u64 {
+        self.server_wait.elapsed().as_secs()
+    }
+
+    /// Draws into memory, or nothing, until the end.
+    pub fn run_offscreen(&mut self) -> Result<(), Failure> {
+        while let Some(task) = self.next(if self.drawing.is_some() { Duration::ZERO } else { POLL_INTERVAL })? {
+            match task {
+                // what was begun is finished first, also where nobody waits for it any more
+                Task::Wait(_) | Task::Draw if self.drawing.is_some() => self.poll_picture()?,
+                Task::Wait(_) | Task::Ended(_) => {}
+                // packing pictures is behind: the server hears that this facet lives, and waits
+                Task::Draw if !self.has_room() => std::thread::sleep(LOG_FULL_PAUSE),
+                Task::Draw => self.draw()?,
+                Task::Present(frame) => self.present(frame)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn draw(&mut self) -> Result<(), Failure> {
+        let Some(frame) = self.facet.begin() else { return Ok(()) };
+        let time_s = self.facet.world().time();
+        match &mut self.render_thread {
+            Some(render_thread) => {
+                render_thread.begin(self.facet.world(), self.facet.viewer(), self.burn_in.then_some(frame))?;
+                self.drawing = Some((frame, time_s));
+                Ok(())
+            }
+            None => self.drawn(frame, time_s, None),
+        }
+    }
+
+    fn poll_picture(&mut self) -> Result<(), Failure> {
+        let (Some(render_thread), Some((frame, time_s))) = (&mut self.render_thread, self.drawing) else {
+            return Ok(());
+        };
+        match render_thread.finished(POLL_INTERVAL)? {
+            Some(image) => self.drawn(frame, time_s, Some(image)),
+            None => Ok(()),
+        }
+    }
+
+    /// A frame is drawn.
+    pub fn drawn(&mut self, frame: u64, time_s: f64, image: Option<Image>) -> Result<(), Failure> {
+        self.drawing = None;
+        let hash = image.as_ref().map_or([0; 16], image_hash);
+        self.picture = Some(DrawnFrame { frame, time_s, hash, image });
+        self.facet.drawn(hash).map_err(failed)
+    }
+
+    /// A frame is shown.
+    pub fn present(&mut self, frame: u64) -> Result<(), Failure> {
+        self.facet.presented().map_err(failed)?;
+        let shown = self.facet.session().shown();
+        let Some(drawn) = self.picture.take().filter(|d| d.frame == frame) else { return Ok(()) };
+        if let (Some(log), Some((_, done))) = (&mut self.log, shown) {
+            log.shown(frame, drawn.time_s, &done.hash, &drawn.hash, drawn.image)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,243 @@
+//! A facet in a window of its own, where its cave says; keys and mouse go to the server as a user's input.
+//!
+//! W A S D, Q E and the arrows move the cave, R and F stretch out the left and the right hand (`--user-colliders`), a body is pulled by the left button, escape ends the facet.
+
+use super::burn_in;
+use super::render_thread::{PREVIEW_PX, draw_list, slot_name};
+use super::runner::{FacetRunner, failed};
+use crate::cave::run_setup::{RunSetup, apply_viewer};
+use crate::failure::Failure;
+use crate::view::view_mode::ViewMode;
+use std::time::{Duration, Instant};
+use tumble::collide::Pose;
+use tumble::dynamics::World;
+use tumble::net::sync::{Input, Task, WaitReason};
+use tumble::render::winit::event::{ElementState, MouseButton, WindowEvent};
+use tumble::render::winit::keyboard::{KeyCode, PhysicalKey};
+use tumble::render::{DrawList, Drawing, Next, Quality, Screen, WindowApp, WindowOptions, caption, run_window};
+use tumble::scene::cave::{Facet, Output};
+
+/// Waiting for a message, between two looks at what the user does.
+const POLL_INTERVAL: Duration = Duration::from_millis(8);
+/// Input that does not change is sent again after this time, since it goes stale.
+const INPUT_RESEND_INTERVAL: Duration = Duration::from_millis(250);
+
+/// What a facet shows itself by.
+pub struct WindowSetup {
+    view_mode: ViewMode,
+    drawing: Drawing,
+    quality: Option<Quality>,
+    options: WindowOptions,
+    user: u16,
+}
+
+impl WindowSetup {
+    /// Of a facet; of all of them where there is none.
+    pub fn new(setup: &RunSetup, facet: Option<&Facet>, quality: Option<Quality>) -> Result<WindowSetup, Failure> {
+        let view = Box::new(setup.view()?);
+        let title = format!("tumble: {} on {}", setup.scene.file, slot_name(facet));
+        let plain = WindowOptions::new(title, view.size_px(facet, PREVIEW_PX));
+        let options = match facet.map(|f| f.output) {
+            Some(Output::Window { position_px }) => {
+                WindowOptions { position_px: Some(position_px), decorated: false, resizable: false, ..plain }
+            }
+            _ => WindowOptions { resizable: facet.is_none(), ..plain },
+        };
+        let user = facet.map_or(0, |f| f.user) as u16;
+        let view_mode = match facet {
+            Some(facet) => ViewMode::Facet(view, Box::new(facet.clone())),
+            None => ViewMode::Unfolded(view),
+        };
+        Ok(WindowSetup { view_mode, drawing: Drawing::new(&setup.scene), quality, options, user })
+    }
+
+    /// Opens the window and runs the facet in it until the run is over or the window is closed.
+    pub fn show(self, runner: &mut FacetRunner, burn_in: bool) -> Result<(), Failure> {
+        let options = self.options.clone();
+        let mut window = Window {
+            window_setup: self,
+            runner,
+            burn_in,
+            list: DrawList::default(),
+            keys: Vec::new(),
+            pulling: false,
+            at_px: [0.0; 2],
+            sent: None,
+            sequence: 0,
+            warned: None,
+            ended: false,
+        };
+        run_window(&options, &mut window)
+    }
+}
+
+struct Window<'a> {
+    window_setup: WindowSetup,
+    runner: &'a mut FacetRunner,
+    burn_in: bool,
+    /// Of the frame that is shown.
+    list: DrawList,
+    /// Held, by USB HID usage.
+    keys: Vec<u16>,
+    pulling: bool,
+    at_px: [f64; 2],
+    /// The newest input, and when it was sent.
+    sent: Option<(Input, Instant)>,
+    sequence: u64,
+    /// The second that is said to have passed without a server.
+    warned: Option<u64>,
+    ended: bool,
+}
+
+impl Window<'_> {
+    fn draw(&mut self, screen: &mut Screen) -> Result<(), Failure> {
+        let Some(frame) = self.runner.facet.begin() else { return Ok(()) };
+        let (world, viewer): (&World, _) = (self.runner.facet.world(), self.runner.facet.viewer());
+        let time_s = world.time();
+        self.list = draw_list(&mut self.window_setup.drawing, world, self.window_setup.quality.as_ref())?;
+        let (ViewMode::Facet(view, _) | ViewMode::Unfolded(view)) = &mut self.window_setup.view_mode else {
+            return Ok(());
+        };
+        apply_viewer(view, viewer);
+        self.window_setup.view_mode.draw(screen, &self.list)?;
+        // drawn is what the device has finished; read back only where somebody wants it
+        let image = match self.runner.log.is_some() {
+            true => Some(screen.renderer().read()?),
+            false => screen.renderer().wait().map(|()| None)?,
+        };
+        self.runner.drawn(frame, time_s, image)
+    }
+
+    fn present(&mut self, screen: &mut Screen, frame: u64) -> Result<(), Failure> {
+        screen.set_caption(self.burn_in.then(|| burn_in::strip(screen.size_px()[0], frame)));
+        self.warned = None;
+        // a window that is hidden shows nothing, and holds nobody up
+        screen.show()?;
+        self.runner.present(frame)
+    }
+
+    /// The picture is old, and says so.
+    fn warn(&mut self, screen: &mut Screen) -> Result<(), Failure> {
+        let passed = self.runner.server_wait_s();
+        if passed >= 1 && self.warned != Some(passed) {
+            self.warned = Some(passed);
+            screen.set_caption(Some(caption(&[format!("no server for {passed} s; what you see is old")], 2)));
+            screen.show()?;
+        }
+        Ok(())
+    }
+
+    /// The user's input, where it is not what the server knows already.
+    fn send(&mut self, screen: &Screen) -> Result<(), Failure> {
+        let wand = if self.pulling { self.wand(screen) } else { None };
+        let (keys, buttons) = (self.keys.clone(), u32::from(wand.is_some()));
+        let idle = keys.is_empty() && buttons == 0;
+        let known = |(sent, at): &(Input, Instant)| {
+            sent.keys == keys
+                && sent.buttons == buttons
+                && sent.wand == wand
+                && (idle || at.elapsed() < INPUT_RESEND_INTERVAL)
+        };
+        if self.sent.as_ref().map_or(idle, known) {
+            return Ok(());
+        }
+        self.sequence += 1;
+        let input = Input {
+            sequence: self.sequence,
+            user: self.window_setup.user,
+            head: None,
+            wand,
+            hands: [None; 2],
+            buttons,
+            keys,
+        };
+        if self.runner.facet.send_input(&input).map_err(failed)? {
+            self.sent = Some((input, Instant::now()));
+        }
+        Ok(())
+    }
+
+    /// The line of sight below the pointer, in the cave's frame: it starts at the eye and goes along its y axis.
+    fn wand(&self, screen: &Screen) -> Option<Pose> {
+        let ray = self.window_setup.view_mode.ray(&self.list, screen.size_px(), self.at_px)?;
+        let viewer = self.runner.facet.viewer();
+        let origin = viewer.cave.inverse() * nalgebra::Point3::from(ray.origin);
+        let direction = viewer.cave.rotation.inverse() * ray.direction;
+        let aside = if direction.z.abs() < 0.9 { nalgebra::Vector3::z() } else { nalgebra::Vector3::x() };
+        let right = direction.cross(&aside).normalize();
+        let axes = nalgebra::Matrix3::from_columns(&[right, direction, right.cross(&direction)]);
+        let rotation =
+            nalgebra::UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(axes));
+        Some(Pose::from_parts((origin.coords / viewer.scale).into(), rotation))
+    }
+}
+
+impl WindowApp for Window<'_> {
+    type Error = Failure;
+
+    fn opened(&mut self, screen: &mut Screen) -> Result<(), Failure> {
+        let usual = if screen.is_software() { Quality::fast() } else { Quality::default() };
+        self.window_setup.quality.get_or_insert(usual);
+        // the first picture takes seconds where pipelines are compiled; the server does not know of us yet
+        self.list =
+            draw_list(&mut self.window_setup.drawing, self.runner.facet.world(), self.window_setup.quality.as_ref())?;
+        self.window_setup.view_mode.draw(screen, &self.list)?;
+        Ok(screen.renderer().wait()?)
+    }
+
+    fn event(&mut self, _: &mut Screen, event: &WindowEvent) -> Result<(), Failure> {
+        match event {
+            WindowEvent::KeyboardInput { event, .. } => {
+                let down = event.state == ElementState::Pressed;
+                let PhysicalKey::Code(code) = event.physical_key else { return Ok(()) };
+                self.ended |= down && code == KeyCode::Escape;
+                if let Some(key) = usage(code) {
+                    self.keys.retain(|held| *held != key);
+                    self.keys.extend(down.then_some(key));
+                }
+            }
+            WindowEvent::CursorMoved { position, .. } => self.at_px = [position.x, position.y],
+            WindowEvent::MouseInput { state, button: MouseButton::Left, .. } => {
+                self.pulling = *state == ElementState::Pressed
+            }
+            WindowEvent::Focused(false) => {
+                self.keys.clear();
+                self.pulling = false;
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn turn(&mut self, screen: &mut Screen) -> Result<Next, Failure> {
+        let Some(task) = self.runner.next(POLL_INTERVAL)?.filter(|_| !self.ended) else { return Ok(Next::End) };
+        match task {
+            Task::Draw if !self.runner.has_room() => std::thread::sleep(POLL_INTERVAL),
+            Task::Draw => self.draw(screen)?,
+            Task::Present(frame) => self.present(screen, frame)?,
+            Task::Wait(WaitReason::Server | WaitReason::Lost) => self.warn(screen)?,
+            Task::Wait(_) | Task::Ended(_) => {}
+        }
+        self.send(screen)?;
+        Ok(Next::At(Instant::now()))
+    }
+}
+
+/// The USB HID usage (page 7) of the keys that move a user.
+fn usage(code: KeyCode) -> Option<u16> {
+    Some(match code {
+        KeyCode::KeyA => 0x04,
+        KeyCode::KeyD => 0x07,
+        KeyCode::KeyE | KeyCode::PageUp => 0x08,
+        KeyCode::KeyF => 0x09,
+        KeyCode::KeyQ | KeyCode::PageDown => 0x14,
+        KeyCode::KeyR => 0x15,
+        KeyCode::KeyS => 0x16,
+        KeyCode::KeyW => 0x1A,
+        KeyCode::ArrowRight => 0x4F,
+        KeyCode::ArrowLeft => 0x50,
+        KeyCode::ArrowDown => 0x51,
+        KeyCode::ArrowUp => 0x52,
+        _ => return None,
+    })
+}

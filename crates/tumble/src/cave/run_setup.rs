@@ -1,0 +1,194 @@
+//! Scene, environment and cave of a run, as the server and every facet build them.
+
+use super::args::CaveSceneOptions;
+use crate::failure::Failure;
+use std::path::Path;
+use tumble::collide::Pose;
+use tumble::dynamics::{Mode, World};
+use tumble::net::sync::transport::MAX_FACETS;
+use tumble::net::sync::{User, Viewer, scene_hash};
+use tumble::render::CaveView;
+use tumble::scene::cave::{Cave, CaveSource, resolve_cave};
+use tumble::scene::{CavePlace, SceneFile, ShapeSpec, resolve_scene, visual_notes};
+
+/// Name of the seat of the one process that draws a preview.
+pub const PREVIEW: &str = "preview";
+
+/// What a process does with the world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Steps it.
+    Server,
+    /// Draws what the server says.
+    Facet,
+}
+
+/// What all processes of a run have in common.
+pub struct RunSetup {
+    pub scene: SceneFile,
+    pub cave: Cave,
+    /// As the files make it, before the first step.
+    pub world: World,
+    /// By which they know that they mean the same.
+    pub hash: [u8; 32],
+    /// The same with the cave and the textures: what a facet must have in common with the server to be let in.
+    pub join_hash: [u8; 32],
+    /// The cave by its file, the same from whatever folder it was named: one run goes on in it.
+    pub place: String,
+    /// What is worth saying.
+    pub notes: Vec<String>,
+}
+
+impl RunSetup {
+    /// Reads the cave and the environment and builds the world of `scene`. The settings of its stepping may differ between server and facets: nothing that is
+    /// seen at the start depends on them.
+    pub fn load(mut scene: SceneFile, surroundings: &CaveSceneOptions, role: Role) -> Result<RunSetup, Failure> {
+        let source = resolve_cave(&surroundings.cave)?;
+        let cave = source.load()?;
+        let place = match &source {
+            CaveSource::Path(path) => path.canonicalize().unwrap_or(path.clone()).display().to_string(),
+            CaveSource::Shipped(cave) => cave.name.to_owned(),
+        };
+        if cave.facets.len() > MAX_FACETS {
+            return Err(Failure::input(format!(
+                "{}: a run has at most {MAX_FACETS} facets, this cave has {}",
+                cave.file,
+                cave.facets.len()
+            )));
+        }
+        let mut notes = Vec::new();
+        if let Some(name) = &surroundings.environment {
+            merge_environment(&mut scene, resolve_scene(name, &[])?.load()?, &mut notes)?;
+        }
+        let build = if role == Role::Server { SceneFile::build } else { SceneFile::build_drawn };
+        let (world, built) = build(&scene).map_err(Failure::input)?;
+        notes.extend(built);
+        // everything that is drawn and stands in no body
+        let seen = format!("{:?} {:?} {:?} {:?} {:?}", scene.camera, scene.cave, scene.lights, scene.sky, scene.ground);
+        let hash = scene_hash(&seen, &world);
+        let join_hash = hash_for_joining(&hash, &cave, &world);
+        notes.extend(visual_notes(world.visuals()));
+        Ok(RunSetup { scene, cave, world, hash, join_hash, place, notes })
+    }
+
+    /// The cave at its place in the scene.
+    pub fn view(&self) -> Result<CaveView, Failure> {
+        CaveView::new(self.cave.clone(), &self.scene).map_err(Failure::input)
+    }
+
+    /// Who looks, as the files say.
+    pub fn viewer(&self) -> Result<Viewer, Failure> {
+        let view = self.view()?;
+        let users = self
+            .cave
+            .users
+            .iter()
+            .map(|user| User { head: head_pose(user), interpupillary_m: user.interpupillary_m, input: 0 })
+            .collect();
+        Ok(Viewer { users, cave: pose_of(view.place()), scale: view.place().scale })
+    }
+}
+
+/// The hash of a scene with what of a cave is to be seen, and the bytes of all textures; addresses, machines and windows are each machine's own.
+fn hash_for_joining(scene: &[u8; 32], cave: &Cave, world: &World) -> [u8; 32] {
+    let mut hasher = blake3::Hasher::new();
+    let mut put = |bytes: &[u8]| {
+        hasher.update(&(bytes.len() as u64).to_le_bytes());
+        hasher.update(bytes);
+    };
+    // a file that cannot be read is told where it is used
+    let content = |path: &Path| std::fs::read(path).map_or([0; 32], |bytes| *blake3::hash(&bytes).as_bytes());
+    put(scene);
+    put(format!("{:?} {:?} {:?}", cave.sync.mode, cave.screens, cave.users).as_bytes());
+    for f in &cave.facets {
+        put(format!(
+            "{:?} {} {} {:?} {} {} {:?} {:?}",
+            f.name, f.screen, f.user, f.size_px, f.near_m, f.far_m, f.stereo, f.flip
+        )
+        .as_bytes());
+        [&f.warp_file, &f.blend_file].into_iter().for_each(|file| put(&file.as_deref().map_or([0; 32], content)));
+    }
+    let textures: std::collections::BTreeSet<_> =
+        world.visuals().filter_map(|visual| visual.appearance.texture.clone()).collect();
+    // by names of files, as the scene's hash has them: folders differ between machines
+    let mut textures: Vec<_> =
+        textures.iter().map(|path| (path.file_name().unwrap_or_default().as_encoded_bytes(), content(path))).collect();
+    textures.sort();
+    for (name, bytes) in textures {
+        put(name);
+        put(&bytes);
+    }
+    *hasher.finalize().as_bytes()
+}
+
+/// Stands the cave and its users in the view as the viewer of a frame has them.
+pub fn apply_viewer(view: &mut CaveView, viewer: &Viewer) {
+    view.set_place(place_of(&viewer.cave, viewer.scale));
+    for (user, seen) in view.users_mut().iter_mut().zip(&viewer.users) {
+        user.eye_m = seen.head.translation.vector.into();
+        user.forward = seen.head.rotation * nalgebra::Vector3::y();
+        user.up = seen.head.rotation * nalgebra::Vector3::z();
+        user.interpupillary_m = seen.interpupillary_m;
+    }
+}
+
+/// A cave's place as a pose: `x_scene = pose · (scale · x_cave)`.
+pub fn pose_of(place: &CavePlace) -> Pose {
+    let turn = nalgebra::UnitQuaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), place.heading_deg.to_radians());
+    Pose::from_parts(nalgebra::Vector3::from(place.origin_m).into(), turn)
+}
+
+/// The way back; caves are upright, so only the turn about the vertical counts.
+pub fn place_of(pose: &Pose, scale: f64) -> CavePlace {
+    let (_, _, heading) = pose.rotation.euler_angles();
+    CavePlace { origin_m: pose.translation.vector.into(), heading_deg: heading.to_degrees(), scale }
+}
+
+/// The head of a user of a cave file: x to the right, y ahead, z up.
+fn head_pose(user: &tumble::scene::cave::User) -> Pose {
+    let (right, ahead) = (user.right(), user.forward);
+    let rotation = nalgebra::Rotation3::from_matrix_unchecked(nalgebra::Matrix3::from_columns(&[
+        right,
+        ahead,
+        right.cross(&ahead),
+    ]));
+    Pose::from_parts(user.eye_m.coords.into(), nalgebra::UnitQuaternion::from_rotation_matrix(&rotation))
+}
+
+/// Puts a scene into another one's surroundings (thesis §IV.C: the immersive scene).
+fn merge_environment(scene: &mut SceneFile, from: SceneFile, notes: &mut Vec<String>) -> Result<(), Failure> {
+    let still = from.bodies.iter().filter(|b| b.mode == Mode::Static && b.alive).count();
+    notes.push(format!("environment {}: its camera, lights, sky, ground and {still} bodies that do not move; camera and lights of {} are ignored", from.file, scene.file));
+    let moving = from.bodies.iter().filter(|b| b.mode != Mode::Static).count() + from.articulated.len();
+    if moving > 0 {
+        notes.push(format!(
+            "environment {}: {moving} objects that move are left out; put them into the scene",
+            from.file
+        ));
+    }
+    (scene.camera, scene.cave, scene.lights, scene.sky, scene.ground) =
+        (from.camera, from.cave, from.lights, from.sky, from.ground);
+    let (meshes, materials) = (scene.meshes.len(), scene.materials.len());
+    scene.meshes.extend(from.meshes);
+    scene.materials.extend(from.materials);
+    for mut body in from.bodies.into_iter().filter(|b| b.mode == Mode::Static && b.alive) {
+        if scene.bodies.iter().any(|b| b.name == body.name) || scene.articulated.iter().any(|a| a.name == body.name) {
+            return Err(Failure::input(format!(
+                "{}: body \"{}\" of the environment has the name of one of {}; rename one",
+                from.file, body.name, scene.file
+            )));
+        }
+        body.collides = false;
+        body.material = body.material.map(|m| m + materials);
+        if let ShapeSpec::Mesh { mesh } = &mut body.shape {
+            *mesh += meshes;
+        }
+        scene.bodies.push(body);
+    }
+    Ok(())
+}
+
+/// Where a facet's files go in a folder; a name may have dots, and none leads out.
+pub fn facet_folder(folder: &Path, name: &str) -> std::path::PathBuf {
+    folder.join(if name.starts_with('.') { format!("_{name}") } else { name.to_owned() })
+}

@@ -1,0 +1,13 @@
+//! The server's process of a run: it simulates the scene, publishes frames, starts the facets' processes and writes the recording and the summary.
+
+mod facet_processes;
+mod histogram;
+mod input_devices;
+mod live_viewers;
+mod outputs;
+mod serve;
+mod summary;
+mod user_colliders;
+mod users;
+
+pub use serve::run;

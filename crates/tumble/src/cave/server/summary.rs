@@ -1,0 +1,308 @@
+//! What a run counted and measured: lines while it runs, a few at its end, and all of it as JSON.
+
+use super::histogram::{Histogram, Quantiles};
+use crate::cave::endpoints::ServerEndpoint;
+use crate::cave::replay::frames::Counts;
+use crate::cave::replay::replayed_input;
+use crate::cave::tracker::osc;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+use tumble::net::sync::transport::{FacetNumber, LinkCounters, Refused};
+use tumble::net::sync::{FacetSlot, Membership, Server, ServerEvent, SlotCounts};
+
+/// Between two reports.
+const EVERY: Duration = Duration::from_secs(5);
+
+/// Times of the run.
+#[derive(Default)]
+pub struct Metrics {
+    /// The steps of one frame.
+    pub step: Histogram,
+    /// From publishing a frame to when all who are waited for have shown it.
+    pub barrier: Histogram,
+    /// From the beginning of one frame to the next.
+    pub frame: Histogram,
+    /// Between the first and the last facet to show a frame, by the server's clock.
+    pub skew: Histogram,
+    /// From what a user did to the last facet that shows it.
+    pub input: Histogram,
+    /// By seat: from the arrival of a frame at the facet to the end of drawing it.
+    draw: Vec<Histogram>,
+    last: Vec<(u64, f64)>,
+    /// By seat: the frame shown last, and how many different ones were: who joins again shows the last one again.
+    shown: Vec<(Option<u64>, u64)>,
+}
+
+/// Packets that a link refused, by reason.
+pub type Refusals = BTreeMap<&'static str, u64>;
+
+/// What a link refused.
+pub fn refused(link: &LinkCounters) -> Refusals {
+    Refused::ALL.iter().map(|&why| (why.name(), link.refused_for(why))).filter(|(_, n)| *n > 0).collect()
+}
+
+/// The whole summary. Units stand in the names.
+#[derive(Serialize)]
+pub struct Summary {
+    pub scene: String,
+    pub cave: String,
+    pub transport: &'static str,
+    pub mode: &'static str,
+    pub frames: u64,
+    pub simulated_s: f64,
+    pub wall_s: f64,
+    /// Time that was given up because frames took longer than their length.
+    pub behind_s: f64,
+    /// Simulating one frame: all its steps.
+    pub simulation: Quantiles,
+    pub barrier: Quantiles,
+    pub frame: Quantiles,
+    /// Between the first and the last facet to show a frame, by the server's clock.
+    pub skew: Option<Quantiles>,
+    /// From what a user did to the last facet that shows it; where users did anything.
+    pub input_to_picture: Option<Quantiles>,
+    /// Of a replay: pictures, compared with those of the recording.
+    pub replay: Option<Counts>,
+    /// Of inputs that were played.
+    pub replay_input: Option<replayed_input::Counts>,
+    /// What came from a tracker.
+    pub tracker: Option<osc::Counts>,
+    /// Heads that were not followed, because an eye would be behind a screen or in it.
+    pub heads_rejected: u64,
+    /// What was refused from who is no facet, by reason; reasons that never came are left out.
+    pub unknown_peers: Refusals,
+    pub facets: Vec<FacetSummary>,
+}
+
+/// Of one facet, as the server counted.
+#[derive(Serialize)]
+pub struct FacetSummary {
+    pub name: String,
+    #[serde(flatten)]
+    pub counts: SlotCounts,
+    /// Frames of the run that it did not show: while it was not there, was behind, or in `latest` had a newer one.
+    pub not_shown: u64,
+    pub draw: Quantiles,
+    pub bytes_out: u64,
+    pub bytes_in: u64,
+    pub repeated: u64,
+    /// What its link refused, by reason; reasons that never came are left out.
+    pub refused_packets: Refusals,
+}
+
+impl Metrics {
+    /// For so many seats.
+    pub fn new(slots: usize) -> Metrics {
+        Metrics {
+            draw: (0..slots).map(|_| Histogram::default()).collect(),
+            last: vec![(0, 0.0); slots],
+            shown: vec![(None, 0); slots],
+            ..Metrics::default()
+        }
+    }
+
+    /// What facets answered.
+    pub fn take(&mut self, event: &ServerEvent, time_s: f64) {
+        if let ServerEvent::Shown(shown) = event {
+            if shown.facets > 1 {
+                self.skew.add(shown.skew.as_secs_f64(), shown.frame, time_s);
+            }
+            shown.input.iter().for_each(|input| self.input.add(input.as_secs_f64(), shown.frame, time_s));
+        }
+        let (ServerEvent::Ready(facet, frame, done, _) | ServerEvent::Presented(facet, frame, done, _)) = event else {
+            return;
+        };
+        let k = *facet as usize;
+        if let (ServerEvent::Ready(..), Some(draw)) = (event, self.draw.get_mut(k)) {
+            draw.add(f64::from(done.took_us) * 1e-6, *frame, time_s);
+            self.last[k].1 = f64::from(done.took_us) * 1e-3;
+        }
+        if let Some(last) = self.last.get_mut(k) {
+            last.0 = *frame;
+        }
+        if let (ServerEvent::Presented(..), Some((last, different))) = (event, self.shown.get_mut(k)) {
+            *different += u64::from(last.replace(*frame) != Some(*frame));
+        }
+    }
+
+    /// All facets, as they stand after so many frames.
+    pub fn facets(&self, server: &Server<ServerEndpoint>, slots: &[FacetSlot], frames: u64) -> Vec<FacetSummary> {
+        let one = |(k, slot): (usize, &FacetSlot)| {
+            let (counts, _, link) = server.counts(k as FacetNumber);
+            FacetSummary {
+                name: slot.name.clone(),
+                not_shown: frames.saturating_sub(self.shown[k].1),
+                counts,
+                draw: self.draw[k].quantiles(),
+                bytes_out: link.bytes_out,
+                bytes_in: link.bytes_in,
+                repeated: link.repeated,
+                refused_packets: refused(&link),
+            }
+        };
+        slots.iter().enumerate().map(one).collect()
+    }
+}
+
+impl Summary {
+    /// The few lines for a person.
+    pub fn lines(&self) -> String {
+        let mut text = format!(
+            "{} in {}: {:.3} s in {} frames, {} over {}; {:.3} s by the clock, {:.3} s behind\n",
+            self.scene, self.cave, self.simulated_s, self.frames, self.mode, self.transport, self.wall_s, self.behind_s
+        );
+        let quantiles = |what: &str, f: &Quantiles| {
+            format!(
+                "{what} {:.2} ms (half), {:.2} ms (99 %), {:.2} ms (all; frame {} at {:.3} s)\n",
+                f.p50_ms, f.p99_ms, f.max_ms, f.max_at_frame, f.max_at_s
+            )
+        };
+        text += &quantiles("simulating a frame took at most", &self.simulation);
+        text += &quantiles("sent, drawn and shown within", &self.barrier);
+        text += &quantiles("a frame took at most", &self.frame);
+        if let Some(skew) = &self.skew {
+            text += &quantiles("facets showed a frame within", skew);
+        }
+        if let Some(input) = &self.input_to_picture {
+            text += &quantiles("what users did was to be seen within", input);
+        }
+        if let Some(Counts { same, different, not_compared }) = self.replay {
+            text += &format!(
+                "pictures: {same} as they were recorded, {different} different, {not_compared} not compared\n"
+            );
+        }
+        if let Some(replayed_input) = &self.replay_input {
+            text += &format!(
+                "{} inputs played: {} states as they were recorded, {} different\n",
+                replayed_input.inputs, replayed_input.same, replayed_input.different
+            );
+        }
+        if let Some(tracker) = &self.tracker {
+            text += &format!(
+                "tracker: {} messages taken in {} datagrams{}\n",
+                tracker.taken,
+                tracker.datagrams,
+                reasons(", dropped", &tracker.dropped)
+            );
+        }
+        if self.heads_rejected > 0 {
+            text += &format!("{} heads not followed: an eye would be behind a screen\n", self.heads_rejected);
+        }
+        for FacetSummary { name, counts: c, not_shown, refused_packets, .. } in &self.facets {
+            text += &format!(
+                "facet {name}: {} shown, {not_shown} not shown, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times{}\n",
+                c.presented,
+                c.late,
+                c.missing,
+                c.duplicate,
+                c.stale,
+                c.torn,
+                c.mismatched,
+                c.dropped,
+                reasons("; packets refused", refused_packets)
+            );
+        }
+        if !self.unknown_peers.is_empty() {
+            text += &unknown_peers_line(&self.unknown_peers);
+        }
+        text
+    }
+}
+
+/// A line of what was refused from who is no facet; nothing for nothing.
+pub fn unknown_peers_line(refused: &Refusals) -> String {
+    let key = if refused.contains_key(Refused::Forged.name()) {
+        " (forged: who has another key file, or none, looks like this)"
+    } else {
+        ""
+    };
+    if refused.is_empty() {
+        String::new()
+    } else {
+        format!("from who is no facet{}{key}\n", reasons(": packets refused", refused))
+    }
+}
+
+/// `; packets refused: 3 forged, 1 replayed`; nothing for nothing.
+fn reasons(what: &str, counts: &Refusals) -> String {
+    let each: Vec<String> = counts.iter().map(|(why, n)| format!("{n} {why}")).collect();
+    if each.is_empty() { String::new() } else { format!("{what}: {}", each.join(", ")) }
+}
+
+/// Lines while it runs: in place on a terminal, every few seconds elsewhere.
+pub struct Status {
+    quiet: bool,
+    terminal: bool,
+    since: Instant,
+    frame: u64,
+    shown: Vec<u64>,
+    lines: usize,
+}
+
+impl Status {
+    /// From now on.
+    pub fn new(quiet: bool) -> Status {
+        Status {
+            quiet,
+            terminal: std::io::stderr().is_terminal(),
+            since: Instant::now(),
+            frame: 0,
+            shown: Vec::new(),
+            lines: 0,
+        }
+    }
+
+    /// What is said next must not be written over.
+    pub fn interrupted(&mut self) {
+        self.lines = 0;
+    }
+
+    /// After each frame.
+    pub fn at(
+        &mut self,
+        server: &Server<ServerEndpoint>,
+        slots: &[FacetSlot],
+        metrics: &Metrics,
+        frame: u64,
+        time_s: f64,
+    ) {
+        let passed = self.since.elapsed();
+        let every = if self.terminal { EVERY / 5 } else { EVERY };
+        if self.quiet || passed < every {
+            return;
+        }
+        let per_s = |now: u64, before: u64| now.saturating_sub(before) as f64 / passed.as_secs_f64();
+        let mut text = if self.terminal && self.lines > 0 { format!("\x1b[{}A", self.lines) } else { String::new() };
+        let more = |what: &str, histogram: &Histogram| {
+            histogram.non_empty().map_or(String::new(), |f| format!(", {what} {:.2} ms", f.p50_ms))
+        };
+        let (skew, input) = (more("skew", &metrics.skew), more("input to picture", &metrics.input));
+        text += &format!(
+            "\x1b[Kframe {frame}, t = {time_s:.2} s, {:.1} frames/s, simulated in {:.2} ms{skew}{input}\n",
+            per_s(frame, self.frame),
+            1e3 * metrics.step.quantile(0.5)
+        );
+        self.shown.resize(slots.len(), 0);
+        for (k, slot) in slots.iter().enumerate() {
+            let (counts, _, _) = server.counts(k as FacetNumber);
+            let membership = match server.membership(k as FacetNumber) {
+                Membership::Absent => "absent",
+                Membership::Following => "behind",
+                Membership::InStep => "in step",
+            };
+            let (last, took_ms) = metrics.last[k];
+            text += &format!(
+                "\x1b[K  {:<12} {membership:<8} frame {last}, {:.1} frames/s, {} late, dropped {} times, drawn in {took_ms:.2} ms\n",
+                slot.name,
+                per_s(counts.presented, self.shown[k]),
+                counts.late + counts.missing,
+                counts.dropped
+            );
+            self.shown[k] = counts.presented;
+        }
+        eprint!("{}", if self.terminal { text } else { text.replace("\x1b[K", "") });
+        (self.lines, self.since, self.frame) = (slots.len() + 1, Instant::now(), frame);
+    }
+}

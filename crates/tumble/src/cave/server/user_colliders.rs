@@ -1,0 +1,149 @@
+//! What of a user pushes things (`--user-colliders`): an upright capsule from the floor to the head, and two hands. They yield to nothing.
+//!
+//! ```text
+//! a step moves a body by at most  v_max · scale · dt  towards where it is wanted
+//! ```
+//!
+//! so that a tracker that jumps strikes nothing at a kilometre a second.
+
+use crate::failure::Failure;
+use tumble::collide::{Pose, Shape, Vec3};
+use tumble::dynamics::{Mode, ObjectId, RigidBody, World, WorldError};
+use tumble::net::sync::{User, Viewer};
+
+/// Of a user's body, m.
+const RADIUS_M: f64 = 0.25;
+/// Of a hand, m.
+const HAND_RADIUS_M: f64 = 0.06;
+/// Fastest that a tracked body moves, and a hand that keys move, metres of the cave per second; walking is among the latter's.
+const MAX_SPEED_M_PER_S: f64 = 10.0;
+const KEY_HAND_SPEED_M_PER_S: f64 = 3.0;
+/// Beside, ahead of and below the head: a hand that hangs (within the capsule), and one that is stretched out.
+const AT_REST_M: [f64; 3] = [0.15, 0.0, -0.7];
+const EXTENDED_M: [f64; 3] = [0.15, 0.7, -0.25];
+/// Left and right.
+const SIDES: [(&str, f64); 2] = [("left", -1.0), ("right", 1.0)];
+
+/// Where a hand is wanted.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Hand {
+    #[default]
+    AtRest,
+    /// Held out, by a key.
+    Extended,
+    /// In the cave's frame.
+    Tracked(Pose),
+}
+
+/// One user's.
+struct Colliders {
+    capsule: ObjectId,
+    hands: [ObjectId; 2],
+}
+
+/// All users' bodies; none where nobody pushes.
+#[derive(Default)]
+pub struct UserColliders(Vec<Colliders>);
+
+impl UserColliders {
+    /// One set for each user.
+    pub fn add(viewer: &Viewer, world: &mut World) -> Result<UserColliders, Failure> {
+        let failed = |e: &dyn std::fmt::Display| Failure::run("a user's body", e);
+        let mut all = UserColliders::default();
+        for (k, user) in viewer.users.iter().enumerate() {
+            let mut add = |name: String, shape: Shape, pose: Pose, drawn: bool| {
+                let body = RigidBody::fixed(name, shape).at(pose);
+                // the capsule is not drawn: the user stands in it
+                let body = if drawn { body } else { body.drawn_as(Vec::new()) };
+                world.add_boxed(Box::new(body), Mode::Kinematic).map_err(|e| failed(&e))
+            };
+            let capsule =
+                Shape::capsule(RADIUS_M * viewer.scale, half_length(user) * viewer.scale).map_err(|e| failed(&e))?;
+            let capsule = add(format!("user {k}"), capsule, upright(viewer, user), false)?;
+            let mut hand = |side: usize| {
+                let ball = Shape::sphere(HAND_RADIUS_M * viewer.scale).map_err(|e| failed(&e))?;
+                add(
+                    format!("user {k} {} hand", SIDES[side].0),
+                    ball,
+                    in_scene(viewer, &target_pose(user, side, Hand::AtRest)),
+                    true,
+                )
+            };
+            all.0.push(Colliders { capsule, hands: [hand(0)?, hand(1)?] });
+        }
+        Ok(all)
+    }
+
+    /// Whether an object is one of them.
+    pub fn contains(&self, id: ObjectId) -> bool {
+        self.0.iter().any(|colliders| colliders.capsule == id || colliders.hands.contains(&id))
+    }
+
+    /// Takes them along for the next step of `dt` seconds; `hands` by user.
+    pub fn follow_users(
+        &self,
+        viewer: &Viewer,
+        hands: impl Fn(usize) -> [Hand; 2],
+        world: &mut World,
+        dt: f64,
+    ) -> Result<(), WorldError> {
+        for (k, (colliders, user)) in self.0.iter().zip(&viewer.users).enumerate() {
+            advance(world, colliders.capsule, upright(viewer, user), MAX_SPEED_M_PER_S * viewer.scale * dt)?;
+            for (side, hand) in hands(k).into_iter().enumerate() {
+                let max = if matches!(hand, Hand::Tracked(_)) { MAX_SPEED_M_PER_S } else { KEY_HAND_SPEED_M_PER_S };
+                advance(
+                    world,
+                    colliders.hands[side],
+                    in_scene(viewer, &target_pose(user, side, hand)),
+                    max * viewer.scale * dt,
+                )?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn advance(world: &mut World, id: ObjectId, target_pose: Pose, max: f64) -> Result<(), WorldError> {
+    let at = world.pose(id, 0).ok_or(WorldError::Stale)?.translation.vector;
+    let by = target_pose.translation.vector - at;
+    let to = at + by * (max / by.norm().max(max));
+    world.move_to(id, Pose::from_parts(to.into(), target_pose.rotation))
+}
+
+fn in_scene(viewer: &Viewer, pose: &Pose) -> Pose {
+    let at = viewer.cave * nalgebra::Point3::from(pose.translation.vector * viewer.scale);
+    Pose::from_parts(at.coords.into(), viewer.cave.rotation * pose.rotation)
+}
+
+/// Of a hand, in the cave's frame.
+fn target_pose(user: &User, side: usize, hand: Hand) -> Pose {
+    let [aside, ahead, above] = match hand {
+        Hand::Tracked(pose) => return pose,
+        Hand::AtRest => AT_REST_M,
+        Hand::Extended => EXTENDED_M,
+    };
+    let head = &user.head;
+    // a stretched hand goes where one looks; one that hangs does so whatever the head does
+    let offset = match hand {
+        Hand::Extended => head.rotation * Vec3::new(SIDES[side].1 * aside, ahead, above),
+        _ => {
+            let right = head.rotation * Vec3::x();
+            let level = Vec3::new(right.x, right.y, 0.0);
+            level * (SIDES[side].1 * aside / level.norm().max(1e-3))
+                + Vec3::new(0.0, 0.0, above.max(0.1 - head.translation.z))
+        }
+    };
+    Pose::from_parts((head.translation.vector + offset).into(), head.rotation)
+}
+
+/// Half the straight part of a user's capsule, from the floor to the head where that is high enough, m of the cave.
+fn half_length(user: &User) -> f64 {
+    (0.5 * user.head.translation.z - RADIUS_M).max(0.01)
+}
+
+/// Where a user's capsule is wanted.
+fn upright(viewer: &Viewer, user: &User) -> Pose {
+    let mut at = user.head.translation.vector;
+    at.z = half_length(user) + RADIUS_M;
+    in_scene(viewer, &Pose::from_parts(at.into(), nalgebra::UnitQuaternion::identity()))
+}

@@ -1,0 +1,191 @@
+//! The users in the world: where they look from, how keys and trackers move them, what their wands pull and their bodies push.
+//!
+//! Each user has at most one wand per device that sends its input. While its first button is held, what the wand's ray meets first is pulled by a spring.
+//! What pushes is in [`user_colliders`](super::user_colliders).
+
+use super::user_colliders::{Hand, UserColliders};
+use crate::failure::Failure;
+use std::collections::BTreeMap;
+use tumble::collide::{Pose, Vec3};
+use tumble::dynamics::{ObjectId, PickForce, World, WorldError};
+use tumble::net::sync::transport::FacetNumber;
+use tumble::net::sync::{Input, Viewer};
+use tumble::scene::cave::{Cave, Screen};
+
+/// Walking, metres of the cave per second, and turning, rad/s, while a key is held.
+const WALK_M_PER_S: f64 = 1.5;
+const TURN_RAD_PER_S: f64 = 1.0;
+/// Of the spring by which the wand pulls, rad/s.
+const PULL_RAD_PER_S: f64 = 10.0;
+/// Input that was not renewed for so long counts no more, simulated s: who left lets go.
+const INPUT_TIMEOUT_S: f64 = 1.0;
+/// An eye comes no nearer to the plane of a screen that is drawn for it, m.
+const MIN_EYE_DISTANCE_M: f64 = 0.02;
+
+/// Keys by their USB HID usage.
+mod key {
+    pub const A: u16 = 0x04;
+    pub const D: u16 = 0x07;
+    pub const E: u16 = 0x08;
+    pub const F: u16 = 0x09;
+    pub const Q: u16 = 0x14;
+    pub const R: u16 = 0x15;
+    pub const S: u16 = 0x16;
+    pub const W: u16 = 0x1A;
+    pub const RIGHT: u16 = 0x4F;
+    pub const LEFT: u16 = 0x50;
+    pub const DOWN: u16 = 0x51;
+    pub const UP: u16 = 0x52;
+}
+
+/// The keys that stretch out the left and the right hand.
+const HAND_KEYS: [u16; 2] = [key::R, key::F];
+
+/// Who sent an input, and for which user.
+type Device = (FacetNumber, u16);
+
+/// All users.
+pub struct Users {
+    /// As it is published.
+    pub viewer: Viewer,
+    /// Heads that were not followed, because an eye would be behind a screen or in it.
+    pub heads_rejected: u64,
+    /// By user, the screens that are drawn for it.
+    screens: Vec<Vec<Screen>>,
+    /// The newest input of each device, and when it came.
+    inputs: BTreeMap<Device, (Input, f64)>,
+    held: BTreeMap<Device, Grabbed>,
+    colliders: UserColliders,
+}
+
+/// What a wand holds.
+struct Grabbed {
+    pull: PickForce,
+    /// From the wand's origin, along its ray, m.
+    distance: f64,
+}
+
+impl Users {
+    /// As the files place them; with bodies, if they are to push.
+    pub fn new(viewer: Viewer, cave: &Cave, world: &mut World, user_colliders: bool) -> Result<Users, Failure> {
+        let drawn = |user: usize| {
+            cave.facets.iter().filter(|f| f.user == user).map(|f| cave.screens[f.screen].clone()).collect()
+        };
+        let screens = (0..viewer.users.len()).map(drawn).collect();
+        let colliders = if user_colliders { UserColliders::add(&viewer, world)? } else { UserColliders::default() };
+        Ok(Users { viewer, heads_rejected: 0, screens, inputs: BTreeMap::new(), held: BTreeMap::new(), colliders })
+    }
+
+    /// What a user did, by a facet's window or another device.
+    pub fn take(&mut self, from: FacetNumber, input: Input, time_s: f64) {
+        let Some(user) = self.viewer.users.get_mut(input.user as usize) else { return };
+        if let Some(head) = input.head {
+            let aside = 0.5 * user.interpupillary_m;
+            let eyes = [-aside, 0.0, aside].map(|x| head * nalgebra::Point3::new(x, 0.0, 0.0));
+            let screens = &self.screens[input.user as usize];
+            let seen = screens.iter().all(|screen| eyes.iter().all(|eye| screen.distance_m(eye) >= MIN_EYE_DISTANCE_M));
+            if seen { user.head = head } else { self.heads_rejected += 1 }
+        }
+        user.input = input.sequence;
+        self.inputs.insert((from, input.user), (input, time_s));
+    }
+
+    /// What users do to the world during the next step of `dt` seconds.
+    pub fn act(&mut self, world: &mut World, dt: f64) -> Result<(), Failure> {
+        let failed = |e: WorldError| Failure::run("what a user does", e);
+        self.inputs.retain(|_, (_, since)| world.time() - *since < INPUT_TIMEOUT_S);
+        let keys: Vec<u16> = self.inputs.values().flat_map(|(input, _)| input.keys.iter().copied()).collect();
+        self.walk(&keys, dt);
+        self.held.retain(|device, _| self.inputs.get(device).is_some_and(|(input, _)| input.buttons & 1 == 1));
+        for (&device, (input, _)) in &self.inputs {
+            let Some(wand) = input.wand.filter(|_| input.buttons & 1 == 1) else { continue };
+            let (origin, direction) =
+                (self.to_scene(&wand.translation.vector), self.viewer.cave.rotation * (wand.rotation * Vec3::y()));
+            if !self.held.contains_key(&device)
+                && let Some(held) = grab(world, &self.colliders, &origin, &direction)
+            {
+                self.held.insert(device, held);
+            }
+            if let Some(held) = self.held.get_mut(&device) {
+                held.pull.target = origin + direction * held.distance;
+                world.pick(&held.pull).map_err(failed)?;
+            }
+        }
+        self.colliders.follow_users(&self.viewer, |user| self.hands(user), world, dt).map_err(failed)
+    }
+
+    /// Where a user's hands are wanted: as they are tracked, else as keys say.
+    fn hands(&self, user: usize) -> [Hand; 2] {
+        let mut hands = [Hand::AtRest; 2];
+        for (input, _) in self.inputs.values().filter(|(input, _)| input.user as usize == user) {
+            for (side, hand) in hands.iter_mut().enumerate() {
+                match input.hands[side] {
+                    Some(pose) => *hand = Hand::Tracked(pose),
+                    None if input.keys.contains(&HAND_KEYS[side]) && *hand == Hand::AtRest => *hand = Hand::Extended,
+                    None => {}
+                }
+            }
+        }
+        hands
+    }
+
+    /// Keys move the whole cave: the users stay where they stand in it.
+    fn walk(&mut self, held: &[u16], dt: f64) {
+        let is = |keys: &[u16]| f64::from(u8::from(keys.iter().any(|k| held.contains(k))));
+        let ahead = is(&[key::W, key::UP]) - is(&[key::S, key::DOWN]);
+        let by = Vec3::new(is(&[key::D]) - is(&[key::A]), ahead, is(&[key::E]) - is(&[key::Q]));
+        let turn = (is(&[key::LEFT]) - is(&[key::RIGHT])) * TURN_RAD_PER_S * dt;
+        let cave = &mut self.viewer.cave;
+        cave.translation.vector += cave.rotation * by * (WALK_M_PER_S * self.viewer.scale * dt);
+        if turn != 0.0
+            && let Some(user) = self.viewer.users.first()
+        {
+            // about the first user
+            let eye = user.head.translation.vector * self.viewer.scale;
+            let pivot = *cave * nalgebra::Point3::from(eye);
+            cave.rotation = nalgebra::UnitQuaternion::from_axis_angle(&Vec3::z_axis(), turn) * cave.rotation;
+            cave.renormalize();
+            cave.translation.vector = pivot.coords - cave.rotation * eye;
+        }
+    }
+
+    fn to_scene(&self, point: &Vec3) -> Vec3 {
+        (self.viewer.cave * nalgebra::Point3::from(point * self.viewer.scale)).coords
+    }
+}
+
+trait Renormalize {
+    fn renormalize(&mut self);
+}
+
+impl Renormalize for Pose {
+    /// Turns add up over days; the rotation stays one.
+    fn renormalize(&mut self) {
+        self.rotation.renormalize();
+    }
+}
+
+/// Takes hold of the first thing on a ray, if it moves. The users' own hands are not in the way.
+fn grab(world: &World, colliders: &UserColliders, origin: &Vec3, direction: &Vec3) -> Option<Grabbed> {
+    let mut first: Option<(ObjectId, usize, f64)> = None;
+    for &id in world.ids().iter().filter(|id| !colliders.contains(**id)) {
+        let Some(renderable) =
+            world.object(id).and_then(|o| o.renderable()).filter(|_| world.status(id).is_some_and(|s| s.enabled))
+        else {
+            continue;
+        };
+        for visual in renderable.visuals() {
+            let Some(part_state) = world.part_state(id, visual.part) else { continue };
+            let Some(distance) = visual.ray(&part_state.pose, origin, direction) else { continue };
+            if first.is_none_or(|(_, _, nearest)| distance < nearest) {
+                first = Some((id, visual.part, distance));
+            }
+        }
+    }
+    let (id, part, distance) = first?;
+    let moves = world.status(id)?.moves() && world.object(id)?.collidable().is_some_and(|c| c.part_moves(part));
+    let part_state = world.part_state(id, part).filter(|_| moves)?;
+    let target = origin + direction * distance;
+    let point = part_state.pose.rotation.inverse() * (target - part_state.position());
+    Some(Grabbed { pull: PickForce { id, part, point, target, frequency: PULL_RAD_PER_S }, distance })
+}

@@ -1,0 +1,4 @@
+//! Input of a tracker: OSC messages over UDP.
+
+pub mod osc;
+pub mod socket;
