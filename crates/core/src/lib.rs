@@ -21,29 +21,16 @@
 pub mod archive;
 pub mod articulated;
 mod clone_by_field;
-mod collidable;
-mod detect;
+mod constraint;
+mod contact;
 mod integrators;
-mod loop_joint;
-mod motion;
-mod mounts;
-mod obb_separation;
 mod object;
-mod pair;
-mod pair_material;
-mod part_state;
+mod report;
 mod rigid;
-mod rotation;
-mod row_builder;
-pub mod rows;
 mod settings;
-mod sleep;
 pub mod solver;
 pub mod spatial;
 mod step;
-mod sync;
-mod view;
-mod visual;
 mod world;
 
 pub use archive::ArchiveError;
@@ -51,23 +38,25 @@ pub use articulated::{
     ArticulatedBody, ArticulatedError, Collider, Coupling, DofSettings, Drive, Joint, LinkMass, Model, ModelBuilder,
     ModelError, Playback, Spring,
 };
-pub use collidable::{Collidable, CollisionGroup, Combine, ContactFrame, Material, rigid_test_impulse};
-pub use loop_joint::{Anchor, LoopJoint, LoopJointError, LoopJointKind, PositionError};
-pub use mounts::{CameraCarrier, CameraMount, Detail, LightCarrier, LightMount, Spread};
+pub use constraint::builder::RowBuilder;
+pub use constraint::loop_joint::{Anchor, LoopJoint, LoopJointError, LoopJointKind, PositionError};
+pub use constraint::rows;
+pub use contact::pair_material::{PairMaterial, PairSide};
+pub use object::collidable::{Collidable, CollisionGroup, Combine, ContactFrame, Material, rigid_test_impulse};
+pub use object::mounts::{CameraCarrier, CameraMount, Detail, LightCarrier, LightMount, Spread};
+pub use object::part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes, Wrench};
+pub use object::visual::{Drawn, Visual, VisualGeometry, VisualMesh};
 pub use object::{
     Appearance, Constraint, Energy, ForceGenerator, Integratable, Level, Momentum, NetSync, Object, Renderable,
     RowTarget, SyncError,
 };
-pub use pair_material::{PairMaterial, PairSide};
-pub use part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes, Wrench};
+pub use report::{StepReport, UnreachableJoint};
 pub use rigid::{BodyError, RigidBody};
-pub use row_builder::RowBuilder;
-pub use settings::{Integrator, Settings, SettingsError, StepReport, UnreachableJoint};
-pub use sleep::Sleep;
+pub use settings::{Integrator, Settings, SettingsError};
 pub use step::{Backtracking, STEPPERS, StepContext, Stepper, TimeStepping, stepper_by_name};
 pub use tumble_collide as collide;
-pub use view::{Mode, ObjectId, Status, WorldView};
-pub use visual::{Drawn, Visual, VisualGeometry, VisualMesh};
+pub use world::sleep::Sleep;
+pub use world::view::{Mode, ObjectId, Status, WorldView};
 pub use world::{
     ContactPoint, MirrorError, Overlap, PickForce, SnapshotError, StateMemoryHold, StepError, World, WorldError,
     WorldState,

@@ -3,8 +3,8 @@
 use super::records::{LoadedTables, Tables, VisualRecord, shape};
 use super::{ArchiveError, damaged};
 use crate::articulated::{ArticulatedParts, Collider};
-use crate::collidable::{CollisionGroup, Material};
-use crate::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
+use crate::object::collidable::{CollisionGroup, Material};
+use crate::object::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
 use crate::object::{Object, Renderable};
 use crate::{ArticulatedBody, Coupling, DofSettings, Model, RigidBody};
 use serde::{Deserialize, Serialize};

@@ -12,10 +12,11 @@
 mod bodies;
 mod records;
 
-use crate::settings::{Settings, StepReport};
+use crate::report::StepReport;
+use crate::settings::Settings;
 use crate::solver::{self, RowSolver};
 use crate::step::{Stepper, stepper_by_name};
-use crate::view::{Mode, ObjectId};
+use crate::world::view::{Mode, ObjectId};
 use crate::world::{ContactPoint, World, WorldState};
 use crate::{ArticulatedBody, LoopJoint, Object, RigidBody, UnreachableJoint};
 use bodies::{ArticulatedRecord, RigidRecord};

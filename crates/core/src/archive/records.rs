@@ -1,11 +1,11 @@
 //! The parts of an archive that name objects by their place, and shapes by their place in a table.
 
 use super::{ArchiveError, ContactPoint, StepReport, UnreachableJoint, damaged};
-use crate::loop_joint::{Anchor, LoopJoint, LoopJointKind};
+use crate::constraint::loop_joint::{Anchor, LoopJoint, LoopJointKind};
+use crate::contact::pair_material::{PairMaterial, PairSide};
+use crate::object::visual::{Visual, VisualGeometry, VisualMesh};
 use crate::object::{Appearance, Object};
-use crate::pair_material::{PairMaterial, PairSide};
-use crate::view::ObjectId;
-use crate::visual::{Visual, VisualGeometry, VisualMesh};
+use crate::world::view::ObjectId;
 use crate::world::{World, WorldError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

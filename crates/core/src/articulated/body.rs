@@ -5,13 +5,13 @@
 //! per collider, with its own frame.
 //! Generalized velocity is `v`; the mass matrix is whitened by the articulated inertias, `M = LᵀL`.
 
-use super::dof::{Coupling, DofSettings};
-use super::dynamics::{Dynamics, Scratch};
-use super::kinematics::Kinematics;
-use super::model::Model;
-use crate::collidable::{CollisionGroup, Material};
-use crate::mounts::{CameraMount, LightMount};
-use crate::visual::Visual;
+use crate::articulated::algorithms::dynamics::{Dynamics, Scratch};
+use crate::articulated::algorithms::kinematics::Kinematics;
+use crate::articulated::model::Model;
+use crate::articulated::model::dof::{Coupling, DofSettings};
+use crate::object::collidable::{CollisionGroup, Material};
+use crate::object::mounts::{CameraMount, LightMount};
+use crate::object::visual::Visual;
 use nalgebra::{Quaternion, Translation3};
 use std::sync::{Mutex, MutexGuard};
 use tumble_collide::{ContactMode, Pose, Quat, Shape, Vec3};
@@ -151,7 +151,7 @@ pub(super) struct Working {
     pub kinematics: Kinematics,
     /// No joint forces, no accelerations.
     pub zeros: Vec<f64>,
-    pub wrenches: Vec<crate::part_state::Wrench>,
+    pub wrenches: Vec<crate::object::part_state::Wrench>,
     pub accelerations: Vec<(Vec3, Vec3)>,
 }
 

@@ -1,12 +1,12 @@
 //! The rows that joints make: limits, dry friction, drives, couplings (equations in `dof.rs`).
 
 use super::body::ArticulatedBody;
-use super::dof::{DofSettings, Drive};
+use crate::articulated::model::dof::{DofSettings, Drive};
+use crate::constraint::builder::RowBuilder;
+use crate::constraint::rows::RowSet;
+use crate::object::part_state::StateRange;
 use crate::object::{Constraint, Level, RowTarget};
-use crate::part_state::StateRange;
-use crate::row_builder::RowBuilder;
-use crate::rows::RowSet;
-use crate::view::WorldView;
+use crate::world::view::WorldView;
 
 /// Where rows are at the acceleration level a drive ends so far before a limit, radians or metres: further than the stepper finds it in time.
 const LIMIT_MARGIN: f64 = 1e-6;

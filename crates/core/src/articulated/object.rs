@@ -1,19 +1,19 @@
 //! The articulated body behind the interfaces of the thesis: it integrates, collides, is drawn and kept in step like any other object.
 
 use super::body::{ArticulatedBody, LinkCollider};
-use super::coordinates::integrate;
-use super::energy::{energy, momentum};
-use super::free_motion;
-use super::joint::Joint;
-use crate::collidable::{Collidable, CollisionGroup, Material};
-use crate::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
+use crate::articulated::algorithms::energy::{energy, momentum};
+use crate::articulated::algorithms::free_motion;
+use crate::articulated::model::coordinates::integrate;
+use crate::articulated::model::joint::Joint;
+use crate::object::collidable::{Collidable, CollisionGroup, Material};
+use crate::object::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
+use crate::object::part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes, Wrench};
+use crate::object::sync;
+use crate::object::visual::Visual;
 use crate::object::{Constraint, Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError};
-use crate::part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes, Wrench};
+use crate::rigid::rotation;
 use crate::rigid::vec3;
-use crate::rotation;
-use crate::sync;
-use crate::view::WorldView;
-use crate::visual::Visual;
+use crate::world::view::WorldView;
 use tumble_collide::{ContactMode, Pose, Shape, Vec3};
 
 impl Object for ArticulatedBody {

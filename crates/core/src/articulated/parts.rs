@@ -1,9 +1,9 @@
 //! What of an articulated body is neither its model nor its freedoms, for archives.
 
 use super::body::{ArticulatedBody, ArticulatedError, Collider, LinkCollider};
-use super::dof::Coupling;
-use crate::mounts::{CameraMount, LightMount};
-use crate::visual::Visual;
+use crate::articulated::model::dof::Coupling;
+use crate::object::mounts::{CameraMount, LightMount};
+use crate::object::visual::Visual;
 use tumble_collide::Pose;
 
 /// Everything that is fixed to the links, and the state at time 0.

@@ -25,15 +25,13 @@
 //!
 //! What is led keeps the velocity that it has at the start of the whole call: `Θ = t·v`, without error.
 
-use super::trajectory::{InnerStep, Trajectory};
-use crate::motion::IntegrationContext;
+use super::trajectory::{InnerStep, STAGES, Trajectory};
+use crate::integrators::context::IntegrationContext;
 use crate::settings::Settings;
-use crate::view::{Entry, Mode};
 use crate::world::StepError;
+use crate::world::view::{Entry, Mode};
 use nalgebra::ComplexField;
 
-/// Stages; the last is the first of the next step.
-pub(super) const STAGES: usize = 7;
 const C: [f64; STAGES] = [0.0, 1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0];
 const A: [[f64; STAGES - 1]; STAGES] = [
     [0.0; 6],

@@ -1,5 +1,6 @@
 //! Integrators that choose their own steps.
 
+pub(crate) mod context;
 mod dormand_prince;
 mod trajectory;
 

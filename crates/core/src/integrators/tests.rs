@@ -1,14 +1,14 @@
 //! The record of a call against integrations that end where it is read; the exponential map's differential against differences.
 
 use super::Adaptive;
-use crate::motion::IntegrationContext;
+use crate::integrators::context::IntegrationContext;
+use crate::object::part_state::{Forces, PartState, StateRange, Wrench};
 use crate::object::{ForceGenerator, Object};
-use crate::part_state::{Forces, PartState, StateRange, Wrench};
 use crate::rigid::RigidBody;
-use crate::rotation;
+use crate::rigid::rotation;
 use crate::settings::Settings;
-use crate::view::{Table, WorldView};
 use crate::world::ObjectState;
+use crate::world::view::{Table, WorldView};
 use tumble_collide::{Mat3, Quat, Shape, Vec3};
 
 /// A spring that pulls part 0 of the first object to the origin and twists it.

@@ -9,9 +9,10 @@
 //!
 //! It meets the step's ends with the right slopes, so the whole is once continuously differentiable.
 
-use super::dormand_prince::STAGES;
-use crate::motion::IntegrationContext;
+use crate::integrators::context::IntegrationContext;
 
+/// Stages of an inner step; the last is the first of the next inner step.
+pub(super) const STAGES: usize = 7;
 const D: [f64; STAGES] = [
     -12715105075.0 / 11282082432.0,
     0.0,

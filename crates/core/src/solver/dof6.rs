@@ -1,7 +1,7 @@
 //! The arithmetic of blocks whose sides have six freedoms each, as rigid bodies have: the same sums as for any other side, laid out for
 //! registers that hold two numbers.
 
-use crate::rows::{Block, Rows, dot6};
+use crate::constraint::rows::{Block, Rows, dot6};
 
 /// Where a block of one or two sides of six freedoms finds its numbers.
 #[derive(Clone, Copy)]

@@ -1,6 +1,6 @@
 //! Islands: sets of blocks that share no moving object, found by union-find. Statics do not merge.
 
-use crate::rows::Rows;
+use crate::constraint::rows::Rows;
 use tumble_collide::UnionFind;
 
 /// The blocks of a solve, grouped. Islands are ordered by their first block, blocks within one as they were added.

@@ -29,7 +29,7 @@
 use super::equality::{Equalities, RANK};
 use super::lemke::{LcpResult, lemke};
 use super::{GaussSeidel, RowSolver, SolveReport, SolverSettings};
-use crate::rows::{Block, RowSet, Rows};
+use crate::constraint::rows::{Block, RowSet, Rows};
 
 /// Most unknowns that are pivoted.
 pub const MAX_UNKNOWNS: usize = 3000;

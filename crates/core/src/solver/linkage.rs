@@ -28,7 +28,7 @@
 
 use super::equality::{Equalities, VANISHED};
 use super::one_contact::Symmetric3;
-use crate::rows::{Block, RowSet, Rows, Side, dot};
+use crate::constraint::rows::{Block, RowSet, Rows, Side, dot};
 
 /// Most equality rows of a linkage that are solved at once.
 pub const MAX_DIRECT_ROWS: usize = 200;

@@ -1,14 +1,16 @@
 //! Solvers of the one contact problem, each behind [`RowSolver`].
 //!
-//! Find `λ` in the rows' sets so that `w = c + (K + R)·λ` (`R`: compliance of soft rows) answers each set as [`RowSet`](crate::rows::RowSet) says.
+//! Find `λ` in the rows' sets so that `w = c + (K + R)·λ` (`R`: compliance of soft rows) answers each set as [`RowSet`](crate::constraint::rows::RowSet) says.
 
 mod dof6;
 mod equality;
+mod extrapolation;
 mod gauss_seidel;
 mod island;
 mod lcp;
 mod lemke;
 mod linkage;
+mod local;
 mod newton;
 mod one_contact;
 mod relaxation;
@@ -24,7 +26,7 @@ pub use lemke::{LcpResult, lemke};
 pub use linkage::MAX_DIRECT_ROWS;
 pub use residual::residual;
 
-use crate::rows::Rows;
+use crate::constraint::rows::Rows;
 
 /// How far an iterative solver goes. Pivoting solvers are exact and take no notice.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -27,9 +27,10 @@
 //! So after one that was none a *cut* jump follows: as far as the first multiplier comes to its bound, `λ + α δλ` with the greatest `α ≤ 1` for which no
 //! normal changes sign and none that sticks leaves its cone. With that one at its bound the next jump has other conditions.
 
-use super::gauss_seidel::{BlockSolver, Extrapolation, Local};
+use super::extrapolation::Extrapolation;
+use super::local::{BlockSolver, Local};
 use super::one_contact::ContactBlock;
-use crate::rows::Rows;
+use crate::constraint::rows::Rows;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
@@ -172,7 +173,7 @@ fn multiplier_change(
     let mut velocity = [0.0; 3];
     for side in local.block.sides() {
         let change = &du[extrapolation.place(side.u)..][..side.dof as usize];
-        (0..n).for_each(|k| velocity[k] += crate::rows::dot(rows.response(side, k), change));
+        (0..n).for_each(|k| velocity[k] += crate::constraint::rows::dot(rows.response(side, k), change));
     }
     let mut change = [0.0; 3];
     for k in 0..n {

@@ -11,7 +11,7 @@
 //! ground) that step diverges, and sliding is solved exactly: the direction is the root of `g(φ) = d × w_t` with `d·w_t > 0`, found by
 //! Newton's method on the angle `φ` of `d`. Both have the Coulomb solutions as their fixed points.
 
-use crate::rows::{Block, Rows, dot, dot6};
+use crate::constraint::rows::{Block, Rows, dot, dot6};
 
 /// Share of `k_nn` from which `μ·|k_nt|` makes the plain step too bold.
 const COUPLED: f64 = 0.5;

@@ -5,7 +5,7 @@
 //! The residual is `‖λ − Π(…)‖·d`, in m/s, with `d` the mean diagonal of the block of `K`; for the scalar sets the shift is
 //! absent and `Π` clamps; `w` of a soft row has its `R·λ`. Source: Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008, ch. 13.
 
-use crate::rows::{Block, RowSet, Rows, dot};
+use crate::constraint::rows::{Block, RowSet, Rows, dot};
 
 /// The largest residual of any block, m/s (m/s² where `c` holds accelerations). `du` must be `Y·λ` of all blocks.
 pub fn residual(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], du: &[f64]) -> f64 {

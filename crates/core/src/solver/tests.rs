@@ -12,7 +12,7 @@ mod soft;
 mod stubborn;
 
 use super::{RowSolver, SolveReport, SolverSettings};
-use crate::rows::{RowSet, Rows};
+use crate::constraint::rows::{RowSet, Rows};
 
 /// As far as rounding lets an iteration go.
 pub(super) const FAR: SolverSettings =

@@ -27,15 +27,15 @@ use super::event_location::{Bracket, LimitRole, Role, SLOW, Watch};
 use super::impact::{self, Candidate};
 use super::limit_correction::{self, ActiveLimit};
 use super::{StepContext, Stepper, TimeStepping, Workspace, joint_correction, projection, unreachable_joints};
-use crate::detect::ContactConstraint;
+use crate::constraint::rows::RowSet;
+use crate::contact::detect::ContactConstraint;
+use crate::contact::pair::PredictionMode;
 use crate::integrators::Adaptive;
+use crate::object::part_state::Wrench;
 use crate::object::{Level, RowTarget};
-use crate::pair::PredictionMode;
-use crate::part_state::Wrench;
-use crate::rows::RowSet;
 use crate::settings::Integrator;
 use crate::solver::SolverSettings;
-use crate::view::Entry;
+use crate::world::view::Entry;
 use crate::world::{Core, StepError};
 
 /// The stepper of the thesis, `backtracking`.

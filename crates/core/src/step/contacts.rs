@@ -2,15 +2,15 @@
 
 use super::joint_correction;
 use super::projection::Projection;
-use crate::detect::{ContactConstraint, Detector};
-use crate::motion::free_motion;
+use crate::constraint::builder::{RowBuilder, RowKind, constraints};
+use crate::constraint::rows::{RowSet, Rows};
+use crate::contact::detect::{ContactConstraint, Detector};
+use crate::contact::pair::PredictionMode;
+use crate::integrators::context::free_motion;
+use crate::object::part_state::PartState;
 use crate::object::{Integratable, Level, RowTarget};
-use crate::pair::PredictionMode;
-use crate::part_state::PartState;
-use crate::row_builder::{RowBuilder, RowKind, constraints};
-use crate::rows::{RowSet, Rows};
 use crate::solver::{Islands, SolverSettings, residual};
-use crate::view::{ObjectId, WorldView};
+use crate::world::view::{ObjectId, WorldView};
 use crate::world::{Core, StepError};
 use tumble_collide::Vec3;
 

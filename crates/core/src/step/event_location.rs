@@ -4,8 +4,8 @@
 //! margin is within the tolerance on either side has landed.
 
 use super::contacts::Limit;
-use crate::detect::ContactConstraint;
-use crate::part_state::PartState;
+use crate::contact::detect::ContactConstraint;
+use crate::object::part_state::PartState;
 use crate::settings::Settings;
 
 /// A margin of at least this is not measured, metres.

@@ -15,8 +15,8 @@
 //! part where its gap is within the contact tolerance, always with `e = 0`.
 
 use super::contacts::{Workspace, row_velocities, zero};
+use crate::constraint::rows::{Block, RowSet, Rows};
 use crate::object::RowTarget;
-use crate::rows::{Block, RowSet, Rows};
 use crate::solver::{RowSolver, SolverSettings, residual};
 use crate::world::Core;
 

@@ -19,10 +19,10 @@
 use super::Workspace;
 use super::contacts::{lay_rows, push, row_velocities, shift, unwhiten_onto, whiten, zero};
 use super::unreachable_joints;
+use crate::constraint::rows::{RowSet, Rows};
 use crate::object::{Integratable, Level, RowTarget};
-use crate::rows::{RowSet, Rows};
 use crate::solver::{GaussSeidel, MAX_DIRECT_ROWS, RowSolver, SolverSettings};
-use crate::view::Entry;
+use crate::world::view::Entry;
 use crate::world::{Core, StepError};
 use std::ops::Range;
 

@@ -16,8 +16,8 @@
 use super::Workspace;
 use super::contacts::{build_rows, limits, push, row_velocities, shift, whiten, zero};
 use super::joint_correction::is_joint;
+use crate::constraint::rows::RowSet;
 use crate::object::Level;
-use crate::rows::RowSet;
 use crate::solver::{GaussSeidel, RowSolver, SolverSettings};
 use crate::world::{Core, StepError};
 

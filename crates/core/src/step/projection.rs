@@ -11,8 +11,8 @@
 
 use super::contacts::{Workspace, displace, limits};
 use super::joint_correction::{self, refresh_at};
+use crate::constraint::rows::{RowSet, Rows};
 use crate::object::RowTarget;
-use crate::rows::{RowSet, Rows};
 use crate::solver::{GaussSeidel, RowSolver, SolverSettings};
 use crate::world::{Core, StepError};
 

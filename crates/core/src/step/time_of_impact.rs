@@ -10,10 +10,10 @@
 //! Between convex bodies the gap along the present normal closes no later than the bodies meet, so no step overshoots. A contact that never
 //! closes is dropped. One that does takes the normal and the lever arms of that moment, and the gap that free motion closes by then.
 
-use crate::collidable::{Collidable, ContactFrame};
-use crate::detect::ContactConstraint;
-use crate::part_state::PartState;
-use crate::rotation::turn;
+use crate::contact::detect::ContactConstraint;
+use crate::object::collidable::{Collidable, ContactFrame};
+use crate::object::part_state::PartState;
+use crate::rigid::rotation::turn;
 use crate::world::Core;
 use nalgebra::Translation3;
 use tumble_collide::{Contact, NormalFrom, Pose, Shape, Vec3};

@@ -28,12 +28,12 @@ use super::impact::{self, Candidate};
 use super::projection::{self, Displacement};
 use super::{StepContext, Stepper, Workspace, time_of_impact};
 use super::{joint_correction, limit_correction, unreachable_joints};
-use crate::detect::ContactConstraint;
-use crate::motion::free_motion;
+use crate::constraint::rows::RowSet;
+use crate::contact::detect::ContactConstraint;
+use crate::contact::pair::PredictionMode;
+use crate::integrators::context::free_motion;
 use crate::object::Level;
-use crate::pair::PredictionMode;
-use crate::rows::RowSet;
-use crate::view::Entry;
+use crate::world::view::Entry;
 use crate::world::{Core, StepError};
 
 /// The default stepper, `time_stepping`.

@@ -25,8 +25,8 @@
 
 use super::Workspace;
 use super::joint_correction::is_joint;
-use crate::row_builder::{RowKind, constraints};
-use crate::settings::UnreachableJoint;
+use crate::constraint::builder::{RowKind, constraints};
+use crate::report::UnreachableJoint;
 use crate::solver::smallest_pivot;
 use crate::world::Core;
 use std::ops::Range;

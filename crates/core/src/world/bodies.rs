@@ -1,10 +1,10 @@
 //! What a user does to the objects of a world between steps.
 
 use super::{World, WorldError};
+use crate::object::part_state::PartState;
 use crate::object::{Integratable, Object};
-use crate::part_state::PartState;
 use crate::rigid::{RigidBody, orientation, vec3};
-use crate::view::{Mode, ObjectId, Status};
+use crate::world::view::{Mode, ObjectId, Status};
 use tumble_collide::{Pose, Vec3};
 
 impl World {

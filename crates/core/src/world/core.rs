@@ -1,13 +1,14 @@
 //! The inside of a world: what the steppers work on.
 
 use super::state::WorldState;
-use crate::detect::{ContactConstraint, DetectorBuffers, Owner};
-use crate::motion::IntegrationContext;
-use crate::pair_material::PairMaterials;
-use crate::part_state::{Forces, PartState, Wrench};
-use crate::settings::{Settings, StepReport};
+use crate::contact::detect::{ContactConstraint, DetectorBuffers, Owner};
+use crate::contact::pair_material::PairMaterials;
+use crate::integrators::context::IntegrationContext;
+use crate::object::part_state::{Forces, PartState, Wrench};
+use crate::report::StepReport;
+use crate::settings::Settings;
 use crate::solver::RowSolver;
-use crate::view::{Entry, ObjectId, Objects, Table};
+use crate::world::view::{Entry, ObjectId, Objects, Table};
 use tumble_collide::{BroadPhase, SweepAndPrune, Vec3};
 
 /// Why a step stopped. [`World::step`](crate::World::step) puts state and time back to where they were before the frame.

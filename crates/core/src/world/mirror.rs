@@ -2,8 +2,8 @@
 
 use super::{World, WorldError};
 use crate::object::SyncError;
-use crate::part_state::PartState;
-use crate::view::ObjectId;
+use crate::object::part_state::PartState;
+use crate::world::view::ObjectId;
 use tumble_collide::Pose;
 
 /// Why an object did not take what came for it. The world is unchanged.

@@ -6,9 +6,11 @@ mod mirror;
 mod overlaps;
 mod pair_materials;
 mod pick;
+pub(crate) mod sleep;
 mod snapshot;
 mod state;
 mod state_memory;
+pub(crate) mod view;
 
 pub use self::core::{ContactPoint, Core, StepError};
 pub use mirror::MirrorError;
@@ -19,15 +21,16 @@ pub(crate) use state::ObjectState;
 pub use state::WorldState;
 pub use state_memory::StateMemoryHold;
 
-use crate::detect::Owner;
+use crate::contact::detect::Owner;
+use crate::object::part_state::{PartState, StateRange, StateSizes};
+use crate::object::visual::Visual;
 use crate::object::{Energy, Momentum, Object};
-use crate::part_state::{PartState, StateRange, StateSizes};
+use crate::report::StepReport;
 use crate::rigid::{BodyError, RigidBody};
-use crate::settings::{Settings, SettingsError, StepReport};
+use crate::settings::{Settings, SettingsError};
 use crate::solver::{GaussSeidel, RowSolver};
 use crate::step::{StepContext, Stepper, TimeStepping};
-use crate::view::{Mode, ObjectId, Placed, Status, Table, WorldView};
-use crate::visual::Visual;
+use crate::world::view::{Mode, ObjectId, Placed, Status, Table, WorldView};
 use std::collections::BTreeMap;
 
 /// Why an object was not added or found.

@@ -1,8 +1,8 @@
 //! Which objects reach into each other as the world stands.
 
-use crate::detect::may_collide;
-use crate::view::{Entry, Mode, ObjectId};
+use crate::contact::detect::may_collide;
 use crate::world::World;
+use crate::world::view::{Entry, Mode, ObjectId};
 use std::collections::BTreeMap;
 use tumble_collide::{Aabb, BroadPhase, Contact, Pose, Shape, SweepAndPrune, contacts_in_mode};
 

@@ -1,9 +1,9 @@
 //! Surface constants of chosen pairs.
 
 use super::{World, WorldError};
-use crate::collidable::Material;
-use crate::pair_material::{PairMaterial, PairSide, Surface};
-use crate::view::ObjectId;
+use crate::contact::pair_material::{PairMaterial, PairSide, Surface};
+use crate::object::collidable::Material;
+use crate::world::view::ObjectId;
 
 impl World {
     /// Gives the contacts of two sides restitution and friction of their own, from the next step on: two objects, two parts `(id, part)`, or two

@@ -21,9 +21,9 @@
 //! implicit steps is stable for any ω h. Under gravity g a body comes to rest g/ω² below the hand.
 
 use super::{World, WorldError};
-use crate::collidable::Collidable;
-use crate::part_state::{PartState, Wrench};
-use crate::view::ObjectId;
+use crate::object::collidable::Collidable;
+use crate::object::part_state::{PartState, Wrench};
+use crate::world::view::ObjectId;
 use nalgebra::Matrix3;
 use tumble_collide::Vec3;
 

@@ -85,7 +85,7 @@ impl World {
     }
 
     fn labels(&self) -> Vec<Label> {
-        let label = |e: crate::view::Entry| Label {
+        let label = |e: crate::world::view::Entry| Label {
             name: e.object.name().to_string(),
             sizes: [e.state_range.x.len() as u32, e.state_range.v.len() as u32, e.state_range.parts.len() as u32],
         };
@@ -109,7 +109,7 @@ impl World {
         if state.sizes() != self.core.state.sizes() {
             return format("its tables have the wrong lengths");
         }
-        let accepts = |e: crate::view::Entry| {
+        let accepts = |e: crate::world::view::Entry| {
             e.object.integratable().is_none_or(|body| body.accepts(&state.x[e.state_range.x.clone()]))
         };
         if !(state.is_finite() && self.core.objects().iter().all(accepts)) {

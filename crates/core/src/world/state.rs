@@ -2,10 +2,10 @@
 
 use super::state_memory::StateVector;
 use crate::clone_by_field::clone_by_field;
-use crate::detect::WarmStarts;
-use crate::part_state::{PartState, StateRange, Wrench};
-use crate::sleep::{RestTimer, SleepGroup};
-use crate::view::Status;
+use crate::contact::detect::WarmStarts;
+use crate::object::part_state::{PartState, StateRange, Wrench};
+use crate::world::sleep::{RestTimer, SleepGroup};
+use crate::world::view::Status;
 use serde::{Deserialize, Serialize};
 use tumble_collide::Vec3;
 

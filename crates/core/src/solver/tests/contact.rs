@@ -1,7 +1,7 @@
 //! Many contacts at once: pivoting against relaxation, redundant contacts, stacks.
 
 use super::{Bodies, FAR, Random, Solved, UP, distance, free, solve};
-use crate::rows::{RowSet, Rows};
+use crate::constraint::rows::{RowSet, Rows};
 use crate::solver::{GaussSeidel, Islands, LcpPyramid, LcpSliding, RowSolver, SolverSettings, residual};
 
 const WEIGHT: f64 = 9.81 / 60.0;

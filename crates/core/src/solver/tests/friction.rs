@@ -2,7 +2,7 @@
 
 use super::contact::random_rows;
 use super::{Bodies, FAR, Random, UP, all, distance, free, solve};
-use crate::rows::RowSet;
+use crate::constraint::rows::RowSet;
 use crate::solver::{GaussSeidel, LcpPyramid, LcpSliding, RowSolver, residual};
 
 const G: f64 = 9.81;
@@ -132,7 +132,7 @@ fn what_relaxation_converges_to_is_a_coulomb_solution() {
 #[test]
 fn dead_rows_get_no_multiplier() {
     for solver in solvers() {
-        let mut rows = crate::rows::Rows::default();
+        let mut rows = crate::constraint::rows::Rows::default();
         rows.clear(2);
         rows.push_block(RowSet::Cone { mu: 0.5 });
         // Freedoms x and z of 1 kg: normal z, first tangent x, second tangent dead.

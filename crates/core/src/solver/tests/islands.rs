@@ -1,7 +1,7 @@
 //! Islands against a search through the blocks.
 
 use super::Random;
-use crate::rows::{RowSet, Rows};
+use crate::constraint::rows::{RowSet, Rows};
 use crate::solver::Islands;
 
 /// Rows among objects of 1 to 3 freedoms, with none, one or two sides.

@@ -1,7 +1,7 @@
 //! Equality rows that are solved at once: chains and loops of boxes pinned to each other.
 
 use super::{Bodies, Random, Solved, UP, all, distance, free, solve};
-use crate::rows::{RowSet, Rows};
+use crate::constraint::rows::{RowSet, Rows};
 use crate::solver::{GaussSeidel, LcpPyramid, MAX_DIRECT_ROWS, SolverSettings, residual};
 use nalgebra::{DMatrix, DVector};
 

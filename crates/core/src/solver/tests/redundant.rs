@@ -1,7 +1,7 @@
 //! Nearly redundant contacts: what Newton's method is there for.
 
 use super::{Bodies, Random, UP, all, free, solve};
-use crate::rows::{RowSet, Rows};
+use crate::constraint::rows::{RowSet, Rows};
 use crate::solver::{GaussSeidel, RowSolver, SolverSettings, residual};
 
 const USUAL: SolverSettings = SolverSettings { max_sweeps: 200, max_relaxations: 20_000, tolerance: 1e-9 };

@@ -2,7 +2,7 @@
 
 use super::Bodies;
 use super::UP;
-use crate::rows::{RowSet, Rows};
+use crate::constraint::rows::{RowSet, Rows};
 use crate::solver::residual;
 
 /// The residual of one row of 1 kg along one freedom: `w = c + λ`.

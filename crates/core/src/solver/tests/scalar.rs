@@ -1,7 +1,7 @@
 //! Equality, half-line and interval rows against closed forms, on sliders along one line.
 
 use super::{FAR, Random, distance, solve};
-use crate::rows::{RowSet, Rows};
+use crate::constraint::rows::{RowSet, Rows};
 use crate::solver::{GaussSeidel, LcpPyramid, LcpSliding, RowSolver};
 
 fn solvers() -> [&'static dyn RowSolver; 3] {

@@ -1,7 +1,7 @@
 //! Soft rows: `w = c + (K + R)·λ`.
 
 use super::{Bodies, FAR, Random, UP, distance, free, solve};
-use crate::rows::{RowSet, Rows};
+use crate::constraint::rows::{RowSet, Rows};
 use crate::solver::{GaussSeidel, LcpPyramid, LcpSliding, RowSolver, residual};
 
 fn solvers() -> [&'static dyn RowSolver; 3] {

@@ -1,7 +1,7 @@
 //! Contacts with friction that sweeps alone do not solve: they conflict, or sweeps go in circles.
 
 use super::{Bodies, UP, all, distance};
-use crate::rows::{RowSet, Rows};
+use crate::constraint::rows::{RowSet, Rows};
 use crate::solver::{GaussSeidel, RowSolver, SolverSettings, residual};
 
 /// A block on two feet, one closer to its centre, that are asked for accelerations which differ along the line between them: no force gives that, so the

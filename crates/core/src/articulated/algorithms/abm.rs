@@ -1,0 +1,417 @@
+//! The articulated-body method: `q̈` from `q`, `q̇` and forces in time proportional to the links [RBDA §7.3], thesis §III.B.4.
+//!
+//! World axes; every quantity of a link is taken at its origin, which is its joint. So from parent to child is a displacement `r` alone. Accelerations are
+//! *classical*: of the material point at the origin, not spatial.
+//!
+//! ```text
+//! place (outward)     o = oₚ + r                       ω = ωₚ + ω_J          v = vₚ + ωₚ × r + v_J
+//!                     α⁰ = α⁰ₚ + ωₚ × ω_J              a⁰ = a⁰ₚ + α⁰ₚ × r + ωₚ × (ωₚ × r + 2 v_J)
+//!                     p = [J α⁰ + ω × J ω + h × a⁰;    m a⁰ + α⁰ × h + ω × (ω × h)]
+//! fold (inward)       U = IA S     D = Sᵀ U     Ia = IA − U D⁻¹ Uᵀ              IAₚ += Xᵀ Ia X
+//! push (inward)       e = τ − Sᵀ p              p' = p + U D⁻¹ e                pₚ += Xᵀ p'
+//! move (outward)      Â' = X Âₚ                 q̈ = D⁻¹ (e − Uᵀ Â')             Â = Â' + S q̈
+//! ```
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `ω_J`, `v_J` | velocity of the link against its parent: `s q̇` of a hinge, of a slider; `R q̇` of a ball joint |
+//! | `α⁰`, `a⁰` | acceleration that the link has with `q̈ = 0`: all centripetal and Coriolis terms |
+//! | `J`, `h`, `m` | rigid inertia about the origin, first moment, mass |
+//! | `IA`, `p` | articulated inertia, and the force that holds the subtree to `Â = 0`; external wrenches are subtracted from `p` |
+//! | `S` | `[s; 0]` of a hinge, `[0; s]` of a slider, `[R; 0]` of a ball joint, `1` of a floating root |
+//! | `X` | `[1 0; −r× 1]`: motion of the parent seen at the child |
+//! | `Â` | acceleration less `[α⁰; a⁰]`. Uniform gravity `g` enters as `Â = [0; −g]` of the world |
+//!
+//! Because `p` carries `α⁰` and `a⁰`, there is no velocity-product term `c` in the inward sweep, against [RBDA Table 7.1]: it is out of the chain
+//! of operations that wait for each other. The inward sweep sums over all children; the thesis's Algorithm 1 serves one.
+
+use crate::articulated::algorithms::factor::{Factor, rows_times, rows_transposed_times};
+use crate::articulated::model::compiled::{Compiled, CompiledLink, JointKind};
+use crate::spatial::{ArticulatedInertia, Force, Inertia, Matrix, Motion, Scalar, Symmetric, Vector};
+use tumble_collide::Vec3;
+
+/// A joint's `D` must be above this part of its inertia's size (the trace of `J` or `M`), or the joint counts as singular.
+pub(in crate::articulated) const SINGULAR: f64 = 1e-12;
+
+/// Where a sweep reads its state and forces. A trait and not closures, so that all of it is compiled for the instructions of the sweep.
+pub(in crate::articulated) trait Input<T> {
+    /// Sine and cosine of the hinge of a link, whose angle is position number `q`.
+    fn joint_angle_sin_cos(&self, link: usize, q: usize) -> (T, T);
+    /// A position number.
+    fn q(&self, k: usize) -> T;
+    /// A velocity number.
+    fn v(&self, k: usize) -> T;
+    /// A joint force.
+    fn tau(&self, k: usize) -> T;
+}
+
+/// What the sweeps know of a link.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::articulated) struct Slot<T> {
+    /// Axes of its inner frame in the world. The third is a hinge's or slider's `s`.
+    pub rotation: Matrix<T>,
+    /// `r`: from the parent's origin to its own.
+    pub arm: Vector<T>,
+    /// `ω`.
+    pub angular: Vector<T>,
+    /// `[α⁰; a⁰]`.
+    pub bias_acceleration: Motion<T>,
+    /// `p`.
+    pub bias: Force<T>,
+    /// `IA`.
+    pub inertia: ArticulatedInertia<T>,
+    /// `U` of a hinge or slider.
+    pub column: Force<T>,
+    /// `D` of a hinge or slider.
+    pub pivot: T,
+    /// `D⁻¹`, or 0.
+    pub inverse: T,
+    /// What is left of `e`: `D⁻¹ e` of a hinge or slider in the first number, `l⁻¹ e` of a ball joint in the first three, `e` of a floating root.
+    pub effort: Force<T>,
+    /// `Â`.
+    pub acceleration: Motion<T>,
+    /// Origin in the world; only where asked for.
+    pub position: Vector<T>,
+    /// Velocity of the origin; only where asked for.
+    pub linear: Vector<T>,
+}
+
+/// Factors of a joint of three degrees of freedom or six.
+///
+/// A ball joint: `first` is of `J`, rows `w = l⁻¹ H`. A floating root: `first` is of `M`, `w = l⁻¹ Hᵀ`, and `second` is of `J − H M⁻¹ Hᵀ`.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::articulated) struct JointFactor<T> {
+    pub first: Factor<T>,
+    pub w: [Vector<T>; 3],
+    pub second: Factor<T>,
+}
+
+/// Working memory of the sweeps: slot 0 is the world.
+#[derive(Clone, Debug)]
+pub(in crate::articulated) struct Sweep<T> {
+    pub slots: Vec<Slot<T>>,
+    pub blocks: Vec<JointFactor<T>>,
+}
+
+impl<T: Scalar> Sweep<T> {
+    pub fn new(compiled: &Compiled, zero: T) -> Sweep<T> {
+        let (none, one) = (Vector::splat(zero), zero.constant(1.0));
+        let (still, no_force) = (Motion::new(none, none), Force::new(none, none));
+        let unit =
+            Matrix::new(Vector::new(one, zero, zero), Vector::new(zero, one, zero), Vector::new(zero, zero, one));
+        let nothing = Symmetric::scaled_identity(zero);
+        let inertia = ArticulatedInertia { rotational: nothing, coupling: [none; 3], mass: nothing };
+        let world = Slot {
+            rotation: unit,
+            arm: none,
+            angular: none,
+            bias_acceleration: still,
+            bias: no_force,
+            inertia,
+            column: no_force,
+            pivot: zero,
+            inverse: zero,
+            effort: no_force,
+            acceleration: still,
+            position: none,
+            linear: none,
+        };
+        let block = JointFactor { first: Factor::zero(zero), w: [none; 3], second: Factor::zero(zero) };
+        Sweep { slots: vec![world; compiled.bodies.len() + 1], blocks: vec![block; compiled.blocks] }
+    }
+
+    /// Places every link and sets its rigid inertia and bias. `WHOLE` also writes positions and velocities of the origins.
+    #[inline(always)]
+    pub fn place<const WHOLE: bool>(&mut self, compiled: &Compiled, state: &impl Input<T>) {
+        for (i, body) in compiled.bodies.iter().enumerate() {
+            let parent = &self.slots[body.parent];
+            let turned = parent.rotation.times_constant(&body.turned);
+            let mut arm = parent.rotation.of_constant(&body.offset);
+            let (outer, outer_bias_acceleration) = (parent.angular, parent.bias_acceleration);
+            let (parent_position, parent_linear) = (parent.position, parent.linear);
+            let zero = outer.x.constant(0.0);
+            let mut turn = Vector::splat(zero);
+            let mut slide = turn;
+            let rotation = match body.kind {
+                JointKind::Revolute => {
+                    turn = turned.z * state.v(body.v);
+                    turn_about_z(&turned, state.joint_angle_sin_cos(i, body.q))
+                }
+                JointKind::Prismatic => {
+                    arm += turned.z * state.q(body.q);
+                    slide = turned.z * state.v(body.v);
+                    turned
+                }
+                JointKind::Spherical(_) => {
+                    let rotation = turned * quaternion_matrix(four(state, body.q));
+                    turn = rotation * three(|k| state.v(k), body.v);
+                    rotation
+                }
+                JointKind::Floating(_) => {
+                    arm = three(|k| state.q(k), body.q);
+                    turn = three(|k| state.v(k), body.v);
+                    slide = three(|k| state.v(k), body.v + 3);
+                    quaternion_matrix(four(state, body.q + 3))
+                }
+            };
+            let angular = outer + turn;
+            let sweeping = outer.cross(arm);
+            let bias_acceleration = Motion {
+                angular: outer_bias_acceleration.angular + outer.cross(turn),
+                linear: outer_bias_acceleration.linear
+                    + outer_bias_acceleration.angular.cross(arm)
+                    + outer.cross(sweeping + (slide + slide)),
+            };
+            let slot = &mut self.slots[i + 1];
+            (slot.rotation, slot.arm, slot.angular, slot.bias_acceleration) =
+                (rotation, arm, angular, bias_acceleration);
+            if WHOLE {
+                slot.position = parent_position + arm;
+                slot.linear = parent_linear + sweeping + slide;
+            }
+            load(body, slot);
+        }
+    }
+
+    /// The inward sweep of inertias.
+    #[inline(always)]
+    pub fn fold(&mut self, compiled: &Compiled) {
+        for (i, body) in compiled.bodies.iter().enumerate().rev() {
+            self.fold_link(i + 1, body);
+        }
+    }
+
+    #[inline(always)]
+    pub fn fold_link(&mut self, i: usize, body: &CompiledLink) {
+        let slot = &mut self.slots[i];
+        let left = match body.kind {
+            JointKind::Revolute => {
+                let s = slot.rotation.z;
+                slot.column = slot.inertia.times_angular(s);
+                slot.pivot = s.dot(slot.column.torque);
+                slot.inverse = slot.pivot.reciprocal_above(slot.inertia.rotational.trace() * SINGULAR);
+                if body.parent == 0 {
+                    return;
+                }
+                slot.inertia.minus_square(slot.column, slot.inverse)
+            }
+            JointKind::Prismatic => {
+                let s = slot.rotation.z;
+                slot.column = slot.inertia.times_linear(s);
+                slot.pivot = s.dot(slot.column.force);
+                slot.inverse = slot.pivot.reciprocal_above(slot.inertia.mass.trace() * SINGULAR);
+                if body.parent == 0 {
+                    return;
+                }
+                slot.inertia.minus_square(slot.column, slot.inverse)
+            }
+            JointKind::Spherical(block) => spherical_factor(&slot.inertia, &mut self.blocks[block]),
+            JointKind::Floating(block) => return floating_factor(&slot.inertia, &mut self.blocks[block]),
+        };
+        if body.parent != 0 {
+            let shifted = left.from_arm(slot.arm);
+            let parent = &mut self.slots[body.parent];
+            parent.inertia = parent.inertia + shifted;
+        }
+    }
+
+    /// The inward step of forces at one link: what is left in `bias` goes to the parent's.
+    #[inline(always)]
+    pub fn push_link(&mut self, i: usize, body: &CompiledLink, state: &impl Input<T>) {
+        let slot = &mut self.slots[i];
+        let mut effort = slot.effort;
+        let passed = push(body, slot, &self.blocks, slot.bias, |k| state.tau(k), &mut effort);
+        slot.effort = effort;
+        let arm = slot.arm;
+        if body.parent != 0 {
+            self.slots[body.parent].bias += passed.from_arm(arm);
+        }
+    }
+
+    /// The whole method in uniform gravity: place, fold, push, spread.
+    #[inline(always)]
+    pub fn run(&mut self, compiled: &Compiled, gravity: &Vec3, state: &impl Input<T>, out: impl FnMut(usize, T)) {
+        self.place::<false>(compiled, state);
+        for (i, body) in compiled.bodies.iter().enumerate().rev() {
+            self.fold_link(i + 1, body);
+            self.push_link(i + 1, body, state);
+        }
+        let zero = self.slots[0].pivot;
+        self.slots[0].acceleration = Motion::new(Vector::splat(zero), Vector::constant(zero, &(-gravity).into()));
+        self.spread(compiled, out);
+    }
+
+    /// The outward sweep of accelerations, from the world's `Â`. Writes `q̈` to `out`.
+    #[inline(always)]
+    pub fn spread(&mut self, compiled: &Compiled, mut out: impl FnMut(usize, T)) {
+        for (i, body) in compiled.bodies.iter().enumerate() {
+            let slot = &self.slots[i + 1];
+            let carried = self.slots[body.parent].acceleration.at(slot.arm);
+            let a = spread(body, slot, &self.blocks, &slot.effort, carried, &mut out);
+            self.slots[i + 1].acceleration = a;
+        }
+    }
+}
+
+/// From the force `p` on the subtree of a link and the forces `tau` of its joint: what the joint passes on, `p'`, and in `effort` what
+/// [`spread`] needs.
+#[inline(always)]
+pub(in crate::articulated) fn push<T: Scalar>(
+    body: &CompiledLink,
+    slot: &Slot<T>,
+    blocks: &[JointFactor<T>],
+    p: Force<T>,
+    tau: impl Fn(usize) -> T + Copy,
+    effort: &mut Force<T>,
+) -> Force<T> {
+    let s = slot.rotation.z;
+    match body.kind {
+        JointKind::Revolute => {
+            let rate = slot.inverse * (tau(body.v) - s.dot(p.torque));
+            effort.torque.x = rate;
+            p + slot.column * rate
+        }
+        JointKind::Prismatic => {
+            let rate = slot.inverse * (tau(body.v) - s.dot(p.force));
+            effort.torque.x = rate;
+            p + slot.column * rate
+        }
+        JointKind::Spherical(block) => {
+            let JointFactor { first, w, .. } = &blocks[block];
+            let wanted = slot.rotation * three(tau, body.v);
+            let e = first.forward(wanted - p.torque);
+            effort.torque = e;
+            Force::new(wanted, p.force + rows_transposed_times(w, first.divide(e)))
+        }
+        JointKind::Floating(_) => {
+            *effort = Force::new(three(tau, body.v), three(tau, body.v + 3)) - p;
+            p
+        }
+    }
+}
+
+/// `Â` of a link from `Â' = X Âₚ`; writes its `q̈` to `out`.
+#[inline(always)]
+pub(in crate::articulated) fn spread<T: Scalar>(
+    body: &CompiledLink,
+    slot: &Slot<T>,
+    blocks: &[JointFactor<T>],
+    effort: &Force<T>,
+    carried: Motion<T>,
+    out: &mut impl FnMut(usize, T),
+) -> Motion<T> {
+    let s = slot.rotation.z;
+    match body.kind {
+        JointKind::Revolute => {
+            let rate = effort.torque.x - slot.inverse * carried.power(slot.column);
+            out(body.v, rate);
+            Motion { angular: carried.angular + s * rate, linear: carried.linear }
+        }
+        JointKind::Prismatic => {
+            let rate = effort.torque.x - slot.inverse * carried.power(slot.column);
+            out(body.v, rate);
+            Motion { angular: carried.angular, linear: carried.linear + s * rate }
+        }
+        JointKind::Spherical(block) => {
+            let JointFactor { first, w, .. } = &blocks[block];
+            let angular = first.backward(first.divide(effort.torque - rows_times(w, carried.linear)));
+            write_three(body.v, slot.rotation.transposed_times(angular - carried.angular), out);
+            Motion { angular, linear: carried.linear }
+        }
+        JointKind::Floating(block) => {
+            let a = solve_floating(&blocks[block], *effort);
+            write_three(body.v, a.angular - carried.angular, out);
+            write_three(body.v + 3, a.linear - carried.linear, out);
+            a
+        }
+    }
+}
+
+/// `Â = D⁻¹ e` of a floating root.
+#[inline(always)]
+pub(in crate::articulated) fn solve_floating<T: Scalar>(block: &JointFactor<T>, e: Force<T>) -> Motion<T> {
+    let JointFactor { first, w, second } = block;
+    let f = first.forward(e.force);
+    let n = e.torque - rows_transposed_times(w, first.divide(f));
+    let angular = second.backward(second.divide(second.forward(n)));
+    Motion { angular, linear: first.backward(first.divide(f - rows_times(w, angular))) }
+}
+
+/// The rigid inertia and the bias `p` of a link that is placed.
+#[inline(always)]
+fn load<T: Scalar>(body: &CompiledLink, slot: &mut Slot<T>) {
+    let like = slot.angular.x;
+    let (n, m) = (slot.rotation.of_constant(&body.pair[0]), slot.rotation.of_constant(&body.pair[1]));
+    let h = slot.rotation.of_constant(&body.moment);
+    let (omega, bias_acceleration) = (slot.angular, slot.bias_acceleration);
+    let paired = Symmetric::of_pair(n, m);
+    let sphere = like.constant(body.sphere);
+    let mass = like.constant(body.mass);
+    let rotational = Symmetric { xx: paired.xx + sphere, yy: paired.yy + sphere, zz: paired.zz + sphere, ..paired };
+    slot.inertia = ArticulatedInertia::rigid(&Inertia { rotational, moment: h, mass });
+    let spin = n * m.dot(omega) + m * n.dot(omega);
+    let torque = rotational * bias_acceleration.angular + omega.cross(spin) + h.cross(bias_acceleration.linear);
+    let force = bias_acceleration.linear * mass + bias_acceleration.angular.cross(h) + omega.cross(omega.cross(h));
+    slot.bias = Force { torque, force };
+}
+
+#[inline(always)]
+fn spherical_factor<T: Scalar>(inertia: &ArticulatedInertia<T>, block: &mut JointFactor<T>) -> ArticulatedInertia<T> {
+    block.first = Factor::new(&inertia.rotational, inertia.rotational.trace() * SINGULAR);
+    block.w = block.first.forward_rows(inertia.coupling);
+    let zero = inertia.mass.xx.constant(0.0);
+    let mass = block.first.complement(&inertia.mass, &block.w);
+    ArticulatedInertia { rotational: Symmetric::scaled_identity(zero), coupling: [Vector::splat(zero); 3], mass }
+}
+
+#[inline(always)]
+fn floating_factor<T: Scalar>(inertia: &ArticulatedInertia<T>, block: &mut JointFactor<T>) {
+    let [x, y, z] = inertia.coupling;
+    let columns = [Vector::new(x.x, y.x, z.x), Vector::new(x.y, y.y, z.y), Vector::new(x.z, y.z, z.z)];
+    block.first = Factor::new(&inertia.mass, inertia.mass.trace() * SINGULAR);
+    block.w = block.first.forward_rows(columns);
+    let rest = block.first.complement(&inertia.rotational, &block.w);
+    block.second = Factor::new(&rest, inertia.rotational.trace() * SINGULAR);
+}
+
+/// `A·Rz` of an angle by its sine and cosine.
+#[inline(always)]
+fn turn_about_z<T: Scalar>(a: &Matrix<T>, (sin, cos): (T, T)) -> Matrix<T> {
+    Matrix { x: a.x * cos + a.y * sin, y: a.y * cos - a.x * sin, z: a.z }
+}
+
+/// The rotation of a quaternion `x, y, z, w` of any length above 0: `1 + s (…)` with `s = 2/|q|²`.
+#[inline(always)]
+fn quaternion_matrix<T: Scalar>([x, y, z, w]: [T; 4]) -> Matrix<T> {
+    let (zero, one) = (x.constant(0.0), x.constant(1.0));
+    let s = (x * x + y * y + z * z + w * w).reciprocal_above(zero) * 2.0;
+    let (sx, sy, sz) = (x * s, y * s, z * s);
+    let (xx, yy, zz) = (x * sx, y * sy, z * sz);
+    let (xy, xz, yz) = (x * sy, x * sz, y * sz);
+    let (wx, wy, wz) = (w * sx, w * sy, w * sz);
+    Matrix {
+        x: Vector::new(one - (yy + zz), xy + wz, xz - wy),
+        y: Vector::new(xy - wz, one - (xx + zz), yz + wx),
+        z: Vector::new(xz + wy, yz - wx, one - (xx + yy)),
+    }
+}
+
+/// Four position numbers from `k` on.
+#[inline(always)]
+fn four<T>(state: &impl Input<T>, k: usize) -> [T; 4] {
+    [state.q(k), state.q(k + 1), state.q(k + 2), state.q(k + 3)]
+}
+
+/// Three numbers from `k` on.
+#[inline(always)]
+pub(in crate::articulated) fn three<T>(from: impl Fn(usize) -> T, k: usize) -> Vector<T> {
+    Vector { x: from(k), y: from(k + 1), z: from(k + 2) }
+}
+
+/// Writes three numbers from `k` on.
+#[inline(always)]
+pub(in crate::articulated) fn write_three<T>(k: usize, v: Vector<T>, out: &mut impl FnMut(usize, T)) {
+    out(k, v.x);
+    out(k + 1, v.y);
+    out(k + 2, v.z);
+}

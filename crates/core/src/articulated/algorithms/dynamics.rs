@@ -1,0 +1,250 @@
+//! Forward dynamics of one model at one state: the sweeps of [`abm`](crate::articulated::algorithms::abm) in `f64`, kept so that many questions are answered at the state last
+//! refreshed.
+
+use crate::articulated::algorithms::abm::{Input, Slot, Sweep, push, spread, three, write_three};
+use crate::articulated::model::Model;
+use crate::articulated::model::compiled::{Compiled, CompiledLink, JointKind};
+use crate::articulated::simd::joint_sin_cos::JointSinCos;
+use crate::object::part_state::Wrench;
+use crate::spatial::{Force, Motion, Vector};
+use nalgebra::{Rotation3, UnitQuaternion};
+use tumble_collide::{Mat3, Pose, Vec3};
+
+/// A model, and everything of it that is a function of `q` and `v`: poses, velocities, bias forces, articulated inertias and their factors.
+/// Before the first [`refresh`](Self::refresh) its answers mean nothing.
+///
+/// ```
+/// use tumble_core::{Joint, LinkMass, ModelBuilder, articulated::Dynamics, collide::{Pose, Vec3}};
+/// let mut builder = ModelBuilder::new();
+/// builder.link("bob", None, Joint::revolute(Vec3::y()), Pose::identity(), LinkMass::point(2.0, Vec3::new(0.0, 0.0, -0.5)));
+/// let model = builder.build()?;
+/// let mut dynamics = Dynamics::new(&model);
+/// dynamics.refresh(&[0.3], &[0.0]);
+/// // A pendulum of length 0.5 m: q̈ = −g/l·sin q.
+/// let mut qdd = [0.0];
+/// dynamics.accelerate_in(&mut dynamics.scratch(), &Vec3::new(0.0, 0.0, -9.81), &[0.0], &[], &mut qdd);
+/// assert!((qdd[0] + 9.81 / 0.5 * f64::sin(0.3)).abs() < 1e-12);
+/// // What an impulse of 1 N·s along x at the bob does, squared: 1/m of the point along its circle.
+/// let mut y = [0.0];
+/// let arm = dynamics.link_pose(0).rotation * Vec3::new(0.0, 0.0, -0.5);
+/// dynamics.point_response(0, &arm, &[Vec3::x()], 1.0, &mut y);
+/// assert!((y[0] * y[0] - f64::cos(0.3).powi(2) / 2.0).abs() < 1e-12);
+/// # Ok::<(), tumble_core::ModelError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Dynamics {
+    pub(in crate::articulated) compiled: Compiled,
+    pub(in crate::articulated) sweep: Sweep<f64>,
+    joint_sin_cos: JointSinCos,
+    /// `√D` and `1/√D` (or 0) of each hinge and slider, by slot.
+    pub(in crate::articulated) roots: Vec<[f64; 2]>,
+    singular: Option<usize>,
+}
+
+/// Working memory of one call, for the maps that take `&self`. Made by [`Dynamics::scratch`]; holds nothing between calls.
+#[derive(Clone, Debug)]
+pub struct Scratch {
+    pub(in crate::articulated) motions: Vec<Motion>,
+    pub(in crate::articulated) forces: Vec<Force>,
+    pub(in crate::articulated) efforts: Vec<Force>,
+}
+
+impl Dynamics {
+    /// Makes a model ready; all allocation happens here.
+    pub fn new(model: &Model) -> Dynamics {
+        let compiled = Compiled::new(model);
+        let sweep = Sweep::new(&compiled, 0.0);
+        Dynamics {
+            roots: vec![[0.0; 2]; compiled.bodies.len() + 1],
+            joint_sin_cos: JointSinCos::new(&compiled),
+            compiled,
+            sweep,
+            singular: None,
+        }
+    }
+
+    /// Moving links.
+    pub fn links(&self) -> usize {
+        self.compiled.bodies.len()
+    }
+
+    /// Degrees of freedom: length of `v`.
+    pub fn dof(&self) -> usize {
+        self.compiled.dof
+    }
+
+    /// Length of `q`.
+    pub fn positions(&self) -> usize {
+        self.compiled.positions
+    }
+
+    /// Working memory for the maps.
+    pub fn scratch(&self) -> Scratch {
+        let slots = self.sweep.slots.len();
+        Scratch {
+            motions: vec![Motion::default(); slots],
+            forces: vec![Force::default(); slots],
+            efforts: vec![Force::default(); slots],
+        }
+    }
+
+    /// Takes a new state. Quaternions in `q` may have any length above 0.
+    pub fn refresh(&mut self, q: &[f64], v: &[f64]) {
+        let turns = self.joint_sin_cos.take(q);
+        self.sweep.place::<true>(&self.compiled, &SingleState { turns, q, v, tau: &[] });
+        self.sweep.fold(&self.compiled);
+        self.singular = None;
+        for (i, body) in self.compiled.bodies.iter().enumerate().rev() {
+            let slot = &self.sweep.slots[i + 1];
+            let positive = match body.kind {
+                JointKind::Revolute | JointKind::Prismatic => {
+                    let root = if slot.inverse > 0.0 { slot.pivot.sqrt() } else { 0.0 };
+                    self.roots[i + 1] = [root, if root > 0.0 { 1.0 / root } else { 0.0 }];
+                    root > 0.0
+                }
+                JointKind::Spherical(block) => {
+                    let block = &mut self.sweep.blocks[block];
+                    block.first = block.first.with_roots();
+                    block.first.is_positive()
+                }
+                JointKind::Floating(block) => {
+                    let block = &mut self.sweep.blocks[block];
+                    (block.first, block.second) = (block.first.with_roots(), block.second.with_roots());
+                    block.first.is_positive() && block.second.is_positive()
+                }
+            };
+            if !positive {
+                self.singular = Some(i);
+            }
+        }
+    }
+
+    /// First link whose joint nothing resists at the state last refreshed (gimbal lock of stacked hinges): `D` along an axis of it is below 1e-12 of
+    /// the size of its articulated inertia. The maps then hold that axis still, and stay finite.
+    pub fn singular(&self) -> Option<usize> {
+        self.singular
+    }
+
+    /// Pose of a link's frame in the world.
+    pub fn link_pose(&self, link: usize) -> Pose {
+        let slot = &self.sweep.slots[link + 1];
+        let rotation = Mat3::from(slot.rotation) * self.compiled.bodies[link].own.transpose();
+        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        Pose::from_parts(Vec3::from(slot.position).into(), rotation)
+    }
+
+    /// Angular velocity of a link, rad/s, and velocity of its origin, m/s, world axes.
+    pub fn link_velocity(&self, link: usize) -> (Vec3, Vec3) {
+        let slot = &self.sweep.slots[link + 1];
+        (slot.angular.into(), slot.linear.into())
+    }
+
+    /// Generalized accelerations `q̈`, Coriolis and centrifugal terms included, under joint forces `tau` (N·m, N) and one wrench per moving link (world
+    /// axes, torque about the link's origin; an empty slice is none). Without gravity.
+    pub fn accelerate(&self, s: &mut Scratch, tau: &[f64], wrenches: &[Wrench], qdd: &mut [f64]) {
+        self.accelerate_in(s, &Vec3::zeros(), tau, wrenches, qdd);
+    }
+
+    /// [`accelerate`](Self::accelerate) in uniform gravity `gravity`, m/s², world axes.
+    pub fn accelerate_in(&self, s: &mut Scratch, gravity: &Vec3, tau: &[f64], wrenches: &[Wrench], qdd: &mut [f64]) {
+        for (p, slot) in s.forces.iter_mut().zip(&self.sweep.slots) {
+            *p = slot.bias;
+        }
+        for (p, wrench) in s.forces[1..].iter_mut().zip(wrenches) {
+            *p -= Force::new(wrench.torque.into(), wrench.force.into());
+        }
+        let Sweep { slots, blocks } = &self.sweep;
+        for (i, body) in self.compiled.bodies.iter().enumerate().rev() {
+            let slot = &slots[i + 1];
+            let passed = push(body, slot, blocks, s.forces[i + 1], |k| tau[k], &mut s.efforts[i + 1]);
+            s.forces[body.parent] += passed.from_arm(slot.arm);
+        }
+        s.motions[0] = Motion::new(Vector::default(), (-gravity).into());
+        for (i, body) in self.compiled.bodies.iter().enumerate() {
+            let slot = &slots[i + 1];
+            let carried = s.motions[body.parent].at(slot.arm);
+            s.motions[i + 1] = spread(body, slot, blocks, &s.efforts[i + 1], carried, &mut |k, x| qdd[k] = x);
+        }
+    }
+
+    /// Angular acceleration of every link, rad/s², and acceleration of the material point at its origin, m/s², world axes, for given `qdd`.
+    pub fn link_accelerations(&self, qdd: &[f64], out: &mut [(Vec3, Vec3)]) {
+        let slots = &self.sweep.slots;
+        for (i, body) in self.compiled.bodies.iter().enumerate() {
+            let parent =
+                body.parent.checked_sub(1).map_or(Motion::default(), |p| Motion::new(out[p].0.into(), out[p].1.into()));
+            let a = carried(body, &slots[i + 1], parent, qdd);
+            out[i] = (a.angular.into(), a.linear.into());
+        }
+        for ((angular, linear), slot) in out.iter_mut().zip(&slots[1..]) {
+            *angular += Vec3::from(slot.bias_acceleration.angular);
+            *linear += Vec3::from(slot.bias_acceleration.linear);
+        }
+    }
+
+    /// Motion of every link that joint rates `v` alone give, into `s.motions`.
+    pub(in crate::articulated) fn propagate_velocities(&self, s: &mut Scratch, v: &[f64]) {
+        s.motions[0] = Motion::default();
+        for (i, body) in self.compiled.bodies.iter().enumerate() {
+            s.motions[i + 1] = carried(body, &self.sweep.slots[i + 1], s.motions[body.parent], v);
+        }
+    }
+}
+
+/// `V = X Vₚ + S v` of a link.
+#[inline(always)]
+fn carried(body: &CompiledLink, slot: &Slot<f64>, parent: Motion, v: &[f64]) -> Motion {
+    let mut motion = parent.at(slot.arm);
+    match body.kind {
+        JointKind::Revolute => motion.angular += slot.rotation.z * v[body.v],
+        JointKind::Prismatic => motion.linear += slot.rotation.z * v[body.v],
+        JointKind::Spherical(_) => motion.angular += slot.rotation * load_vector(v, body.v),
+        JointKind::Floating(_) => motion = Motion::new(load_vector(v, body.v), load_vector(v, body.v + 3)),
+    }
+    motion
+}
+
+/// Forward dynamics in one go: `q̈` from `q`, `v` and joint forces `tau` in uniform gravity. Leaves `d` fit for another call of this alone: its maps need
+/// a [`Dynamics::refresh`] first.
+pub fn forward_dynamics(d: &mut Dynamics, gravity: &Vec3, q: &[f64], v: &[f64], tau: &[f64], qdd: &mut [f64]) {
+    let Dynamics { compiled, sweep, joint_sin_cos, .. } = d;
+    let turns = joint_sin_cos.take(q);
+    sweep.run(compiled, gravity, &SingleState { turns, q, v, tau }, |k, x| qdd[k] = x);
+}
+
+/// One state, as a sweep reads it.
+struct SingleState<'a> {
+    turns: &'a [(f64, f64)],
+    q: &'a [f64],
+    v: &'a [f64],
+    tau: &'a [f64],
+}
+
+impl Input<f64> for SingleState<'_> {
+    #[inline(always)]
+    fn joint_angle_sin_cos(&self, link: usize, _: usize) -> (f64, f64) {
+        self.turns[link]
+    }
+    #[inline(always)]
+    fn q(&self, k: usize) -> f64 {
+        self.q[k]
+    }
+    #[inline(always)]
+    fn v(&self, k: usize) -> f64 {
+        self.v[k]
+    }
+    #[inline(always)]
+    fn tau(&self, k: usize) -> f64 {
+        self.tau[k]
+    }
+}
+
+/// Three numbers of a slice from `k` on.
+pub(in crate::articulated) fn load_vector(x: &[f64], k: usize) -> Vector {
+    three(|k| x[k], k)
+}
+
+/// Writes three numbers of a slice from `k` on.
+pub(in crate::articulated) fn store_vector(x: &mut [f64], k: usize, v: Vector) {
+    write_three(k, v, &mut |k, x_k| x[k] = x_k);
+}

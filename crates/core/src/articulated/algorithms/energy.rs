@@ -1,0 +1,46 @@
+//! Sums over the links: energy, momentum, centre of mass [RBDA §2.13, §5.3].
+//!
+//! ```text
+//! T = Σ ½m·|v + ω×c|² + ½ω·I_c·ω = Σ ½m·|v|² + m·v·(ω×c) + ½ω·I·ω         V = −Σ m·g·(p + c)
+//! P = Σ m·(v + ω×c)                                                     L = Σ I·ω + m·c×v + p×m·(v + ω×c)
+//! ```
+//!
+//! Symbols as in `kinematics.rs`; `g` is gravity, `L` is about the world's origin.
+
+use crate::articulated::algorithms::kinematics::Kinematics;
+use crate::articulated::model::Model;
+use crate::object::{Energy, Momentum};
+use tumble_collide::Vec3;
+
+/// Kinetic energy and potential energy in uniform `gravity` (m/s², world axes; zero at the world's origin), J, at the refreshed motion.
+pub fn energy(model: &Model, kin: &Kinematics, gravity: &Vec3) -> Energy {
+    let mut sum = Energy::default();
+    for (link, own) in model.links().iter().zip(kin.links()) {
+        let (m, turn) = (link.mass.mass, own.angular);
+        let translation = 0.5 * m * own.linear.norm_squared() + m * own.linear.dot(&turn.cross(&own.center));
+        sum.kinetic += translation + 0.5 * turn.dot(&(own.inertia * turn));
+        sum.potential -= m * gravity.dot(&(own.pose.translation.vector + own.center));
+    }
+    sum
+}
+
+/// Linear momentum, N·s, and angular momentum about the world's origin, N·m·s, at the refreshed motion.
+pub fn momentum(model: &Model, kin: &Kinematics) -> Momentum {
+    let mut sum = Momentum::default();
+    for (link, own) in model.links().iter().zip(kin.links()) {
+        let m = link.mass.mass;
+        let linear = m * (own.linear + own.angular.cross(&own.center));
+        sum.linear += linear;
+        sum.angular +=
+            own.inertia * own.angular + m * own.center.cross(&own.linear) + own.pose.translation.vector.cross(&linear);
+    }
+    sum
+}
+
+/// Centre of all mass: position, metres, and velocity, m/s, in the world. `None` for a model without mass (inertia alone).
+pub fn center_of_mass(model: &Model, kin: &Kinematics) -> Option<(Vec3, Vec3)> {
+    let mass = model.mass();
+    let moment: Vec3 =
+        model.links().iter().zip(kin.links()).map(|(l, k)| l.mass.mass * (k.pose.translation.vector + k.center)).sum();
+    (mass > 0.0).then(|| (moment / mass, momentum(model, kin).linear / mass))
+}

@@ -1,0 +1,101 @@
+//! Inverse dynamics: the forces that a motion takes, by the recursive Newton–Euler algorithm [RBDA §5.3].
+//!
+//! Outwards, the accelerations of [`Kinematics::accelerations`] with `−g` added to the base, so that weights come by themselves. Then what
+//! each link needs by itself, about its origin, and inwards what it passes on to its parent:
+//!
+//! ```text
+//! f = m·(a + α×c + ω×(ω×c)) − f_ext           n = I·α + ω×I·ω + m·c×a − n_ext
+//! τ = S_ωᵀ·n + S_vᵀ·f                         f_λ += f,   n_λ += n + r×f
+//! ```
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `f`, `n` | force, and torque about the link's origin, that the joint passes to the link |
+//! | `f_ext`, `n_ext` | external wrench on the link |
+//! | `τ` | generalized force, one number per velocity number |
+//!
+//! Others as in `kinematics.rs`.
+
+use crate::articulated::algorithms::kinematics::{Kinematics, Rates};
+use crate::articulated::model::Model;
+use crate::object::part_state::Wrench;
+use tumble_collide::Vec3;
+
+/// Working memory of inverse dynamics.
+#[derive(Clone, Debug)]
+pub struct InverseDynamics {
+    accelerations: Vec<Rates>,
+    loads: Vec<Wrench>,
+}
+
+impl InverseDynamics {
+    /// Room for `model`.
+    pub fn new(model: &Model) -> InverseDynamics {
+        let count = model.links().len();
+        InverseDynamics { accelerations: vec![Rates::zero(); count], loads: vec![Wrench::default(); count] }
+    }
+
+    /// `tau = M·qdd + C(q, v) − (what gravity and wrenches do)`: the generalized forces under which the refreshed motion accelerates by `qdd`
+    /// (empty for none). `wrenches` has one per link, in world axes, with torque about the link's origin; empty for none.
+    pub fn solve(
+        &mut self,
+        model: &Model,
+        kin: &Kinematics,
+        gravity: &Vec3,
+        qdd: &[f64],
+        wrenches: &[Wrench],
+        tau: &mut [f64],
+    ) {
+        kin.accelerations(model, qdd, &-gravity, &mut self.accelerations);
+        self.own_loads(model, kin, wrenches);
+        for (i, link) in model.links().iter().enumerate().rev() {
+            let load = self.loads[i];
+            for k in link.v..link.v + link.joint.dof() {
+                let column = &kin.columns()[k];
+                tau[k] = column.angular.dot(&load.torque) + column.linear.dot(&load.force);
+            }
+            if let Some(parent) = link.parent {
+                self.loads[parent].force += load.force;
+                self.loads[parent].torque += load.torque + kin.links()[i].arm.cross(&load.force);
+            }
+        }
+    }
+
+    /// The forces that hold the refreshed motion at `qdd = 0`.
+    pub fn bias(&mut self, model: &Model, kin: &Kinematics, gravity: &Vec3, wrenches: &[Wrench], tau: &mut [f64]) {
+        self.solve(model, kin, gravity, &[], wrenches, tau);
+    }
+
+    /// What each joint passed to its link in the last [`solve`](Self::solve): force, and torque about the link's origin, world axes: the reactions in
+    /// the joint and its generalized force together.
+    pub fn joint_loads(&self) -> &[Wrench] {
+        &self.loads
+    }
+
+    fn own_loads(&mut self, model: &Model, kin: &Kinematics, wrenches: &[Wrench]) {
+        for (i, link) in model.links().iter().enumerate() {
+            let (m, own, a) = (link.mass.mass, &kin.links()[i], &self.accelerations[i]);
+            let (c, turn) = (own.center, own.angular);
+            let force = m * (a.linear + a.angular.cross(&c) + turn.cross(&turn.cross(&c)));
+            let torque = own.inertia * a.angular + turn.cross(&(own.inertia * turn)) + m * c.cross(&a.linear);
+            let outside = wrenches.get(i).copied().unwrap_or_default();
+            self.loads[i] = Wrench { torque: torque - outside.torque, force: force - outside.force };
+        }
+    }
+}
+
+/// [`InverseDynamics::solve`] with the kinematics refreshed first: from `q`, `v`, `qdd` to `tau`.
+#[allow(clippy::too_many_arguments, reason = "the arguments of τ = RNEA(q, v, q̈, f), and where to work")]
+pub fn inverse_dynamics(
+    model: &Model,
+    (kin, work): (&mut Kinematics, &mut InverseDynamics),
+    gravity: &Vec3,
+    q: &[f64],
+    v: &[f64],
+    qdd: &[f64],
+    wrenches: &[Wrench],
+    tau: &mut [f64],
+) {
+    kin.refresh(model, q, v);
+    work.solve(model, kin, gravity, qdd, wrenches, tau);
+}

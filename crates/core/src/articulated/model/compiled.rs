@@ -1,0 +1,135 @@
+//! A model as the sweeps read it.
+//!
+//! Link `i` of the model is slot `i + 1`; slot 0 is the world. Hinges and sliders are turned so that their axis is z: the *inner* frame of a link is its
+//! frame times `own`. So a hinge turns by two columns, and its axis in the world is the third.
+//!
+//! The inertia about the link's origin is kept as `λ·1 + n mᵀ + m nᵀ`. With principal moments `λ₁ ≥ λ₂ ≥ λ₃` and axes `e`:
+//!
+//! ```text
+//! λ = λ₂    n = a e₁ + b e₃    m = a e₁ − b e₃    2a² = λ₁ − λ₂    2b² = λ₂ − λ₃
+//! ```
+//!
+//! Two vectors turn into the world in fewer operations than a matrix does, and `λ` has no gyroscopic torque.
+
+use crate::articulated::model::joint::Joint;
+use crate::articulated::model::{Link, LinkMass, Model};
+use crate::spatial::{Matrix, Vector};
+use nalgebra::SymmetricEigen;
+use tumble_collide::{Mat3, Vec3};
+
+/// What a sweep does at a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::articulated) enum JointKind {
+    Revolute,
+    Prismatic,
+    /// Index of its block.
+    Spherical(usize),
+    /// Index of its block.
+    Floating(usize),
+}
+
+/// One link. Lengths and axes are in inner frames: the parent's for the placement, its own for the mass.
+#[derive(Clone, Debug)]
+pub(in crate::articulated) struct CompiledLink {
+    pub kind: JointKind,
+    /// Slot of the parent.
+    pub parent: usize,
+    /// First of its position numbers.
+    pub q: usize,
+    /// First of its velocity numbers.
+    pub v: usize,
+    /// Inner axes at joint position 0 in the parent's.
+    pub turned: Matrix<f64>,
+    /// Joint's origin in the parent's.
+    pub offset: Vector<f64>,
+    /// Inner axes in the link's.
+    pub own: Mat3,
+    pub mass: f64,
+    /// First moment of mass, kg·m.
+    pub moment: Vector<f64>,
+    /// `λ`.
+    pub sphere: f64,
+    /// `n` and `m`.
+    pub pair: [Vector<f64>; 2],
+}
+
+/// All links, and how many of them have a factor of three rows or more.
+#[derive(Clone, Debug)]
+pub(in crate::articulated) struct Compiled {
+    pub bodies: Vec<CompiledLink>,
+    pub blocks: usize,
+    pub positions: usize,
+    pub dof: usize,
+}
+
+impl Compiled {
+    pub fn new(model: &Model) -> Compiled {
+        let mut compiled = Compiled {
+            bodies: Vec::with_capacity(model.links().len()),
+            blocks: 0,
+            positions: model.positions(),
+            dof: model.dof(),
+        };
+        for link in model.links() {
+            let outer = link.parent.map_or(Mat3::identity(), |p| compiled.bodies[p].own);
+            let kind = compiled.kind(&link.joint);
+            compiled.bodies.push(body(link, kind, &outer));
+        }
+        compiled
+    }
+
+    fn kind(&mut self, joint: &Joint) -> JointKind {
+        let block = self.blocks;
+        match joint {
+            Joint::Prismatic { .. } => JointKind::Prismatic,
+            Joint::Spherical | Joint::Floating => {
+                self.blocks += 1;
+                if *joint == Joint::Floating { JointKind::Floating(block) } else { JointKind::Spherical(block) }
+            }
+            // A model holds no fixed links: they are folded into their parents.
+            Joint::Revolute { .. } | Joint::Fixed => JointKind::Revolute,
+        }
+    }
+}
+
+fn body(link: &Link, kind: JointKind, outer: &Mat3) -> CompiledLink {
+    let own = match link.joint {
+        Joint::Revolute { axis } | Joint::Prismatic { axis } => axes_with_z(&axis),
+        _ => Mat3::identity(),
+    };
+    let placed = link.placement.rotation.to_rotation_matrix().into_inner();
+    let (sphere, pair) = biaxial(&link.mass, &own);
+    CompiledLink {
+        kind,
+        parent: link.parent.map_or(0, |p| p + 1),
+        q: link.q,
+        v: link.v,
+        turned: (outer.transpose() * placed * own).into(),
+        offset: (outer.transpose() * link.placement.translation.vector).into(),
+        own,
+        mass: link.mass.mass,
+        moment: (link.mass.mass * (own.transpose() * link.mass.center)).into(),
+        sphere,
+        pair,
+    }
+}
+
+/// Right-handed unit axes with the third along `axis`; exact for coordinate axes.
+fn axes_with_z(axis: &Vec3) -> Mat3 {
+    let k = axis.iamin();
+    let x = Vec3::ith(k, 1.0);
+    let x = (x - axis * axis[k]).normalize();
+    Mat3::from_columns(&[x, axis.cross(&x), *axis])
+}
+
+/// `λ` and `n`, `m` of the inertia about the link's origin, in axes `own`.
+fn biaxial(mass: &LinkMass, own: &Mat3) -> (f64, [Vector<f64>; 2]) {
+    let about = own.transpose() * mass.about_origin() * own;
+    let eigen = SymmetricEigen::new(0.5 * (about + about.transpose()));
+    let mut order = [0, 1, 2];
+    order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
+    let [most, middle, least] = order.map(|i| eigen.eigenvalues[i]);
+    let along = |k: usize, size: f64| -> Vec3 { eigen.eigenvectors.column(order[k]) * (0.5 * size.max(0.0)).sqrt() };
+    let (a, b) = (along(0, most - middle), along(2, middle - least));
+    (middle, [(a + b).into(), (a - b).into()])
+}

@@ -1,0 +1,157 @@
+//! What acts on one degree of freedom of an articulated body: limits, damping, dry friction, a spring, a drive (thesis §III.B.7, §IV.A.4).
+//!
+//! Limits, dry friction and drives become rows, solved together with all contacts. In `time_stepping` damping and drives are implicit: over a step `h`
+//!
+//! ```text
+//! position drive    τ = k(q* − q − h·q̇⁺) + c(q̇* − q̇⁺)      row  q̇⁺ + R·λ = (k(q* − q) + c·q̇*)/(c + h·k),   R = 1/(h(c + h·k)),   |λ| ≤ h·τ_max
+//! damping           τ = −c·q̇⁺                               row  q̇⁺ + R·λ = 0,                               R = 1/(h·c)
+//! velocity drive    whatever it takes, |τ| ≤ τ_max           row  q̇⁺ = q̇*,                                    |λ| ≤ h·τ_max
+//! dry friction      against the motion, |τ| ≤ τ_f            row  q̇⁺ = 0,                                     |λ| ≤ h·τ_f
+//! ```
+//!
+//! so that no gain is too stiff for the step. In `backtracking` damping and position drives are forces, as accurate as the integrator. Springs are
+//! forces in both.
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `q, q̇` | the freedom's position (rad or m) and velocity; `⁺` at the end of the step |
+//! | `k, c` | stiffness, N·m/rad or N/m, and damping, N·m·s/rad or N·s/m |
+//! | `λ = h·τ` | impulse of the row |
+
+use crate::articulated::model::playback::Playback;
+use std::sync::Arc;
+
+/// What acts on one degree of freedom. Of a spherical or floating joint only damping and dry friction apply: its freedoms have no single position.
+#[derive(Clone, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct DofSettings {
+    /// Least and greatest position, rad or m.
+    pub limits: Option<[f64; 2]>,
+    /// Viscous damping, N·m·s/rad or N·s/m, at least 0.
+    pub damping: f64,
+    /// Dry friction: greatest torque or force that resists motion, N·m or N, at least 0.
+    pub friction: f64,
+    /// Spring towards a rest position.
+    pub spring: Option<Spring>,
+    /// Motor.
+    pub drive: Drive,
+}
+
+/// A linear spring on a joint. A force, never implicit: keep `stiffness·dt²` below the inertia that it moves, or use [`Drive::Position`].
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Spring {
+    /// N·m/rad or N/m, at least 0.
+    pub stiffness: f64,
+    /// Position without force, rad or m.
+    pub rest: f64,
+}
+
+/// A motor on one freedom.
+#[derive(Clone, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub enum Drive {
+    /// None. Torques that the user computes go through [`World::apply_generalized`](crate::World::apply_generalized).
+    #[default]
+    None,
+    /// A proportional–derivative drive.
+    Position {
+        /// N·m/rad or N/m, at least 0.
+        stiffness: f64,
+        /// N·m·s/rad or N·s/m, at least 0; one of the two above 0.
+        damping: f64,
+        /// Position aimed at, rad or m.
+        target: f64,
+        /// Velocity aimed at, rad/s or m/s.
+        velocity: f64,
+        /// Greatest torque or force, N·m or N; may be infinite.
+        limit: f64,
+    },
+    /// Holds a velocity as far as its torque goes.
+    Velocity {
+        /// rad/s or m/s.
+        target: f64,
+        /// Greatest torque or force, N·m or N; may be infinite.
+        limit: f64,
+    },
+    /// Follows a recorded motion, exactly while its torque suffices. Once behind, it goes after the motion at full torque in `time_stepping` and may swing about
+    /// it; in `backtracking` it follows the velocity alone.
+    Playback {
+        /// Position over time.
+        #[serde(with = "tumble_collide::shared")]
+        motion: Arc<Playback>,
+        /// Greatest torque or force, N·m or N; may be infinite.
+        limit: f64,
+    },
+}
+
+/// One freedom follows another, as URDF's `mimic`: `q = multiplier·q_of + offset`.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Coupling {
+    /// Velocity coordinate that follows.
+    pub dof: usize,
+    /// Velocity coordinate that it follows.
+    pub of: usize,
+    /// Ratio.
+    pub multiplier: f64,
+    /// Position where the other's is 0, rad or m.
+    pub offset: f64,
+}
+
+impl DofSettings {
+    /// What is out of its range, if anything: which constant, its value, what would be right.
+    pub(in crate::articulated) fn range_error(&self, positional: bool) -> Option<(&'static str, f64, &'static str)> {
+        let least =
+            |what, value: f64| (!(value.is_finite() && value >= 0.0)).then_some((what, value, "finite and at least 0"));
+        let finite = |what, value: f64| (!value.is_finite()).then_some((what, value, "finite"));
+        let limit = |value: f64| {
+            (value.is_nan() || value < 0.0).then_some(("the drive's limit", value, "at least 0; infinite for none"))
+        };
+        if !positional && (self.limits.is_some() || self.spring.is_some() || self.drive != Drive::None) {
+            return Some((
+                "the number of its joint's freedoms that have limits, springs or drives",
+                1.0,
+                "0: only revolute and prismatic joints have them",
+            ));
+        }
+        let [lo, hi] = self.limits.unwrap_or([-1.0, 1.0]);
+        if lo.is_nan() || hi.is_nan() || lo > hi {
+            return Some(("the lower limit", lo, "a number that is not above the upper limit"));
+        }
+        let spring = self.spring.unwrap_or(Spring { stiffness: 0.0, rest: 0.0 });
+        let own = least("damping", self.damping).or(least("friction", self.friction));
+        let own = own
+            .or(least("the spring's stiffness", spring.stiffness))
+            .or(finite("the spring's rest position", spring.rest));
+        own.or(match &self.drive {
+            Drive::None => None,
+            Drive::Position { stiffness, damping, target, velocity, limit: most } => {
+                least("the drive's stiffness", *stiffness)
+                    .or(least("the drive's damping", *damping))
+                    .or(finite("the drive's target", *target))
+                    .or(finite("the drive's velocity", *velocity))
+                    .or(limit(*most))
+                    .or((stiffness + damping <= 0.0).then_some((
+                        "the sum of the drive's stiffness and damping",
+                        0.0,
+                        "above 0",
+                    )))
+            }
+            Drive::Velocity { target, limit: most } => finite("the drive's target", *target).or(limit(*most)),
+            Drive::Playback { limit: most, .. } => limit(*most),
+        })
+    }
+
+    /// The generalized force of what is always a force: the spring.
+    pub(in crate::articulated) fn spring_force(&self, q: f64) -> f64 {
+        self.spring.map_or(0.0, |s| s.stiffness * (s.rest - q))
+    }
+
+    /// The generalized force of what is a force where rows are not implicit: damping and a position drive.
+    pub(in crate::articulated) fn explicit_force(&self, q: f64, v: f64) -> f64 {
+        let drive = match &self.drive {
+            Drive::Position { stiffness, damping, target, velocity, limit } => {
+                (stiffness * (target - q) + damping * (velocity - v)).clamp(-limit, *limit)
+            }
+            _ => 0.0,
+        };
+        drive - self.damping * v
+    }
+}

@@ -1,0 +1,384 @@
+//! A tree of links: what never changes of an articulated body [RBDA §4.1–4.4], thesis §III.B.1.
+//!
+//! Links are numbered so that a parent comes before its children. Fixed links are folded into their parents when the model is built and live on
+//! as [`LinkFrame`]s. Coordinates are laid out link by link: `q` has [`Model::positions`] numbers and `v` has [`Model::dof`].
+
+pub(in crate::articulated) mod compiled;
+pub(in crate::articulated) mod coordinates;
+pub(in crate::articulated) mod dof;
+pub(in crate::articulated) mod joint;
+pub(in crate::articulated) mod playback;
+
+use self::joint::Joint;
+use nalgebra::SymmetricEigen;
+use std::collections::BTreeMap;
+use tumble_collide::{Mat3, Pose, Vec3};
+
+/// Links at most in one model: a bound for what comes from files.
+pub const MAX_LINKS: usize = 10_000;
+
+/// What is wrong with a model.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ModelError {
+    /// Nothing in it.
+    #[error("the model has no moving link")]
+    Empty,
+    /// More links than [`MAX_LINKS`].
+    #[error("the model has more than {MAX_LINKS} links")]
+    TooMany,
+    /// Names are unique within a model.
+    #[error("two links are named '{0}'; names must be unique within a model")]
+    DuplicateName(String),
+    /// A parent that was not added before.
+    #[error("link '{link}': its parent, link number {parent}, was not added before it")]
+    Parent {
+        /// Link.
+        link: String,
+        /// Parent given.
+        parent: usize,
+    },
+    /// Only a root can float.
+    #[error("link '{0}': only a root can have a floating joint")]
+    Floating(String),
+    /// An axis without direction.
+    #[error("link '{link}': its joint axis {axis:?} has no direction; it must be finite and not zero")]
+    Axis {
+        /// Link.
+        link: String,
+        /// Axis given.
+        axis: [f64; 3],
+    },
+    /// A pose with numbers that are not finite, or a rotation that is not of unit length.
+    #[error("link '{0}': its placement must be finite, with a rotation of unit length")]
+    Placement(String),
+    /// Mass or inertia of no body.
+    #[error("link '{link}': {what} is {value}; it must be {wanted}")]
+    Inertia {
+        /// Link.
+        link: String,
+        /// Which constant.
+        what: &'static str,
+        /// Value given.
+        value: f64,
+        /// What would be right.
+        wanted: &'static str,
+    },
+    /// Nothing that a joint moves has any inertia along it.
+    #[error(
+        "link '{0}' and all that hangs on it have no inertia about its joint, so no force could move it as asked: give it or a link below it mass"
+    )]
+    Massless(String),
+}
+
+/// Mass of a link, in the link's frame. All zero is a massless link, for joints of several degrees of freedom that are stacked.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct LinkMass {
+    /// Mass, kg.
+    pub mass: f64,
+    /// Centre of mass, metres, link frame.
+    pub center: Vec3,
+    /// Inertia about the centre of mass, link axes, kg·m².
+    pub inertia: Mat3,
+}
+
+impl LinkMass {
+    /// A link without mass.
+    pub fn none() -> LinkMass {
+        LinkMass { mass: 0.0, center: Vec3::zeros(), inertia: Mat3::zeros() }
+    }
+
+    /// A point of `mass` kg.
+    pub fn point(mass: f64, center: Vec3) -> LinkMass {
+        LinkMass { mass, center, inertia: Mat3::zeros() }
+    }
+
+    /// The inertia about the link's origin: `I + m(|c|²·1 − c·cᵀ)`.
+    pub fn about_origin(&self) -> Mat3 {
+        self.inertia
+            + self.mass * (self.center.norm_squared() * Mat3::identity() - self.center * self.center.transpose())
+    }
+
+    /// The two held together, `other` in the same frame.
+    pub fn with(&self, other: &LinkMass) -> LinkMass {
+        let mass = self.mass + other.mass;
+        if mass == 0.0 {
+            return LinkMass { inertia: self.inertia + other.inertia, ..*self };
+        }
+        let center = (self.mass * self.center + other.mass * other.center) / mass;
+        let moved = |m: &LinkMass| LinkMass { center: m.center - center, ..*m }.about_origin();
+        LinkMass { mass, center, inertia: moved(self) + moved(other) }
+    }
+
+    /// The same mass seen from the frame in which this one's frame has pose `pose`.
+    pub fn seen_from(&self, pose: &Pose) -> LinkMass {
+        let r = pose.rotation.to_rotation_matrix().into_inner();
+        LinkMass {
+            mass: self.mass,
+            center: pose.transform_point(&self.center.into()).coords,
+            inertia: r * self.inertia * r.transpose(),
+        }
+    }
+
+    fn validate(&self, link: &str) -> Result<(), ModelError> {
+        let range_error =
+            |what, value, wanted| Err(ModelError::Inertia { link: link.to_string(), what, value, wanted });
+        if !(self.mass.is_finite() && self.mass >= 0.0) {
+            return range_error("mass", self.mass, "finite and at least 0 kg");
+        }
+        if let Some(value) = self.center.iter().copied().find(|x| !x.is_finite()) {
+            return range_error("a coordinate of the centre of mass", value, "finite");
+        }
+        if let Some(value) = self.inertia.iter().copied().find(|x| !x.is_finite()) {
+            return range_error("an entry of the inertia", value, "finite");
+        }
+        let size = self.inertia.amax();
+        let skew = (self.inertia - self.inertia.transpose()).amax();
+        if skew > 1e-9 * size {
+            return range_error("the asymmetry of the inertia", skew, "0");
+        }
+        let moments = SymmetricEigen::new(0.5 * (self.inertia + self.inertia.transpose())).eigenvalues;
+        if moments.min() < -1e-12 * size {
+            return range_error("the least principal moment of inertia", moments.min(), "at least 0 kg·m²");
+        }
+        Ok(())
+    }
+}
+
+/// A link that moves.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Link {
+    /// Name, unique in the model.
+    pub name: String,
+    /// Link that it hangs on; `None` on the world (or, for a root that floats, on nothing).
+    pub parent: Option<usize>,
+    /// Never [`Joint::Fixed`]; axes are unit.
+    pub joint: Joint,
+    /// The joint's frame in the parent link's frame (in the world for a root). For a floating root, where it starts: its pose is all in `q`.
+    pub placement: Pose,
+    /// Mass, with that of all fixed links folded in, link frame.
+    pub mass: LinkMass,
+    /// First of its position numbers.
+    pub q: usize,
+    /// First of its velocity numbers.
+    pub v: usize,
+}
+
+/// A named frame that moves with a link: every link, the folded ones too.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct LinkFrame {
+    /// Name of the link as it was added.
+    pub name: String,
+    /// Moving link that carries it; `None` for one fixed to the base.
+    pub link: Option<usize>,
+    /// Pose in that link's frame (in the base frame where there is none).
+    pub pose: Pose,
+}
+
+/// A tree of links with its coordinates.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Model {
+    links: Vec<Link>,
+    frames: Vec<LinkFrame>,
+    positions: usize,
+    dof: usize,
+}
+
+impl Model {
+    /// The moving links, parents first.
+    pub fn links(&self) -> &[Link] {
+        &self.links
+    }
+
+    /// All named frames, in the order in which their links were added.
+    pub fn frames(&self) -> &[LinkFrame] {
+        &self.frames
+    }
+
+    /// The frame of that name.
+    pub fn frame(&self, name: &str) -> Option<&LinkFrame> {
+        self.frames.iter().find(|f| f.name == name)
+    }
+
+    /// The moving link of that name.
+    pub fn link(&self, name: &str) -> Option<usize> {
+        self.links.iter().position(|l| l.name == name)
+    }
+
+    /// Length of `q`.
+    pub fn positions(&self) -> usize {
+        self.positions
+    }
+
+    /// Length of `v`: degrees of freedom.
+    pub fn dof(&self) -> usize {
+        self.dof
+    }
+
+    /// Writes the zero position: unit quaternions, all else 0.
+    pub fn write_zero(&self, q: &mut [f64]) {
+        q[..self.positions].fill(0.0);
+        for link in &self.links {
+            if let Some(k) = link.joint.quaternion() {
+                q[link.q + k + 3] = 1.0;
+            }
+        }
+    }
+
+    /// Moves the base: the placements of all roots that do not float.
+    pub(in crate::articulated) fn place(&mut self, step: &Pose) {
+        for link in self.links.iter_mut().filter(|l| l.parent.is_none() && l.joint != Joint::Floating) {
+            link.placement = step * link.placement;
+        }
+    }
+
+    /// Total mass, kg.
+    pub fn mass(&self) -> f64 {
+        self.links.iter().map(|l| l.mass.mass).sum()
+    }
+}
+
+/// Collects links and makes a [`Model`].
+///
+/// ```
+/// use tumble_core::{Joint, LinkMass, ModelBuilder, collide::{Mat3, Pose, Vec3}};
+/// let rod = LinkMass { mass: 1.0, center: Vec3::new(0.0, 0.0, -0.5), inertia: Mat3::from_diagonal(&Vec3::new(1.0 / 12.0, 1.0 / 12.0, 0.0)) };
+/// let mut builder = ModelBuilder::new();
+/// let upper = builder.link("upper", None, Joint::revolute(Vec3::y()), Pose::identity(), rod);
+/// builder.link("lower", Some(upper), Joint::revolute(Vec3::y()), Pose::translation(0.0, 0.0, -1.0), rod);
+/// let model = builder.build()?;
+/// assert_eq!(model.dof(), 2);
+/// # Ok::<(), tumble_core::ModelError>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct ModelBuilder {
+    added: Vec<Added>,
+}
+
+#[derive(Clone, Debug)]
+struct Added {
+    name: String,
+    parent: Option<usize>,
+    joint: Joint,
+    placement: Pose,
+    mass: LinkMass,
+}
+
+impl ModelBuilder {
+    /// No links yet.
+    pub fn new() -> ModelBuilder {
+        ModelBuilder::default()
+    }
+
+    /// Adds a link and returns its number, for its children to name as their parent. `placement` is the joint's frame in the parent link's frame; where the joint is
+    /// at zero it is also the link's own. Nothing is checked before [`build`](Self::build).
+    pub fn link(
+        &mut self,
+        name: impl Into<String>,
+        parent: Option<usize>,
+        joint: Joint,
+        placement: Pose,
+        mass: LinkMass,
+    ) -> usize {
+        self.added.push(Added { name: name.into(), parent, joint, placement, mass });
+        self.added.len() - 1
+    }
+
+    /// Checks everything, folds fixed links into their parents and numbers the coordinates.
+    pub fn build(self) -> Result<Model, ModelError> {
+        if self.added.len() > MAX_LINKS {
+            return Err(ModelError::TooMany);
+        }
+        let mut model = Model { links: Vec::new(), frames: Vec::new(), positions: 0, dof: 0 };
+        let mut names = BTreeMap::new();
+        for (number, added) in self.added.into_iter().enumerate() {
+            if names.insert(added.name.clone(), number).is_some() {
+                return Err(ModelError::DuplicateName(added.name));
+            }
+            model.add(number, added)?;
+        }
+        if model.links.is_empty() {
+            return Err(ModelError::Empty);
+        }
+        model.check_masses()?;
+        Ok(model)
+    }
+}
+
+impl Model {
+    fn add(&mut self, number: usize, added: Added) -> Result<(), ModelError> {
+        let Added { name, parent, joint, mut placement, mass } = added;
+        if parent.is_some_and(|p| p >= number) {
+            return Err(ModelError::Parent { link: name, parent: parent.unwrap_or(number) });
+        }
+        if joint == Joint::Floating && parent.is_some() {
+            return Err(ModelError::Floating(name));
+        }
+        let unit = (placement.rotation.norm() - 1.0).abs() < 1e-9;
+        if !unit || placement.translation.vector.iter().any(|x| !x.is_finite()) {
+            return Err(ModelError::Placement(name));
+        }
+        mass.validate(&name)?;
+        let mut carrier = None;
+        if let Some(frame) = parent.map(|p| &self.frames[p]) {
+            (carrier, placement) = (frame.link, frame.pose * placement);
+        }
+        if joint == Joint::Fixed {
+            if let Some(link) = carrier {
+                let carried = &mut self.links[link].mass;
+                *carried = carried.with(&mass.seen_from(&placement));
+            }
+            self.frames.push(LinkFrame { name, link: carrier, pose: placement });
+            return Ok(());
+        }
+        let joint = unit_axis(joint, &name)?;
+        self.frames.push(LinkFrame { name: name.clone(), link: Some(self.links.len()), pose: Pose::identity() });
+        let (q, v) = (self.positions, self.dof);
+        self.positions += joint.positions();
+        self.dof += joint.dof();
+        self.links.push(Link { name, parent: carrier, joint, placement, mass, q, v });
+        Ok(())
+    }
+
+    /// Whether something of mass hangs on every joint: what is below it must have mass, or inertia of its own.
+    /// Whether parents stand before their children and coordinates follow one another: what a builder makes, and a damaged archive may not hold.
+    pub(crate) fn is_sound(&self) -> bool {
+        let mut ends = (0, 0);
+        let links = self.links.iter().enumerate().all(|(i, link)| {
+            let starts = std::mem::replace(&mut ends, (link.q + link.joint.positions(), link.v + link.joint.dof()));
+            link.parent.is_none_or(|parent| parent < i) && (link.q, link.v) == starts && link.joint.dof() > 0
+        });
+        let frames = self.frames.iter().all(|frame| frame.link.is_none_or(|link| link < self.links.len()));
+        links && frames && ends == (self.positions, self.dof) && self.check_masses().is_ok()
+    }
+
+    fn check_masses(&self) -> Result<(), ModelError> {
+        let mut heavy: Vec<bool> =
+            self.links.iter().map(|l| l.mass.mass > 0.0 || l.mass.inertia.amax() > 0.0).collect();
+        for i in (0..self.links.len()).rev() {
+            if !heavy[i] {
+                return Err(ModelError::Massless(self.links[i].name.clone()));
+            }
+            if let Some(parent) = self.links[i].parent {
+                heavy[parent] = true;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn unit_axis(joint: Joint, link: &str) -> Result<Joint, ModelError> {
+    let unit = |axis: Vec3| {
+        let norm = axis.norm();
+        let fine = norm.is_finite() && norm > 1e-12;
+        if fine {
+            Ok(axis / norm)
+        } else {
+            Err(ModelError::Axis { link: link.to_string(), axis: [axis.x, axis.y, axis.z] })
+        }
+    };
+    Ok(match joint {
+        Joint::Revolute { axis } => Joint::Revolute { axis: unit(axis)? },
+        Joint::Prismatic { axis } => Joint::Prismatic { axis: unit(axis)? },
+        other => other,
+    })
+}

@@ -1,0 +1,148 @@
+//! Forward dynamics of many states of one model side by side: the sweeps of [`abm`](crate::articulated::algorithms::abm), a state per lane.
+//!
+//! A lane's bits are those of [`forward_dynamics`](crate::articulated::forward_dynamics) on that state alone, on every processor: what differs is how many lanes
+//! one instruction moves.
+
+use crate::articulated::algorithms::abm::{Input, Sweep};
+use crate::articulated::model::Model;
+use crate::articulated::model::compiled::Compiled;
+#[cfg(target_arch = "x86_64")]
+use crate::articulated::simd::lanes::{Eight, Four};
+use crate::articulated::simd::lanes::{Lanes, Register};
+use tumble_collide::Vec3;
+
+/// A model made ready for `N` states at a time. Fast where `N` fills registers: a multiple of 8 on processors with AVX-512, of 4 on those with AVX2.
+/// All others are moved one by one.
+#[derive(Clone, Debug)]
+pub struct BatchDynamics<const N: usize> {
+    compiled: Compiled,
+    width: SimdWidth,
+}
+
+/// The registers used, with the proof that the processor has them.
+#[derive(Clone, Debug)]
+enum SimdWidth {
+    One(Sweep<f64>),
+    #[cfg(target_arch = "x86_64")]
+    Four(pulp::x86::V3, Sweep<Four>),
+    #[cfg(target_arch = "x86_64")]
+    Eight(pulp::x86::V4, Sweep<Eight>),
+}
+
+impl<const N: usize> BatchDynamics<N> {
+    /// Makes a model ready; all allocation happens here.
+    pub fn new(model: &Model) -> BatchDynamics<N> {
+        let compiled = Compiled::new(model);
+        BatchDynamics { width: SimdWidth::best(&compiled, N), compiled }
+    }
+
+    /// The same one by one, as on a processor without SIMD: slower, the same bits.
+    pub fn plain(model: &Model) -> BatchDynamics<N> {
+        let compiled = Compiled::new(model);
+        BatchDynamics { width: SimdWidth::One(Sweep::new(&compiled, 0.0)), compiled }
+    }
+
+    /// `q̈` of every lane from its `q`, `v` and joint forces `tau` (lengths `positions` and `dof` of the model, one state per lane), in uniform gravity,
+    /// m/s². Where a joint is singular its axis is held still, as [`Dynamics::singular`](crate::articulated::Dynamics::singular) says.
+    pub fn forward_dynamics(
+        &mut self,
+        gravity: &Vec3,
+        q: &[Lanes<N>],
+        v: &[Lanes<N>],
+        tau: &[Lanes<N>],
+        qdd: &mut [Lanes<N>],
+    ) {
+        let call = Call { compiled: &self.compiled, gravity, q, v, tau, qdd };
+        match &mut self.width {
+            SimdWidth::One(sweep) => call.run((), sweep),
+            #[cfg(target_arch = "x86_64")]
+            SimdWidth::Four(token, sweep) => token.vectorize(VectorizedCall { call, token: *token, sweep }),
+            #[cfg(target_arch = "x86_64")]
+            SimdWidth::Eight(token, sweep) => token.vectorize(VectorizedCall { call, token: *token, sweep }),
+        }
+    }
+}
+
+impl SimdWidth {
+    fn best(compiled: &Compiled, lanes: usize) -> SimdWidth {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if let (0, Some(token)) = (lanes % Eight::LANES, pulp::x86::V4::try_new()) {
+                return SimdWidth::Eight(token, Sweep::new(compiled, Eight::load(token, &[0.0; Eight::LANES])));
+            }
+            if let (0, Some(token)) = (lanes % Four::LANES, pulp::x86::V3::try_new()) {
+                return SimdWidth::Four(token, Sweep::new(compiled, Four::load(token, &[0.0; Four::LANES])));
+            }
+        }
+        let _ = lanes;
+        SimdWidth::One(Sweep::new(compiled, 0.0))
+    }
+}
+
+/// One call's arguments.
+struct Call<'a, const N: usize> {
+    compiled: &'a Compiled,
+    gravity: &'a Vec3,
+    q: &'a [Lanes<N>],
+    v: &'a [Lanes<N>],
+    tau: &'a [Lanes<N>],
+    qdd: &'a mut [Lanes<N>],
+}
+
+impl<const N: usize> Call<'_, N> {
+    /// A register of lanes after the other.
+    #[inline(always)]
+    fn run<T: Register>(self, token: T::Token, sweep: &mut Sweep<T>) {
+        let Call { compiled, gravity, q, v, tau, qdd } = self;
+        for first in (0..N).step_by(T::LANES) {
+            sweep.run(compiled, gravity, &LaneInput::<T, N> { token, first, q, v, tau }, |k, x| {
+                x.store(&mut qdd[k].0[first..])
+            });
+        }
+    }
+}
+
+/// States side by side, as a sweep reads them: a register of lanes from the first on.
+struct LaneInput<'a, T: Register, const N: usize> {
+    token: T::Token,
+    first: usize,
+    q: &'a [Lanes<N>],
+    v: &'a [Lanes<N>],
+    tau: &'a [Lanes<N>],
+}
+
+impl<T: Register, const N: usize> Input<T> for LaneInput<'_, T, N> {
+    #[inline(always)]
+    fn joint_angle_sin_cos(&self, _: usize, q: usize) -> (T, T) {
+        self.q(q).sin_cos()
+    }
+    #[inline(always)]
+    fn q(&self, k: usize) -> T {
+        T::load(self.token, &self.q[k].0[self.first..])
+    }
+    #[inline(always)]
+    fn v(&self, k: usize) -> T {
+        T::load(self.token, &self.v[k].0[self.first..])
+    }
+    #[inline(always)]
+    fn tau(&self, k: usize) -> T {
+        T::load(self.token, &self.tau[k].0[self.first..])
+    }
+}
+
+/// A call that is compiled for the instructions of the one who makes it.
+#[cfg(target_arch = "x86_64")]
+struct VectorizedCall<'a, T: Register, const N: usize> {
+    call: Call<'a, N>,
+    token: T::Token,
+    sweep: &'a mut Sweep<T>,
+}
+
+#[cfg(target_arch = "x86_64")]
+impl<T: Register, const N: usize> pulp::NullaryFnOnce for VectorizedCall<'_, T, N> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        self.call.run(self.token, self.sweep);
+    }
+}

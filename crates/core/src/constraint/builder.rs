@@ -1,0 +1,187 @@
+//! How constraints and contacts become rows.
+
+use crate::constraint::rows::{RowSet, Rows};
+use crate::object::collidable::ContactFrame;
+use crate::object::part_state::PartState;
+use crate::object::{Constraint, Integratable, RowTarget};
+use crate::world::view::{Entry, Mode, ObjectId, Objects};
+use tumble_collide::Vec3;
+
+/// What a row's velocity is of: rows of one kind in one constraint have one unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RowKind {
+    /// Points: metres.
+    Point,
+    /// Rotations: radians.
+    Rotation,
+    /// An object's own coordinates, whatever they are.
+    Coordinate,
+}
+
+/// Collects rows. A row is started with [`row`](Self::row) and then told what it acts on; its velocity is the sum of what it was told.
+///
+/// ```text
+/// out.row(RowTarget::new(RowSet::Equality, drift))
+///    .on_point(bead, 0, &p, &axis, 1.0)
+///    .on_point(post, 0, &p, &axis, -1.0);
+/// ```
+pub struct RowBuilder<'a> {
+    pub(crate) rows: &'a mut Rows,
+    /// Velocity of each row that comes from sides without freedoms (kinematic motion).
+    pub(crate) bias: &'a mut Vec<f64>,
+    pub(crate) targets: &'a mut Vec<RowTarget>,
+    /// Of each target.
+    pub(crate) kinds: &'a mut Vec<RowKind>,
+    pub(crate) objects: Objects<'a>,
+    pub(crate) x: &'a [f64],
+    pub(crate) part_states: &'a [PartState],
+    pub(crate) problem: &'a mut Option<String>,
+    /// Whose rows are being made.
+    pub(crate) owner: ObjectId,
+}
+
+impl RowBuilder<'_> {
+    /// The constraint whose rows are being made, for objects that constrain themselves.
+    pub fn owner(&self) -> ObjectId {
+        self.owner
+    }
+
+    /// Starts a row. A `Cone` set is for contacts, which the world makes itself: it is refused here, and the step reports it.
+    pub fn row(&mut self, target: RowTarget) -> &mut Self {
+        let bounds = if let RowSet::Interval { lo, hi } = target.set { lo <= hi } else { true };
+        if !(target.compliance.is_finite() && target.compliance >= 0.0) {
+            self.refuse(format!("a row's compliance is {}; it must be finite and at least 0", target.compliance));
+            return self;
+        }
+        let finite = [target.error, target.velocity, target.bias_acceleration].iter().all(|x| x.is_finite());
+        if target.set.rows() != 1 || !finite || !bounds {
+            self.refuse("a constraint's row must be Equality, HalfLine or Interval (lo ≤ hi), with finite error, velocity and bias".into());
+            return self;
+        }
+        self.rows.push_soft(target.set, target.compliance);
+        self.bias.push(0.0);
+        self.targets.push(target);
+        self.kinds.push(RowKind::Point);
+        self
+    }
+
+    /// Adds `sign ·` the velocity along `axis` of the material point of one part that is at world point `p`.
+    pub fn on_point(&mut self, id: ObjectId, part: usize, p: &Vec3, axis: &Vec3, sign: f64) -> &mut Self {
+        let objects = self.objects;
+        if !self.open(p.iter().chain(axis.iter())) {
+            return self;
+        }
+        self.on_part(objects.get(id), part, |row, entry| row.point_side(entry, part, p, &[*axis], sign));
+        self
+    }
+
+    /// Adds `sign ·` the angular velocity of one part along the unit vector `axis`. Said by a couple of test impulses, which every part answers:
+    /// for unit `b ⟂ c` with `b × c = axis` it is `(v(p + b) − v(p))·c`, exactly.
+    pub fn on_rotation(&mut self, id: ObjectId, part: usize, axis: &Vec3, sign: f64) -> &mut Self {
+        let objects = self.objects;
+        if !self.open(axis.iter()) {
+            return self;
+        }
+        self.is_of(RowKind::Rotation);
+        let [_, b, c] = ContactFrame::new(Vec3::zeros(), *axis).axes;
+        self.on_part(objects.get(id), part, |row, entry| {
+            let p = row.part_states[entry.state_range.parts.start + part].position();
+            row.point_side(entry, part, &(p + b), &[c], sign) && row.point_side(entry, part, &p, &[c], -sign)
+        });
+        self
+    }
+
+    fn is_of(&mut self, kind: RowKind) {
+        self.kinds.last_mut().into_iter().for_each(|last| *last = kind);
+    }
+
+    /// Lets `add` put its side of the row; refuses the row where the object is gone, has no such part, or is a third.
+    fn on_part(&mut self, entry: Option<Entry>, part: usize, add: impl FnOnce(&mut Self, &Entry) -> bool) {
+        let Some(entry) = entry else { return self.refuse("a row names an object that is not in the world".into()) };
+        if part >= entry.state_range.parts.len() || !add(self, &entry) {
+            self.refuse(format!(
+                "'{}' has no part {part} that answers impulses, or the row names a third object",
+                entry.object.name()
+            ));
+        }
+    }
+
+    /// Adds `Σ j_k · v_k` over the generalized velocities of one object.
+    pub fn on_coordinates(&mut self, id: ObjectId, jacobian: &[f64]) -> &mut Self {
+        let objects = self.objects;
+        if !self.open(jacobian.iter()) {
+            return self;
+        }
+        self.is_of(RowKind::Coordinate);
+        let Some(entry) = objects.get(id) else {
+            self.refuse("a row names an object that is not in the world".into());
+            return self;
+        };
+        let done = entry.object.integratable().filter(|i| i.state_sizes().dof == jacobian.len()).is_some_and(|i| {
+            if !entry.moves() {
+                return self.kinematic_coordinates(&entry, i, jacobian);
+            }
+            let mut y = vec![0.0; jacobian.len()];
+            i.respond(jacobian, &mut y);
+            let side = self.rows.side(entry.state_range.v.start, y.len());
+            side.map(|side| side.iter_mut().zip(&y).for_each(|(s, y)| *s += y)).is_some()
+        });
+        if !done {
+            self.refuse(format!(
+                "'{}': the row's Jacobian has {} numbers, or it names a third object",
+                entry.object.name(),
+                jacobian.len()
+            ));
+        }
+        self
+    }
+
+    /// Whether there is a row to add to, and the numbers given for it are finite; refuses them otherwise.
+    fn open<'n>(&mut self, mut numbers: impl Iterator<Item = &'n f64>) -> bool {
+        let finite = numbers.all(|x| x.is_finite());
+        if self.problem.is_none() && (self.targets.is_empty() || !finite) {
+            self.refuse("a row's points, axes and Jacobians must be finite, and `row` comes first".into());
+        }
+        self.problem.is_none()
+    }
+
+    /// The velocity of something led along a row written in its coordinates.
+    fn kinematic_coordinates(&mut self, entry: &Entry, body: &dyn Integratable, jacobian: &[f64]) -> bool {
+        if entry.status.mode == Mode::Kinematic && entry.status.enabled {
+            let mut v = vec![0.0; jacobian.len()];
+            body.velocity(&self.x[entry.state_range.x.clone()], &mut v);
+            let kinematic: f64 = v.iter().zip(jacobian).map(|(v, j)| v * j).sum();
+            self.bias.last_mut().into_iter().for_each(|bias| *bias += kinematic);
+        }
+        true
+    }
+
+    /// One side of the last block: a test impulse where it moves, its velocity where it is led.
+    pub(crate) fn point_side(&mut self, entry: &Entry, part: usize, p: &Vec3, axes: &[Vec3], sign: f64) -> bool {
+        let part_state = &self.part_states[entry.state_range.parts.start + part];
+        let Some(collidable) = entry.object.collidable() else { return false };
+        if entry.moves() {
+            let Some(y) = self.rows.side(entry.state_range.v.start, entry.state_range.v.len()) else { return false };
+            collidable.test_impulse(part, part_state, p, axes, sign, y);
+        } else {
+            let velocity = part_state.velocity_at(p);
+            let first = self.bias.len() - axes.len();
+            for (bias, axis) in self.bias[first..].iter_mut().zip(axes) {
+                *bias += sign * velocity.dot(axis);
+            }
+        }
+        true
+    }
+
+    fn refuse(&mut self, why: String) {
+        self.problem.get_or_insert(why);
+    }
+}
+
+/// The constraints of the table in the order in which they were added; without those that hold nothing but an object that nothing moves.
+pub(crate) fn constraints<'a>(objects: Objects<'a>) -> impl Iterator<Item = (ObjectId, Entry<'a>, &'a dyn Constraint)> {
+    let entries = objects.table.order.iter().copied().zip(objects.iter());
+    entries
+        .filter(|(_, e)| e.status.enabled)
+        .filter_map(|(id, e)| Some((id, e, e.object.constraint().filter(|c| e.moves() || !c.on_itself())?)))
+}

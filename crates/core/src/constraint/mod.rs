@@ -1,0 +1,5 @@
+//! Constraint rows, how constraints and contacts lay them, and loop joints.
+
+pub(crate) mod builder;
+pub(crate) mod loop_joint;
+pub mod rows;

@@ -1,0 +1,369 @@
+//! Which parts touch or nearly do: broad phase, filters, narrow phase, warm starts.
+
+use crate::clone_by_field::clone_by_field;
+use crate::contact::pair::{MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
+use crate::contact::pair_material::PairMaterials;
+use crate::object::collidable::{ContactFrame, Material};
+use crate::object::part_state::PartState;
+use crate::settings::Settings;
+use crate::step::shift_to_impact;
+use crate::world::view::{Entry, Mode, ObjectId, Objects};
+use tumble_collide::{BroadPhase, Contact, NormalFrom, Vec3};
+
+/// The object of a row of the part table, and the part of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Owner {
+    pub id: ObjectId,
+    /// Place of the object in the order of adding.
+    pub place: u32,
+    pub part: u32,
+}
+
+/// Names a contact across steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+pub(crate) struct ContactKey {
+    /// Serial and part of either side, A first.
+    pub pair: [u32; 4],
+    pub feature: u64,
+}
+
+/// A contact between two sites, with the constants of the pair.
+#[derive(Clone, Debug)]
+pub(crate) struct ContactConstraint {
+    pub a: u32,
+    pub b: u32,
+    pub contact: Contact,
+    /// From A's contact point to B's, metres: not zero where the bodies meet only later in the step.
+    pub offset: Vec3,
+    pub frame: ContactFrame,
+    pub friction: f64,
+    pub restitution: f64,
+    pub key: ContactKey,
+}
+
+/// Last step's impulse (or force) per contact, world axes, on A.
+#[derive(Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(crate) struct WarmStarts {
+    entries: Vec<(ContactKey, [f64; 3])>,
+}
+
+clone_by_field!(WarmStarts { entries });
+
+impl WarmStarts {
+    /// Takes out what is filed under the keys that `which` picks.
+    pub fn take(&mut self, which: impl Fn(&ContactKey) -> bool) -> Vec<(ContactKey, [f64; 3])> {
+        let (taken, kept) = std::mem::take(&mut self.entries).into_iter().partition(|e| which(&e.0));
+        self.entries = kept;
+        taken
+    }
+
+    /// Files what was taken.
+    pub fn add(&mut self, entries: Vec<(ContactKey, [f64; 3])>) {
+        self.entries.extend(entries);
+        self.entries.sort_by_key(|e| e.0);
+        self.entries.dedup_by_key(|e| e.0);
+    }
+
+    /// Files anew; `entries` may come in any order.
+    pub fn replace(&mut self, entries: impl Iterator<Item = (ContactKey, Vec3)>) {
+        self.entries.clear();
+        self.entries.extend(entries.map(|(k, v)| (k, [v.x, v.y, v.z])));
+        if !self.in_order() {
+            self.entries.sort_by_key(|e| e.0);
+        }
+    }
+
+    /// What was filed under `key`. `place` is where the last search ended: keys that come in order are found in a step or two.
+    pub fn get(&self, key: &ContactKey, place: &mut usize) -> Option<Vec3> {
+        let before = self.entries[..*place].last().is_some_and(|e| e.0 >= *key);
+        let from = if before { 0 } else { *place };
+        *place = from + exponential_search(&self.entries[from..], key);
+        let found = self.entries.get(*place).filter(|e| e.0 == *key)?;
+        Some(Vec3::from(found.1))
+    }
+
+    /// Whether any contact of the key's pair carried a force.
+    pub fn carries(&self, key: &ContactKey) -> bool {
+        let first = self.entries.partition_point(|e| e.0.pair < key.pair);
+        self.entries[first..].iter().take_while(|e| e.0.pair == key.pair).any(|e| e.1 != [0.0; 3])
+    }
+
+    /// Sorted by key, as the look-ups need it.
+    pub fn in_order(&self) -> bool {
+        self.entries.is_sorted_by(|a, b| a.0 < b.0)
+    }
+
+    pub fn finite(&self) -> bool {
+        self.entries.iter().flat_map(|e| e.1).all(f64::is_finite)
+    }
+
+    pub fn forget(&mut self, serial: u32) {
+        self.entries.retain(|(k, _)| k.pair[0] != serial && k.pair[2] != serial);
+    }
+}
+
+/// How many entries come before `key`, searched for at doubling distances from the start.
+fn exponential_search(entries: &[(ContactKey, [f64; 3])], key: &ContactKey) -> usize {
+    let (mut low, mut step) = (0, 1);
+    while entries.get(low + step - 1).is_some_and(|e| e.0 < *key) {
+        low += step;
+        step *= 2;
+    }
+    let high = (low + step).min(entries.len());
+    low + entries[low..high].partition_point(|e| e.0 < *key)
+}
+
+/// The detector's working memory.
+#[derive(Default)]
+pub(crate) struct DetectorBuffers {
+    proxies: Vec<u32>,
+    motion_bounds: Vec<MotionBounds>,
+    narrow_phase_cache: NarrowPhaseCache,
+    /// Who has which box of the broad phase: those of the last detection, and of this one. Ascending, as the site table is.
+    registered: Vec<BroadPhaseProxy>,
+    gathered: Vec<BroadPhaseProxy>,
+    /// Place in `proxies` of every handle.
+    place: Vec<u32>,
+    pairs: Vec<[u32; 2]>,
+    found: Vec<Contact>,
+}
+
+impl DetectorBuffers {
+    /// Drops what was found: a frame knows nothing of the one before.
+    pub fn forget(&mut self) {
+        self.narrow_phase_cache.forget();
+    }
+}
+
+/// A part that has a box in the broad phase, under a handle.
+#[derive(Clone, Copy)]
+struct BroadPhaseProxy {
+    /// Serial and part.
+    who: [u32; 2],
+    handle: u32,
+}
+
+/// What the detector reads.
+pub(crate) struct Detector<'a> {
+    pub objects: Objects<'a>,
+    pub owners: &'a [Owner],
+    pub part_states: &'a [PartState],
+    pub settings: &'a Settings,
+    pub pair_materials: &'a PairMaterials,
+    pub broad: &'a mut dyn BroadPhase,
+    pub scratch: &'a mut DetectorBuffers,
+    /// Serials of sleepers that something comes near.
+    pub needs_wake: &'a mut Vec<u32>,
+}
+
+impl Detector<'_> {
+    /// All contacts whose gap is at most what the pair may close within `horizon` seconds, plus the drift tolerance.
+    pub fn detect(&mut self, horizon: f64, prediction: PredictionMode, out: &mut Vec<ContactConstraint>) {
+        out.clear();
+        self.gather(horizon);
+        let mut pairs = std::mem::take(&mut self.scratch.pairs);
+        self.broad.pairs(&mut pairs);
+        self.order_by_part(&mut pairs);
+        self.scratch.narrow_phase_cache.begin();
+        for &[i, j] in &pairs {
+            self.narrow([i as usize, j as usize], (horizon, prediction), out);
+        }
+        self.scratch.narrow_phase_cache.end();
+        self.scratch.pairs = pairs;
+    }
+
+    /// One box per part that can meet anything, around all its way, filed in the broad phase.
+    fn gather(&mut self, horizon: f64) {
+        let s = &mut *self.scratch;
+        s.proxies.clear();
+        s.motion_bounds.clear();
+        s.gathered.clear();
+        let mut registered = s.registered.iter().peekable();
+        for entry in self.objects.iter().filter(|e| e.status.enabled && e.status.collidable) {
+            let Some(collidable) = entry.object.collidable() else { continue };
+            for (part, index) in entry.state_range.parts.clone().enumerate() {
+                let Some(shape) = collidable.shape(part) else { continue };
+                let part_state = &self.part_states[index];
+                let tight = shape.aabb(&part_state.pose);
+                let around = (tight.max - part_state.position()).sup(&(part_state.position() - tight.min));
+                let motion_bounds = MotionBounds::new(part_state, shape.bounding_radius(), around, horizon);
+                let bounds = motion_bounds.swept(&tight, self.settings.drift_tolerance);
+                let moving = entry.status.mode != Mode::Static && !entry.asleep;
+                let who = [entry.serial, part as u32];
+                while let Some(gone) = registered.next_if(|f| f.who < who) {
+                    self.broad.remove(gone.handle);
+                }
+                let handle = match registered.next_if(|f| f.who == who) {
+                    Some(known) => {
+                        self.broad.set(known.handle, &bounds, moving);
+                        known.handle
+                    }
+                    None => self.broad.insert(&bounds, moving),
+                };
+                s.proxies.push(index as u32);
+                s.motion_bounds.push(motion_bounds);
+                s.gathered.push(BroadPhaseProxy { who, handle });
+            }
+        }
+        registered.for_each(|gone| self.broad.remove(gone.handle));
+        std::mem::swap(&mut s.registered, &mut s.gathered);
+    }
+
+    /// Pairs of handles as pairs of places in `proxies`, ascending: what the broad phase remembers does not show. Already in order, as a rule.
+    fn order_by_part(&mut self, pairs: &mut [[u32; 2]]) {
+        let s = &mut *self.scratch;
+        let handles = s.registered.iter().map(|f| f.handle as usize + 1).max().unwrap_or(0);
+        s.place.resize(handles.max(s.place.len()), 0);
+        for (place, registered) in s.registered.iter().enumerate() {
+            s.place[registered.handle as usize] = place as u32;
+        }
+        for pair in pairs.iter_mut() {
+            let [i, j] = pair.map(|handle| s.place[handle as usize]);
+            *pair = [i.min(j), i.max(j)];
+        }
+        pairs.sort_unstable();
+    }
+
+    /// The contacts of one pair.
+    fn narrow(
+        &mut self,
+        [i, j]: [usize; 2],
+        (horizon, prediction): (f64, PredictionMode),
+        out: &mut Vec<ContactConstraint>,
+    ) {
+        let (a, b) = (self.scratch.proxies[i], self.scratch.proxies[j]);
+        let (owner_a, owner_b) = (self.owners[a as usize], self.owners[b as usize]);
+        let [entry_a, entry_b] = [owner_a, owner_b].map(|owner| self.objects.at(owner.place as usize));
+        if !may_collide(&entry_a, owner_a.part as usize, &entry_b, owner_b.part as usize, self.part_states) {
+            return;
+        }
+        let (Some(body_a), Some(body_b)) = (entry_a.object.collidable(), entry_b.object.collidable()) else { return };
+        let (part_a, part_b) = (owner_a.part as usize, owner_b.part as usize);
+        let (state_a, state_b) = (&self.part_states[a as usize], &self.part_states[b as usize]);
+        let (Some(shape_a), Some(shape_b)) = (body_a.shape(part_a), body_b.shape(part_b)) else { return };
+        let mode = body_a.contact_mode(part_a).of_pair(body_b.contact_mode(part_b));
+        let near = 2.0 * self.settings.drift_tolerance;
+        let pair = PairQuery {
+            mode,
+            shapes: [shape_a, shape_b],
+            part_states: [state_a, state_b],
+            motion_bounds: [self.scratch.motion_bounds[i], self.scratch.motion_bounds[j]],
+            near,
+            prediction,
+        };
+        if pair.is_expensive() && pair.is_separated() {
+            return;
+        }
+        let found = &mut self.scratch.found;
+        let moment = pair.contacts([a, b], horizon, &mut self.scratch.narrow_phase_cache, found);
+        let first = out.len();
+        if let Some(sleeper) = [entry_a, entry_b].into_iter().find(|e| e.asleep) {
+            // the frame will be done again with it awake
+            self.needs_wake.extend((!found.is_empty()).then_some(sleeper.serial));
+            return;
+        }
+        let surface_a = (owner_a.id, part_a, body_a.material(part_a));
+        let surface_b = (owner_b.id, part_b, body_b.material(part_b));
+        let Material { restitution, friction, .. } = self.pair_materials.combine(self.settings, surface_a, surface_b);
+        let pair = [entry_a.serial, owner_a.part, entry_b.serial, owner_b.part];
+        let mut frame = ContactFrame { point: Vec3::zeros(), axes: [Vec3::zeros(); 3] };
+        let mut frame_of = |contact: &Contact| {
+            if contact.normal != frame.axes[0] {
+                frame = ContactFrame::new(contact.point, contact.normal);
+            }
+            ContactFrame { point: contact.point, ..frame }
+        };
+        out.extend(found.iter().map(|contact| ContactConstraint {
+            a,
+            b,
+            contact: *contact,
+            offset: Vec3::zeros(),
+            frame: frame_of(contact),
+            friction,
+            restitution,
+            key: ContactKey { pair, feature: contact.feature },
+        }));
+        if moment > 0.0 {
+            out[first..].iter_mut().for_each(|constraint| {
+                shift_to_impact(constraint, &constraint.contact.clone(), state_a, state_b, moment)
+            });
+        }
+    }
+}
+
+/// Rate of a normal that points from B's core point to A's, for the relative velocity of the two.
+fn turning(c: &Contact, relative: Vec3) -> Vec3 {
+    let distance = c.core_a + c.core_b + c.gap;
+    if distance > 0.0 { across(relative, &c.normal) / distance } else { Vec3::zeros() }
+}
+
+/// The part of `v` across a unit direction.
+fn across(v: Vec3, along: &Vec3) -> Vec3 {
+    v - along * along.dot(&v)
+}
+
+/// Whether two parts are to be tested: one of them moves (or is led towards a sleeper), and both kinds say yes.
+pub(crate) fn may_collide(a: &Entry, part_a: usize, b: &Entry, part_b: usize, part_states: &[PartState]) -> bool {
+    let (Some(ca), Some(cb)) = (a.object.collidable(), b.object.collidable()) else { return false };
+    let wakes = a.asleep && b.approaches(part_states) || b.asleep && a.approaches(part_states);
+    if !(wakes || a.moves() && ca.part_moves(part_a) || b.moves() && cb.part_moves(part_b)) {
+        return false;
+    }
+    if a.serial == b.serial && !ca.parts_collide(part_a, part_b) {
+        return false;
+    }
+    ca.collides_with(part_a, cb.collision_group(part_b)) && cb.collides_with(part_b, ca.collision_group(part_a))
+}
+
+impl ContactConstraint {
+    /// The contact point as B has it, metres.
+    pub fn point_b(&self) -> Vec3 {
+        self.contact.point + self.offset
+    }
+
+    /// Relative velocity of A against B at the contact, m/s; negative along the normal where they approach.
+    pub fn velocity(&self, a: &PartState, b: &PartState) -> Vec3 {
+        a.velocity_at(&self.contact.point) - b.velocity_at(&self.point_b())
+    }
+
+    /// Rate of the relative velocity along the contact's axes, as the *contact* moves, m/s²; the first is the second derivative of the gap.
+    ///
+    /// The contact point is not a material point of a rounded surface: a ball that spins in place has a centripetal acceleration at its
+    /// lowest point, and yet does not rise (thesis Fig. 17). So the point's own velocity `ṗ` and the normal's `ṅ` are taken from the core
+    /// features that carry the contact:
+    ///
+    /// ```text
+    /// s = v_A(p) − v_B(p)        ds/dt = [a + α×r + ω×(ṗ − v)]_A − [ … ]_B        d²gap/dt² = n·ds/dt + ṅ·s
+    /// ```
+    pub fn acceleration(&self, a: &PartState, b: &PartState) -> Vec3 {
+        let (c, n) = (&self.contact, &self.contact.normal);
+        let (core_a, core_b) = (c.point + n * (0.5 * c.gap + c.core_a), c.point - n * (0.5 * c.gap + c.core_b));
+        let (va, vb) = (a.velocity_at(&core_a), b.velocity_at(&core_b));
+        let (n_rate, p_rate) = match c.normal_from {
+            NormalFrom::FaceOfA => {
+                let n_rate = a.angular_velocity.cross(n);
+                (n_rate, vb + c.core_b * n_rate)
+            }
+            NormalFrom::FaceOfB => {
+                let n_rate = b.angular_velocity.cross(n);
+                (n_rate, va - c.core_a * n_rate)
+            }
+            NormalFrom::CorePoints => {
+                let n_rate = turning(c, va - vb);
+                (n_rate, va - c.core_a * n_rate)
+            }
+            NormalFrom::LineOfA(along) => {
+                let n_rate = turning(c, across(va - vb, &along)) + along * along.dot(&a.angular_velocity.cross(n));
+                (n_rate, vb + c.core_b * n_rate)
+            }
+            NormalFrom::LineOfB(along) => {
+                let n_rate = turning(c, across(va - vb, &along)) + along * along.dot(&b.angular_velocity.cross(n));
+                (n_rate, va - c.core_a * n_rate)
+            }
+            NormalFrom::Edges => (Vec3::zeros(), 0.5 * (va + vb)),
+        };
+        let rate = a.acceleration_following(&c.point, &p_rate) - b.acceleration_following(&c.point, &p_rate);
+        let [n, t1, t2] = &self.frame.axes;
+        Vec3::new(n.dot(&rate) + n_rate.dot(&self.velocity(a, b)), t1.dot(&rate), t2.dot(&rate))
+    }
+}

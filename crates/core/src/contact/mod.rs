@@ -1,0 +1,6 @@
+//! Contact detection: broad phase, filters and narrow phase for pairs of parts, and the constants of the pairs.
+
+pub(crate) mod detect;
+pub(crate) mod pair;
+pub(crate) mod pair_material;
+mod separation;

@@ -1,0 +1,114 @@
+//! Restitution and friction of chosen pairs, in place of what [`Settings`] makes of the materials of two parts.
+
+use crate::object::collidable::Material;
+use crate::settings::{Settings, SettingsError};
+use crate::world::view::ObjectId;
+use std::collections::BTreeMap;
+
+/// One side of a pair that has surface constants of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum PairSide {
+    /// One part of an object.
+    Part(ObjectId, usize),
+    /// Every part of an object.
+    Object(ObjectId),
+    /// Every part whose [`Material::id`] is this, not 0.
+    Material(u32),
+}
+
+impl From<ObjectId> for PairSide {
+    fn from(id: ObjectId) -> PairSide {
+        PairSide::Object(id)
+    }
+}
+
+impl From<(ObjectId, usize)> for PairSide {
+    fn from((id, part): (ObjectId, usize)) -> PairSide {
+        PairSide::Part(id, part)
+    }
+}
+
+/// Surface constants of a pair; `None` leaves a constant to the rule of [`Settings`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PairMaterial {
+    /// Coefficient of restitution, 0 to 1.
+    pub restitution: Option<f64>,
+    /// Coefficient of Coulomb friction, at least 0.
+    pub friction: Option<f64>,
+}
+
+impl PairMaterial {
+    /// Checks both ranges.
+    pub(crate) fn validate(&self) -> Result<(), SettingsError> {
+        let check = |what, value: Option<f64>, most: f64, wanted| match value {
+            Some(value) if !(value.is_finite() && (0.0..=most).contains(&value)) => {
+                Err(SettingsError { what, value, wanted })
+            }
+            _ => Ok(()),
+        };
+        check("restitution of a pair", self.restitution, 1.0, "0 to 1")?;
+        check("friction of a pair", self.friction, f64::MAX, "finite and at least 0")
+    }
+}
+
+/// A part that is in contact, with its material.
+pub(crate) type Surface = (ObjectId, usize, Material);
+
+/// The chosen pairs of a world. Which side is named first makes no difference.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PairMaterials {
+    entries: BTreeMap<[PairSide; 2], PairMaterial>,
+}
+
+impl PairMaterials {
+    /// Files the constants of a pair; constants that are both `None` take the pair off.
+    pub fn set(&mut self, mut sides: [PairSide; 2], material: PairMaterial) {
+        sides.sort_unstable();
+        match material == PairMaterial::default() {
+            true => self.entries.remove(&sides),
+            false => self.entries.insert(sides, material),
+        };
+    }
+
+    /// All chosen pairs, in the order of their keys.
+    pub fn iter(&self) -> impl Iterator<Item = (&[PairSide; 2], &PairMaterial)> {
+        self.entries.iter()
+    }
+
+    /// Takes off all pairs of an object.
+    pub fn forget(&mut self, id: ObjectId) {
+        let of = |side: &PairSide| matches!(side, PairSide::Part(other, _) | PairSide::Object(other) if *other == id);
+        self.entries.retain(|sides, _| !sides.iter().any(of));
+    }
+
+    /// What a contact of two parts has, `a` the one that was added first: for each constant the entry that names the pair most closely, or else the rule.
+    pub fn combine(&self, settings: &Settings, a: Surface, b: Surface) -> Material {
+        let chosen = if self.entries.is_empty() { PairMaterial::default() } else { self.of(a, b) };
+        let rule = |combine: crate::Combine, of: fn(&Material) -> f64| combine.of(of(&a.2), of(&b.2));
+        Material {
+            restitution: chosen.restitution.unwrap_or_else(|| rule(settings.combine_restitution, |m| m.restitution)),
+            friction: chosen.friction.unwrap_or_else(|| rule(settings.combine_friction, |m| m.friction)),
+            id: 0,
+        }
+    }
+
+    /// A part goes before its object, and that before its material; between entries that name a pair equally closely the one that names `a` more
+    /// closely decides.
+    fn of(&self, a: Surface, b: Surface) -> PairMaterial {
+        let sides = |(id, part, m): Surface| [PairSide::Part(id, part), PairSide::Object(id), PairSide::Material(m.id)];
+        let (a, b) = (sides(a), sides(b));
+        const BY_CLOSENESS: [(usize, usize); 9] =
+            [(0, 0), (0, 1), (1, 0), (0, 2), (1, 1), (2, 0), (1, 2), (2, 1), (2, 2)];
+        let found = || {
+            BY_CLOSENESS.iter().filter_map(|&(i, j)| {
+                let mut key = [a[i], b[j]];
+                key.sort_unstable();
+                self.entries.get(&key)
+            })
+        };
+        PairMaterial {
+            restitution: found().find_map(|entry| entry.restitution),
+            friction: found().find_map(|entry| entry.friction),
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! Smooth motion: forces at a stage, and the integrators that use them (thesis §IV.B.2).
+//!
+//! | integrator | one step of `h` |
+//! |---|---|
+//! | explicit Euler | `x += h·v(x,p)`, `p += h·f(x,p,t)` |
+//! | symplectic Euler | `p += h·f(x,p,t)`, `x += h·v(x,p)` |
+//! | Verlet | `x` coasts `h/2`, `p += h·f(x,p,t+h/2)`, `x` coasts `h/2` |
+//! | Dormand–Prince | fifth order, by inner steps that a tolerance chooses: [`crate::integrators`] |
+//! | RK4 | classical on `p`; on `x` the commutator-free method of Celledoni, Marthinsen and Owren (2003), two exponentials in the last stage |
+
+use crate::integrators::Adaptive;
+use crate::object::part_state::{Forces, PartState, Wrench};
+use crate::settings::Integrator;
+use crate::world::view::{Entry, Mode, ObjectId, Objects, Table, WorldView};
+use crate::world::{ObjectState, StepError};
+use tumble_collide::Vec3;
+
+/// What the integrators work on, borrowed from the world.
+pub(crate) struct IntegrationContext<'a> {
+    pub table: &'a mut Table,
+    pub states: &'a [ObjectState],
+    pub x: &'a mut [f64],
+    pub part_states: &'a mut [PartState],
+    pub forces: &'a mut Forces,
+    pub gravity: Vec3,
+    /// See [`WorldView::implicit`].
+    pub implicit: bool,
+    /// Forces set by the user, per site.
+    pub applied: &'a [Wrench],
+    /// Generalized forces set by the user, per coordinate.
+    pub applied_generalized: &'a [f64],
+    /// Generalized contact forces that hold over the sub-step.
+    pub held: &'a [f64],
+    /// Contact forces that hold over the sub-step on links, per site; empty for none.
+    pub held_wrenches: &'a [Wrench],
+    /// See [`Core::pin`](crate::world::Core).
+    pub pinned: &'a [f64],
+    pub pinned_part_states: &'a mut [PartState],
+}
+
+impl IntegrationContext<'_> {
+    /// Writes sites and caches from the state. What is static or not alive is at rest, whatever momentum it keeps.
+    pub fn refresh(&mut self) {
+        for place in 0..self.states.len() {
+            refresh(self.table, self.states, place, self.x, self.part_states);
+            if !self.pinned.is_empty() && self.table.with(self.states).at(place).moves() {
+                refresh(self.table, self.states, place, self.pinned, self.pinned_part_states);
+            }
+        }
+    }
+
+    /// The same for one object.
+    pub fn refresh_one(&mut self, id: ObjectId) {
+        if let Some(place) = self.table.place(id) {
+            refresh(self.table, self.states, place, self.x, self.part_states);
+        }
+    }
+
+    /// Returns the objects with their switches.
+    pub fn objects(&self) -> Objects<'_> {
+        self.table.with(self.states)
+    }
+
+    /// Forces at the present state and time `t`: rate of momentum of every object into `dp`, accelerations into the sites.
+    pub fn evaluate(&mut self, t: f64, dp: &mut [f64]) {
+        self.refresh();
+        self.forces.wrenches.clear();
+        self.forces.wrenches.extend_from_slice(self.applied);
+        for (wrench, held) in self.forces.wrenches.iter_mut().zip(self.held_wrenches) {
+            wrench.force += held.force;
+            wrench.torque += held.torque;
+        }
+        self.forces.generalized.clear();
+        self.forces
+            .generalized
+            .extend(self.held.iter().zip(self.applied_generalized).map(|(held, applied)| held + applied));
+        let view = WorldView {
+            time: t,
+            gravity: self.gravity,
+            implicit: self.implicit,
+            x: self.x,
+            part_states: self.part_states,
+            objects: self.table.with(self.states),
+        };
+        for entry in self.table.with(self.states).iter().filter(|e| e.status.enabled) {
+            if let Some(body) = entry.object.integratable().filter(|_| entry.moves()) {
+                body.accumulate_forces(entry.state_range, &view, self.forces);
+            }
+            if let Some(force) = entry.object.force() {
+                force.apply(entry.state_range, &view, self.forces);
+            }
+        }
+        dp.fill(0.0);
+        for entry in self.table.with(self.states).iter() {
+            let Some(body) = entry.object.integratable() else { continue };
+            let (state_range, part_states) =
+                (entry.state_range, &mut self.part_states[entry.state_range.parts.clone()]);
+            if entry.moves() {
+                let dp = &mut dp[state_range.v.clone()];
+                body.derivative(&self.x[state_range.x.clone()], &self.forces.slice(state_range), dp);
+                body.accelerations(&self.x[state_range.x.clone()], dp, part_states);
+            } else {
+                // what is led keeps its generalized velocity: a link that turns about another still has its centripetal acceleration
+                part_states.iter_mut().for_each(|s| {
+                    (s.acceleration, s.angular_acceleration) = (s.bias_acceleration, s.bias_angular_acceleration)
+                });
+            }
+        }
+    }
+
+    /// Every object that moves goes on freely for `h`; what is led follows its velocity.
+    pub fn free_motion(&mut self, h: f64) {
+        for entry in self.table.with(self.states).iter() {
+            free_motion(&entry, &mut self.x[entry.state_range.x.clone()], h);
+        }
+    }
+
+    /// Leaves of the rates what the coasts of a splitting do not do by themselves.
+    pub fn subtract_free_motion(&self, dp: &mut [f64]) {
+        let mut rate = Vec::new();
+        for entry in self.table.with(self.states).iter().filter(|e| e.moves()) {
+            let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
+            rate.resize(entry.state_range.v.len(), 0.0);
+            body.free_motion_rate(&self.x[entry.state_range.x.clone()], &mut rate);
+            dp[entry.state_range.v.clone()].iter_mut().zip(&rate).for_each(|(dp, c)| *dp -= c);
+        }
+    }
+
+    fn kick(&mut self, dp: &[f64], h: f64) {
+        for entry in self.table.with(self.states).iter().filter(|e| e.moves()) {
+            if let Some(body) = entry.object.integratable() {
+                body.kick(&mut self.x[entry.state_range.x.clone()], &dp[entry.state_range.v.clone()], h);
+            }
+        }
+    }
+
+    /// Generalized velocities of everything that moves or is led; zero elsewhere.
+    pub fn velocities(&self, v: &mut [f64]) {
+        v.fill(0.0);
+        for entry in self.table.with(self.states).iter().filter(|e| e.status.enabled && e.status.mode != Mode::Static) {
+            if let Some(body) = entry.object.integratable() {
+                body.velocity(&self.x[entry.state_range.x.clone()], &mut v[entry.state_range.v.clone()]);
+            }
+        }
+    }
+
+    fn integrate_positions(&mut self, v: &[f64], h: f64) {
+        for entry in self
+            .table
+            .with(self.states)
+            .iter()
+            .filter(|e| e.status.enabled && e.status.mode != Mode::Static && !e.asleep)
+        {
+            let (x, v) = (&mut self.x[entry.state_range.x.clone()], &v[entry.state_range.v.clone()]);
+            if let Some(body) = entry.object.integratable() {
+                body.integrate_positions(x, v, h);
+            }
+        }
+    }
+
+    /// Integrates over `h` from time `t`: one step, or as many inner steps of `adaptive` as its tolerance asks for, which it records. Returns how far
+    /// it came, s: `h`, but for a record that is full. Sites and caches are left at the new state.
+    pub fn integrate(
+        &mut self,
+        integrator: Integrator,
+        t: f64,
+        h: f64,
+        dp: &mut [f64],
+        adaptive: &mut Adaptive,
+    ) -> Result<f64, StepError> {
+        let start = self.x.to_vec();
+        match integrator {
+            Integrator::Verlet => {
+                self.free_motion(0.5 * h);
+                self.evaluate(t + 0.5 * h, dp);
+                self.subtract_free_motion(dp);
+                self.kick(dp, h);
+                self.free_motion(0.5 * h);
+            }
+            Integrator::SymplecticEuler => {
+                self.evaluate(t, dp);
+                self.kick(dp, h);
+                let mut v = vec![0.0; dp.len()];
+                self.velocities(&mut v);
+                self.integrate_positions(&v, h);
+            }
+            Integrator::ExplicitEuler => {
+                self.evaluate(t, dp);
+                let mut v = vec![0.0; dp.len()];
+                self.velocities(&mut v);
+                self.kick(dp, h);
+                self.integrate_positions(&v, h);
+            }
+            Integrator::Rk4 => self.rk4(t, h, dp),
+            Integrator::DormandPrince => return adaptive.integrate(self, t, h, dp, true),
+        }
+        self.restore_kinematic_velocities(&start);
+        self.refresh();
+        Ok(h)
+    }
+
+    fn rk4(&mut self, t: f64, h: f64, dp: &mut [f64]) {
+        let n = dp.len();
+        let start = self.x.to_vec();
+        let (mut v, mut f) = (vec![vec![0.0; n]; 4], vec![vec![0.0; n]; 4]);
+        self.stage(t, &mut v[0], &mut f[0]);
+        let kinematic = v[0].clone();
+        // stages 2 and 3 start from x0 with half a step
+        self.kick(&f[0], 0.5 * h);
+        self.integrate_positions(&v[0], 0.5 * h);
+        let second = self.x.to_vec();
+        self.stage(t + 0.5 * h, &mut v[1], &mut f[1]);
+        self.keep_kinematic_velocities(&kinematic, &mut v[1]);
+        self.x.copy_from_slice(&start);
+        self.kick(&f[1], 0.5 * h);
+        self.integrate_positions(&v[1], 0.5 * h);
+        self.stage(t + 0.5 * h, &mut v[2], &mut f[2]);
+        self.keep_kinematic_velocities(&kinematic, &mut v[2]);
+        // stage 4: positions from stage 2 by v3 − v1/2, momenta p0 + h·f3
+        self.x.copy_from_slice(&second);
+        self.kick(&combine(&f, [-0.5, 0.0, 1.0, 0.0]), h);
+        self.integrate_positions(&combine(&v, [-0.5, 0.0, 1.0, 0.0]), h);
+        self.stage(t + h, &mut v[3], &mut f[3]);
+        self.keep_kinematic_velocities(&kinematic, &mut v[3]);
+        // the step
+        self.x.copy_from_slice(&start);
+        let sixth = 1.0 / 6.0;
+        dp.copy_from_slice(&combine(&f, [sixth, 2.0 * sixth, 2.0 * sixth, sixth]));
+        self.kick(dp, h);
+        self.integrate_positions(&combine(&v, [3.0 / 12.0, 2.0 / 12.0, 2.0 / 12.0, -1.0 / 12.0]), h);
+        self.integrate_positions(&combine(&v, [-1.0 / 12.0, 2.0 / 12.0, 2.0 / 12.0, 3.0 / 12.0]), h);
+    }
+
+    fn stage(&mut self, t: f64, v: &mut [f64], f: &mut [f64]) {
+        self.evaluate(t, f);
+        self.velocities(v);
+    }
+
+    /// What is led has one velocity over the whole step.
+    fn keep_kinematic_velocities(&self, kinematic: &[f64], v: &mut [f64]) {
+        for entry in self.table.with(self.states).iter().filter(|e| e.status.mode == Mode::Kinematic) {
+            v[entry.state_range.v.clone()].copy_from_slice(&kinematic[entry.state_range.v.clone()]);
+        }
+    }
+
+    /// What is led keeps the velocity it started with, whatever the stages made of it.
+    fn restore_kinematic_velocities(&mut self, start: &[f64]) {
+        for entry in
+            self.table.with(self.states).iter().filter(|e| e.status.enabled && e.status.mode == Mode::Kinematic)
+        {
+            let Some(body) = entry.object.integratable() else { continue };
+            let mut v = vec![0.0; entry.state_range.v.len()];
+            body.velocity(&start[entry.state_range.x.clone()], &mut v);
+            body.write_velocity(&mut self.x[entry.state_range.x.clone()], &v);
+        }
+    }
+}
+
+fn refresh(table: &mut Table, states: &[ObjectState], place: usize, x: &[f64], part_states: &mut [PartState]) {
+    let (placed, status) = (&mut table.placed[place], states[place].status);
+    let part_states = &mut part_states[placed.state_range.parts.clone()];
+    placed.object.refresh(&x[placed.state_range.x.clone()], part_states);
+    if status.mode == Mode::Static || !status.enabled {
+        part_states.iter_mut().for_each(|s| *s = PartState { pose: s.pose, ..PartState::default() });
+    }
+}
+
+/// One object goes on for `h`: freely where it moves, with its given velocity where it is led, not at all where it is static.
+pub(crate) fn free_motion(entry: &Entry, x: &mut [f64], h: f64) {
+    let Some(body) = entry.object.integratable().filter(|_| entry.status.enabled && !entry.asleep) else { return };
+    match entry.status.mode {
+        Mode::Static => {}
+        Mode::Dynamic => body.free_motion(x, h),
+        Mode::Kinematic => {
+            let mut v = vec![0.0; entry.state_range.v.len()];
+            body.velocity(x, &mut v);
+            body.integrate_positions(x, &v, h);
+            body.write_velocity(x, &v);
+        }
+    }
+}
+
+fn combine(k: &[Vec<f64>], weight: [f64; 4]) -> Vec<f64> {
+    (0..k[0].len()).map(|i| (0..4).map(|s| weight[s] * k[s][i]).sum()).collect()
+}

@@ -1,0 +1,94 @@
+//! Nesterov's extrapolation of the iterate between sweeps.
+
+use super::linkage::Linkages;
+use super::local::{INLINE_BLOCKS, Local, apply, extrapolate_value};
+use crate::constraint::rows::Rows;
+use smallvec::SmallVec;
+
+/// The extrapolation between sweeps, over the stretches of `du` that the island acts on. Multipliers follow when it is their turn to be relaxed.
+pub(super) struct Extrapolation {
+    theta: f64,
+    /// `β` of the sweep to come.
+    pub beta: f64,
+    /// First index and end of each stretch of `du`, one after the other; neighbours are joined.
+    stretches: SmallVec<[(u32, u32); 2 * INLINE_BLOCKS]>,
+    /// `du` of the sweep before, of all stretches.
+    last: SmallVec<[f64; 32]>,
+}
+
+impl Extrapolation {
+    pub fn new(locals: &[Local], linkages: &Linkages, du: &[f64]) -> Extrapolation {
+        let mut stretches: SmallVec<[(u32, u32); 2 * INLINE_BLOCKS]> = linkages.stretches().collect();
+        for (i, local) in locals.iter().enumerate() {
+            // the contacts of a pair follow one another: one of them is enough
+            let same =
+                |other: &Local| other.block.sides().iter().map(|s| s.u).eq(local.block.sides().iter().map(|s| s.u));
+            if i == 0 || !same(&locals[i - 1]) {
+                stretches.extend(local.block.sides().iter().map(|s| (s.u, s.u + s.dof)));
+            }
+        }
+        stretches.sort_unstable();
+        stretches.dedup_by(|next, before| {
+            let joins = next.0 <= before.1;
+            if joins {
+                before.1 = before.1.max(next.1);
+            }
+            joins
+        });
+        let last = stretches.iter().flat_map(|&(start, end)| &du[start as usize..end as usize]).copied().collect();
+        Extrapolation { theta: 1.0, beta: 0.0, stretches, last }
+    }
+
+    /// How many freedoms the island has.
+    pub fn size(&self) -> usize {
+        self.last.len()
+    }
+
+    /// The place of a freedom of the island, given by its index in `du`, among those of the island.
+    pub fn place(&self, index: u32) -> usize {
+        let mut before = 0;
+        for &(start, end) in &self.stretches {
+            if index < end {
+                return (before + index - start) as usize;
+            }
+            before += end - start;
+        }
+        before as usize
+    }
+
+    pub fn extrapolate(&mut self, restart: bool, du: &mut [f64]) {
+        let next = 0.5 * (1.0 + (1.0 + 4.0 * self.theta * self.theta).sqrt());
+        self.beta = if restart { 0.0 } else { (self.theta - 1.0) / next };
+        self.theta = if restart { 1.0 } else { next };
+        let beta = self.beta;
+        let mut rest = &mut self.last[..];
+        for &(start, end) in &self.stretches {
+            let (last, try_step) = rest.split_at_mut((end - start) as usize);
+            du[start as usize..end as usize]
+                .iter_mut()
+                .zip(last)
+                .for_each(|(du, last)| extrapolate_value(du, last, beta));
+            rest = try_step;
+        }
+    }
+
+    /// Makes `du` anew from the multipliers, which are not extrapolated yet, and starts from rest.
+    pub fn rebuild(
+        &mut self,
+        locals: &[Local],
+        linkages: &Linkages,
+        rows: &Rows,
+        c: &[f64],
+        lambda: &mut [f64],
+        du: &mut [f64],
+    ) {
+        self.clear(du);
+        apply(locals, linkages, rows, c, lambda, du);
+        self.extrapolate(true, du);
+    }
+
+    /// Zeroes `du` wherever the island acts.
+    pub fn clear(&self, du: &mut [f64]) {
+        self.stretches.iter().for_each(|&(start, end)| du[start as usize..end as usize].fill(0.0));
+    }
+}

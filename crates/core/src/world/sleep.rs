@@ -1,0 +1,342 @@
+//! Sleep: islands that lie still are left out of the steps until something touches them. Off by default; see
+//! [`Settings::sleep`](crate::Settings::sleep).
+//!
+//! ```text
+//! still(b, t)   = no point of b was further than `within` from where it was, since t₀ ≤ t − `after`
+//! asleep(G)     ⇐ still(b) for all b of G, G a component of the graph of contacts and constraints among what moves
+//! awake(G)      ⇐ a dynamic or kinematic mover comes within a contact's margin of G · the forces on G change · G or a support of it is changed
+//! ```
+//!
+//! A frame is rolled back and done again with the whole island awake if something touches a sleeper in it, or if the forces on a
+//! sleeper differ from those with which it fell asleep: no impulse ever meets a sleeper as if it were a wall. An island wakes with the
+//! contact forces with which it fell asleep.
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | within, after | [`Sleep::within`], [`Sleep::after`] |
+//! | G | a group: objects that fell asleep together, and wake together |
+//!
+//! The error of sleep is the velocity that a sleeper had: at most `within/after`. Objects of other crates sleep if
+//! [`Integratable::may_sleep`](crate::Integratable::may_sleep) returns true. Nothing sleeps beside a constraint that does not name its
+//! objects ([`Constraint::partners`](crate::Constraint::partners)).
+
+use crate::clone_by_field::clone_by_field;
+use crate::constraint::builder::constraints;
+use crate::contact::detect::ContactKey;
+use crate::object::part_state::{PartState, Wrench};
+use crate::world::Core;
+use crate::world::view::{Entry, Mode, ObjectId};
+use serde::{Deserialize, Serialize};
+use tumble_collide::Pose;
+
+/// When islands fall asleep.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sleep {
+    /// Simulated seconds that all of an island must have been still, above 0.
+    pub after: f64,
+    /// Metres that the furthest point of a body may have moved in that time, above 0.
+    pub within: f64,
+}
+
+impl Default for Sleep {
+    /// Half a second within a hundredth of a millimetre.
+    fn default() -> Sleep {
+        Sleep { after: 0.5, within: 1e-5 }
+    }
+}
+
+/// Since when (s) an object has been still, and the poses of its parts then: position and quaternion `x, y, z, w`.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub(crate) struct RestTimer {
+    pub since: f64,
+    pub from: Vec<[f64; 7]>,
+}
+
+clone_by_field!(RestTimer { since, from });
+
+impl RestTimer {
+    /// Returns whether all of its numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        self.from.iter().flatten().chain([&self.since]).all(|x| x.is_finite())
+    }
+}
+
+/// Objects that fell asleep together. Serials, ascending.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub(crate) struct SleepGroup {
+    pub members: Vec<u32>,
+    pub supports: Vec<Support>,
+    /// Forces and torques on the members' parts and degrees of freedom by others than themselves; `None` until the first frame asleep.
+    pub load: Option<Vec<f64>>,
+    /// Contact forces with which they fell asleep.
+    pub warm: Vec<(ContactKey, [f64; 3])>,
+}
+
+clone_by_field!(SleepGroup { members, supports, load, warm });
+
+/// Something that does not move and that members of a group lie on or hang from: its serial, and the poses of its parts as in
+/// [`RestTimer`].
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub(crate) struct Support {
+    pub serial: u32,
+    pub poses: Vec<[f64; 7]>,
+}
+
+clone_by_field!(Support { serial, poses });
+
+fn numbers(pose: &Pose) -> [f64; 7] {
+    let (p, q) = (&pose.translation.vector, &pose.rotation.coords);
+    [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
+}
+
+fn poses(part_states: &[PartState]) -> impl Iterator<Item = [f64; 7]> {
+    part_states.iter().map(|s| numbers(&s.pose))
+}
+
+fn write_poses(part_states: &[PartState], out: &mut Vec<[f64; 7]>) {
+    out.clear();
+    out.extend(poses(part_states));
+}
+
+fn at_rest(part_states: &[PartState]) -> bool {
+    part_states.iter().all(|s| s.velocity.norm_squared() + s.angular_velocity.norm_squared() == 0.0)
+}
+
+/// How far the furthest point of a body of this bounding radius has come at most, metres: the way of its middle, and the chord of its turn.
+fn moved(from: &[f64; 7], to: &[f64; 7], radius: f64) -> f64 {
+    let way: f64 = (0..3).map(|i| (to[i] - from[i]).powi(2)).sum::<f64>().sqrt();
+    // the chord of the quaternions is half the turn; q and −q are one orientation
+    let chord = |sign: f64| (3..7).map(|i| (to[i] - sign * from[i]).powi(2)).sum::<f64>().sqrt();
+    way + 2.0 * chord(1.0).min(chord(-1.0)) * radius
+}
+
+impl SleepGroup {
+    /// Whether a snapshot may hold it.
+    pub fn sound(&self) -> bool {
+        let finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
+        let fine = self.load.iter().all(|load| finite(load))
+            && self.warm.iter().all(|w| finite(&w.1))
+            && self.supports.iter().flat_map(|s| &s.poses).all(|p| finite(p));
+        fine && !self.members.is_empty() && self.members.is_sorted_by(|a, b| a < b)
+    }
+}
+
+impl Core {
+    /// Returns the place of the object with a serial.
+    fn by_serial(&self, serial: u32) -> Option<usize> {
+        self.state.objects.binary_search_by_key(&serial, |o| o.serial).ok()
+    }
+
+    /// Wakes the object, and everything that sleeps with it or on it.
+    pub(crate) fn wake(&mut self, id: ObjectId) {
+        let Some(serial) = self.table.place(id).map(|place| self.state.objects[place].serial) else { return };
+        self.wake_groups(|g| g.members.binary_search(&serial).is_ok() || g.supports.iter().any(|s| s.serial == serial));
+    }
+
+    /// Wakes everything.
+    pub(crate) fn wake_all(&mut self) {
+        self.wake_groups(|_| true);
+    }
+
+    fn wake_groups(&mut self, mut which: impl FnMut(&SleepGroup) -> bool) {
+        let state = &mut self.state;
+        for at in (0..state.groups.len()).rev() {
+            if !which(&state.groups[at]) {
+                continue;
+            }
+            let group = state.groups.remove(at);
+            for serial in &group.members {
+                let Ok(place) = state.objects.binary_search_by_key(serial, |o| o.serial) else { continue };
+                let object = &mut state.objects[place];
+                object.asleep = false;
+                object.rest.since = state.time;
+                write_poses(
+                    &self.part_states[self.table.placed[place].state_range.parts.clone()],
+                    &mut object.rest.from,
+                );
+            }
+            state.warm.add(group.warm);
+        }
+    }
+
+    /// Before a frame: wakes groups that are pushed, and those whose support has moved, moves, or is gone.
+    pub(crate) fn wake_disturbed(&mut self) {
+        let disturbed = self.state.groups.iter().filter(|g| self.disturbed(g));
+        let disturbed: Vec<u32> = disturbed.map(|g| g.members[0]).collect();
+        self.wake_groups(|g| disturbed.contains(&g.members[0]));
+    }
+
+    fn disturbed(&self, group: &SleepGroup) -> bool {
+        let changed = |support: &Support| {
+            let Some(e) = self.by_serial(support.serial).map(|place| self.objects().at(place)) else { return true };
+            let part_states = &self.part_states[e.state_range.parts.clone()];
+            e.moves()
+                || !e.status.enabled
+                || !at_rest(part_states)
+                || !poses(part_states).eq(support.poses.iter().copied())
+        };
+        group.members.iter().filter_map(|&s| self.by_serial(s)).any(|place| self.pushed(self.objects().at(place)))
+            || group.supports.iter().any(changed)
+    }
+
+    /// Returns whether a user pushes the object during this frame.
+    fn pushed(&self, e: Entry) -> bool {
+        let generalized = self.state.applied_generalized[e.state_range.v.clone()].iter().any(|f| *f != 0.0);
+        generalized || self.state.applied[e.state_range.parts.clone()].iter().any(|w| *w != Wrench::default())
+    }
+
+    /// After a frame: requests to wake the groups on which other forces act than before. Notes the forces on groups that sleep their
+    /// first frame.
+    pub(crate) fn request_wake_by_load(&mut self) {
+        for at in 0..self.state.groups.len() {
+            let load = self.load(&self.state.groups[at]);
+            let group = &mut self.state.groups[at];
+            if group.load.get_or_insert_with(|| load.clone()) != &load {
+                self.needs_wake.push(group.members[0]);
+            }
+        }
+    }
+
+    fn load(&self, group: &SleepGroup) -> Vec<f64> {
+        let mut load = Vec::new();
+        for place in group.members.iter().filter_map(|&s| self.by_serial(s)) {
+            let state_range = &self.table.placed[place].state_range;
+            load.extend(self.forces.generalized.get(state_range.v.clone()).unwrap_or_default());
+            let wrenches = self.forces.wrenches.get(state_range.parts.clone()).unwrap_or_default();
+            wrenches.iter().for_each(|w| load.extend(w.torque.iter().chain(w.force.iter())));
+        }
+        load
+    }
+
+    /// Wakes the groups that `needs_wake` names; the state is that before the frame.
+    pub(crate) fn wake_requested(&mut self) {
+        let requests = std::mem::take(&mut self.needs_wake);
+        self.wake_groups(|g| requests.iter().any(|s| g.members.binary_search(s).is_ok()));
+        self.needs_wake = requests;
+    }
+
+    /// After a frame: the islands that have been still for long enough fall asleep.
+    pub(crate) fn fall_asleep(&mut self) {
+        let Some(sleep) = self.settings.sleep else { return };
+        let ready = self.at_rest_for(&sleep);
+        if !ready.contains(&true) {
+            return;
+        }
+        let Some(bonds) = self.bonds() else { return };
+        let mut ready = ready;
+        let mut parent: Vec<usize> = (0..ready.len()).collect();
+        let mut supports: Vec<[usize; 2]> = Vec::new();
+        for [a, b] in bonds {
+            let (Some(i), Some(j)) = (self.table.place(a), self.table.place(b)) else { continue };
+            match (self.objects().at(i).moves(), self.objects().at(j).moves()) {
+                (true, true) => {
+                    let (i, j) = (root(&parent, i), root(&parent, j));
+                    parent[i.max(j)] = i.min(j);
+                }
+                (false, false) => {}
+                (first_moves, _) => {
+                    let (mover, support) = if first_moves { (i, j) } else { (j, i) };
+                    ready[mover] &= at_rest(&self.part_states[self.table.placed[support].state_range.parts.clone()]);
+                    supports.push([mover, support]);
+                }
+            }
+        }
+        let roots: Vec<usize> = (0..parent.len()).map(|i| root(&parent, i)).collect();
+        let mut calm = vec![true; parent.len()];
+        for (i, _) in self.objects().iter().enumerate().filter(|(_, e)| e.moves()) {
+            calm[roots[i]] &= ready[i];
+        }
+        for r in (0..parent.len()).filter(|&r| roots[r] == r && calm[r] && ready[r]) {
+            let members: Vec<usize> = (r..parent.len()).filter(|&i| roots[i] == r).collect();
+            let supports = supports.iter().filter(|[mover, _]| roots[*mover] == r).map(|[_, support]| *support);
+            self.put_to_sleep(&members, supports.collect());
+        }
+        self.integration().refresh();
+    }
+
+    /// Returns which objects, in their order, have been still for as long as `sleep` says; restarts the timers of those that moved.
+    fn at_rest_for(&mut self, sleep: &Sleep) -> Vec<bool> {
+        let mut ready = Vec::with_capacity(self.table.placed.len());
+        for place in 0..self.table.placed.len() {
+            let (entry, rest) = (self.objects().at(place), &self.state.objects[place].rest);
+            if !entry.moves() || !entry.object.integratable().is_some_and(|b| b.may_sleep()) {
+                ready.push(false);
+                continue;
+            }
+            let part_states = &self.part_states[entry.state_range.parts.clone()];
+            let radius = |part: usize| {
+                let shape = entry.object.collidable().and_then(|c| c.shape(part));
+                shape.map(|s| s.bounding_radius()).filter(|r| r.is_finite()).unwrap_or(0.0)
+            };
+            let far =
+                |(part, (from, to)): (usize, (&[f64; 7], [f64; 7]))| moved(from, &to, radius(part)) > sleep.within;
+            let restless = rest.from.len() != part_states.len()
+                || self.pushed(entry)
+                || rest.from.iter().zip(poses(part_states)).enumerate().any(far);
+            ready.push(!restless && self.state.time - rest.since >= sleep.after);
+            if restless {
+                let rest = &mut self.state.objects[place].rest;
+                rest.since = self.state.time;
+                write_poses(part_states, &mut rest.from);
+            }
+        }
+        ready
+    }
+
+    /// Returns pairs of objects that touch or are joined; `None` if a constraint does not name the objects that it joins.
+    fn bonds(&self) -> Option<Vec<[ObjectId; 2]>> {
+        let mut bonds: Vec<[ObjectId; 2]> = self.contacts.iter().map(|c| [c.a, c.b]).collect();
+        let mut partners = Vec::new();
+        for (_, _, constraint) in constraints(self.objects()).filter(|(_, _, c)| !c.on_itself()) {
+            partners.clear();
+            if !constraint.partners(&mut partners) {
+                return None;
+            }
+            partners.retain(|&id| self.table.place(id).is_some());
+            bonds.extend(partners.windows(2).map(|w| [w[0], w[1]]));
+        }
+        Some(bonds)
+    }
+
+    fn put_to_sleep(&mut self, members: &[usize], mut supports: Vec<usize>) {
+        let mut group = SleepGroup::default();
+        for &place in members {
+            let (placed, object) = (&self.table.placed[place], &mut self.state.objects[place]);
+            object.asleep = true;
+            group.members.push(object.serial);
+            if let Some(body) = placed.object.integratable() {
+                body.write_velocity(
+                    &mut self.state.x[placed.state_range.x.clone()],
+                    &vec![0.0; placed.state_range.v.len()],
+                );
+            }
+        }
+        supports.sort_unstable();
+        supports.dedup();
+        let support = |place: usize| Support {
+            serial: self.state.objects[place].serial,
+            poses: poses(&self.part_states[self.table.placed[place].state_range.parts.clone()]).collect(),
+        };
+        group.supports = supports.into_iter().map(support).collect();
+        let ours = |serial: &u32| group.members.binary_search(serial).is_ok();
+        group.warm = self.state.warm.take(|key| ours(&key.pair[0]) || ours(&key.pair[2]));
+        self.state.groups.push(group);
+    }
+}
+
+fn root(parent: &[usize], mut i: usize) -> usize {
+    while parent[i] != i {
+        i = parent[i];
+    }
+    i
+}
+
+impl Entry<'_> {
+    /// Returns whether it moves towards others by itself: under forces, or kinematic with a velocity.
+    pub fn approaches(&self, part_states: &[PartState]) -> bool {
+        self.moves()
+            || (self.status.enabled
+                && self.status.mode == Mode::Kinematic
+                && !at_rest(&part_states[self.state_range.parts.clone()]))
+    }
+}

@@ -1,0 +1,217 @@
+//! The table of objects and the read-only view of the world that objects are given.
+
+use crate::object::Object;
+use crate::object::part_state::{PartState, StateRange};
+use crate::world::ObjectState;
+use slotmap::{SlotMap, new_key_type};
+use tumble_collide::Vec3;
+
+new_key_type! {
+    /// Names an object of a world. After the object is removed the id is `None` everywhere, never somebody else.
+    pub struct ObjectId;
+}
+
+/// How a body takes part; switched between steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub enum Mode {
+    /// Never moves; its velocity counts as zero.
+    Static,
+    /// Follows the pose and velocity it is given, and pushes others (the thesis's scripted motion).
+    Kinematic,
+    /// Moved by forces and impulses.
+    #[default]
+    Dynamic,
+}
+
+/// An object's switches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Status {
+    /// How it takes part.
+    pub mode: Mode,
+    /// Not alive: neither moves, nor collides, nor acts, until it is alive again.
+    pub enabled: bool,
+    /// Whether its parts meet others.
+    pub collidable: bool,
+}
+
+impl Default for Status {
+    fn default() -> Status {
+        Status { mode: Mode::Dynamic, enabled: true, collidable: true }
+    }
+}
+
+impl Status {
+    /// Whether impulses move it.
+    pub fn moves(&self) -> bool {
+        self.enabled && self.mode == Mode::Dynamic
+    }
+}
+
+/// An object, the ranges of its numbers in the world's tables, and its switches.
+#[derive(Clone, Copy)]
+pub(crate) struct Entry<'a> {
+    pub object: &'a dyn Object,
+    pub state_range: &'a StateRange,
+    pub status: Status,
+    /// Never used twice in a world: warm starts are filed under it.
+    pub serial: u32,
+    /// Left out of the steps until something wakes it.
+    pub asleep: bool,
+}
+
+impl Entry<'_> {
+    /// Returns whether it takes part in dynamics: dynamic, alive, and with a state; awake or asleep.
+    pub fn dynamic(&self) -> bool {
+        self.status.moves() && !self.state_range.v.is_empty()
+    }
+
+    /// Returns whether forces and impulses move it: dynamic and awake.
+    pub fn moves(&self) -> bool {
+        self.dynamic() && !self.asleep
+    }
+}
+
+/// An object and the ranges of its numbers in the world's tables.
+pub(crate) struct Placed {
+    pub object: Box<dyn Object>,
+    pub state_range: StateRange,
+}
+
+impl Clone for Placed {
+    fn clone(&self) -> Placed {
+        Placed { object: self.object.fork(), state_range: self.state_range.clone() }
+    }
+}
+
+/// The objects of a world, in the order in which they were added, and their ids. Nothing in it changes in a step but the objects'
+/// caches.
+#[derive(Clone, Default)]
+pub(crate) struct Table {
+    pub placed: Vec<Placed>,
+    /// Ids in the same order.
+    pub order: Vec<ObjectId>,
+    places: SlotMap<ObjectId, usize>,
+}
+
+impl Table {
+    /// Returns the place of an object in the order of adding.
+    pub fn place(&self, id: ObjectId) -> Option<usize> {
+        self.places.get(id).copied()
+    }
+
+    /// Returns an object and its ranges.
+    pub fn get(&self, id: ObjectId) -> Option<&Placed> {
+        Some(&self.placed[self.place(id)?])
+    }
+
+    /// Adds an object behind all others.
+    pub fn push(&mut self, object: Box<dyn Object>, state_range: StateRange) -> ObjectId {
+        let id = self.places.insert(self.placed.len());
+        self.placed.push(Placed { object, state_range });
+        self.order.push(id);
+        id
+    }
+
+    /// Removes an object; those behind it move up by one place. Ranges stay as they are.
+    pub fn remove(&mut self, id: ObjectId) -> Option<(usize, Placed)> {
+        let gone = self.places.remove(id)?;
+        self.order.remove(gone);
+        for (place, other) in self.order.iter().enumerate().skip(gone) {
+            self.places[*other] = place;
+        }
+        Some((gone, self.placed.remove(gone)))
+    }
+
+    /// Joins the objects with their switches.
+    pub fn with<'a>(&'a self, states: &'a [ObjectState]) -> Objects<'a> {
+        Objects { table: self, states }
+    }
+}
+
+/// The objects of a world with their switches.
+#[derive(Clone, Copy)]
+pub(crate) struct Objects<'a> {
+    pub table: &'a Table,
+    pub states: &'a [ObjectState],
+}
+
+impl<'a> Objects<'a> {
+    /// Walks them in the order in which they were added.
+    pub fn iter(self) -> impl Iterator<Item = Entry<'a>> + Clone {
+        self.table.placed.iter().zip(self.states).map(|(placed, state)| entry(placed, state))
+    }
+
+    /// Returns the object at a place in the order of adding.
+    pub fn at(self, place: usize) -> Entry<'a> {
+        entry(&self.table.placed[place], &self.states[place])
+    }
+
+    /// Returns an object by id.
+    pub fn get(self, id: ObjectId) -> Option<Entry<'a>> {
+        Some(self.at(self.table.place(id)?))
+    }
+}
+
+fn entry<'a>(placed: &'a Placed, state: &ObjectState) -> Entry<'a> {
+    Entry {
+        object: placed.object.as_ref(),
+        state_range: &placed.state_range,
+        status: state.status,
+        serial: state.serial,
+        asleep: state.asleep,
+    }
+}
+
+/// What an object may read while it accumulates forces or makes rows.
+pub struct WorldView<'a> {
+    /// Simulated time of this stage, s.
+    pub time: f64,
+    /// Gravity, m/s².
+    pub gravity: Vec3,
+    /// Whether this step's rows are at the velocity level, so that drives and damping are implicit rows of a [`Constraint`](crate::Constraint); where
+    /// they are not, such forces belong to the force table.
+    pub implicit: bool,
+    /// The state `X` at this stage.
+    pub x: &'a [f64],
+    /// The site table at this stage.
+    pub part_states: &'a [PartState],
+    pub(crate) objects: Objects<'a>,
+}
+
+impl WorldView<'_> {
+    /// An object by id.
+    pub fn object(&self, id: ObjectId) -> Option<&dyn Object> {
+        self.objects.get(id).map(|e| e.object)
+    }
+
+    /// An object by id, as its own type.
+    pub fn get<T: Object>(&self, id: ObjectId) -> Option<&T> {
+        let object: &dyn std::any::Any = self.object(id)?;
+        object.downcast_ref()
+    }
+
+    /// Where an object's numbers lie.
+    pub fn state_range(&self, id: ObjectId) -> Option<&StateRange> {
+        self.objects.get(id).map(|e| e.state_range)
+    }
+
+    /// The site of one part.
+    pub fn part_state(&self, id: ObjectId, part: usize) -> Option<&PartState> {
+        self.part_states[self.state_range(id)?.parts.clone()].get(part)
+    }
+
+    /// An object's switches.
+    pub fn status(&self, id: ObjectId) -> Option<Status> {
+        self.objects.get(id).map(|e| e.status)
+    }
+
+    /// Whether an object sleeps (see [`Sleep`](crate::Sleep)).
+    pub fn asleep(&self, id: ObjectId) -> bool {
+        self.objects.get(id).is_some_and(|e| e.asleep)
+    }
+
+    /// All ids in the order in which the objects were added.
+    pub fn ids(&self) -> &[ObjectId] {
+        &self.objects.table.order
+    }
+}
