@@ -1,4 +1,4 @@
-"""The dynamics of a robot arm from its URDF, held against finite differences and against each other.
+"""The dynamics of a robot arm from its URDF, compared with finite differences and with each other.
 
     python examples/arm_dynamics.py [ROBOT.urdf]
 """

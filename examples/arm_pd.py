@@ -9,7 +9,7 @@ import numpy as np
 import tumble
 
 urdf = sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parents[1] / "scenes" / "robot" / "arm.urdf"
-KP, KD = 2000.0, 200.0  # N·m/rad and N·m·s/rad; of sliding joints N/m and N·s/m
+KP, KD = 2000.0, 200.0  # N·m/rad and N·m·s/rad; of prismatic joints N/m and N·s/m
 
 world = tumble.World(dt=1 / 240)
 arm = world.add_articulation(urdf)

@@ -1,4 +1,4 @@
-"""A behaviour of your own: a flock by Reynolds's three rules (Flocks, Herds, and Schools, 1987).
+"""A custom behavior: a flock by Reynolds's three rules (Flocks, Herds, and Schools, 1987).
 
     python examples/boids.py
 """
@@ -8,7 +8,7 @@ import numpy as np
 import tumble
 
 
-class Flock(tumble.Behaviour):
+class Flock(tumble.Behavior):
     """Each boid keeps apart from the near, flies as its neighbours do, and towards the middle of them."""
 
     def __init__(self, sight: float = 3.0, room: float = 0.6, speed: float = 2.0) -> None:
@@ -38,7 +38,7 @@ world = tumble.World(gravity=(0, 0, 0), dt=1 / 60)
 boids = [
     world.add_rigid(f"boid_{k}", tumble.Sphere(0.1), mass=0.2, position=rng.uniform(-2, 2, 3), velocity=rng.normal(0, 1, 3)) for k in range(40)
 ]
-world.add_behaviour("flock", Flock(), boids)
+world.add_behavior("flock", Flock(), boids)
 
 for second in range(11):
     velocities = np.array([boid.velocity for boid in boids])

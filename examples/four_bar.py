@@ -5,7 +5,7 @@ import tumble
 
 HINGE = 'joint = "revolute", axis = [0, 1, 0], mass_kg = 1, inertia_kg_m2 = [0, 0, 0]'  # each bar is a point of 1 kg at its middle
 SCENE = f"""
-closure = [{{ name = "ground", type = "point", a = "linkage/rocker", position_m = [1, 0, 0] }}]
+loop_joint = [{{ name = "ground", type = "spherical", a = "linkage/rocker", position_m = [1, 0, 0] }}]
 [[articulated]]
 name = "linkage"
 link = [

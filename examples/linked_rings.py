@@ -1,4 +1,4 @@
-"""A ring hangs in another, as links of a chain do: concave meshes collide as they are, without hulls or pieces.   python examples/linked_rings.py"""
+"""A ring hangs in another, as links of a chain do: concave meshes collide without hulls or decomposition.   python examples/linked_rings.py"""
 
 import numpy as np
 import tumble

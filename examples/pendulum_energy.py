@@ -1,4 +1,4 @@
-"""A pendulum let go at 60 degrees: its period in closed form, and what its energy does under two integrators.
+"""A pendulum let go at 60 degrees: its period in closed form, and its energy under two integrators.
 
     python examples/pendulum_energy.py
 """

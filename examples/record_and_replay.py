@@ -1,4 +1,4 @@
-"""A throw is recorded to a file that Foxglove opens, read back as arrays, and gone on with from its middle.
+"""A throw is recorded to a file that Foxglove opens, read back as arrays, and continued from its middle.
 
     python examples/record_and_replay.py [FILE.mcap]
 """

@@ -1,4 +1,4 @@
-"""A sphere tree of a mesh that numpy makes: how well each level of balls stands for the solid.
+"""A sphere tree of a mesh that numpy makes: how well each level of spheres approximates the solid.
 
     python examples/sphere_tree.py [MESH.obj]
 """
@@ -22,11 +22,11 @@ def torus(major: float, minor: float, around: int = 48, across: int = 24) -> tup
 
 
 mesh = (sys.argv[1],) if len(sys.argv) > 1 else torus(1.0, 0.3)
-tree = tumble.SphereTree.build(*mesh, method="medial", branch=8, depth=2)
+tree = tumble.SphereTree.build(*mesh, method="medial", branching=8, depth=2)
 print(tree)
 print(tree.report())
 
-# the balls are arrays: for example the volume that a level takes if its balls did not overlap
+# the spheres are arrays: for example their total volume without overlap
 for k, (centers, radii) in enumerate(tree.levels):
     volume = 4 / 3 * np.pi * (radii**3).sum()
     print(f"level {k}: {len(centers)} balls of {radii.min():.3f} to {radii.max():.3f} m, {volume:.3f} m³ one by one")

@@ -1,4 +1,4 @@
-"""A force of your own: a wind that blows harder higher up, on balls of three masses.
+"""A custom force: a wind that blows harder higher up, on balls of three masses.
 
     python examples/wind_force.py
 """
@@ -20,7 +20,7 @@ class Wind(tumble.Force):
         return velocity
 
     def apply(self, view: tumble.View) -> None:
-        # one row for each body: no loop; static bodies take no notice
+        # one row for each body: no loop; static bodies are not affected
         view.force += self.drag * (self.air(view.position[:, 2]) - view.velocity)
 
 

@@ -47,7 +47,7 @@ def urls():
     if not address:
         return b""
     if not address.startswith("https://") or any(c.isspace() for c in address):
-        raise SystemExit(f"TUMBLE_REPOSITORY is {address!r}; wanted an address that begins with https://")
+        raise SystemExit(f"TUMBLE_REPOSITORY is {address!r}; expected an address that begins with https://")
     return f"Project-URL: Repository, {address}\n".encode()
 
 

@@ -1,4 +1,4 @@
-//! Bodies on their way into a world.
+//! Adds bodies to a world.
 
 use crate::articulation::Articulation;
 use crate::bodies::{by_name, place_of};
@@ -15,7 +15,7 @@ use std::sync::Arc;
 use tumble::collide::Pose;
 use tumble::dynamics::{Mode, RigidBody as Rigid};
 
-/// Where a body of this world is, given as a handle or by name.
+/// Returns the place of a body of this world, given as a handle or by name.
 pub fn own_place(shared: &Arc<Shared>, body: &Bound<'_, PyAny>) -> Result<Place> {
     let place = match body.extract::<String>() {
         Ok(name) => {
@@ -26,22 +26,22 @@ pub fn own_place(shared: &Arc<Shared>, body: &Bound<'_, PyAny>) -> Result<Place>
     };
     match Arc::ptr_eq(&place.shared, shared) {
         true => place.status().map(|_| place),
-        false => Err(Error::value(format!("'{}' is a body of another world", place.name))),
+        false => Err(Error::value(format!("'{}' belongs to another world", place.name))),
     }
 }
 
-/// A body of a mass, or of a density; what is led needs neither.
-pub fn rigid(name: &str, shape: &Shape, mass: Option<f64>, density: Option<f64>, led: bool) -> Result<Rigid> {
+/// Returns a body with a mass or a density. A kinematic body needs neither.
+pub fn rigid(name: &str, shape: &Shape, mass: Option<f64>, density: Option<f64>, kinematic: bool) -> Result<Rigid> {
     let solid = shape.solid.clone();
     match (mass, density) {
         (Some(mass), None) => Ok(Rigid::with_mass(name, solid, mass)?),
         (None, Some(density)) => Ok(Rigid::with_density(name, solid, density)?),
-        (None, None) if led => Ok(Rigid::fixed(name, solid)),
-        _ => Err(Error::value(format!("body '{name}': wanted a mass or a density, and one of the two alone"))),
+        (None, None) if kinematic => Ok(Rigid::fixed(name, solid)),
+        _ => Err(Error::value(format!("body '{name}': expected a mass or a density, not both"))),
     }
 }
 
-/// Adds a body and gives its handle.
+/// Adds a body and returns its handle.
 pub fn add(shared: &Arc<Shared>, py: Python<'_>, body: Rigid, mode: Mode, collidable: bool) -> Result<RigidBody> {
     let place = shared.write(py, |inner| {
         let body = looks::usual(body, inner.world.ids().len());
@@ -53,7 +53,7 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, body: Rigid, mode: Mode, collid
     RigidBody::new(py, place)
 }
 
-/// Adds an articulated body, a description or the path of one, and gives its handle.
+/// Adds an articulated body, a description or the path of one, and returns its handle.
 pub fn articulated(
     shared: &Arc<Shared>,
     py: Python<'_>,

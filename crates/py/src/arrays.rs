@@ -1,4 +1,4 @@
-//! The numpy arrays of a view, which serve one call after another.
+//! The numpy arrays of a view, which are reused from call to call.
 
 use crate::errors::{Error, Result};
 use crate::layout::Layout;
@@ -12,7 +12,7 @@ use tumble::dynamics::{PartState, Wrench};
 /// Numbers of a row: position, quaternion, velocity, angular velocity, acceleration, angular acceleration.
 const WIDTHS: [usize; 6] = [3, 4, 3, 3, 3, 3];
 
-/// An array that is written here, and a read-only view of it, of which Python gets views.
+/// An array that is written here, and a read-only view of it. Python gets views of the latter.
 type Column = (Py<PyArray2<f64>>, Py<PyAny>);
 
 /// The arrays of a view.
@@ -25,7 +25,7 @@ pub struct Arrays {
 }
 
 impl Arrays {
-    /// For a number of rows.
+    /// Returns arrays with that number of rows.
     pub fn new(py: Python<'_>, rows: usize) -> Result<Arrays> {
         let zeros = |width| PyArray2::zeros(py, [rows, width], false);
         let mut shown = Vec::with_capacity(WIDTHS.len());
@@ -35,33 +35,34 @@ impl Arrays {
             view.call_method1("setflags", (false,))?;
             shown.push((array.unbind(), view.unbind()));
         }
-        let shown = shown.try_into().map_err(|_| Error::Internal("as many arrays as there are kinds".into()))?;
+        let shown = shown.try_into().map_err(|_| Error::Internal("one array for each column".into()))?;
         Ok(Arrays { rows, shown, force: zeros(3).unbind(), torque: zeros(3).unbind() })
     }
 
-    /// Whether they may be written again: Python holds none of them, nor a view of one.
+    /// Returns whether the arrays may be reused: Python has no reference to them or to a view of
+    /// one.
     pub fn free(self: &Arc<Arrays>, py: Python<'_>, rows: usize) -> bool {
         let own = |(array, view): &Column| holders(array, py) == 2 && holders(view, py) == 1;
         let wrenches = [&self.force, &self.torque].iter().all(|array| holders(array, py) == 1);
         self.rows == rows && Arc::strong_count(self) == 1 && wrenches && self.shown.iter().all(own)
     }
 
-    /// Writes the sites, and zeros for what will act.
-    pub fn fill(&self, py: Python<'_>, sites: &[PartState]) -> Result<()> {
+    /// Writes the part states and zeroes forces and torques.
+    pub fn fill(&self, py: Python<'_>, part_states: &[PartState]) -> Result<()> {
         let [position, orientation, velocity, angular_velocity, acceleration, angular_acceleration] = &self.shown;
-        copy(py, position, sites, |s| s.position().into())?;
-        copy(py, orientation, sites, |s| s.pose.rotation.coords.into())?;
-        copy(py, velocity, sites, |s| s.velocity.into())?;
-        copy(py, angular_velocity, sites, |s| s.angular_velocity.into())?;
-        copy(py, acceleration, sites, |s| s.acceleration.into())?;
-        copy(py, angular_acceleration, sites, |s| s.angular_acceleration.into())?;
+        copy(py, position, part_states, |s| s.position().into())?;
+        copy(py, orientation, part_states, |s| s.pose.rotation.coords.into())?;
+        copy(py, velocity, part_states, |s| s.velocity.into())?;
+        copy(py, angular_velocity, part_states, |s| s.angular_velocity.into())?;
+        copy(py, acceleration, part_states, |s| s.acceleration.into())?;
+        copy(py, angular_acceleration, part_states, |s| s.angular_acceleration.into())?;
         for array in [&self.force, &self.torque] {
             array.bind(py).try_readwrite().map_err(PyErr::from)?.as_slice_mut().map_err(PyErr::from)?.fill(0.0);
         }
         Ok(())
     }
 
-    /// What a callback added, by row.
+    /// Returns the forces and torques that a callback added, by row.
     pub fn take(
         &self,
         py: Python<'_>,
@@ -90,15 +91,15 @@ impl Arrays {
     }
 }
 
-/// Writes one row of each site.
+/// Writes one row for each part state.
 fn copy<const N: usize>(
     py: Python<'_>,
     (array, _): &Column,
-    sites: &[PartState],
+    part_states: &[PartState],
     get: impl Fn(&PartState) -> [f64; N],
 ) -> Result<()> {
     let mut out = array.bind(py).try_readwrite().map_err(PyErr::from)?;
     let rows = out.as_slice_mut().map_err(PyErr::from)?.as_chunks_mut().0;
-    rows.iter_mut().zip(sites).for_each(|(row, site)| *row = get(site));
+    rows.iter_mut().zip(part_states).for_each(|(row, part_state)| *row = get(part_state));
     Ok(())
 }

@@ -1,4 +1,5 @@
-//! Articulated bodies: a description from a file, or a handle of one in a world. Both answer the same questions.
+//! Articulated bodies: a description from a file, or a handle of a body in a world. Both have the
+//! same methods.
 
 use crate::body::{Place, hash};
 use crate::collect::{Anchor, anchor};
@@ -8,7 +9,7 @@ use crate::errors::{Error, Result};
 use crate::joints::{drive, result};
 use crate::pool;
 use crate::robot::Robot;
-use crate::spot::{Now, Source, Spot, Which, locked, start};
+use crate::spot::{Binding, Now, Source, Which, locked, start};
 use crate::words::{COLLISION_MESHES, MISSING_MESHES, meaning, word};
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use pyo3::gc::{PyTraverseError, PyVisit};
@@ -22,36 +23,40 @@ use tumble::scene::urdf::{self, UrdfOptions};
 
 /// A tree of links: a robot, a chain, a skeleton.
 ///
-/// ``Articulation.from_urdf`` gives a description, whose dynamics can be asked at once; ``World.add_articulation`` puts it into a world and gives a handle
-/// of the one there. ``q`` has ``nq`` numbers: one per hinge (rad) or slider (m), a quaternion (x, y, z, w) per ball joint, position and quaternion of
-/// a floating root. ``qd`` and ``tau`` have ``dof``: rad/s or m/s and N·m or N; of a floating root angular, then linear, world axes.
+/// ``Articulation.from_urdf`` returns a description, whose dynamics functions work at once.
+/// ``World.add_articulation`` adds it to a world and returns a handle of the body there. ``q`` has
+/// ``nq`` numbers: one per revolute joint (rad) or prismatic joint (m), a quaternion (x, y, z, w)
+/// per spherical joint, position and quaternion of a floating root. ``qd`` and ``tau`` have ``dof``
+/// numbers: rad/s or m/s and N·m or N; those of a floating root are angular, then linear, world
+/// axes.
 ///
-/// All functions of ``q``, ``qd``, ``tau`` take one state or a batch of states, a leading axis: what has none stands for all of the batch. They know the
-/// tree alone: no limits, damping, drives or contacts.
+/// All functions of ``q``, ``qd``, ``tau`` take one state or a batch of states with a leading axis.
+/// An argument without that axis applies to the whole batch. These functions ignore limits,
+/// damping, drives and contacts.
 #[pyclass(frozen, module = "tumble")]
 pub struct Articulation {
     pub name: Arc<str>,
     pub robot: Arc<Robot>,
-    pub spot: Spot,
+    pub spot: Binding,
     anchor: Option<Py<Anchor>>,
 }
 
 impl Articulation {
-    /// A handle of one in a world.
+    /// Returns a handle of a body in a world.
     pub fn placed(py: Python<'_>, place: Place, robot: Arc<Robot>) -> Result<Articulation> {
         Ok(Articulation {
             name: place.name.clone(),
             robot,
             anchor: Some(anchor(py, &place.shared)?),
-            spot: Spot::Placed(place),
+            spot: Binding::Placed(place),
         })
     }
 
-    /// Where it stands, if it is in a world.
+    /// Returns the place of the body, if it is in a world.
     pub fn place(&self) -> Option<&Place> {
         match &self.spot {
-            Spot::Placed(place) => Some(place),
-            Spot::Free { .. } => None,
+            Binding::Placed(place) => Some(place),
+            Binding::Free { .. } => None,
         }
     }
 }
@@ -61,10 +66,12 @@ type Given<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
 
 #[pymethods]
 impl Articulation {
-    /// Reads a URDF: its tree at once, its collision shapes when it is added to a world, the meshes of its visuals when somebody draws them.
+    /// Reads a URDF. The tree is read at once, collision shapes when it is added to a world, and
+    /// visual meshes when they are first drawn.
     ///
-    /// floating: whether the root floats, else it is fixed to the base; packages: folders by name, for ``package://NAME/…``; missing_meshes:
-    /// ``"error"`` or ``"skip"``, for collision meshes that are not there; collision_meshes: ``"exact"`` or ``"hull"``.
+    /// floating: whether the root floats; otherwise it is fixed to the base. packages: folders by
+    /// name, for ``package://NAME/…``. missing_meshes: ``"error"`` or ``"skip"``, for missing
+    /// collision meshes. collision_meshes: ``"exact"`` or ``"hull"``.
     #[staticmethod]
     #[pyo3(signature = (path, *, floating=false, packages=None, missing_meshes="error", collision_meshes="exact"))]
     pub fn from_urdf(
@@ -91,12 +98,12 @@ impl Articulation {
         Ok(Articulation {
             name: read.name.into(),
             robot: Arc::new(robot),
-            spot: Spot::Free { source: Source { file, options, freedoms: read.freedoms }, now: Mutex::new(now) },
+            spot: Binding::Free { source: Source { file, options, dofs: read.dofs }, now: Mutex::new(now) },
             anchor: None,
         })
     }
 
-    /// The robot's name in its file, or the body's in its world.
+    /// Name of the robot in its file, or of the body in its world.
     #[getter]
     fn name(&self) -> &str {
         &self.name
@@ -108,25 +115,25 @@ impl Articulation {
         self.place().is_some()
     }
 
-    /// Whether its world still has it; a description always exists.
+    /// Whether its world still has it; True for a description.
     #[getter]
     fn exists(&self) -> Result<bool> {
         self.place().map_or(Ok(true), |place| place.shared.read(|inner| Ok(inner.world.status(place.id).is_some())))
     }
 
-    /// Names of the moving joints, in the order of the coordinates.
+    /// Names of all joints that are not fixed, in the order of the coordinates.
     #[getter]
     fn joint_names(&self) -> Vec<String> {
         self.robot.joints.clone()
     }
 
-    /// Names of all links, the fixed ones too, in the order of ``link_poses``.
+    /// Names of all links, including fixed ones, in the order of ``link_poses``.
     #[getter]
     fn link_names(&self) -> Vec<String> {
         self.robot.model.frames().iter().map(|frame| frame.name.clone()).collect()
     }
 
-    /// Length of ``qd`` and ``tau``: degrees of freedom.
+    /// Number of degrees of freedom: the length of ``qd`` and ``tau``.
     #[getter]
     fn dof(&self) -> usize {
         self.robot.dof()
@@ -138,7 +145,7 @@ impl Articulation {
         self.robot.positions()
     }
 
-    /// Mass of all that moves, kg.
+    /// Mass of all links that can move, kg.
     #[getter]
     fn mass(&self) -> f64 {
         self.robot.model.mass()
@@ -166,8 +173,9 @@ impl Articulation {
         self.spot.set(py, Which::Qd, &self.robot, value)
     }
 
-    /// Generalized forces, shape (dof,), N·m and N: they act in every step until they are set anew, beside drives and damping. ``save`` and forks take
-    /// them along; ``World.state`` does not hold them.
+    /// Generalized forces, shape (dof,), N·m and N. They act in every step until they are changed,
+    /// in addition to drives and damping. ``save`` and forks include them; ``World.state`` does
+    /// not.
     #[getter]
     fn tau<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
         Ok(array(py, &self.spot.get(Which::Tau, &self.robot)?))
@@ -178,7 +186,8 @@ impl Articulation {
         self.spot.set(py, Which::Tau, &self.robot, value)
     }
 
-    /// Gravity that its functions count with, shape (3,), m/s². In a world it is the world's and set there.
+    /// Gravity used by its functions, shape (3,), m/s². In a world it is the world's gravity and
+    /// can only be set there.
     #[getter]
     fn gravity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
         Ok(vector(py, &self.spot.gravity()?))
@@ -188,22 +197,26 @@ impl Articulation {
     pub fn set_gravity(&self, value: &Bound<'_, PyAny>) -> Result<()> {
         let gravity = vec3(value, "gravity")?;
         match &self.spot {
-            Spot::Free { now, .. } => locked(now).gravity = gravity,
-            Spot::Placed(_) => return Err(Error::value("gravity is the world's; set it there")),
+            Binding::Free { now, .. } => locked(now).gravity = gravity,
+            Binding::Placed(_) => return Err(Error::value("gravity is a setting of the world; set it there")),
         }
         Ok(())
     }
 
-    /// Least and greatest position of each freedom, shape (dof, 2), rad or m; infinite where there is no limit.
+    /// Lower and upper position limit of each degree of freedom, shape (dof, 2), rad or m; infinite
+    /// without a limit.
     #[getter]
     fn limits<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
-        let freedoms = self.spot.freedoms()?;
-        let flat = freedoms.iter().flat_map(|f| f.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])).collect();
-        Ok(PyArray1::from_vec(py, flat).reshape([freedoms.len(), 2])?)
+        let dofs = self.spot.dofs()?;
+        let flat = dofs.iter().flat_map(|f| f.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])).collect();
+        Ok(PyArray1::from_vec(py, flat).reshape([dofs.len(), 2])?)
     }
 
-    /// Accelerations ``qdd`` that generalized forces ``tau`` cause. q: (nq,), qd, tau: (dof,), each also batched (batch, …); what is not given is
-    /// what it is now. Returns (dof,) or (batch, dof).
+    /// Returns the accelerations ``qdd`` that generalized forces ``tau`` cause, shape (dof,) or
+    /// (batch, dof).
+    ///
+    /// q: (nq,), qd, tau: (dof,), each optionally batched (batch, …). Omitted arguments have their
+    /// current values.
     #[pyo3(signature = (q=None, qd=None, tau=None))]
     fn forward_dynamics<'py>(
         &self,
@@ -218,8 +231,11 @@ impl Articulation {
         result(py, &rows, out, &[self.robot.dof()])
     }
 
-    /// Generalized forces that accelerations ``qdd`` take, gravity included. q: (nq,), qd, qdd: (dof,), each also batched. Without ``qdd`` those that
-    /// hold the motion unaccelerated. Returns (dof,) or (batch, dof).
+    /// Returns the generalized forces that accelerations ``qdd`` require, including gravity, shape
+    /// (dof,) or (batch, dof).
+    ///
+    /// q: (nq,), qd, qdd: (dof,), each optionally batched. Without ``qdd`` the accelerations are
+    /// zero.
     #[pyo3(signature = (q=None, qd=None, qdd=None))]
     fn inverse_dynamics<'py>(
         &self,
@@ -236,7 +252,7 @@ impl Articulation {
         result(py, &rows, out, &[self.robot.dof()])
     }
 
-    /// The mass matrix, shape (dof, dof) or (batch, dof, dof), symmetric.
+    /// Returns the mass matrix, symmetric, shape (dof, dof) or (batch, dof, dof).
     #[pyo3(signature = (q=None))]
     fn mass_matrix<'py>(&self, py: Python<'py>, q: Given<'_, 'py>) -> Result<Array<'py>> {
         let mut rows = self.rows(&[(Which::Q, "q", q)])?;
@@ -244,8 +260,9 @@ impl Articulation {
         result(py, &rows, out, &[self.robot.dof(); 2])
     }
 
-    /// What velocities do to a link: shape (6, dof) or (batch, 6, dof). ``J @ qd`` is the angular velocity (first three rows) and the velocity of the
-    /// origin of the link's frame (last three), world axes.
+    /// Returns the Jacobian of a link, shape (6, dof) or (batch, 6, dof). ``J @ qd`` is the angular
+    /// velocity (first three rows) and the velocity of the origin of the link's frame (last three),
+    /// world axes.
     #[pyo3(signature = (link, q=None))]
     fn jacobian<'py>(&self, py: Python<'py>, link: &str, q: Given<'_, 'py>) -> Result<Array<'py>> {
         let frame = self.robot.frame(link)?;
@@ -254,8 +271,8 @@ impl Articulation {
         result(py, &rows, out, &[6, self.robot.dof()])
     }
 
-    /// Poses of all links in the world: shape (links, 7) or (batch, links, 7), in the order of ``link_names``: position, m, and quaternion
-    /// (x, y, z, w).
+    /// Returns the poses of all links in the world, in the order of ``link_names``: position, m,
+    /// and quaternion (x, y, z, w). Shape (links, 7) or (batch, links, 7).
     #[pyo3(signature = (q=None))]
     fn link_poses<'py>(&self, py: Python<'py>, q: Given<'_, 'py>) -> Result<Array<'py>> {
         let mut rows = self.rows(&[(Which::Q, "q", q)])?;
@@ -263,7 +280,7 @@ impl Articulation {
         result(py, &rows, out, &[self.robot.model.frames().len(), 7])
     }
 
-    /// The pose of one link in the world: shape (7,) or (batch, 7), as in ``link_poses``.
+    /// Returns the pose of one link in the world, shape (7,) or (batch, 7), as in ``link_poses``.
     #[pyo3(signature = (link, q=None))]
     fn link_pose<'py>(&self, py: Python<'py>, link: &str, q: Given<'_, 'py>) -> Result<Array<'py>> {
         self.robot.frame(link)?;
@@ -275,7 +292,7 @@ impl Articulation {
         result(py, &rows, own, &[7])
     }
 
-    /// The centre of mass in the world, shape (3,) or (batch, 3), metres.
+    /// Returns the center of mass in the world, shape (3,) or (batch, 3), meters.
     #[pyo3(signature = (q=None))]
     fn center_of_mass<'py>(&self, py: Python<'py>, q: Given<'_, 'py>) -> Result<Array<'py>> {
         let mut rows = self.rows(&[(Which::Q, "q", q)])?;
@@ -283,11 +300,14 @@ impl Articulation {
         result(py, &rows, out, &[3])
     }
 
-    /// Puts a motor on a hinge or slider of one in a world, by the name of its joint.
+    /// Sets the drive of a revolute or prismatic joint of a body in a world, by the name of the
+    /// joint.
     ///
-    /// With ``stiffness`` or ``damping`` it drives to position ``target`` (rad or m) and ``velocity``; with neither it holds ``velocity``; with nothing
-    /// given there is no motor. limit: greatest torque or force, N·m or N; None: none. Part of the body and no state: ``save`` leaves it out.
-    #[pyo3(signature = (joint, *, target=None, velocity=None, stiffness=0.0, damping=0.0, limit=None))]
+    /// With ``stiffness`` or ``damping`` it drives to position ``target`` (rad or m) and
+    /// ``velocity``. With neither it holds ``velocity``. Without arguments the drive is removed.
+    /// max_force: largest torque or force, N·m or N; None: unlimited. The drive is a property of
+    /// the body and not part of the state, so ``save`` does not include it.
+    #[pyo3(signature = (joint, *, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn set_drive(
         &self,
@@ -297,33 +317,34 @@ impl Articulation {
         velocity: Option<f64>,
         stiffness: f64,
         damping: f64,
-        limit: Option<f64>,
+        max_force: Option<f64>,
     ) -> Result<()> {
-        let limit = limit.unwrap_or(f64::INFINITY);
-        let (place, index) = (self.in_world()?, self.freedom(joint)?);
-        let drive = drive(target, velocity, stiffness, damping, limit)?;
+        let max_force = max_force.unwrap_or(f64::INFINITY);
+        let (place, index) = (self.in_world()?, self.dof_of(joint)?);
+        let drive = drive(target, velocity, stiffness, damping, max_force)?;
         place.write(py, |inner| {
             let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
-            let freedom = DofSettings { drive, ..body.dofs()[index].clone() };
-            Ok(body.set_dof(index, freedom)?)
+            let settings = DofSettings { drive, ..body.dofs()[index].clone() };
+            Ok(body.set_dof(index, settings)?)
         })
     }
 
-    /// A force on a link of one in a world, during the next step alone. force: shape (3,), N; point: where in the world it acts, metres (default: the
-    /// origin of the link's frame). World axes.
+    /// Applies a force to a link of a body in a world during the next step only. force: shape (3,),
+    /// N; point: where it acts, meters (default: the origin of the link's frame). World axes.
     #[pyo3(signature = (link, force, point=None))]
     fn apply_force(&self, py: Python<'_>, link: &str, force: &Bound<'_, PyAny>, point: Given<'_, '_>) -> Result<()> {
         let force = vec3(force, "force")?;
         self.push(py, link, point, |inner, place, part, at| Ok(inner.world.apply_force(place.id, part, force, &at)?))
     }
 
-    /// A torque on a link, during the next step alone. torque: shape (3,), N·m, world axes.
+    /// Applies a torque to a link during the next step only. torque: shape (3,), N·m, world axes.
     fn apply_torque(&self, py: Python<'_>, link: &str, torque: &Bound<'_, PyAny>) -> Result<()> {
         let torque = vec3(torque, "torque")?;
         self.push(py, link, None, |inner, place, part, _| Ok(inner.world.apply_torque(place.id, part, torque)?))
     }
 
-    /// An impulse on a link, at once. impulse: shape (3,), N·s; point: as in ``apply_force``.
+    /// Applies an impulse to a link at once. impulse: shape (3,), N·s; point: as in
+    /// ``apply_force``.
     #[pyo3(signature = (link, impulse, point=None))]
     fn apply_impulse(
         &self,
@@ -346,7 +367,7 @@ impl Articulation {
         } else {
             ", a description"
         };
-        format!("<tumble.Articulation '{}', {} freedoms{place}>", self.name, self.robot.dof())
+        format!("<tumble.Articulation '{}', {} dof{place}>", self.name, self.robot.dof())
     }
 
     fn __eq__(slf: &Bound<'_, Self>, other: &Bound<'_, PyAny>) -> bool {
@@ -357,13 +378,14 @@ impl Articulation {
         }
     }
 
-    /// For pickle: the file of a description and its numbers. A handle of one in a world is none by itself.
+    /// Pickles the file of a description and its numbers. A handle of a body in a world cannot be
+    /// pickled.
     #[allow(clippy::type_complexity, reason = "the parts of a description, once")]
     fn __reduce__<'py>(
         &self,
         py: Python<'py>,
     ) -> Result<(Bound<'py, PyAny>, (PathBuf, bool, BTreeMap<String, PathBuf>, [&'static str; 2], [Vec<f64>; 4]))> {
-        let Spot::Free { source, now } = &self.spot else {
+        let Binding::Free { source, now } = &self.spot else {
             return Err(alone(&self.name));
         };
         let file = std::path::absolute(&source.file).unwrap_or_else(|_| source.file.clone());

@@ -1,4 +1,4 @@
-//! All bodies of a world, by number and by name.
+//! The bodies of a world by number and by name.
 
 use crate::articulation::Articulation;
 use crate::body::{Place, RigidBody};
@@ -14,16 +14,17 @@ use pyo3::types::{PyInt, PyIterator, PyList};
 use std::sync::Arc;
 use tumble::dynamics::{ArticulatedBody, ObjectId, RigidBody as Rigid, World as Core};
 
-/// The bodies of a world in the order in which they were added: a sequence that also takes names, ``world.bodies["ball"]``.
+/// The bodies of a world in the order in which they were added: a sequence that also takes names,
+/// ``world.bodies["ball"]``.
 ///
-/// It follows the world. Constraints and forces are no bodies and not in it.
+/// It follows the world. Constraints and forces are not bodies.
 #[pyclass(frozen, sequence, module = "tumble")]
 pub struct Bodies {
     shared: Arc<Shared>,
     anchor: Py<Anchor>,
 }
 
-/// Ids of what counts as a body, in the order of adding.
+/// Returns the ids of all bodies, in the order of addition.
 pub fn body_ids(world: &Core) -> Vec<ObjectId> {
     world.ids().iter().copied().filter(|&id| is_body(world, id)).collect()
 }
@@ -32,7 +33,7 @@ fn is_body(world: &Core, id: ObjectId) -> bool {
     world.get::<Rigid>(id).is_some() || world.get::<ArticulatedBody>(id).is_some()
 }
 
-/// What is needed to make a handle.
+/// Everything a handle is made from.
 pub struct Found {
     /// The object.
     pub id: ObjectId,
@@ -40,13 +41,13 @@ pub struct Found {
     robot: Option<Arc<Robot>>,
 }
 
-/// An object as a handle will show it.
+/// Returns what a handle of the object is made from.
 pub fn found(inner: &Inner, id: ObjectId) -> Option<Found> {
     let name = inner.world.object(id)?.name().into();
     Some(Found { id, name, robot: inner.robots.get(&id).cloned() })
 }
 
-/// The handle of an object.
+/// Returns the handle of an object.
 pub fn handle(py: Python<'_>, shared: &Arc<Shared>, found: Found) -> Result<Py<PyAny>> {
     let place = Place { shared: shared.clone(), id: found.id, name: found.name };
     Ok(match found.robot {
@@ -56,7 +57,7 @@ pub fn handle(py: Python<'_>, shared: &Arc<Shared>, found: Found) -> Result<Py<P
 }
 
 impl Bodies {
-    /// Of a world.
+    /// Returns the bodies of a world.
     pub fn new(py: Python<'_>, shared: Arc<Shared>) -> Result<Bodies> {
         Ok(Bodies { anchor: anchor(py, &shared)?, shared })
     }
@@ -72,7 +73,7 @@ impl Bodies {
     }
 }
 
-/// The body of that name.
+/// Returns the body of that name.
 pub fn by_name(inner: &Inner, name: &str) -> Result<Found> {
     let id = inner.world.find(name).filter(|&id| is_body(&inner.world, id));
     id.and_then(|id| found(inner, id)).ok_or_else(|| {
@@ -84,7 +85,7 @@ pub fn by_name(inner: &Inner, name: &str) -> Result<Found> {
     })
 }
 
-/// The handle of the rigid body of that name.
+/// Returns the handle of the rigid body of that name.
 pub fn rigid_body(py: Python<'_>, shared: &Arc<Shared>, name: &str) -> Result<RigidBody> {
     let Found { id, name, robot } = shared.read(|inner| by_name(inner, name))?;
     match robot {
@@ -95,7 +96,7 @@ pub fn rigid_body(py: Python<'_>, shared: &Arc<Shared>, name: &str) -> Result<Ri
     }
 }
 
-/// The handle of the articulated body of that name.
+/// Returns the handle of the articulated body of that name.
 pub fn articulation(py: Python<'_>, shared: &Arc<Shared>, name: &str) -> Result<Articulation> {
     let Found { id, name, robot } = shared.read(|inner| by_name(inner, name))?;
     match robot {
@@ -106,14 +107,14 @@ pub fn articulation(py: Python<'_>, shared: &Arc<Shared>, name: &str) -> Result<
     }
 }
 
-/// Where a handle of any kind points.
+/// Returns the place of any handle.
 pub fn place_of(body: &Bound<'_, PyAny>) -> Result<Place> {
     if let Some(place) = body.cast::<Articulation>().ok().and_then(|body| body.get().place().cloned()) {
         return Ok(place);
     }
     match body.cast::<RigidBody>() {
         Ok(body) => Ok(body.get().place.clone()),
-        Err(_) => Err(PyTypeError::new_err("wanted a body: a handle or a name").into()),
+        Err(_) => Err(PyTypeError::new_err("expected a body: a handle or a name").into()),
     }
 }
 
@@ -129,7 +130,7 @@ impl Bodies {
             return handle(py, &self.shared, found);
         }
         if !key.is_instance_of::<PyInt>() && !key.hasattr("__index__")? {
-            return Err(PyTypeError::new_err("bodies are asked for by name or by number").into());
+            return Err(PyTypeError::new_err("bodies are indexed by name or by number").into());
         }
         let index: isize = key.extract()?;
         let found = self.shared.read(|inner| {
@@ -155,7 +156,7 @@ impl Bodies {
         Ok(self.list(py)?.try_iter()?)
     }
 
-    /// Their names, in order.
+    /// Returns the names of all bodies, in order.
     fn names(&self) -> Result<Vec<String>> {
         Ok(self.all()?.into_iter().map(|found| found.name.to_string()).collect())
     }

@@ -1,4 +1,4 @@
-//! A rigid body of a world: a handle, which asks the world each time.
+//! A rigid body of a world: a handle that reads from the world at each use.
 
 use crate::collect::{Anchor, anchor};
 use crate::convert::{array, pose, quaternion, rotation, some, symmetric, vec3, vec3_or, vector};
@@ -27,7 +27,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// The error of a handle whose object is gone.
+    /// Returns the error for a handle whose object was removed.
     pub fn removed(&self) -> Error {
         Error::Removed(format!("'{}' was removed from its world", self.name))
     }
@@ -45,30 +45,31 @@ impl Place {
         })
     }
 
-    /// The object's switches.
+    /// Returns mode and flags of the object.
     pub fn status(&self) -> Result<Status> {
         self.read(|inner| inner.world.status(self.id))
     }
 
-    /// The site of one part.
-    pub fn site(&self, part: usize) -> Result<PartState> {
+    /// Returns the state of one part.
+    pub fn part_state(&self, part: usize) -> Result<PartState> {
         self.read(|inner| inner.world.part_state(self.id, part).copied())
     }
 
-    /// Pose of a rigid body's frame.
+    /// Returns the pose of a rigid body's frame.
     pub fn pose(&self) -> Result<Pose> {
         self.read(|inner| inner.world.pose(self.id, 0))
     }
 
-    /// Whether two handles point at the same.
+    /// Returns whether two handles refer to the same object.
     pub fn same(&self, other: &Place) -> bool {
         Arc::ptr_eq(&self.shared, &other.shared) && self.id == other.id
     }
 }
 
-/// A rigid body, or static geometry, of a world. Its frame is that of its shape, of a mesh that of its file; all vectors are in world axes.
+/// A rigid body, or static geometry, of a world. Its frame is that of its shape, for a mesh that of
+/// its file. All vectors are in world axes.
 ///
-/// A handle: it holds no numbers of its own. After the body was removed every use raises ``RemovedError``.
+/// A handle without data of its own. After the body was removed every use raises ``RemovedError``.
 #[pyclass(frozen, module = "tumble")]
 pub struct RigidBody {
     pub place: Place,
@@ -76,7 +77,7 @@ pub struct RigidBody {
 }
 
 impl RigidBody {
-    /// A handle.
+    /// Returns a handle.
     pub fn new(py: Python<'_>, place: Place) -> Result<RigidBody> {
         Ok(RigidBody { anchor: anchor(py, &place.shared)?, place })
     }
@@ -85,7 +86,7 @@ impl RigidBody {
         self.place.read(|inner| inner.world.get::<Rigid>(self.place.id).map(get))
     }
 
-    /// Changes a constant that may be changed; what it was stays where the new value cannot be.
+    /// Changes a constant. An invalid value changes nothing.
     fn change(&self, py: Python<'_>, set: impl FnOnce(&mut Rigid)) -> Result<()> {
         self.place.write(py, |inner| {
             let body = inner.world.get_mut::<Rigid>(self.place.id).ok_or_else(|| self.place.removed())?;
@@ -100,11 +101,11 @@ impl RigidBody {
     fn set_motion(&self, py: Python<'_>, velocity: Option<Vec3>, angular: Option<Vec3>) -> Result<()> {
         let place = &self.place;
         place.write(py, |inner| {
-            let site = *inner.world.part_state(place.id, 0).ok_or_else(|| place.removed())?;
+            let part_state = *inner.world.part_state(place.id, 0).ok_or_else(|| place.removed())?;
             Ok(inner.world.set_velocity(
                 place.id,
-                velocity.unwrap_or(site.velocity),
-                angular.unwrap_or(site.angular_velocity),
+                velocity.unwrap_or(part_state.velocity),
+                angular.unwrap_or(part_state.angular_velocity),
             )?)
         })
     }
@@ -120,7 +121,7 @@ impl RigidBody {
 
 #[pymethods]
 impl RigidBody {
-    /// Unique in its world.
+    /// Name, unique in its world.
     #[getter]
     fn name(&self) -> &str {
         &self.place.name
@@ -132,20 +133,20 @@ impl RigidBody {
         self.place.shared.read(|inner| Ok(inner.world.status(self.place.id).is_some()))
     }
 
-    /// Mass, kg. Of static geometry it means nothing.
+    /// Mass, kg. Meaningless for static geometry.
     #[getter]
     fn mass(&self) -> Result<f64> {
         self.constant(Rigid::mass)
     }
 
-    /// Inertia about the centre of mass, body axes, shape (3, 3), kg·m².
+    /// Inertia about the center of mass, body axes, shape (3, 3), kg·m².
     #[getter]
     fn inertia<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
         symmetric(py, &self.constant(|body| *body.inertia())?)
     }
 
-    /// Where the origin of its frame is, shape (3,), metres: the middle of a sphere, box, capsule or cylinder, the origin of a mesh's file. Setting it
-    /// keeps the velocity.
+    /// Position of the origin of its frame, shape (3,), meters: the center of a sphere, box,
+    /// capsule or cylinder, the origin of a mesh's file. Setting it keeps the velocity.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
         Ok(vector(py, &self.place.pose()?.translation.vector))
@@ -157,20 +158,20 @@ impl RigidBody {
         self.set_place(py, |now| Pose::from_parts(position.into(), now.rotation))
     }
 
-    /// The center of mass in the body's frame, shape (3,), metres: zeros but for meshes.
+    /// The center of mass in the body's frame, shape (3,), meters: zero except for meshes.
     #[getter]
     fn center_of_mass<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
         Ok(vector(py, &self.constant(Rigid::center_of_mass)?))
     }
 
-    /// The center of mass in the world, shape (3,), metres.
+    /// The center of mass in the world, shape (3,), meters.
     #[getter]
     fn world_center_of_mass<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
-        Ok(vector(py, &self.place.site(0)?.position()))
+        Ok(vector(py, &self.place.part_state(0)?.position()))
     }
 
-    /// Orientation, body to world, unit quaternion (x, y, z, w), shape (4,). Setting it turns the body about the origin of its frame and keeps
-    /// the velocity.
+    /// Orientation, body to world, unit quaternion (x, y, z, w), shape (4,). Setting it rotates the
+    /// body about the origin of its frame and keeps the velocity.
     #[getter]
     fn orientation<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
         Ok(quaternion(py, &self.place.pose()?.rotation))
@@ -182,10 +183,10 @@ impl RigidBody {
         self.set_place(py, |now| Pose::from_parts(now.translation, rotation))
     }
 
-    /// Velocity of the centre of mass, shape (3,), m/s.
+    /// Velocity of the center of mass, shape (3,), m/s.
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
-        Ok(vector(py, &self.place.site(0)?.velocity))
+        Ok(vector(py, &self.place.part_state(0)?.velocity))
     }
 
     #[setter]
@@ -196,7 +197,7 @@ impl RigidBody {
     /// Angular velocity, world axes, shape (3,), rad/s.
     #[getter]
     fn angular_velocity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
-        Ok(vector(py, &self.place.site(0)?.angular_velocity))
+        Ok(vector(py, &self.place.part_state(0)?.angular_velocity))
     }
 
     #[setter]
@@ -204,13 +205,14 @@ impl RigidBody {
         self.set_motion(py, None, Some(vec3(value, "angular_velocity")?))
     }
 
-    /// Acceleration of the centre of mass at the last force evaluation, shape (3,), m/s².
+    /// Acceleration of the center of mass at the last force evaluation, shape (3,), m/s².
     #[getter]
     fn acceleration<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
-        Ok(vector(py, &self.place.site(0)?.acceleration))
+        Ok(vector(py, &self.place.part_state(0)?.acceleration))
     }
 
-    /// ``"dynamic"``, ``"kinematic"`` (follows the velocity it is given and pushes others) or ``"static"``.
+    /// ``"dynamic"``, ``"kinematic"`` (moves at its prescribed velocity and pushes dynamic bodies)
+    /// or ``"static"``.
     #[getter]
     fn mode(&self) -> Result<&'static str> {
         Ok(word(self.place.status()?.mode, MODES))
@@ -228,25 +230,26 @@ impl RigidBody {
         self.place.write(py, |inner| Ok(inner.world.set_mode(self.place.id, mode)?))
     }
 
-    /// Whether it takes part in anything at all; its state stays while it does not.
+    /// Whether it takes part in the simulation. A disabled body keeps its state.
     #[getter]
-    fn alive(&self) -> Result<bool> {
+    fn enabled(&self) -> Result<bool> {
         Ok(self.place.status()?.enabled)
     }
 
     #[setter]
-    fn set_alive(&self, py: Python<'_>, value: bool) -> Result<()> {
+    fn set_enabled(&self, py: Python<'_>, value: bool) -> Result<()> {
         self.place.write(py, |inner| Ok(inner.world.set_enabled(self.place.id, value)?))
     }
 
-    /// Whether it sleeps: left out of the steps until something touches it (``World(sleep_after=…)``). What is done to it wakes it.
+    /// Whether it sleeps: the steps leave it out until something touches it
+    /// (``World(sleep_after=…)``). Any change wakes it.
     #[getter]
     fn asleep(&self) -> Result<bool> {
         self.place.status()?;
         self.place.shared.read(|inner| Ok(inner.world.asleep(self.place.id)))
     }
 
-    /// Whether it meets others.
+    /// Whether it collides.
     #[getter]
     fn collidable(&self) -> Result<bool> {
         Ok(self.place.status()?.collidable)
@@ -279,7 +282,7 @@ impl RigidBody {
         self.change(py, |body| body.material.friction = value)
     }
 
-    /// Colour that it is drawn in, sRGB, shape (3,), each 0 to 1. Setting it takes a pattern off.
+    /// Color, sRGB, shape (3,), each 0 to 1. Setting it removes a pattern.
     #[getter]
     fn color<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
         Ok(array(py, &self.constant(looks::color)?))
@@ -289,7 +292,7 @@ impl RigidBody {
     fn set_color(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
         let color = some::<3>(value, "color")?;
         if let Some(wrong) = color.iter().find(|c| !(0.0..=1.0).contains(*c)) {
-            return Err(Error::value(format!("color: {wrong} is not within 0 to 1")));
+            return Err(Error::value(format!("color: {wrong} is not from 0 to 1")));
         }
         self.change(py, |body| *body = looks::colored(body.clone(), color))
     }
@@ -316,7 +319,8 @@ impl RigidBody {
         self.change(py, |body| body.angular_damping = value)
     }
 
-    /// A force during the next frame alone. force: shape (3,), N, world axes; point: where in the world it acts, metres (default: the centre of mass).
+    /// Applies a force during the next step only. force: shape (3,), N, world axes; point: where it
+    /// acts in the world, meters (default: the center of mass).
     #[pyo3(signature = (force, point=None))]
     fn apply_force(&self, py: Python<'_>, force: &Bound<'_, PyAny>, point: Option<&Bound<'_, PyAny>>) -> Result<()> {
         let (force, point) = (vec3(force, "force")?, point.map(|p| vec3(p, "point")).transpose()?);
@@ -327,13 +331,14 @@ impl RigidBody {
         })
     }
 
-    /// A torque during the next frame alone. torque: shape (3,), N·m, world axes.
+    /// Applies a torque during the next step only. torque: shape (3,), N·m, world axes.
     fn apply_torque(&self, py: Python<'_>, torque: &Bound<'_, PyAny>) -> Result<()> {
         let torque = vec3(torque, "torque")?;
         self.place.write(py, |inner| Ok(inner.world.apply_torque(self.place.id, 0, torque)?))
     }
 
-    /// An impulse, at once. impulse: shape (3,), N·s, world axes; point: where in the world it acts, metres (default: the centre of mass).
+    /// Applies an impulse at once. impulse: shape (3,), N·s, world axes; point: where it acts in
+    /// the world, meters (default: the center of mass).
     #[pyo3(signature = (impulse, point=None))]
     fn apply_impulse(
         &self,
@@ -349,7 +354,8 @@ impl RigidBody {
         })
     }
 
-    /// Gives a kinematic body the velocity that brings its frame to a pose by the end of the next frame. What is not given stays as it is.
+    /// Sets the velocity of a kinematic body such that its frame reaches a pose at the end of the
+    /// next step. An omitted argument keeps its present value.
     #[pyo3(signature = (position=None, orientation=None))]
     fn move_to(
         &self,
@@ -367,7 +373,8 @@ impl RigidBody {
         })
     }
 
-    /// Position of a point of the body in the world. point: shape (3,), in the body's frame, metres (default: its origin).
+    /// Returns the position of a point of the body in the world. point: shape (3,), in the body's
+    /// frame, meters (default: its origin).
     #[pyo3(signature = (point=None))]
     fn to_world<'py>(&self, py: Python<'py>, point: Option<&Bound<'_, PyAny>>) -> Result<Bound<'py, PyArray1<f64>>> {
         let point = vec3_or(point, "point", Vec3::zeros())?;
@@ -387,7 +394,7 @@ impl RigidBody {
         hash(&self.place)
     }
 
-    /// For pickle, which a handle by itself is not for.
+    /// Refuses to pickle a handle by itself.
     fn __reduce__(&self) -> Result<()> {
         Err(alone(&self.place.name))
     }
@@ -397,7 +404,7 @@ impl RigidBody {
     }
 }
 
-/// Equal handles have equal hashes.
+/// Returns equal hashes for equal handles.
 pub fn hash(place: &Place) -> u64 {
     use std::hash::{DefaultHasher, Hash, Hasher};
     let mut hasher = DefaultHasher::new();

@@ -1,4 +1,4 @@
-//! Worlds of scene files, and what stands in place of what they say.
+//! Worlds of scene files, and arguments that override the file.
 
 use crate::errors::{Error, Result, caught};
 use crate::inner::Inner;
@@ -7,7 +7,7 @@ use std::sync::Arc;
 use tumble::dynamics::{ArticulatedBody, Joint};
 use tumble::scene::{SceneFile, WorldSettings};
 
-/// What the words and numbers of a constructor make of settings.
+/// Settings given to a constructor.
 pub struct Choices<'a> {
     pub stepper: Option<&'a str>,
     pub integrator: Option<&'a str>,
@@ -19,18 +19,19 @@ impl Choices<'_> {
     /// Writes them into a scene's settings.
     pub fn apply(&self, world: &mut WorldSettings) -> Result<()> {
         world.dt_s = self.dt.unwrap_or(world.dt_s);
-        let told = |what: &str| {
+        let invalid = |what: &str| {
             let what = what.to_string();
             move |e: tumble::scene::UnknownName| Error::value(format!("{what}: {e}"))
         };
-        world.stepper = self.stepper.map_or(Ok(world.stepper), |s| s.parse().map_err(told("stepper")))?;
-        world.integrator = self.integrator.map_or(Ok(world.integrator), |s| s.parse().map_err(told("integrator")))?;
-        world.solver = self.solver.map_or(Ok(world.solver), |s| s.parse().map_err(told("solver")))?;
+        world.stepper = self.stepper.map_or(Ok(world.stepper), |s| s.parse().map_err(invalid("stepper")))?;
+        world.integrator =
+            self.integrator.map_or(Ok(world.integrator), |s| s.parse().map_err(invalid("integrator")))?;
+        world.solver = self.solver.map_or(Ok(world.solver), |s| s.parse().map_err(invalid("solver")))?;
         Ok(())
     }
 }
 
-/// The world of a scene.
+/// Builds the world of a scene.
 pub fn build(scene: SceneFile) -> Result<Inner> {
     let (world, notes) = caught(|| Ok(scene.build()?))?;
     let mut inner = Inner::new(world, Arc::new(scene));

@@ -1,8 +1,11 @@
-//! Circles through a world: a force that holds the world it acts in, or a handle of it, is found by Python's collector.
+//! Reference cycles through a world: Python's garbage collector finds a force that refers to the
+//! world it acts in, or to a handle of it.
 //!
-//! A world lies behind a lock that many handles share, and Python does not see that. So all of them hold one [`Anchor`], which stands for the world where
-//! Python counts references: it alone names the forces and behaviours of the world, each once. They are listed beside the world and not in it: the list is
-//! touched only under the interpreter's lock, so that it is the same all through one collection, whoever steps meanwhile.
+//! A world is behind a lock that many handles share, which Python cannot see. All of them therefore
+//! hold one [`Anchor`], which represents the world in Python's reference counts: it alone refers to
+//! the forces and behaviors of the world, each once. They are listed beside the world and not in
+//! it. The list changes only under the interpreter's lock, so it is constant during one collection,
+//! whichever thread steps meanwhile.
 
 use crate::shared::Shared;
 use pyo3::gc::{PyTraverseError, PyVisit};
@@ -10,10 +13,10 @@ use pyo3::prelude::*;
 use pyo3::types::{PyWeakrefMethods, PyWeakrefReference};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// A force or behaviour: counted by Python once, however many in Rust hold it.
+/// A force or behavior. Python counts it once, however many references Rust has.
 pub type Callable = Arc<Py<PyAny>>;
 
-/// Stands for a world in the eyes of the collector.
+/// Represents a world to the garbage collector.
 #[pyclass(frozen, weakref, module = "tumble", name = "_Anchor")]
 pub struct Anchor {
     shared: Arc<Shared>,
@@ -27,16 +30,16 @@ impl Anchor {
     }
 
     fn __clear__(&self) {
-        self.shared.forsake();
+        self.shared.drop_callbacks();
     }
 }
 
-/// What the collector needs to know of a world.
+/// The garbage collector's data about a world.
 #[derive(Default)]
 pub struct Ground {
-    /// The anchor, if the world has one now.
+    /// The anchor, if the world has one at present.
     anchor: Mutex<Option<Py<PyWeakrefReference>>>,
-    /// Its forces and behaviours.
+    /// Its forces and behaviors.
     callables: Mutex<Vec<Callable>>,
 }
 
@@ -45,14 +48,14 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Ground {
-    /// Lists the forces and behaviours anew. The interpreter's lock must be held.
+    /// Replaces the list of forces and behaviors. The interpreter's lock must be held.
     pub fn list(&self, callables: Vec<Callable>) {
         let before = std::mem::replace(&mut *lock(&self.callables), callables);
         drop(before); // not under the lock: it may run Python
     }
 }
 
-/// The anchor of a world, for every Python object that holds it.
+/// Returns the anchor of a world, for a Python object that refers to the world.
 pub fn anchor(py: Python<'_>, shared: &Arc<Shared>) -> PyResult<Py<Anchor>> {
     let known = lock(&shared.ground.anchor).as_ref().map(|weak| weak.clone_ref(py));
     if let Some(anchor) = known.and_then(|weak| weak.into_bound(py).upgrade_as::<Anchor>().ok().flatten()) {

@@ -9,7 +9,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::PyList;
 use tumble::dynamics::{ArticulatedBody, ObjectId};
 
-/// Fields of a contact: name, format, how many. All have 8 bytes, so that there is no padding.
+/// Fields of a contact: name, format, count. All have 8 bytes, so there is no padding.
 const FIELDS: [(&str, &str, usize); 8] = [
     ("bodies", "<i8", 2),
     ("parts", "<i8", 2),
@@ -21,7 +21,7 @@ const FIELDS: [(&str, &str, usize); 8] = [
     ("force", "<f8", 3),
 ];
 
-/// The contacts as the bytes of the array.
+/// Returns the contacts as the bytes of the array.
 pub fn bytes(inner: &Inner) -> Vec<u8> {
     let ids = body_ids(&inner.world);
     let number = |id: ObjectId| ids.iter().position(|&other| other == id).map_or(-1, |k| k as i64);
@@ -38,21 +38,22 @@ pub fn bytes(inner: &Inner) -> Vec<u8> {
     out
 }
 
-/// The place of the touched link in the `link_names` of its articulation; a rigid body has but one part.
+/// Returns the index of the touched link in the `link_names` of its articulation. A rigid body has
+/// only one part.
 fn link(inner: &Inner, id: ObjectId, part: usize) -> i64 {
     let Some(body) = inner.world.get::<ArticulatedBody>(id) else { return part as i64 };
     let name = body.link_of(part).map(|link| &body.model().links()[link].name);
     let frames = body.model().frames();
-    // what is on the base is of the first link, which all others hang on
+    // Shapes on the base count as the first link, to which all others are attached.
     name.and_then(|name| frames.iter().position(|frame| frame.name == *name)).unwrap_or(0) as i64
 }
 
-/// The array of such bytes.
+/// Returns the array of such bytes.
 pub fn array<'py>(py: Python<'py>, bytes: Vec<u8>) -> Result<Bound<'py, PyAny>> {
     Ok(PyArray1::from_vec(py, bytes).call_method1("view", (kind(py)?,))?)
 }
 
-/// The numpy type of one contact.
+/// Returns the numpy type of one contact.
 pub fn kind<'py>(py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
     static KIND: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let kind = KIND.get_or_try_init(py, || {

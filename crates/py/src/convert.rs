@@ -1,4 +1,5 @@
-//! Python's numbers to Rust's and back. What comes in is checked here: its shape, and that all of it is finite.
+//! Conversion of numbers between Python and Rust. Input is checked for its shape and for finite
+//! numbers.
 
 use crate::errors::{Error, Result};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
@@ -11,30 +12,30 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 use tumble::collide::{Mat3, Pose, Quat, Vec3};
 
-/// How far from 1 the length of a quaternion may be.
+/// Largest deviation of a quaternion's length from 1.
 const UNIT: f64 = 1e-6;
 
-/// Most numbers of an array: 8 GiB of them.
-const MOST: usize = 1 << 30;
+/// Largest size of an array: 8 GiB of numbers.
+const MAX_NUMBERS: usize = 1 << 30;
 
-/// Finite numbers and the shape they came in, in C order.
+/// Finite numbers and their shape, in C order.
 pub struct Numbers {
     /// The shape.
     pub shape: Vec<usize>,
-    /// As many numbers as its product.
+    /// As many numbers as the product of the shape.
     pub data: Vec<f64>,
 }
 
-/// Anything that numpy makes an array of; `what` stands in errors.
+/// Converts anything that numpy can make an array of. `what` names the argument in errors.
 pub fn numbers(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
-    // numpy would drop imaginary parts and count days
+    // numpy would drop imaginary parts and convert dates to days.
     if value.cast::<PyUntypedArray>().is_ok_and(|array| b"cmMSUV".contains(&array.dtype().kind())) {
         return Err(not_numbers(value, what));
     }
     let array: PyArrayLikeDyn<'_, f64, AllowTypeChange> = value.extract().map_err(|_| not_numbers(value, what))?;
     let shape = array.shape().to_vec();
     let mut data = room(array.len(), what)?;
-    // what numpy calls contiguous may be column by column
+    // An array that numpy calls contiguous may be in column order.
     match array.as_slice() {
         Ok(slice) if array.is_c_contiguous() => data.extend_from_slice(slice),
         _ => data.extend(array.as_array().iter()),
@@ -45,56 +46,56 @@ pub fn numbers(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
     }
 }
 
-/// An empty vector with room for so many numbers, where there is memory for them.
+/// Returns an empty vector with room for `len` numbers, if there is enough memory.
 pub fn room(len: usize, what: &str) -> Result<Vec<f64>> {
     let mut room = Vec::new();
-    let reserved = if len <= MOST { room.try_reserve_exact(len).is_ok() } else { false };
+    let reserved = if len <= MAX_NUMBERS { room.try_reserve_exact(len).is_ok() } else { false };
     match reserved {
         true => Ok(room),
-        false => Err(PyMemoryError::new_err(format!(
-            "{what}: {len} numbers are more than there is room for (at most {MOST})"
-        ))
-        .into()),
+        false => {
+            Err(PyMemoryError::new_err(format!("{what}: {len} numbers do not fit into memory (at most {MAX_NUMBERS})"))
+                .into())
+        }
     }
 }
 
 fn not_numbers(value: &Bound<'_, PyAny>, what: &str) -> Error {
     let shown = value.repr().map_or_else(|_| "something".into(), |r| r.to_string());
     let shown: String = shown.chars().take(60).collect();
-    Error::value(format!("{what}: wanted numbers, and not {shown}"))
+    Error::value(format!("{what}: expected numbers, not {shown}"))
 }
 
-/// As many numbers as `N`, in one dimension.
+/// Converts `N` numbers in one dimension.
 pub fn some<const N: usize>(value: &Bound<'_, PyAny>, what: &str) -> Result<[f64; N]> {
     let Numbers { shape, data } = numbers(value, what)?;
     if shape.as_slice() != [N] {
-        return Err(Error::value(format!("{what}: wanted {N} numbers, shape ({N},), and got shape {}", shown(&shape))));
+        return Err(Error::value(format!("{what}: expected {N} numbers, shape ({N},), got shape {}", shown(&shape))));
     }
     data.try_into().map_err(|_| Error::value(what))
 }
 
-/// A shape as Python writes it.
+/// Formats a shape as Python does.
 pub fn shown(shape: &[usize]) -> String {
     let inner: Vec<String> = shape.iter().map(usize::to_string).collect();
     if inner.len() == 1 { format!("({},)", inner[0]) } else { format!("({})", inner.join(", ")) }
 }
 
-/// One finite number.
+/// Checks that a number is finite.
 pub fn number(value: f64, what: &str) -> Result<f64> {
     if value.is_finite() { Ok(value) } else { Err(Error::value(format!("{what} is {value}; it must be finite"))) }
 }
 
-/// Three numbers.
+/// Converts three numbers.
 pub fn vec3(value: &Bound<'_, PyAny>, what: &str) -> Result<Vec3> {
     some::<3>(value, what).map(Vec3::from)
 }
 
-/// Three numbers, or what stands for none.
+/// Converts three numbers, or returns the default for None.
 pub fn vec3_or(value: Option<&Bound<'_, PyAny>>, what: &str, usual: Vec3) -> Result<Vec3> {
     value.map_or(Ok(usual), |value| vec3(value, what))
 }
 
-/// A unit quaternion `x, y, z, w`; a length within 1e-6 of 1 is made 1.
+/// Converts a unit quaternion `x, y, z, w`. A length within 1e-6 of 1 is normalized.
 pub fn rotation(value: &Bound<'_, PyAny>, what: &str) -> Result<Quat> {
     let [x, y, z, w] = some::<4>(value, what)?;
     let q = Quaternion::new(w, x, y, z);
@@ -105,14 +106,14 @@ pub fn rotation(value: &Bound<'_, PyAny>, what: &str) -> Result<Quat> {
     Ok(UnitQuaternion::from_quaternion(q))
 }
 
-/// A pose from a position and an orientation, the identity where they are not given.
+/// Converts a position and an orientation to a pose; omitted ones are those of the identity.
 pub fn pose(position: Option<&Bound<'_, PyAny>>, orientation: Option<&Bound<'_, PyAny>>) -> Result<Pose> {
     let position = vec3_or(position, "position", Vec3::zeros())?;
     let rotation = orientation.map_or(Ok(Quat::identity()), |q| self::rotation(q, "orientation"))?;
     Ok(Pose::from_parts(Translation3::from(position), rotation))
 }
 
-/// A pose from 3 numbers or 7.
+/// Converts 3 or 7 numbers to a pose.
 pub fn base_pose(base: &Bound<'_, PyAny>) -> Result<Pose> {
     let Numbers { shape, data } = numbers(base, "base")?;
     match shape.as_slice() {
@@ -122,24 +123,25 @@ pub fn base_pose(base: &Bound<'_, PyAny>) -> Result<Pose> {
         }
         [7] => Err(Error::value("base: the quaternion (x, y, z, w) in its last four numbers must have length 1")),
         _ => Err(Error::value(format!(
-            "base: wanted a position, shape (3,), or position and quaternion, shape (7,), and got {}",
+            "base: expected a position, shape (3,), or position and quaternion, shape (7,), got {}",
             shown(&shape)
         ))),
     }
 }
 
-/// A pose as 7 numbers: position, quaternion `x, y, z, w`.
+/// Returns a pose as 7 numbers: position, quaternion `x, y, z, w`.
 pub fn pose_numbers(pose: &Pose) -> [f64; 7] {
     let (p, q) = (pose.translation.vector, pose.rotation.coords);
     [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
 }
 
-/// The rotation of four numbers `x, y, z, w`, made unit.
+/// Returns the rotation of four numbers `x, y, z, w`, normalized.
 pub fn unit(q: &[f64]) -> Quat {
     UnitQuaternion::from_quaternion(Quaternion::new(q[3], q[0], q[1], q[2]))
 }
 
-/// A whole number, for `from_py_with`: one that does not fit is a bad value, and not an overflow.
+/// Converts an integer, for `from_py_with`. One that does not fit is a value error and not an
+/// overflow.
 pub fn whole_number<'py, T: for<'a> FromPyObject<'a, 'py>>(value: &Bound<'py, PyAny>) -> PyResult<T> {
     value.extract::<T>().map_err(|error| {
         let error: PyErr = error.into();
@@ -148,31 +150,31 @@ pub fn whole_number<'py, T: for<'a> FromPyObject<'a, 'py>>(value: &Bound<'py, Py
         }
         let written: String =
             value.str().map_or_else(|_| "the number".into(), |s| s.to_string()).chars().take(40).collect();
-        Error::value(format!("{written}: wanted a whole number that is neither negative nor that large")).into()
+        Error::value(format!("{written}: expected a non-negative integer in range")).into()
     })
 }
 
-/// A path: `str` or `os.PathLike`.
+/// Converts a path: `str` or `os.PathLike`.
 pub fn path(value: &Bound<'_, PyAny>) -> Result<PathBuf> {
-    Ok(value.extract().map_err(|_| PyTypeError::new_err("wanted a path: str or os.PathLike"))?)
+    Ok(value.extract().map_err(|_| PyTypeError::new_err("expected a path: str or os.PathLike"))?)
 }
 
-/// A numpy array of one dimension.
+/// Returns a numpy array of one dimension.
 pub fn array<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyArray1<f64>> {
     PyArray1::from_slice(py, values)
 }
 
-/// The three numbers of a vector.
+/// Returns the three numbers of a vector.
 pub fn vector<'py>(py: Python<'py>, v: &Vec3) -> Bound<'py, PyArray1<f64>> {
     array(py, v.as_slice())
 }
 
-/// A quaternion as `x, y, z, w`.
+/// Returns a quaternion as `x, y, z, w`.
 pub fn quaternion<'py>(py: Python<'py>, q: &Quat) -> Bound<'py, PyArray1<f64>> {
     array(py, q.coords.as_slice())
 }
 
-/// A symmetric matrix.
+/// Returns a symmetric matrix.
 pub fn symmetric<'py>(py: Python<'py>, m: &Mat3) -> Result<Bound<'py, PyArray2<f64>>> {
     Ok(array(py, m.as_slice()).reshape([3, 3])?)
 }

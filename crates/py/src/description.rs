@@ -1,11 +1,11 @@
-//! Descriptions of articulated bodies that come from elsewhere than `Articulation.from_urdf`: paths, and pickles.
+//! Descriptions of articulated bodies from paths and pickles.
 
 use crate::articulation::Articulation;
 use crate::convert::{array, path};
 use crate::errors::{Error, Result};
 use crate::pool;
 use crate::robot::Robot;
-use crate::spot::{Now, Spot, Which, locked};
+use crate::spot::{Binding, Now, Which, locked};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
@@ -14,23 +14,24 @@ use tumble::collide::{Pose, Vec3};
 use tumble::dynamics::ArticulatedBody;
 
 impl Articulation {
-    /// The body to be put into a world, in the state that the description has, and what is to be said of its files.
+    /// Returns the body to add to a world, in the state of the description, and notes about its
+    /// files.
     pub fn body(
         &self,
         py: Python<'_>,
         base: Pose,
         name: Option<&str>,
     ) -> Result<(ArticulatedBody, Robot, Vec<String>)> {
-        let Spot::Free { source, now } = &self.spot else {
+        let Binding::Free { source, now } = &self.spot else {
             return Err(Error::value(format!(
-                "'{}' is in a world already; add the description that it was made of",
+                "'{}' is already in a world; add the description that it was made from",
                 self.name
             )));
         };
         let (body, notes) = py.detach(|| pool::run(|| source.body()))?;
         let body = body.at(base).named(name.unwrap_or(&self.name));
         let Now { mut q, qd, .. } = locked(now).clone();
-        // where a floating root is, is said from the base
+        // The pose of a floating root is relative to the base.
         let model = body.model();
         for link in model.links().iter().filter(|link| link.joint == tumble::dynamics::Joint::Floating) {
             let own = Pose::from_parts(
@@ -45,7 +46,7 @@ impl Articulation {
     }
 }
 
-/// What a pickled description becomes: its file is read anew.
+/// Unpickles a description. Its file is read again.
 #[pyfunction]
 pub fn _unpickle_articulation(
     py: Python<'_>,
@@ -66,15 +67,15 @@ pub fn _unpickle_articulation(
     Ok(description)
 }
 
-/// The error of a handle that is pickled.
+/// Returns the error for pickling a handle.
 pub fn alone(name: &str) -> Error {
     PyTypeError::new_err(format!(
-        "cannot pickle a handle of '{name}' by itself; pickle its world, and ask that for the body by name"
+        "cannot pickle a handle of '{name}' by itself; pickle its world and look up the body there by name"
     ))
     .into()
 }
 
-/// A description of a URDF, from a path.
+/// Returns the description of a URDF, from a path.
 pub fn described<'py>(value: &Bound<'py, PyAny>) -> Result<Bound<'py, Articulation>> {
     if let Ok(own) = value.cast::<Articulation>() {
         return Ok(own.clone());

@@ -1,4 +1,4 @@
-//! Errors on their way to Python: the text is Rust's, the class is one of `tumble._errors`.
+//! Conversion of errors to Python: the text comes from Rust, the class is one of `tumble._errors`.
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -16,7 +16,7 @@ use tumble::scene::cave::CaveError;
 use tumble::scene::urdf::UrdfError;
 use tumble::scene::{BuildError, SceneError, UnknownName};
 
-/// Whatever a call from Python can end with.
+/// Any error that a call from Python can end with.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     #[error(transparent)]
@@ -49,21 +49,21 @@ pub enum Error {
     Choice(#[from] UnknownName),
     #[error(transparent)]
     Snapshot(#[from] SnapshotError),
-    /// Bytes that are no pickled world or shape.
+    /// The bytes are not a pickled world or shape.
     #[error(transparent)]
     Archive(ArchiveError),
     #[error(transparent)]
     Step(#[from] StepError),
-    /// A step of one of many forks.
+    /// A step failed in one of many forks.
     #[error("fork {fork}, frame {frame}: {source}")]
     Fork { fork: usize, frame: usize, source: Box<Error> },
-    /// A file that the binding itself reads.
+    /// A file that the binding reads itself.
     #[error("{file}: {source}")]
     File { file: String, source: std::io::Error },
-    /// What is wrong with a value, and what would be right.
+    /// An invalid value, and the expected value.
     #[error("{0}")]
     Value(String),
-    /// A name that nothing has, and what there is.
+    /// An unknown name, and the known ones.
     #[error("{0}")]
     Name(String),
     #[error("{0}")]
@@ -73,20 +73,20 @@ pub enum Error {
     )]
     Busy,
     #[error(
-        "the world is being stepped, and this call comes from within that step; a force or behaviour reads the view it is given"
+        "the world is being stepped, and this call comes from within that step; a force or behavior must use its view"
     )]
     Within,
-    /// Work that ended early; the caller raises what ended it.
+    /// Work that was ended early. The caller raises the reason.
     #[error("the work was stopped")]
     Stopped,
     /// A panic that was caught.
     #[error("an error inside tumble: {0}; please report it")]
     Internal(String),
     #[error(
-        "an error inside tumble stopped this world in the middle of a call; make it anew, or go on from a fork or a snapshot in another world"
+        "an error inside tumble stopped this world in the middle of a call; make a new one, or continue from a fork or a snapshot in another world"
     )]
     Broken,
-    /// What Python itself raised.
+    /// An exception raised by Python.
     #[error(transparent)]
     Python(#[from] PyErr),
 }
@@ -95,12 +95,12 @@ pub enum Error {
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 impl Error {
-    /// A value error.
+    /// Returns a value error.
     pub fn value(text: impl Into<String>) -> Error {
         Error::Value(text.into())
     }
 
-    /// The name of its class in `tumble._errors`.
+    /// Returns the name of its class in `tumble._errors`.
     fn class(&self) -> &'static str {
         match self {
             Error::World(WorldError::Stale) | Error::Removed(_) => "RemovedError",
@@ -150,13 +150,13 @@ impl From<Error> for PyErr {
     }
 }
 
-/// What Python raised in a fork, with a note of where (from Python 3.11 on).
+/// Adds a note about the fork to an exception (Python 3.11 and later).
 fn noted(error: PyErr, fork: usize, frame: usize) -> PyErr {
     Python::attach(|py| _ = error.value(py).call_method1("add_note", (format!("in fork {fork}, frame {frame}"),)));
     error
 }
 
-/// A class of `tumble._errors`, imported once.
+/// Returns a class of `tumble._errors`, imported once.
 fn class<'py>(py: Python<'py>, name: &'static str) -> PyResult<Bound<'py, PyType>> {
     static CLASSES: PyOnceLock<BTreeMap<String, Py<PyType>>> = PyOnceLock::new();
     let classes = CLASSES.get_or_try_init(py, || {
@@ -170,11 +170,11 @@ fn class<'py>(py: Python<'py>, name: &'static str) -> PyResult<Bound<'py, PyType
     classes.get(name).map(|class| class.bind(py).clone()).ok_or_else(|| PyRuntimeError::new_err(name))
 }
 
-/// Runs what must not panic; a panic becomes an [`Error::Internal`] with its text.
+/// Runs `call` and converts a panic to [`Error::Internal`] with its text.
 pub fn caught<T>(call: impl FnOnce() -> Result<T>) -> Result<T> {
     std::panic::catch_unwind(std::panic::AssertUnwindSafe(call)).unwrap_or_else(|panic| {
         let text =
             panic.downcast_ref::<&str>().map(|s| s.to_string()).or_else(|| panic.downcast_ref::<String>().cloned());
-        Err(Error::Internal(text.unwrap_or_else(|| "a panic without words".into())))
+        Err(Error::Internal(text.unwrap_or_else(|| "a panic without a message".into())))
     })
 }

@@ -1,8 +1,10 @@
-//! Forces and behaviours written in Python (the thesis's extensibility, §IV.A.2).
+//! Forces and behaviors written in Python (the thesis's extensibility, §IV.A.2).
 //!
-//! A force is an object of the world like one written in Rust: it is asked at every evaluation of every integrator's stages. A behaviour is asked once
-//! a frame, before it, and what it does acts during that frame. Both see a [`View`]. What Python raises is kept, and handed to the caller of the step
-//! with its traceback; the frame is run to its end without that force, and then the world is put back to where it was before.
+//! A force is an object of the world, like one written in Rust: it is evaluated in every stage of
+//! every integrator. A behavior is called once before each frame, and its forces act during that
+//! frame. Both get a [`View`]. An exception from Python is kept and raised by the step with its
+//! traceback. The frame runs to its end without that force, and then the world returns to its state
+//! before the frame.
 
 use crate::arrays::Arrays;
 use crate::collect::Callable;
@@ -15,12 +17,12 @@ use pyo3::types::PyBytes;
 use std::sync::{Arc, Mutex, MutexGuard};
 use tumble::dynamics::{ForceGenerator, Forces, Mode, Object, ObjectId, StateRange, WorldView, Wrench};
 
-/// A Python object that is called, which rows are whose, and what it raised.
+/// A Python object that is called, the layout of its rows, and its pending exception.
 struct Code {
     name: String,
     object: Callable,
     layout: Mutex<Option<Arc<Layout>>>,
-    /// Of the call before.
+    /// From the previous call.
     arrays: Mutex<Option<Arc<Arrays>>>,
     raised: Mutex<Option<PyErr>>,
 }
@@ -38,7 +40,8 @@ impl Code {
         Code { name: name.into(), object, layout: Mutex::default(), arrays: Mutex::default(), raised: Mutex::default() }
     }
 
-    /// For a fork of the world: what the object's own `fork` answers. What that raises is kept like what a call raises.
+    /// Returns the copy for a fork of the world, from the object's own `fork`. An exception there
+    /// is kept like that of a call.
     fn fork(&self, method: &str) -> Code {
         let fork = |py: Python<'_>| {
             let object = self.object.call_method0(py, "fork")?;
@@ -64,7 +67,7 @@ impl Code {
         }
     }
 
-    /// Calls a method with a view; `each` gets what was added to it, by site.
+    /// Calls a method with a view. `each` receives the added forces by part.
     fn call(
         &self,
         world: &WorldView,
@@ -94,8 +97,8 @@ impl Code {
                 )));
             }
             arrays.take(py, &layout, &self.name, |row, wrench| {
-                let (site, wrench) = layout.at_site(row, world.part_states, wrench);
-                each(site, wrench);
+                let (part_index, wrench) = layout.at_part(row, world.part_states, wrench);
+                each(part_index, wrench);
             })?;
             *lock(&self.arrays) = Some(arrays);
             Ok(())
@@ -103,7 +106,7 @@ impl Code {
     }
 }
 
-/// A force written in Python, as the world holds it.
+/// A force written in Python as an object of the world.
 struct PythonForce {
     code: Code,
 }
@@ -124,13 +127,13 @@ impl Object for PythonForce {
 
 impl ForceGenerator for PythonForce {
     fn apply(&self, _me: &StateRange, view: &WorldView, out: &mut Forces) {
-        // after an error the rest of the frame is of no use
+        // After an error the rest of the frame is discarded.
         if lock(&self.code.raised).is_some() {
             return;
         }
-        let add = |site: usize, wrench: Wrench| {
-            out.wrenches[site].force += wrench.force;
-            out.wrenches[site].torque += wrench.torque;
+        let add = |part_index: usize, wrench: Wrench| {
+            out.wrenches[part_index].force += wrench.force;
+            out.wrenches[part_index].torque += wrench.torque;
         };
         if let Err(error) = self.code.call(view, "apply", None, add) {
             *lock(&self.code.raised) = Some(error.into());
@@ -138,55 +141,56 @@ impl ForceGenerator for PythonForce {
     }
 }
 
-/// A force whose Python object is yet to come: `None` stands for it.
+/// Returns a force whose Python object is set later; `None` stands for it.
 pub fn empty_force(name: &str) -> Box<dyn Object> {
     let nobody = Python::attach(|py| Arc::new(py.None()));
     Box::new(PythonForce { code: Code::of(name, nobody) })
 }
 
-/// Names and objects of forces; names, objects and bodies of behaviours.
+/// Names and objects of forces; names, objects and bodies of behaviors.
 pub type Extensions = (Vec<(String, Py<PyAny>)>, Vec<(String, Py<PyAny>, Vec<String>)>);
 
-/// What pickle asks of a world: the function that makes it anew, its arguments, and what is set afterwards.
+/// The result of `__reduce__`: the function that makes the world, its arguments, and the state for
+/// `__setstate__`.
 pub type Reduced<'py> = (Bound<'py, PyAny>, (Bound<'py, PyBytes>,), Option<Extensions>);
 
-/// A behaviour and the bodies it was given.
+/// A behavior and its bodies.
 struct Attached {
     code: Code,
     bodies: Vec<ObjectId>,
 }
 
-/// The forces and behaviours of one world.
+/// The forces and behaviors of one world.
 #[derive(Default)]
 pub struct Extension {
     forces: Vec<ObjectId>,
-    behaviours: Vec<Attached>,
+    behaviors: Vec<Attached>,
 }
 
 impl Extension {
-    /// Whether there are none.
+    /// Returns whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.forces.is_empty() && self.behaviours.is_empty()
+        self.forces.is_empty() && self.behaviors.is_empty()
     }
 
-    /// For a fork of the world.
+    /// Returns the copy for a fork of the world.
     pub fn fork(&self) -> Extension {
         let attached = |a: &Attached| Attached { code: a.code.fork("act"), bodies: a.bodies.clone() };
-        Extension { forces: self.forces.clone(), behaviours: self.behaviours.iter().map(attached).collect() }
+        Extension { forces: self.forces.clone(), behaviors: self.behaviors.iter().map(attached).collect() }
     }
 }
 
 impl Inner {
-    /// What a callback raised since it was last asked.
+    /// Returns the exception that a callback raised since the last call, as an error.
     pub fn take_raised(&self) -> Result<()> {
         let forces =
             self.extension.forces.iter().filter_map(|&id| self.world.get::<PythonForce>(id)).map(|force| &force.code);
-        let codes = forces.chain(self.extension.behaviours.iter().map(|b| &b.code));
+        let codes = forces.chain(self.extension.behaviors.iter().map(|b| &b.code));
         let mut raised: Vec<PyErr> = codes.filter_map(|code| lock(&code.raised).take()).collect();
         if raised.is_empty() { Ok(()) } else { Err(raised.swap_remove(0).into()) }
     }
 
-    /// Steps by one frame, with behaviours before it and forces in it.
+    /// Runs one frame with behaviors before it and forces in it.
     pub fn extended_frame(&mut self) -> Result<()> {
         self.behave()?;
         let outcome = self.frame();
@@ -194,7 +198,7 @@ impl Inner {
     }
 
     fn behave(&mut self) -> Result<()> {
-        for Attached { code, bodies } in &self.extension.behaviours {
+        for Attached { code, bodies } in &self.extension.behaviors {
             let view = self.world.view();
             let layout = code.layout(&view);
             let rows: Vec<i64> =
@@ -203,14 +207,16 @@ impl Inner {
                 continue;
             }
             let mut wrenches = Vec::new();
-            code.call(&view, "act", Some(&rows), |site, wrench| wrenches.push((site, wrench)))?;
+            code.call(&view, "act", Some(&rows), |part_index, wrench| wrenches.push((part_index, wrench)))?;
             let mut owners = vec![None; view.part_states.len()];
             for (id, span) in view.ids().iter().filter_map(|&id| Some((id, view.state_range(id)?))) {
-                span.parts.clone().enumerate().for_each(|(part, site)| owners[site] = Some((id, part)));
+                span.parts.clone().enumerate().for_each(|(part, part_index)| owners[part_index] = Some((id, part)));
             }
-            for (site, wrench) in wrenches.into_iter().filter(|(_, wrench)| *wrench != Wrench::default()) {
-                let Some((id, part)) = owners[site] else { continue };
-                let Some(point) = self.world.part_state(id, part).map(|site| site.position()) else { continue };
+            for (part_index, wrench) in wrenches.into_iter().filter(|(_, wrench)| *wrench != Wrench::default()) {
+                let Some((id, part)) = owners[part_index] else { continue };
+                let Some(point) = self.world.part_state(id, part).map(|part_state| part_state.position()) else {
+                    continue;
+                };
                 self.world.apply_force(id, part, wrench.force, &point)?;
                 self.world.apply_torque(id, part, wrench.torque)?;
             }
@@ -226,27 +232,27 @@ impl Inner {
         Ok(())
     }
 
-    /// Adds a behaviour of some bodies; it must have `act` and `fork`.
-    pub fn add_behaviour(&mut self, name: &str, object: &Bound<'_, PyAny>, bodies: Vec<ObjectId>) -> Result<()> {
+    /// Adds a behavior of some bodies; it must have `act` and `fork`.
+    pub fn add_behavior(&mut self, name: &str, object: &Bound<'_, PyAny>, bodies: Vec<ObjectId>) -> Result<()> {
         self.check_new(name)?;
         if bodies.is_empty() {
-            return Err(Error::value(format!("behaviour '{name}': wanted at least one body")));
+            return Err(Error::value(format!("behavior '{name}': expected at least one body")));
         }
-        self.extension.behaviours.push(Attached { code: Code::new(name, object), bodies });
+        self.extension.behaviors.push(Attached { code: Code::new(name, object), bodies });
         Ok(())
     }
 
     fn check_new(&self, name: &str) -> Result<()> {
-        match self.world.find(name).is_some() || self.extension.behaviours.iter().any(|b| b.code.name == name) {
+        match self.world.find(name).is_some() || self.extension.behaviors.iter().any(|b| b.code.name == name) {
             true => Err(tumble::dynamics::WorldError::DuplicateName(name.into()).into()),
             false => Ok(()),
         }
     }
 
-    /// Removes a force or a behaviour; whether there was one of that name.
+    /// Removes a force or a behavior. Returns whether there was one of that name.
     pub fn remove_extension(&mut self, name: &str) -> Result<bool> {
-        if let Some(at) = self.extension.behaviours.iter().position(|b| b.code.name == name) {
-            self.extension.behaviours.remove(at);
+        if let Some(at) = self.extension.behaviors.iter().position(|b| b.code.name == name) {
+            self.extension.behaviors.remove(at);
             return Ok(true);
         }
         let Some(id) = self.world.find(name).filter(|id| self.extension.forces.contains(id)) else { return Ok(false) };
@@ -255,58 +261,58 @@ impl Inner {
         Ok(true)
     }
 
-    /// The objects of all forces and behaviours.
+    /// Returns the objects of all forces and behaviors.
     pub fn callables(&self) -> Vec<Callable> {
         let forces =
             self.extension.forces.iter().filter_map(|&id| self.world.get::<PythonForce>(id)).map(|force| &force.code);
-        forces.chain(self.extension.behaviours.iter().map(|b| &b.code)).map(|code| code.object.clone()).collect()
+        forces.chain(self.extension.behaviors.iter().map(|b| &b.code)).map(|code| code.object.clone()).collect()
     }
 
-    /// The objects that are forces written in Python.
+    /// Returns the objects of the world that are forces written in Python.
     pub fn forces(&self) -> &[ObjectId] {
         &self.extension.forces
     }
 
-    /// Counts objects made by [`empty_force`] as forces.
+    /// Registers objects made by [`empty_force`] as forces.
     pub fn expect_forces(&mut self, names: &[String]) {
         self.extension.forces = names.iter().filter_map(|name| self.world.find(name)).collect();
     }
 
-    /// All forces and behaviours with what they were given; `None` where there are none.
+    /// Returns all forces and behaviors with their arguments; `None` if there are none.
     pub fn pickled_extensions(&self, py: Python<'_>) -> Option<Extensions> {
         let [forces, _] = self.extensions(py);
         let name = |&id: &ObjectId| Some(self.world.object(id)?.name().to_string());
         let of = |b: &Attached| {
             (b.code.name.clone(), b.code.object.clone_ref(py), b.bodies.iter().filter_map(name).collect())
         };
-        let behaviours = self.extension.behaviours.iter().map(of).collect();
-        (!self.extension.is_empty()).then_some((forces, behaviours))
+        let behaviors = self.extension.behaviors.iter().map(of).collect();
+        (!self.extension.is_empty()).then_some((forces, behaviors))
     }
 
-    /// Puts forces in the places that are kept for them, and adds behaviours.
-    pub fn unpickle_extensions(&mut self, py: Python<'_>, (forces, behaviours): Extensions) -> Result<()> {
+    /// Sets the objects of restored forces and adds behaviors.
+    pub fn unpickle_extensions(&mut self, py: Python<'_>, (forces, behaviors): Extensions) -> Result<()> {
         for (name, object) in forces {
             let id = self.world.find(&name).filter(|id| self.extension.forces.contains(id));
             let force = id.and_then(|id| self.world.get_mut::<PythonForce>(id));
             let force = force.ok_or_else(|| Error::value(format!("the pickled world has no force '{name}'")))?;
             force.code = Code::new(&name, object.bind(py));
         }
-        for (name, object, bodies) in behaviours {
+        for (name, object, bodies) in behaviors {
             self.check_new(&name)?;
             let bodies = bodies.iter().filter_map(|name| self.world.find(name)).collect();
-            self.extension.behaviours.push(Attached { code: Code::new(&name, object.bind(py)), bodies });
+            self.extension.behaviors.push(Attached { code: Code::new(&name, object.bind(py)), bodies });
         }
         Ok(())
     }
 
-    /// Takes all forces and behaviours out, for who drops them.
+    /// Removes all forces and behaviors and returns them for the caller to drop.
     pub fn take_extension(&mut self) -> impl Send + use<> {
-        let Extension { forces, behaviours } = std::mem::take(&mut self.extension);
+        let Extension { forces, behaviors } = std::mem::take(&mut self.extension);
         let forces: Vec<Option<Box<dyn Object>>> = forces.into_iter().map(|id| self.world.remove(id).ok()).collect();
-        (forces, behaviours)
+        (forces, behaviors)
     }
 
-    /// Names and objects of the forces, then of the behaviours, in the order of adding.
+    /// Returns names and objects of the forces, then of the behaviors, in the order of addition.
     pub fn extensions(&self, py: Python<'_>) -> [Vec<(String, Py<PyAny>)>; 2] {
         let pair = |code: &Code| (code.name.clone(), code.object.clone_ref(py));
         let forces = self
@@ -315,6 +321,6 @@ impl Inner {
             .iter()
             .filter_map(|&id| self.world.get::<PythonForce>(id))
             .map(|force| pair(&force.code));
-        [forces.collect(), self.extension.behaviours.iter().map(|b| pair(&b.code)).collect()]
+        [forces.collect(), self.extension.behaviors.iter().map(|b| pair(&b.code)).collect()]
     }
 }

@@ -1,10 +1,11 @@
-//! Faults on purpose: what a panic inside of tumble does to a Python program is tested by one.
+//! Deliberate faults, with which tests check the effect of a panic inside of tumble on a Python
+//! program.
 
 use crate::errors::{Error, Result};
 use crate::world::World;
 use pyo3::prelude::*;
 
-/// Panics within a call on a world: while it is ``"read"``, ``"changed"`` or ``"stepped"``.
+/// Panics within a call on a world that is ``"read"``, ``"changed"`` or ``"stepped"``.
 #[pyfunction]
 pub fn _panic(py: Python<'_>, world: &Bound<'_, World>, while_: &str) -> Result<()> {
     let shared = &world.get().shared;
@@ -13,6 +14,6 @@ pub fn _panic(py: Python<'_>, world: &Bound<'_, World>, while_: &str) -> Result<
         "read" => shared.read(|inner| Ok(past_the_end(inner.world.state()))).map(drop),
         "changed" => shared.write(py, |inner| Ok(past_the_end(inner.world.state()))).map(drop),
         "stepped" => shared.work(py, |inner| Ok(past_the_end(inner.world.state()))).map(drop),
-        other => Err(Error::value(format!("`{other}` is no kind of call"))),
+        other => Err(Error::value(format!("`{other}` is not a kind of call"))),
     }
 }

@@ -1,4 +1,4 @@
-//! A world and what belongs to it on Python's side: what one call at a time works on.
+//! A world with its Python-side data. One call at a time works on it.
 
 use crate::convert::shown;
 use crate::errors::{Error, Result};
@@ -11,32 +11,32 @@ use std::sync::Arc;
 use tumble::dynamics::{ObjectId, World, WorldState};
 use tumble::scene::{SceneFile, overlap_notes, visual_notes};
 
-/// A world and what belongs to it on Python's side.
+/// A world with its Python-side data.
 pub struct Inner {
     /// The world itself.
     pub world: World,
-    /// The scene that it was made of: its camera, lights and names.
+    /// The scene that it was built from: its camera, lights and names.
     pub scene: Arc<SceneFile>,
-    /// The trees of articulated bodies.
+    /// The models of articulated bodies.
     pub robots: BTreeMap<ObjectId, Arc<Robot>>,
     /// Generalized forces that act on articulated bodies in every frame.
     pub efforts: BTreeMap<ObjectId, Vec<f64>>,
-    /// Forces and behaviours written in Python.
+    /// Forces and behaviors written in Python.
     pub extension: Extension,
-    /// The array that Python sees the state by.
+    /// The array through which Python sees the state.
     pub shown: Shown,
-    /// What is to be said of the files that it was made of.
+    /// Notes about the files that it was built from.
     pub notes: Vec<String>,
-    /// Which bodies overlap, as last asked before the first step.
+    /// Notes about overlapping bodies, as found before the first step.
     pub overlaps: Vec<String>,
-    /// The state before the frame; its memory is used again.
+    /// The state before the frame. Its memory is reused.
     before: WorldState,
-    /// Whether a panic left it half-way.
+    /// Whether a panic left it in an inconsistent state.
     pub broken: bool,
 }
 
 impl Inner {
-    /// A world of a scene.
+    /// Returns the world of a scene.
     pub fn new(world: World, scene: Arc<SceneFile>) -> Inner {
         Inner {
             world,
@@ -52,7 +52,7 @@ impl Inner {
         }
     }
 
-    /// An independent copy, with no arrays yet.
+    /// Returns an independent copy without arrays.
     pub fn fork(&self) -> Inner {
         Inner {
             world: self.world.fork(),
@@ -68,7 +68,7 @@ impl Inner {
         }
     }
 
-    /// Whether an array of Python's looks into the memory that the next frame changes.
+    /// Returns whether a Python array refers to the memory that the next frame changes.
     pub fn looked_into(&self, py: Python<'_>) -> bool {
         self.extension.is_empty() && self.shown.alive(py)
     }
@@ -96,8 +96,9 @@ impl Inner {
         Ok(())
     }
 
-    /// What is to be said of files, of meshes that could not be drawn, and of bodies that overlap at the start. These are looked for now, before the
-    /// first step; after it those are told that were found then.
+    /// Returns notes about files, visual meshes that could not be drawn, and bodies that overlap at
+    /// the start. Overlaps are searched for now if no step was taken yet; later calls return those
+    /// found then.
     pub fn all_notes(&mut self) -> Vec<String> {
         if self.world.frame() == 0 {
             self.overlaps = overlap_notes(&self.world);
@@ -106,17 +107,17 @@ impl Inner {
         self.notes.iter().cloned().chain(found).collect()
     }
 
-    /// What is kept about an object that is gone.
+    /// Drops the data about a removed object.
     pub fn forget(&mut self, id: ObjectId) {
         self.robots.remove(&id);
         self.efforts.remove(&id);
     }
 
-    /// Writes the whole state; all or nothing.
+    /// Writes the whole state, or nothing on an error.
     pub fn write_state(&mut self, shape: &[usize], x: &[f64]) -> Result<()> {
         let wanted = self.world.state().len();
         if shape != [wanted] {
-            return Err(Error::value(format!("state: wanted shape ({wanted},), and got {}", shown(shape))));
+            return Err(Error::value(format!("state: expected shape ({wanted},), got {}", shown(shape))));
         }
         let before = self.world.state().to_vec();
         let mut write = |from: &[f64]| -> Result<()> {

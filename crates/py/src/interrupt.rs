@@ -1,4 +1,5 @@
-//! Ctrl-C during long work: a thread of its own does the work, while the calling thread lets the interpreter look at signals.
+//! Ctrl-C during long work: a separate thread does the work while the calling thread lets the
+//! interpreter handle signals.
 
 use crate::errors::{Error, Result, caught};
 use pyo3::prelude::*;
@@ -9,20 +10,20 @@ use std::thread::{self, Thread};
 use std::time::Duration;
 use tumble::collide::Progress;
 
-/// How often the calling thread looks at signals.
+/// Interval at which the calling thread checks signals.
 const TURN: Duration = Duration::from_millis(50);
 
 thread_local! {
-    /// The stop of the work that this thread is part of.
+    /// The stop flag of the work that this thread is part of.
     static AROUND: RefCell<Option<Stop>> = const { RefCell::new(None) };
 }
 
-/// Tells the threads of one piece of work that it shall end.
+/// Asks the threads of one piece of work to stop.
 #[derive(Clone, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// An error once the work shall end.
+    /// Returns an error once the work should stop.
     pub fn check(&self) -> Result<()> {
         if self.stopped() { Err(Error::Stopped) } else { Ok(()) }
     }
@@ -31,7 +32,7 @@ impl Stop {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Runs `work` as a part of this piece of work: what it starts ends with it.
+    /// Runs `work` as a part of this piece of work. Everything it starts stops with it.
     pub fn within<T>(&self, work: impl FnOnce() -> T) -> T {
         let before = AROUND.replace(Some(self.clone()));
         let outcome = work();
@@ -48,8 +49,8 @@ impl Progress for Stop {
     }
 }
 
-/// Runs `work` with the interpreter let go. Where the interpreter answers a signal with an exception, `work` is told to stop, and the exception
-/// is the outcome once it has.
+/// Runs `work` with the interpreter released. If a signal raises an exception, `work` is asked to
+/// stop, and the exception is returned once it has.
 pub fn interruptible<T: Send>(py: Python<'_>, work: impl FnOnce(&Stop) -> Result<T> + Send) -> Result<T> {
     if let Some(stop) = around() {
         return py.detach(|| caught(|| work(&stop)));
@@ -67,8 +68,8 @@ pub fn interruptible<T: Send>(py: Python<'_>, work: impl FnOnce(&Stop) -> Result
     })
 }
 
-/// As [`interruptible`], for work that owns what it works on: the exception is the outcome at once, and the work ends behind it at its next look at
-/// the stop. For work that looks seldom.
+/// As [`interruptible`], for work that owns its data. The exception is returned at once, and the
+/// work ends later at its next check of the stop flag. For work that checks rarely.
 pub fn abandonable<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(&Stop) -> Result<T> + Send + 'static,
@@ -88,8 +89,8 @@ pub fn abandonable<T: Send + 'static>(
     py.detach(|| joined(worker.join()))
 }
 
-/// The stop of the work that this thread is part of, where it is of a pool: such a thread must not wait for others of its pool, and the thread that
-/// waits for it looks at signals.
+/// Returns the stop flag of the work that this thread is part of, if it belongs to a pool. Such a
+/// thread must not wait for others of its pool; the thread that waits for it checks signals.
 fn around() -> Option<Stop> {
     rayon::current_thread_index().map(|_| AROUND.with_borrow(|around| around.clone().unwrap_or_default()))
 }
@@ -98,14 +99,14 @@ fn named() -> thread::Builder {
     thread::Builder::new().name("tumble".into())
 }
 
-/// Says that the work is done and wakes who waits for it.
+/// Marks the work as done and wakes the waiting thread.
 fn finish<T>(outcome: T, done: &AtomicBool, caller: &Thread) -> T {
     done.store(true, Ordering::Release);
     caller.unpark();
     outcome
 }
 
-/// Waits for the work; an error is what the interpreter made of a signal.
+/// Waits for the work. An error is an exception raised by a signal.
 fn watch(py: Python<'_>, done: &AtomicBool) -> Result<()> {
     while !done.load(Ordering::Acquire) {
         py.detach(|| thread::park_timeout(TURN));

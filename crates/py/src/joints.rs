@@ -1,4 +1,5 @@
-//! What the methods of articulations share: joints and links by name, arguments and results of the algorithms.
+//! Shared parts of the methods of articulations: lookup of joints and links by name, arguments and
+//! results of the algorithms.
 
 use crate::articulation::Articulation;
 use crate::body::Place;
@@ -13,7 +14,7 @@ use tumble::collide::Vec3;
 use tumble::dynamics::Drive;
 
 impl Articulation {
-    /// Arguments of an algorithm: what is not given is what it is now.
+    /// Returns the arguments of an algorithm. Omitted ones have their current values.
     pub fn rows(&self, arguments: &[(Which, &'static str, Option<&Bound<'_, PyAny>>)]) -> Result<Rows> {
         let read = |&(which, name, value): &(Which, &'static str, Option<&Bound<'_, PyAny>>)| {
             let width = which.width(&self.robot);
@@ -29,14 +30,14 @@ impl Articulation {
     pub fn in_world(&self) -> Result<&Place> {
         self.place().ok_or_else(|| {
             Error::value(format!(
-                "'{}' is in no world; World.add_articulation gives the handle of one that is",
+                "'{}' is not in a world; World.add_articulation returns a handle of a body in a world",
                 self.name
             ))
         })
     }
 
-    /// The freedom of a hinge or slider, by the name of its joint.
-    pub fn freedom(&self, joint: &str) -> Result<usize> {
+    /// Returns the degree of freedom of a revolute or prismatic joint, by the name of the joint.
+    pub fn dof_of(&self, joint: &str) -> Result<usize> {
         let number = self.robot.joints.iter().position(|name| name == joint).ok_or_else(|| {
             let names: Vec<&str> = self.robot.joints.iter().map(String::as_str).take(12).collect();
             Error::Name(format!("there is no joint named '{joint}'; there are {}", names.join(", ")))
@@ -44,20 +45,20 @@ impl Articulation {
         let link = &self.robot.model.links()[number];
         if link.joint.dof() != 1 {
             return Err(Error::value(format!(
-                "joint '{joint}' has {} freedoms; drives are of hinges and sliders",
+                "joint '{joint}' has {} degrees of freedom; drives need a revolute or prismatic joint",
                 link.joint.dof()
             )));
         }
         Ok(link.v)
     }
 
-    /// The part that carries a frame.
+    /// Returns the part that carries a frame.
     pub fn part(&self, link: &str) -> Result<usize> {
         let links = self.robot.model.links().len();
         Ok(self.robot.frame(link)?.link.unwrap_or(links))
     }
 
-    /// Something at a point of a link, by default the origin of its frame.
+    /// Applies something at a point of a link, by default the origin of its frame.
     pub fn push(
         &self,
         py: Python<'_>,
@@ -69,14 +70,14 @@ impl Articulation {
         let point = point.map(|p| vec3(p, "point")).transpose()?;
         let frame = self.robot.frame(link)?.pose;
         place.write(py, |inner| {
-            let site = inner.world.part_state(place.id, part).ok_or_else(|| place.removed())?;
-            let at = point.unwrap_or((site.pose * frame).translation.vector);
+            let part_state = inner.world.part_state(place.id, part).ok_or_else(|| place.removed())?;
+            let at = point.unwrap_or((part_state.pose * frame).translation.vector);
             apply(inner, place, part, at)
         })
     }
 }
 
-/// Results in the shape that their arguments ask for.
+/// Returns results in the shape that their arguments require.
 pub fn result<'py>(
     py: Python<'py>,
     rows: &Rows,
@@ -87,13 +88,13 @@ pub fn result<'py>(
     Ok(PyArray1::from_vec(py, data).reshape(IxDyn(&shape))?)
 }
 
-/// The motor that a target, a velocity and gains make.
+/// Returns the drive for a target, a velocity and gains.
 pub fn drive(target: Option<f64>, velocity: Option<f64>, stiffness: f64, damping: f64, limit: f64) -> Result<Drive> {
     let stiff = stiffness != 0.0 || damping != 0.0;
     Ok(match (target, velocity) {
         (None, None) if !stiff => Drive::None,
         (Some(_), _) if !stiff => {
-            return Err(Error::value("target: a drive to a position wants a stiffness or a damping above 0"));
+            return Err(Error::value("target: a drive to a position needs a stiffness or a damping above 0"));
         }
         (None, Some(target)) if !stiff => Drive::Velocity { target, limit },
         _ => Drive::Position {

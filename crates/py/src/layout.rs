@@ -1,4 +1,4 @@
-//! Which rows of a view belong to whom: one for each rigid body, each moving link and each base.
+//! The rows of a view: one for each rigid body, each moving link and each base.
 
 use crate::errors::{Error, Result};
 use std::borrow::Cow;
@@ -7,56 +7,58 @@ use std::sync::Arc;
 use tumble::collide::Vec3;
 use tumble::dynamics::{ArticulatedBody, ObjectId, PartState, RigidBody as Rigid, WorldView, Wrench};
 
-/// Which rows belong to whom: made once and kept until objects come or go.
+/// Assignment of rows to objects. It is kept until objects are added or removed.
 pub struct Layout {
     ids: Vec<ObjectId>,
     /// Objects with rows: their id, name and rows.
     pub objects: Vec<(ObjectId, Arc<str>, Range<usize>)>,
-    /// Of each articulated body the names of its links, the fixed ones too, and their places among its rows.
+    /// For each articulated body, the names of its links, including fixed ones, and their indices
+    /// among its rows.
     links: Vec<(ObjectId, Vec<(String, usize)>)>,
     pub rows: Vec<Row>,
-    /// How many sites the world has, and whether each of them is a row as it stands.
-    sites: usize,
+    /// The number of parts in the world, and whether each part is a row without change.
+    part_states: usize,
     plain: bool,
 }
 
-/// What a row shows: a rigid body, or a link at its centre of mass. Shapes on links have sites too, but no rows: they have no mass of their own.
+/// A row: a rigid body, or a link at its center of mass. Shapes on links are parts as well but have
+/// no rows, since they have no mass of their own.
 pub struct Row {
-    site: usize,
-    /// In the frame of the site, m.
+    part_index: usize,
+    /// In the frame of the part, m.
     center: Vec3,
     /// kg.
     pub mass: f64,
-    /// Not of a base.
+    /// False for a base.
     pub may_move: bool,
 }
 
 impl Row {
-    /// From the site to the centre of mass, world axes, m.
-    fn arm(&self, sites: &[PartState]) -> Vec3 {
-        sites[self.site].pose.rotation * self.center
+    /// Returns the vector from the part's origin to the center of mass, world axes, m.
+    fn arm(&self, part_states: &[PartState]) -> Vec3 {
+        part_states[self.part_index].pose.rotation * self.center
     }
 
-    /// The centre of mass as a site.
-    fn shown(&self, sites: &[PartState]) -> PartState {
-        let (mut site, arm) = (sites[self.site], self.arm(sites));
-        let spin = site.angular_velocity;
-        site.acceleration += site.angular_acceleration.cross(&arm) + spin.cross(&spin.cross(&arm));
-        site.velocity += spin.cross(&arm);
-        site.pose.translation.vector += arm;
-        site
+    /// Returns the part state at the center of mass.
+    fn shown(&self, part_states: &[PartState]) -> PartState {
+        let (mut part_state, arm) = (part_states[self.part_index], self.arm(part_states));
+        let spin = part_state.angular_velocity;
+        part_state.acceleration += part_state.angular_acceleration.cross(&arm) + spin.cross(&spin.cross(&arm));
+        part_state.velocity += spin.cross(&arm);
+        part_state.pose.translation.vector += arm;
+        part_state
     }
 }
 
 impl Layout {
-    /// Of the world as it is.
+    /// Returns the layout of a world.
     pub fn of(view: &WorldView) -> Layout {
         let mut layout = Layout {
             ids: view.ids().to_vec(),
             objects: Vec::new(),
             links: Vec::new(),
             rows: Vec::new(),
-            sites: view.part_states.len(),
+            part_states: view.part_states.len(),
             plain: true,
         };
         for &id in view.ids() {
@@ -71,7 +73,7 @@ impl Layout {
                     let moving = links.iter().enumerate().map(|(i, link)| (i, link.mass.center, link.mass.mass, true));
                     let rows = moving.chain([(links.len(), Vec3::zeros(), 0.0, false)]);
                     layout.rows.extend(rows.map(|(part, center, mass, may_move)| Row {
-                        site: span.parts.start + part,
+                        part_index: span.parts.start + part,
                         center,
                         mass,
                         may_move,
@@ -86,8 +88,8 @@ impl Layout {
                 }
                 None => {
                     let mass = view.get::<Rigid>(id).filter(|body| !body.is_fixed()).map_or(0.0, |body| body.mass());
-                    layout.rows.extend(span.parts.clone().map(|site| Row {
-                        site,
+                    layout.rows.extend(span.parts.clone().map(|part_index| Row {
+                        part_index,
                         center: Vec3::zeros(),
                         mass,
                         may_move: true,
@@ -99,31 +101,36 @@ impl Layout {
         layout
     }
 
-    /// Whether it still holds.
+    /// Returns whether the layout is still valid.
     pub fn fits(&self, view: &WorldView) -> bool {
-        self.ids == view.ids() && self.sites == view.part_states.len()
+        self.ids == view.ids() && self.part_states == view.part_states.len()
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
-    /// The rows as sites.
-    pub fn shown<'a>(&self, sites: &'a [PartState]) -> Cow<'a, [PartState]> {
-        if self.plain { Cow::Borrowed(sites) } else { self.rows.iter().map(|row| row.shown(sites)).collect() }
+    /// Returns the rows as part states.
+    pub fn shown<'a>(&self, part_states: &'a [PartState]) -> Cow<'a, [PartState]> {
+        if self.plain {
+            Cow::Borrowed(part_states)
+        } else {
+            self.rows.iter().map(|row| row.shown(part_states)).collect()
+        }
     }
 
-    /// The site that a row belongs to, and what a wrench at the row is there.
-    pub fn at_site(&self, row: usize, sites: &[PartState], mut wrench: Wrench) -> (usize, Wrench) {
+    /// Returns the part that a row belongs to, and a wrench at the row as a wrench at the part's
+    /// origin.
+    pub fn at_part(&self, row: usize, part_states: &[PartState], mut wrench: Wrench) -> (usize, Wrench) {
         let row = &self.rows[row];
         if !self.plain {
-            wrench.torque += row.arm(sites).cross(&wrench.force);
+            wrench.torque += row.arm(part_states).cross(&wrench.force);
         }
-        (row.site, wrench)
+        (row.part_index, wrench)
     }
 
-    /// The place of a link among the rows of its body.
+    /// Returns the index of a link among the rows of its body.
     pub fn link(&self, id: ObjectId, link: &str) -> Result<usize> {
         let names = self.links.iter().find(|(other, _)| *other == id).map_or(&[][..], |(_, names)| names);
         names.iter().find(|(name, _)| name == link).map(|(_, place)| *place).ok_or_else(|| {
@@ -132,12 +139,12 @@ impl Layout {
         })
     }
 
-    /// Rows of an object.
+    /// Returns the rows of an object.
     pub fn rows(&self, id: ObjectId) -> Option<Range<usize>> {
         Some(self.objects.iter().find(|(other, ..)| *other == id)?.2.clone())
     }
 
-    /// Whose row it is, and which part of it.
+    /// Returns the object that a row belongs to and the part.
     pub fn owner(&self, row: usize) -> Option<(ObjectId, usize, &Arc<str>)> {
         let (id, name, rows) = self.objects.iter().find(|(.., rows)| rows.contains(&row))?;
         Some((*id, row - rows.start, name))

@@ -67,11 +67,11 @@ mod _native {
     #[pymodule_export]
     use super::view::View;
     #[pymodule_export]
-    use super::words::_words;
+    use super::words::_choices;
     #[pymodule_export]
     use super::world::World;
 
-    /// Adds what is not a class or a function.
+    /// Adds everything that is not a class or a function.
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         slow::listen();

@@ -1,9 +1,9 @@
-//! What bodies look like that are made in a program and not by a scene.
+//! Default appearance of bodies that are added by a program.
 
 use tumble::collide::Shape;
 use tumble::dynamics::{Appearance, Renderable, RigidBody as Rigid};
 
-/// Colours that new bodies take in turn, sRGB.
+/// Colors that new bodies take in turn, sRGB.
 const PALETTE: [[f32; 3]; 7] = [
     [0.84, 0.37, 0.23],
     [0.20, 0.49, 0.72],
@@ -14,7 +14,8 @@ const PALETTE: [[f32; 3]; 7] = [
     [0.80, 0.46, 0.60],
 ];
 
-/// A body as it looks unless told otherwise: the `count`th colour; planes are a grey checkerboard of half a metre, other static geometry is grey.
+/// Returns a body with its default appearance: the `count`th color. Planes have a gray checkerboard
+/// of half a meter; other static geometry is gray.
 pub fn usual(body: Rigid, count: usize) -> Rigid {
     let plane = matches!(body.shape(), Shape::HalfSpace);
     let appearance = match (plane, body.is_fixed()) {
@@ -33,7 +34,7 @@ pub fn usual(body: Rigid, count: usize) -> Rigid {
     looking(body, appearance)
 }
 
-/// The body in a plain colour, sRGB, each 0 to 1.
+/// Returns the body in a plain color, sRGB, each 0 to 1.
 pub fn colored(body: Rigid, color: [f64; 3]) -> Rigid {
     looking(body, Appearance { color: color.map(|c| c as f32), ..Appearance::default() })
 }
@@ -48,7 +49,7 @@ fn looking(body: Rigid, appearance: Appearance) -> Rigid {
     body.drawn_as(visuals)
 }
 
-/// The colour of what is first drawn of it.
+/// Returns the color of its first visual.
 pub fn color(body: &Rigid) -> [f64; 3] {
     body.visuals().first().map_or([0.0; 3], |visual| visual.appearance.color.map(f64::from))
 }

@@ -1,4 +1,4 @@
-//! Restitution and friction of pairs: the rules by name, and pairs with constants of their own.
+//! Restitution and friction of pairs: the combination rules by name, and constants of single pairs.
 
 use crate::adding::own_place;
 use crate::bodies::by_name;
@@ -10,7 +10,7 @@ use std::sync::Arc;
 use tumble::dynamics::{ArticulatedBody, Combine, ObjectId, PairMaterial, PairSide};
 use tumble::scene::combine_by_name;
 
-/// A rule by its name.
+/// Returns a combination rule by its name.
 pub fn combine(word: &str, what: &str) -> Result<Combine> {
     combine_by_name(word).map_err(|e| Error::value(format!("{what}: {e}")))
 }
@@ -29,7 +29,7 @@ impl Side {
         }
     }
 
-    /// A part of it that can touch.
+    /// Returns a part of it that can collide.
     fn part(&self, inner: &Inner) -> usize {
         let body = inner.world.get::<ArticulatedBody>(self.id);
         let links = body.map_or(0, |body| body.model().links().len() + 1);
@@ -37,7 +37,7 @@ impl Side {
     }
 }
 
-/// A handle, a name, or ``"ARTICULATION/LINK"``.
+/// Converts a handle, a name, or ``"ARTICULATION/LINK"``.
 fn side(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<Side> {
     if let Ok(name) = value.extract::<String>()
         && let Some((object, link)) = name.split_once('/')
@@ -62,7 +62,7 @@ fn link_side(inner: &Inner, object: &str, link: &str) -> Result<Side> {
     }
 }
 
-/// Gives a pair constants of its own.
+/// Sets the constants of a pair.
 pub fn set(shared: &Arc<Shared>, py: Python<'_>, pair: [&Bound<'_, PyAny>; 2], material: PairMaterial) -> Result<()> {
     let (a, b) = (side(shared, pair[0])?, side(shared, pair[1])?);
     shared.write(py, |inner| {
@@ -75,7 +75,7 @@ pub fn set(shared: &Arc<Shared>, py: Python<'_>, pair: [&Bound<'_, PyAny>; 2], m
     })
 }
 
-/// Restitution and friction of a pair.
+/// Returns restitution and friction of a pair.
 pub fn get(shared: &Arc<Shared>, pair: [&Bound<'_, PyAny>; 2]) -> Result<(f64, f64)> {
     let (a, b) = (side(shared, pair[0])?, side(shared, pair[1])?);
     shared.read(|inner| {

@@ -1,6 +1,6 @@
 //! Worlds and shapes as bytes, for Python's pickle.
 //!
-//! A world is the library's archive, and what belongs to the world on Python's side. Its forces and behaviours are Python objects, which pickle
+//! A world is the library's archive, and what belongs to the world on Python's side. Its forces and behaviors are Python objects, which pickle
 //! writes beside the bytes and `World.__setstate__` puts back, so that one that holds its own world is written too.
 
 use crate::errors::{Error, Result, caught};
@@ -58,7 +58,7 @@ impl SceneRecord {
     }
 }
 
-/// The bytes of a world without its forces and behaviours.
+/// The bytes of a world without its forces and behaviors.
 pub fn write(inner: &Inner) -> Result<Vec<u8>> {
     let ids = inner.world.ids();
     let robots = (0..).zip(ids).filter_map(|(place, id)| {
@@ -118,7 +118,7 @@ pub fn _unpickle_shape(py: Python<'_>, data: PyBackedBytes) -> Result<Py<PyAny>>
     Shape::of_record(py, record)
 }
 
-/// What a pickled world becomes; pickle then puts its forces and behaviours back.
+/// What a pickled world becomes; pickle then puts its forces and behaviors back.
 #[pyfunction]
 pub fn _unpickle_world(py: Python<'_>, data: PyBackedBytes) -> Result<crate::world::World> {
     let read = py.detach(|| caught(|| self::read(&data)))?;

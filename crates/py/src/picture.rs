@@ -1,4 +1,5 @@
-//! Pictures of a world: headless, by one graphics device that all worlds of the process share.
+//! Images of a world, rendered without a window by one graphics device that all worlds of the
+//! process share.
 
 use crate::convert::{number, vec3};
 use crate::errors::{Error, Result, caught};
@@ -14,17 +15,17 @@ use tumble::render::{Camera, CaveView, DebugDraw, DrawList, Drawing, Image, Rend
 use tumble::scene::cave::resolve_cave;
 use tumble::scene::{SceneFile, SceneFile as Scene};
 
-/// Size of a picture where nothing is said, pixels.
+/// Default size of an image, pixels.
 const USUAL: [u32; 2] = [640, 480];
-/// Side of the shadow maps of a cave, which hold all that its screens show together.
+/// Side of the shadow maps of a cave, which cover everything that its screens show.
 const CAVE_SHADOWS: u32 = 4096;
 
-/// Made when the first picture is taken; making one takes longer than a picture.
+/// Made for the first image, which takes longer than drawing one.
 static RENDERER: Mutex<Option<Renderer>> = Mutex::new(None);
 /// The process that made it, or tried to; 0 for none.
 static MADE_BY: AtomicU32 = AtomicU32::new(0);
 
-/// What is asked for.
+/// A requested image.
 pub struct Shot {
     size: [Option<u32>; 2],
     from: From,
@@ -41,7 +42,7 @@ enum From {
 }
 
 impl Shot {
-    /// Checks what can be checked before anything is drawn.
+    /// Checks the arguments before anything is drawn.
     pub fn new(
         size: [Option<u32>; 2],
         camera: Option<&Bound<'_, PyAny>>,
@@ -58,29 +59,30 @@ impl Shot {
             (None, Some(facet), None) => {
                 let parts = facet.rsplit_once(':').filter(|(cave, name)| !cave.is_empty() && !name.is_empty());
                 let (cave, name) = parts.ok_or_else(|| {
-                    Error::value(format!("facet: wanted CAVE:NAME, such as cube4:front, and got `{facet}`"))
+                    Error::value(format!("facet: expected CAVE:NAME, such as cube4:front, got `{facet}`"))
                 })?;
                 if size != [None, None] {
                     return Err(Error::value(
-                        "the cave says how large a facet is (size_px); width and height go without facet",
+                        "the size of a facet is set by the cave (size_px); width and height cannot be combined with facet",
                     ));
                 }
                 From::Facet(cave.into(), name.into())
             }
             (None, None, Some(cave)) => From::Cave(cave.into()),
-            _ => return Err(Error::value("a picture has one of camera, facet and cave")),
+            _ => return Err(Error::value("only one of camera, facet and cave can be given")),
         };
         Ok(Shot { size, from, overlays })
     }
 
-    /// The picture as an array, shape (height, width, 4). The world is held only while what is to be drawn is written down.
+    /// Returns the image as an array, shape (height, width, 4). The world is locked only while the
+    /// draw list is made.
     pub fn take<'py>(&self, py: Python<'py>, shared: &Shared) -> Result<Bound<'py, PyArray3<u8>>> {
         ready(py)?;
         let image = py.detach(|| {
             let (list, scene) =
                 shared.read(|inner| Ok((self.list(&inner.world, &inner.scene)?, inner.scene.clone())))?;
             let mut kept = RENDERER.lock().unwrap_or_else(PoisonError::into_inner);
-            let renderer = kept.as_mut().ok_or_else(|| Error::Internal("the graphics device is gone".into()))?;
+            let renderer = kept.as_mut().ok_or_else(|| Error::Internal("the graphics device was lost".into()))?;
             caught(|| self.draw(renderer, list, &scene))
         })?;
         Ok(PyArray1::from_vec(py, image.rgba).reshape([image.height as usize, image.width as usize, 4])?)
@@ -112,16 +114,17 @@ impl Shot {
     }
 }
 
-/// Makes the device where there is none yet. Drivers complain on stderr where no runtime directory is named, as over ssh or in a container; any folder
-/// satisfies them, for as long as this takes.
+/// Makes the device if there is none yet. Drivers print warnings to stderr if no runtime directory
+/// is set, as over ssh or in a container. Any folder satisfies them, so one is set while the device
+/// is made.
 fn ready(py: Python<'_>) -> Result<()> {
     let kept = || RENDERER.lock().unwrap_or_else(PoisonError::into_inner);
     let process = std::process::id();
     match MADE_BY.load(Ordering::Relaxed) {
-        // a driver's threads are not there in a process that was forked: it would wait for them for ever
+        // A driver's threads do not exist in a forked process, which would wait for them forever.
         other if other != 0 && other != process => return Err(Error::Render(RenderError::Device {
             adapter: "any adapter".into(),
-            reason: "this process was forked from one that had drawn; start it by `spawn` (multiprocessing.get_context(\"spawn\"))".into(),
+            reason: "this process was forked from one that had rendered; start it with `spawn` (multiprocessing.get_context(\"spawn\"))".into(),
         })),
         _ => MADE_BY.store(process, Ordering::Relaxed),
     }
@@ -146,11 +149,11 @@ fn ready(py: Python<'_>) -> Result<()> {
     made
 }
 
-/// `(eye, target)`, and after them `up` and the opening angle in degrees.
+/// Converts `(eye, target)`, optionally followed by `up` and the field of view in degrees.
 fn camera_of(camera: &Bound<'_, PyAny>) -> Result<Camera> {
     let wrong = || {
         Error::value(
-            "camera: wanted (eye, target), (eye, target, up) or (eye, target, up, fov_deg), or a tumble.Camera",
+            "camera: expected (eye, target), (eye, target, up) or (eye, target, up, fov_deg), or a tumble.Camera",
         )
     };
     let parts: Vec<Bound<'_, PyAny>> = camera.try_iter().map_err(|_| wrong())?.take(5).collect::<PyResult<_>>()?;

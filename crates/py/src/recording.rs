@@ -15,13 +15,14 @@ use tumble::dynamics::ObjectId;
 use tumble::net::record::{Ending, Pose, Recorder as Writer, RecorderOptions, read};
 use tumble::net::world::{entities, poses};
 
-/// Most numbers, and most bytes of states, of a recording that is read at once.
-const MOST: usize = 1 << 29;
+/// Largest count of numbers, and of bytes of states, of a recording that is read at once.
+const MAX_NUMBERS: usize = 1 << 29;
 
 /// A recording being written.
 struct Open {
     writer: Writer,
-    /// The world of the last frame and its objects: where they differ, the list of what is drawn is written anew.
+    /// The world of the last frame and its objects. If they change, the list of visuals is written
+    /// again.
     world: Arc<Shared>,
     objects: Vec<ObjectId>,
 }
@@ -32,9 +33,11 @@ enum Stage {
     Closed,
 }
 
-/// Writes an MCAP file that Foxglove and ``tumble.read`` open: ``with tumble.Recorder("run.mcap") as recorder: recorder.frame(world)``.
+/// Writes an MCAP file that Foxglove and ``tumble.read`` open: ``with tumble.Recorder("run.mcap")
+/// as recorder: recorder.frame(world)``.
 ///
-/// The file begins with the first frame. A program that is killed leaves a file that is readable up to the last quarter of a simulated second.
+/// The file is created by the first frame. After a crash the file is readable up to the last
+/// quarter of a simulated second.
 #[pyclass(frozen, module = "tumble")]
 pub struct Recorder {
     path: PathBuf,
@@ -77,7 +80,7 @@ impl Recorder {
 
 #[pymethods]
 impl Recorder {
-    /// path: of the file, which is replaced where there is one; its folder must exist.
+    /// path: of the file. An existing file is replaced; its folder must exist.
     #[new]
     fn new(path: &Bound<'_, PyAny>) -> Result<Recorder> {
         let path = self::path(path)?;
@@ -90,13 +93,15 @@ impl Recorder {
         Ok(Recorder { path, stage: Mutex::new(Stage::Empty), frames: Mutex::new(0) })
     }
 
-    /// Adds the world as it is: what is drawn, all poses, and the state. Frames must come in the order of time, each once.
+    /// Adds the present frame: visuals, poses and state. Frames must be added in the order of time,
+    /// each once.
     fn frame(&self, py: Python<'_>, world: &Bound<'_, World>) -> Result<()> {
         let shared = world.get().shared.clone();
         py.detach(|| self.add(&shared))
     }
 
-    /// Steps the world ``n`` times and adds it after every ``every`` steps; before the first step too where nothing is recorded yet.
+    /// Steps the world ``n`` times and adds a frame after every ``every`` steps. If nothing is
+    /// recorded yet, a frame is also added before the first step.
     #[pyo3(signature = (world, n, *, every=1))]
     fn run(
         &self,
@@ -121,7 +126,8 @@ impl Recorder {
         Ok(())
     }
 
-    /// Ends the file: index and checksums. Later calls do nothing. A recording without a frame leaves no file.
+    /// Writes index and checksums and closes the file. Later calls do nothing. A recording without
+    /// a frame leaves no file.
     fn close(&self, py: Python<'_>) -> Result<()> {
         py.detach(|| {
             let mut stage = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
@@ -138,7 +144,7 @@ impl Recorder {
         *self.frames.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The file.
+    /// Path of the file.
     #[getter]
     fn path(&self) -> &std::path::Path {
         &self.path
@@ -148,7 +154,7 @@ impl Recorder {
         slf
     }
 
-    /// Ends the file, also where the block raised.
+    /// Closes the file, also if the block raised.
     fn __exit__(
         &self,
         py: Python<'_>,
@@ -164,7 +170,7 @@ impl Recorder {
     }
 }
 
-/// Frames of a recording, whose poses are told by the numbers of their names.
+/// Frames of a recording. Poses refer to names by number.
 #[derive(Default)]
 struct Frames {
     names: Vec<String>,
@@ -187,7 +193,7 @@ impl Frames {
         Arc::new(names.iter().map(&mut column).collect())
     }
 
-    /// Both arrays, NaN where a name has no pose.
+    /// Returns both arrays, with NaN for a name without a pose.
     fn arrays(&self) -> (Vec<f64>, Vec<f64>) {
         let count = self.names.len() * self.times.len();
         let (mut positions, mut rotations) = (vec![f64::NAN; 3 * count], vec![f64::NAN; 4 * count]);
@@ -202,7 +208,7 @@ impl Frames {
     }
 }
 
-/// All of a recording, as the arguments of `Recording`.
+/// Returns all of a recording, as the arguments of `Recording`.
 #[pyfunction]
 pub fn read_recording<'py>(py: Python<'py>, path: &Bound<'py, PyAny>) -> Result<Bound<'py, PyDict>> {
     let file = self::path(path)?;
@@ -231,9 +237,9 @@ fn whole(file: &PathBuf) -> Result<(String, Frames, Option<String>)> {
             columns = all.columns(&names);
         }
         all.bytes += frame.state.len();
-        if (all.times.len() + 1) * all.names.len() * 7 > MOST || all.bytes > MOST {
+        if (all.times.len() + 1) * all.names.len() * 7 > MAX_NUMBERS || all.bytes > MAX_NUMBERS {
             return Err(Error::value(format!(
-                "{}: more frames than are read at once ({MOST} numbers or bytes)",
+                "{}: too many frames to read at once ({MAX_NUMBERS} numbers or bytes)",
                 file.display()
             )));
         }

@@ -1,43 +1,44 @@
-//! What the last frame took and how well it went.
+//! Statistics of the last step.
 
 use pyo3::prelude::*;
 use tumble::dynamics::{StepReport as Core, World};
 
-/// What one frame took and how well it went; see ``World.report``.
+/// Statistics of one step; see ``World.report``.
 #[pyclass(frozen, get_all, module = "tumble")]
 pub struct StepReport {
     /// Committed sub-steps.
     substeps: u32,
-    /// ``backtracking``: integrations tried, committed ones included.
+    /// ``backtracking``: integrations, including those that were rolled back.
     tries: u32,
-    /// ``backtracking`` with ``dormand_prince``: inner steps, refused ones included.
+    /// ``backtracking`` with ``dormand_prince``: inner steps, including rejected ones.
     inner_steps: u32,
-    /// ``backtracking``: sub-steps at the floor, where a crossing was accepted and projected out.
+    /// ``backtracking``: sub-steps of minimal length, which accept a crossing and project it out.
     floor_hits: u32,
-    /// Contacts at the last sub-step.
+    /// Contacts of the last sub-step.
     contacts: u32,
     /// Passes of the impact phase.
     impact_passes: u32,
     /// Largest residual of any solve, m/s.
     residual: f64,
-    /// Solves that did not reach the solver's own aim.
+    /// Solves that did not reach the solver's tolerance.
     unconverged: u32,
     /// Solves that ended on a secondary ray.
     rays: u32,
     /// Iterations of the largest solve.
     iterations: u32,
-    /// Objects asleep at its end.
+    /// Objects asleep at the end of the step.
     asleep: u32,
-    /// Deepest penetration found, metres.
+    /// Deepest penetration found, meters.
     max_penetration: f64,
-    /// Name of the joint that was furthest open where it cannot be closed; None where all could.
-    out_of_reach: Option<String>,
-    /// How far that joint is open, metres.
-    out_of_reach_distance: f64,
+    /// Name of the loop joint with the largest gap among those that cannot be closed; None if all
+    /// can be.
+    unreachable_joint: Option<String>,
+    /// Gap of that joint, meters.
+    unreachable_distance: f64,
 }
 
 impl StepReport {
-    /// The report of a world's last frame.
+    /// Returns the report of a world's last step.
     pub fn of(world: &World) -> StepReport {
         let Core {
             substeps,
@@ -68,8 +69,8 @@ impl StepReport {
             iterations,
             max_penetration,
             asleep,
-            out_of_reach: name,
-            out_of_reach_distance: out_of_reach.map_or(0.0, |o| o.distance),
+            unreachable_joint: name,
+            unreachable_distance: out_of_reach.map_or(0.0, |o| o.distance),
         }
     }
 }

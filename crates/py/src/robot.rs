@@ -1,7 +1,8 @@
-//! What never changes of an articulated body, and its algorithms over batches of states.
+//! The constant data of an articulated body, and its algorithms over batches of states.
 //!
-//! Every argument is one row (its numbers) or a batch of rows (a leading axis); rows stand for every row of a batch. Rows are independent, so that a
-//! batch gives the same bits as its rows one by one, on any number of threads.
+//! Every argument is one row (its numbers) or a batch of rows (a leading axis). A single row
+//! applies to every row of a batch. Rows are independent, so a batch gives the same bits as its
+//! rows one by one, on any number of threads.
 
 use crate::convert::{Numbers, room, shown};
 use crate::errors::{Error, Result, caught};
@@ -13,33 +14,33 @@ use tumble::dynamics::articulated::{
     forward_dynamics, inverse_dynamics, link_jacobian, normalize,
 };
 
-/// States that one call of the batched sweep moves.
+/// States that one call of the batched algorithm processes.
 const LANES: usize = 8;
-/// Numbers of results from which on threads share the work.
+/// Number of results from which on threads share the work.
 const SHARED: usize = 4096;
-/// How far from 1 the length of a quaternion in `q` may be.
+/// Largest deviation from 1 of the length of a quaternion in `q`.
 const UNIT: f64 = 1e-6;
 
-/// A tree of links in its place, with the names of its joints.
+/// A tree of links at its base, with the names of its joints.
 #[derive(Clone, Debug)]
 pub struct Robot {
-    /// The tree, with its roots where the base stands.
+    /// The model, with its roots at the base.
     pub model: Model,
-    /// Where the base stands.
+    /// Pose of the base.
     pub base: Pose,
-    /// Names of the moving joints, in the order of the coordinates.
+    /// Names of the joints that are not fixed, in the order of the coordinates.
     pub joints: Vec<String>,
 }
 
-/// Arguments of one call: each a row, or as many rows as the batch has.
+/// Arguments of one call, each a row or one row per element of the batch.
 pub struct Rows {
-    /// `None` where no argument had a leading axis.
+    /// `None` if no argument has a leading axis.
     pub batch: Option<usize>,
     arguments: Vec<(Vec<f64>, usize, bool)>,
 }
 
 impl Rows {
-    /// Checks the shapes: `(name, numbers, width of a row)`.
+    /// Checks the shapes of `(name, numbers, width of a row)`.
     pub fn new(arguments: Vec<(&str, Numbers, usize)>) -> Result<Rows> {
         let mut rows = Rows { batch: None, arguments: Vec::new() };
         for (name, Numbers { shape, data }, width) in arguments {
@@ -58,7 +59,7 @@ impl Rows {
                 }
                 _ => {
                     return Err(Error::value(format!(
-                        "{name}: wanted shape ({width},) or (batch, {width}), and got {}",
+                        "{name}: expected shape ({width},) or (batch, {width}), got {}",
                         shown(&shape)
                     )));
                 }
@@ -68,7 +69,7 @@ impl Rows {
         Ok(rows)
     }
 
-    /// How many rows of results there are.
+    /// Returns the number of rows of results.
     pub fn count(&self) -> usize {
         self.batch.unwrap_or(1)
     }
@@ -78,7 +79,8 @@ impl Rows {
         if *batched { &data[k * width..(k + 1) * width] } else { data }
     }
 
-    /// Makes the quaternions of `q`, the first argument, exactly unit; refuses those that are far from it.
+    /// Normalizes the quaternions of `q`, the first argument. One that is far from unit length is
+    /// an error.
     fn settle(&mut self, model: &Model) -> Result<()> {
         let (data, width, _) = &mut self.arguments[0];
         if *width == 0 {
@@ -99,7 +101,8 @@ impl Rows {
         Ok(())
     }
 
-    /// One result of `width` numbers per row; `make` gives each thread its working memory.
+    /// Computes one result of `width` numbers per row; `make` makes the working memory of each
+    /// thread.
     fn each<W>(
         &self,
         width: usize,
@@ -109,7 +112,7 @@ impl Rows {
         self.chunks(width, 1, make, run)
     }
 
-    /// The same by chunks of rows: `run` gets the first row and room for the results of all.
+    /// Computes results by chunks of rows; `run` gets the first row and room for the results.
     fn chunks<W>(
         &self,
         width: usize,
@@ -136,7 +139,7 @@ impl Rows {
     }
 }
 
-/// One row of positions, its quaternions made exactly unit.
+/// Returns one row of positions with normalized quaternions.
 pub fn settled(robot: &Robot, q: Vec<f64>) -> Result<Vec<f64>> {
     let width = q.len();
     let mut rows = Rows { batch: None, arguments: vec![(q, width, false)] };
@@ -145,17 +148,17 @@ pub fn settled(robot: &Robot, q: Vec<f64>) -> Result<Vec<f64>> {
 }
 
 impl Robot {
-    /// Length of `q`.
+    /// Returns the length of `q`.
     pub fn positions(&self) -> usize {
         self.model.positions()
     }
 
-    /// Length of `qd` and `tau`.
+    /// Returns the length of `qd` and `tau`.
     pub fn dof(&self) -> usize {
         self.model.dof()
     }
 
-    /// A named frame, or the error that says which there are.
+    /// Returns a frame by name. The error lists the names.
     pub fn frame(&self, link: &str) -> Result<&LinkFrame> {
         self.model.frame(link).ok_or_else(|| {
             let names: Vec<&str> = self.model.frames().iter().map(|f| f.name.as_str()).take(12).collect();
@@ -163,7 +166,7 @@ impl Robot {
         })
     }
 
-    /// `q̈` from `q`, `qd`, `tau`.
+    /// Returns `q̈` from `q`, `qd`, `tau`.
     pub fn forward_dynamics(&self, gravity: &Vec3, rows: &mut Rows) -> Result<Vec<f64>> {
         rows.settle(&self.model)?;
         let (rows, model, dof) = (&*rows, &self.model, self.dof());
@@ -186,7 +189,7 @@ impl Robot {
             rows.chunks(dof, LANES, make, |(batch, [q, v, tau, qdd]), first, out| {
                 let last = first + out.len() / dof - 1;
                 for lane in 0..LANES {
-                    // lanes behind the last row repeat it
+                    // Lanes behind the last row repeat it.
                     let k = (first + lane).min(last);
                     for (argument, to) in [&mut *q, &mut *v, &mut *tau].into_iter().enumerate() {
                         to.iter_mut().zip(rows.row(argument, k)).for_each(|(to, x)| to.0[lane] = *x);
@@ -200,7 +203,7 @@ impl Robot {
         })
     }
 
-    /// `tau` from `q`, `qd`, `qdd`.
+    /// Returns `tau` from `q`, `qd`, `qdd`.
     pub fn inverse_dynamics(&self, gravity: &Vec3, rows: &mut Rows) -> Result<Vec<f64>> {
         rows.settle(&self.model)?;
         let (rows, model) = (&*rows, &self.model);
@@ -212,20 +215,21 @@ impl Robot {
         })
     }
 
-    /// `M` of `q`, by rows.
+    /// Returns `M` of `q`, by rows.
     pub fn mass_matrix(&self, rows: &mut Rows) -> Result<Vec<f64>> {
         self.at_positions(rows, self.dof() * self.dof(), |kin, _, out| {
             MassMatrix::new(&self.model).write(&self.model, kin, out)
         })
     }
 
-    /// Angular, then linear velocity of a frame's origin per unit of each velocity, world axes: 6 rows.
+    /// Returns the angular, then the linear velocity of a frame's origin per unit of each velocity,
+    /// world axes: 6 rows.
     pub fn jacobian(&self, frame: &LinkFrame, rows: &mut Rows) -> Result<Vec<f64>> {
         let dof = self.dof();
         self.at_positions(rows, 6 * dof, |kin, _, out| {
             let Some(link) = frame.link else { return };
             link_jacobian(&self.model, kin, link, out);
-            // from the link's origin to the frame's: v' = v + ω × r
+            // From the link's origin to the frame's: v' = v + ω × r.
             let r = kin.frame_pose(frame).translation.vector - kin.links()[link].pose.translation.vector;
             for k in 0..dof {
                 let turn = Vec3::new(out[k], out[dof + k], out[2 * dof + k]).cross(&r);
@@ -234,7 +238,7 @@ impl Robot {
         })
     }
 
-    /// Poses of all frames in the world: position and quaternion of each.
+    /// Returns the poses of all frames in the world: position and quaternion of each.
     pub fn link_poses(&self, rows: &mut Rows) -> Result<Vec<f64>> {
         self.at_positions(rows, 7 * self.model.frames().len(), |kin, _, out| {
             for (frame, out) in self.model.frames().iter().zip(out.chunks_exact_mut(7)) {
@@ -244,7 +248,7 @@ impl Robot {
         })
     }
 
-    /// The centre of mass in the world; the origin for a body without mass.
+    /// Returns the center of mass in the world; the origin for a body without mass.
     pub fn center_of_mass(&self, rows: &mut Rows) -> Result<Vec<f64>> {
         self.at_positions(rows, 3, |kin, _, out| {
             let center = center_of_mass(&self.model, kin).map_or(Vec3::zeros(), |(center, _)| center);
@@ -252,7 +256,7 @@ impl Robot {
         })
     }
 
-    /// Something of the positions alone, with the kinematics there.
+    /// Computes something that depends on the positions alone, with the kinematics there.
     fn at_positions(
         &self,
         rows: &mut Rows,

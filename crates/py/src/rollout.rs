@@ -1,4 +1,4 @@
-//! Many futures of one world at once: forks, each under controls of its own, on all cores.
+//! Rollouts: many forks of one world, each with its own controls, on all cores.
 
 use crate::bodies::body_ids;
 use crate::convert::{Numbers, room, shown};
@@ -12,37 +12,40 @@ use std::cell::Cell;
 use std::sync::Mutex;
 use tumble::dynamics::ObjectId;
 
-/// Most numbers that one call returns: 4 GiB of them.
-const MOST: usize = 1 << 29;
+/// Largest count of numbers that one call returns: 4 GiB.
+const MAX_NUMBERS: usize = 1 << 29;
 
-/// Rollouts within forces within rollouts, and so on, at most: a force that rolls out the world it acts in would go on for ever.
+/// Largest depth of nested rollouts. A force that rolls out the world it acts in would recurse
+/// forever.
 const DEEPEST: usize = 4;
 
 thread_local! {
-    /// How many rollouts this thread is in.
+    /// Number of rollouts that this thread is in.
     static DEPTH: Cell<usize> = const { Cell::new(0) };
 }
 
-/// What is asked for.
+/// The arguments of a rollout, checked.
 pub struct Plan {
     /// Forks.
     pub count: usize,
     /// Frames of each.
     pub frames: usize,
-    /// Every how many frames the state is kept.
+    /// Interval in frames at which the state is kept.
     pub every: usize,
-    /// Articulated bodies and their freedoms: a row of controls is one after the other.
+    /// Articulated bodies and their degrees of freedom. A row of controls has those of one after
+    /// the other.
     pub driven: Vec<(ObjectId, usize)>,
     /// `count · frames · width` generalized forces.
     controls: Vec<f64>,
-    /// How many rollouts it is in, with itself.
+    /// Depth of nesting, including this rollout.
     depth: usize,
-    /// One state for all forks, one for each, or none: where the world is.
+    /// One initial state for all forks, one for each, or none for that of the world.
     states: Option<Numbers>,
 }
 
 impl Plan {
-    /// For some articulated bodies, or all. Checks shapes against each other and the world.
+    /// Checks shapes against each other and the world. `asked`: the articulated bodies, by default
+    /// all.
     pub fn new(
         inner: &Inner,
         asked: Option<Vec<ObjectId>>,
@@ -53,30 +56,30 @@ impl Plan {
         let depth = DEPTH.get() + 1;
         if depth > DEEPEST {
             return Err(PyRecursionError::new_err(format!(
-                "a force that rolls out a world from within a rollout, more than {DEEPEST} deep"
+                "rollouts are nested more than {DEEPEST} deep by forces that roll out their world"
             ))
             .into());
         }
         let all = || body_ids(&inner.world).into_iter().filter(|id| inner.robots.contains_key(id)).collect();
-        let freedoms = |id: ObjectId| {
+        let dofs = |id: ObjectId| {
             inner
                 .robots
                 .get(&id)
                 .map(|robot| (id, robot.dof()))
-                .ok_or_else(|| Error::value("controls are of articulations"))
+                .ok_or_else(|| Error::value("controls are for articulations only"))
         };
-        let driven = asked.unwrap_or_else(all).into_iter().map(freedoms).collect::<Result<Vec<_>>>()?;
+        let driven = asked.unwrap_or_else(all).into_iter().map(dofs).collect::<Result<Vec<_>>>()?;
         let width: usize = driven.iter().map(|(_, dof)| dof).sum();
         let [count, frames, got] = controls.shape[..] else {
             return Err(Error::value(format!(
-                "controls: wanted shape (forks, steps, {width}), and got {}",
+                "controls: expected shape (forks, steps, {width}), got {}",
                 shown(&controls.shape)
             )));
         };
         if got != width {
-            let why = "as many as the articulations have freedoms";
+            let why = "one for each degree of freedom of the articulations";
             return Err(Error::value(format!(
-                "controls: wanted {width} numbers a step, {why}, and got shape {}",
+                "controls: expected {width} numbers per step, {why}, got shape {}",
                 shown(&controls.shape)
             )));
         }
@@ -89,14 +92,14 @@ impl Plan {
             && states.shape != [count, x]
         {
             return Err(Error::value(format!(
-                "states: wanted shape ({x},) or ({count}, {x}), and got {}",
+                "states: expected shape ({x},) or ({count}, {x}), got {}",
                 shown(&states.shape)
             )));
         }
         let numbers = count.checked_mul(frames / every).and_then(|n| n.checked_mul(x.max(1)));
-        if numbers.is_none_or(|n| n > MOST) {
+        if numbers.is_none_or(|n| n > MAX_NUMBERS) {
             return Err(Error::value(format!(
-                "{count} forks of {frames} steps have more than {MOST} numbers; keep fewer with `every`"
+                "{count} forks of {frames} steps have more than {MAX_NUMBERS} numbers; reduce them with `every`"
             )));
         }
         Ok(Plan { depth, count, frames, every, driven, controls: controls.data, states })
@@ -106,7 +109,7 @@ impl Plan {
         self.driven.iter().map(|(_, dof)| dof).sum()
     }
 
-    /// Where a fork starts, if not where the world is.
+    /// Returns the initial state of a fork, if it is not that of the world.
     fn start(&self, fork: usize) -> Option<&[f64]> {
         let Numbers { shape, data } = self.states.as_ref()?;
         match shape[..] {
@@ -115,8 +118,8 @@ impl Plan {
         }
     }
 
-    /// Runs all forks: the states after every `every` frames, fork by fork. `world` is forked again for each, so that only as many exist at
-    /// once as there are threads.
+    /// Runs all forks and returns the states after every `every` frames, fork by fork. `world` is
+    /// forked when a fork starts, so there are only as many at once as threads.
     pub fn run(&self, world: Inner, threads: Option<usize>, stop: &Stop) -> Result<Vec<f64>> {
         let kept = self.frames / self.every * world.world.state().len();
         let mut out = room(self.count * kept, "states")?;
@@ -128,7 +131,7 @@ impl Plan {
             None => pool::shared()?,
             Some(threads) => pool::of(threads)?,
         };
-        // the first fork that failed, whichever was first in time
+        // Returns the error of the fork with the lowest number, whichever failed first.
         match world.extension.is_empty() {
             true => {
                 let template = Mutex::new(world);
@@ -141,7 +144,8 @@ impl Plan {
                     .into_iter()
                     .collect::<Result<()>>()?;
             }
-            // a fork runs code in Python, which may wait for the threads of the pool: none of them may wait for it
+            // A fork runs Python code, which may wait for threads of the pool, so no thread of the
+            // pool may wait for it.
             false => {
                 let few = 4 * pool.current_num_threads();
                 for (first, out) in out.chunks_mut(few * kept).enumerate().map(|(k, out)| (k * few, out)) {
@@ -162,7 +166,7 @@ impl Plan {
     }
 
     fn fork(&self, own: Inner, fork: usize, out: &mut [f64], stop: &Stop) -> Result<()> {
-        // a thread that waits may do another's work meanwhile
+        // A waiting thread may do another fork's work meanwhile.
         let before = DEPTH.replace(self.depth);
         let outcome = stop.within(|| self.go(own, fork, out, stop));
         DEPTH.set(before);

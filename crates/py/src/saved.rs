@@ -1,13 +1,15 @@
-//! What `World.save` writes: the library's snapshot, and behind it the generalized forces that articulated bodies were given.
+//! Format of `World.save`: the library's snapshot, followed by the generalized forces on
+//! articulated bodies.
 //!
 //! | part | bytes |
 //! |---|---|
 //! | snapshot of the library | any |
-//! | of each body: its place in the order of adding, how many freedoms, the forces | 4, 4, 8 each |
+//! | for each body: its index in the order of addition, number of degrees of freedom, forces | 4, 4, 8 each |
 //! | length of the part above | 4 |
 //! | `tumbleT1` | 8 |
 //!
-//! Little-endian. Without such forces the last three are not there: the bytes are those of the command.
+//! Little-endian. Without such forces the last three parts are absent, and the bytes are those of
+//! the command.
 
 use crate::errors::Result;
 use crate::inner::Inner;
@@ -15,7 +17,7 @@ use tumble::dynamics::{ObjectId, SnapshotError};
 
 const MAGIC: [u8; 8] = *b"tumbleT1";
 
-/// The bytes of a world.
+/// Returns the bytes of a world.
 pub fn write(inner: &Inner) -> Vec<u8> {
     let mut bytes = inner.world.save();
     let first = bytes.len();
@@ -35,7 +37,7 @@ pub fn write(inner: &Inner) -> Vec<u8> {
     bytes
 }
 
-/// Puts a world where its bytes say; on an error it stays as it is.
+/// Restores a world from its bytes. On an error it keeps its state.
 pub fn read(inner: &mut Inner, bytes: &[u8]) -> Result<()> {
     let (snapshot, forces) = split(bytes)?;
     let before = inner.world.save();
@@ -50,7 +52,7 @@ pub fn read(inner: &mut Inner, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// The snapshot and the bytes of the forces.
+/// Returns the snapshot and the bytes of the forces.
 fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), SnapshotError> {
     let Some(rest) = bytes.strip_suffix(&MAGIC) else { return Ok((bytes, &[])) };
     let cut = || SnapshotError::Format("its generalized forces are cut off".into());
@@ -59,7 +61,7 @@ fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), SnapshotError> {
     Ok(rest.split_at(at))
 }
 
-/// The forces of each body, which must have as many freedoms.
+/// Returns the forces of each body and checks their number.
 fn efforts(inner: &Inner, mut bytes: &[u8]) -> Result<Vec<(ObjectId, Vec<f64>)>, SnapshotError> {
     let wrong = |what: &str| SnapshotError::Format(format!("its generalized forces {what}"));
     let mut all = Vec::new();

@@ -1,4 +1,4 @@
-//! Shapes: what bodies are made of. Sizes are those that one measures: full edge lengths, lengths without caps.
+//! Collision shapes. Sizes are full sizes: edge lengths, and lengths without caps.
 
 use crate::convert::{number, numbers, path, shown, some, vec3_or};
 use crate::errors::{Error, Result, caught};
@@ -13,14 +13,15 @@ use pyo3::types::PyBytes;
 use tumble::collide::{Pose, Quat, Shape as Solid, TreeCache, TreeSettings, TriMesh, Vec3};
 use tumble::scene::{building_surface, read_solid};
 
-/// A solid that bodies are made of. Made by ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``HalfSpace`` or ``Mesh``.
+/// A collision shape. The classes ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``HalfSpace`` and
+/// ``Mesh`` make one.
 #[pyclass(frozen, subclass, module = "tumble")]
 pub struct Shape {
     /// In its own frame.
     pub solid: Solid,
-    /// Where that frame stands in the body's frame that the user places.
+    /// Pose of that frame in the body's frame, which the user places.
     pub placement: Pose,
-    /// As Python would write it.
+    /// Its Python expression.
     words: String,
 }
 
@@ -29,7 +30,7 @@ impl Shape {
         Shape { solid, placement: Pose::identity(), words }
     }
 
-    /// The shape of a record, as an object of its class.
+    /// Returns the shape of a record, as an object of its class.
     pub fn of_record(py: Python<'_>, record: ShapeRecord) -> Result<Py<PyAny>> {
         let ShapeRecord { solid, placement, words } = record;
         let shape = Shape { solid, placement, words };
@@ -43,7 +44,7 @@ impl Shape {
         })
     }
 
-    /// The shape as an object of one of its classes.
+    /// Returns the shape as an object of one of its classes.
     fn into_a<C: PyClass<BaseType = Shape>>(self, class: C) -> PyClassInitializer<C> {
         PyClassInitializer::from(self).add_subclass(class)
     }
@@ -57,13 +58,14 @@ impl Shape {
         self.solid.volume()
     }
 
-    /// Radius of a ball about the shape's origin that holds it, metres; infinite for a half-space.
+    /// Radius of the smallest sphere about the shape's origin that contains it, meters; infinite
+    /// for a half-space.
     #[getter]
     fn bounding_radius(&self) -> f64 {
         self.solid.bounding_radius()
     }
 
-    /// For pickle.
+    /// Pickles the shape.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         let (py, own) = (slf.py(), slf.get());
         let record = ShapeRecord { solid: own.solid.clone(), placement: own.placement, words: own.words.clone() };
@@ -76,7 +78,7 @@ impl Shape {
     }
 }
 
-/// A ball. radius: metres.
+/// A sphere. radius: meters.
 #[pyclass(frozen, extends = Shape, module = "tumble")]
 pub struct Sphere;
 
@@ -88,7 +90,7 @@ impl Sphere {
     }
 }
 
-/// A block about its centre. size: full edge lengths along x, y and z, metres; one number is a cube.
+/// A box about its center. size: full edge lengths along x, y and z, meters; one number is a cube.
 #[pyclass(frozen, extends = Shape, name = "Box", module = "tumble")]
 pub struct Block;
 
@@ -108,7 +110,8 @@ impl Block {
     }
 }
 
-/// A capsule along z about its centre. radius: metres; length: of the straight part, without the caps, metres.
+/// A capsule along z about its center. radius: meters; length: of the straight part, without the
+/// caps, meters.
 #[pyclass(frozen, extends = Shape, module = "tumble")]
 pub struct Capsule;
 
@@ -121,7 +124,7 @@ impl Capsule {
     }
 }
 
-/// A cylinder along z about its centre. radius, length: metres.
+/// A cylinder along z about its center. radius, length: meters.
 #[pyclass(frozen, extends = Shape, module = "tumble")]
 pub struct Cylinder;
 
@@ -139,13 +142,15 @@ fn half(length: f64) -> Result<f64> {
     if length.is_finite() && length > 0.0 {
         Ok(0.5 * length)
     } else {
-        Err(Error::value(format!("length is {length}, but must be finite and above 0 m")))
+        Err(Error::value(format!("length is {length}; it must be finite and above 0 m")))
     }
 }
 
-/// All points x with ``normal · x <= offset``. normal: of any length above 0, points out of the solid; offset: metres along the unit normal.
+/// All points x with ``normal · x <= offset``. normal: of any length above 0, points out of the
+/// solid; offset: meters along the unit normal.
 ///
-/// Only static and kinematic bodies can have it. The frame of such a body has its z axis along the normal and its origin on the plane.
+/// Only static and kinematic bodies can have it. The frame of such a body has its z axis along the
+/// normal and its origin on the plane.
 #[pyclass(frozen, extends = Shape, module = "tumble")]
 pub struct HalfSpace;
 
@@ -161,7 +166,7 @@ impl HalfSpace {
             return Err(Error::value("normal: (0, 0, 0) has no direction"));
         }
         let n = (given / largest).normalize();
-        // half a turn about x where the normal points straight down
+        // A rotation by 180 degrees about x if the normal points straight down.
         let rotation = Quat::rotation_between(&Vec3::z(), &n)
             .unwrap_or_else(|| Quat::from_quaternion(nalgebra::Quaternion::new(0.0, 1.0, 0.0, 0.0)));
         let placement = Pose::from_parts(Translation3::from(n * offset), rotation);
@@ -170,11 +175,13 @@ impl HalfSpace {
     }
 }
 
-/// A closed mesh. A body of it has the frame that its vertices are given in: ``position`` is where their origin is.
+/// A closed mesh. The frame of its body is that of its vertices, so ``position`` is the position of
+/// their origin.
 ///
-/// ``Mesh(vertices, faces)``: shapes (n, 3) in metres and (m, 3) of indices from 0, counter-clockwise seen from outside.
-/// ``Mesh(path)``: an OBJ, STL or COLLADA file in metres; ``scale`` multiplies its coordinates. An object with ``vertices`` and ``faces``
-/// (trimesh) is taken as such. What is open, or encloses nothing, is a ``ValueError`` that names the place.
+/// ``Mesh(vertices, faces)``: shapes (n, 3) in meters and (m, 3) of indices from 0,
+/// counter-clockwise seen from outside. ``Mesh(path)``: an OBJ, STL or COLLADA file in meters;
+/// ``scale`` multiplies its coordinates. Also takes an object with ``vertices`` and ``faces``, such
+/// as a trimesh. A mesh that is open or encloses nothing is a ``ValueError`` that names the place.
 #[pyclass(frozen, extends = Shape, module = "tumble")]
 pub struct Mesh;
 
@@ -200,14 +207,14 @@ impl Mesh {
         Ok(Shape::new(solid, format!("Mesh({count} triangles)")).into_a(Mesh))
     }
 
-    /// The center of mass in the frame of the vertices, shape (3,), metres.
+    /// The center of mass in the frame of the vertices, shape (3,), meters.
     #[getter]
     fn center_of_mass<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyArray1<f64>>> {
         let base: PyRef<'py, Shape> = slf.clone().into_any().extract().map_err(PyErr::from)?;
         Ok(crate::convert::vector(slf.py(), &base.solid.center_of_mass()))
     }
 
-    /// The vertices after mending, to rounding as they were given, shape (n, 3), metres.
+    /// The vertices after repair, equal to the given ones up to rounding, shape (n, 3), meters.
     #[getter]
     fn vertices<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyArray2<f64>>> {
         let base: PyRef<'py, Shape> = slf.clone().into_any().extract().map_err(PyErr::from)?;
@@ -227,7 +234,7 @@ impl Mesh {
     }
 }
 
-/// Triangles from arrays, from an object that has them (trimesh), or from a file.
+/// Returns triangles from arrays, from an object that has them (trimesh), or from a file.
 pub fn triangles(py: Python<'_>, vertices: &Bound<'_, PyAny>, faces: Option<&Bound<'_, PyAny>>) -> Result<TriMesh> {
     if let Some(faces) = faces {
         return of_arrays(vertices, faces);
@@ -249,13 +256,13 @@ fn of_arrays(vertices: &Bound<'_, PyAny>, faces: &Bound<'_, PyAny>) -> Result<Tr
     let (points, corners) = (numbers(vertices, "vertices")?, numbers(faces, "faces")?);
     for (what, shape) in [("vertices", &points.shape), ("faces", &corners.shape)] {
         if shape.len() != 2 || shape[1] != 3 {
-            return Err(Error::value(format!("{what}: wanted shape (n, 3), and got {}", shown(shape))));
+            return Err(Error::value(format!("{what}: expected shape (n, 3), got {}", shown(shape))));
         }
     }
     let count = points.shape[0];
     let index = |&k: &f64| {
         let right = k >= 0.0 && k < count as f64 && k.fract() == 0.0;
-        if right { Ok(k as u32) } else { Err(Error::value(format!("faces: {k} is no index of {count} vertices"))) }
+        if right { Ok(k as u32) } else { Err(Error::value(format!("faces: {k} is not an index of {count} vertices"))) }
     };
     let flat = corners.data.iter().map(index).collect::<Result<Vec<u32>>>()?;
     Ok(TriMesh {

@@ -1,4 +1,5 @@
-//! One world that many Python objects hold: behind a lock that is tried and never waited for, so that nothing can block or deadlock.
+//! A world that many Python objects share. Its lock is tried and never waited for, so nothing can
+//! block or deadlock.
 
 use crate::collect::Ground;
 use crate::errors::{Error, Result, caught};
@@ -9,34 +10,34 @@ use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 use std::thread::ThreadId;
 use std::time::Duration;
 
-/// How long a call steps before it looks whether the user pressed Ctrl-C.
+/// How long a call steps before it checks for Ctrl-C.
 const PATIENCE: Duration = Duration::from_millis(50);
-/// The same while the interpreter is held: as long as the interpreter lets one thread run while others wait.
+/// The same with the interpreter held: the interpreter's own switch interval between threads.
 const TURN: Duration = Duration::from_millis(5);
 
-/// A world behind its lock, and who is stepping it.
+/// A world behind its lock, and the thread that works on it.
 pub struct Shared {
     inner: Mutex<Inner>,
     stepping: Mutex<Option<ThreadId>>,
-    /// What Python's collector knows of it.
+    /// The garbage collector's data.
     pub ground: Ground,
 }
 
-/// The world while one call works on it.
+/// The locked world of one call.
 pub struct Held<'a> {
     guard: MutexGuard<'a, Inner>,
     shared: &'a Shared,
 }
 
 impl Shared {
-    /// A world to be held by handles.
+    /// Returns a world for handles to share.
     pub fn new(inner: Inner) -> Arc<Shared> {
         let ground = Ground::default();
         ground.list(inner.callables());
         Arc::new(Shared { inner: Mutex::new(inner), stepping: Mutex::new(None), ground })
     }
 
-    /// The world, if nobody works on it.
+    /// Locks the world. An error if another call works on it.
     fn hold(&self) -> Result<Held<'_>> {
         match self.inner.try_lock() {
             Ok(guard) if guard.broken => Err(Error::Broken),
@@ -60,20 +61,20 @@ impl Shared {
         caught(|| call(&held))
     }
 
-    /// Changes the world, under the interpreter's lock: Python may be looking at the state.
+    /// Changes the world under the interpreter's lock, since Python may be reading the state.
     pub fn write<T>(&self, _py: Python<'_>, call: impl FnOnce(&mut Inner) -> Result<T>) -> Result<T> {
         let mut held = self.hold()?;
         guarded(&mut held, call)
     }
 
-    /// The same for what takes long: with the interpreter let go, if it can be.
+    /// As `write`, for long work: with the interpreter released if possible.
     pub fn work<T: Send>(&self, py: Python<'_>, call: impl FnOnce(&mut Inner) -> Result<T> + Send) -> Result<T> {
         let mut held = self.hold()?;
         apart(py, &mut held, |py, inner| leave(py, inner, call))
     }
 
-    /// The same in parts of the given length, until one answers that it was the last: the world stays held over all of them, and Ctrl-C is heard between
-    /// two.
+    /// As `work`, in parts of the given length until one returns true. The world stays locked
+    /// throughout, and Ctrl-C is checked between two parts.
     pub fn work_in_parts(
         &self,
         py: Python<'_>,
@@ -92,22 +93,23 @@ impl Shared {
         })
     }
 
-    /// Adds or removes forces or behaviours, and tells the collector.
+    /// Adds or removes forces or behaviors, and updates the garbage collector's list.
     pub fn extend<T>(&self, py: Python<'_>, call: impl FnOnce(&mut Inner) -> Result<T>) -> Result<T> {
         let (out, callables) = self.write(py, |inner| Ok((call(inner)?, inner.callables())))?;
         self.ground.list(callables);
         Ok(out)
     }
 
-    /// Drops forces and behaviours: nothing can reach this world any more but they themselves.
-    pub fn forsake(&self) {
+    /// Drops forces and behaviors, when only they can still reach this world.
+    pub fn drop_callbacks(&self) {
         self.ground.list(Vec::new());
         let gone = self.inner.try_lock().map(|mut inner| inner.take_extension());
         drop(gone); // not under the lock: it may run Python
     }
 }
 
-/// Where Python runs within the call too, an array that looks into the world's memory shows the state as it was before, until the call is over.
+/// Runs a call. If it also runs Python code, arrays over the world's memory keep showing the state
+/// before the call until it ends.
 fn apart<T>(py: Python<'_>, inner: &mut Inner, call: impl FnOnce(Python<'_>, &mut Inner) -> Result<T>) -> Result<T> {
     if inner.extension.is_empty() || !inner.shown.alive(py) {
         return call(py, inner);
@@ -118,12 +120,13 @@ fn apart<T>(py: Python<'_>, inner: &mut Inner, call: impl FnOnce(Python<'_>, &mu
     outcome
 }
 
-/// Lets the interpreter go meanwhile, if nobody looks into the memory that changes.
+/// Releases the interpreter for a call, unless an array refers to the memory that changes.
 fn leave<T: Send>(py: Python<'_>, inner: &mut Inner, call: impl FnOnce(&mut Inner) -> Result<T> + Send) -> Result<T> {
     if inner.looked_into(py) { guarded(inner, call) } else { py.detach(|| guarded(inner, call)) }
 }
 
-/// A panic in a call that changes the world may leave it half-way: later calls say so.
+/// Runs a call that changes the world. A panic may leave the world inconsistent, so later calls
+/// fail.
 fn guarded<T>(held: &mut Inner, call: impl FnOnce(&mut Inner) -> Result<T>) -> Result<T> {
     let outcome = caught(|| call(held));
     held.broken = matches!(outcome, Err(Error::Internal(_)));

@@ -1,4 +1,4 @@
-//! Loading that takes long, as a Python warning.
+//! Slow loading, as a Python warning.
 
 use crate::errors::Result;
 use pyo3::exceptions::PyUserWarning;
@@ -7,20 +7,20 @@ use std::ffi::CString;
 use std::sync::{Mutex, PoisonError};
 use tumble::scene::set_slow_load_listener;
 
-/// What took long since the last warning.
-static TOLD: Mutex<Vec<String>> = Mutex::new(Vec::new());
+/// Loads that took long since the last warning.
+static SLOW_LOADS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// Takes note of what takes long from now on.
+/// Starts to collect slow loads.
 pub fn listen() {
-    set_slow_load_listener(|line| TOLD.lock().unwrap_or_else(PoisonError::into_inner).push(line.to_owned()));
+    set_slow_load_listener(|line| SLOW_LOADS.lock().unwrap_or_else(PoisonError::into_inner).push(line.to_owned()));
 }
 
-/// Warns of what took long, once of each.
+/// Warns about slow loads, once each.
 pub fn warn(py: Python<'_>) -> Result<()> {
-    let told = std::mem::take(&mut *TOLD.lock().unwrap_or_else(PoisonError::into_inner));
-    for line in told {
+    let lines = std::mem::take(&mut *SLOW_LOADS.lock().unwrap_or_else(PoisonError::into_inner));
+    for line in lines {
         let text = format!("{line} took longer than 2 s; the cache keeps it for the next time");
-        // names of files hold no zero byte
+        // File names have no zero byte.
         let text = CString::new(text.replace('\0', "")).unwrap_or_default();
         PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
     }

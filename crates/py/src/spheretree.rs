@@ -1,4 +1,5 @@
-//! Sphere trees: built, measured, written and read. The trees and all their figures are the library's.
+//! Sphere trees: built, measured, written and read. The library computes the trees and all their
+//! metrics.
 
 use crate::convert::{path, whole_number};
 use crate::errors::{Error, Result, caught};
@@ -18,22 +19,24 @@ use tumble::collide::{
 };
 use tumble::dynamics::archive::{open, seal};
 
-/// Nested balls around a closed mesh: every ball holds the balls of its children, and the balls of each level cover the surface.
+/// Nested spheres around a closed mesh. Every sphere contains those of its children, and the
+/// spheres of each level cover the surface.
 ///
-/// Made by ``SphereTree.build`` or ``SphereTree.load``. All numbers are in the axes of the mesh as it was given, metres.
+/// Made by ``SphereTree.build`` or ``SphereTree.load``. All numbers are in the axes of the given
+/// mesh, meters.
 #[pyclass(frozen, module = "tumble")]
 pub struct SphereTree {
     file: TreeFile,
     levels: Vec<Vec<LevelSphere>>,
-    /// What it was built around; a tree that was loaded has no mesh.
+    /// The mesh that it was built around; none for a loaded tree.
     mesh: Option<TriMesh>,
     quality: OnceLock<Vec<LevelQuality>>,
 }
 
-/// What a pickled tree begins with.
+/// Start of a pickled tree.
 const PICKLED: &[u8; 8] = b"tumbleT1";
 
-/// What a pickled sphere tree becomes.
+/// Unpickles a sphere tree.
 #[pyfunction]
 pub fn _unpickle_tree(py: Python<'_>, data: PyBackedBytes) -> Result<SphereTree> {
     py.detach(|| {
@@ -52,12 +55,12 @@ impl SphereTree {
         SphereTree { levels: file.tree.level_lists(), file, mesh, quality }
     }
 
-    /// The figures of the levels, measured when they are first asked for.
+    /// Returns the metrics of the levels, measured on first use.
     fn measured(&self, py: Python<'_>) -> Result<&[LevelQuality]> {
         if self.quality.get().is_none() {
             let Some(mesh) = &self.mesh else {
                 return Err(Error::value(
-                    "the file of this tree holds no figures, and without its mesh none can be measured; build it anew",
+                    "the file of this tree has no metrics, and without the mesh they cannot be measured; build the tree again",
                 ));
             };
             let quality = py.detach(|| pool::run(|| Ok(self.file.tree.quality(mesh, &QualitySettings::default()))))?;
@@ -66,14 +69,14 @@ impl SphereTree {
         Ok(self.quality.get().map_or(&[], Vec::as_slice))
     }
 
-    /// The tree with its figures, as it is written and printed.
+    /// Returns the tree with its metrics, as it is written and printed.
     fn whole(&self, py: Python<'_>) -> Result<TreeFile> {
         Ok(TreeFile { quality: self.measured(py)?.to_vec(), ..self.file.clone() })
     }
 }
 
-/// The method's usual settings, with what was given instead.
-fn settings(method: &str, branch: Option<u32>, depth: Option<u32>, error: Option<f64>) -> Result<TreeSettings> {
+/// Returns the default settings of the method with the given overrides.
+fn settings(method: &str, branching: Option<u32>, depth: Option<u32>, max_error: Option<f64>) -> Result<TreeSettings> {
     let builder = meaning("method", method, BUILDERS)?;
     let usual = if builder == Builder::Octree {
         TreeSettings::octree()
@@ -81,14 +84,14 @@ fn settings(method: &str, branch: Option<u32>, depth: Option<u32>, error: Option
         TreeSettings { builder, ..TreeSettings::default() }
     };
     Ok(TreeSettings {
-        branch: branch.unwrap_or(usual.branch),
+        branch: branching.unwrap_or(usual.branch),
         depth: depth.unwrap_or(usual.depth),
-        error: error.unwrap_or(usual.error),
+        error: max_error.unwrap_or(usual.error),
         ..usual
     })
 }
 
-/// What the mesh is called in the tree's file.
+/// Returns the name of the mesh in the tree's file.
 fn name_of(vertices: &Bound<'_, PyAny>, faces: Option<&Bound<'_, PyAny>>) -> String {
     let file = faces.is_none().then(|| path(vertices).ok()).flatten();
     file.as_deref()
@@ -100,27 +103,31 @@ fn name_of(vertices: &Bound<'_, PyAny>, faces: Option<&Bound<'_, PyAny>>) -> Str
 impl SphereTree {
     /// Builds a tree around a closed mesh, and checks that it covers the surface and is nested.
     ///
-    /// vertices: shape (n, 3), metres, and faces: shape (m, 3), indices from 0, counter-clockwise seen from outside; or the path of an OBJ, STL or
-    /// COLLADA file; or an object with ``vertices`` and ``faces``, such as a trimesh. method: ``"medial"`` (adaptive medial axis, the tightest),
-    /// ``"hubbard"``, ``"grid"`` or ``"octree"``; branch: most children of a ball, 2 to 64 (default 8); depth: most levels below the root, 1 to 9
-    /// (default 3, of the octree 7); error: no ball that reaches less than this outside is divided, as a part of the mesh's diagonal, 1e-4 to 1
-    /// (default 1e-4, of the octree 0.01); cache: keep the tree on disk and take it from there next time.
+    /// vertices: shape (n, 3), meters, and faces: shape (m, 3), indices from 0, counter-clockwise
+    /// seen from outside; or the path of an OBJ, STL or COLLADA file; or an object with
+    /// ``vertices`` and ``faces``, such as a trimesh. method: ``"medial"`` (adaptive medial axis,
+    /// the tightest), ``"hubbard"``, ``"grid"`` or ``"octree"``. branching: largest number of
+    /// children of a sphere, 2 to 64 (default 8). depth: largest number of levels below the root, 1
+    /// to 9 (default 3, for the octree 7). max_error: spheres that reach less than this outside are
+    /// not divided, as a fraction of the mesh's diagonal, 1e-4 to 1 (default 1e-4, for the octree
+    /// 0.01). cache: whether to keep the tree on disk and read it from there next time.
     ///
-    /// A mesh that is open or encloses nothing, and settings out of range, are ``InvalidValueError``. The interpreter is let go meanwhile; Ctrl-C ends the build.
+    /// A mesh that is open or encloses nothing, and settings out of range, raise
+    /// ``InvalidValueError``. The interpreter is released meanwhile; Ctrl-C ends the build.
     #[staticmethod]
-    #[pyo3(signature = (vertices, faces=None, *, method="medial", branch=None, depth=None, error=None, cache=true))]
+    #[pyo3(signature = (vertices, faces=None, *, method="medial", branching=None, depth=None, max_error=None, cache=true))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn build(
         py: Python<'_>,
         vertices: &Bound<'_, PyAny>,
         faces: Option<&Bound<'_, PyAny>>,
         method: &str,
-        #[pyo3(from_py_with = whole_number)] branch: Option<u32>,
+        #[pyo3(from_py_with = whole_number)] branching: Option<u32>,
         #[pyo3(from_py_with = whole_number)] depth: Option<u32>,
-        error: Option<f64>,
+        max_error: Option<f64>,
         cache: bool,
     ) -> Result<SphereTree> {
-        let settings = settings(method, branch, depth, error)?;
+        let settings = settings(method, branching, depth, max_error)?;
         let (name, mut mesh) = (name_of(vertices, faces), triangles(py, vertices, faces)?);
         let cache = if cache { TreeCache::of_environment() } else { TreeCache::off() };
         abandonable(py, move |stop| {
@@ -133,7 +140,8 @@ impl SphereTree {
         })
     }
 
-    /// Reads a tree that ``save`` or ``tumble spheretree --output`` wrote. What is no tree is an ``InvalidValueError`` that says what is wrong.
+    /// Reads a tree that ``save`` or ``tumble spheretree --output`` wrote. Any other file raises
+    /// ``InvalidValueError`` with the reason.
     #[staticmethod]
     fn load(py: Python<'_>, path: &Bound<'_, PyAny>) -> Result<SphereTree> {
         let path = self::path(path)?;
@@ -147,7 +155,7 @@ impl SphereTree {
         })
     }
 
-    /// Writes the tree and its figures as JSON: the file of ``tumble spheretree --output``.
+    /// Writes the tree and its metrics as JSON: the file of ``tumble spheretree --output``.
     fn save(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> Result<()> {
         let (path, file): (PathBuf, TreeFile) = (self::path(path)?, self.whole(py)?);
         py.detach(|| {
@@ -156,7 +164,7 @@ impl SphereTree {
         })
     }
 
-    /// The same as a string.
+    /// Returns the JSON text that ``save`` writes.
     fn to_json(&self, py: Python<'_>) -> Result<String> {
         Ok(self.whole(py)?.to_json())
     }
@@ -167,26 +175,27 @@ impl SphereTree {
         &self.file.name
     }
 
-    /// How it was built.
+    /// The method that built it.
     #[getter]
     fn method(&self) -> &'static str {
         word(self.file.settings.builder, BUILDERS)
     }
 
-    /// Most children of a ball that were allowed.
+    /// Largest allowed number of children of a sphere.
     #[getter]
-    fn branch(&self) -> u32 {
+    fn branching(&self) -> u32 {
         self.file.settings.branch
     }
 
-    /// Most levels below the root that were allowed.
+    /// Largest allowed number of levels below the root.
     #[getter]
     fn depth(&self) -> u32 {
         self.file.settings.depth
     }
 
-    /// The levels, the root's first: each a ``SphereLevel`` of ``centers``, shape (n, 3), and ``radii``, shape (n,), metres. Every level stands for the
-    /// solid by itself: a leaf above the last level is repeated in the levels below.
+    /// The levels, the root's first: each a ``SphereLevel`` of ``centers``, shape (n, 3), and
+    /// ``radii``, shape (n,), meters. Every level covers the solid by itself: a leaf above the last
+    /// level is repeated in the levels below.
     #[getter]
     fn levels<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyTuple>> {
         let class = py.import("tumble._values")?.getattr("SphereLevel")?;
@@ -199,7 +208,8 @@ impl SphereTree {
         Ok(PyTuple::new(py, self.levels.iter().map(level).collect::<Result<Vec<_>>>()?)?)
     }
 
-    /// For each level, of each ball the index of its parent in the level above, shape (n,); -1 for the root.
+    /// For each level, the index of each sphere's parent in the level above, shape (n,); -1 for the
+    /// root.
     #[getter]
     fn parents<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyTuple>> {
         let parents =
@@ -207,17 +217,21 @@ impl SphereTree {
         Ok(PyTuple::new(py, self.levels.iter().map(parents))?)
     }
 
-    /// How far the balls of the last level reach outside the solid at most, metres: a bound that is proved, not sampled.
+    /// Upper bound of the distance by which the spheres of the last level reach outside the solid,
+    /// meters. Proved, not sampled.
     #[getter]
     fn outward_error(&self) -> f64 {
         self.file.tree.outward_error()
     }
 
-    /// The figures of the levels, measured by samples: a dict of arrays with a number per level. Lengths are parts of the mesh's diagonal.
+    /// The metrics of the levels, measured by samples: a dict of arrays with one number per level.
+    /// Lengths are fractions of the mesh's diagonal.
     ///
-    /// ``level``, ``spheres``; ``coverage``: share of the surface inside the balls; ``protrusion_mean``, ``protrusion_p95``, ``protrusion_max``: how far the
-    /// balls' surface is outside the solid; ``gap_mean``, ``gap_max``: how far bare surface is from the balls; ``volume_ratio``: volume of the
-    /// balls over that of the solid; ``nesting_broken``: balls that stick out of their parents.
+    /// ``level``, ``spheres``; ``coverage``: fraction of the surface inside the spheres;
+    /// ``protrusion_mean``, ``protrusion_p95``, ``protrusion_max``: distance of the spheres'
+    /// surface outside the solid; ``gap_mean``, ``gap_max``: distance of uncovered surface from the
+    /// spheres; ``volume_ratio``: volume of the spheres over that of the solid; ``nesting_broken``:
+    /// spheres that extend beyond their parents.
     #[getter]
     fn quality<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         type Figure = (&'static str, fn(&LevelQuality) -> f64);
@@ -240,13 +254,14 @@ impl SphereTree {
         Ok(dict)
     }
 
-    /// The figures as the table that ``tumble spheretree`` prints; verbose: with more columns and what the builder's stages did.
+    /// Returns the metrics as the table that ``tumble spheretree`` prints. verbose: with more
+    /// columns and the work of the builder's stages.
     #[pyo3(signature = (verbose=false))]
     fn report(&self, py: Python<'_>, verbose: bool) -> Result<String> {
         Ok(self.whole(py)?.table(verbose))
     }
 
-    /// For pickle: the tree, the figures that were measured, and the mesh that others are measured with.
+    /// Pickles the tree, the measured metrics, and the mesh for measuring others.
     fn __reduce__<'py>(&self, py: Python<'py>) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         let quality = self.quality.get().cloned().unwrap_or_default();
         let json = TreeFile { quality, ..self.file.clone() }.to_json();
@@ -261,6 +276,6 @@ impl SphereTree {
 
     fn __repr__(&self) -> String {
         let counts: Vec<String> = self.levels.iter().map(|level| level.len().to_string()).collect();
-        format!("<tumble.SphereTree of {}: {}, {} balls>", self.file.name, self.method(), counts.join(" > "))
+        format!("<tumble.SphereTree of {}: {}, {} spheres>", self.file.name, self.method(), counts.join(" > "))
     }
 }

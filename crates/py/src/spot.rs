@@ -1,4 +1,5 @@
-//! Where an articulated body is: a description by itself, which keeps its numbers, or one in a world, whose numbers are the world's.
+//! Storage of an articulated body's state: a description has its own numbers, a handle refers to
+//! those of a world.
 
 use crate::body::Place;
 use crate::convert::{Numbers, numbers, shown};
@@ -11,22 +12,22 @@ use tumble::collide::Vec3;
 use tumble::dynamics::{ArticulatedBody, DofSettings};
 use tumble::scene::urdf::{self, UrdfOptions};
 
-/// A description by itself, or one in a world.
+/// A description by itself, or a body in a world.
 #[allow(clippy::large_enum_variant, reason = "each is the inside of one Python object")]
-pub enum Spot {
+pub enum Binding {
     Free { source: Source, now: Mutex<Now> },
     Placed(Place),
 }
 
-/// Where a description comes from; its shapes are read when it is put into a world.
+/// Source of a description. Its shapes are read when it is added to a world.
 #[derive(Clone)]
 pub struct Source {
     pub file: PathBuf,
     pub options: UrdfOptions,
-    pub freedoms: Vec<DofSettings>,
+    pub dofs: Vec<DofSettings>,
 }
 
-/// The numbers of a description.
+/// The state of a description.
 #[derive(Clone)]
 pub struct Now {
     pub gravity: Vec3,
@@ -35,7 +36,7 @@ pub struct Now {
     pub tau: Vec<f64>,
 }
 
-/// Which of the numbers.
+/// Selects one array of the state.
 #[derive(Clone, Copy)]
 pub enum Which {
     Q,
@@ -60,44 +61,44 @@ impl Which {
         }
     }
 
-    /// How many numbers there are.
+    /// Returns the length of the array.
     pub fn width(self, robot: &Robot) -> usize {
         if matches!(self, Which::Q) { robot.positions() } else { robot.dof() }
     }
 }
 
 impl Source {
-    /// The body with its shapes, and what is to be said of its files.
+    /// Returns the body with its shapes, and notes about its files.
     pub fn body(&self) -> Result<(ArticulatedBody, Vec<String>)> {
         caught(|| Ok(urdf::load(&self.file, &self.options)?))
     }
 }
 
-impl Spot {
-    /// Forces that act on it from the first frame on.
+impl Binding {
+    /// Returns the generalized forces that act from the first frame on.
     pub fn efforts(&self) -> Option<Vec<f64>> {
         match self {
-            Spot::Free { now, .. } => Some(locked(now).tau.clone()).filter(|tau| tau.iter().any(|t| *t != 0.0)),
-            Spot::Placed(_) => None,
+            Binding::Free { now, .. } => Some(locked(now).tau.clone()).filter(|tau| tau.iter().any(|t| *t != 0.0)),
+            Binding::Placed(_) => None,
         }
     }
 
-    /// Gravity there, m/s².
+    /// Returns gravity, m/s².
     pub fn gravity(&self) -> Result<Vec3> {
         match self {
-            Spot::Free { now, .. } => Ok(locked(now).gravity),
-            Spot::Placed(place) => {
+            Binding::Free { now, .. } => Ok(locked(now).gravity),
+            Binding::Placed(place) => {
                 place.read(|inner| inner.world.status(place.id).map(|_| inner.world.settings().gravity))
             }
         }
     }
 
-    /// Numbers as they are now.
+    /// Returns the present numbers.
     pub fn get(&self, which: Which, robot: &Robot) -> Result<Vec<f64>> {
         let (positions, dof) = (robot.positions(), robot.dof());
         match self {
-            Spot::Free { now, .. } => Ok(which.of(&mut locked(now)).clone()),
-            Spot::Placed(place) => place.read(|inner| {
+            Binding::Free { now, .. } => Ok(which.of(&mut locked(now)).clone()),
+            Binding::Placed(place) => place.read(|inner| {
                 let x = inner.world.state_of(place.id)?;
                 Some(match which {
                     Which::Q => x[..positions].to_vec(),
@@ -108,20 +109,20 @@ impl Spot {
         }
     }
 
-    /// Sets numbers, which must be as many as there are.
+    /// Sets the numbers, whose count must be right.
     pub fn set(&self, py: Python<'_>, which: Which, robot: &Robot, value: &Bound<'_, PyAny>) -> Result<()> {
         let (name, width) = (which.name(), which.width(robot));
         let Numbers { shape, data } = numbers(value, name)?;
         if shape != [width] {
-            return Err(Error::value(format!("{name}: wanted shape ({width},), and got {}", shown(&shape))));
+            return Err(Error::value(format!("{name}: expected shape ({width},), got {}", shown(&shape))));
         }
         let data = if matches!(which, Which::Q) { crate::robot::settled(robot, data)? } else { data };
         match self {
-            Spot::Free { now, .. } => {
+            Binding::Free { now, .. } => {
                 *which.of(&mut locked(now)) = data;
                 Ok(())
             }
-            Spot::Placed(place) => place.write(py, |inner| {
+            Binding::Placed(place) => place.write(py, |inner| {
                 let mut x = inner.world.state_of(place.id).ok_or_else(|| place.removed())?.to_vec();
                 match which {
                     Which::Q => x[..width].copy_from_slice(&data),
@@ -139,23 +140,23 @@ impl Spot {
         }
     }
 
-    /// Limits and drives of its freedoms.
-    pub fn freedoms(&self) -> Result<Vec<DofSettings>> {
+    /// Returns the settings of its degrees of freedom.
+    pub fn dofs(&self) -> Result<Vec<DofSettings>> {
         match self {
-            Spot::Free { source, .. } => Ok(source.freedoms.clone()),
-            Spot::Placed(place) => {
+            Binding::Free { source, .. } => Ok(source.dofs.clone()),
+            Binding::Placed(place) => {
                 place.read(|inner| Some(inner.world.get::<ArticulatedBody>(place.id)?.dofs().to_vec()))
             }
         }
     }
 }
 
-/// The numbers of a description.
+/// Locks the state of a description.
 pub fn locked(now: &Mutex<Now>) -> MutexGuard<'_, Now> {
     now.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
-/// The state that a body starts in.
+/// Returns the initial state of a body.
 pub fn start(body: &ArticulatedBody) -> Vec<f64> {
     use tumble::dynamics::Object;
     let Some(own) = body.integratable() else { return Vec::new() };

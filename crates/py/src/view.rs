@@ -1,8 +1,10 @@
-//! What a force or a behaviour written in Python sees of the world, and where it puts what it does.
+//! The world as seen by a force or a behavior written in Python, and the arrays that receive its
+//! forces.
 //!
-//! There is a row for each body and each link. They are copied into numpy arrays for each call: the world's own memory changes while it is stepped, and an array that a callback
-//! kept would look into it. The arrays of one call serve the next, unless Python kept any. After the call the view
-//! refuses to be asked, and what was added to its arrays is read once and then no more.
+//! There is a row for each body and each link. Rows are copied into numpy arrays for each call,
+//! because the world's own memory changes during a step and an array that a callback keeps would
+//! refer to it. The arrays of one call are reused by the next, unless Python kept any. After the
+//! call the view raises an error, and its force arrays are read once and not again.
 
 use crate::arrays::Arrays;
 use crate::bodies::place_of;
@@ -18,10 +20,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use tumble::collide::Vec3;
 use tumble::dynamics::WorldView;
 
-/// The world as a force or a behaviour sees it while it is called: a row for every rigid body and every link, in world axes.
+/// The world as a force or a behavior sees it during a call: a row for every rigid body and every
+/// link, in world axes.
 ///
-/// The arrays are copies of that moment and read-only, but ``force`` and ``torque``, which begin at zero and take what the callback adds. After the
-/// callback has returned the view raises ``RemovedError``.
+/// The arrays are read-only copies, except ``force`` and ``torque``, which start at zero and to
+/// which the callback adds. After the callback has returned the view raises ``RemovedError``.
 #[pyclass(frozen, module = "tumble")]
 pub struct View {
     arrays: Arc<Arrays>,
@@ -33,7 +36,7 @@ pub struct View {
 }
 
 impl View {
-    /// Of arrays that are filled.
+    /// Returns a view of filled arrays.
     pub fn new(view: &WorldView, layout: &Arc<Layout>, arrays: &Arc<Arrays>) -> View {
         let mut moves = vec![false; layout.len()];
         for (id, _, rows) in &layout.objects {
@@ -50,7 +53,7 @@ impl View {
         }
     }
 
-    /// The callback has returned.
+    /// Marks the end of the callback.
     pub fn end(&self) {
         self.over.store(true, Ordering::Relaxed);
     }
@@ -58,19 +61,19 @@ impl View {
     fn open(&self) -> Result<()> {
         match self.over.load(Ordering::Relaxed) {
             true => Err(Error::Removed(
-                "this view belonged to a call that has returned; copy what is needed later while the call lasts".into(),
+                "this view belonged to a call that has returned; copy data that is needed later during the call".into(),
             )),
             false => Ok(()),
         }
     }
 
-    /// A view of what is shown, by its place in [`Arrays::shown`].
+    /// Returns a view of a read-only array, by its index in [`Arrays::shown`].
     fn shown<'py>(&self, py: Python<'py>, which: usize) -> Result<Bound<'py, PyAny>> {
         self.open()?;
         Ok(self.arrays.shown[which].1.bind(py).call_method0("view")?)
     }
 
-    /// A view that may be written.
+    /// Returns a writable view.
     fn open_view<'py>(&self, py: Python<'py>, array: &Py<PyArray2<f64>>) -> Result<Bound<'py, PyAny>> {
         self.open()?;
         Ok(array.bind(py).call_method0("view")?)
@@ -79,7 +82,7 @@ impl View {
     fn set(&self, py: Python<'_>, array: &Py<PyArray2<f64>>, value: &Bound<'_, PyAny>) -> Result<()> {
         self.open()?;
         let own = array.bind(py);
-        // `view.force += …` gives back what it was given
+        // `view.force += …` assigns the array that it was given.
         match value.cast::<PyArray2<f64>>() {
             Ok(value) if value.data() == own.data() && value.shape() == own.shape() && value.is_c_contiguous() => {
                 Ok(())
@@ -106,7 +109,7 @@ impl View {
 
 #[pymethods]
 impl View {
-    /// Simulated time of this evaluation, s: within a step it may lie anywhere in it.
+    /// Simulated time of this evaluation, s. Within a step it may be anywhere in it.
     #[getter]
     fn time(&self) -> Result<f64> {
         self.open().map(|()| self.time)
@@ -119,7 +122,7 @@ impl View {
         Ok(crate::convert::vector(py, &self.gravity))
     }
 
-    /// Positions of the centres of mass, shape (n, 3), m.
+    /// Positions of the centers of mass, shape (n, 3), m.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         self.shown(py, 0)
@@ -143,7 +146,7 @@ impl View {
         self.shown(py, 3)
     }
 
-    /// Accelerations of the same points when forces were last evaluated, shape (n, 3), m/s².
+    /// Accelerations of the same points at the last force evaluation, shape (n, 3), m/s².
     #[getter]
     fn acceleration<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         self.shown(py, 4)
@@ -155,28 +158,29 @@ impl View {
         self.shown(py, 5)
     }
 
-    /// Masses, shape (n,), kg; 0 of static geometry and of bases.
+    /// Masses, shape (n,), kg; 0 for static geometry and for bases.
     #[getter]
     fn mass<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
         self.open()?;
         Ok(crate::convert::array(py, &self.layout.rows.iter().map(|row| row.mass).collect::<Vec<_>>()))
     }
 
-    /// Whether forces move it: neither static nor kinematic, and alive. Shape (n,), bool.
+    /// Whether forces move it: dynamic and enabled. Shape (n,), bool.
     #[getter]
     fn moves<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<bool>>> {
         self.open()?;
         Ok(PyArray1::from_slice(py, &self.moves))
     }
 
-    /// Of each row the name of its body.
+    /// Name of the body of each row.
     #[getter]
     fn names(&self) -> Result<Vec<String>> {
         self.open()?;
         Ok(self.layout.objects.iter().flat_map(|(_, name, rows)| rows.clone().map(|_| name.to_string())).collect())
     }
 
-    /// Forces at the centres of mass, which ``position`` tells, shape (n, 3), N, world axes: add to it.
+    /// Forces at the centers of mass (``position``), shape (n, 3), N, world axes. Callbacks add to
+    /// it.
     #[getter]
     fn force<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         self.open_view(py, &self.arrays.force)
@@ -187,7 +191,7 @@ impl View {
         self.set(py, &self.arrays.force, value)
     }
 
-    /// Torques, shape (n, 3), N·m, world axes: add to it.
+    /// Torques, shape (n, 3), N·m, world axes. Callbacks add to it.
     #[getter]
     fn torque<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         self.open_view(py, &self.arrays.torque)
@@ -198,8 +202,9 @@ impl View {
         self.set(py, &self.arrays.torque, value)
     }
 
-    /// The row of a rigid body, given by name or as a handle; of an articulated body that of a link, given by name, or the one of its rows with the number
-    /// ``part``. A link that is fixed to another has the row of that one.
+    /// Returns the row of a rigid body, given by name or as a handle. For an articulated body
+    /// ``part`` is the name of a link or a row number among its rows. A link that is fixed to
+    /// another has the row of that one.
     #[pyo3(signature = (body, part=None))]
     fn row(&self, body: &Bound<'_, PyAny>, part: Option<&Bound<'_, PyAny>>) -> Result<usize> {
         let rows = self.row_of(body)?;
@@ -216,14 +221,16 @@ impl View {
         }
     }
 
-    /// The rows of a body as a slice: one of a rigid body; of an articulated body one of each moving link, parents first, and at last one of its base.
+    /// Returns the rows of a body as a slice: one for a rigid body; for an articulated body one for
+    /// each moving link, parents first, and one for its base at the end.
     fn rows<'py>(&self, py: Python<'py>, body: &Bound<'py, PyAny>) -> Result<Bound<'py, PySlice>> {
         let rows = self.row_of(body)?;
         Ok(PySlice::new(py, rows.start as isize, rows.end as isize, 1))
     }
 
-    /// Adds a force, shape (3,), N, that acts on a row at a point of the world, shape (3,), m: with the torque ``(point - position) × force``.
-    fn push(
+    /// Adds a force, shape (3,), N, on a row at a point of the world, shape (3,), m: with the
+    /// torque ``(point - position) × force``.
+    fn apply_force(
         &self,
         py: Python<'_>,
         #[pyo3(from_py_with = whole_number)] row: usize,

@@ -1,4 +1,4 @@
-//! The world: made or loaded, filled, stepped, asked.
+//! The class `World`.
 
 use crate::adding::{add, articulated, own_place, rigid};
 use crate::articulation::Articulation;
@@ -32,16 +32,22 @@ use tumble::collide::{ContactMode, Vec3};
 use tumble::dynamics::{Mode, PairMaterial, RigidBody as Rigid, Settings};
 use tumble::scene::{SceneFile, resolve_scene};
 
-/// A world of bodies that moves in steps of ``dt`` seconds. SI units, radians, z up; quaternions are (x, y, z, w).
+/// A world of bodies that moves in steps of ``dt`` seconds. SI units, radians, z up; quaternions
+/// are (x, y, z, w).
 ///
-/// gravity: shape (3,), m/s²; dt: length of a step, s; stepper: ``"time_stepping"`` or ``"backtracking"``; integrator: ``"verlet"``,
-/// ``"symplectic_euler"``, ``"explicit_euler"``, ``"rk4"`` or ``"dormand_prince"``; solver: ``"gauss_seidel"``, ``"lcp_pyramid"`` or
-/// ``"lcp_sliding"``: the words of scene files, with their defaults. integrator: acts in ``"backtracking"`` (``"time_stepping"`` has its own midpoint rule); substeps: parts of each step; iterations: sweeps of the solver at most;
-/// contact_tolerance: metres; integrator_tolerance: of ``dormand_prince``. sleep_after: seconds after which islands that have moved by less than
-/// sleep_within (metres) are left out of the steps until something touches them; None: never. combine_restitution, combine_friction: what the
-/// coefficients of two bodies make for the pair, ``"min"``, ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``.
+/// gravity: shape (3,), m/s². dt: length of a step, s. stepper: ``"time_stepping"`` or
+/// ``"backtracking"``. integrator: ``"verlet"``, ``"symplectic_euler"``, ``"explicit_euler"``,
+/// ``"rk4"`` or ``"dormand_prince"``; used by ``"backtracking"``, since ``"time_stepping"`` has its
+/// own midpoint rule. solver: ``"gauss_seidel"``, ``"lcp_pyramid"`` or ``"lcp_sliding"``. substeps:
+/// sub-steps of each step. iterations: largest number of solver sweeps. contact_tolerance: meters.
+/// integrator_tolerance: for ``dormand_prince``. sleep_after: seconds after which islands that
+/// moved by less than sleep_within (meters) sleep until something touches them; None: never.
+/// combine_restitution, combine_friction: rule for the coefficients of a pair, ``"min"``,
+/// ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``. Names and defaults are those of
+/// scene files.
 ///
-/// One thread at a time: while one steps a world, calls on it from another raise ``BusyError``. The interpreter is let go while a world steps.
+/// One thread at a time: while one thread steps a world, calls on it from another raise
+/// ``BusyError``. The interpreter is released while a world steps.
 #[pyclass(frozen, weakref, module = "tumble")]
 pub struct World {
     pub shared: Arc<Shared>,
@@ -49,7 +55,7 @@ pub struct World {
 }
 
 impl World {
-    /// A world of its own.
+    /// Wraps a world.
     pub fn of(py: Python<'_>, inner: Inner) -> Result<World> {
         slow::warn(py)?;
         let shared = Shared::new(inner);
@@ -109,10 +115,12 @@ impl World {
         World::of(py, build(scene)?)
     }
 
-    /// The world of a scene: the path of a ``scene.toml`` or of its folder, or the name of a shipped scene.
+    /// Loads the world of a scene: the path of a ``scene.toml`` or of its folder, or the name of a
+    /// shipped scene.
     ///
-    /// What is given beside it stands instead of what the file says. A file that is not there, or an unknown name, is a ``MissingFileError``
-    /// (a ``FileNotFoundError``); a file with problems a ``SceneError`` (a ``ValueError``) that tells all of them with line and column.
+    /// Arguments override the settings of the file. A missing file or an unknown name raises
+    /// ``MissingFileError`` (a ``FileNotFoundError``); a file with problems raises ``SceneError``
+    /// (a ``ValueError``), which lists all of them with line and column.
     #[staticmethod]
     #[pyo3(signature = (path_or_name, *, dt=None, stepper=None, integrator=None, solver=None))]
     fn load(
@@ -134,25 +142,27 @@ impl World {
         World::of(py, built)
     }
 
-    /// The world of a scene that is given as the text of its file.
+    /// Builds the world of a scene from the text of its file.
     #[staticmethod]
     fn parse(py: Python<'_>, text: &str) -> Result<World> {
         World::of(py, py.detach(|| pool::run(|| build(SceneFile::parse(text, "scene.toml")?)))?)
     }
 
-    /// What is to be said of the world: a list of sentences.
+    /// Notes about the world: a list of sentences.
     ///
-    /// Of the files of a scene and of articulations that were added, such as what was mended in a mesh or that a convex hull collides; of visual meshes
-    /// that could not be read, once something has drawn them; of bodies that overlap at the start, the deepest eight by name. Overlaps are looked for when
-    /// this is asked before the first step.
+    /// They are about the files of a scene and of added articulations, such as repairs of a mesh or
+    /// a convex hull in place of an open mesh; about visual meshes that could not be read, once
+    /// something has drawn them; and about bodies that overlap at the start, the deepest eight by
+    /// name. Overlaps are searched for if this is read before the first step.
     #[getter]
     fn notes(&self, py: Python<'_>) -> Result<Vec<String>> {
         self.shared.write(py, |inner| Ok(inner.all_notes()))
     }
 
-    /// Advances by ``n`` steps of ``dt``. The interpreter is let go meanwhile; Ctrl-C ends it between two steps.
+    /// Advances by ``n`` steps of ``dt``. The interpreter is released meanwhile; Ctrl-C stops
+    /// between two steps.
     ///
-    /// On a ``StepError`` the world is as it was before the step that failed; the steps before that stand.
+    /// After a ``StepError`` the world is as before the step that failed; earlier steps are kept.
     #[pyo3(signature = (n=1))]
     fn step(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] n: i64) -> Result<()> {
         let Ok(mut left) = u64::try_from(n) else {
@@ -206,7 +216,8 @@ impl World {
         self.set(py, |s| s.gravity = gravity)
     }
 
-    /// Rule by which the restitution of two bodies in contact combines: ``"min"``, ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``.
+    /// Combination rule for restitution: ``"min"``, ``"max"``, ``"average"``, ``"product"`` or
+    /// ``"geometric_mean"``.
     #[getter]
     fn combine_restitution(&self) -> Result<&'static str> {
         self.settings(|s| s.combine_restitution.name())
@@ -218,7 +229,7 @@ impl World {
         self.set(py, |s| s.combine_restitution = rule)
     }
 
-    /// The same for friction.
+    /// Combination rule for friction.
     #[getter]
     fn combine_friction(&self) -> Result<&'static str> {
         self.settings(|s| s.combine_friction.name())
@@ -230,10 +241,13 @@ impl World {
         self.set(py, |s| s.combine_friction = rule)
     }
 
-    /// Restitution and friction that contacts of two bodies have from the next step on, in place of what the rules make of their materials.
+    /// Sets restitution and friction of the contacts of two bodies from the next step on,
+    /// overriding the combination rules.
     ///
-    /// a, b: handles or names in any order; a link of an articulation, with the links that are fixed to it, is ``"ARTICULATION/LINK"``. What is None goes by
-    /// the rule; with neither given the pair is as any other again. Forks have the same pairs; like materials they are not in ``save``.
+    /// a, b: handles or names in any order; ``"ARTICULATION/LINK"`` is a link of an articulation
+    /// with the links fixed to it. None keeps the rule; without both the pair has no constants of
+    /// its own any more. Forks have the same pairs. ``save`` does not include them, as it does not
+    /// include materials.
     #[pyo3(signature = (a, b, *, restitution=None, friction=None))]
     fn set_pair_material(
         &self,
@@ -246,9 +260,10 @@ impl World {
         pairs::set(&self.shared, py, [a, b], PairMaterial { restitution, friction })
     }
 
-    /// Restitution and friction that contacts of two bodies have: by the pair's own constants where it has them, else by the rules.
+    /// Returns restitution and friction of the contacts of two bodies: the pair's own constants if
+    /// set, else those of the combination rules.
     ///
-    /// a, b: as in ``set_pair_material``. Of an articulation the first shape answers.
+    /// a, b: as in ``set_pair_material``. An articulation is represented by its first shape.
     fn pair_material(&self, a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> Result<(f64, f64)> {
         pairs::get(&self.shared, [a, b])
     }
@@ -259,7 +274,7 @@ impl World {
         self.shared.read(|inner| Ok(inner.world.stepper_name()))
     }
 
-    /// Name of the solver of contacts.
+    /// Name of the contact solver.
     #[getter]
     fn solver(&self) -> Result<&'static str> {
         self.shared.read(|inner| Ok(inner.world.solver_name()))
@@ -271,18 +286,20 @@ impl World {
         self.shared.read(|inner| Ok(inner.scene.world.integrator.to_string()))
     }
 
-    /// All bodies, in the order in which they were added; by number or by name.
+    /// All bodies in the order in which they were added, by number or by name.
     #[getter]
     fn bodies(&self, py: Python<'_>) -> Result<Bodies> {
         Bodies::new(py, self.shared.clone())
     }
 
-    /// The rigid body, or static geometry, of that name. An articulation, or a name that no body has, is an ``UnknownNameError``.
+    /// Returns the rigid body, or static geometry, of that name. An articulation or an unknown name
+    /// raises ``UnknownNameError``.
     fn body(&self, py: Python<'_>, name: &str) -> Result<RigidBody> {
         bodies::rigid_body(py, &self.shared, name)
     }
 
-    /// The articulated body of that name. A rigid body, or a name that no body has, is an ``UnknownNameError``.
+    /// Returns the articulated body of that name. A rigid body or an unknown name raises
+    /// ``UnknownNameError``.
     fn articulation(&self, py: Python<'_>, name: &str) -> Result<Articulation> {
         bodies::articulation(py, &self.shared, name)
     }
@@ -294,21 +311,26 @@ impl World {
 
     /// The contacts of the last step: a structured array with one row each.
     ///
-    /// Fields: ``bodies`` (2,) numbers in ``world.bodies``, -1 for what is none; ``parts`` (2,) of articulated bodies the places of the links in their ``link_names``; ``point`` (3,), m; ``normal`` (3,),
-    /// unit, from the second body to the first; ``depth``, m, negative while apart; ``velocity`` (3,) of the first against the second before the
-    /// contact was solved, m/s; ``impulse`` (3,) on the first over the last sub-step, N·s; ``force`` (3,), N, without impacts. World axes.
+    /// Fields: ``bodies`` (2,), indices in ``world.bodies``, -1 for other objects; ``parts`` (2,),
+    /// for articulated bodies the indices of the links in their ``link_names``; ``point`` (3,), m;
+    /// ``normal`` (3,), unit, from the second body to the first; ``depth``, m, negative while
+    /// apart; ``velocity`` (3,) of the first relative to the second before the contact was solved,
+    /// m/s; ``impulse`` (3,) on the first over the last sub-step, N·s; ``force`` (3,), N, without
+    /// impacts. World axes.
     #[getter]
     fn contacts<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         contacts::array(py, self.shared.read(|inner| Ok(contacts::bytes(inner)))?)
     }
 
-    /// Mechanical energy of everything that moves: ``kinetic``, ``potential`` (zero at the world's origin) and ``total``, J.
+    /// Returns the mechanical energy of everything that moves: ``kinetic``, ``potential`` (zero at
+    /// the world's origin) and ``total``, J.
     fn energy(&self, py: Python<'_>) -> Result<Py<PyAny>> {
         let e = self.shared.read(|inner| Ok(inner.world.energy()))?;
         Ok(py.import("tumble._values")?.call_method1("Energy", (e.kinetic, e.potential, e.total()))?.unbind())
     }
 
-    /// Momentum of everything that moves: ``linear`` (3,), N·s, and ``angular`` (3,) about the world's origin, N·m·s. World axes.
+    /// Returns the momentum of everything that moves: ``linear`` (3,), N·s, and ``angular`` (3,)
+    /// about the world's origin, N·m·s. World axes.
     fn momentum(&self, py: Python<'_>) -> Result<Py<PyAny>> {
         let m = self.shared.read(|inner| Ok(inner.world.momentum()))?;
         Ok(py
@@ -317,26 +339,28 @@ impl World {
             .unbind())
     }
 
-    /// What the last step took and how well it went.
+    /// Statistics of the last step.
     #[getter]
     fn report(&self) -> Result<StepReport> {
         self.shared.read(|inner| Ok(StepReport::of(&inner.world)))
     }
 
-    /// All that the next step reads, as bytes: for ``restore`` in a world of the same bodies. Shapes, masses, settings and drives are not in it.
+    /// Returns everything that the next step reads as bytes, for ``restore`` in a world of the same
+    /// bodies. Shapes, masses, settings and drives are not included.
     fn save<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
         let bytes = self.shared.read(|inner| Ok(saved::write(inner)))?;
         Ok(PyBytes::new(py, &bytes))
     }
 
-    /// Goes back to what ``save`` gave. Bytes that are none, or of another world, are a ``SnapshotError`` and change nothing.
+    /// Restores the bytes of ``save``. Invalid bytes, or those of another world, raise
+    /// ``SnapshotError`` and change nothing.
     fn restore(&self, py: Python<'_>, snapshot: PyBackedBytes) -> Result<()> {
         self.shared.write(py, |inner| saved::read(inner, &snapshot))
     }
 
-    /// An independent copy: same state, same future.
+    /// Returns an independent copy with the same state and the same future.
     ///
-    /// Forces and behaviours are copied by their own ``fork``.
+    /// Forces and behaviors are copied by their own ``fork``.
     fn fork(&self, py: Python<'_>) -> Result<World> {
         let inner = self.shared.read(|inner| Ok(inner.fork()))?;
         inner.take_raised()?;
@@ -351,24 +375,28 @@ impl World {
         self.fork(py)
     }
 
-    /// For pickle: the whole world, with its forces and behaviours.
+    /// Pickles the whole world, with its forces and behaviors.
     fn __reduce__<'py>(&self, py: Python<'py>) -> Result<Reduced<'py>> {
         let (bytes, state) = self.shared.read(|inner| Ok((pickling::write(inner)?, inner.pickled_extensions(py))))?;
         let unpickle = py.import("tumble._native")?.getattr("_unpickle_world")?;
         Ok((unpickle, (PyBytes::new(py, &bytes),), state))
     }
 
-    /// For pickle: the forces and behaviours of an unpickled world.
+    /// Sets the forces and behaviors of an unpickled world.
     fn __setstate__(&self, py: Python<'_>, state: Extensions) -> Result<()> {
         self.shared.extend(py, |inner| inner.unpickle_extensions(py, state))
     }
 
-    /// The futures of many forks, each under forces of its own, on all cores with the interpreter let go. This world stays as it is.
+    /// Runs many forks, each with its own controls, on all cores with the interpreter released.
+    /// This world does not change.
     ///
-    /// controls: shape (forks, steps, n): generalized forces of each step, N·m and N, for all ``articulations`` one after the other (by default all of the
-    /// world, in order; with none of them n is 0); states: where the forks start, shape (len(state),) or (forks, len(state)), by default where the world
-    /// is; every: every how many steps the state is kept; threads: at most so many (default: all cores). Returns the states, shape
-    /// (forks, steps // every, len(state)): the same bits on any number of threads. A fork that fails raises ``StepError`` and says which; Ctrl-C ends all of them between two steps.
+    /// controls: shape (forks, steps, n): generalized forces of each step, N·m and N, for all
+    /// ``articulations`` one after the other (by default all of the world, in order; without any, n
+    /// is 0). states: initial states of the forks, shape (len(state),) or (forks, len(state)), by
+    /// default the state of the world. every: interval in steps at which the state is kept.
+    /// threads: largest number of threads (default: all cores). Returns the states, shape (forks,
+    /// steps // every, len(state)): the same bits on any number of threads. A fork that fails
+    /// raises ``StepError`` with its number; Ctrl-C stops all of them between two steps.
     #[pyo3(signature = (controls, *, articulations=None, states=None, every=1, threads=None))]
     fn rollout<'py>(
         &self,
@@ -393,11 +421,14 @@ impl World {
         Ok(PyArray1::from_vec(py, out).reshape(shape)?)
     }
 
-    /// The flat state, shape (n,): a read-only view of the world's own memory, until bodies are added or removed; then it keeps what it showed last.
+    /// The flat state, shape (n,): a read-only view of the world's own memory until bodies are
+    /// added or removed; then it keeps its last numbers.
     ///
-    /// A rigid body has 13 numbers: position of the center of mass (``body.world_center_of_mass``), quaternion (x, y, z, w), linear and angular momentum; an articulated body its ``q`` and ``qd``. Nothing
-    /// is copied, neither here nor by steps. While a view is held, a step holds the interpreter but for other threads' turns between two frames.
-    /// Setting it writes every body's numbers.
+    /// A rigid body has 13 numbers: position of the center of mass (``body.world_center_of_mass``),
+    /// quaternion (x, y, z, w), linear and angular momentum. An articulated body has its ``q`` and
+    /// ``qd``. Nothing is copied, neither here nor by steps. While a view exists, a step keeps the
+    /// interpreter, except for turns of other threads between two frames. Setting it writes every
+    /// body's numbers.
     #[getter]
     fn state<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         self.shared.write(py, |inner| {
@@ -414,9 +445,11 @@ impl World {
 
     /// Adds a body that moves.
     ///
-    /// mass: kg, or density: kg/m³, one of the two; position: of the shape's frame, the file's for a mesh, metres; orientation: unit quaternion (x, y, z, w); velocity,
-    /// m/s, and angular_velocity, rad/s, world axes; restitution: 0 to 1; friction: at least 0; kinematic: follows the velocity it is given.
-    /// contacts: by its ``"surface"``, or as in the thesis by the ``"spheres"`` of its tree; a pair goes by spheres if either asks for it.
+    /// mass: kg, or density: kg/m³, one of the two. position: of the shape's frame, for a mesh the
+    /// file's, meters. orientation: unit quaternion (x, y, z, w). velocity, m/s, and
+    /// angular_velocity, rad/s: world axes. restitution: 0 to 1. friction: at least 0. kinematic:
+    /// moves at its prescribed velocity. contacts: contact mode, ``"surface"``, or ``"spheres"``
+    /// for the spheres of its tree as in the thesis; a pair uses spheres if either body does.
     #[pyo3(signature = (name, shape, mass=None, density=None, position=None, orientation=None, velocity=None, angular_velocity=None, restitution=0.0,
         friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface"))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
@@ -452,7 +485,8 @@ impl World {
         add(&self.shared, py, body.moving(motion[0], motion[1]), mode, collidable)
     }
 
-    /// Adds geometry that never moves. position, orientation, restitution, friction, contacts: as in ``add_rigid``.
+    /// Adds geometry that never moves. position, orientation, restitution, friction, contacts: as
+    /// in ``add_rigid``.
     #[pyo3(signature = (name, shape, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true, contacts="surface"))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_static(
@@ -475,11 +509,12 @@ impl World {
         add(&self.shared, py, body, Mode::Static, collidable)
     }
 
-    /// Adds an articulated body, and gives the handle of it.
+    /// Adds an articulated body and returns its handle.
     ///
-    /// articulation: a description, or the path of a URDF; base: where its base stands: a position (3,), or position and quaternion (7,), metres and
-    /// (x, y, z, w); name: by default the description's. It starts with the ``q``, ``qd`` and ``tau`` of the description; where a floating root is, is
-    /// said from the base.
+    /// articulation: a description, or the path of a URDF. base: pose of its base: a position (3,),
+    /// or position and quaternion (7,), meters and (x, y, z, w). name: by default the
+    /// description's. It starts with the ``q``, ``qd`` and ``tau`` of the description; the pose of
+    /// a floating root is relative to the base.
     #[pyo3(signature = (articulation, base=None, *, name=None))]
     fn add_articulation(
         &self,
@@ -491,7 +526,8 @@ impl World {
         articulated(&self.shared, py, articulation, base, name)
     }
 
-    /// Removes a body, given as a handle or by name, or a force or behaviour by name. Handles of a body raise ``RemovedError`` from then on.
+    /// Removes a body, given as a handle or by name, or a force or behavior by name. Handles of a
+    /// removed body raise ``RemovedError``.
     fn remove(&self, py: Python<'_>, body: &Bound<'_, PyAny>) -> Result<()> {
         if let Ok(name) = body.extract::<String>()
             && self.shared.extend(py, |inner| inner.remove_extension(&name))?
@@ -506,21 +542,23 @@ impl World {
         })
     }
 
-    /// Adds a force of your own: an object of a subclass of ``tumble.Force``. Its name is unique among bodies, forces and behaviours.
+    /// Adds a custom force: an object of a subclass of ``tumble.Force``. Its name must be unique
+    /// among bodies, forces and behaviors.
     fn add_force(&self, py: Python<'_>, name: &str, force: &Bound<'_, PyAny>) -> Result<()> {
         py.import("tumble._extension")?.call_method1("check_force", (force,))?;
         self.shared.extend(py, |inner| inner.add_force(name, force))
     }
 
-    /// Adds a behaviour of your own, an object of a subclass of ``tumble.Behaviour``, to bodies given by name or as handles.
-    fn add_behaviour(
+    /// Adds a custom behavior, an object of a subclass of ``tumble.Behavior``, to bodies given by
+    /// name or as handles.
+    fn add_behavior(
         &self,
         py: Python<'_>,
         name: &str,
-        behaviour: &Bound<'_, PyAny>,
+        behavior: &Bound<'_, PyAny>,
         bodies: &Bound<'_, PyAny>,
     ) -> Result<()> {
-        py.import("tumble._extension")?.call_method1("check_behaviour", (behaviour,))?;
+        py.import("tumble._extension")?.call_method1("check_behavior", (behavior,))?;
         let given: Vec<Bound<'_, PyAny>> =
             match bodies.is_instance_of::<pyo3::types::PyString>() || place_of(bodies).is_ok() {
                 true => vec![bodies.clone()],
@@ -528,27 +566,30 @@ impl World {
             };
         let places = given.iter().map(|body| own_place(&self.shared, body)).collect::<Result<Vec<_>>>()?;
         self.shared
-            .extend(py, |inner| inner.add_behaviour(name, behaviour, places.iter().map(|place| place.id).collect()))
+            .extend(py, |inner| inner.add_behavior(name, behavior, places.iter().map(|place| place.id).collect()))
     }
 
-    /// Forces of your own by name: a new dict.
+    /// Custom forces by name: a new dict.
     #[getter]
     fn forces(&self, py: Python<'_>) -> Result<BTreeMap<String, Py<PyAny>>> {
         self.shared.read(|inner| Ok(inner.extensions(py)[0].drain(..).collect()))
     }
 
-    /// Behaviours of your own by name: a new dict.
+    /// Custom behaviors by name: a new dict.
     #[getter]
-    fn behaviours(&self, py: Python<'_>) -> Result<BTreeMap<String, Py<PyAny>>> {
+    fn behaviors(&self, py: Python<'_>) -> Result<BTreeMap<String, Py<PyAny>>> {
         self.shared.read(|inner| Ok(inner.extensions(py)[1].drain(..).collect()))
     }
 
-    /// A picture of the world as it is: sRGB and alpha, shape (height, width, 4), uint8, rows from the top. Needs no window.
+    /// Renders the world: sRGB and alpha, shape (height, width, 4), uint8, rows from the top. No
+    /// window is needed.
     ///
-    /// width, height: pixels, 640 x 480 unless told otherwise. From one of: camera, ``tumble.Camera`` or ``(eye, target)`` in metres; facet,
-    /// ``"cube4:front"``: a facet of a cave, given by path or name, at the size that the cave says; cave: all its facets unfolded into at most
-    /// width x height; else the scene's camera, or one that shows everything. overlays: words of ``tumble run --debug-draw``, such as
-    /// ``"contacts,forces"``. Without a graphics adapter ``PictureError``.
+    /// width, height: pixels, by default 640 x 480. The view is one of: camera, ``tumble.Camera``
+    /// or ``(eye, target)`` in meters; facet, ``"cube4:front"``: a facet of a cave, given by path
+    /// or name, at the size in the cave file; cave: all its facets unfolded into at most width x
+    /// height; else the scene's camera, or one that shows everything. overlays: names of ``tumble
+    /// run --debug-draw``, such as ``"contacts,forces"``. Without a graphics adapter it raises
+    /// ``PictureError``.
     #[pyo3(signature = (width=None, height=None, *, camera=None, facet=None, cave=None, overlays=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn render<'py>(
@@ -564,31 +605,33 @@ impl World {
         Shot::new([width, height], camera, facet, cave, overlays)?.take(py, &self.shared)
     }
 
-    /// How a notebook shows the world: a PNG, or nothing where there is no graphics adapter.
+    /// Returns a PNG for notebooks, or None without a graphics adapter.
     fn _repr_png_(slf: &Bound<'_, Self>) -> Result<Py<PyAny>> {
         Ok(slf.py().import("tumble._pictures")?.call_method1("repr_png", (slf,))?.unbind())
     }
 
-    /// Steps a fork for ``seconds`` and plots its energy over time; the world stays as it is. Needs matplotlib, the extra ``plot``.
+    /// Steps a fork for ``duration`` seconds and plots its energy over time. The world does not
+    /// change. Requires matplotlib, the extra ``plot``.
     ///
     /// ax: the axes to plot on, by default new ones. Returns the axes.
-    #[pyo3(signature = (seconds=5.0, *, ax=None))]
-    fn plot_energy(slf: &Bound<'_, Self>, seconds: f64, ax: Option<&Bound<'_, PyAny>>) -> Result<Py<PyAny>> {
-        Ok(slf.py().import("tumble._plots")?.call_method1("energy", (slf, seconds, ax))?.unbind())
+    #[pyo3(signature = (duration=5.0, *, ax=None))]
+    fn plot_energy(slf: &Bound<'_, Self>, duration: f64, ax: Option<&Bound<'_, PyAny>>) -> Result<Py<PyAny>> {
+        Ok(slf.py().import("tumble._plots")?.call_method1("energy", (slf, duration, ax))?.unbind())
     }
 
-    /// Steps a fork for ``seconds`` and plots the paths of bodies (default: all that move) as seen along an axis, ``"x"``, ``"y"`` or ``"z"``.
+    /// Steps a fork for ``duration`` seconds and plots the paths of bodies (default: all dynamic
+    /// bodies) as seen along an axis, ``"x"``, ``"y"`` or ``"z"``.
     ///
-    /// As ``plot_energy`` otherwise.
-    #[pyo3(signature = (seconds=5.0, *, bodies=None, along="y", ax=None))]
+    /// Otherwise as ``plot_energy``.
+    #[pyo3(signature = (duration=5.0, *, bodies=None, along="y", ax=None))]
     fn plot_paths(
         slf: &Bound<'_, Self>,
-        seconds: f64,
+        duration: f64,
         bodies: Option<&Bound<'_, PyAny>>,
         along: &str,
         ax: Option<&Bound<'_, PyAny>>,
     ) -> Result<Py<PyAny>> {
-        Ok(slf.py().import("tumble._plots")?.call_method1("paths", (slf, seconds, bodies, along, ax))?.unbind())
+        Ok(slf.py().import("tumble._plots")?.call_method1("paths", (slf, duration, bodies, along, ax))?.unbind())
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {

@@ -160,10 +160,10 @@ def test_a_shipped_robot_is_found_by_name():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (([0.0] * 5, [0.0] * 6, [0.0] * 6), r"q: wanted shape \(6,\) or \(batch, 6\), and got \(5,\)"),
+        (([0.0] * 5, [0.0] * 6, [0.0] * 6), r"q: expected shape \(6,\) or \(batch, 6\), got \(5,\)"),
         (([0.0] * 6, np.zeros((3, 6)), np.zeros((4, 6))), r"tau: shape \(4, 6\) in a batch of 3"),
         (([np.nan] * 6, [0.0] * 6, [0.0] * 6), "q: number 0 is NaN"),
-        (("no", [0.0] * 6, [0.0] * 6), "q: wanted numbers, and not 'no'"),
+        (("no", [0.0] * 6, [0.0] * 6), "q: expected numbers, not 'no'"),
     ],
 )
 def test_wrong_arguments_are_value_errors(arm, arguments, words):

@@ -1,4 +1,4 @@
-"""Forces and behaviours written in Python."""
+"""Forces and behaviors written in Python."""
 
 import copy
 import threading
@@ -70,7 +70,7 @@ def test_the_view_shows_what_the_handles_show(root):
     world.step(3)
     seen = {}
 
-    class Look(tumble.Behaviour):
+    class Look(tumble.Behavior):
         def act(self, view, rows):
             assert len(view) == len(view.names) == len(view.position)
             for name in set(view.names):
@@ -81,7 +81,7 @@ def test_the_view_shows_what_the_handles_show(root):
 
     rigid = [body for body in world.bodies if isinstance(body, tumble.RigidBody)]
     wanted = {body.name: (body.position, body.orientation, body.velocity, body.mass, body.mode) for body in rigid}
-    world.add_behaviour("look", Look(), rigid[-1])
+    world.add_behavior("look", Look(), rigid[-1])
     time = world.time
     world.step()
     assert seen["time"] == time and (seen["gravity"] == world.gravity).all() and len(seen["rows"]) == 1
@@ -120,7 +120,7 @@ def test_a_push_off_centre_turns_the_body():
 
     class Push(tumble.Force):
         def apply(self, view):
-            view.push(view.row("box"), (0, 0, 3.0), (0.5, 0, 0))
+            view.apply_force(view.row("box"), (0, 0, 3.0), (0.5, 0, 0))
 
     world.add_force("push", Push())
     world.step()
@@ -215,7 +215,7 @@ def test_another_thread_gets_an_error_while_a_callback_runs():
         (lambda view: view.force.fill(np.nan), ValueError, "force on 'ball' is NaN"),
         (lambda view: view.torque.fill(np.inf), ValueError, "torque on 'ball' is inf"),
         (lambda view: view.row("bat"), KeyError, "no body named 'bat'; there are ball"),
-        (lambda view: view.push(5, (0, 0, 1), (0, 0, 0)), ValueError, "row is 5; there are 1"),
+        (lambda view: view.apply_force(5, (0, 0, 1), (0, 0, 0)), ValueError, "row is 5; there are 1"),
         (lambda view: setattr(view, "force", np.zeros((7, 3))), ValueError, "broadcast"),
     ],
 )
@@ -241,7 +241,7 @@ def test_what_is_no_force_is_refused():
     with pytest.raises(ValueError, match="must be unique"):
         world.add_force("ball", Spring(1.0))
     with pytest.raises(KeyError, match="no body named 'bat'"):
-        world.add_behaviour("flock", tumble.Behaviour(), ["ball", "bat"])
+        world.add_behavior("flock", tumble.Behavior(), ["ball", "bat"])
     world.add_force("nothing", tumble.Force())
     with pytest.raises(NotImplementedError, match="Force must define apply"):
         world.step()
@@ -301,8 +301,8 @@ def test_an_error_in_a_rollout_reaches_the_caller():
         world.rollout(np.zeros((3, 2, sum(arm.dof for arm in world.bodies if isinstance(arm, tumble.Articulation)))))
 
 
-def test_a_behaviour_is_asked_once_a_step_and_holds_through_it():
-    class Steers(tumble.Behaviour):
+def test_a_behavior_is_asked_once_a_step_and_holds_through_it():
+    class Steers(tumble.Behavior):
         def __init__(self):
             self.rows = []
 
@@ -313,22 +313,22 @@ def test_a_behaviour_is_asked_once_a_step_and_holds_through_it():
     world = tumble.World(gravity=(0, 0, 0), dt=0.01, stepper="backtracking", integrator="rk4")
     world.add_static("wall", tumble.Box(1.0), position=(9, 9, 9))
     balls = [world.add_rigid(f"ball{k}", tumble.Sphere(0.1), mass=2.0, position=(0, k, 0)) for k in range(3)]
-    world.add_behaviour("steers", Steers(), [balls[0], "ball2"])
+    world.add_behavior("steers", Steers(), [balls[0], "ball2"])
     world.step(10)
     # ½·a·t² with a = F/m = 2
     assert balls[0].position == pytest.approx([0.01, 0, 0]) and balls[2].velocity == pytest.approx([0.2, 0, 0])
     assert (balls[1].velocity == 0).all()
-    assert world.behaviours["steers"].rows == [[1, 3]] * 10
+    assert world.behaviors["steers"].rows == [[1, 3]] * 10
     world.remove("ball0")
     world.step()
-    assert world.behaviours["steers"].rows[-1] == [2]
+    assert world.behaviors["steers"].rows[-1] == [2]
     world.remove("steers")
     world.step()
-    assert world.behaviours == {}
+    assert world.behaviors == {}
 
 
-def test_a_behaviour_s_error_leaves_the_world_before_the_frame():
-    class Raises2(tumble.Behaviour):
+def test_a_behavior_s_error_leaves_the_world_before_the_frame():
+    class Raises2(tumble.Behavior):
         def act(self, view, rows):
             view.force[rows] = 1e6
             raise OSError("lost")
@@ -340,7 +340,7 @@ def test_a_behaviour_s_error_leaves_the_world_before_the_frame():
             calls.append(view.time)
 
     world, ball = one_ball()
-    world.add_behaviour("raises", Raises2(), ball)
+    world.add_behavior("raises", Raises2(), ball)
     world.add_force("counts", Counts())
     before = world.save()
     with pytest.raises(OSError, match="lost"):

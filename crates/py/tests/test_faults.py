@@ -94,7 +94,7 @@ def test_a_panic_in_another_thread_reaches_that_thread():
         lambda: small()[0].step(10**30),
         lambda: small()[0].step(-(10**30)),
         lambda: tumble.World(substeps=-1),
-        lambda: tumble.SphereTree.build(*TETRAHEDRON, branch=10**30),
+        lambda: tumble.SphereTree.build(*TETRAHEDRON, branching=10**30),
         lambda: tumble.SphereTree.build(*TETRAHEDRON, depth=-1),
         lambda: tumble.World(substeps=10**9),
         lambda: tumble.World(iterations=2**40),
@@ -192,14 +192,14 @@ def test_a_callback_cannot_change_its_world():
 
 
 @pytest.mark.parametrize("hold", [lambda w: w, lambda w: w["ball"], lambda w: w.bodies, lambda w: [w, w["arm"], w.step], lambda w: {"a": (w.bodies, w)}])
-@pytest.mark.parametrize("kind", [tumble.Force, tumble.Behaviour])
+@pytest.mark.parametrize("kind", [tumble.Force, tumble.Behavior])
 def test_a_force_that_holds_its_world_is_collected_with_it(root, hold, kind):
     def make():
         world, ball = small()
         world.add_articulation(root / "scenes" / "robot" / "arm.urdf", base=(3, 0, 1), name="arm")
         own = type("Own", (kind,), {"apply": lambda self, view: None, "act": lambda self, view, rows: None})()
         own.held = hold(world)
-        world.add_force("own", own) if kind is tumble.Force else world.add_behaviour("own", own, [ball])
+        world.add_force("own", own) if kind is tumble.Force else world.add_behavior("own", own, [ball])
         world.step(2)
         return weakref.ref(world), weakref.ref(own)
 
@@ -386,7 +386,7 @@ def test_the_link_that_is_touched_is_told(tmp_path):
 
 def test_a_drive_stops_at_a_limit_however_strong_it_is(tmp_path):
     for stepper in ("time_stepping", "backtracking"):
-        for limit in ({}, {"limit": 1e6}, {"limit": 100.0}):
+        for limit in ({}, {"max_force": 1e6}, {"max_force": 100.0}):
             world = tumble.World(stepper=stepper, gravity=(0, 0, 0))
             arm = world.add_articulation(two_links(tmp_path))
             arm.set_drive("elbow", velocity=5.0, **limit)

@@ -110,7 +110,7 @@ def test_the_building_of_a_tree_ends(method):
         soon(1.0)
         try:
             for _ in range(1000):
-                tumble.SphereTree.build(*mesh, method="{method}", branch=8, depth=5, error=1e-4, cache=False)
+                tumble.SphereTree.build(*mesh, method="{method}", branching=8, depth=5, max_error=1e-4, cache=False)
         except KeyboardInterrupt:
             print("interrupted")
         took = waited()

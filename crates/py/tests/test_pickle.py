@@ -37,7 +37,7 @@ class Holds(tumble.Force):
         view.force[:, 2] += 0.1
 
 
-class Rise(tumble.Behaviour):
+class Rise(tumble.Behavior):
     """Twice its weight, upwards."""
 
     def act(self, view, rows):
@@ -86,7 +86,7 @@ def with_robot(root, **words):
     for k, base in enumerate([(5, 0, 1), (0, 5, 1, 0, 0, 1, 0)]):
         arm.q = np.linspace(0, 0.3 * k, arm.nq)
         placed = world.add_articulation(arm, base=base, name=f"arm{k}")
-        placed.set_drive(placed.joint_names[0], target=0.5, stiffness=500, damping=20, limit=30)
+        placed.set_drive(placed.joint_names[0], target=0.5, stiffness=500, damping=20, max_force=30)
         placed.set_drive(placed.joint_names[1], velocity=0.2)
         placed.tau = 0.1 * np.arange(placed.dof)
     return world
@@ -112,7 +112,7 @@ def test_a_pickled_world_has_the_same_future(root, words):
             assert mine.joint_names == theirs.joint_names and (mine.limits == theirs.limits).all() and (mine.tau == theirs.tau).all()
             assert (mine.forward_dynamics() == theirs.forward_dynamics()).all()
             continue
-        for part in ("mass", "inertia", "friction", "restitution", "color", "linear_damping", "mode", "alive", "collidable", "asleep"):
+        for part in ("mass", "inertia", "friction", "restitution", "color", "linear_damping", "mode", "enabled", "collidable", "asleep"):
             assert np.all(getattr(other[name], part) == getattr(world[name], part)), (name, part)
     assert repr(other) == repr(world) and other.bodies.names() == world.bodies.names() and repr(other.report) == repr(world.report)
     assert (other.contacts == world.contacts).all() and len(other.contacts) > 0
@@ -161,16 +161,16 @@ def test_a_pickle_of_a_pickle_is_the_same_bytes(root):
     assert pickle.dumps(again(world)) == pickle.dumps(world)
 
 
-def test_forces_and_behaviours_pickle_along():
+def test_forces_and_behaviors_pickle_along():
     world = tumble.World()
     world.add_force("before", Wind((1, 0, 0)))
     for k in range(3):
         world.add_rigid(f"ball{k}", tumble.Sphere(0.1), mass=1.0, position=(k, 0, 1))
     world.add_force("wind", Wind((0, 2, 0)))
-    world.add_behaviour("rise", Rise(), ["ball0", "ball2"])
+    world.add_behavior("rise", Rise(), ["ball0", "ball2"])
     world.step(5)
     other = again(world)
-    assert list(other.forces) == list(world.forces) and list(other.behaviours) == ["rise"]
+    assert list(other.forces) == list(world.forces) and list(other.behaviors) == ["rise"]
     assert other.forces["wind"].calls == 5 and other.forces["wind"] is not world.forces["wind"]
     same_future(world, other)
     assert other.forces["wind"].calls == world.forces["wind"].calls == 105

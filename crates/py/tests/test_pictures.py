@@ -31,9 +31,9 @@ def red(picture):
 def test_a_ball_is_where_perspective_puts_it(drawn):
     picture = drawn.render(200, 100, camera=tumble.Camera(eye=(0, -5, 0.5), target=(0, 0, 0.5), fov_deg=40))
     assert picture.shape == (100, 200, 4) and picture.dtype == np.uint8 and (picture[..., 3] == 255).all()
-    drawn["ball"].alive = False
+    drawn["ball"].enabled = False
     empty = drawn.render(200, 100, camera=tumble.Camera(eye=(0, -5, 0.5), target=(0, 0, 0.5), fov_deg=40))
-    drawn["ball"].alive = True
+    drawn["ball"].enabled = True
     # the eye is as high as the ball's middle, which is the horizon's: against the sky nothing else differs
     columns = np.nonzero((picture != empty).any(axis=2)[46:49].any(axis=0))[0]
     # tan of the ball's half angle over that of the picture's: asin(0.5/5) seen in 20 degrees
@@ -97,7 +97,7 @@ def test_a_saved_picture_is_a_png_of_the_same_pixels(tmp_path):
     picture = np.random.default_rng(2).integers(0, 256, (7, 5, 4), dtype=np.uint8)
     tumble.save_png(tmp_path / "noise.png", picture)
     assert (decode((tmp_path / "noise.png").read_bytes()) == picture).all()
-    with pytest.raises(ValueError, match=r"wanted uint8 of shape"):
+    with pytest.raises(ValueError, match=r"expected uint8 of shape"):
         tumble.save_png(tmp_path / "noise.png", picture.astype(float))
 
 
@@ -110,7 +110,7 @@ def test_colors_are_kept_and_checked():
     ball = world.add_rigid("ball", tumble.Sphere(0.1), mass=1.0)
     ball.color = (0.25, 0.5, 1.0)
     assert ball.color.tolist() == [0.25, 0.5, 1.0]
-    with pytest.raises(ValueError, match="1.5 is not within 0 to 1"):
+    with pytest.raises(ValueError, match="1.5 is not from 0 to 1"):
         ball.color = (1.5, 0, 0)
 
 
@@ -118,7 +118,7 @@ def test_energy_is_plotted_from_a_fork():
     pytest.importorskip("matplotlib", reason="SKIPPED: matplotlib is not installed")
     world = tumble.World()
     world.add_rigid("ball", tumble.Sphere(0.1), mass=2.0, position=(0, 0, 3))
-    ax = world.plot_energy(seconds=0.5)
+    ax = world.plot_energy(duration=0.5)
     kinetic, potential, total = (line.get_ydata() for line in ax.get_lines())
     times = ax.get_lines()[0].get_xdata()
     assert world.time == 0.0 and times[-1] == pytest.approx(0.5) and ax.get_ylabel() == "energy, J"
@@ -130,14 +130,14 @@ def test_paths_are_plotted_as_seen_along_an_axis():
     pytest.importorskip("matplotlib", reason="SKIPPED: matplotlib is not installed")
     world = tumble.World()
     world.add_rigid("ball", tumble.Sphere(0.1), mass=2.0, velocity=(1, 2, 3))
-    across, up = world.plot_paths(seconds=1.0).get_lines()[0].get_data()
+    across, up = world.plot_paths(duration=1.0).get_lines()[0].get_data()
     assert across[-1] == pytest.approx(1.0) and up[-1] == pytest.approx(3 - 9.81 / 2)
-    across, up = world.plot_paths(seconds=1.0, bodies="ball", along="z").get_lines()[0].get_data()
+    across, up = world.plot_paths(duration=1.0, bodies="ball", along="z").get_lines()[0].get_data()
     assert (across[-1], up[-1]) == pytest.approx((1.0, 2.0))
     with pytest.raises(ValueError, match="'x', 'y' or 'z'"):
         world.plot_paths(along="w")
     with pytest.raises(ValueError, match="finite and above 0"):
-        world.plot_energy(seconds=-1)
+        world.plot_energy(duration=-1)
 
 
 def test_without_matplotlib_the_error_names_it(monkeypatch):
@@ -152,4 +152,4 @@ def test_without_matplotlib_the_error_names_it(monkeypatch):
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setattr(builtins, "__import__", none)
     with pytest.raises(ImportError, match=r"World.plot_energy needs the package matplotlib"):
-        tumble.World().plot_energy(seconds=0.1)
+        tumble.World().plot_energy(duration=0.1)

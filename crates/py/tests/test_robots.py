@@ -44,7 +44,7 @@ def test_notes_of_a_robot_reach_the_world(tmp_path):
     world.add_articulation(path, name="first")
     [hull] = world.notes
     assert hull.startswith('articulated "first": ')
-    assert hull.endswith("open.obj: its surface is not closed, so its convex hull collides")
+    assert hull.endswith("open.obj: its surface is not closed, so its convex hull is used")
     world.add_articulation(path, (3, 0, 0), name="second")
     assert [note.split('"')[1] for note in world.notes] == ["first", "second"]
     copy = world.fork()

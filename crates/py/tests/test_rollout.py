@@ -59,11 +59,11 @@ def test_a_world_without_articulations_rolls_out_without_controls():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"controls": np.zeros((2, 6))}, r"controls: wanted shape \(forks, steps, 6\), and got \(2, 6\)"),
-        ({"controls": np.zeros((2, 3, 5))}, r"controls: wanted 6 numbers a step"),
+        ({"controls": np.zeros((2, 6))}, r"controls: expected shape \(forks, steps, 6\), got \(2, 6\)"),
+        ({"controls": np.zeros((2, 3, 5))}, r"controls: expected 6 numbers per step"),
         ({"controls": np.full((1, 1, 6), np.inf)}, "controls: number 0 is inf"),
         ({"controls": np.zeros((2, 3, 6)), "every": 2}, "every is 2; it must divide the 3 steps"),
-        ({"controls": np.zeros((2, 3, 6)), "states": np.zeros(3)}, r"states: wanted shape \(12,\) or \(2, 12\), and got \(3,\)"),
+        ({"controls": np.zeros((2, 3, 6)), "states": np.zeros(3)}, r"states: expected shape \(12,\) or \(2, 12\), got \(3,\)"),
         ({"controls": np.zeros((2, 3, 6)), "articulations": ["leg"]}, "no body named 'leg'"),
         ({"controls": np.zeros((2, 3, 6)), "threads": 0}, "threads is 0"),
     ],

@@ -119,7 +119,7 @@ def cube():
 def test_literals_are_the_words_of_the_library():
     literals = {name: list(typing.get_args(value)) for name, value in vars(tumble.typing).items() if typing.get_origin(value) is typing.Literal}
     axis = {"Axis": ["x", "y", "z"]}  # a word of the package alone, tried below
-    assert literals == tumble._native._words() | axis
+    assert literals == tumble._native._choices() | axis
 
 
 @pytest.mark.parametrize("name", sorted(CHOICES))

@@ -48,7 +48,7 @@ def test_balls_reach_out_no_further_than_the_bound(tree):
 
 
 def test_the_branch_and_the_method_are_those_asked_for(tree):
-    assert tree.branch == 8 and tree.depth == 2 and f": {tree.method}, " in repr(tree)
+    assert tree.branching == 8 and tree.depth == 2 and f": {tree.method}, " in repr(tree)
     for parents in tree.parents[1:]:
         assert np.bincount(parents).max() <= 8
 
@@ -85,9 +85,9 @@ def test_an_object_with_vertices_and_faces_is_a_mesh():
     "words, said",
     [
         ({"method": "best"}, "medial, hubbard, grid, octree"),
-        ({"branch": 1}, "2 to 64"),
+        ({"branching": 1}, "2 to 64"),
         ({"depth": 10}, "1 to 9"),
-        ({"error": 2.0}, "0.0001 to 1"),
+        ({"max_error": 2.0}, "0.0001 to 1"),
     ],
 )
 def test_settings_out_of_range_are_value_errors(words, said):
@@ -98,7 +98,7 @@ def test_settings_out_of_range_are_value_errors(words, said):
 def test_what_is_no_closed_mesh_is_refused(tmp_path):
     with pytest.raises(ValueError, match="open|boundary|closed|edge"):
         tumble.SphereTree.build(CUBE, SIDES[:-1])
-    with pytest.raises(ValueError, match=r"vertices: wanted shape \(n, 3\)"):
+    with pytest.raises(ValueError, match=r"vertices: expected shape \(n, 3\)"):
         tumble.SphereTree.build(CUBE[:, :2], SIDES)
     with pytest.raises(FileNotFoundError):
         tumble.SphereTree.build(tmp_path / "none.obj")

@@ -1,4 +1,5 @@
-//! `[[articulated]]`: a tree of links that moves as one object, written out or taken from a URDF.
+//! `[[articulated]]`: a tree of links in reduced coordinates, written out in the scene or read from
+//! a URDF.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,42 +16,43 @@ use crate::link::{Inherited, LinkRow, LinkSpec, Surface};
 use crate::rotation;
 use crate::urdf::{CollisionMeshes, MissingMeshes, UrdfOptions};
 
-/// Most pairs in `exclude_collisions`.
-const MOST_PAIRS: usize = 100_000;
+/// Largest number of pairs in `exclude_collisions`.
+const MAX_PAIRS: usize = 100_000;
 
-/// One articulated body at the start, all references resolved.
+/// An articulated body at time 0 with all references resolved.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArticulatedSpec {
-    /// Unique in the scene, bodies included; at most 63 bytes.
+    /// Unique in the scene, rigid bodies included; at most 63 bytes.
     pub name: String,
-    /// Where the base stands, world axes. Links without a parent hang on it; a floating one starts from it.
+    /// Pose of the base, world axes. Links without a parent are attached to it; a floating root
+    /// starts there.
     pub base: Pose,
     /// All links, a parent before its children.
     pub links: Vec<LinkSpec>,
-    /// Whether links that are not joined to each other meet. Default true.
+    /// Whether links that no joint connects collide with each other. Default true.
     pub self_collision: bool,
-    /// Pairs of links that never meet.
+    /// Pairs of links that never collide.
     pub exclude_collisions: Vec<[usize; 2]>,
-    /// Whether links that overlap at the start never meet: true of a URDF.
-    pub part_overlaps: bool,
-    /// Takes part in anything at all. Default true.
-    pub alive: bool,
-    /// What is to be said of the file it comes from.
+    /// Whether links that overlap at time 0 never collide. True for a URDF.
+    pub exclude_overlapping: bool,
+    /// Takes part in the simulation. Default true.
+    pub enabled: bool,
+    /// Notes about the file that it was read from.
     pub notes: Vec<String>,
 }
 
 impl ArticulatedSpec {
-    /// Index of the link of that name.
+    /// Returns the index of the link of that name.
     pub fn link(&self, name: &str) -> Option<usize> {
         self.links.iter().position(|link| link.name == name)
     }
 
-    /// Index of the link whose joint has that name.
+    /// Returns the index of the link whose joint has that name. Fixed joints are not found.
     pub fn joint(&self, name: &str) -> Option<usize> {
         self.links.iter().position(|link| link.joint.name == name && link.joint.kind != Joint::Fixed)
     }
 
-    /// One of these links, its base at the origin.
+    /// Returns an articulated body of these links with its base at the origin.
     pub(crate) fn of(name: String, links: Vec<LinkSpec>) -> ArticulatedSpec {
         let (base, exclude_collisions, notes) = (Pose::identity(), Vec::new(), Vec::new());
         ArticulatedSpec {
@@ -59,21 +61,24 @@ impl ArticulatedSpec {
             links,
             self_collision: true,
             exclude_collisions,
-            part_overlaps: false,
-            alive: true,
+            exclude_overlapping: false,
+            enabled: true,
             notes,
         }
     }
 
-    /// Reads one; `None`, with the problems recorded, where it has no links.
+    /// Reads the table. Returns `None`, with the problems recorded, if it has no links.
     pub(crate) fn read(mut f: Fields<'_>, library: &Library<'_>, place: &Place<'_>) -> Option<ArticulatedSpec> {
         let name = read_name(&mut f).unwrap_or_default();
         let base = rotation::read_pose(&mut f);
         let surface = Surface::read(&mut f, library, &Surface { contacts: library.contacts, ..Surface::default() });
         let floating = f.flag_or("floating", false);
-        let mut spec =
-            ArticulatedSpec { base, part_overlaps: f.value("urdf").is_some(), ..ArticulatedSpec::of(name, Vec::new()) };
-        (spec.self_collision, spec.alive) = (f.flag_or("self_collision", true), f.flag_or("alive", true));
+        let mut spec = ArticulatedSpec {
+            base,
+            exclude_overlapping: f.value("urdf").is_some(),
+            ..ArticulatedSpec::of(name, Vec::new())
+        };
+        (spec.self_collision, spec.enabled) = (f.flag_or("self_collision", true), f.flag_or("enabled", true));
         let from = Inherited {
             library,
             surface: &surface,
@@ -115,13 +120,13 @@ impl ArticulatedSpec {
             mimics.extend(row.mimic.take().map(|(of, value)| (first, row.count, of, value)));
             row.append_to(&mut self.links);
             if from.floating && first > 0 && self.links.get(first).is_some_and(|link| link.parent.is_none()) {
-                let message = format!("{} is a second link without `parent` in a body that floats", table.what);
-                table.log.report(place.clone(), message, "wanted a `parent`: one root carries all");
+                let message = format!("{} is a second link without `parent` in a floating body", table.what);
+                table.log.report(place.clone(), message, "expected a `parent`: a floating body has one root");
             }
             for link in &self.links[first..] {
                 if let Some(line) = lines.insert(link.name.clone(), f.log.line(place.start)) {
                     let message = format!("there is a second link \"{}\"; the first is at line {line}", link.name);
-                    table.log.report(place.clone(), message, "wanted a name that no other link of the body has");
+                    table.log.report(place.clone(), message, "expected a unique name");
                     break;
                 }
             }
@@ -145,7 +150,7 @@ impl ArticulatedSpec {
         }
     }
 
-    /// `urdf`, with the keys that only it has.
+    /// Reads `urdf` and the keys that belong to it.
     fn read_urdf(&mut self, f: &mut Fields<'_>, from: &Inherited<'_, '_>, place: &Place<'_>) -> Option<()> {
         let (path, value) = f.optional_text("urdf")?;
         let options = UrdfOptions {
@@ -158,8 +163,8 @@ impl ArticulatedSpec {
         };
         let file = place.folder.join(path);
         let robot = match place.files.iter().find(|(name, _)| *name == path) {
-            Some((_, text)) => crate::urdf::read_text(text, &file, &options, crate::urdf::Wanted::Body),
-            None => crate::urdf::read_file(&file, &options, crate::urdf::Wanted::Body),
+            Some((_, text)) => crate::urdf::read_text(text, &file, &options, crate::urdf::Content::Body),
+            None => crate::urdf::read_file(&file, &options, crate::urdf::Content::Body),
         };
         match robot {
             Ok(robot) => {
@@ -172,21 +177,17 @@ impl ArticulatedSpec {
                 Some(())
             }
             Err(error) => {
-                let told = error.to_string();
-                let lines: Vec<&str> = told.lines().collect();
+                let message = error.to_string();
+                let lines: Vec<&str> = message.lines().collect();
                 for line in &lines {
-                    f.log.report(
-                        value.span(),
-                        format!("`urdf` of {}: {line}", f.what),
-                        "wanted a URDF that can be read",
-                    );
+                    f.log.report(value.span(), format!("`urdf` of {}: {line}", f.what), "expected a valid URDF");
                 }
                 None
             }
         }
     }
 
-    /// `[[articulated.joint]]`: what acts on joints that are there.
+    /// Reads `[[articulated.joint]]`: limits, drives, damping and friction of existing joints.
     fn read_joints(&mut self, f: &mut Fields<'_>) {
         for mut table in f.tables("joint", MAX_LINKS) {
             let named = table.texts("name", MAX_LINKS, "the name of a joint, or a list of them");
@@ -216,18 +217,18 @@ impl ArticulatedSpec {
         found
     }
 
-    /// `start = { JOINT = position }`.
+    /// Reads `initial_positions = { JOINT = position }`.
     fn read_start(&mut self, f: &mut Fields<'_>) {
-        let Some(start) = f.table("start", "{ JOINT = 0.5 }") else { return };
+        let Some(start) = f.table("initial_positions", "{ JOINT = 0.5 }") else { return };
         for (name, span, value) in start.entries() {
             let Some(link) = self.joint(name).filter(|&k| self.links[k].joint.is_single()) else {
                 let single =
                     self.links.iter().filter(|link| link.joint.is_single()).map(|link| link.joint.name.as_str());
                 let near = crate::suggest::nearest(name, single);
-                let wanted = near.map_or("wanted the name of a revolute or prismatic joint".into(), |near| {
+                let expected = near.map_or("expected the name of a revolute or prismatic joint".into(), |near| {
                     format!("did you mean `{near}`?")
                 });
-                f.log.report(span, format!("{} has no joint \"{name}\" with one position", f.what), wanted);
+                f.log.report(span, format!("{} has no joint \"{name}\" with one degree of freedom", f.what), expected);
                 continue;
             };
             match number_of(value).filter(|x| Bound::ANY.holds(*x)) {
@@ -237,7 +238,7 @@ impl ArticulatedSpec {
         }
     }
 
-    /// The velocity of a base that floats.
+    /// Reads the velocity of a floating root.
     fn read_velocity(&mut self, f: &mut Fields<'_>, floating: bool) {
         if !floating {
             return;
@@ -250,11 +251,11 @@ impl ArticulatedSpec {
     }
 
     fn read_pairs(&mut self, f: &mut Fields<'_>) {
-        let wanted = "pairs of links, such as [[\"a\", \"b\"]]";
-        for value in f.list("keep_apart", MOST_PAIRS, wanted) {
+        let expected = "pairs of links, such as [[\"a\", \"b\"]]";
+        for value in f.list("exclude_collisions", MAX_PAIRS, expected) {
             let items = value.get_ref().as_array().filter(|items| items.len() == 2);
             let Some(items) = items else {
-                f.wrong("keep_apart", value, "two names of links, such as [\"a\", \"b\"]");
+                f.wrong("exclude_collisions", value, "two names of links, such as [\"a\", \"b\"]");
                 continue;
             };
             let pair: Vec<usize> = items.iter().filter_map(|item| self.named_link(f, item)).collect();
@@ -266,12 +267,17 @@ impl ArticulatedSpec {
 
     fn named_link(&self, f: &Fields<'_>, value: &Value<'_>) -> Option<usize> {
         let Some(name) = value.get_ref().as_str() else {
-            f.wrong("keep_apart", value, "the name of a link");
+            f.wrong("exclude_collisions", value, "the name of a link");
             return None;
         };
         let found = self.link(name);
         if found.is_none() {
-            f.unknown_name("keep_apart", value, name, self.links.iter().map(|link| link.name.as_str()).collect());
+            f.unknown_name(
+                "exclude_collisions",
+                value,
+                name,
+                self.links.iter().map(|link| link.name.as_str()).collect(),
+            );
         }
         found
     }
@@ -280,7 +286,7 @@ impl ArticulatedSpec {
 const MISSING: Names<MissingMeshes> = &[("error", MissingMeshes::Error), ("skip", MissingMeshes::Skip)];
 const COLLISION: Names<CollisionMeshes> = &[("exact", CollisionMeshes::Exact), ("hull", CollisionMeshes::Hull)];
 
-/// `packages = { NAME = "dir" }`, directories relative to the folder of the scene.
+/// Reads `packages = { NAME = "dir" }`, directories relative to the folder of the scene.
 fn read_packages(f: &mut Fields<'_>, folder: &Path) -> BTreeMap<String, PathBuf> {
     let Some(table) = f.table("packages", "{ my_robot = \"../my_robot\" }") else { return BTreeMap::new() };
     let mut packages = BTreeMap::new();

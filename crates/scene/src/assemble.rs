@@ -1,4 +1,4 @@
-//! From links to what the dynamics knows: a model, and a body with colliders, pictures and motors.
+//! Builds an articulated body from its description: the model, colliders, visuals and drives.
 
 use tumble_core::articulated::{
     ArticulatedBody, ArticulatedError, Collider, Coupling, DofSettings, Kinematics, LinkMass, Model, ModelBuilder,
@@ -8,14 +8,14 @@ use tumble_core::collide::{Pose, Shape, contacts};
 use tumble_core::{Appearance, CameraMount, Joint, Material, Object, Visual};
 
 use crate::articulated::ArticulatedSpec;
-use crate::build::{look, material_id};
+use crate::build::{appearance, material_id};
 use crate::link::LinkSpec;
 use crate::link_shapes::{Placed, Purpose, ShapeMaker, mass};
 
-/// Pairs of links told by name.
-const TOLD_PAIRS: usize = 8;
+/// Pairs of links that a note lists by name.
+const MAX_LISTED_PAIRS: usize = 8;
 
-/// The tree of links, with a mass for each.
+/// Returns the tree of links with a mass for each.
 pub(crate) fn model(links: &[LinkSpec], masses: &[LinkMass]) -> Result<Model, ModelError> {
     let mut builder = ModelBuilder::new();
     for (link, mass) in links.iter().zip(masses) {
@@ -24,14 +24,15 @@ pub(crate) fn model(links: &[LinkSpec], masses: &[LinkMass]) -> Result<Model, Mo
     builder.build()
 }
 
-/// Names of the joints that move, in the order of the model's links and so of its coordinates.
+/// Returns the names of all joints that are not fixed, in the order of the model's links and of its
+/// coordinates.
 pub(crate) fn moving_joints(links: &[LinkSpec]) -> Vec<String> {
     links.iter().filter(|link| moves(link)).map(|link| link.joint.name.clone()).collect()
 }
 
-/// What acts on each degree of freedom, in the order of the velocities.
-pub(crate) fn freedoms(links: &[LinkSpec]) -> Vec<DofSettings> {
-    let of = |link: &LinkSpec| vec![link.joint.freedom.clone(); link.joint.kind.dof()];
+/// Returns the settings of each degree of freedom, in the order of the velocities.
+pub(crate) fn dofs(links: &[LinkSpec]) -> Vec<DofSettings> {
+    let of = |link: &LinkSpec| vec![link.joint.dof.clone(); link.joint.kind.dof()];
     links.iter().filter(|link| moves(link)).flat_map(of).collect()
 }
 
@@ -39,22 +40,23 @@ fn moves(link: &LinkSpec) -> bool {
     link.joint.kind != Joint::Fixed
 }
 
-/// The body of a description; what is wrong names the link.
+/// Builds the body of a description. Errors name the link.
 pub(crate) fn body(spec: &ArticulatedSpec, maker: &mut ShapeMaker<'_>) -> Result<ArticulatedBody, String> {
-    let told = |link: &LinkSpec, why: String| format!("link \"{}\": {why}", link.name);
+    let in_link = |link: &LinkSpec, why: String| format!("link \"{}\": {why}", link.name);
     let mut shapes = Vec::with_capacity(spec.links.len());
     let mut masses = Vec::with_capacity(spec.links.len());
     for link in &spec.links {
-        let placed = maker.shapes(link).map_err(|why| told(link, why))?;
-        masses.push(mass(link, &placed).map_err(|why| told(link, why.to_string()))?);
+        let placed = maker.shapes(link).map_err(|why| in_link(link, why))?;
+        masses.push(mass(link, &placed).map_err(|why| in_link(link, why.to_string()))?);
         shapes.push(placed);
     }
     let model = model(&spec.links, &masses).map_err(|e| e.to_string())?;
-    furnished(spec, model, &shapes, maker).map_err(|e| e.to_string())
+    assembled(spec, model, &shapes, maker).map_err(|e| e.to_string())
 }
 
-/// The body with all that is on its links and joints.
-fn furnished(
+/// Builds the body from its model: positions, velocities, colliders, visuals, cameras, lights,
+/// joint settings, couplings and disabled collisions.
+fn assembled(
     spec: &ArticulatedSpec,
     model: Model,
     shapes: &[Vec<Placed<'_>>],
@@ -70,7 +72,7 @@ fn furnished(
     body.self_collision = spec.self_collision;
     for (link, placed) in spec.links.iter().zip(shapes) {
         for placed in placed {
-            furnish(&mut body, &link.name, placed)?;
+            attach(&mut body, &link.name, placed)?;
         }
         if let Some(camera) = &link.mounts.camera {
             body.add_camera(&link.name, CameraMount { name: link.name.clone(), ..camera.clone() })?;
@@ -82,7 +84,7 @@ fn furnished(
     for (number, link) in moving.iter().enumerate() {
         let first = body.model().links()[number].v;
         for index in first..first + link.joint.kind.dof() {
-            body.set_dof(index, link.joint.freedom.clone())?;
+            body.set_dof(index, link.joint.dof.clone())?;
         }
         if let Some(mimic) = link.joint.mimic
             && let Some(of) = body.dof_of(&spec.links[mimic.link].name)
@@ -94,14 +96,15 @@ fn furnished(
         body.exclude_collisions(&spec.links[*a].name, &spec.links[*b].name)?;
     }
     keep_apart_across_stacks(spec, &mut body)?;
-    if spec.part_overlaps && spec.self_collision && maker.purpose == Purpose::Stepped {
+    if spec.exclude_overlapping && spec.self_collision && maker.purpose == Purpose::Stepped {
         let poses = link_poses(spec, body.model(), &positions);
-        part_overlaps(spec, shapes, &poses, &mut body, maker)?;
+        exclude_overlapping(spec, shapes, &poses, &mut body, maker)?;
     }
     Ok(body)
 }
 
-/// Position numbers of a joint at time 0; a floating root starts where it is placed.
+/// Returns the position numbers of a joint at time 0. A floating root starts at its placement in
+/// the base.
 fn position(link: &LinkSpec, base: &Pose) -> Vec<f64> {
     match link.joint.kind {
         Joint::Floating => {
@@ -112,7 +115,7 @@ fn position(link: &LinkSpec, base: &Pose) -> Vec<f64> {
     }
 }
 
-fn furnish(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Result<(), ArticulatedError> {
+fn attach(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Result<(), ArticulatedError> {
     let surface = &placed.spec.surface;
     if let Some(shape) = placed.solid().filter(|_| placed.spec.collides) {
         let id = material_id(surface.material);
@@ -123,14 +126,15 @@ fn furnish(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Resul
         )?;
     }
     if placed.visible {
-        let look: Appearance = look(&surface.look, &placed.center());
+        let appearance: Appearance = appearance(&surface.appearance, &placed.center());
         let (geometry, stands_in_for) = (placed.geometry.clone(), placed.stands_in_for.clone());
-        body.add_visual(link, Visual { part: 0, pose: placed.pose, geometry, appearance: look, stands_in_for })?;
+        body.add_visual(link, Visual { part: 0, pose: placed.pose, geometry, appearance: appearance, stands_in_for })?;
     }
     Ok(())
 }
 
-/// Links that are joined through links without mass and shape, the stacks that joints of several freedoms are made of, are neighbours.
+/// Disables collisions of links that are connected through links without mass and shape. Such links
+/// are intermediate frames of joints with several degrees of freedom.
 fn keep_apart_across_stacks(spec: &ArticulatedSpec, body: &mut ArticulatedBody) -> Result<(), ArticulatedError> {
     let empty = |link: &LinkSpec| link.shapes.is_empty() && !link.has_mass();
     for link in &spec.links {
@@ -145,8 +149,9 @@ fn keep_apart_across_stacks(spec: &ArticulatedSpec, body: &mut ArticulatedBody) 
     Ok(())
 }
 
-/// Keeps apart all links that overlap at the start: files of robots do not say which links may meet, and their shapes reach into each other.
-fn part_overlaps(
+/// Disables collisions of all links that overlap at time 0. Robot files do not say which links may
+/// collide, and the shapes of neighboring links often intersect.
+fn exclude_overlapping(
     spec: &ArticulatedSpec,
     shapes: &[Vec<Placed<'_>>],
     poses: &[Pose],
@@ -159,7 +164,7 @@ fn part_overlaps(
         .flat_map(|(link, placed)| placed.iter().filter(|p| p.spec.collides).map(move |p| (link, p)))
         .filter_map(|(link, p)| Some(Solid { link, shape: p.solid()?, pose: poses[link] * p.pose }))
         .collect();
-    // parts are the links, the base, then the colliders in this order
+    // Parts are the links, the base, then the colliders in this order.
     let first = body.model().links().len() + 1;
     let name = |link: usize| spec.links[link].name.as_str();
     let mut pairs = Vec::new();
@@ -173,20 +178,22 @@ fn part_overlaps(
             let pair = format!("{} and {}", name(a.link), name(b.link));
             body.exclude_collisions(name(a.link), name(b.link))?;
             match meet(body) {
-                true => maker.notes.add(pair, "overlap at the start and meet all the same"),
+                true => maker.notes.add(pair, "overlap at the start and still collide"),
                 false => pairs.push(pair),
             }
         }
     }
     if !pairs.is_empty() {
-        let more = pairs.len().saturating_sub(TOLD_PAIRS);
+        let more = pairs.len().saturating_sub(MAX_LISTED_PAIRS);
         let rest = if more > 0 { format!(" and {more} more pairs") } else { String::new() };
-        maker.notes.add("links that overlap at the start never meet", pairs[..pairs.len() - more].join(", ") + &rest);
+        maker
+            .notes
+            .add("links that overlap at the start do not collide", pairs[..pairs.len() - more].join(", ") + &rest);
     }
     Ok(())
 }
 
-/// A shape of a link in the world.
+/// A collision shape of a link with its pose in the world.
 struct Solid<'s> {
     link: usize,
     shape: &'s Shape,
@@ -204,7 +211,7 @@ impl Solid<'_> {
     }
 }
 
-/// Poses of all links in the world at time 0, without shapes.
+/// Returns the poses of all links in the world at time 0, computed without shapes.
 pub(crate) fn link_poses_at_start(spec: &ArticulatedSpec) -> Result<Vec<Pose>, ModelError> {
     let masses: Vec<LinkMass> = spec.links.iter().map(LinkSpec::given_mass).collect();
     let positions: Vec<f64> =
@@ -212,7 +219,7 @@ pub(crate) fn link_poses_at_start(spec: &ArticulatedSpec) -> Result<Vec<Pose>, M
     Ok(link_poses(spec, &model(&spec.links, &masses)?, &positions))
 }
 
-/// Poses of all links in the world.
+/// Returns the poses of all links in the world.
 fn link_poses(spec: &ArticulatedSpec, model: &Model, q: &[f64]) -> Vec<Pose> {
     let mut kinematics = Kinematics::new(model);
     kinematics.refresh(model, q, &vec![0.0; model.dof()]);

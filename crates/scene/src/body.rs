@@ -5,30 +5,30 @@ use std::collections::BTreeMap;
 use tumble_core::Mode;
 use tumble_core::collide::ContactMode;
 
+use crate::appearance::AppearanceSpec;
 use crate::bound::Bound;
 use crate::fields::{Fields, Names};
-use crate::look::Appearance;
 use crate::material::{DEFAULT_FRICTION, DEFAULT_RESTITUTION, FRICTION, MaterialSpec, RESTITUTION};
 use crate::mount::Mounts;
 use crate::rotation;
 use crate::shape::ShapeSpec;
 use crate::world::CONTACTS;
 
-/// Most bytes of a body's name: 64 with the final zero in which it travels between processes.
-pub(crate) const MOST_NAME_BYTES: usize = 63;
+/// Largest length of a body's name in bytes: 64 in network messages, with the final zero.
+pub(crate) const MAX_NAME_BYTES: usize = 63;
 
 const MODES: Names<Mode> = &[("dynamic", Mode::Dynamic), ("static", Mode::Static), ("kinematic", Mode::Kinematic)];
 
-/// How heavy a body is.
+/// The mass of a body or shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MassSpec {
-    /// Spread evenly over the volume, kg.
+    /// Total mass with uniform density, kg.
     Mass(f64),
-    /// kg/m³.
+    /// Density, kg/m³.
     Density(f64),
 }
 
-/// One rigid body at the start, all references resolved and all defaults filled in.
+/// A rigid body at time 0 with all references resolved and all defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodySpec {
     /// Unique in the scene; at most 63 bytes.
@@ -37,24 +37,25 @@ pub struct BodySpec {
     pub mode: Mode,
     /// The shape in body axes.
     pub shape: ShapeSpec,
-    /// Always there if the body is dynamic.
+    /// Present for every dynamic body.
     pub mass: Option<MassSpec>,
-    /// Where the origin of the *shape* is, world axes, m. A mesh or a profile may have its centre
-    /// of mass elsewhere: that is then at `position_m` + R·(its place in the shape).
+    /// Position of the origin of the *shape*, world axes, m. The center of mass of a mesh or a
+    /// profile may be elsewhere: at `position_m` + R·(its position in the shape).
     pub position_m: [f64; 3],
     /// Body axes to world axes, unit quaternion `[x, y, z, w]`.
     pub orientation_xyzw: [f64; 4],
-    /// Velocity of the centre of mass, world axes, m/s.
+    /// Velocity of the center of mass, world axes, m/s.
     pub velocity_m_per_s: [f64; 3],
     /// World axes, rad/s.
     pub angular_velocity_rad_per_s: [f64; 3],
-    /// Index into [`SceneFile::materials`](crate::SceneFile::materials), where one is named.
+    /// Index into [`SceneFile::materials`](crate::SceneFile::materials), if the body names a
+    /// material.
     pub material: Option<usize>,
     /// The body's own, else its material's, else 0.5.
     pub friction: f64,
     /// The body's own, else its material's, else 0.
     pub restitution: f64,
-    /// How its mesh or cylinder collides. Default: as the world says.
+    /// Contact mode of a mesh or cylinder. Default: that of the world.
     pub contacts: ContactMode,
     /// Rate at which velocity decays, 1/s: `dv/dt = −c v`. Default 0.
     pub linear_damping_per_s: f64,
@@ -62,27 +63,27 @@ pub struct BodySpec {
     pub angular_damping_per_s: f64,
     /// Takes part in contacts. Default true.
     pub collides: bool,
-    /// Takes part in anything at all. Default true.
-    pub alive: bool,
+    /// Takes part in the simulation. Default true.
+    pub enabled: bool,
     /// Is drawn. Default true.
     pub visible: bool,
-    /// The body's own look, on top of its material's.
-    pub look: Appearance,
-    /// The camera and the light that it carries, in axes of the shape.
+    /// Appearance of the body: that of its material with the body's own keys on top.
+    pub appearance: AppearanceSpec,
+    /// The camera and the light attached to the body, in axes of the shape.
     pub mounts: Mounts,
 }
 
-/// Names a body can refer to. A name without an index stands for something that is itself wrong.
+/// Meshes and materials by name. A name without an index belongs to an entry that is itself wrong.
 pub(crate) struct Library<'a> {
     pub(crate) meshes: BTreeMap<&'a str, Option<usize>>,
     pub(crate) material_names: BTreeMap<&'a str, usize>,
     pub(crate) materials: &'a [MaterialSpec],
-    /// The world's.
+    /// Default contact mode, from `[world]`.
     pub(crate) contacts: ContactMode,
 }
 
 impl BodySpec {
-    /// Reads all keys of a body but does not finish the table: a grid has keys of its own.
+    /// Reads all keys of a body. Does not finish the table, since a grid has more keys.
     pub(crate) fn read(f: &mut Fields<'_>, library: &Library<'_>) -> Option<BodySpec> {
         let name = read_name(f);
         let mode = read_mode(f);
@@ -92,7 +93,7 @@ impl BodySpec {
         let base = material.map(|index| &library.materials[index]);
         let (friction, restitution) =
             base.map_or((DEFAULT_FRICTION, DEFAULT_RESTITUTION), |m| (m.friction, m.restitution));
-        let look = base.map_or_else(Appearance::default, |m| m.look.clone());
+        let appearance = base.map_or_else(AppearanceSpec::default, |m| m.appearance.clone());
         let [linear, angular] = read_velocities(f, mode);
         let body = BodySpec {
             name: name.unwrap_or_default(),
@@ -110,9 +111,9 @@ impl BodySpec {
             linear_damping_per_s: f.number_or("linear_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
             angular_damping_per_s: f.number_or("angular_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
             collides: f.flag_or("collides", true),
-            alive: f.flag_or("alive", true),
+            enabled: f.flag_or("enabled", true),
             visible: f.flag_or("visible", true),
-            look: Appearance::read(f, &look),
+            appearance: AppearanceSpec::read(f, &appearance),
             mounts: Mounts::read(f),
         };
         let shape = shape?;
@@ -122,20 +123,20 @@ impl BodySpec {
 }
 
 pub(crate) fn read_name(f: &mut Fields<'_>) -> Option<String> {
-    let (name, value) = f.text("name", "a name of its own")?;
+    let (name, value) = f.text("name", "a unique name")?;
     f.what = format!(
         "{} \"{}\"",
         f.what.split(' ').next().unwrap_or("body"),
         f.log.quote(value.span()).trim_matches(['"', '\''])
     );
-    let wanted = "a name of 1 to 63 bytes without control characters";
-    if name.is_empty() || name.len() > MOST_NAME_BYTES || name.chars().any(char::is_control) {
-        f.wrong("name", value, wanted);
+    let expected = "a name of 1 to 63 bytes without control characters";
+    if name.is_empty() || name.len() > MAX_NAME_BYTES || name.chars().any(char::is_control) {
+        f.wrong("name", value, expected);
     }
     Some(name.to_owned())
 }
 
-/// The mode; one that is wrong stands for a mode that asks for nothing else.
+/// Reads the mode. A wrong value counts as kinematic, the mode that requires no other key.
 fn read_mode(f: &mut Fields<'_>) -> Mode {
     match f.value("mode") {
         Some(value) => f.as_choice("mode", value, MODES).unwrap_or(Mode::Kinematic),
@@ -149,14 +150,17 @@ fn read_mass(f: &mut Fields<'_>, mode: Mode) -> Option<MassSpec> {
     match (mass, density) {
         (Some(_), Some(_)) => {
             let message = format!("{} has both `mass_kg` and `density_kg_per_m3`", f.what);
-            f.log.report(f.span.clone(), message, "wanted one of them");
+            f.log.report(f.span.clone(), message, "expected one of them");
             None
         }
         (Some(mass), None) => Some(MassSpec::Mass(mass)),
         (None, Some(density)) => Some(MassSpec::Density(density)),
         (None, None) => {
             if mode == Mode::Dynamic {
-                f.missing("mass_kg", "`mass_kg` or `density_kg_per_m3`, or mode = \"static\" for what never moves");
+                f.missing(
+                    "mass_kg",
+                    "`mass_kg` or `density_kg_per_m3`, or mode = \"static\" for a body that never moves",
+                );
             }
             None
         }
@@ -168,14 +172,14 @@ pub(crate) fn read_material(f: &mut Fields<'_>, library: &Library<'_>) -> Option
     let found = library.material_names.get(name).copied();
     if found.is_none() {
         match library.material_names.is_empty() {
-            true => f.wrong("material", value, "the NAME of a table [materials.NAME], and the scene has none"),
+            true => f.wrong("material", value, "the NAME of a table [materials.NAME]; the scene has none"),
             false => f.unknown_name("material", value, name, library.material_names.keys().copied().collect()),
         }
     }
     found
 }
 
-/// Linear and angular velocity; a static body has none.
+/// Reads linear and angular velocity. A static body may not have any.
 fn read_velocities(f: &mut Fields<'_>, mode: Mode) -> [[f64; 3]; 2] {
     ["velocity_m_per_s", "angular_velocity_rad_per_s"].map(|key| {
         let Some(value) = f.value(key) else {
@@ -183,7 +187,11 @@ fn read_velocities(f: &mut Fields<'_>, mode: Mode) -> [[f64; 3]; 2] {
         };
         let velocity = f.as_vector(key, value, Bound::ANY);
         if mode == Mode::Static && velocity != [0.0; 3] {
-            f.wrong(key, value, "no velocity for a static body; mode = \"kinematic\" moves by itself");
+            f.wrong(
+                key,
+                value,
+                "no velocity for a static body; a body with mode = \"kinematic\" moves at a prescribed velocity",
+            );
         }
         velocity
     })
@@ -192,6 +200,6 @@ fn read_velocities(f: &mut Fields<'_>, mode: Mode) -> [[f64; 3]; 2] {
 fn check_half_space(f: &Fields<'_>, shape: &ShapeSpec, mode: Mode) {
     if *shape == ShapeSpec::HalfSpace && mode == Mode::Dynamic {
         let message = format!("{} is a dynamic half-space, which has no finite mass", f.what);
-        f.log.report(f.span.clone(), message, "wanted mode = \"static\" or \"kinematic\"");
+        f.log.report(f.span.clone(), message, "expected mode = \"static\" or \"kinematic\"");
     }
 }

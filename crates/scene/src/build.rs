@@ -1,32 +1,32 @@
-//! From a description to a world: shapes made, meshes read and checked, bodies placed.
+//! Builds a world from a scene: shapes, meshes, bodies, joints and pairs.
 
 use std::path::PathBuf;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use thiserror::Error;
 use tumble_collide::{Pose, RepairSettings, Shape, ShapeError, TreeCache, TreeSettings, TriMesh, Vec3, decode_text};
-use tumble_core::solver::{self, SolverSettings};
+use tumble_core::solver::SolverSettings;
 use tumble_core::{
-    Appearance as CoreAppearance, ArticulatedBody, LoopJoint, ObjectId, PairMaterial, PairSide, RigidBody, Settings,
-    Sleep, Visual, World, WorldError, stepper_by_name,
+    Appearance, ArticulatedBody, LoopJoint, ObjectId, PairMaterial, PairSide, RigidBody, Settings, Sleep, Visual,
+    World, WorldError,
 };
 
+use crate::appearance::AppearanceSpec;
 use crate::articulated::ArticulatedSpec;
 use crate::assemble;
 use crate::body::{BodySpec, MassSpec};
-use crate::closure::{ClosureKind, ClosureSpec, PartSpec};
 use crate::collada;
 use crate::file::SceneFile;
 use crate::link_shapes::{self, Purpose, ShapeMaker};
-use crate::look::Appearance;
+use crate::loop_joint::{LoopJointKind, LoopJointSpec, PartSpec};
 use crate::mesh::{MeshSource, MeshSpec};
 use crate::pair::{PairSideSpec, PairSpec};
 use crate::slow::building_surface;
 
-/// Most bytes of a mesh file: 1 GiB.
-pub(crate) const MOST_MESH_BYTES: u64 = 1 << 30;
+/// Largest mesh file in bytes: 1 GiB.
+pub(crate) const MAX_MESH_BYTES: u64 = 1 << 30;
 
-/// Why a checked scene did not become a world.
+/// Why a checked scene could not be built into a world.
 #[derive(Debug, Error)]
 pub enum BuildError {
     /// A mesh file could not be read.
@@ -38,10 +38,10 @@ pub enum BuildError {
         mesh: String,
         /// Its file.
         file: PathBuf,
-        /// What the system said.
+        /// From the system.
         source: std::io::Error,
     },
-    /// A mesh is no closed solid, or holds bad numbers.
+    /// A mesh is not a closed solid, or has invalid numbers.
     #[error("{scene}: mesh \"{mesh}\"{}: {why}", file.as_ref().map_or(String::new(), |f| format!(" ({})", f.display())))]
     Mesh {
         /// The scene.
@@ -50,10 +50,10 @@ pub enum BuildError {
         mesh: String,
         /// Its file, if it has one.
         file: Option<PathBuf>,
-        /// From the reader or the check; it names the line, the vertex or the triangle.
+        /// From the reader or the check; names the line, the vertex or the triangle.
         why: String,
     },
-    /// A body's shape or constants are wrong.
+    /// A body's shape or a constant of it is invalid.
     #[error("{scene}: body \"{body}\": {why}")]
     Body {
         /// The scene.
@@ -63,22 +63,22 @@ pub enum BuildError {
         /// From the shape or the body.
         why: String,
     },
-    /// An articulated body's shapes or constants are wrong.
+    /// A shape or a constant of an articulated body is invalid.
     #[error("{scene}: articulated \"{body}\": {why}")]
     Articulated {
         /// The scene.
         scene: String,
         /// The body.
         body: String,
-        /// From the shape or the body; it names the link.
+        /// From the shape or the body; names the link.
         why: String,
     },
-    /// A closure joins what cannot be joined.
+    /// A loop joint is invalid.
     #[error("{scene}: {why}")]
-    Closure {
+    LoopJoint {
         /// The scene.
         scene: String,
-        /// From the closure, which it names.
+        /// From the joint; names the joint.
         why: String,
     },
     /// The world refused a setting.
@@ -91,21 +91,22 @@ pub enum BuildError {
     },
 }
 
-/// What was mended in a mesh, to be said aloud.
+/// Notes for the user: what was repaired or left out.
 pub type Notes = Vec<String>;
 
 impl SceneFile {
-    /// The world at time 0, and what was mended in its meshes. Sphere trees come from the cache that the environment names
-    /// ([`TreeCache::of_environment`]) where it has them.
+    /// Builds the world at time 0. Also returns notes about its meshes and robots. Sphere trees are
+    /// taken from the cache that the environment names ([`TreeCache::of_environment`]) if it has
+    /// them.
     ///
     /// # Errors
-    /// [`BuildError`]: a mesh is unreadable or open, a body has no volume, a constant is refused.
+    /// [`BuildError`]: a mesh is unreadable or open, a body has no volume, a constant is invalid.
     pub fn build(&self) -> Result<(World, Notes), BuildError> {
         self.build_for(Purpose::Stepped)
     }
 
-    /// The same world to be drawn and not stepped, as a facet's: its meshes get no sphere trees and no distance fields until somebody asks for them, and
-    /// links of a URDF that overlap at the start are not looked for.
+    /// Builds the same world for drawing only, as a cave facet needs it. Sphere trees and distance
+    /// fields of meshes are built on first use, and overlaps of URDF links are not searched for.
     ///
     /// # Errors
     /// As [`build`](Self::build).
@@ -119,13 +120,13 @@ impl SceneFile {
         let meshes =
             self.meshes.iter().map(|mesh| self.solid(mesh, purpose, &mut notes)).collect::<Result<Vec<_>, _>>()?;
         let mut built = World::new(self.settings()).map_err(world)?;
-        stepper_by_name(&self.world.stepper.to_string()).into_iter().for_each(|s| built.set_stepper(s));
-        solver::by_name(&self.world.solver.to_string()).into_iter().for_each(|s| built.set_solver(s));
+        built.set_stepper(self.world.stepper.new_stepper());
+        built.set_solver(self.world.solver.new_solver());
         for spec in &self.bodies {
             let body = self.body(spec, &meshes)?;
             let id = built.add_boxed(Box::new(body), spec.mode).map_err(|e| self.body_error(spec, e))?;
             built.set_collidable(id, spec.collides).map_err(world)?;
-            built.set_enabled(id, spec.alive).map_err(world)?;
+            built.set_enabled(id, spec.enabled).map_err(world)?;
         }
         let mut maker = ShapeMaker::new(&meshes, purpose);
         for spec in &self.articulated {
@@ -133,8 +134,8 @@ impl SceneFile {
             let said = spec.notes.iter().cloned().chain(maker.notes.take());
             notes.extend(said.map(|note| format!("{}: articulated \"{}\": {note}", self.file, spec.name)));
         }
-        for spec in &self.closures {
-            self.add_closure(spec, &mut built)?;
+        for spec in &self.loop_joints {
+            self.add_loop_joint(spec, &mut built)?;
         }
         for spec in &self.pairs {
             self.add_pair(spec, &mut built).map_err(world)?;
@@ -151,20 +152,20 @@ impl SceneFile {
         let wrong = |why: String| BuildError::Articulated { scene: self.file.clone(), body: spec.name.clone(), why };
         let body = assemble::body(spec, maker).map_err(wrong)?;
         let id = world.add(body).map_err(|e| wrong(e.to_string()))?;
-        world.set_enabled(id, spec.alive).map_err(|e| wrong(e.to_string()))
+        world.set_enabled(id, spec.enabled).map_err(|e| wrong(e.to_string()))
     }
 
-    fn add_closure(&self, spec: &ClosureSpec, world: &mut World) -> Result<(), BuildError> {
-        let wrong = |why: String| BuildError::Closure { scene: self.file.clone(), why };
+    fn add_loop_joint(&self, spec: &LoopJointSpec, world: &mut World) -> Result<(), BuildError> {
+        let wrong = |why: String| BuildError::LoopJoint { scene: self.file.clone(), why };
         let (a, b) = (self.part(world, &spec.a), spec.b.and_then(|b| self.part(world, &b)));
         let (point, axis, name) = (Vec3::from(spec.position_m), Vec3::from(spec.axis), spec.name.as_str());
-        let closure = match spec.kind {
-            ClosureKind::Point => LoopJoint::spherical_at(name, world, a, b, point),
-            ClosureKind::Hinge => LoopJoint::revolute_at(name, world, a, b, point, axis),
-            ClosureKind::Weld => LoopJoint::fixed_at(name, world, a, b, point),
-            ClosureKind::Slider => LoopJoint::prismatic_at(name, world, a, b, point, axis),
+        let joint = match spec.kind {
+            LoopJointKind::Spherical => LoopJoint::spherical_at(name, world, a, b, point),
+            LoopJointKind::Revolute => LoopJoint::revolute_at(name, world, a, b, point, axis),
+            LoopJointKind::Fixed => LoopJoint::fixed_at(name, world, a, b, point),
+            LoopJointKind::Prismatic => LoopJoint::prismatic_at(name, world, a, b, point, axis),
         };
-        world.add(closure.map_err(|e| wrong(e.to_string()))?).map(drop).map_err(|e| wrong(e.to_string()))
+        world.add(joint.map_err(|e| wrong(e.to_string()))?).map(drop).map_err(|e| wrong(e.to_string()))
     }
 
     fn add_pair(&self, spec: &PairSpec, world: &mut World) -> Result<(), WorldError> {
@@ -176,7 +177,7 @@ impl SceneFile {
         Ok(())
     }
 
-    /// What a side of a pair is in the world: several parts where it is a link with several shapes.
+    /// Returns one side of a pair in the world: several parts for a link with several shapes.
     fn sides(&self, world: &World, side: PairSideSpec) -> Vec<PairSide> {
         let object = |name: &str| world.find(name).map(PairSide::Object).into_iter().collect();
         match side {
@@ -191,7 +192,7 @@ impl SceneFile {
         }
     }
 
-    /// An object of the world and its part.
+    /// Returns the object and part number of a part in the world.
     fn part(&self, world: &World, part: &PartSpec) -> Option<(ObjectId, usize)> {
         match *part {
             PartSpec::Body(body) => Some((world.find(&self.bodies[body].name)?, 0)),
@@ -223,7 +224,7 @@ impl SceneFile {
         }
     }
 
-    /// A mesh as a solid about its center of mass.
+    /// Builds a mesh as a solid about its center of mass.
     fn solid(&self, spec: &MeshSpec, purpose: Purpose, notes: &mut Notes) -> Result<Shape, BuildError> {
         let file = match &spec.source {
             MeshSource::File { path, .. } => Some(path.clone()),
@@ -236,13 +237,13 @@ impl SceneFile {
             why,
         };
         let (mut mesh, lines) = self.triangles(spec, &wrong)?;
-        let mut told = match spec.repair {
+        let mut mesh_notes = match spec.repair {
             true => make_solid(&mut mesh, &lines, Some(&RepairSettings::default())).map_err(&wrong)?,
             false => Vec::new(),
         };
         let mut settings = TreeSettings::octree();
         settings.depth = spec.sphere_tree_depth.unwrap_or(settings.depth);
-        settings.error = spec.sphere_tree_error.unwrap_or(settings.error);
+        settings.error = spec.sphere_tree_max_error.unwrap_or(settings.error);
         let (called, count) = (spec.called(), mesh.triangles.len());
         let made = building_surface(&called, count, || purpose.mesh(mesh, &settings, &TreeCache::of_environment()));
         let (shape, note) = made.map_err(|error| match error {
@@ -252,14 +253,15 @@ impl SceneFile {
         if let Shape::Mesh(solid) = &shape
             && !spec.repair
         {
-            told = solid.report().notes();
+            mesh_notes = solid.report().notes();
         }
-        notes.extend(told.into_iter().map(|note| format!("{}: mesh \"{}\": {note}", self.file, spec.name)));
+        notes.extend(mesh_notes.into_iter().map(|note| format!("{}: mesh \"{}\": {note}", self.file, spec.name)));
         notes.extend(note.filter(|note| !notes.contains(note)));
         Ok(shape)
     }
 
-    /// With the file's line of each triangle, where it has any.
+    /// Returns the triangles of a mesh. For formats with lines, also the line of each triangle in
+    /// the file.
     fn triangles(
         &self,
         spec: &MeshSpec,
@@ -302,8 +304,8 @@ impl SceneFile {
             source,
         };
         let size = std::fs::metadata(path).map_err(unread)?.len();
-        if size > MOST_MESH_BYTES {
-            return Err(wrong(format!("the file has {size} bytes; the most that is read is {MOST_MESH_BYTES}")));
+        if size > MAX_MESH_BYTES {
+            return Err(wrong(format!("the file has {size} bytes; the limit is {MAX_MESH_BYTES}")));
         }
         let bytes = std::fs::read(path).map_err(unread)?;
         read_with_lines(path, &bytes).map_err(wrong)
@@ -343,10 +345,12 @@ impl SceneFile {
     }
 }
 
-/// Reads OBJ, STL, PLY or COLLADA by the file's extension, and makes sure that it is a closed solid
-/// ([`TriMesh::check_closed`]), which is repaired where `repair` says how ([`TriMesh::repair`]). Also returns a sentence
-/// for each thing that was mended or that a user should know. The error names the first triangle that is wrong, and in
-/// an OBJ its line; the caller adds the file's name.
+/// Reads OBJ, STL, PLY or COLLADA, chosen by the file's extension, as a closed solid
+/// ([`TriMesh::check_closed`]). With `repair` the mesh is repaired first ([`TriMesh::repair`]).
+/// Also returns a note for each repair and each defect that a user should know.
+///
+/// # Errors
+/// A sentence without the file's name. It names the first wrong triangle, and in an OBJ its line.
 pub fn read_solid(
     path: &std::path::Path,
     bytes: &[u8],
@@ -365,12 +369,15 @@ fn make_solid(mesh: &mut TriMesh, lines: &[usize], repair: Option<&RepairSetting
     notes.map_err(|e| e.at_line(lines).to_string())
 }
 
-/// Reads OBJ, STL, PLY or COLLADA by the file's extension.
+/// Reads OBJ, STL, PLY or COLLADA, chosen by the file's extension. The mesh need not be closed.
+///
+/// # Errors
+/// A sentence without the file's name.
 pub fn read_triangles(path: &std::path::Path, bytes: &[u8]) -> Result<TriMesh, String> {
     Ok(read_with_lines(path, bytes)?.0)
 }
 
-/// The same with the line of each triangle; none where the format has no lines.
+/// As [`read_triangles`], with the line of each triangle if the format has lines.
 fn read_with_lines(path: &std::path::Path, bytes: &[u8]) -> Result<(TriMesh, Vec<usize>), String> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     match extension.as_str() {
@@ -385,11 +392,11 @@ fn read_with_lines(path: &std::path::Path, bytes: &[u8]) -> Result<(TriMesh, Vec
                 .map_err(|e| format!("byte {} is not UTF-8; a COLLADA file is text", e.valid_up_to()))?;
             Ok((collada::read(text)?, Vec::new()))
         }
-        other => Err(format!("the extension is '{other}'; meshes are read from .obj, .stl, .ply and .dae")),
+        other => Err(format!("the extension is '{other}'; supported are .obj, .stl, .ply and .dae")),
     }
 }
 
-/// The number by which the world knows a material; 0 for none.
+/// Returns the world's id of a material; 0 for none.
 pub(crate) fn material_id(material: Option<usize>) -> u32 {
     material.map_or(0, |index| index as u32 + 1)
 }
@@ -398,28 +405,28 @@ fn visuals(spec: &BodySpec, shape: Shape) -> Vec<Visual> {
     if !spec.visible {
         return Vec::new();
     }
-    let look = look(&spec.look, &shape.center_of_mass());
-    vec![Visual::shape(0, Pose::identity(), shape, look)]
+    let appearance = appearance(&spec.appearance, &shape.center_of_mass());
+    vec![Visual::shape(0, Pose::identity(), shape, appearance)]
 }
 
-/// The look in body axes, whose origin is the centre of mass.
-pub(crate) fn look(look: &Appearance, center: &Vec3) -> CoreAppearance {
-    let [r, g, b] = look.second_color;
+/// Converts an appearance to body axes, whose origin is the center of mass.
+pub(crate) fn appearance(appearance: &AppearanceSpec, center: &Vec3) -> Appearance {
+    let [r, g, b] = appearance.second_color;
     let named = [
         ("second_r", r),
         ("second_g", g),
         ("second_b", b),
-        ("scale_m", look.pattern_scale_m),
-        ("offset_m", look.pattern_offset_m - center.z),
-        ("clearcoat", look.clearcoat),
+        ("scale_m", appearance.pattern_scale_m),
+        ("offset_m", appearance.pattern_offset_m - center.z),
+        ("clearcoat", appearance.clearcoat),
     ];
-    CoreAppearance {
-        color: look.color.map(|c| c as f32),
-        roughness: look.roughness as f32,
-        metallic: look.metallic as f32,
-        shader: look.pattern.name().into(),
+    Appearance {
+        color: appearance.color.map(|c| c as f32),
+        roughness: appearance.roughness as f32,
+        metallic: appearance.metallic as f32,
+        shader: appearance.pattern.name().into(),
         properties: named.map(|(name, value)| (name.to_string(), value)).to_vec(),
-        texture: look.texture.as_deref().map(Into::into),
-        detail: look.detail,
+        texture: appearance.texture.as_deref().map(Into::into),
+        detail: appearance.detail,
     }
 }

@@ -1,11 +1,13 @@
-//! COLLADA (`.dae`): the triangles of a document's scene. Colours, textures, cameras, skins and animation are passed over.
+//! COLLADA (`.dae`): the triangles of a document's scene. Colors, textures, cameras, skins and
+//! animations are ignored.
 //!
 //! ```text
-//! vertex in metres = meter · T(root) · … · T(node) · position
+//! vertex in meters = meter · T(root) · … · T(node) · position
 //! ```
 //!
-//! `T` is the product of a node's `<matrix>`, `<translate>`, `<rotate>` and `<scale>` in the order of the file, and `meter` the length of its unit.
-//! `<up_axis>` is not applied: files of robots are exported in the axes of their links, whatever they say there, and the programs that they are
+//! `T` is the product of a node's `<matrix>`, `<translate>`, `<rotate>` and `<scale>` in the order
+//! of the file. `meter` is the length of its unit. `<up_axis>` is not applied: robot files are
+//! exported in the axes of their links, whatever they declare there, and the programs that they are
 //! made for ignore it too.
 
 use std::collections::BTreeMap;
@@ -15,16 +17,16 @@ use nalgebra::{Matrix4, Rotation3, Unit};
 use roxmltree::{Document, Node, ParsingOptions};
 use tumble_core::collide::{PolygonTriangulator, TriMesh, Vec3};
 
-/// Most nodes of a document.
-const MOST_NODES: u32 = 20_000_000;
-/// Most triangles of a document, instances counted each.
-const MOST_TRIANGLES: usize = 20_000_000;
-/// Nodes within nodes, at most.
+/// Largest number of nodes of a document.
+const MAX_NODES: u32 = 20_000_000;
+/// Largest number of triangles of a document; every instance counts.
+const MAX_TRIANGLES: usize = 20_000_000;
+/// Largest depth of nested nodes.
 const DEEPEST: usize = 64;
 
-/// The triangles of a document; an error names the line.
+/// Returns the triangles of a document. Errors name the line.
 pub(crate) fn read(text: &str) -> Result<TriMesh, String> {
-    let options = ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() };
+    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, options).map_err(|e| e.to_string())?;
     let root = document.root_element();
     if root.tag_name().name() != "COLLADA" {
@@ -70,7 +72,7 @@ fn fault(node: Node<'_, '_>, what: impl std::fmt::Display) -> String {
     format!("line {}: <{}> {what}", node.document().text_pos_at(node.range().start).row, node.tag_name().name())
 }
 
-/// All numbers between blanks in an element.
+/// Parses the numbers in an element, separated by white space.
 fn numbers<T: std::str::FromStr>(node: Node<'_, '_>) -> Result<Vec<T>, String> {
     let words = node.text().unwrap_or("").split_whitespace();
     words
@@ -81,22 +83,22 @@ fn numbers<T: std::str::FromStr>(node: Node<'_, '_>) -> Result<Vec<T>, String> {
 /// Triangles of one geometry, in its own axes.
 type Geometry = (Vec<Vec3>, Vec<[u32; 3]>);
 
-/// A run of corners: where it begins, how many it has, and the list of indices that it lies in.
+/// A face: first corner, number of corners, and the list of indices that they are in.
 type Face = (usize, usize, Rc<Vec<u32>>);
 
 struct Reader<'a, 'd> {
     ids: BTreeMap<&'a str, Node<'a, 'd>>,
-    /// Those read, by the number of their element.
+    /// Geometries read so far, by the number of their element.
     geometries: BTreeMap<u32, Geometry>,
     made: TriMesh,
 }
 
 impl<'a, 'd> Reader<'a, 'd> {
-    /// What `#id` in an attribute points at.
+    /// Returns the element that `#id` in an attribute refers to.
     fn target(&self, node: Node<'a, 'd>, attribute: &str) -> Result<Node<'a, 'd>, String> {
         let uri = node.attribute(attribute).ok_or_else(|| fault(node, format_args!("has no `{attribute}`")))?;
         let id = uri.strip_prefix('#').unwrap_or(uri);
-        self.ids.get(id).copied().ok_or_else(|| fault(node, format_args!("points at \"{uri}\", which is not there")))
+        self.ids.get(id).copied().ok_or_else(|| fault(node, format_args!("refers to \"{uri}\", which is not there")))
     }
 
     fn scene(&self, root: Node<'a, 'd>) -> Option<Node<'a, 'd>> {
@@ -106,7 +108,7 @@ impl<'a, 'd> Reader<'a, 'd> {
 
     fn children(&mut self, parent: Node<'a, 'd>, pose: &Matrix4<f64>, depth: usize) -> Result<(), String> {
         if depth > DEEPEST {
-            return Err(fault(parent, format_args!("lies more than {DEEPEST} nodes deep")));
+            return Err(fault(parent, format_args!("is nested more than {DEEPEST} deep")));
         }
         for node in parent.children().filter(Node::is_element) {
             match node.tag_name().name() {
@@ -127,7 +129,7 @@ impl<'a, 'd> Reader<'a, 'd> {
         self.children(node, &pose, depth + 1)
     }
 
-    /// Adds a geometry at a pose; one that mirrors turns its triangles round.
+    /// Adds a geometry at a pose. A mirroring pose reverses the order of the corners.
     fn add(&mut self, geometry: Node<'a, 'd>, pose: &Matrix4<f64>) -> Result<(), String> {
         let key = geometry.id().get();
         if !self.geometries.contains_key(&key) {
@@ -135,8 +137,8 @@ impl<'a, 'd> Reader<'a, 'd> {
             self.geometries.insert(key, read);
         }
         let (vertices, triangles) = &self.geometries[&key];
-        if self.made.triangles.len() + triangles.len() > MOST_TRIANGLES {
-            return Err(fault(geometry, format_args!("makes more than {MOST_TRIANGLES} triangles in all")));
+        if self.made.triangles.len() + triangles.len() > MAX_TRIANGLES {
+            return Err(fault(geometry, format_args!("makes more than {MAX_TRIANGLES} triangles in all")));
         }
         let first = self.made.vertices.len() as u32;
         let mirrored = pose.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
@@ -166,7 +168,7 @@ impl<'a, 'd> Reader<'a, 'd> {
                     if known {
                         Ok(first + index)
                     } else {
-                        Err(fault(primitive, format_args!("points at vertex {index} of {}", points.len())))
+                        Err(fault(primitive, format_args!("refers to vertex {index} of {}", points.len())))
                     }
                 };
                 if polygons && len > 3 {
@@ -191,7 +193,8 @@ impl<'a, 'd> Reader<'a, 'd> {
         Ok((vertices, triangles))
     }
 
-    /// Where the index of a corner's position stands among the numbers of the corner, how many those are, and the positions.
+    /// Returns the offset of the position index within a corner, the number of indices per corner,
+    /// and the positions.
     fn inputs(&self, primitive: Node<'a, 'd>) -> Result<Option<(usize, usize, Vec<Vec3>)>, String> {
         let inputs: Vec<Node<'a, 'd>> = primitive.children().filter(|node| is(node, "input")).collect();
         let offset = |input: &Node<'_, '_>| {
@@ -212,7 +215,7 @@ impl<'a, 'd> Reader<'a, 'd> {
     }
 }
 
-/// All faces of a primitive.
+/// Returns all faces of a primitive.
 fn faces(primitive: Node<'_, '_>, stride: usize) -> Result<Vec<Face>, String> {
     let mut faces = Vec::new();
     let counts = child(primitive, "vcount").map(numbers::<usize>).transpose()?;
@@ -236,18 +239,18 @@ fn faces(primitive: Node<'_, '_>, stride: usize) -> Result<Vec<Face>, String> {
     Ok(faces)
 }
 
-/// The matrix of one step of a node's transformation; of any other element the identity.
+/// Returns the matrix of one transformation element; the identity for any other element.
 fn transform(step: Node<'_, '_>) -> Result<Matrix4<f64>, String> {
     let tag = step.tag_name().name();
-    let wanted = match tag {
+    let expected = match tag {
         "matrix" => 16,
         "rotate" => 4,
         "translate" | "scale" => 3,
         _ => return Ok(Matrix4::identity()),
     };
     let n = numbers::<f64>(step)?;
-    if n.len() != wanted || n.iter().any(|x| !x.is_finite()) {
-        return Err(fault(step, format_args!("must have {wanted} finite numbers")));
+    if n.len() != expected || n.iter().any(|x| !x.is_finite()) {
+        return Err(fault(step, format_args!("must have {expected} finite numbers")));
     }
     Ok(match tag {
         "matrix" => Matrix4::from_row_slice(&n),
@@ -267,7 +270,8 @@ mod tests {
     use super::read;
     use tumble_core::collide::Vec3;
 
-    /// A unit cube of six quads, each corner with a normal's index beside its own, in a scene with the transformation given.
+    /// A unit cube of six quads in a scene with the given transformation. Each corner has a
+    /// position index and a normal index.
     fn cube(transform: &str) -> String {
         let quads = [[0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1], [2, 3, 7, 6], [0, 1, 3, 2], [4, 6, 7, 5]];
         let corners: String =
@@ -305,13 +309,13 @@ mod tests {
                 let _ = read(&format!("{}{other}{}", &text[..end], &text[end + 1..]));
             }
         }
-        let told = |from: &str, to: &str| read(&text.replace(from, to)).unwrap_err();
-        assert_eq!(told("<p>0 0", "<p>8 0"), "line 4: <polylist> points at vertex 8 of 8");
+        let error_of = |from: &str, to: &str| read(&text.replace(from, to)).unwrap_err();
+        assert_eq!(error_of("<p>0 0", "<p>8 0"), "line 4: <polylist> refers to vertex 8 of 8");
         assert_eq!(
-            told("url=\"#g\"", "url=\"#h\""),
-            "line 5: <instance_geometry> points at \"#h\", which is not there"
+            error_of("url=\"#g\"", "url=\"#h\""),
+            "line 5: <instance_geometry> refers to \"#h\", which is not there"
         );
-        assert_eq!(told("4 4 4 4 4 4<", "4 4 4 4 4 5<"), "line 4: <polylist> counts more corners than it has");
-        assert_eq!(told("0 0 0 0 0 1", "0 0 0 0 x 1"), "line 2: <float_array> holds \"x\"; it must be a number");
+        assert_eq!(error_of("4 4 4 4 4 4<", "4 4 4 4 4 5<"), "line 4: <polylist> counts more corners than it has");
+        assert_eq!(error_of("0 0 0 0 0 1", "0 0 0 0 x 1"), "line 2: <float_array> holds \"x\"; it must be a number");
     }
 }

@@ -1,5 +1,4 @@
-//! What can be wrong with a scene file, and how it is told: one line per problem, or with the
-//! lines of the file drawn below it.
+//! Errors of scene files: one line per problem, or a report with the lines of the file.
 
 use std::fmt;
 use std::ops::Range;
@@ -10,10 +9,10 @@ use thiserror::Error;
 
 use crate::urdf::UrdfError;
 
-/// Problems told in full; the rest are counted.
-const SHOWN_PROBLEMS: usize = 40;
-/// A line longer than this many bytes is not drawn in a report.
-const DRAWN_LINE_BYTES: usize = 400;
+/// Problems that are shown in full; the rest are counted.
+const MAX_SHOWN_PROBLEMS: usize = 40;
+/// Longest line in bytes that a report shows.
+const MAX_DRAWN_LINE_BYTES: usize = 400;
 
 /// Why a scene could not be read.
 #[derive(Debug, Error)]
@@ -23,54 +22,54 @@ pub enum SceneError {
     Read {
         /// The path that was tried.
         file: PathBuf,
-        /// What the system said.
+        /// From the system.
         source: std::io::Error,
     },
-    /// The file is larger than any scene may be.
-    #[error("{}: the file is larger than {limit} bytes, the most a scene may have; keep meshes in files of their own", file.display())]
+    /// The file is too large.
+    #[error("{}: the file is larger than {limit} bytes, the limit for scenes; put meshes into separate files", file.display())]
     TooLarge {
         /// The path that was tried.
         file: PathBuf,
         /// The most bytes allowed.
         limit: u64,
     },
-    /// The file is not text.
+    /// The file is not UTF-8.
     #[error("{}:{line}: byte {byte} of the file is not UTF-8; a scene is a UTF-8 text in TOML", file.display())]
     NotUtf8 {
         /// The path that was tried.
         file: PathBuf,
         /// The line, from 1.
         line: usize,
-        /// Offset of the first bad byte, from 0.
+        /// Offset of the first invalid byte, from 0.
         byte: usize,
     },
-    /// The file is of a format that is not read, or no text.
+    /// The format of the file is not supported, or the file is not text.
     #[error("{}: {why}", file.display())]
     Format {
         /// The path that was tried.
         file: PathBuf,
-        /// What it is, and what is read.
+        /// The format found, and the supported ones.
         why: String,
     },
-    /// A robot's URDF cannot be used.
+    /// A robot's URDF is invalid.
     #[error(transparent)]
     Urdf(#[from] UrdfError),
-    /// Neither a path nor the name of a shipped scene.
+    /// The name is neither a path nor a shipped scene.
     #[error("no scene `{name}`: {hint}")]
     Unknown {
-        /// What was asked for.
+        /// The given name.
         name: String,
-        /// What there is instead.
+        /// The nearest name, or all names.
         hint: String,
     },
-    /// The text was read, and is wrong in one or more places.
+    /// The text has one or more problems.
     #[error("{0}")]
     Invalid(Box<Invalid>),
 }
 
 impl SceneError {
-    /// The error as a full report for a person: the one line, and for each problem of the text
-    /// the lines of the file with the place marked. Escape codes for colour only if `color`.
+    /// Returns the error as a report for people: the message, and for each problem of the text the
+    /// lines of the file with the place marked. Escape codes for color only if `color`.
     pub fn report(&self, color: bool) -> String {
         match self {
             SceneError::Invalid(invalid) => invalid.report(color),
@@ -79,7 +78,8 @@ impl SceneError {
         }
     }
 
-    /// The problems of the text, in the order of the file; empty for the other kinds of error.
+    /// Returns the problems of the text in the order of the file; empty for the other kinds of
+    /// error.
     pub fn problems(&self) -> &[Problem] {
         match self {
             SceneError::Invalid(invalid) => &invalid.problems,
@@ -91,7 +91,7 @@ impl SceneError {
 /// A text with problems.
 #[derive(Debug)]
 pub struct Invalid {
-    /// The name of the file, as it is to be shown.
+    /// The name of the file as messages show it.
     pub file: String,
     /// The whole text.
     pub text: String,
@@ -99,29 +99,29 @@ pub struct Invalid {
     pub problems: Vec<Problem>,
 }
 
-/// One thing that is wrong at one place of a text.
+/// A problem at one place of a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
     /// Line, from 1.
     pub line: usize,
     /// Column, from 1, in characters.
     pub column: usize,
-    /// The bytes of the text that are meant.
+    /// The bytes of the text that are wrong.
     pub span: Range<usize>,
-    /// What is wrong, with the value.
+    /// The fault, with the value.
     pub message: String,
-    /// What would be right.
-    pub wanted: String,
+    /// The expected value.
+    pub expected: String,
 }
 
 impl fmt::Display for Invalid {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (index, problem) in self.problems.iter().take(SHOWN_PROBLEMS).enumerate() {
-            let Problem { line, column, message, wanted, .. } = problem;
+        for (index, problem) in self.problems.iter().take(MAX_SHOWN_PROBLEMS).enumerate() {
+            let Problem { line, column, message, expected, .. } = problem;
             let newline = if index == 0 { "" } else { "\n" };
-            write!(f, "{newline}{}:{line}:{column}: {message}; {wanted}", self.file)?;
+            write!(f, "{newline}{}:{line}:{column}: {message}; {expected}", self.file)?;
         }
-        match self.problems.len().saturating_sub(SHOWN_PROBLEMS) {
+        match self.problems.len().saturating_sub(MAX_SHOWN_PROBLEMS) {
             0 => Ok(()),
             more => write!(f, "\n{}: and {more} more", self.file),
         }
@@ -129,14 +129,14 @@ impl fmt::Display for Invalid {
 }
 
 impl Invalid {
-    /// All problems, each with its line of the file.
+    /// Returns all problems, each with its line of the file.
     pub(crate) fn report(&self, color: bool) -> String {
         let source = Source::from(self.text.as_str());
         let mut out = String::new();
-        for problem in self.problems.iter().take(SHOWN_PROBLEMS) {
+        for problem in self.problems.iter().take(MAX_SHOWN_PROBLEMS) {
             out += &self.drawn(problem, &source, color).unwrap_or_else(|| self.plain(problem));
         }
-        let shown = self.problems.len().min(SHOWN_PROBLEMS);
+        let shown = self.problems.len().min(MAX_SHOWN_PROBLEMS);
         let (count, word) = (self.problems.len(), if self.problems.len() == 1 { "error" } else { "errors" });
         out += &format!("{}: {count} {word}", self.file);
         if shown < count {
@@ -147,24 +147,24 @@ impl Invalid {
     }
 
     fn plain(&self, problem: &Problem) -> String {
-        let Problem { line, column, message, wanted, .. } = problem;
-        format!("error: {message}\n  {}:{line}:{column}: {wanted}\n", self.file)
+        let Problem { line, column, message, expected, .. } = problem;
+        format!("error: {message}\n  {}:{line}:{column}: {expected}\n", self.file)
     }
 
-    /// The problem with its line of the file; `None` where the line is too long to show.
+    /// Returns the problem with its line of the file; `None` if the line is too long to show.
     fn drawn(&self, problem: &Problem, source: &Source<&str>, color: bool) -> Option<String> {
         let text = self.text.as_str();
         let start = floor_char(text, problem.span.start);
         let line_end = text[start..].find('\n').map_or(text.len(), |at| start + at);
         let line_start = text[..start].rfind('\n').map_or(0, |at| at + 1);
-        if line_end - line_start > DRAWN_LINE_BYTES {
+        if line_end - line_start > MAX_DRAWN_LINE_BYTES {
             return None;
         }
-        // A span over several lines is marked on its first.
+        // A span over several lines is marked on its first line.
         let end = floor_char(text, problem.span.end.min(line_end)).max(start);
         let name = self.file.as_str();
         let config = Config::default().with_color(color).with_index_type(IndexType::Byte).with_char_set(CharSet::Ascii);
-        let label = Label::new((name, start..end)).with_message(&problem.wanted).with_color(ariadne::Color::Red);
+        let label = Label::new((name, start..end)).with_message(&problem.expected).with_color(ariadne::Color::Red);
         let mut bytes = Vec::new();
         Report::build(ReportKind::Error, (name, start..end))
             .with_config(config)
@@ -178,7 +178,7 @@ impl Invalid {
     }
 }
 
-/// The largest boundary between characters of `text` that is at most `at`.
+/// Returns the largest character boundary of `text` that is at most `at`.
 fn floor_char(text: &str, at: usize) -> usize {
     let mut at = at.min(text.len());
     while !text.is_char_boundary(at) {

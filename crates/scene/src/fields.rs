@@ -1,8 +1,9 @@
-//! The keys of one table, read one by one: each is checked for type and range, and what nobody
-//! asked for is an unknown key.
+//! The keys of one table. Each getter checks type and range. A key that no getter has read is an
+//! unknown key.
 //!
-//! Getters always answer. Where the file is wrong they record the problem and give a placeholder,
-//! so that reading goes on and finds the next problem; a scene with any problem is never handed out.
+//! Getters always return a value. If the file is wrong they record the problem and return a
+//! placeholder, so that reading continues and finds further problems. A scene with any problem is
+//! never returned.
 
 use std::ops::{Range, RangeInclusive};
 
@@ -11,46 +12,47 @@ use toml::de::{DeTable, DeValue};
 
 use crate::bound::Bound;
 use crate::log::Log;
+use crate::renamed;
 use crate::suggest::{listed, nearest};
 
-/// Names of an enumeration as they stand in files, with what they mean.
+/// Names of an enumeration in files, with their values.
 pub(crate) type Names<T> = &'static [(&'static str, T)];
 
 /// A value with its place in the text.
 pub(crate) type Value<'a> = Spanned<DeValue<'a>>;
 
-/// What is nearer to zero is zero: the inverse of less is no number any more.
-const LEAST: f64 = 1e-300;
+/// Numbers of smaller magnitude are read as 0, since their inverse overflows.
+const MIN_MAGNITUDE: f64 = 1e-300;
 
-/// One table while it is read.
+/// A table that is being read.
 pub(crate) struct Fields<'a> {
-    /// Where problems go.
+    /// Receives the problems.
     pub(crate) log: &'a Log<'a>,
-    /// What the table is, for messages: `[world]`, `body "crate"`.
+    /// What the table is in messages: `[world]`, `body "crate"`.
     pub(crate) what: String,
     /// The place of the table.
     pub(crate) span: Range<usize>,
     table: &'a DeTable<'a>,
     asked: Vec<&'static str>,
-    /// Required keys that are not there, with what was wanted.
+    /// Required keys that are missing, with the expected value.
     missing: Vec<(&'static str, String)>,
 }
 
 impl<'a> Fields<'a> {
-    /// Reads `value` as a table; `None`, with the problem recorded, if it is none.
+    /// Reads `value` as a table. Returns `None`, with the problem recorded, if it is not one.
     pub(crate) fn of(log: &'a Log<'a>, value: &'a Value<'a>, what: impl Into<String>, example: &str) -> Option<Self> {
         let what = what.into();
         match value.get_ref() {
             DeValue::Table(table) => Some(Fields::of_table(log, table, value.span(), what)),
             other => {
                 let message = format!("{what} is {} {}", article(other.type_str()), log.quote(value.span()));
-                log.report(value.span(), message, format!("wanted a table, such as {example}"));
+                log.report(value.span(), message, format!("expected a table, such as {example}"));
                 None
             }
         }
     }
 
-    /// The same for a table already in hand.
+    /// Wraps a parsed table.
     pub(crate) fn of_table(
         log: &'a Log<'a>,
         table: &'a DeTable<'a>,
@@ -60,105 +62,108 @@ impl<'a> Fields<'a> {
         Fields { log, what: what.into(), span, table, asked: Vec::new(), missing: Vec::new() }
     }
 
-    /// The value of `key`, if it is there.
+    /// Returns the value of `key`, if present.
     pub(crate) fn value(&mut self, key: &'static str) -> Option<&'a Value<'a>> {
         self.asked.push(key);
         self.table.get(key)
     }
 
-    /// The name and value of every entry, whatever its name.
+    /// Returns name, place and value of every entry, whatever its name.
     pub(crate) fn entries(&self) -> impl Iterator<Item = (&'a str, Range<usize>, &'a Value<'a>)> + use<'a> {
         self.table.iter().map(|(key, value)| (key.get_ref().as_ref(), key.span(), value))
     }
 
-    /// The value of `key`; its absence is a problem.
-    pub(crate) fn required(&mut self, key: &'static str, wanted: &str) -> Option<&'a Value<'a>> {
+    /// Returns the value of `key`. Its absence is a problem.
+    pub(crate) fn required(&mut self, key: &'static str, expected: &str) -> Option<&'a Value<'a>> {
         let value = self.value(key);
         if value.is_none() {
-            self.missing(key, wanted);
+            self.missing(key, expected);
         }
         value
     }
 
-    /// Records that `key` is not there; told by [`Fields::finish`] or [`Fields::give_up`].
-    pub(crate) fn missing(&mut self, key: &'static str, wanted: &str) {
-        self.missing.push((key, wanted.to_owned()));
+    /// Records that `key` is missing. [`Fields::finish`] and [`Fields::give_up`] report it.
+    pub(crate) fn missing(&mut self, key: &'static str, expected: &str) {
+        self.missing.push((key, expected.to_owned()));
     }
 
     /// Records that the value of `key` is wrong.
-    pub(crate) fn wrong(&self, key: &str, value: &Value<'_>, wanted: impl std::fmt::Display) {
+    pub(crate) fn wrong(&self, key: &str, value: &Value<'_>, expected: impl std::fmt::Display) {
         let message = format!("`{key}` of {} is {}", self.what, self.log.quote(value.span()));
-        self.log.report(value.span(), message, format!("wanted {wanted}"));
+        self.log.report(value.span(), message, format!("expected {expected}"));
     }
 
-    fn wrong_type(&self, key: &str, value: &Value<'_>, wanted: impl std::fmt::Display) {
+    fn wrong_type(&self, key: &str, value: &Value<'_>, expected: impl std::fmt::Display) {
         let kind = article(value.get_ref().type_str());
         let message = format!("`{key}` of {} is {kind}: {}", self.what, self.log.quote(value.span()));
-        self.log.report(value.span(), message, format!("wanted {wanted}"));
+        self.log.report(value.span(), message, format!("expected {expected}"));
     }
 
-    /// Tells of every key that nobody asked for and every required one that is not there. Call it
-    /// once all that can be asked has been.
+    /// Reports every key that was not read and every required key that is missing. Call it after
+    /// all keys have been read.
     pub(crate) fn finish(mut self) {
         self.asked.sort_unstable();
         self.asked.dedup();
         let known = self.asked.clone();
-        self.tell_unknown(&known, true);
+        self.report_unknown(&known, true);
     }
 
-    /// Tells only of the required keys that are not there: what else the table may hold was never asked,
-    /// because that depends on them.
+    /// Reports the missing required keys only. The meaning of the other keys depends on them, so
+    /// these were not read.
     pub(crate) fn give_up(mut self) {
         let known: Vec<&'static str> = self.missing.iter().map(|(key, _)| *key).collect();
-        self.tell_unknown(&known, false);
+        self.report_unknown(&known, false);
     }
 
-    /// Tells of unknown keys, those near a missing one instead of it (and the others only if `all`).
-    fn tell_unknown(&mut self, known: &[&'static str], all: bool) {
+    /// Reports unknown keys. One that is near a missing key is reported instead of the missing key.
+    /// Unknown keys without a near match are reported only if `all`.
+    fn report_unknown(&mut self, known: &[&'static str], all: bool) {
         for (key, span, _) in self.entries() {
             if self.asked.contains(&key) || self.log.is_full() {
                 continue;
             }
-            let meant = nearest(key, known.iter().copied());
-            let wanted = match meant {
-                Some(known) => format!("did you mean `{known}`?"),
-                None if all => self.known_here(known),
-                None => continue,
+            let new_name = renamed::key(key, known);
+            let meant = new_name.or_else(|| nearest(key, known.iter().copied()));
+            let expected = match (new_name, meant) {
+                (Some(new), _) => format!("this is now `{new}`"),
+                (None, Some(known)) => format!("did you mean `{known}`?"),
+                (None, None) if all => self.known_here(known),
+                (None, None) => continue,
             };
             self.missing.retain(|(missing, _)| Some(*missing) != meant);
-            self.log.report(span, format!("unknown key `{}` in {}", shortened(key), self.what), wanted);
+            self.log.report(span, format!("unknown key `{}` in {}", shortened(key), self.what), expected);
         }
-        for (key, wanted) in &self.missing {
-            self.log.report(self.span.clone(), format!("{} has no `{key}`", self.what), format!("wanted {wanted}"));
+        for (key, expected) in &self.missing {
+            self.log.report(self.span.clone(), format!("{} has no `{key}`", self.what), format!("expected {expected}"));
         }
     }
 
-    /// The keys that could still be added.
+    /// Returns the keys that may still be added, as a sentence.
     fn known_here(&self, known: &[&'static str]) -> String {
         let free: Vec<&str> = known.iter().copied().filter(|key| !self.table.contains_key(*key)).collect();
         match free.is_empty() {
-            true => format!("known here are only {}", listed(known.iter().copied(), "and")),
-            false => format!("known here: {}", listed(free, "and")),
+            true => format!("the only keys are {}", listed(known.iter().copied(), "and")),
+            false => format!("known keys: {}", listed(free, "and")),
         }
     }
 
     // Numbers.
 
-    /// A number in `bound`, if the key is there.
+    /// Returns a number in `bound`, if the key is present.
     pub(crate) fn optional_number(&mut self, key: &'static str, bound: Bound) -> Option<f64> {
         let value = self.value(key)?;
         Some(self.as_number(key, value, bound))
     }
 
-    /// A number in `bound`.
+    /// Returns a number in `bound`.
     pub(crate) fn number(&mut self, key: &'static str, bound: Bound) -> f64 {
-        match self.required(key, bound.wanted()) {
+        match self.required(key, bound.expected()) {
             Some(value) => self.as_number(key, value, bound),
             None => f64::NAN,
         }
     }
 
-    /// A number in `bound`, or `default` where the key is not there.
+    /// Returns a number in `bound`, or `default` if the key is absent.
     pub(crate) fn number_or(&mut self, key: &'static str, bound: Bound, default: f64) -> f64 {
         self.optional_number(key, bound).unwrap_or(default)
     }
@@ -166,13 +171,13 @@ impl<'a> Fields<'a> {
     pub(crate) fn as_number(&self, key: &str, value: &Value<'_>, bound: Bound) -> f64 {
         match number_of(value) {
             Some(x) if bound.holds(x) => return x,
-            Some(_) => self.wrong(key, value, bound.wanted()),
-            None => self.wrong_type(key, value, bound.wanted()),
+            Some(_) => self.wrong(key, value, bound.expected()),
+            None => self.wrong_type(key, value, bound.expected()),
         }
         f64::NAN
     }
 
-    /// A whole number in `range`, or `default` where the key is not there.
+    /// Returns an integer in `range`, or `default` if the key is absent.
     pub(crate) fn integer_or(&mut self, key: &'static str, range: RangeInclusive<u32>, default: u32) -> u32 {
         match self.value(key) {
             Some(value) => self.as_integer(key, value, range),
@@ -180,32 +185,32 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// A whole number in `range`.
+    /// Returns `value` as an integer in `range`.
     pub(crate) fn as_integer(&self, key: &str, value: &Value<'_>, range: RangeInclusive<u32>) -> u32 {
-        let wanted = format!("a whole number from {} to {}", range.start(), range.end());
+        let expected = format!("an integer from {} to {}", range.start(), range.end());
         match value.get_ref() {
             DeValue::Integer(digits) => {
                 let number =
                     i64::from_str_radix(digits.as_str(), digits.radix()).ok().and_then(|n| u32::try_from(n).ok());
                 match number.filter(|n| range.contains(n)) {
                     Some(n) => return n,
-                    None => self.wrong(key, value, wanted),
+                    None => self.wrong(key, value, expected),
                 }
             }
-            _ => self.wrong_type(key, value, wanted),
+            _ => self.wrong_type(key, value, expected),
         }
         *range.start()
     }
 
     // Lists of numbers.
 
-    /// `N` numbers in `bound`, if the key is there.
+    /// Returns `N` numbers in `bound`, if the key is present.
     pub(crate) fn optional_vector<const N: usize>(&mut self, key: &'static str, bound: Bound) -> Option<[f64; N]> {
         let value = self.value(key)?;
         Some(self.as_vector(key, value, bound))
     }
 
-    /// `N` numbers in `bound`.
+    /// Returns `N` numbers in `bound`.
     pub(crate) fn vector<const N: usize>(&mut self, key: &'static str, bound: Bound) -> [f64; N] {
         match self.required(key, &format!("a list of {N} numbers")) {
             Some(value) => self.as_vector(key, value, bound),
@@ -213,12 +218,12 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// `N` numbers in `bound`, or `default` where the key is not there.
+    /// Returns `N` numbers in `bound`, or `default` if the key is absent.
     pub(crate) fn vector_or<const N: usize>(&mut self, key: &'static str, bound: Bound, default: [f64; N]) -> [f64; N] {
         self.optional_vector(key, bound).unwrap_or(default)
     }
 
-    /// `value` as `N` numbers in `bound`.
+    /// Returns `value` as `N` numbers in `bound`.
     pub(crate) fn as_vector<const N: usize>(&self, key: &str, value: &Value<'_>, bound: Bound) -> [f64; N] {
         let mut out = [f64::NAN; N];
         match value.get_ref() {
@@ -230,14 +235,15 @@ impl<'a> Fields<'a> {
             DeValue::Array(items) => {
                 let message =
                     format!("`{key}` of {} has {} entries: {}", self.what, items.len(), self.log.quote(value.span()));
-                self.log.report(value.span(), message, format!("wanted a list of {N} numbers"));
+                self.log.report(value.span(), message, format!("expected a list of {N} numbers"));
             }
             _ => self.wrong_type(key, value, format!("a list of {N} numbers")),
         }
         out
     }
 
-    /// A direction, made a unit vector; `default` (already of length 1) where the key is not there.
+    /// Returns a direction as a unit vector, or `default`, a unit vector already, if the key is
+    /// absent.
     pub(crate) fn direction_or(&mut self, key: &'static str, default: [f64; 3]) -> [f64; 3] {
         let Some(value) = self.value(key) else { return default };
         let problems = self.log.count();
@@ -252,7 +258,7 @@ impl<'a> Fields<'a> {
         default
     }
 
-    /// A direction, made a unit vector.
+    /// Returns a direction as a unit vector.
     pub(crate) fn direction(&mut self, key: &'static str) -> [f64; 3] {
         if self.required(key, "a direction, such as [0, 0, -1]").is_none() {
             return [f64::NAN; 3];
@@ -260,9 +266,9 @@ impl<'a> Fields<'a> {
         self.direction_or(key, [f64::NAN; 3])
     }
 
-    // Words.
+    // Strings.
 
-    /// `true` or `false`, or `default` where the key is not there.
+    /// Returns `true` or `false`, or `default` if the key is absent.
     pub(crate) fn flag_or(&mut self, key: &'static str, default: bool) -> bool {
         let Some(value) = self.value(key) else { return default };
         value.get_ref().as_bool().unwrap_or_else(|| {
@@ -271,34 +277,35 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// A text, with its value for messages, if the key is there and is a text.
+    /// Returns a string and its value for messages, if the key is present and a string.
     pub(crate) fn optional_text(&mut self, key: &'static str) -> Option<(&'a str, &'a Value<'a>)> {
         let value = self.value(key)?;
         self.as_text(key, value).map(|text| (text, value))
     }
 
-    /// A text, with its value for messages.
-    pub(crate) fn text(&mut self, key: &'static str, wanted: &str) -> Option<(&'a str, &'a Value<'a>)> {
-        let value = self.required(key, wanted)?;
+    /// Returns a string and its value for messages.
+    pub(crate) fn text(&mut self, key: &'static str, expected: &str) -> Option<(&'a str, &'a Value<'a>)> {
+        let value = self.required(key, expected)?;
         self.as_text(key, value).map(|text| (text, value))
     }
 
-    /// `value` as a text.
+    /// Returns `value` as a string.
     pub(crate) fn as_text(&self, key: &str, value: &'a Value<'a>) -> Option<&'a str> {
         let text = value.get_ref().as_str();
         if text.is_none() {
-            self.wrong_type(key, value, "a text in quotes");
+            self.wrong_type(key, value, "a string in quotes");
         }
         text
     }
 
-    /// One of `names`; `None`, with the problem recorded, where it is missing or another word.
+    /// Returns one of `names`. `None`, with the problem recorded, if the key is absent or has
+    /// another value.
     pub(crate) fn choice<T: Copy>(&mut self, key: &'static str, names: Names<T>) -> Option<T> {
         let value = self.required(key, &listed(names.iter().map(|(name, _)| *name), "or"))?;
         self.as_choice(key, value, names)
     }
 
-    /// One of `names`, or `default` where the key is not there.
+    /// Returns one of `names`, or `default` if the key is absent.
     pub(crate) fn choice_or<T: Copy>(&mut self, key: &'static str, names: Names<T>, default: T) -> T {
         match self.value(key) {
             Some(value) => self.as_choice(key, value, names).unwrap_or(default),
@@ -306,7 +313,7 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// `value` as one of `names`.
+    /// Returns `value` as one of `names`.
     pub(crate) fn as_choice<T: Copy>(&self, key: &str, value: &'a Value<'a>, names: Names<T>) -> Option<T> {
         let typed = self.as_text(key, value)?;
         let found = names.iter().find(|(name, _)| *name == typed).map(|(_, meaning)| *meaning);
@@ -318,10 +325,14 @@ impl<'a> Fields<'a> {
 
     /// Records that `typed` is not among `known`, with the nearest of them.
     pub(crate) fn unknown_name(&self, key: &str, value: &Value<'_>, typed: &str, known: Vec<&str>) {
-        match nearest(typed, known.iter().copied()) {
-            Some(near) => {
+        let hint = match (renamed::value(key, typed, &known), nearest(typed, known.iter().copied())) {
+            (Some(new), _) => Some(format!("this is now `{new}`")),
+            (None, near) => near.map(|near| format!("did you mean `{near}`?")),
+        };
+        match hint {
+            Some(hint) => {
                 let message = format!("`{key}` of {} is {}", self.what, self.log.quote(value.span()));
-                self.log.report(value.span(), message, format!("did you mean `{near}`?"));
+                self.log.report(value.span(), message, hint);
             }
             None => {
                 let mut once: Vec<&str> = Vec::new();
@@ -335,7 +346,7 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// The tables of `[[key]]`, none where the key is not there; at most `limit` of them.
+    /// Returns the tables of `[[key]]`, at most `limit`; none if the key is absent.
     pub(crate) fn tables(&mut self, key: &'static str, limit: usize) -> Vec<Fields<'a>> {
         let Some(value) = self.value(key) else { return Vec::new() };
         let DeValue::Array(items) = value.get_ref() else {
@@ -344,7 +355,7 @@ impl<'a> Fields<'a> {
         };
         if items.len() > limit {
             let message = format!("there are {} tables [[{key}]]", items.len());
-            self.log.report(value.span(), message, format!("wanted at most {limit}"));
+            self.log.report(value.span(), message, format!("expected at most {limit}"));
             return Vec::new();
         }
         let example = format!("[[{key}]]");
@@ -353,7 +364,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// The number a value is, whole or not; not finite where the text says so or overflows.
+/// Returns a number or an integer as a number. It is not finite if the text says so or overflows.
 pub(crate) fn number_of(value: &Value<'_>) -> Option<f64> {
     let number: Option<f64> = match value.get_ref() {
         DeValue::Float(float) => float.as_str().parse().ok(),
@@ -361,15 +372,15 @@ pub(crate) fn number_of(value: &Value<'_>) -> Option<f64> {
         DeValue::Integer(digits) => i64::from_str_radix(digits.as_str(), digits.radix()).ok().map(|n| n as f64),
         _ => None,
     };
-    number.map(|x| if x.abs() < LEAST { 0.0 } else { x })
+    number.map(|x| if x.abs() < MIN_MAGNITUDE { 0.0 } else { x })
 }
 
-/// The Euclidean length of a vector.
+/// Returns the Euclidean length of a vector.
 pub(crate) fn norm<const N: usize>(v: &[f64; N]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// A key for a message, cut where it is long.
+/// Returns a key for a message, truncated if it is long.
 fn shortened(key: &str) -> String {
     key.chars().map(|c| if c.is_control() { ' ' } else { c }).take(48).collect()
 }

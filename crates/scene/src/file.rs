@@ -1,4 +1,4 @@
-//! A scene file as a whole: from text to a checked description.
+//! A scene file: from text to a checked description.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -9,12 +9,12 @@ use toml::de::{DeTable, DeValue};
 
 use crate::articulated::ArticulatedSpec;
 use crate::body::{BodySpec, Library};
-use crate::closure::{ClosureSpec, PartSpec, Parts};
 use crate::error::{Invalid, SceneError};
 use crate::fields::Fields;
 use crate::format::FileKind;
-use crate::grid::{self, MOST_BODIES};
+use crate::grid::{self, MAX_BODIES};
 use crate::log::Log;
+use crate::loop_joint::{LoopJointSpec, PartSpec, Parts};
 use crate::material::MaterialSpec;
 use crate::mesh::MeshSpec;
 use crate::on_floor;
@@ -24,25 +24,26 @@ use crate::view::{CameraSpec, CavePlace, GroundSpec, LightSpec, SkySpec};
 use crate::world::WorldSettings;
 use tumble_core::collide::ContactMode;
 
-/// Most bytes of a scene file: 16 MiB.
-pub const MOST_BYTES: u64 = 16 << 20;
-/// In a longer text only the first slip of syntax is told: the parser keeps every one it finds.
+/// Largest scene file in bytes: 16 MiB.
+pub const MAX_BYTES: u64 = 16 << 20;
+/// In a longer text only the first syntax error is reported, since the parser keeps every one it
+/// finds.
 const RECOVERED_BYTES: usize = 256 << 10;
-/// A text with more slips of syntax is no TOML: only the first is told.
-const MOST_SLIPS: usize = 5;
-/// Most articulated bodies of a scene.
-const MOST_ARTICULATED: usize = 10_000;
-/// Most closures of a scene.
-const MOST_CLOSURES: usize = 100_000;
-/// Most tables `[[pair]]` of a scene.
-const MOST_PAIRS: usize = 1_000;
-/// Most lights of a scene.
-const MOST_LIGHTS: usize = 64;
+/// A text with more syntax errors is probably not TOML. Only the first is reported.
+const MAX_SYNTAX_ERRORS: usize = 5;
+/// Largest number of articulated bodies of a scene.
+const MAX_ARTICULATED: usize = 10_000;
+/// Largest number of loop joints of a scene.
+const MAX_LOOP_JOINTS: usize = 100_000;
+/// Largest number of tables `[[pair]]` of a scene.
+const MAX_PAIRS: usize = 1_000;
+/// Largest number of lights of a scene.
+const MAX_LIGHTS: usize = 64;
 
 /// A scene as its file describes it: checked, references resolved, grids expanded to bodies.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneFile {
-    /// The name of the file, as errors show it.
+    /// The name of the file as errors show it.
     pub file: String,
     /// One line that says what the scene shows; may be empty.
     pub description: String,
@@ -56,45 +57,45 @@ pub struct SceneFile {
     pub bodies: Vec<BodySpec>,
     /// `[[articulated]]` in the order of the file.
     pub articulated: Vec<ArticulatedSpec>,
-    /// `[[closure]]` in the order of the file.
-    pub closures: Vec<ClosureSpec>,
+    /// `[[loop_joint]]` in the order of the file.
+    pub loop_joints: Vec<LoopJointSpec>,
     /// `[[pair]]` in the order of the file.
     pub pairs: Vec<PairSpec>,
     /// `[camera]`; `None` leaves the view to the renderer.
     pub camera: Option<CameraSpec>,
-    /// `[cave]`; `None` leaves the place of a cave to the camera.
+    /// `[cave]`; `None` derives the pose of a cave from the camera.
     pub cave: Option<CavePlace>,
-    /// `[[light]]`; a sun where there is none.
+    /// `[[light]]`; one sun if the scene has none.
     pub lights: Vec<LightSpec>,
     /// `[sky]`.
     pub sky: SkySpec,
     /// `[ground]`; `None` draws no floor.
     pub ground: Option<GroundSpec>,
-    /// What is to be said of the file.
+    /// Notes about the file.
     pub notes: Vec<String>,
 }
 
-/// How a robot or a mesh file is opened as a scene. Scene files say all of this themselves.
+/// How a robot or a mesh file is opened as a scene. Scene files have keys for these options.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadOptions {
     /// How a URDF is read.
     pub urdf: UrdfOptions,
-    /// Whether holes and other defects of a mesh are repaired; otherwise they are an error.
+    /// Whether holes and other defects of a mesh are repaired. Otherwise they are an error.
     pub repair: bool,
 }
 
 impl SceneFile {
-    /// Reads the file at `path`, or `scene.toml` in the folder `path`. A URDF (`.urdf`) becomes a scene of the robot on a floor through its
-    /// lowest point; a mesh (`.obj`, `.stl`, `.ply`, `.dae`) one of a dynamic body of 1000 kg/m³ above a floor, in the frame of its file.
+    /// Reads the file at `path`, or `scene.toml` in the folder `path`. A URDF (`.urdf`) becomes a
+    /// scene with the robot on a floor through its lowest point. A mesh (`.obj`, `.stl`, `.ply`,
+    /// `.dae`) becomes a dynamic body of 1000 kg/m³ above a floor, in the frame of its file.
     ///
     /// # Errors
-    /// [`SceneError`]: the file cannot be read, is larger than 16 MiB, not UTF-8 or of another format, or has problems,
-    /// all of which are told at once.
+    /// [`SceneError`]: the file cannot be read, is larger than 16 MiB, not UTF-8 or of another format, or has problems. All problems are reported at once.
     pub fn load(path: impl AsRef<Path>) -> Result<SceneFile, SceneError> {
         SceneFile::load_with(path, &LoadOptions::default())
     }
 
-    /// The same, with options for robots and meshes.
+    /// As [`SceneFile::load`], with options for robots and meshes.
     ///
     /// # Errors
     /// As [`SceneFile::load`].
@@ -110,7 +111,7 @@ impl SceneFile {
         }
         let bytes = read_capped(&path)?;
         if let Some(at) = bytes.iter().position(|b| *b == 0) {
-            let why = format!("byte {at} of the file is 0, so it is no text; a scene is a UTF-8 text in TOML");
+            let why = format!("byte {at} of the file is 0, so it is not text; a scene is a UTF-8 text in TOML");
             return Err(SceneError::Format { file: path, why });
         }
         match std::str::from_utf8(&bytes) {
@@ -123,7 +124,7 @@ impl SceneFile {
         }
     }
 
-    /// Reads a scene from its text. `file_name` is shown in errors, and mesh files are looked for in
+    /// Reads a scene from its text. `file_name` is shown in errors; paths of meshes are relative to
     /// its folder.
     ///
     /// # Errors
@@ -132,13 +133,14 @@ impl SceneFile {
         SceneFile::parse_with(text, file_name, &[])
     }
 
-    /// The same with texts that stand in for files of the scene's folder: names and contents.
+    /// As [`SceneFile::parse`], with texts that replace files of the scene's folder: names and
+    /// contents.
     pub(crate) fn parse_with(text: &str, file_name: &str, files: &[(&str, &str)]) -> Result<SceneFile, SceneError> {
-        if text.len() as u64 > MOST_BYTES {
-            return Err(SceneError::TooLarge { file: file_name.into(), limit: MOST_BYTES });
+        if text.len() as u64 > MAX_BYTES {
+            return Err(SceneError::TooLarge { file: file_name.into(), limit: MAX_BYTES });
         }
         let log = Log::new(text).in_folder(Path::new(file_name).parent().unwrap_or(Path::new("")));
-        // What follows a slip of syntax is guesswork: it is told alone.
+        // After a syntax error the tree is guesswork, so only syntax errors are reported.
         let scene = parse_toml(&log, text).map(|root| SceneFile::read(&log, &root, file_name, files));
         match scene {
             Some(scene) if log.count() == 0 => Ok(scene),
@@ -160,12 +162,12 @@ impl SceneFile {
         let bodies = read_bodies(&mut f, &library, &mut names);
         let articulated = read_articulated(&mut f, &library, &place, &mut names);
         let objects = Objects { bodies: &bodies, articulated: &articulated };
-        let closures = read_closures(&mut f, &objects, &mut names);
+        let loop_joints = read_loop_joints(&mut f, &objects, &mut names);
         let pairs = read_pairs(&mut f, &library, &objects);
         let camera = read_table(&mut f, "camera", CameraSpec::read);
         let cave = read_table(&mut f, "cave", CavePlace::read);
         let mut lights: Vec<LightSpec> =
-            f.tables("light", MOST_LIGHTS).into_iter().filter_map(LightSpec::read).collect();
+            f.tables("light", MAX_LIGHTS).into_iter().filter_map(LightSpec::read).collect();
         if lights.is_empty() {
             lights.push(LightSpec::sun());
         }
@@ -180,7 +182,7 @@ impl SceneFile {
             meshes: meshes.into_iter().filter_map(|(_, mesh)| mesh).collect(),
             bodies,
             articulated,
-            closures,
+            loop_joints,
             pairs,
             camera,
             cave,
@@ -192,15 +194,15 @@ impl SceneFile {
     }
 }
 
-/// Where the files are that a scene names.
+/// Where the files that a scene names are found.
 pub(crate) struct Place<'a> {
     /// The folder of the scene.
     pub folder: &'a Path,
-    /// Names and contents of those that came with the text of the scene.
+    /// Names and contents of files that are given with the text of the scene.
     pub files: &'a [(&'a str, &'a str)],
 }
 
-/// The tree of a TOML text; `None`, with the problems recorded, if it is no TOML.
+/// Parses a TOML text. Returns `None`, with the problems recorded, if it has syntax errors.
 pub(crate) fn parse_toml<'a>(log: &Log<'_>, text: &'a str) -> Option<DeTable<'a>> {
     let (root, errors) = match text.len() > RECOVERED_BYTES {
         true => DeTable::parse(text).map_or_else(|error| (None, vec![error]), |root| (Some(root), Vec::new())),
@@ -209,25 +211,25 @@ pub(crate) fn parse_toml<'a>(log: &Log<'_>, text: &'a str) -> Option<DeTable<'a>
             (Some(root), errors)
         }
     };
-    let no_toml = errors.len() > MOST_SLIPS;
-    for error in errors.iter().take(if no_toml { 1 } else { MOST_SLIPS }) {
-        let (message, mut wanted) = in_our_words(error.message());
+    let no_toml = errors.len() > MAX_SYNTAX_ERRORS;
+    for error in errors.iter().take(if no_toml { 1 } else { MAX_SYNTAX_ERRORS }) {
+        let (message, mut expected) = message_and_hint(error.message());
         if no_toml {
-            wanted += &format!("; {} more slips of syntax follow, so this may be no TOML at all", errors.len() - 1);
+            expected += &format!("; {} more syntax errors follow, so this may not be TOML", errors.len() - 1);
         }
-        log.report(error.span().unwrap_or(0..0), message, wanted);
+        log.report(error.span().unwrap_or(0..0), message, expected);
     }
     root.filter(|_| errors.is_empty()).map(toml::Spanned::into_inner)
 }
 
-/// At most [`MOST_BYTES`] of a file.
+/// Reads a file of at most [`MAX_BYTES`].
 fn read_capped(path: &Path) -> Result<Vec<u8>, SceneError> {
     let unread = |source| SceneError::Read { file: path.to_path_buf(), source };
     let file = std::fs::File::open(path).map_err(unread)?;
     let mut bytes = Vec::new();
-    file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(unread)?;
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(SceneError::TooLarge { file: PathBuf::from(path), limit: MOST_BYTES });
+    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unread)?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(SceneError::TooLarge { file: PathBuf::from(path), limit: MAX_BYTES });
     }
     Ok(bytes)
 }
@@ -237,18 +239,18 @@ fn invalid(log: Log<'_>, text: &str, file_name: &str) -> SceneError {
     SceneError::Invalid(Box::new(Invalid { file: file_name.to_owned(), text: text.to_owned(), problems }))
 }
 
-/// The parser's message as what is wrong and what is wanted.
-fn in_our_words(message: &str) -> (String, String) {
+/// Splits the parser's message into the fault and the expected text.
+fn message_and_hint(message: &str) -> (String, String) {
     let line = message.split_whitespace().collect::<Vec<_>>().join(" ");
     match line.split_once(", expected ") {
-        Some((wrong, "nothing")) => (format!("TOML: {wrong}"), "wanted nothing here".into()),
-        Some((wrong, wanted)) => (format!("TOML: {wrong}"), format!("wanted {wanted}")),
-        None if line == "duplicate key" => ("TOML: duplicate key".into(), "wanted each key once in its table".into()),
-        None => (format!("TOML: {line}"), "wanted a TOML document".into()),
+        Some((wrong, "nothing")) => (format!("TOML: {wrong}"), "expected nothing here".into()),
+        Some((wrong, expected)) => (format!("TOML: {wrong}"), format!("expected {expected}")),
+        None if line == "duplicate key" => ("TOML: duplicate key".into(), "expected each key once in its table".into()),
+        None => (format!("TOML: {line}"), "expected a TOML document".into()),
     }
 }
 
-/// The table `[key]`, if it is there.
+/// Reads the table `[key]`, if present.
 pub(crate) fn read_table<'a, T>(
     f: &mut Fields<'a>,
     key: &'static str,
@@ -258,7 +260,7 @@ pub(crate) fn read_table<'a, T>(
     Fields::of(f.log, value, format!("[{key}]"), &format!("[{key}]")).map(read)
 }
 
-/// The tables `[key.NAME]` by name; `None` stands for one that is wrong.
+/// Reads the tables `[key.NAME]` by name. `None` marks an invalid one.
 fn read_named<'a, T>(
     f: &mut Fields<'a>,
     key: &'static str,
@@ -289,10 +291,10 @@ fn library<'a>(
     Library { meshes, material_names, materials, contacts }
 }
 
-/// All bodies, those of grids included, each with a name of its own.
+/// Reads all bodies, including those of grids, and checks that their names are unique.
 fn read_bodies(f: &mut Fields<'_>, library: &Library<'_>, names: &mut Taken) -> Vec<BodySpec> {
     let mut bodies = Vec::new();
-    for mut table in f.tables("body", MOST_BODIES) {
+    for mut table in f.tables("body", MAX_BODIES) {
         let place = name_span(&mut table);
         if let Some(body) = BodySpec::read(&mut table, library) {
             note_name(&table, names, &body.name, &place);
@@ -300,10 +302,10 @@ fn read_bodies(f: &mut Fields<'_>, library: &Library<'_>, names: &mut Taken) -> 
         }
         table.finish();
     }
-    for mut table in f.tables("grid", MOST_BODIES) {
+    for mut table in f.tables("grid", MAX_BODIES) {
         let place = name_span(&mut table);
         let (log, what, first) = (table.log, table.what.clone(), bodies.len());
-        grid::read(table, library, MOST_BODIES.saturating_sub(first), &mut bodies);
+        grid::read(table, library, MAX_BODIES.saturating_sub(first), &mut bodies);
         for body in &bodies[first..] {
             if !note_unique(log, &what, names, &body.name, &place) {
                 break;
@@ -313,7 +315,7 @@ fn read_bodies(f: &mut Fields<'_>, library: &Library<'_>, names: &mut Taken) -> 
     bodies
 }
 
-/// All articulated bodies, each with a name that no other object has.
+/// Reads all articulated bodies and checks that their names are unique among objects.
 fn read_articulated(
     f: &mut Fields<'_>,
     library: &Library<'_>,
@@ -328,28 +330,28 @@ fn read_articulated(
         }
         Some(spec)
     };
-    f.tables("articulated", MOST_ARTICULATED).into_iter().filter_map(one).collect()
+    f.tables("articulated", MAX_ARTICULATED).into_iter().filter_map(one).collect()
 }
 
-fn read_closures(f: &mut Fields<'_>, objects: &Objects<'_>, names: &mut Taken) -> Vec<ClosureSpec> {
+fn read_loop_joints(f: &mut Fields<'_>, objects: &Objects<'_>, names: &mut Taken) -> Vec<LoopJointSpec> {
     let one = |mut table: Fields<'_>| {
         let (log, place) = (table.log, name_span(&mut table));
-        let spec = ClosureSpec::read(table, objects)?;
+        let spec = LoopJointSpec::read(table, objects)?;
         if !spec.name.is_empty() {
             note_unique(log, "object", names, &spec.name, &place);
         }
         Some(spec)
     };
-    f.tables("closure", MOST_CLOSURES).into_iter().filter_map(one).collect()
+    f.tables("loop_joint", MAX_LOOP_JOINTS).into_iter().filter_map(one).collect()
 }
 
 fn read_pairs(f: &mut Fields<'_>, library: &Library<'_>, objects: &Objects<'_>) -> Vec<PairSpec> {
     let mut lines = BTreeMap::new();
-    let tables = f.tables("pair", MOST_PAIRS);
+    let tables = f.tables("pair", MAX_PAIRS);
     tables.into_iter().filter_map(|table| PairSpec::read(table, library, objects, &mut lines)).collect()
 }
 
-/// The objects that closures can join and pairs can name.
+/// The objects that loop joints and pairs can name.
 struct Objects<'a> {
     bodies: &'a [BodySpec],
     articulated: &'a [ArticulatedSpec],
@@ -378,7 +380,7 @@ impl Parts for Objects<'_> {
     }
 }
 
-/// Names of objects, with where they stand.
+/// Names of objects, with their places.
 type Taken = BTreeMap<String, Range<usize>>;
 
 fn name_span(table: &mut Fields<'_>) -> Range<usize> {
@@ -391,22 +393,22 @@ fn note_name(table: &Fields<'_>, names: &mut Taken, name: &str, place: &Range<us
     }
 }
 
-/// Files `name`; `false`, with the problem recorded, where it is taken.
+/// Adds `name`. Returns `false`, with the problem recorded, if it is taken.
 fn note_unique(log: &Log<'_>, what: &str, names: &mut Taken, name: &str, place: &Range<usize>) -> bool {
     match names.insert(name.to_owned(), place.clone()) {
         None => true,
         Some(earlier) => {
             let line = log.line(earlier.start);
             let kind = what.split(' ').next().unwrap_or("body");
-            let message = format!("`name`: this {kind} makes a second body \"{name}\"; the first is at line {line}");
-            log.report(place.clone(), message, "wanted a name that no other body has");
+            let message = format!("`name`: there is a second {kind} \"{name}\"; the first is at line {line}");
+            log.report(place.clone(), message, "expected a unique name");
             names.insert(name.to_owned(), earlier);
             false
         }
     }
 }
 
-/// The `description` of a scene's text, without reading the rest; empty where there is none.
+/// Returns the `description` of a scene's text without reading the rest; empty if there is none.
 pub(crate) fn description(text: &str) -> String {
     let (root, _) = DeTable::parse_recoverable(text);
     match root.get_ref().get("description").map(|value| value.get_ref()) {

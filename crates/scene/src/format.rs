@@ -1,58 +1,59 @@
-//! What a file is, by the extension of its name.
+//! File formats by extension.
 
 use std::path::Path;
 
-/// Extensions of meshes.
+/// Extensions of supported mesh formats.
 const MESHES: [&str; 4] = ["obj", "stl", "ply", "dae"];
-/// Extensions of meshes that are not read.
+/// Extensions of mesh formats that are not supported.
 const OTHER_MESHES: [&str; 24] = [
     "off", "glb", "gltf", "fbx", "3ds", "3mf", "amf", "blend", "usd", "usda", "usdc", "usdz", "wrl", "x3d", "step",
     "stp", "iges", "igs", "brep", "vtk", "vtp", "msh", "lwo", "ctm",
 ];
-/// Extensions of robots that are not read.
+/// Extensions of robot formats that are not supported.
 const OTHER_ROBOTS: [&str; 3] = ["sdf", "mjcf", "xml"];
 
-/// The extension of a path in small letters; empty where it has none.
+/// Returns the extension of a path in lower case; empty if it has none.
 pub(crate) fn extension(path: &Path) -> String {
     path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase()
 }
 
-/// What is in a file.
+/// The kind of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileKind {
-    /// A scene; also a cave, and whatever has no extension that is known.
+    /// A scene or a cave, and any file whose extension is not known.
     Scene,
     /// A robot.
     Urdf,
-    /// A mesh of a format that is read.
+    /// A mesh of a supported format.
     Mesh,
 }
 
 impl FileKind {
-    /// By the extension of the name.
+    /// Returns the kind of a file by its extension.
     ///
     /// # Errors
-    /// The extension names a format that is known and not read: a sentence without the file's name.
+    /// The extension names a known format that is not supported: a sentence without the file's
+    /// name.
     pub fn of(path: &Path) -> Result<FileKind, String> {
         let own = extension(path);
         match own.as_str() {
             "urdf" => Ok(FileKind::Urdf),
             e if MESHES.contains(&e) => Ok(FileKind::Mesh),
             e if OTHER_MESHES.contains(&e) => Err(format!(
-                "meshes are read from OBJ, STL, PLY and COLLADA (.obj, .stl, .ply, .dae); .{e} is not one of them; convert the file, as Blender and MeshLab do"
+                "the mesh format .{e} is not supported; convert the file to .obj, .stl, .ply or .dae, for example with Blender or MeshLab"
             )),
             e if OTHER_ROBOTS.contains(&e) => {
-                Err(format!("robots are read from URDF (.urdf); .{e} is not read; convert the file"))
+                Err(format!("the robot format .{e} is not supported; convert the file to URDF (.urdf)"))
             }
             "xacro" => {
-                Err("robots are read from URDF (.urdf); expand the macros first: xacro NAME.xacro > NAME.urdf".into())
+                Err("macros of .xacro are not supported; expand them first: xacro NAME.xacro > NAME.urdf".into())
             }
             _ => Ok(FileKind::Scene),
         }
     }
 }
 
-/// Whether a name has an extension by which files of scenes, robots and meshes are known, read or not.
+/// Returns whether a name has the extension of a scene, robot or mesh format, supported or not.
 pub(crate) fn is_file_name(path: &Path) -> bool {
     let own = extension(path);
     ["toml", "urdf", "xacro"].iter().chain(&MESHES).chain(&OTHER_MESHES).chain(&OTHER_ROBOTS).any(|known| own == *known)

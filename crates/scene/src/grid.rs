@@ -1,18 +1,18 @@
 //! `[[grid]]`: a body repeated in rows, layers or a triangle.
 //!
-//! All keys of a body stand for each copy; copy *k* (from 1) of a grid named `ball` is `ball_k`.
-//! `box` counts along x fastest, then y, then z. `triangle` has 1, 2, 3, … bodies per row, the rows
-//! `√3/2` of the spacing apart along the horizontal direction `toward`, each row from left to right as
-//! one looks along it: the pins of a bowling lane come out with their customary numbers.
+//! All keys of a body apply to each copy; copy *k* (from 1) of a grid named `ball` is `ball_k`.
+//! `box` counts along x first, then y, then z. `triangle` has 1, 2, 3, … bodies per row. Its rows
+//! are `√3/2` of the spacing apart along the horizontal direction `toward`, and each row runs from
+//! left to right as seen along it, so the pins of a bowling lane get their usual numbers.
 
-use crate::body::{BodySpec, Library, MOST_NAME_BYTES};
+use crate::appearance::{as_color, as_pattern};
+use crate::body::{BodySpec, Library, MAX_NAME_BYTES};
 use crate::bound::Bound;
 use crate::fields::{Fields, Names, Value};
-use crate::look::{as_color, as_pattern};
 use toml::de::DeValue;
 
-/// Most bodies of a scene, grids included.
-pub(crate) const MOST_BODIES: usize = 1_000_000;
+/// Largest number of bodies of a scene, grids included.
+pub(crate) const MAX_BODIES: usize = 1_000_000;
 
 #[derive(Clone, Copy)]
 enum Arrangement {
@@ -22,7 +22,7 @@ enum Arrangement {
 
 const ARRANGEMENTS: Names<Arrangement> = &[("box", Arrangement::Box), ("triangle", Arrangement::Triangle)];
 
-/// Reads a grid and appends its bodies; at most `room` of them.
+/// Reads a grid and appends its bodies, at most `room`.
 pub(crate) fn read(mut f: Fields<'_>, library: &Library<'_>, room: usize, out: &mut Vec<BodySpec>) {
     let template = BodySpec::read(&mut f, library);
     let arrangement = f.choice_or("arrangement", ARRANGEMENTS, Arrangement::Box);
@@ -36,10 +36,10 @@ pub(crate) fn read(mut f: Fields<'_>, library: &Library<'_>, room: usize, out: &
         return f.finish();
     };
     let longest = template.name.len() + 1 + offsets.len().to_string().len();
-    if longest > MOST_NAME_BYTES
+    if longest > MAX_NAME_BYTES
         && let Some(value) = f.value("name")
     {
-        f.wrong("name", value, format!("a name that has at most {MOST_NAME_BYTES} bytes with its number behind it"));
+        f.wrong("name", value, format!("a name that has at most {MAX_NAME_BYTES} bytes including the number"));
     }
     f.finish();
     for (k, offset) in offsets.into_iter().enumerate() {
@@ -49,28 +49,29 @@ pub(crate) fn read(mut f: Fields<'_>, library: &Library<'_>, room: usize, out: &
             body.position_m[axis] += offset[axis];
         }
         if !colors.is_empty() {
-            body.look.color = colors[k % colors.len()];
+            body.appearance.color = colors[k % colors.len()];
         }
         if !patterns.is_empty() {
-            body.look.pattern = patterns[k % patterns.len()];
+            body.appearance.pattern = patterns[k % patterns.len()];
         }
         out.push(body);
     }
 }
 
-/// Offsets of a box of bodies; `None`, with the problem recorded, where they are too many.
+/// Returns the offsets of a box of bodies; `None`, with the problem recorded, if there are too
+/// many.
 fn read_box(f: &mut Fields<'_>, room: usize) -> Option<Vec<[f64; 3]>> {
     let count = f.required("count", "the numbers along x, y and z, such as [5, 5, 1]")?;
     let DeValue::Array(items) = count.get_ref() else {
-        f.wrong("count", count, "three whole numbers, along x, y and z");
+        f.wrong("count", count, "three integers, along x, y and z");
         return None;
     };
     if items.len() != 3 {
-        f.wrong("count", count, "three whole numbers, along x, y and z");
+        f.wrong("count", count, "three integers, along x, y and z");
         return None;
     }
     let problems = f.log.count();
-    let n: Vec<usize> = items.iter().map(|item| f.as_integer("count", item, 1..=MOST_BODIES as u32) as usize).collect();
+    let n: Vec<usize> = items.iter().map(|item| f.as_integer("count", item, 1..=MAX_BODIES as u32) as usize).collect();
     let spacing: [f64; 3] = f.vector("spacing_m", Bound::ANY);
     let centered = f.flag_or("centered", false);
     if f.log.count() > problems {
@@ -89,11 +90,11 @@ fn read_box(f: &mut Fields<'_>, room: usize) -> Option<Vec<[f64; 3]>> {
     Some(offsets)
 }
 
-/// Offsets of a triangle of bodies from its apex.
+/// Returns the offsets of a triangle of bodies from its apex.
 fn read_triangle(f: &mut Fields<'_>, room: usize) -> Option<Vec<[f64; 3]>> {
     let value = f.required("rows", "how many rows the triangle has")?;
     let problems = f.log.count();
-    let rows = f.as_integer("rows", value, 1..=MOST_BODIES as u32) as usize;
+    let rows = f.as_integer("rows", value, 1..=MAX_BODIES as u32) as usize;
     let spacing = f.number("spacing_m", Bound::POSITIVE);
     let toward = f.direction_or("toward", [1.0, 0.0, 0.0]);
     if toward[2] != 0.0
@@ -105,7 +106,7 @@ fn read_triangle(f: &mut Fields<'_>, room: usize) -> Option<Vec<[f64; 3]>> {
         return None;
     }
     check_total(f, value, rows.checked_mul(rows + 1).map(|twice| twice / 2), room)?;
-    // Left of someone who looks along `toward` with z up.
+    // To the left when looking along `toward` with z up.
     let left = [-toward[1], toward[0]];
     let depth = spacing * 0.75_f64.sqrt();
     let mut offsets = Vec::with_capacity(rows * (rows + 1) / 2);
@@ -124,13 +125,13 @@ fn check_total(f: &Fields<'_>, value: &Value<'_>, total: Option<usize>, room: us
         false => {
             let bodies = total.map_or("far too many".into(), |n| n.to_string());
             let message = format!("{} makes {bodies} bodies", f.what);
-            f.log.report(value.span(), message, format!("wanted at most {MOST_BODIES} bodies in the whole scene"));
+            f.log.report(value.span(), message, format!("expected at most {MAX_BODIES} bodies in the whole scene"));
             None
         }
     }
 }
 
-/// A list whose entries the copies take in turn; empty where the key is not there.
+/// Reads a list whose entries the copies take in turn; empty if the key is absent.
 fn read_cycle<'a, T>(f: &mut Fields<'a>, key: &'static str, read: fn(&Fields<'a>, &str, &'a Value<'a>) -> T) -> Vec<T> {
     let Some(value) = f.value(key) else {
         return Vec::new();
@@ -138,7 +139,7 @@ fn read_cycle<'a, T>(f: &mut Fields<'a>, key: &'static str, read: fn(&Fields<'a>
     match value.get_ref() {
         DeValue::Array(items) if !items.is_empty() => items.iter().map(|item| read(f, key, item)).collect(),
         _ => {
-            f.wrong(key, value, "a list, whose entries the copies take in turn");
+            f.wrong(key, value, "a list of one or more entries, which the copies take in turn");
             Vec::new()
         }
     }

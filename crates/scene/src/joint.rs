@@ -1,4 +1,5 @@
-//! The joint of a link: how it moves and what acts on it. Keys name their units, and those of a hinge are not those of a slider.
+//! The joint of a link: its type, initial state, limits, damping, friction, spring and drive. Keys
+//! have units, so those of a revolute joint differ from those of a prismatic one.
 
 use std::sync::Arc;
 
@@ -10,29 +11,30 @@ use crate::bound::Bound;
 use crate::fields::{Fields, Names, Value};
 use crate::rotation;
 
-/// Most samples of a recorded motion.
-const MOST_SAMPLES: usize = 100_000;
+/// Largest number of samples of a recorded motion.
+const MAX_SAMPLES: usize = 100_000;
 
-/// One joint at the start.
+/// A joint at time 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointSpec {
-    /// Name: in a scene that of the link it moves, in a URDF its own.
+    /// The name: in a scene that of the link it moves, in a URDF its own.
     pub name: String,
-    /// How the link moves; the axis is of unit length.
+    /// The type of joint; its axis has unit length.
     pub kind: Joint,
-    /// What acts on each of its degrees of freedom.
-    pub freedom: DofSettings,
-    /// The joint that this one follows.
+    /// Settings of each of its degrees of freedom.
+    pub dof: DofSettings,
+    /// The joint whose position this one follows.
     pub mimic: Option<MimicSpec>,
-    /// Its position numbers at time 0, as [`Joint`] says.
+    /// Position numbers at time 0, as defined by [`Joint`].
     pub position: Vec<f64>,
-    /// Its velocity numbers at time 0.
+    /// Velocity numbers at time 0.
     pub velocity: Vec<f64>,
-    /// Greatest torque or force that its motor has, N·m or N, where a file says so: the limit of a drive that names none.
+    /// Largest torque or force of its motor, N·m or N, if a URDF has one. It is the default force
+    /// limit of drives.
     pub effort: Option<f64>,
-    /// Greatest speed that its file allows, rad/s or m/s. Kept, not enforced.
+    /// Largest speed that the file allows, rad/s or m/s. Stored, not enforced.
     pub speed: Option<f64>,
-    /// Whether a position drive without a target holds the starting position.
+    /// Whether a position drive without a target holds the initial position.
     pub(crate) holds_start: bool,
 }
 
@@ -63,20 +65,20 @@ const KINDS: Names<Kind> = &[
 ];
 
 #[derive(Clone, Copy)]
-enum Motor {
+enum DriveKind {
     Position,
     Velocity,
     Playback,
 }
 
-const MOTORS: Names<Motor> =
-    &[("position", Motor::Position), ("velocity", Motor::Velocity), ("playback", Motor::Playback)];
+const DRIVE_KINDS: Names<DriveKind> =
+    &[("position", DriveKind::Position), ("velocity", DriveKind::Velocity), ("playback", DriveKind::Playback)];
 
-/// A key in SI units, and for angles the same in degrees.
+/// A key in SI units, and for angles the key in degrees.
 type Key = (&'static str, Option<&'static str>);
 
-/// What the keys of a joint with one degree of freedom are called.
-struct Words {
+/// The keys of a joint with one degree of freedom.
+struct JointKeys {
     start: Key,
     rate: &'static str,
     limits: Key,
@@ -91,7 +93,7 @@ struct Words {
     offset: Key,
 }
 
-const TURN: Words = Words {
+const REVOLUTE_KEYS: JointKeys = JointKeys {
     start: ("angle_rad", Some("angle_deg")),
     rate: "rate_rad_per_s",
     limits: ("limits_rad", Some("limits_deg")),
@@ -101,12 +103,12 @@ const TURN: Words = Words {
     rest: ("rest_rad", Some("rest_deg")),
     target: ("target_rad", Some("target_deg")),
     target_rate: "target_rad_per_s",
-    limit: "limit_n_m",
+    limit: "max_torque_n_m",
     values: ("values_rad", Some("values_deg")),
     offset: ("offset_rad", Some("offset_deg")),
 };
 
-const SLIDE: Words = Words {
+const PRISMATIC_KEYS: JointKeys = JointKeys {
     start: ("displacement_m", None),
     rate: "rate_m_per_s",
     limits: ("limits_m", None),
@@ -116,24 +118,24 @@ const SLIDE: Words = Words {
     rest: ("rest_m", None),
     target: ("target_m", None),
     target_rate: "target_m_per_s",
-    limit: "limit_n",
+    limit: "max_force_n",
     values: ("values_m", None),
     offset: ("offset_m", None),
 };
 
 impl JointSpec {
-    /// A joint of that kind at rest, with nothing acting on it.
+    /// Returns a joint of that type at rest, without limits, damping, friction, spring and drive.
     pub fn new(name: impl Into<String>, kind: Joint) -> JointSpec {
         let mut position = vec![0.0; kind.positions()];
         if let Some(k) = kind.quaternion() {
             position[k + 3] = 1.0;
         }
         let velocity = vec![0.0; kind.dof()];
-        let freedom = DofSettings::default();
+        let dof = DofSettings::default();
         JointSpec {
             name: name.into(),
             kind,
-            freedom,
+            dof,
             mimic: None,
             position,
             velocity,
@@ -143,16 +145,16 @@ impl JointSpec {
         }
     }
 
-    /// Whether it has one degree of freedom, with a position of its own.
+    /// Returns whether the joint has exactly one degree of freedom.
     pub fn is_single(&self) -> bool {
         self.kind.dof() == 1
     }
 
-    fn words(&self) -> &'static Words {
-        if matches!(self.kind, Joint::Prismatic { .. }) { &SLIDE } else { &TURN }
+    fn keys(&self) -> &'static JointKeys {
+        if matches!(self.kind, Joint::Prismatic { .. }) { &PRISMATIC_KEYS } else { &REVOLUTE_KEYS }
     }
 
-    /// Reads `joint`, its axis and all that acts on it from the table of a link.
+    /// Reads `joint`, its axis and its settings from the table of a link.
     pub(crate) fn read(f: &mut Fields<'_>, name: &str) -> Option<JointSpec> {
         let kind = f.choice("joint", KINDS)?;
         let axis = |f: &mut Fields<'_>| Vec3::from(f.direction("axis"));
@@ -167,22 +169,22 @@ impl JointSpec {
         Some(joint)
     }
 
-    /// Reads where the joint starts and what acts on it; what is not there stays.
+    /// Reads the initial state and the settings. Keys that are absent change nothing.
     pub(crate) fn read_effects(&mut self, f: &mut Fields<'_>) {
-        let words = self.words();
+        let keys = self.keys();
         if self.kind.dof() > 0 {
-            self.freedom.damping = f.number_or(words.damping, Bound::NOT_NEGATIVE, self.freedom.damping);
-            self.freedom.friction = f.number_or(words.friction, Bound::NOT_NEGATIVE, self.freedom.friction);
+            self.dof.damping = f.number_or(keys.damping, Bound::NOT_NEGATIVE, self.dof.damping);
+            self.dof.friction = f.number_or(keys.friction, Bound::NOT_NEGATIVE, self.dof.friction);
         }
         match self.kind {
             Joint::Spherical => self.read_spherical_start(f),
-            _ if self.is_single() => self.read_single(f, words),
+            _ if self.is_single() => self.read_single(f, keys),
             _ => {}
         }
     }
 
     fn read_spherical_start(&mut self, f: &mut Fields<'_>) {
-        if let Some(q) = rotation::axis_angle(f, "turned") {
+        if let Some(q) = rotation::axis_angle(f, "initial_rotation") {
             self.position = q.to_vec();
         }
         if let Some(w) = f.optional_vector::<3>("angular_velocity_rad_per_s", Bound::ANY) {
@@ -190,67 +192,68 @@ impl JointSpec {
         }
     }
 
-    fn read_single(&mut self, f: &mut Fields<'_>, words: &'static Words) {
-        if let Some(position) = number(f, words.start) {
+    fn read_single(&mut self, f: &mut Fields<'_>, keys: &'static JointKeys) {
+        if let Some(position) = number(f, keys.start) {
             self.position = vec![position];
         }
-        self.velocity[0] = f.number_or(words.rate, Bound::ANY, self.velocity[0]);
-        if let Some(limits) = read_limits(f, words.limits) {
-            self.freedom.limits = limits;
+        self.velocity[0] = f.number_or(keys.rate, Bound::ANY, self.velocity[0]);
+        if let Some(limits) = read_limits(f, keys.limits) {
+            self.dof.limits = limits;
         }
-        let example = format!("{{ {} = 10 }}", words.stiffness);
+        let example = format!("{{ {} = 10 }}", keys.stiffness);
         if let Some(mut spring) = f.table("spring", &example) {
-            let stiffness = spring.number(words.stiffness, Bound::NOT_NEGATIVE);
-            let rest = number(&mut spring, words.rest).unwrap_or(0.0);
+            let stiffness = spring.number(keys.stiffness, Bound::NOT_NEGATIVE);
+            let rest = number(&mut spring, keys.rest).unwrap_or(0.0);
             spring.finish();
-            self.freedom.spring = Some(Spring { stiffness, rest });
+            self.dof.spring = Some(Spring { stiffness, rest });
         }
-        if let Some(drive) = f.table("drive", &format!("{{ type = \"position\", {} = 100 }}", words.stiffness)) {
-            self.read_drive(drive, words);
+        if let Some(drive) = f.table("drive", &format!("{{ type = \"position\", {} = 100 }}", keys.stiffness)) {
+            self.read_drive(drive, keys);
         }
     }
 
-    fn read_drive(&mut self, mut f: Fields<'_>, words: &'static Words) {
-        let Some(motor) = f.choice("type", MOTORS) else { return f.give_up() };
+    fn read_drive(&mut self, mut f: Fields<'_>, keys: &'static JointKeys) {
+        let Some(motor) = f.choice("type", DRIVE_KINDS) else { return f.give_up() };
         let most = self.effort.unwrap_or(f64::INFINITY);
         self.holds_start = false;
         let drive = match motor {
-            Motor::Position => {
-                let stiffness = f.number_or(words.stiffness, Bound::NOT_NEGATIVE, 0.0);
-                let damping = f.number_or(words.damping, Bound::NOT_NEGATIVE, 0.0);
+            DriveKind::Position => {
+                let stiffness = f.number_or(keys.stiffness, Bound::NOT_NEGATIVE, 0.0);
+                let damping = f.number_or(keys.damping, Bound::NOT_NEGATIVE, 0.0);
                 if stiffness + damping == 0.0 {
                     let message = format!("{} has no stiffness and no damping", f.what);
                     f.log.report(
                         f.span.clone(),
                         message,
-                        format!("wanted `{}` or `{}` greater than 0", words.stiffness, words.damping),
+                        format!("expected `{}` or `{}` greater than 0", keys.stiffness, keys.damping),
                     );
                 }
-                let target = number(&mut f, words.target);
+                let target = number(&mut f, keys.target);
                 self.holds_start = target.is_none();
-                let velocity = f.number_or(words.target_rate, Bound::ANY, 0.0);
+                let velocity = f.number_or(keys.target_rate, Bound::ANY, 0.0);
                 Some(Drive::Position {
                     stiffness,
                     damping,
                     target: target.unwrap_or(0.0),
                     velocity,
-                    limit: f.number_or(words.limit, Bound::NOT_NEGATIVE, most),
+                    limit: f.number_or(keys.limit, Bound::NOT_NEGATIVE, most),
                 })
             }
-            Motor::Velocity => {
-                let target = f.number(words.target_rate, Bound::ANY);
-                Some(Drive::Velocity { target, limit: f.number_or(words.limit, Bound::NOT_NEGATIVE, most) })
+            DriveKind::Velocity => {
+                let target = f.number(keys.target_rate, Bound::ANY);
+                Some(Drive::Velocity { target, limit: f.number_or(keys.limit, Bound::NOT_NEGATIVE, most) })
             }
-            Motor::Playback => {
-                let limit = f.number_or(words.limit, Bound::NOT_NEGATIVE, most);
-                read_playback(&mut f, words.values).map(|motion| Drive::Playback { motion: Arc::new(motion), limit })
+            DriveKind::Playback => {
+                let limit = f.number_or(keys.limit, Bound::NOT_NEGATIVE, most);
+                read_playback(&mut f, keys.values).map(|motion| Drive::Playback { motion: Arc::new(motion), limit })
             }
         };
         f.finish();
-        self.freedom.drive = drive.unwrap_or_default();
+        self.dof.drive = drive.unwrap_or_default();
     }
 
-    /// Reads `mimic`: which joint this one follows, by name and as it stands in the file. The index of its link is filled in later.
+    /// Reads `mimic`. Returns the name of the joint to follow and its place in the file; the index
+    /// of its link is filled in later.
     pub(crate) fn read_mimic<'a>(&mut self, f: &mut Fields<'a>) -> Option<(&'a str, &'a Value<'a>)> {
         if !self.is_single() {
             return None;
@@ -258,39 +261,40 @@ impl JointSpec {
         let mut mimic = f.table("mimic", "{ joint = \"NAME\", multiplier = 1 }")?;
         let of = mimic.text("joint", "the name of the link whose joint it follows");
         let multiplier = mimic.number_or("multiplier", Bound::ANY, 1.0);
-        let offset = number(&mut mimic, self.words().offset).unwrap_or(0.0);
+        let offset = number(&mut mimic, self.keys().offset).unwrap_or(0.0);
         mimic.finish();
         self.mimic = Some(MimicSpec { link: usize::MAX, multiplier, offset });
         of
     }
 
-    /// Lets a position drive without a target hold the position at time 0.
+    /// Sets the target of a position drive without a target to the position at time 0.
     pub(crate) fn settle(&mut self) {
         if let (true, Drive::Position { target, .. }, Some(start)) =
-            (self.holds_start, &mut self.freedom.drive, self.position.first())
+            (self.holds_start, &mut self.dof.drive, self.position.first())
         {
             *target = *start;
         }
     }
 }
 
-/// A number in SI units or degrees, if either key is there.
+/// Reads a number in SI units or degrees, if either key is present.
 fn number(f: &mut Fields<'_>, (si, degrees): Key) -> Option<f64> {
     let given = f.optional_number(si, Bound::ANY);
     let turned = degrees.and_then(|key| f.optional_number(key, Bound::ANY)).map(f64::to_radians);
     one_of(f, (si, degrees), given, turned)
 }
 
-/// One of two ways to say the same; both is a problem.
+/// Returns the value of the one of two alternative keys that is present. Both at once are a
+/// problem.
 fn one_of<T>(f: &Fields<'_>, (si, degrees): Key, given: Option<T>, turned: Option<T>) -> Option<T> {
     if given.is_some() && turned.is_some() {
         let message = format!("{} has both `{si}` and `{}`", f.what, degrees.unwrap_or_default());
-        f.log.report(f.span.clone(), message, "wanted one of them");
+        f.log.report(f.span.clone(), message, "expected one of them");
     }
     given.or(turned)
 }
 
-/// `Some(None)` where the file says `false`: no limits.
+/// Reads limits. `Some(None)` if the file says `false`: no limits.
 fn read_limits(f: &mut Fields<'_>, key: Key) -> Option<Option<[f64; 2]>> {
     let mut read = |key: &'static str, scale: f64| {
         let value = f.value(key)?;
@@ -311,17 +315,17 @@ fn read_limits(f: &mut Fields<'_>, key: Key) -> Option<Option<[f64; 2]>> {
 
 fn read_playback(f: &mut Fields<'_>, key: Key) -> Option<Playback> {
     let problems = f.log.count();
-    let times = f.optional_numbers("times_s", Bound::ANY, MOST_SAMPLES);
-    let given = f.optional_numbers(key.0, Bound::ANY, MOST_SAMPLES);
-    let turned = key.1.and_then(|key| f.optional_numbers(key, Bound::ANY, MOST_SAMPLES));
+    let times = f.optional_numbers("times_s", Bound::ANY, MAX_SAMPLES);
+    let given = f.optional_numbers(key.0, Bound::ANY, MAX_SAMPLES);
+    let turned = key.1.and_then(|key| f.optional_numbers(key, Bound::ANY, MAX_SAMPLES));
     let turned = turned.map(|values| values.into_iter().map(f64::to_radians).collect());
     let values = one_of(f, key, given, turned);
     let repeat = f.flag_or("repeat", false);
     if times.is_none() {
-        f.missing("times_s", "a list of times that rise");
+        f.missing("times_s", "a list of increasing times");
     }
     if values.is_none() {
-        f.missing(key.0, "a list of as many positions as there are times");
+        f.missing(key.0, "a list of positions, one for each time");
     }
     if f.log.count() > problems {
         return None;
@@ -329,9 +333,9 @@ fn read_playback(f: &mut Fields<'_>, key: Key) -> Option<Playback> {
     let motion = if repeat { Playback::repeating(times?, values?) } else { Playback::new(times?, values?) };
     motion
         .map_err(|error| {
-            let told = error.to_string();
-            let (wrong, wanted) = told.split_once("; ").unwrap_or((told.as_str(), "wanted times that rise"));
-            f.log.report(f.span.clone(), format!("{}: {wrong}", f.what), wanted);
+            let message = error.to_string();
+            let (wrong, expected) = message.split_once("; ").unwrap_or((message.as_str(), "expected increasing times"));
+            f.log.report(f.span.clone(), format!("{}: {wrong}", f.what), expected);
         })
         .ok()
 }

@@ -1,14 +1,14 @@
 //! Scene files: TOML text to a typed, checked description of a world.
 //!
-//! A scene is read in one pass that finds all its problems. Each is told with file, line, column, the
-//! value and what would be right; see [`SceneError`]. What comes out, a [`SceneFile`], has no
-//! references left to resolve and no number that is not finite: meshes and materials are indices,
-//! defaults are filled in, grids are expanded to bodies.
+//! A scene is read in one pass that finds all its problems. Each is reported with file, line, column,
+//! the value and the expected value; see [`SceneError`]. The result, a [`SceneFile`], has no unresolved
+//! references and no number that is not finite: meshes and materials are indices, defaults are filled
+//! in, grids are expanded to bodies.
 //!
 //! # The format
 //!
 //! SI units, radians except in keys that end in `_deg`, z up, right-handed. Quaternions are
-//! `[x, y, z, w]`. Every table and key but those marked *required* may be left out.
+//! `[x, y, z, w]`. Every table and key is optional unless it is marked *required*.
 //!
 //! ```toml
 //! description = "A ball on a plane"
@@ -30,7 +30,7 @@
 //! [[body]]
 //! name = "ball"
 //! shape = { type = "sphere", radius_m = 0.1 }
-//! mass_kg = 0.2                    # or density_kg_per_m3; one is required of what is dynamic
+//! mass_kg = 0.2                    # or density_kg_per_m3; a dynamic body requires one
 //! position_m = [0, 0, 1]
 //! material = "rubber"
 //!
@@ -39,11 +39,11 @@
 //! target_m = [0, 0, 0.3]
 //! ```
 //!
-//! `[[articulated]]` is [`ArticulatedSpec`], a tree of links written out or taken from a URDF ([`urdf`]), and `[[closure]]` is
-//! [`ClosureSpec`], which closes loops. `[meshes.NAME]` is [`MeshSpec`]; `[[grid]]` repeats a body, see [`BodySpec`] for its common keys;
-//! `[[light]]`, `[sky]` and `[ground]` are [`LightSpec`], [`SkySpec`] and [`GroundSpec`]; `[cave]` is [`CavePlace`], and caves have files of
-//! their own ([`cave`]). The table of
-//! all keys is `scenes/README.md`.
+//! `[[articulated]]` is [`ArticulatedSpec`], a tree of links written out or read from a URDF ([`urdf`]),
+//! and `[[loop_joint]]` is [`LoopJointSpec`], which joins parts of any objects. `[meshes.NAME]` is
+//! [`MeshSpec`]; `[[grid]]` repeats a body, see [`BodySpec`] for its keys; `[[light]]`, `[sky]` and
+//! `[ground]` are [`LightSpec`], [`SkySpec`] and [`GroundSpec`]; `[cave]` is [`CavePlace`], and caves have
+//! files of their own ([`cave`]). `scenes/README.md` has a table of all keys.
 //!
 //! ```
 //! let scene = tumble_scene::resolve_scene("stack", &[])?.load()?;
@@ -54,13 +54,13 @@
 //! # Ok::<(), tumble_scene::SceneError>(())
 //! ```
 
+mod appearance;
 mod articulated;
 mod assemble;
 mod body;
 mod bound;
 mod build;
 pub mod cave;
-mod closure;
 mod collada;
 mod error;
 mod fields;
@@ -72,7 +72,7 @@ mod link;
 mod link_shapes;
 mod lists;
 mod log;
-mod look;
+mod loop_joint;
 mod material;
 mod mesh;
 mod mount;
@@ -80,6 +80,7 @@ mod notes;
 mod on_floor;
 mod pair;
 mod profile;
+mod renamed;
 mod rotation;
 mod shape;
 mod shipped;
@@ -90,17 +91,17 @@ mod view;
 mod visual_mesh;
 mod world;
 
+pub use appearance::{AppearanceSpec, Color, Pattern};
 pub use articulated::ArticulatedSpec;
 pub use body::{BodySpec, MassSpec};
 pub use build::{BuildError, Notes, read_solid, read_triangles};
-pub use closure::{ClosureKind, ClosureSpec, PartSpec};
 pub use error::{Invalid, Problem, SceneError};
-pub use file::{LoadOptions, MOST_BYTES, SceneFile};
+pub use file::{LoadOptions, MAX_BYTES, SceneFile};
 pub use format::FileKind;
 pub use joint::{JointSpec, MimicSpec};
 pub use link::{Geometry, LinkMassSpec, LinkShape, LinkSpec, Surface};
 pub use link_shapes::read_mesh_bytes;
-pub use look::{Appearance, Color, Pattern};
+pub use loop_joint::{LoopJointKind, LoopJointSpec, PartSpec};
 pub use material::MaterialSpec;
 pub use mesh::{MeshSource, MeshSpec};
 pub use mount::Mounts;

@@ -1,4 +1,4 @@
-//! `[[articulated.link]]`: a link with its joint, its shapes and its mass.
+//! `[[articulated.link]]`: a link with its joint, shapes and mass.
 
 use std::path::PathBuf;
 
@@ -7,41 +7,41 @@ use tumble_core::Joint;
 use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{ContactMode, Mat3, Pose, Vec3};
 
-use crate::body::{Library, MOST_NAME_BYTES, MassSpec, read_material, read_name};
+use crate::appearance::{AppearanceSpec, Color, as_color};
+use crate::body::{Library, MAX_NAME_BYTES, MassSpec, read_material, read_name};
 use crate::bound::Bound;
 use crate::fields::{Fields, Value};
 use crate::joint::JointSpec;
-use crate::look::{Appearance, Color, as_color};
 use crate::material::{DEFAULT_FRICTION, DEFAULT_RESTITUTION, FRICTION, RESTITUTION};
 use crate::mount::Mounts;
 use crate::rotation;
 use crate::shape::ShapeSpec;
 use crate::world::CONTACTS;
 
-/// Most shapes of one link.
-const MOST_SHAPES: usize = 1000;
+/// Largest number of shapes of one link.
+const MAX_SHAPES: usize = 1000;
 
-/// One link at the start, all references resolved.
+/// A link at time 0 with all references resolved.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinkSpec {
     /// Unique in its body.
     pub name: String,
-    /// Index of the link that it hangs on, always an earlier one; `None` for the base.
+    /// Index of the parent link, always an earlier one; `None` for the base.
     pub parent: Option<usize>,
-    /// The joint's frame in the parent link's frame (the base's where there is none).
+    /// The joint's frame in the frame of the parent link, or of the base.
     pub placement: Pose,
-    /// How it moves.
+    /// The joint that connects it to its parent.
     pub joint: JointSpec,
-    /// How heavy it is.
+    /// Its mass.
     pub mass: LinkMassSpec,
-    /// What it collides with and what is drawn.
+    /// Collision shapes and visuals.
     pub shapes: Vec<LinkShape>,
-    /// The camera and the light that it carries, in axes of the link.
+    /// The camera and the light attached to the link, in axes of the link.
     pub mounts: Mounts,
 }
 
 impl LinkSpec {
-    /// Its mass in numbers; none where it comes from shapes.
+    /// Returns the mass that the file gives in numbers; no mass if it comes from shapes.
     pub(crate) fn given_mass(&self) -> LinkMass {
         match self.mass {
             LinkMassSpec::Given(mass) => mass,
@@ -49,7 +49,7 @@ impl LinkSpec {
         }
     }
 
-    /// Whether it has any mass or inertia of its own.
+    /// Returns whether the link has any mass or inertia.
     pub(crate) fn has_mass(&self) -> bool {
         match &self.mass {
             LinkMassSpec::OfShapes => self.shapes.iter().any(|shape| shape.mass.is_some()),
@@ -59,14 +59,14 @@ impl LinkSpec {
     }
 }
 
-/// How heavy a link is.
+/// The mass of a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LinkMassSpec {
-    /// As its shapes say, each for itself; massless without.
+    /// The sum of the masses of its shapes; none without shapes.
     OfShapes,
-    /// Spread evenly over the volumes of all its shapes.
+    /// Distributed over the volumes of all its shapes.
     Spread(MassSpec),
-    /// In numbers, link frame.
+    /// Mass, center of mass and inertia in numbers, link frame.
     Given(LinkMass),
 }
 
@@ -75,11 +75,11 @@ pub enum LinkMassSpec {
 pub struct LinkShape {
     /// Pose of the shape's own axes in the link's frame.
     pub pose: Pose,
-    /// What it is.
+    /// The geometry.
     pub geometry: Geometry,
-    /// Its own mass, where it has one.
+    /// The mass of the shape itself, if given.
     pub mass: Option<MassSpec>,
-    /// Surface and look.
+    /// Surface and appearance.
     pub surface: Surface,
     /// Takes part in contacts.
     pub collides: bool,
@@ -87,39 +87,39 @@ pub struct LinkShape {
     pub visible: bool,
 }
 
-/// What a shape on a link is.
+/// The geometry of a shape on a link.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
     /// A shape of the scene.
     Shape(ShapeSpec),
-    /// A mesh in a file of its own, as URDF names them.
+    /// A mesh file, as URDF names them.
     File {
-        /// STL or OBJ; it was there when the file that names it was read.
+        /// A mesh that existed when the file that names it was read.
         path: PathBuf,
-        /// Metres per unit, along x, y and z; a negative one mirrors.
+        /// Meters per unit along x, y and z; a negative number mirrors.
         scale: [f64; 3],
-        /// Who names it: file and line.
+        /// File and line that name the mesh.
         place: String,
-        /// Whether its convex hull collides instead of itself.
+        /// Whether its convex hull collides instead of the mesh.
         hull: bool,
-        /// Whether it is an error if it cannot be read, and not just left out.
+        /// Whether an unreadable mesh is an error. Otherwise it is left out.
         required: bool,
     },
 }
 
-/// What a shape does in a contact and how it looks.
+/// Contact constants and appearance of a shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
-    /// Index into [`SceneFile::materials`](crate::SceneFile::materials), where one is named.
+    /// Index into [`SceneFile::materials`](crate::SceneFile::materials), if a material is named.
     pub material: Option<usize>,
-    /// Coulomb's coefficient.
+    /// Coulomb's coefficient of friction.
     pub friction: f64,
-    /// Newton's coefficient.
+    /// Newton's coefficient of restitution.
     pub restitution: f64,
-    /// How its meshes and cylinders collide.
+    /// Contact mode of meshes and cylinders.
     pub contacts: ContactMode,
-    /// Look.
-    pub look: Appearance,
+    /// Appearance.
+    pub appearance: AppearanceSpec,
 }
 
 impl Default for Surface {
@@ -129,54 +129,56 @@ impl Default for Surface {
             friction: DEFAULT_FRICTION,
             restitution: DEFAULT_RESTITUTION,
             contacts: ContactMode::default(),
-            look: Appearance::default(),
+            appearance: AppearanceSpec::default(),
         }
     }
 }
 
 impl Surface {
-    /// The surface whose keys stand in `f`; what is not there is as in `base`, or in the material named.
+    /// Reads the surface keys. Absent keys are taken from the named material, else from `base`.
     pub(crate) fn read(f: &mut Fields<'_>, library: &Library<'_>, base: &Surface) -> Surface {
         let material = read_material(f, library);
         let named = material.map(|index| &library.materials[index]);
-        let (friction, restitution, look) =
-            named.map_or((base.friction, base.restitution, &base.look), |m| (m.friction, m.restitution, &m.look));
+        let (friction, restitution, appearance) = named
+            .map_or((base.friction, base.restitution, &base.appearance), |m| {
+                (m.friction, m.restitution, &m.appearance)
+            });
         Surface {
             material: material.or(base.material),
             friction: f.number_or("friction", FRICTION, friction),
             restitution: f.number_or("restitution", RESTITUTION, restitution),
             contacts: f.choice_or("contacts", CONTACTS, base.contacts),
-            look: Appearance::read(f, look),
+            appearance: AppearanceSpec::read(f, appearance),
         }
     }
 }
 
-/// What a table `[[articulated.link]]` makes: one link, or a row of equal ones.
+/// The links of one table `[[articulated.link]]`: one link, or a chain of `count` equal ones.
 pub(crate) struct LinkRow<'a> {
     pub(crate) link: LinkSpec,
-    /// How many, each hung on the one before.
+    /// Number of links, each attached to the one before.
     pub(crate) count: usize,
-    /// Placement of each but the first in the one before it.
+    /// Placement of each link but the first in the one before it.
     pub(crate) next: Pose,
     pub(crate) colors: Vec<Color>,
     /// The joint that its joint follows.
     pub(crate) mimic: Option<(&'a str, &'a Value<'a>)>,
 }
 
-/// What links take from the body that they belong to.
+/// Defaults that links take from their body.
 pub(crate) struct Inherited<'l, 's> {
     pub(crate) library: &'l Library<'l>,
     pub(crate) surface: &'s Surface,
     pub(crate) collides: bool,
     pub(crate) visible: bool,
-    /// Whether a link that hangs on nothing floats.
+    /// Whether a link without a parent floats.
     pub(crate) floating: bool,
-    /// Links that may still be added.
+    /// Number of links that may still be added.
     pub(crate) room: usize,
 }
 
 impl<'a> LinkRow<'a> {
-    /// Reads a link; `find` tells the index of a link by name and `names` all that there are so far.
+    /// Reads a link. `names` has the names of all earlier links.
     pub(crate) fn read(f: &mut Fields<'a>, from: &Inherited<'_, '_>, names: &[&str]) -> Option<LinkRow<'a>> {
         let name = read_name(f).unwrap_or_default();
         let parent = read_parent(f, names);
@@ -207,7 +209,7 @@ impl<'a> LinkRow<'a> {
         })
     }
 
-    /// Adds its links to a list: `name`, or `name_1` to `name_n`.
+    /// Appends the links: `name`, or `name_1` to `name_n`.
     pub(crate) fn append_to(self, links: &mut Vec<LinkSpec>) {
         for k in 0..self.count {
             let mut link = self.link.clone();
@@ -219,7 +221,7 @@ impl<'a> LinkRow<'a> {
                 (link.parent, link.placement) = (Some(links.len() - 1), self.next);
             }
             if !self.colors.is_empty() {
-                link.shapes.iter_mut().for_each(|s| s.surface.look.color = self.colors[k % self.colors.len()]);
+                link.shapes.iter_mut().for_each(|s| s.surface.appearance.color = self.colors[k % self.colors.len()]);
             }
             links.push(link);
         }
@@ -228,7 +230,7 @@ impl<'a> LinkRow<'a> {
 
 fn read_floating(f: &mut Fields<'_>, name: &str) -> Option<JointSpec> {
     if let Some(value) = f.value("joint") {
-        f.wrong("joint", value, "no joint: the body floats, and this link hangs on nothing; or floating = false");
+        f.wrong("joint", value, "no joint, since the root of a floating body has none; or floating = false");
         JointSpec::read(f, name);
     }
     Some(JointSpec::new(name, Joint::Floating))
@@ -239,7 +241,9 @@ fn read_parent(f: &mut Fields<'_>, names: &[&str]) -> Option<usize> {
     let found = names.iter().position(|other| *other == name);
     match found {
         Some(_) => {}
-        None if names.is_empty() => f.wrong("parent", value, "no parent for the first link, which hangs on the base"),
+        None if names.is_empty() => {
+            f.wrong("parent", value, "no parent for the first link, which is attached to the base")
+        }
         None => f.unknown_name("parent", value, name, names.to_vec()),
     }
     found
@@ -249,9 +253,9 @@ fn read_shapes(f: &mut Fields<'_>, from: &Inherited<'_, '_>) -> Vec<LinkShape> {
     let what = f.what.clone();
     let example = "{ type = \"sphere\", radius_m = 0.5 }";
     let single = f.value("shape");
-    let several = f.list("shapes", MOST_SHAPES, &format!("a list of shapes, such as [{example}]"));
+    let several = f.list("shapes", MAX_SHAPES, &format!("a list of shapes, such as [{example}]"));
     if single.is_some() && f.value("shapes").is_some() {
-        f.log.report(f.span.clone(), format!("{what} has both `shape` and `shapes`"), "wanted one of them");
+        f.log.report(f.span.clone(), format!("{what} has both `shape` and `shapes`"), "expected one of them");
     }
     let all = single.into_iter().map(|value| (value, format!("the shape of {what}")));
     let all =
@@ -266,18 +270,18 @@ impl LinkShape {
             return None;
         };
         if shape == ShapeSpec::HalfSpace {
-            let message = format!("{} is a half-space, which has no end", f.what);
+            let message = format!("{} is a half-space, which is unbounded", f.what);
             f.log.report(
                 f.span.clone(),
                 message,
-                "wanted a shape of finite size; make the half-space a static [[body]]",
+                "expected a shape of finite size; make the half-space a static [[body]]",
             );
         }
         let mass = f.optional_number("mass_kg", Bound::POSITIVE).map(MassSpec::Mass);
         let density = f.optional_number("density_kg_per_m3", Bound::POSITIVE).map(MassSpec::Density);
         if mass.is_some() && density.is_some() {
             let message = format!("{} has both `mass_kg` and `density_kg_per_m3`", f.what);
-            f.log.report(f.span.clone(), message, "wanted one of them");
+            f.log.report(f.span.clone(), message, "expected one of them");
         }
         let read = LinkShape {
             pose: rotation::read_pose(&mut f),
@@ -300,24 +304,30 @@ fn read_mass(f: &mut Fields<'_>, shapes: &[LinkShape], fixed: bool) -> LinkMassS
     let own = shapes.iter().filter(|s| s.mass.is_some()).count();
     let given = mass.is_some() || density.is_some() || center.is_some() || inertia.is_some();
     let contradiction =
-        |message: &str, wanted: &str| f.log.report(f.span.clone(), format!("{} {message}", f.what), wanted);
+        |message: &str, expected: &str| f.log.report(f.span.clone(), format!("{} {message}", f.what), expected);
     if given && own > 0 {
-        contradiction("has a mass and so have its shapes", "wanted the mass of the link, or that of each shape");
+        contradiction("has a mass, and its shapes have masses", "expected the mass of the link, or that of each shape");
     } else if mass.is_some() && density.is_some() {
-        contradiction("has both `mass_kg` and `density_kg_per_m3`", "wanted one of them");
+        contradiction("has both `mass_kg` and `density_kg_per_m3`", "expected one of them");
     } else if (center.is_some() || inertia.is_some()) && mass.is_none() {
-        contradiction("has `center_m` or `inertia_kg_m2` but no `mass_kg`", "wanted `mass_kg` with them");
+        contradiction("has `center_m` or `inertia_kg_m2` but no `mass_kg`", "expected `mass_kg` with them");
     } else if inertia.is_none() && center.is_some() && !shapes.is_empty() {
         contradiction(
             "has `center_m` but no `inertia_kg_m2`",
-            "wanted both, or neither: the mass is then spread over the shapes",
+            "expected both, or neither: the mass is then distributed over the shapes",
         );
     } else if own > 0 && own < shapes.len() {
-        contradiction("has shapes with a mass and shapes without", "wanted a mass for each shape, or one for the link");
+        contradiction(
+            "has shapes with a mass and shapes without",
+            "expected a mass for each shape, or one for the link",
+        );
     } else if !given && own == 0 && !shapes.is_empty() && !fixed {
         f.missing("mass_kg", "`mass_kg` or `density_kg_per_m3` for the link, or for each of its shapes");
     } else if density.is_some() && shapes.is_empty() {
-        contradiction("has a density but no shape", "wanted a shape, or `mass_kg` with `center_m` and `inertia_kg_m2`");
+        contradiction(
+            "has a density but no shape",
+            "expected a shape, or `mass_kg` with `center_m` and `inertia_kg_m2`",
+        );
     }
     match (mass, density) {
         (Some(mass), _) if inertia.is_some() || shapes.is_empty() => {
@@ -330,7 +340,7 @@ fn read_mass(f: &mut Fields<'_>, shapes: &[LinkShape], fixed: bool) -> LinkMassS
     }
 }
 
-/// `inertia_kg_m2`: `[xx, yy, zz]` or `[xx, yy, zz, xy, xz, yz]` about the centre of mass.
+/// Reads `inertia_kg_m2`: `[xx, yy, zz]` or `[xx, yy, zz, xy, xz, yz]` about the center of mass.
 fn read_inertia(f: &mut Fields<'_>) -> Option<Mat3> {
     let value = f.value("inertia_kg_m2")?;
     let problems = f.log.count();
@@ -351,8 +361,8 @@ fn read_inertia(f: &mut Fields<'_>) -> Option<Mat3> {
     Some(inertia)
 }
 
-/// What keeps a symmetric matrix from being the inertia of a body about its centre of mass: principal moments are not negative, and none is greater
-/// than the sum of the others.
+/// Returns why a symmetric matrix cannot be an inertia about a center of mass: a principal moment
+/// is negative, or one is greater than the sum of the others.
 pub(crate) fn inertia_fault(inertia: &Mat3) -> Option<InertiaFault> {
     let mut moments: Vec<f64> = inertia.symmetric_eigenvalues().iter().copied().collect();
     moments.sort_by(f64::total_cmp);
@@ -364,19 +374,19 @@ pub(crate) fn inertia_fault(inertia: &Mat3) -> Option<InertiaFault> {
     (c > a + b + 1e-6 * size && c > a + b + 1e-9).then_some(InertiaFault::Triangle([a, b, c]))
 }
 
-/// Why a matrix is the inertia of no body.
+/// Why a matrix is not an inertia.
 #[derive(Debug)]
 pub(crate) enum InertiaFault {
-    /// The least principal moment.
+    /// The smallest principal moment.
     Negative(f64),
-    /// All principal moments, the least first.
+    /// All principal moments, the smallest first.
     Triangle([f64; 3]),
 }
 
 impl std::fmt::Display for InertiaFault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            InertiaFault::Negative(a) => write!(f, "principal moments of at least 0; the least is {a:.6e} kg·m²"),
+            InertiaFault::Negative(a) => write!(f, "principal moments of at least 0; the smallest is {a:.6e} kg·m²"),
             InertiaFault::Triangle([a, b, c]) => {
                 write!(
                     f,
@@ -387,7 +397,7 @@ impl std::fmt::Display for InertiaFault {
     }
 }
 
-/// `repeat`: how many, how each next one is placed, colours in turn.
+/// Reads `repeat`: count, placement of each next link, and colors that the links take in turn.
 fn read_repeat(f: &mut Fields<'_>, name: &str, room: usize) -> (usize, Pose, Vec<Color>) {
     let span = f.value("repeat").map(Value::span);
     let (Some(mut repeat), Some(span)) = (f.table("repeat", "{ count = 10, position_m = [0, 0, -0.1] }"), span) else {
@@ -398,11 +408,11 @@ fn read_repeat(f: &mut Fields<'_>, name: &str, room: usize) -> (usize, Pose, Vec
         Some(value) => repeat.as_integer("count", value, 1..=most) as usize,
         None => 1,
     };
-    if name.len() + 1 + count.to_string().len() > MOST_NAME_BYTES {
-        f.log.report(span, format!("the name of {} is too long to be numbered", f.what), "wanted a shorter one");
+    if name.len() + 1 + count.to_string().len() > MAX_NAME_BYTES {
+        f.log.report(span, format!("the name of {} is too long to be numbered", f.what), "expected a shorter one");
     }
     let next = rotation::read_pose(&mut repeat);
-    let colors = repeat.list("colors", 1000, "a list of colours, which the links take in turn");
+    let colors = repeat.list("colors", 1000, "a list of colors, which the links take in turn");
     let colors = colors.into_iter().map(|value| as_color(&repeat, "colors", value)).collect();
     repeat.finish();
     (count, next, colors)

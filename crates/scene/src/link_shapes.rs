@@ -1,8 +1,10 @@
-//! What is on links, made from their descriptions: shapes, whose mesh files are read once each, and visual meshes, which are left to whoever draws.
+//! Shapes and visuals of links. Each collision mesh file is read once; visual meshes are read when
+//! they are first drawn.
 //!
-//! Collision meshes of real robots are often not closed, and a surface that is not closed has no inside to collide with. Their convex hull stands in,
-//! and a note says so: it is closed for any input, it touches what the mesh touches from outside, and robots' collision meshes are mostly made to be
-//! used that way. (A box or capsule around them would be larger by far at the corners that robots touch things with.)
+//! Collision meshes of real robots are often not closed, and an open surface has no inside. Their
+//! convex hull is used instead, with a note: a hull is closed for any input, it touches the same
+//! surroundings from outside, and most collision meshes of robots are made to be used that way. A
+//! box or capsule around them would be much larger at the corners with which robots touch things.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,14 +15,14 @@ use tumble_core::collide::{Pose, Shape, ShapeError, TreeCache, TreeSettings, Tri
 use tumble_core::{VisualGeometry, VisualMesh};
 
 use crate::body::MassSpec;
-use crate::build::{MOST_MESH_BYTES, read_triangles};
+use crate::build::{MAX_MESH_BYTES, read_triangles};
 use crate::link::{Geometry, LinkMassSpec, LinkShape, LinkSpec};
 use crate::notes::NoteList;
 use crate::shape::ShapeSpec;
 use crate::slow::building_surface;
 use crate::visual_mesh;
 
-/// Something in its place on a link.
+/// A shape or visual with its pose on a link.
 #[derive(Clone)]
 pub(crate) struct Placed<'s> {
     pub(crate) geometry: VisualGeometry,
@@ -28,17 +30,17 @@ pub(crate) struct Placed<'s> {
     pub(crate) pose: Pose,
     pub(crate) spec: &'s LinkShape,
     pub(crate) visible: bool,
-    /// Drawn only where none of these can be read.
+    /// Drawn only if none of these meshes can be read.
     pub(crate) stands_in_for: Vec<Arc<VisualMesh>>,
 }
 
 impl Placed<'_> {
-    /// The geometry's origin in the axes of the description, metres.
+    /// Returns the geometry's origin in the axes of the description, meters.
     pub(crate) fn center(&self) -> Vec3 {
         center(&self.geometry)
     }
 
-    /// What collides and has a mass; a visual mesh has neither.
+    /// Returns the collision shape, which also has the mass. Visual meshes have none.
     pub(crate) fn solid(&self) -> Option<&Shape> {
         match &self.geometry {
             VisualGeometry::Shape(shape) => Some(shape),
@@ -47,28 +49,29 @@ impl Placed<'_> {
     }
 }
 
-/// Makes shapes, and remembers those from files. Trees come from the cache that the environment names.
+/// Makes shapes and keeps those made from files. Sphere trees come from the cache that the
+/// environment names.
 pub(crate) struct ShapeMaker<'m> {
     /// Meshes of the scene as solids.
     meshes: &'m [Shape],
     solids: BTreeMap<SolidKey, Result<Shape, String>>,
-    pictures: BTreeMap<FileKey, Arc<VisualMesh>>,
+    visuals: BTreeMap<FileKey, Arc<VisualMesh>>,
     cache: TreeCache,
     pub(crate) purpose: Purpose,
     pub(crate) notes: NoteList,
 }
 
-/// What a world is made for.
+/// What a world is built for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Purpose {
     /// To be stepped.
     Stepped,
-    /// To be drawn alone: sphere trees and surfaces are built when somebody asks for them, as nobody does.
+    /// To be drawn only: sphere trees and distance fields are built on first use.
     Drawn,
 }
 
 impl Purpose {
-    /// A closed mesh as a shape, and what is to be said of the cache of trees.
+    /// Returns a closed mesh as a shape, and a note about the tree cache.
     pub(crate) fn mesh(
         self,
         mesh: TriMesh,
@@ -84,10 +87,10 @@ impl Purpose {
 
 /// A file and the bits of its scale.
 type FileKey = (PathBuf, [u64; 3]);
-/// The same, and whether its convex hull collides instead of itself.
+/// The same, and whether its convex hull collides instead of the mesh.
 type SolidKey = (FileKey, bool);
 
-/// The shape of a description.
+/// Makes the shape of a description.
 pub(crate) fn make(spec: &ShapeSpec, meshes: &[Shape]) -> Result<Shape, ShapeError> {
     match *spec {
         ShapeSpec::Mesh { mesh } => Ok(meshes[mesh].clone()),
@@ -111,18 +114,19 @@ impl<'m> ShapeMaker<'m> {
         ShapeMaker {
             meshes,
             solids: BTreeMap::new(),
-            pictures: BTreeMap::new(),
+            visuals: BTreeMap::new(),
             cache: TreeCache::of_environment(),
             purpose,
             notes: NoteList::default(),
         }
     }
 
-    /// All that is on a link; collision meshes that may be left out and cannot be read are, with a note. Where no picture of a link can be read its
-    /// collision shapes are drawn.
+    /// Returns all shapes and visuals of a link. A collision mesh that is not required and cannot
+    /// be read is left out with a note. If no visual of a link can be read, its collision shapes
+    /// are drawn.
     pub(crate) fn shapes<'s>(&mut self, link: &'s LinkSpec) -> Result<Vec<Placed<'s>>, String> {
         let mut placed = Vec::with_capacity(link.shapes.len());
-        let mut lost_picture = false;
+        let mut lost_visual = false;
         let unused =
             |spec: &&LinkShape| matches!(spec.geometry, Geometry::File { .. }) && !spec.collides && !spec.visible;
         for spec in link.shapes.iter().filter(|spec| !unused(spec)) {
@@ -132,7 +136,7 @@ impl<'m> ShapeMaker<'m> {
                     let visible = spec.visible;
                     placed.push(Placed { geometry, pose, spec, visible, stands_in_for: Vec::new() });
                 }
-                None => lost_picture |= spec.visible,
+                None => lost_visual |= spec.visible,
             }
         }
         let shown = placed.iter().filter(|p| p.visible);
@@ -141,7 +145,7 @@ impl<'m> ShapeMaker<'m> {
             VisualGeometry::Shape(_) => None,
         });
         let meshes: Vec<Arc<VisualMesh>> = meshes.collect();
-        if shown.count() == meshes.len() && (lost_picture || !meshes.is_empty()) {
+        if shown.count() == meshes.len() && (lost_visual || !meshes.is_empty()) {
             for p in placed.iter_mut().filter(|p| !p.visible) {
                 (p.visible, p.stands_in_for) = (true, meshes.clone());
             }
@@ -155,7 +159,7 @@ impl<'m> ShapeMaker<'m> {
             Geometry::Shape(shape) => make(shape, self.meshes).map(as_shape).map_err(|e| e.to_string()),
             Geometry::File { path, scale, .. } if !spec.collides => {
                 let key = (path.clone(), scale.map(f64::to_bits));
-                let mesh = self.pictures.entry(key).or_insert_with(|| Arc::new(visual_mesh::of_file(path, *scale)));
+                let mesh = self.visuals.entry(key).or_insert_with(|| Arc::new(visual_mesh::of_file(path, *scale)));
                 Ok(Some(VisualGeometry::Mesh(mesh.clone())))
             }
             Geometry::File { path, scale, place, hull, required } => {
@@ -182,13 +186,14 @@ impl<'m> ShapeMaker<'m> {
             if let Ok(made) = self.solid(path, mesh.clone()) {
                 return Ok(made);
             }
-            self.notes.add(path.display().to_string(), "its surface is not closed, so its convex hull collides");
+            self.notes.add(path.display().to_string(), "its surface is not closed, so its convex hull is used");
         }
         let hull = mesh.convex_hull().map_err(|e| e.to_string())?;
         self.solid(path, hull).map_err(|e| e.to_string())
     }
 
-    /// From the cache, where it is built; `path` names the mesh if that takes long.
+    /// Makes a solid, from the cache if it is there. `path` names the mesh in the message about
+    /// slow loading.
     fn solid(&mut self, path: &Path, mesh: TriMesh) -> Result<Shape, ShapeError> {
         let (name, count) = (path.file_name().unwrap_or_default().to_string_lossy(), mesh.triangles.len());
         let made = building_surface(&name, count, || self.purpose.mesh(mesh, &TreeSettings::octree(), &self.cache));
@@ -202,20 +207,24 @@ pub(crate) fn read_file(path: &Path) -> Result<TriMesh, String> {
     read_triangles(path, &read_mesh_bytes(path)?)
 }
 
-/// The bytes of a mesh file, at most 1 GiB. A pipe or device, which could keep its reader waiting, is refused. The error is a sentence without the file's name.
+/// Returns the bytes of a mesh file, at most 1 GiB. Pipes and devices, which could block the
+/// reader, are an error.
+///
+/// # Errors
+/// A sentence without the file's name.
 pub fn read_mesh_bytes(path: &Path) -> Result<Vec<u8>, String> {
     let unread = |error: std::io::Error| format!("cannot be read: {error}");
     let about = std::fs::metadata(path).map_err(unread)?;
     if !about.is_file() {
-        return Err("cannot be read: it is no regular file".into());
+        return Err("cannot be read: it is not a regular file".into());
     }
-    if about.len() > MOST_MESH_BYTES {
-        return Err(format!("it has {} bytes; the most that is read is {MOST_MESH_BYTES}", about.len()));
+    if about.len() > MAX_MESH_BYTES {
+        return Err(format!("it has {} bytes; the limit is {MAX_MESH_BYTES}", about.len()));
     }
     std::fs::read(path).map_err(unread)
 }
 
-/// Scaled along each axis; a mirrored mesh is turned outside out again.
+/// Scales a mesh along each axis. A mirrored mesh keeps its outside.
 pub(crate) fn stretched(mut mesh: TriMesh, scale: [f64; 3]) -> TriMesh {
     let scale = Vec3::from(scale);
     mesh.vertices.iter_mut().for_each(|v| v.component_mul_assign(&scale));
@@ -225,7 +234,7 @@ pub(crate) fn stretched(mut mesh: TriMesh, scale: [f64; 3]) -> TriMesh {
     mesh
 }
 
-/// The mass of a link, link frame. Visual meshes have none.
+/// Returns the mass of a link, link frame. Visual meshes have no mass.
 pub(crate) fn mass(link: &LinkSpec, placed: &[Placed<'_>]) -> Result<LinkMass, ShapeError> {
     let total = |each: &dyn Fn(&Placed<'_>) -> Option<MassSpec>| {
         let mut sum = LinkMass::none();
@@ -247,7 +256,7 @@ pub(crate) fn mass(link: &LinkSpec, placed: &[Placed<'_>]) -> Result<LinkMass, S
     }
 }
 
-/// In the shape's own axes.
+/// Returns the mass of a shape, in its own axes.
 fn own_mass(shape: &Shape, mass: MassSpec) -> Result<LinkMass, ShapeError> {
     let properties = match mass {
         MassSpec::Density(density) => shape.mass_properties(density)?,

@@ -1,17 +1,17 @@
-//! `[materials.NAME]`: what a surface does in a contact, and how it looks.
+//! `[materials.NAME]`: contact constants and appearance of a surface.
 
+use crate::appearance::AppearanceSpec;
 use crate::bound::Bound;
 use crate::fields::Fields;
-use crate::look::Appearance;
 
-/// Friction of a body that says nothing.
+/// Friction of a body without its own.
 pub(crate) const DEFAULT_FRICTION: f64 = 0.5;
-/// Restitution of a body that says nothing.
+/// Restitution of a body without its own.
 pub(crate) const DEFAULT_RESTITUTION: f64 = 0.0;
 
-/// A coefficient of friction.
+/// Range of coefficients of friction.
 pub(crate) const FRICTION: Bound = Bound::new(0.0, 100.0, "a friction coefficient from 0 to 100");
-/// A coefficient of restitution.
+/// Range of coefficients of restitution.
 pub(crate) const RESTITUTION: Bound = Bound::new(0.0, 1.0, "a restitution from 0 (no bounce) to 1 (no loss)");
 
 /// A named material.
@@ -19,12 +19,14 @@ pub(crate) const RESTITUTION: Bound = Bound::new(0.0, 1.0, "a restitution from 0
 pub struct MaterialSpec {
     /// The NAME of `[materials.NAME]`.
     pub name: String,
-    /// Coulomb's coefficient, at least 0; combined with the other body's. Default 0.5.
+    /// Coulomb's coefficient of friction, at least 0; combined with that of the other body. Default
+    /// 0.5.
     pub friction: f64,
-    /// Newton's coefficient, 0 to 1; combined with the other body's. Default 0.
+    /// Newton's coefficient of restitution, 0 to 1; combined with that of the other body. Default
+    /// 0.
     pub restitution: f64,
-    /// Look of bodies of this material.
-    pub look: Appearance,
+    /// Appearance of bodies of this material.
+    pub appearance: AppearanceSpec,
 }
 
 impl MaterialSpec {
@@ -33,7 +35,7 @@ impl MaterialSpec {
             name: name.to_owned(),
             friction: f.number_or("friction", FRICTION, DEFAULT_FRICTION),
             restitution: f.number_or("restitution", RESTITUTION, DEFAULT_RESTITUTION),
-            look: Appearance::read(&mut f, &Appearance::default()),
+            appearance: AppearanceSpec::read(&mut f, &AppearanceSpec::default()),
         };
         f.finish();
         material

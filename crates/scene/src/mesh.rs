@@ -1,4 +1,4 @@
-//! `[meshes.NAME]`: closed surfaces, from a file or made from a few numbers.
+//! `[meshes.NAME]`: closed surfaces, from a file or generated.
 
 use std::path::{Path, PathBuf};
 
@@ -13,79 +13,80 @@ pub struct MeshSpec {
     pub name: String,
     /// Where its triangles come from.
     pub source: MeshSource,
-    /// Whether holes, fins and other defects that keep it from being a solid are repaired, and told; otherwise they are
-    /// an error.
+    /// Whether holes, fins and other defects are repaired, with a note. Otherwise they are an
+    /// error.
     pub repair: bool,
-    /// Most levels of its sphere tree, 1 to 9; `None` leaves the choice to the builder.
+    /// Largest number of levels of its sphere tree, 1 to 9; `None` for the builder's default.
     pub sphere_tree_depth: Option<u32>,
-    /// How far the spheres may reach beyond the surface, as a part of the mesh's diagonal, 1e-4 to 1; `None`
-    /// leaves the choice to the builder.
-    pub sphere_tree_error: Option<f64>,
+    /// How far the spheres may reach outside the surface, as a fraction of the mesh's diagonal,
+    /// 1e-4 to 1; `None` for the builder's default.
+    pub sphere_tree_max_error: Option<f64>,
 }
 
-/// Where the triangles of a mesh come from. Generated meshes have z as their axis, are closed, and
-/// have the origin that is said here.
+/// The triangles of a mesh. Generated meshes are closed, have z as their axis, and have the origin
+/// stated here.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MeshSource {
-    /// An OBJ, STL, PLY or COLLADA file that was there when the scene was read.
+    /// An OBJ, STL, PLY or COLLADA file that existed when the scene was read.
     File {
-        /// The path, with the folder of the scene in front.
+        /// The path, prefixed with the folder of the scene.
         path: PathBuf,
-        /// Metres per unit of the file.
+        /// Meters per unit of the file.
         scale: f64,
     },
-    /// A profile turned about the z axis; the origin is that of the profile.
+    /// A profile revolved about the z axis; the origin is that of the profile.
     Lathe {
-        /// Radius and height `[r, z]` in metres, from the bottom of the axis to its top; the first
+        /// Radius and height `[r, z]` in meters, from the bottom of the axis to its top. The first
         /// and the last radius are 0, all others positive, and the line does not cross itself.
         profile_m: Vec<[f64; 2]>,
-        /// Sides around the axis.
+        /// Segments around the axis.
         segments: u32,
     },
-    /// A ring about z, centred on the origin.
+    /// A torus about z, centered on the origin.
     Torus {
-        /// From the axis to the middle of the tube, metres; more than the tube's radius.
+        /// From the axis to the center of the tube, meters; more than the tube's radius.
         radius_m: f64,
-        /// Radius of the tube, metres.
+        /// Radius of the tube, meters.
         tube_radius_m: f64,
-        /// Sides around the axis.
+        /// Segments around the axis.
         segments: u32,
-        /// Sides around the tube.
+        /// Segments around the tube.
         tube_segments: u32,
     },
-    /// An icosahedron whose triangles are quartered `subdivisions` times, on a sphere about the origin.
+    /// An icosahedron whose triangles are divided in four `subdivisions` times, projected onto a
+    /// sphere about the origin.
     Icosphere {
-        /// Metres.
+        /// Meters.
         radius_m: f64,
         /// 0 to 7.
         subdivisions: u32,
     },
-    /// A cylinder along z, centred on the origin.
+    /// A cylinder along z, centered on the origin.
     Cylinder {
-        /// Metres.
+        /// Meters.
         radius_m: f64,
-        /// Whole length, metres.
+        /// Full length, meters.
         length_m: f64,
-        /// Sides around the axis.
+        /// Segments around the axis.
         segments: u32,
     },
-    /// A capsule along z, centred on the origin.
+    /// A capsule along z, centered on the origin.
     Capsule {
-        /// Metres.
+        /// Meters.
         radius_m: f64,
-        /// Length of the straight part, without the two caps, metres.
+        /// Length of the straight part, without the two caps, meters.
         length_m: f64,
-        /// Sides around the axis.
+        /// Segments around the axis.
         segments: u32,
     },
-    /// A box centred on the origin.
+    /// A box centered on the origin.
     Box {
-        /// Whole edges along x, y and z, metres.
+        /// Full edge lengths along x, y and z, meters.
         size_m: [f64; 3],
     },
 }
 
-const TREE_ERROR: Bound = Bound::new(1e-4, 1.0, "a part of the mesh's diagonal, from 1e-4 to 1");
+const TREE_ERROR: Bound = Bound::new(1e-4, 1.0, "a fraction of the mesh's diagonal, from 1e-4 to 1");
 
 #[derive(Clone, Copy)]
 enum Kind {
@@ -109,7 +110,7 @@ const KINDS: Names<Kind> = &[
 ];
 
 impl MeshSpec {
-    /// The name of its file, else its own.
+    /// Returns the name of its file, else its own name.
     pub(crate) fn called(&self) -> String {
         match &self.source {
             MeshSource::File { path, .. } => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
@@ -117,7 +118,7 @@ impl MeshSpec {
         }
     }
 
-    /// Reads a mesh; files are looked for beside `folder`.
+    /// Reads a mesh; paths are relative to `folder`.
     pub(crate) fn read(name: &str, mut f: Fields<'_>, folder: &Path) -> Option<Self> {
         let Some(kind) = f.choice("type", KINDS) else {
             f.give_up();
@@ -125,10 +126,10 @@ impl MeshSpec {
         };
         let repair = f.flag_or("repair", false);
         let sphere_tree_depth = f.value("sphere_tree_depth").map(|v| f.as_integer("sphere_tree_depth", v, 1..=9));
-        let sphere_tree_error = f.optional_number("sphere_tree_error", TREE_ERROR);
+        let sphere_tree_max_error = f.optional_number("sphere_tree_max_error", TREE_ERROR);
         let source = MeshSource::read(&mut f, kind, folder);
         f.finish();
-        Some(MeshSpec { name: name.to_owned(), source: source?, repair, sphere_tree_depth, sphere_tree_error })
+        Some(MeshSpec { name: name.to_owned(), source: source?, repair, sphere_tree_depth, sphere_tree_max_error })
     }
 }
 
@@ -179,7 +180,7 @@ fn read_torus(f: &mut Fields<'_>) -> MeshSource {
     MeshSource::Torus { radius_m, tube_radius_m, segments, tube_segments }
 }
 
-/// The path of a mesh's file: an OBJ, STL, PLY or COLLADA that exists.
+/// Reads the path of a mesh file: an existing OBJ, STL, PLY or COLLADA file.
 fn read_path(f: &mut Fields<'_>, folder: &Path) -> Option<PathBuf> {
     let (text, value) = f.text("file", "the path of an .obj, .stl, .ply or .dae file")?;
     let path = folder.join(text);
@@ -192,7 +193,7 @@ fn read_path(f: &mut Fields<'_>, folder: &Path) -> Option<PathBuf> {
     }
     if !path.is_file() {
         let message = format!("`file` of {}: there is no file {}", f.what, path.display());
-        f.log.report(value.span(), message, "wanted a path relative to the folder of the scene");
+        f.log.report(value.span(), message, "expected a path relative to the folder of the scene");
         return None;
     }
     Some(path)

@@ -1,15 +1,17 @@
-//! `camera = { … }` and `light = { … }` of a body or link: a point of view and a light that move with it (thesis §III.A).
+//! `camera = { … }` and `light = { … }` of a body or link: a camera and a light that move with it
+//! (thesis §III.A).
 
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 use tumble_core::collide::{Pose, Vec3};
 use tumble_core::{CameraMount, LightMount, Spread};
 
+use crate::appearance::read_color;
 use crate::bound::Bound;
 use crate::fields::{Fields, Names};
-use crate::look::read_color;
 use crate::view::FOV;
 
-/// What a body or link carries; poses are in the frame of the shape or link, and `part` is not told yet.
+/// The camera and the light attached to a body or link. Poses are in the frame of the shape or
+/// link; `part` is set when the world is built.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mounts {
     /// `camera`.
@@ -29,7 +31,7 @@ const KINDS: Names<Kind> = &[("directional", Kind::Directional), ("point", Kind:
 impl Mounts {
     pub(crate) fn read(f: &mut Fields<'_>) -> Mounts {
         let (log, what) = (f.log, f.what.clone());
-        let example = "{ position_m = [0, 0, 0.1], ahead = [1, 0, 0] }";
+        let example = "{ position_m = [0, 0, 0.1], forward = [1, 0, 0] }";
         let camera = f
             .value("camera")
             .and_then(|value| Fields::of(log, value, format!("the camera of {what}"), example))
@@ -45,18 +47,22 @@ impl Mounts {
 
 fn read_camera(mut f: Fields<'_>) -> CameraMount {
     let position = f.vector_or("position_m", Bound::ANY, [0.0; 3]);
-    let (ahead, up) = (f.direction_or("ahead", [1.0, 0.0, 0.0]), f.direction_or("up", [0.0, 0.0, 1.0]));
+    let (ahead, up) = (f.direction_or("forward", [1.0, 0.0, 0.0]), f.direction_or("up", [0.0, 0.0, 1.0]));
     let fov_deg = f.number_or("vertical_fov_deg", FOV, 40.0);
     let (near, far) = (f.number_or("near_m", Bound::POSITIVE, 0.05), f.number_or("far_m", Bound::POSITIVE, 500.0));
     if near >= far {
         f.log.report(
             f.span.clone(),
-            format!("`near_m` of {} is {near}, `far_m` {far}", f.what),
-            "wanted near_m less than far_m",
+            format!("`near_m` of {} is {near} and `far_m` is {far}", f.what),
+            "expected near_m less than far_m",
         );
     }
     let pose = facing(position, ahead, up).unwrap_or_else(|| {
-        f.log.report(f.span.clone(), format!("{} looks along its own `up`", f.what), "wanted `ahead` not along `up`");
+        f.log.report(
+            f.span.clone(),
+            format!("{} looks along its `up`", f.what),
+            "expected two directions that are not parallel",
+        );
         Pose::identity()
     });
     f.finish();
@@ -88,7 +94,8 @@ fn read_light(mut f: Fields<'_>) -> Option<LightMount> {
     Some(light)
 }
 
-/// The pose at a position with x along `ahead` and z as near to `up` as can be; `None` where they are along each other.
+/// Returns the pose at a position with x along `forward` and z as close to `up` as possible; `None`
+/// if the two are parallel.
 fn facing(position: [f64; 3], ahead: [f64; 3], up: [f64; 3]) -> Option<Pose> {
     let x = Vec3::from(ahead).try_normalize(1e-9)?;
     let y = Vec3::from(up).cross(&x).try_normalize(1e-6)?;

@@ -1,12 +1,12 @@
-//! What is said aloud of files that could be used, but not quite as they are, and of worlds that start in an unlikely way.
+//! Notes about files that are usable with changes, and about worlds that start with overlaps.
 
 use tumble_core::{Visual, VisualGeometry, World};
 
-/// Pairs of bodies that overlap told by name.
-const TOLD_OVERLAPS: usize = 8;
+/// Overlapping pairs that notes list by name.
+const MAX_LISTED_OVERLAPS: usize = 8;
 
-/// Notes of the visual meshes that somebody wanted to draw and that could not be read. Reads none ([`VisualMesh::triangles`](tumble_core::VisualMesh::triangles)
-/// does).
+/// Returns notes about visual meshes that were to be drawn and could not be read. Reads no mesh
+/// itself; [`VisualMesh::triangles`](tumble_core::VisualMesh::triangles) does.
 pub fn visual_notes<'v>(visuals: impl IntoIterator<Item = &'v Visual>) -> Vec<String> {
     let mut notes = NoteList::default();
     for visual in visuals {
@@ -19,8 +19,9 @@ pub fn visual_notes<'v>(visuals: impl IntoIterator<Item = &'v Visual>) -> Vec<St
     notes.take()
 }
 
-/// Notes of the bodies that overlap as the world stands, by more than contacts may drift: each step pushes them apart. The deepest come first; of many the
-/// rest is counted.
+/// Returns notes about bodies that overlap at the current state by more than the drift tolerance of
+/// contacts. Each step pushes such bodies apart. The deepest come first; beyond the first few they
+/// are counted.
 pub fn overlap_notes(world: &World) -> Vec<String> {
     let mut overlaps = world.overlaps(2.0 * world.settings().drift_tolerance);
     overlaps.sort_by(|a, b| b.depth.total_cmp(&a.depth));
@@ -29,38 +30,38 @@ pub fn overlap_notes(world: &World) -> Vec<String> {
         true => format!("links of {a} overlap by {depth:.2e} m at the start"),
         false => format!("{a} and {b} overlap by {depth:.2e} m at the start"),
     };
-    let told = overlaps.iter().take(TOLD_OVERLAPS).map(|o| line(o.objects.map(name), o.depth));
-    let more = overlaps.len().saturating_sub(TOLD_OVERLAPS);
-    told.chain((more > 0).then(|| format!("{more} more pairs of bodies overlap at the start"))).collect()
+    let listed = overlaps.iter().take(MAX_LISTED_OVERLAPS).map(|o| line(o.objects.map(name), o.depth));
+    let more = overlaps.len().saturating_sub(MAX_LISTED_OVERLAPS);
+    listed.chain((more > 0).then(|| format!("{more} more pairs of bodies overlap at the start"))).collect()
 }
 
-/// Notes as they come up; those that say the same of several are told together.
+/// Notes that are collected during reading. Equal notes about several subjects become one line.
 #[derive(Default)]
 pub(crate) struct NoteList {
-    /// Of whom, and what.
+    /// Subject and text.
     notes: Vec<(String, String)>,
 }
 
 impl NoteList {
-    pub(crate) fn add(&mut self, who: impl Into<String>, what: impl Into<String>) {
-        self.notes.push((who.into(), what.into()));
+    pub(crate) fn add(&mut self, subject: impl Into<String>, text: impl Into<String>) {
+        self.notes.push((subject.into(), text.into()));
     }
 
-    /// One line for each different thing said, in the order of the first of each.
+    /// Returns one line for each different text, in the order of first appearance.
     pub(crate) fn take(&mut self) -> Vec<String> {
-        let mut told: Vec<(String, String, Vec<String>)> = Vec::new();
-        for (who, what) in self.notes.drain(..) {
-            match told.iter_mut().find(|(_, other, _)| *other == what) {
-                Some((first, _, others)) if *first != who && !others.contains(&who) => others.push(who),
+        let mut merged: Vec<(String, String, Vec<String>)> = Vec::new();
+        for (subject, text) in self.notes.drain(..) {
+            match merged.iter_mut().find(|(_, other, _)| *other == text) {
+                Some((first, _, others)) if *first != subject && !others.contains(&subject) => others.push(subject),
                 Some(_) => {}
-                None => told.push((who, what, Vec::new())),
+                None => merged.push((subject, text, Vec::new())),
             }
         }
-        let line = |(who, what, others): &(String, String, Vec<String>)| match others.len() {
-            0 => format!("{who}: {what}"),
-            more => format!("{who} and {more} more: {what}"),
+        let line = |(subject, text, others): &(String, String, Vec<String>)| match others.len() {
+            0 => format!("{subject}: {text}"),
+            more => format!("{subject} and {more} more: {text}"),
         };
-        told.iter().map(line).collect()
+        merged.iter().map(line).collect()
     }
 }
 
@@ -69,10 +70,10 @@ mod tests {
     use super::NoteList;
 
     #[test]
-    fn the_same_is_told_once() {
+    fn equal_notes_are_merged() {
         let mut notes = NoteList::default();
-        for (who, what) in [("a", "open"), ("b", "flat"), ("c", "open"), ("c", "open"), ("d", "open")] {
-            notes.add(who, what);
+        for (subject, text) in [("a", "open"), ("b", "flat"), ("c", "open"), ("c", "open"), ("d", "open")] {
+            notes.add(subject, text);
         }
         assert_eq!(notes.take(), ["a and 2 more: open", "b: flat"]);
         assert!(notes.take().is_empty());

@@ -1,4 +1,4 @@
-//! A robot or a mesh file as a scene of its own: on a floor, before a camera.
+//! A robot or a mesh file as a scene of its own: on a floor, in front of a camera.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 use tumble_core::collide::{Aabb, Pose, TriMesh, Vec3};
 use tumble_core::{Joint, Mode};
 
+use crate::appearance::AppearanceSpec;
 use crate::articulated::ArticulatedSpec;
 use crate::assemble;
-use crate::body::{BodySpec, MOST_NAME_BYTES, MassSpec};
+use crate::body::{BodySpec, MAX_NAME_BYTES, MassSpec};
 use crate::error::SceneError;
 use crate::file::SceneFile;
 use crate::link::{Geometry, LinkShape, LinkSpec};
 use crate::link_shapes;
-use crate::look::Appearance;
 use crate::mesh::{MeshSource, MeshSpec};
 use crate::shape::ShapeSpec;
-use crate::urdf::{self, UrdfError, UrdfOptions, Wanted};
+use crate::urdf::{self, Content, UrdfError, UrdfOptions};
 use crate::view::CameraSpec;
 
 /// A static half-space that is drawn as a checkered floor.
@@ -30,26 +30,27 @@ visible = false
 ";
 /// Density of a mesh, kg/m³: that of water.
 const DENSITY: f64 = 1000.0;
-/// Height of a mesh above the floor at time 0, as a share of its diagonal.
+/// Height of a mesh above the floor at time 0, as a fraction of its diagonal.
 const DROP: f64 = 0.1;
-/// A mesh with a longer diagonal is probably not in metres, m.
-const PROBABLY_MILLIMETRES_M: f64 = 10.0;
+/// A mesh with a longer diagonal is probably not in meters, m.
+const LIKELY_MILLIMETERS_M: f64 = 10.0;
 /// The direction in which the camera looks.
 const VIEW: [f64; 3] = [-0.55, 1.0, -0.45];
 const FOV_DEG: f64 = 40.0;
-/// Of a mesh, sRGB: a color that floor and sky do not have.
+/// Color of a mesh, sRGB: one that floor and sky do not have.
 const COLOR: [f64; 3] = [0.78, 0.45, 0.20];
 
-/// A URDF on a floor through its lowest point. Joints start at 0, or at the nearest limit where 0 is beyond it. A robot without a joint that moves floats.
+/// Returns a scene with a URDF on a floor through its lowest point. Joints start at 0, or at the
+/// nearest limit if 0 is outside their limits. A robot without movable joints floats.
 pub(crate) fn robot(path: &Path, options: &UrdfOptions) -> Result<SceneFile, SceneError> {
-    let mut robot = urdf::read_file(path, options, Wanted::Body)?;
+    let mut robot = urdf::read_file(path, options, Content::Body)?;
     if robot.links.iter().all(|link| link.joint.kind == Joint::Fixed) {
-        robot = urdf::read_file(path, &UrdfOptions { floating: true, ..options.clone() }, Wanted::Body)?;
-        robot.notes.push("it has no joint that moves, so its root link floats".into());
+        robot = urdf::read_file(path, &UrdfOptions { floating: true, ..options.clone() }, Content::Body)?;
+        robot.notes.push("it has no movable joint, so its root link floats".into());
     }
     let name = if robot.name.is_empty() { stem(path) } else { robot.name };
     let notes = robot.notes;
-    let mut spec = ArticulatedSpec { part_overlaps: true, notes, ..ArticulatedSpec::of(name, robot.links) };
+    let mut spec = ArticulatedSpec { exclude_overlapping: true, notes, ..ArticulatedSpec::of(name, robot.links) };
     start_within_limits(&mut spec.links);
     let poses =
         assemble::link_poses_at_start(&spec).map_err(|source| UrdfError::Model { file: path.to_path_buf(), source })?;
@@ -60,12 +61,13 @@ pub(crate) fn robot(path: &Path, options: &UrdfOptions) -> Result<SceneFile, Sce
     Ok(scene)
 }
 
-/// A mesh file as a dynamic body of the density of water, a tenth of its diagonal above a floor. Its frame is that of the file.
+/// Returns a scene with a mesh file as a dynamic body of the density of water, a tenth of its
+/// diagonal above a floor. Its frame is that of the file.
 pub(crate) fn mesh(path: &Path, repair: bool) -> Result<SceneFile, SceneError> {
     let wrong = |why: String| SceneError::Format { file: path.to_path_buf(), why };
     let triangles = link_shapes::read_file(path).map_err(wrong)?;
     if triangles.triangles.is_empty() {
-        return Err(wrong("the mesh has no triangles; wanted a closed surface".into()));
+        return Err(wrong("the mesh has no triangles; expected a closed surface".into()));
     }
     let bounds = Aabb::around(triangles.vertices.iter().copied());
     let diagonal = (bounds.max - bounds.min).norm();
@@ -80,7 +82,7 @@ pub(crate) fn mesh(path: &Path, repair: bool) -> Result<SceneFile, SceneError> {
         source,
         repair,
         sphere_tree_depth: None,
-        sphere_tree_error: None,
+        sphere_tree_max_error: None,
     });
     let body = BodySpec {
         name,
@@ -88,21 +90,21 @@ pub(crate) fn mesh(path: &Path, repair: bool) -> Result<SceneFile, SceneError> {
         shape: ShapeSpec::Mesh { mesh: 0 },
         mass: Some(MassSpec::Density(DENSITY)),
         visible: true,
-        look: Appearance { color: COLOR, ..Appearance::default() },
+        appearance: AppearanceSpec { color: COLOR, ..AppearanceSpec::default() },
         ..scene.bodies[0].clone()
     };
     scene.bodies.push(body);
     stand(&mut scene, &bounds, bounds.min.z - DROP * diagonal);
-    if diagonal > PROBABLY_MILLIMETRES_M {
+    if diagonal > LIKELY_MILLIMETERS_M {
         scene.notes.push(format!(
-            "{}: its diagonal is {diagonal:.1} m, so it may be in millimetres; a scene reads it with `scale = 0.001`",
+            "{}: its diagonal is {diagonal:.1} m, so it may be in millimeters; a scene reads it with `scale = 0.001`",
             path.display()
         ));
     }
     Ok(scene)
 }
 
-/// A scene of a floor that has another name than the object on it.
+/// Returns a scene with a floor whose name differs from that of the object on it.
 fn empty(path: &Path, name: &str) -> Result<SceneFile, SceneError> {
     let mut scene = SceneFile::parse(FLOOR, &path.display().to_string())?;
     if name == "floor" {
@@ -111,14 +113,15 @@ fn empty(path: &Path, name: &str) -> Result<SceneFile, SceneError> {
     Ok(scene)
 }
 
-/// Puts the floor at a height and the camera before what is between it and the top of the bounds. Squares of the floor are 10ⁿ m, the largest such below its diagonal.
+/// Moves the floor to a height and the camera in front of the space between the floor and the top
+/// of the bounds. Squares of the floor are 10ⁿ m, the largest such size below the diagonal.
 fn stand(scene: &mut SceneFile, bounds: &Aabb, floor_m: f64) {
     let min = Vec3::new(bounds.min.x, bounds.min.y, floor_m);
     let radius = (0.5 * (bounds.max - min).norm()).max(1e-3);
     scene.bodies[0].position_m[2] = floor_m;
     if let Some(ground) = &mut scene.ground {
         ground.height_m = floor_m;
-        ground.look.pattern_scale_m = libm::pow(10.0, libm::floor(libm::log10(2.0 * radius)));
+        ground.appearance.pattern_scale_m = libm::pow(10.0, libm::floor(libm::log10(2.0 * radius)));
     }
     let target = 0.5 * (min + bounds.max);
     let distance = radius / (0.5 * FOV_DEG).to_radians().sin();
@@ -133,10 +136,10 @@ fn stand(scene: &mut SceneFile, bounds: &Aabb, floor_m: f64) {
     });
 }
 
-/// Positions at time 0 that the limits allow; joints that follow others follow them.
+/// Moves initial positions into the limits. Joints that follow others follow them.
 fn start_within_limits(links: &mut [LinkSpec]) {
     for link in links.iter_mut().filter(|link| link.joint.is_single()) {
-        let [lower, upper] = link.joint.freedom.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        let [lower, upper] = link.joint.dof.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
         link.joint.position[0] = link.joint.position[0].max(lower).min(upper);
     }
     for follower in 0..links.len() {
@@ -149,14 +152,15 @@ fn start_within_limits(links: &mut [LinkSpec]) {
     }
 }
 
-/// Finds how far links reach; mesh files are read once each.
+/// Finds the extent of links. Each mesh file is read once.
 #[derive(Default)]
 struct Extent {
     files: BTreeMap<PathBuf, Option<TriMesh>>,
 }
 
 impl Extent {
-    /// Points in the world whose box holds all shapes; the origins of links where there are none.
+    /// Returns points in the world whose bounding box contains all shapes; the origins of links if
+    /// there are none.
     fn points(&mut self, links: &[LinkSpec], poses: &[Pose]) -> Vec<Vec3> {
         let mut points = Vec::new();
         for (link, pose) in links.iter().zip(poses) {
@@ -168,7 +172,8 @@ impl Extent {
         points
     }
 
-    /// What cannot be read reaches nowhere; building the robot tells it.
+    /// Adds the points of one shape. A file that cannot be read adds none; building the robot
+    /// reports it.
     fn add(&mut self, shape: &LinkShape, pose: &Pose, points: &mut Vec<Vec3>) {
         match &shape.geometry {
             Geometry::Shape(spec) => {
@@ -186,18 +191,18 @@ impl Extent {
     }
 }
 
-/// The name of a file without its extension, as an object may be named.
+/// Returns the name of a file without its extension, shortened to a valid object name.
 fn stem(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let mut name: String = stem.chars().filter(|c| !c.is_control()).collect();
-    while name.len() > MOST_NAME_BYTES {
+    while name.len() > MAX_NAME_BYTES {
         name.pop();
     }
     if name.is_empty() { "object".into() } else { name }
 }
 
 impl SceneFile {
-    /// Whether a robot of the scene stands on a base that is fixed: no link of it floats.
+    /// Returns whether the scene has a robot with a fixed base: one without a floating link.
     pub fn has_fixed_base(&self) -> bool {
         let floats = |spec: &ArticulatedSpec| spec.links.iter().any(|link| link.joint.kind == Joint::Floating);
         self.articulated.iter().any(|spec| !floats(spec))

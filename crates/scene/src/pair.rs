@@ -1,10 +1,11 @@
-//! `[[pair]]`: restitution and friction of two bodies or two materials, in place of what the rules of `[world]` give.
+//! `[[pair]]`: restitution and friction of two bodies or two materials, which override the
+//! combination rules of `[world]`.
 
 use std::collections::BTreeMap;
 
 use crate::body::Library;
-use crate::closure::{PartSpec, Parts};
 use crate::fields::{Fields, Value};
+use crate::loop_joint::{PartSpec, Parts};
 use crate::material::{FRICTION, RESTITUTION};
 
 /// One side of a pair.
@@ -12,7 +13,7 @@ use crate::material::{FRICTION, RESTITUTION};
 pub enum PairSideSpec {
     /// A body, by its index in [`SceneFile::bodies`](crate::SceneFile::bodies).
     Body(usize),
-    /// All of an articulated body, by its index.
+    /// A whole articulated body, by its index.
     Articulated(usize),
     /// A link of an articulated body and the links that are fixed to it, by both indices.
     Link(usize, usize),
@@ -20,19 +21,20 @@ pub enum PairSideSpec {
     Material(usize),
 }
 
-/// Surface constants of a pair, all references resolved; the order of its sides means nothing.
+/// Contact constants of a pair with all references resolved. The order of the sides has no meaning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PairSpec {
     /// Two bodies (or links), or two materials.
     pub sides: [PairSideSpec; 2],
-    /// 0 to 1; `None`: as the rule says.
+    /// 0 to 1; `None` for the combination rule.
     pub restitution: Option<f64>,
-    /// 0 to 100; `None`: as the rule says.
+    /// 0 to 100; `None` for the combination rule.
     pub friction: Option<f64>,
 }
 
 impl PairSpec {
-    /// Reads one; `None`, with the problem recorded, where its sides are not known. `lines` says where each pair stands.
+    /// Reads a pair. Returns `None`, with the problem recorded, if a side is unknown. `lines` has
+    /// the line of each earlier pair.
     pub(crate) fn read(
         mut f: Fields<'_>,
         library: &Library<'_>,
@@ -54,7 +56,7 @@ impl PairSpec {
         sides.sort_unstable();
         if let Some(line) = lines.insert(sides, log.line(span.start)) {
             let message = format!("{what} names the same two as the pair at line {line}");
-            log.report(span, message, "wanted each pair once");
+            log.report(span, message, "expected each pair once");
         }
         Some(PairSpec { sides, restitution, friction })
     }
@@ -71,7 +73,7 @@ fn read_materials(f: &Fields<'_>, value: &Value<'_>, library: &Library<'_>) -> O
         let found = library.material_names.get(name).copied();
         if found.is_none() {
             match library.material_names.is_empty() {
-                true => f.wrong("materials", item, "the NAME of a table [materials.NAME], and the scene has none"),
+                true => f.wrong("materials", item, "the NAME of a table [materials.NAME]; the scene has none"),
                 false => f.unknown_name("materials", item, name, library.material_names.keys().copied().collect()),
             }
         }
@@ -82,8 +84,8 @@ fn read_materials(f: &Fields<'_>, value: &Value<'_>, library: &Library<'_>) -> O
 }
 
 fn read_bodies(f: &mut Fields<'_>, parts: &impl Parts) -> Option<[PairSideSpec; 2]> {
-    let wanted = "the name of a body, or \"OBJECT/LINK\"; or instead of `a` and `b` two `materials`";
-    let (a, b) = (f.text("a", wanted), f.text("b", wanted));
+    let expected = "the name of a body, or \"OBJECT/LINK\"; or instead of `a` and `b` two `materials`";
+    let (a, b) = (f.text("a", expected), f.text("b", expected));
     let find = |key: &str, side: Option<(&str, &Value<'_>)>| {
         let (name, value) = side?;
         let found = side_of(parts, name);

@@ -1,23 +1,24 @@
-//! The profile of a lathe: a line of points `[r, z]` that, turned about z, bounds a solid.
+//! The profile of a lathe: points `[r, z]` whose line, revolved about z, bounds a solid.
 
 use toml::de::DeValue;
 
 use crate::bound::Bound;
 use crate::fields::Fields;
 
-/// Most points of a profile.
-const MOST_POINTS: usize = 1000;
+/// Largest number of points of a profile.
+const MAX_POINTS: usize = 1000;
 const WANTED: &str =
-    "a list of 3 to 1000 points [r, z] in metres, from the bottom of the axis (r = 0) to its top (r = 0)";
+    "a list of 3 to 1000 points [r, z] in meters, from the bottom of the axis (r = 0) to its top (r = 0)";
 
-/// Reads a profile and checks that it bounds a solid; `None`, with the problem recorded, if not.
+/// Reads a profile and checks that it bounds a solid. Returns `None`, with the problem recorded, if
+/// it does not.
 pub(crate) fn read(f: &mut Fields<'_>, key: &'static str) -> Option<Vec<[f64; 2]>> {
     let value = f.required(key, WANTED)?;
     let DeValue::Array(items) = value.get_ref() else {
         f.wrong(key, value, WANTED);
         return None;
     };
-    if !(3..=MOST_POINTS).contains(&items.len()) {
+    if !(3..=MAX_POINTS).contains(&items.len()) {
         f.wrong(key, value, WANTED);
         return None;
     }
@@ -28,14 +29,15 @@ pub(crate) fn read(f: &mut Fields<'_>, key: &'static str) -> Option<Vec<[f64; 2]
     }
     match fault(&points) {
         None => Some(points),
-        Some((index, wanted)) => {
-            f.wrong(key, &items[index], wanted);
+        Some((index, expected)) => {
+            f.wrong(key, &items[index], expected);
             None
         }
     }
 }
 
-/// The first point that keeps the profile from bounding a solid, and what would be right.
+/// Returns the first point because of which the profile does not bound a solid, and what is
+/// expected there.
 fn fault(points: &[[f64; 2]]) -> Option<(usize, String)> {
     let last = points.len() - 1;
     for (index, &[r, _]) in points.iter().enumerate() {
@@ -57,12 +59,13 @@ fn fault(points: &[[f64; 2]]) -> Option<(usize, String)> {
         .map(|(i, j)| (j, format!("a line that does not cross itself: the side after point {} meets it", i + 1)))
 }
 
-/// Area between the profile and the axis, positive if it runs upwards: `½ Σ (rᵢ zᵢ₊₁ − rᵢ₊₁ zᵢ)`.
+/// Returns the area between the profile and the axis, positive if the profile runs upwards: `½ Σ
+/// (rᵢ zᵢ₊₁ − rᵢ₊₁ zᵢ)`.
 fn signed_area(points: &[[f64; 2]]) -> f64 {
     points.windows(2).map(|w| 0.5 * (w[0][0] * w[1][1] - w[1][0] * w[0][1])).sum()
 }
 
-/// The first two sides `(i, i+1)`, `(j, j+1)`, `i + 1 < j`, that meet.
+/// Returns the first two sides `(i, i+1)`, `(j, j+1)`, `i + 1 < j`, that intersect.
 fn crossing(points: &[[f64; 2]]) -> Option<(usize, usize)> {
     let sides = points.len() - 1;
     for j in 2..sides {
@@ -75,7 +78,7 @@ fn crossing(points: &[[f64; 2]]) -> Option<(usize, usize)> {
     None
 }
 
-/// Whether segments `ab` and `cd` share a point.
+/// Returns whether segments `ab` and `cd` share a point.
 fn meet(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> bool {
     let side = |p: [f64; 2], q: [f64; 2], s: [f64; 2]| (q[0] - p[0]) * (s[1] - p[1]) - (q[1] - p[1]) * (s[0] - p[0]);
     let within =
@@ -105,7 +108,7 @@ mod tests {
         assert_eq!(fault(&[[0.0, 0.0], [-1.0, 0.5], [0.0, 1.0]]).unwrap().0, 1);
         assert_eq!(fault(&[[0.0, 0.0], [1.0, 0.5], [1.0, 0.5], [0.0, 1.0]]).unwrap().0, 2);
         assert_eq!(fault(&[[0.0, 1.0], [1.0, 0.5], [0.0, 0.0]]).unwrap().0, 0);
-        // The third side comes back through the first.
+        // The third side crosses the first.
         let knot = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [1.0, -1.0], [3.0, 4.0], [0.0, 4.0]];
         assert_eq!(fault(&knot).unwrap().0, 2);
     }

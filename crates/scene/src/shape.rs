@@ -1,40 +1,40 @@
-//! `shape = { type = … }`: what a body is for collisions, in body axes.
+//! `shape = { type = … }`: the collision shape of a body, in body axes.
 
 use std::collections::BTreeMap;
 
 use crate::bound::Bound;
 use crate::fields::{Fields, Names};
 
-/// The shape of a body, its own axes through its own origin.
+/// The shape of a body in its own axes and about its own origin.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ShapeSpec {
-    /// A ball about the origin.
+    /// A sphere about the origin.
     Sphere {
-        /// Metres.
+        /// Meters.
         radius_m: f64,
     },
     /// A box about the origin.
     Box {
-        /// Whole edges along x, y and z, metres.
+        /// Full edge lengths along x, y and z, meters.
         size_m: [f64; 3],
     },
-    /// All points within `radius_m` of a piece of the z axis about the origin.
+    /// All points within `radius_m` of a segment of the z axis about the origin.
     Capsule {
-        /// Metres.
+        /// Meters.
         radius_m: f64,
-        /// Length of that piece: the straight part, without the two caps, metres.
+        /// Length of the segment: the straight part, without the two caps, meters.
         length_m: f64,
     },
     /// A cylinder along z about the origin.
     Cylinder {
-        /// Metres.
+        /// Meters.
         radius_m: f64,
-        /// Whole length, metres.
+        /// Full length, meters.
         length_m: f64,
     },
-    /// All of space at and below z = 0.
+    /// All points at and below z = 0.
     HalfSpace,
-    /// A mesh, its vertices as they stand in its source.
+    /// A mesh with the vertices of its source.
     Mesh {
         /// Index into [`SceneFile::meshes`](crate::SceneFile::meshes).
         mesh: usize,
@@ -75,7 +75,7 @@ impl ShapeSpec {
         shape
     }
 
-    /// Reads a table that is a shape and holds other keys besides; does not finish it.
+    /// Reads a shape from a table that has other keys as well. Does not finish the table.
     pub(crate) fn read_part(f: &mut Fields<'_>, meshes: &BTreeMap<&str, Option<usize>>) -> Option<ShapeSpec> {
         let kind = f.choice("type", KINDS)?;
         ShapeSpec::of_kind(f, kind, meshes)
@@ -99,13 +99,13 @@ impl ShapeSpec {
     }
 }
 
-/// The mesh named by `mesh`; `None` if there is no such mesh or it is itself wrong.
+/// Returns the mesh named by `mesh`; `None` if there is no such mesh or it is itself wrong.
 fn read_mesh(f: &mut Fields<'_>, meshes: &BTreeMap<&str, Option<usize>>) -> Option<ShapeSpec> {
     let (name, value) = f.text("mesh", "the NAME of a table [meshes.NAME]")?;
     match meshes.get(name) {
         Some(index) => index.map(|mesh| ShapeSpec::Mesh { mesh }),
         None if meshes.is_empty() => {
-            f.wrong("mesh", value, "the NAME of a table [meshes.NAME], and the scene has none");
+            f.wrong("mesh", value, "the NAME of a table [meshes.NAME]; the scene has none");
             None
         }
         None => {

@@ -1,4 +1,4 @@
-//! The scenes that come with tumble, and finding a scene by path or by name.
+//! The scenes that come with tumble, and lookup of a scene by path or name.
 
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ pub struct Shipped {
     pub name: &'static str,
     /// The whole text of its `scene.toml`.
     pub text: &'static str,
-    /// Names and contents of the other files of its folder that it reads.
+    /// Names and contents of the other files that it reads from its folder.
     pub files: &'static [(&'static str, &'static str)],
 }
 
@@ -24,7 +24,7 @@ macro_rules! shipped_file {
     };
 }
 
-/// Names of folders, each with the files beside its `scene.toml`.
+/// Takes names of folders, each with the other files beside its `scene.toml`.
 macro_rules! shipped_scenes {
     ($($name:literal $([$($file:literal),*])?),* $(,)?) => {
         &[$(Shipped { name: $name, text: shipped_file!($name, "scene.toml"), files: &[$($(($file, shipped_file!($name, $file))),*)?] }),*]
@@ -44,13 +44,13 @@ const SHIPPED: &[Shipped] = shipped_scenes![
     "robot"["arm.urdf"]
 ];
 
-/// The scenes that come with tumble.
+/// Returns the scenes that come with tumble.
 pub fn shipped() -> &'static [Shipped] {
     SHIPPED
 }
 
 impl Shipped {
-    /// One line that says what the scene shows.
+    /// Returns the line that describes the scene.
     pub fn description(&self) -> String {
         description(self.text)
     }
@@ -58,7 +58,7 @@ impl Shipped {
     /// Reads the scene.
     ///
     /// # Errors
-    /// None for the scenes as they are; the type is that of [`SceneFile::parse`].
+    /// None for the shipped texts; the type is that of [`SceneFile::parse`].
     pub fn read(&self) -> Result<SceneFile, SceneError> {
         SceneFile::parse_with(self.text, &format!("scenes/{}/scene.toml", self.name), self.files)
     }
@@ -82,7 +82,7 @@ impl SceneSource {
         self.load_with(&LoadOptions::default())
     }
 
-    /// Reads the scene; a robot or a mesh file as the options say.
+    /// Reads the scene, a robot or a mesh file with the given options.
     ///
     /// # Errors
     /// As [`SceneFile::load`].
@@ -94,13 +94,13 @@ impl SceneSource {
     }
 }
 
-/// Finds a scene: the path of a file (a scene, a URDF or a mesh), the path of a folder with a `scene.toml`, or a name, which is
-/// looked for as a folder in each of `search_dirs` and then among the shipped scenes. What looks like a
-/// path (it has a separator, or the extension of a scene, robot or mesh) is never taken for a name.
+/// Finds a scene by path or name. A path is a file (a scene, a URDF or a mesh) or a folder with a
+/// `scene.toml`. A name is searched as a folder in each of `search_dirs`, then among the shipped
+/// scenes. Text with a separator or with the extension of a scene, robot or mesh is always a path.
 ///
 /// # Errors
-/// [`SceneError::Unknown`] for a name that is found nowhere; [`SceneError::Read`] for a path where
-/// nothing is.
+/// [`SceneError::Unknown`] for an unknown name; [`SceneError::Read`] for a path that does not
+/// exist.
 pub fn resolve_scene(name_or_path: &str, search_dirs: &[PathBuf]) -> Result<SceneSource, SceneError> {
     let path = Path::new(name_or_path);
     let like_a_path = name_or_path.contains(['/', '\\']) || is_file_name(path);
@@ -109,7 +109,7 @@ pub fn resolve_scene(name_or_path: &str, search_dirs: &[PathBuf]) -> Result<Scen
     }
     if like_a_path {
         let file = if path.is_dir() { path.join("scene.toml") } else { path.to_path_buf() };
-        // The system's own words for why it cannot be opened, where it has any.
+        // The system's reason why it cannot be opened, if there is one.
         let source = std::fs::metadata(&file).err().unwrap_or(std::io::ErrorKind::InvalidInput.into());
         return Err(SceneError::Read { file, source });
     }
@@ -125,8 +125,8 @@ fn unknown(name: &str) -> SceneError {
     let names = SHIPPED.iter().map(|scene| scene.name);
     let all = listed(names.clone(), "and");
     let hint = match nearest(name, names) {
-        Some(near) => format!("did you mean `{near}`? Shipped are {all}"),
-        None => format!("shipped are {all}; or give the path of a scene.toml"),
+        Some(near) => format!("did you mean `{near}`? There are {all}"),
+        None => format!("there are {all}; or give the path of a scene.toml"),
     };
     SceneError::Unknown { name: name.to_owned(), hint }
 }

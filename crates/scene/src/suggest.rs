@@ -1,8 +1,9 @@
 //! "Did you mean": the known word nearest to a mistyped one.
 
-/// The word of `known` that `typed` most likely means: one that goes on after it, as `dt_s` does after
-/// `dt`, or else the least edit distance, at most a third of the length of the word typed (and at
-/// least one edit), or else the same quantity in another unit, as `limits_rad` is for `limits_m`. Ties go to the earlier word.
+/// Returns the word of `known` that `typed` most likely means. First a word that continues it, as
+/// `dt_s` continues `dt`. Else the word with the smallest edit distance, at most a third of the
+/// typed length and at least one. Else the same quantity in another unit, as `limits_rad` for
+/// `limits_m`. Ties go to the earlier word.
 pub(crate) fn nearest<'k>(typed: &str, known: impl IntoIterator<Item = &'k str>) -> Option<&'k str> {
     let letters: Vec<char> = typed.chars().take(64).collect();
     let allowed = (letters.len() / 3).max(1);
@@ -21,7 +22,7 @@ pub(crate) fn nearest<'k>(typed: &str, known: impl IntoIterator<Item = &'k str>)
     best.map(|(_, word)| word).or(in_another_unit)
 }
 
-/// A key without the unit at its end.
+/// Returns a key without its unit.
 fn quantity(key: &str) -> &str {
     let mut rest = key;
     while let Some((before, last)) = rest.rsplit_once('_')
@@ -34,8 +35,9 @@ fn quantity(key: &str) -> &str {
 
 const UNITS: &[&str] = &["m", "s", "kg", "n", "rad", "deg", "per", "m2", "m3", "s2"];
 
-/// The fewest single-letter insertions, deletions, replacements and swaps of neighbours that turn
-/// `a` into `b` (optimal string alignment: a swapped pair is not edited again).
+/// Returns the smallest number of single-letter insertions, deletions, replacements and swaps of
+/// adjacent letters that turn `a` into `b` (optimal string alignment: a swapped pair is not edited
+/// again).
 fn edit_distance(a: &[char], b: &str) -> usize {
     let b: Vec<char> = b.chars().take(64).collect();
     let width = b.len() + 1;
@@ -59,7 +61,7 @@ fn edit_distance(a: &[char], b: &str) -> usize {
     cost[a.len() * width + b.len()]
 }
 
-/// Words as a list for a message: `a`, `b` or `c`.
+/// Formats words as a list for a message: `a`, `b` or `c`.
 pub(crate) fn listed<'k>(words: impl IntoIterator<Item = &'k str>, last: &str) -> String {
     let quoted: Vec<String> = words.into_iter().map(|word| format!("`{word}`")).collect();
     match quoted.split_last() {

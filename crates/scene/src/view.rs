@@ -1,19 +1,20 @@
-//! `[camera]`, `[[light]]`, `[sky]`, `[ground]`, `[cave]`: what the picture is taken with. Nothing here moves a body.
+//! `[camera]`, `[[light]]`, `[sky]`, `[ground]`, `[cave]`: how the scene is drawn. Nothing here has
+//! an effect on motion.
 
+use crate::appearance::{AppearanceSpec, Color, Pattern, read_color};
 use crate::bound::Bound;
 use crate::fields::{Fields, Names};
-use crate::look::{Appearance, Color, Pattern, read_color};
 
-/// A camera that stands still.
+/// A fixed camera.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CameraSpec {
-    /// Where the eye is, m.
+    /// Position of the eye, m.
     pub eye_m: [f64; 3],
-    /// The point in the middle of the picture, m.
+    /// The point in the center of the image, m.
     pub target_m: [f64; 3],
-    /// A unit vector that is upright in the picture. Default z.
+    /// A unit vector that points up in the image. Default z.
     pub up: [f64; 3],
-    /// Angle between the lower and the upper edge, degrees, 1 to 170. Default 40.
+    /// Angle between the lower and the upper edge of the image, degrees, 1 to 170. Default 40.
     pub vertical_fov_deg: f64,
     /// Nearest depth drawn, m. Default 0.05.
     pub near_m: f64,
@@ -21,7 +22,7 @@ pub struct CameraSpec {
     pub far_m: f64,
 }
 
-/// An opening angle of a picture.
+/// Range of vertical fields of view.
 pub(crate) const FOV: Bound = Bound::new(1.0, 170.0, "an angle from 1 to 170 degrees");
 
 impl CameraSpec {
@@ -48,24 +49,30 @@ impl CameraSpec {
         let aside = [b * z - c * y, c * x - a * z, a * y - b * x];
         let length = crate::fields::norm(&ahead);
         if crate::fields::norm(&aside) <= 1e-6 * length || length == 0.0 {
-            let message = format!("{} looks along its own `up`, or from `eye_m` at itself", f.what);
-            f.log.report(f.span.clone(), message, "wanted a `target_m` away from `eye_m` and not along `up`");
+            let message = format!("{} looks along its `up`, or its `target_m` equals its `eye_m`", f.what);
+            f.log.report(
+                f.span.clone(),
+                message,
+                "expected a `target_m` that differs from `eye_m` in a direction other than `up`",
+            );
         }
         if self.near_m >= self.far_m {
-            let message = format!("`near_m` of {} is {}, `far_m` {}", f.what, self.near_m, self.far_m);
-            f.log.report(f.span.clone(), message, "wanted near_m less than far_m");
+            let message = format!("`near_m` of {} is {} and `far_m` is {}", f.what, self.near_m, self.far_m);
+            f.log.report(f.span.clone(), message, "expected near_m less than far_m");
         }
     }
 }
 
-/// `[cave]`: where the frame of a cave lies in the scene, upright. `x_scene = origin + scale · Rz(heading) · x_cave`.
+/// `[cave]`: the pose of a cave's frame in the scene, upright. `x_scene = origin + scale ·
+/// Rz(heading) · x_cave`.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CavePlace {
-    /// Where the cave's origin is (by custom the floor below its middle), m, world axes.
+    /// The cave's origin (by convention the floor below its center), m, world axes.
     pub origin_m: [f64; 3],
-    /// The turn about the vertical, counter-clockwise from above, degrees: at 0 the cave's y axis is the world's.
+    /// Rotation about the vertical, counter-clockwise from above, degrees. At 0 the cave's y axis
+    /// is the world's.
     pub heading_deg: f64,
-    /// Metres of the scene to a metre of the cave, 1e-6 to 1e6. Default 1.
+    /// Meters of the scene per meter of the cave, 1e-6 to 1e6. Default 1.
     pub scale: f64,
 }
 
@@ -80,8 +87,9 @@ impl CavePlace {
         place
     }
 
-    /// The place at which `eye` of the cave (m, cave axes), facing `forward`, is at `eye_m` of the scene and faces along `towards`, as far
-    /// as an upright cave can: the part of `towards` across the vertical counts, and where there is none the heading is 0.
+    /// Returns the place at which `eye` of the cave (m, cave axes), facing `forward`, is at `eye_m`
+    /// of the scene and faces along `towards`, as far as an upright cave can. Only the horizontal
+    /// part of `towards` counts; without one the heading is 0.
     pub fn standing(eye: [f64; 3], forward: [f64; 3], eye_m: [f64; 3], towards: [f64; 3]) -> Self {
         let bearing = |v: [f64; 3]| (v[0].hypot(v[1]) > 1e-9).then(|| libm::atan2(-v[0], v[1]));
         let heading = bearing(towards).zip(bearing(forward)).map_or(0.0, |(to, from)| to - from);
@@ -90,14 +98,14 @@ impl CavePlace {
         CavePlace { origin_m: [eye_m[0] - x, eye_m[1] - y, eye_m[2] - z], ..place }
     }
 
-    /// A point of the cave in the scene, m.
+    /// Returns a point of the cave in the scene, m.
     pub fn to_scene(&self, point: [f64; 3]) -> [f64; 3] {
         let [x, y, z] = self.turned(point);
         let [ox, oy, oz] = self.origin_m;
         [ox + self.scale * x, oy + self.scale * y, oz + self.scale * z]
     }
 
-    /// A direction of the cave in the scene.
+    /// Returns a direction of the cave in the scene.
     pub fn turned(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let (s, c) = libm::sincos(self.heading_deg.to_radians());
         [c * x - s * y, s * x + c * y, z]
@@ -107,12 +115,12 @@ impl CavePlace {
 /// A light.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LightSpec {
-    /// From everywhere in one direction, or from a point.
+    /// Directional or point.
     pub kind: LightKind,
     /// sRGB, 0 to 1. Default white.
     pub color: Color,
-    /// A directional light of intensity 1 on a white wall that faces it is white; a point light does
-    /// that at 1 m. Default 1.
+    /// A directional light of intensity 1 makes a white wall that faces it white; a point light
+    /// does so at 1 m. Default 1.
     pub intensity: f64,
     /// Default true for a directional light, false for a point.
     pub casts_shadow: bool,
@@ -121,12 +129,12 @@ pub struct LightSpec {
 /// Where a light comes from.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum LightKind {
-    /// Like the sun.
+    /// Parallel rays, like sunlight.
     Directional {
-        /// The unit direction in which the light travels, world axes.
+        /// Unit direction in which the light travels, world axes.
         direction: [f64; 3],
     },
-    /// Like a bulb; falls off with the square of the distance.
+    /// Light from a point; it falls off with the square of the distance.
     Point {
         /// World axes, m.
         position_m: [f64; 3],
@@ -141,11 +149,11 @@ enum Kind {
 
 const KINDS: Names<Kind> = &[("directional", Kind::Directional), ("point", Kind::Point)];
 
-/// Where the sun of a scene without lights shines: from above, the left and the front.
+/// Direction of the default sun: from above, the left and the front.
 const SUN: [f64; 3] = [0.36, 0.48, -0.8];
 
 impl LightSpec {
-    /// The light of a scene that names none.
+    /// Returns the default light of a scene without lights.
     pub(crate) fn sun() -> Self {
         let kind = LightKind::Directional { direction: SUN };
         LightSpec { kind, color: [1.0, 0.97, 0.92], intensity: 1.0, casts_shadow: true }
@@ -172,14 +180,14 @@ impl LightSpec {
     }
 }
 
-/// The sky: behind everything, and the light from everywhere.
+/// The sky: background and ambient light.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SkySpec {
     /// Straight up.
     pub zenith_color: Color,
     /// At the horizon.
     pub horizon_color: Color,
-    /// Below the horizon, as things reflect it.
+    /// Below the horizon, visible in reflections.
     pub nadir_color: Color,
     /// Strength of the light from the sky. Default 1.3.
     pub intensity: f64,
@@ -198,39 +206,39 @@ impl Default for SkySpec {
 
 impl SkySpec {
     pub(crate) fn read(mut f: Fields<'_>) -> Self {
-        let usual = SkySpec::default();
+        let default = SkySpec::default();
         let sky = SkySpec {
-            zenith_color: read_color(&mut f, "zenith_color", usual.zenith_color),
-            horizon_color: read_color(&mut f, "horizon_color", usual.horizon_color),
-            nadir_color: read_color(&mut f, "nadir_color", usual.nadir_color),
-            intensity: f.number_or("intensity", Bound::NOT_NEGATIVE, usual.intensity),
+            zenith_color: read_color(&mut f, "zenith_color", default.zenith_color),
+            horizon_color: read_color(&mut f, "horizon_color", default.horizon_color),
+            nadir_color: read_color(&mut f, "nadir_color", default.nadir_color),
+            intensity: f.number_or("intensity", Bound::NOT_NEGATIVE, default.intensity),
         };
         f.finish();
         sky
     }
 }
 
-/// A horizontal floor that is only drawn: bodies fall through it unless a half-space lies there.
+/// A horizontal floor that is only drawn. Bodies fall through it unless a half-space is there.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct GroundSpec {
     /// Height of the floor, m. Default 0.
     pub height_m: f64,
-    /// Default a grey checker of 1 m.
-    pub look: Appearance,
+    /// Default a gray checkerboard of 1 m.
+    pub appearance: AppearanceSpec,
 }
 
 impl GroundSpec {
     pub(crate) fn read(mut f: Fields<'_>) -> Self {
-        let base = Appearance {
+        let base = AppearanceSpec {
             color: [0.40, 0.41, 0.42],
             second_color: [0.46, 0.47, 0.48],
             pattern: Pattern::Checker,
             pattern_scale_m: 1.0,
             roughness: 0.9,
-            ..Appearance::default()
+            ..AppearanceSpec::default()
         };
         let height_m = f.number_or("height_m", Bound::ANY, 0.0);
-        let ground = GroundSpec { height_m, look: Appearance::read(&mut f, &base) };
+        let ground = GroundSpec { height_m, appearance: AppearanceSpec::read(&mut f, &base) };
         f.finish();
         ground
     }

@@ -1,4 +1,5 @@
-//! Mesh files that are drawn: each is read by whoever draws it first, and the same content stands in memory once per process.
+//! Visual mesh files. Each is read when it is first drawn, and equal content is in memory once per
+//! process.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,12 +12,12 @@ use crate::build::read_triangles;
 use crate::link_shapes::{read_mesh_bytes, stretched};
 
 /// BLAKE3 of a file, its extension, and the bits of its scale.
-type Content = ([u8; 32], String, [u64; 3]);
+type ContentKey = ([u8; 32], String, [u64; 3]);
 
-/// Meshes that somebody holds.
-static KNOWN: Mutex<BTreeMap<Content, Weak<TriMesh>>> = Mutex::new(BTreeMap::new());
+/// Meshes in use.
+static KNOWN: Mutex<BTreeMap<ContentKey, Weak<TriMesh>>> = Mutex::new(BTreeMap::new());
 
-/// The mesh of a file, which nobody has read yet.
+/// Returns the mesh of a file, which is not read yet.
 pub(crate) fn of_file(path: &Path, scale: [f64; 3]) -> VisualMesh {
     let file = path.to_path_buf();
     VisualMesh::read_by(path.display().to_string(), move || read(&file, scale))
@@ -32,7 +33,7 @@ fn read(path: &Path, scale: [f64; 3]) -> Result<Arc<TriMesh>, String> {
     }
     let mesh = stretched(read_triangles(path, &bytes)?, scale);
     mesh.check_data().map_err(|why| why.to_string())?;
-    // corners that faces have in common are smoothed over
+    // Smooths over corners that faces share.
     let mesh = Arc::new(mesh.welded());
     let mut known = known();
     known.retain(|_, mesh| mesh.strong_count() > 0);

@@ -5,29 +5,30 @@ use std::str::FromStr;
 
 use thiserror::Error;
 use tumble_core::collide::ContactMode;
-use tumble_core::{Combine, Sleep};
+use tumble_core::solver::{GaussSeidel, LcpPyramid, LcpSliding, RowSolver};
+use tumble_core::{Backtracking, Combine, Sleep, TimeStepping};
 
 use crate::bound::Bound;
 use crate::fields::{Fields, Names};
 use crate::suggest::{listed, nearest};
 
-/// How the world is stepped.
+/// The stepper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stepper {
-    /// One detection and one solve per step: a fixed cost.
+    /// One detection and one solve per step, at a fixed cost.
     TimeStepping,
-    /// Goes back to the instant of each collision (thesis, Algorithm 4).
+    /// Goes back to the time of each collision (thesis, Algorithm 4).
     Backtracking,
 }
 
-/// How free motion is integrated.
+/// The integrator of free motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integrator {
     /// Velocity Verlet: second order, one force evaluation per step.
     Verlet,
     /// Velocities first, then positions with the new velocities.
     SymplecticEuler,
-    /// All from the state at the start of the step (the thesis's).
+    /// Positions and velocities from the state at the start of the step (the thesis's integrator).
     ExplicitEuler,
     /// The classical Runge–Kutta method of fourth order.
     Rk4,
@@ -35,10 +36,10 @@ pub enum Integrator {
     DormandPrince,
 }
 
-/// How contact forces are found.
+/// The solver of contact forces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solver {
-    /// Sweeps over the friction cones.
+    /// Gauss–Seidel sweeps over the friction cones.
     GaussSeidel,
     /// Pivoting on the four-sided friction pyramid (6m unknowns).
     LcpPyramid,
@@ -47,13 +48,21 @@ pub enum Solver {
 }
 
 impl Stepper {
-    /// All of them with their names, as scene files and Python write them.
+    /// All steppers with their names in scene files and Python.
     pub const NAMES: &[(&str, Self)] =
         &[("time_stepping", Stepper::TimeStepping), ("backtracking", Stepper::Backtracking)];
+
+    /// Makes the stepper.
+    pub(crate) fn new_stepper(self) -> Box<dyn tumble_core::Stepper> {
+        match self {
+            Stepper::TimeStepping => Box::<TimeStepping>::default(),
+            Stepper::Backtracking => Box::<Backtracking>::default(),
+        }
+    }
 }
 
 impl Integrator {
-    /// All of them with their names, as scene files and Python write them.
+    /// All integrators with their names in scene files and Python.
     pub const NAMES: &[(&str, Self)] = &[
         ("verlet", Integrator::Verlet),
         ("symplectic_euler", Integrator::SymplecticEuler),
@@ -64,15 +73,24 @@ impl Integrator {
 }
 
 impl Solver {
-    /// All of them with their names, as scene files and Python write them.
+    /// All solvers with their names in scene files and Python.
     pub const NAMES: &[(&str, Self)] = &[
         ("gauss_seidel", Solver::GaussSeidel),
         ("lcp_pyramid", Solver::LcpPyramid),
         ("lcp_sliding", Solver::LcpSliding),
     ];
+
+    /// Makes the solver.
+    pub(crate) fn new_solver(self) -> Box<dyn RowSolver> {
+        match self {
+            Solver::GaussSeidel => Box::new(GaussSeidel),
+            Solver::LcpPyramid => Box::new(LcpPyramid),
+            Solver::LcpSliding => Box::new(LcpSliding),
+        }
+    }
 }
 
-/// How meshes and cylinders collide: the words of `contacts`.
+/// Values of the key `contacts`: how meshes and cylinders collide.
 pub(crate) const CONTACTS: Names<ContactMode> = ContactMode::NAMES;
 
 impl From<Integrator> for tumble_core::Integrator {
@@ -87,30 +105,30 @@ impl From<Integrator> for tumble_core::Integrator {
     }
 }
 
-/// A word that is not among those a choice has.
+/// A name that a choice does not have.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("`{typed}` is not known; {wanted}")]
+#[error("`{typed}` is not known; {expected}")]
 pub struct UnknownName {
-    /// The word.
+    /// The given name.
     pub typed: String,
-    /// What would be right.
-    pub wanted: String,
+    /// The nearest name, or all names.
+    pub expected: String,
 }
 
-/// The meaning of a word that stands outside of a scene file, as on a command line.
+/// Looks up a name outside of a scene file, as on a command line.
 fn by_name<T: Copy>(typed: &str, names: Names<T>) -> Result<T, UnknownName> {
     let words = || names.iter().map(|(name, _)| *name);
     let found = names.iter().find(|(name, _)| *name == typed).map(|(_, meaning)| *meaning);
     found.ok_or_else(|| UnknownName {
         typed: typed.to_owned(),
-        wanted: match nearest(typed, words()) {
+        expected: match nearest(typed, words()) {
             Some(near) => format!("did you mean `{near}`?"),
-            None => format!("wanted {}", listed(words(), "or")),
+            None => format!("expected {}", listed(words(), "or")),
         },
     })
 }
 
-/// The words of files for each choice, in both directions.
+/// Conversion between choices and their names, in both directions.
 macro_rules! written_by_name {
     ($($choice:ident),*) => {
         $(
@@ -134,7 +152,7 @@ macro_rules! written_by_name {
 
 written_by_name!(Stepper, Integrator, Solver);
 
-/// The rule of that name, as scene files write it.
+/// Returns the combination rule of that name in scene files.
 ///
 /// # Errors
 /// [`UnknownName`].
@@ -145,35 +163,38 @@ pub fn combine_by_name(typed: &str) -> Result<Combine, UnknownName> {
 /// `[world]`. All keys have defaults.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorldSettings {
-    /// Acceleration of free fall, world axes, m/s². Default `[0, 0, -9.81]`.
+    /// Gravitational acceleration, world axes, m/s². Default `[0, 0, -9.81]`.
     pub gravity_m_per_s2: [f64; 3],
-    /// Length of a step, seconds, from 1e-6 to 1. Default 1/240.
+    /// Length of a step, seconds, 1e-6 to 1. Default 1/240.
     pub dt_s: f64,
-    /// Parts each step is cut into, 1 to 1000. Default 1.
+    /// Sub-steps of each step, 1 to 1000. Default 1.
     pub substeps: u32,
-    /// How long the scene runs when nothing else is said, seconds. Default 5.
-    pub seconds: f64,
+    /// How long the command runs the scene by default, seconds. Default 5.
+    pub duration_s: f64,
     /// Default `time_stepping`.
     pub stepper: Stepper,
     /// Default `verlet`.
     pub integrator: Integrator,
-    /// `dormand_prince`: error of an inner step (m, rad, m/s, rad/s), from 1e-14 to 0.1. Default 1e-6.
+    /// `dormand_prince`: error per inner step (m, rad, m/s, rad/s), 1e-14 to 0.1. Default 1e-6.
     pub integrator_tolerance: f64,
     /// Default `gauss_seidel`.
     pub solver: Solver,
-    /// Most sweeps of an iterating solver per solve, 1 to 100 000. Default 200.
+    /// Largest number of sweeps of the iterative solver per solve, 1 to 100 000. Default 200.
     pub iterations: u32,
-    /// `backtracking`: surfaces closer than this touch, and a rebound lower than this rests, metres. Default 1e-7.
+    /// `backtracking`: surfaces closer than this are in contact, and lower rebounds end, meters.
+    /// Default 1e-7.
     pub contact_tolerance_m: f64,
-    /// Islands that have been still for so long are left out of the steps, seconds. Default: never.
+    /// Islands at rest for this long sleep: they are left out of the steps, seconds. Default:
+    /// never.
     pub sleep_after_s: Option<f64>,
-    /// How far the furthest point of what is still may have moved in that time, metres. Default 1e-5.
+    /// Largest displacement of any point of an island at rest during that time, meters. Default
+    /// 1e-5.
     pub sleep_within_m: f64,
-    /// Restitution of a pair from those of its bodies. Default `max`.
+    /// Rule for the restitution of a pair. Default `max`.
     pub combine_restitution: Combine,
-    /// Friction of a pair from those of its bodies. Default `geometric_mean`.
+    /// Rule for the friction of a pair. Default `geometric_mean`.
     pub combine_friction: Combine,
-    /// How meshes and cylinders collide that say nothing of their own. Default `surface`.
+    /// Contact mode of meshes and cylinders without their own. Default `surface`.
     pub contacts: ContactMode,
 }
 
@@ -183,7 +204,7 @@ impl Default for WorldSettings {
             gravity_m_per_s2: [0.0, 0.0, -9.81],
             dt_s: 1.0 / 240.0,
             substeps: 1,
-            seconds: 5.0,
+            duration_s: 5.0,
             stepper: Stepper::TimeStepping,
             integrator: Integrator::Verlet,
             integrator_tolerance: 1e-6,
@@ -207,23 +228,23 @@ const SECONDS: Bound = Bound::new(0.0, 1e6, "a time from 0 to 1e6 s");
 
 impl WorldSettings {
     pub(crate) fn read(mut f: Fields<'_>) -> Self {
-        let usual = WorldSettings::default();
+        let default = WorldSettings::default();
         let world = WorldSettings {
-            gravity_m_per_s2: f.vector_or("gravity_m_per_s2", Bound::ANY, usual.gravity_m_per_s2),
-            dt_s: f.number_or("dt_s", DT, usual.dt_s),
-            substeps: f.integer_or("substeps", 1..=1000, usual.substeps),
-            seconds: f.number_or("seconds", SECONDS, usual.seconds),
-            stepper: f.choice_or("stepper", Stepper::NAMES, usual.stepper),
-            integrator: f.choice_or("integrator", Integrator::NAMES, usual.integrator),
-            integrator_tolerance: f.number_or("integrator_tolerance", ACCURACY, usual.integrator_tolerance),
-            solver: f.choice_or("solver", Solver::NAMES, usual.solver),
-            iterations: f.integer_or("iterations", 1..=100_000, usual.iterations),
-            contact_tolerance_m: f.number_or("contact_tolerance_m", TOLERANCE, usual.contact_tolerance_m),
+            gravity_m_per_s2: f.vector_or("gravity_m_per_s2", Bound::ANY, default.gravity_m_per_s2),
+            dt_s: f.number_or("dt_s", DT, default.dt_s),
+            substeps: f.integer_or("substeps", 1..=1000, default.substeps),
+            duration_s: f.number_or("duration_s", SECONDS, default.duration_s),
+            stepper: f.choice_or("stepper", Stepper::NAMES, default.stepper),
+            integrator: f.choice_or("integrator", Integrator::NAMES, default.integrator),
+            integrator_tolerance: f.number_or("integrator_tolerance", ACCURACY, default.integrator_tolerance),
+            solver: f.choice_or("solver", Solver::NAMES, default.solver),
+            iterations: f.integer_or("iterations", 1..=100_000, default.iterations),
+            contact_tolerance_m: f.number_or("contact_tolerance_m", TOLERANCE, default.contact_tolerance_m),
             sleep_after_s: f.optional_number("sleep_after_s", AFTER),
-            sleep_within_m: f.number_or("sleep_within_m", TOLERANCE, usual.sleep_within_m),
-            combine_restitution: f.choice_or("combine_restitution", Combine::NAMES, usual.combine_restitution),
-            combine_friction: f.choice_or("combine_friction", Combine::NAMES, usual.combine_friction),
-            contacts: f.choice_or("contacts", CONTACTS, usual.contacts),
+            sleep_within_m: f.number_or("sleep_within_m", TOLERANCE, default.sleep_within_m),
+            combine_restitution: f.choice_or("combine_restitution", Combine::NAMES, default.combine_restitution),
+            combine_friction: f.choice_or("combine_friction", Combine::NAMES, default.combine_friction),
+            contacts: f.choice_or("contacts", CONTACTS, default.contacts),
         };
         f.finish();
         world

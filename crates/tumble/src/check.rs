@@ -7,7 +7,7 @@ use tumble::collide::{RepairSettings, Shape, TreeSettings};
 use tumble::dynamics::{ArticulatedBody, World};
 use tumble::net::sync::udp::SharedKey;
 use tumble::render::{Blend, DebugDraw, Drawing, RenderError, Warp};
-use tumble::scene::cave::{Cave, MOST_BYTES, is_cave, resolve_cave, shipped_caves};
+use tumble::scene::cave::{Cave, MAX_BYTES, is_cave, resolve_cave, shipped_caves};
 use tumble::scene::{
     FileKind, SceneError, building_surface, overlap_notes, read_mesh_bytes, read_solid, resolve_scene, shipped,
     visual_notes,
@@ -63,7 +63,7 @@ fn read_visuals(world: &World) -> Vec<String> {
 fn looks_like_cave(file: &str) -> bool {
     let path = Path::new(file);
     if path.is_file() {
-        let small = path.metadata().is_ok_and(|about| about.len() <= MOST_BYTES);
+        let small = path.metadata().is_ok_and(|about| about.len() <= MAX_BYTES);
         return small && std::fs::read_to_string(path).is_ok_and(|text| is_cave(&text));
     }
     let shipped_cave =

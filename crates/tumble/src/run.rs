@@ -25,7 +25,7 @@ pub fn run(options: &RunOptions) -> Result<(), Failure> {
         .flatten()
         .try_for_each(|path| check_writable(path).map_err(|why| Failure::run("the results", why)))?;
     let mut scene = options.scene.load()?;
-    scene.world.seconds = options.duration.unwrap_or(scene.world.seconds);
+    scene.world.duration_s = options.duration.unwrap_or(scene.world.duration_s);
     let (mut world, notes) = scene.build().map_err(Failure::input)?;
     notes.iter().filter(|_| !options.quiet).for_each(|note| println!("{note}"));
     restore(&mut world, options)?;
@@ -74,7 +74,7 @@ fn simulate(
     scene: &SceneFile,
     options: &RunOptions,
 ) -> Result<(Tally, f64, f64), Failure> {
-    let frames = (scene.world.seconds / scene.world.dt_s).round() as u64;
+    let frames = (scene.world.duration_s / scene.world.dt_s).round() as u64;
     let (begin, mut tally, mut wall) = (world.time(), Tally::default(), 0.0);
     let mut progress = Progress::new(frames, options.quiet);
     let mut record = |world: &World| match &mut recorder {

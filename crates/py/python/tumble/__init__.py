@@ -18,7 +18,7 @@ from tumble._errors import (
     UnknownNameError,
     UnreadableFileError,
 )
-from tumble._extension import Behaviour, Force
+from tumble._extension import Behavior, Force
 from tumble._native import (
     Articulation,
     Bodies,
@@ -43,7 +43,7 @@ from tumble._values import Energy, Momentum, SphereLevel
 
 __all__ = [
     "Articulation",
-    "Behaviour",
+    "Behavior",
     "Bodies",
     "Box",
     "BusyError",

@@ -1,28 +1,28 @@
-"""The exceptions: one base, and beside it the built-in one that Python programs expect."""
+"""Exceptions. Each derives from ``TumbleError`` and from the built-in exception that fits."""
 
 
 class TumbleError(Exception):
-    """Everything that tumble raises of its own. The text is that of the library and the command."""
+    """Base of all exceptions of tumble. The text is that of the library and the command."""
 
 
 class InvalidValueError(TumbleError, ValueError):
-    """A number, a shape of an array, a name or a setting that cannot be; says what would be right."""
+    """An invalid number, array shape, name or setting. The text states the expected value."""
 
 
 class SceneError(TumbleError, ValueError):
-    """A scene, URDF or mesh file with problems; all of them are told at once, with line and column."""
+    """A scene, URDF or mesh file with problems; all of them are listed with line and column."""
 
 
 class MissingFileError(TumbleError, FileNotFoundError):
-    """A file, or a shipped scene, that is not there."""
+    """A file or a shipped scene does not exist."""
 
 
 class UnreadableFileError(TumbleError, OSError):
-    """A file that is there and cannot be read or written."""
+    """A file exists but cannot be read or written."""
 
 
 class SnapshotError(TumbleError, ValueError):
-    """Bytes that :meth:`World.restore`, which then changes nothing, or unpickling refuses."""
+    """Bytes are not a snapshot, or not one of this world. :meth:`World.restore` then changes nothing."""
 
 
 class UnknownNameError(TumbleError, KeyError):
@@ -37,20 +37,20 @@ class RemovedError(TumbleError, ReferenceError):
 
 
 class StepError(TumbleError, RuntimeError):
-    """A step that could not be taken. The world is as it was before that frame."""
+    """A step failed. The world has the state before that step."""
 
 
 class BusyError(TumbleError, RuntimeError):
-    """A world that is being stepped: by another thread, or by the step that this very call comes from."""
+    """The world is being stepped, by another thread or by the step that made this call."""
 
 
 class PictureError(TumbleError, RuntimeError):
-    """No graphics adapter, not even a software one, or one that fails; the text says what brings one."""
+    """There is no graphics adapter, not even a software one, or it fails. The text says how to install one."""
 
 
 class RecordingError(TumbleError, ValueError):
-    """A file that is no recording, or a damaged one; says where."""
+    """A file is not a recording, or is damaged. The text has the place."""
 
 
 class InternalError(TumbleError, RuntimeError):
-    """A fault of tumble itself. The world it happened in refuses further use; please report it."""
+    """A bug in tumble. The world can no longer be used; please report the error."""

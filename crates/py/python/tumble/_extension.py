@@ -1,4 +1,4 @@
-"""Forces and behaviours written in Python."""
+"""Forces and behaviors written in Python."""
 
 from __future__ import annotations
 
@@ -15,51 +15,51 @@ if TYPE_CHECKING:
 
 
 class Force:
-    """A force of your own: subclass it, write ``apply``, and give it to ``World.add_force``.
+    """Base class of custom forces: define ``apply`` and pass an object to ``World.add_force``.
 
-    It is asked at every evaluation of forces: once a step with the default integrator, four times with ``rk4``. It should depend on the view
-    alone; what it remembers between calls it must be able to ``fork``.
+    It is called at every evaluation of forces: once per step with the default integrator, four times with ``rk4``. It should depend on the view
+    only. ``fork`` must copy any data that it keeps between calls.
     """
 
     def apply(self, view: View) -> None:
         """Adds to ``view.force`` (n, 3), N, and ``view.torque`` (n, 3), N·m: world axes, one row for each rigid body or link.
 
-        What it raises ends the step and reaches its caller; the world is then as it was before that frame. The world itself cannot be used
-        meanwhile (``BusyError``).
+        An exception ends the step and is raised there; the world then has its state before that step. The world cannot be used within the call
+        (``BusyError``).
         """
         raise NotImplementedError(f"{type(self).__name__} must define apply(self, view)")
 
     def fork(self) -> Self:
-        """The force of a fork of the world: by default a deep copy, so that forks share nothing that changes."""
+        """Returns the force for a fork of the world: by default a deep copy, so forks share no data that changes."""
         return copy.deepcopy(self)
 
 
-class Behaviour:
-    """How some bodies act of themselves, as a boid does: subclass it, write ``act``, and give it to ``World.add_behaviour``.
+class Behavior:
+    """Base class of behaviors, such as those of boids: define ``act`` and pass an object to ``World.add_behavior``.
 
-    It is asked once a step, before it; what it does acts during that step.
+    It is called once before each step. Its forces act during that step.
     """
 
     def act(self, view: View, rows: NDArray[np.int64]) -> None:
-        """Adds to ``view.force`` and ``view.torque``, as a force does. ``rows``: those of the bodies it was given, shape (k,)."""
+        """Adds to ``view.force`` and ``view.torque``, as a force does. rows: the rows of its bodies, shape (k,)."""
         raise NotImplementedError(f"{type(self).__name__} must define act(self, view, rows)")
 
     def fork(self) -> Self:
-        """The behaviour of a fork of the world: by default a deep copy."""
+        """Returns the behavior for a fork of the world: by default a deep copy."""
         return copy.deepcopy(self)
 
 
 def check_force(value: object) -> None:
-    """A ``TypeError`` for what is no force."""
+    """Raises ``TypeError`` for anything but a force."""
     _check(Force, value)
 
 
-def check_behaviour(value: object) -> None:
-    """A ``TypeError`` for what is no behaviour."""
-    _check(Behaviour, value)
+def check_behavior(value: object) -> None:
+    """Raises ``TypeError`` for anything but a behavior."""
+    _check(Behavior, value)
 
 
-def _check(kind: type[Force] | type[Behaviour], value: object) -> None:
+def _check(kind: type[Force] | type[Behavior], value: object) -> None:
     if not isinstance(value, kind):
         given = f"the class {value.__name__} itself" if isinstance(value, type) else type(value).__name__
-        raise TypeError(f"wanted an object of a subclass of tumble.{kind.__name__}, and not {given}")
+        raise TypeError(f"expected an object of a subclass of tumble.{kind.__name__}, not {given}")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import disjoint_base
 
-from tumble._extension import Behaviour, Force
+from tumble._extension import Behavior, Force
 from tumble._values import Energy, Momentum, SphereLevel
 from tumble.typing import Axis, CollisionMeshes, Combine, Contacts, Integrator, MissingMeshes, Mode, Solver, Stepper, TreeMethod
 
@@ -42,7 +42,7 @@ __all__ = [
     "_unpickle_shape",
     "_unpickle_tree",
     "_unpickle_world",
-    "_words",
+    "_choices",
 ]
 
 @disjoint_base
@@ -159,10 +159,10 @@ class RigidBody:
     @mode.setter
     def mode(self, value: Mode) -> None: ...
     @property
-    def alive(self) -> bool:
+    def enabled(self) -> bool:
         """Whether it takes part in anything at all; its state stays while it does not."""
-    @alive.setter
-    def alive(self, value: bool) -> None: ...
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
     @property
     def asleep(self) -> bool:
         """Whether it sleeps: left out of the steps until something touches it (``World(sleep_after=…)``). What is done to it wakes it."""
@@ -317,7 +317,7 @@ class Articulation:
         velocity: float | None = None,
         stiffness: float = 0.0,
         damping: float = 0.0,
-        limit: float | None = None,
+        max_force: float | None = None,
     ) -> None:
         """Puts a motor on a hinge or slider of one in a world, by the name of its joint.
 
@@ -391,10 +391,10 @@ class StepReport:
     def max_penetration(self) -> float:
         """Deepest penetration found, metres."""
     @property
-    def out_of_reach(self) -> str | None:
+    def unreachable_joint(self) -> str | None:
         """Name of the joint that was furthest open where it cannot be closed; None where all could."""
     @property
-    def out_of_reach_distance(self) -> float:
+    def unreachable_distance(self) -> float:
         """How far that joint is open, metres."""
 
 @final
@@ -409,17 +409,17 @@ class SphereTree:
         faces: ArrayLike | None = None,
         *,
         method: TreeMethod = "medial",
-        branch: int | None = None,
+        branching: int | None = None,
         depth: int | None = None,
-        error: float | None = None,
+        max_error: float | None = None,
         cache: bool = True,
     ) -> SphereTree:
         """Builds a tree around a closed mesh, and checks that it covers the surface and is nested.
 
         vertices: shape (n, 3), metres, and faces: shape (m, 3), indices from 0, counter-clockwise seen from outside; or the path of an OBJ, STL or
         COLLADA file; or an object with ``vertices`` and ``faces``, such as a trimesh. method: ``"medial"`` (adaptive medial axis, the tightest),
-        ``"hubbard"``, ``"grid"`` or ``"octree"``; branch: most children of a ball, 2 to 64 (default 8); depth: most levels below the root, 1 to 9
-        (default 3, of the octree 7); error: no ball that reaches less than this outside is divided, as a part of the mesh's diagonal, 1e-4 to 1
+        ``"hubbard"``, ``"grid"`` or ``"octree"``; branching: most children of a ball, 2 to 64 (default 8); depth: most levels below the root, 1 to 9
+        (default 3, of the octree 7); max_error: no ball that reaches less than this outside is divided, as a part of the mesh's diagonal, 1e-4 to 1
         (default 1e-4, of the octree 0.01); cache: keep the tree on disk and take it from there next time.
 
         A mesh that is open or encloses nothing, and settings out of range, are ``InvalidValueError``. The interpreter is let go meanwhile; Ctrl-C ends the build.
@@ -438,7 +438,7 @@ class SphereTree:
     def method(self) -> TreeMethod:
         """How it was built."""
     @property
-    def branch(self) -> int:
+    def branching(self) -> int:
         """Most children of a ball that were allowed."""
     @property
     def depth(self) -> int:
@@ -468,7 +468,7 @@ class SphereTree:
 
 @final
 class View:
-    """The world as a force or a behaviour sees it while it is called: a row for every rigid body and every link, in world axes.
+    """The world as a force or a behavior sees it while it is called: a row for every rigid body and every link, in world axes.
 
     The arrays are copies of that moment and read-only, but ``force`` and ``torque``, which begin at zero and take what the callback adds. After the
     callback has returned the view raises ``RemovedError``.
@@ -502,7 +502,7 @@ class View:
         """Masses, shape (n,), kg; 0 of static geometry and of bases."""
     @property
     def moves(self) -> NDArray[np.bool_]:
-        """Whether forces move it: neither static nor kinematic, and alive. Shape (n,), bool."""
+        """Whether forces move it: neither static nor kinematic, and enabled. Shape (n,), bool."""
     @property
     def names(self) -> list[str]:
         """Of each row the name of its body."""
@@ -522,7 +522,7 @@ class View:
         """
     def rows(self, body: _Body) -> slice:
         """The rows of a body as a slice: one of a rigid body; of an articulated body one of each moving link, parents first, and at last one of its base."""
-    def push(self, row: int, force: ArrayLike, point: ArrayLike) -> None:
+    def apply_force(self, row: int, force: ArrayLike, point: ArrayLike) -> None:
         """Adds a force, shape (3,), N, that acts on a row at a point of the world, shape (3,), m: with the torque ``(point - position) × force``."""
     def __len__(self) -> int: ...
 
@@ -689,7 +689,7 @@ class World:
     def fork(self) -> World:
         """An independent copy: same state, same future.
 
-        Forces and behaviours are copied by their own ``fork``.
+        Forces and behaviors are copied by their own ``fork``.
         """
     def __copy__(self) -> World: ...
     def __deepcopy__(self, _memo: Any) -> World: ...
@@ -767,17 +767,17 @@ class World:
         said from the base.
         """
     def remove(self, body: RigidBody | Articulation | str) -> None:
-        """Removes a body, given as a handle or by name, or a force or behaviour by name. Handles of a body raise ``RemovedError`` from then on."""
+        """Removes a body, given as a handle or by name, or a force or behavior by name. Handles of a body raise ``RemovedError`` from then on."""
     def add_force(self, name: str, force: Force) -> None:
-        """Adds a force of your own: an object of a subclass of ``tumble.Force``. Its name is unique among bodies, forces and behaviours."""
-    def add_behaviour(self, name: str, behaviour: Behaviour, bodies: _Body | Iterable[_Body]) -> None:
-        """Adds a behaviour of your own, an object of a subclass of ``tumble.Behaviour``, to bodies given by name or as handles."""
+        """Adds a force of your own: an object of a subclass of ``tumble.Force``. Its name is unique among bodies, forces and behaviors."""
+    def add_behavior(self, name: str, behavior: Behavior, bodies: _Body | Iterable[_Body]) -> None:
+        """Adds a behavior of your own, an object of a subclass of ``tumble.Behavior``, to bodies given by name or as handles."""
     @property
     def forces(self) -> dict[str, Force]:
         """Forces of your own by name: a new dict."""
     @property
-    def behaviours(self) -> dict[str, Behaviour]:
-        """Behaviours of your own by name: a new dict."""
+    def behaviors(self) -> dict[str, Behavior]:
+        """Behaviors of your own by name: a new dict."""
     def render(
         self,
         width: int | None = None,
@@ -797,22 +797,22 @@ class World:
         """
     def _repr_png_(self) -> bytes | None:
         """How a notebook shows the world: a PNG, or nothing where there is no graphics adapter."""
-    def plot_energy(self, seconds: float = 5.0, *, ax: Any = None) -> Any:
-        """Steps a fork for ``seconds`` and plots its energy over time; the world stays as it is. Needs matplotlib, the extra ``plot``.
+    def plot_energy(self, duration: float = 5.0, *, ax: Any = None) -> Any:
+        """Steps a fork for ``duration`` seconds and plots its energy over time; the world stays as it is. Needs matplotlib, the extra ``plot``.
 
         ax: the axes to plot on, by default new ones. Returns the axes.
         """
     def plot_paths(
-        self, seconds: float = 5.0, *, bodies: _Body | Iterable[_Body] | None = None, along: Axis = "y", ax: Any = None
+        self, duration: float = 5.0, *, bodies: _Body | Iterable[_Body] | None = None, along: Axis = "y", ax: Any = None
     ) -> Any:
-        """Steps a fork for ``seconds`` and plots the paths of bodies (default: all that move) as seen along an axis, ``"x"``, ``"y"`` or ``"z"``.
+        """Steps a fork for ``duration`` seconds and plots the paths of bodies (default: all that move) as seen along an axis, ``"x"``, ``"y"`` or ``"z"``.
 
         As ``plot_energy`` otherwise.
         """
 
 def _panic(world: World, while_: str) -> None:
     """Panics within a call on a world: while it is ``"read"``, ``"changed"`` or ``"stepped"``."""
-def _words() -> dict[str, list[str]]:
+def _choices() -> dict[str, list[str]]:
     """Every set of words by the name of its type in ``tumble.typing``, in the library's order."""
 def _unpickle_articulation(
     file: Path, floating: bool, packages: Mapping[str, Path], words: Sequence[str], numbers: Sequence[Sequence[float]]
@@ -823,4 +823,4 @@ def _unpickle_shape(data: bytes) -> Shape:
 def _unpickle_tree(data: bytes) -> SphereTree:
     """What a pickled sphere tree becomes."""
 def _unpickle_world(data: bytes) -> World:
-    """What a pickled world becomes; pickle then puts its forces and behaviours back."""
+    """What a pickled world becomes; pickle then puts its forces and behaviors back."""

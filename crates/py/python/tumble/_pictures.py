@@ -1,4 +1,4 @@
-"""Pictures: cameras, and the way of an array to a PNG file."""
+"""Images: cameras, and PNG files."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ if TYPE_CHECKING:
 
 
 class Camera(NamedTuple):
-    """A pinhole at ``eye`` that looks at ``target``."""
+    """A pinhole camera at ``eye`` that looks at ``target``."""
 
     eye: ArrayLike
     """Shape (3,), m, world axes."""
     target: ArrayLike
-    """The point in the middle of the picture, shape (3,), m."""
+    """The point in the center of the image, shape (3,), m."""
     up: ArrayLike = (0.0, 0.0, 1.0)
-    """What is upright in the picture, shape (3,)."""
+    """The direction that is up in the image, shape (3,)."""
     fov_deg: float = 40.0
-    """Opening angle from the lower to the upper edge, degrees, above 0 and below 180."""
+    """Vertical field of view, degrees, above 0 and below 180."""
 
 
 def save_png(path: str | PathLike[str], picture: ArrayLike) -> None:
-    """Writes what ``World.render`` gave, shape (height, width, 4), uint8, as a PNG file."""
+    """Writes an image of ``World.render``, shape (height, width, 4), uint8, as a PNG file."""
     data = encode(picture)
     with open(path, "wb") as file:
         file.write(data)
 
 
 def encode(picture: ArrayLike) -> bytes:
-    """A picture, shape (height, width, 4), uint8, as the bytes of a PNG file marked as sRGB."""
+    """Returns an image, shape (height, width, 4), uint8, as the bytes of an sRGB PNG file."""
     pixels = np.ascontiguousarray(picture)
     if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[2] != 4 or 0 in pixels.shape:
-        raise InvalidValueError(f"picture: wanted uint8 of shape (height, width, 4), and got {pixels.dtype} of {pixels.shape}")
+        raise InvalidValueError(f"picture: expected uint8 of shape (height, width, 4), got {pixels.dtype} of {pixels.shape}")
     height, width, _ = pixels.shape
     # each row begins with its filter: 2, the difference to the row above
     above = np.vstack([np.zeros_like(pixels[:1]), pixels[:-1]])
@@ -57,7 +57,7 @@ def _chunk(kind: bytes, body: bytes) -> bytes:
 
 
 def repr_png(world: World) -> bytes | None:
-    """What a notebook shows of a world; nothing where there is no graphics adapter."""
+    """Returns a PNG of a world for notebooks; None without a graphics adapter."""
     try:
         return encode(world.render(640, 400))
     except PictureError:

@@ -1,4 +1,4 @@
-"""Recordings read back: as arrays, or as worlds."""
+"""Reading of recordings as arrays or as worlds."""
 
 from __future__ import annotations
 
@@ -16,40 +16,40 @@ from tumble._native import World, read_recording
 
 @dataclass(frozen=True, repr=False)
 class Recording:
-    """A recording as arrays: n frames of m bodies and links, in world axes."""
+    """A recording as arrays: n frames of m bodies and links, world axes."""
 
     world: str
-    """Where the world came from: the path of its scene, or what it was called."""
+    """Origin of the world: the path of its scene, or its name."""
     times: NDArray[np.float64]
     """Simulated time of each frame, shape (n,), s."""
     frames: NDArray[np.int64]
     """Number of each frame, shape (n,)."""
     names: list[str]
-    """Of the m bodies; a link is ``name/part``."""
+    """Names of the m bodies; a link is ``name/part``."""
     positions: NDArray[np.float64]
-    """Shape (n, m, 3), m; NaN while a body was not there."""
+    """Shape (n, m, 3), m; NaN while a body did not exist."""
     orientations: NDArray[np.float64]
-    """Unit quaternions (x, y, z, w), shape (n, m, 4); NaN while a body was not there."""
+    """Unit quaternions (x, y, z, w), shape (n, m, 4); NaN while a body did not exist."""
     states: list[bytes]
-    """What ``World.restore`` takes, of each frame."""
+    """Snapshot of each frame for ``World.restore``."""
     note: str | None
-    """Where the file was cut, if it was; None of a complete one."""
+    """Where the file was cut; None for a complete one."""
 
     def __len__(self) -> int:
         return len(self.times)
 
     def index(self, name: str) -> int:
-        """Which of the m bodies has that name."""
+        """Returns the index of the body of that name."""
         if name not in self.names:
             raise UnknownNameError(f"the recording has no '{name}'; it has {', '.join(self.names[:8])}")
         return self.names.index(name)
 
     def position(self, name: str) -> NDArray[np.float64]:
-        """The path of a body, shape (n, 3), m."""
+        """Returns the positions of a body, shape (n, 3), m."""
         return self.positions[:, self.index(name)]
 
     def orientation(self, name: str) -> NDArray[np.float64]:
-        """The orientations of a body, (x, y, z, w), shape (n, 4)."""
+        """Returns the orientations of a body, (x, y, z, w), shape (n, 4)."""
         return self.orientations[:, self.index(name)]
 
     def __repr__(self) -> str:
@@ -60,27 +60,27 @@ class Recording:
 def read(path: str | PathLike[str]) -> Recording:
     """Reads a recording of ``Recorder`` or ``tumble run --record``.
 
-    A cut one gives what it holds, and says so in ``note``; a damaged one, or another file, is a ``RecordingError`` that says where.
+    A truncated file gives its complete frames and a ``note``. A damaged or different file raises ``RecordingError`` with the place.
     """
     return Recording(**read_recording(path))
 
 
 def replay(path: str | PathLike[str], world: World | None = None) -> Iterator[World]:
-    """Brings a world to each frame of a recording in turn and yields it, the same one each time: ``for world in tumble.replay(path): ...``.
+    """Sets a world to each frame of a recording in turn and yields it, the same object each time: ``for world in tumble.replay(path): ...``.
 
-    world: one of the same bodies; by default that of the scene which the recording names, read anew. It can be asked, drawn, and stepped on from
-    any frame. Where it has other bodies, ``SnapshotError``.
+    world: a world with the same bodies; by default that of the scene which the recording names, loaded again. It can be read, rendered, and
+    stepped from any frame. Different bodies raise ``SnapshotError``.
     """
     recording = read(path)
     if world is None:
         if recording.world == "World":
-            raise InvalidValueError(f"{path}: the world was made in a program and not by a scene; give one of the same bodies as `world`")
+            raise InvalidValueError(f"{path}: the world was made by a program and not from a scene; pass a world with the same bodies as `world`")
         world = World.load(_scene_of(recording))
     return _frames(world, recording)
 
 
 def _scene_of(recording: Recording) -> str:
-    """What `World.load` takes: a shipped scene is recorded by the path that it has in the sources."""
+    """Returns the argument for `World.load`. A shipped scene is recorded with its path in the sources."""
     match PurePath(recording.world).parts:
         case ("scenes", name, "scene.toml") if not Path(recording.world).exists():
             return name

@@ -1,4 +1,4 @@
-"""What a world answers with more than one number."""
+"""Results of a world that have more than one number."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ class Energy(NamedTuple):
     """Mechanical energy of everything that moves, J. ``energy["kinetic"]`` works too."""
 
     kinetic: float
-    """Of motion."""
+    """Kinetic energy, J."""
     potential: float
-    """In the world's gravity, zero at its origin."""
+    """Potential energy in the world's gravity, zero at the origin, J."""
     total: float
-    """The sum of the two."""
+    """Sum of the two, J."""
 
     def __getitem__(self, key: Any) -> Any:
         return _item(self, key)
@@ -26,9 +26,9 @@ class Momentum(NamedTuple):
     """Momentum of everything that moves, world axes. ``momentum["linear"]`` works too."""
 
     linear: NDArray[np.float64]
-    """Shape (3,), N·s."""
+    """Linear momentum, shape (3,), N·s."""
     angular: NDArray[np.float64]
-    """Shape (3,), about the world's origin, N·m·s."""
+    """Angular momentum about the world's origin, shape (3,), N·m·s."""
 
     def __getitem__(self, key: Any) -> Any:
         return _item(self, key)
@@ -41,9 +41,9 @@ def _item(values: tuple[Any, ...], key: Any) -> Any:
 
 
 class SphereLevel(NamedTuple):
-    """The balls of one level of a :class:`SphereTree`, in the axes of its mesh."""
+    """The spheres of one level of a :class:`SphereTree`, in the axes of its mesh."""
 
     centers: NDArray[np.float64]
-    """Shape (n, 3), m."""
+    """Centers, shape (n, 3), m."""
     radii: NDArray[np.float64]
-    """Shape (n,), m."""
+    """Radii, shape (n,), m."""

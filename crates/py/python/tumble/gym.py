@@ -1,7 +1,7 @@
 """An environment for gymnasium, the extra ``gym``: ``pip install ".[gym]"`` in a clone. ``gymnasium.make("tumble/CartPole-v0")`` finds it after ``import tumble.gym``.
 
-Its equations are those of Barto, Sutton and Anderson (1983), a cart on a rail with a uniform pole on a hinge; here they come out of the library's articulated
-bodies, and are solved by its steps.
+The model is that of Barto, Sutton and Anderson (1983): a cart on a rail with a uniform pole on a revolute joint. The library's articulated bodies
+provide its equations of motion.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ target_m = [0, 0, 0.3]
 
 
 class CartPole(gymnasium.Env[NDArray[np.float32], np.int64]):
-    """A pole of 0.1 kg and 1 m that is hinged on a cart of 1 kg, to be kept upright by pushing the cart.
+    """A pole of 0.1 kg and 1 m on a cart of 1 kg, to be kept upright by forces on the cart.
 
     Observation: position of the cart, m, its velocity, m/s, angle of the pole from upright, rad, positive towards +x, its rate, rad/s; float32,
     shape (4,). Action: 0 pushes with 10 N towards -x, 1 towards +x, for 0.02 s. Reward: 1 for every step. Terminated beyond 2.4 m or 12 degrees.
@@ -96,7 +96,7 @@ class CartPole(gymnasium.Env[NDArray[np.float32], np.int64]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begins anew near the upright rest: all four numbers are drawn evenly from within 0.05."""
+        """Starts a new episode near the upright rest position: all four numbers are uniform within 0.05."""
         super().reset(seed=seed)
         self.world.restore(self._start)
         x, v, angle, rate = self.np_random.uniform(-0.05, 0.05, 4)
@@ -114,7 +114,7 @@ class CartPole(gymnasium.Env[NDArray[np.float32], np.int64]):
         return observation, 1.0, fallen, False, {}
 
     def render(self) -> NDArray[np.uint8] | None:
-        """A picture, shape (400, 600, 3), where ``render_mode`` is ``"rgb_array"``."""
+        """Returns an image, shape (400, 600, 3), if ``render_mode`` is ``"rgb_array"``."""
         return None if self.render_mode is None else self.world.render(600, 400)[..., :3]
 
     def _observation(self) -> NDArray[np.float32]:

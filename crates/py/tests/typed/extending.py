@@ -15,7 +15,7 @@ class Wind(tumble.Force):
         view.force -= 0.1 * view.velocity
 
 
-class Rise(tumble.Behaviour):
+class Rise(tumble.Behavior):
     """Twice its weight, upwards."""
 
     def act(self, view: tumble.View, rows: NDArray[np.int64]) -> None:
@@ -27,7 +27,7 @@ def record(path: Path) -> NDArray[np.float64]:
     world = tumble.World()
     ball = world.add_rigid("ball", tumble.Sphere(0.1), mass=1.0)
     world.add_force("wind", Wind())
-    world.add_behaviour("rise", Rise(), [ball])
+    world.add_behavior("rise", Rise(), [ball])
     with tumble.Recorder(path) as recorder:
         recorder.run(world, 24)
     run: tumble.Recording = tumble.read(path)

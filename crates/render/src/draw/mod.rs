@@ -77,7 +77,7 @@ impl Drawing {
         base.ground = scene.ground.as_ref().map(|g| Ground {
             height_m: g.height_m as f32,
             reach_m: PLANE_M,
-            material: surface::of_spec(&g.look),
+            material: surface::of_spec(&g.appearance),
         });
         let camera = scene.camera.as_ref().map(|c| Camera::LookAt {
             eye: Point3::from(color(c.eye_m)),

@@ -31,7 +31,7 @@ pub(super) fn of_appearance(appearance: &Appearance, name: &str) -> Material {
 }
 
 /// The material of a look in a scene file.
-pub(super) fn of_spec(appearance: &tumble_scene::Appearance) -> Material {
+pub(super) fn of_spec(appearance: &tumble_scene::AppearanceSpec) -> Material {
     let numbers = Numbers {
         second: appearance.second_color.map(|c| c as f32),
         scale_m: appearance.pattern_scale_m as f32,

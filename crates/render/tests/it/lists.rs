@@ -184,9 +184,9 @@ fn every_preset_is_known_and_others_are_not() {
 
 /// A body with a camera and a lamp, one with a sphere tree, one of each quality.
 const CARRIER: &str = "[camera]\neye_m = [0, -5, 2]\ntarget_m = [0, 0, 0]\n\
-    [[body]]\nname = \"cart\"\nmode = \"static\"\nshape = { type = \"box\", size_m = [1, 1, 1] }\nposition_m = [2, 0, 1]\nrotation_deg = [0, 0, 90]\nquality = \"wireframe\"\n\
+    [[body]]\nname = \"cart\"\nmode = \"static\"\nshape = { type = \"box\", size_m = [1, 1, 1] }\nposition_m = [2, 0, 1]\nrotation_deg = [0, 0, 90]\ndetail = \"wireframe\"\n\
     camera = { position_m = [0.5, 0, 0.5], vertical_fov_deg = 60 }\nlight = { type = \"point\", position_m = [0, 0, 1], color = \"#ff0000\", intensity = 2 }\n\
-    [[body]]\nname = \"post\"\nmode = \"static\"\nshape = { type = \"cylinder\", radius_m = 0.2, length_m = 2 }\nquality = \"simplified\"\n";
+    [[body]]\nname = \"post\"\nmode = \"static\"\nshape = { type = \"cylinder\", radius_m = 0.2, length_m = 2 }\ndetail = \"simplified\"\n";
 
 #[test]
 fn bodies_carry_cameras_and_lights_with_them() {
@@ -212,7 +212,7 @@ fn bodies_carry_cameras_and_lights_with_them() {
         SceneFile::parse(&CARRIER.replace("vertical_fov_deg = 60", "vertical_fov_deg = 60, up = [1, 0, 0]"), "s.toml")
             .unwrap_err()
             .to_string();
-    assert!(wrong.contains("the camera of body") && wrong.contains("looks along its own `up`"), "{wrong}");
+    assert!(wrong.contains("the camera of body") && wrong.contains("looks along its `up`"), "{wrong}");
 }
 
 #[test]
@@ -241,7 +241,7 @@ fn quality_says_how_much_of_an_object_is_drawn() {
         SceneFile::parse(&CARRIER.replace("wireframe", "wirframe"), "s.toml")
             .unwrap_err()
             .to_string()
-            .contains("wanted full, simplified, wireframe or sphere_tree=LEVEL")
+            .contains("expected full, simplified, wireframe or sphere_tree=LEVEL")
     );
 }
 
@@ -262,7 +262,7 @@ fn a_texture_is_listed_once_and_a_missing_one_is_told_with_its_line() {
     assert_eq!(list.to_text().matches(" texture 0 every 0.5").count(), 3);
     list.validate().unwrap();
     let missing = SceneFile::parse(&text.replace("t.png", "u.png"), &name).unwrap_err().to_string();
-    assert!(missing.contains("s.toml:2:") && missing.contains("wanted a PNG file; there is none at"), "{missing}");
+    assert!(missing.contains("s.toml:2:") && missing.contains("expected a PNG file; there is none at"), "{missing}");
     std::fs::remove_dir_all(&folder).unwrap();
 }
 

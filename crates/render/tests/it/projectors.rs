@@ -125,9 +125,9 @@ fn a_blend_takes_its_share_of_the_light() {
 /// What caves are refused by is what the renderer can draw.
 #[test]
 fn cave_files_know_how_large_a_picture_may_be() {
-    use tumble_scene::cave::{MOST_PIXELS, MOST_SIDE_PX, RIM_PX};
+    use tumble_scene::cave::{MAX_PIXELS, MAX_SIDE_PX, RIM_PX};
     assert_eq!(
-        (MOST_SIDE_PX, MOST_PIXELS, RIM_PX),
+        (MAX_SIDE_PX, MAX_PIXELS, RIM_PX),
         (tumble_render::MAX_SIDE, tumble_render::MAX_PIXELS, tumble_render::RIM_PX)
     );
 }

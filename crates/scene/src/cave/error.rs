@@ -1,4 +1,4 @@
-//! Why a cave could not be read.
+//! Errors of cave files.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use super::Cave;
 use crate::error::{Invalid, Problem};
 use crate::suggest::{listed, nearest};
 
-/// Why a cave could not be read, or what of it could not be found.
+/// Why a cave could not be read, or why a facet of it was not found.
 #[derive(Debug, Error)]
 pub enum CaveError {
     /// The file could not be opened or read.
@@ -16,50 +16,50 @@ pub enum CaveError {
     Read {
         /// The path that was tried.
         file: PathBuf,
-        /// What the system said.
+        /// From the system.
         source: std::io::Error,
     },
-    /// The file is larger than any cave may be.
-    #[error("{}: the file is larger than {limit} bytes, the most a cave may have", file.display())]
+    /// The file is too large.
+    #[error("{}: the file is larger than {limit} bytes, the limit for caves", file.display())]
     TooLarge {
         /// The path that was tried.
         file: PathBuf,
         /// The most bytes allowed.
         limit: u64,
     },
-    /// The file is not text.
+    /// The file is not UTF-8.
     #[error("{}: byte {byte} of the file is not UTF-8; a cave is a UTF-8 text in TOML", file.display())]
     NotUtf8 {
         /// The path that was tried.
         file: PathBuf,
-        /// Offset of the first bad byte, from 0.
+        /// Offset of the first invalid byte, from 0.
         byte: usize,
     },
-    /// Neither a path nor the name of a shipped cave.
+    /// The name is neither a path nor a shipped cave.
     #[error("no cave `{name}`: {hint}")]
     Unknown {
-        /// What was asked for.
+        /// The given name.
         name: String,
-        /// What there is instead.
+        /// The nearest name, or all names.
         hint: String,
     },
-    /// A facet that the cave has not.
+    /// The cave has no facet of that name.
     #[error("{file}: no facet `{name}`; {hint}")]
     NoFacet {
         /// The cave's file.
         file: String,
-        /// What was asked for.
+        /// The given name.
         name: String,
-        /// What there is instead.
+        /// The nearest name, or all names.
         hint: String,
     },
-    /// The text was read, and is wrong in one or more places.
+    /// The text has one or more problems.
     #[error("{0}")]
     Invalid(Box<Invalid>),
 }
 
 impl CaveError {
-    /// The error as a full report for a person; escape codes for colour only if `color`.
+    /// Returns the error as a report for people. Escape codes for color only if `color`.
     pub fn report(&self, color: bool) -> String {
         match self {
             CaveError::Invalid(invalid) => invalid.report(color),
@@ -67,7 +67,8 @@ impl CaveError {
         }
     }
 
-    /// The problems of the text, in the order of the file; empty for the other kinds of error.
+    /// Returns the problems of the text in the order of the file; empty for the other kinds of
+    /// error.
     pub fn problems(&self) -> &[Problem] {
         match self {
             CaveError::Invalid(invalid) => &invalid.problems,

@@ -1,4 +1,4 @@
-//! `[[facet]]`: one picture on one screen, for one user, drawn by one node.
+//! `[[facet]]`: one image on one screen, for one user, drawn by one node.
 
 use std::path::{Path, PathBuf};
 
@@ -7,41 +7,41 @@ use super::parts::{Node, Screen, User, read_name};
 use crate::bound::Bound;
 use crate::fields::{Fields, Names};
 
-/// How both eyes come into one picture.
+/// How one image shows both eyes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stereo {
-    /// One picture from the point between the eyes.
+    /// One image from the point between the eyes.
     Mono,
-    /// The left eye's picture to the left of the right eye's: twice as wide.
+    /// The left eye's image to the left of the right eye's: twice the width.
     SideBySide,
-    /// The left eye's picture above the right eye's: twice as high.
+    /// The left eye's image above the right eye's: twice the height.
     TopBottom,
-    /// Red from the left eye, green and blue from the right: for red and cyan glasses.
+    /// Red from the left eye, green and blue from the right, for red and cyan glasses.
     Anaglyph,
 }
 
-/// Mirroring of the finished picture, for mirrors and projection from behind.
+/// Mirroring of the final image, for mirrors and rear projection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flip {
-    /// As it is.
+    /// No mirroring.
     None,
-    /// Left and right change places.
+    /// Left and right are exchanged.
     Horizontal,
-    /// Top and bottom change places.
+    /// Top and bottom are exchanged.
     Vertical,
-    /// Both: turned by half a turn.
+    /// Both: a rotation by 180 degrees.
     Both,
 }
 
-/// Where the picture goes.
+/// Where the image is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Output {
-    /// A window without a frame at this place of the desktop, pixels from its top left corner.
+    /// A borderless window at a position of the desktop.
     Window {
-        /// Pixels from the left and from the top; may be negative.
+        /// Pixels from the left and from the top of the desktop; may be negative.
         position_px: [i32; 2],
     },
-    /// Into memory only.
+    /// Memory only.
     Offscreen,
 }
 
@@ -53,12 +53,12 @@ impl Stereo {
         ("anaglyph", Stereo::Anaglyph),
     ];
 
-    /// The sides of the eyes that are drawn: −1 left, 0 between, +1 right.
+    /// Returns the sides of the eyes that are drawn: −1 left, 0 between, +1 right.
     pub fn sides(self) -> &'static [f64] {
         if self == Stereo::Mono { &[0.0] } else { &[-1.0, 1.0] }
     }
 
-    /// The size of the whole from that of one eye's picture, pixels.
+    /// Returns the size of the whole image from that of one eye's, pixels.
     pub fn whole_px(self, [width, height]: [u32; 2]) -> [u32; 2] {
         match self {
             Stereo::Mono | Stereo::Anaglyph => [width, height],
@@ -80,35 +80,36 @@ enum Target {
 }
 const TARGETS: Names<Target> = &[("window", Target::Window), ("offscreen", Target::Offscreen)];
 
-/// One picture on one screen.
+/// An image on a screen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Facet {
     /// Unique among facets.
     pub name: String,
     /// Index of the screen.
     pub screen: usize,
-    /// Index of the user whose eyes it is drawn for. Default the first.
+    /// Index of the user from whose eyes it is drawn. Default the first.
     pub user: usize,
     /// Index of the node that draws it; `None` for the machine that runs the world.
     pub node: Option<usize>,
-    /// Where the picture goes. Default a window at 0, 0.
+    /// Where the image is shown. Default a window at 0, 0.
     pub output: Output,
-    /// Width and height of one eye's picture, pixels, at least 1 each; at most what [`MOST_SIDE_PX`](super::MOST_SIDE_PX) and
-    /// [`MOST_PIXELS`](super::MOST_PIXELS) leave with both eyes, or with the rim of [`RIM_PX`](super::RIM_PX).
+    /// Width and height of one eye's image, pixels, at least 1 each. The image with both eyes, and
+    /// that with the rim of [`RIM_PX`](super::RIM_PX), must be within
+    /// [`MAX_SIDE_PX`](super::MAX_SIDE_PX) and [`MAX_PIXELS`](super::MAX_PIXELS).
     pub size_px: [u32; 2],
     /// Nearest depth drawn, from the eye along the screen's normal, m. Default 0.05.
     pub near_m: f64,
-    /// Farthest depth drawn, likewise. Default 500.
+    /// Farthest depth drawn, from the eye along the screen's normal, m. Default 500.
     pub far_m: f64,
     /// Default mono.
     pub stereo: Stereo,
     /// Default none.
     pub flip: Flip,
-    /// Whether the others wait for it (`lockstep`). Default true.
+    /// Whether the other facets wait for it (`lockstep`). Default true.
     pub critical: bool,
-    /// A grid that bends the finished picture: OBJ or PFM.
+    /// A grid that warps the final image: OBJ or PFM.
     pub warp_file: Option<PathBuf>,
-    /// A picture that darkens the finished one where projectors overlap: PNG.
+    /// An image that darkens the final one where projectors overlap: PNG.
     pub blend_file: Option<PathBuf>,
 }
 
@@ -165,15 +166,16 @@ impl Facet {
         Some(facet)
     }
 
-    /// The size of the target with both eyes in it, pixels.
+    /// Returns the size of the target with both eyes in it, pixels.
     pub fn whole_px(&self) -> [u32; 2] {
         self.stereo.whole_px(self.size_px)
     }
 }
 
-const NEAR: Bound = Bound::new(1e-4, 1e6, "a length from 0.0001 m on");
+const NEAR: Bound = Bound::new(1e-4, 1e6, "a length of at least 0.0001 m");
 
-/// The index of `typed` among `known`; `None`, with the problem recorded, where it is not there.
+/// Returns the index of `typed` among `known`; `None`, with the problem recorded, if it is not
+/// there.
 fn reference(
     f: &Fields<'_>,
     key: &str,
@@ -183,19 +185,19 @@ fn reference(
 ) -> Option<usize> {
     let found = known.iter().position(|name| *name == typed);
     if found.is_none() && known.is_empty() {
-        f.wrong(key, value, format!("a table [[{key}]] of this name, and there is none at all"));
+        f.wrong(key, value, format!("a table [[{key}]] of this name; there is no such table"));
     } else if found.is_none() {
         f.unknown_name(key, value, typed, known);
     }
     found
 }
 
-/// `size_px`: two whole numbers.
+/// Reads `size_px`: two integers.
 fn size(f: &mut Fields<'_>) -> [u32; 2] {
     let Some(value) = f.required("size_px", "width and height in pixels, such as [1920, 1080]") else { return [1, 1] };
     match value.get_ref().as_array().filter(|items| items.len() == 2) {
         Some(items) => std::array::from_fn(|k| {
-            items.get(k).map_or(1, |item| f.as_integer("size_px", item, 1..=checks::MOST_SIDE_PX))
+            items.get(k).map_or(1, |item| f.as_integer("size_px", item, 1..=checks::MAX_SIDE_PX))
         }),
         None => {
             f.wrong("size_px", value, "width and height in pixels, such as [1920, 1080]");
@@ -204,19 +206,20 @@ fn size(f: &mut Fields<'_>) -> [u32; 2] {
     }
 }
 
-/// `position_px`: two whole numbers, negative ones too.
+/// Reads `position_px`: two integers, which may be negative.
 fn position(f: &mut Fields<'_>) -> [i32; 2] {
     let problems = f.log.count();
     let place: [f64; 2] =
         f.vector_or("position_px", Bound::new(-1e6, 1e6, "a number of pixels from -1e6 to 1e6"), [0.0; 2]);
     if f.log.count() == problems && place.iter().any(|x| x.fract() != 0.0) {
-        let message = format!("`position_px` of {} has parts of pixels", f.what);
-        f.log.report(f.span.clone(), message, "wanted two whole numbers");
+        let message = format!("`position_px` of {} has fractions of pixels", f.what);
+        f.log.report(f.span.clone(), message, "expected two integers");
     }
     place.map(|x| x as i32)
 }
 
-/// A file beside the cave, known by its ending. Whether it can be read is seen when it is used.
+/// Reads the path of a file beside the cave and checks its extension. Its content is read when it
+/// is used.
 fn file(f: &mut Fields<'_>, key: &'static str, folder: &Path, endings: &[&'static str]) -> Option<PathBuf> {
     let (text, value) = f.optional_text(key)?;
     let ending = Path::new(text).extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();

@@ -1,12 +1,13 @@
-//! Cave files: where the screens stand, who looks at them, and what draws each.
+//! Cave files: positions of screens and users, and the processes that draw.
 //!
-//! A cave is read like a scene: in one pass that finds all its problems, each with file, line, column, the value and what would be
-//! right. What comes out, a [`Cave`], has references resolved to indices and files to paths. What is worth knowing but no mistake (gaps
-//! between screens, pixels that are not square) is in [`Cave::notes`].
+//! A cave is read like a scene: in one pass that finds all its problems, each with file, line,
+//! column, the value and what is expected. The result, a [`Cave`], has references resolved to
+//! indices and files to paths. [`Cave::notes`] reports conditions that are not errors, such as gaps
+//! between screens and pixels that are not square.
 //!
-//! Frame of a cave: metres, right-handed, z up. By custom x points to the right of who looks at the front screen, y ahead, and the
-//! origin lies on the floor below the middle; nothing depends on it. Where the cave stands in a scene is the scene's matter
-//! ([`crate::CavePlace`]).
+//! Frame of a cave: meters, right-handed, z up. By convention x points to the right when facing the
+//! front screen, y ahead, and the origin lies on the floor below the center. Nothing depends on
+//! this convention. A scene places the cave with [`crate::CavePlace`].
 //!
 //! ```
 //! let cave = tumble_scene::cave::resolve_cave("cube4")?.load()?;
@@ -24,10 +25,10 @@ mod settings;
 mod shipped;
 mod tracker;
 
-pub use checks::{Gap, MOST_PIXELS, MOST_SIDE_PX, RIM_PX, SQUARE_TOLERANCE, gaps};
+pub use checks::{Gap, MAX_PIXELS, MAX_SIDE_PX, RIM_PX, SQUARE_TOLERANCE, gaps};
 pub use error::CaveError;
 pub use facet::{Facet, Flip, Output, Stereo};
-pub use parts::{LAUNCH_WORDS, Node, Screen, User};
+pub use parts::{LAUNCH_PLACEHOLDERS, Node, Screen, User};
 pub use settings::{Mode, Recording, Security, Sync, Transport};
 pub use shipped::{CaveSource, ShippedCave, resolve_cave, shipped_caves};
 pub use tracker::{Axes, TRACKER_PORT, Tracker};
@@ -45,27 +46,27 @@ use crate::file::{parse_toml, read_table};
 use crate::log::Log;
 use crate::suggest::nearest;
 
-/// Most bytes of a cave file: 1 MiB.
-pub const MOST_BYTES: u64 = 1 << 20;
-/// Most users, screens, nodes, and facets, of each.
-pub const MOST_PARTS: usize = 256;
-/// Tables that a cave has and a scene has not: a file with one of them is a cave.
+/// Largest cave file in bytes: 1 MiB.
+pub const MAX_BYTES: u64 = 1 << 20;
+/// Largest number of users, screens, nodes, and facets, of each.
+pub const MAX_PARTS: usize = 256;
+/// Tables that caves have and scenes do not. A file with one of them is a cave.
 const MARKS: [&str; 5] = ["user", "screen", "node", "facet", "sync"];
-/// Tables that a scene has and a cave has not.
+/// Tables that scenes have and caves do not.
 const SCENE_MARKS: [&str; 8] = ["world", "body", "articulated", "ground", "grid", "camera", "cave", "materials"];
 
 /// A cave as its file describes it: checked, references resolved.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cave {
-    /// The name of the file, as errors show it.
+    /// The name of the file as errors show it.
     pub file: String,
-    /// One line that says what the cave is; may be empty.
+    /// One line that describes the cave; may be empty.
     pub description: String,
     /// `[[user]]`, at least one.
     pub users: Vec<User>,
     /// `[[screen]]`, at least one.
     pub screens: Vec<Screen>,
-    /// `[[node]]`; none where all facets are drawn on this machine.
+    /// `[[node]]`; empty if all facets are drawn on this machine.
     pub nodes: Vec<Node>,
     /// `[[facet]]`, at least one.
     pub facets: Vec<Facet>,
@@ -83,14 +84,14 @@ impl Cave {
     /// Reads the cave file at `path`.
     ///
     /// # Errors
-    /// [`CaveError`]: the file cannot be read, is larger than 1 MiB or not UTF-8, or has problems, all of which are told at once.
+    /// [`CaveError`]: the file cannot be read, is larger than 1 MiB or not UTF-8, or has problems. All problems are reported at once.
     pub fn load(path: impl AsRef<Path>) -> Result<Cave, CaveError> {
         let path = path.as_ref();
         let unread = |source| CaveError::Read { file: path.to_path_buf(), source };
         let mut bytes = Vec::new();
-        std::fs::File::open(path).map_err(unread)?.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(unread)?;
-        if bytes.len() as u64 > MOST_BYTES {
-            return Err(CaveError::TooLarge { file: path.to_path_buf(), limit: MOST_BYTES });
+        std::fs::File::open(path).map_err(unread)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unread)?;
+        if bytes.len() as u64 > MAX_BYTES {
+            return Err(CaveError::TooLarge { file: path.to_path_buf(), limit: MAX_BYTES });
         }
         match std::str::from_utf8(&bytes) {
             Ok(text) => Cave::parse(text, &path.display().to_string()),
@@ -98,13 +99,14 @@ impl Cave {
         }
     }
 
-    /// Reads a cave from its text. `file_name` is shown in errors, and files that the cave names are looked for in its folder.
+    /// Reads a cave from its text. `file_name` is shown in errors; paths in the cave are relative
+    /// to its folder.
     ///
     /// # Errors
     /// [`CaveError::TooLarge`] or [`CaveError::Invalid`].
     pub fn parse(text: &str, file_name: &str) -> Result<Cave, CaveError> {
-        if text.len() as u64 > MOST_BYTES {
-            return Err(CaveError::TooLarge { file: file_name.into(), limit: MOST_BYTES });
+        if text.len() as u64 > MAX_BYTES {
+            return Err(CaveError::TooLarge { file: file_name.into(), limit: MAX_BYTES });
         }
         let log = Log::new(text);
         let cave = parse_toml(&log, text).map(|root| Cave::read(&log, &root, file_name));
@@ -159,12 +161,13 @@ impl Cave {
         cave
     }
 
-    /// What is worth knowing before it is used: gaps between neighbouring screens, pixels that are not square, screens nobody draws.
+    /// Returns notes about the cave: gaps between neighboring screens, pixels that are not square,
+    /// screens without a facet.
     pub fn notes(&self) -> Vec<String> {
         checks::notes(self)
     }
 
-    /// One line for a person.
+    /// Returns a summary in one line.
     pub fn summary(&self) -> String {
         let count = |n: usize, one: &str, many: &str| format!("{n} {}", if n == 1 { one } else { many });
         format!(
@@ -180,25 +183,26 @@ impl Cave {
         )
     }
 
-    /// The facet of that name.
+    /// Returns the facet of that name.
     ///
     /// # Errors
-    /// [`CaveError::NoFacet`] with the names there are.
+    /// [`CaveError::NoFacet`] with the names of all facets.
     pub fn facet(&self, name: &str) -> Result<&Facet, CaveError> {
         self.facets.iter().find(|facet| facet.name == name).ok_or_else(|| CaveError::no_facet(self, name))
     }
 }
 
-/// Whether a text is meant as a cave: it has a table that caves have and scenes have not, or, with none of a scene's tables, one by nearly that name.
+/// Returns whether a text is meant as a cave: it has a table that only caves have, or, without any
+/// of a scene's tables, one with nearly such a name.
 pub fn is_cave(text: &str) -> bool {
-    let (root, _) = DeTable::parse_recoverable(text.get(..text.len().min(MOST_BYTES as usize)).unwrap_or(""));
+    let (root, _) = DeTable::parse_recoverable(text.get(..text.len().min(MAX_BYTES as usize)).unwrap_or(""));
     let root = root.get_ref();
     let nearly = || root.keys().any(|key| nearest(key.get_ref(), MARKS).is_some());
     MARKS.iter().any(|key| root.get(*key).is_some())
         || (!SCENE_MARKS.iter().any(|key| root.get(*key).is_some()) && nearly())
 }
 
-/// The tables `[[key]]`, each with a name that no other has.
+/// Reads the tables `[[key]]` and checks that their names are unique.
 fn named<'a, T>(
     f: &mut Fields<'a>,
     key: &'static str,
@@ -207,7 +211,7 @@ fn named<'a, T>(
 ) -> Vec<T> {
     let mut taken: BTreeMap<String, Range<usize>> = BTreeMap::new();
     let mut out = Vec::new();
-    for mut table in f.tables(key, MOST_PARTS) {
+    for mut table in f.tables(key, MAX_PARTS) {
         let (log, place) = (table.log, table.value("name").map_or(table.span.clone(), |value| value.span()));
         let Some(part) = read(table) else { continue };
         match taken.get(name(&part)) {
@@ -217,7 +221,7 @@ fn named<'a, T>(
                     name(&part),
                     log.line(earlier.start)
                 );
-                log.report(place, message, format!("wanted a name that no other {key} has"));
+                log.report(place, message, "expected a unique name");
             }
             None => {
                 taken.insert(name(&part).to_owned(), place);

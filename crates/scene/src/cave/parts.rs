@@ -1,4 +1,4 @@
-//! `[[user]]`, `[[screen]]`, `[[node]]`: who looks, at what, and which machines draw it.
+//! `[[user]]`, `[[screen]]`, `[[node]]`: the viewers, the screens, and the machines that draw.
 
 use std::net::IpAddr;
 
@@ -8,18 +8,19 @@ use super::checks;
 use crate::bound::Bound;
 use crate::fields::Fields;
 
-/// Somebody who looks at the screens.
+/// A viewer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct User {
     /// Unique among users.
     pub name: String,
     /// The point between the eyes, m, cave axes.
     pub eye_m: Point3<f64>,
-    /// Where the user faces: a unit vector. Default y. Stereo eyes stand to the right and left of it; mono does not use it.
+    /// Direction in which the user faces: a unit vector. Default y. Stereo eyes are to the right
+    /// and left of it; mono does not use it.
     pub forward: Vector3<f64>,
-    /// Up for the user: a unit vector. Default z.
+    /// Up direction of the user: a unit vector. Default z.
     pub up: Vector3<f64>,
-    /// Distance between the pupils, m, 0 to 0.2. Default 0.063.
+    /// Interpupillary distance, m, 0 to 0.2. Default 0.063.
     pub interpupillary_m: f64,
 }
 
@@ -37,34 +38,35 @@ impl User {
             interpupillary_m: f.number_or("interpupillary_m", PUPILS, 0.063),
         };
         if f.log.count() == problems && user.forward.cross(&user.up).norm() < 1e-3 {
-            let message = format!("`forward` of {} lies along its `up`", f.what);
-            f.log.report(f.span.clone(), message, "wanted two directions, best perpendicular to each other");
+            let message = format!("`forward` of {} is parallel to its `up`", f.what);
+            f.log.report(f.span.clone(), message, "expected two directions that are not parallel");
         }
         f.finish();
         Some(user)
     }
 
-    /// To the user's right: a unit vector.
+    /// Returns the direction to the user's right: a unit vector.
     pub fn right(&self) -> Vector3<f64> {
         self.forward.cross(&self.up).normalize()
     }
 
-    /// The eye to the `side` (−1 left, 0 between, +1 right): `eye + side · ipd / 2 · right`, m, cave axes.
+    /// Returns the position of the eye on `side` (−1 left, 0 between, +1 right): `eye + side · ipd
+    /// / 2 · right`, m, cave axes.
     pub fn eye(&self, side: f64) -> Point3<f64> {
         self.eye_m + self.right() * (0.5 * side * self.interpupillary_m)
     }
 }
 
-/// A flat rectangle that is looked at from its front.
+/// A flat rectangle with a front.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Screen {
     /// Unique among screens.
     pub name: String,
-    /// As seen by who looks at it, m, cave axes.
+    /// Lower left corner as seen from the front, m, cave axes.
     pub lower_left_m: Point3<f64>,
-    /// As seen by who looks at it, m, cave axes.
+    /// Lower right corner as seen from the front, m, cave axes.
     pub lower_right_m: Point3<f64>,
-    /// As seen by who looks at it, m, cave axes.
+    /// Upper left corner as seen from the front, m, cave axes.
     pub upper_left_m: Point3<f64>,
 }
 
@@ -85,32 +87,32 @@ impl Screen {
         Some(screen)
     }
 
-    /// Along the lower edge, from left to right, m.
+    /// Returns the lower edge from left to right, m.
     pub fn across(&self) -> Vector3<f64> {
         self.lower_right_m - self.lower_left_m
     }
 
-    /// Along the left edge, from below to above, m.
+    /// Returns the left edge from bottom to top, m.
     pub fn upward(&self) -> Vector3<f64> {
         self.upper_left_m - self.lower_left_m
     }
 
-    /// The corner that the file does not name, m.
+    /// Returns the fourth corner, m.
     pub fn upper_right_m(&self) -> Point3<f64> {
         self.upper_left_m + self.across()
     }
 
-    /// Towards who looks at it: a unit vector.
+    /// Returns the normal on the front: a unit vector.
     pub fn normal(&self) -> Vector3<f64> {
         self.across().cross(&self.upward()).normalize()
     }
 
-    /// Width and height, m.
+    /// Returns width and height, m.
     pub fn size_m(&self) -> [f64; 2] {
         [self.across().norm(), self.upward().norm()]
     }
 
-    /// How far in front of the screen's plane a point is, m; negative behind it.
+    /// Returns the distance of a point in front of the screen's plane, m; negative behind it.
     pub fn distance_m(&self, point: &Point3<f64>) -> f64 {
         (point - self.lower_left_m).dot(&self.normal())
     }
@@ -121,17 +123,18 @@ impl Screen {
 pub struct Node {
     /// Unique among nodes.
     pub name: String,
-    /// An IP address, or a host name.
+    /// An IP address or a host name.
     pub address: String,
-    /// The command, word by word, that starts a facet there; none where that is done by hand. In its words stand [`LAUNCH_WORDS`].
+    /// Words of the command that starts a facet on the node; empty if facets are started by hand.
+    /// The words may have [`LAUNCH_PLACEHOLDERS`].
     pub launch: Vec<String>,
 }
 
-/// What may stand in braces in the words of `launch`. `{arguments}`, a word by itself, stands for all words that follow `tumble`; `{line}` for the same as one
-/// text that a shell takes.
-pub const LAUNCH_WORDS: [&str; 5] = ["address", "node", "facet", "arguments", "line"];
-/// Most words of a launch command.
-const MOST_WORDS: usize = 64;
+/// Placeholders in the words of `launch`, written in braces. `{arguments}`, a word by itself,
+/// stands for all words after `tumble`; `{line}` for the same as one string for a shell.
+pub const LAUNCH_PLACEHOLDERS: [&str; 5] = ["address", "node", "facet", "arguments", "line"];
+/// Largest number of words of a launch command.
+const MAX_LAUNCH_WORDS: usize = 64;
 
 impl Node {
     pub(crate) fn read(mut f: Fields<'_>) -> Option<Node> {
@@ -155,45 +158,46 @@ impl Node {
         Some(Node { name, address: address.map_or(String::new(), |(text, _)| text.to_owned()), launch })
     }
 
-    /// Whether it is this machine by its address: 127.x.x.x, ::1 or `localhost`.
+    /// Returns whether the address is this machine: 127.x.x.x, ::1 or `localhost`.
     pub fn is_local(&self) -> bool {
         self.address == "localhost" || self.address.parse::<IpAddr>().is_ok_and(|ip| ip.is_loopback())
     }
 }
 
 fn read_launch(f: &mut Fields<'_>) -> Vec<String> {
-    let wanted = "the words of a command, such as [\"ssh\", \"{address}\", \"tumble {line}\"]";
+    let expected = "the words of a command, such as [\"ssh\", \"{address}\", \"tumble {line}\"]";
     let place = f.value("launch");
     let words: Vec<String> = f
-        .list("launch", MOST_WORDS, wanted)
+        .list("launch", MAX_LAUNCH_WORDS, expected)
         .into_iter()
         .filter_map(|item| f.as_text("launch", item))
         .map(str::to_owned)
         .collect();
     let Some(place) = place else { return words };
-    let unknown = words.iter().find_map(|word| braces(word).find(|inside| !LAUNCH_WORDS.contains(inside)));
+    let unknown = words.iter().find_map(|word| braces(word).find(|inside| !LAUNCH_PLACEHOLDERS.contains(inside)));
     if let Some(unknown) = unknown {
         f.wrong(
             "launch",
             place,
-            format!("none but {{{}}} in braces; there is no {{{unknown}}}", LAUNCH_WORDS.join("}, {")),
+            format!("only {{{}}} in braces; there is no {{{unknown}}}", LAUNCH_PLACEHOLDERS.join("}, {")),
         );
     } else if words.iter().any(|word| word.contains("{arguments}") && word != "{arguments}") {
         f.wrong("launch", place, "{arguments} as a word by itself; within a word it is {line}");
     } else if words.first().is_none_or(|word| word.is_empty())
         || !words.iter().any(|word| word == "{arguments}" || word.contains("{line}"))
     {
-        f.wrong("launch", place, format!("{wanted}, with {{arguments}} or {{line}} among them"));
+        f.wrong("launch", place, format!("{expected}, with {{arguments}} or {{line}} among them"));
     }
     words
 }
 
-/// What stands in braces in a text.
+/// Returns the texts in braces.
 fn braces(text: &str) -> impl Iterator<Item = &str> {
     text.split('{').skip(1).filter_map(|rest| rest.split_once('}').map(|(inside, _)| inside))
 }
 
-/// An IP address, or a host name: letters, digits, hyphens, and dots between them.
+/// Returns whether a text is an IP address or a host name: letters, digits, hyphens, and dots
+/// between them.
 fn is_address(text: &str) -> bool {
     let label = |label: &str| {
         !label.is_empty()
@@ -203,18 +207,19 @@ fn is_address(text: &str) -> bool {
     text.parse::<IpAddr>().is_ok() || (text.len() <= 253 && text.split('.').all(label))
 }
 
-/// The `name` of a table, which from then on is called by it; `None`, with the problems recorded, where there is none.
+/// Reads the `name` of a table, which messages use from then on. `None`, with the problem recorded,
+/// if it has none.
 pub(crate) fn read_name(f: &mut Fields<'_>) -> Option<String> {
     let kind = f.what.split(' ').next().unwrap_or("part").to_owned();
     let Some((name, value)) = f.text("name", "a text") else {
-        // what else may stand here does not depend on the name, but an unnamed part helps nobody
+        // The other keys do not depend on the name, so they are read even without one.
         return Some(String::new());
     };
     let right = (1..=64).contains(&name.chars().count())
         && name.chars().all(|c| c.is_alphanumeric() || "_- .".contains(c))
         && name.trim() == name;
     if !right {
-        f.wrong("name", value, "1 to 64 letters, digits, and _ - . or blanks inside");
+        f.wrong("name", value, "1 to 64 letters, digits, _ - . and inner spaces");
     }
     f.what = format!("{kind} \"{name}\"");
     Some(name.to_owned())

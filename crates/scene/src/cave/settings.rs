@@ -1,4 +1,4 @@
-//! `[sync]`, `[security]`, `[recording]`: how the processes of a cave keep together.
+//! `[sync]`, `[security]`, `[recording]`: synchronization of the processes of a cave.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -7,12 +7,12 @@ use super::Cave;
 use crate::fields::{Fields, Names};
 use crate::log::Log;
 
-/// What carries the frames.
+/// How frames travel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transport {
-    /// Memory that processes of one machine share.
+    /// Memory shared by processes of one machine.
     SharedMemory,
-    /// Datagrams, between machines.
+    /// Datagrams between machines.
     Udp,
 }
 
@@ -21,7 +21,7 @@ pub enum Transport {
 pub enum Mode {
     /// When every critical facet has drawn it: all show the same frame.
     Lockstep,
-    /// As soon as it is drawn: each facet shows the newest it has.
+    /// As soon as it is drawn: each facet shows its newest frame.
     Latest,
 }
 
@@ -33,17 +33,19 @@ const MODES: Names<Mode> = &[("lockstep", Mode::Lockstep), ("latest", Mode::Late
 pub struct Sync {
     /// Default `shared_memory`.
     pub transport: Transport,
-    /// UDP port at which the server listens where a node is another machine, 1 to 65535. Default 47 100.
+    /// UDP port on which the server listens if a node is another machine, 1 to 65535. Default 47
+    /// 100.
     pub port: u16,
     /// Default `lockstep`.
     pub mode: Mode,
-    /// How long the start waits for facets, ms, 1 to 600 000. Default 10 000.
+    /// Time that the start waits for facets, ms, 1 to 600 000. Default 10 000.
     pub connect_timeout_ms: u32,
-    /// How long a frame waits for a facet, ms, 1 to 60 000. Default 100.
+    /// Time that a frame waits for a facet, ms, 1 to 60 000. Default 100.
     pub ready_timeout_ms: u32,
-    /// A facet not heard of for so long is dropped, and may come back, ms, 100 to 600 000: who lives is heard every 50 ms. Default 2000.
+    /// A facet that is silent for this long is dropped and may join again, ms, 100 to 600 000.
+    /// Facets send every 50 ms. Default 2000.
     pub drop_timeout_ms: u32,
-    /// Frames kept for who missed some, 1 to 1024. Default 8.
+    /// Frames kept for retransmission, 1 to 1024. Default 8.
     pub history_frames: u32,
 }
 
@@ -63,26 +65,22 @@ impl Default for Sync {
 
 impl Sync {
     pub(crate) fn read(mut f: Fields<'_>) -> Sync {
-        let usual = Sync::default();
+        let default = Sync::default();
         let sync = Sync {
-            transport: f.choice_or("transport", TRANSPORTS, usual.transport),
-            port: f.integer_or("port", 1..=65_535, usual.port.into()) as u16,
-            mode: f.choice_or("mode", MODES, usual.mode),
-            connect_timeout_ms: f.integer_or("connect_timeout_ms", 1..=600_000, usual.connect_timeout_ms),
-            ready_timeout_ms: f.integer_or("ready_timeout_ms", 1..=60_000, usual.ready_timeout_ms),
-            drop_timeout_ms: f.integer_or("drop_timeout_ms", 100..=600_000, usual.drop_timeout_ms),
-            history_frames: f.integer_or("history_frames", 1..=1024, usual.history_frames),
+            transport: f.choice_or("transport", TRANSPORTS, default.transport),
+            port: f.integer_or("port", 1..=65_535, default.port.into()) as u16,
+            mode: f.choice_or("mode", MODES, default.mode),
+            connect_timeout_ms: f.integer_or("connect_timeout_ms", 1..=600_000, default.connect_timeout_ms),
+            ready_timeout_ms: f.integer_or("ready_timeout_ms", 1..=60_000, default.ready_timeout_ms),
+            drop_timeout_ms: f.integer_or("drop_timeout_ms", 100..=600_000, default.drop_timeout_ms),
+            history_frames: f.integer_or("history_frames", 1..=1024, default.history_frames),
         };
         if sync.drop_timeout_ms < sync.ready_timeout_ms {
             let message = format!(
-                "`drop_timeout_ms` of {} is {}, `ready_timeout_ms` {}",
+                "`drop_timeout_ms` of {} is {} and `ready_timeout_ms` is {}",
                 f.what, sync.drop_timeout_ms, sync.ready_timeout_ms
             );
-            f.log.report(
-                f.span.clone(),
-                message,
-                "wanted a facet to be dropped no sooner than a frame stops waiting for it",
-            );
+            f.log.report(f.span.clone(), message, "expected a `drop_timeout_ms` of at least `ready_timeout_ms`");
         }
         f.finish();
         sync
@@ -92,7 +90,7 @@ impl Sync {
 /// `[security]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Security {
-    /// A file with the key that all nodes share. The key itself never stands in a cave file.
+    /// A file with the key that all nodes share. Cave files never have the key itself.
     pub key_file: PathBuf,
 }
 
@@ -109,7 +107,7 @@ impl Security {
 pub struct Recording {
     /// The recording (MCAP).
     pub file: PathBuf,
-    /// Every so many frames are recorded, 1 to 10 000. Default 1.
+    /// Interval between recorded frames, 1 to 10 000. Default 1.
     pub every_frames: u32,
 }
 
@@ -122,21 +120,21 @@ impl Recording {
     }
 }
 
-/// Shared memory ends at the machine, and nothing leaves it without a key.
+/// Checks that shared memory is used on one machine only and that remote nodes have a key.
 pub(crate) fn check_reach(cave: &Cave, log: &Log<'_>, place: &Range<usize>) {
     let Some(far) = cave.nodes.iter().find(|node| !node.is_local()) else { return };
     if cave.sync.transport == Transport::SharedMemory {
         let message = format!(
-            "node \"{}\" is at {}, and `transport` of [sync] is shared_memory, which ends at this machine",
+            "node \"{}\" is at {}, but `transport` of [sync] is shared_memory, which works on one machine only",
             far.name, far.address
         );
-        log.report(place.clone(), message, "wanted transport = \"udp\", or nodes at 127.0.0.1");
+        log.report(place.clone(), message, "expected transport = \"udp\", or nodes at 127.0.0.1");
     } else if cave.security.is_none() {
-        let message = format!("node \"{}\" is at {}, and there is no [security]", far.name, far.address);
+        let message = format!("node \"{}\" is at {}, but there is no [security]", far.name, far.address);
         log.report(
             place.clone(),
             message,
-            "wanted [security] with a key_file; without one only nodes at 127.0.0.1 are spoken to",
+            "expected [security] with a key_file; without it only nodes at 127.0.0.1 are allowed",
         );
     }
 }

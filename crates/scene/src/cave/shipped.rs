@@ -1,4 +1,4 @@
-//! The caves that come with tumble, and finding a cave by path or by name.
+//! The caves that come with tumble, and lookup of a cave by path or name.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use crate::suggest::{listed, nearest};
 /// A cave that is built into the library.
 #[derive(Clone, Copy, Debug)]
 pub struct ShippedCave {
-    /// The name of its file under `caves/`, without the ending.
+    /// The name of its file under `caves/`, without the extension.
     pub name: &'static str,
     /// The whole text.
     pub text: &'static str,
@@ -23,13 +23,13 @@ macro_rules! shipped_caves {
 
 const SHIPPED: &[ShippedCave] = shipped_caves!["wall3", "cube4", "cube6", "cylinder5", "sphere5"];
 
-/// The caves that come with tumble.
+/// Returns the caves that come with tumble.
 pub fn shipped_caves() -> &'static [ShippedCave] {
     SHIPPED
 }
 
 impl ShippedCave {
-    /// One line that says what the cave is.
+    /// Returns the line that describes the cave.
     pub fn description(&self) -> String {
         description(self.text)
     }
@@ -37,7 +37,7 @@ impl ShippedCave {
     /// Reads the cave.
     ///
     /// # Errors
-    /// None for the caves as they are; the type is that of [`Cave::parse`].
+    /// None for the shipped texts; the type is that of [`Cave::parse`].
     pub fn read(&self) -> Result<Cave, CaveError> {
         Cave::parse(self.text, &format!("caves/{}.toml", self.name))
     }
@@ -65,10 +65,12 @@ impl CaveSource {
     }
 }
 
-/// Finds a cave: the path of a file, or the name of a shipped one. `caves/NAME.toml` of a shipped cave is found from anywhere.
+/// Finds a cave: the path of a file, or the name of a shipped one. `caves/NAME.toml` of a shipped
+/// cave is found from any folder.
 ///
 /// # Errors
-/// [`CaveError::Unknown`] for a name that is not shipped, [`CaveError::Read`] for a path where nothing is.
+/// [`CaveError::Unknown`] for a name that is not shipped, [`CaveError::Read`] for a path that does
+/// not exist.
 pub fn resolve_cave(name_or_path: &str) -> Result<CaveSource, CaveError> {
     let path = Path::new(name_or_path);
     if path.is_file() {
@@ -85,8 +87,8 @@ pub fn resolve_cave(name_or_path: &str) -> Result<CaveSource, CaveError> {
     let names = SHIPPED.iter().map(|cave| cave.name);
     let all = listed(names.clone(), "and");
     let hint = match nearest(name_or_path, names) {
-        Some(near) => format!("did you mean `{near}`? Shipped are {all}"),
-        None => format!("shipped are {all}; or give the path of a cave file"),
+        Some(near) => format!("did you mean `{near}`? There are {all}"),
+        None => format!("there are {all}; or give the path of a cave file"),
     };
     Err(CaveError::Unknown { name: name_or_path.to_owned(), hint })
 }

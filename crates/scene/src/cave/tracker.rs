@@ -1,4 +1,4 @@
-//! `[tracker]`: what tells where heads and hands are.
+//! `[tracker]`: the source of head and hand positions.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
@@ -7,17 +7,17 @@ use toml::de::DeValue;
 use super::User;
 use crate::fields::{Fields, Names};
 
-/// Where datagrams of a tracker are heard where nothing is said.
+/// Default UDP port for datagrams of a tracker.
 pub const TRACKER_PORT: u16 = 47_200;
-/// Most senders that are listed.
-const MOST_SENDERS: usize = 64;
+/// Largest number of senders.
+const MAX_SENDERS: usize = 64;
 
-/// Axes of the tracker's space.
+/// Axes of the tracker's frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axes {
-    /// The cave's own: x to the right, y ahead, z up.
+    /// The cave's axes: x to the right, y ahead, z up.
     ZUp,
-    /// As of most headsets and of OpenXR: x to the right, y up, z back.
+    /// Axes of OpenXR and most headsets: x to the right, y up, z back.
     YUp,
 }
 
@@ -26,22 +26,24 @@ const AXES: Names<Axes> = &[("z_up", Axes::ZUp), ("y_up", Axes::YUp)];
 /// `[tracker]`. All keys have defaults.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tracker {
-    /// Where datagrams (OSC) are heard. Default 127.0.0.1.
+    /// Address on which datagrams (OSC) are received. Default 127.0.0.1.
     pub address: IpAddr,
     /// UDP port, 1 to 65535. Default 47200.
     pub port: u16,
-    /// The names by which the tracker knows the cave's users, in the order of these. Default: their own.
+    /// Names of the cave's users at the tracker, in the order of the users. Default: their own
+    /// names.
     pub users: Vec<String>,
-    /// Whom is listened to. Default: everybody who reaches `address`; needed where that is not this machine alone.
+    /// Accepted senders. Default: every sender that reaches `address`. Required if `address` is not
+    /// local.
     pub senders: Vec<IpAddr>,
     /// Default `z_up`.
     pub axes: Axes,
-    /// Origin of the tracker's space in the cave, m. Default 0, 0, 0.
+    /// Origin of the tracker's frame in the cave, m. Default 0, 0, 0.
     pub origin_m: [f64; 3],
 }
 
 impl Tracker {
-    /// With the defaults, for these users.
+    /// Returns the default settings for these users.
     pub fn of(users: &[User]) -> Tracker {
         Tracker {
             address: Ipv4Addr::LOCALHOST.into(),
@@ -53,30 +55,30 @@ impl Tracker {
         }
     }
 
-    /// Address and port.
+    /// Returns address and port.
     pub fn socket(&self) -> SocketAddr {
         (self.address, self.port).into()
     }
 
     pub(crate) fn read(mut f: Fields<'_>, users: &[User]) -> Tracker {
-        let usual = Tracker::of(users);
+        let default = Tracker::of(users);
         let problems = f.log.count();
         let address = f
             .optional_text("address")
             .and_then(|(text, value)| address_of(&f, "address", text, value))
-            .unwrap_or(usual.address);
-        let port = u32::from(usual.port);
+            .unwrap_or(default.address);
+        let port = u32::from(default.port);
         let tracker = Tracker {
             address,
             port: f.integer_or("port", 1..=65535, port) as u16,
-            users: read_users(&mut f, users).unwrap_or(usual.users),
+            users: read_users(&mut f, users).unwrap_or(default.users),
             senders: read_senders(&mut f),
-            axes: f.choice_or("axes", AXES, usual.axes),
-            origin_m: f.vector_or("origin_m", crate::bound::Bound::ANY, usual.origin_m),
+            axes: f.choice_or("axes", AXES, default.axes),
+            origin_m: f.vector_or("origin_m", crate::bound::Bound::ANY, default.origin_m),
         };
         if f.log.count() == problems && !tracker.address.is_loopback() && tracker.senders.is_empty() {
-            let message = format!("{} listens at {}, and has no `senders`", f.what, tracker.address);
-            f.log.report(f.span.clone(), message, "wanted the IP addresses of those that are listened to, such as senders = [\"10.0.0.7\"]; what comes is not sealed");
+            let message = format!("{} listens at {} without `senders`", f.what, tracker.address);
+            f.log.report(f.span.clone(), message, "expected the IP addresses of accepted senders, such as senders = [\"10.0.0.7\"]; datagrams of trackers are not authenticated");
         }
         f.finish();
         tracker
@@ -85,10 +87,7 @@ impl Tracker {
 
 fn read_users(f: &mut Fields<'_>, users: &[User]) -> Option<Vec<String>> {
     let place = f.value("users")?;
-    let wanted = format!(
-        "one name for each of the cave's {} users, in their order, that no other has and without /",
-        users.len()
-    );
+    let expected = format!("one unique name without / for each of the cave's {} users, in their order", users.len());
     let names: Vec<String> = match place.get_ref() {
         DeValue::Array(items) => items.iter().filter_map(|item| Some(item.get_ref().as_str()?.to_owned())).collect(),
         _ => Vec::new(),
@@ -97,13 +96,13 @@ fn read_users(f: &mut Fields<'_>, users: &[User]) -> Option<Vec<String>> {
         !names[k].is_empty() && names[k].len() <= 64 && !names[k].contains('/') && !names[..k].contains(&names[k])
     };
     if names.len() != users.len() || !(0..names.len()).all(right) {
-        f.wrong("users", place, wanted);
+        f.wrong("users", place, expected);
     }
     Some(names)
 }
 
 fn read_senders(f: &mut Fields<'_>) -> Vec<IpAddr> {
-    let items = f.list("senders", MOST_SENDERS, "a list of IP addresses");
+    let items = f.list("senders", MAX_SENDERS, "a list of IP addresses");
     items
         .into_iter()
         .filter_map(|value| f.as_text("senders", value).and_then(|text| address_of(f, "senders", text, value)))

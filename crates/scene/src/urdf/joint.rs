@@ -1,4 +1,4 @@
-//! `<joint>`: how its child moves against its parent, its limits and what resists it.
+//! `<joint>`: type, axis, limits, damping and friction.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -12,7 +12,7 @@ use super::xml::Element;
 use crate::bound::Bound;
 use crate::joint::JointSpec;
 
-/// The kinds of joints of a URDF. `spherical` is not in its specification, but some write it.
+/// The joint types of a URDF. `spherical` is not in its specification, but some files have it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Kind {
     Fixed,
@@ -34,7 +34,7 @@ const KINDS: &[(&str, Kind)] = &[
     ("planar", Kind::Planar),
 ];
 
-/// A joint as its element says.
+/// A joint as its element describes it.
 pub(crate) struct JointElement {
     pub(crate) name: String,
     pub(crate) span: Range<usize>,
@@ -45,7 +45,7 @@ pub(crate) struct JointElement {
     pub(crate) placement: Pose,
     /// Unit axis; the normal of a planar joint.
     pub(crate) axis: Vec3,
-    pub(crate) freedom: DofSettings,
+    pub(crate) dof: DofSettings,
     pub(crate) effort: Option<f64>,
     pub(crate) speed: Option<f64>,
     pub(crate) mimic: Option<Mimic>,
@@ -61,11 +61,11 @@ pub(crate) struct Mimic {
 
 impl JointElement {
     pub(crate) fn read(joint: &Element<'_, '_>, links: &BTreeMap<String, usize>) -> Option<JointElement> {
-        let name = joint.required_text("name", "a name of its own");
+        let name = joint.required_text("name", "a unique name");
         let kind = read_kind(joint);
         let [parent, child] = ["parent", "child"].map(|end| read_end(joint, end, links));
         let axis = read_axis(joint);
-        let (freedom, effort, speed) = read_limits(joint, kind?);
+        let (dof, effort, speed) = read_limits(joint, kind?);
         let mimic = joint.child("mimic").and_then(|mimic| {
             Some(Mimic {
                 joint: mimic.required_text("joint", "the name of the joint that it follows")?.to_owned(),
@@ -84,14 +84,15 @@ impl JointElement {
             child: child?,
             placement,
             axis,
-            freedom,
+            dof,
             effort,
             speed,
             mimic,
         })
     }
 
-    /// The joint with one or no degree of freedom of its own; `None` for those that are made of several.
+    /// Returns a joint with at most one degree of freedom; `None` for types that are made of
+    /// several joints.
     pub(crate) fn spec(&self) -> Option<JointSpec> {
         let axis = self.axis;
         let kind = match self.kind {
@@ -104,24 +105,24 @@ impl JointElement {
         Some(self.with_effects(JointSpec::new(&self.name, kind)))
     }
 
-    /// A joint with this one's constants.
+    /// Returns the joint with the limits, damping, friction, effort and speed of this element.
     pub(crate) fn with_effects(&self, joint: JointSpec) -> JointSpec {
-        let freedom = if joint.kind == Joint::Fixed { DofSettings::default() } else { self.freedom.clone() };
-        JointSpec { freedom, effort: self.effort, speed: self.speed, ..joint }
+        let dof = if joint.kind == Joint::Fixed { DofSettings::default() } else { self.dof.clone() };
+        JointSpec { dof, effort: self.effort, speed: self.speed, ..joint }
     }
 }
 
 fn read_kind(joint: &Element<'_, '_>) -> Option<Kind> {
-    let wanted = "revolute, continuous, prismatic, fixed, floating, planar or spherical";
-    let typed = joint.required_text("type", wanted)?;
+    let expected = "revolute, continuous, prismatic, fixed, floating, planar or spherical";
+    let typed = joint.required_text("type", expected)?;
     let kind = KINDS.iter().find(|(name, _)| *name == typed).map(|(_, kind)| *kind);
     if kind.is_none() {
-        joint.wrong("type", wanted);
+        joint.wrong("type", expected);
     }
     kind
 }
 
-/// `<parent link>` or `<child link>`.
+/// Reads `<parent link>` or `<child link>`.
 fn read_end(joint: &Element<'_, '_>, end: &'static str, links: &BTreeMap<String, usize>) -> Option<usize> {
     let element = joint.required(end, &format!("<{end} link=\"NAME\"/>"))?;
     let name = element.required_text("link", "the name of a link")?;
@@ -138,15 +139,15 @@ fn read_end(joint: &Element<'_, '_>, end: &'static str, links: &BTreeMap<String,
     found
 }
 
-/// `<axis xyz>`, made unit; x where it is not there.
+/// Reads `<axis xyz>` as a unit vector; x if it is absent.
 fn read_axis(joint: &Element<'_, '_>) -> Vec3 {
     let Some(axis) = joint.child("axis") else { return Vec3::x() };
     let xyz = Vec3::from(axis.numbers("xyz", Bound::ANY).unwrap_or([1.0, 0.0, 0.0]));
     match xyz.try_normalize(1e-9) {
         Some(unit) => unit,
-        // told already where it is not finite
+        // Not finite: already reported.
         None if xyz.iter().any(|x| !x.is_finite()) => Vec3::x(),
-        // the axis of a joint that has none is often written as zero
+        // Files often write a zero axis for joints that have none.
         None if matches!(joint.text("type"), Some("fixed" | "floating" | "spherical")) => Vec3::x(),
         None => {
             axis.wrong("xyz", "a direction: three numbers, not all 0");
@@ -155,13 +156,13 @@ fn read_axis(joint: &Element<'_, '_>) -> Vec3 {
     }
 }
 
-/// `<limit>` and `<dynamics>`: what acts, effort, speed.
+/// Reads `<limit>` and `<dynamics>`: limits, damping, friction, effort, speed.
 fn read_limits(joint: &Element<'_, '_>, kind: Kind) -> (DofSettings, Option<f64>, Option<f64>) {
     let bounded = matches!(kind, Kind::Revolute | Kind::Prismatic);
     let limit = match bounded {
         true => joint.required(
             "limit",
-            "<limit lower upper effort velocity/>, or type=\"continuous\" for a hinge without limits",
+            "<limit lower upper effort velocity/>, or type=\"continuous\" for a revolute joint without limits",
         ),
         false => joint.child("limit"),
     };
@@ -170,7 +171,7 @@ fn read_limits(joint: &Element<'_, '_>, kind: Kind) -> (DofSettings, Option<f64>
     if let Some(limit) = limit.filter(|_| lower > upper) {
         limit.wrong("lower", format_args!("at most `upper`, {upper}"));
     }
-    // 0 and negative numbers stand for "not known" in many files
+    // Many files write 0 or a negative number for an unknown value.
     let most = |name: &str| {
         limit.and_then(|l| l.text(name).and_then(|_| l.open_number(name))).filter(|x| *x > 0.0 && x.is_finite())
     };

@@ -1,4 +1,4 @@
-//! `<link>`: mass, what is drawn, what collides.
+//! `<link>`: mass, visuals, collision shapes.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -10,28 +10,28 @@ use tumble_core::collide::{Mat3, Pose, Vec3};
 
 use super::files::{Found, find};
 use super::xml::Element;
-use super::{CollisionMeshes, MissingMeshes, UrdfOptions, Wanted};
+use super::{CollisionMeshes, Content, MissingMeshes, UrdfOptions};
+use crate::appearance::Color;
 use crate::bound::Bound;
 use crate::link::{Geometry, InertiaFault, LinkShape, inertia_fault};
-use crate::look::Color;
 use crate::notes::NoteList;
 use crate::rotation;
 use crate::shape::ShapeSpec;
 
-/// What links share while they are read.
+/// Context shared by all links of a file.
 pub(crate) struct Context<'c> {
     /// The folder of the file.
     pub(crate) folder: &'c Path,
     /// The file, for messages.
     pub(crate) file: &'c str,
     pub(crate) options: &'c UrdfOptions,
-    pub(crate) wanted: Wanted,
-    /// Colours of the materials at the top of the file.
+    pub(crate) content: Content,
+    /// Colors of the materials at the top of the file.
     pub(crate) colors: BTreeMap<String, Color>,
     pub(crate) notes: NoteList,
 }
 
-/// A link as its element says.
+/// A link as its element describes it.
 pub(crate) struct LinkElement {
     pub(crate) name: String,
     pub(crate) span: Range<usize>,
@@ -39,7 +39,7 @@ pub(crate) struct LinkElement {
     pub(crate) shapes: Vec<LinkShape>,
 }
 
-/// `<origin xyz rpy>`, in a place that may have one.
+/// Reads `<origin xyz rpy>`, if present.
 pub(crate) fn read_origin(parent: &Element<'_, '_>) -> Pose {
     let Some(origin) = parent.child("origin") else { return Pose::identity() };
     let xyz = origin.numbers("xyz", Bound::ANY).unwrap_or_default();
@@ -47,7 +47,7 @@ pub(crate) fn read_origin(parent: &Element<'_, '_>) -> Pose {
     rotation::pose(xyz, rotation::roll_pitch_yaw(rpy))
 }
 
-/// `<color rgba>` of a material; the fourth number is not used.
+/// Reads `<color rgba>` of a material; alpha is not used.
 pub(crate) fn read_color(material: &Element<'_, '_>) -> Option<Color> {
     let [r, g, b, _]: [f64; 4] = material.child("color")?.numbers("rgba", Bound::ANY)?;
     Some([r, g, b].map(|x| x.clamp(0.0, 1.0)))
@@ -55,9 +55,9 @@ pub(crate) fn read_color(material: &Element<'_, '_>) -> Option<Color> {
 
 impl LinkElement {
     pub(crate) fn read(link: &Element<'_, '_>, context: &mut Context<'_>) -> Option<LinkElement> {
-        let name = link.required_text("name", "a name of its own")?.to_owned();
+        let name = link.required_text("name", "a unique name")?.to_owned();
         let mass = link.child("inertial").map_or_else(LinkMass::none, |inertial| read_inertial(&inertial, context));
-        let shapes = if context.wanted != Wanted::Tree { read_shapes(link, context) } else { Vec::new() };
+        let shapes = if context.content != Content::Tree { read_shapes(link, context) } else { Vec::new() };
         Some(LinkElement { name, span: link.span(), mass, shapes })
     }
 }
@@ -67,7 +67,7 @@ fn read_inertial(inertial: &Element<'_, '_>, context: &mut Context<'_>) -> LinkM
     let mass = inertial.required("mass", "<mass value=\"…\"/>, kg");
     let mass = mass.map_or(0.0, |mass| mass.required_number("value", Bound::NOT_NEGATIVE));
     let inertia =
-        inertial.required("inertia", "<inertia ixx iyy izz ixy ixz iyz/>, kg·m² about the centre of mass").map(|i| {
+        inertial.required("inertia", "<inertia ixx iyy izz ixy ixz iyz/>, kg·m² about the center of mass").map(|i| {
             let of = |name| i.number(name, Bound::ANY);
             let diagonal = ["ixx", "iyy", "izz"].map(|name| i.required_number(name, Bound::ANY));
             let [xy, xz, yz] = ["ixy", "ixz", "iyz"].map(|name| of(name).unwrap_or(0.0));
@@ -83,16 +83,17 @@ fn read_inertial(inertial: &Element<'_, '_>, context: &mut Context<'_>) -> LinkM
     LinkMass { mass, center: Vec3::zeros(), inertia: own }.seen_from(&origin)
 }
 
-/// The inertia of a body that can be: negative principal moments, which real files have, are set to 0 and told where they are more than rounding.
-/// Moments that are too large beside the others change nothing in the equations of motion and are only told.
+/// Returns a valid inertia. Negative principal moments, which real files have, are set to 0, with a
+/// note if they are more than rounding. A moment greater than the sum of the others only makes a
+/// note, since it does no harm in the equations of motion.
 fn mended(element: &Element<'_, '_>, inertia: Mat3, context: &mut Context<'_>) -> Mat3 {
     let eigen = SymmetricEigen::new(inertia);
     let negative = eigen.eigenvalues.min() < 0.0;
     if let Some(fault) = inertia_fault(&inertia) {
         let what = match fault {
-            InertiaFault::Negative(_) => "principal moments below 0 are set to 0",
+            InertiaFault::Negative(_) => "negative principal moments are set to 0",
             InertiaFault::Triangle(_) => {
-                "one principal moment is greater than the sum of the others, as that of no rigid body; it is used as it is"
+                "one principal moment is greater than the sum of the others, which no rigid body has; it is used unchanged"
             }
         };
         let line = element.log.line(element.span().start);
@@ -121,7 +122,7 @@ fn read_shapes(link: &Element<'_, '_>, context: &mut Context<'_>) -> Vec<LinkSha
     collisions
 }
 
-/// A `<visual>` or `<collision>`; `None` where it is left out or wrong.
+/// Reads a `<visual>` or `<collision>`; `None` if it is left out or wrong.
 pub(super) fn read_shape(element: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) -> Option<LinkShape> {
     let pose = read_origin(element);
     let geometry = element.required("geometry", "<geometry> with a box, cylinder, sphere, capsule or mesh")?;
@@ -130,7 +131,7 @@ pub(super) fn read_shape(element: &Element<'_, '_>, collides: bool, context: &mu
     if !context.options.recolor
         && let Some(color) = material_color(element, context)
     {
-        surface.look.color = color;
+        surface.appearance.color = color;
     }
     Some(LinkShape { pose, geometry, mass: None, surface, collides, visible: !collides })
 }
@@ -141,9 +142,9 @@ fn material_color(element: &Element<'_, '_>, context: &Context<'_>) -> Option<Co
 }
 
 fn read_geometry(geometry: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) -> Option<Geometry> {
-    let wanted = "wanted <box>, <cylinder>, <sphere>, <capsule> or <mesh>";
+    let expected = "expected <box>, <cylinder>, <sphere>, <capsule> or <mesh>";
     let Some(form) = geometry.first() else {
-        geometry.problem("is empty", wanted);
+        geometry.problem("is empty", expected);
         return None;
     };
     let length = |name: &str| form.required_number(name, Bound::POSITIVE);
@@ -157,7 +158,7 @@ fn read_geometry(geometry: &Element<'_, '_>, collides: bool, context: &mut Conte
         "capsule" => ShapeSpec::Capsule { radius_m: length("radius"), length_m: length("length") },
         "mesh" => return read_mesh(&form, collides, context),
         other => {
-            form.problem(format_args!("(<{other}>) is no shape"), wanted);
+            form.problem(format_args!("(<{other}>) is not a shape"), expected);
             return None;
         }
     }))
@@ -177,11 +178,13 @@ fn read_mesh(mesh: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) 
         Found::Here(path) => return Some(Geometry::File { path, scale, place, hull, required }),
         Found::Missing(path) if collides && required => format!("there is no file {path}"),
         Found::Missing(_) => "there is no such file".into(),
-        Found::Format(format) => format!("the format '{format}' is not read, only .stl, .obj, .ply and .dae"),
+        Found::Format(format) => {
+            format!("the format '{format}' is not supported; supported are .stl, .obj, .ply and .dae")
+        }
     };
     if collides && required {
-        let wanted = "wanted a mesh that is there; `packages` (--package NAME=DIR) says where packages are, missing_meshes = \"skip\" (--missing-meshes skip) leaves it out";
-        mesh.problem(format_args!("\"{uri}\" cannot be collided with: {why}"), wanted);
+        let expected = "expected an existing mesh; `packages` (--package NAME=DIR) sets folders of packages, missing_meshes = \"skip\" (--missing-meshes skip) leaves the mesh out";
+        mesh.problem(format_args!("\"{uri}\" cannot be used for collision: {why}"), expected);
     } else {
         let kind = if collides { "collision" } else { "visual" };
         context.notes.add(format!("{place}: {kind} mesh {uri}"), format!("left out: {why}"));

@@ -1,4 +1,4 @@
-//! URDF: a robot's links, joints, masses and shapes, from the XML files that the robotics world exchanges.
+//! URDF: links, joints, masses and shapes of a robot from XML files.
 //!
 //! ```no_run
 //! use tumble_scene::urdf::{UrdfOptions, load};
@@ -9,19 +9,20 @@
 //! # Ok::<(), tumble_scene::urdf::UrdfError>(())
 //! ```
 //!
-//! | element | what becomes of it |
+//! | element | meaning |
 //! |---|---|
-//! | `<inertial>` | mass, centre and inertia, turned by its origin; a link without is massless |
-//! | `<joint>` revolute, continuous, prismatic, fixed | the joint of that kind; fixed links are folded into their parents |
-//! | `<joint>` planar | two massless slides `NAME/x`, `NAME/y` in the plane, then a hinge `NAME` about its normal |
-//! | `<joint>` floating | a free root where its parent stands still; else slides `NAME/x`, `/y`, `/z` and a ball joint |
-//! | `<limit>` | position limits; effort is the limit of drives that name none; velocity is kept and not enforced |
+//! | `<inertial>` | mass, center of mass and inertia, rotated by its origin; a link without one is massless |
+//! | `<joint>` revolute, continuous, prismatic, fixed | the joint of that type; fixed links are merged into their parents |
+//! | `<joint>` planar | two massless prismatic joints `NAME/x`, `NAME/y` in the plane, then a revolute joint `NAME` about its normal |
+//! | `<joint>` floating | a floating root if its parent is fixed to the base; else prismatic joints `NAME/x`, `/y`, `/z` and a spherical joint |
+//! | `<limit>` | position limits; effort is the default force limit of drives; velocity is stored and not enforced |
 //! | `<dynamics>` | viscous damping and dry friction |
 //! | `<mimic>` | a coupling of the two joints |
 //! | `<collision>` | box, cylinder, sphere, capsule; meshes in STL, OBJ, PLY and COLLADA |
-//! | `<visual>` | the same, with the colour of its material; its mesh need be no solid, is read by whoever draws, and collides with nothing. Where no visual of a link can be read its collision shapes are drawn |
+//! | `<visual>` | the same, with the color of its material. Its mesh need not be closed, is read when it is first drawn, and does not collide. If no visual of a link can be read, its collision shapes are drawn |
 //!
-//! All else (transmissions, sensors, simulators' own elements) is passed over. The root link is fixed to the base, or floats if asked.
+//! Other elements (transmissions, sensors, extensions of simulators) are ignored. The root link is
+//! fixed to the base, or floats with [`UrdfOptions::floating`].
 
 mod files;
 mod joint;
@@ -54,36 +55,38 @@ use tree::TreeBuilder;
 use tumble_core::articulated::{ArticulatedBody, DofSettings, LinkMass, MAX_LINKS, Model, ModelError};
 use xml::Element;
 
-/// Most bytes of a URDF: 64 MiB.
-const MOST_BYTES: u64 = 64 << 20;
+/// Largest URDF in bytes: 64 MiB.
+const MAX_BYTES: u64 = 64 << 20;
 
-/// What to do about collision meshes that are not there or cannot be read. Visual ones are never an error: those that are not there are left out with a
-/// note, those that cannot be read when they are drawn ([`visual_notes`](crate::visual_notes)).
+/// What happens with collision meshes that do not exist or cannot be read. Visual meshes are never
+/// an error: missing ones are left out with a note, unreadable ones when they are drawn
+/// ([`visual_notes`](crate::visual_notes)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MissingMeshes {
-    /// They are an error.
+    /// An error.
     #[default]
     Error,
-    /// They are left out, with a note.
+    /// Left out, with a note.
     Skip,
 }
 
-/// What a collision mesh collides as.
+/// The shape that a collision mesh collides as.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CollisionMeshes {
-    /// As it is, where it is closed; an open one as its convex hull, with a note.
+    /// The mesh itself if it is closed; an open one as its convex hull, with a note.
     #[default]
     Exact,
-    /// As its convex hull.
+    /// Its convex hull.
     Hull,
 }
 
 /// How a URDF is read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct UrdfOptions {
-    /// Whether the root link floats; else it is fixed to the base.
+    /// Whether the root link floats. Otherwise it is fixed to the base.
     pub floating: bool,
-    /// Folders of packages by name, for `package://NAME/…`. What is not among them is looked for in the folders above the URDF.
+    /// Folders of packages by name, for `package://NAME/…`. Other packages are searched in the
+    /// folders above the URDF.
     pub packages: BTreeMap<String, PathBuf>,
     /// Default [`MissingMeshes::Error`].
     pub missing_meshes: MissingMeshes,
@@ -91,7 +94,7 @@ pub struct UrdfOptions {
     pub collision_meshes: CollisionMeshes,
     /// Surface of all links.
     pub surface: Surface,
-    /// Whether the look of `surface` stands instead of the file's colours.
+    /// Whether the appearance of `surface` replaces the file's colors.
     pub recolor: bool,
 }
 
@@ -103,29 +106,29 @@ pub enum UrdfError {
     Read {
         /// The path that was tried.
         file: PathBuf,
-        /// What the system said.
+        /// From the system.
         source: std::io::Error,
     },
-    /// The file is larger than any URDF may be.
-    #[error("{}: the file is larger than {MOST_BYTES} bytes, the most a URDF may have", file.display())]
+    /// The file is too large.
+    #[error("{}: the file is larger than {MAX_BYTES} bytes, the limit for URDFs", file.display())]
     TooLarge {
         /// The path that was tried.
         file: PathBuf,
     },
-    /// The file is not text.
+    /// The file is not UTF-8.
     #[error("{}:{line}: byte {byte} of the file is not UTF-8; a URDF is a UTF-8 text in XML", file.display())]
     NotUtf8 {
         /// The path that was tried.
         file: PathBuf,
         /// The line, from 1.
         line: usize,
-        /// Offset of the first bad byte, from 0.
+        /// Offset of the first invalid byte, from 0.
         byte: usize,
     },
-    /// The text was read, and is wrong in one or more places.
+    /// The text has one or more problems.
     #[error("{0}")]
     Invalid(Box<Invalid>),
-    /// What it says is no tree that can move.
+    /// The links do not form a tree that can move.
     #[error("{}: {source}", file.display())]
     Model {
         /// The file.
@@ -133,26 +136,26 @@ pub enum UrdfError {
         /// From the model.
         source: ModelError,
     },
-    /// A mesh cannot be read, or a shape or constant is refused.
+    /// A mesh cannot be read, or a shape or constant is invalid.
     #[error("{}: {why}", file.display())]
     Body {
         /// The file.
         file: PathBuf,
-        /// What is wrong; it names the link.
+        /// The reason; names the link.
         why: String,
     },
 }
 
-/// Reads a URDF as a body that stands at the origin (or floats there), with its shapes, limits and couplings. The meshes of its visuals are left to
-/// whoever draws them.
+/// Reads a URDF as an articulated body at the origin with its shapes, limits and couplings. Visual
+/// meshes are read when they are first drawn. Also returns notes about the file.
 ///
 /// # Errors
-/// [`UrdfError`]: a file cannot be read, or has problems; those of the XML are told at once with line and column.
+/// [`UrdfError`]: a file cannot be read, or has problems. All problems of the XML are reported at once, with line and column.
 pub fn load(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<(ArticulatedBody, Notes), UrdfError> {
     let path = path.as_ref();
-    let robot = read_file(path, options, Wanted::Body)?;
+    let robot = read_file(path, options, Content::Body)?;
     let mut maker = ShapeMaker::new(&[], Purpose::Stepped);
-    let spec = ArticulatedSpec { part_overlaps: true, ..ArticulatedSpec::of(robot.name, robot.links) };
+    let spec = ArticulatedSpec { exclude_overlapping: true, ..ArticulatedSpec::of(robot.name, robot.links) };
     let body = assemble::body(&spec, &mut maker).map_err(|why| UrdfError::Body { file: path.to_path_buf(), why })?;
     Ok((body, robot.notes.into_iter().chain(maker.notes.take()).collect()))
 }
@@ -162,33 +165,34 @@ pub fn load(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<(Articulate
 pub struct UrdfModel {
     /// The robot's name.
     pub name: String,
-    /// Its tree.
+    /// Its links and joints.
     pub model: Model,
-    /// Names of its joints, one for each of [`Model::links`]: in the order of the coordinates. That of a floating root is the root link's.
+    /// Names of its joints, one for each of [`Model::links`], in the order of the coordinates. The
+    /// name for a floating root is that of the root link.
     pub joints: Vec<String>,
     /// Limits, damping and dry friction of its degrees of freedom, in the order of the velocities.
-    pub freedoms: Vec<DofSettings>,
-    /// What is to be said of the file.
+    pub dofs: Vec<DofSettings>,
+    /// Notes about the file.
     pub notes: Vec<String>,
 }
 
-/// Reads the tree of a URDF. No mesh is looked for.
+/// Reads the tree of a URDF without its shapes. No mesh is searched for.
 ///
 /// # Errors
-/// [`UrdfError`]: the file cannot be read, or has problems, all of which are told at once with line and column.
+/// [`UrdfError`]: the file cannot be read, or has problems. All problems are reported at once, with line and column.
 pub fn model(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<UrdfModel, UrdfError> {
     let path = path.as_ref();
-    let robot = read_file(path, options, Wanted::Tree)?;
+    let robot = read_file(path, options, Content::Tree)?;
     robot.into_model(path)
 }
 
-/// The same from a text; `file_name` is shown in errors.
+/// As [`model`], from a text; `file_name` is shown in errors.
 ///
 /// # Errors
-/// As [`model`], but for those of files.
+/// As [`model`], except those of files.
 pub fn parse_model(text: &str, file_name: &str, options: &UrdfOptions) -> Result<UrdfModel, UrdfError> {
     let path = Path::new(file_name);
-    read_text(text, path, options, Wanted::Tree)?.into_model(path)
+    read_text(text, path, options, Content::Tree)?.into_model(path)
 }
 
 impl Robot {
@@ -196,13 +200,14 @@ impl Robot {
         let masses: Vec<LinkMass> = self.links.iter().map(LinkSpec::given_mass).collect();
         let model = assemble::model(&self.links, &masses)
             .map_err(|source| UrdfError::Model { file: path.to_path_buf(), source })?;
-        let (joints, freedoms) = (assemble::moving_joints(&self.links), assemble::freedoms(&self.links));
-        Ok(UrdfModel { joints, freedoms, name: self.name, model, notes: self.notes })
+        let (joints, dofs) = (assemble::moving_joints(&self.links), assemble::dofs(&self.links));
+        Ok(UrdfModel { joints, dofs, name: self.name, model, notes: self.notes })
     }
 }
 
 impl UrdfError {
-    /// The error as a full report for a person, as [`SceneError::report`](crate::SceneError::report).
+    /// Returns the error as a report for people, as
+    /// [`SceneError::report`](crate::SceneError::report).
     pub fn report(&self, color: bool) -> String {
         match self {
             UrdfError::Invalid(invalid) => invalid.report(color),
@@ -211,7 +216,7 @@ impl UrdfError {
     }
 }
 
-/// What a URDF says.
+/// The content of a URDF.
 pub(crate) struct Robot {
     pub(crate) name: String,
     /// A parent before its children.
@@ -219,28 +224,28 @@ pub(crate) struct Robot {
     pub(crate) notes: Vec<String>,
 }
 
-/// What a file is read for.
+/// The parts of a file that are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Wanted {
-    /// Links, joints and masses; no mesh is looked for.
+pub(crate) enum Content {
+    /// Links, joints and masses; no mesh is searched for.
     Tree,
-    /// All of it.
+    /// Everything.
     Body,
-    /// The shapes, which need not have masses to move.
+    /// The shapes; links may move without a mass.
     Geometry,
 }
 
 /// Reads a file.
-pub(crate) fn read_file(path: &Path, options: &UrdfOptions, wanted: Wanted) -> Result<Robot, UrdfError> {
-    read_text(&text_of(path)?, path, options, wanted)
+pub(crate) fn read_file(path: &Path, options: &UrdfOptions, content: Content) -> Result<Robot, UrdfError> {
+    read_text(&text_of(path)?, path, options, content)
 }
 
-/// The text of a file.
+/// Reads the text of a file.
 fn text_of(path: &Path) -> Result<String, UrdfError> {
     let unread = |source| UrdfError::Read { file: path.to_path_buf(), source };
     let mut bytes = Vec::new();
-    std::fs::File::open(path).map_err(unread)?.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(unread)?;
-    if bytes.len() as u64 > MOST_BYTES {
+    std::fs::File::open(path).map_err(unread)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unread)?;
+    if bytes.len() as u64 > MAX_BYTES {
         return Err(UrdfError::TooLarge { file: path.to_path_buf() });
     }
     String::from_utf8(bytes).map_err(|error| {
@@ -250,8 +255,8 @@ fn text_of(path: &Path) -> Result<String, UrdfError> {
     })
 }
 
-/// Reads a text; `path` is shown in messages, and meshes are looked for from its folder.
-pub(crate) fn read_text(text: &str, path: &Path, options: &UrdfOptions, wanted: Wanted) -> Result<Robot, UrdfError> {
+/// Reads a text. `path` is shown in messages, and meshes are relative to its folder.
+pub(crate) fn read_text(text: &str, path: &Path, options: &UrdfOptions, content: Content) -> Result<Robot, UrdfError> {
     let log = Log::new(text);
     let file = path.display().to_string();
     let document = xml::parse(&log, text);
@@ -260,7 +265,7 @@ pub(crate) fn read_text(text: &str, path: &Path, options: &UrdfOptions, wanted: 
             folder: path.parent().unwrap_or(Path::new("")),
             file: &file,
             options,
-            wanted,
+            content,
             colors: BTreeMap::new(),
             notes: NoteList::default(),
         };
@@ -275,10 +280,10 @@ pub(crate) fn read_text(text: &str, path: &Path, options: &UrdfOptions, wanted: 
     }
 }
 
-/// `<robot>`; `None`, with the problems recorded, where it has no tree.
+/// Reads `<robot>`. `None`, with the problems recorded, if it has no tree.
 fn read_robot(robot: &Element<'_, '_>, mut context: Context<'_>) -> Option<Robot> {
     if robot.tag() != "robot" {
-        robot.problem("is the outermost element", "wanted <robot>");
+        robot.problem("is the outermost element", "expected <robot>");
         return None;
     }
     let colors: Vec<_> = robot.children("material").filter_map(|m| Some((m.text("name")?, read_color(&m)?))).collect();
@@ -292,7 +297,7 @@ fn read_robot(robot: &Element<'_, '_>, mut context: Context<'_>) -> Option<Robot
         note_unique(robot.log, &mut taken, "link", &link.name, &link.span);
     }
     if elements.is_empty() || elements.len() > MAX_LINKS {
-        robot.problem(format_args!("has {} links", elements.len()), format!("wanted 1 to {MAX_LINKS}"));
+        robot.problem(format_args!("has {} links", elements.len()), format!("expected 1 to {MAX_LINKS}"));
         return None;
     }
     let joints: Vec<JointElement> =
@@ -311,6 +316,6 @@ fn read_robot(robot: &Element<'_, '_>, mut context: Context<'_>) -> Option<Robot
 fn note_unique(log: &Log<'_>, taken: &mut BTreeMap<String, usize>, kind: &str, name: &str, span: &Range<usize>) {
     if let Some(line) = taken.insert(name.to_owned(), log.line(span.start)) {
         let message = format!("there is a second {kind} \"{name}\"; the first is at line {line}");
-        log.report(span.clone(), message, format!("wanted a name that no other {kind} has"));
+        log.report(span.clone(), message, "expected a unique name");
     }
 }

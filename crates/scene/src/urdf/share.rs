@@ -1,16 +1,17 @@
-//! How the shapes of a link share the spheres that it may have.
+//! Distributes the allowed number of spheres over the shapes of a link.
 //!
-//! Each shape has one; then the shape whose spheres reach furthest outside it gets one more, until there are as many as there may be or all are good enough.
-//! Which comes next does not depend on how many there may be, and no step makes the worst of a shape worse: with more spheres a link is never covered less
-//! tightly.
+//! Each shape gets one sphere. Then the shape whose spheres reach furthest outside it gets one
+//! more, until the allowed number is used or all shapes are covered tightly enough. The order does
+//! not depend on the allowed number, and no step makes the worst value of a shape worse, so more
+//! spheres never cover a link less tightly.
 
 use tumble_core::collide::{Builder, Covering, SphereTree, TreeSettings, TriMesh, Vec3};
 
 use super::spheres::{SphereOptions, Surface};
 
-/// Most branches of a tree.
-const MOST_BRANCHES: usize = 64;
-/// Balls of trees are tried from this many on, at each doubling.
+/// Largest number of children in a sphere tree.
+const MAX_BRANCHES: usize = 64;
+/// Sphere trees are tried from this number of spheres on, at each doubling.
 const FIRST_TREE: usize = 4;
 
 /// The spheres of a shape so far, in the shape's own frame.
@@ -24,17 +25,17 @@ pub(super) struct MeshShare<'s> {
     covering: Covering,
     solid: &'s TriMesh,
     slack: f64,
-    /// The number of spheres at which trees are tried next.
+    /// Number of spheres at which trees are tried next.
     next_tree: usize,
-    /// Octrees of depth 1, 2, … as far as they were built.
+    /// Octrees of depth 1, 2, …, as far as they are built.
     octrees: Vec<SphereTree>,
     stuck: bool,
 }
 
-/// The spheres of shapes, which share what the options allow.
+/// Returns the spheres of shapes, within the limits of the options.
 ///
 /// # Errors
-/// More shapes than spheres; trees that cannot be built.
+/// There are more shapes than spheres, or a tree cannot be built.
 pub(super) fn shared<'s>(
     surfaces: impl ExactSizeIterator<Item = &'s Surface>,
     options: &SphereOptions,
@@ -81,7 +82,7 @@ impl<'s> Share<'s> {
         }
     }
 
-    /// How far the spheres reach outside the shape at most, metres.
+    /// Returns how far the spheres reach outside the shape at most, meters.
     fn worst(&self) -> f64 {
         match self {
             Share::Sphere(_) => 0.0,
@@ -90,7 +91,8 @@ impl<'s> Share<'s> {
         }
     }
 
-    /// Whether they reach further than a share of the shape's diagonal, and one more would help.
+    /// Returns whether they reach further than a fraction of the shape's diagonal and one more
+    /// would help.
     fn wants_more(&self, error: f64) -> bool {
         match self {
             Share::Sphere(_) => false,
@@ -110,7 +112,7 @@ impl<'s> Share<'s> {
         }
     }
 
-    /// Centre, radius, and how far it reaches outside the shape at most, metres.
+    /// Returns center, radius and the largest distance outside the shape, meters, of each sphere.
     pub(super) fn spheres(&self) -> Vec<(Vec3, f64, f64)> {
         match self {
             Share::Sphere(radius) => vec![(Vec3::zeros(), *radius, 0.0)],
@@ -128,9 +130,9 @@ impl<'s> Share<'s> {
     }
 }
 
-/// The radius of each of so many spheres on a capsule's axis that cover it.
+/// Returns the radius of each of `count` spheres on a capsule's axis that cover it.
 fn reach(radius: f64, length: f64, count: usize) -> f64 {
-    // one alone holds the ends
+    // A single sphere also covers the ends.
     if count == 1 {
         radius + 0.5 * length
     } else {
@@ -152,7 +154,7 @@ impl MeshShare<'_> {
         Ok(())
     }
 
-    /// The centres of trees' balls, at most `count` of each tree.
+    /// Returns the centers of trees' spheres, at most `count` of each tree.
     fn trees(&mut self, count: usize, options: &SphereOptions) -> Result<Vec<Vec<Vec3>>, String> {
         let build = |settings: TreeSettings| {
             SphereTree::build_cached(self.solid, &settings, &options.cache)
@@ -163,7 +165,7 @@ impl MeshShare<'_> {
         let cut = |tree: &SphereTree| tree.select(count, enough).iter().map(|&n| tree.nodes()[n].center).collect();
         if options.tree.builder != Builder::Octree {
             let settings = TreeSettings { branch: count as u32, depth: 1, ..options.tree };
-            return if count <= MOST_BRANCHES { Ok(vec![cut(&build(settings)?)]) } else { Ok(Vec::new()) };
+            return if count <= MAX_BRANCHES { Ok(vec![cut(&build(settings)?)]) } else { Ok(Vec::new()) };
         }
         while self.octrees.len() < options.tree.depth as usize
             && self.octrees.last().is_none_or(|tree| tree.leaves().count() <= count)

@@ -1,14 +1,16 @@
-//! A robot whose collision geometry is spheres, for motion planners and for fast contact.
+//! Replaces a robot's collision geometry by spheres, for motion planners and for fast contact.
 //!
-//! The text of the URDF stays as it is but for the `<collision>` elements: each becomes one element per sphere, which keeps its attributes and its
-//! children other than `<origin>` and `<geometry>`. Spheres stay spheres. The other shapes of a link begin with one sphere each; then, as long as the link may have one more, the shape
-//! whose spheres reach furthest outside it gets it ([`share`]). So more spheres never reach further.
+//! Only the `<collision>` elements of the URDF's text change: each becomes one element per sphere,
+//! which keeps its attributes and its children other than `<origin>` and `<geometry>`. Spheres stay
+//! spheres. The other shapes of a link start with one sphere each. As long as the link may have one
+//! more, the shape whose spheres reach furthest outside it gets it ([`share`]), so more spheres
+//! never reach further.
 //!
 //! | shape | spheres |
 //! |---|---|
 //! | capsule | on its axis at equal distances `d`, of radius `√(R² + d²/4)`: they cover it and reach `√(R² + d²/4) − R` outside |
-//! | box, cylinder, mesh | balls that hold all pieces of its surface, the worst divided in two each time ([`Covering`](tumble_core::collide::Covering)); at 4, 8, 16 and so on the balls of a tree are tried, and taken if they reach less far |
-//! | open mesh | as of the mesh with its holes closed, else of its convex hull; it is the surface as given that is covered |
+//! | box, cylinder, mesh | spheres that contain all pieces of its surface, the worst divided in two each time ([`Covering`](tumble_core::collide::Covering)); at 4, 8, 16, … spheres those of a tree are tried, and used if they reach less far |
+//! | open mesh | as for the mesh with its holes closed, else for its convex hull; the given surface is covered |
 
 use std::ops::Range;
 use std::path::Path;
@@ -19,7 +21,7 @@ use tumble_core::collide::{MeshError, Pose, Progress, RepairSettings, TreeCache,
 use super::link::{Context, read_shape};
 use super::share::{self, Share};
 use super::xml::{self, Element};
-use super::{UrdfError, UrdfOptions, Wanted, read_text, text_of};
+use super::{Content, UrdfError, UrdfOptions, read_text, text_of};
 use crate::link::{Geometry, LinkShape};
 use crate::link_shapes::{read_file, stretched};
 use crate::log::Log;
@@ -28,19 +30,21 @@ use crate::shape::ShapeSpec;
 
 /// Sides of the prism around a cylinder.
 const SIDES: usize = 48;
-/// Spheres are written larger by this share, so that they hold what they should after any reader's rounding.
+/// Relative enlargement of written spheres, so that they still cover the shape after the rounding
+/// of any reader.
 const ROUNDING: f64 = 1e-9;
 
-/// How a robot is covered by spheres.
+/// Options of the covering by spheres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SphereOptions {
-    /// Most spheres of a link; a link with more collision elements than this is an error.
+    /// Largest number of spheres of a link. A link with more collision elements is an error.
     pub most: usize,
-    /// Spheres that reach at most this far outside a shape are not divided: a share of the shape's diagonal.
+    /// Spheres that reach at most this far outside a shape are not divided: a fraction of the
+    /// shape's diagonal.
     pub error: f64,
     /// How trees are built.
     pub tree: TreeSettings,
-    /// Where they are kept.
+    /// Where trees are cached.
     pub cache: TreeCache,
     /// How the URDF is read.
     pub urdf: UrdfOptions,
@@ -55,7 +59,7 @@ pub struct SphereRobot {
     pub text: String,
     /// Its links with collision geometry, in the order of the file.
     pub links: Vec<LinkSpheres>,
-    /// What is to be said of the file and its meshes.
+    /// Notes about the file and its meshes.
     pub notes: Vec<String>,
 }
 
@@ -64,15 +68,16 @@ pub struct SphereRobot {
 pub struct LinkSpheres {
     /// The link.
     pub name: String,
-    /// How many collision elements it had.
+    /// Number of collision elements that it had.
     pub shapes: usize,
-    /// Centre in the link's frame and radius, metres.
+    /// Center in the link's frame and radius, meters.
     pub spheres: Vec<(Vec3, f64)>,
-    /// How far each reaches outside the shape it stands for, at most, metres.
+    /// Upper bound of the distance by which each reaches outside its shape, meters.
     pub outward: Vec<f64>,
 }
 
-/// A collision element: where it stands, what it is, and the surface to cover, in its own frame. Spheres and capsules are known by formula.
+/// A collision element: its pose, its shape, and the surface to cover in its own frame. Spheres and
+/// capsules have formulas.
 struct Part<'a, 'd> {
     node: Node<'a, 'd>,
     shape: LinkShape,
@@ -83,7 +88,8 @@ pub(super) enum Surface {
     Sphere(f64),
     /// Radius, and length of the straight part.
     Capsule(f64, f64),
-    /// The surface that is to be covered, a closed one around the same solid or more, and how far that is outside the shape that it stands for.
+    /// The surface to cover, a closed surface around at least the same solid, and how far that is
+    /// outside the shape it replaces.
     Mesh {
         given: TriMesh,
         solid: TriMesh,
@@ -91,10 +97,11 @@ pub(super) enum Surface {
     },
 }
 
-/// Reads a robot and covers its links by spheres; `progress` is told the share of links that are done.
+/// Reads a robot and covers its links by spheres. `progress` receives the fraction of links that
+/// are done.
 ///
 /// # Errors
-/// [`UrdfError`]: those of [`load`](super::load), and meshes that cannot be read.
+/// [`UrdfError`]: as [`load`](super::load), and meshes that cannot be read.
 pub fn spherize(
     path: impl AsRef<Path>,
     options: &SphereOptions,
@@ -102,17 +109,17 @@ pub fn spherize(
 ) -> Result<SphereRobot, UrdfError> {
     let path = path.as_ref();
     let text = text_of(path)?;
-    // all that is wrong with it is found by the one reader of robots
-    let robot = read_text(&text, path, &options.urdf, Wanted::Geometry)?;
+    // The common reader of robots reports all problems.
+    let robot = read_text(&text, path, &options.urdf, Content::Geometry)?;
     let log = Log::new(&text);
     let file = path.display().to_string();
     let wrong = |why: String| UrdfError::Body { file: path.to_path_buf(), why };
-    let document = xml::parse(&log, &text).ok_or_else(|| wrong("it is no XML".into()))?;
+    let document = xml::parse(&log, &text).ok_or_else(|| wrong("it is not XML".into()))?;
     let mut context = Context {
         folder: path.parent().unwrap_or(Path::new("")),
         file: &file,
         options: &options.urdf,
-        wanted: Wanted::Geometry,
+        content: Content::Geometry,
         colors: Default::default(),
         notes: NoteList::default(),
     };
@@ -132,7 +139,8 @@ pub fn spherize(
     Ok(SphereRobot { name: robot.name, text: edited(&text, edits), links, notes })
 }
 
-/// The collision elements of a link with their surfaces; those that the options leave out are left out.
+/// Returns the collision elements of a link with their surfaces, without those that the options
+/// leave out.
 fn parts<'a, 'd>(link: &Element<'a, 'd>, context: &mut Context<'_>) -> Result<Vec<Part<'a, 'd>>, String> {
     let mut parts = Vec::new();
     for element in link.children("collision") {
@@ -150,11 +158,11 @@ fn surface(geometry: &Geometry, context: &mut Context<'_>) -> Result<Surface, St
         Geometry::Shape(ShapeSpec::Capsule { radius_m, length_m }) => Ok(Surface::Capsule(*radius_m, *length_m)),
         Geometry::Shape(ShapeSpec::Box { size_m }) => Ok(closed(TriMesh::box_(0.5 * Vec3::from(*size_m)), 0.0)),
         Geometry::Shape(ShapeSpec::Cylinder { radius_m, length_m }) => {
-            // around the cylinder, so that what covers the prism covers it
+            // Circumscribed about the cylinder, so a covering of the prism covers the cylinder.
             let outer = radius_m / libm::cos(std::f64::consts::PI / SIDES as f64);
             Ok(closed(TriMesh::cylinder(outer, 0.5 * length_m, SIDES), outer - radius_m))
         }
-        Geometry::Shape(other) => Err(format!("{other:?} is no shape of a URDF")),
+        Geometry::Shape(other) => Err(format!("{other:?} is not a shape of a URDF")),
         Geometry::File { path, scale, hull, .. } => {
             let given = read_file(path)
                 .map(|mesh| stretched(mesh, *scale))
@@ -166,7 +174,7 @@ fn surface(geometry: &Geometry, context: &mut Context<'_>) -> Result<Surface, St
     }
 }
 
-/// A closed surface around what a mesh encloses, and what was done for that.
+/// Returns a closed surface around the solid of a mesh, and a note about how it was closed.
 fn solid_of(given: &TriMesh, hull: bool) -> Result<(TriMesh, Option<String>), MeshError> {
     let mut solid = given.clone();
     if hull {
@@ -184,7 +192,7 @@ fn solid_of(given: &TriMesh, hull: bool) -> Result<(TriMesh, Option<String>), Me
     }
 }
 
-/// The spheres in the link's frame, and the edits that write them.
+/// Returns the spheres in the link's frame and the edits of the text.
 fn written(
     name: String,
     parts: &[Part<'_, '_>],
@@ -219,7 +227,7 @@ fn placed(pose: &Pose, center: &Vec3, radius: f64, exact: bool) -> (Vec3, f64) {
     (center, if exact { radius } else { radius + ROUNDING * (radius + center.norm()) })
 }
 
-/// One element per sphere, set as the original was.
+/// Returns one element per sphere, formatted like the original.
 fn elements(node: &Node<'_, '_>, spheres: &[(Vec3, f64)], text: &str) -> String {
     let start = node.range().start;
     let indent = text[..start].rsplit('\n').next().unwrap_or("");
@@ -231,7 +239,7 @@ fn elements(node: &Node<'_, '_>, spheres: &[(Vec3, f64)], text: &str) -> String 
     let is_kept =
         |child: &Node<'_, '_>| child.is_element() && !child.has_tag_name("origin") && !child.has_tag_name("geometry");
     let kept: String = node.children().filter(is_kept).map(|child| of(child.range())).collect();
-    // comments stand once, before the spheres
+    // Comments are kept once, before the spheres.
     let comments: String =
         node.descendants().filter(Node::is_comment).map(|c| format!("{}{indent}", of(c.range()))).collect();
     let name = node.attribute_node("name").map(|a| of(a.range_value()));
@@ -243,7 +251,7 @@ fn elements(node: &Node<'_, '_>, spheres: &[(Vec3, f64)], text: &str) -> String 
     comments + &spheres.iter().enumerate().map(element).collect::<Vec<_>>().join(&indent)
 }
 
-/// The text with the ranges, which are in order and apart, replaced.
+/// Returns the text with the ranges, which are disjoint and in order, replaced.
 fn edited(text: &str, edits: Vec<(Range<usize>, String)>) -> String {
     let mut out = String::with_capacity(text.len());
     let mut last = 0;

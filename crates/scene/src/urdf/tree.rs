@@ -1,10 +1,11 @@
-//! From the links and joints of a URDF to a tree of links, a parent before its children, children in the order of their joints in the file.
+//! Builds the tree of links of a URDF: a parent before its children, children in the order of their
+//! joints in the file.
 
 use tumble_core::Joint;
 use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{Pose, Vec3};
 
-use super::Wanted;
+use super::Content;
 use super::joint::{JointElement, Kind};
 use super::link::{Context, LinkElement};
 use crate::joint::{JointSpec, MimicSpec};
@@ -12,8 +13,8 @@ use crate::link::{LinkMassSpec, LinkSpec};
 use crate::log::Log;
 use crate::notes::NoteList;
 
-/// The root of the tree: the one link that no joint moves. `None`, with the problem recorded, where there is not exactly one, a link has two
-/// parents, or joints form a loop.
+/// Returns the root of the tree: the one link that no joint moves. `None`, with the problem
+/// recorded, if there is not exactly one root, a link has two parents, or joints form a loop.
 pub(crate) fn find_root(log: &Log<'_>, links: &[LinkElement], joints: &[JointElement]) -> Option<usize> {
     let problems = log.count();
     let mut moved_by: Vec<Option<usize>> = vec![None; links.len()];
@@ -21,25 +22,24 @@ pub(crate) fn find_root(log: &Log<'_>, links: &[LinkElement], joints: &[JointEle
         if let Some(earlier) = moved_by[joint.child].replace(number) {
             let (name, line) = (&links[joint.child].name, log.line(joints[earlier].span.start));
             let message = format!(
-                "joint \"{}\" has the child \"{name}\", which joint \"{}\" at line {line} has too",
+                "joint \"{}\" has the child \"{name}\", which is also the child of joint \"{}\" at line {line}",
                 joint.name, joints[earlier].name
             );
             log.report(
                 joint.span.clone(),
                 message,
-                "wanted one joint for each link; loops are closed by closures of a scene",
+                "expected one joint for each link; a scene closes loops by [[loop_joint]]",
             );
         }
     }
     let roots: Vec<usize> = (0..links.len()).filter(|&k| moved_by[k].is_none()).collect();
     if let [root, second, ..] = roots[..] {
-        let message = format!(
-            "link \"{}\" is the child of no joint, and neither is \"{}\"",
-            links[second].name, links[root].name
-        );
-        log.report(links[second].span.clone(), message, "wanted one root that all others hang on");
+        let message =
+            format!("links \"{}\" and \"{}\" are not children of any joint", links[second].name, links[root].name);
+        log.report(links[second].span.clone(), message, "expected one root link");
     }
-    // follows parents as often as there are links: who is not at a root then goes round in a circle
+    // Follows parents as often as there are links. A link that does not reach a root by then is in
+    // a loop.
     for start in 0..links.len() {
         let mut at = start;
         for _ in 0..links.len() {
@@ -51,7 +51,7 @@ pub(crate) fn find_root(log: &Log<'_>, links: &[LinkElement], joints: &[JointEle
             log.report(
                 joint.span.clone(),
                 format!("joint \"{}\" is part of a loop of joints", joint.name),
-                "wanted a tree with one root",
+                "expected a tree with one root",
             );
             break;
         }
@@ -59,7 +59,7 @@ pub(crate) fn find_root(log: &Log<'_>, links: &[LinkElement], joints: &[JointEle
     (log.count() == problems).then(|| roots.first().copied())?
 }
 
-/// Builds the list of links from the root. Its order is depth first.
+/// Builds the list of links from the root, depth first.
 pub(crate) struct TreeBuilder<'t> {
     pub(crate) log: &'t Log<'t>,
     pub(crate) elements: Vec<LinkElement>,
@@ -74,7 +74,7 @@ impl<'t> TreeBuilder<'t> {
         TreeBuilder { log, elements, joints, links: Vec::new(), spans: Vec::new() }
     }
 
-    /// All links, with mimics resolved and masses, where they are wanted, checked.
+    /// Returns all links with couplings resolved and masses checked if they are wanted.
     pub(crate) fn build(mut self, root: usize, context: &mut Context<'_>) -> Vec<LinkSpec> {
         let mut children: Vec<Vec<usize>> = vec![Vec::new(); self.elements.len()];
         for (number, joint) in self.joints.iter().enumerate() {
@@ -90,13 +90,14 @@ impl<'t> TreeBuilder<'t> {
             waiting.extend(children[self.joints[number].child].iter().rev().map(|&joint| (joint, placed)));
         }
         self.resolve_mimics(&mut context.notes);
-        if context.wanted != Wanted::Geometry {
+        if context.content != Content::Geometry {
             self.check_masses();
         }
         self.links
     }
 
-    /// Adds the child of a joint; a joint of several freedoms becomes a stack of massless links.
+    /// Adds the child of a joint. A joint of several degrees of freedom becomes a chain of massless
+    /// links.
     fn add(&mut self, joint: &JointElement, parent: usize) -> usize {
         let span = joint.span.clone();
         match joint.kind {
@@ -109,7 +110,7 @@ impl<'t> TreeBuilder<'t> {
         }
     }
 
-    /// Two slides in the plane, then a turn about its normal.
+    /// Adds two prismatic joints in the plane, then a revolute joint about its normal.
     fn add_planar(&mut self, joint: &JointElement, parent: usize) -> usize {
         let normal = joint.axis;
         let first = normal.cross(&Vec3::ith(normal.iamin(), 1.0)).normalize();
@@ -120,7 +121,8 @@ impl<'t> TreeBuilder<'t> {
         self.hang(joint.child, Some(y), Pose::identity(), turn, joint.span.clone())
     }
 
-    /// A root of its own where its parent stands still; else three slides and a ball joint.
+    /// Adds a floating root if the parent is fixed to the base; else three prismatic joints and a
+    /// spherical joint.
     fn add_floating(&mut self, joint: &JointElement, parent: usize) -> usize {
         if let Some(pose) = self.pose_in_base(parent) {
             return self.hang(
@@ -138,7 +140,7 @@ impl<'t> TreeBuilder<'t> {
         self.hang(joint.child, Some(z), Pose::identity(), turn, joint.span.clone())
     }
 
-    /// The pose of a link in the base, if it is fixed to it.
+    /// Returns the pose of a link in the base, if it is fixed to the base.
     fn pose_in_base(&self, link: usize) -> Option<Pose> {
         let (mut at, mut pose) = (Some(link), Pose::identity());
         while let Some(link) = at.map(|k| &self.links[k]) {
@@ -190,7 +192,8 @@ impl<'t> TreeBuilder<'t> {
         self.links.len() - 1
     }
 
-    /// Couplings. A fixed joint that mimics, as in robots reduced to some of their joints, follows nothing; nor can one follow it: both are told.
+    /// Resolves couplings. A fixed joint with `<mimic>`, as in robots reduced to some of their
+    /// joints, follows nothing, and no joint can follow it. Both make a note.
     fn resolve_mimics(&mut self, notes: &mut NoteList) {
         for joint in self.joints {
             let Some(mimic) = &joint.mimic else { continue };
@@ -200,7 +203,7 @@ impl<'t> TreeBuilder<'t> {
             match (find(&joint.name), find(&mimic.joint)) {
                 _ if !known => {
                     let message = format!("joint \"{}\" mimics \"{}\"", joint.name, mimic.joint);
-                    self.log.report(mimic.span.clone(), message, "wanted the name of another joint");
+                    self.log.report(mimic.span.clone(), message, "expected the name of another joint");
                 }
                 (Some(follower), Some(link)) => {
                     self.links[follower].joint.mimic =
@@ -210,24 +213,24 @@ impl<'t> TreeBuilder<'t> {
                     let line = self.log.line(mimic.span.start);
                     notes.add(
                         format!("line {line}: joint \"{}\"", joint.name),
-                        "follows no other, as it or the other is fixed",
+                        "does not follow the other, since one of the two is fixed",
                     );
                 }
             }
         }
     }
 
-    /// Something of mass must hang on every joint.
+    /// Checks that every joint moves some mass.
     fn check_masses(&self) {
         let mut heavy: Vec<bool> = self.links.iter().map(LinkSpec::has_mass).collect();
         for k in (0..self.links.len()).rev() {
             let link = &self.links[k];
             if !heavy[k] && link.joint.kind != Joint::Fixed {
                 let message = format!(
-                    "\"{}\" moves link \"{}\", and neither that nor what hangs on it has a mass",
+                    "\"{}\" moves link \"{}\", and neither that link nor its descendants have a mass",
                     link.joint.name, link.name
                 );
-                self.log.report(self.spans[k].clone(), message, "wanted <inertial> in one of them, or a fixed joint");
+                self.log.report(self.spans[k].clone(), message, "expected <inertial> in one of them, or a fixed joint");
             }
             if let Some(parent) = link.parent {
                 heavy[parent] |= heavy[k];

@@ -1,4 +1,5 @@
-//! Elements and attributes of an XML file, read with all problems recorded, as [`Fields`](crate::fields::Fields) does for TOML.
+//! Elements and attributes of an XML file. All problems are recorded, as in
+//! [`Fields`](crate::fields::Fields) for TOML.
 
 use std::ops::Range;
 
@@ -7,35 +8,35 @@ use roxmltree::{Document, Node, ParsingOptions};
 use crate::bound::Bound;
 use crate::log::Log;
 
-/// Most nodes of a file.
-const MOST_NODES: u32 = 2_000_000;
-/// The largest magnitude of a number; limits beyond it are none.
-pub(crate) const LARGEST: f64 = 1e12;
+/// Largest number of nodes of a file.
+const MAX_NODES: u32 = 2_000_000;
+/// Largest magnitude of a number. Limits beyond it count as no limit.
+pub(crate) const MAX_MAGNITUDE: f64 = 1e12;
 
-/// An element while it is read.
+/// An element that is being read.
 #[derive(Clone, Copy)]
 pub(crate) struct Element<'a, 'd> {
     pub(crate) log: &'d Log<'d>,
     node: Node<'a, 'd>,
 }
 
-/// The tree of an XML text; `None`, with the problem recorded, if it is none.
+/// Parses an XML text. Returns `None`, with the problem recorded, if it is not XML.
 pub(crate) fn parse<'d>(log: &Log<'_>, text: &'d str) -> Option<Document<'d>> {
-    let options = ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() };
+    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
     Document::parse_with_options(text, options)
         .map_err(|error| {
             let place = error.pos();
             let at = byte_of(text, place.row as usize, place.col as usize);
             let end = matches!(error, roxmltree::Error::UnclosedRootNode | roxmltree::Error::UnexpectedEndOfStream);
-            let told = error.to_string();
-            let words = told.strip_suffix(&format!(" at {place}")).unwrap_or(&told);
+            let message = error.to_string();
+            let words = message.strip_suffix(&format!(" at {place}")).unwrap_or(&message);
             let at = if end { text.len() } else { at };
-            log.report(at..at, format!("XML: {words}"), "wanted a URDF: an XML document with one element <robot>");
+            log.report(at..at, format!("XML: {words}"), "expected a URDF: an XML document with one element <robot>");
         })
         .ok()
 }
 
-/// The byte at a line and a column, both from 1, columns in characters.
+/// Returns the byte at a line and a column, both from 1, columns in characters.
 fn byte_of(text: &str, line: usize, column: usize) -> usize {
     let start: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
     let rest = text.get(start..).unwrap_or("");
@@ -47,23 +48,23 @@ impl<'a, 'd> Element<'a, 'd> {
         Element { log, node }
     }
 
-    /// As the parser has it.
+    /// Returns the parser's node.
     pub(crate) fn node(&self) -> Node<'a, 'd> {
         self.node
     }
 
-    /// Its tag.
+    /// Returns its tag.
     pub(crate) fn tag(&self) -> &'a str {
         self.node.tag_name().name()
     }
 
-    /// The place of `<tag`.
+    /// Returns the place of `<tag`.
     pub(crate) fn span(&self) -> Range<usize> {
         let start = self.node.range().start;
         start..start + 1 + self.tag().len()
     }
 
-    /// The element as messages name it: `link "base"`, `the origin of joint "j"`.
+    /// Returns the element's name in messages: `link "base"`, `the origin of joint "j"`.
     pub(crate) fn what(&self) -> String {
         if let Some(name) = self.node.attribute("name") {
             return format!("{} \"{}\"", self.tag(), shortened(name));
@@ -75,75 +76,76 @@ impl<'a, 'd> Element<'a, 'd> {
     }
 
     /// Records a problem with the element.
-    pub(crate) fn problem(&self, message: impl std::fmt::Display, wanted: impl Into<String>) {
-        self.log.report(self.span(), format!("{} {message}", self.what()), wanted);
+    pub(crate) fn problem(&self, message: impl std::fmt::Display, expected: impl Into<String>) {
+        self.log.report(self.span(), format!("{} {message}", self.what()), expected);
     }
 
     /// Records that the value of an attribute is wrong.
-    pub(crate) fn wrong(&self, name: &str, wanted: impl std::fmt::Display) {
+    pub(crate) fn wrong(&self, name: &str, expected: impl std::fmt::Display) {
         let span = self.node.attribute_node(name).map_or(self.span(), |a| a.range_value());
         let message = format!("`{name}` of {} is \"{}\"", self.what(), self.log.quote(span.clone()));
-        self.log.report(span, message, format!("wanted {wanted}"));
+        self.log.report(span, message, format!("expected {expected}"));
     }
 
-    /// Children of that tag, in the order of the file.
+    /// Returns the children with that tag, in the order of the file.
     pub(crate) fn children(&self, tag: &'static str) -> impl Iterator<Item = Element<'a, 'd>> + use<'a, 'd> {
         let log = self.log;
         self.node.children().filter(move |n| n.has_tag_name(tag)).map(move |node| Element { log, node })
     }
 
-    /// The first child of that tag.
+    /// Returns the first child with that tag.
     pub(crate) fn child(&self, tag: &'static str) -> Option<Element<'a, 'd>> {
         self.children(tag).next()
     }
 
-    /// The only child of that tag; its absence is a problem.
-    pub(crate) fn required(&self, tag: &'static str, wanted: &str) -> Option<Element<'a, 'd>> {
+    /// Returns the only child with that tag. Its absence is a problem.
+    pub(crate) fn required(&self, tag: &'static str, expected: &str) -> Option<Element<'a, 'd>> {
         let child = self.child(tag);
         if child.is_none() {
-            self.problem(format_args!("has no <{tag}>"), format!("wanted {wanted}"));
+            self.problem(format_args!("has no <{tag}>"), format!("expected {expected}"));
         }
         child
     }
 
-    /// The first child that is an element.
+    /// Returns the first child element.
     pub(crate) fn first(&self) -> Option<Element<'a, 'd>> {
         self.node.children().find(Node::is_element).map(|node| Element { log: self.log, node })
     }
 
-    /// An attribute, if it is there.
+    /// Returns an attribute, if present.
     pub(crate) fn text(&self, name: &str) -> Option<&'a str> {
         self.node.attribute(name)
     }
 
-    /// An attribute; its absence is a problem.
-    pub(crate) fn required_text(&self, name: &str, wanted: &str) -> Option<&'a str> {
+    /// Returns an attribute. Its absence is a problem.
+    pub(crate) fn required_text(&self, name: &str, expected: &str) -> Option<&'a str> {
         let text = self.text(name);
         if text.is_none() {
-            self.problem(format_args!("has no `{name}`"), format!("wanted {wanted}"));
+            self.problem(format_args!("has no `{name}`"), format!("expected {expected}"));
         }
         text
     }
 
-    /// A number in `bound`, if it is there and right.
+    /// Returns a number in `bound`, if present and valid.
     pub(crate) fn number(&self, name: &str, bound: Bound) -> Option<f64> {
         let number = self.text(name)?.trim().parse().ok().filter(|x| bound.holds(*x));
         if number.is_none() {
-            self.wrong(name, bound.wanted());
+            self.wrong(name, bound.expected());
         }
         number
     }
 
-    /// A number in `bound`; its absence is a problem. Not finite where it is wrong.
+    /// Returns a number in `bound`. Its absence is a problem. The result is not finite if it is
+    /// wrong.
     pub(crate) fn required_number(&self, name: &str, bound: Bound) -> f64 {
-        self.required_text(name, bound.wanted()).and_then(|_| self.number(name, bound)).unwrap_or(f64::NAN)
+        self.required_text(name, bound.expected()).and_then(|_| self.number(name, bound)).unwrap_or(f64::NAN)
     }
 
-    /// A bound of a limit: a number, infinite where it is beyond 1e12.
+    /// Returns one end of a limit: a number, or infinity if its magnitude is beyond 1e12.
     pub(crate) fn open_number(&self, name: &str) -> Option<f64> {
         let number = self.text(name)?.trim().parse().ok().filter(|x: &f64| !x.is_nan());
         match number {
-            Some(x) if x.abs() > LARGEST => Some(f64::INFINITY.copysign(x)),
+            Some(x) if x.abs() > MAX_MAGNITUDE => Some(f64::INFINITY.copysign(x)),
             Some(x) => Some(x),
             None => {
                 self.wrong(name, "a number");
@@ -152,12 +154,12 @@ impl<'a, 'd> Element<'a, 'd> {
         }
     }
 
-    /// `N` numbers between blanks, if they are there.
+    /// Returns `N` numbers separated by white space, if present.
     pub(crate) fn numbers<const N: usize>(&self, name: &str, bound: Bound) -> Option<[f64; N]> {
         let numbers: Option<Vec<f64>> = self.text(name)?.split_whitespace().map(|word| word.parse().ok()).collect();
         let array = numbers.and_then(|numbers| <[f64; N]>::try_from(numbers).ok());
         if !array.is_some_and(|a| a.iter().all(|x| bound.holds(*x))) {
-            self.wrong(name, format_args!("{N} numbers with blanks between; each {}", bound.wanted()));
+            self.wrong(name, format_args!("{N} numbers separated by spaces; each {}", bound.expected()));
             return Some([f64::NAN; N]);
         }
         array

@@ -1,4 +1,4 @@
-//! Articulated bodies and closures of scenes as worlds.
+//! Articulated bodies and loop joints of scenes as worlds.
 
 use tumble_core::articulated::{ArticulatedBody, Drive};
 use tumble_core::collide::Vec3;
@@ -95,14 +95,14 @@ fn a_pendulum_of_a_scene_swings_with_the_period_of_the_formula() {
 }
 
 #[test]
-fn closures_of_every_kind_join_links_bodies_and_the_world() {
+fn loop_joints_of_every_kind_join_links_bodies_and_the_world() {
     let links = "[world]\ngravity_m_per_s2 = [0, 0, 0]\n[[articulated]]\nname = \"o\"\n[[articulated.link]]\nname = \"l\"\njoint = \"spherical\"\nmass_kg = 1\ninertia_kg_m2 = [1, 1, 1]\n\
                  [[articulated.link]]\nname = \"m\"\nparent = \"l\"\nposition_m = [1, 0, 0]\njoint = \"fixed\"\n\
                  [[body]]\nname = \"b\"\nshape = { type = \"sphere\", radius_m = 0.1 }\nmass_kg = 1\nposition_m = [2, 0, 0]\nvelocity_m_per_s = [0, 0.1, 0]\n";
-    for (kind, rows) in [("point", 3), ("hinge", 5), ("weld", 6), ("slider", 5)] {
+    for (kind, rows) in [("spherical", 3), ("revolute", 5), ("fixed", 6), ("prismatic", 5)] {
         let axis = if rows == 5 { "axis = [1, 0, 0]" } else { "" };
         let text = format!(
-            "{links}[[closure]]\nname = \"c\"\ntype = \"{kind}\"\na = \"o/m\"\nb = \"b\"\nposition_m = [1.5, 0, 0]\n{axis}\n[[closure]]\nname = \"w\"\ntype = \"point\"\na = \"b\"\nposition_m = [2, 0, 1]\n"
+            "{links}[[loop_joint]]\nname = \"c\"\ntype = \"{kind}\"\na = \"o/m\"\nb = \"b\"\nposition_m = [1.5, 0, 0]\n{axis}\n[[loop_joint]]\nname = \"w\"\ntype = \"spherical\"\na = \"b\"\nposition_m = [2, 0, 1]\n"
         );
         let (mut world, _) = world(&text);
         for _ in 0..240 {
@@ -123,7 +123,7 @@ fn a_urdf_in_a_scene_takes_its_start_and_drives_from_the_scene() {
     let robot = "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial></link>\
                  <joint name=\"shoulder\" type=\"revolute\"><parent link=\"a\"/><child link=\"b\"/><limit lower=\"-1\" upper=\"1\" effort=\"7\" velocity=\"1\"/></joint></robot>";
     std::fs::write(folder.join("robot.urdf"), robot).unwrap();
-    let keys = "start = { shoulder = 0.5 }\n[[articulated.joint]]\nname = \"shoulder\"\ndrive = { type = \"position\", stiffness_n_m_per_rad = 20 }\n";
+    let keys = "initial_positions = { shoulder = 0.5 }\n[[articulated.joint]]\nname = \"shoulder\"\ndrive = { type = \"position\", stiffness_n_m_per_rad = 20 }\n";
     let text =
         |keys: &str| format!("[[articulated]]\nname = \"arm\"\nurdf = \"robot.urdf\"\nposition_m = [0, 0, 3]\n{keys}");
     let name = folder.join("scene.toml").display().to_string();
@@ -139,19 +139,19 @@ fn a_urdf_in_a_scene_takes_its_start_and_drives_from_the_scene() {
 
     let lines = |keys: &str| SceneFile::parse(&text(keys), &name).unwrap_err().to_string().replace(&name, "s");
     assert_eq!(
-        lines("start = { sholder = 1 }\n"),
-        "s:5:11: articulated \"arm\" has no joint \"sholder\" with one position; did you mean `shoulder`?"
+        lines("initial_positions = { sholder = 1 }\n"),
+        "s:5:23: articulated \"arm\" has no joint \"sholder\" with one degree of freedom; did you mean `shoulder`?"
     );
     assert_eq!(
         lines("[[articulated.joint]]\nname = \"elbow\"\n"),
-        "s:6:8: `name` of joint 1 is \"elbow\"; wanted `shoulder`"
+        "s:6:8: `name` of joint 1 is \"elbow\"; expected `shoulder`"
     );
     std::fs::write(folder.join("robot.urdf"), robot.replace("value=\"1\"", "value=\"-1\"")).unwrap();
-    let told = lines("");
-    assert!(told.starts_with("s:3:8: `urdf` of articulated \"arm\": ") && told.contains("robot.urdf:1:"), "{told}");
+    let error = lines("");
+    assert!(error.starts_with("s:3:8: `urdf` of articulated \"arm\": ") && error.contains("robot.urdf:1:"), "{error}");
     assert!(
-        told.contains("`value` of the mass of the inertial of link \"b\" is \"-1\"; wanted a number of at least 0"),
-        "{told}"
+        error.contains("`value` of the mass of the inertial of link \"b\" is \"-1\"; expected a number of at least 0"),
+        "{error}"
     );
     std::fs::remove_dir_all(&folder).unwrap();
 }

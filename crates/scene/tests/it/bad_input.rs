@@ -1,16 +1,16 @@
-//! One golden per kind of bad input: the whole of what is told, with file, line and column.
+//! One golden per kind of bad input: the whole of what is assert_errors, with file, line and column.
 
 use tumble_scene::SceneFile;
 
-/// Reads `text` as `s.toml` and compares all that is told with `expected`, one line per problem.
-pub fn told(text: &str, expected: &[&str]) {
+/// Reads `text` as `s.toml` and compares all reported problems with `expected`, one line per problem.
+pub fn assert_errors(text: &str, expected: &[&str]) {
     let error = SceneFile::parse(text, "s.toml").expect_err("the scene is wrong");
     let lines: Vec<String> = error.to_string().lines().map(str::to_owned).collect();
     assert_eq!(lines, expected, "for:\n{text}");
     let report = error.report(false);
     assert!(!report.contains('\u{1b}'), "no colour unless asked");
     for problem in error.problems() {
-        assert!(report.contains(&problem.message) && report.contains(&problem.wanted), "{report}");
+        assert!(report.contains(&problem.message) && report.contains(&problem.expected), "{report}");
         assert!(report.contains(&format!("s.toml:{}:{}", problem.line, problem.column)), "{report}");
     }
 }
@@ -34,105 +34,143 @@ fn the_frames_used_here_are_right() {
 
 #[test]
 fn toml_that_is_not() {
-    told(
+    assert_errors(
         "[world]\ndt_s = = 1\n",
         &[
-            "s.toml:2:8: TOML: extra `=`; wanted nothing here",
-            "s.toml:2:10: TOML: unexpected key or value; wanted newline, `#`",
+            "s.toml:2:8: TOML: extra `=`; expected nothing here",
+            "s.toml:2:10: TOML: unexpected key or value; expected newline, `#`",
         ],
     );
-    told(
-        "[world]\nseconds = 1\nseconds = 2\n",
-        &["s.toml:3:1: TOML: duplicate key; wanted each key once in its table"],
+    assert_errors(
+        "[world]\nduration_s = 1\nduration_s = 2\n",
+        &["s.toml:3:1: TOML: duplicate key; expected each key once in its table"],
     );
-    told("[materials.a]\n[materials.a]\n", &["s.toml:2:12: TOML: duplicate key; wanted each key once in its table"]);
+    assert_errors(
+        "[materials.a]\n[materials.a]\n",
+        &["s.toml:2:12: TOML: duplicate key; expected each key once in its table"],
+    );
+}
+
+#[test]
+fn old_names_are_reported_with_the_new_ones() {
+    assert_errors(
+        "[world]\nseconds = 1\n",
+        &["s.toml:2:1: unknown key `seconds` in [world]; this is now `duration_s`"],
+    );
+    assert_errors(
+        "[[closure]]\nname = \"c\"\n",
+        &["s.toml:1:3: unknown key `closure` in the scene; this is now `loop_joint`"],
+    );
+    assert_errors(
+        "[[loop_joint]]\nname = \"c\"\ntype = \"weld\"\n",
+        &["s.toml:3:8: `type` of loop_joint \"c\" is \"weld\"; this is now `fixed`"],
+    );
+    // An old name where the new one has no meaning is as any other word.
+    assert_errors(
+        "[sky]\nseconds = 1\n",
+        &[
+            "s.toml:2:1: unknown key `seconds` in [sky]; known keys: `horizon_color`, `intensity`, `nadir_color` and `zenith_color`",
+        ],
+    );
 }
 
 #[test]
 fn unknown_keys() {
-    told("[wrold]\n", &["s.toml:1:2: unknown key `wrold` in the scene; did you mean `world`?"]);
-    told("[world]\ndt = 0.1\n", &["s.toml:2:1: unknown key `dt` in [world]; did you mean `dt_s`?"]);
-    told(&body_with("frction = 0.1"), &["s.toml:5:1: unknown key `frction` in body \"b\"; did you mean `friction`?"]);
-    told(
-        &shape("{ type = \"sphere\", radius_m = 1, colour = 3 }"),
-        &["s.toml:2:42: unknown key `colour` in the shape of body \"b\"; known here are only `radius_m` and `type`"],
+    assert_errors("[wrold]\n", &["s.toml:1:2: unknown key `wrold` in the scene; did you mean `world`?"]);
+    assert_errors("[world]\ndt = 0.1\n", &["s.toml:2:1: unknown key `dt` in [world]; did you mean `dt_s`?"]);
+    assert_errors(
+        &body_with("frction = 0.1"),
+        &["s.toml:5:1: unknown key `frction` in body \"b\"; did you mean `friction`?"],
     );
-    told(
+    assert_errors(
+        &shape("{ type = \"sphere\", radius_m = 1, colour = 3 }"),
+        &["s.toml:2:42: unknown key `colour` in the shape of body \"b\"; the only keys are `radius_m` and `type`"],
+    );
+    assert_errors(
         "[sky]\nbanana = 1\nintensity = 1\n",
-        &["s.toml:2:1: unknown key `banana` in [sky]; known here: `horizon_color`, `nadir_color` and `zenith_color`"],
+        &["s.toml:2:1: unknown key `banana` in [sky]; known keys: `horizon_color`, `nadir_color` and `zenith_color`"],
     );
 }
 
 #[test]
 fn wrong_types() {
-    told("description = 3\n", &["s.toml:1:15: `description` of the scene is an integer: 3; wanted a text in quotes"]);
-    told(
-        "[world]\nseconds = \"ten\"\n",
-        &["s.toml:2:11: `seconds` of [world] is a string: \"ten\"; wanted a time from 0 to 1e6 s"],
+    assert_errors(
+        "description = 3\n",
+        &["s.toml:1:15: `description` of the scene is an integer: 3; expected a string in quotes"],
     );
-    told(
+    assert_errors(
+        "[world]\nduration_s = \"ten\"\n",
+        &["s.toml:2:14: `duration_s` of [world] is a string: \"ten\"; expected a time from 0 to 1e6 s"],
+    );
+    assert_errors(
         "[world]\nsubsteps = 1.5\n",
-        &["s.toml:2:12: `substeps` of [world] is a float: 1.5; wanted a whole number from 1 to 1000"],
+        &["s.toml:2:12: `substeps` of [world] is a float: 1.5; expected an integer from 1 to 1000"],
     );
-    told(
+    assert_errors(
         "[world]\ngravity_m_per_s2 = -9.81\n",
-        &["s.toml:2:20: `gravity_m_per_s2` of [world] is a float: -9.81; wanted a list of 3 numbers"],
+        &["s.toml:2:20: `gravity_m_per_s2` of [world] is a float: -9.81; expected a list of 3 numbers"],
     );
-    told(
+    assert_errors(
         "[world]\ngravity_m_per_s2 = [0, -9.81]\n",
-        &["s.toml:2:20: `gravity_m_per_s2` of [world] has 2 entries: [0, -9.81]; wanted a list of 3 numbers"],
+        &["s.toml:2:20: `gravity_m_per_s2` of [world] has 2 entries: [0, -9.81]; expected a list of 3 numbers"],
     );
-    told(&body_with("collides = 1"), &["s.toml:5:12: `collides` of body \"b\" is an integer: 1; wanted true or false"]);
-    told("world = 1\n", &["s.toml:1:9: [world] is an integer 1; wanted a table, such as [world]"]);
-    told(
+    assert_errors(
+        &body_with("collides = 1"),
+        &["s.toml:5:12: `collides` of body \"b\" is an integer: 1; expected true or false"],
+    );
+    assert_errors("world = 1\n", &["s.toml:1:9: [world] is an integer 1; expected a table, such as [world]"]);
+    assert_errors(
         "[body]\n",
-        &["s.toml:1:1: `body` of the scene is a table: [body]; wanted tables, each under a line [[body]]"],
+        &["s.toml:1:1: `body` of the scene is a table: [body]; expected tables, each under a line [[body]]"],
     );
-    told(
+    assert_errors(
         "materials = { a = 2 }\n",
-        &["s.toml:1:19: [materials.a] is an integer 2; wanted a table, such as [materials.NAME]"],
+        &["s.toml:1:19: [materials.a] is an integer 2; expected a table, such as [materials.NAME]"],
     );
-    told(
+    assert_errors(
         &shape("\"sphere\""),
         &[
-            "s.toml:2:9: the shape of body \"b\" is a string \"sphere\"; wanted a table, such as { type = \"sphere\", radius_m = 0.5 }",
+            "s.toml:2:9: the shape of body \"b\" is a string \"sphere\"; expected a table, such as { type = \"sphere\", radius_m = 0.5 }",
         ],
     );
 }
 
 #[test]
 fn missing_keys() {
-    told(
+    assert_errors(
         "[[body]]\nname = \"b\"\nmass_kg = 1\n",
-        &["s.toml:1:1: body \"b\" has no `shape`; wanted a shape, such as { type = \"sphere\", radius_m = 0.5 }"],
+        &["s.toml:1:1: body \"b\" has no `shape`; expected a shape, such as { type = \"sphere\", radius_m = 0.5 }"],
     );
-    told(
+    assert_errors(
         "[[body]]\nname = \"b\"\nshape = { type = \"sphere\", radius_m = 1 }\n",
         &[
-            "s.toml:1:1: body \"b\" has no `mass_kg`; wanted `mass_kg` or `density_kg_per_m3`, or mode = \"static\" for what never moves",
+            "s.toml:1:1: body \"b\" has no `mass_kg`; expected `mass_kg` or `density_kg_per_m3`, or mode = \"static\" for a body that never moves",
         ],
     );
-    told(
+    assert_errors(
         "[[body]]\nmass_kg = 1\nshape = { type = \"sphere\", radius_m = 1 }\n",
-        &["s.toml:1:1: body 1 has no `name`; wanted a name of its own"],
+        &["s.toml:1:1: body 1 has no `name`; expected a unique name"],
     );
-    told(
+    assert_errors(
         &shape("{ radius_m = 1 }"),
         &[
-            "s.toml:2:9: the shape of body \"b\" has no `type`; wanted `sphere`, `box`, `capsule`, `cylinder`, `half_space` or `mesh`",
+            "s.toml:2:9: the shape of body \"b\" has no `type`; expected `sphere`, `box`, `capsule`, `cylinder`, `half_space` or `mesh`",
         ],
     );
-    told("[camera]\neye_m = [1, 1, 1]\n", &["s.toml:1:1: [camera] has no `target_m`; wanted a list of 3 numbers"]);
-    told(
-        "[[light]]\ntype = \"directional\"\n",
-        &["s.toml:1:1: light 1 has no `direction`; wanted a direction, such as [0, 0, -1]"],
+    assert_errors(
+        "[camera]\neye_m = [1, 1, 1]\n",
+        &["s.toml:1:1: [camera] has no `target_m`; expected a list of 3 numbers"],
     );
-    // A required key that is only mistyped is told once, where it stands.
-    told(
+    assert_errors(
+        "[[light]]\ntype = \"directional\"\n",
+        &["s.toml:1:1: light 1 has no `direction`; expected a direction, such as [0, 0, -1]"],
+    );
+    // A required key that is only mistyped is reported once, at its place.
+    assert_errors(
         &shape("{ type = \"sphere\", raduis_m = 1 }"),
         &["s.toml:2:28: unknown key `raduis_m` in the shape of body \"b\"; did you mean `radius_m`?"],
     );
-    told(
+    assert_errors(
         &shape("{ tpye = \"sphere\", radius_m = 1 }"),
         &["s.toml:2:11: unknown key `tpye` in the shape of body \"b\"; did you mean `type`?"],
     );
@@ -140,76 +178,81 @@ fn missing_keys() {
 
 #[test]
 fn numbers_that_are_not_finite() {
-    told("[world]\nseconds = nan\n", &["s.toml:2:11: `seconds` of [world] is nan; wanted a time from 0 to 1e6 s"]);
-    told(
-        &body_with("position_m = [0, inf, 0]"),
-        &["s.toml:5:18: `position_m` of body \"b\" is inf; wanted a finite number from -1e12 to 1e12"],
+    assert_errors(
+        "[world]\nduration_s = nan\n",
+        &["s.toml:2:14: `duration_s` of [world] is nan; expected a time from 0 to 1e6 s"],
     );
-    told(
+    assert_errors(
+        &body_with("position_m = [0, inf, 0]"),
+        &["s.toml:5:18: `position_m` of body \"b\" is inf; expected a finite number from -1e12 to 1e12"],
+    );
+    assert_errors(
         &body_with("position_m = [0, 0, -1e400]"),
-        &["s.toml:5:21: `position_m` of body \"b\" is -1e400; wanted a finite number from -1e12 to 1e12"],
+        &["s.toml:5:21: `position_m` of body \"b\" is -1e400; expected a finite number from -1e12 to 1e12"],
     );
 }
 
 #[test]
 fn numbers_out_of_range() {
-    let positive = "wanted a number greater than 0 (from 1e-9 to 1e12)";
+    let positive = "expected a number greater than 0 (from 1e-9 to 1e12)";
     for (mass, name) in [("0", "0"), ("-2.5", "-2.5"), ("1e-320", "1e-320")] {
         let text = body_with("").replace("mass_kg = 1", &format!("mass_kg = {mass}"));
-        told(&text, &[&format!("s.toml:4:11: `mass_kg` of body \"b\" is {name}; {positive}")]);
+        assert_errors(&text, &[&format!("s.toml:4:11: `mass_kg` of body \"b\" is {name}; {positive}")]);
     }
-    told(
+    assert_errors(
         &body_with("friction = -0.1"),
-        &["s.toml:5:12: `friction` of body \"b\" is -0.1; wanted a friction coefficient from 0 to 100"],
+        &["s.toml:5:12: `friction` of body \"b\" is -0.1; expected a friction coefficient from 0 to 100"],
     );
-    told(
+    assert_errors(
         "[materials.m]\nrestitution = 1.2\n",
-        &["s.toml:2:15: `restitution` of [materials.m] is 1.2; wanted a restitution from 0 (no bounce) to 1 (no loss)"],
+        &[
+            "s.toml:2:15: `restitution` of [materials.m] is 1.2; expected a restitution from 0 (no bounce) to 1 (no loss)",
+        ],
     );
-    told(
+    assert_errors(
         &shape("{ type = \"sphere\", radius_m = 0 }"),
         &[&format!("s.toml:2:39: `radius_m` of the shape of body \"b\" is 0; {positive}")],
     );
-    told(
+    assert_errors(
         &shape("{ type = \"box\", size_m = [1, -2, 3] }"),
         &[&format!("s.toml:2:38: `size_m` of the shape of body \"b\" is -2; {positive}")],
     );
-    told("[world]\ndt_s = 0\n", &["s.toml:2:8: `dt_s` of [world] is 0; wanted a time from 1e-6 to 1 s"]);
-    told(
+    assert_errors("[world]\ndt_s = 0\n", &["s.toml:2:8: `dt_s` of [world] is 0; expected a time from 1e-6 to 1 s"]);
+    assert_errors(
         "[world]\niterations = -4\n",
-        &["s.toml:2:14: `iterations` of [world] is -4; wanted a whole number from 1 to 100000"],
+        &["s.toml:2:14: `iterations` of [world] is -4; expected an integer from 1 to 100000"],
     );
-    told(
+    assert_errors(
         "[world]\niterations = 99999999999999999999\n",
-        &["s.toml:2:14: `iterations` of [world] is 99999999999999999999; wanted a whole number from 1 to 100000"],
+        &["s.toml:2:14: `iterations` of [world] is 99999999999999999999; expected an integer from 1 to 100000"],
     );
-    told(
+    assert_errors(
         "[sky]\nzenith_color = \"blue\"\n",
         &[
-            "s.toml:2:16: `zenith_color` of [sky] is \"blue\"; wanted a colour: \"#rrggbb\", or [r, g, b] with numbers from 0 to 1",
+            "s.toml:2:16: `zenith_color` of [sky] is \"blue\"; expected a color: \"#rrggbb\", or [r, g, b] with numbers from 0 to 1",
         ],
     );
-    told(
+    assert_errors(
         "[sky]\nzenith_color = [0, 0, 255]\n",
-        &["s.toml:2:23: `zenith_color` of [sky] is 255; wanted a number from 0 to 1"],
+        &["s.toml:2:23: `zenith_color` of [sky] is 255; expected a number from 0 to 1"],
     );
 }
 
 #[test]
 fn words_that_are_not_among_the_known() {
-    told(
+    assert_errors(
         "[world]\nstepper = \"backtrack\"\n",
         &["s.toml:2:11: `stepper` of [world] is \"backtrack\"; did you mean `backtracking`?"],
     );
-    told(
+    assert_errors(
         "[world]\nsolver = \"magic\"\n",
-        &["s.toml:2:10: `solver` of [world] is \"magic\"; wanted `gauss_seidel`, `lcp_pyramid` or `lcp_sliding`"],
+        &["s.toml:2:10: `solver` of [world] is \"magic\"; expected `gauss_seidel`, `lcp_pyramid` or `lcp_sliding`"],
     );
-    told(
+    assert_errors(
         &body_with("mode = \"fixed\""),
-        &["s.toml:5:8: `mode` of body \"b\" is \"fixed\"; wanted `dynamic`, `static` or `kinematic`"],
+        &["s.toml:5:8: `mode` of body \"b\" is \"fixed\"; expected `dynamic`, `static` or `kinematic`"],
     );
-    told(
+    assert_errors(
         &shape("{ type = \"shpere\", radius_m = 1 }"),
         &["s.toml:2:18: `type` of the shape of body \"b\" is \"shpere\"; did you mean `sphere`?"],
     );
@@ -218,56 +261,55 @@ fn words_that_are_not_among_the_known() {
 #[test]
 fn names_used_twice() {
     let again = body_with("") + "\n" + &body_with("");
-    told(
+    assert_errors(
         &again,
-        &[
-            "s.toml:8:8: `name`: this body makes a second body \"b\"; the first is at line 2; wanted a name that no other body has",
-        ],
+        &["s.toml:8:8: `name`: there is a second body \"b\"; the first is at line 2; expected a unique name"],
     );
     let grid = body_with("").replace("\"b\"", "\"g_2\"")
         + "[[grid]]\nname = \"g\"\nshape = { type = \"sphere\", radius_m = 1 }\nmass_kg = 1\ncount = [1, 1, 3]\nspacing_m = [0, 0, 2]\n";
-    told(
+    assert_errors(
         &grid,
-        &[
-            "s.toml:7:8: `name`: this grid makes a second body \"g_2\"; the first is at line 2; wanted a name that no other body has",
-        ],
+        &["s.toml:7:8: `name`: there is a second grid \"g_2\"; the first is at line 2; expected a unique name"],
     );
 }
 
 #[test]
 fn names_that_do_not_fit() {
-    let wanted = "wanted a name of 1 to 63 bytes without control characters";
-    told(&body_with("").replace("\"b\"", "\"\""), &[&format!("s.toml:2:8: `name` of body \"\" is \"\"; {wanted}")]);
+    let expected = "expected a name of 1 to 63 bytes without control characters";
+    assert_errors(
+        &body_with("").replace("\"b\"", "\"\""),
+        &[&format!("s.toml:2:8: `name` of body \"\" is \"\"; {expected}")],
+    );
     let long = "x".repeat(64);
     let error = SceneFile::parse(&body_with("").replace("\"b\"", &format!("{long:?}")), "s.toml").unwrap_err();
-    assert!(error.to_string().contains(wanted), "{error}");
+    assert!(error.to_string().contains(expected), "{error}");
     SceneFile::parse(&body_with("").replace("\"b\"", &format!("{:?}", &long[1..])), "s.toml").unwrap();
 }
 
 #[test]
 fn references_to_nothing() {
-    told(
+    assert_errors(
         &body_with("material = \"felt\""),
         &[
-            "s.toml:5:12: `material` of body \"b\" is \"felt\"; wanted the NAME of a table [materials.NAME], and the scene has none",
+            "s.toml:5:12: `material` of body \"b\" is \"felt\"; expected the NAME of a table [materials.NAME]; the scene has none",
         ],
     );
-    told(
+    assert_errors(
         &("[materials.rubber]\n".to_owned() + &body_with("material = \"ruber\"")),
         &["s.toml:6:12: `material` of body \"b\" is \"ruber\"; did you mean `rubber`?"],
     );
-    told(
+    assert_errors(
         &shape("{ type = \"mesh\", mesh = \"pin\" }"),
         &[
-            "s.toml:2:33: `mesh` of the shape of body \"b\" is \"pin\"; wanted the NAME of a table [meshes.NAME], and the scene has none",
+            "s.toml:2:33: `mesh` of the shape of body \"b\" is \"pin\"; expected the NAME of a table [meshes.NAME]; the scene has none",
         ],
     );
     let two = "[meshes.vase]\ntype = \"icosphere\"\nradius_m = 1\n[meshes.bowl]\ntype = \"icosphere\"\nradius_m = 1\n";
-    told(
+    assert_errors(
         &(two.to_owned() + &shape("{ type = \"mesh\", mesh = \"pin\" }")),
-        &["s.toml:8:33: `mesh` of the shape of body \"b\" is \"pin\"; wanted `bowl` or `vase`"],
+        &["s.toml:8:33: `mesh` of the shape of body \"b\" is \"pin\"; expected `bowl` or `vase`"],
     );
-    // A mesh that is itself wrong is told once, not again where it is used.
+    // A mesh that is itself wrong is reported once, and not again where it is used.
     let wrong = "[meshes.vase]\ntype = \"icosphere\"\nradius_m = 0\n".to_owned()
         + &shape("{ type = \"mesh\", mesh = \"vase\" }");
     assert_eq!(SceneFile::parse(&wrong, "s.toml").unwrap_err().problems().len(), 1);
@@ -276,91 +318,95 @@ fn references_to_nothing() {
 #[test]
 fn mesh_files() {
     let mesh = |file: &str| format!("[meshes.m]\ntype = \"file\"\nfile = \"{file}\"\n");
-    told(
+    assert_errors(
         &mesh("no/bunny.obj"),
         &[
-            "s.toml:3:8: `file` of [meshes.m]: there is no file no/bunny.obj; wanted a path relative to the folder of the scene",
+            "s.toml:3:8: `file` of [meshes.m]: there is no file no/bunny.obj; expected a path relative to the folder of the scene",
         ],
     );
-    told(
+    assert_errors(
         &mesh("bunny.off"),
-        &["s.toml:3:8: `file` of [meshes.m] is \"bunny.off\"; wanted the path of an .obj, .stl, .ply or .dae file"],
+        &["s.toml:3:8: `file` of [meshes.m] is \"bunny.off\"; expected the path of an .obj, .stl, .ply or .dae file"],
     );
 }
 
 #[test]
 fn meshes_that_bound_no_solid() {
     let lathe = |points: &str| format!("[meshes.m]\ntype = \"lathe\"\nprofile_m = {points}\n");
-    told(
+    assert_errors(
         &lathe("[[0, 0], [1, 1], [0.5, 2]]"),
-        &["s.toml:3:30: `profile_m` of [meshes.m] is [0.5, 2]; wanted r = 0 at both ends, so that the solid is closed"],
+        &[
+            "s.toml:3:30: `profile_m` of [meshes.m] is [0.5, 2]; expected r = 0 at both ends, so that the solid is closed",
+        ],
     );
-    told(
+    assert_errors(
         &lathe("[[0, 0], [-1, 1], [0, 2]]"),
-        &["s.toml:3:22: `profile_m` of [meshes.m] is [-1, 1]; wanted r greater than 0 between the ends"],
+        &["s.toml:3:22: `profile_m` of [meshes.m] is [-1, 1]; expected r greater than 0 between the ends"],
     );
-    told(
+    assert_errors(
         &lathe("[[0, 2], [1, 1], [0, 0]]"),
         &[
-            "s.toml:3:14: `profile_m` of [meshes.m] is [0, 2]; wanted the points from the bottom of the axis to its top: these run the other way",
+            "s.toml:3:14: `profile_m` of [meshes.m] is [0, 2]; expected the points from the bottom of the axis to its top: these run the other way",
         ],
     );
-    told(
+    assert_errors(
         &lathe("[[0, 0]]"),
         &[
-            "s.toml:3:13: `profile_m` of [meshes.m] is [[0, 0]]; wanted a list of 3 to 1000 points [r, z] in metres, from the bottom of the axis (r = 0) to its top (r = 0)",
+            "s.toml:3:13: `profile_m` of [meshes.m] is [[0, 0]]; expected a list of 3 to 1000 points [r, z] in meters, from the bottom of the axis (r = 0) to its top (r = 0)",
         ],
     );
-    told(
+    assert_errors(
         "[meshes.m]\ntype = \"torus\"\nradius_m = 1\ntube_radius_m = 1\n",
-        &["s.toml:4:17: `tube_radius_m` of [meshes.m] is 1; wanted less than radius_m, 1, so that the ring has a hole"],
+        &[
+            "s.toml:4:17: `tube_radius_m` of [meshes.m] is 1; expected less than radius_m, 1, so that the ring has a hole",
+        ],
     );
-    told(
+    assert_errors(
         "[meshes.m]\ntype = \"icosphere\"\nradius_m = 1\nsubdivisions = 12\n",
-        &["s.toml:4:16: `subdivisions` of [meshes.m] is 12; wanted a whole number from 0 to 7"],
+        &["s.toml:4:16: `subdivisions` of [meshes.m] is 12; expected an integer from 0 to 7"],
     );
 }
 
 #[test]
 fn things_that_contradict_each_other() {
-    told(
+    assert_errors(
         &body_with("density_kg_per_m3 = 1"),
-        &["s.toml:1:1: body \"b\" has both `mass_kg` and `density_kg_per_m3`; wanted one of them"],
+        &["s.toml:1:1: body \"b\" has both `mass_kg` and `density_kg_per_m3`; expected one of them"],
     );
-    told(
+    assert_errors(
         &shape("{ type = \"half_space\" }"),
         &[
-            "s.toml:1:1: body \"b\" is a dynamic half-space, which has no finite mass; wanted mode = \"static\" or \"kinematic\"",
+            "s.toml:1:1: body \"b\" is a dynamic half-space, which has no finite mass; expected mode = \"static\" or \"kinematic\"",
         ],
     );
-    told(
+    assert_errors(
         &body_with("mode = \"static\"\nvelocity_m_per_s = [1, 0, 0]"),
         &[
-            "s.toml:6:20: `velocity_m_per_s` of body \"b\" is [1, 0, 0]; wanted no velocity for a static body; mode = \"kinematic\" moves by itself",
+            "s.toml:6:20: `velocity_m_per_s` of body \"b\" is [1, 0, 0]; expected no velocity for a static body; a body with mode = \"kinematic\" moves at a prescribed velocity",
         ],
     );
-    told(
+    assert_errors(
         &body_with("rotation_deg = [0, 0, 9]\norientation_xyzw = [0, 0, 0, 1]"),
         &[
-            "s.toml:1:1: body \"b\" has more than one orientation; wanted one of `orientation_xyzw`, `rotation_deg` and `rotation`",
+            "s.toml:1:1: body \"b\" has more than one orientation; expected one of `orientation_xyzw`, `rotation_deg` and `rotation`",
         ],
     );
-    told(
+    assert_errors(
         &body_with("orientation_xyzw = [1, 0, 0, 1]"),
         &[
-            "s.toml:5:20: `orientation_xyzw` of body \"b\" is [1, 0, 0, 1]; wanted a quaternion [x, y, z, w] of length 1; this one has 1.414214",
+            "s.toml:5:20: `orientation_xyzw` of body \"b\" is [1, 0, 0, 1]; expected a quaternion [x, y, z, w] of length 1; this one has 1.414214",
         ],
     );
-    told(
+    assert_errors(
         &body_with("rotation = { axis = [0, 0, 0], angle_deg = 3 }"),
         &[
-            "s.toml:5:21: `axis` of the rotation of body \"b\" is [0, 0, 0]; wanted a direction: a vector that is not zero",
+            "s.toml:5:21: `axis` of the rotation of body \"b\" is [0, 0, 0]; expected a direction: a vector that is not zero",
         ],
     );
-    told(
+    assert_errors(
         "[camera]\neye_m = [0, 0, 5]\ntarget_m = [0, 0, 1]\n",
         &[
-            "s.toml:1:1: [camera] looks along its own `up`, or from `eye_m` at itself; wanted a `target_m` away from `eye_m` and not along `up`",
+            "s.toml:1:1: [camera] looks along its `up`, or its `target_m` equals its `eye_m`; expected a `target_m` that differs from `eye_m` in a direction other than `up`",
         ],
     );
 }
@@ -371,41 +417,46 @@ fn too_many_bodies() {
         shape("{ type = \"sphere\", radius_m = 1 }").replace("[[body]]", "[[grid]]")
             + &format!("count = {count}\nspacing_m = [2, 2, 2]\n")
     };
-    told(
+    assert_errors(
         &grid("[1000, 1000, 2]"),
-        &["s.toml:5:9: grid \"b\" makes 2000000 bodies; wanted at most 1000000 bodies in the whole scene"],
+        &["s.toml:5:9: grid \"b\" makes 2000000 bodies; expected at most 1000000 bodies in the whole scene"],
     );
-    told(
+    assert_errors(
         &grid("[1000000, 1000000, 1000000]"),
-        &["s.toml:5:9: grid \"b\" makes 1000000000000000000 bodies; wanted at most 1000000 bodies in the whole scene"],
+        &[
+            "s.toml:5:9: grid \"b\" makes 1000000000000000000 bodies; expected at most 1000000 bodies in the whole scene",
+        ],
     );
-    told(&grid("[0, 1, 1]"), &["s.toml:5:10: `count` of grid \"b\" is 0; wanted a whole number from 1 to 1000000"]);
+    assert_errors(
+        &grid("[0, 1, 1]"),
+        &["s.toml:5:10: `count` of grid \"b\" is 0; expected an integer from 1 to 1000000"],
+    );
     let triangle = grid("[1, 1, 1]")
         .replace("count = [1, 1, 1]\nspacing_m = [2, 2, 2]", "arrangement = \"triangle\"\nrows = 5000\nspacing_m = 2");
-    told(
+    assert_errors(
         &triangle,
-        &["s.toml:6:8: grid \"b\" makes 12502500 bodies; wanted at most 1000000 bodies in the whole scene"],
+        &["s.toml:6:8: grid \"b\" makes 12502500 bodies; expected at most 1000000 bodies in the whole scene"],
     );
 }
 
 #[test]
 fn all_problems_of_a_file_in_its_order_with_columns_in_characters() {
-    told(
+    assert_errors(
         "description = \"é\" \n[world]\ndt_s = 3\nstepper = 1\n[materials.\"é\"]\nfriction = [1]\n",
         &[
-            "s.toml:3:8: `dt_s` of [world] is 3; wanted a time from 1e-6 to 1 s",
-            "s.toml:4:11: `stepper` of [world] is an integer: 1; wanted a text in quotes",
-            "s.toml:6:12: `friction` of [materials.é] is an array: [1]; wanted a friction coefficient from 0 to 100",
+            "s.toml:3:8: `dt_s` of [world] is 3; expected a time from 1e-6 to 1 s",
+            "s.toml:4:11: `stepper` of [world] is an integer: 1; expected a string in quotes",
+            "s.toml:6:12: `friction` of [materials.é] is an array: [1]; expected a friction coefficient from 0 to 100",
         ],
     );
-    told(
+    assert_errors(
         "materials = { \"é\" = { friction = -1 } }\n",
-        &["s.toml:1:34: `friction` of [materials.é] is -1; wanted a friction coefficient from 0 to 100"],
+        &["s.toml:1:34: `friction` of [materials.é] is -1; expected a friction coefficient from 0 to 100"],
     );
 }
 
 #[test]
-fn many_problems_are_counted_not_all_told() {
+fn many_problems_are_counted_not_all_shown() {
     let text = "[world]\n".to_owned() + &(0..100).map(|k| format!("bad_key_{k} = 1\n")).collect::<String>();
     let error = SceneFile::parse(&text, "s.toml").unwrap_err();
     assert_eq!(error.problems().len(), 100);
@@ -414,22 +465,22 @@ fn many_problems_are_counted_not_all_told() {
 }
 
 #[test]
-fn a_text_that_is_no_toml_is_told_once() {
+fn a_text_that_is_no_toml_is_reported_once() {
     let slips = |count: usize| SceneFile::parse(&"no toml\n".repeat(count), "s.toml").unwrap_err();
     let (few, many) = (slips(2), slips(50));
     assert!((2..=5).contains(&few.problems().len()), "{few}");
     assert_eq!(many.problems().len(), 1, "{many}");
-    let told = many.to_string();
+    let error = many.to_string();
     assert!(
-        told.starts_with("s.toml:1:") && told.ends_with("more slips of syntax follow, so this may be no TOML at all"),
-        "{told}"
+        error.starts_with("s.toml:1:") && error.ends_with("more syntax errors follow, so this may not be TOML"),
+        "{error}"
     );
 }
 
 #[test]
 fn a_report_draws_the_line_and_marks_the_place() {
     let error = SceneFile::parse(&body_with("frction = 0.1"), "s.toml").unwrap_err();
-    let wanted = "\
+    let expected = "\
 error: unknown key `frction` in body \"b\"
    ,-[ s.toml:5:1 ]
    |
@@ -439,7 +490,7 @@ error: unknown key `frction` in body \"b\"
 ---'
 s.toml: 1 error
 ";
-    assert_eq!(error.report(false), wanted);
+    assert_eq!(error.report(false), expected);
     assert!(error.report(true).contains('\u{1b}'), "colour when asked");
 }
 
@@ -447,42 +498,42 @@ s.toml: 1 error
 fn a_line_too_long_to_draw_is_only_named() {
     let text = format!("[world]\ndt_s = -1 # {}\n", "x".repeat(1000));
     let report = SceneFile::parse(&text, "s.toml").unwrap_err().report(false);
-    let wanted = "error: `dt_s` of [world] is -1\n  s.toml:2:8: wanted a time from 1e-6 to 1 s\ns.toml: 1 error\n";
-    assert_eq!(report, wanted);
+    let expected = "error: `dt_s` of [world] is -1\n  s.toml:2:8: expected a time from 1e-6 to 1 s\ns.toml: 1 error\n";
+    assert_eq!(report, expected);
 }
 
 #[test]
 fn pairs() {
     let balls = "[[body]]\nname = \"ball\"\nmode = \"static\"\nshape = { type = \"half_space\" }\n[materials.ice]\n";
     let pair = |lines: &str| format!("{balls}[[pair]]\n{lines}");
-    told(
+    assert_errors(
         &pair("a = \"ball\"\nb = \"bal\"\nfriction = 0.1\n"),
         &["s.toml:8:5: `b` of pair 1 is \"bal\"; did you mean `ball`?"],
     );
-    told(
+    assert_errors(
         &pair("a = \"ball\"\nb = \"ball\"\nfriction = 0.1\n"),
-        &["s.toml:8:5: `b` of pair 1 is \"ball\"; wanted a body other than `a`"],
+        &["s.toml:8:5: `b` of pair 1 is \"ball\"; expected a body other than `a`"],
     );
-    told(
+    assert_errors(
         &pair("materials = [\"ice\", \"icy\"]\nrestitution = 2\n"),
         &[
             "s.toml:7:21: `materials` of pair 1 is \"icy\"; did you mean `ice`?",
-            "s.toml:8:15: `restitution` of pair 1 is 2; wanted a restitution from 0 (no bounce) to 1 (no loss)",
+            "s.toml:8:15: `restitution` of pair 1 is 2; expected a restitution from 0 (no bounce) to 1 (no loss)",
         ],
     );
-    told(
+    assert_errors(
         &pair("materials = [\"ice\"]\nfriction = 0.1\n"),
         &[
-            "s.toml:7:13: `materials` of pair 1 is [\"ice\"]; wanted the names of two materials, such as [\"rubber\", \"ice\"]",
+            "s.toml:7:13: `materials` of pair 1 is [\"ice\"]; expected the names of two materials, such as [\"rubber\", \"ice\"]",
         ],
     );
-    told(
+    assert_errors(
         &pair("materials = [\"ice\", \"ice\"]\n"),
-        &["s.toml:6:1: pair 1 has no `friction`; wanted `restitution`, `friction` or both"],
+        &["s.toml:6:1: pair 1 has no `friction`; expected `restitution`, `friction` or both"],
     );
     let twice = "materials = [\"ice\", \"ice\"]\nfriction = 0.1\n";
-    told(
+    assert_errors(
         &format!("{}[[pair]]\n{twice}", pair(twice)),
-        &["s.toml:9:1: pair 2 names the same two as the pair at line 6; wanted each pair once"],
+        &["s.toml:9:1: pair 2 names the same two as the pair at line 6; expected each pair once"],
     );
 }

@@ -4,7 +4,7 @@ use crate::caves::SMALL;
 use std::net::{IpAddr, Ipv4Addr};
 use tumble_scene::cave::{Axes, Cave};
 
-fn told(text: &str) -> String {
+fn error_of(text: &str) -> String {
     Cave::parse(&format!("{SMALL}{text}"), "my.toml").expect_err("it is wrong").to_string()
 }
 
@@ -27,17 +27,17 @@ fn a_tracker_is_heard_on_this_machine_and_elsewhere_by_name() {
         (vec![IpAddr::from(Ipv4Addr::new(10, 0, 0, 7))], Axes::YUp, vec!["glasses 1".to_owned()])
     );
     let cases = [
-        ("[tracker]\naddress = \"0.0.0.0\"\n", "has no `senders`"),
-        ("[tracker]\naddress = \"here\"\n", "wanted an IP address"),
-        ("[tracker]\nport = 0\n", "a whole number from 1 to 65535"),
-        ("[tracker]\nusers = [\"a\", \"b\"]\n", "one name for each of the cave's 1 users"),
+        ("[tracker]\naddress = \"0.0.0.0\"\n", "without `senders`"),
+        ("[tracker]\naddress = \"here\"\n", "expected an IP address"),
+        ("[tracker]\nport = 0\n", "an integer from 1 to 65535"),
+        ("[tracker]\nusers = [\"a\", \"b\"]\n", "one unique name without / for each of the cave's 1 users"),
         ("[tracker]\nusers = [\"a/b\"]\n", "without /"),
         ("[tracker]\nsenders = [7]\n", "`senders`"),
         ("[tracker]\naxes = \"east\"\n", "`y_up`"),
         ("[tracker]\norigin_m = [0, nan, 0]\n", "finite"),
     ];
     for (text, said) in cases {
-        assert!(told(text).contains(said), "{text}: {}", told(text));
+        assert!(error_of(text).contains(said), "{text}: {}", error_of(text));
     }
 }
 
@@ -56,6 +56,6 @@ fn a_launch_command_names_the_arguments_and_nothing_unknown() {
         ("[\"\", \"{arguments}\"]", "the words of a command"),
     ];
     for (launch, said) in cases {
-        assert!(told(&node(launch)).contains(said), "{launch}: {}", told(&node(launch)));
+        assert!(error_of(&node(launch)).contains(said), "{launch}: {}", error_of(&node(launch)));
     }
 }

@@ -47,7 +47,7 @@ fn a_small_cave_has_its_defaults() {
 }
 
 #[test]
-fn what_is_wrong_is_told_with_its_place_and_what_would_be_right() {
+fn what_is_wrong_is_reported_with_its_place_and_the_expected_value() {
     let cases = [
         (
             "interpupillary = 0.06",
@@ -64,27 +64,27 @@ fn what_is_wrong_is_told_with_its_place_and_what_would_be_right() {
             14,
             "did you mean `side_by_side`?",
         ),
-        ("no pixels", "size_px = [0, 600]", "size_px = [800, 600]", 13, "a whole number from 1 to 16384"),
+        ("no pixels", "size_px = [0, 600]", "size_px = [800, 600]", 13, "an integer from 1 to 16384"),
         (
             "more pixels than can be drawn",
             "size_px = [16384, 16384]",
             "size_px = [800, 600]",
             13,
-            "with the rim of 48 pixels that is drawn around it is 16480 x 16480",
+            "the image with its rim of 48 pixels is 16480 x 16480",
         ),
         (
             "two eyes wider than can be drawn",
             "size_px = [9000, 100]\nstereo = \"side_by_side\"",
             "size_px = [800, 600]",
             13,
-            "the picture with both eyes is 18000 x 100 pixels",
+            "the image with both eyes is 18000 x 100 pixels",
         ),
         (
             "two eyes of too many pixels",
             "size_px = [5000, 4000]\nstereo = \"top_bottom\"",
             "size_px = [800, 600]",
             13,
-            "the picture with both eyes is 5000 x 8000 pixels",
+            "the image with both eyes is 5000 x 8000 pixels",
         ),
         ("one number of pixels", "size_px = [600]", "size_px = [800, 600]", 13, "width and height in pixels"),
         (
@@ -108,7 +108,7 @@ fn what_is_wrong_is_told_with_its_place_and_what_would_be_right() {
             "size_px = [800, 600]\nnear_m = 9\nfar_m = 3",
             "size_px = [800, 600]",
             10,
-            "`near_m` of facet \"f\" is 9, `far_m` 3",
+            "`near_m` of facet \"f\" is 9 and `far_m` is 3",
         ),
         (
             "a warp by another ending",
@@ -122,7 +122,7 @@ fn what_is_wrong_is_told_with_its_place_and_what_would_be_right() {
             "eye_m = [0, 0, 1.5]\nforward = [0, 0, 1]",
             "eye_m = [0, 0, 1.5]",
             2,
-            "`forward` of user \"u\" lies along its `up`",
+            "`forward` of user \"u\" is parallel to its `up`",
         ),
     ];
     for (what, wrong, right, line, said) in cases {
@@ -137,7 +137,7 @@ fn what_is_wrong_is_told_with_its_place_and_what_would_be_right() {
         SMALL.replace("screen = \"s\"", "screen = \"wall\"")
     );
     let said = Cave::parse(&twice, "my.toml").unwrap_err().report(false);
-    assert!(said.contains("wanted `s`") && !said.contains("`s` or `s`"), "a name used twice is listed once: {said}");
+    assert!(said.contains("expected `s`") && !said.contains("`s` or `s`"), "a name used twice is listed once: {said}");
     let (_, message) = problem(
         "description = \"nothing\"\n[[user]]\nname = \"u\"\neye_m = [0, 0, 1]\n[[screen]]\nname = \"s\"\nlower_left_m = [0, 1, 0]\nlower_right_m = [1, 1, 0]\nupper_left_m = [0, 1, 1]\n",
     );
@@ -145,7 +145,7 @@ fn what_is_wrong_is_told_with_its_place_and_what_would_be_right() {
 }
 
 #[test]
-fn swapped_corners_are_told_as_an_eye_behind_the_screen() {
+fn swapped_corners_are_reported_as_an_eye_behind_the_screen() {
     let text = SMALL
         .replace("lower_left_m = [-1,", "lower_left_m = [1,")
         .replace("lower_right_m = [1,", "lower_right_m = [-1,")
@@ -158,7 +158,7 @@ fn swapped_corners_are_told_as_an_eye_behind_the_screen() {
 fn nothing_leaves_the_machine_without_a_key() {
     let far = "[[node]]\nname = \"n\"\naddress = \"10.0.0.7\"\n";
     let (_, message) = problem(&format!("{SMALL}{far}"));
-    assert!(message.contains("shared_memory, which ends at this machine"), "{message}");
+    assert!(message.contains("shared_memory, which works on one machine only"), "{message}");
     let (_, message) = problem(&format!("{SMALL}{far}[sync]\ntransport = \"udp\"\n"));
     assert!(message.contains("there is no [security]"), "{message}");
     let cave = Cave::parse(
@@ -192,7 +192,7 @@ fn gaps_are_what_a_tape_measure_says() {
         "{notes}"
     );
     let wide = Cave::parse(&SMALL.replace("[800, 600]", "[1000, 600]"), "my.toml").unwrap().notes().join("\n");
-    assert!(wide.contains("1.250 times denser across than upward; 1000 x 750 would be square"), "{wide}");
+    assert!(wide.contains("1.250 times denser horizontally than vertically; 1000 x 750 would be square"), "{wide}");
 }
 
 /// 2^25 pixels, rows filled up to multiples of 64, and a rim of 48: 16288 + 96 = 16384 = 2^14 leaves 2^11 - 96 rows.
@@ -221,7 +221,7 @@ fn beside(lower_left: [f64; 3], lower_right: [f64; 3], upper_left: [f64; 3]) -> 
 }
 
 #[test]
-fn a_badly_placed_screen_is_told_as_one_without_a_neighbour() {
+fn a_badly_placed_screen_is_reported_as_one_without_a_neighbor() {
     // turned by 90 degrees, 0.4 m off to the right, and tilted by 8 degrees about the normal of its plane: 1.5 m high, its left edge leans back to y - 1.5 sin 8
     let (sin, cos) = 8f64.to_radians().sin_cos();
     let cave =
@@ -231,7 +231,7 @@ fn a_badly_placed_screen_is_told_as_one_without_a_neighbour() {
     assert_eq!(
         cave.notes(),
         [
-            "screen \"s\" has no neighbour along its right edge: the nearest, the left edge of \"t\", is 451 mm and 8.0 degrees off"
+            "screen \"s\" has no neighbor along its right edge: the nearest, the left edge of \"t\", is 451 mm and 8.0 degrees off"
         ]
     );
     // a metre off it is another wall
@@ -271,7 +271,7 @@ fn shipped_caves_are_whole_and_found_from_anywhere() {
 }
 
 #[test]
-fn caves_and_scenes_are_told_apart() {
+fn caves_and_scenes_are_distinguished() {
     assert!(shipped_caves().iter().all(|cave| is_cave(cave.text)));
     assert!(!tumble_scene::shipped().iter().any(|scene| is_cave(scene.text)));
     assert!(is_cave("[[screeen]]\nname = \"a\"\n") && !is_cave("[[screeen]]\n[world]\n"), "a table by nearly the name");
@@ -421,9 +421,9 @@ fn known_keys(text: &str, table: &str) -> BTreeSet<String> {
         .find(|p| p.message.contains("`zzzzzzzzzzzz`") && p.message.contains(table))
         .unwrap_or_else(|| panic!("{table}: {error}"));
     let list = problem
-        .wanted
+        .expected
         .split_once(": ")
-        .map_or_else(|| problem.wanted.split_once("only ").map_or("", |(_, list)| list), |(_, list)| list);
+        .map_or_else(|| problem.expected.split_once("only ").map_or("", |(_, list)| list), |(_, list)| list);
     list.split('`')
         .filter(|word| !word.is_empty() && word.chars().all(|c| c.is_ascii_lowercase() || c == '_'))
         .map(str::to_owned)

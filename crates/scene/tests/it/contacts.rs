@@ -1,6 +1,6 @@
-//! The key `contacts`: the default, who overrides whom, what a wrong word is told, and that it reaches the world.
+//! The key `contacts`: the default, who overrides whom, what a wrong word is assert_errors, and that it reaches the world.
 
-use crate::bad_input::told;
+use crate::bad_input::assert_errors;
 use tumble_core::World;
 use tumble_core::collide::ContactMode::{self, Spheres, Surface};
 use tumble_scene::SceneFile;
@@ -54,8 +54,8 @@ fn the_word_decides_what_touches() {
 }
 
 #[test]
-fn a_wrong_word_is_told_where_and_what_would_be_right() {
-    told(
+fn a_wrong_word_is_reported_with_its_place_and_the_nearest_one() {
+    assert_errors(
         &ball("contacts = \"sphere\"", ""),
         &["s.toml:2:12: `contacts` of [world] is \"sphere\"; did you mean `spheres`?"],
     );

@@ -25,7 +25,7 @@ fn the_empty_scene_has_the_defaults_of_the_documentation() {
     assert_eq!(scene.world.gravity_m_per_s2, [0.0, 0.0, -9.81]);
     assert_eq!(scene.world.dt_s, 1.0 / 240.0);
     assert_eq!((scene.world.substeps, scene.world.iterations), (1, 200));
-    assert_eq!((scene.world.seconds, scene.world.contact_tolerance_m), (5.0, 1e-7));
+    assert_eq!((scene.world.duration_s, scene.world.contact_tolerance_m), (5.0, 1e-7));
     assert_eq!((scene.world.sleep_after_s, scene.world.sleep_within_m), (None, 1e-5));
     assert_eq!(scene.world.stepper, Stepper::TimeStepping);
     assert_eq!(scene.world.integrator, Integrator::Verlet);
@@ -42,14 +42,14 @@ fn the_empty_scene_has_the_defaults_of_the_documentation() {
 fn every_word_of_the_world() {
     let scene = read(
         "[world]\nstepper = \"backtracking\"\nintegrator = \"dormand_prince\"\nintegrator_tolerance = 1e-9\nsolver = \"lcp_sliding\"\nsubsteps = 4\niterations = 7\n\
-         seconds = 2\ncontact_tolerance_m = 1e-5\ncombine_restitution = \"average\"\ncombine_friction = \"product\"\ngravity_m_per_s2 = [1, 2, 3]\nsleep_after_s = 0.25\nsleep_within_m = 1e-6\n",
+         duration_s = 2\ncontact_tolerance_m = 1e-5\ncombine_restitution = \"average\"\ncombine_friction = \"product\"\ngravity_m_per_s2 = [1, 2, 3]\nsleep_after_s = 0.25\nsleep_within_m = 1e-6\n",
     );
     let world = scene.world;
     assert_eq!(
         (world.stepper, world.integrator, world.solver),
         (Stepper::Backtracking, Integrator::DormandPrince, Solver::LcpSliding)
     );
-    assert_eq!((world.substeps, world.iterations, world.seconds), (4, 7, 2.0));
+    assert_eq!((world.substeps, world.iterations, world.duration_s), (4, 7, 2.0));
     assert_eq!(world.integrator_tolerance, 1e-9);
     assert_eq!((world.sleep_after_s, world.sleep_within_m), (Some(0.25), 1e-6));
     assert_eq!((world.contact_tolerance_m, world.gravity_m_per_s2), (1e-5, [1.0, 2.0, 3.0]));
@@ -135,14 +135,20 @@ fn a_body_takes_what_its_material_says_unless_it_says_otherwise() {
     };
     let plain = one("");
     assert_eq!((plain.friction, plain.restitution, plain.material), (0.9, 0.4, Some(0)));
-    assert_eq!((plain.look.color, plain.look.roughness), ([1.0, 0.0, 0.0], 0.1));
+    assert_eq!((plain.appearance.color, plain.appearance.roughness), ([1.0, 0.0, 0.0], 0.1));
     let other = one("friction = 0.2\ncolor = [0, 0.5, 1]\npattern = \"wood\"");
     assert_eq!((other.friction, other.restitution), (0.2, 0.4));
-    assert_eq!((other.look.color, other.look.roughness, other.look.pattern), ([0.0, 0.5, 1.0], 0.1, Pattern::Wood));
+    assert_eq!(
+        (other.appearance.color, other.appearance.roughness, other.appearance.pattern),
+        ([0.0, 0.5, 1.0], 0.1, Pattern::Wood)
+    );
     let ringed = one("pattern = \"rings\"\npattern_offset_m = -0.2");
-    assert_eq!((ringed.look.pattern, ringed.look.pattern_offset_m), (Pattern::Rings, -0.2));
+    assert_eq!((ringed.appearance.pattern, ringed.appearance.pattern_offset_m), (Pattern::Rings, -0.2));
     let bare = body("");
-    assert_eq!((bare.look.pattern, bare.look.pattern_scale_m, bare.look.pattern_offset_m), (Pattern::Plain, 0.1, 0.0));
+    assert_eq!(
+        (bare.appearance.pattern, bare.appearance.pattern_scale_m, bare.appearance.pattern_offset_m),
+        (Pattern::Plain, 0.1, 0.0)
+    );
     assert_eq!((bare.friction, bare.restitution, bare.material), (0.5, 0.0, None));
 }
 
@@ -150,20 +156,20 @@ fn a_body_takes_what_its_material_says_unless_it_says_otherwise() {
 fn a_body_with_every_key() {
     let it = body(
         "mode = \"kinematic\"\nposition_m = [1, 2, 3]\nvelocity_m_per_s = [4, 5, 6]\nangular_velocity_rad_per_s = [7, 8, 9]\n\
-         linear_damping_per_s = 0.1\nangular_damping_per_s = 0.2\ncollides = false\nalive = false\nvisible = false\nclearcoat = 1\nmetallic = 0.5",
+         linear_damping_per_s = 0.1\nangular_damping_per_s = 0.2\ncollides = false\nenabled = false\nvisible = false\nclearcoat = 1\nmetallic = 0.5",
     );
     assert_eq!((it.mode, it.mass), (Mode::Kinematic, Some(MassSpec::Mass(2.0))));
     assert_eq!((it.position_m, it.velocity_m_per_s), ([1.0, 2.0, 3.0], [4.0, 5.0, 6.0]));
     assert_eq!(it.angular_velocity_rad_per_s, [7.0, 8.0, 9.0]);
     assert_eq!((it.linear_damping_per_s, it.angular_damping_per_s), (0.1, 0.2));
-    assert!(!it.collides && !it.alive && !it.visible);
-    assert_eq!((it.look.clearcoat, it.look.metallic), (1.0, 0.5));
+    assert!(!it.collides && !it.enabled && !it.visible);
+    assert_eq!((it.appearance.clearcoat, it.appearance.metallic), (1.0, 0.5));
 }
 
 #[test]
 fn shapes_and_meshes() {
     let scene = read(
-        "[meshes.c]\ntype = \"cylinder\"\nradius_m = 1\nlength_m = 2\nsphere_tree_depth = 4\nsphere_tree_error = 0.02\n[meshes.b]\ntype = \"box\"\nsize_m = [1, 2, 3]\n\
+        "[meshes.c]\ntype = \"cylinder\"\nradius_m = 1\nlength_m = 2\nsphere_tree_depth = 4\nsphere_tree_max_error = 0.02\n[meshes.b]\ntype = \"box\"\nsize_m = [1, 2, 3]\n\
          [meshes.p]\ntype = \"capsule\"\nradius_m = 1\nlength_m = 2\nsegments = 12\n\
          [[body]]\nname = \"1\"\ndensity_kg_per_m3 = 7800\nshape = { type = \"mesh\", mesh = \"c\" }\n\
          [[body]]\nname = \"2\"\nmass_kg = 1\nshape = { type = \"capsule\", radius_m = 1, length_m = 2 }\n\
@@ -172,7 +178,7 @@ fn shapes_and_meshes() {
     );
     let ShapeSpec::Mesh { mesh } = scene.bodies[0].shape else { panic!("a mesh") };
     assert_eq!((scene.meshes[mesh].name.as_str(), scene.meshes[mesh].sphere_tree_depth), ("c", Some(4)));
-    assert_eq!(scene.meshes[mesh].sphere_tree_error, Some(0.02));
+    assert_eq!(scene.meshes[mesh].sphere_tree_max_error, Some(0.02));
     assert_eq!(scene.meshes[mesh].source, MeshSource::Cylinder { radius_m: 1.0, length_m: 2.0, segments: 48 });
     assert_eq!(scene.meshes[2].source, MeshSource::Capsule { radius_m: 1.0, length_m: 2.0, segments: 12 });
     assert_eq!(scene.bodies[0].mass, Some(MassSpec::Density(7800.0)));
@@ -218,9 +224,9 @@ fn a_box_of_bodies_counts_along_x_then_y_then_z() {
 fn a_triangle_is_numbered_from_its_apex_left_to_right() {
     let bodies = grid("arrangement = \"triangle\"\nrows = 3\nspacing_m = 2\ntoward = [0, 1, 0]");
     let root = 3f64.sqrt();
-    let wanted = [[0.0, 0.0], [-1.0, root], [1.0, root], [-2.0, 2.0 * root], [0.0, 2.0 * root], [2.0, 2.0 * root]];
-    assert_eq!(bodies.len(), wanted.len());
-    for (body, [x, y]) in bodies.iter().zip(wanted) {
+    let expected = [[0.0, 0.0], [-1.0, root], [1.0, root], [-2.0, 2.0 * root], [0.0, 2.0 * root], [2.0, 2.0 * root]];
+    assert_eq!(bodies.len(), expected.len());
+    for (body, [x, y]) in bodies.iter().zip(expected) {
         assert!(
             (body.position_m[0] - x).abs() < 1e-14 && (body.position_m[1] - y).abs() < 1e-14,
             "{:?}",
@@ -233,9 +239,9 @@ fn a_triangle_is_numbered_from_its_apex_left_to_right() {
 fn copies_take_colours_in_turn() {
     let bodies =
         grid("count = [3, 1, 1]\nspacing_m = [2, 2, 2]\ncolors = [\"#000000\", \"#ffffff\"]\npatterns = [\"felt\"]");
-    let colors: Vec<f64> = bodies.iter().map(|body| body.look.color[0]).collect();
+    let colors: Vec<f64> = bodies.iter().map(|body| body.appearance.color[0]).collect();
     assert_eq!(colors, [0.0, 1.0, 0.0]);
-    assert!(bodies.iter().all(|body| body.look.pattern == Pattern::Felt));
+    assert!(bodies.iter().all(|body| body.appearance.pattern == Pattern::Felt));
 }
 
 #[test]

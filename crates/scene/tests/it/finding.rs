@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use tumble_scene::{MOST_BYTES, MeshSource, SceneError, SceneFile, SceneSource, resolve_scene};
+use tumble_scene::{MAX_BYTES, MeshSource, SceneError, SceneFile, SceneSource, resolve_scene};
 
 /// A new folder for one test, removed when it goes out of scope.
 struct Folder(PathBuf);
@@ -54,7 +54,7 @@ fn what_is_not_there() {
     let error = resolve_scene("biliards", &[]).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "no scene `biliards`: did you mean `billiards`? Shipped are `falling`, `stack`, `billiards`, `bowling`, `incline`, `pendulum`, `chain`, `piston`, `skeleton` and `robot`"
+        "no scene `biliards`: did you mean `billiards`? There are `falling`, `stack`, `billiards`, `bowling`, `incline`, `pendulum`, `chain`, `piston`, `skeleton` and `robot`"
     );
     let error = resolve_scene("no/such.toml", &[]).unwrap_err();
     assert!(error.to_string().starts_with("no/such.toml: cannot read it: "), "{error}");
@@ -80,8 +80,8 @@ fn bytes_that_are_not_text_and_files_that_are_too_large() {
         error.to_string(),
         format!("{}:2: byte 13 of the file is not UTF-8; a scene is a UTF-8 text in TOML", path.display())
     );
-    let path = folder.write("large.toml", "#".repeat(MOST_BYTES as usize + 1).as_bytes());
+    let path = folder.write("large.toml", "#".repeat(MAX_BYTES as usize + 1).as_bytes());
     assert!(matches!(SceneFile::load(&path), Err(SceneError::TooLarge { limit: 16_777_216, .. })));
-    let path = folder.write("just.toml", "#".repeat(MOST_BYTES as usize).as_bytes());
+    let path = folder.write("just.toml", "#".repeat(MAX_BYTES as usize).as_bytes());
     assert!(SceneFile::load(&path).is_ok());
 }

@@ -118,11 +118,11 @@ fn kinds_of_files_go_by_the_extension() {
         (kind("scene.toml"), kind("stack"), kind("a.b/c")),
         (Ok(FileKind::Scene), Ok(FileKind::Scene), Ok(FileKind::Scene))
     );
-    assert!(kind("a.gltf").unwrap_err().contains(".gltf is not one of them"));
+    assert!(kind("a.gltf").unwrap_err().contains("the mesh format .gltf is not supported"));
 }
 
 #[test]
-fn what_is_wrong_with_a_robot_is_told_by_its_own_file() {
+fn what_is_wrong_with_a_robot_is_reported_in_its_own_file() {
     let folder = Folder::new("wrong");
     let path = folder.write("r.urdf", "<robot name=\"r\">\n<lnk/></robot>");
     let error = SceneFile::load(&path).unwrap_err();

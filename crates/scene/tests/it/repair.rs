@@ -1,4 +1,4 @@
-//! `repair` of `[meshes.NAME]`: what is an error otherwise becomes a solid, and is told.
+//! `repair` of `[meshes.NAME]`: a mesh that is an error without it becomes a solid, with a note.
 
 use tumble_collide::RepairSettings;
 use tumble_scene::{SceneFile, read_solid};

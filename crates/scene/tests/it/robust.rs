@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use tumble_scene::{SceneFile, shipped};
 
-/// Reads `text`; whatever it is, there is an answer, and an error can be told.
+/// Reads `text`; every text gives a result, and every error can be displayed.
 fn read(text: &str) {
     if let Err(error) = SceneFile::parse(text, "damaged.toml") {
         assert!(!error.problems().is_empty());

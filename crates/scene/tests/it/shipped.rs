@@ -268,7 +268,7 @@ fn the_reference_names_every_key() {
         let error = SceneFile::parse(&text, "s.toml").unwrap_err();
         let answer =
             error.problems().iter().find(|problem| problem.message.contains("qqqqqqqqqqqq")).expect("it is unknown");
-        for key in answer.wanted.split('`').skip(1).step_by(2) {
+        for key in answer.expected.split('`').skip(1).step_by(2) {
             assert!(readme.contains(key), "scenes/README.md does not name `{key}`");
             seen += 1;
         }

@@ -1,4 +1,4 @@
-//! URDF: what its elements mean, and what is told of wrong ones.
+//! URDF: the meaning of its elements, and errors for wrong ones.
 
 use std::path::{Path, PathBuf};
 
@@ -11,8 +11,8 @@ fn read(text: &str) -> UrdfModel {
     parse_model(text, "r.urdf", &UrdfOptions::default()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Reads `text` as `r.urdf` and compares all that is told with `expected`, one line per problem.
-fn told(text: &str, expected: &[&str]) {
+/// Reads `text` as `r.urdf` and compares all reported problems with `expected`, one line per problem.
+fn assert_errors(text: &str, expected: &[&str]) {
     let error = parse_model(text, "r.urdf", &UrdfOptions::default()).expect_err("the robot is wrong");
     let lines: Vec<String> = error.to_string().lines().map(str::to_owned).collect();
     assert_eq!(lines, expected, "for:\n{text}");
@@ -142,27 +142,29 @@ fn a_floating_joint_on_a_link_that_moves_is_a_stack() {
 
 #[test]
 fn xml_that_is_not() {
-    told(
+    assert_errors(
         "<robot>\n<link name=\"a\">\n</robot>",
-        &["r.urdf:3:1: XML: expected 'link' tag, not 'robot'; wanted a URDF: an XML document with one element <robot>"],
+        &[
+            "r.urdf:3:1: XML: expected 'link' tag, not 'robot'; expected a URDF: an XML document with one element <robot>",
+        ],
     );
-    told(
+    assert_errors(
         "<robot>\n<link",
         &[
-            "r.urdf:2:6: XML: the root node was opened but never closed; wanted a URDF: an XML document with one element <robot>",
+            "r.urdf:2:6: XML: the root node was opened but never closed; expected a URDF: an XML document with one element <robot>",
         ],
     );
-    told(
+    assert_errors(
         "",
         &[
-            "r.urdf:1:1: XML: the document does not have a root node; wanted a URDF: an XML document with one element <robot>",
+            "r.urdf:1:1: XML: the document does not have a root node; expected a URDF: an XML document with one element <robot>",
         ],
     );
-    told("<sdf/>", &["r.urdf:1:1: <sdf> is the outermost element; wanted <robot>"]);
-    told("<robot/>", &["r.urdf:1:1: <robot> has 0 links; wanted 1 to 10000"]);
-    told(
+    assert_errors("<sdf/>", &["r.urdf:1:1: <sdf> is the outermost element; expected <robot>"]);
+    assert_errors("<robot/>", &["r.urdf:1:1: <robot> has 0 links; expected 1 to 10000"]);
+    assert_errors(
         "<!DOCTYPE r [<!ENTITY a \"b\">]><robot/>",
-        &["r.urdf:1:1: XML: XML with DTD detected; wanted a URDF: an XML document with one element <robot>"],
+        &["r.urdf:1:1: XML: XML with DTD detected; expected a URDF: an XML document with one element <robot>"],
     );
 }
 
@@ -175,98 +177,96 @@ fn trees_that_are_none() {
         let links: String = links.iter().map(|name| format!("<link name=\"{name}\">{BALL}</link>\n")).collect();
         format!("<robot>\n{links}{joints}</robot>")
     };
-    told(
+    assert_errors(
         &robot(&["a", "b"], &joint("j", "a", "c")),
-        &["r.urdf:4:61: `link` of the child of joint \"j\" is \"c\"; wanted the name of a link; did you mean \"a\"?"],
+        &["r.urdf:4:61: `link` of the child of joint \"j\" is \"c\"; expected the name of a link; did you mean \"a\"?"],
     );
-    told(
+    assert_errors(
         &robot(&["a", "b"], ""),
-        &[
-            "r.urdf:3:1: link \"b\" is the child of no joint, and neither is \"a\"; wanted one root that all others hang on",
-        ],
+        &["r.urdf:3:1: links \"b\" and \"a\" are not children of any joint; expected one root link"],
     );
-    told(
+    assert_errors(
         &robot(&["a", "b", "c"], &(joint("j", "b", "c") + &joint("k", "c", "b"))),
-        &["r.urdf:5:1: joint \"j\" is part of a loop of joints; wanted a tree with one root"],
+        &["r.urdf:5:1: joint \"j\" is part of a loop of joints; expected a tree with one root"],
     );
-    told(
+    assert_errors(
         &robot(&["a", "b", "c"], &(joint("j", "a", "c") + &joint("k", "b", "c"))),
         &[
-            "r.urdf:3:1: link \"b\" is the child of no joint, and neither is \"a\"; wanted one root that all others hang on",
-            "r.urdf:6:1: joint \"k\" has the child \"c\", which joint \"j\" at line 5 has too; wanted one joint for each link; loops are closed by closures of a scene",
+            "r.urdf:3:1: links \"b\" and \"a\" are not children of any joint; expected one root link",
+            "r.urdf:6:1: joint \"k\" has the child \"c\", which is also the child of joint \"j\" at line 5; expected one joint for each link; a scene closes loops by [[loop_joint]]",
         ],
     );
-    told(
+    assert_errors(
         &robot(&["a", "a"], ""),
-        &["r.urdf:3:1: there is a second link \"a\"; the first is at line 2; wanted a name that no other link has"],
+        &["r.urdf:3:1: there is a second link \"a\"; the first is at line 2; expected a unique name"],
     );
-    told(
+    assert_errors(
         &robot(&["a"], "<joint name=\"j\" type=\"hinge\"><parent link=\"a\"/></joint>"),
         &[
-            "r.urdf:3:1: joint \"j\" has no <child>; wanted <child link=\"NAME\"/>",
-            "r.urdf:3:23: `type` of joint \"j\" is \"hinge\"; wanted revolute, continuous, prismatic, fixed, floating, planar or spherical",
+            "r.urdf:3:1: joint \"j\" has no <child>; expected <child link=\"NAME\"/>",
+            "r.urdf:3:23: `type` of joint \"j\" is \"hinge\"; expected revolute, continuous, prismatic, fixed, floating, planar or spherical",
         ],
     );
 }
 
 #[test]
 fn wrong_numbers() {
-    told(
+    assert_errors(
         &two("revolute", ""),
         &[
-            "r.urdf:4:1: joint \"j\" has no <limit>; wanted <limit lower upper effort velocity/>, or type=\"continuous\" for a hinge without limits",
+            "r.urdf:4:1: joint \"j\" has no <limit>; expected <limit lower upper effort velocity/>, or type=\"continuous\" for a revolute joint without limits",
         ],
     );
-    told(
+    assert_errors(
         &two("revolute", "<limit lower=\"1\" upper=\"-1\"/>"),
-        &["r.urdf:4:82: `lower` of the limit of joint \"j\" is \"1\"; wanted at most `upper`, -1"],
+        &["r.urdf:4:82: `lower` of the limit of joint \"j\" is \"1\"; expected at most `upper`, -1"],
     );
-    told(
+    assert_errors(
         &two("continuous", "<axis xyz=\"0 0 0\"/>"),
-        &["r.urdf:4:81: `xyz` of the axis of joint \"j\" is \"0 0 0\"; wanted a direction: three numbers, not all 0"],
+        &["r.urdf:4:81: `xyz` of the axis of joint \"j\" is \"0 0 0\"; expected a direction: three numbers, not all 0"],
     );
-    told(
+    assert_errors(
         &two("continuous", "<origin xyz=\"0 nan 0\"/>"),
         &[
-            "r.urdf:4:83: `xyz` of the origin of joint \"j\" is \"0 nan 0\"; wanted 3 numbers with blanks between; each a finite number from -1e12 to 1e12",
+            "r.urdf:4:83: `xyz` of the origin of joint \"j\" is \"0 nan 0\"; expected 3 numbers separated by spaces; each a finite number from -1e12 to 1e12",
         ],
     );
-    told(
+    assert_errors(
         &two("continuous", "<origin rpy=\"0 0\"/>"),
         &[
-            "r.urdf:4:83: `rpy` of the origin of joint \"j\" is \"0 0\"; wanted 3 numbers with blanks between; each a finite number from -1e12 to 1e12",
+            "r.urdf:4:83: `rpy` of the origin of joint \"j\" is \"0 0\"; expected 3 numbers separated by spaces; each a finite number from -1e12 to 1e12",
         ],
     );
-    told(
+    assert_errors(
         &two("continuous", "").replace("value=\"2\"", "value=\"-2\""),
-        &["r.urdf:3:39: `value` of the mass of the inertial of link \"b\" is \"-2\"; wanted a number of at least 0"],
+        &["r.urdf:3:39: `value` of the mass of the inertial of link \"b\" is \"-2\"; expected a number of at least 0"],
     );
-    told(
+    assert_errors(
         &two("continuous", "").replace("iyy=\"1\"", "iyy=\"one\""),
         &[
-            "r.urdf:3:65: `iyy` of the inertia of the inertial of link \"b\" is \"one\"; wanted a finite number from -1e12 to 1e12",
+            "r.urdf:3:65: `iyy` of the inertia of the inertial of link \"b\" is \"one\"; expected a finite number from -1e12 to 1e12",
         ],
     );
-    told(
+    assert_errors(
         &two("continuous", "<mimic joint=\"k\"/>"),
-        &["r.urdf:4:70: joint \"j\" mimics \"k\"; wanted the name of another joint"],
+        &["r.urdf:4:70: joint \"j\" mimics \"k\"; expected the name of another joint"],
     );
-    told(
+    assert_errors(
         &two("continuous", "").replace(BALL, ""),
         &[
-            "r.urdf:4:1: \"j\" moves link \"b\", and neither that nor what hangs on it has a mass; wanted <inertial> in one of them, or a fixed joint",
+            "r.urdf:4:1: \"j\" moves link \"b\", and neither that link nor its descendants have a mass; expected <inertial> in one of them, or a fixed joint",
         ],
     );
 }
 
 #[test]
-fn an_inertia_of_no_body_is_mended_and_told() {
+fn an_inertia_of_no_body_is_corrected_with_a_note() {
     let robot =
         read(&two("continuous", "").replace("ixx=\"1\" iyy=\"1\" izz=\"1\"", "ixx=\"-0.5\" iyy=\"1\" izz=\"1\""));
     assert_eq!(robot.notes.len(), 1);
     assert_eq!(
         robot.notes[0],
-        "r.urdf:3: the inertia of the inertial of link \"b\": principal moments below 0 are set to 0"
+        "r.urdf:3: the inertia of the inertial of link \"b\": negative principal moments are set to 0"
     );
     assert!((robot.model.links()[0].mass.inertia - Mat3::from_diagonal(&Vec3::new(0.0, 1.0, 1.0))).amax() < 1e-15);
 }
@@ -338,7 +338,7 @@ fn neighbours_and_links_that_overlap_at_the_start_never_meet() {
     assert!(!meet(0, 1) && !meet(1, 2) && !meet(2, 3) && !meet(3, 4), "joined, one pair through a stack");
     assert!(!meet(2, 4), "overlap");
     assert!(meet(0, 2) && meet(0, 3) && meet(1, 3) && meet(1, 4));
-    assert_eq!(notes, ["links that overlap at the start never meet: b and d"]);
+    assert_eq!(notes, ["links that overlap at the start do not collide: b and d"]);
 }
 
 /// One link with a collision mesh and a picture.
@@ -387,8 +387,8 @@ fn meshes_that_are_missing_open_or_in_another_format() {
     let error = load(&path, &UrdfOptions::default()).err().unwrap().to_string();
     assert!(error.starts_with(&format!("{}:2:", path.display())), "{error}");
     assert!(
-        error.contains("nowhere.stl\" cannot be collided with: there is no file")
-            && error.ends_with("missing_meshes = \"skip\" (--missing-meshes skip) leaves it out"),
+        error.contains("nowhere.stl\" cannot be used for collision: there is no file")
+            && error.ends_with("missing_meshes = \"skip\" (--missing-meshes skip) leaves the mesh out"),
         "{error}"
     );
     let (body, notes) = load(&path, &skip).unwrap();
@@ -407,11 +407,11 @@ fn meshes_that_are_missing_open_or_in_another_format() {
     assert_eq!(notes.len(), 2, "{notes:?}");
     assert!(
         notes[0].ends_with(
-            "visual mesh ball.mesh: left out: the format 'mesh' is not read, only .stl, .obj, .ply and .dae"
+            "visual mesh ball.mesh: left out: the format 'mesh' is not supported; supported are .stl, .obj, .ply and .dae"
         ),
         "{notes:?}"
     );
-    assert!(notes[1].ends_with("open.obj: its surface is not closed, so its convex hull collides"), "{notes:?}");
+    assert!(notes[1].ends_with("open.obj: its surface is not closed, so its convex hull is used"), "{notes:?}");
     assert_eq!(body.renderable().unwrap().visuals().len(), 1, "what collides is drawn instead");
 
     let hulls = UrdfOptions { collision_meshes: CollisionMeshes::Hull, ..UrdfOptions::default() };

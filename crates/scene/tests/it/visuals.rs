@@ -107,7 +107,7 @@ fn a_link_whose_meshes_are_lost_is_drawn_as_it_collides() {
     let notes = visual_notes(visuals(&body));
     assert_eq!(notes.len(), 2, "{notes:?}");
     assert!(notes[0].contains("gone.obj: left out: cannot be read: No such file"), "{notes:?}");
-    assert!(notes[1].ends_with("pipe.obj: left out: cannot be read: it is no regular file"), "{notes:?}");
+    assert!(notes[1].ends_with("pipe.obj: left out: cannot be read: it is not a regular file"), "{notes:?}");
 }
 
 #[test]
@@ -129,8 +129,8 @@ fn limits_need_no_mesh() {
     let folder = Folder::new("limits");
     let text = robot(&[]).replace("<sphere radius=\"0.25\"/>", "<mesh filename=\"nowhere.stl\"/>");
     let read = model(folder.write("r.urdf", text), &UrdfOptions::default()).unwrap();
-    assert_eq!(read.freedoms.len(), read.model.dof());
-    assert_eq!(read.freedoms[0].limits, Some([-1.0, 2.0]));
+    assert_eq!(read.dofs.len(), read.model.dof());
+    assert_eq!(read.dofs[0].limits, Some([-1.0, 2.0]));
 }
 
 /// Three balls of radius 0.5 m in a row: the first two 0.9 m apart, the third 0.05 m deep in the ground.

@@ -157,7 +157,7 @@ fn head_pose(user: &tumble::scene::cave::User) -> Pose {
 
 /// Puts a scene into another one's surroundings (thesis §IV.C: the immersive scene).
 fn merge_environment(scene: &mut SceneFile, from: SceneFile, notes: &mut Vec<String>) -> Result<(), Failure> {
-    let still = from.bodies.iter().filter(|b| b.mode == Mode::Static && b.alive).count();
+    let still = from.bodies.iter().filter(|b| b.mode == Mode::Static && b.enabled).count();
     notes.push(format!("environment {}: its camera, lights, sky, ground and {still} bodies that do not move; camera and lights of {} are ignored", from.file, scene.file));
     let moving = from.bodies.iter().filter(|b| b.mode != Mode::Static).count() + from.articulated.len();
     if moving > 0 {
@@ -171,7 +171,7 @@ fn merge_environment(scene: &mut SceneFile, from: SceneFile, notes: &mut Vec<Str
     let (meshes, materials) = (scene.meshes.len(), scene.materials.len());
     scene.meshes.extend(from.meshes);
     scene.materials.extend(from.materials);
-    for mut body in from.bodies.into_iter().filter(|b| b.mode == Mode::Static && b.alive) {
+    for mut body in from.bodies.into_iter().filter(|b| b.mode == Mode::Static && b.enabled) {
         if scene.bodies.iter().any(|b| b.name == body.name) || scene.articulated.iter().any(|a| a.name == body.name) {
             return Err(Failure::input(format!(
                 "{}: body \"{}\" of the environment has the name of one of {}; rename one",

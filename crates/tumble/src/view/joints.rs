@@ -43,7 +43,7 @@ impl Joints {
     pub fn new(scene: &SceneFile, world: &World) -> Joints {
         let mut joints = Vec::new();
         let several = scene.articulated.len() > 1;
-        for spec in scene.articulated.iter().filter(|_| scene.closures.is_empty()) {
+        for spec in scene.articulated.iter().filter(|_| scene.loop_joints.is_empty()) {
             let Some(id) = world.find(&spec.name) else { continue };
             let Some(body) = world.get::<ArticulatedBody>(id) else { continue };
             let place = |link: usize| {
@@ -64,10 +64,10 @@ impl Joints {
                     body: id,
                     freedom,
                     position,
-                    range: joint.freedom.limits.unwrap_or([-most, most]),
+                    range: joint.dof.limits.unwrap_or([-most, most]),
                     unit: if slides { "m" } else { "rad" },
                     effort: joint.effort.unwrap_or(f64::INFINITY),
-                    own: joint.freedom.drive.clone(),
+                    own: joint.dof.drive.clone(),
                     followers: spec.links.iter().enumerate().filter_map(follower).collect(),
                 });
             }

@@ -72,7 +72,7 @@ fn skeleton_falls_down_the_stairs_and_lies_still() {
     let mut world = scene.build().unwrap().0;
     let start = world.energy();
     let (mut past, mut deepest, mut gain, mut energy) = (f64::MIN, 0.0f64, 0.0f64, start.total());
-    for _ in 0..(scene.world.seconds / scene.world.dt_s).round() as usize {
+    for _ in 0..(scene.world.duration_s / scene.world.dt_s).round() as usize {
         deepest = deepest.max(world.step().unwrap().max_penetration);
         past = past.max(past_limits(&world, "skeleton"));
         let now = world.energy().total();

@@ -84,7 +84,7 @@ pub fn json(path: &Path) -> Value {
 /// A scene of one body that falls, with extra lines at the places named.
 pub fn scene(body: &str, rest: &str) -> String {
     format!(
-        "description = \"A test\"\n[world]\nseconds = 0.1\n[[body]]\nname = \"ball\"\nshape = {{ type = \"sphere\", radius_m = 0.1 }}\nmass_kg = 1.0\n{body}\n{rest}\n"
+        "description = \"A test\"\n[world]\nduration_s = 0.1\n[[body]]\nname = \"ball\"\nshape = {{ type = \"sphere\", radius_m = 0.1 }}\nmass_kg = 1.0\n{body}\n{rest}\n"
     )
 }
 

@@ -128,7 +128,7 @@ fn pendulum_twins_a_millionth_apart_part() {
         a.dot(&b).clamp(-1.0, 1.0).acos()
     };
     let (mut first, mut most) = (f64::NAN, 0.0f64);
-    for _ in 0..(scene.world.seconds / scene.world.dt_s) as usize {
+    for _ in 0..(scene.world.duration_s / scene.world.dt_s) as usize {
         world.step().unwrap();
         most = most.max(apart(&world));
         if first.is_nan() && most > 0.1 {
@@ -168,7 +168,7 @@ fn chain_stays_joined_loses_energy_and_balances_its_impulses_about_the_hook() {
     let (mut expected, begin) = (about_hook(&world), about_hook(&world).norm());
     let (mut met, mut rise, mut off, mut open, mut depth) = (f64::NAN, 0.0f64, 0.0f64, 0.0f64, 0.0f64);
     let mut landed = false;
-    for _ in 0..(scene.world.seconds / h) as usize {
+    for _ in 0..(scene.world.duration_s / h) as usize {
         let moment = weight_moment(&world);
         let report = world.step().unwrap();
         depth = depth.max(report.max_penetration);

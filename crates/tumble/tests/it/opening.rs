@@ -139,7 +139,7 @@ fn robots_and_meshes_that_cannot_be_read_give_one_message() {
         ("nowhere.urdf".to_owned(), "nowhere.urdf: cannot read"),
         ("nowhere.obj".to_owned(), "nowhere.obj"),
         (folder.write("broken.urdf", "<robot name=\"r\">\n<link name=\"a\">\n</robot>"), "broken.urdf:3:"),
-        (folder.write("other.urdf", "<model/>"), "wanted <robot>"),
+        (folder.write("other.urdf", "<model/>"), "expected <robot>"),
         (folder.write("gone.urdf", missing_mesh), "gone.stl"),
         (folder.write("empty.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n"), "empty.obj"),
         (folder.write("empty.stl", ""), "empty.stl"),

@@ -131,7 +131,7 @@ fn the_sums_of_the_summary_are_those_of_its_bodies() {
     let folder = Folder::new("sums");
     let path = folder.path("summary.json");
     // a ball of 2 kg that flies for half a second: no contact, so the closed form holds
-    let toml = "[world]\nseconds = 0.5\ndt_s = 0.01\n[[body]]\nname = \"ball\"\nshape = { type = \"sphere\", radius_m = 0.1 }\nmass_kg = 2.0\n\
+    let toml = "[world]\nduration_s = 0.5\ndt_s = 0.01\n[[body]]\nname = \"ball\"\nshape = { type = \"sphere\", radius_m = 0.1 }\nmass_kg = 2.0\n\
         position_m = [1.0, 2.0, 3.0]\nvelocity_m_per_s = [0.5, -0.25, 4.0]\nangular_velocity_rad_per_s = [0, 0, 3.0]\n";
     succeed(&["run", &folder.write("ball.toml", toml), "--quiet", "--summary", &text(&path)]);
     let summary = json(&path);

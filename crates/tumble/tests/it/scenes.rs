@@ -167,7 +167,7 @@ fn falling_stays_in_its_box_and_comes_to_rest_with_few_tries() {
     in_both("falling", |scene, mut world| {
         let ids = movers(scene, &world);
         let fall = world.energy().total();
-        let (frames, method) = (steps(scene, scene.world.seconds), world.stepper_name());
+        let (frames, method) = (steps(scene, scene.world.duration_s), world.stepper_name());
         let (mut tries, mut penetration) = (0, 0.0f64);
         for _ in 0..frames {
             let report = world.step().unwrap();

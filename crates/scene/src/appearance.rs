@@ -1,4 +1,4 @@
-//! How a surface looks: colours, a pattern, and how it shines. Nothing here moves a body.
+//! The appearance of a surface: colors, pattern, gloss. It has no effect on motion.
 
 use crate::bound::Bound;
 use crate::fields::{Fields, Names, Value};
@@ -8,26 +8,26 @@ use tumble_core::Detail;
 /// Red, green and blue from 0 to 1, sRGB (as on a screen, not linear light).
 pub type Color = [f64; 3];
 
-/// A pattern drawn over the surface, in body axes, so that turning shows.
+/// A pattern drawn over the surface in body axes, which makes rotation visible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Pattern {
-    /// One colour.
+    /// One color.
     Plain,
-    /// Squares of the two colours.
+    /// Squares of the two colors.
     Checker,
-    /// Lines of the second colour on the first.
+    /// Lines of the second color on the first.
     Grid,
-    /// A billiard ball of one colour with spots of the second.
+    /// A billiard ball of one color with spots of the second.
     SolidBall,
-    /// A billiard ball of the second colour with a band of the first.
+    /// A billiard ball of the second color with a band of the first.
     StripedBall,
     /// Grain along the body's x axis.
     Wood,
     /// The nap of a billiard cloth.
     Felt,
-    /// Two rings of the second colour around the shape's z axis, as on the neck of a pin.
+    /// Two rings of the second color around the shape's z axis, as on the neck of a bowling pin.
     Rings,
-    /// Veins of the second colour, as in a bowling ball.
+    /// Veins of the second color, as in a bowling ball.
     Marble,
 }
 
@@ -46,41 +46,43 @@ impl Pattern {
 }
 
 impl Pattern {
-    /// The word for it in files; also the name of its shader.
+    /// Returns its name in files, which is also the name of its shader.
     pub fn name(self) -> &'static str {
         Pattern::NAMES.iter().find(|(_, pattern)| *pattern == self).map_or("plain", |(name, _)| *name)
     }
 }
 
-/// The look of a surface.
+/// The appearance of a surface.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Appearance {
-    /// Main colour. Default a light grey.
+pub struct AppearanceSpec {
+    /// Main color. Default a light gray.
     pub color: Color,
-    /// The other colour of a pattern. Default white.
+    /// The other color of a pattern. Default white.
     pub second_color: Color,
     /// Default `plain`.
     pub pattern: Pattern,
-    /// Size of a cell of the pattern (a square, a board, the width of a ring), metres. Default 0.1.
+    /// Size of a cell of the pattern (a square, a board, the width of a ring), meters. Default 0.1.
     pub pattern_scale_m: f64,
-    /// Where along the shape's z axis the pattern begins (the lower edge of `rings`), metres. Default 0.
+    /// Start of the pattern along the shape's z axis (the lower edge of `rings`), meters. Default
+    /// 0.
     pub pattern_offset_m: f64,
     /// 0 mirror-like to 1 dull. Default 0.5.
     pub roughness: f64,
-    /// 0 not metal to 1 metal. Default 0.
+    /// 0 dielectric to 1 metal. Default 0.
     pub metallic: f64,
-    /// Strength of a clear varnish on top, 0 to 1. Default 0.
+    /// Strength of a clear coat, 0 to 1. Default 0.
     pub clearcoat: f64,
-    /// A picture (PNG) over the main colour, which then only tints it, once every `pattern_scale_m`, and once around a sphere. In the file from the
-    /// folder of the scene; here as it is opened.
+    /// A PNG image over the main color, which then tints it. It repeats every `pattern_scale_m`,
+    /// and covers a sphere once. In the file relative to the folder of the scene; here the path as
+    /// it is opened.
     pub texture: Option<PathBuf>,
-    /// How much of it is drawn. Default full.
+    /// Level of detail. Default full.
     pub detail: Detail,
 }
 
-impl Default for Appearance {
+impl Default for AppearanceSpec {
     fn default() -> Self {
-        Appearance {
+        AppearanceSpec {
             color: [0.72, 0.72, 0.74],
             second_color: [1.0, 1.0, 1.0],
             pattern: Pattern::Plain,
@@ -95,10 +97,10 @@ impl Default for Appearance {
     }
 }
 
-impl Appearance {
-    /// The look whose keys stand in `f`; what is not there is as in `base`.
-    pub(crate) fn read(f: &mut Fields<'_>, base: &Appearance) -> Appearance {
-        Appearance {
+impl AppearanceSpec {
+    /// Reads the appearance keys. Absent keys are taken from `base`.
+    pub(crate) fn read(f: &mut Fields<'_>, base: &AppearanceSpec) -> AppearanceSpec {
+        AppearanceSpec {
             color: read_color(f, "color", base.color),
             second_color: read_color(f, "second_color", base.second_color),
             pattern: f.choice_or("pattern", Pattern::NAMES, base.pattern),
@@ -113,7 +115,7 @@ impl Appearance {
     }
 }
 
-/// The file of a texture, which must be there.
+/// Reads the file of a texture, which must exist.
 fn read_texture(f: &mut Fields<'_>) -> Option<PathBuf> {
     let (file, value) = f.optional_text("texture")?;
     let path = f.log.folder().join(file);
@@ -124,14 +126,14 @@ fn read_texture(f: &mut Fields<'_>) -> Option<PathBuf> {
 }
 
 fn read_detail(f: &mut Fields<'_>, default: Detail) -> Detail {
-    let Some((words, value)) = f.optional_text("quality") else { return default };
-    words.parse().unwrap_or_else(|wanted: String| {
-        f.wrong("quality", value, wanted);
+    let Some((words, value)) = f.optional_text("detail") else { return default };
+    words.parse().unwrap_or_else(|expected: String| {
+        f.wrong("detail", value, expected);
         default
     })
 }
 
-/// A colour, or `default` where the key is not there.
+/// Reads a color, or returns `default` if the key is absent.
 pub(crate) fn read_color(f: &mut Fields<'_>, key: &'static str, default: Color) -> Color {
     match f.value(key) {
         Some(value) => as_color(f, key, value),
@@ -139,18 +141,18 @@ pub(crate) fn read_color(f: &mut Fields<'_>, key: &'static str, default: Color) 
     }
 }
 
-/// A value as a colour: `"#rrggbb"` or `[r, g, b]` from 0 to 1.
+/// Returns a value as a color: `"#rrggbb"` or `[r, g, b]` from 0 to 1.
 pub(crate) fn as_color(f: &Fields<'_>, key: &str, value: &Value<'_>) -> Color {
     match value.get_ref().as_str() {
         Some(text) => hex_color(text).unwrap_or_else(|| {
-            f.wrong(key, value, "a colour: \"#rrggbb\", or [r, g, b] with numbers from 0 to 1");
+            f.wrong(key, value, "a color: \"#rrggbb\", or [r, g, b] with numbers from 0 to 1");
             [f64::NAN; 3]
         }),
         None => f.as_vector(key, value, Bound::UNIT),
     }
 }
 
-/// A value as a pattern's name.
+/// Returns a value as a pattern.
 pub(crate) fn as_pattern<'a>(f: &Fields<'a>, key: &str, value: &'a Value<'a>) -> Pattern {
     f.as_choice(key, value, Pattern::NAMES).unwrap_or(Pattern::Plain)
 }

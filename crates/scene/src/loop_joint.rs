@@ -1,30 +1,30 @@
-//! `[[closure]]`: a joint between any two parts of any two objects, which closes a loop.
+//! `[[loop_joint]]`: a joint between two parts of any objects. It may close a loop.
 
 use crate::body::read_name;
 use crate::bound::Bound;
 use crate::fields::{Fields, Names};
 
-/// What a closure holds together.
+/// Which relative motion a loop joint removes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ClosureKind {
-    /// A point: a ball joint.
-    Point,
-    /// A point and an axis.
-    Hinge,
-    /// Everything.
-    Weld,
-    /// All but the way along an axis.
-    Slider,
+pub enum LoopJointKind {
+    /// Holds a point: three rotations are free.
+    Spherical,
+    /// Holds a point and an axis: the rotation about the axis is free.
+    Revolute,
+    /// Holds position and orientation.
+    Fixed,
+    /// Holds all but the translation along an axis.
+    Prismatic,
 }
 
-const KINDS: Names<ClosureKind> = &[
-    ("point", ClosureKind::Point),
-    ("hinge", ClosureKind::Hinge),
-    ("weld", ClosureKind::Weld),
-    ("slider", ClosureKind::Slider),
+const KINDS: Names<LoopJointKind> = &[
+    ("spherical", LoopJointKind::Spherical),
+    ("revolute", LoopJointKind::Revolute),
+    ("fixed", LoopJointKind::Fixed),
+    ("prismatic", LoopJointKind::Prismatic),
 ];
 
-/// A part of an object, by place in the description.
+/// A part of an object in the description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PartSpec {
     /// A body, by its index in [`SceneFile::bodies`](crate::SceneFile::bodies).
@@ -33,35 +33,35 @@ pub enum PartSpec {
     Link(usize, usize),
 }
 
-/// One closure, all references resolved. It joins its sides as they stand at time 0.
+/// One loop joint, all references resolved. It joins its sides as they stand at time 0.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ClosureSpec {
+pub struct LoopJointSpec {
     /// Unique in the scene, bodies included.
     pub name: String,
-    /// What is held.
-    pub kind: ClosureKind,
+    /// Which motion it removes.
+    pub kind: LoopJointKind,
     /// One side.
     pub a: PartSpec,
-    /// The other; `None` is the world.
+    /// The other side; `None` is the world.
     pub b: Option<PartSpec>,
-    /// Where, world axes at time 0, m.
+    /// Position of the joint, world axes at time 0, m.
     pub position_m: [f64; 3],
-    /// Unit axis of a hinge or slider, world axes at time 0.
+    /// Unit axis of a revolute or prismatic joint, world axes at time 0.
     pub axis: [f64; 3],
 }
 
-/// Who can be a side of a closure.
+/// Looks up the parts that a loop joint or a pair names.
 pub(crate) trait Parts {
-    /// The part of that name: `body`, or `object/link`.
+    /// Returns the part of that name: `body`, or `object/link`.
     fn part(&self, name: &str) -> Option<PartSpec>;
-    /// The index of the articulated body of that name.
+    /// Returns the index of the articulated body of that name.
     fn articulated(&self, name: &str) -> Option<usize>;
-    /// Names, for messages.
+    /// Returns all names, for messages.
     fn names(&self) -> Vec<String>;
 }
 
-impl ClosureSpec {
-    pub(crate) fn read(mut f: Fields<'_>, parts: &impl Parts) -> Option<ClosureSpec> {
+impl LoopJointSpec {
+    pub(crate) fn read(mut f: Fields<'_>, parts: &impl Parts) -> Option<LoopJointSpec> {
         let name = read_name(&mut f).unwrap_or_default();
         let Some(kind) = f.choice("type", KINDS) else {
             f.give_up();
@@ -71,8 +71,8 @@ impl ClosureSpec {
         let b = f.optional_text("b");
         let position_m = f.vector("position_m", Bound::ANY);
         let axis = match kind {
-            ClosureKind::Hinge | ClosureKind::Slider => f.direction("axis"),
-            ClosureKind::Point | ClosureKind::Weld => [0.0, 0.0, 1.0],
+            LoopJointKind::Revolute | LoopJointKind::Prismatic => f.direction("axis"),
+            LoopJointKind::Spherical | LoopJointKind::Fixed => [0.0, 0.0, 1.0],
         };
         let find = |key: &str, side: Option<(&str, &crate::fields::Value<'_>)>| {
             let (name, value) = side?;
@@ -89,6 +89,6 @@ impl ClosureSpec {
             f.wrong("b", value, "a part other than `a`; or no `b`, which is the world");
         }
         f.finish();
-        Some(ClosureSpec { name, kind, a: sides[0]?, b: sides[1], position_m, axis })
+        Some(LoopJointSpec { name, kind, a: sides[0]?, b: sides[1], position_m, axis })
     }
 }
