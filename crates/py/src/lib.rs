@@ -1,40 +1,14 @@
 //! The Python module `tumble._native`: conversion between Python and the crates, and no physics.
 
-mod adding;
 mod arrays;
-mod articulation;
-mod bodies;
-mod body;
-mod building;
-mod collect;
-mod contacts;
-mod convert;
-mod description;
+mod choices;
 mod errors;
 mod extension;
 mod faults;
-mod inner;
 mod interrupt;
-mod joints;
-mod layout;
-mod looks;
-mod pairs;
-mod pickling;
-mod picture;
+mod io;
+mod objects;
 mod pool;
-mod recording;
-mod report;
-mod robot;
-mod rollout;
-mod saved;
-mod shapes;
-mod shared;
-mod slow;
-mod spheretree;
-mod spot;
-mod state;
-mod view;
-mod words;
 mod world;
 
 use pyo3::prelude::*;
@@ -45,36 +19,36 @@ mod _native {
     use super::*;
 
     #[pymodule_export]
-    use super::articulation::Articulation;
+    use super::choices::_choices;
     #[pymodule_export]
-    use super::bodies::Bodies;
-    #[pymodule_export]
-    use super::body::RigidBody;
-    #[pymodule_export]
-    use super::description::_unpickle_articulation;
+    use super::extension::view::View;
     #[pymodule_export]
     use super::faults::_panic;
     #[pymodule_export]
-    use super::pickling::{_unpickle_shape, _unpickle_world};
+    use super::io::recording::{Recorder, read_recording};
     #[pymodule_export]
-    use super::recording::{Recorder, read_recording};
+    use super::objects::articulation::Articulation;
     #[pymodule_export]
-    use super::report::StepReport;
+    use super::objects::bodies::Bodies;
     #[pymodule_export]
-    use super::shapes::{Block, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere};
+    use super::objects::body::RigidBody;
     #[pymodule_export]
-    use super::spheretree::{_unpickle_tree, SphereTree};
+    use super::objects::description::_unpickle_articulation;
     #[pymodule_export]
-    use super::view::View;
+    use super::objects::shapes::{Block, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere};
     #[pymodule_export]
-    use super::words::_choices;
+    use super::objects::spheretree::{_unpickle_tree, SphereTree};
     #[pymodule_export]
-    use super::world::World;
+    use super::world::pickling::{_unpickle_shape, _unpickle_world};
+    #[pymodule_export]
+    use super::world::report::StepReport;
+    #[pymodule_export]
+    use super::world::world::World;
 
     /// Adds everything that is not a class or a function.
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        slow::listen();
+        io::slow::listen();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

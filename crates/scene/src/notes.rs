@@ -2,6 +2,9 @@
 
 use tumble_core::{Visual, VisualGeometry, World};
 
+/// Notes for the user: what was repaired or left out.
+pub type Notes = Vec<String>;
+
 /// Overlapping pairs that notes list by name.
 const MAX_LISTED_OVERLAPS: usize = 8;
 

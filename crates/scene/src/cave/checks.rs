@@ -18,7 +18,7 @@ use nalgebra::{Point3, Vector3};
 use super::Cave;
 use super::facet::{Facet, Stereo};
 use super::parts::{Screen, User};
-use crate::fields::Fields;
+use crate::parse::fields::Fields;
 
 /// Largest cosine between the edges of a screen's corner: 1 mm in a meter.
 pub const SQUARE_TOLERANCE: f64 = 1e-3;

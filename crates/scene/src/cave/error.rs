@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::Cave;
-use crate::error::{Invalid, Problem};
-use crate::suggest::{listed, nearest};
+use crate::parse::problem::{Invalid, Problem};
+use crate::parse::suggest::{listed, nearest};
 
 /// Why a cave could not be read, or why a facet of it was not found.
 #[derive(Debug, Error)]

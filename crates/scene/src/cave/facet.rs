@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::checks;
 use super::parts::{Node, Screen, User, read_name};
-use crate::bound::Bound;
-use crate::fields::{Fields, Names};
+use crate::parse::bound::Bound;
+use crate::parse::fields::{Fields, Names};
 
 /// How one image shows both eyes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -180,7 +180,7 @@ fn reference(
     f: &Fields<'_>,
     key: &str,
     typed: &str,
-    value: &crate::fields::Value<'_>,
+    value: &crate::parse::fields::Value<'_>,
     known: Vec<&str>,
 ) -> Option<usize> {
     let found = known.iter().position(|name| *name == typed);

@@ -40,11 +40,11 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
-use crate::error::Invalid;
-use crate::fields::Fields;
-use crate::file::{parse_toml, read_table};
-use crate::log::Log;
-use crate::suggest::nearest;
+use crate::parse::fields::Fields;
+use crate::parse::file::{parse_toml, read_table};
+use crate::parse::log::Log;
+use crate::parse::problem::Invalid;
+use crate::parse::suggest::nearest;
 
 /// Largest cave file in bytes: 1 MiB.
 pub const MAX_BYTES: u64 = 1 << 20;

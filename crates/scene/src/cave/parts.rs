@@ -5,8 +5,8 @@ use std::net::IpAddr;
 use nalgebra::{Point3, Vector3};
 
 use super::checks;
-use crate::bound::Bound;
-use crate::fields::Fields;
+use crate::parse::bound::Bound;
+use crate::parse::fields::Fields;
 
 /// A viewer.
 #[derive(Clone, Debug, PartialEq)]

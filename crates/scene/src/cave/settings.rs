@@ -4,8 +4,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::Cave;
-use crate::fields::{Fields, Names};
-use crate::log::Log;
+use crate::parse::fields::{Fields, Names};
+use crate::parse::log::Log;
 
 /// How frames travel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::{Cave, CaveError};
-use crate::file::description;
-use crate::suggest::{listed, nearest};
+use crate::parse::file::description;
+use crate::parse::suggest::{listed, nearest};
 
 /// A cave that is built into the library.
 #[derive(Clone, Copy, Debug)]

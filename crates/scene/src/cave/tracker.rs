@@ -5,7 +5,7 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use toml::de::DeValue;
 
 use super::User;
-use crate::fields::{Fields, Names};
+use crate::parse::fields::{Fields, Names};
 
 /// Default UDP port for datagrams of a tracker.
 pub const TRACKER_PORT: u16 = 47_200;
@@ -74,7 +74,7 @@ impl Tracker {
             users: read_users(&mut f, users).unwrap_or(default.users),
             senders: read_senders(&mut f),
             axes: f.choice_or("axes", AXES, default.axes),
-            origin_m: f.vector_or("origin_m", crate::bound::Bound::ANY, default.origin_m),
+            origin_m: f.vector_or("origin_m", crate::parse::bound::Bound::ANY, default.origin_m),
         };
         if f.log.count() == problems && !tracker.address.is_loopback() && tracker.senders.is_empty() {
             let message = format!("{} listens at {} without `senders`", f.what, tracker.address);
@@ -109,7 +109,7 @@ fn read_senders(f: &mut Fields<'_>) -> Vec<IpAddr> {
         .collect()
 }
 
-fn address_of(f: &Fields<'_>, key: &str, text: &str, value: &crate::fields::Value<'_>) -> Option<IpAddr> {
+fn address_of(f: &Fields<'_>, key: &str, text: &str, value: &crate::parse::fields::Value<'_>) -> Option<IpAddr> {
     let address = text.parse().ok();
     if address.is_none() {
         f.wrong(key, value, "an IP address, such as \"127.0.0.1\"");

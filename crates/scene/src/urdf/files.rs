@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::UrdfOptions;
+use super::options::UrdfOptions;
 
 /// Number of folders above a URDF that are searched for its packages.
 const MAX_FOLDERS: usize = 32;

@@ -9,8 +9,8 @@ use tumble_core::collide::{Pose, Vec3};
 
 use super::link::read_origin;
 use super::xml::Element;
-use crate::bound::Bound;
-use crate::joint::JointSpec;
+use crate::parse::bound::Bound;
+use crate::parse::joint::JointSpec;
 
 /// The joint types of a URDF. `spherical` is not in its specification, but some files have it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,7 +128,7 @@ fn read_end(joint: &Element<'_, '_>, end: &'static str, links: &BTreeMap<String,
     let name = element.required_text("link", "the name of a link")?;
     let found = links.get(name).copied();
     if found.is_none() {
-        let near = crate::suggest::nearest(name, links.keys().map(String::as_str));
+        let near = crate::parse::suggest::nearest(name, links.keys().map(String::as_str));
         element.wrong(
             "link",
             near.map_or("the name of a link of this file".into(), |near| {

@@ -9,14 +9,15 @@ use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{Mat3, Pose, Vec3};
 
 use super::files::{Found, find};
+use super::options::{CollisionMeshes, MissingMeshes, UrdfOptions};
+use super::read::Content;
 use super::xml::Element;
-use super::{CollisionMeshes, Content, MissingMeshes, UrdfOptions};
-use crate::appearance::Color;
-use crate::bound::Bound;
-use crate::link::{Geometry, InertiaFault, LinkShape, inertia_fault};
 use crate::notes::NoteList;
-use crate::rotation;
-use crate::shape::ShapeSpec;
+use crate::parse::appearance::Color;
+use crate::parse::bound::Bound;
+use crate::parse::link::{Geometry, InertiaFault, LinkShape, inertia_fault};
+use crate::parse::rotation;
+use crate::parse::shape::ShapeSpec;
 
 /// Context shared by all links of a file.
 pub(crate) struct Context<'c> {

@@ -18,15 +18,17 @@ use std::path::Path;
 use roxmltree::Node;
 use tumble_core::collide::{MeshError, Pose, Progress, RepairSettings, TreeCache, TreeSettings, TriMesh, Vec3};
 
+use super::error::UrdfError;
 use super::link::{Context, read_shape};
+use super::options::UrdfOptions;
+use super::read::{Content, read_text, text_of};
 use super::share::{self, Share};
 use super::xml::{self, Element};
-use super::{Content, UrdfError, UrdfOptions, read_text, text_of};
-use crate::link::{Geometry, LinkShape};
-use crate::link_shapes::{read_file, stretched};
-use crate::log::Log;
+use crate::build::mesh_files::{read_file, stretched};
 use crate::notes::NoteList;
-use crate::shape::ShapeSpec;
+use crate::parse::link::{Geometry, LinkShape};
+use crate::parse::log::Log;
+use crate::parse::shape::ShapeSpec;
 
 /// Sides of the prism around a cylinder.
 const SIDES: usize = 48;

@@ -5,13 +5,13 @@ use tumble_core::Joint;
 use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{Pose, Vec3};
 
-use super::Content;
 use super::joint::{JointElement, Kind};
 use super::link::{Context, LinkElement};
-use crate::joint::{JointSpec, MimicSpec};
-use crate::link::{LinkMassSpec, LinkSpec};
-use crate::log::Log;
+use super::read::Content;
 use crate::notes::NoteList;
+use crate::parse::joint::{JointSpec, MimicSpec};
+use crate::parse::link::{LinkMassSpec, LinkSpec};
+use crate::parse::log::Log;
 
 /// Returns the root of the tree: the one link that no joint moves. `None`, with the problem
 /// recorded, if there is not exactly one root, a link has two parents, or joints form a loop.

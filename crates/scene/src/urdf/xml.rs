@@ -1,12 +1,12 @@
 //! Elements and attributes of an XML file. All problems are recorded, as in
-//! [`Fields`](crate::fields::Fields) for TOML.
+//! [`Fields`](crate::parse::fields::Fields) for TOML.
 
 use std::ops::Range;
 
 use roxmltree::{Document, Node, ParsingOptions};
 
-use crate::bound::Bound;
-use crate::log::Log;
+use crate::parse::bound::Bound;
+use crate::parse::log::Log;
 
 /// Largest number of nodes of a file.
 const MAX_NODES: u32 = 2_000_000;

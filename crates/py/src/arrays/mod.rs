@@ -1,0 +1,4 @@
+//! Conversion between numpy arrays and Rust.
+
+pub mod convert;
+pub mod state;

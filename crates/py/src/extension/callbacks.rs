@@ -1,0 +1,326 @@
+//! Forces and behaviors written in Python (the thesis's extensibility, §IV.A.2).
+//!
+//! A force is an object of the world, like one written in Rust: it is evaluated in every stage of
+//! every integrator. A behavior is called once before each frame, and its forces act during that
+//! frame. Both get a [`View`]. An exception from Python is kept and raised by the step with its
+//! traceback. The frame runs to its end without that force, and then the world returns to its state
+//! before the frame.
+
+use crate::errors::{Error, Result};
+use crate::extension::columns::Arrays;
+use crate::extension::layout::Layout;
+use crate::extension::view::View;
+use crate::world::gc::Callable;
+use crate::world::inner::Inner;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use std::sync::{Arc, Mutex, MutexGuard};
+use tumble::dynamics::{ForceGenerator, Forces, Mode, Object, ObjectId, StateRange, WorldView, Wrench};
+
+/// A Python object that is called, the layout of its rows, and its pending exception.
+struct Code {
+    name: String,
+    object: Callable,
+    layout: Mutex<Option<Arc<Layout>>>,
+    /// From the previous call.
+    arrays: Mutex<Option<Arc<Arrays>>>,
+    raised: Mutex<Option<PyErr>>,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+}
+
+impl Code {
+    fn new(name: &str, object: &Bound<'_, PyAny>) -> Code {
+        Code::of(name, Arc::new(object.clone().unbind()))
+    }
+
+    fn of(name: &str, object: Callable) -> Code {
+        Code { name: name.into(), object, layout: Mutex::default(), arrays: Mutex::default(), raised: Mutex::default() }
+    }
+
+    /// Returns the copy for a fork of the world, from the object's own `fork`. An exception there
+    /// is kept like that of a call.
+    fn fork(&self, method: &str) -> Code {
+        let fork = |py: Python<'_>| {
+            let object = self.object.call_method0(py, "fork")?;
+            match object.getattr(py, method).is_ok() && object.getattr(py, "fork").is_ok() {
+                true => Ok(object),
+                false => Err(PyErr::from(Error::value(format!(
+                    "'{}': `fork` must return an object with `{method}` and `fork`",
+                    self.name
+                )))),
+            }
+        };
+        Python::attach(|py| match fork(py) {
+            Ok(object) => Code::of(&self.name, Arc::new(object)),
+            Err(error) => Code { raised: Mutex::new(Some(error)), ..Code::of(&self.name, self.object.clone()) },
+        })
+    }
+
+    fn layout(&self, world: &WorldView) -> Arc<Layout> {
+        let mut kept = lock(&self.layout);
+        match &*kept {
+            Some(layout) if layout.fits(world) => layout.clone(),
+            _ => kept.insert(Arc::new(Layout::of(world))).clone(),
+        }
+    }
+
+    /// Calls a method with a view. `each` receives the added forces by part.
+    fn call(
+        &self,
+        world: &WorldView,
+        method: &str,
+        rows: Option<&[i64]>,
+        mut each: impl FnMut(usize, Wrench),
+    ) -> Result<()> {
+        let layout = self.layout(world);
+        Python::attach(|py| {
+            let arrays = match lock(&self.arrays).take().filter(|arrays| arrays.free(py, layout.len())) {
+                Some(arrays) => arrays,
+                None => Arc::new(Arrays::new(py, layout.len())?),
+            };
+            arrays.fill(py, &layout.shown(world.part_states))?;
+            let view = Bound::new(py, View::new(world, &layout, &arrays))?;
+            let object = self.object.bind(py);
+            let outcome = match rows {
+                Some(rows) => object.call_method1(method, (&view, numpy::PyArray1::from_slice(py, rows))),
+                None => object.call_method1(method, (&view,)),
+            };
+            view.get().end();
+            drop(view);
+            if !outcome?.is_none() {
+                return Err(Error::value(format!(
+                    "'{}': `{method}` must return None; add what it does to view.force and view.torque",
+                    self.name
+                )));
+            }
+            arrays.take(py, &layout, &self.name, |row, wrench| {
+                let (part_index, wrench) = layout.at_part(row, world.part_states, wrench);
+                each(part_index, wrench);
+            })?;
+            *lock(&self.arrays) = Some(arrays);
+            Ok(())
+        })
+    }
+}
+
+/// A force written in Python as an object of the world.
+struct PythonForce {
+    code: Code,
+}
+
+impl Object for PythonForce {
+    fn name(&self) -> &str {
+        &self.code.name
+    }
+
+    fn fork(&self) -> Box<dyn Object> {
+        Box::new(PythonForce { code: self.code.fork("apply") })
+    }
+
+    fn force(&self) -> Option<&dyn ForceGenerator> {
+        Some(self)
+    }
+}
+
+impl ForceGenerator for PythonForce {
+    fn apply(&self, _me: &StateRange, view: &WorldView, out: &mut Forces) {
+        // After an error the rest of the frame is discarded.
+        if lock(&self.code.raised).is_some() {
+            return;
+        }
+        let add = |part_index: usize, wrench: Wrench| {
+            out.wrenches[part_index].force += wrench.force;
+            out.wrenches[part_index].torque += wrench.torque;
+        };
+        if let Err(error) = self.code.call(view, "apply", None, add) {
+            *lock(&self.code.raised) = Some(error.into());
+        }
+    }
+}
+
+/// Returns a force whose Python object is set later; `None` stands for it.
+pub fn empty_force(name: &str) -> Box<dyn Object> {
+    let nobody = Python::attach(|py| Arc::new(py.None()));
+    Box::new(PythonForce { code: Code::of(name, nobody) })
+}
+
+/// Names and objects of forces; names, objects and bodies of behaviors.
+pub type Extensions = (Vec<(String, Py<PyAny>)>, Vec<(String, Py<PyAny>, Vec<String>)>);
+
+/// The result of `__reduce__`: the function that makes the world, its arguments, and the state for
+/// `__setstate__`.
+pub type Reduced<'py> = (Bound<'py, PyAny>, (Bound<'py, PyBytes>,), Option<Extensions>);
+
+/// A behavior and its bodies.
+struct Attached {
+    code: Code,
+    bodies: Vec<ObjectId>,
+}
+
+/// The forces and behaviors of one world.
+#[derive(Default)]
+pub struct Extension {
+    forces: Vec<ObjectId>,
+    behaviors: Vec<Attached>,
+}
+
+impl Extension {
+    /// Returns whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.forces.is_empty() && self.behaviors.is_empty()
+    }
+
+    /// Returns the copy for a fork of the world.
+    pub fn fork(&self) -> Extension {
+        let attached = |a: &Attached| Attached { code: a.code.fork("act"), bodies: a.bodies.clone() };
+        Extension { forces: self.forces.clone(), behaviors: self.behaviors.iter().map(attached).collect() }
+    }
+}
+
+impl Inner {
+    /// Returns the exception that a callback raised since the last call, as an error.
+    pub fn take_raised(&self) -> Result<()> {
+        let forces =
+            self.extension.forces.iter().filter_map(|&id| self.world.get::<PythonForce>(id)).map(|force| &force.code);
+        let codes = forces.chain(self.extension.behaviors.iter().map(|b| &b.code));
+        let mut raised: Vec<PyErr> = codes.filter_map(|code| lock(&code.raised).take()).collect();
+        if raised.is_empty() { Ok(()) } else { Err(raised.swap_remove(0).into()) }
+    }
+
+    /// Runs one frame with behaviors before it and forces in it.
+    pub fn extended_frame(&mut self) -> Result<()> {
+        self.behave()?;
+        let outcome = self.frame();
+        self.take_raised().and(outcome)
+    }
+
+    fn behave(&mut self) -> Result<()> {
+        for Attached { code, bodies } in &self.extension.behaviors {
+            let view = self.world.view();
+            let layout = code.layout(&view);
+            let rows: Vec<i64> =
+                bodies.iter().filter_map(|&id| layout.rows(id)).flatten().map(|row| row as i64).collect();
+            if rows.is_empty() {
+                continue;
+            }
+            let mut wrenches = Vec::new();
+            code.call(&view, "act", Some(&rows), |part_index, wrench| wrenches.push((part_index, wrench)))?;
+            let mut owners = vec![None; view.part_states.len()];
+            for (id, span) in view.ids().iter().filter_map(|&id| Some((id, view.state_range(id)?))) {
+                span.parts.clone().enumerate().for_each(|(part, part_index)| owners[part_index] = Some((id, part)));
+            }
+            for (part_index, wrench) in wrenches.into_iter().filter(|(_, wrench)| *wrench != Wrench::default()) {
+                let Some((id, part)) = owners[part_index] else { continue };
+                let Some(point) = self.world.part_state(id, part).map(|part_state| part_state.position()) else {
+                    continue;
+                };
+                self.world.apply_force(id, part, wrench.force, &point)?;
+                self.world.apply_torque(id, part, wrench.torque)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds a force; it must have `apply` and `fork`.
+    pub fn add_force(&mut self, name: &str, object: &Bound<'_, PyAny>) -> Result<()> {
+        self.check_new(name)?;
+        let id = self.world.add_boxed(Box::new(PythonForce { code: Code::new(name, object) }), Mode::Dynamic)?;
+        self.extension.forces.push(id);
+        Ok(())
+    }
+
+    /// Adds a behavior of some bodies; it must have `act` and `fork`.
+    pub fn add_behavior(&mut self, name: &str, object: &Bound<'_, PyAny>, bodies: Vec<ObjectId>) -> Result<()> {
+        self.check_new(name)?;
+        if bodies.is_empty() {
+            return Err(Error::value(format!("behavior '{name}': expected at least one body")));
+        }
+        self.extension.behaviors.push(Attached { code: Code::new(name, object), bodies });
+        Ok(())
+    }
+
+    fn check_new(&self, name: &str) -> Result<()> {
+        match self.world.find(name).is_some() || self.extension.behaviors.iter().any(|b| b.code.name == name) {
+            true => Err(tumble::dynamics::WorldError::DuplicateName(name.into()).into()),
+            false => Ok(()),
+        }
+    }
+
+    /// Removes a force or a behavior. Returns whether there was one of that name.
+    pub fn remove_extension(&mut self, name: &str) -> Result<bool> {
+        if let Some(at) = self.extension.behaviors.iter().position(|b| b.code.name == name) {
+            self.extension.behaviors.remove(at);
+            return Ok(true);
+        }
+        let Some(id) = self.world.find(name).filter(|id| self.extension.forces.contains(id)) else { return Ok(false) };
+        self.world.remove(id)?;
+        self.extension.forces.retain(|other| *other != id);
+        Ok(true)
+    }
+
+    /// Returns the objects of all forces and behaviors.
+    pub fn callables(&self) -> Vec<Callable> {
+        let forces =
+            self.extension.forces.iter().filter_map(|&id| self.world.get::<PythonForce>(id)).map(|force| &force.code);
+        forces.chain(self.extension.behaviors.iter().map(|b| &b.code)).map(|code| code.object.clone()).collect()
+    }
+
+    /// Returns the objects of the world that are forces written in Python.
+    pub fn forces(&self) -> &[ObjectId] {
+        &self.extension.forces
+    }
+
+    /// Registers objects made by [`empty_force`] as forces.
+    pub fn expect_forces(&mut self, names: &[String]) {
+        self.extension.forces = names.iter().filter_map(|name| self.world.find(name)).collect();
+    }
+
+    /// Returns all forces and behaviors with their arguments; `None` if there are none.
+    pub fn pickled_extensions(&self, py: Python<'_>) -> Option<Extensions> {
+        let [forces, _] = self.extensions(py);
+        let name = |&id: &ObjectId| Some(self.world.object(id)?.name().to_string());
+        let of = |b: &Attached| {
+            (b.code.name.clone(), b.code.object.clone_ref(py), b.bodies.iter().filter_map(name).collect())
+        };
+        let behaviors = self.extension.behaviors.iter().map(of).collect();
+        (!self.extension.is_empty()).then_some((forces, behaviors))
+    }
+
+    /// Sets the objects of restored forces and adds behaviors.
+    pub fn unpickle_extensions(&mut self, py: Python<'_>, (forces, behaviors): Extensions) -> Result<()> {
+        for (name, object) in forces {
+            let id = self.world.find(&name).filter(|id| self.extension.forces.contains(id));
+            let force = id.and_then(|id| self.world.get_mut::<PythonForce>(id));
+            let force = force.ok_or_else(|| Error::value(format!("the pickled world has no force '{name}'")))?;
+            force.code = Code::new(&name, object.bind(py));
+        }
+        for (name, object, bodies) in behaviors {
+            self.check_new(&name)?;
+            let bodies = bodies.iter().filter_map(|name| self.world.find(name)).collect();
+            self.extension.behaviors.push(Attached { code: Code::new(&name, object.bind(py)), bodies });
+        }
+        Ok(())
+    }
+
+    /// Removes all forces and behaviors and returns them for the caller to drop.
+    pub fn take_extension(&mut self) -> impl Send + use<> {
+        let Extension { forces, behaviors } = std::mem::take(&mut self.extension);
+        let forces: Vec<Option<Box<dyn Object>>> = forces.into_iter().map(|id| self.world.remove(id).ok()).collect();
+        (forces, behaviors)
+    }
+
+    /// Returns names and objects of the forces, then of the behaviors, in the order of addition.
+    pub fn extensions(&self, py: Python<'_>) -> [Vec<(String, Py<PyAny>)>; 2] {
+        let pair = |code: &Code| (code.name.clone(), code.object.clone_ref(py));
+        let forces = self
+            .extension
+            .forces
+            .iter()
+            .filter_map(|&id| self.world.get::<PythonForce>(id))
+            .map(|force| pair(&force.code));
+        [forces.collect(), self.extension.behaviors.iter().map(|b| pair(&b.code)).collect()]
+    }
+}

@@ -1,0 +1,256 @@
+//! Recordings: written from worlds, read back as arrays.
+
+use crate::arrays::convert::{path, whole_number};
+use crate::errors::{Error, Result, caught};
+use crate::world::inner::Inner;
+use crate::world::shared::Shared;
+use crate::world::world::World;
+use numpy::{PyArray1, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict, PyList};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use tumble::dynamics::ObjectId;
+use tumble::net::record::{Ending, Pose, Recorder as Writer, RecorderOptions, read};
+use tumble::net::world::{entities, poses};
+
+/// Largest count of numbers, and of bytes of states, of a recording that is read at once.
+const MAX_NUMBERS: usize = 1 << 29;
+
+/// A recording being written.
+struct Open {
+    writer: Writer,
+    /// The world of the last frame and its objects. If they change, the list of visuals is written
+    /// again.
+    world: Arc<Shared>,
+    objects: Vec<ObjectId>,
+}
+
+enum Stage {
+    Empty,
+    Open(Box<Open>),
+    Closed,
+}
+
+/// Writes an MCAP file that Foxglove and ``tumble.read`` open: ``with tumble.Recorder("run.mcap")
+/// as recorder: recorder.frame(world)``.
+///
+/// The file is created by the first frame. After a crash the file is readable up to the last
+/// quarter of a simulated second.
+#[pyclass(frozen, module = "tumble")]
+pub struct Recorder {
+    path: PathBuf,
+    stage: Mutex<Stage>,
+    frames: Mutex<u64>,
+}
+
+impl Open {
+    fn begin(path: &PathBuf, world: &Arc<Shared>, inner: &Inner) -> Result<Open> {
+        let writer = Writer::create(path, &inner.scene.file, &entities(&inner.world), RecorderOptions::default())?;
+        Ok(Open { writer, world: world.clone(), objects: inner.world.ids().to_vec() })
+    }
+
+    fn add(&mut self, world: &Arc<Shared>, inner: &Inner) -> Result<()> {
+        let core = &inner.world;
+        if !Arc::ptr_eq(world, &self.world) || self.objects != core.ids() {
+            self.writer.set_entities(core.time(), &entities(core))?;
+            (self.world, self.objects) = (world.clone(), core.ids().to_vec());
+        }
+        Ok(self.writer.frame(core.time(), core.frame(), &poses(core), &core.save())?)
+    }
+}
+
+impl Recorder {
+    fn add(&self, world: &Arc<Shared>) -> Result<()> {
+        let mut stage = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
+        world.read(|inner| {
+            if matches!(*stage, Stage::Empty) {
+                *stage = Stage::Open(Box::new(Open::begin(&self.path, world, inner)?));
+            }
+            match &mut *stage {
+                Stage::Open(open) => open.add(world, inner),
+                _ => Err(Error::value(format!("{}: the recording is closed", self.path.display()))),
+            }
+        })?;
+        *self.frames.lock().unwrap_or_else(PoisonError::into_inner) += 1;
+        Ok(())
+    }
+}
+
+#[pymethods]
+impl Recorder {
+    /// path: of the file. An existing file is replaced; its folder must exist.
+    #[new]
+    fn new(path: &Bound<'_, PyAny>) -> Result<Recorder> {
+        let path = self::path(path)?;
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+            let source =
+                std::io::Error::new(std::io::ErrorKind::NotFound, format!("there is no folder {}", folder.display()));
+            return Err(Error::File { file: path.display().to_string(), source });
+        }
+        Ok(Recorder { path, stage: Mutex::new(Stage::Empty), frames: Mutex::new(0) })
+    }
+
+    /// Adds the present frame: visuals, poses and state. Frames must be added in the order of time,
+    /// each once.
+    fn frame(&self, py: Python<'_>, world: &Bound<'_, World>) -> Result<()> {
+        let shared = world.get().shared.clone();
+        py.detach(|| self.add(&shared))
+    }
+
+    /// Steps the world ``n`` times and adds a frame after every ``every`` steps. If nothing is
+    /// recorded yet, a frame is also added before the first step.
+    #[pyo3(signature = (world, n, *, every=1))]
+    fn run(
+        &self,
+        py: Python<'_>,
+        world: &Bound<'_, World>,
+        #[pyo3(from_py_with = whole_number)] n: u32,
+        #[pyo3(from_py_with = whole_number)] every: u32,
+    ) -> Result<()> {
+        if every == 0 {
+            return Err(Error::value("every is 0; it must be at least 1"));
+        }
+        if self.frames() == 0 {
+            self.frame(py, world)?;
+        }
+        for k in 1..=n {
+            world.get().shared.work(py, |inner| inner.step())?;
+            if k % every == 0 {
+                self.frame(py, world)?;
+            }
+            py.check_signals()?;
+        }
+        Ok(())
+    }
+
+    /// Writes index and checksums and closes the file. Later calls do nothing. A recording without
+    /// a frame leaves no file.
+    fn close(&self, py: Python<'_>) -> Result<()> {
+        py.detach(|| {
+            let mut stage = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
+            match std::mem::replace(&mut *stage, Stage::Closed) {
+                Stage::Open(open) => Ok(open.writer.finish().map(|_| ())?),
+                _ => Ok(()),
+            }
+        })
+    }
+
+    /// Frames added so far.
+    #[getter]
+    fn frames(&self) -> u64 {
+        *self.frames.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Path of the file.
+    #[getter]
+    fn path(&self) -> &std::path::Path {
+        &self.path
+    }
+
+    fn __enter__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    /// Closes the file, also if the block raised.
+    fn __exit__(
+        &self,
+        py: Python<'_>,
+        _kind: &Bound<'_, PyAny>,
+        _error: &Bound<'_, PyAny>,
+        _trace: &Bound<'_, PyAny>,
+    ) -> Result<()> {
+        self.close(py)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<tumble.Recorder {}: {} frames>", self.path.display(), self.frames())
+    }
+}
+
+/// Frames of a recording. Poses refer to names by number.
+#[derive(Default)]
+struct Frames {
+    names: Vec<String>,
+    numbers: BTreeMap<String, usize>,
+    times: Vec<f64>,
+    frames: Vec<u64>,
+    poses: Vec<(Arc<Vec<usize>>, Vec<Pose>)>,
+    states: Vec<Vec<u8>>,
+    bytes: usize,
+}
+
+impl Frames {
+    fn columns(&mut self, names: &[String]) -> Arc<Vec<usize>> {
+        let mut column = |name: &String| {
+            *self.numbers.entry(name.clone()).or_insert_with(|| {
+                self.names.push(name.clone());
+                self.names.len() - 1
+            })
+        };
+        Arc::new(names.iter().map(&mut column).collect())
+    }
+
+    /// Returns both arrays, with NaN for a name without a pose.
+    fn arrays(&self) -> (Vec<f64>, Vec<f64>) {
+        let count = self.names.len() * self.times.len();
+        let (mut positions, mut rotations) = (vec![f64::NAN; 3 * count], vec![f64::NAN; 4 * count]);
+        for (row, (columns, poses)) in self.poses.iter().enumerate() {
+            for (column, pose) in columns.iter().zip(poses) {
+                let at = row * self.names.len() + column;
+                positions[3 * at..3 * at + 3].copy_from_slice(&pose.position);
+                rotations[4 * at..4 * at + 4].copy_from_slice(&pose.rotation);
+            }
+        }
+        (positions, rotations)
+    }
+}
+
+/// Returns all of a recording, as the arguments of `Recording`.
+#[pyfunction]
+pub fn read_recording<'py>(py: Python<'py>, path: &Bound<'py, PyAny>) -> Result<Bound<'py, PyDict>> {
+    let file = self::path(path)?;
+    let (world, all, note) = py.detach(|| caught(|| whole(&file)))?;
+    let (positions, rotations) = all.arrays();
+    let (frames, names) = (all.times.len(), all.names.len());
+    let dict = PyDict::new(py);
+    dict.set_item("world", world)?;
+    dict.set_item("times", PyArray1::from_vec(py, all.times))?;
+    dict.set_item("frames", PyArray1::from_iter(py, all.frames.iter().map(|&frame| frame as i64)))?;
+    dict.set_item("names", all.names)?;
+    dict.set_item("positions", PyArray1::from_vec(py, positions).reshape([frames, names, 3])?)?;
+    dict.set_item("orientations", PyArray1::from_vec(py, rotations).reshape([frames, names, 4])?)?;
+    dict.set_item("states", PyList::new(py, all.states.iter().map(|state| PyBytes::new(py, state)))?)?;
+    dict.set_item("note", note)?;
+    Ok(dict)
+}
+
+fn whole(file: &PathBuf) -> Result<(String, Frames, Option<String>)> {
+    let mut reader = read(file)?;
+    let (mut all, mut names, mut columns) = (Frames::default(), Vec::new(), Arc::new(Vec::new()));
+    while let Some(frame) = reader.next_frame()? {
+        let now = reader.entities();
+        if !now.iter().map(|entity| &entity.name).eq(&names) {
+            names = now.iter().map(|entity| entity.name.clone()).collect();
+            columns = all.columns(&names);
+        }
+        all.bytes += frame.state.len();
+        if (all.times.len() + 1) * all.names.len() * 7 > MAX_NUMBERS || all.bytes > MAX_NUMBERS {
+            return Err(Error::value(format!(
+                "{}: too many frames to read at once ({MAX_NUMBERS} numbers or bytes)",
+                file.display()
+            )));
+        }
+        all.times.push(frame.time_s);
+        all.frames.push(frame.frame);
+        all.poses.push((columns.clone(), frame.poses));
+        all.states.push(frame.state);
+    }
+    let note = match reader.ending() {
+        Some(Ending::Cut { offset, what }) => Some(format!("cut at byte {offset}: {what}")),
+        _ => None,
+    };
+    Ok((reader.world().to_owned(), all, note))
+}

@@ -1,0 +1,406 @@
+//! Articulated bodies: a description from a file, or a handle of a body in a world. Both have the
+//! same methods.
+
+use crate::arrays::convert::{array, vec3, vector};
+use crate::choices::{COLLISION_MESHES, MISSING_MESHES, meaning, word};
+use crate::errors::{Error, Result};
+use crate::objects::binding::{Binding, Now, Source, Which, locked, start};
+use crate::objects::description::alone;
+use crate::objects::joints::{drive, result};
+use crate::objects::place::{Place, hash};
+use crate::objects::robot::Robot;
+use crate::pool;
+use crate::world::gc::{Anchor, anchor};
+use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
+use pyo3::gc::{PyTraverseError, PyVisit};
+use pyo3::prelude::*;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+use tumble::collide::{Pose, Vec3};
+use tumble::dynamics::{ArticulatedBody, DofSettings};
+use tumble::scene::urdf::{self, UrdfOptions};
+
+/// A tree of links: a robot, a chain, a skeleton.
+///
+/// ``Articulation.from_urdf`` returns a description, whose dynamics functions work at once.
+/// ``World.add_articulation`` adds it to a world and returns a handle of the body there. ``q`` has
+/// ``nq`` numbers: one per revolute joint (rad) or prismatic joint (m), a quaternion (x, y, z, w)
+/// per spherical joint, position and quaternion of a floating root. ``qd`` and ``tau`` have ``dof``
+/// numbers: rad/s or m/s and N·m or N; those of a floating root are angular, then linear, world
+/// axes.
+///
+/// All functions of ``q``, ``qd``, ``tau`` take one state or a batch of states with a leading axis.
+/// An argument without that axis applies to the whole batch. These functions ignore limits,
+/// damping, drives and contacts.
+#[pyclass(frozen, module = "tumble")]
+pub struct Articulation {
+    pub name: Arc<str>,
+    pub robot: Arc<Robot>,
+    pub spot: Binding,
+    anchor: Option<Py<Anchor>>,
+}
+
+impl Articulation {
+    /// Returns a handle of a body in a world.
+    pub fn placed(py: Python<'_>, place: Place, robot: Arc<Robot>) -> Result<Articulation> {
+        Ok(Articulation {
+            name: place.name.clone(),
+            robot,
+            anchor: Some(anchor(py, &place.shared)?),
+            spot: Binding::Placed(place),
+        })
+    }
+
+    /// Returns the place of the body, if it is in a world.
+    pub fn place(&self) -> Option<&Place> {
+        match &self.spot {
+            Binding::Placed(place) => Some(place),
+            Binding::Free { .. } => None,
+        }
+    }
+}
+
+type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
+type Given<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
+
+#[pymethods]
+impl Articulation {
+    /// Reads a URDF. The tree is read at once, collision shapes when it is added to a world, and
+    /// visual meshes when they are first drawn.
+    ///
+    /// floating: whether the root floats; otherwise it is fixed to the base. packages: folders by
+    /// name, for ``package://NAME/…``. missing_meshes: ``"error"`` or ``"skip"``, for missing
+    /// collision meshes. collision_meshes: ``"exact"`` or ``"hull"``.
+    #[staticmethod]
+    #[pyo3(signature = (path, *, floating=false, packages=None, missing_meshes="error", collision_meshes="exact"))]
+    pub fn from_urdf(
+        py: Python<'_>,
+        path: &Bound<'_, PyAny>,
+        floating: bool,
+        packages: Option<BTreeMap<String, PathBuf>>,
+        missing_meshes: &str,
+        collision_meshes: &str,
+    ) -> Result<Articulation> {
+        let file = crate::arrays::convert::path(path)?;
+        let options = UrdfOptions {
+            floating,
+            packages: packages.unwrap_or_default(),
+            missing_meshes: meaning("missing_meshes", missing_meshes, MISSING_MESHES)?,
+            collision_meshes: meaning("collision_meshes", collision_meshes, COLLISION_MESHES)?,
+            ..UrdfOptions::default()
+        };
+        let read = py.detach(|| pool::run(|| Ok(urdf::model(&file, &options)?)))?;
+        let start = start(&ArticulatedBody::new("", read.model.clone()));
+        let (q, qd) = start.split_at(read.model.positions());
+        let now = Now { gravity: Vec3::new(0.0, 0.0, -9.81), q: q.to_vec(), qd: qd.to_vec(), tau: vec![0.0; qd.len()] };
+        let robot = Robot { model: read.model, base: Pose::identity(), joints: read.joints };
+        Ok(Articulation {
+            name: read.name.into(),
+            robot: Arc::new(robot),
+            spot: Binding::Free { source: Source { file, options, dofs: read.dofs }, now: Mutex::new(now) },
+            anchor: None,
+        })
+    }
+
+    /// Name of the robot in its file, or of the body in its world.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Whether it is in a world.
+    #[getter]
+    fn placed_in_world(&self) -> bool {
+        self.place().is_some()
+    }
+
+    /// Whether its world still has it; True for a description.
+    #[getter]
+    fn exists(&self) -> Result<bool> {
+        self.place().map_or(Ok(true), |place| place.shared.read(|inner| Ok(inner.world.status(place.id).is_some())))
+    }
+
+    /// Names of all joints that are not fixed, in the order of the coordinates.
+    #[getter]
+    fn joint_names(&self) -> Vec<String> {
+        self.robot.joints.clone()
+    }
+
+    /// Names of all links, including fixed ones, in the order of ``link_poses``.
+    #[getter]
+    fn link_names(&self) -> Vec<String> {
+        self.robot.model.frames().iter().map(|frame| frame.name.clone()).collect()
+    }
+
+    /// Number of degrees of freedom: the length of ``qd`` and ``tau``.
+    #[getter]
+    fn dof(&self) -> usize {
+        self.robot.dof()
+    }
+
+    /// Length of ``q``.
+    #[getter]
+    fn nq(&self) -> usize {
+        self.robot.positions()
+    }
+
+    /// Mass of all links that can move, kg.
+    #[getter]
+    fn mass(&self) -> f64 {
+        self.robot.model.mass()
+    }
+
+    /// Positions, shape (nq,), rad and m.
+    #[getter]
+    fn q<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(array(py, &self.spot.get(Which::Q, &self.robot)?))
+    }
+
+    #[setter]
+    fn set_q(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.spot.set(py, Which::Q, &self.robot, value)
+    }
+
+    /// Velocities, shape (dof,), rad/s and m/s.
+    #[getter]
+    fn qd<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(array(py, &self.spot.get(Which::Qd, &self.robot)?))
+    }
+
+    #[setter]
+    fn set_qd(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.spot.set(py, Which::Qd, &self.robot, value)
+    }
+
+    /// Generalized forces, shape (dof,), N·m and N. They act in every step until they are changed,
+    /// in addition to drives and damping. ``save`` and forks include them; ``World.state`` does
+    /// not.
+    #[getter]
+    fn tau<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(array(py, &self.spot.get(Which::Tau, &self.robot)?))
+    }
+
+    #[setter]
+    fn set_tau(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.spot.set(py, Which::Tau, &self.robot, value)
+    }
+
+    /// Gravity used by its functions, shape (3,), m/s². In a world it is the world's gravity and
+    /// can only be set there.
+    #[getter]
+    fn gravity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.spot.gravity()?))
+    }
+
+    #[setter]
+    pub fn set_gravity(&self, value: &Bound<'_, PyAny>) -> Result<()> {
+        let gravity = vec3(value, "gravity")?;
+        match &self.spot {
+            Binding::Free { now, .. } => locked(now).gravity = gravity,
+            Binding::Placed(_) => return Err(Error::value("gravity is a setting of the world; set it there")),
+        }
+        Ok(())
+    }
+
+    /// Lower and upper position limit of each degree of freedom, shape (dof, 2), rad or m; infinite
+    /// without a limit.
+    #[getter]
+    fn limits<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
+        let dofs = self.spot.dofs()?;
+        let flat = dofs.iter().flat_map(|f| f.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])).collect();
+        Ok(PyArray1::from_vec(py, flat).reshape([dofs.len(), 2])?)
+    }
+
+    /// Returns the accelerations ``qdd`` that generalized forces ``tau`` cause, shape (dof,) or
+    /// (batch, dof).
+    ///
+    /// q: (nq,), qd, tau: (dof,), each optionally batched (batch, …). Omitted arguments have their
+    /// current values.
+    #[pyo3(signature = (q=None, qd=None, tau=None))]
+    fn forward_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        q: Given<'_, 'py>,
+        qd: Given<'_, 'py>,
+        tau: Given<'_, 'py>,
+    ) -> Result<Array<'py>> {
+        let mut rows = self.rows(&[(Which::Q, "q", q), (Which::Qd, "qd", qd), (Which::Tau, "tau", tau)])?;
+        let gravity = self.spot.gravity()?;
+        let out = py.detach(|| self.robot.forward_dynamics(&gravity, &mut rows))?;
+        result(py, &rows, out, &[self.robot.dof()])
+    }
+
+    /// Returns the generalized forces that accelerations ``qdd`` require, including gravity, shape
+    /// (dof,) or (batch, dof).
+    ///
+    /// q: (nq,), qd, qdd: (dof,), each optionally batched. Without ``qdd`` the accelerations are
+    /// zero.
+    #[pyo3(signature = (q=None, qd=None, qdd=None))]
+    fn inverse_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        q: Given<'_, 'py>,
+        qd: Given<'_, 'py>,
+        qdd: Given<'_, 'py>,
+    ) -> Result<Array<'py>> {
+        let still = array(py, &vec![0.0; self.robot.dof()]).into_any();
+        let mut rows =
+            self.rows(&[(Which::Q, "q", q), (Which::Qd, "qd", qd), (Which::Tau, "qdd", Some(qdd.unwrap_or(&still)))])?;
+        let gravity = self.spot.gravity()?;
+        let out = py.detach(|| self.robot.inverse_dynamics(&gravity, &mut rows))?;
+        result(py, &rows, out, &[self.robot.dof()])
+    }
+
+    /// Returns the mass matrix, symmetric, shape (dof, dof) or (batch, dof, dof).
+    #[pyo3(signature = (q=None))]
+    fn mass_matrix<'py>(&self, py: Python<'py>, q: Given<'_, 'py>) -> Result<Array<'py>> {
+        let mut rows = self.rows(&[(Which::Q, "q", q)])?;
+        let out = py.detach(|| self.robot.mass_matrix(&mut rows))?;
+        result(py, &rows, out, &[self.robot.dof(); 2])
+    }
+
+    /// Returns the Jacobian of a link, shape (6, dof) or (batch, 6, dof). ``J @ qd`` is the angular
+    /// velocity (first three rows) and the velocity of the origin of the link's frame (last three),
+    /// world axes.
+    #[pyo3(signature = (link, q=None))]
+    fn jacobian<'py>(&self, py: Python<'py>, link: &str, q: Given<'_, 'py>) -> Result<Array<'py>> {
+        let frame = self.robot.frame(link)?;
+        let mut rows = self.rows(&[(Which::Q, "q", q)])?;
+        let out = py.detach(|| self.robot.jacobian(frame, &mut rows))?;
+        result(py, &rows, out, &[6, self.robot.dof()])
+    }
+
+    /// Returns the poses of all links in the world, in the order of ``link_names``: position, m,
+    /// and quaternion (x, y, z, w). Shape (links, 7) or (batch, links, 7).
+    #[pyo3(signature = (q=None))]
+    fn link_poses<'py>(&self, py: Python<'py>, q: Given<'_, 'py>) -> Result<Array<'py>> {
+        let mut rows = self.rows(&[(Which::Q, "q", q)])?;
+        let out = py.detach(|| self.robot.link_poses(&mut rows))?;
+        result(py, &rows, out, &[self.robot.model.frames().len(), 7])
+    }
+
+    /// Returns the pose of one link in the world, shape (7,) or (batch, 7), as in ``link_poses``.
+    #[pyo3(signature = (link, q=None))]
+    fn link_pose<'py>(&self, py: Python<'py>, link: &str, q: Given<'_, 'py>) -> Result<Array<'py>> {
+        self.robot.frame(link)?;
+        let number = self.robot.model.frames().iter().position(|frame| frame.name == link).unwrap_or(0);
+        let mut rows = self.rows(&[(Which::Q, "q", q)])?;
+        let out = py.detach(|| self.robot.link_poses(&mut rows))?;
+        let all = 7 * self.robot.model.frames().len();
+        let own = out.chunks_exact(all).flat_map(|poses| &poses[7 * number..7 * number + 7]).copied().collect();
+        result(py, &rows, own, &[7])
+    }
+
+    /// Returns the center of mass in the world, shape (3,) or (batch, 3), meters.
+    #[pyo3(signature = (q=None))]
+    fn center_of_mass<'py>(&self, py: Python<'py>, q: Given<'_, 'py>) -> Result<Array<'py>> {
+        let mut rows = self.rows(&[(Which::Q, "q", q)])?;
+        let out = py.detach(|| self.robot.center_of_mass(&mut rows))?;
+        result(py, &rows, out, &[3])
+    }
+
+    /// Sets the drive of a revolute or prismatic joint of a body in a world, by the name of the
+    /// joint.
+    ///
+    /// With ``stiffness`` or ``damping`` it drives to position ``target`` (rad or m) and
+    /// ``velocity``. With neither it holds ``velocity``. Without arguments the drive is removed.
+    /// max_force: largest torque or force, N·m or N; None: unlimited. The drive is a property of
+    /// the body and not part of the state, so ``save`` does not include it.
+    #[pyo3(signature = (joint, *, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None))]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn set_drive(
+        &self,
+        py: Python<'_>,
+        joint: &str,
+        target: Option<f64>,
+        velocity: Option<f64>,
+        stiffness: f64,
+        damping: f64,
+        max_force: Option<f64>,
+    ) -> Result<()> {
+        let max_force = max_force.unwrap_or(f64::INFINITY);
+        let (place, index) = (self.in_world()?, self.dof_of(joint)?);
+        let drive = drive(target, velocity, stiffness, damping, max_force)?;
+        place.write(py, |inner| {
+            let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
+            let settings = DofSettings { drive, ..body.dofs()[index].clone() };
+            Ok(body.set_dof(index, settings)?)
+        })
+    }
+
+    /// Applies a force to a link of a body in a world during the next step only. force: shape (3,),
+    /// N; point: where it acts, meters (default: the origin of the link's frame). World axes.
+    #[pyo3(signature = (link, force, point=None))]
+    fn apply_force(&self, py: Python<'_>, link: &str, force: &Bound<'_, PyAny>, point: Given<'_, '_>) -> Result<()> {
+        let force = vec3(force, "force")?;
+        self.push(py, link, point, |inner, place, part, at| Ok(inner.world.apply_force(place.id, part, force, &at)?))
+    }
+
+    /// Applies a torque to a link during the next step only. torque: shape (3,), N·m, world axes.
+    fn apply_torque(&self, py: Python<'_>, link: &str, torque: &Bound<'_, PyAny>) -> Result<()> {
+        let torque = vec3(torque, "torque")?;
+        self.push(py, link, None, |inner, place, part, _| Ok(inner.world.apply_torque(place.id, part, torque)?))
+    }
+
+    /// Applies an impulse to a link at once. impulse: shape (3,), N·s; point: as in
+    /// ``apply_force``.
+    #[pyo3(signature = (link, impulse, point=None))]
+    fn apply_impulse(
+        &self,
+        py: Python<'_>,
+        link: &str,
+        impulse: &Bound<'_, PyAny>,
+        point: Given<'_, '_>,
+    ) -> Result<()> {
+        let impulse = vec3(impulse, "impulse")?;
+        self.push(py, link, point, |inner, place, part, at| {
+            Ok(inner.world.apply_impulse(place.id, part, impulse, &at)?)
+        })
+    }
+
+    fn __repr__(&self) -> String {
+        let place = if !self.exists().unwrap_or(true) {
+            ", removed"
+        } else if self.place().is_some() {
+            ""
+        } else {
+            ", a description"
+        };
+        format!("<tumble.Articulation '{}', {} dof{place}>", self.name, self.robot.dof())
+    }
+
+    fn __eq__(slf: &Bound<'_, Self>, other: &Bound<'_, PyAny>) -> bool {
+        let Ok(other) = other.cast::<Articulation>() else { return false };
+        match (slf.get().place(), other.get().place()) {
+            (Some(a), Some(b)) => a.same(b),
+            _ => slf.is(other),
+        }
+    }
+
+    /// Pickles the file of a description and its numbers. A handle of a body in a world cannot be
+    /// pickled.
+    #[allow(clippy::type_complexity, reason = "the parts of a description, once")]
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> Result<(Bound<'py, PyAny>, (PathBuf, bool, BTreeMap<String, PathBuf>, [&'static str; 2], [Vec<f64>; 4]))> {
+        let Binding::Free { source, now } = &self.spot else {
+            return Err(alone(&self.name));
+        };
+        let file = std::path::absolute(&source.file).unwrap_or_else(|_| source.file.clone());
+        let UrdfOptions { floating, packages, missing_meshes, collision_meshes, .. } = source.options.clone();
+        let words = [word(missing_meshes, MISSING_MESHES), word(collision_meshes, COLLISION_MESHES)];
+        let Now { gravity, q, qd, tau } = locked(now).clone();
+        let unpickle = py.import("tumble._native")?.getattr("_unpickle_articulation")?;
+        Ok((unpickle, (file, floating, packages, words, [gravity.as_slice().to_vec(), q, qd, tau])))
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.anchor)
+    }
+
+    fn __hash__(slf: &Bound<'_, Self>) -> u64 {
+        slf.get().place().map_or(slf.as_ptr() as u64 >> 4, hash)
+    }
+}

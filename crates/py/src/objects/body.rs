@@ -1,0 +1,352 @@
+//! A rigid body of a world: a handle that reads from the world at each use.
+
+use crate::arrays::convert::{array, pose, quaternion, rotation, some, symmetric, vec3, vec3_or, vector};
+use crate::choices::{MODES, meaning, word};
+use crate::errors::{Error, Result};
+use crate::objects::appearance;
+use crate::objects::description::alone;
+use crate::objects::place::{Place, hash};
+use crate::world::gc::{Anchor, anchor};
+use numpy::{PyArray1, PyArray2};
+use pyo3::gc::{PyTraverseError, PyVisit};
+use pyo3::prelude::*;
+use tumble::collide::{Pose, Vec3};
+use tumble::dynamics::{Mode, RigidBody as Rigid};
+
+/// A rigid body, or static geometry, of a world. Its frame is that of its shape, for a mesh that of
+/// its file. All vectors are in world axes.
+///
+/// A handle without data of its own. After the body was removed every use raises ``RemovedError``.
+#[pyclass(frozen, module = "tumble")]
+pub struct RigidBody {
+    pub place: Place,
+    anchor: Py<Anchor>,
+}
+
+impl RigidBody {
+    /// Returns a handle.
+    pub fn new(py: Python<'_>, place: Place) -> Result<RigidBody> {
+        Ok(RigidBody { anchor: anchor(py, &place.shared)?, place })
+    }
+
+    fn constant<T>(&self, get: impl FnOnce(&Rigid) -> T) -> Result<T> {
+        self.place.read(|inner| inner.world.get::<Rigid>(self.place.id).map(get))
+    }
+
+    /// Changes a constant. An invalid value changes nothing.
+    fn change(&self, py: Python<'_>, set: impl FnOnce(&mut Rigid)) -> Result<()> {
+        self.place.write(py, |inner| {
+            let body = inner.world.get_mut::<Rigid>(self.place.id).ok_or_else(|| self.place.removed())?;
+            let mut changed = body.clone();
+            set(&mut changed);
+            changed.validate()?;
+            *body = changed;
+            Ok(())
+        })
+    }
+
+    fn set_motion(&self, py: Python<'_>, velocity: Option<Vec3>, angular: Option<Vec3>) -> Result<()> {
+        let place = &self.place;
+        place.write(py, |inner| {
+            let part_state = *inner.world.part_state(place.id, 0).ok_or_else(|| place.removed())?;
+            Ok(inner.world.set_velocity(
+                place.id,
+                velocity.unwrap_or(part_state.velocity),
+                angular.unwrap_or(part_state.angular_velocity),
+            )?)
+        })
+    }
+
+    fn set_place(&self, py: Python<'_>, change: impl FnOnce(Pose) -> Pose) -> Result<()> {
+        let place = &self.place;
+        place.write(py, |inner| {
+            let now = inner.world.pose(place.id, 0).ok_or_else(|| place.removed())?;
+            Ok(inner.world.set_pose(place.id, change(now))?)
+        })
+    }
+}
+
+#[pymethods]
+impl RigidBody {
+    /// Name, unique in its world.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.place.name
+    }
+
+    /// Whether its world still has it.
+    #[getter]
+    fn exists(&self) -> Result<bool> {
+        self.place.shared.read(|inner| Ok(inner.world.status(self.place.id).is_some()))
+    }
+
+    /// Mass, kg. Meaningless for static geometry.
+    #[getter]
+    fn mass(&self) -> Result<f64> {
+        self.constant(Rigid::mass)
+    }
+
+    /// Inertia about the center of mass, body axes, shape (3, 3), kg·m².
+    #[getter]
+    fn inertia<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
+        symmetric(py, &self.constant(|body| *body.inertia())?)
+    }
+
+    /// Position of the origin of its frame, shape (3,), meters: the center of a sphere, box,
+    /// capsule or cylinder, the origin of a mesh's file. Setting it keeps the velocity.
+    #[getter]
+    fn position<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.place.pose()?.translation.vector))
+    }
+
+    #[setter]
+    fn set_position(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        let position = vec3(value, "position")?;
+        self.set_place(py, |now| Pose::from_parts(position.into(), now.rotation))
+    }
+
+    /// The center of mass in the body's frame, shape (3,), meters: zero except for meshes.
+    #[getter]
+    fn center_of_mass<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.constant(Rigid::center_of_mass)?))
+    }
+
+    /// The center of mass in the world, shape (3,), meters.
+    #[getter]
+    fn world_center_of_mass<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.place.part_state(0)?.position()))
+    }
+
+    /// Orientation, body to world, unit quaternion (x, y, z, w), shape (4,). Setting it rotates the
+    /// body about the origin of its frame and keeps the velocity.
+    #[getter]
+    fn orientation<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(quaternion(py, &self.place.pose()?.rotation))
+    }
+
+    #[setter]
+    fn set_orientation(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        let rotation = rotation(value, "orientation")?;
+        self.set_place(py, |now| Pose::from_parts(now.translation, rotation))
+    }
+
+    /// Velocity of the center of mass, shape (3,), m/s.
+    #[getter]
+    fn velocity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.place.part_state(0)?.velocity))
+    }
+
+    #[setter]
+    fn set_velocity(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.set_motion(py, Some(vec3(value, "velocity")?), None)
+    }
+
+    /// Angular velocity, world axes, shape (3,), rad/s.
+    #[getter]
+    fn angular_velocity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.place.part_state(0)?.angular_velocity))
+    }
+
+    #[setter]
+    fn set_angular_velocity(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.set_motion(py, None, Some(vec3(value, "angular_velocity")?))
+    }
+
+    /// Acceleration of the center of mass at the last force evaluation, shape (3,), m/s².
+    #[getter]
+    fn acceleration<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.place.part_state(0)?.acceleration))
+    }
+
+    /// ``"dynamic"``, ``"kinematic"`` (moves at its prescribed velocity and pushes dynamic bodies)
+    /// or ``"static"``.
+    #[getter]
+    fn mode(&self) -> Result<&'static str> {
+        Ok(word(self.place.status()?.mode, MODES))
+    }
+
+    #[setter]
+    fn set_mode(&self, py: Python<'_>, value: &str) -> Result<()> {
+        let mode = meaning("mode", value, MODES)?;
+        if mode == Mode::Dynamic && self.constant(Rigid::is_fixed)? {
+            return Err(Error::value(format!(
+                "'{}' has no mass: it was added as static, and cannot be dynamic",
+                self.place.name
+            )));
+        }
+        self.place.write(py, |inner| Ok(inner.world.set_mode(self.place.id, mode)?))
+    }
+
+    /// Whether it takes part in the simulation. A disabled body keeps its state.
+    #[getter]
+    fn enabled(&self) -> Result<bool> {
+        Ok(self.place.status()?.enabled)
+    }
+
+    #[setter]
+    fn set_enabled(&self, py: Python<'_>, value: bool) -> Result<()> {
+        self.place.write(py, |inner| Ok(inner.world.set_enabled(self.place.id, value)?))
+    }
+
+    /// Whether it sleeps: the steps leave it out until something touches it
+    /// (``World(sleep_after=…)``). Any change wakes it.
+    #[getter]
+    fn asleep(&self) -> Result<bool> {
+        self.place.status()?;
+        self.place.shared.read(|inner| Ok(inner.world.asleep(self.place.id)))
+    }
+
+    /// Whether it collides.
+    #[getter]
+    fn collidable(&self) -> Result<bool> {
+        Ok(self.place.status()?.collidable)
+    }
+
+    #[setter]
+    fn set_collidable(&self, py: Python<'_>, value: bool) -> Result<()> {
+        self.place.write(py, |inner| Ok(inner.world.set_collidable(self.place.id, value)?))
+    }
+
+    /// Coefficient of restitution, 0 to 1.
+    #[getter]
+    fn restitution(&self) -> Result<f64> {
+        self.constant(|body| body.material.restitution)
+    }
+
+    #[setter]
+    fn set_restitution(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |body| body.material.restitution = value)
+    }
+
+    /// Coefficient of Coulomb friction, at least 0.
+    #[getter]
+    fn friction(&self) -> Result<f64> {
+        self.constant(|body| body.material.friction)
+    }
+
+    #[setter]
+    fn set_friction(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |body| body.material.friction = value)
+    }
+
+    /// Color, sRGB, shape (3,), each 0 to 1. Setting it removes a pattern.
+    #[getter]
+    fn color<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(array(py, &self.constant(appearance::color)?))
+    }
+
+    #[setter]
+    fn set_color(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        let color = some::<3>(value, "color")?;
+        if let Some(wrong) = color.iter().find(|c| !(0.0..=1.0).contains(*c)) {
+            return Err(Error::value(format!("color: {wrong} is not from 0 to 1")));
+        }
+        self.change(py, |body| *body = appearance::colored(body.clone(), color))
+    }
+
+    /// Linear damping, 1/s: a force of ``-damping · momentum``.
+    #[getter]
+    fn linear_damping(&self) -> Result<f64> {
+        self.constant(|body| body.linear_damping)
+    }
+
+    #[setter]
+    fn set_linear_damping(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |body| body.linear_damping = value)
+    }
+
+    /// Angular damping, 1/s: a torque of ``-damping · angular momentum``.
+    #[getter]
+    fn angular_damping(&self) -> Result<f64> {
+        self.constant(|body| body.angular_damping)
+    }
+
+    #[setter]
+    fn set_angular_damping(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |body| body.angular_damping = value)
+    }
+
+    /// Applies a force during the next step only. force: shape (3,), N, world axes; point: where it
+    /// acts in the world, meters (default: the center of mass).
+    #[pyo3(signature = (force, point=None))]
+    fn apply_force(&self, py: Python<'_>, force: &Bound<'_, PyAny>, point: Option<&Bound<'_, PyAny>>) -> Result<()> {
+        let (force, point) = (vec3(force, "force")?, point.map(|p| vec3(p, "point")).transpose()?);
+        self.place.write(py, |inner| {
+            let at = point
+                .unwrap_or(inner.world.part_state(self.place.id, 0).ok_or_else(|| self.place.removed())?.position());
+            Ok(inner.world.apply_force(self.place.id, 0, force, &at)?)
+        })
+    }
+
+    /// Applies a torque during the next step only. torque: shape (3,), N·m, world axes.
+    fn apply_torque(&self, py: Python<'_>, torque: &Bound<'_, PyAny>) -> Result<()> {
+        let torque = vec3(torque, "torque")?;
+        self.place.write(py, |inner| Ok(inner.world.apply_torque(self.place.id, 0, torque)?))
+    }
+
+    /// Applies an impulse at once. impulse: shape (3,), N·s, world axes; point: where it acts in
+    /// the world, meters (default: the center of mass).
+    #[pyo3(signature = (impulse, point=None))]
+    fn apply_impulse(
+        &self,
+        py: Python<'_>,
+        impulse: &Bound<'_, PyAny>,
+        point: Option<&Bound<'_, PyAny>>,
+    ) -> Result<()> {
+        let (impulse, point) = (vec3(impulse, "impulse")?, point.map(|p| vec3(p, "point")).transpose()?);
+        self.place.write(py, |inner| {
+            let at = point
+                .unwrap_or(inner.world.part_state(self.place.id, 0).ok_or_else(|| self.place.removed())?.position());
+            Ok(inner.world.apply_impulse(self.place.id, 0, impulse, &at)?)
+        })
+    }
+
+    /// Sets the velocity of a kinematic body such that its frame reaches a pose at the end of the
+    /// next step. An omitted argument keeps its present value.
+    #[pyo3(signature = (position=None, orientation=None))]
+    fn move_to(
+        &self,
+        py: Python<'_>,
+        position: Option<&Bound<'_, PyAny>>,
+        orientation: Option<&Bound<'_, PyAny>>,
+    ) -> Result<()> {
+        let target = pose(position, orientation)?;
+        let (moves, turns) = (position.is_some(), orientation.is_some());
+        self.place.write(py, |inner| {
+            let now = inner.world.pose(self.place.id, 0).ok_or_else(|| self.place.removed())?;
+            let translation = if moves { target.translation } else { now.translation };
+            let rotation = if turns { target.rotation } else { now.rotation };
+            Ok(inner.world.move_to(self.place.id, Pose::from_parts(translation, rotation))?)
+        })
+    }
+
+    /// Returns the position of a point of the body in the world. point: shape (3,), in the body's
+    /// frame, meters (default: its origin).
+    #[pyo3(signature = (point=None))]
+    fn to_world<'py>(&self, py: Python<'py>, point: Option<&Bound<'_, PyAny>>) -> Result<Bound<'py, PyArray1<f64>>> {
+        let point = vec3_or(point, "point", Vec3::zeros())?;
+        Ok(vector(py, &self.place.pose()?.transform_point(&point.into()).coords))
+    }
+
+    fn __repr__(&self) -> String {
+        let gone = !self.exists().unwrap_or(true);
+        format!("<tumble.RigidBody '{}'{}>", self.place.name, if gone { ", removed" } else { "" })
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<RigidBody>().is_ok_and(|other| self.place.same(&other.get().place))
+    }
+
+    fn __hash__(&self) -> u64 {
+        hash(&self.place)
+    }
+
+    /// Refuses to pickle a handle by itself.
+    fn __reduce__(&self) -> Result<()> {
+        Err(alone(&self.place.name))
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.anchor)
+    }
+}

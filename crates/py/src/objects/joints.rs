@@ -1,0 +1,108 @@
+//! Shared parts of the methods of articulations: lookup of joints and links by name, arguments and
+//! results of the algorithms.
+
+use crate::arrays::convert::{Numbers, numbers, vec3};
+use crate::errors::{Error, Result};
+use crate::objects::articulation::Articulation;
+use crate::objects::binding::Which;
+use crate::objects::place::Place;
+use crate::objects::robot::Rows;
+use crate::world::inner::Inner;
+use numpy::{IxDyn, PyArray1, PyArrayDyn, PyArrayMethods};
+use pyo3::prelude::*;
+use tumble::collide::Vec3;
+use tumble::dynamics::Drive;
+
+impl Articulation {
+    /// Returns the arguments of an algorithm. Omitted ones have their current values.
+    pub fn rows(&self, arguments: &[(Which, &'static str, Option<&Bound<'_, PyAny>>)]) -> Result<Rows> {
+        let read = |&(which, name, value): &(Which, &'static str, Option<&Bound<'_, PyAny>>)| {
+            let width = which.width(&self.robot);
+            let numbers = match value {
+                Some(value) => numbers(value, name)?,
+                None => Numbers { shape: vec![width], data: self.spot.get(which, &self.robot)? },
+            };
+            Ok((name, numbers, width))
+        };
+        Rows::new(arguments.iter().map(read).collect::<Result<Vec<_>>>()?)
+    }
+
+    pub fn in_world(&self) -> Result<&Place> {
+        self.place().ok_or_else(|| {
+            Error::value(format!(
+                "'{}' is not in a world; World.add_articulation returns a handle of a body in a world",
+                self.name
+            ))
+        })
+    }
+
+    /// Returns the degree of freedom of a revolute or prismatic joint, by the name of the joint.
+    pub fn dof_of(&self, joint: &str) -> Result<usize> {
+        let number = self.robot.joints.iter().position(|name| name == joint).ok_or_else(|| {
+            let names: Vec<&str> = self.robot.joints.iter().map(String::as_str).take(12).collect();
+            Error::Name(format!("there is no joint named '{joint}'; there are {}", names.join(", ")))
+        })?;
+        let link = &self.robot.model.links()[number];
+        if link.joint.dof() != 1 {
+            return Err(Error::value(format!(
+                "joint '{joint}' has {} degrees of freedom; drives need a revolute or prismatic joint",
+                link.joint.dof()
+            )));
+        }
+        Ok(link.v)
+    }
+
+    /// Returns the part that carries a frame.
+    pub fn part(&self, link: &str) -> Result<usize> {
+        let links = self.robot.model.links().len();
+        Ok(self.robot.frame(link)?.link.unwrap_or(links))
+    }
+
+    /// Applies something at a point of a link, by default the origin of its frame.
+    pub fn push(
+        &self,
+        py: Python<'_>,
+        link: &str,
+        point: Option<&Bound<'_, PyAny>>,
+        apply: impl FnOnce(&mut Inner, &Place, usize, Vec3) -> Result<()>,
+    ) -> Result<()> {
+        let (place, part) = (self.in_world()?, self.part(link)?);
+        let point = point.map(|p| vec3(p, "point")).transpose()?;
+        let frame = self.robot.frame(link)?.pose;
+        place.write(py, |inner| {
+            let part_state = inner.world.part_state(place.id, part).ok_or_else(|| place.removed())?;
+            let at = point.unwrap_or((part_state.pose * frame).translation.vector);
+            apply(inner, place, part, at)
+        })
+    }
+}
+
+/// Returns results in the shape that their arguments require.
+pub fn result<'py>(
+    py: Python<'py>,
+    rows: &Rows,
+    data: Vec<f64>,
+    shape: &[usize],
+) -> Result<Bound<'py, PyArrayDyn<f64>>> {
+    let shape: Vec<usize> = rows.batch.iter().chain(shape).copied().collect();
+    Ok(PyArray1::from_vec(py, data).reshape(IxDyn(&shape))?)
+}
+
+/// Returns the drive for a target, a velocity and gains.
+pub fn drive(target: Option<f64>, velocity: Option<f64>, stiffness: f64, damping: f64, limit: f64) -> Result<Drive> {
+    let stiff = stiffness != 0.0 || damping != 0.0;
+    Ok(match (target, velocity) {
+        (None, None) if !stiff => Drive::None,
+        (Some(_), _) if !stiff => {
+            return Err(Error::value("target: a drive to a position needs a stiffness or a damping above 0"));
+        }
+        (None, Some(target)) if !stiff => Drive::Velocity { target, limit },
+        _ => Drive::Position {
+            stiffness,
+            damping,
+            target: target.unwrap_or(0.0),
+            velocity: velocity.unwrap_or(0.0),
+            limit,
+        },
+    })
+}

@@ -1,0 +1,13 @@
+//! Python classes of bodies, shapes and sphere trees.
+
+pub mod appearance;
+pub mod articulation;
+pub mod binding;
+pub mod bodies;
+pub mod body;
+pub mod description;
+pub mod joints;
+pub mod place;
+pub mod robot;
+pub mod shapes;
+pub mod spheretree;

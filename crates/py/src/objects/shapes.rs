@@ -1,0 +1,272 @@
+//! Collision shapes. Sizes are full sizes: edge lengths, and lengths without caps.
+
+use crate::arrays::convert::{number, numbers, path, shown, some, vec3_or};
+use crate::errors::{Error, Result, caught};
+use crate::io::slow;
+use crate::pool;
+use crate::world::pickling::{ShapeRecord, write_shape};
+use nalgebra::Translation3;
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::PyClass;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use tumble::collide::{Pose, Quat, Shape as Solid, TreeCache, TreeSettings, TriMesh, Vec3};
+use tumble::scene::{building_surface, read_solid};
+
+/// A collision shape. The classes ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``HalfSpace`` and
+/// ``Mesh`` make one.
+#[pyclass(frozen, subclass, module = "tumble")]
+pub struct Shape {
+    /// In its own frame.
+    pub solid: Solid,
+    /// Pose of that frame in the body's frame, which the user places.
+    pub placement: Pose,
+    /// Its Python expression.
+    words: String,
+}
+
+impl Shape {
+    fn new(solid: Solid, words: String) -> Shape {
+        Shape { solid, placement: Pose::identity(), words }
+    }
+
+    /// Returns the shape of a record, as an object of its class.
+    pub fn of_record(py: Python<'_>, record: ShapeRecord) -> Result<Py<PyAny>> {
+        let ShapeRecord { solid, placement, words } = record;
+        let shape = Shape { solid, placement, words };
+        Ok(match &shape.solid {
+            Solid::Sphere { .. } => Py::new(py, shape.into_a(Sphere))?.into_any(),
+            Solid::Box { .. } => Py::new(py, shape.into_a(Block))?.into_any(),
+            Solid::Capsule { .. } => Py::new(py, shape.into_a(Capsule))?.into_any(),
+            Solid::Cylinder(_) => Py::new(py, shape.into_a(Cylinder))?.into_any(),
+            Solid::HalfSpace => Py::new(py, shape.into_a(HalfSpace))?.into_any(),
+            Solid::Mesh(_) => Py::new(py, shape.into_a(Mesh))?.into_any(),
+        })
+    }
+
+    /// Returns the shape as an object of one of its classes.
+    fn into_a<C: PyClass<BaseType = Shape>>(self, class: C) -> PyClassInitializer<C> {
+        PyClassInitializer::from(self).add_subclass(class)
+    }
+}
+
+#[pymethods]
+impl Shape {
+    /// Volume, m³; infinite for a half-space.
+    #[getter]
+    fn volume(&self) -> f64 {
+        self.solid.volume()
+    }
+
+    /// Radius of the smallest sphere about the shape's origin that contains it, meters; infinite
+    /// for a half-space.
+    #[getter]
+    fn bounding_radius(&self) -> f64 {
+        self.solid.bounding_radius()
+    }
+
+    /// Pickles the shape.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let (py, own) = (slf.py(), slf.get());
+        let record = ShapeRecord { solid: own.solid.clone(), placement: own.placement, words: own.words.clone() };
+        let unpickle = py.import("tumble._native")?.getattr("_unpickle_shape")?;
+        Ok((unpickle, (PyBytes::new(py, &write_shape(&record)?),)))
+    }
+
+    fn __repr__(&self) -> &str {
+        &self.words
+    }
+}
+
+/// A sphere. radius: meters.
+#[pyclass(frozen, extends = Shape, module = "tumble")]
+pub struct Sphere;
+
+#[pymethods]
+impl Sphere {
+    #[new]
+    fn new(radius: f64) -> Result<PyClassInitializer<Sphere>> {
+        Ok(Shape::new(Solid::sphere(radius)?, format!("Sphere(radius={radius})")).into_a(Sphere))
+    }
+}
+
+/// A box about its center. size: full edge lengths along x, y and z, meters; one number is a cube.
+#[pyclass(frozen, extends = Shape, name = "Box", module = "tumble")]
+pub struct Block;
+
+#[pymethods]
+impl Block {
+    #[new]
+    fn new(size: &Bound<'_, PyAny>) -> Result<PyClassInitializer<Block>> {
+        let size = match size.extract::<f64>() {
+            Ok(edge) => [number(edge, "size")?; 3],
+            Err(_) => some::<3>(size, "size")?,
+        };
+        let [x, y, z] = size;
+        if let Some(edge) = size.iter().find(|edge| **edge <= 0.0) {
+            return Err(Error::value(format!("size: an edge of {edge} m; edges must be above 0 m")));
+        }
+        Ok(Shape::new(Solid::cuboid(0.5 * Vec3::from(size))?, format!("Box(size=({x}, {y}, {z}))")).into_a(Block))
+    }
+}
+
+/// A capsule along z about its center. radius: meters; length: of the straight part, without the
+/// caps, meters.
+#[pyclass(frozen, extends = Shape, module = "tumble")]
+pub struct Capsule;
+
+#[pymethods]
+impl Capsule {
+    #[new]
+    fn new(radius: f64, length: f64) -> Result<PyClassInitializer<Capsule>> {
+        let solid = Solid::capsule(radius, half(length)?)?;
+        Ok(Shape::new(solid, format!("Capsule(radius={radius}, length={length})")).into_a(Capsule))
+    }
+}
+
+/// A cylinder along z about its center. radius, length: meters.
+#[pyclass(frozen, extends = Shape, module = "tumble")]
+pub struct Cylinder;
+
+#[pymethods]
+impl Cylinder {
+    #[new]
+    fn new(radius: f64, length: f64) -> Result<PyClassInitializer<Cylinder>> {
+        let length_half = half(length)?;
+        let solid = caught(|| Ok(Solid::cylinder(radius, length_half)?))?;
+        Ok(Shape::new(solid, format!("Cylinder(radius={radius}, length={length})")).into_a(Cylinder))
+    }
+}
+
+fn half(length: f64) -> Result<f64> {
+    if length.is_finite() && length > 0.0 {
+        Ok(0.5 * length)
+    } else {
+        Err(Error::value(format!("length is {length}; it must be finite and above 0 m")))
+    }
+}
+
+/// All points x with ``normal · x <= offset``. normal: of any length above 0, points out of the
+/// solid; offset: meters along the unit normal.
+///
+/// Only static and kinematic bodies can have it. The frame of such a body has its z axis along the
+/// normal and its origin on the plane.
+#[pyclass(frozen, extends = Shape, module = "tumble")]
+pub struct HalfSpace;
+
+#[pymethods]
+impl HalfSpace {
+    #[new]
+    #[pyo3(signature = (normal=None, offset=0.0), text_signature = "(normal=(0.0, 0.0, 1.0), offset=0.0)")]
+    fn new(normal: Option<&Bound<'_, PyAny>>, offset: f64) -> Result<PyClassInitializer<HalfSpace>> {
+        let given = vec3_or(normal, "normal", Vec3::z())?;
+        let offset = number(offset, "offset")?;
+        let largest = given.amax();
+        if largest == 0.0 {
+            return Err(Error::value("normal: (0, 0, 0) has no direction"));
+        }
+        let n = (given / largest).normalize();
+        // A rotation by 180 degrees about x if the normal points straight down.
+        let rotation = Quat::rotation_between(&Vec3::z(), &n)
+            .unwrap_or_else(|| Quat::from_quaternion(nalgebra::Quaternion::new(0.0, 1.0, 0.0, 0.0)));
+        let placement = Pose::from_parts(Translation3::from(n * offset), rotation);
+        let words = format!("HalfSpace(normal=({}, {}, {}), offset={offset})", given.x, given.y, given.z);
+        Ok(Shape { solid: Solid::half_space(), placement, words }.into_a(HalfSpace))
+    }
+}
+
+/// A closed mesh. The frame of its body is that of its vertices, so ``position`` is the position of
+/// their origin.
+///
+/// ``Mesh(vertices, faces)``: shapes (n, 3) in meters and (m, 3) of indices from 0,
+/// counter-clockwise seen from outside. ``Mesh(path)``: an OBJ, STL or COLLADA file in meters;
+/// ``scale`` multiplies its coordinates. Also takes an object with ``vertices`` and ``faces``, such
+/// as a trimesh. A mesh that is open or encloses nothing is a ``ValueError`` that names the place.
+#[pyclass(frozen, extends = Shape, module = "tumble")]
+pub struct Mesh;
+
+#[pymethods]
+impl Mesh {
+    #[new]
+    #[pyo3(signature = (vertices, faces=None, *, scale=1.0))]
+    fn new(
+        py: Python<'_>,
+        vertices: &Bound<'_, PyAny>,
+        faces: Option<&Bound<'_, PyAny>>,
+        scale: f64,
+    ) -> Result<PyClassInitializer<Mesh>> {
+        if !(scale.is_finite() && scale > 0.0) {
+            return Err(Error::value(format!("scale is {scale}; it must be finite and above 0")));
+        }
+        let mesh = triangles(py, vertices, faces)?.scaled(scale);
+        let count = mesh.triangles.len();
+        let build = || Ok(Solid::mesh_cached(mesh, &TreeSettings::octree(), &TreeCache::of_environment())?);
+        let name = vertices.extract::<std::path::PathBuf>().unwrap_or_else(|_| "Mesh".into());
+        let (solid, _) = py.detach(|| pool::run(|| building_surface(&name.display().to_string(), count, build)))?;
+        slow::warn(py)?;
+        Ok(Shape::new(solid, format!("Mesh({count} triangles)")).into_a(Mesh))
+    }
+
+    /// The center of mass in the frame of the vertices, shape (3,), meters.
+    #[getter]
+    fn center_of_mass<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyArray1<f64>>> {
+        let base: PyRef<'py, Shape> = slf.clone().into_any().extract().map_err(PyErr::from)?;
+        Ok(crate::arrays::convert::vector(slf.py(), &base.solid.center_of_mass()))
+    }
+
+    /// The vertices after repair, equal to the given ones up to rounding, shape (n, 3), meters.
+    #[getter]
+    fn vertices<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyArray2<f64>>> {
+        let base: PyRef<'py, Shape> = slf.clone().into_any().extract().map_err(PyErr::from)?;
+        let Solid::Mesh(mesh) = &base.solid else { return Err(Error::value("not a mesh")) };
+        let center = mesh.center_of_mass();
+        let flat: Vec<f64> = mesh.mesh().vertices.iter().map(|v| v + center).flat_map(|v| [v.x, v.y, v.z]).collect();
+        Ok(PyArray1::from_vec(slf.py(), flat).reshape([mesh.mesh().vertices.len(), 3])?)
+    }
+
+    /// The triangles, shape (m, 3), indices into ``vertices``.
+    #[getter]
+    fn faces<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyArray2<u32>>> {
+        let base: PyRef<'py, Shape> = slf.clone().into_any().extract().map_err(PyErr::from)?;
+        let Solid::Mesh(mesh) = &base.solid else { return Err(Error::value("not a mesh")) };
+        let flat: Vec<u32> = mesh.mesh().triangles.iter().flatten().copied().collect();
+        Ok(PyArray1::from_vec(slf.py(), flat).reshape([mesh.mesh().triangles.len(), 3])?)
+    }
+}
+
+/// Returns triangles from arrays, from an object that has them (trimesh), or from a file.
+pub fn triangles(py: Python<'_>, vertices: &Bound<'_, PyAny>, faces: Option<&Bound<'_, PyAny>>) -> Result<TriMesh> {
+    if let Some(faces) = faces {
+        return of_arrays(vertices, faces);
+    }
+    if let (Ok(own), Ok(faces)) = (vertices.getattr("vertices"), vertices.getattr("faces")) {
+        return of_arrays(&own, &faces);
+    }
+    let file = path(vertices)?;
+    py.detach(|| {
+        let bytes = std::fs::read(&file).map_err(|source| Error::File { file: file.display().to_string(), source })?;
+        let (mesh, _) = pool::run(|| {
+            read_solid(&file, &bytes, None).map_err(|why| Error::value(format!("{}: {why}", file.display())))
+        })?;
+        Ok(mesh)
+    })
+}
+
+fn of_arrays(vertices: &Bound<'_, PyAny>, faces: &Bound<'_, PyAny>) -> Result<TriMesh> {
+    let (points, corners) = (numbers(vertices, "vertices")?, numbers(faces, "faces")?);
+    for (what, shape) in [("vertices", &points.shape), ("faces", &corners.shape)] {
+        if shape.len() != 2 || shape[1] != 3 {
+            return Err(Error::value(format!("{what}: expected shape (n, 3), got {}", shown(shape))));
+        }
+    }
+    let count = points.shape[0];
+    let index = |&k: &f64| {
+        let right = k >= 0.0 && k < count as f64 && k.fract() == 0.0;
+        if right { Ok(k as u32) } else { Err(Error::value(format!("faces: {k} is not an index of {count} vertices"))) }
+    };
+    let flat = corners.data.iter().map(index).collect::<Result<Vec<u32>>>()?;
+    Ok(TriMesh {
+        vertices: points.data.chunks_exact(3).map(|p| Vec3::new(p[0], p[1], p[2])).collect(),
+        triangles: flat.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+    })
+}

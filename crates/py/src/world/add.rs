@@ -1,0 +1,79 @@
+//! Adds bodies to a world.
+
+use crate::arrays::convert::base_pose;
+use crate::errors::{Error, Result};
+use crate::io::slow;
+use crate::objects::appearance;
+use crate::objects::articulation::Articulation;
+use crate::objects::bodies::place_of;
+use crate::objects::body::RigidBody;
+use crate::objects::description::described;
+use crate::objects::place::{Place, by_name};
+use crate::objects::shapes::Shape;
+use crate::world::shared::Shared;
+use pyo3::prelude::*;
+use std::sync::Arc;
+use tumble::collide::Pose;
+use tumble::dynamics::{Mode, RigidBody as Rigid};
+
+/// Returns the place of a body of this world, given as a handle or by name.
+pub fn own_place(shared: &Arc<Shared>, body: &Bound<'_, PyAny>) -> Result<Place> {
+    let place = match body.extract::<String>() {
+        Ok(name) => {
+            let found = shared.read(|inner| by_name(inner, &name))?;
+            Place { shared: shared.clone(), id: found.id, name: name.into() }
+        }
+        Err(_) => place_of(body)?,
+    };
+    match Arc::ptr_eq(&place.shared, shared) {
+        true => place.status().map(|_| place),
+        false => Err(Error::value(format!("'{}' belongs to another world", place.name))),
+    }
+}
+
+/// Returns a body with a mass or a density. A kinematic body needs neither.
+pub fn rigid(name: &str, shape: &Shape, mass: Option<f64>, density: Option<f64>, kinematic: bool) -> Result<Rigid> {
+    let solid = shape.solid.clone();
+    match (mass, density) {
+        (Some(mass), None) => Ok(Rigid::with_mass(name, solid, mass)?),
+        (None, Some(density)) => Ok(Rigid::with_density(name, solid, density)?),
+        (None, None) if kinematic => Ok(Rigid::fixed(name, solid)),
+        _ => Err(Error::value(format!("body '{name}': expected a mass or a density, not both"))),
+    }
+}
+
+/// Adds a body and returns its handle.
+pub fn add(shared: &Arc<Shared>, py: Python<'_>, body: Rigid, mode: Mode, collidable: bool) -> Result<RigidBody> {
+    let place = shared.write(py, |inner| {
+        let body = appearance::usual(body, inner.world.ids().len());
+        let id = inner.world.add_boxed(Box::new(body), mode)?;
+        inner.world.set_collidable(id, collidable)?;
+        let name = inner.world.object(id).map_or("", |o| o.name()).into();
+        Ok(Place { shared: shared.clone(), id, name })
+    })?;
+    RigidBody::new(py, place)
+}
+
+/// Adds an articulated body, a description or the path of one, and returns its handle.
+pub fn articulated(
+    shared: &Arc<Shared>,
+    py: Python<'_>,
+    description: &Bound<'_, PyAny>,
+    base: Option<&Bound<'_, PyAny>>,
+    name: Option<&str>,
+) -> Result<Articulation> {
+    let description = described(description)?;
+    let description = description.get();
+    let (body, robot, notes) = description.body(py, base.map_or(Ok(Pose::identity()), base_pose)?, name)?;
+    slow::warn(py)?;
+    let (robot, efforts) = (Arc::new(robot), description.spot.efforts());
+    let place = shared.write(py, |inner| {
+        let id = inner.world.add(body)?;
+        inner.robots.insert(id, robot.clone());
+        efforts.map(|tau| inner.efforts.insert(id, tau));
+        let name: Arc<str> = inner.world.object(id).map_or("", |o| o.name()).into();
+        inner.notes.extend(notes.iter().map(|note| format!("articulated \"{name}\": {note}")));
+        Ok(Place { shared: shared.clone(), id, name })
+    })?;
+    Articulation::placed(py, place, robot)
+}

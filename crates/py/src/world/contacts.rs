@@ -1,0 +1,68 @@
+//! The contacts of the last step as one structured numpy array.
+
+use crate::errors::Result;
+use crate::objects::place::body_ids;
+use crate::world::inner::Inner;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyList;
+use tumble::dynamics::{ArticulatedBody, ObjectId};
+
+/// Fields of a contact: name, format, count. All have 8 bytes, so there is no padding.
+const FIELDS: [(&str, &str, usize); 8] = [
+    ("bodies", "<i8", 2),
+    ("parts", "<i8", 2),
+    ("point", "<f8", 3),
+    ("normal", "<f8", 3),
+    ("depth", "<f8", 1),
+    ("velocity", "<f8", 3),
+    ("impulse", "<f8", 3),
+    ("force", "<f8", 3),
+];
+
+/// Returns the contacts as the bytes of the array.
+pub fn bytes(inner: &Inner) -> Vec<u8> {
+    let ids = body_ids(&inner.world);
+    let number = |id: ObjectId| ids.iter().position(|&other| other == id).map_or(-1, |k| k as i64);
+    let contacts = inner.world.contacts();
+    let mut out = Vec::with_capacity(contacts.len() * 20 * 8);
+    for c in contacts {
+        let whole = [number(c.a), number(c.b), link(inner, c.a, c.part_a), link(inner, c.b, c.part_b)];
+        whole.iter().for_each(|k| out.extend_from_slice(&k.to_le_bytes()));
+        let (first, last) =
+            (c.point.iter().chain(c.normal.iter()), c.velocity.iter().chain(c.impulse.iter()).chain(c.force.iter()));
+        let real = first.copied().chain([c.depth]).chain(last.copied());
+        real.for_each(|x| out.extend_from_slice(&x.to_le_bytes()));
+    }
+    out
+}
+
+/// Returns the index of the touched link in the `link_names` of its articulation. A rigid body has
+/// only one part.
+fn link(inner: &Inner, id: ObjectId, part: usize) -> i64 {
+    let Some(body) = inner.world.get::<ArticulatedBody>(id) else { return part as i64 };
+    let name = body.link_of(part).map(|link| &body.model().links()[link].name);
+    let frames = body.model().frames();
+    // Shapes on the base count as the first link, to which all others are attached.
+    name.and_then(|name| frames.iter().position(|frame| frame.name == *name)).unwrap_or(0) as i64
+}
+
+/// Returns the array of such bytes.
+pub fn array<'py>(py: Python<'py>, bytes: Vec<u8>) -> Result<Bound<'py, PyAny>> {
+    Ok(PyArray1::from_vec(py, bytes).call_method1("view", (kind(py)?,))?)
+}
+
+/// Returns the numpy type of one contact.
+pub fn kind<'py>(py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    static KIND: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    let kind = KIND.get_or_try_init(py, || {
+        let fields = FIELDS.map(|(name, format, count)| match count {
+            1 => (name, format).into_pyobject(py).map(|f| f.into_any()),
+            _ => (name, format, (count,)).into_pyobject(py).map(|f| f.into_any()),
+        });
+        let fields = fields.into_iter().collect::<PyResult<Vec<_>>>()?;
+        PyResult::Ok(py.import("numpy")?.call_method1("dtype", (PyList::new(py, fields)?,))?.unbind())
+    })?;
+    Ok(kind.bind(py).clone())
+}

@@ -1,0 +1,14 @@
+//! The Python class of the world and the functions behind its methods.
+
+pub mod add;
+pub mod contacts;
+pub mod gc;
+pub mod inner;
+pub mod load;
+pub mod pairs;
+pub mod pickling;
+pub mod report;
+pub mod rollout;
+pub mod shared;
+pub mod snapshot;
+pub mod world;

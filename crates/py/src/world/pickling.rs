@@ -1,0 +1,132 @@
+//! Worlds and shapes as bytes, for Python's pickle.
+//!
+//! A world is the library's archive, and what belongs to the world on Python's side. Its forces and behaviors are Python objects, which pickle
+//! writes beside the bytes and `World.__setstate__` puts back, so that one that holds its own world is written too.
+
+use crate::errors::{Error, Result, caught};
+use crate::objects::robot::Robot;
+use crate::objects::shapes::Shape;
+use crate::world::inner::Inner;
+use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use tumble::collide::{Pose, Shape as Solid};
+use tumble::dynamics::archive::{open, seal};
+use tumble::dynamics::{ArchiveError, ArticulatedBody, ObjectId, World as Core};
+use tumble::scene::{CameraSpec, CavePlace, GroundSpec, LightSpec, SceneFile, SkySpec};
+
+/// What a pickled world and a pickled shape begin with. The number is raised with every change of what is in them.
+const WORLD: &[u8; 8] = b"tumbleW2";
+const SHAPE: &[u8; 8] = b"tumbleG2";
+
+/// A world.
+#[derive(Serialize, Deserialize)]
+struct Record {
+    archive: Vec<u8>,
+    scene: SceneRecord,
+    /// Places of articulated bodies, the names of their joints, and the forces that act on them.
+    robots: Vec<(u32, Vec<String>, Option<Vec<f64>>)>,
+    notes: Vec<String>,
+    overlaps: Vec<String>,
+}
+
+/// What is kept of a scene: its name, and what pictures are taken with.
+#[derive(Serialize, Deserialize)]
+struct SceneRecord {
+    file: String,
+    description: String,
+    integrator: String,
+    camera: Option<CameraSpec>,
+    cave: Option<CavePlace>,
+    lights: Vec<LightSpec>,
+    sky: SkySpec,
+    ground: Option<GroundSpec>,
+}
+
+impl SceneRecord {
+    fn of(scene: &SceneFile) -> SceneRecord {
+        let SceneFile { file, description, camera, cave, lights, sky, ground, world, .. } = scene.clone();
+        SceneRecord { file, description, integrator: world.integrator.to_string(), camera, cave, lights, sky, ground }
+    }
+
+    fn scene(self) -> Result<SceneFile> {
+        let SceneRecord { file, description, integrator, camera, cave, lights, sky, ground } = self;
+        let mut scene = SceneFile::parse("", &file)?;
+        scene.world.integrator = integrator.parse()?;
+        Ok(SceneFile { description, camera, cave, lights, sky, ground, ..scene })
+    }
+}
+
+/// The bytes of a world without its forces and behaviors.
+pub fn write(inner: &Inner) -> Result<Vec<u8>> {
+    let ids = inner.world.ids();
+    let robots = (0..).zip(ids).filter_map(|(place, id)| {
+        let robot = inner.robots.get(id)?;
+        Some((place, robot.joints.clone(), inner.efforts.get(id).cloned()))
+    });
+    let record = Record {
+        archive: inner.world.archive(inner.forces())?,
+        scene: SceneRecord::of(&inner.scene),
+        robots: robots.collect(),
+        notes: inner.notes.clone(),
+        overlaps: inner.overlaps.clone(),
+    };
+    Ok(seal(WORLD, &record)?)
+}
+
+/// The world of such bytes; its forces have no Python object yet.
+pub fn read(bytes: &[u8]) -> Result<Inner> {
+    let record: Record = open(WORLD, bytes)?;
+    let mut forces = Vec::new();
+    let world = Core::from_archive(&record.archive, &mut |name| {
+        forces.push(name.to_string());
+        Some(crate::extension::callbacks::empty_force(name))
+    })?;
+    let ids: Vec<ObjectId> = world.ids().to_vec();
+    let mut inner = Inner::new(world, Arc::new(record.scene.scene()?));
+    for (place, joints, effort) in record.robots {
+        let missing = || ArchiveError::Damaged(format!("object {place} is not articulated"));
+        let id = ids.get(place as usize).copied().ok_or_else(missing)?;
+        let body = inner.world.get::<ArticulatedBody>(id).ok_or_else(missing)?;
+        let robot = Robot { model: body.model().clone(), base: *body.base(), joints };
+        inner.robots.insert(id, Arc::new(robot));
+        effort.map(|effort| inner.efforts.insert(id, effort));
+    }
+    inner.expect_forces(&forces);
+    (inner.notes, inner.overlaps) = (record.notes, record.overlaps);
+    Ok(inner)
+}
+
+/// A shape: its solid, where that stands in the body's frame, and how it is written.
+#[derive(Serialize, Deserialize)]
+pub struct ShapeRecord {
+    pub solid: Solid,
+    pub placement: Pose,
+    pub words: String,
+}
+
+/// The bytes of a shape.
+pub fn write_shape(record: &ShapeRecord) -> Result<Vec<u8>> {
+    Ok(seal(SHAPE, record)?)
+}
+
+/// What a pickled shape becomes: an object of its class.
+#[pyfunction]
+pub fn _unpickle_shape(py: Python<'_>, data: PyBackedBytes) -> Result<Py<PyAny>> {
+    let record: ShapeRecord = py.detach(|| caught(|| Ok(open(SHAPE, &data)?)))?;
+    Shape::of_record(py, record)
+}
+
+/// What a pickled world becomes; pickle then puts its forces and behaviors back.
+#[pyfunction]
+pub fn _unpickle_world(py: Python<'_>, data: PyBackedBytes) -> Result<crate::world::world::World> {
+    let read = py.detach(|| caught(|| self::read(&data)))?;
+    crate::world::world::World::of(py, read)
+}
+
+impl From<ArchiveError> for Error {
+    fn from(error: ArchiveError) -> Error {
+        Error::Archive(error)
+    }
+}

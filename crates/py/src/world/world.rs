@@ -1,0 +1,654 @@
+//! The class `World`.
+
+use crate::arrays::convert::{Numbers, numbers, path, pose, vec3, vec3_or, vector, whole_number};
+use crate::choices::meaning;
+use crate::errors::{Error, Result};
+use crate::extension::callbacks::{Extensions, Reduced};
+use crate::interrupt::interruptible;
+use crate::io::picture::Shot;
+use crate::io::slow;
+use crate::objects::articulation::Articulation;
+use crate::objects::bodies;
+use crate::objects::bodies::{Bodies, handle, place_of};
+use crate::objects::body::RigidBody;
+use crate::objects::place::{body_ids, by_name};
+use crate::objects::shapes::Shape;
+use crate::pool;
+use crate::world::add::{add, articulated, own_place, rigid};
+use crate::world::gc::{Anchor, anchor};
+use crate::world::inner::Inner;
+use crate::world::load::{Choices, build};
+use crate::world::pairs::{self, combine};
+use crate::world::report::StepReport;
+use crate::world::rollout::Plan;
+use crate::world::shared::Shared;
+use crate::world::{contacts, pickling, snapshot};
+use numpy::{PyArray1, PyArray3, PyArrayMethods};
+use pyo3::gc::{PyTraverseError, PyVisit};
+use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
+use pyo3::types::PyBytes;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Instant;
+use tumble::collide::{ContactMode, Vec3};
+use tumble::dynamics::{Mode, PairMaterial, RigidBody as Rigid, Settings};
+use tumble::scene::{SceneFile, resolve_scene};
+
+/// A world of bodies that moves in steps of ``dt`` seconds. SI units, radians, z up; quaternions
+/// are (x, y, z, w).
+///
+/// gravity: shape (3,), m/s². dt: length of a step, s. stepper: ``"time_stepping"`` or
+/// ``"backtracking"``. integrator: ``"verlet"``, ``"symplectic_euler"``, ``"explicit_euler"``,
+/// ``"rk4"`` or ``"dormand_prince"``; used by ``"backtracking"``, since ``"time_stepping"`` has its
+/// own midpoint rule. solver: ``"gauss_seidel"``, ``"lcp_pyramid"`` or ``"lcp_sliding"``. substeps:
+/// sub-steps of each step. iterations: largest number of solver sweeps. contact_tolerance: meters.
+/// integrator_tolerance: for ``dormand_prince``. sleep_after: seconds after which islands that
+/// moved by less than sleep_within (meters) sleep until something touches them; None: never.
+/// combine_restitution, combine_friction: rule for the coefficients of a pair, ``"min"``,
+/// ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``. Names and defaults are those of
+/// scene files.
+///
+/// One thread at a time: while one thread steps a world, calls on it from another raise
+/// ``BusyError``. The interpreter is released while a world steps.
+#[pyclass(frozen, weakref, module = "tumble")]
+pub struct World {
+    pub shared: Arc<Shared>,
+    anchor: Py<Anchor>,
+}
+
+impl World {
+    /// Wraps a world.
+    pub fn of(py: Python<'_>, inner: Inner) -> Result<World> {
+        slow::warn(py)?;
+        let shared = Shared::new(inner);
+        Ok(World { anchor: anchor(py, &shared)?, shared })
+    }
+
+    fn settings<T>(&self, get: impl FnOnce(&Settings) -> T) -> Result<T> {
+        self.shared.read(|inner| Ok(get(inner.world.settings())))
+    }
+
+    fn set(&self, py: Python<'_>, change: impl FnOnce(&mut Settings)) -> Result<()> {
+        self.shared.write(py, |inner| {
+            let mut settings = *inner.world.settings();
+            change(&mut settings);
+            Ok(inner.world.set_settings(settings)?)
+        })
+    }
+}
+
+#[pymethods]
+impl World {
+    #[new]
+    #[pyo3(
+        text_signature = "(gravity=(0.0, 0.0, -9.81), dt=0.004166666666666667, stepper='time_stepping', integrator='verlet', \
+        solver='gauss_seidel', *, substeps=1, iterations=200, contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, \
+        combine_restitution='max', combine_friction='geometric_mean')"
+    )]
+    #[pyo3(signature = (gravity=None, dt=0.004166666666666667, stepper="time_stepping", integrator="verlet", solver="gauss_seidel", *, substeps=1, iterations=200,
+        contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, combine_restitution="max", combine_friction="geometric_mean"))]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn new(
+        py: Python<'_>,
+        gravity: Option<&Bound<'_, PyAny>>,
+        dt: f64,
+        stepper: &str,
+        integrator: &str,
+        solver: &str,
+        #[pyo3(from_py_with = whole_number)] substeps: u32,
+        #[pyo3(from_py_with = whole_number)] iterations: u32,
+        contact_tolerance: f64,
+        integrator_tolerance: f64,
+        sleep_after: Option<f64>,
+        sleep_within: f64,
+        combine_restitution: &str,
+        combine_friction: &str,
+    ) -> Result<World> {
+        let mut scene = SceneFile::parse("", "World")?;
+        let world = &mut scene.world;
+        world.gravity_m_per_s2 = vec3_or(gravity, "gravity", Vec3::from(world.gravity_m_per_s2))?.into();
+        Choices { stepper: Some(stepper), integrator: Some(integrator), solver: Some(solver), dt: Some(dt) }
+            .apply(world)?;
+        (world.substeps, world.iterations) = (substeps, iterations);
+        (world.contact_tolerance_m, world.integrator_tolerance) = (contact_tolerance, integrator_tolerance);
+        (world.sleep_after_s, world.sleep_within_m) = (sleep_after, sleep_within);
+        world.combine_restitution = combine(combine_restitution, "combine_restitution")?;
+        world.combine_friction = combine(combine_friction, "combine_friction")?;
+        World::of(py, build(scene)?)
+    }
+
+    /// Loads the world of a scene: the path of a ``scene.toml`` or of its folder, or the name of a
+    /// shipped scene.
+    ///
+    /// Arguments override the settings of the file. A missing file or an unknown name raises
+    /// ``MissingFileError`` (a ``FileNotFoundError``); a file with problems raises ``SceneError``
+    /// (a ``ValueError``), which lists all of them with line and column.
+    #[staticmethod]
+    #[pyo3(signature = (path_or_name, *, dt=None, stepper=None, integrator=None, solver=None))]
+    fn load(
+        py: Python<'_>,
+        path_or_name: &Bound<'_, PyAny>,
+        dt: Option<f64>,
+        stepper: Option<&str>,
+        integrator: Option<&str>,
+        solver: Option<&str>,
+    ) -> Result<World> {
+        let asked = path(path_or_name)?;
+        let built = py.detach(|| {
+            pool::run(|| {
+                let mut scene = resolve_scene(&asked.to_string_lossy(), &[])?.load()?;
+                Choices { stepper, integrator, solver, dt }.apply(&mut scene.world)?;
+                build(scene)
+            })
+        })?;
+        World::of(py, built)
+    }
+
+    /// Builds the world of a scene from the text of its file.
+    #[staticmethod]
+    fn parse(py: Python<'_>, text: &str) -> Result<World> {
+        World::of(py, py.detach(|| pool::run(|| build(SceneFile::parse(text, "scene.toml")?)))?)
+    }
+
+    /// Notes about the world: a list of sentences.
+    ///
+    /// They are about the files of a scene and of added articulations, such as repairs of a mesh or
+    /// a convex hull in place of an open mesh; about visual meshes that could not be read, once
+    /// something has drawn them; and about bodies that overlap at the start, the deepest eight by
+    /// name. Overlaps are searched for if this is read before the first step.
+    #[getter]
+    fn notes(&self, py: Python<'_>) -> Result<Vec<String>> {
+        self.shared.write(py, |inner| Ok(inner.all_notes()))
+    }
+
+    /// Advances by ``n`` steps of ``dt``. The interpreter is released meanwhile; Ctrl-C stops
+    /// between two steps.
+    ///
+    /// After a ``StepError`` the world is as before the step that failed; earlier steps are kept.
+    #[pyo3(signature = (n=1))]
+    fn step(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] n: i64) -> Result<()> {
+        let Ok(mut left) = u64::try_from(n) else {
+            return Err(Error::value(format!("n is {n}; it must be at least 0")));
+        };
+        self.shared.work_in_parts(py, |inner, turn| {
+            let begun = (left > 1).then(Instant::now);
+            while left > 0 {
+                inner.step()?;
+                left -= 1;
+                if begun.is_some_and(|begun| begun.elapsed() > turn) {
+                    break;
+                }
+            }
+            Ok(left == 0)
+        })
+    }
+
+    /// Simulated time, s.
+    #[getter]
+    fn time(&self) -> Result<f64> {
+        self.shared.read(|inner| Ok(inner.world.time()))
+    }
+
+    /// Steps taken since the world was made.
+    #[getter]
+    fn frame(&self) -> Result<u64> {
+        self.shared.read(|inner| Ok(inner.world.frame()))
+    }
+
+    /// Length of a step, s.
+    #[getter]
+    fn dt(&self) -> Result<f64> {
+        self.settings(|s| s.dt)
+    }
+
+    #[setter]
+    fn set_dt(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.set(py, |s| s.dt = value)
+    }
+
+    /// Gravity, shape (3,), m/s².
+    #[getter]
+    fn gravity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.settings(|s| s.gravity)?))
+    }
+
+    #[setter]
+    fn set_gravity(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        let gravity = vec3(value, "gravity")?;
+        self.set(py, |s| s.gravity = gravity)
+    }
+
+    /// Combination rule for restitution: ``"min"``, ``"max"``, ``"average"``, ``"product"`` or
+    /// ``"geometric_mean"``.
+    #[getter]
+    fn combine_restitution(&self) -> Result<&'static str> {
+        self.settings(|s| s.combine_restitution.name())
+    }
+
+    #[setter]
+    fn set_combine_restitution(&self, py: Python<'_>, value: &str) -> Result<()> {
+        let rule = combine(value, "combine_restitution")?;
+        self.set(py, |s| s.combine_restitution = rule)
+    }
+
+    /// Combination rule for friction.
+    #[getter]
+    fn combine_friction(&self) -> Result<&'static str> {
+        self.settings(|s| s.combine_friction.name())
+    }
+
+    #[setter]
+    fn set_combine_friction(&self, py: Python<'_>, value: &str) -> Result<()> {
+        let rule = combine(value, "combine_friction")?;
+        self.set(py, |s| s.combine_friction = rule)
+    }
+
+    /// Sets restitution and friction of the contacts of two bodies from the next step on,
+    /// overriding the combination rules.
+    ///
+    /// a, b: handles or names in any order; ``"ARTICULATION/LINK"`` is a link of an articulation
+    /// with the links fixed to it. None keeps the rule; without both the pair has no constants of
+    /// its own any more. Forks have the same pairs. ``save`` does not include them, as it does not
+    /// include materials.
+    #[pyo3(signature = (a, b, *, restitution=None, friction=None))]
+    fn set_pair_material(
+        &self,
+        py: Python<'_>,
+        a: &Bound<'_, PyAny>,
+        b: &Bound<'_, PyAny>,
+        restitution: Option<f64>,
+        friction: Option<f64>,
+    ) -> Result<()> {
+        pairs::set(&self.shared, py, [a, b], PairMaterial { restitution, friction })
+    }
+
+    /// Returns restitution and friction of the contacts of two bodies: the pair's own constants if
+    /// set, else those of the combination rules.
+    ///
+    /// a, b: as in ``set_pair_material``. An articulation is represented by its first shape.
+    fn pair_material(&self, a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> Result<(f64, f64)> {
+        pairs::get(&self.shared, [a, b])
+    }
+
+    /// Name of the stepper.
+    #[getter]
+    fn stepper(&self) -> Result<&'static str> {
+        self.shared.read(|inner| Ok(inner.world.stepper_name()))
+    }
+
+    /// Name of the contact solver.
+    #[getter]
+    fn solver(&self) -> Result<&'static str> {
+        self.shared.read(|inner| Ok(inner.world.solver_name()))
+    }
+
+    /// Name of the integrator.
+    #[getter]
+    fn integrator(&self) -> Result<String> {
+        self.shared.read(|inner| Ok(inner.scene.world.integrator.to_string()))
+    }
+
+    /// All bodies in the order in which they were added, by number or by name.
+    #[getter]
+    fn bodies(&self, py: Python<'_>) -> Result<Bodies> {
+        Bodies::new(py, self.shared.clone())
+    }
+
+    /// Returns the rigid body, or static geometry, of that name. An articulation or an unknown name
+    /// raises ``UnknownNameError``.
+    fn body(&self, py: Python<'_>, name: &str) -> Result<RigidBody> {
+        bodies::rigid_body(py, &self.shared, name)
+    }
+
+    /// Returns the articulated body of that name. A rigid body or an unknown name raises
+    /// ``UnknownNameError``.
+    fn articulation(&self, py: Python<'_>, name: &str) -> Result<Articulation> {
+        bodies::articulation(py, &self.shared, name)
+    }
+
+    /// ``world[name]``: the body of that name, a ``RigidBody`` or an ``Articulation``.
+    fn __getitem__(&self, py: Python<'_>, name: &str) -> Result<Py<PyAny>> {
+        handle(py, &self.shared, self.shared.read(|inner| by_name(inner, name))?)
+    }
+
+    /// The contacts of the last step: a structured array with one row each.
+    ///
+    /// Fields: ``bodies`` (2,), indices in ``world.bodies``, -1 for other objects; ``parts`` (2,),
+    /// for articulated bodies the indices of the links in their ``link_names``; ``point`` (3,), m;
+    /// ``normal`` (3,), unit, from the second body to the first; ``depth``, m, negative while
+    /// apart; ``velocity`` (3,) of the first relative to the second before the contact was solved,
+    /// m/s; ``impulse`` (3,) on the first over the last sub-step, N·s; ``force`` (3,), N, without
+    /// impacts. World axes.
+    #[getter]
+    fn contacts<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
+        contacts::array(py, self.shared.read(|inner| Ok(contacts::bytes(inner)))?)
+    }
+
+    /// Returns the mechanical energy of everything that moves: ``kinetic``, ``potential`` (zero at
+    /// the world's origin) and ``total``, J.
+    fn energy(&self, py: Python<'_>) -> Result<Py<PyAny>> {
+        let e = self.shared.read(|inner| Ok(inner.world.energy()))?;
+        Ok(py.import("tumble._values")?.call_method1("Energy", (e.kinetic, e.potential, e.total()))?.unbind())
+    }
+
+    /// Returns the momentum of everything that moves: ``linear`` (3,), N·s, and ``angular`` (3,)
+    /// about the world's origin, N·m·s. World axes.
+    fn momentum(&self, py: Python<'_>) -> Result<Py<PyAny>> {
+        let m = self.shared.read(|inner| Ok(inner.world.momentum()))?;
+        Ok(py
+            .import("tumble._values")?
+            .call_method1("Momentum", (vector(py, &m.linear), vector(py, &m.angular)))?
+            .unbind())
+    }
+
+    /// Statistics of the last step.
+    #[getter]
+    fn report(&self) -> Result<StepReport> {
+        self.shared.read(|inner| Ok(StepReport::of(&inner.world)))
+    }
+
+    /// Returns everything that the next step reads as bytes, for ``restore`` in a world of the same
+    /// bodies. Shapes, masses, settings and drives are not included.
+    fn save<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
+        let bytes = self.shared.read(|inner| Ok(snapshot::write(inner)))?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Restores the bytes of ``save``. Invalid bytes, or those of another world, raise
+    /// ``SnapshotError`` and change nothing.
+    fn restore(&self, py: Python<'_>, snapshot: PyBackedBytes) -> Result<()> {
+        self.shared.write(py, |inner| snapshot::read(inner, &snapshot))
+    }
+
+    /// Returns an independent copy with the same state and the same future.
+    ///
+    /// Forces and behaviors are copied by their own ``fork``.
+    fn fork(&self, py: Python<'_>) -> Result<World> {
+        let inner = self.shared.read(|inner| Ok(inner.fork()))?;
+        inner.take_raised()?;
+        World::of(py, inner)
+    }
+
+    fn __copy__(&self, py: Python<'_>) -> Result<World> {
+        self.fork(py)
+    }
+
+    fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> Result<World> {
+        self.fork(py)
+    }
+
+    /// Pickles the whole world, with its forces and behaviors.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Result<Reduced<'py>> {
+        let (bytes, state) = self.shared.read(|inner| Ok((pickling::write(inner)?, inner.pickled_extensions(py))))?;
+        let unpickle = py.import("tumble._native")?.getattr("_unpickle_world")?;
+        Ok((unpickle, (PyBytes::new(py, &bytes),), state))
+    }
+
+    /// Sets the forces and behaviors of an unpickled world.
+    fn __setstate__(&self, py: Python<'_>, state: Extensions) -> Result<()> {
+        self.shared.extend(py, |inner| inner.unpickle_extensions(py, state))
+    }
+
+    /// Runs many forks, each with its own controls, on all cores with the interpreter released.
+    /// This world does not change.
+    ///
+    /// controls: shape (forks, steps, n): generalized forces of each step, N·m and N, for all
+    /// ``articulations`` one after the other (by default all of the world, in order; without any, n
+    /// is 0). states: initial states of the forks, shape (len(state),) or (forks, len(state)), by
+    /// default the state of the world. every: interval in steps at which the state is kept.
+    /// threads: largest number of threads (default: all cores). Returns the states, shape (forks,
+    /// steps // every, len(state)): the same bits on any number of threads. A fork that fails
+    /// raises ``StepError`` with its number; Ctrl-C stops all of them between two steps.
+    #[pyo3(signature = (controls, *, articulations=None, states=None, every=1, threads=None))]
+    fn rollout<'py>(
+        &self,
+        py: Python<'py>,
+        controls: &Bound<'py, PyAny>,
+        articulations: Option<Vec<Bound<'py, PyAny>>>,
+        states: Option<&Bound<'py, PyAny>>,
+        #[pyo3(from_py_with = whole_number)] every: usize,
+        #[pyo3(from_py_with = whole_number)] threads: Option<usize>,
+    ) -> Result<Bound<'py, PyArray3<f64>>> {
+        if threads == Some(0) || threads.is_some_and(|n| n > 1024) {
+            return Err(Error::value(format!("threads is {}; it must be 1 to 1024", threads.unwrap_or(0))));
+        }
+        let asked = articulations
+            .map(|all| all.iter().map(|one| Ok(own_place(&self.shared, one)?.id)).collect::<Result<Vec<_>>>())
+            .transpose()?;
+        let (controls, states) = (numbers(controls, "controls")?, states.map(|s| numbers(s, "states")).transpose()?);
+        let (plan, fork) =
+            self.shared.read(|inner| Ok((Plan::new(inner, asked, controls, states, every)?, inner.fork())))?;
+        let shape = [plan.count, plan.frames / plan.every, fork.world.state().len()];
+        let out = interruptible(py, |stop| plan.run(fork, threads, stop))?;
+        Ok(PyArray1::from_vec(py, out).reshape(shape)?)
+    }
+
+    /// The flat state, shape (n,): a read-only view of the world's own memory until bodies are
+    /// added or removed; then it keeps its last numbers.
+    ///
+    /// A rigid body has 13 numbers: position of the center of mass (``body.world_center_of_mass``),
+    /// quaternion (x, y, z, w), linear and angular momentum. An articulated body has its ``q`` and
+    /// ``qd``. Nothing is copied, neither here nor by steps. While a view exists, a step keeps the
+    /// interpreter, except for turns of other threads between two frames. Setting it writes every
+    /// body's numbers.
+    #[getter]
+    fn state<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
+        self.shared.write(py, |inner| {
+            let Inner { world, shown, .. } = inner;
+            Ok(shown.view(py, world)?)
+        })
+    }
+
+    #[setter]
+    fn set_state(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        let Numbers { shape, data } = numbers(value, "state")?;
+        self.shared.write(py, |inner| inner.write_state(&shape, &data))
+    }
+
+    /// Adds a body that moves.
+    ///
+    /// mass: kg, or density: kg/m³, one of the two. position: of the shape's frame, for a mesh the
+    /// file's, meters. orientation: unit quaternion (x, y, z, w). velocity, m/s, and
+    /// angular_velocity, rad/s: world axes. restitution: 0 to 1. friction: at least 0. kinematic:
+    /// moves at its prescribed velocity. contacts: contact mode, ``"surface"``, or ``"spheres"``
+    /// for the spheres of its tree as in the thesis; a pair uses spheres if either body does.
+    #[pyo3(signature = (name, shape, mass=None, density=None, position=None, orientation=None, velocity=None, angular_velocity=None, restitution=0.0,
+        friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface"))]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn add_rigid(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        shape: PyRef<'_, Shape>,
+        mass: Option<f64>,
+        density: Option<f64>,
+        position: Option<&Bound<'_, PyAny>>,
+        orientation: Option<&Bound<'_, PyAny>>,
+        velocity: Option<&Bound<'_, PyAny>>,
+        angular_velocity: Option<&Bound<'_, PyAny>>,
+        restitution: f64,
+        friction: f64,
+        linear_damping: f64,
+        angular_damping: f64,
+        kinematic: bool,
+        collidable: bool,
+        contacts: &str,
+    ) -> Result<RigidBody> {
+        let mode = if kinematic { Mode::Kinematic } else { Mode::Dynamic };
+        let motion = [
+            vec3_or(velocity, "velocity", Vec3::zeros())?,
+            vec3_or(angular_velocity, "angular_velocity", Vec3::zeros())?,
+        ];
+        let mut body = rigid(name, &shape, mass, density, kinematic)?
+            .at(pose(position, orientation)? * shape.placement)
+            .surface(restitution, friction);
+        (body.linear_damping, body.angular_damping, body.contact_mode) =
+            (linear_damping, angular_damping, meaning("contacts", contacts, ContactMode::NAMES)?);
+        add(&self.shared, py, body.moving(motion[0], motion[1]), mode, collidable)
+    }
+
+    /// Adds geometry that never moves. position, orientation, restitution, friction, contacts: as
+    /// in ``add_rigid``.
+    #[pyo3(signature = (name, shape, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true, contacts="surface"))]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn add_static(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        shape: PyRef<'_, Shape>,
+        position: Option<&Bound<'_, PyAny>>,
+        orientation: Option<&Bound<'_, PyAny>>,
+        restitution: f64,
+        friction: f64,
+        collidable: bool,
+        contacts: &str,
+    ) -> Result<RigidBody> {
+        let pose = pose(position, orientation)? * shape.placement;
+        let body = Rigid::fixed(name, shape.solid.clone())
+            .at(pose)
+            .surface(restitution, friction)
+            .colliding_by(meaning("contacts", contacts, ContactMode::NAMES)?);
+        add(&self.shared, py, body, Mode::Static, collidable)
+    }
+
+    /// Adds an articulated body and returns its handle.
+    ///
+    /// articulation: a description, or the path of a URDF. base: pose of its base: a position (3,),
+    /// or position and quaternion (7,), meters and (x, y, z, w). name: by default the
+    /// description's. It starts with the ``q``, ``qd`` and ``tau`` of the description; the pose of
+    /// a floating root is relative to the base.
+    #[pyo3(signature = (articulation, base=None, *, name=None))]
+    fn add_articulation(
+        &self,
+        py: Python<'_>,
+        articulation: &Bound<'_, PyAny>,
+        base: Option<&Bound<'_, PyAny>>,
+        name: Option<&str>,
+    ) -> Result<Articulation> {
+        articulated(&self.shared, py, articulation, base, name)
+    }
+
+    /// Removes a body, given as a handle or by name, or a force or behavior by name. Handles of a
+    /// removed body raise ``RemovedError``.
+    fn remove(&self, py: Python<'_>, body: &Bound<'_, PyAny>) -> Result<()> {
+        if let Ok(name) = body.extract::<String>()
+            && self.shared.extend(py, |inner| inner.remove_extension(&name))?
+        {
+            return Ok(());
+        }
+        let place = own_place(&self.shared, body)?;
+        place.write(py, |inner| {
+            inner.world.remove(place.id)?;
+            inner.forget(place.id);
+            Ok(())
+        })
+    }
+
+    /// Adds a custom force: an object of a subclass of ``tumble.Force``. Its name must be unique
+    /// among bodies, forces and behaviors.
+    fn add_force(&self, py: Python<'_>, name: &str, force: &Bound<'_, PyAny>) -> Result<()> {
+        py.import("tumble._extension")?.call_method1("check_force", (force,))?;
+        self.shared.extend(py, |inner| inner.add_force(name, force))
+    }
+
+    /// Adds a custom behavior, an object of a subclass of ``tumble.Behavior``, to bodies given by
+    /// name or as handles.
+    fn add_behavior(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        behavior: &Bound<'_, PyAny>,
+        bodies: &Bound<'_, PyAny>,
+    ) -> Result<()> {
+        py.import("tumble._extension")?.call_method1("check_behavior", (behavior,))?;
+        let given: Vec<Bound<'_, PyAny>> =
+            match bodies.is_instance_of::<pyo3::types::PyString>() || place_of(bodies).is_ok() {
+                true => vec![bodies.clone()],
+                false => bodies.try_iter()?.collect::<PyResult<_>>()?,
+            };
+        let places = given.iter().map(|body| own_place(&self.shared, body)).collect::<Result<Vec<_>>>()?;
+        self.shared
+            .extend(py, |inner| inner.add_behavior(name, behavior, places.iter().map(|place| place.id).collect()))
+    }
+
+    /// Custom forces by name: a new dict.
+    #[getter]
+    fn forces(&self, py: Python<'_>) -> Result<BTreeMap<String, Py<PyAny>>> {
+        self.shared.read(|inner| Ok(inner.extensions(py)[0].drain(..).collect()))
+    }
+
+    /// Custom behaviors by name: a new dict.
+    #[getter]
+    fn behaviors(&self, py: Python<'_>) -> Result<BTreeMap<String, Py<PyAny>>> {
+        self.shared.read(|inner| Ok(inner.extensions(py)[1].drain(..).collect()))
+    }
+
+    /// Renders the world: sRGB and alpha, shape (height, width, 4), uint8, rows from the top. No
+    /// window is needed.
+    ///
+    /// width, height: pixels, by default 640 x 480. The view is one of: camera, ``tumble.Camera``
+    /// or ``(eye, target)`` in meters; facet, ``"cube4:front"``: a facet of a cave, given by path
+    /// or name, at the size in the cave file; cave: all its facets unfolded into at most width x
+    /// height; else the scene's camera, or one that shows everything. overlays: names of ``tumble
+    /// run --debug-draw``, such as ``"contacts,forces"``. Without a graphics adapter it raises
+    /// ``PictureError``.
+    #[pyo3(signature = (width=None, height=None, *, camera=None, facet=None, cave=None, overlays=None))]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn render<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = whole_number)] width: Option<u32>,
+        #[pyo3(from_py_with = whole_number)] height: Option<u32>,
+        camera: Option<&Bound<'py, PyAny>>,
+        facet: Option<&str>,
+        cave: Option<&str>,
+        overlays: Option<&str>,
+    ) -> Result<Bound<'py, PyArray3<u8>>> {
+        Shot::new([width, height], camera, facet, cave, overlays)?.take(py, &self.shared)
+    }
+
+    /// Returns a PNG for notebooks, or None without a graphics adapter.
+    fn _repr_png_(slf: &Bound<'_, Self>) -> Result<Py<PyAny>> {
+        Ok(slf.py().import("tumble._pictures")?.call_method1("repr_png", (slf,))?.unbind())
+    }
+
+    /// Steps a fork for ``duration`` seconds and plots its energy over time. The world does not
+    /// change. Requires matplotlib, the extra ``plot``.
+    ///
+    /// ax: the axes to plot on, by default new ones. Returns the axes.
+    #[pyo3(signature = (duration=5.0, *, ax=None))]
+    fn plot_energy(slf: &Bound<'_, Self>, duration: f64, ax: Option<&Bound<'_, PyAny>>) -> Result<Py<PyAny>> {
+        Ok(slf.py().import("tumble._plots")?.call_method1("energy", (slf, duration, ax))?.unbind())
+    }
+
+    /// Steps a fork for ``duration`` seconds and plots the paths of bodies (default: all dynamic
+    /// bodies) as seen along an axis, ``"x"``, ``"y"`` or ``"z"``.
+    ///
+    /// Otherwise as ``plot_energy``.
+    #[pyo3(signature = (duration=5.0, *, bodies=None, along="y", ax=None))]
+    fn plot_paths(
+        slf: &Bound<'_, Self>,
+        duration: f64,
+        bodies: Option<&Bound<'_, PyAny>>,
+        along: &str,
+        ax: Option<&Bound<'_, PyAny>>,
+    ) -> Result<Py<PyAny>> {
+        Ok(slf.py().import("tumble._plots")?.call_method1("paths", (slf, duration, bodies, along, ax))?.unbind())
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.anchor)
+    }
+
+    fn __repr__(&self) -> Result<String> {
+        self.shared.read(|inner| {
+            let (stepper, solver) = (inner.world.stepper_name(), inner.world.solver_name());
+            Ok(format!(
+                "<tumble.World {} bodies, t = {} s, {stepper}, {solver}>",
+                body_ids(&inner.world).len(),
+                inner.world.time()
+            ))
+        })
+    }
+}

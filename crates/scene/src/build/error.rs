@@ -1,0 +1,71 @@
+//! Why a scene could not be built.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+use tumble_core::WorldError;
+
+/// Why a checked scene could not be built into a world.
+#[derive(Debug, Error)]
+pub enum BuildError {
+    /// A mesh file could not be read.
+    #[error("{scene}: mesh \"{mesh}\": cannot read {}: {source}", file.display())]
+    MeshFile {
+        /// The scene.
+        scene: String,
+        /// The mesh.
+        mesh: String,
+        /// Its file.
+        file: PathBuf,
+        /// From the system.
+        source: std::io::Error,
+    },
+    /// A mesh is not a closed solid, or has invalid numbers.
+    #[error("{scene}: mesh \"{mesh}\"{}: {why}", file.as_ref().map_or(String::new(), |f| format!(" ({})", f.display())))]
+    Mesh {
+        /// The scene.
+        scene: String,
+        /// The mesh.
+        mesh: String,
+        /// Its file, if it has one.
+        file: Option<PathBuf>,
+        /// From the reader or the check; names the line, the vertex or the triangle.
+        why: String,
+    },
+    /// A body's shape or a constant of it is invalid.
+    #[error("{scene}: body \"{body}\": {why}")]
+    Body {
+        /// The scene.
+        scene: String,
+        /// The body.
+        body: String,
+        /// From the shape or the body.
+        why: String,
+    },
+    /// A shape or a constant of an articulated body is invalid.
+    #[error("{scene}: articulated \"{body}\": {why}")]
+    Articulated {
+        /// The scene.
+        scene: String,
+        /// The body.
+        body: String,
+        /// From the shape or the body; names the link.
+        why: String,
+    },
+    /// A loop joint is invalid.
+    #[error("{scene}: {why}")]
+    LoopJoint {
+        /// The scene.
+        scene: String,
+        /// From the joint; names the joint.
+        why: String,
+    },
+    /// The world refused a setting.
+    #[error("{scene}: {source}")]
+    World {
+        /// The scene.
+        scene: String,
+        /// From the world.
+        source: WorldError,
+    },
+}

@@ -1,0 +1,12 @@
+//! Builds worlds from scenes: shapes, bodies, joints, and the mesh files that they need.
+
+pub(crate) mod appearance;
+pub(crate) mod articulated;
+pub(crate) mod collada;
+pub(crate) mod error;
+pub(crate) mod mesh_files;
+pub(crate) mod meshes;
+pub(crate) mod shapes;
+pub(crate) mod slow;
+pub(crate) mod visual_mesh;
+pub(crate) mod world;

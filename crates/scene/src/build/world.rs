@@ -1,0 +1,191 @@
+//! Builds a world from a scene: shapes, meshes, bodies, joints and pairs.
+
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use tumble_core::collide::{Pose, Shape, Vec3};
+use tumble_core::solver::SolverSettings;
+use tumble_core::{
+    ArticulatedBody, LoopJoint, ObjectId, PairMaterial, PairSide, RigidBody, Settings, Sleep, Visual, World, WorldError,
+};
+
+use crate::build::appearance::{appearance, material_id};
+use crate::build::articulated;
+use crate::build::error::BuildError;
+use crate::build::shapes::{self, Purpose, ShapeMaker};
+use crate::notes::Notes;
+use crate::parse::articulated::ArticulatedSpec;
+use crate::parse::body::{BodySpec, MassSpec};
+use crate::parse::file::SceneFile;
+use crate::parse::loop_joint::{LoopJointKind, LoopJointSpec, PartSpec};
+use crate::parse::pair::{PairSideSpec, PairSpec};
+
+impl SceneFile {
+    /// Builds the world at time 0. Also returns notes about its meshes and robots. Sphere trees are
+    /// taken from the cache that the environment names ([`TreeCache::of_environment`](tumble_core::collide::TreeCache::of_environment)) if it has
+    /// them.
+    ///
+    /// # Errors
+    /// [`BuildError`]: a mesh is unreadable or open, a body has no volume, a constant is invalid.
+    pub fn build(&self) -> Result<(World, Notes), BuildError> {
+        self.build_for(Purpose::Stepped)
+    }
+
+    /// Builds the same world for drawing only, as a cave facet needs it. Sphere trees and distance
+    /// fields of meshes are built on first use, and overlaps of URDF links are not searched for.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build).
+    pub fn build_drawn(&self) -> Result<(World, Notes), BuildError> {
+        self.build_for(Purpose::Drawn)
+    }
+
+    fn build_for(&self, purpose: Purpose) -> Result<(World, Notes), BuildError> {
+        let mut notes = self.notes.clone();
+        let world = |source| BuildError::World { scene: self.file.clone(), source };
+        let meshes =
+            self.meshes.iter().map(|mesh| self.solid(mesh, purpose, &mut notes)).collect::<Result<Vec<_>, _>>()?;
+        let mut built = World::new(self.settings()).map_err(world)?;
+        built.set_stepper(self.world.stepper.new_stepper());
+        built.set_solver(self.world.solver.new_solver());
+        for spec in &self.bodies {
+            let body = self.body(spec, &meshes)?;
+            let id = built.add_boxed(Box::new(body), spec.mode).map_err(|e| self.body_error(spec, e))?;
+            built.set_collidable(id, spec.collides).map_err(world)?;
+            built.set_enabled(id, spec.enabled).map_err(world)?;
+        }
+        let mut maker = ShapeMaker::new(&meshes, purpose);
+        for spec in &self.articulated {
+            self.add_articulated(spec, &mut maker, &mut built)?;
+            let said = spec.notes.iter().cloned().chain(maker.notes.take());
+            notes.extend(said.map(|note| format!("{}: articulated \"{}\": {note}", self.file, spec.name)));
+        }
+        for spec in &self.loop_joints {
+            self.add_loop_joint(spec, &mut built)?;
+        }
+        for spec in &self.pairs {
+            self.add_pair(spec, &mut built).map_err(world)?;
+        }
+        Ok((built, notes))
+    }
+
+    fn add_articulated(
+        &self,
+        spec: &ArticulatedSpec,
+        maker: &mut ShapeMaker<'_>,
+        world: &mut World,
+    ) -> Result<(), BuildError> {
+        let wrong = |why: String| BuildError::Articulated { scene: self.file.clone(), body: spec.name.clone(), why };
+        let body = articulated::body(spec, maker).map_err(wrong)?;
+        let id = world.add(body).map_err(|e| wrong(e.to_string()))?;
+        world.set_enabled(id, spec.enabled).map_err(|e| wrong(e.to_string()))
+    }
+
+    fn add_loop_joint(&self, spec: &LoopJointSpec, world: &mut World) -> Result<(), BuildError> {
+        let wrong = |why: String| BuildError::LoopJoint { scene: self.file.clone(), why };
+        let (a, b) = (self.part(world, &spec.a), spec.b.and_then(|b| self.part(world, &b)));
+        let (point, axis, name) = (Vec3::from(spec.position_m), Vec3::from(spec.axis), spec.name.as_str());
+        let joint = match spec.kind {
+            LoopJointKind::Spherical => LoopJoint::spherical_at(name, world, a, b, point),
+            LoopJointKind::Revolute => LoopJoint::revolute_at(name, world, a, b, point, axis),
+            LoopJointKind::Fixed => LoopJoint::fixed_at(name, world, a, b, point),
+            LoopJointKind::Prismatic => LoopJoint::prismatic_at(name, world, a, b, point, axis),
+        };
+        world.add(joint.map_err(|e| wrong(e.to_string()))?).map(drop).map_err(|e| wrong(e.to_string()))
+    }
+
+    fn add_pair(&self, spec: &PairSpec, world: &mut World) -> Result<(), WorldError> {
+        let [a, b] = spec.sides.map(|side| self.sides(world, side));
+        let material = PairMaterial { restitution: spec.restitution, friction: spec.friction };
+        for (a, b) in a.iter().flat_map(|a| b.iter().map(move |b| (*a, *b))) {
+            world.set_pair_material(a, b, material)?;
+        }
+        Ok(())
+    }
+
+    /// Returns one side of a pair in the world: several parts for a link with several shapes.
+    fn sides(&self, world: &World, side: PairSideSpec) -> Vec<PairSide> {
+        let object = |name: &str| world.find(name).map(PairSide::Object).into_iter().collect();
+        match side {
+            PairSideSpec::Body(body) => object(&self.bodies[body].name),
+            PairSideSpec::Articulated(spec) => object(&self.articulated[spec].name),
+            PairSideSpec::Material(material) => vec![PairSide::Material(material_id(Some(material)))],
+            PairSideSpec::Link(spec, link) => {
+                let Some((id, link)) = self.part(world, &PartSpec::Link(spec, link)) else { return Vec::new() };
+                let body = world.get::<ArticulatedBody>(id);
+                body.into_iter().flat_map(|b| b.colliders_of(b.link_of(link))).map(|p| PairSide::Part(id, p)).collect()
+            }
+        }
+    }
+
+    /// Returns the object and part number of a part in the world.
+    fn part(&self, world: &World, part: &PartSpec) -> Option<(ObjectId, usize)> {
+        match *part {
+            PartSpec::Body(body) => Some((world.find(&self.bodies[body].name)?, 0)),
+            PartSpec::Link(spec, link) => {
+                let spec = &self.articulated[spec];
+                let id = world.find(&spec.name)?;
+                let model = world.get::<ArticulatedBody>(id)?.model();
+                let carrier = model.frame(&spec.links[link].name)?.link;
+                Some((id, carrier.unwrap_or(model.links().len())))
+            }
+        }
+    }
+
+    fn settings(&self) -> Settings {
+        let (w, base) = (&self.world, Settings::default());
+        Settings {
+            gravity: Vec3::from(w.gravity_m_per_s2),
+            dt: w.dt_s,
+            substeps: w.substeps,
+            integrator: w.integrator.into(),
+            integrator_tolerance: w.integrator_tolerance,
+            solver_settings: SolverSettings { max_sweeps: w.iterations, ..base.solver_settings },
+            contact_tolerance: w.contact_tolerance_m,
+            drift_tolerance: base.drift_tolerance.max(w.contact_tolerance_m),
+            sleep: w.sleep_after_s.map(|after| Sleep { after, within: w.sleep_within_m }),
+            combine_friction: w.combine_friction,
+            combine_restitution: w.combine_restitution,
+            ..base
+        }
+    }
+
+    fn body(&self, spec: &BodySpec, meshes: &[Shape]) -> Result<RigidBody, BuildError> {
+        let shape = shapes::make(&spec.shape, meshes).map_err(|e| self.body_error(spec, e))?;
+        let body = match spec.mass {
+            Some(MassSpec::Mass(mass)) => RigidBody::with_mass(&spec.name, shape.clone(), mass),
+            Some(MassSpec::Density(density)) => RigidBody::with_density(&spec.name, shape.clone(), density),
+            None => Ok(RigidBody::fixed(&spec.name, shape.clone())),
+        };
+        let [x, y, z, w] = spec.orientation_xyzw;
+        let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        let pose = Pose::from_parts(Translation3::from(Vec3::from(spec.position_m)), rotation);
+        let mut body = body
+            .map_err(|e| self.body_error(spec, e))?
+            .at(pose)
+            .moving(Vec3::from(spec.velocity_m_per_s), Vec3::from(spec.angular_velocity_rad_per_s))
+            .surface(spec.restitution, spec.friction)
+            .of_material(material_id(spec.material))
+            .colliding_by(spec.contacts)
+            .drawn_as(visuals(spec, shape));
+        if let Some(camera) = &spec.mounts.camera {
+            body = body.with_camera(camera.clone());
+        }
+        if let Some(light) = &spec.mounts.light {
+            body = body.with_light(light.clone());
+        }
+        body.linear_damping = spec.linear_damping_per_s;
+        body.angular_damping = spec.angular_damping_per_s;
+        Ok(body)
+    }
+
+    fn body_error(&self, spec: &BodySpec, why: impl ToString) -> BuildError {
+        BuildError::Body { scene: self.file.clone(), body: spec.name.clone(), why: why.to_string() }
+    }
+}
+
+fn visuals(spec: &BodySpec, shape: Shape) -> Vec<Visual> {
+    if !spec.visible {
+        return Vec::new();
+    }
+    let appearance = appearance(&spec.appearance, &shape.center_of_mass());
+    vec![Visual::shape(0, Pose::identity(), shape, appearance)]
+}

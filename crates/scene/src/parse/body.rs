@@ -1,0 +1,205 @@
+//! `[[body]]`: one rigid body.
+
+use std::collections::BTreeMap;
+
+use tumble_core::Mode;
+use tumble_core::collide::ContactMode;
+
+use crate::parse::appearance::AppearanceSpec;
+use crate::parse::bound::Bound;
+use crate::parse::fields::{Fields, Names};
+use crate::parse::material::{DEFAULT_FRICTION, DEFAULT_RESTITUTION, FRICTION, MaterialSpec, RESTITUTION};
+use crate::parse::mount::Mounts;
+use crate::parse::rotation;
+use crate::parse::shape::ShapeSpec;
+use crate::parse::world::CONTACTS;
+
+/// Largest length of a body's name in bytes: 64 in network messages, with the final zero.
+pub(crate) const MAX_NAME_BYTES: usize = 63;
+
+const MODES: Names<Mode> = &[("dynamic", Mode::Dynamic), ("static", Mode::Static), ("kinematic", Mode::Kinematic)];
+
+/// The mass of a body or shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MassSpec {
+    /// Total mass with uniform density, kg.
+    Mass(f64),
+    /// Density, kg/m³.
+    Density(f64),
+}
+
+/// A rigid body at time 0 with all references resolved and all defaults filled in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodySpec {
+    /// Unique in the scene; at most 63 bytes.
+    pub name: String,
+    /// Default `dynamic`.
+    pub mode: Mode,
+    /// The shape in body axes.
+    pub shape: ShapeSpec,
+    /// Present for every dynamic body.
+    pub mass: Option<MassSpec>,
+    /// Position of the origin of the *shape*, world axes, m. The center of mass of a mesh or a
+    /// profile may be elsewhere: at `position_m` + R·(its position in the shape).
+    pub position_m: [f64; 3],
+    /// Body axes to world axes, unit quaternion `[x, y, z, w]`.
+    pub orientation_xyzw: [f64; 4],
+    /// Velocity of the center of mass, world axes, m/s.
+    pub velocity_m_per_s: [f64; 3],
+    /// World axes, rad/s.
+    pub angular_velocity_rad_per_s: [f64; 3],
+    /// Index into [`SceneFile::materials`](crate::SceneFile::materials), if the body names a
+    /// material.
+    pub material: Option<usize>,
+    /// The body's own, else its material's, else 0.5.
+    pub friction: f64,
+    /// The body's own, else its material's, else 0.
+    pub restitution: f64,
+    /// Contact mode of a mesh or cylinder. Default: that of the world.
+    pub contacts: ContactMode,
+    /// Rate at which velocity decays, 1/s: `dv/dt = −c v`. Default 0.
+    pub linear_damping_per_s: f64,
+    /// Rate at which angular velocity decays, 1/s. Default 0.
+    pub angular_damping_per_s: f64,
+    /// Takes part in contacts. Default true.
+    pub collides: bool,
+    /// Takes part in the simulation. Default true.
+    pub enabled: bool,
+    /// Is drawn. Default true.
+    pub visible: bool,
+    /// Appearance of the body: that of its material with the body's own keys on top.
+    pub appearance: AppearanceSpec,
+    /// The camera and the light attached to the body, in axes of the shape.
+    pub mounts: Mounts,
+}
+
+/// Meshes and materials by name. A name without an index belongs to an entry that is itself wrong.
+pub(crate) struct Library<'a> {
+    pub(crate) meshes: BTreeMap<&'a str, Option<usize>>,
+    pub(crate) material_names: BTreeMap<&'a str, usize>,
+    pub(crate) materials: &'a [MaterialSpec],
+    /// Default contact mode, from `[world]`.
+    pub(crate) contacts: ContactMode,
+}
+
+impl BodySpec {
+    /// Reads all keys of a body. Does not finish the table, since a grid has more keys.
+    pub(crate) fn read(f: &mut Fields<'_>, library: &Library<'_>) -> Option<BodySpec> {
+        let name = read_name(f);
+        let mode = read_mode(f);
+        let shape = ShapeSpec::read(f, &library.meshes);
+        let mass = read_mass(f, mode);
+        let material = read_material(f, library);
+        let base = material.map(|index| &library.materials[index]);
+        let (friction, restitution) =
+            base.map_or((DEFAULT_FRICTION, DEFAULT_RESTITUTION), |m| (m.friction, m.restitution));
+        let appearance = base.map_or_else(AppearanceSpec::default, |m| m.appearance.clone());
+        let [linear, angular] = read_velocities(f, mode);
+        let body = BodySpec {
+            name: name.unwrap_or_default(),
+            mode,
+            shape: shape.clone().unwrap_or(ShapeSpec::HalfSpace),
+            mass,
+            position_m: f.vector_or("position_m", Bound::ANY, [0.0; 3]),
+            orientation_xyzw: rotation::read(f),
+            velocity_m_per_s: linear,
+            angular_velocity_rad_per_s: angular,
+            material,
+            friction: f.number_or("friction", FRICTION, friction),
+            restitution: f.number_or("restitution", RESTITUTION, restitution),
+            contacts: f.choice_or("contacts", CONTACTS, library.contacts),
+            linear_damping_per_s: f.number_or("linear_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
+            angular_damping_per_s: f.number_or("angular_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
+            collides: f.flag_or("collides", true),
+            enabled: f.flag_or("enabled", true),
+            visible: f.flag_or("visible", true),
+            appearance: AppearanceSpec::read(f, &appearance),
+            mounts: Mounts::read(f),
+        };
+        let shape = shape?;
+        check_half_space(f, &shape, mode);
+        Some(BodySpec { shape, ..body })
+    }
+}
+
+pub(crate) fn read_name(f: &mut Fields<'_>) -> Option<String> {
+    let (name, value) = f.text("name", "a unique name")?;
+    f.what = format!(
+        "{} \"{}\"",
+        f.what.split(' ').next().unwrap_or("body"),
+        f.log.quote(value.span()).trim_matches(['"', '\''])
+    );
+    let expected = "a name of 1 to 63 bytes without control characters";
+    if name.is_empty() || name.len() > MAX_NAME_BYTES || name.chars().any(char::is_control) {
+        f.wrong("name", value, expected);
+    }
+    Some(name.to_owned())
+}
+
+/// Reads the mode. A wrong value counts as kinematic, the mode that requires no other key.
+fn read_mode(f: &mut Fields<'_>) -> Mode {
+    match f.value("mode") {
+        Some(value) => f.as_choice("mode", value, MODES).unwrap_or(Mode::Kinematic),
+        None => Mode::Dynamic,
+    }
+}
+
+fn read_mass(f: &mut Fields<'_>, mode: Mode) -> Option<MassSpec> {
+    let mass = f.optional_number("mass_kg", Bound::POSITIVE);
+    let density = f.optional_number("density_kg_per_m3", Bound::POSITIVE);
+    match (mass, density) {
+        (Some(_), Some(_)) => {
+            let message = format!("{} has both `mass_kg` and `density_kg_per_m3`", f.what);
+            f.log.report(f.span.clone(), message, "expected one of them");
+            None
+        }
+        (Some(mass), None) => Some(MassSpec::Mass(mass)),
+        (None, Some(density)) => Some(MassSpec::Density(density)),
+        (None, None) => {
+            if mode == Mode::Dynamic {
+                f.missing(
+                    "mass_kg",
+                    "`mass_kg` or `density_kg_per_m3`, or mode = \"static\" for a body that never moves",
+                );
+            }
+            None
+        }
+    }
+}
+
+pub(crate) fn read_material(f: &mut Fields<'_>, library: &Library<'_>) -> Option<usize> {
+    let (name, value) = f.optional_text("material")?;
+    let found = library.material_names.get(name).copied();
+    if found.is_none() {
+        match library.material_names.is_empty() {
+            true => f.wrong("material", value, "the NAME of a table [materials.NAME]; the scene has none"),
+            false => f.unknown_name("material", value, name, library.material_names.keys().copied().collect()),
+        }
+    }
+    found
+}
+
+/// Reads linear and angular velocity. A static body may not have any.
+fn read_velocities(f: &mut Fields<'_>, mode: Mode) -> [[f64; 3]; 2] {
+    ["velocity_m_per_s", "angular_velocity_rad_per_s"].map(|key| {
+        let Some(value) = f.value(key) else {
+            return [0.0; 3];
+        };
+        let velocity = f.as_vector(key, value, Bound::ANY);
+        if mode == Mode::Static && velocity != [0.0; 3] {
+            f.wrong(
+                key,
+                value,
+                "no velocity for a static body; a body with mode = \"kinematic\" moves at a prescribed velocity",
+            );
+        }
+        velocity
+    })
+}
+
+fn check_half_space(f: &Fields<'_>, shape: &ShapeSpec, mode: Mode) {
+    if *shape == ShapeSpec::HalfSpace && mode == Mode::Dynamic {
+        let message = format!("{} is a dynamic half-space, which has no finite mass", f.what);
+        f.log.report(f.span.clone(), message, "expected mode = \"static\" or \"kinematic\"");
+    }
+}

@@ -1,0 +1,341 @@
+//! The joint of a link: its type, initial state, limits, damping, friction, spring and drive. Keys
+//! have units, so those of a revolute joint differ from those of a prismatic one.
+
+use std::sync::Arc;
+
+use tumble_core::Joint;
+use tumble_core::articulated::{DofSettings, Drive, Playback, Spring};
+use tumble_core::collide::Vec3;
+
+use crate::parse::bound::Bound;
+use crate::parse::fields::{Fields, Names, Value};
+use crate::parse::rotation;
+
+/// Largest number of samples of a recorded motion.
+const MAX_SAMPLES: usize = 100_000;
+
+/// A joint at time 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointSpec {
+    /// The name: in a scene that of the link it moves, in a URDF its own.
+    pub name: String,
+    /// The type of joint; its axis has unit length.
+    pub kind: Joint,
+    /// Settings of each of its degrees of freedom.
+    pub dof: DofSettings,
+    /// The joint whose position this one follows.
+    pub mimic: Option<MimicSpec>,
+    /// Position numbers at time 0, as defined by [`Joint`].
+    pub position: Vec<f64>,
+    /// Velocity numbers at time 0.
+    pub velocity: Vec<f64>,
+    /// Largest torque or force of its motor, N·m or N, if a URDF has one. It is the default force
+    /// limit of drives.
+    pub effort: Option<f64>,
+    /// Largest speed that the file allows, rad/s or m/s. Stored, not enforced.
+    pub speed: Option<f64>,
+    /// Whether a position drive without a target holds the initial position.
+    pub(crate) holds_start: bool,
+}
+
+/// `q = multiplier·q_of + offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MimicSpec {
+    /// Index of the link whose joint is followed.
+    pub link: usize,
+    /// Ratio.
+    pub multiplier: f64,
+    /// rad or m.
+    pub offset: f64,
+}
+
+#[derive(Clone, Copy)]
+enum Kind {
+    Fixed,
+    Revolute,
+    Prismatic,
+    Spherical,
+}
+
+const KINDS: Names<Kind> = &[
+    ("revolute", Kind::Revolute),
+    ("prismatic", Kind::Prismatic),
+    ("spherical", Kind::Spherical),
+    ("fixed", Kind::Fixed),
+];
+
+#[derive(Clone, Copy)]
+enum DriveKind {
+    Position,
+    Velocity,
+    Playback,
+}
+
+const DRIVE_KINDS: Names<DriveKind> =
+    &[("position", DriveKind::Position), ("velocity", DriveKind::Velocity), ("playback", DriveKind::Playback)];
+
+/// A key in SI units, and for angles the key in degrees.
+type Key = (&'static str, Option<&'static str>);
+
+/// The keys of a joint with one degree of freedom.
+struct JointKeys {
+    start: Key,
+    rate: &'static str,
+    limits: Key,
+    damping: &'static str,
+    friction: &'static str,
+    stiffness: &'static str,
+    rest: Key,
+    target: Key,
+    target_rate: &'static str,
+    limit: &'static str,
+    values: Key,
+    offset: Key,
+}
+
+const REVOLUTE_KEYS: JointKeys = JointKeys {
+    start: ("angle_rad", Some("angle_deg")),
+    rate: "rate_rad_per_s",
+    limits: ("limits_rad", Some("limits_deg")),
+    damping: "damping_n_m_s_per_rad",
+    friction: "friction_n_m",
+    stiffness: "stiffness_n_m_per_rad",
+    rest: ("rest_rad", Some("rest_deg")),
+    target: ("target_rad", Some("target_deg")),
+    target_rate: "target_rad_per_s",
+    limit: "max_torque_n_m",
+    values: ("values_rad", Some("values_deg")),
+    offset: ("offset_rad", Some("offset_deg")),
+};
+
+const PRISMATIC_KEYS: JointKeys = JointKeys {
+    start: ("displacement_m", None),
+    rate: "rate_m_per_s",
+    limits: ("limits_m", None),
+    damping: "damping_n_s_per_m",
+    friction: "friction_n",
+    stiffness: "stiffness_n_per_m",
+    rest: ("rest_m", None),
+    target: ("target_m", None),
+    target_rate: "target_m_per_s",
+    limit: "max_force_n",
+    values: ("values_m", None),
+    offset: ("offset_m", None),
+};
+
+impl JointSpec {
+    /// Returns a joint of that type at rest, without limits, damping, friction, spring and drive.
+    pub fn new(name: impl Into<String>, kind: Joint) -> JointSpec {
+        let mut position = vec![0.0; kind.positions()];
+        if let Some(k) = kind.quaternion() {
+            position[k + 3] = 1.0;
+        }
+        let velocity = vec![0.0; kind.dof()];
+        let dof = DofSettings::default();
+        JointSpec {
+            name: name.into(),
+            kind,
+            dof,
+            mimic: None,
+            position,
+            velocity,
+            effort: None,
+            speed: None,
+            holds_start: false,
+        }
+    }
+
+    /// Returns whether the joint has exactly one degree of freedom.
+    pub fn is_single(&self) -> bool {
+        self.kind.dof() == 1
+    }
+
+    fn keys(&self) -> &'static JointKeys {
+        if matches!(self.kind, Joint::Prismatic { .. }) { &PRISMATIC_KEYS } else { &REVOLUTE_KEYS }
+    }
+
+    /// Reads `joint`, its axis and its settings from the table of a link.
+    pub(crate) fn read(f: &mut Fields<'_>, name: &str) -> Option<JointSpec> {
+        let kind = f.choice("joint", KINDS)?;
+        let axis = |f: &mut Fields<'_>| Vec3::from(f.direction("axis"));
+        let kind = match kind {
+            Kind::Fixed => Joint::Fixed,
+            Kind::Revolute => Joint::Revolute { axis: axis(f) },
+            Kind::Prismatic => Joint::Prismatic { axis: axis(f) },
+            Kind::Spherical => Joint::Spherical,
+        };
+        let mut joint = JointSpec::new(name, kind);
+        joint.read_effects(f);
+        Some(joint)
+    }
+
+    /// Reads the initial state and the settings. Keys that are absent change nothing.
+    pub(crate) fn read_effects(&mut self, f: &mut Fields<'_>) {
+        let keys = self.keys();
+        if self.kind.dof() > 0 {
+            self.dof.damping = f.number_or(keys.damping, Bound::NOT_NEGATIVE, self.dof.damping);
+            self.dof.friction = f.number_or(keys.friction, Bound::NOT_NEGATIVE, self.dof.friction);
+        }
+        match self.kind {
+            Joint::Spherical => self.read_spherical_start(f),
+            _ if self.is_single() => self.read_single(f, keys),
+            _ => {}
+        }
+    }
+
+    fn read_spherical_start(&mut self, f: &mut Fields<'_>) {
+        if let Some(q) = rotation::axis_angle(f, "initial_rotation") {
+            self.position = q.to_vec();
+        }
+        if let Some(w) = f.optional_vector::<3>("angular_velocity_rad_per_s", Bound::ANY) {
+            self.velocity = w.to_vec();
+        }
+    }
+
+    fn read_single(&mut self, f: &mut Fields<'_>, keys: &'static JointKeys) {
+        if let Some(position) = number(f, keys.start) {
+            self.position = vec![position];
+        }
+        self.velocity[0] = f.number_or(keys.rate, Bound::ANY, self.velocity[0]);
+        if let Some(limits) = read_limits(f, keys.limits) {
+            self.dof.limits = limits;
+        }
+        let example = format!("{{ {} = 10 }}", keys.stiffness);
+        if let Some(mut spring) = f.table("spring", &example) {
+            let stiffness = spring.number(keys.stiffness, Bound::NOT_NEGATIVE);
+            let rest = number(&mut spring, keys.rest).unwrap_or(0.0);
+            spring.finish();
+            self.dof.spring = Some(Spring { stiffness, rest });
+        }
+        if let Some(drive) = f.table("drive", &format!("{{ type = \"position\", {} = 100 }}", keys.stiffness)) {
+            self.read_drive(drive, keys);
+        }
+    }
+
+    fn read_drive(&mut self, mut f: Fields<'_>, keys: &'static JointKeys) {
+        let Some(motor) = f.choice("type", DRIVE_KINDS) else { return f.give_up() };
+        let most = self.effort.unwrap_or(f64::INFINITY);
+        self.holds_start = false;
+        let drive = match motor {
+            DriveKind::Position => {
+                let stiffness = f.number_or(keys.stiffness, Bound::NOT_NEGATIVE, 0.0);
+                let damping = f.number_or(keys.damping, Bound::NOT_NEGATIVE, 0.0);
+                if stiffness + damping == 0.0 {
+                    let message = format!("{} has no stiffness and no damping", f.what);
+                    f.log.report(
+                        f.span.clone(),
+                        message,
+                        format!("expected `{}` or `{}` greater than 0", keys.stiffness, keys.damping),
+                    );
+                }
+                let target = number(&mut f, keys.target);
+                self.holds_start = target.is_none();
+                let velocity = f.number_or(keys.target_rate, Bound::ANY, 0.0);
+                Some(Drive::Position {
+                    stiffness,
+                    damping,
+                    target: target.unwrap_or(0.0),
+                    velocity,
+                    limit: f.number_or(keys.limit, Bound::NOT_NEGATIVE, most),
+                })
+            }
+            DriveKind::Velocity => {
+                let target = f.number(keys.target_rate, Bound::ANY);
+                Some(Drive::Velocity { target, limit: f.number_or(keys.limit, Bound::NOT_NEGATIVE, most) })
+            }
+            DriveKind::Playback => {
+                let limit = f.number_or(keys.limit, Bound::NOT_NEGATIVE, most);
+                read_playback(&mut f, keys.values).map(|motion| Drive::Playback { motion: Arc::new(motion), limit })
+            }
+        };
+        f.finish();
+        self.dof.drive = drive.unwrap_or_default();
+    }
+
+    /// Reads `mimic`. Returns the name of the joint to follow and its place in the file; the index
+    /// of its link is filled in later.
+    pub(crate) fn read_mimic<'a>(&mut self, f: &mut Fields<'a>) -> Option<(&'a str, &'a Value<'a>)> {
+        if !self.is_single() {
+            return None;
+        }
+        let mut mimic = f.table("mimic", "{ joint = \"NAME\", multiplier = 1 }")?;
+        let of = mimic.text("joint", "the name of the link whose joint it follows");
+        let multiplier = mimic.number_or("multiplier", Bound::ANY, 1.0);
+        let offset = number(&mut mimic, self.keys().offset).unwrap_or(0.0);
+        mimic.finish();
+        self.mimic = Some(MimicSpec { link: usize::MAX, multiplier, offset });
+        of
+    }
+
+    /// Sets the target of a position drive without a target to the position at time 0.
+    pub(crate) fn settle(&mut self) {
+        if let (true, Drive::Position { target, .. }, Some(start)) =
+            (self.holds_start, &mut self.dof.drive, self.position.first())
+        {
+            *target = *start;
+        }
+    }
+}
+
+/// Reads a number in SI units or degrees, if either key is present.
+fn number(f: &mut Fields<'_>, (si, degrees): Key) -> Option<f64> {
+    let given = f.optional_number(si, Bound::ANY);
+    let turned = degrees.and_then(|key| f.optional_number(key, Bound::ANY)).map(f64::to_radians);
+    one_of(f, (si, degrees), given, turned)
+}
+
+/// Returns the value of the one of two alternative keys that is present. Both at once are a
+/// problem.
+fn one_of<T>(f: &Fields<'_>, (si, degrees): Key, given: Option<T>, turned: Option<T>) -> Option<T> {
+    if given.is_some() && turned.is_some() {
+        let message = format!("{} has both `{si}` and `{}`", f.what, degrees.unwrap_or_default());
+        f.log.report(f.span.clone(), message, "expected one of them");
+    }
+    given.or(turned)
+}
+
+/// Reads limits. `Some(None)` if the file says `false`: no limits.
+fn read_limits(f: &mut Fields<'_>, key: Key) -> Option<Option<[f64; 2]>> {
+    let mut read = |key: &'static str, scale: f64| {
+        let value = f.value(key)?;
+        if value.get_ref().as_bool() == Some(false) {
+            return Some(None);
+        }
+        let problems = f.log.count();
+        let limits: [f64; 2] = f.as_vector(key, value, Bound::ANY);
+        if limits[0] > limits[1] && f.log.count() == problems {
+            f.wrong(key, value, "[lower, upper], the lower first; or false for none");
+        }
+        Some(Some(limits.map(|x| x * scale)))
+    };
+    let given = read(key.0, 1.0);
+    let turned = key.1.and_then(|key| read(key, std::f64::consts::PI / 180.0));
+    one_of(f, key, given, turned)
+}
+
+fn read_playback(f: &mut Fields<'_>, key: Key) -> Option<Playback> {
+    let problems = f.log.count();
+    let times = f.optional_numbers("times_s", Bound::ANY, MAX_SAMPLES);
+    let given = f.optional_numbers(key.0, Bound::ANY, MAX_SAMPLES);
+    let turned = key.1.and_then(|key| f.optional_numbers(key, Bound::ANY, MAX_SAMPLES));
+    let turned = turned.map(|values| values.into_iter().map(f64::to_radians).collect());
+    let values = one_of(f, key, given, turned);
+    let repeat = f.flag_or("repeat", false);
+    if times.is_none() {
+        f.missing("times_s", "a list of increasing times");
+    }
+    if values.is_none() {
+        f.missing(key.0, "a list of positions, one for each time");
+    }
+    if f.log.count() > problems {
+        return None;
+    }
+    let motion = if repeat { Playback::repeating(times?, values?) } else { Playback::new(times?, values?) };
+    motion
+        .map_err(|error| {
+            let message = error.to_string();
+            let (wrong, expected) = message.split_once("; ").unwrap_or((message.as_str(), "expected increasing times"));
+            f.log.report(f.span.clone(), format!("{}: {wrong}", f.what), expected);
+        })
+        .ok()
+}

@@ -1,0 +1,419 @@
+//! `[[articulated.link]]`: a link with its joint, shapes and mass.
+
+use std::path::PathBuf;
+
+use toml::de::DeValue;
+use tumble_core::Joint;
+use tumble_core::articulated::LinkMass;
+use tumble_core::collide::{ContactMode, Mat3, Pose, Vec3};
+
+use crate::parse::appearance::{AppearanceSpec, Color, as_color};
+use crate::parse::body::{Library, MAX_NAME_BYTES, MassSpec, read_material, read_name};
+use crate::parse::bound::Bound;
+use crate::parse::fields::{Fields, Value};
+use crate::parse::joint::JointSpec;
+use crate::parse::material::{DEFAULT_FRICTION, DEFAULT_RESTITUTION, FRICTION, RESTITUTION};
+use crate::parse::mount::Mounts;
+use crate::parse::rotation;
+use crate::parse::shape::ShapeSpec;
+use crate::parse::world::CONTACTS;
+
+/// Largest number of shapes of one link.
+const MAX_SHAPES: usize = 1000;
+
+/// A link at time 0 with all references resolved.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinkSpec {
+    /// Unique in its body.
+    pub name: String,
+    /// Index of the parent link, always an earlier one; `None` for the base.
+    pub parent: Option<usize>,
+    /// The joint's frame in the frame of the parent link, or of the base.
+    pub placement: Pose,
+    /// The joint that connects it to its parent.
+    pub joint: JointSpec,
+    /// Its mass.
+    pub mass: LinkMassSpec,
+    /// Collision shapes and visuals.
+    pub shapes: Vec<LinkShape>,
+    /// The camera and the light attached to the link, in axes of the link.
+    pub mounts: Mounts,
+}
+
+impl LinkSpec {
+    /// Returns the mass that the file gives in numbers; no mass if it comes from shapes.
+    pub(crate) fn given_mass(&self) -> LinkMass {
+        match self.mass {
+            LinkMassSpec::Given(mass) => mass,
+            LinkMassSpec::OfShapes | LinkMassSpec::Spread(_) => LinkMass::none(),
+        }
+    }
+
+    /// Returns whether the link has any mass or inertia.
+    pub(crate) fn has_mass(&self) -> bool {
+        match &self.mass {
+            LinkMassSpec::OfShapes => self.shapes.iter().any(|shape| shape.mass.is_some()),
+            LinkMassSpec::Spread(_) => true,
+            LinkMassSpec::Given(mass) => mass.mass > 0.0 || mass.inertia.amax() > 0.0,
+        }
+    }
+}
+
+/// The mass of a link.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LinkMassSpec {
+    /// The sum of the masses of its shapes; none without shapes.
+    OfShapes,
+    /// Distributed over the volumes of all its shapes.
+    Spread(MassSpec),
+    /// Mass, center of mass and inertia in numbers, link frame.
+    Given(LinkMass),
+}
+
+/// A shape on a link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinkShape {
+    /// Pose of the shape's own axes in the link's frame.
+    pub pose: Pose,
+    /// The geometry.
+    pub geometry: Geometry,
+    /// The mass of the shape itself, if given.
+    pub mass: Option<MassSpec>,
+    /// Surface and appearance.
+    pub surface: Surface,
+    /// Takes part in contacts.
+    pub collides: bool,
+    /// Is drawn.
+    pub visible: bool,
+}
+
+/// The geometry of a shape on a link.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Geometry {
+    /// A shape of the scene.
+    Shape(ShapeSpec),
+    /// A mesh file, as URDF names them.
+    File {
+        /// A mesh that existed when the file that names it was read.
+        path: PathBuf,
+        /// Meters per unit along x, y and z; a negative number mirrors.
+        scale: [f64; 3],
+        /// File and line that name the mesh.
+        place: String,
+        /// Whether its convex hull collides instead of the mesh.
+        hull: bool,
+        /// Whether an unreadable mesh is an error. Otherwise it is left out.
+        required: bool,
+    },
+}
+
+/// Contact constants and appearance of a shape.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surface {
+    /// Index into [`SceneFile::materials`](crate::SceneFile::materials), if a material is named.
+    pub material: Option<usize>,
+    /// Coulomb's coefficient of friction.
+    pub friction: f64,
+    /// Newton's coefficient of restitution.
+    pub restitution: f64,
+    /// Contact mode of meshes and cylinders.
+    pub contacts: ContactMode,
+    /// Appearance.
+    pub appearance: AppearanceSpec,
+}
+
+impl Default for Surface {
+    fn default() -> Surface {
+        Surface {
+            material: None,
+            friction: DEFAULT_FRICTION,
+            restitution: DEFAULT_RESTITUTION,
+            contacts: ContactMode::default(),
+            appearance: AppearanceSpec::default(),
+        }
+    }
+}
+
+impl Surface {
+    /// Reads the surface keys. Absent keys are taken from the named material, else from `base`.
+    pub(crate) fn read(f: &mut Fields<'_>, library: &Library<'_>, base: &Surface) -> Surface {
+        let material = read_material(f, library);
+        let named = material.map(|index| &library.materials[index]);
+        let (friction, restitution, appearance) = named
+            .map_or((base.friction, base.restitution, &base.appearance), |m| {
+                (m.friction, m.restitution, &m.appearance)
+            });
+        Surface {
+            material: material.or(base.material),
+            friction: f.number_or("friction", FRICTION, friction),
+            restitution: f.number_or("restitution", RESTITUTION, restitution),
+            contacts: f.choice_or("contacts", CONTACTS, base.contacts),
+            appearance: AppearanceSpec::read(f, appearance),
+        }
+    }
+}
+
+/// The links of one table `[[articulated.link]]`: one link, or a chain of `count` equal ones.
+pub(crate) struct LinkRow<'a> {
+    pub(crate) link: LinkSpec,
+    /// Number of links, each attached to the one before.
+    pub(crate) count: usize,
+    /// Placement of each link but the first in the one before it.
+    pub(crate) next: Pose,
+    pub(crate) colors: Vec<Color>,
+    /// The joint that its joint follows.
+    pub(crate) mimic: Option<(&'a str, &'a Value<'a>)>,
+}
+
+/// Defaults that links take from their body.
+pub(crate) struct Inherited<'l, 's> {
+    pub(crate) library: &'l Library<'l>,
+    pub(crate) surface: &'s Surface,
+    pub(crate) collides: bool,
+    pub(crate) visible: bool,
+    /// Whether a link without a parent floats.
+    pub(crate) floating: bool,
+    /// Number of links that may still be added.
+    pub(crate) room: usize,
+}
+
+impl<'a> LinkRow<'a> {
+    /// Reads a link. `names` has the names of all earlier links.
+    pub(crate) fn read(f: &mut Fields<'a>, from: &Inherited<'_, '_>, names: &[&str]) -> Option<LinkRow<'a>> {
+        let name = read_name(f).unwrap_or_default();
+        let parent = read_parent(f, names);
+        let placement = rotation::read_pose(f);
+        let floats = from.floating && parent.is_none();
+        let joint = if floats { read_floating(f, &name) } else { JointSpec::read(f, &name) };
+        let surface = Surface::read(f, from.library, from.surface);
+        let from = Inherited {
+            surface: &surface,
+            library: from.library,
+            floating: from.floating,
+            room: from.room,
+            collides: f.flag_or("collides", from.collides),
+            visible: f.flag_or("visible", from.visible),
+        };
+        let shapes = read_shapes(f, &from);
+        let mounts = Mounts::read(f);
+        let mass = read_mass(f, &shapes, joint.as_ref().is_some_and(|j| j.kind == Joint::Fixed));
+        let (count, next, colors) = read_repeat(f, &name, from.room);
+        let mut joint = joint?;
+        let mimic = joint.read_mimic(f);
+        Some(LinkRow {
+            link: LinkSpec { name, parent, placement, joint, mass, shapes, mounts },
+            count,
+            next,
+            colors,
+            mimic,
+        })
+    }
+
+    /// Appends the links: `name`, or `name_1` to `name_n`.
+    pub(crate) fn append_to(self, links: &mut Vec<LinkSpec>) {
+        for k in 0..self.count {
+            let mut link = self.link.clone();
+            if self.count > 1 {
+                link.name = format!("{}_{}", self.link.name, k + 1);
+                link.joint.name.clone_from(&link.name);
+            }
+            if k > 0 {
+                (link.parent, link.placement) = (Some(links.len() - 1), self.next);
+            }
+            if !self.colors.is_empty() {
+                link.shapes.iter_mut().for_each(|s| s.surface.appearance.color = self.colors[k % self.colors.len()]);
+            }
+            links.push(link);
+        }
+    }
+}
+
+fn read_floating(f: &mut Fields<'_>, name: &str) -> Option<JointSpec> {
+    if let Some(value) = f.value("joint") {
+        f.wrong("joint", value, "no joint, since the root of a floating body has none; or floating = false");
+        JointSpec::read(f, name);
+    }
+    Some(JointSpec::new(name, Joint::Floating))
+}
+
+fn read_parent(f: &mut Fields<'_>, names: &[&str]) -> Option<usize> {
+    let (name, value) = f.optional_text("parent")?;
+    let found = names.iter().position(|other| *other == name);
+    match found {
+        Some(_) => {}
+        None if names.is_empty() => {
+            f.wrong("parent", value, "no parent for the first link, which is attached to the base")
+        }
+        None => f.unknown_name("parent", value, name, names.to_vec()),
+    }
+    found
+}
+
+fn read_shapes(f: &mut Fields<'_>, from: &Inherited<'_, '_>) -> Vec<LinkShape> {
+    let what = f.what.clone();
+    let example = "{ type = \"sphere\", radius_m = 0.5 }";
+    let single = f.value("shape");
+    let several = f.list("shapes", MAX_SHAPES, &format!("a list of shapes, such as [{example}]"));
+    if single.is_some() && f.value("shapes").is_some() {
+        f.log.report(f.span.clone(), format!("{what} has both `shape` and `shapes`"), "expected one of them");
+    }
+    let all = single.into_iter().map(|value| (value, format!("the shape of {what}")));
+    let all =
+        all.chain(several.into_iter().enumerate().map(|(n, value)| (value, format!("shape {} of {what}", n + 1))));
+    all.filter_map(|(value, what)| LinkShape::read(Fields::of(f.log, value, what, example)?, from)).collect()
+}
+
+impl LinkShape {
+    fn read(mut f: Fields<'_>, from: &Inherited<'_, '_>) -> Option<LinkShape> {
+        let Some(shape) = ShapeSpec::read_part(&mut f, &from.library.meshes) else {
+            f.give_up();
+            return None;
+        };
+        if shape == ShapeSpec::HalfSpace {
+            let message = format!("{} is a half-space, which is unbounded", f.what);
+            f.log.report(
+                f.span.clone(),
+                message,
+                "expected a shape of finite size; make the half-space a static [[body]]",
+            );
+        }
+        let mass = f.optional_number("mass_kg", Bound::POSITIVE).map(MassSpec::Mass);
+        let density = f.optional_number("density_kg_per_m3", Bound::POSITIVE).map(MassSpec::Density);
+        if mass.is_some() && density.is_some() {
+            let message = format!("{} has both `mass_kg` and `density_kg_per_m3`", f.what);
+            f.log.report(f.span.clone(), message, "expected one of them");
+        }
+        let read = LinkShape {
+            pose: rotation::read_pose(&mut f),
+            geometry: Geometry::Shape(shape),
+            mass: mass.or(density),
+            surface: Surface::read(&mut f, from.library, from.surface),
+            collides: f.flag_or("collides", from.collides),
+            visible: f.flag_or("visible", from.visible),
+        };
+        f.finish();
+        Some(read)
+    }
+}
+
+fn read_mass(f: &mut Fields<'_>, shapes: &[LinkShape], fixed: bool) -> LinkMassSpec {
+    let mass = f.optional_number("mass_kg", Bound::POSITIVE);
+    let density = f.optional_number("density_kg_per_m3", Bound::POSITIVE);
+    let center = f.optional_vector::<3>("center_m", Bound::ANY);
+    let inertia = read_inertia(f);
+    let own = shapes.iter().filter(|s| s.mass.is_some()).count();
+    let given = mass.is_some() || density.is_some() || center.is_some() || inertia.is_some();
+    let contradiction =
+        |message: &str, expected: &str| f.log.report(f.span.clone(), format!("{} {message}", f.what), expected);
+    if given && own > 0 {
+        contradiction("has a mass, and its shapes have masses", "expected the mass of the link, or that of each shape");
+    } else if mass.is_some() && density.is_some() {
+        contradiction("has both `mass_kg` and `density_kg_per_m3`", "expected one of them");
+    } else if (center.is_some() || inertia.is_some()) && mass.is_none() {
+        contradiction("has `center_m` or `inertia_kg_m2` but no `mass_kg`", "expected `mass_kg` with them");
+    } else if inertia.is_none() && center.is_some() && !shapes.is_empty() {
+        contradiction(
+            "has `center_m` but no `inertia_kg_m2`",
+            "expected both, or neither: the mass is then distributed over the shapes",
+        );
+    } else if own > 0 && own < shapes.len() {
+        contradiction(
+            "has shapes with a mass and shapes without",
+            "expected a mass for each shape, or one for the link",
+        );
+    } else if !given && own == 0 && !shapes.is_empty() && !fixed {
+        f.missing("mass_kg", "`mass_kg` or `density_kg_per_m3` for the link, or for each of its shapes");
+    } else if density.is_some() && shapes.is_empty() {
+        contradiction(
+            "has a density but no shape",
+            "expected a shape, or `mass_kg` with `center_m` and `inertia_kg_m2`",
+        );
+    }
+    match (mass, density) {
+        (Some(mass), _) if inertia.is_some() || shapes.is_empty() => {
+            let center = Vec3::from(center.unwrap_or_default());
+            LinkMassSpec::Given(LinkMass { mass, center, inertia: inertia.unwrap_or_default() })
+        }
+        (Some(mass), _) => LinkMassSpec::Spread(MassSpec::Mass(mass)),
+        (None, Some(density)) => LinkMassSpec::Spread(MassSpec::Density(density)),
+        (None, None) => LinkMassSpec::OfShapes,
+    }
+}
+
+/// Reads `inertia_kg_m2`: `[xx, yy, zz]` or `[xx, yy, zz, xy, xz, yz]` about the center of mass.
+fn read_inertia(f: &mut Fields<'_>) -> Option<Mat3> {
+    let value = f.value("inertia_kg_m2")?;
+    let problems = f.log.count();
+    let long = matches!(value.get_ref(), DeValue::Array(items) if items.len() == 6);
+    let [xx, yy, zz, xy, xz, yz]: [f64; 6] = match long {
+        true => f.as_vector("inertia_kg_m2", value, Bound::ANY),
+        false => {
+            let [xx, yy, zz] = f.as_vector("inertia_kg_m2", value, Bound::ANY);
+            [xx, yy, zz, 0.0, 0.0, 0.0]
+        }
+    };
+    let inertia = Mat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    if f.log.count() == problems
+        && let Some(why) = inertia_fault(&inertia)
+    {
+        f.wrong("inertia_kg_m2", value, why);
+    }
+    Some(inertia)
+}
+
+/// Returns why a symmetric matrix cannot be an inertia about a center of mass: a principal moment
+/// is negative, or one is greater than the sum of the others.
+pub(crate) fn inertia_fault(inertia: &Mat3) -> Option<InertiaFault> {
+    let mut moments: Vec<f64> = inertia.symmetric_eigenvalues().iter().copied().collect();
+    moments.sort_by(f64::total_cmp);
+    let size = inertia.amax();
+    let [a, b, c] = [moments[0], moments[1], moments[2]];
+    if a < -1e-9 * size && a < -1e-12 {
+        return Some(InertiaFault::Negative(a));
+    }
+    (c > a + b + 1e-6 * size && c > a + b + 1e-9).then_some(InertiaFault::Triangle([a, b, c]))
+}
+
+/// Why a matrix is not an inertia.
+#[derive(Debug)]
+pub(crate) enum InertiaFault {
+    /// The smallest principal moment.
+    Negative(f64),
+    /// All principal moments, the smallest first.
+    Triangle([f64; 3]),
+}
+
+impl std::fmt::Display for InertiaFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            InertiaFault::Negative(a) => write!(f, "principal moments of at least 0; the smallest is {a:.6e} kg·m²"),
+            InertiaFault::Triangle([a, b, c]) => {
+                write!(
+                    f,
+                    "no principal moment greater than the sum of the others; they are {a:.6e}, {b:.6e} and {c:.6e} kg·m²"
+                )
+            }
+        }
+    }
+}
+
+/// Reads `repeat`: count, placement of each next link, and colors that the links take in turn.
+fn read_repeat(f: &mut Fields<'_>, name: &str, room: usize) -> (usize, Pose, Vec<Color>) {
+    let span = f.value("repeat").map(Value::span);
+    let (Some(mut repeat), Some(span)) = (f.table("repeat", "{ count = 10, position_m = [0, 0, -0.1] }"), span) else {
+        return (1, Pose::identity(), Vec::new());
+    };
+    let most = room.clamp(1, 10_000) as u32;
+    let count = match repeat.required("count", "how many links there are") {
+        Some(value) => repeat.as_integer("count", value, 1..=most) as usize,
+        None => 1,
+    };
+    if name.len() + 1 + count.to_string().len() > MAX_NAME_BYTES {
+        f.log.report(span, format!("the name of {} is too long to be numbered", f.what), "expected a shorter one");
+    }
+    let next = rotation::read_pose(&mut repeat);
+    let colors = repeat.list("colors", 1000, "a list of colors, which the links take in turn");
+    let colors = colors.into_iter().map(|value| as_color(&repeat, "colors", value)).collect();
+    repeat.finish();
+    (count, next, colors)
+}
