@@ -1,47 +1,49 @@
-//! What a step reports.
+//! The report of a step.
 
 use crate::solver::SolveReport;
 use crate::world::view::ObjectId;
 
-/// A joint that could not be closed where it was led.
+/// A loop joint that could not be closed at the pose that kinematic motion asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnreachableJoint {
     /// The constraint.
     pub loop_joint: ObjectId,
-    /// How far it is open, metres; 0 where only its angle is.
+    /// Distance between its sides, m; 0 if the largest error is an angle.
     pub distance: f64,
-    /// The same of its angle, rad, where its distance is not what is furthest off.
+    /// Angle between its sides, rad; 0 if the largest error is a distance.
     pub angle: f64,
 }
 
-/// What one frame took and how well it went.
+/// Counts and residuals of one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct StepReport {
-    /// Committed sub-steps.
+    /// Number of committed sub-steps.
     pub substeps: u32,
-    /// `backtracking`: integrations tried, committed ones included.
+    /// `backtracking`: number of integrations, committed ones included.
     pub tries: u32,
-    /// `backtracking` with `dormand_prince`: inner steps of all integrations, refused ones included.
+    /// `backtracking` with `dormand_prince`: inner steps of all integrations, rejected ones
+    /// included.
     pub inner_steps: u32,
-    /// `backtracking`: sub-steps taken at the floor, where a crossing was accepted and projected out.
+    /// `backtracking`: sub-steps of the minimum length, at which a crossing was accepted and
+    /// projected out.
     pub floor_hits: u32,
-    /// Contacts at the last sub-step: what the narrow phase found within its margin.
+    /// Contacts of the last sub-step, speculative ones within the margin included.
     pub contacts: u32,
-    /// Objects asleep at its end.
+    /// Number of sleeping objects at the end of the frame.
     pub asleep: u32,
-    /// Passes of the impact phase.
+    /// Number of passes of the impact phase.
     pub impact_passes: u32,
     /// Largest residual of any solve, m/s (see [`crate::solver::residual`]).
     pub residual: f64,
-    /// Solves that did not reach the solver's own aim.
+    /// Number of solves that did not reach the solver's tolerance.
     pub unconverged: u32,
-    /// Solves that ended on a secondary ray and were resolved at the impulse level.
+    /// Number of solves that ended on a secondary ray and were resolved at the impulse level.
     pub rays: u32,
-    /// Iterations of the largest solve.
+    /// Maximum number of iterations of a solve.
     pub iterations: u32,
-    /// Deepest penetration found by the narrow phase, metres.
+    /// Deepest penetration that the narrow phase found, m.
     pub max_penetration: f64,
-    /// The joint that was furthest open where it cannot be closed; `None` where all could.
+    /// The unreachable joint with the largest error; `None` if all joints could be closed.
     #[serde(skip)]
     pub unreachable_joint: Option<UnreachableJoint>,
 }

@@ -5,54 +5,62 @@ use crate::solver::SolverSettings;
 use crate::world::sleep::Sleep;
 use tumble_collide::Vec3;
 
-/// How smooth motion is integrated between contacts.
+/// Integration of smooth motion between contacts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Integrator {
-    /// Drift, kick, drift: symplectic, of second order, one evaluation of the forces per step.
+    /// Free motion for half a step, all forces, free motion for half a step: symplectic, second
+    /// order, one evaluation of the forces per step.
     #[default]
     Verlet,
-    /// Kick, then drift with the new velocity: symplectic, of first order.
+    /// Velocities first, then positions with the new velocities: symplectic, first order.
     SymplecticEuler,
-    /// The thesis's integrator (§IV.B.2): drift and kick with what was there before. First order; gains energy.
+    /// The thesis's integrator (§IV.B.2): positions and velocities with the rates at the start.
+    /// First order; gains energy.
     ExplicitEuler,
     /// Fourth order: classical Runge–Kutta on momenta, commutator-free on rotations.
     Rk4,
-    /// Fifth order with error control (Dormand and Prince): inner steps as [`Settings::integrator_tolerance`] asks, with dense output.
+    /// Fifth order with error control (Dormand and Prince): inner steps that satisfy
+    /// [`Settings::integrator_tolerance`], with dense output.
     DormandPrince,
 }
 
-/// A world's constants; they may be changed between steps.
+/// The constants of a world. They may change between steps.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Settings {
     /// Gravity, m/s².
     pub gravity: Vec3,
     /// Length of a step, s; 1/240 by default, as in scenes and Python.
     pub dt: f64,
-    /// Equal sub-steps that `time_stepping` divides a frame into, at least 1.
+    /// Number of equal sub-steps of `time_stepping` in a frame, 1 to 1000.
     pub substeps: u32,
-    /// How the backtracking stepper integrates. `time_stepping` is the midpoint rule whatever is chosen here.
+    /// Integrator of the backtracking stepper. `time_stepping` always uses the midpoint rule.
     pub integrator: Integrator,
-    /// `dormand_prince`: error that an inner step may make in any coordinate, as displacement (m, rad) and as velocity (m/s, rad/s), relative where
-    /// the coordinate's displacement or velocity is above 1; 1e-14 to 0.1.
+    /// `dormand_prince`: admissible error of an inner step in any coordinate, as a displacement (m,
+    /// rad) and as a velocity (m/s, rad/s); relative if the coordinate's displacement or velocity
+    /// exceeds 1. 1e-14 to 0.1.
     pub integrator_tolerance: f64,
-    /// Effort of the iterative solvers.
+    /// Limits of the iterative solvers.
     pub solver_settings: SolverSettings,
-    /// Sweeps at most of the position projection; of groups with joints as many as [`Settings::solver_settings`] grants a solve, if that is more.
+    /// Maximum number of sweeps of the position projection. Groups with joints get at least as many
+    /// as [`Settings::solver_settings`] allows a solve.
     pub projection_sweeps: u32,
-    /// Whether the equality rows of constraints (joints) are held in place too, and not in velocity alone: off, they drift.
+    /// Whether positions of equality rows (joints) are corrected. If not, only velocities are
+    /// constrained and positions drift.
     pub stabilize_positions: bool,
-    /// `backtracking`: surfaces closer than this touch, metres; deeper than this, a new contact makes the step go back. A rebound
-    /// lower than this rests.
+    /// `backtracking`: surfaces closer than this are in contact, m. A new contact deeper than this
+    /// makes the step go back, and a rebound lower than this comes to rest.
     pub contact_tolerance: f64,
-    /// Depth that contacts which last may drift to within a sub-step before they are projected out, metres.
+    /// Depth to which a lasting contact may drift within a sub-step before it is projected out, m.
     pub drift_tolerance: f64,
-    /// Greatest speed at which existing penetration is pushed out, m/s.
+    /// Maximum speed at which existing penetration is corrected, m/s.
     pub recovery_speed: f64,
-    /// When what lies still is left out of the steps; `None`: never.
+    /// When islands fall asleep; `None`: never.
     pub sleep: Option<Sleep>,
-    /// How the friction of two bodies combines: by default the geometric mean, so that ice is slippery under everything.
+    /// Combination of the friction coefficients of two bodies. The default is the geometric mean,
+    /// so that ice is slippery under any body.
     pub combine_friction: Combine,
-    /// How the restitution of two bodies combines: by default the larger, so that a ball bounces off a floor of which nothing is said.
+    /// Combination of the restitution coefficients of two bodies. The default is the larger, so
+    /// that a ball bounces off a floor without settings of its own.
     pub combine_restitution: Combine,
 }
 
@@ -85,12 +93,15 @@ pub struct SettingsError {
     pub what: &'static str,
     /// Value given.
     pub value: f64,
-    /// What would be right.
+    /// Admissible range.
     pub wanted: &'static str,
 }
 
 impl Settings {
-    /// Checks every range.
+    /// Checks the range of every setting.
+    ///
+    /// # Errors
+    /// The first setting that is out of its range.
     pub fn validate(&self) -> Result<(), SettingsError> {
         let check = |what, value: f64, right: bool, wanted| {
             if right && value.is_finite() { Ok(()) } else { Err(SettingsError { what, value, wanted }) }

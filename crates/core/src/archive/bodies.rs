@@ -1,4 +1,5 @@
-//! Rigid and articulated bodies as data. What their constructors compute (roots of inertias, whitening, caches) is computed anew.
+//! Rigid and articulated bodies as data. What their constructors compute (roots of inertias,
+//! whitening, caches) is computed anew.
 
 use super::records::{LoadedTables, Tables, VisualRecord, shape};
 use super::{ArchiveError, damaged};
@@ -15,7 +16,7 @@ use tumble_collide::{ContactMode, Mat3, Pose, Vec3};
 pub(super) struct RigidRecord {
     name: String,
     shape: u32,
-    /// Mass, kg, and inertia, kg·m²; `None` of a fixture.
+    /// Mass, kg, and inertia, kg·m²; `None` for a fixed body.
     mass: Option<(f64, Mat3)>,
     material: Material,
     linear_damping: f64,

@@ -4,10 +4,12 @@
 //! |---|---|
 //! | `tumbleA4`; the last is the number of the format | 8 |
 //! | XXH3 of the rest, little-endian | 8 |
-//! | settings, methods, shapes, visual meshes, objects, pairs, state, contacts, report in postcard | any |
+//! | settings, stepper, solver, shapes, visual meshes, objects, pairs, state, contacts, report in postcard | any |
 //!
-//! The same world gives the same bytes. Objects of kinds of their own are written by name alone; the caller makes them anew. Shapes that objects
-//! share are written once and are shared again; meshes that are only drawn are read for it, so that no file is needed later. The order of objects is kept, ids are not: they are new.
+//! The same world gives the same bytes. Objects of user-defined types are written by name alone;
+//! the caller makes them. Shapes that objects share are written once and are shared again; meshes
+//! that are only drawn are read for it, so that no file is needed later. The order of objects is
+//! kept, ids are not: they are new.
 
 mod bodies;
 mod records;
@@ -28,35 +30,36 @@ use serde::{Deserialize, Serialize};
 use tumble_collide::Shape;
 use xxhash_rust::xxh3::xxh3_64;
 
-/// What an archive of a world begins with. The number is raised with every change of what is in it.
+/// First bytes of an archive of a world. The last is the number of the format, which rises with
+/// every change of the content.
 const HEAD: &[u8; 8] = b"tumbleA4";
 
-/// Why an archive was not written or read.
+/// Why an archive cannot be written or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ArchiveError {
-    /// Other bytes.
-    #[error("these bytes do not begin with '{0}': they were not written by tumble, or as something else")]
+    /// The bytes are of another kind.
+    #[error("these bytes do not begin with '{0}': they are of another kind, or were not written by tumble")]
     NotOne(String),
-    /// Of an older or newer library.
+    /// The format is that of an older or newer version.
     #[error("these bytes have format '{theirs}'; this version of tumble reads '{ours}'")]
     Format {
-        /// As written.
+        /// Format of the bytes.
         theirs: String,
-        /// As read here.
+        /// Format of this version.
         ours: String,
     },
-    /// Changed or cut bytes.
+    /// The bytes were changed or cut off.
     #[error("these bytes are damaged: {0}")]
     Damaged(String),
-    /// What cannot be written, such as a path that is not UTF-8.
+    /// A value cannot be written, such as a path that is not UTF-8.
     #[error("the world cannot be written: {0}")]
     Unwritable(String),
-    /// An object that this library cannot write, or that the caller did not make anew.
-    #[error("'{0}' is an object of a kind of its own, and nothing was given to write it or to make it anew")]
+    /// An object of a user-defined type that the caller does not write, or does not make.
+    #[error("'{0}' is an object of a user-defined type, and the caller gave nothing to write or to make it")]
     Foreign(String),
 }
 
-/// What an archive holds.
+/// Content of an archive.
 #[derive(Serialize, Deserialize)]
 struct Archive {
     settings: Settings,
@@ -81,11 +84,13 @@ enum Record {
 }
 
 impl World {
-    /// The whole world as bytes: objects with their shapes, settings, methods and state. `foreign` are the objects of kinds of their own that
-    /// [`from_archive`](World::from_archive)'s caller makes anew.
+    /// Returns the whole world as bytes: objects with their shapes, settings, stepper, solver and
+    /// state. `foreign` are the objects of user-defined types that the caller of
+    /// [`from_archive`](World::from_archive) makes itself.
     ///
     /// # Errors
-    /// [`ArchiveError::Foreign`]: an object of a kind of its own that is not among `foreign`.
+    /// [`ArchiveError::Foreign`] for an object of a user-defined type that is not among `foreign`;
+    /// [`ArchiveError::Unwritable`] for a value that cannot be written.
     pub fn archive(&self, foreign: &[ObjectId]) -> Result<Vec<u8>, ArchiveError> {
         let (mut tables, indices) = (Tables::default(), ObjectIndices::of(self.ids()));
         let (stepper, solver) = (self.stepper_name(), self.solver_name());
@@ -120,10 +125,12 @@ impl World {
         seal(HEAD, &archive)
     }
 
-    /// The world of an archive: the same state, the same future. `foreign` makes an object of a kind of its own by its name.
+    /// Returns the world of an archive, which continues with the same bits. `foreign` makes an
+    /// object of a user-defined type from its name.
     ///
     /// # Errors
-    /// [`ArchiveError`]: bytes that are no archive, of another format or damaged, or an object that `foreign` does not make.
+    /// [`ArchiveError`] for bytes that are no archive, of another format or damaged, and for an
+    /// object that `foreign` does not make.
     pub fn from_archive(
         bytes: &[u8],
         foreign: &mut dyn FnMut(&str) -> Option<Box<dyn Object>>,
@@ -151,7 +158,8 @@ impl World {
     }
 }
 
-/// A value as bytes: eight bytes that name the kind and, as the last, the number of the format; XXH3 of the rest; the value in postcard.
+/// A value as bytes: eight bytes that name the kind and, as the last, the number of the format;
+/// XXH3 of the rest; the value in postcard.
 ///
 /// # Errors
 /// [`ArchiveError::Unwritable`].

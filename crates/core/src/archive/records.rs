@@ -1,4 +1,4 @@
-//! The parts of an archive that name objects by their place, and shapes by their place in a table.
+//! Records of an archive that refer to objects by index, and to shapes by index in a table.
 
 use super::{ArchiveError, ContactPoint, StepReport, UnreachableJoint, damaged};
 use crate::constraint::loop_joint::{Anchor, LoopJoint, LoopJointKind};
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use tumble_collide::{Pose, Shape, TriMesh, Vec3};
 
-/// Every shape once: shared ones by where they are in memory, others as they come.
+/// All shapes, each written once: shared shapes are identified by their address.
 #[derive(Default)]
 pub(super) struct ShapeTable {
     pub list: Vec<Shape>,
@@ -20,7 +20,7 @@ pub(super) struct ShapeTable {
 }
 
 impl ShapeTable {
-    /// The place of a shape.
+    /// Returns the index of a shape.
     pub fn index(&mut self, shape: &Shape) -> u32 {
         let next = self.list.len() as u32;
         let address = match shape {
@@ -36,19 +36,20 @@ impl ShapeTable {
     }
 }
 
-/// The shape at a place.
+/// Returns the shape at an index.
 pub(super) fn shape(shapes: &[Shape], index: u32) -> Result<Shape, ArchiveError> {
     shapes.get(index as usize).cloned().ok_or_else(|| damaged(format!("there is no shape {index}")))
 }
 
-/// Every visual mesh once. They are read now: the archive needs none of their files.
+/// All visual meshes, each written once. They are read here, so the archive needs none of their
+/// files.
 #[derive(Default)]
 pub(super) struct MeshTable {
     pub list: Vec<MeshRecord>,
     tables: BTreeMap<usize, u32>,
 }
 
-/// The name of a visual mesh, and its triangles or why they cannot be read.
+/// Source of a visual mesh, with its triangles or the reason why they cannot be read.
 pub(super) type MeshRecord = (String, Result<TriMesh, String>);
 
 impl MeshTable {
@@ -61,7 +62,7 @@ impl MeshTable {
     }
 }
 
-/// The meshes of a table.
+/// Returns the meshes of a table.
 pub(super) fn meshes(list: Vec<MeshRecord>) -> Vec<Arc<VisualMesh>> {
     let mesh = |(name, triangles): MeshRecord| {
         let triangles = triangles.map(Arc::new);
@@ -70,7 +71,7 @@ pub(super) fn meshes(list: Vec<MeshRecord>) -> Vec<Arc<VisualMesh>> {
     list.into_iter().map(mesh).collect()
 }
 
-/// Places of objects in the order of adding.
+/// Indices of objects in the order of insertion.
 pub(super) struct ObjectIndices(BTreeMap<ObjectId, u32>);
 
 impl ObjectIndices {
@@ -78,21 +79,22 @@ impl ObjectIndices {
         ObjectIndices(ids.iter().zip(0..).map(|(id, index)| (*id, index)).collect())
     }
 
-    /// `None` of an object that is gone.
+    /// Returns `None` for a removed object.
     fn of_id(&self, id: ObjectId) -> Option<u32> {
         self.0.get(&id).copied()
     }
 }
 
-/// The id at a place; one that names nothing where there is none.
+/// Returns the id at an index, or an id of no object.
 fn id(ids: &[ObjectId], index: Option<u32>) -> ObjectId {
     index.and_then(|index| ids.get(index as usize)).copied().unwrap_or_default()
 }
 
-/// One side of a closure: the place of its object, if that is still there, and the part; `None` for the world.
+/// One side of a loop joint: index of its object, if that still exists, and part; `None` for the
+/// world.
 type Side = (Option<(Option<u32>, usize)>, Pose);
 
-/// A closure.
+/// A loop joint.
 #[derive(Serialize, Deserialize)]
 pub(super) struct LoopJointRecord {
     name: String,
@@ -151,7 +153,7 @@ impl ContactRecord {
     }
 }
 
-/// A side of a pair with constants of its own; objects by their places.
+/// One side of a pair with its own surface constants; objects by index.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(super) enum PairSideRecord {
     Part(u32, usize),
@@ -159,17 +161,17 @@ pub(super) enum PairSideRecord {
     Material(u32),
 }
 
-/// A pair with constants of its own.
+/// A pair with its own surface constants.
 #[derive(Serialize, Deserialize)]
 pub(super) struct PairRecord {
-    /// In order.
+    /// Sorted.
     pub sides: [PairSideRecord; 2],
     restitution: Option<f64>,
     friction: Option<f64>,
 }
 
 impl PairRecord {
-    /// `None` of a pair whose object is gone.
+    /// Returns `None` for a pair whose object was removed.
     pub fn of(sides: &[PairSide; 2], material: &PairMaterial, indices: &ObjectIndices) -> Option<PairRecord> {
         let side = |side: PairSide| {
             Some(match side {
@@ -184,7 +186,7 @@ impl PairRecord {
         Some(PairRecord { sides, restitution, friction })
     }
 
-    /// Puts it into a world of these objects.
+    /// Adds the pair to a world with these objects.
     pub fn put(self, world: &mut World, ids: &[ObjectId]) -> Result<(), WorldError> {
         let [a, b] = self.sides.map(|side| match side {
             PairSideRecord::Part(index, part) => PairSide::Part(id(ids, Some(index)), part),
@@ -195,7 +197,7 @@ impl PairRecord {
     }
 }
 
-/// The report of the last step; a joint in it by its place, with its distance and angle.
+/// The report of the last step; its loop joint by index, with distance and angle.
 #[derive(Serialize, Deserialize)]
 pub(super) struct ReportRecord {
     report: StepReport,
@@ -214,7 +216,7 @@ impl ReportRecord {
     }
 }
 
-/// A picture of an object.
+/// A visual.
 #[derive(Serialize, Deserialize)]
 pub(super) struct VisualRecord {
     part: usize,
@@ -224,21 +226,21 @@ pub(super) struct VisualRecord {
     stands_in_for: Vec<u32>,
 }
 
-/// The place of a shape, or of a visual mesh.
+/// Index of a shape, or of a visual mesh.
 #[derive(Serialize, Deserialize)]
 enum GeometryRecord {
     Shape(u32),
     Mesh(u32),
 }
 
-/// What visuals are made of.
+/// Tables that visuals refer to, while an archive is written.
 #[derive(Default)]
 pub(super) struct Tables {
     pub shapes: ShapeTable,
     pub meshes: MeshTable,
 }
 
-/// The same, as it is read.
+/// Tables that visuals refer to, while an archive is read.
 pub(super) struct LoadedTables {
     pub shapes: Vec<Shape>,
     pub meshes: Vec<Arc<VisualMesh>>,

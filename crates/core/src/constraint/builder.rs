@@ -1,4 +1,4 @@
-//! How constraints and contacts become rows.
+//! Conversion of constraints and contacts to rows.
 
 use crate::constraint::rows::{RowSet, Rows};
 use crate::object::collidable::ContactFrame;
@@ -7,18 +7,19 @@ use crate::object::{Constraint, Integratable, RowTarget};
 use crate::world::view::{Entry, Mode, ObjectId, Objects};
 use tumble_collide::Vec3;
 
-/// What a row's velocity is of: rows of one kind in one constraint have one unit.
+/// The quantity that a row constrains. Rows of one kind in one constraint share a unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RowKind {
-    /// Points: metres.
+    /// Points, metric: m.
     Point,
-    /// Rotations: radians.
+    /// Rotations: rad.
     Rotation,
-    /// An object's own coordinates, whatever they are.
+    /// Generalized coordinates of an object, in their own units.
     Coordinate,
 }
 
-/// Collects rows. A row is started with [`row`](Self::row) and then told what it acts on; its velocity is the sum of what it was told.
+/// Collects rows. [`row`](Self::row) starts a row; each `on_…` call then adds a term to its
+/// velocity.
 ///
 /// ```text
 /// out.row(RowTarget::new(RowSet::Equality, drift))
@@ -27,26 +28,27 @@ pub(crate) enum RowKind {
 /// ```
 pub struct RowBuilder<'a> {
     pub(crate) rows: &'a mut Rows,
-    /// Velocity of each row that comes from sides without freedoms (kinematic motion).
+    /// Velocity of each row due to sides without degrees of freedom (kinematic motion).
     pub(crate) bias: &'a mut Vec<f64>,
     pub(crate) targets: &'a mut Vec<RowTarget>,
-    /// Of each target.
+    /// Kind of each target.
     pub(crate) kinds: &'a mut Vec<RowKind>,
     pub(crate) objects: Objects<'a>,
     pub(crate) x: &'a [f64],
     pub(crate) part_states: &'a [PartState],
     pub(crate) problem: &'a mut Option<String>,
-    /// Whose rows are being made.
+    /// Constraint that owns the rows.
     pub(crate) owner: ObjectId,
 }
 
 impl RowBuilder<'_> {
-    /// The constraint whose rows are being made, for objects that constrain themselves.
+    /// Returns the constraint that owns the rows, for objects that constrain themselves.
     pub fn owner(&self) -> ObjectId {
         self.owner
     }
 
-    /// Starts a row. A `Cone` set is for contacts, which the world makes itself: it is refused here, and the step reports it.
+    /// Starts a row. A `Cone` set is reserved for contacts, which the world makes itself: it is
+    /// refused and the step reports an error.
     pub fn row(&mut self, target: RowTarget) -> &mut Self {
         let bounds = if let RowSet::Interval { lo, hi } = target.set { lo <= hi } else { true };
         if !(target.compliance.is_finite() && target.compliance >= 0.0) {
@@ -65,7 +67,7 @@ impl RowBuilder<'_> {
         self
     }
 
-    /// Adds `sign ·` the velocity along `axis` of the material point of one part that is at world point `p`.
+    /// Adds `sign ·` the velocity along `axis` of the material point of a part at world point `p`.
     pub fn on_point(&mut self, id: ObjectId, part: usize, p: &Vec3, axis: &Vec3, sign: f64) -> &mut Self {
         let objects = self.objects;
         if !self.open(p.iter().chain(axis.iter())) {
@@ -75,8 +77,10 @@ impl RowBuilder<'_> {
         self
     }
 
-    /// Adds `sign ·` the angular velocity of one part along the unit vector `axis`. Said by a couple of test impulses, which every part answers:
-    /// for unit `b ⟂ c` with `b × c = axis` it is `(v(p + b) − v(p))·c`, exactly.
+    /// Adds `sign ·` the angular velocity of a part along the unit vector `axis`.
+    ///
+    /// Two test impulses of opposite sign express the rotation, so every part supports it: for unit
+    /// `b ⟂ c` with `b × c = axis` it is exactly `(v(p + b) − v(p))·c`.
     pub fn on_rotation(&mut self, id: ObjectId, part: usize, axis: &Vec3, sign: f64) -> &mut Self {
         let objects = self.objects;
         if !self.open(axis.iter()) {
@@ -95,7 +99,8 @@ impl RowBuilder<'_> {
         self.kinds.last_mut().into_iter().for_each(|last| *last = kind);
     }
 
-    /// Lets `add` put its side of the row; refuses the row where the object is gone, has no such part, or is a third.
+    /// Calls `add` to add a side to the row. Refuses the row if the object is gone, has no such
+    /// part, or is the third one.
     fn on_part(&mut self, entry: Option<Entry>, part: usize, add: impl FnOnce(&mut Self, &Entry) -> bool) {
         let Some(entry) = entry else { return self.refuse("a row names an object that is not in the world".into()) };
         if part >= entry.state_range.parts.len() || !add(self, &entry) {
@@ -136,7 +141,7 @@ impl RowBuilder<'_> {
         self
     }
 
-    /// Whether there is a row to add to, and the numbers given for it are finite; refuses them otherwise.
+    /// Returns whether a row is open and the given numbers are finite; refuses the row otherwise.
     fn open<'n>(&mut self, mut numbers: impl Iterator<Item = &'n f64>) -> bool {
         let finite = numbers.all(|x| x.is_finite());
         if self.problem.is_none() && (self.targets.is_empty() || !finite) {
@@ -145,7 +150,7 @@ impl RowBuilder<'_> {
         self.problem.is_none()
     }
 
-    /// The velocity of something led along a row written in its coordinates.
+    /// Adds the velocity of a kinematic object along a row in its generalized coordinates.
     fn kinematic_coordinates(&mut self, entry: &Entry, body: &dyn Integratable, jacobian: &[f64]) -> bool {
         if entry.status.mode == Mode::Kinematic && entry.status.enabled {
             let mut v = vec![0.0; jacobian.len()];
@@ -156,7 +161,8 @@ impl RowBuilder<'_> {
         true
     }
 
-    /// One side of the last block: a test impulse where it moves, its velocity where it is led.
+    /// Adds one side to the last block: a test impulse for a dynamic object, a velocity for any
+    /// other.
     pub(crate) fn point_side(&mut self, entry: &Entry, part: usize, p: &Vec3, axes: &[Vec3], sign: f64) -> bool {
         let part_state = &self.part_states[entry.state_range.parts.start + part];
         let Some(collidable) = entry.object.collidable() else { return false };
@@ -178,7 +184,8 @@ impl RowBuilder<'_> {
     }
 }
 
-/// The constraints of the table in the order in which they were added; without those that hold nothing but an object that nothing moves.
+/// Returns the enabled constraints in the order of insertion. Constraints that act only on an
+/// object that impulses do not move are left out.
 pub(crate) fn constraints<'a>(objects: Objects<'a>) -> impl Iterator<Item = (ObjectId, Entry<'a>, &'a dyn Constraint)> {
     let entries = objects.table.order.iter().copied().zip(objects.iter());
     entries

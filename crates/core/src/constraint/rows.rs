@@ -1,29 +1,32 @@
-//! Constraint rows in whitened coordinates: all that a solver ever sees.
+//! Constraint rows in whitened coordinates: the only input of a solver.
 //!
-//! With `M = LᵀL` per object and `u = L·v`, an impulse `λ` along the rows `J` changes `u` by `Y·λ`, where
-//! `Y = L⁻ᵀJᵀ` is the thesis's test impulse (§IV.B.3, Algorithms 2 and 3) seen where every mass is 1. The
-//! matrix of the contact problem is `K = YᵀY`, and nothing here says rigid or articulated.
+//! With `M = LᵀL` per object and `u = L·v`, an impulse `λ` along the rows `J` changes `u` by `Y·λ`.
+//! `Y = L⁻ᵀJᵀ` is the thesis's test impulse (§IV.B.3, Algorithms 2 and 3) in coordinates in which
+//! every mass is 1. The matrix of the contact problem is `K = YᵀY`. Rows do not tell rigid bodies
+//! from articulated ones.
 //!
 //! | symbol | meaning |
 //! |---|---|
-//! | `u`  | whitened velocity of all objects, one stretch of `dof` numbers each |
-//! | `Y`  | whitened response; stored per side and row, so a block of `r` rows on a side of `d` freedoms is `r × d`, row-major |
-//! | `c`  | free value of every row: the relative velocity (or acceleration) that the solve must mend |
+//! | `u`  | whitened velocity of all objects, one range of `dof` numbers each |
+//! | `Y`  | whitened response, stored per side and row: a block of `r` rows on a side with `d` degrees of freedom is `r × d`, row-major |
+//! | `c`  | free value of every row: the relative velocity (or acceleration) that the solve has to correct |
 //! | `λ`  | multiplier of every row: impulse in N·s, or force in N at the acceleration level |
-//! | `R`  | compliance of a scalar row, at least 0: it gives way by `R·λ` |
+//! | `R`  | compliance of a scalar row, at least 0: the row yields by `R·λ` |
 
-/// What a block's multipliers may be, and what its row velocities must be in return. With `w = c + (K + R)·λ`:
+/// The set of admissible multipliers of a block, and the condition on its row velocities `w = c +
+/// (K + R)·λ`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RowSet {
-    /// `w = 0`, `λ` free (loop closure). One row.
+    /// `w = 0`, `λ` free (loop joint). One row.
     Equality,
     /// `0 ≤ λ ⟂ w ≥ 0` (joint limit, frictionless contact). One row.
     HalfLine,
-    /// `lo ≤ λ ≤ hi`; `w = 0` inside, `w ≥ 0` at `lo`, `w ≤ 0` at `hi` (motor, joint friction). One row.
+    /// `lo ≤ λ ≤ hi`; `w = 0` inside, `w ≥ 0` at `lo`, `w ≤ 0` at `hi` (motor, joint friction). One
+    /// row.
     Interval {
-        /// Least multiplier.
+        /// Lower bound of the multiplier.
         lo: f64,
-        /// Greatest multiplier.
+        /// Upper bound of the multiplier.
         hi: f64,
     },
     /// Contact with Coulomb friction. Three rows: normal, two tangents. `0 ≤ λ_n ⟂ w_n ≥ 0` and
@@ -35,28 +38,28 @@ pub enum RowSet {
 }
 
 impl RowSet {
-    /// Rows in a block of this kind.
+    /// Returns the number of rows in a block of this kind.
     pub fn rows(&self) -> usize {
         if let RowSet::Cone { .. } = self { 3 } else { 1 }
     }
 }
 
-/// One object's part in a block.
+/// The contribution of one object to a block.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Side {
-    /// First index of the object's stretch in `u`.
+    /// First index of the object's range in `u`.
     pub u: u32,
-    /// Freedoms of the object.
+    /// Degrees of freedom of the object.
     pub dof: u32,
     /// First index of the block's `rows × dof` numbers in [`Rows::y`].
     pub y: u32,
 }
 
-/// Rows that are solved together: one scalar row, or the three of a contact. A side that cannot move
-/// (static, kinematic) is absent.
+/// Rows that are solved together: one scalar row, or the three of a contact. A side that cannot
+/// move (static, kinematic) is absent.
 #[derive(Clone, Copy, Debug)]
 pub struct Block {
-    /// What the multipliers may be.
+    /// Admissible multipliers.
     pub set: RowSet,
     /// First row of the block in `c` and `λ`.
     pub row: u32,
@@ -67,12 +70,12 @@ pub struct Block {
 }
 
 impl Block {
-    /// The sides that can move: none, one or two, of different objects.
+    /// Returns the sides that can move: none, one or two, of different objects.
     pub fn sides(&self) -> &[Side] {
         &self.sides[..self.side_count as usize]
     }
 
-    /// The indices of the block's rows in `c` and `λ`.
+    /// Returns the indices of the block's rows in `c` and `λ`.
     pub fn range(&self) -> std::ops::Range<usize> {
         self.row as usize..self.row as usize + self.set.rows()
     }
@@ -92,7 +95,7 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Forgets all rows and keeps the memory; `dof` is the length of `u`.
+    /// Removes all rows and keeps the memory; `dof` is the length of `u`.
     pub fn clear(&mut self, dof: usize) {
         self.blocks.clear();
         self.y.clear();
@@ -100,12 +103,12 @@ impl Rows {
         self.dof = dof;
     }
 
-    /// Starts a block without sides and returns its index.
+    /// Starts a rigid block without sides and returns its index.
     pub fn push_block(&mut self, set: RowSet) -> usize {
         self.push_soft(set, 0.0)
     }
 
-    /// The same with a compliance, which contacts do not take.
+    /// Starts a block with a compliance and returns its index. Contacts ignore the compliance.
     pub fn push_soft(&mut self, set: RowSet, compliance: f64) -> usize {
         let compliance = if set.rows() == 1 { compliance } else { 0.0 };
         self.blocks.push(Block { set, row: self.len as u32, compliance, sides: [Side::default(); 2], side_count: 0 });
@@ -113,9 +116,11 @@ impl Rows {
         self.blocks.len() - 1
     }
 
-    /// Gives the *last* block the side of the object whose `u` starts at `u` and has `dof` numbers, and returns its
-    /// `rows × dof` responses to be **added to**. A second part of the same object merges into the side that is
-    /// there, so that the cross term is seen. `None` where a third object is named: a row touches at most two.
+    /// Adds a side to the *last* block and returns its `rows × dof` responses, to be **added to**.
+    ///
+    /// The side belongs to the object whose range in `u` starts at `u` and has `dof` numbers. A
+    /// second part of the same object uses the existing side, so that the cross term is included.
+    /// Returns `None` for a third object: a row acts on at most two.
     pub fn side(&mut self, u: usize, dof: usize) -> Option<&mut [f64]> {
         let start = self.y.len();
         let block = self.blocks.last_mut()?;
@@ -134,14 +139,14 @@ impl Rows {
         Some(&mut self.y[start..])
     }
 
-    /// The response of row `k` (from 0 within the block) on one side: `dof` numbers.
+    /// Returns the response of row `k` (from 0 within the block) on one side: `dof` numbers.
     pub fn response(&self, side: &Side, k: usize) -> &[f64] {
         let d = side.dof as usize;
         let y = side.y as usize + k * d;
         &self.y[y..y + d]
     }
 
-    /// `c_i += (Yᵀu)_i` for every row.
+    /// Adds `(Yᵀu)_i` to `c_i` for every row.
     pub fn add_velocity(&self, u: &[f64], c: &mut [f64]) {
         for block in &self.blocks {
             for (k, row) in block.range().enumerate() {
@@ -150,13 +155,13 @@ impl Rows {
         }
     }
 
-    /// `(Yᵀu)` of row `k` of one block.
+    /// Returns `(Yᵀu)` of row `k` of one block.
     #[inline]
     pub fn row_velocity(&self, block: &Block, k: usize, u: &[f64]) -> f64 {
         block.sides().iter().map(|s| dot(self.response(s, k), &u[s.u as usize..(s.u + s.dof) as usize])).sum()
     }
 
-    /// `u += Y·λ` for the rows of one block.
+    /// Adds `Y·λ` of one block to `u`.
     pub fn apply_block(&self, block: &Block, lambda: &[f64], u: &mut [f64]) {
         for (k, row) in block.range().enumerate() {
             for s in block.sides() {
@@ -168,7 +173,8 @@ impl Rows {
         }
     }
 
-    /// `K + R`, with `K = YᵀY`, of the given blocks, dense, row-major, in the order of their rows. For the pivoting solvers and the tests.
+    /// Returns `K + R`, with `K = YᵀY`, of the given blocks: dense, row-major, in the order of
+    /// their rows. For the pivoting solvers and tests.
     pub fn dense(&self, blocks: &[u32]) -> Vec<f64> {
         let rows: Vec<(&Block, usize)> = blocks
             .iter()
@@ -190,12 +196,13 @@ impl Rows {
         dense
     }
 
-    /// One number of a block's own part of `K`.
+    /// Returns entry `(i, j)` of a block's diagonal block of `K`.
     pub fn own(&self, block: &Block, i: usize, j: usize) -> f64 {
         block.sides().iter().map(|s| dot(self.response(s, i), self.response(s, j))).sum()
     }
 
-    /// One number of `K`: what a unit multiplier of row `kb` of `b` does to row `ka` of `a`.
+    /// Returns one entry of `K`: the velocity of row `ka` of `a` due to a unit multiplier of row
+    /// `kb` of `b`.
     pub fn coupling(&self, a: &Block, ka: usize, b: &Block, kb: usize) -> f64 {
         let mut sum = 0.0;
         for sa in a.sides() {
@@ -207,7 +214,8 @@ impl Rows {
     }
 }
 
-/// `a·b`; six numbers, a rigid body's, in two sums that the processor adds at once.
+/// Returns `a·b`. Six numbers (a rigid body) are added in two sums, which the processor computes in
+/// parallel.
 #[inline]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     if let (Some(a), Some(b)) = (a.as_array::<6>(), b.as_array::<6>()) {

@@ -1,13 +1,14 @@
-//! Whether two parts stay apart whatever they do within a step: the separating axes of the boxes around them, for pairs whose contacts are dear.
+//! Separating axes of oriented boxes: a test whether two parts stay apart during a step, for pairs
+//! with expensive contact queries.
 //!
 //! ```text
 //! s(n) = |n·(c_A − c_B)| − h_A·|R_Aᵀn| − h_B·|R_Bᵀn|        the gap between the boxes along n, from B to A
-//! apart if s(n) > what the pair can close along n           for a face of either, for two edges, or along the line of centres
+//! separated if s(n) > the distance that the pair can close along n       for the faces of either, pairs of edges, the line of centers
 //! ```
 
 use tumble_collide::{Mat3, Pose, Shape, Vec3};
 
-/// A box that turns with its part: a half-space has no extent, and one axis.
+/// An oriented bounding box of a part. A half-space has no extent and one axis.
 pub(crate) struct OrientedBox {
     center: Vec3,
     half: Vec3,
@@ -31,7 +32,8 @@ impl OrientedBox {
     }
 }
 
-/// Whether some unit direction `n`, from B to A, has a gap above `closing(n)` along it. Of two half-spaces, no.
+/// Returns whether some unit direction `n`, from B to A, has a gap above `closing(n)`. `false` for
+/// two half-spaces.
 pub(crate) fn are_separated(a: &OrientedBox, b: &OrientedBox, closing: impl Fn(&Vec3) -> f64) -> bool {
     let off = a.center - b.center;
     let gap = |n: Vec3| {
@@ -47,7 +49,7 @@ pub(crate) fn are_separated(a: &OrientedBox, b: &OrientedBox, closing: impl Fn(&
                 .flat_map(|x| b.axes.column_iter().filter_map(move |y| x.cross(&y).try_normalize(1e-6)));
             off.try_normalize(1e-300).into_iter().chain(faces).chain(edges).any(gap)
         }
-        // below its plane a half-space is everywhere
+        // a half-space extends without bound below its plane
         (true, false) => beyond(b, a, closing(&b.axes.column(2).into_owned())),
         (false, true) => beyond(a, b, closing(&-a.axes.column(2))),
         (false, false) => false,

@@ -1,29 +1,33 @@
-//! Dormand–Prince 5(4): an explicit Runge–Kutta pair that chooses its steps by a tolerance, on states with rotations.
+//! Dormand–Prince 5(4): an explicit Runge–Kutta pair with error control, on states with rotations.
 //!
-//! Within an inner step from `x₀` the unknown is `y = (Θ, Π)`: the tangent displacement and the change of momentum since its start
-//! (Runge–Kutta–Munthe-Kaas). The state it stands for is
+//! Within an inner step from `x₀` the unknown is `y = (Θ, Δp)`: the tangent displacement and the
+//! change of momentum since its start (Runge–Kutta–Munthe-Kaas). The corresponding state is
 //!
 //! ```text
-//! x(y) = drift(kick(x₀, Π), Θ)            Θ' = dexp⁻¹_Θ(v(x, t))            Π' = f(x, t)
+//! x(y) = integrate_positions(kick(x₀, Δp), Θ)     Θ' = dexp⁻¹_Θ(v(x, t))            Δp' = f(x, t)
 //! y_i = h·Σ_{j<i} a_ij·k_j                k_i = y'(t + c_i·h, y_i)          i = 1…7;   y₇ is the step (fifth order) and k₇ the next step's k₁
 //! e = h·Σ e_i·k_i                         the difference from the embedded step of fourth order
 //! ```
 //!
-//! The error of an object is the greatest of `|e_Θ| / (tol·(1 + |Θ|))` and `|e_v| / (tol·(1 + |v|))` over its coordinates, with `e_v = M⁻¹·e_Π` the
-//! error as a velocity and 1 one SI unit (m, rad, m/s, rad/s). That of a step is the greatest of all objects, so that one object is not
-//! diluted by many. A step is taken if it is at most 1; the next is `0.9·error^(−1/5)` as long, within 0.2 and 5.
+//! The error of an object is the maximum of `|e_Θ| / (tol·(1 + |Θ|))` and `|e_v| / (tol·(1 + |v|))`
+//! over its coordinates, with `e_v = M⁻¹·e_Δp` the error as a velocity and 1 one SI unit (m, rad,
+//! m/s, rad/s). The error of a step is the maximum over all objects, so that many objects do not
+//! dilute the error of one. A step is accepted if its error is at most 1. The next is
+//! `0.9·error^(−1/5)` times as long, with a factor between 0.2 and 5.
 //!
-//! Sources: Dormand and Prince, *A family of embedded Runge–Kutta formulae*, 1980; Munthe-Kaas, *High order Runge–Kutta methods on manifolds*,
-//! 1999; Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I*, §II.4–6 (step control, dense output), §IV.8 of
-//! Hairer, Lubich and Wanner, *Geometric Numerical Integration* (`dexp⁻¹`).
+//! Sources: Dormand and Prince, *A family of embedded Runge–Kutta formulae*, 1980; Munthe-Kaas,
+//! *High order Runge–Kutta methods on manifolds*, 1999; Hairer, Nørsett and Wanner, *Solving
+//! Ordinary Differential Equations I*, §II.4–6 (step control, dense output), §IV.8 of Hairer,
+//! Lubich and Wanner, *Geometric Numerical Integration* (`dexp⁻¹`).
 //!
 //! | symbol | meaning |
 //! |---|---|
 //! | `h`, `tol` | length of the inner step (s), `Settings::integrator_tolerance` |
-//! | `Θ`, `Π` | displacement and change of momentum since the start of the inner step, `dof` numbers each |
+//! | `Θ`, `Δp` | displacement and change of momentum since the start of the inner step, `dof` numbers each |
 //! | `k_i` | rates of `y` at stage `i`, `2·dof` numbers |
 //!
-//! What is led keeps the velocity that it has at the start of the whole call: `Θ = t·v`, without error.
+//! Kinematic objects keep the velocity that they have at the start of the call: `Θ = t·v`, without
+//! error.
 
 use super::trajectory::{InnerStep, STAGES, Trajectory};
 use crate::integrators::context::IntegrationContext;
@@ -42,30 +46,31 @@ const A: [[f64; STAGES - 1]; STAGES] = [
     [9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0, 0.0],
     [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
 ];
-/// Fifth order less fourth.
+/// Fifth order minus fourth.
 const E: [f64; STAGES] =
     [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
 
-/// Inner steps in one frame at most, refused ones included.
+/// Maximum number of inner steps in one frame, rejected ones included.
 const MAX_STEPS: u32 = 100_000;
-/// Least inner step, as a share of the frame.
+/// Minimum inner step, as a fraction of the frame.
 const MIN_STEP_FRACTION: f64 = 1e-12;
-/// Least and greatest factor from one inner step to the next.
+/// Minimum and maximum factor from one inner step to the next.
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 5.0;
-/// Share of the factor that the error allows which is taken.
+/// Fraction of the step size that the error allows.
 const SAFETY: f64 = 0.9;
 
-/// The integrator's constants for a call, the step size that it carries from call to call, its working memory and its record.
+/// The adaptive integrator: constants of a call, the step size carried between calls, buffers and
+/// the recorded path.
 #[derive(Default)]
 pub(crate) struct Adaptive {
     /// `Settings::integrator_tolerance`.
     pub tolerance: f64,
-    /// Length of a frame, s: what the floor is a share of, and the longest inner step that is carried.
+    /// Length of a frame, s: the maximum inner step; the minimum is a fraction of it.
     pub frame: f64,
-    /// Inner step to begin with, s; the frame where it is 0. Afterwards the one to go on with.
+    /// Initial inner step, s; 0 stands for a frame. After a call: the inner step to continue with.
     pub step: f64,
-    /// Inner steps of the frame so far, refused ones included.
+    /// Inner steps of the frame so far, rejected ones included.
     pub steps: u32,
     /// The accepted inner steps of the last recorded call.
     pub path: Trajectory,
@@ -75,18 +80,18 @@ pub(crate) struct Adaptive {
 #[derive(Default)]
 struct Work {
     start: Vec<f64>,
-    /// Velocity of what is led.
+    /// Velocity of kinematic objects.
     kinematic: Vec<f64>,
     k: [Vec<f64>; STAGES],
     y: Vec<f64>,
-    /// Velocity at the end of the step, not pulled back.
+    /// Velocity at the end of the step, before `pull_back`.
     velocity: Vec<f64>,
     error: Vec<f64>,
     x: Vec<f64>,
     v: Vec<f64>,
 }
 
-/// The greatest error of a step and whose it is: the place in the table's order.
+/// The largest error of a step, and the index of its object in the table's order.
 #[derive(Clone, Copy)]
 struct Worst {
     error: f64,
@@ -94,14 +99,23 @@ struct Worst {
 }
 
 impl Adaptive {
-    /// Before a call: the constants, the inner step to begin with, and how many the frame has had.
+    /// Sets the constants of a call, the initial inner step, and the number of inner steps taken in
+    /// the frame.
     pub fn set(&mut self, settings: &Settings, step: f64, steps: u32) {
         (self.tolerance, self.frame) = (settings.integrator_tolerance, settings.dt);
         (self.step, self.steps) = (step, steps);
     }
 
-    /// Integrates from time `t` over `h` exactly, as many inner steps as the tolerance asks for. With `record` the path is kept, and the call ends
-    /// early where no more of it can be. Returns how far it came, s; state, sites and forces are left there, the last rates in `dp`.
+    /// Integrates from time `t` over `h` exactly, with as many inner steps as the tolerance
+    /// requires.
+    ///
+    /// With `record` the path is kept, and the call ends early when the record is full. Returns the
+    /// time integrated, s. State, part states and forces are left there, and the last rates are in
+    /// `dp`.
+    ///
+    /// # Errors
+    /// [`StepError::Tolerance`] if the tolerance requires too many or too short inner steps;
+    /// [`StepError::Singular`] if a mass matrix is singular.
     pub fn integrate(
         &mut self,
         motion: &mut IntegrationContext,
@@ -119,7 +133,7 @@ impl Adaptive {
             if self.step > 0.0 { self.step.clamp(MIN_STEP_FRACTION * self.frame, self.frame) } else { self.frame };
         let (mut done, mut grow) = (0.0, GROW);
         while done < h && !(record && self.path.full()) {
-            // equal parts of what is left, so that no sliver remains for the last
+            // equal parts of the remaining time, so that no sliver remains for the last
             let parts = ((h - done) / self.step).ceil();
             let step = (h - done) / parts;
             self.steps += 1;
@@ -155,7 +169,7 @@ impl Adaptive {
         Ok(done)
     }
 
-    /// The first stage of the first step.
+    /// Evaluates the first stage of the first step.
     fn begin(&mut self, motion: &mut IntegrationContext, t: f64, n: usize) {
         let w = &mut self.work;
         w.k.iter_mut().for_each(|k| k.resize(2 * n, 0.0));
@@ -168,7 +182,8 @@ impl Adaptive {
         w.kinematic.copy_from_slice(v);
     }
 
-    /// Tries one inner step: the state is left at its end; the rates of all stages are in `k`, the step in `y`.
+    /// Takes one inner step without judging it: leaves the state at its end, the rates of all
+    /// stages in `k` and the step in `y`.
     fn try_step(&mut self, motion: &mut IntegrationContext, t: f64, step: f64) -> Worst {
         let w = &mut self.work;
         let n = w.kinematic.len();
@@ -186,7 +201,7 @@ impl Adaptive {
         self.worst(motion)
     }
 
-    /// The greatest error of all objects that move; what is not a number is infinite.
+    /// Returns the largest error of all dynamic objects; NaN counts as infinite.
     fn worst(&mut self, motion: &IntegrationContext) -> Worst {
         let w = &mut self.work;
         let n = w.kinematic.len();
@@ -194,7 +209,7 @@ impl Adaptive {
         for (object, entry) in motion.objects().iter().enumerate().filter(|(_, e)| e.moves()) {
             let Some(body) = entry.object.integratable() else { continue };
             let (x, v) = (entry.state_range.x.clone(), entry.state_range.v.clone());
-            // e_v = M⁻¹·e_Π: the velocity that the error is, at the end of the step
+            // e_v = M⁻¹·e_Δp: the error as a velocity, at the end of the step
             let momentum = &w.error[n + v.start..n + v.end];
             w.x.clear();
             w.x.extend_from_slice(&motion.x[x]);
@@ -216,7 +231,7 @@ impl Adaptive {
         worst
     }
 
-    /// Makes the end of the step the start of the next: its last stage is the next one's first.
+    /// Makes the end of the step the start of the next; the last stage becomes the first.
     fn advance(&mut self, motion: &IntegrationContext, n: usize) {
         let w = &mut self.work;
         w.start.copy_from_slice(motion.x);
@@ -239,7 +254,7 @@ impl Adaptive {
     }
 }
 
-/// `out = h·Σ weight_j·k_j`.
+/// Computes `out = h·Σ weight_j·k_j`.
 fn combine(k: &[Vec<f64>], weight: &[f64], h: f64, out: &mut [f64]) {
     out.fill(0.0);
     for (k, weight) in k.iter().zip(weight).filter(|(_, w)| **w != 0.0) {
@@ -253,7 +268,7 @@ fn is_kinematic(entry: &Entry) -> bool {
 }
 
 impl IntegrationContext<'_> {
-    /// Writes the state `(Θ, Π)` away from `start`. What is led has its one velocity there too.
+    /// Writes the state at `(Θ, Δp)` from `start`. Kinematic objects keep their velocity.
     pub(super) fn displace(&mut self, start: &[f64], y: &[f64], kinematic_velocity: &[f64]) {
         self.x.copy_from_slice(start);
         let (theta, pi) = y.split_at(kinematic_velocity.len());

@@ -1,4 +1,4 @@
-//! Integrators that choose their own steps.
+//! Integrators of smooth motion: with a fixed step (`context`) and with error control.
 
 pub(crate) mod context;
 mod dormand_prince;

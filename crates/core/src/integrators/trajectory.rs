@@ -1,13 +1,15 @@
-//! Dense output: the state at any time of a call, from the stages that were computed anyway.
+//! Dense output: the state at any time of a call, from the stages of its inner steps.
 //!
-//! Per inner step the interpolant of fourth order of Dormand and Prince (Hairer, Nørsett and Wanner, §II.6) on `y = (Θ, Π)`:
+//! Per inner step the interpolant of fourth order of Dormand and Prince (Hairer, Nørsett and
+//! Wanner, §II.6) on `y = (Θ, Δp)`:
 //!
 //! ```text
 //! y(s) = s·(r₂ + (1−s)·(r₃ + s·(r₄ + (1−s)·r₅)))           s from 0 to 1 over the step of length h
 //! r₂ = y₁     r₃ = h·k₁ − y₁     r₄ = y₁ − h·k₇ − r₃     r₅ = h·Σ d_i·k_i
 //! ```
 //!
-//! It meets the step's ends with the right slopes, so the whole is once continuously differentiable.
+//! It has the right values and slopes at the ends of a step, so the path is continuously
+//! differentiable.
 
 use crate::integrators::context::IntegrationContext;
 
@@ -22,32 +24,32 @@ const D: [f64; STAGES] = [
     -1453857185.0 / 822651844.0,
     69997945.0 / 29380423.0,
 ];
-/// Numbers kept at most (32 MiB), one inner step always.
+/// Maximum size of the record, in numbers (32 MiB); one inner step always fits.
 const MAX_NUMBERS: usize = 1 << 22;
 
-/// One inner step: when it starts, counted from the start of the call, and how long it is, s.
+/// One inner step: start, relative to the start of the call, and length, s.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct InnerStep {
     pub start: f64,
     pub length: f64,
 }
 
-/// The inner steps of a call, one after the other.
+/// The inner steps of a call in order.
 #[derive(Default)]
 pub(crate) struct Trajectory {
     inner_steps: Vec<InnerStep>,
-    /// Per piece: the state at its start, then `r₂ … r₅`.
+    /// Per inner step: the state at its start, then `r₂ … r₅`.
     data: Vec<f64>,
     state: usize,
     dof: usize,
-    /// How far it goes, s.
+    /// End of the path, s.
     end: f64,
-    /// Velocity of what is led.
+    /// Velocity of kinematic objects.
     kinematic: Vec<f64>,
 }
 
 impl Trajectory {
-    /// Forgets everything.
+    /// Removes all inner steps.
     pub fn clear(&mut self) {
         self.inner_steps.clear();
         self.data.clear();
@@ -64,12 +66,12 @@ impl Trajectory {
         self.state + 8 * self.dof
     }
 
-    /// Whether another piece would be too much.
+    /// Returns whether there is no room for another inner step.
     pub(super) fn full(&self) -> bool {
         !self.inner_steps.is_empty() && self.data.len() + self.stride() > MAX_NUMBERS
     }
 
-    /// Adds an inner step that takes the path to `end`.
+    /// Adds an inner step that extends the path to `end`.
     pub(super) fn push(&mut self, inner_step: InnerStep, end: f64, start: &[f64], k: &[Vec<f64>; STAGES], y: &[f64]) {
         let h = inner_step.length;
         self.end = end;
@@ -81,33 +83,35 @@ impl Trajectory {
         self.data.extend((0..y.len()).map(|i| h * (0..STAGES).map(|s| D[s] * k[s][i]).sum::<f64>()));
     }
 
-    /// Whether the path goes from its start to `t` seconds after it.
+    /// Returns whether the path reaches `t` seconds after its start.
     pub fn reaches(&self, t: f64) -> bool {
         !self.inner_steps.is_empty() && t <= self.end
     }
 
-    /// Whether it goes on after `t`.
+    /// Returns whether the path extends beyond `t`.
     pub fn extends_beyond(&self, t: f64) -> bool {
         !self.inner_steps.is_empty() && t < self.end
     }
 
-    /// The last start of an inner step before `t`, counted from the path's start, s, and the state there.
+    /// Returns the last start of an inner step before `t`, s from the start of the path, and the
+    /// state there.
     pub fn before(&self, t: f64) -> (f64, &[f64]) {
         let i = self.index(t);
         (self.inner_steps[i].start, &self.data[i * self.stride()..][..self.state])
     }
 
-    /// Length of the inner step that holds `t`, s.
+    /// Returns the length of the inner step that contains `t`, s.
     pub fn length(&self, t: f64) -> f64 {
         self.inner_steps[self.index(t)].length
     }
 
-    /// The piece that holds `t`.
+    /// Returns the index of the inner step that contains `t`.
     fn index(&self, t: f64) -> usize {
         self.inner_steps.partition_point(|p| p.start < t).saturating_sub(1)
     }
 
-    /// Writes the state `t` seconds after the path's start, and refreshes what readers see; accelerations stay as they are.
+    /// Writes the state `t` seconds after the start of the path and refreshes the part states.
+    /// Accelerations are not updated.
     pub fn write(&self, motion: &mut IntegrationContext, t: f64) {
         let (i, n) = (self.index(t), 2 * self.dof);
         let inner_step = self.inner_steps[i];

@@ -1,40 +1,42 @@
-//! Cameras and lights that objects carry (thesis §III.A: both are interfaces like any other). Data alone: what they see and light is the renderer's matter.
+//! Cameras and lights that objects carry (thesis §III.A: both are interfaces like any other). They
+//! are data for a renderer.
 //!
-//! Axes of a camera and of a light: x ahead, y to the left, z up.
+//! Axes of a camera and of a light: x forward, y to the left, z up.
 
 use tumble_collide::Pose;
 
-/// Carries points of view.
+/// An object that carries cameras.
 pub trait CameraCarrier {
-    /// Its cameras; their names differ.
+    /// Returns its cameras, whose names are unique.
     fn cameras(&self) -> &[CameraMount];
 }
 
-/// Carries lights.
+/// An object that carries lights.
 pub trait LightCarrier {
-    /// Its lights.
+    /// Returns its lights.
     fn lights(&self) -> &[LightMount];
 }
 
 /// A camera fixed to a part.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CameraMount {
-    /// Told apart by it from others of the object; may be empty where there is one.
+    /// Name, unique in the object; may be empty for a single camera.
     pub name: String,
-    /// Part of the object that it moves with.
+    /// Part of the object that it is fixed to.
     pub part: usize,
-    /// Pose in the part's frame: it looks along its x axis, and z is up in the picture.
+    /// Pose in the part's frame: the view direction is the x axis, and z is up in the image.
     pub pose: Pose,
-    /// Angle from the lower to the upper edge of the picture, rad, above 0 and below π.
+    /// Vertical field of view, rad, above 0 and below π.
     pub vertical_fov: f64,
-    /// Nearest depth that is drawn, m, above 0.
+    /// Depth of the near plane, m, above 0.
     pub near: f64,
-    /// Farthest depth that is drawn, m, above `near`.
+    /// Depth of the far plane, m, above `near`.
     pub far: f64,
 }
 
 impl CameraMount {
-    /// A camera of 40 degrees that sees from 5 cm to 500 m.
+    /// Makes a camera with a vertical field of view of 40 degrees and a depth range of 5 cm to 500
+    /// m.
     pub fn new(name: impl Into<String>, part: usize, pose: Pose) -> CameraMount {
         CameraMount { name: name.into(), part, pose, vertical_fov: 40.0_f64.to_radians(), near: 0.05, far: 500.0 }
     }
@@ -43,48 +45,50 @@ impl CameraMount {
 /// A light fixed to a part.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LightMount {
-    /// Part of the object that it moves with.
+    /// Part of the object that it is fixed to.
     pub part: usize,
-    /// Pose in the part's frame: a directional light travels along its x axis.
+    /// Pose in the part's frame: a directional light shines along its x axis.
     pub pose: Pose,
-    /// How it spreads.
+    /// Kind of light.
     pub spread: Spread,
     /// sRGB, each 0 to 1.
     pub color: [f64; 3],
-    /// A directional light of 1 on a white wall that faces it is white; a point light does that at 1 m.
+    /// Brightness. A directional light of 1 makes a white wall that faces it white; a point light
+    /// does so at 1 m.
     pub intensity: f64,
-    /// Whether it throws shadows.
+    /// Whether it casts shadows.
     pub casts_shadow: bool,
 }
 
-/// How a light spreads.
+/// Distribution of a light.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Spread {
-    /// In one direction, from infinitely far.
+    /// Parallel rays from infinitely far.
     Directional,
-    /// From a ball in all directions, falling off with the square of the distance.
+    /// From a sphere in all directions, with the inverse square of the distance.
     Point {
-        /// Radius of the ball, m: the softness of shadows.
+        /// Radius of the sphere, m: it sets the softness of shadows.
         radius: f64,
     },
 }
 
-/// How much of an object is drawn.
+/// Level of detail of an object in an image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Detail {
-    /// Its shape and its look.
+    /// Its shape with its appearance.
     #[default]
     Full,
-    /// Fewer triangles, and one colour without a pattern.
+    /// Fewer triangles, one color and no pattern.
     Simplified,
-    /// The balls of this level of its sphere tree, 0 being the root; what has no tree is drawn in full.
+    /// The spheres of this level of its sphere tree, with 0 the root. Shapes without a tree are
+    /// drawn in full.
     SphereTree(u32),
     /// Its edges.
     Wireframe,
 }
 
 impl Detail {
-    /// The words for it: `full`, `simplified`, `wireframe`, `sphere_tree=LEVEL`.
+    /// Returns its name: `full`, `simplified`, `wireframe`, `sphere_tree=LEVEL`.
     pub fn words(self) -> String {
         match self {
             Detail::Full => "full".into(),

@@ -1,4 +1,4 @@
-//! A slice of the state as bytes: little-endian `f64`, exact.
+//! An object's range of the state as bytes: little-endian `f64`, exact.
 
 use crate::object::SyncError;
 
@@ -7,7 +7,10 @@ pub(crate) fn write_state(x: &[f64], out: &mut Vec<u8>) {
     out.extend(x.iter().flat_map(|x| x.to_le_bytes()));
 }
 
-/// Reads as many numbers as `x` has, if they are a state; on an error `x` is unchanged.
+/// Reads `x.len()` numbers that must be a valid state. On an error `x` is unchanged.
+///
+/// # Errors
+/// [`SyncError::Length`] or [`SyncError::Value`].
 pub(crate) fn read_state(data: &[u8], x: &mut [f64], accepts: impl Fn(&[f64]) -> bool) -> Result<(), SyncError> {
     let wanted = 8 * x.len();
     if data.len() != wanted {

@@ -1,29 +1,30 @@
-//! What is drawn of an object: shapes, and meshes that need not be solids.
+//! The visual geometry of objects: shapes, and meshes that need not be closed.
 //!
-//! A mesh that is only drawn is read when somebody draws it, and is never checked for being closed: a world that nobody looks at does not pay for its
-//! pictures. What cannot be read is not drawn, and [`VisualMesh::fault`] says why from then on.
+//! A visual mesh is read when it is first drawn, so a world without a renderer does not pay for it.
+//! It is never checked for being closed. A mesh that cannot be read is not drawn, and
+//! [`VisualMesh::fault`] then returns the reason.
 
 use crate::object::Appearance;
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 use tumble_collide::{MeshError, Pose, Shape, TriMesh, Vec3};
 
-/// One thing to draw, fixed to a site.
+/// One visual, fixed to a part.
 #[derive(Clone, Debug)]
 pub struct Visual {
-    /// Part of the object that it moves with.
+    /// Part of the object that it is fixed to.
     pub part: usize,
     /// Pose in the part's frame.
     pub pose: Pose,
     /// Geometry.
     pub geometry: VisualGeometry,
-    /// Look.
+    /// Appearance.
     pub appearance: Appearance,
-    /// If not empty: drawn only where none of these can be read.
+    /// If not empty, the visual is drawn only if none of these meshes can be read.
     pub stands_in_for: Vec<Arc<VisualMesh>>,
 }
 
-/// The geometry of a [`Visual`].
+/// Geometry of a [`Visual`].
 #[derive(Clone, Debug)]
 pub enum VisualGeometry {
     /// A solid.
@@ -32,7 +33,7 @@ pub enum VisualGeometry {
     Mesh(Arc<VisualMesh>),
 }
 
-/// What a [`Visual`] draws now.
+/// The geometry of a [`Visual`] that is drawn.
 #[derive(Clone, Copy, Debug)]
 pub enum Drawn<'v> {
     /// A solid.
@@ -42,17 +43,18 @@ pub enum Drawn<'v> {
 }
 
 impl Visual {
-    /// A shape at a pose in the part's frame.
+    /// Makes a visual of a shape at a pose in the part's frame.
     pub fn shape(part: usize, pose: Pose, shape: Shape, appearance: Appearance) -> Visual {
         Visual { part, pose, geometry: VisualGeometry::Shape(shape), appearance, stands_in_for: Vec::new() }
     }
 
-    /// A mesh at a pose in the part's frame.
+    /// Makes a visual of a mesh at a pose in the part's frame.
     pub fn mesh(part: usize, pose: Pose, mesh: Arc<VisualMesh>, appearance: Appearance) -> Visual {
         Visual { part, pose, geometry: VisualGeometry::Mesh(mesh), appearance, stands_in_for: Vec::new() }
     }
 
-    /// What is to be drawn, its mesh read if nobody has before. `None` where it cannot be read, or stands in for what can.
+    /// Returns the geometry to draw and reads its mesh if necessary. `None` if it cannot be read,
+    /// or if a mesh that it stands in for can.
     pub fn drawn(&self) -> Option<Drawn<'_>> {
         if self.stands_in_for.iter().any(|mesh| mesh.triangles().is_ok()) {
             return None;
@@ -63,8 +65,9 @@ impl Visual {
         }
     }
 
-    /// The distance along `direction` (any length above 0) at which a ray from `origin` enters it, metres; world axes. `part` is the pose of its part.
-    /// `None` where it misses or starts inside a shape; a mesh is met from either side.
+    /// Returns the distance at which a ray from `origin` along `direction` (any length above 0)
+    /// enters the visual, m; world axes. `part` is the pose of its part. `None` if the ray misses
+    /// or starts inside a shape; a mesh is hit from either side.
     pub fn ray(&self, part: &Pose, origin: &Vec3, direction: &Vec3) -> Option<f64> {
         let pose = part * self.pose;
         match self.drawn()? {
@@ -74,10 +77,10 @@ impl Visual {
     }
 }
 
-/// Reads the triangles of a [`VisualMesh`]; the error is for the user.
+/// Reads the triangles of a [`VisualMesh`]; the error is a message for the user.
 type Read = dyn Fn() -> Result<Arc<TriMesh>, String> + Send + Sync;
 
-/// Triangles that are drawn and never collide, in metres; they need not be closed. Read once, when first asked for.
+/// Triangles that are drawn and never collide, m. They need not be closed. Read once, at first use.
 pub struct VisualMesh {
     name: String,
     read: Box<Read>,
@@ -85,7 +88,7 @@ pub struct VisualMesh {
 }
 
 impl VisualMesh {
-    /// Triangles in memory.
+    /// Makes a mesh of triangles in memory.
     ///
     /// # Errors
     /// As [`TriMesh::check_data`].
@@ -96,7 +99,8 @@ impl VisualMesh {
         Ok(made)
     }
 
-    /// Triangles that `read` gives when they are first asked for. `name` says where they come from, such as a path.
+    /// Makes a mesh of the triangles that `read` returns at first use. `name` is their source, such
+    /// as a path.
     pub fn read_by(
         name: impl Into<String>,
         read: impl Fn() -> Result<Arc<TriMesh>, String> + Send + Sync + 'static,
@@ -104,15 +108,16 @@ impl VisualMesh {
         VisualMesh { name: name.into(), read: Box::new(read), mesh: OnceLock::new() }
     }
 
-    /// Where it comes from.
+    /// Returns the source of the triangles.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The triangles, read now if they were not.
+    /// Returns the triangles and reads them if necessary.
     ///
     /// # Errors
-    /// Why they cannot be read, or [`TriMesh::check_data`] refuses them; a sentence without the name.
+    /// The reason why `read` failed or [`TriMesh::check_data`] refused the triangles: a sentence
+    /// without the name.
     pub fn triangles(&self) -> Result<&Arc<TriMesh>, &str> {
         let read = || {
             let mesh = (self.read)()?;
@@ -122,12 +127,12 @@ impl VisualMesh {
         self.mesh.get_or_init(read).as_ref().map_err(String::as_str)
     }
 
-    /// Whether they were asked for.
+    /// Returns whether the triangles were read, successfully or not.
     pub fn is_read(&self) -> bool {
         self.mesh.get().is_some()
     }
 
-    /// Why they could not be read, where that was tried; reads nothing.
+    /// Returns the reason why reading failed; `None` before the first attempt. Reads nothing.
     pub fn fault(&self) -> Option<&str> {
         self.mesh.get()?.as_ref().err().map(String::as_str)
     }
@@ -162,7 +167,7 @@ mod tests {
         assert!(matches!(visual.drawn(), Some(Drawn::Mesh(read)) if **read == triangle()));
         assert!(copy.drawn().is_some());
         assert_eq!(reads.load(Relaxed), 1);
-        // the triangle stands at z = 2 + 1, faces up, and is 5 m below the eye
+        // the triangle is at z = 2 + 1, faces up, and is 5 m below the eye
         let hit = visual.ray(&Pose::translation(0.0, 0.0, 1.0), &Vec3::new(0.25, 0.25, 8.0), &-Vec3::z());
         assert_eq!(hit, Some(5.0));
     }

@@ -1,15 +1,19 @@
-//! Torque-free rotation of a rigid body by symmetric splitting, with its energy kept.
+//! Torque-free rotation of a rigid body by symmetric splitting with energy conservation.
 //!
 //! ```text
 //! T = |l|²/2I_b + ½a_i·m_i² + ½a_j·m_j²        a = 1/I − 1/I_b,  I_b the middle moment
 //! ```
 //!
-//! The flow of the first term alone turns the body about `l` by `|l|·h/I_b` and commutes with the others; the flow of each other term is a rotation about
-//! its axis by `a·m·h`, which leaves that `m` unchanged. Composed symmetrically, `b(h) i(h/2) j(h) i(h/2)`, they keep the angular momentum to rounding and are of
-//! second order; a body with two equal moments turns exactly. Of a body with three the energy would be off by the second order of `h`, a little
-//! otherwise after every impact. So the body is turned back onto the energy that it had: `m` moves along `m × ω`, the way up the energy on the sphere `|m| = |l|`.
-//! What is left to the order is where on its path the body is, and when.
-//! Source of the splitting: Dullweber, Leimkuhler, McLachlan, *Symplectic splitting methods for rigid body molecular dynamics*, 1997.
+//! The flow of the first term turns the body about `l` by `|l|·h/I_b` and commutes with the others.
+//! The flow of each other term is a rotation about its axis by `a·m·h`, which leaves that `m`
+//! unchanged. The symmetric composition `b(h) i(h/2) j(h) i(h/2)` conserves angular momentum to
+//! rounding and is of second order; it is exact for a body with two equal moments.
+//!
+//! For three different moments the energy has an error of second order in `h`, and a different one
+//! after every impact. The body is therefore turned back to its former energy: `m` moves along `m ×
+//! ω`, the direction of steepest ascent of the energy on the sphere `|m| = |l|`. The remaining
+//! error is in the phase of the motion. Source of the splitting: Dullweber, Leimkuhler, McLachlan,
+//! *Symplectic splitting methods for rigid body molecular dynamics*, 1997.
 //!
 //! | symbol | meaning |
 //! |---|---|
@@ -21,12 +25,13 @@
 use nalgebra::{ComplexField, Quaternion, Unit};
 use tumble_collide::{Quat, Vec3};
 
-/// Corrections of the energy at most.
+/// Maximum number of energy corrections.
 const CORRECTIONS: usize = 4;
-/// No correction turns by more than this, rad.
+/// Maximum angle of a correction, rad.
 const FARTHEST: f64 = 0.3;
 
-/// Rotates `q` for `h` seconds with world angular momentum `l` held; `moments` are the principal moments. Angular momentum and energy stay to rounding.
+/// Rotates `q` for `h` seconds at constant world angular momentum `l`; `moments` are the principal
+/// moments. Conserves angular momentum and energy to rounding.
 pub fn free_motion(q: &Quat, l: &Vec3, moments: &Vec3, h: f64) -> Quat {
     let inverse = moments.map(|i| 1.0 / i);
     let (low, high) = (moments.imin(), moments.imax());
@@ -40,7 +45,7 @@ pub fn free_motion(q: &Quat, l: &Vec3, moments: &Vec3, h: f64) -> Quat {
     for (axis, part) in [(outer, 0.5), (inner, 1.0), (outer, 0.5)] {
         let (s, c) = ComplexField::sin_cos(0.5 * part * h * a[axis] * m[axis]);
         turned *= about(axis, s, c);
-        // The momentum turns the other way in the turning axes: by −angle, with cos = c² − s², sin = 2sc.
+        // The momentum turns by −angle in the turning axes, with cos = c² − s², sin = 2sc.
         let (cos, sin) = (c * c - s * s, 2.0 * s * c);
         let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
         (m[i], m[j]) = (cos * m[i] + sin * m[j], cos * m[j] - sin * m[i]);
@@ -49,7 +54,7 @@ pub fn free_motion(q: &Quat, l: &Vec3, moments: &Vec3, h: f64) -> Quat {
     onto_energy(free, q, l, &inverse)
 }
 
-/// Turns `q` the least so that the body has the energy that it has at `before`.
+/// Turns `q` by the smallest angle that restores the energy at `before`.
 fn onto_energy(mut q: Quat, before: &Quat, l: &Vec3, inverse: &Vec3) -> Quat {
     let twice = |m: &Vec3| m.component_mul(m).dot(inverse);
     let wanted = twice(&before.inverse_transform_vector(l));
@@ -61,7 +66,7 @@ fn onto_energy(mut q: Quat, before: &Quat, l: &Vec3, inverse: &Vec3) -> Quat {
         if off.abs() <= 1e-15 * wanted || steepness <= 1e-20 * m.norm_squared() * omega.norm_squared() {
             break;
         }
-        // dE = θ·(m × ω) for m turned by θ, which is q turned by −θ in its own axes
+        // dE = θ·(m × ω) if m turns by θ, which is q turned by −θ in its own axes
         let theta = up * (off / steepness);
         let angle = theta.norm();
         q *= turn(&Quat::identity(), &theta, if angle > FARTHEST { FARTHEST / angle } else { 1.0 });
@@ -78,8 +83,8 @@ pub fn turn(q: &Quat, omega: &Vec3, h: f64) -> Quat {
     Unit::new_normalize(Quaternion::from_parts(c, axis) * q.into_inner())
 }
 
-/// The rate of the rotation vector `theta` of a rotation `exp(θ)·q₀` that turns with the world angular velocity `omega`: `dexp⁻¹_θ(ω)`, the inverse
-/// of the differential of [`turn`].
+/// Returns the rate of the rotation vector `theta` of a rotation `exp(θ)·q₀` with the world angular
+/// velocity `omega`: `dexp⁻¹_θ(ω)`, the inverse of the differential of [`turn`].
 ///
 /// ```text
 /// θ̇ = ω − ½·θ×ω + c·θ×(θ×ω)           c = (1 − ½|θ|·cot ½|θ|)/|θ|² = 1/12 + |θ|²/720 + |θ|⁴/30240 + …

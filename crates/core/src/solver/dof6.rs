@@ -1,29 +1,29 @@
-//! The arithmetic of blocks whose sides have six freedoms each, as rigid bodies have: the same sums as for any other side, laid out for
-//! registers that hold two numbers.
+//! Arithmetic of blocks whose sides have six degrees of freedom each, as rigid bodies have. The
+//! sums are those of any other side, arranged for registers of two numbers.
 
 use crate::constraint::rows::{Block, Rows, dot6};
 
-/// Where a block of one or two sides of six freedoms finds its numbers.
+/// Positions of the numbers of a block with one or two sides of six degrees of freedom.
 #[derive(Clone, Copy)]
 pub(super) struct Dof6 {
-    /// First index of each side's stretch of `du`; of one side alone, twice the same.
+    /// First index of each side's range of `du`; a single side is entered twice.
     u: [u32; 2],
-    /// First index of each side's responses, likewise.
+    /// First index of each side's responses; a single side is entered twice.
     y: [u32; 2],
     alone: bool,
 }
 
-/// The responses of `K` rows, and what they meet.
+/// The responses of `K` rows, and the range of `du` that they multiply.
 type SideData<'a, const K: usize> = (&'a [[f64; 6]; K], &'a [f64; 6]);
 
-/// Both sides of a block of `K` rows; the second is absent, or there.
+/// Both sides of a block of `K` rows; the second may be absent.
 pub(super) struct Sides<'a, const K: usize> {
     first: SideData<'a, K>,
     second: Option<SideData<'a, K>>,
 }
 
 impl<const K: usize> Sides<'_, K> {
-    /// `(Yᵀu)` of row `k`.
+    /// Returns `(Yᵀu)` of row `k`.
     #[inline(always)]
     pub fn velocity(&self, k: usize) -> f64 {
         let first = dot6(&self.first.0[k], self.first.1);
@@ -32,7 +32,7 @@ impl<const K: usize> Sides<'_, K> {
 }
 
 impl Dof6 {
-    /// `None` where a side has another number of freedoms.
+    /// Returns `None` if a side has another number of degrees of freedom.
     pub fn of(block: &Block) -> Option<Dof6> {
         match block.sides() {
             [a, b] if a.dof == 6 && b.dof == 6 => Some(Dof6 { u: [a.u, b.u], y: [a.y, b.y], alone: false }),
@@ -41,7 +41,7 @@ impl Dof6 {
         }
     }
 
-    /// The numbers of a block of `K` rows; there always are.
+    /// Returns the numbers of a block of `K` rows; never `None` for a block made by `of`.
     #[inline(always)]
     pub fn sides<'a, const K: usize>(&self, rows: &'a Rows, du: &'a [f64]) -> Option<Sides<'a, K>> {
         let side = |s: usize| Some((responses(rows, self.y[s])?, du.get(self.u[s] as usize..)?.first_chunk()?));
@@ -49,7 +49,7 @@ impl Dof6 {
         Some(Sides { first: side(0)?, second })
     }
 
-    /// `u += Y·δ`.
+    /// Adds `Y·δ` to `u`.
     #[inline(always)]
     pub fn push<const K: usize>(&self, rows: &Rows, delta: [f64; K], du: &mut [f64]) {
         self.push_side(0, rows, delta, du);

@@ -1,4 +1,5 @@
-//! Free multipliers taken out of a problem: `w_E = 0` solved for `λ_E`, redundant rows included. `K` has the compliance of soft rows in it.
+//! Elimination of free multipliers: `w_E = 0` solved for `λ_E`, redundant rows included. `K`
+//! contains the compliance of soft rows.
 //!
 //! ```text
 //! w_E = c_E + K_EE·λ_E + K_EZ·z = 0                      K_EE = P·R·Rᵀ·Pᵀ, pivoted Cholesky, stopped at rank r
@@ -6,15 +7,17 @@
 //! w_Z = (K_ZZ − TᵀT)·z + (c_Z − Tᵀt),   T = R⁻¹·K_EZ,  t = R⁻¹·c_E
 //! ```
 //!
-//! Splitting a free multiplier into two nonnegative ones would serve as well, but rounding makes redundant rows contradict each other,
-//! and a contradiction is a ray.
+//! A free multiplier could also be split into two nonnegative ones. Rounding then makes redundant
+//! rows contradict each other, and a contradiction is a ray.
 //!
-//! Columns of `R` are mostly zero where rows meet few others, as along a chain, and what is zero is passed over: pivots of equal rank are
-//! taken first come, first served, which takes every second joint of a chain first.
+//! Columns of `R` are mostly zero if rows couple to few others, as along a chain, and zeros are
+//! skipped. Pivots of equal rank are taken in order, which takes every second joint of a chain
+//! first.
 
-/// Rows whose pivot fell under this part of their own diagonal depend on the others: rounding is a part of that, however large others are.
+/// A row depends on others if its pivot is below this fraction of its own diagonal. Rounding is
+/// relative to the diagonal, however large other rows are.
 pub(super) const RANK: f64 = 1e-11;
-/// What is left of a diagonal after the elimination, below which nothing is left of its row.
+/// A row vanishes if elimination leaves less than this fraction of its diagonal.
 pub(super) const VANISHED: f64 = 1e-12;
 
 /// A pivoted Cholesky factor of `K_EE`.
@@ -22,15 +25,17 @@ pub(super) struct Equalities {
     size: usize,
     /// Independent rows, as positions within E, in pivot order.
     order: Vec<usize>,
-    /// `R`, one column of `size` numbers after the other, each in the order of E; 0 at the rows of earlier pivots.
+    /// `R` column by column, `size` numbers each, in the order of E; 0 at the rows of earlier
+    /// pivots.
     columns: Vec<f64>,
 }
 
 impl Equalities {
-    /// Factors `k`, `e × e`, row-major, symmetric positive semidefinite. A pivot of at most `rank` of its own diagonal ends it.
+    /// Factors `k`, `e × e`, row-major, symmetric positive semidefinite. It ends at a pivot of at
+    /// most `rank` times its own diagonal.
     pub(super) fn new(k: &[f64], e: usize, rank: f64) -> Equalities {
         let whole: Vec<f64> = (0..e).map(|i| k[i * e + i]).collect();
-        // What is left of each diagonal as a part of it; negative once it was the pivot.
+        // Remaining fraction of each diagonal; negative once it was the pivot.
         let mut left: Vec<f64> = whole.iter().map(|d| if *d > 0.0 { 1.0 } else { 0.0 }).collect();
         let mut factor = Equalities { size: e, order: Vec::new(), columns: Vec::new() };
         for _ in 0..e {
@@ -46,7 +51,8 @@ impl Equalities {
         factor
     }
 
-    /// Appends the column of the pivot at `next`, of which `rest` is left: `(k − Σ earlier columns) / √rest`.
+    /// Appends the column of the pivot at `next`, whose remaining diagonal is `rest`: `(k − Σ
+    /// earlier columns) / √rest`.
     fn eliminate(&mut self, k: &[f64], next: usize, rest: f64) {
         let e = self.size;
         let mut column = k[next * e..(next + 1) * e].to_vec();
@@ -61,7 +67,7 @@ impl Equalities {
         self.order.push(next);
     }
 
-    /// Rows that do not depend on others.
+    /// Returns the number of independent rows.
     pub(super) fn rank(&self) -> usize {
         self.order.len()
     }
@@ -70,7 +76,7 @@ impl Equalities {
         &self.columns[p * self.size..(p + 1) * self.size]
     }
 
-    /// `R⁻¹` of the independent entries of `x`, in pivot order.
+    /// Returns `R⁻¹` of the independent entries of `x`, in pivot order.
     fn forward(&self, x: &[f64]) -> Vec<f64> {
         let mut left = x.to_vec();
         let mut t = Vec::with_capacity(self.rank());
@@ -84,7 +90,7 @@ impl Equalities {
         t
     }
 
-    /// `K_EE⁻¹·x` on the independent rows, 0 elsewhere; as long as `x`.
+    /// Returns `K_EE⁻¹·x` on the independent rows, 0 elsewhere; as long as `x`.
     pub(super) fn solve(&self, x: &[f64]) -> Vec<f64> {
         let t = self.forward(x);
         let mut out = vec![0.0; x.len()];
@@ -95,7 +101,8 @@ impl Equalities {
         out
     }
 
-    /// `K_ZZ −= TᵀT`, `c_Z −= Tᵀt`. `coupling[j]` is column `j` of `K_EZ`; `k` is `n × n` within rows of `stride`.
+    /// Computes `K_ZZ −= TᵀT` and `c_Z −= Tᵀt`. `coupling[j]` is column `j` of `K_EZ`; `k` is `n ×
+    /// n` within rows of `stride`.
     pub(super) fn reduce(&self, coupling: &[Vec<f64>], free: &[f64], k: &mut [f64], stride: usize, c: &mut [f64]) {
         let t = self.forward(free);
         let columns: Vec<Vec<f64>> = coupling.iter().map(|x| self.forward(x)).collect();
@@ -115,7 +122,8 @@ impl Equalities {
     }
 }
 
-/// The smallest pivot of a pivoted Cholesky factor of `k`, `e × e`, among rows that do not depend on others to one part in 1e8; `None` where there is none.
+/// Returns the smallest pivot of a pivoted Cholesky factor of `k`, `e × e`, among the rows that are
+/// independent to one part in 1e8; `None` if there is none.
 pub(crate) fn smallest_pivot(k: &[f64], e: usize) -> Option<f64> {
     let factor = Equalities::new(k, e, 1e-8);
     (0..factor.rank()).map(|p| factor.column(p)[factor.order[p]].powi(2)).reduce(f64::min)
@@ -125,7 +133,7 @@ fn add_multiple(x: &[f64], scale: f64, to: &mut [f64]) {
     to.iter_mut().zip(x).for_each(|(to, x)| *to += scale * x);
 }
 
-/// `a·b` in four sums that the processor adds at once.
+/// Returns `a·b`, computed in four sums in parallel.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
     let mut sums = [0.0; 4];

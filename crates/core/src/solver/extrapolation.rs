@@ -5,14 +5,15 @@ use super::local::{INLINE_BLOCKS, Local, apply, extrapolate_value};
 use crate::constraint::rows::Rows;
 use smallvec::SmallVec;
 
-/// The extrapolation between sweeps, over the stretches of `du` that the island acts on. Multipliers follow when it is their turn to be relaxed.
+/// The extrapolation between sweeps, on the ranges of `du` that the island acts on. Multipliers are
+/// extrapolated when their block is relaxed.
 pub(super) struct Extrapolation {
     theta: f64,
-    /// `β` of the sweep to come.
+    /// `β` of the next sweep.
     pub beta: f64,
-    /// First index and end of each stretch of `du`, one after the other; neighbours are joined.
+    /// Start and end of each range of `du`, in ascending order; adjacent ranges are merged.
     stretches: SmallVec<[(u32, u32); 2 * INLINE_BLOCKS]>,
-    /// `du` of the sweep before, of all stretches.
+    /// `du` of the previous sweep, all ranges in a row.
     last: SmallVec<[f64; 32]>,
 }
 
@@ -20,7 +21,7 @@ impl Extrapolation {
     pub fn new(locals: &[Local], linkages: &Linkages, du: &[f64]) -> Extrapolation {
         let mut stretches: SmallVec<[(u32, u32); 2 * INLINE_BLOCKS]> = linkages.stretches().collect();
         for (i, local) in locals.iter().enumerate() {
-            // the contacts of a pair follow one another: one of them is enough
+            // contacts of a pair are consecutive: one of them is enough
             let same =
                 |other: &Local| other.block.sides().iter().map(|s| s.u).eq(local.block.sides().iter().map(|s| s.u));
             if i == 0 || !same(&locals[i - 1]) {
@@ -39,12 +40,12 @@ impl Extrapolation {
         Extrapolation { theta: 1.0, beta: 0.0, stretches, last }
     }
 
-    /// How many freedoms the island has.
+    /// Returns the number of degrees of freedom of the island.
     pub fn size(&self) -> usize {
         self.last.len()
     }
 
-    /// The place of a freedom of the island, given by its index in `du`, among those of the island.
+    /// Returns the index within the island of a degree of freedom given by its index in `du`.
     pub fn place(&self, index: u32) -> usize {
         let mut before = 0;
         for &(start, end) in &self.stretches {
@@ -72,7 +73,7 @@ impl Extrapolation {
         }
     }
 
-    /// Makes `du` anew from the multipliers, which are not extrapolated yet, and starts from rest.
+    /// Computes `du` anew from the multipliers, which must not be extrapolated, and restarts.
     pub fn rebuild(
         &mut self,
         locals: &[Local],
@@ -87,7 +88,7 @@ impl Extrapolation {
         self.extrapolate(true, du);
     }
 
-    /// Zeroes `du` wherever the island acts.
+    /// Sets `du` to zero on all ranges of the island.
     pub fn clear(&self, du: &mut [f64]) {
         self.stretches.iter().for_each(|&(start, end)| du[start as usize..end as usize].fill(0.0));
     }

@@ -1,23 +1,28 @@
 //! Block Gauss–Seidel on the friction cone.
 //!
-//! For each block in turn, with everything else held: `w = c + Yᵀ(Yλ) + Rλ`, then
+//! Each block in turn is solved with all others held. With `w = c + Yᵀ(Yλ) + Rλ`:
 //!
-//! - half-line, interval: `λ ← clamp(λ − w/k)` with `k` the row's diagonal of `K + R`;
+//! - half-line, interval: `λ ← clamp(λ − w/k)`, with `k` the row's diagonal entry of `K + R`;
 //! - contact: its own three-row problem (`one_contact.rs`).
 //!
-//! Equalities are in no sweep: they are solved all at once and hold in every iterate (`linkage.rs`), but for linkages too large for that,
-//! where they are relaxed like intervals without ends.
+//! Equality rows take no part in the sweeps: they are solved together and hold in every iterate
+//! (`linkage.rs`). Linkages that are too large for that are relaxed like intervals without bounds.
 //!
-//! Its fixed points are the exact Coulomb solutions: `λ_n ⟂ w_n` without the dilation that a convex cone brings, and
-//! friction against the sliding velocity.
+//! The fixed points are exact Coulomb solutions: `λ_n ⟂ w_n` without the dilation of a convex cone,
+//! and friction against the sliding velocity.
 //!
-//! Between sweeps the iterate is extrapolated, `y = λ_k + β_k(λ_k − λ_{k−1})`, with Nesterov's weights `β_k = (θ_k − 1)/θ_{k+1}`,
-//! `θ_{k+1} = ½(1 + √(1 + 4θ_k²))`, and a restart whenever the sweep goes against the last move, `(y − λ_{k+1})·(λ_{k+1} − λ_k) > 0`
-//! (O'Donoghue and Candès, *Adaptive restart for accelerated gradient schemes*, 2015). Plain sweeps carry a load down a stack one
-//! body at a time; a tower of ten boxes wants thousands of them and this about a hundred. With friction the problem is not convex and the
-//! extrapolation can go in circles, so after [`ACCELERATED`] sweeps it is plain. What is slow even so (nearly redundant contacts, high mass ratios) is
-//! finished by Newton's method where an island is small (`newton.rs`); elsewhere the residual says how far. Plain sweeps can go in circles too; those that
-//! get nowhere go on by shorter steps (`relaxation.rs`).
+//! Between sweeps the iterate is extrapolated, `y = λ_k + β_k(λ_k − λ_{k−1})`, with Nesterov's
+//! weights `β_k = (θ_k − 1)/θ_{k+1}`, `θ_{k+1} = ½(1 + √(1 + 4θ_k²))`. The extrapolation restarts
+//! if a sweep goes against the last change, `(y − λ_{k+1})·(λ_{k+1} − λ_k) > 0` (O'Donoghue and
+//! Candès, *Adaptive restart for accelerated gradient schemes*, 2015). Plain sweeps carry a load
+//! down a stack one body at a time: a tower of ten boxes needs thousands of them, and about a
+//! hundred with extrapolation.
+//!
+//! With friction the problem is not convex and extrapolated sweeps can cycle, so there is no
+//! extrapolation after [`ACCELERATED`] sweeps. Nearly redundant contacts and high mass ratios still
+//! converge slowly. Newton's method finishes them on small islands (`newton.rs`); the residual
+//! reports the error on others. Plain sweeps can also cycle; if they stagnate, `relaxation.rs`
+//! shortens their steps.
 
 use super::extrapolation::Extrapolation;
 use super::linkage::Linkages;
@@ -28,7 +33,7 @@ use super::{RowSolver, SolveReport, SolverSettings};
 use crate::constraint::rows::Rows;
 use smallvec::SmallVec;
 
-/// Sweeps with extrapolation between them.
+/// Number of sweeps with extrapolation.
 const ACCELERATED: u32 = 200;
 
 /// The block Gauss–Seidel solver, `gauss_seidel`.
@@ -99,7 +104,9 @@ impl RowSolver for GaussSeidel {
     }
 }
 
-/// The last sweeps are plain: an extrapolated iterate may overshoot far just before it turns, and a solve cut off there would be worse than none.
+/// Number of plain sweeps at the end: an extrapolated iterate may overshoot far just before it
+/// turns back, so a solve that stopped there would be worse than none.
 const FINAL_PLAIN_SWEEPS: u32 = 5;
-/// Extrapolation carries the rounding errors of `du` on and on; after so many sweeps it is made anew from `λ`.
+/// Number of sweeps after which `du` is computed anew from `λ`: extrapolation accumulates its
+/// rounding errors.
 const REBUILD_INTERVAL: u32 = 1000;

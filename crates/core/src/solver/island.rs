@@ -1,9 +1,11 @@
-//! Islands: sets of blocks that share no moving object, found by union-find. Statics do not merge.
+//! Islands: sets of blocks that share no moving object, found by union-find. Static objects do not
+//! merge islands.
 
 use crate::constraint::rows::Rows;
 use tumble_collide::UnionFind;
 
-/// The blocks of a solve, grouped. Islands are ordered by their first block, blocks within one as they were added.
+/// The blocks of a solve, grouped by island. Islands are ordered by their first block, blocks
+/// within an island as they were added.
 #[derive(Clone, Debug, Default)]
 pub struct Islands {
     blocks: Vec<u32>,
@@ -16,7 +18,7 @@ pub struct Islands {
 const NONE: u32 = u32::MAX;
 
 impl Islands {
-    /// Groups the blocks of `rows` for which `keep` holds; a block without sides is left out.
+    /// Groups the blocks of `rows` that satisfy `keep`; blocks without sides are left out.
     pub fn build(&mut self, rows: &Rows, keep: impl Fn(usize) -> bool) {
         self.sets.reset(rows.dof);
         for (b, block) in rows.blocks.iter().enumerate() {
@@ -28,22 +30,22 @@ impl Islands {
         self.sort(rows, &keep);
     }
 
-    /// How many islands there are.
+    /// Returns the number of islands.
     pub fn len(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
 
-    /// Whether there is none.
+    /// Returns whether there is no island.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The blocks of island `i`.
+    /// Returns the blocks of island `i`.
     pub fn get(&self, i: usize) -> &[u32] {
         &self.blocks[self.starts[i] as usize..self.starts[i + 1] as usize]
     }
 
-    /// All islands in order.
+    /// Iterates over all islands in order.
     pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
         (0..self.len()).map(|i| self.get(i))
     }
@@ -64,7 +66,7 @@ impl Islands {
         }
     }
 
-    /// Counting sort of the blocks by island.
+    /// Sorts the blocks by island (counting sort).
     fn sort(&mut self, rows: &Rows, keep: &impl Fn(usize) -> bool) {
         self.starts.clear();
         self.starts.push(0);

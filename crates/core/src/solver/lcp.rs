@@ -1,7 +1,9 @@
-//! The contact problem as a linear complementarity problem, solved by [`lemke`]: exact on a polygonal friction cone.
+//! The contact problem as a linear complementarity problem, solved by [`lemke`]: exact on a
+//! polygonal friction cone.
 //!
-//! Sources: thesis §IV.B.3.d and Algorithm 3 (`Kᶠ` with one tangent per contact, after Kokkevis); Stewart and Trinkle 1996, Anitescu and
-//! Potra 1997 (the pyramid; they prove that Lemke's method finds a solution, so that a ray means contradictory rows). Per contact:
+//! Sources: thesis §IV.B.3.d and Algorithm 3 (`Kᶠ` with one tangent per contact, after Kokkevis);
+//! Stewart and Trinkle 1996, Anitescu and Potra 1997 (the pyramid; they prove that Lemke's method
+//! finds a solution, so a ray means contradictory rows). Per contact:
 //!
 //! ```text
 //! w_n = (K·λ + c)_n                ≥ 0  ⟂  f_n ≥ 0
@@ -12,36 +14,42 @@
 //! | symbol | meaning |
 //! |---|---|
 //! | `f_n`, `f_i`, `s` | normal multiplier, multiplier along direction `i`, multiplier of the friction bound |
-//! | `d₁` | `−c_t/|c_t|`, against the free sliding velocity; the first tangent where nothing slides |
+//! | `d₁` | `−c_t/|c_t|`, against the free sliding velocity; the first tangent if nothing slides |
 //! | `dᵢ` | `d₁` alone (sliding form, 3 unknowns); `±d₁`, `±d₂` with `d₂ ⟂ d₁` (pyramid, 6 unknowns) |
 //!
-//! The pyramid turns with the sliding velocity, so that friction opposes it exactly and at full size: for one contact whose direction of
-//! sliding the solve does not turn, both forms give the exact cone. Where the direction turns, the pyramid is up to 1/√2 of the cone.
-//! The sliding form cannot push any other way, so that it does not hold a body that other contacts or rows drive backward or sideways.
+//! The pyramid turns with the sliding velocity, so friction opposes it exactly and at full size.
+//! For one contact whose sliding direction the solve does not turn, both forms give the exact cone.
+//! If the direction turns, the pyramid is up to 1/√2 of the cone. The sliding form cannot push in
+//! any other direction: it does not hold a body that other contacts or rows drive backward or
+//! sideways.
 //!
-//! Other rows: half-lines are plain; an interval is `λ = lo + z` with a multiplier for `hi − lo − z ≥ 0`; equalities are eliminated
-//! first ([`Equalities`]); `K` has the compliance of soft rows on its diagonal. A row without response gets no multiplier, and a dead tangent no share in `d₁`.
+//! Other rows: half-lines need no transformation. An interval is `λ = lo + z` with a multiplier for
+//! `hi − lo − z ≥ 0`. Equalities are eliminated first ([`Equalities`]). `K` has the compliance of
+//! soft rows on its diagonal. A row without response gets no multiplier, and a tangent without
+//! response does not contribute to `d₁`.
 //!
-//! The warm start is not used, except that [`GaussSeidel`] takes over from it, with `converged` false, where there is no answer: on a
-//! secondary ray (`ray` true), where the pivots run out, and where there are more than [`MAX_UNKNOWNS`] unknowns (pivoting is O(n³)).
-//! Numbers that are not finite give zero multipliers and `converged` false.
+//! The warm start is not used. [`GaussSeidel`] takes over from it, with `converged` false, if there
+//! is no solution: on a secondary ray (`ray` true), at the pivot limit, and above [`MAX_UNKNOWNS`]
+//! unknowns (pivoting is O(n³)). Numbers that are not finite give zero multipliers and `converged`
+//! false.
 
 use super::equality::{Equalities, RANK};
 use super::lemke::{LcpResult, lemke};
 use super::{GaussSeidel, RowSolver, SolveReport, SolverSettings};
 use crate::constraint::rows::{Block, RowSet, Rows};
 
-/// Most unknowns that are pivoted.
+/// Maximum number of unknowns for pivoting.
 pub const MAX_UNKNOWNS: usize = 3000;
-/// Diagonal of `K` under which a tangent has no response, as a part of the block's largest.
+/// A tangent has no response if its diagonal of `K` is below this fraction of the block's largest.
 const RESPONSE_TOLERANCE: f64 = 1e-20;
-/// Sliding velocity that counts as none, as a part of the largest free value of the island.
+/// Sliding velocity that counts as zero, relative to the largest free value of the island.
 const SLIDING_TOLERANCE: f64 = 1e-13;
-/// Free value that is rounding and counts as 0, as a part of the same: scaled up, it could make rows contradict each other.
+/// Free value that counts as rounding and becomes 0, relative to the largest free value of the
+/// island. Scaled up, it could make rows contradict each other.
 const ROUNDING: f64 = 1e-13;
-/// The least that "the largest free value" is taken for, m/s or m/s².
+/// Lower bound of "the largest free value", m/s or m/s².
 const MIN_SCALE: f64 = 1e-3;
-/// Velocity error of the equality rows that still counts as solved, as a part of the same.
+/// Velocity error of the equality rows that counts as solved, relative to the largest free value.
 const ACCEPT: f64 = 1e-9;
 
 /// Lemke's method on the four-sided friction pyramid, `lcp_pyramid`.
@@ -144,7 +152,8 @@ fn solve(
     SolveReport { iterations: pivots, converged, ray: false }
 }
 
-/// Whether all that the island's problem is made of is a number; an interval may end at infinity.
+/// Returns whether all numbers of the island's problem are finite; bounds of an interval may be
+/// infinite.
 fn finite(rows: &Rows, blocks: &[u32], c: &[f64]) -> bool {
     let responses =
         |block: &Block, k: usize| block.sides().iter().all(|s| rows.response(s, k).iter().all(|y| y.is_finite()));
@@ -177,26 +186,26 @@ struct Column {
     weight: [f64; 2],
 }
 
-/// `constant + gain·z_normal − Σ_{limited} z ≥ 0`, complementary to an unknown of its own.
+/// `constant + gain·z_normal − Σ_{limited} z ≥ 0`, complementary to its own unknown.
 struct Bound {
     constant: f64,
     normal: Option<(usize, f64)>,
     limited: std::ops::Range<usize>,
 }
 
-/// The island's problem: unknowns are the columns, then the bounds.
+/// The problem of an island. The unknowns are the columns, followed by the bounds.
 struct Problem {
     /// `K + R` of the island, dense, row-major.
     k: Vec<f64>,
     /// Free values of the island's rows.
     c: Vec<f64>,
-    /// The largest of them, or [`MIN_SCALE`].
+    /// The largest free value, at least [`MIN_SCALE`].
     scale: f64,
-    /// Multipliers at `z = 0`: the lower ends of intervals.
+    /// Multipliers at `z = 0`: the lower bounds of intervals.
     start: Vec<f64>,
     columns: Vec<Column>,
     bounds: Vec<Bound>,
-    /// Rows of the equalities.
+    /// Indices of the equality rows.
     free: Vec<usize>,
     equalities: Equalities,
 }
@@ -275,7 +284,8 @@ impl Problem {
         self.bounds.push(Bound { constant: 0.0, normal: Some((normal, mu)), limited: normal + 1..self.columns.len() });
     }
 
-    /// `d₁` against the free sliding velocity and, where both tangents respond, `d₂` across it.
+    /// Returns `d₁` against the free sliding velocity and, if both tangents have a response, `d₂`
+    /// across it.
     fn directions(&self, row: usize) -> Option<([f64; 2], Option<[f64; 2]>)> {
         let floor = RESPONSE_TOLERANCE * (0..3).map(|r| self.diagonal(row + r)).fold(0.0, f64::max);
         let live = [self.diagonal(row + 1) > floor, self.diagonal(row + 2) > floor];
@@ -300,12 +310,12 @@ impl Problem {
         self.entry(i, i)
     }
 
-    /// `K` of a row with a column's rows.
+    /// Returns `K` of a row with the rows of a column.
     fn against(&self, row: usize, column: &Column) -> f64 {
         (0..2).map(|e| column.weight[e] * self.entry(row, column.row[e])).sum()
     }
 
-    /// `M`, row-major, and `q`.
+    /// Returns `M`, row-major, and `q`.
     fn matrix(&self) -> (Vec<f64>, Vec<f64>) {
         let (columns, n) = (self.columns.len(), self.columns.len() + self.bounds.len());
         let c = self.velocities(&self.start);
@@ -335,7 +345,7 @@ impl Problem {
         (m, q)
     }
 
-    /// `c + (K + R)·λ` of the island's rows.
+    /// Returns `c + (K + R)·λ` of the island's rows.
     fn velocities(&self, lambda: &[f64]) -> Vec<f64> {
         let n = self.c.len();
         (0..n)
@@ -343,13 +353,13 @@ impl Problem {
             .collect()
     }
 
-    /// The island's multipliers, and the largest velocity left on an equality row.
+    /// Returns the island's multipliers, and the largest remaining velocity of an equality row.
     fn multipliers(&self, z: &[f64]) -> (Vec<f64>, f64) {
         let mut lambda = self.start.clone();
         for (column, z) in self.columns.iter().zip(z) {
             (0..2).for_each(|e| lambda[column.row[e]] += column.weight[e] * z);
         }
-        // The second pass is iterative refinement.
+        // the second pass is iterative refinement
         for _ in 0..2 {
             let w = self.velocities(&lambda);
             let wrong: Vec<f64> = self.free.iter().map(|&i| w[i]).collect();

@@ -1,77 +1,85 @@
 //! Lemke's complementary pivoting for a dense linear complementarity problem.
 //!
-//! Source: Cottle, Pang, Stone, *The Linear Complementarity Problem*, 1992, §4.4 (scheme I) and §4.9 (lexicographic rule).
+//! Source: Cottle, Pang, Stone, *The Linear Complementarity Problem*, 1992, §4.4 (scheme I) and
+//! §4.9 (lexicographic rule).
 //!
 //! ```text
 //! find z ≥ 0 with w = M·z + q ≥ 0 and zᵀw = 0
 //!
-//! augmented:   w = q + M·z + d·z₀,  d > 0        z₀ large makes w ≥ 0 at z = 0
+//! augmented:   w = q + M·z + d·z₀,  d > 0        a large z₀ makes w ≥ 0 at z = 0
 //! dictionary:  x_B = b + A·x_N                   n basic variables B, n + 1 nonbasic ones N
 //! pivot (r, s), p = A_rs:
 //!     A_rs ← 1/p,  A_rj ← −A_rj/p,  b_r ← −b_r/p,  A_ij ← A_ij + A_is·A_rj,  b_i ← b_i + A_is·b_r
-//! ratio test:  r = argmin { b_r / −A_rs : A_rs < 0 },  then the complement of what left enters
+//! ratio test:  r = argmin { b_r / −A_rs : A_rs < 0 },  then the complement of the leaving variable enters
 //! ```
 //!
-//! The walk ends when z₀ leaves (a solution) or when nothing bounds the entering variable (a secondary ray).
+//! The walk ends when z₀ leaves (a solution) or when nothing bounds the entering variable (a
+//! secondary ray).
 //!
 //! | symbol | meaning |
 //! |---|---|
-//! | `M`, `q` | the problem, here already scaled: `S·M·S`, `S·q/σ` |
-//! | `S`, `σ` | powers of two that bring rows and columns of `M`, and `q`, near 1; they round nothing |
+//! | `M`, `q` | the scaled problem: `S·M·S`, `S·q/σ` |
+//! | `S`, `σ` | powers of two that bring rows and columns of `M`, and `q`, near 1 without rounding |
 //! | `d`, `z₀` | covering vector, artificial variable |
-//! | `ε` | lexicographic perturbation `q + (ε, ε², …, εⁿ)`; row `r` carries `−A_{r,w_j}` of `εʲ`, or 1 where `w_j` is its own variable |
+//! | `ε` | lexicographic perturbation `q + (ε, ε², …, εⁿ)`; row `r` carries `−A_{r,w_j}` of `εʲ`, or 1 if `w_j` is its own variable |
 //!
-//! Departures. The perturbation is read off the dictionary and costs no columns of its own. Ratios count as tied within
-//! [`FEASIBLE`], ties go to `z₀`, then to the lexicographic minimum among pivots that are not small. The
-//! dictionary is computed anew from `M` and `q` every so often and before a doubtful pivot, because a pivot on what is only rounding makes
-//! the basis singular. The answer is not what the
-//! dictionary accumulated: the final basis is solved again from `M` and `q` by LU with iterative refinement, and counts as a
-//! solution only if `max |min(z, w)| ≤` [`ACCEPT`] of the scaled problem. Where it does not, or the walk ended otherwise, a second walk
-//! starts from another `d`. That check also takes a ray at which `z₀` is only rounding: a body that fits exactly between two walls.
+//! Departures from the source:
+//!
+//! - The perturbation is read from the dictionary and needs no columns of its own.
+//! - Ratios within [`FEASIBLE`] count as tied. Ties go to `z₀`, then to the lexicographic minimum
+//!   among pivots that are not small.
+//! - The dictionary is computed anew from `M` and `q` at intervals and before a doubtful pivot,
+//!   because a pivot on rounding errors makes the basis singular.
+//! - The solution does not come from the dictionary with its accumulated errors. The final basis is
+//!   solved again from `M` and `q` by LU with iterative refinement, and is accepted if `max |min(z,
+//!   w)| ≤` [`ACCEPT`] in the scaled problem. If it is not, or the walk ended otherwise, a second
+//!   walk starts with another `d`. This check also accepts a ray at which `z₀` is only rounding: a
+//!   body that fits exactly between two walls.
 
 use nalgebra::{DMatrix, DVector};
 
-/// What the walk found. `pivots` counts both walks where there were two.
+/// Result of the walk. `pivots` counts those of both walks.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LcpResult {
     /// A complementary solution.
     Solution {
         /// `z`, at least 0.
         z: Vec<f64>,
-        /// Pivots taken.
+        /// Number of pivots.
         pivots: u32,
     },
-    /// Both walks ended on a secondary ray. If `M` is copositive-plus (all symmetric positive semidefinite ones are) no solution exists.
+    /// Both walks ended on a secondary ray. If `M` is copositive-plus (as all symmetric positive
+    /// semidefinite matrices are) no solution exists.
     Ray {
-        /// Pivots taken.
+        /// Number of pivots.
         pivots: u32,
     },
-    /// A walk reached the cap on pivots, or a basis whose solution is not accurate.
+    /// A walk reached the maximum number of pivots, or a basis whose solution is not accurate.
     PivotLimit {
-        /// Pivots taken.
+        /// Number of pivots.
         pivots: u32,
     },
     /// `M` or `q` holds a number that is not finite.
     NotFinite,
 }
 
-/// A pivot is at least this part of the largest number of its column, or of 1.
+/// Minimum size of a pivot, relative to the largest number of its column or to 1.
 const PIVOT: f64 = 1e-10;
-/// How negative a basic variable of the scaled problem may become in one step.
+/// Amount by which a basic variable of the scaled problem may become negative in one step.
 const FEASIBLE: f64 = 1e-11;
 /// Ties in the ratio test prefer pivots within this factor of the strongest.
 const WEAK: f64 = 1e-4;
-/// The dictionary is computed anew after this many pivots, or `n/8`.
+/// The dictionary is computed anew after this many pivots, or after `n/8` if that is more,
 const REBUILD: usize = 50;
-/// And before a pivot under this.
+/// and before a pivot below this.
 const DOUBTFUL: f64 = 1e-6;
-/// Numbers of the lexicographic rows closer than this are equal.
+/// Difference below which numbers of the lexicographic rows count as equal.
 const LEXICOGRAPHIC: f64 = 1e-9;
-/// Largest `|min(z, w)|` of the scaled problem that counts as solved.
+/// Largest accepted `|min(z, w)|` of the scaled problem.
 const ACCEPT: f64 = 1e-10;
 
-/// Solves the linear complementarity problem of `m` (`n × n`, row-major) and `q` (`n`). Time O(n²) per
-/// pivot and O(n³) for every 50 or n/8 of them; n to 3n pivots as a rule.
+/// Solves the linear complementarity problem of `m` (`n × n`, row-major) and `q` (`n`). Time O(n²)
+/// per pivot and O(n³) for every 50 or n/8 of them; n to 3n pivots as a rule.
 ///
 /// # Panics
 /// If `m.len() != q.len()²`.
@@ -99,12 +107,13 @@ fn pivot_cap(n: usize) -> u32 {
     20 * n as u32 + 100
 }
 
-/// `d`: all ones, or between 1 and 2 by the golden ratio's multiples where `spread` is 1.
+/// Returns `d`: all ones if `spread` is 0; numbers between 1 and 2 by multiples of the golden ratio
+/// if it is 1.
 fn covering(n: usize, spread: u32) -> Vec<f64> {
     (1..=n).map(|i| 1.0 + f64::from(spread) * (i as f64 * 0.618_033_988_749_894_9).fract()).collect()
 }
 
-/// The problem with rows and columns of like size: `z = σ·S·z'`, `w = σ·S⁻¹·w'`.
+/// The problem with rows and columns of similar size: `z = σ·S·z'`, `w = σ·S⁻¹·w'`.
 struct Scaled {
     n: usize,
     m: Vec<f64>,
@@ -131,7 +140,7 @@ impl Scaled {
         &self.m[i * self.n..(i + 1) * self.n]
     }
 
-    /// `max |min(z, Mz + q)|`; infinite where that is not a number.
+    /// Returns `max |min(z, Mz + q)|`; infinite if that is not a number.
     fn violation(&self, z: &[f64]) -> f64 {
         let row = |i: usize| self.q[i] + dot(self.row(i), z);
         let all = (0..self.n).map(|i| z[i].min(row(i)).abs() + 0.0 * row(i));
@@ -139,7 +148,8 @@ impl Scaled {
     }
 }
 
-/// Symmetric equilibration: `s_i ← s_i / √(largest of row and column i)`, a few times, then to powers of two.
+/// Returns the symmetric equilibration: `s_i ← s_i / √(largest of row and column i)` several times,
+/// rounded to powers of two.
 fn equilibrate(m: &[f64], n: usize) -> Vec<f64> {
     let mut s = vec![1.0; n];
     for _ in 0..8 {
@@ -156,7 +166,7 @@ fn equilibrate(m: &[f64], n: usize) -> Vec<f64> {
     s.into_iter().map(power_of_two).collect()
 }
 
-/// The power of two at or below `x`; 1 where `x` is 0, tiny or not finite.
+/// Returns the power of two at or below `x`; 1 if `x` is 0, subnormal or not finite.
 fn power_of_two(x: f64) -> f64 {
     if x.is_normal() { f64::from_bits(x.to_bits() & 0x7ff0_0000_0000_0000) } else { 1.0 }
 }
@@ -165,7 +175,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Where a variable stands. Variables: `w_i` is `i`, `z_i` is `n + i`, `z₀` is `2n`.
+/// Position of a variable. Variables: `w_i` is `i`, `z_i` is `n + i`, `z₀` is `2n`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum VariablePlace {
     Row(usize),
@@ -217,10 +227,12 @@ impl Dictionary {
         self.place[self.nonbasic[s]] = VariablePlace::Column(s);
     }
 
-    /// Computes the dictionary of this basis anew from the problem, without what pivoting accumulated; `false` where the basis is singular.
+    /// Computes the dictionary of this basis anew from the problem, without accumulated errors.
+    /// Returns `false` if the basis is singular.
     ///
-    /// With `R` the rows whose `w` is nonbasic, `Q` the others, `A` the basic `z` (`z₀` among them), `N` the nonbasic ones:
-    /// `z_A = M_RA⁻¹(w_R − q_R − M_RN·z_N)`, `w_Q = q_Q + M_QA·z_A + M_QN·z_N`.
+    /// With `R` the rows whose `w` is nonbasic, `Q` the others, `A` the basic `z` (`z₀` among
+    /// them), `N` the nonbasic ones: `z_A = M_RA⁻¹(w_R − q_R − M_RN·z_N)`, `w_Q = q_Q + M_QA·z_A +
+    /// M_QN·z_N`.
     fn rebuild(&mut self, problem: &Scaled, cover: &[f64]) -> bool {
         let n = self.n;
         let entry = |i: usize, v: usize| if v == 2 * n { cover[i] } else { problem.row(i)[v - n] };
@@ -240,7 +252,8 @@ impl Dictionary {
         }
         let below = DMatrix::from_fn(loose.len(), active.len(), |i, j| entry(loose[i], active[j]));
         let mut w = DMatrix::from_fn(loose.len(), n + 2, |i, s| given(loose[i], s));
-        // Column by column: a product of matrices may use fused multiply-add on one processor and not on another.
+        // Column by column: a matrix product may use fused multiply-add on one processor and not on
+        // another.
         (0..n + 2).for_each(|s| w.column_mut(s).gemv(1.0, &below, &z.column(s), 1.0));
         for (values, variables) in [(&z, &active), (&w, &loose)] {
             for (i, &v) in variables.iter().enumerate() {
@@ -252,14 +265,15 @@ impl Dictionary {
         self.a.iter().chain(&self.b).all(|x| x.is_finite())
     }
 
-    /// The rows whose `w` is nonbasic, and the basic `z`; as many of one as of the other.
+    /// Returns the rows whose `w` is nonbasic, and the basic `z`, which are equally many.
     fn basis(&self) -> (Vec<usize>, Vec<usize>) {
         let n = self.n;
         let active = (n..=2 * n).filter(|&v| matches!(self.place[v], VariablePlace::Row(_))).collect();
         ((0..n).filter(|&i| matches!(self.place[i], VariablePlace::Column(_))).collect(), active)
     }
 
-    /// The row that leaves when the variable of column `s` grows; `None` if nothing bounds it.
+    /// Returns the row that leaves when the variable of column `s` grows; `None` if nothing bounds
+    /// it.
     fn leaving(&self, s: usize) -> Option<usize> {
         let largest = (0..self.n).map(|r| self.at(r, s).abs()).fold(1.0, f64::max);
         let falling = || (0..self.n).filter(|&r| self.at(r, s) < -PIVOT * largest);
@@ -274,7 +288,8 @@ impl Dictionary {
         strong.reduce(|best, r| if self.precedes(r, best, s) { r } else { best })
     }
 
-    /// Whether the perturbation of row `r`, per unit of pivot, is lexicographically less than that of row `other`.
+    /// Returns whether the perturbation of row `r`, per unit of pivot, is lexicographically less
+    /// than that of row `other`.
     fn precedes(&self, r: usize, other: usize, s: usize) -> bool {
         let (p, p_other) = (-self.at(r, s), -self.at(other, s));
         for j in 0..self.n {
@@ -286,7 +301,7 @@ impl Dictionary {
         false
     }
 
-    /// What row `r` carries of `εʲ`.
+    /// Returns the coefficient of `εʲ` in row `r`.
     fn perturbation(&self, r: usize, j: usize) -> f64 {
         match self.place[j] {
             VariablePlace::Column(s) => -self.at(r, s),
@@ -295,7 +310,7 @@ impl Dictionary {
     }
 }
 
-/// `a + b`, and 0 where no more than rounding is left of it.
+/// Returns `a + b`, or 0 if only rounding remains.
 #[inline]
 fn cancel(a: f64, b: f64) -> f64 {
     let sum = a + b;
@@ -310,12 +325,12 @@ enum End {
     Limit,
 }
 
-/// Scheme I: from the primary ray to a complementary dictionary or a secondary ray.
+/// Walks by scheme I from the primary ray to a complementary dictionary or a secondary ray.
 fn walk(dictionary: &mut Dictionary, problem: &Scaled, cover: &[f64], cap: u32) -> (End, u32) {
     let n = dictionary.n;
     let fresh_for = (n / 8).max(REBUILD);
     let mut age = 0;
-    // The row that needs z₀ most; of equals the last, whose εⁱ is the least.
+    // The row with the largest deficit; among equals the last, whose εⁱ is the smallest.
     let need = |i: usize| -dictionary.b[i] / cover[i];
     let Some(first) = (0..n).reduce(|best, i| if need(i) >= need(best) { i } else { best }).filter(|&i| need(i) > 0.0)
     else {
@@ -346,7 +361,8 @@ fn walk(dictionary: &mut Dictionary, problem: &Scaled, cover: &[f64], cap: u32) 
     (End::Limit, cap)
 }
 
-/// `z` of the dictionary's basis, from LU or from the dictionary's own numbers, whichever is better; `None` where neither is accurate.
+/// Returns `z` of the dictionary's basis from LU or from the dictionary's own numbers, whichever is
+/// more accurate; `None` if neither is accurate.
 fn best_solution(problem: &Scaled, cover: &[f64], dictionary: &Dictionary) -> Option<Vec<f64>> {
     let n = problem.n;
     let mut own = vec![0.0; n];
@@ -360,7 +376,8 @@ fn best_solution(problem: &Scaled, cover: &[f64], dictionary: &Dictionary) -> Op
     measured.reduce(|a, b| if b.0 < a.0 { b } else { a }).filter(|(violation, _)| *violation <= ACCEPT).map(|(_, z)| z)
 }
 
-/// Solves `M_RA·z_A + d_R·z₀ = −q_R`, with `A` the basic `z` and `R` the rows whose `w` is nonbasic.
+/// Solves `M_RA·z_A + d_R·z₀ = −q_R`, with `A` the basic `z` and `R` the rows whose `w` is
+/// nonbasic.
 fn solve_basis(problem: &Scaled, cover: &[f64], dictionary: &Dictionary) -> Option<Vec<f64>> {
     let n = problem.n;
     let (tight, active) = dictionary.basis();

@@ -1,51 +1,58 @@
-//! Equality rows solved all at once, for the sweeps: loops of links and chains of joints converge badly one by one.
+//! Direct solution of equality rows within the sweeps: loops of links and chains of joints converge
+//! badly one row at a time.
 //!
-//! Objects that equality rows join, directly or through others, are a *linkage*. Its rows E are factored once per solve (`equality.rs`), and
-//! whatever else pushes one of its objects then pushes all of them, with the joints held:
+//! Objects that equality rows join, directly or through others, form a *linkage*. Its rows E are
+//! factored once per solve (`equality.rs`). Any other row that acts on one of its objects then
+//! moves all of them, with the joints held:
 //!
 //! ```text
 //! w_E = c_E + Y_Eᵀu + R_E·λ_E = 0  before and after      A = K_EE + R_E
 //! δλ_E = −A⁻¹·K_Ei·δλ_i
-//! δu   = Y_i·δλ_i + Y_E·δλ_E = Ỹ_i·δλ_i                  Ỹ_i = Y_i − Y_E·A⁻¹·K_Ei   the reach of row i
-//! K̃_ij = Y_iᵀ·Ỹ_j                                        what a sweep meets as its own diagonal
+//! δu   = Y_i·δλ_i + Y_E·δλ_E = Ỹ_i·δλ_i                  Ỹ_i = Y_i − Y_E·A⁻¹·K_Ei   response of the linkage to row i
+//! K̃_ij = Y_iᵀ·Ỹ_j                                        diagonal block in the sweeps
 //! ```
 //!
 //! | symbol | meaning |
 //! |---|---|
 //! | `E`, `i` | equality rows of a linkage; a row of any other block |
 //! | `Y`, `K`, `R`, `c` | as in `rows.rs` |
-//! | `Ỹ` | the whitened velocities that a unit of `λ_i` gives to the whole linkage |
+//! | `Ỹ` | whitened velocities of the whole linkage due to a unit of `λ_i` |
 //!
-//! So a sweep reads a row's velocity from its own two objects, as ever, and writes to the linkages that they belong to. The equalities never
-//! come up in it: they hold in every iterate, and `λ_E` is found at the end. The cost is `e³/3` for the factor and `e²` for every other row that
-//! meets the linkage; where that is more than [`MAX_WORK`], or `e` more than [`MAX_DIRECT_ROWS`], the linkage's rows are relaxed one by one.
+//! A sweep reads a row's velocity from its own two objects and writes to the linkages that they
+//! belong to. The equality rows hold in every iterate, and `λ_E` is found at the end. The cost is
+//! `e³/3` for the factor and `e²` for every other row that acts on the linkage. If that exceeds
+//! [`MAX_WORK`], or `e` exceeds [`MAX_DIRECT_ROWS`], the linkage's rows are relaxed one by one.
 //!
-//! Rows that depend on others get no multiplier. [`RANK`] is coarser here than rounding alone asks: two pins of one joint that have drifted
-//! apart by a part `ε` of the size of their bodies leave `ε²` of a diagonal, and solved for they would lock the joint.
+//! Dependent rows get no multiplier. [`RANK`] is coarser here than rounding requires: two pins of
+//! one joint that have drifted apart by a fraction `ε` of the size of their bodies leave `ε²` of a
+//! diagonal, and a multiplier for that would lock the joint.
 //!
-//! Intervals without ends are equalities. A motor with limits is not: its row would have to join E while it is inside its limits and leave E at them. That
-//! is an active set: bordering the factor by one row (`e²`) when one joins, dropping it by the inverse of that, and a sweep in between.
+//! Intervals without bounds are equalities. A motor with limits is not: its row would have to join
+//! E inside its limits and leave E at them. That would be an active set: bordering the factor by
+//! one row (`e²`) when one joins, the inverse operation when one leaves, and a sweep in between.
 
 use super::equality::{Equalities, VANISHED};
 use super::one_contact::Symmetric3;
 use crate::constraint::rows::{Block, RowSet, Rows, Side, dot};
 
-/// Most equality rows of a linkage that are solved at once.
+/// Maximum number of equality rows of a linkage that are solved directly.
 pub const MAX_DIRECT_ROWS: usize = 200;
-/// Most multiplications spent on a linkage before the first sweep: some 20 ms.
+/// Maximum number of multiplications for a linkage before the first sweep, about 20 ms.
 const MAX_WORK: usize = 40_000_000;
-/// Rows whose pivot fell under this part of their own diagonal depend on the others: two pins of one joint, 0.1 mm in a metre apart.
+/// A row depends on others if its pivot is below this fraction of its diagonal: two pins of one
+/// joint that are 0.1 mm apart in a metre.
 const RANK: f64 = 1e-8;
-/// What is left of a velocity along an equality row counts as none if it is less than this part of the largest that there was.
+/// A remaining velocity along an equality row counts as zero below this fraction of the largest
+/// initial one.
 const SOLVED: f64 = 1e-9;
 
-/// The linkages of an island that are solved at once.
+/// The linkages of an island that are solved directly.
 #[derive(Default)]
 pub(super) struct Linkages {
     linkages: Vec<Linkage>,
-    /// Every object of theirs: the start of its `u` and its linkage, sorted.
+    /// All their objects, sorted: the start of the object's `u`, and its linkage.
     objects: Vec<(u32, usize)>,
-    /// Sides of all reaches, and their responses.
+    /// Sides of all side ranges, and their responses.
     sides: Vec<Side>,
     y: Vec<f64>,
 }
@@ -54,11 +61,11 @@ struct Linkage {
     /// Its equality rows, as indices into `Rows::blocks`.
     rows: Vec<u32>,
     factor: Equalities,
-    /// Its objects, sorted: where `u` starts, freedoms.
+    /// Its objects, sorted: start of `u`, degrees of freedom.
     objects: Vec<(u32, u32)>,
 }
 
-/// What a block of other rows moves where it meets a linkage: sides of [`Linkages`].
+/// The sides that a block of other rows moves if it acts on a linkage: a range in [`Linkages`].
 #[derive(Clone, Copy, Default)]
 pub(super) struct SideRange {
     first: u32,
@@ -66,7 +73,7 @@ pub(super) struct SideRange {
 }
 
 impl SideRange {
-    /// Whether the block meets no linkage: it moves its own sides alone.
+    /// Returns whether the block acts on no linkage and moves only its own sides.
     #[inline(always)]
     pub fn is_own(self) -> bool {
         self.first == self.end
@@ -95,22 +102,22 @@ impl Linkages {
         all
     }
 
-    /// Whether there is none.
+    /// Returns whether there is no linkage.
     pub fn is_empty(&self) -> bool {
         self.linkages.is_empty()
     }
 
-    /// Whether the block is one of the rows solved here.
+    /// Returns whether the block is one of the equality rows solved here.
     pub fn contains_row(&self, rows: &Rows, block: &Block) -> bool {
         !self.is_empty() && is_joint(rows, block) && block.sides().iter().any(|s| self.linkage_of(s).is_some())
     }
 
-    /// First index and end of every stretch of `du` that they move.
+    /// Returns start and end of every range of `du` that the linkages move.
     pub fn stretches(&self) -> impl Iterator<Item = (u32, u32)> {
         self.linkages.iter().flat_map(|l| l.objects.iter().map(|(u, dof)| (*u, u + dof)))
     }
 
-    /// Lays out `Ỹ` of a block of other rows.
+    /// Computes `Ỹ` of a block of other rows.
     pub fn extend_sides(&mut self, rows: &Rows, block: &Block) -> SideRange {
         if self.is_empty() {
             return SideRange::default();
@@ -124,7 +131,7 @@ impl Linkages {
             self.push_side(side.u, side.dof, count);
         }
         for (i, linkage) in met.iter().enumerate().filter_map(|(i, l)| Some((i, (*l)?))) {
-            // both sides in one linkage are one reach
+            // two sides in one linkage share one range
             if i == 0 || met[0] != Some(linkage) {
                 let objects = std::mem::take(&mut self.linkages[linkage].objects);
                 objects.iter().for_each(|(u, dof)| self.push_side(*u, *dof, count));
@@ -144,7 +151,7 @@ impl Linkages {
         side_range
     }
 
-    /// `Ỹ −= Y_E·A⁻¹·K_Ei` of one linkage, for every row of a block.
+    /// Subtracts `Y_E·A⁻¹·K_Ei` of one linkage from `Ỹ`, for every row of a block.
     fn subtract_joint_responses(&mut self, rows: &Rows, block: &Block, linkage: usize, first: usize) {
         for k in 0..block.set.rows() {
             let linkage = &self.linkages[linkage];
@@ -171,7 +178,7 @@ impl Linkages {
         self.y.resize(self.y.len() + count * dof as usize, 0.0);
     }
 
-    /// `Ỹ_k += scale·y` on the object of `side`, in the reach that starts at `first`.
+    /// Adds `scale·y` to `Ỹ_k` on the object of `side`, in the range that starts at `first`.
     fn add(&mut self, first: usize, side: &Side, k: usize, scale: f64, y: &[f64]) {
         if let Some(to) = self.sides[first..].iter().find(|s| s.u == side.u) {
             let start = to.y as usize + k * y.len();
@@ -186,7 +193,7 @@ impl Linkages {
         }
     }
 
-    /// The sides that a block moves, and the numbers that their responses are in.
+    /// Returns the sides that a block moves, and the array of their responses.
     #[inline(always)]
     pub fn moved<'a>(&'a self, rows: &'a Rows, block: &'a Block, side_range: SideRange) -> (&'a [Side], &'a [f64]) {
         if side_range.is_own() {
@@ -196,7 +203,7 @@ impl Linkages {
         }
     }
 
-    /// `K̃_ij = Y_iᵀ·Ỹ_j` of a block's own rows.
+    /// Returns `K̃_ij = Y_iᵀ·Ỹ_j` of a block's own rows.
     pub fn own(&self, rows: &Rows, block: &Block, side_range: SideRange, i: usize, j: usize) -> f64 {
         if side_range.is_own() {
             return rows.own(block, i, j);
@@ -210,13 +217,14 @@ impl Linkages {
         block.sides().iter().filter_map(part).sum()
     }
 
-    /// The whole of a contact's own `K̃`.
+    /// Returns the `K̃` of a contact.
     pub fn own_contact(&self, rows: &Rows, block: &Block, side_range: SideRange) -> Symmetric3 {
         let k = |i, j| self.own(rows, block, side_range, i, j);
         Symmetric3 { m00: k(0, 0), m10: k(1, 0), m20: k(2, 0), m11: k(1, 1), m21: k(2, 1), m22: k(2, 2) }
     }
 
-    /// Finds all `λ_E` for the `du` that the other rows make, and adds what they do. Whether that leaves no velocity along any of the rows.
+    /// Solves all `λ_E` for the `du` of the other rows and adds their effect. Returns whether all
+    /// rows then have no velocity.
     pub fn solve_equalities(&self, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> bool {
         self.linkages.iter().map(|l| l.solve_equalities(rows, c, lambda, du)).fold(true, |all, settled| all & settled)
     }
@@ -254,7 +262,7 @@ impl Linkage {
     }
 }
 
-/// Whether a block is one free multiplier that does something.
+/// Returns whether a block is one free multiplier with a response.
 fn is_joint(rows: &Rows, block: &Block) -> bool {
     let free = match block.set {
         RowSet::Equality => true,
@@ -268,7 +276,7 @@ fn island<'a>(rows: &'a Rows, blocks: &'a [u32]) -> impl Iterator<Item = &'a Blo
     blocks.iter().map(|&b| &rows.blocks[b as usize])
 }
 
-/// The objects of some blocks, sorted: where `u` starts, freedoms.
+/// Returns the objects of the blocks, sorted: start of `u`, degrees of freedom.
 fn objects_of(rows: &Rows, blocks: &[u32]) -> Vec<(u32, u32)> {
     let mut objects: Vec<(u32, u32)> =
         island(rows, blocks).flat_map(|b| b.sides().iter().map(|s| (s.u, s.dof))).collect();
@@ -277,7 +285,7 @@ fn objects_of(rows: &Rows, blocks: &[u32]) -> Vec<(u32, u32)> {
     objects
 }
 
-/// The joints, parted by what hangs together, in the order of the first joint of each part.
+/// Returns the joints grouped by connected objects, in the order of each group's first joint.
 fn groups(rows: &Rows, joints: &[u32]) -> Vec<Vec<u32>> {
     let objects = objects_of(rows, joints);
     let place = |s: &Side| objects.binary_search(&(s.u, s.dof)).unwrap_or(0);
@@ -297,7 +305,7 @@ fn groups(rows: &Rows, joints: &[u32]) -> Vec<Vec<u32>> {
     let mut group_of = vec![usize::MAX; objects.len()];
     let mut groups: Vec<Vec<u32>> = Vec::new();
     for (&b, joint) in joints.iter().zip(island(rows, joints)) {
-        // a joint has a response, and so a side
+        // a joint has a response and therefore a side
         let root = joint.sides().first().map_or(0, |s| root(&parent, place(s)));
         if group_of[root] == usize::MAX {
             group_of[root] = groups.len();

@@ -5,7 +5,7 @@ use super::linkage::{Linkages, SideRange};
 use super::one_contact::{ContactBlock, Symmetric3};
 use crate::constraint::rows::{Block, RowSet, Rows};
 
-/// Blocks of an island that is solved without memory from the heap: a ball on a floor, a box on it.
+/// Number of blocks of an island that is solved without heap memory, such as a box on a floor.
 pub(super) const INLINE_BLOCKS: usize = 4;
 
 pub(super) fn write_back(locals: &[Local], lambda: &mut [f64]) {
@@ -15,7 +15,7 @@ pub(super) fn write_back(locals: &[Local], lambda: &mut [f64]) {
     }
 }
 
-/// `du += Y·λ` of the island, with the equalities that are solved at once; whether those are.
+/// Adds `Y·λ` of the island to `du` and solves the equality rows. Returns whether those hold.
 pub(super) fn apply(
     locals: &[Local],
     linkages: &Linkages,
@@ -34,31 +34,32 @@ pub(super) fn apply(
     linkages.solve_equalities(rows, c, lambda, du)
 }
 
-/// A block as the sweeps read it; of a scalar block only the first of each three numbers counts.
+/// A block in the layout of the sweeps. A scalar block uses the first of three numbers.
 pub(super) struct Local<'a> {
     pub block: &'a Block,
     pub c: [f64; 3],
     pub lambda: [f64; 3],
-    /// `λ` of the sweep before.
+    /// `λ` of the previous sweep.
     last: [f64; 3],
     pub step: BlockSolver,
     side_range: SideRange,
     dof6: Option<Dof6>,
 }
 
-/// What a sweep did.
+/// Changes made by a sweep.
 #[derive(Default)]
 pub(super) struct Progress {
     /// Largest change of a row velocity by its own block.
     pub change: f64,
-    /// How far the change from the extrapolated multipliers goes against the move since the last sweep.
+    /// Product of the change from the extrapolated multipliers and the last move, with sign
+    /// reversed: above 0 the sweep goes against the move.
     pub against: f64,
 }
 
 impl Progress {
     #[inline(always)]
     fn record(&mut self, change: f64) {
-        // Not `max`, which spends several instructions on NaN.
+        // `max` would take several instructions for NaN
         if change > self.change {
             self.change = change;
         }
@@ -74,13 +75,13 @@ pub(super) fn extrapolate_value(x: &mut f64, last: &mut f64, beta: f64) {
 }
 
 pub(super) enum BlockSolver {
-    /// No response: no impulse.
+    /// No response, so no impulse.
     Unresponsive,
     Scalar(ScalarBlock),
     Contact(ContactBlock),
 }
 
-/// A row by itself.
+/// A scalar row.
 pub(super) struct ScalarBlock {
     /// Its diagonal of `K + R`.
     pub k: f64,
@@ -133,7 +134,8 @@ impl<'a> Local<'a> {
         Local { block, c: numbers(c), lambda: start, last: start, step, side_range, dof6 }
     }
 
-    /// Extrapolates the multipliers of this block, solves it with the others held, and goes this share of the way there.
+    /// Extrapolates the multipliers of this block, solves it with the others held, and moves by
+    /// `factor` times the difference.
     #[inline(always)]
     pub fn relax(
         &mut self,
@@ -200,7 +202,7 @@ impl<'a> Local<'a> {
         }
     }
 
-    /// Brings the multipliers back to what they may be.
+    /// Projects the multipliers onto their set.
     pub fn bound(&mut self) {
         match &self.step {
             BlockSolver::Unresponsive => self.lambda = [0.0; 3],
@@ -222,8 +224,9 @@ impl<'a> Local<'a> {
 }
 
 impl ScalarBlock {
-    /// How the multiplier changes where it was `old` and the row velocity is `w = c + velocity + R·old`. Written so that what waits for
-    /// the velocity is short: rows of one body wait for each other.
+    /// Returns the change of the multiplier `old` at the row velocity `w = c + velocity + R·old`.
+    /// The terms are ordered so that few operations wait for `velocity`: the rows of one body
+    /// depend on each other.
     #[inline(always)]
     fn change(&self, old: f64, c: f64, velocity: f64) -> f64 {
         let without = -(c + self.compliance * old) * self.inverse;
@@ -231,7 +234,8 @@ impl ScalarBlock {
     }
 }
 
-/// Not the standard one, which panics where `lo > hi`, nor `max` and `min`, which spend instructions on NaN.
+/// Unlike the standard function it does not panic if `lo > hi`; unlike `max` and `min` it takes no
+/// instructions for NaN.
 #[inline(always)]
 fn clamp(x: f64, lo: f64, hi: f64) -> f64 {
     let above = if x < lo { lo } else { x };

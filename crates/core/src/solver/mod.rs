@@ -1,6 +1,7 @@
 //! Solvers of the one contact problem, each behind [`RowSolver`].
 //!
-//! Find `λ` in the rows' sets so that `w = c + (K + R)·λ` (`R`: compliance of soft rows) answers each set as [`RowSet`](crate::constraint::rows::RowSet) says.
+//! Find `λ` in the rows' sets so that `w = c + (K + R)·λ` (`R`: compliance of soft rows) answers
+//! each set as [`RowSet`](crate::constraint::rows::RowSet) says.
 
 mod dof6;
 mod equality;
@@ -28,45 +29,47 @@ pub use residual::residual;
 
 use crate::constraint::rows::Rows;
 
-/// How far an iterative solver goes. Pivoting solvers are exact and take no notice.
+/// Limits of an iterative solver. Pivoting solvers are exact and ignore them.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SolverSettings {
-    /// Sweeps at most, at least 1.
+    /// Maximum number of sweeps, at least 1.
     pub max_sweeps: u32,
-    /// Relaxations of one block at most, all sweeps of an island together: large islands get fewer sweeps, so that the cost of a
-    /// step is bounded, but never fewer than [`MIN_SWEEPS`] (or `sweeps`, if that is less).
+    /// Maximum number of block relaxations in all sweeps of an island. It bounds the cost of a
+    /// step: large islands get fewer sweeps, but at least [`MIN_SWEEPS`] (or `max_sweeps` if that
+    /// is less).
     pub max_relaxations: u32,
-    /// A sweep that changes no row velocity by more than this ends the solve (m/s; m/s² at the acceleration level).
+    /// A sweep that changes no row velocity by more than this ends the solve (m/s; m/s² at the
+    /// acceleration level).
     pub tolerance: f64,
 }
 
-/// What an island gets however large it is.
+/// Number of sweeps that every island gets, whatever its size.
 pub const MIN_SWEEPS: u32 = 25;
 
 impl SolverSettings {
-    /// Sweeps for an island of that many blocks.
+    /// Returns the maximum number of sweeps of an island with `blocks` blocks.
     pub fn max_sweeps_for(&self, blocks: usize) -> u32 {
         let share = self.max_relaxations / (blocks.max(1) as u32);
         share.max(MIN_SWEEPS).min(self.max_sweeps).max(1)
     }
 }
 
-/// How one island's solve ended.
+/// Result of the solve of one island.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolveReport {
-    /// Sweeps or pivots taken.
+    /// Number of sweeps or pivots.
     pub iterations: u32,
-    /// Whether the solver itself says that it reached its aim: the tolerance, or a complementary basis.
+    /// Whether the solver reached its own criterion: the tolerance, or a complementary basis.
     pub converged: bool,
-    /// A pivoting solver ended on a secondary ray: with friction no solution may exist (Painlevé), and the
-    /// caller resolves the contacts at the impulse level instead.
+    /// Whether a pivoting solver ended on a secondary ray. With friction there may be no solution
+    /// (Painlevé); the caller then resolves the contacts at the impulse level.
     pub ray: bool,
 }
 
-/// Names of all solvers, as files and the command line take them; `lcp` is short for `lcp_pyramid`.
+/// Names of all solvers in files and on the command line; `lcp` is short for `lcp_pyramid`.
 pub const NAMES: [&str; 3] = ["gauss_seidel", "lcp_pyramid", "lcp_sliding"];
 
-/// The solver of that name; `None` for a name that is not in [`NAMES`] and is not `lcp`.
+/// Returns the solver of that name; `None` for a name that is neither in [`NAMES`] nor `lcp`.
 pub fn by_name(name: &str) -> Option<Box<dyn RowSolver>> {
     match name {
         "gauss_seidel" => Some(Box::new(GaussSeidel)),
@@ -76,15 +79,15 @@ pub fn by_name(name: &str) -> Option<Box<dyn RowSolver>> {
     }
 }
 
-/// A way to solve rows.
+/// A solver of constraint rows.
 ///
-/// `lambda` comes in as the warm start and goes out as the answer; `du = Y·λ` of **these blocks** is added to `du`,
-/// which comes in as the sum over other islands (0 on this island's own stretches). A block without sides, or a
-/// row without response, gets no multiplier.
+/// `lambda` is the warm start on entry and the solution on return. `du = Y·λ` of **these blocks**
+/// is added to `du`, which holds the sum over other islands on entry (0 on this island's own
+/// ranges). A block without sides, or a row without response, gets no multiplier.
 pub trait RowSolver: Send + Sync {
-    /// The name that `--solver` takes.
+    /// Returns the name of the solver on the command line (`--solver`).
     fn name(&self) -> &'static str;
-    /// Solves the island made of `blocks` (indices into `rows.blocks`).
+    /// Solves the island of the given `blocks` (indices into `rows.blocks`).
     fn solve(
         &self,
         rows: &Rows,
@@ -94,6 +97,6 @@ pub trait RowSolver: Send + Sync {
         du: &mut [f64],
         settings: SolverSettings,
     ) -> SolveReport;
-    /// An independent copy.
+    /// Returns an independent copy.
     fn fork(&self) -> Box<dyn RowSolver>;
 }

@@ -1,31 +1,38 @@
-//! Newton's method for what sweeps leave: all blocks of an island at once.
+//! Newton's method for the error that sweeps leave: all blocks of an island at once.
 //!
-//! A contact among others that carry the same body is nearly redundant, and sweeps pass load between such contacts by small shares (a pin on
-//! its base wants hundreds). The conditions of all blocks are smooth but for the choice open, stick or slide; with that choice as the multipliers have
-//! it, one linear solve goes to where all hold (semismooth Newton; Alart and Curnier, *A mixed formulation for frictional contact problems prone to
-//! Newton like solution methods*, 1991). Sweeps between the jumps choose anew.
+//! A contact among others that carry the same body is nearly redundant, and sweeps move load
+//! between such contacts in small fractions (a pin on its base needs hundreds). The conditions of
+//! all blocks are smooth except for the choice of open, stick or slide. With the choice that the
+//! multipliers imply, one linear solve reaches the point at which all conditions hold (semismooth
+//! Newton; Alart and Curnier, *A mixed formulation for frictional contact problems prone to Newton
+//! like solution methods*, 1991). Sweeps between the Newton steps make the choice anew.
 //!
-//! Of each block, with `w = c + Yᵀ(Yλ) + Rλ` and the trial `τ = λ − w/k`, normal `τ_n` and `τ_t`:
+//! For each block, with `w = c + Yᵀ(Yλ) + Rλ` and the trial `σ = λ − w/k`, normal `σ_n` and
+//! tangential `σ_t`:
 //!
 //! ```text
-//! open      τ_n ≤ 0           δλ = −λ
-//! stick     |τ_t| ≤ μ τ_n     δλ = −(w + δw)/ε
+//! open      σ_n ≤ 0           δλ = −λ
+//! stick     |σ_t| ≤ μ σ_n     δλ = −(w + δw)/ε
 //! slide     else              δλ_n = −(w_n + δw_n)/ε,   δλ·t = μ δλ_n + r·t,   δλ·s = (r·s − κρ δw·s)/(1 − κ + ερ)
-//!           t = τ_t/|τ_t|,  s across it,  κ = μλ_n/|τ_t|,  ρ = 1/k_t,  r = μλ_n t − λ_t
-//! scalar    τ within          δλ = −(w + δw)/(ε + R);   else to the bound
+//!           t = σ_t/|σ_t|,  s across it,  κ = μλ_n/|σ_t|,  ρ = 1/k_t,  r = μλ_n t − λ_t
+//! scalar    σ within bounds   δλ = −(w + δw)/(ε + R);   else to the bound
 //! ```
 //!
-//! `ε` makes redundant multipliers one answer: the one nearest to those that are there, a proximal step that jumps again until nothing is left of it. So
-//! `δλ = a − G·Yᵀδu` for each block, and `δu = Σ Y·δλ` is one system with as many unknowns as the island has freedoms:
+//! `ε` selects one solution for redundant multipliers: the nearest to the present ones. It is a
+//! proximal step, repeated until nothing changes. With `δλ = a − G·Yᵀδu` for each block, `δu = Σ
+//! Y·δλ` is one system with as many unknowns as the island has degrees of freedom:
 //!
 //! ```text
 //! (1 + Σ Y G Yᵀ) δu = Σ Y a
 //! ```
 //!
-//! Where contacts conflict, the jump goes far along what is redundant: of two contacts close to each other one is to carry all, or two that stick on one body
-//! are asked for accelerations that no rigid body has, and one has to slide. All conditions together have no answer then, and the jump overshoots.
-//! So after one that was none a *cut* jump follows: as far as the first multiplier comes to its bound, `λ + α δλ` with the greatest `α ≤ 1` for which no
-//! normal changes sign and none that sticks leaves its cone. With that one at its bound the next jump has other conditions.
+//! A step goes far along redundant directions if contacts conflict. Examples: one of two
+//! neighboring contacts has to carry all load; two sticking contacts on one body demand
+//! accelerations that no rigid body has, so one must slide. The conditions then have no common
+//! solution and the step overshoots. After a failed step a *damped* step follows. It ends when the
+//! first multiplier reaches its bound: `λ + α δλ` with the largest `α ≤ 1` at which no normal
+//! changes sign and no sticking contact leaves its cone. With that multiplier at its bound the
+//! conditions of the next step differ.
 
 use super::extrapolation::Extrapolation;
 use super::local::{BlockSolver, Local};
@@ -34,36 +41,38 @@ use crate::constraint::rows::Rows;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
-/// `ε` as a share of the mean diagonal of `K`.
+/// `ε` as a fraction of the mean diagonal of `K`.
 const PROXIMAL: f64 = 1e-7;
-/// Islands of more freedoms than this are left to sweeps.
+/// Maximum number of degrees of freedom of an island; larger ones are left to sweeps.
 const MAX_DOFS: usize = 120;
-/// Sweeps before the first jump, besides half the number of freedoms.
+/// Number of sweeps before the first step, in addition to half the number of degrees of freedom.
 const FIRST_WAIT: u32 = 10;
-/// Sweeps after a jump before it is judged.
+/// Number of sweeps after a step before it is judged.
 const TRIAL_SWEEPS: u32 = 3;
-/// The same after a cut jump, which turns friction by much.
+/// Number of sweeps after a damped step before it is judged: such a step turns friction by much.
 const LONG_TRIAL_SWEEPS: u32 = 10;
-/// How far friction of a contact that slides may turn in a cut jump, radians, about.
+/// Approximate maximum turn of the friction of a sliding contact in a damped step, rad.
 const MAX_TURN: f64 = 0.5;
-/// A jump after which sweeps change more than this share of what they did before is not followed by another at once.
+/// If sweeps after a step change more than this fraction of what they did before, the next step
+/// waits.
 const WORTHWHILE: f64 = 0.8;
-/// A cut jump only moves on to other conditions: sweeps may change this many times as much after it.
+/// Admissible growth of the change per sweep after a damped step, which only leads to other
+/// conditions.
 const ALLOWED_GROWTH: f64 = 10.0;
-/// A contact is inside its cone by more than this share of the square of its bound.
+/// A contact is inside its cone by more than this fraction of the square of its bound.
 const INSIDE: f64 = 1e-9;
-/// From this sweep on a jump that was none doubles the wait for the next.
+/// From this sweep on a failed step doubles the wait for the next.
 const LATE_SWEEP: u32 = 200;
 
-/// When to jump, and what to go back to.
+/// When to take a step, and the multipliers to return to.
 pub(super) struct Newton {
     size: usize,
-    /// The sweep after which the next jump is due, or the present one is judged.
+    /// The sweep after which the next step is taken, or the present one is judged.
     due: u32,
     wait: u32,
-    /// Multipliers and change per sweep before a jump on trial.
+    /// Multipliers and change per sweep before a step on trial.
     before: Option<(Vec<[f64; 3]>, f64)>,
-    /// Whether the next jump, or the one on trial, is cut.
+    /// Whether the next step, or the one on trial, is damped.
     damped: bool,
 }
 
@@ -81,8 +90,9 @@ impl Newton {
         Newton { size, due: if size <= MAX_DOFS { wait } else { u32::MAX }, wait, before: None, damped: false }
     }
 
-    /// After the sweep `sweeps.start` that changed row velocities by `change`, of those up to `sweeps.end` that may follow: whether the multipliers jumped, or went back from a jump that was
-    /// none. The velocities are then to be made anew.
+    /// Takes, judges or reverts a step after the sweep `sweeps.start`, which changed row velocities
+    /// by `change`; `sweeps.end` is the last sweep. Returns whether multipliers changed, by a step
+    /// or by the reversal of a failed one. The velocities must then be computed anew.
     pub fn try_step(
         &mut self,
         sweeps: Range<u32>,
@@ -123,8 +133,8 @@ impl Newton {
     }
 }
 
-/// One jump of all multipliers, back within their bounds, or cut where the first of them comes to its bound; whether the system could be solved. `du` is
-/// that of the multipliers.
+/// Takes one step of all multipliers. A full step is projected onto the bounds; a damped one ends
+/// at the first bound. Returns whether the system could be solved. `du` belongs to the multipliers.
 fn newton_step(
     size: usize,
     damped: bool,
@@ -161,7 +171,7 @@ fn newton_step(
     true
 }
 
-/// `δλ` of one block.
+/// Returns `δλ` of one block.
 fn multiplier_change(
     local: &Local,
     linearization: &Linearization,
@@ -182,7 +192,8 @@ fn multiplier_change(
     change
 }
 
-/// How much of a change a contact's multipliers can take until the normal is 0, or until they leave the cone if they are inside.
+/// Returns the largest fraction of `change` at which the normal is not below 0 and multipliers
+/// inside the cone stay inside.
 fn max_fraction(local: &Local, change: &[f64; 3]) -> f64 {
     let (BlockSolver::Contact(contact), [n, x, y]) = (&local.step, local.lambda) else { return 1.0 };
     let lifts = if n > 0.0 && change[0] < -n { -n / change[0] } else { 1.0 };
@@ -195,13 +206,13 @@ fn max_fraction(local: &Local, change: &[f64; 3]) -> f64 {
     }
     let a = change[1] * change[1] + change[2] * change[2] - square * change[0] * change[0];
     let half = x * change[1] + y * change[2] - square * n * change[0];
-    // the least root above 0 of a α² + 2 half α − inside, written so that nothing cancels
+    // the smallest root above 0 of a α² + 2 half α − inside, written without cancellation
     let root = (half * half + a * inside).max(0.0).sqrt();
     let slides = if half + root > 0.0 { inside / (half + root) } else { 1.0 };
     lifts.min(slides)
 }
 
-/// `ε`; `None` where nothing responds.
+/// Returns `ε`; `None` if no block has a response.
 fn proximal(locals: &[Local]) -> Option<f64> {
     let diagonal = |local: &Local| match &local.step {
         BlockSolver::Unresponsive => None,

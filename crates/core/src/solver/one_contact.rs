@@ -1,4 +1,4 @@
-//! The problem of one contact alone: three rows, `w = b + K·λ`.
+//! The problem of a single contact: three rows, `w = b + K·λ`.
 //!
 //! ```text
 //! stick     −K⁻¹b in the cone                                 λ = −K⁻¹b
@@ -6,28 +6,30 @@
 //! slide     w_n = 0, w_t along the unit direction d           λ_t = −μ·λ_n·d,  λ_n = −b_n / r,  r = k_nn − μ·k_nt·d
 //! ```
 //!
-//! Sticking comes first: where two answers hold it keeps piles from flickering between sweeps. Sliding is answered by one projected step, normal
-//! first: gentle, and enough where the normal and the tangents hardly couple. Where `μ·|k_nt|` comes near `k_nn` (a leaning rod on rough
-//! ground) that step diverges, and sliding is solved exactly: the direction is the root of `g(φ) = d × w_t` with `d·w_t > 0`, found by
-//! Newton's method on the angle `φ` of `d`. Both have the Coulomb solutions as their fixed points.
+//! Sticking is tried first: if two solutions exist, this keeps piles from alternating between them.
+//! Sliding takes one projected step, normal first, which suffices if normal and tangents hardly
+//! couple. If `μ·|k_nt|` comes near `k_nn` (a leaning rod on rough ground) that step diverges and
+//! sliding is solved exactly. The direction is then the root of `g(φ) = d × w_t` with `d·w_t > 0`,
+//! found by Newton's method on the angle `φ` of `d`. Both have the Coulomb solutions as their fixed
+//! points.
 
 use crate::constraint::rows::{Block, Rows, dot, dot6};
 
-/// Share of `k_nn` from which `μ·|k_nt|` makes the plain step too bold.
+/// Fraction of `k_nn` at which `μ·|k_nt|` makes the projected step too large.
 const COUPLED: f64 = 0.5;
-/// Steps of Newton's method on the sliding direction.
+/// Maximum number of Newton steps for the sliding direction.
 const SLIDE_STEPS: u32 = 12;
 
-/// A contact with what its own block of `K` gives.
+/// A contact with its diagonal block of `K`.
 pub(super) struct ContactBlock {
     pub mu: f64,
-    /// Its own block of `K`.
+    /// Its diagonal block of `K`.
     pub k: Symmetric3,
-    /// `K⁻¹`, absent where a direction has no response.
+    /// `K⁻¹`, absent if a direction has no response.
     inverse: Option<Symmetric3>,
-    /// `1/λ_max(K_tt)`; 0 where no tangent has a response.
+    /// `1/λ_max(K_tt)`; 0 if no tangent has a response.
     rho: f64,
-    /// Whether `μ·|k_nt|` comes near `k_nn`.
+    /// Whether `μ·|k_nt|` is close to `k_nn`.
     coupled: bool,
 }
 
@@ -43,7 +45,7 @@ pub(super) struct Symmetric3 {
 }
 
 impl ContactBlock {
-    /// The contact whose own block of `K` is `k`.
+    /// Makes the contact with the diagonal block `k` of `K`.
     pub fn new(k: Symmetric3, mu: f64) -> ContactBlock {
         let mean = 0.5 * (k.m11 + k.m22);
         let half = 0.5 * (k.m11 - k.m22);
@@ -53,14 +55,15 @@ impl ContactBlock {
         ContactBlock { mu, k, inverse: if mu > 0.0 { k.inverse() } else { None }, rho, coupled }
     }
 
-    /// Whether a contact without multipliers stays so at normal velocity `w_n`, whatever the tangents do: where `μ·|k_nt| ≤ k_nn/2`, sticking would
-    /// need `w_n ≤ −λ_n·k_nn/2`.
+    /// Returns whether a contact without multipliers stays open at normal velocity `w_n`, whatever
+    /// the tangents do. If `μ·|k_nt| ≤ k_nn/2`, sticking would require `w_n ≤ −λ_n·k_nn/2`.
     #[inline(always)]
     pub fn stays_open(&self, old: [f64; 3], normal: f64) -> bool {
         normal >= 0.0 && !self.coupled && old == [0.0; 3]
     }
 
-    /// The multipliers that answer row velocities `w` found with multipliers `old`, and how they differ from those: `b = w − K·old`.
+    /// Returns the multipliers for row velocities `w` that were found with multipliers `old` (`b =
+    /// w − K·old`), and their difference from `old`.
     #[inline(always)]
     pub fn solve(&self, old: [f64; 3], w: [f64; 3]) -> ([f64; 3], [f64; 3]) {
         if let Some(inverse) = &self.inverse {
@@ -74,7 +77,7 @@ impl ContactBlock {
         (next, [next[0] - old[0], next[1] - old[1], next[2] - old[2]])
     }
 
-    /// The answers without sticking: the rarer ones in a pile.
+    /// Returns the solution without sticking, the rarer case in a pile.
     fn open_or_slide(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
         if !self.coupled {
             return self.projected_step(old, w);
@@ -87,13 +90,15 @@ impl ContactBlock {
         self.slide(old, b).unwrap_or_else(|| self.projected_step(old, w))
     }
 
-    /// The sliding answer, searched from the direction of the multipliers so far, from that of `b_t`, and from across it.
+    /// Returns the sliding solution. The search starts from the direction of the present
+    /// multipliers, from that of `b_t`, and from the directions across it.
     fn slide(&self, old: [f64; 3], b: [f64; 3]) -> Option<[f64; 3]> {
         let starts = [[-old[1], -old[2]], [b[1], b[2]], [-b[2], b[1]], [b[2], -b[1]]];
         starts.into_iter().find_map(|start| self.slide_from(unit(start)?, b))
     }
 
-    /// `None` where Newton's method ends elsewhere, or `r ≤ 0`: there friction alone would press the bodies together (Painlevé).
+    /// Returns `None` if Newton's method ends elsewhere, or if `r ≤ 0`: friction alone would then
+    /// press the bodies together (Painlevé).
     fn slide_from(&self, mut d: [f64; 2], b: [f64; 3]) -> Option<[f64; 3]> {
         let (k, mu) = (&self.k, self.mu);
         let along_normal = |v: [f64; 2]| k.m10 * v[0] + k.m20 * v[1];
@@ -122,8 +127,8 @@ impl ContactBlock {
         None
     }
 
-    /// One projected step: `λ_n ← max(0, λ_n − w_n/k_nn)`, then
-    /// `λ_t ← Π(λ_t − ρ·w_t)` onto the disc of radius `μ·λ_n`.
+    /// Returns one projected step: `λ_n ← max(0, λ_n − w_n/k_nn)`, then `λ_t ← Π(λ_t − ρ·w_t)` onto
+    /// the disk of radius `μ·λ_n`.
     fn projected_step(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
         let normal = (old[0] - w[0] / self.k.m00).max(0.0);
         let dn = normal - old[0];
@@ -134,7 +139,8 @@ impl ContactBlock {
         ])
     }
 
-    /// A normal multiplier of at least 0, and tangents shortened to the disc of `μ` times that.
+    /// Returns the multipliers projected: the normal at least 0, the tangents within the disk of
+    /// radius `μ` times the normal.
     #[inline(always)]
     pub fn bounded(&self, [n, t1, t2]: [f64; 3]) -> [f64; 3] {
         let n = n.max(0.0);
@@ -150,7 +156,7 @@ fn unit(v: [f64; 2]) -> Option<[f64; 2]> {
 }
 
 impl Symmetric3 {
-    /// The own block of `K` of a block of three rows.
+    /// Returns the diagonal block of `K` of a block of three rows.
     pub fn own(rows: &Rows, block: &Block) -> Symmetric3 {
         let mut k = Symmetric3::default();
         for side in block.sides() {
@@ -183,7 +189,7 @@ impl Symmetric3 {
         ]
     }
 
-    /// `None` where it is singular to working precision.
+    /// Returns `None` if the matrix is singular to working precision.
     fn inverse(&self) -> Option<Symmetric3> {
         let Symmetric3 { m00, m10, m20, m11, m21, m22 } = *self;
         let cofactors = Symmetric3 {

@@ -1,13 +1,15 @@
-//! How wrong a solution is, by a formula that shares no code with any solver.
+//! The error of a solution, by a formula that shares no code with any solver.
 //!
-//! The natural map with De Saxcé's shift: for a contact, `λ` solves the problem iff
-//! `λ = Π(λ − (w + μ·|w_t|·n) / d)`, with `Π` the projection onto the friction cone `|λ_t| ≤ μ·λ_n` and any `d > 0`.
-//! The residual is `‖λ − Π(…)‖·d`, in m/s, with `d` the mean diagonal of the block of `K`; for the scalar sets the shift is
-//! absent and `Π` clamps; `w` of a soft row has its `R·λ`. Source: Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008, ch. 13.
+//! The natural map with De Saxcé's shift: for a contact, `λ` solves the problem if and only if `λ =
+//! Π(λ − (w + μ·|w_t|·n) / d)`, with `Π` the projection onto the friction cone `|λ_t| ≤ μ·λ_n` and
+//! any `d > 0`. The residual is `‖λ − Π(…)‖·d`, in m/s, with `d` the mean diagonal of the block of
+//! `K`. The scalar sets have no shift and `Π` clamps; `w` of a soft row contains its `R·λ`. Source:
+//! Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008, ch. 13.
 
 use crate::constraint::rows::{Block, RowSet, Rows, dot};
 
-/// The largest residual of any block, m/s (m/s² where `c` holds accelerations). `du` must be `Y·λ` of all blocks.
+/// Returns the largest residual of any block, m/s (m/s² if `c` holds accelerations). `du` must be
+/// `Y·λ` of all blocks.
 pub fn residual(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], du: &[f64]) -> f64 {
     blocks.iter().map(|&b| block_residual(rows, &rows.blocks[b as usize], c, lambda, du)).fold(0.0, f64::max)
 }
@@ -38,7 +40,7 @@ fn block_residual(rows: &Rows, block: &Block, c: &[f64], lambda: &[f64], du: &[f
 }
 
 fn scalar(lambda: f64, w: f64, d: f64, lo: f64, hi: f64) -> f64 {
-    // Not `clamp`, which panics where `lo > hi`.
+    // `clamp` panics if `lo > hi`
     (lambda - (lambda - w / d).max(lo).min(hi)).abs() * d
 }
 
@@ -49,7 +51,7 @@ fn cone(lambda: [f64; 3], w: [f64; 3], d: f64, mu: f64) -> f64 {
     (0..3).map(|k| (lambda[k] - onto[k]).powi(2)).sum::<f64>().sqrt() * d
 }
 
-/// Euclidean projection onto `{ |x_t| ≤ μ·x_n }`.
+/// Returns the Euclidean projection onto `{ |x_t| ≤ μ·x_n }`.
 fn project(x: [f64; 3], mu: f64) -> [f64; 3] {
     let t = (x[1] * x[1] + x[2] * x[2]).sqrt();
     if t <= mu * x[0] {

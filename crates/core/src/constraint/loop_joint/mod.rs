@@ -1,27 +1,30 @@
-//! Loop closures: joints by equality rows, between any two parts of any two objects (future work of the thesis, §VI).
+//! Loop joints: joints by equality rows between any two parts of any two objects (future work of
+//! the thesis, §VI).
 //!
-//! A frame on each side, given in its part's axes: `p`, and `x y z` for the axes. With `s(q) = v_A(q) − v_B(q)`, the velocity of A's material
-//! point at `q` against B's, and `ω = ω_A − ω_B`:
+//! Each side has a frame in its part's axes: origin `p`, axes `x y z`. `s(q) = v_A(q) − v_B(q)` is
+//! the velocity of A's material point at `q` relative to B's, and `ω = ω_A − ω_B`:
 //!
 //! ```text
-//! rows                     error                       velocity           bias J̇·v
-//! place    e = X, Y, Z     e·(p_A − p_B)               e·ṗ_A − e·ṗ_B      e·(p̈_A − p̈_B)
-//! line     t = x_B, y_B    t·(p_A − p_B)               t·s(p_A)           t·ds/dt + (ω_B × t)·s
-//! turn     e = X, Y, Z     e·log(R_A·R_Bᵀ)             e·ω                e·(α_A − α_B)
-//! axis     t = x_B, y_B    t·(z_B × z_A)·θ/sin θ       t·ω                t·(α_A − α_B) + (ω_B × t)·ω
+//! rows                        error                       velocity           bias J̇·v
+//! origins     e = X, Y, Z     e·(p_A − p_B)               e·ṗ_A − e·ṗ_B      e·(p̈_A − p̈_B)
+//! line        t = x_B, y_B    t·(p_A − p_B)               t·s(p_A)           t·ds/dt + (ω_B × t)·s
+//! rotation    e = X, Y, Z     e·log(R_A·R_Bᵀ)             e·ω                e·(α_A − α_B)
+//! axis        t = x_B, y_B    t·(z_B × z_A)·θ/sin θ       t·ω                t·(α_A − α_B) + (ω_B × t)·ω
 //!
-//! point = place      hinge = place + axis      weld = place + turn      slider = line + turn
+//! spherical = origins    revolute = origins + axis    fixed = origins + rotation    prismatic = line + rotation
 //! ```
 //!
 //! | symbol | meaning |
 //! |---|---|
-//! | `X, Y, Z` | axes of the world: they never turn, so these rows are smooth in any pose |
-//! | `x_B, y_B, z_B` | axes of B's frame; hinge and slider keep `z_A` on `z_B` |
-//! | `p̈`, `α` | accelerations with all generalized velocities held: `ω × (ω × r)` of a rigid body, and what the joints above a link add |
+//! | `X, Y, Z` | axes of the world: they do not turn, so these rows are smooth in any pose |
+//! | `x_B, y_B, z_B` | axes of B's frame; revolute and prismatic joints keep `z_A` on `z_B` |
+//! | `p̈`, `α` | accelerations at constant generalized velocities: `ω × (ω × r)` of a rigid body, plus the terms of the joints above a link |
 //! | `θ` | the angle between `z_A` and `z_B` |
 //!
-//! Velocities and biases are exact in any pose; those of `coincident_origins` and `origin_on_line` are the derivatives of their errors (`s(p_A)` has the arm on which
-//! B's axes turn). A rotation's error is exact to first order and zero only where it should be: the projection goes there in Newton steps.
+//! Velocities and biases are exact in any pose. Those of the origin and line rows are the
+//! derivatives of their errors (`s(p_A)` contains the arm on which B's axes turn). The error of a
+//! rotation is exact to first order and vanishes only at the solution: the position correction
+//! reaches it in Newton steps.
 
 use crate::constraint::builder::RowBuilder;
 use crate::constraint::rows::RowSet;
@@ -35,75 +38,77 @@ use tumble_collide::{Mat3, Pose, Quat, Vec3};
 #[cfg(test)]
 mod tests;
 
-/// What a closure holds together.
+/// The motion that a loop joint leaves free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum LoopJointKind {
-    /// The frames' origins: a ball joint. Three rows.
+    /// The origins coincide; all rotations are free. Three rows.
     Spherical,
-    /// The origins and the z axes: one rotation is left. Five rows.
+    /// The origins and the z axes coincide; one rotation is free. Five rows.
     Revolute,
-    /// Both frames altogether. Six rows.
+    /// Both frames coincide. Six rows.
     Fixed,
-    /// All but the way along the z axes: a piston in its cylinder. Five rows.
+    /// All but the displacement along the z axes is held: a piston in its cylinder. Five rows.
     Prismatic,
 }
 
-/// One side of a closure: a frame fixed to a part, or to the world.
+/// One side of a loop joint: a frame fixed to a part, or to the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Anchor {
     /// Object and part; `None` for the world.
     pub part: Option<(ObjectId, usize)>,
-    /// The frame in the part's axes (the world's where there is no part), metres.
+    /// The frame in the part's axes, or in the world's if there is no part; m.
     pub frame: Pose,
 }
 
 impl Anchor {
-    /// A frame of the world.
+    /// Returns a frame of the world.
     pub fn world(frame: Pose) -> Anchor {
         Anchor { part: None, frame }
     }
 
-    /// A frame fixed to one part of an object.
+    /// Returns a frame fixed to one part of an object.
     pub fn on(id: ObjectId, part: usize, frame: Pose) -> Anchor {
         Anchor { part: Some((id, part)), frame }
     }
 }
 
-/// Why a closure was not made.
+/// Why a loop joint cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LoopJointError {
     /// Both sides are the world.
-    #[error("closure '{0}' joins the world to itself; one side must be a part of an object")]
+    #[error("loop joint '{0}' joins the world to itself; one side must be a part of an object")]
     NoPart(String),
     /// Both sides are the same part.
-    #[error("closure '{0}' joins a part to itself; its sides must be two parts, or a part and the world")]
+    #[error("loop joint '{0}' joins a part to itself; its sides must be two parts, or a part and the world")]
     SamePart(String),
-    /// A side is not there.
-    #[error("closure '{name}': there is no such object, or it has no part {part}")]
+    /// The object or part of a side does not exist.
+    #[error("loop joint '{name}': there is no such object, or it has no part {part}")]
     Gone {
-        /// Closure.
+        /// Loop joint.
         name: String,
-        /// Part asked for.
+        /// Part of the side.
         part: usize,
     },
     /// A frame, point or axis is not finite.
-    #[error("closure '{0}': a frame, point or axis is not finite")]
+    #[error("loop joint '{0}': a frame, point or axis is not finite")]
     NotFinite(String),
-    /// An axis without direction.
-    #[error("closure '{0}': the axis has length 0; it must have a direction")]
+    /// The axis has length 0.
+    #[error("loop joint '{0}': the axis has length 0; it must have a direction")]
     Axis(String),
 }
 
-/// How far the two sides are from where they should be.
+/// Deviation of the two sides from the constraint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PositionError {
-    /// Distance, metres: of the origins, or across the line of a slider.
+    /// Distance of the origins, m; of a prismatic joint, the distance from its line.
     pub distance: f64,
-    /// Angle, rad: between the frames, or the axes of a hinge; 0 for a point.
+    /// Angle between the frames, rad; of a revolute joint, between its axes; 0 for a spherical
+    /// joint.
     pub angle: f64,
 }
 
-/// A joint between two parts of any objects. It has no state. Where a side is gone or not alive it makes no rows.
+/// A joint between two parts of any objects. It has no state. It makes no rows while a side is
+/// missing or not enabled.
 ///
 /// ```
 /// # use tumble_core::{LoopJoint, RigidBody, Settings, World, collide::{Shape, Vec3}};
@@ -125,7 +130,12 @@ pub struct LoopJoint {
 type PartRef = Option<(ObjectId, usize)>;
 
 impl LoopJoint {
-    /// Joins two frames. They need not meet: the projection brings them together at [`recovery_speed`](crate::Settings::recovery_speed).
+    /// Joins two frames. Frames that do not coincide are brought together at
+    /// [`recovery_speed`](crate::Settings::recovery_speed).
+    ///
+    /// # Errors
+    /// [`LoopJointError::NoPart`] or [`LoopJointError::SamePart`] for sides that are the same,
+    /// [`LoopJointError::NotFinite`] for frames that are not finite.
     pub fn new(
         name: impl Into<String>,
         kind: LoopJointKind,
@@ -145,7 +155,11 @@ impl LoopJoint {
         Ok(LoopJoint { name, kind, a, b })
     }
 
-    /// Joins two parts as they stand at a world point (m): a ball joint.
+    /// Joins two parts in their present poses by a spherical joint at a world point (m).
+    ///
+    /// # Errors
+    /// [`LoopJointError`] if the sides are the same, a part does not exist, or the point is not
+    /// finite.
     pub fn spherical_at(
         name: impl Into<String>,
         world: &World,
@@ -156,7 +170,12 @@ impl LoopJoint {
         LoopJoint::at(name.into(), LoopJointKind::Spherical, world, [a, b], point, Vec3::z())
     }
 
-    /// Joins two parts as they stand by a hinge at a world point (m) about a world axis (of any length but 0).
+    /// Joins two parts in their present poses by a revolute joint at a world point (m) about a
+    /// world axis (any length but 0).
+    ///
+    /// # Errors
+    /// [`LoopJointError`] if the sides are the same, a part does not exist, or the point or axis is
+    /// not valid.
     pub fn revolute_at(
         name: impl Into<String>,
         world: &World,
@@ -168,7 +187,12 @@ impl LoopJoint {
         LoopJoint::at(name.into(), LoopJointKind::Revolute, world, [a, b], point, axis)
     }
 
-    /// Joins two parts as they stand; a world point (m) says where, which matters only for how errors are told.
+    /// Joins two parts rigidly in their present poses. The world point (m) is the origin of both
+    /// frames; it affects only the reported errors.
+    ///
+    /// # Errors
+    /// [`LoopJointError`] if the sides are the same, a part does not exist, or the point is not
+    /// finite.
     pub fn fixed_at(
         name: impl Into<String>,
         world: &World,
@@ -179,7 +203,12 @@ impl LoopJoint {
         LoopJoint::at(name.into(), LoopJointKind::Fixed, world, [a, b], point, Vec3::z())
     }
 
-    /// Lets two parts as they stand slide along a world axis (of any length but 0) through a world point (m), and do nothing else.
+    /// Joins two parts in their present poses by a prismatic joint along a world axis (any length
+    /// but 0) through a world point (m).
+    ///
+    /// # Errors
+    /// [`LoopJointError`] if the sides are the same, a part does not exist, or the point or axis is
+    /// not valid.
     pub fn prismatic_at(
         name: impl Into<String>,
         world: &World,
@@ -218,17 +247,18 @@ impl LoopJoint {
         LoopJoint::new(name, kind, sides[0], sides[1])
     }
 
-    /// What it holds.
+    /// Returns the motion that the joint leaves free.
     pub fn kind(&self) -> LoopJointKind {
         self.kind
     }
 
-    /// Its two sides, A and B.
+    /// Returns its two sides, A and B.
     pub fn sides(&self) -> [Anchor; 2] {
         [self.a, self.b]
     }
 
-    /// How far the sides are apart in a view of the world; `None` where it makes no rows.
+    /// Returns the deviation of the sides in a view of the world; `None` while the joint makes no
+    /// rows.
     pub fn position_error(&self, view: &WorldView) -> Option<PositionError> {
         let pair = EndPair { a: JointEnd::of(&self.a, view)?, b: JointEnd::of(&self.b, view)? };
         let mut d = pair.a.p() - pair.b.p();
@@ -245,10 +275,10 @@ impl LoopJoint {
     }
 }
 
-/// One side as it is in a view.
+/// One side in a view of the world.
 struct JointEnd {
     part: PartRef,
-    /// Its accelerations are those without any force.
+    /// State of the part, with the accelerations at zero force.
     part_state: PartState,
     frame: Pose,
 }
@@ -259,7 +289,7 @@ impl JointEnd {
             return Some(JointEnd { part: None, part_state: PartState::default(), frame: anchor.frame });
         };
         view.status(id).filter(|s| s.enabled)?;
-        // a part that is not there is left to the row, which refuses it by name
+        // a missing part is reported by the row, which refuses it by name
         let mut part_state = view.part_state(id, part).copied().unwrap_or_default();
         (part_state.angular_acceleration, part_state.acceleration) =
             (part_state.bias_angular_acceleration, part_state.bias_acceleration);
@@ -274,7 +304,7 @@ impl JointEnd {
         self.frame.rotation * Vec3::ith(k, 1.0)
     }
 
-    /// `p̈` of its own point at `p`.
+    /// Returns `p̈` of the side's material point at `p`.
     fn bias_acceleration_at(&self, p: &Vec3) -> Vec3 {
         self.part_state.acceleration_following(p, &self.part_state.velocity_at(p))
     }
@@ -298,12 +328,12 @@ impl EndPair {
         self.a.part_state.angular_acceleration - self.b.part_state.angular_acceleration
     }
 
-    /// `log(R_A·R_Bᵀ)`, world axes.
+    /// Returns `log(R_A·R_Bᵀ)`, world axes.
     fn rotation_error(&self) -> Vec3 {
         (self.a.frame.rotation * self.b.frame.rotation.inverse()).scaled_axis()
     }
 
-    /// The rotation vector that takes `z_B` to `z_A` the short way.
+    /// Returns the shortest rotation vector that takes `z_B` to `z_A`.
     fn axis_deviation(&self) -> Vec3 {
         let (za, zb) = (self.a.axis(2), self.b.axis(2));
         let (cross, cos) = (zb.cross(&za), zb.dot(&za));
@@ -315,7 +345,7 @@ impl EndPair {
         }
     }
 
-    /// The origins at the same place.
+    /// Adds the rows that keep the origins together.
     fn coincident_origins(&self, out: &mut RowBuilder) {
         let (pa, pb) = (self.a.p(), self.b.p());
         let (error, bias) = (pa - pb, self.a.bias_acceleration_at(&pa) - self.b.bias_acceleration_at(&pb));
@@ -324,7 +354,7 @@ impl EndPair {
         }
     }
 
-    /// A's origin on the line through B's origin along `z_B`.
+    /// Adds the rows that keep A's origin on the line through B's origin along `z_B`.
     fn origin_on_line(&self, out: &mut RowBuilder) {
         let (p, state_b) = (self.a.p(), &self.b.part_state);
         let (d, rate) = (p - self.b.p(), self.a.part_state.velocity_at(&p));
@@ -336,7 +366,7 @@ impl EndPair {
         }
     }
 
-    /// No rotation between the frames.
+    /// Adds the rows that keep the rotations of the frames equal.
     fn equal_rotations(&self, out: &mut RowBuilder) {
         let (error, bias) = (self.rotation_error(), self.alpha());
         for (k, e) in WORLD_AXES.iter().enumerate() {
@@ -344,7 +374,7 @@ impl EndPair {
         }
     }
 
-    /// `z_A` along `z_B`.
+    /// Adds the rows that keep `z_A` along `z_B`.
     fn axis(&self, out: &mut RowBuilder) {
         let (error, omega, alpha) = (self.axis_deviation(), self.omega(), self.alpha());
         for t in [self.b.axis(0), self.b.axis(1)] {
