@@ -1,10 +1,13 @@
-//! Dynamics for tumble: the traits, rigid bodies, contact rows, solvers, integrators, steppers and the world.
+//! Dynamics for tumble: the traits, rigid and articulated bodies, contact rows, solvers,
+//! integrators, steppers and the world.
 //!
-//! A step reads a flat state, accumulates forces, finds contacts, turns test impulses into rows, solves all rows at once and writes the state.
-//! Same inputs, same bits: no IO, clock, thread count, file format or GPU in here.
+//! A step reads the state, accumulates forces, finds contacts, turns test impulses into rows,
+//! solves all rows together and writes the state. Equal inputs give equal bits: this crate has no
+//! IO, clock, threads, file format or GPU.
 //!
-//! SI units, radians, z up; boxes, capsules and cylinders are made of *half* extents and half lengths. `docs/conventions.md` has these and the other
-//! conventions beside those of Python and of scene files.
+//! SI units, radians, z up; boxes, capsules and cylinders are made of *half* extents and half
+//! lengths. `docs/conventions.md` has these and the other conventions beside those of Python and of
+//! scene files.
 //!
 //! ```
 //! use tumble_core::{RigidBody, Settings, World, collide::{Pose, Shape}};

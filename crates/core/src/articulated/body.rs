@@ -1,9 +1,15 @@
-//! The articulated body (thesis §III.B, `KSkeleton` of Fig. 12): one object, exact at its joints, whose links collide like any body.
+//! The articulated body (thesis §III.B, `KSkeleton` of Fig. 12): one object, exact at its joints,
+//! whose links collide like any body.
 //!
-//! State `X = [q, v]`: the model's positions, then its velocities (see [`Joint`](super::Joint) for what the numbers of each joint mean). Parts, and so rows of the site
-//! table: one per moving link, with the link's frame and no shape, in the order of [`Model::links`]; then one for the base, which stands still; then one
-//! per collider, with its own frame.
-//! Generalized velocity is `v`; the mass matrix is whitened by the articulated inertias, `M = LᵀL`.
+//! State `x = [q, v]`: the model's positions, then its velocities; [`Joint`](super::Joint) lists
+//! the numbers of each joint. Parts, in the order of their rows in the table of part states:
+//!
+//! - one per moving link, with the link's frame and no shape, in the order of [`Model::links`];
+//! - one for the base, which does not move;
+//! - one per collider, with its own frame.
+//!
+//! The generalized velocity is `v`. The articulated inertias give the root of the mass matrix, `M =
+//! LᵀL`.
 
 use crate::articulated::algorithms::dynamics::{Dynamics, Scratch};
 use crate::articulated::algorithms::kinematics::Kinematics;
@@ -16,53 +22,53 @@ use nalgebra::{Quaternion, Translation3};
 use std::sync::{Mutex, MutexGuard};
 use tumble_collide::{ContactMode, Pose, Quat, Shape, Vec3};
 
-/// What is wrong with an articulated body.
+/// Why an articulated body is not valid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ArticulatedError {
-    /// No such frame in the model.
+    /// The model has no link of that name.
     #[error("articulated body '{body}' has no link named '{link}'")]
     NoLink {
         /// Body.
         body: String,
-        /// Name asked for.
+        /// Name of the link.
         link: String,
     },
-    /// A joint's constant is out of its range.
+    /// A constant of a joint is out of its range.
     #[error("articulated body '{body}', link '{link}': {what} is {value}; it must be {wanted}")]
     Range {
         /// Body.
         body: String,
-        /// Link that the joint moves.
+        /// Link moved by the joint.
         link: String,
         /// Which constant.
         what: &'static str,
         /// Value given.
         value: f64,
-        /// What would be right.
+        /// Admissible range.
         wanted: &'static str,
     },
-    /// A coupling between freedoms that cannot be.
+    /// A coupling is not valid.
     #[error(
         "articulated body '{body}': the coupling of degree of freedom {dof} to {of}: both must be different degrees of freedom of revolute or prismatic joints below {count}, ratio and offset finite"
     )]
     Coupling {
         /// Body.
         body: String,
-        /// Freedom that follows.
+        /// Degree of freedom that is coupled.
         dof: usize,
-        /// Freedom that it follows.
+        /// Degree of freedom that it follows.
         of: usize,
-        /// Number of freedoms.
+        /// Number of degrees of freedom.
         count: usize,
     },
-    /// Numbers that are no position or velocity of it.
+    /// Numbers are not valid positions or velocities.
     #[error("articulated body '{body}': {what} must be {wanted} finite numbers, quaternions of unit length")]
     Start {
         /// Body.
         body: String,
-        /// Which.
+        /// Positions or velocities.
         what: &'static str,
-        /// How many there must be.
+        /// Required number of values.
         wanted: usize,
     },
 }
@@ -70,22 +76,23 @@ pub enum ArticulatedError {
 /// A shape on a link.
 #[derive(Clone, Debug)]
 pub struct Collider {
-    /// Pose of the shape in the frame of the link that it is put on; of a mesh that of its file's frame. On the body it is that of the part's site.
+    /// Pose of the shape in the frame of its link; for a mesh, the pose of its file's frame.
+    /// Colliders of a body have the pose of the part's frame.
     pub pose: Pose,
     /// Geometry.
     pub shape: Shape,
     /// Surface constants.
     pub material: Material,
-    /// How its mesh or cylinder collides.
+    /// How a mesh or cylinder collides.
     pub contact_mode: ContactMode,
-    /// Its kind, for filtering.
+    /// Collision group of the part.
     pub group: CollisionGroup,
-    /// Kinds it meets, one bit each.
+    /// Groups that the part collides with, one bit each.
     pub mask: u64,
 }
 
 impl Collider {
-    /// A shape with the usual surface that meets everything.
+    /// Makes a collider with the default material that collides with every group.
     pub fn new(shape: Shape, pose: Pose) -> Collider {
         Collider {
             pose,
@@ -98,12 +105,12 @@ impl Collider {
     }
 }
 
-/// A collider in its place.
+/// A collider with its link.
 #[derive(Clone)]
 pub(super) struct LinkCollider {
-    /// Moving link; `None` for one that is fixed to the base.
+    /// Moving link; `None` for the base.
     pub link: Option<usize>,
-    /// What it is, with its pose in the moving link's frame (or the base's).
+    /// The collider, with its pose in the frame of the link or base.
     pub collider: Collider,
 }
 
@@ -130,12 +137,13 @@ pub struct ArticulatedBody {
     pub(super) visuals: Vec<Visual>,
     pub(super) cameras: Vec<CameraMount>,
     pub(super) lights: Vec<LightMount>,
-    /// What acts on each degree of freedom, in the order of `v`. May be changed between steps.
+    /// Settings of each degree of freedom, in the order of `v`. May change between steps.
     dofs: Vec<DofSettings>,
     pub(super) couplings: Vec<Coupling>,
-    /// Whether links meet other links of the same body; links joined to each other never do.
+    /// Whether links collide with other links of the same body. Links joined to each other never
+    /// do.
     pub self_collision: bool,
-    /// Pairs that do not meet, smaller number first and the base (`None`) before all; sorted.
+    /// Pairs that do not collide, smaller number first and the base (`None`) before all; sorted.
     pub(super) excluded_pairs: Vec<[Option<usize>; 2]>,
     pub(super) start: Vec<f64>,
     pub(super) dynamics: Dynamics,
@@ -186,7 +194,8 @@ impl Clone for ArticulatedBody {
 }
 
 impl ArticulatedBody {
-    /// A body at its zero position and at rest, with no colliders and nothing on its joints but what the model says.
+    /// Makes a body at its zero position and at rest, without colliders and with default dof
+    /// settings.
     pub fn new(name: impl Into<String>, model: Model) -> ArticulatedBody {
         let dynamics = Dynamics::new(&model);
         let mut start = vec![0.0; model.positions() + model.dof()];
@@ -223,7 +232,8 @@ impl ArticulatedBody {
         body
     }
 
-    /// Puts the base at a pose in the world: what stands on it moves along, and the start of every floating root.
+    /// Sets the pose of the base in the world. Everything attached to the base moves along, and so
+    /// does the start of every floating root.
     pub fn at(mut self, pose: Pose) -> Self {
         let step = pose * self.base.inverse();
         for link in self.model.links().iter().filter(|l| l.joint == super::Joint::Floating) {
@@ -238,13 +248,16 @@ impl ArticulatedBody {
         self
     }
 
-    /// The same under another name, so that one description can stand in a world more than once.
+    /// Sets the name, so that one description can appear several times in a world.
     pub fn named(mut self, name: impl Into<String>) -> Self {
         self.name = name.into();
         self
     }
 
-    /// Sets all positions at time 0 (see [`Joint`](super::Joint) for what they mean).
+    /// Sets all positions at time 0; [`Joint`](super::Joint) lists the numbers of each joint.
+    ///
+    /// # Errors
+    /// [`ArticulatedError::Start`] for another number of values or values that are no state.
     pub fn with_positions(mut self, q: &[f64]) -> Result<Self, ArticulatedError> {
         let wanted = self.model.positions();
         let mut start = self.start.clone();
@@ -260,6 +273,9 @@ impl ArticulatedBody {
     }
 
     /// Sets all velocities at time 0.
+    ///
+    /// # Errors
+    /// [`ArticulatedError::Start`] for another number of values or values that are not finite.
     pub fn with_velocities(mut self, v: &[f64]) -> Result<Self, ArticulatedError> {
         let (wanted, n) = (self.model.dof(), self.model.positions());
         if v.len() != wanted || v.iter().any(|x| !x.is_finite()) {
@@ -270,7 +286,10 @@ impl ArticulatedBody {
         Ok(self)
     }
 
-    /// Puts a shape on a link, given by the name it was added under (folded links too).
+    /// Adds a shape to the link of that name, which may be a folded link.
+    ///
+    /// # Errors
+    /// [`ArticulatedError::NoLink`].
     pub fn add_collider(&mut self, link: &str, mut collider: Collider) -> Result<(), ArticulatedError> {
         let Some(frame) = self.model.frame(link) else { return Err(self.no_link(link)) };
         let center = Translation3::from(collider.shape.center_of_mass());
@@ -279,34 +298,48 @@ impl ArticulatedBody {
         Ok(())
     }
 
-    /// Adds a picture to a link; its `part` is set here and its pose is in the link's frame.
+    /// Adds a visual to a link. Its pose is in the link's frame; its `part` is set here.
+    ///
+    /// # Errors
+    /// [`ArticulatedError::NoLink`].
     pub fn add_visual(&mut self, link: &str, mut visual: Visual) -> Result<(), ArticulatedError> {
         (visual.part, visual.pose) = self.part_of(link, &visual.pose)?;
         self.visuals.push(visual);
         Ok(())
     }
 
-    /// Adds a camera to a link; its `part` is set here and its pose is in the link's frame.
+    /// Adds a camera to a link. Its pose is in the link's frame; its `part` is set here.
+    ///
+    /// # Errors
+    /// [`ArticulatedError::NoLink`].
     pub fn add_camera(&mut self, link: &str, mut camera: CameraMount) -> Result<(), ArticulatedError> {
         (camera.part, camera.pose) = self.part_of(link, &camera.pose)?;
         self.cameras.push(camera);
         Ok(())
     }
 
-    /// Adds a light to a link; its `part` is set here and its pose is in the link's frame.
+    /// Adds a light to a link. Its pose is in the link's frame; its `part` is set here.
+    ///
+    /// # Errors
+    /// [`ArticulatedError::NoLink`].
     pub fn add_light(&mut self, link: &str, mut light: LightMount) -> Result<(), ArticulatedError> {
         (light.part, light.pose) = self.part_of(link, &light.pose)?;
         self.lights.push(light);
         Ok(())
     }
 
-    /// The part that a link is, or is folded into, and a pose of the link's frame in the part's.
+    /// Returns the part that carries a link, and the pose in the part's frame of a pose in the
+    /// link's frame.
     fn part_of(&self, link: &str, pose: &Pose) -> Result<(usize, Pose), ArticulatedError> {
         let Some(frame) = self.model.frame(link) else { return Err(self.no_link(link)) };
         Ok((frame.link.unwrap_or(self.model.links().len()), frame.pose * pose))
     }
 
-    /// Keeps two links from meeting; what is folded into another link, or into the base, stands for all of that.
+    /// Disables collisions between two links. A folded link stands for the link or base that it is
+    /// folded into.
+    ///
+    /// # Errors
+    /// [`ArticulatedError::NoLink`].
     pub fn exclude_collisions(&mut self, a: &str, b: &str) -> Result<(), ArticulatedError> {
         let find = |link: &str| self.model.frame(link).map(|f| f.link).ok_or_else(|| self.no_link(link));
         let (a, b) = (find(a)?, find(b)?);
@@ -317,10 +350,14 @@ impl ArticulatedBody {
         Ok(())
     }
 
-    /// Sets what acts on one degree of freedom (its place in `v`).
+    /// Sets the settings of the degree of freedom `index`, its index in `v`.
+    ///
+    /// # Errors
+    /// [`ArticulatedError::Range`] for a setting out of its range; [`ArticulatedError::NoLink`] for
+    /// an index out of range.
     pub fn set_dof(&mut self, index: usize, dof: DofSettings) -> Result<(), ArticulatedError> {
         let Some(link) = self.model.links().iter().find(|l| (l.v..l.v + l.joint.dof()).contains(&index)) else {
-            return Err(self.no_link(&format!("of freedom {index}")));
+            return Err(self.no_link(&format!("of degree of freedom {index}")));
         };
         if let Some((what, value, wanted)) = dof.range_error(link.joint.dof() == 1) {
             return Err(ArticulatedError::Range {
@@ -335,7 +372,11 @@ impl ArticulatedBody {
         Ok(())
     }
 
-    /// Makes one freedom follow another.
+    /// Couples one degree of freedom to another.
+    ///
+    /// # Errors
+    /// [`ArticulatedError::Coupling`] unless both are different degrees of freedom of revolute or
+    /// prismatic joints and the numbers are finite.
     pub fn couple(&mut self, coupling: Coupling) -> Result<(), ArticulatedError> {
         let Coupling { dof, of, multiplier, offset } = coupling;
         let fine = dof != of
@@ -349,50 +390,51 @@ impl ArticulatedBody {
         Ok(())
     }
 
-    /// The tree of links.
+    /// Returns the tree of links.
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// What acts on each degree of freedom.
+    /// Returns the settings of each degree of freedom.
     pub fn dofs(&self) -> &[DofSettings] {
         &self.dofs
     }
 
-    /// Where the base stands, in the world.
+    /// Returns the pose of the base in the world.
     pub fn base(&self) -> &Pose {
         &self.base
     }
 
-    /// The velocity coordinate of the joint that moves a link, if that joint has just one.
+    /// Returns the index in `v` of the joint that moves a link, if that joint has a single degree
+    /// of freedom.
     pub fn dof_of(&self, link: &str) -> Option<usize> {
         let link = &self.model.links()[self.model.link(link)?];
         (link.joint.dof() == 1).then_some(link.v)
     }
 
-    /// The place in `q` of the position of a revolute or prismatic freedom.
+    /// Returns the index in `q` of the position of a revolute or prismatic degree of freedom.
     pub fn position_of(&self, dof: usize) -> Option<usize> {
         self.model.links().iter().find(|l| l.v == dof && l.joint.dof() == 1).map(|l| l.q)
     }
 
-    /// The moving link that carries a part; `None` for the base and what is fixed to it.
+    /// Returns the moving link that carries a part; `None` for the base and parts fixed to it.
     pub fn link_of(&self, part: usize) -> Option<usize> {
         let links = self.model.links().len();
         if part < links { Some(part) } else { self.collider(part)?.link }
     }
 
-    /// The parts that are colliders of a moving link and of what is fixed to it; `None` is the base.
+    /// Returns the parts that are colliders of a moving link, or of the base for `None`.
     pub fn colliders_of(&self, link: Option<usize>) -> impl Iterator<Item = usize> {
         let first = self.model.links().len() + 1;
         self.colliders.iter().enumerate().filter(move |(_, part)| part.link == link).map(move |(k, _)| first + k)
     }
 
-    /// The collider that is this part, if it is one.
+    /// Returns the collider of a part, if it has one.
     pub(super) fn collider(&self, part: usize) -> Option<&LinkCollider> {
         self.colliders.get(part.checked_sub(self.model.links().len() + 1)?)
     }
 
-    /// What a link hangs on: its parent, beyond massless links of a stack. `None` is the base.
+    /// Returns the parent of a link, skipping massless links of stacked joints. `None` is the base.
     fn massive_ancestor(&self, link: usize) -> Option<usize> {
         let mut parent = self.model.links()[link].parent;
         while let Some(p) = parent.filter(|&p| self.model.links()[p].mass == super::LinkMass::none()) {
@@ -401,7 +443,7 @@ impl ArticulatedBody {
         parent
     }
 
-    /// Whether two different moving links (or the base, `None`) may meet.
+    /// Returns whether two moving links (or the base, `None`) may collide.
     pub(super) fn links_collide(&self, a: Option<usize>, b: Option<usize>) -> bool {
         let parent = |link: Option<usize>| link.map(|l| self.massive_ancestor(l));
         let grounded = |link: Option<usize>| link.is_none_or(|l| self.model.links()[l].joint != super::Joint::Floating);
@@ -410,7 +452,7 @@ impl ArticulatedBody {
         self.self_collision && a != b && !joined && !kept
     }
 
-    /// Whether these numbers are a state: finite, quaternions of unit length.
+    /// Returns whether the numbers are a state: finite, with quaternions of unit length.
     pub(super) fn is_state(&self, x: &[f64]) -> bool {
         let unit = |l: &super::Link| {
             let norm = l.joint.quaternion().map_or(1.0, |k| x[l.q + k..l.q + k + 4].iter().map(|q| q * q).sum::<f64>());

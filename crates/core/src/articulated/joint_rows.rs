@@ -1,4 +1,4 @@
-//! The rows that joints make: limits, dry friction, drives, couplings (equations in `dof.rs`).
+//! Rows of joints: limits, dry friction, drives, couplings (equations in `dof.rs`).
 
 use super::body::ArticulatedBody;
 use crate::articulated::model::dof::{DofSettings, Drive};
@@ -8,10 +8,11 @@ use crate::object::part_state::StateRange;
 use crate::object::{Constraint, Level, RowTarget};
 use crate::world::view::WorldView;
 
-/// Where rows are at the acceleration level a drive ends so far before a limit, radians or metres: further than the stepper finds it in time.
+/// Distance from a limit at which a drive stops, rad or m, if rows are at the acceleration level.
+/// It is larger than the accuracy with which the stepper locates the limit.
 const LIMIT_MARGIN: f64 = 1e-6;
 
-/// A freedom with its place: coordinate of its velocity, position (0 where it has none) and velocity.
+/// A degree of freedom: index of its velocity, position (0 if it has none), velocity and settings.
 struct DofState<'a> {
     index: usize,
     q: f64,
@@ -20,7 +21,7 @@ struct DofState<'a> {
 }
 
 impl ArticulatedBody {
-    /// Whether anything on its joints becomes a row.
+    /// Returns whether any setting or coupling makes a row.
     pub(super) fn has_rows(&self) -> bool {
         let rows =
             |f: &DofSettings| f.limits.is_some() || f.friction > 0.0 || f.damping > 0.0 || f.drive != Drive::None;
@@ -45,13 +46,14 @@ impl ArticulatedBody {
         }
     }
 
-    /// Energy of the springs, J.
+    /// Returns the energy of the springs, J.
     pub(super) fn spring_energy(&self, x: &[f64]) -> f64 {
         let energy = |p: DofState| p.settings.spring.map_or(0.0, |s| 0.5 * s.stiffness * (p.q - s.rest).powi(2));
         self.dof_states(x).map(energy).sum()
     }
 
-    /// Errors of the limits, in the order of their rows: lower, then upper, of each freedom.
+    /// Returns the errors of the limits in the order of their rows: for each degree of freedom the
+    /// lower, then the upper.
     fn limit_errors<'a>(&'a self, x: &'a [f64]) -> impl Iterator<Item = (usize, f64, f64)> {
         self.dof_states(x).filter_map(|p| p.settings.limits.map(|l| (p, l))).flat_map(|(p, [lo, hi])| {
             let errors = [(p.index, 1.0, p.q - lo), (p.index, -1.0, hi - p.q)];
@@ -89,13 +91,13 @@ impl Constraint for ArticulatedBody {
 }
 
 impl Level {
-    /// Length of the step at the velocity level, s.
+    /// Returns the length of the step at the velocity level, s.
     fn step(self) -> Option<f64> {
         if let Level::Velocity { h } = self { Some(h) } else { None }
     }
 }
 
-/// Makes rows on the coordinates of the owner.
+/// Makes rows on the generalized coordinates of the owner.
 struct RowMaker<'a, 'b> {
     unit: Vec<f64>,
     level: Level,
@@ -110,7 +112,8 @@ impl RowMaker<'_, '_> {
         entries.iter().for_each(|&(i, _)| self.unit[i] = 0.0);
     }
 
-    /// What a force of `limit` may give over the step: an impulse, or the force itself at the acceleration level.
+    /// Returns the set for a force of at most `limit`: an impulse over the step, or the force
+    /// itself at the acceleration level.
     fn bounded(&self, limit: f64) -> RowSet {
         let most = limit * self.level.step().unwrap_or(1.0);
         RowSet::Interval { lo: -most, hi: most }
@@ -130,7 +133,9 @@ impl RowMaker<'_, '_> {
         }
     }
 
-    /// The speed that a drive may ask for: none beyond the joint's limits, which hold whatever the drive's strength. At the end of a step it is just there.
+    /// Clamps the target velocity of a drive so that it does not point beyond the joint's limits,
+    /// which hold for any strength of the drive. At the end of a step the joint is then exactly at
+    /// the limit.
     fn within_limits(&self, p: &DofState, target: f64) -> f64 {
         let Some([lo, hi]) = p.settings.limits else { return target };
         let (down, up) = match self.level.step() {
@@ -150,7 +155,8 @@ impl RowMaker<'_, '_> {
             Drive::None => {}
             Drive::Position { stiffness, damping, target, velocity, limit } => {
                 let Some(h) = self.level.step() else { return };
-                // the view is that of the middle of the step: the position at its start is half a step behind
+                // the view is that of the middle of the step: the position at its start is half a
+                // step behind
                 let (q, gain) = (p.q - 0.5 * h * p.v, damping + h * stiffness);
                 let aim = (stiffness * (target - q) + damping * velocity) / gain;
                 let set = if hard(*limit) { RowSet::Equality } else { self.bounded(*limit) };

@@ -1,4 +1,5 @@
-//! The articulated body behind the interfaces of the thesis: it integrates, collides, is drawn and kept in step like any other object.
+//! The traits of objects for the articulated body: dynamics, collisions, visuals and
+//! synchronization.
 
 use super::body::{ArticulatedBody, LinkCollider};
 use crate::articulated::algorithms::energy::{energy, momentum};
@@ -81,7 +82,7 @@ impl Object for ArticulatedBody {
 }
 
 impl ArticulatedBody {
-    /// Wrenches per moving link from those per part.
+    /// Sums the wrenches on parts to wrenches on moving links.
     fn gather(&self, parts: &[Wrench], links: &mut [Wrench]) {
         let (moving, rest) = parts.split_at(links.len());
         links.copy_from_slice(moving);
@@ -137,8 +138,8 @@ impl Integratable for ArticulatedBody {
     fn singularity(&self) -> Option<String> {
         let link = &self.model.links()[self.dynamics.singular()?];
         Some(format!(
-            "nothing that hangs on the joint of link '{}' has inertia along it where it stands (gimbal lock of stacked joints, or a point mass on the axis): \
-             a spherical joint in place of the stack has no such pose",
+            "the joint of link '{}' moves no inertia in this pose (gimbal lock of stacked joints, or a point mass on the axis); \
+             a spherical joint instead of the stack has no such pose",
             link.name
         ))
     }
@@ -189,7 +190,8 @@ impl Integratable for ArticulatedBody {
 
     fn pull_back(&self, displacement: &[f64], v: &mut [f64]) {
         for link in self.model.links() {
-            // a link's own axes turn on the right, where the world's turn on the left: the same with both signs changed
+            // a link's own axes turn on the right, the world's on the left: the same with both
+            // signs reversed
             let sign = match link.joint {
                 Joint::Floating => 1.0,
                 Joint::Spherical => -1.0,
@@ -297,7 +299,7 @@ impl Renderable for ArticulatedBody {
     }
 }
 
-/// The whole state as little-endian `f64`: exact, for replicas.
+/// The state as little-endian `f64`: exact, for replicas.
 impl NetSync for ArticulatedBody {
     fn get_data(&self, me: &StateRange, view: &WorldView, out: &mut Vec<u8>) {
         sync::write_state(&view.x[me.x.clone()], out);
@@ -308,9 +310,9 @@ impl NetSync for ArticulatedBody {
     }
 }
 
-/// The pose that a part's frame has in its carrier, for those who put things on it.
+/// Placement of parts.
 impl ArticulatedBody {
-    /// Pose of a part's frame in the frame of the link (or the base) that carries it.
+    /// Returns the pose of a part's frame in the frame of the link (or base) that carries it.
     pub fn part_pose(&self, part: usize) -> Pose {
         self.collider(part).map_or(Pose::identity(), |p| p.collider.pose)
     }

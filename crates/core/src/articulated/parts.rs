@@ -1,4 +1,4 @@
-//! What of an articulated body is neither its model nor its freedoms, for archives.
+//! The parts of an articulated body that are neither its model nor its dof settings, for archives.
 
 use super::body::{ArticulatedBody, ArticulatedError, Collider, LinkCollider};
 use crate::articulated::model::dof::Coupling;
@@ -8,7 +8,7 @@ use tumble_collide::Pose;
 
 /// Everything that is fixed to the links, and the state at time 0.
 pub(crate) struct ArticulatedParts {
-    /// With the link that each is fixed to; `None` for the base.
+    /// Each with the moving link that it is fixed to; `None` for the base.
     pub colliders: Vec<(Option<usize>, Collider)>,
     pub visuals: Vec<Visual>,
     pub cameras: Vec<CameraMount>,
@@ -32,7 +32,7 @@ impl ArticulatedBody {
         }
     }
 
-    /// Puts them on a body without any, whose model stands on `base` already.
+    /// Adds the parts to a body without any, whose model is already placed on `base`.
     pub(crate) fn with_parts(mut self, base: Pose, parts: ArticulatedParts) -> Result<Self, ArticulatedError> {
         if !self.is_state(&parts.start) {
             return Err(ArticulatedError::Start { body: self.name, what: "positions", wanted: self.start.len() });

@@ -1,48 +1,51 @@
-//! What is asked of the narrow phase for one pair within a step: how far to look, whether at all, and when.
+//! Narrow-phase queries of a pair within a step: whether to query, with which margin, and at what
+//! time.
 //!
-//! Queries between meshes and cylinders are dear. They are not made where the boxes around both stay apart (`are_separated.rs`), not made twice at the same poses within a
-//! frame, and of two meshes of many vertices not with a margin as wide as fast bodies would need: those are
-//! followed.
+//! Queries between meshes and cylinders are expensive. They are skipped if the bounding boxes stay
+//! apart (`separation.rs`), and cached within a frame while the poses do not change. Two meshes of
+//! many vertices are not queried with the wide margin that fast bodies need; they are followed
+//! along free motion instead.
 
 use crate::contact::separation::{OrientedBox, are_separated};
 use crate::object::part_state::PartState;
 use crate::step::pose_after_free_motion;
 use tumble_collide::{Aabb, Contact, ContactMode, Pose, Shape, Vec3};
 
-/// How far two sphere trees look ahead in the `spheres` mode, as a share of the smaller one's radius.
+/// Margin of two sphere trees in the `spheres` mode, as a fraction of the smaller bounding radius.
 const TREE_MARGIN: f64 = 0.02;
-/// How far two meshes look ahead by their surfaces, likewise: further away they are followed along free motion. A wide margin has most of both surfaces in it.
+/// Margin of two meshes in the `surface` mode, as a fraction of the smaller bounding radius. Beyond
+/// it they are followed along free motion: a wide margin includes most of both surfaces.
 const MESH_MARGIN: f64 = 0.05;
-/// Vertices of a mesh that others look as far for as for a block.
+/// Maximum number of vertices of a mesh that is queried with the full margin.
 const SIMPLE_MESH_VERTICES: usize = 64;
-/// Looks along free motion, unless they come near and do not touch: then twice as many.
+/// Number of samples along free motion; twice as many if the bodies come near and do not touch.
 const MAX_SAMPLES: f64 = 16.0;
 
-/// How far apart two parts are looked for.
+/// How far apart parts may be to be paired.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PredictionMode {
-    /// As far as they come towards each other if neither is stopped: for who looks again after a stop.
+    /// The distance that they close if neither is stopped: for a query after an impact.
     Relative,
-    /// As far as either moves.
+    /// The sum of the distances that each moves.
     Each,
 }
 
-/// What a part may do within the horizon.
+/// Bounds on the motion of a part within the horizon.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct MotionBounds {
-    /// Of its origin at its present velocity, metres.
+    /// Displacement of its origin at its present velocity, m.
     way: Vec3,
-    /// What its acceleration adds, metres.
+    /// Additional displacement due to its acceleration, m.
     gain: Vec3,
-    /// Of its points around its origin, metres at most.
+    /// Bound on the displacement of its points about its origin, m.
     turn: f64,
 }
 
 impl MotionBounds {
-    /// `around` are the part's greatest distances from its origin along the world's axes, metres.
+    /// `around` are the part's largest distances from its origin along the world's axes, m.
     pub fn new(part_state: &PartState, bound: f64, around: Vec3, horizon: f64) -> MotionBounds {
         let (w, e) = (part_state.angular_velocity.abs(), around);
-        // |ω × r| by components, and as a whole
+        // |ω × r| by components and as a whole
         let sweep = Vec3::new(w.y * e.z + w.z * e.y, w.z * e.x + w.x * e.z, w.x * e.y + w.y * e.x).norm();
         let turning = if bound.is_finite() { sweep.min(w.norm() * bound) } else { 0.0 };
         MotionBounds {
@@ -52,13 +55,13 @@ impl MotionBounds {
         }
     }
 
-    /// All that a box around the part may meet, `near` aside.
+    /// Returns the box that a part in the box `tight` may touch, with the margin `near`.
     pub fn swept(&self, tight: &Aabb, near: f64) -> Aabb {
         let grown = tight.grown(near + self.turn + self.gain.norm());
         Aabb { min: grown.min + self.way.inf(&Vec3::zeros()), max: grown.max + self.way.sup(&Vec3::zeros()) }
     }
 
-    /// The same along a unit direction, from the other to this one.
+    /// Returns the distance closed along a unit direction from the other part to this one, m.
     fn along(&self, n: &Vec3, other: &MotionBounds, prediction: PredictionMode) -> f64 {
         let turns = self.turn + other.turn + self.gain.norm() + other.gain.norm();
         let (this, that) = (-n.dot(&self.way), n.dot(&other.way));
@@ -69,7 +72,7 @@ impl MotionBounds {
             }
     }
 
-    /// By how much a gap between two parts may close, metres.
+    /// Returns the distance by which a gap between two parts may close, m.
     fn between(&self, other: &MotionBounds, prediction: PredictionMode) -> f64 {
         let turns = self.turn + other.turn;
         match prediction {
@@ -79,35 +82,35 @@ impl MotionBounds {
     }
 }
 
-/// Two parts that may meet, A first.
+/// Two parts that may touch, A first.
 pub(crate) struct PairQuery<'a> {
     pub mode: ContactMode,
     pub shapes: [&'a Shape; 2],
     pub part_states: [&'a PartState; 2],
     pub motion_bounds: [MotionBounds; 2],
-    /// What counts as near, metres.
+    /// Distance that counts as near, m.
     pub near: f64,
     pub prediction: PredictionMode,
 }
 
 impl PairQuery<'_> {
-    /// Whether a mesh or cylinder takes part.
+    /// Returns whether a mesh or cylinder takes part.
     pub fn is_expensive(&self) -> bool {
         self.shapes.iter().any(|shape| shape.has_tree())
     }
 
-    /// Whether the boxes around both cannot come near each other.
+    /// Returns whether the bounding boxes cannot come near each other.
     pub fn is_separated(&self) -> bool {
         let [a, b] = [0, 1].map(|k| OrientedBox::around(self.shapes[k], &self.part_states[k].pose));
         are_separated(&a, &b, |n| self.near + self.motion_bounds[0].along(n, &self.motion_bounds[1], self.prediction))
     }
 
-    /// Gaps up to this are wanted, and up to this may close.
+    /// Returns the margin of the query, and the distance by which the gap may close.
     fn margins(&self) -> (f64, f64) {
         let closing = self.near + self.motion_bounds[0].between(&self.motion_bounds[1], self.prediction);
         let size = self.shapes.iter().map(|shape| shape.bounding_radius()).fold(f64::INFINITY, f64::min);
         let margin = match (self.mode, self.shapes.map(|shape| shape.has_tree())) {
-            // Two trees within a wide margin have contacts by the million: there the look ahead is bounded.
+            // two trees within a wide margin have contacts by the million, so the margin is bounded
             (ContactMode::Spheres, [true, true]) => closing.min(self.near + TREE_MARGIN * size),
             (ContactMode::Surface, [true, true]) if !self.has_simple_mesh() => {
                 closing.min(self.near + MESH_MARGIN * size)
@@ -117,15 +120,17 @@ impl PairQuery<'_> {
         (margin, closing)
     }
 
-    /// Whether one is a mesh of few vertices: against it a wide margin is cheap, as against a block.
+    /// Returns whether one shape is a mesh of few vertices: a wide margin is then cheap, as for a
+    /// box.
     fn has_simple_mesh(&self) -> bool {
         self.shapes
             .iter()
             .any(|shape| matches!(shape, Shape::Mesh(mesh) if mesh.mesh().vertices.len() <= SIMPLE_MESH_VERTICES))
     }
 
-    /// The contacts at present, by feature, and 0. Of two meshes without any that are further apart than they look, those of where free motion brings them near, and when in
-    /// s. `rows` are the places of both in the site table.
+    /// Finds the present contacts, ordered by feature, and returns 0. Two meshes without any within
+    /// the margin are followed: it then finds the contacts where free motion brings them near, and
+    /// returns the time, s. `rows` are the indices of both in the table of part states.
     pub fn contacts(
         &self,
         rows: [u32; 2],
@@ -150,7 +155,9 @@ impl PairQuery<'_> {
         self.advance_conservatively((margin, closing), horizon, found)
     }
 
-    /// Conservative advancement: no gap closes faster than `closing/horizon`, so a look that sees nothing within its margin, or a least gap, lets that much time pass.
+    /// Finds contacts by conservative advancement. No gap closes faster than `closing/horizon`, so
+    /// a query without a contact within its margin, or its least gap, allows that much time to
+    /// pass.
     fn advance_conservatively(&self, (margin, closing): (f64, f64), horizon: f64, found: &mut Vec<Contact>) -> f64 {
         let (speed, wide) = (closing / horizon, margin.max(closing / MAX_SAMPLES));
         let mut moment = margin / speed;
@@ -184,12 +191,13 @@ impl PairQuery<'_> {
     }
 }
 
-/// What dear queries of this frame gave: the last detection's, and those of the one that goes on. Pairs come in ascending order.
+/// Results of expensive queries in this frame: of the last detection, and of the present one. Pairs
+/// come in ascending order.
 #[derive(Default)]
 pub(crate) struct NarrowPhaseCache {
     last: CachedContacts,
     now: CachedContacts,
-    /// How far the pairs of the last detection have been passed.
+    /// Position in the pairs of the last detection.
     place: usize,
 }
 
@@ -203,7 +211,7 @@ struct CachedQuery {
     rows: [u32; 2],
     poses: [Pose; 2],
     margin: f64,
-    /// Where its contacts end; they begin where those of the pair before end.
+    /// End of its contacts; they start at the end of the previous pair's.
     end: usize,
 }
 
@@ -219,18 +227,19 @@ impl NarrowPhaseCache {
         self.last.clear();
     }
 
-    /// A detection begins.
+    /// Starts a detection.
     pub fn begin(&mut self) {
         self.now.clear();
         self.place = 0;
     }
 
-    /// It ends, and is the last one.
+    /// Ends a detection, which becomes the last one.
     pub fn end(&mut self) {
         std::mem::swap(&mut self.last, &mut self.now);
     }
 
-    /// Writes to `found` what the last detection found for a pair, if neither side has moved since and it looked as far; whether it did.
+    /// Writes the cached contacts of a pair to `found`, if neither part has moved and the margin
+    /// was at least as large. Returns whether it did.
     fn look_up(&mut self, rows: [u32; 2], poses: &[Pose; 2], margin: f64, found: &mut Vec<Contact>) -> bool {
         let queries = &self.last.queries;
         while queries.get(self.place).is_some_and(|k| k.rows < rows) {

@@ -1,9 +1,10 @@
-//! Inertia of a body with others hanging on it by joints [RBDA §7.1]: 21 numbers, world axes.
+//! Articulated-body inertia: a body with descendants attached by joints [RBDA §7.1]. 21 numbers,
+//! world axes.
 //!
 //! ```text
 //! IA = [ J   H ]      [n; f] = [J α + H a;  Hᵀ α + M a]
 //!      [ Hᵀ  M ]
-//! seen at the point from which this one's origin is r away,  Xᵀ IA X  with  X = [1 0; −r× 1]:
+//! about the point from which this one's origin is at r,  Xᵀ IA X  with  X = [1 0; −r× 1]:
 //!      M' = M;   H' = H + r× M;   J' = J − H r× + r× H'ᵀ
 //! ```
 
@@ -14,19 +15,19 @@ use super::scalar::Scalar;
 use super::vector::Vector;
 use std::ops::Add;
 
-/// A symmetric 6×6 by its blocks; `H` by its rows.
+/// A symmetric 6×6 matrix by its blocks; `H` by its rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ArticulatedInertia<T = f64> {
     /// `J`, kg·m².
     pub rotational: Symmetric<T>,
     /// Rows of `H`, kg·m.
     pub coupling: [Vector<T>; 3],
-    /// `M`, kg: not the same in every direction.
+    /// `M`, kg: depends on the direction.
     pub mass: Symmetric<T>,
 }
 
 impl<T: Scalar> ArticulatedInertia<T> {
-    /// Of a rigid body.
+    /// Returns the inertia of a rigid body.
     #[inline(always)]
     pub fn rigid(body: &Inertia<T>) -> ArticulatedInertia<T> {
         let (h, zero) = (body.moment, body.mass.constant(0.0));
@@ -34,19 +35,19 @@ impl<T: Scalar> ArticulatedInertia<T> {
         ArticulatedInertia { rotational: body.rotational, coupling, mass: Symmetric::scaled_identity(body.mass) }
     }
 
-    /// `H v`.
+    /// Returns `H v`.
     #[inline(always)]
     pub fn coupling_times(&self, v: Vector<T>) -> Vector<T> {
         Vector::new(self.coupling[0].dot(v), self.coupling[1].dot(v), self.coupling[2].dot(v))
     }
 
-    /// `Hᵀ v`.
+    /// Returns `Hᵀ v`.
     #[inline(always)]
     pub fn coupling_transposed_times(&self, v: Vector<T>) -> Vector<T> {
         self.coupling[0] * v.x + self.coupling[1] * v.y + self.coupling[2] * v.z
     }
 
-    /// `IA [α; a]`.
+    /// Returns `IA [α; a]`.
     #[inline(always)]
     pub fn times(&self, a: Motion<T>) -> Force<T> {
         Force {
@@ -55,19 +56,20 @@ impl<T: Scalar> ArticulatedInertia<T> {
         }
     }
 
-    /// `IA s` of a turn about the axis `s`: `[J s; Hᵀ s]`.
+    /// Returns `IA s` of a rotation about the axis `s`: `[J s; Hᵀ s]`.
     #[inline(always)]
     pub fn times_angular(&self, s: Vector<T>) -> Force<T> {
         Force { torque: self.rotational * s, force: self.coupling_transposed_times(s) }
     }
 
-    /// `IA s` of a slide along `s`: `[H s; M s]`.
+    /// Returns `IA s` of a translation along `s`: `[H s; M s]`.
     #[inline(always)]
     pub fn times_linear(&self, s: Vector<T>) -> Force<T> {
         Force { torque: self.coupling_times(s), force: self.mass * s }
     }
 
-    /// `IA − U Uᵀ d`: what is left where a joint with `U = IA s` and `d = 1/(s·U)` gives way.
+    /// Returns `IA − U Uᵀ d`: the inertia that remains beyond a joint with `U = IA s` and `d =
+    /// 1/(s·U)`.
     #[inline(always)]
     pub fn minus_square(&self, u: Force<T>, d: T) -> ArticulatedInertia<T> {
         let (n, f) = (u.torque * d, u.force * d);
@@ -79,7 +81,7 @@ impl<T: Scalar> ArticulatedInertia<T> {
         }
     }
 
-    /// The same inertia about the point from which this one's origin is `r` away.
+    /// Returns the same inertia about the point from which this one's origin is at `r`.
     #[inline(always)]
     pub fn from_arm(&self, r: Vector<T>) -> ArticulatedInertia<T> {
         let (mx, my, mz) = (self.mass.row_x(), self.mass.row_y(), self.mass.row_z());

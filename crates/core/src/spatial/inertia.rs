@@ -12,19 +12,20 @@ use super::transform::Transform;
 use super::vector::Vector;
 use tumble_collide::{Mat3, Vec3};
 
-/// How a rigid body resists motion, about its frame's origin.
+/// Inertia of a rigid body about its frame's origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Inertia<T = f64> {
     /// `J`, about the frame's origin, kg·m².
     pub rotational: Symmetric<T>,
-    /// `h = m·c`, mass times centre of mass, kg·m.
+    /// `h = m·c`, mass times center of mass, kg·m.
     pub moment: Vector<T>,
     /// `m`, kg.
     pub mass: T,
 }
 
 impl<T: Scalar> Inertia<T> {
-    /// Momentum of a body that moves by `velocity` (or the force that gives it this acceleration from rest).
+    /// Returns the momentum of a body with velocity `velocity`, or the force for that acceleration
+    /// from rest.
     #[inline(always)]
     pub fn times(&self, velocity: Motion<T>) -> Force<T> {
         Force {
@@ -33,7 +34,7 @@ impl<T: Scalar> Inertia<T> {
         }
     }
 
-    /// Twice the kinetic energy: `vᵀ I v`, J.
+    /// Returns twice the kinetic energy, `vᵀ I v`, J.
     #[inline(always)]
     pub fn doubled_energy(&self, velocity: Motion<T>) -> T {
         velocity.power(self.times(velocity))
@@ -41,15 +42,15 @@ impl<T: Scalar> Inertia<T> {
 }
 
 impl Inertia<f64> {
-    /// From mass, kg, centre of mass, metres, and the inertia about it, kg·m², all in the frame's axes:
-    /// `J = I + m(|c|²·1 − c cᵀ)`.
+    /// Makes the inertia of a body from mass, kg, center of mass, m, and the inertia about it,
+    /// kg·m², all in the frame's axes: `J = I + m(|c|²·1 − c cᵀ)`.
     pub fn new(mass: f64, center: &Vec3, about_center: &Mat3) -> Inertia<f64> {
         let rotational = about_center + mass * (center.norm_squared() * Mat3::identity() - center * center.transpose());
         Inertia { rotational: rotational.into(), moment: (mass * center).into(), mass }
     }
 
-    /// The inertia of B's coordinates in those of A:
-    /// `J' = R J Rᵀ + m(|p|² − p pᵀ) + 2 (p·Rh) − p Rhᵀ − Rh pᵀ`, `h' = R h + m p`.
+    /// Returns the inertia in coordinates of A, from coordinates of B: `J' = R J Rᵀ + m(|p|² − p
+    /// pᵀ) + 2 (p·Rh) − p Rhᵀ − Rh pᵀ`, `h' = R h + m p`.
     pub fn seen_from(&self, frame: &Transform<f64>) -> Inertia<f64> {
         let (r, p, h): (Mat3, Vec3, Vec3) =
             (frame.rotation.into(), frame.position.into(), (frame.rotation * self.moment).into());

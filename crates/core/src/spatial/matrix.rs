@@ -1,4 +1,4 @@
-//! Three by three numbers, any or symmetric.
+//! General and symmetric 3×3 matrices.
 
 use super::scalar::Scalar;
 use super::vector::Vector;
@@ -17,25 +17,25 @@ pub struct Matrix<T = f64> {
 }
 
 impl<T: Scalar> Matrix<T> {
-    /// `[x y z]`, columns.
+    /// Makes the matrix `[x y z]` from its columns.
     #[inline(always)]
     pub fn new(x: Vector<T>, y: Vector<T>, z: Vector<T>) -> Matrix<T> {
         Matrix { x, y, z }
     }
 
-    /// `Aᵀ v`.
+    /// Returns `Aᵀ v`.
     #[inline(always)]
     pub fn transposed_times(&self, v: Vector<T>) -> Vector<T> {
         Vector::new(self.x.dot(v), self.y.dot(v), self.z.dot(v))
     }
 
-    /// `A c` of a constant vector.
+    /// Returns `A c` for a constant vector.
     #[inline(always)]
     pub fn of_constant(&self, c: &Vector<f64>) -> Vector<T> {
         self.x.times_constant(c.x) + self.y.times_constant(c.y) + self.z.times_constant(c.z)
     }
 
-    /// `A C` of a constant matrix.
+    /// Returns `A C` for a constant matrix.
     #[inline(always)]
     pub fn times_constant(&self, c: &Matrix<f64>) -> Matrix<T> {
         Matrix { x: self.of_constant(&c.x), y: self.of_constant(&c.y), z: self.of_constant(&c.z) }
@@ -92,14 +92,14 @@ pub struct Symmetric<T = f64> {
 }
 
 impl<T: Scalar> Symmetric<T> {
-    /// `s·1`.
+    /// Returns `s·1`.
     #[inline(always)]
     pub fn scaled_identity(s: T) -> Symmetric<T> {
         let zero = s.constant(0.0);
         Symmetric { xx: s, yy: s, zz: s, xy: zero, xz: zero, yz: zero }
     }
 
-    /// `a bᵀ + b aᵀ`.
+    /// Returns `a bᵀ + b aᵀ`.
     #[inline(always)]
     pub fn of_pair(a: Vector<T>, b: Vector<T>) -> Symmetric<T> {
         let (x, y, z) = (a.x * b.x, a.y * b.y, a.z * b.z);
@@ -113,31 +113,31 @@ impl<T: Scalar> Symmetric<T> {
         }
     }
 
-    /// First row (and column).
+    /// Returns the first row (and column).
     #[inline(always)]
     pub fn row_x(&self) -> Vector<T> {
         Vector::new(self.xx, self.xy, self.xz)
     }
 
-    /// Second row (and column).
+    /// Returns the second row (and column).
     #[inline(always)]
     pub fn row_y(&self) -> Vector<T> {
         Vector::new(self.xy, self.yy, self.yz)
     }
 
-    /// Third row (and column).
+    /// Returns the third row (and column).
     #[inline(always)]
     pub fn row_z(&self) -> Vector<T> {
         Vector::new(self.xz, self.yz, self.zz)
     }
 
-    /// Sum of the diagonal.
+    /// Returns the sum of the diagonal.
     #[inline(always)]
     pub fn trace(&self) -> T {
         self.xx + self.yy + self.zz
     }
 
-    /// `A − a bᵀ`, where `a` and `b` are parallel, so that the result is symmetric.
+    /// Returns `A − a bᵀ` for parallel `a` and `b`, so that the result is symmetric.
     #[inline(always)]
     pub fn minus_outer(&self, a: Vector<T>, b: Vector<T>) -> Symmetric<T> {
         Symmetric {
@@ -175,7 +175,7 @@ impl<T: Scalar> Mul<Vector<T>> for Symmetric<T> {
 }
 
 impl From<Mat3> for Symmetric<f64> {
-    /// The symmetric part.
+    /// Takes the symmetric part.
     fn from(m: Mat3) -> Symmetric<f64> {
         let mean = |i: usize, j: usize| 0.5 * (m[(i, j)] + m[(j, i)]);
         Symmetric { xx: m[(0, 0)], yy: m[(1, 1)], zz: m[(2, 2)], xy: mean(0, 1), xz: mean(0, 2), yz: mean(1, 2) }

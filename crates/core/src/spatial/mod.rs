@@ -1,14 +1,15 @@
-//! Spatial algebra: what moves and what pushes, six numbers at a time [RBDA §2].
+//! Spatial algebra: motions and forces of six numbers [RBDA §2].
 //!
 //! | type | numbers | meaning |
 //! |---|---|---|
-//! | [`Motion`] | angular, linear | velocity or acceleration of a body, seen at a point of it |
+//! | [`Motion`] | angular, linear | velocity or acceleration of a body, at one of its points |
 //! | [`Force`] | torque, force | wrench or momentum, the torque about a point |
 //! | [`Transform`] | `R`, `p` | change of frame, for both of the above; never stored as 6×6 |
 //! | [`Inertia`] | mass, first moment, inertia about the frame's origin: 10 | of a rigid body |
-//! | [`ArticulatedInertia`] | `J`, `H`, `M`: 21 | of a body that others hang on by joints |
+//! | [`ArticulatedInertia`] | `J`, `H`, `M`: 21 | of a body with descendants attached by joints |
 //!
-//! Motion and force are different spaces: the one product between them is [`Motion::power`], W. Angular parts come first.
+//! Motion and force are different spaces: the one product between them is [`Motion::power`], W.
+//! Angular parts come first.
 //!
 //! ```
 //! use tumble_core::spatial::{Force, Motion, Vector};
@@ -21,7 +22,8 @@
 //! Motion::<f64>::default().power(Motion::default());
 //! ```
 //!
-//! All is generic over a [`Scalar`]: `f64`, or several `f64` side by side, so that one code moves one world or many.
+//! All types are generic over a [`Scalar`]: `f64`, or the lanes of a SIMD register, so that one
+//! code computes one state or several.
 
 mod articulated;
 mod inertia;

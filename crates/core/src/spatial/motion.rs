@@ -30,19 +30,19 @@ pub struct Force<T = f64> {
 }
 
 impl<T: Scalar> Motion<T> {
-    /// `[ω; v]`.
+    /// Makes `[ω; v]`.
     #[inline(always)]
     pub fn new(angular: Vector<T>, linear: Vector<T>) -> Motion<T> {
         Motion { angular, linear }
     }
 
-    /// `ω·n + v·f`, W: what `force` does to a body that moves so.
+    /// Returns `ω·n + v·f`, W: the power of `force` on a body with this motion.
     #[inline(always)]
     pub fn power(self, force: Force<T>) -> T {
         self.angular.dot(force.torque) + self.linear.dot(force.force)
     }
 
-    /// `m × m'`: how a motion `other` that is fixed in the body changes as the body moves.
+    /// Returns `m × m'`: the rate of a motion `other` that is fixed in the moving body.
     #[inline(always)]
     pub fn cross(self, other: Motion<T>) -> Motion<T> {
         Motion {
@@ -51,7 +51,7 @@ impl<T: Scalar> Motion<T> {
         }
     }
 
-    /// `m ×* f`: how a force that is fixed in the body changes as the body moves.
+    /// Returns `m ×* f`: the rate of a force that is fixed in the moving body.
     #[inline(always)]
     pub fn cross_force(self, force: Force<T>) -> Force<T> {
         Force {
@@ -60,7 +60,7 @@ impl<T: Scalar> Motion<T> {
         }
     }
 
-    /// The same velocity of the same body, seen at the point `r` away: `v + ω × r`.
+    /// Returns the velocity of the same body at the point at `r`: `v + ω × r`.
     #[inline(always)]
     pub fn at(self, r: Vector<T>) -> Motion<T> {
         Motion { angular: self.angular, linear: self.linear + self.angular.cross(r) }
@@ -68,13 +68,14 @@ impl<T: Scalar> Motion<T> {
 }
 
 impl<T: Scalar> Force<T> {
-    /// `[n; f]`.
+    /// Makes `[n; f]`.
     #[inline(always)]
     pub fn new(torque: Vector<T>, force: Vector<T>) -> Force<T> {
         Force { torque, force }
     }
 
-    /// The same wrench, its torque now about the point from which this one's is `r` away: `n + r × f`.
+    /// Returns the same wrench with its torque about the point from which this one's is at `r`: `n
+    /// + r × f`.
     #[inline(always)]
     pub fn from_arm(self, r: Vector<T>) -> Force<T> {
         Force { torque: self.torque + r.cross(self.force), force: self.force }

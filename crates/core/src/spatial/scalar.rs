@@ -1,10 +1,11 @@
-//! The numbers that the algebra is written over.
+//! The scalars of the algebra.
 
 use super::trig;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// `f64`, or some of them side by side in the lanes of a SIMD register. Every operation acts on each lane alone and rounds as `f64` does, so a lane's
-/// bits do not depend on how many lanes there are. None contracts a product and a sum into one rounding.
+/// `f64`, or several of them in the lanes of a SIMD register. Every operation acts on each lane
+/// alone and rounds like `f64`, so the bits of a lane do not depend on the number of lanes. No
+/// operation fuses a product and a sum into one rounding.
 pub trait Scalar:
     Copy
     + Add<Output = Self>
@@ -15,15 +16,17 @@ pub trait Scalar:
     + AddAssign
     + SubAssign
 {
-    /// `value` in every lane. A method, because a value may carry the proof that the processor has the instructions.
+    /// Returns `value` in every lane. A method, because a value may carry the proof that the
+    /// processor supports the instructions.
     fn constant(self, value: f64) -> Self;
-    /// Square root.
+    /// Returns the square root.
     fn sqrt(self) -> Self;
-    /// `1/self` where `self > least`, 0 elsewhere (and where either is not a number).
+    /// Returns `1/self` if `self > least`, else 0; also 0 if either is NaN.
     fn reciprocal_above(self, least: Self) -> Self;
-    /// `libm`'s sine and cosine in the lanes where `|self|` is above `far` or not a number, `near` in the others.
+    /// Returns `libm`'s sine and cosine in lanes in which `|self|` exceeds `far` or is NaN, and
+    /// `near` in the others.
     fn sin_cos_beyond(self, far: f64, near: (Self, Self)) -> (Self, Self);
-    /// Sine and cosine of an angle in radians, to one unit in the last place.
+    /// Returns sine and cosine of an angle in rad, to one unit in the last place.
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         self.sin_cos_beyond(trig::FAR, trig::sin_cos(self))

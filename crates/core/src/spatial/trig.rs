@@ -1,4 +1,5 @@
-//! Sine and cosine without a branch, so that lanes go through it side by side and one `f64` takes the same steps to the same bits.
+//! Sine and cosine without a branch, so that SIMD lanes take the same steps as one `f64`, with the
+//! same bits.
 //!
 //! ```text
 //! k = round(2x/π)     y + z = x − k·π/2 in double length      |y| ≤ π/4
@@ -7,12 +8,13 @@
 //! k mod 4:  (s, c), (c, −s), (−s, −c), (−c, s)
 //! ```
 //!
-//! π/2 is three numbers, the first two of 33 bits, so that `k` times them is exact while `|k| < 2²⁰`. `P` and `Q` are minimax (Remez) on `[0, (π/4)²]`.
-//! Beyond [`FAR`], and for what is not finite, a lane takes `libm`'s. Within it the error is below one unit in the last place.
+//! π/2 is three numbers, the first two of 33 bits, so that `k` times them is exact while `|k| <
+//! 2²⁰`. `P` and `Q` are minimax (Remez) on `[0, (π/4)²]`. Beyond [`FAR`], and for what is not
+//! finite, a lane takes `libm`'s. Within it the error is below one unit in the last place.
 
 use super::scalar::Scalar;
 
-/// Angles up to here take the steps above, rad; beyond, `libm`'s.
+/// Largest angle for the steps above, rad; `libm` computes larger ones.
 pub(super) const FAR: f64 = 1e6;
 
 const TWO_OVER_PI: f64 = std::f64::consts::FRAC_2_PI;
@@ -39,7 +41,7 @@ const Q: [f64; 6] = [
     -1.135955931495797e-11,
 ];
 
-/// `(sin x, cos x)` for `|x| ≤` [`FAR`].
+/// Returns `(sin x, cos x)` for `|x| ≤` [`FAR`].
 #[inline(always)]
 pub(super) fn sin_cos<T: Scalar>(x: T) -> (T, T) {
     let one = x.constant(1.0);
@@ -57,7 +59,8 @@ pub(super) fn sin_cos<T: Scalar>(x: T) -> (T, T) {
     let top = one - half;
     let cosine = top + (((one - top) - half) + (t * t * polynomial(t, &Q) - y * z));
 
-    // k = p + 2m; the quarter turns p and the sign of m choose among the four rows by products with 0, 1 and −1, which are exact.
+    // k = p + 2m; the quarter turns p and the sign of m choose among the four rows by products with
+    // 0, 1 and −1, which are exact.
     let p = k - twice(round(k * 0.5 - x.constant(0.25)));
     let m = (k - p) * 0.5;
     let sign = one - twice(m - twice(round(m * 0.5 - x.constant(0.25))));
@@ -77,7 +80,7 @@ fn twice<T: Scalar>(x: T) -> T {
     x + x
 }
 
-/// By pairs, so that less waits for less.
+/// Evaluates in pairs, which shortens the chain of dependent operations.
 #[inline(always)]
 fn polynomial<T: Scalar>(t: T, c: &[f64; 6]) -> T {
     let t2 = t * t;

@@ -1,4 +1,4 @@
-//! Three numbers.
+//! Vectors of three numbers.
 
 use super::scalar::Scalar;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
@@ -22,31 +22,31 @@ impl<T: Scalar> Vector<T> {
         Vector { x, y, z }
     }
 
-    /// The same number three times.
+    /// Makes a vector of three equal components.
     #[inline(always)]
     pub fn splat(x: T) -> Vector<T> {
         Vector { x, y: x, z: x }
     }
 
-    /// A vector of constants, in every lane of `like`.
+    /// Makes a vector of constants, in every lane of `like`.
     #[inline(always)]
     pub fn constant(like: T, v: &Vector<f64>) -> Vector<T> {
         Vector::new(like.constant(v.x), like.constant(v.y), like.constant(v.z))
     }
 
-    /// Times a constant.
+    /// Returns the product with a constant.
     #[inline(always)]
     pub fn times_constant(self, s: f64) -> Vector<T> {
         Vector { x: self.x * s, y: self.y * s, z: self.z * s }
     }
 
-    /// `self · other`, summed in the order x, y, z.
+    /// Returns `self · other`, summed in the order x, y, z.
     #[inline(always)]
     pub fn dot(self, other: Vector<T>) -> T {
         self.x * other.x + self.y * other.y + self.z * other.z
     }
 
-    /// `self × other`.
+    /// Returns `self × other`.
     #[inline(always)]
     pub fn cross(self, other: Vector<T>) -> Vector<T> {
         Vector {

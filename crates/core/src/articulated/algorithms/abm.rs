@@ -1,54 +1,59 @@
-//! The articulated-body method: `q̈` from `q`, `q̇` and forces in time proportional to the links [RBDA §7.3], thesis §III.B.4.
+//! The articulated-body method: `q̈` from `q`, `q̇` and forces in linear time [RBDA §7.3], thesis
+//! §III.B.4.
 //!
-//! World axes; every quantity of a link is taken at its origin, which is its joint. So from parent to child is a displacement `r` alone. Accelerations are
-//! *classical*: of the material point at the origin, not spatial.
+//! World axes; every quantity of a link refers to its origin, which is at its joint. The transform
+//! from parent to child is then a displacement `r`. Accelerations are *classical*: of the material
+//! point at the origin, not spatial.
 //!
 //! ```text
-//! place (outward)     o = oₚ + r                       ω = ωₚ + ω_J          v = vₚ + ωₚ × r + v_J
+//! place  (outward)    o = oₚ + r                       ω = ωₚ + ω_J          v = vₚ + ωₚ × r + v_J
 //!                     α⁰ = α⁰ₚ + ωₚ × ω_J              a⁰ = a⁰ₚ + α⁰ₚ × r + ωₚ × (ωₚ × r + 2 v_J)
 //!                     p = [J α⁰ + ω × J ω + h × a⁰;    m a⁰ + α⁰ × h + ω × (ω × h)]
-//! fold (inward)       U = IA S     D = Sᵀ U     Ia = IA − U D⁻¹ Uᵀ              IAₚ += Xᵀ Ia X
-//! push (inward)       e = τ − Sᵀ p              p' = p + U D⁻¹ e                pₚ += Xᵀ p'
-//! move (outward)      Â' = X Âₚ                 q̈ = D⁻¹ (e − Uᵀ Â')             Â = Â' + S q̈
+//! fold   (inward)     U = IA S     D = Sᵀ U     Ia = IA − U D⁻¹ Uᵀ              IAₚ += Xᵀ Ia X
+//! push   (inward)     e = τ − Sᵀ p              p' = p + U D⁻¹ e                pₚ += Xᵀ p'
+//! spread (outward)    Â' = X Âₚ                 q̈ = D⁻¹ (e − Uᵀ Â')             Â = Â' + S q̈
 //! ```
 //!
 //! | symbol | meaning |
 //! |---|---|
-//! | `ω_J`, `v_J` | velocity of the link against its parent: `s q̇` of a hinge, of a slider; `R q̇` of a ball joint |
-//! | `α⁰`, `a⁰` | acceleration that the link has with `q̈ = 0`: all centripetal and Coriolis terms |
+//! | `ω_J`, `v_J` | velocity of the link relative to its parent: `s q̇` of a revolute or prismatic joint; `R q̇` of a spherical one |
+//! | `α⁰`, `a⁰` | acceleration of the link with `q̈ = 0`: all centripetal and Coriolis terms |
 //! | `J`, `h`, `m` | rigid inertia about the origin, first moment, mass |
-//! | `IA`, `p` | articulated inertia, and the force that holds the subtree to `Â = 0`; external wrenches are subtracted from `p` |
-//! | `S` | `[s; 0]` of a hinge, `[0; s]` of a slider, `[R; 0]` of a ball joint, `1` of a floating root |
-//! | `X` | `[1 0; −r× 1]`: motion of the parent seen at the child |
-//! | `Â` | acceleration less `[α⁰; a⁰]`. Uniform gravity `g` enters as `Â = [0; −g]` of the world |
+//! | `IA`, `p` | articulated inertia, and the force that holds the subtree at `Â = 0`; external wrenches are subtracted from `p` |
+//! | `S` | `[s; 0]` of a revolute joint, `[0; s]` of a prismatic one, `[R; 0]` of a spherical one, `1` of a floating root |
+//! | `X` | `[1 0; −r× 1]`: motion of the parent at the child's origin |
+//! | `Â` | acceleration minus `[α⁰; a⁰]`. Uniform gravity `g` enters as `Â = [0; −g]` of the world |
 //!
-//! Because `p` carries `α⁰` and `a⁰`, there is no velocity-product term `c` in the inward sweep, against [RBDA Table 7.1]: it is out of the chain
-//! of operations that wait for each other. The inward sweep sums over all children; the thesis's Algorithm 1 serves one.
+//! Because `p` contains `α⁰` and `a⁰`, the inward sweep has no velocity-product term `c`, unlike
+//! [RBDA Table 7.1]: it is not in the chain of dependent operations. The inward sweep sums over all
+//! children; the thesis's Algorithm 1 allows one.
 
 use crate::articulated::algorithms::factor::{Factor, rows_times, rows_transposed_times};
 use crate::articulated::model::compiled::{Compiled, CompiledLink, JointKind};
 use crate::spatial::{ArticulatedInertia, Force, Inertia, Matrix, Motion, Scalar, Symmetric, Vector};
 use tumble_collide::Vec3;
 
-/// A joint's `D` must be above this part of its inertia's size (the trace of `J` or `M`), or the joint counts as singular.
+/// A joint is singular unless its `D` exceeds this fraction of its inertia (the trace of `J` or
+/// `M`).
 pub(in crate::articulated) const SINGULAR: f64 = 1e-12;
 
-/// Where a sweep reads its state and forces. A trait and not closures, so that all of it is compiled for the instructions of the sweep.
+/// Input of a sweep: state and forces. A trait instead of closures, so that all of it is compiled
+/// for the instruction set of the sweep.
 pub(in crate::articulated) trait Input<T> {
-    /// Sine and cosine of the hinge of a link, whose angle is position number `q`.
+    /// Returns sine and cosine of the revolute joint of a link, whose angle is position number `q`.
     fn joint_angle_sin_cos(&self, link: usize, q: usize) -> (T, T);
-    /// A position number.
+    /// Returns a position number.
     fn q(&self, k: usize) -> T;
-    /// A velocity number.
+    /// Returns a velocity number.
     fn v(&self, k: usize) -> T;
-    /// A joint force.
+    /// Returns a joint force.
     fn tau(&self, k: usize) -> T;
 }
 
-/// What the sweeps know of a link.
+/// Data of a link in the sweeps.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::articulated) struct Slot<T> {
-    /// Axes of its inner frame in the world. The third is a hinge's or slider's `s`.
+    /// Axes of its inner frame in the world. The third is `s` of a revolute or prismatic joint.
     pub rotation: Matrix<T>,
     /// `r`: from the parent's origin to its own.
     pub arm: Vector<T>,
@@ -60,25 +65,27 @@ pub(in crate::articulated) struct Slot<T> {
     pub bias: Force<T>,
     /// `IA`.
     pub inertia: ArticulatedInertia<T>,
-    /// `U` of a hinge or slider.
+    /// `U` of a revolute or prismatic joint.
     pub column: Force<T>,
-    /// `D` of a hinge or slider.
+    /// `D` of a revolute or prismatic joint.
     pub pivot: T,
     /// `D⁻¹`, or 0.
     pub inverse: T,
-    /// What is left of `e`: `D⁻¹ e` of a hinge or slider in the first number, `l⁻¹ e` of a ball joint in the first three, `e` of a floating root.
+    /// Remainder of `e`: `D⁻¹ e` of a revolute or prismatic joint in the first number, `l⁻¹ e` of a
+    /// spherical one in the first three, `e` of a floating root.
     pub effort: Force<T>,
     /// `Â`.
     pub acceleration: Motion<T>,
-    /// Origin in the world; only where asked for.
+    /// Origin in the world; only if requested.
     pub position: Vector<T>,
-    /// Velocity of the origin; only where asked for.
+    /// Velocity of the origin; only if requested.
     pub linear: Vector<T>,
 }
 
-/// Factors of a joint of three degrees of freedom or six.
+/// Factors of a joint with three or six degrees of freedom.
 ///
-/// A ball joint: `first` is of `J`, rows `w = l⁻¹ H`. A floating root: `first` is of `M`, `w = l⁻¹ Hᵀ`, and `second` is of `J − H M⁻¹ Hᵀ`.
+/// Spherical joint: `first` factors `J`, rows `w = l⁻¹ H`. Floating root: `first` factors `M`, `w =
+/// l⁻¹ Hᵀ`, and `second` factors `J − H M⁻¹ Hᵀ`.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::articulated) struct JointFactor<T> {
     pub first: Factor<T>,
@@ -86,7 +93,7 @@ pub(in crate::articulated) struct JointFactor<T> {
     pub second: Factor<T>,
 }
 
-/// Working memory of the sweeps: slot 0 is the world.
+/// Buffers of the sweeps; slot 0 is the world.
 #[derive(Clone, Debug)]
 pub(in crate::articulated) struct Sweep<T> {
     pub slots: Vec<Slot<T>>,
@@ -120,7 +127,8 @@ impl<T: Scalar> Sweep<T> {
         Sweep { slots: vec![world; compiled.bodies.len() + 1], blocks: vec![block; compiled.blocks] }
     }
 
-    /// Places every link and sets its rigid inertia and bias. `WHOLE` also writes positions and velocities of the origins.
+    /// Places every link and sets its rigid inertia and bias. `WHOLE` also writes positions and
+    /// velocities of the origins.
     #[inline(always)]
     pub fn place<const WHOLE: bool>(&mut self, compiled: &Compiled, state: &impl Input<T>) {
         for (i, body) in compiled.bodies.iter().enumerate() {
@@ -173,7 +181,7 @@ impl<T: Scalar> Sweep<T> {
         }
     }
 
-    /// The inward sweep of inertias.
+    /// Sweeps inertias inward.
     #[inline(always)]
     pub fn fold(&mut self, compiled: &Compiled) {
         for (i, body) in compiled.bodies.iter().enumerate().rev() {
@@ -215,7 +223,7 @@ impl<T: Scalar> Sweep<T> {
         }
     }
 
-    /// The inward step of forces at one link: what is left in `bias` goes to the parent's.
+    /// Takes the inward step of forces at one link: the remainder of `bias` goes to the parent's.
     #[inline(always)]
     pub fn push_link(&mut self, i: usize, body: &CompiledLink, state: &impl Input<T>) {
         let slot = &mut self.slots[i];
@@ -228,7 +236,7 @@ impl<T: Scalar> Sweep<T> {
         }
     }
 
-    /// The whole method in uniform gravity: place, fold, push, spread.
+    /// Runs the whole method in uniform gravity: place, fold, push, spread.
     #[inline(always)]
     pub fn run(&mut self, compiled: &Compiled, gravity: &Vec3, state: &impl Input<T>, out: impl FnMut(usize, T)) {
         self.place::<false>(compiled, state);
@@ -241,7 +249,7 @@ impl<T: Scalar> Sweep<T> {
         self.spread(compiled, out);
     }
 
-    /// The outward sweep of accelerations, from the world's `Â`. Writes `q̈` to `out`.
+    /// Sweeps accelerations outward, from the world's `Â`. Writes `q̈` to `out`.
     #[inline(always)]
     pub fn spread(&mut self, compiled: &Compiled, mut out: impl FnMut(usize, T)) {
         for (i, body) in compiled.bodies.iter().enumerate() {
@@ -253,8 +261,8 @@ impl<T: Scalar> Sweep<T> {
     }
 }
 
-/// From the force `p` on the subtree of a link and the forces `tau` of its joint: what the joint passes on, `p'`, and in `effort` what
-/// [`spread`] needs.
+/// Returns the force `p'` that a joint passes on, from the force `p` on the subtree of its link and
+/// its joint forces `tau`. Writes to `effort` the input of [`spread`].
 #[inline(always)]
 pub(in crate::articulated) fn push<T: Scalar>(
     body: &CompiledLink,
@@ -290,7 +298,7 @@ pub(in crate::articulated) fn push<T: Scalar>(
     }
 }
 
-/// `Â` of a link from `Â' = X Âₚ`; writes its `q̈` to `out`.
+/// Returns `Â` of a link from `Â' = X Âₚ`; writes its `q̈` to `out`.
 #[inline(always)]
 pub(in crate::articulated) fn spread<T: Scalar>(
     body: &CompiledLink,
@@ -327,7 +335,7 @@ pub(in crate::articulated) fn spread<T: Scalar>(
     }
 }
 
-/// `Â = D⁻¹ e` of a floating root.
+/// Returns `Â = D⁻¹ e` of a floating root.
 #[inline(always)]
 pub(in crate::articulated) fn solve_floating<T: Scalar>(block: &JointFactor<T>, e: Force<T>) -> Motion<T> {
     let JointFactor { first, w, second } = block;
@@ -337,7 +345,7 @@ pub(in crate::articulated) fn solve_floating<T: Scalar>(block: &JointFactor<T>, 
     Motion { angular, linear: first.backward(first.divide(f - rows_times(w, angular))) }
 }
 
-/// The rigid inertia and the bias `p` of a link that is placed.
+/// Sets the rigid inertia and the bias `p` of a placed link.
 #[inline(always)]
 fn load<T: Scalar>(body: &CompiledLink, slot: &mut Slot<T>) {
     let like = slot.angular.x;
@@ -374,13 +382,14 @@ fn floating_factor<T: Scalar>(inertia: &ArticulatedInertia<T>, block: &mut Joint
     block.second = Factor::new(&rest, inertia.rotational.trace() * SINGULAR);
 }
 
-/// `A·Rz` of an angle by its sine and cosine.
+/// Returns `A·Rz` for the sine and cosine of an angle.
 #[inline(always)]
 fn turn_about_z<T: Scalar>(a: &Matrix<T>, (sin, cos): (T, T)) -> Matrix<T> {
     Matrix { x: a.x * cos + a.y * sin, y: a.y * cos - a.x * sin, z: a.z }
 }
 
-/// The rotation of a quaternion `x, y, z, w` of any length above 0: `1 + s (…)` with `s = 2/|q|²`.
+/// Returns the rotation of a quaternion `x, y, z, w` of any length above 0: `1 + s (…)` with `s =
+/// 2/|q|²`.
 #[inline(always)]
 fn quaternion_matrix<T: Scalar>([x, y, z, w]: [T; 4]) -> Matrix<T> {
     let (zero, one) = (x.constant(0.0), x.constant(1.0));
@@ -396,13 +405,13 @@ fn quaternion_matrix<T: Scalar>([x, y, z, w]: [T; 4]) -> Matrix<T> {
     }
 }
 
-/// Four position numbers from `k` on.
+/// Returns four position numbers from `k` on.
 #[inline(always)]
 fn four<T>(state: &impl Input<T>, k: usize) -> [T; 4] {
     [state.q(k), state.q(k + 1), state.q(k + 2), state.q(k + 3)]
 }
 
-/// Three numbers from `k` on.
+/// Returns three numbers from `k` on.
 #[inline(always)]
 pub(in crate::articulated) fn three<T>(from: impl Fn(usize) -> T, k: usize) -> Vector<T> {
     Vector { x: from(k), y: from(k + 1), z: from(k + 2) }

@@ -1,7 +1,8 @@
-//! The mass matrix, by the composite-rigid-body algorithm [RBDA §6.2].
+//! The mass matrix by the composite-rigid-body algorithm [RBDA §6.2].
 //!
-//! Inwards, each link takes in what hangs on it: composite mass `m`, first moment `h = m·c` and inertia `I` about the link's origin. The momentum
-//! of that composite at unit velocity of its joint is then carried to every ancestor, whose columns of `S` read their entries from it:
+//! An inward sweep adds each subtree to its link: composite mass `m`, first moment `h = m·c` and
+//! inertia `I` about the link's origin. The momentum of that composite at unit velocity of its
+//! joint is then carried to every ancestor, whose columns of `S` give the entries:
 //!
 //! ```text
 //! f = m·S_v + S_ω×h          n = I·S_ω + h×S_v                       M[k, k] = S_kᵀ·[n; f]
@@ -16,13 +17,13 @@ use crate::articulated::algorithms::kinematics::{Kinematics, Rates};
 use crate::articulated::model::{Link, Model};
 use tumble_collide::{Mat3, Vec3};
 
-/// Working memory of the mass matrix.
+/// Buffers of the mass matrix.
 #[derive(Clone, Debug)]
 pub struct MassMatrix {
     composites: Vec<Composite>,
 }
 
-/// Mass, first moment and inertia of a link and of all that hangs on it, about the link's origin.
+/// Mass, first moment and inertia of a subtree about its link's origin.
 #[derive(Clone, Copy, Debug)]
 struct Composite {
     mass: f64,
@@ -31,7 +32,7 @@ struct Composite {
 }
 
 impl MassMatrix {
-    /// Room for `model`.
+    /// Allocates buffers for `model`.
     pub fn new(model: &Model) -> MassMatrix {
         MassMatrix {
             composites: vec![
@@ -63,7 +64,7 @@ impl MassMatrix {
         }
     }
 
-    /// Composites, children before parents.
+    /// Computes the composites, children before parents.
     fn gather(&mut self, model: &Model, kin: &Kinematics) {
         for (i, link) in model.links().iter().enumerate() {
             let (m, own) = (link.mass.mass, &kin.links()[i]);
@@ -79,7 +80,8 @@ impl MassMatrix {
 }
 
 impl Composite {
-    /// Momentum of the composite that moves by `column`: linear, and angular about the link's origin.
+    /// Returns the momentum of the composite that moves by `column`: linear, and angular about the
+    /// link's origin.
     fn momentum(&self, column: &Rates) -> Rates {
         Rates {
             angular: self.inertia * column.angular + self.moment.cross(&column.linear),
@@ -87,7 +89,7 @@ impl Composite {
         }
     }
 
-    /// Adds a part whose origin lies at `r` from this one.
+    /// Adds a composite whose origin is at `r` from this one.
     fn take(&mut self, part: &Composite, r: &Vec3) {
         let (m, h) = (part.mass, &part.moment);
         self.mass += m;

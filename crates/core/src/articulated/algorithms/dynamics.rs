@@ -1,5 +1,6 @@
-//! Forward dynamics of one model at one state: the sweeps of [`abm`](crate::articulated::algorithms::abm) in `f64`, kept so that many questions are answered at the state last
-//! refreshed.
+//! Forward dynamics of one model at one state: the sweeps of
+//! [`abm`](crate::articulated::algorithms::abm) in `f64`, with results that are kept for several
+//! calls.
 
 use crate::articulated::algorithms::abm::{Input, Slot, Sweep, push, spread, three, write_three};
 use crate::articulated::model::Model;
@@ -10,8 +11,9 @@ use crate::spatial::{Force, Motion, Vector};
 use nalgebra::{Rotation3, UnitQuaternion};
 use tumble_collide::{Mat3, Pose, Vec3};
 
-/// A model, and everything of it that is a function of `q` and `v`: poses, velocities, bias forces, articulated inertias and their factors.
-/// Before the first [`refresh`](Self::refresh) its answers mean nothing.
+/// A model with the quantities derived from `q` and `v`: poses, velocities, bias forces,
+/// articulated inertias and their factors. They are undefined before the first
+/// [`refresh`](Self::refresh).
 ///
 /// ```
 /// use tumble_core::{Joint, LinkMass, ModelBuilder, articulated::Dynamics, collide::{Pose, Vec3}};
@@ -24,7 +26,7 @@ use tumble_collide::{Mat3, Pose, Vec3};
 /// let mut qdd = [0.0];
 /// dynamics.accelerate_in(&mut dynamics.scratch(), &Vec3::new(0.0, 0.0, -9.81), &[0.0], &[], &mut qdd);
 /// assert!((qdd[0] + 9.81 / 0.5 * f64::sin(0.3)).abs() < 1e-12);
-/// // What an impulse of 1 N·s along x at the bob does, squared: 1/m of the point along its circle.
+/// // The squared response to an impulse of 1 N·s along x at the bob: 1/m of the point along its circle.
 /// let mut y = [0.0];
 /// let arm = dynamics.link_pose(0).rotation * Vec3::new(0.0, 0.0, -0.5);
 /// dynamics.point_response(0, &arm, &[Vec3::x()], 1.0, &mut y);
@@ -36,12 +38,13 @@ pub struct Dynamics {
     pub(in crate::articulated) compiled: Compiled,
     pub(in crate::articulated) sweep: Sweep<f64>,
     joint_sin_cos: JointSinCos,
-    /// `√D` and `1/√D` (or 0) of each hinge and slider, by slot.
+    /// `√D` and `1/√D` (or 0) of each revolute or prismatic joint, by slot.
     pub(in crate::articulated) roots: Vec<[f64; 2]>,
     singular: Option<usize>,
 }
 
-/// Working memory of one call, for the maps that take `&self`. Made by [`Dynamics::scratch`]; holds nothing between calls.
+/// Buffers of one call, for the maps that take `&self`. Made by [`Dynamics::scratch`]; no data is
+/// kept between calls.
 #[derive(Clone, Debug)]
 pub struct Scratch {
     pub(in crate::articulated) motions: Vec<Motion>,
@@ -50,7 +53,7 @@ pub struct Scratch {
 }
 
 impl Dynamics {
-    /// Makes a model ready; all allocation happens here.
+    /// Prepares a model. No later call allocates memory.
     pub fn new(model: &Model) -> Dynamics {
         let compiled = Compiled::new(model);
         let sweep = Sweep::new(&compiled, 0.0);
@@ -63,22 +66,22 @@ impl Dynamics {
         }
     }
 
-    /// Moving links.
+    /// Returns the number of moving links.
     pub fn links(&self) -> usize {
         self.compiled.bodies.len()
     }
 
-    /// Degrees of freedom: length of `v`.
+    /// Returns the number of degrees of freedom: the length of `v`.
     pub fn dof(&self) -> usize {
         self.compiled.dof
     }
 
-    /// Length of `q`.
+    /// Returns the length of `q`.
     pub fn positions(&self) -> usize {
         self.compiled.positions
     }
 
-    /// Working memory for the maps.
+    /// Returns buffers for the maps.
     pub fn scratch(&self) -> Scratch {
         let slots = self.sweep.slots.len();
         Scratch {
@@ -88,7 +91,7 @@ impl Dynamics {
         }
     }
 
-    /// Takes a new state. Quaternions in `q` may have any length above 0.
+    /// Sets the state. Quaternions in `q` may have any length above 0.
     pub fn refresh(&mut self, q: &[f64], v: &[f64]) {
         let turns = self.joint_sin_cos.take(q);
         self.sweep.place::<true>(&self.compiled, &SingleState { turns, q, v, tau: &[] });
@@ -119,13 +122,14 @@ impl Dynamics {
         }
     }
 
-    /// First link whose joint nothing resists at the state last refreshed (gimbal lock of stacked hinges): `D` along an axis of it is below 1e-12 of
-    /// the size of its articulated inertia. The maps then hold that axis still, and stay finite.
+    /// Returns the first link whose joint meets no inertia at the refreshed state, as in gimbal
+    /// lock of stacked revolute joints: `D` along one of its axes is below 1e-12 of the size of its
+    /// articulated inertia. The maps then hold that axis and stay finite.
     pub fn singular(&self) -> Option<usize> {
         self.singular
     }
 
-    /// Pose of a link's frame in the world.
+    /// Returns the pose of a link's frame in the world.
     pub fn link_pose(&self, link: usize) -> Pose {
         let slot = &self.sweep.slots[link + 1];
         let rotation = Mat3::from(slot.rotation) * self.compiled.bodies[link].own.transpose();
@@ -133,14 +137,16 @@ impl Dynamics {
         Pose::from_parts(Vec3::from(slot.position).into(), rotation)
     }
 
-    /// Angular velocity of a link, rad/s, and velocity of its origin, m/s, world axes.
+    /// Returns the angular velocity of a link, rad/s, and the velocity of its origin, m/s, world
+    /// axes.
     pub fn link_velocity(&self, link: usize) -> (Vec3, Vec3) {
         let slot = &self.sweep.slots[link + 1];
         (slot.angular.into(), slot.linear.into())
     }
 
-    /// Generalized accelerations `q̈`, Coriolis and centrifugal terms included, under joint forces `tau` (N·m, N) and one wrench per moving link (world
-    /// axes, torque about the link's origin; an empty slice is none). Without gravity.
+    /// Writes the generalized accelerations `q̈`, Coriolis and centrifugal terms included, for
+    /// joint forces `tau` (N·m, N) and one wrench per moving link (world axes, torque about the
+    /// link's origin; empty for none). Without gravity.
     pub fn accelerate(&self, s: &mut Scratch, tau: &[f64], wrenches: &[Wrench], qdd: &mut [f64]) {
         self.accelerate_in(s, &Vec3::zeros(), tau, wrenches, qdd);
     }
@@ -167,7 +173,8 @@ impl Dynamics {
         }
     }
 
-    /// Angular acceleration of every link, rad/s², and acceleration of the material point at its origin, m/s², world axes, for given `qdd`.
+    /// Writes the angular acceleration of every link, rad/s², and the acceleration of the material
+    /// point at its origin, m/s², world axes, for given `qdd`.
     pub fn link_accelerations(&self, qdd: &[f64], out: &mut [(Vec3, Vec3)]) {
         let slots = &self.sweep.slots;
         for (i, body) in self.compiled.bodies.iter().enumerate() {
@@ -182,7 +189,7 @@ impl Dynamics {
         }
     }
 
-    /// Motion of every link that joint rates `v` alone give, into `s.motions`.
+    /// Writes the motion of every link due to joint rates `v` alone to `s.motions`.
     pub(in crate::articulated) fn propagate_velocities(&self, s: &mut Scratch, v: &[f64]) {
         s.motions[0] = Motion::default();
         for (i, body) in self.compiled.bodies.iter().enumerate() {
@@ -191,7 +198,7 @@ impl Dynamics {
     }
 }
 
-/// `V = X Vₚ + S v` of a link.
+/// Returns `V = X Vₚ + S v` of a link.
 #[inline(always)]
 fn carried(body: &CompiledLink, slot: &Slot<f64>, parent: Motion, v: &[f64]) -> Motion {
     let mut motion = parent.at(slot.arm);
@@ -204,15 +211,15 @@ fn carried(body: &CompiledLink, slot: &Slot<f64>, parent: Motion, v: &[f64]) -> 
     motion
 }
 
-/// Forward dynamics in one go: `q̈` from `q`, `v` and joint forces `tau` in uniform gravity. Leaves `d` fit for another call of this alone: its maps need
-/// a [`Dynamics::refresh`] first.
+/// Writes `q̈` from `q`, `v` and joint forces `tau` in uniform gravity, in one pass. Afterwards the
+/// maps of `d` need a [`Dynamics::refresh`].
 pub fn forward_dynamics(d: &mut Dynamics, gravity: &Vec3, q: &[f64], v: &[f64], tau: &[f64], qdd: &mut [f64]) {
     let Dynamics { compiled, sweep, joint_sin_cos, .. } = d;
     let turns = joint_sin_cos.take(q);
     sweep.run(compiled, gravity, &SingleState { turns, q, v, tau }, |k, x| qdd[k] = x);
 }
 
-/// One state, as a sweep reads it.
+/// One state as the input of a sweep.
 struct SingleState<'a> {
     turns: &'a [(f64, f64)],
     q: &'a [f64],
@@ -239,7 +246,7 @@ impl Input<f64> for SingleState<'_> {
     }
 }
 
-/// Three numbers of a slice from `k` on.
+/// Returns three numbers of a slice from `k` on.
 pub(in crate::articulated) fn load_vector(x: &[f64], k: usize) -> Vector {
     three(|k| x[k], k)
 }

@@ -1,4 +1,4 @@
-//! Sums over the links: energy, momentum, centre of mass [RBDA §2.13, §5.3].
+//! Sums over the links: energy, momentum, center of mass [RBDA §2.13, §5.3].
 //!
 //! ```text
 //! T = Σ ½m·|v + ω×c|² + ½ω·I_c·ω = Σ ½m·|v|² + m·v·(ω×c) + ½ω·I·ω         V = −Σ m·g·(p + c)
@@ -12,7 +12,8 @@ use crate::articulated::model::Model;
 use crate::object::{Energy, Momentum};
 use tumble_collide::Vec3;
 
-/// Kinetic energy and potential energy in uniform `gravity` (m/s², world axes; zero at the world's origin), J, at the refreshed motion.
+/// Returns kinetic energy and potential energy in uniform `gravity` (m/s², world axes; zero at the
+/// world's origin), J, for the refreshed motion.
 pub fn energy(model: &Model, kin: &Kinematics, gravity: &Vec3) -> Energy {
     let mut sum = Energy::default();
     for (link, own) in model.links().iter().zip(kin.links()) {
@@ -24,7 +25,8 @@ pub fn energy(model: &Model, kin: &Kinematics, gravity: &Vec3) -> Energy {
     sum
 }
 
-/// Linear momentum, N·s, and angular momentum about the world's origin, N·m·s, at the refreshed motion.
+/// Returns linear momentum, N·s, and angular momentum about the world's origin, N·m·s, for the
+/// refreshed motion.
 pub fn momentum(model: &Model, kin: &Kinematics) -> Momentum {
     let mut sum = Momentum::default();
     for (link, own) in model.links().iter().zip(kin.links()) {
@@ -37,7 +39,8 @@ pub fn momentum(model: &Model, kin: &Kinematics) -> Momentum {
     sum
 }
 
-/// Centre of all mass: position, metres, and velocity, m/s, in the world. `None` for a model without mass (inertia alone).
+/// Returns position, m, and velocity, m/s, of the center of all mass in the world. `None` for a
+/// model without mass (inertia alone).
 pub fn center_of_mass(model: &Model, kin: &Kinematics) -> Option<(Vec3, Vec3)> {
     let mass = model.mass();
     let moment: Vec3 =

@@ -1,11 +1,12 @@
-//! Factors of symmetric 3×3 blocks: `A = l·diag(d)·lᵀ` with `l` unit lower triangular, so `C = l·√d` has `A = C Cᵀ`.
+//! Factors of symmetric 3×3 blocks: `A = l·diag(d)·lᵀ` with `l` unit lower triangular, so `C =
+//! l·√d` has `A = C Cᵀ`.
 //!
-//! A pivot that is not above `least` counts as infinite: its reciprocal and root are 0, and the direction answers nothing. So a singular block gives
-//! finite numbers everywhere.
+//! A pivot at or below `least` counts as infinite: its reciprocal and root are 0, and that
+//! direction has no response. A singular block thus gives finite numbers everywhere.
 
 use crate::spatial::{Scalar, Symmetric, Vector};
 
-/// `l`, `1/d` and, once [`with_roots`](Factor::with_roots) was called, `√d` and `1/√d`.
+/// `l`, `1/d` and, after [`with_roots`](Factor::with_roots), `√d` and `1/√d`.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::articulated) struct Factor<T> {
     /// Below the diagonal: rows 2 and 3 of column 1, row 3 of column 2.
@@ -17,13 +18,13 @@ pub(in crate::articulated) struct Factor<T> {
 }
 
 impl<T: Scalar> Factor<T> {
-    /// Of nothing.
+    /// Returns the factor of the zero block.
     pub fn zero(zero: T) -> Factor<T> {
         let none = Vector::splat(zero);
         Factor { l: [zero; 3], pivots: none, inverse: none, root: none, inverse_root: none }
     }
 
-    /// Without roots.
+    /// Factors a block, without roots.
     #[inline(always)]
     pub fn new(a: &Symmetric<T>, least: T) -> Factor<T> {
         let ix = a.xx.reciprocal_above(least);
@@ -76,12 +77,12 @@ impl<T: Scalar> Factor<T> {
 }
 
 impl Factor<f64> {
-    /// Whether all pivots were above the least.
+    /// Returns whether all pivots exceed the minimum.
     pub fn is_positive(&self) -> bool {
         self.inverse.x > 0.0 && self.inverse.y > 0.0 && self.inverse.z > 0.0
     }
 
-    /// With the roots that the four maps below need.
+    /// Adds the roots that the four maps below need.
     pub fn with_roots(mut self) -> Factor<f64> {
         let roots = |i: f64, d: f64| if i > 0.0 { (d.sqrt(), 1.0 / d.sqrt()) } else { (0.0, 0.0) };
         let (i, d) = (self.inverse, self.pivots);

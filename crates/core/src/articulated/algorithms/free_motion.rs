@@ -4,9 +4,10 @@
 //! q̈ = −M⁻¹·C(q, q̇)          the geodesics of the kinetic energy T = ½ q̇ᵀM(q)q̇
 //! ```
 //!
-//! One step of the classical Runge–Kutta method on `q̇` and of its commutator-free form on positions (see `motion.rs`), then `q̇` is scaled so that `T`
-//! is what it was: a geodesic run through at another speed is the same geodesic, so this moves the result along the exact curve's own
-//! freedom and takes nothing from the order. Coasting then never gains energy, however long the step.
+//! One step of the classical Runge–Kutta method on `q̇` and of its commutator-free form on
+//! positions (see `integrators/context.rs`). Then `q̇` is scaled so that `T` is conserved. A
+//! geodesic traversed at another speed is the same geodesic, so the scaling does not reduce the
+//! order. Free motion then never gains energy, however long the step.
 
 use crate::articulated::algorithms::dynamics::{Dynamics, Scratch};
 use crate::articulated::body::Working;
@@ -14,7 +15,7 @@ use crate::articulated::model::Model;
 use crate::articulated::model::coordinates::{integrate, read_vector};
 use crate::articulated::model::joint::Joint;
 
-/// Moves `x = [q, v]` by `h` seconds of free motion.
+/// Advances `x = [q, v]` by `h` seconds of free motion.
 pub(in crate::articulated) fn free_motion(model: &Model, working: &mut Working, x: &mut [f64], h: f64) {
     let n = model.positions();
     if h == 0.0 || x[n..].iter().all(|v| *v == 0.0) {
@@ -67,13 +68,15 @@ pub(in crate::articulated) fn free_motion(model: &Model, working: &mut Working, 
     }
 }
 
-/// Moves the positions of `x = [q, v]` by `h·d` and carries `v` along parallel to itself in the metric `M` (Levi-Civita):
+/// Moves the positions of `x = [q, v]` by `h·d` and transports `v` in parallel in the metric `M`
+/// (Levi-Civita):
 ///
 /// ```text
-/// v̇ = −Γ(d, v) = ¼(a(v + d) − a(v − d)) − ½[d, v]        a(v) = q̈ of free motion, quadratic in v;   [d, v] = ±d×v of ball joints and floating roots
+/// v̇ = −Γ(d, v) = ¼(a(v + d) − a(v − d)) − ½[d, v]        a(v) = q̈ of free motion, quadratic in v;   [d, v] = ±d×v of spherical joints and floating roots
 /// ```
 ///
-/// Kinetic energy stays, by a last scaling to rounding, and so does linear momentum: it is the product of `v` with a field that is parallel.
+/// Kinetic energy is conserved, by a final scaling to rounding. So is linear momentum, which is the
+/// product of `v` with a parallel field.
 pub(in crate::articulated) fn transport(model: &Model, working: &mut Working, x: &mut [f64], d: &[f64], h: f64) {
     let n = model.positions();
     let size = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
@@ -118,7 +121,7 @@ pub(in crate::articulated) fn transport(model: &Model, working: &mut Working, x:
     }
 }
 
-/// `½|L·v|²`.
+/// Returns `½|L·v|²`.
 fn energy_of(dynamics: &Dynamics, scratch: &mut Scratch, v: &[f64]) -> f64 {
     let mut u = vec![0.0; v.len()];
     dynamics.whiten(scratch, v, &mut u);

@@ -1,18 +1,20 @@
-//! Jacobians: what the generalized velocities do to a point or a link [RBDA §4.4].
+//! Jacobians: velocity of a point or a link due to the generalized velocities [RBDA §4.4].
 //!
-//! Column `k` belongs to a joint on the way from the link to the root, with columns `S_ω`, `S_v` at that joint's link's origin `o`:
+//! Column `k` belongs to a joint on the path from the link to the root, with columns `S_ω`, `S_v`
+//! at the origin `o` of that joint's link:
 //!
 //! ```text
 //! angular  S_ω               linear, at the world point p  S_v + S_ω×(p − o)
 //! ```
 //!
-//! All other columns are zero. `J̇·v` is in [`Kinematics::bias_accelerations`].
+//! All other columns are zero. [`Kinematics::bias_accelerations`] gives `J̇·v`.
 
 use crate::articulated::algorithms::kinematics::{Kinematics, Rates};
 use crate::articulated::model::Model;
 use tumble_collide::Vec3;
 
-/// Velocity of the world point `point` as carried by `link`: 3×dof numbers by rows, world axes, `J·v` in m/s.
+/// Writes the Jacobian of the world point `point` carried by `link`: 3×dof numbers by rows, world
+/// axes, `J·v` in m/s.
 pub fn point_jacobian(model: &Model, kin: &Kinematics, link: usize, point: &Vec3, out: &mut [f64]) {
     let dof = model.dof();
     out[..3 * dof].fill(0.0);
@@ -23,7 +25,8 @@ pub fn point_jacobian(model: &Model, kin: &Kinematics, link: usize, point: &Vec3
     });
 }
 
-/// Angular velocity of `link` (first three rows) and velocity of its origin (last three): 6×dof numbers by rows, world axes.
+/// Writes the Jacobian of the angular velocity of `link` (first three rows) and of the velocity of
+/// its origin (last three): 6×dof numbers by rows, world axes.
 pub fn link_jacobian(model: &Model, kin: &Kinematics, link: usize, out: &mut [f64]) {
     let dof = model.dof();
     out[..6 * dof].fill(0.0);
@@ -36,7 +39,7 @@ pub fn link_jacobian(model: &Model, kin: &Kinematics, link: usize, out: &mut [f6
     });
 }
 
-/// Every column that moves `link`, from the link to the root.
+/// Visits every column that moves `link`, from the link to the root.
 fn columns_at(model: &Model, kin: &Kinematics, link: usize, point: &Vec3, mut visit: impl FnMut(usize, Rates)) {
     let mut at = Some(link);
     while let Some(i) = at {

@@ -1,14 +1,16 @@
-//! Where the links are and how fast: forward kinematics in world axes [RBDA §4.4, §5.3].
+//! Forward kinematics in world axes: poses and velocities of the links [RBDA §4.4, §5.3].
 //!
-//! Every quantity of a link is in world axes and about the link's own origin, so that a child differs from its parent by a translation alone.
-//! With parent `λ`, `r = p − p_λ` and the joint's own motion `ω_J = S_ω·q̇`, `v_J = S_v·q̇`:
+//! Every quantity of a link is in world axes and about the link's own origin, so that a child
+//! differs from its parent by a translation alone. With parent `λ`, `r = p − p_λ` and the joint's
+//! own motion `ω_J = S_ω·q̇`, `v_J = S_v·q̇`:
 //!
 //! ```text
 //! ω = ω_λ + ω_J                                   v = v_λ + ω_λ×r + v_J
 //! α = α_λ + S_ω·q̈ + ω_λ×ω_J                       a = a_λ + α_λ×r + ω_λ×(ω_λ×r) + S_v·q̈ + 2ω_λ×v_J
 //! ```
 //!
-//! `a` is the acceleration of the material point at the origin (not the spatial acceleration, from which it differs by `ω×v`).
+//! `a` is the acceleration of the material point at the origin; the spatial acceleration differs by
+//! `ω×v`.
 //!
 //! | symbol | meaning |
 //! |---|---|
@@ -16,7 +18,7 @@
 //! | `ω`, `v` | angular velocity; velocity of the origin |
 //! | `α`, `a` | angular acceleration; acceleration of the origin |
 //! | `S = [S_ω; S_v]` | motion subspace of the joint: one column per velocity number |
-//! | `c`, `I` | from origin to centre of mass; inertia about the origin |
+//! | `c`, `I` | from origin to center of mass; inertia about the origin |
 
 use crate::articulated::model::coordinates::{read_rotation, read_vector};
 use crate::articulated::model::joint::Joint;
@@ -24,7 +26,7 @@ use crate::articulated::model::{Link, LinkFrame, Model};
 use nalgebra::{ComplexField, Quaternion, Rotation3, Unit};
 use tumble_collide::{Mat3, Pose, Quat, Vec3};
 
-/// A link at one instant: world axes, about the link's origin.
+/// Motion of a link at one instant: world axes, about the link's origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkMotion {
     /// Pose of the link in the world.
@@ -33,25 +35,25 @@ pub struct LinkMotion {
     pub angular: Vec3,
     /// Velocity of the origin, m/s.
     pub linear: Vec3,
-    /// From the parent's origin (the world's for a root) to this one, metres.
+    /// From the parent's origin (the world's for a root) to this one, m.
     pub arm: Vec3,
-    /// From the origin to the centre of mass, metres.
+    /// From the origin to the center of mass, m.
     pub center: Vec3,
     /// Inertia about the origin, kg·m².
     pub inertia: Mat3,
 }
 
-/// Two vectors of one link: rates of rotation and of its origin (a column of `S`, or accelerations).
+/// Angular and linear rates of one link: a column of `S`, or accelerations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rates {
-    /// About the origin.
+    /// Rate of rotation.
     pub angular: Vec3,
-    /// Of the origin.
+    /// Rate of the origin.
     pub linear: Vec3,
 }
 
 impl Rates {
-    /// Neither.
+    /// Returns zero rates.
     pub fn zero() -> Rates {
         Rates { angular: Vec3::zeros(), linear: Vec3::zeros() }
     }
@@ -62,7 +64,8 @@ impl Rates {
     }
 }
 
-/// Poses, velocities and motion subspaces of all links at the position and velocity of the last [`refresh`](Self::refresh).
+/// Poses, velocities and motion subspaces of all links at the positions and velocities of the last
+/// [`refresh`](Self::refresh).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kinematics {
     links: Vec<LinkMotion>,
@@ -71,7 +74,7 @@ pub struct Kinematics {
 }
 
 impl Kinematics {
-    /// Room for `model`, at its zero position and at rest.
+    /// Allocates buffers for `model`, at its zero position and at rest.
     pub fn new(model: &Model) -> Kinematics {
         let still = LinkMotion {
             pose: Pose::identity(),
@@ -93,7 +96,7 @@ impl Kinematics {
         made
     }
 
-    /// Takes positions `q` and velocities `v` of the model that it was made for.
+    /// Sets positions `q` and velocities `v` of the model that it was made for.
     pub fn refresh(&mut self, model: &Model, q: &[f64], v: &[f64]) {
         for (i, link) in model.links().iter().enumerate() {
             let pose = self.place(link, &q[link.q..]);
@@ -114,22 +117,24 @@ impl Kinematics {
         }
     }
 
-    /// The moving links, numbered as in the model.
+    /// Returns the moving links, numbered as in the model.
     pub fn links(&self) -> &[LinkMotion] {
         &self.links
     }
 
-    /// The columns of `S`, one per velocity number: what the link that the number belongs to does, relative to its parent, at unit velocity.
+    /// Returns the columns of `S`, one per velocity number: the motion of its link relative to the
+    /// parent at unit velocity.
     pub fn columns(&self) -> &[Rates] {
         &self.columns
     }
 
-    /// Pose in the world of a named frame of the model.
+    /// Returns the pose in the world of a named frame of the model.
     pub fn frame_pose(&self, frame: &LinkFrame) -> Pose {
         frame.link.map_or(frame.pose, |i| self.links[i].pose * frame.pose)
     }
 
-    /// Accelerations of all links for given `qdd` (empty for none), with `base` added to the acceleration of everything: `−gravity` makes weights of masses.
+    /// Writes the accelerations of all links for given `qdd` (empty for none). `base` is added to
+    /// every acceleration: `−gravity` turns masses into weights.
     pub fn accelerations(&self, model: &Model, qdd: &[f64], base: &Vec3, out: &mut [Rates]) {
         for (i, link) in model.links().iter().enumerate() {
             let (own, moves) = (&self.links[i], &self.joint_rates[i]);
@@ -148,12 +153,13 @@ impl Kinematics {
         }
     }
 
-    /// Accelerations of all links that their velocities alone cause: `J̇·v`, those for `qdd = 0` without gravity.
+    /// Writes the accelerations of all links due to their velocities alone, `J̇·v`: those for `qdd
+    /// = 0` without gravity.
     pub fn bias_accelerations(&self, model: &Model, out: &mut [Rates]) {
         self.accelerations(model, &[], &Vec3::zeros(), out);
     }
 
-    /// `S·rates` of one joint.
+    /// Returns `S·rates` of one joint.
     fn along(&self, link: &Link, rates: &[f64]) -> Rates {
         let mut sum = Rates::zero();
         for k in link.v..link.v + link.joint.dof() {
@@ -162,7 +168,7 @@ impl Kinematics {
         sum
     }
 
-    /// Origin and velocities of what the link hangs on.
+    /// Returns origin, angular velocity and linear velocity of the link's parent.
     fn carrier(&self, link: &Link) -> (Vec3, Vec3, Vec3) {
         link.parent.map_or((Vec3::zeros(), Vec3::zeros(), Vec3::zeros()), |i| {
             let parent = &self.links[i];
@@ -170,7 +176,7 @@ impl Kinematics {
         })
     }
 
-    /// `X_W = X_λ·placement·X_J(q)`; a floating link's position is its pose in the world.
+    /// Returns `X_W = X_λ·placement·X_J(q)`; a floating link's position is its pose in the world.
     fn place(&self, link: &Link, q: &[f64]) -> Pose {
         let joint = match link.joint {
             Joint::Fixed => Pose::identity(),
@@ -183,7 +189,8 @@ impl Kinematics {
         anchor * joint
     }
 
-    /// The joint's columns of `S`; joint axes are the link's axes seen along the joint, because a turn about an axis leaves it where it is.
+    /// Sets the joint's columns of `S`. Joint axes equal the link's axes along the joint, because a
+    /// rotation leaves its own axis fixed.
     fn place_columns(&mut self, link: &Link, pose: &Pose) {
         let r: Rotation3<f64> = pose.rotation.to_rotation_matrix();
         let (mut columns, zero) = (self.columns[link.v..].iter_mut(), Vec3::zeros());
@@ -205,7 +212,7 @@ impl Kinematics {
     }
 }
 
-/// Rotation by `angle` about a unit axis.
+/// Returns the rotation by `angle` about a unit axis.
 fn about(axis: &Vec3, angle: f64) -> Quat {
     let (s, c) = ComplexField::sin_cos(0.5 * angle);
     Unit::new_unchecked(Quaternion::from_parts(c, axis * s))

@@ -1,7 +1,9 @@
-//! Inverse dynamics: the forces that a motion takes, by the recursive Newton–Euler algorithm [RBDA §5.3].
+//! Inverse dynamics by the recursive Newton–Euler algorithm: the forces for a given motion [RBDA
+//! §5.3].
 //!
-//! Outwards, the accelerations of [`Kinematics::accelerations`] with `−g` added to the base, so that weights come by themselves. Then what
-//! each link needs by itself, about its origin, and inwards what it passes on to its parent:
+//! The outward pass is [`Kinematics::accelerations`] with `−g` added to the base, which includes
+//! weights. Each link then needs a force and a torque about its origin, and the inward pass adds
+//! them to the parent's:
 //!
 //! ```text
 //! f = m·(a + α×c + ω×(ω×c)) − f_ext           n = I·α + ω×I·ω + m·c×a − n_ext
@@ -10,7 +12,7 @@
 //!
 //! | symbol | meaning |
 //! |---|---|
-//! | `f`, `n` | force, and torque about the link's origin, that the joint passes to the link |
+//! | `f`, `n` | force, and torque about the link's origin, that the joint transmits to the link |
 //! | `f_ext`, `n_ext` | external wrench on the link |
 //! | `τ` | generalized force, one number per velocity number |
 //!
@@ -21,7 +23,7 @@ use crate::articulated::model::Model;
 use crate::object::part_state::Wrench;
 use tumble_collide::Vec3;
 
-/// Working memory of inverse dynamics.
+/// Buffers of inverse dynamics.
 #[derive(Clone, Debug)]
 pub struct InverseDynamics {
     accelerations: Vec<Rates>,
@@ -29,14 +31,15 @@ pub struct InverseDynamics {
 }
 
 impl InverseDynamics {
-    /// Room for `model`.
+    /// Allocates buffers for `model`.
     pub fn new(model: &Model) -> InverseDynamics {
         let count = model.links().len();
         InverseDynamics { accelerations: vec![Rates::zero(); count], loads: vec![Wrench::default(); count] }
     }
 
-    /// `tau = M·qdd + C(q, v) − (what gravity and wrenches do)`: the generalized forces under which the refreshed motion accelerates by `qdd`
-    /// (empty for none). `wrenches` has one per link, in world axes, with torque about the link's origin; empty for none.
+    /// Writes `tau = M·qdd + C(q, v) − (gravity and wrenches)`: the generalized forces that
+    /// accelerate the refreshed motion by `qdd` (empty for none). `wrenches` has one per link,
+    /// world axes, torque about the link's origin; empty for none.
     pub fn solve(
         &mut self,
         model: &Model,
@@ -61,13 +64,14 @@ impl InverseDynamics {
         }
     }
 
-    /// The forces that hold the refreshed motion at `qdd = 0`.
+    /// Writes the generalized forces of the refreshed motion at `qdd = 0`.
     pub fn bias(&mut self, model: &Model, kin: &Kinematics, gravity: &Vec3, wrenches: &[Wrench], tau: &mut [f64]) {
         self.solve(model, kin, gravity, &[], wrenches, tau);
     }
 
-    /// What each joint passed to its link in the last [`solve`](Self::solve): force, and torque about the link's origin, world axes: the reactions in
-    /// the joint and its generalized force together.
+    /// Returns the load that each joint transmitted to its link in the last [`solve`](Self::solve):
+    /// force, and torque about the link's origin, world axes. It is the sum of the joint reaction
+    /// and the generalized force.
     pub fn joint_loads(&self) -> &[Wrench] {
         &self.loads
     }
@@ -84,7 +88,7 @@ impl InverseDynamics {
     }
 }
 
-/// [`InverseDynamics::solve`] with the kinematics refreshed first: from `q`, `v`, `qdd` to `tau`.
+/// Refreshes the kinematics and calls [`InverseDynamics::solve`]: from `q`, `v`, `qdd` to `tau`.
 #[allow(clippy::too_many_arguments, reason = "the arguments of τ = RNEA(q, v, q̈, f), and where to work")]
 pub fn inverse_dynamics(
     model: &Model,

@@ -1,6 +1,8 @@
-//! A root of the mass matrix from the factors of the articulated-body method, and test impulses through it (thesis §III.B.6).
+//! A root of the mass matrix from the factors of the articulated-body method, and test impulses
+//! through it (thesis §III.B.6).
 //!
-//! Kinetic energy is a sum of squares, one per joint. With `D = C Cᵀ` and `G = U C⁻ᵀ` at each joint, `V' = X Vₚ` and `V = V' + S v`:
+//! Kinetic energy is a sum of squares, one per joint. With `D = C Cᵀ` and `G = U C⁻ᵀ` at each
+//! joint, `V' = X Vₚ` and `V = V' + S v`:
 //!
 //! ```text
 //! vᵀ M v = Σ |uᵢ|²     u = L v:      outward   uᵢ = Gᵀ V' + Cᵀ vᵢ
@@ -9,14 +11,14 @@
 //!                      j = Lᵀ u:     inward    jᵢ = C uᵢ + Sᵀ P           Pₚ += Xᵀ (P + G uᵢ)
 //! ```
 //!
-//! so `M = LᵀL`. An impulse at one link starts as `P` there and leaves the rest of the tree alone: `y` has numbers on the path to the root only, and costs
-//! O(depth).
+//! so `M = LᵀL`. An impulse at one link starts as `P` there and does not affect the rest of the
+//! tree: `y` has numbers only on the path to the root, at a cost of O(depth).
 //!
 //! | joint | `C` | `G` |
 //! |---|---|---|
-//! | hinge, slider | `√D` | `U/√D` |
-//! | ball | `R` own axes to world; `C` of `J` there | `[C; Wᵀ]`, `W = C⁻¹ H` |
-//! | floating root | block upper triangular: `C` of `M`, `W = C⁻¹ Hᵀ`, `C` of `J − Wᵀ W` | none: nothing before it moves |
+//! | revolute, prismatic | `√D` | `U/√D` |
+//! | spherical | `R` own axes to world; `C` of `J` there | `[C; Wᵀ]`, `W = C⁻¹ H` |
+//! | floating root | block upper triangular: `C` of `M`, `W = C⁻¹ Hᵀ`, `C` of `J − Wᵀ W` | none: nothing precedes it |
 
 use crate::articulated::algorithms::abm::JointFactor;
 use crate::articulated::algorithms::dynamics::{Dynamics, Scratch, load_vector, store_vector};
@@ -25,11 +27,11 @@ use crate::articulated::model::compiled::{CompiledLink, JointKind};
 use crate::spatial::{Force, Motion, Vector};
 use tumble_collide::Vec3;
 
-/// Rows that walk to the root together.
+/// Number of rows that walk to the root together.
 const ROWS: usize = 3;
 
 impl Dynamics {
-    /// `u = L v`: velocities where every mass is 1.
+    /// Writes `u = L v`: velocities in coordinates in which every mass is 1.
     pub fn whiten(&self, s: &mut Scratch, v: &[f64], u: &mut [f64]) {
         self.propagate_velocities(s, v);
         for (i, body) in self.compiled.bodies.iter().enumerate() {
@@ -60,7 +62,7 @@ impl Dynamics {
         }
     }
 
-    /// `v = L⁻¹ u`.
+    /// Writes `v = L⁻¹ u`.
     pub fn unwhiten(&self, s: &mut Scratch, u: &[f64], v: &mut [f64]) {
         s.motions[0] = Motion::default();
         for (i, body) in self.compiled.bodies.iter().enumerate() {
@@ -94,7 +96,7 @@ impl Dynamics {
         }
     }
 
-    /// `y = L⁻ᵀ j`: the whitened response to generalized impulses.
+    /// Writes `y = L⁻ᵀ j`: the whitened response to generalized impulses.
     pub fn respond(&self, s: &mut Scratch, j: &[f64], y: &mut [f64]) {
         s.forces.fill(Force::default());
         for (i, body) in self.compiled.bodies.iter().enumerate().rev() {
@@ -103,7 +105,7 @@ impl Dynamics {
         }
     }
 
-    /// `j = Lᵀ u`: the generalized impulse that a change of `u` means.
+    /// Writes `j = Lᵀ u`: the generalized impulse of a change of `u`.
     pub fn recover(&self, s: &mut Scratch, u: &[f64], j: &mut [f64]) {
         s.forces.fill(Force::default());
         for (i, body) in self.compiled.bodies.iter().enumerate().rev() {
@@ -139,19 +141,20 @@ impl Dynamics {
         }
     }
 
-    /// Adds `sign·L⁻ᵀJᵀ` of the velocities, along the world directions `axes`, of the point of `link` that is `arm` (metres, world axes) from its origin.
-    /// `y` has one row of [`dof`](Self::dof) numbers per axis. O(depth) per row; touches the path to the root only.
+    /// Adds `sign·L⁻ᵀJᵀ` for the velocities along the world directions `axes` of a point of `link`
+    /// at `arm` (m, world axes) from its origin. `y` has one row of [`dof`](Self::dof) numbers per
+    /// axis. O(depth) per row; changes only the path to the root.
     pub fn point_response(&self, link: usize, arm: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]) {
         let arm = Vector::from(*arm);
         self.walk(link, axes, sign, y, |n| Force::new(arm.cross(n), n));
     }
 
-    /// Adds `sign·L⁻ᵀJᵀ` of a link's angular velocity along the world direction `axis`.
+    /// Adds `sign·L⁻ᵀJᵀ` for the angular velocity of a link along the world direction `axis`.
     pub fn rotation_response(&self, link: usize, axis: &Vec3, sign: f64, y: &mut [f64]) {
         self.walk(link, std::slice::from_ref(axis), sign, y, |n| Force::new(n, Vector::default()));
     }
 
-    /// Takes the impulses that `impulse` makes of the axes to the root, a few rows at a time.
+    /// Carries the impulses that `impulse` makes of the axes to the root, a few rows at a time.
     fn walk(&self, link: usize, axes: &[Vec3], sign: f64, y: &mut [f64], impulse: impl Fn(Vector) -> Force) {
         let dof = self.dof();
         for (axes, y) in axes.chunks(ROWS).zip(y.chunks_mut(ROWS * dof)) {
@@ -170,7 +173,8 @@ impl Dynamics {
         }
     }
 
-    /// `yᵢ` of one joint to `out`, and what it passes to the parent, about the parent's origin.
+    /// Writes `yᵢ` of one joint to `out` and returns the impulse that it passes to the parent,
+    /// about the parent's origin.
     #[inline(always)]
     fn respond_link(
         &self,

@@ -1,15 +1,18 @@
-//! A model as the sweeps read it.
+//! A model in the layout of the sweeps.
 //!
-//! Link `i` of the model is slot `i + 1`; slot 0 is the world. Hinges and sliders are turned so that their axis is z: the *inner* frame of a link is its
-//! frame times `own`. So a hinge turns by two columns, and its axis in the world is the third.
+//! Link `i` of the model is slot `i + 1`; slot 0 is the world. Links of revolute and prismatic
+//! joints are rotated so that the joint axis is z: the *inner* frame of a link is its frame times
+//! `own`. A revolute joint then changes two columns, and its axis in the world is the third.
 //!
-//! The inertia about the link's origin is kept as `λ·1 + n mᵀ + m nᵀ`. With principal moments `λ₁ ≥ λ₂ ≥ λ₃` and axes `e`:
+//! The inertia about the link's origin is stored as `λ·1 + n mᵀ + m nᵀ`. With principal moments `λ₁
+//! ≥ λ₂ ≥ λ₃` and axes `e`:
 //!
 //! ```text
 //! λ = λ₂    n = a e₁ + b e₃    m = a e₁ − b e₃    2a² = λ₁ − λ₂    2b² = λ₂ − λ₃
 //! ```
 //!
-//! Two vectors turn into the world in fewer operations than a matrix does, and `λ` has no gyroscopic torque.
+//! Rotating two vectors into the world takes fewer operations than rotating a matrix, and `λ` has
+//! no gyroscopic torque.
 
 use crate::articulated::model::joint::Joint;
 use crate::articulated::model::{Link, LinkMass, Model};
@@ -17,32 +20,33 @@ use crate::spatial::{Matrix, Vector};
 use nalgebra::SymmetricEigen;
 use tumble_collide::{Mat3, Vec3};
 
-/// What a sweep does at a link.
+/// Joint of a link, as the sweeps distinguish it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::articulated) enum JointKind {
     Revolute,
     Prismatic,
-    /// Index of its block.
+    /// Index of its factor.
     Spherical(usize),
-    /// Index of its block.
+    /// Index of its factor.
     Floating(usize),
 }
 
-/// One link. Lengths and axes are in inner frames: the parent's for the placement, its own for the mass.
+/// One link. Lengths and axes are in inner frames: the parent's for the placement, its own for the
+/// mass.
 #[derive(Clone, Debug)]
 pub(in crate::articulated) struct CompiledLink {
     pub kind: JointKind,
     /// Slot of the parent.
     pub parent: usize,
-    /// First of its position numbers.
+    /// Index of its first position number.
     pub q: usize,
-    /// First of its velocity numbers.
+    /// Index of its first velocity number.
     pub v: usize,
-    /// Inner axes at joint position 0 in the parent's.
+    /// Inner axes at joint position 0, in the parent's inner axes.
     pub turned: Matrix<f64>,
-    /// Joint's origin in the parent's.
+    /// Origin of the joint in the parent's inner frame.
     pub offset: Vector<f64>,
-    /// Inner axes in the link's.
+    /// Inner axes in the link's axes.
     pub own: Mat3,
     pub mass: f64,
     /// First moment of mass, kg·m.
@@ -53,7 +57,7 @@ pub(in crate::articulated) struct CompiledLink {
     pub pair: [Vector<f64>; 2],
 }
 
-/// All links, and how many of them have a factor of three rows or more.
+/// All links, and the number of those with a factor of three or six rows.
 #[derive(Clone, Debug)]
 pub(in crate::articulated) struct Compiled {
     pub bodies: Vec<CompiledLink>,
@@ -86,7 +90,7 @@ impl Compiled {
                 self.blocks += 1;
                 if *joint == Joint::Floating { JointKind::Floating(block) } else { JointKind::Spherical(block) }
             }
-            // A model holds no fixed links: they are folded into their parents.
+            // a model has no fixed links: they are folded into their parents
             Joint::Revolute { .. } | Joint::Fixed => JointKind::Revolute,
         }
     }
@@ -114,7 +118,7 @@ fn body(link: &Link, kind: JointKind, outer: &Mat3) -> CompiledLink {
     }
 }
 
-/// Right-handed unit axes with the third along `axis`; exact for coordinate axes.
+/// Returns right-handed unit axes with the third along `axis`; exact for coordinate axes.
 fn axes_with_z(axis: &Vec3) -> Mat3 {
     let k = axis.iamin();
     let x = Vec3::ith(k, 1.0);
@@ -122,7 +126,7 @@ fn axes_with_z(axis: &Vec3) -> Mat3 {
     Mat3::from_columns(&[x, axis.cross(&x), *axis])
 }
 
-/// `λ` and `n`, `m` of the inertia about the link's origin, in axes `own`.
+/// Returns `λ` and `n`, `m` of the inertia about the link's origin, in axes `own`.
 fn biaxial(mass: &LinkMass, own: &Mat3) -> (f64, [Vector<f64>; 2]) {
     let about = own.transpose() * mass.about_origin() * own;
     let eigen = SymmetricEigen::new(0.5 * (about + about.transpose()));

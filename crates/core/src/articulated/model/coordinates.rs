@@ -1,6 +1,7 @@
-//! Arithmetic on positions: moving along a velocity, and the velocity between two positions.
+//! Arithmetic on positions: integration along a velocity, and the velocity between two positions.
 //!
-//! Rotations move on the circle that a constant angular velocity draws, so that `integrate` is exact for it and `difference` is its inverse:
+//! Rotations follow the circle of a constant angular velocity, so `integrate` is exact for it and
+//! `difference` is its inverse:
 //!
 //! ```text
 //! spherical   R' = R·exp(h·ω)                      ω in the link's axes
@@ -14,8 +15,8 @@ use crate::rigid::rotation::turn;
 use nalgebra::{Quaternion, Unit};
 use tumble_collide::{Quat, Vec3};
 
-/// Moves the positions `q` along the velocities `v` for `h` seconds; exact on rotations, quaternions made unit again.
-/// Lengths: [`Model::positions`] and [`Model::dof`].
+/// Integrates the positions `q` along the velocities `v` for `h` seconds. Exact on rotations;
+/// normalizes quaternions. Lengths: [`Model::positions`] and [`Model::dof`].
 pub fn integrate(model: &Model, q: &mut [f64], v: &[f64], h: f64) {
     for link in model.links() {
         let (q, v) = (&mut q[link.q..], &v[link.v..]);
@@ -33,7 +34,8 @@ pub fn integrate(model: &Model, q: &mut [f64], v: &[f64], h: f64) {
     }
 }
 
-/// The velocity `v` that takes `from` to `to` in one second: `integrate(from, v, 1) = to`. Rotations go the short way round.
+/// Writes the velocity `v` that takes `from` to `to` in one second: `integrate(from, v, 1) = to`.
+/// Rotations take the shorter way.
 pub fn difference(model: &Model, from: &[f64], to: &[f64], v: &mut [f64]) {
     for link in model.links() {
         let (a, b, v) = (&from[link.q..], &to[link.q..], &mut v[link.v..]);
@@ -49,7 +51,7 @@ pub fn difference(model: &Model, from: &[f64], to: &[f64], v: &mut [f64]) {
     }
 }
 
-/// Makes the quaternions in `q` unit; one without direction becomes the identity.
+/// Normalizes the quaternions in `q`; one of length 0 becomes the identity.
 pub fn normalize(model: &Model, q: &mut [f64]) {
     for link in model.links() {
         if let Some(k) = link.joint.quaternion() {
@@ -61,12 +63,12 @@ pub fn normalize(model: &Model, q: &mut [f64]) {
     }
 }
 
-/// A vector from the first three numbers.
+/// Returns a vector from the first three numbers.
 pub(in crate::articulated) fn read_vector(x: &[f64]) -> Vec3 {
     Vec3::new(x[0], x[1], x[2])
 }
 
-/// A rotation from the first four numbers, `x, y, z, w`, made unit.
+/// Returns a rotation from the first four numbers, `x, y, z, w`, normalized.
 pub(in crate::articulated) fn read_rotation(x: &[f64]) -> Quat {
     Unit::new_normalize(Quaternion::new(x[3], x[0], x[1], x[2]))
 }

@@ -1,34 +1,37 @@
-//! What acts on one degree of freedom of an articulated body: limits, damping, dry friction, a spring, a drive (thesis §III.B.7, §IV.A.4).
+//! Settings of one degree of freedom of an articulated body: limits, damping, dry friction, a
+//! spring, a drive (thesis §III.B.7, §IV.A.4).
 //!
-//! Limits, dry friction and drives become rows, solved together with all contacts. In `time_stepping` damping and drives are implicit: over a step `h`
+//! Limits, dry friction and drives become rows, which are solved together with all contacts. In
+//! `time_stepping` damping and drives are implicit over a step `h`:
 //!
 //! ```text
 //! position drive    τ = k(q* − q − h·q̇⁺) + c(q̇* − q̇⁺)      row  q̇⁺ + R·λ = (k(q* − q) + c·q̇*)/(c + h·k),   R = 1/(h(c + h·k)),   |λ| ≤ h·τ_max
 //! damping           τ = −c·q̇⁺                               row  q̇⁺ + R·λ = 0,                               R = 1/(h·c)
-//! velocity drive    whatever it takes, |τ| ≤ τ_max           row  q̇⁺ = q̇*,                                    |λ| ≤ h·τ_max
+//! velocity drive    any τ with |τ| ≤ τ_max                   row  q̇⁺ = q̇*,                                    |λ| ≤ h·τ_max
 //! dry friction      against the motion, |τ| ≤ τ_f            row  q̇⁺ = 0,                                     |λ| ≤ h·τ_f
 //! ```
 //!
-//! so that no gain is too stiff for the step. In `backtracking` damping and position drives are forces, as accurate as the integrator. Springs are
-//! forces in both.
+//! so no gain is too stiff for the step. In `backtracking` damping and position drives are forces,
+//! as accurate as the integrator. Springs are forces in both steppers.
 //!
 //! | symbol | meaning |
 //! |---|---|
-//! | `q, q̇` | the freedom's position (rad or m) and velocity; `⁺` at the end of the step |
+//! | `q, q̇` | position (rad or m) and velocity of the degree of freedom; `⁺` at the end of the step |
 //! | `k, c` | stiffness, N·m/rad or N/m, and damping, N·m·s/rad or N·s/m |
 //! | `λ = h·τ` | impulse of the row |
 
 use crate::articulated::model::playback::Playback;
 use std::sync::Arc;
 
-/// What acts on one degree of freedom. Of a spherical or floating joint only damping and dry friction apply: its freedoms have no single position.
+/// Settings of one degree of freedom. Spherical and floating joints support only damping and dry
+/// friction: their degrees of freedom have no single position.
 #[derive(Clone, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct DofSettings {
-    /// Least and greatest position, rad or m.
+    /// Lower and upper limit of the position, rad or m.
     pub limits: Option<[f64; 2]>,
     /// Viscous damping, N·m·s/rad or N·s/m, at least 0.
     pub damping: f64,
-    /// Dry friction: greatest torque or force that resists motion, N·m or N, at least 0.
+    /// Dry friction: maximum torque or force that resists motion, N·m or N, at least 0.
     pub friction: f64,
     /// Spring towards a rest position.
     pub spring: Option<Spring>,
@@ -36,67 +39,70 @@ pub struct DofSettings {
     pub drive: Drive,
 }
 
-/// A linear spring on a joint. A force, never implicit: keep `stiffness·dt²` below the inertia that it moves, or use [`Drive::Position`].
+/// A linear spring on a joint. It is an explicit force: keep `stiffness·dt²` below the inertia that
+/// it moves, or use [`Drive::Position`].
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Spring {
-    /// N·m/rad or N/m, at least 0.
+    /// Stiffness, N·m/rad or N/m, at least 0.
     pub stiffness: f64,
-    /// Position without force, rad or m.
+    /// Rest position, rad or m.
     pub rest: f64,
 }
 
-/// A motor on one freedom.
+/// A motor on one degree of freedom.
 #[derive(Clone, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Drive {
-    /// None. Torques that the user computes go through [`World::apply_generalized`](crate::World::apply_generalized).
+    /// No motor. [`World::apply_generalized`](crate::World::apply_generalized) applies torques of
+    /// the caller.
     #[default]
     None,
     /// A proportional–derivative drive.
     Position {
-        /// N·m/rad or N/m, at least 0.
+        /// Stiffness, N·m/rad or N/m, at least 0.
         stiffness: f64,
-        /// N·m·s/rad or N·s/m, at least 0; one of the two above 0.
+        /// Damping, N·m·s/rad or N·s/m, at least 0. Stiffness or damping must be above 0.
         damping: f64,
-        /// Position aimed at, rad or m.
+        /// Target position, rad or m.
         target: f64,
-        /// Velocity aimed at, rad/s or m/s.
+        /// Target velocity, rad/s or m/s.
         velocity: f64,
-        /// Greatest torque or force, N·m or N; may be infinite.
+        /// Maximum torque or force, N·m or N; may be infinite.
         limit: f64,
     },
-    /// Holds a velocity as far as its torque goes.
+    /// Holds a velocity as far as its maximum torque allows.
     Velocity {
-        /// rad/s or m/s.
+        /// Target velocity, rad/s or m/s.
         target: f64,
-        /// Greatest torque or force, N·m or N; may be infinite.
+        /// Maximum torque or force, N·m or N; may be infinite.
         limit: f64,
     },
-    /// Follows a recorded motion, exactly while its torque suffices. Once behind, it goes after the motion at full torque in `time_stepping` and may swing about
-    /// it; in `backtracking` it follows the velocity alone.
+    /// Follows a recorded motion exactly while the maximum torque suffices. A joint that has fallen
+    /// behind follows at full torque in `time_stepping` and may oscillate about the motion. In
+    /// `backtracking` it follows only the velocity.
     Playback {
         /// Position over time.
         #[serde(with = "tumble_collide::shared")]
         motion: Arc<Playback>,
-        /// Greatest torque or force, N·m or N; may be infinite.
+        /// Maximum torque or force, N·m or N; may be infinite.
         limit: f64,
     },
 }
 
-/// One freedom follows another, as URDF's `mimic`: `q = multiplier·q_of + offset`.
+/// Couples one degree of freedom to another, like URDF's `mimic`: `q = multiplier·q_of + offset`.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Coupling {
-    /// Velocity coordinate that follows.
+    /// Velocity coordinate of the coupled degree of freedom.
     pub dof: usize,
-    /// Velocity coordinate that it follows.
+    /// Velocity coordinate of the degree of freedom that it follows.
     pub of: usize,
     /// Ratio.
     pub multiplier: f64,
-    /// Position where the other's is 0, rad or m.
+    /// Position at which the other's is 0, rad or m.
     pub offset: f64,
 }
 
 impl DofSettings {
-    /// What is out of its range, if anything: which constant, its value, what would be right.
+    /// Returns the first setting out of its range: name, value, admissible range.
     pub(in crate::articulated) fn range_error(&self, positional: bool) -> Option<(&'static str, f64, &'static str)> {
         let least =
             |what, value: f64| (!(value.is_finite() && value >= 0.0)).then_some((what, value, "finite and at least 0"));
@@ -106,7 +112,7 @@ impl DofSettings {
         };
         if !positional && (self.limits.is_some() || self.spring.is_some() || self.drive != Drive::None) {
             return Some((
-                "the number of its joint's freedoms that have limits, springs or drives",
+                "the number of degrees of freedom of its joint with limits, springs or drives",
                 1.0,
                 "0: only revolute and prismatic joints have them",
             ));
@@ -139,12 +145,13 @@ impl DofSettings {
         })
     }
 
-    /// The generalized force of what is always a force: the spring.
+    /// Returns the generalized force of the spring, which is explicit in every stepper.
     pub(in crate::articulated) fn spring_force(&self, q: f64) -> f64 {
         self.spring.map_or(0.0, |s| s.stiffness * (s.rest - q))
     }
 
-    /// The generalized force of what is a force where rows are not implicit: damping and a position drive.
+    /// Returns the generalized force of damping and of a position drive, for steps whose rows are
+    /// not implicit.
     pub(in crate::articulated) fn explicit_force(&self, q: f64, v: f64) -> f64 {
         let drive = match &self.drive {
             Drive::Position { stiffness, damping, target, velocity, limit } => {

@@ -1,7 +1,8 @@
-//! A tree of links: what never changes of an articulated body [RBDA §4.1–4.4], thesis §III.B.1.
+//! A tree of links: the constant part of an articulated body [RBDA §4.1–4.4], thesis §III.B.1.
 //!
-//! Links are numbered so that a parent comes before its children. Fixed links are folded into their parents when the model is built and live on
-//! as [`LinkFrame`]s. Coordinates are laid out link by link: `q` has [`Model::positions`] numbers and `v` has [`Model::dof`].
+//! A parent has a lower number than its children. Fixed links are folded into their parents when
+//! the model is built and remain as [`LinkFrame`]s. Coordinates are ordered by link: `q` has
+//! [`Model::positions`] numbers and `v` has [`Model::dof`].
 
 pub(in crate::articulated) mod compiled;
 pub(in crate::articulated) mod coordinates;
@@ -14,33 +15,33 @@ use nalgebra::SymmetricEigen;
 use std::collections::BTreeMap;
 use tumble_collide::{Mat3, Pose, Vec3};
 
-/// Links at most in one model: a bound for what comes from files.
+/// Maximum number of links of a model, as a bound for input from files.
 pub const MAX_LINKS: usize = 10_000;
 
-/// What is wrong with a model.
+/// Why a model is not valid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModelError {
-    /// Nothing in it.
+    /// There is no moving link.
     #[error("the model has no moving link")]
     Empty,
     /// More links than [`MAX_LINKS`].
     #[error("the model has more than {MAX_LINKS} links")]
     TooMany,
-    /// Names are unique within a model.
+    /// Two links have the same name.
     #[error("two links are named '{0}'; names must be unique within a model")]
     DuplicateName(String),
-    /// A parent that was not added before.
+    /// The parent was not added before the link.
     #[error("link '{link}': its parent, link number {parent}, was not added before it")]
     Parent {
         /// Link.
         link: String,
-        /// Parent given.
+        /// Number given as the parent.
         parent: usize,
     },
-    /// Only a root can float.
+    /// A link with a parent has a floating joint.
     #[error("link '{0}': only a root can have a floating joint")]
     Floating(String),
-    /// An axis without direction.
+    /// The joint axis has no direction.
     #[error("link '{link}': its joint axis {axis:?} has no direction; it must be finite and not zero")]
     Axis {
         /// Link.
@@ -48,10 +49,10 @@ pub enum ModelError {
         /// Axis given.
         axis: [f64; 3],
     },
-    /// A pose with numbers that are not finite, or a rotation that is not of unit length.
+    /// The placement is not finite, or its rotation is not of unit length.
     #[error("link '{0}': its placement must be finite, with a rotation of unit length")]
     Placement(String),
-    /// Mass or inertia of no body.
+    /// Mass or inertia is out of its range.
     #[error("link '{link}': {what} is {value}; it must be {wanted}")]
     Inertia {
         /// Link.
@@ -60,45 +61,46 @@ pub enum ModelError {
         what: &'static str,
         /// Value given.
         value: f64,
-        /// What would be right.
+        /// Admissible range.
         wanted: &'static str,
     },
-    /// Nothing that a joint moves has any inertia along it.
+    /// A joint moves no inertia.
     #[error(
-        "link '{0}' and all that hangs on it have no inertia about its joint, so no force could move it as asked: give it or a link below it mass"
+        "link '{0}' and its descendants have no inertia about its joint, so their motion has no solution; give mass to one of them"
     )]
     Massless(String),
 }
 
-/// Mass of a link, in the link's frame. All zero is a massless link, for joints of several degrees of freedom that are stacked.
+/// Mass properties of a link, in the link's frame. All zero is a massless link, for stacked joints
+/// of one degree of freedom each.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LinkMass {
     /// Mass, kg.
     pub mass: f64,
-    /// Centre of mass, metres, link frame.
+    /// Center of mass, m, link frame.
     pub center: Vec3,
-    /// Inertia about the centre of mass, link axes, kg·m².
+    /// Inertia about the center of mass, link axes, kg·m².
     pub inertia: Mat3,
 }
 
 impl LinkMass {
-    /// A link without mass.
+    /// Returns the properties of a massless link.
     pub fn none() -> LinkMass {
         LinkMass { mass: 0.0, center: Vec3::zeros(), inertia: Mat3::zeros() }
     }
 
-    /// A point of `mass` kg.
+    /// Returns the properties of a point mass of `mass` kg at `center`.
     pub fn point(mass: f64, center: Vec3) -> LinkMass {
         LinkMass { mass, center, inertia: Mat3::zeros() }
     }
 
-    /// The inertia about the link's origin: `I + m(|c|²·1 − c·cᵀ)`.
+    /// Returns the inertia about the link's origin: `I + m(|c|²·1 − c·cᵀ)`.
     pub fn about_origin(&self) -> Mat3 {
         self.inertia
             + self.mass * (self.center.norm_squared() * Mat3::identity() - self.center * self.center.transpose())
     }
 
-    /// The two held together, `other` in the same frame.
+    /// Returns the properties of both masses joined; `other` is in the same frame.
     pub fn with(&self, other: &LinkMass) -> LinkMass {
         let mass = self.mass + other.mass;
         if mass == 0.0 {
@@ -109,7 +111,7 @@ impl LinkMass {
         LinkMass { mass, center, inertia: moved(self) + moved(other) }
     }
 
-    /// The same mass seen from the frame in which this one's frame has pose `pose`.
+    /// Returns the properties in the frame in which this one's frame has pose `pose`.
     pub fn seen_from(&self, pose: &Pose) -> LinkMass {
         let r = pose.rotation.to_rotation_matrix().into_inner();
         LinkMass {
@@ -126,7 +128,7 @@ impl LinkMass {
             return range_error("mass", self.mass, "finite and at least 0 kg");
         }
         if let Some(value) = self.center.iter().copied().find(|x| !x.is_finite()) {
-            return range_error("a coordinate of the centre of mass", value, "finite");
+            return range_error("a coordinate of the center of mass", value, "finite");
         }
         if let Some(value) = self.inertia.iter().copied().find(|x| !x.is_finite()) {
             return range_error("an entry of the inertia", value, "finite");
@@ -144,33 +146,34 @@ impl LinkMass {
     }
 }
 
-/// A link that moves.
+/// A moving link.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Link {
     /// Name, unique in the model.
     pub name: String,
-    /// Link that it hangs on; `None` on the world (or, for a root that floats, on nothing).
+    /// Parent link; `None` for a root, which is attached to the world or floats.
     pub parent: Option<usize>,
-    /// Never [`Joint::Fixed`]; axes are unit.
+    /// Joint to the parent; never [`Joint::Fixed`]; axes are unit.
     pub joint: Joint,
-    /// The joint's frame in the parent link's frame (in the world for a root). For a floating root, where it starts: its pose is all in `q`.
+    /// The joint's frame in the parent link's frame, or in the world for a root. For a floating
+    /// root it is the initial pose only: the pose is in `q`.
     pub placement: Pose,
-    /// Mass, with that of all fixed links folded in, link frame.
+    /// Mass properties, with those of all fixed links folded in, link frame.
     pub mass: LinkMass,
-    /// First of its position numbers.
+    /// Index of its first position number.
     pub q: usize,
-    /// First of its velocity numbers.
+    /// Index of its first velocity number.
     pub v: usize,
 }
 
-/// A named frame that moves with a link: every link, the folded ones too.
+/// A named frame that moves with a link. There is one for every link, folded ones included.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LinkFrame {
-    /// Name of the link as it was added.
+    /// Name of the link.
     pub name: String,
-    /// Moving link that carries it; `None` for one fixed to the base.
+    /// Moving link that carries the frame; `None` for the base.
     pub link: Option<usize>,
-    /// Pose in that link's frame (in the base frame where there is none).
+    /// Pose in that link's frame, or in the base frame.
     pub pose: Pose,
 }
 
@@ -184,32 +187,32 @@ pub struct Model {
 }
 
 impl Model {
-    /// The moving links, parents first.
+    /// Returns the moving links, parents first.
     pub fn links(&self) -> &[Link] {
         &self.links
     }
 
-    /// All named frames, in the order in which their links were added.
+    /// Returns all named frames, in the order in which their links were added.
     pub fn frames(&self) -> &[LinkFrame] {
         &self.frames
     }
 
-    /// The frame of that name.
+    /// Returns the frame of that name.
     pub fn frame(&self, name: &str) -> Option<&LinkFrame> {
         self.frames.iter().find(|f| f.name == name)
     }
 
-    /// The moving link of that name.
+    /// Returns the index of the moving link of that name.
     pub fn link(&self, name: &str) -> Option<usize> {
         self.links.iter().position(|l| l.name == name)
     }
 
-    /// Length of `q`.
+    /// Returns the length of `q`.
     pub fn positions(&self) -> usize {
         self.positions
     }
 
-    /// Length of `v`: degrees of freedom.
+    /// Returns the length of `v`: the number of degrees of freedom.
     pub fn dof(&self) -> usize {
         self.dof
     }
@@ -231,7 +234,7 @@ impl Model {
         }
     }
 
-    /// Total mass, kg.
+    /// Returns the total mass, kg.
     pub fn mass(&self) -> f64 {
         self.links.iter().map(|l| l.mass.mass).sum()
     }
@@ -264,13 +267,14 @@ struct Added {
 }
 
 impl ModelBuilder {
-    /// No links yet.
+    /// Makes a builder without links.
     pub fn new() -> ModelBuilder {
         ModelBuilder::default()
     }
 
-    /// Adds a link and returns its number, for its children to name as their parent. `placement` is the joint's frame in the parent link's frame; where the joint is
-    /// at zero it is also the link's own. Nothing is checked before [`build`](Self::build).
+    /// Adds a link and returns its number, for its children. `placement` is the joint's frame in
+    /// the parent link's frame; with the joint at zero it is also the link's frame.
+    /// [`build`](Self::build) checks everything.
     pub fn link(
         &mut self,
         name: impl Into<String>,
@@ -283,7 +287,11 @@ impl ModelBuilder {
         self.added.len() - 1
     }
 
-    /// Checks everything, folds fixed links into their parents and numbers the coordinates.
+    /// Builds the model: checks everything, folds fixed links into their parents and numbers the
+    /// coordinates.
+    ///
+    /// # Errors
+    /// [`ModelError`] for the first property that is not valid.
     pub fn build(self) -> Result<Model, ModelError> {
         if self.added.len() > MAX_LINKS {
             return Err(ModelError::TooMany);
@@ -339,8 +347,8 @@ impl Model {
         Ok(())
     }
 
-    /// Whether something of mass hangs on every joint: what is below it must have mass, or inertia of its own.
-    /// Whether parents stand before their children and coordinates follow one another: what a builder makes, and a damaged archive may not hold.
+    /// Returns whether parents precede their children, coordinates are contiguous and every joint
+    /// moves some inertia. A builder ensures this; a damaged archive may violate it.
     pub(crate) fn is_sound(&self) -> bool {
         let mut ends = (0, 0);
         let links = self.links.iter().enumerate().all(|(i, link)| {
@@ -351,6 +359,7 @@ impl Model {
         links && frames && ends == (self.positions, self.dof) && self.check_masses().is_ok()
     }
 
+    /// Checks that every joint moves a link with mass or inertia.
     fn check_masses(&self) -> Result<(), ModelError> {
         let mut heavy: Vec<bool> =
             self.links.iter().map(|l| l.mass.mass > 0.0 || l.mass.inertia.amax() > 0.0).collect();

@@ -1,12 +1,13 @@
-//! A recorded motion of one joint, played back (thesis §III.B, scripted skeletons).
+//! Playback of a recorded motion of one joint (thesis §III.B, scripted skeletons).
 //!
-//! Between samples the motion is a cubic whose slopes at the samples are those of the parabola through each sample and its neighbours
-//! (Bessel's rule): it passes through every sample, its velocity is continuous, and quadratics are reproduced exactly.
+//! Between samples the motion is a cubic. Its slope at a sample is that of the parabola through the
+//! sample and its neighbors (Bessel's rule). The motion passes through every sample with a
+//! continuous velocity and reproduces quadratics exactly.
 
-/// What is wrong with a recorded motion.
+/// Why a recorded motion is not valid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlaybackError {
-    /// Not as many times as values, or fewer than two.
+    /// The numbers of times and values differ, or there are fewer than two.
     #[error("a recorded motion has {times} times and {values} values; it must have as many of each, and at least 2")]
     Count {
         /// Number of times.
@@ -14,19 +15,19 @@ pub enum PlaybackError {
         /// Number of values.
         values: usize,
     },
-    /// A number that is not finite, or a time that is not after the one before.
+    /// A number is not finite, or times do not rise.
     #[error(
         "sample {index} of a recorded motion: time {time} s, value {value}; both must be finite and times must rise"
     )]
     Sample {
-        /// Which sample, from 0.
+        /// Index of the sample, from 0.
         index: usize,
         /// Its time.
         time: f64,
         /// Its value.
         value: f64,
     },
-    /// A cycle that does not close.
+    /// A cyclic motion does not end where it starts.
     #[error("a motion that repeats must end where it starts; it starts at {first} and ends at {last}")]
     Cycle {
         /// First value.
@@ -36,7 +37,7 @@ pub enum PlaybackError {
     },
 }
 
-/// Position of one freedom over time.
+/// Position of one degree of freedom over time.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Playback {
     times: Vec<f64>,
@@ -46,7 +47,11 @@ pub struct Playback {
 }
 
 impl Playback {
-    /// A motion through `values` (rad or m) at `times` (s, rising); held before the first and after the last.
+    /// Makes a motion through `values` (rad or m) at `times` (s, rising). It is constant before the
+    /// first and after the last sample.
+    ///
+    /// # Errors
+    /// [`PlaybackError::Count`] or [`PlaybackError::Sample`].
     pub fn new(times: Vec<f64>, values: Vec<f64>) -> Result<Playback, PlaybackError> {
         if times.len() != values.len() || times.len() < 2 {
             return Err(PlaybackError::Count { times: times.len(), values: values.len() });
@@ -61,7 +66,10 @@ impl Playback {
         Ok(playback)
     }
 
-    /// The same motion over and over; its last value must be its first.
+    /// Makes a motion that repeats without end; its last value must equal its first.
+    ///
+    /// # Errors
+    /// [`PlaybackError::Cycle`] if it does not, and those of [`new`](Self::new).
     pub fn repeating(times: Vec<f64>, values: Vec<f64>) -> Result<Playback, PlaybackError> {
         let mut playback = Playback::new(times, values)?;
         let (first, last) = (playback.values[0], playback.values[playback.values.len() - 1]);
@@ -95,7 +103,7 @@ impl Playback {
         self.slopes = slopes;
     }
 
-    /// Position (rad or m) and velocity at time `t`, s.
+    /// Returns position (rad or m) and velocity at time `t`, s.
     pub fn at(&self, t: f64) -> (f64, f64) {
         let last = self.times.len() - 1;
         let (start, end) = (self.times[0], self.times[last]);

@@ -1,7 +1,8 @@
-//! Forward dynamics of many states of one model side by side: the sweeps of [`abm`](crate::articulated::algorithms::abm), a state per lane.
+//! Forward dynamics of many states of one model in parallel: the sweeps of
+//! [`abm`](crate::articulated::algorithms::abm) with one state per lane.
 //!
-//! A lane's bits are those of [`forward_dynamics`](crate::articulated::forward_dynamics) on that state alone, on every processor: what differs is how many lanes
-//! one instruction moves.
+//! A lane has the bits of [`forward_dynamics`](crate::articulated::forward_dynamics) for that
+//! state, on every processor. Processors differ only in the number of lanes per instruction.
 
 use crate::articulated::algorithms::abm::{Input, Sweep};
 use crate::articulated::model::Model;
@@ -11,15 +12,15 @@ use crate::articulated::simd::lanes::{Eight, Four};
 use crate::articulated::simd::lanes::{Lanes, Register};
 use tumble_collide::Vec3;
 
-/// A model made ready for `N` states at a time. Fast where `N` fills registers: a multiple of 8 on processors with AVX-512, of 4 on those with AVX2.
-/// All others are moved one by one.
+/// A model prepared for `N` states at a time. It is fast if `N` fills registers: a multiple of 8 on
+/// processors with AVX-512, of 4 on those with AVX2. Otherwise the states are computed one by one.
 #[derive(Clone, Debug)]
 pub struct BatchDynamics<const N: usize> {
     compiled: Compiled,
     width: SimdWidth,
 }
 
-/// The registers used, with the proof that the processor has them.
+/// The register width in use, with the proof that the processor supports it.
 #[derive(Clone, Debug)]
 enum SimdWidth {
     One(Sweep<f64>),
@@ -30,20 +31,22 @@ enum SimdWidth {
 }
 
 impl<const N: usize> BatchDynamics<N> {
-    /// Makes a model ready; all allocation happens here.
+    /// Prepares a model. No later call allocates memory.
     pub fn new(model: &Model) -> BatchDynamics<N> {
         let compiled = Compiled::new(model);
         BatchDynamics { width: SimdWidth::best(&compiled, N), compiled }
     }
 
-    /// The same one by one, as on a processor without SIMD: slower, the same bits.
+    /// Prepares a model for computation of one state at a time, as on a processor without SIMD:
+    /// slower, with the same bits.
     pub fn plain(model: &Model) -> BatchDynamics<N> {
         let compiled = Compiled::new(model);
         BatchDynamics { width: SimdWidth::One(Sweep::new(&compiled, 0.0)), compiled }
     }
 
-    /// `q̈` of every lane from its `q`, `v` and joint forces `tau` (lengths `positions` and `dof` of the model, one state per lane), in uniform gravity,
-    /// m/s². Where a joint is singular its axis is held still, as [`Dynamics::singular`](crate::articulated::Dynamics::singular) says.
+    /// Writes `q̈` of every lane for its `q`, `v` and joint forces `tau`, in uniform gravity, m/s².
+    /// Lengths are `positions` and `dof` of the model, with one state per lane. A singular joint
+    /// axis is held, as [`Dynamics::singular`](crate::articulated::Dynamics::singular) says.
     pub fn forward_dynamics(
         &mut self,
         gravity: &Vec3,
@@ -79,7 +82,7 @@ impl SimdWidth {
     }
 }
 
-/// One call's arguments.
+/// Arguments of a call.
 struct Call<'a, const N: usize> {
     compiled: &'a Compiled,
     gravity: &'a Vec3,
@@ -90,7 +93,7 @@ struct Call<'a, const N: usize> {
 }
 
 impl<const N: usize> Call<'_, N> {
-    /// A register of lanes after the other.
+    /// Computes one register of lanes after the other.
     #[inline(always)]
     fn run<T: Register>(self, token: T::Token, sweep: &mut Sweep<T>) {
         let Call { compiled, gravity, q, v, tau, qdd } = self;
@@ -102,7 +105,7 @@ impl<const N: usize> Call<'_, N> {
     }
 }
 
-/// States side by side, as a sweep reads them: a register of lanes from the first on.
+/// Input of a sweep: a register of lanes, from lane `first` on.
 struct LaneInput<'a, T: Register, const N: usize> {
     token: T::Token,
     first: usize,
@@ -130,7 +133,7 @@ impl<T: Register, const N: usize> Input<T> for LaneInput<'_, T, N> {
     }
 }
 
-/// A call that is compiled for the instructions of the one who makes it.
+/// A call that is compiled for the instruction set of its caller.
 #[cfg(target_arch = "x86_64")]
 struct VectorizedCall<'a, T: Register, const N: usize> {
     call: Call<'a, N>,

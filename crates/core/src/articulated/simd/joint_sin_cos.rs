@@ -1,16 +1,17 @@
-//! Sines and cosines of all hinges of one state, several at a time in SIMD lanes where the processor has them. The bits are those of one at a time.
+//! Sines and cosines of all revolute joints of one state, computed in SIMD lanes if the processor
+//! has them. The bits do not depend on the number of lanes.
 
 use crate::articulated::model::compiled::{Compiled, JointKind};
 use crate::articulated::simd::lanes::Register;
 #[cfg(target_arch = "x86_64")]
 use crate::articulated::simd::lanes::{Eight, Four};
 
-/// The hinges' sines and cosines, by the number of the link.
+/// Sines and cosines of the revolute joints, by link number.
 #[derive(Clone, Debug)]
 pub(in crate::articulated) struct JointSinCos {
-    /// Link and position number of each hinge.
+    /// Link and position number of each revolute joint.
     revolute_joints: Vec<(usize, usize)>,
-    /// Sine and cosine by link; of links that are no hinges nothing.
+    /// Sine and cosine by link; unused for other joints.
     turns: Vec<(f64, f64)>,
 }
 
@@ -21,7 +22,7 @@ impl JointSinCos {
         JointSinCos { revolute_joints: revolute_joints.collect(), turns: vec![(0.0, 1.0); compiled.bodies.len()] }
     }
 
-    /// Takes new angles, and gives all sines and cosines.
+    /// Computes and returns all sines and cosines for the positions `q`.
     #[inline(always)]
     pub fn take(&mut self, q: &[f64]) -> &[(f64, f64)] {
         #[cfg(target_arch = "x86_64")]
@@ -39,7 +40,7 @@ impl JointSinCos {
         &self.turns
     }
 
-    /// `N` hinges at a time, the last of them filled up with angles of 0.
+    /// Computes `N` joints at a time; the last group is filled with angles of 0.
     #[inline(always)]
     fn fill<T: Register, const N: usize>(&mut self, token: T::Token, q: &[f64]) {
         for revolute_joints in self.revolute_joints.chunks(N) {
@@ -58,7 +59,7 @@ impl JointSinCos {
     }
 }
 
-/// A call of [`JointSinCos::fill`] that is compiled for the instructions of the one who makes it.
+/// A call of [`JointSinCos::fill`] that is compiled for the instruction set of its caller.
 #[cfg(target_arch = "x86_64")]
 struct VectorizedFill<'a, T: Register> {
     token: T::Token,

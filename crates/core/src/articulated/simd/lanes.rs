@@ -1,11 +1,12 @@
-//! Several `f64` side by side in the SIMD registers of the processors that have them. All round as `f64` does, lane by lane: one product or sum, one
-//! rounding. The registers come from the crate `pulp`: its tokens prove that the processor was asked.
+//! Several `f64` in one SIMD register, on processors that have them. Every lane rounds like `f64`:
+//! one rounding per product or sum. The registers come from the crate `pulp`, whose tokens prove
+//! that the processor supports them.
 
 use crate::spatial::Scalar;
 #[cfg(target_arch = "x86_64")]
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// `N` numbers, one per state of a batch: how a batch takes its input and gives its output.
+/// `N` numbers, one per state of a batch: input and output of a batch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lanes<const N: usize>(pub [f64; N]);
 
@@ -15,15 +16,15 @@ impl<const N: usize> Default for Lanes<N> {
     }
 }
 
-/// A [`Scalar`] that is filled from a state per lane.
+/// A [`Scalar`] with one state per lane.
 pub(in crate::articulated) trait Register: Scalar {
-    /// How many.
+    /// Number of lanes.
     const LANES: usize;
-    /// Proof that the processor has the instructions.
+    /// Proof that the processor supports the instructions.
     type Token: Copy;
-    /// The first numbers of a slice, one per lane.
+    /// Loads the first numbers of a slice, one per lane.
     fn load(token: Self::Token, x: &[f64]) -> Self;
-    /// Writes one number per lane to the front of a slice.
+    /// Stores one number per lane at the start of a slice.
     fn store(self, out: &mut [f64]);
 }
 
@@ -40,7 +41,8 @@ impl Register for f64 {
     }
 }
 
-/// A [`Scalar`] in one SIMD register: its name, `pulp`'s proof, type and suffix, lanes, bytes.
+/// A [`Scalar`] in one SIMD register. Arguments: doc line, name, `pulp`'s proof, type and suffix,
+/// lanes, bytes.
 #[cfg(target_arch = "x86_64")]
 macro_rules! register {
     ($doc:literal, $name:ident, $token:ty, $type:ident, $lanes:literal, $bytes:literal,
