@@ -1,4 +1,5 @@
-//! The record of a call against integrations that end where it is read; the exponential map's differential against differences.
+//! The record of a call against integrations that end where it is read; the exponential map's
+//! differential against differences.
 
 use super::Adaptive;
 use crate::integrators::context::IntegrationContext;
@@ -128,7 +129,8 @@ fn dense_output_is_as_good_as_the_steps() {
     }
 }
 
-/// The turn from `exp(θ)` to `exp(θ + h·pull_back(θ, ω))` is `h·ω`, to second order in `h` by central differences.
+/// The turn from `exp(θ)` to `exp(θ + h·pull_back(θ, ω))` is `h·ω`, to second order in `h` by
+/// central differences.
 #[test]
 fn the_pulled_back_rate_turns_with_the_velocity() {
     for size in [1e-6, 1e-3, 0.09, 0.11, 1.0, 3.0] {
@@ -151,7 +153,7 @@ fn the_pulled_back_rate_turns_with_the_velocity() {
 fn a_full_record_ends_the_call_early() {
     let mut bench = Bench::new();
     let mut adaptive = Adaptive::default();
-    // a state of 13 and 6 freedoms takes 61 numbers a step: 68,759 steps fit into 2²²
+    // a state of 13 and 6 degrees of freedom takes 61 numbers a step: 68,759 steps fit into 2²²
     adaptive.set(&Settings { integrator_tolerance: 1e-6, dt: 1e-3, ..Settings::default() }, 0.0, 0);
     let came = adaptive.integrate(&mut bench.integration(), 0.0, 100.0, &mut [0.0; 6], true).unwrap();
     assert_eq!(adaptive.steps, 68_759);

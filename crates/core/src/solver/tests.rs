@@ -41,7 +41,7 @@ impl Random {
     }
 }
 
-/// Rigid boxes with 6 freedoms `[ω; v]` each, axes along the world's.
+/// Rigid boxes with 6 degrees of freedom `[ω; v]` each, axes along the world's.
 pub(super) struct Bodies {
     pub mass: Vec<f64>,
     pub inertia: Vec<[f64; 3]>,
@@ -67,7 +67,8 @@ impl Bodies {
         [i[0].sqrt(), i[1].sqrt(), i[2].sqrt(), m, m, m]
     }
 
-    /// A block of `set` at arms `at` from the centres of up to two bodies; the second is pushed along `frame`, the first against it.
+    /// A block of `set` at arms `at` from the centers of up to two bodies; the second is pushed
+    /// along `frame`, the first against it.
     pub fn push(&mut self, set: RowSet, at: [Option<(usize, [f64; 3])>; 2], frame: [[f64; 3]; 3]) {
         self.rows.push_block(set);
         for (sign, side) in [-1.0, 1.0].into_iter().zip(at) {

@@ -246,7 +246,8 @@ fn a_free_top_obeys_euler() {
     assert!((Vec3::new(qdd[3], qdd[4], qdd[5]) + Vec3::z()).norm() < 1e-14);
 }
 
-/// A stack of three hinges, massless but for the last: turned by 90 degrees in the middle, the first and the last have the same axis.
+/// A stack of three revolute joints, of which only the last link has mass. With the middle one at
+/// 90 degrees, the first and the last have the same axis.
 fn gimbal() -> Model {
     let mut builder = ModelBuilder::new();
     let outer = builder.link("yaw", None, Joint::revolute(Vec3::z()), Pose::identity(), LinkMass::none());
@@ -279,7 +280,7 @@ fn gimbal_lock_is_named_and_finite() {
 }
 
 #[test]
-fn gimbal_lock_is_told_from_its_neighbourhood_in_any_structure() {
+fn gimbal_lock_is_distinguished_from_its_neighborhood_in_any_structure() {
     for seed in 0..200 {
         let mut n = Numbers::new(seed);
         let mut builder = ModelBuilder::new();
@@ -312,7 +313,8 @@ fn gimbal_lock_is_told_from_its_neighbourhood_in_any_structure() {
 
 #[test]
 fn a_ball_joint_moves_as_three_hinges_do() {
-    // The same body on a ball joint and on the stack of hinges, away from gimbal lock: the same angular acceleration.
+    // The same body on a spherical joint and on the stack of revolute joints, away from gimbal
+    // lock: the same angular acceleration.
     let stack = gimbal();
     let mut builder = ModelBuilder::new();
     builder.link("ball", None, Joint::Spherical, Pose::identity(), stack.links()[2].mass);

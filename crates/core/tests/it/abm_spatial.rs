@@ -26,7 +26,7 @@ fn frame() -> impl Strategy<Value = Transform> {
     })
 }
 
-/// Mass, centre and the inertia of three pairs of points about it.
+/// Mass, center and the inertia of three pairs of points about it.
 fn body() -> impl Strategy<Value = (f64, Vec3, Mat3)> {
     (0.1..5.0f64, vector(), [vector(), vector(), vector()]).prop_map(|(mass, center, points)| {
         let about = points.iter().fold(Mat3::zeros(), |sum, p| {
@@ -111,7 +111,8 @@ proptest! {
 
     #[test]
     fn cross_products_are_rates_of_transforms(m in motion(), n in motion(), f in force()) {
-        // A frame that moves by m for a short time: what is fixed in it changes by m × n, m ×* f. Central differences.
+        // A frame that moves by m for a short time: what is fixed in it changes by m × n, m ×* f.
+        // Central differences.
         let h = 1e-5;
         let moved = |h: f64| -> Transform {
             let turn = UnitQuaternion::from_scaled_axis(h * Vec3::from(m.angular));
@@ -132,7 +133,8 @@ proptest! {
         prop_assert!(near(inertia.doubled_energy(v), doubled, doubled));
         let momentum = six((about * omega + center.cross(&(mass * velocity))).into(), (mass * velocity).into());
         prop_assert!(close(of_force(inertia.times(v)), momentum));
-        // The same body seen from another frame has the same energy, and its momentum is that force seen from there.
+        // The same body seen from another frame has the same energy, and its momentum is that force
+        // seen from there.
         let seen = inertia.seen_from(&a);
         let scale = doubled + of_force(a.force(inertia.times(v))).amax() * of_motion(a.motion(v)).amax();
         prop_assert!(near(seen.doubled_energy(a.motion(v)), doubled, scale));

@@ -1,10 +1,11 @@
-//! The adaptive integrator: its order, its tolerance, its dense output, what it carries from frame to frame.
+//! The adaptive integrator: its order, its tolerance, its dense output, what it carries from frame
+//! to frame.
 
 use crate::common::*;
 use tumble_core::collide::{Mat3, Pose, Quat, Vec3};
 use tumble_core::*;
 
-/// A force (N) at the centre and a torque (N·m) on one body, as functions of time and orientation.
+/// A force (N) at the center and a torque (N·m) on one body, as functions of time and orientation.
 #[derive(Clone)]
 struct Drive(ObjectId, fn(f64, &Quat) -> (Vec3, Vec3));
 
@@ -31,7 +32,7 @@ impl ForceGenerator for Drive {
     }
 }
 
-/// A spring of `k` N/m and `c` N·s/m between the centre of a body and a point.
+/// A spring of `k` N/m and `c` N·s/m between the center of a body and a point.
 #[derive(Clone)]
 struct Spring {
     name: String,
@@ -147,7 +148,8 @@ fn it_is_of_fifth_order_on_a_free_and_on_a_driven_body() {
     }
 }
 
-/// Two links on ball joints, the first of them on a floating base: every kind of joint that turns in space.
+/// Two links on spherical joints, the first of them on a floating base: every kind of joint that
+/// turns in space.
 fn tangle(dt: f64, integrator: Integrator) -> Vec<f64> {
     let mut world = world("backtracking", dt);
     set(&mut world, |s| (s.integrator, s.integrator_tolerance) = (integrator, 0.1));
@@ -201,7 +203,8 @@ fn it_keeps_angular_momentum_and_energy_of_the_free_body() {
     }
 }
 
-/// `x = sin(10·t)`, `v = 10·cos(10·t)` for 10 s: the error falls with the tolerance, and the steps grow as its fifth root.
+/// `x = sin(10·t)`, `v = 10·cos(10·t)` for 10 s: the error falls with the tolerance, and the steps
+/// grow as its fifth root.
 #[test]
 fn the_error_of_an_oscillator_goes_with_the_tolerance() {
     let at = |tolerance: f64| {
@@ -228,7 +231,8 @@ fn the_error_of_an_oscillator_goes_with_the_tolerance() {
     println!("{found:?}");
     for (pair, tolerance) in found.windows(2).zip([1e-6, 1e-8, 1e-10]) {
         let (coarse, fine) = (pair[0], pair[1]);
-        // a hundredth of the tolerance: 2.5 times the steps, and with order five a hundredth of the error
+        // a hundredth of the tolerance: 2.5 times the steps, and with order five a hundredth of the
+        // error
         let (gain, steps) = (coarse.0 / fine.0, fine.1 as f64 / coarse.1 as f64);
         assert!(
             gain > 40.0 && (2.0..3.0).contains(&steps),
@@ -238,7 +242,8 @@ fn the_error_of_an_oscillator_goes_with_the_tolerance() {
     }
 }
 
-/// The weights integrate polynomials of degree four exactly, if forces are asked for at the stages' times: `P = t⁵` under `F = 5t⁴`.
+/// The weights integrate polynomials of degree four exactly, if forces are asked for at the stages'
+/// times: `P = t⁵` under `F = 5t⁴`.
 #[test]
 fn forces_are_taken_at_the_time_of_their_stage() {
     let mut world = adaptive(0.25, 0.1);
@@ -256,7 +261,8 @@ fn forces_are_taken_at_the_time_of_their_stage() {
     }
 }
 
-/// Between a spring and a wall, at `e = 1`: the phase runs from `−φ` to `φ`, `cos φ = −½`, and jumps back at every stroke.
+/// Between a spring and a wall, at `e = 1`: the phase runs from `−φ` to `φ`, `cos φ = −½`, and
+/// jumps back at every stroke.
 #[test]
 fn strokes_against_a_wall_are_located_within_inner_steps() {
     let mut world = adaptive(0.1, 1e-10);
@@ -289,8 +295,9 @@ fn strokes_against_a_wall_are_located_within_inner_steps() {
     assert!(worst < 12.0 * 1e-7 && tries < 20, "off by {worst:e} m, at most {tries} tries a frame");
 }
 
-/// Pushed away from the middle between two walls, `x = ¼·cosh(κt)`: the parabola of the start arrives late, so every stroke is found in the dense
-/// output. At `e = 1` the way back is the same. `κ` is such that an inner step is as long as a frame.
+/// Pushed away from the middle between two walls, `x = ¼·cosh(κt)`: the parabola of the start
+/// arrives late, so every stroke is found in the dense output. At `e = 1` the way back is the same.
+/// `κ` is such that an inner step is as long as a frame.
 #[test]
 fn a_stroke_that_comes_early_is_found_in_the_dense_output() {
     let (k, rate) = (50.0, 5.0);
@@ -324,7 +331,7 @@ fn a_stroke_that_comes_early_is_found_in_the_dense_output() {
     }
 }
 
-/// Two equal discs that strike off centre exchange what they have along the line of centres.
+/// Two equal discs that strike off center exchange what they have along the line of centers.
 #[test]
 fn balls_strike_where_and_as_they_should() {
     let mut world = adaptive(1.0 / 60.0, 1e-6);
@@ -332,7 +339,7 @@ fn balls_strike_where_and_as_they_should() {
     let a = world.add(ball("a").moving(Vec3::new(3.0, 0.0, 0.0), Vec3::new(0.0, 9.0, 4.0))).unwrap();
     let b = world.add(ball("b").at(Pose::translation(1.0, 0.12, 0.0))).unwrap();
     run(&mut world, 1.0);
-    // centres 0.2 apart at x = 1 − √(0.04 − 0.0144) = 0.84: the normal is (0.8, 0.6)
+    // centers 0.2 apart at x = 1 − √(0.04 − 0.0144) = 0.84: the normal is (0.8, 0.6)
     let (n, time) = (Vec3::new(0.8, 0.6, 0.0), 0.28);
     let (vb, va) = (n * n.x * 3.0, Vec3::new(3.0, 0.0, 0.0) - n * n.x * 3.0);
     let (xa, xb) = (Vec3::new(0.84, 0.0, 0.0) + va * (1.0 - time), Vec3::new(1.0, 0.12, 0.0) + vb * (1.0 - time));
@@ -347,7 +354,8 @@ fn balls_strike_where_and_as_they_should() {
     }
 }
 
-/// A ball that bounces (`e = 1`) keeps its height, and a frame ends where it should whatever happened in it.
+/// A ball that bounces (`e = 1`) keeps its height, and a frame ends where it should whatever
+/// happened in it.
 #[test]
 fn a_bouncing_ball_keeps_its_height_and_frames_their_length() {
     let mut world = world("backtracking", 1.0 / 60.0);
@@ -420,7 +428,8 @@ fn save_restore_run_and_fork_give_the_same_bytes() {
     }
 }
 
-/// The inner step is carried: a frame in the middle of the run refuses none. The spring's 100 rad/s need about seven a frame.
+/// The inner step is carried: a frame in the middle of the run refuses none. The spring's 100 rad/s
+/// need about seven a frame.
 #[test]
 fn the_inner_step_is_carried_from_frame_to_frame() {
     let mut world = adaptive(1.0 / 60.0, 1e-6);
@@ -470,7 +479,8 @@ fn a_far_object_changes_nothing_but_the_steps() {
     assert!(turned < 1e-6 && moved < 1e-6, "turned {turned:e}, moved {moved:e}");
 }
 
-/// What is led keeps its one velocity, and others feel it: a body tied to it by a damper alone follows `v·(1 − e^{−ct/m})`.
+/// A kinematic body keeps its velocity and acts on others: a body coupled to it by a damper alone
+/// follows `v·(1 − e^{−ct/m})`.
 #[test]
 fn what_is_led_keeps_its_velocity() {
     let mut world = adaptive(0.1, 1e-8);

@@ -84,8 +84,8 @@ fn a_slider_on_a_slope_carries_its_share_of_the_weight() {
     assert!((tau[0] - m * (1.5 + G * slope.sin())).abs() < 1e-13);
 }
 
-/// Steady precession: `mgl = I₃·ω₃·Ω − I₁·Ω²·cos θ` (moments about the pivot) holds the top by gravity alone; without gravity the pivot must supply
-/// that torque along the line of nodes.
+/// Steady precession: `mgl = I₃·ω₃·Ω − I₁·Ω²·cos θ` (moments about the pivot) holds the top by
+/// gravity alone; without gravity the pivot must supply that torque along the line of nodes.
 #[test]
 fn a_top_precesses_steadily_without_torque() {
     let (m, l, i1, i3, tilt, precession) = (0.5, 0.06, 4e-3, 1e-3, 0.6f64, 2.0);
@@ -113,7 +113,7 @@ fn a_top_precesses_steadily_without_torque() {
     }
 }
 
-/// Newton and Euler of a free body whose frame is not at its centre of mass.
+/// Newton and Euler of a free body whose frame is not at its center of mass.
 #[test]
 fn a_floating_link_is_a_rigid_body() {
     let mut random = Random(8);
@@ -133,7 +133,8 @@ fn a_floating_link_is_a_rigid_body() {
     }
 }
 
-/// Weight of a tree held still: force through the root joint `−mg`, torque about the root `−Σ c×mg`.
+/// Weight of a tree held still: force through the root joint `−mg`, torque about the root `−Σ
+/// c×mg`.
 #[test]
 fn a_held_tree_hangs_on_its_root() {
     let mut random = Random(9);
@@ -149,7 +150,7 @@ fn a_held_tree_hangs_on_its_root() {
     assert!((root.torque + arm.cross(&(model.mass() * DOWN))).norm() < 1e-12 * model.mass());
 }
 
-/// A fixed link weighs what a hinged one weighs whose hinge is held.
+/// A fixed link weighs the same as a hinged one whose joint is held.
 #[test]
 fn a_folded_link_is_a_hinged_one_that_does_not_turn() {
     let mut random = Random(10);
@@ -176,7 +177,7 @@ fn a_folded_link_is_a_hinged_one_that_does_not_turn() {
     assert!((mine.to_homogeneous() - its.to_homogeneous()).norm() < 1e-14);
 }
 
-/// The mass matrix of a chain of three parallel sliders is that of Newton by hand.
+/// The mass matrix of a chain of three parallel prismatic joints equals Newton's equations by hand.
 #[test]
 fn stacked_sliders_have_a_mass_matrix_of_partial_sums() {
     let mut builder = ModelBuilder::new();
@@ -197,7 +198,8 @@ fn stacked_sliders_have_a_mass_matrix_of_partial_sums() {
     assert_eq!(m, [7.0, 6.0, 4.0, 6.0, 6.0, 4.0, 4.0, 4.0, 4.0]);
 }
 
-/// A force on a link is held by the torques that virtual work gives: a planar arm pulled at its end.
+/// A force on a link is held by the torques that virtual work gives: a planar arm pulled at its
+/// end.
 #[test]
 fn a_pulled_arm_needs_the_moments_of_the_pull() {
     let mut builder = ModelBuilder::new();

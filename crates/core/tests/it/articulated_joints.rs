@@ -1,4 +1,5 @@
-//! What acts on joints: limits, drives, friction, springs, recorded motions, couplings, torques; and joints that cannot move.
+//! What acts on joints: limits, drives, friction, springs, recorded motions, couplings, torques;
+//! and joints that cannot move.
 
 use crate::articulated_world::{adaptive, chain, hinged, rod, run, world};
 use std::sync::Arc;
@@ -217,7 +218,7 @@ fn a_coupled_joint_follows() {
     assert!(body.couple(Coupling { dof: 0, of: 0, multiplier: 1.0, offset: 0.0 }).is_err());
 }
 
-/// Three hinges in one place on massless links, about z, y and x.
+/// Three revolute joints in one place on massless links, about z, y and x.
 fn gimbals(middle: f64) -> ArticulatedBody {
     let mut builder = ModelBuilder::new();
     let outer = builder.link("outer", None, Joint::revolute(Vec3::z()), Pose::identity(), LinkMass::none());
@@ -249,7 +250,8 @@ fn gimbal_lock_is_an_error_that_says_so_and_nothing_is_lost() {
 
 #[test]
 fn a_stack_of_hinges_is_a_ball_joint_away_from_its_lock() {
-    // the same top on a ball joint: same place of the top after a while, by two sets of coordinates
+    // the same top on a spherical joint: same place of the top after a while, by two sets of
+    // coordinates
     let mut stacked = adaptive(1.0 / 60.0, 1e-10);
     let a = stacked.add(gimbals(0.3).with_velocities(&[1.0, 0.5, 2.0]).unwrap()).unwrap();
     let part_state = *stacked.part_state(a, 2).unwrap();
@@ -275,7 +277,7 @@ fn a_stack_of_hinges_is_a_ball_joint_away_from_its_lock() {
 }
 
 #[test]
-fn rubbish_is_told() {
+fn invalid_input_is_reported() {
     let model = || hinged(2, 0.2, rod(1.0, 0.2));
     let mut body = ArticulatedBody::new("arm", model());
     let wrong = [

@@ -1,10 +1,12 @@
-//! Limits of joints in `time_stepping`: no joint passes one by the end of a step, however fast its links swing about each other.
+//! Limits of joints in `time_stepping`: no joint passes one by the end of a step, however fast its
+//! links swing about each other.
 
 use crate::articulated_world::rod;
 use tumble_core::collide::{Pose, Vec3};
 use tumble_core::{ArticulatedBody, DofSettings, Joint, ModelBuilder, Settings, World};
 
-/// Six rods of 0.2 m on hinges about y and x in turn: the first turns freely, the others within ±0.4 rad.
+/// Six rods of 0.2 m on revolute joints about y and x in turn: the first turns freely, the others
+/// within ±0.4 rad.
 fn whip(rates: &[f64; 6]) -> ArticulatedBody {
     let mut builder = ModelBuilder::new();
     let mut parent = None;
@@ -18,8 +20,9 @@ fn whip(rates: &[f64; 6]) -> ArticulatedBody {
     body
 }
 
-/// The end of a step was once guessed from the velocities of its middle, and the guess projected in 15 sweeps: limits were passed by 1e-3 rad and
-/// more, and what brought the joints back gained energy.
+/// The end of a step was once guessed from the velocities of its middle, and the guess projected in
+/// 15 sweeps: limits were passed by 1e-3 rad and more, and what brought the joints back gained
+/// energy.
 #[test]
 fn links_that_swing_about_each_other_keep_to_their_limits() {
     for rate in [60.0, 120.0, 240.0] {

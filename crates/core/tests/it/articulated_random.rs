@@ -64,7 +64,8 @@ pub enum Kinds {
     All,
 }
 
-/// A tree of `count` added links (fixed ones among them), each on one of the last few or on any before it; root 0 floats if asked to.
+/// A tree of `count` added links (fixed ones among them), each on one of the last few or on any
+/// before it; root 0 floats if asked to.
 pub fn random_tree(random: &mut Random, count: usize, floating: bool, kinds: Kinds) -> Model {
     let mut builder = ModelBuilder::new();
     let root = if floating { Joint::Floating } else { Joint::revolute(random.axis()) };
@@ -91,7 +92,8 @@ pub fn random_tree(random: &mut Random, count: usize, floating: bool, kinds: Kin
     builder.build().unwrap()
 }
 
-/// A universal joint of three hinges through one point, the first two on massless links; far from gimbal lock while the second stays near zero.
+/// A universal joint of three revolute joints through one point, the first two on massless links;
+/// far from gimbal lock while the second stays near zero.
 fn stack(random: &mut Random, builder: &mut ModelBuilder, i: usize, parent: usize) -> usize {
     let at =
         builder.link(format!("link {i}"), Some(parent), Joint::revolute(Vec3::z()), random.pose(0.4), LinkMass::none());
@@ -106,7 +108,8 @@ fn stack(random: &mut Random, builder: &mut ModelBuilder, i: usize, parent: usiz
     i + 3
 }
 
-/// Positions all over, but hinges of massless stacks within 1 rad of zero; velocities up to `speed`.
+/// Positions all over, but hinges of massless stacks within 1 rad of zero; velocities up to
+/// `speed`.
 pub fn random_state(random: &mut Random, model: &Model, speed: f64) -> (Vec<f64>, Vec<f64>) {
     let mut q = random.numbers(model.positions(), 1.0);
     for link in model.links() {
@@ -126,7 +129,8 @@ pub fn random_trees(seed: u64) -> Vec<Model> {
         .into()
 }
 
-/// Greatest difference of two lists relative to the greatest number of the second (or to 1, where that is less).
+/// Greatest difference of two lists relative to the greatest number of the second (or to 1, where
+/// that is less).
 pub fn apart(a: &[f64], b: &[f64]) -> f64 {
     greatest_difference(a, b) / b.iter().fold(1.0f64, |m, x| m.max(x.abs()))
 }

@@ -7,7 +7,8 @@ use tumble_core::{ArticulatedBody, Integrator, Joint, LinkMass, ModelBuilder, Wo
 
 const G: f64 = 9.81;
 
-/// Period of a pendulum of angular frequency `w` (small swings) at `amplitude`: `4K(sin(θ/2))/w`, the elliptic integral by the arithmetic–geometric mean.
+/// Period of a pendulum of angular frequency `w` (small swings) at `amplitude`: `4K(sin(θ/2))/w`,
+/// the elliptic integral by the arithmetic–geometric mean.
 fn period(w: f64, amplitude: f64) -> f64 {
     let (mut a, mut g) = (1.0_f64, (0.5 * amplitude).cos());
     for _ in 0..10 {
@@ -16,7 +17,8 @@ fn period(w: f64, amplitude: f64) -> f64 {
     2.0 * PI / (w * a)
 }
 
-/// Moments at which the first position rises through zero, within so many seconds: on the cubic through both ends of the frame.
+/// Moments at which the first position rises through zero, within so many seconds: on the cubic
+/// through both ends of the frame.
 fn rises(world: &mut World, seconds: f64) -> Vec<f64> {
     let id = world.ids()[0];
     let n = world.get::<ArticulatedBody>(id).unwrap().model().positions();
@@ -68,7 +70,8 @@ fn a_point_and_a_rod_swing_with_their_periods_at_any_amplitude() {
 
 #[test]
 fn a_double_pendulum_has_its_two_modes() {
-    // absolute angles: M = m·l²·[4/3 1/2; 1/2 1/3], K = m·g·l·diag(3/2, 1/2); with x = ω²l/g:  (3/2 − 4x/3)(1/2 − x/3) = x²/4
+    // absolute angles: M = m·l²·[4/3 1/2; 1/2 1/3], K = m·g·l·diag(3/2, 1/2); with x = ω²l/g:  (3/2
+    // − 4x/3)(1/2 − x/3) = x²/4
     let (length, root) = (0.2, (7.0_f64 / 6.0).powi(2) - 4.0 * (7.0 / 36.0) * 0.75);
     for sign in [-1.0, 1.0] {
         let x = (7.0 / 6.0 + sign * root.sqrt()) / (2.0 * 7.0 / 36.0);
@@ -89,7 +92,7 @@ fn a_double_pendulum_has_its_two_modes() {
 
 #[test]
 fn a_cone_is_swung_at_its_own_pace() {
-    // a bob on a ball joint goes round at a constant angle with Ω² = g/(l·cos θ)
+    // a bob on a spherical joint goes round at a constant angle with Ω² = g/(l·cos θ)
     let (length, angle) = (0.5, 0.8_f64);
     let mut builder = ModelBuilder::new();
     builder.link(
@@ -117,7 +120,8 @@ fn a_cone_is_swung_at_its_own_pace() {
     assert!((down - want).norm() < 1e-6, "{down:?} {want:?}");
 }
 
-/// Greatest change of energy over so many seconds, as a share of the drop from horizontal to hanging.
+/// Greatest change of energy over so many seconds, as a share of the drop from horizontal to
+/// hanging.
 fn drift(world: &mut World, links: usize, seconds: f64) -> f64 {
     world.add(chain(links, FRAC_PI_2)).unwrap();
     let (start, drop) = (world.energy().total(), G * 0.2 * (links * links) as f64 / 2.0);

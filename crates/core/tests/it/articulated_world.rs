@@ -15,7 +15,8 @@ pub fn rod(mass: f64, length: f64) -> LinkMass {
     }
 }
 
-/// Equal links hung one on another by hinges about y, each `length` m below the one before; `link 0` is the first.
+/// Equal links hung one on another by revolute joints about y, each `length` m below the one
+/// before; `link 0` is the first.
 pub fn hinged(links: usize, length: f64, mass: LinkMass) -> Model {
     let mut builder = ModelBuilder::new();
     let mut parent = None;
@@ -33,7 +34,8 @@ pub fn chain(links: usize, angle: f64) -> ArticulatedBody {
     ArticulatedBody::new("chain", hinged(links, 0.2, rod(1.0, 0.2))).with_positions(&q).unwrap()
 }
 
-/// A floating chain of capsules joined by ball joints, along x, its middle at `center`; its links are 0.1 m long, 2 cm thick and of 50 g.
+/// A floating chain of capsules joined by spherical joints, along x, its middle at `center`; its
+/// links are 0.1 m long, 2 cm thick and of 50 g.
 pub fn loose_chain(links: usize, center: Vec3, friction: f64) -> ArticulatedBody {
     let (length, radius, mass) = (0.1, 0.02, 0.05);
     let shape = Shape::capsule(radius, 0.5 * length - radius).unwrap();
@@ -76,7 +78,7 @@ pub fn adaptive(dt: f64, tolerance: f64) -> World {
     world
 }
 
-/// Steps for so many seconds.
+/// Steps for the given time.
 pub fn run(world: &mut World, seconds: f64) {
     for _ in 0..(seconds / world.settings().dt).round() as usize {
         world.step().unwrap();

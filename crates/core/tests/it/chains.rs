@@ -5,7 +5,7 @@ use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::rows::RowSet;
 use tumble_core::*;
 
-/// Half the length of a bar, metres.
+/// Half the length of a bar, meters.
 const HALF: f64 = 0.1;
 
 /// Joins the right end of a bar to the left end of another; `Err` is a point of the world.
@@ -55,8 +55,9 @@ impl Constraint for Pin {
     }
 }
 
-/// Bars along the lower half of a circle, pinned to each other and at both ends, and pushed sideways: with the world they are a closed chain.
-/// The last one has `heavy` times the mass of the others. Nothing collides.
+/// Bars along the lower half of a circle, pinned to each other and at both ends, and pushed
+/// sideways: with the world they are a closed chain. The last one has `heavy` times the mass of the
+/// others. Nothing collides.
 fn festoon(stepper: &str, dt: f64, count: usize, pins: usize, heavy: f64) -> (World, Vec<ObjectId>) {
     let mut world = world(stepper, dt);
     let turn = std::f64::consts::PI / count as f64;
@@ -82,7 +83,7 @@ fn festoon(stepper: &str, dt: f64, count: usize, pins: usize, heavy: f64) -> (Wo
     (world, bars)
 }
 
-/// Largest distance between ends that are pinned together, metres.
+/// Largest distance between ends that are pinned together, meters.
 fn apart(world: &World, bars: &[ObjectId]) -> f64 {
     let of = |i: usize, x: f64| end(world.part_state(bars[i], 0).unwrap(), x).0;
     (1..bars.len()).map(|i| (of(i - 1, HALF) - of(i, -HALF)).norm()).fold(0.0, f64::max)

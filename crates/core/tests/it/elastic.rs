@@ -15,7 +15,7 @@ fn room(world: &mut World, half: f64, restitution: f64, friction: f64) {
     }
 }
 
-/// Shapes that a push meets far from the centre.
+/// Shapes that a push meets far from the center.
 fn shapes() -> [(&'static str, Shape); 5] {
     let cuboid = |x, y, z| Shape::cuboid(Vec3::new(x, y, z)).unwrap();
     [
@@ -27,8 +27,8 @@ fn shapes() -> [(&'static str, Shape); 5] {
     ]
 }
 
-/// What happened to the kinetic energy, as shares of that at the start: the most and the least of it, the most that a step added, and passes of the
-/// impact phase.
+/// What happened to the kinetic energy, as shares of that at the start: the most and the least of
+/// it, the most that a step added, and passes of the impact phase.
 struct Swing {
     most: f64,
     least: f64,
@@ -61,7 +61,8 @@ fn alone(shape: Shape, rate: f64, spin: Vec3, restitution: f64, friction: f64) -
 
 #[test]
 fn a_body_that_spins_in_an_elastic_room_keeps_its_energy() {
-    // rows of the start of the step, pushed at the moment of impact: the capsule gained 321 % in 60 s at 240 Hz, 18 % at 960 Hz, and long boxes without end
+    // rows of the start of the step, pushed at the moment of impact: the capsule gained 321 % in 60
+    // s at 240 Hz, 18 % at 960 Hz, and long boxes without end
     for (name, shape) in shapes() {
         for (spin, rate) in [
             ([3.0, 8.0, 5.0], 240.0),

@@ -5,14 +5,15 @@ use tumble_core::collide::Vec3;
 use tumble_core::rows::RowSet;
 use tumble_core::*;
 
-/// A pendulum of one joint: `X = [θ, p]`, `M = 1 kg·m²`, torque `−pull·sin θ`, stops at `θ = stops`, one-sided.
+/// A pendulum of one joint: `X = [θ, p]`, `M = 1 kg·m²`, torque `−pull·sin θ`, stops at `θ =
+/// stops`, one-sided.
 #[derive(Clone)]
 struct Pendulum {
     angle: f64,
     rate: f64,
     pull: f64,
     stops: [f64; 2],
-    /// Whether it tells its gaps.
+    /// Whether it reports its gaps.
     located: bool,
 }
 
@@ -109,7 +110,8 @@ fn with(integrator: Integrator, pendulum: Pendulum) -> (World, ObjectId) {
 
 const BOTH: [Integrator; 2] = [Integrator::Verlet, Integrator::DormandPrince];
 
-/// It falls from −1.5 rad to the stop at 0.5 at 3.4 rad/s, loses all it has there, and swings back from rest: its energy is that of the stop's height.
+/// It falls from −1.5 rad to the stop at 0.5 at 3.4 rad/s, loses all it has there, and swings back
+/// from rest: its energy is that of the stop's height.
 #[test]
 fn a_swing_ends_at_its_stop() {
     for integrator in BOTH {
@@ -132,14 +134,16 @@ fn a_swing_ends_at_its_stop() {
             energy / stop_energy - 1.0
         );
         assert!(struck == 1 && furthest < 0.5 + 1e-6, "{integrator:?}: struck {struck} times, came to {furthest} rad");
-        // 1e-6 rad are g·sin θ·1e-6 J at the stop; the energy of the leapfrog swings by h²/8·(g·sin θ)² about that
+        // 1e-6 rad are g·sin θ·1e-6 J at the stop; the energy of the leapfrog swings by h²/8·(g·sin
+        // θ)² about that
         let slope = G * 0.5f64.sin();
         let own = if integrator == Integrator::Verlet { (slope / 60.0).powi(2) / 8.0 } else { 1e-7 };
         assert!((energy - stop_energy).abs() < 1e-6 * slope + own, "{integrator:?}: {energy} J, by hand {stop_energy}");
     }
 }
 
-/// Pressed against its stop it stays within 1e-6 rad of it, from the first frame after the stroke on, and costs no more than a try or two a frame.
+/// Pressed against its stop it stays within 1e-6 rad of it, from the first frame after the stroke
+/// on, and costs no more than a try or two a frame.
 #[test]
 fn what_is_pressed_against_a_stop_rests_there() {
     for integrator in BOTH {
@@ -167,7 +171,8 @@ fn what_is_pressed_against_a_stop_rests_there() {
     }
 }
 
-/// Without a force the moment is the distance by the speed, whatever the frame; nothing is felt before it.
+/// Without a force the moment is the distance by the speed, whatever the frame; nothing is felt
+/// before it.
 #[test]
 fn a_stop_acts_when_it_is_reached_and_not_before() {
     for integrator in BOTH {
@@ -186,9 +191,10 @@ fn a_stop_acts_when_it_is_reached_and_not_before() {
     }
 }
 
-/// What a constraint does not tell is not located: the stop then brakes ahead, as it did, and never lets it through.
+/// What a constraint does not tell is not located: the stop then brakes ahead, as it did, and never
+/// lets it through.
 #[test]
-fn a_stop_that_is_not_told_acts_ahead() {
+fn a_limit_without_a_reported_gap_decelerates_early() {
     for integrator in BOTH {
         let (mut world, id) =
             with(integrator, Pendulum { angle: 0.0, rate: 5.0, pull: 0.0, stops: [-1.0, 0.21], located: false });
@@ -225,8 +231,9 @@ fn a_gap_that_is_no_number_is_an_error() {
     assert!(matches!(world.step().unwrap_err(), StepError::Row { object, .. } if object == "pendulum"));
 }
 
-/// A double pendulum whose first joint falls on a stop and is kept there by its weight, while the second swings on as a pendulum of its own from
-/// there: the first stays on the stop, and the energy is that of the stroke's end.
+/// A double pendulum whose first joint falls on a stop and is kept there by its weight, while the
+/// second swings on as a pendulum of its own from there: the first stays on the stop, and the
+/// energy is that of the stroke's end.
 #[test]
 fn a_joint_is_held_at_its_stop_while_the_next_one_swings() {
     for integrator in BOTH {

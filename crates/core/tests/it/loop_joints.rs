@@ -1,18 +1,21 @@
-//! Mechanisms of rigid bars joined by closures, against the closed forms of their motion: four-bar linkage, slider-crank.
+//! Mechanisms of rigid bars joined by loop joints, against the closed forms of their motion:
+//! four-bar linkage, slider-crank.
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::*;
 
 const RATE: f64 = 240.0;
-/// Hinges of a planar mechanism turn about −y, so that angles in the x-z plane grow from x towards z.
+/// Hinges of a planar mechanism turn about −y, so that angles in the x-z plane grow from x towards
+/// z.
 pub const AXIS: Vec3 = Vec3::new(0.0, -1.0, 0.0);
 
 fn at(angle: f64) -> Vec3 {
     Vec3::new(angle.cos(), 0.0, angle.sin())
 }
 
-/// A bar of 1 kg per metre between two points of the x-z plane, along its own x axis; it collides with nothing.
+/// A bar of 1 kg per meter between two points of the x-z plane, along its own x axis; it collides
+/// with nothing.
 pub fn bar(name: &str, from: Vec3, to: Vec3) -> RigidBody {
     let d = to - from;
     let shape = Shape::cuboid(Vec3::new(0.5 * d.norm(), 0.01, 0.01)).unwrap();
@@ -37,7 +40,8 @@ fn angle(world: &World, bar: ObjectId) -> f64 {
     x.z.atan2(x.x)
 }
 
-/// Crank, coupler and rocker on the ground. Shortest and longest together are shorter than the other two: by Grashof's law the crank goes round.
+/// Crank, coupler and rocker on the ground. Shortest and longest together are shorter than the
+/// other two: by Grashof's law the crank goes round.
 pub struct FourBar {
     pub world: World,
     pub bars: [ObjectId; 3],
@@ -47,7 +51,8 @@ pub struct FourBar {
 pub const LENGTHS: [f64; 3] = [0.2, 0.5, 0.4];
 pub const GROUND: Vec3 = Vec3::new(0.4, 0.0, 0.0);
 
-/// The closed form: the pins between crank and coupler, and between coupler and rocker, at an angle of the crank (coupler above).
+/// The closed form: the pins between crank and coupler, and between coupler and rocker, at an angle
+/// of the crank (coupler above).
 pub fn pins(crank: f64) -> (Vec3, Vec3) {
     let a = LENGTHS[0] * at(crank);
     let d = GROUND - a;
@@ -130,7 +135,8 @@ fn a_four_bar_linkage_stays_closed_for_a_minute_and_keeps_its_energy() {
         // joints are closed to 1e-9 m along each axis
         assert!(worst.gap < 3e-9, "{stepper}: pins are {:e} m apart", worst.gap);
         assert!(worst.off < 1e-6, "{stepper}: the coupler is {:e} m off the closed form", worst.off);
-        // of second order, and no part of it adds up: less at the end of the minute than within a turn
+        // of second order, and no part of it adds up: less at the end of the minute than within a
+        // turn
         assert!(
             worst.energy < 5e-3 * worst.kinetic,
             "{stepper}: energy is off by {:e} J of {} J",
@@ -210,7 +216,8 @@ fn a_slider_crank_follows_its_closed_form() {
 
 #[test]
 fn a_wheel_that_is_led_drives_the_piston_as_asked() {
-    // it starts at once, with the engine at rest, and is where it should be from the first frame on: x(t) = r·cos ωt + √(l² − r²·sin² ωt), and the rate of that
+    // it starts at once, with the engine at rest, and is where it should be from the first frame
+    // on: x(t) = r·cos ωt + √(l² − r²·sin² ωt), and the rate of that
     let spin = 10.0;
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / RATE);

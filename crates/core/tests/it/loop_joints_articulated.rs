@@ -1,4 +1,5 @@
-//! Closures between links of articulated bodies, and between links and rigid bodies: the same linkage cut open at different pins.
+//! Loop joints between links of articulated bodies, and between links and rigid bodies: the same
+//! linkage cut open at different pins.
 
 use crate::common::*;
 use crate::loop_joints::{AXIS, FourBar, GROUND, LENGTHS, bar, hinge, pins};
@@ -12,7 +13,8 @@ fn turn(v: Vec3) -> f64 {
     v.z.atan2(v.x)
 }
 
-/// A chain of the bars named, each hung on the end of the one before it, that starts where the linkage does.
+/// A chain of the bars named, each hung on the end of the one before it, that starts where the
+/// linkage does.
 fn chain(name: &str, bars: &[usize]) -> ArticulatedBody {
     let (a, b) = pins(CRANK);
     let angles = [turn(a), turn(b - a), turn(GROUND - b)];

@@ -1,4 +1,4 @@
-//! Single joints made by closures: pendulums, welds, doors on two hinges, and what happens where a side is gone.
+//! Single loop joints: pendulums, fixed joints, doors on two hinges, and a removed side.
 
 use crate::common::*;
 use crate::loop_joints::{AXIS, bar, hinge};
@@ -6,7 +6,8 @@ use std::f64::consts::PI;
 use tumble_core::collide::{Mat3, Pose, Shape, Vec3};
 use tumble_core::*;
 
-/// `4·√(L/g)·K(sin θ/2)` by the arithmetic-geometric mean, `L` the length of the simple pendulum of the same period.
+/// `4·√(L/g)·K(sin θ/2)` by the arithmetic-geometric mean, `L` the length of the simple pendulum of
+/// the same period.
 fn period(length: f64, amplitude: f64) -> f64 {
     let (mut a, mut b) = (1.0, (0.5 * amplitude).cos());
     for _ in 0..10 {
@@ -15,7 +16,8 @@ fn period(length: f64, amplitude: f64) -> f64 {
     2.0 * PI * (length / G).sqrt() / a
 }
 
-/// A bar of 0.6 m hinged to the world at its end, released at an angle from hanging; the mean period of four swings.
+/// A bar of 0.6 m hinged to the world at its end, released at an angle from hanging; the mean
+/// period of four swings.
 fn measured(stepper: &str, rate: f64, amplitude: f64) -> f64 {
     let mut world = world(stepper, 1.0 / rate);
     let rod = world.add(bar("bar", Vec3::zeros(), 0.6 * Vec3::new(amplitude.sin(), 0.0, -amplitude.cos()))).unwrap();
@@ -72,7 +74,8 @@ fn a_hinged_bar_swings_with_the_period_of_the_elliptic_integral() {
     }
 }
 
-/// Mass, centre and inertia about it of several boxes `(mass, half extents, centre)` in common axes.
+/// Mass, center and inertia about it of several boxes `(mass, half extents, center)` in common
+/// axes.
 fn sum(boxes: &[(f64, Vec3, Vec3)]) -> (f64, Vec3, Mat3) {
     let mass: f64 = boxes.iter().map(|b| b.0).sum();
     let center = boxes.iter().map(|b| b.0 * b.2).sum::<Vec3>() / mass;
@@ -135,7 +138,8 @@ fn a_weld_of_two_bodies_is_one_body() {
             "{stepper}: centre off by {fall:.1e} m, L by {angular:.1e}, ω by {inertial:.1e} rad/s, energy by {kept:.1e} of the spin, {position_error:?}"
         );
         assert!(fall < 1e-9, "{stepper}: the centre leaves the parabola by {fall:e} m");
-        // impulses keep it; moving the bodies together, with their momenta held, is of third order in a step
+        // impulses keep it; moving the bodies together, with their momenta held, is of third order
+        // in a step
         assert!(angular < 1e-5, "{stepper}: angular momentum changes by {angular:e}");
         assert!(inertial < 1e-7, "{stepper}: ω is {inertial:e} rad/s off that of one body");
         assert!(kept < 1e-4, "{stepper}: energy changes by {kept:e} of the spin's");
@@ -143,7 +147,8 @@ fn a_weld_of_two_bodies_is_one_body() {
     }
 }
 
-/// A door with its mass off centre and its inertia askew, hung on so many hinges along an axis that leans. The energy it starts with is kinetic.
+/// A door with its mass off center and its inertia askew, hung on `hinges` hinges along an inclined
+/// axis. The energy it starts with is kinetic.
 fn door(stepper: &str, solver: &str, hinges: usize) -> (World, ObjectId) {
     let mut world = world(stepper, 1.0 / 240.0);
     world.set_solver(solver::by_name(solver).unwrap());
@@ -281,7 +286,8 @@ fn a_joint_that_starts_open_closes_at_the_recovery_speed() {
 
 #[test]
 fn hinged_boxes_come_to_rest_on_the_ground() {
-    // two boxes hinged edge to edge fall flat on the floor and lie there: the hinge is closed, and they stand in no surface
+    // two boxes hinged edge to edge fall flat on the floor and lie there: the hinge is closed, and
+    // they stand in no surface
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 240.0);
         ground(&mut world, 0.0, 0.5);

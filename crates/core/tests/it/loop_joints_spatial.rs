@@ -1,7 +1,9 @@
-//! Bennett's linkage: four bars and four hinges in space that, by the count of freedoms, should not move at all (6·3 − 5·4 = −2), and do.
+//! Bennett's linkage: four bars and four hinges in space that, by the count of degrees of freedom,
+//! should not move at all (6·3 − 5·4 = −2), and do.
 //!
-//! Opposite bars are equal; lengths and twists are in proportion, `a/sin α = b/sin β`. Angles about neighbouring hinges are then tied by
-//! `tan(θ₁/2)·tan(θ₂/2) = sin((β + α)/2)/sin((β − α)/2)`, opposite ones by `θ₃ = −θ₁`, `θ₄ = −θ₂` (Bennett 1903; Denavit–Hartenberg angles).
+//! Opposite bars are equal; lengths and twists are in proportion, `a/sin α = b/sin β`. Angles about
+//! neighboring hinges are then tied by `tan(θ₁/2)·tan(θ₂/2) = sin((β + α)/2)/sin((β − α)/2)`,
+//! opposite ones by `θ₃ = −θ₁`, `θ₄ = −θ₂` (Bennett 1903; Denavit–Hartenberg angles).
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Shape, Vec3};
@@ -29,7 +31,8 @@ fn along(bar: usize) -> Pose {
     Pose::new(Vec3::x() * length, Vec3::x() * twist)
 }
 
-/// A bar lies along the x axis of its frame, from its hinge: its body frame is half-way, turned with it.
+/// A bar lies along the x axis of its frame, from its hinge: its body frame is half-way, turned
+/// with it.
 fn center(bar: usize) -> Pose {
     Pose::translation(0.5 * sizes(bar).0, 0.0, 0.0)
 }

@@ -1,4 +1,5 @@
-//! A mesh keeps the frame of its file: bodies are placed by it, and move about their center of mass.
+//! A mesh keeps the frame of its file: bodies are placed by it, and move about their center of
+//! mass.
 
 use crate::common::*;
 use nalgebra::{Point3, UnitQuaternion};
@@ -54,9 +55,10 @@ fn a_body_is_placed_by_the_frame_of_its_file() {
     }
 }
 
-/// Spun about an axis through its center, the center stands still and the corner that the file calls the origin goes round; momentum holds.
+/// Spun about an axis through its center, the center stands still and the corner that the file
+/// calls the origin goes round; momentum holds.
 #[test]
-fn it_spins_about_its_centre_of_mass() {
+fn it_spins_about_its_center_of_mass() {
     let (shape, file) = corner_cube();
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, 1.0 / 240.0));

@@ -5,21 +5,25 @@ use std::path::PathBuf;
 use tumble_core::collide::{ContactMode, Pose, Shape, TreeSettings, TriMesh, Vec3};
 use tumble_core::*;
 
-/// The folder of the public test meshes: `TUMBLE_MESHES`, else the nearest `shared/meshes` above this crate.
+/// The folder of the public test meshes: `TUMBLE_MESHES`, else the nearest `shared/meshes` above
+/// this crate.
 fn folder() -> Option<PathBuf> {
     let named = std::env::var_os("TUMBLE_MESHES").map(PathBuf::from);
     let here = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
     named.or_else(|| here.ancestors().map(|a| a.join("shared/meshes")).find(|p| p.is_dir()))
 }
 
-/// Below this a body rests in the `spheres` mode, m/s, at its furthest point. What carries a mesh changes from frame to frame among the spheres that are within a few
-/// micrometres of the plane, and a contact made or lost within a frame changes speeds by up to `g·h` = 41 mm/s: half of it is left to that.
+/// Below this a body rests in the `spheres` mode, m/s, at its furthest point. What carries a mesh
+/// changes from frame to frame among the spheres that are within a few micrometers of the plane,
+/// and a contact made or lost within a frame changes speeds by up to `g·h` = 41 mm/s: half of it is
+/// left to that.
 const REST_ON_SPHERES: f64 = 0.5 * G / 240.0;
 /// The same in the `surface` mode: vertices carry it, and they stay.
 const REST: f64 = 1e-4;
 
-/// Drops a mesh of 1000 kg/m³ over a half-space and runs: in the last second it is slower than `REST` everywhere on it and stays within
-/// 0.5 mm of where it was, and it never was deeper than the stated outward error of its tree.
+/// Drops a mesh of 1000 kg/m³ over a half-space and runs: in the last second it is slower than
+/// `REST` everywhere on it and stays within 0.5 mm of where it was, and it never was deeper than
+/// the stated outward error of its tree.
 fn comes_to_rest(name: &str, mesh: &TriMesh, turn: Vec3, height: f64, seconds: f64) {
     falls(ContactMode::Surface, REST, name, mesh, turn, height, seconds);
     falls(ContactMode::Spheres, REST_ON_SPHERES, name, mesh, turn, height, seconds);
@@ -98,7 +102,8 @@ fn the_bunny_comes_to_rest_on_a_plane() {
     }
 }
 
-/// Its base is flat but for a micrometre, and has many vertices: those that carry it must all be among the few contacts that are kept.
+/// Its base is flat but for a micrometer, and has many vertices: those that carry it must all be
+/// among the few contacts that are kept.
 #[test]
 fn the_fandisk_comes_to_rest_on_a_plane() {
     if let Some(fandisk) = public("fandisk.obj") {

@@ -16,7 +16,7 @@ fn add(world: &mut World, name: &str, shape: &Shape, pose: Pose) -> ObjectId {
     world.add(RigidBody::with_mass(name, shape.clone(), 1.0).unwrap().surface(0.0, 0.5).at(pose)).unwrap()
 }
 
-/// How deep two objects are in each other, metres, by their contacts.
+/// How deep two objects are in each other, meters, by their contacts.
 fn depth(world: &World, shapes: [&Shape; 2], ids: [ObjectId; 2]) -> f64 {
     let [a, b] = ids.map(|id| world.part_state(id, 0).unwrap().pose);
     let mut found = Vec::new();
@@ -24,7 +24,8 @@ fn depth(world: &World, shapes: [&Shape; 2], ids: [ObjectId; 2]) -> f64 {
     found.iter().map(|c| -c.gap).fold(0.0, f64::max)
 }
 
-/// A pair floats for 2 s: apart at the end, by the referee too, and never faster than what is pushed out a second (3 m/s) allows.
+/// A pair floats for 2 s: apart at the end, by the referee too, and never faster than what is
+/// pushed out a second (3 m/s) allows.
 fn come_apart(label: &str, [a, b]: [&Shape; 2], off: Pose, apart: impl Fn(&Pose, &Pose) -> bool) {
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, 1.0 / 240.0));
@@ -41,7 +42,7 @@ fn come_apart(label: &str, [a, b]: [&Shape; 2], off: Pose, apart: impl Fn(&Pose,
     }
 }
 
-/// No corner of one unit cube is inside the other by more than a millimetre, nor is its centre.
+/// No corner of one unit cube is inside the other by more than a millimeter, nor is its center.
 fn cubes_are_apart(a: &Pose, b: &Pose) -> bool {
     let inside = |from: &Pose, to: &Pose| {
         let steps = |n: i32| 0.1 * f64::from(n) - 0.5;
@@ -116,7 +117,8 @@ fn ten_cubes_of_meshes_that_overlap_stand_at_the_end() {
     }
 }
 
-/// A cube that is led goes down through a free one that lies on a third: what is between gets out of the way and is not held inside.
+/// A kinematic cube moves down through a free one that lies on a third: the free cube is pushed out
+/// sideways and is not held inside.
 #[test]
 fn a_press_does_not_trap_a_cube() {
     for stepper in STEPPERS {
@@ -136,7 +138,8 @@ fn a_press_does_not_trap_a_cube() {
     }
 }
 
-/// Cubes, as meshes, are shot at a plate of 2 mm, a mesh too: at 500 m/s and 240 Hz they go two metres a step. None comes out on the other side.
+/// Cubes, as meshes, are shot at a plate of 2 mm, a mesh too: at 500 m/s and 240 Hz they go two
+/// meters a step. None comes out on the other side.
 #[test]
 fn fast_cubes_do_not_go_through_a_thin_plate() {
     let (cube, plate) = (mesh_cube(), mesh(TriMesh::box_(Vec3::new(3.0, 3.0, 1e-3))));

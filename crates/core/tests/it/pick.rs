@@ -86,7 +86,7 @@ fn a_pull_is_stable_at_any_length_of_the_step() {
 }
 
 #[test]
-fn what_cannot_move_is_not_pulled_and_what_is_gone_is_told() {
+fn static_bodies_are_not_pulled_and_removed_ones_are_reported() {
     let mut world = world(9.81, 0.01);
     let ground = world.add_static(RigidBody::fixed("ground", Shape::half_space())).unwrap();
     let pick =
@@ -101,7 +101,8 @@ fn what_cannot_move_is_not_pulled_and_what_is_gone_is_told() {
 
 #[test]
 fn a_pendulum_swings_to_the_hand_in_the_plane_in_which_it_can() {
-    // hinged about y at the origin, the bob 0.5 m below; the hand is 30 degrees off the plane and farther out: the nearest direction in the plane wins
+    // hinged about y at the origin, the bob 0.5 m below; the hand is 30 degrees off the plane and
+    // farther out: the nearest direction in the plane wins
     let mut world = world(0.0, 1.0 / 240.0);
     let mut builder = ModelBuilder::new();
     let bob =

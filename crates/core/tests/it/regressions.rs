@@ -12,7 +12,7 @@ fn billiard(world: &mut World, name: &str, at: [f64; 3], v: f64) -> ObjectId {
     world.add(ball.at(Pose::translation(at[0], at[1], at[2])).moving(Vec3::new(v, 0.0, 0.0), Vec3::zeros())).unwrap()
 }
 
-/// A plate that is led, its top at z = 0.1.
+/// A kinematic plate with its top at z = 0.1.
 fn led_plate(world: &mut World) -> ObjectId {
     let plate = RigidBody::fixed("plate", Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap()).surface(0.0, 0.5);
     world.add_boxed(Box::new(plate), Mode::Kinematic).unwrap()
@@ -30,7 +30,8 @@ fn gap(world: &World, body: ObjectId, plate: ObjectId) -> f64 {
 
 #[test]
 fn a_box_on_a_plate_that_starts_to_rise_is_not_thrown_off() {
-    // the plate's velocity already carries the box: pushing it out of the plate once more would lift it. e = 0: the gap stays 0.
+    // the plate's velocity already carries the box: pushing it out of the plate once more would
+    // lift it. e = 0: the gap stays 0.
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);
         let plate = led_plate(&mut world);
@@ -51,7 +52,8 @@ fn a_box_on_a_plate_that_starts_to_rise_is_not_thrown_off() {
 
 #[test]
 fn a_ball_that_starts_inside_a_rising_plate_ends_on_it() {
-    // 1 mm deep; recovery of 3 m/s over 1/60 s may undo 50 mm: the gap is 0 after one frame, not the plate's 1/60 m.
+    // 1 mm deep; recovery of 3 m/s over 1/60 s may undo 50 mm: the gap is 0 after one frame, not
+    // the plate's 1/60 m.
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);
         let plate = led_plate(&mut world);
@@ -97,13 +99,16 @@ fn a_body_that_lands_elsewhere_does_not_lift_a_box_off_a_led_plate() {
 }
 
 #[test]
-fn a_fast_off_centre_hit_goes_along_the_line_of_centres_at_impact() {
-    // Equal masses, e = 1, no friction, impact parameter b: at contact the line of centres makes the angle θ with the velocity, sin θ = b/2R. The struck
-    // ball takes v·cos θ along it: (cos²θ, sin θ·cos θ)·v, and the other keeps the rest (sin²θ, −sin θ·cos θ)·v.
+fn a_fast_off_center_hit_goes_along_the_line_of_centers_at_impact() {
+    // Equal masses, e = 1, no friction, impact parameter b: at contact the line of centers makes
+    // the angle θ with the velocity, sin θ = b/2R. The struck ball takes v·cos θ along it: (cos²θ,
+    // sin θ·cos θ)·v, and the other keeps the rest (sin²θ, −sin θ·cos θ)·v.
     //
-    // A stepper takes the normal where the gap is δ instead of 0: sin θ' = b/(2R + δ), so |δθ| = tan θ·δ/2R, and the velocities, v/2·(1 ± cos 2θ, sin 2θ),
-    // are off by v·|δθ|. Backtracking lands within its contact tolerance (1e-7 m: 6.5e-7·v); time_stepping follows the flight until the surfaces are within
-    // its drift tolerance (1e-4 m: 6.5e-4·v), because it sees contacts that near as touching.
+    // A stepper takes the normal where the gap is δ instead of 0: sin θ' = b/(2R + δ), so |δθ| =
+    // tan θ·δ/2R, and the velocities, v/2·(1 ± cos 2θ, sin 2θ), are off by v·|δθ|. Backtracking
+    // lands within its contact tolerance (1e-7 m: 6.5e-7·v); time_stepping follows the flight until
+    // the surfaces are within its drift tolerance (1e-4 m: 6.5e-4·v), because it sees contacts that
+    // near as touching.
     let (b, d) = (0.02, 2.0 * R);
     let (sin, cos) = (b / d, (1.0 - b * b / (d * d)).sqrt());
     for stepper in STEPPERS {
@@ -131,7 +136,8 @@ fn a_fast_off_centre_hit_goes_along_the_line_of_centres_at_impact() {
 
 #[test]
 fn a_ball_that_misses_by_23_mm_strikes_nothing() {
-    // impact parameter 80 mm against 57.2 mm of two radii: no impulse at all, so the velocities are the same numbers.
+    // impact parameter 80 mm against 57.2 mm of two radii: no impulse at all, so the velocities are
+    // the same numbers.
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, 1.0 / 60.0));
         let a = billiard(&mut world, "flies", [0.0; 3], 10.0);
@@ -172,7 +178,8 @@ fn a_frozen_table_that_was_spinning_does_not_drag_what_lies_on_it() {
     }
 }
 
-/// Three equal balls in a row with gaps, the first comes at `v`: velocities and positions along the row after `seconds`.
+/// Three equal balls in a row with gaps, the first comes at `v`: velocities and positions along the
+/// row after `seconds`.
 fn shock(stepper: &str, dt: f64, v: f64, gaps: [f64; 2], seconds: f64) -> [(f64, f64); 3] {
     let mut world = no_gravity(world(stepper, dt));
     let second = 2.0 * R + gaps[0];
@@ -186,7 +193,8 @@ fn shock(stepper: &str, dt: f64, v: f64, gaps: [f64; 2], seconds: f64) -> [(f64,
 }
 
 fn assert_shock_passed(stepper: &str, dt: f64, v: f64, gaps: [f64; 2], seconds: f64) {
-    // Equal masses, e = 1, head on: each impact hands the velocity on. 0, 0, v; the balls stop a gap further, in order; the last flies for what is left.
+    // Equal masses, e = 1, head on: each impact hands the velocity on. 0, 0, v; the balls stop a
+    // gap further, in order; the last flies for what is left.
     let out = shock(stepper, dt, v, gaps, seconds);
     assert!(
         out.iter().zip([0.0, 0.0, v]).all(|(o, v)| (o.0 - v).abs() < 1e-9),
@@ -200,7 +208,8 @@ fn assert_shock_passed(stepper: &str, dt: f64, v: f64, gaps: [f64; 2], seconds: 
 
 #[test]
 fn a_shock_passes_through_separated_balls() {
-    // 12 m/s at 1/60 s goes 0.2 m in a frame: a ball struck in it crosses a gap of 20 mm and the next ball within the same frame.
+    // 12 m/s at 1/60 s goes 0.2 m in a frame: a ball struck in it crosses a gap of 20 mm and the
+    // next ball within the same frame.
     assert_shock_passed("backtracking", 1.0 / 60.0, 12.0, [0.0028, 0.02], 0.05);
     for stepper in STEPPERS {
         assert_shock_passed(stepper, 1.0 / 240.0, 4.0, [0.001, 0.0048], 0.05);
@@ -216,7 +225,8 @@ fn a_ball_just_struck_does_not_tunnel_in_the_same_frame() {
 
 #[test]
 fn a_ball_sliding_along_a_capsule_is_carried_by_its_weight_in_every_frame() {
-    // The contact moves with the ball, not with a material point of the capsule: no curvature along the axis, so the resting force is m·g = 9.81 N.
+    // The contact moves with the ball, not with a material point of the capsule: no curvature along
+    // the axis, so the resting force is m·g = 9.81 N.
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 240.0);
         let lying = Pose::rotation(Vec3::new(0.0, std::f64::consts::FRAC_PI_2, 0.0));
@@ -255,8 +265,9 @@ fn weight_carried(world: &World, body: ObjectId) -> f64 {
 
 #[test]
 fn a_ball_that_slides_off_a_box_is_carried_to_the_edge_and_then_falls() {
-    // v²/r = 90 m/s² > g: it leaves the edge at once, on the parabola z = 0.2 − g·t²/2. It crosses in the middle of frame 60; a stepper may see that at
-    // either end of the frame, half a frame of fall: vz is off by at most g·h/2.
+    // v²/r = 90 m/s² > g: it leaves the edge at once, on the parabola z = 0.2 − g·t²/2. It crosses
+    // in the middle of frame 60; a stepper may see that at either end of the frame, half a frame of
+    // fall: vz is off by at most g·h/2.
     let h = 1.0 / 240.0;
     for stepper in STEPPERS {
         let mut world = world(stepper, h);
@@ -290,8 +301,9 @@ fn a_ball_that_slides_off_a_box_is_carried_to_the_edge_and_then_falls() {
 
 /// Two tops at the same height are one plane: straight on at 3 m/s, carried by m·g = 9.81 N.
 ///
-/// The ball meets the edge of the next box where that is nearer than the contact tolerance δ, tilted by θ = √(2δ/r): it may lose v·θ² = 6e-6 m/s there,
-/// and the force of that one frame is left out.
+/// The ball meets the edge of the next box where that is nearer than the contact tolerance δ,
+/// tilted by θ = √(2δ/r): it may lose v·θ² = 6e-6 m/s there, and the force of that one frame is
+/// left out.
 fn slide_over_a_seam(stepper: &str) {
     let mut world = world(stepper, 1.0 / 240.0);
     for (name, x) in [("left", 0.0), ("right", 2.0)] {
@@ -321,7 +333,8 @@ fn a_ball_does_not_trip_over_the_seam_of_two_boxes_in_time_stepping() {
 
 #[test]
 fn a_thrust_within_the_frame_does_not_push_a_ball_through_the_ground() {
-    // 500 N on 1 kg over 1/60 s go 69 mm from rest; the ball is at rest when the frame begins, 10 mm up and 40 mm thick.
+    // 500 N on 1 kg over 1/60 s go 69 mm from rest; the ball is at rest when the frame begins, 10
+    // mm up and 40 mm thick.
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);
         ground(&mut world, 0.0, 0.5);

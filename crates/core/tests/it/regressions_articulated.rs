@@ -6,7 +6,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use tumble_core::collide::{Mat3, Pose, Shape, Vec3};
 use tumble_core::*;
 
-/// A floating chain of capsules that bounce and do not rub, whose links do not meet each other, moving anyhow.
+/// A floating chain of capsules that bounce and do not rub, whose links do not meet each other,
+/// moving anyhow.
 fn elastic_chain(links: usize) -> ArticulatedBody {
     let model = loose_chain(links, Vec3::zeros(), 0.0).model().clone();
     let velocities: Vec<f64> =
@@ -24,7 +25,8 @@ fn elastic_chain(links: usize) -> ArticulatedBody {
 
 #[test]
 fn a_chain_that_bounces_in_a_box_gains_no_energy() {
-    // the impact was given where the chain is at its moment, with the mass matrix of the middle of the step: 0.3 J became 55 J in 10 s
+    // the impact was given where the chain is at its moment, with the mass matrix of the middle of
+    // the step: 0.3 J became 55 J in 10 s
     for links in [1, 2, 6] {
         let mut world = no_gravity(world(1.0 / 240.0, "time_stepping", Integrator::Verlet));
         let turns = [(0.0, 0.0), (PI, 0.0), (FRAC_PI_2, 0.0), (-FRAC_PI_2, 0.0), (0.0, FRAC_PI_2), (0.0, -FRAC_PI_2)];
@@ -48,7 +50,7 @@ fn a_chain_that_bounces_in_a_box_gains_no_energy() {
 
 #[test]
 fn what_is_led_past_its_limit_goes_on_freely() {
-    // the limit cannot push what is led: every frame ran into the cap on tries
+    // the limit cannot push a kinematic body: every frame reached the maximum number of tries
     let mut world = no_gravity(world(1.0 / 60.0, "backtracking", Integrator::Verlet));
     let mut body = chain(2, 0.0).with_velocities(&[1.0, 0.0]).unwrap();
     body.set_dof(0, DofSettings { limits: Some([-0.1, 0.1]), ..DofSettings::default() }).unwrap();
@@ -78,7 +80,8 @@ fn a_link_is_kept_apart_from_the_base() {
 
 #[test]
 fn a_box_on_a_turning_arm_that_is_led_stays_on_its_circle() {
-    // 1 rad/s at 0.6 m, held by friction: the carrier's centripetal acceleration was left out, and the box crept out by 5 mm in 2 s
+    // 1 rad/s at 0.6 m, held by friction: the carrier's centripetal acceleration was left out, and
+    // the box crept out by 5 mm in 2 s
     let mut world = world(1.0 / 240.0, "backtracking", Integrator::Verlet);
     let mut builder = ModelBuilder::new();
     let mass = LinkMass { mass: 1.0, center: Vec3::zeros(), inertia: Mat3::identity() };
@@ -101,7 +104,8 @@ fn a_box_on_a_turning_arm_that_is_led_stays_on_its_circle() {
 
 #[test]
 fn a_floating_chain_that_is_struck_keeps_its_linear_momentum() {
-    // displacing links with their joint rates held, and scaling those for the energy, lost 0.43 of 5 N·s in two impacts
+    // displacing links with their joint rates held, and scaling those for the energy, lost 0.43 of
+    // 5 N·s in two impacts
     let mut world = no_gravity(world(1.0 / 240.0, "time_stepping", Integrator::Verlet));
     let mass = LinkMass {
         mass: 1.0,

@@ -5,7 +5,7 @@ use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::rows::RowSet;
 use tumble_core::*;
 
-/// One row on a body's centre along x.
+/// One row on a body's center along x.
 #[derive(Clone)]
 struct AlongX {
     body: ObjectId,
@@ -52,8 +52,9 @@ fn bits(world: &World) -> Vec<u64> {
 
 #[test]
 fn a_velocity_motor_moves_by_velocity_times_time() {
-    // From rest the motor takes up to one frame to reach 1 m/s, in which 0 to h·v are covered: x = v·t less at most one frame's way;
-    // from frame to frame thereafter it is h·v exactly. The row's position error is 0: it holds no place.
+    // From rest the motor takes up to one frame to reach 1 m/s, in which 0 to h·v are covered: x =
+    // v·t less at most one frame's way; from frame to frame thereafter it is h·v exactly. The row's
+    // position error is 0: it holds no place.
     let h = 1.0 / 60.0;
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, h));
@@ -71,7 +72,8 @@ fn a_velocity_motor_moves_by_velocity_times_time() {
 
 #[test]
 fn a_motor_of_6_newtons_gives_its_impulse_whatever_bounces_elsewhere() {
-    // 6 N on 1 kg for 1/60 s: 0.1 m/s. The impacts of others are no time in which a force could act twice, or not at all.
+    // 6 N on 1 kg for 1/60 s: 0.1 m/s. The impacts of others are no time in which a force could act
+    // twice, or not at all.
     for stepper in STEPPERS {
         for bounces in [false, true] {
             let mut world = no_gravity(world(stepper, 1.0 / 60.0));
@@ -114,8 +116,9 @@ fn a_row_with_nan_is_an_error_and_not_a_panic() {
 
 #[test]
 fn a_snapshot_with_a_hostile_counter_is_refused_and_objects_can_still_be_added() {
-    // Every byte but the magic is overwritten in turn by 0xffff_ffff as a variable-length number: whatever counter it hits, the outcome is an
-    // error that changes nothing or a world that still works (a counter at its end overflows when the next object is added).
+    // Every byte but the magic is overwritten in turn by 0xffff_ffff as a variable-length number:
+    // whatever counter it hits, the outcome is an error that changes nothing or a world that still
+    // works (a counter at its end overflows when the next object is added).
     let mut world = no_gravity(world("time_stepping", 1.0 / 60.0));
     unit_ball(&mut world, "ball", [0.0; 3], [0.0; 3]);
     let saved = world.save();
@@ -167,8 +170,10 @@ fn numbers_that_are_no_state_of_a_body_are_refused() {
 
 #[test]
 fn a_failed_step_leaves_time_state_and_contact_forces_as_they_were() {
-    // A resting ball is held by m·g; another's force overflows. Afterwards nothing of the failed frame may act: not the overflow, not the force that held
-    // the resting ball. Lifted to 5 m it falls freely: −g·h after one frame, and z = 5 − g·h²/2 (both steppers are exact on a parabola).
+    // A resting ball is held by m·g; another's force overflows. Afterwards nothing of the failed
+    // frame may act: not the overflow, not the force that held the resting ball. Lifted to 5 m it
+    // falls freely: −g·h after one frame, and z = 5 − g·h²/2 (both steppers are exact on a
+    // parabola).
     let h = 1.0 / 60.0;
     for failing in STEPPERS {
         for next in STEPPERS {
@@ -211,7 +216,8 @@ fn a_failed_step_leaves_time_state_and_contact_forces_as_they_were() {
 
 #[test]
 fn a_failed_step_names_the_body_whose_force_overflowed() {
-    // 1e308 N is a number, 1e308 N / 1 g is none. The ball that rests 5 m away has nothing to do with it.
+    // 1e308 N is a number, 1e308 N / 1 g is none. The ball that rests 5 m away has nothing to do
+    // with it.
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);
         ground(&mut world, 0.0, 0.5);
@@ -226,7 +232,8 @@ fn a_failed_step_names_the_body_whose_force_overflowed() {
 
 #[test]
 fn a_velocity_that_is_not_finite_is_no_state() {
-    // p = 1e308/60 N·s is a number, v = p/m = 1.7e309 m/s is none: the step fails, or its result can be read.
+    // p = 1e308/60 N·s is a number, v = p/m = 1.7e309 m/s is none: the step fails, or its result
+    // can be read.
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, 1.0 / 60.0));
         let light = world.add(RigidBody::with_mass("light", sphere(0.1), 1e-3).unwrap()).unwrap();
@@ -297,7 +304,8 @@ struct Spun {
     speed: f64,
 }
 
-/// Two seconds of a rod of three different inertias that spins about its pinned end. No gravity and a pin that does not move: energy stays.
+/// Two seconds of a rod of three different inertias that spins about its pinned end. No gravity and
+/// a pin that does not move: energy stays.
 fn spin_pinned_rod(stepper: &str, dt: f64) -> Spun {
     let mut world = no_gravity(world(stepper, dt));
     let rod = RigidBody::with_mass("rod", Shape::cuboid(Vec3::new(0.5, 0.1, 0.2)).unwrap(), 1.0).unwrap();
@@ -324,14 +332,16 @@ fn spin_pinned_rod(stepper: &str, dt: f64) -> Spun {
 
 fn assert_pin_holds(stepper: &str) {
     let [coarse, middle, fine] = [240.0, 480.0, 960.0].map(|rate| spin_pinned_rod(stepper, 1.0 / rate));
-    // nothing does work: a thousandth in two seconds is far more than the 5e-5 that second order leaves at this step
+    // nothing does work: a thousandth in two seconds is far more than the 5e-5 that second order
+    // leaves at this step
     assert!(coarse.energy < 1e-3, "{stepper}: energy off by {:e} at 1/240", coarse.energy);
     for spun in [&coarse, &middle, &fine] {
         // joints are closed to 1e-9 m and 1e-9 m/s along each axis
         assert!(spun.drift < 3f64.sqrt() * 1e-9, "{stepper}: drift {:e} m", spun.drift);
         assert!(spun.speed < 3f64.sqrt() * 1e-9, "{stepper}: the end moves at {:e} m/s", spun.speed);
     }
-    // second order: half the step, a quarter of the error (a tenth more for what is of higher order)
+    // second order: half the step, a quarter of the error (a tenth more for what is of higher
+    // order)
     for (a, b) in [(&coarse, &middle), (&middle, &fine)] {
         assert!(b.energy < 0.275 * a.energy, "{stepper}: energy {:e}, at half the step {:e}", a.energy, b.energy);
     }

@@ -1,4 +1,5 @@
-//! Sleep: who lies still is left alone, and nothing can be told from a world in which nobody sleeps.
+//! Sleep: bodies at rest are left out of the step, and the world is otherwise the same as without
+//! sleep.
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Vec3};
@@ -57,7 +58,8 @@ fn a_stack_falls_asleep_and_costs_nothing() {
     }
 }
 
-/// In a world without gravity a ball at rest is asleep at exactly its state: what strikes it cannot tell, to the last bit.
+/// In a world without gravity a ball at rest is asleep at exactly its state: what strikes it cannot
+/// tell, to the last bit.
 #[test]
 fn a_strike_on_sleepers_is_the_same_bits_as_on_the_waking() {
     for stepper in STEPPERS {
@@ -102,7 +104,8 @@ fn only_the_island_that_is_struck_wakes() {
     }
 }
 
-/// Everything that a user or a neighbour can do to sleepers wakes all of them in the frame in which it happens.
+/// Every action of a user or a neighbor on sleeping bodies wakes all of them in the frame in which
+/// it happens.
 #[test]
 fn whatever_is_done_to_a_sleeper_wakes_its_island() {
     type Deed = (&'static str, fn(&mut World, &[ObjectId]));
@@ -133,7 +136,8 @@ fn whatever_is_done_to_a_sleeper_wakes_its_island() {
     }
 }
 
-/// A lift that stands still is a bed like any other; when it goes it takes them along, and a pusher led from afar is felt.
+/// A lift at rest supports sleeping bodies; when it starts it carries them along. A kinematic
+/// pusher from afar wakes them.
 #[test]
 fn what_is_led_wakes_those_it_carries_or_strikes() {
     for stepper in STEPPERS {
@@ -194,7 +198,8 @@ impl ForceGenerator for Gust {
     }
 }
 
-/// A steady breeze lets them sleep; the gust of 2 s wakes them, and drives them as if they had never slept.
+/// A steady breeze lets them sleep; the gust of 2 s wakes them, and drives them as if they had
+/// never slept.
 #[test]
 fn a_force_that_changes_wakes_them_and_a_steady_one_does_not() {
     for stepper in STEPPERS {
@@ -212,7 +217,8 @@ fn a_force_that_changes_wakes_them_and_a_steady_one_does_not() {
         };
         let ((slept, x), (never, waking)) = (blown(Some(Sleep::default())), blown(None));
         assert!(slept && !never, "{stepper}");
-        // 80 N against μ·m·g = 49 N for a second; a gust that begins within a step may find the friction of its start for all of it: μ·g·h for a second
+        // 80 N against μ·m·g = 49 N for a second; a gust that begins within a step may find the
+        // friction of its start for all of it: μ·g·h for a second
         assert!(
             (waking - 0.5 * (8.0 - 0.5 * G)).abs() < 1.2 * 0.5 * G * H && (x - waking).abs() < 1e-6,
             "{stepper}: {x} m, and {waking} m without sleep"
@@ -220,7 +226,7 @@ fn a_force_that_changes_wakes_them_and_a_steady_one_does_not() {
     }
 }
 
-/// A pendulum at its turning points, and a ball that rolls at a millimetre a second, are not still.
+/// A pendulum at its turning points, and a ball that rolls at a millimeter a second, are not still.
 #[test]
 fn what_pauses_or_creeps_stays_awake() {
     for stepper in STEPPERS {
@@ -321,7 +327,8 @@ impl ForceGenerator for Fault {
     }
 }
 
-/// The ball wakes the stack within the frame that fails, so the frame is done a second time before it does.
+/// The ball wakes the stack within the frame that fails, so the frame is done a second time before
+/// it does.
 #[test]
 fn a_step_that_fails_after_it_woke_sleepers_leaves_every_byte_as_it_was() {
     for stepper in STEPPERS {

@@ -5,14 +5,14 @@ use tumble_core::collide::{Pose, Vec3};
 use tumble_core::rows::RowSet;
 use tumble_core::*;
 
-/// An implicit PD drive of a body's centre along x, or whatever row it is told to make.
+/// An implicit PD drive of a body's center along x, or any row that it is given.
 #[derive(Clone)]
 struct Drive {
     body: ObjectId,
     set: RowSet,
     stiffness: f64,
     damping: f64,
-    /// Where to, metres.
+    /// Target, m.
     place: f64,
     h: f64,
 }
@@ -48,7 +48,8 @@ fn ball(world: &mut World, mass: f64, v: f64) -> ObjectId {
     world.add(ball.moving(Vec3::new(v, 0.0, 0.0), Vec3::zeros())).unwrap()
 }
 
-/// `m·(v⁺ − v) = h·(kp·(q* − q − h·v⁺) − kd·v⁺)`; time stepping asks for `q` in the middle of the step, where free motion has it.
+/// `m·(v⁺ − v) = h·(kp·(q* − q − h·v⁺) − kd·v⁺)`; time stepping asks for `q` in the middle of the
+/// step, where free motion has it.
 #[test]
 fn a_drive_gives_the_velocity_found_by_hand() {
     let (h, m, v, place) = (0.01, 2.0, 0.5, 0.3);
@@ -71,7 +72,8 @@ fn a_drive_gives_the_velocity_found_by_hand() {
     }
 }
 
-/// Under its weight a spring gives by `m·g/k`: it is in no way pulled to its place as a joint would be.
+/// Under its weight a spring gives by `m·g/k`: it is in no way pulled to its place as a joint would
+/// be.
 #[test]
 fn a_soft_equality_is_a_spring_and_no_joint() {
     let (h, m, k) = (1.0 / 60.0, 2.0, 100.0);
@@ -88,7 +90,8 @@ fn a_soft_equality_is_a_spring_and_no_joint() {
     }
 }
 
-/// An impact takes no time, in which a spring does nothing: two balls of one mass change their velocities.
+/// An impact takes no time, in which a spring does nothing: two balls of one mass change their
+/// velocities.
 #[test]
 fn a_spring_takes_no_part_in_an_impact() {
     let h = 1.0 / 240.0;

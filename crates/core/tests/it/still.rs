@@ -1,4 +1,5 @@
-//! What stands keeps still to a millionth of a metre per second, and what misses is left alone.
+//! Resting bodies stay at rest to a millionth of a meter per second, and bodies that miss are not
+//! affected.
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Shape, TreeSettings, TriMesh, Vec3};
@@ -28,7 +29,8 @@ fn a_standing_cylinder_does_not_creep() {
     }
 }
 
-/// Two mesh balls of 0.1 m that fly at each other at 50 m/s each, 0.8 m a step, `beside` each other; A and B.
+/// Two mesh balls of 0.1 m that fly at each other at 50 m/s each, 0.8 m a step, `beside` each
+/// other; A and B.
 fn fly(beside: f64) -> (World, [ObjectId; 2]) {
     let mut world = no_gravity(world("time_stepping", 1.0 / 60.0));
     let shape = Shape::mesh(TriMesh::icosphere(0.1, 2), &TreeSettings::octree()).unwrap();
@@ -39,7 +41,8 @@ fn fly(beside: f64) -> (World, [ObjectId; 2]) {
     (world, ids)
 }
 
-/// No frictionless elastic impact takes momentum or energy, and no ball goes through another: they are followed to where they meet.
+/// No frictionless elastic impact takes momentum or energy, and no ball goes through another: they
+/// are followed to where they meet.
 #[test]
 fn meshes_that_fly_at_each_other_bounce() {
     let (mut world, [a, b]) = fly(0.03);

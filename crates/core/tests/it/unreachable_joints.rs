@@ -1,11 +1,12 @@
-//! Closures that are led to where they cannot be: what hangs on them stays sane, lags behind, and closes again.
+//! Loop joints whose kinematic side moves out of reach: the attached bodies lag behind, stay
+//! finite, and the joint closes again.
 
 use crate::articulated_world::{hinged, rod, world};
 use crate::common::*;
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::*;
 
-/// A chain of so many links of 0.2 m from the origin, whose end a hand leads.
+/// A chain of links of 0.2 m from the origin, whose end is joined to a kinematic hand.
 struct Led {
     world: World,
     chain: ObjectId,
@@ -54,7 +55,8 @@ impl Led {
         self.world.state_of(self.chain).unwrap()[self.links..].iter().fold(0.0, |a: f64, v| a.max(v.abs()))
     }
 
-    /// Leads the hand for so many seconds; the fastest joint and the largest misfit on the way.
+    /// Moves the hand for the given time. Returns the highest joint speed and the largest position
+    /// error.
     fn lead(&mut self, velocity: Vec3, seconds: f64) -> (f64, f64) {
         let (mut fastest, mut position_error): (f64, f64) = (0.0, 0.0);
         for _ in 0..(seconds * 240.0).round() as usize {
@@ -77,7 +79,8 @@ fn lag(hand: &Vec3, reach: f64) -> f64 {
 fn a_chain_whose_hand_goes_out_of_reach_follows_it_straight_and_closes_again() {
     // it was flung about at 1e10 rad/s, stayed folded where that left it, and nothing was said
     let speed = 0.5;
-    // the last bend of two links, L·θ²/4 = v·h, is gone in one step; of more, that many times as fast
+    // the last bend of two links, L·θ²/4 = v·h, is gone in one step; of more, that many times as
+    // fast
     let crossing = |links: usize| links as f64 * (4.0 * speed * 240.0 / LENGTH).sqrt();
     for stepper in STEPPERS {
         for links in [2, 5] {
@@ -99,7 +102,8 @@ fn a_chain_whose_hand_goes_out_of_reach_follows_it_straight_and_closes_again() {
                     position_error - expected,
                     led.position_error()
                 );
-                // across the plane nothing is in reach from the start: there the chain is still coming to lie straight
+                // across the plane nothing is in reach from the start: there the chain is still
+                // coming to lie straight
                 let straight = if along.y == 0.0 { 4.0 * speed / LENGTH } else { crossing(links) };
                 assert!(
                     across < crossing(links) && back < crossing(links) && out < straight,

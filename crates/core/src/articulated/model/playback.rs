@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn rubbish_is_told() {
+    fn invalid_input_is_reported() {
         assert_eq!(Playback::new(vec![0.0], vec![1.0]), Err(PlaybackError::Count { times: 1, values: 1 }));
         assert!(matches!(Playback::new(vec![0.0, 0.0], vec![1.0, 2.0]), Err(PlaybackError::Sample { index: 1, .. })));
         assert!(matches!(Playback::repeating(vec![0.0, 1.0], vec![1.0, 2.0]), Err(PlaybackError::Cycle { .. })));

@@ -1,4 +1,5 @@
-//! Rows against finite differences: errors, velocities and biases of every kind, on moving, led and standing bodies.
+//! Rows against finite differences: errors, velocities and biases of every kind, on dynamic,
+//! kinematic and static bodies.
 
 use super::*;
 use crate::constraint::rows::Rows;
@@ -8,7 +9,7 @@ use crate::world::ObjectState;
 use crate::world::view::{Mode, Status, Table};
 use tumble_collide::Shape;
 
-/// Two bodies of one part each in a table, their state and sites.
+/// Two bodies of one part each in a table, with their state and part states.
 struct Pairing {
     table: Table,
     states: Vec<ObjectState>,
@@ -18,7 +19,7 @@ struct Pairing {
     dof: usize,
 }
 
-/// What a closure says at a state.
+/// The rows of a loop joint at a state.
 struct RecordedRows {
     errors: Vec<f64>,
     velocities: Vec<f64>,
@@ -172,7 +173,7 @@ fn velocities_are_the_rates_of_errors_and_biases_the_rates_of_velocities() {
     for (kind, rows) in KINDS {
         for modes in MODES {
             let (pairing, [a, b]) = pairing(modes, Vec3::new(0.3, -0.2, 0.4));
-            // with a static or led side; and with the world in its place
+            // with a static or kinematic side, and with the world instead
             let world = Anchor::world(pairing.part_states[1].pose * b.frame);
             let sides = if modes[1] == Mode::Static { vec![(a, b), (a, world), (world, a)] } else { vec![(a, b)] };
             for (a, b) in sides {

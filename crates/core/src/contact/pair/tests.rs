@@ -1,4 +1,4 @@
-//! What is not asked cannot matter: pairs that are told apart, followed along their motion.
+//! Skipped queries must not matter: separated pairs, followed along their motion.
 
 use super::{MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
 use crate::object::part_state::PartState;
@@ -23,9 +23,10 @@ fn motion_bounds(shape: &Shape, part_state: &PartState) -> MotionBounds {
     MotionBounds::new(part_state, shape.bounding_radius(), around, H)
 }
 
-/// Bodies that fly and spin: whatever is told apart at the start touches at no moment of the step, by the exact contacts of boxes, balls and half-spaces.
+/// Bodies that fly and spin: pairs separated at the start touch at no time of the step, by the
+/// exact contacts of boxes, spheres and half-spaces.
 #[test]
-fn what_is_told_apart_touches_at_no_moment_of_the_step() {
+fn separated_pairs_do_not_touch_during_the_step() {
     let (mut seed, mut recorded, mut touched) = (3, 0, 0);
     let shapes = [
         Shape::cuboid(Vec3::new(0.5, 0.1, 0.2)).unwrap(),
@@ -83,7 +84,7 @@ fn what_is_told_apart_touches_at_no_moment_of_the_step() {
 
 /// The second query at the same poses is not made, gives the same contacts, and a wider one is.
 #[test]
-fn what_has_not_moved_is_recalled() {
+fn contacts_of_pairs_that_did_not_move_are_cached() {
     let (cylinder, block) = (Shape::cylinder(0.1, 0.2).unwrap(), Shape::cuboid(Vec3::repeat(0.5)).unwrap());
     let at = |z: f64| PartState { pose: Pose::translation(0.0, 0.0, z), ..PartState::default() };
     let part_states = [at(0.7001), at(0.0)];
@@ -105,7 +106,7 @@ fn what_has_not_moved_is_recalled() {
     };
     let first = query(1e-3, &mut narrow_phase_cache);
     assert!(first.len() >= 4 && first.iter().all(|c| (c.gap - 1e-4).abs() < 1e-9), "{first:?}");
-    // what is kept is what is given
+    // the stored contacts are returned
     narrow_phase_cache.last.contacts.iter_mut().for_each(|c| c.core_b = 42.0);
     let again = query(1e-3, &mut narrow_phase_cache);
     assert!(again.len() == first.len() && again.iter().all(|c| c.core_b == 42.0), "asked again: {again:?}");

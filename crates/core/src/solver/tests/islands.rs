@@ -4,7 +4,7 @@ use super::Random;
 use crate::constraint::rows::{RowSet, Rows};
 use crate::solver::Islands;
 
-/// Rows among objects of 1 to 3 freedoms, with none, one or two sides.
+/// Rows among objects of 1 to 3 degrees of freedom, with none, one or two sides.
 fn tangle(random: &mut Random) -> Rows {
     let mut starts = vec![0];
     for _ in 0..1 + random.index(12) {

@@ -5,7 +5,7 @@ use super::UP;
 use crate::constraint::rows::{RowSet, Rows};
 use crate::solver::residual;
 
-/// The residual of one row of 1 kg along one freedom: `w = c + λ`.
+/// The residual of one row of 1 kg along one degree of freedom: `w = c + λ`.
 fn scalar(set: RowSet, c: f64, lambda: f64) -> f64 {
     let mut rows = Rows::default();
     rows.clear(1);
@@ -29,7 +29,8 @@ fn scalar_rows_are_judged_by_their_sets() {
     for (set, c, lambda) in solved {
         assert!(scalar(set, c, lambda) < 1e-15, "{set:?} {c} {lambda}");
     }
-    // What is wrong, and by how much: penetration left, pull, push while opening, an end not reached, an end passed.
+    // What is wrong, and by how much: penetration left, pull, push while opening, an end not
+    // reached, an end passed.
     let wrong = [
         (RowSet::Equality, -3.0, 2.5, 0.5),
         (RowSet::HalfLine, -3.0, 2.5, 0.5),
@@ -53,7 +54,8 @@ fn cone(mu: f64, c: [f64; 3], lambda: [f64; 3]) -> f64 {
 
 #[test]
 fn contacts_are_judged_by_coulombs_law() {
-    // Open, sticking, sliding (without the dilation of a convex cone: w_n = 0), sliding along a diagonal, without friction.
+    // Open, sticking, sliding (without the dilation of a convex cone: w_n = 0), sliding along a
+    // diagonal, without friction.
     let solved = [
         (0.5, [1.0, 3.0, -2.0], [0.0; 3]),
         (0.5, [-2.0, 0.6, 0.8], [2.0, -0.6, -0.8]),
@@ -64,7 +66,8 @@ fn contacts_are_judged_by_coulombs_law() {
     for (mu, c, lambda) in solved {
         assert!(cone(mu, c, lambda) < 1e-14, "{mu} {c:?} {lambda:?}: {}", cone(mu, c, lambda));
     }
-    // Too weak, sideways, along the sliding, outside the cone, the convex answer that opens, a pull, penetration left.
+    // Too weak, sideways, along the sliding, outside the cone, the convex answer that opens, a
+    // pull, penetration left.
     let wrong = [
         (0.5, [-2.0, 4.0, 0.0], [2.0, -0.5, 0.0]),
         (0.5, [-2.0, 4.0, 0.0], [2.0, 0.0, 1.0]),

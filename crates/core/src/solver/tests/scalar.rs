@@ -8,7 +8,7 @@ fn solvers() -> [&'static dyn RowSolver; 3] {
     [&GaussSeidel, &LcpPyramid, &LcpSliding]
 }
 
-/// Sliders of 1 freedom each.
+/// Sliders of 1 degree of freedom each.
 fn sliders(count: usize) -> Rows {
     let mut rows = Rows::default();
     rows.clear(count);
@@ -101,7 +101,7 @@ fn a_stop_on_what_cannot_move_does_nothing() {
     }
 }
 
-/// Eight equalities on three freedoms: solved, and by multipliers of an ordinary size.
+/// Eight equalities on three degrees of freedom: solved, and by multipliers of an ordinary size.
 #[test]
 fn redundant_equalities_do_not_blow_up() {
     let mut random = Random(32);
@@ -117,7 +117,7 @@ fn redundant_equalities_do_not_blow_up() {
         }
         let solved = solve(&LcpPyramid, &rows, &c, FAR);
         assert!(solved.outcome.converged);
-        // All three freedoms are stopped.
+        // All three degrees of freedom are stopped.
         assert!(distance(&solved.du, &v.map(|v| -v)) < 1e-12, "{:?}", solved.du);
         let largest = solved.lambda.iter().fold(0.0, |a: f64, l| a.max(l.abs()));
         assert!(largest < 100.0 && solved.lambda.iter().filter(|l| **l != 0.0).count() == 3, "{:?}", solved.lambda);
@@ -135,7 +135,8 @@ fn contradicting_welds_do_not_pass_for_solved() {
     }
 }
 
-/// Two parts of one object that has two freedoms: the block's one side sees their cross term.
+/// Two parts of one object that has two degrees of freedom: the block's one side sees their cross
+/// term.
 #[test]
 fn two_parts_of_one_object_meet_as_two_bodies_would() {
     let (a, b, speed) = (2.0f64, 3.0f64, 4.0);

@@ -4,8 +4,9 @@ use super::{Bodies, UP, all, distance};
 use crate::constraint::rows::{RowSet, Rows};
 use crate::solver::{GaussSeidel, RowSolver, SolverSettings, residual};
 
-/// A block on two feet, one closer to its centre, that are asked for accelerations which differ along the line between them: no force gives that, so the
-/// feet are braced against each other until the one that carries less slides.
+/// A block on two feet, one closer to its center, that are asked for accelerations which differ
+/// along the line between them: no force gives that, so the feet are braced against each other
+/// until the one that carries less slides.
 #[test]
 fn of_two_feet_that_conflict_the_one_that_carries_less_slides() {
     let (mu, near, far) = (0.5, 0.3, 0.5);
@@ -28,7 +29,8 @@ fn of_two_feet_that_conflict_the_one_that_carries_less_slides() {
     }
 }
 
-/// Each of the recorded problems is solved to its own tolerance; the residual is computed by other code.
+/// Each of the recorded problems is solved to its own tolerance; the residual is computed by other
+/// code.
 #[test]
 fn recorded_problems_are_solved() {
     let text = include_str!("stubborn.txt");
