@@ -2,8 +2,8 @@
 //!
 //! With `M = LᵀL` per object and `u = L·v`, an impulse `λ` along the rows `J` changes `u` by `Y·λ`.
 //! `Y = L⁻ᵀJᵀ` is the thesis's test impulse (§IV.B.3, Algorithms 2 and 3) in coordinates in which
-//! every mass is 1. The matrix of the contact problem is `K = YᵀY`. Rows do not tell rigid bodies
-//! from articulated ones.
+//! every mass is 1. The matrix of the contact problem is `K = YᵀY`. Rows do not
+//! distinguish rigid from articulated bodies.
 //!
 //! | symbol | meaning |
 //! |---|---|

@@ -40,7 +40,7 @@ pub const MAX_DIRECT_ROWS: usize = 200;
 /// Maximum number of multiplications for a linkage before the first sweep, about 20 ms.
 const MAX_WORK: usize = 40_000_000;
 /// A row depends on others if its pivot is below this fraction of its diagonal: two pins of one
-/// joint that are 0.1 mm apart in a metre.
+/// joint that are 0.1 mm apart in a meter.
 const RANK: f64 = 1e-8;
 /// A remaining velocity along an equality row counts as zero below this fraction of the largest
 /// initial one.
