@@ -9,7 +9,7 @@ import tumble
 
 
 class Flock(tumble.Behavior):
-    """Each boid keeps apart from the near, flies as its neighbours do, and towards the middle of them."""
+    """Each boid keeps apart from the near, flies as its neighbors do, and towards the middle of them."""
 
     def __init__(self, sight: float = 3.0, room: float = 0.6, speed: float = 2.0) -> None:
         self.sight, self.room, self.speed = sight, room, speed

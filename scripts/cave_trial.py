@@ -4,7 +4,7 @@ launch command in a network namespace.
 
 usage: scripts/cave_trial.py [--long] [--seed 1] [--quality default] [--frames N] [--kills N] [--soak N] [--minute N] [TRIAL ...]
 
-Without names the short ones run that need neither root nor another build: frames, kills, freezes, launchers, servers, minute, cuts. --long has the full numbers,
+Without names the short ones run that need no root and no other build: frames, kills, freezes, launchers, servers, minute, cuts. --long has the full numbers,
 and all but `namespace` (root) and `viewers` (a build with --features foxglove).
 Ends with 1 if a trial does not show what it must. Nothing is left behind but out/cave_trial.
 """
@@ -121,7 +121,7 @@ def shown_after(folder, facet, moment):
 
 
 def same_states(folder):
-    """Whether all facets that showed a frame showed the same state, and who was never disturbed missed none."""
+    """Whether all facets that showed a frame showed the same state, and an undisturbed facet missed none."""
     states = {}
     for facet in FACETS:
         for line in log(folder, facet):

@@ -43,7 +43,6 @@ FORMER = ("scripts/migrate_0_1.py", "scripts/check_docs.py", "crates/py/tests/te
 # Files and folders whose words are not clean yet. Remove an entry when `--todo` counts no fault in it.
 TODO = (
     "ARCHITECTURE.md",
-    "benches/peers/src/tumble.rs",
     "crates/collide/",
     "crates/core/",
     "crates/net/",
@@ -55,17 +54,11 @@ TODO = (
     "docs/command.md",
     "docs/netsync.md",
     "docs/pictures.md",
-    "docs/python_extending.md",
     "docs/recording.md",
     "docs/running_a_cave.md",
     "docs/spheretrees.md",
     "docs/transports.md",
     "docs/view.md",
-    "examples/boids.py",
-    "examples/four_bar.py",
-    "scenes/",
-    "scripts/cave_trial.py",
-    "tests/extension/src/particle.rs",
 )
 
 

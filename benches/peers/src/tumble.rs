@@ -19,7 +19,7 @@ impl Tumble {
             let fixed = RigidBody::fixed(format!("plane{i}"), Shape::half_space())
                 .surface(RESTITUTION, FRICTION)
                 .at(pose(plane));
-            world.add_static(fixed).expect("a fixture is valid");
+            world.add_static(fixed).expect("a fixed body is valid");
         }
         let shape = match scene.body {
             Body::Sphere => Shape::sphere(RADIUS),

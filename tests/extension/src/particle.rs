@@ -1,4 +1,4 @@
-//! A point mass: three freedoms, momentum `P`, no rotation.
+//! A point mass: three degrees of freedom, momentum `P`, no rotation.
 //!
 //! | symbol | meaning |
 //! |---|---|
