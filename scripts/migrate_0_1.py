@@ -19,8 +19,9 @@ from __future__ import annotations
 import re
 import sys
 from bisect import bisect_right
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Iterator, NamedTuple
+from typing import NamedTuple
 
 # Keys of scenes: path, with `*` for a name of the user's and `|` between alternatives, and the new name. Keys of caves have not changed.
 _OBJECT = "body|grid|articulated"

@@ -3,7 +3,8 @@
 //!
 //! A step reads the state, accumulates forces, finds contacts, turns test impulses into rows,
 //! solves all rows together and writes the state. Equal inputs give equal bits: this crate has no
-//! IO, clock, threads, file format or GPU.
+//! IO, clock, threads, file format or GPU. `docs/references.md` lists the thesis, RBDA and all other
+//! sources that the modules cite.
 //!
 //! SI units, radians, z up; boxes, capsules and cylinders are made of *half* extents and half
 //! lengths. `docs/conventions.md` has these and the other conventions beside those of Python and of
