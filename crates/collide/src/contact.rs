@@ -1,4 +1,4 @@
-//! What the narrow phase says of two shapes that touch or nearly do.
+//! Contacts: the result of the narrow phase for two shapes that touch or nearly touch.
 
 use crate::Vec3;
 
@@ -9,62 +9,65 @@ pub struct Contact {
     pub point: Vec3,
     /// Unit normal, from B towards A: A is pushed along it, B against it.
     pub normal: Vec3,
-    /// Signed distance between the surfaces along the normal, meters; negative where they overlap.
+    /// Signed distance between the surfaces along the normal, meters; negative if they overlap.
     pub gap: f64,
-    /// Names the features that touch; the same features keep their id while they stay in contact.
+    /// Identifier of the features that touch. The same features keep it while they stay in contact.
     pub feature: u64,
-    /// Distance from A's surface back along the normal to the core feature that carries it, meters:
-    /// the radius of a sphere, capsule or leaf sphere; 0 for a vertex, edge or face.
+    /// Distance from A's surface back along the normal to its core feature, meters: the radius of a
+    /// sphere, capsule or leaf sphere; 0 for a vertex, edge or face.
     pub core_a: f64,
-    /// The same for B.
+    /// Distance from B's surface along the normal to its core feature, meters.
     pub core_b: f64,
-    /// What the normal turns with.
+    /// The feature that determines the normal.
     pub normal_from: NormalFrom,
 }
 
-/// What fixes a contact's normal, and so how it turns when the bodies move.
+/// The feature that determines a contact's normal, and so how the normal rotates when the bodies
+/// move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NormalFrom {
-    /// A flat face of A: the normal turns with A.
+    /// A flat face of A: the normal rotates with A.
     FaceOfA,
-    /// A flat face of B: the normal turns with B.
+    /// A flat face of B: the normal rotates with B.
     FaceOfB,
-    /// The line from B's core point to A's (two rounded features, or a rounded one and a vertex or an edge).
+    /// The line from B's core point to A's, for two rounded features, or a rounded feature and a
+    /// vertex or edge.
     CorePoints,
-    /// The line from the nearest point of a straight edge or axis of A, along this unit direction (world), to B's core point: that nearest
-    /// point slides freely along the direction.
+    /// The line from the nearest point of a straight edge or axis of A to B's core point. The
+    /// nearest point slides freely along this unit direction of the edge or axis, in world axes.
     LineOfA(Vec3),
-    /// The same with a straight edge or axis of B and A's core point.
+    /// Like [`NormalFrom::LineOfA`], with an edge or axis of B and A's core point.
     LineOfB(Vec3),
-    /// Two edges: perpendicular to both.
+    /// Two edges: the normal is perpendicular to both.
     Edges,
 }
 
-/// How meshes and cylinders collide.
+/// The method of contact generation for meshes and cylinders.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum ContactMode {
-    /// Points and edges of each body against the exact signed distance of the other: flat faces stay flat, gaps and
-    /// normals are those of the surfaces. The gap of two crossing edges of finely triangulated smooth meshes may be
-    /// too large by 2e-4 of a diagonal.
+    /// Vertices and edges of each body are tested against the exact signed distance of the other.
+    /// Flat faces stay flat; gaps and normals are those of the surfaces. The gap of two crossing
+    /// edges of finely triangulated smooth meshes can be too large by 2e-4 of a diagonal.
     #[default]
     Surface,
-    /// The thesis's mode: point and normal from the two leaf spheres. No contact is missed; gaps are too small by at most
-    /// the trees' outward errors ([`crate::SphereTree::outward_error`]).
+    /// The method of the thesis: point and normal come from the two leaf spheres. No contact is
+    /// missed; gaps are too small by at most the outward errors of the trees
+    /// ([`crate::SphereTree::outward_error`]).
     Spheres,
 }
 
 impl ContactMode {
-    /// All modes with their names, as scene files and Python write them.
+    /// All modes with their names in scene files and in Python.
     pub const NAMES: &[(&str, ContactMode)] = &[("surface", ContactMode::Surface), ("spheres", ContactMode::Spheres)];
 
-    /// The mode of a pair: `Spheres` if either side asks for it.
+    /// Returns the mode of a pair: `Spheres` if either side requests it.
     pub fn of_pair(self, other: ContactMode) -> ContactMode {
         if self == ContactMode::Spheres { self } else { other }
     }
 }
 
 impl Contact {
-    /// The same contact with A and B exchanged.
+    /// Returns the same contact with A and B exchanged.
     pub(crate) fn flipped(self) -> Contact {
         let normal_from = match self.normal_from {
             NormalFrom::LineOfA(along) => NormalFrom::LineOfB(along),
@@ -76,7 +79,8 @@ impl Contact {
         Contact { normal: -self.normal, core_a: self.core_b, core_b: self.core_a, normal_from, ..self }
     }
 
-    /// A contact between two spheres about core points; coincident centers are pushed apart along z.
+    /// Returns the contact of two spheres about core points. Coincident centers are separated along
+    /// z.
     pub(crate) fn between_cores(core_a: (Vec3, f64), core_b: (Vec3, f64), feature: u64) -> Contact {
         let ((a, radius_a), (b, radius_b)) = (core_a, core_b);
         let offset = a - b;

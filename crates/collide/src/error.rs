@@ -1,16 +1,16 @@
-//! What can be wrong with a shape or a mesh.
+//! Errors of shapes and meshes.
 
 use thiserror::Error;
 
-/// A shape that cannot be built, or a question that it cannot answer.
+/// A shape that cannot be built, or that lacks the requested property.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum ShapeError {
     /// A length that is zero, negative or not finite.
     #[error("{what} is {value}, but must be a finite length above 0 m")]
     Length {
-        /// Which length.
+        /// The name of the length.
         what: &'static str,
-        /// What was given, meters.
+        /// The given value, meters.
         value: f64,
     },
     /// A density that is zero, negative or not finite.
@@ -19,59 +19,61 @@ pub enum ShapeError {
     /// A half-space has no volume, mass or center.
     #[error("a half-space is unbounded and has no mass properties; make the body static")]
     Unbounded,
-    /// A mesh that makes no shape.
+    /// A mesh that cannot be made a shape.
     #[error(transparent)]
     Mesh(#[from] MeshError),
 }
 
-/// A mesh that cannot be read or is no solid. The caller adds the file's name. Vertices and faces count from 1.
+/// A mesh that cannot be read or is not a solid. The caller adds the file name. Vertices and faces
+/// count from 1.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum MeshError {
-    /// An error with the line it was found on.
+    /// An error with the line at which it was found.
     #[error("line {line}: {error}")]
     At {
         /// From 1.
         line: usize,
-        /// What is wrong there.
+        /// The error on this line.
         error: Box<MeshError>,
     },
-    /// Text that cannot be read.
+    /// Text that cannot be parsed.
     #[error("line {line}: {what}")]
     Syntax {
         /// From 1.
         line: usize,
-        /// What was found.
+        /// The text that was found.
         what: String,
     },
-    /// No triangle at all.
+    /// A mesh without triangles.
     #[error("the mesh has no triangles; at least 4 are needed to close a solid")]
     Empty,
-    /// A mesh whose size says that its unit is wrong, if it is not a point.
+    /// A mesh that is a point, or so small that its unit must be wrong.
     #[error("the mesh is {diagonal:e} m across, but must be at least 1e-30 m; is the unit right?")]
     TooSmall {
         /// Diagonal of its bounding box, meters.
         diagonal: f64,
     },
-    /// Only faces without area.
+    /// A mesh all of whose faces have zero area.
     #[error("none of the {faces} triangles has an area; at least 4 are needed to close a solid")]
     Flat {
-        /// How many there are.
+        /// Number of triangles.
         faces: usize,
     },
-    /// A concave face, or all of them together, with more corners than can be cut into triangles in a reasonable time.
+    /// A concave face, or all concave faces together, with more corners than can be triangulated in
+    /// a reasonable time.
     #[error(
         "a concave face of {corners} corners; at most {most}, and fewer where there are many such faces, are cut into triangles: cut it before"
     )]
     Concave {
-        /// How many it has.
+        /// Number of corners of the face.
         corners: usize,
-        /// How many one may have.
+        /// Largest allowed number of corners.
         most: usize,
     },
-    /// What is no PLY file.
+    /// A file that is not PLY.
     #[error("no PLY that can be read: {what}")]
     Ply {
-        /// What was found and where, and what would be right.
+        /// The text that was found, its place, and the expected text.
         what: String,
     },
     /// A vertex that is NaN or infinite.
@@ -86,12 +88,12 @@ pub enum MeshError {
         /// As read.
         z: f64,
     },
-    /// A vertex absurdly far away.
+    /// A vertex too far from the origin.
     #[error("vertex {vertex} has a coordinate of {value:e} m, but at most 1e9 m is taken; is the unit right?")]
     TooFar {
         /// From 1.
         vertex: usize,
-        /// Its greatest coordinate, meters.
+        /// Its largest coordinate, meters.
         value: f64,
     },
     /// A corner of an STL facet that is NaN or infinite.
@@ -106,30 +108,30 @@ pub enum MeshError {
         /// As read.
         z: f64,
     },
-    /// A face that points at a vertex that does not exist.
+    /// A face with the index of a vertex that does not exist.
     #[error("face {face} points at vertex {index}, but there are {count} vertices")]
     IndexOutOfRange {
         /// From 1.
         face: usize,
-        /// As read, counted from 1 (0 or less: before the first).
+        /// As read, counted from 1; 0 or less if it lies before the first vertex.
         index: i64,
-        /// How many vertices there are.
+        /// Number of vertices.
         count: usize,
     },
-    /// A binary STL whose size does not fit the count in its header.
+    /// A binary STL file whose size does not match the count in its header.
     #[error("the STL header announces {count} triangles ({needed} bytes), but the file has {size} bytes")]
     StlSize {
-        /// As announced.
+        /// Number of triangles in the header.
         count: usize,
-        /// Bytes that many triangles take.
+        /// Bytes that this number of triangles needs.
         needed: usize,
-        /// Bytes there are.
+        /// Bytes in the file.
         size: usize,
     },
-    /// Neither text nor binary STL.
+    /// A file that is neither text nor binary STL.
     #[error("no STL: {size} bytes, neither text that begins with `solid` nor a binary header of 84 bytes")]
     StlShort {
-        /// Bytes there are.
+        /// Bytes in the file.
         size: usize,
     },
     /// Edges with a face on one side only.
@@ -138,81 +140,81 @@ pub enum MeshError {
              begins at edge {from}–{to} of face {face}; close it"
     )]
     Open {
-        /// How many such edges there are.
+        /// Number of such edges.
         edges: usize,
-        /// How many loops they form.
+        /// Number of loops that they form.
         holes: usize,
-        /// Edges of the loop with the first such edge.
+        /// Number of edges in the loop of the first such edge.
         first_hole: usize,
-        /// The first such edge.
+        /// First vertex of the first such edge.
         from: u32,
-        /// The first such edge.
+        /// Second vertex of the first such edge.
         to: u32,
-        /// The face it belongs to.
+        /// The face of the first such edge.
         face: usize,
     },
-    /// An edge whose faces do not pair up (a fin, or a Möbius band).
+    /// An edge whose faces do not pair up: a fin, or a Möbius band.
     #[error(
         "edge {from}–{to} of face {face} is shared by {faces} faces that do not pair up ({edges} such edge(s), {open} open edge(s)): \
              remove the dangling face or split the edge"
     )]
     NonManifold {
-        /// How many such edges there are.
+        /// Number of such edges.
         edges: usize,
-        /// How many edges have one face.
+        /// Number of edges with one face.
         open: usize,
-        /// Faces at the first one.
+        /// Number of faces at the first such edge.
         faces: usize,
-        /// The first such edge.
+        /// First vertex of the first such edge.
         from: u32,
-        /// The first such edge.
+        /// Second vertex of the first such edge.
         to: u32,
-        /// The face named: one with an open edge (the fin) where there is one.
+        /// A face at the first such edge: the one with an open edge (the fin) if there is one.
         face: usize,
     },
-    /// A surface that repair makes no solid of.
+    /// A surface that repair cannot make a solid.
     #[error("{error}; repair was asked for, but {why}")]
     BeyondRepair {
-        /// What is wrong with the mesh as it was.
+        /// The error of the original mesh.
         error: Box<MeshError>,
-        /// What kept it from being repaired.
+        /// The reason why it could not be repaired.
         why: String,
     },
-    /// A closed surface around nothing.
+    /// A closed surface without volume.
     #[error("the mesh is closed but encloses no volume ({volume:e} m³); it must be a solid")]
     NoVolume {
-        /// What was found, m³.
+        /// The computed volume, m³.
         volume: f64,
     },
-    /// A lathe profile that makes no solid.
+    /// A lathe profile that does not make a solid.
     #[error("the profile {what}")]
     Profile {
-        /// What is wrong.
+        /// The fault.
         what: String,
     },
-    /// Sphere tree settings out of range.
+    /// Sphere tree or repair settings out of range.
     #[error("{what} is {value}, but must be {allowed}")]
     Settings {
-        /// Which setting.
+        /// The name of the setting.
         what: &'static str,
         /// As given.
         value: f64,
-        /// What would be right.
+        /// The allowed values.
         allowed: &'static str,
     },
-    /// A sphere tree that breaks one of its promises: an error in the builder, never in the data.
+    /// A sphere tree that breaks one of its guarantees: an error of the builder, never of the data.
     #[error("the sphere tree is wrong: {what}")]
     Tree {
-        /// Which promise, and where.
+        /// The broken guarantee and its place.
         what: String,
     },
-    /// A build ended early because its [`Progress`](crate::Progress) asked for it.
+    /// A build that ended early because [`Progress`](crate::Progress) requested it.
     #[error("the build was stopped")]
     Stopped,
 }
 
 impl MeshError {
-    /// The triangle that the error names, from 1 in the order of the mesh as it was given.
+    /// Returns the triangle that the error names, from 1 in the order of the given mesh.
     pub fn face(&self) -> Option<usize> {
         match self {
             MeshError::At { error, .. } | MeshError::BeyondRepair { error, .. } => error.face(),
@@ -224,7 +226,8 @@ impl MeshError {
         }
     }
 
-    /// With the line of the triangle that it names, where `lines` (from [`TriMesh::from_obj_with_lines`]) tells.
+    /// Adds the line of the named triangle, if `lines` (from [`TriMesh::from_obj_with_lines`])
+    /// contains it.
     ///
     /// [`TriMesh::from_obj_with_lines`]: crate::TriMesh::from_obj_with_lines
     pub fn at_line(self, lines: &[usize]) -> MeshError {

@@ -1,13 +1,17 @@
-//! Geometry for tumble: meshes, shapes, sphere trees, broad and narrow phase. Poses in, contacts out.
+//! Geometry: triangle meshes, shapes, sphere trees, broad phase and narrow phase.
 //!
-//! - [`Shape`]: what a body's part is made of; its [`Aabb`], volume and [`MassProperties`].
-//! - [`contacts`]: the narrow phase, one small file per family of pairs; what it says is a [`Contact`].
-//! - [`BroadPhase`]: which pairs are worth asking about.
-//! - [`TriMesh`]: triangle meshes, read from OBJ, PLY and STL, checked, generated, integrated.
-//! - [`SphereTree`]: nested spheres around a mesh, by which it collides.
+//! - [`Shape`]: the geometry of one part of a body, with its [`Aabb`], volume and
+//!   [`MassProperties`].
+//! - [`contacts`]: the narrow phase, with one small file per family of shape pairs. It returns
+//!   [`Contact`]s.
+//! - [`BroadPhase`]: finds the pairs of boxes that overlap.
+//! - [`TriMesh`]: triangle meshes, read from OBJ, PLY and STL, checked, repaired, generated and
+//!   integrated.
+//! - [`SphereTree`]: nested spheres around a mesh, used for collision and level of detail.
 //!
-//! What holds throughout: no velocity and no time here; the same input gives the same bits; nothing that comes from a
-//! file or a user panics; meters, world axes unless a line says otherwise.
+//! Invariants: this crate knows neither velocity nor time. The same input gives the same bits. Data
+//! from files and users never causes a panic. Lengths are in meters and directions in world axes,
+//! unless the item says otherwise.
 //!
 //! ```
 //! use tumble_collide::{Pose, Shape, TreeSettings, TriMesh, contacts};

@@ -1,4 +1,4 @@
-//! Mass properties of the primitives, closed forms.
+//! Mass properties of the primitives in closed form.
 //!
 //! | symbol | meaning |
 //! |---|---|
@@ -21,12 +21,13 @@ pub struct MassProperties {
 }
 
 impl MassProperties {
-    /// The same solid seen with mass and inertia scaled to a total of `mass` kg.
+    /// Returns the properties scaled to a total mass of `mass` kg.
     pub fn with_mass(&self, mass: f64) -> MassProperties {
         MassProperties { mass, inertia: self.inertia * (mass / self.mass), ..*self }
     }
 
-    /// Inertia about another point of the same frame: `I + m (|d|² 1 − d dᵀ)`, the parallel-axis theorem.
+    /// Returns the inertia about another point of the same frame: `I + m (|d|² 1 − d dᵀ)`, the
+    /// parallel-axis theorem.
     pub fn inertia_about(&self, point: &Vec3) -> Mat3 {
         let d = self.center_of_mass - point;
         self.inertia + self.mass * (Mat3::identity() * d.norm_squared() - d * d.transpose())
@@ -57,7 +58,8 @@ pub(crate) fn cylinder(radius: f64, half_length: f64, density: f64) -> MassPrope
     MassProperties::centered(mass, Vec3::new(across, across, mass * radius * radius / 2.0))
 }
 
-/// A cylinder and two half spheres, whose centers of mass stand `3/8 r` outside the cylinder's ends.
+/// A cylinder and two hemispheres, whose centers of mass lie `3/8 r` outside the ends of the
+/// cylinder.
 pub(crate) fn capsule(radius: f64, half_length: f64, density: f64) -> MassProperties {
     let tube = cylinder(radius, half_length, density);
     let sphere = sphere(radius, density);

@@ -1,6 +1,6 @@
-//! The few linear-algebra names that every crate above shares.
+//! The linear algebra types that all crates share.
 
-/// A vector in three dimensions; frame and unit are said where it is used.
+/// A vector in three dimensions. Frame and unit are stated at its use.
 pub type Vec3 = nalgebra::Vector3<f64>;
 /// A 3×3 matrix.
 pub type Mat3 = nalgebra::Matrix3<f64>;
@@ -19,19 +19,19 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// Whether the two boxes share a point (touching counts).
+    /// Returns whether the two boxes share a point; touching counts.
     pub fn overlaps(&self, other: &Aabb) -> bool {
         (0..3).all(|k| self.min[k] <= other.max[k] && other.min[k] <= self.max[k])
     }
 
-    /// The box grown by `margin` meters on every side.
+    /// Returns the box grown by `margin` meters on every side.
     pub fn grown(&self, margin: f64) -> Aabb {
         Aabb { min: self.min.add_scalar(-margin), max: self.max.add_scalar(margin) }
     }
 }
 
 impl Aabb {
-    /// The least box around points; empty (`min = +∞ > max = −∞`) if there are none.
+    /// Returns the smallest box around points; empty (`min = +∞ > max = −∞`) for no points.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Aabb {
         let empty = Aabb { min: Vec3::repeat(f64::INFINITY), max: Vec3::repeat(f64::NEG_INFINITY) };
         points.into_iter().fold(empty, |b, p| Aabb { min: b.min.inf(&p), max: b.max.sup(&p) })

@@ -1,14 +1,16 @@
-//! Where a ray enters a shape: what a pointer points at.
+//! Ray casts against shapes.
 //!
-//! In the shape's frame the ray is `o + t·d`, `|d| = 1`. A sphere: `t² + 2 t o·d + o² − r² = 0`. A slab `|x| ≤ h` is entered and left at `(∓h − o)/d`; a box is
-//! inside while all its slabs are (Kay and Kajiya, 1986). The side of a tube is a sphere in the two dimensions across its axis. Triangles by Möller and
-//! Trumbore, 1997: of a solid from outside only, of a bare mesh from either side.
+//! In the frame of the shape the ray is `o + t·d`, `|d| = 1`. Sphere: `t² + 2 t o·d + o² − r² = 0`.
+//! A slab `|x| ≤ h` is entered and left at `(∓h − o)/d`; a point is inside a box if it is inside
+//! all slabs (Kay and Kajiya, 1986). The side of a cylinder is a sphere in the two dimensions
+//! across its axis. Triangles: Möller and Trumbore (1997), of a solid from outside only, of a mesh
+//! from either side.
 
 use crate::{Pose, Shape, TriMesh, Vec3};
 
 impl Shape {
-    /// The distance along `direction` (any length above 0) at which a ray from `origin` enters the shape at `pose`, meters; world axes. `None` where it
-    /// misses, or starts inside.
+    /// Returns the distance along `direction` (any length above 0) at which a ray from `origin`
+    /// enters the shape at `pose`, meters; world axes. `None` if it misses or starts inside.
     pub fn ray(&self, pose: &Pose, origin: &Vec3, direction: &Vec3) -> Option<f64> {
         let d = pose.rotation.inverse() * direction.try_normalize(0.0)?;
         let o = pose.rotation.inverse() * (origin - pose.translation.vector);
@@ -30,7 +32,7 @@ impl Shape {
                 side.into_iter().chain(cap).min_by(f64::total_cmp)
             }
             Shape::Mesh(mesh) => {
-                // what passes the sphere around it by misses it
+                // a ray that misses the bounding sphere misses the mesh
                 let near = o - d * o.dot(&d);
                 if near.norm() > mesh.bounding_radius() { None } else { triangles(mesh.mesh(), &o, &d, 0.0) }
             }
@@ -39,8 +41,8 @@ impl Shape {
 }
 
 impl TriMesh {
-    /// The distance along `direction` (any length above 0) at which a ray from `origin` first meets a triangle of the mesh at `pose`, from either side,
-    /// meters; world axes.
+    /// Returns the distance along `direction` (any length above 0) at which a ray from `origin`
+    /// first hits a triangle of the mesh at `pose`, from either side, meters; world axes.
     pub fn ray(&self, pose: &Pose, origin: &Vec3, direction: &Vec3) -> Option<f64> {
         let d = pose.rotation.inverse() * direction.try_normalize(0.0)?;
         let o = pose.rotation.inverse() * (origin - pose.translation.vector);
@@ -49,13 +51,14 @@ impl TriMesh {
 }
 
 fn sphere(o: &Vec3, d: &Vec3, radius: f64) -> Option<f64> {
-    // from the point of the ray that is nearest, so that far spheres keep their digits
+    // measured from the point of the ray nearest to the center, so that distant spheres keep their
+    // digits
     let along = -o.dot(d);
     let left = radius * radius - (o + d * along).norm_squared();
     (left >= 0.0).then(|| along - left.sqrt()).filter(|t| *t >= 0.0)
 }
 
-/// The side of an endless tube about z.
+/// The side of an infinite cylinder about z.
 fn tube(o: &Vec3, d: &Vec3, radius: f64) -> Option<f64> {
     let across = d.xy().norm();
     if across == 0.0 {
@@ -80,7 +83,7 @@ fn slabs(o: &Vec3, d: &Vec3, half: &Vec3) -> Option<f64> {
     (enter >= 0.0 && enter <= leave).then_some(enter)
 }
 
-/// Triangles whose volume with the ray is at most `least` are met from behind and left out.
+/// Skips triangles whose signed volume with the ray is at most `least`: they are hit from behind.
 fn triangles(mesh: &TriMesh, o: &Vec3, d: &Vec3, least: f64) -> Option<f64> {
     let hit = |t: usize| {
         let [a, b, c] = mesh.corners(t);

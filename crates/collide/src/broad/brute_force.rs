@@ -1,9 +1,9 @@
-//! Every pair, one by one: O(n²), and the oracle that the others are tested against.
+//! Brute-force broad phase: compares all pairs, O(n²). The reference for the tests of the others.
 
 use super::BroadPhase;
 use crate::Aabb;
 
-/// Compares every box with every other.
+/// Compares every box with every other box.
 #[derive(Clone, Debug, Default)]
 pub struct BruteForce {
     boxes: Vec<Option<(Aabb, bool)>>,

@@ -1,50 +1,53 @@
-//! Space in cells of a few dozen boxes, each swept by itself.
+//! A spatial tree whose cells hold a few dozen boxes, each swept by itself.
 //!
-//! A tree of planes across the axes cuts space where boxes are many, so that cells suit boxes of any size and any crowd; a box is filed
-//! in every cell that it reaches. Two boxes are a pair of one cell alone, the one that holds the least corner of what they share:
+//! Axis-aligned planes divide space where boxes are dense, so cells suit boxes of any size and
+//! density. A box is stored in every cell that it intersects. A pair of boxes is reported by one
+//! cell only, the one that contains the lowest corner of their intersection:
 //!
 //! ```text
-//! corner_k = max(min_k of a, min_k of b)        low side of a cut if corner < at, else high side
+//! corner_k = max(min_k of a, min_k of b)        low side of a split if corner < at, else high side
 //! ```
 //!
-//! A box that reaches all of space lies in every cell, about one entry per twenty of the boxes that it overlaps: what is found costs more.
-//! Source of the sweep: Baraff, *Dynamic Simulation of Non-Penetrating Rigid Bodies* (1992), §6. Departure: sweeps within cells, because along
-//! one axis of a cube n boxes begin within each other n^(5/3) times.
+//! A box that covers all of space is stored in every cell: about one entry per twenty boxes that it
+//! overlaps, fewer than the pairs. Source of the sweep: Baraff, *Dynamic Simulation of
+//! Non-Penetrating Rigid Bodies* (1992), §6. Departure: the sweep runs within cells, because n
+//! boxes in a cube overlap n^(5/3) times along one axis.
 
 use super::fat::{FatBox, pair};
 
-/// A cell is cut when it holds more.
+/// Number of boxes above which a cell is split.
 const CELL_CAPACITY: usize = 72;
-/// A cut must leave either side with at most this share of the boxes, in percent.
+/// Maximum percentage of the boxes on either side of a split.
 const MAX_SIDE_PERCENT: usize = 80;
-/// Centers that are looked at to place a cut.
+/// Maximum number of box centers that place a split.
 const MAX_SAMPLES: usize = 32;
-/// A tree is not cut deeper.
+/// Maximum depth of the tree.
 const MAX_DEPTH: u32 = 40;
 
-/// A place in the tree.
+/// A node of the tree.
 #[derive(Clone, Copy, Debug)]
 enum Node {
-    /// The low side is node `low`, the high side the one after it.
+    /// The low side is node `low`, the high side the next node.
     Split { axis: u8, at: f32, low: u32 },
     /// Index of a cell.
     Cell(u32),
 }
 
-/// A box and whose it is.
+/// A box and its handle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
     pub fat: FatBox,
     pub handle: u32,
 }
 
-/// Boxes that reach one region, and their handles, in no order.
+/// Boxes that intersect one region, and their handles, unordered.
 #[derive(Clone, Debug)]
 struct Cell {
     region: FatBox,
     boxes: Vec<FatBox>,
     handles: Vec<u32>,
-    /// It is cut when it holds more: more than [`CELL_CAPACITY`] where that was tried in vain.
+    /// Number of boxes above which the cell is split; above [`CELL_CAPACITY`] after a failed
+    /// attempt.
     limit: usize,
     depth: u32,
 }
@@ -54,18 +57,18 @@ struct Cell {
 pub(super) struct Cells {
     nodes: Vec<Node>,
     cells: Vec<Cell>,
-    /// Cells when it was built; those cut since.
+    /// Number of cells when the tree was built, and of splits since.
     built: usize,
     splits: usize,
     /// A cell of each box, by handle; a hint.
     cell_hints: Vec<u32>,
-    /// Working memory.
+    /// Scratch memory.
     buffer: Vec<Entry>,
     places: Vec<(u32, bool, bool)>,
 }
 
 impl Cells {
-    /// Files all boxes anew, and adds all pairs of them.
+    /// Stores all boxes and appends all their pairs.
     pub fn build(&mut self, entries: impl Iterator<Item = Entry>, pairs: &mut Vec<u64>) {
         let mut buffer = std::mem::take(&mut self.buffer);
         buffer.clear();
@@ -86,17 +89,18 @@ impl Cells {
         (self.built, self.splits, self.buffer) = (self.cells.len(), 0, buffer);
     }
 
-    /// A cell where a box was last seen: boxes that are refiled in this order meet cells that others have just met.
+    /// Returns a cell in which the box was stored last. Updates in the order of these cells access
+    /// memory coherently.
     pub fn cell_hint(&self, handle: u32) -> u32 {
         self.cell_hints.get(handle as usize).copied().unwrap_or(0)
     }
 
-    /// Whether so many cells were cut one by one that the tree may lean.
+    /// Returns whether so many cells were split one by one that the tree may be unbalanced.
     pub fn needs_rebuild(&self) -> bool {
         self.splits > self.built / 2 + 8
     }
 
-    /// Files one box anew, that was `old`, and tells every other that it meets.
+    /// Moves one box from `old` to `new` and calls `met` for every box that it overlaps.
     pub fn update(&mut self, handle: u32, old: &FatBox, new: &FatBox, mut met: impl FnMut(u32)) {
         self.cell_hints.resize(self.cell_hints.len().max(handle as usize + 1), 0);
         let mut places = std::mem::take(&mut self.places);
@@ -127,7 +131,7 @@ impl Cells {
         self.places = places;
     }
 
-    /// Cuts a cell that has grown too full, where it stands.
+    /// Splits a cell with too many boxes.
     fn split_cell(&mut self, node: u32, index: u32) {
         let cell = &mut self.cells[index as usize];
         let (boxes, handles, region, depth) =
@@ -141,7 +145,8 @@ impl Cells {
         self.buffer = buffer;
     }
 
-    /// Makes of a node whatever suits the boxes of `buffer` from `from` on, what lies before is not touched; and shows every new cell.
+    /// Replaces a node by the subtree of the boxes in `buffer[from..]` and calls `visit` for every
+    /// new cell. Entries before `from` are not touched.
     fn subdivide(
         &mut self,
         node: usize,
@@ -179,7 +184,8 @@ impl Cells {
 }
 
 impl Cell {
-    /// Forgets a box that `was_here` here, tells whom the new one meets here, and takes that in.
+    /// Removes a box if it `was_here`, calls `met` for the boxes that the new one overlaps here,
+    /// and stores it.
     fn update(&mut self, handle: u32, was_here: bool, new: Option<&FatBox>, met: &mut impl FnMut(u32)) {
         let place = if was_here { self.handles.iter().position(|h| *h == handle) } else { None };
         if let Some(place) = place {
@@ -198,7 +204,7 @@ impl Cell {
         }
     }
 
-    /// All pairs of a cell of these boxes, which are sorted for it.
+    /// Appends all pairs of the boxes of a cell, which are sorted for it.
     fn sweep(region: &FatBox, entries: &mut [Entry], pairs: &mut Vec<u64>) {
         let axis = axes(entries)[0].1;
         entries.sort_unstable_by(|a, b| a.fat.min(axis).total_cmp(&b.fat.min(axis)));
@@ -213,7 +219,8 @@ impl Cell {
     }
 }
 
-/// Whether the least corner of what two boxes share lies in a region (its high sides do not count, but where they are infinite).
+/// Returns whether the lowest corner of the intersection of two boxes lies in a region. The high
+/// sides of the region are excluded unless infinite.
 fn owns_pair(region: &FatBox, a: &FatBox, b: &FatBox) -> bool {
     (0..3).all(|k| {
         let corner = a.min(k).max(b.min(k));
@@ -221,7 +228,8 @@ fn owns_pair(region: &FatBox, a: &FatBox, b: &FatBox) -> bool {
     })
 }
 
-/// An axis and a place on it that part the boxes well: the median of a sample of their centers, on the widest axis where that is worth it.
+/// Returns an axis and a coordinate that split the boxes well: the median of a sample of their
+/// centers, on the widest axis on which that is worthwhile.
 fn find_split(entries: &[Entry]) -> Option<(usize, f32)> {
     let most = entries.len() * MAX_SIDE_PERCENT / 100;
     axes(entries).into_iter().find_map(|(_, axis)| {
@@ -240,7 +248,7 @@ fn find_split(entries: &[Entry]) -> Option<(usize, f32)> {
     })
 }
 
-/// How far apart the centers are, and on which axis; the widest first.
+/// Returns the extent of the centers on each axis, widest first.
 fn axes(entries: &[Entry]) -> [(f32, usize); 3] {
     let mut widths = [0, 1, 2].map(|axis| {
         let bounds = |(low, high): (f32, f32), x: f32| (low.min(x), high.max(x));
@@ -251,7 +259,8 @@ fn axes(entries: &[Entry]) -> [(f32, usize); 3] {
     widths
 }
 
-/// Centers of up to [`MAX_SAMPLES`] boxes, evenly from the list; without those of unbounded ones.
+/// Returns the centers of up to [`MAX_SAMPLES`] boxes, evenly spaced in the list, without those of
+/// unbounded boxes.
 fn sample(entries: &[Entry], axis: usize) -> impl Iterator<Item = f32> {
     let every = entries.len().div_ceil(MAX_SAMPLES).max(1);
     entries.iter().step_by(every).map(move |e| 0.5 * e.fat.min(axis) + 0.5 * e.fat.max(axis)).filter(|x| x.is_finite())

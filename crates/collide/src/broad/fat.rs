@@ -1,22 +1,23 @@
-//! Fat boxes: what the cells file. A box may move inside its fat box and nobody need be told.
+//! Fat boxes: the boxes that the cells store. A box can move inside its fat box without an update.
 
 use crate::Aabb;
 
-/// A box in `f32`, rounded outwards (meters, world axes), and whether it moves, as eight numbers that are compared at once:
+/// A box in `f32`, rounded outwards (meters, world axes), with a flag for moving bodies, as eight
+/// numbers that are compared at once:
 ///
 /// ```text
 /// box      min x, y, z   −max x, y, z   0 if it moves, else 1    0
-/// seeker   max x, y, z   −min x, y, z   1 if it moves, else 0    0         a pair: box ≤ seeker, number by number
+/// query    max x, y, z   −min x, y, z   1 if it moves, else 0    0         a pair: box ≤ query, number by number
 /// ```
 ///
-/// A box whose sides are not numbers is nowhere: it meets nothing.
+/// A box with a side that is not a number overlaps nothing.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FatBox([f32; 8]);
 
-/// How much of the room is shifted ahead.
+/// Fraction of the margin by which the box is shifted ahead.
 const MOTION_SHIFT: f64 = 0.5;
 
-/// A fat box as it looks for others.
+/// The other operand of [`FatBox::overlaps`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OverlapQuery([f32; 8]);
 
@@ -24,15 +25,16 @@ impl FatBox {
     pub const EMPTY: FatBox = FatBox([f32::NAN; 8]);
     pub const UNBOUNDED: FatBox = FatBox([f32::NEG_INFINITY; 8]);
 
-    /// The box with room to move by `share` of its smallest extent in every direction, of which part is shifted to the side on which it
-    /// left an `old` fat box: what has moved that way may well go on.
+    /// Returns the box with a margin of `share` of its smallest extent in every direction. Part of
+    /// the margin is shifted to the side on which the box left its `old` fat box, since the motion
+    /// probably continues.
     pub fn around(tight: &Aabb, share: f64, moving: bool, old: &FatBox) -> FatBox {
         let extent = tight.max - tight.min;
         let smallest = extent.x.min(extent.y).min(extent.z);
         let margin = if smallest.is_finite() { share * smallest } else { 0.0 };
         let side = |k: usize| {
             let displacement = 0.5 * (tight.min[k] + tight.max[k] - f64::from(old.min(k)) - f64::from(old.max(k)));
-            // false for what is not a number
+            // false if not a number
             let shift = if displacement.abs() < 4.0 * margin {
                 (MOTION_SHIFT * displacement).clamp(-MOTION_SHIFT * margin, MOTION_SHIFT * margin)
             } else {
@@ -44,7 +46,7 @@ impl FatBox {
         FatBox([x.0, y.0, z.0, x.1, y.1, z.1, if moving { 0.0 } else { 1.0 }, 0.0])
     }
 
-    /// Whether the box lies inside.
+    /// Returns whether the box lies inside.
     pub fn contains(&self, tight: &Aabb) -> bool {
         let side = |k: usize| (f64::from(self.min(k)) <= tight.min[k]) & (tight.max[k] <= f64::from(self.max(k)));
         side(0) & side(1) & side(2)
@@ -59,7 +61,8 @@ impl FatBox {
         OverlapQuery([-d, -e, -f, -a, -b, -c, 1.0 - still, 0.0])
     }
 
-    /// Whether the two share a point and one of them moves. No branches: eight comparisons cost less than one that is guessed wrong.
+    /// Returns whether the two share a point and one of them moves. Branch-free: eight comparisons
+    /// cost less than one misprediction.
     #[inline(always)]
     pub fn overlaps(&self, overlap_query: &OverlapQuery) -> bool {
         self.0.iter().zip(&overlap_query.0).fold(true, |all, (a, b)| all & (a <= b))
@@ -73,7 +76,7 @@ impl FatBox {
         -self.0[axis + 3]
     }
 
-    /// The parts of it to either side of a plane.
+    /// Returns the parts on either side of a plane.
     pub fn split(&self, axis: usize, at: f32) -> [FatBox; 2] {
         let (mut low, mut high) = (*self, *self);
         (low.0[axis + 3], high.0[axis]) = (-at, at);
@@ -81,17 +84,18 @@ impl FatBox {
     }
 }
 
-/// A box in `f32`, rounded to the nearest, in the order of [`FatBox`]: half as much to read, and most pairs are told by it. Rounding keeps order: where
-/// the rounded sides differ, the sides do too, and in the same sense.
+/// A box in `f32`, rounded to nearest, in the layout of [`FatBox`]: half the memory, and sufficient
+/// for most pairs. Rounding is monotonic, so if two rounded sides differ, the exact sides differ in
+/// the same sense.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rounded([f32; 8]);
 
-/// What the rounded boxes know.
+/// The result of a comparison of rounded boxes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum RoundedOverlap {
     No,
     Yes,
-    /// Sides that are equal but for rounding.
+    /// Some sides are equal after rounding.
     Uncertain,
 }
 
@@ -101,7 +105,7 @@ impl Rounded {
         Rounded([min.x, min.y, min.z, max.x, max.y, max.z, -1.0, -1.0])
     }
 
-    /// Whether the boxes share a point.
+    /// Returns whether the boxes share a point.
     #[inline(always)]
     pub fn overlaps(&self, other: &Rounded) -> RoundedOverlap {
         let [a, b, c, d, e, f, g, h] = other.0;
@@ -118,12 +122,13 @@ impl Rounded {
     }
 }
 
-/// A pair as one number, the lesser handle first: ascending numbers are ascending pairs.
+/// Returns a pair as one number, smaller handle first; the order of the numbers is the order of the
+/// pairs.
 pub(super) fn pair(a: u32, b: u32) -> u64 {
     u64::from(a.min(b)) << 32 | u64::from(a.max(b))
 }
 
-/// The greatest `f32` not above `x`.
+/// Returns the greatest `f32` not above `x`.
 fn down(x: f64) -> f32 {
     let near = x as f32;
     if f64::from(near) > x { near.next_down() } else { near }

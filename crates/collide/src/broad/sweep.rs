@@ -1,27 +1,29 @@
-//! Sweep and prune that uses coherence: what has not moved much is not looked at again.
+//! Sweep and prune with temporal coherence: boxes that moved little are not processed again.
 //!
-//! | list | holds | changes |
+//! | list | content | updated |
 //! |---|---|---|
-//! | `tight` | the boxes as they were given, and `rounded` the same in short | when they are set |
-//! | `fat` | each box with some room around it | when the box has left it |
-//! | `cells` | space in cells, each with the fat boxes that reach it ([`Cells`]) | with the fat boxes |
-//! | `candidates` | the pairs of fat boxes that overlap | with the fat boxes |
+//! | `tight` | the boxes as given, and `rounded` in single precision | on every `set` |
+//! | `fat` | each box with a margin | if the box left it |
+//! | `cells` | space in cells, each with the fat boxes that intersect it ([`Cells`]) | with the fat boxes |
+//! | `candidates` | the overlapping pairs of fat boxes | with the fat boxes |
 //!
-//! Every pair of boxes that overlap is a pair of fat boxes that do, so the answer is `candidates`, each pair compared by its tight boxes: linear
-//! in the boxes that are set and in what is near. A box that left its fat box is filed anew, and meets what lies in its cells.
-//! If many have, all cells are made anew and swept: near O(n) too, as a cell holds a few dozen boxes.
+//! If two boxes overlap, their fat boxes do. So the result is the candidates whose tight boxes
+//! overlap: linear in the number of set boxes and of candidates. A box that left its fat box is
+//! stored again and compared with the boxes of its cells. If many have, all cells are rebuilt and
+//! swept: nearly O(n), as a cell holds a few dozen boxes.
 //!
-//! Boxes that are not set cost nothing. What is remembered changes the speed alone, never the answer.
-//! Sources: Baraff, *Dynamic Simulation of Non-Penetrating Rigid Bodies* (1992), §6, for coherence; fat boxes go back to Verlet's neighbor lists (1967).
+//! Boxes that are not set cost nothing. The stored state affects the speed only, never the result.
+//! Sources: Baraff, *Dynamic Simulation of Non-Penetrating Rigid Bodies* (1992), §6, for coherence;
+//! fat boxes go back to Verlet's neighbor lists (1967).
 
 use super::cells::{Cells, Entry};
 use super::fat::{FatBox, Rounded, RoundedOverlap, pair};
 use super::{BroadPhase, EMPTY, sanitized};
 use crate::Aabb;
 
-/// Room of a fat box in every direction, as a share of the box's smallest extent.
+/// Margin of a fat box in every direction, as a fraction of the box's smallest extent.
 const MARGIN: f64 = 0.1;
-/// Everything is filed anew when one box in so many has left its fat box.
+/// All boxes are processed again if more than one in this number left its fat box.
 const REBUILD_DIVISOR: usize = 4;
 
 /// The default broad phase.
@@ -31,24 +33,24 @@ pub struct SweepAndPrune {
     rounded: Vec<Rounded>,
     fat: Vec<FatBox>,
     state: Vec<State>,
-    /// Boxes to be filed anew.
+    /// Boxes to store again.
     changed: Vec<u32>,
-    /// Handles that no box has, and how many boxes there are.
+    /// Unused handles, and the number of boxes.
     free: Vec<u32>,
     count: usize,
     cells: Cells,
-    /// Ascending, as [`pair`] writes them.
+    /// Ascending, encoded by [`pair`].
     candidates: Vec<u64>,
-    /// Working memory.
+    /// Scratch memory.
     new_pairs: Vec<u64>,
 }
 
-/// What else is known of a handle.
+/// State of a handle.
 #[derive(Clone, Copy, Debug, Default)]
 struct State {
     in_use: bool,
     moving: bool,
-    /// It is among those changed.
+    /// Whether the box is in `changed`.
     changed: bool,
 }
 
@@ -103,7 +105,7 @@ impl BroadPhase for SweepAndPrune {
 }
 
 impl SweepAndPrune {
-    /// Fat boxes, cells and near pairs of everything.
+    /// Rebuilds fat boxes, cells and candidates.
     fn rebuild(&mut self) {
         self.changed.clear();
         self.state.iter_mut().for_each(|s| s.changed = false);
@@ -116,7 +118,8 @@ impl SweepAndPrune {
         self.candidates.sort_unstable();
     }
 
-    /// The near pairs that overlap indeed. Every pair is written and only then counted or not: whether they do is anybody's guess.
+    /// Writes the candidates whose boxes overlap. Every pair is written and counted only if it
+    /// overlaps, as the outcome is unpredictable for a branch.
     fn compare(&self, out: &mut Vec<[u32; 2]>) {
         out.clear();
         out.resize(self.candidates.len(), [0; 2]);
@@ -134,7 +137,8 @@ impl SweepAndPrune {
         out.truncate(count);
     }
 
-    /// The same, where only the changed boxes have to be looked at. A box is told of those that were filed before it.
+    /// Updates the candidates of the changed boxes only. A box is compared with those stored before
+    /// it.
     fn update_changed(&mut self) {
         let SweepAndPrune { tight, fat, state, changed, cells, candidates, new_pairs, .. } = self;
         let mut count = 0;
@@ -163,7 +167,7 @@ impl SweepAndPrune {
     }
 }
 
-/// Works `new_pairs` into `list`; both ascend.
+/// Merges `new_pairs` into `list`; both are ascending.
 fn merge(list: &mut Vec<u64>, new_pairs: &[u64]) {
     let mut from = list.len();
     list.resize(list.len() + new_pairs.len(), 0);

@@ -1,11 +1,11 @@
-//! What every builder does: a job in, nested cells and an account of the stages out.
+//! The interface of all tree builders: a job in, nested cells and stage counts out.
 
 use super::TreeSettings;
 use super::sphere::Sphere;
 use crate::{MeshDistance, MeshError, TriMesh};
 use serde::{Deserialize, Serialize};
 
-/// What a builder works on.
+/// The input of a builder.
 pub(super) struct Job<'a> {
     /// Closed, outward-wound.
     pub mesh: &'a TriMesh,
@@ -14,54 +14,56 @@ pub(super) struct Job<'a> {
     pub progress: &'a dyn Progress,
 }
 
-/// A method of building: one file (or folder) each.
+/// A build method; each has its own file or folder.
 pub(super) trait TreeBuilder {
-    /// Nested cells whose spheres cover the surface; the spheres of inner cells are made later, around their children.
+    /// Returns nested cells whose spheres cover the surface. The spheres of inner cells are fitted
+    /// later, around their children.
     fn build(&self, job: &Job) -> Result<Built, MeshError>;
 }
 
-/// What a builder hands over.
+/// The output of a builder.
 pub(super) struct Built {
     pub root: Cell,
     pub stages: Vec<StageCount>,
 }
 
-/// Nested cells, whose leaves have their spheres.
+/// Nested cells. Leaves have their spheres.
 pub(super) enum Cell {
     Leaf(Sphere),
     Inner(Vec<Cell>),
 }
 
-/// Hears how far a build is, and can end it; called from any thread that works on the build.
+/// Receives the progress of a build and can stop it. Called from any thread that works on the
+/// build.
 pub trait Progress: Sync {
-    /// `share` of the work is done, 0 to 1; does not fall.
+    /// Reports that the fraction `share` of the work is done, 0 to 1; never decreases.
     fn report(&self, share: f64);
 
-    /// Whether the build shall end early, with [`MeshError::Stopped`]. Asked in every long loop; a build that runs to its end does not
-    /// depend on it.
+    /// Returns whether the build should end early with [`MeshError::Stopped`]. Polled in every long
+    /// loop. The result of a build that is not stopped does not depend on it.
     fn stopped(&self) -> bool {
         false
     }
 }
 
-/// [`MeshError::Stopped`] where the build shall end early.
+/// Returns [`MeshError::Stopped`] if the build should end early.
 pub(super) fn check_stopped(progress: &dyn Progress) -> Result<(), MeshError> {
     if progress.stopped() { Err(MeshError::Stopped) } else { Ok(()) }
 }
 
-/// Nobody listens.
+/// Ignores all reports.
 impl Progress for () {
     fn report(&self, _share: f64) {}
 }
 
-/// How often a stage of a builder did its work at one level.
+/// A count of one stage of a builder at one level.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StageCount {
-    /// Level of the spheres that were made, the root being 0.
+    /// Level of the spheres that were made; 0 for the root.
     pub level: u32,
-    /// The stage, in the words of the builder's file.
+    /// Name of the stage, as in the file of the builder.
     pub stage: String,
-    /// How many.
+    /// The count.
     pub count: u64,
 }

@@ -1,9 +1,9 @@
-//! A tree as bytes, for the cache of shapes.
+//! Binary encoding of a tree, for the cache of shapes.
 
 use super::{SphereNode, SphereTree};
 use crate::bytes::{Reader, Write};
 
-/// Levels of a tree that is read, at most.
+/// Maximum number of levels of a tree that is read.
 const MAX_LEVELS: u32 = 64;
 
 impl SphereTree {
@@ -16,10 +16,10 @@ impl SphereTree {
         });
     }
 
-    /// `None` where it is no tree of nested spheres.
+    /// Returns `None` unless the bytes are a tree of nested spheres.
     pub(crate) fn read(from: &mut Reader) -> Option<SphereTree> {
         let mut nodes = from.list(read_node)?;
-        // breadth first: the children of each follow those of the one before
+        // breadth first: the children of each node follow those of the node before it
         let mut next = 1.min(nodes.len());
         for n in 0..nodes.len() {
             let first = if nodes[n].children == 0 { 0 } else { next as u32 };

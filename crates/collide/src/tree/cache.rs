@@ -1,35 +1,36 @@
-//! Trees from the cache: the same bits as a build, without the work.
+//! Sphere trees from the cache: the same bits as a build, without the work.
 
 use super::{MeshId, Progress, SphereTree, StageCount, TreeFile, TreeSettings};
 use crate::cache::{Entry, Kind, TreeCache};
 use crate::{MeshError, TriMesh};
 
-/// A tree, and where it came from.
+/// A tree from the cache or from a build.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CachedTree {
-    /// The same bits, however it came.
+    /// The tree. Its bits do not depend on its origin.
     pub tree: SphereTree,
-    /// What the builder's stages did when it was built.
+    /// Counts of the builder's stages, from the original build.
     pub stages: Vec<StageCount>,
-    /// Whether it was there.
+    /// Whether the tree was in the cache.
     pub found: bool,
-    /// What is to be said of the cache: a file that was not to be trusted, a folder that cannot be written.
+    /// A warning about the cache: an invalid file, or a folder that cannot be written.
     pub note: Option<String>,
 }
 
 impl SphereTree {
-    /// [`SphereTree::build`], or the tree that was built before of the same content and settings.
+    /// Returns the cached tree of the same mesh and settings, or else builds and stores it.
     ///
     /// # Errors
-    /// Those of the build; none of the cache.
+    /// Those of [`SphereTree::build`]. Faults of the cache are not errors; see
+    /// [`CachedTree::note`].
     pub fn build_cached(mesh: &TriMesh, settings: &TreeSettings, cache: &TreeCache) -> Result<CachedTree, MeshError> {
         SphereTree::build_cached_with_progress(mesh, settings, cache, &())
     }
 
-    /// The same, told how far it is.
+    /// Like [`SphereTree::build_cached`], with progress reports.
     ///
     /// # Errors
-    /// As [`SphereTree::build_cached`].
+    /// As [`SphereTree::build_cached`]; [`MeshError::Stopped`] if `progress` requests it.
     pub fn build_cached_with_progress(
         mesh: &TriMesh,
         settings: &TreeSettings,

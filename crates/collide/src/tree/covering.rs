@@ -1,16 +1,19 @@
-//! Spheres around a surface, one more at a time.
+//! A cover of a surface by spheres, refined one sphere at a time.
 //!
-//! The surface is split into small pieces of triangles. Each piece belongs to one sphere, which holds it: a piece lies in a sphere iff its corners do. So the spheres
-//! cover the surface at all times, whatever is done to them. What a sphere about `c` with the pieces `P` needs to reach outside the solid is at most
+//! The surface is split into small pieces of triangles. Each piece belongs to one sphere, which
+//! contains it: a piece lies in a sphere iff its corners do. So the spheres cover the surface at
+//! all times. A sphere about `c` with the pieces `P` extends outside the solid by at most
 //!
 //! ```text
 //! need(c, P) = max over the corners p of P of |p − c| + s(c)
 //! ```
 //!
-//! `s` the signed distance of the center, negative inside. [`Covering::refine`] divides the sphere of the greatest need into two: at the middle of its pieces, across
-//! their principal and some other axes, and the two spheres of the way that comes out best choose their pieces anew and are fitted again. Either half has no greater need than the whole,
-//! as the old sphere would do for both. So the greatest need never rises with the number of spheres. [`Covering::suggest`] takes centers from elsewhere, such as a
-//! tree's, where they do better.
+//! where `s` is the signed distance of the center, negative inside. [`Covering::refine`] divides
+//! the sphere of the greatest need into two, at the mean of its pieces, across their principal axes
+//! and some others. The two spheres of the best division select their pieces again and are fitted
+//! again. Neither half has a greater need than the whole, as the old sphere would contain both. So
+//! the greatest need never increases with the number of spheres. [`Covering::suggest`] uses centers
+//! from elsewhere, such as those of a tree, if they are better.
 
 use super::grow_to_cover::halves_of;
 use super::nelder_mead::nelder_mead;
@@ -19,26 +22,28 @@ use crate::{Mat3, MeshDistance, TriMesh, Vec3};
 use nalgebra::SymmetricEigen;
 use rayon::prelude::*;
 
-/// Pieces that the surface is split into at first.
+/// Number of pieces that the surface is split into initially.
 const INITIAL_PIECES: usize = 4000;
-/// Pieces in all.
+/// Maximum number of pieces.
 const MAX_PIECES: usize = 4_000_000;
-/// A sphere of fewer pieces has them halved before it is divided; all together have as many times the spheres before centers from elsewhere are looked at.
+/// The pieces of a sphere with fewer are halved before the sphere is divided. Suggested centers are
+/// tried only with this many pieces per center.
 const MIN_SPHERE_PIECES: usize = 100;
-/// Pieces of a sphere that is to be divided are halved until none is longer than this part of its radius, or they are so many.
+/// The pieces of a sphere that is to be divided are halved until none is longer than this fraction
+/// of its radius, or until there are `MAX_SPHERE_PIECES`.
 const PIECE_SIZE: f64 = 0.2;
 const MAX_SPHERE_PIECES: usize = 2000;
-/// Ways of dividing whose spheres are fitted, the most promising by boxes.
+/// Number of divisions whose spheres are fitted, the best by bounding boxes.
 const FITTED_SPLITS: usize = 2;
-/// Pieces smaller than this part of the diagonal are not halved.
+/// Smallest piece that is halved, as a fraction of the diagonal.
 const MIN_PIECE: f64 = 1e-9;
-/// Rounds of fitting anew.
+/// Maximum number of fitting rounds.
 const MAX_REFITS: usize = 6;
-/// Pairs of a piece and a sphere that may be looked at in a round.
+/// Maximum number of pairs of a piece and a sphere that one round compares.
 const MAX_CHOICES: usize = 100_000_000;
 /// Evaluations of the search for a center.
 const EVALUATIONS: usize = 60;
-/// Spheres are larger by this share, so that they hold what they should in floating point.
+/// Relative growth of the spheres, so that containment holds in floating point.
 const ROUNDING: f64 = 1e-12;
 
 /// Spheres that cover a surface.
@@ -57,13 +62,13 @@ struct PieceSphere {
     /// Meters; at least 0.
     outward: f64,
     pieces: Vec<u32>,
-    /// It cannot be divided.
+    /// Whether the sphere cannot be divided.
     indivisible: bool,
 }
 
 impl Covering {
-    /// One sphere around the surface `given`, which need not be closed; how far spheres reach outside is measured from `solid`: closed, outward-wound. Both of at
-    /// least one triangle.
+    /// Returns one sphere around the surface `given`, which need not be closed. Outward errors are
+    /// measured from `solid`, a closed, outward-wound mesh. Both need at least one triangle.
     pub fn new(given: &TriMesh, solid: &TriMesh) -> Covering {
         let (distance, pieces) = (MeshDistance::new(solid), initial_pieces(given));
         let mut covering = Covering { distance, spheres: Vec::new(), small: MIN_PIECE * given.diagonal(), pieces };
@@ -71,22 +76,23 @@ impl Covering {
         covering
     }
 
-    /// Number of spheres.
+    /// Returns the number of spheres.
     pub fn count(&self) -> usize {
         self.spheres.len()
     }
 
-    /// Center and radius of each, meters, and how far it reaches outside the solid at most.
+    /// Returns the center and radius of each sphere, and its outward error, meters.
     pub fn spheres(&self) -> impl Iterator<Item = (Vec3, f64, f64)> {
         self.spheres.iter().map(|entry| (entry.sphere.center, entry.sphere.radius, entry.outward))
     }
 
-    /// The most that a sphere reaches outside, meters.
+    /// Returns the largest outward error, meters.
     pub fn worst(&self) -> f64 {
         worst(&self.spheres)
     }
 
-    /// Divides the sphere that reaches furthest outside into two; `false` where none can be divided.
+    /// Divides the sphere with the largest outward error into two. Returns `false` if no sphere can
+    /// be divided.
     pub fn refine(&mut self) -> bool {
         loop {
             let candidates = (0..self.spheres.len()).filter(|k| !self.spheres[*k].indivisible);
@@ -106,7 +112,8 @@ impl Covering {
         }
     }
 
-    /// Takes spheres about these centers, fitted to the pieces that they get, if they reach out less and are no more than `most`. Whether they were taken.
+    /// Uses spheres about these centers, fitted to the pieces assigned to them, if they have a
+    /// smaller outward error and are at most `most`. Returns whether they are used.
     pub fn suggest(&mut self, centers: &[Vec3], most: usize) -> bool {
         if centers.is_empty() {
             return false;
@@ -136,7 +143,8 @@ impl Covering {
         better
     }
 
-    /// [`Covering::suggest`] with the centers there are: pieces may change their spheres. Nothing is done where they are too many.
+    /// Calls [`Covering::suggest`] with the present centers: pieces can change their spheres. Does
+    /// nothing if there are too many pairs of pieces and spheres.
     pub fn settle(&mut self) -> bool {
         if self.pieces.len() * self.spheres.len() > MAX_CHOICES {
             return false;
@@ -145,7 +153,8 @@ impl Covering {
         self.suggest(&centers, centers.len())
     }
 
-    /// The sphere of a set of pieces: around the smallest sphere's center or one of `tried`, moved to where its need is less.
+    /// Fits the sphere of a set of pieces. The search starts at the center of the smallest sphere
+    /// or at one of `tried`, and minimizes the need.
     fn fit_sphere(&self, pieces: Vec<u32>, tried: &[Vec3]) -> PieceSphere {
         let points: Vec<Vec3> = pieces.iter().flat_map(|n| self.pieces[*n as usize]).collect();
         let start = around_points(&points);
@@ -168,7 +177,8 @@ impl Covering {
         PieceSphere { outward: best.0.max(0.0), sphere: best.1, pieces, indivisible: false }
     }
 
-    /// The pieces, each with the center of which it needs least, and spheres fitted to what each gets. Centers that get none are left out.
+    /// Assigns each piece to the center with the smallest need, and fits a sphere to the pieces of
+    /// each center. Centers without pieces are left out.
     fn fitted(&self, pieces: &[u32], centers: &[Vec3]) -> Vec<PieceSphere> {
         let depths: Vec<f64> = centers.iter().map(|c| self.distance.closest(c).signed_distance).collect();
         let chosen: Vec<usize> = pieces
@@ -200,7 +210,7 @@ impl Covering {
         while self.spheres[worst].pieces.len() < MIN_SPHERE_PIECES {
             self.halve_pieces(worst, self.small)?;
         }
-        // long ones would be held by both halves
+        // both halves would have to contain long pieces
         let fine = PIECE_SIZE * self.spheres[worst].sphere.radius;
         while self.spheres[worst].pieces.len() < MAX_SPHERE_PIECES && self.halve_pieces(worst, fine).is_some() {}
         let (pieces, old) = (&self.spheres[worst].pieces, self.spheres[worst].sphere.center);
@@ -223,12 +233,12 @@ impl Covering {
             .collect();
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
         ranked.truncate(FITTED_SPLITS);
-        // the old sphere does for either half, so that neither needs more
+        // the old sphere contains either half, so neither has a greater need
         let fit = |(_, halves): (f64, [Vec<u32>; 2])| self.refitted(halves.map(|half| self.fit_sphere(half, &[old])));
         ranked.into_par_iter().map(fit).collect::<Vec<_>>().into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))
     }
 
-    /// What the sphere about the middle of the box around pieces needs, meters.
+    /// Returns the need of the sphere about the middle of the pieces' bounding box, meters.
     fn box_estimate(&self, pieces: &[u32]) -> f64 {
         let points = || pieces.iter().flat_map(|n| self.pieces[*n as usize]);
         let bounds = crate::Aabb::around(points());
@@ -237,7 +247,7 @@ impl Covering {
         square.sqrt() + self.distance.closest(&middle).signed_distance
     }
 
-    /// The two choose their pieces anew, while that helps.
+    /// Reassigns the pieces between the two spheres as long as that helps.
     fn refitted(&self, mut pair: [PieceSphere; 2]) -> [PieceSphere; 2] {
         for _ in 0..MAX_REFITS {
             let all: Vec<u32> = pair.iter().flat_map(|entry| entry.pieces.iter().copied()).collect();
@@ -250,7 +260,8 @@ impl Covering {
         pair
     }
 
-    /// Halves the pieces of a sphere that are larger; `None` where none is, or they are as many as they may be.
+    /// Halves the pieces of a sphere that are larger than `larger`. Returns `None` if there is
+    /// none, or if the maximum number of pieces is reached.
     fn halve_pieces(&mut self, sphere: usize, larger: f64) -> Option<()> {
         if self.pieces.len() + self.spheres[sphere].pieces.len() > MAX_PIECES {
             return None;
@@ -270,7 +281,9 @@ impl Covering {
     }
 }
 
-/// The principal axes, those half-way between two of them (of equal ones any are principal axes, as the diagonals of a square), and the axes of the mesh.
+/// Returns the principal axes, the directions half-way between two of them, and the coordinate
+/// axes. Between equal principal values any axes are principal axes, for instance the diagonals of
+/// a square.
 fn directions(covariance: &Mat3) -> Vec<Vec3> {
     let axes = SymmetricEigen::new(*covariance).eigenvectors;
     let [u, v, w] = [0, 1, 2].map(|k| axes.column(k).into_owned());
@@ -281,17 +294,17 @@ fn worst(spheres: &[PieceSphere]) -> f64 {
     spheres.iter().map(|entry| entry.outward).fold(0.0, f64::max)
 }
 
-/// The worst first, and a little of the other.
+/// The larger outward error, plus a small part of the sum.
 fn cost(pair: &[PieceSphere; 2]) -> f64 {
     worst(pair) + 1e-3 * (pair[0].outward + pair[1].outward)
 }
 
-/// The triangles, the longest halved first, until there are as many pieces as there shall be at first.
+/// Splits the longest triangles until the initial number of pieces is reached.
 fn initial_pieces(mesh: &TriMesh) -> Vec<[Vec3; 3]> {
     let mut pieces: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
     while pieces.len() < INITIAL_PIECES {
         let sizes: Vec<f64> = pieces.iter().map(|p| halves_of(p).0).collect();
-        // all within a factor of the longest at once
+        // all pieces within a factor of the longest at once
         let bar = 0.7 * sizes.iter().copied().fold(0.0, f64::max);
         for n in 0..sizes.len() {
             if sizes[n] >= bar {

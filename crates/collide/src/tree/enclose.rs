@@ -1,27 +1,29 @@
-//! The smallest sphere around spheres, exactly.
+//! The exact smallest sphere around spheres.
 //!
-//! The smallest sphere is that of at most four of the spheres, its basis, which touch it from within: `|c − cᵢ| = R − rᵢ`.
-//! With `x = c − c₁` and `dᵢ = cᵢ − c₁`, taking the first equation from the others leaves
+//! The smallest enclosing sphere is determined by at most four of the spheres, its basis, which
+//! touch it from within: `|c − cᵢ| = R − rᵢ`. With `x = c − c₁` and `dᵢ = cᵢ − c₁`, subtracting the
+//! first equation from the others gives
 //!
 //! ```text
 //! dᵢ · x = (|dᵢ|² + r₁² − rᵢ²)/2 + R (rᵢ − r₁)      x = u + R v in the span of the dᵢ
 //! (v·v − 1) R² + 2 (u·v + r₁) R + u·u − r₁² = 0
 //! ```
 //!
-//! The basis is found as in a simplex method: while a sphere sticks out, the farthest joins the basis, and of the subsets of
-//! those five the smallest sphere that holds all five is the next. Its radius grows each time, so that no basis comes
-//! back. Source for spheres in place of points: Fischer and Gärtner, *The smallest enclosing ball of balls:
-//! combinatorial structure and algorithms* (2003).
+//! The basis is found as in a simplex method. While some sphere is not contained, the farthest one
+//! joins the basis; the next basis is the subset of these five whose tangent sphere is the smallest
+//! that contains all five. The radius grows in each step, so no basis repeats. Source for spheres
+//! instead of points: Fischer and Gärtner, *The smallest enclosing ball of balls: combinatorial
+//! structure and algorithms* (2003).
 
 use super::sphere::Sphere;
 use crate::Vec3;
 
-/// Bounds the changes of basis; a dozen are usual.
+/// Maximum number of basis changes; a dozen are typical.
 const MAX_CHANGES: usize = 200;
-/// A sphere sticks out if by more than this part of the radius.
+/// A sphere is not contained if it exceeds the radius by more than this fraction.
 const TOLERANCE: f64 = 1e-12;
 
-/// The smallest sphere around the spheres; of radius zero for none.
+/// Returns the smallest sphere around the spheres; of radius zero for no spheres.
 pub(super) fn smallest_around(spheres: &[Sphere]) -> Sphere {
     let Some(&first) = spheres.iter().max_by(|a, b| a.radius.total_cmp(&b.radius)) else {
         return Sphere { center: Vec3::zeros(), radius: 0.0 };
@@ -38,17 +40,17 @@ pub(super) fn smallest_around(spheres: &[Sphere]) -> Sphere {
         };
         (sphere, basis) = (next, its_basis);
     }
-    // what rounding left, and a rounding's worth more
+    // what rounding left, and one rounding error more
     let radius = spheres.iter().map(|b| reach(&sphere.center, b)).fold(0.0, f64::max) * (1.0 + 1e-12);
     Sphere { radius, ..sphere }
 }
 
-/// How far a sphere reaches from a point.
+/// Returns the largest distance of a point of the sphere from `c`.
 fn reach(c: &Vec3, sphere: &Sphere) -> f64 {
     (sphere.center - c).norm() + sphere.radius
 }
 
-/// The smallest sphere around at most five spheres, and those that it touches.
+/// Returns the smallest sphere around at most five spheres, and the spheres that touch it.
 fn enclosing_subset(spheres: &[Sphere]) -> Option<(Sphere, Vec<Sphere>)> {
     let mut best: Option<(Sphere, Vec<Sphere>)> = None;
     for set in 1..1_u32 << spheres.len() {
@@ -65,7 +67,8 @@ fn enclosing_subset(spheres: &[Sphere]) -> Option<(Sphere, Vec<Sphere>)> {
     best
 }
 
-/// The smallest sphere that all of one to four spheres touch from within, its center in the span of theirs.
+/// Returns the smallest sphere that one to four spheres all touch from within, with its center in
+/// the span of theirs.
 fn tangent_sphere(spheres: &[Sphere]) -> Option<Sphere> {
     let first = spheres[0];
     // orthonormal axes of the span, and along them u and v
@@ -90,7 +93,7 @@ fn tangent_sphere(spheres: &[Sphere]) -> Option<Sphere> {
     radius.is_finite().then(|| Sphere { center: first.center + u + v * radius, radius })
 }
 
-/// Of `a x² + 2 h x + c = 0`; not numbers where there are none.
+/// Returns the roots of `a x² + 2 h x + c = 0`; not numbers if there are none.
 fn roots(a: f64, h: f64, c: f64) -> [f64; 2] {
     let root = (h * h - a * c).max(0.0).sqrt();
     // the sum that does not cancel
@@ -102,7 +105,7 @@ fn roots(a: f64, h: f64, c: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Numbers in [0, 1), the same each time.
+    /// Returns a generator of deterministic numbers in [0, 1).
     fn numbers(seed: u64) -> impl FnMut() -> f64 {
         let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
         move || {
@@ -113,8 +116,8 @@ mod tests {
         }
     }
 
-    /// The radius is a convex function of the center, so that it is least where no direction lowers it: on any way,
-    /// some sphere that is touched gets farther (or, to a rounding, no nearer).
+    /// The radius is a convex function of the center, so it is minimal iff no direction lowers it:
+    /// in every direction some touching sphere gets farther (or, up to rounding, no nearer).
     fn is_minimal(sphere: &Sphere, spheres: &[Sphere], next: &mut impl FnMut() -> f64) -> bool {
         let touched: Vec<Vec3> = spheres
             .iter()
@@ -142,7 +145,7 @@ mod tests {
             let sphere = smallest_around(&spheres);
             assert!(spheres.iter().all(|b| reach(&sphere.center, b) <= sphere.radius), "{seed}");
             assert!(is_minimal(&sphere, &spheres, &mut next), "{seed}");
-            // nor do a thousand centers tried anywhere
+            // none of a thousand random centers gives a smaller radius
             let any = (0..1000).map(|_| {
                 let c = Vec3::from_fn(|_, _| next());
                 spheres.iter().map(|b| reach(&c, b)).fold(0.0, f64::max)

@@ -1,4 +1,5 @@
-//! A tree as a JSON text, with what it was made of and how good it is.
+//! The JSON file format of sphere trees, with the source mesh, the settings and the quality of the
+//! tree.
 //!
 //! ```json
 //! {
@@ -11,12 +12,15 @@
 //! }
 //! ```
 //!
-//! Every level stands for the solid by itself: a leaf above the last level is repeated in each level below, as the only child of itself.
-//! `format`, `version` and `levels` must be there, and of a sphere `c`, `r` and, but for the root, `parent`. Without `out` a sphere reaches `2 r` outside, the most that one that meets
-//! the solid can; without `mesh` lengths are over the diagonal of the box around the leaves; without `settings` those of the usual method stand.
+//! Every level represents the whole solid: a leaf above the last level is repeated in each level
+//! below, as its own only child. Required are `format`, `version` and `levels`, and for each sphere
+//! `c`, `r` and (except for the root) `parent`. The default of `out` is `2 r`, the most that a
+//! sphere that meets the solid can extend outside. Without `mesh`, lengths are relative to the
+//! diagonal of the box around the leaves. Without `settings`, the default settings apply.
 //!
-//! Numbers are written with as many digits as give the same bits back. What is read is checked as if it came from an enemy: sizes are
-//! capped, numbers finite, parents there and in order, children inside their parents.
+//! Numbers are written with enough digits to restore the same bits. Input is not trusted: the
+//! reader limits sizes and requires finite numbers, parents that exist and are in order, and
+//! children inside their parents.
 
 use super::{LevelQuality, SphereNode, SphereTree, StageCount, TreeSettings};
 use crate::cache::MOST_BYTES;
@@ -25,88 +29,89 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use thiserror::Error;
 
-/// Most spheres of a tree that is read.
+/// Maximum number of spheres of a tree that is read.
 const MAX_SPHERES: usize = 1 << 23;
-/// Most levels of a tree that is read.
+/// Maximum number of levels of a tree that is read.
 const MAX_LEVELS: usize = 64;
-/// Centers up to this from the origin and radii up to this are read, meters.
+/// Maximum coordinate and radius of a sphere that is read, meters.
 const MAX_COORDINATE: f64 = 1e10;
-/// A sphere sticks out of its parent if by more than this part of the parent's radius, as in [`SphereTree::check_nesting`].
+/// Excess over the parent's radius, as a fraction of it, from which a sphere is outside its parent,
+/// as in [`SphereTree::check_nesting`].
 const NESTING_TOLERANCE: f64 = 1e-12;
 const FORMAT: &str = "tumble sphere tree";
-/// The version of the format that is written and read.
+/// Version of the format that is read and written.
 const VERSION: u32 = 1;
 
-/// A tree and what is known of it.
+/// A sphere tree with its origin and quality.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TreeFile {
-    /// The name of the mesh, such as its file's.
+    /// Name of the mesh, such as its file name.
     pub name: String,
-    /// What it was built around.
+    /// The mesh of the tree.
     pub mesh: MeshId,
-    /// How it was built.
+    /// The build settings.
     pub settings: TreeSettings,
-    /// What the builder's stages did.
+    /// Counts of the builder's stages.
     pub stages: Vec<StageCount>,
-    /// The figures of its levels; may be left empty.
+    /// Quality of each level; may be empty.
     pub quality: Vec<LevelQuality>,
     /// The tree.
     pub tree: SphereTree,
 }
 
-/// What tells one mesh from another.
+/// Identifies a mesh.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeshId {
     /// BLAKE3 of the vertices' bits and the triangles, in hexadecimal.
     pub blake3: String,
-    /// How many triangles it has.
+    /// Number of triangles.
     pub triangles: usize,
     /// Diagonal of its bounding box, meters.
     pub diagonal: f64,
 }
 
-/// Why a text is no tree.
+/// Faults of a sphere tree file.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum TreeFileError {
     /// The text is too long.
     #[error("the text has {0} bytes; a sphere tree may have {MOST_BYTES}")]
     TooLong(usize),
-    /// No JSON, or not the keys of a tree.
+    /// Not JSON, or not the keys of a sphere tree.
     #[error("{0}")]
     Json(String),
-    /// Another kind of file, or of another time.
+    /// A different format or version.
     #[error("it is a \"{format}\" of version {version}; what is read is a \"{FORMAT}\" of version {VERSION}")]
     Format {
-        /// As it says.
+        /// The format in the file.
         format: String,
-        /// As it says.
+        /// The version in the file.
         version: u32,
     },
     /// Units other than meters.
     #[error("units are \"{0}\"; a sphere tree is in \"m\"")]
     Units(String),
-    /// Too many or too few.
+    /// A count out of range.
     #[error("there are {count} {what}; wanted {wanted}")]
     Count {
-        /// Of what.
+        /// The counted items.
         what: String,
-        /// As found.
+        /// The count in the file.
         count: usize,
-        /// What would be right.
+        /// The allowed counts.
         wanted: String,
     },
-    /// A sphere that cannot be.
+    /// An invalid sphere.
     #[error("sphere {sphere} of level {level}: {what}")]
     Sphere {
         /// From 0.
         level: usize,
         /// From 0.
         sphere: usize,
-        /// What is wrong with it, and what would be right.
+        /// The fault, and the allowed values.
         what: String,
     },
-    /// A promise that the tree breaks.
+    /// A guarantee that the tree breaks.
     #[error("{0}")]
     Tree(String),
 }
@@ -141,7 +146,8 @@ struct JsonSphere {
 }
 
 impl JsonSphere {
-    /// A sphere that meets the solid reaches no further out of it than it is wide.
+    /// Returns the outward error; a sphere that meets the solid extends at most its diameter
+    /// outside.
     fn out(&self) -> f64 {
         self.out.unwrap_or(2.0 * self.r)
     }
@@ -156,11 +162,11 @@ fn no_parent() -> i64 {
 }
 
 impl MeshId {
-    /// Of a mesh.
+    /// Returns the identity of a mesh.
     pub fn of(mesh: &TriMesh) -> MeshId {
         let mut hash = blake3::Hasher::new();
         hash.update(&(mesh.vertices.len() as u64).to_le_bytes());
-        // the hash is quick where it gets much at once
+        // hashed at once: the hash is fast for large inputs
         hash.update(
             &mesh.vertices.iter().flat_map(|v| [v.x, v.y, v.z]).flat_map(f64::to_le_bytes).collect::<Vec<u8>>(),
         );
@@ -174,7 +180,7 @@ impl MeshId {
 }
 
 impl TreeFile {
-    /// The text: the head in some lines, then one sphere per line.
+    /// Returns the file as text: a few lines of header, then one sphere per line.
     pub fn to_json(&self) -> String {
         let mut text = String::from("{\n");
         let mut key = |name: &str, value: String| _ = writeln!(text, "\"{name}\": {value},");
@@ -205,10 +211,11 @@ impl TreeFile {
         text
     }
 
-    /// Reads and checks a text.
+    /// Parses and checks a text.
     ///
     /// # Errors
-    /// [`TreeFileError`] says what is wrong, where, and what would be right. That the tree fits a mesh is not looked at.
+    /// [`TreeFileError`] names the fault, its place and the allowed values. Whether the tree fits a
+    /// mesh is not checked.
     pub fn from_json(text: &str) -> Result<TreeFile, TreeFileError> {
         if text.len() > MOST_BYTES {
             return Err(TreeFileError::TooLong(text.len()));
@@ -252,7 +259,8 @@ impl TreeFile {
     }
 }
 
-/// `null` for what JSON cannot say; a tree that was built holds no such number.
+/// Returns the JSON of `value`, or `null` if JSON cannot represent it; a tree that was built has no
+/// such number.
 fn json<T: Serialize + ?Sized>(value: &T) -> String {
     serde_json::to_string(value).unwrap_or_else(|_| "null".into())
 }
@@ -281,7 +289,8 @@ fn read_levels(levels: &[Vec<JsonSphere>]) -> Result<SphereTree, TreeFileError> 
         return count("spheres", spheres, format!("at most {MAX_SPHERES}"));
     }
     let mut nodes: Vec<SphereNode> = Vec::with_capacity(spheres);
-    // for every sphere of the level above its node, and whether it was carried down to there
+    // for every sphere of the level above: its node, and whether that is a leaf repeated from
+    // higher up
     let mut above: Vec<(usize, bool)> = Vec::new();
     for (number, level) in levels.iter().enumerate() {
         above = read_level(number, level, &above, &mut nodes)?;
@@ -355,7 +364,8 @@ fn read_sphere(number: usize, sphere: &JsonSphere) -> Result<SphereNode, String>
     })
 }
 
-/// The parent's index in the level above; `None` for the root. Parents must not fall along a level, so that siblings are neighbors.
+/// Returns the parent's index in the level above; `None` for the root. Parents must ascend along a
+/// level, so that siblings are adjacent.
 fn read_parent(number: usize, n: usize, level: &[JsonSphere], above: usize) -> Result<Option<usize>, String> {
     let parent = level[n].parent;
     if number == 0 {

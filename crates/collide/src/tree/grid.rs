@@ -1,25 +1,29 @@
-//! The grid builder: a region is parted by a grid of cubes, and each cube's points get a sphere.
+//! The grid builder: a grid of cubes partitions a region, and one sphere is fitted to the points of
+//! each cube.
 //!
-//! Source: Bradshaw and O'Sullivan, *Adaptive medial-axis approximation for sphere-tree construction* (2004), which has an
-//! oriented, optimized grid of spheres among its simpler methods. Of grids in several orientations, offsets and
-//! spacings, those that need no more cubes than there may be spheres are ranked by the largest box of a cube's
-//! points; the spheres of the best few are fitted, and the grid whose worst sphere reaches out least is taken. Spheres are fitted
-//! to the cube's points, not drawn around cubes, so that they are far smaller where the surface cuts a corner.
+//! Source: Bradshaw and O'Sullivan, *Adaptive medial-axis approximation for sphere-tree
+//! construction* (2004), which has an oriented, optimized grid of spheres among its simpler
+//! methods. Grids of several orientations, offsets and spacings are tried. Those with few enough
+//! cubes are ranked by the largest box around the points of a cube. Spheres are fitted for the best
+//! few grids, and the grid with the smallest worst outward error wins. Spheres are fitted to the
+//! points of a cube, not to the cube, so they are far smaller where the surface cuts a corner of
+//! it.
 
 use super::builder::{Built, Job, TreeBuilder};
 use super::regions::{Part, build, cover_points, refitted, worst};
 use crate::{Mat3, MeshError, Vec3};
 use nalgebra::{Rotation3, SymmetricEigen, Unit};
 
-/// Points of a region that grids are ranked by.
+/// Maximum number of points of a region that rank the grids.
 const MAX_SAMPLES: usize = 500;
-/// Spacings tried: from the longest side of the region's box down by this factor each.
+/// Number of spacings that are tried: from the longest side of the region's box, each smaller by
+/// `SPACING_FACTOR`.
 const SPACINGS: usize = 24;
 const SPACING_FACTOR: f64 = 0.9;
-/// Grids whose spheres are fitted.
+/// Number of grids whose spheres are fitted.
 const FITTED_GRIDS: usize = 6;
 
-/// The builder.
+/// The grid builder.
 pub(super) struct Grid;
 
 impl TreeBuilder for Grid {
@@ -30,7 +34,8 @@ impl TreeBuilder for Grid {
     }
 }
 
-/// Cubes of side `spacing` along the rows of `axes`, one of which has its least corner at `origin` in these axes.
+/// Cubes of side `spacing` along the rows of `axes`; one cube has its lowest corner at `origin` in
+/// these axes.
 #[derive(Clone, Copy, Debug)]
 struct Cubes {
     axes: Mat3,
@@ -44,7 +49,8 @@ impl Cubes {
         [at.x.floor() as i64, at.y.floor() as i64, at.z.floor() as i64]
     }
 
-    /// The longest diagonal of the boxes of cubes' points, `None` if more than `most` cubes have points.
+    /// Returns the longest diagonal of the boxes of the cubes' points; `None` if more than `most`
+    /// cubes have points.
     fn rank(&self, points: &[Vec3], most: usize) -> Option<f64> {
         let mut boxes: Vec<([i64; 3], Vec3, Vec3)> = Vec::with_capacity(most);
         for p in points {
@@ -58,7 +64,7 @@ impl Cubes {
         Some(boxes.iter().map(|b| (b.2 - b.1).norm()).fold(0.0, f64::max))
     }
 
-    /// The points of each cube, in the order in which they come.
+    /// Returns the points of each cube, in the order of first occurrence.
     fn parts(&self, region: &[u32], points: &[Vec3]) -> Vec<Vec<u32>> {
         let mut parts: Vec<([i64; 3], Vec<u32>)> = Vec::new();
         for &i in region {
@@ -72,7 +78,7 @@ impl Cubes {
     }
 }
 
-/// The region parted by the best grid found; nothing if no grid parts it.
+/// Returns the region partitioned by the best grid found; empty if no grid partitions it.
 fn best_partition(region: &[u32], points: &[Vec3], most: usize, job: &Job) -> Vec<Part> {
     let sampled: Vec<u32> = region.iter().copied().step_by(region.len().div_ceil(MAX_SAMPLES)).collect();
     let some: Vec<Vec3> = sampled.iter().map(|&i| points[i as usize]).collect();
@@ -83,7 +89,7 @@ fn best_partition(region: &[u32], points: &[Vec3], most: usize, job: &Job) -> Ve
         .iter()
         .take_while(|_| !job.progress.stopped())
         .map(|(_, cubes)| cubes.parts(region, points))
-        // points that were not looked at may lie in more cubes
+        // points that were not sampled can lie in further cubes
         .filter(|parts| (2..=most).contains(&parts.len()))
         .take(FITTED_GRIDS)
         .map(|parts| parts.into_iter().map(|own| Part::of(own, None, points, job.distance)).collect::<Vec<Part>>())
@@ -92,7 +98,8 @@ fn best_partition(region: &[u32], points: &[Vec3], most: usize, job: &Job) -> Ve
     refitted(best, points, job.distance, job.progress)
 }
 
-/// The grids tried: along the axes given, along the principal axes, and these turned by 45° about each.
+/// Returns the grids to try: along the given axes, along the principal axes, and the latter rotated
+/// by 45° about each axis.
 fn grids(points: &[Vec3]) -> Vec<Cubes> {
     let principal = principal_axes(points);
     let mut frames = vec![Mat3::identity(), principal];
@@ -109,7 +116,7 @@ fn grids(points: &[Vec3]) -> Vec<Cubes> {
         }
         for n in 0..SPACINGS {
             let spacing = side * 1.001 * SPACING_FACTOR.powi(n as i32);
-            // with its cubes even about the middle, or a cube in the middle, along each axis by itself
+            // on each axis either a cube boundary or a cube center at the middle
             for offset in 0..8_u32 {
                 let shift = |k: u32| if offset >> k & 1 == 0 { 0.0 } else { 0.5 * spacing };
                 let origin = 0.5 * (bounds.min + bounds.max) + Vec3::new(shift(0), shift(1), shift(2));
@@ -120,7 +127,7 @@ fn grids(points: &[Vec3]) -> Vec<Cubes> {
     all
 }
 
-/// Rows are the axes of the points' covariance, a right-handed set.
+/// Returns the axes of the points' covariance as rows, a right-handed set.
 fn principal_axes(points: &[Vec3]) -> Mat3 {
     let mean = points.iter().sum::<Vec3>() / points.len().max(1) as f64;
     let covariance: Mat3 = points.iter().map(|p| (p - mean) * (p - mean).transpose()).sum();

@@ -1,15 +1,19 @@
 //! Hubbard's builder: medial spheres of a fixed set of samples, merged until few are left.
 //!
-//! Source: Hubbard, *Approximating polyhedra with spheres for time-critical collision detection* (1996). Samples of the
-//! surface give Voronoi spheres whose centers are inside the solid (and others where those leave samples bare), once for the
-//! whole solid. For each region, its points choose among the spheres that hold them; then, of all pairs of neighbors,
-//! the pair is merged whose sphere reaches out of the solid least, until as many are left as there may be children.
+//! Source: Hubbard, *Approximating polyhedra with spheres for time-critical collision detection*
+//! (1996). Samples of the surface give Voronoi spheres with centers inside the solid, and further
+//! ones if those leave samples uncovered. This is done once for the whole solid. For each region,
+//! every point selects one of the spheres that contain it. Then the pair of neighbors whose merged
+//! sphere extends least outside the solid is merged, until at most `branch` spheres are left.
 //!
-//! Neighbors are groups some of whose points lie in one sphere; groups that hang together with no other get the nearest for
-//! a neighbor. A merged sphere is about either old center or the point half-way between, whichever reaches out less.
+//! Groups are neighbors if some points of both lie in one sphere. A set of groups without further
+//! neighbors is connected to the nearest other group. The center of a merged sphere is one of the
+//! old centers or their midpoint, whichever extends less.
 //!
-//! Departs from the paper: where a sphere reaches out far, over a hole between samples, a sample is added; and the parts that are left are refitted
-//! (points choose spheres, spheres are fitted anew), which brought spot's 64 spheres from 0.034 to 0.023–0.031 of the diagonal.
+//! Departures from the paper: a sphere that extends far outside spans a hole between samples, so a
+//! sample is added there. The remaining parts are refitted (points select spheres, spheres are
+//! fitted again), which reduced the error of spot's 64 spheres from 0.034 to 0.023–0.031 of the
+//! diagonal.
 
 use super::builder::{Built, Job, Progress, StageCount, TreeBuilder};
 use super::medial::CoverPoints;
@@ -20,21 +24,22 @@ use crate::{MeshDistance, MeshError, Vec3};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
-/// Samples that the spheres are made of; about three spheres each.
+/// Number of samples for the Voronoi spheres; gives about three spheres each.
 const SAMPLES: usize = 2000;
 
-/// A sphere that reaches further out, in diagonals, is over a hole between samples, and gets one more.
+/// A sphere with a larger outward error, in diagonals, spans a hole between samples, which gets
+/// another sample.
 const MAX_OUTWARD: f64 = 0.01;
 
-/// Points of a component that others are sought from.
+/// Maximum number of points of a component from which the nearest other group is searched.
 const LINK_SAMPLES: usize = 32;
 
-/// Points of a group by which costs are bounded.
+/// Number of points of a group that bound its merge costs.
 const BOUND_SAMPLES: usize = 4;
-/// Spheres that hold a point which are kept, those that reach out least.
+/// Maximum number of spheres that are kept per point, those with the smallest outward errors.
 const MAX_HOLDERS: usize = 32;
 
-/// The builder.
+/// Hubbard's builder.
 pub(super) struct Hubbard;
 
 impl TreeBuilder for Hubbard {
@@ -62,14 +67,14 @@ impl TreeBuilder for Hubbard {
 
 struct MedialSpheres<'a> {
     all: Vec<MedialSphere>,
-    /// Per cover point, spheres that hold it, the one that reaches out least first.
+    /// Per cover point, the spheres that contain it, smallest outward error first.
     holders: Vec<Vec<u32>>,
     cover: &'a CoverPoints,
     distance: &'a MeshDistance,
     progress: &'a dyn Progress,
 }
 
-/// A sphere that some were merged into.
+/// A group of merged spheres.
 struct Group {
     center: Vec3,
     /// Signed distance of the center.
@@ -90,7 +95,7 @@ impl MedialSpheres<'_> {
             progress: self.progress,
         };
         merging.run(most);
-        // half merged, the groups are too many for what follows
+        // a partial merge leaves too many groups for the following steps
         if self.progress.stopped() {
             return Vec::new();
         }
@@ -100,7 +105,7 @@ impl MedialSpheres<'_> {
         if parts.len() < 2 { Vec::new() } else { refitted(parts, &self.cover.points, self.distance, self.progress) }
     }
 
-    /// Each point with the sphere that reaches out least, among those that hold it.
+    /// Assigns each point to the sphere with the smallest outward error that contains it.
     fn groups(&self, region: &[u32]) -> Vec<Group> {
         let chosen = |i: u32| self.holders[i as usize].first().copied().unwrap_or(0);
         let mut number: BTreeMap<u32, u32> = BTreeMap::new();
@@ -116,7 +121,7 @@ impl MedialSpheres<'_> {
             }
             groups[g].points.push(i);
         }
-        // in the order of a sphere's points, each group with the next that the sphere holds some of
+        // connects each group to the next group among the points of a sphere
         let mut last: BTreeMap<u32, u32> = BTreeMap::new();
         for &i in region {
             let own = number[&chosen(i)];
@@ -132,7 +137,7 @@ impl MedialSpheres<'_> {
     }
 }
 
-/// Cost (ordered bits), whether it is known or a lower bound, and the pair of groups.
+/// Cost (ordered bits), whether it is exact or a lower bound, and the pair of groups.
 type QueuedMerge = Reverse<(u64, bool, u32, u32)>;
 
 struct Merging<'a> {
@@ -163,7 +168,8 @@ impl Merging<'_> {
         }
     }
 
-    /// Queues the pairs of a group with its neighbors by what they cost at least; what they cost is found when they come up.
+    /// Queues the pairs of a group with its neighbors by lower bounds of their costs. The exact
+    /// cost is computed when a pair is taken from the queue.
     fn queue_merges(&self, a: u32, queue: &mut BinaryHeap<QueuedMerge>, which: impl Fn(u32, u32) -> bool) {
         if self.groups[a as usize].active {
             for &b in self.groups[a as usize].neighbors.iter().filter(|b| which(a, **b)) {
@@ -172,7 +178,8 @@ impl Merging<'_> {
         }
     }
 
-    /// A lower bound of [`Merging::merge_cost`], by some of the points, and since signed distances differ by no more than centers do.
+    /// Returns a lower bound of [`Merging::merge_cost`], from some of the points; signed distances
+    /// differ by no more than the centers do.
     fn merge_cost_bound(&self, a: u32, b: u32) -> f64 {
         let [a, b] = [a, b].map(|g| &self.groups[g as usize]);
         let half = 0.5 * (a.center - b.center).norm();
@@ -184,11 +191,12 @@ impl Merging<'_> {
             let [one, other] = [a, b].map(|g| g.points.iter().step_by(some(g)).map(square).fold(0.0, f64::max));
             one.max(other).sqrt() + signed
         });
-        // less a rounding's worth
+        // minus one rounding error
         (reaches.into_iter().fold(f64::INFINITY, f64::min) * (1.0 - 1e-9)).max(0.0)
     }
 
-    /// How far the sphere of two groups reaches out, at least 0, its center and that one's signed distance.
+    /// Returns the outward error of the sphere around two groups, at least 0, its center and the
+    /// center's signed distance.
     fn merge_cost(&self, a: u32, b: u32) -> (f64, Vec3, f64) {
         let [a, b] = [a, b].map(|g| &self.groups[g as usize]);
         let middle = 0.5 * (a.center + b.center);
@@ -225,7 +233,8 @@ impl Merging<'_> {
     }
 }
 
-/// Makes neighbors until all groups hang together: each component but the largest gets the group of the point closest to some of its own.
+/// Connects all components of groups: each component except the largest becomes a neighbor of the
+/// group with the nearest point.
 fn connect(groups: &mut [Group], region: &[u32], points: &[Vec3]) {
     let mut group_of: BTreeMap<u32, u32> = BTreeMap::new();
     for (g, group) in groups.iter().enumerate() {
@@ -256,7 +265,7 @@ fn connect(groups: &mut [Group], region: &[u32], points: &[Vec3]) {
     }
 }
 
-/// The component of each group, and which has most points.
+/// Returns the component of each group, and the component with the most points.
 fn components(groups: &[Group]) -> (Vec<usize>, usize) {
     let mut component = vec![usize::MAX; groups.len()];
     let mut sizes = Vec::new();

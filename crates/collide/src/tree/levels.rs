@@ -1,9 +1,11 @@
-//! A tree as a list of levels, each of which stands for the solid: the form of files and of the quality report.
+//! A tree as a list of levels, each of which represents the solid: the form of tree files and of
+//! the quality report.
 
 use super::SphereTree;
 use crate::Vec3;
 
-/// One sphere of a level. A leaf above the level is carried down: it is its own parent, once per level.
+/// One sphere of a level. A leaf above the level is repeated in it, as its own parent, once per
+/// level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevelSphere {
     /// Mesh frame, meters.
@@ -17,15 +19,15 @@ pub struct LevelSphere {
 }
 
 impl LevelSphere {
-    /// A sphere without a parent and of no tree.
+    /// Returns a sphere without a parent that belongs to no tree.
     pub fn new(center: Vec3, radius: f64) -> LevelSphere {
         LevelSphere { center, radius, parent: None, node: 0 }
     }
 }
 
 impl SphereTree {
-    /// The spheres of [`SphereTree::at_level`] for every level from the root's on, with their parents. Spheres stand in the order of their
-    /// parents, so that the children of one sphere are neighbors.
+    /// Returns the spheres of [`SphereTree::at_level`] for every level, starting at the root, with
+    /// their parents. Spheres are ordered by parent, so the children of one sphere are adjacent.
     pub fn level_lists(&self) -> Vec<Vec<LevelSphere>> {
         let sphere = |node: usize, parent| LevelSphere {
             center: self.nodes[node].center,

@@ -1,14 +1,16 @@
-//! Sphere trees: a closed surface inside nested spheres.
+//! Sphere trees: nested spheres around a closed surface.
 //!
-//! Two promises are checked on every build and are an error if broken: every sphere contains the spheres of its children,
-//! and the leaves cover the surface. A third number is stated: how far the spheres reach beyond the solid.
+//! Every build verifies two guarantees and fails if one is broken: every sphere contains the
+//! spheres of its children, and the leaves cover the surface. It also states how far the spheres
+//! extend beyond the solid.
 //!
-//! **Outward error.** A sphere `(c, r)` whose center lies `d` below the surface reaches at most `r − d` beyond it: on
-//! the way from `c` to any outside point of the sphere the surface is crossed, at `d` or later (`d` is negative for a
-//! center outside).
+//! **Outward error.** A sphere `(c, r)` whose center lies `d` below the surface extends at most `r
+//! − d` beyond the surface. The segment from `c` to any outside point of the sphere crosses the
+//! surface at distance `d` or later (`d` is negative for a center outside).
 //!
-//! Two trees whose spheres are `g` apart have solids that are between `g` and `g + e₁ + e₂` apart, `e` their outward
-//! errors: no contact is missed, and none is invented beyond `e₁ + e₂`.
+//! If the spheres of two trees are `g` apart, their solids are between `g` and `g + e₁ + e₂` apart,
+//! where `e` are the outward errors. So no contact is missed, and contacts are invented by at most
+//! `e₁ + e₂`.
 
 mod builder;
 mod bytes;
@@ -46,16 +48,16 @@ use builder::{Cell, Job, TreeBuilder, check_stopped};
 use sphere::Sphere;
 pub(crate) use sphere::around_points;
 
-/// One sphere of a tree, in the mesh's frame.
+/// One sphere of a tree, in the frame of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SphereNode {
     /// Meters.
     pub center: Vec3,
     /// Meters.
     pub radius: f64,
-    /// Upper bound of how far the sphere reaches outside the solid, meters.
+    /// Upper bound of how far the sphere extends outside the solid, meters.
     pub outward: f64,
-    /// Index of the first child; children are neighbors.
+    /// Index of the first child. Children are adjacent.
     pub first_child: u32,
     /// Number of children; 0 for a leaf.
     pub children: u32,
@@ -64,18 +66,18 @@ pub struct SphereNode {
 }
 
 impl SphereNode {
-    /// Whether the sphere has no children.
+    /// Returns whether the sphere has no children.
     pub fn is_leaf(&self) -> bool {
         self.children == 0
     }
 
-    /// Indices of the children.
+    /// Returns the indices of the children.
     pub fn child_range(&self) -> std::ops::Range<usize> {
         self.first_child as usize..(self.first_child + self.children) as usize
     }
 }
 
-/// A tree of spheres around a closed surface; flat, breadth first, the root first.
+/// A tree of spheres around a closed surface: a flat array, breadth first, root first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SphereTree {
     nodes: Vec<SphereNode>,
@@ -83,12 +85,20 @@ pub struct SphereTree {
 }
 
 impl SphereTree {
-    /// Builds and verifies a tree around a closed, outward-wound mesh (see [`TriMesh::check_closed`]).
+    /// Builds and verifies a tree around a closed, outward-wound mesh (see
+    /// [`TriMesh::check_closed`]).
+    ///
+    /// # Errors
+    /// [`MeshError`] for settings out of range, invalid mesh data, and a tree that breaks a
+    /// guarantee.
     pub fn build(mesh: &TriMesh, settings: &TreeSettings) -> Result<SphereTree, MeshError> {
         Ok(SphereTree::build_with_progress(mesh, settings, &())?.0)
     }
 
-    /// The same, told how far it is, and with what each stage did.
+    /// Like [`SphereTree::build`], with progress reports. Also returns the counts of each stage.
+    ///
+    /// # Errors
+    /// As [`SphereTree::build`]; [`MeshError::Stopped`] if `progress` requests it.
     pub fn build_with_progress(
         mesh: &TriMesh,
         settings: &TreeSettings,
@@ -99,7 +109,7 @@ impl SphereTree {
         SphereTree::build_by(mesh, &MeshDistance::new(mesh), settings, progress)
     }
 
-    /// The same of a mesh whose distance is there already.
+    /// Builds a tree with a distance that was computed before.
     pub(crate) fn build_by(
         mesh: &TriMesh,
         distance: &MeshDistance,
@@ -124,51 +134,53 @@ impl SphereTree {
         Ok((tree, built.stages))
     }
 
-    /// One sphere around all vertices of a mesh whose data is right.
+    /// Returns a tree of one sphere around all vertices of a mesh with valid data.
     pub(crate) fn bounding_sphere(mesh: &TriMesh) -> SphereTree {
         let sphere = around_points(&mesh.vertices);
-        // no point of the sphere is further from the surface than its other end
+        // no point of the sphere is further from the surface than its diameter
         let node =
             SphereNode { center: sphere.center, radius: sphere.radius, outward: 2.0 * sphere.radius, ..empty_node(0) };
         SphereTree::of_nodes(vec![node])
     }
 
-    /// All spheres, breadth first; the root is the first.
+    /// Returns all spheres, breadth first, root first.
     pub fn nodes(&self) -> &[SphereNode] {
         &self.nodes
     }
 
-    /// The spheres that have no children.
+    /// Returns the spheres without children.
     pub fn leaves(&self) -> impl Iterator<Item = &SphereNode> {
         self.nodes.iter().filter(|n| n.is_leaf())
     }
 
-    /// Number of levels; the root alone is one.
+    /// Returns the number of levels; a root without children is one level.
     pub fn levels(&self) -> u32 {
         self.nodes.last().map_or(0, |n| n.level + 1)
     }
 
-    /// The spheres that stand for the solid when looked at to `level`: those of that level and the leaves above it.
+    /// Returns the spheres that represent the solid at `level`: those of that level and the leaves
+    /// above it.
     pub fn at_level(&self, level: u32) -> impl Iterator<Item = &SphereNode> {
         self.nodes.iter().filter(move |n| n.level == level || (n.level < level && n.is_leaf()))
     }
 
-    /// Upper bound of how far the leaves reach outside the solid, meters.
+    /// Returns an upper bound of how far the leaves extend outside the solid, meters.
     pub fn outward_error(&self) -> f64 {
         self.leaves().map(|n| n.outward).fold(0.0, f64::max)
     }
 
-    /// The same for [`SphereTree::at_level`].
+    /// Returns the same bound for the spheres of [`SphereTree::at_level`].
     pub fn outward_error_at(&self, level: u32) -> f64 {
         self.at_level(level).map(|n| n.outward).fold(0.0, f64::max)
     }
 
-    /// Box around all leaves, in the mesh's frame.
+    /// Returns the box around all leaves, in the frame of the mesh.
     pub fn bounds(&self) -> &Aabb {
         &self.bounds
     }
 
-    /// Breadth first, so that children are neighbors; a cell with one child is replaced by it.
+    /// Stores the cells breadth first, so that children are adjacent. A cell with one child is
+    /// replaced by that child.
     fn flatten(root: &Cell, distance: &MeshDistance, deep: bool, progress: &dyn Progress) -> SphereTree {
         let mut nodes = vec![empty_node(0)];
         let mut cells = vec![skip_single(root)];
@@ -205,7 +217,7 @@ impl SphereTree {
         SphereTree::of_nodes(nodes)
     }
 
-    /// Of nodes that are already a tree: breadth first, children neighbors.
+    /// Makes a tree of nodes that are in tree order: breadth first, children adjacent.
     fn of_nodes(nodes: Vec<SphereNode>) -> SphereTree {
         let leaf_boxes = nodes
             .iter()

@@ -1,10 +1,11 @@
-//! A search without derivatives.
+//! Minimization without derivatives.
 //!
 //! Source: Nelder and Mead, *A simplex method for function minimization* (1965).
 
 use crate::Vec3;
 
-/// Nelder and Mead in three dimensions, from a corner simplex of side `step`; `f` keeps the best itself.
+/// Runs Nelder–Mead in three dimensions from a corner simplex of side `step`. The function `f`
+/// records the best point.
 pub(super) fn nelder_mead(start: Vec3, step: f64, evaluations: usize, mut f: impl FnMut(&Vec3) -> f64) {
     let mut at = [start; 4];
     for k in 0..3 {

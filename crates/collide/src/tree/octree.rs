@@ -1,25 +1,28 @@
-//! The octree builder: the surface is cut by the planes of an octree, and each cell's piece gets a tight sphere.
+//! The octree builder: the planes of an octree cut the surface, and each cell's piece gets a tight
+//! sphere.
 //!
-//! A piece's sphere starts at the small enclosing sphere of its corners and is moved inwards along the mean normal,
-//! growing so that it still holds the piece: a larger sphere with its center deeper in the solid bulges less (`δ²/2R`
-//! for a flat piece of radius `δ`). Of a few such spheres the one with the least outward error is kept. A cell whose
-//! sphere is good enough is a leaf; others are divided.
+//! The sphere of a piece starts as the small enclosing sphere of its corners and is moved inwards
+//! along the mean normal, growing to contain the piece. A larger sphere with a deeper center bulges
+//! less (`δ²/2R` for a flat piece of radius `δ`). Of a few such spheres the one with the smallest
+//! outward error is kept. A cell whose sphere meets the target is a leaf; others are divided.
 //!
-//! With `even`, each leaf is then grown until it reaches `target` outwards, no more and no less: the leaves' outer
-//! points lie on one offset surface, and a flat face stays flat. A tree of one sphere is left as it is.
+//! With `even`, each leaf is then grown until it extends exactly `target` outside. The outermost
+//! points of the leaves lie on one offset surface, so a flat face stays flat. A tree of one sphere
+//! is not grown.
 //!
-//! Departs from the classic octree tree (spheres around cells) in all of that; it keeps its robustness: any triangles
-//! will do.
+//! Departs from the classic octree (spheres around cells) in all of this, but accepts any triangles
+//! as that does.
 
 use super::builder::{Built, Cell, Job, Progress, StageCount, TreeBuilder};
 use super::sphere::{Sphere, around_points};
 use crate::{MeshDistance, MeshError, Vec3};
 
-/// No tree gets more leaves than this.
+/// Maximum number of leaves of a tree.
 const MAX_LEAVES: usize = 400_000;
-/// How far the sphere's center is moved inwards, in radii of the starting sphere.
+/// Distances by which the sphere's center is moved inwards, in radii of the initial sphere.
 const SHIFTS: [f64; 9] = [0.0, 0.3, 0.6, 1.0, 1.5, 2.2, 3.2, 4.5, 6.5];
-/// Leaves are grown by this part of the starting radius, so that neighbors overlap by more than rounding.
+/// Growth of each leaf, as a fraction of its initial radius, so that neighbors overlap by more than
+/// rounding.
 const OVERLAP: f64 = 0.01;
 
 /// A convex piece of one triangle.
@@ -27,7 +30,7 @@ type Piece = Vec<Vec3>;
 
 struct Context<'a> {
     distance: &'a MeshDistance,
-    /// Good enough: outward error in meters.
+    /// Outward error at which a cell is not divided, meters.
     target: f64,
     depth: u32,
     even: bool,
@@ -35,7 +38,7 @@ struct Context<'a> {
     progress: &'a dyn Progress,
 }
 
-/// The builder.
+/// The octree builder.
 pub(super) struct Octree;
 
 impl TreeBuilder for Octree {
@@ -87,7 +90,7 @@ impl Context<'_> {
         Cell::Inner(children.collect())
     }
 
-    /// The sphere of least outward error among those tried, and that error.
+    /// Returns the tried sphere with the smallest outward error, and that error.
     fn tight_sphere(&self, pieces: &[Piece]) -> (Sphere, f64) {
         let points: Vec<Vec3> = pieces.iter().flatten().copied().collect();
         let start = around_points(&points);
@@ -105,12 +108,13 @@ impl Context<'_> {
     }
 }
 
-/// Sum of the pieces' areas times their normals (twice).
+/// Returns the sum of the pieces' areas times their normals, doubled.
 fn area_vector(pieces: &[Piece]) -> Vec3 {
     pieces.iter().map(|p| p.windows(2).skip(1).map(|w| (w[0] - p[0]).cross(&(w[1] - p[0]))).sum::<Vec3>()).sum()
 }
 
-/// Cuts all pieces at `x_k = at`: those below, those above. A corner made by a cut is the same number on both sides.
+/// Cuts all pieces at `x_k = at` into those below and those above. A corner that a cut makes has
+/// the same bits on both sides.
 fn cut(pieces: Vec<Piece>, k: usize, at: f64) -> [Vec<Piece>; 2] {
     let (mut below, mut above) = (Vec::new(), Vec::new());
     for piece in pieces {

@@ -1,19 +1,21 @@
-//! How good a tree of spheres is: the figures of each level against the solid, measured on samples.
+//! Quality of a sphere tree: compares each level with the solid, by sampling.
 //!
-//! The measure knows nothing of how the tree was built, and takes any spheres. `L` is the union of a level's spheres, `M` the solid inside the
-//! mesh, `D` the diagonal of its bounding box, `d_M` the signed distance to `M` (above 0 outside), `d_L(p) = minᵢ |p − cᵢ| − rᵢ`:
+//! The measure works for any spheres and knows nothing about the builder. `L` is the union of the
+//! spheres of a level, `M` the solid inside the mesh, `D` the diagonal of its bounding box, `d_M`
+//! the signed distance to `M` (above 0 outside), `d_L(p) = minᵢ |p − cᵢ| − rᵢ`:
 //!
 //! | figure | meaning |
 //! |---|---|
-//! | coverage | share of surface samples with `d_L ≤ tolerance` |
-//! | gap | `max(0, d_L)` over surface samples, over `D`: how far what is bare is from `L` |
-//! | protrusion | `max(0, d_M)` over the exposed boundary of `L`, weighted by area, over `D` |
-//! | sphere error | per sphere the largest `d_M` of any of its points, exposed or not, over `D` (the measure of Bradshaw and O'Sullivan) |
+//! | coverage | fraction of surface samples with `d_L ≤ tolerance` |
+//! | gap | `max(0, d_L)` over surface samples, divided by `D`: distance of uncovered points from `L` |
+//! | protrusion | `max(0, d_M)` over the exposed boundary of `L`, weighted by area, divided by `D` |
+//! | sphere error | per sphere the largest `d_M` of any of its points, exposed or not, divided by `D` (the measure of Bradshaw and O'Sullivan) |
 //! | volume ratio | `vol L / vol M`; outside is `vol(L ∖ M) / vol M`, missing `vol(M ∖ L) / vol M` |
-//! | nesting | spheres that stick out of their parent by more than the tolerance (or have none), and by how much, over `D` |
+//! | nesting | number of spheres outside their parent by more than the tolerance (or without a parent), and the largest excess, divided by `D` |
 //!
-//! Samples are deterministic and evenly spread; results are the same bits on any number of threads. Being samples, they tell a little less
-//! than the worst: [`SphereTree::outward_error_at`] is the bound above it, [`SphereTree::check_coverage`] the proof of coverage.
+//! Samples are deterministic and evenly distributed; results have the same bits on any number of
+//! threads. Sampled maxima are slightly too small: [`SphereTree::outward_error_at`] is the upper
+//! bound, [`SphereTree::check_coverage`] proves coverage.
 
 mod samples;
 mod sphere_union;
@@ -25,28 +27,30 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sphere_union::SphereUnion;
 
-/// Most samples of one kind.
+/// Maximum number of samples of one kind.
 const MAX_SAMPLES: usize = 1 << 26;
-/// A point this part of `D` below the surface of another sphere is not exposed.
+/// Depth, as a fraction of `D`, below the surface of another sphere from which a point is not
+/// exposed.
 const EXPOSED: f64 = 1e-9;
 
-/// How many samples are taken. Counts above 67 million count as that.
+/// Numbers of samples. Counts above 67 million are reduced to that.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QualitySettings {
-    /// On the surface of the mesh.
+    /// Samples on the surface of the mesh.
     pub surface_samples: usize,
-    /// On all spheres of a level together, in proportion to their areas.
+    /// Samples on all spheres of a level together, in proportion to their areas.
     pub sphere_samples: usize,
-    /// On each sphere at least.
+    /// Minimum number of samples on each sphere.
     pub min_samples_per_sphere: usize,
-    /// In the box around mesh and spheres.
+    /// Samples in the box around mesh and spheres.
     pub volume_samples: usize,
-    /// What counts as covered and as nested, as a part of the diagonal.
+    /// Tolerance of coverage and nesting, as a fraction of the diagonal.
     pub tolerance: f64,
 }
 
 impl Default for QualitySettings {
-    /// 20,000 on the surface, 60,000 (48 at least) on the spheres, 131,072 in the volume; tolerance 1e-6.
+    /// Returns 20,000 samples on the surface, 60,000 on the spheres (at least 48 each), 131,072 in
+    /// the volume; tolerance 1e-6.
     fn default() -> QualitySettings {
         QualitySettings {
             surface_samples: 20_000,
@@ -58,58 +62,59 @@ impl Default for QualitySettings {
     }
 }
 
-/// The figures of one level; lengths over the diagonal of the mesh's bounding box.
+/// Quality of one level. Lengths are divided by the diagonal of the mesh's bounding box.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LevelQuality {
     /// 0 for the root.
     pub level: u32,
-    /// Spheres that stand for the solid at this level.
+    /// Number of spheres that represent the solid at this level.
     pub spheres: usize,
-    /// Share of the surface inside the spheres, 0 to 1.
+    /// Fraction of the surface inside the spheres, 0 to 1.
     pub coverage: f64,
-    /// Mean over the surface of how far bare points are from the spheres.
+    /// Mean distance of uncovered surface points from the spheres, over the whole surface.
     pub gap_mean: f64,
-    /// The 95th percentile of the same.
+    /// 95th percentile of that distance.
     pub gap_p95: f64,
-    /// The most.
+    /// Largest such distance.
     pub gap_max: f64,
-    /// Share of vertices inside the spheres.
+    /// Fraction of vertices inside the spheres.
     pub vertex_coverage: f64,
-    /// The most that a vertex is from the spheres.
+    /// Largest distance of a vertex from the spheres.
     pub vertex_gap_max: f64,
-    /// The most that the exposed boundary of the spheres is outside the solid.
+    /// Largest distance of the exposed boundary of the spheres outside the solid.
     pub protrusion_max: f64,
-    /// The 95th percentile by area.
+    /// 95th percentile of that distance, by area.
     pub protrusion_p95: f64,
-    /// The mean by area.
+    /// Mean of that distance, by area.
     pub protrusion_mean: f64,
-    /// The most that any sphere reaches outside.
+    /// Largest distance that any sphere extends outside.
     pub sphere_worst: f64,
-    /// The mean over spheres of the most that each reaches outside.
+    /// Mean over the spheres of the distance that each extends outside.
     pub sphere_mean: f64,
-    /// Volume of the union over that of the solid.
+    /// Volume of the union divided by that of the solid.
     pub volume_ratio: f64,
-    /// Volume of the union outside the solid, over that of the solid.
+    /// Volume of the union outside the solid, divided by that of the solid.
     pub outside: f64,
-    /// Volume of the solid outside the union, over that of the solid.
+    /// Volume of the solid outside the union, divided by that of the solid.
     pub missing: f64,
-    /// Spheres outside their parents.
+    /// Number of spheres outside their parents.
     pub nesting_broken: usize,
-    /// The most that one is.
+    /// Largest excess of a sphere over its parent.
     pub nesting_max: f64,
 }
 
 impl SphereTree {
-    /// Measures every level of the tree against its mesh: closed, outward-wound, not empty.
+    /// Measures every level of the tree against its mesh, which must be closed, outward-wound and
+    /// not empty.
     pub fn quality(&self, mesh: &TriMesh, settings: &QualitySettings) -> Vec<LevelQuality> {
         LevelQuality::of_levels(&self.level_lists(), mesh, settings)
     }
 }
 
 impl LevelQuality {
-    /// Measures any spheres, level by level; `node` is not looked at. A level without spheres has no figures; a parent that is not there
-    /// (below the first level) counts as broken nesting.
+    /// Measures any spheres, level by level; `node` is ignored. A level without spheres has all
+    /// figures 0. A missing parent (below the first level) counts as broken nesting.
     pub fn of_levels(levels: &[Vec<LevelSphere>], mesh: &TriMesh, settings: &QualitySettings) -> Vec<LevelQuality> {
         let solid = Solid::new(mesh, settings);
         let above = std::iter::once(None).chain(levels.iter().map(Some));
@@ -122,7 +127,7 @@ impl LevelQuality {
     }
 }
 
-/// The mesh, made ready to be compared with.
+/// The mesh, prepared for the comparison.
 struct Solid<'a> {
     mesh: &'a TriMesh,
     distance: MeshDistance,
@@ -132,7 +137,8 @@ struct Solid<'a> {
     settings: QualitySettings,
 }
 
-/// A point on a sphere: which sphere, the area it stands for, how far it is outside the solid, whether no other sphere hides it.
+/// A sample on a sphere: the sphere, the area it represents, its distance outside the solid,
+/// whether it is outside all other spheres.
 struct BoundaryPoint {
     sphere: usize,
     area: f64,
@@ -182,7 +188,7 @@ impl<'a> Solid<'a> {
         (row.vertex_coverage, row.vertex_gap_max) = (share, largest(&gaps));
     }
 
-    /// Share of the points within the tolerance, and the gaps of all.
+    /// Returns the fraction of the points within the tolerance, and the gaps of all points.
     fn gaps(&self, union: &SphereUnion, points: &[Vec3]) -> (f64, Vec<f64>) {
         let gaps: Vec<f64> = points.par_iter().map(|p| union.distance(p).max(0.0) / self.diagonal).collect();
         let covered = gaps.iter().filter(|g| **g <= self.settings.tolerance).count();
@@ -203,7 +209,7 @@ impl<'a> Solid<'a> {
         row.protrusion_p95 = percentile_95(exposed);
     }
 
-    /// Points on all spheres, in the spheres' order.
+    /// Samples all spheres, in their order.
     fn boundary(&self, level: &[LevelSphere], union: &SphereUnion) -> Vec<BoundaryPoint> {
         let square: f64 = level.iter().map(|b| b.radius * b.radius).sum::<f64>().max(f64::MIN_POSITIVE);
         let of_sphere = |(sphere, b): (usize, &LevelSphere)| {
@@ -253,7 +259,8 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().copied().fold(0.0, f64::max)
 }
 
-/// The least value that is not exceeded by 95 % of the weight; 0 for none. Items are (value, weight).
+/// Returns the smallest value that is not exceeded by 95 % of the weight; 0 for no items. Items are
+/// (value, weight).
 fn percentile_95(mut items: Vec<(f64, f64)>) -> f64 {
     items.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let wanted = 0.95 * items.iter().map(|i| i.1).sum::<f64>();

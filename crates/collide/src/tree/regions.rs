@@ -1,7 +1,9 @@
-//! Building by regions: points of the surface are parted among a few spheres, and each part among its own few.
+//! Top-down builds: the points of the surface are partitioned among a few spheres, then the points
+//! of each again.
 //!
-//! What the builders differ in is how a region is parted ([`Part`]); what they share is here: the levels, when to stop, and the closing
-//! of the leaves over the surface itself ([`super::grow_to_cover`]).
+//! Builders differ in how a region is partitioned ([`Part`]). This module has the shared parts: the
+//! levels, the stopping rule, and the growth of the leaves to cover the surface itself
+//! ([`super::grow_to_cover`]).
 
 use super::builder::{Built, Cell, Job, Progress, StageCount};
 use super::grow_to_cover::grown_to_cover;
@@ -11,30 +13,32 @@ use super::sphere::{Sphere, around_points};
 use crate::{MeshDistance, Vec3};
 use rayon::prelude::*;
 
-/// Cover points per sphere of the deepest level, and bounds of their number.
+/// Cover points per sphere of the deepest level, and the limits of their number.
 const POINTS_PER_SPHERE: f64 = 40.0;
 const POINT_RANGE: (f64, f64) = (4000.0, 24_000.0);
-/// A region of fewer points is a leaf. With the number of points it bounds the number of leaves.
+/// A region of fewer points is a leaf. Together with the number of points this limits the number of
+/// leaves.
 const MIN_POINTS: usize = 4;
-/// Spheres of a smaller radius, as a part of the diagonal, are none.
+/// Smallest radius of a sphere, as a fraction of the diagonal.
 const MIN_RADIUS: f64 = 1e-9;
-/// Greatest number of rounds of [`refitted`].
+/// Maximum number of rounds of [`refitted`].
 const MAX_REFITS: usize = 6;
 /// Evaluations of the search for a part's center.
 const EVALUATIONS: usize = 60;
 
-/// Points of the surface, by their place in the cover, and a sphere that holds them.
+/// Points of the surface, as indices into the cover points, and a sphere that contains them.
 #[derive(Clone, Debug)]
 pub(super) struct Part {
     pub sphere: Sphere,
     pub points: Vec<u32>,
-    /// Upper bound of how far the sphere reaches out of the solid, meters.
+    /// Upper bound of how far the sphere extends outside the solid, meters.
     pub outward: f64,
 }
 
 impl Part {
-    /// The points with a sphere that reaches out of the solid little: the small enclosing sphere, or the one about `center`,
-    /// moved to where `max |p − c| + s(c)` is less, `s` the signed distance of the center.
+    /// Fits a sphere to the points that extends little outside the solid. The search starts at the
+    /// smallest enclosing sphere, or at `center`, and minimizes `max |p − c| + s(c)`, where `s` is
+    /// the signed distance of the center.
     pub fn of(points: Vec<u32>, center: Option<Vec3>, all: &[Vec3], distance: &MeshDistance) -> Part {
         let own: Vec<Vec3> = points.iter().map(|&i| all[i as usize]).collect();
         let start = around_points(&own);
@@ -54,7 +58,8 @@ impl Part {
     }
 }
 
-/// Points choose the sphere that reaches out least to hold them, and spheres are fitted anew, while that lowers how far the worst reaches out.
+/// Alternates two steps while the worst outward error decreases: each point selects the sphere that
+/// extends outside least to contain it, and the spheres are fitted again.
 pub(super) fn refitted(
     mut parts: Vec<Part>,
     all: &[Vec3],
@@ -84,19 +89,20 @@ pub(super) fn refitted(
     parts
 }
 
-/// How far the parts' spheres reach out, meters.
+/// Returns the largest outward error of the parts, meters.
 pub(super) fn worst(parts: &[Part]) -> f64 {
     parts.iter().map(|p| p.outward).fold(0.0, f64::max)
 }
 
-/// The cover points of a build.
+/// Returns the cover points of a build.
 pub(super) fn cover_points(job: &Job) -> CoverPoints {
     let spheres = f64::from(job.settings.branch).powi(job.settings.depth as i32);
     CoverPoints::on(job.mesh, (spheres * POINTS_PER_SPHERE).clamp(POINT_RANGE.0, POINT_RANGE.1) as usize)
 }
 
-/// Builds down to the settings' depth. `divide` parts a region (places in the cover, at least [`MIN_POINTS`]) into at most
-/// `branch` parts; a region that it cannot part stays a leaf.
+/// Builds all levels down to the depth of the settings. `divide` partitions a region (indices of
+/// cover points, at least [`MIN_POINTS`]) into at most `branch` parts. A region that it cannot
+/// partition stays a leaf.
 pub(super) fn build(job: &Job, cover: &CoverPoints, divide: &(dyn Fn(&[u32]) -> Vec<Part> + Sync)) -> Built {
     let (enough, tiny) = (job.settings.error * job.mesh.diagonal(), MIN_RADIUS * job.mesh.diagonal());
     let all: Vec<u32> = (0..cover.points.len() as u32).collect();
@@ -111,7 +117,7 @@ pub(super) fn build(job: &Job, cover: &CoverPoints, divide: &(dyn Fn(&[u32]) -> 
                 } else {
                     Vec::new()
                 };
-                // points at one place make no sphere; closing has others hold them
+                // coincident points make no sphere; other spheres are grown to contain them later
                 parts.retain(|p| p.sphere.radius > tiny);
                 if parts.len() < 2 { vec![part] } else { parts }
             })
@@ -131,7 +137,8 @@ pub(super) fn build(job: &Job, cover: &CoverPoints, divide: &(dyn Fn(&[u32]) -> 
     Built { root: nested(&spheres, &parents), stages }
 }
 
-/// Nested cells over the leaves' spheres. `parents` has per level the place of each sphere's parent in the level above, the deepest level last.
+/// Returns nested cells over the leaves' spheres. `parents` lists for each level the index of each
+/// sphere's parent in the level above, the deepest level last.
 fn nested(spheres: &[Sphere], parents: &[Vec<usize>]) -> Cell {
     let mut below: Vec<Cell> = spheres.iter().map(|sphere| Cell::Leaf(*sphere)).collect();
     for of in parents.iter().rev() {

@@ -1,19 +1,22 @@
-//! Any number of spheres from a tree, and spheres made to cover a surface.
+//! Selection of a given number of spheres from a tree.
 //!
-//! **A cut** is a set of nodes of which every leaf has exactly one above it or in it. Spheres hold the spheres of their children, so every cut holds
-//! what the leaves hold: the surface. From the root on, the sphere that reaches furthest outside is opened, as long as its children do not make too many.
+//! **A cut** is a set of nodes such that every leaf has exactly one node of the set above it or is
+//! in the set. Spheres contain the spheres of their children, so every cut contains what the leaves
+//! contain: the surface. Starting at the root, the sphere that extends furthest outside is replaced
+//! by its children as long as the limit allows.
 
 use super::SphereTree;
 use crate::{TriMesh, Vec3};
 
-/// A piece of a triangle smaller than this part of the mesh's diagonal is not split further.
+/// Smallest piece of a triangle that is split further, as a fraction of the mesh's diagonal.
 const MIN_PIECE: f64 = 1e-5;
-/// Splits of a triangle.
+/// Maximum number of splits of a triangle.
 const MAX_SPLITS: u32 = 40;
 
 impl SphereTree {
-    /// At most `most` spheres (1 at least) that hold the surface: indices of nodes, ascending. Spheres that reach at most `outward` meters outside are not
-    /// opened.
+    /// Returns at most `most` spheres (at least 1) that contain the surface, as ascending node
+    /// indices. Spheres that extend at most `outward` meters outside are not replaced by their
+    /// children.
     pub fn select(&self, most: usize, outward: f64) -> Vec<usize> {
         let mut selected = vec![0];
         loop {
@@ -35,9 +38,10 @@ impl SphereTree {
     }
 }
 
-/// Grows spheres (center and radius, meters) until they cover the surface of `mesh`, which need not be closed; at least one sphere. Each bare piece is
-/// taken in by the sphere that grows least for it. Returns by how much the sphere that grew most did: 0 where all was covered, which makes this a
-/// proof of coverage.
+/// Grows spheres (center and radius, meters) until they cover the surface of `mesh`, which need not
+/// be closed. Needs at least one sphere. Each uncovered piece is assigned to the sphere that grows
+/// least for it. Returns the largest growth: 0 if the spheres covered the surface before, which
+/// proves coverage.
 pub fn grow_to_cover(spheres: &mut [(Vec3, f64)], mesh: &TriMesh) -> f64 {
     let before: Vec<f64> = spheres.iter().map(|b| b.1).collect();
     let tiny = MIN_PIECE * mesh.diagonal();
@@ -48,7 +52,8 @@ pub fn grow_to_cover(spheres: &mut [(Vec3, f64)], mesh: &TriMesh) -> f64 {
     spheres.iter().zip(before).map(|(sphere, before)| sphere.1 - before).fold(0.0, f64::max)
 }
 
-/// A triangle lies in a sphere iff its corners do; else it is split 1:4. `last` is the sphere that held the last piece: mostly it holds the next.
+/// Covers a piece: it lies in a sphere iff its corners do; otherwise it is split 1:4. `last` is the
+/// sphere that contained the last piece and usually contains the next.
 fn cover(spheres: &mut [(Vec3, f64)], piece: &[Vec3; 3], tiny: f64, splits: u32, last: &mut usize) {
     let reach = |(center, _): &(Vec3, f64)| piece.iter().map(|p| (p - center).norm()).fold(0.0, f64::max);
     let holds = |sphere: &(Vec3, f64)| reach(sphere) <= sphere.1;

@@ -1,50 +1,52 @@
-//! How a sphere tree is to be built.
+//! Settings of sphere tree builds.
 
 use crate::MeshError;
 use serde::{Deserialize, Serialize};
 
-/// How a tree is built.
+/// Settings of a sphere tree build.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TreeSettings {
-    /// Which method.
+    /// The build method.
     pub builder: Builder,
-    /// Greatest number of children of a sphere, 2 to 64. The octree has 8 at most and takes no notice.
+    /// Maximum number of children per sphere, 2 to 64. The octree ignores it and has at most 8.
     pub branch: u32,
-    /// Greatest number of subdivisions, 1 to 9.
+    /// Maximum number of subdivisions, 1 to 9.
     pub depth: u32,
-    /// A cell is not divided further once its sphere reaches at most this far outwards, as a part of the mesh's
-    /// diagonal; 1e-4 to 1.
+    /// A cell is not divided further once its sphere extends at most this far outside, as a
+    /// fraction of the mesh's diagonal; 1e-4 to 1.
     pub error: f64,
-    /// Grow every leaf to the same stand-off, `error`: flat faces stay flat, so that what stands on them stands
-    /// upright and at rest. Otherwise each leaf is as tight as it can be. Of the octree only.
+    /// Grow every leaf to the same offset, `error`. Flat faces stay flat, so a body that stands on
+    /// one stays upright and at rest. Otherwise each leaf is as tight as possible. Octree only.
     pub even: bool,
 }
 
-/// The methods there are.
+/// The build methods.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Builder {
-    /// Cells of an octree that the surface passes through. The fastest, and the one whose flat faces can be even.
+    /// Cells of an octree that intersect the surface. The fastest method, and the only one with
+    /// even flat faces.
     Octree,
-    /// Adaptive medial axis. The tightest.
+    /// Adaptive medial axis. The tightest method.
     #[default]
     Medial,
-    /// Hubbard's medial axis: spheres of a fixed set of samples, merged. Faster than the adaptive one and coarser.
+    /// Hubbard's medial axis: merges the spheres of a fixed set of samples. Faster and coarser than
+    /// the adaptive one.
     Hubbard,
-    /// Spheres of an oriented grid's cubes. Faster still.
+    /// Spheres of the cubes of an oriented grid. Faster still.
     Grid,
 }
 
 impl Default for TreeSettings {
-    /// The tightest tree of at most 8, 64 and 512 spheres.
+    /// The tightest tree, with at most 8, 64 and 512 spheres.
     fn default() -> TreeSettings {
         TreeSettings { builder: Builder::Medial, branch: 8, depth: 3, error: 1e-4, even: false }
     }
 }
 
 impl TreeSettings {
-    /// An octree of an outward error of 1 % of the diagonal, evenly.
+    /// Returns the settings of an even octree with an outward error of 1 % of the diagonal.
     pub fn octree() -> TreeSettings {
         TreeSettings { builder: Builder::Octree, branch: 8, depth: 7, error: 0.01, even: true }
     }

@@ -1,20 +1,20 @@
-//! Spheres, and small enclosing ones of points.
+//! Spheres, and small enclosing spheres of points.
 //!
-//! Source: Bădoiu and Clarkson, *Smaller core-sets for balls* (2003): step from the center towards the farthest item,
-//! by a falling share of the way; after `n` steps the radius is within `1/√n` of the least. The sphere returned
-//! encloses exactly.
+//! Source: Bădoiu and Clarkson, *Smaller core-sets for balls* (2003): step from the center towards
+//! the farthest item by a decreasing fraction of the distance. After `n` steps the radius is within
+//! `1/√n` of the smallest. The returned sphere contains all points exactly.
 
 use super::enclose::smallest_around;
 use super::nelder_mead::nelder_mead;
 use crate::{MeshDistance, Vec3};
 
-/// Triangles that a search for a center looks at for each distance; what the search comes to is measured exactly.
+/// Triangles that a center search examines per distance query; its result is measured exactly.
 pub(super) const SEARCH_TRIANGLES: usize = 400;
 const STEPS: usize = 100;
-/// Evaluations of each of the two searches for the center of a sphere that lies deep.
+/// Evaluations of each of the two searches for the center of an enclosing sphere.
 const EVALUATIONS: usize = 40;
 
-/// A sphere; meters.
+/// A sphere; lengths in meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Sphere {
     pub center: Vec3,
@@ -22,19 +22,19 @@ pub(crate) struct Sphere {
 }
 
 impl Sphere {
-    /// Upper bound of how far the sphere reaches outside the solid.
+    /// Returns an upper bound of how far the sphere extends outside the solid.
     pub fn outward(&self, distance: &MeshDistance) -> f64 {
         (self.radius + distance.closest(&self.center).signed_distance).max(0.0)
     }
 
-    /// The sphere about `center` that just holds the points.
+    /// Returns the smallest sphere about `center` that contains the points.
     pub fn about(center: Vec3, points: &[Vec3]) -> Sphere {
         let square = points.iter().map(|p| (p - center).norm_squared()).fold(0.0, f64::max);
         Sphere { center, radius: square.sqrt() }
     }
 }
 
-/// A sphere around points, close to the smallest; zero for none.
+/// Returns a sphere around points that is close to the smallest; zero for no points.
 pub(crate) fn around_points(points: &[Vec3]) -> Sphere {
     let bounds = crate::Aabb::around(points.iter().copied());
     let mut center = 0.5 * (bounds.min + bounds.max);
@@ -53,14 +53,14 @@ pub(crate) fn around_points(points: &[Vec3]) -> Sphere {
     best
 }
 
-/// The last of the points that are farthest from `center`, and the square of its distance.
+/// Returns the last of the points farthest from `center`, and its squared distance.
 fn farthest(points: &[Vec3], center: &Vec3) -> Option<(Vec3, f64)> {
     let squares = points.iter().map(|p| (*p, (p - center).norm_squared()));
     squares.reduce(|a, b| if b.1 >= a.1 { b } else { a })
 }
 
-/// Of the spheres around spheres the one that reaches out of the solid least, so far as a search finds it: its center
-/// lies deeper than that of the smallest.
+/// Returns the sphere around spheres that extends least outside the solid, as far as a search finds
+/// it. Its center lies deeper than that of the smallest enclosing sphere.
 pub(super) fn min_outward_enclosing(spheres: &[Sphere], distance: &MeshDistance) -> Sphere {
     let smallest = smallest_around(spheres);
     let mut best = (smallest.radius + distance.closest(&smallest.center).signed_distance, smallest);

@@ -1,15 +1,18 @@
-//! The promises of a sphere tree, checked by code that shares nothing with the builders.
+//! Verification of a sphere tree, by code that shares nothing with the builders.
 
 use super::builder::check_stopped;
 use super::{Progress, SphereNode, SphereTree};
 use crate::{MeshError, TriMesh, Vec3};
 
-/// A piece of surface smaller than this part of the mesh's diagonal that lies across spheres is covered if its corners
-/// are.
+/// Smallest piece of surface that is split, as a fraction of the mesh's diagonal. A smaller piece
+/// is covered if its corners are.
 const MIN_PIECE: f64 = 1e-5;
 
 impl SphereTree {
-    /// Every parent contains its children: `|c − c'| + r' ≤ r`, to rounding.
+    /// Checks that every parent contains its children: `|c − c'| + r' ≤ r`, up to rounding.
+    ///
+    /// # Errors
+    /// [`MeshError::Tree`] names the first child that is not contained.
     pub fn check_nesting(&self) -> Result<(), MeshError> {
         for (n, parent) in self.nodes.iter().enumerate() {
             for child in parent.child_range() {
@@ -25,14 +28,17 @@ impl SphereTree {
         Ok(())
     }
 
-    /// The leaves cover the surface of `mesh`. A triangle lies in a sphere iff its corners do, so each is halved
-    /// until every piece lies in one sphere, or is tiny (1e-5 of the diagonal) and each of its corners lies in some
-    /// sphere.
+    /// Checks that the leaves cover the surface of `mesh`. A triangle lies in a sphere iff its
+    /// corners do. Each triangle is halved until every piece lies in one sphere, or is tiny (1e-5
+    /// of the diagonal) and each of its corners lies in some sphere.
+    ///
+    /// # Errors
+    /// [`MeshError::Tree`] names a triangle and a point that is not covered.
     pub fn check_coverage(&self, mesh: &TriMesh) -> Result<(), MeshError> {
         self.check_coverage_watched(mesh, &())
     }
 
-    /// The same; `progress` can end it.
+    /// Like [`SphereTree::check_coverage`]; `progress` can stop it.
     pub(super) fn check_coverage_watched(&self, mesh: &TriMesh, progress: &dyn Progress) -> Result<(), MeshError> {
         let tiny = MIN_PIECE * mesh.diagonal();
         for t in 0..mesh.triangles.len() {
@@ -64,8 +70,8 @@ impl SphereTree {
         [[a, middle, c], [middle, b, c]].iter().try_for_each(|t| self.cover(t, tiny, splits - 1))
     }
 
-    /// Whether one leaf below `node` holds all the points. Spheres nest, so a node that does not hold them has no such
-    /// leaf.
+    /// Returns whether one leaf below `node` contains all the points. Spheres nest, so a node that
+    /// does not contain them has no such leaf.
     fn leaf_holding(&self, node: usize, points: &[Vec3]) -> bool {
         let here = &self.nodes[node];
         points.iter().all(|p| holds(here, p))

@@ -1,13 +1,14 @@
-//! Burst: a sphere is taken away and its points go to the others, again and again, the sphere that is missed least first.
+//! Burst: removes spheres one by one, cheapest first, and assigns their points to the others.
 //!
-//! Source: Bradshaw and O'Sullivan, *Adaptive medial-axis approximation for sphere-tree construction* (2004), §5. What
-//! a burst costs is how much the sum of the sixth powers of all errors grows.
+//! Source: Bradshaw and O'Sullivan, *Adaptive medial-axis approximation for sphere-tree
+//! construction* (2004), §5. The cost of a removal is the growth of the sum of the sixth powers of
+//! all errors.
 
 use super::refit::Fit;
 use super::site::Site;
 use crate::Vec3;
 
-/// The sites that are left of `fit` when at most `most` are.
+/// Returns the sites that remain of `fit` when at most `most` are left.
 pub(super) fn burst(points: &[Vec3], mut fit: Fit, most: usize) -> Vec<Site> {
     while fit.sites.len() > most.max(1) {
         let costs = (0..fit.sites.len()).map(|k| (cost(points, &fit, k), k));
@@ -20,7 +21,7 @@ pub(super) fn burst(points: &[Vec3], mut fit: Fit, most: usize) -> Vec<Site> {
     fit.sites
 }
 
-/// How much dearer the others are without site `k`.
+/// Returns the cost of removing site `k`.
 fn cost(points: &[Vec3], fit: &Fit, k: usize) -> f64 {
     let mut grown: Vec<(usize, f64)> = Vec::new();
     for &i in &fit.parts[k] {

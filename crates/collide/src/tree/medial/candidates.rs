@@ -1,20 +1,22 @@
-//! Candidate centers: the spheres inside the solid that touch the surface at a cover point and are as large as can be.
+//! Candidate centers: the largest spheres inside the solid that touch the surface at a cover point.
 //!
-//! Source: Ma, Bae and Choi, *3D medial axis point approximation using nearest neighbors and the normal field*
-//! (2012), with the mesh's own closest point in place of the nearest sample. From a sphere that touches at `p` with
-//! inward normal `−n`, the closest surface point `q` of its center, if it lies within the sphere, gives the next
-//! smaller one through `p` and `q`: `r ← |p − q|² / 2 n·(p − q)`. The centers lie on the medial axis, next to the
-//! Voronoi centers that sampling gives, and none is missed for want of samples.
+//! Source: Ma, Bae and Choi, *3D medial axis point approximation using nearest neighbors and the
+//! normal field* (2012), with the closest point of the mesh instead of the nearest sample. Given a
+//! sphere that touches at `p` with inward normal `−n`, let `q` be the closest surface point of its
+//! center. If `q` lies within the sphere, the next smaller sphere passes through `p` and `q`: `r ←
+//! |p − q|² / 2 n·(p − q)`. The centers lie on the medial axis, next to the Voronoi centers of the
+//! samples, and do not depend on the sample density.
 
 use super::site::Site;
 use super::types::CoverPoints;
 use crate::tree::sphere::SEARCH_TRIANGLES;
 use crate::{MeshDistance, Vec3};
 
-/// Bounds the shrinking; five steps are usual.
+/// Maximum number of shrinking steps; five are typical.
 const STEPS: usize = 12;
 
-/// The largest inner sphere that touches at cover point `i`; `largest` is the first radius tried.
+/// Returns the largest inner sphere that touches at cover point `i`; `largest` is the initial
+/// radius.
 pub(super) fn touching(cover: &CoverPoints, i: u32, distance: &MeshDistance, largest: f64) -> Site {
     let (p, n) = (cover.points[i as usize], cover.normals[i as usize]);
     let mut radius = largest;

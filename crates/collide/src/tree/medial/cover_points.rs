@@ -1,8 +1,9 @@
-//! The points of the surface that the spheres are made to cover: vertices, and points inside triangles by area.
+//! Sampling of the surface points that the spheres must cover: vertices, and points inside
+//! triangles by area.
 //!
-//! Along the triangles in their order, each `A/n` of area gets a point (`A` the whole area, `n` the number asked
-//! for); within its triangle it lies at the next member of the R₂ sequence, which spreads evenly (Roberts, *The
-//! unreasonable effectiveness of quasirandom sequences*, 2018).
+//! In the order of the triangles, each `A/n` of area gets a point (`A` the whole area, `n` the
+//! requested number). Within a triangle the point is the next member of the R₂ sequence, which is
+//! evenly distributed (Roberts, *The unreasonable effectiveness of quasirandom sequences*, 2018).
 
 use super::types::CoverPoints;
 use crate::{TriMesh, Vec3};
@@ -11,7 +12,8 @@ use crate::{TriMesh, Vec3};
 const R2: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
 
 impl CoverPoints {
-    /// About `count` points by area, and all vertices of triangles (at most `count` of them, evenly left out).
+    /// Samples about `count` points by area, and all vertices of triangles (at most `count`, evenly
+    /// spaced).
     pub fn on(mesh: &TriMesh, count: usize) -> CoverPoints {
         let mut cover = CoverPoints::default();
         let triangle_of = vertex_triangles(mesh);
@@ -44,7 +46,7 @@ impl CoverPoints {
     }
 }
 
-/// Per vertex, the first triangle that holds it.
+/// Returns for each vertex the first triangle that contains it.
 fn vertex_triangles(mesh: &TriMesh) -> Vec<Option<u32>> {
     let mut of = vec![None; mesh.vertices.len()];
     for (t, triangle) in mesh.triangles.iter().enumerate() {
@@ -60,7 +62,7 @@ fn area_vector(mesh: &TriMesh, t: usize) -> Vec3 {
     (b - a).cross(&(c - a))
 }
 
-/// The unit square folded onto the triangle.
+/// Maps the unit square to the triangle by folding.
 fn on_triangle([a, b, c]: [Vec3; 3], u: f64, v: f64) -> Vec3 {
     let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
     a + (b - a) * u + (c - a) * v

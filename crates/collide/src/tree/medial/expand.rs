@@ -1,20 +1,22 @@
-//! Expand and select: every candidate is grown to a stand-off `e` beyond the surface, a greedy set cover of the points
-//! is drawn from them, and the smallest `e` that gives at most `most` spheres is searched by halving.
+//! Expand and select: grows every candidate to an offset `e` beyond the surface, draws a greedy set
+//! cover of the points from them, and finds the smallest `e` that needs at most `most` spheres by
+//! bisection.
 //!
-//! Source: Bradshaw and O'Sullivan, *Adaptive medial-axis approximation for sphere-tree construction* (2004), §5.
-//! A candidate grown to `e` holds `p` iff `need(c, p) ≤ e`, so that all needs are computed once.
+//! Source: Bradshaw and O'Sullivan, *Adaptive medial-axis approximation for sphere-tree
+//! construction* (2004), §5. A candidate grown to `e` contains `p` iff `need(c, p) ≤ e`, so all
+//! needs are computed once.
 
 use super::site::Site;
 use crate::Vec3;
 
-/// Halvings of the interval of stand-offs.
+/// Number of bisection steps.
 const HALVINGS: usize = 12;
 
-/// At most `most` of the candidates, chosen so that the greatest need of the points is small.
+/// Returns at most `most` of the candidates, with a small greatest need of the points.
 pub(super) fn expand(candidates: &[Site], points: &[Vec3], most: usize) -> Vec<Site> {
     let needs: Vec<f64> = candidates.iter().flat_map(|s| points.iter().map(|p| s.need(p))).collect();
     let rows: Vec<&[f64]> = needs.chunks(points.len().max(1)).collect();
-    // one candidate alone covers all at the least of the rows' greatest needs
+    // the candidate that alone covers all points with the smallest need
     let single = |row: &&[f64]| row.iter().copied().fold(0.0, f64::max);
     let Some(alone) = (0..rows.len()).min_by(|&a, &b| single(&rows[a]).total_cmp(&single(&rows[b]))) else {
         return Vec::new();
@@ -31,8 +33,8 @@ pub(super) fn expand(candidates: &[Site], points: &[Vec3], most: usize) -> Vec<S
     chosen.into_iter().map(|k| candidates[k]).collect()
 }
 
-/// Rows that together have an entry of at most `e` in each column, the one with most new columns first; `None` if
-/// `most` do not suffice.
+/// Returns rows that together have an entry of at most `e` in each column, most new columns first;
+/// `None` if `most` rows do not suffice.
 fn greedy(rows: &[&[f64]], columns: usize, e: f64, most: usize) -> Option<Vec<usize>> {
     let words = columns.div_ceil(64);
     let held: Vec<u64> = rows.iter().flat_map(|row| row.chunks(64).map(|c| bits(c, e))).collect();

@@ -1,9 +1,10 @@
-//! Groups: which spheres of a level lie in which sphere of the level above.
+//! Groups: the assignment of the spheres of a level to the spheres of the level above.
 //!
-//! Where the surface is hard the worst spheres want help from regions where it is easy, but a sphere has room for `branch`
-//! children only. So an exchange across groups comes with a chain of hand-overs: the group that has one too many
-//! hands one of its spheres to a neighbor, and so on, to a group with room; the chain is the one of least cost (Bellman
-//! and Ford). It is done only if the spheres around all groups that change reach out no further than a budget.
+//! The worst spheres lie where the surface is difficult, and need spheres from regions where it is
+//! easy. But a sphere has at most `branch` children. So an exchange across groups includes a chain
+//! of transfers: a group with one sphere too many gives one to a neighbor, and so on, up to a group
+//! with room. The chain has the least cost (Bellman and Ford). It is accepted only if the spheres
+//! around all changed groups stay within an error budget.
 
 use super::refit::keep;
 use super::site::Site;
@@ -11,20 +12,21 @@ use crate::MeshDistance;
 use crate::tree::TreeSettings;
 use crate::tree::sphere::{Sphere, min_outward_enclosing};
 
-/// With more groups than this, spheres are exchanged within groups only.
+/// Maximum number of groups for exchanges between groups; with more, spheres are exchanged within
+/// groups only.
 const MAX_GROUPS: usize = 128;
-/// How far the spheres above the leaves may reach out, as a multiple of what the worst of their level does before any
-/// exchange, all levels' parts together.
+/// Error budget of the spheres above the leaves, relative to the worst error of their level before
+/// any exchange, the sum over all levels.
 const SLACK: f64 = 0.2;
-/// The same for spheres two and more levels above those that are exchanged.
+/// The same for spheres two and more levels above the exchanged ones.
 const SLACK_ABOVE: f64 = 0.05;
 
 /// The groups of a level.
 #[derive(Clone, Debug)]
 pub(super) struct Groups {
-    /// Spheres that a group has room for.
+    /// Maximum number of spheres of a group.
     pub room: usize,
-    /// How far the sphere around a group may reach out of the solid, meters.
+    /// Maximum outward error of the sphere around a group, meters.
     pub budget: f64,
     /// Group of each sphere.
     pub of: Vec<usize>,
@@ -33,23 +35,23 @@ pub(super) struct Groups {
     sites: Vec<Site>,
     /// The spheres around the groups.
     around: Vec<Sphere>,
-    /// How those are grouped in turn.
+    /// The groups of these spheres in the level above.
     above: Option<Box<Groups>>,
 }
 
-/// An exchange among spheres, as the groups see it.
+/// An exchange of spheres.
 pub(super) struct Change {
-    /// Spheres that are other spheres now.
+    /// Spheres that change.
     pub spheres: Vec<(usize, Sphere)>,
-    /// The new sphere, maybe in the place of a burst one.
+    /// The new sphere; it can replace a removed one.
     pub new: (usize, Sphere),
-    /// The sphere that was split, in whose group the new one starts.
+    /// The sphere that was split. The new sphere starts in its group.
     pub split: usize,
 }
 
 impl Groups {
-    /// Groups of spheres, `of` saying which is whose, below those of the level above. Their budget is a little more than
-    /// the worst of them needs.
+    /// Makes groups of spheres below those of the level above; `of` is the group of each sphere.
+    /// The budget is a little above the worst error.
     pub fn new(
         spheres: Vec<Sphere>,
         of: Vec<usize>,
@@ -77,7 +79,7 @@ impl Groups {
         }
     }
 
-    /// Fits all spheres around groups anew, on all levels.
+    /// Fits all spheres around groups again, on all levels.
     pub fn refit(&mut self, distance: &MeshDistance) {
         (0..self.sites.len()).for_each(|g| self.fit(g, distance));
         if let Some(above) = &mut self.above {
@@ -86,19 +88,19 @@ impl Groups {
         }
     }
 
-    /// How far the spheres around the groups reach out at most.
+    /// Returns the largest outward error of the spheres around the groups.
     fn worst(&self) -> f64 {
         self.around.iter().zip(&self.sites).map(|(b, s)| b.radius - s.depth).fold(0.0, f64::max)
     }
 
-    /// Drops the spheres that are not marked; the groups of the others.
+    /// Drops the spheres that are not marked. Returns the groups of the others.
     pub fn keep(&mut self, kept: &[bool]) -> Vec<usize> {
         keep(&mut self.of, kept);
         keep(&mut self.spheres, kept);
         self.of.clone()
     }
 
-    /// Within what a sphere has to stay.
+    /// Returns the sphere within which sphere `k` has to stay.
     pub fn parent_bound(&self, k: usize) -> Option<Sphere> {
         let site = &self.sites[self.of[k]];
         Some(Sphere { center: site.center, radius: site.depth + self.budget })
@@ -113,8 +115,8 @@ impl Groups {
         }
     }
 
-    /// Makes the groups hold their spheres; whether they and all above stay within their budgets. A group is fitted
-    /// anew only where its present center does not do.
+    /// Fits the spheres around the stale groups. Returns whether they and all above stay within
+    /// their budgets. A group gets a new center only if its present one does not suffice.
     fn fit_groups(&mut self, mut stale: Vec<usize>, distance: &MeshDistance) -> bool {
         stale.sort_unstable();
         stale.dedup();
@@ -147,12 +149,13 @@ impl Groups {
         above.fit_groups(stale.into_iter().map(|g| above.of[g]).collect(), distance)
     }
 
-    /// Whether `sphere` in the place of sphere `k` would lie within what its group may hold about its present center.
+    /// Returns whether `sphere`, instead of sphere `k`, would fit its group within the budget at
+    /// the group's present center.
     fn would_fit(&self, k: usize, sphere: &Sphere) -> bool {
         need(&self.sites[self.of[k]], sphere) <= self.budget
     }
 
-    /// The groups after a change, if it can be had within the budget.
+    /// Returns the groups after a change, if it is possible within the budget.
     pub fn with_change(&self, change: &Change, distance: &MeshDistance) -> Option<Groups> {
         let mut next = self.clone();
         for &(k, sphere) in &change.spheres {
@@ -186,7 +189,7 @@ impl Groups {
         next.fit_groups(stale, distance).then_some(next)
     }
 
-    /// Hand-overs `(sphere, to)` from `full` to a group with room, of least total cost.
+    /// Returns transfers `(sphere, to)` from `full` to a group with room, of least total cost.
     fn chain(&self, size: &[usize], full: usize) -> Option<Vec<(usize, usize)>> {
         let groups = size.len();
         if groups > MAX_GROUPS {
@@ -196,7 +199,7 @@ impl Groups {
         for (k, (sphere, &from)) in self.spheres.iter().zip(&self.of).enumerate() {
             let here = self.cost(&self.sites[from], sphere).min(1.0);
             for (to, site) in self.sites.iter().enumerate() {
-                // a group is refitted after a hand-over, which makes some room
+                // a group is refitted after a transfer, which makes some room
                 let extra = (self.cost(site, sphere) - here).max(1e-6);
                 if to != from && extra < 3.0 && extra < hand[from][to].0 {
                     hand[from][to] = (extra, k);
@@ -231,13 +234,13 @@ impl Groups {
         (to == full).then_some(chain)
     }
 
-    /// What it costs a group to hold a sphere: 1 at the budget.
+    /// Returns the cost of a sphere in a group: 1 at the budget.
     fn cost(&self, site: &Site, sphere: &Sphere) -> f64 {
         (need(site, sphere) / self.budget).max(0.0).powi(4)
     }
 }
 
-/// How far the sphere about the site must reach out of the solid to hold `sphere`, meters.
+/// Returns the outward error of the sphere about the site that contains `sphere`, meters.
 fn need(site: &Site, sphere: &Sphere) -> f64 {
     (sphere.center - site.center).norm() + sphere.radius - site.depth
 }

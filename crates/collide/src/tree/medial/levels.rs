@@ -1,4 +1,4 @@
-//! The levels of the tree, from the root down.
+//! Construction of the levels of the tree, starting at the root.
 
 use super::adaptive::MedialAxis;
 use super::candidates::touching;
@@ -15,28 +15,28 @@ use crate::tree::sphere::{Sphere, around_points};
 use rayon::prelude::*;
 use std::sync::Mutex;
 
-/// Candidates per region: medial spheres, and spheres that touch it.
+/// Maximum number of candidates per region: medial spheres, and touching spheres.
 const MEDIAL: usize = 200;
 const TOUCHING: usize = 100;
-/// Sites that the medial spheres begin with.
+/// Initial number of sites of the medial axis.
 const FIRST_SITES: usize = 100;
-/// Medial spheres for each region that is to be divided, and bounds of their number.
+/// Number of medial spheres for each region that is divided, and the limits of their total.
 const SPHERES_PER_REGION: f64 = 120.0;
 const MIN_SPHERES: f64 = 1000.0;
 const MAX_SPHERES: f64 = 8000.0;
-/// Points of a region that the reducers look at; the last refit looks at all.
+/// Maximum number of points of a region for the reducers; the last refit uses all points.
 const MAX_SAMPLES: usize = 1200;
-/// Exchanges tried per sphere, and in one run.
+/// Number of exchanges tried per sphere, and the maximum of one run.
 const TRIES_PER_SPHERE: usize = 3;
 const MAX_TRIES: usize = 2000;
-/// Cover points: at least, at most while there are 40 for each leaf, at most while there are ten.
+/// Number of cover points: minimum, maximum at 40 per leaf, maximum at ten per leaf.
 const POINTS: (f64, f64, f64) = (6000.0, 20_000.0, 60_000.0);
-/// The spheres that a sphere is divided into stay within what it would be if it reached out so much farther than the worst
-/// of its level.
+/// The children of a sphere stay within the sphere enlarged to this multiple of the worst error of
+/// its level.
 const PARENT_BOUND_FACTOR: f64 = 1.15;
-/// Shares of the work: dividing, exchanging, filling gaps.
+/// Fractions of the work: division, exchange, filling of gaps.
 const PROGRESS_SHARES: [f64; 3] = [0.4, 0.3, 0.25];
-/// Sizes of the gaps that are filled, one after the other; parts of the mesh's diagonal.
+/// Sizes of the gaps that are filled one after the other, as fractions of the mesh's diagonal.
 const GAP_SIZES: [f64; 4] = [8e-3, 4e-3, 2e-3, 1e-3];
 
 pub(super) struct Levels<'a> {
@@ -44,7 +44,7 @@ pub(super) struct Levels<'a> {
     cover: CoverPoints,
     /// Per cover point, the sphere that touches there.
     candidates: Vec<Site>,
-    /// Adaptive medial spheres, and per cover point those that hold it.
+    /// Adaptive medial spheres, and per cover point the ones that contain it.
     medial: Vec<Site>,
     holders: Vec<Vec<u32>>,
     scale: f64,
@@ -52,10 +52,10 @@ pub(super) struct Levels<'a> {
     pub stages: Vec<StageCount>,
 }
 
-/// A part covered by few spheres.
+/// A region covered by few spheres.
 struct Divided {
     fit: Fit,
-    /// The way of reducing that won.
+    /// The reduction method that won.
     method: Option<usize>,
     exchanges: u64,
 }
@@ -80,7 +80,7 @@ impl<'a> Levels<'a> {
         levels
     }
 
-    /// Candidates for the cover points that have none yet.
+    /// Computes candidates for the cover points that have none yet.
     fn add_candidates(&mut self) {
         let new = self.candidates.len() as u32..self.cover.points.len() as u32;
         let touching = |i| match self.job.progress.stopped() {
@@ -91,7 +91,7 @@ impl<'a> Levels<'a> {
         self.candidates.extend(more);
     }
 
-    /// The whole of it.
+    /// Builds the tree and returns its cells.
     pub fn cells(&mut self) -> Cell {
         let (fit, parents) = self.leaves();
         let spheres = grown_to_cover(self.job.mesh, self.spheres(&fit), self.job.progress);
@@ -102,7 +102,7 @@ impl<'a> Levels<'a> {
         fit.sites.iter().zip(&fit.parts).map(|(s, part)| s.sphere(&points_of(&self.cover.points, part))).collect()
     }
 
-    /// The leaves, and of each level the spheres' parents.
+    /// Returns the leaves, and for each level the parents of its spheres.
     fn leaves(&mut self) -> (Fit, Vec<Vec<usize>>) {
         let all: Vec<u32> = (0..self.cover.points.len() as u32).collect();
         let alone = self.single_sphere(&all);
@@ -136,7 +136,7 @@ impl<'a> Levels<'a> {
         (fit, parents)
     }
 
-    /// One sphere for all points.
+    /// Fits one sphere to all points.
     fn single_sphere(&self, all: &[u32]) -> Fit {
         let center = around_points(&self.cover.points).center;
         let mut fit = Fit::of(vec![Site::at(center, self.job.distance)], &self.cover.points, all);
@@ -144,19 +144,19 @@ impl<'a> Levels<'a> {
         fit
     }
 
-    /// An outward error that needs no dividing, meters.
+    /// Returns the outward error at which a sphere is not divided, meters.
     fn target_error(&self) -> f64 {
         self.job.settings.error * self.scale
     }
 
-    /// The spheres of a level in those of the level above, from the second on.
+    /// Returns the groups of a level, from the second level on.
     fn grouped(&self, fit: &Fit, of: &[usize], above: Option<Groups>) -> Option<Groups> {
-        // the first level's spheres lie in the root and nowhere else
+        // all spheres of the first level belong to the root
         let root = of.iter().all(|g| *g == 0);
         (!root).then(|| Groups::new(self.spheres(fit), of.to_vec(), self.job.settings, above, self.job.distance))
     }
 
-    /// The leaves once more, with cover points where the surface between the others was left bare.
+    /// Refits the leaves with further cover points on the surface that they left uncovered.
     fn with_gaps_filled(&mut self, mut fit: Fit, level: u32, room: usize, mut groups: Option<&mut Groups>) -> Fit {
         for (n, gap) in GAP_SIZES.into_iter().enumerate().take_while(|_| !self.job.progress.stopped()) {
             let spheres = self.spheres(&fit);
@@ -172,7 +172,7 @@ impl<'a> Levels<'a> {
         fit
     }
 
-    /// Refines the medial spheres for the division of a level's spheres.
+    /// Refines the medial spheres for the division of a level.
     fn refine_medial(&mut self, axis: &mut MedialAxis, fit: &Fit, level: u32) {
         let parts = fit.errors.len() as f64;
         let least = (parts * SPHERES_PER_REGION).clamp(MIN_SPHERES, MAX_SPHERES) as usize;
@@ -185,7 +185,8 @@ impl<'a> Levels<'a> {
         self.stages.extend(axis.counts().stages(level));
     }
 
-    /// Candidates for a region: medial spheres that hold points of it, and spheres that touch it.
+    /// Returns the candidates of a region: medial spheres that contain points of it, and spheres
+    /// that touch it.
     fn candidates_of(&self, part: &[u32], parent_bound: Option<Sphere>) -> Vec<Site> {
         let mut holders: Vec<u32> =
             sample_evenly(part, MAX_SAMPLES).iter().flat_map(|&i| self.holders[i as usize].iter().copied()).collect();
@@ -196,7 +197,8 @@ impl<'a> Levels<'a> {
         medial.chain(touching).map(|site| Site { parent_bound, ..site }).collect()
     }
 
-    /// Spheres exchanged among all regions of a level, as far as its groups allow, and refitted together.
+    /// Exchanges spheres among all regions of a level, as far as the groups allow, and refits them
+    /// together.
     fn with_exchanges(&mut self, mut fit: Fit, level: u32, room: usize, groups: Option<&mut Groups>) -> Fit {
         let mut groups = groups;
         if let Some(groups) = groups.as_deref_mut() {
@@ -236,7 +238,7 @@ impl<'a> Levels<'a> {
                     let fit = Fit { sites: vec![*site], parts: vec![part.clone()], errors: vec![*error] };
                     Divided { fit, method: None, exchanges: 0 }
                 } else {
-                    // children stay within what the worst of the level reaches
+                    // children stay within the sphere at the worst error of the level
                     let reach = site.depth + PARENT_BOUND_FACTOR * fit.worst();
                     let parent_bound = (level > 1).then_some(Sphere { center: site.center, radius: reach });
                     self.divide_region(part, parent_bound)
@@ -259,7 +261,7 @@ impl<'a> Levels<'a> {
         (next, of)
     }
 
-    /// The points of a part covered by at most `branch` spheres.
+    /// Covers the points of a region by at most `branch` spheres.
     fn divide_region(&self, part: &[u32], parent_bound: Option<Sphere>) -> Divided {
         let most = self.job.settings.branch as usize;
         let points = &self.cover.points;
@@ -279,7 +281,7 @@ impl<'a> Levels<'a> {
         self.stages.push(StageCount { level, stage: stage.into(), count });
     }
 
-    /// A further share of the work is done.
+    /// Reports that a further fraction of the work is done.
     fn report(&self, share: f64) {
         if let Ok(mut done) = self.done.lock() {
             *done = (*done + share).min(1.0);
@@ -288,7 +290,7 @@ impl<'a> Levels<'a> {
     }
 }
 
-/// Nested cells over the leaves' spheres; `parents` of each level, the deepest last.
+/// Returns nested cells over the leaves' spheres; `parents` lists each level, the deepest last.
 fn nested(spheres: &[Sphere], parents: &[Vec<usize>]) -> Cell {
     let mut below: Vec<Option<Cell>> = spheres.iter().map(|sphere| Some(Cell::Leaf(*sphere))).collect();
     for of in parents.iter().rev() {
@@ -303,7 +305,7 @@ fn nested(spheres: &[Sphere], parents: &[Vec<usize>]) -> Cell {
     below.into_iter().flatten().next().unwrap_or(Cell::Inner(Vec::new()))
 }
 
-/// At most `most` of the items, evenly.
+/// Returns at most `most` of the items, evenly spaced.
 fn sample_evenly(items: &[u32], most: usize) -> Vec<u32> {
     items.iter().copied().step_by(items.len().div_ceil(most).max(1)).collect()
 }

@@ -1,8 +1,10 @@
-//! Optimize: the worst sphere is split in two, and to keep the count the sphere that is missed least is burst.
+//! Optimize: splits the worst sphere in two and, to keep the count, removes the sphere with the
+//! smallest removal need.
 //!
-//! Bursting hands the points of a sphere to the others; the sphere missed least is the one whose points then need least
-//! of those. After each exchange the spheres that it touches are refitted; it is kept if their cost falls. Whatever it
-//! does not touch stays as it is, so that an exchange costs the same among 500 spheres as among eight.
+//! A removal assigns the points of a sphere to the others; the removal need is the largest need of
+//! these points there. After each exchange the affected spheres are refitted, and the exchange is
+//! kept if their cost decreases. All other spheres stay unchanged, so an exchange costs the same
+//! among 500 spheres as among eight.
 
 use super::group::{Change, Groups};
 use super::refit::{Fit, optimized, points_of};
@@ -10,35 +12,35 @@ use super::site::Site;
 use crate::tree::Progress;
 use crate::{MeshDistance, Vec3};
 
-/// After so many exchanges in a row that did not pay, the worst spheres are left as they are.
+/// Maximum number of consecutive exchanges without improvement.
 const MAX_FAILURES: usize = 12;
-/// Spheres tried to burst for one that is split, where groups may refuse.
+/// Number of spheres tried for removal per split, as groups can refuse.
 const MAX_BURSTS: usize = 4;
-/// Candidates looked at for one half of a sphere that is split.
+/// Maximum number of candidates for one half of a split sphere.
 const MAX_CANDIDATES: usize = 48;
 
-/// What the exchanges work on.
+/// The input of the exchanges.
 pub(super) struct Exchange<'a> {
     pub points: &'a [Vec3],
     /// Per point, the sphere that touches there.
     pub candidates: &'a [Site],
     pub distance: &'a MeshDistance,
-    /// Greatest number of spheres.
+    /// Maximum number of spheres.
     pub most: usize,
-    /// Spheres that reach out no further than this are left as they are, meters.
+    /// Outward error at which a sphere is not split, meters.
     pub enough: f64,
-    /// Exchanges tried.
+    /// Maximum number of exchanges tried.
     pub tries: usize,
     pub progress: &'a dyn Progress,
 }
 
 impl Exchange<'_> {
-    /// The fit after the exchanges that paid, and their number; `groups`, if there are any, follow.
+    /// Returns the fit after the exchanges that improved it, and their number. Updates `groups`.
     pub fn run(&self, mut fit: Fit, mut groups: Option<&mut Groups>) -> (Fit, u64) {
         let mut removal_need: Vec<f64> = (0..fit.sites.len())
             .map(|k| if self.progress.stopped() { 0.0 } else { self.removal_need(&fit, k).0 })
             .collect();
-        // spheres that were split in vain, until something near them changes
+        // spheres that were split without success, until a sphere near them changes
         let mut failed = vec![false; fit.sites.len()];
         let (mut wins, mut failures) = (0, 0);
         for _ in 0..self.tries {
@@ -70,8 +72,9 @@ impl Exchange<'_> {
         (fit, wins)
     }
 
-    /// Which spheres to burst for a half of `worst`, in the order in which they are tried: those that are missed less
-    /// than `worst` errs, and one of the same group. None need be while there is room; that is tried first.
+    /// Returns the spheres to remove for a half of `worst`, in the order of trial: those with a
+    /// removal need below the error of `worst`, and one of the same group. While there is room, no
+    /// removal is tried first.
     fn bursts(&self, fit: &Fit, worst: usize, removal_need: &[f64], groups: Option<&Groups>) -> Vec<Option<usize>> {
         let mut order: Vec<usize> =
             (0..removal_need.len()).filter(|&k| k != worst && removal_need[k] < fit.errors[worst]).collect();
@@ -83,8 +86,8 @@ impl Exchange<'_> {
         room.then_some(None).into_iter().chain(order.into_iter().map(Some)).collect()
     }
 
-    /// The touched spheres after an exchange, with their places in `fit` (those of the halves last), if they cost less
-    /// than before.
+    /// Returns the affected spheres after an exchange, with their indices in `fit` (the halves
+    /// last), if their cost decreases.
     fn exchanged(
         &self,
         fit: &Fit,
@@ -121,7 +124,7 @@ impl Exchange<'_> {
         Some((touched, after))
     }
 
-    /// Two sites for the two halves of the points of a part.
+    /// Returns two sites for the two halves of the points of a part.
     fn halves(&self, fit: &Fit, k: usize) -> Option<[Site; 2]> {
         let part = &fit.parts[k];
         let farthest = |from: &Vec3| {
@@ -141,7 +144,7 @@ impl Exchange<'_> {
         Some([near_a, near_b].map(|half| self.best_for(&half, fit.sites[k])))
     }
 
-    /// Of the spheres that touch at the points, and `old`, the one they need least of, moved.
+    /// Returns the best of the spheres that touch at the points, and of `old`, after optimization.
     fn best_for(&self, part: &[u32], old: Site) -> Site {
         let own = points_of(self.points, part);
         let some = part.iter().step_by(part.len().div_ceil(MAX_CANDIDATES));
@@ -155,7 +158,7 @@ impl Exchange<'_> {
         optimized(best.1.exact(self.distance), &own, self.distance)
     }
 
-    /// The greatest need of the points of a part of all other sites, and which those are.
+    /// Returns the largest need of the points of a part at the other sites, and those sites.
     fn removal_need(&self, fit: &Fit, k: usize) -> (f64, Vec<usize>) {
         let mut takers = Vec::new();
         let mut worst: f64 = 0.0;
@@ -176,7 +179,7 @@ impl Exchange<'_> {
     }
 }
 
-/// Puts what was touched back in its places.
+/// Stores the affected spheres at their indices.
 fn store(fit: &mut Fit, places: &[usize], mut after: Fit) {
     for (n, &k) in places.iter().enumerate() {
         if k == fit.sites.len() {

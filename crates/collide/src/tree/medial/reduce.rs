@@ -1,4 +1,4 @@
-//! Reduce: many candidates come to few spheres in three ways, and the best of the three is kept.
+//! Reduce: three methods select few spheres from many candidates, and the best result is kept.
 
 use super::burst::burst;
 use super::expand::expand;
@@ -7,15 +7,15 @@ use super::refit::{Fit, points_of};
 use super::site::Site;
 use crate::{MeshDistance, Vec3};
 
-/// Merge and burst begin with this many spheres for each that is to be left.
+/// Merge and burst start with this multiple of the number of spheres to be left.
 const START_FACTOR: usize = 5;
-/// Passes of refitting that each way gets before they are compared.
+/// Refit passes of each result before the comparison.
 const REFIT_PASSES: usize = 3;
 
-/// The ways, in the words of the account.
+/// Names of the methods in the stage counts.
 pub(super) const METHODS: [&str; 3] = ["expand won", "merge won", "burst won"];
 
-/// The points of `region` covered by at most `most` spheres, and which way won.
+/// Covers the points of `region` by at most `most` spheres. Also returns the method that won.
 pub(super) fn reduce(
     candidates: &[Site],
     points: &[Vec3],

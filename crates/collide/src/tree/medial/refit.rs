@@ -1,8 +1,9 @@
-//! Refit: points choose their spheres, spheres move to where their points need least.
+//! Refit: points select their spheres, spheres move to reduce the needs of their points.
 //!
-//! One pass assigns each point to the site of least need (an additively weighted Voronoi partition) and then moves
-//! each site by Nelder and Mead's simplex (*A simplex method for function minimization*, 1965) to lower
-//! `max |p − c| + s(c)` over its own points. Neither half can raise the worst need.
+//! One pass assigns each point to the site with the smallest need (an additively weighted Voronoi
+//! partition). Then it moves each site by Nelder and Mead's simplex (*A simplex method for function
+//! minimization*, 1965) to reduce `max |p − c| + s(c)` over its own points. Neither step can
+//! increase the worst need.
 
 use super::site::Site;
 use crate::tree::builder::Job;
@@ -11,10 +12,10 @@ use crate::tree::sphere::SEARCH_TRIANGLES;
 use crate::{MeshDistance, Vec3};
 use rayon::prelude::*;
 
-/// Evaluations of the simplex per site and pass.
+/// Function evaluations of the simplex per site and pass.
 const EVALUATIONS: usize = 36;
 
-/// Sites and the points that each must hold.
+/// Sites and the points that each must contain.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fit {
     pub sites: Vec<Site>,
@@ -32,7 +33,7 @@ impl Fit {
         fit
     }
 
-    /// Assigns the points of `region`, each to the site it needs least of.
+    /// Assigns each point of `region` to the site with the smallest need.
     pub fn assign(&mut self, points: &[Vec3], region: &[u32]) {
         self.parts.resize(self.sites.len(), Vec::new());
         self.parts.iter_mut().for_each(Vec::clear);
@@ -40,7 +41,7 @@ impl Fit {
         self.add_points(points, region);
     }
 
-    /// Gives further points to the sites.
+    /// Assigns further points to the sites.
     pub fn add_points(&mut self, points: &[Vec3], region: &[u32]) {
         for &i in region {
             let (need, k) = least(&self.sites, &points[i as usize]);
@@ -49,7 +50,7 @@ impl Fit {
         }
     }
 
-    /// Drops the sites without points; which were kept.
+    /// Drops the sites without points. Returns the marks of the sites that were kept.
     pub fn drop_empty(&mut self) -> Vec<bool> {
         let kept: Vec<bool> = self.parts.iter().map(|p| !p.is_empty()).collect();
         keep(&mut self.sites, &kept);
@@ -58,18 +59,18 @@ impl Fit {
         kept
     }
 
-    /// The greatest error.
+    /// Returns the largest error.
     pub fn worst(&self) -> f64 {
         self.errors.iter().copied().fold(0.0, f64::max)
     }
 
-    /// What the reducers compare and lower: the sum of the errors' eighth powers, each as a part of `scale`, so that
-    /// the worst counts most and the others are not forgotten.
+    /// Returns the cost that the reducers compare: the sum of the eighth powers of the errors,
+    /// relative to `scale`. The worst error dominates, but the others count too.
     pub fn cost(&self, scale: f64) -> f64 {
         self.errors.iter().map(|e| (e / scale).powi(8)).sum()
     }
 
-    /// `passes` times: move the sites, assign anew.
+    /// Moves the sites and assigns the points again, `passes` times.
     pub fn refit(&mut self, passes: usize, points: &[Vec3], region: &[u32], distance: &MeshDistance) {
         let mut settled = vec![Vec::new(); self.sites.len()];
         for _ in 0..passes {
@@ -85,7 +86,7 @@ impl Fit {
         }
     }
 
-    /// The same for many sites, on all threads.
+    /// Like [`Fit::refit`], for many sites, on all threads.
     pub fn refit_all(&mut self, passes: usize, points: &[Vec3], job: &Job) {
         for _ in (0..passes).take_while(|_| !job.progress.stopped()) {
             self.assign_all(points, job);
@@ -98,7 +99,7 @@ impl Fit {
         self.assign_all(points, job);
     }
 
-    /// Assigns all points there are, on all threads.
+    /// Assigns all points, on all threads.
     fn assign_all(&mut self, points: &[Vec3], job: &Job) {
         let least = |p: &Vec3| if job.progress.stopped() { (0.0, 0) } else { least(&self.sites, p) };
         let owners: Vec<(f64, usize)> = points.par_iter().map(least).collect();
@@ -111,18 +112,18 @@ impl Fit {
     }
 }
 
-/// Keeps the items marked.
+/// Keeps the marked items.
 pub(super) fn keep<T>(items: &mut Vec<T>, kept: &[bool]) {
     let mut marks = kept.iter();
     items.retain(|_| *marks.next().unwrap_or(&true));
 }
 
-/// The points of a part.
+/// Returns the points of a part.
 pub(super) fn points_of(points: &[Vec3], part: &[u32]) -> Vec<Vec3> {
     part.iter().map(|&i| points[i as usize]).collect()
 }
 
-/// The least need of the sites and which has it, the first of equals.
+/// Returns the smallest need of the sites and its site, the first of equals.
 fn least(sites: &[Site], p: &Vec3) -> (f64, usize) {
     sites
         .iter()
@@ -130,7 +131,7 @@ fn least(sites: &[Site], p: &Vec3) -> (f64, usize) {
         .fold((f64::INFINITY, 0), |best, (k, site)| site.need_below(p, best.0).map_or(best, |n| (n, k)))
 }
 
-/// The site moved to where its points need less.
+/// Returns the site, moved to reduce the needs of its points.
 pub(super) fn optimized(site: Site, own: &[Vec3], distance: &MeshDistance) -> Site {
     if own.is_empty() {
         return site;
@@ -146,7 +147,7 @@ pub(super) fn optimized(site: Site, own: &[Vec3], distance: &MeshDistance) -> Si
     let mut best = (site.center, before);
     nelder_mead(site.center, step, EVALUATIONS, |c| {
         let reach = own.iter().map(|p| (p - c).norm_squared()).fold(0.0, f64::max).sqrt();
-        // depths differ by no more than the centers do
+        // depths differ by no more than the distance of the centers
         let bound = reach - site.depth - (c - site.center).norm();
         if bound >= 2.0 * start {
             return bound;
@@ -159,7 +160,7 @@ pub(super) fn optimized(site: Site, own: &[Vec3], distance: &MeshDistance) -> Si
         }
         cost
     });
-    // measured exactly, where the search may have looked at too little
+    // measured exactly, as the search examines a limited number of triangles
     let exact = if best.0 == site.center { site.depth } else { -distance.closest(&best.0).signed_distance };
     if best.1 + depth - exact < before { Site { center: best.0, depth: exact, ..site } } else { site }
 }

@@ -1,4 +1,4 @@
-//! The stages by themselves, on cases whose answer is known.
+//! Tests of each stage on cases with known results.
 
 use super::burst::burst;
 use super::expand::expand;
@@ -62,7 +62,7 @@ fn every_point_has_one_sphere_which_it_needs_least_of() {
     assert!(seen.iter().all(|n| *n == 1));
     fit.refit(4, &cover.points, &region, &distance);
     assert!(fit.worst() < before, "{} of {before}", fit.worst());
-    // what the spheres are said to need is what they need
+    // the stated needs are the real needs
     for (site, (part, error)) in fit.sites.iter().zip(fit.parts.iter().zip(&fit.errors)) {
         let radius = part.iter().map(|&i| (cover.points[i as usize] - site.center).norm()).fold(0.0, f64::max);
         assert!((radius + distance.closest(&site.center).signed_distance - error).abs() < 1e-12);
@@ -89,7 +89,7 @@ fn expand_finds_the_least_stand_off() {
 fn merge_and_burst_give_up_the_sphere_that_another_stands_for() {
     let distance = MeshDistance::new(&bar());
     let points: Vec<Vec3> = (-8..=8).map(|n| Vec3::new(0.5 * f64::from(n), 0.5, 0.1)).collect();
-    // the first two are all but one
+    // the first two nearly coincide
     let few = sites(&[-3.0, -2.9, 0.0, 3.0], &distance);
     let fit = Fit::of(few.clone(), &points, &all(&points));
     let left = burst(&points, fit.clone(), 3);
@@ -99,7 +99,8 @@ fn merge_and_burst_give_up_the_sphere_that_another_stands_for() {
     assert_eq!((burst(&points, fit.clone(), 1).len(), merge(&few, &points, &fit, 1)), (1, vec![few[2]]));
 }
 
-/// Three groups along the bar, the first two full. A sphere that comes into the first is made room for by a chain.
+/// Three groups along the bar, the first two full. A chain makes room for a sphere that is added to
+/// the first.
 #[test]
 fn full_groups_hand_on_what_they_can_not_hold() {
     let distance = MeshDistance::new(&bar());
@@ -108,7 +109,7 @@ fn full_groups_hand_on_what_they_can_not_hold() {
     let settings = TreeSettings { branch: 2, depth: 2, ..TreeSettings::default() };
     let mut groups = Groups::new(spheres, vec![0, 0, 1, 1, 2], &settings, None, &distance);
     let change = Change { spheres: vec![(0, sphere(-3.2))], new: (5, sphere(-2.8)), split: 0 };
-    // the second group must take sphere 1 and let sphere 3 go; within what it needs now it can not
+    // the second group must take sphere 1 and give up sphere 3; its present error does not allow it
     groups.budget = 10.0;
     let after = groups.with_change(&change, &distance).expect("there is room in the third group");
     assert_eq!(after.of, [0, 1, 1, 2, 2, 0]);
@@ -132,7 +133,7 @@ fn gaps_are_where_no_sphere_is() {
     let mut cover = CoverPoints::default();
     let added = add_uncovered(&mut cover, &mesh, &corners.clone().collect::<Vec<_>>(), 0.05, &());
     assert!(added > 0 && added == cover.points.len());
-    // each sticks out of some sphere, next to where none is
+    // each lies outside some sphere, next to uncovered surface
     let depth = |p: &Vec3| mesh.vertices.iter().map(|v| (p - v).norm() - 0.45).fold(f64::INFINITY, f64::min);
     assert!(cover.points.iter().all(|p| depth(p) > -0.05) && cover.points.iter().any(|p| depth(p) > 0.04));
     let whole = [Sphere { center: Vec3::zeros(), radius: 1.0 + 1e-9 }];

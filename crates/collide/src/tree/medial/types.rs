@@ -1,29 +1,29 @@
-//! What the stages of the medial builders hand to one another.
+//! Data that the stages of the medial builders exchange.
 
 use crate::Vec3;
 use crate::tree::sphere::Sphere;
 
-/// A sphere that may stand for a part of the solid, and how well it does.
+/// A candidate sphere and its error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::tree) struct MedialSphere {
     pub sphere: Sphere,
-    /// Upper bound of how far it reaches outside the solid, meters.
+    /// Upper bound of how far the sphere extends outside the solid, meters.
     pub outward: f64,
 }
 
-/// Points of the surface that are to be covered.
+/// Points of the surface that must be covered.
 #[derive(Clone, Debug, Default)]
 pub(in crate::tree) struct CoverPoints {
     /// Meters.
     pub points: Vec<Vec3>,
-    /// Outward, of length one (zero where the triangle has no area).
+    /// Unit outward normals (zero for triangles without area).
     pub normals: Vec<Vec3>,
-    /// The triangle that each point lies on.
+    /// The triangle of each point.
     pub triangles: Vec<u32>,
 }
 
-/// What is asked of a source of candidate spheres for a region: refine until the worst outward error is below `target`
-/// and there are at least `least` spheres, with at most `most` insertions.
+/// The goal of a refinement: a worst outward error below `target` and at least `least` spheres,
+/// with at most `most` insertions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::tree) struct RefineGoal {
     /// Meters.

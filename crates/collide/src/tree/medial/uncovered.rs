@@ -1,7 +1,8 @@
-//! Gaps: the places of the surface that the spheres leave uncovered between the cover points.
+//! Detection of surface that the spheres leave uncovered between the cover points.
 //!
-//! Where spheres meet, the surface between samples sticks out of both. The points that stick out most become cover
-//! points, so that refitting sees them: closing then has little left to grow.
+//! Where spheres meet, the surface between samples lies outside both. The points that lie furthest
+//! outside become cover points, so that refitting includes them. The final growth of the leaves is
+//! then small.
 
 use super::types::CoverPoints;
 use crate::TriMesh;
@@ -10,8 +11,8 @@ use crate::tree::Progress;
 use crate::tree::grow_to_cover::{deficit, halves_of};
 use crate::tree::sphere::Sphere;
 
-/// Adds cover points where pieces of surface of about the size `small` lie in no sphere, one for each cube of that size;
-/// their number.
+/// Adds a cover point for each cube of side `small` in which pieces of surface of about that size
+/// lie in no sphere. Returns the number of points added.
 pub(super) fn add_uncovered(
     cover: &mut CoverPoints,
     mesh: &TriMesh,
@@ -36,7 +37,7 @@ pub(super) fn add_uncovered(
     cover.points.len() - before
 }
 
-/// Finds the points that stick out: by how much, where, on which triangle.
+/// Finds the uncovered points: how far outside each lies, its position, its triangle.
 fn find_uncovered(
     piece: &[Vec3; 3],
     t: u32,

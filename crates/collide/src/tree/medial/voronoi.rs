@@ -1,51 +1,54 @@
-//! Voronoi vertices as spheres: the sphere through the corners of each Delaunay cell, and how it lies to the solid.
+//! Voronoi spheres: the sphere through the corners of each Delaunay cell, and its relation to the
+//! solid.
 //!
 //! ```text
 //! u = b − a, v = c − a, w = d − a
 //! o = a + (|u|² v×w + |v|² w×u + |w|² u×v) / (2 u·(v×w))
 //! ```
 //!
-//! `u·(v×w)` is taken from the exact predicate, since it is what goes wrong in slivers. Eight corners of a large box
-//! around the points are sites too: the cells of all others then end, so that each point of the surface lies in some
-//! sphere (see [`super::adaptive`]).
+//! `u·(v×w)` comes from the exact predicate, since slivers make it inaccurate. Eight corners of a
+//! large box around the points are sites too. They make the cells of all other sites bounded, so
+//! each point of the surface lies in some sphere (see [`super::adaptive`]).
 
 use super::delaunay::{Delaunay, orient};
 use crate::tree::sphere::Sphere;
 use crate::{Aabb, MeshDistance, Vec3};
 
-/// Half the side of the box around, in diagonals of what is inside.
+/// Half the side of the surrounding box, in diagonals of the solid.
 const BOX: f64 = 1.5;
-/// A sphere whose corners are not at one distance to this part of the radius has no center in floating point.
+/// Largest relative difference of the corners' distances from the center; beyond it, floating point
+/// gives no center.
 const ROUND: f64 = 1e-4;
 
-/// What is known of a Voronoi vertex.
+/// The sphere of a Voronoi vertex.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::tree) struct VoronoiSphere {
-    /// Holds its four forming points (meters).
+    /// Contains the four corners of the cell; meters.
     pub sphere: Sphere,
-    /// Of the center, meters, negative inside the solid; positive infinity for centers well outside of the points' box,
-    /// which are not looked up.
+    /// Signed distance of the center, meters, negative inside the solid. Positive infinity for
+    /// centers well outside the box of the points, whose distance is not computed.
     pub signed_distance: f64,
     /// Whether the center is inside the solid.
     pub internal: bool,
 }
 
-/// A tetrahedralization of sites within a large box, and the sphere of each cell.
+/// A tetrahedralization of sites within a large box, with the sphere of each cell.
 pub(in crate::tree) struct Voronoi<'a> {
     pub delaunay: Delaunay,
     distance: &'a MeshDistance,
-    /// Around what can be inside the solid.
+    /// Box around all centers that can be inside the solid.
     bounds: Aabb,
-    /// By cell; `None` for ghosts, dead cells and slivers beyond floating point.
+    /// By cell; `None` for ghosts, removed cells, and slivers beyond floating point.
     spheres: Vec<Option<VoronoiSphere>>,
 }
 
-/// Number of corners of the box, which are the first vertices.
+/// Number of corners of the box. They are the first vertices.
 pub(in crate::tree) const CORNERS: usize = 8;
 
 impl<'a> Voronoi<'a> {
-    /// Of `sites`, which are vertices from [`CORNERS`] on. `solid` is the box of the solid, which all sites ever to be
-    /// inserted must lie in; `None` if it is not finite or is a single point.
+    /// Builds the tetrahedralization of `sites`, which are the vertices from [`CORNERS`] on.
+    /// `solid` is the box of the solid, which must contain all sites, later ones included. Returns
+    /// `None` if it is not finite or is a single point.
     pub fn new(sites: &[Vec3], solid: &Aabb, distance: &'a MeshDistance) -> Option<Voronoi<'a>> {
         let middle = 0.5 * (solid.min + solid.max);
         let half = BOX * (solid.max - solid.min).norm();
@@ -70,13 +73,13 @@ impl<'a> Voronoi<'a> {
         Some(created)
     }
 
-    /// The sphere of a cell.
+    /// Returns the sphere of a cell.
     pub fn sphere(&self, cell: u32) -> Option<&VoronoiSphere> {
         self.spheres.get(cell as usize)?.as_ref()
     }
 
-    /// Inserts a site, walking from `hint`; whether it was new. The changes are the tetrahedralization's `created` and
-    /// `removed`.
+    /// Inserts a site, walking from `hint`. Returns whether it was new. The tetrahedralization
+    /// lists the changes in `created` and `removed`.
     pub fn insert(&mut self, p: Vec3, hint: u32) -> bool {
         if self.delaunay.insert(p, hint).is_none() {
             return false;
@@ -91,7 +94,7 @@ impl<'a> Voronoi<'a> {
         true
     }
 
-    /// The signed distance of a cell's center, looked up if it was not yet.
+    /// Returns the signed distance of a cell's center, computed on first use.
     pub fn signed_distance(&mut self, cell: u32) -> f64 {
         let distance = self.distance;
         self.spheres.get_mut(cell as usize).and_then(Option::as_mut).map_or(f64::INFINITY, |b| {
@@ -116,8 +119,8 @@ impl<'a> Voronoi<'a> {
     }
 }
 
-/// The sphere about the center of the sphere through four points, grown to hold them all; `None` where floating point
-/// does not give it.
+/// Returns the sphere about the circumcenter of four points, grown to contain them all; `None` if
+/// floating point does not determine it.
 pub(in crate::tree) fn circumscribed(corners: &[Vec3; 4]) -> Option<Sphere> {
     let [a, b, c, d] = corners;
     let (u, v, w) = (b - a, c - a, d - a);

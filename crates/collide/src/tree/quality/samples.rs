@@ -1,7 +1,8 @@
-//! Deterministic, evenly spread points on a surface, on a sphere and in a box.
+//! Deterministic, evenly distributed points on a surface, on a sphere and in a box.
 //!
-//! Additive recurrences `xₙ = frac(½ + n·α)` with the powers of `1/φ_d`, `φ_d` the root of `x^(d+1) = x + 1`: Roberts, *The unreasonable
-//! effectiveness of quasirandom sequences* (2018). On a sphere the Fibonacci lattice: `z = 1 − 2(n + ½)/N`, longitude by the golden angle.
+//! Additive recurrences `xₙ = frac(½ + n·α)` with the powers of `1/φ_d`, where `φ_d` is the root of
+//! `x^(d+1) = x + 1`: Roberts, *The unreasonable effectiveness of quasirandom sequences* (2018). On
+//! a sphere the Fibonacci lattice: `z = 1 − 2(n + ½)/N`, longitude by the golden angle.
 
 use crate::{Aabb, MeshDistance, TriMesh, Vec3};
 use nalgebra::ComplexField;
@@ -9,10 +10,11 @@ use std::f64::consts::PI;
 
 const PLASTIC: f64 = 1.324_717_957_244_746;
 const PHI_3: f64 = 1.220_744_084_605_759_6;
-/// Points of one cell that are asked for one by one.
+/// Number of points of a cell up to which each is tested by itself.
 const MAX_CELL_POINTS: usize = 4;
 
-/// `count` points, uniform by area: even steps along the summed areas, an additive recurrence within the triangles.
+/// Returns `count` points, uniform by area: even steps along the summed areas, an additive
+/// recurrence within the triangles.
 pub(super) fn on_surface(mesh: &TriMesh, count: usize) -> Vec<Vec3> {
     let mut summed = Vec::with_capacity(mesh.triangles.len());
     let mut total = 0.0;
@@ -33,7 +35,7 @@ pub(super) fn on_surface(mesh: &TriMesh, count: usize) -> Vec<Vec3> {
         .collect()
 }
 
-/// `count` points on the unit sphere.
+/// Returns `count` points on the unit sphere.
 pub(super) fn fibonacci(count: usize) -> Vec<Vec3> {
     let golden = PI * (1.0 + 5.0_f64.sqrt());
     (0..count)
@@ -47,7 +49,7 @@ pub(super) fn fibonacci(count: usize) -> Vec<Vec3> {
         .collect()
 }
 
-/// `count` points in a box.
+/// Returns `count` points in a box.
 pub(super) fn in_box(bounds: &Aabb, count: usize) -> Vec<Vec3> {
     let size = bounds.max - bounds.min;
     let steps = [1.0 / PHI_3, 1.0 / (PHI_3 * PHI_3), 1.0 / (PHI_3 * PHI_3 * PHI_3)];
@@ -58,8 +60,9 @@ fn step(n: usize, alpha: f64) -> f64 {
     (0.5 + n as f64 * alpha).fract()
 }
 
-/// Which of the points lie inside the solid. Cells whose center is further from the surface than their corners hold points of one kind;
-/// others are halved three times, until few points are left.
+/// Returns which of the points lie inside the solid. If the center of a cell is further from the
+/// surface than its corners, all its points are inside or all are outside. Other cells are halved
+/// along the three axes until few points are left.
 pub(super) fn inside(distance: &MeshDistance, points: &[Vec3], bounds: &Aabb) -> Vec<bool> {
     let mut answer = vec![false; points.len()];
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
@@ -79,7 +82,7 @@ fn classify(distance: &MeshDistance, points: &[Vec3], order: &mut [u32], cell: A
         order.iter().for_each(|&n| answer[n as usize] = d < 0.0);
         return;
     }
-    // splits the slice at the cell's middle along one axis after the other
+    // splits the slice at the cell's middle, one axis after the other
     let mut parts = vec![(order, cell)];
     for k in 0..3 {
         parts = parts.into_iter().flat_map(|(part, cell)| split_points(points, part, cell, k, center[k])).collect();

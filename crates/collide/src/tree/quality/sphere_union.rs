@@ -1,12 +1,13 @@
-//! A union of spheres made ready for questions about points: a binary tree over the centers, each node with the box of its centers and its
-//! greatest radius. A sphere of the node is no nearer to `p` than `distance(p, box) − r_max`.
+//! A union of spheres for point queries: a binary tree over the centers. Each node stores the box
+//! of its centers and the largest radius. The distance of `p` from a sphere of the node is at least
+//! `distance(p, box) − r_max`.
 
 use crate::{Aabb, Vec3};
 
-/// Spheres per leaf.
+/// Maximum number of spheres of a leaf.
 const MAX_LEAF_SPHERES: usize = 4;
 
-/// The union.
+/// A union of spheres.
 pub(super) struct SphereUnion {
     spheres: Vec<(Vec3, f64)>,
     nodes: Vec<Node>,
@@ -15,28 +16,29 @@ pub(super) struct SphereUnion {
 struct Node {
     centers: Aabb,
     largest: f64,
-    /// Leaf: range of spheres. Inner (`count` 0): the left child is the next node, the right one is `second`.
+    /// Leaf: range of spheres. Inner node (`count` 0): the left child is the next node, the right
+    /// one is `second`.
     first: usize,
     count: usize,
     second: usize,
 }
 
 impl SphereUnion {
-    /// Of at least one sphere: centers and radii.
+    /// Builds the union of at least one sphere, from centers and radii.
     pub fn new(mut spheres: Vec<(Vec3, f64)>) -> SphereUnion {
         let mut nodes = Vec::new();
         split(&mut spheres, 0, &mut nodes);
         SphereUnion { spheres, nodes }
     }
 
-    /// Least `|p − c| − r` over the spheres: below 0 inside the union.
+    /// Returns the minimum of `|p − c| − r` over the spheres: below 0 inside the union.
     pub fn distance(&self, p: &Vec3) -> f64 {
         let mut best = f64::INFINITY;
         self.search(0, p, &mut best);
         best
     }
 
-    /// Whether some sphere holds `p` more than `depth` below its surface.
+    /// Returns whether some sphere contains `p` more than `depth` below its surface.
     pub fn contains(&self, p: &Vec3, depth: f64) -> bool {
         self.any_contains(0, p, depth)
     }
@@ -81,7 +83,8 @@ impl Node {
     }
 }
 
-/// Pre-order, halved along the longest side of the centers' box; depth at most 64 by halving.
+/// Builds nodes in pre-order, halved along the longest side of the box of the centers; the depth is
+/// at most 64.
 fn split(spheres: &mut [(Vec3, f64)], first: usize, nodes: &mut Vec<Node>) {
     let centers = Aabb::around(spheres.iter().map(|b| b.0));
     let largest = spheres.iter().map(|b| b.1).fold(0.0, f64::max);

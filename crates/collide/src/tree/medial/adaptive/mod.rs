@@ -1,23 +1,26 @@
 //! Adaptive medial spheres: Voronoi spheres of few sites, refined where they are worst.
 //!
-//! Source: Bradshaw and O'Sullivan, *Adaptive medial-axis approximation for sphere-tree construction* (2004), §4.
+//! Source: Bradshaw and O'Sullivan, *Adaptive medial-axis approximation for sphere-tree
+//! construction* (2004), §4.
 //!
 //! - A sphere is INTERNAL if its center is inside the solid.
-//! - A cover point that no INTERNAL sphere holds has the best of the other spheres that hold it flagged COVER. The spheres
-//!   that hold a point are those of the cells that would go were it inserted, a connected set around the cell that it
-//!   lies in. It is never empty: the Voronoi cell of the nearest site is bounded and holds the point, so that some vertex
-//!   `v` of it is at least as far along from the site `s` as the point `p` is, `(v − s)·(p − s) ≥ |p − s|²`, hence
-//!   `|v − p| ≤ |v − s|`.
-//! - The error of a sphere is at most `r + s(c)`, `s` the signed distance of its center.
-//! - Refinement takes the worst flagged sphere and makes its closest surface point a site, which is inside the sphere
-//!   and so ends it.
+//! - For a cover point in no INTERNAL sphere, the best of the other spheres that contain it is
+//!   flagged COVER. The spheres that contain a point are those of the cells that its insertion
+//!   would remove, a connected set around the cell in which it lies. The set is never empty: the
+//!   Voronoi cell of the nearest site is bounded and contains the point. So some vertex `v` of that
+//!   cell is at least as far along from the site `s` as the point `p`, `(v − s)·(p − s) ≥ |p −
+//!   s|²`, hence `|v − p| ≤ |v − s|`.
+//! - The error of a sphere is at most `r + s(c)`, where `s` is the signed distance of its center.
+//! - Refinement takes the worst flagged sphere and makes its closest surface point a site. That
+//!   point is inside the sphere, so the sphere is removed.
 //!
-//! Each cover point keeps one flagged sphere as its *witness*. When a cell goes, the points that it was witness of are
-//! judged anew, and no others; a COVER sphere is judged anew before it is refined, and at the end, since an INTERNAL one
-//! may have come to hold its points.
+//! Each cover point has one flagged sphere as its *witness*. When a cell is removed, only the
+//! points with this witness are assigned again. A COVER sphere is checked again before it is
+//! refined, and at the end, since an INTERNAL sphere can contain its points by then.
 //!
-//! Departs from the paper: best is least error, not the largest radius less distance; and it is sought among all spheres that
-//! hold the point, not only those of the nearest site.
+//! Departures from the paper: the best sphere is the one with the least error, not with the largest
+//! radius minus distance. It is searched among all spheres that contain the point, not only those
+//! of the nearest site.
 
 #[cfg(test)]
 mod tests;
@@ -33,23 +36,23 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 const NONE: u32 = u32::MAX;
-/// A sphere is told to hold a point up to this part of its radius, and is grown by it.
+/// Relative tolerance of containment; spheres are enlarged by it.
 const SLACK: f64 = 1e-9;
 
-/// What a refinement did.
+/// Counts of a refinement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(in crate::tree) struct Counts {
     pub inserted: u64,
     pub internal: u64,
     pub cover: u64,
-    /// Cover points that only a sphere of no size holds, since floating point gives no other.
+    /// Cover points in no sphere that floating point can represent; each gets a sphere of radius 0.
     pub alone: u64,
-    /// Sites that were there already.
+    /// Number of sites that existed before.
     pub duplicates: u64,
 }
 
 impl Counts {
-    /// As an account of `level`.
+    /// Returns the counts as stages of `level`.
     pub fn stages(&self, level: u32) -> Vec<StageCount> {
         [
             ("sites inserted", self.inserted),
@@ -63,10 +66,10 @@ impl Counts {
     }
 }
 
-/// Voronoi spheres with their flags. Cover points are numbered by their place in the region.
+/// Voronoi spheres with their flags. Cover points are numbered by their index in the region.
 pub(in crate::tree) struct MedialAxis<'a> {
     points: Vec<Vec3>,
-    /// Whether the points are of a part of the surface.
+    /// Whether the points are part of the surface only.
     partial: bool,
     distance: &'a MeshDistance,
     progress: &'a dyn Progress,
@@ -74,16 +77,16 @@ pub(in crate::tree) struct MedialAxis<'a> {
     voronoi: Option<Voronoi<'a>>,
     /// Per cover point, the cell whose sphere is its witness.
     witness: Vec<u32>,
-    /// Per cell, its points, as a chain: the first, and per point the next.
+    /// Per cell, its points as a linked list: the first, and per point the next.
     first: Vec<u32>,
     next: Vec<u32>,
     /// Per cell, whether its sphere is INTERNAL.
     inner: Vec<bool>,
-    /// Per cell, how often it went: entries of the queue of earlier lives are void.
+    /// Per cell, the number of its removals. Queue entries of earlier generations are invalid.
     generations: Vec<u32>,
-    /// Per cell, the life in which it was queued last.
+    /// Per cell, the generation in which it was queued last.
     queued: Vec<u32>,
-    /// Error (as ordered bits), cell, life.
+    /// Error (as ordered bits), cell, generation.
     queue: BinaryHeap<(u64, Reverse<u32>, u32)>,
     seen: Vec<u32>,
     search: u32,
@@ -93,7 +96,7 @@ pub(in crate::tree) struct MedialAxis<'a> {
 }
 
 impl<'a> MedialAxis<'a> {
-    /// Begins with `sites` of the region's points (at least 8), taken evenly.
+    /// Starts with `sites` of the region's points (at least 8), evenly spaced.
     pub fn new(
         cover: &CoverPoints,
         region: &[u32],
@@ -135,7 +138,8 @@ impl<'a> MedialAxis<'a> {
         axis
     }
 
-    /// Refines until the worst error is below the target and there are enough spheres, or no more may be inserted.
+    /// Refines until the worst error is below the target and there are enough spheres, or the
+    /// maximum number of insertions is reached.
     pub fn refine(&mut self, goal: &RefineGoal) {
         let most = self.inserted + goal.most;
         while self.inserted < most && !self.progress.stopped() {
@@ -150,7 +154,7 @@ impl<'a> MedialAxis<'a> {
         }
     }
 
-    /// The flagged spheres, of points that have none a sphere of no size.
+    /// Returns the flagged spheres, and a sphere of radius 0 for each point without one.
     pub fn spheres(&mut self) -> Vec<MedialSphere> {
         let progress = self.progress;
         for c in (0..self.first.len() as u32).take_while(|_| !progress.stopped()) {
@@ -169,8 +173,8 @@ impl<'a> MedialAxis<'a> {
         spheres
     }
 
-    /// Per point, the spheres of the list that [`MedialAxis::spheres`] just gave which hold it: all that do, up to rounding; that
-    /// is at least one.
+    /// Returns for each point the spheres of the last [`MedialAxis::spheres`] that contain it, up
+    /// to rounding; at least one.
     pub fn holders(&mut self) -> Vec<Vec<u32>> {
         let mut place = vec![NONE; self.first.len()];
         let listed = self.listed();
@@ -201,12 +205,12 @@ impl<'a> MedialAxis<'a> {
         all
     }
 
-    /// The flagged cells that matter.
+    /// Returns the flagged cells of the region.
     fn listed(&self) -> Vec<u32> {
         (0..self.first.len() as u32).filter(|&c| self.is_flagged(c) && self.is_in_region(c)).collect()
     }
 
-    /// What was done so far.
+    /// Returns the counts so far.
     pub fn counts(&self) -> Counts {
         Counts {
             inserted: self.inserted as u64,
@@ -217,7 +221,7 @@ impl<'a> MedialAxis<'a> {
         }
     }
 
-    /// The worst flagged sphere, taken from the queue.
+    /// Takes the worst flagged sphere from the queue.
     fn worst(&mut self) -> Option<(f64, u32)> {
         while let Some((bits, cell, generation)) = self.queue.pop() {
             if self.generations[cell.0 as usize] != generation {
@@ -232,7 +236,8 @@ impl<'a> MedialAxis<'a> {
         None
     }
 
-    /// Makes the closest surface point of a sphere a site. A sphere whose closest surface point is a site already is as good as it gets.
+    /// Makes the closest surface point of a sphere a site. If that point is a site already, the
+    /// sphere cannot be improved.
     fn split(&mut self, cell: u32) {
         let Some(voronoi) = self.voronoi.as_mut() else { return };
         let Some(sphere) = voronoi.sphere(cell).map(|b| b.sphere) else { return };
@@ -255,7 +260,7 @@ impl<'a> MedialAxis<'a> {
         }
     }
 
-    /// Forgets the cells that are gone; the points that they were witness of.
+    /// Unregisters the removed cells. Returns the points whose witness they were.
     fn remove_cells(&mut self) -> Vec<u32> {
         let Some(voronoi) = self.voronoi.as_ref() else { return Vec::new() };
         let mut orphans = Vec::new();

@@ -1,9 +1,9 @@
-//! Each point is held, each error is what is said, and the target is reached.
+//! Each point is contained, each error is as stated, and the target is reached.
 
 use super::*;
 use crate::TriMesh;
 
-/// The whole of it: the spheres of a region and what was done.
+/// Returns the spheres of a region and the counts.
 fn adaptive(
     cover: &CoverPoints,
     region: &[u32],

@@ -1,4 +1,4 @@
-//! Flags and witnesses of the spheres: who holds which point.
+//! Flags of the spheres, and the witness of each point.
 
 use super::{MedialAxis, NONE, SLACK};
 use crate::Vec3;
@@ -6,13 +6,13 @@ use crate::tree::sphere::Sphere;
 use std::cmp::Reverse;
 
 impl MedialAxis<'_> {
-    /// The tetrahedra that the last insertion made.
+    /// Returns the tetrahedra that the last insertion created.
     pub(super) fn created(&self) -> Vec<u32> {
         let Some(voronoi) = self.voronoi.as_ref() else { return Vec::new() };
         voronoi.delaunay.created().iter().copied().filter(|&c| voronoi.delaunay.is_finite(c)).collect()
     }
 
-    /// Flags a new cell, if it is INTERNAL.
+    /// Flags a new cell if it is INTERNAL.
     pub(super) fn register_cell(&mut self, cell: u32) {
         if self.voronoi.as_ref().and_then(|v| v.sphere(cell)).is_some_and(|b| b.internal) {
             self.inner[cell as usize] = true;
@@ -21,7 +21,7 @@ impl MedialAxis<'_> {
         }
     }
 
-    /// Judges anew the points of a COVER sphere.
+    /// Assigns the points of a COVER sphere again.
     pub(super) fn reassign_witnesses(&mut self, cell: u32) {
         if self.inner[cell as usize] || self.first[cell as usize] == NONE {
             return;
@@ -36,8 +36,8 @@ impl MedialAxis<'_> {
         }
     }
 
-    /// Finds a point its witness: the first INTERNAL sphere met that holds it, or else the one of least error. The cell it
-    /// lies in, walking from `hint`.
+    /// Assigns a witness to a point: the first INTERNAL sphere found that contains it, else the one
+    /// with the least error. Returns the cell in which the point lies, walking from `hint`.
     pub(super) fn assign_witness(&mut self, i: u32, hint: u32) -> u32 {
         let mut best = (f64::INFINITY, NONE);
         let home = self.for_each_holder(i, hint, |c, axis| {
@@ -57,7 +57,8 @@ impl MedialAxis<'_> {
         home
     }
 
-    /// Calls `visit` for all cells whose spheres hold point `i`, until it says no. The cell it lies in, walking from `hint`.
+    /// Calls `visit` for all cells whose spheres contain point `i`, until it returns false. Returns
+    /// the cell in which the point lies, walking from `hint`.
     pub(super) fn for_each_holder(&mut self, i: u32, hint: u32, mut visit: impl FnMut(u32, &mut Self) -> bool) -> u32 {
         let Some(voronoi) = self.voronoi.as_ref() else { return NONE };
         let p = self.points[i as usize];
@@ -71,7 +72,7 @@ impl MedialAxis<'_> {
             }
             let Some(voronoi) = self.voronoi.as_ref() else { break };
             for n in voronoi.delaunay.across(c) {
-                // on through slivers that have no sphere
+                // continue through slivers without a sphere
                 let on = voronoi.delaunay.is_finite(n) && voronoi.sphere(n).is_none_or(|b| contains(&b.sphere, &p));
                 if on && self.seen[n as usize] != self.search {
                     self.seen[n as usize] = self.search;
@@ -108,14 +109,14 @@ impl MedialAxis<'_> {
         self.inner[cell as usize] || self.first[cell as usize] != NONE
     }
 
-    /// Whether a flagged sphere is of the region: it holds some point of it.
+    /// Returns whether a flagged sphere contains a point of the region.
     pub(super) fn is_in_region(&self, cell: u32) -> bool {
         !self.partial
             || self.first[cell as usize] != NONE
             || (0..self.points.len() as u32).any(|i| self.contains(cell, i))
     }
 
-    /// Upper bound of how far the sphere reaches out of the solid, meters.
+    /// Returns an upper bound of how far the sphere extends outside the solid, meters.
     pub(super) fn error(&mut self, cell: u32) -> f64 {
         let Some(voronoi) = self.voronoi.as_mut() else { return 0.0 };
         let signed = voronoi.signed_distance(cell);
@@ -143,7 +144,7 @@ fn contains(sphere: &Sphere, p: &Vec3) -> bool {
     (p - sphere.center).norm_squared() <= sphere.radius * sphere.radius * (1.0 + SLACK)
 }
 
-/// Appends a chain of points to `all`.
+/// Appends a linked list of points to `all`.
 pub(super) fn chain(mut i: u32, next: &[u32], all: &mut Vec<u32>) {
     while i != NONE {
         all.push(i);

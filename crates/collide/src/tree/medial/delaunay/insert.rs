@@ -1,24 +1,27 @@
-//! Putting in one point: the cells whose spheres hold it are taken out, and the hole is filled with cells around it.
+//! Insertion of one point: the cells whose spheres contain it are removed, and the cavity is filled
+//! with cells around it.
 //!
-//! Source: Bowyer, *Computing Dirichlet tessellations*, and Watson, *Computing the n-dimensional Delaunay tessellation*
-//! (both 1981).
+//! Source: Bowyer, *Computing Dirichlet tessellations*, and Watson, *Computing the n-dimensional
+//! Delaunay tessellation* (both 1981).
 //!
-//! **Ties.** A cell goes only if the point is *strictly* inside its sphere. That is the symbolic perturbation of
-//! Devillers and Teillaud (*Perturbations for Delaunay and weighted Delaunay 3D triangulations*, 2011) in which each
-//! point is lifted by far more than all before it, so that the hole is connected and star-shaped whatever lies on
-//! one sphere. A facet in one plane with the point is never on its rim: in that plane both of its cells' spheres
-//! are the facet's circle, so that both go or both stay. A ghost goes if the point is strictly beyond its facet; in
-//! the facet's plane the circle decides, which is to say the sphere of the finite cell behind it. With that no
-//! flat cell is ever made.
+//! **Ties.** A cell is removed only if the point is *strictly* inside its sphere. This is the
+//! symbolic perturbation of Devillers and Teillaud (*Perturbations for Delaunay and weighted
+//! Delaunay 3D triangulations*, 2011), in which each point is lifted by far more than all before
+//! it. So the cavity is connected and star-shaped even for points on one sphere. A facet coplanar
+//! with the point is never on the cavity's boundary: in that plane the spheres of both its cells
+//! are the facet's circle, so both are removed or both stay. A ghost is removed if the point is
+//! strictly beyond its facet. In the plane of the facet the circle decides, that is, the sphere of
+//! the finite cell behind it. So no flat cell is ever created.
 
 use super::predicates::in_sphere;
 use super::{Cell, Delaunay, GHOST, NONE};
 
-/// Set in `across` of a cell that goes: the entry is the new cell on that facet.
+/// Flag in `across` of a removed cell: the entry is the new cell on that facet.
 const NEW: u32 = 1 << 31;
 
 impl Delaunay {
-    /// Inserts vertex `v`, whose point is there, walking from `hint`; whether it was: a duplicate is not.
+    /// Inserts vertex `v`, whose point is stored, walking from `hint`. Returns `false` for a
+    /// duplicate.
     pub(super) fn insert_vertex(&mut self, v: u32, hint: u32) -> bool {
         let p = self.points[v as usize];
         self.removed.clear();
@@ -38,7 +41,8 @@ impl Delaunay {
         true
     }
 
-    /// Collects the cells that go (`removed`) and the facets around the hole (`cavity_boundary`).
+    /// Collects the cells to remove (`removed`) and the facets around the cavity
+    /// (`cavity_boundary`).
     fn find_cavity(&mut self, start: u32, v: u32) {
         let p = self.points[v as usize];
         self.stamp += 2;
@@ -74,7 +78,7 @@ impl Delaunay {
         in_sphere(self.cells[c as usize].vertices.each_ref().map(|&v| &self.points[v as usize]), p) > 0.0
     }
 
-    /// One new cell on each facet of the rim, with corner `k` put at the new vertex.
+    /// Creates one cell on each boundary facet, with corner `k` at the new vertex.
     fn fill_cavity(&mut self, v: u32) {
         for r in 0..self.cavity_boundary.len() {
             let (c, k) = self.cavity_boundary[r];
@@ -90,8 +94,8 @@ impl Delaunay {
         }
     }
 
-    /// Joins the new cells to one another: around each edge of the rim, through the cells that go, to the rim's other
-    /// facet at that edge.
+    /// Links the new cells to one another: around each edge of the boundary, through the removed
+    /// cells, to the other boundary facet at that edge.
     fn link_created(&mut self) {
         for r in 0..self.cavity_boundary.len() {
             let ((c, k), id) = (self.cavity_boundary[r], self.created[r]);
@@ -100,7 +104,7 @@ impl Delaunay {
                     continue;
                 }
                 let (mut at, mut exit, mut kept) = (c, j, k);
-                // the number of cells that go bounds the turn
+                // the number of removed cells limits the turn
                 let other = loop {
                     let next = self.cells[at as usize].across[exit];
                     if next & NEW != 0 {
@@ -118,7 +122,7 @@ impl Delaunay {
         }
     }
 
-    /// Adds a cell, in the place of a dead one if there is one.
+    /// Adds a cell, in a free slot if there is one.
     pub(super) fn add(&mut self, cell: Cell) -> u32 {
         let id = match self.free.pop() {
             Some(id) => id,

@@ -1,15 +1,16 @@
-//! Where a point lies: a walk from cell to cell.
+//! Point location by a walk from cell to cell.
 
 use super::predicates::orient;
 use super::{Delaunay, NONE};
 use crate::Vec3;
 
 impl Delaunay {
-    /// The finite cell that holds `p` (or one of them), or a ghost whose hull facet `p` is strictly beyond. Walks from
-    /// `hint`, a cell of any kind, or dead.
+    /// Returns the finite cell that contains `p` (or one of them), or a ghost whose hull facet `p`
+    /// is strictly beyond. Walks from `hint`, which can be any cell, also a removed one.
     ///
-    /// The walk crosses any facet that has `p` strictly beyond it; in a Delaunay tetrahedralization that comes to an
-    /// end (Devillers, Pion and Teillaud, *Walking in a triangulation*, 2002). It is bounded all the same.
+    /// The walk crosses any facet that has `p` strictly beyond it. In a Delaunay tetrahedralization
+    /// that terminates (Devillers, Pion and Teillaud, *Walking in a triangulation*, 2002). The
+    /// number of steps is limited all the same.
     pub fn locate(&self, p: &Vec3, hint: u32) -> u32 {
         let mut at = self.finite_near(hint);
         let mut from = NONE;
@@ -35,7 +36,7 @@ impl Delaunay {
         (0..self.cells.len() as u32).find(|&c| self.is_in_use(c) && holds(c)).unwrap_or(self.finite_near(NONE))
     }
 
-    /// `hint`, the finite neighbor of a ghost, or any finite cell.
+    /// Returns `hint`, the finite neighbor of a ghost, or any finite cell.
     fn finite_near(&self, hint: u32) -> u32 {
         let finite = |c: &u32| (*c as usize) < self.cells.len() && self.is_finite(*c);
         if finite(&hint) {
@@ -51,8 +52,8 @@ impl Delaunay {
         (0..self.cells.len() as u32).find(finite).unwrap_or(0)
     }
 
-    /// Which side of facet `k` a point is on: the orientation of the cell with corner `k` put at `p`. Positive on the
-    /// cell's own side.
+    /// Returns the side of facet `k` on which a point lies: the orientation of the cell with corner
+    /// `k` at `p`. Positive on the side of the cell.
     pub(super) fn side(&self, cell: u32, k: usize, p: &Vec3) -> f64 {
         let v = &self.cells[cell as usize].vertices;
         let at = |n: usize| if n == k { p } else { &self.points[v[n] as usize] };

@@ -1,15 +1,17 @@
-//! Delaunay tetrahedralization: no sphere through the corners of a cell holds another point strictly inside.
+//! Delaunay tetrahedralization: no sphere through the corners of a cell contains another point
+//! strictly inside.
 //!
-//! Built point by point ([`insert`]), with exact predicates ([`predicates`]), in a spatial order ([`order`]). The
-//! outside of the convex hull is filled with *ghost* cells: one on each facet of the hull, with a corner at infinity,
-//! so that every facet has a cell on both sides and the hull needs no case of its own.
+//! Points are inserted one by one ([`insert`]), with exact predicates ([`predicates`]), in a
+//! spatial order ([`order`]). The outside of the convex hull is filled with *ghost* cells: one on
+//! each facet of the hull, with a corner at infinity. So every facet has a cell on both sides and
+//! the hull needs no special case.
 //!
 //! | name | meaning |
 //! |---|---|
 //! | corner `k` of a cell | `vertices[k]`, [`GHOST`] for infinity |
 //! | facet `k` | the three corners other than `k` |
 //! | `across[k]` | the cell beyond facet `k` |
-//! | orientation | `orient` of the four corners is positive; of a ghost with any point strictly beyond its hull facet in infinity's place |
+//! | orientation | `orient` of the four corners is positive; for a ghost with any point strictly beyond its hull facet instead of infinity |
 
 mod insert;
 mod locate;
@@ -24,38 +26,38 @@ use crate::Vec3;
 
 /// The vertex at infinity.
 pub(in crate::tree) const GHOST: u32 = u32::MAX;
-/// No cell.
+/// Marks a missing cell.
 pub(in crate::tree) const NONE: u32 = u32::MAX;
 
-/// Four vertices and the four cells around.
+/// Four vertices and the four adjacent cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Cell {
     vertices: [u32; 4],
     across: [u32; 4],
 }
 
-/// A tetrahedralization that points can be added to.
+/// A tetrahedralization with insertion of points.
 #[derive(Clone, Debug)]
 pub(in crate::tree) struct Delaunay {
     points: Vec<Vec3>,
     cells: Vec<Cell>,
-    /// Dead cells, to be used again.
+    /// Removed cells, for reuse.
     free: Vec<u32>,
-    /// What the last insertion made.
+    /// Cells created by the last insertion.
     created: Vec<u32>,
-    /// What the last insertion took away; the ids may be given anew by the next.
+    /// Cells removed by the last insertion; the next one can reuse their ids.
     removed: Vec<u32>,
-    /// Facets around the hole, as (cell that goes, facet).
+    /// Facets around the cavity, as (removed cell, facet).
     cavity_boundary: Vec<(u32, usize)>,
-    /// Per cell, the last insertion that looked at it, and how it was judged.
+    /// Per cell, the last insertion that visited it, and whether it is removed.
     stamps: Vec<u32>,
     stamp: u32,
     duplicates: usize,
 }
 
 impl Delaunay {
-    /// The tetrahedralization of `points`, which keep their numbers as vertices; `None` if they all lie in one plane.
-    /// Of points that are the same bits the first is used.
+    /// Builds the tetrahedralization of `points`, which keep their indices as vertices. Of points
+    /// with the same bits the first is used. Returns `None` if all points lie in one plane.
     pub fn new(points: &[Vec3]) -> Option<Delaunay> {
         let order = order::order(points);
         let first = independent(points, &order)?;
@@ -85,8 +87,8 @@ impl Delaunay {
         Some(created)
     }
 
-    /// Adds a point; its vertex, or `None` for a duplicate. [`Delaunay::created`] and [`Delaunay::removed`] say what
-    /// changed. `hint`: a cell to walk from.
+    /// Adds a point, walking from the cell `hint`. Returns its vertex, or `None` for a duplicate.
+    /// [`Delaunay::created`] and [`Delaunay::removed`] list the changes.
     pub fn insert(&mut self, p: Vec3, hint: u32) -> Option<u32> {
         let v = self.points.len() as u32;
         self.points.push(p);
@@ -98,47 +100,47 @@ impl Delaunay {
         None
     }
 
-    /// One more than the greatest cell; some below are ghosts or dead.
+    /// Returns one more than the greatest cell id. Some ids below are ghosts or free.
     pub fn cell_count(&self) -> usize {
         self.cells.len()
     }
 
-    /// Cells made by the last insertion, ghosts too.
+    /// Returns the cells created by the last insertion, ghosts included.
     pub fn created(&self) -> &[u32] {
         &self.created
     }
 
-    /// Cells taken away by the last insertion, ghosts too.
+    /// Returns the cells removed by the last insertion, ghosts included.
     pub fn removed(&self) -> &[u32] {
         &self.removed
     }
 
-    /// Points that were skipped since they were there.
+    /// Returns the number of points skipped as duplicates.
     pub fn duplicates(&self) -> usize {
         self.duplicates
     }
 
-    /// The four vertices, [`GHOST`] among them for a ghost.
+    /// Returns the four vertices; one is [`GHOST`] in a ghost.
     pub fn vertices(&self, cell: u32) -> [u32; 4] {
         self.cells[cell as usize].vertices
     }
 
-    /// The cells beyond the four facets.
+    /// Returns the cells beyond the four facets.
     pub fn across(&self, cell: u32) -> [u32; 4] {
         self.cells[cell as usize].across
     }
 
-    /// Corners of a finite cell.
+    /// Returns the corners of a finite cell.
     pub fn corners(&self, cell: u32) -> [Vec3; 4] {
         self.vertices(cell).map(|v| self.points[v as usize])
     }
 
-    /// Whether the cell is a tetrahedron.
+    /// Returns whether the cell is a tetrahedron.
     pub fn is_finite(&self, cell: u32) -> bool {
         self.vertices(cell).iter().all(|&v| v != GHOST)
     }
 
-    /// All tetrahedra.
+    /// Returns all tetrahedra.
     #[cfg(test)]
     pub fn finite_cells(&self) -> impl Iterator<Item = u32> {
         (0..self.cells.len() as u32).filter(|&c| self.is_finite(c))
@@ -152,13 +154,13 @@ impl Delaunay {
         self.vertices(cell).iter().position(|&v| v == GHOST)
     }
 
-    /// One tetrahedron and its four ghosts.
+    /// Creates one tetrahedron and its four ghosts.
     fn initialize(&mut self, [a, b, c, d]: [u32; 4]) {
         let at = |v: u32| &self.points[v as usize];
         let vertices = if orient(at(a), at(b), at(c), at(d)) > 0.0 { [a, b, c, d] } else { [b, a, c, d] };
         self.add(Cell { vertices, across: [1, 2, 3, 4] });
         for k in 0..4 {
-            // infinity in place of corner k is on the other side, so that two of the others change places
+            // infinity at corner k is on the other side, so two of the others are swapped
             let mut ghost = vertices;
             ghost[k] = GHOST;
             ghost.swap((k + 1) % 4, (k + 2) % 4);
@@ -171,7 +173,7 @@ impl Delaunay {
     }
 }
 
-/// The first four points in the order that are not in one plane.
+/// Returns the first four points in the order that are not coplanar.
 fn independent(points: &[Vec3], order: &[u32]) -> Option<[u32; 4]> {
     let at = |v: u32| &points[v as usize];
     let &a = order.first()?;

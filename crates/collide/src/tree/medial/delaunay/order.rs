@@ -1,13 +1,13 @@
-//! The order in which points are inserted: rounds that double, each along a space-filling curve.
+//! The insertion order of the points: rounds of doubling size, each along a space-filling curve.
 //!
-//! Source: Amenta, Choi and Rote, *Incremental constructions con BRIO* (2003). Rounds keep the expected work of the
-//! randomized construction, the curve keeps each point close to the one before. The dice are a hash of the index, so
-//! that the order is a function of the points alone.
+//! Source: Amenta, Choi and Rote, *Incremental constructions con BRIO* (2003). The rounds preserve
+//! the expected cost of random insertion; the curve keeps each point close to its predecessor. The
+//! random choice is a hash of the index, so the order depends on the points alone.
 
 use crate::Vec3;
 use crate::mesh::morton_codes;
 
-/// All indices of `points`, in the order in which to insert them.
+/// Returns all indices of `points` in insertion order.
 pub(super) fn order(points: &[Vec3]) -> Vec<u32> {
     let mut keys: Vec<(u32, u64, u32)> =
         morton_codes(points).into_iter().zip(0..).map(|(place, n)| (round(u64::from(n)), place, n)).collect();
@@ -15,7 +15,8 @@ pub(super) fn order(points: &[Vec3]) -> Vec<u32> {
     keys.into_iter().map(|k| k.2).collect()
 }
 
-/// The last round takes half of the points, the one before a quarter, and so on.
+/// Returns the round of a point: the last round has half of the points, the one before a quarter,
+/// and so on.
 fn round(n: u64) -> u32 {
     64 - hash(n).trailing_zeros()
 }

@@ -1,4 +1,5 @@
-//! Against brute force: empty spheres, the hull's volume by divergence, the counts of a sphere.
+//! Tests against brute force: empty spheres, the volume of the hull by the divergence theorem,
+//! Euler's formula.
 
 use super::predicates::{in_sphere, orient};
 use super::{Delaunay, GHOST};
@@ -41,7 +42,7 @@ fn on_surface(mesh: &TriMesh, each: usize) -> Vec<Vec3> {
     points
 }
 
-/// Each cell right way round, each link mutual and over the same facet.
+/// Each cell has positive orientation; each link is mutual and shares the facet.
 fn check_links(d: &Delaunay) {
     for c in (0..d.cell_count() as u32).filter(|&c| d.is_in_use(c)) {
         if d.is_finite(c) {
@@ -70,8 +71,8 @@ fn check_empty(d: &Delaunay, points: &[Vec3]) {
     }
 }
 
-/// The cells fill what the ghosts' facets enclose (divergence theorem), and no point is beyond any of those: their
-/// hull is the points' convex hull.
+/// The cells fill the volume that the ghosts' facets enclose (divergence theorem), and no point is
+/// beyond any of these facets: their hull is the convex hull of the points.
 fn check_hull(d: &Delaunay, points: &[Vec3]) {
     let filled: f64 = d.finite_cells().map(|c| d.corners(c)).map(|[p, q, r, s]| orient(&p, &q, &r, &s) / 6.0).sum();
     let mut enclosed = 0.0;
@@ -85,8 +86,8 @@ fn check_hull(d: &Delaunay, points: &[Vec3]) {
     assert!((filled - enclosed).abs() <= 1e-12 * enclosed, "{filled} in {enclosed}");
 }
 
-/// With infinity the cells make a three-sphere: `V − E + F − C = 0`, and each cell has four facets, each facet two
-/// cells.
+/// With infinity the cells form a three-sphere: `V − E + F − C = 0`; each cell has four facets,
+/// each facet two cells.
 fn check_euler(d: &Delaunay) {
     let cells: Vec<u32> = (0..d.cell_count() as u32).filter(|&c| d.is_in_use(c)).collect();
     let mut vertices: Vec<u32> = cells.iter().flat_map(|&c| d.vertices(c)).collect();
@@ -207,7 +208,7 @@ fn ten_thousand_points_twice_the_same() {
     check_euler(&d);
     let again = Delaunay::new(&points).unwrap();
     assert_eq!(d.cells, again.cells);
-    // spheres against a sample of the points; their corners' neighbors are held against all by the links' law
+    // spheres against a sample of the points; the local Delaunay property extends it to all points
     for c in d.finite_cells().step_by(97) {
         let corners = d.corners(c);
         assert!(points.iter().all(|p| in_sphere(corners.each_ref(), p) <= 0.0));
