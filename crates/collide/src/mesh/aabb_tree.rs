@@ -1,15 +1,16 @@
-//! A binary tree of boxes around triangles: what closest points, winding numbers and crossings are found by.
+//! A binary tree of boxes around triangles (BVH), used for closest points, winding numbers and
+//! crossings.
 
 use crate::{Aabb, Vec3};
 
-/// Triangles per leaf box.
+/// Maximum number of triangles of a leaf.
 const MAX_LEAF_TRIANGLES: usize = 4;
 
 /// The tree, in pre-order.
 #[derive(Clone, Debug)]
 pub(crate) struct AabbTree {
     pub nodes: Vec<AabbNode>,
-    /// The triangles in the order of the leaves.
+    /// The triangles in leaf order.
     pub ids: Vec<u32>,
 }
 
@@ -17,21 +18,23 @@ pub(crate) struct AabbTree {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AabbNode {
     pub bounds: Aabb,
-    /// Leaf: a range of `ids`. Inner (`count` is 0): the left child is the next node, the right one is `second`.
+    /// Leaf: a range of `ids`. Inner node (`count` is 0): the left child is the next node, the
+    /// right one is `second`.
     pub first: u32,
     pub count: u32,
     pub second: u32,
 }
 
 impl AabbNode {
-    /// The range of a leaf; empty for an inner node.
+    /// Returns the range of a leaf; empty for an inner node.
     pub fn range(&self) -> std::ops::Range<usize> {
         self.first as usize..(self.first + self.count) as usize
     }
 }
 
 impl AabbTree {
-    /// Of at least one triangle. Halved along the longest side, so the depth is at most 32.
+    /// Builds the tree of at least one triangle. Nodes are halved along the longest side, so the
+    /// depth is at most 32.
     pub fn new(corners: &[[Vec3; 3]]) -> AabbTree {
         let mut items: Vec<(Vec3, u32)> =
             corners.iter().enumerate().map(|(t, c)| (c.iter().sum::<Vec3>() / 3.0, t as u32)).collect();

@@ -1,7 +1,9 @@
-//! Is the mesh a solid? Harmless defects are mended and told; the rest is an error that names where.
+//! Validation of closed meshes. Harmless defects are repaired and reported; other defects are
+//! errors that name their place.
 //!
-//! A surface is closed and consistently wound iff every directed edge `u→v` is met by as many `v→u`. More than one of
-//! each is a non-manifold edge with a well-defined volume, which is accepted and told.
+//! A surface is closed and consistently wound iff every directed edge `u→v` occurs as often as
+//! `v→u`. If each occurs more than once, the edge is non-manifold but the volume is well defined.
+//! Such edges are accepted and reported.
 
 use super::TriMesh;
 use super::edges::{EdgeGroups, HalfEdge, edge_groups, unbalanced};
@@ -9,14 +11,14 @@ use super::shells::shells;
 use super::union::Boundary;
 use crate::{MeshError, UnionFind, Vec3};
 
-/// What [`TriMesh::check_closed`] found and did.
+/// The result of [`TriMesh::check_closed`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ClosedReport {
-    /// Vertices merged with another at exactly the same place.
+    /// Vertices merged with another at exactly the same position.
     pub welded_vertices: usize,
     /// Zero-area faces removed.
     pub degenerate_faces: usize,
-    /// Faces removed because the same face was there before (coincident shells).
+    /// Removed faces that repeat an earlier face (coincident shells).
     pub duplicate_faces: usize,
     /// Faces reversed to agree with their neighbors.
     pub flipped_faces: usize,
@@ -24,23 +26,24 @@ pub struct ClosedReport {
     pub turned: bool,
     /// Edges with four or more faces.
     pub nonmanifold_edges: usize,
-    /// Connected pieces of the surface.
+    /// Number of connected pieces of the surface.
     pub shells: usize,
-    /// Of these, how many lay outside all others and were turned outwards by themselves.
+    /// Number of shells that lay outside all others, were inside out and were reversed
+    /// individually.
     pub inverted_shells: usize,
-    /// Faces that cross or touch others that are no neighbors (at least so many, where `crossing_capped`).
+    /// Faces that cross or touch others that are not neighbors; a lower bound if `crossing_capped`.
     pub crossing_faces: usize,
-    /// Whether the search for those faces ended early, because they are too many.
+    /// Whether the search for those faces ended early because there are too many.
     pub crossing_capped: bool,
-    /// Volume of the solid that the surface goes around at least once, m³.
+    /// Volume of the solid that the surface encloses at least once, m³.
     pub volume: f64,
-    /// The share of the surface's area that could not be told to be the solid's boundary or not, 0 to 1. It is taken as
-    /// boundary; volume and mass are not exact then.
+    /// Fraction of the surface's area that could not be classified as boundary of the solid or not,
+    /// 0 to 1. It is treated as boundary, so volume and mass are not exact.
     pub doubtful: f64,
 }
 
 impl ClosedReport {
-    /// One sentence per thing a user should know; empty for a faultless mesh.
+    /// Returns one sentence per defect that a user should know; empty for a mesh without defects.
     pub fn notes(&self) -> Vec<String> {
         let counted = [
             (self.welded_vertices, "vertices at the same place were welded"),
@@ -79,13 +82,16 @@ impl ClosedReport {
 }
 
 impl TriMesh {
-    /// Makes sure that the mesh is a closed, outward-wound solid. Welds equal vertices, drops zero-area and duplicate
-    /// faces, makes the winding consistent and turns an inside-out mesh, all in place and told in the report. An open
-    /// or dangling surface, or one without volume, is an error, and the mesh is then left as it was. Errors number
-    /// vertices and faces as they stand in this mesh, from 1.
+    /// Verifies that the mesh is a closed, outward-wound solid. Welds equal vertices, drops
+    /// zero-area and duplicate faces, makes the winding consistent and reverses an inside-out mesh,
+    /// all in place and listed in the report.
+    ///
+    /// # Errors
+    /// [`MeshError`] for invalid data, an open or dangling surface, and a surface without volume.
+    /// The mesh is then unchanged. Errors number vertices and faces as in this mesh, from 1.
     pub fn check_closed(&mut self) -> Result<ClosedReport, MeshError> {
         self.check_data()?;
-        // zero-area faces are first dropped; where that opens a seam that they close, they stay
+        // zero-area faces are dropped first; if that opens a seam that they close, they stay
         let (mesh, report) = self.cleaned(true).or_else(|error| self.cleaned(false).map_err(|_| error))?;
         *self = mesh;
         Ok(report)
@@ -94,7 +100,7 @@ impl TriMesh {
     fn cleaned(&self, drop_collinear: bool) -> Result<(TriMesh, ClosedReport), MeshError> {
         let (mut mesh, welded_vertices) = self.with_shared_vertices();
         let mut report = ClosedReport { welded_vertices, ..ClosedReport::default() };
-        // the number that each face of `mesh` has in `self`
+        // the index in `self` of each face of `mesh`
         let mut face_of: Vec<usize> = (0..self.triangles.len()).collect();
         report.degenerate_faces = mesh.drop_degenerate(drop_collinear, &mut face_of);
         report.duplicate_faces = mesh.drop_duplicates(&mut face_of);
@@ -126,14 +132,14 @@ impl TriMesh {
         Ok((mesh, report))
     }
 
-    /// Merges vertices at exactly the same place (`-0` equals `0`) and drops those not in use. Indices must be in range
-    /// ([`TriMesh::check_data`]).
+    /// Merges vertices at exactly the same position (`-0` equals `0`) and drops unused ones.
+    /// Indices must be in range ([`TriMesh::check_data`]).
     pub fn welded(&self) -> TriMesh {
         self.with_shared_vertices().0.compacted()
     }
 
-    /// Lets every triangle name the first in use of the vertices at the same place; also returns how many others
-    /// there were. The vertices stay.
+    /// Replaces every vertex index by the first used vertex at the same position. Also returns the
+    /// number of merged vertices. The vertices stay.
     pub(super) fn with_shared_vertices(&self) -> (TriMesh, usize) {
         let mut order: Vec<u32> = self.triangles.iter().flatten().copied().collect();
         order.sort_unstable();
@@ -155,7 +161,7 @@ impl TriMesh {
         (TriMesh { vertices: self.vertices.clone(), triangles }, merged)
     }
 
-    /// Without the vertices that no triangle uses; the others keep their order.
+    /// Drops the vertices that no triangle uses; the others keep their order.
     pub(crate) fn compacted(&self) -> TriMesh {
         let mut kept: Vec<u32> = self.triangles.iter().flatten().copied().collect();
         kept.sort_unstable();
@@ -165,7 +171,8 @@ impl TriMesh {
         TriMesh { vertices: kept.iter().map(|&v| self.vertices[v as usize]).collect(), triangles }
     }
 
-    /// Keeps the triangles of which `keep` says so, and their numbers in `face_of`; returns how many went.
+    /// Keeps the triangles for which `keep` is true, and their entries of `face_of`. Returns the
+    /// number of removed triangles.
     pub(super) fn retain_faces(&mut self, face_of: &mut Vec<usize>, keep: impl Fn(usize) -> bool) -> usize {
         let before = self.triangles.len();
         let kept: Vec<usize> = (0..before).filter(|&t| keep(t)).collect();
@@ -185,7 +192,7 @@ impl TriMesh {
         })
     }
 
-    /// Drops a face that has the same corners in the same sense as an earlier one.
+    /// Drops each face that has the same corners in the same orientation as an earlier one.
     pub(super) fn drop_duplicates(&mut self, face_of: &mut Vec<usize>) -> usize {
         let smallest_first = |t: [u32; 3]| {
             let k = (0..3).min_by_key(|&k| t[k]).unwrap_or(0);
@@ -199,8 +206,8 @@ impl TriMesh {
         self.retain_faces(face_of, |t| !repeats[t])
     }
 
-    /// Spreads the winding of each shell's first face over edges of two faces, then turns each shell that was changed
-    /// outwards.
+    /// Propagates the winding of each shell's first face across edges with two faces, then reverses
+    /// each changed shell that has negative volume. Returns the number of reversed faces.
     pub(super) fn unify_winding(&mut self) -> usize {
         let groups = edge_groups(self);
         let mut neighbors: Vec<Vec<(usize, bool)>> = vec![Vec::new(); self.triangles.len()];
@@ -253,7 +260,8 @@ impl TriMesh {
     }
 }
 
-/// `face_of` gives the numbers that faces have for the user.
+/// Returns an error if the half-edges of some edge do not pair up. `face_of` is the user's
+/// numbering of the faces.
 fn check_balanced(groups: &EdgeGroups, face_of: &[usize]) -> Result<(), MeshError> {
     let bad: Vec<&[HalfEdge]> = unbalanced(groups).collect();
     if bad.is_empty() {
@@ -288,8 +296,9 @@ fn share_vertex(a: &HalfEdge, b: &HalfEdge) -> bool {
     [a.low, a.high].iter().any(|v| *v == b.low || *v == b.high)
 }
 
-/// Groups `0..count` by a relation; each item gets the least member of its group. Quadratic, but open edges are few
-/// or the answer's wording does not matter; beyond 2000 all count as one group.
+/// Groups `0..count` by a relation and returns the smallest member of each item's group. Quadratic,
+/// but open edges are few. Beyond 2000 all items count as one group, as the exact message does not
+/// matter then.
 fn connected_groups(count: usize, related: impl Fn(usize, usize) -> bool) -> Vec<usize> {
     if count > 2000 {
         return vec![0; count];

@@ -1,31 +1,34 @@
-//! Which faces cross or touch others that they are no neighbors of.
+//! Detection of faces that cross or touch faces that are not their neighbors.
 //!
-//! Signs of orient3d and orient2d are exact (Shewchuk's adaptive predicates, crate `robust`), so the answer depends on
-//! no tolerance. Neighbors share corners, by index: with one shared corner the opposite edge of either must meet the
-//! other face; with two, the faces must be folded onto each other.
+//! The signs of orient3d and orient2d are exact (Shewchuk's adaptive predicates, crate `robust`),
+//! so the result depends on no tolerance. Neighbors share corners, by index. Faces with one shared
+//! corner cross if the opposite edge of either meets the other face; faces with two shared corners,
+//! if they are folded onto each other.
 
 use super::TriMesh;
 use super::aabb_tree::AabbTree;
 use crate::{Aabb, Vec3};
 use robust::{Coord, Coord3D};
 
-/// Pairs of boxes looked at per face, on average, before the search gives up; and a floor for small meshes.
+/// Maximum number of box tests, per face on average, and its minimum for small meshes.
 const MAX_BOX_TESTS_PER_FACE: usize = 2_000;
 const MIN_BOX_TESTS: usize = 4_000_000;
-/// Pairs kept per face, on average, and a floor.
+/// Maximum number of stored pairs, per face on average, and its minimum.
 const MAX_PAIRS_PER_FACE: usize = 16;
 const MIN_PAIRS: usize = 100_000;
 
-/// What was found.
+/// The crossing faces of a mesh.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Crossings {
-    /// Pairs of faces, the lower first, in ascending order.
+    /// Pairs of faces, lower index first, in ascending order.
     pub pairs: Vec<(u32, u32)>,
-    /// Whether the search gave up before its end: there may be more.
+    /// Whether the search ended early; there may be more pairs.
     pub capped: bool,
 }
 
-/// Which shells (told per face) have faces that cross or touch: pairs, the lower first, a shell with itself too; `None` where they are too many to know.
+/// Returns the pairs of shells whose faces cross or touch, lower index first; a shell can be paired
+/// with itself. `shell` is the shell of each face. Returns `None` if there are too many crossings
+/// to find all.
 pub(crate) fn crossing_shells(mesh: &TriMesh, shell: &[u32]) -> Option<Vec<(u32, u32)>> {
     let found = Crossings::of(mesh);
     let of = |&(a, b): &(u32, u32)| [shell[a as usize], shell[b as usize]];
@@ -36,7 +39,7 @@ pub(crate) fn crossing_shells(mesh: &TriMesh, shell: &[u32]) -> Option<Vec<(u32,
 }
 
 impl Crossings {
-    /// All pairs of a mesh whose indices are in range.
+    /// Finds all pairs of a mesh whose indices are in range.
     pub fn of(mesh: &TriMesh) -> Crossings {
         let corners: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
         if corners.is_empty() {
@@ -79,7 +82,7 @@ impl Crossings {
         found
     }
 
-    /// How many faces are in a pair.
+    /// Returns the number of faces that are in a pair.
     pub fn faces(&self) -> usize {
         let mut faces: Vec<u32> = self.pairs.iter().flat_map(|&(a, b)| [a, b]).collect();
         faces.sort_unstable();
@@ -92,7 +95,7 @@ fn overlap(a: &Aabb, b: &Aabb) -> bool {
     (0..3).all(|k| a.min[k] <= b.max[k] && b.min[k] <= a.max[k])
 }
 
-/// Do two faces of a mesh have a point in common that their shared corners do not account for?
+/// Returns whether two faces share a point beyond their shared corners.
 fn faces_cross(mesh: &TriMesh, corners: &[[Vec3; 3]], i: usize, j: usize) -> bool {
     let (ti, tj) = (mesh.triangles[i], mesh.triangles[j]);
     let (a, b) = (&corners[i], &corners[j]);
@@ -110,12 +113,12 @@ fn faces_cross(mesh: &TriMesh, corners: &[[Vec3; 3]], i: usize, j: usize) -> boo
     }
 }
 
-/// Do the triangles `u v p` and `u v q` lie in one plane, on the same side of `uv`?
+/// Returns whether the triangles `u v p` and `u v q` lie in one plane, on the same side of `uv`.
 fn folded(u: &Vec3, v: &Vec3, p: &Vec3, q: &Vec3) -> bool {
     orient3d(u, v, p, q) == 0.0 && PLANES.iter().any(|&plane| orient2d(plane, u, v, p) * orient2d(plane, u, v, q) > 0.0)
 }
 
-/// Does a closed segment meet a closed triangle? A triangle without area is met by nothing.
+/// Returns whether a closed segment meets a closed triangle; false for a triangle without area.
 fn segment_meets([p, q]: [&Vec3; 2], [a, b, c]: &[Vec3; 3]) -> bool {
     let (sp, sq) = (orient3d(a, b, c, p), orient3d(a, b, c, q));
     if sp * sq > 0.0 || (sp > 0.0 && sq > 0.0) || (sp < 0.0 && sq < 0.0) {
@@ -128,7 +131,7 @@ fn segment_meets([p, q]: [&Vec3; 2], [a, b, c]: &[Vec3; 3]) -> bool {
     s.iter().all(|x| *x >= 0.0) || s.iter().all(|x| *x <= 0.0)
 }
 
-/// The same where all five points lie in one plane.
+/// Like [`segment_meets`], for five points in one plane.
 fn flat_segment_meets([p, q]: [&Vec3; 2], [a, b, c]: [&Vec3; 3]) -> bool {
     let Some(&plane) = PLANES.iter().find(|&&plane| orient2d(plane, a, b, c) != 0.0) else { return false };
     let within = |x: &Vec3| {
@@ -139,13 +142,14 @@ fn flat_segment_meets([p, q]: [&Vec3; 2], [a, b, c]: [&Vec3; 3]) -> bool {
         let across = |s: f64, t: f64| !((s > 0.0 && t > 0.0) || (s < 0.0 && t < 0.0));
         let lines =
             [orient2d(plane, p, q, u), orient2d(plane, p, q, v), orient2d(plane, u, v, p), orient2d(plane, u, v, q)];
-        // four zeros: all on one line, where an end of one would lie in the other, which `within` sees
+        // four zeros: all on one line, so that an end of one lies in the other, which `within`
+        // detects
         lines.iter().any(|t| *t != 0.0) && across(lines[0], lines[1]) && across(lines[2], lines[3])
     };
     within(p) || within(q) || meets(a, b) || meets(b, c) || meets(c, a)
 }
 
-/// Coordinates to look at, seen along the third.
+/// The two coordinates of the projections along each axis.
 const PLANES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 
 fn orient2d([k, l]: [usize; 2], a: &Vec3, b: &Vec3, c: &Vec3) -> f64 {

@@ -1,13 +1,14 @@
 //! Signed distance to the solid of a closed mesh.
 //!
-//! A binary tree of boxes finds the closest piece of the solid's boundary. The sign comes from the angle-weighted
-//! pseudonormal of the closest feature (Baerentzen and Aanaes, *Signed distance computation using the angle weighted
-//! pseudonormal*, 2005); at features next to faces that cross others, or where the surface is pinched, from the
-//! winding number. Closest point on a triangle: Ericson, *Real-Time Collision Detection* (2005), §5.1.5.
+//! A binary tree of boxes finds the closest piece of the solid's boundary. The sign comes from the
+//! angle-weighted pseudonormal of the closest feature (Baerentzen and Aanaes, *Signed distance
+//! computation using the angle weighted pseudonormal*, 2005). At features next to crossing faces,
+//! or where the surface is pinched, it comes from the winding number.
 //!
-//! Where shells overlap or the surface crosses itself, the solid is what it goes around at least once: the union.
-//! What of the surface is buried in it is no boundary and is passed over. Faces that cross too many others to be cut
-//! are kept whole: next to those, a point inside may be told less than its depth, never more.
+//! If shells overlap or the surface crosses itself, the solid is what the surface encloses at least
+//! once: the union. Surface inside the union is not boundary and is skipped. Faces that cross too
+//! many others to be cut are kept whole: next to them, the depth of an inside point can be too
+//! small, never too large.
 
 use super::TriMesh;
 use super::aabb_tree::AabbTree;
@@ -22,23 +23,24 @@ use nalgebra::ComplexField;
 /// The closest point of a mesh to a query point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosestPoint {
-    /// On the surface.
+    /// A point of the surface.
     pub point: Vec3,
     /// Meters; negative inside.
     pub signed_distance: f64,
-    /// Index of a triangle that holds the point.
+    /// Index of a triangle that contains the point.
     pub triangle: usize,
 }
 
-/// A mesh made ready for distance queries.
+/// A mesh prepared for distance queries.
 #[derive(Clone, Debug)]
 pub struct MeshDistance {
     corners: Vec<[Vec3; 3]>,
     ids: Vec<u32>,
-    /// Per piece: pseudonormals of its face, its edges (k to k+1) and its vertices; those in doubt are zero.
+    /// Per piece: pseudonormals of its face, its edges (k to k+1) and its vertices; zero if they do
+    /// not determine the side.
     normals: Vec<[Vec3; 7]>,
     tree: AabbTree,
-    /// Where the surface crosses itself, is pinched, or has more than one shell.
+    /// Present if the surface crosses itself, is pinched, or has more than one shell.
     winding: Option<WindingNumber>,
 }
 
@@ -48,7 +50,8 @@ impl MeshDistance {
         MeshDistance::from_boundary(mesh, Boundary::of(mesh))
     }
 
-    /// The same of a mesh that is known not to cross itself: that is not looked for, which takes longer than all else.
+    /// Prepares a mesh that is known not to cross itself. Skips the search for crossings, which
+    /// takes most of the time.
     pub(crate) fn without_crossings(mesh: &TriMesh) -> MeshDistance {
         MeshDistance::from_boundary(mesh, Boundary::from_crossings(mesh, &Crossings::default()))
     }
@@ -66,13 +69,14 @@ impl MeshDistance {
         }
     }
 
-    /// The closest point of the solid's boundary and the signed distance.
+    /// Returns the closest point of the solid's boundary and the signed distance.
     pub fn closest(&self, p: &Vec3) -> ClosestPoint {
         self.closest_approximate(p, usize::MAX)
     }
 
-    /// The closest point found when at most about `upper_bound` triangles are looked at, near ones first. That is all but always the
-    /// closest there is; from the middle of a sphere, all triangles are about as far, and what is found is about that.
+    /// Returns the closest point found among at most about `max_triangles` triangles, near ones
+    /// first. Almost always that is the exact result. From the middle of a sphere all triangles are
+    /// about equally far, and the result has about that distance.
     pub(crate) fn closest_approximate(&self, p: &Vec3, max_triangles: usize) -> ClosestPoint {
         let mut best = (f64::INFINITY, Vec3::zeros(), 0, 0);
         let mut left = max_triangles;
@@ -82,13 +86,13 @@ impl MeshDistance {
         ClosestPoint { point, signed_distance: sign * square.sqrt(), triangle: self.ids[n] as usize }
     }
 
-    /// Calls `each` with the index of every triangle within `radius` meters of `p`, its closest point and that point's
-    /// feature (see [`closest_on_triangle`]).
+    /// Calls `each` for every triangle within `radius` meters of `p`, with its index, its closest
+    /// point and the feature of that point (see [`closest_on_triangle`]).
     pub(crate) fn within(&self, p: &Vec3, radius: f64, each: &mut dyn FnMut(usize, Vec3, usize)) {
         self.search_within(0, p, radius * radius, each);
     }
 
-    /// Goes down the tree of boxes where `to` hopes to find something, where most of it first.
+    /// Searches the tree of boxes, the child with the larger bound first.
     pub(crate) fn descend(&self, to: &mut impl BestFirstSearch) {
         self.search_node(0, to);
     }
@@ -160,17 +164,17 @@ impl MeshDistance {
     }
 }
 
-/// A search for the most of something among the triangles of a mesh.
+/// A branch-and-bound search for a maximum over the triangles of a mesh.
 pub(crate) trait BestFirstSearch {
-    /// No less than what any triangle in a box has.
+    /// Returns an upper bound of the value of all triangles in a box.
     fn upper_bound(&self, bounds: &Aabb) -> f64;
-    /// What has no more than this is passed over.
+    /// Returns the value that a box must exceed to be searched.
     fn threshold(&self) -> f64;
-    /// A triangle that may have more.
+    /// Evaluates a triangle.
     fn visit_triangle(&mut self, t: usize);
 }
 
-/// Normals that tell no side are zero.
+/// Returns the normals, with those that do not determine the side set to zero.
 fn trusted_normals(normals: &[Vec3; 7], trust: Trust) -> [Vec3; 7] {
     match trust {
         Trust::All => *normals,
@@ -183,13 +187,14 @@ pub(crate) fn box_distance_squared(b: &Aabb, p: &Vec3) -> f64 {
     (p - p.zip_zip_map(&b.min, &b.max, |x, low, high| x.clamp(low, high))).norm_squared()
 }
 
-/// Outward unit normals of the triangles; zero where there is no area.
+/// Returns the outward unit normals of the triangles; zero for triangles without area.
 pub(crate) fn face_normals(mesh: &TriMesh) -> Vec<Vec3> {
     let normal = |[a, b, c]: [Vec3; 3]| (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
     (0..mesh.triangles.len()).map(|t| normal(mesh.corners(t))).collect()
 }
 
-/// Face (0), edges (1–3) and vertices (4–6) of every triangle. `groups`: the edges of the mesh.
+/// Returns the pseudonormals of the face (0), edges (1–3) and vertices (4–6) of every triangle.
+/// `groups` are the edges of the mesh.
 pub(crate) fn pseudonormals(mesh: &TriMesh, groups: &EdgeGroups) -> Vec<[Vec3; 7]> {
     let face = face_normals(mesh);
     let mut all: Vec<[Vec3; 7]> = face.iter().map(|n| [*n; 7]).collect();

@@ -1,15 +1,18 @@
-//! Ear clipping: a ring of points as triangles.
+//! Ear clipping: triangulates a polygon.
 //!
-//! The ring is projected onto the plane across its area vector `Σ (pₖ − p₀) × (pₖ₊₁ − p₀)`. A corner that turns left and in whose triangle no other point
-//! lies is an ear; the ear of the best shape is taken off, until three points are left. Points at the place of one of an ear's corners are no hindrance, so
-//! that rings that touch themselves, as those of faces with holes do, come out right. A ring that crosses itself has not always an ear: then the corner of
-//! the best shape is taken all the same.
+//! The polygon is projected onto the plane perpendicular to its area vector `Σ (pₖ − p₀) × (pₖ₊₁ −
+//! p₀)`. An ear is a corner that turns left and whose triangle contains no other point. The ear of
+//! the best quality is cut off, until three points are left. Points that coincide with a corner of
+//! an ear are ignored, so polygons that touch themselves, as those of faces with holes do, are
+//! triangulated correctly. A polygon that crosses itself can lack an ear; then the corner of the
+//! best quality is cut off anyway.
 
 use crate::Vec3;
 use std::collections::BinaryHeap;
 
-/// Clips a ring of at least three points; the triangles go round as the points do. At most `max_tries` corners are looked at for each ear, and points are compared with ears at most `work` times; what
-/// is left of that comes back in it.
+/// Triangulates a polygon of at least three points; the triangles keep its orientation. Tests at
+/// most `max_tries` corners for each ear, and compares points with ears at most `work` times. The
+/// remaining work is stored in `work`.
 pub(super) fn clip_ears(points: &[Vec3], max_tries: usize, work: &mut u64) -> Vec<[usize; 3]> {
     let mut clipper = EarClipper::new(points, max_tries, *work);
     let mut triangles = Vec::with_capacity(points.len() - 2);
@@ -22,13 +25,14 @@ pub(super) fn clip_ears(points: &[Vec3], max_tries: usize, work: &mut u64) -> Ve
     triangles
 }
 
-/// A polygon in the plane, whose points that are left form a ring.
+/// A polygon in the plane; the remaining points form a ring.
 struct EarClipper {
     flat: Vec<[f64; 2]>,
     before: Vec<usize>,
     after: Vec<usize>,
     remaining: Vec<bool>,
-    /// Shape (as ordered bits), point, and how often that point's ear had changed: stale entries are passed over.
+    /// Quality (as ordered bits), point, and the number of changes of its ear; entries with an
+    /// older number are skipped.
     heap: BinaryHeap<(i64, usize, u32)>,
     changes: Vec<u32>,
     max_tries: usize,
@@ -58,7 +62,7 @@ impl EarClipper {
 
     fn push(&mut self, j: usize) {
         let quality = self.quality(j).to_bits() as i64;
-        // ordered as the numbers are, as in `f64::total_cmp`
+        // ordered like the numbers, as in `f64::total_cmp`
         let ordered = quality ^ (((quality >> 63) as u64) >> 1) as i64;
         self.heap.push((ordered, j, self.changes[j]));
     }
@@ -68,7 +72,8 @@ impl EarClipper {
         (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
     }
 
-    /// Twice the area over the square of the longest side; negative for a corner that turns the wrong way.
+    /// Returns twice the area over the square of the longest side; negative for a corner that turns
+    /// the wrong way.
     fn quality(&self, j: usize) -> f64 {
         let (i, k) = (self.before[j], self.after[j]);
         let square = |a: usize, b: usize| (0..2).map(|n| (self.flat[a][n] - self.flat[b][n]).powi(2)).sum::<f64>();
@@ -76,7 +81,7 @@ impl EarClipper {
         if longest > 0.0 { self.turn(i, j, k) / longest } else { 0.0 }
     }
 
-    /// Whether it turns left and no other point lies in its triangle.
+    /// Returns whether the corner turns left and no other point lies in its triangle.
     fn is_ear(&mut self, j: usize) -> bool {
         if self.quality(j) <= 0.0 {
             return false;

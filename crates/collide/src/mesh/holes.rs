@@ -1,34 +1,37 @@
-//! Triangles across a hole.
+//! Triangulation of holes.
 //!
-//! Short rims: of all triangulations of the rim the one whose sharpest fold, against each other and
-//! against the faces around, is least; of equal ones that of least area. By dynamic programming over the rim's
-//! sub-chains `i … k`:
+//! Short boundaries: the triangulation whose sharpest fold, against itself and the surrounding
+//! faces, is the smallest; of equal ones the one with the least area. Found by dynamic programming
+//! over the sub-chains `i … k` of the boundary:
 //!
 //! ```text
 //! W(i, k) = min over m of  max-and-sum( W(i, m), W(m, k), weight of triangle (i, m, k) )
 //! ```
 //!
-//! Longer rims are clipped ear by ear ([`super::ear_clipping`]); a rim that crosses itself there is filled all the same.
+//! Longer boundaries are ear-clipped ([`super::ear_clipping`]); a boundary that crosses itself is
+//! filled too.
 //!
-//! Sources: Barequet and Sharir, *Filling gaps in the boundary of a polyhedron* (1995), for the programme; Liepa,
-//! *Filling holes in meshes* (2003), for the weight.
+//! Sources: Barequet and Sharir, *Filling gaps in the boundary of a polyhedron* (1995), for the
+//! program; Liepa, *Filling holes in meshes* (2003), for the weight.
 
 use super::ear_clipping::clip_ears;
 use crate::Vec3;
 
-/// Rims of up to so many edges are filled by weight: time grows as the cube.
+/// Maximum number of edges of a boundary for dynamic programming, whose time is cubic.
 const MAX_DP_EDGES: usize = 200;
-/// Corners of longer rims that are looked at before the one of the best shape is taken all the same.
+/// Maximum number of corners of longer boundaries that are tested per ear.
 const MAX_TRIES: usize = 64;
-/// Edges times the square of the limit, over all rims of a mesh: many rims are kept from taking long.
+/// Maximum of the number of edges times the square of the limit, over all boundaries of a mesh:
+/// limits the total time.
 const MAX_WORK: f64 = 1.5e9;
-/// The fold of a triangle that has no area, worse than any other.
+/// Fold of a triangle without area, larger than any other.
 const DEGENERATE_FOLD: f64 = 4.0;
-/// Of one that names a vertex twice.
+/// Fold of a triangle that repeats a vertex.
 const REPEATED_VERTEX_FOLD: f64 = 8.0;
 
-/// Fills a rim with triangles of indices into it. `normals[n]` is that of the face at the edge from point n to n+1,
-/// unit length or zero. The triangles go round as the points do.
+/// Fills a hole with triangles of indices into its boundary. `normals[n]` is the normal of the face
+/// at the edge from point n to n+1, unit length or zero. The triangles have the orientation of the
+/// points.
 pub(super) fn fill(points: &[Vec3], normals: &[Vec3], max_dp_edges: usize) -> Vec<[usize; 3]> {
     if points.len() <= max_dp_edges {
         min_weight_triangulation(points, normals)
@@ -37,12 +40,13 @@ pub(super) fn fill(points: &[Vec3], normals: &[Vec3], max_dp_edges: usize) -> Ve
     }
 }
 
-/// The longest rim to be filled by weight where all rims of the mesh together have so many edges.
+/// Returns the limit of dynamic programming for a mesh whose boundaries have `edges` edges in
+/// total.
 pub(super) fn max_dp_edges_for(edges: usize) -> usize {
     MAX_DP_EDGES.min((MAX_WORK / edges.max(1) as f64).sqrt() as usize).max(4)
 }
 
-/// Sharpest fold as 1 − cos of the angle between normals, and area (twice).
+/// Sharpest fold as 1 − cos of the angle between normals, and doubled area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Weight(f64, f64);
 
@@ -52,7 +56,7 @@ impl Weight {
     }
 
     fn is_less(self, other: Weight) -> bool {
-        // folds that differ by rounding alone are equal
+        // folds that differ only by rounding are equal
         if (self.0 - other.0).abs() > 1e-9 { self.0 < other.0 } else { self.1 < other.1 }
     }
 }
@@ -107,7 +111,7 @@ fn min_weight_triangulation(points: &[Vec3], edge_normals: &[Vec3]) -> Vec<[usiz
     triangles
 }
 
-/// 1 − cos of the angle between two faces' normals; none against nothing.
+/// Returns 1 − cos of the angle between the normals of two faces; 0 without a second face.
 fn fold_angle(a: &Vec3, b: &Vec3) -> f64 {
     if *b == Vec3::zeros() { 0.0 } else { 1.0 - a.dot(b) }
 }

@@ -1,45 +1,52 @@
-//! Convex hull of a mesh's vertices: quickhull (Barber, Dobkin and Huhdanpaa 1996) on integers, so that no case is degenerate.
+//! Convex hull of a mesh's vertices: quickhull (Barber, Dobkin and Huhdanpaa 1996) on integers,
+//! without degenerate cases.
 //!
-//! Vertices are put on a grid of 2²⁰ cells along the longest side of their box, where the sign of
+//! Vertices are rounded to a grid of 2²⁰ cells along the longest side of their box, where the sign
+//! of
 //!
 //! ```text
 //! d(f, p) = (b − a) × (c − a) · (p − a),     f = (a, b, c) counter-clockwise seen from outside
 //! ```
 //!
-//! is exact in 64 bits: products of three differences of at most 2²⁰ sum to less than 2⁶³. A face sees `p` iff `d > 0`. The faces that see a point
-//! then form one patch with one simple rim, and no new face is without area: were `p` in line with an edge of the rim, it would be in the plane of the
-//! face that is said to see it.
+//! is exact in 64 bits: products of three differences of at most 2²⁰ sum to less than 2⁶³. A face
+//! is visible from `p` iff `d > 0`. The faces visible from a point form one patch with one simple
+//! horizon, and no new face has zero area: if `p` were collinear with a horizon edge, it would lie
+//! in the plane of the visible face at that edge.
 //!
-//! Departure from the paper: points in the plane of a face are not merged into it, so flat sides come out as several triangles.
+//! Departure from the paper: points in the plane of a face are not merged into it, so a flat side
+//! consists of several triangles.
 
 use super::TriMesh;
 use crate::{MeshError, Vec3};
 use std::collections::BTreeMap;
 
-/// Cells along the longest side.
+/// Number of grid cells along the longest side.
 const GRID_CELLS: f64 = 1_048_576.0;
 
 type Point = [i64; 3];
 
-/// An edge of a patch's rim: from and to which point, the face beyond it, and the number of the edge there.
+/// An edge of the horizon: from point, to point, the face beyond it, and the number of the edge in
+/// that face.
 type HorizonEdge = (u32, u32, usize, usize);
 
-/// A triangle of the hull as it grows.
+/// A triangle of the growing hull.
 struct Face {
     corners: [u32; 3],
     /// The face beyond the edge from corner `k` to the next.
     beyond: [usize; 3],
-    /// Points that it sees and no other face is in charge of.
+    /// Points outside this face that are assigned to it.
     outside: Vec<u32>,
     active: bool,
 }
 
 impl TriMesh {
-    /// The convex hull of the vertices in use by triangles: closed and wound outwards. Its vertices are within half a millionth of the longest side
-    /// of the bounding box of those that it stands for.
+    /// Returns the convex hull of the vertices used by triangles: closed and outward-wound. Its
+    /// vertices differ from the original ones by at most half a millionth of the longest side of
+    /// the bounding box.
     ///
     /// # Errors
-    /// As [`check_data`](Self::check_data); [`MeshError::NoVolume`] where all vertices lie in a plane (to that accuracy).
+    /// As [`check_data`](Self::check_data); [`MeshError::NoVolume`] if all vertices lie in a plane
+    /// (to that accuracy).
     pub fn convex_hull(&self) -> Result<TriMesh, MeshError> {
         self.check_data()?;
         let mesh = self.welded();
@@ -60,12 +67,12 @@ impl TriMesh {
 struct Hull<'p> {
     points: &'p [Point],
     faces: Vec<Face>,
-    /// Faces that may have points outside.
+    /// Faces that can have points outside.
     pending: Vec<usize>,
 }
 
 impl<'p> Hull<'p> {
-    /// Grown to the end; `None` where all points lie in a plane.
+    /// Computes the hull; `None` if all points lie in a plane.
     fn of(points: &'p [Point]) -> Option<Hull<'p>> {
         let mut hull = Hull { points, faces: Vec::new(), pending: Vec::new() };
         hull.initial_tetrahedron()?;
@@ -77,7 +84,7 @@ impl<'p> Hull<'p> {
         Some(hull)
     }
 
-    /// A tetrahedron of points far apart, and all others given to its faces.
+    /// Creates a tetrahedron of distant points and assigns all others to its faces.
     fn initial_tetrahedron(&mut self) -> Option<()> {
         let points = self.points;
         let all = || 0..points.len() as u32;
@@ -103,14 +110,15 @@ impl<'p> Hull<'p> {
         Some(())
     }
 
-    /// `d(f, p)`: positive where the face sees the point.
+    /// Returns `d(f, p)`: positive if the face is visible from the point.
     fn signed_volume(&self, corners: &[u32; 3], p: u32) -> i64 {
         let [a, b, c] = corners.map(|v| self.points[v as usize]);
         let (n, p) = (cross(a, b, c), self.points[p as usize]);
         (0..3).map(|k| n[k] * (p[k] - a[k])).sum()
     }
 
-    /// Gives each point to the first face from `first` on that sees it; who is seen by none is inside.
+    /// Assigns each point to the first face from `first` on that is visible from it. A point that
+    /// sees no face is inside.
     fn assign_points(&mut self, points: Vec<u32>, first: usize) {
         for p in points {
             if let Some(face) = (first..self.faces.len()).find(|&f| self.signed_volume(&self.faces[f].corners, p) > 0) {
@@ -120,7 +128,8 @@ impl<'p> Hull<'p> {
         self.pending.extend((first..self.faces.len()).filter(|&f| !self.faces[f].outside.is_empty()));
     }
 
-    /// Replaces all faces that see the farthest point of `face` by a cone from their rim to it.
+    /// Replaces all faces visible from the farthest point of `face` by a cone from their horizon to
+    /// it.
     fn add_farthest(&mut self, face: usize) {
         let corners = self.faces[face].corners;
         let Some(apex) = self.faces[face].outside.iter().copied().max_by_key(|&p| (self.signed_volume(&corners, p), p))
@@ -150,7 +159,7 @@ impl<'p> Hull<'p> {
         self.assign_points(left, first);
     }
 
-    /// The faces that see `apex`, and their rim.
+    /// Returns the faces visible from `apex`, and their horizon.
     fn visible_patch(&self, face: usize, apex: u32) -> (Vec<usize>, Vec<HorizonEdge>) {
         let mut visible_patch = vec![face];
         let mut inside: BTreeMap<usize, bool> = BTreeMap::from([(face, true)]);

@@ -1,4 +1,4 @@
-//! Triangle meshes: reading, checking, generating, integrating, measuring distance to.
+//! Triangle meshes: readers, validation, repair, generators, integrals and distance queries.
 
 mod aabb_tree;
 mod check;
@@ -40,12 +40,13 @@ pub use winding::WindingNumber;
 
 use crate::{Aabb, MeshError, Vec3};
 
-/// Coordinates up to this are taken, meters: their products stay within what floating point can hold.
+/// Largest allowed coordinate, meters: products of coordinates stay within the range of floating
+/// point.
 const FARTHEST: f64 = 1e9;
-/// Meshes whose bounding box has a diagonal of at least this are taken, meters: for the same reason.
+/// Smallest allowed diagonal of the bounding box, meters, for the same reason.
 const SMALLEST: f64 = 1e-30;
 
-/// A surface made of triangles, counter-clockwise seen from outside.
+/// A surface of triangles, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TriMesh {
     /// Positions, meters.
@@ -55,40 +56,43 @@ pub struct TriMesh {
 }
 
 impl TriMesh {
-    /// The corners of triangle `t`; the index must be in range.
+    /// Returns the corners of triangle `t`; the index must be in range.
     pub fn corners(&self, t: usize) -> [Vec3; 3] {
         self.triangles[t].map(|v| self.vertices[v as usize])
     }
 
-    /// The box around the vertices in use by triangles or not; empty (`min > max`) if there are none.
+    /// Returns the box around all vertices, used or not; empty (`min > max`) without vertices.
     pub fn aabb(&self) -> Aabb {
         Aabb::around(self.vertices.iter().copied())
     }
 
-    /// Length of the diagonal of the bounding box, meters (0 for an empty mesh).
+    /// Returns the diagonal of the bounding box, meters; 0 for an empty mesh.
     pub fn diagonal(&self) -> f64 {
         if self.vertices.is_empty() { 0.0 } else { (self.aabb().max - self.aabb().min).norm() }
     }
 
-    /// Area of all triangles, m².
+    /// Returns the area of all triangles, m².
     pub fn area(&self) -> f64 {
         (0..self.triangles.len()).map(|t| self.corners(t)).map(|[a, b, c]| 0.5 * (b - a).cross(&(c - a)).norm()).sum()
     }
 
-    /// The same mesh moved by `offset` meters.
+    /// Returns the mesh moved by `offset` meters.
     pub fn translated(mut self, offset: &Vec3) -> TriMesh {
         self.vertices.iter_mut().for_each(|v| *v += offset);
         self
     }
 
-    /// The same mesh scaled about the origin.
+    /// Returns the mesh scaled about the origin.
     pub fn scaled(mut self, factor: f64) -> TriMesh {
         self.vertices.iter_mut().for_each(|v| *v *= factor);
         self
     }
 
-    /// Refuses an empty mesh, vertices that are not finite or beyond 1e9 m, a mesh smaller than 1e-30 m, and indices out of range, naming the
-    /// first offender (numbers count from 1, as in an OBJ file).
+    /// Checks that the mesh is not empty, that vertices are finite and within 1e9 m, that the mesh
+    /// is at least 1e-30 m across, and that indices are in range.
+    ///
+    /// # Errors
+    /// [`MeshError`] names the first fault; numbers count from 1, as in an OBJ file.
     pub fn check_data(&self) -> Result<(), MeshError> {
         if self.triangles.is_empty() {
             return Err(MeshError::Empty);

@@ -1,6 +1,8 @@
-//! Places along Morton's space-filling curve: what is close in space is close in memory.
+//! Morton order: a space-filling curve along which points that are close in space are close in
+//! memory.
 //!
-//! Source: Morton, *A computer oriented geodetic data base* (1966): the bits of the coordinates in turn.
+//! Source: Morton, *A computer oriented geodetic data base* (1966): interleaves the bits of the
+//! coordinates.
 
 use super::TriMesh;
 use crate::{Aabb, Vec3};
@@ -8,7 +10,7 @@ use crate::{Aabb, Vec3};
 /// Bits of the curve per axis.
 const BITS: u32 = 20;
 
-/// The place of each point along the curve through the box around all.
+/// Returns the Morton code of each point in the box around all points.
 pub(crate) fn morton_codes(points: &[Vec3]) -> Vec<u64> {
     let bounds = Aabb::around(points.iter().copied());
     let side = (bounds.max - bounds.min).max();
@@ -22,7 +24,7 @@ fn morton_code(p: Vec3) -> u64 {
 }
 
 impl TriMesh {
-    /// The same mesh with vertices and triangles in the order of the curve.
+    /// Returns the mesh with vertices and triangles in Morton order.
     pub(crate) fn in_morton_order(&self) -> TriMesh {
         let by_place = |points: &[Vec3]| {
             let keys = morton_codes(points);
@@ -61,7 +63,7 @@ mod tests {
             all
         };
         assert_eq!(sorted(&mesh), sorted(&in_morton_order));
-        // neighbors in memory are near each other
+        // neighbors in memory are close to each other
         let way = |mesh: &TriMesh| {
             (1..count).map(|t| (mesh.corners(t)[0] - mesh.corners(t - 1)[0]).norm()).sum::<f64>() / count as f64
         };

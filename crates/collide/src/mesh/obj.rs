@@ -1,7 +1,7 @@
-//! Wavefront OBJ, the geometry only: `v` and `f` lines. Everything else is passed over.
+//! Wavefront OBJ: `v` and `f` lines only. All other lines are ignored.
 //!
-//! Faces may be written `v`, `v/vt`, `v//vn` or `v/vt/vn`; a negative index counts back from the last vertex read;
-//! a polygon is cut into triangles ([`PolygonTriangulator`]).
+//! Faces can be written `v`, `v/vt`, `v//vn` or `v/vt/vn`. A negative index counts back from the
+//! last vertex read. A polygon is triangulated ([`PolygonTriangulator`]).
 
 use super::TriMesh;
 use super::polygon::PolygonTriangulator;
@@ -9,13 +9,19 @@ use super::text::obj_lines;
 use crate::{MeshError, Vec3};
 
 impl TriMesh {
-    /// Reads the text of an OBJ file. Errors name the line (from 1), and the vertex or face (from 1).
+    /// Reads the text of an OBJ file.
+    ///
+    /// # Errors
+    /// [`MeshError`] names the line, and the vertex or face, each from 1.
     pub fn from_obj(text: &str) -> Result<TriMesh, MeshError> {
         Ok(TriMesh::from_obj_with_lines(text)?.0)
     }
 
-    /// The same, with the line (from 1) of each triangle, for [`MeshError::at_line`]. A polygon of `n` corners is `n − 2`
-    /// triangles.
+    /// Like [`TriMesh::from_obj`]; also returns the line (from 1) of each triangle, for
+    /// [`MeshError::at_line`]. A polygon of `n` corners gives `n − 2` triangles.
+    ///
+    /// # Errors
+    /// As [`TriMesh::from_obj`].
     pub fn from_obj_with_lines(text: &str) -> Result<(TriMesh, Vec<usize>), MeshError> {
         let mut mesh = TriMesh::default();
         let mut faces = Vec::new();
@@ -40,7 +46,8 @@ impl TriMesh {
         if mesh.triangles.is_empty() { Err(MeshError::Empty) } else { Ok((mesh, lines)) }
     }
 
-    /// Adds the triangles of a face; corners are numbers of vertices from 1, as is `face`, the number that errors name.
+    /// Appends the triangles of a face. Corners are vertex numbers from 1; `face` is the number for
+    /// errors, from 1.
     pub(super) fn push_face(
         &mut self,
         corners: &[i64],
@@ -72,7 +79,7 @@ fn vertex<'a>(mut words: impl Iterator<Item = &'a str>, line: usize, vertex: usi
     Err(MeshError::At { line, error: Box::new(MeshError::NotFinite { vertex, x: v.x, y: v.y, z: v.z }) })
 }
 
-/// Corner indices as 1-based numbers; range is checked once all vertices are known.
+/// Parses corner indices to numbers from 1. The range is checked once all vertices are known.
 fn face<'a>(words: impl Iterator<Item = &'a str>, line: usize, so_far: usize) -> Result<Vec<i64>, MeshError> {
     let mut corners = Vec::new();
     for word in words {

@@ -1,26 +1,27 @@
-//! Which face goes on over which edge: the surface as pieces with rims.
+//! Pairing of half-edges: the surface as pieces with boundary loops.
 //!
-//! Each face uses its three edges in a direction. A use is paired with one of the same edge in the other direction;
-//! what stays without is a rim. Where more than two faces meet, two uses of the same sheet (faces connected over plain
-//! edges) are paired first, then those of the larger sheets: a fin or an inner wall stays over. The corners of faces
-//! that are joined over pairs form fans; around an open fan exactly one rim comes in and one goes out, so rims close
-//! to loops without choice.
+//! Each half-edge is paired with one of the same edge in the opposite direction. A half-edge
+//! without partner is a boundary edge. If more than two faces meet at an edge, half-edges of the
+//! same sheet (faces connected across edges with two faces) are paired first, then those of the
+//! larger sheets. So the half-edges of fins and inner walls stay unpaired. The corners of faces
+//! that are connected by pairs form fans. At an open fan exactly one boundary edge enters and one
+//! leaves, so the boundary edges form unique loops.
 
 use super::TriMesh;
 use super::edges::{HalfEdge, edge_groups};
 use crate::UnionFind;
 
-/// No partner.
+/// Marks a half-edge without partner.
 pub(super) const BOUNDARY: u32 = u32::MAX;
 
-/// Use `3t + k` is that of edge `k` (corners k to k+1) of triangle `t`.
+/// The pairing. Half-edge `3t + k` belongs to edge `k` (corners k to k+1) of triangle `t`.
 pub(super) struct Pairing {
-    /// The use on the other side, or [`BOUNDARY`].
+    /// The opposite half-edge, or [`BOUNDARY`].
     pub partner: Vec<u32>,
-    /// The piece of each face: faces connected over pairs, counted from 0.
+    /// The piece of each face: faces connected by pairs, counted from 0.
     pub piece: Vec<u32>,
     pub pieces: usize,
-    /// Whether a piece has a rim at an edge where other faces go on.
+    /// Whether a piece has a boundary at an edge that other faces share.
     pub dangling: Vec<bool>,
 }
 
@@ -53,7 +54,7 @@ impl Pairing {
         Pairing { partner, piece, pieces, dangling }
     }
 
-    /// Whether each piece has a rim.
+    /// Returns whether each piece has a boundary.
     pub fn has_boundary(&self) -> Vec<bool> {
         let mut has_boundary = vec![false; self.pieces];
         for (u, _) in self.partner.iter().enumerate().filter(|(_, p)| **p == BOUNDARY) {
@@ -62,7 +63,8 @@ impl Pairing {
         has_boundary
     }
 
-    /// The loops of rims, each as uses in the order in which a face that fills the hole goes round, against the uses.
+    /// Returns the boundary loops as half-edges, in the order of a face that fills the hole,
+    /// opposite to the half-edges.
     pub fn loops(&self) -> Vec<Vec<u32>> {
         let mut seen = vec![false; self.partner.len()];
         let mut loops = Vec::new();
@@ -81,7 +83,8 @@ impl Pairing {
         loops
     }
 
-    /// The rim that ends where `boundary` starts: round the fan of that corner.
+    /// Returns the boundary edge that ends where `boundary` starts, by walking around the fan of
+    /// that corner.
     fn previous_boundary_edge(&self, boundary: u32) -> u32 {
         let before = |u: u32| u / 3 * 3 + (u % 3 + 2) % 3;
         let mut at = before(boundary);
@@ -105,7 +108,7 @@ fn opposite(group: &[HalfEdge]) -> bool {
     group.len() == 2 && group[0].forward != group[1].forward
 }
 
-/// Pairs the uses of one edge.
+/// Pairs the half-edges of one edge.
 fn pair_group(group: &[HalfEdge], sheet: &[u32], area: &[f64], join: &mut impl FnMut(&HalfEdge, &HalfEdge)) {
     let mut left: Vec<&HalfEdge> = group.iter().collect();
     let size = |u: &HalfEdge| area[sheet[u.face] as usize];

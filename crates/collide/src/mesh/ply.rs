@@ -1,4 +1,5 @@
-//! PLY, text and binary of either byte order: positions, faces and triangle strips. Every other property and element is passed over.
+//! PLY, text and binary in either byte order: positions, faces and triangle strips. Other
+//! properties and elements are ignored.
 //!
 //! ```text
 //! ply
@@ -12,20 +13,22 @@
 //! end_header
 //! ```
 //!
-//! Then the elements follow in the order of the header, each with its properties in theirs; a list begins with its length. Counts in the header are not
-//! believed: memory grows with what the file holds.
+//! The elements follow in the order of the header, each with its properties in order; a list starts
+//! with its length. Counts in the header are not trusted: memory grows with the content of the
+//! file.
 
 use super::TriMesh;
 use super::polygon::PolygonTriangulator;
 use super::strip::strip_triangles;
 use crate::{MeshError, Vec3};
 
-/// Lines of a header.
+/// Maximum number of lines of a header.
 const MAX_LINES: usize = 10_000;
 
 impl TriMesh {
-    /// Reads the bytes of a PLY file. A face of more than three corners is cut into triangles ([`PolygonTriangulator`](crate::PolygonTriangulator)). Triangle strips
-    /// turn every second triangle, start again after -1, and leave out triangles that name a vertex twice.
+    /// Reads the bytes of a PLY file. Faces of more than three corners are triangulated
+    /// ([`PolygonTriangulator`](crate::PolygonTriangulator)). In triangle strips every second
+    /// triangle is reversed, -1 starts a new strip, and triangles that repeat a vertex are skipped.
     ///
     /// # Errors
     /// [`MeshError`] names the line of the header, or the vertex, face or strip (from 1).
@@ -119,7 +122,7 @@ impl ScalarType {
         }
     }
 
-    /// Of its bytes, the lowest first; the others are 0.
+    /// Decodes bytes, lowest first; unused bytes are 0.
     fn value(self, b: [u8; 8]) -> f64 {
         let (two, four) = ([b[0], b[1]], [b[0], b[1], b[2], b[3]]);
         match self {
@@ -138,7 +141,7 @@ impl ScalarType {
 struct Property {
     name: String,
     number: ScalarType,
-    /// The kind of a list's length.
+    /// Type of the length of a list.
     length: Option<ScalarType>,
 }
 
@@ -148,7 +151,7 @@ struct Element {
     properties: Vec<Property>,
 }
 
-/// What of an element is wanted: the places of its properties.
+/// The kind of an element, with the indices of its properties.
 #[derive(Clone, Copy)]
 enum ElementKind {
     Vertex([usize; 3]),
@@ -182,7 +185,7 @@ struct Header {
 }
 
 impl Header {
-    /// The header, and what comes after it.
+    /// Reads the header and returns it with the remaining bytes.
     fn read(bytes: &[u8]) -> Result<(Header, &[u8]), MeshError> {
         let (mut encoding, mut elements) = (None, Vec::<Element>::new());
         let mut rest = bytes;
@@ -216,7 +219,7 @@ impl Header {
                 ["property", kind, name] => add_property(&mut elements, name, kind, None).map_err(wrong)?,
                 ["end_header"] => {
                     let encoding = encoding.ok_or_else(|| wrong("the header has no line `format`".into()))?;
-                    // an element without properties takes no place, however many there are
+                    // an element without properties has no data, whatever its count
                     elements.retain(|e| !e.properties.is_empty());
                     return Ok((Header { encoding, elements }, rest));
                 }
@@ -231,7 +234,7 @@ impl Header {
         Err(ply_error(&format!("line {MAX_LINES}"), "the header has no end"))
     }
 
-    /// The error of a file whose elements hold no triangle, such as a cloud of points.
+    /// Returns the error of a file without triangles, such as a point cloud.
     fn no_triangles_error(&self) -> MeshError {
         let names: Vec<String> = self.elements.iter().take(10).map(|e| format!("{} {}", e.count, e.name)).collect();
         ply_error(
@@ -252,25 +255,26 @@ fn add_property(elements: &mut [Element], name: &str, kind: &str, length: Option
     Ok(())
 }
 
-/// The first line, as far as it is text, and the bytes after its end, which is `\n`, `\r\n` or `\r`.
+/// Returns the first line, as far as it is valid text, and the bytes after its end, which is `\n`,
+/// `\r\n` or `\r`.
 fn first_line(bytes: &[u8]) -> Option<(&str, &[u8])> {
     let end = bytes.iter().position(|b| matches!(b, b'\n' | b'\r'))?;
     let long = if bytes[end..].starts_with(b"\r\n") { 2 } else { 1 };
     let line = &bytes[..end];
-    // comments may be in any encoding
+    // comments can have any encoding
     let text =
         std::str::from_utf8(line).unwrap_or_else(|e| std::str::from_utf8(&line[..e.valid_up_to()]).unwrap_or(""));
     Some((text, &bytes[end + long..]))
 }
 
-/// The numbers after the header.
+/// Reads the numbers after the header.
 struct ValueReader<'a> {
     encoding: Encoding,
     rest: &'a [u8],
 }
 
 impl ValueReader<'_> {
-    /// Reads a property, and gives `each` the numbers of it that are no length.
+    /// Reads a property and calls `each` for its numbers, without the length of a list.
     fn property(&mut self, property: &Property, mut each: impl FnMut(f64)) -> Result<(), String> {
         let Some(length) = property.length else {
             each(self.next(property.number)?);
@@ -320,7 +324,7 @@ fn read_vertex(element: &Element, at: [usize; 3], values: &mut ValueReader<'_>) 
     Ok(vertex)
 }
 
-/// Corners as numbers from 1.
+/// Returns the corners as numbers from 1.
 fn read_face(element: &Element, at: usize, values: &mut ValueReader<'_>) -> Result<Vec<i64>, String> {
     let mut corners = read_indices(element, at, values)?;
     if corners.len() < 3 {
@@ -330,7 +334,8 @@ fn read_face(element: &Element, at: usize, values: &mut ValueReader<'_>) -> Resu
     Ok(corners)
 }
 
-/// The list at place `at` of an element's properties: numbers of vertices, from 0 as in the file.
+/// Returns the list at index `at` of an element's properties: vertex indices from 0, as in the
+/// file.
 fn read_indices(element: &Element, at: usize, values: &mut ValueReader<'_>) -> Result<Vec<i64>, String> {
     let mut indices = Vec::new();
     let mut odd = None;

@@ -1,22 +1,24 @@
-//! Faces of more than three corners, cut into triangles.
+//! Triangulation of polygonal faces.
 //!
-//! A face becomes a fan around its first corner where that covers it once: each triangle turns as the face does, and together they go less than once round
-//! that corner. All others, the concave ones, are clipped ear by ear ([`super::ear_clipping`]): a fan would lie on itself, and reach over the notches.
+//! A face becomes a fan around its first corner if the fan is simple: every triangle has the
+//! orientation of the face, and their angles at that corner sum to less than a full turn. All other
+//! (concave) faces are ear-clipped ([`super::ear_clipping`]), because a fan would overlap itself
+//! and cover the notches.
 
 use super::ear_clipping::clip_ears;
 use crate::{MeshError, Vec3};
 use nalgebra::RealField;
 use std::f64::consts::PI;
 
-/// Corners of a concave face, at most.
+/// Maximum number of corners of a concave face.
 const MAX_CORNERS: usize = 5000;
-/// Comparisons of points with ears, over all faces of a mesh: a hostile file is kept from taking long.
+/// Maximum number of point comparisons over all faces of a mesh; limits the time for hostile files.
 const MAX_WORK: u64 = 2_000_000_000;
 
-/// Cuts the faces of one mesh.
+/// Triangulates the faces of one mesh.
 #[derive(Clone, Debug)]
 pub struct PolygonTriangulator {
-    /// Comparisons that are left.
+    /// Remaining comparisons.
     work: u64,
 }
 
@@ -27,11 +29,12 @@ impl Default for PolygonTriangulator {
 }
 
 impl PolygonTriangulator {
-    /// Triangles of indices into `corners`, which go round as the corners do: two fewer than those, none for fewer than three. Corners need not lie in one plane; a face that
-    /// crosses itself is cut somehow.
+    /// Returns triangles of indices into `corners`, in the orientation of the face: two fewer than
+    /// corners, none for fewer than three corners. Corners need not be coplanar. A face that
+    /// crosses itself is triangulated in some way.
     ///
     /// # Errors
-    /// [`MeshError::Concave`]: concave faces with too many corners, one or all together.
+    /// [`MeshError::Concave`] if one concave face, or all together, have too many corners.
     pub fn triangulate(&mut self, corners: &[Vec3]) -> Result<Vec<[usize; 3]>, MeshError> {
         let count = corners.len();
         let fan = || (2..count).map(|k| [0, k - 1, k]).collect();

@@ -1,8 +1,8 @@
-//! Repair on request: a surface with defects becomes a solid, and all that was done to it is told.
+//! Mesh repair: makes a solid of a surface with defects and reports all changes.
 //!
-//! In this order: close vertices become one; faces without area and double faces go; the winding is made consistent;
-//! pieces that dangle from an edge where others go on (fins, inner walls) and small open pieces go; holes are filled.
-//! What comes out has passed [`TriMesh::check_closed`].
+//! In order: close vertices are welded; zero-area and duplicate faces are dropped; the winding is
+//! made consistent; pieces that dangle from an edge of other faces (fins, inner walls) and small
+//! open pieces are dropped; holes are filled. The result passes [`TriMesh::check_closed`].
 
 use super::TriMesh;
 use super::check::ClosedReport;
@@ -11,16 +11,16 @@ use super::holes;
 use super::pairing::Pairing;
 use crate::{MeshError, Vec3};
 
-/// What [`TriMesh::repair`] may do.
+/// Settings of [`TriMesh::repair`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RepairSettings {
-    /// Vertices at most this far apart become one, meters; 0 (the default) for those at the same place, else 1e-12 to
-    /// 0.01 of the diagonal.
+    /// Distance up to which vertices are welded, meters: 0 (the default) for vertices at the same
+    /// position, else 1e-12 to 0.01 of the diagonal.
     pub weld: f64,
-    /// A hole of more edges than this is an error, 3 to 5000 (default 2000).
+    /// Maximum number of edges of a hole, 3 to 5000 (default 2000); longer holes are an error.
     pub hole_edges: usize,
-    /// Open pieces whose bounding box has a diagonal of at most this part of the mesh's are dropped, 0 to 1 (default
-    /// 0.05).
+    /// Open pieces are dropped if their bounding box has at most this fraction of the mesh's
+    /// diagonal, 0 to 1 (default 0.05).
     pub debris: f64,
 }
 
@@ -30,37 +30,37 @@ impl Default for RepairSettings {
     }
 }
 
-/// What [`TriMesh::repair`] did.
+/// The result of [`TriMesh::repair`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RepairReport {
-    /// Vertices merged with another closer than the tolerance.
+    /// Vertices merged with another within the tolerance.
     pub welded_vertices: usize,
     /// Zero-area faces removed.
     pub degenerate_faces: usize,
-    /// Faces removed because the same face was there before.
+    /// Removed faces that repeat an earlier face.
     pub duplicate_faces: usize,
     /// Faces reversed to agree with their neighbors.
     pub flipped_faces: usize,
-    /// Pieces that hung from an edge where others go on, dropped.
+    /// Dropped pieces that dangled from an edge of other faces.
     pub dangling_pieces: usize,
-    /// Faces of these.
+    /// Faces of the dangling pieces.
     pub dangling_faces: usize,
-    /// Small open pieces, dropped.
+    /// Dropped small open pieces.
     pub debris_pieces: usize,
-    /// Faces of these.
+    /// Faces of the small open pieces.
     pub debris_faces: usize,
-    /// Holes that were filled.
+    /// Filled holes.
     pub filled_holes: usize,
-    /// Edges of the longest one.
+    /// Number of edges of the longest hole.
     pub longest_hole: usize,
-    /// Triangles put into them.
+    /// Triangles that fill the holes.
     pub filled_faces: usize,
-    /// The check of what came out.
+    /// The check of the repaired mesh.
     pub closed: ClosedReport,
 }
 
 impl RepairReport {
-    /// One sentence per thing a user should know; empty for a faultless mesh.
+    /// Returns one sentence per change that a user should know; empty for a mesh without defects.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         let mut say = |count: usize, what: String| {
@@ -124,7 +124,7 @@ impl TriMesh {
                 *self = mesh;
                 return Ok(RepairReport { closed, ..report });
             }
-            // nothing is missing there that could be added
+            // these defects cannot be repaired by adding or dropping faces
             Err(refused @ (MeshError::Empty | MeshError::Flat { .. } | MeshError::NoVolume { .. })) => {
                 return Err(refused);
             }
@@ -136,7 +136,7 @@ impl TriMesh {
                 Ok(report)
             }
             Err(why) => {
-                // the face as it stands in the user's mesh, which welding may have changed
+                // the face in the user's numbering, which welding can change
                 let first = self.clone().check_closed().err().unwrap_or(refused);
                 Err(MeshError::BeyondRepair { why, error: Box::new(first) })
             }
@@ -162,7 +162,7 @@ impl TriMesh {
         Ok(())
     }
 
-    /// Drops the open pieces that dangle, and the small ones; never the only or the largest piece.
+    /// Drops dangling and small open pieces, but never the only or the largest piece.
     fn drop_loose_pieces(&mut self, debris: f64, report: &mut RepairReport) {
         let pairing = Pairing::of(self);
         let mut faces: Vec<Vec<usize>> = vec![Vec::new(); pairing.pieces];
@@ -214,7 +214,8 @@ impl TriMesh {
         let max_dp_edges = holes::max_dp_edges_for(loops.iter().map(Vec::len).sum());
         let mut added = Vec::new();
         for boundary in &loops {
-            // the filling goes against the faces around: from the end of each use to its start
+            // the triangles run opposite to the surrounding half-edges: from the end of each to its
+            // start
             let end = |u: u32| self.triangles[u as usize / 3][(u as usize % 3 + 1) % 3];
             let vertices: Vec<u32> = boundary.iter().map(|&u| end(u)).collect();
             let points: Vec<Vec3> = vertices.iter().map(|&v| self.vertices[v as usize]).collect();
@@ -230,8 +231,8 @@ impl TriMesh {
         Ok(())
     }
 
-    /// Lets vertices within `tolerance` of an earlier one be that one; returns how many. Those at the same place
-    /// count too.
+    /// Merges each vertex with an earlier one within `tolerance`. Returns the number of merged
+    /// vertices, including those at the same position.
     fn weld_within(&mut self, tolerance: f64) -> usize {
         let mut used: Vec<u32> = self.triangles.iter().flatten().copied().collect();
         used.sort_unstable();

@@ -1,7 +1,8 @@
-//! The connected pieces of a closed surface, and which of them are inside out.
+//! Shells (connected pieces) of a closed surface, and the orientation of each.
 //!
-//! A shell of negative volume is a cavity if it lies within another; one that reaches outside all others can only be
-//! inside out. It is turned, and with it the shells that lie wholly within it, which were wound to suit it.
+//! A shell of negative volume is a cavity if it lies within another shell. If it extends outside
+//! all others, it is inside out. Then it is reversed, together with the shells that lie wholly
+//! within it, whose winding matches it.
 
 use super::TriMesh;
 use super::edges::EdgeGroups;
@@ -9,11 +10,11 @@ use super::winding::{WindingNumber, solid_angle};
 use crate::{UnionFind, Vec3};
 use std::f64::consts::PI;
 
-/// Faces of a shell at which it is asked where the shell lies.
+/// Maximum number of faces of a shell that are tested for its position.
 const SAMPLES: usize = 32;
 
-/// The shell of each face, counted from 0 in the order of their first faces, and how many there are. Faces are
-/// connected over edges.
+/// Returns the shell of each face, counted from 0 in the order of their first faces, and the number
+/// of shells. Faces are connected across edges.
 pub(crate) fn shells(mesh: &TriMesh, groups: &EdgeGroups) -> (Vec<u32>, usize) {
     let mut sets = UnionFind::new(mesh.triangles.len());
     for pair in groups.iter().flat_map(|group| group.windows(2)) {
@@ -23,7 +24,7 @@ pub(crate) fn shells(mesh: &TriMesh, groups: &EdgeGroups) -> (Vec<u32>, usize) {
 }
 
 impl TriMesh {
-    /// Turns shells that are inside out one by one; returns how many were.
+    /// Reverses shells that are inside out, one by one. Returns their number.
     pub(super) fn orient_shells(&mut self, shell: &[u32], count: usize) -> usize {
         let mut members: Vec<Vec<usize>> = vec![Vec::new(); count];
         shell.iter().enumerate().for_each(|(face, &s)| members[s as usize].push(face));
@@ -62,7 +63,7 @@ impl TriMesh {
         self.corners(face).iter().sum::<Vec3>() / 3.0
     }
 
-    /// Signed, m³, of some faces that close a solid.
+    /// Returns the signed volume of faces that enclose a solid, m³.
     fn volume_of(&self, faces: &[usize]) -> f64 {
         let origin = faces.first().map_or(Vec3::zeros(), |&f| self.corners(f)[0]);
         faces.iter().map(|&f| self.corners(f).map(|p| p - origin)).map(|[a, b, c]| a.dot(&b.cross(&c)) / 6.0).sum()

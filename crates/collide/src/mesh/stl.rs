@@ -1,17 +1,21 @@
-//! STL, text and binary. The format has no shared vertices, so equal positions are welded (exact comparison).
+//! STL, text and binary. The format has no shared vertices, so equal positions are welded (exact
+//! comparison).
 
 use super::TriMesh;
 use super::text::numbered_lines;
 use crate::{MeshError, Vec3};
 
-/// 80 bytes of title, then the count.
+/// 80 bytes of title and the count.
 const HEADER: usize = 84;
 /// Normal, three corners, two bytes of attributes.
 const RECORD: usize = 50;
 
 impl TriMesh {
-    /// Reads the bytes of an STL file, text or binary. Nothing is allocated on the word of a header: the count must
-    /// agree with the file's size.
+    /// Reads the bytes of an STL file, text or binary. The count in the header must match the size
+    /// of the file before memory is allocated.
+    ///
+    /// # Errors
+    /// [`MeshError`] names the line or the facet (from 1), or states the sizes that do not match.
     pub fn from_stl(bytes: &[u8]) -> Result<TriMesh, MeshError> {
         let soup = match binary_count(bytes) {
             Some(count) if bytes.len() == HEADER + RECORD * count => read_binary(bytes),
@@ -36,7 +40,7 @@ impl TriMesh {
     }
 }
 
-/// The count that a binary file announces (at most u32, so `HEADER + RECORD·count` fits in 64 bits).
+/// Returns the count in a binary header (at most u32, so `HEADER + RECORD·count` fits in 64 bits).
 fn binary_count(bytes: &[u8]) -> Option<usize> {
     let word = bytes.get(80..HEADER)?;
     Some(u32::from_le_bytes([word[0], word[1], word[2], word[3]]) as usize)

@@ -1,16 +1,17 @@
 //! Triangle strips: each vertex after the first two makes a triangle with the two before it.
 //!
-//! Triangle `k` of a strip is `(v_k, v_k+1, v_k+2)` where `k` is even and `(v_k+1, v_k, v_k+2)` where it is odd, so that all wind the same way. `-1` ends
-//! a strip; the next one begins with an even triangle. A triangle that names a vertex twice only leads the strip to another place and is left out.
+//! Triangle `k` of a strip is `(v_k, v_k+1, v_k+2)` for even `k` and `(v_k+1, v_k, v_k+2)` for odd
+//! `k`, so all have the same winding. `-1` ends a strip; the next one starts with an even triangle.
+//! A triangle that repeats a vertex only moves the strip and is skipped.
 
 /// Ends a strip.
 const RESTART: i64 = -1;
 
-/// The triangles of strips that stand one after the other in `indices`, numbers of `count` vertices from 0.
+/// Returns the triangles of the strips in `indices`, which are indices of `count` vertices from 0.
 pub(super) fn strip_triangles(indices: &[i64], count: usize) -> Result<Vec<[u32; 3]>, String> {
     let mut triangles = Vec::with_capacity(indices.len().saturating_sub(2));
     for strip in indices.split(|&index| index == RESTART) {
-        // two restarts side by side, or one at the end, leave nothing between them
+        // consecutive or trailing restarts make empty strips
         if !strip.is_empty() && strip.len() < 3 {
             return Err(format!("a strip of {} vertices, but it needs at least 3", strip.len()));
         }

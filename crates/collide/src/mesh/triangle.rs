@@ -2,7 +2,8 @@
 
 use crate::Vec3;
 
-/// The closest point of a triangle and its feature: 0 the face, 1–3 the edge from corner k to k+1, 4–6 a corner.
+/// Returns the closest point of a triangle and its feature: 0 the face, 1–3 the edge from corner k
+/// to k+1, 4–6 a corner.
 #[inline]
 pub(crate) fn closest_on_triangle(p: &Vec3, [a, b, c]: &[Vec3; 3]) -> (Vec3, usize) {
     let (ab, ac, ap) = (b - a, c - a, p - a);

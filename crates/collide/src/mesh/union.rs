@@ -1,18 +1,20 @@
-//! The boundary of the solid that a closed surface goes around at least once.
+//! The boundary of the solid that a closed surface encloses at least once.
 //!
-//! Where shells overlap, or a surface crosses itself, some of it is buried. Faces that cross others are cut along the
-//! planes of those others, so that each piece lies on one side of every other face. A piece's center `c` then tells
-//! for the whole of it: with the faces through `c` left out,
+//! If shells overlap, or a surface crosses itself, part of it is buried in the solid. Faces that
+//! cross others are cut along the planes of those others, so that each piece lies on one side of
+//! every other face. The piece is then classified at its center `c`, without the faces through `c`:
 //!
 //! ```text
 //! front = w(c) − J/2        back = w(c) + J/2        J = Σ ±1 over the faces through c, + where they face alike
 //! ```
 //!
-//! are the winding numbers in front of the piece and behind it, with no step off the surface. The piece bounds the
-//! solid if one of them is above 1/2 and the other is not; it is then counted `1/|J|` times, since each of the faces
-//! that lie on each other there has such a piece. Faces that cross none are told patch by patch.
+//! are the winding numbers in front of the piece and behind it, without the jump at the surface.
+//! The piece bounds the solid if exactly one of them is above 1/2. It then has the weight `1/|J|`,
+//! since each of the coincident faces has such a piece. Faces without crossings are classified
+//! patch by patch.
 //!
-//! Integrals over the boundary's pieces are exact for the union, whatever the number of times it is gone around.
+//! Integrals over the pieces of the boundary are exact for the union, however often the surface
+//! encloses it.
 
 use super::TriMesh;
 use super::crossing::Crossings;
@@ -22,38 +24,39 @@ use super::triangle::closest_on_triangle;
 use super::winding::WindingNumber;
 use crate::{MassProperties, UnionFind, Vec3};
 
-/// Faces with more others across them than this are not cut.
+/// Maximum number of crossing faces for which a face is cut.
 const MAX_PARTNERS: usize = 64;
-/// Pieces of one face.
+/// Maximum number of pieces of one face.
 const MAX_PIECES: usize = 512;
-/// Pieces per face of the mesh, on average, and a floor for small meshes; further faces are not cut.
+/// Maximum number of pieces, per face of the mesh on average, and its minimum for small meshes;
+/// further faces are not cut.
 const MAX_CUT: usize = 4;
 const MIN_CUT: usize = 200_000;
-/// Faces closer than this part of the diagonal lie on each other.
+/// Largest distance of coincident faces, as a fraction of the diagonal.
 const SAME_PLACE: f64 = 1e-10;
-/// A winding number farther than this from an integer is not believed.
+/// Largest difference of a reliable winding number from an integer.
 const MAX_ROUNDING: f64 = 0.2;
 
 /// A triangle of the boundary.
 #[derive(Clone, Debug)]
 pub(super) struct Piece {
     pub corners: [Vec3; 3],
-    /// The face that it is, or is a part of.
+    /// The face of which this is all or a part.
     pub face: u32,
-    /// How often it counts in an integral over the boundary, 0 to 1.
+    /// Weight of the piece in integrals over the boundary, 0 to 1.
     pub weight: f64,
-    /// Which normals tell the side that a point is on.
+    /// The normals that determine the side on which a point lies.
     pub trust: Trust,
 }
 
-/// How far the normals of a piece tell which side is which.
+/// The places where the normals of a piece determine the side on which a point lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Trust {
-    /// Not at all.
+    /// Nowhere.
     None,
-    /// Above its middle, but not at edges and corners.
+    /// Above the interior of the face, but not at edges and corners.
     Face,
-    /// Everywhere: the faces around all its corners are whole, and lie round each in one fan.
+    /// Everywhere: the faces around all its corners are whole, and form one fan at each corner.
     All,
 }
 
@@ -62,29 +65,30 @@ pub(super) enum Trust {
 pub(super) struct Boundary {
     pub pieces: Vec<Piece>,
     pub crossing_faces: usize,
-    /// Whether there may be more of these.
+    /// Whether there can be more crossing faces.
     pub capped: bool,
-    /// Whether some of the surface is no boundary, or counts other than once.
+    /// Whether part of the surface is not boundary, or has a weight other than 1.
     pub differs: bool,
-    /// Area of what was kept without being sure, m².
+    /// Area of pieces that are kept although their classification is uncertain, m².
     pub doubtful_area: f64,
 }
 
 impl TriMesh {
-    /// The same where the surface crosses itself or shells overlap: of all that it goes around at least once, each
-    /// place counted once. Exact up to rounding, but for faces that cross more than 64 others, which count whole.
+    /// Like [`TriMesh::mass_properties`], for surfaces that cross themselves or have overlapping
+    /// shells: volume that is enclosed several times counts once. Exact up to rounding, except for
+    /// faces that cross more than 64 others, which count whole.
     pub fn union_mass_properties(&self, density: f64) -> MassProperties {
         Boundary::of(self).0.moments(&self.middle()).mass_properties(&self.middle(), density)
     }
 }
 
 impl Boundary {
-    /// Of a closed mesh (see [`TriMesh::check_closed`]).
+    /// Computes the boundary of a closed mesh (see [`TriMesh::check_closed`]).
     pub fn of(mesh: &TriMesh) -> (Boundary, Option<WindingNumber>) {
         Boundary::from_crossings(mesh, &Crossings::of(mesh))
     }
 
-    /// The same of a mesh whose crossing faces are known.
+    /// Computes the boundary of a mesh with known crossing faces.
     pub fn from_crossings(mesh: &TriMesh, crossings: &Crossings) -> (Boundary, Option<WindingNumber>) {
         let groups = edge_groups(mesh);
         let patches = patches(mesh, &groups, crossings);
@@ -105,14 +109,14 @@ impl Boundary {
             }
         }
         if boundary.pieces.is_empty() {
-            // a surface around nothing: there is a distance, and no inside
+            // a surface around nothing: it has a distance, but no inside
             (0..mesh.triangles.len()).for_each(|t| boundary.add_piece(t, mesh.corners(t), PieceClass::Doubtful));
         }
         boundary.trust(mesh, split);
         (boundary, winding)
     }
 
-    /// Integrals over the solid, about `origin`.
+    /// Integrates over the solid, about `origin`.
     pub fn moments(&self, origin: &Vec3) -> Moments {
         Moments::of(self.pieces.iter().map(|p| (p.corners, p.weight)), origin)
     }
@@ -165,7 +169,8 @@ impl Boundary {
         }
     }
 
-    /// Where all faces around all corners of a face are whole and trusted, so are the normals of its edges and corners.
+    /// Trusts the normals of the edges and corners of a face if all faces around its corners are
+    /// whole and trusted.
     fn trust(&mut self, mesh: &TriMesh, mut pinched: Vec<bool>) {
         let mut whole = vec![false; mesh.triangles.len()];
         for piece in self.pieces.iter().filter(|p| p.weight == 1.0 && p.trust == Trust::Face) {
@@ -182,14 +187,14 @@ impl Boundary {
     }
 }
 
-/// What a piece is to the solid.
+/// The relation of a piece to the solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum PieceClass {
-    /// Solid, or none, on both sides.
+    /// Inside or outside the solid on both sides.
     Buried,
-    /// Its boundary, of which it is such a share; negative where the solid is in front of it.
+    /// Boundary, with this weight; negative if the solid is in front of it.
     Bounds(f64),
-    /// Taken as its boundary for safety.
+    /// Uncertain; treated as boundary.
     Doubtful,
 }
 
@@ -222,8 +227,8 @@ fn classify(
     if (front > 0.5) == (back > 0.5) { PieceClass::Buried } else { PieceClass::Bounds(1.0 / jump) }
 }
 
-/// A face cut along the planes of others, and of the edges of those that lie in its own plane; `None` if they are
-/// too many.
+/// Cuts a face along the planes of others, and along the edges of coplanar others. Returns `None`
+/// if there are too many others or pieces.
 fn split_face(mesh: &TriMesh, face: usize, others: &[u32]) -> Option<Vec<[Vec3; 3]>> {
     let corners = mesh.corners(face);
     if others.len() > MAX_PARTNERS {
@@ -249,7 +254,8 @@ fn split_face(mesh: &TriMesh, face: usize, others: &[u32]) -> Option<Vec<[Vec3; 
     Some(pieces.iter().flat_map(|p| (1..p.len() - 1).map(|k| [p[0], p[k], p[k + 1]])).collect())
 }
 
-/// Cuts those convex pieces that could meet the triangle `across` by the plane through `at` along `normal`.
+/// Cuts the convex pieces that can meet the triangle `across`, by the plane through `at` with
+/// normal `normal`.
 fn split(pieces: Vec<Vec<Vec3>>, across: &[Vec3; 3], at: &Vec3, normal: &Vec3) -> Vec<Vec<Vec3>> {
     let bounds = crate::Aabb::around(*across);
     let mut after = Vec::with_capacity(pieces.len() + 1);
@@ -266,7 +272,7 @@ fn split(pieces: Vec<Vec<Vec3>>, across: &[Vec3; 3], at: &Vec3, normal: &Vec3) -
     after
 }
 
-/// What of a convex piece lies where `sign · height ≥ 0`.
+/// Returns the part of a convex piece with `sign · height ≥ 0`.
 fn clip_half(piece: &[Vec3], heights: &[f64], sign: f64) -> Vec<Vec3> {
     let mut kept = Vec::with_capacity(piece.len() + 1);
     for n in 0..piece.len() {
@@ -276,7 +282,7 @@ fn clip_half(piece: &[Vec3], heights: &[f64], sign: f64) -> Vec<Vec3> {
             kept.push(piece[n]);
         }
         if h * g < 0.0 {
-            // from the same end for both halves, so that they share the very point
+            // interpolated from the same end for both halves, so that they share the exact point
             let (low, high) = if heights[n] < heights[m] { (n, m) } else { (m, n) };
             let fraction = heights[low] / (heights[low] - heights[high]);
             kept.push(piece[low] + (piece[high] - piece[low]) * fraction);
@@ -285,16 +291,17 @@ fn clip_half(piece: &[Vec3], heights: &[f64], sign: f64) -> Vec<Vec3> {
     kept
 }
 
-/// Twice the area, along the normal.
+/// Returns the normal with the length of twice the area.
 fn area_vector([a, b, c]: &[Vec3; 3]) -> Vec3 {
     (b - a).cross(&(c - a))
 }
 
-/// Faces that cross none, joined over edges of two faces: all of a patch has the same on either side.
+/// Patches of faces without crossings, connected across edges with two faces. All faces of a patch
+/// have the same class.
 struct Patches {
-    /// Of each face; means nothing for one that crosses.
+    /// Patch of each face; undefined for faces with crossings.
     of: Vec<u32>,
-    /// The face of each patch that is largest.
+    /// The largest face of each patch.
     largest: Vec<usize>,
     count: usize,
 }
@@ -335,7 +342,8 @@ fn patches(mesh: &TriMesh, groups: &EdgeGroups, crossings: &Crossings) -> Patche
     patches
 }
 
-/// Which vertices have more than one fan of faces around them, an edge of more than two, or a face without area.
+/// Returns the vertices with several fans of faces, with an edge of more than two faces, or with a
+/// face without area.
 fn pinched_vertices(mesh: &TriMesh, groups: &EdgeGroups) -> Vec<bool> {
     let mut pinched = vec![false; mesh.vertices.len()];
     for (_, triangle) in
@@ -343,7 +351,7 @@ fn pinched_vertices(mesh: &TriMesh, groups: &EdgeGroups) -> Vec<bool> {
     {
         triangle.iter().for_each(|&v| pinched[v as usize] = true);
     }
-    // corners of faces, joined over the edges that meet there: one set per fan
+    // corners of faces, joined across the edges that meet there: one set per fan
     let mut sets = UnionFind::new(3 * mesh.triangles.len());
     let corner =
         |face: usize, v: u32| (3 * face + mesh.triangles[face].iter().position(|&w| w == v).unwrap_or(0)) as u32;

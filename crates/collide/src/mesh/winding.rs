@@ -1,7 +1,7 @@
-//! Winding numbers: how often a surface goes round a point.
+//! Winding numbers: how often a surface encloses a point.
 //!
-//! For a closed surface it is an integer, 0 outside. Overlapping shells add up, so above 1/2 is inside their union; a
-//! shell wound inwards takes one off, so a cavity counts 0.
+//! For a closed surface it is an integer, 0 outside. Overlapping shells add up, so values above 1/2
+//! are inside their union. A shell wound inwards subtracts one, so a cavity has 0.
 //!
 //! ```text
 //! w(q) = 1/4π Σ Ω(a−q, b−q, c−q)        tan(Ω/2) = a·(b×c) / (|a||b||c| + (a·b)|c| + (b·c)|a| + (c·a)|b|)
@@ -15,8 +15,8 @@
 //! | `N = Σ A n` | sum of area vectors of the group |
 //! | `D = Σ A (c − p) nᵀ` | their first moment, `c` a triangle's centroid |
 //!
-//! Sources: Van Oosterom and Strackee, *The solid angle of a plane triangle* (1983); Barill et al., *Fast winding
-//! numbers for soups and clouds* (2018), of which the first two terms are taken.
+//! Sources: Van Oosterom and Strackee, *The solid angle of a plane triangle* (1983); Barill et al.,
+//! *Fast winding numbers for soups and clouds* (2018), of which the first two terms are used.
 
 use super::TriMesh;
 use super::aabb_tree::AabbTree;
@@ -24,26 +24,27 @@ use crate::{Mat3, Vec3};
 use nalgebra::RealField;
 use std::f64::consts::PI;
 
-/// A group whose triangles all lie within `R` of its middle is far at `FAR_FACTOR·R`.
+/// A group whose triangles all lie within `R` of its middle is far at distance `FAR_FACTOR·R`.
 const FAR_FACTOR: f64 = 2.0;
-/// A sum farther than this from an integer is taken again, exactly.
+/// Largest difference of a sum from an integer for which it is not computed again exactly.
 const MAX_ROUNDING: f64 = 0.2;
-/// A point lies in a triangle's plane where the box that its three corners span, seen from there, is smaller than this part of the product of its edges.
+/// A point lies in a triangle's plane if the volume spanned by the directions to the corners is
+/// smaller than this fraction of the product of their lengths.
 const COPLANAR: f64 = 1e-14;
 
-/// How a triangle is seen from a point.
+/// A solid angle function of a point and a triangle.
 type Angle = fn(&Vec3, &[Vec3; 3]) -> f64;
 
-/// A mesh made ready for winding numbers.
+/// A mesh prepared for winding numbers.
 #[derive(Clone, Debug)]
 pub struct WindingNumber {
     tree: AabbTree,
-    /// In the order of the leaves.
+    /// In leaf order.
     corners: Vec<[Vec3; 3]>,
     groups: Vec<Group>,
 }
 
-/// The triangles of one node seen from afar.
+/// The far-field expansion of the triangles of one node.
 #[derive(Clone, Copy, Debug)]
 struct Group {
     middle: Vec3,
@@ -67,30 +68,31 @@ impl WindingNumber {
         WindingNumber { tree, corners, groups }
     }
 
-    /// The winding number at `p`, meters. Groups of triangles that are far are taken together, which errs by some
-    /// thousandths; where the sum is not close to an integer, every triangle is taken.
+    /// Returns the winding number at `p`, meters. Far groups of triangles are approximated, with an
+    /// error of some thousandths. If the sum is not close to an integer, all triangles are
+    /// evaluated.
     pub fn at(&self, p: &Vec3) -> f64 {
         self.excluding(p, &[])
     }
 
-    /// The same by the sum of all solid angles, for any mesh; time linear in the mesh.
+    /// Returns the winding number as the sum of all solid angles, for any mesh, in linear time.
     pub fn exact(&self, p: &Vec3) -> f64 {
         self.corners.iter().map(|c| solid_angle(p, c)).sum::<f64>() / (4.0 * PI)
     }
 
-    /// Whether `p` is inside the solid around which the surface goes at least once.
+    /// Returns whether `p` is inside the solid that the surface encloses at least once.
     pub fn contains(&self, p: &Vec3) -> bool {
         self.checked_sum(p, &[], solid_angle_off_plane) > 0.5
     }
 
-    /// Without some triangles, through which `p` passes.
+    /// Returns the winding number without some triangles that contain `p`.
     pub(super) fn excluding(&self, p: &Vec3, skipped: &[u32]) -> f64 {
         self.checked_sum(p, skipped, solid_angle)
     }
 
     fn checked_sum(&self, p: &Vec3, skipped: &[u32], angle: Angle) -> f64 {
         let near = self.sum(p, skipped, 1.0, angle);
-        // what is skipped may stand for halves
+        // the skipped triangles can account for halves
         if (2.0 * near - (2.0 * near).round()).abs() <= MAX_ROUNDING {
             near
         } else {
@@ -144,7 +146,7 @@ impl Group {
     }
 }
 
-/// Past the last triangle of each node.
+/// Returns the end of each node's triangles.
 fn ends(tree: &AabbTree) -> Vec<usize> {
     let mut ends = vec![0; tree.nodes.len()];
     for n in (0..tree.nodes.len()).rev() {
@@ -154,16 +156,16 @@ fn ends(tree: &AabbTree) -> Vec<usize> {
     ends
 }
 
-/// [`solid_angle`], and 0 from a point within the triangle: the middle of what is seen from its two sides, so that faces that lie on each other back to back
-/// count as none.
+/// Returns [`solid_angle`], or 0 for a point in the plane of the triangle: the mean of the values
+/// on its two sides, so that coincident faces back to back cancel.
 fn solid_angle_off_plane(p: &Vec3, corners: &[Vec3; 3]) -> f64 {
     let [a, b, c] = corners.map(|x| x - p);
     let flat = a.dot(&b.cross(&c)).abs() <= COPLANAR * a.norm() * b.norm() * c.norm();
     if flat { 0.0 } else { solid_angle(p, corners) }
 }
 
-/// Of a triangle seen from `p`, steradians; positive where its winding is clockwise seen from there, so that a closed
-/// outward surface sums to 4π inside.
+/// Returns the solid angle of a triangle seen from `p`, steradians. Positive if its winding is
+/// clockwise seen from there, so a closed outward-wound surface sums to 4π inside.
 pub(super) fn solid_angle(p: &Vec3, corners: &[Vec3; 3]) -> f64 {
     let [a, b, c] = corners.map(|x| x - p);
     let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
