@@ -1,6 +1,7 @@
 //! Box against box: separating axes, then a face manifold, a pair of edges, or the closest points.
 //!
-//! Source: Gottschalk, Lin, Manocha, *OBBTree* (1996) for the 15 axes; clipping as in `clip.rs`. All in A's frame.
+//! Source: Gottschalk, Lin, Manocha, *OBBTree* (1996) for the 15 axes; clipping as in `clip.rs`.
+//! All in A's frame.
 //!
 //! | symbol | meaning |
 //! |---|---|
@@ -9,8 +10,9 @@
 //! | `a`, `b` | half extents |
 //! | separation on axis `n` | `|t·n| − Σ aᵢ|eᵢ·n| − Σ bⱼ|Rⱼ·n|`, a lower bound of the signed distance |
 //!
-//! A face is preferred over a pair of edges by a small bias, because it gives a manifold; where the boxes are apart
-//! and no face manifold reaches the least separation, the exact closest points are used (`box_closest.rs`).
+//! A face is preferred over a pair of edges by a small bias, because it gives a manifold. If the
+//! boxes are separated and no face manifold reaches the greatest separation, the exact closest
+//! points are used (`box_closest.rs`).
 
 use super::box_pair::BoxPair;
 use super::clip::Polygon;
@@ -77,8 +79,8 @@ fn in_frame_of_a(f: &BoxPair, margin: f64, out: &mut Vec<Contact>) {
     }
 }
 
-/// The face axis of greatest separation (A's unless B's is greater by `bias`); `None` if some axis separates by more
-/// than `margin`.
+/// Returns the face axis of greatest separation (A's unless B's is greater by `bias`); `None` if
+/// some axis separates by more than `margin`.
 fn best_face(f: &BoxPair, margin: f64, bias: f64) -> Option<FaceAxis> {
     let across_a = f.t.abs() - f.a - f.r.abs() * f.b;
     let across_b = f.r.tr_mul(&f.t).abs() - f.b - f.r.abs().tr_mul(&f.a);
@@ -91,13 +93,13 @@ fn best_face(f: &BoxPair, margin: f64, bias: f64) -> Option<FaceAxis> {
     Some(FaceAxis { of_b, k, separation })
 }
 
-/// Index of the greatest entry, where a later one must be greater by `bias`.
+/// Returns the index of the greatest entry; a later entry must be greater by `bias`.
 fn greatest_axis(v: &Vec3, bias: f64) -> usize {
     (1..3).fold(0, |best, k| if v[k] > v[best] + bias { k } else { best })
 }
 
-/// The pair of edges of greatest separation, if any is not parallel; outer `None` if one separates by more than
-/// `margin`.
+/// Returns the pair of non-parallel edges of greatest separation, if any; outer `None` if one
+/// separates by more than `margin`.
 fn best_edge(f: &BoxPair, margin: f64) -> Option<Option<EdgeAxis>> {
     let mut best: Option<EdgeAxis> = None;
     for i in 0..3 {
@@ -121,7 +123,7 @@ fn best_edge(f: &BoxPair, margin: f64) -> Option<Option<EdgeAxis>> {
     Some(best)
 }
 
-/// One contact midway between the two edges that support the axis.
+/// Returns one contact midway between the two edges that support the axis.
 fn edge_contact(f: &BoxPair, edge: &EdgeAxis) -> Contact {
     let EdgeAxis { normal, i, j, separation } = edge;
     let local_b = f.r.tr_mul(normal);
@@ -151,7 +153,8 @@ fn sign_bits(v: &Vec3) -> u64 {
     (0..3).map(|k| u64::from(v[k] > 0.0) << k).sum()
 }
 
-/// A face manifold that is never empty: if rounding clips all away, the supporting corner stands for it.
+/// Appends a face manifold that is never empty: if rounding clips all points, it is the supporting
+/// corner.
 fn face_or_support(f: &BoxPair, face: &FaceAxis, margin: f64, out: &mut Vec<Contact>) {
     let start = out.len();
     face_manifold(f, face, margin, out);
@@ -164,8 +167,8 @@ fn face_or_support(f: &BoxPair, face: &FaceAxis, margin: f64, out: &mut Vec<Cont
     }
 }
 
-/// Clips the incident face by the reference face's prism; appends up to 4 points with gap ≤ `margin`, returns the
-/// least gap.
+/// Clips the incident face by the prism of the reference face. Appends up to 4 points with gap ≤
+/// `margin`, and returns the smallest gap.
 fn face_manifold(f: &BoxPair, face: &FaceAxis, margin: f64, out: &mut Vec<Contact>) -> f64 {
     let view = FaceView::new(f, face);
     let slop = 1e-3 * view.half.min().min(view.other_half.min());
@@ -187,7 +190,7 @@ fn face_manifold(f: &BoxPair, face: &FaceAxis, margin: f64, out: &mut Vec<Contac
     least
 }
 
-/// The reference box's frame, and the other box seen from it.
+/// The other box in the frame of the reference box.
 struct FaceView<'a> {
     boxes: &'a BoxPair,
     face: &'a FaceAxis,
@@ -196,7 +199,7 @@ struct FaceView<'a> {
     /// The other box's axes and center in the reference frame.
     axes: Mat3,
     center: Vec3,
-    /// Which side of the reference axis faces the other box.
+    /// The side of the reference axis that faces the other box.
     sign: f64,
 }
 
@@ -208,7 +211,8 @@ impl<'a> FaceView<'a> {
         FaceView { boxes: f, face, half, other_half, axes, center, sign }
     }
 
-    /// Axis and side of the other box's face that is turned most against the reference normal.
+    /// Returns the axis and side of the other box's face that is most opposite to the reference
+    /// normal.
     fn incident(&self) -> (usize, f64) {
         let along = self.axes.row(self.face.k).transpose() * self.sign;
         let j = (1..3).fold(0, |best, j| if along[j].abs() > along[best].abs() + 1e-9 { j } else { best });
@@ -223,7 +227,8 @@ impl<'a> FaceView<'a> {
         [middle + u + v, middle - u + v, middle - u - v, middle + u - v]
     }
 
-    /// The contact of a point of the incident face, given in the reference frame, in A's frame.
+    /// Returns the contact, in A's frame, of a point of the incident face, given in the reference
+    /// frame.
     fn contact(&self, p: Vec3, name: u64) -> Contact {
         let k = self.face.k;
         let gap = self.sign * p[k] - self.half[k];

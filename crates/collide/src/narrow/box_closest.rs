@@ -1,14 +1,14 @@
 //! Exact closest points of two separated boxes whose closest features are not a face manifold.
 //!
-//! The closest pair then has an edge or corner of B in it (a corner of A over a face of B belongs to the face case),
-//! so the least of the twelve exact distances from B's edges to A is the answer.
+//! The closest pair then includes an edge or corner of B (a corner of A over a face of B belongs to
+//! the face case). So the result is the smallest of the twelve exact distances from B's edges to A.
 
 use super::box_pair::BoxPair;
 use super::segment::segment_box;
 use super::sphere::{clamp, region};
 use crate::{Contact, NormalFrom, Vec3};
 
-/// In A's frame; `None` if the boxes touch or overlap.
+/// Returns the contact in A's frame; `None` if the boxes touch or overlap.
 pub(super) fn closest(f: &BoxPair) -> Option<Contact> {
     let mut best: Option<Contact> = None;
     for axis in 0..3 {
@@ -22,7 +22,8 @@ pub(super) fn closest(f: &BoxPair) -> Option<Contact> {
     best
 }
 
-/// B's edge along `axis`; the bits of `corner` are its signs on the other two axes.
+/// Returns the contact of B's edge along `axis`; the bits of `corner` are its signs on the other
+/// two axes.
 fn edge_to_box(f: &BoxPair, axis: usize, corner: u64) -> Option<Contact> {
     let (k1, k2) = ((axis + 1) % 3, (axis + 2) % 3);
     let mut middle = Vec3::zeros();
@@ -47,7 +48,8 @@ fn edge_to_box(f: &BoxPair, axis: usize, corner: u64) -> Option<Contact> {
     Some(Contact { point: 0.5 * (p + q), normal: offset / gap, gap, feature, core_a: 0.0, core_b: 0.0, normal_from })
 }
 
-/// Inside an edge: its axis and corner; at an end: the signs of the vertex, whichever edge led there.
+/// Returns the feature: within an edge its axis and corner, at an end the signs of the vertex,
+/// independent of the edge.
 fn feature_of_b(axis: usize, k1: usize, k2: usize, corner: u64, s: f64) -> u64 {
     if s.abs() < 1.0 {
         return 16 + 4 * axis as u64 + corner;

@@ -1,16 +1,18 @@
 //! Capsule (always A) against capsule and box.
 //!
-//! Both begin with the exact closest points of the core segments. A capsule that lies along another, or on a
-//! face, also gives the two ends of the overlap, so that it rests on two points.
+//! Both start with the exact closest points of the core segments. If a capsule is parallel to
+//! another, or to a face, the two ends of the overlap are contacts too, so that it rests on two
+//! points.
 
 use super::segment::{clip_to_prism, closest_on_segment, segment_box, segment_segment};
 use super::sphere::{clamp, region};
 use crate::shape::axis;
 use crate::{Contact, NormalFrom, Pose, Vec3};
 
-/// Sine of the angle under which two capsules count as lying along each other.
+/// Sine of the angle below which two capsules are treated as parallel.
 const PARALLEL_SINE: f64 = 0.05;
-/// Cosine of the angle between the closest direction and a face normal under which the face carries the capsule.
+/// Cosine of the angle between the closest direction and a face normal above which the face
+/// supports the capsule.
 const FACE_COSINE: f64 = 0.99;
 
 pub(super) fn capsule_capsule(
@@ -43,7 +45,7 @@ pub(super) fn capsule_capsule(
     out.push(closest);
 }
 
-/// Where the axes meet, the way out is across both.
+/// If the axes intersect, the normal is perpendicular to both.
 fn separate_crossing_axes(contact: &mut Contact, ea: &Vec3, eb: &Vec3, rb: f64) {
     let cross = ea.cross(eb);
     let normal = if cross.norm() > 1e-9 { cross.normalize() } else { any_perpendicular(ea) };
@@ -55,8 +57,8 @@ fn any_perpendicular(e: &Vec3) -> Vec3 {
     e.cross(&Vec3::ith(e.iamin(), 1.0)).normalize()
 }
 
-/// Contacts at both ends of the stretch where the two run side by side; false if there is none, or if the closest
-/// points, at gap `least`, lie inside it and so tell more.
+/// Appends contacts at both ends of the overlap of two parallel capsules. Returns false if there is
+/// no overlap, or if the closest points, at gap `least`, lie inside it and are closer.
 fn push_overlap_ends(
     a: (Vec3, Vec3, f64),
     b: (Vec3, Vec3, f64),
@@ -85,7 +87,7 @@ fn push_overlap_ends(
     pair[0].gap.min(pair[1].gap) <= least + 1e-9 * (ra + rb)
 }
 
-/// A capsule's segment `c + s·u`, `s ∈ [−1, 1]`, in the frame of the box that it meets.
+/// A capsule's segment `c + s·u`, `s ∈ [−1, 1]`, in the frame of the box.
 struct CoreSegment {
     c: Vec3,
     u: Vec3,
@@ -98,7 +100,7 @@ impl CoreSegment {
     }
 }
 
-/// All in the box's frame until a contact is emitted.
+/// Works in the frame of the box until a contact is appended.
 pub(super) fn capsule_box(
     (radius, half_length): (f64, f64),
     pose_a: &Pose,
@@ -126,7 +128,7 @@ pub(super) fn capsule_box(
     }
 }
 
-/// The core segment is outside the box; `s` is its closest point.
+/// Handles a core segment outside the box; `s` is its closest point.
 fn separated_cores(core: &CoreSegment, s: f64, half: &Vec3, margin: f64, out: &mut Vec<Contact>) {
     let (p, radius) = (core.at(s), core.radius);
     let offset = p - clamp(&p, half);
@@ -162,8 +164,8 @@ fn end_code(s: f64) -> u64 {
     }
 }
 
-/// Contacts at both ends of the part of the segment that is over the face across axis `k` on side `sign`; returns the
-/// least gap.
+/// Appends contacts at both ends of the part of the segment that is over the face across axis `k`
+/// on side `sign`. Returns the smallest gap.
 fn push_on_face(core: &CoreSegment, half: &Vec3, (k, sign): (usize, f64), margin: f64, out: &mut Vec<Contact>) -> f64 {
     let (slop, radius) = (1e-3 * half.min(), core.radius);
     let Some((low, high)) = clip_to_prism(&core.c, &core.u, &half.add_scalar(slop), k) else { return f64::INFINITY };
@@ -191,7 +193,8 @@ fn push_on_face(core: &CoreSegment, half: &Vec3, (k, sign): (usize, f64), margin
     least
 }
 
-/// The core segment passes through the box: least separation over the faces and the edges' cross products.
+/// Handles a core segment through the box: the greatest separation over the faces and the cross
+/// products of edges.
 fn crossing_cores(core: &CoreSegment, half: &Vec3, margin: f64, out: &mut Vec<Contact>) {
     let CoreSegment { c, u, radius } = core;
     let face = c.abs() - u.abs() - half;
@@ -223,7 +226,7 @@ fn crossing_cores(core: &CoreSegment, half: &Vec3, margin: f64, out: &mut Vec<Co
     }
 }
 
-/// Separation along `± e_j × u`, towards the segment; `None` where the two are parallel.
+/// Returns the separation along `± e_j × u`, towards the segment; `None` if the two are parallel.
 fn edge_separation(c: &Vec3, u: &Vec3, half: &Vec3, j: usize) -> Option<(f64, usize, Vec3)> {
     let cross = Vec3::ith(j, 1.0).cross(u);
     let length = cross.norm();
@@ -234,7 +237,7 @@ fn edge_separation(c: &Vec3, u: &Vec3, half: &Vec3, j: usize) -> Option<(f64, us
     Some((axis.dot(c) - axis.abs().dot(half), j, axis))
 }
 
-/// The point of the segment nearest to the box's edge along `j` that supports `normal`.
+/// Returns the point of the segment nearest to the box's edge along `j` that supports `normal`.
 fn crossing_point(c: &Vec3, u: &Vec3, half: &Vec3, j: usize, normal: &Vec3) -> Vec3 {
     let mut edge = half.zip_map(normal, |h, n| if n < 0.0 { -h } else { h });
     edge[j] = 0.0;

@@ -1,7 +1,8 @@
-//! Clipping of a convex polygon by the side planes of a prism, with a name for each vertex.
+//! Clipping of a convex polygon by the side planes of a prism, with a feature id for each vertex.
 //!
-//! Sutherland and Hodgman (1974). Each polygon edge carries an id: 0–3 the incident face's own edges, 4–7 the prism's
-//! sides. A vertex is where two edges meet, so the pair of ids names it for as long as the same edges meet there.
+//! Source: Sutherland and Hodgman (1974). Each polygon edge has an id: 0–3 for the edges of the
+//! incident face, 4–7 for the sides of the prism. The ids of the two edges at a vertex identify it
+//! as long as the same edges meet there.
 
 use crate::Vec3;
 
@@ -42,7 +43,7 @@ impl Polygon {
         }
     }
 
-    /// Keeps the part with `sign · x_k ≤ bound`; the new edge is called `edge`.
+    /// Returns the part with `sign · x_k ≤ bound`; the new edge has the id `edge`.
     pub fn clip(&self, k: usize, sign: f64, bound: f64, edge: u8) -> Polygon {
         let mut kept = Polygon::empty();
         for n in 0..self.len {
@@ -61,7 +62,7 @@ impl Polygon {
         kept
     }
 
-    /// Vertices with their names (`edge that arrives · 8 + edge that leaves`).
+    /// Returns the vertices with their ids (`incoming edge · 8 + outgoing edge`).
     pub fn vertices(&self) -> impl Iterator<Item = (Vec3, u64)> + '_ {
         (0..self.len).map(|n| {
             let before = self.corners[(n + self.len - 1) % self.len].edge;

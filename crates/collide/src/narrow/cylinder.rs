@@ -1,18 +1,18 @@
 //! A cylinder (A) on a half-space (B), exactly.
 //!
-//! Each flat face gives its lowest rim point. A face that is near level also gives four rim points fixed in the body,
-//! so that a standing cylinder keeps the same contacts while it trembles. One that lies on its side rests on the two
-//! lowest points, whose core is the axis.
+//! Each flat face has a contact at its lowest rim point. A face that is nearly level also has four
+//! rim points fixed in the body, so that a standing cylinder keeps its contacts under small
+//! rotations. A cylinder on its side rests on the two lowest points, whose core is the axis.
 
 use crate::shape::axis;
 use crate::{Contact, NormalFrom, Pose, Vec3};
 
-/// Sine of the tilt below which the lowest rim point is not told apart from the fixed ones (it lies lower by 0.3 of
-/// this, in radii).
+/// Sine of the tilt below which the lowest rim point is not distinguished from the fixed ones (it
+/// is lower by 0.3 of this, in radii).
 const LEVEL_TILT: f64 = 1e-4;
 /// Sine of the tilt above which a face stands on one point.
 const STEEP_TILT: f64 = 0.2;
-/// Sine of the tilt above which the cylinder lies.
+/// Sine of the tilt above which the cylinder lies on its side.
 const SIDE_TILT: f64 = 0.99;
 
 pub(super) fn half_space(
@@ -24,7 +24,7 @@ pub(super) fn half_space(
 ) {
     let (normal, origin) = (axis(pose_b), pose_b.translation.vector);
     let up = axis(pose_a);
-    // the way down in the flat faces
+    // the downward direction in the flat faces
     let down = up * up.dot(&normal) - normal;
     let tilt = down.norm();
     let core_a = if tilt > SIDE_TILT { radius } else { 0.0 };

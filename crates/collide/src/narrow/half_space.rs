@@ -3,7 +3,8 @@
 use crate::shape::axis;
 use crate::{Contact, NormalFrom, Pose, Vec3};
 
-/// Emits the contact of a sphere about `core` (radius 0: a vertex) with the plane, if within `margin`.
+/// Appends the contact of a sphere about `core` (radius 0: a vertex) with the plane, if within
+/// `margin`.
 #[inline]
 fn push(core: Vec3, radius: f64, normal: &Vec3, origin: &Vec3, feature: u64, margin: f64, out: &mut Vec<Contact>) {
     let gap = normal.dot(&(core - origin)) - radius;
@@ -37,7 +38,8 @@ pub(super) fn capsule(
     push(pose_a.translation.vector + half, radius, &normal, &origin, 1, margin, out);
 }
 
-/// One contact per corner within `margin`; the feature is the corner's signs (bit k set: `+` on axis k).
+/// Appends one contact per corner within `margin`. The feature is the corner's signs (bit k set:
+/// `+` on axis k).
 pub(super) fn cuboid(half: &Vec3, pose_a: &Pose, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
     let (normal, origin) = (axis(pose_b), pose_b.translation.vector);
     let rotation = pose_a.rotation.to_rotation_matrix();

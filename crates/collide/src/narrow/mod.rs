@@ -1,4 +1,4 @@
-//! The narrow phase: contacts between two posed shapes. One file per family of pairs.
+//! The narrow phase: contacts between two shapes at given poses, with one file per family of pairs.
 
 mod box_box;
 mod box_closest;
@@ -19,17 +19,18 @@ use crate::sdf::primitive::{BoxField, CylinderField, HalfSpaceField, RoundField}
 use crate::{Contact, ContactMode, Pose, Shape};
 use sdf_contact::{Body, BodyElements};
 
-/// [`contacts_in_mode`] the default mode, `surface`.
+/// Calls [`contacts_in_mode`] with the default mode, `surface`.
 pub fn contacts(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
     contacts_in_mode(ContactMode::Surface, a, pose_a, b, pose_b, margin, out);
 }
 
-/// Appends to `out` all contacts between `a` and `b` whose gap is at most `margin` meters (`margin ≥ 0`).
+/// Appends to `out` all contacts between `a` and `b` whose gap is at most `margin` meters (`margin
+/// ≥ 0`).
 ///
-/// Normals point from B towards A. Exact among half-space, sphere, box and capsule, and for a cylinder on a
-/// half-space. Where a mesh or another cylinder takes part, the mode decides: see [`ContactMode`]. Manifolds are
-/// reduced to the few points that matter. Does not allocate beyond the growth of `out`. A pose that is not finite
-/// touches nothing.
+/// **Normals point from B towards A.** Exact among half-space, sphere, box and capsule, and for a
+/// cylinder on a half-space. For meshes and other pairs with cylinders the mode applies: see
+/// [`ContactMode`]. Manifolds are reduced to the few points that matter. Allocates only for the
+/// growth of `out`. A pose that is not finite has no contacts.
 #[allow(clippy::too_many_arguments)]
 pub fn contacts_in_mode(
     mode: ContactMode,
@@ -57,7 +58,7 @@ fn is_finite(pose: &Pose) -> bool {
     (pose.translation.vector.sum() + pose.rotation.coords.sum()).is_finite()
 }
 
-/// Pairs are handled with the lower rank first.
+/// Pairs are ordered by rank, lower rank first.
 fn rank(shape: &Shape) -> u8 {
     match shape {
         Shape::Mesh(_) | Shape::Cylinder(_) => 0,
@@ -109,18 +110,19 @@ fn dispatch(
         _ => match (a.tree(), b.tree()) {
             (Some(tree_a), Some(tree_b)) => tree::tree_tree(tree_a, pose_a, tree_b, pose_b, margin, out),
             (Some(tree_a), None) => tree::tree_primitive(tree_a, pose_a, b, pose_b, margin, out),
-            // ranks put every other combination the other way round
+            // the ranks exclude all other combinations
             _ => debug_assert!(false, "pair out of order"),
         },
     }
 }
 
-/// How many surfaces a shape has: several where shells of a mesh overlap, none for meshes that cross themselves in another way.
+/// Returns the number of surfaces of a shape: several for a mesh of overlapping shells, none for
+/// other meshes that cross themselves.
 fn part_count(shape: &Shape) -> usize {
     if let Shape::Mesh(mesh) = shape { mesh.surfaces().len() } else { 1 }
 }
 
-/// What the `surface` mode knows of a shape, or of that part of it.
+/// Calls `visit` with the data of a shape, or of one part of it, for the `surface` mode.
 fn with_body(shape: &Shape, part: usize, visit: &mut dyn FnMut(&Body)) {
     let radius = shape.bounding_radius();
     let mut call =

@@ -1,11 +1,12 @@
-//! Meshes whose shells overlap: the contacts of each pair of shells, without those at places that are buried in another shell.
+//! Meshes with overlapping shells: the contacts of each pair of shells, without those inside
+//! another shell.
 
 use super::{part_count, sdf_contact, with_body};
 use crate::sdf::shells::is_inside_other_shell;
 use crate::{Contact, Pose, Shape, Vec3};
 use nalgebra::Point3;
 
-/// All contacts of two shapes of which one has several parts.
+/// Appends all contacts of two shapes of which at least one has several parts.
 pub(super) fn contacts_of_parts(
     a: &Shape,
     pose_a: &Pose,
@@ -15,7 +16,7 @@ pub(super) fn contacts_of_parts(
     out: &mut Vec<Contact>,
 ) {
     let start = out.len();
-    // the deepest overlap of what is buried: all that is left where nothing else overlaps
+    // the deepest contact inside another shell, used only if nothing else overlaps
     let mut fallback: Option<Contact> = None;
     for i in 0..part_count(a) {
         for j in 0..part_count(b) {
@@ -50,10 +51,10 @@ pub(super) fn contacts_of_parts(
     }
 }
 
-/// Spreads small numbers over all bits.
+/// Multiplier that distributes small numbers over all bits.
 const HASH_MULTIPLIER: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// Whether a place on a shape's part, in world axes, lies inside another part.
+/// Returns whether a point on a shape's part, in world axes, lies inside another part.
 fn is_inside_other_part(shape: &Shape, pose: &Pose, part: usize, at: Vec3) -> bool {
     let Shape::Mesh(mesh) = shape else { return false };
     mesh.surfaces().len() > 1

@@ -1,11 +1,12 @@
-//! Manifold reduction: few points that keep the deepest one and the area.
+//! Manifold reduction: few points that preserve the deepest one and the area.
 //!
-//! All points of one manifold share a normal. Kept, in this order: the deepest; the furthest from it; the one that
-//! makes the greatest triangle; the one furthest out on the other side of it. Ties go to the earlier point.
+//! All points of one manifold share a normal. Kept, in this order: the deepest; the furthest from
+//! it; the one that makes the largest triangle; the one furthest outside on the other side of it.
+//! Ties go to the earlier point.
 
 use crate::{Contact, NormalFrom, Pose, Vec3};
 
-/// Keeps at most four of `out[start..]`, in the order they were found.
+/// Keeps at most four of `out[start..]`, in their order.
 pub(super) fn reduce_to_four(out: &mut Vec<Contact>, start: usize) {
     if out.len() - start <= 4 {
         return;
@@ -32,7 +33,8 @@ pub(super) fn reduce_to_four(out: &mut Vec<Contact>, start: usize) {
     out.truncate(length);
 }
 
-/// Index of the greatest score; the first one wins unless a later one is greater by more than rounding.
+/// Returns the index of the greatest score. The first one wins unless a later one is greater by
+/// more than rounding.
 fn arg_max(count: usize, score: impl Fn(usize) -> f64) -> usize {
     let mut found = (0, score(0));
     for n in 1..count {
@@ -44,7 +46,7 @@ fn arg_max(count: usize, score: impl Fn(usize) -> f64) -> usize {
     found.0
 }
 
-/// The greatest area that `p` adds to a triangle beyond one of its sides.
+/// Returns the largest area that `p` adds to a triangle beyond one of its sides.
 fn outside_triangle([a, b, c]: [Vec3; 3], side: f64, normal: &Vec3, p: Vec3) -> f64 {
     [(a, b), (b, c), (c, a)]
         .iter()
@@ -52,40 +54,42 @@ fn outside_triangle([a, b, c]: [Vec3; 3], side: f64, normal: &Vec3, p: Vec3) -> 
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Contacts whose normals are within this cosine of the deepest one's belong together.
+/// Cosine to the normal of the deepest contact above which a contact belongs to the same cluster.
 const CLUSTER_COSINE: f64 = 0.85;
-/// Above this many, those found so far are reduced, so that a deep overlap costs no memory.
+/// Number of pending contacts above which they are reduced, so that a deep overlap needs little
+/// memory.
 const MAX_PENDING: usize = 512;
-/// At most this many sides.
+/// Maximum number of clusters.
 const MAX_CLUSTERS: usize = 8;
 
-/// Gathers the many contacts of leaf spheres in B's frame at the end of `out` and keeps few.
+/// Collects the contacts of two bodies in B's frame at the end of `out` and reduces them.
 ///
-/// Contacts are clustered by normal, the deepest first. Of each cluster are kept the deepest, and for each of five
-/// directions the point that would touch first if A tilted a little that way: the vertices of the manifold's lower
-/// hull, which is what it can rest on. Three more stand for a wider tilt, if they are others.
+/// Contacts are clustered by normal, the deepest first. Each cluster keeps its deepest contact, and
+/// for each of five directions the point that would touch first if A tilted slightly in that
+/// direction: the vertices of the lower hull of the manifold, on which A can rest. Three more
+/// points are kept for a larger tilt if they are different.
 ///
-/// Once more than a few hundred were gathered the overlap is wide; if it is also deep (by more than a band below the
-/// deepest), the shallow ones tell nothing that the deep ones do not, and are no longer asked for.
+/// After a few hundred contacts the overlap is wide. If it is also deep (by more than a band below
+/// the deepest contact), shallow contacts add nothing, and the limit excludes them.
 pub(super) struct Collector<'a> {
     out: &'a mut Vec<Contact>,
     start: usize,
     limit: f64,
     band: f64,
-    /// The deepest overlap that no element faces.
+    /// The deepest contact that no element faces.
     fallback: Option<Contact>,
 }
 
-/// The band, as a part of the smaller body's radius.
+/// Width of the band, as a fraction of the smaller body's radius.
 const BAND: f64 = 0.05;
 
 impl<'a> Collector<'a> {
-    /// `radius` is that of the smaller body.
+    /// Returns an empty collector. `radius` is that of the smaller body.
     pub fn new(margin: f64, radius: f64, out: &'a mut Vec<Contact>) -> Collector<'a> {
         Collector { start: out.len(), out, limit: margin, band: BAND * radius, fallback: None }
     }
 
-    /// Only contacts with a gap up to this are wanted.
+    /// Returns the largest gap of contacts that are still needed.
     pub fn limit(&self) -> f64 {
         self.limit
     }
@@ -93,35 +97,36 @@ impl<'a> Collector<'a> {
     pub fn push(&mut self, contact: Contact) {
         if self.out.len() - self.start >= MAX_PENDING {
             self.reduce();
-            // the first one kept is the deepest
+            // the first contact kept is the deepest
             self.limit = self.limit.min(self.out[self.start].gap + self.band);
         }
         self.out.push(contact);
     }
 
-    /// Whether any that was found and kept is like this.
+    /// Returns whether some collected contact satisfies `like`.
     pub fn contains_like(&self, like: impl Fn(&Contact) -> bool) -> bool {
         self.out[self.start..].iter().any(like)
     }
 
-    /// The least gap found.
+    /// Returns the smallest gap collected.
     pub fn min_gap(&self) -> f64 {
         self.out[self.start..].iter().map(|c| c.gap).fold(f64::INFINITY, f64::min)
     }
 
-    /// The contact that has it.
+    /// Returns the contact with the smallest gap.
     pub fn deepest(&self) -> Option<&Contact> {
         self.out[self.start..].iter().min_by(|x, y| x.gap.total_cmp(&y.gap))
     }
 
-    /// Forgets what was found, and takes contacts with a gap up to another limit; returns the one before.
+    /// Drops all contacts and sets a new limit. Returns the old limit.
     pub fn restart(&mut self, limit: f64) -> f64 {
         self.out.truncate(self.start);
         self.fallback = None;
         std::mem::replace(&mut self.limit, limit)
     }
 
-    /// Changes all contacts found, and keeps those that it is said of and that are within the limit, which is set anew.
+    /// Sets a new limit, changes all contacts, and keeps those within the limit for which `change`
+    /// returns true.
     pub fn map_and_retain(&mut self, limit: f64, mut change: impl FnMut(&mut Contact) -> bool) {
         self.limit = limit;
         let mut kept = self.start;
@@ -136,19 +141,21 @@ impl<'a> Collector<'a> {
         self.fallback = None;
     }
 
-    /// How far the two overlap as far as is known, places that no element faces included, meters; below 0 where they do not.
+    /// Returns the known penetration, meters, including contacts that no element faces; below 0
+    /// without overlap.
     pub fn penetration(&self) -> f64 {
         -self.fallback.iter().map(|c| c.gap).fold(self.min_gap(), f64::min)
     }
 
-    /// A deep overlap at a place that the element does not face: it counts only if nothing else overlaps.
+    /// Stores a deep contact at a point that the element does not face; used only if nothing else
+    /// overlaps.
     pub fn push_fallback(&mut self, contact: Contact) {
         if contact.gap < -0.02 * self.band && self.fallback.is_none_or(|s| contact.gap < s.gap) {
             self.fallback = Some(contact);
         }
     }
 
-    /// Reduces what was gathered and turns it into world axes.
+    /// Reduces the contacts and transforms them to world axes.
     pub fn finish(mut self, pose_b: &Pose) {
         if self.out[self.start..].iter().all(|c| c.gap >= 0.0) {
             self.out.extend(self.fallback);
@@ -167,7 +174,7 @@ impl<'a> Collector<'a> {
         let (slack, touching_gap, far) =
             (SUPPORT_TOLERANCE * self.band, TOUCHING_GAP * self.band, self.limit > FAST_MARGIN * self.band);
         let found = &mut self.out[self.start..];
-        // `found[..kept]` are kept, `found[rest..]` are in no cluster yet
+        // `found[..kept]` are kept, `found[rest..]` are not yet in a cluster
         let (mut kept, mut rest) = (0, 0);
         for _ in 0..MAX_CLUSTERS {
             if rest == found.len() {
@@ -186,7 +193,8 @@ impl<'a> Collector<'a> {
     }
 }
 
-/// Moves the deepest contact to the front and all that face its way next to it; returns how many those are.
+/// Moves the deepest contact to the front, followed by all with a similar normal. Returns their
+/// number.
 fn gather_cluster(found: &mut [Contact]) -> usize {
     let deeper = |a: &Contact, b: &Contact| a.gap < b.gap || (a.gap == b.gap && a.feature < b.feature);
     let deepest = (1..found.len()).fold(0, |best, n| if deeper(&found[n], &found[best]) { n } else { best });
@@ -202,13 +210,16 @@ fn gather_cluster(found: &mut [Contact]) -> usize {
     end
 }
 
-/// Moves to the front the deepest contact of a cluster (its first) and its support points; returns how many.
+/// Moves the deepest contact of a cluster (its first) and its support points to the front. Returns
+/// their number.
 ///
-/// Of contacts that support within `slack` of one another, the one with the least feature is kept, so that the choice lasts.
+/// Of contacts that support within `slack` of one another, the one with the smallest feature is
+/// kept, so that the selection is stable.
 ///
-/// Where contacts are looked for `far` away, wider tilts follow. Where the two touch (the deepest gap is less than `touching_gap`), finer ones do: a base that is
-/// flat but for rounding rests on places that are deeper than others by a micrometer; were one left out it would sink, become the deepest and be kept while
-/// another one is not, and so on without end.
+/// For a `far` margin, larger tilts are added. For bodies that touch (the deepest gap is less than
+/// `touching_gap`), smaller tilts are added. The reason: a base that is flat up to rounding rests
+/// on points that are deeper than others by a micrometer. If one of them were left out, the base
+/// would sink there until that point is the deepest and another one is left out, and so on.
 fn keep_supports(cluster: &mut [Contact], slack: f64, touching_gap: f64, far: bool) -> usize {
     let (normal, deepest) = (cluster[0].normal, cluster[0].gap);
     let u = normal.cross(&Vec3::ith(normal.iamin(), 1.0)).normalize();
@@ -235,28 +246,30 @@ fn keep_supports(cluster: &mut [Contact], slack: f64, touching_gap: f64, far: bo
     kept
 }
 
-/// Of the contacts whose score is within `slack` of the greatest, the one with the least feature.
+/// Returns the contact with the smallest feature among those whose score is within `slack` of the
+/// greatest.
 fn support_of_least_feature(cluster: &[Contact], slack: f64, score: impl Fn(&Contact) -> f64) -> usize {
     let most = cluster.iter().map(&score).fold(f64::NEG_INFINITY, f64::max);
     let near = (0..cluster.len()).filter(|&n| score(&cluster[n]) >= most - slack);
     near.min_by_key(|&n| cluster[n].feature).unwrap_or(0)
 }
 
-/// Differences of support that count as none, in bands ([`BAND`]): 1e-5 of the smaller body's radius.
+/// Differences of support that are treated as equal, in bands ([`BAND`]): 1e-5 of the smaller
+/// body's radius.
 const SUPPORT_TOLERANCE: f64 = 2e-4;
 
-/// Tilts (tangents of their angles) and directions for which a cluster's support point is kept: all five for what the
-/// body rests on, three for what it may swing onto within a step. On a flat base the wide ones find the same points
-/// again.
+/// Tilts (tangents of their angles) and directions for which the support points of a cluster are
+/// kept: all five for the points on which the body rests, three for the points that it can reach
+/// within a step. On a flat base the large tilts find the same points again.
 const SUPPORTS: [(f64, usize); 8] =
     [(0.02, 0), (0.02, 1), (0.02, 2), (0.02, 3), (0.02, 4), (0.15, 0), (0.15, 2), (0.15, 3)];
-/// Gaps up to this are those of bodies that touch, in bands ([`BAND`]): 1e-3 of the smaller body's radius.
+/// Largest gap of bodies that touch, in bands ([`BAND`]): 1e-3 of the smaller body's radius.
 const TOUCHING_GAP: f64 = 2e-2;
-/// Parts of the tilt that are looked for then: down to 6e-7.
+/// Factors of the smaller tilts for bodies that touch; the smallest tilt is 6e-7.
 const FINE_TILTS: [f64; 5] = [0.125, 0.016, 2e-3, 2.5e-4, 3e-5];
-/// Contacts looked for so far away, in bands, are those of fast bodies: 15 % of the smaller one's radius.
+/// Margin, in bands, above which bodies are fast: 15 % of the smaller one's radius.
 const FAST_MARGIN: f64 = 3.0;
-/// Tilts for those: what strikes with one corner may swing onto any other in the same step.
+/// Tilts for fast bodies: after one corner strikes, any other can follow in the same step.
 const WIDE_TILTS: [f64; 2] = [0.5, 2.0];
 /// Corners of a regular pentagon.
 const DIRECTIONS: [(f64, f64); 5] = [

@@ -1,21 +1,22 @@
-//! Closest points of segments. A segment is `c + s·u`, `s ∈ [−1, 1]` (`u` half its length).
+//! Closest points of segments. A segment is `c + s·u`, `s ∈ [−1, 1]` (`u` is half its length).
 //!
 //! Segment–segment: Ericson, *Real-Time Collision Detection* (2005), §5.1.9, in centered form.
-//! Segment–box: `f(s) = |p(s) − clamp(p(s))|²` is convex and quadratic between the at most six values of `s` where a
-//! coordinate crosses a face plane, so `f'` is linear there and its root is found exactly.
+//! Segment–box: `f(s) = |p(s) − clamp(p(s))|²` is convex and quadratic between the at most six
+//! values of `s` at which a coordinate crosses a face plane, so `f'` is linear there and its root
+//! is exact.
 
 use crate::Vec3;
 
-/// Below this, relative to lengths that are squared, two directions count as parallel.
+/// Threshold for parallel directions, relative to the squared lengths.
 const PARALLEL: f64 = 1e-14;
 
-/// Parameter of the point of `s·u` closest to `p`.
+/// Returns the parameter of the point of `s·u` closest to `p`.
 pub(super) fn closest_on_segment(p: &Vec3, u: &Vec3) -> f64 {
     let uu = u.norm_squared();
     if uu > 0.0 { (p.dot(u) / uu).clamp(-1.0, 1.0) } else { 0.0 }
 }
 
-/// Parameters of the closest points of `c1 + s·u1` and `c2 + t·u2`.
+/// Returns the parameters of the closest points of `c1 + s·u1` and `c2 + t·u2`.
 pub(super) fn segment_segment(c1: &Vec3, u1: &Vec3, c2: &Vec3, u2: &Vec3) -> (f64, f64) {
     let r = c1 - c2;
     let (a, b, e) = (u1.norm_squared(), u1.dot(u2), u2.norm_squared());
@@ -27,7 +28,8 @@ pub(super) fn segment_segment(c1: &Vec3, u1: &Vec3, c2: &Vec3, u2: &Vec3) -> (f6
     (closest_on_segment(&(c2 + u2 * t - c1), u1), t)
 }
 
-/// Parameter of the point of `c + s·u` closest to the box `|x| ≤ half`; the first such if there are several.
+/// Returns the parameter of the point of `c + s·u` closest to the box `|x| ≤ half`; the first of
+/// several.
 pub(super) fn segment_box(c: &Vec3, u: &Vec3, half: &Vec3) -> f64 {
     let slope = |s: f64| -> f64 {
         (0..3)
@@ -64,7 +66,8 @@ pub(super) fn segment_box(c: &Vec3, u: &Vec3, half: &Vec3) -> f64 {
     1.0
 }
 
-/// The part of `c + s·u`, `s ∈ [−1, 1]`, with `|x_k| ≤ half_k` on the two axes other than `skip`.
+/// Returns the part of `c + s·u`, `s ∈ [−1, 1]`, with `|x_k| ≤ half_k` on the two axes other than
+/// `skip`.
 pub(super) fn clip_to_prism(c: &Vec3, u: &Vec3, half: &Vec3, skip: usize) -> Option<(f64, f64)> {
     let (mut low, mut high) = (-1.0_f64, 1.0_f64);
     for k in [(skip + 1) % 3, (skip + 2) % 3] {

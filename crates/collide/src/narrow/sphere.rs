@@ -36,7 +36,7 @@ pub(super) fn sphere_capsule(
         contact.normal_from = NormalFrom::LineOfB(direction);
     }
     if (a - core).norm_squared() < 1e-24 * radius_b * radius_b {
-        // on the axis every direction across it is as good as the other
+        // on the axis all perpendicular directions are equivalent
         contact = Contact { normal: pose_b.rotation * Vec3::x(), ..contact };
         contact.point = core + contact.normal * (radius_b + 0.5 * contact.gap);
     }
@@ -68,27 +68,27 @@ pub(super) fn sphere_box(radius: f64, pose_a: &Pose, half: &Vec3, pose_b: &Pose,
     }
 }
 
-/// The axis along which the edge of an edge region runs: the one digit that is 1.
+/// Returns the axis of the edge of an edge region: the one digit that is 1.
 fn edge(region: u64) -> Option<usize> {
     let inside = |k: usize| region / 3u64.pow(k as u32) % 3 == 1;
     let mut free = (0..3).filter(|k| inside(*k));
     free.next().filter(|_| free.next().is_none())
 }
 
-/// What a box says of a point, in the box's frame.
+/// The relation of a point to a box, in the box's frame.
 pub(super) struct PointBox {
     /// Signed distance from the surface, meters.
     pub distance: f64,
     /// Outward unit normal at the closest surface point.
     pub normal: Vec3,
-    /// Which of the 27 regions (faces 1 clamped axis, edges 2, vertices 3): base 3, digit k is 0, 1, 2 for −, inside,
-    /// +.
+    /// One of 27 regions (faces have 1 clamped axis, edges 2, vertices 3): base 3, digit k is 0, 1,
+    /// 2 for −, inside, +.
     pub region: u64,
     /// Whether the closest feature is a face.
     pub face: bool,
 }
 
-/// Signed distance and normal of a box at `p`; `None` only for a point that is not finite.
+/// Returns signed distance and normal of a box at `p`; `None` only if the point is not finite.
 pub(super) fn point_box(p: &Vec3, half: &Vec3) -> Option<PointBox> {
     let outside = p - clamp(p, half);
     let distance = outside.norm();
@@ -116,7 +116,7 @@ pub(super) fn clamp(p: &Vec3, half: &Vec3) -> Vec3 {
     p.zip_map(half, |x, h| x.clamp(-h, h))
 }
 
-/// The code of the region of space around the box that `p` is in.
+/// Returns the code of the region around the box that contains `p`.
 pub(super) fn region(p: &Vec3, half: &Vec3) -> u64 {
     (0..3).rev().fold(0, |code, k| {
         3 * code

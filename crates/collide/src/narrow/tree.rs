@@ -1,9 +1,10 @@
-//! Sphere trees against each other and against primitives: the thesis's mode, where point and normal come from leaf
-//! spheres.
+//! Sphere trees against each other and against primitives: the method of the thesis, which takes
+//! point and normal from leaf spheres.
 //!
-//! Source: thesis §IV.B.3.a–b. Two trees are walked together, the larger sphere opened first. A primitive is asked for
-//! its signed distance at a sphere's center; it changes by at most 1 m per meter, so a sphere that is further than
-//! `margin` hides no leaf within it. The feature of a contact is the pair of leaf indices.
+//! Source: thesis §IV.B.3.a–b. Two trees are traversed together; the larger sphere is replaced by
+//! its children first. For a primitive, its signed distance at a sphere's center is evaluated. That
+//! changes by at most 1 m per meter, so a sphere further away than `margin` contains no leaf within
+//! it. The feature of a contact is the pair of leaf indices.
 
 use super::reduce::Collector;
 use super::segment::closest_on_segment;
@@ -11,7 +12,7 @@ use super::sphere::point_box;
 use crate::{Contact, NormalFrom, Pose, Shape, SphereTree, Vec3};
 use nalgebra::Point3;
 
-/// Both trees, seen from B's frame.
+/// Two trees in B's frame.
 struct TreePair<'a> {
     a: &'a SphereTree,
     b: &'a SphereTree,
@@ -34,15 +35,15 @@ pub(super) fn tree_tree(
 }
 
 impl TreePair<'_> {
-    /// The place of a sphere of A as B sees it.
+    /// Returns the center of a sphere of A in B's frame.
     fn center_in_b(&self, na: usize) -> Vec3 {
         (self.a_in_b * Point3::from(self.a.nodes()[na].center)).coords
     }
 
-    /// A pair of spheres, A's at `center_a`. It is placed once for all of B's spheres that it is held against.
+    /// Visits a pair of spheres, A's at `center_a`, which is computed once for all spheres of B.
     fn visit(&self, na: usize, center_a: &Vec3, nb: usize, found: &mut Collector) {
         let (a, b) = (&self.a.nodes()[na], &self.b.nodes()[nb]);
-        // a deep limit leaves nothing of spheres that are too small to reach it
+        // spheres that are too small to reach a deep limit are excluded
         let reach = (a.radius + b.radius + found.limit()).max(0.0);
         if (center_a - b.center).norm_squared() > reach * reach {
             return;
@@ -58,7 +59,7 @@ impl TreePair<'_> {
     }
 }
 
-/// What a primitive says of a point in its own frame.
+/// Signed distance of a primitive at a point, in its own frame.
 struct PrimitiveSample {
     distance: f64,
     normal: Vec3,
@@ -66,7 +67,7 @@ struct PrimitiveSample {
     face: bool,
 }
 
-/// Tree (A) against half-space, sphere, box or capsule (B).
+/// Appends the contacts of a tree (A) and a half-space, sphere, box or capsule (B).
 pub(super) fn tree_primitive(
     a: &SphereTree,
     pose_a: &Pose,
@@ -104,7 +105,8 @@ fn visit(tree: &SphereTree, pose: &Pose, primitive: &Shape, node: usize, found: 
     });
 }
 
-/// Signed distance and outward normal of a primitive at `p`; `None` for shapes that have no such formula here.
+/// Returns signed distance and outward normal of a primitive at `p`; `None` for shapes without such
+/// a formula here.
 fn sample_primitive(primitive: &Shape, p: &Vec3) -> Option<PrimitiveSample> {
     match primitive {
         Shape::HalfSpace => Some(PrimitiveSample { distance: p.z, normal: Vec3::z(), core: 0.0, face: true }),
@@ -123,7 +125,8 @@ fn sample_primitive(primitive: &Shape, p: &Vec3) -> Option<PrimitiveSample> {
     }
 }
 
-/// A sphere about the core point that `offset` starts at; on it, x.
+/// Returns the sample of a sphere about a core point; `offset` is the vector from there. At the
+/// core the normal is x.
 fn sample_round(offset: &Vec3, radius: f64) -> PrimitiveSample {
     let length = offset.norm();
     let normal = if length > 1e-300 { offset / length } else { Vec3::x() };

@@ -1,20 +1,25 @@
-//! What of a mesh is held against the other's field: points and edges, held by the spheres of its sphere tree.
+//! Features of a mesh (vertices, edges) that are tested against the other body's signed distance
+//! field, grouped in a hierarchy of bounding spheres.
 //!
-//! A point is held by one leaf that covers it, an edge by one of its ends. What a leaf holds is halved into groups of a few points. Around all
-//! that a sphere or a group holds there is a sphere of its own, and of each point it is known how long its edges are: one look at the field passes
-//! over all that is further than the margin.
+//! A vertex is stored with one leaf of the sphere tree that contains it, an edge with one of its
+//! ends. The vertices of a leaf are halved into groups of a few. Every tree node and group has a
+//! bounding sphere of its own content, and every vertex stores the lengths of its edges. So one
+//! field query skips all features beyond the margin.
 //!
-//! **Which edges.** An edge of length `L` that turns by `θ` (the angle between its faces' normals) is left out where
-//! `θ·L/4 ≤ ε`. Where two edges cross at distance `g`, the ends of the first have at least one at distance
-//! `g + L₁·θ₂/4` or less from the other body (its slopes to the two sides differ by at most `θ₂`), and the other way round.
-//! If both edges were left out, the least of these is at most `√(θ₁L₁·θ₂L₂)/4 ≤ ε`: a finely triangulated smooth surface
-//! needs only its vertices, and the gap is overestimated by `ε` at most (to first order in θ).
+//! **Selection of edges.** An edge of length `L` with the angle `θ` between its faces' normals is
+//! left out if `θ·L/4 ≤ ε`. If two edges cross at distance `g`, at least one end of the first is at
+//! distance `g + L₁·θ₂/4` or less from the other body (its slopes to the two sides differ by at
+//! most `θ₂`), and vice versa. If both edges are left out, the smaller of these errors is at most
+//! `√(θ₁L₁·θ₂L₂)/4 ≤ ε`. So a finely triangulated smooth surface needs only its vertices, and the
+//! gap is too large by at most `ε` (to first order in θ).
 //!
-//! That supposes flat faces on both sides. A cylinder of radius `R` falls away from the middle of an edge by `L²/8R`, however little the edge
-//! turns: the edges left out ([`Edge::fine`]) are searched against cylinders alone, where a search is cheap.
+//! This assumes flat faces on both sides. A cylinder of radius `R` falls away from the middle of an
+//! edge by `L²/8R`, independent of the edge's angle. So the edges left out ([`Edge::fine`]) are
+//! tested against cylinders only, for which a search is cheap.
 //!
-//! A short edge that turns little is [`Edge::end_tolerance`]: it makes no contact of its own where one of its ends is on a face and at most `ε`
-//! further from the other body. The least gap is then known to the same `ε`.
+//! A short edge with a small angle has an [`Edge::end_tolerance`]: it makes no contact of its own
+//! if one of its ends is on a face and at most `ε` further from the other body. The gap then has
+//! the same error `ε`.
 
 use crate::bytes::{Reader, Write};
 use crate::mesh::{EdgeGroups, face_normals};
@@ -22,21 +27,22 @@ use crate::tree::around_points;
 use crate::{Aabb, SphereTree, TriMesh, Vec3};
 use nalgebra::ComplexField;
 
-/// `ε`: how much too large the gap of two crossing edges may be, as a part of the diagonal.
+/// `ε`: largest error of the gap of two crossing edges, as a fraction of the diagonal.
 pub(crate) const EDGE_ERROR: f64 = 2e-4;
-/// An edge is a smooth surface's if it turns by less, radians, and is shorter than this part of the diagonal.
+/// Largest angle, radians, and largest length, as a fraction of the diagonal, of an edge of a
+/// smooth surface.
 const SMOOTH_ANGLE: f64 = 0.5;
 const SMOOTH_LENGTH: f64 = 0.03;
-/// Normals of one vertex that are within this cosine of another one are left out.
+/// Normals of a vertex within this cosine of another one are left out.
 const SAME_NORMAL_COSINE: f64 = 0.98;
-/// Normals kept per vertex at most.
+/// Maximum number of normals per vertex.
 const MAX_NORMALS: usize = 12;
 
-/// A point of the surface, with the normals around it.
+/// A vertex of the surface, with the normals around it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Point {
     pub at: Vec3,
-    /// Names it.
+    /// Identifier of the vertex.
     pub index: u32,
     /// Range of its outward normals in [`Elements::normals`].
     pub first: u32,
@@ -44,10 +50,11 @@ pub(crate) struct Point {
     /// Range of the directions of the searched edges that start here, in [`Elements::edge_directions`].
     pub first_direction: u32,
     pub edge_directions: u32,
-    /// Where the edges that it holds begin in [`Elements::edges`], how many are searched always, how many are fine.
+    /// Start of its edges in [`Elements::edges`], number of those that are always tested, number of
+    /// fine ones.
     pub first_edge: u32,
     pub edges: [u32; 2],
-    /// Lengths of the longest of those searched always and of all, meters.
+    /// Largest length of the edges that are always tested, and of all its edges, meters.
     pub longest: [f64; 2],
 }
 
@@ -57,40 +64,43 @@ pub(crate) struct Edge {
     pub ends: [Vec3; 2],
     /// Meters.
     pub length: f64,
-    /// Names of the points at its ends.
+    /// Identifiers of its end points.
     pub points: [u32; 2],
-    /// Its own contact may be left out if an end is no further by this, meters: `ε` on a smooth surface, else 0.
+    /// The edge needs no contact if an end is no further away by this, meters: `ε` on a smooth
+    /// surface, else 0.
     pub end_tolerance: f64,
-    /// Whether it turns so little that only cylinders are held against it.
+    /// Whether its angle is so small that it is tested against cylinders only.
     pub fine: bool,
     /// Outward normals of its faces.
     pub normals: [Vec3; 2],
-    /// Names it.
+    /// Identifier of the edge.
     pub index: u32,
 }
 
-/// All of a mesh, grouped by the tree's spheres.
+/// All features of a mesh, grouped by the nodes of the sphere tree.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Elements {
     pub points: Vec<Point>,
     pub edges: Vec<Edge>,
     pub normals: Vec<Vec3>,
     pub edge_directions: Vec<Vec3>,
-    /// Spheres and groups; the first holds all, the parts of each are side by side.
+    /// Nodes and groups. The first contains all; the children of each are adjacent.
     pub groups: Vec<Group>,
 }
 
-/// What a sphere of the tree, or a part of a leaf, holds. Thirty-two bytes: with poses that change most of the time goes by waiting for them.
+/// The content of a tree node or of a part of a leaf. Thirty-two bytes, since memory access
+/// dominates when poses change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(align(32))]
 pub(crate) struct Group {
     center: [f32; 3],
-    /// How far what it and its parts hold reaches from the center, without the fine edges and with them, meters; rounded up.
+    /// Distance from the center of all its content, without and with the fine edges, meters;
+    /// rounded up.
     reach: [f32; 2],
-    /// Where its parts begin in [`Elements::groups`], or what it holds in [`Elements::points`].
+    /// Start of its children in [`Elements::groups`], or of its vertices in [`Elements::points`].
     first: u32,
     count: u32,
-    /// Whether it has parts.
+    /// Whether it has children.
     has_children: bool,
 }
 
@@ -103,7 +113,7 @@ impl Group {
         &self.center
     }
 
-    /// From the center, with the fine edges or without, meters.
+    /// Returns the radius about the center, with or without the fine edges, meters.
     pub fn reach(&self, fine: bool) -> f64 {
         f64::from(self.reach[usize::from(fine)])
     }
@@ -122,24 +132,24 @@ impl Group {
     }
 }
 
-/// A group on the way to [`Group`]: each before its parts, all that it holds up to `end`.
+/// A [`Group`] under construction, in pre-order; `end` is the end of its descendants.
 struct GroupDraft {
     group: Group,
     end: usize,
 }
 
-/// Points of a group that is not halved.
+/// Maximum number of vertices of a group without children.
 const MAX_GROUP_POINTS: usize = 4;
-/// Parts of a group: as many as are looked at side by side, unless a sphere of the tree has more children.
+/// Number of children that are tested together; more only if a tree node has more.
 pub(crate) const MAX_CHILDREN: usize = 8;
-/// Groups that are read are nested no deeper.
+/// Maximum depth of groups that are read.
 const MAX_GROUP_DEPTH: u32 = 100;
-/// Rounds up to single precision.
+/// Factor that rounds up to single precision.
 const ROUND_UP: f64 = 1.0 + 1e-6;
 
 impl Elements {
-    /// The points in the order of the mesh's vertices, and the edges; no groups yet. Also returns, per triangle, which of its edges (k to k+1) are among the
-    /// elements.
+    /// Returns the vertices, in the order of the mesh, and the edges, without groups. Also returns
+    /// for each triangle which of its edges (k to k+1) are elements.
     fn without_groups(mesh: &TriMesh, groups: &EdgeGroups) -> (Elements, Vec<[bool; 3]>) {
         let face = face_normals(mesh);
         let mut all = Elements::default();
@@ -162,7 +172,8 @@ impl Elements {
         (all, searched)
     }
 
-    /// Also returns, per triangle, which of its edges (k to k+1) are among the elements. `groups`: the edges of the mesh.
+    /// Builds the elements. `groups` are the edges of the mesh. Also returns for each triangle
+    /// which of its edges (k to k+1) are elements.
     pub fn new(mesh: &TriMesh, groups: &EdgeGroups, tree: &SphereTree) -> (Elements, Vec<[bool; 3]>) {
         let (mut all, searched) = Elements::without_groups(mesh, groups);
         let mut points: Vec<(u32, Point)> =
@@ -182,7 +193,8 @@ impl Elements {
         (all, searched)
     }
 
-    /// The same with groups that were made before of the same mesh and tree; `order` names the points in theirs. `None` where they do not fit the mesh.
+    /// Builds the elements with stored groups of the same mesh and tree; `order` lists the vertices
+    /// in their order. Returns `None` if they do not fit the mesh.
     pub fn from_groups(
         mesh: &TriMesh,
         edges: &EdgeGroups,
@@ -198,7 +210,8 @@ impl Elements {
         (all.points.len() == count && all.has_valid_groups()).then_some((all, searched))
     }
 
-    /// Whether each group but the first is a part of one before it, each point is held by one group, and nothing is nested too deep.
+    /// Returns whether each group except the first is a child of an earlier one, each vertex is in
+    /// one group, and the depth is within the limit.
     fn has_valid_groups(&self) -> bool {
         let mut depth = vec![None; self.groups.len()];
         let mut held = vec![false; self.points.len()];
@@ -223,7 +236,7 @@ impl Elements {
         held.iter().all(|held| *held)
     }
 
-    /// The points that a group holds itself; none where it has parts.
+    /// Returns the vertices of a group; empty if it has children.
     pub fn points_of(&self, group: &Group) -> &[Point] {
         if group.has_children { &[] } else { &self.points[group.first as usize..][..group.count as usize] }
     }
@@ -232,7 +245,7 @@ impl Elements {
         if group.has_children { &self.groups[group.first as usize..][..group.count as usize] } else { &[] }
     }
 
-    /// The edges that a point holds, with the fine ones or without.
+    /// Returns the edges stored with a vertex, with or without the fine ones.
     pub fn edges_of(&self, point: &Point, fine: bool) -> &[Edge] {
         let count = point.edges[0] + if fine { point.edges[1] } else { 0 };
         &self.edges[point.first_edge as usize..(point.first_edge + count) as usize]
@@ -246,7 +259,8 @@ impl Elements {
         &self.edge_directions[point.first_direction as usize..(point.first_direction + point.edge_directions) as usize]
     }
 
-    /// The group of a sphere of the tree and of its children; nothing where they hold nothing. `held`: ranges in `points`, per sphere.
+    /// Appends the groups of a tree node and its children; nothing if they are empty. `held` are
+    /// ranges in `points`, per node.
     fn gather(
         &mut self,
         tree: &SphereTree,
@@ -278,7 +292,7 @@ impl Elements {
         out[group].end = out.len();
     }
 
-    /// The groups of a range of points, which are put into another order.
+    /// Appends the groups of a range of vertices, which are reordered.
     fn halve(&mut self, points: &mut [Point], first: usize, last: usize, out: &mut Vec<GroupDraft>) {
         let group = self.group(points, &[[first, last]], out);
         if last - first <= MAX_GROUP_POINTS {
@@ -296,7 +310,7 @@ impl Elements {
         out[group].end = out.len();
     }
 
-    /// A group around ranges of points; returns its number.
+    /// Appends a group around ranges of vertices. Returns its index.
     fn group(&mut self, points: &[Point], ranges: &[[usize; 2]], out: &mut Vec<GroupDraft>) -> usize {
         let all = &*self;
         let held = || ranges.iter().flat_map(|[a, b]| &points[*a..*b]);
@@ -310,7 +324,8 @@ impl Elements {
         out.len() - 1
     }
 
-    /// Files the parts of a group side by side, then theirs; those of a few parts are taken for its own.
+    /// Stores the children of a group adjacently, then theirs. Children with few children are
+    /// replaced by them.
     fn store_children(&mut self, drafts: &[GroupDraft], from: usize, to: usize) {
         if !drafts[from].group.has_children {
             return;
@@ -324,13 +339,13 @@ impl Elements {
         }
     }
 
-    /// The vertices.
+    /// Collects the vertices.
     fn gather_points(&mut self, mesh: &TriMesh, face: &[Vec3], searched: &[[bool; 3]]) {
         let mut edge_directions: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.vertices.len()];
         for (t, triangle) in mesh.triangles.iter().enumerate() {
             for k in (0..3).filter(|&k| searched[t][k]) {
                 let (from, to) = (triangle[k] as usize, triangle[(k + 1) % 3] as usize);
-                // the neighbor's triangle has the same edge the other way
+                // the neighboring triangle has the same edge in the opposite direction
                 edge_directions[from].push((mesh.vertices[to] - mesh.vertices[from]).normalize());
             }
         }
@@ -366,7 +381,8 @@ impl Elements {
     }
 }
 
-/// The parts of a group, or in the place of one its own, the widest first, as long as there are few.
+/// Returns the children of a group; while there are few, the widest is replaced by its own
+/// children.
 fn children_of(drafts: &[GroupDraft], group: usize) -> Vec<usize> {
     let direct = |group: usize| -> Vec<usize> {
         std::iter::successors(Some(group + 1), |n| Some(drafts[*n].end).filter(|n| *n < drafts[group].end)).collect()
@@ -390,7 +406,7 @@ fn children_of(drafts: &[GroupDraft], group: usize) -> Vec<usize> {
     }
 }
 
-/// The edges that turn outwards.
+/// Returns the convex edges.
 fn gather_edges(mesh: &TriMesh, groups: &EdgeGroups, face: &[Vec3]) -> (Vec<Edge>, Vec<[bool; 3]>) {
     let mut searched = vec![[false; 3]; mesh.triangles.len()];
     let mut edges = Vec::new();
@@ -400,7 +416,7 @@ fn gather_edges(mesh: &TriMesh, groups: &EdgeGroups, face: &[Vec3]) -> (Vec<Edge
         let ends = [group[0].low, group[0].high].map(|v| mesh.vertices[v as usize]);
         let normals = [face[group[0].face], face[group[group.len() - 1].face]];
         let apart = mesh.corners(group[group.len() - 1].face);
-        // more than two faces, or a convex edge: the other face is below the first one's plane
+        // more than two faces, or a convex edge: the other face is below the plane of the first
         let reach = apart.iter().map(|c| normals[0].dot(&(c - ends[0]))).fold(0.0, f64::min);
         let turn = ComplexField::acos(normals[0].dot(&normals[1]).clamp(-1.0, 1.0));
         let length = (ends[1] - ends[0]).norm();
@@ -431,7 +447,8 @@ fn gather_edges(mesh: &TriMesh, groups: &EdgeGroups, face: &[Vec3]) -> (Vec<Edge
     (edges, searched)
 }
 
-/// The smallest sphere found, going down, that holds `p`; the root where rounding leaves none.
+/// Returns the smallest sphere, found top-down, that contains `p`; the root if rounding leaves
+/// none.
 fn holding_node(tree: &SphereTree, p: &Vec3) -> u32 {
     let nodes = tree.nodes();
     let holds = |n: usize| (p - nodes[n].center).norm() <= nodes[n].radius * (1.0 + 1e-9);

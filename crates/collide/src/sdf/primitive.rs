@@ -1,23 +1,25 @@
-//! Signed distances of the primitives, exact; each in its own frame.
+//! Exact signed distances of the primitives, each in its own frame.
 
 use super::{DistanceField, Feature, Hit, facing, opposition};
 use crate::Vec3;
 
-/// How much further than the closest face another one may be that is taken instead, in sizes of the body.
+/// Maximum distance beyond the closest face up to which another face can be selected, in sizes of
+/// the body.
 const FACE_CHOICE_RANGE: f64 = 0.02;
-/// As much of a distance as is along a face's normal counts as straight above the face.
+/// Fraction of a distance along a face's normal from which a point is directly above the face.
 const STRAIGHT_ABOVE: f64 = 1.0 - 5e-7;
 
 /// `z ≤ 0`.
 pub(crate) struct HalfSpaceField;
 
-/// All within `radius` of the segment from `−half_length` to `half_length` on z; a sphere if that is 0.
+/// All points within `radius` of the segment from `−half_length` to `half_length` on z; a sphere if
+/// that is 0.
 pub(crate) struct RoundField {
     pub radius: f64,
     pub half_length: f64,
 }
 
-/// A block.
+/// A box.
 pub(crate) struct BoxField {
     pub half: Vec3,
 }
@@ -97,7 +99,7 @@ impl DistanceField for BoxField {
             return Hit { distance, nearest: distance, normal, core: 0.0, feature, facing: facing(normals, &normal) };
         }
         let nearer = |&a: &usize, &b: &usize| {
-            // of faces at the same distance, the one that the element faces most squarely
+            // of faces at the same distance, the one most opposite to the element
             let square = || opposition(normals, &sign(a)).total_cmp(&opposition(normals, &sign(b)));
             if (outside[a] - outside[b]).abs() < touching { square() } else { outside[b].total_cmp(&outside[a]) }
         };

@@ -1,21 +1,22 @@
-//! A mesh of several shells that overlap, shell by shell.
+//! A mesh of several overlapping shells, shell by shell.
 //!
 //! ```text
-//! d_U(p) = min over the shells i of d_i(p)      outside the union exact, inside it at least what the depth is
+//! d_U(p) = min over the shells i of d_i(p)      outside the union exact, inside it at least the depth
 //! ```
 //!
-//! The closest place of the union from outside is the closest of one of its shells, so each shell has elements and a field of its own, as a body
-//! that stands alone; what they find on a place that lies inside another shell is buried and does not count. A shell that lies wholly
-//! inside another one is left out.
+//! From outside, the closest point of the union is the closest point of one of its shells. So each
+//! shell has elements and a field of its own, and contacts at places inside another shell are
+//! ignored. A shell that lies completely inside another one is left out.
 
 use super::{DistanceField, Surface};
 use crate::mesh::{crossing_shells, edge_groups, shells};
 use crate::{SphereTree, TriMesh, Vec3};
 
-/// More shells than this collide by spheres.
+/// Maximum number of shells; meshes with more collide by spheres.
 const MAX_SHELLS: usize = 32;
 
-/// The surfaces of the shells of a closed mesh that overlap; `None` where a shell crosses itself or is a cavity, or they are too many.
+/// Returns the surfaces of the overlapping shells of a closed mesh; `None` if a shell crosses
+/// itself or is a cavity, or if there are too many.
 pub(crate) fn shell_surfaces(mesh: &TriMesh, tree: &SphereTree) -> Option<Vec<Surface>> {
     let (shell, count) = shells(mesh, &edge_groups(mesh));
     let crossings = crossing_shells(mesh, &shell)?;
@@ -30,7 +31,7 @@ pub(crate) fn shell_surfaces(mesh: &TriMesh, tree: &SphereTree) -> Option<Vec<Su
         return None;
     }
     let all: Vec<Surface> = meshes.iter().map(|part| Surface::new(part, tree)).collect();
-    // what does not cross is inside with all its points or with none
+    // shells that do not cross are inside with all points or with none
     let crosses = |n: usize, m: usize| crossings.contains(&(n.min(m) as u32, n.max(m) as u32));
     let within = |n: usize, m: usize| {
         n != m && !crosses(n, m) && meshes[n].vertices.iter().take(1).all(|p| all[m].field.nearest(p).distance < 0.0)
@@ -39,10 +40,11 @@ pub(crate) fn shell_surfaces(mesh: &TriMesh, tree: &SphereTree) -> Option<Vec<Su
     Some(all.into_iter().zip(hidden).filter(|(_, hidden)| !hidden).map(|(surface, _)| surface).collect())
 }
 
-/// How deep inside another shell a place is buried, as a part of the diagonal: what lies on the common boundary of two shells is not.
+/// Smallest depth inside another shell, as a fraction of the diagonal: the common boundary of two
+/// shells is not inside.
 const MIN_BURIED_DEPTH: f64 = 1e-6;
 
-/// Whether a place on the surface of shell `own` lies inside another one.
+/// Returns whether a point on the surface of shell `own` lies inside another shell.
 pub(crate) fn is_inside_other_shell(parts: &[Surface], own: usize, p: &Vec3) -> bool {
     parts.iter().enumerate().any(|(n, part)| {
         n != own

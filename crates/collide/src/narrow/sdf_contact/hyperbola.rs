@@ -1,4 +1,4 @@
-//! The distance from one straight edge or corner, along a line that passes it.
+//! The distance from one straight edge or corner along a line: a hyperbola.
 //!
 //! ```text
 //! d(s) = √(f² + k (s − s*)²)        k = 1 − (u·w)²      of a corner 1
@@ -6,24 +6,25 @@
 //! d'(s) = m   at   s* + m·f/√(k (k − m²))
 //! ```
 //!
-//! | symbol | is |
+//! | symbol | meaning |
 //! |---|---|
 //! | `u`, `w` | directions of the line and of the edge |
 //! | `s₀`, `d₀`, `g₀` | a place where the edge or corner is closest, the distance there, its slope per meter |
-//! | `s*`, `f` | the foot: the place that is closest, and how close |
+//! | `s*`, `f` | the foot: the closest place, and the distance there |
 //!
-//! The distance from a whole surface is at most this, so the foot of what is closest is a good place to look next. Where a line runs over a face and off
-//! it, the plane of the face and the distance from the edge that bounds it touch: there the slope `m` is the face's.
+//! The distance from a whole surface is at most this, so the foot of the closest feature is a good
+//! next sample. If a line runs over a face and beyond its edge, the plane of the face and the
+//! distance from that edge are tangent: there the slope `m` is that of the face.
 
 use crate::Vec3;
 use crate::sdf::{Feature, Hit};
 
-/// Square of the sine between lines that are as good as parallel.
+/// Smallest squared sine between lines that are not treated as parallel.
 const MIN_ACROSS: f64 = 1e-6;
 
 /// The distance from a straight edge or a corner along a line.
 pub(super) struct Hyperbola {
-    /// `s*`, where it is least.
+    /// `s*`, the position of the minimum.
     pub foot: f64,
     /// `f²`.
     least: f64,
@@ -32,7 +33,9 @@ pub(super) struct Hyperbola {
 }
 
 impl Hyperbola {
-    /// Of what is closest at `s`, where the distance rises by `slope` along the line; `None` of a face, and from within, where an edge is nowhere closest.
+    /// Returns the hyperbola of the closest feature at `s`, where the distance changes by `slope`
+    /// along the line. `None` for a face, for parallel directions, and from inside, where no edge
+    /// is the closest feature.
     pub fn new(hit: &Hit, s: f64, slope: f64, along: &Vec3) -> Option<Hyperbola> {
         let across = match hit.feature {
             Feature::Face => return None,
@@ -48,7 +51,7 @@ impl Hyperbola {
         (self.least + self.across * (s - self.foot).powi(2)).sqrt()
     }
 
-    /// Where it rises by so much per meter.
+    /// Returns the position of this slope.
     pub fn at_slope(&self, slope: f64) -> Option<f64> {
         let steepest = self.across - slope * slope;
         (steepest > 0.0).then(|| self.foot + slope * (self.least / (self.across * steepest)).sqrt())

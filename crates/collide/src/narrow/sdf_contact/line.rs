@@ -1,19 +1,25 @@
-//! A straight element (an edge, an axis) against a field: the least distance along it, and where it leaves a face that it lies on.
+//! A straight element (an edge, an axis) against a field: the minimum distance along it, and the
+//! ends of its parts that lie on a face.
 //!
-//! **Search along an edge.** Against a convex body `d_B` is convex along a line, so two tangents meet below the minimum
-//! (Kelley 1960, *The cutting-plane method*): where that is above the margin, the search ends; else their meeting point
-//! is the next place to look. On flat faces a few looks are exact. Other bodies: the edge is first halved into short pieces, and those
-//! that are too far to reach the margin are dropped (`d_B` changes by at most 1 m per meter). Within a piece that is kept the function
-//! is treated as convex until a look lies below the tangent of another one: there is a valley of B between them, and perhaps a second minimum,
-//! so that part is halved a few times.
-//! Where an edge or a corner of B is closest, the distance from it alone has its least place in closed form ([`Hyperbola`]): that is looked at next, and where
-//! the same edge or corner is closest there, it is the minimum.
-//! What comes out:
+//! **Search along an edge.** Against a convex body `d_B` is convex along a line, so two tangents
+//! intersect below the minimum (Kelley 1960, *The cutting-plane method*). If the intersection is
+//! above the margin, the search ends; otherwise it is the next sample. On flat faces a few samples
+//! are exact.
 //!
-//! - a kink, two slopes: an edge of B (or the ridge between two faces, inside) is crossed. The normal is the combination of the two that is
-//!   perpendicular to the edge;
-//! - a face that the edge lies on, or slopes gently over. Its two ends are contacts, the corners of the area of contact, unless they are the
-//!   edge's own ends, which are points and speak for themselves.
+//! For other bodies the edge is first halved into short pieces, and pieces too far away are dropped
+//! (`d_B` changes by at most 1 m per meter). Within a piece the function is treated as convex until
+//! a sample lies below the tangent of another one. Then B has a valley between them, perhaps with a
+//! second minimum, so that part is halved a few times.
+//!
+//! If an edge or a corner of B is closest, the minimum of the distance from it has a closed form
+//! ([`Hyperbola`]). That place is sampled next. If the same edge or corner is closest there, it is
+//! the minimum. Results:
+//!
+//! - a kink between two slopes: the line crosses an edge of B (or, inside, the ridge between two
+//!   faces). The normal is the combination of the two normals that is perpendicular to the line;
+//! - a face on which the edge lies, or over which it is slightly inclined. The two ends of this
+//!   part are contacts (corners of the contact area), except for the ends of the edge itself, which
+//!   are tested as points.
 
 use super::super::reduce::Collector;
 use super::hyperbola::Hyperbola;
@@ -23,17 +29,18 @@ use crate::sdf::elements::Edge;
 use crate::sdf::{Feature, Hit, TOUCHING, facing};
 use crate::{NormalFrom, Vec3};
 
-/// The same where both faces of the edge belong to a smooth surface: its ends say enough.
+/// Maximum length of a piece if both faces of the edge belong to a smooth surface, in the same
+/// unit; its ends suffice.
 const MAX_SMOOTH_PIECE: f64 = 0.06;
-/// Looks for the end of a flat bottom at most.
+/// Maximum number of samples for the end of a flat part.
 const MAX_END_SAMPLES: usize = 20;
-/// Looks for the minimum at most: a third of them halve what is left.
+/// Maximum number of samples for a minimum; a third of them are bisections.
 const MAX_SAMPLES: usize = 90;
-/// Halvings of a part over a valley, at most.
+/// Maximum number of halvings of a part over a valley.
 const MAX_SPLITS: u32 = 5;
-/// A foot so near a look is no news, as a part of what is left.
+/// Smallest distance of a foot from an existing sample, as a fraction of the remaining interval.
 const MIN_FOOT_OFFSET: f64 = 1e-6;
-/// How far below a tangent is no rounding, as a part of the smaller body's radius.
+/// Distance below a tangent that exceeds rounding, as a fraction of the smaller body's radius.
 const CONVEXITY_TOLERANCE: f64 = 1e-9;
 
 /// A straight element in the frame of the field.
@@ -44,11 +51,11 @@ struct Line<'a> {
     radius: f64,
     normals: &'a [Vec3],
     index: u32,
-    /// The edge of a mesh that it is.
+    /// The edge, if the element is an edge of a mesh.
     edge: Option<&'a Edge>,
 }
 
-/// A look at a place on a line.
+/// The distance and slope at a place on a line.
 #[derive(Clone, Copy)]
 struct Sample {
     s: f64,
@@ -57,7 +64,7 @@ struct Sample {
 }
 
 impl Sample {
-    /// Whether the line lies here on a face, or along a straight round side.
+    /// Returns whether the line lies on a face here, or along a straight round side.
     fn is_flat(&self) -> bool {
         match self.hit.feature {
             Feature::Face => self.hit.facing && self.slope.abs() < FLAT_SLOPE,
@@ -65,12 +72,12 @@ impl Sample {
         }
     }
 
-    /// The tangent at another place.
+    /// Returns the tangent at another place.
     fn height(&self, s: f64) -> f64 {
         self.hit.distance + self.slope * (s - self.s)
     }
 
-    /// The distance from the edge or corner that is closest here.
+    /// Returns the distance along the line from the edge or corner that is closest here.
     fn hyperbola(&self, line: &Line) -> Option<Hyperbola> {
         Hyperbola::new(&self.hit, self.s, self.slope, &line.along)
     }
@@ -104,7 +111,8 @@ impl Query<'_> {
         }
     }
 
-    /// A piece that may be in reach, between two places that may have been looked at. Returns what was seen at them.
+    /// Searches a piece between two places, which can have been sampled before. Returns the samples
+    /// at them.
     fn halve(
         &self,
         line: &Line,
@@ -128,7 +136,7 @@ impl Query<'_> {
             }
             return [first, last];
         }
-        // one that rises steeply into the piece, from either end, has its least place there
+        // the minimum of a piece that rises steeply from either end is at that end
         let start = low.1.unwrap_or_else(|| self.sample(line, low.0));
         if start.slope >= FLAT_SLOPE && high.1.is_none() {
             return [Some(start), None];
@@ -138,7 +146,7 @@ impl Query<'_> {
         [Some(start), Some(end)]
     }
 
-    /// Whether the distance along so much of an edge is treated as convex.
+    /// Returns whether the distance along an edge of this length is treated as convex.
     pub(super) fn is_one_piece(&self, length: f64, smooth: bool) -> bool {
         self.field.is_convex() || length <= if smooth { MAX_SMOOTH_PIECE } else { MAX_PIECE } * self.size
     }
@@ -155,12 +163,13 @@ impl Query<'_> {
         let at = line.at(s);
         let hit = self.hit_at(&at, name, line.normals, TOUCHING);
         let slope = hit.normal.dot(&line.along);
-        // the surface around an axis is its radius away across it alone
+        // the surface of a round element is its radius away only perpendicular to the axis
         self.record(&hit, if slope.abs() <= SLOPE_ROUNDING { line.radius } else { 0.0 });
         Sample { s, slope, hit }
     }
 
-    /// The minimum between two looks, if it is not at one of them, and where the line leaves a face that it lies on.
+    /// Searches between two samples: the minimum, if it is not at one of them, and the exit from a
+    /// face on which the line lies.
     fn search(&self, line: &Line, low: Sample, high: Sample, found: &mut Collector) {
         let nonconvex = !self.field.is_convex() && self.is_nonconvex(&low, &high);
         if !nonconvex && (high.slope - low.slope <= LEVEL_SLOPE || ends_suffice(line, &low, &high)) {
@@ -174,7 +183,8 @@ impl Query<'_> {
         self.minima(line, low, high, low.is_flat() != high.is_flat(), MAX_SPLITS, found);
     }
 
-    /// The minima between two looks; a part beyond a ridge is halved so often at most. `on_face`: the face that the line lies on is known.
+    /// Searches the minima between two samples; parts beyond a ridge are halved at most `halvings`
+    /// times. `on_face`: the face on which the line lies is known.
     fn minima(&self, line: &Line, low: Sample, high: Sample, on_face: bool, halvings: u32, found: &mut Collector) {
         match (low.slope < -LEVEL_SLOPE, high.slope > LEVEL_SLOPE) {
             (true, true) => {
@@ -187,7 +197,8 @@ impl Query<'_> {
         }
     }
 
-    /// A part that rises from a minimum, or falls to one, at both ends: further minima where a look lies below the tangent of another.
+    /// Searches a part that rises from a minimum, or falls to one, at both ends. It has further
+    /// minima if a sample lies below the tangent of another.
     fn search_nonconvex(
         &self,
         line: &Line,
@@ -202,7 +213,7 @@ impl Query<'_> {
         if halvings == 0 || self.field.is_convex() || least > found.limit() || !self.is_nonconvex(&low, &high) {
             return;
         }
-        // two faces that meet in a valley are as high as both tangents where those meet
+        // two faces that meet in a valley are as high as both tangents at their intersection
         let (s, _) = tangent_intersection(&low, &high);
         let s = if halvings == MAX_SPLITS && s > low.s + 0.01 * length && s < high.s - 0.01 * length {
             s
@@ -220,13 +231,15 @@ impl Query<'_> {
         }
     }
 
-    /// Whether one of two looks lies below the tangent of the other: not convex between them.
+    /// Returns whether one of two samples lies below the tangent of the other: the distance is not
+    /// convex between them.
     fn is_nonconvex(&self, low: &Sample, high: &Sample) -> bool {
         let slack = CONVEXITY_TOLERANCE * self.size;
         low.hit.distance < high.height(low.s) - slack || high.hit.distance < low.height(high.s) - slack
     }
 
-    /// The minimum that tangents lead to between two slopes, a contact if it is in reach, and the looks next to it; `None` where it is out of reach.
+    /// Finds the minimum between two opposite slopes by tangents and adds a contact if it is within
+    /// the limit. Returns the samples next to it; `None` if it is beyond the limit.
     fn descend(
         &self,
         line: &Line,
@@ -240,7 +253,7 @@ impl Query<'_> {
         for n in 0..MAX_SAMPLES {
             let (s, level) = tangent_intersection(&low, &high);
             let least = low.hit.distance.min(high.hit.distance);
-            // tangents that meet above what was seen are no bound: not convex here
+            // tangents that intersect above a sample are no bound: not convex here
             let convex = level <= least + tolerance;
             if convex && level > limit {
                 return None;
@@ -276,7 +289,8 @@ impl Query<'_> {
         Some([low, high])
     }
 
-    /// The foot on the feature that is closest at the lower of two looks, or else at the other, where it lies between them.
+    /// Returns the foot on the feature that is closest at the lower of two samples, or else at the
+    /// other, if it lies between them.
     fn foot_between(&self, line: &Line, low: &Sample, high: &Sample) -> Option<f64> {
         if self.field.is_round() {
             return None;
@@ -289,7 +303,7 @@ impl Query<'_> {
             .find(|s| *s > low.s + margin && *s < high.s - margin)
     }
 
-    /// A minimum between two slopes.
+    /// Adds the contact of a minimum between two slopes.
     fn kink(&self, line: &Line, low: &Sample, high: &Sample, found: &mut Collector) {
         let (s, level) = tangent_intersection(low, high);
         let (a, b) = (high.slope, -low.slope);
@@ -315,7 +329,7 @@ impl Query<'_> {
         self.push_if(fits, &line.at(s), line.radius, &hit, line_normal(line, &hit), line.feature(0), found);
     }
 
-    /// A part that lies on a face: its two ends.
+    /// Adds contacts at the two ends of a part that lies on a face.
     fn face(&self, line: &Line, sample: &Sample, low: Sample, high: Sample, found: &mut Collector) {
         let from = self.exit_place(line, sample, low);
         let to = self.exit_place(line, sample, high);
@@ -327,20 +341,21 @@ impl Query<'_> {
         }
     }
 
-    /// The end of a part that lies on a face and begins at `sample`, on the side of `outer`.
+    /// Adds a contact at the end, towards `outer`, of a part that lies on a face and starts at
+    /// `sample`.
     fn end_of_face(&self, line: &Line, sample: &Sample, outer: Sample, found: &mut Collector) {
         if sample.hit.distance.min(sample.height(outer.s)) - line.radius > found.limit() {
             return;
         }
         let s = self.exit_place(line, sample, outer);
-        // at the very start it is the element's own end, or another piece's
+        // the start is an end of the element, or belongs to another piece
         if (s - sample.s).abs() > 1e-6 * self.size {
             self.push_on_face(line, sample, s, if outer.s > sample.s { 2 } else { 1 }, found);
         }
     }
 
-    /// Where the line leaves the face that is under `sample`, towards `outer`: in closed form where the edge that bounds the face is closest at `outer`,
-    /// else where the tangents of the two meet.
+    /// Returns where the line leaves the face under `sample`, towards `outer`. In closed form if
+    /// the edge that bounds the face is closest at `outer`, else by the intersection of tangents.
     fn exit_place(&self, line: &Line, sample: &Sample, mut outer: Sample) -> f64 {
         let tolerance = 1e-9 * self.size;
         for _ in 0..MAX_END_SAMPLES {
@@ -349,7 +364,7 @@ impl Query<'_> {
             if rise < tolerance || turn.abs() <= LEVEL_SLOPE {
                 return outer.s;
             }
-            // the edge may end before that place: the look there tells
+            // the edge can end before that place: the next sample shows it
             let s = self.exit_in_closed_form(line, sample, &outer, tolerance).unwrap_or(outer.s - rise / turn);
             if (s - sample.s) * (outer.s - sample.s) <= 0.0 || (s - outer.s) * (sample.s - outer.s) <= 0.0 {
                 return sample.s;
@@ -359,7 +374,8 @@ impl Query<'_> {
         outer.s
     }
 
-    /// The same where the feature that is closest at `outer` bounds that face: its distance touches the face's plane there.
+    /// Returns the exit if the closest feature at `outer` bounds that face: its distance is tangent
+    /// to the plane of the face.
     fn exit_in_closed_form(&self, line: &Line, sample: &Sample, outer: &Sample, tolerance: f64) -> Option<f64> {
         if self.field.is_round() {
             return None;
@@ -386,7 +402,7 @@ impl Line<'_> {
         self.start + self.along * s
     }
 
-    /// Whether going from the edge into either of its faces leads no closer.
+    /// Returns whether no direction from the edge into one of its faces leads closer.
     fn is_closest(&self, normal: &Vec3) -> bool {
         let [n1, n2] = self.normals else { return true };
         let cos = n1.dot(n2);
@@ -399,14 +415,15 @@ impl Line<'_> {
     }
 }
 
-/// Where the tangents of two looks meet: place and height.
+/// Returns the intersection of the tangents of two samples: place and height.
 fn tangent_intersection(low: &Sample, high: &Sample) -> (f64, f64) {
     let fall = high.hit.distance - low.hit.distance + low.slope * low.s - high.slope * high.s;
     let s = fall / (low.slope - high.slope);
     (s, low.hit.distance + low.slope * (s - low.s))
 }
 
-/// Whether an edge of a smooth surface is no deeper than one of its ends, which counts, by more than the stated error.
+/// Returns whether an edge of a smooth surface is deeper than the lower of its ends by less than
+/// the stated error, and that end has a contact.
 fn ends_suffice(line: &Line, low: &Sample, high: &Sample) -> bool {
     let Some(edge) = line.edge else { return false };
     let end = if low.hit.distance < high.hit.distance { low } else { high };
@@ -416,7 +433,7 @@ fn ends_suffice(line: &Line, low: &Sample, high: &Sample) -> bool {
     whole && end.hit.feature == Feature::Face && end.hit.facing && end.hit.distance - least < edge.end_tolerance
 }
 
-/// What the normal of a line's contact turns with.
+/// Returns the feature that determines the normal of a line's contact.
 fn line_normal(line: &Line, hit: &Hit) -> NormalFrom {
     match hit.feature {
         Feature::Face => NormalFrom::FaceOfB,

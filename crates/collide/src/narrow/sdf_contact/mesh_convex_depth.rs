@@ -1,12 +1,14 @@
-//! Deep overlaps of a mesh and a flat-sided convex body: the deepest point of all the mesh's surface, inside its faces too.
+//! Deep overlaps of a mesh and a flat-sided convex body: the deepest point of the mesh's surface,
+//! inside its faces too.
 //!
 //! ```text
-//! depth = − min over the points p of all faces of d_B(p)      d_B convex: so is its least value over a triangle, and along any line in it
-//! h(s)  = min over t of d_B(p(s, t))                          convex again: two searches by golden sections (Kiefer 1953), one in the other
+//! depth = − min over the points p of all faces of d_B(p)      d_B convex: so is its minimum over a triangle, and along any line in it
+//! h(s)  = min over t of d_B(p(s, t))                          convex again: two nested golden-section searches (Kiefer 1953)
 //! ```
 //!
-//! In shallow overlaps vertices and edges that face the other body are the deepest. Where one is deep in the other, a place inside a face may be,
-//! or one that faces the other way; without it the two are pushed apart by less than they overlap.
+//! In shallow overlaps the deepest points are vertices and edges that face the other body. In deep
+//! overlaps the deepest point can lie inside a face, or on a feature that faces away. Without it,
+//! the contacts would separate the bodies by less than their overlap.
 
 use super::super::reduce::Collector;
 use super::query::{Query, point_normal};
@@ -14,7 +16,7 @@ use crate::Vec3;
 use crate::sdf::TOUCHING;
 use crate::sdf::field::MeshField;
 
-/// What a deeper place must gain to count, in the same.
+/// Minimum gain of depth over the other contacts, in radii of the smaller body.
 const MIN_GAIN: f64 = 1e-4;
 /// Steps of a search: they leave 5e-7 of a side.
 const MAX_STEPS: usize = 30;
@@ -22,7 +24,8 @@ const MAX_STEPS: usize = 30;
 const GOLDEN_SECTION: f64 = 0.618_033_988_749_894_9;
 
 impl Query<'_> {
-    /// One contact at the deepest point of the mesh's faces, where that is deeper than what was found.
+    /// Adds one contact at the deepest point of the mesh's faces, if that is deeper than the other
+    /// contacts.
     pub(super) fn faces(&self, mesh: &MeshField, found: &mut Collector) {
         if let Some(other) = self.mesh {
             return self.deepest(mesh, other, found);
@@ -49,7 +52,7 @@ impl Query<'_> {
         }
     }
 
-    /// The place of a triangle where the field is least, and its value there.
+    /// Returns the point of a triangle where the field is smallest, and the value.
     fn lowest_of_face(&self, [a, b, c]: &[Vec3; 3]) -> (Vec3, f64) {
         golden_section_search(|s| {
             let (from, to) = (a + (b - a) * s, a + (c - a) * s);
@@ -61,7 +64,7 @@ impl Query<'_> {
     }
 }
 
-/// The least value of a convex function on 0 to 1, and what comes with it.
+/// Returns the minimum of a convex function on 0 to 1, and its point.
 fn golden_section_search(value: impl Fn(f64) -> (Vec3, f64)) -> (Vec3, f64) {
     let (mut low, mut high) = (0.0, 1.0);
     let (mut s, mut t) = (1.0 - GOLDEN_SECTION, GOLDEN_SECTION);

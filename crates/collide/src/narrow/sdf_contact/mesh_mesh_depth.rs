@@ -1,4 +1,5 @@
-//! Deep overlaps of two meshes: the deepest point of all of one's surface below the other's, by branch and bound.
+//! Deep overlaps of two meshes: the deepest point of one surface below the other, by branch and
+//! bound.
 //!
 //! ```text
 //! D(p) = − d_B(p) ≤ dist_t(p)                            depth below B's surface: at most the distance from any of its triangles t
@@ -12,11 +13,13 @@
 //! |---|---|
 //! | `p_i` | corners of a face of A, or of a part of one |
 //! | `t` | the triangles of B that are closest to these corners |
-//! | `λ` | mixed strategy of a game of which the `t` are the rows and the corners the columns; its value is the bound |
+//! | `λ` | mixed strategy of a matrix game with rows `t` and columns `p_i`; the value of the game is the bound |
 //!
-//! Where one triangle of B stays the closest, the bound is met at a corner; on a ridge of `D`, where two or three are as close, the mixture is exact for
-//! flat faces. A part whose bound exceeds the deepest place so far by more than the tolerance is halved across its longest side (Horst and Tuy,
-//! *Global optimization*, 1996). Faces are found by a tree of boxes, deeper boxes first.
+//! If one triangle of B is closest to the whole part, the bound is attained at a corner. On a ridge
+//! of `D`, where two or three triangles are equally close, the mixture is exact for flat faces. A
+//! part whose bound exceeds the best depth by more than the tolerance is halved across its longest
+//! side (Horst and Tuy, *Global optimization*, 1996). Faces are found by a tree of boxes, deeper
+//! boxes first.
 
 use super::super::reduce::Collector;
 use super::query::{Query, point_normal};
@@ -25,13 +28,16 @@ use crate::sdf::field::MeshField;
 use crate::sdf::{DistanceField, TOUCHING};
 use crate::{Aabb, Vec3};
 
-/// What a deeper place must gain to count, in radii of the smaller body: the search may stay short of the deepest by as much.
+/// Minimum gain of depth, in radii of the smaller body: the result can be less than the maximum by
+/// this.
 const MIN_GAIN: f64 = 4e-4;
-/// Halvings of a face at most: of one as long as the body they leave parts of a millionth of it.
+/// Maximum number of halvings of a face; for a face as long as the body they leave parts of a
+/// millionth of it.
 const MAX_HALVINGS: u32 = 40;
 
 impl Query<'_> {
-    /// One contact at the deepest point of the mesh's faces below the surface of the other one, where that is deeper than what was found.
+    /// Adds one contact at the deepest point of the mesh's faces below the other mesh's surface, if
+    /// that is deeper than the other contacts.
     pub(super) fn deepest(&self, mesh: &MeshField, other: &MeshField, found: &mut Collector) {
         let mut search = DepthSearch {
             query: self,
@@ -53,20 +59,20 @@ struct DepthSearch<'a, 'b> {
     query: &'a Query<'b>,
     mesh: &'a MeshField,
     other: &'a MeshField,
-    /// Meters; of the deepest place so far, and how much more is asked for.
+    /// Best depth so far, and the required gain, meters.
     deepest: f64,
     gain: f64,
-    /// The face that it is in, and the place in the frame of the field.
+    /// The face with the best depth, and the point in the frame of the field.
     best: Option<(usize, Vec3)>,
 }
 
-/// What is known of a place.
+/// The depth at a point.
 #[derive(Clone, Copy)]
 struct DepthSample {
     at: Vec3,
-    /// Below the other's surface.
+    /// Depth below the other's surface, meters.
     depth: f64,
-    /// The other's triangle that is closest.
+    /// The closest triangle of the other mesh.
     closest: usize,
 }
 
@@ -110,7 +116,7 @@ impl DepthSearch<'_, '_> {
         DepthSample { at, depth, closest }
     }
 
-    /// A part of a face, which may be halved so often.
+    /// Searches a part of a face, with at most `halvings` halvings.
     fn refine_part(&mut self, t: usize, corners: [DepthSample; 3], halvings: u32) {
         if halvings == 0 || self.bound(&corners) <= self.threshold() {
             return;
@@ -124,9 +130,10 @@ impl DepthSearch<'_, '_> {
         self.refine_part(t, [middle, last, c], halvings - 1);
     }
 
-    /// At most the depth anywhere in a part.
+    /// Returns an upper bound of the depth in a part.
     fn bound(&self, corners: &[DepthSample; 3]) -> f64 {
-        // `D` changes by at most 1 m per meter; outside the other that says more than distances do
+        // `D` changes by at most 1 m per meter; outside the other body this is better than
+        // distances
         let far = |c: &DepthSample| corners.iter().map(|x| (x.at - c.at).norm_squared()).fold(0.0, f64::max).sqrt();
         let upper_bound = corners.iter().map(|c| c.depth + far(c)).fold(f64::INFINITY, f64::min);
         if upper_bound <= self.threshold() {
@@ -141,7 +148,8 @@ impl DepthSearch<'_, '_> {
     }
 }
 
-/// At most the value of a game in which the rows' player wants little; it is met but for rounding.
+/// Returns an upper bound of the value of a matrix game with a minimizing row player; it is
+/// attained up to rounding.
 fn game_value(rows: &[[f64; 3]; 3]) -> f64 {
     let upper_bound = |weights: [f64; 3]| {
         (0..3).map(|i| (0..3).map(|t| weights[t] * rows[t][i]).sum::<f64>()).fold(f64::NEG_INFINITY, f64::max)
@@ -154,7 +162,7 @@ fn game_value(rows: &[[f64; 3]; 3]) -> f64 {
             least = least.min(upper_bound(weights.map(|w| w / sum)));
         }
     };
-    // two rows, mixed so that two columns are alike
+    // two rows, mixed so that two columns are equal
     for (t, u) in [(0, 1), (1, 2), (2, 0)] {
         for (i, j) in [(0, 1), (1, 2), (2, 0)] {
             let (rises, falls) = (rows[t][j] - rows[t][i], rows[u][i] - rows[u][j]);
@@ -163,7 +171,7 @@ fn game_value(rows: &[[f64; 3]; 3]) -> f64 {
             try_weights(weights);
         }
     }
-    // all three, so that all columns are alike
+    // all three rows, mixed so that all columns are equal
     let column = |i: usize| Vec3::new(rows[0][i], rows[1][i], rows[2][i]);
     let mixed = (column(0) - column(1)).cross(&(column(0) - column(2)));
     try_weights((mixed * mixed.sum().signum()).into());

@@ -1,20 +1,25 @@
-//! The least translation that parts two bodies, where the contacts of their elements do not.
+//! Minimum translation that separates two bodies, for overlaps that the contacts of their elements
+//! do not resolve.
 //!
 //! ```text
-//! D(n) = max over B of n·x − min over A of n·x      how far A goes along n until a plane across n is between the two (or their hulls)
-//! D*   = min over n of D(n)                         the least translation, of convex bodies
+//! D(n) = max over B of n·x − min over A of n·x      translation of A along n after which a plane across n separates the two (or their hulls)
+//! D*   = min over n of D(n)                         the minimum translation, for convex bodies
 //! ```
 //!
-//! A contact at depth `g` with normal `n` of two convex bodies is right about the whole of them only if `D(n) = g`: moved so far they are apart. It is not
-//! where an element lies flush with a side, or beyond it: no corner of a block pushed straight into another one faces the side that it lies on, and the
-//! face that it does face is further away than elements look. Then A is moved along the best `n` by `D(n)`, where the two only touch; the contacts that
-//! they have there are those sought, all deeper by the part of `D` along their normals.
+//! A contact of two convex bodies at depth `g` with normal `n` resolves the overlap only if `D(n) =
+//! g`: that translation separates the bodies. It does not if an element is flush with a side or
+//! beyond it. Example: no corner of a box that was pushed straight into another one faces the side
+//! on which it lies, and the face that it does face is out of range. Then A is moved along the best
+//! `n` by `D(n)`, so that the two just touch. Their contacts there are used, each deepened by the
+//! component of `D` along its normal.
 //!
-//! Directions tried: normals of faces and products of edges (the separating axes; all of them where they are few), axes and centers. Where surfaces are
-//! bent or have very many faces, a search from the best of them follows. Any of them parts the two: only how far is more than the least.
+//! Candidate directions: face normals and cross products of edges (the separating axes; all of them
+//! if they are few), axes, and the line of centers. For curved surfaces, or very many faces, a
+//! local search from the best candidate follows. Every direction separates the two; only the
+//! translation can be larger than the minimum.
 //!
-//! Bodies that are not convex have the depth of their deepest place, if the two are free when moved so far; else their hulls are parted, if much of one is
-//! in the other.
+//! Bodies that are not convex have the depth of their deepest point, if that translation separates
+//! them. Otherwise their hulls are separated, if much of one is inside the other.
 
 use super::super::reduce::Collector;
 use super::query::{NearestCache, Query};
@@ -27,43 +32,44 @@ use crate::{Contact, Mat3, NormalFrom, Pose, Vec3};
 use arrayvec::ArrayVec;
 use nalgebra::Point3;
 
-/// What the elements made of two bodies.
+/// The result of the element queries of two bodies.
 pub(super) struct SampledDistance {
-    /// The least signed distance of any place that was looked at, whether it made a contact or not, meters.
+    /// Smallest signed distance of all sampled points, with or without contact, meters.
     pub min: f64,
 }
 
-/// All in radii of the smaller body. A place this near or inside is evidence that the two overlap.
+/// Distance below which a point shows that the bodies overlap. This and the following are in radii
+/// of the smaller body.
 const OVERLAP_TOLERANCE: f64 = 1e-6;
-/// Depths that differ by less are the same.
+/// Largest difference of equal depths.
 const SAME_DEPTH: f64 = 1e-4;
-/// Overlaps below this are told by the elements: faces that far away are looked for.
+/// Depth up to which the elements resolve the overlap: faces within this distance are considered.
 const MIN_DEPTH: f64 = 2e-3;
-/// By how much, as a factor, the way along a contact's normal may be longer than its depth.
+/// Largest ratio of the translation along a contact's normal to its depth.
 const MAX_TRANSLATION_RATIO: f64 = 1.1;
-/// The gap at which the two touch.
+/// Gap at which the two touch.
 const TOUCH_GAP: f64 = 1e-5;
-/// How far contacts are looked for where they touch.
+/// Margin of the contacts at which they touch.
 const TOUCH_MARGIN: f64 = 0.02;
-/// Cosine of a contact's normal and the way out.
+/// Smallest cosine between a contact's normal and the translation.
 const MIN_ALIGNMENT: f64 = 0.7;
 
-/// Faces of a mesh that are tried at most; of finer ones every so manieth.
+/// Maximum number of faces of a mesh that are tried; evenly spaced for finer meshes.
 const MAX_FACES: usize = 256;
-/// Directions of edges of a body; of one that has more none is tried.
+/// Maximum number of edge directions of a body; if there are more, none is tried.
 const MAX_EDGE_DIRECTIONS: usize = 16;
-/// A direction must be better by this to count, so that the first of equal ones does.
+/// Factor by which a direction must be better, so that the first of equal ones wins.
 const IMPROVEMENT: f64 = 1.0 - 1e-6;
-/// Points of a mesh that are asked whether they are inside, at most.
+/// Maximum number of points of a mesh that are tested for being inside.
 const MAX_POINTS: usize = 128;
-/// Two are in each other if so much of one is.
+/// Fraction of the points inside the other body above which two bodies are inside each other.
 const MIN_INSIDE_FRACTION: f64 = 0.2;
-/// Steps of the search from the best direction: from the first, radians, halved, down to the last.
+/// First and last step of the local search, radians; steps are halved.
 const FIRST_STEP: f64 = 0.1;
 const LAST_STEP: f64 = 1e-4;
 const MAX_STEPS: usize = 60;
 
-/// Corrects what was found where it does not part the two.
+/// Replaces the contacts if they do not separate the bodies.
 pub(super) fn separate(a: &Body, b: &Body, a_in_b: &Pose, size: f64, sampled: &SampledDistance, found: &mut Collector) {
     let (contact_depth, sampled_depth) = (-found.min_gap(), -sampled.min);
     let missing = sampled_depth >= -OVERLAP_TOLERANCE * size && contact_depth < sampled_depth - SAME_DEPTH * size;
@@ -100,13 +106,13 @@ struct BodyPair<'a> {
 }
 
 impl BodyPair<'_> {
-    /// `D(n)`, meters; `n` from B to A.
+    /// Returns `D(n)`, meters; `n` points from B to A.
     fn overlap_along(&self, n: &Vec3) -> f64 {
         self.b.elements.support(n) + self.a.elements.support(&-self.rotation.tr_mul(n))
             - n.dot(&self.pose.translation.vector)
     }
 
-    /// The direction along which they are parted soonest, of those tried, and how far that is.
+    /// Returns the best direction of those tried, and its translation.
     fn min_overlap(&self) -> (Vec3, f64) {
         let off = self.pose.translation.vector;
         let mut best = (Vec3::z(), f64::INFINITY);
@@ -133,7 +139,7 @@ impl BodyPair<'_> {
         for (x, y) in edges_a.iter().flat_map(|x| edges_b.iter().map(move |y| (x, y))) {
             x.cross(y).try_normalize(1e-6).into_iter().for_each(&mut either);
         }
-        // straight away from an axis, and from center to center
+        // away from an axis, and from center to center
         for axis in [Vec3::z(), self.rotation.column(2).into_owned()] {
             (off - axis * axis.dot(&off)).try_normalize(1e-9 * self.size).into_iter().for_each(&mut either);
         }
@@ -146,7 +152,7 @@ impl BodyPair<'_> {
         if many(self.a) || many(self.b) { self.refine(best) } else { best }
     }
 
-    /// Two of which one is not convex: by the deepest place, or by their hulls.
+    /// Separates two bodies of which one is not convex: by the deepest point, or by their hulls.
     fn separate_nonconvex(&self, found: &mut Collector) {
         if found.min_gap() > -DEEP_OVERLAP * self.size {
             let inverse = self.pose.inverse();
@@ -164,7 +170,7 @@ impl BodyPair<'_> {
         }
     }
 
-    /// Whether they do not overlap where A is moved by so much.
+    /// Returns whether the bodies do not overlap after A is moved by `shift`.
     fn is_free_after(&self, shift: Vec3) -> bool {
         let (mut out, mut moved) = (Vec::new(), *self.pose);
         moved.translation.vector += shift;
@@ -173,7 +179,8 @@ impl BodyPair<'_> {
         sampled.min > -SAME_DEPTH * self.size && there.min_gap() > -SAME_DEPTH * self.size
     }
 
-    /// Which share of the points of the one that has more of them there is inside the other one, or on it.
+    /// Returns the fraction of points inside or on the other body, for the body with the larger
+    /// fraction.
     fn inside_fraction(&self) -> f64 {
         let inverse = self.pose.inverse();
         let [first, second] = [(self.a, self.b, self.pose), (self.b, self.a, &inverse)]
@@ -201,7 +208,8 @@ impl BodyPair<'_> {
         (n, depth)
     }
 
-    /// The contacts that the two have where A, moved by `depth` along `direction`, touches B, as deep as they are where it is.
+    /// Replaces the contacts by those at which A, moved by `depth` along `direction`, touches B,
+    /// with their depths at the original pose.
     fn touching_contacts(&self, direction: Vec3, depth: f64, found: &mut Collector) {
         let shift = depth + TOUCH_GAP * self.size;
         let mut moved = *self.pose;
@@ -215,7 +223,7 @@ impl BodyPair<'_> {
             along > MIN_ALIGNMENT
         });
         if found.min_gap() > -(1.0 - TOUCH_MARGIN) * depth {
-            // nothing flat meets: the outermost places do
+            // no flat parts touch, so the support points do
             let lowest = self.pose.translation.vector
                 + self.rotation * self.a.elements.support_point(&-self.rotation.tr_mul(&direction));
             let point = 0.5 * (lowest + self.b.elements.support_point(&direction));
@@ -232,7 +240,7 @@ impl BodyPair<'_> {
     }
 }
 
-/// Of a mesh's points; 0 of others.
+/// Returns the fraction of a mesh's points inside another body; 0 for other shapes.
 fn inside_fraction(of: &Body, within: &Body, pose: &Pose, size: f64) -> f64 {
     let BodyElements::Mesh(elements) = &of.elements else { return 0.0 };
     let every = elements.points.len().div_ceil(MAX_POINTS).max(1);
@@ -241,11 +249,11 @@ fn inside_fraction(of: &Body, within: &Body, pose: &Pose, size: f64) -> f64 {
     count as f64 / elements.points.len().div_ceil(every).max(1) as f64
 }
 
-/// Names the contact of two bodies that have no other.
+/// Feature of the only contact of two bodies.
 const SEPARATION_FEATURE: u64 = 5 << 56;
 
 impl Body<'_> {
-    /// Normals of flat faces.
+    /// Calls `visit` for the normals of flat faces.
     fn for_each_normal(&self, visit: &mut dyn FnMut(Vec3)) {
         match (&self.elements, self.mesh) {
             (BodyElements::Mesh(_), Some(mesh)) => mesh_normals(mesh, visit),
@@ -255,7 +263,7 @@ impl Body<'_> {
         }
     }
 
-    /// Directions of its straight edges, or of its straight sides; none if they are many.
+    /// Returns the directions of straight edges or straight sides; empty if there are too many.
     fn edge_directions(&self) -> ArrayVec<Vec3, MAX_EDGE_DIRECTIONS> {
         let mut edge_directions = ArrayVec::new();
         match &self.elements {
@@ -277,7 +285,7 @@ impl Body<'_> {
     }
 }
 
-/// Normals of a mesh's triangles, most of the repeated ones once.
+/// Calls `visit` for the normals of a mesh's triangles, skipping most repetitions.
 fn mesh_normals(mesh: &MeshField, visit: &mut dyn FnMut(Vec3)) {
     let mut last = Vec3::zeros();
     for t in (0..mesh.faces().len()).step_by(mesh.faces().len().div_ceil(MAX_FACES).max(1)) {
@@ -290,7 +298,7 @@ fn mesh_normals(mesh: &MeshField, visit: &mut dyn FnMut(Vec3)) {
 }
 
 impl BodyElements<'_> {
-    /// The greatest `n·x` of the body.
+    /// Returns the support function: the maximum of `n·x` over the body.
     fn support(&self, n: &Vec3) -> f64 {
         match self {
             BodyElements::Mesh(elements) => support(elements, n).dot(n),
@@ -301,7 +309,7 @@ impl BodyElements<'_> {
         }
     }
 
-    /// A place that has it.
+    /// Returns a point of the body that attains it.
     fn support_point(&self, n: &Vec3) -> Vec3 {
         let sign = |x: f64| if x.abs() < 1e-9 { 0.0 } else { x.signum() };
         match self {
@@ -317,7 +325,7 @@ impl BodyElements<'_> {
     }
 }
 
-/// The vertex of a mesh that is furthest along `n`.
+/// Returns the vertex of a mesh that is furthest along `n`.
 fn support(elements: &Elements, n: &Vec3) -> Vec3 {
     let further = |best: (f64, Vec3), p: Vec3| if p.dot(n) > best.0 { (p.dot(n), p) } else { best };
     elements.points.iter().map(|p| p.at).fold((f64::NEG_INFINITY, Vec3::zeros()), further).1

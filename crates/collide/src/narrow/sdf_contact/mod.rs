@@ -1,13 +1,14 @@
-//! The `surface` mode: elements of each body against the signed distance of the other.
+//! The `surface` mode: elements of each body against the signed distance field of the other.
 //!
 //! ```text
 //! point x        d_B(x) where it is
 //! edge x(s)      min over s of d_B(x(s))      slope g(s) = n(x(s))·u,  u the edge's direction, n the field's normal
-//! core           the same for the points and axes of rounded bodies, less their radius
+//! core           the same for the points and axes of rounded bodies, minus their radius
 //! ```
 //!
-//! Source for elements against fields: Macklin et al., *Local optimization for robust signed distance field collision* (2020), whose
-//! search of a face we need in deep overlaps alone ([`mesh_convex_depth`], [`mesh_mesh_depth`]), since edges and vertices of both bodies are exact.
+//! Source for elements against fields: Macklin et al., *Local optimization for robust signed
+//! distance field collision* (2020). Departure: faces are searched only in deep overlaps
+//! ([`mesh_convex_depth`], [`mesh_mesh_depth`]), since edges and vertices of both bodies are exact.
 
 mod hyperbola;
 mod line;
@@ -28,13 +29,13 @@ use min_translation::SampledDistance;
 use query::{NearestCache, Query};
 use tolerances::DEEP_OVERLAP;
 
-/// A body as the pass sees it that takes its elements.
+/// The elements of a body.
 pub(in crate::narrow) enum BodyElements<'a> {
     /// A mesh.
     Mesh(&'a Elements),
-    /// A block's corners and edges.
+    /// Corners and edges of a box; half extents.
     Box(Vec3),
-    /// All within a radius of the segment `±half_length` on z; a sphere if that is 0.
+    /// All points within a radius of the segment `±half_length` on z; a sphere if that is 0.
     Round { radius: f64, half_length: f64 },
     /// Rims and axis.
     Cylinder { radius: f64, half_length: f64 },
@@ -46,12 +47,12 @@ pub(in crate::narrow) enum BodyElements<'a> {
 pub(in crate::narrow) struct Body<'a> {
     pub elements: BodyElements<'a>,
     pub field: &'a dyn DistanceField,
-    /// The field again, where it is a mesh's.
+    /// The same field, if it is that of a mesh.
     pub mesh: Option<&'a MeshField>,
     pub radius: f64,
 }
 
-/// All contacts of `a` and `b`.
+/// Appends all contacts of `a` and `b`.
 pub(in crate::narrow) fn contacts(
     a: &Body,
     pose_a: &Pose,
@@ -68,7 +69,8 @@ pub(in crate::narrow) fn contacts(
     found.finish(pose_b);
 }
 
-/// The contacts of the elements of both, in B's frame; of deep overlaps that of their faces too.
+/// Adds the contacts of the elements of both, in B's frame, and those of their faces for deep
+/// overlaps.
 fn elements(a: &Body, b: &Body, a_in_b: &Pose, size: f64, found: &mut Collector) -> SampledDistance {
     let b_in_a = a_in_b.inverse();
     let cache_first = NearestCache::new();
@@ -83,7 +85,7 @@ fn elements(a: &Body, b: &Body, a_in_b: &Pose, size: f64, found: &mut Collector)
     SampledDistance { min: first.min_distance().min(second.min_distance()) }
 }
 
-/// The deepest place of the faces of each mesh in the other body.
+/// Adds the deepest point of the faces of each mesh in the other body.
 fn faces(queries: [&Query; 2], bodies: [&Body; 2], found: &mut Collector) {
     for (query, body) in queries.into_iter().zip(bodies) {
         if let Some(mesh) = body.mesh {

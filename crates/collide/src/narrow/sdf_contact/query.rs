@@ -1,4 +1,5 @@
-//! The elements of one body against the field of the other: which are in reach, and what becomes of those that are.
+//! The elements of one body against the field of the other: finds the elements within the margin
+//! and their contacts.
 
 use super::super::reduce::Collector;
 use super::tolerances::{FLAT_SLOPE, LEVEL_SLOPE, SLOPE_ROUNDING};
@@ -13,15 +14,16 @@ use std::cell::{Cell, RefCell};
 /// Normals of an element, in the frame of the field.
 pub(super) type Normals = ArrayVec<Vec3, 12>;
 
-/// What is known of the field at a point.
+/// A bound of the field at a point.
 struct PointBound {
-    /// At most the distance.
+    /// Lower bound of the distance, meters.
     bound: f64,
-    /// The normal, where every element meets the same.
+    /// The normal, if it is the same for every element.
     up: Option<Vec3>,
 }
 
-/// Contacts of two edges that differ by less are one, found from either side; as parts of the smaller body's radius.
+/// Two edge contacts that differ by less are the same contact, found from both sides; as fractions
+/// of the smaller body's radius.
 const SAME_DEPTH: f64 = 1e-6;
 const SAME_POINT: f64 = 1e-3;
 
@@ -32,37 +34,37 @@ pub(super) struct Query<'a> {
     pub(super) field: &'a dyn DistanceField,
     pub(super) mesh: Option<&'a MeshField>,
     pub(super) size: f64,
-    /// In the second pass, where the field is A's: the pose of A in B.
+    /// In the second query, whose field is A's: the pose of A in B.
     pub(super) second: Option<&'a Pose>,
     cache: &'a NearestCache,
-    /// From the element's frame to a mesh's field.
+    /// Map from the element's frame to the field of a mesh.
     frame_map: Option<FrameMap>,
-    /// The least distance of a place looked at, less its radius.
+    /// Smallest distance of all samples, minus their radius.
     min_distance: Cell<f64>,
 }
 
-/// What a mesh's field says of points of a mesh, by their names: each is the end of several edges.
+/// Cache of the closest points of mesh vertices, by index: each vertex is the end of several edges.
 pub(super) struct NearestCache {
     seen: RefCell<ArrayVec<(u32, Hit), CACHE_SIZE>>,
-    /// Where in `seen` a name may be found.
+    /// Position in `seen` at which an index can be found.
     slots: [Cell<u16>; CACHE_SLOTS],
 }
 
 impl NearestCache {
-    /// Of nothing; inlined, so that it is not moved.
+    /// Returns an empty cache; inlined to avoid a move.
     #[inline(always)]
     pub(super) const fn new() -> NearestCache {
         NearestCache { seen: RefCell::new(ArrayVec::new_const()), slots: [const { Cell::new(0) }; CACHE_SLOTS] }
     }
 }
 
-/// Points that are remembered at most; all are forgotten when there are more.
+/// Maximum number of cached points; the cache is cleared when it is full.
 const CACHE_SIZE: usize = 192;
-/// More, so that few names share one.
+/// Number of slots; larger, so that few indices collide.
 const CACHE_SLOTS: usize = 1024;
 
 impl<'a> Query<'a> {
-    /// The elements of one body, which has that `pose` in the frame of the other.
+    /// Prepares the query of one body, at `pose` in the frame of the other.
     pub(super) fn new(
         [one, other]: [&Body<'a>; 2],
         pose: &'a Pose,
@@ -95,12 +97,12 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// The least signed distance of all places looked at, whatever they face, meters.
+    /// Returns the smallest signed distance of all samples, whatever they face, meters.
     pub(super) fn min_distance(&self) -> f64 {
         self.min_distance.get()
     }
 
-    /// Takes note of a look at a place.
+    /// Records the distance of a sample.
     pub(super) fn record(&self, hit: &Hit, radius: f64) {
         self.min_distance.set(self.min_distance.get().min(hit.nearest - radius));
     }
@@ -117,9 +119,11 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// A group that may be in reach; `bound` is at most the field's distance at its center.
+    /// Queries a group that can be within the limit; `bound` is a lower bound of the distance at
+    /// its center.
     ///
-    /// All parts are asked for before any is opened: so the memory that each waits for is waited for once.
+    /// Bounds of all children are computed before any child is entered, so that their memory
+    /// accesses overlap.
     fn query_group(&self, elements: &Elements, group: &Group, bound: f64, found: &mut Collector) {
         for children in elements.children_of(group).chunks(MAX_CHILDREN) {
             let bounds: ArrayVec<f64, MAX_CHILDREN> =
@@ -135,7 +139,8 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// At most the field's distance at a point of the element, told in single precision too.
+    /// Returns a lower bound of the distance at a point of the element, given in single precision
+    /// too.
     #[inline]
     pub(super) fn bound(&self, single: &[f32; 3], point: impl Fn() -> Vec3) -> f64 {
         match (self.mesh, &self.frame_map) {
@@ -144,7 +149,8 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// A point of a mesh and the edges that it holds; `bound` is at most the field's distance there.
+    /// Queries a point of a mesh and the edges stored with it; `bound` is a lower bound of the
+    /// distance there.
     fn query_vertex_and_edges(&self, elements: &Elements, point: &Point, bound: f64, found: &mut Collector) {
         let (fine, only_points) = (self.field.is_curved(), self.field.is_linear());
         let longest = if only_points { 0.0 } else { point.longest[usize::from(fine)] };
@@ -157,7 +163,8 @@ impl<'a> Query<'a> {
         if only_points || bound - longest > found.limit() {
             return;
         }
-        // where the distance rises steeply from here an edge has nothing but its end, one of a smooth surface where it rises at all; a long one may come near
+        // if the distance rises steeply from here, an edge has no contact except at its end (for an
+        // edge of a smooth surface, if the distance rises at all); a long edge can come near
         // another part of the body
         let up = seen.up.map(|up| self.rotation.tr_mul(&up));
         let rises = |edge: &Edge| {
@@ -209,7 +216,8 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// The end of a rounded body: every place of a mesh that it touches, the closest of others.
+    /// Queries the end of a rounded body: all points of a mesh that it touches, the closest point
+    /// of other bodies.
     fn core_point(&self, at: &Vec3, radius: f64, index: u32, found: &mut Collector) {
         let Some(mesh) = self.mesh else { return self.point(at, radius, &[], &[], index, found) };
         if self.field.bound(at) - radius > found.limit() {
@@ -223,10 +231,12 @@ impl<'a> Query<'a> {
         });
     }
 
-    /// A point with its normals in the field's frame; `edge_directions` are the directions of its edges in the element's own.
+    /// Queries a point with its normals in the field's frame; `edge_directions` are in the
+    /// element's frame.
     ///
-    /// Straight above or below a face it counts wherever it is. Near an edge or corner of the other body it counts only if it is
-    /// closest there: where one of its edges leads closer, that edge or its face makes the contact.
+    /// Directly above or below a face a point always counts. Near an edge or corner of the other
+    /// body it counts only if it is closest there: if one of its edges leads closer, that edge or
+    /// its face makes the contact.
     fn point(
         &self,
         at: &Vec3,
@@ -242,7 +252,7 @@ impl<'a> Query<'a> {
         self.push_point(at, radius, self.field.hit(at, normals, OVERHANG), edge_directions, index, found);
     }
 
-    /// A point of a mesh.
+    /// Queries a vertex of a mesh.
     fn query_vertex(&self, at: &Vec3, elements: &Elements, point: &Point, found: &mut Collector) -> PointBound {
         let transformed = || -> Normals { elements.normals_of(point).iter().map(|n| self.rotation * n).collect() };
         let (hit, seen) = match self.mesh {
@@ -251,7 +261,7 @@ impl<'a> Query<'a> {
                     Ok(nearest) => nearest,
                     Err(bound) => return PointBound { bound, up: None },
                 };
-                // of what is closer, the elements' normals have a say
+                // for closer points the result depends on the normals of the element
                 let up = Some(nearest.normal).filter(|_| nearest.distance > mesh.touching());
                 let seen = PointBound { bound: nearest.distance, up };
                 if nearest.distance > found.limit() {
@@ -271,14 +281,15 @@ impl<'a> Query<'a> {
         seen
     }
 
-    /// What the field says of a place that may have a name.
+    /// Returns the hit at a point, which can have an index in the cache.
     pub(super) fn hit_at(&self, at: &Vec3, name: Option<u32>, normals: &[Vec3], beside: f64) -> Hit {
         let (Some(mesh), Some(name)) = (self.mesh, name) else { return self.field.hit(at, normals, beside) };
         let nearest = self.nearest_named(mesh, at, name, f64::INFINITY).unwrap_or_else(|_| mesh.nearest(at));
         mesh.hit_from_nearest(at, nearest, normals, beside)
     }
 
-    /// What a mesh's field says of a named place, if it may be less than `limit` away; else a bound.
+    /// Returns the closest point of a mesh to an indexed vertex if it can be within `limit`;
+    /// otherwise a lower bound.
     fn nearest_named(&self, mesh: &MeshField, at: &Vec3, name: u32, limit: f64) -> Result<Hit, f64> {
         let slot = &self.cache.slots[name as usize % CACHE_SLOTS];
         let mut seen = self.cache.seen.borrow_mut();
@@ -322,8 +333,8 @@ impl<'a> Query<'a> {
         self.push_if(true, at, radius, hit, normal_from, feature, found);
     }
 
-    /// One contact: a core point of the element and what the field says there. One that does not `fit` is kept in
-    /// reserve.
+    /// Adds the contact of a core point of the element and its hit. If it does not `fit`, it is
+    /// stored as fallback.
     #[allow(clippy::too_many_arguments)]
     pub(super) fn push_if(
         &self,
@@ -347,7 +358,7 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// The contact of a core point of the element and what the field says there, in B's frame.
+    /// Returns the contact, in B's frame, of a core point of the element and its hit.
     fn contact(&self, at: &Vec3, radius: f64, hit: &Hit, normal_from: NormalFrom, feature: u64) -> Contact {
         let gap = hit.distance - radius;
         let contact = Contact {
@@ -365,7 +376,7 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// Whether there is a contact at about this place that is as deep.
+    /// Returns whether there is a contact of the same depth at nearly the same place.
     pub(super) fn is_duplicate(&self, at: &Vec3, radius: f64, hit: &Hit, found: &Collector) -> bool {
         let new = self.contact(at, radius, hit, NormalFrom::Edges, 0);
         found.contains_like(|c| {
@@ -374,7 +385,7 @@ impl<'a> Query<'a> {
     }
 }
 
-/// What the normal of a point's contact turns with.
+/// Returns the feature that determines the normal of a point's contact.
 pub(super) fn point_normal(hit: &Hit) -> NormalFrom {
     match hit.feature {
         Feature::Face => NormalFrom::FaceOfB,
@@ -383,7 +394,7 @@ pub(super) fn point_normal(hit: &Hit) -> NormalFrom {
     }
 }
 
-/// The same contact in another frame.
+/// Returns the contact in another frame.
 fn transformed(contact: Contact, pose: &Pose) -> Contact {
     let normal_from = match contact.normal_from {
         NormalFrom::LineOfA(along) => NormalFrom::LineOfA(pose.rotation * along),

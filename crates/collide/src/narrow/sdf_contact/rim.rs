@@ -6,15 +6,18 @@
 //! tangent plane at w₀     d(x₀) + r·n₀·(w − w₀)
 //! ```
 //!
-//! A rim is cut into arcs, and those are halved that may be in reach (`d` changes by at most 1 m per meter), until an arc is short or the
-//! body is flat below it. Where `d` falls into an arc from both ends, the lowest place is found as along an edge, by tangents (Kelley 1960): planes,
-//! of which the higher one counts. On a circle both the lowest place of a plane and the places where two planes are level have closed forms:
-//! with `θ` from the middle of the arc and `t = tan θ/2`, `A cos θ + B sin θ = C` is `(C + A) t² − 2 B t + C − A = 0`.
+//! A rim is divided into arcs. Arcs within the margin are halved (`d` changes by at most 1 m per
+//! meter) until an arc is short or the body below it is flat. If `d` falls into an arc from both
+//! ends, its minimum is found by tangents as along an edge (Kelley 1960); the higher of two tangent
+//! planes applies. On a circle the minimum of a plane and the intersections of two planes have
+//! closed forms. With `θ` from the middle of the arc and `t = tan θ/2`, `A cos θ + B sin θ = C`
+//! becomes `(C + A) t² − 2 B t + C − A = 0`.
 //!
-//! Of a convex body's `d` an arc has one lowest place: the higher one of two planes has no more. Where a look lies below the tangent plane of
-//! another, the body has a valley between them, and there may be a second: that part is halved until its slope tells.
+//! For a convex body `d` has one minimum on an arc, as the higher of two planes has. If a sample
+//! lies below the tangent plane of another, the body has a valley between them and perhaps a second
+//! minimum. That part is halved until the slope decides.
 //!
-//! A rim that hardly tilts over a face rests on four fixed points instead.
+//! A rim that is nearly parallel to a face rests on four fixed points instead.
 
 use super::super::reduce::Collector;
 use super::query::{Query, point_normal};
@@ -25,15 +28,15 @@ use crate::sdf::{Feature, Hit, OVERHANG, facing};
 /// A circle at the end of a cylinder, in the frame of the field.
 struct Rim {
     middle: Vec3,
-    /// Out of the body.
+    /// Away from the body.
     up: Vec3,
-    /// Directions go around this, the same for both rims.
+    /// Axis of rotation of the directions, the same for both rims.
     axis: Vec3,
     radius: f64,
     side: u64,
 }
 
-/// A look at a place on a rim.
+/// The distance and slope at a place on a rim.
 #[derive(Clone, Copy)]
 struct RimSample {
     direction: Vec3,
@@ -41,7 +44,7 @@ struct RimSample {
     hit: Hit,
 }
 
-/// Directions that a rim is cut at; every third is a fixed point that carries.
+/// Number of directions at which a rim is divided; every third is a fixed support point.
 const RIM_DIRECTIONS: usize = 12;
 /// Cosine and sine of multiples of 30°.
 const RIM_POINTS: [(f64, f64); RIM_DIRECTIONS] = [
@@ -59,23 +62,24 @@ const RIM_POINTS: [(f64, f64); RIM_DIRECTIONS] = [
     (COS_30, -0.5),
 ];
 const COS_30: f64 = 0.866_025_403_784_438_6;
-/// An arc of 30° is halved at least once, and never more often than this.
+/// Maximum number of halvings of an arc of 30°; it is halved at least once.
 const MAX_HALVINGS: u32 = 7;
-/// Looks within an arc at most; from the half on, every other one halves it.
+/// Maximum number of samples within an arc; in the second half every other one is a bisection.
 const MAX_SAMPLES: usize = 40;
-/// Halvings of a part of an arc over a valley, at most.
+/// Maximum number of halvings of a part of an arc over a valley.
 const MAX_SPLITS: u32 = 6;
-/// How far below a tangent plane is no rounding, as a part of the smaller body's radius.
+/// Distance below a tangent plane that exceeds rounding, as a fraction of the smaller body's
+/// radius.
 const CONVEXITY_TOLERANCE: f64 = 1e-9;
 /// Sine of the tilt below which a rim rests on its fixed points.
 const MIN_TILT: f64 = 1e-4;
 /// Sine of the tilt above which it rests on one point.
 const STEEP_TILT: f64 = 0.2;
-/// Sine of the tilt above which the cylinder lies.
+/// Sine of the tilt above which the cylinder lies on its side.
 const SIDE_TILT: f64 = 0.99;
 
 impl Query<'_> {
-    /// The axis, and on each rim fixed points and the lowest ones.
+    /// Queries the axis, and on each rim the fixed points and the lowest ones.
     pub(super) fn cylinder(&self, radius: f64, half_length: f64, found: &mut Collector) {
         let ends = [-half_length, half_length].map(|z| Vec3::z() * z);
         if self.field.is_round() {
@@ -109,7 +113,7 @@ impl Query<'_> {
         }
     }
 
-    /// A piece of a rim that may be in reach. `part` numbers the contacts that it makes.
+    /// Queries an arc of a rim that can be within the limit. `part` numbers its contacts.
     fn arc(&self, rim: &Rim, from: &Vec3, to: &Vec3, halved: u32, part: &mut u64, found: &mut Collector) {
         let middle = (from + to).normalize();
         let reach = (middle - from).norm() * rim.radius;
@@ -140,14 +144,15 @@ impl Query<'_> {
         RimSample { direction: *direction, slope: hit.normal.dot(&rim.axis.cross(direction)), hit }
     }
 
-    /// Whether one face is below both.
+    /// Returns whether the same face is below both.
     fn flat(&self, rim: &Rim, low: &RimSample, high: &RimSample) -> bool {
         let face = |sample: &RimSample| sample.hit.feature == Feature::Face && sample.hit.facing;
         let level = low.height(rim, &high.direction) - high.hit.distance;
         face(low) && face(high) && (low.hit.normal - high.hit.normal).norm() < 1e-9 && level.abs() < 1e-9 * self.size
     }
 
-    /// The lowest place of an arc between two slopes, and of its parts beyond a ridge; `halvings` of those at most.
+    /// Searches the minimum of an arc between two opposite slopes, and in its parts beyond a ridge,
+    /// with at most `halvings` halvings.
     fn search_arc(
         &self,
         rim: &Rim,
@@ -164,7 +169,8 @@ impl Query<'_> {
         }
     }
 
-    /// A part of an arc that rises from a lowest place, or falls to one, at both ends: further lowest places where it has a ridge.
+    /// Searches a part of an arc that rises from a minimum, or falls to one, at both ends. It has
+    /// further minima if it contains a ridge.
     fn search_nonconvex_arc(
         &self,
         rim: &Rim,
@@ -191,7 +197,8 @@ impl Query<'_> {
         }
     }
 
-    /// The lowest place that tangents lead to, a contact if it is in reach; `None` where it cannot be.
+    /// Finds the minimum by tangents and adds a contact if it is within the limit; `None` if it is
+    /// beyond.
     fn descend_arc(
         &self,
         rim: &Rim,
@@ -205,7 +212,7 @@ impl Query<'_> {
         for n in 0..MAX_SAMPLES {
             let (mut direction, level) = tangent_intersection(rim, &low, &high);
             let least = low.hit.distance.min(high.hit.distance);
-            // not convex where the tangents meet above what was seen
+            // not convex if the tangents intersect above a sample
             let convex = level <= least + tolerance;
             if convex && level > found.limit() {
                 return None;
@@ -228,7 +235,7 @@ impl Query<'_> {
                 (low, high) = (sample, sample);
                 break;
             }
-            // converged to a smooth bottom
+            // converged to a smooth minimum
             if (before - sample.hit.distance).abs() < 1e-13 * self.size && sample.slope.abs() < 1e-5 {
                 break;
             }
@@ -246,7 +253,7 @@ impl Query<'_> {
         if !hit.facing || tilt < MIN_TILT {
             return Some(best);
         }
-        // one that lies has its axis for a core
+        // the core of a cylinder on its side is its axis
         let core = if tilt > SIDE_TILT { rim.radius } else { 0.0 };
         let hit = Hit { distance: hit.distance + core, ..hit };
         self.push(&(rim.at(&direction) + hit.normal * core), core, &hit, point_normal(&hit), rim.feature(*part), found);
@@ -256,7 +263,7 @@ impl Query<'_> {
 }
 
 impl RimSample {
-    /// The tangent plane at another place.
+    /// Returns the tangent plane at another place.
     fn height(&self, rim: &Rim, direction: &Vec3) -> f64 {
         self.hit.distance + rim.radius * self.hit.normal.dot(&(direction - self.direction))
     }
@@ -272,7 +279,8 @@ impl Rim {
     }
 }
 
-/// The lowest place of the higher one of two tangent planes within the arc between them, and its height.
+/// Returns the minimum of the higher of two tangent planes within the arc between them, and its
+/// height.
 fn tangent_intersection(rim: &Rim, low: &RimSample, high: &RimSample) -> (Vec3, f64) {
     let inside = |direction: &Vec3| {
         low.direction.cross(direction).dot(&rim.axis) >= 0.0 && direction.cross(&high.direction).dot(&rim.axis) >= 0.0
@@ -297,13 +305,14 @@ fn tangent_intersection(rim: &Rim, low: &RimSample, high: &RimSample) -> (Vec3, 
     (direction, low.height(rim, &direction).max(high.height(rim, &direction)))
 }
 
-/// `(n₁ − n₂)·w` where the two tangent planes are level.
+/// Returns `(n₁ − n₂)·w` where the two tangent planes intersect.
 fn turn_offset(rim: &Rim, low: &RimSample, high: &RimSample) -> f64 {
     (high.hit.distance - low.hit.distance) / rim.radius + low.hit.normal.dot(&low.direction)
         - high.hit.normal.dot(&high.direction)
 }
 
-/// The normal of the ridge between two faces across the rim, and how much deeper it is than they are.
+/// Returns the normal of the ridge between two faces across the rim, and the ratio of its depth to
+/// theirs.
 fn ridge(low: &RimSample, high: &RimSample) -> Option<(Vec3, f64)> {
     let (a, b) = (high.slope, -low.slope);
     let sum = low.hit.normal * a + high.hit.normal * b;
@@ -311,7 +320,7 @@ fn ridge(low: &RimSample, high: &RimSample) -> Option<(Vec3, f64)> {
     (a > LEVEL_SLOPE && b > LEVEL_SLOPE && length > 1e-9 * (a + b)).then(|| (sum / length, (a + b) / length))
 }
 
-/// The part of `v` across a unit direction.
+/// Returns the component of `v` perpendicular to a unit direction.
 fn across(v: &Vec3, along: &Vec3) -> Vec3 {
     v - along * along.dot(v)
 }

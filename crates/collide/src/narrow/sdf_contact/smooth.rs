@@ -1,11 +1,13 @@
-//! An edge of a smooth surface against a mesh's field: whether it has to be searched.
+//! Edges of a smooth surface against a mesh's field: whether they have to be searched.
 //!
-//! Such an edge needs a contact of its own only where the distance has its least place within the edge, by more than `ε` below an end that counts
-//! ([`Edge::end_tolerance`]). Where it only leaves a face of the other, the corners of the area of contact are vertices, an edge's length away at most.
+//! Such an edge needs a contact of its own only if the distance has its minimum inside the edge, by
+//! more than `ε` below an end that has a contact ([`Edge::end_tolerance`]). If the edge only leaves
+//! a face of the other mesh, the corners of the contact area are vertices, at most an edge's length
+//! away.
 //!
 //! ```text
-//! d(s) ≥ d(s') − |s − s'|        a few bounds along the edge, a look at none of these places
-//! d(s) ≥ both tangents           at the ends, where d is convex between them: as good as always on so short an edge
+//! d(s) ≥ d(s') − |s − s'|        a few bounds along the edge, without evaluating the distance
+//! d(s) ≥ both tangents           at the ends, if d is convex between them: nearly always on so short an edge
 //! ```
 
 use super::super::reduce::Collector;
@@ -15,7 +17,7 @@ use crate::sdf::elements::Edge;
 use crate::sdf::{Feature, TOUCHING};
 
 impl Query<'_> {
-    /// Whether an edge may have a contact of its own.
+    /// Returns whether an edge can have a contact of its own.
     pub(super) fn may_have_contact(&self, edge: &Edge, found: &Collector) -> bool {
         let short = edge.end_tolerance > 0.0 && self.is_one_piece(edge.length, true);
         self.mesh.is_none() || !short || self.may_have_minimum(edge, found)
@@ -42,7 +44,7 @@ impl Query<'_> {
         if rise <= LEVEL_SLOPE * edge.length {
             return false;
         }
-        // where the tangents meet
+        // the intersection of the tangents
         let level = (low.distance * rise + high.distance * fall - rise * fall) / (rise + fall);
         let lower = if low.distance < high.distance { &low } else { &high };
         let end_counts = lower.feature == Feature::Face && lower.facing;

@@ -1,12 +1,13 @@
-//! Tolerances that several searches share.
+//! Tolerances shared by several searches.
 
-/// Pieces that an edge is halved into against a body that is not convex, in radii of the smaller body.
+/// Maximum length of the pieces of an edge against a body that is not convex, in radii of the
+/// smaller body.
 pub(super) const MAX_PIECE: f64 = 0.03;
-/// Slopes that differ by this are the same.
+/// Largest slope that is treated as zero.
 pub(super) const LEVEL_SLOPE: f64 = 1e-7;
-/// An edge that slopes less than this over a face lies on it.
+/// Slope over a face below which an edge lies on it.
 pub(super) const FLAT_SLOPE: f64 = 0.15;
-/// Slopes across an edge down to this are rounding's.
+/// Largest slope across an edge that is due to rounding.
 pub(super) const SLOPE_ROUNDING: f64 = 1e-6;
-/// An overlap is deep if it is more than this, in radii of the smaller body.
+/// Depth above which an overlap is deep, in radii of the smaller body.
 pub(super) const DEEP_OVERLAP: f64 = 0.03;

@@ -1,11 +1,14 @@
 //! Lazy construction of the octree's cells.
 //!
-//! The outermost cell is cut into `8^level` cubes. The cells in a cube form a *block*, which the first query in the cube builds. A block is a pure function of the
-//! mesh and the cube: neither the order of queries nor the thread that asks changes a bit. Only the blocks near other bodies are ever built.
+//! The outermost cell is divided into `8^level` cubes. The cells in a cube form a *block*, which
+//! the first query in the cube builds. A block is a pure function of the mesh and the cube: its
+//! bits do not depend on the order of the queries or on the thread. Only the blocks near other
+//! bodies are ever built.
 //!
-//! A cell inherits the triangles that count in its parent ([`super::builder`]), so the cells above a block are examined first. They are kept too: a divided cell
-//! as its [`CellView`], which decides for each triangle whether it counts, an undivided one as the cell that stands for all of its blocks. The triangles that are
-//! close enough to a cell come from a tree of boxes.
+//! A cell inherits the relevant triangles of its parent ([`super::builder`]), so the cells above a
+//! block are examined first. They are stored too: a divided cell as its [`CellView`], which decides
+//! for each triangle whether it is relevant, an undivided one as the cell that covers all of its
+//! blocks. A tree of boxes finds the triangles close enough to a cell.
 
 use super::ListedTriangle;
 use super::builder::{Builder, corner};
@@ -15,15 +18,15 @@ use super::triangles::Triangles;
 use crate::Vec3;
 use std::sync::OnceLock;
 
-/// Divisions above a block at most.
+/// Maximum number of levels above a block.
 const MAX_UPPER_LEVELS: u32 = 5;
-/// Divisions within a block that [`Block::top`] skips at most.
+/// Maximum number of levels within a block that [`Block::top`] skips.
 const MAX_SKIPPED_LEVELS: u32 = 2;
 
 /// The cells in a cube.
 #[derive(Clone, Debug)]
 pub(super) struct Block {
-    /// The cell, times 16, plus its depth, at or above each of the cubes that are passed at once.
+    /// For each of the skipped cubes, the cell at or above it, times 16, plus its depth.
     pub top: Box<[u32]>,
     pub cells: Box<[Cell]>,
     pub lists: Box<[ListedTriangle]>,
@@ -41,9 +44,9 @@ enum UpperCell {
 pub(super) struct Blocks {
     center: Vec3,
     half: f64,
-    /// Divisions of the smallest cells.
+    /// Depth of the smallest cells.
     max_depth: u32,
-    /// Divisions above a block, and down to the cubes of [`Block::top`].
+    /// Number of levels above a block, and down to the cubes of [`Block::top`].
     level: u32,
     top: u32,
     upper: Box<[OnceLock<UpperCell>]>,
@@ -51,7 +54,8 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Of the cube with this center and half side, divided at most `max_depth` times; no block is built yet.
+    /// Returns the blocks, not yet built, of the cube with this center and half side, divided at
+    /// most `max_depth` times.
     pub fn new(center: Vec3, half: f64, max_depth: u32) -> Blocks {
         let top = max_depth.min(MAX_UPPER_LEVELS + MAX_SKIPPED_LEVELS);
         let level = top.saturating_sub(MAX_SKIPPED_LEVELS);
@@ -60,12 +64,12 @@ impl Blocks {
         Blocks { center, half, max_depth, level, top, upper, blocks }
     }
 
-    /// Divisions of the outermost cell down to the cubes of [`Block::top`].
+    /// Returns the number of levels from the outermost cell to the cubes of [`Block::top`].
     pub fn top(&self) -> u32 {
         self.top
     }
 
-    /// The block of a cube of the top, and the number of that cube in [`Block::top`].
+    /// Returns the block of a cube of the top level, and the index of that cube in [`Block::top`].
     #[inline(always)]
     pub fn at(&self, cube: &[u32; 4], triangles: &Triangles) -> (&Block, usize) {
         let within = self.top - self.level;
@@ -101,7 +105,8 @@ impl Blocks {
         })
     }
 
-    /// Adds the views of all cells above a block, the outermost first, to `views`; ends at an undivided cell and returns it with its depth and list.
+    /// Appends the views of all cells above a block to `views`, outermost first. Stops at an
+    /// undivided cell and returns it with its depth and list.
     fn upper<'a>(
         &'a self,
         cube: [u32; 3],
@@ -119,7 +124,7 @@ impl Blocks {
         None
     }
 
-    /// A cell above the blocks, told the views of those above it.
+    /// Builds a cell above the blocks, given the views of the cells above it.
     fn build_upper_cell(&self, depth: u32, cube: [u32; 3], triangles: &Triangles, views: &[&CellView]) -> UpperCell {
         let (center, half) = self.cube_bounds(depth, cube);
         let passed = |t: u32| views.iter().rev().all(|cell_view| cell_view.passes_on(triangles, t));
@@ -141,7 +146,7 @@ impl Blocks {
         UpperCell::Undivided(cell.unwrap_or_else(Cell::empty), builder.lists.into())
     }
 
-    /// Center and half side of a cell.
+    /// Returns the center and half side of a cell.
     fn cube_bounds(&self, depth: u32, cube: [u32; 3]) -> (Vec3, f64) {
         let (mut center, mut half) = (self.center, self.half);
         for digit in (0..depth).rev() {
@@ -153,7 +158,8 @@ impl Blocks {
     }
 }
 
-/// The triangles that are close enough to a cell to count in it, of those that the cells above pass on.
+/// Returns the triangles close enough to be relevant in a cell, of those that the cells above pass
+/// on.
 fn inherited(triangles: &Triangles, views: &[&CellView], center: Vec3, half: f64) -> Option<Vec<NearTriangle>> {
     let passed = |t: u32| views.iter().rev().all(|cell_view| cell_view.passes_on(triangles, t));
     let cell_view = CellView::new(triangles, center, half, triangles.closest_near(&center, passed)?);
@@ -167,12 +173,13 @@ fn inherited(triangles: &Triangles, views: &[&CellView], center: Vec3, half: f64
     Some(list)
 }
 
-/// Cells of all depths above this one.
+/// Returns the number of cells of all depths above this one.
 fn cells_above_level(depth: u32) -> usize {
     (0..depth).map(|d| 1 << (3 * d)).sum()
 }
 
-/// The cell of a block, times 16, plus its depth, at or above a cube `within` divisions further down; the block's own is of depth `depth`.
+/// Returns the cell of a block at or above a cube `within` levels further down, times 16, plus its
+/// depth. The root of the block has the depth `depth`.
 fn cell_above(cells: &[Cell], cube: u32, depth: u32, within: u32) -> u32 {
     let (mut cell, mut passed) = (0, 0);
     while passed < within && cells[cell].children() > 0 {
@@ -185,7 +192,7 @@ fn cell_above(cells: &[Cell], cube: u32, depth: u32, within: u32) -> u32 {
 
 #[cfg(test)]
 impl Blocks {
-    /// Makes all blocks, in an order that `step` gives; a number that has no factor in common with 2.
+    /// Builds all blocks, in an order given by `step`, an odd number.
     pub fn build_all(&self, step: usize, triangles: &Triangles) {
         for n in 0..self.blocks.len() {
             let (number, level) = (n * step % self.blocks.len(), self.level);
@@ -194,7 +201,7 @@ impl Blocks {
         }
     }
 
-    /// The blocks that are there.
+    /// Returns the blocks built so far.
     pub fn built(&self) -> impl Iterator<Item = &Block> {
         self.blocks.iter().filter_map(OnceLock::get)
     }

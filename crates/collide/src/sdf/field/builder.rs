@@ -1,6 +1,7 @@
-//! Fills the octree of a mesh's field.
+//! Construction of the octree of a mesh's field.
 //!
-//! A cell takes over from its parent the triangles that can be closest to a point in it. Those of a cell of center `c` and half diagonal `r`:
+//! A cell inherits from its parent the triangles that can be closest to a point in it. For a cell
+//! of center `c`, half side `h` and half diagonal `r`:
 //!
 //! ```text
 //! d_t(p) ≥ d_t(c) + g_t·(p − c)        the distance from a triangle is convex, its slope at c is g_t
@@ -10,9 +11,10 @@
 //! inside:      −d(p) ≤ d_0(p), so e = e₀ + h·|g + g_0|₁             signs: d_c = −d_0(c)
 //! ```
 //!
-//! A child is told at first all triangles with `d_t(c) ≤ d_0(c) + 2r`, since `|d(p) − d(c)| ≤ |p − c| ≤ r` for each and for all; of those
-//! the first line tells which need no look.
-//! A cell is divided until its list is short. Far from the surface it may have no list, only the bound.
+//! A child first receives all triangles with `d_t(c) ≤ d_0(c) + 2r`, since `|d(p) − d(c)| ≤ |p − c|
+//! ≤ r` for each triangle and for the whole surface. The first line then excludes triangles without
+//! computing their distance. A cell is divided until its list is short. Far from the surface it can
+//! have no list, only the bound.
 
 use super::ListedTriangle;
 use super::cell_view::{CellView, LONG_LIST, NearTriangle, ROUNDING, SHORT_LIST, order};
@@ -20,20 +22,20 @@ use super::octree::Cell;
 use super::triangles::Triangles;
 use crate::{Aabb, Vec3};
 
-/// The outermost cell reaches this far beyond the mesh, as a part of the diagonal.
+/// Distance of the outermost cell beyond the mesh, as a fraction of the diagonal.
 const MARGIN: f64 = 0.05;
-/// Cells are divided down to this half diagonal, in mean lengths of an edge.
+/// Smallest half diagonal of a cell, in mean lengths of an edge.
 const MIN_CELL: f64 = 0.6;
-/// Divisions at most.
+/// Maximum depth.
 const MAX_DEPTH: f64 = 9.0;
-/// Keeps a distance rounded to single precision below it.
+/// Factor that keeps a distance below its exact value when rounded to single precision.
 const ROUND_DOWN: f64 = 1.0 - 2e-7;
-/// Cells and listed triangles of a block at most; beyond, the tree of boxes answers.
+/// Maximum number of cells and of listed triangles of a block; beyond, the tree of boxes is used.
 const MAX_CELLS: usize = 1 << 16;
 const MAX_LISTED: usize = 1 << 19;
 
 impl Triangles {
-    /// Center and half side of the outermost cell, and how often it is divided at most.
+    /// Returns center and half side of the outermost cell, and its maximum depth.
     pub fn outermost(&self, bounds: &Aabb) -> (Vec3, f64, u32) {
         let (center, half) =
             (0.5 * (bounds.min + bounds.max), 0.5 * (bounds.max - bounds.min).max() + MARGIN * self.diagonal);
@@ -43,19 +45,19 @@ impl Triangles {
     }
 }
 
-/// Makes a cell and all below it.
+/// Builds a cell and all its descendants.
 pub(super) struct Builder<'a> {
     triangles: &'a Triangles,
     max_depth: u32,
-    /// The first is the one that was asked for; links are indices in here and in `lists`.
+    /// The first is the requested cell; links are indices into this and into `lists`.
     pub cells: Vec<Cell>,
     pub lists: Vec<ListedTriangle>,
-    /// Working memory.
+    /// Scratch memory.
     below: Vec<f64>,
     buffers: Vec<Vec<NearTriangle>>,
 }
 
-/// Offset of a corner of a cube from its center.
+/// Returns the offset of a corner of a cube from its center.
 pub(super) fn corner(octant: usize, half: f64) -> Vec3 {
     Vec3::from_fn(|k, _| if octant >> k & 1 == 1 { half } else { -half })
 }
@@ -65,7 +67,8 @@ impl<'a> Builder<'a> {
         Builder { triangles, max_depth, cells: Vec::new(), lists: Vec::new(), below: Vec::new(), buffers: Vec::new() }
     }
 
-    /// Makes a cell and all below it. `list`: the triangles that count in the parent, as seen from its center, from which this one is `moved`.
+    /// Builds a cell and all its descendants. `list` are the relevant triangles of the parent,
+    /// relative to its center, from which this cell's center is offset by `moved`.
     pub fn branch(&mut self, center: Vec3, half: f64, list: &[NearTriangle], moved: &Vec3, depth: u32) {
         self.cells.push(Cell::empty());
         self.cell(0, center, half, list, moved, depth);
@@ -91,7 +94,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The cell with its list, or `None` if it is to be divided; then `near` holds the triangles that count in it.
+    /// Returns the cell with its list, or `None` if it must be divided; then `near` contains its
+    /// relevant triangles.
     pub fn build_cell(
         &mut self,
         center: Vec3,
@@ -103,7 +107,7 @@ impl<'a> Builder<'a> {
     ) -> Option<Cell> {
         let triangles = self.triangles;
         let at = |triangle: u32| triangles.near(&center, triangle);
-        // convex: no triangle is closer than its tangent plane in the parent tells
+        // convexity: no triangle is closer than its tangent plane in the parent
         self.below.clear();
         self.below.extend(list.iter().map(|n| n.distance + n.slope.dot(moved)));
         let below = &self.below;
@@ -132,7 +136,7 @@ impl<'a> Builder<'a> {
         Some(self.finish(&cell_view, near, full))
     }
 
-    /// The cell of a view with the list of those that count, unless there are too many.
+    /// Returns the cell of a view with the list of relevant triangles, unless there are too many.
     fn finish(&mut self, cell_view: &CellView, near: &mut [NearTriangle], full: bool) -> Cell {
         let (triangles, distance) = (self.triangles, cell_view.distance);
         let mut cell = Cell::empty();
@@ -152,8 +156,8 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// `e`: how far the distance falls short of the plane through `(c, distance)` with this slope, at most, meters; in a cell that holds
-/// nothing of the surface.
+/// Returns `e`: an upper bound of how far the distance falls below the plane through `(c,
+/// distance)` with this slope, meters, for a cell without surface.
 fn shortfall(cell_view: &CellView, slope: &Vec3, near: &[NearTriangle]) -> f64 {
     if cell_view.distance > 0.0 {
         let of = |n: &NearTriangle| cell_view.distance - n.distance + cell_view.half * (slope - n.slope).abs().sum();
@@ -184,12 +188,13 @@ mod tests {
         Vec3::new(place(1, 1.3), place(611, 1.3), place(1301, 0.35))
     }
 
-    /// Cells and lists, bit by bit.
+    /// Returns the bits of cells and lists as text.
     fn bits(field: &MeshField) -> String {
         field.tree.blocks.built().map(|block| format!("{block:?}\n")).collect()
     }
 
-    /// Blocks made one by one, backwards, by five threads at once, or by queries here and there are the same.
+    /// Blocks have the same bits if built one by one, backwards, by five threads at once, or by
+    /// scattered queries.
     #[test]
     fn neither_order_nor_threads_change_a_bit() {
         let fields = [torus(), torus(), torus()];
@@ -216,7 +221,7 @@ mod tests {
         assert!(bits(&lazy).lines().all(|block| all.contains(block)));
     }
 
-    /// A query makes the block around it, and no other.
+    /// A query builds the block around it, and no other.
     #[test]
     fn what_is_not_asked_is_not_made() {
         let field = torus();
@@ -226,7 +231,7 @@ mod tests {
         assert!((1..=2).contains(&field.tree.blocks.built().count()));
     }
 
-    /// Distances are those of a look at every triangle.
+    /// Distances equal those of a brute-force search.
     #[test]
     fn blocks_tell_the_distance() {
         let mesh = TriMesh::torus(1.0, 0.3, 32, 16);
@@ -241,7 +246,8 @@ mod tests {
         }
     }
 
-    /// Bounds of places told in another frame, in single precision, in and around the mesh and far away: never above the distance, and as good as the others.
+    /// Bounds in another frame, in single precision, near the mesh and far away: never above the
+    /// distance, and as good as in the mesh's frame.
     #[test]
     fn bounds_from_another_frame() {
         let field = torus();
@@ -262,7 +268,8 @@ mod tests {
         }
     }
 
-    /// Above, below and beside a large slab of twelve triangles the bound is the distance itself; past its edges no more.
+    /// Above, below and beside a large slab of twelve triangles the bound is the exact distance;
+    /// beyond its edges it is at most the distance.
     #[test]
     fn the_bound_of_a_slab_is_its_distance() {
         let half = Vec3::new(1.5, 1.5, 0.1);

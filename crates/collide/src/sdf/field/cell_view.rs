@@ -1,43 +1,46 @@
-//! A cell as its closest triangle decides it: which other triangles count in it, and whether it is divided. The rules are those of [`super::builder`].
+//! A cell and its closest triangle, which decide the other relevant triangles and whether the cell
+//! is divided. The rules are those of [`super::builder`].
 
 use super::builder::corner;
 use super::triangles::Triangles;
 use crate::Vec3;
 use crate::mesh::closest_on_triangle;
 
-/// Lists up to this length are not divided.
+/// Length of a list up to which the cell is not divided.
 pub(super) const SHORT_LIST: usize = 16;
-/// At the last level, or far from the surface, lists up to this length are kept.
+/// Maximum length of a list at the last level, or far from the surface.
 pub(super) const LONG_LIST: usize = 96;
-/// A cell further from the surface than this many half diagonals is not divided, if its list is not too long,
+/// Distance from the surface, in half diagonals, above which a cell is not divided if its list is
+/// not too long.
 const FAR_FACTOR: f64 = 3.0;
-/// or it is further than this, as a part of the diagonal.
+/// Distance from the surface, as a fraction of the diagonal, above which a cell is not divided.
 const FAR_DISTANCE: f64 = 0.06;
-/// Another way: cosine between the normals below this.
+/// Cosine between the normals below which a triangle faces another side.
 const OTHER_SIDE_COSINE: f64 = 0.5;
-/// A distance that has a direction in spite of rounding, as a part of the diagonal.
+/// Smallest distance with a reliable direction, as a fraction of the diagonal.
 const MIN_DISTANCE: f64 = 1e-9;
-/// Of single precision in distances and places, and more.
+/// Bound of single-precision errors in distances and coordinates.
 pub(super) const ROUNDING: f64 = 1e-6;
 
-/// A triangle that may count in a cell.
+/// A triangle that can be relevant in a cell.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NearTriangle {
-    /// Of the cell's center.
+    /// Distance from the cell's center.
     pub distance: f64,
     pub triangle: u32,
-    /// Of the distance at the cell's center; none on the triangle itself, where the distance is least.
+    /// Slope of the distance at the cell's center; zero on the triangle itself, where the distance
+    /// is minimal.
     pub slope: Vec3,
 }
 
 impl NearTriangle {
-    /// Of a triangle that nothing is known of yet.
+    /// Returns a triangle whose distance is not yet known.
     pub fn anywhere(triangle: u32) -> NearTriangle {
         NearTriangle { distance: 0.0, triangle, slope: Vec3::zeros() }
     }
 }
 
-/// A cell and its closest triangle, which decide which others count.
+/// A cell and its closest triangle.
 #[derive(Clone, Debug)]
 pub(super) struct CellView {
     pub center: Vec3,
@@ -45,11 +48,12 @@ pub(super) struct CellView {
     /// Half the diagonal.
     pub reach: f64,
     pub first: NearTriangle,
-    /// Signed, of the center.
+    /// Signed distance of the center.
     pub distance: f64,
     /// `e₀`.
     pub excess: f64,
-    /// Whether triangles that face another way are taken: where an element is inside, or as good as touches.
+    /// Whether triangles that face another side are relevant: if an element can be inside, or
+    /// nearly touches.
     pub takes_others: bool,
 }
 
@@ -62,18 +66,18 @@ impl CellView {
         CellView { center, half, reach, first, distance, excess, takes_others: distance < reach + triangles.around }
     }
 
-    /// No triangle that counts is further from the center.
+    /// Returns the largest distance of a relevant triangle from the center.
     pub fn furthest(&self, triangles: &Triangles) -> f64 {
         self.first.distance + 2.0 * self.reach + triangles.around
     }
 
-    /// Whether a triangle is taken that faces another way than the closest.
+    /// Returns whether a triangle is relevant that faces another side than the closest one.
     pub fn is_turned(&self, triangles: &Triangles, t: u32) -> bool {
         let facing_first = triangles.normals[self.first.triangle as usize][0];
         self.takes_others && triangles.normals[t as usize][0].dot(&facing_first) < OTHER_SIDE_COSINE
     }
 
-    /// Whether a triangle is close enough to be looked at.
+    /// Returns whether a triangle is close enough to be tested.
     fn is_close(&self, triangles: &Triangles, n: &NearTriangle) -> bool {
         n.distance <= self.first.distance + 2.0 * self.reach
             || (n.distance <= self.furthest(triangles) && self.is_turned(triangles, n.triangle))
@@ -89,13 +93,14 @@ impl CellView {
         self.counts(triangles, n, self.is_turned(triangles, n.triangle))
     }
 
-    /// Whether the cell's children inherit a triangle: one that may face another way in a child may not do so in this cell.
+    /// Returns whether the cell's children inherit a triangle. A triangle that faces another side
+    /// in a child need not do so here.
     pub fn passes_on(&self, triangles: &Triangles, t: u32) -> bool {
         let n = triangles.near(&self.center, t);
         self.is_close(triangles, &n) && self.counts(triangles, &n, self.takes_others)
     }
 
-    /// Whether the cell is listed with a triangle that it inherits.
+    /// Returns whether an inherited triangle belongs in the cell's list.
     pub fn lists(&self, triangles: &Triangles, t: u32) -> bool {
         let n = triangles.near(&self.center, t);
         self.is_close(triangles, &n) && self.is_listed(triangles, &n)
@@ -105,7 +110,8 @@ impl CellView {
         self.first.distance > FAR_DISTANCE * triangles.diagonal
     }
 
-    /// Whether a list is so long, and the surface so close, that the cell is divided; `listed` may be capped at more than [`LONG_LIST`].
+    /// Returns whether the list is so long, and the surface so close, that the cell is divided;
+    /// `listed` can be capped at more than [`LONG_LIST`].
     pub fn is_divided(&self, triangles: &Triangles, listed: usize) -> bool {
         let far = self.first.distance > FAR_FACTOR * self.reach && (listed <= LONG_LIST || self.is_away(triangles));
         listed > SHORT_LIST && !far
@@ -117,7 +123,7 @@ pub(super) fn order(a: &NearTriangle, b: &NearTriangle) -> std::cmp::Ordering {
 }
 
 impl Triangles {
-    /// A triangle as it is seen from a cell's center.
+    /// Returns a triangle with its distance from a cell's center.
     pub fn near(&self, center: &Vec3, triangle: u32) -> NearTriangle {
         let from = center - closest_on_triangle(center, &self.corners[triangle as usize]).0;
         let distance = from.norm();
@@ -126,7 +132,8 @@ impl Triangles {
     }
 }
 
-/// `e₀`: how far the distance of a triangle rises above its tangent plane within the cell, at most, meters.
+/// Returns `e₀`: an upper bound of how far the distance of a triangle rises above its tangent plane
+/// within the cell, meters.
 fn excess(triangles: &Triangles, center: &Vec3, half: f64, n: &NearTriangle) -> f64 {
     let (slope, triangle) = (n.slope, &triangles.corners[n.triangle as usize]);
     let of = |offset: Vec3| {

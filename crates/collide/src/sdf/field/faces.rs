@@ -1,33 +1,33 @@
-//! What searches over a mesh's faces ask of its field.
+//! Queries of a mesh's field for searches over faces.
 
 use super::MeshField;
 use crate::Vec3;
 use crate::mesh::{BestFirstSearch, closest_on_triangle};
 
 impl MeshField {
-    /// Corners of all triangles.
+    /// Returns the corners of all triangles.
     pub fn faces(&self) -> &[[Vec3; 3]] {
         &self.triangles.corners
     }
 
-    /// Outward, of triangle `t`; zero if that has no area.
+    /// Returns the outward normal of triangle `t`; zero if it has no area.
     pub fn face_normal(&self, t: usize) -> Vec3 {
         self.triangles.normals[t][0]
     }
 
-    /// Signed distance of `p` and the closest triangle.
+    /// Returns the signed distance of `p` and the closest triangle.
     pub fn closest_face(&self, p: &Vec3) -> (f64, usize) {
         let listed = self.tree.locate(p, &self.triangles).and_then(|place| self.closest(p, &place));
         let closest = listed.unwrap_or_else(|| self.closest_by_tree(p));
         (self.triangles.describe(p, &closest).distance, closest.triangle)
     }
 
-    /// Distance of `p` from triangle `t`.
+    /// Returns the distance of `p` from triangle `t`.
     pub fn distance_from_face(&self, t: usize, p: &Vec3) -> f64 {
         (p - closest_on_triangle(p, &self.triangles.corners[t]).0).norm()
     }
 
-    /// Goes down the tree of boxes around the triangles.
+    /// Searches the tree of boxes around the triangles.
     pub fn search_faces(&self, to: &mut impl BestFirstSearch) {
         self.boxes().descend(to);
     }

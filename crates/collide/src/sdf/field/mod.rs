@@ -1,11 +1,12 @@
-//! The signed distance of a mesh by an [`octree`]: each cell near the surface lists the few triangles that can be closest to
-//! a point in it.
+//! The signed distance field of a mesh in an [`octree`]: each cell near the surface lists the few
+//! triangles that can be closest to a point in it.
 //!
-//! So distances are exact: nothing is interpolated. A query where there is no list asks the tree of boxes ([`MeshDistance`]). Cells and boxes are
-//! made by the first query that needs them ([`blocks`]).
+//! Distances are exact; nothing is interpolated. A query in a cell without a list uses the tree of
+//! boxes ([`MeshDistance`]). Cells and boxes are built by the first query that needs them
+//! ([`blocks`]).
 //!
-//! A cell also lists triangles a little further away that face another way: from an element on a ridge the closest face
-//! may be one that it cannot meet, and the next one is taken.
+//! A cell also lists slightly further triangles that face another side. If an element on a ridge
+//! cannot touch the closest face, the next one is used.
 
 mod blocks;
 mod builder;
@@ -23,39 +24,40 @@ use octree::{CellPoint, Octree};
 use std::sync::OnceLock;
 use triangles::Triangles;
 
-/// Relative difference of squared distances that is rounding's.
+/// Relative difference of squared distances that is due to rounding.
 const SAME_SQUARE: f64 = 1e-11;
-/// Faces that an element faces as squarely but for rounding.
+/// Difference of opposition that is due to rounding.
 const SAME_OPPOSITION: f64 = 1e-9;
-/// Sides of a convex solid that each bound asks.
+/// Maximum number of sides of a convex solid that every bound tests.
 const MAX_SIDES: usize = 16;
 /// A triangle in the list of a cell.
 #[derive(Clone, Copy, Debug)]
 struct ListedTriangle {
     triangle: u32,
-    /// At most its distance from the cell's center; it rises along a list.
+    /// Lower bound of its distance from the cell's center; ascending along a list.
     nearer: f32,
 }
 
 /// The field of a mesh.
 #[derive(Clone, Debug)]
 pub(crate) struct MeshField {
-    /// No faces of one shell cross.
+    /// Faces of the same shell do not cross.
     mesh: TriMesh,
     triangles: Triangles,
-    /// Triangles around each vertex.
+    /// Number of triangles around each vertex.
     valence: Vec<u32>,
     tree: Octree,
-    /// A sphere around each triangle, about the middle of the bounds, and its radius.
+    /// Bounding sphere of each triangle: center relative to the middle of the bounds, and radius.
     spheres: Vec<[f32; 4]>,
-    /// Made when it is first asked.
+    /// Built on first use.
     boxes: OnceLock<MeshDistance>,
     convex: bool,
-    /// Of a convex solid of few sides: their outward normals and how far they are from the origin. Below these a bound is better than a cell's.
+    /// For a convex solid with few sides: their outward normals and distances from the origin. They
+    /// give better bounds than cells.
     sides: ArrayVec<(Vec3, f64), MAX_SIDES>,
 }
 
-/// A triangle's closest point.
+/// The closest point of a triangle.
 #[derive(Clone, Copy)]
 struct Closest {
     square: f64,
@@ -65,7 +67,8 @@ struct Closest {
 }
 
 impl MeshField {
-    /// `groups`: the edges of the mesh. `searched`: which edges of each triangle are elements. `convex`: [`is_convex`].
+    /// Builds the field. `groups` are the edges of the mesh, `searched` the edges of each triangle
+    /// that are elements, `convex` the result of [`is_convex`].
     pub fn new(mesh: TriMesh, groups: &EdgeGroups, searched: Vec<[bool; 3]>, convex: bool) -> MeshField {
         let triangles = Triangles::new(&mesh, groups, searched);
         let (center, half, deepest) = triangles.outermost(&mesh.aabb());
@@ -91,11 +94,11 @@ impl MeshField {
         self.boxes.get_or_init(|| MeshDistance::without_crossings(&self.mesh))
     }
 
-    /// The planes of a convex solid's sides; none where it is not convex or they are many.
+    /// Returns the planes of a convex solid's sides; empty if it is not convex or has too many.
     fn convex_sides(&self) -> ArrayVec<(Vec3, f64), MAX_SIDES> {
         let mut sides = ArrayVec::new();
         for (corners, normals) in self.triangles.corners.iter().zip(&self.triangles.normals) {
-            // as high as its highest corner, so that rounding leaves none outside
+            // at the height of its highest corner, so that rounding leaves none outside
             let side = (normals[0], corners.iter().map(|c| normals[0].dot(c)).fold(f64::NEG_INFINITY, f64::max));
             let known =
                 |s: &(Vec3, f64)| (s.0 - side.0).norm() < 1e-12 && (s.1 - side.1).abs() < 1e-12 * self.diagonal();
@@ -106,28 +109,30 @@ impl MeshField {
         sides
     }
 
-    /// At most the signed distance at `p`, told what the octree says.
+    /// Returns a lower bound of the signed distance at `p`, given the bound of the octree.
     #[inline]
     fn tighten_by_sides(&self, p: &Vec3, bound: f64) -> f64 {
         if self.sides.is_empty() { bound } else { self.distance_above_sides(p).max(bound) }
     }
 
-    /// How far `p` is above the highest side, at most: a convex solid is below all.
+    /// Returns a lower bound of the height of `p` above the highest side plane.
     #[inline(never)]
     fn distance_above_sides(&self, p: &Vec3) -> f64 {
         let slack = 1e-11 * self.diagonal();
         self.sides.iter().map(|(n, height)| n.dot(p) - height - slack).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Center and radius of a sphere around triangle `t`.
+    /// Returns center and radius of a bounding sphere of triangle `t`.
     pub fn sphere(&self, t: usize) -> (Vec3, f64) {
         let [x, y, z, radius] = self.spheres[t].map(f64::from);
         (self.tree.center + Vec3::new(x, y, z), radius)
     }
 
-    /// The closest of a cell's listed triangles; of those that share the closest point, the one that faces `p` most squarely.
+    /// Returns the closest of a cell's listed triangles. Of those that share the closest point, it
+    /// is the one that faces `p` most directly.
     ///
-    /// The list is in the order of the distance from the center `c`: `dist(p, t) ≥ dist(c, t) − |p − c|` ends the search.
+    /// The list is ordered by distance from the center `c`: `dist(p, t) ≥ dist(c, t) − |p − c|`
+    /// ends the search.
     fn closest(&self, p: &Vec3, place: &CellPoint) -> Option<Closest> {
         let mut best: Option<Closest> = None;
         let (mut limit, mut reach, mut furthest) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
@@ -161,12 +166,12 @@ impl MeshField {
         best
     }
 
-    /// The closest part of the surface, whatever an element faces.
+    /// Returns the closest part of the surface, whatever an element faces.
     pub fn nearest(&self, p: &Vec3) -> Hit {
         self.nearest_in(p, self.tree.locate(p, &self.triangles).as_ref())
     }
 
-    /// The same where it may be less than `limit`; else a bound.
+    /// Returns the closest part if it can be within `limit`; otherwise a lower bound.
     pub fn nearest_within(&self, p: &Vec3, limit: f64) -> Result<Hit, f64> {
         let place = self.tree.locate(p, &self.triangles);
         let bound = place.map_or_else(|| self.tree.bound(p, &self.triangles), |place| self.tree.bound_at(&place));
@@ -179,17 +184,18 @@ impl MeshField {
         self.triangles.describe(p, &closest.unwrap_or_else(|| self.closest_by_tree(p)))
     }
 
-    /// Of the mesh, meters.
+    /// Returns the diagonal of the mesh, meters.
     pub fn diagonal(&self) -> f64 {
         self.triangles.diagonal
     }
 
-    /// How far beside a face a place on an edge still counts as above it, meters.
+    /// Returns the distance beside a face up to which a place on an edge is treated as above it,
+    /// meters.
     pub fn touching(&self) -> f64 {
         self.triangles.touching
     }
 
-    /// [`DistanceField::hit`], told [`MeshField::nearest`].
+    /// Computes [`DistanceField::hit`] from the result of [`MeshField::nearest`].
     pub fn hit_from_nearest(&self, p: &Vec3, hit: Hit, normals: &[Vec3], beside: f64) -> Hit {
         let beside = beside * self.diagonal();
         let faces = facing(normals, &hit.normal);
@@ -201,24 +207,25 @@ impl MeshField {
         self.closest_facing(p, normals, list, hit.distance, beside).unwrap_or(Hit { facing: faces, ..hit })
     }
 
-    /// For [`MeshField::bound_mapped`]; `None` where the sides of a convex solid tell more.
+    /// Returns the map for [`MeshField::bound_mapped`]; `None` if the sides of a convex solid give
+    /// better bounds.
     pub fn frame_map(&self, rotation: &Mat3, translation: &Vec3, reach: f64) -> Option<FrameMap> {
         self.sides.is_empty().then(|| self.tree.frame_map(rotation, translation, reach))
     }
 
-    /// At most the signed distance of a point told in another frame.
+    /// Returns a lower bound of the signed distance of a point in another frame.
     #[inline]
     pub fn bound_mapped(&self, way: &FrameMap, p: &[f32; 3]) -> f64 {
         self.tree.bound_mapped(way, p, &self.triangles)
     }
 
-    /// The closest by the tree of boxes.
+    /// Returns the closest point by the tree of boxes.
     fn closest_by_tree(&self, p: &Vec3) -> Closest {
         self.triangles.closest_of(p, self.boxes().closest(p).triangle)
     }
 
-    /// The closest face among those listed that faces the element, has `p` behind it (or on it), and is not much further
-    /// than `nearest`: the far side of the solid is not meant.
+    /// Returns the closest listed face that the element can touch, with `p` behind or on it, and
+    /// not much further than `nearest`: the far side of the solid is excluded.
     fn closest_facing(
         &self,
         p: &Vec3,
@@ -240,13 +247,13 @@ impl MeshField {
             if distance > nearest.abs() + self.triangles.around {
                 continue;
             }
-            // of two triangles of one side, the one that has it below
+            // of two triangles of one side, the one above or below which the point lies
             let squarer = |b: &(f64, f64, Hit)| {
                 square < b.1 - SAME_OPPOSITION || (square < b.1 + SAME_OPPOSITION && distance < b.0)
             };
             let nearer = |b: &(f64, f64, Hit)| distance < b.0 - aside || (distance < b.0 + aside && squarer(b));
             if best.as_ref().is_none_or(nearer) {
-                // beyond an edge by less than counts, it is still above or below the face
+                // within the tolerance beyond an edge, the point is still above or below the face
                 let beside = (p - point - normal * above).norm();
                 let distance_signed = if above > 0.0 || beside < aside { above } else { -distance };
                 let hit =
@@ -257,9 +264,10 @@ impl MeshField {
         best.map(|b| b.2)
     }
 
-    /// Calls `each` with a number that names the feature and the hit of every local minimum of the distance from `p` (outside
-    /// the solid) within `radius`: a closest point inside a triangle, or on an edge or corner if all triangles there agree
-    /// that it is closest. Where very many are in reach, only those nearest.
+    /// Calls `each`, with a feature id and a hit, for every local minimum of the distance from `p`
+    /// (outside the solid) within `radius`: a closest point inside a triangle, or on an edge or
+    /// corner if it is the closest point of all triangles there. If very many triangles are within
+    /// `radius`, only the nearest ones are tested.
     pub fn minima(&self, p: &Vec3, mut radius: f64, each: &mut dyn FnMut(u64, Hit)) {
         let closest = self.boxes().closest(p);
         let least = closest.signed_distance;
@@ -302,7 +310,7 @@ impl MeshField {
         self.triangles.describe(p, &self.triangles.closest_of(p, triangle))
     }
 
-    /// A number for a feature of triangle `t`, the same from all triangles that share it.
+    /// Returns an id for a feature of triangle `t`, the same for all triangles that share it.
     fn feature_id(&self, t: usize, feature: usize) -> u64 {
         let v = self.mesh.triangles[t];
         match feature {
@@ -316,7 +324,7 @@ impl MeshField {
     }
 }
 
-/// Triangles near a core point at most.
+/// Maximum number of triangles near a core point.
 const MAX_NEAR_TRIANGLES: usize = 512;
 
 impl DistanceField for MeshField {
@@ -333,13 +341,13 @@ impl DistanceField for MeshField {
     }
 }
 
-/// A sphere around a triangle, its center told from `center`; rounding is on the safe side.
+/// Returns a bounding sphere of a triangle, relative to `center`; rounded up.
 fn sphere_around(corners: &[Vec3; 3], center: &Vec3, diagonal: f64) -> [f32; 4] {
     let longest = (0..3)
         .map(|k| (corners[k], corners[(k + 1) % 3]))
         .max_by(|a, b| (a.1 - a.0).norm().total_cmp(&(b.1 - b.0).norm()));
     let (u, v) = longest.unwrap_or((corners[0], corners[1]));
-    // the middle of the longest side serves the obtuse, the mean of the corners others
+    // the middle of the longest side suits obtuse triangles, the mean of the corners others
     let middles = [0.5 * (u + v), (corners[0] + corners[1] + corners[2]) / 3.0];
     let radius = |m: &Vec3| corners.iter().map(|c| (c - m).norm()).fold(0.0, f64::max);
     let middle = if radius(&middles[0]) < radius(&middles[1]) { middles[0] } else { middles[1] };
@@ -353,7 +361,7 @@ fn valence(mesh: &TriMesh) -> Vec<u32> {
     count
 }
 
-/// Whether every edge is convex or flat and the surface is one piece.
+/// Returns whether every edge is convex or flat and the surface is connected.
 pub(super) fn is_convex(mesh: &TriMesh, groups: &EdgeGroups) -> bool {
     let slack = 1e-9 * mesh.diagonal();
     groups.iter().all(|group| {

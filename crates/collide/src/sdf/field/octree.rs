@@ -1,4 +1,5 @@
-//! The octree of a mesh's field: cells with lists of triangles, and a bound of the distance in each.
+//! The octree of a mesh's field: cells with lists of triangles, and a bound of the distance in
+//! each.
 //!
 //! ```text
 //! c, h, r   center, half side and half diagonal of a cell       d_c  signed distance of c
@@ -6,35 +7,37 @@
 //! d(p) ≥ √(|p − q|² + max(d(q), 0)²)                            outside all cells; q is the closest point of the outermost cell
 //! ```
 //!
-//! The last holds since `p − q` makes no acute angle with the way from `q` to anything in that cell.
+//! The last line holds because the angle between `p − q` and the direction from `q` to any point of
+//! that cell is not acute.
 
 use super::ListedTriangle;
 use super::blocks::{Block, Blocks};
 use super::triangles::Triangles;
 use crate::{Mat3, Vec3};
 
-/// Of single precision in a place and in a bound, in half sides of the outermost cell.
+/// Single-precision error of a coordinate and of a bound, in half sides of the outermost cell.
 const ROUNDING: f64 = 2e-6;
-/// The greatest number below 2, and the digits of a number behind the first one.
+/// The greatest number below 2, and the mantissa bits of a number.
 const BELOW_TWO: f32 = 1.999_999_9;
 const MANTISSA: u32 = (1 << 23) - 1;
 
-/// Thirty-two bytes, in single precision, since most of the time of a query goes by waiting for cells.
+/// A cell of thirty-two bytes, in single precision, since memory access dominates the time of a
+/// query.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
 pub(super) struct Cell {
     /// `g`, and `d_c − e` for the plane through the center.
     plane: [f32; 4],
-    /// Signed distance at the center, or a little less.
+    /// Signed distance at the center, rounded down.
     distance: f32,
-    /// Where its list begins if it has one; else the first of eight children, 0 if there are none.
+    /// Start of its list if it has one; else the first of eight children, 0 if there are none.
     pub link: u32,
-    /// Length of the list; 0 where there is none.
+    /// Length of the list; 0 without a list.
     pub count: u8,
 }
 
 impl Cell {
-    /// One that knows nothing.
+    /// Returns a cell without bound.
     pub fn empty() -> Cell {
         Cell { plane: [0.0, 0.0, 0.0, f32::NEG_INFINITY], distance: f32::NEG_INFINITY, link: 0, count: 0 }
     }
@@ -43,41 +46,41 @@ impl Cell {
         if self.count == 0 { self.link as usize } else { 0 }
     }
 
-    /// Takes `d_c`, which may be rounded down by the caller.
+    /// Sets `d_c`, which the caller can round down.
     pub fn set_distance(&mut self, distance: f64) {
         self.distance = distance as f32;
     }
 
-    /// Takes a slope, as it can be kept; returns what is kept.
+    /// Sets the slope and returns it as stored.
     pub fn set_slope(&mut self, slope: &Vec3) -> Vec3 {
         let kept: [f32; 3] = std::array::from_fn(|k| slope[k] as f32);
         self.plane[..3].copy_from_slice(&kept);
         Vec3::from(kept.map(f64::from))
     }
 
-    /// Takes `e`, meters, once the distance is known.
+    /// Sets `e`, meters, after the distance.
     pub fn set_shortfall(&mut self, shortfall: f64) {
         self.plane[3] = (f64::from(self.distance) - shortfall) as f32;
     }
 }
 
-/// A place in a cell.
+/// A point in a cell.
 #[derive(Clone, Copy)]
 pub(super) struct CellPoint<'a> {
     cell: &'a Cell,
     block: &'a Block,
-    /// From the cell's center; the fourth is 1.
+    /// Offset from the cell's center; the fourth entry is 1.
     offset: [f32; 4],
 }
 
 impl<'a> CellPoint<'a> {
-    /// The triangles that can be closest here; none where the cell has no list.
+    /// Returns the triangles that can be closest here; empty for a cell without a list.
     pub fn list(&self) -> &'a [ListedTriangle] {
         let (link, count) = (self.cell.link as usize, self.cell.count as usize);
         if count == 0 { &[] } else { &self.block.lists[link..][..count] }
     }
 
-    /// At most the signed distance here, but for rounding.
+    /// Returns a lower bound of the signed distance here, up to rounding.
     #[inline(always)]
     fn bound(&self) -> f64 {
         let products: [f32; 4] = std::array::from_fn(|k| self.cell.plane[k] * self.offset[k]);
@@ -85,20 +88,21 @@ impl<'a> CellPoint<'a> {
         f64::from(plane.max(self.cell.distance - self.offset_length()))
     }
 
-    /// How far from the cell's center it is, meters.
+    /// Returns the distance from the cell's center, meters.
     pub fn offset_length(&self) -> f32 {
         let squares: [f32; 4] = std::array::from_fn(|k| self.offset[k] * self.offset[k]);
         (squares[0] + squares[1] + squares[2]).sqrt()
     }
 }
 
-/// From another frame to places in the outermost cell, told from its lowest corner; in single precision.
+/// Map from another frame to positions relative to the lowest corner of the outermost cell, in
+/// single precision.
 pub(crate) struct FrameMap {
     columns: [[f32; 4]; 3],
     offset: [f32; 4],
-    /// The side of the outermost cell, meters.
+    /// Side of the outermost cell, meters.
     side: f32,
-    /// What single precision may add to a bound, meters.
+    /// Single-precision error of a bound, meters.
     rounding: f64,
 }
 
@@ -113,23 +117,23 @@ fn single(v: &Vec3) -> [f32; 4] {
     [v.x as f32, v.y as f32, v.z as f32, 0.0]
 }
 
-/// Cells within a cube.
+/// An octree of cells within a cube.
 #[derive(Clone, Debug)]
 pub(super) struct Octree {
     pub(super) blocks: Blocks,
     pub center: Vec3,
     /// Half the side.
     half: f64,
-    /// How many of the outermost cells go into a meter.
+    /// Number of outermost cells per meter.
     per_metre: f32,
-    /// Half the side of a cell by its depth.
+    /// Half the side of a cell, by depth.
     halves: [f32; 16],
-    /// What single precision may add to a bound, meters.
+    /// Single-precision error of a bound, meters.
     rounding: f64,
 }
 
 impl Octree {
-    /// A cube that is divided so often at most.
+    /// Returns the octree of a cube that is divided at most `max_depth` times.
     pub fn new(center: Vec3, half: f64, max_depth: u32) -> Octree {
         Octree {
             blocks: Blocks::new(center, half, max_depth),
@@ -141,20 +145,20 @@ impl Octree {
         }
     }
 
-    /// What single precision may cost, meters.
+    /// Returns the single-precision error of a bound, meters.
     pub fn rounding(&self) -> f64 {
         self.rounding
     }
 
-    /// The smallest cell that holds `p`; `None` outside all.
+    /// Returns the smallest cell that contains `p`; `None` outside all cells.
     pub fn locate(&self, p: &Vec3, triangles: &Triangles) -> Option<CellPoint<'_>> {
-        // written so that what is not a number is outside
+        // written so that values that are not numbers are outside
         let from_low = (p - self.center).add_scalar(self.half);
         let within = from_low.iter().all(|x| *x >= 0.0 && *x <= 2.0 * self.half);
         within.then(|| self.descend(&single(&from_low), triangles))
     }
 
-    /// At most the signed distance at `p`.
+    /// Returns a lower bound of the signed distance at `p`.
     pub fn bound(&self, p: &Vec3, triangles: &Triangles) -> f64 {
         let from_low = (p - self.center).add_scalar(self.half);
         let side = 2.0 * self.half;
@@ -164,7 +168,7 @@ impl Octree {
         if outside == 0.0 { bound } else { (outside + bound.max(0.0).powi(2)).sqrt() }
     }
 
-    /// The way from another frame to this one, for points that are no further from its origin than `reach`.
+    /// Returns the map from another frame to this one, for points within `reach` of its origin.
     pub fn frame_map(&self, rotation: &Mat3, translation: &Vec3, reach: f64) -> FrameMap {
         let offset = (translation - self.center).add_scalar(self.half);
         let columns = [0, 1, 2].map(|k| single(&rotation.column(k).into_owned()));
@@ -176,7 +180,8 @@ impl Octree {
         }
     }
 
-    /// [`Octree::bound`] of a point in that other frame, a little less.
+    /// Returns a bound like [`Octree::bound`] for a point in the other frame, minus the rounding
+    /// error.
     #[inline(always)]
     pub fn bound_mapped(&self, frame_map: &FrameMap, p: &[f32; 3], triangles: &Triangles) -> f64 {
         let [a, b, c] = &frame_map.columns;
@@ -189,19 +194,21 @@ impl Octree {
         (if outside == 0.0 { bound } else { (outside + bound.max(0.0).powi(2)).sqrt() }) - frame_map.rounding
     }
 
-    /// The same at a place.
+    /// Returns the bound at a point of a cell.
     #[inline]
     pub fn bound_at(&self, place: &CellPoint) -> f64 {
         place.bound() - self.rounding
     }
 
-    /// The smallest cell around a place that lies so far from the lowest corner, which is within the outermost cell. One near a face of a cell may be taken
-    /// for the neighbor's; then the offset is more than half the side by rounding.
-    /// Inlined: on the way through memory four numbers at once wait for each other.
+    /// Returns the smallest cell around a position relative to the lowest corner, which must be
+    /// within the outermost cell. Near a face of a cell it can be the neighboring cell; then the
+    /// offset exceeds half the side by a rounding error. Inlined: passing four numbers through
+    /// memory would cause store-forwarding stalls.
     #[inline(always)]
     fn descend(&self, low: &[f32; 4], triangles: &Triangles) -> CellPoint<'_> {
         let level = self.blocks.top();
-        // which cube: the first binary digits of the place, as a part of the side, behind the 1 that is added
+        // the cube: the first binary digits of the position, as a fraction of the side, after
+        // adding 1
         let place: [u32; 4] = std::array::from_fn(|k| {
             let x = low[k] * self.per_metre + 1.0;
             let x = if x < BELOW_TWO { x } else { BELOW_TWO };

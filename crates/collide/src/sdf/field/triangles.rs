@@ -1,4 +1,4 @@
-//! The triangles of a closed mesh, with what distances and normals are told by.
+//! The triangles of a closed mesh, with the data for distances and normals.
 
 use super::Closest;
 use super::cell_view::{NearTriangle, order};
@@ -7,27 +7,29 @@ use crate::sdf::{Feature, Hit, TOUCHING};
 use crate::{TriMesh, Vec3};
 use std::sync::OnceLock;
 
-/// Triangles up to this much further than the closest are listed if they face another way, as a part of the diagonal.
+/// Maximum distance beyond the closest triangle up to which triangles that face another side are
+/// listed, as a fraction of the diagonal.
 const FACE_CHOICE_RANGE: f64 = 0.01;
-/// As much of the squared distance as is along a face's normal counts as straight above the face.
+/// Fraction of the squared distance along a face's normal from which a point is directly above the
+/// face.
 const STRAIGHT_ABOVE: f64 = 1.0 - 1e-6;
-/// Squares of distances from boxes are compared with so much room for rounding.
+/// Factor for rounding in comparisons of squared distances from boxes.
 const SQUARE_ROUNDING: f64 = 1.0 + 1e-9;
 
 #[derive(Clone, Debug)]
 pub(super) struct Triangles {
     pub corners: Vec<[Vec3; 3]>,
-    /// Pseudonormals of the face, its edges and its corners, of unit length: [`pseudonormals`].
+    /// Unit pseudonormals of the face, its edges and its corners: [`pseudonormals`].
     pub normals: Vec<[Vec3; 7]>,
     /// Built by the first query.
     boxes: OnceLock<AabbTree>,
     /// Whether the edges of each triangle (k to k+1) are elements.
     searched: Vec<[bool; 3]>,
-    /// How far beside a face a place on an edge still counts as above it, meters.
+    /// Distance beside a face up to which a place on an edge is treated as above it, meters.
     pub touching: f64,
-    /// Of the mesh, meters.
+    /// Diagonal of the mesh, meters.
     pub diagonal: f64,
-    /// How much further than the closest face another one may be that is taken instead, meters.
+    /// Maximum distance beyond the closest face up to which another face can be selected, meters.
     pub around: f64,
 }
 
@@ -51,12 +53,12 @@ impl Triangles {
         Closest { square: (p - point).norm_squared(), point, triangle, feature }
     }
 
-    /// Square of the distance from a triangle's plane.
+    /// Returns the squared distance from a triangle's plane.
     pub fn above(&self, p: &Vec3, triangle: usize) -> f64 {
         self.normals[triangle][0].dot(&(p - self.corners[triangle][0])).powi(2)
     }
 
-    /// What a triangle's closest point makes of `p`.
+    /// Returns the hit of `p` for the closest point of a triangle.
     pub fn describe(&self, p: &Vec3, found: &Closest) -> Hit {
         let (face, normal) = (self.normals[found.triangle][0], self.normals[found.triangle][found.feature]);
         let (offset, length) = (p - found.point, found.square.sqrt());
@@ -86,7 +88,7 @@ impl Triangles {
         self.boxes.get_or_init(|| AabbTree::new(&self.corners))
     }
 
-    /// The triangle closest to `p`, of equally close ones the first, among those that `passed` admits.
+    /// Returns the triangle closest to `p` among those that `passed` accepts, the first of equals.
     pub fn closest_near(&self, p: &Vec3, passed: impl Fn(u32) -> bool) -> Option<NearTriangle> {
         let tree = self.boxes();
         let square = |n: usize| box_distance_squared(&tree.nodes[n].bounds, p);
@@ -105,7 +107,7 @@ impl Triangles {
             }
             if node.count == 0 {
                 let mut children = [n + 1, node.second as usize].map(|child| (square(child), child));
-                // the nearer one is looked at first
+                // the nearer one is visited first
                 children.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
                 open.extend(children);
             }
