@@ -60,7 +60,7 @@ fn related_pose(rng: &mut Rng, case: usize) -> Pose {
 
 const MARGIN: f64 = 0.25;
 
-fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
+fn find_contacts(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
     let mut out = Vec::new();
     contacts(a, pa, b, pb, MARGIN, &mut out);
     for c in &out {
@@ -126,7 +126,7 @@ fn primitives_agree_with_parry() {
 #[allow(clippy::too_many_arguments)]
 fn compare(a: &Both, pa: &Pose, b: &Both, pb: &Pose, ka: usize, kb: usize, case: usize, counts: &mut [u32; 3]) {
     let label = format!("kinds {ka} {kb}, case {case}: {:?} at {pa:?}, {:?} at {pb:?}", a.ours, b.ours);
-    let found = ask(&a.ours, pa, &b.ours, pb);
+    let found = find_contacts(&a.ours, pa, &b.ours, pb);
     let (distance, normal) = reference(a, pa, b, pb);
     let Some(contact) = deepest(&found) else {
         assert!(distance > MARGIN - 1e-5, "missed {distance}: {label}");
@@ -162,7 +162,7 @@ fn exchanging_the_shapes_mirrors_the_contacts() {
         let (ka, kb) = (rng.below(4), rng.below(4));
         let (a, b) = (random_primitive(&mut rng, ka), random_primitive(&mut rng, kb));
         let (pa, pb) = (rng.pose(1.0), rng.pose(1.0));
-        let (ab, ba) = (ask(&a.ours, &pa, &b.ours, &pb), ask(&b.ours, &pb, &a.ours, &pa));
+        let (ab, ba) = (find_contacts(&a.ours, &pa, &b.ours, &pb), find_contacts(&b.ours, &pb, &a.ours, &pa));
         if let (Some(x), Some(y)) = (deepest(&ab), deepest(&ba)) {
             assert!((x.gap - y.gap).abs() < 1e-3 + 0.05 * x.gap.abs(), "case {case}");
             if ka != kb {
@@ -191,7 +191,7 @@ fn points_are_midway_between_the_surfaces() {
         let (a, b) = (random_primitive(&mut rng, ka), random_primitive(&mut rng, kb));
         let (pa, pb) = (related_pose(&mut rng, 2 * (case % 2)), related_pose(&mut rng, case));
         // shallow contacts: a deep one's far side may leave a face's extent
-        let found = ask(&a.ours, &pa, &b.ours, &pb);
+        let found = find_contacts(&a.ours, &pa, &b.ours, &pb);
         let least = deepest(&found).map_or(0.0, |c| c.gap);
         for c in found.iter().filter(|c| c.gap.abs() < 0.05) {
             let (on_a, on_b) = (c.point + c.normal * (0.5 * c.gap), c.point - c.normal * (0.5 * c.gap));
@@ -226,14 +226,14 @@ fn points_are_midway_between_the_surfaces() {
 }
 
 #[test]
-fn features_of_a_pair_are_distinct_and_last() {
+fn features_of_a_pair_are_distinct_and_persistent() {
     let mut rng = Rng::new(31);
     let (mut kept, mut total) = (0, 0);
     for case in 0..3000 {
         let (ka, kb) = (rng.below(3), rng.below(4));
         let (a, b) = (random_primitive(&mut rng, ka), random_primitive(&mut rng, kb));
         let (pa, pb) = (related_pose(&mut rng, 2 * (case % 2)), related_pose(&mut rng, case));
-        let before = ask(&a.ours, &pa, &b.ours, &pb);
+        let before = find_contacts(&a.ours, &pa, &b.ours, &pb);
         let mut names: Vec<u64> = before.iter().map(|c| c.feature).collect();
         names.sort_unstable();
         names.dedup();
@@ -241,7 +241,7 @@ fn features_of_a_pair_are_distinct_and_last() {
         // what a step of rest does to a body: a millionth of a meter and of a radian
         let nudge = Quat::from_scaled_axis(rng.vec(1e-6));
         let nudged = Pose::from_parts((pa.translation.vector + rng.vec(1e-6)).into(), nudge * pa.rotation);
-        let after = ask(&a.ours, &nudged, &b.ours, &pb);
+        let after = find_contacts(&a.ours, &nudged, &b.ours, &pb);
         total += before.len();
         kept += after.iter().filter(|c| names.binary_search(&c.feature).is_ok()).count();
     }

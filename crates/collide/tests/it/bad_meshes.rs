@@ -155,7 +155,7 @@ fn holes_that_share_a_vertex_are_filled_each_for_itself() {
 }
 
 #[test]
-fn what_repair_cannot_do_is_an_error_that_names_the_face() {
+fn failed_repairs_are_errors_that_name_the_face() {
     // a Möbius band has no sides to tell apart
     let mut band = TriMesh::default();
     let n = 12;

@@ -9,23 +9,23 @@ struct Both {
     sweep: SweepAndPrune,
     brute: BruteForce,
     /// Handle here and there, box, moving.
-    filed: Vec<(u32, u32, Aabb, bool)>,
+    stored: Vec<(u32, u32, Aabb, bool)>,
 }
 
 impl Both {
     fn insert(&mut self, bounds: Aabb, moving: bool) {
-        self.filed.push((self.sweep.insert(&bounds, moving), self.brute.insert(&bounds, moving), bounds, moving));
+        self.stored.push((self.sweep.insert(&bounds, moving), self.brute.insert(&bounds, moving), bounds, moving));
     }
 
     fn set(&mut self, n: usize, bounds: Aabb, moving: bool) {
-        let filed = &mut self.filed[n];
-        (filed.2, filed.3) = (bounds, moving);
-        self.sweep.set(filed.0, &bounds, moving);
-        self.brute.set(filed.1, &bounds, moving);
+        let stored = &mut self.stored[n];
+        (stored.2, stored.3) = (bounds, moving);
+        self.sweep.set(stored.0, &bounds, moving);
+        self.brute.set(stored.1, &bounds, moving);
     }
 
     fn remove(&mut self, n: usize) {
-        let (here, there, ..) = self.filed.swap_remove(n);
+        let (here, there, ..) = self.stored.swap_remove(n);
         self.sweep.remove(here);
         self.brute.remove(there);
     }
@@ -37,8 +37,8 @@ impl Both {
         self.brute.pairs(&mut expected);
         assert!(found.is_sorted() && found.iter().all(|[i, j]| i < j), "{what}: not in order");
         // the two may number boxes differently
-        let mut names = vec![u32::MAX; self.filed.iter().map(|f| f.1 as usize + 1).max().unwrap_or(0)];
-        self.filed.iter().for_each(|f| names[f.1 as usize] = f.0);
+        let mut names = vec![u32::MAX; self.stored.iter().map(|f| f.1 as usize + 1).max().unwrap_or(0)];
+        self.stored.iter().for_each(|f| names[f.1 as usize] = f.0);
         for pair in &mut expected {
             *pair = pair.map(|there| names[there as usize]);
             pair.sort_unstable();
@@ -49,26 +49,26 @@ impl Both {
     }
 }
 
-fn block(center: Vec3, half: Vec3) -> Aabb {
+fn box_around(center: Vec3, half: Vec3) -> Aabb {
     Aabb { min: center - half, max: center + half }
 }
 
 /// Mostly blocks; sometimes a huge one, a flat one, a point, one with infinite sides, one that is not a number, one turned inside out.
 fn any_box(rng: &mut Rng, space: f64) -> Aabb {
     let (center, half) = (rng.vec(space), rng.vec(0.5).abs());
-    let mut b = block(center, half);
+    let mut b = box_around(center, half);
     let k = rng.below(3);
     match rng.below(24) {
-        0 => b = block(center, half * 20.0),
-        1 => b = block(center, Vec3::new(20.0, 20.0, 0.01)),
-        2 => b = block(center, Vec3::zeros()),
+        0 => b = box_around(center, half * 20.0),
+        1 => b = box_around(center, Vec3::new(20.0, 20.0, 0.01)),
+        2 => b = box_around(center, Vec3::zeros()),
         3 => (b.min, b.max[k]) = (Vec3::repeat(f64::NEG_INFINITY), f64::INFINITY),
         4 => b.max[k] = f64::INFINITY,
         5 => b.min[k] = f64::NAN,
         6 => b.max[k] = f64::NAN,
         7 => std::mem::swap(&mut b.min, &mut b.max),
-        8 => b = block(center * 1e300, Vec3::repeat(1e300)),
-        9 => b = block(center * 1e-300, Vec3::repeat(1e-310)),
+        8 => b = box_around(center * 1e300, Vec3::repeat(1e300)),
+        9 => b = box_around(center * 1e-300, Vec3::repeat(1e-310)),
         10 => b = Aabb::around([]),
         _ => {}
     }
@@ -90,8 +90,8 @@ fn equals_brute_force_over_random_histories() {
         for step in 0..120 {
             // quiet stretches, where few leave their fat boxes, and wild ones
             let speed = [0.0, 0.002, 0.02, 1.0][step / 8 % 4];
-            for n in 0..both.filed.len() {
-                let (_, _, bounds, moving) = both.filed[n];
+            for n in 0..both.stored.len() {
+                let (_, _, bounds, moving) = both.stored[n];
                 match rng.below(200) {
                     0 => both.set(n, any_box(&mut rng, space), moving),
                     1 => both.set(n, bounds, !moving),
@@ -100,18 +100,18 @@ fn equals_brute_force_over_random_histories() {
                 }
             }
             for _ in 0..rng.below(most / 8 + 2) {
-                if both.filed.len() < most {
+                if both.stored.len() < most {
                     let moving = rng.below(3) > 0;
                     both.insert(any_box(&mut rng, space), moving);
                 }
             }
             for _ in 0..rng.below(3) {
-                if !both.filed.is_empty() {
-                    both.remove(rng.below(both.filed.len()));
+                if !both.stored.is_empty() {
+                    both.remove(rng.below(both.stored.len()));
                 }
             }
             if rng.below(60) == 0 {
-                (0..both.filed.len()).rev().for_each(|n| both.remove(n));
+                (0..both.stored.len()).rev().for_each(|n| both.remove(n));
             }
             if rng.below(4) > 0 {
                 total += both.check(&format!("seed {seed}, step {step}"));
@@ -126,12 +126,12 @@ fn a_crowd_that_travels_is_followed() {
     // the cells are cut and left behind as it goes: 4,000 boxes that move 30 times their own size
     let mut rng = Rng::new(7);
     let mut both = Both::default();
-    (0..4000).for_each(|_| both.insert(block(rng.vec(4.0), Vec3::repeat(0.15)), true));
+    (0..4000).for_each(|_| both.insert(box_around(rng.vec(4.0), Vec3::repeat(0.15)), true));
     let mut total = 0;
     for step in 0..60 {
         // one in ten at a time: too few for all to be filed anew
         for n in (0..4000).filter(|n| n % 10 == step % 10) {
-            let bounds = moved(&both.filed[n].2, Vec3::new(1.5, 0.2, 0.0));
+            let bounds = moved(&both.stored[n].2, Vec3::new(1.5, 0.2, 0.0));
             both.set(n, bounds, true);
         }
         if step % 6 == 5 {
@@ -142,28 +142,28 @@ fn a_crowd_that_travels_is_followed() {
 }
 
 #[test]
-fn many_boxes_in_one_place_all_meet() {
+fn many_coincident_boxes_all_overlap() {
     let mut both = Both::default();
-    (0..200).for_each(|_| both.insert(block(Vec3::zeros(), Vec3::repeat(0.5)), true));
+    (0..200).for_each(|_| both.insert(box_around(Vec3::zeros(), Vec3::repeat(0.5)), true));
     assert_eq!(both.check("all at once"), 200 * 199 / 2);
-    (0..100).for_each(|_| both.insert(block(Vec3::repeat(0.1), Vec3::repeat(0.5)), true));
+    (0..100).for_each(|_| both.insert(box_around(Vec3::repeat(0.1), Vec3::repeat(0.5)), true));
     assert_eq!(both.check("more of them"), 300 * 299 / 2);
     (0..250).for_each(|_| both.remove(0));
     assert_eq!(both.check("fewer"), 50 * 49 / 2);
 }
 
 #[test]
-fn boxes_that_touch_are_a_pair_and_what_does_not_move_is_not() {
+fn touching_boxes_are_a_pair_unless_both_are_fixed() {
     let mut both = Both::default();
     for x in 0..100 {
-        both.insert(block(Vec3::new(f64::from(x), 0.0, 0.0), Vec3::repeat(0.5)), x % 3 == 0);
+        both.insert(box_around(Vec3::new(f64::from(x), 0.0, 0.0), Vec3::repeat(0.5)), x % 3 == 0);
     }
     // 99 neighbors touch; of them those between x = 1 and 2, 4 and 5 and so on do not move: 33
     assert_eq!(both.check("a row"), 99 - 33);
 }
 
 #[test]
-fn the_answer_does_not_tell_the_history() {
+fn the_result_does_not_depend_on_the_history() {
     let mut rng = Rng::new(3);
     let mut old = SweepAndPrune::default();
     let mut boxes: Vec<Aabb> = (0..500).map(|_| any_box(&mut rng, 4.0)).collect();
@@ -188,12 +188,12 @@ fn the_answer_does_not_tell_the_history() {
 }
 
 #[test]
-fn nothing_and_handles_of_nobody() {
+fn empty_input_and_unknown_handles() {
     let mut sweep = SweepAndPrune::default();
     let mut found = vec![[0, 1]];
     sweep.pairs(&mut found);
     assert!(found.is_empty());
-    let b = block(Vec3::zeros(), Vec3::repeat(1.0));
+    let b = box_around(Vec3::zeros(), Vec3::repeat(1.0));
     sweep.remove(3);
     sweep.set(3, &b, true);
     let (first, second) = (sweep.insert(&b, true), sweep.insert(&b, true));

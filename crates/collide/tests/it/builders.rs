@@ -81,7 +81,7 @@ fn spot_is_tighter_than_the_references_trees() {
 }
 
 #[test]
-fn generated_solids_get_trees_whose_spheres_reach_out_as_stated() {
+fn generated_solids_get_trees_with_the_stated_outward_error() {
     let meshes = [
         ("box", TriMesh::box_(Vec3::new(0.5, 1.0, 0.1))),
         ("sheet", TriMesh::box_(Vec3::new(0.5, 1.0, 1e-3))),
@@ -150,7 +150,7 @@ fn branching_of_two_and_of_many() {
 
 /// The sphere around a unit cube has the radius √3/2 and reaches `(√3/2 − 1/2)/√3 = 21.13 %` of the diagonal outside.
 #[test]
-fn a_sphere_that_is_good_enough_is_neither_divided_nor_grown() {
+fn a_sphere_within_the_error_is_neither_divided_nor_grown() {
     let cube = TriMesh::box_(Vec3::repeat(0.5));
     let bound = 0.5 - 0.5 / 3.0_f64.sqrt();
     for builder in [Builder::Octree, Builder::Medial, Builder::Hubbard, Builder::Grid] {
@@ -176,7 +176,7 @@ fn no_sphere_is_a_point() {
 }
 
 #[test]
-fn a_covering_covers_and_never_reaches_further_with_more_spheres() {
+fn a_covering_covers_and_its_error_never_grows() {
     let bowl = {
         let mut sphere = TriMesh::uv_sphere(0.2, 16, 12);
         sphere.triangles.retain(|t| t.iter().all(|&v| sphere.vertices[v as usize].z < 1e-9));

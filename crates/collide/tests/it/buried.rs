@@ -23,7 +23,7 @@ fn shape(mesh: &TriMesh) -> (Shape, Pose) {
     (shape, Pose::from_parts(offset.into(), Default::default()))
 }
 
-fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec<Contact> {
+fn find_contacts(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec<Contact> {
     let mut out = Vec::new();
     contacts_in_mode(ContactMode::Surface, a, pa, b, pb, margin, &mut out);
     out
@@ -39,7 +39,7 @@ fn buried_corners_do_not_touch_a_plane() {
     let (shape, pose) = shape(&step());
     // the lower block's bottom is 0.1 above the taller one's; the plane is 0.15 above that
     let ground = Pose::translation(0.0, 0.0, -0.35);
-    let found = ask(&shape, &pose, &Shape::half_space(), &ground, 0.01);
+    let found = find_contacts(&shape, &pose, &Shape::half_space(), &ground, 0.01);
     let place = |c: &Contact| c.point - 0.5 * c.gap.abs() * c.normal;
     for c in &found {
         let p = place(c);
@@ -52,13 +52,13 @@ fn buried_corners_do_not_touch_a_plane() {
 }
 
 #[test]
-fn a_sphere_in_the_seam_touches_both_blocks() {
+fn a_sphere_in_the_seam_touches_both_boxes() {
     let (shape, pose) = shape(&step());
     let (r, deep) = (0.05, 1e-4);
     let sphere = Shape::sphere(r).unwrap();
     // the taller one's side is x = 0.5, the lower one's top z = 0.1
     let at = Pose::translation(0.5 + r - deep, 0.03, 0.1 + r - 2.0 * deep);
-    let mut found = ask(&sphere, &at, &shape, &pose, 1e-3);
+    let mut found = find_contacts(&sphere, &at, &shape, &pose, 1e-3);
     found.sort_by(|a, b| a.gap.total_cmp(&b.gap));
     let told: Vec<(f64, Vec3)> = found.iter().map(|c| (c.gap, c.normal)).collect();
     assert_eq!(told.len(), 2, "{found:?}");
@@ -89,7 +89,8 @@ fn gaps_are_those_of_the_union() {
             // apart, and overlapping with the sphere's center outside
             if (-0.03..0.05).contains(&truth) {
                 near += 1;
-                let found = ask(&sphere, &Pose::from_parts(p.into(), Default::default()), &shape, &pose, 0.05);
+                let found =
+                    find_contacts(&sphere, &Pose::from_parts(p.into(), Default::default()), &shape, &pose, 0.05);
                 let gap = found.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
                 assert!((gap - truth).abs() < 1e-9, "at {p:?}: {gap} but {truth}");
             }
@@ -106,7 +107,7 @@ fn no_contact_lies_inside_the_union() {
     let (mut rng, mut count) = (Rng::new(8), 0);
     for _ in 0..5000 {
         let other = rng.pose(1.0);
-        let found = ask(&block, &other, &shape, &pose, 0.01);
+        let found = find_contacts(&block, &other, &shape, &pose, 0.01);
         // deep in each other, places on the surface are told along the normal alone
         for c in found.iter().filter(|c| c.gap > -0.02) {
             let on_mesh = c.point - 0.5 * c.gap * c.normal;
@@ -127,8 +128,8 @@ fn a_shell_within_another_changes_nothing() {
     let mut touching = 0;
     for _ in 0..300 {
         let other = rng.pose(0.9);
-        let [one, two] =
-            [(&alone, &pose), (&both, &pose_of_both)].map(|(shape, pose)| ask(&block, &other, shape, pose, 0.01));
+        let [one, two] = [(&alone, &pose), (&both, &pose_of_both)]
+            .map(|(shape, pose)| find_contacts(&block, &other, shape, pose, 0.01));
         assert_eq!(one.len(), two.len());
         touching += usize::from(!one.is_empty());
         for (c, d) in one.iter().zip(&two) {

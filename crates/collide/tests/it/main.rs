@@ -3,6 +3,7 @@
 mod against_parry;
 mod bad_meshes;
 mod broad;
+mod brute_force;
 mod builders;
 mod buried;
 mod hull;
@@ -13,7 +14,6 @@ mod overlaps;
 mod primitives;
 mod quality;
 mod rays;
-mod referee;
 mod rng;
 mod shape_cache;
 mod shared_meshes;

@@ -19,7 +19,7 @@ fn both(a: TriMesh, b: &TriMesh) -> TriMesh {
 }
 
 /// A box whose corners are moved a little, each its own way, so that nothing is symmetric.
-fn crooked(half: Vec3, seed: u64) -> TriMesh {
+fn distorted_box(half: Vec3, seed: u64) -> TriMesh {
     let mut rng = Rng::new(seed);
     let mut mesh = TriMesh::box_(half);
     for v in &mut mesh.vertices {
@@ -57,16 +57,16 @@ fn check(name: &str, mesh: &TriMesh, tree: &SphereTree, settings: &TreeSettings)
 fn covers_and_nests_thin_and_scattered_solids() {
     let sphere = TriMesh::icosphere(0.3, 2);
     let cases = [
-        ("sheet", crooked(Vec3::new(1.0, 0.8, 1e-3), 1)),
-        ("needle", crooked(Vec3::new(1.0, 1e-3, 2e-3), 2)),
-        ("crooked box", crooked(Vec3::new(1.0, 0.5, 0.3), 3)),
+        ("sheet", distorted_box(Vec3::new(1.0, 0.8, 1e-3), 1)),
+        ("needle", distorted_box(Vec3::new(1.0, 1e-3, 2e-3), 2)),
+        ("crooked box", distorted_box(Vec3::new(1.0, 0.5, 0.3), 3)),
         (
             "two parts",
-            both(crooked(Vec3::new(0.5, 0.2, 0.3), 4), &sphere.clone().translated(&Vec3::new(2.0, 0.5, 0.0))),
+            both(distorted_box(Vec3::new(0.5, 0.2, 0.3), 4), &sphere.clone().translated(&Vec3::new(2.0, 0.5, 0.0))),
         ),
         (
             "parts that overlap",
-            both(crooked(Vec3::new(0.5, 0.2, 0.3), 5), &sphere.translated(&Vec3::new(0.5, 0.0, 0.0))),
+            both(distorted_box(Vec3::new(0.5, 0.2, 0.3), 5), &sphere.translated(&Vec3::new(0.5, 0.0, 0.0))),
         ),
         ("ring", TriMesh::torus(1.0, 0.25, 24, 12)),
     ];
@@ -94,7 +94,7 @@ fn a_sphere_is_covered_by_spheres_as_large() {
 }
 
 #[test]
-fn what_is_good_enough_is_not_divided() {
+fn spheres_within_the_error_are_not_divided() {
     let mesh = TriMesh::torus(1.0, 0.25, 24, 12);
     let coarse = TreeSettings { error: 0.5, ..settings(3) };
     let tree = SphereTree::build(&mesh, &coarse).unwrap();
@@ -103,17 +103,17 @@ fn what_is_good_enough_is_not_divided() {
 }
 
 /// What was told, in order.
-struct Told(Mutex<Vec<f64>>);
+struct Reports(Mutex<Vec<f64>>);
 
-impl Progress for Told {
+impl Progress for Reports {
     fn report(&self, share: f64) {
         self.0.lock().unwrap().push(share);
     }
 }
 
 #[test]
-fn tells_how_far_it_is_and_what_each_stage_did() {
-    let told = Told(Mutex::new(Vec::new()));
+fn progress_is_monotonic_and_stages_are_counted() {
+    let told = Reports(Mutex::new(Vec::new()));
     let mesh = TriMesh::torus(1.0, 0.25, 24, 12);
     let (tree, stages) = SphereTree::build_with_progress(&mesh, &settings(2), &told).unwrap();
     let shares = told.0.into_inner().unwrap();

@@ -62,7 +62,7 @@ fn bodies() -> Vec<Both> {
     all
 }
 
-fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec<Contact> {
+fn find_contacts(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec<Contact> {
     let mut out = Vec::new();
     contacts_in_mode(ContactMode::Spheres, a, pa, b, pb, margin, &mut out);
     for c in &out {
@@ -92,7 +92,7 @@ fn tree_contacts_agree_with_the_distance_to_the_mesh() {
                 let pa = Pose::from_parts((pb.translation.vector + away).into(), pa.rotation);
                 let distance =
                     query::distance(&to_parry(&pa), &*a.theirs, &to_parry(&pb), &*b.theirs).unwrap().distance;
-                let found = ask(&a.ours, &pa, &b.ours, &pb, MARGIN);
+                let found = find_contacts(&a.ours, &pa, &b.ours, &pb, MARGIN);
                 let least = found.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
                 let label = format!("{} on {}, case {case}: {least} but {distance}", a.name, b.name);
                 assert!(least <= distance.max(1e-12) + 1e-6 || distance > MARGIN - 1e-6, "missed: {label}");
@@ -115,8 +115,8 @@ fn a_ring_hangs_on_a_peg_through_its_hole_without_contact() {
     let ring = Shape::mesh(TriMesh::torus(1.0, 0.25, 64, 32), &TreeSettings::octree()).unwrap();
     let peg = Shape::capsule(0.6, 2.0).unwrap();
     let here = Pose::identity();
-    assert!(ask(&ring, &here, &peg, &here, 0.0).is_empty(), "the hole is 0.75 wide");
-    let touching = ask(&ring, &Pose::translation(0.3, 0.0, 0.0), &peg, &here, 0.0);
+    assert!(find_contacts(&ring, &here, &peg, &here, 0.0).is_empty(), "the hole is 0.75 wide");
+    let touching = find_contacts(&ring, &Pose::translation(0.3, 0.0, 0.0), &peg, &here, 0.0);
     let deepest = touching.iter().min_by(|a, b| a.gap.total_cmp(&b.gap)).unwrap();
     // the ring's left inner side leans on the peg's left: the ring is pushed towards −x. An error e of the gap turns
     // the deepest normal by θ with 0.3 (1 − cos θ) < e = 0.036
@@ -127,7 +127,8 @@ fn a_ring_hangs_on_a_peg_through_its_hole_without_contact() {
 fn a_box_mesh_lies_flat_on_a_wide_base() {
     let shape = Shape::mesh(TriMesh::box_(Vec3::new(0.5, 0.5, 0.25)), &TreeSettings::octree()).unwrap();
     let error = shape.tree().unwrap().outward_error();
-    let found = ask(&shape, &Pose::translation(0.0, 0.0, 0.25), &Shape::half_space(), &Pose::identity(), 0.005);
+    let found =
+        find_contacts(&shape, &Pose::translation(0.0, 0.0, 0.25), &Shape::half_space(), &Pose::identity(), 0.005);
     assert!((4..=9).contains(&found.len()), "{found:?}");
     assert!(
         found.iter().all(|c| c.gap >= -error
@@ -158,7 +159,7 @@ fn a_pin_stands_upright_on_its_base() {
     ];
     let pin = Shape::mesh(TriMesh::lathe(&profile, 32).unwrap(), &TreeSettings::octree()).unwrap();
     let error = pin.tree().unwrap().outward_error();
-    let found = ask(
+    let found = find_contacts(
         &pin,
         &Pose::translation(0.0, 0.0, pin.center_of_mass().z + error),
         &Shape::half_space(),
@@ -184,7 +185,7 @@ fn a_sphere_lies_in_a_cup() {
     let error = cup.tree().unwrap().outward_error();
     let sphere = Shape::sphere(0.4).unwrap();
     let at_height = |above: f64| {
-        ask(
+        find_contacts(
             &sphere,
             &Pose::translation(0.3, 0.2, 0.5 + 0.4 + above - cup.center_of_mass().z),
             &cup,
@@ -253,17 +254,18 @@ fn cylinder_on_a_half_space_is_exact() {
         let cos = n.dot(&axis);
         let height = n.dot(&(pose.translation.vector - ground.translation.vector));
         let expected = height - half * cos.abs() - radius * (1.0 - cos * cos).max(0.0).sqrt();
-        let found = ask(&shape, &pose, &Shape::half_space(), &ground, 10.0);
+        let found = find_contacts(&shape, &pose, &Shape::half_space(), &ground, 10.0);
         let least = found.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
         assert!((least - expected).abs() < 1e-4 * radius);
     }
-    let standing = ask(&shape, &Pose::translation(0.0, 0.0, 0.999), &Shape::half_space(), &Pose::identity(), 0.01);
+    let standing =
+        find_contacts(&shape, &Pose::translation(0.0, 0.0, 0.999), &Shape::half_space(), &Pose::identity(), 0.01);
     assert_eq!(standing.len(), 4);
     let lying = Pose::from_parts(
         Vec3::new(0.0, 0.0, 0.499).into(),
         Quat::from_scaled_axis(Vec3::x() * std::f64::consts::FRAC_PI_2),
     );
-    let lying = ask(&shape, &lying, &Shape::half_space(), &Pose::identity(), 0.01);
+    let lying = find_contacts(&shape, &lying, &Shape::half_space(), &Pose::identity(), 0.01);
     assert_eq!(lying.len(), 2);
     assert!(lying.iter().all(|c| (c.gap + 0.001).abs() < 1e-12 && c.core_a == radius));
 }
@@ -309,7 +311,7 @@ fn same_input_gives_the_same_bits() {
         let mut bits = Vec::new();
         for _ in 0..300 {
             let (a, b) = (&all[rng.below(all.len())], &all[rng.below(all.len())]);
-            for c in ask(&a.ours, &rng.pose(0.4), &b.ours, &rng.pose(0.4), 0.02) {
+            for c in find_contacts(&a.ours, &rng.pose(0.4), &b.ours, &rng.pose(0.4), 0.02) {
                 bits.extend([c.point.x.to_bits(), c.normal.z.to_bits(), c.gap.to_bits(), c.feature]);
             }
         }

@@ -11,7 +11,7 @@ fn cube() -> Shape {
     mesh(TriMesh::box_(Vec3::repeat(0.5)))
 }
 
-fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
+fn find_contacts(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
     let mut out = Vec::new();
     contacts(a, pa, b, pb, 1e-3, &mut out);
     let mut names: Vec<u64> = out.iter().map(|c| c.feature).collect();
@@ -22,20 +22,20 @@ fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
 }
 
 /// The deepest contact has this depth and parts the two along this way.
-fn parts(label: &str, found: &[Contact], depth: f64, way: Vec3, slack: f64) {
+fn check_separation(label: &str, found: &[Contact], depth: f64, direction: Vec3, slack: f64) {
     let deepest = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).unwrap_or_else(|| panic!("{label}: no contact"));
     assert!(
-        (deepest.gap + depth).abs() < slack && deepest.normal.dot(&way) > 1.0 - 1e-3,
-        "{label}: {depth} along {way:?}, but {deepest:?}"
+        (deepest.gap + depth).abs() < slack && deepest.normal.dot(&direction) > 1.0 - 1e-3,
+        "{label}: {depth} along {direction:?}, but {deepest:?}"
     );
     // none pushes it back
-    assert!(found.iter().filter(|c| c.gap < 0.0).all(|c| c.normal.dot(&way) > 0.0), "{label}: {found:?}");
+    assert!(found.iter().filter(|c| c.gap < 0.0).all(|c| c.normal.dot(&direction) > 0.0), "{label}: {found:?}");
 }
 
 const OVERLAPS: [f64; 10] = [1e-3, 5e-3, 0.01, 0.015, 0.02, 0.03, 0.05, 0.1, 0.3, 0.49];
 
 #[test]
-fn aligned_cubes_part_by_their_overlap() {
+fn aligned_cubes_separate_by_their_overlap() {
     let (mesh, block) = (cube(), Shape::cuboid(Vec3::repeat(0.5)).unwrap());
     for (a, b) in [(&mesh, &mesh), (&mesh, &block), (&block, &mesh)] {
         for overlap in OVERLAPS {
@@ -46,17 +46,19 @@ fn aligned_cubes_part_by_their_overlap() {
                 (2, Vec3::new(1e-4, 1e-3, 0.0)),
                 (2, Vec3::new(0.01, 0.007, 0.0)),
             ] {
-                let way = Vec3::ith(k, 1.0);
-                for (way, yaw) in [(way, 0.0), (-way, 0.0), (way, if k == 2 { 0.05 } else { 0.0 })] {
+                let direction = Vec3::ith(k, 1.0);
+                for (direction, yaw) in
+                    [(direction, 0.0), (-direction, 0.0), (direction, if k == 2 { 0.05 } else { 0.0 })]
+                {
                     let pose = Pose::from_parts(
-                        (way * (1.0 - overlap) + shift).into(),
+                        (direction * (1.0 - overlap) + shift).into(),
                         Quat::from_scaled_axis(Vec3::z() * yaw),
                     );
-                    parts(
+                    check_separation(
                         &format!("{overlap} {shift:?} {yaw}"),
-                        &ask(a, &pose, b, &Pose::identity()),
+                        &find_contacts(a, &pose, b, &Pose::identity()),
                         overlap,
-                        way,
+                        direction,
                         1e-9,
                     );
                 }
@@ -66,24 +68,24 @@ fn aligned_cubes_part_by_their_overlap() {
 }
 
 #[test]
-fn aligned_cylinders_part_by_their_overlap() {
+fn aligned_cylinders_separate_by_their_overlap() {
     let cylinder = Shape::cylinder(0.5, 0.5).unwrap();
     let (block, cube) = (Shape::cuboid(Vec3::repeat(0.5)).unwrap(), cube());
     for overlap in OVERLAPS {
         for (name, other) in [("cylinder", &cylinder), ("block", &block), ("cube", &cube)] {
             for (a, b) in [(&cylinder, other), (other, &cylinder)] {
                 let stacked = Pose::translation(0.0, 0.0, 1.0 - overlap);
-                parts(
+                check_separation(
                     &format!("{overlap} stacked on {name}"),
-                    &ask(a, &stacked, b, &Pose::identity()),
+                    &find_contacts(a, &stacked, b, &Pose::identity()),
                     overlap,
                     Vec3::z(),
                     1e-9,
                 );
                 let beside = Pose::translation(1.0 - overlap, 0.0, 0.0);
-                parts(
+                check_separation(
                     &format!("{overlap} beside {name}"),
-                    &ask(a, &beside, b, &Pose::identity()),
+                    &find_contacts(a, &beside, b, &Pose::identity()),
                     overlap,
                     Vec3::x(),
                     1e-9,
@@ -95,18 +97,18 @@ fn aligned_cylinders_part_by_their_overlap() {
 
 /// Meshes of many faces: their sides are as flat, or come within a known chord of the circle.
 #[test]
-fn aligned_fine_meshes_part_by_their_overlap() {
+fn aligned_fine_meshes_separate_by_their_overlap() {
     let fine = mesh(TriMesh::cylinder(0.5, 0.5, 32));
     for overlap in OVERLAPS {
-        parts(
+        check_separation(
             "stacked",
-            &ask(&fine, &Pose::translation(0.0, 0.0, 1.0 - overlap), &fine, &Pose::identity()),
+            &find_contacts(&fine, &Pose::translation(0.0, 0.0, 1.0 - overlap), &fine, &Pose::identity()),
             overlap,
             Vec3::z(),
             1e-6,
         );
         // the corners of the two prisms are at ±0.5
-        let beside = ask(&fine, &Pose::translation(1.0 - overlap, 0.0, 0.0), &fine, &Pose::identity());
+        let beside = find_contacts(&fine, &Pose::translation(1.0 - overlap, 0.0, 0.0), &fine, &Pose::identity());
         let deepest = beside.iter().map(|c| -c.gap).fold(0.0, f64::max);
         let chord = 1.0 - (std::f64::consts::PI / 32.0).cos();
         assert!(deepest > overlap - 2.0 * chord && deepest < overlap + 1e-9, "{overlap}: {beside:?}");
@@ -126,16 +128,16 @@ fn angle() -> Shape {
 }
 
 #[test]
-fn aligned_angles_part_by_their_overlap() {
+fn aligned_angles_separate_by_their_overlap() {
     let angle = angle();
     for overlap in OVERLAPS.into_iter().filter(|x| *x < 0.2) {
         // on each other, and heel to toe
-        for way in [Vec3::z(), Vec3::x()] {
-            parts(
-                &format!("{overlap} {way:?}"),
-                &ask(&angle, &Pose::from(way * (1.0 - overlap)), &angle, &Pose::identity()),
+        for direction in [Vec3::z(), Vec3::x()] {
+            check_separation(
+                &format!("{overlap} {direction:?}"),
+                &find_contacts(&angle, &Pose::from(direction * (1.0 - overlap)), &angle, &Pose::identity()),
                 overlap,
-                way,
+                direction,
                 1e-3,
             );
         }
@@ -144,7 +146,7 @@ fn aligned_angles_part_by_their_overlap() {
 
 /// Where none is deeper in one way than in another, any way out will do: moved so that all contacts are satisfied they are apart.
 #[test]
-fn coincident_bodies_have_a_way_out() {
+fn coincident_bodies_are_separated() {
     let turned = Quat::from_scaled_axis(Vec3::new(0.2, 0.4, 0.6));
     for (name, shape) in [
         ("cube", cube()),
@@ -155,14 +157,14 @@ fn coincident_bodies_have_a_way_out() {
         for pose in [Pose::identity(), Pose::from_parts(Vec3::zeros().into(), turned)] {
             for shift in [0.0, 1e-6, 1e-3, 0.02, 0.1] {
                 let a = Pose::from_parts((pose.translation.vector + Vec3::z() * shift).into(), pose.rotation);
-                let found = ask(&shape, &a, &shape, &pose);
+                let found = find_contacts(&shape, &a, &shape, &pose);
                 assert!(found.iter().any(|c| c.gap < 0.0), "{name} {shift}: {found:?}");
-                let way = way_out(&found);
-                let free = Pose::from_parts((a.translation.vector + way * (1.0 + 1e-4)).into(), a.rotation);
-                let left = ask(&shape, &free, &shape, &pose);
+                let direction = separating_translation(&found);
+                let free = Pose::from_parts((a.translation.vector + direction * (1.0 + 1e-4)).into(), a.rotation);
+                let left = find_contacts(&shape, &free, &shape, &pose);
                 assert!(
                     left.iter().all(|c| c.gap > -1e-4),
-                    "{name} {shift}: moved by {way:?} leaves {left:?} of {found:?}"
+                    "{name} {shift}: moved by {direction:?} leaves {left:?} of {found:?}"
                 );
             }
         }
@@ -170,10 +172,10 @@ fn coincident_bodies_have_a_way_out() {
 }
 
 /// A short translation that closes all overlaps that contacts tell, by projections (Kaczmarz 1937).
-fn way_out(found: &[Contact]) -> Vec3 {
-    let mut way = Vec3::zeros();
+fn separating_translation(found: &[Contact]) -> Vec3 {
+    let mut direction = Vec3::zeros();
     for contact in found.iter().cycle().take(2000 * found.len()) {
-        way += contact.normal * (-contact.gap - contact.normal.dot(&way)).max(0.0);
+        direction += contact.normal * (-contact.gap - contact.normal.dot(&direction)).max(0.0);
     }
-    way
+    direction
 }

@@ -30,7 +30,7 @@ fn sphere_on_half_space() {
 }
 
 #[test]
-fn box_lies_on_box_on_four_corners_with_lasting_names() {
+fn box_rests_on_box_on_four_corners_with_persistent_features() {
     let shape = Shape::cuboid(Vec3::new(0.5, 0.5, 0.5)).unwrap();
     let mut names = None;
     for step in 0..20 {

@@ -17,7 +17,7 @@ fn cached(mesh: TriMesh, cache: &TreeCache) -> (Shape, Option<String>) {
 }
 
 /// All that two of a shape say of each other in many places, deep, close and apart, and of a sphere, a block and a cylinder; as text that tells all bits apart.
-fn said(shape: &Shape) -> String {
+fn contact_bits(shape: &Shape) -> String {
     let cylinder = Shape::cylinder(0.3, 0.6).unwrap();
     let others =
         [shape.clone(), Shape::sphere(0.3).unwrap(), Shape::cuboid(Vec3::new(0.2, 0.3, 0.4)).unwrap(), cylinder];
@@ -36,7 +36,7 @@ fn said(shape: &Shape) -> String {
 fn a_shape_from_the_cache_has_the_bits_of_a_fresh_one() {
     let folder = Folder::new();
     let fresh = Shape::mesh(bumpy(), &TreeSettings::octree()).unwrap();
-    let expected = said(&fresh);
+    let expected = contact_bits(&fresh);
     for found in [false, true, true] {
         assert_eq!(folder.files().len(), usize::from(found));
         let (shape, note) = cached(bumpy(), &folder.cache());
@@ -48,16 +48,16 @@ fn a_shape_from_the_cache_has_the_bits_of_a_fresh_one() {
         assert_eq!(shape.aabb(&Pose::identity()), fresh.aabb(&Pose::identity()));
         let (Shape::Mesh(a), Shape::Mesh(b)) = (&shape, &fresh) else { panic!("no meshes") };
         assert_eq!((a, a.report()), (b, b.report()));
-        assert!(said(&shape) == expected, "found: {found}");
+        assert!(contact_bits(&shape) == expected, "found: {found}");
         // asked again, and in a copy, when everything was made
-        assert!(said(&shape.clone()) == expected);
+        assert!(contact_bits(&shape.clone()) == expected);
     }
 }
 
 /// Queries in another order, and from several threads at once, make the same.
 #[test]
-fn contacts_do_not_depend_on_who_asked_first() {
-    let expected = said(&Shape::mesh(bumpy(), &TreeSettings::octree()).unwrap());
+fn contacts_do_not_depend_on_the_order_of_queries() {
+    let expected = contact_bits(&Shape::mesh(bumpy(), &TreeSettings::octree()).unwrap());
     let shape = Shape::mesh(bumpy(), &TreeSettings::octree()).unwrap();
     let sphere = Shape::sphere(0.2).unwrap();
     for n in (0..40).rev() {
@@ -65,13 +65,13 @@ fn contacts_do_not_depend_on_who_asked_first() {
         contacts(&shape, &Pose::identity(), &sphere, &pose, 0.3, &mut Vec::new());
     }
     std::thread::scope(|scope| {
-        let each = [(); 4].map(|()| scope.spawn(|| said(&shape)));
+        let each = [(); 4].map(|()| scope.spawn(|| contact_bits(&shape)));
         each.into_iter().for_each(|thread| assert!(thread.join().unwrap() == expected));
     });
 }
 
 #[test]
-fn what_was_mended_is_told_from_the_cache_too() {
+fn repairs_are_reported_from_the_cache_too() {
     let folder = Folder::new();
     let mut mesh = bumpy();
     mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
@@ -87,7 +87,7 @@ fn what_was_mended_is_told_from_the_cache_too() {
 
 /// A mesh that is no solid is the same error, whatever is in the cache.
 #[test]
-fn nothing_is_kept_of_what_cannot_be_built() {
+fn a_shape_that_cannot_be_built_is_not_cached() {
     let folder = Folder::new();
     let mut mesh = bumpy();
     mesh.triangles.pop();
@@ -98,7 +98,7 @@ fn nothing_is_kept_of_what_cannot_be_built() {
 }
 
 #[test]
-fn a_damaged_cut_or_foreign_file_is_told_and_built_anew() {
+fn a_damaged_truncated_or_foreign_file_is_reported_and_rebuilt() {
     let folder = Folder::new();
     let small = || TriMesh::torus(1.0, 0.3, 12, 8);
     let (fresh, ..) = cached(small(), &folder.cache());
@@ -154,7 +154,7 @@ fn a_folder_that_cannot_be_written_is_a_note_and_the_shape_is_fine() {
     let (shape, note) = cached(bumpy(), &TreeCache::at(in_the_way.join("trees")));
     let note = note.unwrap();
     assert!(note.starts_with("the shape is not kept in") && note.contains("trees"), "{note}");
-    assert!(said(&shape) == said(&Shape::mesh(bumpy(), &TreeSettings::octree()).unwrap()));
+    assert!(contact_bits(&shape) == contact_bits(&Shape::mesh(bumpy(), &TreeSettings::octree()).unwrap()));
 }
 
 const ITS_FOLDER: &str = "TUMBLE_TEST_SHAPE_CACHE";
@@ -197,5 +197,5 @@ fn processes_that_write_at_once_leave_one_whole_file() {
     assert_eq!(folder.files().len(), 1);
     let (shape, note) = cached(bumpy(), &folder.cache());
     assert_eq!(note, None);
-    assert!(said(&shape) == said(&Shape::mesh(bumpy(), &TreeSettings::octree()).unwrap()));
+    assert!(contact_bits(&shape) == contact_bits(&Shape::mesh(bumpy(), &TreeSettings::octree()).unwrap()));
 }

@@ -4,7 +4,7 @@ use crate::rng::Rng;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use tumble_collide::{Contact, NormalFrom, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts};
 
-fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec<Contact> {
+fn find_contacts(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec<Contact> {
     let mut out = Vec::new();
     contacts(a, pa, b, pb, margin, &mut out);
     for c in &out {
@@ -41,7 +41,7 @@ fn a_mesh_box_touches_a_plane_with_its_four_corners() {
     let mut rng = Rng::new(1);
     for _ in 0..200 {
         let pose = turned(0.2 + 1e-5, rng.between(0.0, 6.3));
-        let found = ask(&shape, &pose, &Shape::half_space(), &Pose::identity(), 1e-3);
+        let found = find_contacts(&shape, &pose, &Shape::half_space(), &Pose::identity(), 1e-3);
         assert_eq!(found.len(), 4, "{found:?}");
         for c in &found {
             assert!((c.gap - 1e-5).abs() < 1e-12 && c.normal == Vec3::z() && c.normal_from == NormalFrom::FaceOfB);
@@ -50,14 +50,14 @@ fn a_mesh_box_touches_a_plane_with_its_four_corners() {
 }
 
 #[test]
-fn blocks_of_the_same_size_meet_face_to_face() {
+fn boxes_of_the_same_size_touch_face_to_face() {
     // each as a mesh and as a primitive, aligned, and the upper one moved a little, either way
     let (mesh, block) = (mesh_box(0.5, 0.5, 0.5), Shape::cuboid(Vec3::repeat(0.5)).unwrap());
     for (a, b) in [(&mesh, &mesh), (&mesh, &block), (&block, &mesh)] {
         for shift in [0.0, 1e-9, -1e-9, 1e-7, -1e-5, 1e-3, 0.2] {
             for gap in [1e-4, 1e-7, 0.0, -1e-7, -1e-4] {
                 let upper = Pose::translation(shift, -0.5 * shift, 1.0 + gap);
-                let found = ask(a, &upper, b, &Pose::identity(), 1e-3);
+                let found = find_contacts(a, &upper, b, &Pose::identity(), 1e-3);
                 assert!(found.iter().all(|c| (c.normal - Vec3::z()).norm() < 1e-6), "{shift} {gap}: {found:?}");
                 assert!(found.iter().all(|c| (c.gap - gap).abs() < 1e-9), "{shift} {gap}: {found:?}");
                 let wide = spread(&found);
@@ -72,11 +72,11 @@ fn blocks_of_the_same_size_meet_face_to_face() {
 }
 
 #[test]
-fn a_block_turned_on_another_touches_where_the_edges_cross() {
+fn a_rotated_box_on_another_touches_where_the_edges_cross() {
     let (mesh, block) = (mesh_box(0.5, 0.5, 0.5), Shape::cuboid(Vec3::repeat(0.5)).unwrap());
     for (a, b) in [(&mesh, &mesh), (&mesh, &block), (&block, &mesh)] {
         for gap in [1e-4, 0.0, -1e-4] {
-            let found = ask(a, &turned(1.0 + gap, FRAC_PI_4), b, &Pose::identity(), 1e-3);
+            let found = find_contacts(a, &turned(1.0 + gap, FRAC_PI_4), b, &Pose::identity(), 1e-3);
             assert!(found.len() >= 4, "{found:?}");
             // the octagon in which the two squares overlap has its corners at (½, ½·tan 22.5°) and the like
             for c in &found {
@@ -97,7 +97,7 @@ fn a_bar_across_a_bar_has_the_corners_of_their_common_square() {
     let (mesh, block) = (mesh_box(1.0, 0.1, 0.1), Shape::cuboid(Vec3::new(1.0, 0.1, 0.1)).unwrap());
     for (a, b) in [(&mesh, &mesh), (&mesh, &block), (&block, &mesh)] {
         for gap in [1e-4, 0.0, -1e-4] {
-            let found = ask(a, &turned(0.2 + gap, FRAC_PI_2), b, &Pose::identity(), 1e-3);
+            let found = find_contacts(a, &turned(0.2 + gap, FRAC_PI_2), b, &Pose::identity(), 1e-3);
             assert!(found.len() >= 4 && found.len() <= 9, "{found:?}");
             for c in &found {
                 assert!((c.point.x.abs() - 0.1).abs() < 1e-3 && (c.point.y.abs() - 0.1).abs() < 1e-3, "{gap}: {c:?}");
@@ -118,7 +118,7 @@ fn crossed_edges_meet_at_one_point() {
     };
     for (a, b) in [(&mesh, &mesh), (&mesh, &block), (&block, &mesh)] {
         for gap in [1e-3, 1e-6, -1e-6, -1e-3, -2e-2] {
-            let found = ask(a, &on_edge(2.0 * reach + gap, FRAC_PI_2), b, &on_edge(0.0, 0.0), 2e-3);
+            let found = find_contacts(a, &on_edge(2.0 * reach + gap, FRAC_PI_2), b, &on_edge(0.0, 0.0), 2e-3);
             let deepest = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).unwrap();
             assert!((deepest.gap - gap).abs() < 1e-7 + 1e-3 * gap.abs(), "{gap}: {found:?}");
             assert!((deepest.normal - Vec3::z()).norm() < 1e-3, "{gap}: {found:?}");
@@ -132,13 +132,13 @@ fn a_thin_plate_is_not_seen_from_its_other_side() {
     // a plate 1 mm thick lies on a block; its lower corners are near the block's top, its upper ones not
     let (plate, block) = (mesh_box(0.2, 0.2, 0.0005), mesh_box(0.5, 0.5, 0.5));
     for gap in [1e-4, 0.0, -1e-4] {
-        let found = ask(&plate, &Pose::translation(0.0, 0.0, 0.5005 + gap), &block, &Pose::identity(), 5e-4);
+        let found = find_contacts(&plate, &Pose::translation(0.0, 0.0, 0.5005 + gap), &block, &Pose::identity(), 5e-4);
         assert!(
             found.len() >= 4 && found.iter().all(|c| (c.gap - gap).abs() < 1e-9 && c.normal.z > 0.999),
             "{gap}: {found:?}"
         );
         // the same from below, and a block that hangs from the plate's underside
-        let found = ask(&block, &Pose::translation(0.0, 0.0, -0.5005 - gap), &plate, &Pose::identity(), 5e-4);
+        let found = find_contacts(&block, &Pose::translation(0.0, 0.0, -0.5005 - gap), &plate, &Pose::identity(), 5e-4);
         assert!(
             found.len() >= 4 && found.iter().all(|c| (c.gap - gap).abs() < 1e-9 && c.normal.z < -0.999),
             "{gap}: {found:?}"
@@ -147,7 +147,7 @@ fn a_thin_plate_is_not_seen_from_its_other_side() {
 }
 
 #[test]
-fn a_cylinder_on_a_block_touches_as_on_a_plane() {
+fn a_cylinder_on_a_box_touches_as_on_a_plane() {
     let cylinder = Shape::cylinder(0.2, 0.3).unwrap();
     for block in [mesh_box(1.0, 1.0, 0.1), Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap()] {
         let mut rng = Rng::new(9);
@@ -165,7 +165,7 @@ fn a_cylinder_on_a_block_touches_as_on_a_plane() {
             let reach = 0.3 * axis.z.abs() + 0.2 * (1.0 - axis.z * axis.z).max(0.0).sqrt();
             let gap = rng.between(-1e-3, 1e-3);
             let pose = Pose::from_parts(Vec3::new(0.1, -0.2, 0.1 + reach + gap).into(), turn);
-            let found = ask(&cylinder, &pose, &block, &Pose::identity(), 2e-3);
+            let found = find_contacts(&cylinder, &pose, &block, &Pose::identity(), 2e-3);
             let least = found.iter().map(|c| c.gap).fold(9.0, f64::min);
             assert!((least - gap).abs() < 1e-8, "case {case}: {least} but {gap}: {found:?}");
             assert!(found.iter().all(|c| (c.normal - Vec3::z()).norm() < 1e-9), "case {case}: {found:?}");
@@ -186,7 +186,7 @@ fn a_sphere_in_a_groove_touches_both_sides() {
     let sphere = Shape::sphere(0.9).unwrap();
     // the sphere sits on the hole: its center is (0.9 + 0.25) from the tube's middle circle
     let height = (1.15_f64.powi(2) - 1.0).sqrt();
-    let found = ask(&sphere, &Pose::translation(0.0, 0.0, height), &ring, &Pose::identity(), 0.01);
+    let found = find_contacts(&sphere, &Pose::translation(0.0, 0.0, height), &ring, &Pose::identity(), 0.01);
     assert!(found.len() >= 3, "{found:?}");
     let sum: Vec3 = found.iter().map(|c| c.normal).sum();
     assert!(found.iter().all(|c| c.gap.abs() < 0.01 && c.normal.z > 0.3), "{found:?}");
@@ -204,7 +204,7 @@ fn the_round_side_of_a_cylinder_beside_an_edge_is_not_lost() {
         Vec3::new(0.18382241907346522, -0.5465112021749865, 0.20248664782432102).into(),
         Quat::from_quaternion(turn),
     );
-    let found = ask(&mesh, &pose, &cylinder, &Pose::identity(), 0.02);
+    let found = find_contacts(&mesh, &pose, &cylinder, &Pose::identity(), 0.02);
     let least = found.iter().map(|c| c.gap).fold(9.0, f64::min);
     assert!((least - 0.011_523_9).abs() < 2e-6, "{found:?}");
 }
@@ -216,7 +216,7 @@ fn a_cylinder_across_the_straight_lines_of_a_smooth_surface_meets_their_middle()
     let across = Quat::from_scaled_axis(Vec3::x() * FRAC_PI_2);
     for gap in [1e-3, 1e-5, -1e-5] {
         let pose = Pose::from_parts(Vec3::new(1.1 + gap, 0.0, 0.0).into(), across);
-        let found = ask(&Shape::cylinder(0.1, 0.3).unwrap(), &pose, &drum, &Pose::identity(), 2e-3);
+        let found = find_contacts(&Shape::cylinder(0.1, 0.3).unwrap(), &pose, &drum, &Pose::identity(), 2e-3);
         let deepest = found.iter().min_by(|a, b| a.gap.total_cmp(&b.gap)).unwrap();
         assert!((deepest.gap - gap).abs() < 1e-5 && (deepest.normal - Vec3::x()).norm() < 1e-2, "{gap}: {found:?}");
     }
@@ -241,7 +241,7 @@ fn a_rim_over_a_shallow_valley_meets_both_its_sides() {
         let rotation = Quat::from_scaled_axis(Vec3::x() * tilt) * Quat::from_scaled_axis(Vec3::z() * turn);
         let lift = r * tilt.sin() + 0.15 * tilt.cos() + 1e-3;
         let pose = Pose::from_parts((bottom + Vec3::z() * lift).into(), rotation);
-        let found = ask(&cylinder, &pose, &trough, &Pose::identity(), 2e-3);
+        let found = find_contacts(&cylinder, &pose, &trough, &Pose::identity(), 2e-3);
         let theta = (a / tilt.sin()).atan();
         let gap = (1e-3 + r * tilt.sin() * (1.0 - theta.cos()) - a * r * theta.sin()) / a.hypot(1.0);
         for side in [-1.0, 1.0] {
@@ -253,7 +253,7 @@ fn a_rim_over_a_shallow_valley_meets_both_its_sides() {
 }
 
 #[test]
-fn contacts_do_not_depend_on_what_was_asked_before() {
+fn contacts_do_not_depend_on_earlier_queries() {
     let shapes = [
         Shape::mesh(TriMesh::torus(0.3, 0.1, 24, 12), &TreeSettings::octree()).unwrap(),
         mesh_box(0.3, 0.2, 0.1),
@@ -278,14 +278,14 @@ fn contacts_do_not_depend_on_what_was_asked_before() {
 /// A bar goes through a block that has a dent, both meshes. No vertex and no edge of either is as deep as the places inside faces are.
 #[test]
 fn two_meshes_deep_in_each_other_have_the_depth_of_the_deepest_face() {
-    let (block, bar) = (dented_block(), mesh_box(3.0, 0.7, 0.4));
+    let (block, bar) = (dented_box(), mesh_box(3.0, 0.7, 0.4));
     // the bar's wide faces are at z = ±0.4, 0.6 below the block's; the bar's edges are 0.3 below y = ±1; the block's own faces are 0.4 deep in the bar
     let straight = Pose::identity();
     // moved by 0.1 up: one wide face comes to z = 0.5, the other to z = −0.3, 0.7 below the block's lower side
     let raised = Pose::translation(0.0, 0.0, 0.1);
     for (pose, depth) in [(straight, 0.6), (raised, 0.7)] {
         for (a, pa, b, pb) in [(&block, Pose::identity(), &bar, pose), (&bar, pose, &block, Pose::identity())] {
-            let found = ask(a, &pa, b, &pb, 1e-3);
+            let found = find_contacts(a, &pa, b, &pb, 1e-3);
             let least = found.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
             // to 4e-4 of the smaller radius, and never deeper
             assert!(least >= -depth - 1e-12 && least < -depth + 4e-4 * 3.0_f64.sqrt(), "{least} but {depth}");
@@ -294,7 +294,7 @@ fn two_meshes_deep_in_each_other_have_the_depth_of_the_deepest_face() {
 }
 
 /// A cube of edge 2 about its center of mass, less a pyramid of 0.01 in one side, which moves that by 6e-5 (the deepest places are beside it in z).
-fn dented_block() -> Shape {
+fn dented_box() -> Shape {
     let mut mesh = TriMesh::box_(Vec3::repeat(1.0));
     let at = |mesh: &TriMesh, v: u32| mesh.vertices[v as usize];
     let side: Vec<[u32; 3]> =
@@ -314,7 +314,7 @@ fn dented_block() -> Shape {
 fn convex_meshes_through_each_other_have_the_depth_of_the_least_translation() {
     let (block, bar) = (mesh_box(1.0, 1.0, 1.0), mesh_box(3.0, 0.7, 0.4));
     for (rise, depth) in [(0.0, 1.4), (0.1, 1.3)] {
-        let found = ask(&bar, &Pose::translation(0.0, 0.0, rise), &block, &Pose::identity(), 1e-3);
+        let found = find_contacts(&bar, &Pose::translation(0.0, 0.0, rise), &block, &Pose::identity(), 1e-3);
         let least = found.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
         assert!(
             (least + depth).abs() < 1e-9 && found.iter().all(|c| c.normal.z.abs() > 1.0 - 1e-9),

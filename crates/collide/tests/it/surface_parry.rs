@@ -7,7 +7,7 @@
 //! use: [`MeshDistance`] and formulas written here.
 
 use crate::against_parry::{to_parry, vector};
-use crate::referee::{self, Kind};
+use crate::brute_force::{self, Kind};
 use crate::rng::Rng;
 use crate::shared_meshes::text;
 use nalgebra::Point3;
@@ -139,12 +139,12 @@ struct Counts {
     turned: u32,
     /// Near ones of which no contact that is as deep within the stated error has parry's normal: where a vertex is closest to a flat face, as a
     /// referee says, and where something else is.
-    elsewhere: [u32; 2],
+    other_normals: [u32; 2],
     worst_apart: f64,
     worst_depth: f64,
 }
 
-fn ask(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
+fn find_contacts(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
     let mut out = Vec::new();
     contacts(a, pa, b, pb, MARGIN, &mut out);
     assert!(out.len() <= 72 && out.iter().all(|c| c.gap <= MARGIN && (c.normal.norm() - 1.0).abs() < 1e-9));
@@ -175,7 +175,7 @@ fn compare(a: &Body, b: &Body, cases: usize, brute: usize, rng: &mut Rng, counts
         }
         pa.translation.vector -= way * if case % 4 == 0 { rng.between(0.0, 0.2) } else { rng.between(-0.02, 0.02) };
         let deep = case % (cases / brute.min(cases)) == 0;
-        judge(&format!("{} on {}, case {case}", a.name, b.name), (a, &pa), (b, &pb), deep, counts);
+        check_pose(&format!("{} on {}, case {case}", a.name, b.name), (a, &pa), (b, &pb), deep, counts);
     }
 }
 
@@ -198,7 +198,7 @@ fn compare_by_halves(a: &Body, b: &Body, cases: usize, brute: usize, rng: &mut R
             let deeper = if n == 0 { rng.between(0.0, 0.2) } else { rng.between(-0.02, 0.02) };
             let pa = Pose::from_parts((pb.translation.vector + way * (free - deeper)).into(), turn * pa.rotation);
             let deep = way_number % (cases / POSES / brute.min(cases / POSES)) == 0 && n < 2;
-            judge(&format!("{} on {}, case {case}", a.name, b.name), (a, &pa), (b, &pb), deep, counts);
+            check_pose(&format!("{} on {}, case {case}", a.name, b.name), (a, &pa), (b, &pb), deep, counts);
         }
     }
 }
@@ -207,12 +207,12 @@ fn compare_by_halves(a: &Body, b: &Body, cases: usize, brute: usize, rng: &mut R
 const POSES: usize = 5;
 
 /// Holds one pose against parry, and if they overlap and `deep` asks for it against brute force.
-fn judge(label: &str, (a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), deep: bool, counts: &mut Counts) {
+fn check_pose(label: &str, (a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), deep: bool, counts: &mut Counts) {
     let (distance, line) = apart(a, pa, b, pb);
-    let found = ask(&a.ours, pa, &b.ours, pb);
+    let found = find_contacts(&a.ours, pa, &b.ours, pb);
     let deepest = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap));
     let gap = deepest.map_or(f64::INFINITY, |c| c.gap);
-    let label = || eprintln!("{label}: {gap} but {distance}; {}", told(pa, pb));
+    let label = || eprintln!("{label}: {gap} but {distance}; {}", pose_bits(pa, pb));
     let inside = |x: &Body, px: &Pose, y: &Body, py: &Pose| {
         let p = x.samples.first().copied().unwrap_or_default();
         signed(y, &(py.inv_mul(px) * Point3::from(p)).coords) < 0.0
@@ -238,7 +238,7 @@ fn judge(label: &str, (a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), deep: bo
         let turned = |c: &Contact| line.is_some_and(|line| line.dot(&c.normal) < 1.0_f64.to_radians().cos());
         if (1e-3..MARGIN - ERROR).contains(&distance) && found.iter().filter(|c| c.gap < distance + ERROR).all(turned) {
             label();
-            counts.elsewhere[usize::from(!closest_is_face((a, pa), (b, pb), distance))] += 1;
+            counts.other_normals[usize::from(!closest_is_face((a, pa), (b, pb), distance))] += 1;
         }
         if distance > 1e-3
             && (gap - distance).abs() < rounding
@@ -269,7 +269,7 @@ fn judge(label: &str, (a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), deep: bo
 /// Whether a vertex of one is closest to the inside of a face of the other, by brute force where both are meshes; else it is taken to be.
 fn closest_is_face((a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), distance: f64) -> bool {
     let (Shape::Mesh(x), Shape::Mesh(y), Some(field)) = (&a.ours, &b.ours, &b.distance) else { return true };
-    let all = referee::closest(x.mesh(), pa, y.mesh(), pb, field, 1e-9);
+    let all = brute_force::closest(x.mesh(), pa, y.mesh(), pb, field, 1e-9);
     assert!(
         (all[0].distance - distance).abs() < 1e-9,
         "{} on {}: {} but parry says {distance}",
@@ -281,7 +281,7 @@ fn closest_is_face((a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), distance: f
 }
 
 /// Two poses, to the last bit.
-fn told(pa: &Pose, pb: &Pose) -> String {
+fn pose_bits(pa: &Pose, pb: &Pose) -> String {
     let of = |p: &Pose| format!("{:?} {:?}", p.translation.vector.as_slice(), p.rotation.coords.as_slice());
     format!("{} {}", of(pa), of(pb))
 }
@@ -310,7 +310,7 @@ fn on_meshes(poses: usize, brute: usize) {
     }
     println!("meshes on meshes: {counts:?}");
     agree(&counts);
-    assert_eq!(counts.elsewhere[0], 0, "a flat face is closest, and no contact has its normal");
+    assert_eq!(counts.other_normals[0], 0, "a flat face is closest, and no contact has its normal");
 }
 
 fn agree(c: &Counts) {
@@ -339,7 +339,7 @@ fn meshes_on_spheres_and_capsules_agree_with_parry_full_length() {
 }
 
 #[test]
-fn meshes_on_blocks_agree_with_parry_full_length() {
+fn meshes_on_boxes_agree_with_parry_full_length() {
     if is_slow() {
         on_primitive("block", 10_000, 100);
     }
@@ -370,7 +370,7 @@ fn meshes_on_a_half_space_are_exact() {
             let lowest = shape.mesh().vertices.iter().map(|v| (turn * v).z).fold(f64::INFINITY, f64::min);
             let gap = rng.between(-0.1, 0.9 * MARGIN);
             let pose = Pose::from_parts(Vec3::new(0.3, 0.2, gap - lowest).into(), turn);
-            let found = ask(&body.ours, &pose, &Shape::half_space(), &Pose::identity());
+            let found = find_contacts(&body.ours, &pose, &Shape::half_space(), &Pose::identity());
             let least = found.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
             assert!((least - gap).abs() < 1e-12, "{}: {least} but {gap}", body.name);
             assert!(found.iter().all(|c| c.normal == Vec3::z()));
@@ -395,6 +395,6 @@ fn an_edge_ends_at_its_corner() {
         [0.09169844050522347, 0.38733862619982207, 0.036220080719898226, 0.9166505825095997],
     );
     let (distance, _) = apart(a, &pa, b, &pb);
-    let least = ask(&a.ours, &pa, &b.ours, &pb).iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
+    let least = find_contacts(&a.ours, &pa, &b.ours, &pb).iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
     assert!((least - distance).abs() < 1e-9, "{least} but {distance}");
 }

@@ -200,7 +200,7 @@ fn the_oldest_go_first() {
 }
 
 #[test]
-fn files_of_others_stay_whatever_their_names_end_in() {
+fn unknown_files_are_never_removed() {
     let folder = Folder::new();
     let ours = cached(&TriMesh::box_(Vec3::repeat(1.0)), &folder.cache());
     assert!(!ours.found);
@@ -224,7 +224,7 @@ fn files_of_others_stay_whatever_their_names_end_in() {
 }
 
 #[test]
-fn a_file_in_place_of_the_folder_is_told_as_what_it_is() {
+fn a_file_instead_of_the_folder_is_reported() {
     let folder = Folder::new();
     std::fs::create_dir_all(&folder.0).unwrap();
     let file = folder.0.join("file");

@@ -50,7 +50,7 @@ fn a_tree_comes_back_with_the_same_bits() {
 }
 
 #[test]
-fn every_level_in_the_text_stands_for_the_solid() {
+fn every_level_of_the_file_represents_the_solid() {
     let mesh = TriMesh::cylinder(0.2, 1.0, 24);
     let file = file(&mesh, 6);
     let text: serde_json::Value = serde_json::from_str(&file.to_json()).unwrap();
@@ -70,15 +70,15 @@ const GOOD: &str = r#"{"format":"tumble sphere tree","version":1,"name":"","unit
 [{"c":[1,0,0],"r":2,"out":1,"parent":0},{"c":[-2,0,0],"r":2,"out":1,"parent":1},{"c":[0,0,0],"r":2,"out":1,"parent":1}]]}"#;
 
 #[test]
-fn a_leaf_that_is_carried_down_is_one_sphere() {
+fn a_repeated_leaf_is_one_sphere() {
     let tree = TreeFile::from_json(GOOD).unwrap().tree;
-    let said: Vec<(f64, u32, u32, u32)> =
+    let reference_levels: Vec<(f64, u32, u32, u32)> =
         tree.nodes().iter().map(|n| (n.center.x, n.level, n.first_child, n.children)).collect();
-    assert_eq!(said, [(0.0, 0, 1, 2), (1.0, 1, 0, 0), (-1.0, 1, 3, 2), (-2.0, 2, 0, 0), (0.0, 2, 0, 0)]);
+    assert_eq!(reference_levels, [(0.0, 0, 1, 2), (1.0, 1, 0, 0), (-1.0, 1, 3, 2), (-2.0, 2, 0, 0), (0.0, 2, 0, 0)]);
 }
 
 #[test]
-fn wrong_texts_are_refused_with_the_place_and_what_would_be_right() {
+fn invalid_files_are_rejected_with_place_and_remedy() {
     let cases = [
         ("\"version\":1", "\"version\":2", "of version 2; what is read is a \"tumble sphere tree\" of version 1"),
         ("tumble sphere tree", "other", "it is a \"other\""),
@@ -123,11 +123,11 @@ fn wrong_texts_are_refused_with_the_place_and_what_would_be_right() {
         ),
         ("\"diagonal\":1.0", "\"diagonal\":0", "`diagonal` of `mesh` is 0; wanted above 0"),
     ];
-    for (from, to, said) in cases {
+    for (from, to, reference_levels) in cases {
         assert!(GOOD.contains(from), "{from}");
         let row = serde_json::to_string(&LevelQuality::default()).unwrap();
         let error = TreeFile::from_json(&GOOD.replacen(from, &to.replace("QUALITY", &row), 1)).unwrap_err().to_string();
-        assert!(error.contains(said), "{from} → {to}: {error}");
+        assert!(error.contains(reference_levels), "{from} → {to}: {error}");
     }
     let repeated = GOOD.replace("]]}", "],[{\"c\":[1,0,0],\"r\":1,\"out\":1,\"parent\":0}]]}");
     let error = TreeFile::from_json(&repeated).unwrap_err();
@@ -142,7 +142,7 @@ fn wrong_texts_are_refused_with_the_place_and_what_would_be_right() {
 }
 
 #[test]
-fn a_tree_by_hand_needs_its_spheres_alone() {
+fn a_handwritten_tree_needs_spheres_only() {
     let text = r#"{"format":"tumble sphere tree","version":1,"levels":[[{"c":[0,0,0],"r":2}],[{"c":[0,0,1],"r":1,"parent":0},{"c":[0,0,-1],"r":1,"out":0.5,"parent":0}]]}"#;
     let file = TreeFile::from_json(text).unwrap();
     assert_eq!(file.tree.nodes().iter().map(|n| n.outward).collect::<Vec<_>>(), [4.0, 2.0, 0.5]);
@@ -217,7 +217,7 @@ fn measure_in_python(mesh: &TriMesh, tree: &str) -> Option<serde_json::Value> {
     let path = |name: &str| folder.join(name);
     std::fs::write(path("mesh.obj"), obj(mesh)).unwrap();
     std::fs::write(path("tree.json"), tree).unwrap();
-    let said = Command::new(&python)
+    let reference_levels = Command::new(&python)
         .arg(script)
         .arg("eval")
         .args([path("mesh.obj"), path("tree.json")])
@@ -225,7 +225,7 @@ fn measure_in_python(mesh: &TriMesh, tree: &str) -> Option<serde_json::Value> {
         .arg(path("said.json"))
         .output()
         .unwrap();
-    assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
+    assert!(reference_levels.status.success(), "{}", String::from_utf8_lossy(&reference_levels.stderr));
     let answer = serde_json::from_str(&std::fs::read_to_string(path("said.json")).unwrap()).unwrap();
     std::fs::remove_dir_all(folder).unwrap();
     Some(answer)
@@ -259,11 +259,11 @@ const KEYS: [Key; 12] = [
     ("miss_frac", |q| q.missing, 0.005),
     ("nest_max", |q| q.nesting_max, 1e-9),
 ];
-type Said = [f64; 12];
+type ReferenceLevel = [f64; 12];
 /// Name there, figure here, tolerance.
 type Key = (&'static str, fn(&LevelQuality) -> f64, f64);
 
-fn assert_agreement(ours: &[LevelQuality], its: &[Said]) {
+fn assert_agreement(ours: &[LevelQuality], its: &[ReferenceLevel]) {
     assert_eq!(ours.len(), its.len());
     for (ours, its) in ours.iter().zip(its) {
         for ((key, figure, tolerance), its) in KEYS.iter().zip(its) {
@@ -277,7 +277,7 @@ fn assert_agreement(ours: &[LevelQuality], its: &[Said]) {
     }
 }
 
-fn said(answer: &serde_json::Value) -> Vec<Said> {
+fn reference_levels(answer: &serde_json::Value) -> Vec<ReferenceLevel> {
     answer["levels"]
         .as_array()
         .unwrap()
@@ -288,7 +288,7 @@ fn said(answer: &serde_json::Value) -> Vec<Said> {
 
 /// What `tools/sphere_quality.py` said of [`ring`] with numpy 2.4, scipy 1.17, trimesh 5.2 and rtree 1.4. The next test prints it anew:
 /// `TUMBLE_PYTHON=target/python/bin/python cargo test --release -p tumble-collide --test it figures_agree -- --nocapture`.
-const RING: [Said; 3] = [
+const RING: [ReferenceLevel; 3] = [
     [1.0, 0.0, 1.0, 0.0, 0.379274048, 0.13714331, 0.379274048, 0.379274048, 6.85171579, 5.85151487, 0.0, 0.0],
     [
         1.0,
@@ -321,21 +321,21 @@ const RING: [Said; 3] = [
 ];
 
 #[test]
-fn figures_are_those_that_python_gave() {
+fn figures_equal_those_of_the_python_tool() {
     let (mesh, levels) = ring();
     assert_agreement(&LevelQuality::of_levels(&levels, &mesh, &QualitySettings::default()), &RING);
 }
 
 #[test]
-fn figures_agree_with_the_measure_in_python() {
+fn figures_agree_with_the_python_tool() {
     let (mesh, levels) = ring();
     let Some(answer) = measure_in_python(&mesh, &levels_text(&levels)) else { return };
-    eprintln!("{:?}", said(&answer));
+    eprintln!("{:?}", reference_levels(&answer));
     let ours = LevelQuality::of_levels(&levels, &mesh, &QualitySettings::default());
-    assert_agreement(&ours, &said(&answer));
+    assert_agreement(&ours, &reference_levels(&answer));
     assert_eq!(answer["levels"][2]["nest_bad"].as_u64(), Some(ours[2].nesting_broken as u64));
 
     let file = file(&mesh, 3);
     let answer = measure_in_python(&mesh, &file.to_json()).unwrap();
-    assert_agreement(&file.tree.quality(&mesh, &QualitySettings::default()), &said(&answer));
+    assert_agreement(&file.tree.quality(&mesh, &QualitySettings::default()), &reference_levels(&answer));
 }

@@ -109,7 +109,7 @@ fn hard_meshes_and_fine_settings_still_cover() {
 }
 
 #[test]
-fn an_uneven_tree_is_tighter_on_the_mean() {
+fn an_uneven_tree_has_a_smaller_mean_error() {
     let mesh = TriMesh::torus(1.0, 0.3, 48, 24);
     let mean = |even| {
         let tree = SphereTree::build(&mesh, &TreeSettings { even, ..TreeSettings::octree() }).unwrap();

@@ -257,7 +257,7 @@ fn shell_in_a_shell_is_a_cavity_or_buried_by_its_winding() {
 
 /// Shells that are inside out are turned, with what lies in them; cavities stay.
 #[test]
-fn shells_are_turned_by_where_they_lie() {
+fn shells_are_reversed_by_their_position() {
     let (outer, inner) = (TriMesh::icosphere(1.0, 2), TriMesh::icosphere(0.5, 2));
     let (big, small) = (outer.signed_volume(), inner.signed_volume());
     let hollow = both(&outer, &inside_out(inner));

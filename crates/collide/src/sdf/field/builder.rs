@@ -223,7 +223,7 @@ mod tests {
 
     /// A query builds the block around it, and no other.
     #[test]
-    fn what_is_not_asked_is_not_made() {
+    fn only_queried_blocks_are_built() {
         let field = torus();
         assert_eq!(field.tree.blocks.built().count(), 0);
         field.nearest(&Vec3::new(1.3, 0.0, 0.0));
@@ -233,7 +233,7 @@ mod tests {
 
     /// Distances equal those of a brute-force search.
     #[test]
-    fn blocks_tell_the_distance() {
+    fn blocks_give_the_exact_distance() {
         let mesh = TriMesh::torus(1.0, 0.3, 32, 16);
         let field = torus();
         for n in 0..2000_u32 {

@@ -125,7 +125,7 @@ pub(super) struct Octree {
     /// Half the side.
     half: f64,
     /// Number of outermost cells per meter.
-    per_metre: f32,
+    per_meter: f32,
     /// Half the side of a cell, by depth.
     halves: [f32; 16],
     /// Single-precision error of a bound, meters.
@@ -139,7 +139,7 @@ impl Octree {
             blocks: Blocks::new(center, half, max_depth),
             center,
             half,
-            per_metre: (0.5 / half) as f32,
+            per_meter: (0.5 / half) as f32,
             halves: std::array::from_fn(|depth| (half / f64::from(1_u32 << depth)) as f32),
             rounding: ROUNDING * half,
         }
@@ -210,7 +210,7 @@ impl Octree {
         // the cube: the first binary digits of the position, as a fraction of the side, after
         // adding 1
         let place: [u32; 4] = std::array::from_fn(|k| {
-            let x = low[k] * self.per_metre + 1.0;
+            let x = low[k] * self.per_meter + 1.0;
             let x = if x < BELOW_TWO { x } else { BELOW_TWO };
             (x.to_bits() & MANTISSA) >> (23 - level)
         });

@@ -45,7 +45,7 @@ fn cover_points_lie_on_their_triangles_by_area() {
 }
 
 #[test]
-fn every_point_has_one_sphere_which_it_needs_least_of() {
+fn each_point_has_the_sphere_of_its_least_need() {
     let (mesh, distance) = (bar(), MeshDistance::new(&bar()));
     let cover = CoverPoints::on(&mesh, 500);
     let region = all(&cover.points);
@@ -70,7 +70,7 @@ fn every_point_has_one_sphere_which_it_needs_least_of() {
 }
 
 #[test]
-fn expand_finds_the_least_stand_off() {
+fn expand_finds_the_smallest_offset() {
     let (mesh, distance) = (bar(), MeshDistance::new(&bar()));
     let points = CoverPoints::on(&mesh, 300).points;
     let candidates = sites(&[-3.0, -2.0, -1.0, 0.0, 0.5, 1.0, 2.0, 3.0], &distance);
@@ -86,7 +86,7 @@ fn expand_finds_the_least_stand_off() {
 }
 
 #[test]
-fn merge_and_burst_give_up_the_sphere_that_another_stands_for() {
+fn merge_and_burst_remove_a_redundant_sphere() {
     let distance = MeshDistance::new(&bar());
     let points: Vec<Vec3> = (-8..=8).map(|n| Vec3::new(0.5 * f64::from(n), 0.5, 0.1)).collect();
     // the first two nearly coincide
@@ -102,7 +102,7 @@ fn merge_and_burst_give_up_the_sphere_that_another_stands_for() {
 /// Three groups along the bar, the first two full. A chain makes room for a sphere that is added to
 /// the first.
 #[test]
-fn full_groups_hand_on_what_they_can_not_hold() {
+fn full_groups_transfer_spheres() {
     let distance = MeshDistance::new(&bar());
     let sphere = |x: f64| Sphere { center: along_x(x), radius: 0.8 };
     let spheres = [-3.0, -2.0, -1.0, 0.5, 2.5].map(sphere).to_vec();
@@ -118,7 +118,7 @@ fn full_groups_hand_on_what_they_can_not_hold() {
 }
 
 #[test]
-fn a_leaf_is_grown_by_what_it_lacks_and_no_more() {
+fn a_leaf_grows_by_its_deficit_only() {
     let mesh = TriMesh::box_(Vec3::new(1.0, 2.0, 2.0));
     let spheres = grown_to_cover(&mesh, vec![Sphere { center: Vec3::zeros(), radius: 0.1 }], &());
     assert!((spheres[0].radius - 3.0).abs() < 1e-9, "{}", spheres[0].radius);
@@ -127,7 +127,7 @@ fn a_leaf_is_grown_by_what_it_lacks_and_no_more() {
 }
 
 #[test]
-fn gaps_are_where_no_sphere_is() {
+fn uncovered_points_lie_in_no_sphere() {
     let mesh = TriMesh { vertices: vec![Vec3::zeros(), Vec3::x(), Vec3::y()], triangles: vec![[0, 1, 2]] };
     let corners = mesh.vertices.iter().map(|v| Sphere { center: *v, radius: 0.45 });
     let mut cover = CoverPoints::default();

@@ -43,7 +43,7 @@ fn check(mesh: &TriMesh, goal: &RefineGoal) -> (Vec<MedialSphere>, Counts) {
 }
 
 #[test]
-fn a_box_is_refined_to_what_is_asked() {
+fn a_box_is_refined_to_the_target() {
     let mesh = TriMesh::box_(Vec3::new(0.5, 1.0, 0.2));
     let (spheres, counts) = check(&mesh, &RefineGoal { target: 0.05, least: 100, most: 2000 });
     assert!(counts.inserted < 2000 && spheres.len() >= 100, "{counts:?}");
@@ -77,7 +77,7 @@ fn a_region_of_coplanar_points() {
 }
 
 #[test]
-fn points_of_thin_sheets_and_needles_are_held() {
+fn points_of_thin_sheets_and_needles_are_contained() {
     for half in [Vec3::new(1.0, 1.0, 1e-3), Vec3::new(1.0, 1e-4, 1e-4)] {
         let (_, counts) = check(&TriMesh::box_(half), &RefineGoal { target: 0.02, least: 100, most: 1000 });
         assert_eq!(counts.alone, 0, "{half}");

@@ -155,7 +155,7 @@ fn a_plane_and_one_more_point() {
 }
 
 #[test]
-fn duplicates_are_left_out_and_said() {
+fn duplicates_are_skipped_and_counted() {
     let mut points = random(50);
     points.extend_from_within(10..40);
     let mut d = check(&points);
@@ -170,7 +170,7 @@ fn duplicates_are_left_out_and_said() {
 }
 
 #[test]
-fn points_added_later_keep_all_spheres_empty_and_tell_what_changed() {
+fn points_added_later_keep_all_spheres_empty_and_list_the_changes() {
     let mut points = grid(3);
     let mut d = Delaunay::new(&points).unwrap();
     let mut dice = Dice(5);

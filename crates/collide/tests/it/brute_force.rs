@@ -105,24 +105,24 @@ fn inside_edges([a, b]: [&Vec3; 2], [c, d]: [&Vec3; 2]) -> Option<[Vec3; 2]> {
 }
 
 #[test]
-fn the_referee_knows_cubes() {
+fn the_reference_is_right_for_cubes() {
     let cube = TriMesh::box_(Vec3::repeat(0.5));
     let distance = MeshDistance::new(&cube);
-    let ask = |pose: &Pose| closest(&cube, pose, &cube, &Pose::identity(), &distance, 0.0)[0];
+    let find_contacts = |pose: &Pose| closest(&cube, pose, &cube, &Pose::identity(), &distance, 0.0)[0];
     // an edge across an edge: each is √½ from its center
     let turn = |axis: Vec3, angle: f64| tumble_collide::Quat::from_scaled_axis(axis * angle);
     let way = Vec3::new(0.0, 0.5_f64.sqrt(), 0.5_f64.sqrt());
     // the upper cube's lowest edge, across the lower one's edge along x
     let across = nalgebra::Rotation3::from_axis_angle(&nalgebra::Unit::new_normalize(way), 0.7);
     let upper = tumble_collide::Quat::from_rotation_matrix(&across);
-    let found = ask(&Pose::from_parts((way * (2.0_f64.sqrt() + 0.1)).into(), upper));
+    let found = find_contacts(&Pose::from_parts((way * (2.0_f64.sqrt() + 0.1)).into(), upper));
     assert!(
         (found.distance - 0.1).abs() < 1e-12 && found.kind == Kind::Edges && (found.normal - way).norm() < 1e-9,
         "{found:?}"
     );
     // a corner down on a face
     let corner = turn(Vec3::new(1.0, -1.0, 0.0).normalize(), (1.0 / 3.0_f64.sqrt()).acos());
-    let found = ask(&Pose::from_parts(Vec3::new(0.1, 0.07, 0.5 + 0.75_f64.sqrt() + 0.1).into(), corner));
+    let found = find_contacts(&Pose::from_parts(Vec3::new(0.1, 0.07, 0.5 + 0.75_f64.sqrt() + 0.1).into(), corner));
     assert!(
         (found.distance - 0.1).abs() < 1e-12 && found.kind == Kind::Face && (found.normal - Vec3::z()).norm() < 1e-9,
         "{found:?}"
