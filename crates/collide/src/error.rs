@@ -62,7 +62,7 @@ pub enum MeshError {
     /// A concave face, or all concave faces together, with more corners than can be triangulated in
     /// a reasonable time.
     #[error(
-        "a concave face of {corners} corners; at most {most}, and fewer where there are many such faces, are cut into triangles: cut it before"
+        "a concave face has {corners} corners; at most {most} are triangulated, fewer if there are many such faces: triangulate it before import"
     )]
     Concave {
         /// Number of corners of the face.
@@ -71,7 +71,7 @@ pub enum MeshError {
         most: usize,
     },
     /// A file that is not PLY.
-    #[error("no PLY that can be read: {what}")]
+    #[error("not a readable PLY file: {what}")]
     Ply {
         /// The text that was found, its place, and the expected text.
         what: String,
@@ -89,7 +89,7 @@ pub enum MeshError {
         z: f64,
     },
     /// A vertex too far from the origin.
-    #[error("vertex {vertex} has a coordinate of {value:e} m, but at most 1e9 m is taken; is the unit right?")]
+    #[error("vertex {vertex} has a coordinate of {value:e} m, but at most 1e9 m is allowed; is the unit right?")]
     TooFar {
         /// From 1.
         vertex: usize,
@@ -109,7 +109,7 @@ pub enum MeshError {
         z: f64,
     },
     /// A face with the index of a vertex that does not exist.
-    #[error("face {face} points at vertex {index}, but there are {count} vertices")]
+    #[error("face {face} refers to vertex {index}, but there are {count} vertices")]
     IndexOutOfRange {
         /// From 1.
         face: usize,
@@ -129,7 +129,7 @@ pub enum MeshError {
         size: usize,
     },
     /// A file that is neither text nor binary STL.
-    #[error("no STL: {size} bytes, neither text that begins with `solid` nor a binary header of 84 bytes")]
+    #[error("not an STL file: {size} bytes, neither text that begins with `solid` nor a binary header of 84 bytes")]
     StlShort {
         /// Bytes in the file.
         size: usize,
@@ -173,7 +173,7 @@ pub enum MeshError {
         face: usize,
     },
     /// A surface that repair cannot make a solid.
-    #[error("{error}; repair was asked for, but {why}")]
+    #[error("{error}; repair failed: {why}")]
     BeyondRepair {
         /// The error of the original mesh.
         error: Box<MeshError>,
@@ -203,7 +203,7 @@ pub enum MeshError {
         allowed: &'static str,
     },
     /// A sphere tree that breaks one of its guarantees: an error of the builder, never of the data.
-    #[error("the sphere tree is wrong: {what}")]
+    #[error("the sphere tree is invalid: {what}")]
     Tree {
         /// The broken guarantee and its place.
         what: String,

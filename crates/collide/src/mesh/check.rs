@@ -46,24 +46,24 @@ impl ClosedReport {
     /// Returns one sentence per defect that a user should know; empty for a mesh without defects.
     pub fn notes(&self) -> Vec<String> {
         let counted = [
-            (self.welded_vertices, "vertices at the same place were welded"),
+            (self.welded_vertices, "vertices at the same position were welded"),
             (self.degenerate_faces, "faces of zero area were dropped"),
-            (self.duplicate_faces, "faces that were there twice were dropped"),
+            (self.duplicate_faces, "duplicate faces were dropped"),
             (self.flipped_faces, "faces were reversed to agree with their neighbors"),
             (self.nonmanifold_edges, "edges have four or more faces (accepted: the volume is well defined)"),
         ];
         let mut notes: Vec<String> =
             counted.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
         if self.turned {
-            notes.push("the mesh was inside out and was turned".into());
+            notes.push("the mesh was inside out and was reversed".into());
         }
         if self.inverted_shells > 0 {
-            notes.push(format!("{} shells were inside out and were turned", self.inverted_shells));
+            notes.push(format!("{} shells were inside out and were reversed", self.inverted_shells));
         }
         if self.crossing_faces > 0 {
             let least = if self.crossing_capped { "at least " } else { "" };
             notes.push(format!(
-                "{least}{} faces cross or touch others (accepted by winding number: the solid is what the surface goes around at \
+                "{least}{} faces cross or touch others (accepted by winding number: the solid is the volume that the surface encloses at \
                  least once)",
                 self.crossing_faces
             ));

@@ -239,7 +239,7 @@ impl Header {
         let names: Vec<String> = self.elements.iter().take(10).map(|e| format!("{} {}", e.count, e.name)).collect();
         ply_error(
             "the file has no triangles",
-            &format!("wanted elements `face` or `tristrips`; there are: {}", names.join(", ")),
+            &format!("wanted elements `face` or `tristrips`; found: {}", names.join(", ")),
         )
     }
 }
@@ -247,7 +247,7 @@ impl Header {
 fn add_property(elements: &mut [Element], name: &str, kind: &str, length: Option<&str>) -> Result<(), String> {
     let number = |word: &str| {
         ScalarType::from_name(word).ok_or_else(|| {
-            format!("`{word}` is no kind of number; wanted char, uchar, short, ushort, int, uint, float or double")
+            format!("`{word}` is not a number type; wanted char, uchar, short, ushort, int, uint, float or double")
         })
     };
     let property = Property { name: name.into(), number: number(kind)?, length: length.map(number).transpose()? };

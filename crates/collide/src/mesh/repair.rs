@@ -70,10 +70,10 @@ impl RepairReport {
         };
         say(
             self.welded_vertices,
-            format!("{} vertices at or close to the place of another were welded", self.welded_vertices),
+            format!("{} vertices at or close to the position of another were welded", self.welded_vertices),
         );
         say(self.degenerate_faces, format!("{} faces of zero area were dropped", self.degenerate_faces));
-        say(self.duplicate_faces, format!("{} faces that were there twice were dropped", self.duplicate_faces));
+        say(self.duplicate_faces, format!("{} duplicate faces were dropped", self.duplicate_faces));
         say(self.flipped_faces, format!("{} faces were reversed to agree with their neighbors", self.flipped_faces));
         say(
             self.dangling_pieces,
@@ -154,7 +154,7 @@ impl TriMesh {
         }
         mesh.drop_loose_pieces(settings.debris, report);
         if mesh.triangles.is_empty() {
-            return Err("nothing is left of it once zero-area faces and loose pieces are dropped".into());
+            return Err("nothing remains after zero-area faces and loose pieces are dropped".into());
         }
         mesh.fill_holes(settings.hole_edges, report)?;
         report.closed = mesh.check_closed().map_err(|e| format!("after repair {e}"))?;
@@ -200,7 +200,7 @@ impl TriMesh {
     fn fill_holes(&mut self, most_edges: usize, report: &mut RepairReport) -> Result<(), String> {
         let pairing = Pairing::of(self);
         if pairing.dangling.contains(&true) {
-            return Err("faces meet at an edge without a way to tell which go on over it".into());
+            return Err("the faces at some edge cannot be paired uniquely".into());
         }
         let loops = pairing.loops();
         let longest = loops.iter().map(Vec::len).max().unwrap_or(0);

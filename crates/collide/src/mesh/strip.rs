@@ -26,5 +26,5 @@ pub(super) fn strip_triangles(indices: &[i64], count: usize) -> Result<Vec<[u32;
 fn check_index(index: i64, count: usize) -> Result<u32, String> {
     let within = u32::try_from(index).ok().filter(|&v| (v as usize) < count);
     within
-        .ok_or_else(|| format!("it points at vertex {index} (from 0), but there are {count} vertices; -1 ends a strip"))
+        .ok_or_else(|| format!("it refers to vertex {index} (from 0), but there are {count} vertices; -1 ends a strip"))
 }

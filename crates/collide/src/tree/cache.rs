@@ -65,7 +65,7 @@ fn read(entry: &Entry, mesh: &MeshId, settings: &TreeSettings) -> Result<Option<
     let text = String::from_utf8(body).map_err(|e| entry.refused(e))?;
     let found = TreeFile::from_json(&text).map_err(|e| entry.refused(e))?;
     if found.mesh != *mesh || found.settings != *settings {
-        return Err(entry.refused("it is of another mesh or of other settings"));
+        return Err(entry.refused("it belongs to another mesh or other settings"));
     }
     Ok(Some(found))
 }

@@ -75,13 +75,13 @@ pub struct MeshId {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum TreeFileError {
     /// The text is too long.
-    #[error("the text has {0} bytes; a sphere tree may have {MOST_BYTES}")]
+    #[error("the text has {0} bytes; at most {MOST_BYTES} are allowed")]
     TooLong(usize),
     /// Not JSON, or not the keys of a sphere tree.
     #[error("{0}")]
     Json(String),
     /// A different format or version.
-    #[error("it is a \"{format}\" of version {version}; what is read is a \"{FORMAT}\" of version {VERSION}")]
+    #[error("it is a \"{format}\" of version {version}; supported is \"{FORMAT}\" of version {VERSION}")]
     Format {
         /// The format in the file.
         format: String,
@@ -281,7 +281,7 @@ fn read_levels(levels: &[Vec<JsonSphere>]) -> Result<SphereTree, TreeFileError> 
         return count(
             &format!("spheres in level {empty}"),
             0,
-            "at least 1: each level stands for the whole solid".into(),
+            "at least 1: each level represents the whole solid".into(),
         );
     }
     let spheres = levels.iter().map(Vec::len).sum();
@@ -323,12 +323,12 @@ fn read_level(
         if same {
             placed.push((parent, true));
         } else if carried {
-            return Err(wrong("its parent repeats the sphere above it, as only a leaf is".into()));
+            return Err(wrong("its parent is a repeated leaf, which has no other children".into()));
         } else {
             let excess = (node.center - of.center).norm() + node.radius - of.radius;
             if excess > NESTING_TOLERANCE * of.radius {
                 return Err(wrong(format!(
-                    "it sticks out of its parent, sphere {number_above} of level {}, by {excess:e} m",
+                    "it extends beyond its parent, sphere {number_above} of level {}, by {excess:e} m",
                     number - 1
                 )));
             }
@@ -375,7 +375,7 @@ fn read_parent(number: usize, n: usize, level: &[JsonSphere], above: usize) -> R
     let index = index.ok_or_else(|| format!("its parent is {parent}; wanted 0 to {}", above - 1))?;
     if n > 0 && level[n - 1].parent > parent {
         return Err(format!(
-            "its parent {parent} comes after {}; spheres stand in the order of their parents",
+            "its parent {parent} comes after {}; spheres must be ordered by parent",
             level[n - 1].parent
         ));
     }

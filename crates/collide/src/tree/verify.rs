@@ -20,7 +20,7 @@ impl SphereTree {
                 let excess = (c.center - parent.center).norm() + c.radius - parent.radius;
                 if excess > 1e-12 * parent.radius {
                     return Err(MeshError::Tree {
-                        what: format!("sphere {child} sticks out of its parent {n} by {excess:e} m"),
+                        what: format!("sphere {child} extends beyond its parent {n} by {excess:e} m"),
                     });
                 }
             }

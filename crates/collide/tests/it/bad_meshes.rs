@@ -80,7 +80,7 @@ fn long_rim_is_filled_in_its_plane() {
     let mut mesh = without(TriMesh::cylinder(1.0, 0.5, sides), |c| all(c, |p| p.z == 0.5));
     let error = mesh.repair(&RepairSettings { hole_edges: 100, ..RepairSettings::default() }).unwrap_err();
     assert!(
-        error.to_string().ends_with("repair was asked for, but its longest hole has 640 edges; at most 100 are filled"),
+        error.to_string().ends_with("repair failed: its longest hole has 640 edges; at most 100 are filled"),
         "{error}"
     );
 }

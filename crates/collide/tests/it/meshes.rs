@@ -98,7 +98,7 @@ fn obj_errors_name_the_line() {
         ("v 0 0 0\nv 0 x 0\n", "line 2: `x` where a coordinate should be"),
         ("v 0 0 0\nf 1 1\n", "line 2: a face of 2 corners, but it needs at least 3"),
         ("v 0 0 0\nf 1 1 q/2\n", "line 2: `q/2` where a vertex number should be"),
-        ("v 0 0 0\n\nf 1 1 0\n", "line 3: face 1 points at vertex 0, but there are 1 vertices"),
+        ("v 0 0 0\n\nf 1 1 0\n", "line 3: face 1 refers to vertex 0, but there are 1 vertices"),
         ("v 0 0 nan\n", "line 1: vertex 1 is (0, 0, NaN), but coordinates must be finite"),
         ("", "the mesh has no triangles; at least 4 are needed to close a solid"),
     ];
@@ -186,7 +186,7 @@ fn bad_meshes_are_mended_or_refused_with_a_reason() {
     assert_eq!(error("empty"), MeshError::Empty);
     assert!(error("nan_vertex").to_string().contains("vertex 18 "), "{}", error("nan_vertex"));
     assert!(error("inf_vertex").to_string().contains("vertex 18 "), "{}", error("inf_vertex"));
-    assert!(error("index_out_of_range").to_string().contains("face 13 points at vertex 100, but there are 8"));
+    assert!(error("index_out_of_range").to_string().contains("face 13 refers to vertex 100, but there are 8"));
     // 36 faces around one point leave one hole
     assert!(
         matches!(error("open_hole"), MeshError::Open { holes: 1, edges, first_hole, .. } if edges == first_hole),
@@ -519,8 +519,8 @@ fn ply_errors_name_the_place() {
         ("end_header\n", "", "line 9: `0` where format, element"),
         ("1 0 0", "1 a 0", "vertex 2: `a` where a number should be"),
         ("3 0 1 2", "2 0 1", "face 1: 2 corners, but it needs at least 3"),
-        ("3 0 1 2", "3 0 1 3", "face 1 points at vertex 4, but there are 3 vertices"),
-        ("3 0 1 2", "3 0 1 -1", "face 1 points at vertex 0, but there are 3 vertices"),
+        ("3 0 1 2", "3 0 1 3", "face 1 refers to vertex 4, but there are 3 vertices"),
+        ("3 0 1 2", "3 0 1 -1", "face 1 refers to vertex 0, but there are 3 vertices"),
         ("3 0 1 2", "3 0 1 1.5", "face 1: 1.5 where the number of a vertex should be"),
         ("3 0 1 2", "-3 0 1 2", "face 1: a list of -3 numbers"),
         ("1 0 0", "1 nan 0", "vertex 2 is (1, NaN, 0), but coordinates must be finite"),
@@ -594,9 +594,9 @@ fn ply_errors_of_strips_name_the_place() {
     let there = "there are 4 vertices";
     assert!(
         said(&[&[0, 2, 1, 3], &[0, 1, 4]])
-            .contains(&format!("tristrips 2: it points at vertex 4 (from 0), but {there}"))
+            .contains(&format!("tristrips 2: it refers to vertex 4 (from 0), but {there}"))
     );
-    assert!(said(&[&[0, 2, -2, 3]]).contains(&format!("tristrips 1: it points at vertex -2 (from 0), but {there}")));
+    assert!(said(&[&[0, 2, -2, 3]]).contains(&format!("tristrips 1: it refers to vertex -2 (from 0), but {there}")));
     assert!(said(&[&[0, 2, 1, -1, 0, 1]]).contains("tristrips 1: a strip of 2 vertices, but it needs at least 3"));
     assert!(said(&[&[0, 1, 1]]).contains("wanted elements `face` or `tristrips`; there are: 4 vertex, 1 tristrips"));
     let text = String::from_utf8(ply_of_strips("ascii", &[&[0, 2, 1, 3]])).unwrap();

@@ -80,7 +80,7 @@ fn a_repeated_leaf_is_one_sphere() {
 #[test]
 fn invalid_files_are_rejected_with_place_and_remedy() {
     let cases = [
-        ("\"version\":1", "\"version\":2", "of version 2; what is read is a \"tumble sphere tree\" of version 1"),
+        ("\"version\":1", "\"version\":2", "of version 2; supported is \"tumble sphere tree\" of version 1"),
         ("tumble sphere tree", "other", "it is a \"other\""),
         ("\"units\":\"m\"", "\"units\":\"mm\"", "units are \"mm\"; a sphere tree is in \"m\""),
         ("\"name\":\"\"", "\"nam\":\"\"", "unknown field `nam`"),
@@ -94,7 +94,7 @@ fn invalid_files_are_rejected_with_place_and_remedy() {
             "sphere 1 of level 2: its center has the coordinate -200000000000; wanted at most 1e10 m",
         ),
         ("[-2,0,0]", "[-2,0]", "invalid length 2"),
-        ("[-2,0,0]", "[-5,0,0]", "sphere 1 of level 2: it sticks out of its parent, sphere 1 of level 1, by 3e0 m"),
+        ("[-2,0,0]", "[-5,0,0]", "sphere 1 of level 2: it extends beyond its parent, sphere 1 of level 1, by 3e0 m"),
         ("\"r\":4,\"out\":1", "\"r\":4,\"out\":-1", "outward error `out` is -1"),
         ("\"parent\":-1", "\"parent\":0", "sphere 0 of level 0: its parent is 0; the root has none"),
         (
@@ -106,7 +106,7 @@ fn invalid_files_are_rejected_with_place_and_remedy() {
         (
             "[0,0,0],\"r\":2,\"out\":1,\"parent\":1",
             "[0,0,0],\"r\":2,\"out\":1,\"parent\":0",
-            "its parent 0 comes after 1; spheres stand in the order of their parents",
+            "its parent 0 comes after 1; spheres must be ordered by parent",
         ),
         ("\"levels\":[[", "\"levels\":[],\"other\":[[", "unknown field"),
         ("\"levels\":[[{", "\"levels\":[[],[{", "there are 0 spheres in level 0; wanted 1, the root"),
@@ -136,7 +136,7 @@ fn invalid_files_are_rejected_with_place_and_remedy() {
         TreeFileError::Sphere {
             level: 3,
             sphere: 0,
-            what: "its parent repeats the sphere above it, as only a leaf is".into()
+            what: "its parent is a repeated leaf, which has no other children".into()
         }
     );
 }

@@ -58,7 +58,7 @@ impl Counts {
             ("sites inserted", self.inserted),
             ("internal spheres", self.internal),
             ("cover spheres", self.cover),
-            ("points alone", self.alone),
+            ("isolated points", self.alone),
             ("duplicate sites", self.duplicates),
         ]
         .map(|(stage, count)| StageCount { level, stage: stage.into(), count })
