@@ -1,4 +1,5 @@
-//! Tells the cache of sphere trees and shapes which builders it belongs to: a hash of the sources of this crate.
+//! Computes a hash of the sources of this crate. The cache of sphere trees and shapes uses it as
+//! the version of the builders.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +7,7 @@ fn main() {
     let mut hash: u64 = 0xcbf2_9ce4_8422_2325;
     println!("cargo::rerun-if-changed=src");
     for file in sources(Path::new("src")) {
-        // what cannot be read counts as empty: the compiler will say so
+        // unreadable files count as empty: the compiler reports them
         let bytes = std::fs::read(&file).unwrap_or_default();
         let name = file.to_string_lossy().replace('\\', "/");
         for byte in name.bytes().chain(bytes).filter(|b| *b != b'\r') {
@@ -16,7 +17,7 @@ fn main() {
     println!("cargo::rustc-env=TUMBLE_BUILDERS={hash:016x}");
 }
 
-/// The files below a folder, sorted.
+/// Returns the files below a folder, sorted.
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();

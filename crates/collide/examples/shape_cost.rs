@@ -1,7 +1,10 @@
-//! What a user waits for when a scene with a mesh starts: file and shape for the first time, and again from the cache; then what the first contact takes.
+//! Measures the start of a scene with a mesh: file and shape without and with the cache, and the
+//! first contact.
 //!
-//! `cargo run --release -p tumble-collide --example shape_cost -- MESH…` prints CPU seconds and the most memory of whole processes, one for each run.
-//! A mesh is an OBJ file, `FILE.obj@COUNT` for that file refined to so many triangles with some noise, or `bumps@N`: an icosphere divided N times, with bumps.
+//! `cargo run --release -p tumble-collide --example shape_cost -- MESH…` prints CPU seconds and
+//! peak memory of whole processes, one per run. A mesh is an OBJ file, `FILE.obj@COUNT` for that
+//! file refined to this number of triangles with some noise, or `bumps@N`: an icosphere divided N
+//! times, with bumps.
 
 mod cpu;
 mod refine;
@@ -58,7 +61,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(std::fs::remove_dir_all(&folder)?)
 }
 
-/// Loads a mesh, then brings it up to itself in some places, and prints what either took in all.
+/// Loads a mesh, moves a copy towards it in several places, and prints the total cost.
 fn measure(file: &str) -> Result<(), Box<dyn Error>> {
     let mesh = TriMesh::from_obj(&std::fs::read_to_string(file)?)?;
     let (shape, note) = Shape::mesh_cached(mesh, &TreeSettings::octree(), &TreeCache::of_environment())?;
@@ -71,7 +74,7 @@ fn measure(file: &str) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Contacts of two copies in ten places, each brought up along x in steps until they touch.
+/// Moves a copy along x in steps until it touches, in ten places. Returns the number of contacts.
 fn touch(shape: &Shape) -> usize {
     let size = shape.bounding_radius();
     let mut count = 0;

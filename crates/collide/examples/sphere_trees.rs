@@ -1,7 +1,9 @@
-//! The table of the book: trees of the public meshes by every method, beside the toolkit of 2003.
+//! Prints the table of the documentation: trees of the public meshes by every method, compared with
+//! the toolkit of 2003.
 //!
-//! `cargo run --release -p tumble-collide --example sphere_trees -- MESHES [DEPTH] [METHOD…]`, with a folder of OBJ files. Reference: trees of the
-//! toolkit of Bradshaw and O'Sullivan (2003; method medial, branch 8), measured by the same definitions; as it makes them, and made to cover and nest.
+//! `cargo run --release -p tumble-collide --example sphere_trees -- MESHES [DEPTH] [METHOD…]`, with
+//! a folder of OBJ files. Reference: trees of the toolkit of Bradshaw and O'Sullivan (2003; method
+//! medial, branch 8), measured by the same definitions: as built, and modified to cover and nest.
 
 mod cpu;
 
@@ -9,7 +11,8 @@ use cpu::cpu_seconds;
 use std::error::Error;
 use tumble_collide::{Builder, QualitySettings, SphereTree, TreeSettings, TriMesh};
 
-/// Mesh, depth; worst and mean outward error at that level over the diagonal, the worst of the trees made to cover and nest, CPU seconds.
+/// Mesh, depth; worst and mean outward error at that level over the diagonal, worst error of the
+/// trees modified to cover and nest, CPU seconds.
 const REFERENCE: [(&str, u32, f64, f64, f64, f64); 7] = [
     ("spot", 2, 0.0228, 0.0094, 0.0256, 26.4),
     ("spot", 3, 0.0097, 0.0025, f64::NAN, 98.6),

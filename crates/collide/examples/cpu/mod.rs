@@ -1,6 +1,6 @@
-//! The clock of the examples that measure.
+//! CPU time and memory of this process.
 
-/// CPU time of this process on all cores; NaN where there is no /proc.
+/// Returns the CPU time of this process on all cores, seconds; NaN without /proc.
 pub fn cpu_seconds() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
     // after the name in brackets: utime and stime are the 12th and 13th fields, in hundredths of a second
@@ -9,7 +9,7 @@ pub fn cpu_seconds() -> f64 {
     (ticks(11) + ticks(12)) / 100.0
 }
 
-/// The most memory that this process had, megabytes; NaN where there is no /proc.
+/// Returns the peak memory of this process, megabytes; NaN without /proc.
 #[allow(dead_code)]
 pub fn peak_megabytes() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

@@ -1,12 +1,13 @@
-//! Large meshes that look like scans: finer than the files at hand, and not flat where they were made finer.
+//! Large meshes that resemble scans: finer than the available files, with noise where they were
+//! refined.
 
 use std::collections::{BTreeMap, BinaryHeap};
 use tumble_collide::{TriMesh, Vec3};
 
-/// Of the length of an edge: how far its middle is moved at most.
+/// Maximum displacement of the middle of an edge, as a fraction of its length.
 const NOISE: f64 = 0.08;
 
-/// A sphere of radius 1 with bumps of many sizes: 20·4ⁿ triangles.
+/// Returns a sphere of radius 1 with bumps of many sizes: 20·4ⁿ triangles.
 pub fn bumps(n: u32) -> TriMesh {
     let mut mesh = TriMesh::icosphere(1.0, n);
     for v in &mut mesh.vertices {
@@ -16,7 +17,8 @@ pub fn bumps(n: u32) -> TriMesh {
     mesh
 }
 
-/// A closed mesh whose longest edges are halved until it has so many triangles; each middle is moved a little along the surface's normal.
+/// Returns a closed mesh whose longest edges are halved until it has `count` triangles. Each middle
+/// is moved slightly along the normal.
 pub fn refined(mesh: &TriMesh, count: usize) -> TriMesh {
     let mut mesh = mesh.clone();
     let mut faces_of: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
@@ -57,7 +59,7 @@ pub fn refined(mesh: &TriMesh, count: usize) -> TriMesh {
 fn moved(mesh: &TriMesh, edge: (u32, u32), faces: &[u32]) -> Vec3 {
     let [u, v] = [edge.0, edge.1].map(|n| mesh.vertices[n as usize]);
     let normal: Vec3 = faces.iter().map(|&t| mesh.corners(t as usize)).map(|[a, b, c]| (b - a).cross(&(c - a))).sum();
-    // the same at every run, and as good as random
+    // deterministic, and random enough
     let noise = (12.9898 * f64::from(edge.0) + 78.233 * f64::from(edge.1)).sin();
     0.5 * (u + v) + normal.try_normalize(0.0).unwrap_or_default() * (NOISE * noise * (v - u).norm())
 }

@@ -1,9 +1,10 @@
-//! Contacts against parry's distances and penetration depths, over thousands of seeded random poses.
+//! Contacts compared with parry's distances and penetration depths, over thousands of seeded random
+//! poses.
 //!
-//! Tolerances. Parry's GJK and EPA end at about 1e-6 of the size, so exact pairs are compared to 1e-5 m on shapes of
-//! about 1 m, and normals to 1e-2, since a distance that is good to ε has a normal that is good to √ε. Box on
-//! box (and a capsule's core inside a box) prefers a face over a pair of edges by `1e-3 · least half extent + 5 %`,
-//! so there the depth may be that much greater than the least one.
+//! Tolerances: parry's GJK and EPA end at about 1e-6 of the size. So exact pairs are compared to
+//! 1e-5 m on shapes of about 1 m, and normals to 1e-2, since a distance with error ε has a normal
+//! with error √ε. Box on box (and a capsule's core inside a box) prefers a face over a pair of
+//! edges by `1e-3 · smallest half extent + 5 %`, so there the depth can exceed the minimum by that.
 
 use crate::rng::Rng;
 use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector};
@@ -20,7 +21,7 @@ pub fn vector(v: &Vec3) -> Vector {
     Vector::new(v.x, v.y, v.z)
 }
 
-/// The same primitive here and there.
+/// The same primitive in both libraries.
 struct Both {
     ours: Shape,
     theirs: Box<dyn ParryShape>,
@@ -46,8 +47,8 @@ fn random_primitive(rng: &mut Rng, kind: usize) -> Both {
     }
 }
 
-/// A pose of the second shape: any, nearly aligned or exactly aligned with the axes, the cases that stacks are made
-/// of.
+/// Returns a pose of the second shape: any, nearly aligned or exactly aligned with the axes, as in
+/// stacks.
 fn related_pose(rng: &mut Rng, case: usize) -> Pose {
     let any = rng.pose(1.2);
     let turn = match case % 3 {
@@ -76,8 +77,9 @@ fn deepest(found: &[Contact]) -> Option<&Contact> {
     found.iter().min_by(|a, b| a.gap.total_cmp(&b.gap))
 }
 
-/// Signed distance and normal (towards A) by parry: GJK where separate, EPA where not; for a half-space the support
-/// point (its `contact` of a sphere with a half-space is wrong once the center is inside).
+/// Returns signed distance and normal (towards A) by parry: GJK if separated, EPA if not; for a
+/// half-space the support point (its `contact` of a sphere with a half-space is wrong if the center
+/// is inside).
 fn reference(a: &Both, pa: &Pose, b: &Both, pb: &Pose) -> (f64, Option<Vec3>) {
     if matches!(a.ours, Shape::HalfSpace) {
         let (distance, normal) = reference(b, pb, a, pa);
@@ -149,7 +151,8 @@ fn compare(a: &Both, pa: &Pose, b: &Both, pb: &Pose, ka: usize, kb: usize, case:
     } else {
         counts[2] += 1;
     }
-    // moved along the normal by what the contact says, the shapes come apart: normal, sign and depth in one
+    // a translation along the normal by the depth separates the shapes: checks normal, sign and
+    // depth together
     let moved = |by: f64| Pose::from_parts((pa.translation.vector + contact.normal * by).into(), pa.rotation);
     let apart = reference(a, &moved(0.01 - contact.gap), b, pb).0;
     assert!(apart > 0.009 - bias, "normal {:?} gap {} leaves {apart}: {label}", contact.normal, contact.gap);
@@ -172,7 +175,7 @@ fn exchanging_the_shapes_mirrors_the_contacts() {
     }
 }
 
-/// Distance from a shape's surface by parry, inside or out.
+/// Returns the distance from a shape's surface by parry, inside or out.
 fn off_surface(shape: &Both, pose: &Pose, point: &Vec3) -> f64 {
     let local = pose.inverse_transform_point(&(*point).into()).coords;
     if matches!(shape.ours, Shape::HalfSpace) {
@@ -190,18 +193,19 @@ fn points_are_midway_between_the_surfaces() {
         let (ka, kb) = (rng.below(4), rng.below(4));
         let (a, b) = (random_primitive(&mut rng, ka), random_primitive(&mut rng, kb));
         let (pa, pb) = (related_pose(&mut rng, 2 * (case % 2)), related_pose(&mut rng, case));
-        // shallow contacts: a deep one's far side may leave a face's extent
+        // shallow contacts: the far side of a deep one can be beyond the extent of a face
         let found = find_contacts(&a.ours, &pa, &b.ours, &pb);
         let least = deepest(&found).map_or(0.0, |c| c.gap);
         for c in found.iter().filter(|c| c.gap.abs() < 0.05) {
             let (on_a, on_b) = (c.point + c.normal * (0.5 * c.gap), c.point - c.normal * (0.5 * c.gap));
             let (off_a, off_b) = (off_surface(&a, &pa, &on_a), off_surface(&b, &pb, &on_b));
-            // one side is exact; the other may stand beyond the edge of a face by the clipping's slop, or be the
-            // plane of a face that a slightly tilted edge or end crosses
-            // (the end of the part of a tilted capsule that is over a face is neither)
+            // one side is exact; the other can be beyond the edge of a face by the slop of the
+            // clipping, or in the plane of a face that a slightly tilted edge or end crosses (the
+            // end of the part of a tilted capsule over a face is neither)
             let exact = if (ka, kb) == (1, 2) || (ka, kb) == (2, 1) { 2e-3 } else { 1e-6 };
             assert!(off_a.min(off_b) < exact, "kinds {ka} {kb}, case {case}: {off_a} {off_b} {c:?}");
-            // a capsule's upper end is a sphere within the tube, so only the deepest contact must lie on both surfaces
+            // a capsule's upper end is a sphere within the cylinder, so only the deepest contact
+            // must lie on both surfaces
             assert!(
                 c.gap > least || off_a.max(off_b) < 2e-3 + 0.2 * c.gap.abs(),
                 "kinds {ka} {kb}, case {case}: {off_a} {off_b} {c:?}"
@@ -238,7 +242,7 @@ fn features_of_a_pair_are_distinct_and_persistent() {
         names.sort_unstable();
         names.dedup();
         assert_eq!(names.len(), before.len(), "kinds {ka} {kb}, case {case}: {before:?}");
-        // what a step of rest does to a body: a millionth of a meter and of a radian
+        // the motion of a resting body in one step: a millionth of a meter and of a radian
         let nudge = Quat::from_scaled_axis(rng.vec(1e-6));
         let nudged = Pose::from_parts((pa.translation.vector + rng.vec(1e-6)).into(), nudge * pa.rotation);
         let after = find_contacts(&a.ours, &nudged, &b.ours, &pb);

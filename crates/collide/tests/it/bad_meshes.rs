@@ -1,4 +1,4 @@
-//! Meshes as they come: each defect has its stated outcome, made here and in the public files.
+//! Defective meshes: each defect, generated here or in the public files, has its stated result.
 
 use crate::rng::Rng;
 use crate::shared_meshes::text;
@@ -14,7 +14,7 @@ fn repaired(mut mesh: TriMesh) -> (TriMesh, RepairReport) {
     (mesh, report)
 }
 
-/// Without the faces of which `gone` says so.
+/// Returns the mesh without the faces for which `gone` is true.
 fn without(mut mesh: TriMesh, gone: impl Fn(&[Vec3; 3]) -> bool) -> TriMesh {
     mesh.triangles =
         (0..mesh.triangles.len()).filter(|&t| !gone(&mesh.corners(t))).map(|t| mesh.triangles[t]).collect();
@@ -38,8 +38,8 @@ fn box_without_two_sides_is_closed_flat() {
     assert_eq!(report.notes(), ["2 hole(s) were filled with 4 faces; the longest has 4 edges"]);
 }
 
-/// A hole in a fine sphere is closed by what is close to a flat cap: the volume lacks that of the cap, `πh²(3r − h)/3`, at
-/// most, and the filling lies within the sphere.
+/// A hole in a fine sphere is closed by a nearly flat cap: the missing volume is at most that of
+/// the cap, `πh²(3r − h)/3`, and the filling lies within the sphere.
 #[test]
 fn hole_in_a_sphere_is_closed_within_the_cap() {
     for (height, edges) in [(0.995, 20), (0.8, 40), (-0.2, 40)] {
@@ -62,11 +62,12 @@ fn hole_in_a_sphere_is_closed_within_the_cap() {
     }
 }
 
-/// A hole whose rim has 640 edges is past what is filled by weight; the rim is plane, so the volume has a closed form.
+/// A hole with 640 boundary edges exceeds the limit of dynamic programming; its boundary is planar,
+/// so the volume has a closed form.
 #[test]
 fn long_rim_is_filled_in_its_plane() {
     let sides = 640;
-    // a cylinder without its lid, pressed into a star so that the rim is not convex
+    // a cylinder without its lid, pressed into a star so that the boundary is not convex
     let mut star = TriMesh::cylinder(1.0, 0.5, sides);
     for v in &mut star.vertices {
         let squeeze = 1.0 + 0.4 * (5.0 * v.y.atan2(v.x)).sin();
@@ -98,7 +99,8 @@ fn fins_walls_and_debris_go() {
     let (mesh, report) = repaired(fin);
     assert_eq!((report.dangling_pieces, report.dangling_faces, mesh.triangles.len()), (1, 2, 12));
     near(report.closed.volume, 1.0, 1e-12, "fin");
-    // a wall across the middle: two boxes' shells without the sides they share, and one sheet for both
+    // a wall across the middle: the shells of two boxes without their common sides, and one sheet
+    // for both
     let lower = without(TriMesh::box_(Vec3::repeat(0.5)), |c| all(c, |p| p.z == 0.5));
     let upper = without(unit.clone().translated(&Vec3::z()), |c| all(c, |p| p.z == 0.5));
     let wall = without(unit.clone(), |c| !all(c, |p| p.z == 0.5));
@@ -115,7 +117,7 @@ fn fins_walls_and_debris_go() {
 
 #[test]
 fn cracks_close_within_the_tolerance_given() {
-    // each face of the sphere for itself, its corners off by up to 1e-5
+    // each face of the sphere separately, its corners displaced by up to 1e-5
     let sphere = TriMesh::icosphere(1.0, 3);
     let mut rng = Rng::new(3);
     let vertices: Vec<Vec3> =
@@ -134,7 +136,8 @@ fn cracks_close_within_the_tolerance_given() {
     }
 }
 
-/// Two tetrahedra that share a corner, each without one face: two rims through the one vertex.
+/// Two tetrahedra that share a corner, each without one face: two boundaries through the same
+/// vertex.
 #[test]
 fn holes_that_share_a_vertex_are_filled_each_for_itself() {
     let v = Vec3::new;
@@ -156,7 +159,7 @@ fn holes_that_share_a_vertex_are_filled_each_for_itself() {
 
 #[test]
 fn failed_repairs_are_errors_that_name_the_face() {
-    // a Möbius band has no sides to tell apart
+    // a Möbius band has only one side
     let mut band = TriMesh::default();
     let n = 12;
     for k in 0..n {
@@ -177,7 +180,7 @@ fn failed_repairs_are_errors_that_name_the_face() {
         "{error}"
     );
     assert_eq!(band, before);
-    // one triangle closes around nothing
+    // one triangle encloses nothing
     let mut lone = TriMesh { vertices: vec![Vec3::x(), Vec3::y(), Vec3::z()], triangles: vec![[0, 1, 2]] };
     let error = lone.repair(&RepairSettings::default()).unwrap_err();
     assert!(error.to_string().contains("of face 1;"), "{error}");
@@ -186,7 +189,7 @@ fn failed_repairs_are_errors_that_name_the_face() {
     assert!(matches!(nan.repair(&RepairSettings::default()), Err(MeshError::NotFinite { vertex: 3, .. })));
 }
 
-/// Every file of the public folder has its stated outcome, strict and under repair, and is done in bounded time.
+/// Every file of the public folder has its stated result, strict and with repair, in bounded time.
 #[test]
 fn public_bad_meshes_have_their_stated_outcome() {
     let Some(spot) = text("spot.obj") else { return };
@@ -225,13 +228,13 @@ fn public_bad_meshes_have_their_stated_outcome() {
             near(found.unwrap().volume, volume, 1e-9, name);
         }
         if let Some(volume) = mended {
-            // what is filled over 36 faces of spot differs from them a little
+            // the filling of 36 faces of spot differs from them slightly
             near(repaired.unwrap().closed.volume, volume, if name == "open_hole" { 1e-2 * volume } else { 1e-9 }, name);
         }
     }
 }
 
-/// The volume against a count of points on a grid whose winding number is above 1/2.
+/// Compares the volume with a count of grid points whose winding number is above 1/2.
 fn check_union(mesh: &TriMesh, volume: f64) {
     let (winding, bounds, n) = (WindingNumber::new(mesh), mesh.aabb(), 60);
     let step = (bounds.max - bounds.min) / f64::from(n);
@@ -243,8 +246,8 @@ fn check_union(mesh: &TriMesh, volume: f64) {
     near(f64::from(count) * step.product(), volume, 2e-3 * volume, "by grid");
 }
 
-/// Random soups, and a good mesh with random damage: read, checked, repaired and measured without a panic; what comes
-/// out of repair is closed.
+/// Random soups, and a good mesh with random damage, are read, checked, repaired and measured
+/// without a panic; the result of a repair is closed.
 #[test]
 fn soups_and_damaged_meshes_end_in_a_solid_or_an_error() {
     let mut rng = Rng::new(2026);
@@ -276,7 +279,8 @@ fn soups_and_damaged_meshes_end_in_a_solid_or_an_error() {
     assert!(solids > 200 && errors > 100, "{solids} {errors}");
 }
 
-/// A few vertices, on a coarse grid so that they often coincide, and any triangles between them.
+/// Returns a few vertices, on a coarse grid so that they often coincide, and random triangles
+/// between them.
 fn soup(rng: &mut Rng) -> TriMesh {
     let count = 4 + rng.below(12);
     let vertices = (0..count).map(|_| rng.vec(1.0).map(|x| (x * 3.0).round() / 3.0)).collect();

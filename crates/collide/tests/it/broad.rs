@@ -3,12 +3,12 @@
 use crate::rng::Rng;
 use tumble_collide::{Aabb, BroadPhase, BruteForce, SweepAndPrune, Vec3};
 
-/// Both broad phases under the same orders.
+/// Both broad phases with the same operations.
 #[derive(Default)]
 struct Both {
     sweep: SweepAndPrune,
     brute: BruteForce,
-    /// Handle here and there, box, moving.
+    /// Handles in both, box, moving.
     stored: Vec<(u32, u32, Aabb, bool)>,
 }
 
@@ -30,13 +30,13 @@ impl Both {
         self.brute.remove(there);
     }
 
-    /// The pairs of both, which must be the same boxes; how many they are.
+    /// Checks that both return the pairs of the same boxes. Returns their number.
     fn check(&mut self, what: &str) -> usize {
         let (mut found, mut expected) = (Vec::new(), Vec::new());
         self.sweep.pairs(&mut found);
         self.brute.pairs(&mut expected);
         assert!(found.is_sorted() && found.iter().all(|[i, j]| i < j), "{what}: not in order");
-        // the two may number boxes differently
+        // handles can differ between the two
         let mut names = vec![u32::MAX; self.stored.iter().map(|f| f.1 as usize + 1).max().unwrap_or(0)];
         self.stored.iter().for_each(|f| names[f.1 as usize] = f.0);
         for pair in &mut expected {
@@ -53,7 +53,8 @@ fn box_around(center: Vec3, half: Vec3) -> Aabb {
     Aabb { min: center - half, max: center + half }
 }
 
-/// Mostly blocks; sometimes a huge one, a flat one, a point, one with infinite sides, one that is not a number, one turned inside out.
+/// Returns mostly ordinary boxes; sometimes a huge one, a flat one, a point, one with infinite
+/// sides, with NaN, or inverted.
 fn any_box(rng: &mut Rng, space: f64) -> Aabb {
     let (center, half) = (rng.vec(space), rng.vec(0.5).abs());
     let mut b = box_around(center, half);
@@ -88,7 +89,7 @@ fn equals_brute_force_over_random_histories() {
         let space = [2.0, 4.0, 8.0][rng.below(3)];
         let most = [3, 30, 300][rng.below(3)];
         for step in 0..120 {
-            // quiet stretches, where few leave their fat boxes, and wild ones
+            // calm phases, where few boxes leave their fat boxes, and wild ones
             let speed = [0.0, 0.002, 0.02, 1.0][step / 8 % 4];
             for n in 0..both.stored.len() {
                 let (_, _, bounds, moving) = both.stored[n];
@@ -123,13 +124,13 @@ fn equals_brute_force_over_random_histories() {
 
 #[test]
 fn a_crowd_that_travels_is_followed() {
-    // the cells are cut and left behind as it goes: 4,000 boxes that move 30 times their own size
+    // cells are split and left behind: 4,000 boxes that move 30 times their own size
     let mut rng = Rng::new(7);
     let mut both = Both::default();
     (0..4000).for_each(|_| both.insert(box_around(rng.vec(4.0), Vec3::repeat(0.15)), true));
     let mut total = 0;
     for step in 0..60 {
-        // one in ten at a time: too few for all to be filed anew
+        // one in ten at a time: too few for a rebuild
         for n in (0..4000).filter(|n| n % 10 == step % 10) {
             let bounds = moved(&both.stored[n].2, Vec3::new(1.5, 0.2, 0.0));
             both.set(n, bounds, true);
@@ -204,7 +205,7 @@ fn empty_input_and_unknown_handles() {
     sweep.set(first, &b, true);
     sweep.pairs(&mut found);
     assert!(found.is_empty());
-    // taken out and given again before anybody asked
+    // removed and inserted again before a query
     sweep.remove(second);
     let (third, fourth) = (sweep.insert(&b, false), sweep.insert(&b, true));
     sweep.pairs(&mut found);

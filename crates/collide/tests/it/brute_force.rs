@@ -1,12 +1,13 @@
-//! The least distance of two triangle surfaces by brute force, with the features that have it: a referee that shares no code with the crate or with
-//! parry.
+//! The minimum distance of two triangle surfaces by brute force, with the closest features. Shares
+//! no code with the crate or with parry.
 //!
-//! Two triangles apart are closest at a vertex of one and a place inside the other, at places inside an edge of each, or at what bounds these: every
-//! pair of features whose feet lie inside them is a candidate.
+//! Two separated triangles are closest at a vertex of one and a point inside the other, at points
+//! inside an edge of each, or at the boundaries of these. So every pair of features whose closest
+//! points lie inside them is a candidate.
 
 use tumble_collide::{MeshDistance, Pose, TriMesh, Vec3};
 
-/// What is closest to what.
+/// The kind of the closest features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// A vertex and the inside of a face: the normal is that of the flat face.
@@ -17,7 +18,7 @@ pub enum Kind {
     Corner,
 }
 
-/// A pair of features, from the place on B to that on A.
+/// A pair of features, with the vector from the point on B to the point on A.
 #[derive(Clone, Copy, Debug)]
 pub struct Closest {
     pub distance: f64,
@@ -25,7 +26,8 @@ pub struct Closest {
     pub kind: Kind,
 }
 
-/// All candidates that are at most `more` further apart than the closest one, the closest first. `distance` is that of B.
+/// Returns all candidates that are at most `more` further apart than the closest one, closest
+/// first. `distance` is that of B.
 pub fn closest(a: &TriMesh, pa: &Pose, b: &TriMesh, pb: &Pose, distance: &MeshDistance, more: f64) -> Vec<Closest> {
     let to = pb.inv_mul(pa);
     let near_of_b: Vec<[Vec3; 3]> = (0..b.triangles.len()).map(|t| b.corners(t)).collect();
@@ -33,7 +35,7 @@ pub fn closest(a: &TriMesh, pa: &Pose, b: &TriMesh, pb: &Pose, distance: &MeshDi
         (0..a.triangles.len()).map(|t| a.corners(t).map(|p| (to * nalgebra::Point3::from(p)).coords)).collect();
     let middle = |t: &[Vec3; 3]| (t[0] + t[1] + t[2]) / 3.0;
     let radius = |t: &[Vec3; 3]| t.iter().map(|p| (p - middle(t)).norm()).fold(0.0, f64::max);
-    // no vertex of A is closer than the surfaces are
+    // no vertex of A is closer than the surfaces
     let vertices =
         placed.iter().flatten().map(|p| distance.closest(p).signed_distance.abs()).fold(f64::INFINITY, f64::min);
     let mut all = Vec::new();
@@ -80,7 +82,7 @@ fn pairs(t: &[Vec3; 3], u: &[Vec3; 3], all: &mut Vec<Closest>) {
     }
 }
 
-/// The foot of `p` on a triangle's plane, if it is inside.
+/// Returns the projection of `p` on a triangle's plane, if it is inside.
 fn inside_face(p: &Vec3, [a, b, c]: &[Vec3; 3]) -> Option<Vec3> {
     let normal = (b - a).cross(&(c - a)).normalize();
     let foot = p - normal * normal.dot(&(p - a));
@@ -93,7 +95,7 @@ fn inside_edge(p: &Vec3, a: &Vec3, b: &Vec3) -> Option<Vec3> {
     (s > 0.0 && s < 1.0).then(|| a + (b - a) * s)
 }
 
-/// Where two lines are closest, if that is inside both edges.
+/// Returns the closest points of two lines, if they are inside both edges.
 fn inside_edges([a, b]: [&Vec3; 2], [c, d]: [&Vec3; 2]) -> Option<[Vec3; 2]> {
     let (u, v, w) = (b - a, d - c, a - c);
     // u·(w + s u − r v) = 0 = v·(w + s u − r v)

@@ -1,5 +1,5 @@
-//! The simpler builders of sphere trees: every tree covers and nests (each build verifies that by itself, and fails
-//! otherwise), stays within what was asked, and is the same twice.
+//! The simpler builders of sphere trees: every tree covers and nests (each build verifies that
+//! itself and fails otherwise), respects the settings, and is reproducible.
 
 use crate::rng::Rng;
 use crate::shared_meshes::text;
@@ -11,7 +11,8 @@ fn settings(builder: Builder, depth: u32) -> TreeSettings {
     TreeSettings { builder, branch: 8, depth, error: 1e-3, even: false }
 }
 
-/// Surface samples lie in leaves; spheres have at most `branch` children and lie in their parents.
+/// Checks that surface samples lie in leaves, and that spheres have at most `branch` children,
+/// which lie inside them.
 fn check(name: &str, mesh: &TriMesh, tree: &SphereTree, settings: &TreeSettings) {
     let nodes = tree.nodes();
     assert!(tree.levels() <= settings.depth + 1, "{name}");
@@ -66,8 +67,9 @@ fn public_meshes_are_covered_and_nested() {
     }
 }
 
-/// The reference's own trees of spot, by the same methods and of as many spheres, reach out .0725 (grid) and .0408 (Hubbard) of the
-/// diagonal at level 2, though they neither nest nor cover all.
+/// The reference toolkit's trees of spot, by the same methods and with as many spheres, have the
+/// errors .0725 (grid) and .0408 (Hubbard) of the diagonal at level 2, although they neither nest
+/// nor cover completely.
 #[test]
 fn spot_is_tighter_than_the_references_trees() {
     let Some(text) = text("spot.obj") else { return };
@@ -107,7 +109,8 @@ fn generated_solids_get_trees_with_the_stated_outward_error() {
     }
 }
 
-/// A sphere is itself: one sphere is enough, and it is the right one. The sphere through the vertices of the icosphere has radius 1.
+/// A sphere needs one sphere, which is the right one. The sphere through the vertices of the
+/// icosphere has radius 1.
 #[test]
 fn a_sphere_needs_one_sphere() {
     let mesh = TriMesh::icosphere(1.0, 2);
@@ -134,7 +137,7 @@ fn two_boxes_far_apart_share_no_leaf() {
     }
 }
 
-/// Any branching is kept to.
+/// The branching is respected.
 #[test]
 fn branching_of_two_and_of_many() {
     let mesh = TriMesh::torus(1.0, 0.3, 24, 12);
@@ -148,7 +151,8 @@ fn branching_of_two_and_of_many() {
     }
 }
 
-/// The sphere around a unit cube has the radius √3/2 and reaches `(√3/2 − 1/2)/√3 = 21.13 %` of the diagonal outside.
+/// The sphere around a unit cube has the radius √3/2 and extends `(√3/2 − 1/2)/√3 = 21.13 %` of the
+/// diagonal outside.
 #[test]
 fn a_sphere_within_the_error_is_neither_divided_nor_grown() {
     let cube = TriMesh::box_(Vec3::repeat(0.5));
@@ -191,7 +195,7 @@ fn a_covering_covers_and_its_error_never_grows() {
             assert_eq!(covering.count(), count);
             assert!(covering.worst() <= last, "{count}: {} after {last}", covering.worst());
             last = covering.worst();
-            // by the other proof: nothing has to grow but by rounding
+            // the other proof of coverage: no sphere has to grow except for rounding
             let mut spheres: Vec<(Vec3, f64)> = covering.spheres().map(|(c, r, _)| (c, r * (1.0 + 1e-9))).collect();
             if count == 13 {
                 let grown = grow_to_cover(&mut spheres, given);

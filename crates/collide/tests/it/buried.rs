@@ -1,9 +1,9 @@
-//! Meshes of shells that overlap: what is buried in another shell does not count.
+//! Meshes of overlapping shells: features inside another shell have no contacts.
 
 use crate::rng::Rng;
 use tumble_collide::{Contact, ContactMode, MeshDistance, Pose, Shape, TreeSettings, TriMesh, Vec3, contacts_in_mode};
 
-/// Boxes by half extents and center, as one mesh.
+/// Returns boxes, given by half extents and center, as one mesh.
 fn boxes(all: &[(Vec3, Vec3)]) -> TriMesh {
     let mut mesh = TriMesh { vertices: Vec::new(), triangles: Vec::new() };
     for (half, center) in all {
@@ -15,7 +15,7 @@ fn boxes(all: &[(Vec3, Vec3)]) -> TriMesh {
     mesh
 }
 
-/// The shape, and the pose that puts the mesh's own origin at the world's.
+/// Returns the shape, and the pose that places the mesh's own origin at the world's.
 fn shape(mesh: &TriMesh) -> (Shape, Pose) {
     let shape = Shape::mesh(mesh.clone(), &TreeSettings::octree()).unwrap();
     let Shape::Mesh(made) = &shape else { panic!("no mesh") };
@@ -29,7 +29,7 @@ fn find_contacts(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec
     out
 }
 
-/// A tall block, and a lower one that sticks into its side.
+/// Returns a tall box, and a lower one that extends into its side.
 fn step() -> TriMesh {
     boxes(&[(Vec3::repeat(0.5), Vec3::zeros()), (Vec3::new(0.5, 0.4, 0.25), Vec3::new(0.8, 0.0, -0.15))])
 }
@@ -37,7 +37,7 @@ fn step() -> TriMesh {
 #[test]
 fn buried_corners_do_not_touch_a_plane() {
     let (shape, pose) = shape(&step());
-    // the lower block's bottom is 0.1 above the taller one's; the plane is 0.15 above that
+    // the lower box's bottom is 0.1 above the taller one's; the plane is 0.15 above that
     let ground = Pose::translation(0.0, 0.0, -0.35);
     let found = find_contacts(&shape, &pose, &Shape::half_space(), &ground, 0.01);
     let place = |c: &Contact| c.point - 0.5 * c.gap.abs() * c.normal;
@@ -108,7 +108,7 @@ fn no_contact_lies_inside_the_union() {
     for _ in 0..5000 {
         let other = rng.pose(1.0);
         let found = find_contacts(&block, &other, &shape, &pose, 0.01);
-        // deep in each other, places on the surface are told along the normal alone
+        // in deep overlaps, points on the surface are exact along the normal only
         for c in found.iter().filter(|c| c.gap > -0.02) {
             let on_mesh = c.point - 0.5 * c.gap * c.normal;
             count += 1;

@@ -1,15 +1,16 @@
-//! Convex hulls: against parry's, against volumes known, and against what convex means.
+//! Convex hulls: against parry's, against known volumes, and against the definition of convexity.
 
 use crate::rng::Rng;
 use tumble_collide::{TriMesh, Vec3};
 
-/// A mesh with these vertices; its triangles mean nothing.
+/// Returns a mesh with these vertices; its triangles are arbitrary.
 fn cloud(vertices: Vec<Vec3>) -> TriMesh {
     let triangles = (0..vertices.len() as u32).map(|v| [v, 0, 0]).collect();
     TriMesh { vertices, triangles }
 }
 
-/// Closed, outward, and no point is beyond any face by more than the grid allows.
+/// Checks that the hull is closed and outward-wound, and that no point is beyond any face by more
+/// than the grid allows.
 fn check(points: &[Vec3], hull: &TriMesh) -> f64 {
     let report = hull.clone().check_closed().expect("closed");
     assert_eq!((report.flipped_faces, report.shells, report.turned, report.nonmanifold_edges), (0, 1, false, 0));

@@ -1,4 +1,5 @@
-//! The adaptive medial axis builder: what it promises, and its figures beside those of the reference toolkit.
+//! The adaptive medial axis builder: its guarantees, and its errors compared with the reference
+//! toolkit.
 
 use super::rng::Rng;
 use super::shared_meshes;
@@ -9,7 +10,7 @@ fn settings(depth: u32) -> TreeSettings {
     TreeSettings { depth, ..TreeSettings::default() }
 }
 
-/// Both meshes in one.
+/// Returns both meshes as one.
 fn both(a: TriMesh, b: &TriMesh) -> TriMesh {
     let offset = a.vertices.len() as u32;
     let mut all = a;
@@ -18,7 +19,7 @@ fn both(a: TriMesh, b: &TriMesh) -> TriMesh {
     all
 }
 
-/// A box whose corners are moved a little, each its own way, so that nothing is symmetric.
+/// Returns a box whose corners are moved slightly, each differently, so that nothing is symmetric.
 fn distorted_box(half: Vec3, seed: u64) -> TriMesh {
     let mut rng = Rng::new(seed);
     let mut mesh = TriMesh::box_(half);
@@ -28,8 +29,8 @@ fn distorted_box(half: Vec3, seed: u64) -> TriMesh {
     mesh
 }
 
-/// Checked here by points alone: each point of the surface lies in a sphere of each level, each sphere in its parent, and no point
-/// is told an error larger than the stated one.
+/// Checks with points only: each point of the surface lies in a sphere of each level, each sphere
+/// in its parent, and no point has an error larger than the stated one.
 fn check(name: &str, mesh: &TriMesh, tree: &SphereTree, settings: &TreeSettings) {
     let mut rng = Rng::new(5);
     let levels = tree.level_lists();
@@ -79,8 +80,9 @@ fn covers_and_nests_thin_and_scattered_solids() {
     }
 }
 
-/// One sphere about the middle of a polyhedron that is inscribed in a sphere reaches out by the sagitta of its faces. Eight that
-/// share its points find that, but for what closing them over the surface between the points grows.
+/// One sphere about the middle of a polyhedron that is inscribed in a sphere extends outside by the
+/// sagitta of its faces. Eight spheres that share its points have the same error, except for the
+/// growth to cover the surface between the points.
 #[test]
 fn a_sphere_is_covered_by_spheres_as_large() {
     let mesh = TriMesh::icosphere(1.0, 3);
@@ -102,7 +104,7 @@ fn spheres_within_the_error_are_not_divided() {
     check("coarse", &mesh, &tree, &coarse);
 }
 
-/// What was told, in order.
+/// The reports in order.
 struct Reports(Mutex<Vec<f64>>);
 
 impl Progress for Reports {
@@ -143,8 +145,8 @@ fn the_same_bits_on_any_number_of_threads() {
     assert!(one.nodes().iter().zip(two.nodes()).all(|(a, b)| a.radius.to_bits() == b.radius.to_bits()));
 }
 
-/// Worst and mean outward error of the reference toolkit's leaves over the diagonal, as they are and neither covering nor nested;
-/// and of its first level made to nest.
+/// Worst and mean outward error of the reference toolkit's leaves over the diagonal, as built
+/// (neither covering nor nested), and of its first level modified to nest.
 const TOOLKIT: [(&str, f64, f64, Option<f64>); 6] = [
     ("spot", 0.0228, 0.0094, Some(0.131)),
     ("panda_link5", 0.0244, 0.0093, Some(0.117)),

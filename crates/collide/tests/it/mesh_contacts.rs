@@ -1,5 +1,5 @@
-//! Contacts of sphere trees (the `spheres` mode) against parry's distance to the mesh itself: none missed, none invented beyond the stated
-//! error.
+//! Contacts of sphere trees (the `spheres` mode) compared with parry's distance to the mesh itself:
+//! none missed, none invented beyond the stated error.
 
 use crate::against_parry::{to_parry, vector};
 use crate::rng::Rng;
@@ -20,7 +20,7 @@ struct Both {
 }
 
 fn solid(name: &'static str, mesh: TriMesh) -> Both {
-    // about 1 m across, whatever the file's unit
+    // about 1 m across, independent of the file's unit
     let scale = 1.0 / mesh.diagonal();
     let ours = Shape::mesh(mesh.scaled(scale), &TreeSettings::octree()).unwrap();
     let Shape::Mesh(shape) = &ours else { panic!("{name} is no mesh") };
@@ -86,7 +86,7 @@ fn tree_contacts_agree_with_the_distance_to_the_mesh() {
             // parry takes milliseconds for a pair of fine meshes
             let cases = if a.error > 0.0 && b.error > 0.0 { 12 } else { 200 };
             for case in 0..cases {
-                // centers at about the distance where the two begin to touch
+                // centers at about the distance at which the two touch
                 let away = rng.direction() * (a.size + b.size) * rng.between(0.3, 1.0);
                 let (pa, pb) = (rng.pose(0.5), rng.pose(0.5));
                 let pa = Pose::from_parts((pb.translation.vector + away).into(), pa.rotation);
@@ -118,8 +118,8 @@ fn a_ring_hangs_on_a_peg_through_its_hole_without_contact() {
     assert!(find_contacts(&ring, &here, &peg, &here, 0.0).is_empty(), "the hole is 0.75 wide");
     let touching = find_contacts(&ring, &Pose::translation(0.3, 0.0, 0.0), &peg, &here, 0.0);
     let deepest = touching.iter().min_by(|a, b| a.gap.total_cmp(&b.gap)).unwrap();
-    // the ring's left inner side leans on the peg's left: the ring is pushed towards −x. An error e of the gap turns
-    // the deepest normal by θ with 0.3 (1 − cos θ) < e = 0.036
+    // the ring's left inner side touches the peg's left, so the ring is pushed towards −x. An error
+    // e of the gap turns the deepest normal by θ with 0.3 (1 − cos θ) < e = 0.036
     assert!(deepest.normal.x < -0.88 && deepest.point.x < -0.4 && deepest.gap < -0.15, "{deepest:?}");
 }
 
@@ -139,13 +139,14 @@ fn a_box_mesh_lies_flat_on_a_wide_base() {
     let low = found.iter().fold(Vec3::repeat(9.0), |m, c| m.inf(&c.point));
     let high = found.iter().fold(Vec3::repeat(-9.0), |m, c| m.sup(&c.point));
     assert!((high - low).x > 0.7 && (high - low).y > 0.7, "{low:?} {high:?}");
-    // the face is even: it stands off by the same amount everywhere
+    // the face is even: it has the same offset everywhere
     assert!(found.iter().filter(|c| (c.gap + error).abs() < 1e-9).count() >= 3, "{found:?}");
 }
 
 #[test]
 fn a_pin_stands_upright_on_its_base() {
-    // a bowling pin's lower half is enough: base of radius 26 mm, belly of 60 mm at 114 mm, 381 mm high
+    // the lower half of a bowling pin suffices: base of radius 26 mm, belly of 60 mm at 114 mm, 381
+    // mm high
     let profile = [
         (0.0, 0.0),
         (0.026, 0.0),
@@ -279,7 +280,8 @@ fn boxes_around_shapes_hold_their_spheres_and_vertices() {
             let bounds = body.ours.aabb(&pose);
             let theirs = body.theirs.compute_aabb(&to_parry(&pose));
             for k in 0..3 {
-                // no wider than the sphere around all; exact for a primitive (parry's box of a turned mesh is loose)
+                // no wider than the bounding sphere; exact for a primitive (parry's box of a
+                // rotated mesh is loose)
                 let width = bounds.max[k] - bounds.min[k];
                 assert!(width <= 2.0 * (body.size + 2.0 * body.error) + 1e-9, "{}", body.name);
                 let off = (bounds.min[k] - theirs.mins[k]).abs().max((bounds.max[k] - theirs.maxs[k]).abs());

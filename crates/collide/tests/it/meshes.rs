@@ -151,7 +151,7 @@ fn stl_that_lies_about_its_size_is_one_clear_error() {
     assert!(matches!(TriMesh::from_stl(&nan), Err(MeshError::NotFiniteInFace { face: 2, .. })));
 }
 
-/// The outcomes that `bad/README.md` asks for, as far as they can be had without a repairing remesher.
+/// The results stated in `bad/README.md`, as far as they are possible without remeshing.
 #[test]
 fn bad_meshes_are_mended_or_refused_with_a_reason() {
     let Some(spot) = text("spot.obj") else { return };
@@ -232,7 +232,8 @@ fn signed_distance_of_a_fine_sphere_is_that_of_a_sphere() {
     }
 }
 
-/// Damage to any byte gives a mesh or an error, never a panic, and a mesh that passes the check has a volume.
+/// Damage to any byte gives a mesh or an error, never a panic, and a mesh that passes the check has
+/// a volume.
 #[test]
 fn damaged_files_are_read_or_refused() {
     let sphere = TriMesh::icosphere(1.0, 1);
@@ -294,7 +295,8 @@ fn prism(outline: &[[f64; 2]]) -> (String, f64) {
     (format!("{vertices}f{bottom}\nf{top}\n{sides}"), area)
 }
 
-/// The outlines, each begun at every one of its corners: a fan is right from some of them at best.
+/// Returns the outlines, each starting at every one of its corners: a fan is valid from some of
+/// them at best.
 fn concave() -> Vec<Vec<[f64; 2]>> {
     let star = (0..20)
         .map(|k| (f64::from(k) * PI / 10.0, if k % 2 == 1 { 1.0 } else { 0.3 }))
@@ -308,7 +310,7 @@ fn concave() -> Vec<Vec<[f64; 2]>> {
     let outlines: [Vec<[f64; 2]>; 5] = [
         vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]],
         vec![[4.0, 0.0], [0.0, 2.0], [1.0, 0.0], [0.0, -2.0]],
-        // a square with a square hole, joined by a cut that is gone along twice
+        // a square with a square hole, joined by a cut that is traversed twice
         vec![
             [0.0, 0.0],
             [3.0, 0.0],
@@ -358,7 +360,7 @@ fn a_fan_that_is_right_stays_and_hostile_faces_end() {
     let (obj, _) = prism(&(0..64).map(|k| f64::from(k) * PI / 32.0).map(|a| [a.cos(), a.sin()]).collect::<Vec<_>>());
     let mesh = TriMesh::from_obj(&obj).unwrap();
     assert!(mesh.triangles[..62].iter().enumerate().all(|(k, t)| *t == [63, 62 - k as u32, 61 - k as u32]));
-    // a zigzag of more corners than are cut, and a face that crosses itself
+    // a zigzag with more corners than the limit, and a face that crosses itself
     let zigzag: String = (0..5001)
         .map(|k| format!("v {k} {} 0\n", k % 2 * 100))
         .chain(["f".into()])
@@ -371,7 +373,7 @@ fn a_fan_that_is_right_stays_and_hostile_faces_end() {
     assert_eq!(TriMesh::from_obj(&(star + "f 1 2 3 4 5 6 7\n")).unwrap().triangles.len(), 5);
 }
 
-/// The L that a fan folds: the sheet over its notch has no thickness and is no part of the solid.
+/// The L that a fan folds: the sheet over its notch has no thickness and is not part of the solid.
 #[test]
 fn a_sheet_over_a_notch_does_not_break_the_bound_of_a_tree() {
     let outline = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
@@ -381,7 +383,7 @@ fn a_sheet_over_a_notch_does_not_break_the_bound_of_a_tree() {
     };
     mesh.triangles.splice(..8, fan(0, true).chain(fan(6, false)).collect::<Vec<_>>());
     assert!(mesh.check_closed().unwrap().crossing_faces > 0);
-    // the distance from the L, outside of it exact
+    // the distance from the L, exact outside
     let block = |p: &Vec3, x: f64, y: f64| {
         let q = (p - Vec3::new(0.5 * x, 0.5 * y, 0.5)).abs() - Vec3::new(0.5 * x, 0.5 * y, 0.5);
         q.sup(&Vec3::zeros()).norm()
@@ -415,7 +417,7 @@ fn obj_files_come_in_several_spellings() {
     assert_eq!(read(&[b"# caf\xe9 \xff\n", plain.as_bytes()].concat()), wanted);
     assert_eq!(read(plain.replace("1 3 2", "1 \\\n3 \\\r\n 2").as_bytes()), wanted);
     assert_eq!(read(format!("# ends in \\\n{plain}").as_bytes()), wanted);
-    // lines are those of the file, and of a line that goes on the first
+    // line numbers are those of the file; a continued line has the first one's
     let (_, lines) = TriMesh::from_obj_with_lines(&plain.replace("1 3 2", "1 \\\n3 2")).unwrap();
     assert_eq!(lines, [5, 7, 8, 9]);
     assert_eq!(decode_text(b"v 0\0"), Err(3));
@@ -445,7 +447,7 @@ fn a_mesh_of_no_size_says_so() {
     );
 }
 
-/// A box of six quads as PLY, with a property and an element that are passed over.
+/// Returns a box of six quads as PLY, with an unknown property and element.
 fn ply(encoding: &str, corners: &[[f32; 3]], quads: &[[i32; 4]]) -> Vec<u8> {
     let mut bytes = format!(
         "ply\nformat {encoding} 1.0\ncomment made here\nelement vertex {}\nproperty float x\nproperty float y\nproperty uchar red\nproperty float z\n\
@@ -490,7 +492,7 @@ fn ply_is_read_in_all_three_encodings() {
             "{encoding}"
         );
         assert_near(mesh.check_closed().unwrap().volume, 1.75_f64.powi(3), 1e-12, encoding);
-        // a file that is cut is an error that says so, and one with other bytes is an error or a mesh
+        // a truncated file is an error that says so, and one with other bytes is an error or a mesh
         for end in 0..bytes.len() - 1 {
             assert!(TriMesh::from_ply(&bytes[..end]).is_err() || encoding == "ascii", "{encoding} cut at {end}");
         }
@@ -531,7 +533,7 @@ fn ply_errors_name_the_place() {
     }
 }
 
-/// A tetrahedron as one strip of six, in the given encoding.
+/// Returns a tetrahedron as one strip of six, in the given encoding.
 fn ply_of_strips(encoding: &str, strips: &[&[i32]]) -> Vec<u8> {
     let mut bytes = format!(
         "ply\nformat {encoding} 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
@@ -554,7 +556,8 @@ fn ply_of_strips(encoding: &str, strips: &[&[i32]]) -> Vec<u8> {
     bytes
 }
 
-/// However its strips are cut, the tetrahedron has four faces that wind outwards and a sixth of a cube's volume.
+/// For any division into strips, the tetrahedron has four outward-wound faces and a sixth of a
+/// cube's volume.
 #[test]
 fn ply_triangle_strips_are_read() {
     let cases: [&[&[i32]]; 5] = [
@@ -563,7 +566,7 @@ fn ply_triangle_strips_are_read() {
         &[&[0, 2, 1, 3, -1, 1, 3, 0, 2]],
         &[&[0, 2, 1, -1, 1, 2, 3, -1, 1, 3, 0, -1, 0, 3, 2, -1]],
         &[&[0, 2, 1, 3], &[-1, 1, 3, 0, 2, -1, -1]],
-        // vertices named twice lead from one strip to the next without a restart
+        // repeated vertices lead from one strip to the next without a restart
         &[&[0, 2, 1, 3, 3, 1, 1, 3, 0, 2]],
     ];
     for encoding in ["ascii", "binary_little_endian", "binary_big_endian"] {

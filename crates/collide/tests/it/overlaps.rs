@@ -1,5 +1,5 @@
-//! Overlaps of bodies that are aligned with each other, so that no corner of either lies deep in the other: the contacts part them, by the least
-//! translation that closed forms give.
+//! Overlaps of aligned bodies, in which no corner of either lies deep in the other: the contacts
+//! separate them by the minimum translation, known in closed form.
 
 use tumble_collide::{Contact, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts};
 
@@ -21,14 +21,14 @@ fn find_contacts(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
     out
 }
 
-/// The deepest contact has this depth and parts the two along this way.
+/// Checks that the deepest contact has this depth and separates the two along this direction.
 fn check_separation(label: &str, found: &[Contact], depth: f64, direction: Vec3, slack: f64) {
     let deepest = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).unwrap_or_else(|| panic!("{label}: no contact"));
     assert!(
         (deepest.gap + depth).abs() < slack && deepest.normal.dot(&direction) > 1.0 - 1e-3,
         "{label}: {depth} along {direction:?}, but {deepest:?}"
     );
-    // none pushes it back
+    // none pushes in the opposite direction
     assert!(found.iter().filter(|c| c.gap < 0.0).all(|c| c.normal.dot(&direction) > 0.0), "{label}: {found:?}");
 }
 
@@ -95,7 +95,7 @@ fn aligned_cylinders_separate_by_their_overlap() {
     }
 }
 
-/// Meshes of many faces: their sides are as flat, or come within a known chord of the circle.
+/// Meshes of many faces: their sides are as flat, or within a known chord of the circle.
 #[test]
 fn aligned_fine_meshes_separate_by_their_overlap() {
     let fine = mesh(TriMesh::cylinder(0.5, 0.5, 32));
@@ -116,7 +116,7 @@ fn aligned_fine_meshes_separate_by_their_overlap() {
     }
 }
 
-/// A prism over an L: a unit square without a quarter, one high.
+/// Returns a prism over an L: a unit square without a quarter, one high.
 fn angle() -> Shape {
     let outline = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.5), (0.5, 0.5), (0.5, 1.0), (0.0, 1.0)];
     let vertices = [0.0, 1.0].iter().flat_map(|z| outline.map(|(x, y)| Vec3::new(x, y, *z))).collect();
@@ -144,7 +144,8 @@ fn aligned_angles_separate_by_their_overlap() {
     }
 }
 
-/// Where none is deeper in one way than in another, any way out will do: moved so that all contacts are satisfied they are apart.
+/// Coincident bodies have several equal directions. Any of them is valid: after a translation that
+/// satisfies all contacts they are separated.
 #[test]
 fn coincident_bodies_are_separated() {
     let turned = Quat::from_scaled_axis(Vec3::new(0.2, 0.4, 0.6));
@@ -171,7 +172,7 @@ fn coincident_bodies_are_separated() {
     }
 }
 
-/// A short translation that closes all overlaps that contacts tell, by projections (Kaczmarz 1937).
+/// Returns a short translation that resolves all contacts, by projections (Kaczmarz 1937).
 fn separating_translation(found: &[Contact]) -> Vec3 {
     let mut direction = Vec3::zeros();
     for contact in found.iter().cycle().take(2000 * found.len()) {

@@ -50,7 +50,7 @@ fn box_rests_on_box_on_four_corners_with_persistent_features() {
 
 #[test]
 fn crossed_edges_give_one_contact() {
-    // both turned by 45° so that an edge along x crosses an edge along y at height 0
+    // both rotated by 45° so that an edge along x crosses an edge along y at height 0
     let shape = Shape::cuboid(Vec3::new(1.0, 1.0, 1.0)).unwrap();
     let quarter = std::f64::consts::FRAC_PI_4;
     for (gap, margin) in [(-0.02, 0.0), (0.02, 0.05)] {
@@ -151,7 +151,8 @@ fn half_space_boxes_are_bounded_only_along_an_axis() {
     assert_eq!((tilted.min.z, tilted.max.z), (f64::NEG_INFINITY, f64::INFINITY));
 }
 
-/// The clipped face reached beyond the margin while an edge was within it, and nothing was told.
+/// Regression test: the clipped face was beyond the margin while an edge was within it, and no
+/// contact was found.
 #[test]
 fn an_edge_just_within_the_margin_is_not_missed() {
     let a = Shape::cuboid(Vec3::new(0.7084363941525877, 0.31168860079970623, 0.6147508599287879)).unwrap();

@@ -5,7 +5,7 @@ use tumble_collide::{
     LevelQuality, LevelSphere, QualitySettings, SphereTree, TreeSettings, TriMesh, Vec3, grow_to_cover,
 };
 
-/// The figures of spheres `(x, r)` with their centers on the x axis.
+/// Measures spheres `(x, r)` with their centers on the x axis.
 fn on_axis(spheres: &[(f64, f64)], mesh: &TriMesh) -> LevelQuality {
     let level = spheres.iter().map(|&(x, r)| LevelSphere::new(Vec3::x() * x, r)).collect();
     LevelQuality::of_levels(&[level], mesh, &QualitySettings::default()).remove(0)
@@ -42,7 +42,7 @@ fn a_sphere_around_a_cube() {
     near("error of the sphere", q.sphere_worst, (r - 1.0) / d, 2e-5);
     let ratio = 4.0 / 3.0 * PI * r.powi(3) / 8.0;
     near("volume ratio", q.volume_ratio, ratio, 1e-3 * ratio);
-    // half the standard deviation of as many random points
+    // half the standard deviation of the same number of random points
     near("outside", q.outside, ratio - 1.0, 3.4e-3);
     assert_eq!(q.missing, 0.0);
 }
@@ -89,14 +89,16 @@ fn two_spheres_that_overlap_count_their_lens_once() {
 
 #[test]
 fn a_sphere_beside_a_sphere() {
-    // the solid is a sphere to 0.1 %, the tree the same sphere moved by 0.7: what they share is the lens
+    // the solid is a sphere to 0.1 %, the tree the same sphere moved by 0.7: their intersection is
+    // the lens
     let apart = 0.7_f64;
     let q = on_axis(&[(apart, 1.0)], &TriMesh::icosphere(1.0, 5));
     let (whole, lens) = (4.0 / 3.0 * PI, PI * (4.0 + apart) * (2.0 - apart).powi(2) / 12.0);
     near("outside", q.outside, 1.0 - lens / whole, 2e-3);
     near("missing", q.missing, 1.0 - lens / whole, 2e-3);
     near("error", q.sphere_worst * 12.0_f64.sqrt(), apart, 2e-3);
-    // of the surface of the solid the cap beyond x = apart / 2 is covered; the mesh lies 0.07 % within its sphere, which moves that by 5e-4
+    // the cap of the solid's surface beyond x = apart / 2 is covered; the mesh lies 0.07 % within
+    // its sphere, which changes that by 5e-4
     near("coverage", q.coverage, (1.0 - 0.5 * apart) / 2.0, 2e-3);
 }
 

@@ -1,4 +1,4 @@
-//! A seeded source of numbers (splitmix64), so that each failure can be had again.
+//! A seeded random number generator (splitmix64), so that each failure can be reproduced.
 
 use tumble_collide::{Pose, Quat, Vec3};
 
@@ -6,7 +6,7 @@ use tumble_collide::{Pose, Quat, Vec3};
 pub struct Rng(u64);
 
 impl Rng {
-    /// A stream of its own per seed.
+    /// Returns an independent stream per seed.
     pub fn new(seed: u64) -> Rng {
         Rng(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x1234_5678_9abc_def0)
     }
@@ -19,27 +19,27 @@ impl Rng {
         z ^ (z >> 31)
     }
 
-    /// Uniform in [0, 1).
+    /// Returns a number uniform in [0, 1).
     pub fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Uniform in [low, high).
+    /// Returns a number uniform in [low, high).
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// Uniform in 0..n.
+    /// Returns an index uniform in 0..n.
     pub fn below(&mut self, n: usize) -> usize {
         (self.unit() * n as f64) as usize
     }
 
-    /// Each component uniform in [−size, size).
+    /// Returns a vector with each component uniform in [−size, size).
     pub fn vec(&mut self, size: f64) -> Vec3 {
         Vec3::from_fn(|_, _| self.between(-size, size))
     }
 
-    /// A direction, near enough to uniform.
+    /// Returns a nearly uniform direction.
     pub fn direction(&mut self) -> Vec3 {
         loop {
             let v = self.vec(1.0);
@@ -49,7 +49,7 @@ impl Rng {
         }
     }
 
-    /// Any orientation, translation within `size` on each axis.
+    /// Returns a pose with any orientation and a translation within `size` on each axis.
     pub fn pose(&mut self, size: f64) -> Pose {
         let turn = Quat::from_scaled_axis(self.direction() * self.between(0.0, 3.1));
         Pose::from_parts(self.vec(size).into(), turn)

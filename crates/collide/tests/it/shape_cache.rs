@@ -1,11 +1,11 @@
-//! Mesh shapes from the cache: the same contacts to the last bit, and no file in it is trusted.
+//! Mesh shapes from the cache: the same contacts to the last bit, and no file is trusted.
 
 use crate::tree_cache::Folder;
 use std::fs;
 use std::process::Command;
 use tumble_collide::{Pose, Quat, Shape, TreeCache, TreeSettings, TriMesh, Vec3, contacts};
 
-/// A ring with bumps: no two of its points are alike.
+/// Returns a ring with bumps: no two of its points are alike.
 fn bumpy() -> TriMesh {
     let mut mesh = TriMesh::torus(1.0, 0.35, 40, 20);
     mesh.vertices.iter_mut().for_each(|v| *v *= 1.0 + 0.03 * (7.0 * v.x + 5.0 * v.y + 9.0 * v.z).sin());
@@ -16,7 +16,8 @@ fn cached(mesh: TriMesh, cache: &TreeCache) -> (Shape, Option<String>) {
     Shape::mesh_cached(mesh, &TreeSettings::octree(), cache).unwrap()
 }
 
-/// All that two of a shape say of each other in many places, deep, close and apart, and of a sphere, a block and a cylinder; as text that tells all bits apart.
+/// Returns the bits of all contacts of two copies of a shape in many poses, deep, close and apart,
+/// and with a sphere, a box and a cylinder, as text.
 fn contact_bits(shape: &Shape) -> String {
     let cylinder = Shape::cylinder(0.3, 0.6).unwrap();
     let others =
@@ -49,12 +50,12 @@ fn a_shape_from_the_cache_has_the_bits_of_a_fresh_one() {
         let (Shape::Mesh(a), Shape::Mesh(b)) = (&shape, &fresh) else { panic!("no meshes") };
         assert_eq!((a, a.report()), (b, b.report()));
         assert!(contact_bits(&shape) == expected, "found: {found}");
-        // asked again, and in a copy, when everything was made
+        // queried again, and with a copy, after everything was built
         assert!(contact_bits(&shape.clone()) == expected);
     }
 }
 
-/// Queries in another order, and from several threads at once, make the same.
+/// Queries in another order, and from several threads at once, give the same bits.
 #[test]
 fn contacts_do_not_depend_on_the_order_of_queries() {
     let expected = contact_bits(&Shape::mesh(bumpy(), &TreeSettings::octree()).unwrap());
@@ -85,7 +86,7 @@ fn repairs_are_reported_from_the_cache_too() {
     assert_eq!(folder.files().len(), 1);
 }
 
-/// A mesh that is no solid is the same error, whatever is in the cache.
+/// A mesh that is not a solid gives the same error for any content of the cache.
 #[test]
 fn a_shape_that_cannot_be_built_is_not_cached() {
     let folder = Folder::new();
@@ -125,7 +126,7 @@ fn a_damaged_truncated_or_foreign_file_is_reported_and_rebuilt() {
     }
 }
 
-/// A file whose checksum is right and which holds no shape, such as one that somebody made up.
+/// A file with a valid checksum that contains no shape.
 #[test]
 fn a_checksum_alone_is_not_trusted() {
     let folder = Folder::new();
@@ -148,7 +149,7 @@ fn a_checksum_alone_is_not_trusted() {
 fn a_folder_that_cannot_be_written_is_a_note_and_the_shape_is_fine() {
     let folder = Folder::new();
     fs::create_dir_all(&folder.0).unwrap();
-    // a file where the folder should be: refused for any user, root too
+    // a file instead of the folder: rejected for any user, including root
     let in_the_way = folder.0.join("file");
     fs::write(&in_the_way, "").unwrap();
     let (shape, note) = cached(bumpy(), &TreeCache::at(in_the_way.join("trees")));
@@ -159,7 +160,7 @@ fn a_folder_that_cannot_be_written_is_a_note_and_the_shape_is_fine() {
 
 const ITS_FOLDER: &str = "TUMBLE_TEST_SHAPE_CACHE";
 
-/// Run by the next test, in processes of its own.
+/// Run by the next test in separate processes.
 #[test]
 #[ignore = "a part of processes_that_write_at_once_leave_one_whole_file"]
 fn one_of_several_processes() {
@@ -168,7 +169,7 @@ fn one_of_several_processes() {
         let (_, note) = cached(bumpy(), &TreeCache::at(&folder));
         assert_eq!(note, None);
         fs::read_dir(&folder).unwrap().flatten().map(|e| e.path()).for_each(|f| {
-            // all write again and again
+            // all write repeatedly
             if f.extension().is_some_and(|e| e == "shape") {
                 _ = fs::remove_file(f);
             }

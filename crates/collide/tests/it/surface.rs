@@ -1,4 +1,4 @@
-//! The `surface` mode: flat faces, aligned and crossed blocks, cylinders.
+//! The `surface` mode: flat faces, aligned and crossed boxes, cylinders.
 
 use crate::rng::Rng;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
@@ -28,7 +28,7 @@ fn turned(z: f64, angle: f64) -> Pose {
     Pose::from_parts(Vec3::new(0.0, 0.0, z).into(), Quat::from_scaled_axis(Vec3::z() * angle))
 }
 
-/// Extent of the points in the horizontal plane.
+/// Returns the extent of the points in the horizontal plane.
 fn spread(found: &[Contact]) -> Vec3 {
     let low = found.iter().fold(Vec3::repeat(9.0), |m, c| m.inf(&c.point));
     let high = found.iter().fold(Vec3::repeat(-9.0), |m, c| m.sup(&c.point));
@@ -51,7 +51,8 @@ fn a_mesh_box_touches_a_plane_with_its_four_corners() {
 
 #[test]
 fn boxes_of_the_same_size_touch_face_to_face() {
-    // each as a mesh and as a primitive, aligned, and the upper one moved a little, either way
+    // each as a mesh and as a primitive, aligned, and with the upper one moved slightly in either
+    // direction
     let (mesh, block) = (mesh_box(0.5, 0.5, 0.5), Shape::cuboid(Vec3::repeat(0.5)).unwrap());
     for (a, b) in [(&mesh, &mesh), (&mesh, &block), (&block, &mesh)] {
         for shift in [0.0, 1e-9, -1e-9, 1e-7, -1e-5, 1e-3, 0.2] {
@@ -109,7 +110,7 @@ fn a_bar_across_a_bar_has_the_corners_of_their_common_square() {
 
 #[test]
 fn crossed_edges_meet_at_one_point() {
-    // two blocks on edge, one along x, one along y: closest at the crossing, at ½√2 from each axis
+    // two boxes on edge, one along x, one along y: closest at the crossing, at ½√2 from each axis
     let reach = 0.5 * 2.0_f64.sqrt();
     let (mesh, block) = (mesh_box(1.0, 0.5, 0.5), Shape::cuboid(Vec3::new(1.0, 0.5, 0.5)).unwrap());
     let on_edge = |z: f64, yaw: f64| {
@@ -129,7 +130,8 @@ fn crossed_edges_meet_at_one_point() {
 
 #[test]
 fn a_thin_plate_is_not_seen_from_its_other_side() {
-    // a plate 1 mm thick lies on a block; its lower corners are near the block's top, its upper ones not
+    // a plate 1 mm thick lies on a box; its lower corners are near the box's top, its upper ones
+    // not
     let (plate, block) = (mesh_box(0.2, 0.2, 0.0005), mesh_box(0.5, 0.5, 0.5));
     for gap in [1e-4, 0.0, -1e-4] {
         let found = find_contacts(&plate, &Pose::translation(0.0, 0.0, 0.5005 + gap), &block, &Pose::identity(), 5e-4);
@@ -137,7 +139,7 @@ fn a_thin_plate_is_not_seen_from_its_other_side() {
             found.len() >= 4 && found.iter().all(|c| (c.gap - gap).abs() < 1e-9 && c.normal.z > 0.999),
             "{gap}: {found:?}"
         );
-        // the same from below, and a block that hangs from the plate's underside
+        // the same from below, and a box that hangs from the plate's underside
         let found = find_contacts(&block, &Pose::translation(0.0, 0.0, -0.5005 - gap), &plate, &Pose::identity(), 5e-4);
         assert!(
             found.len() >= 4 && found.iter().all(|c| (c.gap - gap).abs() < 1e-9 && c.normal.z < -0.999),
@@ -181,7 +183,8 @@ fn a_cylinder_on_a_box_touches_as_on_a_plane() {
 
 #[test]
 fn a_sphere_in_a_groove_touches_both_sides() {
-    // two blocks turned by 45° make a groove; here one concave mesh would do as well: a ring's hole and a sphere in it
+    // two boxes rotated by 45° make a groove; here one concave mesh does as well: a ring's hole and
+    // a sphere in it
     let ring = Shape::mesh(TriMesh::torus(1.0, 0.25, 48, 24), &TreeSettings::octree()).unwrap();
     let sphere = Shape::sphere(0.9).unwrap();
     // the sphere sits on the hole: its center is (0.9 + 0.25) from the tube's middle circle
@@ -195,7 +198,8 @@ fn a_sphere_in_a_groove_touches_both_sides() {
 
 #[test]
 fn the_round_side_of_a_cylinder_beside_an_edge_is_not_lost() {
-    // a pose that was found at random; 11.5239 mm are parry's distance of a prism of 720 sides, which is 1 µm short
+    // a pose found at random; 11.5239 mm is parry's distance of a prism of 720 sides, which is 1 µm
+    // short
     let half = Vec3::new(0.2, 0.3, 0.1) / (2.0 * 0.14_f64.sqrt());
     let (mesh, cylinder) = (mesh_box(half.x, half.y, half.z), Shape::cylinder(0.1, 0.15).unwrap());
     let turn =
@@ -224,8 +228,9 @@ fn a_cylinder_across_the_straight_lines_of_a_smooth_surface_meets_their_middle()
 
 #[test]
 fn a_rim_over_a_shallow_valley_meets_both_its_sides() {
-    // a trough z = a|x|, and a cylinder tilted by τ across it, its rim's lowest point above the bottom: at an angle θ from there the rim is at
-    // z₀ − r sin τ cos θ, so least above the sides where tan θ = ± a / sin τ, 0.4° here: both in one arc
+    // a trough z = a|x|, and a cylinder tilted by τ across it, with its rim's lowest point above
+    // the bottom. At an angle θ from there the rim is at z₀ − r sin τ cos θ, so the minimum above
+    // the sides is at tan θ = ± a / sin τ, 0.4° here: both in one arc
     let (a, r, tilt, depth) = (2e-3, 0.1, 0.3_f64, 0.2);
     let profile = [(-0.5, 0.5 * a), (0.0, 0.0), (0.5, 0.5 * a), (0.5, -depth), (-0.5, -depth)];
     let vertices = [-0.4, 0.4].iter().flat_map(|y| profile.map(|(x, z)| Vec3::new(x, *y, z))).collect();
@@ -275,13 +280,16 @@ fn contacts_do_not_depend_on_earlier_queries() {
     assert_eq!(forwards, backwards);
 }
 
-/// A bar goes through a block that has a dent, both meshes. No vertex and no edge of either is as deep as the places inside faces are.
+/// A bar through a box with a dent, both meshes. No vertex and no edge of either is as deep as
+/// points inside the faces.
 #[test]
 fn two_meshes_deep_in_each_other_have_the_depth_of_the_deepest_face() {
     let (block, bar) = (dented_box(), mesh_box(3.0, 0.7, 0.4));
-    // the bar's wide faces are at z = ±0.4, 0.6 below the block's; the bar's edges are 0.3 below y = ±1; the block's own faces are 0.4 deep in the bar
+    // the bar's wide faces are at z = ±0.4, 0.6 below the box's; the bar's edges are 0.3 below y =
+    // ±1; the box's own faces are 0.4 deep in the bar
     let straight = Pose::identity();
-    // moved by 0.1 up: one wide face comes to z = 0.5, the other to z = −0.3, 0.7 below the block's lower side
+    // moved up by 0.1: one wide face is at z = 0.5, the other at z = −0.3, 0.7 below the box's
+    // lower side
     let raised = Pose::translation(0.0, 0.0, 0.1);
     for (pose, depth) in [(straight, 0.6), (raised, 0.7)] {
         for (a, pa, b, pb) in [(&block, Pose::identity(), &bar, pose), (&bar, pose, &block, Pose::identity())] {
@@ -293,7 +301,8 @@ fn two_meshes_deep_in_each_other_have_the_depth_of_the_deepest_face() {
     }
 }
 
-/// A cube of edge 2 about its center of mass, less a pyramid of 0.01 in one side, which moves that by 6e-5 (the deepest places are beside it in z).
+/// Returns a cube of edge 2 about its center of mass, minus a pyramid of 0.01 in one side, which
+/// moves that by 6e-5 (the deepest points are beside it in z).
 fn dented_box() -> Shape {
     let mut mesh = TriMesh::box_(Vec3::repeat(1.0));
     let at = |mesh: &TriMesh, v: u32| mesh.vertices[v as usize];
@@ -302,14 +311,15 @@ fn dented_box() -> Shape {
     mesh.triangles.retain(|t| !side.contains(t));
     let middle = mesh.vertices.len() as u32;
     mesh.vertices.push(Vec3::new(0.0, 0.99, 0.0));
-    // the rim of the side: edges that only one of its triangles has
+    // the boundary of the side: edges of only one of its triangles
     let edges: Vec<[u32; 2]> = side.iter().flat_map(|t| (0..3).map(|k| [t[k], t[(k + 1) % 3]])).collect();
     let rim = edges.iter().filter(|[a, b]| !edges.contains(&[*b, *a]));
     mesh.triangles.extend(rim.map(|[a, b]| [*a, *b, middle]));
     Shape::mesh(mesh, &TreeSettings::octree()).unwrap()
 }
 
-/// The same bar and a block without a dent, both convex: the least way out is over the block's upper side, `1 + 0.4`, or `1 + 0.3` for the raised one.
+/// The same bar and a box without a dent, both convex: the minimum translation is over the box's
+/// upper side, `1 + 0.4`, or `1 + 0.3` for the raised one.
 #[test]
 fn convex_meshes_through_each_other_have_the_depth_of_the_least_translation() {
     let (block, bar) = (mesh_box(1.0, 1.0, 1.0), mesh_box(3.0, 0.7, 0.4));

@@ -1,10 +1,11 @@
-//! The `surface` mode against parry's distances and brute force, over random poses near contact: what was missed, what
-//! was invented, how far the depths are apart. `TUMBLE_SLOW=1` takes 10,000 poses
-//! of meshes on each primitive and 280,000 of meshes on meshes.
+//! The `surface` mode compared with parry's distances and with brute force, over random poses near
+//! contact: missed and invented contacts, and differences of depth. `TUMBLE_SLOW=1` runs 10,000
+//! poses of meshes on each primitive and 280,000 of meshes on meshes.
 //!
-//! Apart, the reference is parry's distance. Overlapping, it is the deepest point of either surface in the other
-//! solid, by brute force over vertices and points inside the triangles, with signed distances that the mode does not
-//! use: [`MeshDistance`] and formulas written here.
+//! For separated bodies the reference is parry's distance. For overlapping ones it is the deepest
+//! point of either surface in the other solid, by brute force over vertices and points inside the
+//! triangles, with signed distances that the mode does not use: [`MeshDistance`] and formulas of
+//! this file.
 
 use crate::against_parry::{to_parry, vector};
 use crate::brute_force::{self, Kind};
@@ -16,12 +17,13 @@ use parry3d_f64::query::{self, ClosestPoints};
 use parry3d_f64::shape::{Ball, Capsule, ConvexPolyhedron, Cuboid, Shape as ParryShape, TriMesh as ParryMesh};
 use tumble_collide::{Contact, MeshDistance, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts};
 
-/// What the mode states: 2e-4 of a diagonal per mesh (they are 1 m), and parry's own rounding.
+/// The stated error: 2e-4 of a diagonal per mesh (they are 1 m), and parry's own rounding.
 const ERROR: f64 = 4e-4 + 1e-5;
 const MARGIN: f64 = 0.02;
-/// What parry's prism is short of a cylinder by: `0.1 (1 − cos(π/720))`.
+/// Difference of parry's prism from a cylinder: `0.1 (1 − cos(π/720))`.
 const ROUNDING: f64 = 1e-6;
-/// Overlaps up to this deep are counted apart: vertices and edges tell their depth, faces are searched in deeper ones alone.
+/// Overlaps up to this depth are counted separately: vertices and edges determine their depth;
+/// faces are searched in deeper ones only.
 const SHALLOW: f64 = 0.02;
 
 struct Body {
@@ -59,7 +61,7 @@ fn solid(name: &'static str, mesh: TriMesh) -> Body {
 fn primitives() -> Vec<Body> {
     let body =
         |name, ours, theirs: Box<dyn ParryShape>| Body { name, ours, theirs, distance: None, samples: Vec::new() };
-    // parry's cylinder is along y: a prism of many sides is as good
+    // parry's cylinder is along y; a prism of many sides is equivalent
     let prism = TriMesh::cylinder(0.1, 0.15, 720);
     let prism = ConvexPolyhedron::from_convex_hull(&prism.vertices.iter().map(vector).collect::<Vec<_>>()).unwrap();
     let half = Vec3::new(0.15, 0.1, 0.2);
@@ -88,7 +90,7 @@ fn meshes() -> Vec<Body> {
     all
 }
 
-/// A sphere with a wavy surface: neither convex nor symmetric.
+/// Returns a sphere with a wavy surface: neither convex nor symmetric.
 fn bumps() -> TriMesh {
     let mut mesh = TriMesh::icosphere(0.4, 3);
     for v in &mut mesh.vertices {
@@ -97,7 +99,7 @@ fn bumps() -> TriMesh {
     mesh
 }
 
-/// Signed distance of a body at a point of its own frame.
+/// Returns the signed distance of a body at a point of its own frame.
 fn signed(body: &Body, p: &Vec3) -> f64 {
     if let Some(distance) = &body.distance {
         return distance.closest(p).signed_distance;
@@ -128,17 +130,17 @@ fn deepest_sample(a: &Body, pa: &Pose, b: &Body, pb: &Pose) -> f64 {
 struct Counts {
     apart: u32,
     near: u32,
-    /// All that overlap, and those of them that were held against brute force.
+    /// All overlapping poses, and those compared with brute force.
     met: u32,
     overlapping: u32,
     missed: u32,
     invented: u32,
     shallow: u32,
-    /// Of deep overlaps, of shallow ones.
+    /// Deep overlaps, shallow overlaps.
     shallower: [u32; 2],
     turned: u32,
-    /// Near ones of which no contact that is as deep within the stated error has parry's normal: where a vertex is closest to a flat face, as a
-    /// referee says, and where something else is.
+    /// Close poses in which no contact of the same depth (within the stated error) has parry's
+    /// normal: with a vertex closest to a flat face (by brute force), and others.
     other_normals: [u32; 2],
     worst_apart: f64,
     worst_depth: f64,
@@ -151,7 +153,8 @@ fn find_contacts(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
     out
 }
 
-/// How far apart parry says that the two are, up to a bit more than the margin, and the line from its closest point of B to that of A.
+/// Returns parry's distance of the two, up to a little more than the margin, and the vector from
+/// its closest point of B to that of A.
 fn apart(a: &Body, pa: &Pose, b: &Body, pb: &Pose) -> (f64, Option<Vec3>) {
     match query::closest_points(&to_parry(pa), &*a.theirs, &to_parry(pb), &*b.theirs, 1.1 * MARGIN).unwrap() {
         ClosestPoints::WithinMargin(x, y) => {
@@ -162,13 +165,15 @@ fn apart(a: &Body, pa: &Pose, b: &Body, pb: &Pose) -> (f64, Option<Vec3>) {
     }
 }
 
-/// Random poses at about the distance where the two touch: parry's distance says how far to go.
+/// Compares random poses at about the distance at which the two touch; parry's distance gives the
+/// displacement.
 fn compare(a: &Body, b: &Body, cases: usize, brute: usize, rng: &mut Rng, counts: &mut Counts) {
     for case in 0..cases {
         let (pa, pb) = (rng.pose(0.3), rng.pose(0.3));
         let way = rng.direction();
         let mut pa = Pose::from_parts((pb.translation.vector + way * 3.0).into(), pa.rotation);
-        // as far along the way as parry says is free, a few times; then near, or a little or much too far
+        // moves along the direction as far as parry's distance allows, a few times; then close,
+        // slightly too far or much too far
         for _ in 0..4 {
             let free = query::distance(&to_parry(&pa), &*a.theirs, &to_parry(&pb), &*b.theirs).unwrap().distance;
             pa.translation.vector -= way * free;
@@ -179,7 +184,8 @@ fn compare(a: &Body, b: &Body, cases: usize, brute: usize, rng: &mut Rng, counts
     }
 }
 
-/// The same where parry's distance takes too long: it is asked which of the places along a way touch, and then of several poses close to there.
+/// Like [`compare`], for pairs whose distance is slow in parry: tests which places along a line
+/// touch, and then several poses close to there.
 fn compare_by_halves(a: &Body, b: &Body, cases: usize, brute: usize, rng: &mut Rng, counts: &mut Counts) {
     for way_number in 0..cases.div_ceil(POSES) {
         let (pa, pb) = (rng.pose(0.3), rng.pose(0.3));
@@ -203,10 +209,10 @@ fn compare_by_halves(a: &Body, b: &Body, cases: usize, brute: usize, rng: &mut R
     }
 }
 
-/// Poses along one way.
+/// Number of poses along one line.
 const POSES: usize = 5;
 
-/// Holds one pose against parry, and if they overlap and `deep` asks for it against brute force.
+/// Compares one pose with parry, and, if they overlap and `deep` is set, with brute force.
 fn check_pose(label: &str, (a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), deep: bool, counts: &mut Counts) {
     let (distance, line) = apart(a, pa, b, pb);
     let found = find_contacts(&a.ours, pa, &b.ours, pb);
@@ -242,7 +248,7 @@ fn check_pose(label: &str, (a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), dee
         }
         if distance > 1e-3
             && (gap - distance).abs() < rounding
-            // of contacts that are all as deep, parry has one
+            // of contacts of equal depth, parry returns one
             && found.iter().filter(|c| c.gap < gap + rounding).all(turned)
         {
             label();
@@ -266,7 +272,8 @@ fn check_pose(label: &str, (a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), dee
     counts.met += u32::from(distance <= 0.0 || contained);
 }
 
-/// Whether a vertex of one is closest to the inside of a face of the other, by brute force where both are meshes; else it is taken to be.
+/// Returns whether a vertex of one is closest to the inside of a face of the other, by brute force
+/// if both are meshes; otherwise true.
 fn closest_is_face((a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), distance: f64) -> bool {
     let (Shape::Mesh(x), Shape::Mesh(y), Some(field)) = (&a.ours, &b.ours, &b.distance) else { return true };
     let all = brute_force::closest(x.mesh(), pa, y.mesh(), pb, field, 1e-9);
@@ -280,13 +287,14 @@ fn closest_is_face((a, pa): (&Body, &Pose), (b, pb): (&Body, &Pose), distance: f
     all.iter().any(|c| c.kind == Kind::Face)
 }
 
-/// Two poses, to the last bit.
+/// Returns the bits of two poses as text.
 fn pose_bits(pa: &Pose, pb: &Pose) -> String {
     let of = |p: &Pose| format!("{:?} {:?}", p.translation.vector.as_slice(), p.rotation.coords.as_slice());
     format!("{} {}", of(pa), of(pb))
 }
 
-/// Meshes on the primitive of this name; about so many poses in all, of which so many of each pair are held against brute force.
+/// Compares meshes with the primitive of this name; about `poses` poses in all, of which `brute` of
+/// each pair are compared with brute force.
 fn on_primitive(name: &str, poses: usize, brute: usize) {
     let (meshes, primitives) = (meshes(), primitives());
     let (i, b) = primitives.iter().enumerate().find(|(_, b)| b.name == name).unwrap();
@@ -298,7 +306,8 @@ fn on_primitive(name: &str, poses: usize, brute: usize) {
     agree(&counts);
 }
 
-/// Meshes on meshes; about so many poses in all, of which so many of each pair are held against brute force.
+/// Compares meshes with meshes; about `poses` poses in all, of which `brute` of each pair are
+/// compared with brute force.
 fn on_meshes(poses: usize, brute: usize) {
     let meshes = meshes();
     let pairs = meshes.len() * (meshes.len() + 1) / 2;
@@ -378,7 +387,8 @@ fn meshes_on_a_half_space_are_exact() {
     }
 }
 
-/// An edge of the block passes below the flat base of the wedge and beyond a corner of it: where the base's edge is crossed there is none of it any more.
+/// An edge of the box passes below the flat base of the wedge and beyond a corner of it: where the
+/// base's edge would be crossed it has already ended.
 #[test]
 fn an_edge_ends_at_its_corner() {
     let all = meshes();

@@ -1,11 +1,11 @@
-//! The cache of trees: the same bits as a build, and no file in it is trusted.
+//! The cache of trees: the same bits as a build, and no file is trusted.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use tumble_collide::{CachedTree, Shape, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3};
 
-/// A folder of its own for one test; removed at the end.
+/// A folder for one test, removed at the end.
 pub struct Folder(pub PathBuf);
 
 impl Folder {
@@ -59,7 +59,7 @@ fn a_tree_from_the_cache_has_the_bits_of_a_fresh_one() {
     let (shape, note) = Shape::mesh_cached(ring(), &settings(), &folder.cache()).unwrap();
     let plain = Shape::mesh(ring(), &settings()).unwrap();
     assert_eq!((shape.tree(), note), (plain.tree(), None));
-    // shapes have files of their own
+    // shapes have separate files
     assert_eq!(folder.files().len(), 2);
 }
 
@@ -86,7 +86,8 @@ fn another_mesh_or_other_settings_have_a_file_of_their_own() {
     }
 }
 
-/// What is there instead of the file is told, built anew, and there again.
+/// Checks that the content instead of the file is reported, that the tree is rebuilt, and that the
+/// file is restored.
 fn is_built_anew(folder: &Folder, file: &Path, content: &[u8], what: &str) {
     let good = fs::read(file).unwrap();
     fs::write(file, content).unwrap();
@@ -102,7 +103,7 @@ fn a_file_that_was_cut_anywhere_is_built_anew() {
     cached(&ring(), &folder.cache());
     let file = folder.files().remove(0);
     let good = fs::read(&file).unwrap();
-    // every byte of the head, then steps that hit all of a sphere's fields
+    // every byte of the header, then steps that reach all fields of a sphere
     let cuts = (0..300).chain((300..good.len()).step_by(7)).chain([good.len() - 1]);
     for cut in cuts {
         is_built_anew(&folder, &file, &good[..cut], &format!("cut at {cut} of {}", good.len()));
@@ -148,7 +149,7 @@ fn many_at_once_all_get_the_tree_and_leave_one_whole_file() {
         let work = || {
             (0..20)
                 .filter_map(|n| {
-                    // now and then somebody empties the folder under the others
+                    // another process empties the folder from time to time
                     if n % 7 == 3 {
                         folder.files().iter().for_each(|f| _ = fs::remove_file(f));
                     }
@@ -161,7 +162,7 @@ fn many_at_once_all_get_the_tree_and_leave_one_whole_file() {
         let threads: Vec<_> = (0..4).map(|_| scope.spawn(work)).collect();
         threads.into_iter().flat_map(|t| t.join().unwrap()).map(Some).collect()
     });
-    // a file that was removed before its renaming is told; no file was ever read half
+    // a file that was removed before its renaming is reported; no file was ever read partially
     assert!(notes.iter().flatten().all(|note| note.contains("is not kept")), "{notes:?}");
     cached(&ring(), &folder.cache());
     assert!(cached(&ring(), &folder.cache()).found);
@@ -172,7 +173,7 @@ fn many_at_once_all_get_the_tree_and_leave_one_whole_file() {
 fn a_folder_that_cannot_be_written_is_a_note() {
     let folder = Folder::new();
     fs::create_dir_all(&folder.0).unwrap();
-    // a file where the folder should be: refused for any user, root too
+    // a file instead of the folder: rejected for any user, including root
     let in_the_way = folder.0.join("file");
     fs::write(&in_the_way, "").unwrap();
     let cached = cached(&ring(), &TreeCache::at(in_the_way.join("trees")));
@@ -186,7 +187,7 @@ fn the_oldest_go_first() {
     let boxes: Vec<TriMesh> = (1..=4).map(|n| TriMesh::box_(Vec3::repeat(f64::from(n)))).collect();
     for mesh in &boxes[..3] {
         cached(mesh, &folder.cache());
-        // file times may be as coarse as a few milliseconds
+        // file times can have a resolution of a few milliseconds
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
     let size = |files: &[PathBuf]| files.iter().map(|f| fs::metadata(f).unwrap().len()).sum::<u64>();

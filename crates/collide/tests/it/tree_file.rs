@@ -1,4 +1,5 @@
-//! Trees as JSON: the same bits back, wrong texts refused, and the figures of an outside program on what is written.
+//! Trees as JSON: the same bits after reading, invalid files rejected, and the figures of an
+//! external program for the written file.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -8,7 +9,7 @@ use tumble_collide::{
 };
 
 fn file(mesh: &TriMesh, depth: u32) -> TreeFile {
-    // an error at which some leaves are above the last level
+    // with this error some leaves are above the last level
     let settings = TreeSettings { depth, error: 0.03, ..TreeSettings::octree() };
     let (tree, stages) = SphereTree::build_with_progress(mesh, &settings, &()).unwrap();
     let few = QualitySettings {
@@ -63,7 +64,7 @@ fn every_level_of_the_file_represents_the_solid() {
     }
 }
 
-/// A small good text to damage: a root with two leaves and one of them divided.
+/// A small valid file to damage: a root with two leaves, one of them divided.
 const GOOD: &str = r#"{"format":"tumble sphere tree","version":1,"name":"","units":"m","mesh":{"blake3":"","triangles":4,"diagonal":1.0},
 "settings":{"builder":"octree","branch":8,"depth":2,"error":0.1,"even":true},"stages":[],"quality":[],
 "levels":[[{"c":[0,0,0],"r":4,"out":1,"parent":-1}],[{"c":[1,0,0],"r":2,"out":1,"parent":0},{"c":[-1,0,0],"r":3,"out":1,"parent":0}],
@@ -173,7 +174,8 @@ fn a_cut_or_damaged_text_never_panics() {
     }
 }
 
-/// A ring and spheres about it by formula; the last ones leave a part of it bare and stick out of their parents.
+/// Returns a ring and spheres about it by formula; the last ones leave part of it uncovered and
+/// extend beyond their parents.
 fn ring() -> (TriMesh, Vec<Vec<LevelSphere>>) {
     let spheres = |count: usize, radius: f64, parents: Option<usize>| -> Vec<LevelSphere> {
         let at = |n: usize| {
@@ -191,14 +193,15 @@ fn ring() -> (TriMesh, Vec<Vec<LevelSphere>>) {
     )
 }
 
-/// The text of levels, for the measure in Python.
+/// Returns levels as text, for the Python tool.
 fn levels_text(levels: &[Vec<LevelSphere>]) -> String {
     let sphere = |b: &LevelSphere| serde_json::json!({"c": [b.center.x, b.center.y, b.center.z], "r": b.radius, "parent": b.parent.map_or(-1, |p| p as i64)});
     let levels: Vec<Vec<_>> = levels.iter().map(|level| level.iter().map(sphere).collect()).collect();
     serde_json::json!({"levels": levels}).to_string()
 }
 
-/// The measure in Python: `$TUMBLE_SPHERE_QUALITY`, else `shared/tools/sphere_quality.py` above this crate; said on stderr where it is absent.
+/// Runs the Python tool: `$TUMBLE_SPHERE_QUALITY`, else `shared/tools/sphere_quality.py` above this
+/// crate. Reports on stderr if it is absent.
 fn measure_in_python(mesh: &TriMesh, tree: &str) -> Option<serde_json::Value> {
     let script = std::env::var_os("TUMBLE_SPHERE_QUALITY").map(PathBuf::from).or_else(|| {
         let here = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -232,7 +235,7 @@ fn measure_in_python(mesh: &TriMesh, tree: &str) -> Option<serde_json::Value> {
 }
 
 fn skipped(why: &str) -> Option<serde_json::Value> {
-    // past the harness, which keeps what passing tests print
+    // bypasses the harness, which hides the output of passing tests
     let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: {why}\n"));
     None
 }
@@ -243,8 +246,8 @@ fn obj(mesh: &TriMesh) -> String {
     vertices.chain(faces).collect()
 }
 
-/// A level as the outside program tells it: the keys of its answer, and how far ours may be from it. Both look at the same points of the spheres, at
-/// others of the surface and of space.
+/// The figures of a level: the keys of the external program, and the tolerances. Both use the same
+/// points of the spheres, but different points of the surface and of space.
 const KEYS: [Key; 12] = [
     ("coverage", |q| q.coverage, 0.005),
     ("gap_max", |q| q.gap_max, 5e-4),
@@ -260,7 +263,7 @@ const KEYS: [Key; 12] = [
     ("nest_max", |q| q.nesting_max, 1e-9),
 ];
 type ReferenceLevel = [f64; 12];
-/// Name there, figure here, tolerance.
+/// Key of the program, figure of the crate, tolerance.
 type Key = (&'static str, fn(&LevelQuality) -> f64, f64);
 
 fn assert_agreement(ours: &[LevelQuality], its: &[ReferenceLevel]) {
@@ -286,8 +289,9 @@ fn reference_levels(answer: &serde_json::Value) -> Vec<ReferenceLevel> {
         .collect()
 }
 
-/// What `tools/sphere_quality.py` said of [`ring`] with numpy 2.4, scipy 1.17, trimesh 5.2 and rtree 1.4. The next test prints it anew:
-/// `TUMBLE_PYTHON=target/python/bin/python cargo test --release -p tumble-collide --test it figures_agree -- --nocapture`.
+/// Output of `tools/sphere_quality.py` for [`ring`] with numpy 2.4, scipy 1.17, trimesh 5.2 and
+/// rtree 1.4. The next test prints it again: `TUMBLE_PYTHON=target/python/bin/python cargo test
+/// --release -p tumble-collide --test it figures_agree -- --nocapture`.
 const RING: [ReferenceLevel; 3] = [
     [1.0, 0.0, 1.0, 0.0, 0.379274048, 0.13714331, 0.379274048, 0.379274048, 6.85171579, 5.85151487, 0.0, 0.0],
     [

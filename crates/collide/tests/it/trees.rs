@@ -1,4 +1,4 @@
-//! Sphere trees: their promises on public meshes and on generated ones.
+//! Sphere trees: their guarantees on public and generated meshes.
 
 use crate::rng::Rng;
 use crate::shared_meshes::text;
@@ -10,7 +10,8 @@ fn solid(name: &str) -> Option<TriMesh> {
     Some(mesh)
 }
 
-/// Points of the leaf spheres must not be further outside than stated; surface samples must lie in a leaf.
+/// Checks that points of the leaf spheres are not further outside than stated, and that surface
+/// samples lie in a leaf.
 fn sample(name: &str, mesh: &TriMesh, tree: &SphereTree) {
     let distance = MeshDistance::new(mesh);
     let mut rng = Rng::new(7);
@@ -40,8 +41,7 @@ fn public_meshes_get_tight_trees() {
         eprintln!("{name}: {count} leaves, {} spheres, error per level {relative:.4?}", tree.nodes().len());
         assert!(tree.outward_error() < 0.02 * mesh.diagonal(), "{name}");
         assert!(count < 6000, "{name}: {count}");
-        // the cow crosses itself, and the distance that the samples are judged by takes some of its inside for
-        // outside
+        // the cow crosses itself, and the reference distance takes part of its inside for outside
         if name != "cow" {
             sample(name, &mesh, &tree);
         }

@@ -4,7 +4,7 @@ use crate::rng::Rng;
 use crate::shared_meshes::text;
 use tumble_collide::{Mat3, MeshDistance, Quat, Shape, TreeSettings, TriMesh, Vec3, WindingNumber};
 
-/// Two meshes as one.
+/// Returns two meshes as one.
 pub fn both(a: &TriMesh, b: &TriMesh) -> TriMesh {
     let mut mesh = a.clone();
     let first = mesh.vertices.len() as u32;
@@ -13,7 +13,7 @@ pub fn both(a: &TriMesh, b: &TriMesh) -> TriMesh {
     mesh
 }
 
-/// With every face turned round.
+/// Returns the mesh with every face reversed.
 pub fn inside_out(mut mesh: TriMesh) -> TriMesh {
     mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
     mesh
@@ -23,7 +23,8 @@ fn near(found: f64, expected: f64, tolerance: f64, what: &str) {
     assert!((found - expected).abs() <= tolerance, "{what}: {found} instead of {expected}");
 }
 
-/// By the sum of solid angles with the formula of l'Huilier, which shares nothing with the code's.
+/// Returns the winding number by solid angles with the formula of l'Huilier, which shares nothing
+/// with the crate.
 fn winding_by_excess(mesh: &TriMesh, p: &Vec3) -> f64 {
     let sum: f64 = (0..mesh.triangles.len())
         .map(|t| {
@@ -38,7 +39,7 @@ fn winding_by_excess(mesh: &TriMesh, p: &Vec3) -> f64 {
     sum / (4.0 * std::f64::consts::PI)
 }
 
-/// How often a ray from `p` leaves the surface more than it enters.
+/// Returns how often a ray from `p` leaves the surface more than it enters.
 fn winding_by_ray(mesh: &TriMesh, p: &Vec3, along: &Vec3) -> i32 {
     (0..mesh.triangles.len())
         .map(|t| {
@@ -86,7 +87,7 @@ fn winding_number_is_the_sum_of_solid_angles_and_counts_what_a_ray_counts() {
 
 #[test]
 fn an_open_surface_has_the_share_of_directions_it_covers() {
-    // the top of a cube seen from the cube's middle is a sixth of all
+    // the top of a cube seen from the cube's center is a sixth of the sphere
     let mut lid = TriMesh::box_(Vec3::repeat(1.0));
     let up = |m: &TriMesh, t: usize| m.corners(t).iter().all(|p| p.z == 1.0);
     let kept: Vec<[u32; 3]> = (0..12).filter(|&t| up(&lid, t)).map(|t| lid.triangles[t]).collect();
@@ -121,7 +122,8 @@ fn overlapping_boxes_are_their_union_in_mass_and_distance() {
     let both_inertia = block(half, Vec3::zeros()) + block(half, shift) - block(half - 0.5 * shift, 0.5 * shift);
     let expected = turn.matrix() * both_inertia * turn.matrix().transpose();
     near((mass.inertia - expected).norm(), 0.0, 1e-8, "inertia");
-    // distance: outside the lesser of the two; within, to what is left of the faces, sampled
+    // distance: outside the smaller of the two; inside, the distance to the remaining parts of the
+    // faces, sampled
     let distance = MeshDistance::new(&mesh);
     let box_distance = |p: &Vec3| {
         let q = p.abs() - half;
@@ -144,8 +146,9 @@ fn overlapping_boxes_are_their_union_in_mass_and_distance() {
     assert!(inside > 500);
 }
 
-/// Of a point in the union of a box about the origin and one about `shift`: the closest point over each face, cut to
-/// what is outside the other box, by going through the rectangles that are left.
+/// Returns the depth of a point in the union of a box about the origin and one about `shift`: the
+/// distance to the closest point over each face, clipped to the outside of the other box, over the
+/// remaining rectangles.
 fn depth_in_union(p: &Vec3, half: &Vec3, shift: &Vec3) -> f64 {
     let mut least = f64::INFINITY;
     for (own, other) in [(Vec3::zeros(), *shift), (*shift, Vec3::zeros())] {
@@ -174,7 +177,7 @@ fn depth_in_union(p: &Vec3, half: &Vec3, shift: &Vec3) -> f64 {
     least
 }
 
-/// Faces that lie in one plane and overlap, alike or back to back.
+/// Coplanar faces that overlap, with equal or opposite normals.
 #[test]
 fn boxes_with_faces_on_each_other_count_once() {
     let unit = TriMesh::box_(Vec3::repeat(0.5));
@@ -200,8 +203,8 @@ fn boxes_with_faces_on_each_other_count_once() {
     }
 }
 
-/// An arrowhead whose bottom is triangulated over the notch, so that it is folded: the fold is no boundary. With a box
-/// on the fold three faces lie on each other, and together count once.
+/// An arrowhead whose bottom is triangulated over the notch, so that it is folded: the fold is not
+/// boundary. With a box on the fold three faces coincide, and together count once.
 #[test]
 fn folded_face_counts_what_it_bounds() {
     let outline = [[2.0, 0.0], [-1.0, 1.0], [0.0, 0.0], [-1.0, -1.0]];
@@ -255,7 +258,7 @@ fn shell_in_a_shell_is_a_cavity_or_buried_by_its_winding() {
     near(MeshDistance::new(&full).closest(&Vec3::new(0.2, 0.0, 0.0)).signed_distance, -0.8, 0.02, "buried");
 }
 
-/// Shells that are inside out are turned, with what lies in them; cavities stay.
+/// Shells that are inside out are reversed, with their contents; cavities stay.
 #[test]
 fn shells_are_reversed_by_their_position() {
     let (outer, inner) = (TriMesh::icosphere(1.0, 2), TriMesh::icosphere(0.5, 2));
@@ -282,8 +285,8 @@ fn shells_are_reversed_by_their_position() {
     }
 }
 
-/// Public meshes that cross themselves: the sign is that of the winding number everywhere, and outside the distance is
-/// that to the nearest triangle of all.
+/// Public meshes that cross themselves: the sign is that of the winding number everywhere, and
+/// outside the distance is that to the nearest triangle.
 #[test]
 fn crossing_public_meshes_have_the_sign_of_their_union() {
     let mut rng = Rng::new(77);
