@@ -60,9 +60,9 @@ fn a_sphere_in_the_seam_touches_both_boxes() {
     let at = Pose::translation(0.5 + r - deep, 0.03, 0.1 + r - 2.0 * deep);
     let mut found = find_contacts(&sphere, &at, &shape, &pose, 1e-3);
     found.sort_by(|a, b| a.gap.total_cmp(&b.gap));
-    let told: Vec<(f64, Vec3)> = found.iter().map(|c| (c.gap, c.normal)).collect();
-    assert_eq!(told.len(), 2, "{found:?}");
-    for ((gap, normal), (depth, way)) in told.iter().zip([(2.0 * deep, Vec3::z()), (deep, Vec3::x())]) {
+    let gaps: Vec<(f64, Vec3)> = found.iter().map(|c| (c.gap, c.normal)).collect();
+    assert_eq!(gaps.len(), 2, "{found:?}");
+    for ((gap, normal), (depth, way)) in gaps.iter().zip([(2.0 * deep, Vec3::z()), (deep, Vec3::x())]) {
         assert!((gap + depth).abs() < 1e-9 && (normal - way).norm() < 1e-9, "{found:?}");
     }
     assert_ne!(found[0].feature, found[1].feature);

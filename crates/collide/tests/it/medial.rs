@@ -115,10 +115,10 @@ impl Progress for Reports {
 
 #[test]
 fn progress_is_monotonic_and_stages_are_counted() {
-    let told = Reports(Mutex::new(Vec::new()));
+    let reports = Reports(Mutex::new(Vec::new()));
     let mesh = TriMesh::torus(1.0, 0.25, 24, 12);
-    let (tree, stages) = SphereTree::build_with_progress(&mesh, &settings(2), &told).unwrap();
-    let shares = told.0.into_inner().unwrap();
+    let (tree, stages) = SphereTree::build_with_progress(&mesh, &settings(2), &reports).unwrap();
+    let shares = reports.0.into_inner().unwrap();
     assert!(shares.len() > 5 && shares.windows(2).all(|w| w[0] <= w[1]) && shares.last() == Some(&1.0), "{shares:?}");
     let count = |level, stage: &str| {
         stages.iter().filter(|s| s.level == level && s.stage == stage).map(|s| s.count).sum::<u64>()

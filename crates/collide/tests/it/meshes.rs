@@ -161,7 +161,7 @@ fn bad_meshes_are_mended_or_refused_with_a_reason() {
     let solid = |name: &str| {
         let mut mesh = read(name).unwrap();
         let report = mesh.check_closed().unwrap_or_else(|e| panic!("{name}: {e}"));
-        assert!(!report.notes().is_empty(), "{name} must be told");
+        assert!(!report.notes().is_empty(), "{name} must be reported");
         report
     };
     let error = |name: &str| read(name).and_then(|mut m| m.check_closed()).unwrap_err();

@@ -93,8 +93,8 @@ fn is_built_anew(folder: &Folder, file: &Path, content: &[u8], what: &str) {
     fs::write(file, content).unwrap();
     let cached = cached(&ring(), &folder.cache());
     assert!(!cached.found, "{what}: trusted");
-    assert!(cached.note.is_some_and(|note| note.contains(&file.display().to_string())), "{what}: not told");
-    assert_eq!(fs::read(file).unwrap(), good, "{what}: not mended");
+    assert!(cached.note.is_some_and(|note| note.contains(&file.display().to_string())), "{what}: not reported");
+    assert_eq!(fs::read(file).unwrap(), good, "{what}: not restored");
 }
 
 #[test]

@@ -276,9 +276,9 @@ fn shells_are_reversed_by_their_position() {
         ),
         ("overlapping", both(&both(&outer, &away(&outer, 9.0)), &inside_out(away(&outer, 7.9))), f64::NAN, (false, 1)),
     ];
-    for (name, mut mesh, volume, told) in cases {
+    for (name, mut mesh, volume, expected) in cases {
         let report = mesh.check_closed().unwrap();
-        assert_eq!((report.turned, report.inverted_shells), told, "{name}");
+        assert_eq!((report.turned, report.inverted_shells), expected, "{name}");
         if volume.is_finite() {
             near(report.volume, volume, 1e-12, name);
         }
