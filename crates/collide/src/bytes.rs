@@ -1,8 +1,9 @@
-//! Numbers and lists as bytes, little-endian, and back with bounds: memory grows with what is there, not with a count that is read.
+//! Binary encoding of numbers and lists, little-endian. Memory grows with the available bytes, not
+//! with a count that is read.
 
 use crate::Vec3;
 
-/// Bytes that are read from the front; `None` where they end early or cannot be.
+/// Reads bytes from the front; returns `None` if they end early or are invalid.
 pub(crate) struct Reader<'a>(pub &'a [u8]);
 
 impl Reader<'_> {
@@ -28,12 +29,12 @@ impl Reader<'_> {
         }
     }
 
-    /// A finite number.
+    /// Reads a finite number.
     pub fn number(&mut self) -> Option<f64> {
         self.take().map(f64::from_le_bytes).filter(|x| x.is_finite())
     }
 
-    /// A finite number in single precision.
+    /// Reads a finite number in single precision.
     pub fn single(&mut self) -> Option<f32> {
         self.take().map(f32::from_le_bytes).filter(|x| x.is_finite())
     }
@@ -42,7 +43,7 @@ impl Reader<'_> {
         Some(Vec3::new(self.number()?, self.number()?, self.number()?))
     }
 
-    /// A list of items of at least one byte each.
+    /// Reads a list of items of at least one byte each.
     pub fn list<T>(&mut self, mut item: impl FnMut(&mut Self) -> Option<T>) -> Option<Vec<T>> {
         let count = self.size().filter(|count| *count <= self.0.len())?;
         let mut items = Vec::new();
@@ -53,7 +54,7 @@ impl Reader<'_> {
     }
 }
 
-/// What [`Reader`] reads.
+/// Writes the data that [`Reader`] reads.
 pub(crate) trait Write {
     fn u32(&mut self, x: u32);
     fn size(&mut self, n: usize);

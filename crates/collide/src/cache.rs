@@ -1,15 +1,18 @@
-//! What takes long to build, on disk: sphere trees and the shapes of meshes, found again by what they were built of.
+//! The disk cache of sphere trees and mesh shapes, identified by the content from which they were
+//! built.
 //!
-//! A file's name is the BLAKE3 hash of the mesh's content, the settings and the sources of this crate; its first line is
+//! The name of a file is the BLAKE3 hash of the mesh's content, the settings and the sources of
+//! this crate. Its first line is
 //!
 //! ```text
 //! HEAD NAME CHECKSUM
 //! ```
 //!
-//! `HEAD` names the kind of file and its version, and `CHECKSUM` is the hash of the name and of the rest. A file that is cut, changed, of another name or of
-//! another version is built anew. Several processes may use one folder at once: a file is written under a name of its own and renamed, which takes
-//! effect at once and as a whole; whoever comes last wins, and both wrote the same. What goes wrong with the folder is told in a note and
-//! never fails a build. Above a size the oldest files are removed.
+//! `HEAD` names the kind of file and its version; `CHECKSUM` is the hash of the name and of the
+//! rest. A file that is truncated, changed, renamed or of another version is rebuilt. Several
+//! processes can use one folder at once: a file is written under a temporary name and then renamed,
+//! which is atomic. The last writer wins, and all write the same content. Faults of the folder are
+//! reported in a note and never fail a build. Above a size limit the oldest files are removed.
 
 use crate::{MeshId, TreeSettings};
 use std::fs;
@@ -18,16 +21,16 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::SystemTime;
 
-/// Most bytes of a file that is read: 512 MiB.
+/// Maximum size of a file that is read: 512 MiB.
 pub(crate) const MOST_BYTES: usize = 512 << 20;
-/// Of files that are being written.
+/// Name extension of unfinished files.
 const UNFINISHED: &str = "tmp";
-/// Most bytes of a folder unless told otherwise.
+/// Default of the maximum size of a folder.
 const MOST_IN_ALL: u64 = 1 << 30;
 /// The version of this crate and of its sources (see `build.rs`).
 const BUILDERS: &str = concat!(env!("CARGO_PKG_VERSION"), " ", env!("TUMBLE_BUILDERS"));
 
-/// A folder of built trees and shapes, or none.
+/// A folder of trees and shapes, or none.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TreeCache {
     folder: Option<PathBuf>,
@@ -35,18 +38,19 @@ pub struct TreeCache {
 }
 
 impl TreeCache {
-    /// No cache: everything is built.
+    /// Returns a disabled cache: everything is built.
     pub fn off() -> TreeCache {
         TreeCache { folder: None, most_bytes: MOST_IN_ALL }
     }
 
-    /// In a folder, which is made when the first file is kept.
+    /// Returns a cache in a folder, which is created with the first file.
     pub fn at(folder: impl Into<PathBuf>) -> TreeCache {
         TreeCache { folder: Some(folder.into()), most_bytes: MOST_IN_ALL }
     }
 
-    /// As the environment says: in the folder `$TUMBLE_CACHE`, or none if that is `off` in any case; where it is empty or blank, in `tumble/trees` of `$XDG_CACHE_HOME` or
-    /// `~/.cache`; none where there is no home.
+    /// Returns the cache that the environment selects: the folder `$TUMBLE_CACHE`, or none if that
+    /// is `off` (in any case). If it is empty or blank, the folder `tumble/trees` in
+    /// `$XDG_CACHE_HOME` or `~/.cache`; none without a home folder.
     pub fn of_environment() -> TreeCache {
         let path = |name: &str| {
             std::env::var_os(name).filter(|value| !value.to_string_lossy().trim().is_empty()).map(PathBuf::from)
@@ -55,7 +59,7 @@ impl TreeCache {
             Some(word) if word.to_string_lossy().trim().eq_ignore_ascii_case("off") => TreeCache::off(),
             Some(folder) => TreeCache::at(folder),
             None => {
-                // a relative path there is to be passed over, says the XDG specification
+                // the XDG specification requires that relative paths are ignored
                 let base = path("XDG_CACHE_HOME")
                     .filter(|p| p.is_absolute())
                     .or_else(|| path("HOME").map(|home| home.join(".cache")));
@@ -64,12 +68,12 @@ impl TreeCache {
         }
     }
 
-    /// The same with another limit; the oldest files go first. Default 1 GiB.
+    /// Sets the maximum size of the folder; the oldest files are removed first. Default 1 GiB.
     pub fn with_most_bytes(self, most_bytes: u64) -> TreeCache {
         TreeCache { most_bytes, ..self }
     }
 
-    /// Where it is; `None` if it is off.
+    /// Returns the folder; `None` if the cache is off.
     pub fn folder(&self) -> Option<&Path> {
         self.folder.as_deref()
     }
@@ -101,26 +105,26 @@ impl Kind {
         }
     }
 
-    /// Of files in the folder.
+    /// Name extension of the files.
     fn extension(self) -> &'static str {
         self.word()
     }
 }
 
-/// The place of one tree or shape.
+/// The file of one tree or shape.
 pub(crate) struct Entry<'a> {
     folder: &'a Path,
     most_bytes: u64,
     kind: Kind,
-    /// In hexadecimal.
+    /// Name in hexadecimal.
     name: String,
 }
 
 impl<'a> Entry<'a> {
-    /// Of what is built of a mesh by these settings; `None` where the cache is off.
+    /// Returns the entry for a mesh and settings; `None` if the cache is off.
     pub fn new(cache: &'a TreeCache, kind: Kind, mesh: &MeshId, settings: &TreeSettings) -> Option<Entry<'a>> {
         let folder = cache.folder.as_deref()?;
-        // every field of the settings, numbers in their shortest exact form
+        // all fields of the settings, numbers in their shortest exact form
         let content = format!("{} {BUILDERS} {} {settings:?}", kind.head(), mesh.blake3);
         let name = blake3::hash(content.as_bytes()).to_hex().to_string();
         Some(Entry { folder, most_bytes: cache.most_bytes, kind, name })
@@ -135,16 +139,18 @@ impl<'a> Entry<'a> {
         format!("{} {} {checksum}", self.kind.head(), self.name)
     }
 
-    /// Why the file is not to be trusted, to be told.
+    /// Returns the note that the file is invalid, with the reason.
     pub fn refused(&self, why: impl std::fmt::Display) -> String {
-        format!("the cached {} {} is built anew: {why}", self.kind.word(), self.path().display())
+        format!("the cached {} {} is rebuilt: {why}", self.kind.word(), self.path().display())
     }
 
-    /// What stands in the file behind its first line, `None` if there is no file, or why it is not to be trusted.
+    /// Returns the content of the file after its first line; `None` without a file; an error if it
+    /// is invalid.
     pub fn read(&self) -> Result<Option<Vec<u8>>, String> {
         let file = match fs::File::open(self.path()) {
             Ok(file) => file,
-            // a file where the folder should be holds nothing, and is told when something is to be kept
+            // a file instead of the folder has no entries; the fault is reported when an entry is
+            // written
             Err(error) if matches!(error.kind(), std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory) => {
                 return Ok(None);
             }
@@ -152,17 +158,17 @@ impl<'a> Entry<'a> {
         };
         let mut bytes = Vec::with_capacity(file.metadata().map_or(0, |m| m.len().min(MOST_BYTES as u64) as usize));
         file.take(MOST_BYTES as u64).read_to_end(&mut bytes).map_err(|e| self.refused(e))?;
-        let end = bytes.iter().position(|b| *b == b'\n').ok_or_else(|| self.refused("it has no first line"))?;
+        let end = bytes.iter().position(|b| *b == b'\n').ok_or_else(|| self.refused("it has no header line"))?;
         let body = bytes.split_off(end + 1);
         if bytes[..end] != *self.first_line(&body).as_bytes() {
-            return Err(self.refused("its content is not what its first line says"));
+            return Err(self.refused("its content does not match its header line"));
         }
         Ok(Some(body))
     }
 
-    /// Keeps a file; an error says why it is not kept.
+    /// Writes a file. The error is the reason why it could not be written.
     pub fn write(&self, body: &[u8]) -> Result<(), String> {
-        // names within a process are told apart by the counter, processes by their id
+        // the counter separates names within a process, the id separates processes
         static COUNTER: AtomicU64 = AtomicU64::new(0);
         let told = |error: std::io::Error| {
             format!("the {} is not kept in {}: {error}", self.kind.word(), self.folder.display())
@@ -181,7 +187,8 @@ impl<'a> Entry<'a> {
     }
 }
 
-/// Whether a file has a name that only this cache gives: 64 hexadecimal digits and what a kept file or an unfinished one ends in.
+/// Returns whether a file has a name that only this cache uses: 64 hexadecimal digits and the
+/// extension of a finished or unfinished file.
 fn is_ours(path: &Path) -> bool {
     let Some((name, rest)) = path.file_name().and_then(|name| name.to_str()).and_then(|name| name.split_at_checked(64))
     else {
@@ -196,7 +203,8 @@ fn is_ours(path: &Path) -> bool {
     hexadecimal && (kept || unfinished)
 }
 
-/// Removes our files, oldest first, until the rest has at most `most_bytes`. What another process removes meanwhile is gone, and as well.
+/// Removes files of the cache, oldest first, until the rest has at most `most_bytes`. Files that
+/// another process removes meanwhile are ignored.
 fn remove_oldest(folder: &Path, most_bytes: u64) {
     let entries =
         fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).filter(|path| is_ours(path));

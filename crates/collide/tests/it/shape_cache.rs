@@ -120,7 +120,7 @@ fn a_damaged_truncated_or_foreign_file_is_reported_and_rebuilt() {
         fs::write(&file, &content).unwrap();
         let (shape, note) = cached(small(), &folder.cache());
         let note = note.expect("the file was trusted");
-        assert!(note.starts_with("the cached shape") && note.contains("is built anew"), "{note}");
+        assert!(note.starts_with("the cached shape") && note.contains("is rebuilt"), "{note}");
         assert!(matches!((&shape, &fresh), (Shape::Mesh(a), Shape::Mesh(b)) if a == b));
         assert!(fs::read(&file).unwrap() == good, "not mended: {note}");
     }

@@ -232,6 +232,6 @@ fn a_file_instead_of_the_folder_is_reported() {
     std::fs::write(&file, "mine").unwrap();
     let built = cached(&ring(), &TreeCache::at(&file));
     let note = built.note.unwrap();
-    assert!(note.starts_with("the tree is not kept in") && !note.contains("anew"), "{note}");
+    assert!(note.starts_with("the tree is not kept in") && !note.contains("rebuilt"), "{note}");
     assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine");
 }
