@@ -22,11 +22,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::SystemTime;
 
 /// Maximum size of a file that is read: 512 MiB.
-pub(crate) const MOST_BYTES: usize = 512 << 20;
+pub(crate) const MAX_BYTES: usize = 512 << 20;
 /// Name extension of unfinished files.
 const UNFINISHED: &str = "tmp";
 /// Default of the maximum size of a folder.
-const MOST_IN_ALL: u64 = 1 << 30;
+const MAX_FOLDER_BYTES: u64 = 1 << 30;
 /// The version of this crate and of its sources (see `build.rs`).
 const BUILDERS: &str = concat!(env!("CARGO_PKG_VERSION"), " ", env!("TUMBLE_BUILDERS"));
 
@@ -34,18 +34,18 @@ const BUILDERS: &str = concat!(env!("CARGO_PKG_VERSION"), " ", env!("TUMBLE_BUIL
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TreeCache {
     folder: Option<PathBuf>,
-    most_bytes: u64,
+    max_bytes: u64,
 }
 
 impl TreeCache {
     /// Returns a disabled cache: everything is built.
     pub fn off() -> TreeCache {
-        TreeCache { folder: None, most_bytes: MOST_IN_ALL }
+        TreeCache { folder: None, max_bytes: MAX_FOLDER_BYTES }
     }
 
     /// Returns a cache in a folder, which is created with the first file.
     pub fn at(folder: impl Into<PathBuf>) -> TreeCache {
-        TreeCache { folder: Some(folder.into()), most_bytes: MOST_IN_ALL }
+        TreeCache { folder: Some(folder.into()), max_bytes: MAX_FOLDER_BYTES }
     }
 
     /// Returns the cache that the environment selects: the folder `$TUMBLE_CACHE`, or none if that
@@ -69,8 +69,8 @@ impl TreeCache {
     }
 
     /// Sets the maximum size of the folder; the oldest files are removed first. Default 1 GiB.
-    pub fn with_most_bytes(self, most_bytes: u64) -> TreeCache {
-        TreeCache { most_bytes, ..self }
+    pub fn with_max_bytes(self, max_bytes: u64) -> TreeCache {
+        TreeCache { max_bytes, ..self }
     }
 
     /// Returns the folder; `None` if the cache is off.
@@ -114,7 +114,7 @@ impl Kind {
 /// The file of one tree or shape.
 pub(crate) struct Entry<'a> {
     folder: &'a Path,
-    most_bytes: u64,
+    max_bytes: u64,
     kind: Kind,
     /// Name in hexadecimal.
     name: String,
@@ -127,7 +127,7 @@ impl<'a> Entry<'a> {
         // all fields of the settings, numbers in their shortest exact form
         let content = format!("{} {BUILDERS} {} {settings:?}", kind.head(), mesh.blake3);
         let name = blake3::hash(content.as_bytes()).to_hex().to_string();
-        Some(Entry { folder, most_bytes: cache.most_bytes, kind, name })
+        Some(Entry { folder, max_bytes: cache.max_bytes, kind, name })
     }
 
     fn path(&self) -> PathBuf {
@@ -156,8 +156,8 @@ impl<'a> Entry<'a> {
             }
             Err(error) => return Err(self.refused(error)),
         };
-        let mut bytes = Vec::with_capacity(file.metadata().map_or(0, |m| m.len().min(MOST_BYTES as u64) as usize));
-        file.take(MOST_BYTES as u64).read_to_end(&mut bytes).map_err(|e| self.refused(e))?;
+        let mut bytes = Vec::with_capacity(file.metadata().map_or(0, |m| m.len().min(MAX_BYTES as u64) as usize));
+        file.take(MAX_BYTES as u64).read_to_end(&mut bytes).map_err(|e| self.refused(e))?;
         let end = bytes.iter().position(|b| *b == b'\n').ok_or_else(|| self.refused("it has no header line"))?;
         let body = bytes.split_off(end + 1);
         if bytes[..end] != *self.first_line(&body).as_bytes() {
@@ -182,7 +182,7 @@ impl<'a> Entry<'a> {
             let _ = fs::remove_file(&own);
             return Err(told(error));
         }
-        remove_oldest(self.folder, self.most_bytes);
+        remove_oldest(self.folder, self.max_bytes);
         Ok(())
     }
 }
@@ -203,9 +203,9 @@ fn is_ours(path: &Path) -> bool {
     hexadecimal && (kept || unfinished)
 }
 
-/// Removes files of the cache, oldest first, until the rest has at most `most_bytes`. Files that
+/// Removes files of the cache, oldest first, until the rest has at most `max_bytes`. Files that
 /// another process removes meanwhile are ignored.
-fn remove_oldest(folder: &Path, most_bytes: u64) {
+fn remove_oldest(folder: &Path, max_bytes: u64) {
     let entries =
         fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).filter(|path| is_ours(path));
     let mut files: Vec<(SystemTime, PathBuf, u64)> = entries
@@ -219,7 +219,7 @@ fn remove_oldest(folder: &Path, most_bytes: u64) {
     files.sort_unstable();
     let mut total: u64 = files.iter().map(|f| f.2).sum();
     for (_, path, size) in files {
-        if total <= most_bytes {
+        if total <= max_bytes {
             return;
         }
         let _ = fs::remove_file(path);

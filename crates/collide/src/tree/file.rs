@@ -23,7 +23,7 @@
 //! children inside their parents.
 
 use super::{LevelQuality, SphereNode, SphereTree, StageCount, TreeSettings};
-use crate::cache::MOST_BYTES;
+use crate::cache::MAX_BYTES;
 use crate::{TriMesh, Vec3};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
@@ -75,7 +75,7 @@ pub struct MeshId {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum TreeFileError {
     /// The text is too long.
-    #[error("the text has {0} bytes; at most {MOST_BYTES} are allowed")]
+    #[error("the text has {0} bytes; at most {MAX_BYTES} are allowed")]
     TooLong(usize),
     /// Not JSON, or not the keys of a sphere tree.
     #[error("{0}")]
@@ -217,7 +217,7 @@ impl TreeFile {
     /// [`TreeFileError`] names the fault, its place and the allowed values. Whether the tree fits a
     /// mesh is not checked.
     pub fn from_json(text: &str) -> Result<TreeFile, TreeFileError> {
-        if text.len() > MOST_BYTES {
+        if text.len() > MAX_BYTES {
             return Err(TreeFileError::TooLong(text.len()));
         }
         let text: JsonTree = serde_json::from_str(text).map_err(|e| TreeFileError::Json(e.to_string()))?;

@@ -191,7 +191,7 @@ fn the_oldest_go_first() {
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
     let size = |files: &[PathBuf]| files.iter().map(|f| fs::metadata(f).unwrap().len()).sum::<u64>();
-    let keep_three = folder.cache().with_most_bytes(size(&folder.files()) + 10);
+    let keep_three = folder.cache().with_max_bytes(size(&folder.files()) + 10);
     fs::write(folder.0.join("notes.txt"), "not ours").unwrap();
     cached(&boxes[3], &keep_three);
     assert_eq!(folder.files().len(), 4);
@@ -219,7 +219,7 @@ fn unknown_files_are_never_removed() {
     others.iter().for_each(|name| fs::write(folder.0.join(name), vec![0; 1000]).unwrap());
     fs::write(&unfinished, vec![0; 1000]).unwrap();
     std::thread::sleep(std::time::Duration::from_millis(20));
-    cached(&TriMesh::box_(Vec3::repeat(2.0)), &folder.cache().with_most_bytes(1));
+    cached(&TriMesh::box_(Vec3::repeat(2.0)), &folder.cache().with_max_bytes(1));
     assert!(others.iter().all(|name| folder.0.join(name).exists()));
     assert!(!kept[0].exists() && !unfinished.exists());
 }
