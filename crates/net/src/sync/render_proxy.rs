@@ -2,7 +2,7 @@
 //! have.
 
 use tumble_collide::{Shape, Vec3};
-use tumble_core::{Collidable, CollisionGroup, Material, Object, PartState, Renderable, Visual};
+use tumble_core::{Cache, Collidable, CollisionGroup, Material, Object, PartState, Renderable, Visual};
 
 /// Parts with visuals, at the poses that were set for display.
 #[derive(Clone)]
@@ -51,7 +51,7 @@ impl Collidable for RenderProxy {
         false
     }
 
-    fn test_impulse(&self, _: usize, _: &PartState, _: &Vec3, _: &[Vec3], _: f64, _: &mut [f64]) {}
+    fn test_impulse(&self, _: &mut Cache, _: usize, _: &PartState, _: &Vec3, _: &[Vec3], _: f64, _: &mut [f64]) {}
 }
 
 impl Renderable for RenderProxy {
