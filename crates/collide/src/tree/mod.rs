@@ -205,7 +205,7 @@ impl SphereTree {
         SphereTree::of_nodes(nodes)
     }
 
-    /// Of nodes that are already a tree: breadth first, children neighbors.
+    /// Returns the tree of these nodes, which are breadth first with siblings side by side.
     fn of_nodes(nodes: Vec<SphereNode>) -> SphereTree {
         let leaf_boxes = nodes
             .iter()
