@@ -49,6 +49,6 @@ impl Serialize for CylinderShape {
 impl<'de> Deserialize<'de> for CylinderShape {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<CylinderShape, D::Error> {
         let [radius, half_length] = <[f64; 2]>::deserialize(deserializer)?;
-        CylinderShape::new(radius, half_length).map_err(D::Error::custom)
+        CylinderShape::new(radius, 2.0 * half_length).map_err(D::Error::custom)
     }
 }

@@ -42,32 +42,29 @@ impl Shape {
 
     /// A ball of `radius` metres.
     pub fn sphere(radius: f64) -> Result<Shape, ShapeError> {
-        length("radius of a sphere", radius)?;
+        positive("radius of a sphere", radius)?;
         Ok(Shape::Sphere { radius })
     }
 
-    /// A block; half extents in metres.
-    pub fn cuboid(half_extents: Vec3) -> Result<Shape, ShapeError> {
-        for (k, what) in
-            ["half extent x of a box", "half extent y of a box", "half extent z of a box"].into_iter().enumerate()
-        {
-            length(what, half_extents[k])?;
-        }
+    /// A box with edges of `size` along x, y and z, meters.
+    pub fn cuboid(size: Vec3) -> Result<Shape, ShapeError> {
+        let [x, y, z] = size.into();
+        let half_extents =
+            Vec3::new(half("size x of a box", x)?, half("size y of a box", y)?, half("size z of a box", z)?);
         Ok(Shape::Box { half_extents })
     }
 
-    /// A capsule along z: radius and half length of the segment, metres.
-    pub fn capsule(radius: f64, half_length: f64) -> Result<Shape, ShapeError> {
-        length("radius of a capsule", radius)?;
-        length("half length of a capsule", half_length)?;
-        Ok(Shape::Capsule { radius, half_length })
+    /// A capsule along z: all points within `radius` of a segment of `length`, meters.
+    pub fn capsule(radius: f64, length: f64) -> Result<Shape, ShapeError> {
+        positive("radius of a capsule", radius)?;
+        Ok(Shape::Capsule { radius, half_length: half("length of a capsule", length)? })
     }
 
-    /// A cylinder along z: radius and half length, metres.
-    pub fn cylinder(radius: f64, half_length: f64) -> Result<Shape, ShapeError> {
-        length("radius of a cylinder", radius)?;
-        length("half length of a cylinder", half_length)?;
-        Ok(Shape::Cylinder(Arc::new(CylinderShape::new(radius, half_length)?)))
+    /// A cylinder along z of `radius` and `length`, meters.
+    pub fn cylinder(radius: f64, length: f64) -> Result<Shape, ShapeError> {
+        positive("radius of a cylinder", radius)?;
+        half("length of a cylinder", length)?;
+        Ok(Shape::Cylinder(Arc::new(CylinderShape::new(radius, length)?)))
     }
 
     /// A closed mesh (mended where that is harmless, see [`TriMesh::check_closed`]), moved so that its centre of mass
@@ -183,8 +180,14 @@ impl Shape {
     }
 }
 
-fn length(what: &'static str, value: f64) -> Result<(), ShapeError> {
+fn positive(what: &'static str, value: f64) -> Result<(), ShapeError> {
     if value.is_finite() && value > 0.0 { Ok(()) } else { Err(ShapeError::Length { what, value }) }
+}
+
+/// Half a length, exact; both are above 0.
+fn half(what: &'static str, value: f64) -> Result<f64, ShapeError> {
+    let half = 0.5 * value;
+    if half.is_finite() && half > 0.0 { Ok(half) } else { Err(ShapeError::Length { what, value }) }
 }
 
 /// The local z axis in the world.

@@ -226,11 +226,12 @@ impl PartialEq for CylinderShape {
 const SIDES: usize = 48;
 
 impl CylinderShape {
-    /// Radius and half length in metres.
-    pub fn new(radius: f64, half_length: f64) -> Result<CylinderShape, ShapeError> {
+    /// A cylinder of `radius` and `length`, meters.
+    pub fn new(radius: f64, length: f64) -> Result<CylinderShape, ShapeError> {
+        let half_length = 0.5 * length;
         // the prism is around the cylinder, so that its tree covers the true surface
         let outer = radius / nalgebra::ComplexField::cos(std::f64::consts::PI / SIDES as f64);
-        let mesh = TriMesh::cylinder(outer, half_length, SIDES);
+        let mesh = TriMesh::cylinder(outer, length, SIDES);
         mesh.check_data()?;
         // leaves of an octree that ends for its error and not for its depth reach no further; a prism's does
         let error = TreeSettings::octree().error * mesh.diagonal() * (1.0 + ROUNDING);

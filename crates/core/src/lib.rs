@@ -5,9 +5,8 @@
 //! solves all rows together and writes the state. Equal inputs give equal bits: this crate has no
 //! IO, clock, threads, file format or GPU.
 //!
-//! SI units, radians, z up; boxes, capsules and cylinders are made of *half* extents and half
-//! lengths. `docs/conventions.md` has these and the other conventions beside those of Python and of
-//! scene files.
+//! SI units, radians, z up; sizes of shapes are full lengths. `docs/conventions.md` has these and
+//! the other conventions beside those of Python and of scene files.
 //!
 //! ```
 //! use tumble_core::{RigidBody, Settings, World, collide::{Pose, Shape}};

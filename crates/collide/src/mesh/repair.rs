@@ -104,7 +104,7 @@ impl TriMesh {
     /// ```
     /// use tumble_collide::{RepairSettings, TriMesh, Vec3};
     ///
-    /// let mut mesh = TriMesh::box_(Vec3::repeat(0.5));
+    /// let mut mesh = TriMesh::cuboid(Vec3::repeat(1.0));
     /// mesh.triangles.truncate(10); // a side is missing
     /// let report = mesh.repair(&RepairSettings::default())?;
     /// assert_eq!(report.notes(), ["1 hole(s) were filled with 2 faces; the longest has 4 edges"]);

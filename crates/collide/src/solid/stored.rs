@@ -99,7 +99,7 @@ mod tests {
         let other = ball(0.6);
         two.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + two.vertices.len() as u32)));
         two.vertices.extend(other.vertices);
-        vec![TriMesh::torus(1.0, 0.3, 12, 8), TriMesh::box_(Vec3::new(0.1, 0.2, 0.3)), two]
+        vec![TriMesh::torus(1.0, 0.3, 12, 8), TriMesh::cuboid(Vec3::new(0.2, 0.4, 0.6)), two]
     }
 
     #[test]

@@ -21,7 +21,7 @@ fn both(a: TriMesh, b: &TriMesh) -> TriMesh {
 /// A box whose corners are moved a little, each its own way, so that nothing is symmetric.
 fn crooked(half: Vec3, seed: u64) -> TriMesh {
     let mut rng = Rng::new(seed);
-    let mut mesh = TriMesh::box_(half);
+    let mut mesh = TriMesh::cuboid(2.0 * half);
     for v in &mut mesh.vertices {
         *v += half.map(|h| h * rng.between(-0.2, 0.2));
     }

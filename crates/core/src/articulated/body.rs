@@ -124,7 +124,7 @@ pub(super) struct LinkCollider {
 /// let upper = builder.link("upper", None, Joint::revolute(Vec3::y()), Pose::identity(), rod);
 /// builder.link("lower", Some(upper), Joint::revolute(Vec3::y()), Pose::translation(0.0, 0.0, -1.0), rod);
 /// let mut arm = ArticulatedBody::new("arm", builder.build()?).at(Pose::translation(0.0, 0.0, 2.0));
-/// arm.add_collider("lower", Collider::new(Shape::capsule(0.05, 0.4)?, Pose::translation(0.0, 0.0, -0.5)))?;
+/// arm.add_collider("lower", Collider::new(Shape::capsule(0.05, 0.8)?, Pose::translation(0.0, 0.0, -0.5)))?;
 /// arm.set_dof(0, DofSettings { limits: Some([-1.0, 1.0]), ..DofSettings::default() })?;
 /// world.add(arm)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
