@@ -4,7 +4,7 @@
 //! |---|---|
 //! | primitives | their sizes |
 //! | cylinder | radius and half length; the tree is built anew |
-//! | mesh | the bytes of the cache (`solid/stored.rs`), which check themselves when they are read |
+//! | mesh | the bytes of the cache (`shape/stored.rs`), which are checked when they are read |
 
 use crate::{CylinderShape, MeshShape};
 use serde::de::Error as _;

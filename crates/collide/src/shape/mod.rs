@@ -1,9 +1,12 @@
-//! The shapes that a body's part can have.
+//! The shapes that a part of a body can have.
 
-use crate::{
-    Aabb, CylinderShape, MassProperties, MeshShape, Pose, ShapeError, SphereTree, TreeCache, TreeSettings, TriMesh,
-    Vec3, mass,
-};
+mod cylinder;
+mod mesh;
+mod stored;
+
+use crate::{Aabb, MassProperties, Pose, ShapeError, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3, mass};
+pub use cylinder::CylinderShape;
+pub use mesh::MeshShape;
 use std::sync::Arc;
 
 /// A solid in its own frame. Primitives are centred on the origin.

@@ -3,7 +3,7 @@
 //! What is quick to make of those (edges, normals) is made anew, and the cells of fields are made where they are asked for. What is read is checked
 //! as if it came from an enemy: counts are bounded by the bytes that are there, indices in range, nothing nested in itself.
 
-use super::{MeshShape, Tree};
+use super::mesh::{MeshShape, Tree};
 use crate::bytes::{Reader, Write};
 use crate::sdf::Surface;
 use crate::{ClosedReport, MassProperties, Mat3, SphereTree, TriMesh};
