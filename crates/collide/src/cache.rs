@@ -65,6 +65,7 @@ impl TreeCache {
     }
 
     /// The same with another limit; the oldest files go first. Default 1 GiB.
+    #[must_use]
     pub fn with_most_bytes(self, most_bytes: u64) -> TreeCache {
         TreeCache { most_bytes, ..self }
     }

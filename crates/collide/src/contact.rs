@@ -58,6 +58,7 @@ impl ContactMode {
     pub const NAMES: &[(&str, ContactMode)] = &[("surface", ContactMode::Surface), ("spheres", ContactMode::Spheres)];
 
     /// The mode of a pair: `Spheres` if either side asks for it.
+    #[must_use]
     pub fn of_pair(self, other: ContactMode) -> ContactMode {
         if self == ContactMode::Spheres { self } else { other }
     }

@@ -25,8 +25,10 @@ pub mod articulated;
 mod clone_by_field;
 mod constraint;
 mod contact;
+mod force;
 mod integrators;
 mod object;
+pub mod prelude;
 mod report;
 mod rigid;
 mod settings;
@@ -60,6 +62,6 @@ pub use tumble_collide as collide;
 pub use world::sleep::Sleep;
 pub use world::view::{Mode, ObjectId, Status, WorldView};
 pub use world::{
-    ContactPoint, MirrorError, Overlap, PickForce, SnapshotError, StateMemoryHold, StepError, World, WorldError,
-    WorldState,
+    BodyView, ContactPoint, MirrorError, Overlap, PickForce, SnapshotError, StateMemoryHold, StepError, World,
+    WorldError, WorldState,
 };

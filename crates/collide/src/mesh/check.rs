@@ -83,6 +83,9 @@ impl TriMesh {
     /// faces, makes the winding consistent and turns an inside-out mesh, all in place and told in the report. An open
     /// or dangling surface, or one without volume, is an error, and the mesh is then left as it was. Errors number
     /// vertices and faces as they stand in this mesh, from 1.
+    ///
+    /// # Errors
+    /// [`MeshError`]: what keeps the mesh from enclosing a solid, and the face at which it was found.
     pub fn check_closed(&mut self) -> Result<ClosedReport, MeshError> {
         self.check_data()?;
         // zero-area faces are first dropped; where that opens a seam that they close, they stay

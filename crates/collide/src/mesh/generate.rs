@@ -73,6 +73,9 @@ impl TriMesh {
     /// A closed solid of revolution about z. `profile` holds `(r, z)` in meters, first and last on the axis (`r =
     /// 0`), all between off it, no two neighbors equal; either direction. The profile must not cross itself (not
     /// checked here).
+    ///
+    /// # Errors
+    /// [`MeshError::Profile`] if the profile is not as described.
     pub fn lathe(profile: &[(f64, f64)], segments: usize) -> Result<TriMesh, MeshError> {
         let bad = |what: &str| Err(MeshError::Profile { what: what.into() });
         let [first, middle @ .., last] = profile else { return bad("has fewer than 3 points") };

@@ -76,12 +76,14 @@ impl TriMesh {
     }
 
     /// The same mesh moved by `offset` meters.
+    #[must_use]
     pub fn translated(mut self, offset: &Vec3) -> TriMesh {
         self.vertices.iter_mut().for_each(|v| *v += offset);
         self
     }
 
     /// The same mesh scaled about the origin.
+    #[must_use]
     pub fn scaled(mut self, factor: f64) -> TriMesh {
         self.vertices.iter_mut().for_each(|v| *v *= factor);
         self
@@ -89,6 +91,9 @@ impl TriMesh {
 
     /// Refuses an empty mesh, vertices that are not finite or beyond 1e9 m, a mesh smaller than 1e-30 m, and indices out of range, naming the
     /// first offender (numbers count from 1, as in an OBJ file).
+    ///
+    /// # Errors
+    /// [`MeshError`]: no triangle, an index out of range, a coordinate that is not finite or too large, or all vertices in one point.
     pub fn check_data(&self) -> Result<(), MeshError> {
         if self.triangles.is_empty() {
             return Err(MeshError::Empty);

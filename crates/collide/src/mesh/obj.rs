@@ -10,12 +10,18 @@ use crate::{MeshError, Vec3};
 
 impl TriMesh {
     /// Reads the text of an OBJ file. Errors name the line (from 1), and the vertex or face (from 1).
+    ///
+    /// # Errors
+    /// [`MeshError`] names the line of text that cannot be read.
     pub fn from_obj(text: &str) -> Result<TriMesh, MeshError> {
         Ok(TriMesh::from_obj_with_lines(text)?.0)
     }
 
     /// The same, with the line (from 1) of each triangle, for [`MeshError::at_line`]. A polygon of `n` corners is `n − 2`
     /// triangles.
+    ///
+    /// # Errors
+    /// [`MeshError`] names the line of text that cannot be read.
     pub fn from_obj_with_lines(text: &str) -> Result<(TriMesh, Vec<usize>), MeshError> {
         let mut mesh = TriMesh::default();
         let mut faces = Vec::new();

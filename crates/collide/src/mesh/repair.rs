@@ -111,6 +111,9 @@ impl TriMesh {
     /// assert!((report.closed.volume - 1.0).abs() < 1e-12);
     /// # Ok::<(), tumble_collide::MeshError>(())
     /// ```
+    ///
+    /// # Errors
+    /// [`MeshError`]: data that are no mesh, a setting out of its range, or a surface that cannot be repaired; the mesh is then unchanged.
     pub fn repair(&mut self, settings: &RepairSettings) -> Result<RepairReport, MeshError> {
         self.check_data()?;
         settings.check(self.diagonal())?;

@@ -12,6 +12,9 @@ const RECORD: usize = 50;
 impl TriMesh {
     /// Reads the bytes of an STL file, text or binary. Nothing is allocated on the word of a header: the count must
     /// agree with the file's size.
+    ///
+    /// # Errors
+    /// [`MeshError`]: bytes that end too early, text that is not STL, or a coordinate that is not finite.
     pub fn from_stl(bytes: &[u8]) -> Result<TriMesh, MeshError> {
         let soup = match binary_count(bytes) {
             Some(count) if bytes.len() == HEADER + RECORD * count => read_binary(bytes),

@@ -31,6 +31,9 @@ const SIDES: usize = 48;
 
 impl CylinderShape {
     /// A cylinder of `radius` and `length`, meters.
+    ///
+    /// # Errors
+    /// [`ShapeError`] if a size is too small or too large for a mesh around it.
     pub fn new(radius: f64, length: f64) -> Result<CylinderShape, ShapeError> {
         let half_length = 0.5 * length;
         // the prism is around the cylinder, so that its tree covers the true surface

@@ -52,6 +52,9 @@ impl PartialEq for MeshShape {
 impl MeshShape {
     /// Checks and mends `mesh` ([`TriMesh::check_closed`]), moves its centre of mass to the origin and builds the
     /// tree.
+    ///
+    /// # Errors
+    /// [`MeshError`]: a mesh that encloses no solid, a setting out of its range, or a tree that cannot be built.
     pub fn new(mesh: TriMesh, settings: &TreeSettings) -> Result<MeshShape, MeshError> {
         let shape = MeshShape::new_lazy(mesh, settings, &TreeCache::off())?;
         let tree = shape.build_tree()?;
@@ -68,6 +71,9 @@ impl MeshShape {
     }
 
     /// The same with tree and surface built when first asked for: for what is drawn and not stepped. A tree that cannot be built is then one ball.
+    ///
+    /// # Errors
+    /// [`MeshError`]: a mesh that encloses no solid, or a setting out of its range.
     pub fn new_lazy(mut mesh: TriMesh, settings: &TreeSettings, cache: &TreeCache) -> Result<MeshShape, MeshError> {
         settings.check()?;
         let report = mesh.check_closed()?;
@@ -100,6 +106,9 @@ impl MeshShape {
     }
 
     /// The same from the cache where it has it; also returns what is to be said of the cache.
+    ///
+    /// # Errors
+    /// [`MeshError`]: a mesh that encloses no solid, a setting out of its range, or a tree that cannot be built.
     pub fn new_cached(
         mesh: TriMesh,
         settings: &TreeSettings,

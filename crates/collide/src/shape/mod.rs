@@ -44,12 +44,18 @@ impl Shape {
     }
 
     /// A ball of `radius` metres.
+    ///
+    /// # Errors
+    /// [`ShapeError::Length`] if the radius is not finite and above 0.
     pub fn sphere(radius: f64) -> Result<Shape, ShapeError> {
         positive("radius of a sphere", radius)?;
         Ok(Shape::Sphere { radius })
     }
 
     /// A box with edges of `size` along x, y and z, meters.
+    ///
+    /// # Errors
+    /// [`ShapeError::Length`] if an edge is not finite and above 0.
     pub fn cuboid(size: Vec3) -> Result<Shape, ShapeError> {
         let [x, y, z] = size.into();
         let half_extents =
@@ -58,12 +64,18 @@ impl Shape {
     }
 
     /// A capsule along z: all points within `radius` of a segment of `length`, meters.
+    ///
+    /// # Errors
+    /// [`ShapeError::Length`] if a size is not finite and above 0.
     pub fn capsule(radius: f64, length: f64) -> Result<Shape, ShapeError> {
         positive("radius of a capsule", radius)?;
         Ok(Shape::Capsule { radius, half_length: half("length of a capsule", length)? })
     }
 
     /// A cylinder along z of `radius` and `length`, meters.
+    ///
+    /// # Errors
+    /// [`ShapeError::Length`] if a size is not finite and above 0.
     pub fn cylinder(radius: f64, length: f64) -> Result<Shape, ShapeError> {
         positive("radius of a cylinder", radius)?;
         half("length of a cylinder", length)?;
@@ -72,12 +84,18 @@ impl Shape {
 
     /// A closed mesh (mended where that is harmless, see [`TriMesh::check_closed`]), moved so that its centre of mass
     /// is the origin; [`Shape::center_of_mass`] is where it was.
+    ///
+    /// # Errors
+    /// [`ShapeError::Mesh`]: a mesh that encloses no solid, a setting out of its range, or a tree that cannot be built.
     pub fn mesh(mesh: TriMesh, settings: &TreeSettings) -> Result<Shape, ShapeError> {
         Ok(Shape::Mesh(Arc::new(MeshShape::new(mesh, settings)?)))
     }
 
     /// [`Shape::mesh`] from the cache, if it was made before of the same vertices, triangles and settings; else it is made and kept there. The same bits
     /// either way. Also returns what is to be said of the cache.
+    ///
+    /// # Errors
+    /// [`ShapeError::Mesh`], as [`Shape::mesh`]. A cache that cannot be used is no error.
     pub fn mesh_cached(
         mesh: TriMesh,
         settings: &TreeSettings,
@@ -89,6 +107,9 @@ impl Shape {
 
     /// [`Shape::mesh`] with its tree and surface built when first asked for: for a world that is drawn and not stepped. The tree then comes from the cache
     /// where it has it.
+    ///
+    /// # Errors
+    /// [`ShapeError::Mesh`]: a mesh that encloses no solid, or a setting out of its range.
     pub fn mesh_lazy(mesh: TriMesh, settings: &TreeSettings, cache: &TreeCache) -> Result<Shape, ShapeError> {
         Ok(Shape::Mesh(Arc::new(MeshShape::new_lazy(mesh, settings, cache)?)))
     }
@@ -133,6 +154,9 @@ impl Shape {
     }
 
     /// Mass properties at a uniform `density` in kg/m³.
+    ///
+    /// # Errors
+    /// [`ShapeError::Density`] if the density is not finite and above 0, [`ShapeError::Unbounded`] for a half-space.
     pub fn mass_properties(&self, density: f64) -> Result<MassProperties, ShapeError> {
         if !(density.is_finite() && density > 0.0) {
             return Err(ShapeError::Density(density));

@@ -68,6 +68,7 @@ pub struct MeshId {
 
 /// Why a text is no tree.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum TreeFileError {
     /// The text is too long.
     #[error("the text has {0} bytes; a sphere tree may have {MOST_BYTES}")]

@@ -84,11 +84,17 @@ pub struct SphereTree {
 
 impl SphereTree {
     /// Builds and verifies a tree around a closed, outward-wound mesh (see [`TriMesh::check_closed`]).
+    ///
+    /// # Errors
+    /// [`MeshError`]: a setting out of its range, or a tree that does not cover the mesh.
     pub fn build(mesh: &TriMesh, settings: &TreeSettings) -> Result<SphereTree, MeshError> {
         Ok(SphereTree::build_with_progress(mesh, settings, &())?.0)
     }
 
     /// The same, told how far it is, and with what each stage did.
+    ///
+    /// # Errors
+    /// [`MeshError`]: a setting out of its range, a tree that does not cover the mesh, or a stop that `progress` asked for.
     pub fn build_with_progress(
         mesh: &TriMesh,
         settings: &TreeSettings,

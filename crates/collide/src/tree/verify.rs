@@ -10,6 +10,9 @@ const MIN_PIECE: f64 = 1e-5;
 
 impl SphereTree {
     /// Every parent contains its children: `|c − c'| + r' ≤ r`, to rounding.
+    ///
+    /// # Errors
+    /// [`MeshError::Tree`] if a node is not within its parent.
     pub fn check_nesting(&self) -> Result<(), MeshError> {
         for (n, parent) in self.nodes.iter().enumerate() {
             for child in parent.child_range() {
@@ -28,6 +31,9 @@ impl SphereTree {
     /// The leaves cover the surface of `mesh`. A triangle lies in a sphere iff its corners do, so each is halved
     /// until every piece lies in one sphere, or is tiny (1e-5 of the diagonal) and each of its corners lies in some
     /// sphere.
+    ///
+    /// # Errors
+    /// [`MeshError::Tree`] if a level does not cover the surface.
     pub fn check_coverage(&self, mesh: &TriMesh) -> Result<(), MeshError> {
         self.check_coverage_watched(mesh, &())
     }

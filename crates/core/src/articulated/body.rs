@@ -24,6 +24,7 @@ use tumble_collide::{ContactMode, Pose, Quat, Shape, Vec3};
 
 /// Why an articulated body is not valid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ArticulatedError {
     /// The model has no link of that name.
     #[error("articulated body '{body}' has no link named '{link}'")]
@@ -234,6 +235,7 @@ impl ArticulatedBody {
 
     /// Sets the pose of the base in the world. Everything attached to the base moves along, and so
     /// does the start of every floating root.
+    #[must_use]
     pub fn at(mut self, pose: Pose) -> Self {
         let step = pose * self.base.inverse();
         for link in self.model.links().iter().filter(|l| l.joint == super::Joint::Floating) {
@@ -249,6 +251,7 @@ impl ArticulatedBody {
     }
 
     /// Sets the name, so that one description can appear several times in a world.
+    #[must_use]
     pub fn named(mut self, name: impl Into<String>) -> Self {
         self.name = name.into();
         self

@@ -93,7 +93,7 @@ fn an_energy_that_rounds_to_zero_has_no_sign() {
         None => format!("{line}\n"),
     };
     let path = folder.write("cube.obj", cube(1).lines().map(centered).collect::<String>());
-    let said = succeed(&["run", &path, "--seconds", "0.1"]);
+    let said = succeed(&["run", &path, "--duration", "0.1"]);
     assert!(said.contains("energy 0.000000 J at the start, 0.000000 J at the end"), "{said}");
 }
 

@@ -42,6 +42,7 @@ impl Site {
     }
 
     /// The same center measured exactly.
+    #[must_use]
     pub fn exact(self, distance: &MeshDistance) -> Site {
         Site { parent_bound: self.parent_bound, ..Site::at(self.center, distance) }
     }

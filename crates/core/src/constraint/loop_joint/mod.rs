@@ -74,6 +74,7 @@ impl Anchor {
 
 /// Why a loop joint cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LoopJointError {
     /// Both sides are the world.
     #[error("loop joint '{0}' joins the world to itself; one side must be a part of an object")]
