@@ -23,7 +23,7 @@ impl Tumble {
         }
         let shape = match scene.body {
             Body::Sphere => Shape::sphere(RADIUS),
-            Body::Box => Shape::cuboid(Vec3::repeat(0.5 * EDGE)),
+            Body::Box => Shape::cuboid(Vec3::repeat(EDGE)),
         };
         let shape = shape.expect("the sizes are valid");
         let mut add = |(i, c): (usize, &[f64; 3])| {

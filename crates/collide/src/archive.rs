@@ -4,7 +4,7 @@
 //! |---|---|
 //! | primitives | their sizes |
 //! | cylinder | radius and half length; the tree is built anew |
-//! | mesh | the bytes of the cache (`solid/stored.rs`), which check themselves when they are read |
+//! | mesh | the bytes of the cache (`shape/stored.rs`), which are checked when they are read |
 
 use crate::{CylinderShape, MeshShape};
 use serde::de::Error as _;
@@ -49,6 +49,6 @@ impl Serialize for CylinderShape {
 impl<'de> Deserialize<'de> for CylinderShape {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<CylinderShape, D::Error> {
         let [radius, half_length] = <[f64; 2]>::deserialize(deserializer)?;
-        CylinderShape::new(radius, half_length).map_err(D::Error::custom)
+        CylinderShape::new(radius, 2.0 * half_length).map_err(D::Error::custom)
     }
 }

@@ -69,6 +69,7 @@ impl TreeCache {
     }
 
     /// Sets the maximum size of the folder; the oldest files are removed first. Default 1 GiB.
+    #[must_use]
     pub fn with_max_bytes(self, max_bytes: u64) -> TreeCache {
         TreeCache { max_bytes, ..self }
     }

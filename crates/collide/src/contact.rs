@@ -61,6 +61,7 @@ impl ContactMode {
     pub const NAMES: &[(&str, ContactMode)] = &[("surface", ContactMode::Surface), ("spheres", ContactMode::Spheres)];
 
     /// Returns the mode of a pair: `Spheres` if either side requests it.
+    #[must_use]
     pub fn of_pair(self, other: ContactMode) -> ContactMode {
         if self == ContactMode::Spheres { self } else { other }
     }

@@ -4,6 +4,7 @@ use thiserror::Error;
 
 /// A shape that cannot be built, or that lacks the requested property.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ShapeError {
     /// A length that is zero, negative or not finite.
     #[error("{what} is {value}, but must be a finite length above 0 m")]
@@ -27,6 +28,7 @@ pub enum ShapeError {
 /// A mesh that cannot be read or is not a solid. The caller adds the file name. Vertices and faces
 /// count from 1.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum MeshError {
     /// An error with the line at which it was found.
     #[error("line {line}: {error}")]
@@ -230,6 +232,7 @@ impl MeshError {
     /// contains it.
     ///
     /// [`TriMesh::from_obj_with_lines`]: crate::TriMesh::from_obj_with_lines
+    #[must_use]
     pub fn at_line(self, lines: &[usize]) -> MeshError {
         match self.face().and_then(|face| lines.get(face.checked_sub(1)?)) {
             Some(&line) if !matches!(self, MeshError::At { .. }) => MeshError::At { line, error: Box::new(self) },

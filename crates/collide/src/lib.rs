@@ -36,7 +36,6 @@ mod pose;
 mod ray;
 mod sdf;
 mod shape;
-mod solid;
 mod tree;
 mod union_find;
 
@@ -53,8 +52,7 @@ pub use mesh::{
 };
 pub use narrow::{contacts, contacts_in_mode};
 pub use pose::{Aabb, Mat3, Pose, Quat, Vec3};
-pub use shape::Shape;
-pub use solid::{CylinderShape, MeshShape};
+pub use shape::{CylinderShape, MeshShape, Shape};
 pub use tree::{
     Builder, CachedTree, Covering, LevelQuality, LevelSphere, MeshId, Progress, QualitySettings, SphereNode,
     SphereTree, StageCount, TreeFile, TreeFileError, TreeSettings, align_columns, grow_to_cover,

@@ -6,9 +6,8 @@
 //! IO, clock, threads, file format or GPU. `docs/references.md` lists the thesis, RBDA and all other
 //! sources that the modules cite.
 //!
-//! SI units, radians, z up; boxes, capsules and cylinders are made of *half* extents and half
-//! lengths. `docs/conventions.md` has these and the other conventions beside those of Python and of
-//! scene files.
+//! SI units, radians, z up; sizes of shapes are full lengths. `docs/conventions.md` has these and
+//! the other conventions beside those of Python and of scene files.
 //!
 //! ```
 //! use tumble_core::{RigidBody, Settings, World, collide::{Pose, Shape}};
@@ -30,6 +29,7 @@ mod contact;
 mod derived;
 mod integrators;
 mod object;
+pub mod prelude;
 mod report;
 mod rigid;
 mod settings;
@@ -64,6 +64,6 @@ pub use tumble_collide as collide;
 pub use world::sleep::Sleep;
 pub use world::view::{Mode, ObjectId, Status, WorldView};
 pub use world::{
-    ContactPoint, MirrorError, Overlap, PickForce, SnapshotError, StateMemoryHold, StepError, World, WorldError,
-    WorldState,
+    BodyView, ContactPoint, MirrorError, Overlap, PickForce, SnapshotError, StateMemoryHold, StepError, World,
+    WorldError, WorldState,
 };

@@ -175,9 +175,14 @@ impl Summary {
                 self.tries_mean, self.tries_max, self.floor_hits
             );
         }
-        let total = |s: &State| s.kinetic_energy_j + s.potential_energy_j;
+        let total = |s: &State| without_negative_zero(s.kinetic_energy_j + s.potential_energy_j);
         text + &format!("energy {:.6} J at the start, {:.6} J at the end\n", total(&self.start), total(&self.end))
     }
+}
+
+/// The number, or 0 if six decimals would show it as `-0.000000`.
+fn without_negative_zero(x: f64) -> f64 {
+    if x.abs() < 0.5e-6 { 0.0 } else { x }
 }
 
 fn bodies(world: &World) -> Vec<Body> {

@@ -9,8 +9,9 @@ use std::f64::consts::PI;
 const MAX_SEGMENTS: usize = 4096;
 
 impl TriMesh {
-    /// A block about the origin: 8 vertices, 12 triangles. Half extents in meters, above 0.
-    pub fn box_(half_extents: Vec3) -> TriMesh {
+    /// A box about the origin with edges of `size` meters, above 0: 8 vertices, 12 triangles.
+    pub fn cuboid(size: Vec3) -> TriMesh {
+        let half_extents = 0.5 * size;
         let vertices = (0..8_u32).map(|n| half_extents.zip_map(&signs(n), |h, s| h * s)).collect();
         let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
         TriMesh { vertices, triangles: quads.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect() }
@@ -32,13 +33,15 @@ impl TriMesh {
         mesh.scaled(radius)
     }
 
-    /// A cylinder along z about the origin.
-    pub fn cylinder(radius: f64, half_length: f64, segments: usize) -> TriMesh {
+    /// A cylinder along z about the origin, in meters.
+    pub fn cylinder(radius: f64, length: f64, segments: usize) -> TriMesh {
+        let half_length = 0.5 * length;
         revolve(&[(0.0, -half_length), (radius, -half_length), (radius, half_length), (0.0, half_length)], segments)
     }
 
-    /// A capsule along z about the origin; `half_length` without the caps, `rings` per cap.
-    pub fn capsule(radius: f64, half_length: f64, segments: usize, rings: usize) -> TriMesh {
+    /// A capsule along z about the origin, in meters; `length` without the caps, `rings` per cap.
+    pub fn capsule(radius: f64, length: f64, segments: usize, rings: usize) -> TriMesh {
+        let half_length = 0.5 * length;
         let rings = rings.clamp(1, MAX_SEGMENTS);
         let angle = |n: usize| 0.5 * PI * n as f64 / rings as f64;
         let lower = (0..=rings).map(|n| on_arc(radius, -half_length, angle(n)));
@@ -70,6 +73,9 @@ impl TriMesh {
     /// A closed solid of revolution about z. `profile` holds `(r, z)` in meters, first and last on the axis (`r =
     /// 0`), all between off it, no two neighbors equal; either direction. The profile must not cross itself (not
     /// checked here).
+    ///
+    /// # Errors
+    /// [`MeshError::Profile`] if the profile is not as described.
     pub fn lathe(profile: &[(f64, f64)], segments: usize) -> Result<TriMesh, MeshError> {
         let bad = |what: &str| Err(MeshError::Profile { what: what.into() });
         let [first, middle @ .., last] = profile else { return bad("has fewer than 3 points") };

@@ -77,12 +77,14 @@ impl TriMesh {
     }
 
     /// Returns the mesh moved by `offset` meters.
+    #[must_use]
     pub fn translated(mut self, offset: &Vec3) -> TriMesh {
         self.vertices.iter_mut().for_each(|v| *v += offset);
         self
     }
 
     /// Returns the mesh scaled about the origin.
+    #[must_use]
     pub fn scaled(mut self, factor: f64) -> TriMesh {
         self.vertices.iter_mut().for_each(|v| *v *= factor);
         self

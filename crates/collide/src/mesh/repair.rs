@@ -104,13 +104,16 @@ impl TriMesh {
     /// ```
     /// use tumble_collide::{RepairSettings, TriMesh, Vec3};
     ///
-    /// let mut mesh = TriMesh::box_(Vec3::repeat(0.5));
+    /// let mut mesh = TriMesh::cuboid(Vec3::repeat(1.0));
     /// mesh.triangles.truncate(10); // a side is missing
     /// let report = mesh.repair(&RepairSettings::default())?;
     /// assert_eq!(report.notes(), ["1 hole(s) were filled with 2 faces; the longest has 4 edges"]);
     /// assert!((report.closed.volume - 1.0).abs() < 1e-12);
     /// # Ok::<(), tumble_collide::MeshError>(())
     /// ```
+    ///
+    /// # Errors
+    /// [`MeshError`]: data that are no mesh, a setting out of its range, or a surface that cannot be repaired; the mesh is then unchanged.
     pub fn repair(&mut self, settings: &RepairSettings) -> Result<RepairReport, MeshError> {
         self.check_data()?;
         settings.check(self.diagonal())?;

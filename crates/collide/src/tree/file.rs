@@ -73,6 +73,7 @@ pub struct MeshId {
 
 /// Faults of a sphere tree file.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum TreeFileError {
     /// The text is too long.
     #[error("the text has {0} bytes; at most {MAX_BYTES} are allowed")]

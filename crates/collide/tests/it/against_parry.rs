@@ -37,11 +37,15 @@ fn random_primitive(rng: &mut Rng, kind: usize) -> Both {
         }
         1 => {
             let (r, l) = (0.5 * size(), size());
-            Both { ours: Shape::capsule(r, l).unwrap(), theirs: Box::new(Capsule::new_z(l, r)), least: r }
+            Both { ours: Shape::capsule(r, 2.0 * l).unwrap(), theirs: Box::new(Capsule::new_z(l, r)), least: r }
         }
         2 => {
             let half = Vec3::new(size(), size(), size());
-            Both { ours: Shape::cuboid(half).unwrap(), theirs: Box::new(Cuboid::new(vector(&half))), least: half.min() }
+            Both {
+                ours: Shape::cuboid(2.0 * half).unwrap(),
+                theirs: Box::new(Cuboid::new(vector(&half))),
+                least: half.min(),
+            }
         }
         _ => Both { ours: Shape::half_space(), theirs: Box::new(HalfSpace::new(Vector::Z)), least: f64::INFINITY },
     }

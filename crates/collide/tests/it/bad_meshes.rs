@@ -27,7 +27,8 @@ fn all(corners: &[Vec3; 3], holds: impl Fn(&Vec3) -> bool) -> bool {
 
 #[test]
 fn box_without_two_sides_is_closed_flat() {
-    let open = without(TriMesh::box_(Vec3::new(1.0, 2.0, 3.0)), |c| all(c, |p| p.z == 3.0) || all(c, |p| p.z == -3.0));
+    let open =
+        without(TriMesh::cuboid(Vec3::new(2.0, 4.0, 6.0)), |c| all(c, |p| p.z == 3.0) || all(c, |p| p.z == -3.0));
     let mut strict = open.clone();
     let error = strict.check_closed().unwrap_err();
     assert!(matches!(error, MeshError::Open { holes: 2, edges: 8, .. }), "{error}");
@@ -68,7 +69,7 @@ fn hole_in_a_sphere_is_closed_within_the_cap() {
 fn long_rim_is_filled_in_its_plane() {
     let sides = 640;
     // a cylinder without its lid, pressed into a star so that the boundary is not convex
-    let mut star = TriMesh::cylinder(1.0, 0.5, sides);
+    let mut star = TriMesh::cylinder(1.0, 1.0, sides);
     for v in &mut star.vertices {
         let squeeze = 1.0 + 0.4 * (5.0 * v.y.atan2(v.x)).sin();
         (v.x, v.y) = (v.x * squeeze, v.y * squeeze);
@@ -78,7 +79,7 @@ fn long_rim_is_filled_in_its_plane() {
     assert_eq!((report.filled_holes, report.longest_hole, report.filled_faces), (1, sides, sides - 2));
     near(report.closed.volume, volume, 1e-9, "volume");
     assert_eq!(report.closed.crossing_faces, 0);
-    let mut mesh = without(TriMesh::cylinder(1.0, 0.5, sides), |c| all(c, |p| p.z == 0.5));
+    let mut mesh = without(TriMesh::cylinder(1.0, 1.0, sides), |c| all(c, |p| p.z == 0.5));
     let error = mesh.repair(&RepairSettings { hole_edges: 100, ..RepairSettings::default() }).unwrap_err();
     assert!(
         error.to_string().ends_with("repair failed: its longest hole has 640 edges; at most 100 are filled"),
@@ -88,7 +89,7 @@ fn long_rim_is_filled_in_its_plane() {
 
 #[test]
 fn fins_walls_and_debris_go() {
-    let unit = TriMesh::box_(Vec3::repeat(0.5));
+    let unit = TriMesh::cuboid(Vec3::repeat(1.0));
     // a fin of two triangles over an edge of the box
     let mut fin = unit.clone();
     let edge = fin.triangles[0];
@@ -101,7 +102,7 @@ fn fins_walls_and_debris_go() {
     near(report.closed.volume, 1.0, 1e-12, "fin");
     // a wall across the middle: the shells of two boxes without their common sides, and one sheet
     // for both
-    let lower = without(TriMesh::box_(Vec3::repeat(0.5)), |c| all(c, |p| p.z == 0.5));
+    let lower = without(TriMesh::cuboid(Vec3::repeat(1.0)), |c| all(c, |p| p.z == 0.5));
     let upper = without(unit.clone().translated(&Vec3::z()), |c| all(c, |p| p.z == 0.5));
     let wall = without(unit.clone(), |c| !all(c, |p| p.z == 0.5));
     let (_, report) = repaired(both(&both(&lower, &upper), &wall));
@@ -184,7 +185,7 @@ fn failed_repairs_are_errors_that_name_the_face() {
     let mut lone = TriMesh { vertices: vec![Vec3::x(), Vec3::y(), Vec3::z()], triangles: vec![[0, 1, 2]] };
     let error = lone.repair(&RepairSettings::default()).unwrap_err();
     assert!(error.to_string().contains("of face 1;"), "{error}");
-    let mut nan = TriMesh::box_(Vec3::repeat(1.0));
+    let mut nan = TriMesh::cuboid(Vec3::repeat(2.0));
     nan.vertices[2].y = f64::NAN;
     assert!(matches!(nan.repair(&RepairSettings::default()), Err(MeshError::NotFinite { vertex: 3, .. })));
 }

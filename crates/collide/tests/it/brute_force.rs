@@ -108,7 +108,7 @@ fn inside_edges([a, b]: [&Vec3; 2], [c, d]: [&Vec3; 2]) -> Option<[Vec3; 2]> {
 
 #[test]
 fn the_reference_is_right_for_cubes() {
-    let cube = TriMesh::box_(Vec3::repeat(0.5));
+    let cube = TriMesh::cuboid(Vec3::repeat(1.0));
     let distance = MeshDistance::new(&cube);
     let find_contacts = |pose: &Pose| closest(&cube, pose, &cube, &Pose::identity(), &distance, 0.0)[0];
     // an edge across an edge: each is √½ from its center

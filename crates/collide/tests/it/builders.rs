@@ -85,11 +85,11 @@ fn spot_is_tighter_than_the_references_trees() {
 #[test]
 fn generated_solids_get_trees_with_the_stated_outward_error() {
     let meshes = [
-        ("box", TriMesh::box_(Vec3::new(0.5, 1.0, 0.1))),
-        ("sheet", TriMesh::box_(Vec3::new(0.5, 1.0, 1e-3))),
-        ("needle", TriMesh::box_(Vec3::new(1e-3, 1.0, 1e-3))),
-        ("cube", TriMesh::box_(Vec3::repeat(1.0))),
-        ("cylinder", TriMesh::cylinder(0.5, 0.5, 32)),
+        ("box", TriMesh::cuboid(Vec3::new(1.0, 2.0, 0.2))),
+        ("sheet", TriMesh::cuboid(Vec3::new(1.0, 2.0, 2e-3))),
+        ("needle", TriMesh::cuboid(Vec3::new(2e-3, 2.0, 2e-3))),
+        ("cube", TriMesh::cuboid(Vec3::repeat(2.0))),
+        ("cylinder", TriMesh::cylinder(0.5, 1.0, 32)),
         ("sphere", TriMesh::icosphere(1.0, 2)),
         ("torus", TriMesh::torus(1.0, 0.3, 24, 12)),
     ];
@@ -126,7 +126,7 @@ fn a_sphere_needs_one_sphere() {
 /// Two solids far apart are in different children.
 #[test]
 fn two_boxes_far_apart_share_no_leaf() {
-    let one = TriMesh::box_(Vec3::new(0.2, 0.2, 0.2));
+    let one = TriMesh::cuboid(Vec3::new(0.4, 0.4, 0.4));
     let mut mesh = one.clone();
     let first = mesh.vertices.len() as u32;
     mesh.vertices.extend(one.vertices.iter().map(|v| v + Vec3::new(10.0, 0.0, 0.0)));
@@ -155,7 +155,7 @@ fn branching_of_two_and_of_many() {
 /// diagonal outside.
 #[test]
 fn a_sphere_within_the_error_is_neither_divided_nor_grown() {
-    let cube = TriMesh::box_(Vec3::repeat(0.5));
+    let cube = TriMesh::cuboid(Vec3::repeat(1.0));
     let bound = 0.5 - 0.5 / 3.0_f64.sqrt();
     for builder in [Builder::Octree, Builder::Medial, Builder::Hubbard, Builder::Grid] {
         for error in [0.24, 0.5, 1.0] {
@@ -171,7 +171,7 @@ fn a_sphere_within_the_error_is_neither_divided_nor_grown() {
 #[test]
 fn no_sphere_is_a_point() {
     for builder in BUILDERS {
-        for mesh in [TriMesh::box_(Vec3::new(0.5, 0.4, 0.3)), TriMesh::torus(1.0, 0.3, 24, 12)] {
+        for mesh in [TriMesh::cuboid(Vec3::new(1.0, 0.8, 0.6)), TriMesh::torus(1.0, 0.3, 24, 12)] {
             let tree = SphereTree::build(&mesh, &TreeSettings { builder, ..TreeSettings::default() }).unwrap();
             let least = tree.nodes().iter().map(|n| n.radius).fold(f64::INFINITY, f64::min);
             assert!(least > 1e-6 * mesh.diagonal(), "{builder:?}: {least:e}");
@@ -187,7 +187,7 @@ fn a_covering_covers_and_its_error_never_grows() {
         sphere
     };
     let hull = bowl.convex_hull().unwrap();
-    let plate = TriMesh::box_(Vec3::new(0.5, 0.5, 0.05));
+    let plate = TriMesh::cuboid(Vec3::new(1.0, 1.0, 0.1));
     for (given, solid) in [(&plate, &plate), (&bowl, &hull)] {
         let mut covering = Covering::new(given, solid);
         let mut last = f64::INFINITY;

@@ -7,7 +7,7 @@ use tumble_collide::{Contact, ContactMode, MeshDistance, Pose, Shape, TreeSettin
 fn boxes(all: &[(Vec3, Vec3)]) -> TriMesh {
     let mut mesh = TriMesh { vertices: Vec::new(), triangles: Vec::new() };
     for (half, center) in all {
-        let one = TriMesh::box_(*half).translated(center);
+        let one = TriMesh::cuboid(2.0 * half).translated(center);
         let first = mesh.vertices.len() as u32;
         mesh.vertices.extend(one.vertices);
         mesh.triangles.extend(one.triangles.iter().map(|t| t.map(|v| v + first)));
@@ -103,7 +103,7 @@ fn gaps_are_those_of_the_union() {
 fn no_contact_lies_inside_the_union() {
     let mesh = step();
     let ((shape, pose), union) = (shape(&mesh), MeshDistance::new(&mesh));
-    let block = Shape::cuboid(Vec3::new(0.2, 0.1, 0.15)).unwrap();
+    let block = Shape::cuboid(Vec3::new(0.4, 0.2, 0.3)).unwrap();
     let (mut rng, mut count) = (Rng::new(8), 0);
     for _ in 0..5000 {
         let other = rng.pose(1.0);
@@ -124,7 +124,7 @@ fn a_shell_within_another_changes_nothing() {
     let (both, pose_of_both) =
         shape(&boxes(&[(Vec3::repeat(0.5), Vec3::zeros()), (Vec3::repeat(0.45), Vec3::zeros())]));
     let mut rng = Rng::new(9);
-    let block = Shape::cuboid(Vec3::new(0.2, 0.1, 0.15)).unwrap();
+    let block = Shape::cuboid(Vec3::new(0.4, 0.2, 0.3)).unwrap();
     let mut touching = 0;
     for _ in 0..300 {
         let other = rng.pose(0.9);

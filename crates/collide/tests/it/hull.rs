@@ -37,8 +37,8 @@ fn a_cube_full_of_points_in_its_faces_and_edges_is_a_cube() {
 fn convex_meshes_are_their_own_hulls() {
     for (mesh, vertices) in [
         (TriMesh::icosphere(0.3, 3), 642),
-        (TriMesh::cylinder(0.2, 1.0, 48), 96),
-        (TriMesh::box_(Vec3::new(1.0, 2.0, 3.0)), 8),
+        (TriMesh::cylinder(0.2, 2.0, 48), 96),
+        (TriMesh::cuboid(Vec3::new(2.0, 4.0, 6.0)), 8),
     ] {
         let hull = mesh.convex_hull().unwrap();
         let (volume, exact) = (check(&mesh.vertices, &hull), mesh.signed_volume());

@@ -22,7 +22,7 @@ fn both(a: TriMesh, b: &TriMesh) -> TriMesh {
 /// Returns a box whose corners are moved slightly, each differently, so that nothing is symmetric.
 fn distorted_box(half: Vec3, seed: u64) -> TriMesh {
     let mut rng = Rng::new(seed);
-    let mut mesh = TriMesh::box_(half);
+    let mut mesh = TriMesh::cuboid(2.0 * half);
     for v in &mut mesh.vertices {
         *v += half.map(|h| h * rng.between(-0.2, 0.2));
     }

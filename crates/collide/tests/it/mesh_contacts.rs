@@ -37,22 +37,22 @@ fn primitive(name: &'static str, ours: Shape, theirs: Box<dyn ParryShape>) -> Bo
 }
 
 fn bodies() -> Vec<Both> {
-    let cylinder = Shape::cylinder(0.2, 0.3).unwrap();
+    let cylinder = Shape::cylinder(0.2, 0.6).unwrap();
     let Shape::Cylinder(c) = &cylinder else { panic!("no cylinder") };
     let error = c.tree().outward_error();
     let theirs = ParryMesh::new(c.mesh().vertices.iter().map(vector).collect(), c.mesh().triangles.clone()).unwrap();
     let size = cylinder.bounding_radius();
     let mut all = vec![
-        solid("box mesh", TriMesh::box_(Vec3::new(0.2, 0.3, 0.1))),
+        solid("box mesh", TriMesh::cuboid(Vec3::new(0.4, 0.6, 0.2))),
         solid("ring", TriMesh::torus(1.0, 0.3, 48, 24)),
         Both { name: "cylinder", ours: cylinder, theirs: Box::new(theirs), error, size },
         primitive("sphere", Shape::sphere(0.3).unwrap(), Box::new(Ball::new(0.3))),
         primitive(
             "box",
-            Shape::cuboid(Vec3::new(0.3, 0.2, 0.4)).unwrap(),
+            Shape::cuboid(Vec3::new(0.6, 0.4, 0.8)).unwrap(),
             Box::new(Cuboid::new(vector(&Vec3::new(0.3, 0.2, 0.4)))),
         ),
-        primitive("capsule", Shape::capsule(0.1, 0.4).unwrap(), Box::new(Capsule::new_z(0.4, 0.1))),
+        primitive("capsule", Shape::capsule(0.1, 0.8).unwrap(), Box::new(Capsule::new_z(0.4, 0.1))),
     ];
     for (name, file) in [("bunny", "bunny.obj"), ("spot", "spot.obj"), ("link", "panda_link5.obj")] {
         if let Some(obj) = text(file) {
@@ -113,7 +113,7 @@ fn tree_contacts_agree_with_the_distance_to_the_mesh() {
 #[test]
 fn a_ring_hangs_on_a_peg_through_its_hole_without_contact() {
     let ring = Shape::mesh(TriMesh::torus(1.0, 0.25, 64, 32), &TreeSettings::octree()).unwrap();
-    let peg = Shape::capsule(0.6, 2.0).unwrap();
+    let peg = Shape::capsule(0.6, 4.0).unwrap();
     let here = Pose::identity();
     assert!(find_contacts(&ring, &here, &peg, &here, 0.0).is_empty(), "the hole is 0.75 wide");
     let touching = find_contacts(&ring, &Pose::translation(0.3, 0.0, 0.0), &peg, &here, 0.0);
@@ -125,7 +125,7 @@ fn a_ring_hangs_on_a_peg_through_its_hole_without_contact() {
 
 #[test]
 fn a_box_mesh_lies_flat_on_a_wide_base() {
-    let shape = Shape::mesh(TriMesh::box_(Vec3::new(0.5, 0.5, 0.25)), &TreeSettings::octree()).unwrap();
+    let shape = Shape::mesh(TriMesh::cuboid(Vec3::new(1.0, 1.0, 0.5)), &TreeSettings::octree()).unwrap();
     let error = shape.tree().unwrap().outward_error();
     let found =
         find_contacts(&shape, &Pose::translation(0.0, 0.0, 0.25), &Shape::half_space(), &Pose::identity(), 0.005);
@@ -247,7 +247,7 @@ fn poses_that_are_not_numbers_do_no_harm() {
 #[test]
 fn cylinder_on_a_half_space_is_exact() {
     let (radius, half) = (0.5, 1.0);
-    let shape = Shape::cylinder(radius, half).unwrap();
+    let shape = Shape::cylinder(radius, 2.0 * half).unwrap();
     let mut rng = Rng::new(3);
     for _ in 0..2000 {
         let (pose, ground) = (rng.pose(1.0), rng.pose(1.0));
@@ -329,11 +329,11 @@ fn same_input_gives_the_same_bits() {
 
 #[test]
 fn mesh_shape_is_moved_to_its_center_of_mass() {
-    let mesh = TriMesh::box_(Vec3::new(0.1, 0.2, 0.3)).translated(&Vec3::new(5.0, 6.0, 7.0));
+    let mesh = TriMesh::cuboid(Vec3::new(0.2, 0.4, 0.6)).translated(&Vec3::new(5.0, 6.0, 7.0));
     let shape = Shape::mesh(mesh, &TreeSettings::octree()).unwrap();
     assert!((shape.center_of_mass() - Vec3::new(5.0, 6.0, 7.0)).norm() < 1e-12);
     let mass = shape.mass_properties(1000.0).unwrap();
-    let expected = Shape::cuboid(Vec3::new(0.1, 0.2, 0.3)).unwrap().mass_properties(1000.0).unwrap();
+    let expected = Shape::cuboid(Vec3::new(0.2, 0.4, 0.6)).unwrap().mass_properties(1000.0).unwrap();
     assert!((mass.mass - 48.0).abs() < 1e-9 && mass.center_of_mass == Vec3::zeros());
     assert!((mass.inertia - expected.inertia).norm() < 1e-9);
     assert!((shape.bounding_radius() - 0.14_f64.sqrt()).abs() < 1e-12);

@@ -8,7 +8,7 @@ fn mesh(mesh: TriMesh) -> Shape {
 }
 
 fn cube() -> Shape {
-    mesh(TriMesh::box_(Vec3::repeat(0.5)))
+    mesh(TriMesh::cuboid(Vec3::repeat(1.0)))
 }
 
 fn find_contacts(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> Vec<Contact> {
@@ -36,7 +36,7 @@ const OVERLAPS: [f64; 10] = [1e-3, 5e-3, 0.01, 0.015, 0.02, 0.03, 0.05, 0.1, 0.3
 
 #[test]
 fn aligned_cubes_separate_by_their_overlap() {
-    let (mesh, block) = (cube(), Shape::cuboid(Vec3::repeat(0.5)).unwrap());
+    let (mesh, block) = (cube(), Shape::cuboid(Vec3::repeat(1.0)).unwrap());
     for (a, b) in [(&mesh, &mesh), (&mesh, &block), (&block, &mesh)] {
         for overlap in OVERLAPS {
             for (k, shift) in [
@@ -69,8 +69,8 @@ fn aligned_cubes_separate_by_their_overlap() {
 
 #[test]
 fn aligned_cylinders_separate_by_their_overlap() {
-    let cylinder = Shape::cylinder(0.5, 0.5).unwrap();
-    let (block, cube) = (Shape::cuboid(Vec3::repeat(0.5)).unwrap(), cube());
+    let cylinder = Shape::cylinder(0.5, 1.0).unwrap();
+    let (block, cube) = (Shape::cuboid(Vec3::repeat(1.0)).unwrap(), cube());
     for overlap in OVERLAPS {
         for (name, other) in [("cylinder", &cylinder), ("block", &block), ("cube", &cube)] {
             for (a, b) in [(&cylinder, other), (other, &cylinder)] {
@@ -98,7 +98,7 @@ fn aligned_cylinders_separate_by_their_overlap() {
 /// Meshes of many faces: their sides are as flat, or within a known chord of the circle.
 #[test]
 fn aligned_fine_meshes_separate_by_their_overlap() {
-    let fine = mesh(TriMesh::cylinder(0.5, 0.5, 32));
+    let fine = mesh(TriMesh::cylinder(0.5, 1.0, 32));
     for overlap in OVERLAPS {
         check_separation(
             "stacked",
@@ -151,7 +151,7 @@ fn coincident_bodies_are_separated() {
     let turned = Quat::from_scaled_axis(Vec3::new(0.2, 0.4, 0.6));
     for (name, shape) in [
         ("cube", cube()),
-        ("cylinder", Shape::cylinder(0.5, 0.5).unwrap()),
+        ("cylinder", Shape::cylinder(0.5, 1.0).unwrap()),
         ("sphere", mesh(TriMesh::icosphere(0.5, 2))),
         ("ring", mesh(TriMesh::torus(0.4, 0.12, 32, 16))),
     ] {

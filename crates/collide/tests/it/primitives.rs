@@ -31,7 +31,7 @@ fn sphere_on_half_space() {
 
 #[test]
 fn box_rests_on_box_on_four_corners_with_persistent_features() {
-    let shape = Shape::cuboid(Vec3::new(0.5, 0.5, 0.5)).unwrap();
+    let shape = Shape::cuboid(Vec3::new(1.0, 1.0, 1.0)).unwrap();
     let mut names = None;
     for step in 0..20 {
         let wobble = 1e-4 * f64::from(step % 5 - 2);
@@ -51,7 +51,7 @@ fn box_rests_on_box_on_four_corners_with_persistent_features() {
 #[test]
 fn crossed_edges_give_one_contact() {
     // both rotated by 45° so that an edge along x crosses an edge along y at height 0
-    let shape = Shape::cuboid(Vec3::new(1.0, 1.0, 1.0)).unwrap();
+    let shape = Shape::cuboid(Vec3::new(2.0, 2.0, 2.0)).unwrap();
     let quarter = std::f64::consts::FRAC_PI_4;
     for (gap, margin) in [(-0.02, 0.0), (0.02, 0.05)] {
         let height = 2.0 * 2.0_f64.sqrt() + gap;
@@ -71,7 +71,7 @@ fn crossed_edges_give_one_contact() {
 
 #[test]
 fn separated_corners_give_the_line_between_them() {
-    let shape = Shape::cuboid(Vec3::new(1.0, 1.0, 1.0)).unwrap();
+    let shape = Shape::cuboid(Vec3::new(2.0, 2.0, 2.0)).unwrap();
     let found = query(&shape, &at(2.01, 2.02, 2.02), &shape, &at(0.0, 0.0, 0.0), 0.05);
     assert_eq!(found.len(), 1);
     assert!((found[0].gap - 0.03).abs() < 1e-12);
@@ -81,9 +81,9 @@ fn separated_corners_give_the_line_between_them() {
 
 #[test]
 fn capsules_lying_down_rest_on_two_points() {
-    let capsule = Shape::capsule(0.2, 0.5).unwrap();
+    let capsule = Shape::capsule(0.2, 1.0).unwrap();
     let lying = turned(0.0, 0.0, 0.699, Vec3::y() * std::f64::consts::FRAC_PI_2);
-    let on_box = query(&capsule, &lying, &Shape::cuboid(Vec3::new(2.0, 2.0, 0.5)).unwrap(), &at(0.0, 0.0, 0.0), 0.0);
+    let on_box = query(&capsule, &lying, &Shape::cuboid(Vec3::new(4.0, 4.0, 1.0)).unwrap(), &at(0.0, 0.0, 0.0), 0.0);
     assert_eq!(on_box.len(), 2);
     let on_capsule =
         query(&capsule, &lying, &capsule, &turned(0.25, 0.0, 0.3, Vec3::y() * std::f64::consts::FRAC_PI_2), 0.0);
@@ -100,8 +100,8 @@ fn capsules_lying_down_rest_on_two_points() {
 fn coincident_centers_give_a_finite_normal() {
     let shapes = [
         Shape::sphere(0.5).unwrap(),
-        Shape::cuboid(Vec3::new(0.5, 0.5, 0.5)).unwrap(),
-        Shape::capsule(0.3, 0.4).unwrap(),
+        Shape::cuboid(Vec3::new(1.0, 1.0, 1.0)).unwrap(),
+        Shape::capsule(0.3, 0.8).unwrap(),
         Shape::half_space(),
     ];
     for a in &shapes {
@@ -123,7 +123,7 @@ fn coincident_centers_give_a_finite_normal() {
 #[test]
 fn mass_of_a_capsule_is_a_tube_and_a_sphere() {
     // r = 1, l = 1, ρ = 3/π: tube 6, sphere 4; Izz = 6/2 + 8/5; Ixx = 6(1/4 + 1/3) + 4(2/5 + 1 + 3/4)
-    let mass = Shape::capsule(1.0, 1.0).unwrap().mass_properties(3.0 / std::f64::consts::PI).unwrap();
+    let mass = Shape::capsule(1.0, 2.0).unwrap().mass_properties(3.0 / std::f64::consts::PI).unwrap();
     assert!((mass.mass - 10.0).abs() < 1e-12);
     assert!((mass.inertia[(2, 2)] - 4.6).abs() < 1e-12);
     assert!((mass.inertia[(0, 0)] - 12.1).abs() < 1e-12);
@@ -134,8 +134,8 @@ fn mass_of_a_capsule_is_a_tube_and_a_sphere() {
 fn bad_numbers_are_refused() {
     assert!(matches!(Shape::sphere(-1.0), Err(ShapeError::Length { .. })));
     assert!(matches!(
-        Shape::cuboid(Vec3::new(1.0, f64::NAN, 1.0)),
-        Err(ShapeError::Length { what: "half extent y of a box", .. })
+        Shape::cuboid(Vec3::new(2.0, f64::NAN, 2.0)),
+        Err(ShapeError::Length { what: "size y of a box", .. })
     ));
     assert!(matches!(Shape::capsule(1.0, f64::INFINITY), Err(ShapeError::Length { .. })));
     assert_eq!(Shape::half_space().mass_properties(1.0), Err(ShapeError::Unbounded));
@@ -155,8 +155,8 @@ fn half_space_boxes_are_bounded_only_along_an_axis() {
 /// contact was found.
 #[test]
 fn an_edge_just_within_the_margin_is_not_missed() {
-    let a = Shape::cuboid(Vec3::new(0.7084363941525877, 0.31168860079970623, 0.6147508599287879)).unwrap();
-    let b = Shape::cuboid(Vec3::new(0.5587402072637294, 0.26632436260223613, 0.4442867410980149)).unwrap();
+    let a = Shape::cuboid(Vec3::new(1.4168727883051754, 0.62337720159941246, 1.2295017198575758)).unwrap();
+    let b = Shape::cuboid(Vec3::new(1.1174804145274588, 0.53264872520447226, 0.8885734821960298)).unwrap();
     let pose = |t: [f64; 3], q: [f64; 4]| {
         let turn = tumble_collide::Quat::from_quaternion(nalgebra::Quaternion::new(q[3], q[0], q[1], q[2]));
         Pose::from_parts(Vec3::from(t).into(), turn)

@@ -35,7 +35,7 @@ fn mean_distance_to_cube(r: f64) -> f64 {
 fn a_sphere_around_a_cube() {
     let (r, d) = (3.0_f64.sqrt(), 12.0_f64.sqrt());
     // grown by more than the rounding of the corners
-    let q = on_axis(&[(0.0, r * (1.0 + 1e-12))], &TriMesh::box_(Vec3::repeat(1.0)));
+    let q = on_axis(&[(0.0, r * (1.0 + 1e-12))], &TriMesh::cuboid(Vec3::repeat(2.0)));
     assert_eq!((q.spheres, q.coverage, q.vertex_coverage, q.gap_max, q.vertex_gap_max), (1, 1.0, 1.0, 0.0, 0.0));
     near("greatest protrusion", q.protrusion_max, (r - 1.0) / d, 2e-5);
     near("mean protrusion", q.protrusion_mean, mean_distance_to_cube(r) / d, 2e-5);
@@ -50,7 +50,7 @@ fn a_sphere_around_a_cube() {
 #[test]
 fn a_sphere_in_a_cube() {
     let d = 12.0_f64.sqrt();
-    let q = on_axis(&[(0.0, 1.0)], &TriMesh::box_(Vec3::repeat(1.0)));
+    let q = on_axis(&[(0.0, 1.0)], &TriMesh::cuboid(Vec3::repeat(2.0)));
     assert_eq!(
         (q.coverage, q.vertex_coverage, q.protrusion_max, q.protrusion_mean, q.outside),
         (0.0, 0.0, 0.0, 0.0, 0.0)
@@ -66,7 +66,7 @@ fn a_sphere_in_a_cube() {
 #[test]
 fn the_share_of_a_sheet_that_a_sphere_covers() {
     // faces of 2 × 2 at z = ±0.1; the sphere of radius 0.5 cuts a disc from each and reaches no rim
-    let mesh = TriMesh::box_(Vec3::new(1.0, 1.0, 0.1));
+    let mesh = TriMesh::cuboid(Vec3::new(2.0, 2.0, 0.2));
     let q = on_axis(&[(0.0, 0.5)], &mesh);
     let area = 2.0 * 4.0 + 4.0 * 2.0 * 0.2;
     near("coverage", q.coverage, 2.0 * PI * (0.25 - 0.01) / area, 5e-4);
@@ -79,7 +79,7 @@ fn the_share_of_a_sheet_that_a_sphere_covers() {
 
 #[test]
 fn two_spheres_that_overlap_count_their_lens_once() {
-    let (apart, mesh) = (0.8_f64, TriMesh::box_(Vec3::repeat(2.0)));
+    let (apart, mesh) = (0.8_f64, TriMesh::cuboid(Vec3::repeat(4.0)));
     let q = on_axis(&[(-0.5 * apart, 1.0), (0.5 * apart, 1.0)], &mesh);
     let lens = PI * (4.0 + apart) * (2.0 - apart).powi(2) / 12.0;
     near("volume ratio", q.volume_ratio, (8.0 / 3.0 * PI - lens) / 64.0, 3e-4);
@@ -104,7 +104,7 @@ fn a_sphere_beside_a_sphere() {
 
 #[test]
 fn a_hidden_sphere_protrudes_from_nothing_but_has_its_own_error() {
-    let mesh = TriMesh::box_(Vec3::repeat(1.0));
+    let mesh = TriMesh::cuboid(Vec3::repeat(2.0));
     let d = mesh.diagonal();
     // the small sphere is outside the cube, and within the large one
     let q = on_axis(&[(0.0, 2.0), (1.4, 0.3)], &mesh);
@@ -115,7 +115,7 @@ fn a_hidden_sphere_protrudes_from_nothing_but_has_its_own_error() {
 
 #[test]
 fn broken_nesting_is_counted() {
-    let mesh = TriMesh::box_(Vec3::repeat(1.0));
+    let mesh = TriMesh::cuboid(Vec3::repeat(2.0));
     let child = |x: f64, r: f64, parent| LevelSphere { parent, ..LevelSphere::new(Vec3::x() * x, r) };
     let levels = [
         vec![child(0.0, 2.0, None)],
@@ -175,7 +175,7 @@ fn a_cut_of_any_size_covers() {
 #[test]
 fn spheres_grow_by_as_much_as_covering_needs() {
     // one sphere about a cube must reach the corners; spheres that cover do not grow
-    let mesh = TriMesh::box_(Vec3::repeat(1.0));
+    let mesh = TriMesh::cuboid(Vec3::repeat(2.0));
     let mut spheres = [(Vec3::zeros(), 0.5)];
     near("growth", grow_to_cover(&mut spheres, &mesh), 3.0_f64.sqrt() - 0.5, 1e-12);
     assert_eq!(grow_to_cover(&mut spheres, &mesh), 0.0);

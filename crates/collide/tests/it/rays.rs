@@ -33,16 +33,16 @@ fn a_ray_enters_where_geometry_says() {
 fn rays_agree_with_parry() {
     let mut rng = Rng::new(5);
     let half = Vec3::new(0.3, 0.5, 0.7);
-    let sharp = TriMesh::box_(half);
+    let sharp = TriMesh::cuboid(2.0 * half);
     let cases: [(Shape, Box<dyn RayCast>); 5] = [
         (Shape::sphere(0.6).unwrap(), Box::new(Ball::new(0.6))),
-        (Shape::cuboid(half).unwrap(), Box::new(Cuboid::new(Vector::new(0.3, 0.5, 0.7)))),
+        (Shape::cuboid(2.0 * half).unwrap(), Box::new(Cuboid::new(Vector::new(0.3, 0.5, 0.7)))),
         (
-            Shape::capsule(0.3, 0.6).unwrap(),
+            Shape::capsule(0.3, 1.2).unwrap(),
             Box::new(Capsule::new(Vector::new(0.0, 0.0, -0.6), Vector::new(0.0, 0.0, 0.6), 0.3)),
         ),
         // parry's stands on y
-        (Shape::cylinder(0.4, 0.5).unwrap(), Box::new(Cylinder::new(0.5, 0.4))),
+        (Shape::cylinder(0.4, 1.0).unwrap(), Box::new(Cylinder::new(0.5, 0.4))),
         (Shape::mesh(sharp, &TreeSettings::octree()).unwrap(), Box::new(Cuboid::new(Vector::new(0.3, 0.5, 0.7)))),
     ];
     for (index, (shape, theirs)) in cases.iter().enumerate() {

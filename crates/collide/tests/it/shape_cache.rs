@@ -19,9 +19,9 @@ fn cached(mesh: TriMesh, cache: &TreeCache) -> (Shape, Option<String>) {
 /// Returns the bits of all contacts of two copies of a shape in many poses, deep, close and apart,
 /// and with a sphere, a box and a cylinder, as text.
 fn contact_bits(shape: &Shape) -> String {
-    let cylinder = Shape::cylinder(0.3, 0.6).unwrap();
+    let cylinder = Shape::cylinder(0.3, 1.2).unwrap();
     let others =
-        [shape.clone(), Shape::sphere(0.3).unwrap(), Shape::cuboid(Vec3::new(0.2, 0.3, 0.4)).unwrap(), cylinder];
+        [shape.clone(), Shape::sphere(0.3).unwrap(), Shape::cuboid(Vec3::new(0.4, 0.6, 0.8)).unwrap(), cylinder];
     let mut found = Vec::new();
     for n in 0..60 {
         let place = |step: u32, span: f64| span * (f64::from(n * step % 61) / 30.0 - 1.0);
@@ -106,7 +106,7 @@ fn a_damaged_truncated_or_foreign_file_is_reported_and_rebuilt() {
     let file = folder.files().remove(0);
     let good = fs::read(&file).unwrap();
     let other = Folder::new();
-    cached(TriMesh::box_(Vec3::repeat(1.0)), &other.cache());
+    cached(TriMesh::cuboid(Vec3::repeat(2.0)), &other.cache());
     let mut bad: Vec<Vec<u8>> = vec![Vec::new(), b"\n".to_vec(), fs::read(other.files().remove(0)).unwrap()];
     bad.push([&good[..], b" "].concat());
     bad.push(String::from_utf8_lossy(&good).replacen("shape 1 ", "shape 0 ", 1).into_bytes());

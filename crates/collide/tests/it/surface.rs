@@ -21,7 +21,7 @@ fn find_contacts(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, margin: f64) -> Vec
 }
 
 fn mesh_box(x: f64, y: f64, z: f64) -> Shape {
-    Shape::mesh(TriMesh::box_(Vec3::new(x, y, z)), &TreeSettings::octree()).unwrap()
+    Shape::mesh(TriMesh::cuboid(Vec3::new(x, y, z)), &TreeSettings::octree()).unwrap()
 }
 
 fn turned(z: f64, angle: f64) -> Pose {
@@ -37,7 +37,7 @@ fn spread(found: &[Contact]) -> Vec3 {
 
 #[test]
 fn a_mesh_box_touches_a_plane_with_its_four_corners() {
-    let shape = mesh_box(0.5, 0.3, 0.2);
+    let shape = mesh_box(1.0, 0.6, 0.4);
     let mut rng = Rng::new(1);
     for _ in 0..200 {
         let pose = turned(0.2 + 1e-5, rng.between(0.0, 6.3));
@@ -53,7 +53,7 @@ fn a_mesh_box_touches_a_plane_with_its_four_corners() {
 fn boxes_of_the_same_size_touch_face_to_face() {
     // each as a mesh and as a primitive, aligned, and with the upper one moved slightly in either
     // direction
-    let (mesh, block) = (mesh_box(0.5, 0.5, 0.5), Shape::cuboid(Vec3::repeat(0.5)).unwrap());
+    let (mesh, block) = (mesh_box(1.0, 1.0, 1.0), Shape::cuboid(Vec3::repeat(1.0)).unwrap());
     for (a, b) in [(&mesh, &mesh), (&mesh, &block), (&block, &mesh)] {
         for shift in [0.0, 1e-9, -1e-9, 1e-7, -1e-5, 1e-3, 0.2] {
             for gap in [1e-4, 1e-7, 0.0, -1e-7, -1e-4] {
@@ -74,7 +74,7 @@ fn boxes_of_the_same_size_touch_face_to_face() {
 
 #[test]
 fn a_rotated_box_on_another_touches_where_the_edges_cross() {
-    let (mesh, block) = (mesh_box(0.5, 0.5, 0.5), Shape::cuboid(Vec3::repeat(0.5)).unwrap());
+    let (mesh, block) = (mesh_box(1.0, 1.0, 1.0), Shape::cuboid(Vec3::repeat(1.0)).unwrap());
     for (a, b) in [(&mesh, &mesh), (&mesh, &block), (&block, &mesh)] {
         for gap in [1e-4, 0.0, -1e-4] {
             let found = find_contacts(a, &turned(1.0 + gap, FRAC_PI_4), b, &Pose::identity(), 1e-3);
@@ -95,7 +95,7 @@ fn a_rotated_box_on_another_touches_where_the_edges_cross() {
 #[test]
 fn a_bar_across_a_bar_has_the_corners_of_their_common_square() {
     // no corner of either is near the other
-    let (mesh, block) = (mesh_box(1.0, 0.1, 0.1), Shape::cuboid(Vec3::new(1.0, 0.1, 0.1)).unwrap());
+    let (mesh, block) = (mesh_box(2.0, 0.2, 0.2), Shape::cuboid(Vec3::new(2.0, 0.2, 0.2)).unwrap());
     for (a, b) in [(&mesh, &mesh), (&mesh, &block), (&block, &mesh)] {
         for gap in [1e-4, 0.0, -1e-4] {
             let found = find_contacts(a, &turned(0.2 + gap, FRAC_PI_2), b, &Pose::identity(), 1e-3);
@@ -112,7 +112,7 @@ fn a_bar_across_a_bar_has_the_corners_of_their_common_square() {
 fn crossed_edges_meet_at_one_point() {
     // two boxes on edge, one along x, one along y: closest at the crossing, at ½√2 from each axis
     let reach = 0.5 * 2.0_f64.sqrt();
-    let (mesh, block) = (mesh_box(1.0, 0.5, 0.5), Shape::cuboid(Vec3::new(1.0, 0.5, 0.5)).unwrap());
+    let (mesh, block) = (mesh_box(2.0, 1.0, 1.0), Shape::cuboid(Vec3::new(2.0, 1.0, 1.0)).unwrap());
     let on_edge = |z: f64, yaw: f64| {
         let turn = Quat::from_scaled_axis(Vec3::z() * yaw) * Quat::from_scaled_axis(Vec3::x() * FRAC_PI_4);
         Pose::from_parts(Vec3::new(0.07, 0.11, z).into(), turn)
@@ -132,7 +132,7 @@ fn crossed_edges_meet_at_one_point() {
 fn a_thin_plate_is_not_seen_from_its_other_side() {
     // a plate 1 mm thick lies on a box; its lower corners are near the box's top, its upper ones
     // not
-    let (plate, block) = (mesh_box(0.2, 0.2, 0.0005), mesh_box(0.5, 0.5, 0.5));
+    let (plate, block) = (mesh_box(0.4, 0.4, 0.001), mesh_box(1.0, 1.0, 1.0));
     for gap in [1e-4, 0.0, -1e-4] {
         let found = find_contacts(&plate, &Pose::translation(0.0, 0.0, 0.5005 + gap), &block, &Pose::identity(), 5e-4);
         assert!(
@@ -150,8 +150,8 @@ fn a_thin_plate_is_not_seen_from_its_other_side() {
 
 #[test]
 fn a_cylinder_on_a_box_touches_as_on_a_plane() {
-    let cylinder = Shape::cylinder(0.2, 0.3).unwrap();
-    for block in [mesh_box(1.0, 1.0, 0.1), Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap()] {
+    let cylinder = Shape::cylinder(0.2, 0.6).unwrap();
+    for block in [mesh_box(2.0, 2.0, 0.2), Shape::cuboid(Vec3::new(2.0, 2.0, 0.2)).unwrap()] {
         let mut rng = Rng::new(9);
         for case in 0..300 {
             let standing = case % 3 == 0;
@@ -201,7 +201,7 @@ fn the_round_side_of_a_cylinder_beside_an_edge_is_not_lost() {
     // a pose found at random; 11.5239 mm is parry's distance of a prism of 720 sides, which is 1 µm
     // short
     let half = Vec3::new(0.2, 0.3, 0.1) / (2.0 * 0.14_f64.sqrt());
-    let (mesh, cylinder) = (mesh_box(half.x, half.y, half.z), Shape::cylinder(0.1, 0.15).unwrap());
+    let (mesh, cylinder) = (mesh_box(2.0 * half.x, 2.0 * half.y, 2.0 * half.z), Shape::cylinder(0.1, 0.3).unwrap());
     let turn =
         nalgebra::Quaternion::new(0.846268223820806, -0.2642777604899751, -0.3376229903667359, 0.31622472236908467);
     let pose = Pose::from_parts(
@@ -216,11 +216,11 @@ fn the_round_side_of_a_cylinder_beside_an_edge_is_not_lost() {
 #[test]
 fn a_cylinder_across_the_straight_lines_of_a_smooth_surface_meets_their_middle() {
     // lines 0.2 m long that turn by 2π/1000: their ends are 41 mm from the cylinder that touches their middles
-    let drum = Shape::mesh(TriMesh::cylinder(1.0, 0.1, 1000), &TreeSettings::octree()).unwrap();
+    let drum = Shape::mesh(TriMesh::cylinder(1.0, 0.2, 1000), &TreeSettings::octree()).unwrap();
     let across = Quat::from_scaled_axis(Vec3::x() * FRAC_PI_2);
     for gap in [1e-3, 1e-5, -1e-5] {
         let pose = Pose::from_parts(Vec3::new(1.1 + gap, 0.0, 0.0).into(), across);
-        let found = find_contacts(&Shape::cylinder(0.1, 0.3).unwrap(), &pose, &drum, &Pose::identity(), 2e-3);
+        let found = ask(&Shape::cylinder(0.1, 0.6).unwrap(), &pose, &drum, &Pose::identity(), 2e-3);
         let deepest = found.iter().min_by(|a, b| a.gap.total_cmp(&b.gap)).unwrap();
         assert!((deepest.gap - gap).abs() < 1e-5 && (deepest.normal - Vec3::x()).norm() < 1e-2, "{gap}: {found:?}");
     }
@@ -238,7 +238,7 @@ fn a_rim_over_a_shallow_valley_meets_both_its_sides() {
     let mut triangles = vec![[0, 4, 1], [1, 4, 3], [1, 3, 2], [5, 6, 9], [6, 8, 9], [6, 7, 8]];
     triangles.extend((0..5_u32).flat_map(|n| [[n, (n + 1) % 5, n + 5], [(n + 1) % 5, (n + 1) % 5 + 5, n + 5]]));
     let trough = Shape::mesh(TriMesh { vertices, triangles }, &TreeSettings::octree()).unwrap();
-    let cylinder = Shape::cylinder(r, 0.15).unwrap();
+    let cylinder = Shape::cylinder(r, 0.3).unwrap();
     // the mesh's frame is its center of mass
     let Shape::Mesh(shape) = &trough else { panic!("no mesh") };
     let bottom = shape.mesh().vertices[1] - Vec3::new(0.0, -0.4, 0.0);
@@ -261,10 +261,10 @@ fn a_rim_over_a_shallow_valley_meets_both_its_sides() {
 fn contacts_do_not_depend_on_earlier_queries() {
     let shapes = [
         Shape::mesh(TriMesh::torus(0.3, 0.1, 24, 12), &TreeSettings::octree()).unwrap(),
-        mesh_box(0.3, 0.2, 0.1),
-        Shape::cylinder(0.2, 0.3).unwrap(),
-        Shape::capsule(0.1, 0.2).unwrap(),
-        Shape::cuboid(Vec3::new(0.2, 0.3, 0.2)).unwrap(),
+        mesh_box(0.6, 0.4, 0.2),
+        Shape::cylinder(0.2, 0.6).unwrap(),
+        Shape::capsule(0.1, 0.4).unwrap(),
+        Shape::cuboid(Vec3::new(0.4, 0.6, 0.4)).unwrap(),
     ];
     let mut rng = Rng::new(77);
     let queries: Vec<(usize, usize, Pose)> = (0..200).map(|n| (n % 3, n / 3 % 5, rng.pose(0.25))).collect();
@@ -284,7 +284,7 @@ fn contacts_do_not_depend_on_earlier_queries() {
 /// points inside the faces.
 #[test]
 fn two_meshes_deep_in_each_other_have_the_depth_of_the_deepest_face() {
-    let (block, bar) = (dented_box(), mesh_box(3.0, 0.7, 0.4));
+    let (block, bar) = (dented_block(), mesh_box(6.0, 1.4, 0.8));
     // the bar's wide faces are at z = ±0.4, 0.6 below the box's; the bar's edges are 0.3 below y =
     // ±1; the box's own faces are 0.4 deep in the bar
     let straight = Pose::identity();
@@ -304,7 +304,7 @@ fn two_meshes_deep_in_each_other_have_the_depth_of_the_deepest_face() {
 /// Returns a cube of edge 2 about its center of mass, minus a pyramid of 0.01 in one side, which
 /// moves that by 6e-5 (the deepest points are beside it in z).
 fn dented_box() -> Shape {
-    let mut mesh = TriMesh::box_(Vec3::repeat(1.0));
+    let mut mesh = TriMesh::cuboid(Vec3::repeat(2.0));
     let at = |mesh: &TriMesh, v: u32| mesh.vertices[v as usize];
     let side: Vec<[u32; 3]> =
         mesh.triangles.iter().copied().filter(|t| t.iter().all(|&v| at(&mesh, v).y > 0.0)).collect();
@@ -322,7 +322,7 @@ fn dented_box() -> Shape {
 /// upper side, `1 + 0.4`, or `1 + 0.3` for the raised one.
 #[test]
 fn convex_meshes_through_each_other_have_the_depth_of_the_least_translation() {
-    let (block, bar) = (mesh_box(1.0, 1.0, 1.0), mesh_box(3.0, 0.7, 0.4));
+    let (block, bar) = (mesh_box(2.0, 2.0, 2.0), mesh_box(6.0, 1.4, 0.8));
     for (rise, depth) in [(0.0, 1.4), (0.1, 1.3)] {
         let found = find_contacts(&bar, &Pose::translation(0.0, 0.0, rise), &block, &Pose::identity(), 1e-3);
         let least = found.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);

@@ -62,20 +62,20 @@ fn primitives() -> Vec<Body> {
     let body =
         |name, ours, theirs: Box<dyn ParryShape>| Body { name, ours, theirs, distance: None, samples: Vec::new() };
     // parry's cylinder is along y; a prism of many sides is equivalent
-    let prism = TriMesh::cylinder(0.1, 0.15, 720);
+    let prism = TriMesh::cylinder(0.1, 0.3, 720);
     let prism = ConvexPolyhedron::from_convex_hull(&prism.vertices.iter().map(vector).collect::<Vec<_>>()).unwrap();
     let half = Vec3::new(0.15, 0.1, 0.2);
     vec![
         body("sphere", Shape::sphere(0.15).unwrap(), Box::new(Ball::new(0.15))),
-        body("capsule", Shape::capsule(0.05, 0.2).unwrap(), Box::new(Capsule::new_z(0.2, 0.05))),
-        body("block", Shape::cuboid(half).unwrap(), Box::new(Cuboid::new(vector(&half)))),
-        body("cylinder", Shape::cylinder(0.1, 0.15).unwrap(), Box::new(prism)),
+        body("capsule", Shape::capsule(0.05, 0.4).unwrap(), Box::new(Capsule::new_z(0.2, 0.05))),
+        body("block", Shape::cuboid(2.0 * half).unwrap(), Box::new(Cuboid::new(vector(&half)))),
+        body("cylinder", Shape::cylinder(0.1, 0.3).unwrap(), Box::new(prism)),
     ]
 }
 
 fn meshes() -> Vec<Body> {
     let mut all = vec![
-        solid("box mesh", TriMesh::box_(Vec3::new(0.2, 0.3, 0.1))),
+        solid("box mesh", TriMesh::cuboid(Vec3::new(0.4, 0.6, 0.2))),
         solid("ring", TriMesh::torus(1.0, 0.3, 32, 16)),
         solid("round", TriMesh::icosphere(1.0, 3)),
         solid("wedge", TriMesh::lathe(&[(0.0, 0.0), (0.5, 0.0), (0.1, 0.8), (0.0, 0.9)], 5).unwrap()),

@@ -133,7 +133,7 @@ fn a_stale_version_another_trees_file_and_a_folder_in_its_place_are_built_anew()
     is_built_anew(&folder, &file, text.replacen("tree 1 ", "tree 0 ", 1).as_bytes(), "stale");
     is_built_anew(&folder, &file, b"", "empty");
     let other = Folder::new();
-    cached(&TriMesh::box_(Vec3::repeat(1.0)), &other.cache());
+    cached(&TriMesh::cuboid(Vec3::repeat(2.0)), &other.cache());
     is_built_anew(&folder, &file, &fs::read(other.files().remove(0)).unwrap(), "another tree's");
     fs::remove_file(&file).unwrap();
     fs::create_dir(&file).unwrap();
@@ -184,7 +184,7 @@ fn a_folder_that_cannot_be_written_is_a_note() {
 #[test]
 fn the_oldest_go_first() {
     let folder = Folder::new();
-    let boxes: Vec<TriMesh> = (1..=4).map(|n| TriMesh::box_(Vec3::repeat(f64::from(n)))).collect();
+    let boxes: Vec<TriMesh> = (1..=4).map(|n| TriMesh::cuboid(Vec3::repeat(2.0 * f64::from(n)))).collect();
     for mesh in &boxes[..3] {
         cached(mesh, &folder.cache());
         // file times can have a resolution of a few milliseconds
@@ -203,7 +203,7 @@ fn the_oldest_go_first() {
 #[test]
 fn unknown_files_are_never_removed() {
     let folder = Folder::new();
-    let ours = cached(&TriMesh::box_(Vec3::repeat(1.0)), &folder.cache());
+    let ours = cached(&TriMesh::cuboid(Vec3::repeat(2.0)), &folder.cache());
     assert!(!ours.found);
     let kept = folder.files();
     let hex = "0123456789abcdef".repeat(4);
@@ -219,7 +219,7 @@ fn unknown_files_are_never_removed() {
     others.iter().for_each(|name| fs::write(folder.0.join(name), vec![0; 1000]).unwrap());
     fs::write(&unfinished, vec![0; 1000]).unwrap();
     std::thread::sleep(std::time::Duration::from_millis(20));
-    cached(&TriMesh::box_(Vec3::repeat(2.0)), &folder.cache().with_max_bytes(1));
+    cached(&TriMesh::cuboid(Vec3::repeat(4.0)), &folder.cache().with_max_bytes(1));
     assert!(others.iter().all(|name| folder.0.join(name).exists()));
     assert!(!kept[0].exists() && !unfinished.exists());
 }

@@ -32,7 +32,7 @@ fn file(mesh: &TriMesh, depth: u32) -> TreeFile {
 fn a_tree_comes_back_with_the_same_bits() {
     for (mesh, depth) in [
         (TriMesh::torus(1.0, 0.3, 48, 24), 6),
-        (TriMesh::box_(Vec3::new(0.1, 1.0 / 3.0, 1e-4)), 5),
+        (TriMesh::cuboid(Vec3::new(0.2, 2.0 / 3.0, 2e-4)), 5),
         (TriMesh::icosphere(1e-7, 2), 1),
     ] {
         let file = file(&mesh, depth);
@@ -52,7 +52,7 @@ fn a_tree_comes_back_with_the_same_bits() {
 
 #[test]
 fn every_level_of_the_file_represents_the_solid() {
-    let mesh = TriMesh::cylinder(0.2, 1.0, 24);
+    let mesh = TriMesh::cylinder(0.2, 2.0, 24);
     let file = file(&mesh, 6);
     let text: serde_json::Value = serde_json::from_str(&file.to_json()).unwrap();
     let levels = text["levels"].as_array().unwrap();

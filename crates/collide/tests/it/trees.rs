@@ -51,8 +51,8 @@ fn public_meshes_get_tight_trees() {
 #[test]
 fn generated_solids_get_tight_trees() {
     let meshes = [
-        TriMesh::box_(Vec3::new(0.5, 1.0, 0.1)),
-        TriMesh::cylinder(0.5, 0.5, 32),
+        TriMesh::cuboid(Vec3::new(1.0, 2.0, 0.2)),
+        TriMesh::cylinder(0.5, 1.0, 32),
         TriMesh::icosphere(1.0, 3),
         TriMesh::torus(1.0, 0.3, 48, 24),
     ];
@@ -79,7 +79,7 @@ fn coverage_check_notices_a_hole() {
 
 #[test]
 fn settings_out_of_range_are_refused() {
-    let mesh = TriMesh::box_(Vec3::repeat(1.0));
+    let mesh = TriMesh::cuboid(Vec3::repeat(2.0));
     for settings in [
         TreeSettings { depth: 0, ..TreeSettings::octree() },
         TreeSettings { error: f64::NAN, ..TreeSettings::octree() },
@@ -91,10 +91,10 @@ fn settings_out_of_range_are_refused() {
 #[test]
 fn hard_meshes_and_fine_settings_still_cover() {
     // a needle, a sheet, a box far from the origin, and a sphere at a tenth of the default error
-    let far = TriMesh::box_(Vec3::repeat(0.5)).translated(&Vec3::new(1e5, -1e5, 1e5));
+    let far = TriMesh::cuboid(Vec3::repeat(1.0)).translated(&Vec3::new(1e5, -1e5, 1e5));
     let meshes = [
-        TriMesh::cylinder(1e-3, 1.0, 8),
-        TriMesh::box_(Vec3::new(1.0, 1.0, 1e-4)),
+        TriMesh::cylinder(1e-3, 2.0, 8),
+        TriMesh::cuboid(Vec3::new(2.0, 2.0, 2e-4)),
         far,
         TriMesh::torus(1.0, 0.01, 64, 8),
     ];

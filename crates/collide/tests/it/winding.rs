@@ -88,7 +88,7 @@ fn winding_number_is_the_sum_of_solid_angles_and_counts_what_a_ray_counts() {
 #[test]
 fn an_open_surface_has_the_share_of_directions_it_covers() {
     // the top of a cube seen from the cube's center is a sixth of the sphere
-    let mut lid = TriMesh::box_(Vec3::repeat(1.0));
+    let mut lid = TriMesh::cuboid(Vec3::repeat(2.0));
     let up = |m: &TriMesh, t: usize| m.corners(t).iter().all(|p| p.z == 1.0);
     let kept: Vec<[u32; 3]> = (0..12).filter(|&t| up(&lid, t)).map(|t| lid.triangles[t]).collect();
     lid.triangles = kept;
@@ -100,7 +100,7 @@ fn an_open_surface_has_the_share_of_directions_it_covers() {
 fn overlapping_boxes_are_their_union_in_mass_and_distance() {
     let (half, shift) = (Vec3::new(1.0, 1.0, 1.0), Vec3::new(0.7, 0.9, 1.1));
     let turn = Quat::from_scaled_axis(Vec3::new(0.3, -0.5, 0.8)).to_rotation_matrix();
-    let mut mesh = both(&TriMesh::box_(half), &TriMesh::box_(half).translated(&shift));
+    let mut mesh = both(&TriMesh::cuboid(2.0 * half), &TriMesh::cuboid(2.0 * half).translated(&shift));
     mesh.vertices.iter_mut().for_each(|v| *v = turn * *v);
     let report = mesh.check_closed().unwrap();
     let overlap = (2.0 - shift.x) * (2.0 - shift.y) * (2.0 - shift.z);
@@ -180,7 +180,7 @@ fn depth_in_union(p: &Vec3, half: &Vec3, shift: &Vec3) -> f64 {
 /// Coplanar faces that overlap, with equal or opposite normals.
 #[test]
 fn boxes_with_faces_on_each_other_count_once() {
-    let unit = TriMesh::box_(Vec3::repeat(0.5));
+    let unit = TriMesh::cuboid(Vec3::repeat(1.0));
     for (shift, volume) in [
         (Vec3::new(0.25, 0.25, 0.0), 2.0 - 0.75 * 0.75),
         (Vec3::new(1.0, 0.0, 0.0), 2.0),
@@ -215,7 +215,7 @@ fn folded_face_counts_what_it_bounds() {
     let report = arrow.clone().check_closed().unwrap();
     near(report.volume, 2.0, 1e-12, "arrow");
     assert!(report.crossing_faces > 0 && report.doubtful == 0.0, "{report:?}");
-    let block = TriMesh::box_(Vec3::new(0.625, 0.5, 0.5)).translated(&Vec3::new(-0.875, 0.0, 0.5));
+    let block = TriMesh::cuboid(Vec3::new(1.25, 1.0, 1.0)).translated(&Vec3::new(-0.875, 0.0, 0.5));
     // the arrow has two triangles of 1/32 m² of the box's 1.25 m²
     let mut joined = both(&arrow, &block);
     near(joined.check_closed().unwrap().volume, 2.0 + 1.25 - 0.0625, 1e-12, "with a box");

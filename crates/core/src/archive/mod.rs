@@ -36,6 +36,7 @@ const HEAD: &[u8; 8] = b"tumbleA4";
 
 /// Why an archive cannot be written or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ArchiveError {
     /// The bytes are of another kind.
     #[error("these bytes do not begin with '{0}': they are of another kind, or were not written by tumble")]

@@ -55,7 +55,7 @@ pub enum Combine {
 }
 
 impl Combine {
-    /// All rules with their names, as scene files and Python write them.
+    /// All rules with their names, in the order of their declaration, as scene files and Python write them.
     pub const NAMES: &[(&str, Combine)] = &[
         ("min", Combine::Min),
         ("max", Combine::Max),
@@ -66,13 +66,7 @@ impl Combine {
 
     /// The rule's name.
     pub fn name(self) -> &'static str {
-        match self {
-            Combine::Min => "min",
-            Combine::Max => "max",
-            Combine::Average => "average",
-            Combine::Product => "product",
-            Combine::GeometricMean => "geometric_mean",
-        }
+        Combine::NAMES[self as usize].0
     }
 
     /// The pair's constant.

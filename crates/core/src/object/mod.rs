@@ -277,6 +277,7 @@ pub trait NetSync {
 
 /// Why a message was not applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SyncError {
     /// Wrong length.
     #[error("the message has {got} bytes; this object's has {wanted}")]

@@ -29,6 +29,7 @@ use tumble_collide::{ContactMode, Mat3, Pose, Quat, Shape, Vec3};
 
 /// What is wrong with the constants of a body.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum BodyError {
     /// The mass is not a positive finite number.
     #[error("body '{name}': mass is {mass} kg; it must be finite and above 0")]
@@ -190,12 +191,14 @@ impl RigidBody {
     }
 
     /// Sets the pose of its frame at time 0.
+    #[must_use]
     pub fn at(mut self, pose: Pose) -> Self {
         self.initial_pose = pose;
         self
     }
 
     /// Sets the velocity (m/s) and angular velocity (rad/s, world axes) at time 0.
+    #[must_use]
     pub fn moving(mut self, velocity: Vec3, angular_velocity: Vec3) -> Self {
         self.initial_velocity = velocity;
         self.initial_angular_velocity = angular_velocity;
@@ -203,30 +206,35 @@ impl RigidBody {
     }
 
     /// Sets restitution (0 to 1) and friction (at least 0).
+    #[must_use]
     pub fn surface(mut self, restitution: f64, friction: f64) -> Self {
         self.material = Material { restitution, friction, ..self.material };
         self
     }
 
     /// Sets the number of its material, by which pairs of materials are found (see [`Material::id`]).
+    #[must_use]
     pub fn of_material(mut self, id: u32) -> Self {
         self.material.id = id;
         self
     }
 
     /// Sets how its mesh or cylinder collides.
+    #[must_use]
     pub fn colliding_by(mut self, mode: ContactMode) -> Self {
         self.contact_mode = mode;
         self
     }
 
     /// Sets what it looks like; by default its shape in grey.
+    #[must_use]
     pub fn drawn_as(mut self, visuals: Vec<Visual>) -> Self {
         self.visuals = visuals;
         self
     }
 
     /// Adds a camera; its pose is in the body's frame.
+    #[must_use]
     pub fn with_camera(mut self, mut camera: CameraMount) -> Self {
         camera.pose = Translation3::from(-self.center) * camera.pose;
         self.cameras.push(camera);
@@ -234,6 +242,7 @@ impl RigidBody {
     }
 
     /// Adds a light; its pose is in the body's frame.
+    #[must_use]
     pub fn with_light(mut self, mut light: LightMount) -> Self {
         light.pose = Translation3::from(-self.center) * light.pose;
         self.lights.push(light);
@@ -277,6 +286,9 @@ impl RigidBody {
     }
 
     /// Checks everything that can be set freely: restitution in 0..=1, friction and damping at least 0, finite pose and velocity.
+    ///
+    /// # Errors
+    /// [`BodyError`] names the first constant that is out of its range.
     pub fn validate(&self) -> Result<(), BodyError> {
         let range = |what, value: f64, right: bool, wanted| {
             if right && value.is_finite() {

@@ -33,18 +33,27 @@ impl World {
     }
 
     /// Switches an object between static, kinematic and dynamic.
+    ///
+    /// # Errors
+    /// [`WorldError::Stale`] if the object was removed.
     pub fn set_mode(&mut self, id: ObjectId, mode: Mode) -> Result<(), WorldError> {
         self.status_mut(id)?.mode = mode;
         Ok(())
     }
 
     /// Takes an object out of the world's doings, or back in; its state stays.
+    ///
+    /// # Errors
+    /// [`WorldError::Stale`] if the object was removed.
     pub fn set_enabled(&mut self, id: ObjectId, enabled: bool) -> Result<(), WorldError> {
         self.status_mut(id)?.enabled = enabled;
         Ok(())
     }
 
     /// Switches an object's collisions.
+    ///
+    /// # Errors
+    /// [`WorldError::Stale`] if the object was removed.
     pub fn set_collidable(&mut self, id: ObjectId, collidable: bool) -> Result<(), WorldError> {
         self.status_mut(id)?.collidable = collidable;
         Ok(())
@@ -81,6 +90,9 @@ impl World {
     }
 
     /// Writes an object's slice of the state, all of it (see the object's type for what the numbers mean). Refused where it is no state of it.
+    ///
+    /// # Errors
+    /// [`WorldError::Stale`], or [`WorldError::BadState`] if the numbers are no state of the object.
     pub fn write_state_of(&mut self, id: ObjectId, x: &[f64]) -> Result<(), WorldError> {
         self.core.wake(id);
         let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
@@ -94,6 +106,9 @@ impl World {
     }
 
     /// Puts the frame of a rigid body at a pose; the velocity of its center of mass stays what it was.
+    ///
+    /// # Errors
+    /// [`WorldError`]: the object was removed, is not a rigid body, or the pose is not finite.
     pub fn set_pose(&mut self, id: ObjectId, pose: Pose) -> Result<(), WorldError> {
         self.edit_rigid(id, |body, x| {
             let mut v = [0.0; 6];
@@ -106,12 +121,18 @@ impl World {
     }
 
     /// Gives a rigid body a velocity (m/s, of the centre of mass) and angular velocity (rad/s, world axes). A kinematic body follows it.
+    ///
+    /// # Errors
+    /// [`WorldError`]: the object was removed, is not a rigid body, or a number is not finite.
     pub fn set_velocity(&mut self, id: ObjectId, velocity: Vec3, angular_velocity: Vec3) -> Result<(), WorldError> {
         let (w, v) = (angular_velocity, velocity);
         self.edit_rigid(id, |body, x| body.write_velocity(x, &[w.x, w.y, w.z, v.x, v.y, v.z]))
     }
 
     /// Gives a kinematic body the velocity that brings its frame to `target` at the end of the next step.
+    ///
+    /// # Errors
+    /// [`WorldError`]: the object was removed, is not a rigid body, or the target is not finite.
     pub fn move_to(&mut self, id: ObjectId, target: Pose) -> Result<(), WorldError> {
         let dt = self.core.settings.dt;
         if !target.to_homogeneous().iter().all(|x| x.is_finite()) {
@@ -127,6 +148,9 @@ impl World {
     }
 
     /// Applies a force (N) at a world point of one part during the next frame.
+    ///
+    /// # Errors
+    /// [`WorldError`]: the object was removed, has no such part, or a number is not finite.
     pub fn apply_force(&mut self, id: ObjectId, part: usize, force: Vec3, point: &Vec3) -> Result<(), WorldError> {
         let index = self.part(id, part, &[force, *point])?;
         let arm = point - self.core.derived.part_states[index].position();
@@ -136,6 +160,9 @@ impl World {
     }
 
     /// Applies a torque (N·m, world axes) to one part during the next frame.
+    ///
+    /// # Errors
+    /// [`WorldError`]: the object was removed, has no such part, or a number is not finite.
     pub fn apply_torque(&mut self, id: ObjectId, part: usize, torque: Vec3) -> Result<(), WorldError> {
         let index = self.part(id, part, &[torque])?;
         self.core.state.applied[index].torque += torque;
@@ -143,6 +170,9 @@ impl World {
     }
 
     /// Applies generalized forces during the next frame, one per degree of freedom of the object: joint torques (N·m) and forces (N).
+    ///
+    /// # Errors
+    /// [`WorldError`]: the object was removed, the count is not its degrees of freedom, or a number is not finite.
     pub fn apply_generalized(&mut self, id: ObjectId, forces: &[f64]) -> Result<(), WorldError> {
         let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
         let name = || entry.object.name().to_string();
@@ -163,6 +193,9 @@ impl World {
     }
 
     /// Applies an impulse (N·s) at a world point of one part, at once.
+    ///
+    /// # Errors
+    /// [`WorldError`]: the object was removed, has no such part, or a number is not finite.
     pub fn apply_impulse(&mut self, id: ObjectId, part: usize, impulse: Vec3, point: &Vec3) -> Result<(), WorldError> {
         let index = self.part(id, part, &[impulse, *point])?;
         self.core.wake(id);

@@ -15,6 +15,7 @@ use tumble_collide::{BroadPhase, SweepAndPrune, Vec3};
 
 /// Why a step stopped. [`World::step`](crate::World::step) puts state and time back to where they were before the frame.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum StepError {
     /// A force, a momentum or a position is no longer a number.
     #[error("'{object}' at t = {time} s: {what} is not finite; look at the forces and impulses given to it")]

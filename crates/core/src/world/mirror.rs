@@ -8,6 +8,7 @@ use tumble_collide::Pose;
 
 /// Why an object did not take what came for it. The world is unchanged.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MirrorError {
     /// No such object, or no such part.
     #[error(transparent)]
@@ -28,6 +29,9 @@ pub enum MirrorError {
 impl World {
     /// Shows an object's parts at these poses, one per part. They are at rest, and the state stays what it was: the next step or change of state puts
     /// the parts back to where the state says. For a world that is drawn and never stepped.
+    ///
+    /// # Errors
+    /// [`WorldError`]: the object was removed, the count of poses is not that of its parts, or a pose is not finite.
     pub fn set_displayed_poses(&mut self, id: ObjectId, poses: &[Pose]) -> Result<(), WorldError> {
         let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
         let (name, state_range) = (entry.object.name(), entry.state_range.parts.clone());
@@ -54,6 +58,9 @@ impl World {
     }
 
     /// Applies such a message (thesis `ReadData`). It is not trusted: what is no state of the object is refused.
+    ///
+    /// # Errors
+    /// [`MirrorError`]: the object was removed, takes no messages, or refuses this one.
     pub fn read_data(&mut self, id: ObjectId, data: &[u8]) -> Result<(), MirrorError> {
         self.core.wake(id);
         let core = &mut self.core;

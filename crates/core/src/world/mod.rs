@@ -1,11 +1,13 @@
 //! The world: objects in, frames out (the thesis's `Engine`, §IV.B).
 
 mod bodies;
+mod body_view;
 mod core;
 mod mirror;
 mod overlaps;
 mod pair_materials;
 mod pick;
+mod queries;
 pub(crate) mod sleep;
 mod snapshot;
 mod state;
@@ -14,6 +16,7 @@ pub(crate) mod view;
 
 pub(crate) use self::core::Coordinates;
 pub use self::core::{ContactPoint, Core, StepError};
+pub use body_view::BodyView;
 pub use mirror::MirrorError;
 pub use overlaps::Overlap;
 pub use pick::PickForce;
@@ -36,6 +39,7 @@ use std::collections::BTreeMap;
 
 /// Why an object was not added or found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum WorldError {
     /// Names are unique.
     #[error("an object named '{0}' is already in the world; names must be unique")]
@@ -104,8 +108,21 @@ pub struct World {
     names: BTreeMap<String, ObjectId>,
 }
 
+impl Default for World {
+    /// Returns an empty world with the default settings.
+    fn default() -> World {
+        match World::new(Settings::default()) {
+            Ok(world) => world,
+            Err(_) => unreachable!("the default settings are in range"),
+        }
+    }
+}
+
 impl World {
     /// Returns an empty world with the default solver (`gauss_seidel`) and stepper (`time_stepping`).
+    ///
+    /// # Errors
+    /// [`WorldError::Settings`] names a setting that is out of its range.
     pub fn new(settings: Settings) -> Result<World, WorldError> {
         settings.validate()?;
         let core = Core::new(Table::default(), settings, Box::new(GaussSeidel), WorldState::default());
@@ -142,6 +159,9 @@ impl World {
     }
 
     /// Changes the constants from the next step on.
+    ///
+    /// # Errors
+    /// [`WorldError::Settings`] names a setting that is out of its range; nothing has changed then.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), WorldError> {
         settings.validate()?;
         self.core.wake_all();
@@ -288,6 +308,9 @@ impl World {
     }
 
     /// Adds an object; it moves unless it is a [fixture](RigidBody::fixed), which is static, or [`set_mode`](Self::set_mode) says otherwise.
+    ///
+    /// # Errors
+    /// [`WorldError`]: a name that is taken, constants out of their range, or numbers that are not finite. Nothing is added then.
     pub fn add(&mut self, object: impl Object) -> Result<ObjectId, WorldError> {
         let any: &dyn std::any::Any = &object;
         let fixed = any.downcast_ref::<RigidBody>().is_some_and(RigidBody::is_fixed);
@@ -295,11 +318,17 @@ impl World {
     }
 
     /// Adds an object that never moves.
+    ///
+    /// # Errors
+    /// [`WorldError`], as [`add`](Self::add).
     pub fn add_static(&mut self, object: impl Object) -> Result<ObjectId, WorldError> {
         self.add_boxed(Box::new(object), Mode::Static)
     }
 
     /// Adds an object in a given mode.
+    ///
+    /// # Errors
+    /// [`WorldError`], as [`add`](Self::add).
     pub fn add_boxed(&mut self, object: Box<dyn Object>, mode: Mode) -> Result<ObjectId, WorldError> {
         let name = object.name().to_string();
         if name.is_empty() || name.len() > 63 {
@@ -346,6 +375,9 @@ impl World {
     }
 
     /// Removes an object and gives it back; its state goes, and the slices behind it move up.
+    ///
+    /// # Errors
+    /// [`WorldError::Stale`] if it was removed before.
     pub fn remove(&mut self, id: ObjectId) -> Result<Box<dyn Object>, WorldError> {
         self.core.wake(id);
         let core = &mut self.core;

@@ -10,6 +10,9 @@ impl World {
     /// materials ([`PairSide::Material`]), in any order. A part goes before its object, an object before its material. A constant that is `None` goes by
     /// the rule of [`Settings`](crate::Settings); both `None` take the pair off. Forks have the same pairs; like materials they are not in
     /// [`save`](World::save). They go with their objects.
+    ///
+    /// # Errors
+    /// [`WorldError`]: an object that was removed, a part that it does not have, or a constant out of its range.
     pub fn set_pair_material(
         &mut self,
         a: impl Into<PairSide>,
@@ -30,6 +33,9 @@ impl World {
     }
 
     /// Restitution and friction that contacts of these two parts have.
+    ///
+    /// # Errors
+    /// [`WorldError`]: an object that was removed, or a part that it does not have.
     pub fn pair_material(&self, a: (ObjectId, usize), b: (ObjectId, usize)) -> Result<Material, WorldError> {
         let in_order = self.part(a.0, a.1, &[])? <= self.part(b.0, b.1, &[])?;
         let (a, b) = if in_order { (a, b) } else { (b, a) };

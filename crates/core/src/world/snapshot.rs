@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// Why a snapshot was refused. The world is unchanged.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SnapshotError {
     /// Not bytes that [`World::save`] wrote.
     #[error("not a snapshot of tumble, or cut off, or of another version: {0}")]

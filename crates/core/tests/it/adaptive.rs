@@ -388,7 +388,7 @@ fn lively() -> World {
         let shape = if i % 2 == 0 {
             sphere(0.2)
         } else {
-            tumble_core::collide::Shape::cuboid(Vec3::new(0.1, 0.2, 0.3)).unwrap()
+            tumble_core::collide::Shape::cuboid(Vec3::new(0.2, 0.4, 0.6)).unwrap()
         };
         let body = RigidBody::with_mass(format!("body{i}"), shape, 1.0 + i as f64).unwrap().surface(0.6, 0.3);
         let id = world

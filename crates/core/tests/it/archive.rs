@@ -12,7 +12,7 @@ fn everything(stepper: &str) -> World {
     ground(&mut world, 0.3, 0.4);
     let gone = world.add(RigidBody::with_mass("gone", sphere(0.1), 1.0).unwrap()).unwrap();
     let mesh = Shape::mesh(TriMesh::torus(0.3, 0.1, 24, 12), &TreeSettings::octree()).unwrap();
-    let shapes = [sphere(0.1), cube(0.2), Shape::capsule(0.1, 0.1).unwrap(), Shape::cylinder(0.1, 0.1).unwrap(), mesh];
+    let shapes = [sphere(0.1), cube(0.2), Shape::capsule(0.1, 0.2).unwrap(), Shape::cylinder(0.1, 0.2).unwrap(), mesh];
     let ids: Vec<ObjectId> = (0..10)
         .map(|i| {
             let body = RigidBody::with_density(format!("body{i}"), shapes[i % 5].clone(), 500.0 + i as f64).unwrap();

@@ -11,7 +11,7 @@ use tumble_core::{
 /// A box that is thrown at the floor: a rigid body, or a floating link with nothing on it.
 fn thrown(mut world: World, articulated: bool, lift: f64) -> (World, ObjectId) {
     ground(&mut world, 0.6, 0.5);
-    let shape = Shape::cuboid(Vec3::new(0.1, 0.2, 0.3)).unwrap();
+    let shape = Shape::cuboid(Vec3::new(0.2, 0.4, 0.6)).unwrap();
     let solid = RigidBody::with_mass("box", shape.clone(), 2.0).unwrap();
     let pose = Pose::new(Vec3::new(0.0, 0.0, 0.6 + lift), Vec3::new(0.3, 0.5, 0.1));
     let (v, w) = (Vec3::new(0.5, 0.2, -1.0), Vec3::new(1.0, 2.0, 3.0));
@@ -166,7 +166,7 @@ fn folding(own: bool, apart: bool) -> (World, ObjectId) {
     world.set_settings(Settings { gravity: Vec3::zeros(), ..*world.settings() }).unwrap();
     let mut body = ArticulatedBody::new("arm", hinged(3, 0.4, rod(1.0, 0.4))).with_positions(&[0.0, 1.5, 0.0]).unwrap();
     for i in 0..3 {
-        let shape = Shape::capsule(0.03, 0.15).unwrap();
+        let shape = Shape::capsule(0.03, 0.3).unwrap();
         body.add_collider(&format!("link {i}"), Collider::new(shape, Pose::translation(0.0, 0.0, -0.2))).unwrap();
     }
     for i in 0..2 {
@@ -209,14 +209,14 @@ fn a_ball_at_rest_on_a_held_arm_loads_its_joint() {
     let mut body = ArticulatedBody::new("table", builder.build().unwrap());
     body.add_collider(
         "plate",
-        Collider::new(Shape::cuboid(Vec3::new(0.2, 0.2, 0.01)).unwrap(), Pose::translation(0.2, 0.0, 0.0)),
+        Collider::new(Shape::cuboid(Vec3::new(0.4, 0.4, 0.02)).unwrap(), Pose::translation(0.2, 0.0, 0.0)),
     )
     .unwrap();
     // weights at 0.2 and 0.3 m: 9.81·(0.2 + 0.3) = 4.905 N·m
     let hold = |friction| DofSettings { friction, ..DofSettings::default() };
     body.set_dof(0, hold(4.95)).unwrap();
     let table = world.add(body).unwrap();
-    let cube = RigidBody::with_mass("cube", Shape::cuboid(Vec3::repeat(0.05)).unwrap(), 1.0)
+    let cube = RigidBody::with_mass("cube", Shape::cuboid(Vec3::repeat(0.1)).unwrap(), 1.0)
         .unwrap()
         .at(Pose::translation(0.3, 0.0, 1.06));
     world.add(cube).unwrap();

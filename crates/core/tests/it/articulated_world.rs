@@ -38,7 +38,7 @@ pub fn chain(links: usize, angle: f64) -> ArticulatedBody {
 /// links are 0.1 m long, 2 cm thick and of 50 g.
 pub fn loose_chain(links: usize, center: Vec3, friction: f64) -> ArticulatedBody {
     let (length, radius, mass) = (0.1, 0.02, 0.05);
-    let shape = Shape::capsule(radius, 0.5 * length - radius).unwrap();
+    let shape = Shape::capsule(radius, length - 2.0 * radius).unwrap();
     let along = Pose::new(Vec3::new(0.5 * length, 0.0, 0.0), Vec3::new(0.0, std::f64::consts::FRAC_PI_2, 0.0));
     let solid = shape.mass_properties(1.0).unwrap();
     let unit = LinkMass { mass, center: Vec3::zeros(), inertia: solid.inertia * (mass / solid.mass) };

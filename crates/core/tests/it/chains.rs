@@ -67,7 +67,8 @@ fn festoon(stepper: &str, dt: f64, count: usize, pins: usize, heavy: f64) -> (Wo
         let angle = turn * (i as f64 + 0.5) - 0.5 * std::f64::consts::PI;
         let mass = if i + 1 == count { 0.5 * heavy } else { 0.5 };
         let body =
-            RigidBody::with_mass(format!("bar{i}"), Shape::cuboid(Vec3::new(HALF, 0.02, 0.02)).unwrap(), mass).unwrap();
+            RigidBody::with_mass(format!("bar{i}"), Shape::cuboid(Vec3::new(2.0 * HALF, 0.04, 0.04)).unwrap(), mass)
+                .unwrap();
         let at = Pose::new(Vec3::new(radius * angle.sin(), 0.0, -radius * angle.cos()), Vec3::new(0.0, -angle, 0.0));
         bars.push(world.add(body.at(at).moving(Vec3::new(0.0, 0.3 * angle.cos(), 0.0), Vec3::zeros())).unwrap());
         world.set_collidable(bars[i], false).unwrap();

@@ -31,7 +31,7 @@ pub fn sphere(radius: f64) -> Shape {
 }
 
 pub fn cube(edge: f64) -> Shape {
-    Shape::cuboid(Vec3::repeat(0.5 * edge)).unwrap()
+    Shape::cuboid(Vec3::repeat(edge)).unwrap()
 }
 
 pub fn position(world: &World, id: ObjectId) -> Vec3 {

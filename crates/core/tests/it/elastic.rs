@@ -17,9 +17,9 @@ fn room(world: &mut World, half: f64, restitution: f64, friction: f64) {
 
 /// Shapes that a push meets far from the center.
 fn shapes() -> [(&'static str, Shape); 5] {
-    let cuboid = |x, y, z| Shape::cuboid(Vec3::new(x, y, z)).unwrap();
+    let cuboid = |x, y, z| Shape::cuboid(Vec3::new(2.0 * x, 2.0 * y, 2.0 * z)).unwrap();
     [
-        ("capsule", Shape::capsule(0.02, 0.2).unwrap()),
+        ("capsule", Shape::capsule(0.02, 0.4).unwrap()),
         ("long box", cuboid(0.02, 0.03, 0.2)),
         ("plate", cuboid(0.2, 0.15, 0.01)),
         ("brick", cuboid(0.05, 0.1, 0.15)),

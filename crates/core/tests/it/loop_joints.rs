@@ -18,7 +18,7 @@ fn at(angle: f64) -> Vec3 {
 /// with nothing.
 pub fn bar(name: &str, from: Vec3, to: Vec3) -> RigidBody {
     let d = to - from;
-    let shape = Shape::cuboid(Vec3::new(0.5 * d.norm(), 0.01, 0.01)).unwrap();
+    let shape = Shape::cuboid(Vec3::new(d.norm(), 0.02, 0.02)).unwrap();
     let pose = Pose::new(0.5 * (from + to), AXIS * d.z.atan2(d.x));
     let mut bar = RigidBody::with_mass(name, shape, d.norm()).unwrap().at(pose);
     bar.mask = 0;

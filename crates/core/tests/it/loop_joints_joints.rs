@@ -100,7 +100,7 @@ fn a_weld_of_two_bodies_is_one_body() {
             .iter()
             .enumerate()
             .map(|(i, &(m, half, c))| {
-                let mut body = RigidBody::with_mass(format!("box {i}"), Shape::cuboid(half).unwrap(), m)
+                let mut body = RigidBody::with_mass(format!("box {i}"), Shape::cuboid(2.0 * half).unwrap(), m)
                     .unwrap()
                     .at(Pose::from(c));
                 body.mask = 0;
@@ -152,7 +152,7 @@ fn a_weld_of_two_bodies_is_one_body() {
 fn door(stepper: &str, solver: &str, hinges: usize) -> (World, ObjectId) {
     let mut world = world(stepper, 1.0 / 240.0);
     world.set_solver(solver::by_name(solver).unwrap());
-    let shape = Shape::cuboid(Vec3::new(0.4, 0.02, 1.0)).unwrap();
+    let shape = Shape::cuboid(Vec3::new(0.8, 0.04, 2.0)).unwrap();
     let inertia = Mat3::new(3.0, 0.4, 0.7, 0.4, 3.5, -0.3, 0.7, -0.3, 1.2);
     let (axis, foot) = (Vec3::new(0.1, 0.2, 1.0).normalize(), Vec3::new(-0.4, 0.0, -0.8));
     let spin = 4.0 * axis;
@@ -293,7 +293,7 @@ fn hinged_boxes_come_to_rest_on_the_ground() {
         ground(&mut world, 0.0, 0.5);
         let ids = [-0.2, 0.2].map(|x| {
             let body =
-                RigidBody::with_mass(format!("box at {x}"), Shape::cuboid(Vec3::new(0.18, 0.1, 0.05)).unwrap(), 1.0)
+                RigidBody::with_mass(format!("box at {x}"), Shape::cuboid(Vec3::new(0.36, 0.2, 0.1)).unwrap(), 1.0)
                     .unwrap();
             world.add(body.at(Pose::translation(x, 0.0, 0.3)).surface(0.0, 0.5)).unwrap()
         });

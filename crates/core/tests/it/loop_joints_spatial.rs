@@ -56,7 +56,7 @@ fn bennett(stepper: &str, first: f64) -> Bennett {
     // the closed form closes
     assert!((frame.to_homogeneous() - ground.to_homogeneous()).norm() < 1e-12);
     let bars = [0, 1, 2, 3].map(|bar| {
-        let shape = Shape::cuboid(Vec3::new(0.5 * sizes(bar).0, 0.01, 0.02)).unwrap();
+        let shape = Shape::cuboid(Vec3::new(sizes(bar).0, 0.02, 0.04)).unwrap();
         let mut body = RigidBody::with_mass(format!("bar {bar}"), shape, 1.0).unwrap().at(frames[bar] * center(bar));
         body.mask = 0;
         // the last one is the ground

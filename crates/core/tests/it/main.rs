@@ -5,6 +5,7 @@ mod abm_lanes;
 mod abm_reference;
 mod abm_spatial;
 mod adaptive;
+mod api;
 mod archive;
 mod articulated_agree;
 mod articulated_closed;

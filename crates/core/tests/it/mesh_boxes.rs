@@ -5,7 +5,7 @@ use tumble_core::collide::{Pose, Quat, Shape, TreeSettings, TriMesh, Vec3};
 use tumble_core::*;
 
 fn mesh_cube(edge: f64) -> Shape {
-    Shape::mesh(TriMesh::box_(Vec3::repeat(0.5 * edge)), &TreeSettings::octree()).unwrap()
+    Shape::mesh(TriMesh::cuboid(Vec3::repeat(edge)), &TreeSettings::octree()).unwrap()
 }
 
 fn add(world: &mut World, name: &str, shape: &Shape, pose: Pose) -> ObjectId {
@@ -85,12 +85,12 @@ fn a_mesh_box_rests_on_another_however_it_lies() {
 fn a_cylinder_stands_and_rolls_on_a_block() {
     for stepper in STEPPERS {
         for block in [
-            Shape::cuboid(Vec3::new(5.0, 1.0, 0.1)).unwrap(),
-            Shape::mesh(TriMesh::box_(Vec3::new(5.0, 1.0, 0.1)), &TreeSettings::octree()).unwrap(),
+            Shape::cuboid(Vec3::new(10.0, 2.0, 0.2)).unwrap(),
+            Shape::mesh(TriMesh::cuboid(Vec3::new(10.0, 2.0, 0.2)), &TreeSettings::octree()).unwrap(),
         ] {
             let mut world = world(stepper, 1.0 / 60.0);
             world.add_static(RigidBody::fixed("floor", block).surface(0.0, 0.5)).unwrap();
-            let shape = Shape::cylinder(0.1, 0.2).unwrap();
+            let shape = Shape::cylinder(0.1, 0.4).unwrap();
             let standing = add(&mut world, "standing", &shape, Pose::translation(-2.0, 0.5, 0.3));
             let lying = Pose::new(Vec3::new(-2.0, 0.0, 0.2), Vec3::x() * std::f64::consts::FRAC_PI_2);
             let body = RigidBody::with_mass("rolling", shape, 10.0).unwrap().surface(0.0, 0.5).at(lying);

@@ -8,7 +8,7 @@ use tumble_core::*;
 
 /// A cube of edge 1 with one corner at the origin of its file, and its vertices there.
 fn corner_cube() -> (Shape, Vec<Vec3>) {
-    let mesh = TriMesh::box_(Vec3::repeat(0.5)).translated(&Vec3::repeat(0.5));
+    let mesh = TriMesh::cuboid(Vec3::repeat(1.0)).translated(&Vec3::repeat(0.5));
     let vertices = mesh.vertices.clone();
     (Shape::mesh(mesh, &TreeSettings::octree()).unwrap(), vertices)
 }

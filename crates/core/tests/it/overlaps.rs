@@ -9,7 +9,7 @@ fn mesh(mesh: TriMesh) -> Shape {
 }
 
 fn mesh_cube() -> Shape {
-    mesh(TriMesh::box_(Vec3::repeat(0.5)))
+    mesh(TriMesh::cuboid(Vec3::repeat(1.0)))
 }
 
 fn add(world: &mut World, name: &str, shape: &Shape, pose: Pose) -> ObjectId {
@@ -77,7 +77,7 @@ fn cubes_of_meshes_come_apart() {
 
 #[test]
 fn cylinders_come_apart() {
-    let cylinder = Shape::cylinder(0.5, 0.5).unwrap();
+    let cylinder = Shape::cylinder(0.5, 1.0).unwrap();
     for overlap in [1e-3, 0.01, 0.05, 0.2, 0.5] {
         for way in [Vec3::x(), Vec3::z()] {
             let apart = |a: &Pose, b: &Pose| {
@@ -94,7 +94,7 @@ fn what_coincides_comes_apart() {
     let far = |reach: f64| move |a: &Pose, b: &Pose| (b.translation.vector - a.translation.vector).norm() > reach;
     let turned = Pose::from_parts(Vec3::zeros().into(), Quat::identity());
     come_apart("cubes", [&mesh_cube(); 2], turned, far(0.99));
-    come_apart("cylinders", [&Shape::cylinder(0.5, 0.5).unwrap(); 2], turned, far(0.99));
+    come_apart("cylinders", [&Shape::cylinder(0.5, 1.0).unwrap(); 2], turned, far(0.99));
     come_apart("balls", [&mesh(TriMesh::icosphere(0.5, 2)); 2], turned, far(0.95));
     come_apart("rings", [&mesh(TriMesh::torus(0.4, 0.12, 32, 16)); 2], turned, far(0.2));
 }
@@ -142,7 +142,7 @@ fn a_press_does_not_trap_a_cube() {
 /// meters a step. None comes out on the other side.
 #[test]
 fn fast_cubes_do_not_go_through_a_thin_plate() {
-    let (cube, plate) = (mesh_cube(), mesh(TriMesh::box_(Vec3::new(3.0, 3.0, 1e-3))));
+    let (cube, plate) = (mesh_cube(), mesh(TriMesh::cuboid(Vec3::new(6.0, 6.0, 2e-3))));
     let mut seed = 1_u64;
     for speed in [100.0, 200.0, 500.0] {
         for case in 0..15 {

@@ -39,9 +39,10 @@ fn painleves_rod_gains_no_energy_and_does_not_sink() {
             world.set_solver(solver::by_name(name).unwrap());
             ground(&mut world, 0.0, 2.0);
             let (radius, half, tilt) = (0.01, 0.5, 0.9f64);
-            let rod = RigidBody::with_mass("rod", tumble_core::collide::Shape::capsule(radius, half).unwrap(), 1.0)
-                .unwrap()
-                .surface(0.0, 2.0);
+            let rod =
+                RigidBody::with_mass("rod", tumble_core::collide::Shape::capsule(radius, 2.0 * half).unwrap(), 1.0)
+                    .unwrap()
+                    .surface(0.0, 2.0);
             // the upper end leans back from the sliding direction, so that friction presses the lower end down
             let pose = Pose::new(Vec3::new(0.0, 0.0, half * tilt.cos() + radius), Vec3::new(0.0, -tilt, 0.0));
             let id = world.add(rod.at(pose).moving(Vec3::new(-3.0, 0.0, 0.0), Vec3::zeros())).unwrap();

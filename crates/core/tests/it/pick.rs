@@ -29,7 +29,7 @@ fn drag(world: &mut World, pick: &PickForce, seconds: f64) {
 }
 
 fn crate_of(world: &mut World, mass: f64) -> ObjectId {
-    let shape = Shape::cuboid(Vec3::new(0.3, 0.2, 0.1)).unwrap();
+    let shape = Shape::cuboid(Vec3::new(0.6, 0.4, 0.2)).unwrap();
     world.add(RigidBody::with_mass("crate", shape, mass).unwrap().at(Pose::translation(0.0, 0.0, 5.0))).unwrap()
 }
 

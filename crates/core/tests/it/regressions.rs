@@ -14,7 +14,7 @@ fn billiard(world: &mut World, name: &str, at: [f64; 3], v: f64) -> ObjectId {
 
 /// A kinematic plate with its top at z = 0.1.
 fn led_plate(world: &mut World) -> ObjectId {
-    let plate = RigidBody::fixed("plate", Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap()).surface(0.0, 0.5);
+    let plate = RigidBody::fixed("plate", Shape::cuboid(Vec3::new(2.0, 2.0, 0.2)).unwrap()).surface(0.0, 0.5);
     world.add_boxed(Box::new(plate), Mode::Kinematic).unwrap()
 }
 
@@ -79,7 +79,7 @@ fn a_body_that_lands_elsewhere_does_not_lift_a_box_off_a_led_plate() {
                 .unwrap();
             let plate = led_plate(&mut world);
             let body = box_on_plate(&mut world);
-            let tumbler = RigidBody::with_mass("tumbler", Shape::cuboid(Vec3::new(0.1, 0.2, 0.15)).unwrap(), 1.0)
+            let tumbler = RigidBody::with_mass("tumbler", Shape::cuboid(Vec3::new(0.2, 0.4, 0.3)).unwrap(), 1.0)
                 .unwrap()
                 .surface(0.2, 0.5);
             let tumbler = tumbler.at(Pose::translation(4.0, 0.0, 0.0)).moving(Vec3::zeros(), Vec3::new(3.0, 2.0, 1.0));
@@ -161,7 +161,7 @@ fn a_frozen_table_that_was_spinning_does_not_drag_what_lies_on_it() {
     for stepper in STEPPERS {
         for spin in [Vec3::zeros(), Vec3::new(10.0, 0.0, 0.0), Vec3::new(0.0, 0.0, 10.0)] {
             let mut world = world(stepper, 1.0 / 60.0);
-            let table = RigidBody::with_mass("table", Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap(), 10.0)
+            let table = RigidBody::with_mass("table", Shape::cuboid(Vec3::new(2.0, 2.0, 0.2)).unwrap(), 10.0)
                 .unwrap()
                 .surface(0.0, 0.3);
             let table = world.add(table.moving(Vec3::zeros(), spin)).unwrap();
@@ -231,7 +231,7 @@ fn a_ball_sliding_along_a_capsule_is_carried_by_its_weight_in_every_frame() {
         let mut world = world(stepper, 1.0 / 240.0);
         let lying = Pose::rotation(Vec3::new(0.0, std::f64::consts::FRAC_PI_2, 0.0));
         world
-            .add_static(RigidBody::fixed("capsule", Shape::capsule(0.1, 5.0).unwrap()).surface(0.0, 0.0).at(lying))
+            .add_static(RigidBody::fixed("capsule", Shape::capsule(0.1, 10.0).unwrap()).surface(0.0, 0.0).at(lying))
             .unwrap();
         let ball = sliding_ball(&mut world, 0.0);
         for frame in 0..60 {
@@ -272,7 +272,7 @@ fn a_ball_that_slides_off_a_box_is_carried_to_the_edge_and_then_falls() {
     for stepper in STEPPERS {
         let mut world = world(stepper, h);
         world
-            .add_static(RigidBody::fixed("table", Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap()).surface(0.0, 0.0))
+            .add_static(RigidBody::fixed("table", Shape::cuboid(Vec3::new(2.0, 2.0, 0.2)).unwrap()).surface(0.0, 0.0))
             .unwrap();
         let ball = sliding_ball(&mut world, 1.0 - 60.5 * 3.0 * h);
         for frame in 0..120 {
@@ -307,7 +307,7 @@ fn a_ball_that_slides_off_a_box_is_carried_to_the_edge_and_then_falls() {
 fn slide_over_a_seam(stepper: &str) {
     let mut world = world(stepper, 1.0 / 240.0);
     for (name, x) in [("left", 0.0), ("right", 2.0)] {
-        let table = RigidBody::fixed(name, Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap()).surface(0.0, 0.0);
+        let table = RigidBody::fixed(name, Shape::cuboid(Vec3::new(2.0, 2.0, 0.2)).unwrap()).surface(0.0, 0.0);
         world.add_static(table.at(Pose::translation(x, 0.0, 0.0))).unwrap();
     }
     let ball = sliding_ball(&mut world, 0.503);
@@ -359,7 +359,7 @@ fn energy_never_grows_in_impacts_with_friction_whether_or_not_something_is_led_f
                 let s = seed as f64;
                 let mut world = no_gravity(world(stepper, 1.0 / 240.0));
                 ground(&mut world, 1.0, 1.0);
-                let rod = RigidBody::with_mass("rod", Shape::cuboid(Vec3::new(0.5, 0.02, 0.02)).unwrap(), 1.0)
+                let rod = RigidBody::with_mass("rod", Shape::cuboid(Vec3::new(1.0, 0.04, 0.04)).unwrap(), 1.0)
                     .unwrap()
                     .surface(1.0, 1.0);
                 let pose = Pose::new(Vec3::new(0.0, 0.0, 0.6), Vec3::new(0.0, 0.2 + 0.03 * s, 0.0));

@@ -16,7 +16,7 @@ fn elastic_chain(links: usize) -> ArticulatedBody {
     body.self_collision = false;
     for i in 0..links {
         let along = Pose::new(Vec3::new(0.05, 0.0, 0.0), Vec3::new(0.0, FRAC_PI_2, 0.0));
-        let mut collider = Collider::new(Shape::capsule(0.02, 0.03).unwrap(), along);
+        let mut collider = Collider::new(Shape::capsule(0.02, 0.06).unwrap(), along);
         (collider.material.restitution, collider.material.friction) = (1.0, 0.0);
         body.add_collider(&format!("link {i}"), collider).unwrap();
     }
@@ -87,11 +87,11 @@ fn a_box_on_a_turning_arm_that_is_led_stays_on_its_circle() {
     let mass = LinkMass { mass: 1.0, center: Vec3::zeros(), inertia: Mat3::identity() };
     builder.link("table", None, Joint::revolute(Vec3::z()), Pose::identity(), mass);
     let mut table = ArticulatedBody::new("table", builder.build().unwrap()).with_velocities(&[1.0]).unwrap();
-    let mut plate = Collider::new(Shape::cuboid(Vec3::new(0.5, 0.5, 0.05)).unwrap(), Pose::translation(0.6, 0.0, 0.0));
+    let mut plate = Collider::new(Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap(), Pose::translation(0.6, 0.0, 0.0));
     plate.material.friction = 1.0;
     table.add_collider("table", plate).unwrap();
     world.add_boxed(Box::new(table), Mode::Kinematic).unwrap();
-    let cube = RigidBody::with_mass("box", Shape::cuboid(Vec3::repeat(0.05)).unwrap(), 1.0).unwrap().surface(0.0, 1.0);
+    let cube = RigidBody::with_mass("box", Shape::cuboid(Vec3::repeat(0.1)).unwrap(), 1.0).unwrap().surface(0.0, 1.0);
     let at = cube.at(Pose::translation(0.6, 0.0, 0.1)).moving(Vec3::new(0.0, 0.6, 0.0), Vec3::z());
     let id = world.add(at).unwrap();
     for _ in 0..480 {
@@ -121,7 +121,7 @@ fn a_floating_chain_that_is_struck_keeps_its_linear_momentum() {
     }
     let mut body = ArticulatedBody::new("chain", builder.build().unwrap());
     for i in 0..3 {
-        let mut collider = Collider::new(Shape::capsule(0.03, 0.12).unwrap(), Pose::translation(0.0, 0.0, -0.15));
+        let mut collider = Collider::new(Shape::capsule(0.03, 0.24).unwrap(), Pose::translation(0.0, 0.0, -0.15));
         (collider.material.restitution, collider.material.friction) = (1.0, 0.3);
         body.add_collider(&format!("link {i}"), collider).unwrap();
     }

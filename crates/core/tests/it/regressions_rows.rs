@@ -308,7 +308,7 @@ struct Spun {
 /// a pin that does not move: energy stays.
 fn spin_pinned_rod(stepper: &str, dt: f64) -> Spun {
     let mut world = no_gravity(world(stepper, dt));
-    let rod = RigidBody::with_mass("rod", Shape::cuboid(Vec3::new(0.5, 0.1, 0.2)).unwrap(), 1.0).unwrap();
+    let rod = RigidBody::with_mass("rod", Shape::cuboid(Vec3::new(1.0, 0.2, 0.4)).unwrap(), 1.0).unwrap();
     let rod = world.add(rod).unwrap();
     let spin = Vec3::new(0.0, 6.0, 6.0);
     world.set_velocity(rod, spin.cross(&-END), spin).unwrap();

@@ -10,12 +10,12 @@ use tumble_core::*;
 fn a_standing_cylinder_does_not_creep() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 240.0);
-        let block = Shape::cuboid(Vec3::new(0.5, 0.5, 0.1)).unwrap();
+        let block = Shape::cuboid(Vec3::new(1.0, 1.0, 0.2)).unwrap();
         world
             .add_static(RigidBody::fixed("block", block).surface(0.0, 0.5).at(Pose::translation(0.0, 0.0, -0.1)))
             .unwrap();
         let cylinder =
-            RigidBody::with_mass("cylinder", Shape::cylinder(0.05, 0.15).unwrap(), 1.0).unwrap().surface(0.0, 0.5);
+            RigidBody::with_mass("cylinder", Shape::cylinder(0.05, 0.3).unwrap(), 1.0).unwrap().surface(0.0, 0.5);
         let id = world.add(cylinder.at(Pose::translation(0.03, 0.02, 0.15))).unwrap();
         let start = position(&world, id);
         for _ in 0..480 {

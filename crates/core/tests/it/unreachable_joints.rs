@@ -129,7 +129,7 @@ fn rigid_bars_pinned_in_a_row_share_what_is_out_of_reach() {
         let mut world = world(1.0 / 240.0, stepper, Integrator::Verlet);
         let bar = |i: usize| {
             let mut body =
-                RigidBody::with_mass(format!("bar {i}"), Shape::cuboid(Vec3::new(0.1, 0.01, 0.01)).unwrap(), 1.0)
+                RigidBody::with_mass(format!("bar {i}"), Shape::cuboid(Vec3::new(0.2, 0.02, 0.02)).unwrap(), 1.0)
                     .unwrap();
             body.mask = 0;
             body.at(Pose::translation(0.1 + 0.2 * i as f64, 0.0, 0.0))

@@ -144,9 +144,9 @@ fn get_geometry(rest: &mut ByteReader<'_>, base: &World) -> Result<VisualGeometr
     let shape = match rest.u8()? {
         0 => Ok(Shape::half_space()),
         1 => Shape::sphere(rest.f64()?),
-        2 => Shape::cuboid(Vec3::from(rest.f64s::<3>()?)),
-        3 => rest.f64s().map(|[radius, half]| Shape::capsule(radius, half))?,
-        4 => rest.f64s().map(|[radius, half]| Shape::cylinder(radius, half))?,
+        2 => Shape::cuboid(2.0 * Vec3::from(rest.f64s::<3>()?)),
+        3 => rest.f64s().map(|[radius, half]| Shape::capsule(radius, 2.0 * half))?,
+        4 => rest.f64s().map(|[radius, half]| Shape::cylinder(radius, 2.0 * half))?,
         5 => return mesh_of(base, rest.name()?, rest.u32()? as usize),
         6 => {
             let mesh = get_mesh(rest)?;

@@ -14,7 +14,7 @@ fn isometry(pose: &record::Pose) -> Pose {
 
 #[test]
 fn a_recorded_mesh_stands_where_its_file_says() {
-    let mesh = TriMesh::box_(Vec3::repeat(0.5)).translated(&Vec3::repeat(0.5));
+    let mesh = TriMesh::cuboid(Vec3::repeat(1.0)).translated(&Vec3::repeat(0.5));
     let file = mesh.vertices.clone();
     let shape = Shape::mesh(mesh, &TreeSettings::octree()).unwrap();
     let frame = Pose::from_parts(Vec3::new(3.0, -2.0, 5.0).into(), UnitQuaternion::from_euler_angles(0.3, -0.8, 1.9));

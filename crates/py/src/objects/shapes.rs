@@ -106,7 +106,7 @@ impl Block {
         if let Some(edge) = size.iter().find(|edge| **edge <= 0.0) {
             return Err(Error::value(format!("size: an edge of {edge} m; edges must be above 0 m")));
         }
-        Ok(Shape::new(Solid::cuboid(0.5 * Vec3::from(size))?, format!("Box(size=({x}, {y}, {z}))")).into_a(Block))
+        Ok(Shape::new(Solid::cuboid(Vec3::from(size))?, format!("Box(size=({x}, {y}, {z}))")).into_a(Block))
     }
 }
 
@@ -119,7 +119,7 @@ pub struct Capsule;
 impl Capsule {
     #[new]
     fn new(radius: f64, length: f64) -> Result<PyClassInitializer<Capsule>> {
-        let solid = Solid::capsule(radius, half(length)?)?;
+        let solid = Solid::capsule(radius, checked_length(length)?)?;
         Ok(Shape::new(solid, format!("Capsule(radius={radius}, length={length})")).into_a(Capsule))
     }
 }
@@ -132,15 +132,15 @@ pub struct Cylinder;
 impl Cylinder {
     #[new]
     fn new(radius: f64, length: f64) -> Result<PyClassInitializer<Cylinder>> {
-        let length_half = half(length)?;
-        let solid = caught(|| Ok(Solid::cylinder(radius, length_half)?))?;
+        let length = checked_length(length)?;
+        let solid = caught(|| Ok(Solid::cylinder(radius, length)?))?;
         Ok(Shape::new(solid, format!("Cylinder(radius={radius}, length={length})")).into_a(Cylinder))
     }
 }
 
-fn half(length: f64) -> Result<f64> {
+fn checked_length(length: f64) -> Result<f64> {
     if length.is_finite() && length > 0.0 {
-        Ok(0.5 * length)
+        Ok(length)
     } else {
         Err(Error::value(format!("length is {length}; it must be finite and above 0 m")))
     }

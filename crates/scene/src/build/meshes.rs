@@ -70,12 +70,12 @@ impl SceneFile {
             }
             MeshSource::Icosphere { radius_m, subdivisions } => TriMesh::icosphere(*radius_m, *subdivisions),
             MeshSource::Cylinder { radius_m, length_m, segments } => {
-                TriMesh::cylinder(*radius_m, 0.5 * length_m, *segments as usize)
+                TriMesh::cylinder(*radius_m, *length_m, *segments as usize)
             }
             MeshSource::Capsule { radius_m, length_m, segments } => {
-                TriMesh::capsule(*radius_m, 0.5 * length_m, *segments as usize, (*segments as usize / 4).max(2))
+                TriMesh::capsule(*radius_m, *length_m, *segments as usize, (*segments as usize / 4).max(2))
             }
-            MeshSource::Box { size_m } => TriMesh::box_(0.5 * Vec3::from(*size_m)),
+            MeshSource::Box { size_m } => TriMesh::cuboid(Vec3::from(*size_m)),
         };
         Ok((made, Vec::new()))
     }

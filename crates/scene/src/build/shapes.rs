@@ -96,9 +96,9 @@ pub(crate) fn make(spec: &ShapeSpec, meshes: &[Shape]) -> Result<Shape, ShapeErr
         ShapeSpec::Mesh { mesh } => Ok(meshes[mesh].clone()),
         ShapeSpec::HalfSpace => Ok(Shape::half_space()),
         ShapeSpec::Sphere { radius_m } => Shape::sphere(radius_m),
-        ShapeSpec::Box { size_m } => Shape::cuboid(0.5 * Vec3::from(size_m)),
-        ShapeSpec::Capsule { radius_m, length_m } => Shape::capsule(radius_m, 0.5 * length_m),
-        ShapeSpec::Cylinder { radius_m, length_m } => Shape::cylinder(radius_m, 0.5 * length_m),
+        ShapeSpec::Box { size_m } => Shape::cuboid(Vec3::from(size_m)),
+        ShapeSpec::Capsule { radius_m, length_m } => Shape::capsule(radius_m, length_m),
+        ShapeSpec::Cylinder { radius_m, length_m } => Shape::cylinder(radius_m, length_m),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::parse::body::read_name;
 use crate::parse::bound::Bound;
-use crate::parse::fields::{Fields, Names};
+use crate::parse::fields::{Fields, Names, Value};
 
 /// Which relative motion a loop joint removes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +58,31 @@ pub(crate) trait Parts {
     fn articulated(&self, name: &str) -> Option<usize>;
     /// Returns all names, for messages.
     fn names(&self) -> Vec<String>;
+
+    /// Returns the sides that `a` and `b` name; reports an unknown name and two equal sides. `expected` says what `b` may be.
+    fn sides<T: Copy + PartialEq>(
+        &self,
+        f: &Fields<'_>,
+        [a, b]: [Option<(&str, &Value<'_>)>; 2],
+        find: impl Fn(&str) -> Option<T>,
+        expected: &str,
+    ) -> [Option<T>; 2] {
+        let side = |key: &str, given: Option<(&str, &Value<'_>)>| {
+            let (name, value) = given?;
+            let found = find(name);
+            if found.is_none() {
+                f.unknown_name(key, value, name, self.names().iter().map(String::as_str).collect());
+            }
+            found
+        };
+        let sides = [side("a", a), side("b", b)];
+        if let ([Some(first), Some(second)], Some((_, value))) = (sides, b)
+            && first == second
+        {
+            f.wrong("b", value, expected);
+        }
+        sides
+    }
 }
 
 impl LoopJointSpec {
@@ -74,20 +99,8 @@ impl LoopJointSpec {
             LoopJointKind::Revolute | LoopJointKind::Prismatic => f.direction("axis"),
             LoopJointKind::Spherical | LoopJointKind::Fixed => [0.0, 0.0, 1.0],
         };
-        let find = |key: &str, side: Option<(&str, &crate::parse::fields::Value<'_>)>| {
-            let (name, value) = side?;
-            let found = parts.part(name);
-            if found.is_none() {
-                f.unknown_name(key, value, name, parts.names().iter().map(String::as_str).collect());
-            }
-            found
-        };
-        let sides = [find("a", a), find("b", b)];
-        if let ([Some(first), Some(second)], Some((_, value))) = (sides, b)
-            && first == second
-        {
-            f.wrong("b", value, "a part other than `a`; or no `b`, which is the world");
-        }
+        let expected = "a part other than `a`; or no `b`, which is the world";
+        let sides = parts.sides(&f, [a, b], |name| parts.part(name), expected);
         f.finish();
         Some(LoopJointSpec { name, kind, a: sides[0]?, b: sides[1], position_m, axis })
     }

@@ -86,21 +86,8 @@ fn read_materials(f: &Fields<'_>, value: &Value<'_>, library: &Library<'_>) -> O
 fn read_bodies(f: &mut Fields<'_>, parts: &impl Parts) -> Option<[PairSideSpec; 2]> {
     let expected = "the name of a body, or \"OBJECT/LINK\"; or instead of `a` and `b` two `materials`";
     let (a, b) = (f.text("a", expected), f.text("b", expected));
-    let find = |key: &str, side: Option<(&str, &Value<'_>)>| {
-        let (name, value) = side?;
-        let found = side_of(parts, name);
-        if found.is_none() {
-            f.unknown_name(key, value, name, parts.names().iter().map(String::as_str).collect());
-        }
-        found
-    };
-    let sides = [find("a", a), find("b", b)];
-    if let ([Some(first), Some(second)], Some((_, value))) = (sides, b)
-        && first == second
-    {
-        f.wrong("b", value, "a body other than `a`");
-    }
-    Some([sides[0]?, sides[1]?])
+    let [a, b] = parts.sides(f, [a, b], |name| side_of(parts, name), "a body other than `a`");
+    Some([a?, b?])
 }
 
 fn side_of(parts: &impl Parts, name: &str) -> Option<PairSideSpec> {

@@ -158,11 +158,11 @@ fn surface(geometry: &Geometry, context: &mut Context<'_>) -> Result<Surface, St
     match geometry {
         Geometry::Shape(ShapeSpec::Sphere { radius_m }) => Ok(Surface::Sphere(*radius_m)),
         Geometry::Shape(ShapeSpec::Capsule { radius_m, length_m }) => Ok(Surface::Capsule(*radius_m, *length_m)),
-        Geometry::Shape(ShapeSpec::Box { size_m }) => Ok(closed(TriMesh::box_(0.5 * Vec3::from(*size_m)), 0.0)),
+        Geometry::Shape(ShapeSpec::Box { size_m }) => Ok(closed(TriMesh::cuboid(Vec3::from(*size_m)), 0.0)),
         Geometry::Shape(ShapeSpec::Cylinder { radius_m, length_m }) => {
             // Circumscribed about the cylinder, so a covering of the prism covers the cylinder.
             let outer = radius_m / libm::cos(std::f64::consts::PI / SIDES as f64);
-            Ok(closed(TriMesh::cylinder(outer, 0.5 * length_m, SIDES), outer - radius_m))
+            Ok(closed(TriMesh::cylinder(outer, *length_m, SIDES), outer - radius_m))
         }
         Geometry::Shape(other) => Err(format!("{other:?} is not a shape of a URDF")),
         Geometry::File { path, scale, hull, .. } => {

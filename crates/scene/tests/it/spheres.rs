@@ -106,13 +106,13 @@ fn surface(link: &str) -> Vec<Vec3> {
     // fine meshes whose vertices lie on the true cylinder and capsule; points within their triangles lie a little inside
     match link {
         "arm" => [
-            points(&TriMesh::box_(Vec3::new(0.2, 0.1, 0.05)), at([0.1, -0.2, 0.3], [0.3, -0.4, 0.5])),
-            points(&TriMesh::cylinder(0.05, 0.3, 360), at([0.0, 0.0, 1.0], [1.0, 0.0, 0.0])),
+            points(&TriMesh::cuboid(Vec3::new(0.4, 0.2, 0.1)), at([0.1, -0.2, 0.3], [0.3, -0.4, 0.5])),
+            points(&TriMesh::cylinder(0.05, 0.6, 360), at([0.0, 0.0, 1.0], [1.0, 0.0, 0.0])),
             points(&TriMesh::icosphere(0.06 * (1.0 - 1e-12), 3), at([0.0, 1.0, 0.0], [0.0; 3])),
         ]
         .concat(),
         _ => [
-            points(&TriMesh::capsule(0.05, 0.15, 90, 30), at([0.0, 0.0, 0.4], [0.0, 1.0, 0.0])),
+            points(&TriMesh::capsule(0.05, 0.3, 90, 30), at([0.0, 0.0, 0.4], [0.0, 1.0, 0.0])),
             points(&scaled(ring(), Vec3::new(0.1, -0.2, 0.1)), at([0.0; 3], [0.0, 0.0, 1.0])),
             points(&bowl(), at([1.0, 0.0, 0.0], [0.0; 3])),
         ]

@@ -351,7 +351,7 @@ fn with_meshes(collision: &str, scale: &str, visual: &str) -> String {
 #[test]
 fn meshes_are_found_by_package_path_and_uri() {
     let folder = Folder::new("found");
-    let box_ = TriMesh::box_(Vec3::new(0.5, 1.0, 1.5)).translated(&Vec3::new(1.0, 0.0, 0.0));
+    let box_ = TriMesh::cuboid(Vec3::new(1.0, 2.0, 3.0)).translated(&Vec3::new(1.0, 0.0, 0.0));
     let mesh = folder.write("my_robot/meshes/box.obj", &obj(&box_, 0));
     let elsewhere =
         UrdfOptions { packages: [("other".to_owned(), folder.0.join("my_robot"))].into(), ..UrdfOptions::default() };

@@ -80,6 +80,23 @@ fn a_mesh_falls_on_a_floor() {
     assert!(succeed(&["check", &path]).contains("a closed mesh of 12 triangles, volume 1.000000e0"));
 }
 
+/// A cube about the origin falls freely, so its energy stays 0 J to rounding.
+#[test]
+fn an_energy_that_rounds_to_zero_has_no_sign() {
+    let folder = Folder::new("open-centered");
+    let [low, high] = ["-0.35", "0.35"];
+    let centered = |line: &str| match line.strip_prefix("v ") {
+        Some(corner) => format!(
+            "v {}\n",
+            corner.split(' ').map(|x| if x == "0" { low } else { high }).collect::<Vec<_>>().join(" ")
+        ),
+        None => format!("{line}\n"),
+    };
+    let path = folder.write("cube.obj", cube(1).lines().map(centered).collect::<String>());
+    let said = succeed(&["run", &path, "--duration", "0.1"]);
+    assert!(said.contains("energy 0.000000 J at the start, 0.000000 J at the end"), "{said}");
+}
+
 #[test]
 fn a_mesh_of_hundreds_of_metres_is_noted() {
     let folder = Folder::new("open-large");

@@ -273,7 +273,7 @@ mod tests {
     #[test]
     fn the_bound_of_a_slab_is_its_distance() {
         let half = Vec3::new(1.5, 1.5, 0.1);
-        let field = field(TriMesh::box_(half));
+        let field = field(TriMesh::cuboid(2.0 * half));
         for n in 0..2000_u32 {
             let place = |step: u32, span: f64| span * (f64::from(n * step % 1999) / 999.5 - 1.0);
             let p = Vec3::new(place(1, 1.9), place(611, 1.9), place(1301, 0.5));

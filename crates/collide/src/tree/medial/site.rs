@@ -43,6 +43,7 @@ impl Site {
     }
 
     /// Returns the site with its exact depth.
+    #[must_use]
     pub fn exact(self, distance: &MeshDistance) -> Site {
         Site { parent_bound: self.parent_bound, ..Site::at(self.center, distance) }
     }

@@ -15,7 +15,7 @@ use crate::{MeshDistance, TriMesh, Vec3};
 
 /// A bar along x, from -4 to 4.
 fn bar() -> TriMesh {
-    TriMesh::box_(Vec3::new(4.0, 0.5, 0.5))
+    TriMesh::cuboid(Vec3::new(8.0, 1.0, 1.0))
 }
 
 fn along_x(x: f64) -> Vec3 {
@@ -119,7 +119,7 @@ fn full_groups_transfer_spheres() {
 
 #[test]
 fn a_leaf_grows_by_its_deficit_only() {
-    let mesh = TriMesh::box_(Vec3::new(1.0, 2.0, 2.0));
+    let mesh = TriMesh::cuboid(Vec3::new(2.0, 4.0, 4.0));
     let spheres = grown_to_cover(&mesh, vec![Sphere { center: Vec3::zeros(), radius: 0.1 }], &());
     assert!((spheres[0].radius - 3.0).abs() < 1e-9, "{}", spheres[0].radius);
     let enough = vec![Sphere { center: Vec3::zeros(), radius: 3.5 }];

@@ -20,6 +20,7 @@ pub const MAX_LINKS: usize = 10_000;
 
 /// Why a model is not valid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ModelError {
     /// There is no moving link.
     #[error("the model has no moving link")]

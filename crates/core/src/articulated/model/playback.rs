@@ -6,6 +6,7 @@
 
 /// Why a recorded motion is not valid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlaybackError {
     /// The numbers of times and values differ, or there are fewer than two.
     #[error("a recorded motion has {times} times and {values} values; it must have as many of each, and at least 2")]

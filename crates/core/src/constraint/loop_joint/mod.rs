@@ -74,6 +74,7 @@ impl Anchor {
 
 /// Why a loop joint cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LoopJointError {
     /// Both sides are the world.
     #[error("loop joint '{0}' joins the world to itself; one side must be a part of an object")]
@@ -113,7 +114,7 @@ pub struct PositionError {
 /// ```
 /// # use tumble_core::{LoopJoint, RigidBody, Settings, World, collide::{Shape, Vec3}};
 /// # let mut world = World::new(Settings::default())?;
-/// # let door = world.add(RigidBody::with_mass("door", Shape::cuboid(Vec3::new(0.4, 0.02, 1.0))?, 20.0)?)?;
+/// # let door = world.add(RigidBody::with_mass("door", Shape::cuboid(Vec3::new(0.8, 0.04, 2.0))?, 20.0)?)?;
 /// # let (point, axis) = (Vec3::new(-0.4, 0.0, 0.0), Vec3::z());
 /// let hinge = LoopJoint::revolute_at("hinge", &world, Some((door, 0)), None, point, axis)?;
 /// world.add(hinge)?;

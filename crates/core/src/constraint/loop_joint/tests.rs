@@ -140,7 +140,7 @@ impl Pairing {
 }
 
 fn body(name: &str, pose: Pose, velocity: Vec3, spin: Vec3) -> RigidBody {
-    let shape = Shape::cuboid(Vec3::new(0.3, 0.2, 0.1)).unwrap();
+    let shape = Shape::cuboid(Vec3::new(0.6, 0.4, 0.2)).unwrap();
     RigidBody::with_mass(name, shape, 2.0).unwrap().at(pose).moving(velocity, spin)
 }
 

@@ -29,9 +29,9 @@ fn motion_bounds(shape: &Shape, part_state: &PartState) -> MotionBounds {
 fn separated_pairs_do_not_touch_during_the_step() {
     let (mut seed, mut recorded, mut touched) = (3, 0, 0);
     let shapes = [
-        Shape::cuboid(Vec3::new(0.5, 0.1, 0.2)).unwrap(),
+        Shape::cuboid(Vec3::new(1.0, 0.2, 0.4)).unwrap(),
         Shape::sphere(0.2).unwrap(),
-        Shape::cuboid(Vec3::new(0.05, 0.3, 0.3)).unwrap(),
+        Shape::cuboid(Vec3::new(0.1, 0.6, 0.6)).unwrap(),
         Shape::half_space(),
     ];
     for n in 0..4000 {
@@ -85,7 +85,7 @@ fn separated_pairs_do_not_touch_during_the_step() {
 /// The second query at the same poses is not made, gives the same contacts, and a wider one is.
 #[test]
 fn contacts_of_pairs_that_did_not_move_are_cached() {
-    let (cylinder, block) = (Shape::cylinder(0.1, 0.2).unwrap(), Shape::cuboid(Vec3::repeat(0.5)).unwrap());
+    let (cylinder, block) = (Shape::cylinder(0.1, 0.4).unwrap(), Shape::cuboid(Vec3::repeat(1.0)).unwrap());
     let at = |z: f64| PartState { pose: Pose::translation(0.0, 0.0, z), ..PartState::default() };
     let part_states = [at(0.7001), at(0.0)];
     let pair = |near: f64| PairQuery {

@@ -104,9 +104,9 @@ fn objects_come_and_go() {
     let spun = Pose::from_parts(Vec3::new(1.0, 2.0, 3.0).into(), Quat::from_scaled_axis(Vec3::new(0.3, -0.2, 0.9)));
     for (k, shape) in [
         Shape::sphere(0.2),
-        Shape::cuboid(Vec3::new(0.1, 0.2, 0.3)),
-        Shape::capsule(0.1, 0.2),
-        Shape::cylinder(0.1, 0.3),
+        Shape::cuboid(Vec3::new(0.2, 0.4, 0.6)),
+        Shape::capsule(0.1, 0.4),
+        Shape::cylinder(0.1, 0.6),
     ]
     .into_iter()
     .enumerate()

@@ -17,13 +17,13 @@ pub fn scene() -> World {
     let mut world = World::new(Settings { dt: 1.0 / 60.0, ..Settings::default() }).unwrap();
     world.add_static(RigidBody::fixed("ground", Shape::half_space())).unwrap();
     world
-        .add_static(RigidBody::fixed("post", Shape::capsule(0.1, 1.0).unwrap()).at(Pose::translation(3.0, 0.0, 1.0)))
+        .add_static(RigidBody::fixed("post", Shape::capsule(0.1, 2.0).unwrap()).at(Pose::translation(3.0, 0.0, 1.0)))
         .unwrap();
     for k in 0..5 {
         let ball = RigidBody::with_mass(format!("ball {k}"), Shape::sphere(0.1).unwrap(), 1.0).unwrap();
         world.add(ball.at(Pose::translation(0.3 * k as f64, 0.0, 1.0 + 0.2 * k as f64))).unwrap();
     }
-    let crate_ = RigidBody::with_mass("crate", Shape::cuboid([0.2, 0.2, 0.2].into()).unwrap(), 2.0).unwrap();
+    let crate_ = RigidBody::with_mass("crate", Shape::cuboid([0.4, 0.4, 0.4].into()).unwrap(), 2.0).unwrap();
     let crate_ = world.add(crate_.at(Pose::translation(0.0, 2.0, 0.2))).unwrap();
     world.set_velocity(crate_, [1.0, 0.0, 0.0].into(), [0.0, 0.0, 3.0].into()).unwrap();
     world

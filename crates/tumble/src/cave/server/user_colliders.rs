@@ -60,8 +60,8 @@ impl UserColliders {
                 let body = if drawn { body } else { body.drawn_as(Vec::new()) };
                 world.add_boxed(Box::new(body), Mode::Kinematic).map_err(|e| failed(&e))
             };
-            let capsule =
-                Shape::capsule(RADIUS_M * viewer.scale, half_length(user) * viewer.scale).map_err(|e| failed(&e))?;
+            let capsule = Shape::capsule(RADIUS_M * viewer.scale, 2.0 * half_length(user) * viewer.scale)
+                .map_err(|e| failed(&e))?;
             let capsule = add(format!("user {k}"), capsule, upright(viewer, user), false)?;
             let mut hand = |side: usize| {
                 let ball = Shape::sphere(HAND_RADIUS_M * viewer.scale).map_err(|e| failed(&e))?;

@@ -44,7 +44,7 @@ fn check(mesh: &TriMesh, goal: &RefineGoal) -> (Vec<MedialSphere>, Counts) {
 
 #[test]
 fn a_box_is_refined_to_the_target() {
-    let mesh = TriMesh::box_(Vec3::new(0.5, 1.0, 0.2));
+    let mesh = TriMesh::cuboid(Vec3::new(1.0, 2.0, 0.4));
     let (spheres, counts) = check(&mesh, &RefineGoal { target: 0.05, least: 100, most: 2000 });
     assert!(counts.inserted < 2000 && spheres.len() >= 100, "{counts:?}");
     let worst = spheres.iter().map(|b| b.outward).fold(0.0, f64::max);
@@ -63,7 +63,7 @@ fn more_insertions_than_allowed_are_not_made() {
 
 #[test]
 fn a_region_of_coplanar_points() {
-    let mesh = TriMesh::box_(Vec3::new(0.5, 0.5, 0.5));
+    let mesh = TriMesh::cuboid(Vec3::new(1.0, 1.0, 1.0));
     let cover = CoverPoints::on(&mesh, 600);
     let region: Vec<u32> = (0..cover.points.len() as u32).filter(|&i| cover.points[i as usize].z == 0.5).collect();
     let distance = MeshDistance::new(&mesh);
@@ -79,7 +79,7 @@ fn a_region_of_coplanar_points() {
 #[test]
 fn points_of_thin_sheets_and_needles_are_contained() {
     for half in [Vec3::new(1.0, 1.0, 1e-3), Vec3::new(1.0, 1e-4, 1e-4)] {
-        let (_, counts) = check(&TriMesh::box_(half), &RefineGoal { target: 0.02, least: 100, most: 1000 });
+        let (_, counts) = check(&TriMesh::cuboid(2.0 * half), &RefineGoal { target: 0.02, least: 100, most: 1000 });
         assert_eq!(counts.alone, 0, "{half}");
     }
 }

@@ -135,11 +135,11 @@ fn grids_whose_cells_share_spheres() {
 
 #[test]
 fn points_of_surfaces() {
-    let box_ = TriMesh::box_(Vec3::new(0.5, 1.0, 0.1));
+    let box_ = TriMesh::cuboid(Vec3::new(1.0, 2.0, 0.2));
     check(&on_surface(&box_, 20));
     check(&on_surface(&TriMesh::icosphere(1.0, 2), 0));
     check(&on_surface(&TriMesh::torus(1.0, 0.3, 16, 8), 1));
-    check(&on_surface(&TriMesh::cylinder(0.5, 0.5, 24), 2));
+    check(&on_surface(&TriMesh::cylinder(0.5, 1.0, 24), 2));
 }
 
 #[test]

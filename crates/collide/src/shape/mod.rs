@@ -1,9 +1,12 @@
-//! The shapes that a body's part can have.
+//! The shapes that a part of a body can have.
 
-use crate::{
-    Aabb, CylinderShape, MassProperties, MeshShape, Pose, ShapeError, SphereTree, TreeCache, TreeSettings, TriMesh,
-    Vec3, mass,
-};
+mod cylinder;
+mod mesh;
+mod stored;
+
+use crate::{Aabb, MassProperties, Pose, ShapeError, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3, mass};
+pub use cylinder::CylinderShape;
+pub use mesh::MeshShape;
 use std::sync::Arc;
 
 /// A solid in its own frame. Primitives are centred on the origin.
@@ -41,43 +44,58 @@ impl Shape {
     }
 
     /// A ball of `radius` metres.
+    ///
+    /// # Errors
+    /// [`ShapeError::Length`] if the radius is not finite and above 0.
     pub fn sphere(radius: f64) -> Result<Shape, ShapeError> {
-        length("radius of a sphere", radius)?;
+        positive("radius of a sphere", radius)?;
         Ok(Shape::Sphere { radius })
     }
 
-    /// A block; half extents in metres.
-    pub fn cuboid(half_extents: Vec3) -> Result<Shape, ShapeError> {
-        for (k, what) in
-            ["half extent x of a box", "half extent y of a box", "half extent z of a box"].into_iter().enumerate()
-        {
-            length(what, half_extents[k])?;
-        }
+    /// A box with edges of `size` along x, y and z, meters.
+    ///
+    /// # Errors
+    /// [`ShapeError::Length`] if an edge is not finite and above 0.
+    pub fn cuboid(size: Vec3) -> Result<Shape, ShapeError> {
+        let [x, y, z] = size.into();
+        let half_extents =
+            Vec3::new(half("size x of a box", x)?, half("size y of a box", y)?, half("size z of a box", z)?);
         Ok(Shape::Box { half_extents })
     }
 
-    /// A capsule along z: radius and half length of the segment, metres.
-    pub fn capsule(radius: f64, half_length: f64) -> Result<Shape, ShapeError> {
-        length("radius of a capsule", radius)?;
-        length("half length of a capsule", half_length)?;
-        Ok(Shape::Capsule { radius, half_length })
+    /// A capsule along z: all points within `radius` of a segment of `length`, meters.
+    ///
+    /// # Errors
+    /// [`ShapeError::Length`] if a size is not finite and above 0.
+    pub fn capsule(radius: f64, length: f64) -> Result<Shape, ShapeError> {
+        positive("radius of a capsule", radius)?;
+        Ok(Shape::Capsule { radius, half_length: half("length of a capsule", length)? })
     }
 
-    /// A cylinder along z: radius and half length, metres.
-    pub fn cylinder(radius: f64, half_length: f64) -> Result<Shape, ShapeError> {
-        length("radius of a cylinder", radius)?;
-        length("half length of a cylinder", half_length)?;
-        Ok(Shape::Cylinder(Arc::new(CylinderShape::new(radius, half_length)?)))
+    /// A cylinder along z of `radius` and `length`, meters.
+    ///
+    /// # Errors
+    /// [`ShapeError::Length`] if a size is not finite and above 0.
+    pub fn cylinder(radius: f64, length: f64) -> Result<Shape, ShapeError> {
+        positive("radius of a cylinder", radius)?;
+        half("length of a cylinder", length)?;
+        Ok(Shape::Cylinder(Arc::new(CylinderShape::new(radius, length)?)))
     }
 
     /// A closed mesh (mended where that is harmless, see [`TriMesh::check_closed`]), moved so that its centre of mass
     /// is the origin; [`Shape::center_of_mass`] is where it was.
+    ///
+    /// # Errors
+    /// [`ShapeError::Mesh`]: a mesh that encloses no solid, a setting out of its range, or a tree that cannot be built.
     pub fn mesh(mesh: TriMesh, settings: &TreeSettings) -> Result<Shape, ShapeError> {
         Ok(Shape::Mesh(Arc::new(MeshShape::new(mesh, settings)?)))
     }
 
     /// [`Shape::mesh`] from the cache, if it was made before of the same vertices, triangles and settings; else it is made and kept there. The same bits
     /// either way. Also returns what is to be said of the cache.
+    ///
+    /// # Errors
+    /// [`ShapeError::Mesh`], as [`Shape::mesh`]. A cache that cannot be used is no error.
     pub fn mesh_cached(
         mesh: TriMesh,
         settings: &TreeSettings,
@@ -89,6 +107,9 @@ impl Shape {
 
     /// [`Shape::mesh`] with its tree and surface built when first asked for: for a world that is drawn and not stepped. The tree then comes from the cache
     /// where it has it.
+    ///
+    /// # Errors
+    /// [`ShapeError::Mesh`]: a mesh that encloses no solid, or a setting out of its range.
     pub fn mesh_lazy(mesh: TriMesh, settings: &TreeSettings, cache: &TreeCache) -> Result<Shape, ShapeError> {
         Ok(Shape::Mesh(Arc::new(MeshShape::new_lazy(mesh, settings, cache)?)))
     }
@@ -133,6 +154,9 @@ impl Shape {
     }
 
     /// Mass properties at a uniform `density` in kg/m³.
+    ///
+    /// # Errors
+    /// [`ShapeError::Density`] if the density is not finite and above 0, [`ShapeError::Unbounded`] for a half-space.
     pub fn mass_properties(&self, density: f64) -> Result<MassProperties, ShapeError> {
         if !(density.is_finite() && density > 0.0) {
             return Err(ShapeError::Density(density));
@@ -183,8 +207,14 @@ impl Shape {
     }
 }
 
-fn length(what: &'static str, value: f64) -> Result<(), ShapeError> {
+fn positive(what: &'static str, value: f64) -> Result<(), ShapeError> {
     if value.is_finite() && value > 0.0 { Ok(()) } else { Err(ShapeError::Length { what, value }) }
+}
+
+/// Half a length, exact; both are above 0.
+fn half(what: &'static str, value: f64) -> Result<f64, ShapeError> {
+    let half = 0.5 * value;
+    if half.is_finite() && half > 0.0 { Ok(half) } else { Err(ShapeError::Length { what, value }) }
 }
 
 /// The local z axis in the world.

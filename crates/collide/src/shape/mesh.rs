@@ -1,42 +1,36 @@
-//! The shapes that carry a sphere tree: meshes and cylinders.
-
-mod stored;
+//! The shape of a closed mesh, with its sphere tree and its signed distance field.
 
 use crate::cache::{Entry, Kind};
 use crate::sdf::Surface;
 use crate::sdf::shells::shell_surfaces;
-use crate::shape::axis;
 use crate::{
-    Aabb, ClosedReport, MassProperties, MeshDistance, MeshError, MeshId, Pose, ShapeError, SphereTree, TreeCache,
-    TreeSettings, TriMesh, Vec3,
+    Aabb, ClosedReport, MassProperties, MeshDistance, MeshError, MeshId, Pose, SphereTree, TreeCache, TreeSettings,
+    TriMesh, Vec3,
 };
 use std::sync::OnceLock;
-
-/// Of a bound that is computed otherwise than what it bounds.
-const ROUNDING: f64 = 1e-9;
 
 /// A closed mesh about its centre of mass, with its sphere tree.
 #[derive(Clone, Debug)]
 pub struct MeshShape {
-    mesh: TriMesh,
-    settings: TreeSettings,
-    cache: TreeCache,
-    tree: OnceLock<Tree>,
+    pub(super) mesh: TriMesh,
+    pub(super) settings: TreeSettings,
+    pub(super) cache: TreeCache,
+    pub(super) tree: OnceLock<Tree>,
     /// One; of shells that overlap, each; none where it collides by its balls.
-    surfaces: OnceLock<Vec<Surface>>,
+    pub(super) surfaces: OnceLock<Vec<Surface>>,
     /// Whether some of its faces are no surface of the union of its shells.
-    buried: bool,
+    pub(super) buried: bool,
     /// At density 1.
-    unit_mass: MassProperties,
-    bounding_radius: f64,
-    report: ClosedReport,
+    pub(super) unit_mass: MassProperties,
+    pub(super) bounding_radius: f64,
+    pub(super) report: ClosedReport,
     /// Where the origin is in the frame that the mesh came in.
-    center: Vec3,
+    pub(super) center: Vec3,
 }
 
 /// A tree, and the radius of the ball about the origin that holds its leaves, metres.
 #[derive(Clone, Debug)]
-struct Tree {
+pub(super) struct Tree {
     tree: SphereTree,
     leaf_radius: f64,
 }
@@ -58,6 +52,9 @@ impl PartialEq for MeshShape {
 impl MeshShape {
     /// Checks and mends `mesh` ([`TriMesh::check_closed`]), moves its centre of mass to the origin and builds the
     /// tree.
+    ///
+    /// # Errors
+    /// [`MeshError`]: a mesh that encloses no solid, a setting out of its range, or a tree that cannot be built.
     pub fn new(mesh: TriMesh, settings: &TreeSettings) -> Result<MeshShape, MeshError> {
         let shape = MeshShape::new_lazy(mesh, settings, &TreeCache::off())?;
         let tree = shape.build_tree()?;
@@ -74,6 +71,9 @@ impl MeshShape {
     }
 
     /// The same with tree and surface built when first asked for: for what is drawn and not stepped. A tree that cannot be built is then one ball.
+    ///
+    /// # Errors
+    /// [`MeshError`]: a mesh that encloses no solid, or a setting out of its range.
     pub fn new_lazy(mut mesh: TriMesh, settings: &TreeSettings, cache: &TreeCache) -> Result<MeshShape, MeshError> {
         settings.check()?;
         let report = mesh.check_closed()?;
@@ -88,7 +88,7 @@ impl MeshShape {
         Ok(MeshShape { settings, cache, center, ..MeshShape::of_checked(mesh, unit_mass, report) })
     }
 
-    fn of_checked(mesh: TriMesh, unit_mass: MassProperties, report: ClosedReport) -> MeshShape {
+    pub(super) fn of_checked(mesh: TriMesh, unit_mass: MassProperties, report: ClosedReport) -> MeshShape {
         let bounding_radius = mesh.vertices.iter().map(Vec3::norm).fold(0.0, f64::max);
         let buried = report.crossing_faces > 0 || (unit_mass.mass - mesh.signed_volume()).abs() > 1e-9 * unit_mass.mass;
         MeshShape {
@@ -106,6 +106,9 @@ impl MeshShape {
     }
 
     /// The same from the cache where it has it; also returns what is to be said of the cache.
+    ///
+    /// # Errors
+    /// [`MeshError`]: a mesh that encloses no solid, a setting out of its range, or a tree that cannot be built.
     pub fn new_cached(
         mesh: TriMesh,
         settings: &TreeSettings,
@@ -200,76 +203,5 @@ impl MeshShape {
             inertia: self.unit_mass.inertia * density,
             ..self.unit_mass.with_mass(self.unit_mass.mass * density)
         }
-    }
-}
-
-/// A cylinder along local z about the origin. The sphere tree of a closed mesh around it is built when first asked for: contacts by surfaces need none.
-#[derive(Clone, Debug)]
-pub struct CylinderShape {
-    radius: f64,
-    half_length: f64,
-    mesh: TriMesh,
-    tree: OnceLock<SphereTree>,
-    /// Of a cylinder around prism and leaves, metres.
-    outer_radius: f64,
-    outer_half_length: f64,
-}
-
-/// The rest is made of these two.
-impl PartialEq for CylinderShape {
-    fn eq(&self, other: &CylinderShape) -> bool {
-        (self.radius, self.half_length) == (other.radius, other.half_length)
-    }
-}
-
-/// Sides of the prism that stands for a cylinder: its edges lie `1/cos(π/48)`, 0.2 % of the radius, outside.
-const SIDES: usize = 48;
-
-impl CylinderShape {
-    /// Radius and half length in metres.
-    pub fn new(radius: f64, half_length: f64) -> Result<CylinderShape, ShapeError> {
-        // the prism is around the cylinder, so that its tree covers the true surface
-        let outer = radius / nalgebra::ComplexField::cos(std::f64::consts::PI / SIDES as f64);
-        let mesh = TriMesh::cylinder(outer, half_length, SIDES);
-        mesh.check_data()?;
-        // leaves of an octree that ends for its error and not for its depth reach no further; a prism's does
-        let error = TreeSettings::octree().error * mesh.diagonal() * (1.0 + ROUNDING);
-        let (outer_radius, outer_half_length) = (outer + error, half_length + error);
-        Ok(CylinderShape { radius, half_length, mesh, tree: OnceLock::new(), outer_radius, outer_half_length })
-    }
-
-    /// Metres.
-    pub fn radius(&self) -> f64 {
-        self.radius
-    }
-
-    /// From the centre to a flat face, metres.
-    pub fn half_length(&self) -> f64 {
-        self.half_length
-    }
-
-    /// The box in world axes around the leaves.
-    pub(crate) fn aabb(&self, pose: &Pose) -> Aabb {
-        let here = pose.translation.vector;
-        // a disc reaches r·sin of the angle between its axis and the direction asked for
-        let half =
-            axis(pose).map(|e| self.outer_half_length * e.abs() + self.outer_radius * (1.0 - e * e).max(0.0).sqrt());
-        Aabb { min: here - half, max: here + half }
-    }
-
-    /// The prism around the cylinder that the tree is made of.
-    pub fn mesh(&self) -> &TriMesh {
-        &self.mesh
-    }
-
-    /// The balls around the surface, built when first asked for; one ball where that fails.
-    pub fn tree(&self) -> &SphereTree {
-        let build = || SphereTree::build(&self.mesh, &TreeSettings::octree());
-        self.tree.get_or_init(|| build().unwrap_or_else(|_| SphereTree::bounding_sphere(&self.mesh)))
-    }
-
-    /// Whether that has happened.
-    pub fn is_built(&self) -> bool {
-        self.tree.get().is_some()
     }
 }

@@ -3,7 +3,7 @@
 //! What is quick to make of those (edges, normals) is made anew, and the cells of fields are made where they are asked for. What is read is checked
 //! as if it came from an enemy: counts are bounded by the bytes that are there, indices in range, nothing nested in itself.
 
-use super::{MeshShape, Tree};
+use super::mesh::{MeshShape, Tree};
 use crate::bytes::{Reader, Write};
 use crate::sdf::Surface;
 use crate::{ClosedReport, MassProperties, Mat3, SphereTree, TriMesh};
@@ -99,7 +99,7 @@ mod tests {
         let other = ball(0.6);
         two.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + two.vertices.len() as u32)));
         two.vertices.extend(other.vertices);
-        vec![TriMesh::torus(1.0, 0.3, 12, 8), TriMesh::box_(Vec3::new(0.1, 0.2, 0.3)), two]
+        vec![TriMesh::torus(1.0, 0.3, 12, 8), TriMesh::cuboid(Vec3::new(0.2, 0.4, 0.6)), two]
     }
 
     #[test]
