@@ -1,7 +1,9 @@
-//! What leaves and enters a process: recordings, and NetSync sessions over their transports.
+//! Recordings, and NetSync sessions over their transports: everything that leaves or enters a
+//! process.
 //!
-//! [`record`] writes and reads MCAP files: Foxglove's published schemas for what is seen, a channel of our own for
-//! the exact state. [`sync`] keeps the processes of a cave together. Nothing here ever steps a world.
+//! [`record`] writes and reads MCAP files: Foxglove's published schemas for the picture and one
+//! channel of our own for the exact state. [`sync`] keeps the processes of a cave showing the same
+//! frame. Nothing in this crate steps a world.
 
 pub mod record;
 pub mod sync;

@@ -1,24 +1,25 @@
-//! What of a world goes into a recording.
+//! Conversion of a world to the entities and poses of a recording.
 
 use crate::record::{Entity, Pose, Shape, VisualPart};
 use nalgebra::Translation3;
 use tumble_collide::{Shape as Solid, TriMesh, Vec3};
 use tumble_core::{Drawn, ObjectId, RigidBody, World};
 
-/// Half the side of the square that stands for a half-space, metres.
+/// Half the side of the square that represents a half-space, m.
 const PLANE_M: f64 = 20.0;
 
-/// Every part that can be drawn as an entity of its own: the object's name, with `/part` behind it where an object has several.
+/// Returns every drawable part as one entity. It has the name of its object, followed by `/part` if
+/// the object has several parts.
 pub fn entities(world: &World) -> Vec<Entity> {
     sites(world).map(|(id, part)| entity(world, id, part)).collect()
 }
 
-/// The poses of the same parts in the same order.
+/// Returns the poses of the entities, in the order of [`entities`].
 pub fn poses(world: &World) -> Vec<Pose> {
     sites(world).filter_map(|(id, part)| world.pose(id, part)).map(|frame| pose(&frame)).collect()
 }
 
-/// Their names, without the rest.
+/// Returns the names of the entities, in the order of [`entities`].
 pub fn names(world: &World) -> Vec<String> {
     sites(world).map(|(id, part)| name(world, id, part)).collect()
 }

@@ -1,7 +1,10 @@
-//! Keeps the cores of this machine from falling asleep: a core that sleeps takes tens of microseconds to hear that there is work, one that waits awake takes none.
+//! Keeps the cores of this machine out of deep idle states. A core in a deep idle state takes tens
+//! of µs to wake up, a core in a shallow one almost none.
 //!
-//! Linux's `/dev/cpu_dma_latency` (kernel documentation, "PM Quality of Service"): as long as a process holds it open, no core enters a state that takes longer to
-//! leave than it wrote there, µs. It is over when the process ends, however that is. Whoever may write to it (root, usually) decides; the price is electricity.
+//! Linux offers `/dev/cpu_dma_latency` (kernel documentation, "PM Quality of Service"). While a
+//! process holds the file open, no core enters a state with an exit latency above the value written
+//! to it, in µs. The request ends with the process. Opening the file needs write permission, by
+//! default root's. The cost is electric power.
 
 use super::transport::LinkError;
 use std::fs::{File, OpenOptions};
@@ -9,16 +12,17 @@ use std::io::Write;
 
 const DEVICE: &str = "/dev/cpu_dma_latency";
 
-/// As long as it lives the cores stay awake.
+/// A request for low wake-up latency. It holds until it is dropped.
 pub struct CpuLatencyRequest {
-    /// Held open, no more.
+    /// Held open and never read.
     _device: File,
 }
 
 impl CpuLatencyRequest {
-    /// Asks for it.
+    /// Requests an exit latency of 0 µs.
     ///
-    /// Errors: the system does not have it, or this user may not.
+    /// # Errors
+    /// The system has no such device, or this user may not write to it.
     pub fn ask() -> Result<CpuLatencyRequest, LinkError> {
         let io = |why| LinkError::Io { what: format!("keeping the cores awake: {DEVICE}"), why };
         let mut device = OpenOptions::new().write(true).open(DEVICE).map_err(io)?;

@@ -1,4 +1,5 @@
-//! Sessions over links, by the clock: what `tumble serve` and `tumble facet` call.
+//! Runs sessions over links in real time. `tumble serve` and `tumble facet` use [`Server`] and
+//! [`Facet`].
 
 use super::facet::{FacetOptions, FacetSession, Task};
 use super::input::Input;
@@ -12,24 +13,24 @@ use super::wire::Hash;
 use std::time::{Duration, Instant};
 use tumble_core::World;
 
-/// Why a server or a facet cannot go on.
+/// Error of a server or a facet that ends its session.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
-    /// The link.
+    /// The link failed.
     #[error(transparent)]
     Link(#[from] LinkError),
     /// The world cannot be sent.
     #[error(transparent)]
     Publish(#[from] PublishError),
-    /// Critical facets did not come.
-    #[error("{} did not join within {:.1} s; start them, or look at why they end", .0.join(", "), .1.as_secs_f64())]
+    /// Critical facets did not join within the timeout.
+    #[error("{} did not join within {:.1} s; start them, or check why they ended", .0.join(", "), .1.as_secs_f64())]
     Missing(Vec<String>, Duration),
 }
 
-/// A wait that is over when something comes or is due.
+/// Longest wait for a link event. A wait ends early if an event arrives or work is due.
 const MAX_WAIT: Duration = Duration::from_secs(1);
 
-/// A server and its link.
+/// A server session and its link.
 pub struct Server<L> {
     link: L,
     session: ServerSession,
@@ -38,7 +39,7 @@ pub struct Server<L> {
 }
 
 impl<L: ServerLink> Server<L> {
-    /// `base`: the world as the scene file makes it, before the first step.
+    /// Creates the session. `base` is the world as the scene file makes it, before the first step.
     pub fn new(link: L, options: ServerOptions, base: &World) -> Server<L> {
         Server { link, session: ServerSession::new(options, base), start: Instant::now(), buffer: Vec::new() }
     }
@@ -46,7 +47,8 @@ impl<L: ServerLink> Server<L> {
     /// Waits until every critical facet has joined.
     ///
     /// # Errors
-    /// [`SessionError::Missing`] when `timeout` is over, with their names.
+    /// [`SessionError::Missing`] with the names of the missing facets after `timeout`; errors of
+    /// the link.
     pub fn wait_for_facets(&mut self, timeout: Duration) -> Result<(), SessionError> {
         let until = self.now() + timeout;
         while !self.session.all_critical_joined() {
@@ -62,20 +64,22 @@ impl<L: ServerLink> Server<L> {
         Ok(())
     }
 
-    /// Publishes the world as the next frame, and in lockstep waits until it is shown by all who are in step (bounded by the time-outs). Its number.
+    /// Publishes the world as the next frame and returns its number. In lockstep it first waits
+    /// until all facets in step have shown the frame, bounded by the timeouts.
     ///
     /// # Errors
-    /// The link's, and [`PublishError`].
+    /// Errors of the link, and [`PublishError`].
     pub fn frame(&mut self, world: &World, viewer: &Viewer) -> Result<u64, SessionError> {
         let frame = self.begin(world, viewer)?;
         while !self.shown(MAX_WAIT)? {}
         Ok(frame)
     }
 
-    /// Publishes the world as the next frame, and does not wait: [`shown`](Self::shown) does. Its number.
+    /// Publishes the world as the next frame and returns its number without waiting.
+    /// [`shown`](Self::shown) waits.
     ///
     /// # Errors
-    /// The link's, and [`PublishError`].
+    /// Errors of the link, and [`PublishError`].
     pub fn begin(&mut self, world: &World, viewer: &Viewer) -> Result<u64, SessionError> {
         self.poll(Duration::ZERO)?;
         let frame = self.session.publish(self.now(), world, viewer)?;
@@ -83,20 +87,21 @@ impl<L: ServerLink> Server<L> {
         Ok(frame)
     }
 
-    /// Publishes a frame as it was recorded, like [`begin`](Self::begin).
+    /// Publishes a recorded frame without waiting, like [`begin`](Self::begin).
     ///
     /// # Errors
-    /// The link's.
+    /// Errors of the link.
     pub fn begin_recorded(&mut self, recorded: &FrameRecord) -> Result<(), SessionError> {
         self.poll(Duration::ZERO)?;
         self.session.publish_recorded(self.now(), recorded);
         self.flush()
     }
 
-    /// Whether the frame is shown by all who are waited for, after waiting for that for at most `timeout`.
+    /// Waits at most `timeout` until all awaited facets have shown the frame. Returns whether they
+    /// have.
     ///
     /// # Errors
-    /// The link's.
+    /// Errors of the link.
     pub fn shown(&mut self, timeout: Duration) -> Result<bool, SessionError> {
         let until = self.now().saturating_add(timeout);
         while !self.session.is_idle() {
@@ -109,34 +114,35 @@ impl<L: ServerLink> Server<L> {
         Ok(true)
     }
 
-    /// Publishes a frame as it was recorded, and waits like [`frame`](Self::frame).
+    /// Publishes a recorded frame and waits, like [`frame`](Self::frame).
     ///
     /// # Errors
-    /// The link's.
+    /// Errors of the link.
     pub fn replay(&mut self, recorded: &FrameRecord) -> Result<(), SessionError> {
         self.begin_recorded(recorded)?;
         while !self.shown(MAX_WAIT)? {}
         Ok(())
     }
 
-    /// A facet's process has ended: nobody waits for it any more.
+    /// Removes a facet whose process has ended, so that no frame waits for it.
     ///
     /// # Errors
-    /// The link's.
+    /// Errors of the link.
     pub fn facet_exited(&mut self, facet: FacetNumber) -> Result<(), SessionError> {
         self.session.facet_exited(self.now(), facet);
         self.flush()
     }
 
-    /// The session, to be asked.
+    /// Returns the session.
     pub fn session(&self) -> &ServerSession {
         &self.session
     }
 
-    /// Looks after the link until `until` from the start ([`now`](Self::now)): the time between two frames.
+    /// Processes link events until `until`, a time since the start ([`now`](Self::now)). A server
+    /// calls it between two frames.
     ///
     /// # Errors
-    /// The link's.
+    /// Errors of the link.
     pub fn idle_until(&mut self, until: Duration) -> Result<(), SessionError> {
         loop {
             let left = until.saturating_sub(self.now());
@@ -147,10 +153,11 @@ impl<L: ServerLink> Server<L> {
         }
     }
 
-    /// Tells the facets that the run is over, and waits until they have heard it: who draws hears it after the picture. At most a second.
+    /// Sends END to all facets and waits at most 1 s until each has acknowledged it. A facet that
+    /// is drawing acknowledges after its picture.
     ///
     /// # Errors
-    /// The link's.
+    /// Errors of the link.
     pub fn end(&mut self) -> Result<(), SessionError> {
         self.session.end();
         self.flush()?;
@@ -161,38 +168,40 @@ impl<L: ServerLink> Server<L> {
         Ok(())
     }
 
-    /// Since the start.
+    /// Returns the time since the start.
     pub fn now(&self) -> Duration {
         self.start.elapsed()
     }
 
-    /// What happened since the last call.
+    /// Returns the events since the last call.
     pub fn events(&mut self) -> Vec<ServerEvent> {
         self.session.events()
     }
 
-    /// How a facet stands.
+    /// Returns the membership of a facet.
     pub fn membership(&self, facet: FacetNumber) -> Membership {
         self.session.membership(facet)
     }
 
-    /// What was counted about those who are no facet.
+    /// Returns the counters of packets that belong to no facet.
     pub fn unknown_peers(&self) -> LinkCounters {
         self.link.unknown_peers()
     }
 
-    /// Notes when an input came that no facet sent, so that the picture that shows it is timed: see [`ServerSession::note_input`].
+    /// Notes the arrival of an input that no facet sent, so that its latency is measured; see
+    /// [`ServerSession::note_input`].
     pub fn note_input(&mut self, user: u16, sequence: u64) {
         self.session.note_input(self.now(), user, sequence);
     }
 
-    /// What was counted about a facet: here, by itself, and on its link.
+    /// Returns the counts about a facet: the server's, the facet's own, and those of its link.
     pub fn counts(&self, facet: FacetNumber) -> (SlotCounts, FacetCounts, LinkCounters) {
         let (here, there) = self.session.counts(facet);
         (here, there, self.link.counters(facet))
     }
 
-    /// Waits for one report of the link, at most `timeout` and until something is due, and does what is due.
+    /// Waits for one link event, at most `timeout` and no longer than until the session has work
+    /// due. Then does the work.
     fn poll(&mut self, timeout: Duration) -> Result<(), SessionError> {
         let due = self.session.wake().map_or(timeout, |wake| wake.saturating_sub(self.now()));
         let event = self.link.recv(timeout.min(due), &mut self.buffer)?;
@@ -213,7 +222,7 @@ impl<L: ServerLink> Server<L> {
     }
 }
 
-/// A facet and its link.
+/// A facet session and its link.
 pub struct Facet<L> {
     link: L,
     session: FacetSession,
@@ -221,16 +230,18 @@ pub struct Facet<L> {
 }
 
 impl<L: FacetLink> Facet<L> {
-    /// `base`: the world as the scene file makes it.
+    /// Creates the session. `base` is the world as the scene file makes it.
     pub fn new(link: L, options: FacetOptions, base: World) -> Facet<L> {
         Facet { link, session: FacetSession::new(options, base), start: Instant::now() }
     }
 
-    /// What to do next, after waiting for it for at most `timeout`. On [`Task::Draw`] call [`begin`](Self::begin), draw, and [`drawn`](Self::drawn); on
-    /// [`Task::Present`] show it and call [`presented`](Self::presented); on [`Task::Wait`] keep the window alive and come again.
+    /// Waits at most `timeout` for the next task and returns it. On [`Task::Draw`] call
+    /// [`begin`](Self::begin), draw, then call [`drawn`](Self::drawn). On [`Task::Present`] show
+    /// the picture and call [`presented`](Self::presented). On [`Task::Wait`] process window events
+    /// and call this again.
     ///
     /// # Errors
-    /// The link's.
+    /// Errors of the link.
     pub fn next(&mut self, timeout: Duration) -> Result<Task, SessionError> {
         let until = self.now() + timeout;
         loop {
@@ -243,64 +254,66 @@ impl<L: FacetLink> Facet<L> {
         }
     }
 
-    /// Applies the frame to be drawn; its number. `None`: it did not fit and was refused.
+    /// Applies the next frame and returns its number. Returns `None` if the frame did not fit the
+    /// scene and was refused.
     pub fn begin(&mut self) -> Option<u64> {
         self.session.begin()
     }
 
-    /// What to draw.
+    /// Returns the world to draw.
     pub fn world(&self) -> &World {
         self.session.world()
     }
 
-    /// Who looks, and where the cave stands.
+    /// Returns the users' heads and the cave's place in the scene.
     pub fn viewer(&self) -> &Viewer {
         self.session.viewer()
     }
 
-    /// The frame is drawn. `image`: first 16 bytes of the BLAKE3 of its pixels, zeros where there are none.
+    /// Reports that the frame is drawn. `image` holds the first 16 bytes of the BLAKE3 hash of its
+    /// pixels, or zeros if there are none.
     ///
     /// # Errors
-    /// The link's.
+    /// Errors of the link.
     pub fn drawn(&mut self, image: Hash) -> Result<(), SessionError> {
         self.session.drawn(self.now(), image);
         self.flush()
     }
 
-    /// The frame is on the screen.
+    /// Reports that the frame is on the screen.
     ///
     /// # Errors
-    /// The link's.
+    /// Errors of the link.
     pub fn presented(&mut self) -> Result<(), SessionError> {
         self.session.presented(self.now());
         self.flush()
     }
 
-    /// Sends what a user does; `false` while there is no server.
+    /// Sends a user's input. Returns `false` while there is no server.
     ///
     /// # Errors
-    /// The link's.
+    /// Errors of the link.
     pub fn send_input(&mut self, input: &Input) -> Result<bool, SessionError> {
         let sent = self.session.send_input(self.now(), input);
         self.flush().map(|()| sent)
     }
 
-    /// Says good-bye, and gives the link a moment to carry it.
+    /// Sends LEAVE and gives the link 20 ms to transmit it.
     ///
     /// # Errors
-    /// The link's.
+    /// Errors of the link.
     pub fn leave(&mut self) -> Result<(), SessionError> {
         self.session.leave();
         self.flush()?;
         self.poll(Duration::from_millis(20))
     }
 
-    /// The session, to be asked.
+    /// Returns the session.
     pub fn session(&self) -> &FacetSession {
         &self.session
     }
 
-    /// What happened on its link.
+    /// Returns the counters of the link.
     pub fn link_counters(&self) -> LinkCounters {
         self.link.counters()
     }

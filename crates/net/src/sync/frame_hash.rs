@@ -1,15 +1,17 @@
-//! The hash of what a facet has drawn. The server makes it of what it sent, a facet of the world it drew, read back after drawing: so it can differ.
+//! Hash of a drawn frame. The server computes it from the message that it sent. A facet computes it
+//! from the world that it drew, read back after drawing, so the two can differ.
 
 use super::wire::{Hash, put_name};
 use tumble_collide::Pose;
 use xxhash_rust::xxh3::xxh3_128;
 
-/// Collects what is seen, object by object.
+/// Collects the bytes that are hashed, object by object.
 #[derive(Default)]
 pub(crate) struct FrameHasher(Vec<u8>);
 
 impl FrameHasher {
-    /// Of a frame: `table` is the hash of the list of objects with what stands still.
+    /// Begins the hash of a frame. `table` is the hash of the object table with its stationary
+    /// objects.
     pub fn frame(mut self, frame: u64, time_s: f64, table: Hash) -> FrameHasher {
         self.0.clear();
         self.0.extend(frame.to_le_bytes());
@@ -18,7 +20,7 @@ impl FrameHasher {
         self
     }
 
-    /// Of a list of objects.
+    /// Begins the hash of an object table.
     pub fn table(mut self) -> FrameHasher {
         self.0.clear();
         self
@@ -33,7 +35,8 @@ impl FrameHasher {
         self.0.push(enabled as u8);
     }
 
-    /// A pose as it is drawn: positions as they are, rotations in the renderer's precision. Poses that differ as they travel differ here.
+    /// Adds a pose as it is drawn: the position exactly, the rotation in the renderer's single
+    /// precision. Poses that differ in the message differ here.
     #[inline]
     pub fn pose(&mut self, pose: &Pose) {
         let (p, q) = (&pose.translation.vector, &pose.rotation.coords);
@@ -48,7 +51,7 @@ impl FrameHasher {
         write(&mut self.0);
     }
 
-    /// The hash; the memory is kept for the next.
+    /// Returns the hash, and the hasher with its memory for the next frame.
     pub fn hash(self) -> (Hash, FrameHasher) {
         (xxh3_128(&self.0).to_le_bytes(), self)
     }

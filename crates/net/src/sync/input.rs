@@ -1,33 +1,36 @@
-//! What the user does, on its way to the server (thesis §III.C): where the head is, what the wand points at, which keys are held.
+//! Input of a user on its way to the server (thesis §III.C): head, wand, hands, buttons and keys.
 
 use super::viewer::{MAX_USERS, exact_pose, put_exact_pose};
 use super::wire::{ByteReader, MessageError};
 use tumble_collide::Pose;
 
-/// Most keys held at a time.
+/// Maximum number of keys held at a time.
 pub const MAX_KEYS: usize = 32;
 
-/// The state of one user's devices; each message holds all of it, so that a lost one is mended by the next.
+/// State of one user's devices. Each message holds the whole state, so the next message repairs the
+/// loss of one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Input {
-    /// Number of the message, rising by one per message and user; wraps. The frame that shows it carries it ([`User::input`](super::User::input)).
+    /// Number of the message, one higher for each message of a user; it wraps. The frame that shows
+    /// the input carries this number ([`User::input`](super::User::input)).
     pub sequence: u64,
-    /// Which user of the cave.
+    /// Index of the user in the cave file.
     pub user: u16,
-    /// Head in the cave's frame, if it is tracked: the origin between the eyes (m), x to the right, y ahead, z up.
+    /// Head in the cave's frame if it is tracked: origin between the eyes (m), x to the right, y
+    /// ahead, z up.
     pub head: Option<Pose>,
-    /// Wand in the cave's frame, if there is one: it points along its y axis.
+    /// Wand in the cave's frame, if there is one. It points along its y axis.
     pub wand: Option<Pose>,
-    /// Left and right hand in the cave's frame, as far as they are tracked; axes as the head's.
+    /// Left and right hand in the cave's frame if they are tracked, with the axes of the head.
     pub hands: [Option<Pose>; 2],
-    /// Held buttons of the wand, bit by bit; bit 0 picks and pulls.
+    /// Bit mask of the wand's held buttons. Bit 0 picks and pulls.
     pub buttons: u32,
-    /// Keys held, by their USB HID usage (page 7); at most [`MAX_KEYS`], the rest is left out.
+    /// Held keys by USB HID usage (page 7), at most [`MAX_KEYS`]; further keys are left out.
     pub keys: Vec<u16>,
 }
 
 impl Input {
-    /// Appends it.
+    /// Appends the message.
     pub fn write(&self, out: &mut Vec<u8>) {
         out.extend(self.sequence.to_le_bytes());
         out.extend(self.user.to_le_bytes());
@@ -39,7 +42,7 @@ impl Input {
         self.keys.iter().take(MAX_KEYS).for_each(|key| out.extend(key.to_le_bytes()));
     }
 
-    /// Reads it.
+    /// Reads the message.
     ///
     /// # Errors
     /// [`MessageError::Malformed`].
@@ -47,7 +50,7 @@ impl Input {
         let mut rest = ByteReader(payload);
         let (sequence, user, flags, keys, buttons) = (rest.u64()?, rest.u16()?, rest.u8()?, rest.u8()?, rest.u32()?);
         if flags > 15 || keys as usize > MAX_KEYS || user as usize >= MAX_USERS {
-            return Err(MessageError::Malformed("a flag that there is not, too many keys, or no such user"));
+            return Err(MessageError::Malformed("an unknown flag, too many keys, or an unknown user"));
         }
         let mut pose = |bit: u8| if flags & bit != 0 { exact_pose(&mut rest).map(Some) } else { Ok(None) };
         let (head, wand, hands) = (pose(1)?, pose(2)?, [pose(4)?, pose(8)?]);

@@ -1,4 +1,5 @@
-//! The transport within one process: queues behind a lock. Nothing is lost, so it is the reference for the others.
+//! Transport within one process: queues behind a lock. It loses nothing, so it is the reference for
+//! the other transports.
 
 use super::transport::{
     Closed, Delivery, FacetLink, FacetNumber, LinkCounters, LinkError, LinkEvent, MAX_FACETS, MAX_MESSAGE_BYTES,
@@ -15,7 +16,7 @@ struct Item {
     bytes: Vec<u8>,
 }
 
-/// One direction to one listener.
+/// Messages of one direction to one receiver.
 #[derive(Default)]
 struct Queue {
     items: VecDeque<Item>,
@@ -24,7 +25,8 @@ struct Queue {
 
 #[derive(Default)]
 struct Queues {
-    /// How many times a server and each facet were made; an end of an earlier making is deaf and dumb.
+    /// How many endpoints were made for the server and for each facet. An endpoint of an earlier
+    /// generation sends and receives nothing.
     server: u64,
     facets: Vec<u64>,
     open: Vec<bool>,
@@ -38,17 +40,18 @@ struct Shared {
     wakeup: Condvar,
 }
 
-/// Where ends of links are plugged in. An end that is dropped closes its connections; one that is made again opens new ones.
+/// Makes the endpoints of links within a process. Dropping an endpoint closes its connections, and
+/// a new endpoint opens new ones.
 #[derive(Clone)]
 pub struct LocalTransport(Arc<Shared>);
 
-/// The server's end.
+/// The server's endpoint.
 pub struct LocalServer {
     shared: Arc<Shared>,
     generation: u64,
 }
 
-/// A facet's end.
+/// A facet's endpoint.
 pub struct LocalFacet {
     shared: Arc<Shared>,
     facet: FacetNumber,
@@ -56,7 +59,7 @@ pub struct LocalFacet {
 }
 
 impl LocalTransport {
-    /// For so many facets, at most [`MAX_FACETS`].
+    /// Creates the transport for `facets` facets, at most [`MAX_FACETS`].
     pub fn new(facets: usize) -> LocalTransport {
         let n = facets.min(MAX_FACETS);
         let counters = || vec![LinkCounters::default(); n];
@@ -70,7 +73,7 @@ impl LocalTransport {
         LocalTransport(Arc::new(Shared { queues: Mutex::new(queues), wakeup: Condvar::new() }))
     }
 
-    /// A server's end; it takes the place of an earlier one.
+    /// Returns a server endpoint, which replaces the previous one.
     pub fn server(&self) -> LocalServer {
         let mut queues = lock(&self.0);
         (0..queues.open.len()).for_each(|k| queues.close(k, Closed::Replaced, Closed::ByPeer));
@@ -81,7 +84,8 @@ impl LocalTransport {
         LocalServer { generation: queues.server, shared: self.0.clone() }
     }
 
-    /// A facet's end; it takes the place of an earlier one. `None`: the hub has no such facet.
+    /// Returns a facet's endpoint, which replaces the previous one. Returns `None` if the transport
+    /// has no such facet.
     pub fn facet(&self, facet: FacetNumber) -> Option<LocalFacet> {
         let (mut queues, k) = (lock(&self.0), facet as usize);
         let generation = *queues.facets.get(k)? + 1;
@@ -99,7 +103,7 @@ fn lock(shared: &Shared) -> MutexGuard<'_, Queues> {
 }
 
 impl Queues {
-    /// Opens a connection where both ends are there and none is open.
+    /// Opens a connection if both endpoints exist and no connection is open.
     fn try_open(&mut self, k: usize) {
         if !self.open[k] && self.server > 0 && self.facets[k] > 0 {
             self.open[k] = true;
@@ -109,7 +113,7 @@ impl Queues {
         }
     }
 
-    /// Closes a connection; what was under way is gone.
+    /// Closes a connection and discards its messages in flight.
     fn close(&mut self, k: usize, to_server: Closed, to_facet: Closed) {
         if std::mem::take(&mut self.open[k]) {
             self.up.items.retain(|item| item.facet as usize != k || item.event != LinkEvent::Message);
@@ -161,7 +165,7 @@ impl Queues {
     }
 }
 
-/// Takes the next item, waiting until `timeout` is over.
+/// Takes the next item, waiting at most `timeout`.
 fn wait(shared: &Shared, timeout: Duration, mut next: impl FnMut(&mut Queues) -> Option<Item>) -> Option<Item> {
     let until = Instant::now().checked_add(timeout);
     let mut queues = lock(shared);

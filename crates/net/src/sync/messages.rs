@@ -1,30 +1,31 @@
-//! The small messages: payloads of JOIN, REFUSED, READY, PRESENTED and BEAT. PRESENT, REJOIN, RESYNC, END and LEAVE have none.
+//! Payloads of the small messages: JOIN, REFUSED, READY, PRESENTED and HEARTBEAT. PRESENT, REJOIN,
+//! RESYNC, END and LEAVE have none.
 
 use super::wire::{ByteReader, Hash, MessageError, put_name};
 
-/// Most bytes of a refusal's text.
+/// Maximum length of a refusal's text, bytes.
 const MAX_TEXT: usize = 1024;
 
-/// A facet asks to be let in.
+/// Request of a facet to join.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Join {
-    /// BLAKE3 of the scene file and of what it names, by which both know that they mean the same scene.
+    /// BLAKE3 hash of the scene file and the files that it names. Equal hashes mean equal scenes.
     pub scene: [u8; 32],
     /// The facet's name in the cave file.
     pub name: String,
-    /// Whether it wants exact messages (a replica) and not poses.
+    /// Whether the facet wants exact messages (a replica) instead of poses.
     pub exact: bool,
 }
 
 impl Join {
-    /// Appends it: 32, 64, and 1 byte.
+    /// Appends the payload: 32, 64 and 1 byte.
     pub fn write(&self, out: &mut Vec<u8>) {
         out.extend(self.scene);
         put_name(out, &self.name);
         out.push(self.exact as u8);
     }
 
-    /// Reads it.
+    /// Reads the payload.
     ///
     /// # Errors
     /// [`MessageError::Malformed`].
@@ -33,54 +34,58 @@ impl Join {
         let (scene, name) = (rest.array()?, rest.name()?.to_owned());
         let exact = match rest.u8()? {
             exact @ (0 | 1) => exact == 1,
-            _ => return Err(MessageError::Malformed("a flag that there is not")),
+            _ => return Err(MessageError::Malformed("an unknown flag")),
         };
         rest.end()?;
         Ok(Join { scene, name, exact })
     }
 }
 
-/// Why a facet is not let in, in words.
+/// Text that says why a facet may not join.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refusal(pub String);
 
 impl Refusal {
-    /// Appends it.
+    /// Appends the payload.
     pub fn write(&self, out: &mut Vec<u8>) {
         let end = (0..=self.0.len().min(MAX_TEXT)).rev().find(|&n| self.0.is_char_boundary(n)).unwrap_or(0);
         out.extend(&self.0.as_bytes()[..end]);
     }
 
-    /// Reads it; control characters become spaces, since it will be printed.
+    /// Reads the payload. Control characters become spaces because the text is printed.
     ///
     /// # Errors
     /// [`MessageError::Malformed`].
     pub fn read(payload: &[u8]) -> Result<Refusal, MessageError> {
         let text = std::str::from_utf8(payload).ok().filter(|t| t.len() <= MAX_TEXT);
-        let text = text.ok_or(MessageError::Malformed("a refusal that is no short text"))?;
+        let text = text.ok_or(MessageError::Malformed("a refusal text that is too long or not UTF-8"))?;
         Ok(Refusal(text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()))
     }
 }
 
-/// READY and PRESENTED: what a facet has drawn or shown. The frame is in the header.
+/// Payload of READY and PRESENTED: a facet has drawn or shown the frame in the header.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrameAck {
-    /// Hash of what it applied and drew.
+    /// Hash of the state that the facet applied and drew.
     pub hash: Hash,
-    /// First 16 bytes of the BLAKE3 of the picture's pixels; zeros where there are none (null rendering), and in READY.
+    /// First 16 bytes of the BLAKE3 hash of the picture's pixels. Zeros without a picture, and in
+    /// READY.
     pub image: Hash,
-    /// READY: from the arrival of the state to the end of drawing. PRESENTED: from there to being shown. µs, saturating.
+    /// READY: time from the arrival of the state to the end of drawing. PRESENTED: time from there
+    /// to the presentation. In µs, saturating.
     pub took_us: u32,
-    /// From when the facet sent the newest of its inputs that the picture is the first to show, to showing it, µs, saturating; `None` in READY, and where there is none.
+    /// Time from sending the newest input of this facet that the picture is the first to show, to
+    /// its presentation, µs, saturating. `None` in READY, and if there is no such input.
     pub input_us: Option<u32>,
-    /// When the state (READY) or PRESENT (PRESENTED; in `latest` the state) came, µs by the facet's own clock; `None`: something else stood for it.
+    /// Arrival of the state (READY), of PRESENT (PRESENTED) or, in `latest`, of the state, µs by
+    /// the facet's clock. `None` if another message took its place.
     pub received_us: Option<u64>,
-    /// When the frame was drawn (READY) or shown (PRESENTED), µs by the facet's own clock.
+    /// Time at which the frame was drawn (READY) or shown (PRESENTED), µs by the facet's clock.
     pub completed_us: u64,
 }
 
 impl FrameAck {
-    /// Appends it: 56 bytes. What there is not travels as the largest number.
+    /// Appends the payload, 56 bytes. An absent value is encoded as the largest number.
     pub fn write(&self, out: &mut Vec<u8>) {
         out.extend(self.hash);
         out.extend(self.image);
@@ -90,7 +95,7 @@ impl FrameAck {
         out.extend(self.completed_us.to_le_bytes());
     }
 
-    /// Reads it.
+    /// Reads the payload.
     ///
     /// # Errors
     /// [`MessageError::Malformed`].
@@ -105,24 +110,25 @@ impl FrameAck {
     }
 }
 
-/// What a facet counted; its beat carries it to the server. Counts wrap.
+/// Counts of a facet, which its heartbeats carry to the server. They wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FacetCounts {
     /// Frames shown.
     pub shown: u64,
-    /// Frames that never came, or were skipped for a newer one.
+    /// Frames that never arrived, or were skipped for a newer one.
     pub missing: u64,
-    /// Messages that came again.
+    /// Messages received more than once.
     pub duplicate: u64,
-    /// Messages of an earlier frame, run or joining.
+    /// Messages of an earlier frame, run or join.
     pub stale: u64,
-    /// Messages whose hash did not fit.
+    /// Messages with a wrong hash.
     pub torn: u64,
-    /// Frames that came before their list of objects, or were to be shown before they were drawn.
+    /// Frames that arrived before their object table, and PRESENT messages for a frame not drawn
+    /// yet.
     pub early: u64,
     /// Messages refused for any other reason.
     pub refused: u64,
-    /// Times that the server was lost.
+    /// Times that the connection to the server was lost.
     pub lost: u64,
 }
 
@@ -140,12 +146,12 @@ impl FacetCounts {
         ]
     }
 
-    /// Appends them: 64 bytes.
+    /// Appends the counts, 64 bytes.
     pub fn write(mut self, out: &mut Vec<u8>) {
         self.fields().iter().for_each(|n| out.extend(n.to_le_bytes()));
     }
 
-    /// Reads them.
+    /// Reads the counts.
     ///
     /// # Errors
     /// [`MessageError::Malformed`].

@@ -1,4 +1,5 @@
-//! The client's side of the frame: payloads to a world that is drawn and never stepped.
+//! A facet's copy of the world: built from the scene file, updated by messages, drawn and never
+//! stepped.
 
 use super::frame_hash::FrameHasher;
 use super::quantize::get_pose;
@@ -11,25 +12,26 @@ use std::collections::BTreeSet;
 use tumble_collide::Pose;
 use tumble_core::{Mode, ObjectId, World};
 
-/// What a slot of the list is here.
+/// An object of the table in this copy.
 struct MirroredObject {
-    /// `None`: the viewer.
+    /// `None` for the viewer.
     id: Option<ObjectId>,
     kind: EntryKind,
     stationary: bool,
     parts: u16,
 }
 
-/// A copy of the server's world. Built from the same scene file; after that it follows messages.
+/// A copy of the server's world. It is built from the same scene file and then follows the
+/// messages.
 ///
 /// A message is applied whole or not at all.
 pub struct Mirror {
     base: World,
     world: World,
     slots: Vec<MirroredObject>,
-    /// How many of them do not stand still.
+    /// Number of objects that are not stationary.
     moving: usize,
-    /// Memory for the poses of a frame.
+    /// Scratch memory for the poses of a frame.
     poses: Vec<Pose>,
     revision: Option<u32>,
     viewer: Viewer,
@@ -39,7 +41,7 @@ pub struct Mirror {
 }
 
 impl Mirror {
-    /// `base`: the world as the scene file makes it.
+    /// Creates the copy. `base` is the world as the scene file makes it.
     pub fn new(base: World) -> Mirror {
         let world = base.fork();
         Mirror {
@@ -56,30 +58,30 @@ impl Mirror {
         }
     }
 
-    /// What is to be drawn.
+    /// Returns the world to draw.
     pub fn world(&self) -> &World {
         &self.world
     }
 
-    /// Who looks, and where the cave stands.
+    /// Returns the users' heads and the cave's place in the scene.
     pub fn viewer(&self) -> &Viewer {
         &self.viewer
     }
 
-    /// The frame applied last.
+    /// Returns the number of the last applied frame.
     pub fn frame(&self) -> u64 {
         self.frame
     }
 
-    /// Number of the list of objects; `None` before the first snapshot.
+    /// Returns the revision of the object table; `None` before the first snapshot.
     pub fn revision(&self) -> Option<u32> {
         self.revision
     }
 
-    /// Takes the list of objects from a snapshot's payload.
+    /// Applies the object table of a snapshot.
     ///
     /// # Errors
-    /// [`MessageError::Malformed`], [`MessageError::Unfit`]; nothing has changed then.
+    /// [`MessageError::Malformed`], [`MessageError::Unfit`]. The copy is then unchanged.
     pub fn apply_snapshot(&mut self, payload: &[u8]) -> Result<(), MessageError> {
         let snapshot = Snapshot::parse(payload)?;
         let (mut world, mut names, mut slots) =
@@ -87,13 +89,13 @@ impl Mirror {
         let mut viewers = 0;
         for entry in &snapshot.entries {
             if !names.insert(entry.name) {
-                return Err(MessageError::Malformed("a name twice"));
+                return Err(MessageError::Malformed("a duplicate name"));
             }
             viewers += usize::from(entry.kind == EntryKind::Viewer);
         }
         if viewers != 1 || snapshot.entries.last().is_none_or(|e| e.kind != EntryKind::Viewer || e.name != VIEWER_NAME)
         {
-            return Err(MessageError::Malformed("a list that does not end with its one viewer"));
+            return Err(MessageError::Malformed("a table that does not end with its only viewer"));
         }
         for &id in self.base.ids() {
             let absent = self
@@ -113,7 +115,7 @@ impl Mirror {
         Ok(())
     }
 
-    /// Makes sure of one object of a list, and puts a still one where it stands.
+    /// Finds or adds one object of the table, and places it if it is stationary.
     fn slot(&self, world: &mut World, entry: &Entry<'_>) -> Result<MirroredObject, MessageError> {
         let unfit = |why: &str| MessageError::Unfit(format!("'{}' {why}", entry.name));
         let (stationary, parts) = (entry.stationary, entry.parts);
@@ -122,7 +124,7 @@ impl Mirror {
         }
         let still_bytes = if stationary { poses_bytes(parts) } else { 0 };
         let (poses, looks) =
-            entry.body.split_at_checked(still_bytes).ok_or(MessageError::Malformed("it ends too early"))?;
+            entry.body.split_at_checked(still_bytes).ok_or(MessageError::Malformed("unexpected end"))?;
         let id = match (entry.described, world.find(entry.name)) {
             (false, Some(id)) => id,
             (false, None) => return Err(unfit("is not in this scene")),
@@ -134,10 +136,10 @@ impl Mirror {
             }
         };
         if !entry.described && !looks.is_empty() {
-            return Err(MessageError::Malformed("it goes on after its end"));
+            return Err(MessageError::Malformed("trailing bytes"));
         }
         if entry.kind == EntryKind::Exact && world.object(id).is_none_or(|o| o.net_sync().is_none()) {
-            return Err(unfit("takes no messages"));
+            return Err(unfit("accepts no messages"));
         }
         let here = world.view().state_range(id).map_or(0, |span| span.parts.len());
         if here != parts as usize {
@@ -152,7 +154,7 @@ impl Mirror {
         Ok(MirroredObject { id: Some(id), kind: entry.kind, stationary, parts })
     }
 
-    /// The revision that a state's payload is for.
+    /// Returns the table revision that a STATE payload belongs to.
     ///
     /// # Errors
     /// [`MessageError::Malformed`].
@@ -160,23 +162,23 @@ impl Mirror {
         parse_state(payload).map(|(revision, ..)| revision)
     }
 
-    /// Applies a frame's payload.
+    /// Applies the payload of a frame.
     ///
     /// # Errors
-    /// [`MessageError::Malformed`], [`MessageError::Unfit`]; nothing has changed then.
+    /// [`MessageError::Malformed`], [`MessageError::Unfit`]. The copy is then unchanged.
     pub fn apply_state(&mut self, frame: u64, time_s: f64, payload: &[u8]) -> Result<(), MessageError> {
         let (revision, count, mut records) = parse_state(payload)?;
         if Some(revision) != self.revision {
             return Err(MessageError::Unfit(format!("list of objects {revision}; here is {:?}", self.revision)));
         }
         if count as usize != self.moving {
-            return Err(MessageError::Malformed("not as many objects as move"));
+            return Err(MessageError::Malformed("a wrong number of objects"));
         }
         let (mut viewer, mut messages) = (None, Vec::new());
         let (mut poses, mut shown) = (std::mem::take(&mut self.poses), Vec::with_capacity(self.moving));
         poses.clear();
         for (wanted, slot) in self.slots.iter().enumerate().filter(|(_, slot)| !slot.stationary) {
-            let (index, body) = records.next().ok_or(MessageError::Malformed("it ends too early"))??;
+            let (index, body) = records.next().ok_or(MessageError::Malformed("unexpected end"))??;
             match (slot.id, slot.kind) {
                 _ if index != wanted => return Err(MessageError::Malformed("objects out of order")),
                 (None, _) => viewer = Some(Viewer::read(body)?),
@@ -206,7 +208,7 @@ impl Mirror {
         Ok(())
     }
 
-    /// Hands the objects their messages: all of them, or none.
+    /// Applies the objects' own messages: all of them or none.
     fn apply_messages(&mut self, messages: &[(ObjectId, &[u8])]) -> Result<(), MessageError> {
         let before: Vec<Vec<f64>> =
             messages.iter().map(|(id, _)| self.world.state_of(*id).unwrap_or_default().to_vec()).collect();
@@ -224,7 +226,8 @@ impl Mirror {
         Ok(())
     }
 
-    /// The hash of what [`world`](Self::world) shows now, read from the world itself.
+    /// Returns the hash of the state that [`world`](Self::world) shows, read back from the world
+    /// itself.
     pub fn hash(&mut self) -> Hash {
         let mut hasher = std::mem::take(&mut self.scratch).frame(self.frame, self.world.time(), self.table);
         for slot in self.slots.iter().filter(|slot| !slot.stationary) {
@@ -277,7 +280,7 @@ fn has_parts(world: &World, id: ObjectId) -> bool {
     world.view().state_range(id).is_some_and(|span| !span.parts.is_empty())
 }
 
-/// Appends as many poses as there are parts.
+/// Appends one pose per part.
 fn read_poses(body: &[u8], parts: u16, out: &mut Vec<Pose>) -> Result<(), MessageError> {
     let (poses, rest) = body.as_chunks();
     if poses.len() != parts as usize || !rest.is_empty() {

@@ -1,6 +1,6 @@
-//! NetSync: one server simulates, one process per facet draws, and every facet shows the same frame (thesis §IV.A.6, §IV.C).
+//! NetSync: one server simulates, one process per facet draws, and all facets show the same frame (thesis §IV.A.6, §IV.C).
 //!
-//! The server owns time and randomness; a facet builds the same world from the same scene file and only ever shows what messages say. Both sides are
+//! The server owns time and random numbers. A facet builds the same world from the same scene file and shows the states of the messages. Both sides are
 //! state machines without a clock ([`ServerSession`], [`FacetSession`]); [`Server`] and [`Facet`] run them over a link ([`transport`]).
 //!
 //! ```
@@ -48,8 +48,8 @@
 //!
 //! # Messages
 //!
-//! [`wire`] has the frame around all of them, [`table`] the snapshot and the state, [`messages`] and [`input`] the small ones, [`quantize`] the poses with
-//! their stated error. `docs/netsync.md` tells the whole.
+//! `wire.rs` holds the header of all messages, `table.rs` the snapshot and the state, `messages.rs` and `input.rs` the small
+//! messages, `quantize.rs` the poses with the bound on their error. `docs/netsync.md` describes the protocol.
 
 pub mod cpu_latency;
 mod driver;

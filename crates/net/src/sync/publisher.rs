@@ -1,4 +1,5 @@
-//! The server's side of the frame: a world to payloads, and the hash that a client which drew them must answer.
+//! The server's side of a frame: turns a world into payloads, and computes the hash that a facet
+//! must acknowledge.
 
 use super::frame_hash::FrameHasher;
 use super::quantize::{get_pose, put_pose};
@@ -11,64 +12,65 @@ use std::sync::Arc;
 use tumble_collide::Pose;
 use tumble_core::{Mode, ObjectId, World};
 
-/// Why a world cannot be sent.
+/// Error of a world that cannot be sent.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PublishError {
-    /// A pose that is no number.
-    #[error("part {part} of '{name}' stands at a pose that is not finite")]
+    /// A pose is not finite.
+    #[error("part {part} of '{name}' has a pose that is not finite")]
     NotFinite {
-        /// Object.
+        /// Name of the object.
         name: String,
-        /// Its part.
+        /// Index of the part.
         part: usize,
     },
-    /// Too many objects, or one with too many parts.
+    /// A limit of the protocol is exceeded.
     #[error("{what}: {count}, at most {max} can be sent")]
     LimitExceeded {
-        /// Of what.
+        /// The quantity that has the limit.
         what: String,
-        /// How many.
+        /// Its value.
         count: usize,
-        /// Allowed.
+        /// Its maximum.
         max: usize,
     },
-    /// A name that the protocol needs.
+    /// An object has the name that the protocol reserves for the viewer.
     #[error("an object is named '{VIEWER_NAME}', which is the viewer's name; rename it")]
     Name,
 }
 
-/// A frame as it travels.
+/// A frame, encoded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Published {
     /// Payload of STATE.
     pub state: Vec<u8>,
-    /// What a client that drew it must answer.
+    /// Hash that a facet which drew the frame must acknowledge.
     pub hash: Hash,
-    /// Whether the list of objects is new: the snapshot goes first.
+    /// Whether the object table is new, so that the snapshot must be sent first.
     pub fresh: bool,
-    /// Poses beyond ±32768 m, which stand at the edge in the message.
+    /// Number of poses beyond ±32768 m, which are clamped in the message.
     pub saturated: u32,
 }
 
 struct TableRow {
     id: ObjectId,
     kind: EntryKind,
-    /// Whether its mode is static.
+    /// Whether the mode is static.
     fixed: bool,
-    /// Fixed, and sent as poses: in the list and in no state.
+    /// Static and sent as poses: its poses are in the table and in no state.
     stationary: bool,
-    /// Whether it is alive, of a still one.
+    /// Whether a stationary object is enabled.
     enabled: bool,
     parts: usize,
-    /// Poses of a still one, as the world has them.
+    /// Poses of a stationary object, as the world has them.
     poses: Vec<Pose>,
 }
 
-/// Makes the payloads of one kind of client: those that draw, or replicas that want exact messages.
+/// Encodes the payloads for one kind of facet: those that draw poses, or replicas that take exact
+/// messages.
 pub struct Publisher {
     exact: bool,
     base: World,
-    /// Objects of the world that was listed.
+    /// Objects of the world at the last rebuild of the table.
     ids: Vec<ObjectId>,
     rows: Vec<TableRow>,
     revision: u32,
@@ -78,7 +80,8 @@ pub struct Publisher {
 }
 
 impl Publisher {
-    /// `base`: the world as the scene file makes it, before the first step. `revision`: number before the first list's (it wraps).
+    /// Creates a publisher. `base` is the world as the scene file makes it, before the first step.
+    /// `revision` is the number before that of the first table; it wraps.
     pub fn new(base: &World, exact: bool, revision: u32) -> Publisher {
         Publisher {
             exact,
@@ -92,15 +95,15 @@ impl Publisher {
         }
     }
 
-    /// Payload of SNAPSHOT, of the last [`publish`](Self::publish); empty before the first.
+    /// Returns the SNAPSHOT payload of the last [`publish`](Self::publish); empty before the first.
     pub fn snapshot(&self) -> Arc<Vec<u8>> {
         self.snapshot.clone()
     }
 
-    /// Makes the payloads of a frame.
+    /// Encodes the payloads of a frame.
     ///
     /// # Errors
-    /// [`PublishError`]; the list of objects is then made anew by the next call.
+    /// [`PublishError`]. The next call then rebuilds the object table.
     pub fn publish(&mut self, world: &World, viewer: &Viewer, frame: u64) -> Result<Published, PublishError> {
         let fresh = self.snapshot.is_empty() || !self.is_current(world);
         if fresh {
@@ -131,7 +134,8 @@ impl Publisher {
         Ok(Published { state, hash, fresh, saturated })
     }
 
-    /// Whether the list is still that of the world: the same objects, and what stood still stands where it stood.
+    /// Returns whether the table still describes the world: the same objects, with every stationary
+    /// object at its pose.
     fn is_current(&self, world: &World) -> bool {
         let same = |row: &TableRow| {
             let Some(status) = world.status(row.id) else { return false };
@@ -143,7 +147,8 @@ impl Publisher {
         world.ids() == self.ids && self.rows.iter().all(same)
     }
 
-    /// What of an object travels: kind, whether it is still, whether it is alive, parts. `None`: nothing.
+    /// Returns kind, stationary flag, enabled flag and number of parts of an object; `None` if it
+    /// is not sent.
     fn classify(&self, world: &World, id: ObjectId) -> Option<(EntryKind, bool, bool, usize)> {
         let (object, status) = (world.object(id)?, world.status(id)?);
         let parts = world.view().state_range(id)?.parts.len();
@@ -156,7 +161,7 @@ impl Publisher {
         }
     }
 
-    /// Lists the objects anew and writes the snapshot.
+    /// Rebuilds the object table and writes the snapshot.
     fn rebuild_table(&mut self, world: &World) -> Result<(), PublishError> {
         self.revision = self.revision.wrapping_add(1);
         self.rows.clear();
@@ -216,7 +221,7 @@ impl Publisher {
     }
 }
 
-/// One object's body, and what of it will be seen.
+/// Appends the body of one object and hashes what a facet will see of it.
 fn put_row(
     out: &mut Vec<u8>,
     row: &TableRow,

@@ -1,16 +1,17 @@
-//! A run as a recording: what was sent, what users did, what facets answered. And back: the same facets driven from the file.
+//! Recordings of a run: frames as they were sent, inputs of the users and acknowledgements of the
+//! facets. A recording can drive the same facets again.
 //!
-//! The file is what [`crate::record`] writes, with poses for viewers. The state bytes of a frame are NetSync messages one behind the other, as
-//! [`wire`](super::wire) frames them:
+//! [`crate::record`] writes the file, with poses for viewers of other programs. The state bytes of
+//! a frame are NetSync messages in sequence, each with its header:
 //!
-//! | kind | header's `join` | |
+//! | kind | `join` in the header | content |
 //! |---|---|---|
-//! | JOIN | 0 | in the first frame: the hash of the scene; the name is the server's |
-//! | SNAPSHOT | 0 | where the list of objects is new, and in the first frame |
+//! | JOIN | 0 | in the first frame: hash of the scene; the name is the server's |
+//! | SNAPSHOT | 0 | if the object table is new, and in the first frame |
 //! | STATE | 0 | the frame |
-//! | READY | 0 | what a client must answer: the server's own hash |
-//! | INPUT | facet | what users did since the frame before |
-//! | PRESENTED | facet | what facets answered since then, each with its frame in the header |
+//! | READY | 0 | hash that a facet must acknowledge: the server's own |
+//! | INPUT | facet | inputs since the frame before |
+//! | PRESENTED | facet | acknowledgements since then, each with its frame in the header |
 
 use super::input::Input;
 use super::messages::{FrameAck, Join};
@@ -30,22 +31,23 @@ pub struct FrameRecord {
     pub frame: u64,
     /// Simulated time, s.
     pub time_s: f64,
-    /// Payload of SNAPSHOT, where the list of objects is new.
+    /// Payload of SNAPSHOT if the object table is new.
     pub snapshot: Option<Arc<Vec<u8>>>,
     /// Payload of STATE.
     pub state: Vec<u8>,
-    /// What a client that drew it must answer.
+    /// Hash that a facet which drew the frame must acknowledge.
     pub hash: Hash,
 }
 
-/// Writes a session. A frame is written when the next one comes, so that its answers are with it.
+/// Writes the recording of a session. A frame is written when the next one arrives, together with
+/// its acknowledgements.
 pub struct SessionRecorder {
     recorder: Recorder,
     every: u32,
     count: u64,
-    /// The frame that waits for its answers: number, time, poses, messages so far.
+    /// The frame that waits for its acknowledgements: number, time, poses, messages so far.
     waiting: Option<(u64, f64, Vec<Pose>, Vec<u8>)>,
-    /// What came in frames that are left out.
+    /// Inputs and acknowledgements of frames that are not recorded.
     notes: Vec<u8>,
     list: Option<Arc<Vec<u8>>>,
     names: Vec<String>,
@@ -53,11 +55,12 @@ pub struct SessionRecorder {
 }
 
 impl SessionRecorder {
-    /// Creates (or replaces) the file. `name` is the scene's, for people; `scene` its hash. One in `every` frames is recorded (`every_frames` of a cave file;
-    /// 0 counts as 1); inputs and answers all are.
+    /// Creates or replaces the file. `name` is the scene's name for readers, `scene` its hash.
+    /// Every `every`-th frame is recorded (`every_frames` of a cave file; 0 counts as 1), and every
+    /// input and acknowledgement.
     ///
     /// # Errors
-    /// As [`Recorder::create`].
+    /// Those of [`Recorder::create`].
     pub fn create(
         path: impl AsRef<Path>,
         name: &str,
@@ -81,11 +84,12 @@ impl SessionRecorder {
         })
     }
 
-    /// Records the frame published last: [`ServerSession::recorded`](super::ServerSession::recorded) of the world as it was then, with
+    /// Records the last published frame:
+    /// [`ServerSession::recorded`](super::ServerSession::recorded) of the world at that time, with
     /// `fresh` at the first call.
     ///
     /// # Errors
-    /// As [`Recorder::frame`].
+    /// Those of [`Recorder::frame`].
     pub fn frame(&mut self, world: &World, recorded: FrameRecord) -> Result<(), RecordError> {
         let first = self.count == 0;
         self.list = recorded.snapshot.or(self.list.take());
@@ -115,7 +119,7 @@ impl SessionRecorder {
         Ok(())
     }
 
-    /// Records what happened: inputs and answers.
+    /// Records the inputs and acknowledgements among the events.
     pub fn events(&mut self, events: &[ServerEvent]) {
         for event in events {
             let head = |kind, facet: FacetNumber, frame| MessageHeader {
@@ -143,7 +147,7 @@ impl SessionRecorder {
     /// Ends the recording.
     ///
     /// # Errors
-    /// As [`Recorder::finish`].
+    /// Those of [`Recorder::finish`].
     pub fn finish(mut self) -> Result<Summary, RecordError> {
         self.write_waiting()?;
         self.recorder.finish()
@@ -159,36 +163,34 @@ impl SessionRecorder {
 /// One frame of a recorded session.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedFrame {
-    /// What was published.
+    /// The published frame.
     pub recorded: FrameRecord,
-    /// What users did.
+    /// Inputs of users, by the facet that sent them.
     pub inputs: Vec<(FacetNumber, Input)>,
-    /// What facets answered, each with its frame.
+    /// Acknowledgements of facets, each with its frame.
     pub presented: Vec<(FacetNumber, u64, FrameAck)>,
 }
 
-/// Why a recording is not replayed.
+/// Error of a recording that cannot be replayed.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionReadError {
-    /// The file.
+    /// The file cannot be read as a recording.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// A recording, and of no session.
-    #[error(
-        "frame {0} of the recording is no frame of a session ({1}); record one with `[recording]` in the cave file"
-    )]
+    /// A frame of the recording holds no session.
+    #[error("frame {0} of the recording holds no session ({1}); record one with `[recording]` in the cave file")]
     Frame(u64, MessageError),
-    /// Of another scene.
+    /// The recording was made with another scene.
     #[error("the recording is of a scene with the hash {theirs}; this scene has {ours}")]
     Scene {
-        /// In the file.
+        /// Hash in the file, hexadecimal.
         theirs: String,
-        /// Here.
+        /// Hash of this scene, hexadecimal.
         ours: String,
     },
 }
 
-/// Reads a session back, frame by frame.
+/// Reads the recording of a session, frame by frame.
 pub struct SessionReader {
     reader: Reader,
     ahead: Option<RecordedFrame>,
@@ -196,22 +198,22 @@ pub struct SessionReader {
 }
 
 impl SessionReader {
-    /// Opens a recording, complete or cut.
+    /// Opens a recording, complete or truncated.
     ///
     /// # Errors
-    /// [`SessionReadError`]: no recording, or not of a session.
+    /// [`SessionReadError`] if the file is no recording, or not one of a session.
     pub fn open(path: impl AsRef<Path>) -> Result<SessionReader, SessionReadError> {
         let mut replay = SessionReader { reader: read(path)?, ahead: None, scene: [0; 32] };
         replay.ahead = replay.read_frame()?;
         Ok(replay)
     }
 
-    /// The hash of the scene it is of; zeros where no frame is left.
+    /// Returns the hash of the recorded scene; zeros if no frame can be read.
     pub fn scene(&self) -> [u8; 32] {
         self.scene
     }
 
-    /// Refuses another scene, with both hashes.
+    /// Checks that the recording was made with the scene of this hash.
     ///
     /// # Errors
     /// [`SessionReadError::Scene`].
@@ -224,7 +226,7 @@ impl SessionReader {
         }
     }
 
-    /// The next frame; `None` at the end.
+    /// Returns the next frame, or `None` at the end.
     ///
     /// # Errors
     /// [`SessionReadError`].
@@ -244,7 +246,7 @@ impl SessionReader {
     }
 }
 
-/// A frame's messages, and the scene's hash if it is among them.
+/// Parses the messages of a frame. Returns the hash of the scene too if it is among them.
 ///
 /// # Errors
 /// [`MessageError`].
@@ -253,7 +255,7 @@ pub fn parse_frame(mut bytes: &[u8]) -> Result<(RecordedFrame, Option<[u8; 32]>)
     let (mut inputs, mut presented) = (Vec::new(), Vec::new());
     while !bytes.is_empty() {
         let (header, payload, rest) = next_message(bytes)?;
-        let facet = u16::try_from(header.join).map_err(|_| MessageError::Malformed("a facet that there is not"))?;
+        let facet = u16::try_from(header.join).map_err(|_| MessageError::Malformed("an unknown facet"))?;
         match header.kind {
             MessageKind::Join => scene = Some(Join::read(payload)?.scene),
             MessageKind::Snapshot => snapshot = Some(Arc::new(payload.to_vec())),
@@ -270,12 +272,12 @@ pub fn parse_frame(mut bytes: &[u8]) -> Result<(RecordedFrame, Option<[u8; 32]>)
     Ok((RecordedFrame { recorded: FrameRecord { frame, time_s, snapshot, state, hash }, inputs, presented }, scene))
 }
 
-/// The message at the front, and what follows.
+/// Splits off the first message: header, payload, rest.
 fn next_message(bytes: &[u8]) -> Result<(MessageHeader, &[u8], &[u8]), MessageError> {
     let size = ByteReader(bytes.get(64..).unwrap_or_default()).u64()?;
     if size < HEADER_BYTES as u64 || size > MAX_MESSAGE_BYTES as u64 {
-        return Err(MessageError::Malformed("a message with a size that cannot be"));
+        return Err(MessageError::Malformed("a message with an impossible size"));
     }
-    let (first, rest) = bytes.split_at_checked(size as usize).ok_or(MessageError::Malformed("it ends too early"))?;
+    let (first, rest) = bytes.split_at_checked(size as usize).ok_or(MessageError::Malformed("unexpected end"))?;
     open(first).map(|(header, payload)| (header, payload, rest))
 }

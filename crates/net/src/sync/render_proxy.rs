@@ -1,9 +1,10 @@
-//! An object that is drawn and nothing else: what came by name, and the scene file has not.
+//! An object that is only drawn. It represents an object of the server that the scene file does not
+//! have.
 
 use tumble_collide::{Shape, Vec3};
 use tumble_core::{Collidable, CollisionGroup, Material, Object, PartState, Renderable, Visual};
 
-/// Parts with pictures, which stand where they are shown.
+/// Parts with visuals, at the poses that were set for display.
 #[derive(Clone)]
 pub(crate) struct RenderProxy {
     pub name: String,

@@ -1,4 +1,4 @@
-//! By what a server and a facet know that they mean the same scene.
+//! Hash of a scene, by which server and facets check that they have the same one.
 
 use super::viewer::put_exact_pose;
 use super::wire::{put_f64, put_name};
@@ -6,8 +6,10 @@ use std::path::Path;
 use tumble_collide::{Shape, TriMesh};
 use tumble_core::{Appearance, Drawn, World};
 
-/// The BLAKE3 of a scene: the text of its file (lights, camera, sky), and everything in the world as it makes it that can be seen: names, modes, poses,
-/// shapes with every corner of every mesh, looks (textures by the names of their files). So a mesh file that differs is found even where the scene file is the same.
+/// Returns the BLAKE3 hash of a scene. It covers `text` (camera, lights, sky of the file) and
+/// everything visible in the world: names, status, poses, shapes with all vertices of meshes, and
+/// appearances with the names of their texture files. So a changed mesh file is found even if the
+/// scene file is the same.
 pub fn scene_hash(text: &str, world: &World) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
     hasher.update(&(text.len() as u64).to_le_bytes());
@@ -32,7 +34,7 @@ pub fn scene_hash(text: &str, world: &World) -> [u8; 32] {
                 Drawn::Shape(Shape::Cylinder(c)) => put_f64(&mut out, &[4.0, c.radius(), c.half_length()]),
                 Drawn::Shape(other) => out.extend(format!("{other:?}").bytes()), // plain numbers, written so that they read back the same
             }
-            // a texture by its file's name: the folder is another one on another machine
+            // by file name only: the folder differs between machines
             let texture = visual
                 .appearance
                 .texture

@@ -1,33 +1,35 @@
-//! A network that does its worst, and the same worst again for the same seed. It carries single messages and mends nothing: what a session survives
-//! here it survives over any link that keeps less than its promise.
+//! A network with faults, reproducible by its seed. It carries single messages and repairs nothing.
+//! A session that works over it works over any link with weaker faults.
 //!
-//! It has no clock: `now` is whatever the caller says, and messages come out in the order of their time of arrival.
+//! It has no clock: the caller gives `now`, and messages are delivered in the order of their
+//! arrival times.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// What happens to messages. Shares are of 1.
+/// Faults of the network. Probabilities are from 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NetworkConditions {
-    /// Share that is lost.
+    /// Probability that a message is lost.
     pub loss: f64,
-    /// Share that arrives twice.
+    /// Probability that a message arrives twice.
     pub duplication: f64,
-    /// Share that is held back by up to four times `delay`, so that others overtake it.
+    /// Probability that a message is delayed by up to four more times the maximum of `delay`, so
+    /// that others overtake it.
     pub reordering: f64,
-    /// Share of which one to three bits are flipped, or the end is cut off.
+    /// Probability that one to three bits of a message are flipped, or that its end is cut off.
     pub corruption: f64,
-    /// Least and most time under way.
+    /// Minimum and maximum delay.
     pub delay: [Duration; 2],
 }
 
 impl NetworkConditions {
-    /// At once, and all of it.
+    /// No delay and no faults.
     pub const PERFECT: NetworkConditions =
         NetworkConditions { loss: 0.0, duplication: 0.0, reordering: 0.0, corruption: 0.0, delay: [Duration::ZERO; 2] };
 }
 
-/// Where a message goes: to the server, or to a facet.
+/// Direction of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Destination {
     /// From this facet to the server.
@@ -36,22 +38,22 @@ pub enum Destination {
     Facet(u16),
 }
 
-/// What the network did.
+/// Counts of the network.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkStats {
-    /// Messages given to it.
+    /// Messages sent.
     pub sent: u64,
-    /// Lost, or swallowed by a partition.
+    /// Lost by chance or by a partition.
     pub lost: u64,
     /// Delivered twice.
     pub duplicated: u64,
     /// Held back.
     pub reordered: u64,
-    /// Delivered damaged.
+    /// Delivered with damage.
     pub corrupted: u64,
 }
 
-/// The network between a server and its facets.
+/// Simulated network between a server and its facets.
 pub struct SimulatedNetwork {
     random_state: u64,
     conditions: NetworkConditions,
@@ -62,7 +64,7 @@ pub struct SimulatedNetwork {
 }
 
 impl SimulatedNetwork {
-    /// The same seed and the same calls give the same deliveries.
+    /// Creates the network. The same seed and the same calls give the same deliveries.
     pub fn new(seed: u64, conditions: NetworkConditions) -> SimulatedNetwork {
         SimulatedNetwork {
             random_state: super::facet::splitmix64(seed) | 1,
@@ -74,12 +76,13 @@ impl SimulatedNetwork {
         }
     }
 
-    /// Changes the weather for what is sent from now on.
+    /// Sets the conditions for later messages.
     pub fn set_conditions(&mut self, conditions: NetworkConditions) {
         self.conditions = conditions;
     }
 
-    /// Cuts a facet off, or joins it again. What is under way to and from it is lost.
+    /// Separates a facet from the server, or connects it again. A separation discards its messages
+    /// in flight.
     pub fn set_partitioned(&mut self, facet: u16, partitioned: bool) {
         self.partitioned.retain(|&f| f != facet);
         if partitioned {
@@ -89,12 +92,12 @@ impl SimulatedNetwork {
         }
     }
 
-    /// What it did so far.
+    /// Returns the counts so far.
     pub fn stats(&self) -> LinkStats {
         self.stats
     }
 
-    /// Takes a message.
+    /// Sends a message.
     pub fn send(&mut self, now: Duration, to: Destination, message: &[u8]) {
         self.stats.sent += 1;
         let (Destination::Server(facet) | Destination::Facet(facet)) = to;
@@ -121,12 +124,12 @@ impl SimulatedNetwork {
         }
     }
 
-    /// When the next message arrives.
+    /// Returns when the next message arrives.
     pub fn next_arrival(&self) -> Option<Duration> {
         self.in_flight.keys().next().map(|(at, _)| *at)
     }
 
-    /// The next message that has arrived by `now`.
+    /// Returns the next message that has arrived by `now`.
     pub fn receive(&mut self, now: Duration) -> Option<(Destination, Vec<u8>)> {
         let first = self.in_flight.first_entry()?;
         (first.key().0 <= now).then(|| first.remove())

@@ -1,29 +1,31 @@
-//! Payloads of SNAPSHOT and STATE: objects by name once, by index afterwards.
+//! Payloads of SNAPSHOT and STATE. A snapshot lists the objects by name (the object table), and a
+//! state refers to them by index.
 //!
 //! ```text
 //! SNAPSHOT  revision u32 | exact u8 | 0 u8 | 0 u16 | count u32 | count times: name 64, size u64, body
-//!           body: kind u8 | flags u8 | parts u16 | 20 bytes per part if it is still | looks if it is described
+//!           body: kind u8 | flags u8 | parts u16 | 20 bytes per part if it is stationary | visuals if it is described
 //! STATE     revision u32 | count u32 | count times: index u32, size u32, body
-//!           body: 20 bytes per part | the object's own message | the viewer; nothing if it is not alive
+//!           body: 20 bytes per part | the object's own message | the viewer; nothing if it is not enabled
 //! ```
 //!
-//! A state has each object of the snapshot that is not still, in order: whole, or refused. Whatever changes the list (an object added, removed, a still
-//! one moved) makes a new revision and a new snapshot.
+//! A state holds every object of the snapshot that is not stationary, in order; a partial state is
+//! refused. Every change of the table makes a new revision and a new snapshot: an object added or
+//! removed, or a stationary object moved.
 
 use super::quantize::POSE_BYTES;
 use super::wire::{ByteReader, MessageError, put_name};
 
-/// Most objects of a scene.
+/// Maximum number of objects of a scene.
 pub const MAX_OBJECTS: usize = 100_000;
 
-/// What of an object travels.
+/// How an object is sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EntryKind {
-    /// Quantised poses of its parts.
+    /// Quantized poses of its parts.
     Poses,
-    /// Its own message, exact (thesis `GetData`).
+    /// Its own message, exact (thesis §IV.C, `GetData`).
     Exact,
-    /// The viewer's.
+    /// The viewer.
     Viewer,
 }
 
@@ -32,27 +34,27 @@ const ALIVE: u8 = 1;
 const STATIONARY: u8 = 2;
 const DESCRIBED: u8 = 4;
 
-/// One object in a snapshot.
+/// An entry of the object table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry<'a> {
     /// Its name.
     pub name: &'a str,
-    /// What of it travels.
+    /// How the object is sent.
     pub kind: EntryKind,
-    /// Whether a still object is there; of others the state says.
+    /// Whether a stationary object is enabled. For others the state says so.
     pub enabled: bool,
-    /// It does not move: its poses are here and in no state.
+    /// The object does not move: its poses are in the table and in no state.
     pub stationary: bool,
-    /// It is not in the scene file: how it looks is here.
+    /// The scene file does not have the object: its visuals are in the table.
     pub described: bool,
     /// Number of its parts.
     pub parts: u16,
-    /// Poses of a still one, then looks of a described one.
+    /// Poses of a stationary object, then visuals of a described one.
     pub body: &'a [u8],
 }
 
 impl Entry<'_> {
-    /// Appends it, with its header.
+    /// Appends the entry with its header.
     pub fn write(&self, out: &mut Vec<u8>) {
         put_name(out, self.name);
         out.extend((4 + self.body.len() as u64).to_le_bytes());
@@ -64,18 +66,18 @@ impl Entry<'_> {
     }
 }
 
-/// A snapshot's payload, taken apart.
+/// Payload of a snapshot, parsed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot<'a> {
-    /// Number of the list.
+    /// Number of the table.
     pub revision: u32,
-    /// For a replica: exact messages where objects have them.
+    /// For a replica: exact messages of the objects that have them.
     pub exact: bool,
     /// The objects.
     pub entries: Vec<Entry<'a>>,
 }
 
-/// Appends what stands before the entries.
+/// Appends the header before the entries.
 pub(crate) fn put_snapshot_head(out: &mut Vec<u8>, revision: u32, exact: bool, count: usize) {
     out.extend(revision.to_le_bytes());
     out.extend([exact as u8, 0, 0, 0]);
@@ -83,7 +85,7 @@ pub(crate) fn put_snapshot_head(out: &mut Vec<u8>, revision: u32, exact: bool, c
 }
 
 impl<'a> Snapshot<'a> {
-    /// The number of its list alone.
+    /// Returns the revision alone.
     ///
     /// # Errors
     /// [`MessageError::Malformed`].
@@ -91,7 +93,7 @@ impl<'a> Snapshot<'a> {
         ByteReader(payload).u32()
     }
 
-    /// Takes a payload apart.
+    /// Parses a payload.
     ///
     /// # Errors
     /// [`MessageError::Malformed`].
@@ -100,9 +102,9 @@ impl<'a> Snapshot<'a> {
         let (revision, exact) = (rest.u32()?, rest.array()?);
         let count = rest.u32()? as usize;
         if count > MAX_OBJECTS || !matches!(exact, [0 | 1, 0, 0, 0]) {
-            return Err(MessageError::Malformed("more than 100000 objects, or a flag that there is not"));
+            return Err(MessageError::Malformed("more than 100000 objects, or an unknown flag"));
         }
-        // a count is believed no further than the bytes go: an entry has 76 at least
+        // the capacity is bounded by the bytes there: an entry has at least 76
         let mut entries = Vec::with_capacity(count.min(payload.len() / 76));
         for _ in 0..count {
             entries.push(entry(&mut rest)?);
@@ -117,18 +119,18 @@ fn entry<'a>(rest: &mut ByteReader<'a>) -> Result<Entry<'a>, MessageError> {
     let size = rest.u64()?;
     let mut body = ByteReader(rest.take(size)?);
     let (kind, flags, parts) = (body.u8()?, body.u8()?, body.u16()?);
-    let kind = *KINDS.get(kind as usize).ok_or(MessageError::Malformed("a kind of object that there is not"))?;
+    let kind = *KINDS.get(kind as usize).ok_or(MessageError::Malformed("an unknown kind of object"))?;
     if flags & !(ALIVE | STATIONARY | DESCRIBED) != 0 {
-        return Err(MessageError::Malformed("a flag that there is not"));
+        return Err(MessageError::Malformed("an unknown flag"));
     }
     let [enabled, stationary, described] = [ALIVE, STATIONARY, DESCRIBED].map(|bit| flags & bit != 0);
     if (stationary || described) && kind == EntryKind::Viewer {
-        return Err(MessageError::Malformed("a viewer that is still or described"));
+        return Err(MessageError::Malformed("a viewer that is stationary or described"));
     }
     Ok(Entry { name, kind, enabled, stationary, described, parts, body: body.0 })
 }
 
-/// Appends what stands before the records of a state.
+/// Appends the header before the records of a state.
 pub(crate) fn put_state_head(out: &mut Vec<u8>, revision: u32, count: usize) {
     out.extend(revision.to_le_bytes());
     out.extend((count as u32).to_le_bytes());
@@ -144,17 +146,17 @@ pub(crate) fn put_record(out: &mut Vec<u8>, index: usize, write: impl FnOnce(&mu
     out[start - 4..start].copy_from_slice(&size.to_le_bytes());
 }
 
-/// The revision and the records of a state's payload, in order.
+/// Returns revision, count and records of a state's payload.
 ///
 /// # Errors
-/// [`MessageError::Malformed`], of the head here and of a record where it comes.
+/// [`MessageError::Malformed`] of the header. The iterator returns the error of a record.
 pub(crate) fn parse_state(payload: &[u8]) -> Result<(u32, u32, Records<'_>), MessageError> {
     let mut rest = ByteReader(payload);
     let (revision, count) = (rest.u32()?, rest.u32()?);
     Ok((revision, count, Records { rest, left: count }))
 }
 
-/// Records of a state: index and body.
+/// Iterator over the records of a state: index and body.
 pub(crate) struct Records<'a> {
     rest: ByteReader<'a>,
     left: u32,
@@ -182,7 +184,7 @@ impl<'a> Iterator for Records<'a> {
     }
 }
 
-/// How many bytes the poses of that many parts take.
+/// Returns the number of bytes of the poses of `parts` parts.
 pub(crate) fn poses_bytes(parts: u16) -> usize {
     parts as usize * POSE_BYTES
 }

@@ -1,80 +1,96 @@
-//! What the session asks of whatever carries its messages: shared memory, datagrams, or a simulated network.
+//! Contract between a session and the transport that carries its messages: shared memory, UDP, or
+//! queues within a process.
 //!
-//! One server, up to [`MAX_FACETS`] facets. A facet is known by its number in the cave file, so a facet that was killed and started again comes back
-//! under the same number. A *connection* lives from [`LinkEvent::Opened`] to [`LinkEvent::Closed`] on the same side; a facet has at most one at a time.
+//! There is one server and up to [`MAX_FACETS`] facets. A facet is identified by its number in the
+//! cave file, so a facet that was killed and restarted returns under the same number. A
+//! *connection* lives from [`LinkEvent::Opened`] to [`LinkEvent::Closed`] on the same side. A facet
+//! has at most one connection at a time.
 //!
 //! # The contract
 //!
-//! - A message is opaque bytes, 1 to [`MAX_MESSAGE_BYTES`]. It arrives whole and unchanged or not at all; a link never delivers a part.
-//! - [`Delivery::Reliable`]: within a connection every such message arrives, once, in the order in which it was sent, or the connection is closed.
-//!   There is no promise across connections: what was under way when one closed is gone.
-//! - [`Delivery::Newest`]: arrives at most once, never after a later one, and may be left out where a later one exists or a repair would be late. The
-//!   last one sent does arrive while the connection lives. Reliable and newest messages may overtake each other.
-//! - Nothing of an earlier connection arrives after the `Opened` of a later one.
-//! - `send` never waits. Where a peer has not taken [`MAX_QUEUED_BYTES`] of reliable messages its connection is closed (`Closed::Overrun`): a slow viewer
-//!   never stalls the wall. Where the link is not open a message is dropped, counted as `unsent`, and `send` says `false`.
-//! - `recv` waits at most `timeout` and is also where the link does its work (retransmission, liveness): whoever holds a link calls it again and again.
-//!   `None` means that the time is over. It does not spin.
-//! - A facet's link looks for its server by itself and goes on for ever: after `Closed` it looks again, and tells `Opened` when it found one.
-//! - What a peer sends is not trusted: lengths are checked before any allocation, and what is refused is counted by reason ([`Refused`]) and never
-//!   ends the link. [`LinkError`] is for this side's own system (a socket, shared memory) alone.
+//! - A message is an opaque byte string of 1 to [`MAX_MESSAGE_BYTES`]. It arrives whole and
+//!   unchanged or not at all.
+//! - [`Delivery::Reliable`]: within a connection, every such message arrives once and in order, or
+//!   the connection is closed. Nothing is guaranteed across connections: messages in flight are
+//!   lost when a connection closes.
+//! - [`Delivery::Newest`]: a message arrives at most once and never after a later one. It may be
+//!   dropped if a later one exists or a repair would be late. The last one sent does arrive while
+//!   the connection lives. Reliable and newest messages may overtake each other.
+//! - No message of an earlier connection arrives after the `Opened` of a later one.
+//! - `send` never blocks. If a peer has not taken [`MAX_QUEUED_BYTES`] of reliable messages, its
+//!   connection is closed (`Closed::Overrun`), so a slow facet never stalls the others. Without a
+//!   connection the message is dropped and counted as `unsent`, and `send` returns `false`.
+//! - `recv` waits at most `timeout`, and does the link's work (retransmission, liveness). The owner
+//!   of a link must call it again and again. `None` means that the timeout has passed. It does not
+//!   spin.
+//! - A facet's link looks for its server by itself and without end: after `Closed` it reconnects
+//!   and reports `Opened`.
+//! - Data of a peer is not trusted. Lengths are checked before any allocation. Refused data is
+//!   counted by reason ([`Refused`]) and never ends the link. [`LinkError`] reports only failures
+//!   of this side's system (a socket, shared memory).
 //!
-//! Whether a peer may draw, is late or speaks the same version is the session's business.
+//! The session decides whether a peer may join, is late or has the right version.
 
 use std::time::Duration;
 
-/// Most facets of a server.
+/// Maximum number of facets of a server.
 pub const MAX_FACETS: usize = 64;
-/// Most bytes in one message.
+/// Maximum length of a message, bytes.
 pub const MAX_MESSAGE_BYTES: usize = 16 << 20;
-/// Most bytes of reliable messages that wait for one peer.
+/// Maximum size of the reliable messages that wait for one peer, bytes.
 pub const MAX_QUEUED_BYTES: usize = 64 << 20;
 
-/// A facet's number: its place among the facets of the cave file, below [`MAX_FACETS`].
+/// Number of a facet: its index in the cave file, below [`MAX_FACETS`].
 pub type FacetNumber = u16;
 
-/// What is promised for a message.
+/// Delivery guarantee of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Delivery {
-    /// Every one, once, in order, or the connection closes.
+    /// Each message arrives once and in order, or the connection closes.
     Reliable,
-    /// The newest is what matters.
+    /// Only the newest message matters.
     Newest,
 }
 
 /// Why a connection ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Closed {
-    /// The other side said so.
+    /// The peer closed it.
     ByPeer,
-    /// This side said so ([`ServerLink::close`], [`FacetLink::close`]).
+    /// This side closed it ([`ServerLink::close`], [`FacetLink::close`]).
     ByUs,
-    /// Nothing was heard for too long.
+    /// Nothing was received for the idle timeout.
     TimedOut,
-    /// A new connection of the same facet took its place: it was started again.
+    /// A new connection of the same facet replaced it: the facet was restarted.
     Replaced,
-    /// It did not take what was sent to it.
+    /// The peer did not take the messages sent to it.
     Overrun,
 }
 
-/// What `recv` reports.
+/// Event that `recv` reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinkEvent {
-    /// A connection is there.
+    /// A connection was opened.
     Opened,
     /// A message is in the buffer.
     Message,
-    /// The connection is gone.
+    /// The connection was closed.
     Closed(Closed),
 }
 
-/// The server's end.
+/// The server's side of a transport.
 pub trait ServerLink {
-    /// Sends to one facet. `false`: there is no connection, or the message is empty or too long; nothing was sent.
+    /// Sends a message to one facet. Returns `false` if there is no connection, or if the message
+    /// is empty or too long.
     ///
-    /// Errors: this side's system refuses.
+    /// # Errors
+    /// This side's system refuses.
     fn send(&mut self, to: FacetNumber, delivery: Delivery, message: &[u8]) -> Result<bool, LinkError>;
-    /// Sends the same message to each of `to`; how many it was sent to. A transport that can write once for all does.
+    /// Sends a message to each facet of `to` and returns how many it was sent to. A transport that
+    /// can write once for all does so.
+    ///
+    /// # Errors
+    /// This side's system refuses.
     fn send_all(&mut self, to: &[FacetNumber], delivery: Delivery, message: &[u8]) -> Result<usize, LinkError> {
         let mut sent = 0;
         for &facet in to {
@@ -82,34 +98,47 @@ pub trait ServerLink {
         }
         Ok(sent)
     }
-    /// Waits at most `timeout` for something from any facet. `message` is cleared, and filled on [`LinkEvent::Message`]. `None`: time is over.
+    /// Waits at most `timeout` for an event of any facet. `message` is cleared, and filled on
+    /// [`LinkEvent::Message`]. Returns `None` after the timeout.
+    ///
+    /// # Errors
+    /// This side's system fails.
     fn recv(&mut self, timeout: Duration, message: &mut Vec<u8>)
     -> Result<Option<(FacetNumber, LinkEvent)>, LinkError>;
-    /// Ends a facet's connection; it may come back. What was sent before need not arrive. `recv` reports `Closed(ByUs)` if there was one.
+    /// Closes a facet's connection; the facet may return. Messages sent before need not arrive.
+    /// `recv` reports `Closed(ByUs)` if there was a connection.
     fn close(&mut self, facet: FacetNumber);
-    /// What happened on a facet's connections so far.
+    /// Returns the counters of a facet's connections.
     fn counters(&self, facet: FacetNumber) -> LinkCounters;
-    /// What was refused and could not be laid to any facet (a stranger's datagram).
+    /// Returns the counters of refused data that belongs to no facet.
     fn unknown_peers(&self) -> LinkCounters {
         LinkCounters::default()
     }
 }
 
-/// A facet's end.
+/// A facet's side of a transport.
 pub trait FacetLink {
-    /// Sends to the server. `false`: there is no connection, or the message is empty or too long; nothing was sent.
+    /// Sends a message to the server. Returns `false` if there is no connection, or if the message
+    /// is empty or too long.
     ///
-    /// Errors: this side's system refuses.
+    /// # Errors
+    /// This side's system refuses.
     fn send(&mut self, delivery: Delivery, message: &[u8]) -> Result<bool, LinkError>;
-    /// Waits at most `timeout` for something from the server. `message` is cleared, and filled on [`LinkEvent::Message`]. `None`: time is over.
+    /// Waits at most `timeout` for an event of the server. `message` is cleared, and filled on
+    /// [`LinkEvent::Message`]. Returns `None` after the timeout.
+    ///
+    /// # Errors
+    /// This side's system fails.
     fn recv(&mut self, timeout: Duration, message: &mut Message) -> Result<Option<LinkEvent>, LinkError>;
-    /// Ends the connection; the link then looks for a server anew. `recv` reports `Closed(ByUs)` if there was one.
+    /// Closes the connection; the link then looks for a server again. `recv` reports `Closed(ByUs)`
+    /// if there was a connection.
     fn close(&mut self);
-    /// What happened on this link so far.
+    /// Returns the counters of this link.
     fn counters(&self) -> LinkCounters;
 }
 
-/// The bytes of a message that arrived: a facet's own, or lent by the transport where they lie (shared memory), until this is dropped.
+/// Bytes of a received message: owned, or on loan from the transport (shared memory) until this
+/// value is dropped.
 #[derive(Default)]
 pub struct Message(Storage);
 
@@ -119,12 +148,12 @@ enum Storage {
 }
 
 impl Message {
-    /// Shows bytes that somebody lends.
+    /// Wraps bytes on loan.
     pub fn loaned(bytes: impl AsRef<[u8]> + Send + 'static) -> Message {
         Message(Storage::Loaned(Box::new(bytes)))
     }
 
-    /// The bytes as one's own: copied if they are lent.
+    /// Returns the bytes, copied if they are on loan.
     pub fn into_vec(self) -> Vec<u8> {
         match self.0 {
             Storage::Owned(bytes) => bytes,
@@ -132,7 +161,7 @@ impl Message {
         }
     }
 
-    /// An empty one, and the buffer that this one had, if it had one of its own.
+    /// Empties the message and returns its buffer if it owned one.
     pub(crate) fn clear(&mut self) -> Vec<u8> {
         match std::mem::take(&mut self.0) {
             Storage::Owned(mut buffer) => {
@@ -166,29 +195,29 @@ impl std::ops::Deref for Message {
     }
 }
 
-/// Why something that arrived was not taken.
+/// Reason for which received data was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Refused {
-    /// Shorter than its header, or than its header says.
+    /// Shorter than its header, or than the header says.
     Truncated,
-    /// Longer than allowed, or than its header says.
+    /// Longer than allowed, or than the header says.
     Oversize,
     /// Not of this protocol, or of another version of it.
     Foreign,
-    /// Its seal does not fit: forged, flipped, or of another key.
+    /// The authentication tag is wrong: forged, damaged, or made with another key.
     Forged,
-    /// It was taken before.
+    /// Received before.
     Replayed,
-    /// Older than what the replay window remembers, or of an earlier connection.
+    /// Older than the replay window, or of an earlier connection.
     Stale,
-    /// Its fragments contradict each other, or its checksum does not fit.
+    /// Contradictory fragments, or a wrong checksum.
     Torn,
-    /// From no facet that this cave has.
+    /// From an unknown address, or for a facet that the cave does not have.
     UnknownPeer,
 }
 
 impl Refused {
-    /// All of them, in the order of [`LinkCounters::refused`].
+    /// All reasons, in the order of [`LinkCounters::refused`].
     pub const ALL: [Refused; 8] = [
         Refused::Truncated,
         Refused::Oversize,
@@ -200,7 +229,7 @@ impl Refused {
         Refused::UnknownPeer,
     ];
 
-    /// In lower case, as reports print it.
+    /// Returns the name in lower case, as reports print it.
     pub fn name(self) -> &'static str {
         match self {
             Refused::Truncated => "truncated",
@@ -215,7 +244,7 @@ impl Refused {
     }
 }
 
-/// Counts of one link. They wrap.
+/// Counters of one link. They wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkCounters {
     /// Connections opened.
@@ -224,45 +253,45 @@ pub struct LinkCounters {
     pub messages_in: u64,
     /// Messages sent from this side.
     pub messages_out: u64,
-    /// Bytes that arrived, with everything around the messages.
+    /// Bytes received, including headers.
     pub bytes_in: u64,
-    /// Bytes that left, with everything around the messages and every repeat.
+    /// Bytes sent, including headers and repeated packets.
     pub bytes_out: u64,
-    /// Packets (or fragments) sent again.
+    /// Packets or fragments sent again.
     pub repeated: u64,
-    /// Newest messages that a later one replaced before they were delivered.
+    /// Newest messages that a later one replaced before delivery.
     pub superseded: u64,
-    /// Messages that were not sent because there was no connection.
+    /// Messages not sent because there was no connection.
     pub unsent: u64,
-    /// What arrived and was not taken, in the order of [`Refused::ALL`].
+    /// Refused packets, in the order of [`Refused::ALL`].
     pub refused: [u64; Refused::ALL.len()],
 }
 
 impl LinkCounters {
-    /// Counts something that was not taken.
+    /// Counts refused data.
     pub fn refuse(&mut self, why: Refused) {
         let count = &mut self.refused[why as usize];
         *count = count.wrapping_add(1);
     }
 
-    /// How often something was refused for this reason.
+    /// Returns how often data was refused for this reason.
     pub fn refused_for(&self, why: Refused) -> u64 {
         self.refused[why as usize]
     }
 }
 
-/// This side's system refuses.
+/// Failure of this side's system.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
-    /// A socket or file.
+    /// A socket or file failed.
     #[error("{what}: {why}")]
     Io {
-        /// What was tried, with the address or path.
+        /// The operation, with the address or path.
         what: String,
-        /// What the system says.
+        /// The system's error.
         why: std::io::Error,
     },
-    /// Anything else: a service that cannot be opened, a key that is none.
+    /// Any other failure, such as a service that cannot be opened or an invalid key.
     #[error("{0}")]
     Other(String),
 }

@@ -1,32 +1,34 @@
-//! Who looks, and where the cave stands: the thesis's `SidData` (§IV.C), an object among the others.
+//! The users' heads and the cave's place in the scene, which are sent as one object among the
+//! others (thesis §IV.C, `SidData`).
 
 use super::wire::{ByteReader, MessageError, put_f64};
 use tumble_collide::{Pose, Quat, Vec3};
 
-/// The name it is addressed by.
+/// Name of the viewer in the object table.
 pub const VIEWER_NAME: &str = "SidData";
-/// Most users of a cave.
+/// Maximum number of users of a cave.
 pub const MAX_USERS: usize = 256;
 
-/// One user, in the cave's frame.
+/// A user, in the cave's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct User {
     /// Head: the origin between the eyes (m), x to the right, y ahead, z up.
     pub head: Pose,
-    /// Between the eyes, m.
+    /// Distance between the eyes, m.
     pub interpupillary_m: f64,
-    /// Sequence number of the newest [`Input`](super::Input) of this user that the frame shows; 0 for none.
+    /// Sequence number of the newest [`Input`](super::Input) of this user that the frame shows; 0
+    /// if there is none.
     pub input: u64,
 }
 
-/// Users and camera, exact.
+/// Users and place of the cave, in double precision.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Viewer {
-    /// In the order of the cave file.
+    /// Users in the order of the cave file.
     pub users: Vec<User>,
-    /// The cave's frame in the scene.
+    /// Pose of the cave's frame in the scene.
     pub cave: Pose,
-    /// Metres of the scene to a metre of the cave.
+    /// Meters of the scene per meter of the cave.
     pub scale: f64,
 }
 
@@ -37,7 +39,8 @@ impl Default for Viewer {
 }
 
 impl Viewer {
-    /// Appends it: place (7 numbers), scale, count (u16), and 80 bytes per user. Users beyond [`MAX_USERS`] are left out.
+    /// Appends pose (7 numbers), scale, count (u16), and 80 bytes per user. Users beyond
+    /// [`MAX_USERS`] are left out.
     pub fn write(&self, out: &mut Vec<u8>) {
         let users = &self.users[..self.users.len().min(MAX_USERS)];
         put_exact_pose(out, &self.cave);
@@ -50,7 +53,7 @@ impl Viewer {
         }
     }
 
-    /// Reads what [`write`](Self::write) wrote.
+    /// Reads the bytes of [`write`](Self::write).
     ///
     /// # Errors
     /// [`MessageError::Malformed`].
@@ -68,7 +71,7 @@ impl Viewer {
     }
 }
 
-/// Position and `x, y, z, w`.
+/// Appends position, then quaternion as `x, y, z, w`.
 pub(crate) fn put_exact_pose(out: &mut Vec<u8>, pose: &Pose) {
     put_f64(out, pose.translation.vector.as_slice());
     put_f64(out, pose.rotation.coords.as_slice());

@@ -1,7 +1,8 @@
-//! How an object looks that the scene file does not have: shapes, colours and poses, as bytes.
+//! Visuals of objects that the scene file does not have, as bytes: shapes, poses and appearances.
 //!
-//! A mesh that is drawn anywhere in the scene of the file travels as a reference (object and number of the visual); another one travels whole, once per
-//! snapshot and object, and is drawn as it is on the other side: nothing collides there, so that it need not be a solid.
+//! A mesh that the scene file draws anywhere is sent as a reference (object and index of the
+//! visual). Any other mesh is sent whole, once per snapshot and object. It is only drawn by the
+//! receiver, so it need not be closed.
 
 use super::viewer::{exact_pose, put_exact_pose};
 use super::wire::{ByteReader, MessageError, put_f64, put_name};
@@ -9,14 +10,14 @@ use std::sync::Arc;
 use tumble_collide::{Shape, TriMesh, Vec3};
 use tumble_core::{Appearance, Drawn, Visual, VisualGeometry, VisualMesh, World};
 
-/// Most pictures of one object.
+/// Maximum number of visuals of one object.
 pub const MAX_VISUALS: usize = 4096;
-/// Most properties of a look.
+/// Maximum number of properties of an appearance.
 const MAX_PROPERTIES: usize = 64;
-/// Most bytes of a shader's or property's name.
+/// Maximum length of the name of a shader or property, bytes.
 const MAX_TEXT: usize = 255;
 
-/// Appends the pictures. `base` is the world as the scene file makes it.
+/// Appends the visuals. `base` is the world as the scene file makes it.
 pub(crate) fn put_visuals(out: &mut Vec<u8>, visuals: &[Visual], base: &World) {
     let drawn: Vec<(&Visual, Drawn<'_>)> =
         visuals.iter().filter_map(|visual| Some((visual, visual.drawn()?))).take(MAX_VISUALS).collect();
@@ -64,7 +65,8 @@ fn put_geometry(out: &mut Vec<u8>, drawn: Drawn<'_>, base: &World) {
     }
 }
 
-/// Where the scene of the file draws the same: the object's name and the number of the visual.
+/// Finds the same geometry in the scene of the file. Returns the object's name and the index of the
+/// visual.
 fn place_of(base: &World, same: impl Fn(&VisualGeometry) -> bool) -> Option<(&str, usize)> {
     base.ids().iter().find_map(|&id| {
         let object = base.object(id)?;
@@ -111,18 +113,18 @@ fn put_text(out: &mut Vec<u8>, text: &str) {
     out.extend(&text.as_bytes()[..end]);
 }
 
-/// Reads pictures of an object of `parts` parts; `base` as before.
+/// Reads the visuals of an object with `parts` parts; `base` as in [`put_visuals`].
 pub(crate) fn get_visuals(bytes: &[u8], parts: usize, base: &World) -> Result<Vec<Visual>, MessageError> {
     let mut rest = ByteReader(bytes);
     let count = rest.u32()? as usize;
     if count > MAX_VISUALS {
-        return Err(MessageError::Malformed("more than 4096 pictures of an object"));
+        return Err(MessageError::Malformed("more than 4096 visuals of an object"));
     }
     let mut visuals = Vec::new();
     for _ in 0..count {
         let part = rest.u32()? as usize;
         if part >= parts {
-            return Err(MessageError::Malformed("a picture of a part that there is not"));
+            return Err(MessageError::Malformed("a visual of an unknown part"));
         }
         let pose = exact_pose(&mut rest)?;
         let geometry = get_geometry(&mut rest, base)?;
@@ -154,7 +156,7 @@ fn get_geometry(rest: &mut ByteReader<'_>, base: &World) -> Result<VisualGeometr
             })?;
             return Ok(VisualGeometry::Mesh(Arc::new(mesh)));
         }
-        _ => return Err(MessageError::Malformed("a shape that there is not")),
+        _ => return Err(MessageError::Malformed("an unknown shape")),
     };
     shape.map(VisualGeometry::Shape).map_err(|_| MessageError::Malformed("a shape with a size that is not above 0"))
 }
@@ -164,7 +166,7 @@ fn mesh_of(base: &World, name: &str, index: usize) -> Result<VisualGeometry, Mes
     let visual = object.and_then(|o| o.renderable()).and_then(|r| r.visuals().get(index));
     visual
         .map(|v| v.geometry.clone())
-        .ok_or_else(|| MessageError::Unfit(format!("picture {index} of '{name}', which the scene has not")))
+        .ok_or_else(|| MessageError::Unfit(format!("visual {index} of '{name}', which the scene does not have")))
 }
 
 fn get_mesh(rest: &mut ByteReader<'_>) -> Result<TriMesh, MessageError> {
@@ -175,7 +177,7 @@ fn get_mesh(rest: &mut ByteReader<'_>) -> Result<TriMesh, MessageError> {
     let triangle = |_| Ok([indices.u32()?, indices.u32()?, indices.u32()?]);
     let triangles: Vec<[u32; 3]> = (0..triangles).map(triangle).collect::<Result<_, MessageError>>()?;
     if triangles.iter().flatten().any(|&i| i as usize >= vertices.len()) {
-        return Err(MessageError::Malformed("a triangle with a corner that there is not"));
+        return Err(MessageError::Malformed("a triangle with an unknown vertex"));
     }
     Ok(TriMesh { vertices, triangles })
 }
@@ -185,7 +187,7 @@ fn get_appearance(rest: &mut ByteReader<'_>) -> Result<Appearance, MessageError>
     for x in &mut shares {
         *x = f32::from_le_bytes(rest.array()?);
         if !(0.0..=1.0).contains(x) {
-            return Err(MessageError::Malformed("a colour or surface that is not within 0 to 1"));
+            return Err(MessageError::Malformed("a color or surface outside 0 to 1"));
         }
     }
     let [r, g, b, roughness, metallic] = shares;

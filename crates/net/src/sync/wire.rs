@@ -1,4 +1,5 @@
-//! The frame around every message: the thesis's engine header (§IV.A.6, Fig. 13), and behind it what an engine must know before it reads on.
+//! Header of every message: the engine header of the thesis (§IV.A.6, Fig. 13) with the fields of
+//! NetSync behind it.
 //!
 //! | byte | field | |
 //! |---|---|---|
@@ -8,60 +9,61 @@
 //! | 76 | version | u16, [`VERSION`] |
 //! | 78 | kind | u8, [`MessageKind`] |
 //! | 79 | | zero |
-//! | 80 | run | u64, the server's run; 0 from a facet that knows none |
-//! | 88 | join | u64, the facet's joining that this is about; 0 to all |
+//! | 80 | run | u64, number of the server's run; 0 from a facet that does not know it |
+//! | 88 | join | u64, number of the facet's join that the message belongs to; 0 for all |
 //! | 96 | frame | u64, wraps |
-//! | 104 | time | f64, simulated, s |
+//! | 104 | time | f64, simulated time, s |
 //! | 112 | hash | XXH3 (128 bits) of the payload, seeded by the XXH3 (64 bits) of bytes 72 to 112 |
 //! | 128 | payload | |
 //!
-//! All numbers are little-endian, and every byte counts: a message with any bit flipped is refused. The hash finds damage and torn reads; against
-//! forgery stands the seal of the transport.
+//! All numbers are little-endian. Every byte is checked: a message with any bit flipped is refused.
+//! The hash detects damage and torn reads. Against forgery the transport authenticates its packets.
 
 use super::transport::MAX_MESSAGE_BYTES;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_128_with_seed};
 
-/// Version of all messages; the frame up to here stays as it is in later ones.
+/// Version of all messages. Later versions keep the header up to this field.
 pub const VERSION: u16 = 2;
-/// Bytes before the payload.
+/// Length of the header, bytes.
 pub const HEADER_BYTES: usize = 128;
-/// Bytes of a name, the last one zero (thesis §IV.A.6).
+/// Length of a name, bytes, the last one zero (thesis §IV.A.6).
 pub const NAME_BYTES: usize = 64;
 const MAGIC: [u8; 4] = *b"NSyn";
 const ENGINE: &str = "Engine";
 
-/// Sixteen bytes that tell what differs: of a message or of what was drawn an XXH3, of a picture the first of a BLAKE3.
+/// Hash of 16 bytes: XXH3 of messages and drawn states, the first half of a BLAKE3 hash of
+/// pictures.
 pub type Hash = [u8; 16];
 
-/// What a message is.
+/// Kind of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum MessageKind {
-    /// Facet: let me in.
+    /// Facet: request to join.
     Join = 1,
-    /// Server: no, and why.
+    /// Server: refusal to join, with the reason.
     Refused = 2,
-    /// Server: all objects by name.
+    /// Server: the object table.
     Snapshot = 3,
-    /// Server: a frame.
+    /// Server: the state of a frame.
     State = 4,
-    /// Facet: this frame is drawn.
+    /// Facet: the frame is drawn.
     Ready = 5,
-    /// Server: show it.
+    /// Server: present the frame.
     Present = 6,
-    /// Facet: it is shown.
+    /// Facet: the frame is presented.
     Presented = 7,
-    /// Facet: send the snapshot again.
+    /// Facet: request to send the snapshot again.
     Resync = 8,
-    /// Server: I do not know you; join.
+    /// Server: the join is unknown; join again.
     Rejoin = 9,
-    /// Both: I live.
+    /// Both: sign of life.
     Heartbeat = 10,
     /// Server: the run is over.
     End = 11,
-    /// Facet: I go.
+    /// Facet: it leaves the run.
     Leave = 12,
-    /// Facet: what the user does.
+    /// Facet: input of a user.
     Input = 13,
 }
 
@@ -83,58 +85,58 @@ impl MessageKind {
     ];
 }
 
-/// Why a message was not taken.
+/// Reason for which a message was refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MessageError {
-    /// Shorter than its header or than it says.
-    #[error("a message of {got} bytes, {wanted} are wanted")]
+    /// Shorter than its header, or than the header says.
+    #[error("a message of {got} bytes, expected {wanted}")]
     Truncated {
-        /// Bytes there.
+        /// Bytes received.
         got: usize,
-        /// Bytes wanted.
+        /// Bytes expected.
         wanted: u64,
     },
-    /// Longer than allowed or than it says.
+    /// Longer than allowed, or than the header says.
     #[error("a message of {got} bytes, at most {max} are allowed")]
     Oversize {
-        /// Bytes there.
+        /// Bytes received.
         got: u64,
-        /// Bytes allowed.
+        /// Maximum number of bytes.
         max: u64,
     },
-    /// Not NetSync.
+    /// Not a NetSync message.
     #[error("not a NetSync message: {0}")]
     Foreign(&'static str),
     /// Another version of NetSync.
     #[error("a message of NetSync version {0}; this is version {VERSION}")]
     Version(u16),
-    /// Its hash does not fit: damaged, or read while it was written.
-    #[error("a message whose hash does not fit its bytes")]
+    /// Wrong hash: damaged, or read while it was written.
+    #[error("a message with a wrong hash")]
     Torn,
-    /// Sound as a frame, and yet no message.
+    /// The header is valid and the payload is not.
     #[error("not a message: {0}")]
     Malformed(&'static str),
-    /// It names or fits nothing here.
+    /// The content does not fit the scene.
     #[error("does not fit the scene: {0}")]
     Unfit(String),
 }
 
-/// What stands before the payload.
+/// Header of a message.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MessageHeader {
-    /// What it is.
+    /// Kind of the message.
     pub kind: MessageKind,
-    /// The server's run.
+    /// Number of the server's run.
     pub run: u64,
-    /// The facet's joining.
+    /// Number of the facet's join.
     pub join: u64,
     /// Frame number.
     pub frame: u64,
-    /// Simulated time, s, finite.
+    /// Simulated time, s; finite.
     pub time_s: f64,
 }
 
-/// A message: header and the payload that `write` appends.
+/// Encodes a message: the header, then the payload that `write` appends.
 pub fn message(header: &MessageHeader, write: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     let mut out = Vec::with_capacity(HEADER_BYTES + 64);
     put_name(&mut out, ENGINE);
@@ -153,10 +155,10 @@ pub fn message(header: &MessageHeader, write: impl FnOnce(&mut Vec<u8>)) -> Vec<
     out
 }
 
-/// The header and payload of a message that nothing is known about.
+/// Parses a message from an untrusted source. Returns its header and payload.
 ///
 /// # Errors
-/// Any [`MessageError`] but `Unfit`.
+/// Every [`MessageError`] except `Unfit`.
 pub fn open(bytes: &[u8]) -> Result<(MessageHeader, &[u8]), MessageError> {
     if bytes.len() < HEADER_BYTES {
         return Err(MessageError::Truncated { got: bytes.len(), wanted: HEADER_BYTES as u64 });
@@ -170,7 +172,7 @@ pub fn open(bytes: &[u8]) -> Result<(MessageHeader, &[u8]), MessageError> {
     }
     let size = rest.u64()?;
     if rest.array()? != MAGIC {
-        return Err(MessageError::Foreign("the magic bytes are others"));
+        return Err(MessageError::Foreign("wrong magic bytes"));
     }
     let version = rest.u16()?;
     if version != VERSION {
@@ -191,7 +193,7 @@ pub fn open(bytes: &[u8]) -> Result<(MessageHeader, &[u8]), MessageError> {
         .into_iter()
         .find(|k| *k as u8 == kind)
         .filter(|_| zero == 0)
-        .ok_or(MessageError::Malformed("a kind that there is not"))?;
+        .ok_or(MessageError::Malformed("an unknown kind of message"))?;
     let header = MessageHeader {
         kind,
         run: numbers[0],
@@ -209,7 +211,8 @@ fn hash_of(message: &[u8]) -> Hash {
     xxh3_128_with_seed(&message[HEADER_BYTES..], xxh3_64(&message[72..112])).to_le_bytes()
 }
 
-/// Appends a name of at most 63 bytes and zeros up to 64; a longer one is cut (worlds refuse longer ones).
+/// Appends a name of at most 63 bytes, padded with zeros to 64. A longer name is cut; worlds refuse
+/// longer ones.
 pub(crate) fn put_name(out: &mut Vec<u8>, name: &str) {
     let end = out.len() + NAME_BYTES;
     out.extend(name.bytes().take(NAME_BYTES - 1));
@@ -221,13 +224,13 @@ pub(crate) fn put_f64(out: &mut Vec<u8>, numbers: &[f64]) {
     out.extend(numbers.iter().flat_map(|x| x.to_le_bytes()));
 }
 
-/// The unread rest of a payload. A length is believed only as far as the bytes go.
+/// Reader of a payload. It never reads or allocates beyond the bytes there.
 pub(crate) struct ByteReader<'a>(pub &'a [u8]);
 
 impl<'a> ByteReader<'a> {
     #[inline]
     pub fn take(&mut self, n: u64) -> Result<&'a [u8], MessageError> {
-        let short = MessageError::Malformed("it ends too early");
+        let short = MessageError::Malformed("unexpected end");
         let (head, rest) = usize::try_from(n).ok().and_then(|n| self.0.split_at_checked(n)).ok_or(short)?;
         self.0 = rest;
         Ok(head)
@@ -257,13 +260,13 @@ impl<'a> ByteReader<'a> {
         self.array().map(u64::from_le_bytes)
     }
 
-    /// A finite number.
+    /// Reads a finite number.
     pub fn f64(&mut self) -> Result<f64, MessageError> {
         let x = f64::from_le_bytes(self.array()?);
         if x.is_finite() { Ok(x) } else { Err(MessageError::Malformed("a number that is not finite")) }
     }
 
-    /// Finite numbers.
+    /// Reads finite numbers.
     pub fn f64s<const N: usize>(&mut self) -> Result<[f64; N], MessageError> {
         let mut out = [0.0; N];
         for x in &mut out {
@@ -272,7 +275,7 @@ impl<'a> ByteReader<'a> {
         Ok(out)
     }
 
-    /// A name in its 64 bytes.
+    /// Reads a name from its 64 bytes.
     pub fn name(&mut self) -> Result<&'a str, MessageError> {
         let field = self.take(NAME_BYTES as u64)?;
         let end = field.iter().position(|&b| b == 0).ok_or(MessageError::Malformed("a name without an end"))?;
@@ -283,13 +286,14 @@ impl<'a> ByteReader<'a> {
         std::str::from_utf8(name).map_err(|_| MessageError::Malformed("a name that is not UTF-8"))
     }
 
-    /// Nothing may be left.
+    /// Checks that nothing is left.
     pub fn end(&self) -> Result<(), MessageError> {
-        if self.0.is_empty() { Ok(()) } else { Err(MessageError::Malformed("it goes on after its end")) }
+        if self.0.is_empty() { Ok(()) } else { Err(MessageError::Malformed("trailing bytes")) }
     }
 }
 
-/// Whether frame `a` is later than `b`, where numbers wrap: within half the range.
+/// Returns whether frame `a` is later than `b`. Numbers wrap, so the difference must be within half
+/// the range.
 pub fn is_later(a: u64, b: u64) -> bool {
     a != b && a.wrapping_sub(b) < 1 << 63
 }

@@ -83,7 +83,7 @@ fn a_key_file_is_checked() {
     assert!(read(good.as_bytes(), 0o600).is_ok() && read(good.as_bytes(), 0o400).is_ok());
     for (text, mode, what) in [
         (good.as_str(), 0o640, "mode 640 lets others read it; run: chmod 600"),
-        ("0123", 0o600, "4 digits; wanted are 64 hexadecimal digits"),
+        ("0123", 0o600, "4 digits; expected are 64 hexadecimal digits"),
         (&good.replace('b', "g"), 0o600, "is no hexadecimal digit"),
         (&"0".repeat(64), 0o600, "all zeros"),
         (&"0".repeat(1000), 0o600, "1000 bytes long"),

@@ -2,16 +2,17 @@
 
 use std::net::{SocketAddr, UdpSocket};
 
-/// How a facet finds the server.
+/// Address at which a facet reaches the server.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum ServerAddress {
-    /// The run's name in shared memory.
+    /// Name of the run in shared memory.
     Memory(String),
-    /// The server's address.
+    /// Address over UDP.
     Udp(SocketAddr),
 }
 
-/// This machine's address as `node` would see it; `None` where it cannot be told. Nothing is sent.
+/// Returns the local address of this machine on the route to `node`; `None` if there is no route.
+/// Nothing is sent.
 pub fn address_towards(node: &str, port: u16) -> Option<std::net::IpAddr> {
     let socket = UdpSocket::bind(("0.0.0.0", 0)).ok()?;
     socket.connect((node, port)).ok()?;

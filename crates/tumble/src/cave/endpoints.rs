@@ -1,4 +1,4 @@
-//! The two ends of whatever carries a run's frames.
+//! Endpoints of a run's transport, chosen at run time.
 
 use super::address::ServerAddress;
 use super::run_setup::RunSetup;
@@ -12,16 +12,16 @@ use tumble::net::sync::transport::{
 use tumble::net::sync::udp::{SharedKey, Timing, UdpFacet, UdpServer};
 use tumble::scene::cave::Cave;
 
-/// The server's end.
+/// The server's endpoint.
 pub enum ServerEndpoint {
     Shm(Box<ShmServer>),
     Udp(Box<UdpServer>),
 }
 
-/// A facet's end.
+/// A facet's endpoint.
 pub struct FacetEndpoint {
     link: Link,
-    /// Where the server may be anew: a run that begins again has another name or port.
+    /// Search for the server's address, which changes when a run is started again.
     lookup: Option<ServerLookup>,
 }
 
@@ -30,9 +30,9 @@ enum Link {
     Udp(Box<UdpFacet>),
 }
 
-/// What is asked for the server's address while there is no connection.
+/// State of the search for the server's address while there is no connection.
 struct ServerLookup {
-    /// The cave's place, by which its run is found.
+    /// Identity of the cave, by which its run is found.
     place: String,
     cave: Cave,
     facet: FacetNumber,
@@ -41,13 +41,13 @@ struct ServerLookup {
     last_lookup: Instant,
 }
 
-/// Between two looks for a server's new address.
+/// Interval between two searches for the server's address.
 const LOOKUP_INTERVAL: Duration = Duration::from_millis(250);
 
-/// The cave's key, where it has one.
+/// Reads the cave's key, if the cave has one.
 pub fn key(cave: &Cave) -> Result<Option<SharedKey>, Failure> {
     let read = |file: &Path| {
-        // a pipe would be waited for
+        // reading a pipe would block
         if std::fs::metadata(file).is_ok_and(|about| !about.is_file()) {
             return Err(Failure::input(format!("key file {}: is no regular file", file.display())));
         }
@@ -57,7 +57,8 @@ pub fn key(cave: &Cave) -> Result<Option<SharedKey>, Failure> {
 }
 
 impl FacetEndpoint {
-    /// Begins to look for the server. `again`: where it is found is asked of the cave's lock whenever there is no connection; else it stays there.
+    /// Starts to connect to the server. With `again`, the address is read from the cave's lock file
+    /// while there is no connection; otherwise it never changes.
     pub fn open(
         address: &ServerAddress,
         facet: FacetNumber,
@@ -76,7 +77,7 @@ impl FacetEndpoint {
         Ok(FacetEndpoint { link, lookup: again.then(lookup) })
     }
 
-    /// Goes where the server is now, if that is elsewhere than it was.
+    /// Reconnects if the server's address has changed.
     fn follow_server(&mut self) {
         let Some(lookup) = self.lookup.as_mut().filter(|l| !l.connected && l.last_lookup.elapsed() >= LOOKUP_INTERVAL)
         else {
@@ -87,7 +88,7 @@ impl FacetEndpoint {
         if address == lookup.address {
             return;
         }
-        // what fails now is tried again, as long as the facet waits at all
+        // a failure is retried for as long as the facet waits
         if let Ok(link) = Link::open(&address, lookup.facet, &lookup.cave) {
             (self.link, lookup.address) = (link, address);
         }
@@ -108,12 +109,12 @@ impl Link {
     }
 }
 
-/// A link is given up no sooner than a facet is dropped.
+/// Returns the idle timeout of links, which equals the drop timeout of facets.
 pub fn idle_timeout(cave: &Cave) -> Duration {
     Duration::from_millis(cave.sync.drop_timeout_ms.into())
 }
 
-/// The same for datagrams.
+/// Returns the timing of UDP links.
 pub fn timing(cave: &Cave) -> Timing {
     let idle_timeout = idle_timeout(cave);
     Timing { idle_timeout, ping_interval: (idle_timeout / 8).min(Timing::default().ping_interval), ..Timing::default() }

@@ -1,6 +1,7 @@
-//! One run per cave and user: a file that is locked while the run lives, and says which it is (thesis §IV.C: a run that is going on is found).
+//! One run per cave and user: a locked file that describes the run in progress (thesis §IV.C).
 //!
-//! The lock is the system's, so it goes with the process however that ends. The text is for people and for facets that are started by hand.
+//! The system releases the lock with the process, however that ends. Facets that are started by
+//! hand read the address of the server from the file.
 
 use super::address::ServerAddress;
 use super::run_setup::RunSetup;
@@ -13,27 +14,27 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use tumble::net::sync::shm::folder;
 
-/// How long a run that is to be replaced may take to end by itself, and then to be gone.
+/// Time for a replaced run to end by itself, and then to be gone after it was killed.
 const REPLACE_TIMEOUT: Duration = Duration::from_secs(5);
-/// Most bytes of the text: a few paths, each as long as the system lets it be, with every byte escaped.
+/// Maximum length of the text, bytes: a few paths of maximum length with every byte escaped.
 const MAX_LOCK_BYTES: u64 = 1 << 16;
 
-/// What the file says.
+/// Content of the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunInfo {
     pub pid: i32,
     pub scene: String,
     pub cave: String,
-    /// Seconds since 1970.
+    /// Start of the run, s since 1970.
     pub since_unix_s: u64,
-    /// When the process began, ticks since the machine did: its number may be another's later.
+    /// Start of the process, ticks since boot. A process id alone may be reused.
     pub start_ticks: u64,
-    /// Where facets find it; not there before it can be joined.
+    /// Address of the server; `None` before facets can join.
     pub address: Option<ServerAddress>,
 }
 
 impl RunInfo {
-    /// This process's run.
+    /// Describes the run of this process.
     pub fn here(scene: &str, cave: &str) -> RunInfo {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let pid = std::process::id() as i32;
@@ -47,7 +48,7 @@ impl RunInfo {
         }
     }
 
-    /// Whether the process that it names is the one that wrote it.
+    /// Returns whether the process is still the one that wrote the file.
     fn is_running(&self) -> bool {
         start_ticks(self.pid) == Some(self.start_ticks)
     }
@@ -57,14 +58,15 @@ impl RunInfo {
     }
 }
 
-/// Held while the run lives; the file goes with it.
+/// The lock of a run. The file is removed with it.
 pub struct RunLock {
     file: File,
     path: PathBuf,
 }
 
 impl RunLock {
-    /// Takes the cave, or refuses by the name of who has it. With `replace` that run is asked to end, then killed.
+    /// Locks the cave, or refuses with a description of the run in progress. With `replace` that
+    /// run is asked to end, then killed.
     pub fn take(setup: &RunSetup, run: &RunInfo, replace: bool) -> Result<RunLock, Failure> {
         let (cave, path) = (&setup.cave, path(&setup.place)?);
         let until = Instant::now() + 2 * REPLACE_TIMEOUT;
@@ -75,18 +77,15 @@ impl RunLock {
                 lock.write(run)?;
                 return Ok(lock);
             }
-            // the text may still be an earlier run's, and its process another by now
+            // the text may be of an earlier run, and its process id reused
             let other = read(&path).filter(RunInfo::is_running);
             let name = other
                 .as_ref()
-                .map_or("another process, which has not said yet who it is".to_owned(), RunInfo::description);
+                .map_or("another process, which has not written its description yet".to_owned(), RunInfo::description);
             if !replace {
                 return Err(Failure::run(
                     "the cave",
-                    format!(
-                        "a run is going on in {} already: {name}; end it first, or take its place with --replace",
-                        cave.file
-                    ),
+                    format!("a run is already in progress in {}: {name}; end it first, or use --replace", cave.file),
                 ));
             }
             let now = Instant::now();
@@ -108,12 +107,12 @@ impl RunLock {
         }
     }
 
-    /// Where it is.
+    /// Returns the path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Says which run it is.
+    /// Writes the description of the run.
     pub fn write(&mut self, run: &RunInfo) -> Result<(), Failure> {
         let failed = |e: std::io::Error| Failure::run("the cave's lock", e);
         let text = serde_json::to_string(run).map_err(|e| Failure::run("the cave's lock", e))?;
@@ -124,21 +123,24 @@ impl RunLock {
 
 impl Drop for RunLock {
     fn drop(&mut self) {
-        // while it is still locked: who waits for it then finds that the path is another file's
+        // still locked: a process that waits for the lock then finds another file at the path
         let _ = std::fs::remove_file(&self.path);
     }
 }
 
-/// Where the run is that goes on in the cave at `place` ([`RunSetup::place`]) on this machine, if there is one that can be joined. Nothing is locked for it: a
-/// run that begins at this moment would take that for another.
+/// Returns the server's address of the run in progress in the cave at `place` ([`RunSetup::place`])
+/// on this machine, if facets can join it. It takes no lock, which a starting run would mistake for
+/// a run in progress.
 pub fn find_run(place: &str) -> Result<Option<ServerAddress>, Failure> {
     Ok(read(&path(place)?).filter(RunInfo::is_running).and_then(|run| run.address))
 }
 
-/// When a process began, ticks since the machine did; `None`: there is none of this number, or it ended and is only not yet asked for.
+/// Returns when a process started, ticks since boot. Returns `None` if there is no such process, or
+/// if it is a zombie.
 fn start_ticks(pid: i32) -> Option<u64> {
     let about = std::fs::read(format!("/proc/{pid}/stat")).ok()?;
-    // the name, in brackets, may hold anything; behind it come the third field and so on, and the beginning is the 22nd
+    // the name in parentheses may contain anything; the third field follows it, and the start time
+    // is the 22nd
     let behind = String::from_utf8_lossy(&about).rsplit_once(')')?.1.to_owned();
     let fields: Vec<&str> = behind.split_whitespace().collect();
     if matches!(fields.first(), Some(&("Z" | "X"))) {
@@ -153,7 +155,7 @@ fn path(place: &str) -> Result<PathBuf, Failure> {
     Ok(folder.join(format!("cave-{}.lock", &hash[..16])))
 }
 
-/// The file, locked; `None` where another process has it.
+/// Opens and locks the file; `None` if another process has the lock.
 fn try_take(path: &Path) -> Result<Option<File>, Failure> {
     let failed = |e: std::io::Error| Failure::run(&format!("the cave's lock {}", path.display()), e);
     for _ in 0..100 {
@@ -170,7 +172,7 @@ fn try_take(path: &Path) -> Result<Option<File>, Failure> {
             Err(TryLockError::WouldBlock) => return Ok(None),
             Err(TryLockError::Error(e)) => return Err(failed(e)),
         }
-        // the run before may have removed the file between opening and locking
+        // the previous run may have removed the file between opening and locking
         let (ours, there) = (file.metadata().map_err(failed)?.ino(), std::fs::metadata(path).map(|m| m.ino()).ok());
         if there == Some(ours) {
             return Ok(Some(file));
@@ -191,7 +193,8 @@ fn signal(pid: i32, signal: rustix::process::Signal) {
     }
 }
 
-/// `2026-11-21 13:05:22 UTC`. Days to a date by the proleptic Gregorian calendar, with years that begin in March.
+/// Formats a time as `2026-11-21 13:05:22 UTC`. Converts days to a date of the proleptic Gregorian
+/// calendar, with years that begin in March.
 fn utc(unix_s: u64) -> String {
     let (days, s) = ((unix_s / 86_400) as i64 + 719_468, unix_s % 86_400);
     let (era, day_of_era) = (days.div_euclid(146_097), days.rem_euclid(146_097));

@@ -1,24 +1,25 @@
-//! `tumble cave`, `tumble serve`, `tumble facet`: a server that simulates and a process per facet that draws (thesis §III.C, §IV.C; design of NetSync).
+//! `tumble cave`, `tumble serve`, `tumble facet`: a server that simulates, and a process per facet
+//! that draws (thesis §III.C, §IV.C; `docs/netsync.md`).
 //!
 //! ```text
-//! tumble cave ─┬─ simulates, publishes        tumble serve: the same without the processes below it
+//! tumble cave ─┬─ simulates, publishes        tumble serve: the same without child processes
 //!              ├─ tumble facet front ─ draws
 //!              ├─ tumble facet left  ─ draws   each in a process group of its own, with a pipe from the launcher as stdin:
-//!              └─ …                            when that ends, the facet ends
+//!              └─ …                            a facet ends when its stdin ends
 //! ```
 //!
-//! The launcher is the server: what it prints about the facets it knows at first hand, and a cave of four facets is five processes.
+//! The launcher is the server, so a cave of four facets is five processes.
 
-/// As the standard one, but a stderr that nobody reads any more ends no run: pictures and recordings go on without it.
+/// Like the standard macro, without a panic if stderr is closed: pictures and recordings continue.
 macro_rules! eprintln {
     ($($text:tt)*) => {{
-        // in one piece: processes of a run share a stderr
+        // one write, because the processes of a run share stderr
         let text = format!($($text)*) + "\n";
         let _ = std::io::Write::write_all(&mut std::io::stderr(), text.as_bytes());
     }};
 }
 
-/// The same without the line's end.
+/// The same without the newline.
 macro_rules! eprint {
     ($($text:tt)*) => {{
         let _ = std::io::Write::write_all(&mut std::io::stderr(), format!($($text)*).as_bytes());
@@ -39,22 +40,22 @@ mod tracker;
 use crate::failure::Failure;
 use args::{CaveOptions, FacetOptions, RecoverOptions, ReplayOptions, ServeOptions};
 
-/// Server and facets of this machine.
+/// Runs the server and the facets of this machine.
 pub fn cave(options: &CaveOptions) -> Result<(), Failure> {
     server::run(&options.serve, Some(options), None)
 }
 
-/// The server alone.
+/// Runs the server alone.
 pub fn serve(options: &ServeOptions) -> Result<(), Failure> {
     server::run(options, None, None)
 }
 
-/// One facet.
+/// Runs one facet.
 pub fn facet(options: &FacetOptions) -> Result<(), Failure> {
     facet::run(options)
 }
 
-/// The facets of a cave, driven from a recording.
+/// Shows a recorded run on the facets of a cave.
 pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
     let serve = &options.cave.serve;
     let users = serve.user_colliders || serve.tracker.is_some() || serve.replay_input.is_some();
@@ -69,7 +70,7 @@ pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
     server::run(serve, Some(&options.cave), Some(&options.file))
 }
 
-/// A recording, mended.
+/// Copies everything readable of a recording to a new file.
 pub fn recover(options: &RecoverOptions) -> Result<(), Failure> {
     let report = tumble::net::record::recover(&options.file, &options.output).map_err(Failure::input)?;
     println!(

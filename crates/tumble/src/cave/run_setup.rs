@@ -1,4 +1,4 @@
-//! Scene, environment and cave of a run, as the server and every facet build them.
+//! Scene, environment and cave of a run, which server and facets build in the same way.
 
 use super::args::CaveSceneOptions;
 use crate::failure::Failure;
@@ -11,37 +11,37 @@ use tumble::render::CaveView;
 use tumble::scene::cave::{Cave, CaveSource, resolve_cave};
 use tumble::scene::{CavePlace, SceneFile, ShapeSpec, resolve_scene, visual_notes};
 
-/// Name of the seat of the one process that draws a preview.
+/// Name of the slot of the process that draws a preview.
 pub const PREVIEW: &str = "preview";
 
-/// What a process does with the world.
+/// Role of a process in a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// Steps it.
+    /// Steps the world.
     Server,
-    /// Draws what the server says.
+    /// Draws the world.
     Facet,
 }
 
-/// What all processes of a run have in common.
+/// Data that all processes of a run have in common.
 pub struct RunSetup {
     pub scene: SceneFile,
     pub cave: Cave,
-    /// As the files make it, before the first step.
+    /// World before the first step.
     pub world: World,
-    /// By which they know that they mean the same.
+    /// Hash of the scene.
     pub hash: [u8; 32],
-    /// The same with the cave and the textures: what a facet must have in common with the server to be let in.
+    /// Hash of scene, cave and textures. It must be equal on server and facet for a join.
     pub join_hash: [u8; 32],
-    /// The cave by its file, the same from whatever folder it was named: one run goes on in it.
+    /// Identity of the cave: its canonical path or shipped name. One run at a time may use it.
     pub place: String,
-    /// What is worth saying.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
 impl RunSetup {
-    /// Reads the cave and the environment and builds the world of `scene`. The settings of its stepping may differ between server and facets: nothing that is
-    /// seen at the start depends on them.
+    /// Reads the cave and the environment and builds the world of `scene`. Stepping options may
+    /// differ between server and facets, because nothing visible at the start depends on them.
     pub fn load(mut scene: SceneFile, surroundings: &CaveSceneOptions, role: Role) -> Result<RunSetup, Failure> {
         let source = resolve_cave(&surroundings.cave)?;
         let cave = source.load()?;
@@ -63,7 +63,7 @@ impl RunSetup {
         let build = if role == Role::Server { SceneFile::build } else { SceneFile::build_drawn };
         let (world, built) = build(&scene).map_err(Failure::input)?;
         notes.extend(built);
-        // everything that is drawn and stands in no body
+        // everything visible that belongs to no body
         let seen = format!("{:?} {:?} {:?} {:?} {:?}", scene.camera, scene.cave, scene.lights, scene.sky, scene.ground);
         let hash = scene_hash(&seen, &world);
         let join_hash = hash_for_joining(&hash, &cave, &world);
@@ -71,12 +71,12 @@ impl RunSetup {
         Ok(RunSetup { scene, cave, world, hash, join_hash, place, notes })
     }
 
-    /// The cave at its place in the scene.
+    /// Returns the cave at its place in the scene.
     pub fn view(&self) -> Result<CaveView, Failure> {
         CaveView::new(self.cave.clone(), &self.scene).map_err(Failure::input)
     }
 
-    /// Who looks, as the files say.
+    /// Returns the users and the cave's place as the files define them.
     pub fn viewer(&self) -> Result<Viewer, Failure> {
         let view = self.view()?;
         let users = self
@@ -89,14 +89,15 @@ impl RunSetup {
     }
 }
 
-/// The hash of a scene with what of a cave is to be seen, and the bytes of all textures; addresses, machines and windows are each machine's own.
+/// Returns the hash of a scene with the visible properties of a cave and the bytes of all textures.
+/// Addresses, nodes and windows are local to a machine and excluded.
 fn hash_for_joining(scene: &[u8; 32], cave: &Cave, world: &World) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
     let mut put = |bytes: &[u8]| {
         hasher.update(&(bytes.len() as u64).to_le_bytes());
         hasher.update(bytes);
     };
-    // a file that cannot be read is told where it is used
+    // an unreadable file is reported where it is used
     let content = |path: &Path| std::fs::read(path).map_or([0; 32], |bytes| *blake3::hash(&bytes).as_bytes());
     put(scene);
     put(format!("{:?} {:?} {:?}", cave.sync.mode, cave.screens, cave.users).as_bytes());
@@ -110,7 +111,7 @@ fn hash_for_joining(scene: &[u8; 32], cave: &Cave, world: &World) -> [u8; 32] {
     }
     let textures: std::collections::BTreeSet<_> =
         world.visuals().filter_map(|visual| visual.appearance.texture.clone()).collect();
-    // by names of files, as the scene's hash has them: folders differ between machines
+    // by file name, like the scene's hash: folders differ between machines
     let mut textures: Vec<_> =
         textures.iter().map(|path| (path.file_name().unwrap_or_default().as_encoded_bytes(), content(path))).collect();
     textures.sort();
@@ -121,7 +122,7 @@ fn hash_for_joining(scene: &[u8; 32], cave: &Cave, world: &World) -> [u8; 32] {
     *hasher.finalize().as_bytes()
 }
 
-/// Stands the cave and its users in the view as the viewer of a frame has them.
+/// Applies the viewer of a frame to the view: the cave's place and the users' heads.
 pub fn apply_viewer(view: &mut CaveView, viewer: &Viewer) {
     view.set_place(place_of(&viewer.cave, viewer.scale));
     for (user, seen) in view.users_mut().iter_mut().zip(&viewer.users) {
@@ -132,19 +133,20 @@ pub fn apply_viewer(view: &mut CaveView, viewer: &Viewer) {
     }
 }
 
-/// A cave's place as a pose: `x_scene = pose · (scale · x_cave)`.
+/// Converts a cave's place to a pose: `x_scene = pose · (scale · x_cave)`.
 pub fn pose_of(place: &CavePlace) -> Pose {
     let turn = nalgebra::UnitQuaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), place.heading_deg.to_radians());
     Pose::from_parts(nalgebra::Vector3::from(place.origin_m).into(), turn)
 }
 
-/// The way back; caves are upright, so only the turn about the vertical counts.
+/// Converts a pose to a cave's place. Caves are upright, so only the rotation about the vertical
+/// counts.
 pub fn place_of(pose: &Pose, scale: f64) -> CavePlace {
     let (_, _, heading) = pose.rotation.euler_angles();
     CavePlace { origin_m: pose.translation.vector.into(), heading_deg: heading.to_degrees(), scale }
 }
 
-/// The head of a user of a cave file: x to the right, y ahead, z up.
+/// Returns the head pose of a user of a cave file: x to the right, y ahead, z up.
 fn head_pose(user: &tumble::scene::cave::User) -> Pose {
     let (right, ahead) = (user.right(), user.forward);
     let rotation = nalgebra::Rotation3::from_matrix_unchecked(nalgebra::Matrix3::from_columns(&[
@@ -155,7 +157,7 @@ fn head_pose(user: &tumble::scene::cave::User) -> Pose {
     Pose::from_parts(user.eye_m.coords.into(), nalgebra::UnitQuaternion::from_rotation_matrix(&rotation))
 }
 
-/// Puts a scene into another one's surroundings (thesis §IV.C: the immersive scene).
+/// Puts a scene into the environment of another scene (thesis §IV.C: the immersive scene).
 fn merge_environment(scene: &mut SceneFile, from: SceneFile, notes: &mut Vec<String>) -> Result<(), Failure> {
     let still = from.bodies.iter().filter(|b| b.mode == Mode::Static && b.enabled).count();
     notes.push(format!("environment {}: its camera, lights, sky, ground and {still} bodies that do not move; camera and lights of {} are ignored", from.file, scene.file));
@@ -188,7 +190,7 @@ fn merge_environment(scene: &mut SceneFile, from: SceneFile, notes: &mut Vec<Str
     Ok(())
 }
 
-/// Where a facet's files go in a folder; a name may have dots, and none leads out.
+/// Returns a facet's folder. A name may contain dots, and none leads out of `folder`.
 pub fn facet_folder(folder: &Path, name: &str) -> std::path::PathBuf {
     folder.join(if name.starts_with('.') { format!("_{name}") } else { name.to_owned() })
 }

@@ -1,6 +1,7 @@
-//! Ctrl-C, SIGTERM and SIGHUP end a run in order. What does not end then, because of a frame that nobody answers, ends anyway after a while, and at
-//! once by a second signal: processes that were started are killed first, and the lock is removed. (Some senders send each signal twice, so one right behind the
-//! first is the same.)
+//! Ctrl-C, SIGTERM and SIGHUP end a run in order. If the run does not end, for instance because a
+//! frame is not answered, it is ended after a timeout, or at once by a second signal. Child
+//! processes are then killed and the lock is removed. (Some programs send each signal twice, so a
+//! signal right after the first one is ignored.)
 
 use crate::failure::Failure;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -9,23 +10,23 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How often the watching thread looks.
+/// Interval at which the watching thread polls.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
-/// Signals within this time are one.
+/// Signals within this time count as one.
 const DEBOUNCE: Duration = Duration::from_millis(500);
-/// An end in order takes no longer: well above what facets are given to end.
+/// Timeout of an orderly end, well above that of the facets.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(10);
-/// As shells tell Ctrl-C.
+/// Exit code of shells for Ctrl-C.
 const EXIT_CODE: i32 = 130;
 
-/// Whether the end was asked for.
+/// Shared state of the signal watch: whether the end was requested.
 #[derive(Clone)]
 pub struct Signals {
     stop_requested: Arc<AtomicBool>,
     cleanup: Arc<Mutex<Cleanup>>,
 }
 
-/// What an end out of order must not leave.
+/// Processes and files that a forced end must remove.
 #[derive(Default)]
 struct Cleanup {
     /// Leaders of process groups.
@@ -34,7 +35,7 @@ struct Cleanup {
 }
 
 impl Signals {
-    /// From now on.
+    /// Starts to watch the signals.
     pub fn watch() -> Result<Signals, Failure> {
         let (came, stop_requested) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
         for signal in [SIGINT, SIGTERM, SIGHUP] {
@@ -49,22 +50,22 @@ impl Signals {
         Ok(Signals { stop_requested, cleanup })
     }
 
-    /// Whether one came.
+    /// Returns whether a signal arrived.
     pub fn stop_requested(&self) -> bool {
         self.stop_requested.load(Ordering::Relaxed)
     }
 
-    /// A process that leads a group was started.
+    /// Notes a started process that leads a process group.
     pub fn started(&self, process: u32) {
         lock(&self.cleanup).processes.push(process);
     }
 
-    /// It is gone.
+    /// Notes the end of a process.
     pub fn ended(&self, process: u32) {
         lock(&self.cleanup).processes.retain(|other| *other != process);
     }
 
-    /// A file that goes with this process.
+    /// Notes a file to remove at a forced end.
     pub fn remove_at_the_end(&self, file: PathBuf) {
         lock(&self.cleanup).files.push(file);
     }

@@ -63,7 +63,7 @@ fn the_summary_tells_how_late_a_facet_was_and_what_was_refused() {
             ready = [false; 2];
         }
     }
-    // from who is no facet: too short for a header, longer than any datagram, of another protocol
+    // from unknown peers: too short for a header, longer than any datagram, of another protocol
     let stranger = UdpSocket::bind("127.0.0.1:0").unwrap();
     let wrong = [(3, 5), (2, 1300), (4, 40)];
     wrong.iter().for_each(|(times, length)| {

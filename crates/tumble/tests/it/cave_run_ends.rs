@@ -23,7 +23,7 @@ fn ctrl_c_keeps_summary_and_recording_where_a_facet_does_not_answer() {
     let (code, said, wrong) = run.end();
     assert_eq!(code, Some(0), "{wrong}");
     assert!(said.contains("facet r: ") && said.contains("recording: "), "{said}");
-    assert!(wrong.contains("facet r: does not end and is killed"), "{wrong}");
+    assert!(wrong.contains("facet r: does not end and was killed"), "{wrong}");
     assert!(json(&place.folder.path("summary.json"))["frames"].as_u64() > Some(5));
     assert!(std::fs::read(&record).unwrap().ends_with(MAGIC));
     facets.iter().for_each(|(name, pid)| assert!(!alive(*pid), "facet {name} lives on"));
@@ -195,7 +195,7 @@ fn a_shipped_cave_is_one_from_every_folder() {
     assert!(first.wait().unwrap().success());
     let wrong = String::from_utf8_lossy(&out.stderr);
     assert_eq!(out.status.code(), Some(1), "{wrong}");
-    assert!(wrong.contains("a run is going on"), "{wrong}");
+    assert!(wrong.contains("a run is already in progress"), "{wrong}");
     place.assert_clean();
 }
 

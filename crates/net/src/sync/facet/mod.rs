@@ -1,13 +1,15 @@
-//! A facet's side of a session: a state machine. It has no clock and no link; `now` and messages go in, messages and tasks come out.
+//! A facet's side of a session: a state machine without clock and link. Times and messages go in,
+//! messages and tasks come out.
 //!
 //! ```text
 //!  joining ──SNAPSHOT, STATE──► live: draw ──► READY ──PRESENT──► show ──► PRESENTED, and again
 //!     ▲                          │
-//!     └── silent for drop_after, REJOIN, link closed          REFUSED, END: over
-//!         (each time under a new number)
+//!     └── drop_timeout, REJOIN, link closed          REFUSED, END: ended
+//!         (each time with a new join number)
 //! ```
 //!
-//! A state of a later frame stands for the PRESENT of the one that is drawn: the server would not have sent it before.
+//! The state of a later frame implies the PRESENT of the drawn one: the server would not have sent
+//! it before.
 
 mod receiving;
 
@@ -22,33 +24,34 @@ use std::collections::VecDeque;
 use std::time::Duration;
 use tumble_core::World;
 
-/// Inputs remembered until a picture shows them.
+/// Maximum number of inputs that wait for the frame that shows them.
 const MAX_PENDING_INPUTS: usize = 256;
 
-/// The half of a joining's number that tells the process.
+/// Bits of a join number that identify the process.
 const PROCESS_MASK: u64 = !0 << 32;
 
-/// What a facet is told at the start.
+/// Options of a facet's session.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FacetOptions {
-    /// Its name in the cave file.
+    /// Name of the facet in the cave file.
     pub name: String,
-    /// BLAKE3 of the scene.
+    /// BLAKE3 hash of the scene.
     pub scene: [u8; 32],
-    /// Whether it wants exact messages (a replica) and not poses.
+    /// Whether the facet wants exact messages (a replica) instead of poses.
     pub exact: bool,
-    /// When frames are shown; as the server's.
+    /// When frames are shown; must equal the server's mode.
     pub mode: SyncMode,
-    /// `drop_timeout_ms`: the server is lost when nothing was heard for so long.
+    /// `drop_timeout_ms`: the server is lost if nothing arrives for this time.
     pub drop_timeout: Duration,
-    /// How often it asks to be let in.
+    /// Interval between two JOIN messages.
     pub join_interval: Duration,
-    /// Where the numbers of its joinings begin: another one at each start of the process. The upper half of all of them tells the process.
+    /// Seed of the join numbers, different at each start of the process. The upper half of all
+    /// numbers from one seed identifies the process.
     pub seed: u64,
 }
 
 impl FacetOptions {
-    /// The defaults of a cave file.
+    /// Returns the options with the defaults of a cave file.
     pub fn new(name: &str, scene: [u8; 32], seed: u64) -> FacetOptions {
         let ms = Duration::from_millis;
         FacetOptions {
@@ -63,40 +66,41 @@ impl FacetOptions {
     }
 }
 
-/// What a facet does next.
+/// Next task of a facet.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Task {
     /// Wait for a message.
     Wait(WaitReason),
-    /// [`begin`](FacetSession::begin), draw [`world`](FacetSession::world), and say [`drawn`](FacetSession::drawn).
+    /// Call [`begin`](FacetSession::begin), draw [`world`](FacetSession::world), then call
+    /// [`drawn`](FacetSession::drawn).
     Draw,
-    /// Show what was drawn, and say [`presented`](FacetSession::presented).
+    /// Show the drawn picture, then call [`presented`](FacetSession::presented).
     Present(u64),
-    /// Nothing any more.
+    /// The session has ended.
     Ended(EndReason),
 }
 
-/// What a facet waits for: what its screen should say where it has no picture.
+/// What a facet waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WaitReason {
     /// A server, for the first time.
     Server,
-    /// A server: the one it had is lost. The last picture is old.
+    /// A server again: the connection is lost and the last picture is old.
     Lost,
-    /// A frame.
+    /// The next frame.
     Frame,
-    /// The others: it has drawn the frame.
+    /// The other facets: this one has drawn the frame.
     Others(u64),
 }
 
-/// Why it is over.
+/// Reason for the end of a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum EndReason {
-    /// The server said that the run is over.
+    /// The server ended the run.
     Ended,
-    /// The server does not let it in.
+    /// The server refused the join, with the reason.
     Refused(String),
-    /// It left.
+    /// The facet left.
     Left,
 }
 
@@ -122,7 +126,7 @@ pub struct FacetSession {
     lost: bool,
     run: u64,
     join: u64,
-    /// In the upper half of the numbers of its joinings.
+    /// Upper half of the join numbers.
     process: u64,
     asked: Option<Duration>,
     last_received: Duration,
@@ -130,21 +134,22 @@ pub struct FacetSession {
     resynced: Option<Duration>,
     /// Frame of the newest snapshot.
     listed: Option<u64>,
-    /// The newest frame that came.
+    /// The newest frame received.
     newest: Option<u64>,
     pending: Option<PendingState>,
-    /// Came before its list of objects, or before the answer to JOIN.
+    /// A state received before its object table, or before the answer to JOIN.
     early: Option<PendingState>,
-    /// A list of objects that came while a frame is being drawn: it waits, since that frame is of the old one.
+    /// An object table received while a frame is being drawn. It waits because that frame belongs
+    /// to the old table.
     list: Option<PendingState>,
-    /// Applied, and being drawn: frame and when it came.
+    /// The frame that is applied and being drawn, and its arrival.
     drawing: Option<(u64, Duration)>,
-    /// Drawn: frame, what READY said, when it was drawn.
+    /// The drawn frame, its READY message, and the time at which it was drawn.
     drawn_frame: Option<(u64, FrameAck, Duration)>,
     show: bool,
-    /// When PRESENT came for the frame that is held.
+    /// Arrival of PRESENT for the drawn frame.
     present_received: Option<Duration>,
-    /// Inputs that no picture has shown yet: user, number, when they were sent.
+    /// Inputs that no picture has shown yet: user, number, time of sending.
     inputs: VecDeque<(u16, u64, Duration)>,
     shown: Option<(u64, FrameAck)>,
     counts: FacetCounts,
@@ -153,7 +158,7 @@ pub struct FacetSession {
 }
 
 impl FacetSession {
-    /// `base`: the world as the scene file makes it.
+    /// Creates the session. `base` is the world as the scene file makes it.
     pub fn new(options: FacetOptions, base: World) -> FacetSession {
         let mut session = FacetSession {
             process: splitmix64(options.seed) & PROCESS_MASK,
@@ -186,37 +191,37 @@ impl FacetSession {
         session
     }
 
-    /// What to draw after [`begin`](Self::begin).
+    /// Returns the world to draw after [`begin`](Self::begin).
     pub fn world(&self) -> &World {
         self.mirror.world()
     }
 
-    /// Who looks, and where the cave stands.
+    /// Returns the users' heads and the cave's place in the scene.
     pub fn viewer(&self) -> &Viewer {
         self.mirror.viewer()
     }
 
-    /// What was counted.
+    /// Returns the counts.
     pub fn counts(&self) -> FacetCounts {
         self.counts
     }
 
-    /// The frame shown last since the last joining, and what PRESENTED said of it.
+    /// Returns the last frame shown since the last join, and its PRESENTED message.
     pub fn shown(&self) -> Option<(u64, FrameAck)> {
         self.shown
     }
 
-    /// What is to be sent.
+    /// Returns the messages to send, and forgets them.
     pub fn outgoing(&mut self) -> Vec<(Delivery, Vec<u8>)> {
         std::mem::take(&mut self.out)
     }
 
-    /// Whether the link is to be closed, so that it looks for a server anew.
+    /// Returns once whether the link must be closed, so that it looks for a server again.
     pub fn closing(&mut self) -> bool {
         std::mem::take(&mut self.close)
     }
 
-    /// What to do next.
+    /// Returns the next task.
     pub fn task(&self) -> Task {
         match (&self.phase, &self.drawn_frame, &self.pending) {
             (Phase::Ended(why), ..) => Task::Ended(why.clone()),
@@ -228,7 +233,8 @@ impl FacetSession {
         }
     }
 
-    /// Applies the frame that waits to be drawn; its number. `None`: there is none, or it does not fit and was refused.
+    /// Applies the pending frame and returns its number. Returns `None` if there is none, or if it
+    /// did not fit and was refused.
     pub fn begin(&mut self) -> Option<u64> {
         let PendingState { header, message, arrived } = self.pending.take()?;
         let applied = self.mirror.apply_state(header.frame, header.time_s, message.get(HEADER_BYTES..).unwrap_or(&[]));
@@ -242,7 +248,8 @@ impl FacetSession {
         Some(header.frame)
     }
 
-    /// The frame of [`begin`](Self::begin) is drawn. `image`: first 16 bytes of the BLAKE3 of its pixels, zeros where there are none.
+    /// Reports that the frame of [`begin`](Self::begin) is drawn. `image` holds the first 16 bytes
+    /// of the BLAKE3 hash of its pixels, or zeros if there are none.
     pub fn drawn(&mut self, now: Duration, image: Hash) {
         let Some((frame, arrived)) = self.drawing.take() else { return };
         let took_us = short_micros(now.saturating_sub(arrived));
@@ -267,7 +274,7 @@ impl FacetSession {
         }
     }
 
-    /// The frame that was held is on the screen.
+    /// Reports that the drawn frame is on the screen.
     pub fn presented(&mut self, now: Duration) {
         let Some((frame, done, since)) = self.drawn_frame.take() else { return };
         let (took_us, input_us) = (
@@ -286,7 +293,8 @@ impl FacetSession {
         self.answer(MessageKind::Presented, frame, &done);
     }
 
-    /// When the newest of our inputs was sent that the picture shows, if it is the first to; all up to it are forgotten.
+    /// Returns when the newest of this facet's inputs in the picture was sent, if the picture is
+    /// the first to show it. Forgets all inputs up to it.
     fn take_shown_input(&mut self) -> Option<Duration> {
         let users = &self.mirror.viewer().users;
         let shows = |user: u16| users.get(user as usize).map(|u| u.input);
@@ -300,7 +308,7 @@ impl FacetSession {
         newest
     }
 
-    /// Sends what a user does; `false` while there is no server.
+    /// Sends a user's input. Returns `false` while there is no server.
     pub fn send_input(&mut self, now: Duration, input: &Input) -> bool {
         let live = self.phase == Phase::Live;
         if live {
@@ -313,7 +321,7 @@ impl FacetSession {
         live
     }
 
-    /// Says good-bye.
+    /// Sends LEAVE and ends the session.
     pub fn leave(&mut self) {
         if self.phase == Phase::Live {
             self.send(MessageKind::Leave, 0, |_| {});
@@ -321,7 +329,8 @@ impl FacetSession {
         self.phase = Phase::Ended(EndReason::Left);
     }
 
-    /// Takes what the link reports, and the message, if it is one: a state is kept as it came until it is drawn.
+    /// Processes an event of the link with its message, if it has one. A state is kept as it
+    /// arrived until it is drawn.
     pub fn on_event(&mut self, now: Duration, event: LinkEvent, message: Message) {
         match event {
             LinkEvent::Opened => self.asked = None,
@@ -335,7 +344,7 @@ impl FacetSession {
         self.advance(now);
     }
 
-    /// Does what is due by now: call it whenever `recv` returns.
+    /// Does the work that is due; must be called after each return of `recv`.
     pub fn advance(&mut self, now: Duration) {
         match self.phase {
             Phase::Ended(_) => {}
@@ -396,7 +405,7 @@ fn micros(duration: Duration) -> u64 {
     u64::try_from(duration.as_micros()).unwrap_or(u64::MAX)
 }
 
-/// A number that looks nothing like its neighbours: splitmix64.
+/// Mixes a seed into a number without visible pattern: splitmix64.
 pub(crate) fn splitmix64(seed: u64) -> u64 {
     let mut z = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

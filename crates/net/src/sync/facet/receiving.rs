@@ -1,4 +1,4 @@
-//! What a facet does with each message of the server.
+//! Handling of the server's messages in a facet.
 
 use super::super::messages::{Refusal, increment};
 use super::super::mirror::Mirror;
@@ -48,7 +48,7 @@ impl FacetSession {
             MessageKind::Rejoin if about_us && self.phase == Phase::Live => self.on_server_lost(),
             MessageKind::Rejoin if about_us => self.restart_join(),
             MessageKind::End if live || about_us => {
-                // so that the server knows who has heard it
+                // the server waits for this acknowledgement
                 self.send(MessageKind::Leave, 0, |_| {});
                 self.phase = Phase::Ended(EndReason::Ended);
             }
@@ -115,7 +115,7 @@ impl FacetSession {
         Ok(())
     }
 
-    /// Asks for the list and the frame again, unless it did so a moment ago.
+    /// Requests snapshot and state again, at most once per join interval.
     pub(super) fn resync(&mut self, now: Duration) {
         if self.resynced.is_none_or(|asked| now >= asked.saturating_add(self.options.join_interval)) {
             self.resynced = Some(now);
@@ -165,7 +165,7 @@ impl FacetSession {
         }
     }
 
-    /// The server asks again: the answer was lost.
+    /// Repeats an acknowledgement that was lost: the server has asked again.
     fn repeat_answer(&mut self, frame: u64) {
         if let Some((drawn_frame, done, _)) = self.drawn_frame.filter(|(drawn_frame, ..)| *drawn_frame == frame) {
             self.answer(MessageKind::Ready, drawn_frame, &done);

@@ -1,35 +1,37 @@
-//! Two processes that say to be the same facet: the first keeps its place while it answers, the second is refused for good.
+//! Detection of two processes that claim the same facet. The first one keeps the slot while it
+//! answers, and the second one is refused for good.
 //!
-//! A link gives a facet's connection to who came last, so that a facet that was killed and started again is back at once. If the one that was pushed out
-//! comes back soon it lives, and the one that pushed it out is the second. If it comes back late (it was stopped, say), its place is taken and it is
-//! refused itself.
+//! A link gives a facet's connection to the newest process, so that a facet that was killed and
+//! restarted is back at once. If the replaced process returns within the grace period, it is alive,
+//! and the process that replaced it is the second. If it returns later (it was stopped, for
+//! instance), its slot is taken and it is refused itself.
 
 use super::super::transport::{Closed, LinkEvent};
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Processes of one facet that are remembered.
+/// Maximum number of processes remembered per facet.
 const MAX_REMEMBERED: usize = 8;
 
-/// Which process a joining is of: the upper half of its number.
+/// Returns the process of a join: the upper half of its number.
 pub(crate) fn process_of(join: u64) -> u32 {
     (join >> 32) as u32
 }
 
-/// The processes that wanted one place.
+/// Processes that claimed one slot.
 #[derive(Default)]
 pub(super) struct DuplicateFacets {
-    /// Who has the place, or had it last.
+    /// The process that has the slot, or had it last.
     holder: Option<u32>,
-    /// Its connection was taken by another one, of which nobody knows yet whose it is.
+    /// Another process took over the connection, and its join is not known yet.
     replaced: bool,
-    /// Who was pushed out, and when: the first of them first.
+    /// Replaced processes with the time of replacement, the earliest first.
     replaced_processes: VecDeque<(u32, Duration)>,
     refused: VecDeque<u32>,
 }
 
 impl DuplicateFacets {
-    /// What the link says of the place.
+    /// Notes an event of the slot's link.
     pub(super) fn link(&mut self, event: LinkEvent) {
         match event {
             LinkEvent::Closed(why) => self.replaced = why == Closed::Replaced,
@@ -37,7 +39,8 @@ impl DuplicateFacets {
         }
     }
 
-    /// Whether a process may have the place. It is soon up to `grace` after it was pushed out.
+    /// Returns whether a process may have the slot. `grace` is the time after its replacement
+    /// within which a process may reclaim it.
     pub(super) fn admit(&mut self, now: Duration, process: u32, grace: Duration) -> bool {
         if self.refused.contains(&process) {
             return false;

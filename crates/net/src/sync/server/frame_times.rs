@@ -1,22 +1,23 @@
-//! When frames were shown, by the server's clock: how far apart the facets showed one, and how long after what a user did.
+//! Presentation times of frames by the server's clock: the skew between facets, and the latency
+//! from an input to the picture that shows it.
 //!
-//! Each facet has a clock of its own. An exchange with four times tells how far it is ahead (RFC 5905, §8):
+//! Each facet has its own clock. An exchange with four time stamps gives its offset (RFC 5905, §8):
 //!
 //! ```text
-//! server   t1 asks ─────┐                   ┌─► t4 has the answer
-//! facet                 └─► T2 hears ─ T3 does it
+//! server   t1 sends ────┐                    ┌─► t4 receives
+//! facet                 └─► T2 receives ─ T3 done
 //!
-//! ahead = ((T2 − t1) + (T3 − t4)) / 2          wrong by at most      wait / 2,  wait = (t4 − t1) − (T3 − T2)
-//! shown = T3 − ahead
-//! skew  = last shown − first shown             input to picture = last shown − input
+//! offset = ((T2 − t1) + (T3 − t4)) / 2         error at most delay / 2,  delay = (t4 − t1) − (T3 − T2)
+//! shown  = T3 − offset
+//! skew   = last shown − first shown            latency = last shown − input
 //! ```
 //!
 //! | symbol | meaning |
 //! |---|---|
-//! | t1, T2 | STATE or PRESENT is sent, and comes |
-//! | T3, t4 | the frame is drawn or shown, and READY or PRESENTED has come |
-//! | wait | what both ways took together; of the last exchanges the one with the least counts, because its bound is the sharpest |
-//! | input | when the oldest of the inputs was made that this frame is the first to show: by the clock of the facet that sent it, else when it came here |
+//! | t1, T2 | STATE or PRESENT is sent and received |
+//! | T3, t4 | the frame is drawn or shown, and READY or PRESENTED is received |
+//! | delay | travel time of both messages; of the last exchanges the one with the smallest delay counts, because its error bound is the smallest |
+//! | input | time of the oldest input that this frame is the first to show: by the clock of the facet that sent it, otherwise its arrival at the server |
 
 use super::super::messages::FrameAck;
 use super::super::viewer::Viewer;
@@ -24,38 +25,40 @@ use super::ServerSession;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-/// After so many exchanges the best of them is forgotten: clocks drift.
+/// Number of exchanges after which the best one expires, because clocks drift.
 const EXCHANGES_PER_WINDOW: u32 = 64;
-/// Frames looked after at once: in `latest` some show one while others have the next.
+/// Maximum number of frames measured at once: in `latest`, some facets show one frame while others
+/// have the next.
 const MAX_OPEN_FRAMES: usize = 4;
-/// Users whose inputs are looked after.
+/// Maximum number of users whose inputs are timed.
 const MAX_TIMED_USERS: usize = super::super::viewer::MAX_USERS;
 
-/// How a frame was shown.
+/// Presentation of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameTimes {
-    /// Its number.
+    /// Number of the frame.
     pub frame: u64,
-    /// How many facets showed it in time.
+    /// Number of facets that showed it in time.
     pub facets: usize,
-    /// From the first to the last facet that showed it.
+    /// Time from the first to the last facet that showed it.
     pub skew: Duration,
-    /// The skew is wrong by at most so much: what the least exchanges of the two took.
+    /// Error bound of the skew: the sum of the bounds of the two clock offsets.
     pub error: Duration,
-    /// From what a user did to the last facet that showed it; only for the first frame that shows an input.
+    /// Time from the input to the last facet that showed it. Only for the first frame that shows an
+    /// input.
     pub input: Option<Duration>,
 }
 
-/// How far a facet's clock is ahead of the server's.
+/// Offset of a facet's clock from the server's.
 #[derive(Clone, Copy, Default)]
 pub(super) struct ClockOffset {
-    /// Least wait and what it told, µs: of these exchanges, and of those before.
+    /// Smallest delay and its offset, µs, of the current and of the previous window of exchanges.
     best: [Option<(i64, i64)>; 2],
     exchanges: u32,
 }
 
 impl ClockOffset {
-    /// Takes an exchange. What a facet says is not trusted: times that cannot be are left out.
+    /// Adds an exchange. A facet's times are not trusted: impossible ones are ignored.
     fn exchange(&mut self, asked: Duration, done: &FrameAck, now: Duration) {
         let Some(received) = done.received_us.and_then(|us| i64::try_from(us).ok()) else { return };
         let Ok(at) = i64::try_from(done.completed_us) else { return };
@@ -77,14 +80,14 @@ impl ClockOffset {
         self.best[0] = Some(self.best[0].map_or(sample, |best| if best.0 <= wait { best } else { sample }));
     }
 
-    /// A time of the facet's clock by the server's, and by how much it may be wrong, µs.
+    /// Converts a time of the facet's clock to the server's. Returns it with its error bound, µs.
     fn here(&self, completed_us: u64) -> Option<(i64, i64)> {
         let (wait, ahead) = self.best.into_iter().flatten().min()?;
         Some((i64::try_from(completed_us).ok()?.checked_sub(ahead)?, wait / 2))
     }
 }
 
-/// A frame that is being shown.
+/// A frame that is being presented.
 struct OpenFrame {
     frame: u64,
     /// By the server's clock, µs.
@@ -94,25 +97,25 @@ struct OpenFrame {
     facets: usize,
 }
 
-/// Frames that are being shown, and inputs that are not shown yet.
+/// Frames that are being presented, and inputs that are not shown yet.
 #[derive(Default)]
 pub(super) struct FrameTimer {
     open_frames: VecDeque<OpenFrame>,
-    /// By user: number of the newest input, and when it came.
+    /// Newest input and its arrival, by user.
     arrivals: BTreeMap<u16, (u64, Duration)>,
-    /// By user: number of the input that the last frame shows.
+    /// Number of the input that the last frame shows, by user.
     shown: Vec<u64>,
 }
 
 impl FrameTimer {
-    /// An input is here.
+    /// Notes the arrival of an input.
     pub(super) fn input(&mut self, now: Duration, user: u16, sequence: u64) {
         if (user as usize) < MAX_TIMED_USERS {
             self.arrivals.insert(user, (sequence, now));
         }
     }
 
-    /// A frame goes out; those of earlier frames that are pushed out by it.
+    /// Adds a frame. Returns the times of an older frame that it displaces.
     pub(super) fn publish(&mut self, frame: u64, viewer: Option<&Viewer>) -> Option<FrameTimes> {
         let mut input = None;
         if let Some(viewer) = viewer {
@@ -134,7 +137,7 @@ impl FrameTimer {
             .flatten()
     }
 
-    /// A facet has shown a frame.
+    /// Adds the presentation of a frame by a facet.
     fn presented(&mut self, frame: u64, at: (i64, i64), input_us: Option<u32>) {
         let Some(open_frames) = self.open_frames.iter_mut().find(|s| s.frame == frame) else { return };
         open_frames.facets += 1;
@@ -143,7 +146,7 @@ impl FrameTimer {
         open_frames.input = earlier(open_frames.input, input_us.map(|us| at.0.saturating_sub(us.into())));
     }
 
-    /// A frame is finished: nobody is waited for.
+    /// Closes a frame: no facet is awaited any more.
     pub(super) fn finish(&mut self, frame: u64) -> Option<FrameTimes> {
         let k = self.open_frames.iter().position(|s| s.frame == frame)?;
         self.open_frames.drain(..=k).next_back()?.frame_times()
@@ -173,23 +176,25 @@ fn micros(at: Duration) -> i64 {
     i64::try_from(at.as_micros()).unwrap_or(i64::MAX)
 }
 
-/// A message that was sent for a frame, and when; without a time if it was sent more than once, because nobody knows then which copy was answered.
+/// Frame of the last message to a facet, and the time of sending. There is no time if the message
+/// was sent more than once, because the acknowledged copy is unknown.
 pub(super) type RequestTime = Option<(u64, Option<Duration>)>;
 
-/// A message for a frame goes out.
+/// Notes the sending of a message for a frame.
 pub(super) fn note_request(asked: &mut RequestTime, frame: u64, now: Duration) {
     let again = asked.is_some_and(|(before, _)| before == frame);
     *asked = Some((frame, (!again).then_some(now)));
 }
 
 impl ServerSession {
-    /// Notes when an input came that no facet sent: from a tracker, or a recording. What facets send is noted by itself. A frame whose viewer carries this number
-    /// for this user is then timed ([`FrameTimes::input`]).
+    /// Notes the arrival of an input that no facet sent: from a tracker or a recording. Inputs of
+    /// facets are noted automatically. A frame whose viewer carries this number for this user is
+    /// then timed ([`FrameTimes::input`]).
     pub fn note_input(&mut self, now: Duration, user: u16, sequence: u64) {
         self.frame_times.input(now, user, sequence);
     }
 
-    /// READY has come.
+    /// Processes the times of a READY message.
     pub(super) fn time_ready(&mut self, now: Duration, facet: usize, frame: u64, done: &FrameAck) {
         let facet_state = &mut self.facets[facet];
         if let Some((_, Some(asked))) = facet_state.state_requested.filter(|(of, _)| *of == frame) {
@@ -197,7 +202,7 @@ impl ServerSession {
         }
     }
 
-    /// PRESENTED has come.
+    /// Processes the times of a PRESENTED message.
     pub(super) fn time_presented(&mut self, now: Duration, facet: usize, frame: u64, done: &FrameAck) {
         let facet_state = &mut self.facets[facet];
         let asked = if self.options.mode == super::SyncMode::Lockstep {

@@ -1,4 +1,4 @@
-//! A frame's way: published, ready, presented.
+//! Stages of a frame: published, ready, presented.
 
 use super::super::messages::increment;
 use super::super::publisher::PublishError;
@@ -13,8 +13,9 @@ use std::time::Duration;
 use tumble_core::World;
 
 impl ServerSession {
-    /// Publishes the world as the next frame; its number. Publish also while the world stands still, so that who joins sees it. Where a frame is still
-    /// under way it is given up, and who has not shown it counts as late.
+    /// Publishes the world as the next frame and returns its number. A world at rest must be
+    /// published too, so that joining facets see it. A frame that is still in progress is
+    /// abandoned, and facets that have not shown it count as late.
     ///
     /// # Errors
     /// [`PublishError`]; nothing was sent.
@@ -38,7 +39,8 @@ impl ServerSession {
         Ok(frame)
     }
 
-    /// Publishes a frame as it was recorded, under its number. One session either simulates or replays. Replicas get nothing: recordings hold poses.
+    /// Publishes a recorded frame under its number. A session either simulates or replays. Replicas
+    /// get nothing, because recordings hold poses.
     pub fn publish_recorded(&mut self, now: Duration, recorded: &FrameRecord) {
         self.abandon_frame();
         self.time_s = recorded.time_s;
@@ -53,7 +55,8 @@ impl ServerSession {
         }
     }
 
-    /// The frame published last, as a recording keeps it; `fresh`: with its list of objects even if that is an old one.
+    /// Returns the last published frame for a recording. With `fresh` it includes the object table
+    /// even if that is an old one.
     pub fn recorded(&self, fresh: bool) -> Option<FrameRecord> {
         let (frame, stream) = (self.frame?, &self.streams[0]);
         let state = stream.state.get(HEADER_BYTES..)?.to_vec();
@@ -75,7 +78,7 @@ impl ServerSession {
         }
     }
 
-    /// Sends the frame that was kept, with its list of objects if that is new.
+    /// Sends the kept frame, after its object table if that is new.
     pub(super) fn send_frame(&mut self, now: Duration, frame: u64) {
         let first = self.frame.is_none();
         (self.frame, self.next, self.stage, self.first_ready_at) =
@@ -93,7 +96,7 @@ impl ServerSession {
             if fresh {
                 to.iter().for_each(|&(k, _)| self.send_snapshot(k));
             }
-            // who follows wants the newest frame, and not all that it missed before it
+            // a following facet gets the newest frame only, not those that it missed
             for membership in [Membership::InStep, Membership::Following] {
                 let to: Vec<FacetNumber> = to.iter().filter(|(_, s)| *s == membership).map(|(k, _)| *k).collect();
                 if !state.is_empty() && !to.is_empty() {
@@ -141,18 +144,18 @@ impl ServerSession {
         }
     }
 
-    /// When those who have not answered are waited for no longer.
+    /// Returns the time at which the server stops waiting for facets that have not answered.
     pub(super) fn wait_deadline(&self) -> Option<Duration> {
         let options = &self.options;
         match self.stage {
             FrameStage::Idle => None,
             FrameStage::Ready(since) => {
-                // while nobody is ready nobody is held up
+                // as long as no facet is ready, none is delayed by the others
                 let at_most = since.saturating_add(options.ready_timeout.max(options.drop_timeout));
                 let end = |p: &FacetState| match (p.synced, self.first_ready_at) {
                     (false, _) => since.saturating_add(options.first_frame_timeout),
                     (true, None) => at_most,
-                    // what it began before it was waited for comes first
+                    // it may still have to finish an older frame
                     (true, Some(first)) => {
                         first.saturating_add(options.ready_timeout * if p.caught_up { 2 } else { 1 }).min(at_most)
                     }
@@ -163,7 +166,7 @@ impl ServerSession {
         }
     }
 
-    /// Waits no longer for those who are in step and not `done`.
+    /// Stops waiting for facets in step that have not `done` their part.
     pub(super) fn stop_waiting(
         &mut self,
         frame: u64,
@@ -181,7 +184,7 @@ impl ServerSession {
         }
     }
 
-    /// Ends the waiting for the frame that is under way.
+    /// Stops waiting for the frame in progress.
     pub(super) fn abandon_frame(&mut self) {
         let Some(frame) = self.frame else { return };
         if let FrameStage::Ready(_) = self.stage {

@@ -1,16 +1,18 @@
-//! The server's side of a session: a state machine. It has no clock and no link; `now` and messages go in, messages and events come out.
+//! The server's side of a session: a state machine without clock and link. Times and messages go
+//! in, messages and events come out.
 //!
 //! ```text
 //!                 JOIN               first READY / PRESENTED
 //!  facet:  absent ─────► following ───────────────────────────► in step
 //!                           ▲        late, or not presented        │
-//!                           └──────────────────────────────────────┘     silent for drop_after, LEAVE, closed: absent
+//!                           └──────────────────────────────────────┘     drop_timeout, LEAVE, closed: absent
 //!
-//!  frame:  idle ──publish──► ready? ──all in step are, or ready_after──► presented? ──all in step have, or ready_after──► idle
+//!  frame:  idle ──publish──► ready? ──all in step, or ready_timeout──► presented? ──all in step, or ready_timeout──► idle
 //! ```
 //!
-//! A facet that is *following* gets all messages and nobody waits for it: a wall stands still once, for `ready_timeout`, when a facet freezes. A facet that
-//! joined before the first frame is waited for from that frame on, for `first_frame_timeout`.
+//! A *following* facet gets all messages, and no frame waits for it. So a facet that freezes stalls
+//! the others once, for `ready_timeout`. A facet that joined before the first frame is awaited from
+//! that frame on, for `first_frame_timeout`.
 
 mod duplicate_facets;
 mod frame_times;
@@ -33,51 +35,51 @@ use std::sync::Arc;
 use std::time::Duration;
 use tumble_core::World;
 
-/// When a frame is shown.
+/// When facets show a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SyncMode {
     /// When every critical facet has drawn it.
     Lockstep,
-    /// By each facet as soon as it has drawn it.
+    /// Each facet as soon as it has drawn it.
     Latest,
 }
 
 /// A facet that may join.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FacetSlot {
-    /// Its name in the cave file.
+    /// Name in the cave file.
     pub name: String,
-    /// Whether the others wait for it.
+    /// Whether the other facets wait for it.
     pub critical: bool,
 }
 
-/// What a server is told at the start; names as in `[sync]` of a cave file.
+/// Options of a server's session, named as in `[sync]` of a cave file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ServerOptions {
-    /// Number of this run, another one at each start.
+    /// Number of this run, different at each start.
     pub run: u64,
-    /// BLAKE3 of the scene.
+    /// BLAKE3 hash of the scene.
     pub scene: [u8; 32],
-    /// The facets, by number; at most [`MAX_FACETS`], the rest cannot join.
+    /// The facets, by number. At most [`MAX_FACETS`]; further ones cannot join.
     pub slots: Vec<FacetSlot>,
     /// `mode`.
     pub mode: SyncMode,
-    /// `ready_timeout_ms`: how long those who are ready wait for the others.
+    /// `ready_timeout_ms`: how long ready facets wait for the others.
     pub ready_timeout: Duration,
-    /// How long the first frame of who joined before it may take.
+    /// Timeout of the first frame for facets that joined before it.
     pub first_frame_timeout: Duration,
     /// `drop_timeout_ms`.
     pub drop_timeout: Duration,
-    /// `history_frames`: frames whose hashes are remembered.
+    /// `history_frames`: number of frames whose hashes are kept.
     pub history: usize,
-    /// For links that may lose messages, how long to wait before one is sent again; `None` where the link sees to that.
+    /// Resend interval for links that may lose messages. `None` if the link is reliable.
     pub resend_interval: Option<Duration>,
     /// Number of the first frame.
     pub first_frame: u64,
 }
 
 impl ServerOptions {
-    /// The defaults of a cave file.
+    /// Returns the options with the defaults of a cave file.
     pub fn new(run: u64, scene: [u8; 32], slots: Vec<FacetSlot>) -> ServerOptions {
         let ms = Duration::from_millis;
         ServerOptions {
@@ -95,80 +97,81 @@ impl ServerOptions {
     }
 }
 
-/// How a facet stands.
+/// Membership of a facet in the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Membership {
-    /// Not there.
+    /// Not joined.
     Absent,
-    /// There; nobody waits for it.
+    /// Joined, and not awaited.
     Following,
-    /// There, and waited for.
+    /// Joined, and awaited by every frame.
     InStep,
 }
 
-/// What the server counted about one facet. Counts wrap.
+/// Counts of the server about one facet. They wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct SlotCounts {
-    /// Times it joined.
+    /// Number of joins.
     pub joined: u64,
-    /// Times it was dropped: silent, or its link closed.
+    /// Times that it was dropped: by timeout, or because its link closed.
     pub dropped: u64,
-    /// Frames it has shown.
+    /// Frames that it has shown.
     pub presented: u64,
-    /// Frames that others did not wait for any longer.
+    /// Frames that continued without it because it was not ready in time.
     pub late: u64,
-    /// Frames that it did not tell to have shown in time.
+    /// Frames whose presentation it did not acknowledge in time.
     pub missing: u64,
-    /// Messages that came again.
+    /// Messages received more than once.
     pub duplicate: u64,
-    /// Messages of an earlier run, joining, or of a frame long past.
+    /// Messages of an earlier run, join, or long past frame.
     pub stale: u64,
-    /// Messages whose hash did not fit.
+    /// Messages with a wrong hash.
     pub torn: u64,
     /// Messages refused for any other reason.
     pub refused: u64,
-    /// Frames of which it drew something else than was sent.
+    /// Frames for which its hash differs from the server's.
     pub mismatched: u64,
 }
 
-/// Something that happened.
+/// Event of a session.
 #[allow(clippy::large_enum_variant)] // inputs are few, and a box would show to all who take them
 #[derive(Clone, Debug, PartialEq)]
 pub enum ServerEvent {
-    /// A facet is there.
+    /// A facet joined.
     Joined(FacetNumber),
-    /// A facet was told why it is not let in.
+    /// A facet's join was refused, with the reason.
     Refused(FacetNumber, String),
-    /// A facet is gone: silent, closed, or by its own word (`true`).
+    /// A facet is gone: timed out, closed, or left by itself (`true`).
     Gone(FacetNumber, bool),
-    /// A facet has drawn a frame; whether it is what was sent.
+    /// A facet has drawn a frame; the flag says whether its hash is right.
     Ready(FacetNumber, u64, FrameAck, bool),
-    /// A facet has shown a frame; whether it is what was sent.
+    /// A facet has shown a frame; the flag says whether its hash is right.
     Presented(FacetNumber, u64, FrameAck, bool),
-    /// A frame went on without a facet.
+    /// A frame continued without a facet.
     Late(FacetNumber, u64),
-    /// When a frame was shown, of those who showed it. In lockstep just before `Finished`, in `latest` some frames later.
+    /// Presentation times of a frame. In lockstep it precedes `Finished`, in `latest` it follows
+    /// some frames later.
     Shown(FrameTimes),
-    /// A frame has been shown by all who were waited for.
+    /// All awaited facets have shown a frame.
     Finished(u64),
-    /// What a user did.
+    /// Input of a user.
     Input(FacetNumber, Input),
 }
 
-/// A message to be sent.
+/// A message to send.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ToFacets {
-    /// To whom.
+    /// Receivers.
     pub to: Vec<FacetNumber>,
-    /// How.
+    /// Delivery guarantee.
     pub delivery: Delivery,
-    /// What.
+    /// The encoded message.
     pub message: Arc<Vec<u8>>,
 }
 
-/// Events kept for who does not ask for them.
+/// Maximum number of events kept between two calls of [`ServerSession::events`].
 const MAX_EVENTS: usize = 1 << 16;
-/// Earlier joinings of a facet that are remembered as such.
+/// Number of former joins of a facet that are remembered.
 const MAX_FORMER_JOINS: usize = 8;
 
 struct FacetState {
@@ -180,13 +183,14 @@ struct FacetState {
     exact: bool,
     last_received: Duration,
     sent: Duration,
-    /// It has answered the snapshot with a frame.
+    /// Whether the facet has answered the snapshot with a frame.
     synced: bool,
     ready: Option<u64>,
     presented: Option<u64>,
-    /// While it follows: the frame that it was ready for last, and when it said so.
+    /// While following: its last ready frame, and the time of that message.
     answered: Option<(u64, Duration)>,
-    /// It is drawing in time again, and is waited for from the next frame on; until it is ready for that one.
+    /// Whether it draws in time again. It is then awaited from the next frame on, and the flag
+    /// holds until it is ready for that frame.
     caught_up: bool,
     counts: SlotCounts,
     reported: FacetCounts,
@@ -203,11 +207,11 @@ enum FrameStage {
     Presented(Duration),
 }
 
-/// One stream of frames: for those that draw, or for replicas.
+/// Frames of one kind: for drawing facets, or for replicas.
 struct Stream {
     publisher: Publisher,
     snapshot: Arc<Vec<u8>>,
-    /// Frame that brought the list of objects.
+    /// Frame with which the object table was sent.
     listed: Option<u64>,
     state: Arc<Vec<u8>>,
     hashes: VecDeque<(u64, Hash)>,
@@ -217,14 +221,14 @@ struct Stream {
 pub struct ServerSession {
     options: ServerOptions,
     facets: Vec<FacetState>,
-    /// Poses, exact.
+    /// Poses, then exact messages.
     streams: [Stream; 2],
-    /// The frame published last.
+    /// The last published frame.
     frame: Option<u64>,
     next: u64,
     time_s: f64,
     stage: FrameStage,
-    /// When the first of those who are waited for was ready for the frame.
+    /// When the first awaited facet was ready for the frame.
     first_ready_at: Option<Duration>,
     out: Vec<ToFacets>,
     events: VecDeque<ServerEvent>,
@@ -234,7 +238,7 @@ pub struct ServerSession {
 }
 
 impl ServerSession {
-    /// `base`: the world as the scene file makes it, before the first step.
+    /// Creates the session. `base` is the world as the scene file makes it, before the first step.
     pub fn new(mut options: ServerOptions, base: &World) -> ServerSession {
         options.slots.truncate(MAX_FACETS);
         options.history = options.history.clamp(1, 1024);
@@ -285,27 +289,27 @@ impl ServerSession {
         }
     }
 
-    /// How a facet stands.
+    /// Returns the membership of a facet.
     pub fn membership(&self, facet: FacetNumber) -> Membership {
         self.facets.get(facet as usize).map_or(Membership::Absent, |p| p.membership)
     }
 
-    /// What was counted here about a facet, and what it counted itself by its last beat.
+    /// Returns the server's counts about a facet, and the facet's own counts of its last heartbeat.
     pub fn counts(&self, facet: FacetNumber) -> (SlotCounts, FacetCounts) {
         self.facets.get(facet as usize).map_or_else(Default::default, |p| (p.counts, p.reported))
     }
 
-    /// Whether any facet is there.
+    /// Returns whether any facet has joined.
     pub fn has_facets(&self) -> bool {
         self.joined().next().is_some()
     }
 
-    /// Whether every critical facet is there.
+    /// Returns whether every critical facet has joined.
     pub fn all_critical_joined(&self) -> bool {
         self.facets.iter().all(|p| !p.slot.critical || p.membership != Membership::Absent)
     }
 
-    /// Names of the critical facets that are not there.
+    /// Returns the names of the critical facets that have not joined.
     pub fn missing_facets(&self) -> Vec<&str> {
         self.facets
             .iter()
@@ -314,41 +318,41 @@ impl ServerSession {
             .collect()
     }
 
-    /// Whether the next frame may be published: the last one has been shown, or nobody waits for it any more.
+    /// Returns whether the next frame may be published: no facet is awaited any more.
     pub fn is_idle(&self) -> bool {
         self.stage == FrameStage::Idle
     }
 
-    /// The frame published last.
+    /// Returns the number of the last published frame.
     pub fn frame(&self) -> Option<u64> {
         self.frame
     }
 
-    /// What happened since the last call; the oldest of more than 65536 are forgotten.
+    /// Returns the events since the last call, at most the newest 65536.
     pub fn events(&mut self) -> Vec<ServerEvent> {
         self.events.drain(..).collect()
     }
 
-    /// What is to be sent.
+    /// Returns the messages to send, and forgets them.
     pub fn outgoing(&mut self) -> Vec<ToFacets> {
         std::mem::take(&mut self.out)
     }
 
-    /// Facets whose connection is to be closed.
+    /// Returns the facets whose connection must be closed, and forgets them.
     pub fn closing(&mut self) -> Vec<FacetNumber> {
         std::mem::take(&mut self.close)
     }
 
-    /// Tells all facets that the run is over.
+    /// Sends END to all facets.
     pub fn end(&mut self) {
-        // by the number of its joining: who has no frame yet knows no number of the run
+        // addressed by join number, because a facet without a frame does not know the run number
         let to: Vec<(FacetNumber, u64)> = self.joined().map(|(k, facet_state)| (k, facet_state.join)).collect();
         let frame = self.frame.unwrap_or(0);
         to.into_iter().for_each(|(facet, join)| self.send_to(facet, MessageKind::End, join, frame, |_| {}));
         (self.ended, self.stage) = (true, FrameStage::Idle);
     }
 
-    /// Takes what a link reports; `bytes` is the message, if it is one.
+    /// Processes an event of the link; `bytes` is the message, if it is one.
     pub fn on_event(&mut self, now: Duration, facet: FacetNumber, event: LinkEvent, bytes: &[u8]) {
         self.facets
             .get_mut(facet as usize)
@@ -362,7 +366,7 @@ impl ServerSession {
         self.advance(now);
     }
 
-    /// A facet's process has ended: it is dropped at once, and nobody waits for it.
+    /// Drops a facet whose process has ended, so that no frame waits for it.
     pub fn facet_exited(&mut self, now: Duration, facet: FacetNumber) {
         if self.membership(facet) != Membership::Absent {
             self.mark_absent(facet, false);
@@ -371,7 +375,7 @@ impl ServerSession {
         self.advance(now);
     }
 
-    /// Does what is due by now: call it whenever `recv` returns.
+    /// Does the work that is due; must be called after each return of `recv`.
     pub fn advance(&mut self, now: Duration) {
         self.drop_timed_out(now);
         if let Some(after) = self.options.resend_interval {
@@ -395,7 +399,7 @@ impl ServerSession {
     }
 }
 
-/// Lower-case hexadecimal.
+/// Returns the bytes in lower-case hexadecimal.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }

@@ -1,4 +1,4 @@
-//! What a server does with each message of a facet.
+//! Handling of the facets' messages in a server.
 
 use super::super::input::Input;
 use super::super::messages::{FacetCounts, FrameAck, Join, Refusal, increment};
@@ -93,7 +93,7 @@ impl ServerSession {
         let (grace, facet_state) = (self.options.drop_timeout, &mut self.facets[facet as usize]);
         if !facet_state.duplicate_facets.admit(now, process_of(join), grace) {
             let why = format!(
-                "another process shows facet '{}' and answers: end that one first, or show another facet",
+                "another process already shows facet '{}': end it first, or show another facet",
                 facet_state.slot.name
             );
             return self.reject_join(facet, join, why);
@@ -115,7 +115,7 @@ impl ServerSession {
         self.send_snapshot_and_state(now, facet);
     }
 
-    /// Why a facet cannot be let in.
+    /// Returns why a facet may not join, if there is a reason.
     pub(super) fn join_problem(&self, facet: FacetNumber, wanted: &Join) -> Option<String> {
         let slot = &self.facets[facet as usize].slot;
         if slot.name != wanted.name {
@@ -140,13 +140,15 @@ impl ServerSession {
         self.report(ServerEvent::Refused(facet, why));
     }
 
-    /// Whether a frame's hash is what was sent, if it is remembered.
+    /// Returns whether a frame's hash is right, if the frame is remembered.
     pub(super) fn check(&self, exact: bool, frame: u64, hash: &Hash) -> Option<bool> {
         self.streams[exact as usize].hashes.iter().find(|(f, _)| *f == frame).map(|(_, ours)| ours == hash)
     }
 
-    /// A facet that follows draws one frame after the other, always the newest: the time between two answers is what one takes it. Where that is well below what
-    /// a frame is waited for, it can be waited for again, also if it is slower than the frames come.
+    /// Detects that a following facet is fast enough again. It draws one frame after the other,
+    /// always the newest, so the time between two answers is its drawing time. If that is well
+    /// below `ready_timeout`, the facet can be awaited again, even if it is slower than the frame
+    /// rate.
     fn track_catch_up(&mut self, now: Duration, facet: FacetNumber, frame: u64) {
         let well_below = self.options.ready_timeout * 3 / 4;
         let facet_state = &mut self.facets[facet as usize];
@@ -187,7 +189,7 @@ impl ServerSession {
         }
         let at_the_barrier = self.frame == Some(frame) && matches!(self.stage, FrameStage::Ready(_));
         self.advance_frame(now);
-        // who comes when the frame has been shown, or asks again, is answered by itself
+        // a late or repeated READY gets its own PRESENT
         if !at_the_barrier && self.facets[facet as usize].presented != Some(frame) {
             self.send_present(now, vec![facet], frame);
         }

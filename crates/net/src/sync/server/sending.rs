@@ -1,4 +1,4 @@
-//! What a server sends, and what it does when time passes.
+//! Sending, and the work that is due by time.
 
 use super::super::transport::{Delivery, FacetNumber};
 use super::super::wire::{MessageHeader, MessageKind, message};
@@ -17,7 +17,7 @@ impl ServerSession {
         }
     }
 
-    /// Over a link that loses messages: what is unanswered goes out again.
+    /// Resends unanswered messages, for links that lose messages.
     pub(super) fn resend(&mut self, now: Duration, after: Duration) {
         let due: Vec<FacetNumber> =
             self.joined().filter(|(_, p)| now >= p.sent.saturating_add(after)).map(|(k, _)| k).collect();
@@ -37,7 +37,8 @@ impl ServerSession {
         }
     }
 
-    /// The next time at which [`advance`](Self::advance) has something to do, if nothing comes before.
+    /// Returns the next time at which [`advance`](Self::advance) has work, if no event comes
+    /// before.
     pub fn wake(&self) -> Option<Duration> {
         let joined = self.joined().map(|(_, p)| p.last_received.saturating_add(self.options.drop_timeout));
         let beats = self.joined().map(|(_, p)| p.sent.saturating_add(self.options.drop_timeout / 4));
@@ -49,7 +50,7 @@ impl ServerSession {
         joined.chain(beats).chain(again).chain(self.wait_deadline()).min()
     }
 
-    /// Who hears nothing else hears that the server lives.
+    /// Sends heartbeats to facets that got no other message for a quarter of the drop timeout.
     pub(super) fn send_heartbeats(&mut self, now: Duration) {
         let every = self.options.drop_timeout / 4;
         let due: Vec<FacetNumber> =
@@ -79,7 +80,7 @@ impl ServerSession {
         MessageHeader { kind, run: self.options.run, join, frame, time_s: self.time_s }
     }
 
-    /// The snapshot, and the frame published last: what a facet needs to begin.
+    /// Sends the snapshot and the last frame, with which a facet begins.
     pub(super) fn send_snapshot_and_state(&mut self, now: Duration, facet: FacetNumber) {
         if self.frame.is_some() {
             self.send_snapshot(facet);

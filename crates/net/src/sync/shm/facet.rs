@@ -1,4 +1,4 @@
-//! A facet's end of shared memory.
+//! A facet's endpoint in shared memory.
 
 use super::ports::{Ports, Received};
 use super::reassembly::{Reassembly, SendHistory};
@@ -11,24 +11,24 @@ use crate::sync::transport::{
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// Pieces remembered for a server that missed them: at least one longest message.
+/// Number of pieces kept for resending, enough for one message of maximum length.
 const HISTORY_PIECES: usize = 2048;
 
-/// How far the connection is.
+/// State of the connection.
 enum ConnectionState {
-    /// Asks, anew at the given time.
+    /// Sends Hello again at the given time.
     Connecting { next: Duration },
-    /// Knows its server's number.
+    /// Connected to the server process with this id.
     Connected { server_id: u64, reassembly: Reassembly, last_received: Duration, sent: Duration },
 }
 
-/// What waits for the user.
+/// Event or message that waits for the caller.
 enum Queued {
     Event(LinkEvent),
     Message(Delivery, Message),
 }
 
-/// A facet's end of shared memory.
+/// A facet's endpoint in shared memory.
 pub struct ShmFacet {
     run: String,
     facet: FacetNumber,
@@ -43,9 +43,10 @@ pub struct ShmFacet {
 }
 
 impl ShmFacet {
-    /// Begins to look for the server of run `run`.
+    /// Starts to connect to the server of run `run`.
     ///
-    /// Errors: the facet's number is too large; iceoryx2 or the system refuses.
+    /// # Errors
+    /// The facet's number is too large; iceoryx2 or the system refuses.
     pub fn new(run: &str, facet: FacetNumber) -> Result<ShmFacet, LinkError> {
         if usize::from(facet) >= MAX_FACETS {
             return Err(LinkError::Other(format!("facet {facet}: the largest number is {}", MAX_FACETS - 1)));
@@ -64,7 +65,8 @@ impl ShmFacet {
         })
     }
 
-    /// A server of which nothing was heard for so long is given up, in place of [`IDLE_TIMEOUT`].
+    /// Sets the time without any message after which the server is given up, instead of
+    /// [`IDLE_TIMEOUT`].
     pub fn with_idle_timeout(mut self, idle_timeout: Duration) -> ShmFacet {
         self.idle_timeout = idle_timeout;
         self
@@ -111,7 +113,7 @@ impl ShmFacet {
         Ok(())
     }
 
-    /// Takes a sample; what is asked for again comes back.
+    /// Processes a sample. Returns the header of a resend request.
     fn take(&mut self, ports: &Ports, sample: Received) -> Option<SampleHeader> {
         let now = self.start.elapsed();
         let header = match SampleHeader::parse(sample.header()) {
@@ -139,7 +141,7 @@ impl ShmFacet {
             return None;
         };
         if *server_id != header.server_id {
-            // Another server took the run over.
+            // another server has taken over the run
             self.end(Closed::ByPeer);
             return None;
         }
@@ -148,7 +150,8 @@ impl ShmFacet {
             SampleKind::Piece => {
                 let mine = header.mask >> self.facet & 1 == 1;
                 self.counters.bytes_in += if mine { (HEADER_BYTES + sample.as_ref().len()) as u64 } else { 0 };
-                // What is repeated for another facet says nothing to this one, even where it misses the same number.
+                // a piece repeated for another facet has no meaning here, even if this facet misses
+                // the same number
                 let repeated_for_another = header.connection != 0 && !for_me;
                 let (queued, superseded) = (&mut self.queued, &mut self.counters.superseded);
                 let deliver = |delivery, message| *superseded += queue(queued, delivery, message);
@@ -190,7 +193,7 @@ impl ShmFacet {
         Ok(())
     }
 
-    /// Asks for the server, or again for what is missing; pings; finds silence.
+    /// Connects, requests missing pieces, pings and checks the idle timeout.
     fn maintain(&mut self) -> Result<(), LinkError> {
         let now = self.start.elapsed();
         match &mut self.state {
@@ -207,7 +210,7 @@ impl ShmFacet {
             ConnectionState::Connected { reassembly, last_received, sent, .. } => {
                 if now >= *last_received + self.idle_timeout {
                     self.end(Closed::TimedOut);
-                    // The services may be those of a server that was killed: join anew.
+                    // the services may be those of a killed server: open them again
                     self.ports = None;
                 } else if let Some((number, until)) = reassembly.ask(now) {
                     let header = SampleHeader { number, until, ..self.header(SampleKind::ResendRequest) };
@@ -245,7 +248,8 @@ impl ShmFacet {
     }
 }
 
-/// A newest message that still waits is replaced; how many were.
+/// Queues a message. A newest message replaces one that still waits; returns how many were
+/// replaced.
 fn queue(queued: &mut VecDeque<Queued>, delivery: Delivery, message: Message) -> u64 {
     let before = queued.len();
     if delivery == Delivery::Newest {
@@ -308,7 +312,7 @@ impl FacetLink for ShmFacet {
     fn close(&mut self) {
         if let ConnectionState::Connected { .. } = self.state {
             let close = self.header(SampleKind::Close);
-            // A server that does not hear it finds the silence.
+            // if the server misses it, its idle timeout ends the connection
             let _ = self.send_control(close, &[]);
             self.end(Closed::ByUs);
         }

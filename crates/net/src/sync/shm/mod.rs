@@ -1,9 +1,12 @@
-//! Shared memory between the processes of one machine, by iceoryx2.
+//! Shared memory between the processes of one machine, over iceoryx2.
 //!
-//! A message is written once for all facets that it is for, and read where it lies; a [`wakeup`] wakes who waits, nobody spins. The buffers overflow safely: a
-//! reader that was stopped or killed never holds the writer up. What that costs, reliability, comes back by numbers: see [`reassembly`].
+//! A message is written once for all its receivers and read in place. `wakeup.rs` wakes waiting
+//! processes; no process spins. The buffers overflow safely: a reader that was stopped or killed
+//! never blocks the writer. Sequence numbers and resend requests make this reliable, see
+//! `reassembly.rs`.
 //!
-//! All work is done in `recv`; there is no thread. A side that looks in only after a long picture finds its samples in the buffer, or asks for them again.
+//! All work is done in `recv`; there is no thread. A side that calls `recv` only after a long
+//! picture finds its samples in the buffer, or requests them again.
 
 mod facet;
 mod node_lock;
@@ -25,21 +28,23 @@ pub use server::ShmServer;
 
 use std::time::Duration;
 
-/// A side that had nothing to send for so long says that it lives.
+/// Idle time after which a side sends a ping.
 pub const PING_INTERVAL: Duration = Duration::from_millis(200);
-/// A connection of which nothing was heard for so long is closed.
+/// Time without any message after which a connection is closed.
 pub const IDLE_TIMEOUT: Duration = Duration::from_secs(2);
-/// A facet that looks for its server asks this often.
+/// Interval between two Hello samples of a facet that looks for its server.
 pub const CONNECT_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Removes what killed processes of this user left in shared memory and in the folder. A launcher calls it after it has killed a process.
+/// Removes the shared memory and files that killed processes of this user left. A launcher calls it
+/// after it has killed a process.
 ///
-/// Errors: iceoryx2 or the system refuses.
+/// # Errors
+/// iceoryx2 or the system refuses.
 pub fn clean_up() -> Result<(), crate::sync::transport::LinkError> {
     ports::clean_up()
 }
 
-/// A number that no other process draws.
+/// Returns a random number.
 fn random_id() -> Result<u64, crate::sync::transport::LinkError> {
     Ok(crate::sync::udp::Entropy::system()?.next_u64())
 }

@@ -1,7 +1,10 @@
-//! Who of a user's processes is here: the last one that goes takes away what iceoryx2 leaves.
+//! Tracks whether any process of a user has an iceoryx2 node. The last one to exit removes the
+//! files that iceoryx2 leaves.
 //!
-//! All nodes of a folder draw their numbers from one counter in it (`….global_mgmt`, 16 bytes), which iceoryx2 0.10 never removes, because a node that still
-//! runs would draw numbers twice. Whoever has a node holds a shared lock on a file in the folder; who gets it alone knows that there is no node.
+//! All nodes of a folder draw their numbers from one counter in it (`….global_mgmt`, 16 bytes).
+//! iceoryx2 0.10 never removes the counter, because a node that still runs would then draw numbers
+//! twice. A process with a node holds a shared lock on a file in the folder. A process that gets
+//! the lock exclusively knows that there is no node.
 
 use super::wakeup;
 use crate::sync::transport::LinkError;
@@ -12,7 +15,7 @@ use std::path::{Path, PathBuf};
 const LOCK: &str = "nodes.lock";
 const COUNTER: &str = ".global_mgmt";
 
-/// Held by a process as long as it has a node, and dropped after it.
+/// Held by a process while it has a node, and dropped after the node.
 pub struct NodeLock {
     file: File,
     path: PathBuf,
@@ -20,9 +23,10 @@ pub struct NodeLock {
 }
 
 impl NodeLock {
-    /// Says that this process is here.
+    /// Takes the shared lock.
     ///
-    /// Errors: the file cannot be made or locked.
+    /// # Errors
+    /// The file cannot be created or locked.
     pub fn new(folder: &Path, user: u32) -> Result<NodeLock, LinkError> {
         let path = folder.join(LOCK);
         let io = |why| LinkError::Io { what: format!("shared memory: {}", path.display()), why };
@@ -36,14 +40,14 @@ impl NodeLock {
                 .open(&path)
                 .map_err(io)?;
             file.lock_shared().map_err(io)?; // who holds it alone removes two files and lets go
-            // one of those may be this one
+            // the removed files may include this one
             if std::fs::metadata(&path).is_ok_and(|there| file.metadata().is_ok_and(|ours| there.ino() == ours.ino())) {
                 return Ok(NodeLock { file, path, user });
             }
         }
     }
 
-    /// The user's number.
+    /// Returns the user id.
     pub fn user(&self) -> u32 {
         self.user
     }

@@ -1,8 +1,10 @@
-//! The ends of iceoryx2 that one process holds, the bell, and where its files lie.
+//! The iceoryx2 ports of one process, its wakeup counters, and the location of their files.
 //!
-//! Two services of samples per run, named by the run: `tumble/RUN/down` and `…/up`, and a [`Wakeup`]. Files lie in a folder of this user alone, objects in
-//! `/dev/shm` carry the user's number and have mode 600: another user's run is neither seen nor disturbed. What a killed process leaves is removed when the next node begins,
-//! or when a server ends; what then still stays, the last process takes along ([`super::node_lock`]).
+//! A run has two publish-subscribe services, `tumble/RUN/down` and `tumble/RUN/up`, and a
+//! [`Wakeup`]. The files are in a folder of this user. Objects in `/dev/shm` carry the user id and
+//! have mode 600, so runs of different users do not interfere. Leftovers of a killed process are
+//! removed when the next node begins or a server ends; the last process removes the rest
+//! ([`super::node_lock`]).
 
 use super::node_lock::NodeLock;
 use super::service::Private;
@@ -20,21 +22,21 @@ use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Most bytes of a sample from the server; a longer message goes in pieces.
+/// Maximum size of a sample from the server, bytes. A longer message is sent in pieces.
 pub const DOWN_BYTES: usize = 128 << 10;
-/// Most bytes of a sample from a facet.
+/// Maximum size of a sample from a facet, bytes.
 pub const UP_BYTES: usize = 16 << 10;
-/// Samples that a slow reader's buffer holds.
+/// Number of samples in the buffer of a slow reader.
 const BUFFER_SAMPLES: usize = 8;
 
-/// Samples that a reader may hold while it goes on reading.
+/// Number of samples that a reader may hold while it continues to read.
 const MAX_BORROWED: usize = 6;
 
-/// A sample that was received. It lies in shared memory, and nobody writes over it until it is dropped.
+/// A received sample. It lies in shared memory and is not overwritten until it is dropped.
 pub struct Received(Sample<Private, [u8], HeaderWords>);
 
 impl Received {
-    /// Its head.
+    /// Returns the header.
     pub fn header(&self) -> HeaderWords {
         *self.0.user_header()
     }
@@ -46,11 +48,11 @@ impl AsRef<[u8]> for Received {
     }
 }
 
-/// The ends.
+/// The ports of one process.
 pub struct Ports {
     publisher: Publisher<Private, [u8], HeaderWords>,
     subscriber: Subscriber<Private, [u8], HeaderWords>,
-    /// Held by each sample that was lent.
+    /// Its reference count is the number of samples on loan.
     loaned: Arc<()>,
     wakeup: Wakeup,
     sample: usize,
@@ -59,10 +61,10 @@ pub struct Ports {
 }
 
 impl Ports {
-    /// Begins the services of a run, or joins those that an earlier server of it left.
+    /// Creates the services of a run, or opens those that an earlier server of the run left.
     pub fn serve(run: &str, facets: FacetNumber) -> Result<Ports, LinkError> {
         let (node, node_lock) = node("tumble server")?;
-        // Killed processes hold their places until they are cleaned up.
+        // killed processes keep their places until they are cleaned up
         let places = 2 * usize::from(facets) + 4;
         let data = |name: &str, publishers: usize, subscribers: usize| {
             let builder = node
@@ -81,7 +83,7 @@ impl Ports {
                 .open_or_create()
                 .map_err(|why| refused(run, name, why))
         };
-        // Before the services: who finds them finds it.
+        // before the services: a facet that finds them also finds the counters
         let wakeup = Wakeup::serve(run, node_lock.user())?;
         let (down, up) = (data("down", 4, places)?, data("up", places, 4)?);
         let ports = Ports {
@@ -96,7 +98,7 @@ impl Ports {
         Ok(ports)
     }
 
-    /// Joins a run's services as a facet; `None` while there are none.
+    /// Opens a run's services as a facet; `None` while there are none.
     pub fn join(run: &str) -> Result<Option<Ports>, LinkError> {
         let (node, node_lock) = node("tumble facet")?;
         let data = |name: &str| {
@@ -124,12 +126,12 @@ impl Ports {
         Ok(Some(ports))
     }
 
-    /// Most bytes of a message in one sample.
+    /// Returns the maximum number of message bytes in one sample.
     pub fn piece_bytes(&self) -> usize {
         self.sample
     }
 
-    /// Publishes a sample. Nobody is woken yet.
+    /// Publishes a sample without waking a process.
     pub fn publish(&self, header: HeaderWords, data: &[u8]) -> Result<(), LinkError> {
         let mut sample = self.publisher.loan_slice_uninit(data.len()).map_err(|why| failed("loan", why))?;
         *sample.user_header_mut() = header;
@@ -137,7 +139,7 @@ impl Ports {
         Ok(())
     }
 
-    /// Looks again for the bell of a run: a new server of it may have another one.
+    /// Opens the wakeup counters of a run again, because a new server may have created others.
     pub fn reopen_wakeup(&mut self, run: &str) -> Result<(), LinkError> {
         if let Some(wakeup) = Wakeup::join(run, self.node_lock.user())? {
             self.wakeup = wakeup;
@@ -145,19 +147,20 @@ impl Ports {
         Ok(())
     }
 
-    /// What wakes the other side.
+    /// Returns the wakeup counters.
     pub fn wakeup(&self) -> &Wakeup {
         &self.wakeup
     }
 
-    /// The next sample, if there is one.
+    /// Returns the next sample, if there is one.
     pub fn receive(&self) -> Result<Option<Received>, LinkError> {
         Ok(self.subscriber.receive().map_err(|why| failed("receive", why))?.map(Received))
     }
 
-    /// The message of a sample: where it lies, or a copy where the reader holds so many already that it could not go on reading.
+    /// Returns the message of a sample: in place, or a copy if too many samples are on loan
+    /// already.
     pub fn loan(&self, sample: Received) -> Message {
-        // one more is held while it is looked at
+        // one more sample is held while it is read
         if Arc::strong_count(&self.loaned) + 1 < MAX_BORROWED {
             Message::loaned(Loaned { sample, _held: self.loaned.clone() })
         } else {
@@ -165,14 +168,14 @@ impl Ports {
         }
     }
 
-    /// Removes what killed processes left.
+    /// Removes leftovers of killed processes.
     pub fn clean_up(&self) {
         self.node.try_cleanup_dead_nodes();
         wakeup::clean_up(self.node_lock.user());
     }
 }
 
-/// A sample that somebody holds.
+/// A sample on loan.
 struct Loaned {
     sample: Received,
     _held: Arc<()>,
@@ -196,7 +199,7 @@ fn publisher(service: &Samples, bytes: usize) -> Result<Publisher<Private, [u8],
     service.publisher_builder().initial_max_slice_len(bytes).allocation_strategy(AllocationStrategy::Static).create()
 }
 
-/// A node, which removes what is stale as it begins, and the word that it is here.
+/// Creates a node, which removes stale resources, and takes the node lock.
 fn node(name: &str) -> Result<(Node<Private>, NodeLock), LinkError> {
     set_log_level(LogLevel::Fatal); // what goes wrong is told by our errors
     let (folder, user) = folder()?;
@@ -204,7 +207,7 @@ fn node(name: &str) -> Result<(Node<Private>, NodeLock), LinkError> {
     let unusable =
         |why: &dyn Debug| LinkError::Other(format!("shared memory: the folder {text} cannot be used: {why:?}"));
     let mut config = Config::default();
-    // Of another folder another one: nodes that do not see each other draw from different counters.
+    // the prefix depends on the folder: nodes that do not see each other use different counters
     let prefix = format!("tumble_{user}_{}_", &blake3::hash(text.as_bytes()).to_hex()[..8]);
     let node_lock = NodeLock::new(&folder, user)?;
     config.global.prefix = FileName::new(prefix.as_bytes()).map_err(|why| unusable(&why))?;
@@ -216,7 +219,7 @@ fn node(name: &str) -> Result<(Node<Private>, NodeLock), LinkError> {
     Ok((node, node_lock))
 }
 
-/// Removes what killed processes left.
+/// Removes leftovers of killed processes.
 pub fn clean_up() -> Result<(), LinkError> {
     let (node, node_lock) = node("tumble clean-up")?;
     node.try_cleanup_dead_nodes();
@@ -225,7 +228,10 @@ pub fn clean_up() -> Result<(), LinkError> {
     Ok(())
 }
 
-/// A folder of this user alone, made if need be; and the user's number.
+/// Returns a folder that only this user can enter, created if needed, and the user id.
+///
+/// # Errors
+/// The folder cannot be created, or has another owner or mode.
 pub fn folder() -> Result<(PathBuf, u32), LinkError> {
     let user = std::fs::metadata("/proc/self").map_err(|why| LinkError::Io { what: "/proc/self".into(), why })?.uid();
     let base = std::env::var_os("XDG_RUNTIME_DIR")

@@ -1,52 +1,55 @@
-//! Reliable order over a buffer that overflows: numbers, a memory of what was sent, and asking again.
+//! Reliable, ordered delivery over a buffer that overflows: sequence numbers, a history of sent
+//! pieces, and resend requests.
 //!
-//! A reader that is slower than its buffer loses the *oldest* samples, so the newest always arrives and shows by its number what is missing. The reader
-//! asks for the first few of those again, at most as many as its buffer holds, and for the next when they came: it sets the pace itself. What is no longer wanted
-//! of those, messages of which a newer one is there, is not sent again but said to be nothing, in one sample however much it is.
+//! A reader that is slower than its buffer loses the *oldest* samples. The newest sample always
+//! arrives, and its number reveals the gap. The reader requests the first few missing pieces, no
+//! more than its buffer holds, and the next ones when those have arrived; so the reader sets the
+//! rate. Pieces of a message that a newer one has superseded are not sent again: one sample marks
+//! any number of them as skipped.
 
 use super::wire::SampleHeader;
 use crate::sync::transport::{Delivery, MAX_MESSAGE_BYTES, MAX_QUEUED_BYTES, Message};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-/// Pieces asked for at once: below what a reader's buffer holds.
+/// Maximum number of pieces per resend request, below the capacity of a reader's buffer.
 const MAX_RESEND: u64 = 6;
-/// When what was asked for has not come, it is asked for again.
+/// Time after which a request is repeated.
 const RESEND_TIMEOUT: Duration = Duration::from_millis(5);
-/// Pieces held out of order.
+/// Maximum number of pieces held out of order.
 const MAX_PENDING: usize = 65_536;
 
-/// A piece that was sent.
+/// A sent piece.
 pub struct SentPiece {
-    /// For whom.
+    /// Receivers, one bit per facet.
     pub mask: u64,
-    /// Of a newest message.
+    /// Whether the message has [`Delivery::Newest`].
     pub newest: bool,
-    /// More of this message follows.
+    /// Whether more pieces of the message follow.
     pub more: bool,
     /// The bytes.
     pub data: Vec<u8>,
 }
 
-/// What was sent and may be asked for again.
+/// Sent pieces that may be requested again.
 #[derive(Default)]
 pub struct SendHistory {
     first: u64,
     sent_piece: VecDeque<SentPiece>,
     bytes: usize,
-    /// A buffer to use again: fresh memory costs more than the copy.
+    /// A buffer to reuse: allocating costs more than the copy.
     spare: Vec<u8>,
 }
 
 impl SendHistory {
-    /// The number of the next piece.
+    /// Returns the number of the next piece.
     pub fn next(&self) -> u64 {
         self.first + self.sent_piece.len() as u64
     }
 
-    /// Remembers the piece that was sent as [`next`](Self::next).
+    /// Keeps the piece that was sent as [`next`](Self::next).
     pub fn keep(&mut self, mask: u64, newest: bool, more: bool, bytes: &[u8]) {
-        // A small piece does not take a large buffer away.
+        // a small piece does not take a large buffer
         let mut data =
             if self.spare.capacity() / 4 <= bytes.len() { std::mem::take(&mut self.spare) } else { Vec::new() };
         data.clear();
@@ -65,18 +68,19 @@ impl SendHistory {
         true
     }
 
-    /// Forgets all before `number`.
+    /// Forgets all pieces before `number`.
     pub fn forget_before(&mut self, number: u64) {
         while self.first < number && self.forget_first() {}
     }
 
-    /// Forgets beyond the cap; what is first then. Everyone who lacks an earlier piece cannot be served any more.
+    /// Forgets pieces beyond the limits and returns the number of the first one left. A reader that
+    /// misses an earlier piece cannot be served any more.
     pub fn trim(&mut self, pieces: usize) -> u64 {
         while (self.bytes > MAX_QUEUED_BYTES || self.sent_piece.len() > pieces) && self.forget_first() {}
         self.first
     }
 
-    /// The pieces asked for, capped; `None` where one is forgotten.
+    /// Returns the requested pieces, at most [`MAX_RESEND`]; `None` if one of them is forgotten.
     pub fn resend(&self, header: &SampleHeader) -> Option<impl Iterator<Item = (u64, &SentPiece)>> {
         let until = header.until.min(header.number.saturating_add(MAX_RESEND)).min(self.next());
         let range = header.number..until;
@@ -84,7 +88,8 @@ impl SendHistory {
             .then(|| range.filter_map(|number| Some((number, self.sent_piece.get((number - self.first) as usize)?))))
     }
 
-    /// The same for one reader of many, whose bit of the masks is `bit`: what is for others, or older than its newest, is left out, however much that is.
+    /// Returns the requested pieces for the reader with mask bit `bit`. Pieces for others, or
+    /// superseded by the reader's newest message, are merged into one skip each.
     pub fn resend_to(&self, header: &SampleHeader, bit: u64) -> Option<Vec<Resend<'_>>> {
         let mut left = self
             .sent_piece
@@ -117,7 +122,8 @@ impl SendHistory {
         Some(resend)
     }
 
-    /// Where the last newest message of a reader begins; the pieces of a message lie together.
+    /// Returns the first piece of a reader's last newest message. The pieces of a message are
+    /// contiguous.
     fn newest_of(&self, bit: u64) -> Option<usize> {
         let is_of = |sent_piece: &SentPiece| sent_piece.newest && sent_piece.mask & bit != 0;
         let last = self.sent_piece.iter().rposition(|sent_piece| is_of(sent_piece) && !sent_piece.more)?;
@@ -126,11 +132,11 @@ impl SendHistory {
     }
 }
 
-/// What a reader gets that asked for pieces again.
+/// Answer to a resend request.
 pub enum Resend<'a> {
-    /// The piece of this number.
+    /// The piece with this number.
     Piece(u64, &'a SentPiece),
-    /// Nothing for it, from the first number to before the second.
+    /// No piece for the reader, from the first number to before the second.
     Nothing(u64, u64),
 }
 
@@ -142,11 +148,11 @@ struct Pending {
     data: Vec<u8>,
 }
 
-/// A gap that will not close: more is held than may be.
+/// The gap cannot be closed: more pieces are held than allowed.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Overrun;
 
-/// Puts pieces in order and joins them.
+/// Orders pieces and joins them to messages.
 pub struct Reassembly {
     next: u64,
     pending: BTreeMap<u64, Pending>,
@@ -156,17 +162,18 @@ pub struct Reassembly {
 }
 
 impl Reassembly {
-    /// The first piece expected is `next`.
+    /// Creates the state in which `next` is the first expected piece.
     pub fn new(next: u64) -> Reassembly {
         Reassembly { next, pending: BTreeMap::new(), pending_bytes: 0, partial: Vec::new(), asked: None }
     }
 
-    /// The first number that was not taken.
+    /// Returns the first number not taken yet.
     pub fn next(&self) -> u64 {
         self.next
     }
 
-    /// Takes a piece; whole messages go to `deliver`. One that came in one piece and in order goes on as it is.
+    /// Takes a piece and delivers complete messages. A message of one piece that arrives in order
+    /// is passed on without a copy.
     pub fn take(
         &mut self,
         header: &SampleHeader,
@@ -198,7 +205,8 @@ impl Reassembly {
         Ok(())
     }
 
-    /// There is nothing for this side from one number to before another: a message that was begun goes no further.
+    /// Skips the numbers from `from` to before `until`, under which there is nothing for this side.
+    /// A message that was begun is discarded.
     pub fn skip(&mut self, from: u64, until: u64, mut deliver: impl FnMut(Delivery, Message)) -> Result<(), Overrun> {
         if from > self.next || until <= self.next {
             return Ok(());
@@ -211,7 +219,7 @@ impl Reassembly {
         self.join_held(&mut deliver)
     }
 
-    /// What to ask for now, if anything: first and the one after the last.
+    /// Returns the range of numbers to request now, if any: the first, and the one after the last.
     pub fn ask(&mut self, now: Duration) -> Option<(u64, u64)> {
         let known = *self.pending.keys().next()?;
         if self.asked.is_some_and(|(until, at)| self.next < until && now < at + RESEND_TIMEOUT) {
@@ -222,14 +230,14 @@ impl Reassembly {
         Some((self.next, until))
     }
 
-    /// An empty buffer to build the next message in, where there is none.
+    /// Takes an empty buffer for the next message, if there is none.
     pub fn loan(&mut self, buffer: Vec<u8>) {
         if self.partial.is_empty() && self.partial.capacity() < buffer.capacity() {
             self.partial = buffer;
         }
     }
 
-    /// Whether something is missing.
+    /// Returns whether a piece is missing.
     pub fn has_gap(&self) -> bool {
         !self.pending.is_empty()
     }
@@ -267,7 +275,8 @@ mod tests {
     use super::super::wire::SampleKind;
     use super::*;
 
-    /// A buffer of 8 that drops the oldest, as safe overflow does, between a writer and a reader that looks rarely.
+    /// A buffer of 8 that drops the oldest sample, like safe overflow, between a writer and a
+    /// reader that rarely reads.
     #[test]
     fn a_slow_reader_gets_all_in_order() {
         let (mut history, mut reassembly, mut buffer) = (SendHistory::default(), Reassembly::new(0), VecDeque::new());
@@ -311,7 +320,8 @@ mod tests {
                 );
             }
         }
-        // Numbers 3k and 3k + 1 are the two pieces of a message for this reader; 3k + 2 is for another.
+        // numbers 3k and 3k + 1 are the two pieces of a message for this reader; 3k + 2 is for
+        // another
         let want: Vec<Vec<u8>> =
             (0..history.next()).step_by(3).map(|k| [[k as u8; 3], [(k + 1) as u8; 3]].concat()).collect();
         let whole = history.next() as usize / 3 + usize::from(history.next() % 3 == 2);
@@ -319,7 +329,8 @@ mod tests {
         assert!(got.len() > 300 && got == want[..whole]);
     }
 
-    /// A reader that slept through many newest messages of two pieces, among which two were for others and one was reliable, gets the reliable one and the newest, at once.
+    /// The reader missed many newest messages of two pieces each, among them two for others and one
+    /// reliable. It gets the reliable one and the newest, in one request.
     #[test]
     fn what_a_newer_message_replaces_is_not_sent_again() {
         let mut history = SendHistory::default();
@@ -329,7 +340,7 @@ mod tests {
                 history.keep(if message % 500 == 7 { 2 } else { 1 }, !reliable, more, &message.to_le_bytes());
             }
         }
-        // it has the first half of the first message; nothing after that came but the very last piece
+        // it has the first half of the first message, and then only the last piece
         let (mut reassembly, mut got) = (Reassembly::new(0), Vec::new());
         let header = |number, sent_piece: &SentPiece| SampleHeader {
             number,

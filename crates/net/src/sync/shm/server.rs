@@ -1,4 +1,4 @@
-//! The server's end of shared memory.
+//! The server's endpoint in shared memory.
 
 use super::ports::{Ports, Received};
 use super::reassembly::{Reassembly, Resend, SendHistory};
@@ -11,30 +11,30 @@ use crate::sync::transport::{
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// Pieces remembered for those who missed them.
+/// Number of pieces kept for resending.
 const HISTORY_PIECES: usize = 16_384;
 
-/// How long the server sleeps while a piece is missing, before it asks for it again.
+/// Wait of the server before it requests a missing piece.
 const GAP_POLL: Duration = Duration::from_millis(2);
 
-/// A facet that is connected.
+/// A connected facet.
 struct Connection {
     number: u64,
     reassembly: Reassembly,
-    /// The first piece it has not taken.
+    /// First piece that the facet has not taken.
     taken: u64,
     last_received: Duration,
-    /// It was sent something since its last message.
+    /// Whether a message was sent to it since its last message.
     owes_reply: bool,
 }
 
-/// What waits for the user.
+/// Event or message that waits for the caller.
 enum Queued {
     Event(LinkEvent),
     Message(Delivery, Vec<u8>),
 }
 
-/// The server's end of shared memory.
+/// The server's endpoint in shared memory.
 pub struct ShmServer {
     ports: Ports,
     server_id: u64,
@@ -49,9 +49,10 @@ pub struct ShmServer {
 }
 
 impl ShmServer {
-    /// Begins run `run` for facets with numbers below `facets`.
+    /// Creates run `run` for facets with numbers below `facets`.
     ///
-    /// Errors: iceoryx2 or the system refuses; the message names the service or the folder.
+    /// # Errors
+    /// iceoryx2 or the system refuses; the message names the service or the folder.
     pub fn new(run: &str, facets: FacetNumber) -> Result<ShmServer, LinkError> {
         let facets = facets.min(MAX_FACETS as FacetNumber);
         let count = usize::from(facets);
@@ -69,7 +70,9 @@ impl ShmServer {
         })
     }
 
-    /// A facet of which nothing was heard for so long is given up, in place of [`IDLE_TIMEOUT`]. While it draws it says nothing: give it more than a picture takes.
+    /// Sets the time without any message after which a facet is dropped, instead of
+    /// [`IDLE_TIMEOUT`]. A facet sends nothing while it draws, so the time must exceed that of a
+    /// picture.
     pub fn with_idle_timeout(mut self, idle_timeout: Duration) -> ShmServer {
         self.idle_timeout = idle_timeout;
         self
@@ -80,7 +83,8 @@ impl ShmServer {
         to.iter().filter(connected).fold(0, |mask, facet| mask | 1 << facet)
     }
 
-    /// Writes once for all; wakes everyone; then remembers, which is not what anyone waits for.
+    /// Writes the message once for all receivers, wakes them, and then keeps it for resending,
+    /// which no process waits for.
     fn publish(&mut self, mask: u64, delivery: Delivery, message: &[u8]) -> Result<(), LinkError> {
         let mut chunks = message.chunks(self.ports.piece_bytes()).peekable();
         let newest = delivery == Delivery::Newest;
@@ -147,7 +151,7 @@ impl ShmServer {
             |connection: &&mut Connection| connection.number == header.connection && header.server_id == self.server_id;
         let Some(connection) = self.connections[facet].as_mut().filter(known) else {
             self.counters[facet].refuse(Refused::Stale);
-            // One that was stopped for long and goes on: it does not know yet that it was given up.
+            // a facet that was stopped and continues does not know that it was dropped
             return self.send_control(SampleHeader {
                 facet: header.facet,
                 connection: header.connection,
@@ -205,7 +209,7 @@ impl ShmServer {
         })
     }
 
-    /// Sends again what a slow facet missed and still wants; of the rest, that there is nothing.
+    /// Resends the pieces that a slow facet missed and still needs, and skips for the rest.
     fn send_missing(&mut self, asked: &SampleHeader) -> Result<(), LinkError> {
         let bit = 1 << asked.facet;
         let Some(resend) = self.history.resend_to(asked, bit) else {
@@ -235,7 +239,8 @@ impl ShmServer {
         Ok(())
     }
 
-    /// Pings, asks again, forgets what all have, and finds who is silent.
+    /// Pings, requests missing pieces, forgets pieces that all facets have, and checks the idle
+    /// timeouts.
     fn maintain(&mut self) -> Result<(), LinkError> {
         let now = self.start.elapsed();
         for facet in 0..self.connections.len() {
@@ -272,7 +277,7 @@ impl ShmServer {
         !over.is_empty()
     }
 
-    /// What had arrived is told before, unless this side closes.
+    /// Ends a connection. Received messages are reported first, unless this side closes.
     fn end(&mut self, facet: FacetNumber, why: Closed) {
         if self.connections[usize::from(facet)].take().is_some() {
             if why == Closed::ByUs {
@@ -287,7 +292,7 @@ fn of_mask(counters: &mut [LinkCounters], mask: u64) -> impl Iterator<Item = &mu
     counters.iter_mut().enumerate().filter(move |(facet, _)| mask >> facet & 1 == 1).map(|(_, counters)| counters)
 }
 
-/// A newest message that still waits is replaced.
+/// Queues a message. A newest message replaces one that still waits.
 fn queue(queued: &mut VecDeque<(FacetNumber, Queued)>, facet: FacetNumber, delivery: Delivery, message: Vec<u8>) {
     if delivery == Delivery::Newest {
         queued.retain(|(of, what)| *of != facet || !matches!(what, Queued::Message(Delivery::Newest, _)));
@@ -351,7 +356,7 @@ impl ServerLink for ShmServer {
 
     fn close(&mut self, facet: FacetNumber) {
         let Some(connection) = self.connections.get(usize::from(facet)).and_then(Option::as_ref) else { return };
-        // A facet that does not hear it finds the silence.
+        // if the facet misses it, its idle timeout ends the connection
         let _ = self.send_control(SampleHeader {
             facet,
             connection: connection.number,

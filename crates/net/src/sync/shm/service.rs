@@ -1,8 +1,10 @@
-//! The kind of service that is used: iceoryx2's own for threads of several processes, but for one thing.
+//! The iceoryx2 service type in use: the inter-process type of iceoryx2 with one change.
 //!
-//! All nodes of a folder draw their numbers from one counter, and iceoryx2 0.10 makes that counter for all users of a machine: `/dev/shm/….global_mgmt`, which
-//! anybody may write, and cut to nothing, which ends every process that reads it. Here it is a file in the run's folder, where its mode counts for nothing,
-//! because nobody else gets in. Everything else that lies in `/dev/shm` has mode 600.
+//! All nodes of a folder draw their numbers from one counter. iceoryx2 0.10 shares that counter
+//! between all users of a machine: `/dev/shm/….global_mgmt`, which every user may write and
+//! truncate, and truncation kills each process that reads it. Here the counter is a file in the
+//! run's folder, which no other user can enter, so its mode does not matter. All other objects in
+//! `/dev/shm` have mode 600.
 
 use iceoryx2::prelude::ZeroCopySend;
 use iceoryx2::service::{Service, internal::ServiceInternal};
@@ -12,7 +14,7 @@ use iceoryx2_cal::shm_allocator::{bump_allocator::BumpAllocator, pool_allocator:
 use iceoryx2_cal::*;
 use std::fmt::Debug;
 
-/// Shared memory that belongs to one user.
+/// Shared memory of one user.
 #[derive(Clone, Debug)]
 pub struct Private;
 

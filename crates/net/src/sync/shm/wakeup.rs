@@ -1,20 +1,23 @@
-//! How the processes of a run wake each other: a few counters in shared memory that the kernel can wait on (futex).
+//! Wakes the processes of a run by counters in shared memory on which the kernel can wait (futex).
 //!
 //! ```text
-//! server, to all facets at once                     facet, to the server
-//!   rung  ← rung + 1                                  answers ← answers + 1
-//!   wake all who wait for `facet_notifications` to change            wake it if answers has reached wanted
+//! server, to all facets at once                        facet, to the server
+//!   to_facets ← to_facets + 1                            to_server ← to_server + 1
+//!   wake all that wait for to_facets to change           wake it if to_server has reached wanted
 //!
-//! facet waits                                       server waits
-//!   while rung = what it was before it looked         wanted ← what answers was before it looked + those who owe one
-//!                                                     while answers = what it was before it looked
+//! facet waits                                          server waits
+//!   while to_facets = value before it read               wanted ← to_server before it read + outstanding replies
+//!                                                        while to_server = value before it read
 //! ```
 //!
-//! So a message to any number of facets costs one system call here and one in each of them, and of all answers only the last one wakes the server. Nothing is
-//! lost between looking and waiting: the kernel compares before it sleeps. The counters carry no data; whoever misses a ring looks again after its time-out.
+//! A message to any number of facets costs one system call of the server and one of each facet, and
+//! only the last reply wakes the server. No wakeup is lost between reading and waiting, because the
+//! kernel compares the counter before it sleeps. The counters carry no data; a process that misses
+//! a wakeup reads again after its timeout.
 //!
-//! The memory is one page per run, `tumble_USER_…_RUN.wakeup`. Its server holds a lock on it as long as it lives and removes it at its end; one on which nobody
-//! holds a lock is what a killed server left, and [`clean_up`] removes it. (A process's number would not tell: it may be another's, or of another container.)
+//! The memory is one page per run, `tumble_USER_…_RUN.wakeup`. The server holds a lock on it and
+//! removes it at its end. A page without a lock was left by a killed server, and [`clean_up`]
+//! removes it. (A process id would not do: it may be reused, or belong to another container.)
 
 use crate::sync::transport::LinkError;
 use iceoryx2::prelude::{FileName, SemanticString};
@@ -33,7 +36,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering::SeqCst;
 use std::time::Duration;
 
-/// Rung to the facets; answers to the server; answers at which it wants to be woken; servers so far.
+/// Notifications to the facets; notifications to the server; value at which the server wants to be
+/// woken; number of servers so far.
 type Counters = [AtomicU32; 4];
 const TO_FACETS: usize = 0;
 const TO_SERVER: usize = 1;
@@ -41,22 +45,23 @@ const WANTED: usize = 2;
 const SERVERS: usize = 3;
 
 const SUFFIX: &str = ".wakeup";
-/// Times that a bell is made, at most, before it is given up.
+/// Maximum number of attempts to create the page.
 const MAX_TRIES: usize = 100;
-/// Where shared memory lies as files.
+/// Folder of shared memory objects.
 const SHM_DIR: &str = "/dev/shm";
 
-/// One end of it.
+/// Access to the counters of a run.
 pub struct Wakeup {
     memory: Storage<Counters>,
-    /// Which server of the run this is, and the lock that it holds; `None` for a facet.
+    /// Number of this server of the run and its lock; `None` for a facet.
     server: Option<(u32, File)>,
 }
 
 impl Wakeup {
-    /// The server's: makes it, or takes over the one that an earlier server of the run left.
+    /// Creates the counters, or takes over those of an earlier server of the run.
     ///
-    /// Errors: the system refuses.
+    /// # Errors
+    /// The system refuses.
     pub fn serve(run: &str, user: u32) -> Result<Wakeup, LinkError> {
         let (name, configuration) = (file_name(run)?, configuration(user)?);
         let path = file(&name, &configuration);
@@ -73,7 +78,7 @@ impl Wakeup {
                 .has_ownership(false)
                 .timeout(Duration::from_secs(1));
             let storage = builder.initializer(&mut fresh).open_or_create().map_err(refused)?;
-            // who cleans up may have been quicker than the lock: then there is another one to make
+            // a clean-up may have come before the lock: create another page
             let Some(lock) = open_private(&path).filter(|lock| lock.try_lock_shared().is_ok()) else { continue };
             if open_private(&path).is_some_and(|there| same_inode(&there, &lock)) {
                 let server = storage.get()[SERVERS].fetch_add(1, SeqCst).wrapping_add(1);
@@ -87,9 +92,10 @@ impl Wakeup {
         )))
     }
 
-    /// A facet's; `None` while there is no server.
+    /// Opens the counters as a facet; `None` while there is no server.
     ///
-    /// Errors: the run's name is too long.
+    /// # Errors
+    /// The run's name is too long.
     pub fn join(run: &str, user: u32) -> Result<Option<Wakeup>, LinkError> {
         let (name, configuration) = (file_name(run)?, configuration(user)?);
         if open_private(&file(&name, &configuration)).is_none() {
@@ -100,13 +106,13 @@ impl Wakeup {
         Ok(memory.ok().map(|memory| Wakeup { memory, server: None }))
     }
 
-    /// To all facets.
+    /// Wakes all facets.
     pub fn notify_facets(&self) {
         self.counter(TO_FACETS).fetch_add(1, SeqCst);
         self.wake(TO_FACETS, i32::MAX as u32);
     }
 
-    /// To the server; `now`: even if it waits for others.
+    /// Counts a reply to the server, and wakes it if it waits for no more; with `now` in any case.
     pub fn notify_server(&self, now: bool) {
         let server_notifications = self.counter(TO_SERVER).fetch_add(1, SeqCst).wrapping_add(1);
         let past = server_notifications.wrapping_sub(self.counter(WANTED).load(SeqCst));
@@ -115,22 +121,22 @@ impl Wakeup {
         }
     }
 
-    /// How often it rang: to be asked before looking for messages.
+    /// Returns the notifications to facets so far. To be read before reading messages.
     pub fn facet_notifications(&self) -> u32 {
         self.counter(TO_FACETS).load(SeqCst)
     }
 
-    /// How many answers there were: to be asked before looking for messages.
+    /// Returns the notifications to the server so far. To be read before reading messages.
     pub fn server_notifications(&self) -> u32 {
         self.counter(TO_SERVER).load(SeqCst)
     }
 
-    /// A facet waits for the next ring, at most `timeout`.
+    /// Waits for the next notification to facets, at most `timeout`.
     pub fn wait_for_facet_notification(&self, seen: u32, timeout: Duration) -> Result<(), LinkError> {
         self.wait(TO_FACETS, seen, timeout)
     }
 
-    /// The server waits for so many more answers (at least one), at most `timeout`.
+    /// Waits for `owed` more notifications to the server (at least one), at most `timeout`.
     pub fn wait_for_server_notifications(&self, seen: u32, owed: u32, timeout: Duration) -> Result<(), LinkError> {
         self.counter(WANTED).store(seen.wrapping_add(owed.max(1)), SeqCst);
         self.wait(TO_SERVER, seen, timeout)
@@ -141,14 +147,14 @@ impl Wakeup {
     }
 
     fn wake(&self, which: usize, most: u32) {
-        // It fails only for an address that is none.
+        // it fails only for an invalid address
         let _ = futex::wake(self.counter(which), futex::Flags::empty(), most);
     }
 
     fn wait(&self, which: usize, seen: u32, timeout: Duration) -> Result<(), LinkError> {
         let timeout = timeout.try_into().ok();
         match futex::wait(self.counter(which), futex::Flags::empty(), seen, timeout.as_ref()) {
-            // Changed before it slept; the time is over; a signal: look again.
+            // changed before the sleep, timed out, or interrupted by a signal: read again
             Ok(()) | Err(Errno::AGAIN | Errno::TIMEDOUT | Errno::INTR) => Ok(()),
             Err(why) => Err(LinkError::Io { what: "shared memory: wait".into(), why: why.into() }),
         }
@@ -156,7 +162,7 @@ impl Wakeup {
 }
 
 impl Drop for Wakeup {
-    /// The file goes with its server, unless another one has taken over.
+    /// Removes the file, unless another server has taken over.
     fn drop(&mut self) {
         if self.server.as_ref().is_some_and(|(server, _)| self.counter(SERVERS).load(SeqCst) != *server) {
             self.memory.release_ownership();
@@ -164,14 +170,14 @@ impl Drop for Wakeup {
     }
 }
 
-/// Removes the bells of this user's servers that are gone.
+/// Removes the pages of this user's servers that are gone.
 pub fn clean_up(user: u32) {
     let (Ok(files), Ok(configuration)) = (std::fs::read_dir(SHM_DIR), configuration(user)) else { return };
     let is_bell = |name: &OsStr| {
         FileName::new(name.as_encoded_bytes()).is_ok_and(|name| configuration.extract_name_from_file(&name).is_some())
     };
     for file in files.flatten().filter(|file| is_bell(&file.file_name())) {
-        // a server that is about to lock it finds it gone, and makes another one
+        // a server that is about to lock it finds it gone and creates another
         if let Some(left) = open_private(&file.path())
             && left.try_lock().is_ok()
             && open_private(&file.path()).is_some_and(|there| same_inode(&there, &left))
@@ -181,18 +187,19 @@ pub fn clean_up(user: u32) {
     }
 }
 
-/// Where the memory of that name lies.
+/// Returns the file of the object with this name.
 fn file(name: &FileName, configuration: &Configuration<Counters>) -> PathBuf {
     Path::new(SHM_DIR).join(String::from_utf8_lossy(configuration.path_for(name).file_name().as_bytes()).as_ref())
 }
 
-/// A file of this user that nobody else may open: others could cut it to nothing, which ends whoever reads it.
+/// Opens a file of this user with mode 600. Another user could truncate any other file, which kills
+/// each process that reads it.
 fn open_private(path: &Path) -> Option<File> {
     let mine = |about: Metadata| {
         about.is_file() && about.uid() == rustix::process::geteuid().as_raw() && about.mode() & 0o077 == 0
     };
     std::fs::symlink_metadata(path).ok().filter(|about| mine(about.clone()))?;
-    // to be written: one that is being made can not be read yet
+    // for writing: a page that is being created cannot be read yet
     OpenOptions::new().write(true).open(path).ok().filter(|file| file.metadata().is_ok_and(mine))
 }
 
@@ -205,7 +212,7 @@ fn configuration(user: u32) -> Result<Configuration<Counters>, LinkError> {
     Ok(Configuration::default().prefix(&name(&format!("tumble_{user}_"))?).suffix(&name(SUFFIX)?))
 }
 
-/// Of any run's name one that is a file's: its hash.
+/// Returns the hash of a run's name, which is a valid file name.
 fn file_name(run: &str) -> Result<FileName, LinkError> {
     FileName::new(&blake3::hash(run.as_bytes()).to_hex().as_bytes()[..32]).map_err(refused)
 }
@@ -219,7 +226,7 @@ mod tests {
     use super::*;
     use std::sync::atomic::AtomicBool;
 
-    // users that there are not; a test that cleans up has one of its own
+    // users that do not exist; a test that cleans up has one of its own
     const NOBODY: u32 = 4_000_000_000;
     const NOBODY_ELSE: u32 = 4_000_000_001;
 
@@ -254,7 +261,7 @@ mod tests {
             assert!(!cpu_latency.load(SeqCst), "two of three answers woke it");
             facets[2].notify_server(false);
             waits.join().unwrap();
-            // what came between looking and waiting is not slept over
+            // a notification between reading and waiting is not lost
             server.wait_for_server_notifications(seen, 6, long).unwrap();
         });
     }
@@ -264,11 +271,11 @@ mod tests {
         let there = |run: &str| Wakeup::join(run, NOBODY).unwrap().is_some();
         let [alive, dead, young] = ["alive", "dead", "young"].map(|name| format!("bell-{}-{name}", std::process::id()));
         let server = Wakeup::serve(&alive, NOBODY).unwrap();
-        // as kill -9 leaves it: the file stays, the lock is the system's
+        // as after kill -9: the file stays, the system drops the lock
         let killed = Wakeup::serve(&dead, NOBODY).unwrap();
         killed.memory.release_ownership();
         drop(killed);
-        // and before it was locked at all
+        // and one that was never locked
         let barely = file_name(&young).unwrap();
         let mut fresh = |value: &mut std::mem::MaybeUninit<Counters>, _: &mut _| {
             value.write(Default::default());
@@ -279,7 +286,7 @@ mod tests {
         assert!(there(&alive) && there(&dead) && there(&young));
         clean_up(NOBODY);
         assert!(there(&alive) && !there(&dead) && !there(&young));
-        // one that took over keeps it when the first goes
+        // a server that took over keeps the page when the first one ends
         let second = Wakeup::serve(&alive, NOBODY).unwrap();
         drop(server);
         assert!(there(&alive));
@@ -287,7 +294,7 @@ mod tests {
         assert!(!there(&alive));
     }
 
-    /// Another user may make a file of that name first; what it holds is then not looked at.
+    /// Another user may create a file with that name first; its content is not read.
     #[test]
     fn a_bell_that_others_may_open_is_not_touched() {
         let run = format!("bell-{}-open", std::process::id());

@@ -1,37 +1,38 @@
-//! The head of every sample in shared memory: six words of 64 bits beside the bytes of the message, so that those are copied as they are.
+//! Header of every sample in shared memory: six words of 64 bits beside the message bytes, which
+//! are therefore copied unchanged.
 //!
-//! | word | bits | what |
+//! | word | bits | content |
 //! |---|---|---|
 //! | 0 | 0 to 7 | [`SampleKind`] |
-//! | | 8 to 15 | flags: 1 newest, 2 more of this message follows, 4 nothing for you under these numbers |
+//! | | 8 to 15 | flags: 1 newest, 2 more of this message follows, 4 skip these numbers |
 //! | | 16 to 31 | facet |
 //! | | 32 to 63 | magic `shm3` |
-//! | 1 | | the server's reign: a number that each server process draws |
-//! | 2 | | the facet's connection: a number of each of its connections; 0 on a piece sent to all, its own on a piece sent again |
-//! | 3 | | for whom: bit k for facet k (from the server) |
-//! | 4 | | number of this piece, or the first that is asked for again |
-//! | 5 | | first number that is not taken yet, or the one after the last that is asked for again, or after the last under which there is nothing |
+//! | 1 | | id of the server process, a random number |
+//! | 2 | | number of the facet's connection; 0 on a piece for all, its own on a resent piece |
+//! | 3 | | receivers: bit k for facet k (from the server) |
+//! | 4 | | number of this piece, or the first requested one |
+//! | 5 | | first number not taken yet; for a resend request or a skip, the number after its last |
 
 use crate::sync::transport::{FacetNumber, Refused};
 
-/// A head as it lies in shared memory.
+/// A header as it lies in shared memory.
 pub type HeaderWords = [u64; 6];
-/// Its bytes.
+/// Length of the header, bytes.
 pub const HEADER_BYTES: usize = size_of::<HeaderWords>();
 const MAGIC: u32 = u32::from_le_bytes(*b"shm3");
 
-/// What a sample is for.
+/// Kind of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SampleKind {
-    /// Facet: I am here.
+    /// Facet: request to connect.
     Hello = 1,
-    /// Server: you are connected; `number` is the first piece that is for you.
+    /// Server: connected; `number` is the first piece for the facet.
     Welcome = 2,
     /// A piece of a message.
     Piece = 3,
-    /// Send these again.
+    /// Request to send pieces again.
     ResendRequest = 4,
-    /// I live.
+    /// Sign of life.
     Ping = 5,
     /// The connection is over.
     Close = 6,
@@ -46,33 +47,33 @@ const SAMPLE_KINDS: [SampleKind; 6] = [
     SampleKind::Close,
 ];
 
-/// The head.
+/// Header of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SampleHeader {
-    /// What the sample is for.
+    /// Kind of the sample.
     pub kind: SampleKind,
-    /// Of a newest message.
+    /// Whether the message has newest delivery.
     pub newest: bool,
-    /// More of this message follows.
+    /// Whether more pieces of this message follow.
     pub more: bool,
-    /// Nothing for you from `number` to before `until`.
+    /// Whether there is nothing for the receiver from `number` to before `until`.
     pub skip: bool,
-    /// From or to which facet.
+    /// Sending or receiving facet.
     pub facet: FacetNumber,
-    /// The server's number.
+    /// Id of the server process.
     pub server_id: u64,
-    /// The facet's number.
+    /// Number of the facet's connection.
     pub connection: u64,
-    /// For whom.
+    /// Receivers, one bit per facet.
     pub mask: u64,
     /// Number of the piece.
     pub number: u64,
-    /// What is taken; in a head with `skip` and in one that asks again, the end.
+    /// First number not taken yet; for a skip or a resend request, the number after its last.
     pub until: u64,
 }
 
 impl SampleHeader {
-    /// A head with zeros behind the kind.
+    /// Returns a header with zeros after the kind.
     pub fn new(kind: SampleKind, server_id: u64) -> SampleHeader {
         SampleHeader {
             kind,
@@ -88,14 +89,17 @@ impl SampleHeader {
         }
     }
 
-    /// As it lies in shared memory.
+    /// Encodes the header.
     pub fn words(&self) -> HeaderWords {
         let flags = u64::from(self.newest) | u64::from(self.more) << 1 | u64::from(self.skip) << 2;
         let first = self.kind as u64 | flags << 8 | u64::from(self.facet) << 16 | u64::from(MAGIC) << 32;
         [first, self.server_id, self.connection, self.mask, self.number, self.until]
     }
 
-    /// The head of a sample.
+    /// Parses a header.
+    ///
+    /// # Errors
+    /// [`Refused::Foreign`] for an unknown kind, magic or flag.
     pub fn parse([first, server_id, connection, mask, number, until]: HeaderWords) -> Result<SampleHeader, Refused> {
         let [kind, flags, facet @ ..] = (first as u32).to_le_bytes();
         let kind = SAMPLE_KINDS.into_iter().find(|known| *known as u8 == kind).ok_or(Refused::Foreign)?;

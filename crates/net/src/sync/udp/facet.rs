@@ -1,4 +1,4 @@
-//! A facet's side, without socket or clock.
+//! A facet's side of UDP without socket and clock.
 
 use super::Timing;
 use super::handshake::{Hello, Reply};
@@ -11,28 +11,28 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What is set when a facet begins.
+/// Settings of a facet.
 #[derive(Clone, Copy, Debug)]
 pub struct FacetSettings {
-    /// Which facet.
+    /// Number of the facet.
     pub facet: FacetNumber,
-    /// Where its server is.
+    /// Address of the server.
     pub server: SocketAddr,
-    /// How often, and how long at most.
+    /// Intervals and timeouts.
     pub timing: Timing,
-    /// Where counting begins.
+    /// First packet and message numbers.
     pub numbering: Numbering,
 }
 
-/// How far the connection is.
+/// State of the connection.
 enum ConnectionState {
-    /// Asks for a challenge, or answers one that came.
+    /// Requests or answers a challenge.
     Connecting(HandshakeAttempt),
-    /// Has keys.
+    /// Has session keys.
     Connected(Box<Session>),
 }
 
-/// Asks for a challenge, or answers one that came; anew at the given time.
+/// A handshake in progress: requests or answers a challenge, again at `next`.
 struct HandshakeAttempt {
     hello: Hello,
     answering: bool,
@@ -40,17 +40,17 @@ struct HandshakeAttempt {
     give_up: Duration,
 }
 
-/// What is done beside a session of which nothing was heard for some time.
+/// A second handshake beside a session from which nothing was received for some time.
 struct Probe {
     attempt: HandshakeAttempt,
-    /// The session that would take its place, when the server has said something under its seal.
+    /// The session that replaces the current one as soon as it has received a sealed packet.
     other: Option<Box<Session>>,
 }
 
-/// A session is doubted when nothing was heard for so many pings.
+/// Number of ping intervals without any packet after which the session is probed.
 const PROBE_AFTER_PINGS: u32 = 2;
 
-/// A facet's side: datagrams and time in, datagrams and events out.
+/// A facet's state machine: datagrams and times in, datagrams and events out.
 pub struct FacetMachine {
     settings: FacetSettings,
     shared: SharedKey,
@@ -63,7 +63,7 @@ pub struct FacetMachine {
 }
 
 impl FacetMachine {
-    /// A facet that begins to look for its server.
+    /// Creates a facet that looks for its server.
     pub fn new(now: Duration, settings: FacetSettings, shared: SharedKey, entropy: Entropy) -> FacetMachine {
         let mut entropy = entropy;
         FacetMachine {
@@ -78,7 +78,7 @@ impl FacetMachine {
         }
     }
 
-    /// Takes a datagram.
+    /// Processes a datagram.
     pub fn receive(&mut self, now: Duration, from: SocketAddr, datagram: &[u8]) {
         self.counters.bytes_in += datagram.len() as u64;
         if let Err(why) = self.take(now, from, datagram) {
@@ -86,7 +86,8 @@ impl FacetMachine {
         }
     }
 
-    /// Sends what is due by `emit`, and finds what is over.
+    /// Sends due datagrams by `emit`, and ends the connection if it is closed, timed out or
+    /// exhausted.
     pub fn transmit(&mut self, now: Duration, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
         match &mut self.state {
             ConnectionState::Connecting(attempt) => {
@@ -110,7 +111,8 @@ impl FacetMachine {
         }
     }
 
-    /// Asks whether the server still knows the session, where nothing was heard for some time.
+    /// Probes whether the server still knows a session from which nothing was received for some
+    /// time.
     fn probe(&mut self, now: Duration, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
         let ConnectionState::Connected(session) = &self.state else { return };
         let number = session.agreed.session;
@@ -131,7 +133,7 @@ impl FacetMachine {
         }
     }
 
-    /// When [`transmit`](Self::transmit) has something to do, if nothing arrives before.
+    /// Returns when [`transmit`](Self::transmit) has work, if no datagram arrives before.
     pub fn wake(&self) -> Duration {
         match (&self.state, &self.probe) {
             (ConnectionState::Connecting(attempt), _) => attempt.next.min(attempt.give_up),
@@ -142,7 +144,8 @@ impl FacetMachine {
         }
     }
 
-    /// Takes a message for the server. `false`: there is no connection, or the message is empty or too long.
+    /// Queues a message for the server. Returns `false` if there is no connection, or if the
+    /// message is empty or too long.
     pub fn send(&mut self, now: Duration, delivery: Delivery, message: &[u8]) -> bool {
         let fits = (1..=MAX_MESSAGE_BYTES).contains(&message.len());
         let ConnectionState::Connected(session) = &mut self.state else {
@@ -161,7 +164,7 @@ impl FacetMachine {
         true
     }
 
-    /// The next event.
+    /// Returns the next event and its message.
     pub fn poll(&mut self) -> Option<(LinkEvent, Vec<u8>)> {
         let event = self.events.pop_front().or_else(|| match &mut self.state {
             ConnectionState::Connected(session) => session.pop().map(|(_, message)| (LinkEvent::Message, message)),
@@ -171,7 +174,7 @@ impl FacetMachine {
         event
     }
 
-    /// Ends the connection and looks for a server anew.
+    /// Ends the connection and looks for a server again.
     pub fn close(&mut self, now: Duration, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
         if let ConnectionState::Connected(session) = &mut self.state {
             session.send_close(now, &mut self.counters, emit);
@@ -179,7 +182,7 @@ impl FacetMachine {
         }
     }
 
-    /// What happened on this link so far.
+    /// Returns the counters of this link.
     pub fn counters(&self) -> LinkCounters {
         self.counters
     }
@@ -208,7 +211,7 @@ impl FacetMachine {
         Ok(())
     }
 
-    /// What was asked and is not answered yet.
+    /// Returns the handshake that waits for an answer.
     fn attempt(&mut self) -> Option<&mut HandshakeAttempt> {
         match (&mut self.state, &mut self.probe) {
             (ConnectionState::Connecting(attempt), _) => Some(attempt),
@@ -230,7 +233,7 @@ impl FacetMachine {
             .and_then(|probe| probe.other.as_mut())
             .filter(|other| other.agreed.session == header.session);
         other.ok_or(Refused::Stale)?.receive(now, header, datagram, counters)?;
-        // the server has the new keys, and said nothing by the old ones
+        // the server has the new keys, and sent nothing with the old ones
         if let Some(other) = self.probe.take().and_then(|probe| probe.other) {
             self.end(now, Closed::ByPeer);
             self.connect(other);
@@ -263,7 +266,8 @@ impl FacetMachine {
         Ok(())
     }
 
-    /// What had arrived is told before: it may say why the other side closes.
+    /// Ends the connection. Received messages are reported first, because they may say why the peer
+    /// closes.
     fn end(&mut self, now: Duration, why: Closed) {
         if let (ConnectionState::Connected(session), true) = (&mut self.state, why != Closed::ByUs) {
             self.events.extend(std::iter::from_fn(|| session.pop()).map(|(_, message)| (LinkEvent::Message, message)));
@@ -279,7 +283,8 @@ impl FacetMachine {
 }
 
 impl HandshakeAttempt {
-    /// With a fresh nonce. An answer that leads nowhere for a second is given up: the server may have been started again meanwhile.
+    /// Starts with a fresh nonce. A handshake without result is given up after a second, because
+    /// the server may have been restarted.
     fn new(now: Duration, settings: &FacetSettings, entropy: &mut Entropy, suspect_session: u32) -> HandshakeAttempt {
         let hello = Hello { nonce: entropy.next_bytes(), facet: settings.facet, cookie: [0; 32], suspect_session };
         HandshakeAttempt { hello, answering: false, next: now, give_up: now + 10 * settings.timing.connect_interval }
@@ -307,7 +312,7 @@ impl HandshakeAttempt {
     }
 }
 
-/// When a session is doubted, if nothing comes before.
+/// Returns when a session is probed, if no packet arrives before.
 fn probe_time(session: &Session, settings: &FacetSettings) -> Duration {
     session.last_received() + PROBE_AFTER_PINGS * settings.timing.ping_interval
 }

@@ -1,37 +1,40 @@
-//! The inside of a sealed packet: frames, one after another.
+//! Content of a sealed packet: a sequence of frames.
 //!
-//! | frame | bytes, after its first byte | what |
+//! | frame | bytes, after its first byte | content |
 //! |---|---|---|
-//! | 1 acknowledgement | reliable u32, [newest u32], largest u32, n u8, mask n | all reliable messages before `reliable` and all newest ones before `newest` are there; so is packet `largest - k` for each bit k of the mask; of packets beyond the mask nothing is said |
+//! | 1 acknowledgement | reliable u32, [newest u32], largest u32, n u8, mask n | all reliable messages before `reliable` and all newest messages before `newest` have arrived, and so has packet `largest - k` for each bit k of the mask; packets beyond the mask are not covered |
 //! | 2 whole | message u32, total u16, data | a message of at most 1120 bytes |
 //! | 3 fragment | message u32, total u32, index u16, data | bytes `1120 index …` of a message of `total` bytes |
 //! | 4 parity | message u32, total u32, group u16, groups u16, 1120 bytes | exclusive or of the fragments i with `i mod groups = group`, padded with zeros |
-//! | 5 ping | | acknowledge this |
+//! | 5 ping | | requests an acknowledgement |
 //! | 6 close | | the session is over |
 //!
-//! The first byte is the number of the frame; 16 more, of 2 to 4, where the message is a newest one, of 1, where `newest` is said. `largest` is the lower half.
+//! The first byte is the number of the frame. 16 is added for a newest message (2 to 4), and for an
+//! acknowledgement with `newest` (1). `largest` is the lower half of a packet number.
 //!
-//! The length of a fragment follows from `total` and `index`, so there is no second number that could contradict it.
+//! The length of a fragment follows from `total` and `index`, so no second number can contradict
+//! it.
 
 use crate::sync::transport::{Delivery, MAX_MESSAGE_BYTES};
 
-/// Bytes of a whole fragment. With header, seal, an acknowledgement and its own head it stays below 1200.
+/// Length of a full fragment, bytes. With header, tag, an acknowledgement and its own header a
+/// packet stays below 1200 bytes.
 pub const FRAGMENT_BYTES: usize = 1120;
-/// Most bytes of an acknowledgement.
+/// Maximum length of an acknowledgement, bytes.
 pub const ACK_BYTES: usize = 30;
-/// Bytes around the data of a parity frame.
+/// Bytes of a parity frame around its data.
 pub const PARITY_HEADER_BYTES: usize = 13;
-/// Added to a frame's number for the newest messages.
+/// Added to a frame's number for newest messages.
 const NEWEST: u8 = 16;
-/// Most frames in a packet.
+/// Maximum number of frames in a packet.
 const MAX_FRAMES: usize = 128;
 
-/// Which of the two streams of messages: the index into pairs of them.
+/// One of the two streams of messages; an index into pairs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
-    /// Every one, in order.
+    /// Every message, in order.
     Reliable = 0,
-    /// The newest is what matters.
+    /// Only the newest message matters.
     Newest = 1,
 }
 
@@ -44,59 +47,59 @@ impl From<Delivery> for Channel {
     }
 }
 
-/// What has arrived.
+/// Acknowledgement of received packets and messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ack {
-    /// Reliable messages before this one are complete.
+    /// All reliable messages before this one are complete.
     pub reliable: u32,
-    /// Newest messages before this one are complete; nothing is said while none came.
+    /// All newest messages before this one are complete; `None` while none has arrived.
     pub newest: Option<u32>,
-    /// The largest packet taken: the lower half of its number.
+    /// The largest packet received: the lower half of its number.
     pub largest: u32,
-    /// Bytes of the mask, 1 to 16.
+    /// Number of mask bytes, 1 to 16.
     pub bytes: u8,
-    /// Bit k: packet `largest - k` was taken. Bits beyond its bytes are zero.
+    /// Bit k: packet `largest - k` was received. Bits beyond the mask bytes are zero.
     pub mask: u128,
 }
 
-/// Which message, and how long it is.
+/// Number and length of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MessageInfo {
     /// Its stream.
     pub channel: Channel,
-    /// Its number in the stream; wraps.
+    /// Number in its stream; wraps.
     pub message: u32,
-    /// Its length in bytes, 1 to [`MAX_MESSAGE_BYTES`].
+    /// Length in bytes, 1 to [`MAX_MESSAGE_BYTES`].
     pub total: u32,
 }
 
 impl MessageInfo {
-    /// Number of fragments.
+    /// Returns the number of fragments.
     pub fn fragments(&self) -> u16 {
         (self.total as usize).div_ceil(FRAGMENT_BYTES) as u16
     }
 
-    /// Bytes around the data of a fragment.
+    /// Returns the bytes of a fragment frame around its data.
     pub fn header_bytes(&self) -> usize {
         if self.fragments() == 1 { 7 } else { 11 }
     }
 
-    /// Length of a fragment.
+    /// Returns the length of a fragment, bytes.
     pub fn length(&self, index: u16) -> usize {
         (self.total as usize - usize::from(index) * FRAGMENT_BYTES).min(FRAGMENT_BYTES)
     }
 }
 
-/// A frame, with its bytes still in the packet.
+/// A frame that borrows its bytes from the packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Frame<'a> {
-    /// What has arrived.
+    /// Acknowledgement.
     Ack(Ack),
-    /// A piece of a message.
+    /// Fragment of a message: index and bytes.
     Fragment(MessageInfo, u16, &'a [u8]),
     /// Exclusive or of a group of fragments: group, number of groups, bytes.
     Parity(MessageInfo, u16, u16, &'a [u8]),
-    /// Wants an acknowledgement.
+    /// Requests an acknowledgement.
     Ping,
     /// The session is over.
     Close,
@@ -144,7 +147,8 @@ fn write_part(kind: u8, part: &MessageInfo, out: &mut Vec<u8>) {
     out.extend_from_slice(&part.total.to_le_bytes());
 }
 
-/// All frames of a body, or none: a body that contradicts itself anywhere is refused whole. Allocates for at most 128 frames.
+/// Parses all frames of a body, or none: one invalid frame invalidates the body. Allocates for at
+/// most 128 frames.
 pub fn parse(mut body: &[u8]) -> Option<Vec<Frame<'_>>> {
     let mut frames = Vec::with_capacity(4);
     while !body.is_empty() {
@@ -218,7 +222,7 @@ fn take_slice<'a>(body: &mut &'a [u8], n: usize) -> Option<&'a [u8]> {
     Some(header_bytes)
 }
 
-/// Whether `a` comes before `b` in numbers that wrap.
+/// Returns whether `a` precedes `b`; numbers wrap.
 pub fn before(a: u32, b: u32) -> bool {
     (b.wrapping_sub(a) as i32) > 0
 }

@@ -1,22 +1,27 @@
-//! How a session begins: four packets, and a cookie, so that the server keeps nothing for an address that cannot receive.
+//! Handshake of four packets with a cookie, so that the server keeps no state for an address that
+//! cannot receive.
 //!
 //! ```text
 //! facet                                             server
-//!   Hello(nonce, facet), padded to 256 bytes    →            nothing kept
+//!   Hello(nonce, facet), padded to 256 bytes    →            no state
 //!                                               ←   Challenge(nonce, cookie), 97 bytes
-//!   Answer(nonce, facet, cookie), padded        →            cookie fits: the session is prepared
+//!   Answer(nonce, facet, cookie), padded        →            valid cookie: the session is prepared
 //!                                               ←   Welcome(nonce, server's nonce, session), 97 bytes
 //!   Data: the first sealed packet               →            the session is live, and replaces an older one of this facet
 //! ```
 //!
-//! `cookie = BLAKE3-keyed(secret of this server's process, address ‖ nonce ‖ facet ‖ ten-second interval)`; that of the interval before is taken too.
-//! All four carry a tag by the handshake key: without the key file a machine gets no answer at all. A recorded Answer that is sent again gets the same
-//! Welcome again, or prepares a session that nobody can bring to life; it never touches a live one.
+//! `cookie = BLAKE3-keyed(secret of this server's process, address ‖ nonce ‖ facet ‖ ten-second
+//! interval)`; the cookie of the previous interval is accepted too. All four packets carry a tag by
+//! the handshake key, so a machine without the key file gets no answer. A recorded Answer that is
+//! sent again gets the same Welcome, or prepares a session that nobody can complete; it never
+//! affects a live session.
 //!
-//! A facet that hears nothing for two pings doubts its session: the server may have been started again, or have given it up. It names the session in a
-//! Hello. A server that knows it says so under that session's seal; one that does not answers as to any Hello, and a session begins beside the old one. The
-//! old one ends when the first sealed packet of the new one has come, and not by any word under the handshake key, which other servers may have too. Whatever comes of
-//! the old one before ends the doubt.
+//! A facet that receives nothing for two ping intervals probes its session, because the server may
+//! have been restarted or may have dropped it. It names the session in a Hello. A server that knows
+//! the session answers with a packet sealed by it. Any other server answers as to every Hello, and
+//! a second session begins beside the old one. The old session ends when the first sealed packet of
+//! the new one arrives, and never by a packet under the handshake key, which other servers may have
+//! too. Any packet of the old session before that ends the probe.
 
 use super::keys::Handshake;
 use super::packet::{self, HEADER_BYTES, PacketHeader, PacketKind, TAG_BYTES};
@@ -24,29 +29,29 @@ use crate::sync::transport::{FacetNumber, Refused};
 use std::net::{IpAddr, SocketAddr};
 use std::time::Duration;
 
-/// Length of what asks: larger than every answer.
+/// Length of a request, bytes: larger than every answer.
 pub const REQUEST_BYTES: usize = 256;
 const INTERVAL_S: u64 = 10;
 
-/// Facet: I am here.
+/// Hello or Answer of a facet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hello {
-    /// Fresh for each try to connect.
+    /// Fresh for each attempt to connect.
     pub nonce: [u8; 32],
-    /// Who.
+    /// Number of the facet.
     pub facet: FacetNumber,
-    /// The proof; zeros in a Hello.
+    /// Cookie of the challenge; zeros in a Hello.
     pub cookie: [u8; 32],
-    /// The session that it has and doubts, because nothing came for some time; 0 where there is none.
+    /// Session that is being probed because nothing arrived for some time; 0 if there is none.
     pub suspect_session: u32,
 }
 
-/// Server: a nonce of the facet given back, and a cookie or the server's nonce.
+/// Challenge or Welcome of a server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reply {
-    /// The facet's nonce.
+    /// Nonce of the facet.
     pub nonce: [u8; 32],
-    /// The cookie (Challenge) or the server's nonce (Welcome).
+    /// Cookie (Challenge) or nonce of the server (Welcome).
     pub value: [u8; 32],
 }
 
@@ -61,7 +66,10 @@ impl Hello {
         handshake.tag(datagram);
     }
 
-    /// Reads one.
+    /// Reads a Hello or an Answer.
+    ///
+    /// # Errors
+    /// The length or the tag is wrong.
     pub fn read(datagram: &[u8], handshake: &Handshake) -> Result<Hello, Refused> {
         if datagram.len() != REQUEST_BYTES {
             return Err(if datagram.len() < REQUEST_BYTES { Refused::Truncated } else { Refused::Oversize });
@@ -88,7 +96,10 @@ impl Reply {
         handshake.tag(datagram);
     }
 
-    /// Reads one.
+    /// Reads a Challenge or a Welcome.
+    ///
+    /// # Errors
+    /// The length or the tag is wrong.
     pub fn read(datagram: &[u8], handshake: &Handshake) -> Result<Reply, Refused> {
         match datagram.len().cmp(&(HEADER_BYTES + 64 + TAG_BYTES)) {
             std::cmp::Ordering::Less => return Err(Refused::Truncated),
@@ -102,21 +113,21 @@ impl Reply {
     }
 }
 
-/// Makes cookies and knows its own.
+/// Makes and verifies cookies.
 pub struct Cookies([u8; 32]);
 
 impl Cookies {
-    /// With a secret of this process.
+    /// Creates it with a secret of this process.
     pub fn new(secret: [u8; 32]) -> Cookies {
         Cookies(secret)
     }
 
-    /// For this Hello from this address, now.
+    /// Returns the cookie for this Hello from this address at this time.
     pub fn create(&self, now: Duration, from: SocketAddr, hello: &Hello) -> [u8; 32] {
         *self.of(now.as_secs() / INTERVAL_S, from, hello).as_bytes()
     }
 
-    /// Whether the Answer carries a cookie for this address that is at most 20 s old.
+    /// Returns whether the Answer carries a cookie for this address that is at most 20 s old.
     pub fn verify(&self, now: Duration, from: SocketAddr, answer: &Hello) -> bool {
         let interval = now.as_secs() / INTERVAL_S;
         let given = blake3::Hash::from(answer.cookie);

@@ -1,22 +1,24 @@
-//! Fragments in, whole messages out: reassembly under caps.
+//! Reassembly of messages from fragments, with limits.
 //!
-//! A message is complete when each fragment is there or follows from the parity of its group. Reliable messages leave in the order of their numbers;
-//! of newest messages one leaves when it is complete, and all before it are forgotten.
+//! A message is complete when each fragment has arrived or follows from the parity of its group.
+//! Reliable messages leave in the order of their numbers. A newest message leaves when it is
+//! complete, and all earlier ones are discarded.
 //!
-//! Memory is taken for bytes that have arrived, never for bytes that were announced.
+//! Memory is allocated for bytes that have arrived, never for announced ones.
 
 use super::frames::{Channel, FRAGMENT_BYTES, MessageInfo, before};
 use crate::sync::transport::{Delivery, MAX_QUEUED_BYTES};
 use std::collections::{BTreeMap, VecDeque};
 
-/// Reliable messages under way at once; the other side starts no more.
+/// Maximum number of reliable messages in flight; the sender starts no more.
 pub const MAX_RELIABLE_IN_FLIGHT: u32 = 256;
-/// Newest messages under way at once; the other side starts no more.
+/// Maximum number of newest messages in flight; the sender starts no more.
 pub const MAX_NEWEST_IN_FLIGHT: u32 = 4;
-/// Bytes of messages under way at once; the other side starts no more, or one message alone.
+/// Maximum size of the messages in flight, bytes; the sender starts no more, or one larger message
+/// alone.
 pub const MAX_BYTES_IN_FLIGHT: usize = 32 << 20;
 
-/// A message in pieces.
+/// A message that is being reassembled.
 struct Assembly {
     part: MessageInfo,
     fragments: BTreeMap<u16, Box<[u8]>>,
@@ -24,13 +26,13 @@ struct Assembly {
     groups: u16,
 }
 
-/// A fragment or a parity frame contradicts what was agreed, or what came before.
+/// A fragment or parity frame contradicts the limits or an earlier frame.
 #[derive(Debug, PartialEq, Eq)]
 pub struct ConflictingFragment;
 
-/// What has arrived of one connection.
+/// Received messages of one connection.
 pub struct Inbox {
-    /// The first message that is not complete (reliable), and the one after the last that was delivered (newest).
+    /// First incomplete message (reliable), and the one after the last delivered (newest).
     next: [u32; 2],
     first: u32,
     assemblies: [BTreeMap<u32, Assembly>; 2],
@@ -41,7 +43,8 @@ pub struct Inbox {
 }
 
 impl Inbox {
-    /// Empty; message numbers begin at `first` (0 but in tests of the wrap).
+    /// Creates an empty inbox. Message numbers begin at `first`, which is 0 except in tests of the
+    /// wrap.
     pub fn new(first: u32) -> Inbox {
         Inbox {
             first,
@@ -54,22 +57,22 @@ impl Inbox {
         }
     }
 
-    /// Where message numbers begin.
+    /// Returns the first message number.
     pub fn first(&self) -> u32 {
         self.first
     }
 
-    /// What an acknowledgement says: messages before these are complete.
+    /// Returns the message numbers of an acknowledgement: all messages before these are complete.
     pub fn complete(&self) -> [u32; 2] {
         self.next
     }
 
-    /// Newest messages that a later one replaced; counted since this was asked last.
+    /// Returns the number of newest messages superseded since the last call.
     pub fn take_superseded(&mut self) -> u64 {
         std::mem::take(&mut self.superseded)
     }
 
-    /// The next message for the user.
+    /// Returns the next message.
     pub fn pop(&mut self) -> Option<(Delivery, Vec<u8>)> {
         let (delivery, message) = self.ready.pop_front()?;
         self.ready_bytes -= message.len();
@@ -77,7 +80,7 @@ impl Inbox {
         Some((delivery, message))
     }
 
-    /// Takes a fragment. One of a message that is complete is no fault: it was sent again.
+    /// Takes a fragment. One of a complete message is ignored: it was resent.
     pub fn fragment(&mut self, part: MessageInfo, index: u16, data: &[u8]) -> Result<(), ConflictingFragment> {
         let Some(assembly) = self.assembly(part)? else { return Ok(()) };
         if assembly.fragments.contains_key(&index) {
@@ -112,14 +115,15 @@ impl Inbox {
         Ok(())
     }
 
-    /// The assembly of a message, begun if need be; `None` if the message is already complete.
+    /// Returns the assembly of a message, created if needed; `None` if the message is already
+    /// complete.
     fn assembly(&mut self, part: MessageInfo) -> Result<Option<&mut Assembly>, ConflictingFragment> {
         let channel = part.channel as usize;
         let ahead = if part.channel == Channel::Reliable { MAX_RELIABLE_IN_FLIGHT } else { 1 << 24 };
         if before(part.message, self.next[channel]) {
             return Ok(None);
         }
-        // Twice what the other side keeps to, because what it counts as done may still be held here.
+        // twice the sender's limit, because messages that it counts as done may still be held here
         if part.message.wrapping_sub(self.next[channel]) >= ahead || self.held > 2 * MAX_BYTES_IN_FLIGHT {
             return Err(ConflictingFragment);
         }
@@ -131,7 +135,7 @@ impl Inbox {
         if assembly.part == part { Ok(Some(assembly)) } else { Err(ConflictingFragment) }
     }
 
-    /// Of newest messages under way, forgets the oldest beyond twice what the other side keeps to.
+    /// Discards the oldest newest messages beyond twice the sender's limit.
     fn make_room(&mut self, message: u32) {
         let assemblies = &mut self.assemblies[Channel::Newest as usize];
         while assemblies.len() >= 2 * MAX_NEWEST_IN_FLIGHT as usize && !assemblies.contains_key(&message) {
@@ -164,7 +168,7 @@ impl Inbox {
         self.release();
     }
 
-    /// A newest message that still waits for the user is replaced.
+    /// Queues a newest message in place of one that still waits.
     fn deliver_newest(&mut self, message: Vec<u8>) {
         if let Some(waiting) = self.ready.iter().position(|(delivery, _)| *delivery == Delivery::Newest)
             && let Some((_, old)) = self.ready.remove(waiting)
@@ -176,7 +180,7 @@ impl Inbox {
         self.ready.push_back((Delivery::Newest, message));
     }
 
-    /// Moves what is whole and in order to the user, as long as the user takes it.
+    /// Queues complete reliable messages in order, as long as the caller takes them.
     fn release(&mut self) {
         let next = &mut self.next[Channel::Reliable as usize];
         let assemblies = &mut self.assemblies[Channel::Reliable as usize];
@@ -206,7 +210,8 @@ impl Assembly {
         message
     }
 
-    /// `missing = parity ⊕ the others`, where one of the group is missing. How many bytes that gave.
+    /// Recovers the only missing fragment of a group: `missing = parity ⊕ the others`. Returns its
+    /// length, or 0.
     fn recover(&mut self, group: u16) -> usize {
         let Some(parity) = self.parity.get(&group) else { return 0 };
         let members = (group..self.part.fragments()).step_by(usize::from(self.groups));
@@ -222,12 +227,12 @@ impl Assembly {
     }
 }
 
-/// `into ^= other`, where the shorter `other` counts as padded with zeros.
+/// Computes `into ^= other`, with a shorter `other` padded with zeros.
 pub fn xor(into: &mut [u8], other: &[u8]) {
     into.iter_mut().zip(other).for_each(|(a, b)| *a ^= b);
 }
 
-/// The parity of a group of a message's fragments.
+/// Returns the parity of a group of a message's fragments.
 pub fn parity(message: &[u8], group: u16, groups: u16) -> [u8; FRAGMENT_BYTES] {
     let mut parity = [0; FRAGMENT_BYTES];
     message

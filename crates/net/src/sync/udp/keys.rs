@@ -1,13 +1,14 @@
-//! Keys: from the file that all machines of a cave share, to the two keys of each session.
+//! Keys: from the key file that all machines of a cave share to the two keys of each session.
 //!
-//! | name | what |
+//! | name | definition |
 //! |---|---|
 //! | pre-shared key | 32 bytes that only the machines of this cave know |
-//! | handshake key | `BLAKE3-derive("… handshake", pre-shared key)`: tags what is sent before there is a session |
-//! | session keys | `BLAKE3-derive("… facet to server", pre-shared key ‖ facet's nonce ‖ server's nonce ‖ session ‖ facet)`, and the same the other way |
+//! | handshake key | `BLAKE3-derive("… handshake", pre-shared key)`: tags packets before there is a session |
+//! | session keys | `BLAKE3-derive("… facet to server", pre-shared key ‖ facet's nonce ‖ server's nonce ‖ session ‖ facet)`, and the same for the other direction |
 //!
-//! Both sides give a fresh nonce of 32 bytes, so no session ever uses the keys of another one, and a packet of one direction, facet or session is a
-//! forgery in every other. Losing the key file opens the sessions recorded before: there is no forward secrecy, because there is no other secret.
+//! Both sides contribute a fresh nonce of 32 bytes, so no two sessions have the same keys, and a
+//! packet of one direction, facet or session is a forgery in every other. Whoever gets the key file
+//! can decrypt recorded sessions: there is no forward secrecy, because there is no other secret.
 
 use super::packet::{self, HEADER_BYTES, MAX_DATAGRAM, PacketHeader, TAG_BYTES};
 use crate::sync::transport::{FacetNumber, LinkError, Refused};
@@ -20,7 +21,7 @@ const TO_SERVER: &str = "tumble-net udp v2 facet to server";
 const TO_FACET: &str = "tumble-net udp v2 server to facet";
 const SEEDED: &str = "tumble-net udp v1 random numbers of one process";
 
-/// The key that all machines of a cave share.
+/// The pre-shared key.
 #[derive(Clone)]
 pub struct SharedKey {
     bytes: [u8; 32],
@@ -34,24 +35,27 @@ impl std::fmt::Debug for SharedKey {
 }
 
 impl SharedKey {
-    /// No secret: damage is still found, a forger is not. Only loopback is bound with it.
+    /// Returns a public key: it detects damage and no forgery. It is used on loopback addresses
+    /// only.
     pub fn none() -> SharedKey {
         SharedKey { bytes: [0; 32], secret: false }
     }
 
-    /// A key from its bytes.
+    /// Returns a secret key.
     pub fn new(bytes: [u8; 32]) -> SharedKey {
         SharedKey { bytes, secret: true }
     }
 
-    /// Whether this is a secret.
+    /// Returns whether the key is secret.
     pub fn is_secret(&self) -> bool {
         self.secret
     }
 
-    /// Reads a key file: 64 hexadecimal digits (32 bytes), white space around them.
+    /// Reads a key file: 64 hexadecimal digits (32 bytes), with optional white space around them.
     ///
-    /// Errors, each naming the file and what would be right: it cannot be read, others than its owner may read it, or it holds something else.
+    /// # Errors
+    /// The file cannot be read, others than its owner may read it, or it has another content. Each
+    /// message names the file and the remedy.
     pub fn read(path: &Path) -> Result<SharedKey, LinkError> {
         let refuse = |why: String| LinkError::Other(format!("key file {}: {why}", path.display()));
         let file = std::fs::File::open(path)
@@ -66,7 +70,7 @@ impl SharedKey {
                 return Err(refuse(format!("mode {mode:03o} lets others read it; run: chmod 600 {}", path.display())));
             }
         }
-        let wanted = "wanted are 64 hexadecimal digits (32 bytes); make one with: head -c 32 /dev/urandom | od -An -tx1 | tr -d ' \\n'";
+        let wanted = "expected are 64 hexadecimal digits (32 bytes); make one with: head -c 32 /dev/urandom | od -An -tx1 | tr -d ' \\n'";
         if about.len() > 256 {
             return Err(refuse(format!("{} bytes long; {wanted}", about.len())));
         }
@@ -94,59 +98,65 @@ impl SharedKey {
     }
 }
 
-/// Random bytes: in a process from the operating system, in a test from a seed.
+/// Random bytes, from the operating system or, in tests, from a seed.
 pub struct Entropy {
     key: [u8; 32],
     counter: u64,
 }
 
 impl Entropy {
-    /// From the operating system.
+    /// Returns a generator seeded by the operating system.
+    ///
+    /// # Errors
+    /// The system gives no random numbers.
     pub fn system() -> Result<Entropy, LinkError> {
         let key = Key::<ChaCha20Poly1305>::try_generate()
             .map_err(|why| LinkError::Other(format!("the system gives no random numbers: {why}")))?;
         Ok(Entropy { key: key.into(), counter: 0 })
     }
 
-    /// From a seed: the same numbers each time. For tests alone.
+    /// Returns a generator with a fixed seed, for tests.
     pub fn seeded(seed: u64) -> Entropy {
         Entropy { key: blake3::derive_key(SEEDED, &seed.to_le_bytes()), counter: 0 }
     }
 
-    /// The next 32 bytes.
+    /// Returns the next 32 bytes.
     pub fn next_bytes(&mut self) -> [u8; 32] {
         self.counter += 1;
         *blake3::keyed_hash(&self.key, &self.counter.to_le_bytes()).as_bytes()
     }
 
-    /// The next number; never 0.
+    /// Returns the next number, never 0.
     pub fn next_u64(&mut self) -> u64 {
         let [a, b, c, d, e, f, g, h, ..] = self.next_bytes();
         u64::from_le_bytes([a, b, c, d, e, f, g, h]).max(1)
     }
 }
 
-/// Tags what is sent before there is a session.
+/// Key that tags packets before there is a session.
 #[derive(Clone)]
 pub struct Handshake([u8; 32]);
 
 impl Handshake {
-    /// Of this cave.
+    /// Derives the key.
     pub fn new(shared: &SharedKey) -> Handshake {
         Handshake(blake3::derive_key(HANDSHAKE, &shared.bytes))
     }
 
-    /// Ends a datagram begun by [`packet::begin`]: length, tag, checksum.
+    /// Completes a datagram begun by [`packet::begin`]: length, tag, checksum.
     pub fn tag(&self, datagram: &mut Vec<u8>) {
         packet::set_length(datagram);
         let tag = self.of(datagram);
         packet::finish(datagram, &tag);
     }
 
-    /// The body, if the tag fits.
+    /// Returns the body if the tag is right.
+    ///
+    /// # Errors
+    /// [`Refused::Forged`].
     pub fn open<'a>(&self, datagram: &'a [u8]) -> Result<&'a [u8], Refused> {
         let (covered, tag) = datagram.split_at(datagram.len() - TAG_BYTES);
-        // Compared in constant time, as one hash with another.
+        // comparing two hashes takes constant time
         let (mut have, mut want) = ([0; 32], [0; 32]);
         have[..TAG_BYTES].copy_from_slice(tag);
         want[..TAG_BYTES].copy_from_slice(&self.of(covered));
@@ -167,21 +177,21 @@ impl Handshake {
     }
 }
 
-/// Which end of a session.
+/// Side of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// The server's.
+    /// The server.
     Server,
-    /// A facet's.
+    /// A facet.
     Facet,
 }
 
-/// What both sides agreed on.
+/// Parameters of a session that both sides know.
 #[derive(Clone, Copy)]
 pub struct Agreement {
-    /// The session's number, drawn by the server.
+    /// Number of the session, drawn by the server.
     pub session: u32,
-    /// Whose it is.
+    /// Number of the facet.
     pub facet: FacetNumber,
     /// Drawn by the facet.
     pub facet_nonce: [u8; 32],
@@ -189,7 +199,7 @@ pub struct Agreement {
     pub server_nonce: [u8; 32],
 }
 
-/// Seals what one side sends and opens what it receives.
+/// Encrypts sent packets and decrypts received ones.
 pub struct Seal {
     session: u32,
     outgoing: ChaCha20Poly1305,
@@ -198,7 +208,8 @@ pub struct Seal {
 }
 
 impl Seal {
-    /// The keys of `side`. `first` is the first sequence number: 0 but in tests of the wrap.
+    /// Derives the keys of `side`. `first` is the first sequence number, 0 except in tests of the
+    /// wrap.
     pub fn new(shared: &SharedKey, agreed: &Agreement, side: Side, first: u64) -> Seal {
         let material = [
             &shared.bytes[..],
@@ -216,12 +227,14 @@ impl Seal {
         Seal { session: agreed.session, outgoing, incoming, next: first }
     }
 
-    /// The sequence number of the next packet; `None` when they are used up: a number is never used twice under one key.
+    /// Returns the sequence number of the next packet; `None` when all are used up, because a
+    /// number is never used twice under one key.
     pub fn next_sequence(&self) -> Option<u64> {
         (self.next < u64::MAX).then_some(self.next)
     }
 
-    /// Writes the next packet with this body. `false`: the sequence numbers are used up, or the body is too long; nothing was written.
+    /// Writes the next packet with this body. Returns `false` and writes nothing if the sequence
+    /// numbers are used up or the body is too long.
     pub fn close(&mut self, body: &[u8], datagram: &mut Vec<u8>) -> bool {
         let Some(sequence) = self.next_sequence().filter(|_| HEADER_BYTES + body.len() + TAG_BYTES <= MAX_DATAGRAM)
         else {
@@ -241,7 +254,10 @@ impl Seal {
         true
     }
 
-    /// The body of a packet with its whole number, opened into `body`.
+    /// Decrypts the body of a packet with its full sequence number into `body`.
+    ///
+    /// # Errors
+    /// [`Refused::Forged`].
     pub fn open(&self, header: &PacketHeader, datagram: &[u8], body: &mut Vec<u8>) -> Result<(), Refused> {
         let (covered, tag) = datagram.split_at(datagram.len() - TAG_BYTES);
         body.clear();
@@ -258,7 +274,7 @@ impl Seal {
     }
 }
 
-/// 32 zero bits and the sequence number.
+/// Returns 32 zero bits followed by the sequence number.
 fn nonce(sequence: u64) -> Nonce {
     let mut nonce = [0; 12];
     nonce[4..].copy_from_slice(&sequence.to_le_bytes());

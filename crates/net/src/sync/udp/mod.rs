@@ -1,4 +1,4 @@
-//! Datagrams between machines: sealed, repaired, in order.
+//! UDP between machines: encrypted, reliable and ordered.
 //!
 //! ```text
 //! socket ──► packet ──► session { window → seal → frames → inbox } ──► messages
@@ -6,12 +6,13 @@
 //! socket ◄── packet ◄── session { seal ◄ frames ◄ outbox } ◄── messages
 //! ```
 //!
-//! [`ServerMachine`] and [`FacetMachine`] are pure: datagrams and the time in, datagrams and events out. They have no socket and no clock, so a test drives them
-//! through a [`network`] that loses, repeats, reorders and damages by a seed. [`UdpServer`] and [`UdpFacet`] put a socket and two threads around
-//! them: one that receives, one that waits for the next thing that is due. So a facet that renders for long still acknowledges, and a server that
-//! simulates still repairs.
+//! The state machines of server and facet have no socket and no clock: datagrams and times go in,
+//! datagrams and events come out. Tests drive them through a simulated network that loses, repeats,
+//! reorders and damages packets by a seed. [`UdpServer`] and [`UdpFacet`] put a socket and two
+//! threads around them: one receives, the other waits for the next due work. So a facet that
+//! renders for long still acknowledges, and a server that simulates still repairs.
 //!
-//! `docs/transports.md` has the packets, the threats and the figures.
+//! `docs/transports.md` describes packets, threats and measurements.
 
 mod facet;
 mod inbox;
@@ -55,14 +56,14 @@ pub use {
 
 use std::time::Duration;
 
-/// How often, and how long at most.
+/// Intervals and timeouts of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
-    /// A side that had nothing to send for so long asks for a sign of life.
+    /// Idle time after which a side sends a ping.
     pub ping_interval: Duration,
-    /// A connection of which nothing was heard for so long is closed.
+    /// Time without any packet after which a connection is closed.
     pub idle_timeout: Duration,
-    /// A facet that looks for its server asks this often.
+    /// Interval between two Hellos of a facet that looks for its server.
     pub connect_interval: Duration,
 }
 

@@ -1,42 +1,43 @@
-//! A network with faults, by a seed and without a clock: the same seed gives the same faults.
+//! Simulated network with faults, reproducible by its seed and without a clock.
 //!
-//! As Linux's `netem` does it: a datagram is delayed by `delay_s` plus up to `jitter_s`; with probability `reorder` it overtakes, that is, it is not delayed at
-//! all; then it may be lost, sent twice, or damaged.
+//! It follows Linux's `netem`: a datagram is delayed by `delay_s` plus up to `jitter_s`. With
+//! probability `reorder` it is not delayed at all and overtakes others. Then it may be lost,
+//! duplicated or damaged.
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::time::Duration;
 
-/// How bad the network is; shares are 0 to 1, per datagram and direction.
+/// Faults of the network. Probabilities are per datagram and direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Faults {
-    /// Share lost.
+    /// Probability of loss.
     pub loss: f64,
-    /// Share that overtakes.
+    /// Probability that a datagram overtakes others.
     pub reorder: f64,
-    /// Share that arrives twice.
+    /// Probability that a datagram arrives twice.
     pub duplicate: f64,
-    /// Share of which a random bit is flipped.
+    /// Probability that a random bit is flipped.
     pub flip: f64,
-    /// Share that is cut at a random place.
+    /// Probability that a datagram is cut at a random length.
     pub cut: f64,
-    /// Delay one way, seconds.
+    /// Delay of one direction, s.
     pub delay_s: f64,
-    /// Most that is added to the delay, seconds.
+    /// Maximum additional delay, s.
     pub jitter_s: f64,
 }
 
-/// A stream of random numbers (splitmix64).
+/// Random numbers (splitmix64).
 #[derive(Clone, Debug)]
 pub struct Random(u64);
 
 impl Random {
-    /// From a seed.
+    /// Creates the generator.
     pub fn new(seed: u64) -> Random {
         Random(seed)
     }
 
-    /// The next number.
+    /// Returns the next number.
     pub fn next_u64(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -45,12 +46,12 @@ impl Random {
         z ^ z >> 31
     }
 
-    /// In [0, 1).
+    /// Returns a number in [0, 1).
     pub fn unit(&mut self) -> f64 {
         (self.next_u64() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Below `n`; 0 for 0.
+    /// Returns a number below `n`; 0 for 0.
     pub fn below(&mut self, n: usize) -> usize {
         (self.unit() * n as f64) as usize
     }
@@ -60,23 +61,23 @@ impl Random {
     }
 }
 
-/// A datagram under way: from, to, bytes.
+/// A datagram in flight: sender, receiver, bytes.
 pub type InFlight = (SocketAddr, SocketAddr, Vec<u8>);
 
-/// Datagrams under way.
+/// A network with its datagrams in flight.
 pub struct Network {
     faults: Faults,
     random: Random,
     in_flight: BTreeMap<(Duration, u64), InFlight>,
     count: u64,
-    /// While set, everything is lost.
+    /// While set, every datagram is lost.
     pub partitioned: bool,
-    /// Bytes that were sent, lost ones included.
+    /// Total number of bytes sent, including lost datagrams.
     pub bytes: u64,
 }
 
 impl Network {
-    /// A quiet network.
+    /// Creates a network without datagrams.
     pub fn new(seed: u64, faults: Faults) -> Network {
         Network {
             faults,
@@ -88,7 +89,7 @@ impl Network {
         }
     }
 
-    /// Sends a datagram into it.
+    /// Sends a datagram.
     pub fn send(&mut self, now: Duration, from: SocketAddr, to: SocketAddr, datagram: &[u8]) {
         self.bytes += datagram.len() as u64;
         let copies = 1 + usize::from(self.random.happens(self.faults.duplicate));
@@ -105,13 +106,13 @@ impl Network {
         }
     }
 
-    /// The next datagram that has arrived by now.
+    /// Returns the next datagram that has arrived by `now`.
     pub fn receive(&mut self, now: Duration) -> Option<InFlight> {
         let first = self.in_flight.first_entry().filter(|first| first.key().0 <= now)?;
         Some(first.remove())
     }
 
-    /// When the next datagram arrives.
+    /// Returns when the next datagram arrives.
     pub fn next(&self) -> Option<Duration> {
         self.in_flight.keys().next().map(|(at, _)| *at)
     }

@@ -1,70 +1,76 @@
-//! The outside of every datagram: a header that can be checked before any key is used, and the seal.
+//! Format of every datagram: a header that can be checked without a key, and the authentication
+//! tag.
 //!
 //! All numbers are little-endian.
 //!
-//! | byte | size | what |
+//! | byte | size | content |
 //! |---|---|---|
 //! | 0 | 2 | magic `74 db` |
 //! | 2 | 1 | version, [`VERSION`] (upper four bits), and [`PacketKind`] (lower four) |
 //! | 3 | 2 | length of the whole datagram |
-//! | 5 | 4 | CRC-32 of all bytes but these four: tells a packet damaged on its way from a forged one |
-//! | 9 | 4 | session (in a Hello: the one in doubt; 0 where there is none) |
-//! | 13 | 4 | sequence, its lower half: the number of this packet within its session and direction |
-//! | 17 | n | body: sealed in [`PacketKind::Data`], plain in the others |
+//! | 5 | 4 | CRC-32 of all bytes except these four: distinguishes a damaged packet from a forged one |
+//! | 9 | 4 | session (in a Hello: the probed one, or 0) |
+//! | 13 | 4 | lower half of the sequence number of this packet within its session and direction |
+//! | 17 | n | body: encrypted in [`PacketKind::Data`], plain in the others |
 //! | 17 + n | 16 | tag: Poly1305 in [`PacketKind::Data`], keyed BLAKE3 in the others |
 //!
-//! Everything of the header but the checksum is associated data of the tag, so none of it can be changed. The whole sequence number, 64 bits, is the nonce of
-//! the seal; its upper half follows from what came before ([`full_sequence`]), and where that guess is wrong the seal does not fit.
+//! The tag covers the whole header except the checksum, so no field can be changed. The nonce of
+//! the encryption is the full sequence number of 64 bits. Its upper half follows from the packets
+//! before ([`full_sequence`]); if that guess is wrong, the tag does not match.
 
 use crate::sync::transport::Refused;
 
-/// The protocol's version; a datagram of another one is refused.
+/// Version of the protocol; datagrams of other versions are refused.
 pub const VERSION: u8 = 2;
-/// Most bytes of a datagram (payload of UDP): passes every path of 1280 bytes, which IPv6 demands.
+/// Maximum length of a datagram (UDP payload), bytes. It fits every path with an MTU of 1280 bytes,
+/// the minimum of IPv6.
 pub const MAX_DATAGRAM: usize = 1200;
-/// Bytes before the body.
+/// Length of the header, bytes.
 pub const HEADER_BYTES: usize = 17;
-/// Bytes after the body.
+/// Length of the tag, bytes.
 pub const TAG_BYTES: usize = 16;
 
 const MAGIC: [u8; 2] = [0x74, 0xdb];
 const CHECKSUM: std::ops::Range<usize> = 5..9;
 
-/// What a datagram is for.
+/// Kind of a datagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PacketKind {
-    /// Facet: I am here. Padded, so that no answer is larger than what asked for it.
+    /// Facet: request to connect, padded so that no answer is larger than its request.
     Hello = 1,
-    /// Server: prove that you receive at this address. It keeps nothing.
+    /// Server: request to prove that the facet receives at its address. The server keeps no state.
     Challenge = 2,
     /// Facet: the proof.
     Answer = 3,
-    /// Server: your session.
+    /// Server: the session.
     Welcome = 4,
-    /// Either: sealed frames.
+    /// Both: encrypted frames.
     Data = 6,
 }
 
 const PACKET_KINDS: [PacketKind; 5] =
     [PacketKind::Hello, PacketKind::Challenge, PacketKind::Answer, PacketKind::Welcome, PacketKind::Data];
 
-/// What the header says.
+/// Header of a datagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PacketHeader {
-    /// What the datagram is for.
+    /// Kind of the datagram.
     pub kind: PacketKind,
-    /// Whose it is.
+    /// Number of the session.
     pub session: u32,
-    /// Its number; as [`parse`] reads it only the lower half.
+    /// Sequence number; [`parse`] returns its lower half only.
     pub sequence: u64,
 }
 
-/// The session that a header names: of a datagram that [`parse`] took.
+/// Returns the session in the header of a datagram that [`parse`] accepted.
 pub fn session_of(datagram: &[u8]) -> u32 {
     u32_at(datagram, 9)
 }
 
-/// Reads the header; looks at nothing else. Cheap: no key, no allocation.
+/// Parses the header without looking at the body. Needs no key and no allocation.
+///
+/// # Errors
+/// The length, magic, version, checksum or kind is wrong.
 pub fn parse(datagram: &[u8]) -> Result<PacketHeader, Refused> {
     if datagram.len() < HEADER_BYTES + TAG_BYTES {
         return Err(Refused::Truncated);
@@ -89,7 +95,7 @@ pub fn parse(datagram: &[u8]) -> Result<PacketHeader, Refused> {
     Ok(PacketHeader { kind, session: u32_at(datagram, 9), sequence: u64::from(u32_at(datagram, 13)) })
 }
 
-/// The whole number whose lower half this is, nearest to `near`.
+/// Returns the number with this lower half that is nearest to `near`.
 pub fn full_sequence(lower: u32, near: u64) -> u64 {
     let same = near & !u64::from(u32::MAX) | u64::from(lower);
     let others = [same.checked_sub(1 << 32), same.checked_add(1 << 32)];
@@ -99,7 +105,7 @@ pub fn full_sequence(lower: u32, near: u64) -> u64 {
         .fold(same, |best, other| if other.abs_diff(near) < best.abs_diff(near) { other } else { best })
 }
 
-/// Clears `datagram` and writes the header into it; `seal_off` or [`finish`] set length and checksum.
+/// Clears `datagram` and writes the header. [`set_length`] and [`finish`] set length and checksum.
 pub fn begin(datagram: &mut Vec<u8>, header: PacketHeader) {
     datagram.clear();
     datagram.extend_from_slice(&MAGIC);
@@ -109,7 +115,7 @@ pub fn begin(datagram: &mut Vec<u8>, header: PacketHeader) {
     datagram.extend_from_slice(&(header.sequence as u32).to_le_bytes());
 }
 
-/// Sets the length that the datagram will have with its tag. Before the tag is made, because the tag covers it.
+/// Sets the length of the datagram with its tag; must precede the tag, which covers the length.
 pub fn set_length(datagram: &mut [u8]) {
     let length = (datagram.len() + TAG_BYTES) as u16;
     datagram[3..5].copy_from_slice(&length.to_le_bytes());
@@ -122,7 +128,7 @@ pub fn finish(datagram: &mut Vec<u8>, tag: &[u8; TAG_BYTES]) {
     datagram[CHECKSUM].copy_from_slice(&sum.to_le_bytes());
 }
 
-/// What of the header the tag covers: all but the checksum.
+/// Returns the header bytes that the tag covers: all except the checksum.
 pub fn associated(datagram: &[u8]) -> [u8; HEADER_BYTES - 4] {
     let mut covered = [0; HEADER_BYTES - 4];
     covered[..CHECKSUM.start].copy_from_slice(&datagram[..CHECKSUM.start]);

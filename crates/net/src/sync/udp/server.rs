@@ -1,4 +1,4 @@
-//! The server's side, without socket or clock.
+//! The server's side of UDP without socket and clock.
 
 use super::Timing;
 use super::handshake::{Cookies, Hello, Reply};
@@ -13,25 +13,27 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Sessions prepared and not yet live; beyond, the oldest goes.
+/// Maximum number of prepared sessions that are not live; beyond it the oldest is discarded.
 const MAX_PREPARED: usize = 2 * MAX_FACETS;
-/// Sessions that are over and whose late packets are known; beyond, the oldest goes.
+/// Maximum number of ended sessions whose late packets are recognized; beyond it the oldest is
+/// discarded.
 const MAX_OVER: usize = 2 * MAX_FACETS;
-/// Answers that wait to be sent; beyond, they are dropped and the facet asks again.
+/// Maximum number of handshake replies that wait to be sent; further ones are dropped and the facet
+/// repeats its request.
 const MAX_REPLIES: usize = 256;
 
-/// What is set when a server begins.
+/// Settings of a server.
 #[derive(Clone, Copy, Debug)]
 pub struct ServerSettings {
     /// Facets have numbers below this, at most [`MAX_FACETS`].
     pub facets: FacetNumber,
-    /// How often, and how long at most.
+    /// Intervals and timeouts.
     pub timing: Timing,
-    /// Where counting begins.
+    /// First packet and message numbers.
     pub numbering: Numbering,
 }
 
-/// The server's side: datagrams and time in, datagrams and events out.
+/// A server's state machine: datagrams and times in, datagrams and events out.
 pub struct ServerMachine {
     settings: ServerSettings,
     shared: SharedKey,
@@ -42,18 +44,18 @@ pub struct ServerMachine {
     /// The live session of each facet.
     live: Vec<Option<u32>>,
     prepared: VecDeque<u32>,
-    /// Were live, and are over: what the facet sent before it knew is on its way.
+    /// Ended sessions that were live: packets that the facet sent before the end may still arrive.
     over: VecDeque<Session>,
     replies: VecDeque<(SocketAddr, Vec<u8>)>,
     events: VecDeque<(FacetNumber, LinkEvent, Vec<u8>)>,
     counters: Vec<LinkCounters>,
     unknown_peers: LinkCounters,
-    /// The facet that is asked first for a message.
+    /// The facet that is polled first for a message.
     turn: usize,
 }
 
 impl ServerMachine {
-    /// A server that nobody has joined.
+    /// Creates a server without connections.
     pub fn new(settings: ServerSettings, shared: SharedKey, mut entropy: Entropy) -> ServerMachine {
         let facets = usize::from(settings.facets).min(MAX_FACETS);
         ServerMachine {
@@ -74,7 +76,7 @@ impl ServerMachine {
         }
     }
 
-    /// Takes a datagram.
+    /// Processes a datagram.
     pub fn receive(&mut self, now: Duration, from: SocketAddr, datagram: &[u8]) {
         let header = packet::parse(datagram);
         let facet = match &header {
@@ -95,7 +97,7 @@ impl ServerMachine {
         }
     }
 
-    /// Sends what is due by `emit`, and finds what is over.
+    /// Sends due datagrams by `emit`, and ends sessions that are closed, timed out or exhausted.
     pub fn transmit(&mut self, now: Duration, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
         for (to, datagram) in self.replies.drain(..) {
             self.unknown_peers.bytes_out += datagram.len() as u64;
@@ -120,12 +122,13 @@ impl ServerMachine {
         }
     }
 
-    /// When [`transmit`](Self::transmit) has something to do, if nothing arrives before.
+    /// Returns when [`transmit`](Self::transmit) has work, if no datagram arrives before.
     pub fn wake(&self) -> Option<Duration> {
         self.sessions.values().map(Session::wake).min()
     }
 
-    /// Takes a message for a facet. `false`: there is no connection, or the message is empty or too long.
+    /// Queues a message for a facet. Returns `false` if there is no connection, or if the message
+    /// is empty or too long.
     pub fn send(&mut self, to: FacetNumber, delivery: Delivery, message: &Arc<[u8]>) -> bool {
         let session = self.live_session(to);
         let fits = (1..=MAX_MESSAGE_BYTES).contains(&message.len());
@@ -144,7 +147,7 @@ impl ServerMachine {
         true
     }
 
-    /// The next event, in order for each facet; facets take turns.
+    /// Returns the next event, in order for each facet, and round-robin over the facets.
     pub fn poll(&mut self) -> Option<(FacetNumber, LinkEvent, Vec<u8>)> {
         if let Some((facet, event, message)) = self.events.pop_front() {
             self.counters[usize::from(facet)].messages_in += u64::from(event == LinkEvent::Message);
@@ -170,12 +173,12 @@ impl ServerMachine {
         self.end(id, Closed::ByUs);
     }
 
-    /// What happened on a facet's connections so far.
+    /// Returns the counters of a facet's connections.
     pub fn counters(&self, facet: FacetNumber) -> LinkCounters {
         self.counters.get(usize::from(facet)).copied().unwrap_or_default()
     }
 
-    /// What could not be laid to any facet.
+    /// Returns the counters of datagrams that belong to no facet.
     pub fn unknown_peers(&self) -> LinkCounters {
         self.unknown_peers
     }
@@ -202,7 +205,8 @@ impl ServerMachine {
         taken
     }
 
-    /// A packet of a session that is not known, or over: not answered, for it proves nothing. Genuine ones that were late do no harm and are no refusal.
+    /// Processes a packet of an unknown or ended session. It is not answered, because it proves
+    /// nothing. A genuine late packet of an ended session does not count as refused.
     fn take_late(&mut self, from: SocketAddr, header: &PacketHeader, datagram: &[u8]) -> Result<(), Refused> {
         let over =
             self.over.iter_mut().find(|session| session.agreed.session == header.session && session.address == from);
@@ -255,7 +259,7 @@ impl ServerMachine {
         Ok(())
     }
 
-    /// A session that the first sealed packet will bring to life.
+    /// Prepares a session; its first sealed packet makes it live.
     fn prepare(&mut self, now: Duration, from: SocketAddr, answer: &Hello) -> Agreement {
         while self.prepared.len() >= MAX_PREPARED {
             if let Some(oldest) = self.prepared.pop_front() {
@@ -289,7 +293,7 @@ impl ServerMachine {
         self.events.push_back((facet, LinkEvent::Opened, Vec::new()));
     }
 
-    /// What had arrived is told before.
+    /// Ends a session. Received messages are reported first, unless this side closes.
     fn end(&mut self, id: u32, why: Closed) {
         let Some(mut session) = self.sessions.remove(&id) else { return };
         self.prepared.retain(|prepared| *prepared != id);

@@ -1,4 +1,4 @@
-//! One session, one side of it: packets and messages through seal, window, inbox and outbox.
+//! One side of a session: packets and messages pass encryption, replay window, inbox and outbox.
 
 use super::Timing;
 use super::frames::{self, ACK_BYTES, Ack, Channel, Frame};
@@ -12,30 +12,31 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Packets that may arrive before they are acknowledged at once.
+/// Number of received packets that are acknowledged at once.
 const PACKETS_PER_ACK: u32 = 8;
-/// How long an acknowledgement may wait for a message that it can travel with: what is answered at once costs no packet of its own.
+/// Delay of an acknowledgement, so that it can travel with a message. A prompt answer costs no
+/// packet of its own.
 const ACK_DELAY: Duration = Duration::from_micros(500);
-/// Each packet is told by so many acknowledgements, so that one that is lost does no harm.
+/// Number of acknowledgements that cover each packet, so that the loss of one does no harm.
 const ACK_REPEATS: usize = 4;
 const BODY: usize = MAX_DATAGRAM - HEADER_BYTES - TAG_BYTES;
 
-/// Where the counting begins; other than 0 in tests of the wrap.
+/// First numbers of a session, 0 except in tests of the wrap.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Numbering {
-    /// First packet.
+    /// Number of the first packet.
     pub sequence: u64,
-    /// First message of each stream.
+    /// Number of the first message of each stream.
     pub message: u32,
 }
 
 /// One side of a session.
 pub struct Session {
-    /// Where the other side is.
+    /// Address of the peer.
     pub address: SocketAddr,
-    /// What both sides agreed on.
+    /// Parameters of the session.
     pub agreed: Agreement,
-    /// Whether the other side has shown that it has the keys.
+    /// Whether the peer has proved that it has the keys.
     pub live: bool,
     seal: Seal,
     window: ReplayWindow,
@@ -44,10 +45,10 @@ pub struct Session {
     timing: Timing,
     last_received: Duration,
     sent: Duration,
-    /// Packets that want an acknowledgement, and when it is due.
+    /// Number of packets to acknowledge, and when that is due.
     unacknowledged: u32,
     ack_due: Option<Duration>,
-    /// The largest packets that the last acknowledgements told, the oldest first.
+    /// Largest packet of each of the last acknowledgements, the oldest first.
     acked_largest: [u64; ACK_REPEATS],
     /// Number of the first packet of either side.
     first: u64,
@@ -58,7 +59,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// Begins a session.
+    /// Creates a session.
     pub fn new(
         now: Duration,
         shared: &SharedKey,
@@ -90,7 +91,11 @@ impl Session {
         }
     }
 
-    /// Takes a packet. Nothing of it is believed before its seal was checked, and nothing of it is taken where one frame contradicts.
+    /// Processes a packet. Nothing of it is used before its tag is checked, and none of it if one
+    /// frame is invalid.
+    ///
+    /// # Errors
+    /// The reason for which the packet was refused.
     pub fn receive(
         &mut self,
         now: Duration,
@@ -110,7 +115,11 @@ impl Session {
         result
     }
 
-    /// Looks at a packet that comes when the session is over: whether the other side sent it before it knew.
+    /// Checks a packet that arrives after the end of the session: whether the peer sent it before
+    /// the end.
+    ///
+    /// # Errors
+    /// The reason for which the packet was refused.
     pub fn receive_late(&mut self, header: &PacketHeader, datagram: &[u8]) -> Result<(), Refused> {
         let mut body = std::mem::take(&mut self.body);
         let result = self.open(header, datagram, &mut body);
@@ -118,12 +127,12 @@ impl Session {
         result
     }
 
-    /// Lets go of all messages: the session is over.
+    /// Discards all messages after the end of the session.
     pub fn clear_messages(&mut self) {
         (self.inbox, self.outbox) = (Inbox::new(0), Outbox::new(0));
     }
 
-    /// Window and seal.
+    /// Checks the replay window and decrypts the body.
     fn open(&mut self, header: &PacketHeader, datagram: &[u8], body: &mut Vec<u8>) -> Result<(), Refused> {
         let header = PacketHeader {
             sequence: full_sequence(header.sequence as u32, self.window.largest().unwrap_or(self.first)),
@@ -163,22 +172,25 @@ impl Session {
         Ok(())
     }
 
-    /// Takes a message to be sent.
+    /// Queues a message.
+    ///
+    /// # Errors
+    /// [`QueueFull`].
     pub fn send(&mut self, delivery: Delivery, message: Arc<[u8]>) -> Result<(), QueueFull> {
         self.outbox.push(Channel::from(delivery), message)
     }
 
-    /// The next message that arrived.
+    /// Returns the next received message.
     pub fn pop(&mut self) -> Option<(Delivery, Vec<u8>)> {
         self.inbox.pop()
     }
 
-    /// Asks the other side for a sign of life with the next packet.
+    /// Requests an acknowledgement with the next packet.
     pub fn ping(&mut self) {
         self.outbox.ping();
     }
 
-    /// Sends what is due by `emit`.
+    /// Sends due packets by `emit`.
     pub fn transmit(&mut self, now: Duration, counters: &mut LinkCounters, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
         self.outbox.tick(now);
         if now >= self.sent + self.timing.ping_interval {
@@ -207,7 +219,7 @@ impl Session {
         counters.superseded += self.outbox.take_superseded();
     }
 
-    /// Tells the other side that the session is over; three times, because nobody will repeat it.
+    /// Sends Close three times, because it is never resent.
     pub fn send_close(&mut self, now: Duration, counters: &mut LinkCounters, emit: &mut dyn FnMut(SocketAddr, &[u8])) {
         for _ in 0..3 {
             self.body.clear();
@@ -216,7 +228,7 @@ impl Session {
         }
     }
 
-    /// When [`transmit`](Self::transmit) has something to do, if nothing arrives before.
+    /// Returns when [`transmit`](Self::transmit) has work, if no packet arrives before.
     pub fn wake(&self) -> Duration {
         let over = self.last_received + self.timing.idle_timeout;
         if !self.live {
@@ -226,22 +238,22 @@ impl Session {
         [self.ack_due, self.outbox.wake()].into_iter().flatten().fold(idle, Duration::min)
     }
 
-    /// When something was heard last.
+    /// Returns when the last packet was received.
     pub fn last_received(&self) -> Duration {
         self.last_received
     }
 
-    /// Whether nothing was heard for too long.
+    /// Returns whether nothing was received for the idle timeout.
     pub fn is_timed_out(&self, now: Duration) -> bool {
         now >= self.last_received + self.timing.idle_timeout
     }
 
-    /// Whether the other side closed it.
+    /// Returns whether the peer closed the session.
     pub fn is_closed_by_peer(&self) -> bool {
         self.closed_by_peer
     }
 
-    /// Whether the sequence numbers are used up.
+    /// Returns whether the sequence numbers are used up.
     pub fn is_exhausted(&self) -> bool {
         self.exhausted
     }

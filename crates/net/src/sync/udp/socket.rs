@@ -1,7 +1,9 @@
-//! A socket and two threads around each machine: the only place here that knows sockets and the clock.
+//! A socket and two threads around each state machine. No other file of this module uses sockets or
+//! the clock.
 //!
-//! One thread receives; the other waits for the next thing that is due. Both, and whoever holds the link, work on the machine under one lock, and
-//! whoever changed it sends what is due before it lets go. A datagram that the system will not send counts as lost on its way.
+//! One thread receives, the other waits for the next due work. Both threads and the owner of the
+//! link use the machine under one lock, and each sends due datagrams before it releases the lock. A
+//! datagram that the system refuses to send counts as lost.
 
 use super::facet::FacetSettings;
 use super::keys::{Entropy, SharedKey};
@@ -15,12 +17,12 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// How often the receiving thread looks whether it is to stop.
+/// Interval at which the receiving thread checks whether to stop.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
-/// Longer than any datagram that is taken, so that a longer one is seen to be longer.
+/// Longer than any valid datagram, so that a longer one is recognized.
 const BUFFER: usize = 2048;
 
-/// What both machines can do.
+/// Common interface of the two state machines.
 trait Machine: Send + 'static {
     type Event;
     fn receive(&mut self, now: Duration, from: SocketAddr, datagram: &[u8]);
@@ -32,7 +34,7 @@ trait Machine: Send + 'static {
 
 struct State<M> {
     machine: M,
-    /// Until when the waiting thread sleeps.
+    /// Time until which the waiting thread sleeps.
     asleep_until: Duration,
     stop: bool,
     failed: Option<std::io::Error>,
@@ -40,9 +42,9 @@ struct State<M> {
 
 struct Shared<M> {
     state: Mutex<State<M>>,
-    /// Something may be there for the user.
+    /// Signals that an event may be there.
     arrived: Condvar,
-    /// Something is due earlier than the waiting thread knows.
+    /// Signals work that is due before the waiting thread would wake up.
     earlier: Condvar,
     socket: UdpSocket,
     start: Instant,
@@ -57,7 +59,7 @@ impl<M: Machine> Shared<M> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Sends what is due, and wakes the waiting thread if it would sleep too long.
+    /// Sends due datagrams, and wakes the waiting thread if it would sleep too long.
     fn transmit_due(&self, state: &mut State<M>) {
         state.machine.transmit(self.now(), &mut |to, datagram| self.emit(to, datagram));
         if state.machine.wake().is_some_and(|wake| wake < state.asleep_until) {
@@ -102,7 +104,7 @@ impl<M: Machine> Shared<M> {
                 self.transmit_due(&mut state);
                 self.arrived.notify_one();
             }
-            // At least a little, so that a fault in a machine cannot make this thread spin.
+            // a minimum, so that an error in a machine cannot make this thread spin
             let wake = state
                 .machine
                 .wake()
@@ -133,7 +135,7 @@ impl<M: Machine> Shared<M> {
     }
 }
 
-/// A system's answer that is over with the next call.
+/// Returns whether an error of the system concerns a single call only.
 fn is_transient(error: &std::io::Error) -> bool {
     use std::io::ErrorKind::*;
     matches!(
@@ -152,7 +154,7 @@ fn name(socket: &UdpSocket) -> String {
     socket.local_addr().map_or_else(|_| "?".into(), |address| address.to_string())
 }
 
-/// A core and its threads; all end when this goes.
+/// A machine with its threads, which end when this is dropped.
 struct Running<M: Machine> {
     shared: Arc<Shared<M>>,
     threads: Vec<JoinHandle<()>>,
@@ -197,7 +199,7 @@ impl<M: Machine> Drop for Running<M> {
     }
 }
 
-/// Refuses to be open to the network without a key.
+/// Refuses an address other than loopback without a key.
 fn check_address(address: SocketAddr, key: &Option<SharedKey>, what: &str) -> Result<(), LinkError> {
     if key.is_some() || address.ip().is_loopback() {
         return Ok(());
@@ -211,26 +213,25 @@ fn bind(address: SocketAddr) -> Result<UdpSocket, LinkError> {
     UdpSocket::bind(address).map_err(|why| LinkError::Io { what: format!("cannot bind udp {address}"), why })
 }
 
-/// What a user should know about an address: whether it is sealed.
+/// Describes an address for the user, and whether its packets are encrypted.
 fn describe(socket: &UdpSocket, sealed: bool) -> String {
-    let state = if sealed {
-        "sealed by the key file"
-    } else {
-        "no key: only this machine is served, and nobody is authenticated"
-    };
+    let state =
+        if sealed { "sealed by the key file" } else { "no key: serves this machine only, without authentication" };
     format!("udp {}, {state}", name(socket))
 }
 
-/// The server's end of UDP.
+/// The server's endpoint over UDP.
 pub struct UdpServer {
     running: Running<ServerMachine>,
     sealed: bool,
 }
 
 impl UdpServer {
-    /// Binds `address` for facets with numbers below `facets`. Without a key only a loopback address is bound.
+    /// Binds `address` for facets with numbers below `facets`. Without a key only a loopback
+    /// address is bound.
     ///
-    /// Errors: the address is not loopback and there is no key; the system refuses.
+    /// # Errors
+    /// The address is not loopback and there is no key; the system refuses.
     pub fn bind(
         address: SocketAddr,
         facets: FacetNumber,
@@ -244,14 +245,15 @@ impl UdpServer {
         Ok(UdpServer { running: Running::start(bind(address)?, machine)?, sealed })
     }
 
-    /// The address that was bound: with its port, if port 0 was asked for.
+    /// Returns the bound address, with its port if port 0 was requested.
     ///
-    /// Errors: the system refuses.
+    /// # Errors
+    /// The system refuses.
     pub fn address(&self) -> Result<SocketAddr, LinkError> {
         self.running.shared.socket.local_addr().map_err(|why| LinkError::Io { what: "udp socket".into(), why })
     }
 
-    /// One line for the user: the address, and whether it is sealed.
+    /// Returns a line for the user: the address, and whether packets are encrypted.
     pub fn describe(&self) -> String {
         describe(&self.running.shared.socket, self.sealed)
     }
@@ -296,16 +298,17 @@ impl ServerLink for UdpServer {
     }
 }
 
-/// A facet's end of UDP.
+/// A facet's endpoint over UDP.
 pub struct UdpFacet {
     running: Running<FacetMachine>,
     sealed: bool,
 }
 
 impl UdpFacet {
-    /// Begins to look for the server. Without a key only a loopback address is asked.
+    /// Starts to connect to the server. Without a key only a loopback address is used.
     ///
-    /// Errors: the address is not loopback and there is no key; the system refuses.
+    /// # Errors
+    /// The address is not loopback and there is no key; the system refuses.
     pub fn connect(
         server: SocketAddr,
         facet: FacetNumber,
@@ -326,7 +329,7 @@ impl UdpFacet {
         Ok(UdpFacet { running: Running::start(bind(local)?, machine)?, sealed })
     }
 
-    /// One line for the user: the address, and whether it is sealed.
+    /// Returns a line for the user: the address, and whether packets are encrypted.
     pub fn describe(&self) -> String {
         describe(&self.running.shared.socket, self.sealed)
     }

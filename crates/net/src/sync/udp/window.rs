@@ -1,13 +1,15 @@
-//! Which of the last 256 packets were taken: refuses a second copy, and is what an acknowledgement tells the other side.
+//! Replay window: remembers which of the last 256 packets were received. It refuses duplicates and
+//! supplies the acknowledgements.
 //!
-//! Bit k stands for the packet `largest - k`. Nothing is ever added to a sequence number, so the window is right up to `u64::MAX`.
+//! Bit k stands for the packet `largest - k`. Nothing is ever added to a sequence number, so the
+//! window is correct up to `u64::MAX`.
 
 use crate::sync::transport::Refused;
 
-/// Packets that the window remembers.
+/// Number of packets in the window.
 pub const WINDOW: u64 = 256;
 
-/// The packets taken of one session and direction.
+/// Received packets of one session and direction.
 #[derive(Clone, Debug, Default)]
 pub struct ReplayWindow {
     largest: Option<u64>,
@@ -15,7 +17,11 @@ pub struct ReplayWindow {
 }
 
 impl ReplayWindow {
-    /// Whether this packet may still be taken. Changes nothing: that a packet exists is believed only after its seal was checked.
+    /// Checks whether a packet may be taken, without changing the window: a packet counts as
+    /// received only after its tag was checked.
+    ///
+    /// # Errors
+    /// [`Refused::Stale`] or [`Refused::Replayed`].
     pub fn check(&self, sequence: u64) -> Result<(), Refused> {
         match self.age(sequence) {
             None => Ok(()),
@@ -25,7 +31,7 @@ impl ReplayWindow {
         }
     }
 
-    /// Takes a packet whose seal was checked.
+    /// Marks a packet with a valid tag as received.
     pub fn take(&mut self, sequence: u64) {
         match (self.age(sequence), self.largest) {
             (Some(age), _) if age < WINDOW => self.bits[(age / 64) as usize] |= 1 << (age % 64),
@@ -38,17 +44,18 @@ impl ReplayWindow {
         }
     }
 
-    /// The largest packet taken.
+    /// Returns the largest received packet.
     pub fn largest(&self) -> Option<u64> {
         self.largest
     }
 
-    /// The largest packet taken and the 128 before it: bit k stands for `largest - k`.
+    /// Returns the largest received packet and a mask of the 128 up to it: bit k stands for
+    /// `largest - k`.
     pub fn taken(&self) -> Option<(u64, u128)> {
         Some((self.largest?, u128::from(self.bits[0]) | u128::from(self.bits[1]) << 64))
     }
 
-    /// How far behind the largest; `None` ahead of it.
+    /// Returns the distance behind the largest packet; `None` ahead of it.
     fn age(&self, sequence: u64) -> Option<u64> {
         self.largest?.checked_sub(sequence)
     }
@@ -77,7 +84,7 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    /// The same rule by a set of numbers, without bits.
+    /// Reference implementation with a set of numbers.
     fn brute(taken: &BTreeSet<u64>, sequence: u64) -> Result<(), Refused> {
         match taken.last() {
             Some(last) if *last >= sequence && last - sequence >= 256 => Err(Refused::Stale),

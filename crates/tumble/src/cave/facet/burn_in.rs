@@ -1,19 +1,20 @@
-//! `--burn_in`: the number of a frame in its picture, for people and for programs.
+//! `--burn-in`: the frame number in the picture, for people and for programs.
 //!
-//! In the upper left corner of the finished picture: 64 squares in two rows of 32, bit 63 first, white for 1 and black for 0, each of side
-//! `max(2, width / 64)` pixels, with the number in figures below them.
+//! It occupies the upper left corner of the finished picture: 64 squares in two rows of 32, bit 63
+//! first, white for 1 and black for 0. Each square has side `max(2, width / 64)` pixels. The number
+//! in digits is below them.
 
 use tumble::render::{Image, caption};
 
-/// Squares in a row.
+/// Number of squares in a row.
 pub const COLUMNS: u32 = 32;
 
-/// Side of a square in a picture of this width, pixels.
+/// Returns the side of a square in a picture of this width, pixels.
 pub fn side_px(width: u32) -> u32 {
     (width / 64).max(2)
 }
 
-/// Draws it.
+/// Draws the number into a picture.
 pub fn burn_in(image: &mut Image, frame: u64) {
     let strip = strip(image.width, frame);
     for y in 0..strip.height {
@@ -23,7 +24,7 @@ pub fn burn_in(image: &mut Image, frame: u64) {
     }
 }
 
-/// By itself, for a picture of this width.
+/// Returns the number as an image of its own, for a picture of this width.
 pub fn strip(picture_width: u32, frame: u64) -> Image {
     let side = side_px(picture_width);
     let text = caption(&[frame.to_string()], (picture_width / 256).clamp(1, 8));
@@ -43,7 +44,7 @@ pub fn strip(picture_width: u32, frame: u64) -> Image {
 }
 
 fn put(image: &mut Image, x: u32, y: u32, pixel: [u8; 4]) {
-    // solid where there is anything: what is below shall not show
+    // opaque wherever there is anything, so that the background does not show through
     let pixel = [pixel[0], pixel[1], pixel[2], 255];
     if x < image.width && y < image.height {
         let at = 4 * (y as usize * image.width as usize + x as usize);

@@ -8,18 +8,18 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use tumble::net::sync::{Task, WaitReason};
 
-/// Between two looks at signals, pipe and picture.
+/// Interval at which signals, parent and picture are polled.
 pub const POLL_INTERVAL: Duration = Duration::from_millis(50);
-/// Waiting for a server that is no longer than this is not worth a word.
+/// Time without a server after which the facet reports it.
 const REPORT_DELAY: Duration = Duration::from_secs(1);
 
-/// Who may end a facet, and how long it waits.
+/// Conditions that end a facet, and its timeout.
 pub struct FacetControl {
     pub name: String,
     pub signals: Signals,
     pub parent_gone: Option<Arc<AtomicBool>>,
     pub connect_timeout: Duration,
-    /// The server answers nobody who has another key file.
+    /// Whether packets are authenticated. A server with another key file then does not answer.
     pub sealed: bool,
 }
 
@@ -41,7 +41,7 @@ impl FacetControl {
     }
 }
 
-/// Raised when stdin ends: the launcher is gone, however that came.
+/// Returns a flag that is set when stdin ends, which happens when the launcher ends in any way.
 pub fn watch_parent() -> Result<Arc<AtomicBool>, Failure> {
     let gone = Arc::new(AtomicBool::new(false));
     let raise = gone.clone();
@@ -54,7 +54,7 @@ pub fn watch_parent() -> Result<Arc<AtomicBool>, Failure> {
     Ok(gone)
 }
 
-/// How long there has been no server, and what was said about it.
+/// Time without a server, and whether it was reported.
 #[derive(Default)]
 pub struct ServerWait {
     since: Option<(WaitReason, Instant)>,
@@ -62,7 +62,7 @@ pub struct ServerWait {
 }
 
 impl ServerWait {
-    /// How long there has been no server; zero while there is one.
+    /// Returns the time without a server; zero while there is one.
     pub fn elapsed(&self) -> Duration {
         self.since.map_or(Duration::ZERO, |(_, since)| since.elapsed())
     }
@@ -70,7 +70,7 @@ impl ServerWait {
     pub fn update(&mut self, task: &Task, control: &FacetControl) -> Result<(), Failure> {
         let Task::Wait(why @ (WaitReason::Server | WaitReason::Lost)) = *task else {
             if self.since.take().is_some() && std::mem::take(&mut self.said) {
-                control.say("has its server");
+                control.say("is connected");
             }
             return Ok(());
         };
@@ -78,20 +78,20 @@ impl ServerWait {
         self.since = Some((why, since));
         if since.elapsed() > control.connect_timeout {
             let what =
-                if why == WaitReason::Lost { "the server is lost and did not come back" } else { "no server answers" };
+                if why == WaitReason::Lost { "the server is lost and did not return" } else { "no server answers" };
             let key = if control.sealed {
-                "; a server that has another key file looks like this, too: compare them"
+                "; a server with another key file looks the same: compare the key files"
             } else {
                 ""
             };
             return Err(Failure::run(
                 &control.title(),
-                format!("{what}, {:.0} s long{key}", control.connect_timeout.as_secs_f64()),
+                format!("{what} for {:.0} s{key}", control.connect_timeout.as_secs_f64()),
             ));
         }
         if !self.said && (why == WaitReason::Lost || since.elapsed() > REPORT_DELAY) {
             control.say(if why == WaitReason::Lost {
-                "has lost its server, keeps the last picture and looks for it"
+                "lost its server; keeps the last picture and reconnects"
             } else {
                 "waits for the server"
             });

@@ -1,4 +1,4 @@
-//! `frames.jsonl`: a line for each frame that a facet has shown.
+//! `frames.jsonl`: one line per shown frame of a facet.
 
 use crate::cave::run_setup::facet_folder;
 use crate::failure::Failure;
@@ -13,23 +13,25 @@ use std::thread::JoinHandle;
 use std::time::{SystemTime, UNIX_EPOCH};
 use tumble::render::Image;
 
-/// A line.
+/// One line of the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameLine {
     pub frame: u64,
     pub time_s: f64,
-    /// Hash of what was applied and drawn, hexadecimal.
+    /// Hash of the applied and drawn state, hexadecimal.
     pub state: String,
-    /// First 16 bytes of the BLAKE3 of the picture's pixels, hexadecimal; zeros without a picture.
+    /// First 16 bytes of the BLAKE3 hash of the picture's pixels, hexadecimal; zeros without a
+    /// picture.
     pub image: String,
-    /// When it was shown, microseconds since 1970: comparable between processes of one machine.
+    /// Time of presentation, µs since 1970: comparable between processes of one machine.
     pub shown_unix_us: u64,
 }
 
-/// Frames that wait to be written; a facet draws no further one meanwhile.
+/// Maximum number of frames that wait to be written; meanwhile the facet draws no further frame.
 const MAX_WAITING: usize = 2;
 
-/// A facet's folder. It is written by a thread of its own: a large picture takes longer to pack than a server waits for a sign of life.
+/// Writer of a facet's folder. It has its own thread, because compressing a large picture can take
+/// longer than the server's drop timeout.
 pub struct FrameLog {
     frames: Option<SyncSender<(FrameLine, Option<Image>)>>,
     writer: Option<JoinHandle<Result<(), Failure>>>,
@@ -38,7 +40,8 @@ pub struct FrameLog {
 }
 
 impl FrameLog {
-    /// Makes the folder, and goes on behind the lines that a facet before it has written in this run. Pictures of runs before are removed.
+    /// Creates the folder and continues after the lines that this run has written before. Pictures
+    /// of earlier runs are removed.
     pub fn open(folder: &Path, facet: &str, pictures: bool, anew: bool) -> Result<FrameLog, Failure> {
         let folder = facet_folder(folder, facet);
         let failed = |e: std::io::Error| Failure::input(format!("{}: cannot be written: {e}", folder.display()));
@@ -65,17 +68,17 @@ impl FrameLog {
         Ok(FrameLog { frames: Some(frames), writer: Some(writer), waiting, pictures })
     }
 
-    /// Whether another frame may be drawn.
+    /// Returns whether another frame may be drawn.
     pub fn has_room(&self) -> bool {
         self.waiting.load(Ordering::Acquire) < MAX_WAITING
     }
 
-    /// What went wrong so far: a disk that is full, say.
+    /// Returns an error of the writer so far, such as a full disk.
     pub fn check(&mut self) -> Result<(), Failure> {
         if self.writer.as_ref().is_some_and(JoinHandle::is_finished) { self.finish() } else { Ok(()) }
     }
 
-    /// A frame that is on the screen.
+    /// Logs a presented frame.
     pub fn shown(
         &mut self,
         frame: u64,
@@ -93,16 +96,16 @@ impl FrameLog {
         if sent { Ok(()) } else { self.finish() }
     }
 
-    /// Waits until all is written; what went wrong.
+    /// Waits until everything is written and returns an error of the writer.
     pub fn finish(&mut self) -> Result<(), Failure> {
         self.frames = None;
         self.writer.take().map_or(Ok(()), |writer| {
-            writer.join().unwrap_or_else(|_| Err(Failure::run("the frames", "their writer has gone")))
+            writer.join().unwrap_or_else(|_| Err(Failure::run("the frames", "their writer has ended")))
         })
     }
 }
 
-/// Each picture, and behind it its line, whole.
+/// Writes each picture, and then its line.
 fn write_all(
     folder: &Path,
     mut file: File,
@@ -123,7 +126,7 @@ fn write_all(
     Ok(())
 }
 
-/// In hexadecimal.
+/// Returns the bytes in hexadecimal.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }

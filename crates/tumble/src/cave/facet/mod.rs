@@ -1,4 +1,5 @@
-//! `tumble facet`: what the server says is drawn, shown when the server says, and acknowledged by what was really drawn.
+//! `tumble facet`: draws the server's frames, shows each when the server says so, and acknowledges
+//! the hash of what it drew.
 
 mod burn_in;
 mod control;
@@ -26,7 +27,7 @@ use tumble::net::sync::{transport::FacetNumber, udp::Entropy};
 use tumble::scene::cave::{Mode, Output};
 use window::WindowSetup;
 
-/// Runs a facet until the run is over.
+/// Runs a facet until the end of the run.
 pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     let signals = Signals::watch()?;
     let parent_gone = options.parent_watch.then(watch_parent).transpose()?;
@@ -72,13 +73,13 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
         Some(window_setup) => window_setup.show(&mut runner, draw.burn_in),
         None => runner.run_offscreen(),
     };
-    // whatever happened, the server need not find out by silence
+    // in any case, the server need not wait for the timeout
     let _ = runner.facet.leave();
-    // what could not be written is why the rest went wrong
+    // a write error is the cause of other errors
     runner.log.as_mut().map_or(Ok(()), FrameLog::finish).and(outcome)
 }
 
-/// Whether there is none to open a window on; one that is named and does not answer is said.
+/// Returns whether there is no desktop for a window. Reports one that is named and does not answer.
 fn lacks_desktop(name: &str) -> bool {
     match desktop() {
         Desktop::Available => return false,
@@ -90,7 +91,7 @@ fn lacks_desktop(name: &str) -> bool {
     true
 }
 
-/// What the session is told, as the cave file says.
+/// Returns the session's options from the cave file.
 fn session_options(setup: &RunSetup, name: &str) -> Result<SessionOptions, Failure> {
     let seed = Entropy::system().map_err(|e| Failure::run("the facet", e))?.next_u64();
     let sync = &setup.cave.sync;
@@ -102,7 +103,8 @@ fn session_options(setup: &RunSetup, name: &str) -> Result<SessionOptions, Failu
     })
 }
 
-/// Where the server is: as the command line says, or as the run that goes on here says, which is waited for.
+/// Returns the server's address: from the command line, or from the run in progress on this
+/// machine, for which it waits.
 fn address(options: &FacetOptions, setup: &RunSetup, control: &FacetControl) -> Result<ServerAddress, Failure> {
     if let Some(server) = options.server {
         return Ok(ServerAddress::Udp(server));
@@ -121,11 +123,11 @@ fn address(options: &FacetOptions, setup: &RunSetup, control: &FacetControl) -> 
         }
         if Instant::now() > until {
             let far = setup.cave.nodes.iter().any(|n| !n.is_local());
-            let hint = if far { "; on another machine say where it is with --server ADDR:PORT" } else { "" };
+            let hint = if far { "; for a run on another machine use --server ADDR:PORT" } else { "" };
             return Err(Failure::run(
                 &control.title(),
                 format!(
-                    "no run goes on in {} on this machine, {:.0} s long{hint}",
+                    "no run was in progress in {} on this machine for {:.0} s{hint}",
                     setup.cave.file, options.connect_timeout
                 ),
             ));

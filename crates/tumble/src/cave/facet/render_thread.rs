@@ -1,4 +1,5 @@
-//! What draws a facet into memory: a thread of its own, so that the session answers the server however long a picture takes.
+//! Draws a facet into memory in a thread of its own, so that the session answers the server however
+//! long a picture takes.
 
 use super::burn_in::burn_in;
 use crate::cave::run_setup::{PREVIEW, RunSetup, apply_viewer};
@@ -10,19 +11,19 @@ use tumble::net::sync::Viewer;
 use tumble::render::{CaveView, DebugDraw, DrawList, Drawing, Image, Quality, RenderError, Renderer};
 use tumble::scene::cave::Facet;
 
-/// Side of the shadow maps where it is the usual one elsewhere, as for pictures of caves.
+/// Size of shadow maps in caves instead of the default, texels; as for all pictures of caves.
 const CAVE_SHADOW_MAP_PX: u32 = 4096;
-/// Largest picture of an unfolded cave, pixels.
+/// Maximum size of the picture of an unfolded cave, pixels.
 pub const PREVIEW_PX: [u32; 2] = [1280, 960];
 
-/// A picture that is wanted.
+/// Request for a picture.
 struct RenderRequest {
     list: DrawList,
     viewer: Viewer,
     burn_in: Option<u64>,
 }
 
-/// Makes draw lists here, and pictures on its thread.
+/// Makes draw lists in the calling thread and pictures in its own.
 pub struct RenderThread {
     drawing: Drawing,
     quality: Option<Quality>,
@@ -31,7 +32,7 @@ pub struct RenderThread {
 }
 
 impl RenderThread {
-    /// For a facet; all of them unfolded where there is none.
+    /// Starts the thread for a facet, or for all facets unfolded if there is none.
     pub fn new(setup: &RunSetup, facet: Option<&Facet>, quality: Option<Quality>) -> Result<RenderThread, Failure> {
         let (view, facet) = (setup.view()?, facet.cloned());
         let (requests, incoming) = sync_channel::<RenderRequest>(1);
@@ -53,31 +54,31 @@ impl RenderThread {
             .map_err(|e| Failure::run("drawing", e))?;
         started.recv().map_err(|e| Failure::run("drawing", e))?.map_err(|e| Failure::run("drawing", e))?;
         let mut render_thread = RenderThread { drawing: Drawing::new(&setup.scene), quality, requests, pictures };
-        // the first picture takes seconds where pipelines are compiled; nobody waits for it yet
+        // the first picture takes seconds to compile pipelines, and nothing waits for it yet
         render_thread.begin(&setup.world, &setup.viewer()?, None)?;
         while render_thread.finished(Duration::from_secs(1))?.is_none() {}
         Ok(render_thread)
     }
 
-    /// Begins a picture of the world; with the frame's number in it, if it is to be stamped.
+    /// Starts a picture of the world, with the frame number in it if `burn_in` is given.
     pub fn begin(&mut self, world: &World, viewer: &Viewer, burn_in: Option<u64>) -> Result<(), Failure> {
         let list = draw_list(&mut self.drawing, world, self.quality.as_ref())?;
         self.requests
             .send(RenderRequest { list, viewer: viewer.clone(), burn_in })
-            .map_err(|_| Failure::run("drawing", "the painter has gone"))
+            .map_err(|_| Failure::run("drawing", "the render thread has ended"))
     }
 
-    /// The picture, if it is finished within `timeout`.
+    /// Returns the picture if it is finished within `timeout`.
     pub fn finished(&mut self, timeout: Duration) -> Result<Option<Image>, Failure> {
         match self.pictures.recv_timeout(timeout) {
             Ok(image) => image.map(Some).map_err(|e| Failure::run("drawing", e)),
             Err(RecvTimeoutError::Timeout) => Ok(None),
-            Err(RecvTimeoutError::Disconnected) => Err(Failure::run("drawing", "the painter has gone")),
+            Err(RecvTimeoutError::Disconnected) => Err(Failure::run("drawing", "the render thread has ended")),
         }
     }
 }
 
-/// As all pictures of caves are drawn.
+/// Makes the draw list of a picture of a cave.
 pub fn draw_list(drawing: &mut Drawing, world: &World, quality: Option<&Quality>) -> Result<DrawList, Failure> {
     let mut list = drawing.list(world, &DebugDraw::default()).map_err(|e| Failure::run("drawing", e))?;
     if let Some(quality) = quality {
@@ -111,14 +112,14 @@ fn render_all(
     }
 }
 
-/// First 16 bytes of the BLAKE3 of a picture's pixels.
+/// Returns the first 16 bytes of the BLAKE3 hash of a picture's pixels.
 pub fn image_hash(image: &Image) -> [u8; 16] {
     let mut hash = [0; 16];
     hash.copy_from_slice(&blake3::hash(&image.rgba).as_bytes()[..16]);
     hash
 }
 
-/// The seat's name, as errors and folders have it.
+/// Returns the name of the facet's slot.
 pub fn slot_name(facet: Option<&Facet>) -> &str {
     facet.map_or(PREVIEW, |f| &f.name)
 }

@@ -12,7 +12,7 @@ use tumble::render::Image;
 /// Pause while the frame log has no room for another frame.
 const LOG_FULL_PAUSE: Duration = Duration::from_millis(5);
 
-/// A facet that is connected, or looks for its server.
+/// A facet that is connected or looks for its server.
 pub struct FacetRunner {
     pub facet: Facet<FacetEndpoint>,
     render_thread: Option<RenderThread>,
@@ -20,9 +20,9 @@ pub struct FacetRunner {
     burn_in: bool,
     control: FacetControl,
     server_wait: ServerWait,
-    /// The frame that is being drawn, and its simulated time.
+    /// The frame being drawn, and its simulated time.
     drawing: Option<(u64, f64)>,
-    /// The frame that is drawn, and not yet shown.
+    /// The drawn frame that is not shown yet.
     picture: Option<DrawnFrame>,
 }
 
@@ -33,13 +33,13 @@ struct DrawnFrame {
     image: Option<Image>,
 }
 
-/// The link's trouble.
+/// Reports an error of the link.
 pub fn failed(error: SessionError) -> Failure {
     Failure::run("the connection to the server", error)
 }
 
 impl FacetRunner {
-    /// A facet that has drawn nothing yet.
+    /// Creates a facet that has drawn nothing.
     pub fn new(
         facet: Facet<FacetEndpoint>,
         render_thread: Option<RenderThread>,
@@ -51,11 +51,11 @@ impl FacetRunner {
         FacetRunner { facet, render_thread, log, burn_in, control, server_wait, drawing: None, picture: None }
     }
 
-    /// What to do next, after waiting for it for at most `timeout`; `None` when the facet is to end.
+    /// Waits at most `timeout` for the next task. Returns `None` when the facet must end.
     pub fn next(&mut self, timeout: Duration) -> Result<Option<Task>, Failure> {
         self.log.as_mut().map_or(Ok(()), FrameLog::check)?;
         if self.control.is_orphaned() {
-            return Err(Failure::run(&self.control.title(), "its launcher is gone"));
+            return Err(Failure::run(&self.control.title(), "its launcher has ended"));
         }
         if self.control.signals.stop_requested() {
             return Ok(None);
@@ -71,12 +71,12 @@ impl FacetRunner {
         }
     }
 
-    /// Whether what was shown is written, so far that there is room for more.
+    /// Returns whether the frame log has room for another frame.
     pub fn has_room(&self) -> bool {
         self.log.as_ref().is_none_or(FrameLog::has_room)
     }
 
-    /// For how many whole seconds there has been no server.
+    /// Returns the number of whole seconds without a server.
     pub fn server_wait_s(&self) -> u64 {
         self.server_wait.elapsed().as_secs()
     }
@@ -85,10 +85,10 @@ impl FacetRunner {
     pub fn run_offscreen(&mut self) -> Result<(), Failure> {
         while let Some(task) = self.next(if self.drawing.is_some() { Duration::ZERO } else { POLL_INTERVAL })? {
             match task {
-                // what was begun is finished first, also where nobody waits for it any more
+                // a started picture is finished first, even if no frame waits for it any more
                 Task::Wait(_) | Task::Draw if self.drawing.is_some() => self.poll_picture()?,
                 Task::Wait(_) | Task::Ended(_) => {}
-                // packing pictures is behind: the server hears that this facet lives, and waits
+                // the frame log is behind: the session stays alive and the server waits
                 Task::Draw if !self.has_room() => std::thread::sleep(LOG_FULL_PAUSE),
                 Task::Draw => self.draw()?,
                 Task::Present(frame) => self.present(frame)?,
@@ -120,7 +120,7 @@ impl FacetRunner {
         }
     }
 
-    /// A frame is drawn.
+    /// Reports a drawn frame.
     pub fn drawn(&mut self, frame: u64, time_s: f64, image: Option<Image>) -> Result<(), Failure> {
         self.drawing = None;
         let hash = image.as_ref().map_or([0; 16], image_hash);
@@ -128,7 +128,7 @@ impl FacetRunner {
         self.facet.drawn(hash).map_err(failed)
     }
 
-    /// A frame is shown.
+    /// Reports and logs a shown frame.
     pub fn present(&mut self, frame: u64) -> Result<(), Failure> {
         self.facet.presented().map_err(failed)?;
         let shown = self.facet.session().shown();

@@ -1,6 +1,7 @@
-//! A facet in a window of its own, where its cave says; keys and mouse go to the server as a user's input.
+//! A facet in a window of its own. Keys and mouse are sent to the server as a user's input.
 //!
-//! W A S D, Q E and the arrows move the cave, R and F stretch out the left and the right hand (`--user-colliders`), a body is pulled by the left button, escape ends the facet.
+//! W A S D, Q E and the arrow keys move the cave. R and F stretch out the left and the right hand
+//! (`--user-colliders`). The left mouse button pulls a body. Escape ends the facet.
 
 use super::burn_in;
 use super::render_thread::{PREVIEW_PX, draw_list, slot_name};
@@ -17,12 +18,12 @@ use tumble::render::winit::keyboard::{KeyCode, PhysicalKey};
 use tumble::render::{DrawList, Drawing, Next, Quality, Screen, WindowApp, WindowOptions, caption, run_window};
 use tumble::scene::cave::{Facet, Output};
 
-/// Waiting for a message, between two looks at what the user does.
+/// Wait for a message between two polls of the window's input.
 const POLL_INTERVAL: Duration = Duration::from_millis(8);
-/// Input that does not change is sent again after this time, since it goes stale.
+/// Interval at which unchanged input is sent again, because the server expires it.
 const INPUT_RESEND_INTERVAL: Duration = Duration::from_millis(250);
 
-/// What a facet shows itself by.
+/// Everything that a facet needs to open its window.
 pub struct WindowSetup {
     view_mode: ViewMode,
     drawing: Drawing,
@@ -32,7 +33,7 @@ pub struct WindowSetup {
 }
 
 impl WindowSetup {
-    /// Of a facet; of all of them where there is none.
+    /// Prepares the window of a facet, or of all facets if there is none.
     pub fn new(setup: &RunSetup, facet: Option<&Facet>, quality: Option<Quality>) -> Result<WindowSetup, Failure> {
         let view = Box::new(setup.view()?);
         let title = format!("tumble: {} on {}", setup.scene.file, slot_name(facet));
@@ -51,7 +52,7 @@ impl WindowSetup {
         Ok(WindowSetup { view_mode, drawing: Drawing::new(&setup.scene), quality, options, user })
     }
 
-    /// Opens the window and runs the facet in it until the run is over or the window is closed.
+    /// Opens the window and runs the facet until the run ends or the window is closed.
     pub fn show(self, runner: &mut FacetRunner, burn_in: bool) -> Result<(), Failure> {
         let options = self.options.clone();
         let mut window = Window {
@@ -75,16 +76,16 @@ struct Window<'a> {
     window_setup: WindowSetup,
     runner: &'a mut FacetRunner,
     burn_in: bool,
-    /// Of the frame that is shown.
+    /// Draw list of the shown frame.
     list: DrawList,
-    /// Held, by USB HID usage.
+    /// Held keys by USB HID usage.
     keys: Vec<u16>,
     pulling: bool,
     at_px: [f64; 2],
     /// The newest input, and when it was sent.
     sent: Option<(Input, Instant)>,
     sequence: u64,
-    /// The second that is said to have passed without a server.
+    /// Number of seconds without a server in the last warning.
     warned: Option<u64>,
     ended: bool,
 }
@@ -100,7 +101,7 @@ impl Window<'_> {
         };
         apply_viewer(view, viewer);
         self.window_setup.view_mode.draw(screen, &self.list)?;
-        // drawn is what the device has finished; read back only where somebody wants it
+        // a frame is drawn when the device has finished; it is read back only for the log
         let image = match self.runner.log.is_some() {
             true => Some(screen.renderer().read()?),
             false => screen.renderer().wait().map(|()| None)?,
@@ -111,12 +112,12 @@ impl Window<'_> {
     fn present(&mut self, screen: &mut Screen, frame: u64) -> Result<(), Failure> {
         screen.set_caption(self.burn_in.then(|| burn_in::strip(screen.size_px()[0], frame)));
         self.warned = None;
-        // a window that is hidden shows nothing, and holds nobody up
+        // a hidden window shows nothing and must not delay the others
         screen.show()?;
         self.runner.present(frame)
     }
 
-    /// The picture is old, and says so.
+    /// Shows a warning that the picture is old.
     fn warn(&mut self, screen: &mut Screen) -> Result<(), Failure> {
         let passed = self.runner.server_wait_s();
         if passed >= 1 && self.warned != Some(passed) {
@@ -127,7 +128,7 @@ impl Window<'_> {
         Ok(())
     }
 
-    /// The user's input, where it is not what the server knows already.
+    /// Sends the user's input if the server does not have it yet.
     fn send(&mut self, screen: &Screen) -> Result<(), Failure> {
         let wand = if self.pulling { self.wand(screen) } else { None };
         let (keys, buttons) = (self.keys.clone(), u32::from(wand.is_some()));
@@ -157,7 +158,8 @@ impl Window<'_> {
         Ok(())
     }
 
-    /// The line of sight below the pointer, in the cave's frame: it starts at the eye and goes along its y axis.
+    /// Returns the line of sight through the pointer in the cave's frame: from the eye along its y
+    /// axis.
     fn wand(&self, screen: &Screen) -> Option<Pose> {
         let ray = self.window_setup.view_mode.ray(&self.list, screen.size_px(), self.at_px)?;
         let viewer = self.runner.facet.viewer();
@@ -178,7 +180,8 @@ impl WindowApp for Window<'_> {
     fn opened(&mut self, screen: &mut Screen) -> Result<(), Failure> {
         let usual = if screen.is_software() { Quality::fast() } else { Quality::default() };
         self.window_setup.quality.get_or_insert(usual);
-        // the first picture takes seconds where pipelines are compiled; the server does not know of us yet
+        // the first picture takes seconds to compile pipelines; the server does not know this facet
+        // yet
         self.list =
             draw_list(&mut self.window_setup.drawing, self.runner.facet.world(), self.window_setup.quality.as_ref())?;
         self.window_setup.view_mode.draw(screen, &self.list)?;
@@ -223,7 +226,7 @@ impl WindowApp for Window<'_> {
     }
 }
 
-/// The USB HID usage (page 7) of the keys that move a user.
+/// Returns the USB HID usage (page 7) of a key that moves a user.
 fn usage(code: KeyCode) -> Option<u16> {
     Some(match code {
         KeyCode::KeyA => 0x04,

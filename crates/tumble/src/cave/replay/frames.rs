@@ -1,4 +1,5 @@
-//! A recording in place of the simulation, and what facets answer beside what they answered then.
+//! Replay of recorded frames instead of a simulation, with a comparison of the pictures then and
+//! now.
 
 use crate::failure::Failure;
 use std::collections::BTreeMap;
@@ -6,33 +7,33 @@ use std::path::Path;
 use tumble::net::sync::transport::FacetNumber;
 use tumble::net::sync::{FrameRecord, RecordedFrame, ServerEvent, SessionReader};
 
-/// Answers that are remembered for who is slow.
+/// Maximum number of recorded pictures that wait for a comparison.
 const MAX_REMEMBERED: usize = 1 << 16;
 
-/// A recording that is shown again.
+/// A recording that is being replayed.
 pub struct Replay {
     reader: SessionReader,
-    /// The first two frames, so far as they were not asked for.
+    /// The first two frames, if not returned yet.
     ahead: std::collections::VecDeque<RecordedFrame>,
     frame_length: Option<f64>,
-    /// What facets showed of a frame then, by frame and facet.
+    /// Recorded pictures by frame and facet.
     images: BTreeMap<(u64, FacetNumber), [u8; 16]>,
     pub counts: Counts,
 }
 
-/// Pictures, compared.
+/// Result of the comparison of pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Counts {
-    /// Pictures that are the same bit by bit.
+    /// Number of identical pictures.
     pub same: u64,
-    /// Pictures that are not.
+    /// Number of different pictures.
     pub different: u64,
-    /// Frames that were shown now and not then, or without a picture then or now.
+    /// Number of frames that were shown only now, or without a picture then or now.
     pub not_compared: u64,
 }
 
 impl Replay {
-    /// Opens it, if it is of this scene.
+    /// Opens a recording of this scene.
     pub fn open(path: &Path, scene: [u8; 32]) -> Result<Replay, Failure> {
         let wrong = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", path.display()));
         let mut reader = SessionReader::open(path).map_err(|e| wrong(&e))?;
@@ -48,7 +49,7 @@ impl Replay {
         Ok(Replay { reader, ahead, frame_length, images: BTreeMap::new(), counts: Counts::default() })
     }
 
-    /// The next frame, as it was sent.
+    /// Returns the next frame as it was sent.
     pub fn next(&mut self) -> Result<Option<FrameRecord>, Failure> {
         let next = match self.ahead.pop_front() {
             Some(frame) => Some(frame),
@@ -62,12 +63,12 @@ impl Replay {
         Ok(Some(frame.recorded))
     }
 
-    /// From the first frame to the second, s.
+    /// Returns the time from the first frame to the second, s.
     pub fn frame_length(&self) -> Option<f64> {
         self.frame_length
     }
 
-    /// What a facet answers now.
+    /// Compares the picture of a facet with the recorded one.
     pub fn take(&mut self, event: &ServerEvent) {
         let ServerEvent::Presented(facet, frame, done, _) = event else { return };
         match self.images.remove(&(*frame, *facet)) {

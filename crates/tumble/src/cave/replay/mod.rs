@@ -1,4 +1,4 @@
-//! Recorded runs: frames that are shown again, and inputs that are applied again.
+//! Recorded runs: replay of frames, and replay of the users' inputs in a new simulation.
 
 pub mod frames;
 pub mod replayed_input;

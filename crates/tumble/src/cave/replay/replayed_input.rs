@@ -1,17 +1,18 @@
-//! `--replay-input`: what users did in an earlier run, done again at the same frames.
+//! `--replay-input`: applies the users' inputs of an earlier run at the same frames.
 //!
-//! An input counts from the first step after it came, and a recording has it with the frame before that step. So the same scene, steps and options give the
-//! same states again, which the hashes of the recording show.
+//! An input takes effect with the first step after its arrival, and a recording has it with the
+//! frame before that step. So the same scene, steps and options give the same states again. The
+//! hashes of the recording prove it.
 
 use crate::failure::Failure;
 use std::path::{Path, PathBuf};
 use tumble::net::sync::transport::FacetNumber;
 use tumble::net::sync::{FrameRecord, Input, RecordedFrame, SessionReader};
 
-/// Times of frames that differ by more are other times, s.
+/// Tolerance for times of equal frames, s.
 const TIME_TOLERANCE_S: f64 = 1e-9;
 
-/// A recording whose inputs are played.
+/// A recording whose inputs are replayed.
 pub struct ReplayedInput {
     path: PathBuf,
     reader: SessionReader,
@@ -20,20 +21,20 @@ pub struct ReplayedInput {
     pub counts: Counts,
 }
 
-/// What came of it.
+/// Result of the replay.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Counts {
     pub inputs: u64,
-    /// Frames whose state is the recorded one, bit by bit.
+    /// Number of frames whose state is bitwise equal to the recorded one.
     pub same: u64,
-    /// Frames whose state is not.
+    /// Number of frames whose state differs.
     pub different: u64,
     /// The first of these.
     pub first_different: Option<u64>,
 }
 
 impl ReplayedInput {
-    /// Opens it, if it is of this scene and has every frame.
+    /// Opens a recording of this scene that has every frame.
     pub fn open(path: &Path, scene: [u8; 32]) -> Result<ReplayedInput, Failure> {
         let wrong = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", path.display()));
         let mut reader = SessionReader::open(path).map_err(|e| wrong(&e))?;
@@ -43,18 +44,19 @@ impl ReplayedInput {
         let numbers = [&now, &next].map(|frame| frame.as_ref().map(|f| f.recorded.frame));
         if numbers != [Some(0), Some(1)] {
             return Err(wrong(
-                &"its inputs are played only if it begins with frame 0 and has every frame (every_frames = 1)",
+                &"its inputs can be replayed only if it begins with frame 0 and has every frame (every_frames = 1)",
             ));
         }
         Ok(ReplayedInput { path: path.to_owned(), reader, now, next, counts: Counts::default() })
     }
 
-    /// Whether the recording is over.
+    /// Returns whether the recording has ended.
     pub fn is_over(&self) -> bool {
         self.now.is_none()
     }
 
-    /// A frame was simulated: compares it, and gives what users did from it to the next one.
+    /// Compares a simulated frame with the recorded one. Returns the inputs from it to the next
+    /// frame.
     pub fn after(&mut self, simulated: &FrameRecord) -> Result<Vec<(FacetNumber, Input)>, Failure> {
         let Some(then) = std::mem::replace(&mut self.now, self.next.take()) else { return Ok(Vec::new()) };
         self.next = self.reader.next_frame().map_err(|e| Failure::run("the recorded inputs", e))?;
@@ -76,18 +78,18 @@ impl ReplayedInput {
             self.counts.different += 1;
             if self.counts.first_different.is_none() {
                 self.counts.first_different = Some(ours.0);
-                eprintln!("frame {} comes out otherwise than recorded", ours.0);
+                eprintln!("frame {} differs from the recording", ours.0);
             }
         }
         self.counts.inputs += then.inputs.len() as u64;
         Ok(then.inputs)
     }
 
-    /// Whether all frames came out as recorded.
+    /// Returns an error if any frame differs from the recording.
     pub fn check(&self) -> Result<(), Failure> {
         let Counts { same, different, first_different: Some(first), .. } = self.counts else { return Ok(()) };
         let why = format!(
-            "{different} of {} frames came out otherwise than recorded, the first is frame {first}; scene, environment, cave, --user-colliders, --stepper and --solver must be those of the recording",
+            "{different} of {} frames differ from the recording, the first is frame {first}; scene, environment, cave, --user-colliders, --stepper and --solver must be those of the recording",
             same + different
         );
         Err(Failure::run(&format!("--replay-input {}", self.path.display()), why))

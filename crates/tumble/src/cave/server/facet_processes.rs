@@ -1,5 +1,5 @@
-//! The facets of a run as processes: those of this machine, and those of nodes with a launch command, are started, watched and ended; of the others it is told
-//! how to start them.
+//! The processes of a run's facets. Those of this machine, and of nodes with a launch command, are
+//! started, monitored and ended. For all others the command line is printed.
 
 use crate::cave::address::{ServerAddress, address_towards};
 use crate::cave::args::{CaveOptions, ServeOptions, TransportKind};
@@ -15,18 +15,19 @@ use tumble::net::sync::FacetSlot;
 use tumble::net::sync::transport::FacetNumber;
 use tumble::scene::cave::{Cave, Node};
 
-/// How long facets may take to end by themselves after they were told: to pack the last pictures. Together with the next well below the time that signals give.
+/// Time for facets to end by themselves after END, to write their last pictures. Together with the
+/// next it is well below the shutdown timeout of signals.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(3);
-/// The same after their pipe was closed, and for those that were still starting.
+/// The same after their pipe was closed, and for facets that were still starting.
 const FINAL_EXIT_TIMEOUT: Duration = Duration::from_secs(1);
-/// Restarts of a facet within a minute, at most.
+/// Maximum number of restarts of a facet within the window.
 const MAX_RESTARTS: usize = 5;
 const RESTART_WINDOW: Duration = Duration::from_secs(60);
-/// A facet that ends sooner than this after its last restart is not started again at once, but after a pause.
+/// A facet that ends sooner after its restart is restarted with a delay.
 const MIN_UPTIME: Duration = Duration::from_secs(5);
 const RESTART_DELAY: Duration = Duration::from_secs(1);
 
-/// The facets that are started here.
+/// The facets started by this process.
 pub struct FacetProcesses {
     processes: Vec<FacetProcess>,
     restart: bool,
@@ -41,35 +42,36 @@ struct FacetProcess {
     command: Vec<OsString>,
     child: Option<Child>,
     ended: Option<Instant>,
-    /// Ended for good: closed by the user, or too often.
+    /// Ended for good: closed by the user, or failed too often.
     over: bool,
-    /// It ended last by a failure.
+    /// Whether its last end was a failure.
     failed: bool,
-    /// How, where it ended last by the exit code of a failure of its own; what shells and ssh tell of one that was killed is none.
+    /// Description of its last end if that was an exit code of its own failure. Codes by which
+    /// shells and ssh report a killed process do not count.
     fault: Option<String>,
     restarts: VecDeque<Instant>,
 }
 
-/// What a look at the crew brings.
+/// Result of polling the processes.
 pub struct ProcessReport {
-    /// How it stands.
+    /// Status of all processes.
     pub processes: ProcessStatus,
-    /// Whose processes have ended since the last look.
+    /// Facets whose processes have ended since the last poll.
     pub ended: Vec<FacetNumber>,
 }
 
-/// How the crew stands.
+/// Status of all processes together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProcessStatus {
-    /// Somebody is there, or nobody had to be.
+    /// At least one is running, or none was started.
     Running,
-    /// All have ended as their users wished.
+    /// All have ended on request of their users.
     AllLeft,
     /// All have ended, at least one by a failure.
     AllFailed,
 }
 
-/// The seats of a run: all facets, or the preview alone.
+/// Returns the facet slots of a run: all facets, or the preview alone.
 pub fn slots(cave: &Cave, preview: bool) -> Vec<FacetSlot> {
     if preview {
         return vec![FacetSlot { name: PREVIEW.into(), critical: true }];
@@ -78,7 +80,8 @@ pub fn slots(cave: &Cave, preview: bool) -> Vec<FacetSlot> {
 }
 
 impl FacetProcesses {
-    /// Starts the facets of this machine, if there is a launcher, and says how the others are started.
+    /// Starts the facets of this machine if there is a launcher, and prints how to start the
+    /// others.
     pub fn start(
         serve: &ServeOptions,
         cave: &Cave,
@@ -98,7 +101,7 @@ impl FacetProcesses {
             match (launcher, remote) {
                 (Some(_), Some(node)) if server_address.is_none() && !node.launch.is_empty() => {
                     let why = format!(
-                        "{} cannot be reached from here, so the address at which its facets would find this machine is not known; name it with --listen ADDR:PORT",
+                        "{} is unreachable, so this machine's address as its facets see it is unknown; give it with --listen ADDR:PORT",
                         node.address
                     );
                     return Err(Failure::input(format!("node {}: {why}", node.name)));
@@ -154,7 +157,8 @@ impl FacetProcesses {
         Ok(processes)
     }
 
-    /// Looks whether somebody ended, and restarts if asked to. `joining`: before the first frame, where an end is a failure.
+    /// Polls the processes and restarts them if requested. While `joining`, before the first frame,
+    /// an end is an error.
     pub fn watch(&mut self, joining: bool) -> Result<ProcessReport, Failure> {
         let mut ended = Vec::new();
         for k in 0..self.processes.len() {
@@ -167,7 +171,7 @@ impl FacetProcesses {
                 if joining {
                     return Err(Failure::run(
                         &title,
-                        format!("ended before the start ({}); what it said stands above", describe_exit(status)),
+                        format!("ended before the start ({}); its output is above", describe_exit(status)),
                     ));
                 }
                 self.report(&if status.success() {
@@ -194,7 +198,7 @@ impl FacetProcesses {
                     continue;
                 }
                 process.restarts.push_back(Instant::now());
-                // the others go on without it, and it is tried again
+                // the other facets continue, and this one is tried again
                 if let Err(failure) = self.spawn(k) {
                     eprint!("{}", failure.report());
                     (self.processes[k].ended, self.processes[k].failed) = (Some(Instant::now()), true);
@@ -210,21 +214,23 @@ impl FacetProcesses {
         Ok(ProcessReport { processes, ended })
     }
 
-    /// After the facets were told that the run is over: waits for them, and ends who does not. `started`: they were there, and can have heard it.
+    /// Waits for the facets after END, and kills those that do not end. `started`: they had joined
+    /// and can have received END.
     ///
-    /// Errors: a facet has ended by a failure of its own, and was not started again.
+    /// # Errors
+    /// A facet ended by a failure of its own and was not restarted.
     pub fn end(&mut self, started: bool) -> Result<(), Failure> {
         self.wait(if started { EXIT_TIMEOUT } else { FINAL_EXIT_TIMEOUT / 2 });
         let faults: Vec<String> =
             self.processes.iter().filter_map(|m| Some(format!("{} ({})", m.name, m.fault.as_ref()?))).collect();
-        // who has not heard it finds its pipe closed
+        // a facet that missed END finds its pipe closed
         self.processes.iter_mut().filter_map(|m| m.child.as_mut()).for_each(|child| drop(child.stdin.take()));
         self.wait(FINAL_EXIT_TIMEOUT);
-        // all before any is waited for: with a driver at work each takes its time to be gone
+        // all are killed before any is waited for: graphics drivers take time to release a process
         for process in &mut self.processes {
             let Some(child) = &mut process.child else { continue };
             if let Ok(None) = child.try_wait() {
-                eprintln!("facet {}: does not end and is killed", process.name);
+                eprintln!("facet {}: does not end and was killed", process.name);
             }
             let _ = child.kill();
         }
@@ -236,12 +242,12 @@ impl FacetProcesses {
             true => Ok(()),
             false => Err(Failure::run(
                 "the facets",
-                format!("{} ended by a failure; what it said stands above", faults.join(", ")),
+                format!("{} ended by a failure; its output is above", faults.join(", ")),
             )),
         }
     }
 
-    /// Until all have ended, at most so long.
+    /// Waits at most `max` until all have ended.
     fn wait(&mut self, most: Duration) {
         let until = Instant::now() + most;
         while Instant::now() < until {
@@ -257,7 +263,7 @@ impl FacetProcesses {
         let process = &mut self.processes[k];
         // never empty: the program is this one, or the first word of a launch command
         let mut command = Command::new(&process.command[0]);
-        // a group of its own: Ctrl-C is for the launcher, who ends the run in order
+        // a group of its own, because Ctrl-C is for the launcher, which ends the run in order
         command.args(&process.command[1..]).stdin(Stdio::piped()).stdout(Stdio::null()).process_group(0);
         let child = command.spawn().map_err(|e| Failure::run(&format!("starting facet {}", process.name), e))?;
         self.signals.started(child.id());
@@ -297,7 +303,7 @@ impl FacetProcess {
         }
     }
 
-    /// How it ended, if it did since the last look.
+    /// Returns how the process ended, if it did since the last poll.
     fn poll_exit(&mut self, signals: &Signals) -> Option<ExitStatus> {
         let child = self.child.as_mut()?;
         let status = child.try_wait().ok().flatten()?;
@@ -309,7 +315,7 @@ impl FacetProcess {
     }
 }
 
-/// The server's address, as a node reaches it; `None` where there is no way to the node.
+/// Returns the server's address as a node reaches it; `None` if there is no route to the node.
 fn address_for(node: &Node, address: &ServerAddress) -> Option<ServerAddress> {
     match *address {
         ServerAddress::Udp(at) if at.ip().is_unspecified() => {
@@ -319,7 +325,8 @@ fn address_for(node: &Node, address: &ServerAddress) -> Option<ServerAddress> {
     }
 }
 
-/// The launch command of a node, with everything filled in. The pipe that it holds as stdin ends with the launcher, and a facet behind it ends with the pipe.
+/// Returns the launch command of a node with all placeholders filled in. Its stdin is a pipe that
+/// ends with the launcher, and the facet ends with the pipe.
 fn launch(node: &Node, facet: &str, arguments: &[String]) -> Vec<String> {
     let line = arguments.iter().map(|a| shell_quoted(a)).collect::<Vec<_>>().join(" ");
     let fill = |word: &String| match word.as_str() {
@@ -334,7 +341,7 @@ fn launch(node: &Node, facet: &str, arguments: &[String]) -> Vec<String> {
     node.launch.iter().flat_map(fill).collect()
 }
 
-/// What a facet is started with.
+/// Returns the arguments of a facet's process.
 fn parent_watch(launcher: &CaveOptions, name: &str, address: &ServerAddress) -> Vec<String> {
     let mut args = vec!["facet".to_owned()];
     args.extend(scene_args(&launcher.serve));
@@ -356,7 +363,7 @@ fn parent_watch(launcher: &CaveOptions, name: &str, address: &ServerAddress) -> 
     args.extend(draw.quality.iter().flat_map(|q| ["--quality".to_owned(), q.to_string()]));
     let switches = [("--burn-in", draw.burn_in), ("--offscreen", draw.offscreen), ("--no-pictures", draw.no_pictures)];
     args.extend(switches.iter().filter(|(_, on)| *on).map(|(name, _)| (*name).to_owned()));
-    // the launcher gives up before its facets do
+    // the launcher times out before its facets
     let wait = launcher.serve.connect_timeout.map_or("600".to_owned(), |s| (s + 10.0).to_string());
     args.extend(["--connect-timeout".into(), wait, "--parent-watch".into()]);
     args
@@ -371,7 +378,7 @@ fn scene_args(serve: &ServeOptions) -> Vec<String> {
     args
 }
 
-/// An address that this machine listens on, as it reaches itself.
+/// Returns an address on which this machine listens, as this machine reaches it.
 fn local(at: std::net::SocketAddr) -> std::net::SocketAddr {
     match at.ip().is_unspecified() {
         true if at.is_ipv4() => (std::net::Ipv4Addr::LOCALHOST, at.port()).into(),
@@ -380,7 +387,7 @@ fn local(at: std::net::SocketAddr) -> std::net::SocketAddr {
     }
 }
 
-/// As a shell takes it.
+/// Quotes a word for a shell.
 fn shell_quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "_-./=:".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
@@ -399,7 +406,7 @@ fn describe_exit(status: ExitStatus) -> String {
     }
 }
 
-/// What carries the frames: as the command line says, else the cave.
+/// Returns the transport: from the command line, else from the cave.
 pub fn transport_kind(serve: &ServeOptions, cave: &Cave) -> TransportKind {
     let of_cave = if cave.sync.transport == tumble::scene::cave::Transport::Udp {
         TransportKind::Udp

@@ -1,7 +1,7 @@
-//! Times of a run that may go on for days, in memory that does not grow.
+//! Histogram of durations in constant memory, for runs of any length.
 //!
 //! ```text
-//! bucket of x = ⌊ ln(x / 1 µs) / ln 1.02 ⌋        so a share of all times is known to 2 %
+//! bucket of x = ⌊ ln(x / 1 µs) / ln 1.02 ⌋        so a quantile has an error of at most 2 %
 //! ```
 
 use serde::Serialize;
@@ -11,22 +11,22 @@ const RATIO: f64 = 1.02;
 /// Up to about 2 hours.
 const BUCKETS: usize = 1150;
 
-/// How times were spread.
+/// Distribution of durations.
 pub struct Histogram {
     counts: Vec<u64>,
     count: u64,
-    /// The longest, s, and which frame at what simulated time.
+    /// The longest duration (s), its frame and simulated time.
     longest: (f64, u64, f64),
 }
 
-/// The same in a few numbers.
+/// Quantiles of a distribution.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Quantiles {
     pub count: u64,
     pub p50_ms: f64,
     pub p99_ms: f64,
     pub max_ms: f64,
-    /// The frame that took longest, and its simulated time.
+    /// Frame with the longest duration, and its simulated time.
     pub max_at_frame: u64,
     pub max_at_s: f64,
 }
@@ -38,7 +38,7 @@ impl Default for Histogram {
 }
 
 impl Histogram {
-    /// A frame at a simulated time took so many seconds.
+    /// Adds the duration of a frame, s.
     pub fn add(&mut self, duration: f64, frame: u64, time_s: f64) {
         let bucket = ((duration.max(MIN_S) / MIN_S).ln() / RATIO.ln()) as usize;
         self.counts[bucket.min(BUCKETS - 1)] += 1;
@@ -48,7 +48,7 @@ impl Histogram {
         }
     }
 
-    /// What this share of the times stayed within, s: the upper end of a bucket, at most the longest.
+    /// Returns the quantile for this fraction, s: the upper end of its bucket, at most the maximum.
     pub fn quantile(&self, share: f64) -> f64 {
         let wanted = (share * self.count as f64).ceil() as u64;
         let mut sum = 0;
@@ -59,12 +59,12 @@ impl Histogram {
         bucket.map_or(0.0, |k| MIN_S * RATIO.powi(k as i32 + 1)).min(self.longest.0)
     }
 
-    /// All of it, if there is anything.
+    /// Returns the quantiles if there is any value.
     pub fn non_empty(&self) -> Option<Quantiles> {
         (self.count > 0).then(|| self.quantiles())
     }
 
-    /// All of it.
+    /// Returns the quantiles.
     pub fn quantiles(&self) -> Quantiles {
         let (longest, max_at_frame, max_at_s) = self.longest;
         Quantiles {

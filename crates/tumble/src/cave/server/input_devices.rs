@@ -1,4 +1,5 @@
-//! Where users' input comes from beside the facets' windows: a tracker, or a recording in place of everything live.
+//! Sources of the users' input besides the facets' windows: a tracker, or a recording that replaces
+//! all live input.
 
 use crate::cave::args::ServeOptions;
 use crate::cave::replay::replayed_input::{self, ReplayedInput};
@@ -9,17 +10,17 @@ use tumble::net::sync::transport::FacetNumber;
 use tumble::net::sync::{FrameRecord, Input};
 use tumble::scene::cave::Cave;
 
-/// The tracker's number among those that send input; no facet has it.
+/// Source number of the tracker; no facet has it.
 pub const TRACKER_SOURCE: FacetNumber = FacetNumber::MAX;
 
-/// All devices of a run.
+/// All input devices of a run.
 pub struct InputDevices {
     tracker: Option<TrackerSocket>,
     replayed_input: Option<ReplayedInput>,
 }
 
 impl InputDevices {
-    /// As files and command line say, for a scene of this hash.
+    /// Opens the devices of cave file and command line for a scene with this hash.
     pub fn open(
         options: &ServeOptions,
         cave: &Cave,
@@ -34,28 +35,29 @@ impl InputDevices {
             eprintln!("{}", socket.describe(tracker));
         }
         if let (Some(path), false) = (&options.replay_input, options.quiet) {
-            eprintln!("input: as recorded in {}; what windows and trackers say now is left out", path.display());
+            eprintln!("input: replayed from {}; live input of windows and trackers is ignored", path.display());
         }
         Ok(InputDevices { tracker, replayed_input })
     }
 
-    /// Whether what facets send counts.
+    /// Returns whether input of facets is used.
     pub fn live(&self) -> bool {
         self.replayed_input.is_none()
     }
 
-    /// Whether a recording of inputs has come to its end.
+    /// Returns whether a recording of inputs has ended.
     pub fn over(&self) -> bool {
         self.replayed_input.as_ref().is_some_and(ReplayedInput::is_over)
     }
 
-    /// What the tracker told since the last frame.
+    /// Returns the tracker's inputs since the last frame.
     pub fn tracker_inputs(&self) -> Vec<(FacetNumber, Input)> {
         let inputs = self.tracker.iter().flat_map(TrackerSocket::inputs);
         inputs.map(|input| (TRACKER_SOURCE, input)).collect()
     }
 
-    /// What was recorded as done from this frame to the next; `simulated` is asked for only where there is a recording.
+    /// Returns the recorded inputs from this frame to the next. `simulated` is called only if there
+    /// is a recording.
     pub fn after(
         &mut self,
         simulated: impl FnOnce() -> Option<FrameRecord>,
@@ -66,17 +68,17 @@ impl InputDevices {
         }
     }
 
-    /// What came from the tracker.
+    /// Returns the tracker's counts.
     pub fn tracker_counts(&self) -> Option<osc::Counts> {
         self.tracker.as_ref().map(TrackerSocket::counts)
     }
 
-    /// Whether the inputs of a recording made of the scene what they made of it then.
+    /// Checks that replayed inputs gave the recorded states.
     pub fn check(&self) -> Result<(), Failure> {
         self.replayed_input.as_ref().map_or(Ok(()), ReplayedInput::check)
     }
 
-    /// What came of playing inputs.
+    /// Returns the result of replayed inputs.
     pub fn replayed_counts(&self) -> Option<replayed_input::Counts> {
         self.replayed_input.as_ref().map(|p| p.counts)
     }

@@ -1,10 +1,10 @@
-//! `--foxglove`: viewers that watch a run in Foxglove. Without the feature of that name there are none.
+//! `--foxglove`: streams a run to Foxglove. Without the feature `foxglove` it does nothing.
 
 use crate::cave::args::ServeOptions;
 use crate::failure::Failure;
 use tumble::dynamics::World;
 
-/// Those who watch.
+/// Server for viewers in Foxglove.
 pub struct LiveViewers {
     #[cfg(feature = "foxglove")]
     live: Option<tumble::net::record::live::Live>,
@@ -12,7 +12,7 @@ pub struct LiveViewers {
 
 #[cfg(feature = "foxglove")]
 impl LiveViewers {
-    /// Opens the address, if one was asked for.
+    /// Opens the address, if one is given.
     pub fn open(options: &ServeOptions) -> Result<LiveViewers, Failure> {
         let start = |at: std::net::SocketAddr| {
             tumble::net::record::live::Live::start(at, &options.scene.name).map_err(|e| Failure::run("viewers", e))
@@ -24,7 +24,7 @@ impl LiveViewers {
         Ok(LiveViewers { live })
     }
 
-    /// A frame; returns at once.
+    /// Publishes a frame; returns at once.
     pub fn frame(&mut self, world: &World) {
         self.live.iter_mut().for_each(|live| live.frame(world));
     }

@@ -1,4 +1,5 @@
-//! The files that a run writes: none of them is one that it reads, and none is lost to a run that does not begin.
+//! Files that a run writes. None of them is a file that it reads, and a run that does not start
+//! destroys none.
 
 use super::facet_processes::transport_kind;
 use crate::cave::args::{ServeOptions, TransportKind};
@@ -9,8 +10,8 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use tumble::scene::cave::Cave;
 
-/// Refuses what cannot go well, before anything is opened: a recording over the one that is played, a summary that cannot be written, and an address that
-/// nobody listens at.
+/// Checks the outputs before anything is opened. Refuses a recording over the replayed one, a
+/// summary that cannot be written, and --listen without UDP.
 pub fn check(options: &ServeOptions, cave: &Cave) -> Result<(), Failure> {
     let written = options.record.as_ref().or(cave.recording.as_ref().map(|r| &r.file));
     if let (Some(read), Some(written)) = (&options.replay_input, written)
@@ -18,29 +19,29 @@ pub fn check(options: &ServeOptions, cave: &Cave) -> Result<(), Failure> {
     {
         let (read, written) = (read.display(), written.display());
         return Err(Failure::input(format!(
-            "--replay-input {read}: the run would be recorded into the same file ({written}); say another with --record"
+            "--replay-input {read}: the run would be recorded into the same file ({written}); choose another with --record"
         )));
     }
     if let (Some(listen), TransportKind::SharedMemory) = (options.listen, transport_kind(options, cave)) {
         return Err(Failure::input(format!(
-            "--listen {listen}: frames go through shared memory and nobody listens there; it goes with --transport udp"
+            "--listen {listen}: frames go through shared memory; the option needs --transport udp"
         )));
     }
     options.summary.as_deref().map_or(Ok(()), writable)
 }
 
-/// Whether two names are one file's.
+/// Returns whether two paths name the same file.
 fn same(a: &Path, b: &Path) -> bool {
     let number = |path: &Path| std::fs::metadata(path).map(|about| (about.dev(), about.ino())).ok();
     a == b || number(a).is_some_and(|ours| Some(ours) == number(b))
 }
 
-/// Whether an open file is the one at `path`.
+/// Returns whether an open file is the one at `path`.
 fn same_file(file: &File, path: &Path) -> bool {
     matches!((file.metadata(), std::fs::metadata(path)), (Ok(ours), Ok(there)) if ours.ino() == there.ino())
 }
 
-/// Tries it and leaves the folder as it was.
+/// Tries to open the file for writing and leaves the folder as it was.
 fn writable(path: &Path) -> Result<(), Failure> {
     let there = std::fs::symlink_metadata(path).is_ok();
     if there && std::fs::metadata(path).is_ok_and(|about| !about.is_file() && !about.is_dir()) {
@@ -58,7 +59,7 @@ fn writable(path: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// To stdout, where somebody reads it; what fails otherwise is a failure.
+/// Prints to stdout. A closed pipe is no error.
 pub fn say(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
@@ -67,8 +68,10 @@ pub fn say(text: &str) -> Result<(), Failure> {
     }
 }
 
-/// Where a run is recorded: into a file beside the one that is wanted, which takes its place when the run begins. So a start at which nobody joins costs no
-/// earlier recording. Its process holds a lock on it; one that nobody holds is left from a start that was killed, and goes with the next recording.
+/// The recording of a run. It is written beside the target and replaces the target when the run
+/// starts, so a start without facets destroys no earlier recording. The process holds a lock on the
+/// temporary file. A temporary file without a lock was left by a killed start, and the next
+/// recording removes it.
 pub struct Recording {
     file: PathBuf,
     beside: Option<PathBuf>,
@@ -76,12 +79,13 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Of that file; what a link leads to is meant. Devices and pipes are written at once.
+    /// Creates the temporary file of a target; links are followed. Devices and pipes are written
+    /// directly.
     pub fn new(file: PathBuf) -> Result<Recording, Failure> {
         let real = file.canonicalize().unwrap_or(file.clone());
         let about = std::fs::metadata(&real).ok();
         if about.as_ref().is_some_and(|about| about.is_dir()) {
-            return Err(Failure::input(format!("{}: cannot be recorded into: it is a folder", file.display())));
+            return Err(Failure::input(format!("{}: cannot record into it: it is a folder", file.display())));
         }
         if about.is_some_and(|about| !about.is_file()) {
             return Ok(Recording { file, beside: None, _lock: None });
@@ -90,10 +94,10 @@ impl Recording {
         remove_left(&real, &begin);
         let beside = real.with_file_name(format!("{begin}{}", std::process::id()));
         let failed = |e: std::io::Error| Failure::run(&format!("recording into {}", file.display()), e);
-        // who removes what is left may be quicker than the lock
+        // a clean-up may have come before the lock
         for _ in 0..10 {
             let lock = OpenOptions::new().write(true).create(true).truncate(true).open(&beside).map_err(failed)?;
-            // a file system without locks keeps what is left
+            // on a file system without locks, leftovers stay
             let locked = lock.try_lock().is_ok();
             if same_file(&lock, &beside) {
                 return Ok(Recording { file: real, beside: Some(beside), _lock: locked.then_some(lock) });
@@ -105,12 +109,12 @@ impl Recording {
         ))
     }
 
-    /// What is opened.
+    /// Returns the path to write to.
     pub fn begins_at(&self) -> &Path {
         self.beside.as_deref().unwrap_or(&self.file)
     }
 
-    /// The run begins.
+    /// Moves the recording to its target.
     pub fn begin(&mut self) -> Result<(), Failure> {
         match self.beside.take() {
             Some(beside) => std::fs::rename(&beside, &self.file).map_err(|e| {
@@ -121,18 +125,19 @@ impl Recording {
         }
     }
 
-    /// Whether it has.
+    /// Returns whether the recording is at its target.
     pub fn has_begun(&self) -> bool {
         self.beside.is_none()
     }
 
-    /// Where it lies.
+    /// Returns the target.
     pub fn file(&self) -> &Path {
         &self.file
     }
 }
 
-/// Removes what starts that were killed left beside `real`: names that begin so and end with a process's number, and are nobody's.
+/// Removes temporary files of killed starts beside `real`: names with this prefix and a process id,
+/// without a lock.
 fn remove_left(real: &Path, begin: &str) {
     let number =
         |name: &str| name.strip_prefix(begin).is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
@@ -169,7 +174,7 @@ mod tests {
         std::fs::write(given_up.begins_at(), "given up").unwrap();
         drop(given_up);
         assert_eq!(std::fs::read(&file).unwrap(), b"before");
-        // through a link: the file that it leads to
+        // through a link: the target of the link
         let link = folder.join("link.mcap");
         std::os::unix::fs::symlink(&file, &link).unwrap();
         let mut begun = Recording::new(link.clone()).ok().unwrap();
@@ -177,7 +182,7 @@ mod tests {
         assert!(begun.begin().is_ok());
         drop(begun);
         assert_eq!(std::fs::read(&file).unwrap(), b"now");
-        // what killed starts left goes, and nothing else
+        // leftovers of killed starts are removed, and nothing else
         let [left, held, other] = [".run.mcap.1", ".run.mcap.2", ".run.mcap.notes"].map(|name| folder.join(name));
         [&left, &held, &other].into_iter().for_each(|path| std::fs::write(path, "begun").unwrap());
         let holder = File::open(&held).unwrap();

@@ -1,4 +1,5 @@
-//! The server's process: it simulates, publishes, keeps time, and looks after facets, recording and users.
+//! The server's process: simulates, publishes, keeps real time, and serves facets, recording and
+//! users.
 
 use super::facet_processes::{FacetProcesses, ProcessStatus, slots, transport_kind};
 use super::input_devices::InputDevices;
@@ -29,10 +30,11 @@ use tumble::net::sync::{
 };
 use tumble::scene::cave::{Cave, Mode};
 
-/// Between two looks at signals and processes while nothing happens.
+/// Interval at which signals and processes are polled.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Runs a scene in a cave, or shows a recording of one; with a launcher's options, also the facets of this machine.
+/// Runs a scene in a cave, or replays a recording of one. With a launcher's options it also runs
+/// the facets of this machine.
 pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Option<&Path>) -> Result<(), Failure> {
     let signals = Signals::watch()?;
     let setup = RunSetup::load(options.scene.load()?, &options.surroundings, Role::Server)?;
@@ -65,7 +67,7 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
             (ServerEndpoint::Udp(Box::new(server)), address)
         }
     };
-    // from now on it can be joined
+    // from here on facets can join
     run.address = Some(address.clone());
     lock.write(&run)?;
     let shared_memory = matches!(end, ServerEndpoint::Shm(_));
@@ -81,7 +83,7 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
     });
     drop(processes);
     if shared_memory {
-        // what killed facets left
+        // leftovers of killed facets
         clean_up().map_err(|e| Failure::run("cleaning up", e))?;
     }
     drop(lock);
@@ -94,12 +96,12 @@ fn listen(options: &ServeOptions, cave: &Cave) -> SocketAddr {
     options.listen.unwrap_or(usual.into())
 }
 
-/// How long the start waits for facets.
+/// Returns the timeout for facets to join.
 fn connect_timeout(options: &ServeOptions, cave: &Cave) -> Duration {
     options.connect_timeout.map_or(Duration::from_millis(cave.sync.connect_timeout_ms.into()), Duration::from_secs_f64)
 }
 
-/// What the session is told: as the cave file says.
+/// Returns the session's options from the cave file.
 fn session_options(options: &ServeOptions, setup: &RunSetup, run: u64, slots: &[FacetSlot]) -> ServerOptions {
     let (sync, wait) = (&setup.cave.sync, connect_timeout(options, &setup.cave));
     let ms = |ms: u32| Duration::from_millis(ms.into());
@@ -129,7 +131,7 @@ struct RunLoop<'a> {
     slots: Vec<FacetSlot>,
     metrics: Metrics,
     status: Status,
-    /// What is shown, where nothing is simulated.
+    /// The recording to replay instead of simulating.
     replay: Option<Replay>,
     time_s: f64,
     began: Instant,
@@ -191,7 +193,7 @@ impl<'a> RunLoop<'a> {
         })
     }
 
-    /// From the first joining to the last frame.
+    /// Runs from the first join to the last frame.
     fn run_frames(&mut self, processes: &mut FacetProcesses) -> Result<(), Failure> {
         if !self.wait_for_facets(processes)? {
             return Ok(());
@@ -224,7 +226,7 @@ impl<'a> RunLoop<'a> {
         Ok(())
     }
 
-    /// Waits for the critical facets; `false` when the end was asked for meanwhile.
+    /// Waits for the critical facets. Returns `false` if the end was requested meanwhile.
     fn wait_for_facets(&mut self, processes: &mut FacetProcesses) -> Result<bool, Failure> {
         let wait = connect_timeout(self.options, &self.cave);
         let until = self.server.now() + wait;
@@ -244,7 +246,7 @@ impl<'a> RunLoop<'a> {
         Ok(true)
     }
 
-    /// The steps of one frame.
+    /// Simulates the steps of one frame.
     fn simulate(&mut self, frame: u64, steps: u32) -> Result<(), Failure> {
         let (clock, dt) = (Instant::now(), self.world.settings().dt);
         for _ in 0..steps {
@@ -255,12 +257,13 @@ impl<'a> RunLoop<'a> {
         Ok(())
     }
 
-    /// Of the simulation, s; a recording has its own.
+    /// Returns the frame length, s: of a recording, or the simulated one.
     fn frame_length(&self, simulated: f64) -> f64 {
         self.replay.as_ref().and_then(Replay::frame_length).unwrap_or(simulated)
     }
 
-    /// Waits until the frame is shown. A facet whose process ends meanwhile is waited for no longer, and started again.
+    /// Waits until the frame is shown. A facet whose process ends meanwhile is no longer awaited,
+    /// and is restarted.
     fn wait(&mut self, processes: &mut FacetProcesses) -> Result<(), Failure> {
         while !self.server.shown(POLL_INTERVAL).map_err(failed)?
             && self.check_processes(processes)?
@@ -269,7 +272,7 @@ impl<'a> RunLoop<'a> {
         Ok(())
     }
 
-    /// Looks whether facets' processes have ended; `false` when all have, as their users wished.
+    /// Polls the facets' processes. Returns `false` if all have ended on request of their users.
     fn check_processes(&mut self, processes: &mut FacetProcesses) -> Result<bool, Failure> {
         let look = processes.watch(false)?;
         look.ended.into_iter().try_for_each(|facet| self.server.facet_exited(facet)).map_err(failed)?;
@@ -280,11 +283,12 @@ impl<'a> RunLoop<'a> {
         }
     }
 
-    /// The next frame, to its being shown: simulated, or from the recording. `false` where that is over.
+    /// Publishes the next frame and waits until it is shown. Returns `false` at the end of a
+    /// recording.
     fn publish(&mut self, frame: u64, steps: u32, processes: &mut FacetProcesses) -> Result<bool, Failure> {
         let recorded = self.replay.as_mut().map(Replay::next).transpose()?;
         if recorded.is_none() && frame > 0 {
-            // what came since the last frame counts in this one
+            // inputs since the last frame take effect in this one
             self.take_events(self.time_s);
             self.input_devices.tracker_inputs().into_iter().for_each(|(from, input)| self.take_input(from, input));
             self.simulate(frame, steps)?;
@@ -320,7 +324,8 @@ impl<'a> RunLoop<'a> {
         Ok(true)
     }
 
-    /// Waits until the next frame is due, and when that is. What is late by more than a frame is given up: time then goes slower, and no frame is left out.
+    /// Waits until the next frame is due and returns when that is. A delay of more than a frame is
+    /// dropped: time then runs slower, and no frame is skipped.
     fn wait_for_next_frame(&mut self, due: Duration, dt: f64) -> Result<Duration, Failure> {
         let (next, now) = (due + Duration::from_secs_f64(dt), self.server.now());
         let late = now.saturating_sub(next);
@@ -345,13 +350,13 @@ impl<'a> RunLoop<'a> {
             self.replay.iter_mut().for_each(|replay| replay.take(&event));
             let slot = |k: &u16| self.slots.get(*k as usize).map_or("", |s| s.name.as_str());
             let said = match &event {
-                ServerEvent::Joined(k) => Some(format!("facet {} is there", slot(k))),
-                ServerEvent::Refused(k, why) => Some(format!("facet {} is not let in: {why}", slot(k))),
+                ServerEvent::Joined(k) => Some(format!("facet {} joined", slot(k))),
+                ServerEvent::Refused(k, why) => Some(format!("facet {} was refused: {why}", slot(k))),
                 ServerEvent::Gone(k, true) => Some(format!("facet {} left", slot(k))),
-                ServerEvent::Gone(k, false) => Some(format!("facet {} is dropped; the others go on", slot(k))),
+                ServerEvent::Gone(k, false) => Some(format!("facet {} was dropped; the others continue", slot(k))),
                 ServerEvent::Late(k, frame) => Some(format!("facet {} is late with frame {frame}", slot(k))),
                 ServerEvent::Presented(k, frame, _, false) => {
-                    Some(format!("facet {} drew another frame {frame} than was sent", slot(k)))
+                    Some(format!("facet {} drew frame {frame} with another state than was sent", slot(k)))
                 }
                 _ => None,
             };
@@ -365,7 +370,7 @@ impl<'a> RunLoop<'a> {
         }
     }
 
-    /// What a user did by another device than a facet's window.
+    /// Takes an input of a device other than a facet's window.
     fn take_input(&mut self, from: FacetNumber, input: Input) {
         self.server.note_input(input.user, input.sequence);
         let event = ServerEvent::Input(from, input);
@@ -377,7 +382,8 @@ impl<'a> RunLoop<'a> {
         }
     }
 
-    /// Ends the run: recording, summary, facets. As much of it as can be done is, and what is to be kept comes first: facets may not answer.
+    /// Ends the run: recording, summary, facets. Every part is done even if another fails, and
+    /// files come first because facets may not answer.
     fn end(&mut self, processes: &mut FacetProcesses) -> Result<(), Failure> {
         let wall_s = self.began.elapsed().as_secs_f64();
         let session_options = self.server.end().map_err(failed);
@@ -395,7 +401,7 @@ impl<'a> RunLoop<'a> {
         session_options.and(recorded.map(drop)).and(summed).and(processes).and(self.input_devices.check())
     }
 
-    /// What was counted and measured, to stdout and file.
+    /// Prints the summary and writes its file.
     fn write_summary(&self, wall_s: f64) -> Result<(), Failure> {
         if self.frames > 0 {
             let summary = Summary {
@@ -432,7 +438,7 @@ impl<'a> RunLoop<'a> {
             }
         }
         if self.frames == 0 {
-            // why nobody came
+            // explains why no facet joined
             eprint!("{}", unknown_peers_line(&refused(&self.server.unknown_peers())));
         }
         Ok(())

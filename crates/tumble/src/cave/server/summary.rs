@@ -1,4 +1,5 @@
-//! What a run counted and measured: lines while it runs, a few at its end, and all of it as JSON.
+//! Counts and timings of a run: status lines while it runs, a few lines at its end, and everything
+//! as JSON.
 
 use super::histogram::{Histogram, Quantiles};
 use crate::cave::endpoints::ServerEndpoint;
@@ -12,38 +13,39 @@ use std::time::{Duration, Instant};
 use tumble::net::sync::transport::{FacetNumber, LinkCounters, Refused};
 use tumble::net::sync::{FacetSlot, Membership, Server, ServerEvent, SlotCounts};
 
-/// Between two reports.
+/// Interval of the status lines.
 const EVERY: Duration = Duration::from_secs(5);
 
-/// Times of the run.
+/// Timings of a run.
 #[derive(Default)]
 pub struct Metrics {
-    /// The steps of one frame.
+    /// Simulation of one frame.
     pub step: Histogram,
-    /// From publishing a frame to when all who are waited for have shown it.
+    /// From publishing a frame until all awaited facets have shown it.
     pub barrier: Histogram,
-    /// From the beginning of one frame to the next.
+    /// From the start of one frame to the next.
     pub frame: Histogram,
-    /// Between the first and the last facet to show a frame, by the server's clock.
+    /// From the first to the last facet that shows a frame, by the server's clock.
     pub skew: Histogram,
-    /// From what a user did to the last facet that shows it.
+    /// From an input to the last facet that shows it.
     pub input: Histogram,
-    /// By seat: from the arrival of a frame at the facet to the end of drawing it.
+    /// By slot: from the arrival of a frame at the facet to the end of drawing.
     draw: Vec<Histogram>,
     last: Vec<(u64, f64)>,
-    /// By seat: the frame shown last, and how many different ones were: who joins again shows the last one again.
+    /// By slot: the last frame shown, and the number of different ones. A facet that joins again
+    /// shows the last frame again.
     shown: Vec<(Option<u64>, u64)>,
 }
 
-/// Packets that a link refused, by reason.
+/// Refused packets of a link, by reason.
 pub type Refusals = BTreeMap<&'static str, u64>;
 
-/// What a link refused.
+/// Returns the refused packets of a link.
 pub fn refused(link: &LinkCounters) -> Refusals {
     Refused::ALL.iter().map(|&why| (why.name(), link.refused_for(why))).filter(|(_, n)| *n > 0).collect()
 }
 
-/// The whole summary. Units stand in the names.
+/// The whole summary. Names end with units.
 #[derive(Serialize)]
 pub struct Summary {
     pub scene: String,
@@ -53,47 +55,47 @@ pub struct Summary {
     pub frames: u64,
     pub simulated_s: f64,
     pub wall_s: f64,
-    /// Time that was given up because frames took longer than their length.
+    /// Dropped time, because frames took longer than their length.
     pub behind_s: f64,
-    /// Simulating one frame: all its steps.
+    /// Simulation of one frame: all its steps.
     pub simulation: Quantiles,
     pub barrier: Quantiles,
     pub frame: Quantiles,
-    /// Between the first and the last facet to show a frame, by the server's clock.
+    /// From the first to the last facet that shows a frame, by the server's clock.
     pub skew: Option<Quantiles>,
-    /// From what a user did to the last facet that shows it; where users did anything.
+    /// From an input to the last facet that shows it, if there was input.
     pub input_to_picture: Option<Quantiles>,
-    /// Of a replay: pictures, compared with those of the recording.
+    /// Of a replay: pictures compared with the recording.
     pub replay: Option<Counts>,
-    /// Of inputs that were played.
+    /// Of replayed inputs: states compared with the recording.
     pub replay_input: Option<replayed_input::Counts>,
-    /// What came from a tracker.
+    /// Messages of a tracker.
     pub tracker: Option<osc::Counts>,
-    /// Heads that were not followed, because an eye would be behind a screen or in it.
+    /// Head poses not applied, because an eye would be behind a screen or in it.
     pub heads_rejected: u64,
-    /// What was refused from who is no facet, by reason; reasons that never came are left out.
+    /// Refused packets that belong to no facet, by reason; zero counts are omitted.
     pub unknown_peers: Refusals,
     pub facets: Vec<FacetSummary>,
 }
 
-/// Of one facet, as the server counted.
+/// Counts of the server about one facet.
 #[derive(Serialize)]
 pub struct FacetSummary {
     pub name: String,
     #[serde(flatten)]
     pub counts: SlotCounts,
-    /// Frames of the run that it did not show: while it was not there, was behind, or in `latest` had a newer one.
+    /// Frames of the run that it did not show: absent, behind, or in `latest` superseded.
     pub not_shown: u64,
     pub draw: Quantiles,
     pub bytes_out: u64,
     pub bytes_in: u64,
     pub repeated: u64,
-    /// What its link refused, by reason; reasons that never came are left out.
+    /// Refused packets of its link, by reason; zero counts are omitted.
     pub refused_packets: Refusals,
 }
 
 impl Metrics {
-    /// For so many seats.
+    /// Creates the timings for this number of slots.
     pub fn new(slots: usize) -> Metrics {
         Metrics {
             draw: (0..slots).map(|_| Histogram::default()).collect(),
@@ -103,7 +105,7 @@ impl Metrics {
         }
     }
 
-    /// What facets answered.
+    /// Adds an event of the session.
     pub fn take(&mut self, event: &ServerEvent, time_s: f64) {
         if let ServerEvent::Shown(shown) = event {
             if shown.facets > 1 {
@@ -127,7 +129,7 @@ impl Metrics {
         }
     }
 
-    /// All facets, as they stand after so many frames.
+    /// Returns the summaries of all facets after this number of frames.
     pub fn facets(&self, server: &Server<ServerEndpoint>, slots: &[FacetSlot], frames: u64) -> Vec<FacetSummary> {
         let one = |(k, slot): (usize, &FacetSlot)| {
             let (counts, _, link) = server.counts(k as FacetNumber);
@@ -147,35 +149,35 @@ impl Metrics {
 }
 
 impl Summary {
-    /// The few lines for a person.
+    /// Returns the lines for the terminal.
     pub fn lines(&self) -> String {
         let mut text = format!(
-            "{} in {}: {:.3} s in {} frames, {} over {}; {:.3} s by the clock, {:.3} s behind\n",
+            "{} in {}: {:.3} s in {} frames, {} over {}; {:.3} s wall time, {:.3} s behind\n",
             self.scene, self.cave, self.simulated_s, self.frames, self.mode, self.transport, self.wall_s, self.behind_s
         );
         let quantiles = |what: &str, f: &Quantiles| {
             format!(
-                "{what} {:.2} ms (half), {:.2} ms (99 %), {:.2} ms (all; frame {} at {:.3} s)\n",
+                "{what}: median {:.2} ms, 99 % within {:.2} ms, maximum {:.2} ms (frame {} at {:.3} s)\n",
                 f.p50_ms, f.p99_ms, f.max_ms, f.max_at_frame, f.max_at_s
             )
         };
-        text += &quantiles("simulating a frame took at most", &self.simulation);
-        text += &quantiles("sent, drawn and shown within", &self.barrier);
-        text += &quantiles("a frame took at most", &self.frame);
+        text += &quantiles("simulation of a frame", &self.simulation);
+        text += &quantiles("sent, drawn and shown", &self.barrier);
+        text += &quantiles("frame to frame", &self.frame);
         if let Some(skew) = &self.skew {
-            text += &quantiles("facets showed a frame within", skew);
+            text += &quantiles("skew between facets", skew);
         }
         if let Some(input) = &self.input_to_picture {
-            text += &quantiles("what users did was to be seen within", input);
+            text += &quantiles("input to picture", input);
         }
         if let Some(Counts { same, different, not_compared }) = self.replay {
             text += &format!(
-                "pictures: {same} as they were recorded, {different} different, {not_compared} not compared\n"
+                "pictures: {same} identical to the recording, {different} different, {not_compared} not compared\n"
             );
         }
         if let Some(replayed_input) = &self.replay_input {
             text += &format!(
-                "{} inputs played: {} states as they were recorded, {} different\n",
+                "{} inputs replayed: {} states identical to the recording, {} different\n",
                 replayed_input.inputs, replayed_input.same, replayed_input.different
             );
         }
@@ -188,7 +190,7 @@ impl Summary {
             );
         }
         if self.heads_rejected > 0 {
-            text += &format!("{} heads not followed: an eye would be behind a screen\n", self.heads_rejected);
+            text += &format!("{} head poses rejected: an eye would be behind a screen\n", self.heads_rejected);
         }
         for FacetSummary { name, counts: c, not_shown, refused_packets, .. } in &self.facets {
             text += &format!(
@@ -211,27 +213,27 @@ impl Summary {
     }
 }
 
-/// A line of what was refused from who is no facet; nothing for nothing.
+/// Returns a line about refused packets that belong to no facet; empty without any.
 pub fn unknown_peers_line(refused: &Refusals) -> String {
     let key = if refused.contains_key(Refused::Forged.name()) {
-        " (forged: who has another key file, or none, looks like this)"
+        " (forged: a peer with another key file, or without one, looks like this)"
     } else {
         ""
     };
     if refused.is_empty() {
         String::new()
     } else {
-        format!("from who is no facet{}{key}\n", reasons(": packets refused", refused))
+        format!("from unknown peers{}{key}\n", reasons(": packets refused", refused))
     }
 }
 
-/// `; packets refused: 3 forged, 1 replayed`; nothing for nothing.
+/// Returns `; packets refused: 3 forged, 1 replayed`, for instance; empty without any.
 fn reasons(what: &str, counts: &Refusals) -> String {
     let each: Vec<String> = counts.iter().map(|(why, n)| format!("{n} {why}")).collect();
     if each.is_empty() { String::new() } else { format!("{what}: {}", each.join(", ")) }
 }
 
-/// Lines while it runs: in place on a terminal, every few seconds elsewhere.
+/// Status lines while a run is in progress: in place on a terminal, every few seconds elsewhere.
 pub struct Status {
     quiet: bool,
     terminal: bool,
@@ -242,7 +244,7 @@ pub struct Status {
 }
 
 impl Status {
-    /// From now on.
+    /// Creates the status lines.
     pub fn new(quiet: bool) -> Status {
         Status {
             quiet,
@@ -254,12 +256,12 @@ impl Status {
         }
     }
 
-    /// What is said next must not be written over.
+    /// Keeps other output from being overwritten.
     pub fn interrupted(&mut self) {
         self.lines = 0;
     }
 
-    /// After each frame.
+    /// Updates the status lines after a frame.
     pub fn at(
         &mut self,
         server: &Server<ServerEndpoint>,

@@ -1,59 +1,62 @@
-//! What of a user pushes things (`--user-colliders`): an upright capsule from the floor to the head, and two hands. They yield to nothing.
+//! Kinematic colliders of the users (`--user-colliders`): an upright capsule from the floor to the
+//! head, and two hands. They push dynamic bodies and are not pushed back.
 //!
 //! ```text
-//! a step moves a body by at most  v_max · scale · dt  towards where it is wanted
+//! a step moves a collider by at most  v_max · scale · dt  towards its target
 //! ```
 //!
-//! so that a tracker that jumps strikes nothing at a kilometre a second.
+//! So a tracker that jumps does not hit bodies at an enormous speed.
 
 use crate::failure::Failure;
 use tumble::collide::{Pose, Shape, Vec3};
 use tumble::dynamics::{Mode, ObjectId, RigidBody, World, WorldError};
 use tumble::net::sync::{User, Viewer};
 
-/// Of a user's body, m.
+/// Radius of the capsule, m.
 const RADIUS_M: f64 = 0.25;
-/// Of a hand, m.
+/// Radius of a hand, m.
 const HAND_RADIUS_M: f64 = 0.06;
-/// Fastest that a tracked body moves, and a hand that keys move, metres of the cave per second; walking is among the latter's.
+/// Maximum speed of a tracked collider, and of a hand moved by keys, meters of the cave per second.
+/// Walking counts for the latter.
 const MAX_SPEED_M_PER_S: f64 = 10.0;
 const KEY_HAND_SPEED_M_PER_S: f64 = 3.0;
-/// Beside, ahead of and below the head: a hand that hangs (within the capsule), and one that is stretched out.
+/// Offset from the head to the side, ahead and up: of a hand at rest (within the capsule), and of
+/// an extended one.
 const AT_REST_M: [f64; 3] = [0.15, 0.0, -0.7];
 const EXTENDED_M: [f64; 3] = [0.15, 0.7, -0.25];
 /// Left and right.
 const SIDES: [(&str, f64); 2] = [("left", -1.0), ("right", 1.0)];
 
-/// Where a hand is wanted.
+/// Target of a hand.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Hand {
     #[default]
     AtRest,
-    /// Held out, by a key.
+    /// Extended by a key.
     Extended,
-    /// In the cave's frame.
+    /// Tracked, in the cave's frame.
     Tracked(Pose),
 }
 
-/// One user's.
+/// Colliders of one user.
 struct Colliders {
     capsule: ObjectId,
     hands: [ObjectId; 2],
 }
 
-/// All users' bodies; none where nobody pushes.
+/// Colliders of all users; empty without `--user-colliders`.
 #[derive(Default)]
 pub struct UserColliders(Vec<Colliders>);
 
 impl UserColliders {
-    /// One set for each user.
+    /// Adds the colliders of each user to the world.
     pub fn add(viewer: &Viewer, world: &mut World) -> Result<UserColliders, Failure> {
         let failed = |e: &dyn std::fmt::Display| Failure::run("a user's body", e);
         let mut all = UserColliders::default();
         for (k, user) in viewer.users.iter().enumerate() {
             let mut add = |name: String, shape: Shape, pose: Pose, drawn: bool| {
                 let body = RigidBody::fixed(name, shape).at(pose);
-                // the capsule is not drawn: the user stands in it
+                // the capsule is not drawn, because the user stands in it
                 let body = if drawn { body } else { body.drawn_as(Vec::new()) };
                 world.add_boxed(Box::new(body), Mode::Kinematic).map_err(|e| failed(&e))
             };
@@ -74,12 +77,13 @@ impl UserColliders {
         Ok(all)
     }
 
-    /// Whether an object is one of them.
+    /// Returns whether an object is one of the colliders.
     pub fn contains(&self, id: ObjectId) -> bool {
         self.0.iter().any(|colliders| colliders.capsule == id || colliders.hands.contains(&id))
     }
 
-    /// Takes them along for the next step of `dt` seconds; `hands` by user.
+    /// Moves the colliders towards their targets for the next step of `dt` seconds. `hands` returns
+    /// the targets by user.
     pub fn follow_users(
         &self,
         viewer: &Viewer,
@@ -115,7 +119,7 @@ fn in_scene(viewer: &Viewer, pose: &Pose) -> Pose {
     Pose::from_parts(at.coords.into(), viewer.cave.rotation * pose.rotation)
 }
 
-/// Of a hand, in the cave's frame.
+/// Returns the target of a hand in the cave's frame.
 fn target_pose(user: &User, side: usize, hand: Hand) -> Pose {
     let [aside, ahead, above] = match hand {
         Hand::Tracked(pose) => return pose,
@@ -123,7 +127,7 @@ fn target_pose(user: &User, side: usize, hand: Hand) -> Pose {
         Hand::Extended => EXTENDED_M,
     };
     let head = &user.head;
-    // a stretched hand goes where one looks; one that hangs does so whatever the head does
+    // an extended hand follows the direction of view; a hand at rest hangs down
     let offset = match hand {
         Hand::Extended => head.rotation * Vec3::new(SIDES[side].1 * aside, ahead, above),
         _ => {
@@ -136,12 +140,13 @@ fn target_pose(user: &User, side: usize, hand: Hand) -> Pose {
     Pose::from_parts((head.translation.vector + offset).into(), head.rotation)
 }
 
-/// Half the straight part of a user's capsule, from the floor to the head where that is high enough, m of the cave.
+/// Returns half the length of the straight part of a user's capsule, from the floor to the head,
+/// meters of the cave.
 fn half_length(user: &User) -> f64 {
     (0.5 * user.head.translation.z - RADIUS_M).max(0.01)
 }
 
-/// Where a user's capsule is wanted.
+/// Returns the target of a user's capsule.
 fn upright(viewer: &Viewer, user: &User) -> Pose {
     let mut at = user.head.translation.vector;
     at.z = half_length(user) + RADIUS_M;

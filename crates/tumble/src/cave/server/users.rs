@@ -1,7 +1,8 @@
-//! The users in the world: where they look from, how keys and trackers move them, what their wands pull and their bodies push.
+//! The users in the world: heads, motion by keys and trackers, wands that pull bodies, colliders.
 //!
-//! Each user has at most one wand per device that sends its input. While its first button is held, what the wand's ray meets first is pulled by a spring.
-//! What pushes is in [`user_colliders`](super::user_colliders).
+//! Each user has at most one wand per device that sends its input. While its first button is held,
+//! a spring pulls the first body on the wand's ray. The colliders are in
+//! [`user_colliders`](super::user_colliders).
 
 use super::user_colliders::{Hand, UserColliders};
 use crate::failure::Failure;
@@ -12,17 +13,17 @@ use tumble::net::sync::transport::FacetNumber;
 use tumble::net::sync::{Input, Viewer};
 use tumble::scene::cave::{Cave, Screen};
 
-/// Walking, metres of the cave per second, and turning, rad/s, while a key is held.
+/// Speed of walking, meters of the cave per second, and of turning, rad/s, while a key is held.
 const WALK_M_PER_S: f64 = 1.5;
 const TURN_RAD_PER_S: f64 = 1.0;
-/// Of the spring by which the wand pulls, rad/s.
+/// Frequency of the wand's spring, rad/s.
 const PULL_RAD_PER_S: f64 = 10.0;
-/// Input that was not renewed for so long counts no more, simulated s: who left lets go.
+/// Time after which an input that was not renewed expires, simulated s.
 const INPUT_TIMEOUT_S: f64 = 1.0;
-/// An eye comes no nearer to the plane of a screen that is drawn for it, m.
+/// Minimum distance of an eye from the plane of a screen that is drawn for it, m.
 const MIN_EYE_DISTANCE_M: f64 = 0.02;
 
-/// Keys by their USB HID usage.
+/// Keys by USB HID usage.
 mod key {
     pub const A: u16 = 0x04;
     pub const D: u16 = 0x07;
@@ -38,35 +39,35 @@ mod key {
     pub const UP: u16 = 0x52;
 }
 
-/// The keys that stretch out the left and the right hand.
+/// Keys that extend the left and the right hand.
 const HAND_KEYS: [u16; 2] = [key::R, key::F];
 
-/// Who sent an input, and for which user.
+/// Source of an input, and its user.
 type Device = (FacetNumber, u16);
 
-/// All users.
+/// All users of a run.
 pub struct Users {
-    /// As it is published.
+    /// The viewer that is published.
     pub viewer: Viewer,
-    /// Heads that were not followed, because an eye would be behind a screen or in it.
+    /// Head poses not applied, because an eye would be behind a screen or in it.
     pub heads_rejected: u64,
-    /// By user, the screens that are drawn for it.
+    /// Screens that are drawn for each user.
     screens: Vec<Vec<Screen>>,
-    /// The newest input of each device, and when it came.
+    /// The newest input of each device, and its arrival.
     inputs: BTreeMap<Device, (Input, f64)>,
     held: BTreeMap<Device, Grabbed>,
     colliders: UserColliders,
 }
 
-/// What a wand holds.
+/// A body grabbed by a wand.
 struct Grabbed {
     pull: PickForce,
-    /// From the wand's origin, along its ray, m.
+    /// Distance from the wand's origin along its ray, m.
     distance: f64,
 }
 
 impl Users {
-    /// As the files place them; with bodies, if they are to push.
+    /// Places the users as the files define them; with `user_colliders` it adds their colliders.
     pub fn new(viewer: Viewer, cave: &Cave, world: &mut World, user_colliders: bool) -> Result<Users, Failure> {
         let drawn = |user: usize| {
             cave.facets.iter().filter(|f| f.user == user).map(|f| cave.screens[f.screen].clone()).collect()
@@ -76,7 +77,7 @@ impl Users {
         Ok(Users { viewer, heads_rejected: 0, screens, inputs: BTreeMap::new(), held: BTreeMap::new(), colliders })
     }
 
-    /// What a user did, by a facet's window or another device.
+    /// Takes an input of a facet's window or another device.
     pub fn take(&mut self, from: FacetNumber, input: Input, time_s: f64) {
         let Some(user) = self.viewer.users.get_mut(input.user as usize) else { return };
         if let Some(head) = input.head {
@@ -90,7 +91,7 @@ impl Users {
         self.inputs.insert((from, input.user), (input, time_s));
     }
 
-    /// What users do to the world during the next step of `dt` seconds.
+    /// Applies the users' input for the next step of `dt` seconds.
     pub fn act(&mut self, world: &mut World, dt: f64) -> Result<(), Failure> {
         let failed = |e: WorldError| Failure::run("what a user does", e);
         self.inputs.retain(|_, (_, since)| world.time() - *since < INPUT_TIMEOUT_S);
@@ -114,7 +115,7 @@ impl Users {
         self.colliders.follow_users(&self.viewer, |user| self.hands(user), world, dt).map_err(failed)
     }
 
-    /// Where a user's hands are wanted: as they are tracked, else as keys say.
+    /// Returns the targets of a user's hands: tracked, else by keys.
     fn hands(&self, user: usize) -> [Hand; 2] {
         let mut hands = [Hand::AtRest; 2];
         for (input, _) in self.inputs.values().filter(|(input, _)| input.user as usize == user) {
@@ -129,7 +130,7 @@ impl Users {
         hands
     }
 
-    /// Keys move the whole cave: the users stay where they stand in it.
+    /// Moves the whole cave by keys; the users keep their place in it.
     fn walk(&mut self, held: &[u16], dt: f64) {
         let is = |keys: &[u16]| f64::from(u8::from(keys.iter().any(|k| held.contains(k))));
         let ahead = is(&[key::W, key::UP]) - is(&[key::S, key::DOWN]);
@@ -159,13 +160,13 @@ trait Renormalize {
 }
 
 impl Renormalize for Pose {
-    /// Turns add up over days; the rotation stays one.
+    /// Normalizes the rotation, because rounding errors of rotations accumulate.
     fn renormalize(&mut self) {
         self.rotation.renormalize();
     }
 }
 
-/// Takes hold of the first thing on a ray, if it moves. The users' own hands are not in the way.
+/// Grabs the first body on a ray if it can move. The users' colliders are ignored.
 fn grab(world: &World, colliders: &UserColliders, origin: &Vec3, direction: &Vec3) -> Option<Grabbed> {
     let mut first: Option<(ObjectId, usize, f64)> = None;
     for &id in world.ids().iter().filter(|id| !colliders.contains(**id)) {

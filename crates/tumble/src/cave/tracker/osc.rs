@@ -1,14 +1,15 @@
-//! What trackers send (Open Sound Control 1.0, by `rosc`), and what of it is taken.
+//! Decoder of a tracker's messages (Open Sound Control 1.0, parsed by `rosc`).
 //!
 //! | address | arguments |
 //! |---|---|
-//! | `/tumble/user/NAME/head` | `x y z qx qy qz qw`: metres and a unit quaternion, in the tracker's axes; the origin is between the eyes, x to the right, y ahead, z up for `z_up` |
-//! | `/tumble/user/NAME/hand/left`, `…/hand/right` | the same; without arguments: lost |
+//! | `/tumble/user/NAME/head` | `x y z qx qy qz qw`: position in m and unit quaternion in the tracker's axes; the origin is between the eyes, x to the right, y ahead, z up for `z_up` |
+//! | `/tumble/user/NAME/hand/left`, `…/hand/right` | the same; without arguments: not tracked |
 //! | `/tumble/user/NAME/wand` | the same; it points along its y axis |
-//! | `/tumble/user/NAME/buttons` | one number: held buttons of the wand, bit by bit; the first picks and pulls |
-//! | `/tumble/user/NAME/keys` | held keys, by their USB HID usage; none for none |
+//! | `/tumble/user/NAME/buttons` | one number: bit mask of the wand's held buttons; the first picks and pulls |
+//! | `/tumble/user/NAME/keys` | held keys by USB HID usage; no arguments for none |
 //!
-//! Numbers may be float, double or int. Nothing that comes can do more than move a user: what is wrong is counted, by reason, and changes nothing.
+//! Numbers may be float, double or int. A message can only move a user. Invalid messages are
+//! counted by reason and have no effect.
 
 use rosc::{OscMessage, OscPacket, OscType};
 use std::collections::BTreeMap;
@@ -17,40 +18,40 @@ use tumble::collide::{Pose, Quat, Vec3};
 use tumble::net::sync::{Input, MAX_KEYS};
 use tumble::scene::cave::{Axes, Tracker};
 
-/// Longest datagram that is read, bytes.
+/// Maximum length of a datagram, bytes.
 pub const MAX_DATAGRAM_BYTES: usize = 1536;
-/// Most messages of one datagram.
+/// Maximum number of messages in a datagram.
 const MAX_MESSAGES: usize = 64;
-/// Nothing is farther from the origin than this, m.
+/// Maximum distance of a pose from the origin, m.
 const MAX_DISTANCE_M: f64 = 100.0;
-/// A quaternion of single precision is this near to unit length.
+/// Tolerance for the length of a quaternion in single precision.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
-/// Why something was dropped.
+/// Reason for which a datagram or message was dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Dropped {
-    /// From an address that is not listened to.
+    /// From an address that is not among the senders.
     UnknownSender,
-    /// More than so many in a tenth of a second, or in one datagram.
+    /// More than the limit in a tenth of a second, or in one datagram.
     TooMany,
     /// A datagram longer than [`MAX_DATAGRAM_BYTES`].
     TooLong,
-    /// No OSC.
+    /// Not OSC.
     Malformed,
-    /// An address that does not begin or end as ours do.
+    /// An address with another prefix or suffix.
     UnknownAddress,
-    /// Of a user that the cave has not.
+    /// For a user that the cave does not have.
     UnknownUser,
-    /// Another number of arguments, or none that are numbers.
+    /// Wrong number or type of arguments.
     Arguments,
-    /// Not finite, or farther than 100 m away.
+    /// Not finite, or more than 100 m from the origin.
     OutOfRange,
     /// A quaternion that is not of unit length.
     InvalidRotation,
 }
 
 impl Dropped {
-    /// For people and programs.
+    /// Returns the name in reports and summaries.
     pub fn name(self) -> &'static str {
         match self {
             Dropped::UnknownSender => "unknown_sender",
@@ -66,18 +67,18 @@ impl Dropped {
     }
 }
 
-/// What came. Counts wrap.
+/// Counts of received data. They wrap.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Counts {
     /// Datagrams.
     pub datagrams: u64,
-    /// Messages that were taken.
+    /// Applied messages.
     pub taken: u64,
-    /// Datagrams or messages that were not, by reason.
+    /// Dropped datagrams and messages, by reason.
     pub dropped: BTreeMap<&'static str, u64>,
 }
 
-/// What is known of one user.
+/// State of one user's devices.
 #[derive(Clone, Debug, Default)]
 struct TrackedUser {
     head: Option<Pose>,
@@ -89,7 +90,7 @@ struct TrackedUser {
     sequence: u64,
 }
 
-/// All that a tracker has told. No socket, no clock.
+/// Decoder of a tracker's datagrams, without socket and clock.
 pub struct OscDecoder {
     names: Vec<String>,
     senders: Vec<IpAddr>,
@@ -101,7 +102,7 @@ pub struct OscDecoder {
 }
 
 impl OscDecoder {
-    /// Of no datagram yet.
+    /// Creates the decoder.
     pub fn new(tracker: &Tracker) -> OscDecoder {
         let rotation = match tracker.axes {
             Axes::ZUp => Quat::identity(),
@@ -119,7 +120,7 @@ impl OscDecoder {
         }
     }
 
-    /// A datagram that nobody looks at, because too many come.
+    /// Counts a datagram that is dropped unread, because too many arrive.
     pub fn skip(&mut self) {
         self.counts.datagrams = self.counts.datagrams.wrapping_add(1);
         self.drop(Dropped::TooMany);
@@ -130,7 +131,8 @@ impl OscDecoder {
         *count = count.wrapping_add(1);
     }
 
-    /// A datagram; longer ones than [`MAX_DATAGRAM_BYTES`] may be cut behind that length.
+    /// Decodes a datagram. One longer than [`MAX_DATAGRAM_BYTES`] may be truncated behind that
+    /// length.
     pub fn take(&mut self, from: IpAddr, bytes: &[u8]) {
         self.counts.datagrams = self.counts.datagrams.wrapping_add(1);
         if !self.senders.is_empty() && !self.senders.iter().any(|known| known.to_canonical() == from.to_canonical()) {
@@ -182,7 +184,7 @@ impl OscDecoder {
         Ok(())
     }
 
-    /// A pose in the cave; `None` for no arguments.
+    /// Returns a pose in the cave's frame; `None` without arguments.
     fn pose(&self, args: &[OscType]) -> Result<Option<Pose>, Dropped> {
         if args.is_empty() {
             return Ok(None);
@@ -190,7 +192,7 @@ impl OscDecoder {
         let numbers: Vec<f64> = args.iter().map(number).collect::<Option<_>>().ok_or(Dropped::Arguments)?;
         let [x, y, z, i, j, k, w] = numbers[..] else { return Err(Dropped::Arguments) };
         let (position, rotation) = (Vec3::new(x, y, z), nalgebra::Quaternion::new(w, i, j, k));
-        // false for what is no number, too
+        // also false for NaN
         if !numbers.iter().all(|n| n.is_finite()) || position.norm() > MAX_DISTANCE_M {
             return Err(Dropped::OutOfRange);
         }
@@ -201,13 +203,13 @@ impl OscDecoder {
         Ok(Some(Pose::from_parts((self.rotation * position + self.origin).into(), rotation)))
     }
 
-    /// What is new since the last call, as input of the users.
+    /// Returns the users' input that changed since the last call.
     pub fn inputs(&mut self) -> Vec<Input> {
         let mut inputs = Vec::new();
         for (k, user) in self.users.iter_mut().enumerate().filter(|(_, user)| user.fresh) {
             user.fresh = false;
             user.sequence = user.sequence.wrapping_add(1);
-            // where nothing is said of a wand, it is the right hand
+            // without a wand the right hand takes its place
             let wand = user.wand.or(user.hands[1]);
             let TrackedUser { head, hands, buttons, ref keys, sequence, .. } = *user;
             inputs.push(Input { sequence, user: k as u16, head, wand, hands, buttons, keys: keys.clone() });
@@ -268,14 +270,15 @@ mod tests {
             (inputs.len(), inputs[0].user, inputs[0].sequence, inputs[0].head.unwrap().translation.z),
             (1, 0, 1, 1.0)
         );
-        // told once
+        // returned once
         assert!(decoder.inputs().is_empty());
-        // as a socket of both kinds of addresses names the same sender
+        // as a dual-stack socket reports the same sender
         decoder.take(Ipv4Addr::LOCALHOST.to_ipv6_mapped().into(), &head());
         assert!(decoder.inputs().len() == 1 && decoder.counts.dropped["unknown_sender"] == 1);
     }
 
-    /// A million packets: random bytes, and a good one with random changes, cuts and repeats. All of them are counted, none does what a message cannot.
+    /// A million packets: random bytes, and a valid one with random changes, cuts and repeats. All
+    /// are counted, and none has an effect that a valid message cannot have.
     #[test]
     fn a_million_random_packets_do_no_harm() {
         let (mut decoder, good) = (decoder(), head());

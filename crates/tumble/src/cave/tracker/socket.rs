@@ -1,4 +1,5 @@
-//! A socket that hears a tracker: a thread of its own reads it, so that a flood costs the simulation nothing, and what is newest is there when a frame begins.
+//! Socket of a tracker, read by its own thread. So a flood of datagrams does not slow the
+//! simulation, and the newest input is there when a frame begins.
 
 use super::osc::{Counts, MAX_DATAGRAM_BYTES, OscDecoder};
 use crate::failure::Failure;
@@ -11,13 +12,14 @@ use std::time::{Duration, Instant};
 use tumble::net::sync::Input;
 use tumble::scene::cave::{Cave, Tracker};
 
-/// Datagrams that are read in each [`RATE_WINDOW`]; four times as many more are counted and dropped, and what comes beyond waits, or is dropped by the system.
+/// Maximum number of datagrams decoded in each [`RATE_WINDOW`]. Up to four times as many more are
+/// counted and dropped; the rest waits in the system's buffer or is dropped there.
 const MAX_PER_WINDOW: u32 = 500;
 const RATE_WINDOW: Duration = Duration::from_millis(100);
-/// The thread looks this often whether it is to end.
+/// Interval at which the thread checks whether to end.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// A tracker that is heard.
+/// A tracker's socket and its thread.
 pub struct TrackerSocket {
     decoder: Arc<Mutex<OscDecoder>>,
     end: Arc<AtomicBool>,
@@ -25,16 +27,18 @@ pub struct TrackerSocket {
     at: SocketAddr,
 }
 
-/// What is listened to: as the cave file says, with the command line's address and senders if there are any; `None` where neither says anything.
+/// Returns the tracker of the cave file with the address and senders of the command line, if there
+/// are any. Returns `None` if neither defines a tracker.
 ///
-/// Errors: other machines reach the address, and nobody says which of them are meant.
+/// # Errors
+/// The address is reachable from other machines and there are no senders.
 pub fn configured(cave: &Cave, address: Option<SocketAddr>, senders: &[IpAddr]) -> Result<Option<Tracker>, Failure> {
     let configured = cave.tracker.clone();
     if configured.is_none() && address.is_none() {
         return if senders.is_empty() {
             Ok(None)
         } else {
-            Err(Failure::input("--tracker-from: there is no tracker; say where it is heard with --tracker"))
+            Err(Failure::input("--tracker-from: there is no tracker; give its address with --tracker"))
         };
     }
     let mut tracker = configured.unwrap_or_else(|| Tracker::of(&cave.users));
@@ -45,14 +49,14 @@ pub fn configured(cave: &Cave, address: Option<SocketAddr>, senders: &[IpAddr]) 
         tracker.senders = senders.to_vec();
     }
     if !tracker.address.is_loopback() && tracker.senders.is_empty() {
-        let why = "its datagrams are not sealed, so say who is listened to: --tracker-from IP, or senders = [\"IP\"] in [tracker] of the cave file";
-        return Err(Failure::input(format!("--tracker {}: other machines reach it; {why}", tracker.socket())));
+        let why = "its datagrams are not authenticated, so name the senders: --tracker-from IP, or senders = [\"IP\"] in [tracker] of the cave file";
+        return Err(Failure::input(format!("--tracker {}: reachable from other machines; {why}", tracker.socket())));
     }
     Ok(Some(tracker))
 }
 
 impl TrackerSocket {
-    /// Listens.
+    /// Opens the socket and starts the thread.
     pub fn open(tracker: &Tracker) -> Result<TrackerSocket, Failure> {
         let failed = |e: std::io::Error| Failure::run(&format!("the tracker's address {}", tracker.socket()), e);
         let socket = UdpSocket::bind(tracker.socket()).map_err(failed)?;
@@ -67,7 +71,7 @@ impl TrackerSocket {
         Ok(TrackerSocket { decoder, end, thread: Some(thread), at })
     }
 
-    /// For a person: where, and who is heard.
+    /// Returns a line for the user: address, senders, users.
     pub fn describe(&self, tracker: &Tracker) -> String {
         let who = match &tracker.senders[..] {
             [] => "this machine".to_owned(),
@@ -76,12 +80,12 @@ impl TrackerSocket {
         format!("tracker: OSC at {}, from {who}; users {}", self.at, tracker.users.join(", "))
     }
 
-    /// What is new.
+    /// Returns the users' input that changed since the last call.
     pub fn inputs(&self) -> Vec<Input> {
         lock(&self.decoder).inputs()
     }
 
-    /// What came so far.
+    /// Returns the counts.
     pub fn counts(&self) -> Counts {
         lock(&self.decoder).counts.clone()
     }
@@ -101,7 +105,7 @@ fn lock(decoder: &Mutex<OscDecoder>) -> MutexGuard<'_, OscDecoder> {
 }
 
 fn listen(socket: &UdpSocket, decoder: &Mutex<OscDecoder>, end: &AtomicBool) {
-    // one byte more than may come: so a longer one is known
+    // one byte more than allowed, to recognize a longer datagram
     let mut bytes = [0; MAX_DATAGRAM_BYTES + 1];
     let (mut since, mut count) = (Instant::now(), 0);
     while !end.load(Ordering::Relaxed) {
@@ -119,7 +123,7 @@ fn listen(socket: &UdpSocket, decoder: &Mutex<OscDecoder>, end: &AtomicBool) {
                 if count <= MAX_PER_WINDOW { decoder.take(from.ip(), &bytes[..length]) } else { decoder.skip() }
             }
             Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
-            // as when an answer of ours were refused; we send none, so whatever it is may pass
+            // such as a refused answer; this socket sends none, so any error may pass
             Err(_) => std::thread::sleep(POLL_INTERVAL),
         }
     }

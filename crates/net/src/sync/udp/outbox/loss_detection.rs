@@ -1,4 +1,5 @@
-//! What became of packets: acknowledged, late, lost; and the round trip that tells these apart. The equations stand at the top of the module above.
+//! Loss detection: marks packets as acknowledged or lost, and measures the round trip. The
+//! equations are at the top of the parent module.
 
 use super::super::frames::{Ack, before};
 use super::super::packet::full_sequence;
@@ -6,7 +7,8 @@ use super::stream::Stream;
 use super::{Outbox, PacketStatus, Piece, Sent};
 use std::time::Duration;
 
-/// Packets remembered after they were given up, so that a late acknowledgement still tells the round trip.
+/// Maximum number of packets remembered after their loss, so that a late acknowledgement still
+/// measures the round trip.
 const MAX_REMEMBERED: usize = 512;
 const RESOLUTION: Duration = Duration::from_millis(1);
 const MAX_TIMEOUT: Duration = Duration::from_millis(250);
@@ -16,7 +18,10 @@ const MAX_TIMEOUT: Duration = Duration::from_millis(250);
 pub struct InvalidAck;
 
 impl Outbox {
-    /// Takes an acknowledgement.
+    /// Processes an acknowledgement.
+    ///
+    /// # Errors
+    /// [`InvalidAck`].
     pub fn acknowledged(&mut self, now: Duration, ack: &Ack, next_sequence: u64) -> Result<(), InvalidAck> {
         let largest = full_sequence(ack.largest, next_sequence);
         let complete = [Some(ack.reliable), ack.newest];
@@ -34,12 +39,12 @@ impl Outbox {
         Ok(())
     }
 
-    /// When something is due without any packet arriving.
+    /// Returns when a packet times out, if no packet arrives before.
     pub fn wake(&self) -> Option<Duration> {
         self.sent.iter().filter(|sent| sent.status == PacketStatus::InFlight).map(|sent| self.due(sent)).min()
     }
 
-    /// Gives up the packets whose time is over.
+    /// Marks packets as lost whose time has passed.
     pub fn tick(&mut self, now: Duration) {
         let mut timed_out = false;
         for k in 0..self.sent.len() {
@@ -127,7 +132,7 @@ impl Outbox {
         }
     }
 
-    /// Forgets packets from the front that nothing is expected of any more.
+    /// Forgets packets at the front that need no further attention.
     pub(super) fn forget(&mut self) {
         while self.sent.front().is_some_and(|sent| {
             sent.status == PacketStatus::Acknowledged

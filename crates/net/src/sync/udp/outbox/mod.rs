@@ -1,24 +1,27 @@
-//! Messages in, pieces of packets out; acknowledgements in, repairs out.
+//! Sending: splits messages into pieces of packets, and repairs losses after acknowledgements.
 //!
-//! A packet is lost when it is not acknowledged `loss_delay` after it was sent although a later one was, or `timeout` after it was sent at all:
+//! A packet is lost if it is not acknowledged within `loss_delay` although a later one was, or not
+//! within `timeout` at all:
 //!
 //! ```text
 //! srtt   ← 7/8 srtt + 1/8 sample          var ← 3/4 var + 1/4 |srtt − sample|          (RFC 6298; smoothed round trip and its deviation)
 //! loss_delay = srtt + max(2 var, 0.5 ms)
-//! timeout    = srtt + min(4 var, 4 ms) + 1 ms              for the first two time-outs in a row
+//! timeout    = srtt + min(4 var, 4 ms) + 1 ms              for the first two timeouts in a row
 //!            = (srtt + 4 var + 1 ms) · 2^(k − 2)           for those after k, at most 250 ms
 //! ```
 //!
-//! What is lost is sent again, twice where the budget allows: at a loss of 5 % a repair then fails 0.25 % of the time, for 5 % more bytes, and it is the repair
-//! of a repair that makes the longest delays. While more than 0.5 % is lost, a message of several fragments gets a parity fragment for each four, and a message
-//! of one is sent twice, again where the budget allows. The budget is what keeps the bytes in bounds:
+//! Lost pieces are sent again, twice if the budget allows. At a loss of 5 % a repair then fails
+//! 0.25 % of the time, for 5 % more bytes; repairs of repairs make the longest delays. While more
+//! than 0.5 % of packets are lost, a message of several fragments gets a parity fragment for each
+//! four, and a message of one fragment is sent twice, if the budget allows. The budget bounds the
+//! total number of bytes:
 //!
 //! ```text
-//! balance += 1.5 · length of a message        balance −= length of each packet sent or received
+//! budget += 1.5 · length of a message        budget −= length of each packet sent or received
 //! ```
 //!
-//! Something redundant is sent only while the balance covers it. Ordering over a fixed time rather than over a count of later packets keeps reordering
-//! from looking like loss.
+//! Redundant packets are sent only while the budget covers them. Packets are declared lost after a
+//! time instead of after a number of later packets, so that reordering is not mistaken for loss.
 
 mod loss_detection;
 mod stream;
@@ -31,14 +34,14 @@ use std::sync::Arc;
 use std::time::Duration;
 use stream::Stream;
 
-/// Packets under way at once; half of what a socket's default buffer holds.
+/// Maximum number of packets in flight: half of what the default buffer of a socket holds.
 const MAX_PACKETS_IN_FLIGHT: usize = 64;
-/// Share of lost packets above which redundancy pays.
+/// Fraction of lost packets above which redundancy is sent.
 const REDUNDANCY_THRESHOLD: f64 = 0.005;
-/// Bytes by which the balance may run ahead or behind.
+/// Bounds of the budget, bytes.
 const MAX_BUDGET: i64 = 32 << 10;
 
-/// What a packet holds.
+/// Content of a packet.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Piece {
     Fragment(Channel, u32, u16),
@@ -60,17 +63,17 @@ struct Sent {
     status: PacketStatus,
 }
 
-/// More waits than may.
+/// More data waits than allowed.
 #[derive(Debug, PartialEq, Eq)]
 pub struct QueueFull;
 
-/// What is to be sent of one connection.
+/// Messages of one connection on their way out.
 pub struct Outbox {
     streams: [Stream; 2],
     sent: VecDeque<Sent>,
     in_flight: usize,
     repairs: VecDeque<Piece>,
-    /// Second copies, sent in a packet of their own.
+    /// Second copies, each sent in its own packet.
     again: VecDeque<Piece>,
     ping: bool,
     srtt: Duration,
@@ -85,7 +88,8 @@ pub struct Outbox {
 }
 
 impl Outbox {
-    /// Empty; message numbers begin at `first` (0 but in tests of the wrap).
+    /// Creates an empty outbox. Message numbers begin at `first`, which is 0 except in tests of the
+    /// wrap.
     pub fn new(first: u32) -> Outbox {
         Outbox {
             streams: [(); 2].map(|()| Stream::new(first)),
@@ -106,7 +110,11 @@ impl Outbox {
         }
     }
 
-    /// Takes a message of 1 to [`MAX_MESSAGE_BYTES`](crate::sync::transport::MAX_MESSAGE_BYTES) bytes.
+    /// Queues a message of 1 to [`MAX_MESSAGE_BYTES`](crate::sync::transport::MAX_MESSAGE_BYTES)
+    /// bytes.
+    ///
+    /// # Errors
+    /// [`QueueFull`].
     pub fn push(&mut self, channel: Channel, message: Arc<[u8]>) -> Result<(), QueueFull> {
         self.credit(message.len() * 3 / 2);
         let stream = &mut self.streams[channel as usize];
@@ -123,22 +131,24 @@ impl Outbox {
         Ok(())
     }
 
-    /// Asks for an acknowledgement although there is nothing to send.
+    /// Requests an acknowledgement even if there is nothing to send.
     pub fn ping(&mut self) {
         self.ping = true;
     }
 
-    /// Pieces sent again or for redundancy; counted since this was asked last.
+    /// Returns the number of pieces resent or sent for redundancy since the last call.
     pub fn take_repeated(&mut self) -> u64 {
         std::mem::take(&mut self.repeated)
     }
 
-    /// Newest messages replaced before they were begun; counted since this was asked last.
+    /// Returns the number of newest messages replaced before they were started, since the last
+    /// call.
     pub fn take_superseded(&mut self) -> u64 {
         std::mem::take(&mut self.superseded)
     }
 
-    /// Fills a packet with up to `room` bytes of frames. `false`: there is nothing to send now.
+    /// Fills a packet with up to `room` bytes of frames. Returns `false` if there is nothing to
+    /// send now.
     pub fn fill(&mut self, now: Duration, sequence: u64, room: usize, body: &mut Vec<u8>) -> bool {
         let end = body.len() + room;
         let mut pieces = Vec::new();
@@ -155,17 +165,17 @@ impl Outbox {
         true
     }
 
-    /// A packet of so many bytes was sent or received: it is paid for.
+    /// Debits a sent or received packet.
     pub fn debit(&mut self, bytes: usize) {
         self.budget = (self.budget - bytes as i64).max(-MAX_BUDGET);
     }
 
     fn credit(&mut self, bytes: usize) {
-        // A long message earns and pays within the same burst, so only what stands idle is cut.
+        // a long message is credited and debited within one burst, so only an idle budget is capped
         self.budget = self.budget.min(MAX_BUDGET) + bytes as i64;
     }
 
-    /// What to send next: repairs, then what was never sent, then redundancy.
+    /// Returns the next piece to send: repairs, then new pieces, then redundancy.
     fn choose(&mut self, room: usize, first: bool) -> Option<Piece> {
         while let Some(&piece) = self.repairs.front() {
             match self.size(piece) {
@@ -193,7 +203,7 @@ impl Outbox {
         (first && std::mem::take(&mut self.ping)).then_some(Piece::Ping)
     }
 
-    /// The next piece that was never sent, if it has room.
+    /// Returns the next new piece if it fits.
     fn unsent(&mut self, room: usize) -> Option<Piece> {
         let (loss, budget) = (self.loss, self.budget);
         let outgoing = self
@@ -226,14 +236,14 @@ impl Outbox {
         Some(piece)
     }
 
-    /// A second copy in a packet of its own, if the budget covers it.
+    /// Schedules a second copy in a packet of its own, if the budget covers it.
     fn repeat(&mut self, piece: Piece, size: usize) {
         if self.budget >= 2 * (size + 64) as i64 && self.again.len() < MAX_PACKETS_IN_FLIGHT {
             self.again.push_back(piece);
         }
     }
 
-    /// Bytes of a piece; `None` if it is not needed any more.
+    /// Returns the length of a piece; `None` if it is no longer needed.
     fn size(&mut self, piece: Piece) -> Option<usize> {
         let Piece::Fragment(channel, message, index) = piece else { return Some(1) };
         let outgoing = self.streams[channel as usize].find(message)?;
@@ -278,7 +288,7 @@ impl Outbox {
     }
 }
 
-/// A parity fragment for each four, as far as the balance covers it.
+/// Returns the number of parity fragments: one for each four, as far as the budget covers them.
 fn parity_groups(part: &MessageInfo, budget: i64) -> u16 {
     let affordable = budget.max(0) / (FRAGMENT_BYTES + 100) as i64;
     let fragments = i64::from(part.fragments());

@@ -1,52 +1,52 @@
-//! One stream of messages on its way out: those that wait, those that are begun, and how far each of their fragments is.
+//! One outgoing stream: waiting messages, started messages, and the progress of their fragments.
 
 use super::super::frames::{Channel, MessageInfo, before};
 use super::super::inbox::{MAX_BYTES_IN_FLIGHT, MAX_NEWEST_IN_FLIGHT, MAX_RELIABLE_IN_FLIGHT};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// A fragment under way.
+/// Progress of a fragment.
 #[derive(Clone, Copy, Default)]
 pub struct Progress {
-    /// Packets under way that hold it.
+    /// Number of packets in flight that contain it.
     pub copies: u8,
     pub arrived: bool,
 }
 
-/// A message under way.
+/// A started message.
 pub struct Outgoing {
     pub part: MessageInfo,
     pub data: Arc<[u8]>,
     pub progress: Vec<Progress>,
     pub missing: u16,
-    /// Fragments from here on were never sent.
+    /// First fragment that was never sent.
     pub unsent: u16,
-    /// Parity groups, 0 until the last fragment was sent; and those from here on were never sent.
+    /// Number of parity groups, 0 until the last fragment was sent; and the first one never sent.
     pub groups: u16,
     pub unsent_parity: u16,
 }
 
 /// One stream of messages.
 pub struct Stream {
-    /// Messages that were not begun; at most one of the newest.
+    /// Messages that were not started; at most one in the newest stream.
     pub waiting: VecDeque<Arc<[u8]>>,
     pub begun: VecDeque<Outgoing>,
     pub begun_bytes: usize,
     pub waiting_bytes: usize,
     pub next: u32,
-    /// The other side has all before this one.
+    /// The peer has all messages before this one.
     pub done: u32,
 }
 
 impl Outgoing {
-    /// Whether a fragment, or a parity that may still help, was never sent.
+    /// Returns whether a fragment, or a parity fragment that can still help, was never sent.
     pub fn has_unsent(&self) -> bool {
         self.unsent < self.part.fragments() || (self.unsent_parity < self.groups && self.missing > 0)
     }
 }
 
 impl Stream {
-    /// Empty; numbers begin at `first`.
+    /// Creates an empty stream. Numbers begin at `first`.
     pub fn new(first: u32) -> Stream {
         Stream {
             waiting: VecDeque::new(),
@@ -83,13 +83,13 @@ impl Stream {
         });
     }
 
-    /// The message, if it is still under way.
+    /// Returns the message if it is in progress.
     pub fn find(&mut self, message: u32) -> Option<&mut Outgoing> {
         let first = self.begun.front()?.part.message;
         self.begun.get_mut(message.wrapping_sub(first) as usize)
     }
 
-    /// The other side has all messages before `done`.
+    /// Notes that the peer has all messages before `done`.
     pub fn finish(&mut self, done: u32) {
         if before(self.done, done) {
             self.done = done;
