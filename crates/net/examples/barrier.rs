@@ -1,4 +1,5 @@
-//! How long a frame takes from the server to all facets and back, within one process: no network, no pictures. What is left is the protocol's own work.
+//! How long a frame takes from the server to all facets and back, within one process: no network,
+//! no pictures. What is left is the protocol's own work.
 //!
 //! ```text
 //! cargo run --release -p tumble-net --example barrier -- [BODIES] [FACETS] [FRAMES]

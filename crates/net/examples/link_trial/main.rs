@@ -1,14 +1,18 @@
-//! How fast and how sure a transport is: a server, facets in processes of their own, nothing simulated and nothing drawn.
+//! How fast and how sure a transport is: a server, facets in processes of their own, nothing
+//! simulated and nothing drawn.
 //!
 //! ```sh
 //! cargo run --release -p tumble-net --example link_trial -- --transport shm --facets 6 --bytes 65536 --rate 500 --frames 2000
 //! cargo run --release -p tumble-net --example link_trial -- --transport udp --facets 2 --bytes 16384 --rate 60 --frames 2000 --loss 0.05
 //! ```
 //!
-//! With `--stay-cpu_latency yes` the cores are kept from sleeping meanwhile (`/dev/cpu_dma_latency`, usually root's).
+//! With `--stay-cpu_latency yes` the cores are kept from sleeping meanwhile
+//! (`/dev/cpu_dma_latency`, usually root's).
 //!
-//! Each frame goes the whole way: STATE to all facets, READY from each, PRESENT to all, PRESENTED from each. Times are taken by the clock of this machine,
-//! which its processes share. `scripts/netns.sh` runs the same between network namespaces, with the roles apart (`--role server`, `facet`, `relay`).
+//! Each frame goes the whole way: STATE to all facets, READY from each, PRESENT to all, PRESENTED
+//! from each. Times are taken by the clock of this machine, which its processes share.
+//! `scripts/netns.sh` runs the same between network namespaces, with the roles apart (`--role
+//! server`, `facet`, `relay`).
 
 mod facet;
 mod options;

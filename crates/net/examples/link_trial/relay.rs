@@ -1,4 +1,5 @@
-//! A bad network as a process: takes the facets' datagrams at `--listen`, hands them on to `--address`, and back, with the faults asked for.
+//! A bad network as a process: takes the facets' datagrams at `--listen`, hands them on to
+//! `--address`, and back, with the faults asked for.
 
 use super::Failure;
 use super::options::Options;

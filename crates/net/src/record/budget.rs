@@ -1,7 +1,8 @@
-//! What a protobuf message will take in memory, found before it is decoded.
+//! Memory that a decoded protobuf message will take, computed before decoding.
 //!
-//! Two bytes on the wire are enough for an empty submessage that takes hundreds in memory, and compression makes the
-//! two bytes nearly free. This walk over the wire format (Protocol Buffers, "Encoding") allocates nothing:
+//! Two bytes on the wire are enough for an empty submessage that takes hundreds in memory, and
+//! compression makes the two bytes nearly free. This walk over the wire format (Protocol Buffers,
+//! "Encoding") allocates nothing:
 //!
 //! ```text
 //! message = (key value)*,   key = varint (number · 8 + wire type)

@@ -1,9 +1,9 @@
-//! Little-endian fields out of a slice. A length is believed only as far as the slice goes; nothing is allocated on
-//! the strength of a number.
+//! Little-endian fields out of a slice. A length is believed only as far as the slice goes; nothing
+//! is allocated on the strength of a number.
 
 use std::collections::BTreeMap;
 
-/// What is missing, for an error message.
+/// Description of a fault, for an error message.
 pub(crate) type Problem = String;
 
 /// The unread rest of a record.

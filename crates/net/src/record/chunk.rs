@@ -1,4 +1,5 @@
-//! Chunks: decompression under a bound, checksum, and the records inside (MCAP specification, "Records").
+//! Chunks: decompression under a bound, checksum, and the records inside (MCAP specification,
+//! "Records").
 
 use super::bytes::{Fields, Problem};
 use super::{MAX_CHUNK_BYTES, MAX_DEFINITION_BYTES, MAX_DEFINITIONS};
@@ -23,7 +24,8 @@ pub(crate) struct Channel {
     pub metadata: BTreeMap<String, String>,
 }
 
-/// Notes a definition, if it is new to both. Another one under the same number is a fault, and so is one too many.
+/// Notes a definition, if it is new to both. Another one under the same number is a fault, and so
+/// is one too many.
 pub(crate) fn define<T: PartialEq>(
     known: &BTreeMap<u16, T>,
     new: &mut BTreeMap<u16, T>,
@@ -139,7 +141,8 @@ pub(crate) fn open_chunk(body: &[u8]) -> Result<Chunk, Problem> {
     Ok(Chunk { compression, content })
 }
 
-/// Decompresses to at most one byte more than `size`; memory grows with the bytes that come out, not with the claim.
+/// Decompresses to at most one byte more than `size`; memory grows with the bytes that come out,
+/// not with the claim.
 fn decompress(compression: &str, stored: &[u8], size: u64) -> Result<Vec<u8>, Problem> {
     let fault = |e: std::io::Error| format!("{compression} data in the chunk: {e}");
     let mut out = Vec::new();

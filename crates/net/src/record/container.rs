@@ -1,11 +1,12 @@
-//! The outer file, record by record, from the first byte to the last (MCAP specification, "File structure").
+//! The outer file, record by record, from the first byte to the last (MCAP specification, "File
+//! structure").
 //!
 //! ```text
 //! magic  Header  (Chunk MessageIndex* | Metadata | …)*  DataEnd(crc)  summary  Footer(crc)  magic
 //! ```
 //!
-//! A record is one byte of opcode, eight of length, then the body. Both checksums are verified on the way, so that
-//! after [`Ending::Complete`] every byte of the file was covered by one.
+//! A record is one byte of opcode, eight of length, then the body. Both checksums are verified on
+//! the way, so that after [`Ending::Complete`] every byte of the file was covered by one.
 
 use super::MAX_RECORD_BYTES;
 use super::bytes::Fields;
@@ -23,16 +24,16 @@ pub enum Ending {
     Complete,
     /// In the middle, as a killed run leaves it. Everything before `offset` was read.
     Cut {
-        /// First byte that is of no use.
+        /// First unusable byte.
         offset: u64,
-        /// What is missing there.
+        /// Description of the missing part.
         what: String,
     },
 }
 
 /// One record of the outer file.
 pub(crate) struct RawRecord {
-    /// Where its opcode stands in the file.
+    /// Offset of its opcode in the file.
     pub offset: u64,
     pub opcode: u8,
     pub body: Vec<u8>,
@@ -178,7 +179,8 @@ impl Container {
         Ok(Next::End(Ending::Complete))
     }
 
-    /// Compares a checksum with the one stored as the last field of `body`, after `skip` bytes. Zero means none was made.
+    /// Compares a checksum with the one stored as the last field of `body`, after `skip` bytes.
+    /// Zero means none was made.
     fn compare_crc(&self, offset: u64, body: &[u8], skip: u64, crc: crc32fast::Hasher, what: &str) -> Result<()> {
         let fault = |what: String| RecordError::corrupt(&self.path, offset, what);
         let mut fields = Fields(body);

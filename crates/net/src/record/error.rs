@@ -1,4 +1,4 @@
-//! What can go wrong while recording, reading and mending.
+//! Errors of recording, reading and recovering.
 
 use std::path::{Path, PathBuf};
 
@@ -10,9 +10,9 @@ pub enum RecordError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What was tried.
+        /// The operation.
         what: &'static str,
-        /// The system's answer.
+        /// The system's error.
         source: std::io::Error,
     },
     /// The container's writer refused (a full disk, usually).
@@ -20,10 +20,10 @@ pub enum RecordError {
     Write {
         /// The file.
         path: PathBuf,
-        /// The writer's answer.
+        /// The writer's error.
         source: mcap::McapError,
     },
-    /// What the caller wants recorded cannot be.
+    /// The input cannot be recorded.
     #[error("cannot record {what}: {why}")]
     Input {
         /// Which entity, frame or option.
@@ -36,7 +36,7 @@ pub enum RecordError {
     NotMcap {
         /// The file.
         path: PathBuf,
-        /// What is there instead.
+        /// Description of the content.
         why: String,
     },
     /// An MCAP file, but not one of ours.
@@ -44,7 +44,7 @@ pub enum RecordError {
     NotARecording {
         /// The file.
         path: PathBuf,
-        /// What is missing or different.
+        /// The missing or different part.
         why: String,
     },
     /// The file is damaged.
@@ -52,9 +52,9 @@ pub enum RecordError {
     Corrupt {
         /// The file.
         path: PathBuf,
-        /// Where in the file the damaged record begins.
+        /// Offset of the damaged record.
         offset: u64,
-        /// What is wrong there.
+        /// Description of the damage.
         what: String,
     },
     /// A cut or damaged file holds no whole frame.
@@ -62,14 +62,14 @@ pub enum RecordError {
     NothingToRecover {
         /// The file.
         path: PathBuf,
-        /// Where reading ended.
+        /// Offset at which reading ended.
         offset: u64,
         /// Why it ended.
         what: String,
     },
 }
 
-/// This module's result.
+/// Result of this module.
 pub(crate) type Result<T> = std::result::Result<T, RecordError>;
 
 impl RecordError {

@@ -1,7 +1,9 @@
-//! What a recording would show, sent while it happens: a WebSocket server that Foxglove connects to (feature `live`).
+//! Live stream of a recording's content: a WebSocket server that Foxglove connects to (feature
+//! `live`).
 //!
-//! The scene goes to a viewer when it comes, poses go with every frame. Each viewer has a queue of [`BACKLOG`] messages; where it is full, the oldest is
-//! dropped, so nobody who watches delays anybody. Nothing that a viewer sends is read but which topics it wants.
+//! The scene goes to a viewer when it comes, poses go with every frame. Each viewer has a queue of
+//! [`BACKLOG`] messages; where it is full, the oldest is dropped, so nobody who watches delays
+//! anybody. Nothing that a viewer sends is read but which topics it wants.
 
 use super::error::Result;
 use super::messages::{nanoseconds, scene_update, set_transforms, transforms_for};
@@ -26,7 +28,7 @@ pub struct Live {
     transforms: Channel<FrameTransforms>,
     message: FrameTransforms,
     names: Vec<String>,
-    /// Somebody new wants the scene.
+    /// A new viewer needs the scene.
     wanted: Arc<Newcomers>,
     // the channels are in it
     _context: Arc<Context>,
@@ -44,7 +46,7 @@ impl ServerListener for Newcomers {
 }
 
 impl Live {
-    /// Listens. Whoever reaches the address sees the run: there is no key.
+    /// Listens. Every machine that reaches the address can watch: there is no key.
     ///
     /// # Errors
     /// The address is taken or not this machine's.
@@ -86,7 +88,7 @@ impl Live {
     pub fn frame(&mut self, world: &World) {
         let newcomers = self.wanted.0.swap(false, Ordering::AcqRel);
         if self.viewers() == 0 {
-            // who comes next gets all of it
+            // the next viewer gets all of it
             self.names.clear();
             return;
         }

@@ -16,7 +16,8 @@ pub(crate) fn nanoseconds(time_s: f64) -> u64 {
     (time_s * NANOS_PER_SECOND as f64).round() as u64
 }
 
-/// A log time as Foxglove's stamp. Below `MAX_TIME_S` the seconds fit 32 bits; beyond, they saturate.
+/// A log time as Foxglove's stamp. Below `MAX_TIME_S` the seconds fit 32 bits; beyond, they
+/// saturate.
 fn stamp(log_time: u64) -> Timestamp {
     let seconds = u32::try_from(log_time / NANOS_PER_SECOND).unwrap_or(u32::MAX);
     Timestamp::new(seconds, (log_time % NANOS_PER_SECOND) as u32)
@@ -151,7 +152,8 @@ pub(crate) fn set_transforms(message: &mut FrameTransforms, log_time: u64, poses
     }
 }
 
-/// Names and poses out of a message; a field left out is the identity's, as protobuf's zero would be no rotation.
+/// Names and poses out of a message; a field left out is the identity's, as protobuf's zero would
+/// be no rotation.
 pub(crate) fn poses_of(message: FrameTransforms) -> Vec<(String, Pose)> {
     let read = |t: FrameTransform| (t.child_frame_id, read_pose(t.translation, t.rotation));
     message.transforms.into_iter().map(read).collect()

@@ -1,4 +1,5 @@
-//! Recordings: MCAP files that Foxglove and Rerun open as they are, and that a killed run leaves readable.
+//! Recordings: MCAP files that Foxglove and Rerun open as they are, and that a killed run leaves
+//! readable.
 //!
 //! ```
 //! use tumble_net::record::{Entity, Pose, Recorder, RecorderOptions, Shape, VisualPart, read};
@@ -29,27 +30,31 @@
 //! | [`TOPIC_TRANSFORMS`] | `foxglove.FrameTransforms` | every frame: [`ROOT_FRAME`] → each entity's frame, named as the entity |
 //! | [`TOPIC_STATE`] | `tumble.State` | every frame: frame number, exact time and the caller's state bytes |
 //!
-//! All three are protobuf and carry their schema in the file; the text of `tumble.State` stands in the channel's
-//! metadata under `proto` as well. A metadata record named `tumble` says the version and the world's name.
+//! All three are protobuf and carry their schema in the file; the text of `tumble.State` stands in
+//! the channel's metadata under `proto` as well. A metadata record named `tumble` says the version
+//! and the world's name.
 //!
-//! **What viewers show.** Foxglove draws the entities and moves them. Rerun (0.41) reads all three topics and moves the
-//! frames, but does not draw `foxglove.SceneUpdate`; it lists the message's fields.
+//! **What viewers show.** Foxglove draws the entities and moves them. Rerun (0.41) reads all three
+//! topics and moves the frames, but does not draw `foxglove.SceneUpdate`; it lists the message's
+//! fields.
 //!
-//! **Time.** Every time stamp is *simulated* time in nanoseconds from 0, rounded to the nearest; no wall clock enters
-//! the file, so the same run gives the same bytes. A viewer that shows dates shows 1 January 1970. The unrounded
-//! `f64` is in `tumble.State`.
+//! **Time.** Every time stamp is *simulated* time in nanoseconds from 0, rounded to the nearest; no
+//! wall clock enters the file, so the same run gives the same bytes. A viewer that shows dates
+//! shows 1 January 1970. The unrounded `f64` is in `tumble.State`.
 //!
-//! **Killed runs.** Chunks are built in memory and appended whole; nothing already written is touched again. A file
-//! that ends anywhere is readable up to its last flush ([`FlushEvery`]), which puts the bytes into the operating
-//! system's hands: they survive the death of the process, not a power cut. A chunk holds whole frames only.
-//! [`read`] accepts a cut file and says where it ends; [`recover`] turns it into a complete one, for programs that insist.
+//! **Killed runs.** Chunks are built in memory and appended whole; nothing already written is
+//! touched again. A file that ends anywhere is readable up to its last flush ([`FlushEvery`]),
+//! which puts the bytes into the operating system's hands: they survive the death of the process,
+//! not a power cut. A chunk holds whole frames only. [`read`] accepts a cut file and says where it
+//! ends; [`recover`] turns it into a complete one, for programs that insist.
 //!
 //! # Bounds
 //!
-//! No length in a file is believed before it was checked against the bytes that are there and against a cap:
-//! [`MAX_RECORD_BYTES`], [`MAX_CHUNK_BYTES`], [`MAX_DEFINITION_BYTES`], [`MAX_DEFINITIONS`], [`MAX_SCENE_MEMORY`],
-//! [`MAX_ENTITIES`], [`MAX_NAME_BYTES`]. The writer keeps to the same caps
-//! (and [`MAX_STATE_BYTES`], [`MAX_SCENE_BYTES`]), so whatever it writes can be read.
+//! No length in a file is believed before it was checked against the bytes that are there and
+//! against a cap: [`MAX_RECORD_BYTES`], [`MAX_CHUNK_BYTES`], [`MAX_DEFINITION_BYTES`],
+//! [`MAX_DEFINITIONS`], [`MAX_SCENE_MEMORY`], [`MAX_ENTITIES`], [`MAX_NAME_BYTES`]. The writer
+//! keeps to the same caps (and [`MAX_STATE_BYTES`], [`MAX_SCENE_BYTES`]), so whatever it writes can
+//! be read.
 
 mod budget;
 mod bytes;

@@ -33,8 +33,8 @@ pub struct Frame {
 
 /// Opens a recording, complete or cut, and reads up to its first scene.
 ///
-/// Errors: no file, not MCAP, not one of ours, or damaged before the first scene. A file cut there is not an error: it
-/// has no entities and no frames, and [`Reader::ending`] says where it stops.
+/// Errors: no file, not MCAP, not one of ours, or damaged before the first scene. A file cut there
+/// is not an error: it has no entities and no frames, and [`Reader::ending`] says where it stops.
 pub fn read(path: impl AsRef<Path>) -> Result<Reader> {
     let mut reader = Reader {
         container: Container::open(path.as_ref())?,
@@ -97,9 +97,9 @@ impl Reader {
         self.world.as_deref().unwrap_or_default()
     }
 
-    /// The entities that the last frame's poses belong to (before the first frame: the first scene's). Their parts are
-    /// as drawn: a capsule is a cylinder and two spheres, a plane is a mesh. An entity whose scene was lost to damage
-    /// has its name and no parts.
+    /// The entities that the last frame's poses belong to (before the first frame: the first
+    /// scene's). Their parts are as drawn: a capsule is a cylinder and two spheres, a plane is a
+    /// mesh. An entity whose scene was lost to damage has its name and no parts.
     pub fn entities(&self) -> &[Entity] {
         &self.entities
     }
@@ -111,8 +111,9 @@ impl Reader {
 
     /// The next frame, or `None` at the end.
     ///
-    /// Errors: damage, with the byte where the damaged record begins. After an error there are no more frames. Each frame
-    /// handed out passed its chunk's checksum; that a whole chunk is missing shows only in the checksum at the end.
+    /// Errors: damage, with the byte where the damaged record begins. After an error there are no
+    /// more frames. Each frame handed out passed its chunk's checksum; that a whole chunk is
+    /// missing shows only in the checksum at the end.
     pub fn next_frame(&mut self) -> Result<Option<Frame>> {
         if let Some(frame) = self.ahead.take() {
             return Ok(Some(frame));
@@ -252,7 +253,8 @@ impl Reader {
         Ok(())
     }
 
-    /// Makes the list of entities that of these transforms. They differ only where a scene was lost.
+    /// Makes the list of entities that of these transforms. They differ only where a scene was
+    /// lost.
     fn adopt_names(&mut self, named: &[(String, Pose)]) {
         if named.iter().map(|(name, _)| name).eq(self.entities.iter().map(|entity| &entity.name)) {
             return;

@@ -16,7 +16,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 
-/// What [`recover`] found and kept.
+/// Result of [`recover`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecoverReport {
     /// Frames kept.
@@ -31,18 +31,18 @@ pub struct RecoverReport {
     pub dropped_records: u64,
     /// Bytes of the old file that were walked through; the rest is of no use.
     pub bytes_used: u64,
-    /// What is wrong with the old file, first fault first; `None` if it was complete.
+    /// First fault of the old file; `None` if it was complete.
     pub fault: Option<String>,
 }
 
 /// Reads `input` as far as it goes and writes a complete file `output`, which must not exist.
 ///
-/// A chunk whose content is damaged is left out and reading goes on behind it; where the file's own structure is
-/// damaged, reading ends. Messages, their times and the division into chunks stay as they are, so that a complete
-/// file of ours comes out byte for byte.
+/// A chunk whose content is damaged is left out and reading goes on behind it; where the file's own
+/// structure is damaged, reading ends. Messages, their times and the division into chunks stay as
+/// they are, so that a complete file of ours comes out byte for byte.
 ///
-/// Errors: `input` is no MCAP file; no frame can be read ([`RecordError::NothingToRecover`]); `output` exists or cannot be written. After an
-/// error there is no `output`.
+/// Errors: `input` is no MCAP file; no frame can be read ([`RecordError::NothingToRecover`]);
+/// `output` exists or cannot be written. After an error there is no `output`.
 pub fn recover(input: impl AsRef<Path>, output: impl AsRef<Path>) -> Result<RecoverReport> {
     let (input, output) = (input.as_ref(), output.as_ref());
     let container = Container::open(input)?;
@@ -199,7 +199,7 @@ impl<'a> Mender<'a> {
     }
 }
 
-/// What a chunk brings: definitions that were not there before, and messages.
+/// Content of a chunk: new definitions, and messages.
 #[derive(Default)]
 struct Parsed<'b> {
     schemas: BTreeMap<u16, Schema>,
@@ -208,7 +208,7 @@ struct Parsed<'b> {
 }
 
 impl Mender<'_> {
-    /// The writer, made when the first chunk tells the compression.
+    /// The writer, made when the first chunk gives the compression.
     fn writer(&mut self, compression: &str) -> Result<&mut AppendWriter> {
         if let Some(file) = self.file.take() {
             let compression = match compression {

@@ -1,14 +1,14 @@
-//! What is drawn: entities, their parts and poses, as plain data.
+//! Visible content: entities, their parts and poses, as plain data.
 
 use super::error::{RecordError, Result};
 use super::schemas::ROOT_FRAME;
 use super::{MAX_ENTITIES, MAX_NAME_BYTES};
 use std::collections::BTreeSet;
 
-/// Where a frame stands in its parent: rotate, then translate.
+/// Pose of a frame in its parent: rotate, then translate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// Origin, metres.
+    /// Origin, meters.
     pub position: [f64; 3],
     /// Unit quaternion, `x, y, z, w`.
     pub rotation: [f64; 4],
@@ -18,12 +18,13 @@ impl Pose {
     /// No rotation, no translation.
     pub const IDENTITY: Pose = Pose { position: [0.0; 3], rotation: [0.0, 0.0, 0.0, 1.0] };
 
-    /// Translation alone, metres.
+    /// Translation alone, meters.
     pub const fn at(position: [f64; 3]) -> Pose {
         Pose { position, ..Pose::IDENTITY }
     }
 
-    /// Why a viewer could not use this pose, if it could not: numbers not finite, quaternion not of unit length (1e-3).
+    /// Why a viewer could not use this pose, if it could not: numbers not finite, quaternion not of
+    /// unit length (1e-3).
     pub(crate) fn fault(&self) -> Option<String> {
         let finite = self.position.iter().chain(&self.rotation).all(|x| x.is_finite());
         let norm = self.rotation.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -39,10 +40,10 @@ impl Pose {
     }
 }
 
-/// The form of a part, about its own origin. All lengths in metres.
+/// The form of a part, about its own origin. All lengths in meters.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    /// A ball.
+    /// A sphere.
     Sphere {
         /// Radius.
         radius: f64,
@@ -59,7 +60,8 @@ pub enum Shape {
         /// Half of the length.
         half_height: f64,
     },
-    /// A cylinder along z with half a ball on each end. Stored as a cylinder and two spheres, and read back as these.
+    /// A cylinder along z with a hemisphere on each end. Stored as a cylinder and two spheres, and
+    /// read back as these.
     Capsule {
         /// Radius of cylinder and caps.
         radius: f64,
@@ -73,14 +75,15 @@ pub enum Shape {
         /// Three indices each, counter-clockwise from outside.
         triangles: Vec<[u32; 3]>,
     },
-    /// The plane z = 0 with normal +z, drawn as a square. Stored as two triangles, and read back as a mesh.
+    /// The plane z = 0 with normal +z, drawn as a square. Stored as two triangles, and read back as
+    /// a mesh.
     Plane {
         /// Half of the square's edge.
         half_size: f64,
     },
 }
 
-/// A coloured shape at a place in its entity's frame.
+/// A colored shape at a place in its entity's frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VisualPart {
     /// The form.
@@ -96,7 +99,7 @@ pub struct VisualPart {
 pub struct Entity {
     /// Name, unique in the recording at a time; 1 to [`MAX_NAME_BYTES`] bytes, and not `world`.
     pub name: String,
-    /// What is drawn; may be empty.
+    /// Visible parts; may be empty.
     pub parts: Vec<VisualPart>,
 }
 
@@ -152,7 +155,7 @@ fn shape_fault(shape: &Shape) -> Option<String> {
         Shape::Mesh { vertices, triangles } => return mesh_fault(vertices, triangles),
     };
     let bad = lengths.iter().find(|x| !(x.is_finite() && **x >= 0.0))?;
-    Some(format!("length {bad}, a finite number of metres not below 0 is needed"))
+    Some(format!("length {bad}, a finite number of meters not below 0 is needed"))
 }
 
 fn mesh_fault(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Option<String> {

@@ -17,7 +17,7 @@ pub const TOPIC_SCENE: &str = "/scene";
 pub const TOPIC_TRANSFORMS: &str = "/tf";
 /// Topic of our own state.
 pub const TOPIC_STATE: &str = "/tumble/state";
-/// Name of the frame that all entities hang from: metres, z up, right-handed.
+/// Name of the frame that all entities hang from: meters, z up, right-handed.
 pub const ROOT_FRAME: &str = "world";
 
 pub(crate) const STATE_SCHEMA: &str = "tumble.State";
@@ -29,10 +29,12 @@ pub(crate) const METADATA_NAME: &str = "tumble";
 /// Version of the recording's layout.
 pub(crate) const VERSION: u32 = 1;
 
-/// The state message, as text. It is in every file twice: compiled, as the channel's schema, and like this.
+/// The state message, as text. It is in every file twice: compiled, as the channel's schema, and
+/// like this.
 ///
-/// Protobuf rather than bare bytes, so that viewers open the channel without complaint and any protobuf tool decodes
-/// it. Fixed-width fields are little-endian on the wire; the payload is the caller's, by convention little-endian.
+/// Protobuf rather than bare bytes, so that viewers open the channel without complaint and any
+/// protobuf tool decodes it. Fixed-width fields are little-endian on the wire; the payload is the
+/// caller's, by convention little-endian.
 pub const STATE_PROTO: &str = r#"syntax = "proto3";
 package tumble;
 
@@ -140,7 +142,8 @@ mod tests {
         kind.as_str_name().trim_start_matches("TYPE_").to_lowercase()
     }
 
-    /// Wire bytes worked out by hand: key = number·8 + wire type (5 fixed32, 1 fixed64, 2 bytes), little-endian values.
+    /// Wire bytes worked out by hand: key = number·8 + wire type (5 fixed32, 1 fixed64, 2 bytes),
+    /// little-endian values.
     #[test]
     fn state_bytes_are_as_documented() {
         let state = State { version: 1, frame: 0x0102, time_s: 0.5, payload: vec![7, 8] };

@@ -40,16 +40,17 @@ impl Compression {
 /// How much a killed run may lose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FlushEvery {
-    /// A flush after so many frames, at least 1.
+    /// A flush after this number of frames, at least 1.
     Frames(u32),
-    /// A flush once so many seconds of simulated time have passed since the last one, above 0.
+    /// A flush once this many seconds of simulated time have passed since the last one, above 0.
     SimulatedSeconds(f64),
 }
 
 /// Settings of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecorderOptions {
-    /// A chunk that has grown to so many bytes (uncompressed) is written at once, even if no flush is due; 1 to 64 MiB.
+    /// A chunk of this uncompressed size in bytes is written at once, even if no flush is due; 1 to
+    /// 64 MiB.
     pub chunk_size: u64,
     /// When the file is made readable up to here.
     pub flush_every: FlushEvery,
@@ -86,7 +87,7 @@ impl RecorderOptions {
     }
 }
 
-/// What a finished recording holds.
+/// Summary of a finished recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
     /// The file.
@@ -104,12 +105,14 @@ pub struct Summary {
 /// An MCAP writer that only ever appends: a chunk is built in memory and written whole.
 pub(crate) type AppendWriter = Writer<NoSeek<BufWriter<File>>>;
 
-/// Options that make bytes a function of the input: no threads, no seeking, and chunks end where we say.
+/// Options that make bytes a function of the input: no threads, no seeking, and chunks end where we
+/// say.
 pub(crate) fn append_options(compression: Option<mcap::Compression>) -> WriteOptions {
     WriteOptions::new().disable_seeking(true).chunk_size(None).compression(compression).compression_threads(0)
 }
 
-/// Writes a recording. Dropping it finishes the file as well as it can, errors unseen; [`Recorder::finish`] reports them.
+/// Writes a recording. Dropping it finishes the file as well as it can, errors unseen;
+/// [`Recorder::finish`] reports them.
 pub struct Recorder {
     path: PathBuf,
     options: RecorderOptions,
@@ -169,7 +172,8 @@ impl Recorder {
         Ok(recorder)
     }
 
-    /// Replaces the list of entities from `time_s` on; later frames bring one pose for each of these.
+    /// Replaces the list of entities from `time_s` on; later frames bring one pose for each of
+    /// these.
     ///
     /// Errors: as [`Recorder::create`]; a time before the last frame's.
     pub fn set_entities(&mut self, time_s: f64, entities: &[Entity]) -> Result<()> {
@@ -304,7 +308,7 @@ fn description(world: &str) -> Metadata {
         ("version", VERSION.to_string()),
         ("world", world.to_owned()),
         ("time", "simulated time in nanoseconds from 0".to_owned()),
-        ("units", "metres, seconds, z up, right-handed, quaternions x y z w".to_owned()),
+        ("units", "meters, seconds, z up, right-handed, quaternions x y z w".to_owned()),
     ];
     Metadata { name: METADATA_NAME.into(), metadata: BTreeMap::from(entries.map(|(k, v)| (k.to_owned(), v))) }
 }

@@ -1,7 +1,10 @@
-//! NetSync: one server simulates, one process per facet draws, and all facets show the same frame (thesis §IV.A.6, §IV.C).
+//! NetSync: one server simulates, one process per facet draws, and all facets show the same frame
+//! (thesis §IV.A.6, §IV.C).
 //!
-//! The server owns time and random numbers. A facet builds the same world from the same scene file and shows the states of the messages. Both sides are
-//! state machines without a clock ([`ServerSession`], [`FacetSession`]); [`Server`] and [`Facet`] run them over a link ([`transport`]).
+//! The server owns time and random numbers. A facet builds the same world from the same scene file
+//! and shows the states of the messages. Both sides are state machines without a clock
+//! ([`ServerSession`], [`FacetSession`]); [`Server`] and [`Facet`] run them over a link
+//! ([`transport`]).
 //!
 //! ```
 //! use std::time::Duration;
@@ -48,8 +51,9 @@
 //!
 //! # Messages
 //!
-//! `wire.rs` holds the header of all messages, `table.rs` the snapshot and the state, `messages.rs` and `input.rs` the small
-//! messages, `quantize.rs` the poses with the bound on their error. `docs/netsync.md` describes the protocol.
+//! `wire.rs` holds the header of all messages, `table.rs` the snapshot and the state, `messages.rs`
+//! and `input.rs` the small messages, `quantize.rs` the poses with the bound on their error.
+//! `docs/netsync.md` describes the protocol.
 
 pub mod cpu_latency;
 mod driver;

@@ -78,7 +78,7 @@ pub struct ServeOptions {
     /// file.
     #[arg(long, value_name = "IP,…", value_delimiter = ',')]
     pub tracker_from: Vec<std::net::IpAddr>,
-    /// Stream the run to Foxglove (WebSocket); everybody who reaches the address can watch.
+    /// Stream the run to Foxglove (WebSocket); every machine that reaches the address can watch.
     #[cfg(feature = "foxglove")]
     #[arg(long, value_name = "ADDR:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]
     pub foxglove: Option<SocketAddr>,

@@ -230,7 +230,7 @@ fn what_a_run_shares_is_open_to_nobody_else() {
     assert_eq!(about.mode() & 0o777, 0o700);
     let prefix = format!("tumble_{}_{}_", about.uid(), &blake3::hash(text(&folder).as_bytes()).to_hex()[..8]);
     let ours = |name: &str| {
-        name.starts_with(&prefix) || name.starts_with(&format!("tumble_{}_", about.uid())) && name.ends_with(".bell")
+        name.starts_with(&prefix) || name.starts_with(&format!("tumble_{}_", about.uid())) && name.ends_with(".wakeup")
     };
     let files: Vec<_> = std::fs::read_dir("/dev/shm")
         .unwrap()
@@ -238,7 +238,7 @@ fn what_a_run_shares_is_open_to_nobody_else() {
         .filter(|file| file.file_name().to_str().is_some_and(ours))
         .map(|file| file.path())
         .collect();
-    // samples and services in both directions, connections of two facets, a bell
+    // samples and services in both directions, connections of two facets, the wakeup counters
     assert!(files.len() >= 10, "{files:?}");
     for file in &files {
         // those of other tests may be gone by now, and one that is being made is less open still

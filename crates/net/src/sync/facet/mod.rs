@@ -80,7 +80,7 @@ pub enum Task {
     Ended(EndReason),
 }
 
-/// What a facet waits for.
+/// The event that a facet waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WaitReason {
     /// A server, for the first time.

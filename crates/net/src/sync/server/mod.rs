@@ -134,7 +134,7 @@ pub struct SlotCounts {
 }
 
 /// Event of a session.
-#[allow(clippy::large_enum_variant)] // inputs are few, and a box would show to all who take them
+#[allow(clippy::large_enum_variant)] // inputs are rare, and a box would be part of the API
 #[derive(Clone, Debug, PartialEq)]
 pub enum ServerEvent {
     /// A facet joined.

@@ -39,7 +39,7 @@ impl NodeLock {
                 .mode(0o600)
                 .open(&path)
                 .map_err(io)?;
-            file.lock_shared().map_err(io)?; // who holds it alone removes two files and lets go
+            file.lock_shared().map_err(io)?; // an exclusive holder removes two files and releases the lock
             // the removed files may include this one
             if std::fs::metadata(&path).is_ok_and(|there| file.metadata().is_ok_and(|ours| there.ino() == ours.ino())) {
                 return Ok(NodeLock { file, path, user });

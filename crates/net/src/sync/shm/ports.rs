@@ -201,7 +201,7 @@ fn publisher(service: &Samples, bytes: usize) -> Result<Publisher<Private, [u8],
 
 /// Creates a node, which removes stale resources, and takes the node lock.
 fn node(name: &str) -> Result<(Node<Private>, NodeLock), LinkError> {
-    set_log_level(LogLevel::Fatal); // what goes wrong is told by our errors
+    set_log_level(LogLevel::Fatal); // our errors report failures
     let (folder, user) = folder()?;
     let text = folder.display().to_string();
     let unusable =

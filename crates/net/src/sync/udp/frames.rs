@@ -2,7 +2,7 @@
 //!
 //! | frame | bytes, after its first byte | content |
 //! |---|---|---|
-//! | 1 acknowledgement | reliable u32, [newest u32], largest u32, n u8, mask n | all reliable messages before `reliable` and all newest messages before `newest` have arrived, and so has packet `largest - k` for each bit k of the mask; packets beyond the mask are not covered |
+//! | 1 acknowledgement | reliable u32, [newest u32], largest u32, n u8, mask n | all reliable messages before `reliable` and all newest messages before `newest` have arrived; packet `largest - k` has arrived for each bit k of the mask; packets beyond the mask are not covered |
 //! | 2 whole | message u32, total u16, data | a message of at most 1120 bytes |
 //! | 3 fragment | message u32, total u32, index u16, data | bytes `1120 index …` of a message of `total` bytes |
 //! | 4 parity | message u32, total u32, group u16, groups u16, 1120 bytes | exclusive or of the fragments i with `i mod groups = group`, padded with zeros |

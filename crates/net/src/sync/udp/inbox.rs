@@ -168,7 +168,7 @@ impl Inbox {
         self.release();
     }
 
-    /// Queues a newest message in place of one that still waits.
+    /// Queues a newest message; it replaces one that still waits.
     fn deliver_newest(&mut self, message: Vec<u8>) {
         if let Some(waiting) = self.ready.iter().position(|(delivery, _)| *delivery == Delivery::Newest)
             && let Some((_, old)) = self.ready.remove(waiting)

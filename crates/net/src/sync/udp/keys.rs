@@ -7,8 +7,8 @@
 //! | session keys | `BLAKE3-derive("… facet to server", pre-shared key ‖ facet's nonce ‖ server's nonce ‖ session ‖ facet)`, and the same for the other direction |
 //!
 //! Both sides contribute a fresh nonce of 32 bytes, so no two sessions have the same keys, and a
-//! packet of one direction, facet or session is a forgery in every other. Whoever gets the key file
-//! can decrypt recorded sessions: there is no forward secrecy, because there is no other secret.
+//! packet of one direction, facet or session is a forgery in every other. The key file decrypts
+//! recorded sessions: there is no forward secrecy, because there is no other secret.
 
 use super::packet::{self, HEADER_BYTES, MAX_DATAGRAM, PacketHeader, TAG_BYTES};
 use crate::sync::transport::{FacetNumber, LinkError, Refused};

@@ -1,4 +1,5 @@
-//! The server's process of a run: it simulates the scene, publishes frames, starts the facets' processes and writes the recording and the summary.
+//! The server's process of a run: it simulates the scene, publishes frames, starts the facets'
+//! processes and writes the recording and the summary.
 
 mod facet_processes;
 mod histogram;

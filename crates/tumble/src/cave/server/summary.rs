@@ -65,9 +65,9 @@ pub struct Summary {
     pub skew: Option<Quantiles>,
     /// From an input to the last facet that shows it, if there was input.
     pub input_to_picture: Option<Quantiles>,
-    /// Of a replay: pictures compared with the recording.
+    /// Replay: pictures compared with the recording.
     pub replay: Option<Counts>,
-    /// Of replayed inputs: states compared with the recording.
+    /// Replayed inputs: states compared with the recording.
     pub replay_input: Option<replayed_input::Counts>,
     /// Messages of a tracker.
     pub tracker: Option<osc::Counts>,

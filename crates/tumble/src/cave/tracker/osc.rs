@@ -252,7 +252,7 @@ mod tests {
         OscDecoder::new(&Tracker { senders: vec![Ipv4Addr::LOCALHOST.into()], ..Tracker::of(&[user("a"), user("b")]) })
     }
 
-    /// `/tumble/user/a/head`, seven floats: a metre up, no turn.
+    /// `/tumble/user/a/head`, seven floats: one meter up, no rotation.
     fn head() -> Vec<u8> {
         let mut bytes = b"/tumble/user/a/head\0,fffffff\0\0\0\0".to_vec();
         [0.0f32, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0].iter().for_each(|x| bytes.extend(x.to_be_bytes()));

@@ -73,11 +73,11 @@ impl TrackerSocket {
 
     /// Returns a line for the user: address, senders, users.
     pub fn describe(&self, tracker: &Tracker) -> String {
-        let who = match &tracker.senders[..] {
+        let senders = match &tracker.senders[..] {
             [] => "this machine".to_owned(),
             senders => senders.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "),
         };
-        format!("tracker: OSC at {}, from {who}; users {}", self.at, tracker.users.join(", "))
+        format!("tracker: OSC at {}, from {senders}; users {}", self.at, tracker.users.join(", "))
     }
 
     /// Returns the users' input that changed since the last call.
