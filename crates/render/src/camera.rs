@@ -58,6 +58,7 @@ impl Camera {
     }
 
     /// Sets the opening angle from bottom to top, rad. Raw cameras are unchanged.
+    #[must_use]
     pub fn with_fov(mut self, fov_rad: f32) -> Self {
         if let Camera::LookAt { vertical_fov_rad, .. } = &mut self {
             *vertical_fov_rad = fov_rad;

@@ -244,6 +244,7 @@ impl Material {
     }
 
     /// Sets the pattern.
+    #[must_use]
     pub fn with_pattern(mut self, pattern: Pattern) -> Self {
         self.pattern = pattern;
         self

@@ -89,6 +89,7 @@ impl FacetView {
 
     /// Makes the view one of several for a picture of this size; see [`Part`]. Screens in one plane
     /// with equal pixels share their dither.
+    #[must_use]
     pub fn part(mut self, width: u32, height: u32, rim_px: u32) -> FacetView {
         let [wide, high, right, down] = self.plane;
         // a quarter of a pixel keeps the rounding consistent for screens that start at half pixels

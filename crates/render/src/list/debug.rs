@@ -24,18 +24,21 @@ impl DebugStyle {
     }
 
     /// Sets it to be drawn over everything.
+    #[must_use]
     pub fn on_top(mut self) -> Self {
         self.on_top = true;
         self
     }
 
     /// Sets the width, pixels.
+    #[must_use]
     pub fn width(mut self, px: f32) -> Self {
         self.width_px = px;
         self
     }
 
     /// Sets the opacity.
+    #[must_use]
     pub fn opacity(mut self, opacity: f32) -> Self {
         self.opacity = opacity;
         self

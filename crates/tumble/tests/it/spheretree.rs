@@ -132,7 +132,7 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
         (&[&mesh, "--max-error", "2"], "wanted a number from 0.0001 to 1"),
         (
             &[&mesh, "--method", "octree", "--depth", "2", "--screenshot", &level, "--level", "7"],
-            "--level is 7; a tree of --depth 2 has levels 0 to 2 at most",
+            "--level is 7; a tree with --depth 2 has at most levels 0 to 2",
         ),
         (&[], "wanted a mesh, or --urdf ROBOT"),
         (&[&mesh, "-o", &nowhere], "nowhere/tree.json cannot be written: there is no folder"),
@@ -210,7 +210,7 @@ fn a_robot_of_spheres_is_written_with_the_lists_for_planners() {
         "--spheres",
         "12",
     ]);
-    assert!(said.contains("100 % of the collision surface of each link lies inside"), "{said}");
+    assert!(said.contains("100 % of the collision surface of each link is proved to lie inside"), "{said}");
     succeed(&["spheretree", "--no-cache", "-q", "--urdf", &robot, "--planner", &list, "--spheres", "12"]);
     assert!(succeed(&["check", &out]).contains("a robot of 2 links"));
     let list: Value = json(list.as_ref());
