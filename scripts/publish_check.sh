@@ -30,4 +30,6 @@ done
 } >"$packages/Cargo.toml"
 sed -n '/^\[profile.release\]/,/^\[profile.checked\]/p' Cargo.toml | sed '$d' >>"$packages/Cargo.toml"
 cp Cargo.lock "$packages/"
-CARGO_TARGET_DIR="$target" cargo check --release --offline --workspace --manifest-path "$packages/Cargo.toml"
+CARGO_TARGET_DIR="$target" cargo check --release --offline --workspace --manifest-path "$packages/Cargo.toml" || exit 1
+# the library alone: geometry, dynamics and scenes, without pictures, network and command
+CARGO_TARGET_DIR="$target" cargo check --release --offline -p tumble --lib --no-default-features --manifest-path "$packages/Cargo.toml"

@@ -1,10 +1,14 @@
-//! Frames per second on this machine, as the table of docs/pictures.md: `cargo run --release -p tumble-render --example frames`.
+//! Frames per second on this machine, the table of docs/pictures.md: `cargo run --release -p
+//! tumble-render --example frames`.
 //!
-//! A frame is all that a window does for it once the world has moved: the draw list made from the world, checked, sent, every facet drawn.
-//! The picture stays on the device, as it does in a window, and the next list is made while the device draws. The whole table takes less than five minutes on
-//! two idle cores: after a frame to warm up a row runs for `--duration S` (default 1.5) and three frames, but begins none after six seconds. Other options: `--only WORDS` (rows that
-//! contain the words), `--quality WORDS` (instead of the five shown), `--readback` (with the way back to memory), `--stages` (where the time of each row goes),
-//! `--pictures FOLDER` (the last picture of each row).
+//! A frame is all the work of a window after the world has moved: the draw list is made from the
+//! world, checked and sent, and every facet is drawn. The picture stays on the device, as in a
+//! window, and the next list is made while the device draws. The whole table takes less than five
+//! minutes on two idle cores: after a warm-up frame, a row runs for `--duration S` (default 1.5)
+//! and three frames, but starts none after six seconds. Other options: `--only WORDS` (rows that
+//! contain the words), `--quality WORDS` (instead of the five shown), `--readback` (with the copy
+//! to memory), `--stages` (the time of each row by stage), `--pictures FOLDER` (the last picture of
+//! each row).
 
 use nalgebra::Vector3;
 use std::time::{Duration, Instant};
@@ -13,7 +17,7 @@ use tumble_render::{CaveView, DebugDraw, DrawList, Drawing, Quality, RenderError
 use tumble_scene::SceneFile;
 use tumble_scene::cave::{Stereo, resolve_cave};
 
-/// Frames of a row, and how long it may take, s.
+/// Smallest number of frames of a row, and its longest time, s.
 const ENOUGH_FRAMES: u32 = 3;
 const LONGEST_S: f64 = 6.0;
 
@@ -28,7 +32,7 @@ struct Options {
     pictures: Option<std::path::PathBuf>,
 }
 
-/// What is drawn.
+/// The content of a row.
 struct Subject {
     name: &'static str,
     world: World,
@@ -36,7 +40,7 @@ struct Subject {
     drawing: Drawing,
 }
 
-/// On what: the scene's own camera, or a cave.
+/// The viewpoints: the scene's own camera, or a cave.
 struct Facets {
     cave: Option<CaveView>,
     shown: String,
@@ -116,7 +120,7 @@ fn subject(name: &'static str, scene: SceneFile) -> Result<Subject, Failure> {
     Ok(Subject { name, world: scene.build()?.0, drawing: Drawing::new(&scene), scene })
 }
 
-/// A bed of balls of 0.1 m, `nx · ny · nz` of them, which fills the picture.
+/// A bed of spheres of 0.1 m, `nx · ny · nz` of them, that fills the picture.
 fn bodies(name: &'static str, [nx, ny, nz]: [usize; 3]) -> Result<Subject, Failure> {
     let wide = 0.21 * nx as f64;
     let scene = SceneFile::parse(
@@ -126,7 +130,7 @@ fn bodies(name: &'static str, [nx, ny, nz]: [usize; 3]) -> Result<Subject, Failu
              colors = [\"#c0392b\", \"#2980b9\", \"#f1c40f\", \"#27ae60\", \"#8e44ad\", \"#ecf0f1\", \"#d35400\"]\nroughness = 0.3\n\
              [camera]\neye_m = [0, {}, {}]\ntarget_m = [0, {}, 0.2]\nvertical_fov_deg = 40\n",
             0.1 + 0.11 * (nz - 1) as f64,
-            // all of it is in the picture
+            // the whole bed is in the picture
             -1.35 * wide,
             0.8 * wide,
             -0.08 * wide,
@@ -136,7 +140,7 @@ fn bodies(name: &'static str, [nx, ny, nz]: [usize; 3]) -> Result<Subject, Failu
     subject(name, scene)
 }
 
-/// One cell: frames per second, or none where it was not asked for.
+/// One cell: frames per second, or none if it was not requested.
 fn row(
     options: &Options,
     renderer: &mut Renderer,
@@ -159,7 +163,7 @@ fn row(
         stages[1] += listed.elapsed();
         Ok(())
     };
-    // pipelines are made in it
+    // the first frame creates the pipelines
     frame(renderer)?;
     renderer.wait()?;
     if let Some(folder) = &options.pictures {
@@ -222,8 +226,8 @@ fn facets(scene: &SceneFile, count: usize, size: [u32; 2], stereo: Stereo) -> Re
     Ok(Facets { cave: Some(CaveView::new(cave, &scene)?), shown, size })
 }
 
-/// Processor time of this process so far, all threads, s; on a software driver it is what a frame costs however busy the machine is. 0 where
-/// the system does not tell.
+/// Processor time of this process so far, all threads, s. With a software driver it is the cost of
+/// a frame, however busy the machine is. 0 if the system does not report it.
 fn processor_s() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
     let after_name = stat.rsplit(')').next().unwrap_or("");

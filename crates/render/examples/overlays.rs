@@ -1,4 +1,5 @@
-//! The pictures of docs/pictures.md: one of each overlay, `cargo run --release -p tumble-render --example overlays -- FOLDER`.
+//! The pictures of docs/pictures.md: one of each overlay, `cargo run --release -p tumble-render
+//! --example overlays -- FOLDER`.
 
 use tumble_render::{DebugDraw, Drawing, Renderer};
 use tumble_scene::shipped;

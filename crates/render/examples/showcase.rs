@@ -1,4 +1,5 @@
-//! Draws a test composition to a PNG: `cargo run --release -p tumble-render --example showcase -- out.png [billiards|bowling|boxes|debug|many] [width height]`.
+//! Draws a test composition to a PNG: `cargo run --release -p tumble-render --example showcase --
+//! out.png [billiards|bowling|boxes|debug|many] [width height]`.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use tumble_render::{
@@ -28,7 +29,7 @@ fn main() -> Result<(), RenderError> {
     Ok(())
 }
 
-/// A turn that looks random and is not.
+/// A reproducible rotation that looks random.
 fn turn(i: usize) -> UnitQuaternion<f32> {
     let k = i as f32;
     UnitQuaternion::from_euler_angles((k * 1.7).sin() * 1.2, (k * 2.3).cos() * 0.9, k * 2.4)
@@ -80,7 +81,7 @@ fn billiards() -> DrawList {
     list
 }
 
-/// The outline of a regulation pin: radius and height in metres.
+/// The outline of a regulation pin: radius and height, m.
 const PIN: [[f32; 2]; 19] = [
     [0.0, 0.0],
     [0.0258, 0.0],
@@ -164,7 +165,7 @@ fn smooth(points: &[[f32; 2]]) -> Vec<[f32; 2]> {
     out
 }
 
-/// A heap of a thousand balls.
+/// A heap of a thousand spheres.
 fn many() -> DrawList {
     let mut list = DrawList::default();
     for i in 0..1000 {

@@ -1,8 +1,8 @@
-//! Where the picture is seen from: a plain pinhole, or any view and projection (off-axis walls of a cave).
+//! Cameras: a pinhole, or any view and projection (off-axis walls of a cave).
 //!
-//! Frames: world is z up, right-handed. View space looks along −z with x right and y up. Clip space is
-//! wgpu's: x right, y up, depth 0 at the near plane and 1 at the far plane. (The passes reverse depth by
-//! themselves for precision; callers never see that.)
+//! Frames: world is z up, right-handed. View space looks along −z with x right and y up. Clip space
+//! is wgpu's: x right, y up, depth 0 at the near plane and 1 at the far plane. (The passes reverse
+//! depth internally for precision; callers never see that.)
 
 use crate::RenderError;
 use nalgebra::{Matrix4, Point3, Vector3, Vector4};
@@ -12,24 +12,27 @@ use nalgebra::{Matrix4, Point3, Vector3, Vector4};
 pub enum Camera {
     /// A symmetric pinhole.
     LookAt {
-        /// The eye in the world, in metres.
+        /// The eye in the world, m.
         eye: Point3<f32>,
-        /// The point that appears in the middle of the picture.
+        /// The point in the middle of the picture.
         target: Point3<f32>,
-        /// What is up in the picture; need not be perpendicular to the line of sight, only not along it.
+        /// The upward direction in the picture. It need not be perpendicular to the line of sight,
+        /// but must not be parallel to it.
         up: Vector3<f32>,
-        /// Full opening angle from the bottom to the top of the picture, in radians, between 0 and π.
+        /// Full opening angle from the bottom to the top of the picture, rad, between 0 and π.
         vertical_fov_rad: f32,
-        /// Distance of the near plane, above 0.
+        /// Distance of the near plane, m, above 0.
         near_m: f32,
-        /// Distance of the far plane, above `near_m`.
+        /// Distance of the far plane, m, above `near_m`.
         far_m: f32,
     },
-    /// View and projection as they are: for off-axis projections, where the aspect is part of the matrix.
+    /// View and projection matrices, for off-axis projections; the aspect ratio is part of the
+    /// projection.
     Raw {
         /// World to view space: a rigid motion.
         view: Matrix4<f32>,
-        /// View to clip space: a frustum (last row `0 0 −1 0`, off-axis allowed) or an orthographic box (last row `0 0 0 1`).
+        /// View to clip space: a frustum (last row `0 0 −1 0`, off-axis allowed) or an orthographic
+        /// box (last row `0 0 0 1`).
         projection: Matrix4<f32>,
     },
 }
@@ -41,7 +44,8 @@ impl Default for Camera {
 }
 
 impl Camera {
-    /// A pinhole at `eye` looking at `target`: z up, 40 degrees from bottom to top, depth range from 5 cm to 500 m.
+    /// Returns a pinhole at `eye` that looks at `target`: z up, 40 degrees from bottom to top,
+    /// depth range from 5 cm to 500 m.
     pub fn look_at(eye: Point3<f32>, target: Point3<f32>) -> Self {
         Camera::LookAt {
             eye,
@@ -53,7 +57,8 @@ impl Camera {
         }
     }
 
-    /// The same pinhole with another opening angle (radians, bottom to top). Raw cameras stay as they are.
+    /// Sets the opening angle from bottom to top, rad. Raw cameras are unchanged.
+    #[must_use]
     pub fn with_fov(mut self, fov_rad: f32) -> Self {
         if let Camera::LookAt { vertical_fov_rad, .. } = &mut self {
             *vertical_fov_rad = fov_rad;
@@ -61,7 +66,8 @@ impl Camera {
         self
     }
 
-    /// A pinhole seen along `direction` that shows the whole ball `(center, radius_m)` with `fill` (0 to 1) of the picture's height.
+    /// Returns a pinhole along `direction` that shows the whole sphere `(center, radius_m)` with
+    /// `fill` (0 to 1) of the picture's height.
     pub fn framing(center: Point3<f32>, radius_m: f32, direction: Vector3<f32>, fill: f32) -> Self {
         let fov = 40f32.to_radians();
         let radius = radius_m.max(1e-4);
@@ -78,10 +84,11 @@ impl Camera {
         }
     }
 
-    /// The view and projection matrices for a picture whose width is `aspect` times its height.
+    /// Returns the view and projection matrices for a picture whose width is `aspect` times its
+    /// height.
     ///
     /// # Errors
-    /// [`RenderError::BadValue`] where the numbers make no camera.
+    /// [`RenderError::BadValue`] if the numbers make no camera.
     pub fn matrices(&self, aspect: f32) -> Result<(Matrix4<f32>, Matrix4<f32>), RenderError> {
         match *self {
             Camera::LookAt { eye, target, up, vertical_fov_rad, near_m, far_m } => {
@@ -134,8 +141,8 @@ impl Camera {
         }
     }
 
-    /// Where a world point lands in a `width` x `height` picture: pixels from the top left corner, and depth 0 (near) to 1 (far).
-    /// `None` behind the eye, or where the camera itself is bad.
+    /// Projects a world point into a `width` x `height` picture: pixels from the top left corner,
+    /// and depth 0 (near) to 1 (far). Returns `None` behind the eye, and for an invalid camera.
     pub fn project(&self, point: Point3<f32>, width: u32, height: u32) -> Option<[f32; 3]> {
         let (view, projection) = self.matrices(width as f32 / height as f32).ok()?;
         let clip = projection * view * Vector4::new(point.x, point.y, point.z, 1.0);
@@ -146,7 +153,7 @@ impl Camera {
     }
 }
 
-/// Frustum with depth 0 at `near` and 1 at `far`, view space looking along −z.
+/// Returns a frustum with depth 0 at `near` and 1 at `far`; view space looks along −z.
 pub(crate) fn perspective(vertical_fov_rad: f32, aspect: f32, near: f32, far: f32) -> Matrix4<f32> {
     let f = 1.0 / (0.5 * vertical_fov_rad).tan();
     Matrix4::new(
@@ -169,7 +176,8 @@ pub(crate) fn perspective(vertical_fov_rad: f32, aspect: f32, near: f32, far: f3
     )
 }
 
-/// Orthographic box `[min, max]` of view space, depth 0 at `z = max.z` (nearest) and 1 at `z = min.z`.
+/// Returns an orthographic projection of the box `[min, max]` of view space, with depth 0 at `z =
+/// max.z` (nearest) and 1 at `z = min.z`.
 pub(crate) fn orthographic(min: Vector3<f32>, max: Vector3<f32>) -> Matrix4<f32> {
     let size = max - min;
     Matrix4::new(

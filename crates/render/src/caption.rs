@@ -1,19 +1,19 @@
-//! Lines of text on a dark ground, to be laid over a picture.
+//! Lines of text on a dark background, to be blended over a picture.
 
 use crate::Image;
 use crate::facet::{blank, font};
 
-/// Dots from one line to the next, and around all.
+/// Dots from one line to the next, and around the text.
 const LINE: i64 = 10;
 const RIM: i64 = 4;
-/// Letters of a line and lines, at most.
+/// Largest number of lines, and of letters per line.
 const MAX_LINES: usize = 120;
 
 const GROUND: [u8; 4] = [12, 14, 18, 170];
 const INK: [u8; 4] = [236, 238, 240, 255];
 
-/// The lines, one below the other, in capital letters of 5 x 7 dots, each dot `scale` (1 to 8) pixels wide. Lines longer than 120 letters, and more lines
-/// than that, are cut off.
+/// Draws the lines one below the other, in capital letters of 5 x 7 dots, each dot `scale` (1 to 8)
+/// pixels wide. Lines beyond 120, and letters beyond 120 in a line, are cut off.
 pub fn caption<S: AsRef<str>>(lines: &[S], scale: u32) -> Image {
     let scale = i64::from(scale.clamp(1, 8));
     let lines: Vec<String> =

@@ -29,12 +29,13 @@ use targets::{ShadowMaps, Targets};
 use textures::TextureCache;
 pub use window::{Screen, Shown};
 
-/// Targets of several sizes are kept while they have no more pixels than this together.
+/// Targets of several sizes are kept while they have at most this many pixels in total.
 const KEPT_PIXELS: u64 = 8 << 20;
-/// Longest wait for the last work of a device that complained.
+/// Longest wait for the last work of a device that has reported an error.
 const LAST_WORK: std::time::Duration = std::time::Duration::from_secs(2);
 
-/// A graphics device that draws into memory. Making one takes a moment; keep it for all pictures of a run.
+/// A graphics device that draws into memory. Creating one takes a moment, so one renderer should
+/// draw all pictures of a run.
 pub struct Renderer {
     gpu: Gpu,
     pipelines: Pipelines,
@@ -42,38 +43,41 @@ pub struct Renderer {
     textures: TextureCache,
     finisher: Finisher,
     shadows: Option<ShadowMaps>,
-    /// The one used last is the last.
+    /// Ordered by use, the last used at the end.
     targets: Vec<Targets>,
     /// The finished picture.
     picture: Option<wgpu::Texture>,
     stages: u64,
-    /// Ends of frames that the device may still be at.
+    /// Ends of frames that the device may not have reached yet.
     ends: std::collections::VecDeque<wgpu::SubmissionIndex>,
 }
 
-/// The device, its queue, and the last thing it complained about.
+/// The device, its queue and its last error.
 pub(crate) struct Gpu {
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
     adapter: String,
-    /// Where shaders cannot write which samples of a pixel they cover, among other things.
+    /// Whether the adapter uses OpenGL; its shaders cannot write which samples of a pixel they
+    /// cover, among other limits.
     opengl: bool,
-    /// Whether spheres that nobody sees are left out beforehand: where the processor draws.
+    /// Whether hidden spheres are culled on the CPU, as for software drivers.
     choosy: bool,
     complaint: Arc<Mutex<Option<String>>>,
     lost: Arc<Mutex<Option<String>>>,
 }
 
 impl Renderer {
-    /// Finds an adapter (a graphics card, or a software driver) and prepares it. Nothing global is changed.
+    /// Finds an adapter (a graphics card, or a software driver) and prepares it. No global state is
+    /// changed.
     ///
     /// # Errors
-    /// [`RenderError::NoAdapter`] where the machine has none: the caller goes on without pictures. [`RenderError::Device`] where it has one that fails.
+    /// [`RenderError::NoAdapter`] if the machine has none: the caller can continue without
+    /// pictures. [`RenderError::Device`] if the adapter fails.
     pub fn new() -> Result<Self, RenderError> {
         Renderer::on(pollster::block_on(first_adapter())?)
     }
 
-    /// On an adapter that was chosen.
+    /// Prepares an adapter.
     fn on(adapter: wgpu::Adapter) -> Result<Self, RenderError> {
         let gpu = pollster::block_on(Gpu::open(adapter))?;
         let pipelines = Pipelines::new(&gpu.device, !gpu.opengl);
@@ -102,15 +106,16 @@ impl Renderer {
     /// Draws the list into a picture of `width` x `height` pixels.
     ///
     /// # Errors
-    /// A size or a list that cannot be drawn, or a device that fails. The renderer stays usable unless the device is lost.
+    /// A size or a list that cannot be drawn, or a device that fails. The renderer stays usable
+    /// unless the device is lost.
     pub fn render(&mut self, list: &DrawList, width: u32, height: u32) -> Result<Image, RenderError> {
         self.render_from(&list.camera, list, width, height)
     }
 
-    /// The same, seen from elsewhere than the list's camera.
+    /// Draws the list from another viewpoint than its camera.
     ///
     /// # Errors
-    /// As [`Renderer::render`], or a point of view that is none.
+    /// As [`Renderer::render`], or an invalid viewpoint.
     pub fn render_from(
         &mut self,
         from: &dyn Viewpoint,
@@ -122,8 +127,8 @@ impl Renderer {
         self.read()
     }
 
-    /// The same, but the picture stays on the device: [`Renderer::picture`] for a window to show, [`Renderer::read`] to have it in memory. Does not
-    /// wait for the device.
+    /// Draws a picture and leaves it on the device: a window can show it ([`Renderer::picture`]),
+    /// and [`Renderer::read`] copies it into memory. Does not wait for the device.
     ///
     /// # Errors
     /// As [`Renderer::render_from`].
@@ -132,13 +137,15 @@ impl Renderer {
         list.validate()?;
         let lens = from.lens(width as f32 / height as f32)?;
         let projection: Matrix4<f32> = (lens.projection * lens.view).cast();
-        // views that are parts of one whole fit everything to what is the same for all of them
+        // views that are parts of a whole fit shadows and occlusion to the whole world, which is
+        // the same for all of them
         let seen = if lens.part.is_some() { list.whole_box() } else { list.visible_box(&projection) };
         let stage = self.sent(list, seen.as_ref(), lens.part.is_some())?;
         self.draw_lens(&stage, lens, width, height)
     }
 
-    /// Sends a list to the device, to be drawn from several points of view with [`Renderer::draw_stage`].
+    /// Sends a list to the device, to be drawn from several viewpoints with
+    /// [`Renderer::draw_stage`].
     ///
     /// # Errors
     /// A list that cannot be drawn, or a device that fails.
@@ -147,10 +154,10 @@ impl Renderer {
         self.sent(list, list.whole_box().as_ref(), true)
     }
 
-    /// As [`Renderer::draw`], of a list that was sent before.
+    /// Draws a list that [`Renderer::stage`] has sent, as [`Renderer::draw`] does.
     ///
     /// # Errors
-    /// A size that cannot be drawn, a point of view that is none, or a device that fails.
+    /// A size that cannot be drawn, an invalid viewpoint, or a device that fails.
     pub fn draw_stage(
         &mut self,
         stage: &Stage,
@@ -163,15 +170,15 @@ impl Renderer {
         self.draw_lens(stage, lens, width, height)
     }
 
-    /// The picture drawn last, on the device: 8-bit sRGB with alpha, rows from the top.
+    /// The last picture, on the device: 8-bit sRGB with alpha, rows from the top.
     pub fn picture(&self) -> Option<&wgpu::Texture> {
         self.picture.as_ref()
     }
 
-    /// The picture drawn last, in memory. Waits for the device.
+    /// Copies the last picture into memory. Waits for the device.
     ///
     /// # Errors
-    /// A device that fails or hangs; nothing was drawn yet.
+    /// A device that fails or hangs, or no picture yet.
     pub fn read(&self) -> Result<Image, RenderError> {
         let picture = self.picture.as_ref().ok_or_else(|| self.gpu.failed("no picture was drawn yet".into()))?;
         let image = targets::read(&self.gpu, picture);
@@ -179,7 +186,7 @@ impl Renderer {
         image
     }
 
-    /// Waits until the device has drawn what it was given.
+    /// Waits until the device has finished its work.
     ///
     /// # Errors
     /// A device that fails, is lost, or hangs.
@@ -187,7 +194,8 @@ impl Renderer {
         targets::wait(&self.gpu)
     }
 
-    /// Ends a frame and waits until the device is at most `ahead` frames behind: with 1 the next list is made while the device draws this one.
+    /// Ends a frame and waits until the device is at most `ahead` frames behind. With 1, the next
+    /// list is made while the device draws this one.
     ///
     /// # Errors
     /// As [`Renderer::wait`].
@@ -208,7 +216,7 @@ impl Renderer {
         Ok(stage)
     }
 
-    /// Draws all pixels of a view, the rim that its lens asks for included, and leaves the middle.
+    /// Draws all pixels of a view, including the rim of its lens, and keeps the middle.
     fn draw_lens(&mut self, stage: &Stage, lens: Lens, width: u32, height: u32) -> Result<(), RenderError> {
         let rim = self.draw_with_rim(stage, lens, width, height)?;
         self.picture = match self.targets.last() {
@@ -219,9 +227,9 @@ impl Renderer {
         self.gpu.complaint()
     }
 
-    /// Draws a view into the last targets, and says how many pixels wider they are on each side.
+    /// Draws a view into the last targets. Returns the width of the rim in pixels.
     fn draw_with_rim(&mut self, stage: &Stage, mut lens: Lens, width: u32, height: u32) -> Result<u32, RenderError> {
-        // only occlusion looks beyond the edge
+        // only occlusion reads beyond the edge
         let rim = lens.part.map_or(0, |part| if stage.reach > 0.0 { part.rim_px } else { 0 });
         lens.part = lens.part.map(|part| Part { rim_px: rim, ..part });
         if rim > 0 {
@@ -249,7 +257,8 @@ impl Renderer {
         Ok(rim)
     }
 
-    /// Draws what one eye sees, and puts it, finished for its projector, into its place in the whole picture of this size.
+    /// Draws the view of one eye, finishes it for its projector, and places it in the whole picture
+    /// of this size.
     pub(crate) fn draw_placed(
         &mut self,
         stage: &Stage,
@@ -271,7 +280,7 @@ impl Renderer {
         match self.targets.iter().position(|t| t.fits(width, height, samples)) {
             Some(i) => self.targets[i..].rotate_left(1),
             None => {
-                // old ones go before new ones come
+                // old targets are freed before new ones are allocated
                 let new = u64::from(width) * u64::from(height);
                 while !self.targets.is_empty()
                     && new + self.targets.iter().map(Targets::pixels).sum::<u64>() > KEPT_PIXELS
@@ -337,13 +346,13 @@ impl Gpu {
         })
     }
 
-    /// What went wrong on the device since the last call.
+    /// Returns the first device error since the last call.
     fn complaint(&self) -> Result<(), RenderError> {
-        // a loss is told at the next poll
+        // a loss is reported at the next poll
         let _ = self.device.poll(wgpu::PollType::Poll);
         let complaint = self.complaint.lock().unwrap_or_else(PoisonError::into_inner).take();
         if complaint.is_some() {
-            // what is lost complains at once, and tells its loss when its last work is done
+            // a lost device reports an error at once, and the loss when its last work is done
             let _ = self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(LAST_WORK) });
         }
         let lost = self.lost.lock().unwrap_or_else(PoisonError::into_inner).clone();
@@ -355,12 +364,13 @@ impl Gpu {
     }
 }
 
-/// A message of many lines as one.
+/// Joins a message of several lines into one.
 fn one_line(message: &str) -> String {
     message.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// A Vulkan adapter, else one of OpenGL. Asked one after the other, so that OpenGL's libraries are loaded only where needed.
+/// Finds a Vulkan adapter, otherwise one of OpenGL. They are requested one after the other, so that
+/// OpenGL's libraries are loaded only if needed.
 async fn first_adapter() -> Result<wgpu::Adapter, RenderError> {
     let mut reasons = Vec::new();
     for (name, backends) in [("Vulkan", wgpu::Backends::VULKAN), ("OpenGL", wgpu::Backends::GL)] {

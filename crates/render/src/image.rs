@@ -1,4 +1,4 @@
-//! A picture in memory, and its way to and from PNG.
+//! Pictures in memory, as PNG and from PNG.
 
 use crate::RenderError;
 use std::fs::File;
@@ -10,14 +10,15 @@ use std::path::Path;
 pub struct Image {
     /// Pixels per row.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
     /// `4 * width * height` bytes.
     pub rgba: Vec<u8>,
 }
 
 impl Image {
-    /// The four bytes of the pixel `x` to the right and `y` down from the top left corner; `None` outside the picture.
+    /// Returns the pixel `x` to the right and `y` down from the top left corner; `None` outside the
+    /// picture.
     pub fn pixel(&self, x: u32, y: u32) -> Option<[u8; 4]> {
         if x >= self.width || y >= self.height {
             return None;
@@ -40,7 +41,7 @@ impl Image {
     /// Returns the bytes that [`Image::write_png`] writes.
     ///
     /// # Errors
-    /// [`RenderError::Png`] for an image without pixels, or with more or fewer bytes than its sides say.
+    /// [`RenderError::Png`] for an image without pixels, or without four bytes for each.
     pub fn to_png(&self) -> Result<Vec<u8>, RenderError> {
         let mut bytes = Vec::new();
         self.encode(&mut bytes).map_err(|e| RenderError::Png(e.to_string()))?;
@@ -58,10 +59,11 @@ impl Image {
         writer.finish()
     }
 
-    /// Reads any PNG as a picture to put on surfaces: grey, palettes and 16 bits are made 8-bit RGBA. Sides are at most 8192 pixels.
+    /// Reads any PNG as a texture. Gray, palettes and 16 bits become 8-bit RGBA. Sides are at most
+    /// 8192 pixels.
     ///
     /// # Errors
-    /// [`RenderError::File`] names the path and what is wrong.
+    /// [`RenderError::File`] names the path and the fault.
     pub fn load_png(path: impl AsRef<Path>) -> Result<Image, RenderError> {
         let path = path.as_ref();
         let fail = |reason: String| RenderError::File { path: path.display().to_string(), reason };
@@ -82,10 +84,10 @@ impl Image {
         Ok(Image { width, height, rgba })
     }
 
-    /// Reads an 8-bit RGBA PNG such as [`Image::write_png`] makes (golden pictures).
+    /// Reads an 8-bit RGBA PNG as written by [`Image::write_png`], for golden pictures.
     ///
     /// # Errors
-    /// [`RenderError::File`] names the path and what is wrong; other PNG layouts are refused.
+    /// [`RenderError::File`] names the path and the fault; other PNG layouts are refused.
     pub fn read_png(path: impl AsRef<Path>) -> Result<Image, RenderError> {
         let path = path.as_ref();
         let fail = |reason: String| RenderError::File { path: path.display().to_string(), reason };

@@ -1,7 +1,8 @@
-//! A world to pixels.
+//! Draws worlds: from a world to pixels.
 //!
-//! A [`DrawList`] is plain data: meshes, spheres, lights, debug strokes and a [`Camera`]. It is built, checked, printed and compared
-//! without a GPU. A [`Renderer`] turns it into an [`Image`] with wgpu, headless; on machines without a graphics card a software driver does it.
+//! A [`DrawList`] is plain data: meshes, spheres, lights, debug lines and a [`Camera`]. It is
+//! built, checked, printed and compared without a GPU. A [`Renderer`] turns it into an [`Image`]
+//! with wgpu, headless. On a machine without a graphics card a software driver does the work.
 //!
 //! ```no_run
 //! use tumble_render::{DrawList, Ground, Light, Material, Renderer};
@@ -11,15 +12,16 @@
 //! list.ground = Some(Ground::grid(0.0));
 //! list.lights.push(Light::sun(Vector3::new(0.5, 0.6, -1.0), 2.5));
 //! list.camera = list.framing_camera(Vector3::new(-1.0, 0.8, -0.5));
-//! Renderer::new()?.render(&list, 640, 480)?.write_png("ball.png")?;
+//! Renderer::new()?.render(&list, 640, 480)?.write_png("sphere.png")?;
 //! # Ok::<(), tumble_render::RenderError>(())
 //! ```
 //!
-//! Conventions: world z up, right-handed, metres, radians; colours in the list are sRGB from 0 to 1; `f32` throughout.
-//! The same list on the same adapter gives the same bytes.
+//! Conventions: world z up, right-handed, meters, radians; colors in the list are sRGB from 0 to 1;
+//! `f32` throughout. The same list on the same adapter gives the same bytes.
 //!
-//! Passes: depth maps of lights that throw shadows; depth of the camera's view and ambient occlusion from it; then everything in one pass, usually with
-//! four samples per pixel: spheres, capsules, meshes, floor, backdrop, lines, translucent shells, lines on top.
+//! Passes: depth maps of the lights that cast shadows; depth of the camera's view, and ambient
+//! occlusion from it; then one pass for everything else, by default with four samples per pixel:
+//! spheres, capsules, meshes, floor, backdrop, lines, translucent shells, lines on top.
 
 mod camera;
 mod caption;
@@ -53,7 +55,7 @@ pub use viewpoint::{Lens, Part, Viewpoint};
 pub use window::{Next, WindowApp, WindowOptions, run_window};
 pub use winit;
 
-/// The longest side of a picture, in pixels (the device may allow less).
+/// Longest side of a picture, pixels; a device may allow less.
 pub const MAX_SIDE: u32 = 16384;
-/// The most pixels of a picture: one of 7680 x 4320 fits.
+/// Largest number of pixels of a picture; 7680 x 4320 fits.
 pub const MAX_PIXELS: u64 = 1 << 25;

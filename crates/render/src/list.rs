@@ -1,4 +1,5 @@
-//! The draw list: everything a picture shows, as plain data. No GPU is needed to build, test, print or compare one.
+//! The draw list: everything a picture shows, as plain data. It is built, tested, printed and
+//! compared without a GPU.
 
 pub(crate) mod bounds;
 pub(crate) mod debug;
@@ -14,83 +15,87 @@ use crate::{Camera, Image, Material, MeshData, Pattern};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
-/// A mesh of a [`DrawList`]: its place in [`DrawList::meshes`].
+/// A mesh of a [`DrawList`]: its index in [`DrawList::meshes`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct MeshId(pub usize);
 
 /// A mesh placed in the world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instance {
-    /// Which mesh.
+    /// The mesh.
     pub mesh: MeshId,
     /// Pose of the mesh's frame in the world.
     pub pose: Isometry3<f32>,
     /// Factors along the mesh's own axes, applied before the pose; none may be 0.
     pub scale: Vector3<f32>,
-    /// Its surface.
+    /// The material.
     pub material: Material,
-    /// Whether it throws shadows. Turn off for what only receives them and is large (a floor slab): shadows are sharper then.
+    /// Whether it casts shadows. A large object that only receives them, such as a floor slab,
+    /// should not: shadows are sharper then.
     pub casts_shadow: bool,
 }
 
 /// A sphere, drawn by ray casting: round at every distance and cheap by the thousand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sphere {
-    /// Centre in the world.
+    /// Center in the world.
     pub center: Point3<f32>,
-    /// Radius in metres, above 0.
+    /// Radius, m, above 0.
     pub radius: f32,
     /// Object to world, for patterns that show rotation.
     pub orientation: UnitQuaternion<f32>,
-    /// Its surface.
+    /// The material.
     pub material: Material,
-    /// Whether it throws a shadow.
+    /// Whether it casts a shadow.
     pub casts_shadow: bool,
 }
 
-/// A capsule, drawn by ray casting like a sphere: what lies within a radius of a segment.
+/// A capsule, drawn by ray casting like a sphere: all points within a radius of a segment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Capsule {
     /// Pose of its frame in the world: the middle of the segment, which lies along z.
     pub pose: Isometry3<f32>,
-    /// Half the length of the segment in metres, 0 or more.
+    /// Half the length of the segment, m, 0 or more.
     pub half_length: f32,
-    /// Radius in metres, above 0.
+    /// Radius, m, above 0.
     pub radius: f32,
-    /// Its surface.
+    /// The material.
     pub material: Material,
-    /// Whether it throws a shadow.
+    /// Whether it casts a shadow.
     pub casts_shadow: bool,
 }
 
-/// A source of light. Colours are sRGB; intensity 1 with white is a well-lit surface at perpendicular light.
+/// A light source. Colors are sRGB. Intensity 1 with white at perpendicular incidence gives a
+/// well-lit surface.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Light {
     /// Parallel light, like the sun.
     Directional {
-        /// The way the light travels (from the source into the scene); any length above 0.
+        /// Direction in which the light travels, from the source into the scene; any length above
+        /// 0.
         direction: Vector3<f32>,
-        /// Colour.
+        /// Color.
         color: [f32; 3],
         /// Irradiance on a perpendicular surface, divided by π.
         intensity: f32,
-        /// Half the angle under which the source is seen, in radians: the softness of shadows (sun 0.0047).
+        /// Half the angle under which the source is seen, rad: the softness of shadows (sun
+        /// 0.0047).
         angular_radius_rad: f32,
-        /// Whether it throws shadows.
+        /// Whether it casts shadows.
         casts_shadow: bool,
     },
-    /// A lamp. Outside the box around everything that throws shadows one map holds them; amid it six do, and only where shadows are soft. What is nearer
-    /// to its middle than its own radius throws none.
+    /// A lamp. Outside the box around all shadow casters it has one shadow map. Inside it has six,
+    /// and only with soft shadows. Objects closer to its center than its own radius cast no shadow.
     Point {
-        /// Where, in the world.
+        /// Position in the world.
         position: Point3<f32>,
-        /// Colour.
+        /// Color.
         color: [f32; 3],
         /// Irradiance at a distance of 1 m, divided by π.
         intensity: f32,
-        /// Radius of the source in metres: the softness of shadows.
+        /// Radius of the source, m: the softness of shadows.
         radius_m: f32,
-        /// Whether it throws shadows.
+        /// Whether it casts shadows.
         casts_shadow: bool,
     },
 }
@@ -118,7 +123,7 @@ impl Light {
         }
     }
 
-    /// Whether it is meant to throw shadows.
+    /// Returns whether it is set to cast shadows.
     pub fn casts_shadow(&self) -> bool {
         match self {
             Light::Directional { casts_shadow, .. } | Light::Point { casts_shadow, .. } => *casts_shadow,
@@ -126,20 +131,22 @@ impl Light {
     }
 }
 
-/// What surrounds the scene: the background, the ambient light and what glossy surfaces reflect. Colours are sRGB.
+/// The surroundings of the scene: the background, the ambient light and the reflections in glossy
+/// surfaces. Colors are sRGB.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sky {
     /// Straight up.
     pub zenith: [f32; 3],
     /// At eye level.
     pub horizon: [f32; 3],
-    /// Straight down: what comes back from below.
+    /// Straight down: light from below.
     pub ground: [f32; 3],
-    /// Factor of the light that the sky gives (not of the background).
+    /// Factor on the light of the sky, not on the background.
     pub ambient: f32,
-    /// A bright panel overhead that only glossy surfaces see, as photographers use; 0 for none.
+    /// Brightness of a panel overhead that only glossy surfaces reflect, as photographers use; 0
+    /// for none.
     pub softbox: f32,
-    /// One flat sRGB background colour instead of the gradient (light and reflections stay).
+    /// A flat sRGB background color that replaces the gradient; light and reflections stay.
     pub backdrop: Option<[f32; 3]>,
 }
 
@@ -169,7 +176,7 @@ impl Sky {
         }
     }
 
-    /// No ambient light, a flat backdrop: for tests and plots.
+    /// No ambient light and a flat backdrop: for tests and plots.
     pub fn flat(backdrop: [f32; 3]) -> Self {
         Sky {
             zenith: [0.0; 3],
@@ -182,41 +189,43 @@ impl Sky {
     }
 }
 
-/// A floor that fades into the horizon. It receives shadows and throws none.
+/// A floor that fades into the horizon. It receives shadows and casts none.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ground {
     /// Height of its plane, world z.
     pub height_m: f32,
-    /// How far it reaches from the middle of what is seen before it has faded away.
+    /// Distance from the middle of the visible objects at which it has faded away.
     pub reach_m: f32,
-    /// Its surface; patterns run in world coordinates.
+    /// The material; patterns use world coordinates.
     pub material: Material,
 }
 
 impl Ground {
-    /// A grey floor at the height with a grid of 1 m.
+    /// A gray floor at the height with a grid of 1 m.
     pub fn grid(height_m: f32) -> Self {
         let pattern = Pattern::Grid { line: [0.46, 0.47, 0.49], size_m: 1.0, width_m: 0.02 };
         Ground { height_m, reach_m: 60.0, material: Material::matte([0.60, 0.61, 0.63]).with_pattern(pattern) }
     }
 }
 
-/// Numbers of the picture as a whole.
+/// Settings of the picture as a whole.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Factor on all light before tone mapping.
     pub exposure: f32,
     /// Side of a shadow map in texels (256 to 8192).
     pub shadow_map_size: u32,
-    /// Reach of ambient occlusion in metres: `None` for a twelfth of the radius of what is seen; `Some(0.0)` turns it off.
+    /// Reach of ambient occlusion, m: `None` for a twelfth of the radius of the visible objects;
+    /// `Some(0.0)` turns it off.
     pub occlusion_m: Option<f32>,
-    /// Filmic tone curve; without it light above 1 is cut off (tests and plots).
+    /// Filmic tone curve; without it light above 1 is clipped (tests and plots).
     pub tone_map: bool,
     /// How shadows are drawn.
     pub shadows: Shadows,
     /// Samples per pixel: 1, or 4 for smooth edges.
     pub samples: u32,
-    /// Whether surfaces mirror the sky, lacquer and lamps as they should; without, light is a cheap likeness of that.
+    /// Whether surfaces reflect the sky and have clear coats and full highlights; without it a
+    /// cheap approximation is used.
     pub reflections: bool,
 }
 
@@ -247,9 +256,10 @@ impl Default for Settings {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DrawList {
-    /// Meshes by [`MeshId`]. Shared, so that a list per frame copies nothing and the renderer uploads each once.
+    /// Meshes by [`MeshId`]. They are shared, so that a list per frame copies nothing and the
+    /// renderer uploads each once.
     pub meshes: Vec<Arc<MeshData>>,
-    /// Pictures on surfaces, by the number in [`crate::Texture`]; shared like meshes.
+    /// Textures, by the index in [`crate::Texture`]; shared like meshes.
     pub textures: Vec<Arc<Image>>,
     /// Placed meshes.
     pub instances: Vec<Instance>,
@@ -257,39 +267,40 @@ pub struct DrawList {
     pub spheres: Vec<Sphere>,
     /// Capsules.
     pub capsules: Vec<Capsule>,
-    /// Debug: lines and arrows.
+    /// Debug lines and arrows.
     pub lines: Vec<DebugLine>,
-    /// Debug: points.
+    /// Debug points.
     pub points: Vec<DebugPoint>,
-    /// Debug: wire or translucent spheres.
+    /// Debug spheres, as rings or translucent shells.
     pub debug_spheres: Vec<DebugSphere>,
-    /// Lights, at most [`crate::MAX_LIGHTS`]; the first [`crate::MAX_SHADOWS`] that throw shadows do.
+    /// Lights, at most [`crate::MAX_LIGHTS`]; the first [`crate::MAX_SHADOWS`] that are set to cast
+    /// shadows do.
     pub lights: Vec<Light>,
-    /// Point of view.
+    /// The viewpoint.
     pub camera: Camera,
-    /// Surroundings.
+    /// The surroundings.
     pub sky: Sky,
-    /// Floor.
+    /// The floor.
     pub ground: Option<Ground>,
-    /// Numbers of the picture as a whole.
+    /// Settings of the picture as a whole.
     pub settings: Settings,
 }
 
 impl DrawList {
-    /// Adds a mesh to place with [`DrawList::add_instance`].
+    /// Adds a mesh for [`DrawList::add_instance`].
     pub fn add_mesh(&mut self, mesh: impl Into<Arc<MeshData>>) -> MeshId {
         self.meshes.push(mesh.into());
         MeshId(self.meshes.len() - 1)
     }
 
-    /// Places a mesh, at its own size, throwing shadows.
+    /// Places a mesh at its own size; it casts shadows.
     pub fn add_instance(&mut self, mesh: MeshId, pose: Isometry3<f32>, material: Material) -> &mut Instance {
         self.instances.push(Instance { mesh, pose, scale: Vector3::repeat(1.0), material, casts_shadow: true });
         let last = self.instances.len() - 1;
         &mut self.instances[last]
     }
 
-    /// Adds a sphere that throws a shadow.
+    /// Adds a sphere that casts a shadow.
     pub fn add_sphere(
         &mut self,
         center: Point3<f32>,
@@ -302,7 +313,7 @@ impl DrawList {
         &mut self.spheres[last]
     }
 
-    /// Adds a capsule that throws a shadow.
+    /// Adds a capsule that casts a shadow.
     pub fn add_capsule(
         &mut self,
         pose: Isometry3<f32>,

@@ -1,31 +1,34 @@
-//! What a surface looks like: a physically based base and a procedural pattern, evaluated in the object's own frame so that
-//! a rolling ball shows its rotation.
+//! Materials: a physically based base and a procedural pattern. Patterns are evaluated in the
+//! object's own frame, so a rolling sphere shows its rotation.
 
-/// A surface. All colours are sRGB, 0 to 1, as colour pickers give them; they become linear once, on the way to the GPU.
+/// The material of a surface. All colors are sRGB, 0 to 1, as color pickers give them. They become
+/// linear once, on the way to the GPU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
-    /// Base colour: diffuse reflection of a dielectric, or mirror colour of a metal.
+    /// Base color: diffuse reflection of a dielectric, or mirror color of a metal.
     pub color: [f32; 3],
     /// 0 is a mirror, 1 is chalk.
     pub roughness: f32,
     /// 0 for plastic, wood, cloth and stone; 1 for metal.
     pub metallic: f32,
-    /// Strength of a thin, smooth lacquer over everything (0 to 1): billiard balls, varnished wood.
+    /// Strength of a thin, smooth clear coat over the surface, 0 to 1: billiard balls, varnished
+    /// wood.
     pub clearcoat: f32,
-    /// The procedural pattern over the base colour.
+    /// Procedural pattern over the base color.
     pub pattern: Pattern,
     /// How light is applied.
     pub shader: Shader,
-    /// A picture over the base colour, which then only tints it; none under most.
+    /// Texture over the base color, which then tints it; most materials have none.
     pub texture: Option<Texture>,
 }
 
-/// A picture on a surface: around a sphere as a map of the earth, on all else from three sides.
+/// A texture on a surface: wrapped around a sphere like a map of the earth, projected from three
+/// sides onto other shapes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Texture {
-    /// Which: its place in [`crate::DrawList::textures`].
+    /// Index in [`crate::DrawList::textures`].
     pub id: usize,
-    /// Side of the square that the picture covers once, m; spheres wear it once around.
+    /// Side of the square that the texture covers once, m. On a sphere it goes around once.
     pub repeat_m: f32,
 }
 
@@ -35,43 +38,46 @@ pub enum Shader {
     /// Physically based (GGX) with shadows and ambient light.
     #[default]
     Lit,
-    /// The colour as it is: no light, no tone mapping.
+    /// The color itself: no light, no tone mapping.
     Unlit,
 }
 
-/// A procedural pattern in the object's frame (metres; for a sphere from its centre).
+/// A procedural pattern in the object's frame, m; for a sphere from its center.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Pattern {
-    /// One colour.
+    /// One color.
     #[default]
     Plain,
     /// A three-dimensional checkerboard of cubes of side `size_m`, alternating with `other`.
     Checker {
-        /// The second colour.
+        /// The second color.
         other: [f32; 3],
-        /// Side of a field.
+        /// Side of a cube.
         size_m: f32,
     },
-    /// Lines of `line` colour, `width_m` wide, every `size_m` along object x and y; every tenth line is stronger.
+    /// Lines of color `line`, `width_m` wide, every `size_m` along object x and y; every tenth line
+    /// is stronger.
     Grid {
-        /// Colour of the lines.
+        /// Color of the lines.
         line: [f32; 3],
         /// Distance of the lines.
         size_m: f32,
         /// Width of a line.
         width_m: f32,
     },
-    /// A billiard ball: white spots with the number around ±x; with `stripe`, `color` is a band around the z axis on white.
-    /// Number 0 leaves the spots out (with `stripe` false: a plain cue ball with a red dot at each end of the three axes).
+    /// A billiard ball: white spots with the number around ±x; with `stripe`, `color` is a band
+    /// around the z axis on white. Number 0 leaves the spots out; without `stripe` it is a plain
+    /// cue ball with a red dot at each end of the three axes.
     Ball {
         /// 0 to 99.
         number: u8,
-        /// Balls 9 to 15 of the usual set.
+        /// Whether it is striped, as 9 to 15 are in the standard set.
         stripe: bool,
     },
-    /// Wood: grain along object x, `dark` in the late wood; boards `board_m` wide along y where that is above 0 (parquet, lanes).
+    /// Wood: grain along object x, `dark` in the late wood. With `board_m` above 0 it has boards of
+    /// that width along y (parquet, lanes).
     Wood {
-        /// Colour of the dark grain.
+        /// Color of the dark grain.
         dark: [f32; 3],
         /// Distance of the growth rings.
         ring_m: f32,
@@ -83,32 +89,33 @@ pub enum Pattern {
         /// Distance of the threads.
         thread_m: f32,
     },
-    /// Marble: veins of `vein` colour, about `size_m` apart, in no regular order (bowling balls).
+    /// Marble: irregular veins of color `vein`, about `size_m` apart (bowling balls).
     Marble {
-        /// Colour of the veins.
+        /// Color of the veins.
         vein: [f32; 3],
         /// Distance of the veins.
         size_m: f32,
     },
-    /// Rings of `other` colour around the z axis, from `from_m` to `to_m` and as far again with the same gap between (the stripes of a pin's neck).
+    /// Two rings of color `other` around the z axis (the stripes of a pin's neck). The first is
+    /// from `from_m` to `to_m`; the second has the same width and begins half a width above it.
     Rings {
-        /// Colour of the rings.
+        /// Color of the rings.
         other: [f32; 3],
         /// Height of the lower edge of the lower ring.
         from_m: f32,
-        /// Height of the upper edge of the lower ring; the second begins half a width above it.
+        /// Height of the upper edge of the lower ring.
         to_m: f32,
     },
 }
 
 impl Pattern {
-    /// The pattern's name, as the text form writes it.
+    /// The pattern's name in the text form of a draw list.
     pub fn name(&self) -> &'static str {
         match self {
             Pattern::Plain => "plain",
             Pattern::Checker { .. } => "checker",
             Pattern::Grid { .. } => "grid",
-            Pattern::Ball { .. } => "ball",
+            Pattern::Ball { .. } => "billiard_ball",
             Pattern::Wood { .. } => "wood",
             Pattern::Felt { .. } => "felt",
             Pattern::Rings { .. } => "rings",
@@ -116,7 +123,7 @@ impl Pattern {
         }
     }
 
-    /// Its number in the shaders, three colour components (sRGB) and two lengths.
+    /// Returns the pattern's number in the shaders, three color components (sRGB) and two lengths.
     pub(crate) fn packed(&self) -> (u32, [f32; 3], [f32; 2]) {
         match *self {
             Pattern::Plain => (0, [0.0; 3], [0.0; 2]),
@@ -137,7 +144,8 @@ impl Default for Material {
     }
 }
 
-/// The colours of the usual set of billiard balls, 1 to 8; 9 to 15 repeat 1 to 7 as stripes. Index 0 is the cue ball.
+/// The colors of the standard set of billiard balls, 1 to 8; 9 to 15 repeat 1 to 7 as stripes.
+/// Index 0 is the cue ball.
 const BALL_COLORS: [[f32; 3]; 9] = [
     [0.96, 0.94, 0.88],
     [0.98, 0.74, 0.04],
@@ -164,12 +172,12 @@ impl Material {
         }
     }
 
-    /// Chalky and dull.
+    /// Matte, like chalk.
     pub fn matte(color: [f32; 3]) -> Self {
         Material { roughness: 0.9, ..Material::plastic(color) }
     }
 
-    /// Polished and lacquered.
+    /// Polished, with a clear coat.
     pub fn glossy(color: [f32; 3]) -> Self {
         Material { roughness: 0.25, clearcoat: 1.0, ..Material::plastic(color) }
     }
@@ -179,12 +187,13 @@ impl Material {
         Material { roughness: 0.3, metallic: 1.0, ..Material::plastic(color) }
     }
 
-    /// A colour that takes no light.
+    /// A color without light.
     pub fn unlit(color: [f32; 3]) -> Self {
         Material { shader: Shader::Unlit, ..Material::plastic(color) }
     }
 
-    /// A ball of the usual billiard set: 0 is the cue ball, 1 to 8 solid, 9 to 15 striped; the colours repeat beyond.
+    /// A billiard ball of the standard set: 0 is the cue ball, 1 to 8 solid, 9 to 15 striped; the
+    /// colors repeat beyond.
     pub fn billiard_ball(number: u8) -> Self {
         let stripe = number > 8;
         let color = BALL_COLORS[if stripe { (usize::from(number) - 9) % 7 + 1 } else { usize::from(number) }];
@@ -208,7 +217,8 @@ impl Material {
         Material::matte([0.04, 0.31, 0.19]).with_pattern(Pattern::Felt { thread_m: 0.0015 })
     }
 
-    /// A bowling pin of the usual size (38.1 cm, its base at object z = −`base_m`): white lacquer, two red rings on the neck.
+    /// A bowling pin of standard size (38.1 cm, its base at object z = −`base_m`): white lacquer,
+    /// two red rings on the neck.
     pub fn bowling_pin(base_m: f32) -> Self {
         Material::glossy([0.95, 0.93, 0.89]).with_pattern(Pattern::Rings {
             other: [0.75, 0.05, 0.06],
@@ -217,14 +227,14 @@ impl Material {
         })
     }
 
-    /// A grey checkerboard.
+    /// A gray checkerboard.
     pub fn checker(size_m: f32) -> Self {
         Material { roughness: 0.7, ..Material::plastic([0.55, 0.56, 0.58]) }
             .with_pattern(Pattern::Checker { other: [0.40, 0.41, 0.43], size_m })
     }
 
-    /// What its pipelines are made for: the pattern's number, 100 more where light does not matter, 1000 more under lacquer,
-    /// 10000 more with a texture.
+    /// The surface number that selects a pipeline: the pattern's number, plus 100 without light,
+    /// plus 1000 with a clear coat, plus 10000 with a texture.
     pub(crate) fn surface(&self) -> u32 {
         let unlit = self.shader == Shader::Unlit;
         self.pattern.packed().0
@@ -233,7 +243,8 @@ impl Material {
             + if self.texture.is_some() { 10_000 } else { 0 }
     }
 
-    /// The same surface under another pattern.
+    /// Sets the pattern.
+    #[must_use]
     pub fn with_pattern(mut self, pattern: Pattern) -> Self {
         self.pattern = pattern;
         self
@@ -243,7 +254,8 @@ impl Material {
     pub const PRESETS: [&'static str; 9] =
         ["checker", "felt", "glossy", "lane", "matte", "metal", "plastic", "unlit", "walnut"];
 
-    /// A surface by name, as scene files give it; `color` (sRGB) replaces the preset's own where given. `None` for an unknown name.
+    /// Returns a preset by its name in scene files; `color` (sRGB) replaces the preset's own.
+    /// Returns `None` for an unknown name.
     pub fn preset(name: &str, color: Option<[f32; 3]>) -> Option<Self> {
         let neutral = color.unwrap_or([0.8, 0.8, 0.8]);
         let mut material = match name {
@@ -265,12 +277,12 @@ impl Material {
     }
 }
 
-/// One sRGB component to linear light (IEC 61966-2-1).
+/// Converts one sRGB component to linear light (IEC 61966-2-1).
 pub(crate) fn linear(c: f32) -> f32 {
     if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }
 
-/// An sRGB colour to linear light.
+/// Converts an sRGB color to linear light.
 pub(crate) fn linear3(c: [f32; 3]) -> [f32; 3] {
     c.map(linear)
 }

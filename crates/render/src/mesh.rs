@@ -1,35 +1,38 @@
-//! Triangle meshes as the renderer wants them: one normal per vertex, hard edges split.
+//! Triangle meshes for the renderer: one normal per vertex, with vertices split at hard edges.
 
 use crate::RenderError;
 use nalgebra::Vector3;
 use std::f32::consts::{PI, TAU};
 
-/// Most vertices, and most indices, a single mesh may have.
+/// Largest number of vertices, and of indices, of a single mesh.
 pub const MAX_MESH_VERTICES: usize = 1 << 24;
 
-/// Triangles with a normal per vertex, in the mesh's own frame, metres. Counter-clockwise seen from outside.
+/// Triangles with a normal per vertex, in the mesh's own frame, m. They are counter-clockwise seen
+/// from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshData {
     /// One point per vertex.
     pub positions: Vec<[f32; 3]>,
     /// One unit vector per vertex.
     pub normals: Vec<[f32; 3]>,
-    /// Three vertex numbers per triangle.
+    /// Three vertex indices per triangle.
     pub indices: Vec<u32>,
-    /// Per vertex the place in the texture (0 to 1 from its left and lower edge, repeated beyond) and how much of it a metre covers; empty where textures are
-    /// laid on by position.
+    /// Texture coordinates per vertex (0 to 1 from the left and lower edge, repeated beyond), and
+    /// how often the texture repeats per meter; empty if textures are projected by position.
     pub unwrapped: Vec<[f32; 3]>,
 }
 
 impl MeshData {
-    /// From bare triangles, with normals smoothed over edges flatter than `crease_rad` and vertices split at sharper ones.
+    /// Builds a mesh from triangles. Normals are smoothed over edges flatter than `crease_rad`;
+    /// vertices are split at sharper ones.
     ///
-    /// The normal of a corner is the sum of the normals of the faces around its vertex, weighted by their angle there,
-    /// over the faces that lie within `crease_rad` of the corner's own face. `0` gives flat shading; `0.6` (34 degrees) suits most.
-    /// Triangles without area are dropped.
+    /// The normal of a corner is the sum of the normals of the faces around its vertex, weighted by
+    /// their angle there, over the faces that lie within `crease_rad` of the corner's own face. `0`
+    /// gives flat shading; `0.6` (34 degrees) suits most. Triangles without area are dropped.
     ///
     /// # Errors
-    /// [`RenderError::BadMesh`] for an index out of range, a number that is not finite, or too many vertices.
+    /// [`RenderError::BadMesh`] for an index out of range, a number that is not finite, or too many
+    /// vertices.
     pub fn from_triangles(
         positions: &[[f32; 3]],
         triangles: &[[u32; 3]],
@@ -41,10 +44,12 @@ impl MeshData {
         Ok(Self::smoothed(positions, triangles, &[], crease_rad))
     }
 
-    /// The same with places in a texture: for every triangle those of its three corners. Vertices are split where these differ.
+    /// Builds a mesh with texture coordinates: those of the three corners of each triangle.
+    /// Vertices are split if these differ.
     ///
     /// # Errors
-    /// As [`MeshData::from_triangles`]; also for another number of triangles, or places that are not finite.
+    /// As [`MeshData::from_triangles`]; also for a different number of triangles, or coordinates
+    /// that are not finite.
     pub fn from_unwrapped(
         positions: &[[f32; 3]],
         triangles: &[[u32; 3]],
@@ -64,7 +69,7 @@ impl MeshData {
         Ok(Self::smoothed(positions, triangles, places, crease_rad))
     }
 
-    /// Vertices split at creases, and where places in the texture differ.
+    /// Splits vertices at creases, and if their texture coordinates differ.
     fn smoothed(positions: &[[f32; 3]], triangles: &[[u32; 3]], places: &[[[f32; 2]; 3]], crease_rad: f32) -> Self {
         let point = |i: u32| Vector3::from(positions[i as usize]);
         let faces: Vec<Face> =
@@ -102,7 +107,7 @@ impl MeshData {
         mesh
     }
 
-    /// A box with the given half extents, flat faces.
+    /// A box with the given half extents and flat faces.
     pub fn cuboid(half: [f32; 3]) -> Self {
         let mut mesh = MeshData::default();
         for axis in 0..3 {
@@ -129,7 +134,8 @@ impl MeshData {
         Self::cuboid([0.5; 3])
     }
 
-    /// A box whose edges are rounded off with `radius` (at most the smallest half extent); highlights on the edges make boxes readable.
+    /// A box whose edges are rounded with `radius`, at most the smallest half extent. Highlights on
+    /// the edges make its form visible.
     pub fn rounded_cuboid(half: [f32; 3], radius: f32, segments: usize) -> Self {
         let radius = radius.clamp(0.0, half[0].min(half[1]).min(half[2]));
         let n = segments.clamp(1, 32) as i32;
@@ -175,7 +181,7 @@ impl MeshData {
         Self::lathe(&[[0.0, -h], [r, -h], [r, h], [0.0, h]], segments, 0.5)
     }
 
-    /// A capsule around z: a cylinder of `2 * half_length` closed by half spheres.
+    /// A capsule around z: a cylinder of length `2 * half_length` closed by hemispheres.
     pub fn capsule(radius: f32, half_length: f32, segments: usize) -> Self {
         let quarter = (segments / 4).clamp(2, 512);
         let arc = |i: usize, from: f32, shift: f32| {
@@ -187,8 +193,8 @@ impl MeshData {
         Self::revolve(&below.chain(above).collect::<Vec<_>>(), segments)
     }
 
-    /// A solid of revolution around z from a profile of `[radius, z]`, listed from bottom to top (pins, bowls, bottles).
-    /// Corners of the profile sharper than `crease_rad` stay hard.
+    /// A solid of revolution around z from a profile of `[radius, z]`, listed from bottom to top
+    /// (pins, bowls, bottles). Corners of the profile sharper than `crease_rad` stay hard.
     pub fn lathe(profile: &[[f32; 2]], segments: usize, crease_rad: f32) -> Self {
         let edge_normal = |i: usize| {
             let (a, b) = (profile[i], profile[i + 1]);
@@ -211,7 +217,7 @@ impl MeshData {
         Self::revolve(&points, segments)
     }
 
-    /// A square of the plane `z = 0`, normal up, from `-half_extent` to `half_extent`.
+    /// A square in the plane `z = 0`, normal up, from `-half_extent` to `half_extent`.
     pub fn ground_quad(half_extent: f32) -> Self {
         let h = half_extent;
         MeshData {
@@ -222,7 +228,7 @@ impl MeshData {
         }
     }
 
-    /// The corners `(min, max)` of the smallest box around the mesh; `None` when it is empty.
+    /// The corners `(min, max)` of the bounding box; `None` for an empty mesh.
     pub fn bounds(&self) -> Option<([f32; 3], [f32; 3])> {
         let mut points = self.positions.iter();
         let first = *points.next()?;
@@ -234,7 +240,7 @@ impl MeshData {
     /// Checks that the arrays fit each other and hold finite numbers.
     ///
     /// # Errors
-    /// [`RenderError::BadMesh`] says what does not fit.
+    /// [`RenderError::BadMesh`] names the fault.
     pub fn validate(&self) -> Result<(), RenderError> {
         check_counts(self.positions.len(), self.indices.len())?;
         if self.normals.len() != self.positions.len() {
@@ -282,7 +288,7 @@ impl MeshData {
         mesh
     }
 
-    /// Two triangles per cell of a `rows` x `columns` grid of vertices that starts at `first`.
+    /// Adds two triangles per cell of a `rows` x `columns` grid of vertices that starts at `first`.
     fn grid_indices(&mut self, first: u32, rows: u32, columns: u32, outward: bool) {
         for i in 0..rows.saturating_sub(1) {
             for j in 0..columns.saturating_sub(1) {
@@ -308,7 +314,7 @@ struct Face {
     normal: Vector3<f32>,
     angles: [f32; 3],
     places: Option<[[f32; 2]; 3]>,
-    /// Shares of the texture per metre: the root of the ratio of the areas.
+    /// Repetitions of the texture per meter: the root of the ratio of the areas.
     per_metre: f32,
 }
 
@@ -324,7 +330,7 @@ impl Face {
     }
 }
 
-/// For every point the faces that meet there and their angle at it.
+/// Returns, for every point, the faces that meet there and their angle at it.
 fn corners_around(faces: &[Face], points: usize) -> Vec<Vec<(u32, f32)>> {
     let mut around = vec![Vec::new(); points];
     for (f, face) in faces.iter().enumerate() {

@@ -1,9 +1,9 @@
-//! Sliders to be laid over a picture: for each a name, its number and a bar from the least to the greatest value.
+//! Slider panels over a picture: for each slider a name, a value and a bar.
 
 use crate::Image;
 use crate::facet::{blank, fill_rect, font};
 
-/// Dots of the panel: its width, the rim around all, the height of the title and of a slider.
+/// Dots of the panel: its width, its rim, the height of the title and of a slider.
 const WIDTH: i64 = 180;
 const RIM: i64 = 4;
 const TITLE: i64 = 14;
@@ -11,9 +11,9 @@ const ROW: i64 = 24;
 /// Dots from the top of a slider to its bar, and the bar's height.
 const BAR_TOP: i64 = 10;
 const BAR: i64 = 7;
-/// Dots at both ends of the bar, for the least and the greatest value.
+/// Dots at both ends of the bar, for the bounds of the range.
 const ENDS: i64 = 38;
-/// Letters of a name at most.
+/// Largest number of letters of a name.
 const LETTERS: usize = 16;
 
 const GROUND: [u8; 4] = [12, 14, 18, 190];
@@ -24,38 +24,39 @@ const TRACK: [u8; 4] = [112, 118, 130, 255];
 const HANDLE: [u8; 4] = [255, 160, 50, 255];
 const TARGET: [u8; 4] = [120, 200, 255, 255];
 
-/// A number that can be slid.
+/// A value with a slider.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slider {
-    /// What it is; the first 16 letters are shown.
+    /// Its name; the first 16 letters are shown.
     pub name: String,
-    /// The number.
+    /// The value.
     pub value: f64,
-    /// Least and greatest value.
+    /// Lower and upper bound.
     pub range: [f64; 2],
-    /// Behind the number, such as `rad`.
+    /// Unit after the value, such as `rad`.
     pub unit: &'static str,
-    /// A second mark on the bar: where the number is driven to.
+    /// A second mark on the bar: the target of a drive.
     pub target: Option<f64>,
-    /// Whether keys move this one.
+    /// Whether keys move this slider.
     pub chosen: bool,
 }
 
-/// A column of sliders below a title, and where everything in it lies. All pixels are from the panel's upper left corner.
+/// Layout of a column of sliders below a title. All pixels are from the panel's upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SliderPanel {
-    /// Pixels to a dot, 1 to 8.
+    /// Pixels per dot, 1 to 8.
     pub scale: u32,
-    /// How many sliders there are.
+    /// Number of sliders.
     pub count: usize,
-    /// The first that is shown.
+    /// Index of the first slider shown.
     pub first: usize,
-    /// How many are shown.
+    /// Number of sliders shown.
     pub shown: usize,
 }
 
 impl SliderPanel {
-    /// As many of `count` sliders as a height holds, at least one, with `chosen` among them and otherwise from `first` on.
+    /// Fits as many of `count` sliders as possible into a height, at least one. `chosen` is among
+    /// them; otherwise they start at `first`.
     pub fn fitting(count: usize, chosen: usize, first: usize, scale: u32, height_px: u32) -> SliderPanel {
         let scale = scale.clamp(1, 8);
         let room = i64::from(height_px / scale) - TITLE - 2 * RIM;
@@ -69,7 +70,8 @@ impl SliderPanel {
         [WIDTH, 2 * RIM + TITLE + ROW * self.shown as i64].map(|dots| dots as u32 * self.scale)
     }
 
-    /// The slider at a pixel, and what share of its bar lies to the left of it, 0 to 1 (also where the pixel is beside the bar).
+    /// Returns the slider at a pixel and the fraction of its bar to the left of it, 0 to 1; also
+    /// for pixels beside the bar.
     pub fn at(&self, [x, y]: [f64; 2]) -> Option<(usize, f64)> {
         let [width, height] = self.size_px();
         let scale = f64::from(self.scale);
@@ -79,7 +81,7 @@ impl SliderPanel {
         (inside && index < self.shown).then(|| (self.first + index, self.share(x)))
     }
 
-    /// What share of a bar lies to the left of a column of pixels, 0 to 1.
+    /// The fraction of a bar to the left of a column of pixels, 0 to 1.
     pub fn share(&self, x: f64) -> f64 {
         let [left, right] = self.bar_px();
         ((x - left) / (right - left)).clamp(0.0, 1.0)
@@ -90,7 +92,7 @@ impl SliderPanel {
         [RIM + ENDS, WIDTH - RIM - ENDS].map(|dots| (dots * i64::from(self.scale)) as f64)
     }
 
-    /// Middle of the bar of a slider, pixels from the top; `None` where it is not shown.
+    /// Height of the bar of a slider, pixels from the top; `None` if it is not shown.
     pub fn middle_px(&self, index: usize) -> Option<f64> {
         let row = index.checked_sub(self.first).filter(|row| *row < self.shown)? as i64;
         Some(
@@ -99,7 +101,7 @@ impl SliderPanel {
         )
     }
 
-    /// The panel with its title; `sliders` are all of them.
+    /// Draws the panel with its title; `sliders` holds all sliders.
     pub fn draw(&self, title: &str, sliders: &[Slider]) -> Image {
         let [width, height] = self.size_px();
         let mut panel = Panel { image: blank(width, height, GROUND), scale: i64::from(self.scale) };
@@ -115,7 +117,7 @@ impl SliderPanel {
     }
 }
 
-/// A picture that is drawn on in dots.
+/// A picture that is drawn in dots.
 struct Panel {
     image: Image,
     scale: i64,
@@ -126,7 +128,7 @@ impl Panel {
         font::write(&mut self.image, &text.to_uppercase(), x * self.scale, y * self.scale, self.scale, color);
     }
 
-    /// Text that ends at a column.
+    /// Writes text that ends at the column `x`.
     fn text_before(&mut self, text: &str, x: i64, y: i64, color: [u8; 4]) {
         self.text(text, x - font::text_width(text, 1), y, color);
     }
@@ -176,7 +178,7 @@ mod tests {
 
     #[test]
     fn a_low_window_shows_those_around_the_chosen_one() {
-        // 24 dots a slider, 22 for title and rims: 100 dots hold 3
+        // 24 dots per slider and 22 for title and rims: 100 dots hold 3
         let panel = SliderPanel::fitting(10, 6, 0, 1, 100);
         assert_eq!((panel.first, panel.shown), (4, 3));
         assert_eq!(panel.middle_px(3), None);

@@ -1,18 +1,20 @@
-//! What a picture is taken with, whoever it is: a look-at camera, raw matrices, a facet of a cave.
+//! The interface of everything that a picture can be taken with: a look-at camera, raw matrices, a
+//! facet of a cave.
 
 use crate::{Camera, RenderError};
 use nalgebra::Matrix4;
 
-/// Something that pictures can be taken with ([`crate::Renderer::render_from`]).
+/// A viewpoint of pictures ([`crate::Renderer::render_from`]).
 pub trait Viewpoint {
-    /// The matrices, and what else a picture of this shape needs to know.
+    /// Returns the matrices, and how the picture is part of a larger one.
     ///
     /// # Errors
-    /// [`RenderError::BadValue`] where the numbers make no view.
+    /// [`RenderError::BadValue`] if the numbers make no view.
     fn lens(&self, aspect: f32) -> Result<Lens, RenderError>;
 }
 
-/// A view in numbers. World z up; view space looks along −z, x right, y up; clip space has depth 0 near and 1 far.
+/// A view in numbers. World z up; view space looks along −z, x right, y up; clip space has depth 0
+/// near and 1 far.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lens {
     /// World to view: a rigid motion.
@@ -23,13 +25,15 @@ pub struct Lens {
     pub part: Option<Part>,
 }
 
-/// That a picture is one of several that show one world side by side, and must agree at their edges. Shadows, floor and occlusion are
-/// then fitted to all there is instead of to what this view sees, and dither runs on across the pictures.
+/// Marks one of several pictures that show one world side by side and must agree at their edges.
+/// Shadows, floor and occlusion are then fitted to the whole world instead of to this view, and the
+/// dither continues across the pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part {
-    /// The number of the first pixel, to the right and down, in the plane that the picture shares with others.
+    /// Index of the first pixel, to the right and down, in the plane that the pictures share.
     pub first_pixel: [i32; 2],
-    /// Pixels drawn beyond each edge and cut off again, so that occlusion sees past the edge. It reaches no farther than this: 0 turns it off.
+    /// Pixels drawn beyond each edge and cut off again, so that occlusion sees past the edge. It is
+    /// also the largest reach of occlusion; 0 turns occlusion off.
     pub rim_px: u32,
 }
 
@@ -41,7 +45,7 @@ impl Viewpoint for Camera {
 }
 
 impl Lens {
-    /// The same view with `rim` pixels more on each side of a picture of this size.
+    /// Extends the view by `rim` pixels on each side of a picture of this size.
     pub(crate) fn widened(mut self, width: u32, height: u32, rim: u32) -> Lens {
         let share = |side: u32| f64::from(side) / f64::from(side + 2 * rim);
         let across = self.projection.row(0) * share(width);

@@ -1,6 +1,7 @@
-//! A window with a program in it: opening, events, pace, end. What is shown is the program's business ([`WindowApp`]).
+//! A window that runs an application: opening, events, timing, end. The application decides what
+//! the window shows ([`WindowApp`]).
 //!
-//! One window per process: the desktop's library allows one event loop.
+//! A process has at most one window, because the window library allows one event loop.
 
 use crate::RenderError;
 use crate::gpu::Screen;
@@ -12,70 +13,72 @@ use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::window::{Window, WindowId};
 
-/// How the window opens.
+/// Options of a new window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WindowOptions {
-    /// In the title bar.
+    /// Text of the title bar.
     pub title: String,
-    /// Width and height of the picture in it, pixels.
+    /// Width and height of its content, pixels.
     pub size_px: [u32; 2],
-    /// Place of its upper left corner on the desktop; `None` leaves it to the desktop.
+    /// Position of its upper left corner on the desktop; `None` leaves it to the desktop.
     pub position_px: Option<[i32; 2]>,
-    /// Title bar and frame.
+    /// Whether it has a title bar and a frame.
     pub decorated: bool,
     /// Whether the user may change its size.
     pub resizable: bool,
 }
 
 impl WindowOptions {
-    /// An ordinary window.
+    /// A decorated, resizable window at a place that the desktop chooses.
     pub fn new(title: impl Into<String>, size_px: [u32; 2]) -> WindowOptions {
         WindowOptions { title: title.into(), size_px, position_px: None, decorated: true, resizable: true }
     }
 }
 
-/// When the program wants its turn again.
+/// When the application is called next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Next {
-    /// At this moment, whatever happens before.
+    /// At this time, even without an event.
     At(Instant),
     /// After the next event.
     Event,
-    /// Never: close the window.
+    /// Never: closes the window.
     End,
 }
 
-/// A program in a window.
+/// An application in a window.
 pub trait WindowApp {
-    /// What ends it early.
+    /// The error that ends it early.
     type Error: From<RenderError>;
 
-    /// The window is open.
+    /// Called when the window is open.
     ///
     /// # Errors
-    /// Whatever ends the program.
+    /// Any error that ends the application.
     fn opened(&mut self, screen: &mut Screen) -> Result<(), Self::Error> {
         let _ = screen;
         Ok(())
     }
 
-    /// Something happened. The screen already has a new size; what closes the window is told too, and then it closes.
+    /// Called for every event. The screen already has its new size; the event that closes the
+    /// window comes before it closes.
     ///
     /// # Errors
-    /// Whatever ends the program.
+    /// Any error that ends the application.
     fn event(&mut self, screen: &mut Screen, event: &WindowEvent) -> Result<(), Self::Error>;
 
-    /// Its turn: time to draw and show. Called at the moments it asked for.
+    /// Called at the requested times, to draw and show.
     ///
     /// # Errors
-    /// Whatever ends the program.
+    /// Any error that ends the application.
     fn turn(&mut self, screen: &mut Screen) -> Result<Next, Self::Error>;
 }
 
-/// Opens a window and runs the program until it ends or the window is closed.
+/// Opens a window and runs the application until it ends or the window is closed.
 ///
 /// # Errors
-/// [`RenderError::NoWindow`] where there is no desktop, [`RenderError::BadSize`], [`RenderError::NoAdapter`], [`RenderError::Device`]; and the program's own.
+/// [`RenderError::NoWindow`] without a desktop, [`RenderError::BadSize`],
+/// [`RenderError::NoAdapter`], [`RenderError::Device`], and the application's own errors.
 pub fn run_window<A: WindowApp>(options: &WindowOptions, app: &mut A) -> Result<(), A::Error> {
     let refused = |reason: String| RenderError::NoWindow { reason };
     let [width, height] = options.size_px;
@@ -91,13 +94,13 @@ pub fn run_window<A: WindowApp>(options: &WindowOptions, app: &mut A) -> Result<
     ended.map_err(|e| refused(e.to_string()).into())
 }
 
-/// The window library's message without the line of its source at which it was made.
+/// Removes the source line of the window library from its message.
 fn without_place(reason: &str) -> String {
     let said = reason.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")).map_or(reason, |(_, said)| said);
     said.trim_end_matches('.').to_string()
 }
 
-/// With what was tried, where something was.
+/// Adds the displays that were tried.
 fn tried(reason: String) -> String {
     let set = |name: &str| {
         std::env::var_os(name)
@@ -117,7 +120,7 @@ struct Host<'a, A: WindowApp> {
 }
 
 impl<A: WindowApp> Host<'_, A> {
-    /// Ends with an error, if there is one.
+    /// Ends the event loop if there is an error.
     fn checked(&mut self, event_loop: &ActiveEventLoop, result: Result<(), A::Error>) {
         if let Err(error) = result {
             if self.outcome.is_ok() {
@@ -196,7 +199,7 @@ impl<A: WindowApp> ApplicationHandler for Host<'_, A> {
     }
 
     fn exiting(&mut self, _event_loop: &ActiveEventLoop) {
-        // before the event loop, whose display it lies on
+        // before the event loop, whose display it uses
         self.screen = None;
     }
 }

@@ -1,8 +1,10 @@
-//! Steps a scene as it is told: for every line with a number on its input that many steps, and a line with the frame when they are done.
+//! Steps a scene on request: for each input line with a number it takes that many steps and prints
+//! a line with the frame.
 //!
 //!     cargo build --release -p tumble --example steps && echo 240 | target/release/examples/steps billiards
 //!
-//! What the program takes between two lines is what stepping takes in Rust: `benches/python/costs.py` compares it with a loop in Python.
+//! The time between two lines is the time of stepping in Rust: `benches/python/costs.py` compares
+//! it with a loop in Python.
 
 use std::io::{BufRead, Write, stdin, stdout};
 use tumble::scene::resolve_scene;

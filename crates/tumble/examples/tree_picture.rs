@@ -1,6 +1,4 @@
-//! The picture of the book: a mesh with levels 1 to 3 of its tree, a row per method.
-//!
-//! `cargo run --release -p tumble --example tree_picture -- bunny.obj docs/images/spheretrees.png`
+//! Draws the picture of the documentation: a mesh with levels 1 to 3 of its tree, a row per method.
 
 use std::error::Error;
 use tumble::collide::{Builder, SphereTree, TreeCache, TreeSettings, TriMesh};

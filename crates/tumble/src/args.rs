@@ -1,4 +1,4 @@
-//! What can be typed.
+//! The command line: commands, options and their parsers.
 
 use crate::cave::args::{CaveOptions, FacetOptions, RecoverOptions, ReplayOptions, ServeOptions};
 use crate::failure::Failure;
@@ -46,13 +46,14 @@ pub enum Command {
     Completions(CompletionOptions),
 }
 
-/// What is simulated, and how it is stepped.
+/// The scene and its stepping.
 #[derive(Args, Clone)]
 pub struct SceneOptions {
-    /// A scene file, a folder that holds a scene.toml, the name of a shipped scene, a robot (.urdf) or a mesh (.obj, .stl, .ply, .dae).
+    /// A scene file, a folder with a scene.toml, the name of a shipped scene, a robot (.urdf) or a
+    /// mesh (.obj, .stl, .ply, .dae).
     #[arg(value_name = "SCENE")]
     pub name: String,
-    /// Length of a step, s (default: what the scene says).
+    /// Length of a step, s (default: from the scene).
     #[arg(long, help_heading = "Stepping", value_name = "S", value_parser = time_step)]
     pub dt: Option<f64>,
     /// time_stepping or backtracking.
@@ -61,7 +62,8 @@ pub struct SceneOptions {
     /// gauss_seidel, lcp (short for lcp_pyramid), lcp_pyramid or lcp_sliding.
     #[arg(long, help_heading = "Stepping", value_name = "NAME", value_parser = solver)]
     pub solver: Option<Solver>,
-    /// verlet, symplectic_euler, explicit_euler, rk4 or dormand_prince; time_stepping is the midpoint rule whatever is chosen.
+    /// verlet, symplectic_euler, explicit_euler, rk4 or dormand_prince; time_stepping always uses
+    /// the midpoint rule.
     #[arg(long, help_heading = "Stepping", value_name = "NAME")]
     pub integrator: Option<Integrator>,
     #[command(flatten)]
@@ -69,7 +71,7 @@ pub struct SceneOptions {
 }
 
 impl SceneOptions {
-    /// The scene, with the settings that the command line gives.
+    /// Loads the scene and applies the settings of the command line.
     pub fn load(&self) -> Result<SceneFile, Failure> {
         let mut scene = self.opening.load(&self.name)?;
         let w = &mut scene.world;
@@ -81,38 +83,40 @@ impl SceneOptions {
     }
 }
 
-/// How a robot or a mesh file is opened.
+/// Opening a robot or a mesh file.
 #[derive(Args, Clone)]
 #[command(next_help_heading = "Robots and meshes")]
 pub struct OpeningOptions {
-    /// The root link of a URDF floats.
+    /// Let the root link of a URDF float.
     #[arg(long, conflicts_with = "fixed_base")]
     pub floating: bool,
-    /// The root link of a URDF is fixed to the world (default).
+    /// Fix the root link of a URDF to the world (default).
     #[arg(long)]
     pub fixed_base: bool,
-    /// Where a package of package://NAME/... is; may be given several times. Others are looked for in the folders above the URDF.
+    /// Folder of the package in package://NAME/...; may be given several times. Other packages are
+    /// searched in the folders above the URDF.
     #[arg(long = "package", value_name = "NAME=DIR", value_parser = package)]
     pub packages: Vec<(String, PathBuf)>,
-    /// What to do where a collision mesh of a URDF is not there: error, or skip it with a note.
+    /// If a collision mesh of a URDF is missing: error, or skip it with a note.
     #[arg(long, value_name = "error|skip", value_parser = missing)]
     pub missing_meshes: Option<MissingMeshes>,
-    /// Repair a mesh that is no solid: holes, fins, inner walls, debris. What was done is told; the file stays as it is.
+    /// Repair a mesh that is not a closed solid: holes, fins, inner walls, debris. Notes list the
+    /// repairs; the file stays unchanged.
     #[arg(long)]
     pub repair: bool,
 }
 
 impl OpeningOptions {
-    /// The scene of that name or path; notes tell of a base that is fixed unasked.
+    /// Loads the scene of that name or path. A note says so if the base is fixed by default.
     pub fn load(&self, name: &str) -> Result<SceneFile, Failure> {
         let mut scene = self.read(name)?;
         if kind(name) == FileKind::Urdf && !self.fixed_base && scene.has_fixed_base() {
-            scene.notes.push(format!("{name}: the root link is fixed to the world; --floating frees it"));
+            scene.notes.push(format!("{name}: the root link is fixed to the world; --floating makes it float"));
         }
         Ok(scene)
     }
 
-    /// The scene of that name or path.
+    /// Loads the scene of that name or path.
     pub fn read(&self, name: &str) -> Result<SceneFile, Failure> {
         self.check(kind(name)).map_err(|option| Failure::input(format!("{name}: {option}")))?;
         let urdf = UrdfOptions {
@@ -139,25 +143,25 @@ impl OpeningOptions {
         args
     }
 
-    /// An option that says nothing about a file of this kind is refused.
+    /// Refuses options that have no effect on a file of this kind.
     fn check(&self, kind: FileKind) -> Result<(), &'static str> {
         let robot = self.floating || self.fixed_base || !self.packages.is_empty() || self.missing_meshes.is_some();
         match kind {
             FileKind::Urdf if self.repair => {
-                Err("--repair goes with a mesh; open meshes of a URDF collide by their hulls")
+                Err("--repair needs a mesh file; an open mesh of a URDF collides by its convex hull")
             }
             FileKind::Mesh | FileKind::Scene if robot => Err(
-                "--floating, --fixed-base, --package and --missing-meshes go with a .urdf; a scene says so itself, under [[articulated]]",
+                "--floating, --fixed-base, --package and --missing-meshes need a .urdf file; a scene has these settings under [[articulated]]",
             ),
             FileKind::Scene if self.repair => {
-                Err("--repair goes with a mesh; a scene says `repair = true` under [meshes.NAME]")
+                Err("--repair needs a mesh file; a scene has `repair = true` under [meshes.NAME]")
             }
             _ => Ok(()),
         }
     }
 }
 
-/// What a name stands for; a name without an extension for a scene.
+/// The kind of file that a name stands for; a name without an extension is a scene.
 pub fn kind(name: &str) -> FileKind {
     FileKind::of(Path::new(name)).unwrap_or(FileKind::Scene)
 }
@@ -166,7 +170,7 @@ pub fn kind(name: &str) -> FileKind {
 pub struct RunOptions {
     #[command(flatten)]
     pub scene: SceneOptions,
-    /// Simulated time to run for, s (default: what the scene says).
+    /// Simulated time of the run, s (default: from the scene).
     #[arg(long, help_heading = "Stepping", value_name = "S", value_parser = seconds)]
     pub duration: Option<f64>,
     /// Write a recording (MCAP; opens in Foxglove).
@@ -178,31 +182,36 @@ pub struct RunOptions {
     /// Write a picture of the last frame (PNG).
     #[arg(long, help_heading = "Pictures", value_name = "FILE", value_parser = png)]
     pub screenshot: Option<PathBuf>,
-    /// Size of the picture, pixels; an unfolded cave is made to fit (default: 1280x720; a facet has the size that its cave says).
+    /// Size of the picture, pixels. An unfolded cave is fitted into it (default: 1280x720; a facet
+    /// has the size in its cave file).
     #[arg(long, help_heading = "Pictures", value_name = "WxH", value_parser = size)]
     pub size: Option<(u32, u32)>,
-    /// Draw for a cave: all its facets, unfolded into one picture. A cave file or the name of a shipped cave.
+    /// Draw for a cave: all its facets, unfolded into one picture. A cave file or the name of a
+    /// shipped cave.
     #[arg(long, help_heading = "Pictures", value_name = "CAVE")]
     pub cave: Option<String>,
-    /// Draw this facet of the cave alone, as its projector gets it.
+    /// Draw this facet of the cave alone, as its projector shows it.
     #[arg(long, help_heading = "Pictures", value_name = "NAME")]
     pub facet: Option<String>,
     /// Write pictures of the run into a folder: frame_000000.png and so on.
     #[arg(long, help_heading = "Pictures", value_name = "DIR")]
     pub frames_dir: Option<PathBuf>,
-    /// Write a video of the run (needs the program ffmpeg; the ending says the kind, such as .mp4).
+    /// Write a video of the run. It needs the program ffmpeg; the extension selects the format,
+    /// such as .mp4.
     #[arg(long, help_heading = "Pictures", value_name = "FILE")]
     pub video: Option<PathBuf>,
     /// Frames of the video, and pictures in the folder, per simulated second.
     #[arg(long, help_heading = "Pictures", value_name = "N", default_value = "30", value_parser = rate)]
     pub fps: f64,
-    /// Draw over the picture: contacts, normals, velocities, forces, joints, frames, islands, sleep, tree=LEVEL, all; with commas between them.
+    /// Overlays: contacts, normals, velocities, forces, joints, frames, islands, sleep, tree=LEVEL,
+    /// all; separated by commas.
     #[arg(long, help_heading = "Pictures", value_name = "WHAT", default_value = "")]
     pub debug_draw: Overlays,
-    /// Speed against looks: usual, fast, fastest, and shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off, map=TEXELS; with commas between them.
+    /// Quality of pictures against speed: default, fast, fastest, and shadows=off|hard|soft,
+    /// samples=1|4, occlusion=on|off, reflections=on|off, map=TEXELS; separated by commas.
     #[arg(long, help_heading = "Pictures", value_name = "WHAT", default_value = "default")]
     pub quality: tumble::render::Quality,
-    /// See from this camera: scene, or the name of an object that carries one.
+    /// The camera: scene, or the name of an object with a camera.
     #[arg(long, help_heading = "Pictures", value_name = "NAME", conflicts_with = "cave")]
     pub camera: Option<String>,
     /// Restore a saved state before the first step.
@@ -211,7 +220,7 @@ pub struct RunOptions {
     /// Save the state after the last step.
     #[arg(long, help_heading = "Results", value_name = "FILE")]
     pub save: Option<PathBuf>,
-    /// Say nothing but errors.
+    /// Print nothing but errors.
     #[arg(long, short, help_heading = "Results")]
     pub quiet: bool,
 }
@@ -221,60 +230,66 @@ pub struct RunOptions {
 pub struct ViewOptions {
     #[command(flatten)]
     pub scene: SceneOptions,
-    /// Size of the window, pixels; an unfolded cave is made to fit (default: 1280x720; a facet has the size that its cave says).
+    /// Size of the window, pixels. An unfolded cave is fitted into it (default: 1280x720; a facet
+    /// has the size in its cave file).
     #[arg(long, help_heading = "Window", value_name = "WxH", value_parser = size)]
     pub size: Option<(u32, u32)>,
-    /// Look through the screens of a cave that moves with the user: a file or the name of a shipped cave.
+    /// Look through the screens of a cave that moves with the user. A cave file or the name of a
+    /// shipped cave.
     #[arg(long, help_heading = "Window", value_name = "CAVE")]
     pub cave: Option<String>,
-    /// Show this facet of the cave alone, as its projector gets it, in a window without a frame.
+    /// Show this facet of the cave alone, as its projector shows it, in a window without a frame.
     #[arg(long, help_heading = "Window", value_name = "NAME", requires = "cave", conflicts_with = "preview")]
     pub facet: Option<String>,
-    /// Show all facets of the cave, unfolded; so does --cave without --facet.
+    /// Show all facets of the cave, unfolded; this is the default with --cave.
     #[arg(long, help_heading = "Window", requires = "cave")]
     pub preview: bool,
-    /// The camera to begin with: scene, one that a body or link carries, front, left, back, right or top.
+    /// The first camera: scene, one on a body or link, front, left, back, right or top.
     #[arg(long, help_heading = "Window", value_name = "NAME")]
     pub camera: Option<String>,
-    /// Draw over the picture: contacts, normals, velocities, forces, joints, frames, islands, sleep, tree=LEVEL, all; with commas between them.
+    /// Overlays: contacts, normals, velocities, forces, joints, frames, islands, sleep, tree=LEVEL,
+    /// all; separated by commas.
     #[arg(long, help_heading = "Window", value_name = "WHAT", default_value = "")]
     pub debug_draw: Overlays,
-    /// usual, fast or fastest, or parts of it: shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off, map=TEXELS; with commas between them (default: usual; fast
-    /// where a software driver draws).
+    /// Quality of pictures against speed: default, fast or fastest, or shadows=off|hard|soft,
+    /// samples=1|4, occlusion=on|off, reflections=on|off, map=TEXELS; separated by commas (default:
+    /// default; fast with a software driver).
     #[arg(long, help_heading = "Window", value_name = "WORDS")]
     pub quality: Option<Quality>,
-    /// Begin with time standing.
+    /// Start paused.
     #[arg(long, help_heading = "Session")]
     pub paused: bool,
-    /// Begin without text over the picture.
+    /// Start without text over the picture.
     #[arg(long, help_heading = "Window")]
     pub no_hud: bool,
-    /// Pictures per second at most (default: what the desktop shows).
+    /// Pictures per second, at most (default: the desktop's refresh rate).
     #[arg(long, help_heading = "Window", value_name = "N", value_parser = rate)]
     pub fps: Option<f64>,
     /// End at this simulated time, s.
     #[arg(long, help_heading = "Stepping", value_name = "S", value_parser = seconds)]
     pub duration: Option<f64>,
-    /// End after so many pictures.
+    /// End after this number of pictures.
     #[arg(long, help_heading = "Session", value_name = "N")]
     pub frames: Option<u64>,
-    /// Write what is shown at the end (PNG).
+    /// Write the last picture (PNG).
     #[arg(long, help_heading = "Session", value_name = "FILE", value_parser = png)]
     pub screenshot: Option<PathBuf>,
-    /// Where the key P leaves pictures: SCENE_000123.png, by the number of the step.
+    /// Folder for the screenshots of the key P: SCENE_000123.png, with the number of the step.
     #[arg(long, help_heading = "Session", value_name = "DIR", default_value = ".")]
     pub screenshot_dir: PathBuf,
-    /// Write what is shown as JSON, a line whenever the user changes something and four a second; - for stdout.
+    /// Write the state of the window as lines of JSON, at each change by the user and four times a
+    /// second; - is stdout.
     #[arg(long, help_heading = "Session", value_name = "FILE|-")]
     pub status: Option<PathBuf>,
-    /// Lose the graphics device after so many pictures, as a driver that crashes does: to see what comes then.
+    /// Lose the graphics device after this number of pictures, as if a driver crashed; for tests.
     #[arg(long, value_name = "N", hide = true)]
     pub lose_device: Option<u64>,
 }
 
 #[derive(Args)]
 pub struct CheckOptions {
-    /// Scene files, folders, names of shipped scenes; cave files, names of shipped caves; .urdf robots; .obj, .stl, .ply and .dae meshes.
+    /// Scene files, folders, names of shipped scenes; cave files, names of shipped caves; .urdf
+    /// robots; .obj, .stl, .ply and .dae meshes.
     #[arg(required = true)]
     pub files: Vec<String>,
     #[command(flatten)]
@@ -287,20 +302,22 @@ pub struct SphereTreeOptions {
     /// A closed mesh: .obj, .stl, .ply or .dae.
     #[arg(conflicts_with = "urdf")]
     pub mesh: Option<PathBuf>,
-    /// How trees are built: medial (adaptive medial axis, the tightest; default), hubbard (medial axis of fixed samples), grid (cubes of a grid) or octree (the fastest).
+    /// Method of building: medial (adaptive medial axis, the tightest; default), hubbard (medial
+    /// axis of fixed samples), grid (cubes of a grid) or octree (the fastest).
     #[arg(long, value_name = "NAME", value_parser = method)]
     pub method: Option<Builder>,
-    /// Greatest number of children of a ball, 2 to 64 (default 8; an octree has 8).
+    /// Largest number of children of a sphere, 2 to 64 (default 8; an octree has 8).
     #[arg(long, value_name = "N")]
     pub branching: Option<u32>,
-    /// Greatest number of subdivisions, 1 to 9 (default 3; of an octree 7).
+    /// Largest number of subdivisions, 1 to 9 (default 3; for an octree 7).
     #[arg(long, value_name = "N")]
     pub depth: Option<u32>,
-    /// Balls that reach at most this far outside are not divided further: a share of the mesh's diagonal, 0.0001 to 1 (default 0.0001; of an octree 0.01, which its leaves
-    /// are all grown to; with --urdf 0.001).
+    /// Outward error at which spheres are not subdivided further: a fraction of the mesh's
+    /// diagonal, 0.0001 to 1 (default 0.0001; for an octree 0.01, to which all its leaves are
+    /// grown; with --urdf 0.001).
     #[arg(long, value_name = "SHARE", value_parser = fraction)]
     pub max_error: Option<f64>,
-    /// Close holes and drop what dangles before building; what was done is said.
+    /// Repair holes and dangling parts before building. Notes list the repairs.
     #[arg(long, conflicts_with = "urdf")]
     pub repair: bool,
     /// Write the tree (JSON), or the URDF of spheres.
@@ -309,40 +326,43 @@ pub struct SphereTreeOptions {
     /// Write a picture (PNG) of a level over the mesh.
     #[arg(long, help_heading = "Picture", value_name = "FILE", conflicts_with = "urdf", value_parser = png)]
     pub screenshot: Option<PathBuf>,
-    /// The level of the picture, the root being 0 (default: the last).
+    /// Level in the picture; the root is level 0 (default: the last level).
     #[arg(long, help_heading = "Picture", value_name = "N", requires = "screenshot")]
     pub level: Option<u32>,
-    /// The axis that is up in the picture.
+    /// Axis of the mesh that points up in the picture.
     #[arg(long, help_heading = "Picture", value_name = "x|y|z", default_value = "z", value_parser = ["x", "y", "z"])]
     pub up: String,
     /// Size of the picture, pixels.
     #[arg(long, help_heading = "Picture", value_name = "WxH", default_value = "960x720", value_parser = size)]
     pub size: (u32, u32),
-    /// Keep built trees in this folder (default: $TUMBLE_CACHE, else the user's cache folder).
+    /// Folder of the cache of built trees (default: $TUMBLE_CACHE, else the user's cache folder).
     #[arg(long, value_name = "DIR", value_parser = folder)]
     pub cache: Option<PathBuf>,
-    /// Build even if the tree was built before, and keep nothing.
+    /// Build the tree even if it is cached, and cache nothing.
     #[arg(long, conflicts_with = "cache")]
     pub no_cache: bool,
     /// Replace the collision geometry of every link of this robot by spheres.
     #[arg(long, help_heading = "Robots", value_name = "ROBOT")]
     pub urdf: Option<PathBuf>,
-    /// Where a package of package://NAME/... is; may be given several times. Others are looked for in the folders above the URDF.
+    /// Folder of the package in package://NAME/...; may be given several times. Other packages are
+    /// searched in the folders above the URDF.
     #[arg(long = "package", help_heading = "Robots", value_name = "NAME=DIR", requires = "urdf", value_parser = package)]
     pub packages: Vec<(String, PathBuf)>,
-    /// What to do where a collision mesh is not there: error, or skip it with a note.
+    /// If a collision mesh is missing: error, or skip it with a note.
     #[arg(long, help_heading = "Robots", value_name = "error|skip", requires = "urdf", default_value = "error", value_parser = missing)]
     pub missing_meshes: MissingMeshes,
-    /// Most spheres per link, at least one per collision element; a link gets fewer where all reach out less than --max-error (default 32, or 10000 with --max-error).
+    /// Number of spheres per link, at most, and at least one per collision element. A link gets
+    /// fewer if all stay within --max-error (default 32, or 10000 with --max-error).
     #[arg(long, help_heading = "Robots", value_name = "N", requires = "urdf", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub spheres: Option<u32>,
-    /// Also write the spheres for motion planners: yaml (cuRobo) or json (foam, VAMP) beside the output, or a file that ends in .yml or .json.
+    /// Also write the spheres for motion planners: yaml (cuRobo) or json (foam, VAMP) beside the
+    /// output, or a file that ends in .yml or .json.
     #[arg(long, help_heading = "Robots", value_name = "yaml|json|FILE", requires = "urdf", value_parser = planner)]
     pub planner: Option<PathBuf>,
-    /// More figures, and what the stages of the builder did.
+    /// Print more figures and the stages of the builder.
     #[arg(long, short)]
     pub verbose: bool,
-    /// Say nothing but errors.
+    /// Print nothing but errors.
     #[arg(long, short, conflicts_with = "verbose")]
     pub quiet: bool,
 }
@@ -358,21 +378,21 @@ pub struct CompletionOptions {
 
 #[derive(Args)]
 pub struct CavesOptions {
-    /// Draw a calibration pattern: grid, corners, colours or name.
+    /// Draw a calibration pattern: grid, corners, colors or name.
     #[arg(long, value_name = "WHAT", requires_all = ["cave", "facet", "screenshot"])]
     pub pattern: Option<CalibrationPattern>,
     /// A cave file or the name of a shipped cave.
     #[arg(long, value_name = "CAVE", requires = "pattern")]
     pub cave: Option<String>,
-    /// The facet that the pattern is for.
+    /// The facet that shows the pattern.
     #[arg(long, value_name = "NAME", requires = "pattern")]
     pub facet: Option<String>,
-    /// Where the picture goes (PNG).
+    /// Write the pattern here (PNG).
     #[arg(long, value_name = "FILE", requires = "pattern", value_parser = png)]
     pub screenshot: Option<PathBuf>,
 }
 
-/// Overlays, or none for an empty word.
+/// Overlays of `--debug-draw`; an empty word means none.
 #[derive(Clone, Copy, Default)]
 pub struct Overlays(pub DebugDraw);
 
@@ -412,7 +432,7 @@ fn fraction(text: &str) -> Result<f64, String> {
     number(text, 1e-4, 1.0)
 }
 
-/// The names are those of the JSON of a tree.
+/// Parses the names that the JSON of a tree uses.
 fn method(text: &str) -> Result<Builder, String> {
     serde_json::from_value(text.into()).map_err(|e| e.to_string().replace("variant", "method").replace('`', ""))
 }
@@ -441,7 +461,7 @@ fn missing(text: &str) -> Result<MissingMeshes, String> {
     }
 }
 
-/// A file for a picture: PNG is what is written, and no ending says something else.
+/// Parses the name of a picture: its extension must be .png, or missing.
 fn png(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match path.extension() {

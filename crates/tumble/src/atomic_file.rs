@@ -13,9 +13,10 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         .map_err(|e| Failure::run(&format!("writing {}", path.display()), e))
 }
 
-/// Writes a temporary file beside `path` and renames it to `path`. An earlier file keeps its bytes until the new one is
-/// complete, and keeps them if writing fails, as on a full disk. A `path` that exists and is no regular file, such as
-/// `/dev/stdout`, is written directly. A symbolic link stays a link, and its target is replaced.
+/// Writes a temporary file beside `path` and renames it to `path`. An earlier file keeps its bytes
+/// until the new one is complete, and keeps them if writing fails, as on a full disk. A `path` that
+/// exists and is no regular file, such as `/dev/stdout`, is written directly. A symbolic link stays
+/// a link, and its target is replaced.
 ///
 /// # Errors
 /// The errors of `write`, which gets the path to write to, and of the renaming.
@@ -44,7 +45,8 @@ fn temporary_beside(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{name}.{}.unfinished", std::process::id()))
 }
 
-/// Checks, before the work for a file is done, that its folder exists and that it is not a folder itself.
+/// Checks, before the work for a file is done, that its folder exists and that it is not a folder
+/// itself.
 ///
 /// # Errors
 /// A sentence that names the path and says what keeps the file from being written.

@@ -1,4 +1,5 @@
-//! Pictures of a run: of its end, one after another into a folder, or as a video; by the scene's camera, one facet of a cave, or all of them.
+//! Pictures of a run: a screenshot of the last frame, a series of frames in a folder, or a video.
+//! The viewpoint is a camera, one facet of a cave, or the cave unfolded.
 
 use crate::args::RunOptions;
 use crate::atomic_file::write_file;
@@ -10,12 +11,12 @@ use tumble::render::{CaveView, DebugDraw, DrawList, Drawing, Image, Quality, Ren
 use tumble::scene::SceneFile;
 use tumble::scene::cave::{Facet, resolve_cave};
 
-/// Size of a picture where nothing is said, pixels.
+/// Default size of a picture, pixels.
 const DEFAULT_SIZE_PX: [u32; 2] = [1280, 720];
-/// Shadow maps of a cave, which hold all that its screens show together, are this much wider.
+/// Factor by which shadow maps of a cave are wider, because one map serves all of its screens.
 const CAVE_SHADOWS: u32 = 2;
 
-/// Takes pictures of one scene.
+/// Takes the pictures of one run.
 pub struct Capture {
     drawing: Drawing,
     renderer: Renderer,
@@ -26,14 +27,14 @@ pub struct Capture {
     frames: Option<FrameSeries>,
 }
 
-/// Where pictures are taken from, with the size asked for.
+/// The viewpoint of the pictures, with the requested size in pixels.
 enum Source {
     Camera([u32; 2]),
     Facet(Box<CaveView>, Box<Facet>),
     Unfolded(Box<CaveView>, [u32; 2]),
 }
 
-/// Pictures at an even pace of simulated time.
+/// Pictures at a fixed rate of simulated time.
 struct FrameSeries {
     per_second: f64,
     taken: u64,
@@ -42,16 +43,15 @@ struct FrameSeries {
 }
 
 impl Capture {
-    /// Checks all that can be wrong before the simulation starts. `None` where no picture is wanted, or where there is no graphics adapter:
-    /// everything else still counts then, and the message says what brings one.
+    /// Checks everything that can be wrong before the simulation starts. Returns `None` if no
+    /// picture is requested, and without a graphics adapter: the run goes on then, and a message
+    /// says how to get one.
     pub fn new(scene: &SceneFile, world: &World, options: &RunOptions) -> Result<Option<Capture>, Failure> {
         let source = source(scene, options)?;
         if options.screenshot.is_none() && options.frames_dir.is_none() && options.video.is_none() {
             return match source {
                 Source::Camera(_) => Ok(None),
-                _ => Err(Failure::input(
-                    "--cave draws pictures; say which: --screenshot FILE, --frames-dir DIR or --video FILE",
-                )),
+                _ => Err(Failure::input("--cave needs an output: --screenshot FILE, --frames-dir DIR or --video FILE")),
             };
         }
         if options.video.is_some() {
@@ -62,12 +62,12 @@ impl Capture {
         let drawing = Drawing::new(scene);
         let (overlays, quality, camera) = (options.debug_draw.0, options.quality, options.camera.clone());
         let mut capture = Capture { drawing, renderer, source, overlays, quality, camera, frames };
-        // textures are read and the camera is found now
+        // reads the textures and finds the camera
         capture.list(world).map_err(Failure::input)?;
         Ok(Some(capture))
     }
 
-    /// What is drawn of the world as it is now.
+    /// Returns the draw list of the world's present state.
     fn list(&mut self, world: &World) -> Result<DrawList, String> {
         let mut list = self.drawing.list(world, &self.overlays).map_err(|e| e.to_string())?;
         self.quality.apply(&mut list.settings);
@@ -77,7 +77,7 @@ impl Capture {
         Ok(list)
     }
 
-    /// The world as it is now.
+    /// Draws the world's present state.
     pub fn take(&mut self, world: &World) -> Result<Image, Failure> {
         let failed = |e: RenderError| Failure::run("the picture", e);
         let mut list = self.list(world).map_err(|e| Failure::run("the picture", e))?;
@@ -96,7 +96,8 @@ impl Capture {
         .map_err(failed)
     }
 
-    /// After each frame of a run that began at the time `begin`: takes the pictures that are due.
+    /// Takes the pictures that are due; called after each frame of a run that began at the
+    /// simulated time `begin`, s.
     pub fn frame(&mut self, world: &World, begin: f64) -> Result<(), Failure> {
         let due = |frames: &FrameSeries| world.time() - begin >= frames.taken as f64 / frames.per_second - 1e-9;
         if !self.frames.as_ref().is_some_and(due) {
@@ -104,7 +105,7 @@ impl Capture {
         }
         let image = self.take(world)?;
         let Some(frames) = &mut self.frames else { return Ok(()) };
-        // a frame longer than the pace stands for all that were due in it
+        // after a frame longer than the interval several pictures are due, all of this state
         while due(frames) {
             if let Some(folder) = &frames.folder {
                 let path = folder.join(format!("frame_{:06}.png", frames.taken));
@@ -118,7 +119,7 @@ impl Capture {
         Ok(())
     }
 
-    /// Ends the video; the number of frames written.
+    /// Ends the video and returns the number of frames written.
     pub fn finish_frames(&mut self) -> Result<u64, Failure> {
         let Some(frames) = &mut self.frames else { return Ok(0) };
         if let Some(video) = frames.video.take() {
@@ -132,7 +133,7 @@ fn source(scene: &SceneFile, options: &RunOptions) -> Result<Source, Failure> {
     let size = options.size.map(|(w, h)| [w, h]);
     let Some(name) = &options.cave else {
         return match &options.facet {
-            Some(_) => Err(Failure::input("--facet names a facet of a cave; say which with --cave FILE")),
+            Some(_) => Err(Failure::input("--facet names a facet of a cave; it needs --cave FILE")),
             None => Ok(Source::Camera(size.unwrap_or(DEFAULT_SIZE_PX))),
         };
     };
@@ -141,7 +142,7 @@ fn source(scene: &SceneFile, options: &RunOptions) -> Result<Source, Failure> {
     let view = Box::new(CaveView::new(cave, scene).map_err(Failure::input)?);
     match facet {
         Some(_) if size.is_some() => Err(Failure::input(
-            "the cave says how large a facet is (size_px); --size goes with the unfolded cave or without one",
+            "a facet has the size in its cave file (size_px); --size needs an unfolded cave, or no cave",
         )),
         Some(facet) => Ok(Source::Facet(view, Box::new(facet))),
         None => Ok(Source::Unfolded(view, size.unwrap_or(DEFAULT_SIZE_PX))),
@@ -154,7 +155,7 @@ fn frames(source: &Source, options: &RunOptions) -> Result<Option<FrameSeries>, 
     }
     if let Some(folder) = &options.frames_dir {
         std::fs::create_dir_all(folder)
-            .map_err(|e| Failure::input(format!("{}: cannot be made: {e}", folder.display())))?;
+            .map_err(|e| Failure::input(format!("{}: cannot be created: {e}", folder.display())))?;
     }
     let size = match source {
         Source::Camera(size) => *size,

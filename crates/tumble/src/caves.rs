@@ -1,4 +1,4 @@
-//! `tumble caves`: what is shipped, and calibration pictures.
+//! `tumble caves`: lists the shipped caves and draws calibration patterns.
 
 use crate::args::CavesOptions;
 use crate::capture::write_png;
@@ -14,9 +14,9 @@ pub fn caves(options: &CavesOptions) -> Result<(), Failure> {
         }
         return Ok(());
     };
-    // clap lets no pattern through without these
+    // clap requires all three with --pattern
     let (Some(name), Some(facet), Some(path)) = (&options.cave, &options.facet, &options.screenshot) else {
-        return Err(Failure::input("--pattern wants --cave FILE, --facet NAME and --screenshot FILE"));
+        return Err(Failure::input("--pattern needs --cave FILE, --facet NAME and --screenshot FILE"));
     };
     let cave = resolve_cave(name)?.load()?;
     let facet = cave.facet(facet)?;

@@ -1,4 +1,4 @@
-//! `tumble check`: reads and builds, runs nothing.
+//! `tumble check`: reads and builds files without running them.
 
 use crate::args::{CheckOptions, OpeningOptions, kind};
 use crate::failure::Failure;
@@ -13,7 +13,7 @@ use tumble::scene::{
     visual_notes,
 };
 
-/// Checks every file; all are looked at, and the first failure's code is kept.
+/// Checks every file and reports each failure. The exit code is that of the first one.
 pub fn check(options: &CheckOptions) -> Result<(), Failure> {
     let mut outcome = Ok(());
     for file in &options.files {
@@ -45,7 +45,7 @@ fn robot(name: &str, opening: &OpeningOptions) -> Result<String, Failure> {
     let body = scene.articulated.first().and_then(|spec| world.get::<ArticulatedBody>(world.find(&spec.name)?));
     let model = body.ok_or_else(|| Failure::input(format!("{name}: the file has no robot")))?.model();
     Ok(format!(
-        "a robot of {} links, {} degrees of freedom on a {} base, {:.6} kg that move",
+        "a robot of {} links, {} degrees of freedom on a {} base, {:.6} kg of moving mass",
         model.frames().len(),
         model.dof(),
         if scene.has_fixed_base() { "fixed" } else { "floating" },
@@ -53,13 +53,14 @@ fn robot(name: &str, opening: &OpeningOptions) -> Result<String, Failure> {
     ))
 }
 
-/// Reads the meshes that are only drawn; what is to be said of those that cannot be read.
+/// Reads the meshes that are drawn and never collide. Returns a note for each that cannot be read.
 fn read_visuals(world: &World) -> Vec<String> {
     world.visuals().for_each(|visual| _ = visual.drawn());
     visual_notes(world.visuals())
 }
 
-/// A file is a cave where it has a table that caves have and scenes have not; a name where it is a shipped cave's and no scene's.
+/// Returns whether `file` is a cave: a file with a table that caves have and scenes do not, or the
+/// name of a shipped cave that no shipped scene has.
 fn looks_like_cave(file: &str) -> bool {
     let path = Path::new(file);
     if path.is_file() {
@@ -73,13 +74,13 @@ fn looks_like_cave(file: &str) -> bool {
 
 fn cave(name: &str) -> Result<String, Failure> {
     let cave = resolve_cave(name)?.load()?;
-    files_of(&cave)?;
+    check_files(&cave)?;
     cave.notes().iter().for_each(|note| println!("{note}"));
     Ok(cave.summary())
 }
 
-/// Reads the files that a cave names, as its facets and server do.
-fn files_of(cave: &Cave) -> Result<(), Failure> {
+/// Reads the files that a cave names (warps, blends, the key), as its facets and its server do.
+fn check_files(cave: &Cave) -> Result<(), Failure> {
     for facet in &cave.facets {
         let named = |e: RenderError| Failure::input(format!("facet \"{}\" of {}: {e}", facet.name, cave.file));
         facet.warp_file.as_deref().map(Warp::load).transpose().map_err(named)?;
@@ -91,12 +92,12 @@ fn files_of(cave: &Cave) -> Result<(), Failure> {
 
 fn scene(name: &str) -> Result<String, Failure> {
     let scene = resolve_scene(name, &[]).map_err(|error| match error {
-        SceneError::Unknown { .. } => neither(name, &error),
+        SceneError::Unknown { .. } => unknown_name(name, &error),
         error => error.into(),
     })?;
     let scene = scene.load()?;
     let (world, notes) = scene.build().map_err(Failure::input)?;
-    // textures and meshes that are only drawn are read when a picture is made
+    // reads textures and visual meshes
     Drawing::new(&scene)
         .list(&world, &DebugDraw::default())
         .map_err(|e| Failure::input(format!("{}: {e}", scene.file)))?;
@@ -105,8 +106,8 @@ fn scene(name: &str) -> Result<String, Failure> {
     Ok(format!("a scene of {} bodies, {} degrees of freedom", world.ids().len(), degrees(&world)))
 }
 
-/// A name that is no scene's may be meant as a cave's.
-fn neither(name: &str, error: &SceneError) -> Failure {
+/// The message for a name that no scene and no cave has.
+fn unknown_name(name: &str, error: &SceneError) -> Failure {
     let cave = resolve_cave(name).err().map_or(String::new(), |error| format!("; {error}"));
     Failure::input(format!("{error}{cave}"))
 }
@@ -129,7 +130,7 @@ fn mesh(path: &Path, repair: bool) -> Result<String, Failure> {
     let center = shape.center_of_mass();
     let error = shape.tree().map_or(0.0, |tree| tree.outward_error());
     Ok(format!(
-        "a closed mesh of {triangles} triangles, volume {:.6e} m³, centre of mass ({:.6}, {:.6}, {:.6}) m, sphere tree within {:.3} % of its diagonal",
+        "a closed mesh of {triangles} triangles, volume {:.6e} m³, center of mass ({:.6}, {:.6}, {:.6}) m, sphere tree within {:.3} % of its diagonal",
         shape.volume(),
         center.x,
         center.y,

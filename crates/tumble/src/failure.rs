@@ -1,15 +1,15 @@
-//! How the command fails: one clear message and an exit code.
+//! The failures of the command: one message and an exit code.
 
 use std::io::IsTerminal;
 use tumble::scene::SceneError;
 use tumble::scene::cave::CaveError;
 use tumble::scene::urdf::UrdfError;
 
-/// Why the command stopped.
+/// The reason for which the command stopped, with its message.
 pub enum Failure {
     /// Bad usage or input: exit code 2.
     Input(String),
-    /// A failure while running: exit code 1.
+    /// A failure at run time: exit code 1.
     Run(String),
 }
 
@@ -19,12 +19,12 @@ impl Failure {
         Failure::Input(format!("error: {}\n", why.to_string()))
     }
 
-    /// Failure at run time, with what was being done.
+    /// A failure at run time; `doing` names the activity that failed.
     pub fn run(doing: &str, why: impl ToString) -> Failure {
         Failure::Run(format!("error: {doing}: {}\n", why.to_string()))
     }
 
-    /// The whole message, ending in a line feed.
+    /// The whole message, with a final line feed.
     pub fn report(&self) -> &str {
         match self {
             Failure::Input(report) | Failure::Run(report) => report,

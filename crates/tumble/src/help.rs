@@ -1,9 +1,9 @@
-//! `tumble --help`: commands in groups, and exit codes below the help of each.
+//! `tumble --help`: the commands in groups; the exit codes below the help of each command.
 
 use crate::args::Tumble;
 use clap::{Command, CommandFactory};
 
-/// Commands by what they are for; clap prints one list.
+/// The commands, grouped by purpose; clap would print one list.
 const GROUPS: [(&str, &[&str]); 5] = [
     ("Simulate", &["run", "view"]),
     ("Caves", &["cave", "serve", "facet", "caves"]),
@@ -12,8 +12,8 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Shell", &["completions", "help"]),
 ];
 
-/// Commands that take signals.
-const RUNS: [&str; 4] = ["cave", "serve", "facet", "replay"];
+/// Commands that a signal ends, and a second signal ends at once.
+const SIGNALED: [&str; 4] = ["cave", "serve", "facet", "replay"];
 
 const EXIT_CODES: &str = "Exit codes:
   0    success
@@ -21,7 +21,7 @@ const EXIT_CODES: &str = "Exit codes:
   2    bad usage or input, such as an unknown option or a file with a mistake";
 const SECOND_SIGNAL: &str = "\n  130  ended at once by a second Ctrl-C";
 
-/// The command line with its help.
+/// Returns the command line with its help.
 pub fn command() -> Command {
     let bare = Tumble::command().mut_subcommands(with_exit_codes);
     let template = format!(
@@ -34,11 +34,11 @@ pub fn command() -> Command {
 
 fn with_exit_codes(command: Command) -> Command {
     let own = command.get_after_help().map_or(String::new(), |help| format!("{help}\n\n"));
-    let second = if RUNS.contains(&command.get_name()) { SECOND_SIGNAL } else { "" };
+    let second = if SIGNALED.contains(&command.get_name()) { SECOND_SIGNAL } else { "" };
     command.after_help(format!("{own}{EXIT_CODES}{second}"))
 }
 
-/// The commands with their descriptions, group by group.
+/// Formats the commands with their descriptions, group by group.
 fn groups(command: &Command) -> String {
     let about = |name: &str| match command.find_subcommand(name).and_then(Command::get_about) {
         Some(about) => about.to_string(),
@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_command_stands_in_one_group() {
+    fn every_command_is_in_one_group() {
         let mut grouped: Vec<&str> = GROUPS.iter().flat_map(|(_, names)| names.iter().copied()).collect();
         let command = Tumble::command();
         let mut all: Vec<&str> = command.get_subcommands().map(Command::get_name).chain(["help"]).collect();

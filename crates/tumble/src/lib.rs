@@ -1,8 +1,9 @@
 //! Real-time dynamics for interactive and immersive environments.
 //!
-//! Reexports the crates: geometry ([`collide`]), dynamics ([`dynamics`]), scene files ([`scene`]), networking and
-//! recordings (`net`) and pictures (`render`). The `tumble` command is built on this library. `docs/conventions.md`
-//! compares units, sizes, frames and signs with those of Python and of scene files.
+//! Reexports the crates: geometry ([`collide`]), dynamics ([`dynamics`]), scene files ([`scene`]),
+//! networking and recordings (`net`) and pictures (`render`). The `tumble` command is built on this
+//! library. `docs/conventions.md` compares units, sizes, frames and signs with those of Python and
+//! of scene files.
 //!
 //! | feature | adds | default |
 //! |---|---|---|

@@ -1,4 +1,5 @@
-//! The `tumble` command: run scenes, show them in a window, check files, build sphere trees, list what is shipped.
+//! The `tumble` command: runs scenes, shows them in windows and caves, checks files and builds
+//! sphere trees.
 //!
 //! Exit codes: 0 success, 1 failure at run time, 2 bad usage or input.
 
@@ -26,7 +27,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     set_runtime_dir();
     exit_on_closed_stdout();
-    // where stderr is closed there is nobody to tell
+    // a closed stderr loses the line, and nothing else
     tumble::scene::set_slow_load_listener(|line| _ = writeln!(std::io::stderr(), "{line} …"));
     let command = match Tumble::from_arg_matches(&help::command().get_matches()) {
         Ok(typed) => typed.command,
@@ -49,24 +50,27 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            // where stderr is closed or full the exit code says it
+            // if stderr is closed or full, the exit code still reports the failure
             let _ = std::io::stderr().write_all(failure.report().as_bytes());
             ExitCode::from(failure.code())
         }
     }
 }
 
-/// Graphics drivers complain on stderr where no runtime directory is named, as over ssh or in a container; any folder satisfies them.
+/// Names a runtime directory for graphics drivers, which complain on stderr without one, as over
+/// ssh or in a container. Any folder satisfies them.
 #[allow(unsafe_code)]
 fn set_runtime_dir() {
     if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
-        // SAFETY: the first thing that the process does; no other thread exists that could read the environment.
+        // SAFETY: nothing ran before in this process, so no other thread exists that could read the
+        // environment.
         unsafe { std::env::set_var("XDG_RUNTIME_DIR", std::env::temp_dir()) };
     }
 }
 
-/// Who reads what is printed may have enough before the end, as `head` has: the process then ends, without a word. A stdout that fails otherwise, as a full
-/// disk does, is a failure like any other.
+/// Ends the process with 0 and without a message if the reader of its output has closed the pipe,
+/// as `head` does. If stdout fails for another reason, such as a full disk, the process ends with a
+/// message and 1.
 fn exit_on_closed_stdout() {
     let default_hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
@@ -74,7 +78,7 @@ fn exit_on_closed_stdout() {
         match message.and_then(|m| m.strip_prefix("failed printing to stdout: ")) {
             Some(why) if why.contains("Broken pipe") => std::process::exit(0),
             Some(why) => {
-                // where stderr fails too there is nobody to tell
+                // if stderr fails too, the exit code still reports the failure
                 let _ = writeln!(std::io::stderr(), "error: stdout: {why}");
                 std::process::exit(1)
             }

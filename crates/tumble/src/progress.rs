@@ -1,14 +1,14 @@
-//! Progress: a bar on a terminal, a line every few seconds elsewhere, nothing when quiet.
+//! Progress: a bar on a terminal, a line every few seconds elsewhere, nothing with `--quiet`.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Between two plain lines.
+/// Time between two lines.
 const LINE_INTERVAL: Duration = Duration::from_secs(5);
 
-/// Shows how far a run is.
+/// Progress of a run in frames.
 pub enum Progress {
     Quiet,
     Bar(ProgressBar),
@@ -16,7 +16,7 @@ pub enum Progress {
 }
 
 impl Progress {
-    /// For `total` frames.
+    /// Starts at 0 of `total` frames.
     pub fn new(total: u64, quiet: bool) -> Progress {
         if quiet {
             return Progress::Quiet;
@@ -28,7 +28,7 @@ impl Progress {
         Progress::Bar(ProgressBar::new(total).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar())))
     }
 
-    /// After frame `done`, at simulated time `time`.
+    /// Reports that frame `done` is finished, at the simulated time `time`, s.
     pub fn at(&mut self, done: u64, time: f64) {
         match self {
             Progress::Quiet => {}
@@ -44,7 +44,7 @@ impl Progress {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn done(self) {
         if let Progress::Bar(bar) = self {
             bar.finish_and_clear();
@@ -52,18 +52,18 @@ impl Progress {
     }
 }
 
-/// Shows what share of a piece of work is done, from whichever thread does it.
+/// Progress of a computation as a fraction; any thread may report it.
 pub enum WorkProgress {
     Quiet,
     Bar(ProgressBar),
     Lines { what: String, last: Mutex<Instant> },
 }
 
-/// Parts of a bar.
+/// Resolution of a bar.
 const BAR_STEPS: f64 = 1000.0;
 
 impl WorkProgress {
-    /// For the work named.
+    /// Starts at 0; `what` names the activity.
     pub fn new(what: &str, quiet: bool) -> WorkProgress {
         if quiet {
             return WorkProgress::Quiet;
@@ -78,7 +78,7 @@ impl WorkProgress {
         WorkProgress::Bar(bar)
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn done(self) {
         if let WorkProgress::Bar(bar) = self {
             bar.finish_and_clear();
@@ -92,7 +92,7 @@ impl tumble::collide::Progress for WorkProgress {
             WorkProgress::Quiet => {}
             WorkProgress::Bar(bar) => bar.set_position((BAR_STEPS * share) as u64),
             WorkProgress::Lines { what, last } => {
-                // a line that another thread is about to write is enough
+                // another thread is about to print a line
                 let Ok(mut last) = last.try_lock() else { return };
                 if last.elapsed() >= LINE_INTERVAL {
                     *last = Instant::now();

@@ -1,4 +1,4 @@
-//! `tumble run`: simulate, record, sum up, take a picture.
+//! `tumble run`: simulates a scene and writes its results.
 
 use crate::args::RunOptions;
 use crate::atomic_file::{check_writable, write_file};
@@ -14,7 +14,7 @@ use tumble::net::record::{Recorder, RecorderOptions};
 use tumble::net::world::{entities, poses};
 use tumble::scene::{SceneFile, visual_notes};
 
-/// Most bytes of a saved state: a thousand times what ten thousand bodies take.
+/// Largest saved state that is read: a thousand times the size of one of ten thousand bodies.
 const MAX_STATE_BYTES: u64 = 1 << 30;
 
 /// Runs a scene.
@@ -31,7 +31,7 @@ pub fn run(options: &RunOptions) -> Result<(), Failure> {
     restore(&mut world, options)?;
     let mut capture = Capture::new(&scene, &world, options)?;
     let mut recorder = recorder(&world, &scene, options)?;
-    // both have read the meshes that are only drawn
+    // the capture and the recorder have read the visual meshes by now
     visual_notes(world.visuals()).iter().filter(|_| !options.quiet).for_each(|note| println!("{note}"));
     let start = State::of(&world);
     let (tally, simulated, wall) = simulate(&mut world, recorder.as_mut(), capture.as_mut(), &scene, options)?;
@@ -51,11 +51,11 @@ fn restore(world: &mut World, options: &RunOptions) -> Result<(), Failure> {
     let Some(path) = &options.restore else { return Ok(()) };
     let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
     let mut bytes = Vec::new();
-    // what never ends is read no further
+    // an endless file, such as a device, is read no further
     let read = std::fs::File::open(path).and_then(|file| file.take(MAX_STATE_BYTES + 1).read_to_end(&mut bytes));
     read.map_err(|e| wrong(format!("cannot be read: {e}")))?;
     if bytes.len() as u64 > MAX_STATE_BYTES {
-        return Err(wrong(format!("is larger than {MAX_STATE_BYTES} bytes, the most that a saved state may have")));
+        return Err(wrong(format!("is larger than {MAX_STATE_BYTES} bytes, the largest size of a saved state")));
     }
     world.restore(&bytes).map_err(|e| wrong(e.to_string()))
 }
@@ -66,7 +66,8 @@ fn recorder(world: &World, scene: &SceneFile, options: &RunOptions) -> Result<Op
     recorder.map(Some).map_err(|e| Failure::run("recording", e))
 }
 
-/// Steps to the end; what was tallied, simulated seconds, and seconds of the clock spent in steps.
+/// Steps to the end. Returns the tally, the simulated time and the wall-clock time spent in steps,
+/// both in s.
 fn simulate(
     world: &mut World,
     mut recorder: Option<&mut Recorder>,
@@ -115,7 +116,7 @@ fn write_summary(summary: &Summary, options: &RunOptions) -> Result<(), Failure>
     Ok(())
 }
 
-/// Ends the video and takes the picture of the last frame.
+/// Ends the video and takes the screenshot of the last frame.
 fn pictures(world: &World, capture: Option<Capture>, options: &RunOptions) -> Result<(), Failure> {
     let Some(mut capture) = capture else { return Ok(()) };
     let count = capture.finish_frames()?;

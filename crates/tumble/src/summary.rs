@@ -1,9 +1,9 @@
-//! `--summary`: what a run took and how well it went, as JSON.
+//! `--summary`: cost and accuracy of a run, as JSON.
 
 use serde::Serialize;
 use tumble::dynamics::{Energy, StepReport, UnreachableJoint, World};
 
-/// The whole summary. Units stand in the names; quaternions are `x, y, z, w`.
+/// The summary. Names carry the units; quaternions are `x, y, z, w`.
 #[derive(Serialize)]
 pub struct Summary {
     scene: String,
@@ -23,7 +23,8 @@ pub struct Summary {
     unconverged_solves: u64,
     rays: u64,
     max_penetration_m: f64,
-    /// Furthest that a joint was open where it could not be closed, and its name; 0 and none where all could.
+    /// Largest opening of a joint whose sides could not reach each other, and its name; 0 and none
+    /// if all could.
     out_of_reach_max_m: f64,
     out_of_reach: Option<String>,
     tries_mean: f64,
@@ -34,7 +35,7 @@ pub struct Summary {
     bodies: Vec<Body>,
 }
 
-/// Sums at one moment, over everything that moves.
+/// Sums over all dynamic objects at one moment.
 #[derive(Serialize)]
 pub struct State {
     kinetic_energy_j: f64,
@@ -51,7 +52,7 @@ struct Body {
     asleep: bool,
 }
 
-/// Adds up the reports of a run.
+/// Accumulates the reports of a run.
 #[derive(Default)]
 pub struct Tally {
     steps: u64,
@@ -69,7 +70,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// One frame's report, and the seconds of the clock that it took.
+    /// Adds one frame's report and the wall-clock time that it took, s.
     pub fn add(&mut self, report: &StepReport, wall_s: f64) {
         self.steps += 1;
         self.frames_s.push(wall_s);
@@ -86,7 +87,7 @@ impl Tally {
         self.floor_hits += report.floor_hits as u64;
     }
 
-    /// What this share of the frames stayed within, ms.
+    /// Returns the time that the fraction `share` of the frames stayed within, ms.
     fn frame_ms(&self, share: f64) -> f64 {
         let mut sorted = self.frames_s.clone();
         sorted.sort_by(f64::total_cmp);
@@ -98,7 +99,7 @@ impl Tally {
         sum as f64 / self.steps.max(1) as f64
     }
 
-    /// The summary at the end of a run that took `wall_s` seconds of the clock.
+    /// Returns the summary at the end of a run that took `wall_s` seconds of wall-clock time.
     pub fn summary(&self, scene: &str, world: &World, start: State, simulated_s: f64, wall_s: f64) -> Summary {
         let (stepper, solver) = (world.stepper_name(), world.solver_name());
         Summary {
@@ -131,7 +132,7 @@ impl Tally {
 }
 
 impl State {
-    /// The sums now.
+    /// Sums over the present state.
     pub fn of(world: &World) -> State {
         let (Energy { kinetic, potential }, momentum) = (world.energy(), world.momentum());
         State {
@@ -144,7 +145,7 @@ impl State {
 }
 
 impl Summary {
-    /// The few lines for a person.
+    /// Formats the summary as a few lines of text.
     pub fn lines(&self) -> String {
         let mut text = format!(
             "{}: {:.3} s in {} frames by {} and {}; {:.1} times real time; a frame at most {:.2} ms (99 %), {:.2} ms (all)\n",
@@ -167,7 +168,7 @@ impl Summary {
             self.max_penetration_m
         );
         if let Some(name) = &self.out_of_reach {
-            text += &format!("'{name}' was led out of reach: {:.3} m open at most\n", self.out_of_reach_max_m);
+            text += &format!("'{name}' is out of reach: open by {:.3} m at most\n", self.out_of_reach_max_m);
         }
         if self.tries_max > 0 {
             text += &format!(

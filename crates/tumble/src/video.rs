@@ -1,7 +1,8 @@
-//! A video by the `ffmpeg` program: frames go in through its standard input, its complaints come out.
+//! A video, encoded by the program `ffmpeg`: frames go in through its standard input, and error
+//! messages come out of stderr.
 //!
-//! Nothing waits for ever: a frame that is not taken within [`TIMEOUT`], or an end that takes longer, is a failure, and the child is always
-//! ended and reaped.
+//! No call blocks for ever. If a frame is not accepted within [`TIMEOUT`], or ffmpeg does not end
+//! within it, the video fails. The child process is killed and reaped in every case.
 
 use crate::failure::Failure;
 use std::io::{ErrorKind, Read, Write};
@@ -12,14 +13,14 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tumble::render::Image;
 
-/// How long ffmpeg may take for one frame, or for the end.
+/// Longest time that ffmpeg may take for one frame, or to end.
 const TIMEOUT: Duration = Duration::from_secs(60);
-/// Between two looks.
+/// Time between two polls of the child process.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
-/// Bytes of ffmpeg's complaints that are kept.
+/// Bytes of ffmpeg's messages that are kept, the last ones.
 const MAX_MESSAGE_BYTES: usize = 4096;
 
-/// A video that is being written.
+/// A video in progress.
 pub struct Video {
     child: Child,
     frames: Option<SyncSender<Vec<u8>>>,
@@ -29,7 +30,7 @@ pub struct Video {
 }
 
 impl Video {
-    /// Whether there is an `ffmpeg` to be started.
+    /// Checks that `ffmpeg` can be started.
     pub fn probe() -> Result<(), Failure> {
         let started = Command::new("ffmpeg")
             .arg("-version")
@@ -43,12 +44,12 @@ impl Video {
         }
     }
 
-    /// Starts one of this size, pixels, at so many frames per second.
+    /// Starts a video of this size in pixels, with `per_second` frames per second.
     pub fn start(path: &Path, size: [u32; 2], per_second: f64) -> Result<Video, Failure> {
         let mut command = Command::new("ffmpeg");
         command.args(["-hide_banner", "-nostdin", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgba"]);
         command.args(["-s", &format!("{}x{}", size[0], size[1]), "-r", &per_second.to_string(), "-i", "pipe:0"]);
-        // even sides, and the pixel format that players know
+        // even sides, and the pixel format that players support
         command
             .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-movflags", "+faststart"])
             .arg("--")
@@ -66,7 +67,7 @@ impl Video {
         Ok(Video { child, frames: Some(send), writer, messages, size })
     }
 
-    /// The next frame.
+    /// Adds a frame.
     pub fn add(&mut self, image: &Image) -> Result<(), Failure> {
         if [image.width, image.height] != self.size {
             return Err(Failure::run(
@@ -79,12 +80,12 @@ impl Video {
         }
         let (mut frame, begin) = (image.rgba.clone(), Instant::now());
         loop {
-            let Some(frames) = &self.frames else { return Err(self.failed("it has ended")) };
+            let Some(frames) = &self.frames else { return Err(self.failed("the video has ended")) };
             match frames.try_send(frame) {
                 Ok(()) => return Ok(()),
                 Err(TrySendError::Disconnected(_)) => return Err(self.failed("ffmpeg ended early")),
                 Err(TrySendError::Full(_)) if begin.elapsed() > TIMEOUT => {
-                    return Err(self.failed("ffmpeg takes no more frames"));
+                    return Err(self.failed("ffmpeg accepts no more frames"));
                 }
                 Err(TrySendError::Full(back)) => frame = back,
             }
@@ -92,24 +93,24 @@ impl Video {
         }
     }
 
-    /// Waits for the last frames to be written.
+    /// Waits until the last frames are written.
     pub fn finish(mut self) -> Result<(), Failure> {
         drop(self.frames.take());
         match wait(&mut self.child, TIMEOUT) {
             Ok(true) => Ok(()),
             Ok(false) => Err(self.failed("ffmpeg failed")),
-            Err(_) => Err(self.failed("ffmpeg does not come to an end")),
+            Err(_) => Err(self.failed("ffmpeg does not end")),
         }
     }
 
-    /// Ends the child and tells what it said.
+    /// Ends the child process and returns a failure with its messages.
     fn failed(&mut self, what: &str) -> Failure {
         self.end();
         let messages = self.messages.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
         let messages = messages.trim();
         Failure::run(
             "the video",
-            if messages.is_empty() { format!("{what}, and said nothing") } else { format!("{what}: {messages}") },
+            if messages.is_empty() { format!("{what}, without a message") } else { format!("{what}: {messages}") },
         )
     }
 
@@ -130,7 +131,7 @@ impl Drop for Video {
 }
 
 fn feed(mut input: std::process::ChildStdin, frames: &Receiver<Vec<u8>>) {
-    // a child that is gone breaks the pipe; whoever sends next hears of it
+    // a write to a child process that has ended fails; the next `add` then reports it
     while let Ok(frame) = frames.recv() {
         if input.write_all(&frame).is_err() {
             return;
@@ -138,7 +139,7 @@ fn feed(mut input: std::process::ChildStdin, frames: &Receiver<Vec<u8>>) {
     }
 }
 
-/// The last of what was said.
+/// Returns the last messages of the child process.
 fn collect_messages(mut from: std::process::ChildStderr) -> String {
     let (mut messages, mut piece) = (Vec::new(), [0; 1024]);
     while let Ok(count @ 1..) = from.read(&mut piece) {
@@ -149,7 +150,8 @@ fn collect_messages(mut from: std::process::ChildStderr) -> String {
     String::from_utf8_lossy(&messages).into_owned()
 }
 
-/// Whether the child succeeded; one that takes too long is ended.
+/// Waits for the end of the child process and returns whether it succeeded; kills it at the
+/// timeout.
 fn wait(child: &mut Child, timeout: Duration) -> Result<bool, Failure> {
     let begin = Instant::now();
     loop {

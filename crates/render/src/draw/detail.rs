@@ -1,18 +1,19 @@
-//! Less than an object's full picture: fewer triangles, its edges, the balls of its sphere tree (thesis §III.A, render quality per object).
+//! Reduced detail of objects: fewer triangles, edges, or the spheres of the sphere tree (thesis
+//! §III.A, render quality per object).
 
 use crate::{DebugStyle, DrawList, Material, MeshData};
 use nalgebra::{Isometry3, Point3};
 use std::collections::BTreeMap;
 use tumble_collide::{Pose, Shape, SphereTree};
 
-/// Cells along the longest side of a mesh that is simplified: vertices of a cell become one.
+/// Cells along the longest side of a mesh that is simplified; all vertices in a cell become one.
 const CELLS: f32 = 10.0;
-/// Edges whose faces turn by less than this are no edges of a wireframe, as cosine.
+/// Cosine of the angle between two faces above which their common edge is not part of a wireframe.
 const FLAT_COS: f32 = 0.999;
-/// Most edges drawn of one mesh.
+/// Largest number of edges drawn of one mesh.
 const MAX_EDGES: usize = 50_000;
 
-/// The same mesh with the vertices of each cell of a grid made one, and the triangles that this leaves.
+/// Merges the vertices in each cell of a grid and keeps the triangles that remain.
 pub(super) fn simplified(mesh: &MeshData) -> MeshData {
     let Some((lo, hi)) = mesh.bounds() else { return mesh.clone() };
     let cell = (0..3).map(|k| hi[k] - lo[k]).fold(0.0, f32::max) / CELLS;
@@ -36,14 +37,14 @@ pub(super) fn simplified(mesh: &MeshData) -> MeshData {
     let positions: Vec<[f32; 3]> = sums.iter().map(|(sum, count)| sum.map(|s| s / count)).collect();
     let corners = mesh.indices.chunks_exact(3).map(|t| [of[t[0] as usize], of[t[1] as usize], of[t[2] as usize]]);
     let triangles: Vec<[u32; 3]> = corners.filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]).collect();
-    // flat faces, so that it shows how few there are
+    // flat shading shows the coarse triangles
     MeshData::from_triangles(&positions, &triangles, 0.0)
         .ok()
         .filter(|m| !m.indices.is_empty())
         .unwrap_or_else(|| mesh.clone())
 }
 
-/// The edges of a mesh between faces that are not in one plane, each once.
+/// Returns the edges between faces that are not in one plane, each once.
 pub(super) fn edges(mesh: &MeshData) -> Vec<[[f32; 3]; 2]> {
     let bits = |p: &[f32; 3]| p.map(|c| (c + 0.0).to_bits());
     let mut faces: BTreeMap<[[u32; 3]; 2], (nalgebra::Vector3<f32>, bool)> = BTreeMap::new();
@@ -72,14 +73,14 @@ pub(super) fn edges(mesh: &MeshData) -> Vec<[[f32; 3]; 2]> {
     shown.map(|(edge, _)| edge.map(|p| p.map(f32::from_bits))).collect()
 }
 
-/// Lines along the edges.
+/// Draws lines along the edges.
 pub(super) fn draw_edges(list: &mut DrawList, edges: &[[[f32; 3]; 2]], pose: &Isometry3<f32>, color: [f32; 3]) {
     for [a, b] in edges {
         list.line(pose * Point3::from(*a), pose * Point3::from(*b), DebugStyle::new(color).width(1.5));
     }
 }
 
-/// The balls of a level; a branch that ended before it shows its leaf. `None` where there is no tree.
+/// Draws the spheres of a level, and the leaves above it. Returns `None` without a tree.
 pub(super) fn draw_tree_spheres(
     list: &mut DrawList,
     shape: &Shape,

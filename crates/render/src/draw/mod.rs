@@ -1,4 +1,4 @@
-//! From a world and its scene to a draw list. Reads the world, never writes it.
+//! From a world and its scene to a draw list. The world is only read.
 
 mod detail;
 mod overlay;
@@ -24,32 +24,32 @@ use tumble_core::{Appearance, Detail, Drawn, Visual, VisualGeometry, World};
 use tumble_scene::{LightKind, LightSpec, MeshSource, SceneFile};
 use unwrap::Unwrapped;
 
-/// Half the side of the square that stands for a half-space, metres.
+/// Half the side of the square that represents a half-space, m.
 const PLANE_M: f32 = 60.0;
-/// Edges sharper than this stay sharp, radians.
+/// Edges sharper than this stay sharp, rad.
 const CREASE_RAD: f32 = 0.7;
 
-/// What the filmic curve shows as white is this much light.
+/// Factor on light intensities: the filmic curve shows this much light as white.
 const LIGHT: f32 = 1.7;
 
-/// Edges of boxes are rounded by this share of the shortest half side.
+/// Radius of rounded box edges, as a fraction of the shortest half side.
 const ROUNDING: f32 = 0.06;
 
-/// Makes draw lists of one scene; meshes are converted once and shared by all frames.
+/// Makes draw lists of one scene. Meshes are converted once and shared by all frames.
 pub struct Drawing {
     meshes: BTreeMap<String, Arc<MeshData>>,
     edges: BTreeMap<String, Vec<[[f32; 3]; 2]>>,
-    /// What those were made of: their keys hold addresses.
+    /// Keeps the geometry of the converted meshes in memory, because the keys contain addresses.
     sources: Vec<VisualGeometry>,
     textures: BTreeMap<Arc<Path>, Arc<Image>>,
-    /// The scene's files of meshes; read when the first mesh with a texture is met.
+    /// The scene's mesh files; read when a mesh with a texture occurs for the first time.
     mesh_files: Vec<PathBuf>,
     unwrapped: Option<Vec<Unwrapped>>,
     base: DrawList,
     camera: Option<Camera>,
-    /// As many as the last list had.
+    /// Number of spheres in the last list.
     spheres: usize,
-    /// How much of every object is drawn, instead of what each one says.
+    /// Detail of all objects, if set; otherwise each object has its own.
     pub detail: Option<Detail>,
 }
 
@@ -61,7 +61,7 @@ struct Placed {
 }
 
 impl Drawing {
-    /// Camera, lights, sky and floor of the scene.
+    /// Prepares camera, lights, sky and floor of the scene.
     pub fn new(scene: &SceneFile) -> Drawing {
         let mut base = DrawList { lights: scene.lights.iter().map(light).collect(), ..DrawList::default() };
         let sky = &scene.sky;
@@ -105,10 +105,10 @@ impl Drawing {
         }
     }
 
-    /// The world as it is now, with overlays.
+    /// Returns the draw list of the world's present state, with overlays.
     ///
     /// # Errors
-    /// [`RenderError`] where a mesh has more vertices than can be drawn.
+    /// [`RenderError`] if a mesh has more vertices than can be drawn.
     pub fn list(&mut self, world: &World, overlays: &DebugDraw) -> Result<DrawList, RenderError> {
         let mut list = self.base.clone();
         list.spheres.reserve(self.spheres);
@@ -214,7 +214,7 @@ impl Drawing {
 }
 
 impl Drawing {
-    /// A wireframe: rings around a ball, else the edges of the mesh.
+    /// Draws a wireframe: rings around a sphere, otherwise the edges of the mesh.
     fn place_edges(
         &mut self,
         list: &mut DrawList,
@@ -231,7 +231,7 @@ impl Drawing {
         let key = key(drawn);
         if !self.edges.contains_key(&key) {
             let mesh = match drawn {
-                // without the roundings, which would be edges beside edges
+                // without rounded edges, which would double the lines
                 Drawn::Shape(Shape::Box { half_extents }) => MeshData::cuboid(small(half_extents).into()),
                 other => mesh_of(other)?,
             };
@@ -242,7 +242,7 @@ impl Drawing {
         Ok(())
     }
 
-    /// A mesh with the texture coordinates of its file, where it has any.
+    /// Returns a mesh with the texture coordinates of its file, if it has any.
     fn unwrapped(&mut self, drawn: Drawn<'_>) -> Option<Result<MeshData, RenderError>> {
         let Drawn::Shape(Shape::Mesh(mesh)) = drawn else { return None };
         let mesh = mesh.mesh();
@@ -253,7 +253,7 @@ impl Drawing {
         Some(MeshData::from_unwrapped(&positions(mesh), &mesh.triangles, places, CREASE_RAD))
     }
 
-    /// The texture of a look in the list, its file read when it is first met.
+    /// Adds the texture of an appearance to the list; its file is read at the first use.
     fn texture(
         &mut self,
         list: &mut DrawList,
@@ -278,7 +278,7 @@ impl Drawing {
     }
 }
 
-/// What makes two visuals share a mesh: their numbers, or the shared mesh itself.
+/// The key by which visuals share a mesh: their dimensions, or the address of the shared mesh.
 fn key(drawn: Drawn<'_>) -> String {
     match drawn {
         Drawn::Mesh(mesh) => format!("triangles {:p}", Arc::as_ptr(mesh)),
@@ -299,7 +299,7 @@ fn mesh_of(drawn: Drawn<'_>) -> Result<MeshData, RenderError> {
         Shape::Box { half_extents } => {
             let half = small(half_extents);
             let (half, radius) = ([half.x, half.y, half.z], ROUNDING * half.min());
-            // on long thin boxes the rounding would be finer than a pixel, and glitter
+            // on long thin boxes the rounding would be finer than a pixel and flicker
             if radius < 0.2 * ROUNDING * half[0].max(half[1]).max(half[2]) {
                 MeshData::cuboid(half)
             } else {
@@ -320,7 +320,7 @@ fn positions(mesh: &TriMesh) -> Vec<[f32; 3]> {
     mesh.vertices.iter().map(|v| small(v).into()).collect()
 }
 
-/// A point or vector in the renderer's precision.
+/// Converts a point or vector to the renderer's precision.
 fn small(v: &Vec3) -> Vector3<f32> {
     v.cast()
 }

@@ -1,4 +1,5 @@
-//! Debug drawing: contact points, normals, velocities, forces and sphere trees, as the thesis's detector draws them (§IV.B.3).
+//! Debug drawing: contact points, normals, velocities, forces and sphere trees, as the thesis's
+//! detector draws them (§IV.B.3).
 
 use super::small;
 use crate::{DebugStyle, DrawList};
@@ -8,7 +9,7 @@ use std::str::FromStr;
 use tumble_core::collide::{Pose, Shape, UnionFind, Vec3};
 use tumble_core::{ArticulatedBody, ContactPoint, Joint, LoopJoint, LoopJointKind, Mode, ObjectId, World};
 
-/// Which overlays to draw.
+/// The overlays to draw.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DebugDraw {
     /// Contact points.
@@ -19,22 +20,23 @@ pub struct DebugDraw {
     pub velocities: bool,
     /// Contact forces.
     pub forces: bool,
-    /// Axes of joints, and anchors of closures.
+    /// Axes of joints, and anchors of loop joints.
     pub joints: bool,
     /// Axes of every part: x red, y green, z blue.
     pub frames: bool,
-    /// Objects that are solved together, each group in a colour of its own.
+    /// Objects that are solved together, each island in its own color.
     pub islands: bool,
-    /// Sleepers in blue-grey, what stands still awake in olive, what moves in orange.
+    /// Sleeping objects in blue-gray, resting objects that are awake in olive, moving objects in
+    /// orange.
     pub sleep: bool,
-    /// A level of every sphere tree, 0 for the root.
+    /// A level of every sphere tree; 0 is the root.
     pub tree_level: Option<u32>,
 }
 
 /// A word that names no overlay.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no overlay '{0}'; wanted contacts, normals, velocities, forces, joints, frames, islands, sleep, tree=LEVEL or all, with commas between them"
+    "no overlay '{0}'; wanted contacts, normals, velocities, forces, joints, frames, islands, sleep, tree=LEVEL or all, separated by commas"
 )]
 pub struct UnknownOverlay(String);
 
@@ -74,14 +76,15 @@ impl FromStr for DebugDraw {
     }
 }
 
-/// An arrow of this share of the scene's size stands for the largest force; a force of a hundredth still has a tenth of its length.
+/// Length of the longest arrow as a fraction of the scene's size. It belongs to the largest force;
+/// a force of a hundredth has a tenth of its length.
 const ARROW: f32 = 0.2;
-/// Length of a normal, as a share of the longest arrow.
+/// Length of a normal, as a fraction of the longest arrow.
 const NORMAL: f32 = 0.4;
-/// A velocity's arrow is where the body would be after this time, s.
+/// A velocity's arrow ends where the body would be after this time, s.
 const VELOCITY_ARROW_S: f64 = 0.1;
 
-/// Neighbouring balls of a tree take these in turn, so that each is told from the next.
+/// Colors of adjacent spheres of a tree, in turn.
 pub(super) const SHELL_COLORS: [[f32; 3]; 6] = [
     [0.95, 0.45, 0.10],
     [0.10, 0.55, 0.95],
@@ -134,7 +137,7 @@ impl DebugDraw {
     }
 }
 
-/// The axes of every part that is drawn.
+/// Draws the axes of every part that is drawn.
 fn frames(world: &World, list: &mut DrawList, length: f32) {
     for &id in world.ids() {
         let visuals = world.object(id).and_then(|o| o.renderable()).map_or(&[][..], |r| r.visuals());
@@ -153,7 +156,8 @@ const REVOLUTE_COLOR: [f32; 3] = [1.0, 0.55, 0.05];
 const PRISMATIC_COLOR: [f32; 3] = [0.1, 0.8, 0.85];
 const SPHERICAL_COLOR: [f32; 3] = [0.85, 0.25, 0.9];
 
-/// Joints: a dot, and an arrow along the axis of a hinge or slider. Closures: a dot at both ends, and a line that shows how far they are apart.
+/// Draws joints: a dot, and an arrow along the axis of a revolute or prismatic joint. A loop joint
+/// has a dot or arrow at both ends, which shows how far they are apart.
 fn joints(world: &World, list: &mut DrawList, length: f32) {
     let mut joint = |at: Point3<f32>, axis: Option<Vector3<f32>>, color: [f32; 3]| {
         let style = DebugStyle::new(color).on_top();
@@ -196,7 +200,8 @@ fn joints(world: &World, list: &mut DrawList, length: f32) {
     }
 }
 
-/// Returns a color for each dynamic object: the same for all objects of an island. Objects without contact and joint are gray.
+/// Returns a color for each dynamic object. Objects share it if contacts or loop joints connect
+/// them, directly or through other dynamic objects. Objects without connections are gray.
 pub(super) fn island_colors(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
     let moves = |id: ObjectId| world.status(id).is_some_and(|s| s.mode == Mode::Dynamic);
     let loop_joints = world.ids().iter().filter_map(|&id| world.get::<LoopJoint>(id)).filter_map(|c| {
@@ -223,10 +228,11 @@ pub(super) fn island_colors(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
     moving.into_iter().zip(island).map(|(id, n)| (id, colors[n as usize])).collect()
 }
 
-/// An object stands still below this speed of each of its parts, m/s and rad/s.
+/// An object rests below this speed of each of its parts, m/s and rad/s.
 const REST_SPEED: f64 = 5e-3;
 
-/// Blue-grey for each dynamic object that sleeps, olive for those that stand still awake, orange for those that move.
+/// Returns a color for each dynamic object: blue-gray if it sleeps, olive if it rests but is awake,
+/// orange if it moves.
 pub(super) fn sleep_colors(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
     let moving = world.ids().iter().copied().filter(|&id| world.status(id).is_some_and(|s| s.mode == Mode::Dynamic));
     let parts = |id| (0..).map_while(move |part| world.part_state(id, part));
@@ -243,7 +249,8 @@ pub(super) fn sleep_colors(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
     moving.map(|id| (id, color(id))).collect()
 }
 
-/// 1 where the arrows of a contact are those of its `a`, -1 where they are those of its `b`: of the body that moves, or of the upper one.
+/// Returns 1 if a contact's arrows are drawn as acting on its `a`, -1 if on its `b`: on the dynamic
+/// body, or on the upper of two.
 fn toward_shown(world: &World, contact: &ContactPoint) -> f32 {
     let moves = |id| world.status(id).is_some_and(|s| s.mode == Mode::Dynamic);
     match (moves(contact.a), moves(contact.b)) {
@@ -254,7 +261,7 @@ fn toward_shown(world: &World, contact: &ContactPoint) -> f32 {
     }
 }
 
-/// The balls of one level; a branch that ended before it shows its leaf.
+/// Draws the spheres of one level, and the leaves above it.
 fn trees(world: &World, list: &mut DrawList, level: u32) {
     for &id in world.ids() {
         let Some(collidable) = world.object(id).and_then(|o| o.collidable()) else { continue };

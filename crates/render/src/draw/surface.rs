@@ -1,13 +1,14 @@
-//! Looks, as objects and scene files give them, made materials.
+//! Materials from the appearance of objects and of scene files.
 
 use crate::{Material, Pattern};
 use tumble_core::Appearance;
 
-/// The material of a look. A ball's number is the one at the end of the body's name (`ball_12`); none leaves the spots blank.
+/// The material of an object's appearance. A billiard ball's number is the one at the end of the
+/// body's name (`ball_12`); without a number the spots stay blank.
 pub(super) fn of_appearance(appearance: &Appearance, name: &str) -> Material {
     let mut numbers = Numbers { second: [1.0; 3], scale_m: 0.1, offset_m: 0.0, name };
     let mut clearcoat = 0.0;
-    // of equal names the first counts
+    // the first of equal names counts
     for (key, value) in appearance.properties.iter().rev() {
         let value = *value as f32;
         match key.as_str() {
@@ -30,7 +31,7 @@ pub(super) fn of_appearance(appearance: &Appearance, name: &str) -> Material {
     }
 }
 
-/// The material of a look in a scene file.
+/// The material of an appearance in a scene file.
 pub(super) fn of_spec(appearance: &tumble_scene::AppearanceSpec) -> Material {
     let numbers = Numbers {
         second: appearance.second_color.map(|c| c as f32),

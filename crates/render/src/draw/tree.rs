@@ -1,4 +1,4 @@
-//! A level of a sphere tree over its mesh (thesis Fig. 16).
+//! The picture of one level of a sphere tree over its mesh (thesis Fig. 16).
 
 use super::overlay::SHELL_COLORS;
 use super::{CREASE_RAD, small};
@@ -7,26 +7,28 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use std::f32::consts::FRAC_PI_2;
 use tumble_collide::{SphereTree, TriMesh, Vec3};
 
-/// Of the camera: narrower than what frames the ball around the mesh's box, which most meshes leave half empty.
+/// Opening angle of the camera: narrower than for the bounding sphere of the mesh's box, which most
+/// meshes leave half empty.
 const LENS_RAD: f32 = 0.58;
 
-/// The axis of a mesh that is up in its picture.
+/// The axis of a mesh that points up in its picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UpAxis {
     /// x.
     X,
-    /// y, as most meshes of graphics have it.
+    /// y, the convention of most graphics meshes.
     Y,
     /// z.
     #[default]
     Z,
 }
 
-/// The mesh, and translucent the balls that stand for it at `level` (0 is the root), seen from the front and above. Everything is scaled to a unit
-/// diagonal about the mesh's middle, so that light and lens are the same for all.
+/// Returns a draw list of the mesh with the translucent spheres of `level` (0 is the root), seen
+/// from the front and above. The mesh is scaled to a diagonal of 1 around its middle, so that light
+/// and camera are the same for all meshes.
 ///
 /// # Errors
-/// [`RenderError`] where the mesh has more vertices than can be drawn.
+/// [`RenderError`] if the mesh has more vertices than can be drawn.
 pub fn tree_over_mesh(mesh: &TriMesh, tree: &SphereTree, level: u32, up: UpAxis) -> Result<DrawList, RenderError> {
     let bounds = mesh.aabb();
     let (middle, scale) = (0.5 * (bounds.min + bounds.max), 1.0 / mesh.diagonal().max(f64::MIN_POSITIVE));

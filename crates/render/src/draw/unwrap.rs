@@ -1,22 +1,24 @@
-//! Texture coordinates of OBJ files (`vt`), which the meshes of a world do not keep: read again from the file, for the renderer alone.
+//! Texture coordinates of OBJ files (`vt`). The meshes of a world do not keep them, so the renderer
+//! reads them from the file again.
 //!
-//! A file belongs to a mesh where both have the same triangles, corner by corner, so a mesh that was repaired or made otherwise finds none and its texture is
-//! laid on by position.
+//! A file belongs to a mesh if both have the same triangles, corner by corner. A repaired mesh
+//! therefore has no file, and its texture is projected by position.
 
 use std::path::Path;
 use tumble_collide::{PolygonTriangulator, Vec3, decode_text, obj_lines};
 
-/// A larger file is not read.
+/// Largest file that is read.
 const MOST_BYTES: u64 = 256 << 20;
 
-/// Triangles of a file, and the places of their corners in a texture.
+/// The triangles of a file and the texture coordinates of their corners.
 pub(super) struct Unwrapped {
     triangles: Vec<[u32; 3]>,
     places: Vec<[[f32; 2]; 3]>,
 }
 
 impl Unwrapped {
-    /// Of an OBJ file; none of another one, or where a corner has no place.
+    /// Reads an OBJ file. Returns `None` for other files, and if a corner has no texture
+    /// coordinates.
     pub fn load(path: &Path) -> Option<Unwrapped> {
         if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) || path.metadata().ok()?.len() > MOST_BYTES
         {
@@ -25,7 +27,7 @@ impl Unwrapped {
         Unwrapped::parse(&decode_text(&std::fs::read(path).ok()?).ok()?)
     }
 
-    /// Polygons are cut as in [`tumble_collide::TriMesh::from_obj`].
+    /// Parses the text; polygons are triangulated as in [`tumble_collide::TriMesh::from_obj`].
     fn parse(text: &str) -> Option<Unwrapped> {
         let (mut vertices, mut known, mut faces) = (Vec::new(), Vec::new(), Vec::new());
         for (_, line) in obj_lines(text) {
@@ -61,13 +63,13 @@ impl Unwrapped {
         (!out.triangles.is_empty()).then_some(out)
     }
 
-    /// The places for these triangles, if they are those of the file.
+    /// Returns the coordinates for these triangles, if they are those of the file.
     pub fn places_of(&self, triangles: &[[u32; 3]]) -> Option<&[[[f32; 2]; 3]]> {
         (self.triangles == triangles).then_some(&self.places)
     }
 }
 
-/// `v/vt` or `v/vt/vn`: the vertex from 0 on, and its place.
+/// Parses `v/vt` or `v/vt/vn`: the vertex index from 0 and its texture coordinates.
 fn corner(word: &str, vertices: i64, known: &[[f32; 2]]) -> Option<(u32, [f32; 2])> {
     let mut numbers = word.split('/');
     let mut index = |count: i64| {

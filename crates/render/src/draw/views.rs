@@ -1,4 +1,5 @@
-//! Points of view by name, and the lights that objects carry (thesis §III.A: cameras and lights are interfaces of objects).
+//! Named viewpoints, and the lights mounted on objects (thesis §III.A: cameras and lights are
+//! interfaces of objects).
 
 use super::{LIGHT, small};
 use crate::{Camera, DrawList, Light};
@@ -9,27 +10,29 @@ use tumble_core::{CameraMount, LightMount, Spread, World};
 /// The name of the scene's own camera.
 const SCENE: &str = "scene";
 
-/// A point of view with its name: `scene` for that of the scene, else the object's, with `/` and the camera's behind it where it has one.
+/// A named viewpoint: `scene` for the scene's camera; for a mounted one the object's name, followed
+/// by `/` and the camera's name if it has one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedView {
     /// Unique in a world.
     pub name: String,
-    /// As it is now.
+    /// Its present camera.
     pub camera: Camera,
 }
 
 /// A name that no camera has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no camera is named '{name}'; there are: {}", known.join(", "))]
+#[error("no camera is named '{name}'; wanted one of {}", known.join(", "))]
 pub struct UnknownView {
-    /// What was asked for.
+    /// The requested name.
     pub name: String,
-    /// What there is.
+    /// The existing names.
     pub known: Vec<String>,
 }
 
 impl DrawList {
-    /// All points of view of the world that this list was made from, as they are now: the list's own first, then those that living objects carry.
+    /// Returns all viewpoints of the world that this list was made from: the scene's camera first,
+    /// then those mounted on enabled objects.
     pub fn views(&self, world: &World) -> Vec<NamedView> {
         let mut out = vec![NamedView { name: SCENE.into(), camera: self.camera }];
         for &id in world.ids() {
@@ -49,10 +52,10 @@ impl DrawList {
         out
     }
 
-    /// Takes the point of view of that name.
+    /// Sets the camera to the viewpoint of that name.
     ///
     /// # Errors
-    /// There is none; the names that there are.
+    /// [`UnknownView`] lists the existing names.
     pub fn look_from(&mut self, world: &World, name: &str) -> Result<(), UnknownView> {
         let views = self.views(world);
         match views.iter().find(|view| view.name == name) {
@@ -80,7 +83,7 @@ fn seen_from(mount: &CameraMount, pose: &Pose) -> Camera {
     }
 }
 
-/// A light that an object carries, where it is now.
+/// Returns a mounted light at its present pose.
 pub(super) fn carried_light(mount: &LightMount, pose: &Pose) -> Light {
     let (color, intensity, casts_shadow) =
         (mount.color.map(|c| c as f32), LIGHT * mount.intensity as f32, mount.casts_shadow);

@@ -1,22 +1,23 @@
-//! Edge blending: where two projectors overlap, each gives part of the light.
+//! Edge blending: projectors that overlap share the light.
 
 use crate::material::linear;
 use crate::{Image, MAX_SIDE, RenderError};
 use std::path::Path;
 
-/// The share of its light that each pixel keeps.
+/// The fraction of its light that each pixel keeps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Blend {
     width: u32,
-    /// Three shares (red, green, blue) per pixel, 0 to 1, rows from the top.
+    /// Three fractions (red, green, blue) per pixel, 0 to 1, rows from the top.
     shares: Vec<[f32; 3]>,
 }
 
 impl Blend {
-    /// Reads a PNG, grey or in colour, of the size of one eye's picture. A value `m` of 0 to 255 keeps `m / 255` of the light; alpha is not used.
+    /// Reads a PNG, gray or in color, of the size of one eye's picture. A value `m` of 0 to 255
+    /// keeps `m / 255` of the light; alpha is not used.
     ///
     /// # Errors
-    /// [`RenderError::File`]: it cannot be read, or has another size.
+    /// [`RenderError::File`] if it cannot be read or has another size.
     pub fn load(path: &Path, [width, height]: [u32; 2]) -> Result<Blend, RenderError> {
         let fail = |reason: String| RenderError::File { path: path.display().to_string(), reason };
         let file = std::fs::File::open(path).map_err(|e| fail(format!("the blend mask cannot be read: {e}")))?;
@@ -39,7 +40,7 @@ impl Blend {
         Ok(Blend { width, shares })
     }
 
-    /// The shares as bytes, 255 for all of the light.
+    /// The fractions as bytes, 255 for all of the light.
     pub(crate) fn bytes(&self) -> Vec<[u8; 3]> {
         self.shares.iter().map(|shares| shares.map(|s| (255.0 * s).round() as u8)).collect()
     }
@@ -57,7 +58,7 @@ impl Blend {
     }
 }
 
-/// Linear light as an sRGB byte.
+/// Converts linear light to an sRGB byte.
 pub(crate) fn encoded(light: f32) -> u8 {
     let c = if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
     (255.0 * c.clamp(0.0, 1.0)).round() as u8

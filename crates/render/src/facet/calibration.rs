@@ -1,4 +1,5 @@
-//! Pictures to set up projectors by: grid, corners, colours, name. Drawn on the screen's own metres, so that a tape measure checks them.
+//! Calibration pictures for projectors: grid, corners, colors, name. They are drawn in meters of
+//! the screen, so that a tape measure checks them.
 
 use super::canvas::{fill_rect, put};
 use super::compose::{blank, combined, flipped};
@@ -8,23 +9,26 @@ use std::fmt;
 use std::str::FromStr;
 use tumble_scene::cave::{Cave, Facet, Screen};
 
-/// What a calibration picture shows.
+/// The content of a calibration picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CalibrationPattern {
-    /// Lines every 0.1 m, stronger ones every 0.5 m from the middle, a circle, the diagonals: straightness, squareness, size.
+    /// Lines every 0.1 m, stronger ones every 0.5 m from the middle, a circle and the diagonals:
+    /// checks straightness, squareness and size.
     Grid,
-    /// Marks in the corners with their place in the cave, a frame one pixel wide at the rim: that nothing is cut off.
+    /// Marks in the corners with their position in the cave, and a frame one pixel wide at the
+    /// edge: checks that nothing is cut off.
     Corners,
-    /// Bars and ramps: that projectors agree in colour and brightness.
-    Colours,
-    /// The facet's name, large, with its node, user, size: that the right picture is on the right screen, the right way up.
+    /// Bars and ramps: check that projectors agree in color and brightness.
+    Colors,
+    /// The facet's name, large, with its node, user and size: checks that the right picture is on
+    /// the right screen, upright.
     Name,
 }
 
 const NAMES: [(&str, CalibrationPattern); 4] = [
     ("grid", CalibrationPattern::Grid),
     ("corners", CalibrationPattern::Corners),
-    ("colours", CalibrationPattern::Colours),
+    ("colors", CalibrationPattern::Colors),
     ("name", CalibrationPattern::Name),
 ];
 
@@ -36,7 +40,7 @@ impl FromStr for CalibrationPattern {
             .iter()
             .find(|(name, _)| *name == word)
             .map(|(_, pattern)| *pattern)
-            .ok_or_else(|| "wanted grid, corners, colours or name".into())
+            .ok_or_else(|| "wanted grid, corners, colors or name".into())
     }
 }
 
@@ -55,7 +59,8 @@ const GREEN: [u8; 4] = [64, 220, 96, 255];
 const BLUE: [u8; 4] = [80, 144, 255, 255];
 const YELLOW: [u8; 4] = [255, 220, 64, 255];
 
-/// The pattern on a facet: both eyes where it is in stereo (each says which it is), mirrored as the facet is, not bent or darkened.
+/// Draws the pattern of a facet: in stereo one per eye, labeled, mirrored as the facet is, not
+/// warped and not blended.
 pub fn calibration_picture(cave: &Cave, facet: &Facet, pattern: CalibrationPattern) -> Image {
     let screen = &cave.screens[facet.screen];
     let eyes = facet
@@ -73,14 +78,14 @@ fn one_eye(cave: &Cave, facet: &Facet, screen: &Screen, pattern: CalibrationPatt
     match pattern {
         CalibrationPattern::Grid => grid(&mut image, screen),
         CalibrationPattern::Corners => corners(&mut image, screen),
-        CalibrationPattern::Colours => colours(&mut image),
+        CalibrationPattern::Colors => colors(&mut image),
         CalibrationPattern::Name => {}
     }
     caption(&mut image, cave, facet, screen, pattern, side);
     image
 }
 
-/// Lines by metres from the middle, a circle that fits, and the diagonals.
+/// Lines by meters from the middle, a circle that fits, and the diagonals.
 fn grid(image: &mut Image, screen: &Screen) {
     let [wide, high] = screen.size_m();
     let per_metre = [f64::from(image.width) / wide, f64::from(image.height) / high];
@@ -116,7 +121,7 @@ fn grid(image: &mut Image, screen: &Screen) {
     }
 }
 
-/// A frame at the rim, and in each corner a mark and its place in the cave.
+/// A frame at the edge, and in each corner a mark with its position in the cave.
 fn corners(image: &mut Image, screen: &Screen) {
     let (w, h) = (i64::from(image.width), i64::from(image.height));
     fill_rect(image, 0, 0, w, h, WHITE);
@@ -145,8 +150,8 @@ fn corners(image: &mut Image, screen: &Screen) {
     }
 }
 
-/// Bars of the primaries, and ramps from black to full in each and in grey.
-fn colours(image: &mut Image) {
+/// Bars of the primaries, and ramps from black to full in each and in gray.
+fn colors(image: &mut Image) {
     let (w, h) = (i64::from(image.width), i64::from(image.height));
     let full = |r: u8, g: u8, b: u8| [255 * r, 255 * g, 255 * b, 255];
     let bars = [
@@ -166,7 +171,7 @@ fn colours(image: &mut Image) {
     for (row, mask) in [[1, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1]].iter().enumerate() {
         let (top, bottom) = (h / 3 + h * row as i64 / 6, h / 3 + h * (row as i64 + 1) / 6);
         for x in 0..w {
-            // the lower half in 16 steps, so that clipping at either end is seen
+            // the lower half in 16 steps, so that clipping at either end is visible
             let level = (255 * x / (w - 1).max(1)) as u8;
             let step = (17 * (16 * x / w)) as u8;
             let color = |v: u8| [v * mask[0], v * mask[1], v * mask[2], 255];
@@ -176,7 +181,7 @@ fn colours(image: &mut Image) {
     }
 }
 
-/// The facet's name in the middle, what it is below, and an arrow that points up.
+/// The facet's name in the middle, its properties below, and an arrow that points up.
 fn caption(image: &mut Image, cave: &Cave, facet: &Facet, screen: &Screen, pattern: CalibrationPattern, side: f64) {
     let (w, h) = (i64::from(image.width), i64::from(image.height));
     let large = pattern == CalibrationPattern::Name;
@@ -196,7 +201,7 @@ fn caption(image: &mut Image, cave: &Cave, facet: &Facet, screen: &Screen, patte
         format!("{} X {} PX  {wide:.3} X {high:.3} M", facet.size_px[0], facet.size_px[1]),
         format!("USER {}", cave.users[facet.user].name.to_uppercase()),
     ];
-    // a picture too small for them goes without
+    // a picture that is too small omits them
     lines.retain(|line| text_width(line, small) < w * 9 / 10);
     let block = text_width(&name, scale).max(lines.iter().map(|l| text_width(l, small)).max().unwrap_or(0));
     let height = 9 * scale + 10 * small * lines.len() as i64;

@@ -1,15 +1,15 @@
-//! Finished pictures put together: both eyes into one, mirrored, side by side.
+//! Composition of finished pictures: both eyes in one, mirrored, side by side.
 
 use crate::Image;
 use tumble_scene::cave::{Flip, Stereo};
 
-/// A picture of one colour.
+/// A picture of one color.
 pub(crate) fn blank(width: u32, height: u32, color: [u8; 4]) -> Image {
     let rgba = color.into_iter().cycle().take(4 * width as usize * height as usize).collect();
     Image { width, height, rgba }
 }
 
-/// Copies `from` into `into` with its top left corner at `x`, `y`; what would stick out is cut off.
+/// Copies `from` into `into` with its top left corner at `x`, `y`; pixels outside are cut off.
 pub(crate) fn paste(into: &mut Image, from: &Image, x: u32, y: u32) {
     let (w, h) = (
         from.width.min(into.width.saturating_sub(x)) as usize,
@@ -22,7 +22,8 @@ pub(crate) fn paste(into: &mut Image, from: &Image, x: u32, y: u32) {
     }
 }
 
-/// The pictures of the eyes (one, or left and right of one size) as the stereo mode shows them.
+/// Combines the pictures of the eyes (one, or left and right of one size) as the stereo mode shows
+/// them.
 pub(crate) fn combined(mut eyes: Vec<Image>, stereo: Stereo) -> Image {
     if eyes.len() < 2 || stereo == Stereo::Mono {
         return eyes.swap_remove(0);
@@ -49,7 +50,7 @@ pub(crate) fn combined(mut eyes: Vec<Image>, stereo: Stereo) -> Image {
     }
 }
 
-/// The picture mirrored.
+/// Mirrors a picture.
 pub(crate) fn flipped(mut image: Image, flip: Flip) -> Image {
     let width = image.width as usize;
     if matches!(flip, Flip::Horizontal | Flip::Both) {

@@ -1,4 +1,4 @@
-//! Capital letters and digits of 5 x 7 dots, for calibration pictures and captions.
+//! Capital letters and digits of 5 x 7 dots, for calibration pictures and text.
 
 use super::canvas::fill_rect;
 use crate::Image;
@@ -62,12 +62,12 @@ const LETTERS: [(char, [u8; 7]); 52] = [
     ('?', [0b01110, 0b10001, 0b00001, 0b00110, 0b00100, 0b00000, 0b00100]),
 ];
 
-/// The width of a text at `scale` pixels to a dot.
+/// The width of a text at `scale` pixels per dot.
 pub(crate) fn text_width(text: &str, scale: i64) -> i64 {
     (ADVANCE * text.chars().count() as i64 - 1).max(0) * scale
 }
 
-/// Writes with the top left corner at `x`, `y`. Letters that are not known are question marks; blanks are blank.
+/// Writes text with the top left corner at `x`, `y`. Unknown letters become question marks.
 pub(crate) fn write(image: &mut Image, text: &str, x: i64, y: i64, scale: i64, color: [u8; 4]) {
     for (i, letter) in text.chars().enumerate().filter(|(_, c)| *c != ' ') {
         let find = |wanted: char| LETTERS.iter().find(|(c, _)| *c == wanted);

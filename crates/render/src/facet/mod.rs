@@ -1,7 +1,8 @@
-//! Pictures of caves: what each eye sees through each screen.
+//! Pictures of caves: the view of each eye through each screen.
 //!
-//! [`FacetView`] is the projection; [`CaveView`] is a cave that stands in a scene, and draws its facets one by one or unfolded side by
-//! side; [`Warp`] and [`Blend`] bend and darken finished pictures for projectors; [`Pattern`](CalibrationPattern) helps to set them up.
+//! [`FacetView`] is the projection. [`CaveView`] is a cave at its place in a scene; it draws facets
+//! one by one, or unfolded side by side. [`Warp`] and [`Blend`] bend and darken finished pictures
+//! for projectors, and [`CalibrationPattern`] helps to set them up.
 
 mod blend;
 mod calibration;

@@ -1,5 +1,6 @@
-//! Generalized perspective: the view of one eye through one screen, wherever both are (R. Kooima, "Generalized Perspective Projection",
-//! 2008, from its geometry; written for parallelograms, so that screens measured a little out of square still meet at their edges).
+//! Generalized perspective: the view of one eye through one screen at any place (R. Kooima,
+//! "Generalized Perspective Projection", 2008, from its geometry; written for parallelograms, so
+//! that screens measured slightly out of square still meet at their edges).
 //!
 //! ```text
 //! r = u / |u|      n = u × v / |u × v|      t = n × r              axes of the view: right, towards the viewer, up
@@ -17,7 +18,7 @@
 //! | e | the eye, m |
 //! | s | depth along the screen's normal, m |
 //!
-//! With square corners `v·r = 0` and this is Kooima's frustum: left = l_x near / d and so on.
+//! With square corners `v·r = 0`, and this is Kooima's frustum: left = l_x near / d and so on.
 
 use crate::RenderError;
 use crate::viewpoint::{Lens, Part, Viewpoint};
@@ -28,17 +29,20 @@ use nalgebra::{Matrix2, Matrix4, Point3, RowVector4, Vector2, Vector3};
 pub struct FacetView {
     view: Matrix4<f64>,
     projection: Matrix4<f64>,
-    /// Width and height of the screen, m, and where its upper left corner lies in its plane: to the right and down from the origin's foot.
+    /// Width and height of the screen, m, and the place of its upper left corner in its plane: to
+    /// the right and down from the foot of the world's origin.
     plane: [f64; 4],
     part: Option<Part>,
 }
 
 impl FacetView {
-    /// From the eye, the screen's corners (lower left, lower right, upper left, as seen by the eye), and the depths `near_m` and `far_m` along the
+    /// Returns the view from the eye through the screen with these corners (lower left, lower
+    /// right, upper left, as seen by the eye). The depths `near_m` and `far_m` are along the
     /// screen's normal.
     ///
     /// # Errors
-    /// [`RenderError::BadValue`]: a screen without area, an eye that is not in front of it, numbers that are not finite, or depths out of order.
+    /// [`RenderError::BadValue`] for a screen without area, an eye that is not in front of it,
+    /// numbers that are not finite, or depths out of order.
     pub fn new(
         eye: Point3<f64>,
         [a, b, c]: [Point3<f64>; 3],
@@ -83,10 +87,12 @@ impl FacetView {
         Ok(FacetView { view, projection, plane, part: None })
     }
 
-    /// The same view as one of several for a picture of this size: see [`Part`]. Screens in one plane with the same pixels share their dither.
+    /// Makes the view one of several for a picture of this size; see [`Part`]. Screens in one plane
+    /// with equal pixels share their dither.
+    #[must_use]
     pub fn part(mut self, width: u32, height: u32, rim_px: u32) -> FacetView {
         let [wide, high, right, down] = self.plane;
-        // a quarter of a pixel keeps screens that start at halves from rounding apart
+        // a quarter of a pixel keeps the rounding consistent for screens that start at half pixels
         let number = |at: f64, length: f64, pixels: u32| {
             (at / length * f64::from(pixels) + 0.25).floor().clamp(-1e6, 1e6) as i32
         };
@@ -99,20 +105,22 @@ impl FacetView {
         (&self.view, &self.projection)
     }
 
-    /// Where a point of the world lands: x and y from −1 to 1 on the screen (right, up), depth 0 near to 1 far. `None` at and behind the eye.
+    /// Projects a world point: x and y from −1 to 1 on the screen (right, up), depth 0 near to 1
+    /// far. Returns `None` at and behind the eye.
     pub fn project(&self, point: &Point3<f64>) -> Option<Vector3<f64>> {
         let clip = self.projection * (self.view * point.to_homogeneous());
         (clip.w > 0.0).then(|| clip.xyz() / clip.w)
     }
 
-    /// Where a point of the world lands in a picture of this size: pixels from the top left corner. `None` at and behind the eye.
+    /// Projects a world point into a picture of this size: pixels from the top left corner. Returns
+    /// `None` at and behind the eye.
     pub fn pixel(&self, point: &Point3<f64>, width: u32, height: u32) -> Option<[f64; 2]> {
         self.project(point).map(|ndc| [(0.5 + 0.5 * ndc.x) * f64::from(width), (0.5 - 0.5 * ndc.y) * f64::from(height)])
     }
 }
 
 impl Viewpoint for FacetView {
-    /// The shape of the picture does not matter: the screen's is in the matrix.
+    /// The aspect ratio has no influence, because the screen's is in the matrix.
     fn lens(&self, _aspect: f32) -> Result<Lens, RenderError> {
         Ok(Lens { view: self.view, projection: self.projection, part: self.part })
     }

@@ -1,13 +1,15 @@
-//! All facets of a cave in one picture: screens that share edges are laid beside each other, as if the cave were cut open and pressed flat.
+//! All facets of a cave in one picture: screens with common edges are adjacent, as if the cave were
+//! cut open and flattened.
 //!
-//! The first facet's screen is laid down; then, in the order of the file, each screen that has an edge in common with one already there (right with
-//! left, upper with lower, never turned) is laid against it, where it covers none; what is left over is laid in a row below.
+//! The first facet's screen is placed first. Then each screen, in the order of the file, is placed
+//! at a common edge with one already placed (right with left, upper with lower, never rotated) if
+//! it covers none. The remaining screens form a row below.
 
 use std::collections::VecDeque;
 
 use tumble_scene::cave::{Cave, gaps};
 
-/// A facet's place in the unfolded picture.
+/// A facet's rectangle in the unfolded picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tile {
     /// Index of the facet.
@@ -21,7 +23,8 @@ pub struct Tile {
 /// Screens in the plane: lower left corner and size, m; y up.
 type Placed = Vec<Option<([f64; 2], [f64; 2])>>;
 
-/// The size of the picture, at most `most` pixels each way, and the facets' tiles, one for each screen that has a facet.
+/// Returns the size of the picture, at most `most` pixels each way, and a tile for each screen that
+/// has a facet.
 pub fn unfold(cave: &Cave, most: [u32; 2]) -> ([u32; 2], Vec<Tile>) {
     let facets: Vec<usize> = (0..cave.facets.len())
         .filter(|&i| cave.facets[..i].iter().all(|f| f.screen != cave.facets[i].screen))
@@ -32,13 +35,14 @@ pub fn unfold(cave: &Cave, most: [u32; 2]) -> ([u32; 2], Vec<Tile>) {
     let greatest: [f64; 2] =
         std::array::from_fn(|k| boxes.iter().map(|(_, (at, size))| at[k] + size[k]).fold(f64::MIN, f64::max));
     let extent: [f64; 2] = std::array::from_fn(|k| greatest[k] - least[k]);
-    // the largest at which the rounded size fits: what is unfolded into its own size is the same
+    // the largest scale at which the rounded size fits, so that unfolding into its own size changes
+    // nothing
     let fitting = |k: usize| (f64::from(most[k]) + 0.499) / extent[k];
     let per_metre = fitting(0).min(fitting(1));
     let edge = |metres: f64| (metres * per_metre).round().max(0.0) as u32;
     let whole = [0, 1].map(|k| edge(extent[k]).clamp(1, most[k].max(1)));
     let tile = |&(facet, (at, size)): &(usize, ([f64; 2], [f64; 2]))| {
-        // both ends are rounded, so that neighbours meet
+        // both ends are rounded, so that neighbors meet
         let (x0, x1) = (edge(at[0] - least[0]), edge(at[0] + size[0] - least[0]));
         let (y0, y1) = (edge(greatest[1] - at[1] - size[1]), edge(greatest[1] - at[1]));
         Tile { facet, position_px: [x0, y0], size_px: [(x1 - x0).max(1), (y1 - y0).max(1)] }
@@ -79,7 +83,7 @@ fn lay(cave: &Cave, facets: &[usize]) -> Placed {
     placed
 }
 
-/// What has found no neighbour, in a row with some room between.
+/// Places the screens without a common edge in a row with gaps.
 fn row_below(drawn: &[usize], size: impl Fn(usize) -> [f64; 2], placed: &mut Placed) {
     let floor = placed.iter().flatten().map(|(at, _)| at[1]).fold(f64::MAX, f64::min);
     let mut x = placed.iter().flatten().map(|(at, _)| at[0]).fold(f64::MAX, f64::min);
@@ -92,7 +96,7 @@ fn row_below(drawn: &[usize], size: impl Fn(usize) -> [f64; 2], placed: &mut Pla
     }
 }
 
-/// Whether two boxes share no area.
+/// Returns whether two boxes share no area.
 fn apart((a, s): &([f64; 2], [f64; 2]), (b, t): &([f64; 2], [f64; 2])) -> bool {
     (0..2).any(|k| a[k] + s[k] <= b[k] + 1e-3 * t[k] || b[k] + t[k] <= a[k] + 1e-3 * s[k])
 }

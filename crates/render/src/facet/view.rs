@@ -1,4 +1,4 @@
-//! A cave that stands in a scene.
+//! A cave at its place in a scene.
 
 use super::compose::{combined, flipped};
 use super::perspective::FacetView;
@@ -11,13 +11,14 @@ use std::sync::Arc;
 use tumble_scene::cave::{Cave, Facet, Flip, Stereo, User};
 use tumble_scene::{CavePlace, SceneFile};
 
-/// Pixels drawn beyond the edges of a facet and cut off again: what occlusion may reach across an edge.
+/// Pixels drawn beyond the edges of a facet and cut off again; occlusion reaches this far across an
+/// edge.
 pub const RIM_PX: u32 = 48;
 
-/// Behind and between the facets of an unfolded cave.
+/// Background of the unfolded picture, between the facets.
 const BACKGROUND: [u8; 4] = [24, 24, 26, 255];
 
-/// A cave at its place in a scene, with what its facets read from files.
+/// A cave at its place in a scene, with the files of its facets.
 pub struct CaveView {
     cave: Cave,
     place: CavePlace,
@@ -25,13 +26,13 @@ pub struct CaveView {
     warps: Vec<Option<Warp>>,
     /// By facet.
     blends: Vec<Option<Blend>>,
-    /// The two of them for the device, by facet.
+    /// Warp and blend for the device, by facet.
     finishes: Vec<Option<Arc<Finish>>>,
 }
 
 impl CaveView {
-    /// The cave where the scene puts it; where the scene does not say, upright with the first user's eye at the scene's camera, facing as it does.
-    /// Reads the files of warps and blends.
+    /// Places the cave as the scene says; by default upright, with the first user's eye at the
+    /// scene's camera and facing as it does. Reads the files of warps and blends.
     ///
     /// # Errors
     /// [`RenderError::File`] and others for warps and blends that cannot be read or do not fit.
@@ -51,22 +52,23 @@ impl CaveView {
         &self.cave
     }
 
-    /// Where it stands in the scene.
+    /// Its place in the scene.
     pub fn place(&self) -> &CavePlace {
         &self.place
     }
 
-    /// Puts it elsewhere in the scene.
+    /// Moves it to another place in the scene.
     pub fn set_place(&mut self, place: CavePlace) {
         self.place = place;
     }
 
-    /// The users, to be moved as they move: what is drawn next is seen by their new eyes.
+    /// The users; the next picture is drawn from the eyes that are set here.
     pub fn users_mut(&mut self) -> &mut [User] {
         &mut self.cave.users
     }
 
-    /// What the eye to the `side` (−1 left, 0 between, +1 right) sees through a facet's screen, in the scene.
+    /// Returns the view of one eye through a facet's screen, in the scene. `side` is −1 for the
+    /// left eye, 0 for between the eyes, +1 for the right eye.
     ///
     /// # Errors
     /// As [`FacetView::new`].
@@ -77,7 +79,8 @@ impl CaveView {
         FacetView::new(at(user.eye(side)), corners, facet.near_m * self.place.scale, facet.far_m * self.place.scale)
     }
 
-    /// The size of a facet's finished picture, and of all facets unfolded to fit `most` pixels, for who must know before.
+    /// The size of a facet's finished picture, or of all facets unfolded into at most `most`
+    /// pixels.
     pub fn size_px(&self, facet: Option<&Facet>, most: [u32; 2]) -> [u32; 2] {
         match facet {
             Some(facet) => facet.whole_px(),
@@ -85,7 +88,7 @@ impl CaveView {
         }
     }
 
-    /// A facet's picture as its projector gets it: both eyes, bent, darkened, mirrored.
+    /// Draws a facet's picture as its projector shows it: both eyes, warped, blended, mirrored.
     ///
     /// # Errors
     /// As [`Renderer::render_from`].
@@ -95,7 +98,8 @@ impl CaveView {
         renderer.read()
     }
 
-    /// The same, but the picture stays on the device ([`Renderer::picture`]). One stage serves all facets of a frame.
+    /// Draws a facet's picture and leaves it on the device ([`Renderer::picture`]). One stage
+    /// serves all facets of a frame.
     ///
     /// # Errors
     /// As [`Renderer::draw_stage`].
@@ -111,7 +115,7 @@ impl CaveView {
                 _ => ([0, 0], [true; 3]),
             };
             let begin = (i == 0).then_some([0, 0, 0, 255]);
-            // each eye by itself: mirroring the whole would give each the other's half
+            // each eye is mirrored by itself; mirroring the whole would swap the eyes
             let placed =
                 Placed { whole_px: facet.whole_px(), at_px, begin, flip: facet.flip, channels, finish: finish.clone() };
             renderer.draw_placed(stage, &self.eye(facet, *side)?.part(w, h, RIM_PX), [w, h], &placed)?;
@@ -119,7 +123,8 @@ impl CaveView {
         Ok(())
     }
 
-    /// What [`CaveView::draw`] gives, with all that is done to finished pictures done in memory: the reference for the device.
+    /// Draws as [`CaveView::draw`] does, with warp, blend and mirroring in memory: the reference
+    /// for the device.
     ///
     /// # Errors
     /// As [`Renderer::render_from`].
@@ -144,7 +149,8 @@ impl CaveView {
         Ok(combined(eyes.into_iter().map(|eye| flipped(eye, facet.flip)).collect(), facet.stereo))
     }
 
-    /// All facets unfolded into one picture of at most `most` pixels: what the point between the eyes sees, neither bent nor mirrored.
+    /// Draws all facets unfolded into one picture of at most `most` pixels, seen from between the
+    /// eyes, not warped and not mirrored.
     ///
     /// # Errors
     /// As [`Renderer::render_from`].
@@ -159,7 +165,7 @@ impl CaveView {
         renderer.read()
     }
 
-    /// The same, but the picture stays on the device ([`Renderer::picture`]).
+    /// Draws all facets unfolded and leaves the picture on the device ([`Renderer::picture`]).
     ///
     /// # Errors
     /// As [`Renderer::draw_stage`].
@@ -188,7 +194,7 @@ impl CaveView {
         self.cave.facets.iter().position(|f| f.name == facet.name)
     }
 
-    /// Warp and blend of a facet in numbers for the device.
+    /// Returns warp and blend of a facet as numbers for the device.
     fn finish(&self, index: usize) -> Option<Arc<Finish>> {
         let size = self.cave.facets[index].size_px;
         let small = |place: [f64; 2]| place.map(|p| p as f32);
@@ -199,7 +205,7 @@ impl CaveView {
     }
 }
 
-/// The first user's eye at the camera's, upright.
+/// Places the first user's eye at the scene's camera, upright.
 fn default_place(cave: &Cave, scene: &SceneFile) -> CavePlace {
     let user = &cave.users[0];
     let (eye, towards) = match &scene.camera {

@@ -1,36 +1,41 @@
-//! Warping: a grid that says, for places of the projected picture, which place of the drawn picture appears there.
+//! Warping: a grid that maps each place of the projected picture to a place of the drawn picture.
 //!
-//! - OBJ: `v x y [z]` is a place of the target, `vt u v` the place of the drawn picture shown there, both from 0 to 1 with the origin at the lower
-//!   left; `f a/b …` its triangles or convex polygons (`v/vt` or `v/vt/vn`; a bare `v` takes the texture corner of that number).
-//! - PFM (`PF`, three floats): a grid of places, the first row at the bottom, spread evenly over the target from edge to edge; red and green are
-//!   `u` and `v`, blue is not used. A place that is not finite or lies outside −0.5 to 1.5 stays black, with the cells around it.
+//! - OBJ: `v x y [z]` is a place of the target, `vt u v` the place of the drawn picture shown
+//!   there. Both go from 0 to 1, with the origin at the lower left. `f a/b …` are its triangles or
+//!   convex polygons (`v/vt` or `v/vt/vn`; a bare `v` takes the texture corner of that number).
+//! - PFM (`PF`, three floats): a grid of places, the first row at the bottom, spread evenly over
+//!   the target from edge to edge. Red and green are `u` and `v`, blue is not used. A place that is
+//!   not finite or lies outside −0.5 to 1.5 stays black, with the cells around it.
 //!
-//! Projectors throw past their screens, and grids of them reach past 0 to 1: places of the target there are cut off, and for places of the drawn picture its
-//! edge goes on. Farther than half a picture outside nothing real lies; numbers there are pixels, and are refused.
+//! Projectors throw past their screens, so their grids go beyond 0 to 1. Places of the target are
+//! cut off there; for places of the drawn picture its edge is repeated. Places farther than half a
+//! picture outside are refused, because they are numbers in pixels.
 //!
-//! Work: `Σ area of each triangle's upright box within the target ≤ 100 targets`. Grids whose triangles lie side by side have about 2.
+//! Work: `Σ area of each triangle's upright box within the target ≤ 100 targets`. Grids of adjacent
+//! triangles have about 2.
 //!
-//! Each pixel's middle is looked up by barycentric coordinates, and the picture there is read bilinearly in linear light. Outside the grid it is black.
+//! Each pixel's center is located by barycentric coordinates, and the picture is sampled bilinearly
+//! in linear light. Outside the grid the result is black.
 
 use super::blend::encoded;
 use crate::material::linear;
 use crate::{Image, RenderError};
 use std::path::Path;
 
-/// Most bytes of a warp file.
+/// Largest warp file, bytes.
 const MOST_BYTES: u64 = 64 << 20;
-/// Most triangles of a grid.
+/// Largest number of triangles of a grid.
 const MOST_TRIANGLES: usize = 1 << 21;
 
-/// Places are within this; the picture itself is 0 to 1.
+/// Range of places; the picture itself is 0 to 1.
 const PLACES: std::ops::RangeInclusive<f64> = -0.5..=1.5;
-/// How often triangles may cover the target altogether, by their upright boxes.
+/// Largest sum of the areas of the triangles' upright boxes, in targets.
 const MOST_COVERS: f64 = 100.0;
 
 /// A corner: place in the target, place in the drawn picture; both 0 to 1, y up.
 type Corner = ([f64; 2], [f64; 2]);
 
-/// A grid that bends pictures.
+/// A grid that warps pictures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Warp {
     triangles: Vec<[Corner; 3]>,
@@ -52,13 +57,13 @@ impl Warp {
         warp.map_err(fail)
     }
 
-    /// From the text of an OBJ file.
+    /// Parses the text of an OBJ file.
     ///
     /// # Errors
-    /// What is wrong, with the line.
+    /// The fault with its line.
     pub fn from_obj(bytes: &[u8]) -> Result<Warp, String> {
         let text = std::str::from_utf8(bytes)
-            .map_err(|e| format!("the warp grid is neither PFM nor text (byte {})", e.valid_up_to()))?;
+            .map_err(|e| format!("the warp grid is not PFM and not text (byte {})", e.valid_up_to()))?;
         let (mut places, mut sources, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
         for (number, line) in text.lines().enumerate() {
             let at = |what: String| format!("line {}: {what}", number + 1);
@@ -88,10 +93,10 @@ impl Warp {
         Warp::of(triangles)
     }
 
-    /// From the bytes of a PFM file.
+    /// Parses the bytes of a PFM file.
     ///
     /// # Errors
-    /// What is wrong.
+    /// The fault.
     pub fn from_pfm(bytes: &[u8]) -> Result<Warp, String> {
         let (header, data) = pfm_header(bytes)?;
         let ([w, h], little) = header;
@@ -121,7 +126,7 @@ impl Warp {
         Warp::of(triangles)
     }
 
-    /// Of triangles that lie side by side, at least nearly.
+    /// Builds a warp from triangles that are adjacent, at least approximately.
     fn of(triangles: Vec<[Corner; 3]>) -> Result<Warp, String> {
         let side = |t: &[Corner; 3], k: usize| {
             let along = t.map(|(place, _)| place[k].clamp(0.0, 1.0));
@@ -130,13 +135,13 @@ impl Warp {
         let covers: f64 = triangles.iter().map(|t| side(t, 0) * side(t, 1)).sum();
         if covers > MOST_COVERS {
             return Err(format!(
-                "the triangles of the warp grid cover the picture {covers:.0} times over; wanted triangles side by side, and at most {MOST_COVERS} times"
+                "the triangles of the warp grid cover the picture {covers:.0} times; wanted adjacent triangles, and at most {MOST_COVERS} times"
             ));
         }
         Ok(Warp { triangles })
     }
 
-    /// The bent picture, of the same size.
+    /// Returns the warped picture, of the same size.
     pub fn apply(&self, image: &Image) -> Image {
         let mut out = super::compose::blank(image.width, image.height, [0, 0, 0, 255]);
         for (pixel, from) in out.rgba.chunks_exact_mut(4).zip(self.sources([image.width, image.height])) {
@@ -147,7 +152,8 @@ impl Warp {
         out
     }
 
-    /// For each pixel of a picture of this size, by rows from the top, the place that appears there: pixels, middles at whole numbers.
+    /// For each pixel of a picture of this size, by rows from the top, the place that appears
+    /// there, in pixels; centers are at whole numbers.
     pub(crate) fn sources(&self, [width, height]: [u32; 2]) -> Vec<Option<[f64; 2]>> {
         let (w, h) = (width as usize, height as usize);
         let mut out = vec![None; w * h];
@@ -192,7 +198,8 @@ fn cross(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// The picture between its pixels, whose middles lie at whole numbers; the edge goes on outside.
+/// Samples the picture bilinearly; pixel centers are at whole numbers, and the edge is repeated
+/// outside.
 fn sample(image: &Image, x: f64, y: f64) -> [u8; 4] {
     let (fx, fy) = ((x - x.round()).abs(), (y - y.round()).abs());
     let clamped = |v: f64, most: u32| v.clamp(0.0, f64::from(most - 1)) as usize;
@@ -223,7 +230,7 @@ fn pair<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<[f64; 2]> {
     Some([number()?, number()?])
 }
 
-/// `v/vt`, `v/vt/vn` or `v`; numbers from 1, or from the end where negative.
+/// Parses `v/vt`, `v/vt/vn` or `v`; indices start at 1, negative ones count from the end.
 fn corner(word: &str, places: &[[f64; 2]], sources: &[[f64; 2]]) -> Result<Corner, String> {
     let mut parts = word.split('/');
     let place = parts.next().unwrap_or("");
@@ -243,7 +250,7 @@ fn corner(word: &str, places: &[[f64; 2]], sources: &[[f64; 2]]) -> Result<Corne
 /// Size, and whether the floats are little-endian.
 type PfmHeader = ([usize; 2], bool);
 
-/// The header, and the floats.
+/// Returns the header and the floats.
 fn pfm_header(bytes: &[u8]) -> Result<(PfmHeader, &[u8]), String> {
     let mut words = Vec::new();
     let mut at = 0;

@@ -1,33 +1,41 @@
-//! Which balls have a pixel in a picture, for drivers that draw on the processor: there a ball that nobody sees costs as much as any other, and finding it here costs a tenth.
+//! Occlusion culling of spheres for software rasterizers, where a hidden sphere costs as much to
+//! draw as a visible one and culling it a tenth of that.
 //!
-//! The outline of a ball in a picture is an ellipse (a circle in a parallel view). With rows `m_i` of the map from the world to the pixels `(x, y, w)` of a picture, `n_i` their
-//! first three numbers, `C = (c, 1)` the centre and `r` the radius, its dual conic is `q_ij = (m_i·C)(m_j·C) - r² n_i·n_j` (Hartley and Zisserman, Multiple View Geometry, §8.3); its
-//! middle is `t = (q_xw, q_yw) / q_ww` and its shape `Σ = t tᵀ - (q_xx, q_xy; q_xy, q_yy) / q_ww`: points `p` with `(p - t)ᵀ Σ⁻¹ (p - t) <= 1`.
+//! The outline of a sphere in a picture is an ellipse (a circle in a parallel view). Let `m_i` be
+//! the rows of the map from the world to the pixels `(x, y, w)` of a picture, `n_i` their first
+//! three numbers, `C = (c, 1)` the center and `r` the radius. The dual conic is `q_ij =
+//! (m_i·C)(m_j·C) - r² n_i·n_j` (Hartley and Zisserman, Multiple View Geometry, §8.3). Its middle
+//! is `t = (q_xw, q_yw) / q_ww` and its shape `Σ = t tᵀ - (q_xx, q_xy; q_xy, q_yy) / q_ww`: points
+//! `p` with `(p - t)ᵀ Σ⁻¹ (p - t) <= 1`.
 //!
-//! 1. Each ball writes into the cells of a coarse map that lie wholly in its outline how far its front may reach: nothing behind that is seen there.
-//! 2. A ball is hidden where all cells that its outline may touch hold less than the depth at which it begins.
+//! 1. Each sphere writes the largest depth of its front into the cells of a coarse map that lie
+//!    entirely in its outline; nothing behind that depth is visible there.
+//! 2. A sphere is hidden if all cells that its outline may touch hold less than the depth at which
+//!    it begins.
 //!
 //! | symbol | meaning |
 //! |---|---|
-//! | `f`, `e` | the way the picture looks; the way from the ball to the eye, both of length 1 |
-//! | `begin` | view depth of the ball's nearest point, `(c - eye)·f - r` |
-//! | `end` | no point of its front lies deeper: `(c - eye)·f + r sin α`, `α` between `f` and `-e` (points of the front have a normal `n` with `n·e >= 0`) |
+//! | `f`, `e` | direction of view; direction from the sphere to the eye; both of length 1 |
+//! | `begin` | view depth of the sphere's nearest point, `(c - eye)·f - r` |
+//! | `end` | upper bound of the depth of its front: `(c - eye)·f + r sin α`, `α` between `f` and `-e` (points of the front have a normal `n` with `n·e >= 0`) |
 //!
-//! Nothing that has a pixel is ever left out (`tests::what_is_left_out_has_no_pixel`): outlines are taken smaller where they hide and larger where they are hidden, by more than rounding.
+//! **Invariant:** no sphere with a visible pixel is culled (`tests::culled_spheres_have_no_pixel`).
+//! Outlines are shrunk where they hide and grown where they are hidden, by more than rounding.
 
 use super::data::Eye;
 use nalgebra::{Point3, Vector4};
 use std::ops::Range;
 
-/// Middle and radius, m.
+/// Center and radius, m.
 pub type SphereBounds = (Point3<f32>, f32);
 
-/// Most cells along a side.
+/// Largest number of cells along a side.
 const MAX_CELLS: usize = 512;
 /// Smallest side of a cell, pixels.
 const CELL_PX: usize = 2;
 
-/// Numbers, among `ranges`, of the balls that may have a pixel in what the eye sees, in their order; `samples` of a pixel say how near to its edge one is asked.
+/// Returns the indices, among `ranges`, of the spheres that may have a visible pixel, in their
+/// order. `samples` per pixel determine how close to a pixel's edge a sample may be.
 pub fn visible(
     spheres: &[SphereBounds],
     ranges: impl Iterator<Item = Range<u32>>,
@@ -54,34 +62,34 @@ pub fn visible(
         .collect()
 }
 
-/// What of a point of view places balls.
+/// The parts of a viewpoint that place spheres.
 struct Picture<'a> {
     eye: &'a Eye,
     rows: [Vector4<f64>; 3],
     /// `n_i·n_j` for xx, xy, yy, xw, yw, ww.
     products: [f64; 6],
-    /// Planes of its sides: how far inside a place is, m.
+    /// Planes of its sides: signed distance inside, m.
     sides: [Vector4<f64>; 4],
 }
 
 enum Place {
-    /// Without a pixel.
+    /// No pixel.
     Outside,
-    /// Around the eye, or across the plane through it: no ellipse.
+    /// The sphere contains the eye or crosses the plane through it, so its outline is no ellipse.
     Around,
     Before(Outline),
 }
 
-/// An ellipse in the picture, and the depths between which the front of its ball lies.
+/// An ellipse in the picture, and the range of depths of the sphere's front.
 struct Outline {
     middle: [f64; 2],
     /// `Σ_xx`, `Σ_xy`, `Σ_yy`, squares of pixels.
     shape: [f64; 3],
     begin: f64,
     end: f64,
-    /// Pixels by which the device may draw it beside where it is.
+    /// Pixels by which the device may displace it.
     error: f64,
-    /// Neither the near nor the far plane cuts it.
+    /// Whether it lies between the near and the far plane.
     whole: bool,
 }
 
@@ -112,7 +120,7 @@ impl Picture<'_> {
         let [x, y, w] = self.rows.map(|m| m.xyz().dot(&c) + m.w);
         let [xx, xy, yy, xw, yw, ww] = self.products.map(|p| r * r * p);
         let q = w * w - ww;
-        // where the plane through the eye touches it, or nearly
+        // the plane through the eye touches the sphere, or nearly
         if w <= 0.0 || q < 0.01 * w * w {
             return Place::Around;
         }
@@ -133,24 +141,24 @@ impl Picture<'_> {
 }
 
 impl Outline {
-    /// Across and down, pixels.
+    /// Half its width and half its height, pixels.
     fn half_sides(&self) -> [f64; 2] {
         [self.shape[0].max(0.0).sqrt(), self.shape[2].max(0.0).sqrt()]
     }
 
-    /// No point of its front is deeper, as depths are rounded.
+    /// An upper bound of the depth of its front, including rounding.
     fn surely_ends(&self) -> f32 {
         (self.end + 1e-5 * self.end.abs() + 1e-3 * (self.end - self.begin)) as f32
     }
 }
 
-/// For each cell a depth behind which nothing is seen in it.
+/// For each cell a depth behind which nothing is visible in it.
 struct Map {
     per_cell: f64,
     cell: f64,
     columns: usize,
     rows: usize,
-    /// Samples lie at least so far from the edges of their pixel.
+    /// Smallest distance of a sample from the edge of its pixel.
     inset: f64,
     depths: Vec<f32>,
 }
@@ -172,22 +180,23 @@ impl Map {
         }
     }
 
-    /// Numbers of the cells of which samples may lie between two places, and perhaps one more.
+    /// The cells that may contain a sample between two places, and perhaps one more.
     fn touched(&self, from: f64, to: f64, count: usize) -> Range<usize> {
-        // what is negative becomes 0
+        // negative numbers become 0
         let first = ((from + self.inset) * self.per_cell) as usize;
         let end = if to < self.inset { 0 } else { ((to - self.inset) * self.per_cell) as usize + 1 };
         first.min(count)..end.clamp(first.min(count), count)
     }
 
-    /// Numbers of the cells of which all samples lie between two places, or one less.
+    /// The cells whose samples all lie between two places, or one less.
     fn filled(&self, from: f64, to: f64, count: usize) -> Range<usize> {
         let first = if from <= self.inset { 0 } else { ((from - self.inset) * self.per_cell) as usize + 1 };
         let end = ((to + self.inset) * self.per_cell) as usize;
         first.min(count)..end.clamp(first.min(count), count)
     }
 
-    /// What lies behind the ball is not seen in the cells that it fills: in each row those between its edges at the row's upper and at its lower side.
+    /// Writes the sphere's depth into the cells that it fills: in each row, those between its edges
+    /// at the row's upper and lower side.
     fn write(&mut self, o: &Outline) {
         let [across, down] = o.half_sides();
         let margin = 0.03 + o.error;

@@ -1,4 +1,5 @@
-//! What the shaders read, as flat numbers in the layout of the WGSL structs (all members are vec4 or mat4x4).
+//! Data for the shaders, as flat numbers in the layout of the WGSL structs (all members are vec4 or
+//! mat4x4).
 
 use crate::list::debug::Stroke;
 use crate::material::linear3;
@@ -8,34 +9,37 @@ use nalgebra::{Matrix2, Matrix3, Matrix4, Point3, Vector2, Vector3, Vector4};
 /// Numbers per mesh instance, sphere, capsule and stroke.
 pub const INSTANCE_FLOATS: u64 = 24;
 pub const SPHERE_FLOATS: u64 = 20;
-/// Texels that tell of a sphere, of four words each.
+/// Texels that describe a sphere, of four words each.
 pub const SPHERE_TEXELS: usize = 4;
-/// Middle, radius and number.
+/// Center, radius and index.
 pub const SPHERE_WORDS: u64 = 5;
 pub const CAPSULE_FLOATS: u64 = 24;
 pub const STROKE_FLOATS: u64 = 16;
 
-/// A point of view in the terms of `struct View` of the shaders; computed in f64, because far scenes cancel badly.
+/// A viewpoint in the terms of the shaders' `struct View`; computed in f64, because distant scenes
+/// suffer from cancellation.
 pub struct Eye {
     pub clip_from_world: Matrix4<f64>,
     pub depth: [f64; 4],
     pub perspective: bool,
     origin: [Vector3<f64>; 3],
     dir: [Vector3<f64>; 3],
-    /// The way it looks, of length 1.
+    /// Direction of view, of length 1.
     ahead: Vector3<f64>,
     per_pixel: f64,
     per_ndc: [f64; 2],
     size: [f64; 2],
-    /// Number of the first pixel for dither, and the most pixels that occlusion reaches.
+    /// Index of the first pixel for dither, and the reach of occlusion in pixels.
     grid: [f64; 3],
 }
 
 impl Eye {
-    /// From view and projection (depth 0 near, 1 far) for a picture of the given size in pixels.
+    /// Converts view and projection (depth 0 near, 1 far) for a picture of the given size in
+    /// pixels.
     ///
-    /// With `A` the upper left 2 x 2 of the projection, `o` its last column and `s` the view depth, a perspective point of the picture `n` sees
-    /// `x(s) = A⁻¹(−o) + s A⁻¹(n + c)`, with `c` the third column; a parallel one sees `x(s) = A⁻¹(n − o) + s A⁻¹c`.
+    /// With `A` the upper left 2 x 2 of the projection, `o` its last column and `s` the view depth,
+    /// a perspective point of the picture `n` sees `x(s) = A⁻¹(−o) + s A⁻¹(n + c)`, with `c` the
+    /// third column; a parallel one sees `x(s) = A⁻¹(n − o) + s A⁻¹c`.
     pub fn new(view: &Matrix4<f64>, projection: &Matrix4<f64>, width: u32, height: u32) -> Self {
         let p = *projection;
         let perspective = p[(3, 3)] == 0.0;
@@ -67,16 +71,18 @@ impl Eye {
         }
     }
 
-    /// The same as a part of a whole whose pixels are numbered from elsewhere, with a rim that occlusion may not reach beyond.
+    /// Makes the viewpoint a part of a whole, with its own pixel indices and a rim that limits the
+    /// reach of occlusion.
     pub fn numbered(mut self, part: &Part) -> Self {
-        // far from 0, so that numbers stay positive; a multiple of the tiles of noise
+        // far from 0, so that indices stay positive; a multiple of the noise tiles
         let number = |first: i32| f64::from((first - part.rim_px as i32 + 65_536).rem_euclid(131_072));
         self.grid =
             [number(part.first_pixel[0]), number(part.first_pixel[1]), f64::from(part.rim_px.saturating_sub(3))];
         self
     }
 
-    /// Whether the eye is in, or near to, one of the balls, or one lies across the plane through the eye: there an outline is no ellipse before it.
+    /// Returns whether a sphere contains the eye, is close to it, or crosses the plane through it:
+    /// its outline is then no ellipse in front of the eye.
     pub fn near_any<'a>(&self, mut spheres: impl Iterator<Item = &'a (Point3<f32>, f32)>) -> bool {
         let at: Vector3<f32> = self.origin[0].cast();
         let ahead: Vector3<f32> = self.clip_from_world.row(3).transpose().xyz().cast();
@@ -87,14 +93,15 @@ impl Eye {
         self.perspective
             && spheres.any(|(center, radius)| {
                 let to = center.coords - at;
-                // a little more than the shaders' own bounds
+                // slightly more than the shaders' own bounds
                 (to.norm_squared() < 2.1 * radius * radius
                     || (to.dot(&ahead).abs() < 3.0 * radius && to.norm() < 1e6 * radius))
                     && !beside(center, *radius)
             })
     }
 
-    /// Rows of the map from the world to `(x, y, w)`: `x / w` and `y / w` are pixels from the left and from the top.
+    /// Rows of the map from the world to `(x, y, w)`: `x / w` and `y / w` are pixels from the left
+    /// and from the top.
     pub fn pixel_rows(&self) -> [Vector4<f64>; 3] {
         let [x, y, w] = [0, 1, 3].map(|i| self.clip_from_world.row(i).transpose());
         [(w + x) * (0.5 * self.size[0]), (w - y) * (0.5 * self.size[1]), w]
@@ -105,43 +112,45 @@ impl Eye {
         self.size.map(|side| side as usize)
     }
 
-    /// How far ahead a place lies, m.
+    /// View depth of a place, m.
     pub fn view_depth(&self, place: &Vector3<f64>) -> f64 {
         (place - self.origin[0]).dot(&self.ahead)
     }
 
-    /// Depth as it is drawn, 1 at the near plane and 0 at the far plane; none behind the eye.
+    /// Depth as it is drawn, 1 at the near plane and 0 at the far plane; `None` behind the eye.
     pub fn depth_at(&self, view_depth: f64) -> Option<f64> {
         let [x, y, z, w] = self.depth;
         (!self.perspective || view_depth > 0.0).then(|| (x * view_depth + y) / (z * view_depth + w))
     }
 
-    /// Planes of the four sides of the picture, as rows whose product with a homogeneous point is its distance inside, m.
+    /// Planes of the four sides of the picture, as rows whose product with a homogeneous point is
+    /// its distance inside, m.
     pub fn sides(&self) -> [Vector4<f64>; 4] {
         let [x, y, w] = [0, 1, 3].map(|i| self.clip_from_world.row(i).transpose());
         [w + x, w - x, w + y, w - y].map(|side| side / side.xyz().norm().max(1e-300))
     }
 
-    /// Sine of the angle between the way it looks and the way to a place.
+    /// Sine of the angle between the direction of view and the direction to a place.
     pub fn sine_beside(&self, place: &Vector3<f64>) -> f64 {
         let to = if self.perspective { place - self.origin[0] } else { self.dir[0] };
         let cosine = to.dot(&self.ahead) / to.norm();
         (1.0 - cosine * cosine).max(0.0).sqrt()
     }
 
-    /// Pixels that a metre across covers at a depth, at most.
+    /// Largest number of pixels that a meter covers at a depth.
     pub fn pixels_per_metre(&self, view_depth: f64) -> f64 {
         let [wide, high] = self.map_widths_per_metre();
         let depth = if self.perspective { view_depth.max(1e-9) } else { 1.0 };
         (wide * self.size[0]).max(high * self.size[1]) / depth
     }
 
-    /// The largest coordinate of where it looks from.
+    /// The largest coordinate of the eye.
     pub fn reach(&self) -> f64 {
         self.origin[0].amax()
     }
 
-    /// How many picture widths and heights a metre across the view covers (at view depth 1, where perspective).
+    /// Picture widths and heights that a meter across the view covers (at view depth 1, for
+    /// perspective).
     pub fn map_widths_per_metre(&self) -> [f64; 2] {
         self.per_ndc.map(|metres| 0.5 / metres)
     }
@@ -163,7 +172,8 @@ impl Eye {
     }
 }
 
-/// A mesh instance: three rows of object to world, then the material; of a mesh that is unwrapped the texture repeats every -1 m.
+/// A mesh instance: three rows of object to world, then the material. For a mesh with texture
+/// coordinates the repeat is -1 m.
 pub fn instance(x: &Instance, unwrapped: bool, out: &mut Vec<f32>) {
     let r = x.pose.rotation.to_rotation_matrix().into_inner() * Matrix3::from_diagonal(&x.scale);
     for i in 0..3 {
@@ -172,8 +182,9 @@ pub fn instance(x: &Instance, unwrapped: bool, out: &mut Vec<f32>) {
     material(&x.material, if unwrapped { -1.0 } else { x.material.texture.map_or(0.0, |t| t.repeat_m) }, out);
 }
 
-/// A sphere as bits: centre and radius; colours, roughness and metal as shares of 65,535, two to a word; turn; lacquer, repeat of the texture and sizes. What all surfaces read
-/// comes first.
+/// A sphere as bits: center and radius; colors, roughness and metallic as fractions of 65,535, two
+/// per word; orientation; clear coat, repeat of the texture and sizes. Members that all surfaces
+/// read come first.
 pub fn sphere(s: &Sphere, out: &mut Vec<u32>) {
     let (c, q, m) = (s.center, s.orientation.coords, &s.material);
     let (_, other, size) = m.pattern.packed();
@@ -187,11 +198,12 @@ pub fn sphere(s: &Sphere, out: &mut Vec<u32>) {
     };
     out.extend([c.x, c.y, c.z, s.radius].map(f32::to_bits));
     out.extend([pair(r, g), pair(b, m.roughness), pair(or, og), pair(ob, m.metallic)]);
-    // a sphere wears its texture once around
+    // the texture goes once around a sphere
     out.extend([q.x, q.y, q.z, q.w, m.clearcoat, 0.0, size[0], size[1]].map(f32::to_bits));
 }
 
-/// A capsule: centre and radius, turn, material, half length. A texture is laid on by position.
+/// A capsule: center and radius, orientation, material, half length. Its texture is projected by
+/// position.
 pub fn capsule(c: &Capsule, out: &mut Vec<f32>) {
     let (t, q) = (c.pose.translation.vector, c.pose.rotation.coords);
     out.extend([t.x, t.y, t.z, c.radius, q.x, q.y, q.z, q.w]);
@@ -199,7 +211,7 @@ pub fn capsule(c: &Capsule, out: &mut Vec<f32>) {
     out.extend([c.half_length, 0.0, 0.0, 0.0]);
 }
 
-/// A translucent sphere: its opacity takes the place of the roughness.
+/// A translucent sphere; its opacity replaces the roughness.
 pub fn shell(s: &crate::DebugSphere, out: &mut Vec<f32>) {
     let [r, g, b] = linear3(s.style.color);
     out.extend([s.center.x, s.center.y, s.center.z, s.radius, 0.0, 0.0, 0.0, 1.0]);
@@ -207,7 +219,7 @@ pub fn shell(s: &crate::DebugSphere, out: &mut Vec<f32>) {
     out.extend([0.0; 8]);
 }
 
-/// A stroke: ends with widths, colour, kind.
+/// A stroke: ends with widths, color, kind.
 pub fn stroke(s: &Stroke, out: &mut Vec<f32>) {
     let [r, g, b] = linear3(s.style.color);
     out.extend([s.start.x, s.start.y, s.start.z, s.start_px, s.end.x, s.end.y, s.end.z, s.end_px]);

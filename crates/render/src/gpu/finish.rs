@@ -1,7 +1,9 @@
-//! Finished pictures on the device: the rim cut off; both eyes in one picture, bent, darkened and mirrored for projectors.
+//! Finishing pictures on the device: removes the rim, places both eyes in one picture, and warps,
+//! darkens and mirrors for projectors.
 //!
-//! Where a picture only changes its place its bytes are copied. All else is one pass per eye, which gives what [`crate::Warp::apply`] and
-//! [`crate::Blend::apply`] give to within a level: they round to bytes in between, and the pass does not.
+//! If a picture only changes its place, its bytes are copied. Otherwise one pass per eye gives the
+//! result of [`crate::Warp::apply`] and [`crate::Blend::apply`] to within one level: these round to
+//! bytes in between, the pass does not.
 
 use super::Gpu;
 use super::frame::bind;
@@ -18,28 +20,29 @@ use wgpu::{
 };
 
 const FINISH_WGSL: &str = include_str!("../shaders/finish.wgsl");
-/// Most finishes whose textures are kept.
+/// Largest number of finishes whose textures are kept.
 const MOST_KEPT: usize = 64;
-/// Stands for no source in the texture of a warp.
+/// Marks a pixel without a source in the texture of a warp.
 const NOWHERE: f32 = -1e9;
 
-/// What a projector needs done to every picture of one size, in numbers.
+/// Warp and blend of every picture of one size, as numbers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Finish {
     pub size: [u32; 2],
-    /// For each pixel the place of the picture that appears there, in pixels, middles at whole numbers; `None` stays black.
+    /// For each pixel the place of the picture that appears there, in pixels, centers at whole
+    /// numbers; `None` stays black.
     pub warp: Option<Vec<Option<[f32; 2]>>>,
-    /// For each pixel the share of light that it keeps, per colour, 255 for all of it.
+    /// For each pixel the fraction of light that it keeps, per color, 255 for all of it.
     pub shares: Option<Vec<[u8; 3]>>,
 }
 
-/// Where and how an eye's picture goes into the whole.
+/// How an eye's picture is placed in the whole.
 pub(crate) struct Placed {
     /// Size of the whole, pixels.
     pub whole_px: [u32; 2],
     /// Top left corner in the whole.
     pub at_px: [u32; 2],
-    /// Whether the whole begins anew, with this colour behind it.
+    /// If set, the whole is first cleared to this color.
     pub begin: Option<[u8; 4]>,
     pub flip: Flip,
     /// Which of red, green and blue are written.
@@ -47,10 +50,10 @@ pub(crate) struct Placed {
     pub finish: Option<Arc<Finish>>,
 }
 
-/// The pass, the pictures that it makes, and the textures that it reads.
+/// The pass, its pictures and its textures.
 pub(crate) struct Finisher {
     layout: BindGroupLayout,
-    /// All colours; red; green and blue.
+    /// All colors; red; green and blue.
     pipelines: [RenderPipeline; 3],
     nothing: [TextureView; 2],
     known: Vec<(Arc<Finish>, [TextureView; 2])>,
@@ -94,7 +97,7 @@ impl Finisher {
         Finisher { layout, pipelines, nothing, known: Vec::new(), whole: None }
     }
 
-    /// The middle of a picture without `rim` pixels on each side.
+    /// Copies the middle of a picture, without `rim` pixels on each side.
     pub fn cut(&mut self, gpu: &Gpu, from: &Texture, rim: u32) -> Texture {
         let size = [from.width() - 2 * rim, from.height() - 2 * rim];
         let whole = self.whole(gpu, size);
@@ -104,7 +107,7 @@ impl Finisher {
         whole
     }
 
-    /// Puts the picture of the targets into its place; the whole.
+    /// Places the picture of the targets and returns the whole.
     pub fn place(
         &mut self,
         gpu: &Gpu,
@@ -154,7 +157,7 @@ impl Finisher {
         Ok(whole)
     }
 
-    /// The texture of finished pictures of this size; its content stays from call to call.
+    /// The texture of finished pictures of this size; its content persists between calls.
     fn whole(&mut self, gpu: &Gpu, [width, height]: [u32; 2]) -> Texture {
         match &self.whole {
             Some(whole) if (whole.width(), whole.height()) == (width, height) => whole.clone(),
@@ -193,13 +196,13 @@ fn place_floats(rim: u32, [w, h]: [u32; 2], placed: &Placed) -> [f32; 8] {
     [placed.at_px[0] as f32, placed.at_px[1] as f32, across, upward, w as f32, h as f32, rim as f32, warped]
 }
 
-/// A byte colour as what the clear of an sRGB texture takes.
+/// Converts a color of bytes for clearing an sRGB texture.
 fn linear_color([r, g, b, a]: [u8; 4]) -> wgpu::Color {
     let linear = |c: u8| f64::from(crate::material::linear(f32::from(c) / 255.0));
     wgpu::Color { r: linear(r), g: linear(g), b: linear(b), a: f64::from(a) / 255.0 }
 }
 
-/// The middle of a picture into a place of another; what would stick out is cut off.
+/// Copies the middle of a picture to a place in another; pixels outside are cut off.
 fn copy(
     encoder: &mut wgpu::CommandEncoder,
     from: &Texture,
@@ -218,7 +221,7 @@ fn copy(
     encoder.copy_texture_to_texture(source, target, size);
 }
 
-/// A texture with these bytes.
+/// Creates a texture with these bytes.
 pub(super) fn upload(gpu: &Gpu, [width, height]: [u32; 2], format: TextureFormat, bytes: &[u8]) -> TextureView {
     let descriptor = wgpu::TextureDescriptor {
         label: Some("finish"),

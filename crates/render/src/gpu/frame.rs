@@ -1,4 +1,4 @@
-//! One picture of a stage: bindings of its point of view, and the passes in their order.
+//! One picture of a stage: bindings of its viewpoint, and the passes in their order.
 
 use super::data::Eye;
 use super::pipelines::Pipelines;
@@ -9,7 +9,7 @@ use super::{Gpu, meshes::uniform_buffer};
 use crate::{Lens, RenderError};
 use wgpu::{BindGroup, BindGroupEntry, BindingResource, CommandEncoder, RenderPass, TextureView};
 
-/// What one picture needs on the device beside its stage.
+/// Device resources of one picture, in addition to its stage.
 pub struct Frame<'a> {
     stage: &'a Stage,
     targets: &'a Targets,
@@ -62,7 +62,7 @@ impl<'a> Frame<'a> {
         })
     }
 
-    /// All passes but those of shadows.
+    /// Records all passes except the shadow maps.
     pub fn draw(&self, encoder: &mut CommandEncoder, pipelines: &Pipelines) {
         let (occlusion, variant) = (self.stage.reach > 0.0, &self.stage.variant);
         if occlusion || variant.depth_first() {
@@ -119,7 +119,8 @@ impl<'a> Frame<'a> {
                 color_pass(encoder, "picture", color, Some(&t.picture), Some(cleared(depth, wgpu::StoreOp::Discard)))
             }
             None => {
-                // all depth is there already and only read, or that of the spheres is and the rest is added
+                // all depth exists and is only read, or the depth of spheres exists and the rest is
+                // added
                 let added = wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Discard };
                 let depth_ops = self.stage.variant.spheres_first().then_some(added);
                 let depth =
@@ -130,7 +131,7 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Resources in the order of a layout's bindings.
+/// Binds resources in the order of the layout.
 pub fn bind(gpu: &Gpu, layout: &wgpu::BindGroupLayout, resources: &[BindingResource]) -> BindGroup {
     let entries: Vec<_> = resources
         .iter()
@@ -140,7 +141,7 @@ pub fn bind(gpu: &Gpu, layout: &wgpu::BindGroupLayout, resources: &[BindingResou
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
 }
 
-/// A pass that draws depth alone.
+/// Begins a pass that draws depth only.
 pub fn depth_pass<'e>(encoder: &'e mut CommandEncoder, label: &str, depth: &TextureView) -> RenderPass<'e> {
     encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         label: Some(label),
@@ -149,7 +150,7 @@ pub fn depth_pass<'e>(encoder: &'e mut CommandEncoder, label: &str, depth: &Text
     })
 }
 
-/// A pass that begins black.
+/// Begins a pass that starts black.
 pub fn color_pass<'e>(
     encoder: &'e mut CommandEncoder,
     label: &str,
@@ -168,7 +169,7 @@ pub fn color_pass<'e>(
     })
 }
 
-/// Depth cleared to the far plane.
+/// Depth, cleared to the far plane.
 fn cleared(view: &TextureView, store: wgpu::StoreOp) -> wgpu::RenderPassDepthStencilAttachment<'_> {
     wgpu::RenderPassDepthStencilAttachment {
         view,

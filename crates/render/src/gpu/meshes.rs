@@ -1,11 +1,12 @@
-//! Meshes on the device, and how numbers get there.
+//! Meshes and buffers on the device.
 
 use super::Gpu;
 use crate::{MeshData, RenderError};
 use std::sync::Arc;
 use wgpu::{Buffer, BufferUsages};
 
-/// Meshes on the device, known by their `Arc`: a mesh is uploaded once, and let go when a list no longer holds it.
+/// Meshes on the device, identified by their `Arc`: a mesh is uploaded once, and freed when a list
+/// no longer contains it.
 #[derive(Default)]
 pub struct MeshCache {
     known: Vec<(Arc<MeshData>, MeshBuffers)>,
@@ -20,7 +21,7 @@ pub struct MeshBuffers {
 }
 
 impl MeshCache {
-    /// Buffers for the meshes of a list, in its order.
+    /// Returns the buffers for the meshes of a list, in its order.
     pub(crate) fn sync(&mut self, gpu: &Gpu, meshes: &[Arc<MeshData>]) -> Result<Vec<MeshBuffers>, RenderError> {
         let mut kept = Vec::with_capacity(meshes.len());
         for mesh in meshes {
@@ -57,24 +58,27 @@ impl MeshBuffers {
     }
 }
 
-/// Numbers that vertices are made of.
+/// Creates a vertex buffer.
 pub fn vertex_buffer(gpu: &Gpu, floats: &[f32], what: &'static str) -> Result<Buffer, RenderError> {
     buffer(gpu, bytemuck::cast_slice(floats), BufferUsages::VERTEX, what)
 }
 
-/// Numbers that are the same for a whole pass.
+/// Creates a uniform buffer, constant for a whole pass.
 pub fn uniform_buffer(gpu: &Gpu, floats: &[f32], what: &'static str) -> Result<Buffer, RenderError> {
     buffer(gpu, bytemuck::cast_slice(floats), BufferUsages::UNIFORM, what)
 }
 
-/// A buffer with these bytes; refused beyond what the device can hold, never empty.
+/// Creates a buffer with these bytes; never empty.
+///
+/// # Errors
+/// More bytes than the device can hold.
 pub fn buffer(gpu: &Gpu, bytes: &[u8], usage: BufferUsages, what: &'static str) -> Result<Buffer, RenderError> {
     let cap = gpu.device.limits().max_buffer_size;
     if bytes.len() as u64 > cap {
         return Err(RenderError::TooMany { what, count: bytes.len(), cap: cap as usize });
     }
     let contents = if bytes.is_empty() { &[0; 16] } else { bytes };
-    // not mapped: on a lost device that would be a panic and no error
+    // not mapped at creation, which panics on a lost device
     let size = contents.len() as u64;
     let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(what),

@@ -1,5 +1,6 @@
-//! Shaders, binding layouts and pipelines. Layouts and shaders are made once per device, pipelines when a picture first needs them: one for each
-//! pass, pattern and quality, so that none computes what it does not show.
+//! Shaders, binding layouts and pipelines. Layouts and shaders are created once per device,
+//! pipelines when a picture first needs them. There is one for each pass, pattern and quality, so
+//! that none computes what it does not show.
 
 use super::data::{CAPSULE_FLOATS, INSTANCE_FLOATS, SPHERE_FLOATS, SPHERE_WORDS, STROKE_FLOATS};
 use crate::{DrawList, Light, Settings, Shadows};
@@ -11,17 +12,17 @@ use wgpu::{
 
 /// The picture: linear in the shader, sRGB in memory, averaged in linear light.
 pub const COLOR: TextureFormat = TextureFormat::Rgba8UnormSrgb;
-/// Reversed depth wants floating point.
+/// Reversed depth needs floating point.
 pub const DEPTH: TextureFormat = TextureFormat::Depth32Float;
 /// Ambient occlusion.
 pub const OCCLUSION: TextureFormat = TextureFormat::R8Unorm;
-/// Number of the nearest sphere.
+/// Index of the nearest sphere.
 pub const ID: TextureFormat = TextureFormat::R32Uint;
 
 /// Textures that are read, not sampled; depth textures too.
 const NUMBERS: wgpu::TextureSampleType = wgpu::TextureSampleType::Float { filterable: false };
 
-/// All but the edges of spheres.
+/// Everything except the edges of spheres.
 const PICTURE_WGSL: &str = concat!(
     include_str!("../shaders/variant.wgsl"),
     include_str!("../shaders/view.wgsl"),
@@ -39,7 +40,7 @@ const EDGE_SAMPLES_WGSL: &str = include_str!("../shaders/edge_samples.wgsl");
 const EDGE_PIXELS_WGSL: &str = include_str!("../shaders/edge_pixels.wgsl");
 const OCCLUSION_WGSL: &str = concat!(include_str!("../shaders/view.wgsl"), include_str!("../shaders/occlusion.wgsl"));
 
-/// What is drawn by a pipeline.
+/// The kind of item that a pipeline draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Pass {
     Sky,
@@ -52,7 +53,7 @@ pub enum Pass {
     LineOnTop,
 }
 
-/// What all pipelines of a picture have in common.
+/// Common properties of all pipelines of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Variant {
     pub samples: u32,
@@ -60,7 +61,7 @@ pub struct Variant {
     occlusion: bool,
     softbox: bool,
     reflections: bool,
-    /// Whether the only light has a direction alone: told only where light is a cheap likeness.
+    /// Whether the only light is directional; set only with the cheap approximation of light.
     one_sun: bool,
 }
 
@@ -78,19 +79,21 @@ impl Variant {
         }
     }
 
-    /// With one sample the nearest depth is drawn first, and only what is nearest is lit.
+    /// With one sample per pixel, the nearest depth is drawn first, and only the nearest surface is
+    /// lit.
     pub fn depth_first(&self) -> bool {
         self.samples == 1
     }
 
-    /// Without occlusion the depth of spheres alone comes first: where there is none, the shader that lights spheres is not run at all. (Software drivers
-    /// run a shader to its end where it discards, but not where a depth test before it fails.)
+    /// Without occlusion, the depth of spheres is drawn first, so that the shader that lights
+    /// spheres does not run for pixels without one. (Software drivers run a shader to its end after
+    /// a discard, but not after a failed depth test.)
     pub fn spheres_first(&self) -> bool {
         self.depth_first() && !self.occlusion
     }
 }
 
-/// A pipeline's name: pass, number of the surface ([`crate::Material`]'s), variant.
+/// The key of a pipeline: pass, surface number ([`crate::Material`]'s), variant.
 pub type Key = (Pass, u32, Variant);
 
 /// Everything that does not change from picture to picture.
@@ -100,11 +103,11 @@ pub struct Pipelines {
     pub occlusion_layout: BindGroupLayout,
     pub texture_layout: BindGroupLayout,
     pub shadow_sampler: wgpu::Sampler,
-    /// Floor, meshes, spheres, spheres that the eye is near to, and capsules: depth alone.
+    /// Depth only: floor, meshes, spheres, spheres near the eye, and capsules.
     pub depth: [RenderPipeline; 5],
-    /// The same, and the number of the nearest sphere.
+    /// Depth and the index of the nearest sphere, in the order of `depth`.
     pub ids: [RenderPipeline; 5],
-    /// Depth of meshes into the picture's pass.
+    /// Depth of meshes in the picture's pass.
     pub mesh_first: RenderPipeline,
     pub occlusion: RenderPipeline,
     pub blur: RenderPipeline,
@@ -116,7 +119,8 @@ pub struct Pipelines {
 impl Pipelines {
     /// `sample_masks`: whether shaders can write which samples of a pixel they cover.
     pub fn new(device: &Device, sample_masks: bool) -> Self {
-        // OpenGL has no interpolation without perspective; where it is asked for w is 1, and it is the same
+        // OpenGL has no interpolation without perspective; in the shaders that use it w is 1, so
+        // the result is the same
         let common = if sample_masks {
             PICTURE_WGSL.to_owned()
         } else {
@@ -223,7 +227,7 @@ impl Pipelines {
         }
     }
 
-    /// Makes the pipelines that are not there yet.
+    /// Creates the missing pipelines.
     pub fn prepare(&mut self, device: &Device, keys: impl Iterator<Item = Key>) {
         for key in keys {
             if !self.known.contains_key(&key) {
@@ -233,7 +237,7 @@ impl Pipelines {
         }
     }
 
-    /// A pipeline that was prepared.
+    /// Returns a pipeline that [`Pipelines::prepare`] has created.
     pub fn of(&self, key: Key) -> Option<&RenderPipeline> {
         self.known.get(&key)
     }
@@ -247,7 +251,7 @@ impl Pipelines {
             _ => (WRITE, WRITE_BEHIND, WRITE),
         };
         let (vs, fs, input, depth, blend) = match pass {
-            // at the far plane: only where nothing is
+            // at the far plane: only pixels without an item
             Pass::Sky => ("vs_sky", "fs_sky", Input::None, TEST, None),
             Pass::Ground => ("vs_ground", "fs_ground", Input::Mesh, behind, None),
             Pass::Mesh => ("vs_mesh", "fs_mesh", Input::Mesh, solid, None),
@@ -288,7 +292,7 @@ impl Pipelines {
     }
 }
 
-/// Depth test and write: nearer is greater.
+/// Depth test and write; nearer is greater.
 #[derive(Clone, Copy)]
 struct DepthUse {
     compare: CompareFunction,
@@ -296,25 +300,25 @@ struct DepthUse {
     bias: i32,
 }
 const WRITE: DepthUse = DepthUse { compare: CompareFunction::GreaterEqual, write: true, bias: 0 };
-/// A hair farther than it is: what lies on the floor in its plane is seen.
+/// Slightly farther, so that objects in the plane of the floor are visible.
 const WRITE_BEHIND: DepthUse = DepthUse { bias: -1, ..WRITE };
 const TEST: DepthUse = DepthUse { write: false, ..WRITE };
 const TEST_BEHIND: DepthUse = DepthUse { write: false, ..WRITE_BEHIND };
-/// At the far plane: where something is.
+/// At the far plane: pixels with an item.
 const WHERE_ANY: DepthUse = DepthUse { compare: CompareFunction::Less, write: false, bias: 0 };
 const ALWAYS: DepthUse = DepthUse { compare: CompareFunction::Always, write: false, bias: 0 };
 
-/// What the vertex stage reads.
+/// Input of the vertex stage.
 #[derive(Clone, Copy, PartialEq)]
 enum Input {
     None,
     Mesh,
     Sphere,
-    /// Middle, radius and number of a sphere.
+    /// Center, radius and index of a sphere.
     SphereBounds,
     Capsule,
     Stroke,
-    /// Two whole numbers.
+    /// Two integers.
     Range,
 }
 
@@ -379,7 +383,7 @@ impl Plan<'_> {
                 } else {
                     wgpu::PrimitiveTopology::TriangleList
                 },
-                // of the boxes around capsules the far sides are drawn
+                // of the boxes around capsules, the far sides are drawn
                 cull_mode: (self.input == Input::Capsule).then_some(wgpu::Face::Front),
                 ..Default::default()
             },
@@ -426,7 +430,7 @@ impl Input {
     }
 }
 
-/// As many vec4 attributes as fill `floats`, from location `first` on.
+/// Returns as many vec4 attributes as fill `floats`, from location `first` on.
 fn attributes(first: u32, floats: u64) -> Vec<wgpu::VertexAttribute> {
     (0..floats / 4)
         .map(|i| wgpu::VertexAttribute {

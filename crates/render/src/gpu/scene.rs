@@ -7,7 +7,8 @@ use crate::list::bounds::{Bounds, sphere_around};
 use crate::material::linear3;
 use crate::{DrawList, Light, MAX_LIGHTS, MAX_SHADOWS};
 
-/// The views of the lights that throw shadows, with the light's number, in the list's order: one or six layers of the shadow maps each, as many as fit.
+/// Returns the views of the lights that cast shadows, with the light's index, in the list's order.
+/// Each takes one or six layers of the shadow maps; lights beyond the last layer have none.
 pub fn shadow_eyes(list: &DrawList, seen: Option<&Bounds>) -> Vec<(usize, Eye)> {
     let Some(seen) = seen else { return Vec::new() };
     let each = list
@@ -25,12 +26,12 @@ pub fn shadow_eyes(list: &DrawList, seen: Option<&Bounds>) -> Vec<(usize, Eye)> 
     out
 }
 
-/// Reach of ambient occlusion in metres; 0 for none.
+/// Reach of ambient occlusion, m; 0 for none.
 pub fn occlusion_reach(list: &DrawList, seen: Option<&Bounds>, part: bool) -> f32 {
     match (list.settings.occlusion_m, list.sky.ambient > 0.0) {
         (_, false) => 0.0,
         (Some(reach), _) => reach,
-        // all there is may be wide: then the usual size of a thing says how far it darkens its neighbours
+        // the whole world may be wide: then the median size of the items gives the reach
         (None, _) if part => seen.map_or(0.0, |b| (sphere_around(b).1 / 12.0).min(4.0 * list.usual_radius())),
         (None, _) => seen.map_or(0.0, |b| sphere_around(b).1 / 12.0),
     }
@@ -47,8 +48,9 @@ pub fn floor(list: &DrawList, seen: Option<&Bounds>) -> [f32; 4] {
     ]
 }
 
-/// Linear radiance that comes back from below, in units of the ambient factor: a floor returns its colour times the light that falls on it
-/// (sky and suns; lamps light it unevenly), without a floor it is the sky's ground colour.
+/// Linear radiance from below, in units of the ambient factor. A floor returns its color times the
+/// light that falls on it (sky and suns; lamps light it unevenly). Without a floor it is the sky's
+/// ground color.
 fn bounce(list: &DrawList) -> [f32; 3] {
     let sky = &list.sky;
     let Some(floor) = &list.ground else { return linear3(sky.ground) };

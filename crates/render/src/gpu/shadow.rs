@@ -1,4 +1,5 @@
-//! Where a light looks from: the tightest view that holds everything that throws shadows, or six views around a lamp amid it.
+//! Views of lights: the tightest view that contains all shadow casters, or six views around a lamp
+//! inside their box.
 
 use super::data::Eye;
 use crate::camera::orthographic;
@@ -6,7 +7,8 @@ use crate::list::bounds::{Bounds, corners_of, union};
 use crate::{DrawList, Light, Shadows};
 use nalgebra::{Matrix4, Point3, Vector3, Vector4};
 
-/// The views of a light onto what throws shadows near the `seen` box: one, or six of a lamp amid it where shadows are soft, or none.
+/// Returns the views of a light onto the shadow casters near the `seen` box: one, or six for a lamp
+/// inside their box with soft shadows, or none.
 pub fn eyes_of(light: &Light, list: &DrawList, seen: &Bounds) -> Vec<Eye> {
     let size = list.settings.shadow_map_size;
     let Some(casters) = union(list.casters_near(seen).map(|c| c.2)).filter(|_| light.casts_shadow()) else {
@@ -22,8 +24,8 @@ pub fn eyes_of(light: &Light, list: &DrawList, seen: &Bounds) -> Vec<Eye> {
     }
 }
 
-/// Parallel view along `direction`. Its x axis follows the longer side of the scene and both axes are scaled by themselves,
-/// so that a long lane wastes no texels.
+/// A parallel view along `direction`. Its x axis follows the longer side of the scene, and the axes
+/// are scaled independently, so that a long lane wastes no texels.
 fn sun(direction: &Vector3<f32>, list: &DrawList, seen: &Bounds, (lo, hi): &Bounds, size: u32) -> Eye {
     let back = -direction.normalize();
     let extent = hi - lo;
@@ -39,12 +41,13 @@ fn sun(direction: &Vector3<f32>, list: &DrawList, seen: &Bounds, (lo, hi): &Boun
             (min, max) = (min.inf(&p.add_scalar(-radius)), max.sup(&p.add_scalar(radius)));
         }
     }
-    // room for the filter at the rim, and never without extent
+    // room for the filter at the edge, and never without extent
     let margin = (max - min) * 0.02 + Vector3::repeat(1e-3 + 1e-4 * extent.norm());
     Eye::new(&view.cast(), &orthographic(min - margin, max + margin).cast(), size, size)
 }
 
-/// Perspective view from a lamp outside the box around what throws shadows, looking at the box's nearest point, with a frustum that just holds its corners.
+/// A perspective view from a lamp outside the box around the shadow casters. It looks at the box's
+/// nearest point, with the tightest frustum around its corners.
 fn lamp(position: &Point3<f32>, casters: &Bounds, size: u32) -> Option<Eye> {
     let (lo, hi) = casters;
     let nearest = Point3::from(position.coords.sup(&lo.coords).inf(&hi.coords));
@@ -61,7 +64,7 @@ fn lamp(position: &Point3<f32>, casters: &Bounds, size: u32) -> Option<Eye> {
         near = near.min(s);
         far = far.max(s);
         for k in 0..2 {
-            // a flat frustum beyond 80 degrees to a side would leave no texels for the rest
+            // beyond 80 degrees to a side, a flat frustum would leave no texels for the rest
             let t = (p[k] / s.max(1e-6)).clamp(-5.7, 5.7);
             (min[k], max[k]) = (min[k].min(t), max[k].max(t));
         }
@@ -94,10 +97,12 @@ fn lamp(position: &Point3<f32>, casters: &Bounds, size: u32) -> Option<Eye> {
     Some(Eye::new(&view.cast(), &projection.cast(), size, size))
 }
 
-/// Wider than 90 degrees, so that filters near the edge of one side of the cube stay within its map.
+/// Wider than 90 degrees, so that filters near the edge of one side of the cube stay within its
+/// map.
 const CUBE_TANGENT: f32 = 1.25;
 
-/// Perspective views to the six sides of a cube around a lamp, +x, -x, +y, -y, +z, -z; what lies within the lamp is not seen.
+/// Perspective views to the six sides of a cube around a lamp, +x, -x, +y, -y, +z, -z; objects
+/// inside the lamp are not seen.
 fn lamp_amid(position: &Point3<f32>, radius: f32, casters: &Bounds, size: u32) -> Vec<Eye> {
     let far = corners_of(casters).iter().map(|p| (p - position).norm()).fold(0.0, f32::max).max(1e-3) * 1.02;
     let near = radius.max(1e-3 * far).min(0.5 * far);

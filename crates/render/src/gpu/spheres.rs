@@ -1,4 +1,4 @@
-//! The spheres of a stage: what they look like, and which of them a point of view asks for.
+//! The spheres of a stage: their appearance, and the selection for a viewpoint.
 
 use super::Gpu;
 use super::cull::{SphereBounds, visible};
@@ -14,28 +14,29 @@ pub struct Spheres {
     spheres: Vec<SphereBounds>,
     /// Four texels per sphere, 256 spheres per row.
     pub appearances: TextureView,
-    /// First and last number of the spheres of each group.
+    /// First and last index of the spheres of each group.
     pub ranges: Buffer,
-    /// All balls, where points of view do not choose among them.
+    /// All spheres, if viewpoints do not select among them.
     whole: Option<Buffer>,
     samples: u32,
 }
 
-/// The spheres that a point of view draws.
+/// The spheres that a viewpoint draws.
 pub struct Choice {
-    /// Middle, radius and number of each.
+    /// Center, radius and index of each.
     pub spheres: Buffer,
-    /// Places in it, a range for each group.
+    /// Ranges in `spheres`, one for each group.
     pub ranges: Vec<Range<u32>>,
-    /// Whether one is so near to the eye that its outline is no circle on a plane before it.
+    /// Whether a sphere is so near to the eye that its outline is no circle on a plane in front of
+    /// it.
     pub near: bool,
 }
 
-/// Which of the spheres are asked for.
+/// A subset of the spheres.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Which {
     All,
-    /// Those that throw shadows.
+    /// Shadow casters.
     Casters,
 }
 
@@ -60,7 +61,8 @@ impl Spheres {
         })
     }
 
-    /// What a point of view draws: all, or on drivers that draw on the processor those that it may see.
+    /// Selects the spheres for a viewpoint: all, or with a software driver those that may be
+    /// visible.
     pub(super) fn choose(&self, gpu: &Gpu, eye: &Eye, which: Which) -> Result<Choice, RenderError> {
         let of = |same: &Same| if which == Which::All { same.all.clone() } else { same.casters.clone() };
         if let Some(whole) = &self.whole {
@@ -89,7 +91,7 @@ fn sphere_buffer(
         let (center, radius) = spheres[number as usize];
         words.extend([center.x.to_bits(), center.y.to_bits(), center.z.to_bits(), radius.to_bits(), number]);
     }
-    super::meshes::buffer(gpu, bytemuck::cast_slice(&words), BufferUsages::VERTEX, "balls")
+    super::meshes::buffer(gpu, bytemuck::cast_slice(&words), BufferUsages::VERTEX, "spheres")
 }
 
 fn appearances(gpu: &Gpu, list: &DrawList, order: &[usize]) -> Result<TextureView, RenderError> {

@@ -1,4 +1,4 @@
-//! A draw list on the device: what is the same for all points of view from which it is drawn.
+//! A draw list on the device: the data that all viewpoints share.
 
 use super::data::{self, Eye};
 use super::meshes::{MeshBuffers, MeshCache, uniform_buffer, vertex_buffer};
@@ -12,14 +12,14 @@ use crate::{DebugSphere, DrawList, Instance, Material, MeshData, MeshId, RenderE
 use std::ops::Range;
 use wgpu::{BindGroup, Buffer, CommandEncoder, RenderPass, RenderPipeline};
 
-/// A list that was sent to the device, to be drawn from as many points of view as there are eyes and screens ([`crate::Renderer::stage`]).
-/// Shadows are fitted to all that is there, wherever one looks from.
+/// A list on the device, to be drawn from any number of viewpoints ([`crate::Renderer::stage`]).
+/// Shadows are fitted to the whole world, for every viewpoint.
 pub struct Stage {
     pub(super) serial: u64,
     pub(super) variant: Variant,
     pub(super) shadow_map_size: u32,
     pub(super) reach: f32,
-    /// Each with the spheres that throw its shadows.
+    /// Each with the spheres that cast its shadows.
     pub(super) shadow_views: Vec<(BindGroup, Choice)>,
     pub(super) scene: Buffer,
     shells: Vec<DebugSphere>,
@@ -46,7 +46,7 @@ impl Textures {
     }
 }
 
-/// Items with one surface, side by side in a buffer; those that throw shadows first.
+/// Items with one surface, contiguous in a buffer, shadow casters first.
 pub(super) struct Same {
     surface: u32,
     texture: Option<usize>,
@@ -67,7 +67,8 @@ pub struct Batch {
 }
 
 impl Stage {
-    /// `seen`: what shadows, floor and occlusion are fitted to; `part`: whether that is all there is.
+    /// `seen`: the bounds that shadows, floor and occlusion are fitted to; `part`: whether these
+    /// are of the whole world.
     #[allow(clippy::too_many_arguments)]
     pub(super) fn new(
         gpu: &Gpu,
@@ -117,7 +118,7 @@ impl Stage {
         Ok(stage)
     }
 
-    /// All pipelines that a picture of it may need.
+    /// The keys of all pipelines that a picture of it may need.
     fn keys(&self) -> impl Iterator<Item = Key> {
         let fixed = [(Pass::Sky, 0), (Pass::Shell, 0), (Pass::Line, 0), (Pass::LineOnTop, 0)];
         let ground = self.ground.iter().map(|(_, _, (surface, _))| (Pass::Ground, *surface));
@@ -133,7 +134,7 @@ impl Stage {
             .map(|(pass, surface)| (pass, surface, self.variant))
     }
 
-    /// One depth map per shadow.
+    /// Draws one depth map per shadow.
     pub(super) fn draw_shadows(&self, encoder: &mut CommandEncoder, pipelines: &Pipelines, maps: &ShadowMaps) {
         for ((view, choice), layer) in self.shadow_views.iter().zip(&maps.layers) {
             let mut pass = super::frame::depth_pass(encoder, "shadow", layer);
@@ -142,7 +143,8 @@ impl Stage {
         }
     }
 
-    /// Depth of everything, the floor included, by pipelines for floor, meshes, spheres, near spheres and capsules.
+    /// Draws the depth of everything including the floor; `by` holds pipelines for floor, meshes,
+    /// spheres, near spheres and capsules.
     pub(super) fn draw_view_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 5], choice: &Choice) {
         if let Some((mesh, instance, _)) = &self.ground {
             pass.set_pipeline(&by[0]);
@@ -151,7 +153,7 @@ impl Stage {
         self.draw_depth(pass, by, choice, |same| same.all.clone());
     }
 
-    /// Depth of spheres alone, with or without the number of the nearest.
+    /// Draws the depth of spheres alone, with or without the index of the nearest.
     pub(super) fn draw_sphere_depth(&self, pass: &mut RenderPass, by: &[RenderPipeline; 5], choice: &Choice) {
         pass.set_vertex_buffer(0, choice.spheres.slice(..));
         for pipeline in &by[2..if choice.near { 4 } else { 3 }] {
@@ -181,7 +183,7 @@ impl Stage {
         self.draw_sphere_depth(pass, by, choice);
     }
 
-    /// Everything in colour, with the view's own shells.
+    /// Draws everything in color, with the view's own shells.
     pub(super) fn draw_picture(&self, pass: &mut RenderPass, pipelines: &Pipelines, choice: &Choice, shells: &Batch) {
         let select = |pass: &mut RenderPass, which, surface| {
             pipelines.of((which, surface, self.variant)).map(|p| pass.set_pipeline(p)).is_some()
@@ -225,7 +227,7 @@ impl Stage {
         }
     }
 
-    /// Each with its surface: by squares, or all of a surface at once where the nearest is known.
+    /// Draws spheres by surface: by squares, or all of a surface at once if the nearest is known.
     fn draw_spheres(
         &self,
         pass: &mut RenderPass,
@@ -247,7 +249,7 @@ impl Stage {
         }
     }
 
-    /// Shells from back to front, so that they blend the right way.
+    /// Sorts shells from back to front, so that they blend correctly.
     pub(super) fn shells_from(&self, gpu: &Gpu, view: &nalgebra::Matrix4<f32>) -> Result<Batch, RenderError> {
         let mut shells: Vec<(f32, &DebugSphere)> =
             self.shells.iter().map(|s| (view.transform_point(&s.center).z, s)).collect();
@@ -264,7 +266,7 @@ impl Batch {
     }
 }
 
-/// A point of view, bound.
+/// Binds a viewpoint.
 pub fn bind_view(gpu: &Gpu, pipelines: &Pipelines, eye: &Eye) -> Result<BindGroup, RenderError> {
     let uniform = uniform_buffer(gpu, &eye.floats(), "view")?;
     Ok(super::frame::bind(gpu, &pipelines.view_layout, &[uniform.as_entire_binding()]))
@@ -298,7 +300,7 @@ fn group_instances(gpu: &Gpu, list: &DrawList, meshes: &[MeshBuffers]) -> Result
     Ok((groups, vertex_buffer(gpu, &floats, "instances")?))
 }
 
-/// Spheres or capsules by surface, and in which order.
+/// Groups spheres or capsules by surface; returns the groups and the order.
 pub(super) fn group_items<T>(items: &[T], kind: impl Fn(&T) -> (&Material, bool)) -> (Vec<Same>, Vec<usize>) {
     let kinds: Vec<_> =
         items.iter().map(kind).map(|(m, casts)| ((m.surface(), m.texture.map(|t| t.id)), casts)).collect();
@@ -310,7 +312,7 @@ pub(super) fn group_items<T>(items: &[T], kind: impl Fn(&T) -> (&Material, bool)
     (groups, order)
 }
 
-/// Runs of one kind in an order that has those that cast first in each; with the first item of each.
+/// Forms runs of one kind, with the first item of each; shadow casters come first in each run.
 fn runs<K: PartialEq>(
     order: &[usize],
     kind: impl Fn(usize) -> K,
@@ -325,7 +327,7 @@ fn runs<K: PartialEq>(
     })
 }
 
-/// The ground's mesh, its one instance, and its surface and texture.
+/// The ground's mesh, its single instance, and its surface and texture.
 type GroundBatch = (MeshBuffers, Buffer, (u32, Option<usize>));
 
 fn ground(gpu: &Gpu, list: &DrawList, seen: Option<&Bounds>) -> Result<Option<GroundBatch>, RenderError> {

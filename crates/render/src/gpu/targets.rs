@@ -1,11 +1,11 @@
-//! The textures that are drawn into, and the way back to memory.
+//! The textures that are drawn into, and the transfer to memory.
 
 use super::Gpu;
 use super::pipelines::{COLOR, DEPTH, ID, OCCLUSION};
 use crate::{Image, RenderError};
 use wgpu::{Extent3d, Texture, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor};
 
-/// How long a picture may take before the device counts as hung.
+/// Longest time for a picture; after it the device counts as hung.
 const PATIENCE: std::time::Duration = std::time::Duration::from_secs(600);
 
 const DRAW: TextureUsages = TextureUsages::RENDER_ATTACHMENT;
@@ -15,11 +15,11 @@ const LOOK: TextureUsages = DRAW.union(TextureUsages::TEXTURE_BINDING);
 pub struct Targets {
     pub width: u32,
     pub height: u32,
-    /// Colour and depth of several samples per pixel; `None` where there is one.
+    /// Color and depth with several samples per pixel; `None` with one.
     pub samples: Option<(TextureView, TextureView)>,
     pub picture: TextureView,
     pub view_depth: TextureView,
-    /// Number of the nearest sphere; of one pixel where there are several samples.
+    /// Index of the nearest sphere; a single pixel if there are several samples.
     pub ids: TextureView,
     pub occlusion_raw: TextureView,
     pub occlusion: TextureView,
@@ -50,16 +50,17 @@ impl Targets {
         (self.width, self.height, self.samples.is_some()) == (width, height, samples > 1)
     }
 
-    /// Pixels of a picture.
+    /// Number of pixels of a picture.
     pub fn pixels(&self) -> u64 {
         u64::from(self.width) * u64::from(self.height)
     }
 }
 
-/// Most shadow maps: one of a light, six of a lamp amid what throws shadows.
+/// Largest number of shadow maps: one per light, six for a lamp inside the box of the shadow
+/// casters.
 pub const MAX_LAYERS: usize = 12;
 
-/// The maps of the lights that throw shadows.
+/// The maps of the lights that cast shadows.
 pub struct ShadowMaps {
     pub size: u32,
     pub layers: Vec<TextureView>,
@@ -71,7 +72,7 @@ pub struct ShadowMaps {
 impl ShadowMaps {
     pub fn new(gpu: &Gpu, size: u32, count: usize) -> Self {
         let count = count.clamp(1, MAX_LAYERS) as u32;
-        // OpenGL takes one layer for no array, and each six for a cube
+        // OpenGL treats one layer as no array, and a multiple of six as a cube
         let spare = u32::from(gpu.opengl && (count == 1 || count.is_multiple_of(6)));
         let maps = texture(&gpu.device, "shadow maps", [size, size, count + spare], 1, DEPTH, LOOK);
         let layer = |i| TextureViewDescriptor {
@@ -96,12 +97,12 @@ impl ShadowMaps {
     }
 }
 
-/// A texture for finished pictures: drawn into, copied from and to, shown by a window.
+/// Creates a texture for finished pictures: drawn into, copied from and to, shown by a window.
 pub fn finished_texture(device: &wgpu::Device, label: &str, width: u32, height: u32) -> Texture {
     texture(device, label, [width, height, 1], 1, COLOR, LOOK | TextureUsages::COPY_SRC | TextureUsages::COPY_DST)
 }
 
-/// A finished picture to memory; waits for the device.
+/// Copies a finished picture to memory; waits for the device.
 pub fn read(gpu: &Gpu, from: &Texture) -> Result<Image, RenderError> {
     let (width, height) = (from.width(), from.height());
     let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
@@ -136,19 +137,19 @@ pub fn read(gpu: &Gpu, from: &Texture) -> Result<Image, RenderError> {
     Ok(Image { width, height, rgba })
 }
 
-/// Until all that was submitted is done.
+/// Waits until all submitted work is done.
 pub fn wait(gpu: &Gpu) -> Result<(), RenderError> {
     wait_for(gpu, None)
 }
 
-/// Until this submission is done, or all are.
+/// Waits until this submission is done, or all are.
 pub fn wait_for(gpu: &Gpu, submission_index: Option<wgpu::SubmissionIndex>) -> Result<(), RenderError> {
     let done = gpu.device.poll(wgpu::PollType::Wait { submission_index, timeout: Some(PATIENCE) });
     gpu.complaint()?;
     done.map(drop).map_err(|e| gpu.failed(e.to_string()))
 }
 
-/// Bytes per row in the buffer: wgpu wants a multiple of 256.
+/// Bytes per row in the buffer: wgpu needs a multiple of 256.
 fn pitch(width: u32) -> u32 {
     (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
 }

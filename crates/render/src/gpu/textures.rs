@@ -1,4 +1,4 @@
-//! Pictures on surfaces: sent once, with smaller and smaller copies for what is far away.
+//! Textures on the device, uploaded once with mipmaps for distant surfaces.
 
 use super::Gpu;
 use super::frame::bind;
@@ -9,10 +9,11 @@ use std::sync::Arc;
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{BindGroup, BindGroupLayout, BindingResource, TextureFormat};
 
-/// Textures on the device, known by their `Arc`, and let go when a list no longer holds them.
+/// Textures on the device, identified by their `Arc`, and freed when a list no longer contains
+/// them.
 pub struct TextureCache {
     sampler: wgpu::Sampler,
-    /// What is bound where there is no texture.
+    /// Binding of surfaces without a texture.
     pub white: BindGroup,
     known: Vec<(Arc<Image>, BindGroup)>,
 }
@@ -32,7 +33,7 @@ impl TextureCache {
         TextureCache { sampler, white, known: Vec::new() }
     }
 
-    /// Bindings for the textures of a list, in its order.
+    /// Returns the bindings for the textures of a list, in its order.
     pub(super) fn sync(
         &mut self,
         gpu: &Gpu,
@@ -83,7 +84,7 @@ fn send(gpu: &Gpu, layout: &BindGroupLayout, sampler: &wgpu::Sampler, image: &Im
     bind(gpu, layout, &[BindingResource::TextureView(&view), BindingResource::Sampler(sampler)])
 }
 
-/// Half as wide and high, averaged in linear light; none of a single pixel.
+/// Halves width and height by averaging in linear light; returns `None` for a single pixel.
 fn half(image: &Image) -> Option<Image> {
     let (w, h) = (image.width as usize, image.height as usize);
     if w == 1 && h == 1 {

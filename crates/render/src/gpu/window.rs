@@ -1,6 +1,8 @@
-//! A window's surface as a target: what the renderer drew last is shown, from where it is on the device. Nothing is read back.
+//! A window's surface as a target: shows the renderer's last picture directly from the device.
+//! Nothing is read back.
 //!
-//! Two steps, so that several machines can show their pictures at one moment: [`Screen::renderer`] draws, [`Screen::show`] brings it to the eye.
+//! Drawing and showing are two steps, so that several machines can show their pictures at the same
+//! moment: [`Screen::renderer`] draws, [`Screen::show`] presents.
 
 use super::meshes::uniform_buffer;
 use super::pipelines::COLOR;
@@ -12,15 +14,15 @@ use wgpu::{CommandEncoder, CurrentSurfaceTexture, TextureFormat, TextureUsages, 
 use winit::event_loop::ActiveEventLoop;
 use winit::window::Window;
 
-/// How often in a row a surface may be lost before the window is given up.
+/// Number of consecutive losses of a surface after which the window fails.
 const MAX_LOSSES: u32 = 8;
 
-/// Whether a picture came to the eye.
+/// Whether a picture was presented.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shown {
-    /// It did.
+    /// It was.
     Yes,
-    /// The window is hidden, empty or busy: try again later.
+    /// The window is hidden, empty or busy; it can be tried again later.
     NotNow,
 }
 
@@ -39,10 +41,11 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// A surface on a window that is open, on the first adapter that can show there: of Vulkan, else of OpenGL.
+    /// Opens a surface on an open window, on the first adapter that can present there: of Vulkan,
+    /// otherwise of OpenGL.
     ///
     /// # Errors
-    /// [`RenderError::NoAdapter`] where none can, [`RenderError::Device`] where one fails.
+    /// [`RenderError::NoAdapter`] if none can, [`RenderError::Device`] if one fails.
     pub(crate) fn new(event_loop: &ActiveEventLoop, window: Arc<Window>) -> Result<Screen, RenderError> {
         let mut reasons = Vec::new();
         for (name, backends) in [("Vulkan", wgpu::Backends::VULKAN), ("OpenGL", wgpu::Backends::GL)] {
@@ -112,28 +115,30 @@ impl Screen {
         self.renderer.adapter()
     }
 
-    /// Whether the processor does the adapter's work: [`Quality::fast`](crate::Quality::fast) is made for that.
+    /// Whether the adapter is a software driver; [`Quality::fast`](crate::Quality::fast) is made
+    /// for these.
     pub fn is_software(&self) -> bool {
         self.software
     }
 
-    /// Ends the device, as a driver that crashes does: whatever is asked of it next fails.
+    /// Destroys the device, as if a driver crashed: the next call to it fails.
     #[doc(hidden)]
     pub fn lose_device(&self) {
         self.renderer.gpu.device.destroy();
     }
 
-    /// What draws: [`Renderer::draw`] and its like leave a picture on the device, which [`show`](Self::show) shows.
+    /// The renderer; [`Renderer::draw`] and similar calls leave a picture on the device, which
+    /// [`show`](Self::show) presents.
     pub fn renderer(&mut self) -> &mut Renderer {
         &mut self.renderer
     }
 
-    /// Width and height, pixels; of an empty window those that it had before.
+    /// Width and height, pixels; for an empty window the last ones.
     pub fn size_px(&self) -> [u32; 2] {
         [self.config.width, self.config.height]
     }
 
-    /// The window has a new size.
+    /// Adapts to a new size of the window.
     ///
     /// # Errors
     /// [`RenderError::BadSize`] for a window larger than can be drawn.
@@ -147,21 +152,23 @@ impl Screen {
         self.renderer.gpu.complaint()
     }
 
-    /// Writing in the upper left corner of what is shown, blended over the picture by its alpha.
+    /// Sets an image in the upper left corner, blended over the picture by its alpha.
     pub fn set_caption(&mut self, caption: Option<Image>) {
         replace(&self.renderer.gpu, &mut self.caption, caption);
     }
 
-    /// A picture in the upper right corner of what is shown, blended over all else by its alpha.
+    /// Sets an image in the upper right corner, blended over the picture and the caption by its
+    /// alpha.
     pub fn set_panel(&mut self, panel: Option<Image>) {
         replace(&self.renderer.gpu, &mut self.panel, panel);
     }
 
-    /// Shows the picture that was drawn last, its upper left corner in that of the window, with caption and panel. What is larger than the window is cut off. Waits
-    /// until the device is at most one picture behind. Where the surface is lost it is made anew.
+    /// Presents the last picture with caption and panel, its upper left corner in that of the
+    /// window. Pixels outside the window are cut off. Waits until the device is at most one picture
+    /// behind. A lost surface is created again.
     ///
     /// # Errors
-    /// [`RenderError::Device`] where the device fails, or the surface is lost again and again.
+    /// [`RenderError::Device`] if the device fails, or the surface is lost repeatedly.
     pub fn show(&mut self) -> Result<Shown, RenderError> {
         let frame = match self.surface.get_current_texture() {
             CurrentSurfaceTexture::Success(frame) | CurrentSurfaceTexture::Suboptimal(frame) => frame,
@@ -193,11 +200,11 @@ impl Screen {
         Ok(Shown::Yes)
     }
 
-    /// A surface that no longer fits is configured again; one that is lost is made anew.
+    /// Configures a surface that no longer fits, or creates a lost one again.
     fn mend(&mut self, lost: bool) -> Result<Shown, RenderError> {
         self.losses += 1;
         if self.losses > MAX_LOSSES {
-            return Err(self.renderer.gpu.failed("the window's surface is lost again and again".into()));
+            return Err(self.renderer.gpu.failed("the window's surface is lost repeatedly".into()));
         }
         if lost {
             self.surface = self
@@ -278,7 +285,7 @@ impl Copies {
         Copies { show: make(None), blend: make(Some(wgpu::BlendState::ALPHA_BLENDING)), layout }
     }
 
-    /// A texture to the upper edge of a target, so many pixels from its left one.
+    /// Copies a texture to the upper edge of a target, `left` pixels from its left edge.
     fn copy(
         &self,
         gpu: &Gpu,
@@ -324,7 +331,7 @@ fn pass<'e>(
     })
 }
 
-/// Uploads a picture where it is not the one that is there.
+/// Uploads a picture if it differs from the present one.
 fn replace(gpu: &Gpu, there: &mut Option<(Image, wgpu::Texture)>, image: Option<Image>) {
     if there.as_ref().map(|(image, _)| image) != image.as_ref() {
         *there = image.map(|image| {

@@ -1,4 +1,5 @@
-//! Where the things of a list are: for cameras, for fitting shadow maps, for the reach of effects.
+//! Bounds of the items of a list: for cameras, for the fit of shadow maps, for the reach of
+//! effects.
 
 use super::{DrawList, Instance};
 use crate::Camera;
@@ -7,27 +8,31 @@ use nalgebra::{Matrix4, Point3, Vector3};
 /// Corners `(min, max)` of a box along the world axes.
 pub(crate) type Bounds = (Point3<f32>, Point3<f32>);
 
-/// Things farther from the middle of what is seen than this many times its radius are not fitted into shadow maps: a body that fell off
-/// the floor long ago must not blur the shadows of the rest.
+/// Items farther from the middle of the visible box than this multiple of its radius are not fitted
+/// into shadow maps. A body that fell off the floor must not blur the shadows of the rest.
 const FAR_AWAY: f32 = 4.0;
 
-/// Things farther out than this many times the median do not count for a framing camera.
+/// Items farther out than this multiple of the median do not count for a framing camera.
 const FLOWN_OFF: f32 = 20.0;
 
 impl DrawList {
-    /// A ball `(center, radius)` around all instances and spheres (those that throw shadows, if `casters` is set); `None` when there are none.
-    /// The ground and debug drawings do not count.
+    /// Returns a sphere `(center, radius)` around all instances and spheres, or only around shadow
+    /// casters if `casters` is set; `None` if there are none. The ground and debug drawings do not
+    /// count.
     pub fn bounding_sphere(&self, casters: bool) -> Option<(Point3<f32>, f32)> {
         self.bounding_box(casters).map(|b| sphere_around(&b))
     }
 
-    /// The box `(min, max)` around all instances and spheres, as for [`DrawList::bounding_sphere`].
+    /// Returns the box `(min, max)` around all instances and spheres, as for
+    /// [`DrawList::bounding_sphere`].
     pub fn bounding_box(&self, casters: bool) -> Option<(Point3<f32>, Point3<f32>)> {
         union(self.items(casters).map(|item| item.1))
     }
 
-    /// A camera that looks along `direction` and shows what throws shadows: a wide floor does not count, nor what flew off so far that the
-    /// rest would be a dot. Where nothing throws shadows it looks at the middle of what there is, from no farther than shows 5 m around it.
+    /// Returns a camera along `direction` that shows all shadow casters. A wide floor does not
+    /// count, and a body that is so far off that the rest would be a dot does not count either.
+    /// Without shadow casters it shows the middle of the list, from at most the distance that shows
+    /// 5 m around it.
     pub fn framing_camera(&self, direction: Vector3<f32>) -> Camera {
         let floor = || self.bounding_sphere(false).map(|(center, radius)| (center, radius.min(5.0)));
         let (center, radius) =
@@ -35,7 +40,8 @@ impl DrawList {
         Camera::framing(center, radius, direction, 0.9)
     }
 
-    /// The box around what throws shadows, without what lies many times farther from their median than half of them do.
+    /// The box around the shadow casters, without those that lie many times farther from their
+    /// median than half of them do.
     fn main_box(&self) -> Option<Bounds> {
         let boxes: Vec<Bounds> = self.items(true).map(|item| item.1).collect();
         let spheres: Vec<_> = boxes.iter().map(sphere_around).collect();
@@ -45,7 +51,8 @@ impl DrawList {
         union(boxes.into_iter().zip(reach).filter(|(_, r)| *r <= limit).map(|(b, _)| b))
     }
 
-    /// The box around what throws shadows and lies at least in part in a view (by bounding balls); around everything where there is no such thing.
+    /// The box around the shadow casters that are at least partly in a view, by their bounding
+    /// spheres; around everything if there are none.
     pub(crate) fn visible_box(&self, clip_from_world: &Matrix4<f32>) -> Option<Bounds> {
         let planes = planes(clip_from_world);
         let seen = |b: &Bounds| {
@@ -55,18 +62,20 @@ impl DrawList {
         union(self.items(true).map(|item| item.1).filter(seen)).or_else(|| self.bounding_box(false))
     }
 
-    /// The box around what counts of the whole world, wherever one looks: what throws shadows, without what flew off; everything where there is no such thing.
+    /// The box around the shadow casters of the whole world, without distant ones; around
+    /// everything if there are none.
     pub(crate) fn whole_box(&self) -> Option<Bounds> {
         self.main_box().or_else(|| self.bounding_box(false))
     }
 
-    /// The median radius of what throws shadows, m; 0 where nothing does.
+    /// The median radius of the shadow casters, m; 0 if there are none.
     pub(crate) fn usual_radius(&self) -> f32 {
         median(self.items(true).map(|item| sphere_around(&item.1).1))
     }
 
-    /// What throws shadows near the `seen` box: each one's corners in the world (eight; a sphere's centre alone, both ends of a capsule's segment), as points to be
-    /// transformed, with a radius around them.
+    /// The shadow casters near the `seen` box. For each: points in the world with a radius around
+    /// them that contain it, and its box. The points are eight corners, a sphere's center, or both
+    /// ends of a capsule's segment.
     pub(crate) fn casters_near(&self, seen: &Bounds) -> impl Iterator<Item = (Corners, f32, Bounds)> {
         let (middle, radius) = sphere_around(seen);
         self.items(true).filter_map(move |(points, bounds, around)| {
@@ -75,7 +84,7 @@ impl DrawList {
         })
     }
 
-    /// Points and a radius around them that hold each item, and its box.
+    /// For each item, points and a radius around them that contain it, and its box.
     fn items(&self, casters: bool) -> impl Iterator<Item = (Corners, Bounds, f32)> {
         let meshes: Vec<_> = self.meshes.iter().map(|m| m.bounds()).collect();
         let instances = self.instances.iter().filter(move |i| i.casts_shadow || !casters).filter_map(move |i| {
@@ -114,7 +123,7 @@ fn world_corners(instance: &Instance, local: Option<([f32; 3], [f32; 3])>) -> Op
     )
 }
 
-/// The upper median; 0 of nothing.
+/// The upper median; 0 without numbers.
 fn median(numbers: impl Iterator<Item = f32>) -> f32 {
     let mut all: Vec<f32> = numbers.collect();
     let middle = all.len() / 2;
@@ -126,7 +135,7 @@ pub(crate) fn union(boxes: impl Iterator<Item = Bounds>) -> Option<Bounds> {
     boxes.reduce(|(lo, hi), (a, b)| (lo.inf(&a), hi.sup(&b)))
 }
 
-/// The ball around a box.
+/// The sphere around a box.
 pub(crate) fn sphere_around((lo, hi): &Bounds) -> (Point3<f32>, f32) {
     (nalgebra::center(lo, hi), (hi - lo).norm() / 2.0)
 }
@@ -139,7 +148,8 @@ pub(crate) fn corners_of((lo, hi): &Bounds) -> [Point3<f32>; 8] {
     })
 }
 
-/// The six planes of a view, as rows whose product with a homogeneous point is its distance inside (Gribb and Hartmann, 2001).
+/// The six planes of a view, as rows whose product with a homogeneous point is its distance inside
+/// (Gribb and Hartmann, 2001).
 fn planes(clip_from_world: &Matrix4<f32>) -> [nalgebra::Vector4<f32>; 6] {
     let row = |i: usize| clip_from_world.row(i).transpose();
     let (x, y, z, w) = (row(0), row(1), row(2), row(3));

@@ -1,40 +1,44 @@
-//! Debug drawing: contact points, normals, velocities, forces, sphere trees [thesis §IV.B.3, the detector's `Render`].
+//! Debug drawing: contact points, normals, velocities, forces, sphere trees (thesis §IV.B.3, the
+//! detector's `Render`).
 
 use super::DrawList;
 use nalgebra::{Point3, Vector3};
 
-/// Colour and layering of a debug drawing.
+/// Color and layering of a debug drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DebugStyle {
     /// sRGB.
     pub color: [f32; 3],
     /// 1 is solid, 0 invisible.
     pub opacity: f32,
-    /// Width of lines, diameter of points: pixels.
+    /// Width of lines, diameter of points, pixels.
     pub width_px: f32,
-    /// Drawn over everything instead of being hidden by what is in front.
+    /// Whether it is drawn over everything, instead of being hidden by objects in front.
     pub on_top: bool,
 }
 
 impl DebugStyle {
-    /// Solid, 2 pixels wide, hidden by what is in front.
+    /// Solid, 2 pixels wide, hidden by objects in front.
     pub fn new(color: [f32; 3]) -> Self {
         DebugStyle { color, opacity: 1.0, width_px: 2.0, on_top: false }
     }
 
-    /// The same over everything.
+    /// Sets it to be drawn over everything.
+    #[must_use]
     pub fn on_top(mut self) -> Self {
         self.on_top = true;
         self
     }
 
-    /// The same with another width in pixels.
+    /// Sets the width, pixels.
+    #[must_use]
     pub fn width(mut self, px: f32) -> Self {
         self.width_px = px;
         self
     }
 
-    /// The same with another opacity.
+    /// Sets the opacity.
+    #[must_use]
     pub fn opacity(mut self, opacity: f32) -> Self {
         self.opacity = opacity;
         self
@@ -46,33 +50,33 @@ impl DebugStyle {
 pub struct DebugLine {
     /// One end.
     pub start: Point3<f32>,
-    /// The other; the tip of an arrow.
+    /// The other end; the tip of an arrow.
     pub end: Point3<f32>,
-    /// Length of the arrow's head in metres; 0 for a plain line.
+    /// Length of the arrow's head, m; 0 for a plain line.
     pub head_m: f32,
-    /// Colour and layering.
+    /// Color and layering.
     pub style: DebugStyle,
 }
 
 /// A round dot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DebugPoint {
-    /// Where.
+    /// Position in the world.
     pub position: Point3<f32>,
-    /// Colour and layering; the width is the diameter.
+    /// Color and layering; the width is the diameter.
     pub style: DebugStyle,
 }
 
 /// A sphere of a sphere tree.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DebugSphere {
-    /// Centre.
+    /// Center.
     pub center: Point3<f32>,
-    /// Radius in metres.
+    /// Radius, m.
     pub radius: f32,
-    /// Wire or glass.
+    /// Rings or shell.
     pub kind: SphereStyle,
-    /// Colour and layering (`on_top` and the width hold for rings only).
+    /// Color and layering; `on_top` and the width apply to rings only.
     pub style: DebugStyle,
 }
 
@@ -94,7 +98,7 @@ impl DrawList {
         self.lines.push(DebugLine { start, end, head_m: 0.0, style });
     }
 
-    /// Adds an arrow from `start` along `vector` (metres); its head takes a quarter of it.
+    /// Adds an arrow from `start` along `vector`, m; its head takes a quarter of it.
     pub fn arrow(&mut self, start: Point3<f32>, vector: Vector3<f32>, style: DebugStyle) {
         self.lines.push(DebugLine { start, end: start + vector, head_m: 0.25 * vector.norm(), style });
     }
@@ -104,18 +108,18 @@ impl DrawList {
         self.points.push(DebugPoint { position, style });
     }
 
-    /// Adds a sphere of three rings.
+    /// Adds a sphere as three rings.
     pub fn wire_sphere(&mut self, center: Point3<f32>, radius: f32, style: DebugStyle) {
         self.debug_spheres.push(DebugSphere { center, radius, kind: SphereStyle::Rings, style });
     }
 
-    /// Adds a translucent sphere.
+    /// Adds a sphere as a translucent shell.
     pub fn shell(&mut self, center: Point3<f32>, radius: f32, style: DebugStyle) {
         self.debug_spheres.push(DebugSphere { center, radius, kind: SphereStyle::Shell, style });
     }
 }
 
-/// A straight stroke whose width may change along it: all debug lines come down to these.
+/// A straight stroke whose width may change along it; all debug lines are made of strokes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stroke {
     pub start: Point3<f32>,
@@ -126,7 +130,7 @@ pub(crate) struct Stroke {
     pub style: DebugStyle,
 }
 
-/// All strokes of a list, in its order.
+/// Returns all strokes of a list, in its order.
 pub(crate) fn strokes(list: &DrawList) -> Vec<Stroke> {
     let mut out = Vec::new();
     list.debug_spheres.iter().filter(|s| s.kind == SphereStyle::Rings).for_each(|s| ring_strokes(s, &mut out));

@@ -1,17 +1,17 @@
-//! Looks against speed: shadows, edges and occlusion by name.
+//! Quality of pictures against speed: shadows, edges, occlusion and reflections by name.
 
 use super::Settings;
 use std::fmt;
 use std::str::FromStr;
 
-/// How the shadows of lights that throw any are drawn.
+/// How shadows are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Shadows {
-    /// None.
+    /// No shadows.
     Off,
     /// Sharp, smoothed over one texel of the map.
     Hard,
-    /// With penumbrae as wide as the light's size gives.
+    /// With penumbrae whose width follows from the light's size.
     #[default]
     Soft,
 }
@@ -19,7 +19,7 @@ pub enum Shadows {
 const SHADOWS: [(&str, Shadows); 3] = [("off", Shadows::Off), ("hard", Shadows::Hard), ("soft", Shadows::Soft)];
 
 impl Shadows {
-    /// The word for it.
+    /// The word for it in [`Quality`].
     pub fn name(self) -> &'static str {
         SHADOWS.iter().find(|(_, shadows)| *shadows == self).map_or("", |(name, _)| name)
     }
@@ -30,8 +30,9 @@ impl Shadows {
     }
 }
 
-/// The part of [`Settings`] that trades looks for speed. As words: `default`, `fast`, `fastest`, and behind it or alone `shadows=off|hard|soft`, `samples=1|4`,
-/// `occlusion=on|off`, `reflections=on|off`, `map=TEXELS`, with commas between them.
+/// The part of [`Settings`] that trades appearance for speed. As text: `default`, `fast` or
+/// `fastest`, and after it or alone `shadows=off|hard|soft`, `samples=1|4`, `occlusion=on|off`,
+/// `reflections=on|off`, `map=TEXELS`, separated by commas.
 ///
 /// ```
 /// use tumble_render::{Quality, Shadows};
@@ -45,9 +46,9 @@ pub struct Quality {
     pub shadows: Shadows,
     /// Samples per pixel: 1 or 4.
     pub samples: u32,
-    /// Whether corners and creases get less of the sky's light.
+    /// Whether corners and creases receive less light from the sky.
     pub occlusion: bool,
-    /// Whether surfaces mirror the sky and have lacquer.
+    /// Whether surfaces reflect the sky and have clear coats.
     pub reflections: bool,
     /// Side of a shadow map in texels, 256 to 8192.
     pub shadow_map_size: u32,
@@ -56,12 +57,12 @@ pub struct Quality {
 /// A word that names no quality.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no quality '{0}'; wanted default, fast, fastest, shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off or map=TEXELS (256 to 8192), with commas between them"
+    "no quality '{0}'; wanted default, fast, fastest, shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off or map=TEXELS (256 to 8192), separated by commas"
 )]
 pub struct UnknownQuality(String);
 
 impl Default for Quality {
-    /// What pictures have: soft shadows, four samples, occlusion.
+    /// The quality of screenshots: soft shadows, four samples, occlusion.
     fn default() -> Self {
         Quality { shadows: Shadows::Soft, samples: 4, occlusion: true, reflections: true, shadow_map_size: 2048 }
     }
@@ -73,12 +74,13 @@ impl Quality {
         Quality { shadows: Shadows::Hard, samples: 1, occlusion: false, reflections: true, shadow_map_size: 1024 }
     }
 
-    /// As [`Quality::fast`] without shadows and reflections.
+    /// As [`Quality::fast`], without shadows and reflections.
     pub fn fastest() -> Self {
         Quality { shadows: Shadows::Off, reflections: false, ..Quality::fast() }
     }
 
-    /// Writes it into the settings of a list. A reach of occlusion that is set stays, unless occlusion is off.
+    /// Sets it in the settings of a list. An explicit reach of occlusion stays, unless occlusion is
+    /// off.
     pub fn apply(&self, settings: &mut Settings) {
         settings.shadows = self.shadows;
         settings.samples = self.samples;

@@ -1,11 +1,12 @@
-//! The text form of a draw list: rounded, in list order, for golden tests that need no GPU and for reading.
+//! The text form of a draw list: rounded, in list order. Golden tests without a GPU compare it.
 
 use super::{DebugStyle, DrawList, Light, SphereStyle};
 use crate::{Camera, Material, Pattern, Shader};
 use std::fmt::{Display, Formatter, Result};
 
 impl DrawList {
-    /// The list as text: one line per item, lengths rounded to 0.1 mm, other numbers to four decimals.
+    /// Returns the list as text: one line per item, lengths rounded to 0.1 mm, other numbers to
+    /// four decimals.
     pub fn to_text(&self) -> String {
         self.to_string()
     }
@@ -171,7 +172,7 @@ fn shadow(casts: bool) -> &'static str {
     if casts { "" } else { " no shadow" }
 }
 
-/// A number rounded to four decimals, without trailing zeros and without a negative zero.
+/// Formats a number with four decimals, without trailing zeros and without a negative zero.
 fn n(x: f32) -> String {
     let text = format!("{x:.4}");
     let short = text.trim_end_matches('0').trim_end_matches('.');

@@ -1,23 +1,23 @@
-//! What is checked before anything is allocated or drawn: counts, ranges, finite numbers.
+//! Checks of a draw list before anything is allocated or drawn: counts, ranges, finite numbers.
 
 use super::{DrawList, Light};
 use crate::{Material, RenderError};
 
-/// Most lights in a list.
+/// Largest number of lights in a list.
 pub const MAX_LIGHTS: usize = 8;
-/// Most lights that throw shadows; further ones shine without.
+/// Largest number of lights with shadows; further lights have none.
 pub const MAX_SHADOWS: usize = 4;
-/// Most pictures on surfaces.
+/// Largest number of textures.
 pub const MAX_TEXTURES: usize = 256;
-/// Most items of each other kind in a list.
+/// Largest number of items of each other kind.
 pub const MAX_ITEMS: usize = 1 << 20;
 
 impl DrawList {
-    /// Checks the list: counts within their caps, mesh numbers that exist, numbers finite and in range.
-    /// Meshes are checked by [`crate::MeshData::validate`] when they are first uploaded.
+    /// Checks the list: counts within their limits, mesh indices that exist, numbers finite and in
+    /// range. [`crate::MeshData::validate`] checks meshes when they are first uploaded.
     ///
     /// # Errors
-    /// The first fault, naming the item, the field, its value and what would be right.
+    /// The first fault, with the item, the field, its value and the valid range.
     pub fn validate(&self) -> Result<(), RenderError> {
         self.check_counts()?;
         for (i, x) in self.instances.iter().enumerate() {
@@ -154,7 +154,7 @@ fn check_light(at: Item, light: &Light) -> Result<(), RenderError> {
     at.check(in_range(size, 0.0, 1e6), "radius", &size, "0 or more")
 }
 
-/// The item that a complaint is about.
+/// The item that an error names.
 #[derive(Clone, Copy)]
 struct Item(&'static str, usize);
 
@@ -181,7 +181,7 @@ impl Item {
         self.check(c.iter().all(|&x| in_range(x, 0.0, 1.0)), field, &c, "three sRGB components from 0 to 1")
     }
 
-    /// A texture that is there, at a scale.
+    /// Checks that a texture exists and has a valid scale.
     fn texture(self, m: &Material, textures: usize) -> Result<(), RenderError> {
         let Some(texture) = m.texture else { return Ok(()) };
         self.check(texture.id < textures, "texture", &texture.id, "the number of a texture of this list")?;

@@ -1,12 +1,13 @@
-// Capsules by ray casting inside a box that just holds them, whose far sides are drawn: so the eye may be within the box.
+// Capsules by ray casting inside a tight box. The far sides of the box are drawn, so the eye may be
+// inside it.
 //
-// A capsule is what lies within r of the segment c + u a, |u| <= h. With o the point of the ray nearest to c and D its direction of view depth 1, the ray
-// passes the segment at the least distance where u = -(c - o)·a' / a'·a' (a' = a less its part along D), clamped to the segment. It enters the
-// round wall where t² A + 2 t B + C = 0 with
-//   A = D·D - (D·a)²,  B = (o - c)·D - (D·a) ((o - c)·a),  C = |o - c|² - ((o - c)·a)² - r²,
-// and where that is beyond an end, the sphere around the end.
+// A capsule contains all points within r of the segment c + u a, |u| <= h. Let o be the point of
+// the ray nearest to c, D its direction with view depth 1, and a' = a less its part along D. The
+// ray is closest to the segment at u = -(c - o)·a' / a'·a', clamped to the segment. It enters the
+// round wall at t² A + 2 t B + C = 0 with A = D·D - (D·a)²,  B = (o - c)·D - (D·a) ((o - c)·a),  C
+// = |o - c|² - ((o - c)·a)² - r², and beyond an end it enters the sphere around that end.
 struct CapsuleIn {
-    @location(0) sphere: vec4f, // centre, radius
+    @location(0) sphere: vec4f, // center, radius
     @location(1) turn: vec4f, // quaternion x, y, z, w: object to world; the axis is z
     @location(2) color_rough: vec4f,
     @location(3) other_metal: vec4f,
@@ -28,7 +29,7 @@ fn turned(q: vec4f, v: vec3f) -> vec3f {
     return v + q.w * t + cross(q.xyz, t);
 }
 
-// Corners of the sides of a cube as a strip of triangles that face outward.
+// Corners of a cube's sides as a strip of triangles that face outward.
 const STRIP = array<u32, 14>(6u, 7u, 2u, 3u, 1u, 7u, 5u, 6u, 4u, 2u, 0u, 1u, 4u, 5u);
 
 @vertex fn vs_capsule(in: CapsuleIn, @builtin(vertex_index) index: u32) -> CapsuleOut {
@@ -43,7 +44,8 @@ const STRIP = array<u32, 14>(6u, 7u, 2u, 3u, 1u, 7u, 5u, 6u, 4u, 2u, 0u, 1u, 4u,
     return CapsuleOut(clip, in.sphere, in.turn, in.color_rough, in.other_metal, in.pattern, vec4f(turned(in.turn, vec3f(0.0, 0.0, 1.0)), in.half_length.x));
 }
 
-// Ray, its parameter nearest to the middle, the way from there to the middle, and the place on the segment that it passes nearest to.
+// The ray, its parameter nearest to the middle, the vector from there to the middle, and the
+// closest place on the segment.
 struct Passing { ray: Ray, nearest: f32, to: vec3f, u: f32, room: f32 };
 
 fn pass_capsule(sphere: vec4f, axis: vec4f, pixel: vec2f) -> Passing {
@@ -75,7 +77,7 @@ fn hit_capsule(sphere: vec4f, axis: vec4f, pixel: vec2f) -> Hit {
     var t = (-half - sqrt(max(half * half - wide * (dot(o, o) - o_a * o_a - sphere.w * sphere.w), 0.0))) / wide;
     var u = o_a + t * d_a;
     if (p.room <= 0.0) {
-        // at the rim the ray may just miss: the normal is that of the nearest point
+        // at the rim the ray may just miss: the normal is that of the closest point
         u = p.u;
         t = dot(p.to + u * a, d) / dot(d, d);
     } else if (abs(u) > axis.w) {
@@ -102,7 +104,7 @@ fn capsule_depth(in: CapsuleOut) -> f32 {
     return capsule_depth(in);
 }
 
-// Where the number of the nearest sphere is asked for: it is none.
+// The index of the nearest sphere: none.
 @fragment fn fs_capsule_no_id(in: CapsuleOut) -> BoundsPixel {
     return BoundsPixel(0u, capsule_depth(in));
 }
@@ -115,6 +117,6 @@ fn capsule_depth(in: CapsuleOut) -> f32 {
     if (mask == 0u || behind(h.s) || depth > 1.0 || depth < 0.0) { discard; }
     let color = pixel_color(h.position, h.normal, h.to_eye, unturn(in.turn, h.position - in.sphere.xyz), unturn(in.turn, h.normal), h.s, pixel, vec3f(0.0),
         Appearance(in.color_rough, in.other_metal, in.pattern));
-    // a hair nearer than in the pass before, where there is one
+    // slightly nearer than in the depth pass, if there was one
     return sphere_pixel(vec4f(color, 1.0), min(depth * 1.000001, 1.0), mask);
 }

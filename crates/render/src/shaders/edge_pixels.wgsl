@@ -1,4 +1,5 @@
-// Edges of cast spheres and capsules where the interface cannot write a sample mask (OpenGL): whole pixels.
+// Edges of ray-cast spheres and capsules as whole pixels, for interfaces that cannot write a sample
+// mask (OpenGL).
 struct SpherePixel {
     @location(0) color: vec4f,
     @builtin(frag_depth) depth: f32,

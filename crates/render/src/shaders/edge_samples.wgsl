@@ -1,4 +1,4 @@
-// Edges of cast spheres and capsules: each sample is tested against the exact outline.
+// Edges of ray-cast spheres and capsules: each sample is tested against the exact outline.
 struct SpherePixel {
     @location(0) color: vec4f,
     @builtin(frag_depth) depth: f32,

@@ -1,12 +1,13 @@
-// One eye's picture into its place of the whole: mirrored, darkened, bent. The same steps as on the CPU (`facet/warp.rs`, `facet/blend.rs`).
+// Places one eye's picture in the whole: mirrored, darkened, warped. The steps are those on the CPU
+// (`facet/warp.rs`, `facet/blend.rs`).
 struct Place {
-    at: vec4f,   // left and top edge in the whole; 1 where left and right, top and bottom change places
-    size: vec4f, // width and height; pixels of rim around the source; 1 where there is a warp
+    at: vec4f,   // left and top edge in the whole; 1 if left and right, top and bottom are swapped
+    size: vec4f, // width and height; pixels of rim around the source; 1 if there is a warp
 };
 @group(0) @binding(0) var<uniform> place: Place;
 @group(0) @binding(1) var source: texture_2d<f32>;
-@group(0) @binding(2) var warp: texture_2d<f32>;   // source of each pixel, middles at whole numbers; below -1e8 where it stays black
-@group(0) @binding(3) var shares: texture_2d<f32>; // of its light that each pixel keeps; one texel for all where there is no mask
+@group(0) @binding(2) var warp: texture_2d<f32>;   // source of each pixel, centers at whole numbers; below -1e8 for black
+@group(0) @binding(3) var shares: texture_2d<f32>; // fraction of its light that each pixel keeps; one texel if there is no mask
 
 @vertex fn vs_place(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
     return vec4f(select(-1.0, 3.0, index == 1u), select(-1.0, 3.0, index == 2u), 0.0, 1.0);

@@ -1,18 +1,19 @@
-// Light on a surface: GGX with lamps, soft shadows, and the sky as ambient light and reflection.
+// Light on a surface: GGX with lamps and soft shadows; the sky as ambient light and reflection.
 //
-// Microfacets: Walter et al. 2007 (GGX), Heitz 2014 (height-correlated masking), Schlick 1994 (Fresnel);
-// environment term: the analytic fit by Karis, 2014; soft shadows: Fernando 2005 (percentage closer).
-// Radiance is in units where a white surface under perpendicular light of intensity 1 leaves 1.
+// Microfacets: Walter et al. 2007 (GGX), Heitz 2014 (height-correlated masking), Schlick 1994
+// (Fresnel); environment term: the analytic fit by Karis, 2014; soft shadows: Fernando 2005
+// (percentage closer). Unit of radiance: a white surface under perpendicular light of intensity 1
+// reflects 1.
 struct Light {
     at: vec4f,      // w = 0: direction to the light; w = 1: position
-    color: vec4f,   // linear colour times intensity; w: angular radius, or radius of the lamp
-    shadow: vec4f,  // x: layer of its shadow map or -1; y: 6 where there is one for each side of a cube
+    color: vec4f,   // linear color times intensity; w: angular radius, or radius of the lamp
+    shadow: vec4f,  // x: layer of its shadow map or -1; y: 6 if there is one for each side of a cube
 };
 struct Shadow {
     clip_from_world: mat4x4f,
     world_from_clip: mat4x4f,
     depth: vec4f,   // as in View
-    scale: vec4f,   // x, y: map widths per metre (times view depth if perspective); z: 1 for perspective; w: metres per texel likewise
+    scale: vec4f,   // x, y: map widths per meter (times view depth if perspective); z: 1 for perspective; w: meters per texel likewise
 };
 struct Scene {
     lights: array<Light, 8>,
@@ -23,14 +24,14 @@ struct Scene {
     backdrop: vec4f, // w: 1 for a flat backdrop
     tone: vec4f,     // exposure, 1 for the filmic curve, unused, side of the shadow maps
     floor: vec4f,    // middle x, y, reach and height of the ground
-    bounce: vec4f,   // radiance that comes back from below
+    bounce: vec4f,   // radiance from below
 };
 @group(1) @binding(0) var<uniform> scene: Scene;
 @group(1) @binding(1) var shadow_maps: texture_depth_2d_array;
 @group(1) @binding(2) var shadow_sampler: sampler_comparison;
 @group(1) @binding(3) var occlusion: texture_2d<f32>;
-@group(1) @binding(4) var shadow_depths: texture_2d_array<f32>; // the same maps, to be read as numbers (OpenGL reads no depth texture)
-@group(1) @binding(5) var seen_id: texture_2d<u32>;     // number of the nearest sphere from 1 on, where that was drawn first
+@group(1) @binding(4) var shadow_depths: texture_2d_array<f32>; // the same maps as numbers (OpenGL reads no depth texture)
+@group(1) @binding(5) var seen_id: texture_2d<u32>;     // index of the nearest sphere from 1 on, if that was drawn first
 @group(1) @binding(6) var sphere_data: texture_2d<u32>; // four texels per sphere, 256 spheres per row
 
 struct Surface {
@@ -43,10 +44,10 @@ struct Surface {
 };
 
 const PI = 3.14159265;
-// Widest penumbra, as a share of the shadow map.
+// Widest penumbra, as a fraction of the shadow map.
 const WIDEST = 0.08;
 
-// x to the power of 2.5; of 5.
+// x to the power of 2.5, and of 5.
 fn fall(x: f32) -> f32 { return x * x * sqrt(x); }
 fn fifth(x: f32) -> f32 { let x2 = x * x; return x2 * x2 * x; }
 
@@ -66,15 +67,16 @@ fn sky_radiance(dir: vec3f, blur: f32) -> vec3f {
     return c;
 }
 
-// Clouds, walls and the eye's adaptation take colour out of the light of a sky: shade is not as blue as the zenith.
-fn greyed(c: vec3f) -> vec3f {
+// Desaturates the light of a sky, as clouds, walls and the eye's adaptation do: shade is not as
+// blue as the zenith.
+fn desaturated(c: vec3f) -> vec3f {
     return mix(vec3f(dot(c, vec3f(0.2126, 0.7152, 0.0722))), c, 0.3);
 }
 
 fn sky_irradiance(n: vec3f) -> vec3f {
     let up = 0.5 + 0.5 * n.z;
     let sky = 0.55 * scene.zenith.xyz + 0.45 * scene.horizon.xyz;
-    return mix(scene.bounce.xyz, greyed(sky), up) * (1.0 + 0.03 * scene.ground.w * max(n.z, 0.0));
+    return mix(scene.bounce.xyz, desaturated(sky), up) * (1.0 + 0.03 * scene.ground.w * max(n.z, 0.0));
 }
 
 fn backdrop_at(dir: vec3f) -> vec3f {
@@ -83,7 +85,8 @@ fn backdrop_at(dir: vec3f) -> vec3f {
     return select(mix(scene.ground.xyz, above, smoothstep(-0.7, 0.0, dir.z)), scene.backdrop.xyz, scene.backdrop.w > 0.5);
 }
 
-// Points spread evenly over the unit disc: each is turned by the golden angle against the one before, and the i-th of n lies sqrt((i + 1/2) / n) out.
+// Points spread evenly over the unit disc: each is rotated by the golden angle against the previous
+// one, and the i-th of n is at the radius sqrt((i + 1/2) / n).
 const GOLDEN = vec2f(-0.73736886, 0.67549032);
 
 fn next_way(way: vec2f) -> vec2f {
@@ -94,7 +97,8 @@ fn shadow_depth_to_s(sh: Shadow, depth: f32) -> f32 {
     return (sh.depth.y - depth * sh.depth.w) / (depth * sh.depth.z - sh.depth.x);
 }
 
-// The map that shows `p`: of six, in the order +x -x +y -y +z -z, that of the side to which it lies.
+// The map that shows `p`: of six, in the order +x -x +y -y +z -z, the one of the side that `p` is
+// on.
 fn shadow_layer(light: Light, p: vec3f) -> i32 {
     var layer = i32(light.shadow.x);
     if (light.shadow.y > 1.5) {
@@ -107,7 +111,7 @@ fn shadow_layer(light: Light, p: vec3f) -> i32 {
     return layer;
 }
 
-// Share of the light that reaches `p`.
+// Fraction of the light that reaches `p`.
 fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> f32 {
     let sh = scene.shadows[index];
     let texels = scene.tone.w;
@@ -117,15 +121,16 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     if (clip.w <= 0.0) { return 1.0; }
     let ndc = clip.xyz / clip.w;
     let uv = ndc.xy * vec2f(0.5, -0.5) + 0.5;
-    // penumbrae reach beyond the map, whose rim is empty
+    // penumbrae reach beyond the map, and its edge is empty
     if (any(uv <= vec2f(-WIDEST)) || any(uv >= vec2f(1.0 + WIDEST))) { return 1.0; }
-    // behind the map's far plane everything that throws shadows is in front
+    // behind the map's far plane, every shadow caster is in front
     let depth = clamp(ndc.z, 1e-6, 1.0);
     if (SHADOWS == 1u) {
         let outside = any(uv <= vec2f(0.0)) || any(uv >= vec2f(1.0));
         return select(textureSampleCompareLevel(shadow_maps, shadow_sampler, uv, index, depth + 1e-5), 1.0, outside);
     }
-    // depth along the surface's plane is affine in the map: its slope keeps wide filters free of acne
+    // depth along the surface's plane is affine in the map; its slope keeps wide filters free of
+    // acne
     let plane = transpose(sh.world_from_clip) * vec4f(n, -dot(n, p));
     var slope = vec2f(0.0);
     if (abs(plane.z) > 1e-9) { slope = -plane.xy / plane.z * vec2f(2.0, -2.0); }
@@ -134,12 +139,12 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
 
     let turn = 6.2831853 * fract(52.9829189 * fract(dot(floor(pixel) + view.grid.xy, vec2f(0.06711056, 0.00583715))));
     let s = select(shadow_depth_to_s(sh, ndc.z), clip.w, sh.scale.z > 0.5);
-    let per_metre = sh.scale.xy / mix(1.0, s, sh.scale.z);
+    let per_meter = sh.scale.xy / mix(1.0, s, sh.scale.z);
     let s_near = shadow_depth_to_s(sh, 1.0);
     let reach = select(size * (s - s_near), size * (s - s_near) / s_near, sh.scale.z > 0.5);
     let smallest = vec2f(1.5 / texels);
-    let search = clamp(reach * per_metre, smallest, vec2f(WIDEST));
-    // the empty map is at depth 0: no filter may reach below it
+    let search = clamp(reach * per_meter, smallest, vec2f(WIDEST));
+    // the empty map is at depth 0, so no filter may reach below it
     var sum = 0.0;
     var count = 0.0;
     let first = vec2f(cos(turn), sin(turn));
@@ -156,7 +161,7 @@ fn light_visibility(index: i32, p: vec3f, n: vec3f, size: f32, pixel: vec2f) -> 
     let s_block = shadow_depth_to_s(sh, sum / count);
     let gap = max(s - s_block, 0.0);
     let width = select(size * gap, size * gap / max(s_block, 1e-6), sh.scale.z > 0.5);
-    let filter_uv = clamp(width * per_metre, smallest, search);
+    let filter_uv = clamp(width * per_meter, smallest, search);
     var lit = 0.0;
     way = first;
     for (var i = 0u; i < 32u; i++) {
@@ -179,15 +184,16 @@ fn schlick(f0: vec3f, v_h: f32) -> vec3f {
     return f0 + (1.0 - f0) * fifth(1.0 - v_h);
 }
 
-// Reflectance of a rough surface under an even surrounding: scale and offset of f0.
+// Reflectance of a rough surface under uniform surroundings: scale and offset of f0.
 fn environment_term(roughness: f32, n_v: f32) -> vec2f {
     let r = roughness * vec4f(-1.0, -0.0275, -0.572, 0.022) + vec4f(1.0, 0.0425, 1.04, -0.04);
     let a = min(r.x * r.x, exp2(-9.28 * n_v)) * r.x + r.y;
     return vec2f(-1.04, 1.04) * a + r.zw;
 }
 
-// A likeness for slow devices: highlights by the approximation of Karis, 2013 ("a² / (q² 4 max(0.1, (v·h)²) (r + 1/2))", with h = l + v not normalized, so that
-// n·h = n·l + n·v and h² = 2 + 2 l·v), the sky as a gradient, no lacquer.
+// A cheap approximation for slow devices: highlights after Karis, 2013 ("a² / (q² 4 max(0.1,
+// (v·h)²) (r + 1/2))", with h = l + v not normalized, so that n·h = n·l + n·v and h² = 2 + 2 l·v),
+// the sky as a gradient, no clear coat.
 struct Simple { diffuse: vec3f, f0: vec3f, rough: f32, n_v: f32 };
 
 fn lit_simply(s: Surface, m: Simple, l: vec3f, light: Light) -> vec3f {
@@ -271,7 +277,7 @@ fn shade(s: Surface) -> vec3f {
         let h = normalize(l + v);
         let v_h = max(dot(v, h), 0.0);
         let n_h = max(dot(n, h), 0.0);
-        // a source of some size widens the lobe and keeps its energy
+        // an extended source widens the lobe and keeps its energy
         let wide = clamp(alpha + 0.5 * angle, 0.0, 1.0);
         let specular = schlick(f0, v_h) * (ggx(n_h, n_v, n_l, wide) * alpha * alpha / (wide * wide) * PI);
         var coat_f = 0.0;
@@ -290,7 +296,7 @@ fn shade(s: Surface) -> vec3f {
     let env = environment_term(rough, n_v);
     let mirror = reflect(-v, n);
     let horizon_open = clamp(open * open + 0.15 * open, 0.0, 1.0);
-    // light bounced between bright surfaces keeps their creases from going grey
+    // light bounced between bright surfaces keeps their creases from turning gray
     let bounced = vec3f(open) + (1.0 - open) * open * s.base.color;
     var ambient = diffuse * sky_irradiance(n) * bounced * (1.0 + s.base.sheen * grazing * grazing * grazing)
         + (f0 * env.x + env.y) * sky_radiance(mirror, rough) * horizon_open;
@@ -301,10 +307,10 @@ fn shade(s: Surface) -> vec3f {
     return out + ambient * scene.horizon.w;
 }
 
-// Scene light to display light.
+// Converts scene light to display light.
 fn tone(c: vec3f) -> vec3f {
     let x = max(c * scene.tone.x, vec3f(0.0));
-    // filmic curve (the rational fit by Narkowicz, 2015, to ACES), scaled so that middle grey stays
+    // filmic curve (the rational fit by Narkowicz, 2015, to ACES), scaled so that middle gray stays
     let y = x * 0.72;
     let filmic = (y * (2.51 * y + 0.03)) / (y * (2.43 * y + 0.59) + 0.14);
     return min(select(filmic, x, scene.tone.y < 0.5), vec3f(1.0));

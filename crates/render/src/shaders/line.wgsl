@@ -1,4 +1,5 @@
-// Strokes with a width in pixels, tapered for arrow heads, round for points; edges smoothed by coverage.
+// Strokes with a width in pixels, tapered for arrow heads, round for points; edges are smoothed by
+// coverage.
 struct StrokeIn {
     @location(0) start: vec4f, // w: width at the start, pixels
     @location(1) end: vec4f,
@@ -42,7 +43,7 @@ fn clipped(a: vec4f, b: vec4f) -> vec4f {
         offset = vec2f(side, end_side) * reach;
         out.across = offset;
     }
-    // a hair towards the eye, so that lines on a surface are seen
+    // slightly closer to the eye, so that lines on a surface are visible
     out.clip = vec4f(here.xy + offset / px * here.w, here.z + 2e-4 * max(here.z, 0.0), here.w);
     out.half = half;
     out.color = in.color;

@@ -7,11 +7,13 @@ struct MeshIn {
     @location(5) color_rough: vec4f,
     @location(6) other_metal: vec4f,
     @location(7) pattern: vec4f,
-    @location(8) place: vec3f, // in the texture, and shares of it per metre
+    @location(8) place: vec3f, // texture coordinates, and repetitions per meter
 };
-// Taken at a point inside the triangle (centroid): at the middle of a pixel that a thin triangle only grazes they would run beyond it. There llvmpipe
-// multiplies by the w of the pixel's middle all the same, which is wrong by a share: centimetres, far from the origin, and speckled shadows on meshes
-// finer than a pixel. A one that is interpolated with the rest comes out as that share.
+// Interpolated at a point inside the triangle (centroid). At the center of a pixel that a thin
+// triangle only touches, the values would be extrapolated. llvmpipe still multiplies by the w of
+// the pixel's center there, which is wrong by a factor: centimeters, far from the origin, and
+// speckled shadows on meshes finer than a pixel. A member with the value 1 is interpolated with the
+// rest and returns that factor.
 struct MeshOut {
     @invariant @builtin(position) clip: vec4f,
     @location(0) @interpolate(perspective, centroid) offset: vec3f,
@@ -35,14 +37,14 @@ fn world_of(in: MeshIn) -> vec3f {
 @vertex fn vs_mesh(in: MeshIn) -> MeshOut {
     var out: MeshOut;
     out.clip = view.clip_from_world * vec4f(world_of(in), 1.0);
-    // width times its inverse, so that no compiler takes it for a constant
+    // width times its inverse, so that no compiler treats it as a constant
     out.one = view.size.x * view.size.z;
     out.origin = vec3f(in.row_x.w, in.row_y.w, in.row_z.w);
     out.offset = vec3f(dot(in.row_x.xyz, in.position), dot(in.row_y.xyz, in.position), dot(in.row_z.xyz, in.position));
     let cx = vec3f(in.row_x.x, in.row_y.x, in.row_z.x);
     let cy = vec3f(in.row_x.y, in.row_y.y, in.row_z.y);
     let cz = vec3f(in.row_x.z, in.row_y.z, in.row_z.z);
-    // normals turn by the cofactor matrix
+    // normals transform by the cofactor matrix
     let side = sign(dot(cx, cross(cy, cz)));
     out.normal = (cross(cy, cz) * in.normal.x + cross(cz, cx) * in.normal.y + cross(cx, cy) * in.normal.z) * side;
     out.object = in.position * vec3f(length(cx), length(cy), length(cz));
@@ -59,10 +61,10 @@ fn world_of(in: MeshIn) -> vec3f {
     return view.clip_from_world * vec4f(world_of(in), 1.0);
 }
 
-// Where the number of the nearest sphere is asked for: it is none.
+// The index of the nearest sphere: none.
 @fragment fn fs_no_id() -> @location(0) u32 { return 0u; }
 
-// Depth alone, in a pass that has a colour.
+// Depth only, in a pass that has a color.
 @fragment fn fs_nothing() {}
 
 fn mesh_color(in: MeshOut, front: bool) -> vec3f {
@@ -70,7 +72,8 @@ fn mesh_color(in: MeshOut, front: bool) -> vec3f {
     let s = view_depth_at(world);
     let to_eye = -normalize(ray_at(in.clip.xy).dir);
     var normal = normalize(in.normal) * in.side;
-    // seen from behind; triangles thinner than a pixel may be rounded over, so the normal must say so too
+    // a back face; triangles thinner than a pixel may be rounded inside out, so the normal must
+    // agree
     if (!front && dot(normal, to_eye) < 0.0) { normal = -normal; }
     return pixel_color(world, normal, to_eye, in.object / in.one, normalize(in.object_normal), s, in.clip.xy, in.place / in.one,
         Appearance(in.color_rough, in.other_metal, in.pattern));
@@ -80,9 +83,10 @@ fn mesh_color(in: MeshOut, front: bool) -> vec3f {
     return vec4f(mesh_color(in, front), 1.0);
 }
 
-// The floor fades into what lies behind it. It is met by the ray through the pixel's middle, not between the corners of its triangles: these are cut where they
-// leave the view, so that their edges lie elsewhere in each picture, and a pixel across one would show another place. A ray that misses it, by a rounded edge at the
-// horizon, sees what lies behind.
+// The floor fades into the background. It is hit by the ray through the pixel's center and not
+// interpolated between the corners of its triangles. These are cut at the edges of the view, so
+// their edges differ from picture to picture, and a pixel across one would show another place. A
+// ray that misses the floor, by rounding at the horizon, shows the background.
 struct GroundOut {
     @invariant @builtin(position) clip: vec4f,
     @location(0) @interpolate(flat) color_rough: vec4f,

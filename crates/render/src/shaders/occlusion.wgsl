@@ -1,11 +1,12 @@
-// Ambient occlusion in screen space, after McGuire, Mara and Luebke, "Scalable Ambient Obscurance", 2012:
-// A = max(0, 1 - 5 k / (r^6 n) * sum max(0, r^2 - v.v)^3 max(0, (v.n - b) / (v.v + e))), v from the point to its neighbours.
+// Ambient occlusion in screen space, after McGuire, Mara and Luebke, "Scalable Ambient Obscurance",
+// 2012: A = max(0, 1 - 5 k / (r^6 n) * sum max(0, r^2 - v.v)^3 max(0, (v.n - b) / (v.v + e))), v
+// from the point to its neighbors.
 @group(1) @binding(0) var depth_map: texture_2d<f32>;
-@group(1) @binding(1) var<uniform> reach: vec4f; // x: radius in metres
+@group(1) @binding(1) var<uniform> reach: vec4f; // x: radius in meters
 @group(1) @binding(2) var raw: texture_2d<f32>;
 
 const TAPS = 20u;
-// Cosine and sine of the golden angle, by which each tap is turned against the one before.
+// Cosine and sine of the golden angle, by which each tap is rotated against the previous one.
 const GOLDEN = vec2f(-0.73736886, 0.67549032);
 
 @vertex fn vs_whole(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
@@ -22,7 +23,7 @@ fn point_at(p: vec2i) -> vec3f {
     return ray.origin + ray.dir * view_depth_of(textureLoad(depth_map, q, 0).x);
 }
 
-// The shorter of the two differences along one axis: the one that stays on the surface.
+// The smaller of the two differences along one axis: the one that stays on the surface.
 fn step_along(p: vec2i, d: vec2i, middle: vec3f) -> vec3f {
     let a = point_at(p + d) - middle;
     let b = middle - point_at(p - d);
@@ -39,10 +40,11 @@ fn step_along(p: vec2i, d: vec2i, middle: vec3f) -> vec3f {
     if (dot(n, ray_at(at.xy).dir) > 0.0) { n = -n; }
     let r = reach.x;
     let r2 = r * r;
-    // in steps of a sixteenth of an octave: taps round to pixels, and the last bits of a depth, which differ from facet to facet, must not decide to which
+    // in steps of a sixteenth of an octave: taps are rounded to pixels, and the last bits of a
+    // depth, which differ between facets, must not decide to which
     let pixels = min(exp2(floor(16.0 * log2(r / footprint_at(s))) / 16.0), view.grid.z);
     if (pixels < 1.0) { return vec4f(1.0); }
-    // 16 turns in a 4 x 4 tile, averaged away by the blur
+    // 16 rotations in a 4 x 4 tile; the blur averages them
     let tile = (u32(p.x) + u32(view.grid.x)) % 4u + 4u * ((u32(p.y) + u32(view.grid.y)) % 4u);
     let turn = 6.2831853 * f32((tile * 7u) % 16u) / 16.0;
     let least = 0.004 * r + 0.002 * footprint_at(s);
@@ -56,7 +58,7 @@ fn step_along(p: vec2i, d: vec2i, middle: vec3f) -> vec3f {
         let v = ray.origin + ray.dir * view_depth_of(z) - here;
         let vv = dot(v, v);
         let fall = max(r2 - vv, 0.0);
-        // nothing at all lies at the far plane
+        // the far plane is empty
         sum += select(0.0, fall * fall * fall * max((dot(v, n) - least) / (vv + 0.01 * r2), 0.0), z > 0.0);
     }
     let open = max(0.0, 1.0 - sum * 3.0 * r / (r2 * r2 * r2 * f32(TAPS)));

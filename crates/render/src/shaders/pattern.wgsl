@@ -1,4 +1,5 @@
-// Procedural patterns over a base colour, in the object's frame. `w` is the width of a pixel there, for filtering.
+// Procedural patterns over a base color, in the object's frame. `w` is the width of a pixel there,
+// for filtering.
 struct Base { color: vec3f, roughness: f32, coat: f32, sheen: f32 };
 
 // Integral of a square wave that is -1 and 1 over halves of its period of 2.
@@ -12,7 +13,7 @@ fn square_wave(x: f32, w: f32) -> f32 {
     return (triangle_wave(x - 0.5 * h) - triangle_wave(x + 0.5 * h)) / h;
 }
 
-// Share of [x - w/2, x + w/2] covered by lines of `width` centred on the integers.
+// Fraction of [x - w/2, x + w/2] covered by lines of `width` centered on the integers.
 fn line_cover(x: f32, width: f32, w: f32) -> f32 {
     let h = max(w, 1e-5);
     let a = x - 0.5 * h + 0.5 * width;
@@ -29,7 +30,7 @@ fn segment_distance(p: vec2f, a: vec2f, b: vec2f) -> f32 {
     return length(p - a - d * clamp(dot(p - a, d) / dot(d, d), 0.0, 1.0));
 }
 
-// Distance to a digit of strokes in a box of 1 x 2 around the origin.
+// Distance to a digit made of strokes in a box of 1 x 2 around the origin.
 fn digit_distance(p: vec2f, digit: u32) -> f32 {
     var masks = array<u32, 10>(63u, 6u, 91u, 79u, 102u, 109u, 125u, 7u, 127u, 111u);
     let bits = masks[min(digit, 9u)];
@@ -54,8 +55,9 @@ fn number_distance(p: vec2f, number: u32) -> f32 {
 const IVORY = vec3f(0.87, 0.84, 0.76);
 const INK = vec3f(0.012, 0.012, 0.014);
 
-// Solid, striped or cue ball; `d` is the direction from the centre, `w` the angle of a pixel.
-fn ball(color: vec3f, d: vec3f, w: f32, number: u32, stripe: bool) -> vec3f {
+// A solid or striped billiard ball, or the cue ball; `d` is the direction from the center, `w` the
+// angle of a pixel.
+fn billiard_ball(color: vec3f, d: vec3f, w: f32, number: u32, stripe: bool) -> vec3f {
     if (number == 0u && !stripe) {
         let off = 1.0 - max(max(abs(d.x), abs(d.y)), abs(d.z));
         let r = 0.0135;
@@ -72,7 +74,7 @@ fn ball(color: vec3f, d: vec3f, w: f32, number: u32, stripe: bool) -> vec3f {
     return mix(face, c, smoothstep(-w, w, angle - spot));
 }
 
-// Rings of growth around an axis along x, seen in boards `board` wide; `dark` shares the late wood.
+// Growth rings around an axis along x, cut into boards `board` wide; `dark` tints the late wood.
 fn wood(color: vec3f, dark: vec3f, p: vec3f, ring: f32, board: f32, w: f32) -> vec3f {
     var q = p;
     var tint = 0.0;
@@ -88,7 +90,7 @@ fn wood(color: vec3f, dark: vec3f, p: vec3f, ring: f32, board: f32, w: f32) -> v
         bold = 0.38;
         joint = line_cover(p.y / board, 0.035, w / board);
     }
-    // the pith lies below the cut and wanders slowly, so that rings open into long arches
+    // the pith lies below the cut and varies slowly, so that rings open into long arches
     let wander = vec2f(noise3(vec3f(q.x / (ring * 60.0), 3.5, 0.5)), noise3(vec3f(q.x / (ring * 45.0), 7.5, 0.5))) - 0.5;
     let radial = vec2f(q.y * 0.8, q.z + ring * 3.0) + wander * ring * 7.0;
     let rough = noise3(vec3f(q.x / (ring * 25.0), q.y / (ring * 2.0), q.z / (ring * 2.0))) - 0.5;
@@ -96,17 +98,19 @@ fn wood(color: vec3f, dark: vec3f, p: vec3f, ring: f32, board: f32, w: f32) -> v
     let saw = fract(phase);
     let visible = 1.0 - smoothstep(0.25, 1.2, w / ring);
     let late = mix(0.35, smoothstep(0.15, 0.85, saw) * (1.0 - smoothstep(0.88, 1.0, saw)), visible);
-    let fibre_at = vec3f(q.x / (ring * 9.0), q.y / (ring * 0.12), q.z / (ring * 0.12));
-    let fibre_visible = 1.0 - smoothstep(0.05, 0.5, w / ring);
-    let fibre = (noise3(fibre_at) - 0.5) * fibre_visible;
-    let c = mix(color, dark, clamp(bold * late + 0.28 * fibre + 0.18 * rough * visible, 0.0, 1.0)) * (1.0 + 0.34 * tint);
+    let fiber_at = vec3f(q.x / (ring * 9.0), q.y / (ring * 0.12), q.z / (ring * 0.12));
+    let fiber_visible = 1.0 - smoothstep(0.05, 0.5, w / ring);
+    let fiber = (noise3(fiber_at) - 0.5) * fiber_visible;
+    let c = mix(color, dark, clamp(bold * late + 0.28 * fiber + 0.18 * rough * visible, 0.0, 1.0)) * (1.0 + 0.34 * tint);
     return mix(c, dark * 0.35, 0.75 * clamp(joint, 0.0, 1.0));
 }
 
 @group(2) @binding(0) var albedo: texture_2d<f32>;
 @group(2) @binding(1) var albedo_sampler: sampler;
 
-// The texture at a point: where the mesh says (repeat below 0), once around a sphere (0), else from the side that the surface faces most. The level is that of a pixel `w` wide.
+// The texture at a point. Its coordinates come from the mesh (repeat below 0), go once around a
+// sphere (0), or are projected from the side that the surface faces most. The mipmap level is that
+// of a pixel `w` wide.
 fn texture_at(p: vec3f, n: vec3f, place: vec3f, w: f32, repeat: f32) -> vec3f {
     let texels = vec2f(textureDimensions(albedo));
     let side = abs(n);
@@ -130,7 +134,7 @@ fn base_of(p: vec3f, n: vec3f, place: vec3f, w: f32, color_rough: vec4f, other: 
     let size = max(pattern.zw, vec2f(1e-6));
     switch SURFACE % 100u {
         case 1u: {
-            // a face that lies in a plane of the lattice would flicker: sample slightly inside
+            // a face in a plane of the lattice would flicker, so the sample is slightly inside
             let q = (p - n * 1e-3 * size.x) / size.x;
             base.color = mix(other, color_rough.xyz, checker(q, vec3f(w / size.x) * (1.0 - n * n * 0.999)));
         }
@@ -142,10 +146,10 @@ fn base_of(p: vec3f, n: vec3f, place: vec3f, w: f32, color_rough: vec4f, other: 
             base.color = mix(color_rough.xyz, other, clamp(max(0.7 * fine, tenth), 0.0, 1.0));
         }
         case 3u: {
-            base.color = ball(color_rough.xyz, normalize(p), w / max(length(p), 1e-6), u32(pattern.z), pattern.w > 0.5);
+            base.color = billiard_ball(color_rough.xyz, normalize(p), w / max(length(p), 1e-6), u32(pattern.z), pattern.w > 0.5);
         }
         case 4u: {
-            // boards run on over the sides that they would lie flat in
+            // boards continue over the sides that they would lie flat in
             let beside = abs(n.y) > max(abs(n.x), abs(n.z));
             base.color = wood(color_rough.xyz, other, select(p, p.xzy, beside), size.x, pattern.w, w);
         }

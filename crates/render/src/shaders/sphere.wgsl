@@ -1,7 +1,8 @@
-// Spheres by ray casting inside a square that just covers them. Each sample of a pixel is tested against the exact outline,
-// so edges are as smooth as those of triangles; colour and depth are those of the pixel's middle.
+// Spheres by ray casting inside a tight square. Each sample of a pixel is tested against the exact
+// outline, so edges are as smooth as those of triangles. Color and depth are those of the pixel's
+// center.
 struct SphereIn {
-    @location(0) sphere: vec4f, // centre, radius
+    @location(0) sphere: vec4f, // center, radius
     @location(1) turn: vec4f, // quaternion x, y, z, w: object to world
     @location(2) color_rough: vec4f,
     @location(3) other_metal: vec4f,
@@ -21,11 +22,13 @@ fn corner_of(index: u32) -> vec2f {
     return vec2f(select(-1.0, 1.0, (index & 1u) != 0u), select(-1.0, 1.0, (index & 2u) != 0u));
 }
 
-// A square around the sphere's outline, in the plane through its centre c across the way from the eye. The outline is a circle there: of radius
-// h² = r² d² / (d² - r²) at the distance d in perspective, of h = r in a parallel view. Where the eye is too near for that: the whole picture.
+// A square around the sphere's outline, in the plane through its center c perpendicular to the
+// direction to the eye. The outline is a circle there: its radius is h² = r² d² / (d² - r²) at the
+// distance d in perspective, and h = r in a parallel view. If the eye is too near, the square is
+// the whole picture.
 struct Cover {
     clip: vec4f,
-    plane: vec2f,    // place in the plane, m from the centre
+    plane: vec2f,    // place in the plane, m from the center
     numbers: vec3f,  // d², d² - r², h²
     near: bool,
 };
@@ -35,7 +38,8 @@ fn clip_row(i: u32) -> vec3f {
     return vec3f(m[0][i], m[1][i], m[2][i]);
 }
 
-// Whether a sphere lies wholly to a side of the picture: the planes of the sides are w + x = 0, w - x = 0, w + y = 0 and w - y = 0.
+// Whether a sphere lies entirely to a side of the picture: the planes of the sides are w + x = 0, w
+// - x = 0, w + y = 0 and w - y = 0.
 fn beside(middle: vec4f, radius: f32) -> bool {
     let x = clip_row(0u);
     let y = clip_row(1u);
@@ -63,7 +67,7 @@ fn cover(sphere: vec4f, index: u32) -> Cover {
     axis = normalize(axis);
     let side = normalize(cross(axis, select(vec3f(0.0, 0.0, 1.0), vec3f(1.0, 0.0, 0.0), abs(axis.z) > 0.9)));
     let up = cross(side, axis);
-    // w is affine in the corner: its least value decides whether a corner lies behind the eye
+    // w is affine in the corner; its smallest value decides whether a corner lies behind the eye
     let row = clip_row(3u);
     let least = middle.w - half * (abs(dot(row, side)) + abs(dot(row, up)));
     if (view.lens.x > 0.5 && least < 1e-3 * half) {
@@ -83,10 +87,11 @@ const NOWHERE = vec4f(0.0, 0.0, 2.0, 1.0);
     return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.sphere, in.turn, in.color_rough, in.other_metal, in.pattern);
 }
 
-// A sphere that may be seen, and its number.
+// A sphere that may be visible, and its index.
 struct BoundsIn { @location(0) sphere: vec4f, @location(1) id: u32 };
 
-// A texel of the four that tell of a sphere: sphere; colours, roughness and metal, two to a word; turn; the rest of its appearance.
+// One of the four texels that describe a sphere: center and radius; colors, roughness and metallic,
+// two per word; orientation; the rest of its appearance.
 fn sphere_texel(id: u32, i: u32) -> vec4u {
     return textureLoad(sphere_data, vec2i(vec2u((id % 256u) * 4u + i, id / 256u)), 0);
 }
@@ -106,8 +111,9 @@ fn read_appearance(id: u32) -> Appearance {
     return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.sphere, bitcast<vec4f>(sphere_texel(in.id, 2u)), appearance.color_rough, appearance.other_metal, appearance.pattern);
 }
 
-// With d the ray's direction, of length 1, and c the way to the centre: m = c - (c·d) d is the way from the nearest point of the ray to the centre, the ray enters
-// q = sqrt(r² - m²) before that point, and the normal there is -(m + q d) / r.
+// With d the ray's direction, of length 1, and c the vector to the center: m = c - (c·d) d is the
+// vector from the closest point of the ray to the center. The ray enters q = sqrt(r² - m²) before
+// that point, and the normal there is -(m + q d) / r.
 struct Crossing { room: f32, before: f32, miss: vec3f, dir: vec3f, per_length: f32 };
 
 fn cross_sphere(sphere: vec4f, pixel: vec2f) -> Crossing {
@@ -120,12 +126,12 @@ fn cross_sphere(sphere: vec4f, pixel: vec2f) -> Crossing {
     return Crossing(sphere.w * sphere.w - dot(miss, miss), before, miss, dir, per_length);
 }
 
-// View depth at which the ray enters; where it just misses, that of its nearest point.
+// View depth at which the ray enters; if it just misses, that of its closest point.
 fn entry(c: Crossing) -> f32 {
     return (c.before - sqrt(max(c.room, 0.0))) * c.per_length;
 }
 
-// Square of the radius less the square of the ray's distance from the centre.
+// Square of the radius less the square of the ray's distance from the center.
 fn inside(sphere: vec4f, pixel: vec2f) -> f32 {
     return cross_sphere(sphere, pixel).room;
 }
@@ -153,10 +159,12 @@ fn unturn(q: vec4f, v: vec3f) -> vec3f {
     return sphere_pixel(vec4f(color, 1.0), depth, mask);
 }
 
-// Depth alone needs less. With t = u / d the place in the plane of the cover as a tangent, k = r² / d² and w the view depth of that place, the ray through it
-// enters at the view depth s with 1 / s = (1 + sqrt(k - (1 - k) t²)) / (w (1 - k)). Everything in
-//     1 / s = W + sqrt(S² - T²),   W = 1 / (w (1 - k)),   S = sqrt(k) W,   T = t / (w sqrt(1 - k))
-// is affine in the picture, and depth is affine in 1 / s. In a parallel view -s = W + sqrt(S² - T²) with W = -(view depth of the centre), S = r, T = u.
+// Depth alone needs less. Let t = u / d be the place in the plane of the cover as a tangent, k = r²
+// / d², and w the view depth of that place. The ray through it enters at the view depth s with 1 /
+// s = (1 + sqrt(k - (1 - k) t²)) / (w (1 - k)). Everything in 1 / s = W + sqrt(S² - T²),   W = 1 /
+// (w (1 - k)),   S = sqrt(k) W,   T = t / (w sqrt(1 - k)) is affine in the picture, and depth is
+// affine in 1 / s. In a parallel view -s = W + sqrt(S² - T²) with W = -(view depth of the center),
+// S = r, T = u.
 struct BoundsOut {
     @builtin(position) clip: vec4f,
     @location(0) @interpolate(linear) at: vec4f, // T, W, S
@@ -191,12 +199,12 @@ fn bounds_depth(at: vec4f) -> f32 {
 
 struct BoundsPixel { @location(0) id: u32, @builtin(frag_depth) depth: f32 };
 
-// Which sphere is nearest, from 1 on.
+// Index of the nearest sphere, from 1 on.
 @fragment fn fs_bounds_id(in: BoundsOut) -> BoundsPixel {
     return BoundsPixel(in.id + 1u, bounds_depth(in.at));
 }
 
-// The few that the eye is too near to, by whole pictures.
+// Spheres too near to the eye, drawn over the whole picture.
 struct NearOut {
     @builtin(position) clip: vec4f,
     @location(0) @interpolate(flat) sphere: vec4f,
@@ -224,7 +232,7 @@ fn near_depth(sphere: vec4f, pixel: vec2f) -> f32 {
     return BoundsPixel(in.id + 1u, near_depth(in.sphere, in.clip.xy));
 }
 
-// All spheres of one surface at once, where the nearest is known: each pixel is lit once.
+// All spheres of one surface at once, if the nearest is known: each pixel is lit once.
 @fragment fn fs_sphere_seen(@builtin(position) at: vec4f, @location(0) @interpolate(flat) range: vec2u) -> @location(0) vec4f {
     let id = textureLoad(seen_id, vec2i(at.xy), 0).x - 1u;
     if (id < range.x || id >= range.y) { discard; }
@@ -238,7 +246,7 @@ fn near_depth(sphere: vec4f, pixel: vec2f) -> f32 {
 
 struct SeenOut { @builtin(position) clip: vec4f, @location(0) @interpolate(flat) range: vec2u };
 
-// The whole picture, for the spheres from one number to another.
+// The whole picture, for a range of sphere indices.
 @vertex fn vs_seen(@location(0) range: vec2u, @builtin(vertex_index) index: u32) -> SeenOut {
     return SeenOut(vec4f(select(-1.0, 3.0, index == 1u), select(-1.0, 3.0, index == 2u), 0.0, 1.0), range);
 }

@@ -1,6 +1,6 @@
-// A picture into a window, pixel by pixel.
+// Copies a picture into a window, pixel by pixel.
 struct Place {
-    how: vec4f, // x: 1 where the target keeps numbers as they are and wants sRGB; y, z: the picture's upper left corner, pixels
+    how: vec4f, // x: 1 if the target stores numbers unconverted and needs sRGB; y, z: the picture's upper left corner, pixels
 };
 @group(0) @binding(0) var<uniform> place: Place;
 @group(0) @binding(1) var picture: texture_2d<f32>;

@@ -1,4 +1,5 @@
-//! Capsules that are cast, lamps amid things, textures by coordinates, and the orders of passes: each against closed forms or another way to the same picture.
+//! Ray-cast capsules, lamps amid objects, textures by coordinates, and the orders of passes, each
+//! against a closed form or another way to the same picture.
 
 use crate::support::{area, bare, exact_edges, from_above, linear, picture};
 use nalgebra::{Isometry3, Matrix4, Point3, UnitQuaternion, Vector3};
@@ -15,7 +16,8 @@ fn tipped(angle: f32, at: [f32; 3]) -> Isometry3<f32> {
 
 #[test]
 fn a_capsule_covers_a_disc_and_a_strip() {
-    // 4 m in 400 pixels, seen in parallel: pi r² and 2 r times the length across the view, 2 h sin(angle)
+    // 4 m in 400 pixels, parallel view: pi r² and 2 r times the length across the view, 2 h
+    // sin(angle)
     let mut projection = Matrix4::identity();
     (projection[(0, 0)], projection[(1, 1)], projection[(2, 2)], projection[(2, 3)]) = (0.5, 0.5, -0.1, 0.0);
     let view = Matrix4::look_at_rh(&Point3::new(0.0, 0.0, 5.0), &Point3::origin(), &Vector3::y());
@@ -32,7 +34,8 @@ fn a_capsule_covers_a_disc_and_a_strip() {
     }
 }
 
-/// Triangles of half a pixel: shadow speckled them while their places were a little beside the surface (1,100 pixels of the first pair).
+/// Triangles of half a pixel once had speckled shadows because their points lay slightly off the
+/// surface (1,100 pixels of the first pair).
 #[test]
 fn a_cast_capsule_and_a_tessellated_one_agree() {
     if !exact_edges() {
@@ -59,7 +62,8 @@ fn a_cast_capsule_and_a_tessellated_one_agree() {
         let [Some(cast), Some(mesh)] = pictures else { return };
         let off = |least: u8| cast.rgba.iter().zip(&mesh.rgba).filter(|(a, b)| a.abs_diff(**b) > least).count();
         assert!(area(&mesh, 0) > 500.0, "it is in the picture: {}", area(&mesh, 0));
-        // light within two levels everywhere but at edges of coverage, which may differ by a chord's sagitta
+        // light within two levels everywhere except at edges of coverage, which may differ by a
+        // chord's sagitta
         assert!(
             off(2) < 400 && off(40) < 60,
             "{} channels differ by more than 2 levels, {} by more than 40",
@@ -71,7 +75,8 @@ fn a_cast_capsule_and_a_tessellated_one_agree() {
 
 #[test]
 fn the_shadow_of_a_capsule_lies_where_the_light_leaves_it() {
-    // along y at height 2, light leaning 45 degrees towards +x: around x = 2, 0.3 sqrt 2 wide to both sides, from y = -0.8 to 0.8
+    // along y at height 2, light leaning 45 degrees towards +x: around x = 2, 0.3 sqrt 2 wide to
+    // both sides, from y = -0.8 to 0.8
     let mut list = bare(from_above(10.0));
     let floor = list.add_mesh(MeshData::ground_quad(3.5));
     list.add_instance(floor, Isometry3::identity(), Material { roughness: 1.0, ..Material::matte(WHITE) })
@@ -101,7 +106,7 @@ fn the_shadow_of_a_capsule_lies_where_the_light_leaves_it() {
     );
 }
 
-/// Balls, capsules and blocks that hide and cut each other, over a floor, by colours that take no light.
+/// Spheres, capsules and boxes that hide and cut each other, over a floor, in unlit colors.
 fn medley() -> DrawList {
     let mut list = bare(Camera::look_at(Point3::new(3.0, -2.5, 2.0), Point3::new(0.0, 0.0, 0.3)));
     let cube = list.add_mesh(MeshData::cuboid([0.4, 0.3, 0.35]));
@@ -126,7 +131,8 @@ fn medley() -> DrawList {
     list
 }
 
-/// With one sample per pixel spheres come first, or all depth comes first where occlusion needs it: what is nearest is the same.
+/// With one sample per pixel, spheres are drawn first, or all depth first if occlusion needs it.
+/// The nearest surface is the same.
 #[test]
 fn whichever_depth_comes_first_the_nearest_is_seen() {
     let mut list = medley();
@@ -135,9 +141,10 @@ fn whichever_depth_comes_first_the_nearest_is_seen() {
     list.settings.occlusion_m = Some(0.2);
     let all_first = picture(&list, 300, 200).expect("an adapter");
     let differing = spheres_first.rgba.chunks(4).zip(all_first.rgba.chunks(4)).filter(|(a, b)| a != b).count();
-    // where a cast surface and a mesh meet, depths that differ in their last bits may change places
+    // at the intersection of a cast surface and a mesh, depths that differ in their last bits may
+    // swap
     assert!(differing < 10, "{differing} pixels differ");
-    // and with four samples, but for edges
+    // and with four samples, except at edges
     list.settings.samples = 4;
     let smooth = picture(&list, 300, 200).expect("an adapter");
     let inside = spheres_first.rgba.chunks(4).zip(smooth.rgba.chunks(4)).filter(|(a, b)| a == b).count();
@@ -146,8 +153,9 @@ fn whichever_depth_comes_first_the_nearest_is_seen() {
 
 #[test]
 fn a_lamp_amid_posts_throws_a_shadow_behind_each() {
-    // the lamp at height 1, plates 0.5 high and 0.4 wide at a distance of 1 in eight directions: the shadow of each reaches from 1 to 1 / (1 - 0.5) = 2, and
-    // is 0.2 times the distance wide to both sides
+    // the lamp at height 1, plates 0.5 high and 0.4 wide at a distance of 1 in eight directions:
+    // the shadow of each reaches from 1 to 1 / (1 - 0.5) = 2, and is 0.2 times the distance wide to
+    // both sides
     let mut list = bare(from_above(10.0));
     let floor = list.add_mesh(MeshData::ground_quad(3.5));
     list.add_instance(floor, Isometry3::identity(), Material { roughness: 1.0, ..Material::matte(WHITE) })
@@ -162,7 +170,7 @@ fn a_lamp_amid_posts_throws_a_shadow_behind_each() {
             Material::unlit([0.0; 3]),
         );
     }
-    // something above the lamp, so that it hangs amid
+    // an object above the lamp puts it inside the box of the casters
     list.add_instance(plate, Isometry3::translation(0.0, 0.0, 2.0), Material::unlit([0.0; 3]));
     list.lights.push(Light::Point {
         position: Point3::new(0.0, 0.0, 1.0),
@@ -196,7 +204,8 @@ fn a_lamp_amid_posts_throws_a_shadow_behind_each() {
     }
 }
 
-/// A cube whose faces wear a texture of a red and a blue half: by its coordinates the halves lie apart along y on the face above.
+/// A cube whose faces have a texture of a red and a blue half: by its coordinates the halves are
+/// apart along y on the top face.
 #[test]
 fn a_texture_lies_where_the_coordinates_of_the_file_say() {
     let folder = std::env::temp_dir().join(format!("tumble-unwrapped-{}", std::process::id()));

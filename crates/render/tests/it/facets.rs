@@ -1,4 +1,5 @@
-//! Facets against geometry worked out otherwise: corners, shared edges, ray casting through a cube, one wall in parts.
+//! Facets against independent geometry: corners, shared edges, ray casting through a cube, one wall
+//! in parts.
 
 use crate::support::{bare, picture, picture_from};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
@@ -76,7 +77,8 @@ fn a_wall_measured_out_of_square_is_filled_to_its_corners() {
     }
 }
 
-/// The ray from the eye is met with the screen by plane geometry, and depth by its definition.
+/// The ray from the eye is intersected with the screen by plane geometry; depth follows from its
+/// definition.
 #[test]
 fn points_land_where_their_ray_meets_the_screen() {
     let (screen, mut random) = (resolve_cave("cylinder5").unwrap().load().unwrap().screens[3].clone(), Random(2));
@@ -113,7 +115,8 @@ fn both_pictures_of_a_shared_edge_have_its_points_at_the_same_place() {
         let facing =
             Vector3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), random.within(-1.0, 1.0)).normalize();
         let [width, height] = cave.facets[0].size_px;
-        // a point of the edge as the first screen has it, and something beyond or before it on the same ray
+        // a point of the edge as the first screen has it, and something beyond or before it on the
+        // same ray
         let screen = &cave.screens[gap.first.0];
         let (ll, u, v) = (screen.lower_left_m, screen.across(), screen.upward());
         let t = random.next();
@@ -130,7 +133,7 @@ fn both_pictures_of_a_shared_edge_have_its_points_at_the_same_place() {
                 let view = FacetView::new(eye, corners(&cave.screens[screen]), 0.05, 500.0).unwrap();
                 let [x, y] = view.pixel(&point, width, height).unwrap();
                 let (w, h) = (f64::from(width), f64::from(height));
-                // how far off the picture's edge, and how far along it from the edge's first corner
+                // distance off the picture's edge, and along it from the edge's first corner
                 let (off, at) = [(y - h, x), (x - w, h - y), (y, x), (x, h - y)][edge];
                 worst = worst.max(off.abs());
                 let s = &cave.screens[screen];
@@ -159,7 +162,7 @@ fn six_faces_see_every_direction_once_and_where_it_meets_the_cube() {
             0 => Vector3::new([-1.5, 1.5][k / 3 % 2], [-1.5, 1.5][k / 6 % 2], random.within(0.0, 3.0)) - eye.coords,
             _ => Vector3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), random.within(-1.0, 1.0)),
         };
-        // slabs: the least way out of the room
+        // slabs: the shortest distance out of the room
         let way = (0..3).map(|a| {
             let (lo, hi) = if a == 2 { (0.0, 3.0) } else { (-1.5, 1.5) };
             ((if direction[a] > 0.0 { hi } else { lo }) - eye[a]) / direction[a]
@@ -216,7 +219,8 @@ fn unfolded_caves_are_nets_without_overlap() {
     }
 }
 
-/// A window is made of the size that an unfolded cave has, and the cave is then unfolded into the window.
+/// A window is created with the size of an unfolded cave, and the cave is then unfolded into the
+/// window.
 #[test]
 fn what_is_unfolded_into_its_own_size_stays_as_it_is() {
     for cave in tumble_scene::cave::shipped_caves() {
@@ -235,7 +239,8 @@ fn what_is_unfolded_into_its_own_size_stays_as_it_is() {
 
 // Pictures.
 
-/// Things, a floor, sun and lamp shadows, occlusion, gloss: all that could depend on the facet.
+/// Objects, a floor, sun and lamp shadows, occlusion, gloss: everything that could depend on the
+/// facet.
 fn still_life() -> DrawList {
     let mut list = bare(tumble_render::Camera::default());
     (list.sky, list.settings) = Default::default();
@@ -264,7 +269,8 @@ fn still_life() -> DrawList {
 
 const EYE: Point3<f64> = Point3::new(0.3, 0.0, 1.6);
 
-/// The part of a wall 6 m wide and 2 m high at y = 2 from `from` to `to` of its width, in a picture of so many pixels.
+/// The part of a wall 6 m wide and 2 m high at y = 2 from `from` to `to` of its width, in a picture
+/// of this size in pixels.
 fn part_of_wall(list: &DrawList, eye: Point3<f64>, from: f64, to: f64, width: u32, height: u32) -> Option<Image> {
     let at = |t: f64, z: f64| Point3::new(-3.0 + 6.0 * t, 2.0, z);
     let view = FacetView::new(eye, [at(from, 0.2), at(to, 0.2), at(from, 2.2)], 0.05, 200.0)
@@ -298,7 +304,8 @@ fn joined(parts: &[Image]) -> Image {
     Image { width, height, rgba: rows.collect() }
 }
 
-/// What is off lies at edges of things, whose corners are rounded to a fraction of a pixel that is not the same for each part.
+/// Differences lie at edges of objects, whose corners are rounded to a fraction of a pixel that
+/// differs between the parts.
 #[test]
 fn a_wall_in_parts_is_the_wall() {
     let all = 768 * 256;
@@ -348,7 +355,7 @@ fn a_wall_in_parts_is_the_wall() {
                 elsewhere.len()
             );
         }
-        // and it would show: each part from an eye 2 cm aside of where it belongs
+        // and a fault would show: each part from an eye 2 cm off
         let aside = joined(
             &(0..3)
                 .filter_map(|i| {
@@ -368,8 +375,8 @@ fn a_wall_in_parts_is_the_wall() {
     }
 }
 
-/// Along the edge where two walls meet at a right angle, the last column of one and the first of the other are neighbours like any
-/// two columns: brightness does not jump there.
+/// Along the edge of two walls at a right angle, the last column of one and the first of the other
+/// are neighbors like any two columns: brightness does not jump there.
 #[test]
 fn brightness_does_not_jump_where_walls_meet() {
     let list = still_life();

@@ -1,8 +1,10 @@
-//! Pictures of all shipped scenes, and of one cave, beside ones that were looked at and kept: one set per interface (Vulkan, OpenGL), because
-//! they differ in edges. `TUMBLE_KEEP_PICTURES=1` writes them anew (`make goldens`, and `VK_ICD_FILENAMES=/none make goldens` for OpenGL); then look at them before they are committed.
+//! Pictures of all shipped scenes, and of one cave, against golden pictures that were inspected.
+//! There is one set per interface (Vulkan, OpenGL), because they differ at edges.
+//! `TUMBLE_KEEP_PICTURES=1` writes them again (`make goldens`, and `VK_ICD_FILENAMES=/none make
+//! goldens` for OpenGL); they are inspected before they are committed.
 //!
-//! The measure: pictures are made 4 times smaller in linear light, which forgives a pixel's edge, and may then differ by [`MEAN_LEVELS`] on the average and by
-//! [`MAX_LEVELS`] anywhere.
+//! The measure: pictures are reduced 4 times in linear light, which tolerates a pixel's edge. They
+//! may then differ by [`MEAN_LEVELS`] on average and by [`MAX_LEVELS`] anywhere.
 
 use crate::support::renderer;
 use std::path::PathBuf;
@@ -14,7 +16,7 @@ use tumble_scene::cave::resolve_cave;
 const SIZE: [u32; 2] = [192, 108];
 const MEAN_LEVELS: f64 = 1.0;
 const MAX_LEVELS: f64 = 24.0;
-/// Moments of a scene that are looked at, frames.
+/// The frame of a scene that is compared.
 const FRAMES: u64 = 24;
 
 fn pictures(renderer: &mut Renderer, only: Option<&str>) -> Vec<(String, Image)> {
@@ -50,7 +52,7 @@ fn pictures_of_shipped_scenes_are_those_that_were_looked_at() {
     compare(None);
 }
 
-/// Draws one scene where the variable says so; told by the test below.
+/// Draws one scene if the environment variable names it; the test below starts it as a process.
 #[test]
 #[ignore = "a child of the test below"]
 fn child_draws_one_scene() {
@@ -60,7 +62,7 @@ fn child_draws_one_scene() {
     }
 }
 
-/// Where no driver of Vulkan is found OpenGL draws, and the same to the eye.
+/// Without a Vulkan driver OpenGL draws, and the result looks the same.
 #[test]
 fn without_vulkan_opengl_draws() {
     if renderer().is_none() {
@@ -89,7 +91,7 @@ fn without_vulkan_opengl_draws() {
     assert!(output.status.success() && said.contains("Gl)"), "{said}");
 }
 
-/// Compares pictures of all scenes, or of one, with those that are kept.
+/// Compares pictures of all scenes, or of one, with the golden ones.
 fn compare(only: Option<&str>) {
     let Some(mut renderer) = renderer() else { return };
     let interface = if renderer.adapter().contains("Gl)") { "opengl" } else { "vulkan" };

@@ -55,7 +55,7 @@ mesh 1: 3 vertices 1 triangles from (0 0 0) to (2 2 0) unwrapped
 texture 0: 2 x 1
 instance 0: mesh 0 at (1 0 0.5) turned (0 0 0 1) scale (1 1 1) color (0.8 0.3 0.2) rough 0.45 metal 0 coat 0 no shadow
 instance 1: mesh 1 at (0 0 0) turned (0 0 0 1) scale (1 1 2) color (1 1 1) rough 0.45 metal 0 coat 0 unlit texture 0 every 1
-sphere 0: at (0 0 0.25) radius 0.25 turned (0 0 0 1) color (0.82 0.08 0.07) rough 0.25 metal 0 coat 1 pattern ball (0 0 0) (11 1)
+sphere 0: at (0 0 0.25) radius 0.25 turned (0 0 0 1) color (0.82 0.08 0.07) rough 0.25 metal 0 coat 1 pattern billiard_ball (0 0 0) (11 1)
 capsule 0: at (0 2 1) turned (0 0 0 1) half length 0.5 radius 0.125 color (0.42 0.25 0.14) rough 0.5 metal 1 coat 0.2 pattern wood (0.2 0.1 0.05) (0.012 0) texture 0 every 0.25 no shadow
 arrow 0: from (0 0 0) to (0 0 1) color (1 0 0) opacity 1 width 2 on top
 line 1: from (0 0 0) to (1 2 3) color (0 1 0) opacity 1 width 2
@@ -66,7 +66,7 @@ shell 1: at (0 0 0) radius 1 color (1 1 0) opacity 0.25 width 2
     assert_eq!(sample().to_text(), expected);
 }
 
-/// Particles are small balls: of 40 none becomes triangles.
+/// Particles are small spheres: none of 40 becomes triangles.
 #[test]
 fn a_flock_is_forty_cast_spheres_and_no_mesh() {
     let scene = SceneFile::parse(
@@ -162,7 +162,7 @@ fn rings_stand_where_the_scene_says_though_the_body_turns_about_its_centre_of_ma
     let scene = SceneFile::parse(text, "s.toml").expect("a right scene");
     let (world, _) = scene.build().expect("a right world");
     let list = Drawing::new(&scene).list(&world, &DebugDraw::default()).expect("a small mesh");
-    // the centre of mass of a cone is a quarter of its height above its base: 1 m
+    // the center of mass of a cone is a quarter of its height above its base: 1 m
     let Pattern::Rings { other, from_m, to_m } = list.instances[0].material.pattern else {
         panic!("rings, not {:?}", list.instances[0].material.pattern)
     };
@@ -182,7 +182,7 @@ fn every_preset_is_known_and_others_are_not() {
     assert_eq!(Material::preset("velvet", None), None);
 }
 
-/// A body with a camera and a lamp, one with a sphere tree, one of each quality.
+/// A body with a camera and a lamp, one with a sphere tree, one of each detail.
 const CARRIER: &str = "[camera]\neye_m = [0, -5, 2]\ntarget_m = [0, 0, 0]\n\
     [[body]]\nname = \"cart\"\nmode = \"static\"\nshape = { type = \"box\", size_m = [1, 1, 1] }\nposition_m = [2, 0, 1]\nrotation_deg = [0, 0, 90]\ndetail = \"wireframe\"\n\
     camera = { position_m = [0.5, 0, 0.5], vertical_fov_deg = 60 }\nlight = { type = \"point\", position_m = [0, 0, 1], color = \"#ff0000\", intensity = 2 }\n\
@@ -196,7 +196,8 @@ fn bodies_carry_cameras_and_lights_with_them() {
     let views = list.views(&world);
     assert_eq!(views.iter().map(|v| v.name.as_str()).collect::<Vec<_>>(), ["scene", "cart"]);
     assert_eq!(views[0].camera, list.camera);
-    // a quarter turn to the left: ahead is the world's y, and (0.5, 0, 0.5) of the cart lies at (2, 0.5, 1.5)
+    // a quarter turn to the left: ahead is the world's y, and (0.5, 0, 0.5) of the cart lies at (2,
+    // 0.5, 1.5)
     list.look_from(&world, "cart").unwrap();
     assert!(
         list.to_text()
@@ -207,7 +208,7 @@ fn bodies_carry_cameras_and_lights_with_them() {
     let lamp = list.to_text().lines().find(|l| l.contains("point at")).unwrap().to_owned();
     assert_eq!(lamp, "light 1: point at (2 0 2) color (1 0 0) intensity 3.4 radius 0.1 no shadow");
     let error = list.look_from(&world, "crat").unwrap_err().to_string();
-    assert_eq!(error, "no camera is named 'crat'; there are: scene, cart");
+    assert_eq!(error, "no camera is named 'crat'; wanted one of scene, cart");
     let wrong =
         SceneFile::parse(&CARRIER.replace("vertical_fov_deg = 60", "vertical_fov_deg = 60, up = [1, 0, 0]"), "s.toml")
             .unwrap_err()
@@ -232,7 +233,7 @@ fn quality_says_how_much_of_an_object_is_drawn() {
     drawing.detail = Some("simplified".parse().unwrap());
     let simple = drawing.list(&world, &DebugDraw::default()).unwrap();
     assert!(triangles(&simple) * 2 < triangles(&full), "{} of {}", triangles(&simple), triangles(&full));
-    // level 0 of a tree is one ball that holds the post: at least half its diagonal
+    // level 0 of a tree is one sphere that contains the post: at least half its diagonal
     drawing.detail = Some("sphere_tree=0".parse().unwrap());
     let balls = drawing.list(&world, &DebugDraw::default()).unwrap();
     assert_eq!(balls.spheres.len(), 1);
@@ -305,7 +306,7 @@ fn what_stands_still_is_told_from_what_moves() {
     let [box_, ball, capsule] =
         [list.instances[0].material.color, list.spheres[0].material.color, list.capsules[0].material.color];
     assert!(world.asleep(world.find("lies").unwrap()));
-    // blue-grey, orange, and as it is
+    // blue-gray, orange, and unchanged
     assert!(
         box_[2] > box_[0] && ball[0] > 2.0 * ball[2] && capsule == [0.0, 1.0, 0.0],
         "{box_:?} {ball:?} {capsule:?}"

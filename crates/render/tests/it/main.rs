@@ -1,4 +1,5 @@
-//! One binary for all tests of the crate; what needs a graphics adapter says so visibly where there is none.
+//! All tests of the crate in one binary. Tests that need a graphics adapter print that they are
+//! skipped if there is none.
 
 mod cameras;
 mod cast;

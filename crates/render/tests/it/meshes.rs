@@ -1,4 +1,5 @@
-//! Mesh constructors against closed forms: volume by the divergence theorem, area, orientation, crease splitting.
+//! Mesh constructors against closed forms: volume by the divergence theorem, area, orientation,
+//! crease splitting.
 
 use nalgebra::Vector3;
 use std::f32::consts::PI;
@@ -58,7 +59,8 @@ fn solids_have_their_volume_and_outward_normals() {
 
 #[test]
 fn a_rounded_box_is_the_sum_of_a_box_and_a_ball() {
-    // Steiner: V = V0 + A0 r + (sum of the 12 edges) pi r^2 / 4 + 4/3 pi r^3 for the core of half extents h - r
+    // Steiner: V = V0 + A0 r + (sum of the 12 edges) pi r^2 / 4 + 4/3 pi r^3 for the core of half
+    // extents h - r
     let (half, r) = ([1.0f32, 1.5, 2.0], 0.4f32);
     let [a, b, c] = half.map(|h| 2.0 * (h - r));
     let expected =
@@ -84,7 +86,8 @@ fn creases_split_and_smooth_edges_do_not() {
     let soft = MeshData::from_triangles(&points, &faces, PI).expect("valid");
     assert_eq!(soft.positions.len(), 8, "no split at a crease angle of 180 degrees");
     for (p, n) in soft.positions.iter().zip(&soft.normals) {
-        // weighted by angle, each of the three faces counts 90 degrees: the normal is the diagonal however faces are cut
+        // weighted by angle, each of the three faces counts 90 degrees: the normal is the diagonal
+        // however faces are cut
         assert!((Vector3::from(*n) - Vector3::from(*p).normalize()).norm() < 1e-5, "{n:?} at {p:?}");
     }
 }

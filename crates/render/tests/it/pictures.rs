@@ -16,9 +16,10 @@ fn block(list: &mut DrawList, half: [f32; 3], at: [f32; 3], color: [f32; 3]) -> 
     list.add_instance(mesh, Isometry3::translation(at[0], at[1], at[2]), Material::unlit(color))
 }
 
-/// Semi-axes and centre (pixels) of the ellipse as which a ball appears whose centre lies on the picture's horizontal middle line, `angle` off
-/// the axis and `distance` away: its cone of half angle a = asin(r/d) meets the plane at unit distance between tan(angle - a) and tan(angle + a).
-/// Along y the ellipse's half width is sin a / sqrt(cos(angle + a) cos(angle - a)).
+/// Semi-axes and center (pixels) of the ellipse of a sphere whose center is on the picture's
+/// horizontal middle line, `angle` off the axis and `distance` away: its cone of half angle a =
+/// asin(r/d) meets the plane at unit distance between tan(angle - a) and tan(angle + a). Along y
+/// the ellipse's half width is sin a / sqrt(cos(angle + a) cos(angle - a)).
 fn outline(radius: f64, distance: f64, angle: f64, pixels_per_tan: f64) -> (f64, f64, f64) {
     let a = (radius / distance).asin();
     let (left, right) = ((angle - a).tan(), (angle + a).tan());
@@ -35,7 +36,7 @@ fn a_ball_in_the_middle_has_the_radius_of_its_cone() {
     let (a, b, _) = outline(1.0, 5.0, 0.0, pixels_per_tan);
     let (sum, x, y) = moments(&image, 0);
     assert!((sum / (PI * a * b) - 1.0).abs() < 2e-3, "area {sum}, expected {}", PI * a * b);
-    assert!((x - 200.0).abs() < 0.02 && (y - 200.0).abs() < 0.02, "centre {x} {y}");
+    assert!((x - 200.0).abs() < 0.02 && (y - 200.0).abs() < 0.02, "center {x} {y}");
 }
 
 #[test]
@@ -50,7 +51,7 @@ fn a_ball_at_the_side_is_the_predicted_ellipse() {
     assert!((sum / (PI * a * b) - 1.0).abs() < 3e-3, "area {sum}, expected {}", PI * a * b);
     assert!(
         (mx - 200.0 - center).abs() < 0.05 && (my - 200.0).abs() < 0.02,
-        "centre {mx} {my}, expected {}",
+        "center {mx} {my}, expected {}",
         200.0 + center
     );
 }
@@ -60,13 +61,15 @@ fn a_box_covers_its_projected_face() {
     let mut list = bare(from_above(5.0));
     block(&mut list, [0.5, 0.25, 0.5], [0.3, -0.2, 0.0], WHITE);
     let Some(image) = picture(&list, 400, 400) else { return };
-    // the top face, 4.5 m below the eye, from x -0.2 to 0.8 and y -0.45 to 0.05; it reaches over the axis, so that it hides all sides
+    // the top face, 4.5 m below the eye, from x -0.2 to 0.8 and y -0.45 to 0.05; it extends across
+    // the axis, so it hides all sides
     let scale = 200.0 / 0.4f64.tan();
     let hull = 1.0 * 0.5 * (scale / 4.5).powi(2);
     let sum = area(&image, 0);
     // edges along the pixel grid are known to an eighth of a pixel with four samples
     assert!((sum / hull - 1.0).abs() < 4e-3, "area {sum}, expected {hull}");
-    // edges: left edge of the top face at x = 200 + scale * -0.2/4.5, lower edge at y = 200 + scale * 0.45/4.5
+    // edges: left edge of the top face at x = 200 + scale * -0.2/4.5, lower edge at y = 200 + scale
+    // * 0.45/4.5
     let edge_x = (200.0 - scale * 0.2 / 4.5).floor() as u32;
     let edge_y = (200.0 + scale * 0.45 / 4.5).floor() as u32;
     assert_eq!((linear(&image, edge_x - 1, 200, 0), linear(&image, edge_x + 1, 200, 0)), (0.0, 1.0));
@@ -92,7 +95,8 @@ fn a_cast_ball_and_a_tessellated_one_agree() {
     let differing = cast.rgba.chunks(4).zip(mesh.rgba.chunks(4)).filter(|(a, b)| a != b).count();
     let inner = cast.rgba.chunks(4).filter(|p| p[0] == 255).count();
     assert!(inner > 5000, "the ball is in the picture: {inner}");
-    // same samples, same outline: only samples within a chord's sagitta (0.02 pixels) of the edge may differ
+    // same samples, same outline: only samples within a chord's sagitta (0.02 pixels) of the edge
+    // may differ
     assert!(differing < 20, "{differing} pixels differ");
     assert!((area(&cast, 0) - area(&mesh, 0)).abs() < 6.0, "{} and {}", area(&cast, 0), area(&mesh, 0));
 }
@@ -122,7 +126,8 @@ fn edges_have_quarter_steps() {
 
 #[test]
 fn nearer_things_hide_farther_ones_in_any_order() {
-    // along the axis from the eye at 5 m: red ball top at 2.0, green box top at 1.5, blue sphere top at 1.0
+    // along the axis from the eye at 5 m: red sphere top at 2.0, green box top at 1.5, blue sphere
+    // top at 1.0
     let build = |order: [usize; 3]| {
         let mut list = bare(from_above(5.0));
         for k in order {
@@ -147,7 +152,8 @@ fn nearer_things_hide_farther_ones_in_any_order() {
 
 #[test]
 fn a_ball_sinks_into_a_floor_at_its_waterline() {
-    // a ball of radius 1 whose centre lies 0.6 below a plate: what sticks out is a cap of radius sqrt(1 - 0.36) = 0.8
+    // a sphere of radius 1 with its center 0.6 below a plate: a cap of radius sqrt(1 - 0.36) = 0.8
+    // sticks out
     let mut list = bare(from_above(10.0));
     ball(&mut list, [0.0, 0.0, -0.6], 1.0, [1.0, 0.0, 0.0]);
     let plate = list.add_mesh(MeshData::ground_quad(3.0));
@@ -163,7 +169,8 @@ fn off_axis_projection_shifts_the_picture() {
     if !exact_edges() {
         return;
     }
-    // a frustum through the window x 0..2, y -1..1 at distance 1: the point straight ahead lies on the left edge
+    // a frustum through the window x 0..2, y -1..1 at distance 1: the point straight ahead lies on
+    // the left edge
     let mut projection = Matrix4::zeros();
     (projection[(0, 0)], projection[(0, 2)], projection[(1, 1)]) = (1.0, 1.0, 1.0);
     let (near, far) = (0.1, 100.0);
@@ -174,7 +181,8 @@ fn off_axis_projection_shifts_the_picture() {
     let mut list = bare(Camera::Raw { view, projection });
     ball(&mut list, [5.0, 0.0, 0.0], 0.5, WHITE);
     let Some(image) = picture(&list, 400, 400) else { return };
-    // its middle direction has tangent 1: window x = 1 of 0..2, the middle of the picture; the ellipse's centre as in `outline`
+    // its middle direction has tangent 1: window x = 1 of 0..2, the middle of the picture; the
+    // ellipse's center as in `outline`
     let (a, b, center) = outline(0.5, 50f64.sqrt(), PI / 4.0, 200.0);
     let (sum, x, y) = moments(&image, 0);
     assert!((sum / (PI * a * b) - 1.0).abs() < 5e-3, "area {sum}, expected {}", PI * a * b);
@@ -241,12 +249,14 @@ fn balls_at_behind_and_around_the_eye() {
         ball(&mut list, center, 1.0, WHITE);
         picture(&list, 100, 100).map(|image| area(&image, 0) / 1e4)
     };
-    // 1.2 radii before the eye a ball spans asin(1/1.2) = 0.985 rad to each side: more than the 0.4 of the picture and the 0.54 of its corners
+    // 1.2 radii in front of the eye a sphere spans asin(1/1.2) = 0.985 rad to each side: more than
+    // the 0.4 of the picture and the 0.54 of its corners
     let Some(close) = white_share([0.0, 0.0, 3.8]) else { return };
     assert_eq!(close, 1.0);
     assert_eq!(white_share([0.0, 0.0, 6.5]), Some(0.0), "behind the eye");
     assert_eq!(white_share([0.0, 0.0, 4.9]), Some(0.0), "around the eye: its back is not drawn");
-    // abreast of the eye, its nearest direction pi/2 - asin(1/1.05) = 0.31 rad off the axis: only pixels beyond tan 0.31 to that side
+    // abreast of the eye, its nearest direction pi/2 - asin(1/1.05) = 0.31 rad off the axis: only
+    // pixels beyond tan 0.31 to that side
     let share = white_share([1.05, 0.0, 5.0]).expect("an adapter");
     assert!(share > 0.05 && share < 0.14, "{share}");
 }

@@ -1,4 +1,4 @@
-//! What happens to finished pictures of facets: both eyes, mirrors, warps, blends, calibration.
+//! Finishing of facet pictures: stereo, mirroring, warps, blends, calibration.
 
 use crate::support::renderer;
 use nalgebra::{Point3, Vector3};
@@ -43,14 +43,15 @@ fn a_mirroring_warp_mirrors_and_a_half_leaves_the_rest_black() {
             assert_eq!(mirrored.pixel(x, y), image.pixel(19 - x, y));
         }
         assert!((10..20).all(|x| half.pixel(x, y) == Some([0, 0, 0, 255])));
-        // the fourth pixel shows what lies between the seventh and the eighth
+        // the fourth pixel shows the point between the seventh and the eighth
         let between = |k: usize| (image.pixel(6, y).unwrap()[k], image.pixel(7, y).unwrap()[k]);
         let got = half.pixel(3, y).unwrap();
         assert!((0..3).all(|k| got[k] >= between(k).0.min(between(k).1) && got[k] <= between(k).0.max(between(k).1)));
     }
 }
 
-/// A grid of 3 x 3 places whose corner lies a little outside shows the picture's edge there, as an OBJ does; one marked by -1 stays black with its cell.
+/// A grid of 3 x 3 places whose corner is slightly outside shows the picture's edge there, as an
+/// OBJ does. A place marked by -1 stays black with its cell.
 #[test]
 fn a_place_slightly_outside_blacks_out_no_cell() {
     let image = colorful(40, 40);
@@ -87,11 +88,12 @@ fn bad_warps_say_what_is_wrong_and_where() {
     for pixels in ["v 0 0\nv 480 320\n", "v 0 0\nvt 480 320\n", "v 0 0\nv 1.6 0\n", "v 0 0\nv 0 -0.6\n"] {
         assert!(obj(pixels).starts_with("line 2: wanted `v") && obj(pixels).contains("not pixels"), "{}", obj(pixels));
     }
-    // one that a projector throws past its screen
+    // a grid for a projector that throws past its screen
     assert!(Warp::from_obj(b"v -0.2 -0.2\nv 1.3 -0.2\nv 0.5 1.5\nvt -0.1 0\nvt 1.1 0\nvt 0.5 1.2\nf 1 2 3\n").is_ok());
-    // quads over the whole picture are two triangles with a box of one picture each: 50 are let through
+    // quads over the whole picture are two triangles with a box of one picture each: 50 are
+    // accepted
     assert!(Warp::from_obj(format!("{UNIT}{}", "f 1 2 3 4\n".repeat(50)).as_bytes()).is_ok());
-    assert!(obj(&format!("{UNIT}{}", "f 1 2 3 4\n".repeat(3000))).contains("cover the picture 6000 times over"));
+    assert!(obj(&format!("{UNIT}{}", "f 1 2 3 4\n".repeat(3000))).contains("cover the picture 6000 times"));
     assert!(obj(&format!("{UNIT}f 1/1 2/2\n")).contains("a face of 2 corners"));
     assert!(obj("# nothing\n").contains("has no faces"));
     let pfm = |bytes: &[u8]| Warp::from_pfm(bytes).unwrap_err();
@@ -122,7 +124,7 @@ fn a_blend_takes_its_share_of_the_light() {
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
-/// What caves are refused by is what the renderer can draw.
+/// The limits on cave files are those of the renderer.
 #[test]
 fn cave_files_know_how_large_a_picture_may_be() {
     use tumble_scene::cave::{MAX_PIXELS, MAX_SIDE_PX, RIM_PX};
@@ -144,7 +146,7 @@ fn empty_scene() -> SceneFile {
     SceneFile::parse("[cave]\norigin_m = [0, 0, 0]\n", "my.toml").unwrap()
 }
 
-/// A white ball, unlit surroundings: 4 m ahead at eye height, behind the screen.
+/// A white sphere in unlit surroundings: 4 m ahead at eye height, behind the screen.
 fn ball() -> DrawList {
     let mut list = crate::support::bare(tumble_render::Camera::default());
     list.add_sphere(Point3::new(0.0, 4.0, 1.0), 0.2, nalgebra::UnitQuaternion::identity(), Material::unlit([1.0; 3]));
@@ -168,8 +170,9 @@ fn eyes_see_the_ball_apart_by_what_similar_triangles_say() {
         let view = CaveView::new(cave(facet), &empty_scene()).unwrap();
         view.draw(&mut renderer, &ball(), &view.cave().facets[0]).unwrap()
     };
-    // eyes 0.1 m apart, screen at 2 m, ball at 4 m: its pictures on the screen are 0.05 m apart, at 50 pixels to the metre; the left eye sees it left... of
-    // its own axis to the right: at -0.05 + 0.05 * 2 / 4 = -0.025 m
+    // eyes 0.1 m apart, screen at 2 m, sphere at 4 m: its images on the screen are 0.05 m apart, at
+    // 50 pixels per meter; the left eye sees it to the right of its own axis: at -0.05 + 0.05 * 2 /
+    // 4 = -0.025 m
     let side = draw("stereo = \"side_by_side\"");
     assert_eq!((side.width, side.height), (200, 100));
     let (left, right) = (middle(&side, 0, 0, 100), middle(&side, 0, 100, 200) - 100.0);
@@ -210,7 +213,8 @@ fn flips_mirror_the_finished_picture() {
     assert_ne!(plain, across);
 }
 
-/// Mirrors are for projectors behind the screen: each eye's picture is mirrored in its own half, and stays with its eye.
+/// Mirroring is for projectors behind the screen: each eye's picture is mirrored in its own half
+/// and stays with its eye.
 #[test]
 fn each_eye_is_mirrored_in_its_own_place() {
     let Some(mut renderer) = renderer() else { return };
@@ -253,7 +257,8 @@ fn a_scene_puts_its_cave_and_scales_it() {
     // the screen's middle is at (0, 2, 1) of the cave
     let ndc = eye.project(&Point3::new(10.0 - 4.0, 20.0, 32.0)).unwrap();
     assert!(ndc.x.abs() < 1e-12 && ndc.y.abs() < 1e-12, "{ndc:?}");
-    // without [cave] the user stands with the eye at the camera, upright, facing as it does: here along x
+    // without [cave] the user stands with the eye at the camera, upright, facing as it does: here
+    // along x
     let scene = SceneFile::parse("[camera]\neye_m = [1, 2, 3]\ntarget_m = [4, 2, 1]\n", "my.toml").unwrap();
     let view = CaveView::new(cave(""), &scene).unwrap();
     let ndc = view.eye(&view.cave().facets[0], 0.0).unwrap().project(&Point3::new(9.0, 2.0, 3.0)).unwrap();
@@ -262,7 +267,7 @@ fn a_scene_puts_its_cave_and_scales_it() {
 
 #[test]
 fn calibration_pictures_have_their_lines_where_a_tape_measures_them() {
-    // 2 m on 400 pixels: half metres are 100 pixels apart, and the middle cross at 200
+    // 2 m on 400 pixels: half meters are 100 pixels apart, and the middle cross at 200
     let mut cave = cave("");
     cave.facets[0].size_px = [400, 400];
     let grid = calibration_picture(&cave, &cave.facets[0], CalibrationPattern::Grid);
@@ -271,13 +276,13 @@ fn calibration_pictures_have_their_lines_where_a_tape_measures_them() {
     assert!((0..400).all(|i| white(i, 0) && white(i, 399) && white(0, i) && white(399, i)), "the rim");
     assert!(
         white(99, 30) && white(100, 30) && white(300, 30) && !white(103, 30) && !white(200, 30),
-        "lines of half a metre"
+        "lines of half a meter"
     );
     for shipped in shipped_caves() {
         let cave = shipped.read().unwrap();
         let facet = &cave.facets[0];
         let pictures =
-            ["grid", "corners", "colours", "name"].map(|word| calibration_picture(&cave, facet, word.parse().unwrap()));
+            ["grid", "corners", "colors", "name"].map(|word| calibration_picture(&cave, facet, word.parse().unwrap()));
         for picture in &pictures {
             assert_eq!([picture.width, picture.height], facet.whole_px());
             let lit = picture.rgba.chunks_exact(4).filter(|p| p[..3].iter().any(|&c| c > 60)).count();
@@ -295,7 +300,7 @@ fn calibration_pictures_of_every_small_size_are_drawn() {
     let sizes = (1..=64).flat_map(|h| (1..=64).map(move |w| [w, h])).chain((1..=64).flat_map(|n| [[500, n], [n, 500]]));
     for size in sizes {
         cave.facets[0].size_px = size;
-        for word in ["grid", "corners", "colours", "name"] {
+        for word in ["grid", "corners", "colors", "name"] {
             let picture = calibration_picture(&cave, &cave.facets[0], word.parse().unwrap());
             assert_eq!(
                 ([picture.width, picture.height], picture.rgba.len() as u32),
@@ -306,7 +311,8 @@ fn calibration_pictures_of_every_small_size_are_drawn() {
     }
 }
 
-/// A cave whose facet bends its picture by a wavy grid and darkens it towards an edge; the files are in a folder of their own.
+/// A cave whose facet warps its picture by a wavy grid and darkens it towards an edge; the files
+/// are in a folder of their own.
 fn bent_cave(folder: &std::path::Path, facet: &str) -> CaveView {
     std::fs::create_dir_all(folder).unwrap();
     let (mut obj, n) = (String::new(), 8);
@@ -323,7 +329,7 @@ fn bent_cave(folder: &std::path::Path, facet: &str) -> CaveView {
     for y in 0..n {
         for x in 0..n {
             let a = y * (n + 1) + x + 1;
-            // a corner of the grid stays away, and black
+            // a corner of the grid is missing, and black
             if x + y > 0 {
                 obj += &[a, a + 1, a + n + 2, a + n + 1].iter().fold("f".to_string(), |f, i| format!("{f} {i}/{i}"));
                 obj += "\n";

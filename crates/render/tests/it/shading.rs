@@ -4,7 +4,7 @@ use crate::support::{bare, from_above, linear, picture, white_sun};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use tumble_render::{Camera, DrawList, Image, Light, Material, MeshData, Sky};
 
-/// A dull floor of sRGB white and nothing else on it.
+/// A matte floor of sRGB white and nothing else on it.
 fn floor(list: &mut DrawList, half: f32) {
     let quad = list.add_mesh(MeshData::ground_quad(half));
     let dull = Material { roughness: 1.0, ..Material::matte([1.0; 3]) };
@@ -24,7 +24,8 @@ fn brightness(image: &Image, x: f64, y: f64) -> f64 {
 
 #[test]
 fn diffuse_light_follows_the_cosine() {
-    // Lambert: brightness = albedo * intensity * cos. The thin reflection of a dull surface adds a few percent at most.
+    // Lambert: brightness = albedo * intensity * cos. The faint reflection of a matte surface adds
+    // a few percent at most.
     for degrees in [0f32, 30.0, 60.0] {
         let a = degrees.to_radians();
         let mut list = bare(from_above(10.0));
@@ -60,7 +61,8 @@ fn lamps_fall_off_with_the_square_of_the_distance() {
 
 #[test]
 fn the_shadow_of_a_ball_lies_where_the_light_leaves_it() {
-    // a ball of radius 0.3 at height 2, light leaning 45 degrees towards +x: shadow centre at x = 2, an ellipse 0.3 sqrt 2 by 0.3
+    // a sphere of radius 0.3 at height 2, light inclined 45 degrees towards +x: shadow center at x
+    // = 2, an ellipse 0.3 sqrt 2 by 0.3
     let mut list = bare(from_above(10.0));
     floor(&mut list, 3.5);
     list.add_sphere(Point3::new(0.0, 0.0, 2.0), 0.3, UnitQuaternion::identity(), Material::unlit([0.0; 3]));
@@ -82,7 +84,8 @@ fn the_shadow_of_a_ball_lies_where_the_light_leaves_it() {
 
 #[test]
 fn the_shadow_of_a_box_under_a_lamp_is_its_central_projection() {
-    // a plate from -0.5 to 0.5 at height 1 under a lamp at height 3: scaled by 3/2 on the floor (0.745 for the lower rim at 0.99)
+    // a plate from -0.5 to 0.5 at height 1 under a lamp at height 3: scaled by 3/2 on the floor
+    // (0.745 for the lower rim at 0.99)
     let mut list = bare(from_above(10.0));
     floor(&mut list, 3.5);
     let plate = list.add_mesh(MeshData::cuboid([0.5, 0.5, 0.01]));
@@ -106,7 +109,8 @@ fn the_shadow_of_a_box_under_a_lamp_is_its_central_projection() {
 
 #[test]
 fn penumbra_width_is_the_gap_times_the_size_of_the_sun() {
-    // the straight edge of a large plate 1 m above the floor, sun overhead of angular radius 0.1: light rises from 0 to 1 over 0.2 m, half at the edge
+    // the straight edge of a large plate 1 m above the floor, sun overhead of angular radius 0.1:
+    // light rises from 0 to 1 over 0.2 m, half at the edge
     let mut list = bare(from_above(10.0));
     floor(&mut list, 3.5);
     let plate = list.add_mesh(MeshData::cuboid([1.0, 1.5, 0.005]));
@@ -118,7 +122,7 @@ fn penumbra_width_is_the_gap_times_the_size_of_the_sun() {
         angular_radius_rad: 0.1,
         casts_shadow: true,
     });
-    // seen from the side below the plate's height, since the plate itself hides its shadow from above
+    // seen from the side below the plate's height, because the plate hides its shadow from above
     list.camera = Camera::LookAt {
         eye: Point3::new(6.0, 0.0, 3.0),
         target: Point3::origin(),
@@ -138,14 +142,15 @@ fn penumbra_width_is_the_gap_times_the_size_of_the_sun() {
     };
     assert!(open(0.16) > 0.93, "open beyond the penumbra: {}", open(0.16));
     assert!((open(0.0) - 0.5).abs() < 0.12, "half at the edge: {}", open(0.0));
-    // share of a disc beyond a chord half a radius off its middle: 1/3 + sqrt 3 / (4 pi) ... = 0.8045 open
+    // fraction of a disc beyond a chord half a radius off its middle: 1/3 + sqrt 3 / (4 pi) ... =
+    // 0.8045 open
     assert!((open(0.05) - 0.8045).abs() < 0.12, "half way out: {}", open(0.05));
     assert!(open(-0.16) < 0.05, "dark within: {}", open(-0.16));
 }
 
 #[test]
 fn smooth_surfaces_show_no_acne_and_feet_touch_their_shadows() {
-    // a lit ball resting on the floor under a slanting sun
+    // a lit sphere resting on the floor under a slanting sun
     let mut list = bare(from_above(10.0));
     floor(&mut list, 3.5);
     let dull = Material { roughness: 1.0, ..Material::matte([1.0; 3]) };
@@ -176,8 +181,9 @@ fn smooth_surfaces_show_no_acne_and_feet_touch_their_shadows() {
         }
     }
     assert!(checked > 4000, "{checked}");
-    // seen from above, the ball hides its foot; beside it the shadow must begin at once: the terminator's tangent ray from the rim lands at
-    // x = cos a + (1 + sin a) tan a; everything from the ball's outline to there is dark
+    // seen from above, the sphere hides its foot; beside it the shadow must begin at once: the
+    // terminator's tangent ray from the rim lands at x = cos a + (1 + sin a) tan a; everything from
+    // the sphere's outline to there is dark
     let end = a.cos() + (1.0 + a.sin()) * a.tan();
     assert!(brightness(&image, 1.12, 0.0) < 0.01 && brightness(&image, end - 0.05, 0.0) < 0.01);
     assert!(brightness(&image, end + 0.05, 0.0) > 0.7, "{}", brightness(&image, end + 0.05, 0.0));
@@ -185,7 +191,8 @@ fn smooth_surfaces_show_no_acne_and_feet_touch_their_shadows() {
 
 #[test]
 fn a_wide_floor_that_throws_shadows_shades_itself_nowhere() {
-    // 20 m of floor in one shadow map (a texel is 1 cm), under a sun 20 degrees high: light sin 20 degrees everywhere, but in the box's shadow
+    // 20 m of floor in one shadow map (a texel is 1 cm), under a sun 20 degrees high: light sin 20
+    // degrees everywhere except in the box's shadow
     let mut list = bare(from_above(10.0));
     let slab = list.add_mesh(MeshData::cuboid([10.0, 10.0, 0.1]));
     let dull = Material { roughness: 1.0, ..Material::matte([1.0; 3]) };
@@ -235,7 +242,8 @@ fn ambient_occlusion_darkens_creases_and_leaves_open_ground() {
 
 #[test]
 fn a_turned_ball_shows_its_other_side() {
-    // a striped ball, its stripe around z: from above the pole is white; turned on its side the number's spot or the stripe comes up
+    // a striped billiard ball, its stripe around z: from above the pole is white; turned on its
+    // side the number's spot or the stripe appears
     let top = |orientation: UnitQuaternion<f32>| {
         let mut list = bare(from_above(4.0));
         let material = Material { shader: tumble_render::Shader::Unlit, ..Material::billiard_ball(10) };

@@ -4,12 +4,13 @@ use nalgebra::Point3;
 use std::sync::{Mutex, OnceLock, PoisonError};
 use tumble_render::{Camera, DrawList, Image, Light, RenderError, Renderer, Settings, Sky, Viewpoint};
 
-/// The picture of a list, or `None` (said visibly) without an adapter. One renderer serves all tests.
+/// The picture of a list, or `None` without an adapter, which is printed. One renderer serves all
+/// tests.
 pub fn picture(list: &DrawList, width: u32, height: u32) -> Option<Image> {
     picture_from(&list.camera, list, width, height)
 }
 
-/// The same, seen from elsewhere than the list's camera.
+/// The picture from another viewpoint than the list's camera.
 pub fn picture_from(from: &dyn Viewpoint, list: &DrawList, width: u32, height: u32) -> Option<Image> {
     static SHARED: OnceLock<Option<Mutex<Renderer>>> = OnceLock::new();
     let shared = SHARED.get_or_init(|| renderer().map(Mutex::new));
@@ -22,7 +23,8 @@ pub fn picture_from(from: &dyn Viewpoint, list: &DrawList, width: u32, height: u
     Some(renderer.render_from(from, list, width, height).expect("the list is valid"))
 }
 
-/// Whether spheres have exact edges: OpenGL, the fallback, draws them in whole pixels. Said visibly where not.
+/// Whether spheres have exact edges; OpenGL, the fallback, draws them in whole pixels, which is
+/// printed.
 pub fn exact_edges() -> bool {
     let exact = renderer().is_some_and(|r| !r.adapter().contains("Gl)"));
     if !exact {
@@ -35,7 +37,7 @@ pub fn exact_edges() -> bool {
     exact
 }
 
-/// A renderer of one's own; any failure but a missing adapter fails the test.
+/// A separate renderer; any failure except a missing adapter fails the test.
 pub fn renderer() -> Option<Renderer> {
     match Renderer::new() {
         Ok(renderer) => Some(renderer),
@@ -51,7 +53,7 @@ pub fn renderer() -> Option<Renderer> {
     }
 }
 
-/// No ambient light, no tone curve, no occlusion, black behind: light is what the lights give.
+/// No ambient light, no tone curve, no occlusion, a black background: only the lights give light.
 pub fn bare(camera: Camera) -> DrawList {
     DrawList {
         camera,
@@ -73,7 +75,7 @@ pub fn from_above(height: f32) -> Camera {
     }
 }
 
-/// White parallel light without colour, so that numbers are easy.
+/// White parallel light, so that numbers are simple.
 pub fn white_sun(direction: [f32; 3], intensity: f32, casts_shadow: bool) -> Light {
     Light::Directional {
         direction: direction.into(),
@@ -90,7 +92,8 @@ pub fn linear(image: &Image, x: u32, y: u32, channel: usize) -> f64 {
     if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Sum of a channel's linear light over the picture: for white on black the area in pixels, edges counted by their share.
+/// Sum of a channel's linear light over the picture: for white on black the area in pixels, with
+/// edges counted partly.
 pub fn area(image: &Image, channel: usize) -> f64 {
     moments(image, channel).0
 }

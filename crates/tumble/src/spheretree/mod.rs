@@ -1,4 +1,5 @@
-//! `tumble spheretree`: build a tree around a mesh and say how good it is; or a robot of spheres.
+//! `tumble spheretree`: builds a sphere tree around a mesh and measures it, or makes a robot of
+//! spheres.
 
 mod picture;
 mod robot;
@@ -20,11 +21,12 @@ pub fn spheretree(options: &SphereTreeOptions) -> Result<(), Failure> {
     match (&options.mesh, &options.urdf) {
         (_, Some(urdf)) => robot::spherize(urdf, options),
         (Some(mesh), None) => of_mesh(mesh, options),
-        (None, None) => Err(Failure::input("wanted a mesh, or --urdf ROBOT")),
+        (None, None) => Err(Failure::input("wanted a mesh or --urdf ROBOT")),
     }
 }
 
-/// What would be refused after the work is refused before it.
+/// Refuses before the work what would fail after it: outputs that cannot be written, levels that no
+/// tree has.
 fn check_outputs(options: &SphereTreeOptions) -> Result<(), Failure> {
     for path in options.output.iter().chain(&options.screenshot) {
         check_writable(path).map_err(Failure::input)?;
@@ -32,7 +34,7 @@ fn check_outputs(options: &SphereTreeOptions) -> Result<(), Failure> {
     let depth = settings(options).depth;
     match options.level {
         Some(level) if level > depth => Err(Failure::input(format!(
-            "--level is {level}; a tree of --depth {depth} has levels 0 to {depth} at most"
+            "--level is {level}; a tree with --depth {depth} has at most levels 0 to {depth}"
         ))),
         _ => Ok(()),
     }
@@ -72,7 +74,7 @@ fn of_mesh(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
     }
 }
 
-/// The mesh, mended where that is harmless, which is said.
+/// Reads the mesh. Harmless defects are repaired, with notes.
 fn read(path: &Path, options: &SphereTreeOptions) -> Result<TriMesh, Failure> {
     let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
     let bytes = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
@@ -82,7 +84,7 @@ fn read(path: &Path, options: &SphereTreeOptions) -> Result<TriMesh, Failure> {
     Ok(mesh)
 }
 
-/// The method's usual settings with what the command line says instead.
+/// The defaults of the method, with the options of the command line.
 fn settings(options: &SphereTreeOptions) -> TreeSettings {
     let defaults = match options.method {
         Some(Builder::Octree) => TreeSettings::octree(),
@@ -105,9 +107,9 @@ fn cache(options: &SphereTreeOptions) -> TreeCache {
     }
 }
 
-/// Metres; those that six places would not show by their power of ten.
-fn length(metres: f64) -> String {
-    if metres >= 1e-3 { format!("{metres:.6}") } else { format!("{metres:.6e}") }
+/// Formats meters with six decimals, and lengths below 1 mm by their power of ten.
+fn length(meters: f64) -> String {
+    if meters >= 1e-3 { format!("{meters:.6}") } else { format!("{meters:.6e}") }
 }
 
 fn say(options: &SphereTreeOptions, what: &str, path: &Path) {

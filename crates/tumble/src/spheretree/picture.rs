@@ -1,4 +1,5 @@
-//! `tumble spheretree --screenshot`: draws a level of the tree over its mesh and writes the picture.
+//! `tumble spheretree --screenshot`: draws a level of the tree over its mesh and writes the
+//! picture.
 
 use crate::args::SphereTreeOptions;
 use crate::capture::{open_renderer, write_png};
@@ -7,7 +8,8 @@ use std::path::Path;
 use tumble::collide::{SphereTree, TriMesh};
 use tumble::render::{RenderError, UpAxis, tree_over_mesh};
 
-/// Draws the level and writes it to `path`. Without a graphics adapter it prints a note and writes nothing.
+/// Draws the level and writes it to `path`. Without a graphics adapter it prints a note and writes
+/// nothing.
 pub fn picture(mesh: &TriMesh, tree: &SphereTree, path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
     let last = tree.levels() - 1;
     let level = options.level.unwrap_or(last);

@@ -1,4 +1,5 @@
-//! `--urdf`: a robot whose collision geometry is spheres, and the lists that motion planners read.
+//! `--urdf`: a robot whose collision geometry is spheres, and the lists of spheres that motion
+//! planners read.
 
 use crate::args::SphereTreeOptions;
 use crate::atomic_file::{check_writable, write_file};
@@ -10,14 +11,14 @@ use std::path::{Path, PathBuf};
 use tumble::collide::align_columns;
 use tumble::scene::urdf::{LinkSpheres, SphereOptions, SphereRobot, UrdfOptions, spherize as cover};
 
-/// Spheres per link unless told otherwise.
+/// Default number of spheres per link, at most.
 const DEFAULT_MAX_SPHERES: u32 = 32;
-/// Most spheres per link where only an error is asked for.
+/// Default number of spheres per link, at most, if `--max-error` is given.
 const MAX_SPHERES_FOR_ERROR: u32 = 10_000;
-/// The error that is good enough unless told otherwise, as a share of a shape's diagonal.
+/// Default outward error, as a fraction of a shape's diagonal.
 const DEFAULT_MAX_ERROR: f64 = 1e-3;
 
-/// Reads a robot, covers its links by spheres, prints and writes.
+/// Reads a robot, covers its links with spheres, prints and writes.
 pub fn spherize(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
     let most = options.spheres.unwrap_or(if options.max_error.is_some() {
         MAX_SPHERES_FOR_ERROR
@@ -46,10 +47,7 @@ pub fn spherize(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure>
     progress.done();
     let robot = robot?;
     if robot.links.is_empty() {
-        return Err(Failure::input(format!(
-            "{}: no link has a <collision>; there is nothing to cover",
-            path.display()
-        )));
+        return Err(Failure::input(format!("{}: no link has a <collision> element", path.display())));
     }
     if !options.quiet {
         robot.notes.iter().for_each(|note| println!("{note}"));
@@ -67,7 +65,8 @@ pub fn spherize(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure>
     Ok(())
 }
 
-/// Where the planner's list goes, and whether it is YAML. A bare format stands for a file beside the output.
+/// Returns the file of the planner's list, and whether it is YAML. A bare format names a file
+/// beside the output.
 fn planner_file(path: &Path, options: &SphereTreeOptions) -> Result<Option<(PathBuf, bool)>, Failure> {
     let Some(planner) = &options.planner else { return Ok(None) };
     let (file, ending) = match planner.extension() {
@@ -76,7 +75,7 @@ fn planner_file(path: &Path, options: &SphereTreeOptions) -> Result<Option<(Path
             let beside = options.output.as_deref().ok_or_else(|| {
                 let name = path.file_stem().unwrap_or_default().to_string_lossy();
                 Failure::input(format!(
-                    "--planner {0} has no --output to lie beside; name a file, such as --planner {name}.{0}",
+                    "--planner {0} needs --output, or a file such as --planner {name}.{0}",
                     planner.display()
                 ))
             })?;
@@ -88,7 +87,7 @@ fn planner_file(path: &Path, options: &SphereTreeOptions) -> Result<Option<(Path
 }
 
 fn table(robot: &SphereRobot) -> String {
-    let heads = ["link", "shapes", "spheres", "outside at most mm", "mean mm", "covered %"];
+    let heads = ["link", "shapes", "spheres", "outside max mm", "outside mean mm", "covered %"];
     let worst = |link: &LinkSpheres| link.outward.iter().copied().fold(0.0, f64::max);
     let mean = |link: &LinkSpheres| link.outward.iter().sum::<f64>() / link.outward.len().max(1) as f64;
     let row = |link: &LinkSpheres| {
@@ -107,12 +106,13 @@ fn table(robot: &SphereRobot) -> String {
     let mut text = align_columns(rows);
     _ = writeln!(
         text,
-        "{total} spheres; 100 % of the collision surface of each link lies inside the spheres of that link: proved piece by piece, not sampled"
+        "{total} spheres; 100 % of the collision surface of each link is proved to lie inside the spheres of that link"
     );
     text
 }
 
-/// What cuRobo reads: `collision_spheres`, by link a list of `center` and `radius`. Names are quoted, so that no name is taken for a number.
+/// The format of cuRobo: `collision_spheres`, for each link a list of `center` and `radius`. Names
+/// are quoted, so that none is read as a number.
 fn planner_yaml(robot: &SphereRobot) -> String {
     let mut text = format!("robot: {}\ncollision_spheres:\n", Value::from(robot.name.as_str()));
     for link in &robot.links {
@@ -131,12 +131,13 @@ fn planner_yaml(robot: &SphereRobot) -> String {
     text
 }
 
-/// With a point, so that YAML takes it for no integer.
+/// Formats a number with a decimal point, so that YAML does not read it as an integer.
 fn float(x: f64) -> String {
     Value::from(x).to_string()
 }
 
-/// What foam writes: by link the errors (here how far spheres reach outside, metres) and `spheres` of `origin` and `radius`.
+/// The format of foam: for each link the errors (here how far spheres reach outside, m), and
+/// `spheres` of `origin` and `radius`.
 fn planner_json(robot: &SphereRobot) -> String {
     let sphere = |(c, radius): &(tumble::collide::Vec3, f64)| json!({"origin": [c.x, c.y, c.z], "radius": radius});
     let link = |link: &LinkSpheres| {

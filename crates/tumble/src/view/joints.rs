@@ -1,45 +1,50 @@
-//! Joints that sliders move. While time stands a slider sets the position of its joint, exactly; while it goes it sets the target of a drive, so that the robot
-//! moves by the same physics as everything else.
+//! Joints that sliders move. While the simulation is paused, a slider sets the position of its
+//! joint exactly. While it runs, the slider sets the target of a drive, so that the robot moves by
+//! the same physics as everything else.
 //!
-//! The drives hold all joints with sliders: critically damped, of [`FREQUENCY`] in proportion to the inertia that the joint moves at that moment (the
-//! diagonal of the mass matrix), within the joint's effort.
+//! The drives hold all joints that have sliders. They are critically damped, with the angular
+//! frequency [`FREQUENCY`] for the inertia that the joint moves at that moment (the diagonal of the
+//! mass matrix), within the joint's effort.
 
 use tumble::dynamics::articulated::{ArticulatedBody, DofSettings, Drive, Kinematics, MassMatrix};
 use tumble::dynamics::{ObjectId, World, WorldError};
 use tumble::render::Slider;
 use tumble::scene::SceneFile;
 
-/// Of the drives that hold, rad/s: a joint is there after a tenth of a second, and gravity bends one that carries a weight at 1 m by g/ω² = 0.003 rad.
+/// Angular frequency of the drives, rad/s: a joint arrives after 0.1 s, and gravity deflects one
+/// that carries a weight at 1 m by g/ω² = 0.003 rad.
 const FREQUENCY: f64 = 60.0;
-/// Range of a joint without limits, to both sides of 0: rad, and m for a prismatic one.
+/// Range of a joint without limits, to both sides of 0: rad for revolute joints, m for prismatic
+/// ones.
 const UNLIMITED: [f64; 2] = [std::f64::consts::PI, 1.0];
 
-/// A joint of one freedom that follows no other.
+/// A joint with one degree of freedom that is not coupled to another joint.
 pub struct SliderJoint {
     name: String,
     body: ObjectId,
-    /// Its place in `v` and in `q`.
-    freedom: usize,
+    /// Index in `v` and index in `q`.
+    dof_index: usize,
     position: usize,
     range: [f64; 2],
     unit: &'static str,
-    /// Greatest torque or force of its motor, N·m or N; infinite where the file names none.
+    /// Largest torque or force of its motor, N·m or N; infinite if the file gives none.
     effort: f64,
-    /// The drive that it has by itself.
+    /// The drive that the scene gives it.
     own: Drive,
-    /// The freedoms that follow it: place in `q`, multiplier and offset.
+    /// The joints coupled to it: index in `q`, multiplier and offset.
     followers: Vec<(usize, f64, f64)>,
 }
 
 /// All joints with sliders.
 pub struct Joints {
     joints: Vec<SliderJoint>,
-    /// Targets, while the joints are held.
+    /// The targets while drives hold the joints.
     targets: Option<Vec<f64>>,
 }
 
 impl Joints {
-    /// Those of a scene's articulated bodies; none where closures join anything, since they would tear.
+    /// Collects the joints of a scene's articulated bodies. There are none if the scene has loop
+    /// joints, which a position set by hand would open.
     pub fn new(scene: &SceneFile, world: &World) -> Joints {
         let mut joints = Vec::new();
         let several = scene.articulated.len() > 1;
@@ -47,11 +52,11 @@ impl Joints {
             let Some(id) = world.find(&spec.name) else { continue };
             let Some(body) = world.get::<ArticulatedBody>(id) else { continue };
             let place = |link: usize| {
-                let freedom = body.dof_of(&spec.links[link].name)?;
-                Some((freedom, body.position_of(freedom)?))
+                let dof_index = body.dof_of(&spec.links[link].name)?;
+                Some((dof_index, body.position_of(dof_index)?))
             };
             for (number, link) in spec.links.iter().enumerate().filter(|(_, link)| link.joint.mimic.is_none()) {
-                let Some((freedom, position)) = place(number) else { continue };
+                let Some((dof_index, position)) = place(number) else { continue };
                 let joint = &link.joint;
                 let slides = matches!(joint.kind, tumble::dynamics::Joint::Prismatic { .. });
                 let most = UNLIMITED[usize::from(slides)];
@@ -62,7 +67,7 @@ impl Joints {
                 joints.push(SliderJoint {
                     name: if several { format!("{}/{}", spec.name, joint.name) } else { joint.name.clone() },
                     body: id,
-                    freedom,
+                    dof_index,
                     position,
                     range: joint.dof.limits.unwrap_or([-most, most]),
                     unit: if slides { "m" } else { "rad" },
@@ -75,17 +80,17 @@ impl Joints {
         Joints { joints, targets: None }
     }
 
-    /// How many there are.
+    /// The number of joints.
     pub fn len(&self) -> usize {
         self.joints.len()
     }
 
-    /// Whether drives hold them.
+    /// Returns whether drives hold the joints.
     pub fn held(&self) -> bool {
         self.targets.is_some()
     }
 
-    /// The sliders for a world as it is.
+    /// Returns the sliders for the world's present state.
     pub fn sliders(&self, world: &World, chosen: usize) -> Vec<Slider> {
         let slider = |(index, joint): (usize, &SliderJoint)| Slider {
             name: joint.name.clone(),
@@ -98,7 +103,7 @@ impl Joints {
         self.joints.iter().enumerate().map(slider).collect()
     }
 
-    /// Moves a joint to a share of its range.
+    /// Moves a joint to a fraction of its range.
     pub fn set_fraction(
         &mut self,
         world: &mut World,
@@ -111,7 +116,7 @@ impl Joints {
         self.set(world, index, least + share.clamp(0.0, 1.0) * (greatest - least), paused)
     }
 
-    /// Moves a joint by a share of its range, from its target where it is held.
+    /// Moves a joint by a fraction of its range, from its target if it is held.
     pub fn nudge(&mut self, world: &mut World, index: usize, share: f64, paused: bool) -> Result<(), WorldError> {
         let Some(joint) = self.joints.get(index) else { return Ok(()) };
         let [least, greatest] = joint.range;
@@ -119,7 +124,8 @@ impl Joints {
         self.set(world, index, (from + share * (greatest - least)).clamp(least, greatest), paused)
     }
 
-    /// The position where time stands, else the target of the drive; all are then held.
+    /// Sets the position while paused. While the simulation runs, sets the target of the drive; all
+    /// joints are then held.
     fn set(&mut self, world: &mut World, index: usize, value: f64, paused: bool) -> Result<(), WorldError> {
         if paused {
             self.joints[index].put(world, value)?;
@@ -133,19 +139,19 @@ impl Joints {
         Ok(())
     }
 
-    /// Drives hold all joints where they are.
+    /// Holds all joints at their present positions.
     pub fn hold(&mut self, world: &mut World) {
         self.targets = Some(self.joints.iter().map(|joint| joint.value(world).unwrap_or(0.0)).collect());
         self.drive(world);
     }
 
-    /// Joints have the drives again that the scene gives them.
+    /// Gives the joints back the drives of the scene.
     pub fn release(&mut self, world: &mut World) {
         self.targets = None;
         self.drive(world);
     }
 
-    /// Gives each joint the drive of its target, or its own.
+    /// Sets the drive of each joint: towards its target, or its own.
     fn drive(&self, world: &mut World) {
         for (index, joint) in self.joints.iter().enumerate() {
             let drive = match &self.targets {
@@ -153,9 +159,10 @@ impl Joints {
                 None => joint.own.clone(),
             };
             if let Some(body) = world.get_mut::<ArticulatedBody>(joint.body) {
-                let freedom = DofSettings { drive, ..body.dofs()[joint.freedom].clone() };
-                // gains and targets are finite and positive; a joint that refuses them keeps what it has
-                let _ = body.set_dof(joint.freedom, freedom);
+                let settings = DofSettings { drive, ..body.dofs()[joint.dof_index].clone() };
+                // gains and targets are finite and positive; a joint that refuses them keeps its
+                // drive
+                let _ = body.set_dof(joint.dof_index, settings);
             }
         }
     }
@@ -166,7 +173,7 @@ impl SliderJoint {
         world.state_of(self.body)?.get(self.position).copied()
     }
 
-    /// Puts the joint at a position, at rest, and with it those that follow it.
+    /// Puts the joint, and the joints coupled to it, at a position and at rest.
     fn put(&self, world: &mut World, value: f64) -> Result<(), WorldError> {
         let (Some(state), Some(body)) = (world.state_of(self.body), world.get::<ArticulatedBody>(self.body)) else {
             return Err(WorldError::Stale);
@@ -174,7 +181,7 @@ impl SliderJoint {
         let mut x = state.to_vec();
         let rates = body.model().positions();
         x[self.position] = value;
-        x[rates + self.freedom] = 0.0;
+        x[rates + self.dof_index] = 0.0;
         self.followers.iter().for_each(|(position, multiplier, offset)| x[*position] = multiplier * value + offset);
         world.write_state_of(self.body, &x)
     }
@@ -190,7 +197,7 @@ impl SliderJoint {
         }
     }
 
-    /// What the joint moves while all others stand still, kg·m² or kg.
+    /// The inertia that the joint moves while all others are fixed, kg·m² or kg.
     fn inertia(&self, world: &World) -> Option<f64> {
         let (state, body) = (world.state_of(self.body)?, world.get::<ArticulatedBody>(self.body)?);
         let model = body.model();
@@ -200,6 +207,6 @@ impl SliderJoint {
         kinematics.refresh(model, q, v.get(..dof)?);
         let mut matrix = vec![0.0; dof * dof];
         MassMatrix::new(model).write(model, &kinematics, &mut matrix);
-        matrix.get(self.freedom * (dof + 1)).copied()
+        matrix.get(self.dof_index * (dof + 1)).copied()
     }
 }

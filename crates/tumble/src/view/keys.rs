@@ -1,9 +1,9 @@
-//! What keys do.
+//! The assignment of keys.
 
 use super::user::Movement;
 use tumble::render::winit::keyboard::{Key, KeyCode, NamedKey};
 
-/// What a key asks for.
+/// An action that a key triggers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
     Pause,
@@ -30,43 +30,43 @@ pub enum Command {
 }
 
 impl Command {
-    /// Whether a key that is held goes on asking for it.
+    /// Returns whether the action repeats while its key is held.
     pub fn repeats(self) -> bool {
         matches!(self, Command::NextJoint | Command::JointUp | Command::JointDown)
     }
 }
 
-/// Overlays by number key from 1 on, as `--debug-draw` names them.
+/// The overlays of the number keys, from 1 on, by their names in `--debug-draw`.
 pub const OVERLAYS: [&str; 8] = ["contacts", "normals", "velocities", "forces", "joints", "frames", "islands", "tree"];
 
-/// What is told of keys and mouse.
+/// The help text for keys and mouse.
 pub const HELP: [&str; 23] = [
-    "W A S D     walk; arrows too, left and right turn",
-    "E Q         up and down; also page up, page down",
+    "W A S D     walk; arrow keys walk and turn",
+    "E Q         up, down; also page up, page down",
     "shift       four times as fast",
-    "F           fly where you look, or walk level",
-    "right drag  look around; left drag off a body too",
-    "left drag   pull a body; the wheel brings it nearer",
-    "wheel       faster or slower on foot",
-    "C, shift C  next camera, the one before",
+    "F           fly along the view, or walk level",
+    "right drag  look around; also left drag off a body",
+    "left drag   pull a body; the wheel brings it closer",
+    "wheel       walk faster or slower",
+    "C, shift C  next camera, previous camera",
     "home        the scene's camera",
-    "J, drag     sliders of joints; tab chooses one",
-    "[ ]         chosen joint down, up; shift faster",
-    "K           hold all joints by drives, free them",
-    "space       pause, go on",
-    ". or N      one step",
-    "R           back to time 0",
-    "+ -         time twice as fast, half as fast",
+    "J, drag     sliders of joints; tab selects one",
+    "[ ]         selected joint down, up; shift: faster",
+    "K           hold all joints by drives, or release",
+    "space       pause, continue",
+    ". or N      single step",
+    "R           reset to time 0",
+    "+ -         double, halve the speed of time",
     "1 2 3 4     contacts, normals, velocities, forces",
     "5 6 7       joints, frames, islands",
     "8           sphere trees, level by level",
     "T, H or F1  statistics, this help",
-    "G           looks: usual, fast, fastest",
-    "P, F11      picture to a file, full screen",
-    "escape      end",
+    "G           quality: default, fast, fastest",
+    "P, F11      screenshot, full screen",
+    "escape      quit",
 ];
 
-/// What a key that goes down asks for, if anything.
+/// Returns the action of a key, if it has one.
 pub fn command(key: &Key) -> Option<Command> {
     let letter = match key {
         Key::Named(NamedKey::Space) => return Some(Command::Pause),
@@ -102,7 +102,8 @@ pub fn command(key: &Key) -> Option<Command> {
     })
 }
 
-/// Which way a key moves the user, by its place on the keyboard, whatever is printed on it.
+/// Returns how a key moves the user. Keys are identified by their place on the keyboard, whatever
+/// is printed on them.
 pub fn movement(code: KeyCode) -> Option<Movement> {
     Some(match code {
         KeyCode::KeyW | KeyCode::ArrowUp => Movement::Ahead,

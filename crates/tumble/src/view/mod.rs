@@ -1,7 +1,8 @@
-//! `tumble view`: a scene in a window. Keys and mouse move the user, time stands and goes, bodies are pulled.
+//! `tumble view`: a scene in a window. Keys and mouse move the user, control time and pull bodies.
 //!
-//! Time goes by the clock, in whole steps: which steps are taken depends on the clock, what a step does does not. When nobody pulls, the state after n steps is
-//! that of `tumble run`.
+//! Simulated time follows the clock in whole steps: the clock decides how many steps are taken, and
+//! has no influence on a step. If nothing is pulled and no joint is moved, the state after n steps
+//! is that of `tumble run`.
 
 mod joints;
 mod keys;
@@ -26,7 +27,7 @@ use tumble::scene::cave::{Output, resolve_cave};
 use view_mode::ViewMode;
 use viewer::Viewer;
 
-/// Size of the window where nothing is said, pixels.
+/// Default size of the window, pixels.
 const DEFAULT_SIZE_PX: [u32; 2] = [1280, 720];
 
 /// Shows a scene until the window is closed.
@@ -46,7 +47,7 @@ pub fn view(options: &ViewOptions) -> Result<(), Failure> {
     }
 }
 
-/// What can be known of `--screenshot` and `--screenshot-dir` before a window opens.
+/// Checks `--screenshot` and `--screenshot-dir` before a window opens.
 fn check_outputs(options: &ViewOptions) -> Result<(), Failure> {
     if let Some(path) = &options.screenshot {
         check_writable(path).map_err(|why| Failure::input(format!("--screenshot: {why}")))?;
@@ -62,16 +63,16 @@ fn check_outputs(options: &ViewOptions) -> Result<(), Failure> {
 
 fn view_mode(scene: &SceneFile, options: &ViewOptions) -> Result<ViewMode, Failure> {
     let Some(name) = &options.cave else {
-        // clap lets neither --facet nor --preview through without it
+        // clap requires --cave with --facet and with --preview
         return Ok(ViewMode::Camera);
     };
     let cave = resolve_cave(name)?.load()?;
     let facet = options.facet.as_ref().map(|facet| cave.facet(facet).cloned()).transpose()?;
     let view = Box::new(CaveView::new(cave, scene).map_err(Failure::input)?);
     match facet {
-        Some(_) if options.size.is_some() => Err(Failure::input(
-            "the cave says how large a facet is (size_px); --size goes with --preview or without a cave",
-        )),
+        Some(_) if options.size.is_some() => {
+            Err(Failure::input("a facet has the size in its cave file (size_px); --size needs --preview, or no cave"))
+        }
         Some(facet) => Ok(ViewMode::Facet(view, Box::new(facet))),
         None => Ok(ViewMode::Unfolded(view)),
     }

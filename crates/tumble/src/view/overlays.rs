@@ -1,19 +1,20 @@
-//! Which overlays are on, by name.
+//! The overlays that keys switch.
 
 use super::keys::OVERLAYS;
 use tumble::render::DebugDraw;
 
-/// The deepest level of sphere trees that keys go through.
+/// Deepest level of sphere trees that the key steps through.
 const MAX_LEVEL: u32 = 5;
 
-/// Debug drawing that keys switch.
+/// Debug drawing, switched by keys.
 pub struct Overlays {
-    /// As it is drawn.
+    /// The present overlays.
     pub draw: DebugDraw,
 }
 
 impl Overlays {
-    /// Switches the overlay of a number; trees go on to the next level, and off after the last.
+    /// Switches the overlay with this index. Sphere trees advance by a level, and are off after the
+    /// last.
     pub fn switch(&mut self, index: usize) {
         let draw = &mut self.draw;
         match OVERLAYS[index] {
@@ -30,7 +31,7 @@ impl Overlays {
         }
     }
 
-    /// Names of those that are on, as `--debug-draw` takes them.
+    /// The names of the active overlays, as `--debug-draw` takes them.
     pub fn names(&self) -> Vec<String> {
         let d = &self.draw;
         let flags = [d.contacts, d.normals, d.velocities, d.forces, d.joints, d.frames, d.islands];

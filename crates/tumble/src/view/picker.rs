@@ -1,22 +1,24 @@
-//! The user's hand: a body is picked by the mouse and pulled by a spring.
+//! Picking with the mouse: the pointer selects a body, and a spring pulls it.
 
 use super::view_mode::Ray;
 use tumble::collide::Vec3;
 use tumble::dynamics::{ObjectId, PickForce, World, WorldError};
 use tumble::render::{DebugStyle, DrawList};
 
-/// Frequency of the spring, rad/s: the hand has what it pulls after a third of a second, and what hangs from it is 4 cm below.
+/// Angular frequency of the spring, rad/s: a body reaches the pointer after a third of a second and
+/// hangs 4 cm below it.
 pub const FREQUENCY: f64 = 15.0;
 
-/// What is held, and where it is wanted.
+/// The picked body and the target of its spring.
 pub struct Picker {
-    pull: PickForce,
-    /// Depth along the line of sight at which the hand is, m.
+    force: PickForce,
+    /// Distance of the target along the axis of the view, m.
     depth_m: f64,
 }
 
 impl Picker {
-    /// Takes hold of what moves where the ray meets it; `None` where it meets nothing, or first what does not move.
+    /// Picks the first body that the ray meets. Returns `None` if the ray meets nothing, or first a
+    /// part that does not move.
     pub fn pick(world: &World, ray: &Ray) -> Option<Picker> {
         let (id, part, distance) = first_seen(world, ray)?;
         let moves = world.status(id)?.moves() && world.object(id)?.collidable().is_some_and(|c| c.part_moves(part));
@@ -24,37 +26,37 @@ impl Picker {
         let target = ray.origin + ray.direction * distance;
         let point = part_state.pose.rotation.inverse() * (target - part_state.position());
         Some(Picker {
-            pull: PickForce { id, part, point, target, frequency: FREQUENCY },
+            force: PickForce { id, part, point, target, frequency: FREQUENCY },
             depth_m: distance * ray.direction.dot(&ray.axis),
         })
     }
 
-    /// Where the pointer points now.
+    /// Moves the target to the ray of the pointer.
     pub fn follow(&mut self, ray: &Ray) {
         let along = ray.direction.dot(&ray.axis);
         if along > 1e-6 {
-            self.pull.target = ray.origin + ray.direction * (self.depth_m / along);
+            self.force.target = ray.origin + ray.direction * (self.depth_m / along);
         }
     }
 
-    /// Nearer to the user or farther away, by a factor.
+    /// Scales the target's distance from the eye.
     pub fn scale_distance(&mut self, factor: f64) {
         self.depth_m = (self.depth_m * factor).clamp(1e-3, 1e4);
     }
 
     /// Pulls during the next step.
     pub fn pull(&self, world: &mut World) -> Result<(), WorldError> {
-        world.pick(&self.pull).map(drop)
+        world.pick(&self.force).map(drop)
     }
 
-    /// Whose body it is, the point that is held, and where it is wanted, world axes, m.
+    /// Returns the body's name, the picked point and the target, world axes, m.
     pub fn picked(&self, world: &World) -> Option<(String, Vec3, Vec3)> {
-        let part_state = world.part_state(self.pull.id, self.pull.part)?;
-        let point = part_state.pose.rotation * self.pull.point + part_state.position();
-        Some((world.object(self.pull.id)?.name().to_string(), point, self.pull.target))
+        let part_state = world.part_state(self.force.id, self.force.part)?;
+        let point = part_state.pose.rotation * self.force.point + part_state.position();
+        Some((world.object(self.force.id)?.name().to_string(), point, self.force.target))
     }
 
-    /// A line from the point that is held to the hand.
+    /// Draws a line from the picked point to the target.
     pub fn draw(&self, world: &World, list: &mut DrawList) {
         let Some((_, point, target)) = self.picked(world) else { return };
         let (from, to) = (nalgebra::Point3::from(point.cast::<f32>()), nalgebra::Point3::from(target.cast::<f32>()));
@@ -65,7 +67,7 @@ impl Picker {
     }
 }
 
-/// The object, part and distance of the first visual that a ray enters.
+/// Returns object, part and distance of the first visual that the ray enters.
 fn first_seen(world: &World, ray: &Ray) -> Option<(ObjectId, usize, f64)> {
     let mut first: Option<(ObjectId, usize, f64)> = None;
     for &id in world.ids() {

@@ -1,29 +1,30 @@
-//! Named points of view that a key goes through.
+//! Named viewpoints that a key steps through.
 
 use nalgebra::Vector3;
 use tumble::dynamics::World;
 use tumble::render::{Camera, DrawList};
 
-/// Where a view comes from.
+/// The origin of a viewpoint.
 enum Source {
-    /// Stands still: the scene's camera.
+    /// A camera at rest: the scene's.
     Fixed(Camera),
-    /// Goes with a body or link that carries it.
+    /// A camera mounted on a body or link.
     Carried,
-    /// Shows everything from a direction.
+    /// A camera that shows the whole scene from a direction.
     Framing(Vector3<f32>),
 }
 
-/// The list, and which of it is in use.
+/// The viewpoints, and the index of the active one.
 pub struct Presets {
     list: Vec<(String, Source)>,
     current: usize,
-    /// Whether the user has not moved by himself since.
+    /// Whether the view still follows the active viewpoint; moving the user ends it.
     attached: bool,
 }
 
 impl Presets {
-    /// The scene's camera first, then those that objects carry, then everything from the front, both sides, behind and above.
+    /// Lists the scene's camera, then the mounted ones, then views of the whole scene from the
+    /// front, left, back, right and top.
     pub fn new(world: &World, list: &DrawList) -> Presets {
         let around = [
             ("front", [0.0, 1.0, -0.3]),
@@ -39,19 +40,19 @@ impl Presets {
         Presets { list, current: 0, attached: false }
     }
 
-    /// Goes on in the list, or back.
+    /// Steps through the list by `by`.
     pub fn go(&mut self, by: isize) {
         let count = self.list.len() as isize;
         self.current = (self.current as isize + by).rem_euclid(count) as usize;
         self.attached = true;
     }
 
-    /// To the first.
+    /// Returns to the scene's camera.
     pub fn home(&mut self) {
         self.current = 0;
     }
 
-    /// To the one of that name; whether there is one.
+    /// Activates the viewpoint of this name. Returns whether there is one.
     pub fn find(&mut self, name: &str) -> bool {
         let found = self.list.iter().position(|(known, _)| known == name);
         self.current = found.unwrap_or(self.current);
@@ -59,22 +60,23 @@ impl Presets {
         found.is_some()
     }
 
-    /// Names in their order.
+    /// All names in order.
     pub fn names(&self) -> Vec<&str> {
         self.list.iter().map(|(name, _)| name.as_str()).collect()
     }
 
-    /// The name in use.
+    /// The active name.
     pub fn name(&self) -> &str {
         &self.list[self.current].0
     }
 
-    /// The user goes by himself from here.
+    /// Stops following the active viewpoint.
     pub fn release(&mut self) {
         self.attached = false;
     }
 
-    /// The camera in use, for the world as it is; `None` where it is gone with its object.
+    /// The active camera for the world's present state; `None` if the object that it was mounted on
+    /// is gone.
     pub fn camera(&self, world: &World, list: &DrawList) -> Option<Camera> {
         match &self.list[self.current].1 {
             Source::Fixed(camera) => Some(*camera),
@@ -85,14 +87,14 @@ impl Presets {
         }
     }
 
-    /// The camera to follow, where the one in use moves and the user is still with it.
+    /// Returns the active camera if it is mounted and the user has not moved since it was chosen.
     pub fn followed(&self, world: &World, list: &DrawList) -> Option<Camera> {
         let follows = self.attached && matches!(self.list[self.current].1, Source::Carried);
         if follows { self.camera(world, list) } else { None }
     }
 }
 
-/// Whoever walks off from a framing camera comes nearer and goes farther than it was made for.
+/// Widens the depth range of a framing camera, because the user may walk closer and farther away.
 fn walking_depths(mut camera: Camera) -> Camera {
     if let Camera::LookAt { near_m, far_m, .. } = &mut camera {
         (*near_m, *far_m) = (near_m.min(0.05), far_m.max(500.0));
@@ -100,7 +102,7 @@ fn walking_depths(mut camera: Camera) -> Camera {
     camera
 }
 
-/// How far the eye of a camera is from what it looks at, m.
+/// Distance from the eye of a camera to its target, m.
 pub fn distance(camera: &Camera) -> f64 {
     match camera {
         Camera::LookAt { eye, target, .. } => f64::from((target - eye).norm()),

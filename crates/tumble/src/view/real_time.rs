@@ -1,28 +1,30 @@
-//! Simulated time against the clock: how many steps are due, and what is given up when they take too long.
+//! Simulated time against the clock: how many steps are due, and how much time is skipped if they
+//! take too long.
 
 use std::time::Duration;
 
-/// What of a pause between two turns counts at most, s: a window that was hidden or a machine that slept is not caught up with.
+/// Longest time between two updates that is caught up with, s. The rest is skipped, as after a
+/// window was hidden or the machine slept.
 const MAX_LATE_S: f64 = 1.0;
-/// Speeds, as powers of 2.
+/// Range of speeds, as powers of 2.
 const SPEEDS: std::ops::RangeInclusive<i32> = -6..=4;
 
 /// Keeps simulated time in step with the clock.
 pub struct RealTime {
-    /// Whether time stands.
+    /// Whether the simulation is paused.
     pub paused: bool,
     /// Simulated seconds that are due and not yet stepped.
     owed_s: f64,
-    /// Simulated seconds that were given up since the start.
+    /// Simulated seconds skipped since the start.
     pub behind_s: f64,
-    /// Speed as a power of 2.
+    /// The speed as a power of 2.
     power: i32,
-    /// Steps asked for one by one.
+    /// Requested single steps.
     single: u32,
 }
 
 impl RealTime {
-    /// At real time.
+    /// Starts at the speed of the clock.
     pub fn new(paused: bool) -> RealTime {
         RealTime { paused, owed_s: 0.0, behind_s: 0.0, power: 0, single: 0 }
     }
@@ -32,25 +34,25 @@ impl RealTime {
         2f64.powi(self.power)
     }
 
-    /// Twice as fast (1), half as fast (-1).
+    /// Doubles (1) or halves (-1) the speed.
     pub fn change_speed(&mut self, by: i32) {
         self.power = (self.power + by).clamp(*SPEEDS.start(), *SPEEDS.end());
     }
 
-    /// Stands, or goes on. What was owed is forgotten.
+    /// Pauses, or continues. Time that was due is dropped.
     pub fn toggle(&mut self) {
         self.paused = !self.paused;
         (self.owed_s, self.single) = (0.0, 0);
     }
 
-    /// One step, and then time stands.
+    /// Requests one step and pauses.
     pub fn step_once(&mut self) {
         self.paused = true;
         self.owed_s = 0.0;
         self.single = (self.single + 1).min(100);
     }
 
-    /// The clock went on by so many seconds.
+    /// Adds time that has passed on the clock, s.
     pub fn pass(&mut self, clock_s: f64) {
         if !self.paused {
             let counted = clock_s.clamp(0.0, MAX_LATE_S);
@@ -59,7 +61,7 @@ impl RealTime {
         }
     }
 
-    /// Whether a step of `dt` seconds is due; it then counts as taken.
+    /// Returns whether a step of `dt` seconds is due; it then counts as taken.
     pub fn take(&mut self, dt: f64) -> bool {
         if self.single > 0 {
             self.single -= 1;
@@ -72,7 +74,7 @@ impl RealTime {
         due
     }
 
-    /// Time of the clock until a step of `dt` seconds is due; long where none will be.
+    /// Time on the clock until a step of `dt` seconds is due; long if none will be.
     pub fn until(&self, dt: f64) -> Duration {
         match (self.single > 0, self.paused) {
             (true, _) => Duration::ZERO,
@@ -81,7 +83,7 @@ impl RealTime {
         }
     }
 
-    /// Steps took too long: what is still owed is given up, so that the next picture does not come later still.
+    /// Skips the time that is still due, so that slow steps do not delay the next picture further.
     pub fn give_up(&mut self) {
         self.behind_s += self.owed_s;
         self.owed_s = 0.0;
@@ -113,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn time_stands_when_paused_and_single_steps_are_exact() {
+    fn no_time_passes_while_paused_and_single_steps_are_exact() {
         let mut real_time = RealTime::new(true);
         real_time.pass(0.5);
         assert_eq!(steps(&mut real_time, 0.01), 0);
@@ -123,7 +125,7 @@ mod tests {
         assert_eq!(steps(&mut real_time, 0.01), 2);
         real_time.toggle();
         assert!(!real_time.paused);
-        assert_eq!(steps(&mut real_time, 0.01), 0, "what passed while it stood is not owed");
+        assert_eq!(steps(&mut real_time, 0.01), 0, "time that passed during the pause is not due");
     }
 
     #[test]
@@ -137,15 +139,11 @@ mod tests {
         real_time.step_once();
         assert_eq!(real_time.until(0.75), Duration::ZERO);
         assert!(real_time.take(0.75) && real_time.paused);
-        assert_eq!(
-            real_time.until(0.75),
-            Duration::from_secs(1),
-            "nothing comes while time stands; a look a second does no harm"
-        );
+        assert_eq!(real_time.until(0.75), Duration::from_secs(1), "no step is due while paused");
     }
 
     #[test]
-    fn what_is_late_is_given_up_and_counted() {
+    fn late_time_is_skipped_and_counted() {
         let mut real_time = RealTime::new(false);
         real_time.pass(10.0);
         assert_eq!((real_time.owed_s, real_time.behind_s), (1.0, 9.0));

@@ -1,7 +1,9 @@
-//! The simulation behind the window, on a thread of its own: slow pictures do not hold it up, and slow steps do not hold up keys and mouse.
+//! The simulation behind the window, on its own thread: slow pictures do not delay it, and slow
+//! steps do not delay keys and mouse.
 //!
-//! Between two steps whoever looks may have the world ([`SimulationThread::lock`]); a step is never interrupted, and what it does depends on no clock. Which steps are
-//! taken does: [`RealTime`] says. So the state after n steps is that of `tumble run`, whatever the pictures take.
+//! Between two steps other threads may lock the world ([`SimulationThread::lock`]). A step is never
+//! interrupted, and its result depends on no clock; [`RealTime`] only decides when steps are taken.
+//! The state after n steps is therefore that of `tumble run`, however long pictures take.
 
 use super::picker::Picker;
 use super::real_time::RealTime;
@@ -14,36 +16,37 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tumble::dynamics::World;
 
-/// Steps that are due at once take at most this long, and then one more; what is still due is given up.
+/// Longest time for steps that are due at once, exceeded by one step at most. Time that is still
+/// due is then skipped.
 const MAX_STEPPING: Duration = Duration::from_millis(100);
 /// Longest sleep between two looks at the clock.
 const MAX_SLEEP: Duration = Duration::from_millis(50);
-/// Longest wait for those who want the world.
+/// Longest wait for a thread that requests the lock.
 const MAX_YIELD: Duration = Duration::from_millis(1);
 
-/// A world and what moves it.
+/// A world and everything that drives it.
 pub struct Simulation {
     pub world: World,
     pub real_time: RealTime,
-    /// What pulls a body.
+    /// The picked body, if any.
     pub picker: Option<Picker>,
-    /// What stopped it.
+    /// The error that stopped the simulation.
     pub error: Option<String>,
-    /// How long steps took.
+    /// Durations of the steps.
     pub steps: Meter,
-    /// Counts whatever changes the world: steps, and going back.
+    /// Number of changes of the world: steps, resets and joints moved by hand.
     pub changes: u64,
-    /// The world at time 0.
+    /// The snapshot at time 0.
     start: Vec<u8>,
-    /// No step after this one.
+    /// Number of the last step.
     last: Option<u64>,
-    /// When the clock was looked at.
+    /// The last look at the clock.
     turn: Instant,
     ending: bool,
 }
 
 impl Simulation {
-    /// At time 0; ends after `last` steps.
+    /// Starts at time 0; ends after `last` steps.
     pub fn new(world: World, real_time: RealTime, last: Option<u64>) -> Simulation {
         let start = world.save();
         let steps = Meter::default();
@@ -61,24 +64,24 @@ impl Simulation {
         }
     }
 
-    /// Whether the last step is taken, or no further one can be.
+    /// Returns whether the last step has been taken, or an error prevents further ones.
     pub fn is_over(&self) -> bool {
         self.last.is_some_and(|last| self.world.frame() >= last || self.error.is_some())
     }
 
-    /// Back to time 0.
+    /// Returns to time 0.
     pub fn reset(&mut self) -> Result<(), Failure> {
         (self.picker, self.error) = (None, None);
         self.changes += 1;
-        self.world.restore(&self.start).map_err(|e| Failure::run("going back to time 0", e))
+        self.world.restore(&self.start).map_err(|e| Failure::run("resetting to time 0", e))
     }
 
-    /// Takes a step if one is due; whether it did.
+    /// Takes a step if one is due; returns whether it did.
     fn advance(&mut self) -> bool {
         if self.error.is_some() || self.is_over() || !self.real_time.take(self.world.settings().dt) {
             return false;
         }
-        // what is no longer there lets go
+        // a picked object that was removed is released
         self.picker = self.picker.take().filter(|picker| picker.pull(&mut self.world).is_ok());
         let clock = Instant::now();
         if let Err(error) = self.world.step() {
@@ -90,21 +93,21 @@ impl Simulation {
         true
     }
 
-    /// The clock went on since the last look.
+    /// Accounts for the time since the last call.
     fn advance_clock(&mut self) {
         let now = Instant::now();
         self.real_time.pass((now - self.turn).as_secs_f64());
         self.turn = now;
     }
 
-    /// How long nothing is due.
+    /// Returns for how long no step is due.
     fn pause(&self) -> Duration {
         let standing = self.error.is_some() || self.is_over();
         if standing { MAX_SLEEP } else { MAX_SLEEP.min(self.real_time.until(self.world.settings().dt)) }
     }
 }
 
-/// The thread, and the way to what it works on.
+/// The thread and its simulation.
 pub struct SimulationThread {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
@@ -112,21 +115,21 @@ pub struct SimulationThread {
 
 struct Shared {
     simulation: Mutex<Simulation>,
-    /// How many want it: the thread stands aside for them.
+    /// Number of threads that wait for the lock; the simulation yields to them.
     wanted: AtomicUsize,
-    /// Rung when somebody had it.
+    /// Signaled when the lock is released.
     released: Condvar,
 }
 
 impl SimulationThread {
-    /// Stands until it is [started](Self::start).
+    /// Holds the simulation at its state until [`SimulationThread::start`].
     pub fn new(simulation: Simulation) -> SimulationThread {
         let shared =
             Shared { simulation: Mutex::new(simulation), wanted: AtomicUsize::new(0), released: Condvar::new() };
         SimulationThread { shared: Arc::new(shared), thread: None }
     }
 
-    /// From now on time goes by the clock.
+    /// Starts the clock and the thread.
     pub fn start(&mut self) -> Result<(), Failure> {
         self.lock().turn = Instant::now();
         let shared = self.shared.clone();
@@ -135,12 +138,12 @@ impl SimulationThread {
         Ok(())
     }
 
-    /// Whether it was started.
+    /// Returns whether the thread was started.
     pub fn runs(&self) -> bool {
         self.thread.is_some()
     }
 
-    /// The simulation between two steps; waits for the step that is being taken.
+    /// Locks the simulation between two steps; waits for the end of the present step.
     pub fn lock(&self) -> SimulationGuard<'_> {
         self.shared.wanted.fetch_add(1, Ordering::Relaxed);
         let guard = ignore_poison(self.shared.simulation.lock());
@@ -148,7 +151,7 @@ impl SimulationThread {
         SimulationGuard { guard, released: &self.shared.released }
     }
 
-    /// Whether the thread ended by itself, which only a fault in it can do.
+    /// Returns whether the thread ended by itself, which only a bug in it can cause.
     pub fn is_broken(&self) -> bool {
         self.thread.as_ref().is_some_and(JoinHandle::is_finished)
     }
@@ -163,7 +166,7 @@ impl Drop for SimulationThread {
     }
 }
 
-/// The simulation, held between two steps.
+/// The simulation, locked between two steps.
 pub struct SimulationGuard<'a> {
     guard: MutexGuard<'a, Simulation>,
     released: &'a Condvar,
@@ -209,7 +212,8 @@ fn run_thread(shared: &Shared) {
     }
 }
 
-/// What a lock gives, also where another thread panicked with it: that is told apart by [`SimulationThread::is_broken`].
+/// Returns the guard even if another thread panicked with it; [`SimulationThread::is_broken`]
+/// reports the panic.
 fn ignore_poison<T>(result: Result<T, PoisonError<T>>) -> T {
     result.unwrap_or_else(PoisonError::into_inner)
 }

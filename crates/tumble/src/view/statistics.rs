@@ -1,11 +1,11 @@
-//! How fast pictures come, and the lines that say so.
+//! Rates and durations of pictures and steps.
 
 use std::time::{Duration, Instant};
 
-/// Figures are means over this time, so that they can be read.
+/// Figures are means over this time, so that they are readable.
 const AVERAGING_TIME: Duration = Duration::from_millis(500);
 
-/// How often something was done, and how long it took.
+/// Counts an activity and its duration.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Meter {
     count: u32,
@@ -13,29 +13,30 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// Once more.
+    /// Counts one occurrence.
     pub fn add(&mut self, took: Duration) {
         self.count += 1;
         self.seconds += took.as_secs_f64();
     }
 
-    /// Times per second over so many seconds, and the mean in ms; counts from zero again.
+    /// Returns occurrences per second over `over_s` seconds and their mean duration in ms; counts
+    /// from zero again.
     fn take(&mut self, over_s: f64) -> (f64, f64) {
         let Meter { count, seconds } = std::mem::take(self);
         (f64::from(count) / over_s, 1e3 * seconds / f64::from(count.max(1)))
     }
 }
 
-/// What pictures and steps took.
+/// Means of pictures and steps.
 pub struct Statistics {
     since: Instant,
-    /// Drawing pictures and handing them over.
+    /// Drawing and presenting pictures.
     pub pictures: Meter,
-    /// Of the last time that was counted.
+    /// The figures of the last period.
     pub shown: Figures,
 }
 
-/// Means.
+/// Mean values over one period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figures {
     pub pictures_per_s: f64,
@@ -47,12 +48,13 @@ pub struct Figures {
 }
 
 impl Statistics {
-    /// From now on.
+    /// Starts the first period.
     pub fn new(now: Instant) -> Statistics {
         Statistics { since: now, pictures: Meter::default(), shown: Figures::default() }
     }
 
-    /// Whether it is time for new figures; they are then made, with those of the steps.
+    /// Ends the period if it has lasted long enough, and returns whether it did. `steps` are the
+    /// durations of its steps.
     pub fn count(&mut self, now: Instant, steps: &mut Meter) -> bool {
         let over = now - self.since;
         if over < AVERAGING_TIME {

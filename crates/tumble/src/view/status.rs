@@ -1,4 +1,4 @@
-//! `--status`: what the window shows, line by line, for programs.
+//! `--status`: the state of the window as lines of JSON, for programs.
 
 use crate::failure::Failure;
 use serde::Serialize;
@@ -6,41 +6,41 @@ use std::fs::File;
 use std::io::{Write, stdout};
 use std::path::Path;
 
-/// One line. Units stand in the names; world axes.
+/// One line. Names carry the units; vectors have world axes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Status {
     /// Steps since time 0.
     pub frame: u64,
     pub time_s: f64,
     pub paused: bool,
-    /// Simulated seconds wanted per second.
+    /// Requested simulated seconds per second.
     pub speed: f64,
-    /// Simulated seconds that were given up because steps took too long.
+    /// Simulated seconds that were skipped because steps took too long.
     pub behind_s: f64,
-    /// Pictures shown.
+    /// Number of pictures shown.
     pub shown: u64,
     pub size_px: [u32; 2],
-    /// Whether keys come to the window.
+    /// Whether the window has the keyboard's focus.
     pub focused: bool,
     pub eye_m: [f64; 3],
     /// Unit vector.
     pub forward: [f64; 3],
     pub camera: String,
     pub flies: bool,
-    /// How far a tap on a key moves the eye.
+    /// Distance that a tap on a key moves the eye.
     pub step_m: f64,
-    /// The body that is pulled, where it is held, and where the hand is.
+    /// The picked body, its picked point and the target of the spring.
     pub picked: Option<String>,
     pub picked_point_m: Option<[f64; 3]>,
     pub pick_target_m: Option<[f64; 3]>,
-    /// As `--quality` takes it.
+    /// In the words of `--quality`.
     pub quality: Option<String>,
     pub overlays: Vec<String>,
     pub caption: bool,
     /// Joints with sliders, and whether drives hold them.
     pub joints: Vec<JointStatus>,
     pub joints_held: bool,
-    /// BLAKE3 of what `tumble run --save` writes of the same state, in hexadecimal.
+    /// BLAKE3, in hexadecimal, of the bytes that `tumble run --save` writes for the same state.
     pub state_blake3: String,
 }
 
@@ -50,14 +50,15 @@ pub struct JointStatus {
     pub name: String,
     /// rad or m.
     pub position: f64,
-    /// Where a drive moves it, if one holds it.
+    /// Target of the drive that holds it, if any.
     pub target: Option<f64>,
-    /// Left and right end of its bar and the bar's middle from the top, pixels of the window; none where it is not shown.
+    /// Left end, right end and height of its bar, pixels from the window's top left corner; none if
+    /// it is not shown.
     pub slider_px: Option<[f64; 3]>,
 }
 
 impl Status {
-    /// Whether anything differs but what changes by itself.
+    /// Returns whether anything differs that does not change by itself.
     pub fn differs(&self, other: &Status) -> bool {
         let still = |s: &Status| Status {
             frame: 0,
@@ -73,14 +74,14 @@ impl Status {
     }
 }
 
-/// Where lines go.
+/// The destination of the status lines.
 pub struct Log {
     to: Option<Box<dyn Write>>,
     last: Option<Status>,
 }
 
 impl Log {
-    /// Into a file, to stdout (`-`), or nowhere.
+    /// Opens a file, stdout (`-`), or nothing.
     pub fn create(path: Option<&Path>) -> Result<Log, Failure> {
         let to: Option<Box<dyn Write>> = match path {
             None => None,
@@ -93,12 +94,12 @@ impl Log {
         Ok(Log { to, last: None })
     }
 
-    /// Whether there is anyone to tell.
+    /// Returns whether there is a destination.
     pub fn wanted(&self) -> bool {
         self.to.is_some()
     }
 
-    /// A line, if something differs from the last one or `anyway`.
+    /// Writes a line if the status differs from the last one, or if `anyway` is set.
     pub fn write(&mut self, status: Status, anyway: bool) -> Result<(), Failure> {
         let Some(to) = &mut self.to else { return Ok(()) };
         if anyway || self.last.as_ref().is_none_or(|last| status.differs(last)) {

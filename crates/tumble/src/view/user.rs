@@ -1,27 +1,29 @@
-//! Where the user is and looks, and how keys and mouse move him (thesis §III.C: the keyboard moves the user and changes his elevation, the mouse turns him).
+//! Position and direction of the user, moved by keys and mouse (thesis §III.C: the keyboard moves
+//! the user and changes the elevation, the mouse turns).
 //!
-//! Speeds are lengths of a second of holding a key; a tap moves by a tenth of that, however short it is and however slowly pictures come.
+//! The speed is the distance covered in a second of holding a key. A tap moves by a tenth of it,
+//! however short the tap is and however slow the pictures are.
 
 use nalgebra::{Point3, Vector3};
 use tumble::render::Camera;
 use tumble::scene::CavePlace;
 
-/// A tap moves as holding for this time does, s.
+/// A tap moves as far as holding the key for this time, s.
 const TAP_S: f64 = 0.1;
-/// Holding longer than this goes on after the tap's step, s.
+/// A key held for longer than this continues after the tap's step, s.
 const HOLD_S: f64 = 0.3;
-/// What of a turn counts at most for a key that is held, s.
+/// Longest time per update that counts for a held key, s.
 const MAX_TURN_S: f64 = 0.1;
 /// Turning by keys, rad/s.
 const TURN_RAD_PER_S: f64 = 1.5;
-/// Steepest look up or down, rad.
+/// Steepest view up or down, rad.
 const MAX_PITCH_RAD: f64 = 1.55;
 /// Factor of the speed with Shift.
 const FAST: f64 = 4.0;
 
 type Vec3 = Vector3<f64>;
 
-/// Ways in which a key can move the user.
+/// Movements of the user that keys control.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Movement {
     Ahead,
@@ -34,28 +36,30 @@ pub enum Movement {
     TurnRight,
 }
 
-/// What the user sees by.
+/// The eye or eyes of the user.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Rig {
     /// One eye: a camera.
     Eye(Camera),
-    /// The eye of a cave, with its place in the cave and the way it faces there.
+    /// The user of a cave: the cave's place in the scene, the eye in the cave, and the direction of
+    /// view there.
     Cave { place: CavePlace, eye_m: [f64; 3], forward: [f64; 3] },
 }
 
 /// The user.
 pub struct User {
     rig: Rig,
-    /// Whether he goes where he looks; else along the floor.
+    /// Whether movement follows the direction of view; otherwise it is level.
     pub flies: bool,
-    /// While a key is held, m/s.
+    /// Speed while a key is held, m/s.
     pub speed: f64,
     /// Whether Shift is held.
     pub fast: bool,
     keys: Vec<HeldKey>,
 }
 
-/// A key that moves: seconds since it went down, seconds of motion done, whether it is up again.
+/// A movement key that is held or was tapped: time since it went down, time of movement done, and
+/// whether it is up again.
 struct HeldKey {
     movement: Movement,
     down_s: f64,
@@ -64,17 +68,17 @@ struct HeldKey {
 }
 
 impl User {
-    /// At a place; `distance_m` is from the eye to what there is to see, and sets the speed.
+    /// Starts at a place. `distance_m`, from the eye to what is in view, sets the speed.
     pub fn new(rig: Rig, distance_m: f64) -> User {
         User { rig, flies: false, speed: round_speed(distance_m / 4.0), fast: false, keys: Vec::new() }
     }
 
-    /// What he sees by.
+    /// The eye or eyes.
     pub fn rig(&self) -> &Rig {
         &self.rig
     }
 
-    /// Looks from a camera's eye along it; a cave stays upright.
+    /// Moves to a camera's eye and direction; a cave stays upright.
     pub fn look_from(&mut self, camera: &Camera) {
         match &mut self.rig {
             Rig::Eye(own) => *own = *camera,
@@ -90,7 +94,7 @@ impl User {
         }
     }
 
-    /// Where his eye is, world axes, m.
+    /// Position of the eye, world axes, m.
     pub fn eye(&self) -> [f64; 3] {
         match &self.rig {
             Rig::Eye(Camera::LookAt { eye, .. }) => eye.cast().into(),
@@ -99,7 +103,7 @@ impl User {
         }
     }
 
-    /// The way he looks, a unit vector in world axes.
+    /// Direction of view, a unit vector in world axes.
     pub fn forward(&self) -> [f64; 3] {
         match &self.rig {
             Rig::Eye(Camera::LookAt { eye, target, .. }) => (target - eye).cast::<f64>().normalize().into(),
@@ -108,7 +112,7 @@ impl User {
         }
     }
 
-    /// A key that moves goes down.
+    /// A movement key goes down.
     pub fn press(&mut self, movement: Movement) {
         match self.keys.iter_mut().find(|h| h.movement == movement) {
             Some(keys) if keys.released => {
@@ -119,28 +123,28 @@ impl User {
         }
     }
 
-    /// It comes up again.
+    /// A movement key comes up.
     pub fn release(&mut self, movement: Movement) {
         self.keys.iter_mut().filter(|h| h.movement == movement).for_each(|h| h.released = true);
     }
 
-    /// All keys come up, as when another window gets them.
+    /// All keys come up, as when another window gets the focus.
     pub fn release_all(&mut self) {
         self.keys.iter_mut().for_each(|h| h.released = true);
     }
 
-    /// Whether a key moves him.
+    /// Returns whether a key moves the user.
     pub fn moves(&self) -> bool {
         !self.keys.is_empty()
     }
 
-    /// The clock went on: what held keys do.
+    /// Moves by the held keys for the time that has passed on the clock, s.
     pub fn pass(&mut self, clock_s: f64) {
         let turn = clock_s.clamp(0.0, MAX_TURN_S);
         let mut keys = std::mem::take(&mut self.keys);
         for key in &mut keys {
             key.down_s += turn;
-            // the tap's step first; beyond it only what is held on
+            // the tap's step first; after it only keys that are still held
             let repeats = !key.released && key.down_s > HOLD_S;
             let part = if repeats { turn } else { turn.min((TAP_S - key.done_s).max(0.0)) };
             key.done_s += part;
@@ -168,7 +172,7 @@ impl User {
         }
     }
 
-    /// Moves without turning, m, world axes.
+    /// Moves by a vector without turning, m, world axes.
     pub fn shift(&mut self, by: Vec3) {
         match &mut self.rig {
             Rig::Eye(Camera::LookAt { eye, target, .. }) => {
@@ -180,7 +184,7 @@ impl User {
         }
     }
 
-    /// Turns to the left and looks up, rad. A cave stays upright: it only turns.
+    /// Turns left and up, rad. A cave stays upright and turns left only.
     pub fn turn(&mut self, left: f64, up: f64) {
         let forward = Vec3::from(self.forward());
         match &mut self.rig {
@@ -206,12 +210,12 @@ impl User {
         }
     }
 
-    /// How far a tap moves, m.
+    /// Distance that a tap moves, m.
     pub fn step_m(&self) -> f64 {
         self.speed * TAP_S
     }
 
-    /// Faster (1) or slower (-1), in steps of 1, 2, 5, 10.
+    /// Raises (1) or lowers (-1) the speed in steps of 1, 2, 5, 10.
     pub fn change_speed(&mut self, by: i32) {
         let factor = if by > 0 { 1.8 } else { 1.0 / 1.8 };
         for _ in 0..by.abs().min(20) {
@@ -220,13 +224,13 @@ impl User {
     }
 }
 
-/// Moves a cave so that a point of it is at a point of the scene.
+/// Moves a cave so that its point `eye_m` is at the point `at` of the scene.
 fn set_eye(place: &mut CavePlace, eye_m: [f64; 3], at: [f64; 3]) {
     let now = place.to_scene(eye_m);
     (0..3).for_each(|k| place.origin_m[k] += at[k] - now[k]);
 }
 
-/// The nearest of 1, 2 or 5 times a power of ten (in proportion).
+/// Rounds to the nearest of 1, 2 or 5 times a power of ten, by ratio.
 fn round_speed(speed: f64) -> f64 {
     let speed = if speed.is_finite() { speed.clamp(1e-3, 1e3) } else { 1.0 };
     let ten = 10f64.powi(speed.log10().floor() as i32);

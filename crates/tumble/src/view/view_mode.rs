@@ -1,20 +1,20 @@
-//! What the window shows: the scene's camera, one facet of a cave, or the whole cave unfolded.
+//! The content of a window: the scene's camera, one facet of a cave, or the whole cave unfolded.
 
 use super::user::Rig;
 use tumble::collide::Vec3;
 use tumble::render::{CaveView, DrawList, Image, RIM_PX, RenderError, Screen, Viewpoint, unfold};
 use tumble::scene::cave::{Facet, Flip, Stereo};
 
-/// Shadow maps of a cave are this much wider, as for its pictures.
+/// Factor by which shadow maps of a cave are wider, as in its screenshots.
 const CAVE_SHADOWS: u32 = 2;
 
-/// What is shown.
+/// The content of a window.
 pub enum ViewMode {
-    /// Through the user's one eye.
+    /// The view of one camera.
     Camera,
-    /// A facet, as its projector gets it.
+    /// A facet, as its projector shows it.
     Facet(Box<CaveView>, Box<Facet>),
-    /// All facets, from the point between the eyes.
+    /// All facets, seen from the point between the eyes.
     Unfolded(Box<CaveView>),
 }
 
@@ -29,7 +29,7 @@ pub struct Ray {
     pub axis: Vec3,
 }
 
-/// A view in a rectangle.
+/// A view in a rectangle of the window.
 struct Tile {
     from: Box<dyn Viewpoint>,
     position_px: [u32; 2],
@@ -38,7 +38,7 @@ struct Tile {
 }
 
 impl ViewMode {
-    /// The body of whoever looks: an eye where the list's camera is, or the cave's user where his cave is.
+    /// Returns the user's eyes: the list's camera, or the cave's user at the cave's place.
     pub fn rig(&self, list: &DrawList) -> Rig {
         let (view, user) = match self {
             ViewMode::Camera => return Rig::Eye(list.camera),
@@ -49,7 +49,7 @@ impl ViewMode {
         Rig::Cave { place: *view.place(), eye_m: user.eye_m.into(), forward: user.forward.into() }
     }
 
-    /// Takes the cave to where the user is, or the list's camera to his eye.
+    /// Moves the cave to the user's place, or the list's camera to the user's eye.
     pub fn set_place(&mut self, rig: &Rig, list: &mut DrawList) {
         match (self, rig) {
             (ViewMode::Camera, Rig::Eye(camera)) => list.camera = *camera,
@@ -58,14 +58,14 @@ impl ViewMode {
         }
     }
 
-    /// The shadow maps of a cave hold all that its screens show together.
+    /// Widens the shadow maps for a cave, because one map serves all of its screens.
     pub fn widen_shadows(&self, list: &mut DrawList) {
         if !matches!(self, ViewMode::Camera) {
             list.settings.shadow_map_size = (CAVE_SHADOWS * list.settings.shadow_map_size).min(8192);
         }
     }
 
-    /// Draws on the window's device: what it shows next.
+    /// Draws on the window's device; the window shows it next.
     pub fn draw(&self, screen: &mut Screen, list: &DrawList) -> Result<(), RenderError> {
         let [w, h] = screen.size_px();
         let renderer = screen.renderer();
@@ -82,13 +82,14 @@ impl ViewMode {
         }
     }
 
-    /// The same, in memory.
+    /// Draws and reads the picture back into memory.
     pub fn picture(&self, screen: &mut Screen, list: &DrawList) -> Result<Image, RenderError> {
         self.draw(screen, list)?;
         screen.renderer().read()
     }
 
-    /// The line of sight through a pixel; `None` where nothing is shown there. Of an anaglyph the left eye's.
+    /// Returns the line of sight through a pixel, for an anaglyph that of the left eye; `None` if
+    /// nothing is shown there.
     pub fn ray(&self, list: &DrawList, size_px: [u32; 2], at_px: [f64; 2]) -> Option<Ray> {
         let tiles = self.tiles(list, size_px).ok()?;
         let within = |t: &&Tile| {
@@ -127,7 +128,7 @@ impl ViewMode {
     }
 }
 
-/// Both eyes' views of a facet, or the one between them, in their places.
+/// Returns the views of a facet in their rectangles: one per eye, or one from between the eyes.
 fn eyes(view: &CaveView, facet: &Facet) -> Result<Vec<Tile>, RenderError> {
     let [w, h] = facet.size_px;
     let flip = [matches!(facet.flip, Flip::Horizontal | Flip::Both), matches!(facet.flip, Flip::Vertical | Flip::Both)];

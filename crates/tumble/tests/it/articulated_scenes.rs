@@ -1,4 +1,4 @@
-//! What the pages of the articulated scenes promise, by hand-made numbers.
+//! Claims of the pages of the articulated scenes, checked against independent numbers.
 
 use tumble::collide::Vec3;
 use tumble::dynamics::articulated::{InverseDynamics, Kinematics, inverse_dynamics};
@@ -27,7 +27,7 @@ fn place(world: &World, name: &str) -> Vec3 {
     world.part_state(world.find(name).unwrap(), 0).unwrap().position()
 }
 
-/// How far the joints of a body are past their limits, rad.
+/// The angle by which the joints of a body exceed their limits, rad.
 fn past_limits(world: &World, name: &str) -> f64 {
     let (body, q, _) = body(world, name);
     let links = body.model().links().iter().filter(|link| link.joint.dof() == 1);
@@ -36,7 +36,7 @@ fn past_limits(world: &World, name: &str) -> f64 {
         .fold(f64::MIN, f64::max)
 }
 
-/// Where the joint of a link is, world axes.
+/// Position of a link's joint, world axes.
 fn joint(world: &World, name: &str, link: &str) -> Vec3 {
     let (body, q, v) = body(world, name);
     let mut kin = Kinematics::new(body.model());
@@ -65,7 +65,8 @@ fn skeleton_has_the_lengths_and_masses_of_its_page() {
     }
 }
 
-/// It falls from the landing to the floor, within its limits, and never has more energy than before.
+/// It falls from the landing to the floor, within its limits, and never has more energy than
+/// before.
 #[test]
 fn skeleton_falls_down_the_stairs_and_lies_still() {
     let scene = load("skeleton");
@@ -156,7 +157,8 @@ fn robot_follows_its_recording_within_its_torques_and_moves_the_blocks_as_its_pa
         }
     }
     println!("off by {off:.1e} rad, torques at most {used:.2?} of the efforts, penetration {deepest:.1e} m");
-    // the blow of the blocks gives way for a few frames: the tool's drive has 10 N m/240 Hz = 0.04 N m s a frame to hold against it
+    // the impact of the boxes deflects it for a few frames: the tool's drive has 10 N m/240 Hz =
+    // 0.04 N m s per frame against it
     assert!(off < 2e-3, "it is {off} rad off its recording");
     assert!(past <= 0.0, "past a limit by {past} rad");
     assert!(used.iter().all(|share| *share < 0.9), "torques as parts of the efforts: {used:?}");

@@ -1,12 +1,13 @@
-//! Bad input: exit code 2, one clear message that names the file, the line or the value; nothing panics.
+//! Bad input: exit code 2, and one clear message that names the file, the line or the value;
+//! nothing panics.
 
 use crate::common::*;
 
-/// What is wrong, and the words its message must hold (besides the file's name).
+/// Faults, and the words that each message must contain besides the file's name.
 fn table() -> Vec<(&'static str, String, Vec<&'static str>)> {
     let bare = |body: &str| format!("[[body]]\nname = \"b\"\n{body}\n");
     vec![
-        ("unknown key", scene("colour = \"#ffffff\"", ""), vec![":8:", "colour", "color"]),
+        ("unknown key", scene("collor = \"#ffffff\"", ""), vec![":8:", "collor", "color"]),
         ("unknown table", scene("", "[wurld]\n"), vec![":9:", "wurld"]),
         ("duplicate name", scene("", "[[body]]\nname = \"ball\"\nmode = \"static\"\nshape = { type = \"half_space\" }"), vec!["ball", ":10:"]),
         ("negative friction", scene("friction = -0.5", ""), vec![":8:", "friction", "-0.5"]),
@@ -46,7 +47,8 @@ fn every_bad_scene_gets_one_clear_message() {
     }
 }
 
-/// Bytes that are no text at all, or text that is no TOML: as many messages as the reader finds faults, all of one file.
+/// Bytes that are not text, or text that is not TOML: one message per fault that the parser finds,
+/// all about one file.
 #[test]
 fn garbage_is_no_scene() {
     let folder = Folder::new("garbage");
@@ -167,7 +169,7 @@ fn what_cannot_be_written_is_a_failure_at_run_time() {
         let said = fail(&["run", "stack", "--duration", "0.02", "--quiet", option, &below], 1);
         assert!(said.contains(&below), "{option}: {said}");
     }
-    // what is known is said before a run of eleven days begins
+    // known faults are reported before a run of eleven days begins
     for option in ["--summary", "--save", "--screenshot", "--video"] {
         let said = fail(&["run", "stack", "--duration", "1e6", "--quiet", option, &text(&folder.path("."))], 1);
         assert!(said.contains("it is a folder"), "{option}: {said}");
@@ -176,7 +178,7 @@ fn what_cannot_be_written_is_a_failure_at_run_time() {
     }
 }
 
-/// A full disk, by the device that Linux has for it.
+/// A full disk, by Linux's device for it.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_a_failure_at_run_time() {
@@ -192,12 +194,12 @@ fn a_full_disk_is_a_failure_at_run_time() {
         assert!(said.contains("error: stdout: No space left") && !said.contains("panicked"), "{args:?}: {said}");
         assert!(
             command(args).stdout(full()).stderr(full()).output().unwrap().status.code() == Some(1),
-            "{args:?}: nobody to tell"
+            "{args:?}: no stream for the message"
         );
     }
 }
 
-/// Whoever reads may have enough before the end.
+/// A reader may close the pipe before the end.
 #[test]
 fn a_reader_that_goes_away_is_no_failure() {
     use std::io::Read;

@@ -1,4 +1,4 @@
-//! Caves by the command: lists, checks, facets, frames, videos, and what goes wrong.
+//! Caves on the command line: lists, checks, facets, frames, videos, and errors.
 
 use crate::common::*;
 use std::process::Command;
@@ -7,7 +7,7 @@ fn small() -> String {
     cave("size_px = [80, 60]")
 }
 
-/// Whether there is an adapter; said visibly where not.
+/// Whether there is an adapter; without one the test prints that it is skipped.
 fn pictured(said: &str) -> bool {
     if said.contains("no picture:") {
         // past the harness, which keeps what passing tests print
@@ -52,7 +52,7 @@ fn a_file_is_checked_as_what_it_is() {
     assert!(said.contains("wrong.toml:3:1") && said.contains("did you mean `eye_m`?"), "{said}");
 }
 
-/// What facets and server would stumble over is told by the check, with the facet's name.
+/// The check reports faults that would stop facets and server, with the facet's name.
 #[test]
 fn a_check_reads_the_files_that_caves_and_scenes_name() {
     let folder = Folder::new("cave-files");
@@ -71,7 +71,7 @@ fn a_check_reads_the_files_that_caves_and_scenes_name() {
     let look = "[[body]]\nname = \"b\"\nshape = { type = \"sphere\", radius_m = 0.5 }\nmass_kg = 1\ntexture = \"damaged.png\"\n";
     let said = fail(&["check", &folder.write("textured.toml", look)], 2);
     assert!(said.contains("textured.toml") && said.contains("damaged.png: the texture is no PNG"), "{said}");
-    // neither a scene nor a cave: both are named
+    // no scene and no cave has the name: the message names both
     let said = fail(&["check", "cube5"], 2);
     assert!(said.contains("no scene `cube5`") && said.contains("did you mean `cube4`?"), "{said}");
 }
@@ -177,7 +177,7 @@ fn frames_come_at_an_even_pace_of_simulated_time() {
     }
 }
 
-/// Runs with a program of this text as `ffmpeg`.
+/// Runs the command with a script as `ffmpeg`.
 #[cfg(unix)]
 fn with_ffmpeg(folder: &Folder, script: Option<&str>) -> (Option<i32>, String) {
     use std::os::unix::fs::PermissionsExt;
@@ -218,7 +218,7 @@ fn a_video_gets_every_frame_and_its_failures_are_told() {
         code == Some(1) && said.contains("there is no ffmpeg") && said.contains("apt-get install ffmpeg"),
         "{said}"
     );
-    // one that keeps the raw frames: the path is its last argument
+    // a script that keeps the raw frames; the path is its last argument
     let keeps = "#!/bin/sh\n[ \"$1\" = -version ] && exit 0\nfor last; do :; done\nexec cat > \"$last\"\n";
     let (code, said) = with_ffmpeg(&folder, Some(keeps));
     assert_eq!(code, Some(0), "{said}");
@@ -226,13 +226,14 @@ fn a_video_gets_every_frame_and_its_failures_are_told() {
         return;
     }
     assert_eq!(std::fs::read(folder.path("out.mp4")).unwrap().len(), 5 * 31 * 24 * 4);
-    // one that reads a little and complains
+    // a script that reads a little and fails with a message
     let fails = "#!/bin/sh\n[ \"$1\" = -version ] && exit 0\nhead -c 100 > /dev/null\necho 'Unknown encoder quux' >&2\nexit 3\n";
     let (code, said) = with_ffmpeg(&folder, Some(fails));
     assert!(code == Some(1) && said.contains("Unknown encoder quux"), "{said}");
 }
 
-/// With the real program: as many frames as were sent, and the last one is the picture of the end, as far as its compression lets it.
+/// With the real program: the video has as many frames as were sent, and its last frame matches the
+/// screenshot, as far as compression allows.
 #[test]
 fn a_video_plays_the_run() {
     let out = Command::new("ffmpeg").arg("-version").output();
@@ -270,7 +271,7 @@ fn a_video_plays_the_run() {
         .args(["-v", "error", "-i", &video, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"])
         .output()
         .unwrap();
-    // sides are made even
+    // sides are rounded up to even numbers
     let (width, height) = (162, 120);
     assert_eq!(raw.stdout.len(), 5 * width * height * 3, "{}", String::from_utf8_lossy(&raw.stderr));
     let last = &raw.stdout[4 * width * height * 3..];

@@ -18,7 +18,7 @@ const COMMANDS: [&str; 12] = [
     "scenes",
     "completions",
 ];
-/// Those that end with 130 at a second signal.
+/// Commands that end with 130 at a second signal.
 const RUNS: [&str; 4] = ["cave", "serve", "facet", "replay"];
 
 /// Long options in a text.
@@ -67,7 +67,7 @@ fn completions_complete() {
     assert!(said.contains("cobol") && said.contains("zsh"), "{said}");
     let folder = Folder::new("completions");
     let script = folder.write("tumble.bash", succeed(&["completions", "bash"]));
-    // what bash asks for after "tumble sph<tab>" and "tumble run --scr<tab>"
+    // the completions of "tumble sph<tab>" and "tumble run --scr<tab>"
     for (words, answer) in [("tumble sph", "spheretree"), ("tumble run --scr", "--screenshot")] {
         let last = words.split(' ').next_back().unwrap();
         let count = words.split(' ').count() - 1;
@@ -89,7 +89,8 @@ fn the_reference_names_every_option() {
         let section = sections.iter().find(|s| s.lines().next() == Some(&format!("tumble {name}")));
         let section = section.unwrap_or_else(|| panic!("docs/command.md has no section on tumble {name}"));
         let mut wanted = options(&succeed(&[name, "--help"]));
-        // in every help, and told once for all; an option of features that are not always built
+        // options of every command, described once; and an option of features that are not always
+        // built
         wanted.remove("--help");
         let mut told = options(section);
         told.remove("--foxglove");

@@ -1,4 +1,4 @@
-//! Runs the command, and gives each test a folder of its own that goes with it.
+//! Runs the command, and gives each test a temporary folder.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ pub const SCENES: [&str; 10] =
     ["billiards", "bowling", "chain", "falling", "incline", "pendulum", "piston", "robot", "skeleton", "stack"];
 pub const STEPPERS: [&str; 2] = ["time_stepping", "backtracking"];
 
-/// A folder that is removed in the end.
+/// A folder that is removed at the end.
 pub struct Folder(PathBuf);
 
 impl Folder {
@@ -23,7 +23,7 @@ impl Folder {
         self.0.join(file)
     }
 
-    /// Writes a file and gives its path as text.
+    /// Writes a file and returns its path as text.
     pub fn write(&self, file: &str, bytes: impl AsRef<[u8]>) -> String {
         std::fs::write(self.path(file), bytes).unwrap();
         text(&self.path(file))
@@ -40,7 +40,7 @@ pub fn text(path: &Path) -> String {
     path.to_str().unwrap().to_string()
 }
 
-/// The command, away from the repository: shipped scenes are inside it.
+/// The command, outside the repository: shipped scenes are inside it.
 pub fn command(args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tumble"));
     command.args(args).current_dir(std::env::temp_dir());
@@ -51,7 +51,7 @@ pub fn tumble(args: &[&str]) -> Output {
     command(args).output().unwrap()
 }
 
-/// Runs, expects success, and gives what was said on stdout.
+/// Runs the command, expects success, and returns its stdout.
 pub fn succeed(args: &[&str]) -> String {
     let out = tumble(args);
     let (said, wrong) = (String::from_utf8(out.stdout).unwrap(), String::from_utf8(out.stderr).unwrap());
@@ -59,7 +59,8 @@ pub fn succeed(args: &[&str]) -> String {
     said
 }
 
-/// Runs, expects failure with one message that does not look like a panic, and gives the message.
+/// Runs the command, expects a failure with one message that does not look like a panic, and
+/// returns the message.
 pub fn fail(args: &[&str], code: i32) -> String {
     let wrong = fail_often(args, code);
     let messages = wrong.lines().filter(|line| line.starts_with("error: ")).count();
@@ -81,14 +82,14 @@ pub fn json(path: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
-/// A scene of one body that falls, with extra lines at the places named.
+/// A scene of one falling body, with extra lines at the two places.
 pub fn scene(body: &str, rest: &str) -> String {
     format!(
         "description = \"A test\"\n[world]\nduration_s = 0.1\n[[body]]\nname = \"ball\"\nshape = {{ type = \"sphere\", radius_m = 0.1 }}\nmass_kg = 1.0\n{body}\n{rest}\n"
     )
 }
 
-/// A cave of one screen, 2 m x 1.5 m and 2 m ahead, with these keys of its one facet `f`.
+/// A cave of one screen, 2 m x 1.5 m and 2 m ahead, with these keys for its facet `f`.
 pub fn cave(facet: &str) -> String {
     format!(
         "[[user]]\nname = \"u\"\neye_m = [0, 0, 1.5]\n[[screen]]\nname = \"s\"\nlower_left_m = [-1, 2, 0.5]\nlower_right_m = [1, 2, 0.5]\nupper_left_m = [-1, 2, 2.0]\n\

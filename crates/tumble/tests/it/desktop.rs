@@ -1,4 +1,5 @@
-//! A desktop of a test's own (Xvfb), real keys and mouse (xdotool), a picture of a window (import); and `tumble view` on it.
+//! A desktop for one test (Xvfb), real keys and mouse (xdotool), pictures of a window (import), and
+//! `tumble view` on it.
 
 use crate::common::*;
 use serde_json::Value;
@@ -6,10 +7,10 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Nothing here waits longer.
+/// Longest wait.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Ends a process when the test does, however that is.
+/// Ends a process when the test ends in any way.
 pub struct Running(pub Child);
 
 impl Drop for Running {
@@ -19,7 +20,7 @@ impl Drop for Running {
     }
 }
 
-/// An X server without a screen, on a display that was free.
+/// An X server without a screen, on a free display.
 pub struct Desktop {
     pub server: Running,
     pub display: String,
@@ -31,7 +32,7 @@ pub fn skip(why: &str) {
 }
 
 impl Desktop {
-    /// `None`, said visibly, where a program is missing.
+    /// Returns `None` if a program is missing, which is printed.
     pub fn open() -> Option<Desktop> {
         let has = |program: &str| {
             std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default())
@@ -44,7 +45,8 @@ impl Desktop {
             return None;
         }
         let mut command = Command::new("Xvfb");
-        // without -noreset it begins anew when the last window closes, and refuses who comes in that moment
+        // without -noreset the server restarts when the last window closes, and refuses connections
+        // in that moment
         command
             .args(["-displayfd", "1", "-screen", "0", "1000x700x24", "-nolisten", "tcp", "-noreset"])
             .stdout(Stdio::piped())
@@ -64,17 +66,17 @@ impl Desktop {
     }
 }
 
-/// `tumble view` on a desktop, with its status.
+/// `tumble view` on a desktop, with its status lines.
 pub struct Session<'a> {
     desktop: &'a Desktop,
     pub folder: Folder,
     process: Running,
-    /// Its X11 number.
+    /// Its X11 id.
     pub window: String,
 }
 
 impl<'a> Session<'a> {
-    /// Opens a window and waits for its first picture. `None` where there is no graphics adapter.
+    /// Opens a window and waits for its first picture. Returns `None` without a graphics adapter.
     pub fn open(desktop: &'a Desktop, name: &str, args: &[&str]) -> Option<Session<'a>> {
         let folder = Folder::new(name);
         let mut session = Session::spawn(desktop, folder, args);
@@ -100,7 +102,7 @@ impl<'a> Session<'a> {
         Session::spawn_with(desktop, folder, args, &[])
     }
 
-    /// With more of an environment.
+    /// With additional environment variables.
     pub fn spawn_with(
         desktop: &'a Desktop,
         folder: Folder,
@@ -115,14 +117,14 @@ impl<'a> Session<'a> {
         Session { desktop, folder, process, window: String::new() }
     }
 
-    /// The last whole line of the status.
+    /// The last complete line of the status.
     pub fn status(&self) -> Option<Value> {
         let text = std::fs::read_to_string(self.folder.path("status")).ok()?;
         let whole = &text[..text.rfind('\n')?];
         Some(serde_json::from_str(whole.lines().last()?).unwrap())
     }
 
-    /// Waits until the status is as wanted.
+    /// Waits until the status meets the condition.
     pub fn until(&mut self, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
         let start = Instant::now();
         loop {
@@ -148,12 +150,13 @@ impl<'a> Session<'a> {
         self.desktop.run("xdotool", &[what, button]);
     }
 
-    /// What the window shows: rows of red, green, blue.
+    /// The content of the window: rows of red, green, blue.
     pub fn shot(&self) -> Vec<u8> {
         self.desktop.run("import", &["-window", &self.window, "-depth", "8", "rgb:-"])
     }
 
-    /// Waits until the window shows a picture, but for a level of each channel: presenting takes its time.
+    /// Waits until the window shows a picture, to within a level of each channel: presenting takes
+    /// time.
     pub fn comes_to_show(&self, image: &tumble::render::Image) {
         let start = Instant::now();
         loop {
@@ -172,7 +175,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// As a desktop does when the cross in the title bar is clicked.
+    /// Closes the window as a desktop does for the cross in the title bar.
     pub fn ask_to_close(&self) {
         use x11rb::connection::Connection;
         use x11rb::protocol::xproto::{ClientMessageEvent, ConnectionExt, EventMask};
@@ -185,7 +188,7 @@ impl<'a> Session<'a> {
         server.flush().unwrap();
     }
 
-    /// The exit code, and what was said.
+    /// The exit code, and the messages.
     pub fn end(&mut self) -> (Option<i32>, String) {
         let start = Instant::now();
         loop {

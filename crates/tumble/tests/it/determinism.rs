@@ -1,4 +1,5 @@
-//! Same input, same bits: between processes, across a save in mid-contact, and in what a killed run leaves.
+//! Same input, same bits: between processes, across a save in mid-contact, and in the recording of
+//! a killed run.
 
 use crate::common::*;
 use std::process::Stdio;
@@ -15,7 +16,8 @@ fn state(folder: &Folder, name: &str, args: &[&str]) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-/// Seconds that a scene is run for: past its first contacts and into its piles; with `TUMBLE_SLOW=1` a minute.
+/// Duration of a scene's run: past its first contacts and into its piles; with `TUMBLE_SLOW=1` a
+/// minute.
 fn seconds(scene: &str) -> f64 {
     match scene {
         _ if std::env::var_os("TUMBLE_SLOW").is_some_and(|v| v == "1") => 60.0,
@@ -99,7 +101,7 @@ fn the_recording_of_a_killed_run_is_readable() {
     assert!(frames.len() > 10, "{} frames in {} bytes", frames.len(), written());
     assert!(frames.iter().enumerate().all(|(i, frame)| frame.frame == i as u64), "none is missing up to the cut");
     assert_eq!(reader.entities().len(), 11);
-    // what was recorded before the kill is what a whole run records
+    // the frames recorded before the kill are those of a complete run
     let frame = &frames[10];
     let whole = state(&folder, "whole", &["stack", "--duration", &(10.0 / 240.0).to_string()]);
     assert!(frame.state == whole, "frame 10 differs from that of a whole run");

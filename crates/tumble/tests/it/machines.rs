@@ -1,4 +1,5 @@
-//! What the pages of the shipped pendulums, chain and engine promise, by closed forms and conservation laws.
+//! Claims of the pages of the pendulums, the chain and the engine, checked by closed forms and
+//! conservation laws.
 
 use std::f64::consts::{PI, TAU};
 use tumble::collide::Vec3;
@@ -46,7 +47,7 @@ fn swing(part_state: &PartState) -> (f64, f64) {
     ((-down.x).atan2(-down.z), part_state.angular_velocity.y)
 }
 
-/// Where the cubic through two states `(θ, θ̇)`, `h` apart, is 0; as a part of `h`.
+/// Zero of the cubic through two states `(θ, θ̇)`, `h` apart, as a fraction of `h`.
 fn crossing(a: (f64, f64), b: (f64, f64), h: f64) -> f64 {
     let at = |s: f64| {
         let (p, q) = (1.0 + 2.0 * s, 3.0 - 2.0 * s);
@@ -77,7 +78,7 @@ fn pendulum_the_bob_and_the_rod_swing_in_the_time_of_the_elliptic_integral() {
             }
         }
     }
-    // ball: L + 2r²/5L; bar: 2l/3 + w²/6l
+    // sphere: L + 2r²/5L; bar: 2l/3 + w²/6l
     let lengths = [1.0 + 0.4 * 0.07 * 0.07, 0.6 + 0.05 * 0.05 / 5.4];
     let told = [2.1549834512555384, 2.7393315102684546];
     for (k, degrees) in [60.0, 150.0].into_iter().enumerate() {
@@ -92,7 +93,7 @@ fn pendulum_the_bob_and_the_rod_swing_in_the_time_of_the_elliptic_integral() {
     assert!(drift.abs() < 1e-8, "energy is off by {drift:e} of all after 30 s");
 }
 
-/// The conical pendulum and the top go round steadily: same tilt, and the azimuth grows as `Ω·t`.
+/// The conical pendulum and the top precess steadily: same tilt, and the azimuth grows as `Ω·t`.
 #[test]
 fn pendulum_the_cone_and_the_top_go_round_as_their_quadratics_say() {
     let scene = load("pendulum");
@@ -207,7 +208,8 @@ fn chain_stays_joined_loses_energy_and_balances_its_impulses_about_the_hook() {
     assert!(away.fold(f64::INFINITY, f64::min) > 0.5, "the ball has come off the chain");
 }
 
-/// `x = r·cos ψ + √(l² − r²·sin² ψ)` of each piston, `ψ` the crank's angle from its cylinder, for a minute with `TUMBLE_SLOW=1`.
+/// `x = r·cos ψ + √(l² − r²·sin² ψ)` of each piston, `ψ` the crank's angle from its cylinder, for a
+/// minute with `TUMBLE_SLOW=1`.
 #[test]
 fn piston_follows_the_slider_crank_formula_without_drift() {
     let slow = std::env::var_os("TUMBLE_SLOW").is_some_and(|v| v == "1");
@@ -245,7 +247,7 @@ fn piston_follows_the_slider_crank_formula_without_drift() {
             "{method}, {seconds} s: pistons off by {off:?} m in each half, rods by {open:e} m, crank by {late:?} rad"
         );
         assert!(off[0].max(off[1]) < 1e-6, "{method}: {off:?} m");
-        // the drive holds a velocity at the ends of frames, and nothing holds the angle
+        // the drive holds a velocity at the ends of frames, and no row holds the angle
         assert!(late[0].max(late[1]) < 5e-6, "{method}: the crank is {late:?} rad from 4π·t");
     }
 }

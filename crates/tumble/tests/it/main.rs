@@ -1,4 +1,4 @@
-//! The `tumble` command as its users run it: processes, files, exit codes.
+//! The `tumble` command as users run it: processes, files, exit codes.
 
 mod articulated_scenes;
 mod bad_input;

@@ -1,9 +1,10 @@
-//! Robots and meshes opened by themselves: on a floor, simulated, checked; and files that cannot be.
+//! Robots and meshes opened directly: on a floor, simulated, checked; and files that are refused.
 
 use crate::common::*;
 use std::fs::File;
 
-/// A box of 0.2 x 0.2 x 1 m and 3 kg that hangs from a hinge 2 m above the origin; the box reaches down to 1 m.
+/// A box of 0.2 x 0.2 x 1 m and 3 kg on a revolute joint 2 m above the origin; the box reaches down
+/// to 1 m.
 fn pendulum(shape: &str) -> String {
     format!(
         r#"<robot name="pendulum"><link name="world"/>
@@ -44,7 +45,7 @@ fn a_urdf_stands_on_a_floor_through_its_lowest_point() {
         assert!(run["end"]["kinetic_energy_j"].as_f64().unwrap() < 1e-12, "{run}");
     }
     let said = succeed(&["run", &folder.write("p.urdf", pendulum("visual")), "--duration", "0"]);
-    assert!(said.contains("--floating frees it"), "{said}");
+    assert!(said.contains("--floating makes it float"), "{said}");
 }
 
 #[test]
@@ -54,7 +55,7 @@ fn a_root_that_floats_falls_as_free_bodies_do() {
     let fall = summary(&folder, &[&path, "--floating", "--duration", "0.5"]);
     let speed = 9.81 * 0.5;
     assert!((fall["end"]["kinetic_energy_j"].as_f64().unwrap() - 0.5 * speed * speed).abs() < 1e-9, "{fall}");
-    // what has no joints floats by itself
+    // a robot without joints floats by default
     assert!(succeed(&["check", &path]).contains("6 degrees of freedom on a floating base"));
     let path = folder.write("p.urdf", pendulum("visual"));
     assert!(succeed(&["check", &path]).contains("1 degrees of freedom on a fixed base"));
@@ -102,8 +103,8 @@ fn a_mesh_of_hundreds_of_metres_is_noted() {
     let folder = Folder::new("open-large");
     let path = folder.write("part.obj", cube(100));
     let said = succeed(&["run", &path, "--duration", "0"]);
-    assert!(said.contains("diagonal is 173.2 m") && said.contains("millimetres"), "{said}");
-    assert!(!succeed(&["run", &folder.write("cube.obj", cube(1)), "--duration", "0"]).contains("millimetres"));
+    assert!(said.contains("diagonal is 173.2 m") && said.contains("millim"), "{said}");
+    assert!(!succeed(&["run", &folder.write("cube.obj", cube(1)), "--duration", "0"]).contains("millim"));
 }
 
 #[test]
@@ -179,10 +180,10 @@ fn options_of_robots_and_meshes_are_refused_elsewhere() {
     let folder = Folder::new("opening-options");
     let (cube, urdf) = (folder.write("cube.obj", cube(1)), folder.write("crate.urdf", CRATE));
     for (args, words) in [
-        (&["run", "stack", "--floating"][..], "go with a .urdf"),
-        (&["run", &cube, "--fixed-base"], "go with a .urdf"),
-        (&["run", "stack", "--repair"], "--repair goes with a mesh"),
-        (&["run", &urdf, "--repair"], "--repair goes with a mesh"),
+        (&["run", "stack", "--floating"][..], "need a .urdf"),
+        (&["run", &cube, "--fixed-base"], "need a .urdf"),
+        (&["run", "stack", "--repair"], "--repair needs a mesh"),
+        (&["run", &urdf, "--repair"], "--repair needs a mesh"),
         (&["run", &urdf, "--floating", "--fixed-base"], "--fixed-base"),
         (&["run", &urdf, "--package", "p=/nonexistent/folder"], "/nonexistent/folder"),
     ] {

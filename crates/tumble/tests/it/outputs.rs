@@ -1,4 +1,5 @@
-//! What a run leaves: the summary is complete and its numbers agree with each other, the recording reads back and ends where `--save` ends.
+//! Results of a run: the summary is complete and consistent, and the recording reads back and ends
+//! at the state of `--save`.
 
 use crate::common::*;
 use serde_json::Value;
@@ -130,7 +131,7 @@ fn check_recording(name: &str, path: &str, frames: usize, saved: &[u8], summary:
 fn the_sums_of_the_summary_are_those_of_its_bodies() {
     let folder = Folder::new("sums");
     let path = folder.path("summary.json");
-    // a ball of 2 kg that flies for half a second: no contact, so the closed form holds
+    // a sphere of 2 kg that flies for half a second: no contact, so the closed form holds
     let toml = "[world]\nduration_s = 0.5\ndt_s = 0.01\n[[body]]\nname = \"ball\"\nshape = { type = \"sphere\", radius_m = 0.1 }\nmass_kg = 2.0\n\
         position_m = [1.0, 2.0, 3.0]\nvelocity_m_per_s = [0.5, -0.25, 4.0]\nangular_velocity_rad_per_s = [0, 0, 3.0]\n";
     succeed(&["run", &folder.write("ball.toml", toml), "--quiet", "--summary", &text(&path)]);
@@ -166,17 +167,20 @@ fn check_passes_what_is_good_and_scenes_lists_what_is_shipped() {
     names.sort();
     assert_eq!(names, SCENES);
     let folder = Folder::new("check");
-    // a tetrahedron with three unit edges: volume 1/6, centre of mass at a quarter of each
+    // a tetrahedron with three unit edges: volume 1/6, center of mass at a quarter of each
     let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
     let said = succeed(&["check", &folder.write("tetrahedron.obj", mesh)]);
     assert!(said.contains("volume 1.666667e-1 m³") && said.contains("(0.250000, 0.250000, 0.250000)"), "{said}");
     let robot = "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"><inertial><mass value=\"2\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial></link>\n\
                  <joint name=\"j\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/></joint></robot>";
     let said = succeed(&["check", &folder.write("robot.urdf", robot)]);
-    assert!(said.contains("a robot of 2 links, 1 degrees of freedom on a fixed base, 2.000000 kg that move"), "{said}");
+    assert!(
+        said.contains("a robot of 2 links, 1 degrees of freedom on a fixed base, 2.000000 kg of moving mass"),
+        "{said}"
+    );
 }
 
-/// One line of text per thing written, and a summary of the run, unless quiet.
+/// One line of text per file written, and a summary of the run, without `--quiet`.
 #[test]
 fn a_run_says_what_it_wrote() {
     let folder = Folder::new("says");

@@ -3,7 +3,7 @@
 use crate::common::*;
 use std::path::Path;
 
-/// Takes every graphics driver away: no Vulkan ICD, no EGL vendor, no Mesa driver to load.
+/// Hides every graphics driver: no Vulkan ICD, no EGL vendor, no Mesa driver.
 fn without_adapter(args: &[&str]) -> std::process::Output {
     let mut command = command(args);
     for key in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES", "VK_ADD_DRIVER_FILES"] {

@@ -1,4 +1,4 @@
-//! `tumble check --repair`: meshes that are no solids are made ones, and what was done is told.
+//! `tumble check --repair`: meshes that are not solids become solids, and notes list the repairs.
 
 use crate::common::*;
 
@@ -16,12 +16,13 @@ fn an_open_mesh_is_closed_on_request_and_the_file_stays() {
         "{said}"
     );
     assert_eq!(std::fs::read_to_string(&path).unwrap(), OPEN);
-    // nothing to close around
+    // no hole can be closed
     let said = fail(&["check", "--repair", &folder.write("lone.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")], 2);
     assert!(said.contains("line 4") && said.contains("repair was asked for, but"), "{said}");
 }
 
-/// Every public bad mesh ends within a minute, with success or one message, with and without repair.
+/// Every public bad mesh ends within a minute, with success or one message, with and without
+/// repair.
 #[test]
 fn public_bad_meshes_end_in_success_or_one_message() {
     let given = std::env::var_os("TUMBLE_MESHES").map(std::path::PathBuf::from);

@@ -1,4 +1,4 @@
-//! What the shipped scenes' own pages promise, by hand-made numbers.
+//! Claims of the pages of the shipped scenes, checked against independent numbers.
 
 use crate::common::SCENES;
 use tumble::collide::Vec3;
@@ -61,7 +61,8 @@ fn billiards_the_cue_ball_arrives_as_its_page_says() {
     assert!(part_state(&world, cue).1.norm() < 0.8 * speed, "it meets the rack within the next frame");
 }
 
-/// The break without friction, damping and loss keeps momentum and energy until a ball comes to a cushion.
+/// Without friction, damping and loss, the break keeps momentum and energy until a billiard ball
+/// reaches a cushion.
 #[test]
 fn billiards_the_break_keeps_momentum_and_energy_before_the_first_cushion() {
     let mut scene = load("billiards");
@@ -97,7 +98,7 @@ fn billiards_the_break_keeps_momentum_and_energy_before_the_first_cushion() {
     assert!(moving >= 10, "{moving} balls move when the first comes to a cushion: the rack was broken");
 }
 
-/// The parabola of a slipping ball, and the pocket.
+/// The parabola of a slipping bowling ball, and the pocket.
 #[test]
 fn bowling_the_ball_hooks_as_its_page_says_and_at_least_seven_pins_fall() {
     let scene = load("bowling");
@@ -161,7 +162,8 @@ fn incline_the_block_stops_where_and_when_its_page_says_and_stays() {
     });
 }
 
-/// Everything stays in the box and above its floor, and nearly all the energy goes. What can roll still does: nothing here resists rolling.
+/// Everything stays in the box and above its floor, and nearly all the energy is lost. Bodies that
+/// can roll still do, because nothing resists rolling.
 #[test]
 fn falling_stays_in_its_box_and_comes_to_rest_with_few_tries() {
     in_both("falling", |scene, mut world| {
@@ -216,7 +218,7 @@ fn stack_stands_with_few_tries() {
     });
 }
 
-/// A scene that is shipped must not fail, whatever solver it is run with.
+/// A shipped scene must not fail with any solver.
 #[test]
 fn every_scene_runs_with_every_solver() {
     for name in SCENES {

@@ -1,4 +1,5 @@
-//! `tumble spheretree`: tables, files, pictures, the cache under several processes, robots, and what is said of wrong input.
+//! `tumble spheretree`: tables, files, pictures, the cache under several processes, robots, and
+//! errors.
 
 use crate::common::*;
 use serde_json::Value;
@@ -14,7 +15,7 @@ fn ring() -> TriMesh {
     TriMesh::torus(1.0, 0.3, 16, 8)
 }
 
-/// The words after the mesh for a quick tree.
+/// Options for a quick tree.
 const QUICK: [&str; 4] = ["--method", "octree", "--depth", "2"];
 
 #[test]
@@ -59,7 +60,7 @@ fn many_processes_share_a_cache_and_all_write_the_same() {
     assert_eq!(std::fs::read_dir(&cache).unwrap().count(), 1);
     let said = succeed(&[&["spheretree", &mesh, "--cache", &cache][..], &QUICK].concat());
     assert!(said.contains("from the cache"), "{said}");
-    // what the environment names is used where nothing is typed
+    // the environment variable is used without the option
     let mut named = command(&[&["spheretree", &mesh][..], &QUICK].concat());
     let said = String::from_utf8(named.env("TUMBLE_CACHE", &cache).output().unwrap().stdout).unwrap();
     assert!(said.contains("from the cache"), "{said}");
@@ -77,8 +78,11 @@ fn a_damaged_file_of_the_cache_is_told_and_built_anew() {
     let good = std::fs::read(&file).unwrap();
     std::fs::write(&file, &good[..good.len() / 2]).unwrap();
     let out = tumble(&words);
-    let (said, told) = (String::from_utf8_lossy(&out.stdout), String::from_utf8_lossy(&out.stderr));
-    assert!(out.status.success() && said.contains("built in") && told.contains("is rebuilt"), "{said}{told}");
+    let (said, messages) = (String::from_utf8_lossy(&out.stdout), String::from_utf8_lossy(&out.stderr));
+    assert!(
+        out.status.success() && said.contains("built in") && messages.contains("is rebuilt"),
+        "{said}{messages}"
+    );
     assert_eq!(std::fs::read(&file).unwrap(), good);
 }
 
@@ -93,13 +97,13 @@ fn a_picture_of_a_level_is_written() {
         ]
         .concat(),
     );
-    let told = String::from_utf8_lossy(&out.stderr);
-    assert!(out.status.success(), "{told}");
-    if told.contains("no picture:") {
+    let messages = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success(), "{messages}");
+    if messages.contains("no picture:") {
         // past the harness, which keeps what passing tests print
         let _ = std::io::Write::write_fmt(
             &mut std::io::stderr(),
-            format_args!("\nSKIPPED: this machine has no graphics adapter; {told}\n"),
+            format_args!("\nSKIPPED: this machine has no graphics adapter; {messages}\n"),
         );
         return;
     }
@@ -128,7 +132,7 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
         (&[&mesh, "--max-error", "2"], "wanted a number from 0.0001 to 1"),
         (
             &[&mesh, "--method", "octree", "--depth", "2", "--screenshot", &level, "--level", "7"],
-            "--level is 7; a tree of --depth 2 has levels 0 to 2 at most",
+            "--level is 7; a tree with --depth 2 has at most levels 0 to 2",
         ),
         (&[], "wanted a mesh, or --urdf ROBOT"),
         (&[&mesh, "-o", &nowhere], "nowhere/tree.json cannot be written: there is no folder"),
@@ -139,11 +143,11 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
         (&["--urdf", &gone], "--package NAME=DIR"),
         (&["--urdf", &none], "cannot read the URDF"),
         (&["--urdf", &robot, "--planner", "xml"], "wanted yaml, json, or a file that ends in .yml, .yaml or .json"),
-        (&["--urdf", &robot, "--planner", "yaml"], "name a file, such as --planner robot.yaml"),
+        (&["--urdf", &robot, "--planner", "yaml"], "needs --output, or a file such as --planner robot.yaml"),
     ];
     for (words, said) in cases {
-        let told = fail_often(&[&["spheretree", "--no-cache"], words].concat(), 2);
-        assert!(told.contains(said), "{words:?}: {told}");
+        let messages = fail_often(&[&["spheretree", "--no-cache"], words].concat(), 2);
+        assert!(messages.contains(said), "{words:?}: {messages}");
     }
     let said = succeed(&[&["spheretree", &open, "--no-cache", "--repair"][..], &QUICK].concat());
     assert!(said.contains("1 hole(s) were filled"), "{said}");
@@ -170,7 +174,7 @@ fn a_file_that_cannot_be_written_whole_stays_as_it_was() {
     let folder = Folder::new("spheretree-whole");
     let (mesh, out) = (folder.write("ring.obj", obj(&ring())), folder.path("tree.json"));
     std::fs::write(&out, "what was there").unwrap();
-    // a limit on the size of files stands for a full disk
+    // a limit on the size of files acts like a full disk
     let tree = text(&out);
     let words = [&["spheretree", &mesh, "--no-cache", "-o", &tree][..], &QUICK].concat();
     let run = ["-c", "trap '' XFSZ; ulimit -f 1; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_tumble")];
@@ -179,7 +183,7 @@ fn a_file_that_cannot_be_written_whole_stays_as_it_was() {
     assert!(String::from_utf8_lossy(&done.stderr).contains("writing"), "{done:?}");
     assert_eq!(std::fs::read_to_string(&out).unwrap(), "what was there");
     assert_eq!(std::fs::read_dir(folder.path("")).unwrap().count(), 2, "something was left behind");
-    // what is no file is written into
+    // a path that is no regular file is written directly
     let said = succeed(&[&["spheretree", &mesh, "--no-cache", "-q", "-o", "/dev/stdout"][..], &QUICK].concat());
     TreeFile::from_json(&said).unwrap();
 }
@@ -206,7 +210,7 @@ fn a_robot_of_spheres_is_written_with_the_lists_for_planners() {
         "--spheres",
         "12",
     ]);
-    assert!(said.contains("100 % of the collision surface of each link lies inside"), "{said}");
+    assert!(said.contains("100 % of the collision surface of each link is proved to lie inside"), "{said}");
     succeed(&["spheretree", "--no-cache", "-q", "--urdf", &robot, "--planner", &list, "--spheres", "12"]);
     assert!(succeed(&["check", &out]).contains("a robot of 2 links"));
     let list: Value = json(list.as_ref());

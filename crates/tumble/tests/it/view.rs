@@ -1,10 +1,10 @@
-//! `tumble view`: what keys and mouse do, which steps are taken, and what is said before a window opens.
+//! `tumble view`: keys and mouse, the steps that are taken, and errors before a window opens.
 
 use crate::common::*;
 use crate::desktop::{Desktop, Session, skip};
 use serde_json::Value;
 
-/// A ball of 2 kg that hangs in the middle of the view, without gravity; the eye is 4 m in front of it.
+/// A sphere of 2 kg in the middle of the view, without gravity; the eye is 4 m in front of it.
 const BALL: &str = "description = \"A ball in the middle\"
 [world]
 dt_s = 0.01
@@ -28,7 +28,7 @@ fn close(a: [f64; 3], b: [f64; 3], within: f64) -> bool {
     (0..3).all(|k| (a[k] - b[k]).abs() <= within)
 }
 
-/// The hash of the state after so many seconds of `tumble run`.
+/// The hash of the state after this simulated time of `tumble run`, s.
 fn state_of_run(folder: &Folder, scene: &str, seconds: &str) -> String {
     let path = text(&folder.path("run.state"));
     succeed(&["run", scene, "--quiet", "--duration", seconds, "--save", &path]);
@@ -92,14 +92,14 @@ fn keys_and_mouse_do_what_they_say() {
         eye = std::array::from_fn(|k| eye[k] + by[k]);
         view.until(&format!("{key} to move the eye to {eye:?}"), |s| close(three(&s["eye_m"]), eye, 1e-5));
     }
-    // a mouse that is dragged by 100 pixels turns by 0.5 rad to the right, and as much up
+    // dragging by 100 pixels turns by 0.5 rad to the right, and by the same angle up
     view.mouse([50, 120]);
     view.button("mousedown", "3");
     view.mouse([150, 20]);
     view.button("mouseup", "3");
     let (sin, cos) = 0.5f64.sin_cos();
     view.until("the turn", |s| close(three(&s["forward"]), [cos * sin, cos * cos, sin], 1e-5));
-    // on foot ahead is level, in flight it is where one looks
+    // walking is level, flying is along the view
     view.key("w");
     eye = [eye[0] + 0.1 * sin, eye[1] + 0.1 * cos, eye[2]];
     view.until("a level step", |s| close(three(&s["eye_m"]), eye, 1e-5));
@@ -135,7 +135,7 @@ fn a_run_that_nobody_touches_is_the_run_of_the_command() {
     let Some(desktop) = Desktop::open() else { return };
     let folder = Folder::new("view-same");
     for scene in ["billiards", "robot"] {
-        // it may end before anyone finds its window
+        // the run may end before its window is found
         let args = [scene, "--size", "64x48", "--fps", "15", "--duration", "0.5"];
         let mut view = Session::spawn(&desktop, Folder::new("view-same-status"), &args);
         let (code, said) = view.end();
@@ -155,7 +155,7 @@ fn a_body_is_pulled_to_the_pointer() {
     let folder = Folder::new("view-pull");
     let scene = folder.write("ball.toml", BALL);
     let Some(mut view) = Session::open(&desktop, "view-pull-status", &[&scene, "--size", "200x200"]) else { return };
-    // the middle of the ball's front is 3.5 m away
+    // the middle of the sphere's front is 3.5 m away
     view.mouse([100, 100]);
     view.button("mousedown", "1");
     let held = view.until("the ball in the hand", |s| s["picked"] == "ball");
@@ -169,7 +169,7 @@ fn a_body_is_pulled_to_the_pointer() {
     assert_eq!(there["picked"], "ball");
     view.button("mouseup", "1");
     view.until("the ball let go", |s| s["picked"].is_null());
-    // beside the ball there is nothing to hold: the view turns
+    // beside the sphere there is nothing to pick: the view turns
     view.mouse([5, 195]);
     view.button("mousedown", "1");
     view.mouse([25, 195]);
@@ -178,7 +178,8 @@ fn a_body_is_pulled_to_the_pointer() {
     assert!(turned["picked"].is_null());
 }
 
-/// The first picture takes seconds where a software driver makes its pipelines; the scene begins with it.
+/// The first picture takes seconds while a software driver builds its pipelines; the scene starts
+/// with it.
 #[test]
 fn time_begins_with_the_first_picture() {
     let Some(desktop) = Desktop::open() else { return };
@@ -212,7 +213,7 @@ fn a_picture_that_cannot_be_written_ends_no_session() {
     };
     view.key("space");
     view.until("the pause", |s| s["paused"] == true);
-    // the folder goes while the window is open
+    // the folder is removed while the window is open
     std::fs::remove_dir(&shots).unwrap();
     view.key("p");
     view.key("1");

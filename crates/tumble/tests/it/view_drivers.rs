@@ -1,4 +1,5 @@
-//! Windows on each driver and desktop: X with Vulkan and with OpenGL alone, Wayland; and what happens where the driver crashes.
+//! Windows on each driver and desktop: X with Vulkan and with OpenGL alone, Wayland; and crashes of
+//! the driver.
 
 use crate::common::*;
 use crate::desktop::{Desktop, PATIENCE, Running, Session, skip};
@@ -8,13 +9,13 @@ use std::time::{Duration, Instant};
 /// A machine without Vulkan.
 const NO_VULKAN: [(&str, &str); 2] = [("VK_DRIVER_FILES", "/none"), ("VK_ICD_FILENAMES", "/none")];
 
-/// The exit code, and what was said without what the driver's loader says.
+/// The exit code, and the messages without those of the driver's loader.
 fn outcome(session: &mut Session) -> (Option<i32>, String) {
     let (code, said) = session.end();
     (code, said.lines().filter(|line| !line.starts_with("libEGL")).collect::<Vec<_>>().join("\n"))
 }
 
-/// A driver that crashes takes the device with it, in the middle of a run.
+/// A driver that crashes loses its device, in the middle of a run.
 fn loses_its_device(desktop: &Desktop, name: &str, interface: &str, environment: &[(&str, &str)]) {
     let args = ["stack", "--size", "64x48", "--lose-device", "3"];
     let mut view = Session::spawn_with(desktop, Folder::new(name), &args, environment);
@@ -59,7 +60,7 @@ fn a_machine_without_vulkan_shows_the_same() {
     assert_eq!(gl["shown"], 3);
 }
 
-/// A desktop of Wayland without a screen, whose sockets lie in a folder of its own.
+/// A Wayland desktop without a screen; its sockets are in a folder of its own.
 fn compositor(folder: &Folder) -> Option<Running> {
     let mut command = Command::new("weston");
     command.args([
@@ -110,7 +111,7 @@ fn windows_open_on_wayland() {
     let status = view.status().unwrap();
     assert!(status["shown"] == 3 && status["size_px"] == serde_json::json!([64, 48]), "{status}");
     loses_its_device(&desktop, "view-device-wayland", "Vulkan", &wayland);
-    // the desktop goes away in mid-run
+    // the desktop ends in mid-run
     let mut view =
         Session::spawn_with(&desktop, Folder::new("view-wayland-lost"), &["stack", "--size", "64x48"], &wayland);
     let start = Instant::now();

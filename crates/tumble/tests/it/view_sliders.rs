@@ -13,12 +13,12 @@ fn joint(status: &Value, index: usize) -> (f64, Option<f64>, [f64; 3]) {
     (joint["position"].as_f64().unwrap(), joint["target"].as_f64(), pixels)
 }
 
-/// The pixel of a slider at a share of its bar.
+/// The pixel of a slider at a fraction of its bar.
 fn pixel([left, right, middle]: [f64; 3], share: f64) -> [u32; 2] {
     [(left + share * (right - left)).round() as u32, middle as u32]
 }
 
-/// Drags a slider from where it is to a share of its bar.
+/// Drags a slider from one fraction of its bar to another.
 fn drag(view: &Session<'_>, bar: [f64; 3], from: f64, to: f64) {
     view.mouse(pixel(bar, from));
     view.button("mousedown", "1");
@@ -37,7 +37,7 @@ fn sliders_set_positions_while_time_stands_and_targets_while_it_goes() {
     let (start, target, bar) = joint(&status, 1);
     assert_eq!((start, target), (0.0, None));
 
-    // time stands: the position is where the mouse is, to a pixel, and nothing else moves
+    // while paused, the position is that of the mouse, to a pixel, and nothing else moves
     let [least, greatest] = SHOULDER;
     let a_pixel = (greatest - least) / (bar[1] - bar[0]);
     drag(&view, bar, -least / (greatest - least), 0.75);
@@ -51,7 +51,7 @@ fn sliders_set_positions_while_time_stands_and_targets_while_it_goes() {
     let at = 3 * (480 * y + x) as usize;
     assert!(shot[at] > 240 && (140..180).contains(&shot[at + 1]) && shot[at + 2] < 80, "{:?}", &shot[at..at + 3]);
 
-    // keys: the chosen joint moves by a hundredth of its range
+    // keys: the selected joint moves by a hundredth of its range
     let before = joint(&view.status().unwrap(), 1).0;
     view.key("bracketright");
     let step = 0.01 * (greatest - least);
@@ -60,7 +60,7 @@ fn sliders_set_positions_while_time_stands_and_targets_while_it_goes() {
     view.key("bracketleft");
     view.until("the next joint", |s| joint(s, 2).0 < 0.0);
 
-    // held by drives the arm keeps its pose, but for what gravity bends it
+    // drives hold the pose of the arm, except for its deflection by gravity
     view.key("k");
     let held = view.until("hold", |s| s["joints_held"] == true);
     view.key("space");
@@ -70,21 +70,21 @@ fn sliders_set_positions_while_time_stands_and_targets_while_it_goes() {
         assert!((position - target.unwrap()).abs() < 0.05, "joint {k} is at {position}, not {target:?}");
     }
 
-    // time goes: the mouse sets the target, and the joint goes there
+    // while running, the mouse sets the target, and the joint moves there
     let from = (joint(&later, 1).1.unwrap() - least) / (greatest - least);
     drag(&view, bar, from, 0.25);
     let wanted = least + 0.25 * (greatest - least);
     view.until("the target", |s| joint(s, 1).1.is_some_and(|target| (target - wanted).abs() <= a_pixel));
     view.until("the joint", |s| (joint(s, 1).0 - wanted).abs() < 0.05);
 
-    // free again it falls; R goes back to the start
+    // released, the arm falls; R resets to the start
     view.key("k");
     view.until("free", |s| s["joints_held"] == false && s["joints"][1]["target"].is_null());
     view.key("space");
     view.until("a pause", |s| s["paused"] == true);
     view.key("r");
     view.until("the start", |s| s["frame"] == 0 && (0..6).all(|k| joint(s, k).0 == 0.0));
-    // J takes the panel away
+    // J hides the panel
     view.key("j");
     view.until("no panel", |s| s["joints"][0]["slider_px"].is_null());
     view.key("Escape");
@@ -99,7 +99,7 @@ fn the_sliders_of_a_scene_come_when_asked_for() {
     assert!(view.status().unwrap()["joints"][0]["slider_px"].is_null());
     view.key("j");
     let status = view.until("sliders", |s| s["joints"][0]["slider_px"].is_array());
-    // a drag on the panel takes hold of no body
+    // a drag on the panel picks no body
     let (_, _, bar) = joint(&status, 0);
     view.mouse(pixel(bar, 0.8));
     view.button("mousedown", "1");

@@ -1,4 +1,4 @@
-//! What the windows of `tumble view` show, against pictures of `tumble run`, and how they end.
+//! Pictures in the windows of `tumble view` against those of `tumble run`, and the end of windows.
 
 use crate::common::*;
 use crate::desktop::{Desktop, Session};
@@ -27,7 +27,8 @@ fn a_window_shows_the_picture_that_run_takes() {
     assert!(bright.iter().max() > bright.iter().min().map(|m| m + 60).as_ref(), "the picture shows nothing");
 }
 
-/// A facet whose projector stands askew: a grid that bends and leaves a corner black, a mask that darkens one side.
+/// A facet whose projector is at an angle: a grid that warps and leaves a corner black, a mask that
+/// darkens one side.
 fn bent(folder: &Folder) -> String {
     let at = |k: u32| f64::from(k) / 4.0;
     let mut grid = String::new();
@@ -53,7 +54,8 @@ fn bent(folder: &Folder) -> String {
     "warp_file = \"warp.obj\"\nblend_file = \"mask.png\"\n".to_string()
 }
 
-/// Stereo, mirrors, warp and blend reach the window as they reach the file, and all facets unfolded do.
+/// Stereo, mirroring, warp and blend appear in the window as in the file, and so do all facets
+/// unfolded.
 #[test]
 fn facets_and_unfolded_caves_show_what_run_takes() {
     let Some(desktop) = Desktop::open() else { return };
@@ -89,7 +91,8 @@ fn facets_and_unfolded_caves_show_what_run_takes() {
         view.comes_to_show(&image);
         pictures.push(image);
     }
-    // the grid leaves its first corner black, and the mask takes red on the right and blue on the left; a plain facet has neither
+    // the grid leaves its first corner black, and the mask takes red on the right and blue on the
+    // left; a plain facet has neither
     let sum = |image: &Image, channel: usize, from: u32, to: u32| {
         (0..90)
             .flat_map(|y| (from..to).map(move |x| (x, y)))
@@ -105,7 +108,8 @@ fn facets_and_unfolded_caves_show_what_run_takes() {
         "{:?}",
         pictures[2].pixel(2, 87)
     );
-    // the mask leaves 155/255 of the red light there and 205/255 here: in sRGB bytes (155/205)^(1/2.4) = 0.89 of it, where the picture is grey
+    // the mask leaves 155/255 of the red light there and 205/255 here: in sRGB bytes
+    // (155/205)^(1/2.4) = 0.89 of it on gray parts of the picture
     assert!((share(0, 90, 110) / share(0, 40, 60) - 0.89).abs() < 0.04, "{} {}", share(0, 90, 110), share(0, 40, 60));
 }
 
@@ -120,7 +124,7 @@ fn windows_that_end_end_well() {
         Session::spawn(&desktop, Folder::new("view-frames"), &[&args[..], &["--frames", "3", "--paused"]].concat());
     assert_eq!(view.end(), (Some(0), String::new()));
     assert_eq!(view.status().unwrap()["shown"], 3);
-    // without its X server a window ends too: X's own library sees to that, and says so
+    // without its X server a window ends too, with a message of the X library
     let Some(mut view) = Session::open(&desktop, "view-lost", &args) else { return };
     assert!(Command::new("kill").arg(desktop.server.0.id().to_string()).status().unwrap().success());
     let (code, said) = view.end();

@@ -1,11 +1,11 @@
-//! Leaving out must not change a picture, and must leave out what closed forms say is hidden.
+//! Culling must not change a picture, and must cull what closed forms give as hidden.
 
 use super::*;
 use crate::camera::orthographic;
 use crate::{Camera, DrawList, Ground, Light, Material, Quality, Renderer, Viewpoint};
 use nalgebra::{Matrix4, Point3, UnitQuaternion, Vector3};
 
-/// Numbers from 0 to 1, the same each time.
+/// Reproducible numbers from 0 to 1.
 struct Numbers(u64);
 
 impl Numbers {
@@ -15,7 +15,7 @@ impl Numbers {
     }
 }
 
-/// Balls of many sizes in a box of 4 x 4 x 2 m, under a sun and a lamp.
+/// Spheres of many sizes in a box of 4 x 4 x 2 m, under a sun and a lamp.
 fn pile(count: usize, seed: u64) -> DrawList {
     let mut numbers = Numbers(seed);
     let mut list = DrawList { ground: Some(Ground::grid(0.0)), ..DrawList::default() };
@@ -35,7 +35,7 @@ fn parallel() -> Camera {
     Camera::Raw { view, projection: orthographic(Vector3::new(-2.5, -2.0, -12.0), Vector3::new(2.0, 2.5, -1.0)) }
 }
 
-/// Through a window beside the middle, as a screen of a cave.
+/// A view through a window beside the middle, as through a screen of a cave.
 fn beside() -> Camera {
     let view = Matrix4::look_at_rh(&Point3::new(2.5, -3.0, 1.5), &Point3::new(0.0, 0.0, 1.0), &Vector3::z());
     let mut projection = nalgebra::Perspective3::new(1.3, 1.2, 0.1, 50.0).to_homogeneous();
@@ -59,7 +59,7 @@ fn views() -> Vec<Camera> {
 }
 
 #[test]
-fn what_is_left_out_has_no_pixel() {
+fn culled_spheres_have_no_pixel() {
     let Ok(mut renderer) = Renderer::new() else { return };
     for (seed, quality) in
         [(1, "fastest"), (2, "fast"), (3, "fast,samples=4,shadows=soft,map=512"), (4, "fast,occlusion=on")]
@@ -84,8 +84,9 @@ fn eye(camera: &Camera) -> Eye {
 }
 
 #[test]
-fn most_of_a_pile_is_left_out() {
-    // 20 layers of touching balls, seen from above: an octahedral arrangement lets see no deeper than the first few
+fn most_of_a_pile_is_culled() {
+    // 20 layers of touching spheres, seen from above: in an octahedral arrangement only the first
+    // few are visible
     let spheres: Vec<SphereBounds> = (0..20 * 400)
         .map(|i| (i / 400, i / 20 % 20, i % 20))
         .map(|(z, y, x)| {
@@ -105,8 +106,9 @@ fn most_of_a_pile_is_left_out() {
 }
 
 #[test]
-fn a_ball_is_hidden_in_the_shadow_of_a_larger_one() {
-    // from the origin along x: a ball of 1 m at 5 m covers a cone of asin(1/5), one of 0.3 m at 10 m about the angle a is within it while a + asin(0.03) is less
+fn a_sphere_is_hidden_behind_a_larger_one() {
+    // from the origin along x: a sphere of 1 m at 5 m covers a cone of asin(1/5); one of 0.3 m at
+    // 10 m at the angle a is within it while a + asin(0.03) is less
     let camera = Camera::LookAt {
         eye: Point3::origin(),
         target: Point3::new(1.0, 0.0, 0.0),
@@ -117,7 +119,7 @@ fn a_ball_is_hidden_in_the_shadow_of_a_larger_one() {
     };
     let eye = eye(&camera);
     let limit = (0.2f32).asin() - (0.03f32).asin();
-    // a cell of 2 pixels and their share at the edges: 366 pixels per tangent
+    // a cell of 2 pixels and their fraction at the edges: 366 pixels per tangent
     let slack = 6.0 / 366.0;
     for (angle, hidden) in [(0.0, true), (limit - slack, true), (limit + 0.001, false), (2.0 * limit, false)] {
         for turn in [0.0f32, 0.7, 2.0, 4.0] {
@@ -134,16 +136,17 @@ fn a_ball_is_hidden_in_the_shadow_of_a_larger_one() {
             }
         }
     }
-    // behind the eye, beside the picture, beyond the far plane: none; around the eye: drawn
+    // behind the eye, beside the picture, beyond the far plane: culled; around the eye: drawn
     let outside = [([-3.0, 0.0, 0.0], 1.0), ([5.0, 6.0, 0.0], 1.0), ([5.0, 0.0, -7.0], 2.0), ([200.0, 0.0, 0.0], 1.0)]
         .map(|(at, r): ([f32; 3], f32)| (Point3::from(at), r));
     assert!(visible(&outside, std::iter::once(0..4), &eye, 1).is_empty());
     assert_eq!(visible(&[(Point3::new(0.2, 0.0, 0.0), 1.0)], std::iter::once(0..1), &eye, 1), [0]);
 }
 
-/// Four layers of 50 x 50 balls from in front and above, as in the example `frames`. Which have a pixel is told by rays through the middles of all pixels.
+/// Four layers of 50 x 50 spheres from in front and above, as in the example `frames`. Rays through
+/// the centers of all pixels determine which have one.
 #[test]
-fn of_four_layers_a_third_is_left_out_and_none_that_a_ray_meets() {
+fn a_third_of_four_layers_is_culled_and_none_that_a_ray_meets() {
     let (width, height, fov) = (1024usize, 768usize, 40f64.to_radians());
     let at =
         |i: usize| [0.21 * ((i / 200) as f64 - 24.5), 0.23 * ((i / 4 % 50) as f64 - 24.5), 0.1 + 0.22 * (i % 4) as f64];
@@ -194,8 +197,8 @@ fn of_four_layers_a_third_is_left_out_and_none_that_a_ray_meets() {
     );
     assert!(
         met.len() > 2500 && met.iter().all(|i| drawn.binary_search(&(*i as u32)).is_ok()),
-        "{} balls have a pixel",
+        "{} spheres have a pixel",
         met.len()
     );
-    assert!(drawn.len() < 6700, "{} balls are drawn, {} have a pixel", drawn.len(), met.len());
+    assert!(drawn.len() < 6700, "{} spheres are drawn, {} have a pixel", drawn.len(), met.len());
 }

@@ -1,4 +1,4 @@
-//! What keys and mouse do.
+//! Keys, mouse and window events.
 
 use super::*;
 use crate::view::picker::Picker;
@@ -7,11 +7,11 @@ use tumble::render::winit::event::{ElementState, MouseButton, MouseScrollDelta};
 use tumble::render::winit::keyboard::PhysicalKey;
 use tumble::render::winit::window::Fullscreen;
 
-/// What dragging turns, rad per pixel.
+/// Turn per pixel of dragging, rad.
 const TURN_RAD_PER_PX: f64 = 0.005;
 
 impl Viewer {
-    /// Something happened to the window.
+    /// Handles a window event.
     pub(super) fn handle(&mut self, screen: &mut Screen, event: &WindowEvent) -> Result<(), Failure> {
         match event {
             WindowEvent::KeyboardInput { event, .. } => {
@@ -128,7 +128,7 @@ impl Viewer {
         self.view_mode.ray(&self.list, screen.size_px(), self.pointer.at_px)
     }
 
-    /// The hand stays below the pointer, wherever user and pointer go.
+    /// Keeps the spring's target below the pointer when the user or the pointer moves.
     pub(super) fn move_picker(&mut self, screen: &Screen) {
         let ray = self.ray(screen);
         if let Some(picker) = &mut self.simulation_thread.lock().picker {

@@ -1,10 +1,10 @@
-//! What is told of what is shown: lines over the picture, the title, the status.
+//! The HUD, the window title and the status lines.
 
 use super::*;
 use crate::view::status::Status;
 
 impl Viewer {
-    /// Lines over the picture.
+    /// The lines of the HUD.
     pub(super) fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
         let simulation = self.simulation_thread.lock();
@@ -28,7 +28,7 @@ impl Viewer {
                 self.presets.name()
             ));
         }
-        lines.extend(simulation.error.iter().map(|error| format!("stopped: {error}. R goes back to time 0")));
+        lines.extend(simulation.error.iter().map(|error| format!("stopped: {error}. R resets to time 0")));
         if self.show.any && self.show.help {
             lines.extend(keys::HELP.iter().map(|line| line.to_string()));
         }
@@ -78,7 +78,7 @@ impl Viewer {
         }
     }
 
-    /// A line of the status, where something changed or it is time.
+    /// Writes a status line if the status has changed or [`STATUS_INTERVAL`] has passed.
     pub(super) fn write_status(&mut self, now: Instant) -> Result<(), Failure> {
         if !self.log.wanted() {
             return Ok(());

@@ -1,4 +1,5 @@
-//! The program in the window: what is shown, and when. Keys and mouse are in `events.rs`, sliders in `panel.rs`, what is told of it in `hud.rs`; steps are taken on another thread
+//! The application in the window: state and drawing. `events.rs` handles keys and mouse, `panel.rs`
+//! the sliders, `hud.rs` text and status lines. Steps are taken on another thread
 //! ([`SimulationThread`]).
 
 mod events;
@@ -25,16 +26,17 @@ use tumble::render::winit::event::WindowEvent;
 use tumble::render::{DebugDraw, DrawList, Drawing, Image, Next, Quality, Screen, Shown, WindowApp, caption};
 use tumble::scene::{FileKind, SceneFile, visual_notes};
 
-/// Between two status lines while nothing but time changes.
+/// Time between two status lines while only the simulation changes.
 const STATUS_INTERVAL: Duration = Duration::from_millis(250);
-/// Between two looks at what is to be done while nothing is.
+/// Time between two updates while the window is idle.
 const IDLE_INTERVAL: Duration = Duration::from_millis(20);
-/// Time begins after so long even where the desktop shows no picture, as in a window that was opened hidden.
+/// The simulation starts after this time even if the desktop shows no picture, as in a window that
+/// opens hidden.
 const FIRST_PICTURE_TIMEOUT: Duration = Duration::from_secs(5);
-/// Pictures per second where the desktop does not say how many it shows.
+/// Pictures per second if the desktop does not report its refresh rate.
 const DEFAULT_RATE: f64 = 60.0;
 
-/// A scene that is looked at.
+/// A scene in a window.
 pub struct Viewer {
     name: String,
     simulation_thread: SimulationThread,
@@ -51,18 +53,18 @@ pub struct Viewer {
     log: Log,
     show: Hud,
     limits: Limits,
-    /// `None` until it is known what draws.
+    /// `None` until the graphics driver is known.
     quality: Option<Quality>,
     screenshot_dir: PathBuf,
     picture_wanted: bool,
     last_picture: Option<Image>,
-    /// Whether what is shown is no longer what is.
+    /// Whether the shown picture is out of date.
     stale: bool,
-    /// The simulation's count of changes that the list is of.
+    /// [`Simulation::changes`] of the present list.
     drawn: u64,
     ended: bool,
     shown: u64,
-    /// Of the window.
+    /// Size of the window.
     size_px: [u32; 2],
     focused: bool,
     times: Times,
@@ -73,11 +75,11 @@ pub struct Viewer {
 struct Pointer {
     at_px: [f64; 2],
     turning: bool,
-    /// Of the wheel, what is not yet a whole notch.
+    /// Fraction of a notch by which the wheel has turned.
     wheel: f64,
 }
 
-/// Text over the picture.
+/// Visibility of text over the picture.
 struct Hud {
     any: bool,
     statistics: bool,
@@ -88,11 +90,11 @@ struct Hud {
 struct Limits {
     pictures: Option<u64>,
     per_second: Option<f64>,
-    /// The picture after which the device is lost.
+    /// The picture after which the graphics device is lost, for tests.
     device: Option<u64>,
 }
 
-/// Moments of the last turn and status line, and of the opening.
+/// Times of the last update, the last status line and the opening of the window.
 struct Times {
     turn: Instant,
     hud: Option<Instant>,
@@ -100,7 +102,7 @@ struct Times {
 }
 
 impl Viewer {
-    /// Of a world at time 0.
+    /// Opens a viewer for a world at time 0.
     pub fn new(scene: &SceneFile, world: World, view_mode: ViewMode, options: &ViewOptions) -> Result<Viewer, Failure> {
         let mut drawing = Drawing::new(scene);
         let list = drawing.list(&world, &DebugDraw::default()).map_err(Failure::input)?;
@@ -118,7 +120,7 @@ impl Viewer {
         }
         let now = Instant::now();
         let robot = crate::args::kind(&options.scene.name) == FileKind::Urdf;
-        // a robot of a file has no drives: time would let it fall before anybody has seen it
+        // a robot of a URDF file has no drives and would collapse before it is seen
         let paused = options.paused || (robot && options.duration.is_none());
         let joints = Joints::new(scene, &world);
         let last = options.duration.map(|s| (s / world.settings().dt).round() as u64);
@@ -152,7 +154,8 @@ impl Viewer {
         })
     }
 
-    /// After the window is closed: the last status line, and the picture of the end if it is wanted.
+    /// After the window is closed: writes the last status line and returns the screenshot, if
+    /// requested.
     pub fn finish(&mut self) -> Result<Option<Image>, Failure> {
         if self.log.wanted() {
             let status = self.status();
@@ -164,7 +167,7 @@ impl Viewer {
         }
     }
 
-    /// The draw list of this moment.
+    /// Updates the draw list to the present state.
     fn update_list(&mut self) -> Result<(), Failure> {
         let simulation = self.simulation_thread.lock();
         let world = &simulation.world;
@@ -202,7 +205,7 @@ impl Viewer {
         Ok(())
     }
 
-    /// A picture for the user. Where it cannot be written that is said, and the session goes on.
+    /// Writes a screenshot. If it cannot be written, a message says so and the session continues.
     fn save_picture(&mut self, screen: &mut Screen) -> Result<(), Failure> {
         let frame = self.simulation_thread.lock().world.frame();
         self.update_list()?;
@@ -214,7 +217,7 @@ impl Viewer {
         Ok(())
     }
 
-    /// The picture of the end, where one is wanted.
+    /// Takes the screenshot at the end, if requested.
     fn take_last(&mut self, screen: &mut Screen) -> Result<(), Failure> {
         if self.picture_wanted {
             self.update_list()?;
@@ -230,7 +233,8 @@ impl Viewer {
         Duration::from_secs_f64(1.0 / rate.max(0.01))
     }
 
-    /// Time begins when the first picture is on the screen: until then pipelines are made, and nobody would see what happens.
+    /// Starts the simulation when the first picture is on the screen; before that the pipelines are
+    /// built.
     fn begin(&mut self, screen: &mut Screen) -> Result<(), Failure> {
         if self.simulation_thread.runs() || (self.shown == 0 && self.times.opened.elapsed() < FIRST_PICTURE_TIMEOUT) {
             return Ok(());
@@ -240,7 +244,7 @@ impl Viewer {
         self.simulation_thread.start()
     }
 
-    /// The clock went on: the user moves by the keys that he holds.
+    /// Moves the user by the held keys.
     fn walk(&mut self, screen: &Screen, passed_s: f64) {
         if self.user.moves() {
             self.presets.release();
@@ -258,7 +262,7 @@ impl WindowApp for Viewer {
     fn opened(&mut self, screen: &mut Screen) -> Result<(), Failure> {
         let default = if screen.is_software() { Quality::fast() } else { Quality::default() };
         self.quality.get_or_insert(default);
-        // opening took its time; the simulation starts with the first picture
+        // opening took time; the simulation starts with the first picture
         self.times.turn = Instant::now();
         self.times.opened = self.times.turn;
         Ok(())
@@ -275,7 +279,7 @@ impl WindowApp for Viewer {
         self.times.turn = now;
         self.walk(screen, passed);
         if self.simulation_thread.is_broken() {
-            return Err(Failure::run("the simulation", "its thread ended; what it said stands above"));
+            return Err(Failure::run("the simulation", "its thread ended; the message above says why"));
         }
         let (moved, over, paused, counted) = {
             let mut simulation = self.simulation_thread.lock();
@@ -301,7 +305,7 @@ impl WindowApp for Viewer {
     }
 }
 
-/// What of a scene's name or path serves as a file's name.
+/// Returns the part of a scene's name or path that serves as a file name.
 fn file_name(scene: &str) -> String {
     let path = std::path::Path::new(scene);
     let stem = path.file_stem().and_then(|s| s.to_str()).filter(|s| *s != "scene");

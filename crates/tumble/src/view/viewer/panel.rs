@@ -1,22 +1,22 @@
-//! The panel of sliders: mouse and keys move joints.
+//! The panel of sliders, moved by mouse and keys.
 
 use super::*;
 use crate::view::simulation_thread::Simulation;
 use crate::view::status::JointStatus;
 use tumble::render::SliderPanel;
 
-/// Share of its range that a key moves a joint by; with Shift ten times that.
+/// Fraction of its range that a key moves a joint by; ten times as much with Shift.
 const NUDGE: f64 = 0.01;
 
-/// What of the panel the user has changed.
+/// The state of the panel.
 pub(super) struct Panel {
-    /// Whether it is wanted.
+    /// Whether it is switched on.
     pub(super) wanted: bool,
-    /// The joint that keys move.
+    /// Index of the joint that keys move.
     chosen: usize,
-    /// The first one shown.
+    /// Index of the first joint shown.
     first: usize,
-    /// The joint whose slider is dragged.
+    /// Index of the joint whose slider is dragged.
     dragged: Option<usize>,
 }
 
@@ -31,7 +31,7 @@ impl Panel {
 }
 
 impl Viewer {
-    /// The panel, where it is shown.
+    /// The panel, if it is shown.
     fn panel(&self) -> Option<SliderPanel> {
         let [width, height] = self.size_px;
         let panel =
@@ -47,11 +47,11 @@ impl Viewer {
     pub(super) fn panel_image(&self) -> Option<Image> {
         let panel = self.panel()?;
         let sliders = self.joints.sliders(&self.simulation_thread.lock().world, self.panel.chosen);
-        let title = if self.joints.held() { "joints held, K frees" } else { "joints free, K holds" };
+        let title = if self.joints.held() { "joints held, K releases" } else { "joints free, K holds" };
         Some(panel.draw(title, &sliders))
     }
 
-    /// A press of the left button; whether it was on the panel.
+    /// Handles a press of the left button; returns whether it was on the panel.
     pub(super) fn press_panel(&mut self) -> Result<bool, Failure> {
         let Some(panel) = self.panel() else { return Ok(false) };
         let [x, y] = self.pointer.at_px;
@@ -64,7 +64,7 @@ impl Viewer {
         Ok((0.0..width).contains(&own[0]) && own[1] < height)
     }
 
-    /// The pointer moved; whether a slider goes with it.
+    /// Handles a motion of the pointer; returns whether it moves a slider.
     pub(super) fn drag_slider(&mut self) -> Result<bool, Failure> {
         let (Some(index), Some(panel)) = (self.panel.dragged, self.panel()) else { return Ok(false) };
         let share = panel.share(self.pointer.at_px[0] - self.panel_left(&panel));
@@ -74,7 +74,7 @@ impl Viewer {
         Ok(true)
     }
 
-    /// Keys choose the next joint, or the one before.
+    /// Chooses the next joint, or the previous one.
     pub(super) fn choose_joint(&mut self, by: isize) {
         let count = self.joints.len().max(1) as isize;
         self.panel.wanted |= self.joints.len() > 0;
@@ -82,7 +82,7 @@ impl Viewer {
         self.panel.first = self.panel().map_or(0, |panel| panel.first);
     }
 
-    /// Keys move the chosen joint.
+    /// Moves the chosen joint by a key.
     pub(super) fn nudge_joint(&mut self, sign: f64) -> Result<(), Failure> {
         let (index, share) = (self.panel.chosen, sign * NUDGE * if self.user.fast { 10.0 } else { 1.0 });
         self.move_joint(|joints, simulation| {
@@ -90,7 +90,7 @@ impl Viewer {
         })
     }
 
-    /// Holds all joints where they are, or lets them go.
+    /// Holds all joints, or releases them.
     pub(super) fn switch_hold(&mut self) {
         let world = &mut self.simulation_thread.lock().world;
         if self.joints.held() { self.joints.release(world) } else { self.joints.hold(world) }
@@ -107,7 +107,7 @@ impl Viewer {
         Ok(())
     }
 
-    /// Joints and their sliders, for programs.
+    /// The joints and their sliders, for status lines.
     pub(super) fn joint_status(&self, world: &World) -> Vec<JointStatus> {
         let panel = self.panel();
         let place = |index: usize| {
@@ -125,7 +125,7 @@ impl Viewer {
     }
 }
 
-/// Pixels to a dot of writing, by the width of the window.
+/// Pixels per dot of text, by the width of the window.
 pub(super) fn scale(width_px: u32) -> u32 {
     if width_px >= 960 { 2 } else { 1 }
 }
