@@ -27,6 +27,7 @@ mod clone_by_field;
 mod constraint;
 mod contact;
 mod derived;
+mod force;
 mod integrators;
 mod object;
 pub mod prelude;

@@ -220,7 +220,7 @@ fn a_cylinder_across_the_straight_lines_of_a_smooth_surface_meets_their_middle()
     let across = Quat::from_scaled_axis(Vec3::x() * FRAC_PI_2);
     for gap in [1e-3, 1e-5, -1e-5] {
         let pose = Pose::from_parts(Vec3::new(1.1 + gap, 0.0, 0.0).into(), across);
-        let found = ask(&Shape::cylinder(0.1, 0.6).unwrap(), &pose, &drum, &Pose::identity(), 2e-3);
+        let found = find_contacts(&Shape::cylinder(0.1, 0.6).unwrap(), &pose, &drum, &Pose::identity(), 2e-3);
         let deepest = found.iter().min_by(|a, b| a.gap.total_cmp(&b.gap)).unwrap();
         assert!((deepest.gap - gap).abs() < 1e-5 && (deepest.normal - Vec3::x()).norm() < 1e-2, "{gap}: {found:?}");
     }
@@ -284,7 +284,7 @@ fn contacts_do_not_depend_on_earlier_queries() {
 /// points inside the faces.
 #[test]
 fn two_meshes_deep_in_each_other_have_the_depth_of_the_deepest_face() {
-    let (block, bar) = (dented_block(), mesh_box(6.0, 1.4, 0.8));
+    let (block, bar) = (dented_box(), mesh_box(6.0, 1.4, 0.8));
     // the bar's wide faces are at z = ±0.4, 0.6 below the box's; the bar's edges are 0.3 below y =
     // ±1; the box's own faces are 0.4 deep in the bar
     let straight = Pose::identity();
