@@ -17,7 +17,7 @@
 
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::{
-    Collidable, CollisionGroup, Constraint, Energy, ForceSlice, Forces, Integratable, Level, Material, Momentum,
+    Cache, Collidable, CollisionGroup, Constraint, Energy, ForceSlice, Forces, Integratable, Level, Material, Momentum,
     Object, PartState, RowBuilder, RowTarget, StateRange, StateSizes, WorldView, rows::RowSet,
 };
 
@@ -36,16 +36,19 @@ pub struct Bead {
     pub speed: f64,
     /// A stop: `φ` cannot go beyond it, rad.
     pub stop: Option<f64>,
-    /// `√M` at the state last refreshed.
+}
+
+/// Values that a bead derives from its state.
+struct BeadCache {
+    /// `√M`.
     root: f64,
-    /// `r'` at the state last refreshed.
+    /// `r'`.
     tangent: Vec3,
 }
 
 impl Bead {
     /// A bead of `mass` kg and the given shape on the cycloid of a circle of `radius` m (both above 0).
     pub fn new(name: impl Into<String>, mass: f64, radius: f64, shape: Shape) -> Bead {
-        let (root, tangent) = (2.0 * radius * mass.sqrt(), Vec3::new(2.0 * radius, 0.0, 0.0));
         Bead {
             name: name.into(),
             mass,
@@ -55,8 +58,6 @@ impl Bead {
             angle: 0.0,
             speed: 0.0,
             stop: None,
-            root,
-            tangent,
         }
     }
 
@@ -105,11 +106,15 @@ impl Object for Bead {
         Box::new(self.clone())
     }
 
-    fn refresh(&mut self, x: &[f64], part_states: &mut [PartState]) {
-        self.root = self.inertia(x[0]).sqrt();
-        self.tangent = self.tangent(x[0]);
+    fn new_cache(&self) -> Cache {
+        Cache::new(BeadCache { root: 0.0, tangent: Vec3::zeros() })
+    }
+
+    fn refresh(&self, x: &[f64], cache: &mut Cache, part_states: &mut [PartState]) {
+        let cache: &mut BeadCache = cache.get();
+        (cache.root, cache.tangent) = (self.inertia(x[0]).sqrt(), self.tangent(x[0]));
         part_states[0].pose = Pose::from_parts(self.position(x[0]).into(), tumble_core::collide::Quat::identity());
-        part_states[0].velocity = self.tangent * (x[1] / self.root.powi(2));
+        part_states[0].velocity = cache.tangent * (x[1] / cache.root.powi(2));
     }
 
     fn integratable(&self) -> Option<&dyn Integratable> {
@@ -147,12 +152,12 @@ impl Integratable for Bead {
     }
 
     /// `Q = F·r'`; the part of `ṗ` that comes from `M'(φ)` belongs to free motion.
-    fn derivative(&self, x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
+    fn derivative(&self, _cache: &mut Cache, x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
         dp[0] = f.wrenches[0].force.dot(&self.tangent(x[0])) + f.generalized[0];
     }
 
     /// `r̈ = r'·φ̈ + r''·φ̇²` with `φ̈ = (Q + ½·M'·φ̇² − M'·φ̇²)/M`.
-    fn accelerations(&self, x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
+    fn accelerations(&self, _cache: &mut Cache, x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
         let (phi, m) = (x[0], self.inertia(x[0]));
         let rate = x[1] / m;
         let slope = -2.0 * self.mass * self.radius.powi(2) * phi.sin();
@@ -166,7 +171,7 @@ impl Integratable for Bead {
     }
 
     /// Exact: the arc length grows by `σ·h`, and `p` follows `M`.
-    fn free_motion(&self, x: &mut [f64], h: f64) {
+    fn free_motion(&self, _cache: &mut Cache, x: &mut [f64], h: f64) {
         let sigma = x[1] / (self.mass * self.stretch(x[0]));
         let arc = 4.0 * self.radius * (0.5 * x[0]).sin() + sigma * h;
         x[0] = 2.0 * (arc / (4.0 * self.radius)).clamp(-1.0, 1.0).asin();
@@ -177,20 +182,20 @@ impl Integratable for Bead {
         x[0] += h * v[0];
     }
 
-    fn whiten(&self, x: &[f64], u: &mut [f64]) {
-        u[0] = x[1] / self.root;
+    fn whiten(&self, cache: &mut Cache, x: &[f64], u: &mut [f64]) {
+        u[0] = x[1] / cache.get::<BeadCache>().root;
     }
 
-    fn unwhiten(&self, u: &[f64], v: &mut [f64]) {
-        v[0] = u[0] / self.root;
+    fn unwhiten(&self, cache: &mut Cache, u: &[f64], v: &mut [f64]) {
+        v[0] = u[0] / cache.get::<BeadCache>().root;
     }
 
-    fn respond(&self, j: &[f64], y: &mut [f64]) {
-        y[0] = j[0] / self.root;
+    fn respond(&self, cache: &mut Cache, j: &[f64], y: &mut [f64]) {
+        y[0] = j[0] / cache.get::<BeadCache>().root;
     }
 
-    fn recover(&self, du: &[f64], dp: &mut [f64]) {
-        dp[0] = self.root * du[0];
+    fn recover(&self, cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
+        dp[0] = cache.get::<BeadCache>().root * du[0];
     }
 
     fn energy(&self, x: &[f64], gravity: &Vec3) -> Energy {
@@ -230,6 +235,7 @@ impl Collidable for Bead {
     /// `J = axisᵀ·r'`.
     fn test_impulse(
         &self,
+        cache: &mut Cache,
         _part: usize,
         _part_state: &PartState,
         _point: &Vec3,
@@ -237,8 +243,9 @@ impl Collidable for Bead {
         sign: f64,
         y: &mut [f64],
     ) {
+        let cache: &mut BeadCache = cache.get();
         for (axis, y) in axes.iter().zip(y) {
-            *y += sign * axis.dot(&self.tangent) / self.root;
+            *y += sign * axis.dot(&cache.tangent) / cache.root;
         }
     }
 }

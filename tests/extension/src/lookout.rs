@@ -2,7 +2,9 @@
 
 use crate::Particle;
 use tumble_core::collide::Pose;
-use tumble_core::{CameraCarrier, CameraMount, Integratable, LightCarrier, LightMount, Object, PartState, Spread};
+use tumble_core::{
+    Cache, CameraCarrier, CameraMount, Integratable, LightCarrier, LightMount, Object, PartState, Spread,
+};
 
 /// A [`Particle`] with a camera that looks along the world's x axis and a white lamp.
 #[derive(Clone)]
@@ -37,8 +39,12 @@ impl Object for Lookout {
         Box::new(self.clone())
     }
 
-    fn refresh(&mut self, x: &[f64], part_states: &mut [PartState]) {
-        self.particle.refresh(x, part_states);
+    fn new_cache(&self) -> Cache {
+        self.particle.new_cache()
+    }
+
+    fn refresh(&self, x: &[f64], cache: &mut Cache, part_states: &mut [PartState]) {
+        self.particle.refresh(x, cache, part_states);
     }
 
     fn integratable(&self) -> Option<&dyn Integratable> {

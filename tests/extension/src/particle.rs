@@ -8,7 +8,7 @@
 
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::{
-    Collidable, CollisionGroup, Energy, ForceSlice, Forces, Integratable, Material, Momentum, Object, PartState,
+    Cache, Collidable, CollisionGroup, Energy, ForceSlice, Forces, Integratable, Material, Momentum, Object, PartState,
     StateRange, StateSizes, WorldView,
 };
 
@@ -69,7 +69,7 @@ impl Object for Particle {
         Box::new(self.clone())
     }
 
-    fn refresh(&mut self, x: &[f64], part_states: &mut [PartState]) {
+    fn refresh(&self, x: &[f64], _cache: &mut Cache, part_states: &mut [PartState]) {
         part_states[0].pose = Pose::translation(x[0], x[1], x[2]);
         part_states[0].velocity = vec3(&x[3..]) / self.mass;
     }
@@ -105,11 +105,11 @@ impl Integratable for Particle {
         scaled(v, self.mass, &mut x[3..]);
     }
 
-    fn derivative(&self, _x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
+    fn derivative(&self, _cache: &mut Cache, _x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
         (0..3).for_each(|k| dp[k] = f.wrenches[0].force[k] + f.generalized[k]);
     }
 
-    fn accelerations(&self, _x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
+    fn accelerations(&self, _cache: &mut Cache, _x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
         part_states[0].acceleration = vec3(dp) / self.mass;
     }
 
@@ -117,7 +117,7 @@ impl Integratable for Particle {
         (0..3).for_each(|k| x[3 + k] += h * dp[k]);
     }
 
-    fn free_motion(&self, x: &mut [f64], h: f64) {
+    fn free_motion(&self, _cache: &mut Cache, x: &mut [f64], h: f64) {
         (0..3).for_each(|k| x[k] += h * x[3 + k] / self.mass);
     }
 
@@ -125,19 +125,19 @@ impl Integratable for Particle {
         (0..3).for_each(|k| x[k] += h * v[k]);
     }
 
-    fn whiten(&self, x: &[f64], u: &mut [f64]) {
+    fn whiten(&self, _cache: &mut Cache, x: &[f64], u: &mut [f64]) {
         scaled(&x[3..], 1.0 / self.mass.sqrt(), u);
     }
 
-    fn unwhiten(&self, u: &[f64], v: &mut [f64]) {
+    fn unwhiten(&self, _cache: &mut Cache, u: &[f64], v: &mut [f64]) {
         scaled(u, 1.0 / self.mass.sqrt(), v);
     }
 
-    fn respond(&self, j: &[f64], y: &mut [f64]) {
+    fn respond(&self, _cache: &mut Cache, j: &[f64], y: &mut [f64]) {
         scaled(j, 1.0 / self.mass.sqrt(), y);
     }
 
-    fn recover(&self, du: &[f64], dp: &mut [f64]) {
+    fn recover(&self, _cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
         scaled(du, self.mass.sqrt(), dp);
     }
 
@@ -177,6 +177,7 @@ impl Collidable for Particle {
 
     fn test_impulse(
         &self,
+        _cache: &mut Cache,
         _part: usize,
         _part_state: &PartState,
         _point: &Vec3,

@@ -12,14 +12,12 @@
 //! LᵀL`.
 
 use crate::articulated::algorithms::dynamics::{Dynamics, Scratch};
-use crate::articulated::algorithms::kinematics::Kinematics;
 use crate::articulated::model::Model;
 use crate::articulated::model::dof::{Coupling, DofSettings};
 use crate::object::collidable::{CollisionGroup, Material};
 use crate::object::mounts::{CameraMount, LightMount};
 use crate::object::visual::Visual;
 use nalgebra::{Quaternion, Translation3};
-use std::sync::{Mutex, MutexGuard};
 use tumble_collide::{ContactMode, Pose, Quat, Shape, Vec3};
 
 /// Why an articulated body is not valid.
@@ -129,6 +127,7 @@ pub(super) struct LinkCollider {
 /// world.add(arm)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+#[derive(Clone)]
 pub struct ArticulatedBody {
     pub(super) name: String,
     pub(super) model: Model,
@@ -146,49 +145,30 @@ pub struct ArticulatedBody {
     /// Pairs that do not collide, smaller number first and the base (`None`) before all; sorted.
     pub(super) excluded_pairs: Vec<[Option<usize>; 2]>,
     pub(super) start: Vec<f64>,
-    pub(super) dynamics: Dynamics,
-    pub(super) working: Mutex<Working>,
 }
 
-/// Working memory of the calls that take `&self`.
-#[derive(Clone)]
-pub(super) struct Working {
+/// What a body computes from one state, and the working memory of its calls.
+pub(super) struct BodyCache {
+    pub dynamics: Dynamics,
     pub scratch: Scratch,
-    /// For states other than the last refreshed.
+    /// For states other than that of `dynamics`.
     pub elsewhere: Dynamics,
-    pub kinematics: Kinematics,
     /// No joint forces, no accelerations.
     pub zeros: Vec<f64>,
     pub wrenches: Vec<crate::object::part_state::Wrench>,
     pub accelerations: Vec<(Vec3, Vec3)>,
 }
 
-impl Working {
-    /// The kinematics at a state.
-    pub fn moved(&mut self, model: &Model, x: &[f64]) -> &Kinematics {
-        let (q, v) = x.split_at(model.positions());
-        self.kinematics.refresh(model, q, v);
-        &self.kinematics
-    }
-}
-
-impl Clone for ArticulatedBody {
-    fn clone(&self) -> ArticulatedBody {
-        ArticulatedBody {
-            name: self.name.clone(),
-            model: self.model.clone(),
-            base: self.base,
-            colliders: self.colliders.clone(),
-            visuals: self.visuals.clone(),
-            cameras: self.cameras.clone(),
-            lights: self.lights.clone(),
-            dofs: self.dofs.clone(),
-            couplings: self.couplings.clone(),
-            self_collision: self.self_collision,
-            excluded_pairs: self.excluded_pairs.clone(),
-            start: self.start.clone(),
-            dynamics: self.dynamics.clone(),
-            working: Mutex::new(self.working().clone()),
+impl BodyCache {
+    pub fn new(model: &Model) -> BodyCache {
+        let dynamics = Dynamics::new(model);
+        BodyCache {
+            scratch: dynamics.scratch(),
+            elsewhere: dynamics.clone(),
+            zeros: vec![0.0; model.dof()],
+            wrenches: vec![Default::default(); model.links().len()],
+            accelerations: vec![(Vec3::zeros(), Vec3::zeros()); model.links().len()],
+            dynamics,
         }
     }
 }
@@ -197,22 +177,13 @@ impl ArticulatedBody {
     /// Makes a body at its zero position and at rest, without colliders and with default dof
     /// settings.
     pub fn new(name: impl Into<String>, model: Model) -> ArticulatedBody {
-        let dynamics = Dynamics::new(&model);
         let mut start = vec![0.0; model.positions() + model.dof()];
         model.write_zero(&mut start);
         for link in model.links().iter().filter(|l| l.joint == super::Joint::Floating) {
             write_pose(&mut start[link.q..link.q + 7], &link.placement);
         }
-        let working = Working {
-            scratch: dynamics.scratch(),
-            elsewhere: dynamics.clone(),
-            kinematics: Kinematics::new(&model),
-            zeros: vec![0.0; model.dof()],
-            wrenches: vec![Default::default(); model.links().len()],
-            accelerations: vec![(Vec3::zeros(), Vec3::zeros()); model.links().len()],
-        };
         let dofs = vec![DofSettings::default(); model.dof()];
-        let mut body = ArticulatedBody {
+        ArticulatedBody {
             name: name.into(),
             model,
             base: Pose::identity(),
@@ -225,11 +196,7 @@ impl ArticulatedBody {
             self_collision: true,
             excluded_pairs: Vec::new(),
             start,
-            dynamics,
-            working: Mutex::new(working),
-        };
-        body.refresh_dynamics(&body.start.clone());
-        body
+        }
     }
 
     /// Sets the pose of the base in the world. Everything attached to the base moves along, and so
@@ -242,9 +209,6 @@ impl ArticulatedBody {
         }
         self.model.place(&step);
         self.base = pose;
-        self.dynamics = Dynamics::new(&self.model);
-        self.working().elsewhere = self.dynamics.clone();
-        self.refresh_dynamics(&self.start.clone());
         self
     }
 
@@ -267,7 +231,6 @@ impl ArticulatedBody {
         if q.len() != wanted || !self.is_state(&start) {
             return Err(ArticulatedError::Start { body: self.name, what: "positions", wanted });
         }
-        self.refresh_dynamics(&start);
         self.start = start;
         Ok(self)
     }
@@ -282,7 +245,6 @@ impl ArticulatedBody {
             return Err(ArticulatedError::Start { body: self.name, what: "velocities", wanted });
         }
         self.start[n..].copy_from_slice(v);
-        self.refresh_dynamics(&self.start.clone());
         Ok(self)
     }
 
@@ -459,15 +421,6 @@ impl ArticulatedBody {
             (norm - 1.0).abs() < 1e-9
         };
         x.len() == self.start.len() && x.iter().all(|x| x.is_finite()) && self.model.links().iter().all(unit)
-    }
-
-    pub(super) fn refresh_dynamics(&mut self, x: &[f64]) {
-        let (q, v) = x.split_at(self.model.positions());
-        self.dynamics.refresh(q, v);
-    }
-
-    pub(super) fn working(&self) -> MutexGuard<'_, Working> {
-        self.working.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 
     fn no_link(&self, link: &str) -> ArticulatedError {

@@ -1,11 +1,14 @@
 //! The traits of objects for the articulated body: dynamics, collisions, visuals and
 //! synchronization.
 
-use super::body::{ArticulatedBody, LinkCollider};
+use super::body::{ArticulatedBody, BodyCache, LinkCollider};
+use crate::articulated::algorithms::dynamics::Dynamics;
 use crate::articulated::algorithms::energy::{energy, momentum};
 use crate::articulated::algorithms::free_motion;
+use crate::articulated::algorithms::kinematics::Kinematics;
 use crate::articulated::model::coordinates::integrate;
 use crate::articulated::model::joint::Joint;
+use crate::derived::Cache;
 use crate::object::collidable::{Collidable, CollisionGroup, Material};
 use crate::object::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
 use crate::object::part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes, Wrench};
@@ -26,17 +29,22 @@ impl Object for ArticulatedBody {
         Box::new(self.clone())
     }
 
-    fn refresh(&mut self, x: &[f64], part_states: &mut [PartState]) {
-        self.refresh_dynamics(x);
+    fn new_cache(&self) -> Cache {
+        Cache::new(BodyCache::new(&self.model))
+    }
+
+    fn refresh(&self, x: &[f64], cache: &mut Cache, part_states: &mut [PartState]) {
+        let BodyCache { dynamics, zeros, accelerations, .. } = cache.get();
+        let (q, v) = x.split_at(self.model.positions());
+        dynamics.refresh(q, v);
         let links = self.model.links().len();
         let (moving, rest) = part_states.split_at_mut(links);
-        let working = self.working.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner());
-        self.dynamics.link_accelerations(&working.zeros, &mut working.accelerations);
+        dynamics.link_accelerations(zeros, accelerations);
         for (i, part_state) in moving.iter_mut().enumerate() {
-            let (angular_velocity, velocity) = self.dynamics.link_velocity(i);
+            let (angular_velocity, velocity) = dynamics.link_velocity(i);
             (part_state.pose, part_state.angular_velocity, part_state.velocity) =
-                (self.dynamics.link_pose(i), angular_velocity, velocity);
-            (part_state.bias_angular_acceleration, part_state.bias_acceleration) = working.accelerations[i];
+                (dynamics.link_pose(i), angular_velocity, velocity);
+            (part_state.bias_angular_acceleration, part_state.bias_acceleration) = accelerations[i];
         }
         rest[0] = PartState { pose: *self.base(), ..PartState::default() };
         for (part_state, LinkCollider { link, collider }) in rest[1..].iter_mut().zip(&self.colliders) {
@@ -82,13 +90,21 @@ impl Object for ArticulatedBody {
 }
 
 impl ArticulatedBody {
+    /// Returns the kinematics at a state.
+    fn kinematics(&self, x: &[f64]) -> Kinematics {
+        let (q, v) = x.split_at(self.model.positions());
+        let mut kinematics = Kinematics::new(&self.model);
+        kinematics.refresh(&self.model, q, v);
+        kinematics
+    }
+
     /// Sums the wrenches on parts to wrenches on moving links.
-    fn gather(&self, parts: &[Wrench], links: &mut [Wrench]) {
+    fn gather(&self, dynamics: &Dynamics, parts: &[Wrench], links: &mut [Wrench]) {
         let (moving, rest) = parts.split_at(links.len());
         links.copy_from_slice(moving);
         for (wrench, LinkCollider { link, collider }) in rest[1..].iter().zip(&self.colliders) {
             let Some(link) = *link else { continue };
-            let arm = self.dynamics.link_pose(link).rotation * collider.pose.translation.vector;
+            let arm = dynamics.link_pose(link).rotation * collider.pose.translation.vector;
             links[link].force += wrench.force;
             links[link].torque += wrench.torque + arm.cross(&wrench.force);
         }
@@ -116,7 +132,8 @@ impl Integratable for ArticulatedBody {
         for (i, link) in self.model.links().iter().enumerate().filter(|(_, l)| l.mass.mass > 0.0) {
             let (weight, wrench) = (link.mass.mass * view.gravity, &mut out.wrenches[me.parts.start + i]);
             wrench.force += weight;
-            wrench.torque += (self.dynamics.link_pose(i).rotation * link.mass.center).cross(&weight);
+            let pose = &view.part_states[me.parts.start + i].pose;
+            wrench.torque += (pose.rotation * link.mass.center).cross(&weight);
         }
         self.joint_forces(&view.x[me.x.clone()], view.implicit, &mut out.generalized[me.v.clone()]);
     }
@@ -129,14 +146,14 @@ impl Integratable for ArticulatedBody {
         x[self.model.positions()..].copy_from_slice(v);
     }
 
-    fn derivative(&self, _x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
-        let working = &mut *self.working();
-        self.gather(f.wrenches, &mut working.wrenches);
-        self.dynamics.accelerate(&mut working.scratch, f.generalized, &working.wrenches, dp);
+    fn derivative(&self, cache: &mut Cache, _x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
+        let BodyCache { dynamics, scratch, wrenches, .. } = cache.get();
+        self.gather(dynamics, f.wrenches, wrenches);
+        dynamics.accelerate(scratch, f.generalized, wrenches, dp);
     }
 
-    fn singularity(&self) -> Option<String> {
-        let link = &self.model.links()[self.dynamics.singular()?];
+    fn singularity(&self, cache: &mut Cache) -> Option<String> {
+        let link = &self.model.links()[cache.get::<BodyCache>().dynamics.singular()?];
         Some(format!(
             "the joint of link '{}' moves no inertia in this pose (gimbal lock of stacked joints, or a point mass on the axis); \
              a spherical joint instead of the stack has no such pose",
@@ -144,11 +161,11 @@ impl Integratable for ArticulatedBody {
         ))
     }
 
-    fn accelerations(&self, _x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
-        let working = &mut *self.working();
-        self.dynamics.link_accelerations(dp, &mut working.accelerations);
+    fn accelerations(&self, cache: &mut Cache, _x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
+        let BodyCache { dynamics, accelerations, .. } = cache.get();
+        dynamics.link_accelerations(dp, accelerations);
         let (moving, rest) = part_states.split_at_mut(self.model.links().len());
-        for (part_state, (angular, linear)) in moving.iter_mut().zip(&working.accelerations) {
+        for (part_state, (angular, linear)) in moving.iter_mut().zip(&*accelerations) {
             (part_state.angular_acceleration, part_state.acceleration) = (*angular, *linear);
         }
         for (part_state, LinkCollider { link, .. }) in rest[1..].iter_mut().zip(&self.colliders) {
@@ -167,25 +184,25 @@ impl Integratable for ArticulatedBody {
         true
     }
 
-    fn free_motion_rate(&self, _x: &[f64], out: &mut [f64]) {
-        let working = &mut *self.working();
-        self.dynamics.accelerate(&mut working.scratch, &working.zeros, &[], out);
+    fn free_motion_rate(&self, cache: &mut Cache, _x: &[f64], out: &mut [f64]) {
+        let BodyCache { dynamics, scratch, zeros, .. } = cache.get();
+        dynamics.accelerate(scratch, zeros, &[], out);
     }
 
     fn kick(&self, x: &mut [f64], dp: &[f64], h: f64) {
         x[self.model.positions()..].iter_mut().zip(dp).for_each(|(v, dp)| *v += h * dp);
     }
 
-    fn free_motion(&self, x: &mut [f64], h: f64) {
-        free_motion::free_motion(&self.model, &mut self.working(), x, h);
+    fn free_motion(&self, cache: &mut Cache, x: &mut [f64], h: f64) {
+        free_motion::free_motion(&self.model, cache.get(), x, h);
     }
 
     fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64) {
         integrate(&self.model, &mut x[..self.model.positions()], v, h);
     }
 
-    fn displace(&self, x: &mut [f64], v: &[f64], h: f64) {
-        free_motion::transport(&self.model, &mut self.working(), x, v, h);
+    fn displace(&self, cache: &mut Cache, x: &mut [f64], v: &[f64], h: f64) {
+        free_motion::transport(&self.model, cache.get(), x, v, h);
     }
 
     fn pull_back(&self, displacement: &[f64], v: &mut [f64]) {
@@ -202,28 +219,34 @@ impl Integratable for ArticulatedBody {
         }
     }
 
-    fn whiten(&self, x: &[f64], u: &mut [f64]) {
-        self.dynamics.whiten(&mut self.working().scratch, &x[self.model.positions()..], u);
+    fn whiten(&self, cache: &mut Cache, x: &[f64], u: &mut [f64]) {
+        let BodyCache { dynamics, scratch, .. } = cache.get();
+        dynamics.whiten(scratch, &x[self.model.positions()..], u);
     }
 
-    fn unwhiten(&self, u: &[f64], v: &mut [f64]) {
-        self.dynamics.unwhiten(&mut self.working().scratch, u, v);
+    fn unwhiten(&self, cache: &mut Cache, u: &[f64], v: &mut [f64]) {
+        let BodyCache { dynamics, scratch, .. } = cache.get();
+        dynamics.unwhiten(scratch, u, v);
     }
 
-    fn respond(&self, j: &[f64], y: &mut [f64]) {
-        self.dynamics.respond(&mut self.working().scratch, j, y);
+    fn respond(&self, cache: &mut Cache, j: &[f64], y: &mut [f64]) {
+        let BodyCache { dynamics, scratch, .. } = cache.get();
+        dynamics.respond(scratch, j, y);
     }
 
-    fn recover(&self, du: &[f64], j: &mut [f64]) {
-        self.dynamics.recover(&mut self.working().scratch, du, j);
+    fn recover(&self, cache: &mut Cache, du: &[f64], j: &mut [f64]) {
+        let BodyCache { dynamics, scratch, .. } = cache.get();
+        dynamics.recover(scratch, du, j);
     }
 
-    fn whiten_rate(&self, dp: &[f64], du: &mut [f64]) {
-        self.dynamics.whiten(&mut self.working().scratch, dp, du);
+    fn whiten_rate(&self, cache: &mut Cache, dp: &[f64], du: &mut [f64]) {
+        let BodyCache { dynamics, scratch, .. } = cache.get();
+        dynamics.whiten(scratch, dp, du);
     }
 
-    fn unwhiten_rate(&self, du: &[f64], dp: &mut [f64]) {
-        self.dynamics.unwhiten(&mut self.working().scratch, du, dp);
+    fn unwhiten_rate(&self, cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
+        let BodyCache { dynamics, scratch, .. } = cache.get();
+        dynamics.unwhiten(scratch, du, dp);
     }
 
     fn may_sleep(&self) -> bool {
@@ -231,12 +254,12 @@ impl Integratable for ArticulatedBody {
     }
 
     fn energy(&self, x: &[f64], gravity: &Vec3) -> Energy {
-        let sum = energy(&self.model, self.working().moved(&self.model, x), gravity);
+        let sum = energy(&self.model, &self.kinematics(x), gravity);
         Energy { potential: sum.potential + self.spring_energy(x), ..sum }
     }
 
     fn momentum(&self, x: &[f64]) -> Momentum {
-        momentum(&self.model, self.working().moved(&self.model, x))
+        momentum(&self.model, &self.kinematics(x))
     }
 }
 
@@ -273,11 +296,21 @@ impl Collidable for ArticulatedBody {
         self.links_collide(self.link_of(part_a), self.link_of(part_b))
     }
 
-    fn test_impulse(&self, part: usize, part_state: &PartState, point: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]) {
+    fn test_impulse(
+        &self,
+        cache: &mut Cache,
+        part: usize,
+        part_state: &PartState,
+        point: &Vec3,
+        axes: &[Vec3],
+        sign: f64,
+        y: &mut [f64],
+    ) {
+        let dynamics = &cache.get::<BodyCache>().dynamics;
         let Some(link) = self.link_of(part) else { return };
         let carried = self.collider(part).map_or(Vec3::zeros(), |p| p.collider.pose.translation.vector);
-        let arm = point - part_state.position() + self.dynamics.link_pose(link).rotation * carried;
-        self.dynamics.point_response(link, &arm, axes, sign, y);
+        let arm = point - part_state.position() + dynamics.link_pose(link).rotation * carried;
+        dynamics.point_response(link, &arm, axes, sign, y);
     }
 }
 

@@ -41,7 +41,6 @@ impl ArticulatedBody {
         self.colliders = colliders.into_iter().map(|(link, collider)| LinkCollider { link, collider }).collect();
         (self.base, self.visuals, self.cameras, self.lights) = (base, visuals, cameras, lights);
         (self.couplings, self.excluded_pairs) = (couplings, excluded_pairs);
-        self.refresh_dynamics(&start);
         self.start = start;
         Ok(self)
     }

@@ -1,6 +1,7 @@
 //! Conversion of constraints and contacts to rows.
 
 use crate::constraint::rows::{RowSet, Rows};
+use crate::derived::Cache;
 use crate::object::collidable::ContactFrame;
 use crate::object::part_state::PartState;
 use crate::object::{Constraint, Integratable, RowTarget};
@@ -35,6 +36,8 @@ pub struct RowBuilder<'a> {
     pub(crate) kinds: &'a mut Vec<RowKind>,
     pub(crate) objects: Objects<'a>,
     pub(crate) x: &'a [f64],
+    /// At which rows respond.
+    pub(crate) caches: &'a mut [Cache],
     pub(crate) part_states: &'a [PartState],
     pub(crate) problem: &'a mut Option<String>,
     /// Constraint that owns the rows.
@@ -127,7 +130,7 @@ impl RowBuilder<'_> {
                 return self.kinematic_coordinates(&entry, i, jacobian);
             }
             let mut y = vec![0.0; jacobian.len()];
-            i.respond(jacobian, &mut y);
+            i.respond(&mut self.caches[entry.place], jacobian, &mut y);
             let side = self.rows.side(entry.state_range.v.start, y.len());
             side.map(|side| side.iter_mut().zip(&y).for_each(|(s, y)| *s += y)).is_some()
         });
@@ -168,7 +171,7 @@ impl RowBuilder<'_> {
         let Some(collidable) = entry.object.collidable() else { return false };
         if entry.moves() {
             let Some(y) = self.rows.side(entry.state_range.v.start, entry.state_range.v.len()) else { return false };
-            collidable.test_impulse(part, part_state, p, axes, sign, y);
+            collidable.test_impulse(&mut self.caches[entry.place], part, part_state, p, axes, sign, y);
         } else {
             let velocity = part_state.velocity_at(p);
             let first = self.bias.len() - axes.len();

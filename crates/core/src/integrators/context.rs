@@ -8,6 +8,7 @@
 //! | Dormand–Prince | fifth order, by inner steps that a tolerance chooses: [`crate::integrators`] |
 //! | RK4 | classical on `p`; on `x` the commutator-free method of Celledoni, Marthinsen and Owren (2003), two exponentials in the last stage |
 
+use crate::derived::{Cache, Derived};
 use crate::integrators::Adaptive;
 use crate::object::part_state::{Forces, PartState, Wrench};
 use crate::settings::Integrator;
@@ -17,10 +18,10 @@ use tumble_collide::Vec3;
 
 /// What the integrators work on, borrowed from the world.
 pub(crate) struct IntegrationContext<'a> {
-    pub table: &'a mut Table,
+    pub table: &'a Table,
     pub states: &'a [ObjectState],
     pub x: &'a mut [f64],
-    pub part_states: &'a mut [PartState],
+    pub derived: &'a mut Derived,
     pub forces: &'a mut Forces,
     pub gravity: Vec3,
     /// See [`WorldView::implicit`].
@@ -33,26 +34,18 @@ pub(crate) struct IntegrationContext<'a> {
     pub held: &'a [f64],
     /// Contact forces that hold over the sub-step on links, per site; empty for none.
     pub held_wrenches: &'a [Wrench],
-    /// See [`Core::pin`](crate::world::Core).
-    pub pinned: &'a [f64],
-    pub pinned_part_states: &'a mut [PartState],
 }
 
 impl IntegrationContext<'_> {
-    /// Writes sites and caches from the state. What is static or not alive is at rest, whatever momentum it keeps.
+    /// Writes part states and caches from the state.
     pub fn refresh(&mut self) {
-        for place in 0..self.states.len() {
-            refresh(self.table, self.states, place, self.x, self.part_states);
-            if !self.pinned.is_empty() && self.table.with(self.states).at(place).moves() {
-                refresh(self.table, self.states, place, self.pinned, self.pinned_part_states);
-            }
-        }
+        refresh_all(self.table.with(self.states), self.x, self.derived);
     }
 
     /// The same for one object.
     pub fn refresh_one(&mut self, id: ObjectId) {
-        if let Some(place) = self.table.place(id) {
-            refresh(self.table, self.states, place, self.x, self.part_states);
+        if let Some(entry) = self.table.with(self.states).get(id) {
+            refresh(&entry, &mut self.derived.caches[entry.place], self.x, &mut self.derived.part_states);
         }
     }
 
@@ -79,7 +72,7 @@ impl IntegrationContext<'_> {
             gravity: self.gravity,
             implicit: self.implicit,
             x: self.x,
-            part_states: self.part_states,
+            part_states: &self.derived.part_states,
             objects: self.table.with(self.states),
         };
         for entry in self.table.with(self.states).iter().filter(|e| e.status.enabled) {
@@ -93,12 +86,13 @@ impl IntegrationContext<'_> {
         dp.fill(0.0);
         for entry in self.table.with(self.states).iter() {
             let Some(body) = entry.object.integratable() else { continue };
-            let (state_range, part_states) =
-                (entry.state_range, &mut self.part_states[entry.state_range.parts.clone()]);
+            let Derived { part_states, caches } = &mut *self.derived;
+            let (state_range, part_states, cache) =
+                (entry.state_range, &mut part_states[entry.state_range.parts.clone()], &mut caches[entry.place]);
             if entry.moves() {
                 let dp = &mut dp[state_range.v.clone()];
-                body.derivative(&self.x[state_range.x.clone()], &self.forces.slice(state_range), dp);
-                body.accelerations(&self.x[state_range.x.clone()], dp, part_states);
+                body.derivative(cache, &self.x[state_range.x.clone()], &self.forces.slice(state_range), dp);
+                body.accelerations(cache, &self.x[state_range.x.clone()], dp, part_states);
             } else {
                 // what is led keeps its generalized velocity: a link that turns about another still has its centripetal acceleration
                 part_states.iter_mut().for_each(|s| {
@@ -111,17 +105,18 @@ impl IntegrationContext<'_> {
     /// Every object that moves goes on freely for `h`; what is led follows its velocity.
     pub fn free_motion(&mut self, h: f64) {
         for entry in self.table.with(self.states).iter() {
-            free_motion(&entry, &mut self.x[entry.state_range.x.clone()], h);
+            free_motion(&entry, &mut self.derived.caches[entry.place], &mut self.x[entry.state_range.x.clone()], h);
         }
     }
 
     /// Leaves of the rates what the coasts of a splitting do not do by themselves.
-    pub fn subtract_free_motion(&self, dp: &mut [f64]) {
+    pub fn subtract_free_motion(&mut self, dp: &mut [f64]) {
         let mut rate = Vec::new();
         for entry in self.table.with(self.states).iter().filter(|e| e.moves()) {
             let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
             rate.resize(entry.state_range.v.len(), 0.0);
-            body.free_motion_rate(&self.x[entry.state_range.x.clone()], &mut rate);
+            let cache = &mut self.derived.caches[entry.place];
+            body.free_motion_rate(cache, &self.x[entry.state_range.x.clone()], &mut rate);
             dp[entry.state_range.v.clone()].iter_mut().zip(&rate).for_each(|(dp, c)| *dp -= c);
         }
     }
@@ -256,21 +251,27 @@ impl IntegrationContext<'_> {
     }
 }
 
-fn refresh(table: &mut Table, states: &[ObjectState], place: usize, x: &[f64], part_states: &mut [PartState]) {
-    let (placed, status) = (&mut table.placed[place], states[place].status);
-    let part_states = &mut part_states[placed.state_range.parts.clone()];
-    placed.object.refresh(&x[placed.state_range.x.clone()], part_states);
-    if status.mode == Mode::Static || !status.enabled {
+/// Writes part states and caches from a state. What is static or not alive is at rest, whatever momentum it keeps.
+pub(crate) fn refresh_all(objects: Objects, x: &[f64], derived: &mut Derived) {
+    for (entry, cache) in objects.iter().zip(&mut derived.caches) {
+        refresh(&entry, cache, x, &mut derived.part_states);
+    }
+}
+
+fn refresh(entry: &Entry, cache: &mut Cache, x: &[f64], part_states: &mut [PartState]) {
+    let part_states = &mut part_states[entry.state_range.parts.clone()];
+    entry.object.refresh(&x[entry.state_range.x.clone()], cache, part_states);
+    if entry.status.mode == Mode::Static || !entry.status.enabled {
         part_states.iter_mut().for_each(|s| *s = PartState { pose: s.pose, ..PartState::default() });
     }
 }
 
 /// One object goes on for `h`: freely where it moves, with its given velocity where it is led, not at all where it is static.
-pub(crate) fn free_motion(entry: &Entry, x: &mut [f64], h: f64) {
+pub(crate) fn free_motion(entry: &Entry, cache: &mut Cache, x: &mut [f64], h: f64) {
     let Some(body) = entry.object.integratable().filter(|_| entry.status.enabled && !entry.asleep) else { return };
     match entry.status.mode {
         Mode::Static => {}
-        Mode::Dynamic => body.free_motion(x, h),
+        Mode::Dynamic => body.free_motion(cache, x, h),
         Mode::Kinematic => {
             let mut v = vec![0.0; entry.state_range.v.len()];
             body.velocity(x, &mut v);

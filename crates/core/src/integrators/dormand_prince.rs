@@ -242,12 +242,11 @@ impl Adaptive {
         }
     }
 
-    fn tolerance_error(&self, motion: &IntegrationContext, time: f64, step: f64, worst: Worst) -> StepError {
-        let Some(entry) = motion.objects().iter().nth(worst.object) else {
-            unreachable!("the object was found in this table")
-        };
+    fn tolerance_error(&self, motion: &mut IntegrationContext, time: f64, step: f64, worst: Worst) -> StepError {
+        let entry = motion.table.with(motion.states).at(worst.object);
+        let cache = &mut motion.derived.caches[worst.object];
         let object = entry.object.name().to_string();
-        match entry.object.integratable().and_then(|body| body.singularity()) {
+        match entry.object.integratable().and_then(|body| body.singularity(cache)) {
             Some(why) => StepError::Singular { object, why, time },
             None => StepError::Tolerance { object, time, step, steps: self.steps, tolerance: self.tolerance },
         }

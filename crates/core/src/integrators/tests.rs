@@ -2,6 +2,7 @@
 //! differential against differences.
 
 use super::Adaptive;
+use crate::derived::Derived;
 use crate::integrators::context::IntegrationContext;
 use crate::object::part_state::{Forces, PartState, StateRange, Wrench};
 use crate::object::{ForceGenerator, Object};
@@ -42,7 +43,7 @@ struct Bench {
     table: Table,
     states: [ObjectState; 2],
     x: Vec<f64>,
-    part_states: Vec<PartState>,
+    derived: Derived,
     forces: Forces,
     applied: Vec<Wrench>,
     held: Vec<f64>,
@@ -60,6 +61,7 @@ impl Bench {
         let state_ranges =
             [StateRange { x: 0..13, v: 0..6, parts: 0..1 }, StateRange { x: 13..13, v: 6..6, parts: 1..1 }];
         let objects: [Box<dyn Object>; 2] = [Box::new(body), Box::new(Spring)];
+        let caches = objects.iter().map(|object| object.new_cache()).collect();
         for (object, state_range) in objects.into_iter().zip(state_ranges) {
             table.push(object, state_range);
         }
@@ -67,7 +69,7 @@ impl Bench {
             table,
             states: Default::default(),
             x,
-            part_states: vec![PartState::default()],
+            derived: Derived { part_states: vec![PartState::default()], caches },
             forces: Forces::default(),
             applied: vec![Wrench::default()],
             held: vec![0.0; 6],
@@ -76,10 +78,10 @@ impl Bench {
 
     fn integration(&mut self) -> IntegrationContext<'_> {
         IntegrationContext {
-            table: &mut self.table,
+            table: &self.table,
             states: &self.states,
             x: &mut self.x,
-            part_states: &mut self.part_states,
+            derived: &mut self.derived,
             forces: &mut self.forces,
             gravity: Vec3::zeros(),
             implicit: false,
@@ -87,8 +89,6 @@ impl Bench {
             applied_generalized: &[0.0; 6],
             held: &self.held,
             held_wrenches: &[],
-            pinned: &[],
-            pinned_part_states: &mut [],
         }
     }
 }

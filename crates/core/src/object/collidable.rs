@@ -1,5 +1,6 @@
 //! What collides: shapes, materials, who meets whom, and the test impulse (thesis §IV.A.3).
 
+use crate::derived::Cache;
 use crate::object::Integratable;
 use crate::object::part_state::PartState;
 use tumble_collide::{ContactMode, Shape, Vec3};
@@ -133,12 +134,23 @@ pub trait Collidable {
     }
     /// "What would unit impulses along these axes at this point do?" (thesis `ApplyTestImpulse`). Adds `sign · L⁻ᵀJᵀ` to `y`: one
     /// row of `dof` numbers per axis.
-    fn test_impulse(&self, part: usize, part_state: &PartState, point: &Vec3, axes: &[Vec3], sign: f64, y: &mut [f64]);
+    #[allow(clippy::too_many_arguments)]
+    fn test_impulse(
+        &self,
+        cache: &mut Cache,
+        part: usize,
+        part_state: &PartState,
+        point: &Vec3,
+        axes: &[Vec3],
+        sign: f64,
+        y: &mut [f64],
+    );
 }
 
 /// The test impulse of a single rigid part whose coordinates are `[ω; v]` at the site's origin.
 pub fn rigid_test_impulse(
     body: &dyn Integratable,
+    cache: &mut Cache,
     part_state: &PartState,
     point: &Vec3,
     axes: &[Vec3],
@@ -150,7 +162,7 @@ pub fn rigid_test_impulse(
         let moment = r.cross(axis);
         let jacobian = [moment.x, moment.y, moment.z, axis.x, axis.y, axis.z];
         let mut response = [0.0; 6];
-        body.respond(&jacobian, &mut response);
+        body.respond(cache, &jacobian, &mut response);
         for (y, response) in y.iter_mut().zip(response) {
             *y += sign * response;
         }

@@ -12,6 +12,7 @@ pub(crate) mod visual;
 
 use crate::constraint::builder::RowBuilder;
 use crate::constraint::rows::RowSet;
+use crate::derived::Cache;
 use crate::object::collidable::Collidable;
 use crate::object::mounts::{CameraCarrier, Detail, LightCarrier};
 use crate::object::part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes};
@@ -29,10 +30,14 @@ pub trait Object: Any + Send + Sync {
     fn name(&self) -> &str;
     /// An independent copy.
     fn fork(&self) -> Box<dyn Object>;
-    /// Writes the poses and velocities of its sites from its slice of the state, and its caches, which must be pure functions of `x`
-    /// (thesis `UpdateState`). Accelerations are left to [`Integratable::accelerations`].
-    fn refresh(&mut self, x: &[f64], part_states: &mut [PartState]) {
-        let _ = (x, part_states);
+    /// Makes the memory for a [`refresh`](Self::refresh) and for the calls that are given a cache; nothing by default.
+    fn new_cache(&self) -> Cache {
+        Cache::default()
+    }
+    /// Writes the poses and velocities of its sites and its cache from its slice of the state; pure functions of `x` (thesis
+    /// `UpdateState`). Accelerations are left to [`Integratable::accelerations`].
+    fn refresh(&self, x: &[f64], cache: &mut Cache, part_states: &mut [PartState]) {
+        let _ = (x, cache, part_states);
     }
     /// Whether it has a state that the integrator advances.
     fn integratable(&self) -> Option<&dyn Integratable> {
@@ -71,7 +76,8 @@ pub trait Object: Any + Send + Sync {
 /// An object with a state (thesis `Integratable` and `SimulationState`, §IV.A.1–2).
 ///
 /// `x` is always the object's own slice of the state, `v`, `dp`, `u` its `dof` numbers: generalized velocity, generalized force (or impulse),
-/// and whitened velocity `u = L·v` where the mass matrix is `M = LᵀL`. The four whitening maps hold at the state last refreshed.
+/// and whitened velocity `u = L·v` where the mass matrix is `M = LᵀL`. `cache` is of the object's [`new_cache`](Object::new_cache): the
+/// maps hold at the state for which it was last refreshed.
 pub trait Integratable {
     /// How many numbers it needs.
     fn state_sizes(&self) -> StateSizes;
@@ -89,13 +95,14 @@ pub trait Integratable {
     fn write_velocity(&self, x: &mut [f64], v: &[f64]);
     /// Rate of what [`kick`](Self::kick) changes under the forces `f`: the thesis's derivative. That is momentum, or velocity for an object
     /// whose state holds velocities; `dp` names it either way.
-    fn derivative(&self, x: &[f64], f: &ForceSlice, dp: &mut [f64]);
+    fn derivative(&self, cache: &mut Cache, x: &[f64], f: &ForceSlice, dp: &mut [f64]);
     /// Why the state at the last refresh has no motion (a singular mass matrix), if so. The step then ends with this as its error.
-    fn singularity(&self) -> Option<String> {
+    fn singularity(&self, cache: &mut Cache) -> Option<String> {
+        let _ = cache;
         None
     }
     /// Writes the accelerations of its sites for a rate of momentum `dp`.
-    fn accelerations(&self, x: &[f64], dp: &[f64], part_states: &mut [PartState]);
+    fn accelerations(&self, cache: &mut Cache, x: &[f64], dp: &[f64], part_states: &mut [PartState]);
     /// Writes `dp − M·v̇`: what of the rate of momentum changes the velocity's direction in the body and not its size (`ω × L` of a rigid
     /// body, Coriolis terms). Rows at the acceleration level need `v̇`. Zero where the mass matrix is constant.
     fn gyroscopic(&self, x: &[f64], out: &mut [f64]) {
@@ -105,13 +112,14 @@ pub trait Integratable {
     /// Momentum (or velocity, as [`derivative`](Self::derivative) says) changes by `h·dp`; positions stay.
     fn kick(&self, x: &mut [f64], dp: &[f64], h: f64);
     /// Free motion for `h` seconds with the momentum held: exact or symmetric of second order at least.
-    fn free_motion(&self, x: &mut [f64], h: f64);
+    fn free_motion(&self, cache: &mut Cache, x: &mut [f64], h: f64);
     /// Positions move with generalized velocity `v` for `h` seconds; exact on rotations. Momentum stays.
     fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64);
     /// Positions move by `h·v`, a displacement and no motion: kinetic energy stays, and linear momentum to second order at least. [`integrate_positions`](Self::integrate_positions)
     /// where the mass matrix is constant; a rigid body that is turned scales its angular momentum, and an object whose state holds velocities carries them
     /// along parallel to themselves.
-    fn displace(&self, x: &mut [f64], v: &[f64], h: f64) {
+    fn displace(&self, cache: &mut Cache, x: &mut [f64], v: &[f64], h: f64) {
+        let _ = cache;
         self.integrate_positions(x, v, h);
     }
     /// Turns a velocity `v` at the displacement `displacement` from some state into the rate of that displacement: the inverse of the
@@ -120,13 +128,13 @@ pub trait Integratable {
         let _ = (displacement, v);
     }
     /// `u = L·v` of the momentum in `x`.
-    fn whiten(&self, x: &[f64], u: &mut [f64]);
+    fn whiten(&self, cache: &mut Cache, x: &[f64], u: &mut [f64]);
     /// `v = L⁻¹·u`.
-    fn unwhiten(&self, u: &[f64], v: &mut [f64]);
+    fn unwhiten(&self, cache: &mut Cache, u: &[f64], v: &mut [f64]);
     /// `y = L⁻ᵀ·j`: the whitened response to a generalized impulse `j`.
-    fn respond(&self, j: &[f64], y: &mut [f64]);
+    fn respond(&self, cache: &mut Cache, j: &[f64], y: &mut [f64]);
     /// `j = Lᵀ·du`: the generalized impulse that a change of `u` means.
-    fn recover(&self, du: &[f64], j: &mut [f64]);
+    fn recover(&self, cache: &mut Cache, du: &[f64], j: &mut [f64]);
     /// Whether its state holds velocities instead of momenta, because its mass matrix turns with its pose. `time_stepping` then asks for everything that
     /// pushes it (mass matrix, rows, the velocity before the push) in the middle of the step; of others where they meet something, if they do.
     fn holds_velocity(&self) -> bool {
@@ -134,17 +142,17 @@ pub trait Integratable {
     }
     /// What of [`derivative`](Self::derivative) is already in [`free_motion`](Self::free_motion): zero where coasting leaves the state's momentum alone;
     /// the acceleration without any force of an object whose state holds velocities.
-    fn free_motion_rate(&self, x: &[f64], out: &mut [f64]) {
-        let _ = x;
+    fn free_motion_rate(&self, cache: &mut Cache, x: &[f64], out: &mut [f64]) {
+        let _ = (cache, x);
         out.fill(0.0);
     }
     /// The change of whitened velocity that a change `dp` of the state's momentum means. An object whose state holds velocities answers `L·dp`.
-    fn whiten_rate(&self, dp: &[f64], du: &mut [f64]) {
-        self.respond(dp, du);
+    fn whiten_rate(&self, cache: &mut Cache, dp: &[f64], du: &mut [f64]) {
+        self.respond(cache, dp, du);
     }
     /// The inverse of [`whiten_rate`](Self::whiten_rate); `L⁻¹·du` for an object whose state holds velocities.
-    fn unwhiten_rate(&self, du: &[f64], dp: &mut [f64]) {
-        self.recover(du, dp);
+    fn unwhiten_rate(&self, cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
+        self.recover(cache, du, dp);
     }
     /// Whether it may be left out of the steps while it lies still (see [`Sleep`](crate::Sleep)): nothing that it feels of itself changes with time.
     fn may_sleep(&self) -> bool {

@@ -16,6 +16,7 @@
 
 pub(crate) mod rotation;
 
+use crate::derived::Cache;
 use crate::object::collidable::{Collidable, CollisionGroup, Material};
 use crate::object::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
 use crate::object::part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes};
@@ -102,7 +103,6 @@ pub struct RigidBody {
     visuals: Vec<Visual>,
     cameras: Vec<CameraMount>,
     lights: Vec<LightMount>,
-    cache: Cache,
 }
 
 /// Body inertia and its roots.
@@ -116,9 +116,8 @@ struct Inertia {
     principal: Quat,
 }
 
-/// Pure functions of the state last refreshed.
-#[derive(Clone)]
-struct Cache {
+/// What whitens at one orientation.
+struct Whitening {
     /// `I^{-½}·Rᵀ`: whitens an angular impulse.
     respond: Mat3,
     /// `R·I^½`: what a whitened change means as angular momentum.
@@ -133,7 +132,6 @@ impl RigidBody {
             return Err(BodyError::Mass { name, mass });
         }
         let inertia = Inertia::new(&name, inertia)?;
-        let cache = Cache { respond: inertia.inverse_root, recover: inertia.root };
         let visuals = vec![Visual::shape(0, Pose::identity(), shape.clone(), Default::default())];
         Ok(RigidBody {
             name,
@@ -155,7 +153,6 @@ impl RigidBody {
             visuals,
             cameras: Vec::new(),
             lights: Vec::new(),
-            cache,
         })
     }
 
@@ -382,15 +379,20 @@ impl Object for RigidBody {
         Box::new(self.clone())
     }
 
-    fn refresh(&mut self, x: &[f64], part_states: &mut [PartState]) {
+    fn new_cache(&self) -> Cache {
+        Cache::new(Whitening { respond: self.inertia.inverse_root, recover: self.inertia.root })
+    }
+
+    fn refresh(&self, x: &[f64], cache: &mut Cache, part_states: &mut [PartState]) {
+        let cache: &mut Whitening = cache.get();
         let q = orientation(x);
         let r = q.to_rotation_matrix().into_inner();
-        self.cache.respond = self.inertia.inverse_root * r.transpose();
-        self.cache.recover = r * self.inertia.root;
+        cache.respond = self.inertia.inverse_root * r.transpose();
+        cache.recover = r * self.inertia.root;
         let part_state = &mut part_states[0];
         part_state.pose = Pose::from_parts(Translation3::from(vec3(x)), q);
         part_state.velocity = vec3(&x[7..]) / self.mass;
-        part_state.angular_velocity = self.cache.respond.tr_mul(&(self.cache.respond * vec3(&x[10..])));
+        part_state.angular_velocity = cache.respond.tr_mul(&(cache.respond * vec3(&x[10..])));
     }
 
     fn integratable(&self) -> Option<&dyn Integratable> {
@@ -467,12 +469,12 @@ impl Integratable for RigidBody {
         x[10..13].copy_from_slice(l.as_slice());
     }
 
-    fn derivative(&self, _x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
+    fn derivative(&self, _cache: &mut Cache, _x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
         write6(dp, &f.wrenches[0].torque, &f.wrenches[0].force);
         dp.iter_mut().zip(f.generalized).for_each(|(dp, f)| *dp += f);
     }
 
-    fn accelerations(&self, x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
+    fn accelerations(&self, _cache: &mut Cache, x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
         let (q, l, part_state) = (orientation(x), vec3(&x[10..]), &mut part_states[0]);
         part_state.acceleration = vec3(&dp[3..]) / self.mass;
         // α = I⁻¹(τ − ω × L)
@@ -489,7 +491,7 @@ impl Integratable for RigidBody {
         add(&mut x[7..10], &vec3(&dp[3..]), h);
     }
 
-    fn free_motion(&self, x: &mut [f64], h: f64) {
+    fn free_motion(&self, _cache: &mut Cache, x: &mut [f64], h: f64) {
         let (p, l) = (vec3(&x[7..]), vec3(&x[10..]));
         add(&mut x[..3], &p, h / self.mass);
         if l != Vec3::zeros() {
@@ -506,7 +508,7 @@ impl Integratable for RigidBody {
         write_orientation(x, &turned);
     }
 
-    fn displace(&self, x: &mut [f64], v: &[f64], h: f64) {
+    fn displace(&self, _cache: &mut Cache, x: &mut [f64], v: &[f64], h: f64) {
         let before = self.spinning(x);
         self.integrate_positions(x, v, h);
         let after = self.spinning(x);
@@ -521,20 +523,24 @@ impl Integratable for RigidBody {
         v[..3].copy_from_slice(rate.as_slice());
     }
 
-    fn whiten(&self, x: &[f64], u: &mut [f64]) {
-        write6(u, &(self.cache.respond * vec3(&x[10..])), &(vec3(&x[7..]) / self.root_mass));
+    fn whiten(&self, cache: &mut Cache, x: &[f64], u: &mut [f64]) {
+        let cache: &mut Whitening = cache.get();
+        write6(u, &(cache.respond * vec3(&x[10..])), &(vec3(&x[7..]) / self.root_mass));
     }
 
-    fn unwhiten(&self, u: &[f64], v: &mut [f64]) {
-        write6(v, &self.cache.respond.tr_mul(&vec3(u)), &(vec3(&u[3..]) / self.root_mass));
+    fn unwhiten(&self, cache: &mut Cache, u: &[f64], v: &mut [f64]) {
+        let cache: &mut Whitening = cache.get();
+        write6(v, &cache.respond.tr_mul(&vec3(u)), &(vec3(&u[3..]) / self.root_mass));
     }
 
-    fn respond(&self, j: &[f64], y: &mut [f64]) {
-        write6(y, &(self.cache.respond * vec3(j)), &(vec3(&j[3..]) / self.root_mass));
+    fn respond(&self, cache: &mut Cache, j: &[f64], y: &mut [f64]) {
+        let cache: &mut Whitening = cache.get();
+        write6(y, &(cache.respond * vec3(j)), &(vec3(&j[3..]) / self.root_mass));
     }
 
-    fn recover(&self, du: &[f64], dp: &mut [f64]) {
-        write6(dp, &(self.cache.recover * vec3(du)), &(self.root_mass * vec3(&du[3..])));
+    fn recover(&self, cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
+        let cache: &mut Whitening = cache.get();
+        write6(dp, &(cache.recover * vec3(du)), &(self.root_mass * vec3(&du[3..])));
     }
 
     fn may_sleep(&self) -> bool {
@@ -580,6 +586,7 @@ impl Collidable for RigidBody {
 
     fn test_impulse(
         &self,
+        cache: &mut Cache,
         _part: usize,
         part_state: &PartState,
         point: &Vec3,
@@ -587,10 +594,11 @@ impl Collidable for RigidBody {
         sign: f64,
         y: &mut [f64],
     ) {
+        let cache: &mut Whitening = cache.get();
         let r = point - part_state.position();
         let linear = sign / self.root_mass;
         for (axis, y) in axes.iter().zip(y.chunks_exact_mut(6)) {
-            let angular = self.cache.respond * r.cross(axis);
+            let angular = cache.respond * r.cross(axis);
             for k in 0..3 {
                 y[k] += sign * angular[k];
                 y[k + 3] += linear * axis[k];

@@ -101,28 +101,29 @@ impl Stepper for Backtracking {
 impl Backtracking {
     /// Contacts, rows and smooth accelerations at the present state; overlap beyond the contact tolerance is projected out first.
     fn gather(&mut self, core: &mut Core, left: f64) -> Result<(), StepError> {
-        detect(core, left, PredictionMode::Relative, &mut self.work.contact_constraints);
-        build_rows(core, &mut self.work, Level::Acceleration, 0.0)?;
+        detect(core, None, (left, PredictionMode::Relative), &mut self.work.contact_constraints);
+        build_rows(core, None, &mut self.work, Level::Acceleration, 0.0)?;
         let off = |e: f64| e < -core.settings.contact_tolerance;
         let drifted = |t: &RowTarget| t.set == RowSet::HalfLine && off(t.error);
         if self.work.targets.iter().any(drifted) || self.work.contact_constraints.iter().any(|t| off(t.contact.gap)) {
             projection::project(
                 core,
+                None,
                 &mut self.work,
                 projection::Displacement::InPlace,
                 core.settings.recovery_speed * left,
                 1e-2 * core.settings.contact_tolerance,
             )?;
             core.integration().refresh();
-            detect(core, left, PredictionMode::Relative, &mut self.work.contact_constraints);
+            detect(core, None, (left, PredictionMode::Relative), &mut self.work.contact_constraints);
         }
         let recovery = core.settings.recovery_speed * left;
         self.kept = unreachable_joints::left(&self.work, |i| self.work.targets[i].error, recovery);
         self.work.dp.resize(core.dof, 0.0);
         let time = core.state.time;
         core.integration().evaluate(time, &mut self.work.dp);
-        core.check_finite(&self.work.dp)?;
-        build_rows(core, &mut self.work, Level::Acceleration, 0.5 * left)
+        core.check_finite(&self.work.dp, None)?;
+        build_rows(core, None, &mut self.work, Level::Acceleration, 0.5 * left)
     }
 
     fn roles(&mut self, core: &Core) {
@@ -131,7 +132,10 @@ impl Backtracking {
             let lasts = core.state.warm.carries(&constraint.key) && constraint.contact.gap <= s.drift_tolerance;
             let touching = lasts || constraint.contact.gap <= s.contact_tolerance;
             let speed = constraint
-                .velocity(&core.part_states[constraint.a as usize], &core.part_states[constraint.b as usize])
+                .velocity(
+                    &core.derived.part_states[constraint.a as usize],
+                    &core.derived.part_states[constraint.b as usize],
+                )
                 .dot(&constraint.contact.normal);
             let allowed =
                 if lasts || (touching && speed.abs() < SLOW) { s.drift_tolerance } else { s.contact_tolerance };
@@ -151,7 +155,10 @@ impl Backtracking {
             .zip(&self.watch.roles)
             .map(|(constraint, role)| {
                 let pressing = (-constraint
-                    .acceleration(&core.part_states[constraint.a as usize], &core.part_states[constraint.b as usize])
+                    .acceleration(
+                        &core.derived.part_states[constraint.a as usize],
+                        &core.derived.part_states[constraint.b as usize],
+                    )
                     .x)
                     .max(0.0);
                 let rebound =
@@ -162,7 +169,7 @@ impl Backtracking {
             })
             .collect();
         let (mut u, mut total) = (Vec::new(), vec![0.0; work.rows.len]);
-        whiten(core, &work.dp, 0.0, &mut u, &mut work.du_force);
+        whiten(core.coordinates(None), &work.dp, 0.0, &mut u, &mut work.du_force);
         let before = u.clone();
         impact::resolve(core, work, &candidates, IMPACT_PASSES, &mut u, &mut total);
         let struck = total.iter().any(|l| *l != 0.0);
@@ -179,17 +186,20 @@ impl Backtracking {
         core.integration().evaluate(time, &mut dp);
         let work = &mut self.work;
         let mut u = Vec::new();
-        whiten(core, &dp, 1.0, &mut u, &mut work.du_force);
+        whiten(core.coordinates(None), &dp, 1.0, &mut u, &mut work.du_force);
         work.dp = dp;
         let mut velocity = Vec::new();
         row_velocities(&work.rows, &work.bias, &u, &mut velocity);
-        let acceleration: Vec<f64> = gyroscopic(core).iter().zip(&work.du_force).map(|(g, rate)| rate - g).collect();
+        let acceleration: Vec<f64> =
+            gyroscopic(core.coordinates(None)).iter().zip(&work.du_force).map(|(g, rate)| rate - g).collect();
         row_velocities(&work.rows, &vec![0.0; work.rows.len], &acceleration, &mut work.c);
         let mut keep = vec![true; work.rows.blocks.len()];
         for (i, (constraint, role)) in work.contact_constraints.iter().zip(&self.watch.roles).enumerate() {
             let range = work.rows.blocks[i].range();
-            let acceleration = constraint
-                .acceleration(&core.part_states[constraint.a as usize], &core.part_states[constraint.b as usize]);
+            let acceleration = constraint.acceleration(
+                &core.derived.part_states[constraint.a as usize],
+                &core.derived.part_states[constraint.b as usize],
+            );
             for (k, row) in range.clone().enumerate() {
                 work.c[row] = acceleration[k] + velocity[row] / left;
             }
@@ -276,7 +286,7 @@ impl Backtracking {
         let mut bracket = Bracket::new(self.watch.nearest(&self.work.contact_constraints, tolerance));
         let mut h = self
             .watch
-            .first_guess(&self.work.contact_constraints, &core.part_states, left)
+            .first_guess(&self.work.contact_constraints, &core.derived.part_states, left)
             .clamp(floor.min(left), left);
         loop {
             h = self.go_to(core, &start, h)?;
@@ -293,8 +303,7 @@ impl Backtracking {
                 core.clear_contact_forces();
                 let reach = core.settings.drift_tolerance;
                 limit_correction::hold(core, &mut self.probe, &self.held, h, reach)?;
-                joint_correction::refresh_at(core, &start);
-                joint_correction::close(core, &mut self.work, &start, (h, Level::Acceleration), &self.kept)?;
+                joint_correction::close(core, None, &mut self.work, &start, (h, Level::Acceleration), &self.kept)?;
                 core.finish_substep(h)?;
                 return Ok(h);
             }
@@ -324,7 +333,7 @@ impl Backtracking {
             core.state.inner_step = self.adaptive.step;
             core.report.inner_steps = self.adaptive.steps;
         }
-        core.check_finite(&self.work.dp)?;
+        core.check_finite(&self.work.dp, None)?;
         Ok(came)
     }
 
@@ -345,7 +354,7 @@ impl Backtracking {
             self.adaptive.set(&core.settings, length, core.report.inner_steps);
             self.adaptive.integrate(&mut core.integration(), time + from, at - from, &mut self.work.dp, false)?;
             core.report.inner_steps = self.adaptive.steps;
-            core.check_finite(&self.work.dp)?;
+            core.check_finite(&self.work.dp, None)?;
             let off = self.margin(core, at)?;
             if off.abs() <= tolerance {
                 return Ok(at);
@@ -355,15 +364,15 @@ impl Backtracking {
         }
         core.state.x.copy_from_slice(&dense);
         core.integration().evaluate(time + h, &mut self.work.dp);
-        core.check_finite(&self.work.dp)?;
+        core.check_finite(&self.work.dp, None)?;
         Ok(h)
     }
 
     /// The margin of the present state, `h` after the start of the sub-step: one try.
     fn margin(&mut self, core: &mut Core, h: f64) -> Result<f64, StepError> {
         core.report.tries += 1;
-        detect(core, 0.0, PredictionMode::Relative, &mut self.after);
-        limits(core, core.state.time + h, &mut self.limits_after)?;
+        detect(core, None, (0.0, PredictionMode::Relative), &mut self.after);
+        limits(&core.view(core.state.time + h), &mut self.limits_after)?;
         Ok(self.watch.margin(
             &self.work.contact_constraints,
             &self.after,
@@ -376,7 +385,7 @@ impl Backtracking {
 /// The forces that hold over the sub-step: generalized ones into `held`. What contacts do to an object whose state holds velocities is kept as wrenches on
 /// its parts: its coordinates turn with its links, and a force in them would turn too.
 fn hold_forces(core: &mut Core, work: &Workspace, held: &mut [f64]) {
-    recover(core, &work.du, held);
+    recover(core.coordinates(None), &work.du, held);
     core.held_wrenches.clear();
     let on_links = |e: &Entry| e.moves() && e.object.integratable().is_some_and(|b| b.holds_velocity());
     if work.contact_constraints.is_empty() || !core.objects().iter().any(|e| on_links(&e)) {
@@ -387,17 +396,17 @@ fn hold_forces(core: &mut Core, work: &Workspace, held: &mut [f64]) {
         .iter()
         .for_each(|block| work.rows.apply_block(block, &work.lambda, &mut joined));
     let mut generalized = vec![0.0; core.dof];
-    recover(core, &joined, &mut generalized);
+    recover(core.coordinates(None), &joined, &mut generalized);
     for entry in core.objects().iter().filter(|e| on_links(e)) {
         held[entry.state_range.v.clone()].copy_from_slice(&generalized[entry.state_range.v.clone()]);
     }
-    core.held_wrenches.resize(core.part_states.len(), Wrench::default());
+    core.held_wrenches.resize(core.derived.part_states.len(), Wrench::default());
     for (constraint, force) in work.contact_constraints.iter().zip(impulses(work, &work.lambda)) {
         for (part_state, point, force) in
             [(constraint.a, constraint.contact.point, force), (constraint.b, constraint.point_b(), -force)]
         {
             if on_links(&core.objects().at(core.owners[part_state as usize].place as usize)) {
-                let arm = point - core.part_states[part_state as usize].position();
+                let arm = point - core.derived.part_states[part_state as usize].position();
                 let wrench = &mut core.held_wrenches[part_state as usize];
                 wrench.force += force;
                 wrench.torque += arm.cross(&force);
@@ -409,6 +418,6 @@ fn hold_forces(core: &mut Core, work: &Workspace, held: &mut [f64]) {
 /// Makes the whitened velocity `after` where it was `before`, and refreshes what readers see.
 fn push_to(core: &mut Core, after: &[f64], before: &[f64]) {
     let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
-    push(core, &change, &mut Vec::new());
+    push(core.coordinates(None), &change, &mut Vec::new());
     core.integration().refresh();
 }

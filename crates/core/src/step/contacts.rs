@@ -1,17 +1,18 @@
 //! From touches to rows, and from multipliers back to momentum: what both steppers share.
 
-use super::joint_correction;
 use super::projection::Projection;
+use super::{Moment, joint_correction};
 use crate::constraint::builder::{RowBuilder, RowKind, constraints};
 use crate::constraint::rows::{RowSet, Rows};
-use crate::contact::detect::{ContactConstraint, Detector};
+use crate::contact::detect::{ContactConstraint, Detector, Owner};
 use crate::contact::pair::PredictionMode;
+use crate::derived::{Cache, Derived};
 use crate::integrators::context::free_motion;
 use crate::object::part_state::PartState;
 use crate::object::{Integratable, Level, RowTarget};
 use crate::solver::{Islands, SolverSettings, residual};
 use crate::world::view::{ObjectId, WorldView};
-use crate::world::{Core, StepError};
+use crate::world::{Coordinates, Core, StepError};
 use tumble_collide::Vec3;
 
 /// Buffers of a step, kept from one to the next. Rows of touches come first, in the order of `contact_constraints`, then those of constraints.
@@ -54,21 +55,13 @@ pub(crate) struct Limit {
     pub target: Option<u32>,
 }
 
-/// The one-sided rows that constraints locate, at the present state and sites and at a given time; sorted by key.
-pub(crate) fn limits(core: &Core, time: f64, out: &mut Vec<Limit>) -> Result<(), StepError> {
+/// Writes the one-sided rows that constraints locate in a view; sorted by key.
+pub(crate) fn limits(view: &WorldView, out: &mut Vec<Limit>) -> Result<(), StepError> {
     out.clear();
-    let view = WorldView {
-        time,
-        gravity: core.settings.gravity,
-        implicit: core.implicit,
-        x: &core.state.x,
-        part_states: &core.part_states,
-        objects: core.objects(),
-    };
     let mut gaps = Vec::new();
-    for (place, (_, entry, constraint)) in constraints(core.objects()).enumerate() {
+    for (place, (_, entry, constraint)) in constraints(view.objects).enumerate() {
         gaps.clear();
-        constraint.gaps(entry.state_range, &view, &mut gaps);
+        constraint.gaps(entry.state_range, view, &mut gaps);
         if gaps.iter().any(|gap| !gap.is_finite()) {
             return Err(StepError::Row {
                 object: entry.object.name().to_string(),
@@ -84,12 +77,17 @@ pub(crate) fn limits(core: &Core, time: f64, out: &mut Vec<Limit>) -> Result<(),
     Ok(())
 }
 
-/// Finds the contacts within reach of the next `horizon` seconds.
-pub(crate) fn detect(core: &mut Core, horizon: f64, prediction: PredictionMode, out: &mut Vec<ContactConstraint>) {
+/// Finds the contacts at `moment`, or else at the present, within reach of the next `horizon` seconds.
+pub(crate) fn detect(
+    core: &mut Core,
+    moment: Option<&Moment>,
+    (horizon, prediction): (f64, PredictionMode),
+    out: &mut Vec<ContactConstraint>,
+) {
     let mut detector = Detector {
         objects: core.table.with(&core.state.objects),
         owners: &core.owners,
-        part_states: &core.part_states,
+        part_states: &moment.map_or(&core.derived, |moment| &moment.derived).part_states,
         settings: &core.settings,
         pair_materials: &core.pair_materials,
         broad: core.broad.as_mut(),
@@ -102,18 +100,10 @@ pub(crate) fn detect(core: &mut Core, horizon: f64, prediction: PredictionMode, 
     core.report.contacts = out.len() as u32;
 }
 
-/// State and sites at another moment of the step.
-pub(crate) struct Moment {
-    pub x: Vec<f64>,
-    pub part_states: Vec<PartState>,
-    /// Seconds from the present.
-    pub ahead: f64,
-}
-
-/// State and sites in `ahead` seconds if no momentum changes (or no velocity, of objects whose state holds velocities); caches stay at the present.
+/// Returns the state in `ahead` seconds if no momentum changes (or no velocity, of objects whose state holds velocities).
 fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
-    let start = core.state.x.to_vec();
-    let (objects, x) = core.objects_and_x();
+    let mut moment = core.moment();
+    let Coordinates { objects, x, caches } = moment.coordinates(core);
     for entry in objects.iter() {
         let x = &mut x[entry.state_range.x.clone()];
         match entry.object.integratable().filter(|b| b.holds_velocity() && entry.moves()) {
@@ -122,75 +112,103 @@ fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
                 body.velocity(x, &mut v);
                 body.integrate_positions(x, &v, ahead);
             }
-            None => free_motion(&entry, x, ahead),
+            None => free_motion(&entry, &mut caches[entry.place], x, ahead),
         }
     }
-    core.integration().refresh();
-    let moment = Moment { x: core.state.x.to_vec(), part_states: core.part_states.clone(), ahead };
-    core.state.x.copy_from_slice(&start);
-    core.integration().refresh();
+    moment.refresh(core.objects());
     moment
 }
 
-/// Makes the rows of all touches and constraints: the thesis's test impulses. Touches are as they were found; constraints are asked about the
-/// state that free motion makes in `ahead` seconds, half the step to come: a direction that turns is then right to second order, where one
-/// taken at the start feeds energy to every pendulum (`g·h/2ℓ` of it a second). Where there are joints that state is brought back onto them first. The
-/// errors are told for the present state all the same.
-pub(crate) fn build_rows(core: &mut Core, work: &mut Workspace, level: Level, ahead: f64) -> Result<(), StepError> {
+/// The states from which rows are made.
+pub(crate) struct Basis<'a> {
+    pub owners: &'a [Owner],
+    /// State and part states at which the contacts were found.
+    pub found: (&'a [f64], &'a [PartState]),
+    /// Part states at which contacts act on dynamic objects, if other than `found`.
+    pub acting: Option<&'a [PartState]>,
+    /// The caches by which all rows respond.
+    pub caches: &'a mut [Cache],
+    /// The view that constraints are given.
+    pub view: WorldView<'a>,
+}
+
+impl Core {
+    /// Returns the basis of rows of contacts at the present and of constraints at a time (s) and a moment, or else the present.
+    /// Rows respond at the moment `acting`, or else at the present.
+    pub(super) fn basis<'a>(
+        &'a mut self,
+        acting: Option<&'a mut Moment>,
+        time: f64,
+        seen: Option<&'a Moment>,
+    ) -> Basis<'a> {
+        let Core { table, state, derived: Derived { part_states, caches }, .. } = self;
+        let (gravity, implicit) = (self.settings.gravity, self.implicit);
+        let found = (&state.x[..], &part_states[..]);
+        let (x, part_states) = seen.map_or(found, |moment| (&moment.x, &moment.derived.part_states));
+        let view = WorldView { time, gravity, implicit, x, part_states, objects: table.with(&state.objects) };
+        let (acting, caches) = match acting {
+            Some(Moment { derived: Derived { part_states, caches }, .. }) => (Some(&part_states[..]), caches),
+            None => (None, caches),
+        };
+        Basis { owners: &self.owners, found, acting, caches, view }
+    }
+}
+
+/// Makes the rows of all touches and constraints: the thesis's test impulses. Rows respond at the moment `acting`, or else at the
+/// present.
+///
+/// Touches are as they were found. Constraints see the state that free motion makes in `ahead` seconds, half the step to come: a
+/// direction that turns is then right to second order, whereas one taken at the start feeds energy to every pendulum (`g·h/2ℓ` of it a
+/// second). Joints are closed at that state first. Errors are those of the present state all the same.
+pub(crate) fn build_rows(
+    core: &mut Core,
+    mut acting: Option<&mut Moment>,
+    work: &mut Workspace,
+    level: Level,
+    ahead: f64,
+) -> Result<(), StepError> {
+    let time = core.state.time;
     if ahead <= 0.0 || constraints(core.objects()).next().is_none() {
-        lay_rows(core, work, level, None)?;
-        return locate_limits(core, work);
+        lay_rows(core.basis(acting, time, None), work, level)?;
+        return locate_limits(core, work, time);
     }
     let middle = look_ahead(core, ahead);
-    lay_rows(core, work, level, Some(&middle))?;
+    lay_rows(core.basis(acting.as_deref_mut(), time + ahead, Some(&middle)), work, level)?;
+    core.moments.push(middle);
     let mut present = Vec::new();
     if work.targets.iter().any(joint_correction::is_joint) {
-        let (errors, made) = joint_correction::middle(core, level, ahead)?;
-        adopt(core, work, made);
+        let (errors, made) = joint_correction::middle(core, acting.as_deref_mut(), level, ahead)?;
+        adopt(core.basis(acting.as_deref_mut(), time, None), work, made);
         present = errors;
     }
     if present.len() == work.targets.len() {
         work.targets.iter_mut().zip(present).for_each(|(target, error)| target.error = error);
     } else {
-        present_errors(core, work, ahead);
+        present_errors(core.coordinates(acting), work, ahead);
     }
-    locate_limits(core, work)
+    locate_limits(core, work, time)
 }
 
-/// Rows of the touches at the present and of the constraints at the `moment` given, else at the present too; errors are of that moment.
-pub(crate) fn lay_rows(
-    core: &Core,
-    work: &mut Workspace,
-    level: Level,
-    moment: Option<&Moment>,
-) -> Result<(), StepError> {
-    lay_contact_rows(core, work);
+/// Makes the rows of the touches and of the constraints; errors are those of the view.
+pub(crate) fn lay_rows(mut basis: Basis, work: &mut Workspace, level: Level) -> Result<(), StepError> {
+    lay_contact_rows(&mut basis, work);
     let mut problem = None;
+    let Basis { view, .. } = basis;
     let mut builder = RowBuilder {
         rows: &mut work.rows,
         bias: &mut work.bias,
         targets: &mut work.targets,
         kinds: &mut work.kinds,
-        objects: core.objects(),
-        x: &core.state.x,
-        part_states: &core.part_states,
+        objects: view.objects,
+        x: basis.found.0,
+        caches: basis.caches,
+        part_states: view.part_states,
         problem: &mut problem,
         owner: ObjectId::default(),
     };
-    let (x, part_states, ahead) =
-        moment.map_or((&core.state.x[..], &core.part_states, 0.0), |m| (&m.x[..], &m.part_states, m.ahead));
-    builder.part_states = part_states;
-    let view = WorldView {
-        time: core.state.time + ahead,
-        gravity: core.settings.gravity,
-        implicit: core.implicit,
-        x,
-        part_states,
-        objects: core.objects(),
-    };
     let mut first = std::mem::take(&mut work.first);
     first.clear();
-    for (id, entry, constraint) in constraints(core.objects()) {
+    for (id, entry, constraint) in constraints(view.objects) {
         first.push(builder.targets.len());
         builder.owner = id;
         constraint.rows(entry.state_range, &view, level, &mut builder);
@@ -210,9 +228,10 @@ fn make_room(work: &mut Workspace) {
     zero(&mut work.lambda, n);
 }
 
-/// The rows of the touches, and no others.
-fn lay_contact_rows(core: &Core, work: &mut Workspace) {
-    work.rows.clear(core.dof);
+/// Makes the rows of the touches, and no others.
+fn lay_contact_rows(basis: &mut Basis, work: &mut Workspace) {
+    let (objects, (x, found)) = (basis.view.objects, basis.found);
+    work.rows.clear(objects.table.dof());
     work.bias.clear();
     work.targets.clear();
     work.kinds.clear();
@@ -221,9 +240,10 @@ fn lay_contact_rows(core: &Core, work: &mut Workspace) {
         bias: &mut work.bias,
         targets: &mut work.targets,
         kinds: &mut work.kinds,
-        objects: core.objects(),
-        x: &core.state.x,
-        part_states: &core.part_states,
+        objects,
+        x,
+        caches: basis.caches,
+        part_states: found,
         problem: &mut None,
         owner: ObjectId::default(),
     };
@@ -235,22 +255,21 @@ fn lay_contact_rows(core: &Core, work: &mut Workspace) {
         for (part_state, point, sign) in
             [(constraint.a, constraint.contact.point, 1.0), (constraint.b, constraint.point_b(), -1.0)]
         {
-            let (owner, index) = (core.owners[part_state as usize], part_state as usize);
-            let entry = core.objects().at(owner.place as usize);
-            let pinned = core.pinned_part_states().filter(|_| entry.moves());
+            let (owner, index) = (basis.owners[part_state as usize], part_state as usize);
+            let entry = objects.at(owner.place as usize);
+            let acting = basis.acting.filter(|_| entry.moves());
             // the arm stays as it was found: the lowest point of a ball that spins does not turn with it
-            let point = pinned.map_or(point, |part_states| {
-                point + part_states[index].position() - core.part_states[index].position()
-            });
-            builder.part_states = pinned.unwrap_or(&core.part_states);
+            let point =
+                acting.map_or(point, |part_states| point + part_states[index].position() - found[index].position());
+            builder.part_states = acting.unwrap_or(found);
             builder.point_side(&entry, owner.part as usize, &point, axes, sign);
         }
     }
 }
 
 /// The touches' rows, and after them the constraints' rows of another workspace.
-fn adopt(core: &Core, work: &mut Workspace, made: Workspace) {
-    lay_contact_rows(core, work);
+fn adopt(mut basis: Basis, work: &mut Workspace, made: Workspace) {
+    lay_contact_rows(&mut basis, work);
     for block in &made.rows.blocks {
         work.rows.push_soft(block.set, block.compliance);
         for side in block.sides() {
@@ -264,9 +283,9 @@ fn adopt(core: &Core, work: &mut Workspace, made: Workspace) {
     make_room(work);
 }
 
-/// Gives one-sided rows the gap that their constraint tells for the present state.
-fn locate_limits(core: &Core, work: &mut Workspace) -> Result<(), StepError> {
-    limits(core, core.state.time, &mut work.limits)?;
+/// Gives one-sided rows the gaps that their constraints report for the present state and a time (s).
+pub(super) fn locate_limits(core: &Core, work: &mut Workspace, time: f64) -> Result<(), StepError> {
+    limits(&core.view(time), &mut work.limits)?;
     let first = &work.first;
     for of_one in work.limits.chunk_by_mut(|a, b| a.key[0] == b.key[0]) {
         let place = of_one[0].key[0] as usize;
@@ -283,11 +302,11 @@ fn locate_limits(core: &Core, work: &mut Workspace) -> Result<(), StepError> {
 }
 
 /// Takes back from the errors of the constraints what free motion does to them in `ahead` seconds, to second order.
-fn present_errors(core: &Core, work: &mut Workspace, ahead: f64) {
-    let mut u = vec![0.0; core.dof];
-    for entry in core.objects().iter().filter(|e| e.moves()) {
+fn present_errors(Coordinates { objects, x, caches }: Coordinates, work: &mut Workspace, ahead: f64) {
+    let mut u = vec![0.0; objects.table.dof()];
+    for entry in objects.iter().filter(|e| e.moves()) {
         if let Some(body) = entry.object.integratable() {
-            body.whiten(&core.state.x[entry.state_range.x.clone()], &mut u[entry.state_range.v.clone()]);
+            body.whiten(&mut caches[entry.place], &x[entry.state_range.x.clone()], &mut u[entry.state_range.v.clone()]);
         }
     }
     for (block, target) in work.rows.blocks[work.contact_constraints.len()..].iter().zip(&mut work.targets) {
@@ -297,41 +316,47 @@ fn present_errors(core: &Core, work: &mut Workspace, ahead: f64) {
 }
 
 /// Writes the whitened velocities and what `dp` (rate of momentum) adds to them in `h`, of everything that moves.
-pub(crate) fn whiten(core: &Core, dp: &[f64], h: f64, u: &mut Vec<f64>, du: &mut Vec<f64>) {
-    zero(u, core.dof);
-    zero(du, core.dof);
-    for entry in core.objects().iter().filter(|e| e.moves()) {
+pub(crate) fn whiten(
+    Coordinates { objects, x, caches }: Coordinates,
+    dp: &[f64],
+    h: f64,
+    u: &mut Vec<f64>,
+    du: &mut Vec<f64>,
+) {
+    zero(u, dp.len());
+    zero(du, dp.len());
+    for entry in objects.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
-        let x = core.pinned().unwrap_or(&core.state.x);
-        body.whiten(&x[entry.state_range.x.clone()], &mut u[v.clone()]);
-        body.whiten_rate(&dp[v.clone()], &mut du[v.clone()]);
+        let cache = &mut caches[entry.place];
+        body.whiten(cache, &x[entry.state_range.x.clone()], &mut u[v.clone()]);
+        body.whiten_rate(cache, &dp[v.clone()], &mut du[v.clone()]);
         du[v].iter_mut().for_each(|x| *x *= h);
     }
 }
 
-/// What `h` seconds of coasting add to the whitened velocity of objects whose state holds velocities, from where they are pinned. Rows of joints
-/// are to hold at the end of the step, and aim ahead by it; a contact's point does not go with the part as it turns, and does not.
-pub(crate) fn free_motion_change(core: &Core, h: f64) -> Vec<f64> {
-    let mut out = vec![0.0; core.dof];
-    let Some(middle) = core.pinned() else { return out };
-    for entry in core.objects().iter().filter(|e| e.moves()) {
+/// Returns what `h` seconds of free motion add to the whitened velocity of objects whose state holds velocities. Rows of joints hold at
+/// the end of the step and aim ahead by it; the point of a contact does not go with the part as it turns, so its rows do not.
+pub(crate) fn free_motion_change(Coordinates { objects, x, caches }: Coordinates, h: f64) -> Vec<f64> {
+    let mut out = vec![0.0; objects.table.dof()];
+    for entry in objects.iter().filter(|e| e.moves()) {
         let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
         let (v, mut rate) = (entry.state_range.v.clone(), vec![0.0; entry.state_range.v.len()]);
-        body.free_motion_rate(&middle[entry.state_range.x.clone()], &mut rate);
+        let cache = &mut caches[entry.place];
+        body.free_motion_rate(cache, &x[entry.state_range.x.clone()], &mut rate);
         rate.iter_mut().for_each(|r| *r *= h);
-        body.whiten_rate(&rate, &mut out[v]);
+        body.whiten_rate(cache, &rate, &mut out[v]);
     }
     out
 }
 
 /// What of the whitened rate of momentum turns velocities and is no acceleration of theirs: `L⁻ᵀ(ṗ − M·v̇)`. Rows of constraints need it taken off.
-pub(crate) fn gyroscopic(core: &Core) -> Vec<f64> {
-    let (mut out, x) = (vec![0.0; core.dof], core.pinned().unwrap_or(&core.state.x));
-    for entry in core.objects().iter().filter(|e| e.moves()) {
+pub(crate) fn gyroscopic(Coordinates { objects, x, caches }: Coordinates) -> Vec<f64> {
+    let mut out = vec![0.0; objects.table.dof()];
+    for entry in objects.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
         let mut turning = vec![0.0; v.len()];
         body.gyroscopic(&x[entry.state_range.x.clone()], &mut turning);
-        body.whiten_rate(&turning, &mut out[v]);
+        body.whiten_rate(&mut caches[entry.place], &turning, &mut out[v]);
     }
     out
 }
@@ -343,58 +368,65 @@ pub(crate) fn zero(v: &mut Vec<f64>, n: usize) {
 }
 
 /// The generalized impulse (or force) that a change `du` of whitened velocity (or acceleration) means.
-pub(crate) fn recover(core: &Core, du: &[f64], j: &mut [f64]) {
+pub(crate) fn recover(Coordinates { objects, caches, .. }: Coordinates, du: &[f64], j: &mut [f64]) {
     j.fill(0.0);
-    for entry in core.objects().iter().filter(|e| e.moves()) {
+    for entry in objects.iter().filter(|e| e.moves()) {
         if let Some(body) = entry.object.integratable() {
-            body.recover(&du[entry.state_range.v.clone()], &mut j[entry.state_range.v.clone()]);
+            body.recover(
+                &mut caches[entry.place],
+                &du[entry.state_range.v.clone()],
+                &mut j[entry.state_range.v.clone()],
+            );
         }
     }
 }
 
 /// Changes the whitened velocity of the state by `du`; `dp` is the momentum (or velocity) that this is.
-pub(crate) fn push(core: &mut Core, du: &[f64], dp: &mut Vec<f64>) {
-    zero(dp, core.dof);
-    let (objects, x) = core.objects_and_x();
+pub(crate) fn push(Coordinates { objects, x, caches }: Coordinates, du: &[f64], dp: &mut Vec<f64>) {
+    zero(dp, du.len());
     for entry in objects.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
-        body.unwhiten_rate(&du[v.clone()], &mut dp[v.clone()]);
+        body.unwhiten_rate(&mut caches[entry.place], &du[v.clone()], &mut dp[v.clone()]);
         body.kick(&mut x[entry.state_range.x.clone()], &dp[v], 1.0);
     }
 }
 
 /// Moves positions by `h·L⁻¹u`, with no effect on kinetic energy: what overlaps goes apart and takes nothing from it.
-pub(crate) fn displace(core: &mut Core, u: &[f64], h: f64) {
-    each_displaced(core, u, |body, x, v| body.displace(x, v, h));
+pub(crate) fn displace(at: Coordinates, u: &[f64], h: f64) {
+    each_displaced(at, u, |body, cache, x, v| body.displace(cache, x, v, h));
 }
 
 /// The same along the rows of a step, which is how joints are closed: momenta stay, and what that does to the energy the next step undoes.
-pub(crate) fn shift(core: &mut Core, u: &[f64], h: f64) {
-    each_displaced(core, u, |body, x, v| {
-        if body.holds_velocity() { body.displace(x, v, h) } else { body.integrate_positions(x, v, h) }
+pub(crate) fn shift(at: Coordinates, u: &[f64], h: f64) {
+    each_displaced(at, u, |body, cache, x, v| {
+        if body.holds_velocity() { body.displace(cache, x, v, h) } else { body.integrate_positions(x, v, h) }
     });
 }
 
 /// `v += L⁻¹·u`.
-pub(crate) fn unwhiten_onto(core: &Core, u: &[f64], v: &mut [f64]) {
+pub(crate) fn unwhiten_onto(Coordinates { objects, caches, .. }: Coordinates, u: &[f64], v: &mut [f64]) {
     let mut velocity = Vec::new();
-    for entry in core.objects().iter().filter(|e| e.moves()) {
+    for entry in objects.iter().filter(|e| e.moves()) {
         let (Some(body), range) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
         zero(&mut velocity, range.len());
-        body.unwhiten(&u[range.clone()], &mut velocity);
+        body.unwhiten(&mut caches[entry.place], &u[range.clone()], &mut velocity);
         v[range].iter_mut().zip(&velocity).for_each(|(v, more)| *v += more);
     }
 }
 
-fn each_displaced(core: &mut Core, u: &[f64], go: impl Fn(&dyn Integratable, &mut [f64], &[f64])) {
+fn each_displaced(
+    Coordinates { objects, x, caches }: Coordinates,
+    u: &[f64],
+    go: impl Fn(&dyn Integratable, &mut Cache, &mut [f64], &[f64]),
+) {
     let mut velocity = Vec::new();
-    let (objects, x) = core.objects_and_x();
     for entry in objects.iter().filter(|e| e.moves()) {
         let (Some(body), u) = (entry.object.integratable(), &u[entry.state_range.v.clone()]) else { continue };
         if u.iter().any(|u| *u != 0.0) {
             zero(&mut velocity, u.len());
-            body.unwhiten(u, &mut velocity);
-            go(body, &mut x[entry.state_range.x.clone()], &velocity);
+            let cache = &mut caches[entry.place];
+            body.unwhiten(cache, u, &mut velocity);
+            go(body, cache, &mut x[entry.state_range.x.clone()], &velocity);
         }
     }
 }

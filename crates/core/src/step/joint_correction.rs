@@ -16,14 +16,15 @@
 //! step is reversible: energy comes and goes with the swing and is not lost in the joints. That needs a middle *on* the joints. So do redundant
 //! joints: two hinges of a door agree about its axis only where both are closed, and rows taken beside that place would hold the door fast.
 
-use super::Workspace;
 use super::contacts::{lay_rows, push, row_velocities, shift, unwhiten_onto, whiten, zero};
 use super::unreachable_joints;
+use super::{Moment, Workspace};
 use crate::constraint::rows::{RowSet, Rows};
+use crate::derived::Cache;
 use crate::object::{Integratable, Level, RowTarget};
 use crate::solver::{GaussSeidel, MAX_DIRECT_ROWS, RowSolver, SolverSettings};
-use crate::world::view::Entry;
-use crate::world::{Core, StepError};
+use crate::world::view::{Entry, Objects};
+use crate::world::{Coordinates, Core, StepError};
 use std::ops::Range;
 
 /// Rounds at most.
@@ -47,49 +48,54 @@ pub(super) fn is_joint(t: &RowTarget) -> bool {
     t.set == RowSet::Equality && t.compliance == 0.0
 }
 
-/// Errors of all constraint rows at the present, and the rows of the middle of the step: free motion of `ahead` seconds brought onto the joints.
-/// Their Jacobians are those of the middle, their responses those of the present, as all rows of a step have. Sites and caches are those of the
-/// present before and after.
-pub(super) fn middle(core: &mut Core, level: Level, ahead: f64) -> Result<(Vec<f64>, Workspace), StepError> {
+/// Returns the errors of all constraint rows at the present, and the rows of the middle of the step: free motion of `ahead` seconds
+/// brought onto the joints. Their Jacobians are those of the middle, their responses those of the moment `acting` (or else of the
+/// present), as all rows of a step have.
+pub(super) fn middle(
+    core: &mut Core,
+    acting: Option<&mut Moment>,
+    level: Level,
+    ahead: f64,
+) -> Result<(Vec<f64>, Workspace), StepError> {
     let mut rows = Workspace::default();
-    lay_rows(core, &mut rows, level, None)?;
+    let (start, time) = (core.state.time, core.state.time + ahead);
+    lay_rows(core.basis(None, start, None), &mut rows, level)?;
     let errors: Vec<f64> = rows.targets.iter().map(|t| t.error).collect();
-    let (start, time, pinned) = (core.state.x.to_vec(), core.state.time, core.lift_pin());
-    core.integration().free_motion(ahead);
-    core.integration().refresh();
-    core.state.time += ahead;
-    // what is open is asked for half-way closer: whether that is out of reach shows here
+    let mut at = core.moment();
+    go_on(core, &mut at, ahead);
+    // open joints aim half-way closer: whether that is out of reach shows here
     let closer = if core.settings.stabilize_positions { core.settings.recovery_speed * ahead } else { 0.0 };
     let aims = |closer: f64, rows: &Workspace| unreachable_joints::left(rows, |i| errors[i], closer);
     let aim = aims(closer, &rows);
-    let mut far = onto(core, &mut rows, level, &aim);
+    let mut far = onto(core, &mut at, &mut rows, (level, time), &aim);
     if far.as_ref().is_ok_and(|far| far.is_empty())
         && Piece::all(core, &mut rows).iter().any(|p| p.direct() && unreachable_joints::weak(&rows, &p.rows))
     {
-        let mut end = Workspace::default();
-        let middle = core.state.x.to_vec();
-        core.integration().free_motion(ahead);
-        core.integration().refresh();
-        core.state.time += ahead;
-        lay_rows(core, &mut end, level, None)?;
+        let (mut end, mut at_end, time) = (Workspace::default(), core.moment(), time + ahead);
+        at_end.x.copy_from_slice(&at.x);
+        go_on(core, &mut at_end, ahead);
+        lay_rows(at_end.basis(core, time), &mut end, level)?;
         let aim = aims(2.0 * closer, &end);
-        far = onto(core, &mut end, level, &aim);
-        core.state.x.copy_from_slice(&middle);
-        core.integration().refresh();
+        far = onto(core, &mut at_end, &mut end, (level, time), &aim);
+        core.moments.push(at_end);
     }
-    map_sides(core, &mut rows, |body, y, j| body.recover(y, j)); // Jᵀ = Lᵀ·Y
-    core.state.time = time;
-    core.state.x.copy_from_slice(&start);
-    core.pin_again(pinned);
-    core.integration().refresh();
-    map_sides(core, &mut rows, |body, j, y| body.respond(j, y));
+    map_sides(at.coordinates(core), &mut rows, |body, cache, y, j| body.recover(cache, y, j)); // Jᵀ = Lᵀ·Y
+    core.moments.push(at);
+    map_sides(core.coordinates(acting), &mut rows, |body, cache, j, y| body.respond(cache, j, y));
     unreachable_joints::soften(&mut rows, &far?, unreachable_joints::GIVING);
     Ok((errors, rows))
 }
 
+/// Advances a moment by `h` seconds of free motion.
+fn go_on(core: &mut Core, moment: &mut Moment, h: f64) {
+    let mut motion = core.integration_of(Some(moment));
+    motion.free_motion(h);
+    motion.refresh();
+}
+
 /// What moves, in the order of its coordinates, in which it was added too.
-fn by_start(core: &Core) -> Vec<Entry<'_>> {
-    core.objects().iter().filter(|e| e.moves()).collect()
+fn by_start(objects: Objects<'_>) -> Vec<Entry<'_>> {
+    objects.iter().filter(|e| e.moves()).collect()
 }
 
 fn entry_at<'e>(entries: &[Entry<'e>], u: u32) -> Option<Entry<'e>> {
@@ -97,25 +103,36 @@ fn entry_at<'e>(entries: &[Entry<'e>], u: u32) -> Option<Entry<'e>> {
 }
 
 /// Replaces what every row holds of every side.
-fn map_sides(core: &Core, work: &mut Workspace, map: impl Fn(&dyn Integratable, &[f64], &mut [f64])) {
-    let entries = by_start(core);
+fn map_sides(
+    Coordinates { objects, caches, .. }: Coordinates,
+    work: &mut Workspace,
+    map: impl Fn(&dyn Integratable, &mut Cache, &[f64], &mut [f64]),
+) {
+    let entries = by_start(objects);
     let Rows { blocks, y, .. } = &mut work.rows;
     for side in blocks.iter().flat_map(|b| b.sides()) {
-        if let Some(body) = entry_at(&entries, side.u).and_then(|e| e.object.integratable()) {
+        let entry = entry_at(&entries, side.u);
+        if let Some((entry, body)) = entry.and_then(|e| Some((e, e.object.integratable()?))) {
             let held = &mut y[side.y as usize..(side.y + side.dof) as usize];
             let before = held.to_vec();
-            map(body, &before, held);
+            map(body, &mut caches[entry.place], &before, held);
         }
     }
 }
 
-/// Moves the present state to where the joints have the errors given; `probe` has the rows there, sites and caches are those of it. The rows of joints that
-/// cannot have them, sorted.
-fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) -> Result<Vec<u32>, StepError> {
+/// Moves a moment to where the joints have the errors given; `probe` has the rows there. Returns the rows of joints that cannot have
+/// them, sorted.
+fn onto(
+    core: &Core,
+    at: &mut Moment,
+    probe: &mut Workspace,
+    (level, time): (Level, f64),
+    errors: &[f64],
+) -> Result<Vec<u32>, StepError> {
     let least = 1e-2 * core.settings.contact_tolerance;
-    lay_rows(core, probe, level, None)?;
+    lay_rows(at.basis(core, time), probe, level)?;
     let mut pieces = Piece::all(core, probe);
-    let mut kept = core.state.x.to_vec();
+    let mut kept = at.x.clone();
     while probe.targets.len() == errors.len() && pieces.iter().any(|p| !p.done) {
         let off: Vec<f64> = probe.targets.iter().zip(errors).map(|(t, e)| t.error - e).collect();
         let mut dx = vec![0.0; core.dof];
@@ -123,7 +140,7 @@ fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) ->
             let worst = piece.largest(&off);
             piece.rounds = piece.rounds.saturating_sub(1);
             if worst > piece.left.0 {
-                piece.copy(&kept, &mut core.state.x); // it was better before
+                piece.copy(&kept, &mut at.x); // it was better before
                 piece.damp();
                 piece.done |= piece.rounds == 0;
                 continue;
@@ -135,10 +152,10 @@ fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) ->
                 solve(&probe.rows, &piece.rows, &off, &mut dx, 0.1 * least);
             }
         }
-        kept.copy_from_slice(&core.state.x);
-        shift(core, &dx, 1.0);
-        core.integration().refresh();
-        lay_rows(core, probe, level, None)?;
+        kept.copy_from_slice(&at.x);
+        shift(at.coordinates(core), &dx, 1.0);
+        at.refresh(core.objects());
+        lay_rows(at.basis(core, time), probe, level)?;
     }
     let mut far: Vec<u32> = pieces
         .iter()
@@ -149,10 +166,11 @@ fn onto(core: &mut Core, probe: &mut Workspace, level: Level, errors: &[f64]) ->
     Ok(far)
 }
 
-/// Closes the joints of `work`, whose rows were built at the state `start`, at the present state, `step.0` seconds later; `step.1` is the level of the
-/// rows. `kept` is the error of each constraint row that is to stay. Sites and caches are those of `start` before and after.
+/// Closes the joints of `work` at the present state, which is `step.0` seconds after the state `start`; `step.1` is the level of the
+/// rows. They respond at the moment `acting`, or else at `start`. `kept` is the error of each constraint row that is to stay.
 pub(super) fn close(
     core: &mut Core,
+    acting: Option<&mut Moment>,
     work: &mut Workspace,
     start: &[f64],
     step: (f64, Level),
@@ -161,11 +179,38 @@ pub(super) fn close(
     if !work.targets.iter().any(is_joint) {
         return Ok(());
     }
+    let mut at_start = None;
+    let acting = match acting {
+        Some(moment) => moment,
+        None => {
+            let moment = at_start.insert(core.moment());
+            moment.x.copy_from_slice(start);
+            moment.refresh(core.objects());
+            moment
+        }
+    };
+    let mut end = core.moment();
+    close_at(core, &mut end, acting, work, start, step, kept)?;
+    core.state.x.copy_from_slice(&end.x);
+    core.moments.extend([Some(end), at_start].into_iter().flatten());
+    Ok(())
+}
+
+/// The same at the moment `end`.
+fn close_at(
+    core: &mut Core,
+    end: &mut Moment,
+    acting: &mut Moment,
+    work: &mut Workspace,
+    start: &[f64],
+    step: (f64, Level),
+    kept: &[f64],
+) -> Result<(), StepError> {
     let pushed = pushed(work);
-    let (arrived, mut moved) = (core.state.x.to_vec(), vec![0.0; core.dof]);
+    let (arrived, mut moved) = (end.x.clone(), vec![0.0; core.dof]);
     let mut pieces = Piece::all(core, work);
     let mut probe = Workspace::default();
-    let mut open = JointErrors::measure(core, work, &mut probe, step, kept, &pushed)?;
+    let mut open = JointErrors::measure(core, end, work, &mut probe, step, kept, &pushed)?;
     pieces.iter_mut().for_each(|piece| piece.left = open.of(piece));
     loop {
         pieces
@@ -174,18 +219,17 @@ pub(super) fn close(
         if pieces.iter().all(|p| p.done) {
             break;
         }
-        let (before, moved_before) = (core.state.x.to_vec(), moved.clone());
-        open.newton(core, &mut probe, &pieces, &mut moved);
-        refresh_at(core, start);
-        open.chord(core, work, &pieces, &mut moved);
-        open = JointErrors::measure(core, work, &mut probe, step, kept, &pushed)?;
+        let (before, moved_before) = (end.x.clone(), moved.clone());
+        open.newton(end.coordinates(core), &mut probe, &pieces, &mut moved);
+        open.chord(end.coordinates_by(core, &mut acting.derived.caches), work, &pieces, &mut moved);
+        open = JointErrors::measure(core, end, work, &mut probe, step, kept, &pushed)?;
         let mut worse = false;
         for piece in pieces.iter_mut().filter(|p| !p.done) {
             let (left, was) = (open.of(piece), piece.left);
             piece.rounds -= 1;
             if was.0 > 1.0 && left.1 > was.1.max(1.0) && !piece.place_first {
                 // with the place rows change, and velocities along them: one after the other
-                piece.copy(&before, &mut core.state.x);
+                piece.copy(&before, &mut end.x);
                 piece.forget(&moved_before, &mut moved);
                 (worse, piece.place_first) = (true, true);
                 continue;
@@ -195,7 +239,7 @@ pub(super) fn close(
                 piece.left = left;
                 piece.damping = (piece.damping / DAMPING.1).max(1.0);
             } else {
-                piece.copy(&before, &mut core.state.x);
+                piece.copy(&before, &mut end.x);
                 piece.forget(&moved_before, &mut moved);
                 worse = true;
                 if !piece.chord {
@@ -205,15 +249,14 @@ pub(super) fn close(
             piece.chord &= share < SLOW;
         }
         if worse {
-            open = JointErrors::measure(core, work, &mut probe, step, kept, &pushed)?;
+            open = JointErrors::measure(core, end, work, &mut probe, step, kept, &pushed)?;
         }
     }
     let far = core.settings.contact_tolerance / open.least.0;
     for piece in pieces.iter().filter(|p| p.direct() && p.left.0 > far) {
-        unreachable_joints::go_as_moved(core, &piece.stretches, [start, &arrived], &moved, step.0);
+        unreachable_joints::go_as_moved(end.coordinates(core), &piece.stretches, [start, &arrived], &moved, step.0);
         unreachable_joints::report(core, &probe, &piece.rows);
     }
-    refresh_at(core, start);
     Ok(())
 }
 
@@ -241,7 +284,7 @@ impl Piece {
     fn all(core: &Core, work: &mut Workspace) -> Vec<Piece> {
         let (contact_constraints, targets) = (work.contact_constraints.len(), &work.targets);
         work.islands.build(&work.rows, |b| b >= contact_constraints && is_joint(&targets[b - contact_constraints]));
-        let entries = by_start(core);
+        let entries = by_start(core.objects());
         let piece = |blocks: &[u32]| {
             let mut starts: Vec<u32> =
                 blocks.iter().flat_map(|&b| work.rows.blocks[b as usize].sides()).map(|s| s.u).collect();
@@ -317,42 +360,25 @@ struct JointErrors {
 }
 
 impl JointErrors {
-    /// Sites and caches are left at the present, whose rows come in `probe`. Nothing is open where they are not those of `work`.
+    /// Refreshes the moment `at`, and leaves its rows in `probe`. Nothing is open if they are not those of `work`.
     fn measure(
-        core: &mut Core,
+        core: &Core,
+        at: &mut Moment,
         work: &Workspace,
         probe: &mut Workspace,
         step: (f64, Level),
         kept: &[f64],
         pushed: &[bool],
     ) -> Result<JointErrors, StepError> {
-        let pinned = core.lift_pin();
-        let open = JointErrors::measure_here(core, work, probe, step, kept, pushed);
-        core.pin_again(pinned);
-        open
-    }
-
-    fn measure_here(
-        core: &mut Core,
-        work: &Workspace,
-        probe: &mut Workspace,
-        step: (f64, Level),
-        kept: &[f64],
-        pushed: &[bool],
-    ) -> Result<JointErrors, StepError> {
-        core.integration().refresh();
-        let time = core.state.time;
-        core.state.time += step.0;
-        let laid = lay_rows(core, probe, step.1, None);
-        core.state.time = time;
-        laid?;
+        at.refresh(core.objects());
+        lay_rows(at.basis(core, core.state.time + step.0), probe, step.1)?;
         let n = work.targets.len();
         let least = (1e-2 * core.settings.contact_tolerance, core.settings.solver_settings.tolerance.max(FINEST));
         let mut open = JointErrors { place: vec![0.0; n], speed: vec![0.0; n], least };
         if probe.targets.len() != n {
             return Ok(open);
         }
-        whiten(core, &vec![0.0; core.dof], 0.0, &mut probe.u, &mut probe.du_force);
+        whiten(at.coordinates(core), &vec![0.0; core.dof], 0.0, &mut probe.u, &mut probe.du_force);
         row_velocities(&probe.rows, &probe.bias, &probe.u, &mut probe.c);
         for (i, (target, block)) in probe.targets.iter().zip(&probe.rows.blocks).enumerate() {
             let joint = is_joint(target);
@@ -369,10 +395,10 @@ impl JointErrors {
     }
 
     /// A round with the rows of the step, in the caches that they were built with.
-    fn chord(&self, core: &mut Core, work: &Workspace, pieces: &[Piece], moved: &mut [f64]) {
+    fn chord(&self, at: Coordinates, work: &Workspace, pieces: &[Piece], moved: &mut [f64]) {
         let contact_constraints = work.contact_constraints.len();
         self.apply(
-            core,
+            at,
             &work.rows,
             contact_constraints,
             pieces.iter().filter(|p| !p.done && p.chord).map(|p| (&p.blocks[..], p.moves_first())),
@@ -381,12 +407,12 @@ impl JointErrors {
     }
 
     /// A round with the rows of the present, where those of the step have got too little done.
-    fn newton(&self, core: &mut Core, probe: &mut Workspace, pieces: &[Piece], moved: &mut [f64]) {
+    fn newton(&self, at: Coordinates, probe: &mut Workspace, pieces: &[Piece], moved: &mut [f64]) {
         for piece in pieces.iter().filter(|p| !p.done && !p.chord) {
             piece.soften(probe, piece.largest(&self.place));
         }
         self.apply(
-            core,
+            at,
             &probe.rows,
             0,
             pieces.iter().filter(|p| !p.done && !p.chord).map(|p| (&p.rows[..], p.moves_first())),
@@ -396,13 +422,13 @@ impl JointErrors {
 
     fn apply<'p>(
         &self,
-        core: &mut Core,
+        Coordinates { objects, x, caches }: Coordinates,
         rows: &Rows,
         contact_constraints: usize,
         pieces: impl Iterator<Item = (&'p [u32], bool)>,
         moved: &mut [f64],
     ) {
-        let (mut dx, mut dv) = (vec![0.0; core.dof], vec![0.0; core.dof]);
+        let (mut dx, mut dv) = (vec![0.0; moved.len()], vec![0.0; moved.len()]);
         let mut c = [vec![0.0; rows.len], vec![0.0; rows.len]];
         for (i, block) in rows.blocks[contact_constraints..].iter().enumerate() {
             (c[0][block.row as usize], c[1][block.row as usize]) = (self.place[i], self.speed[i]);
@@ -416,9 +442,9 @@ impl JointErrors {
                 }
             }
         }
-        unwhiten_onto(core, &dx, moved);
-        shift(core, &dx, 1.0);
-        push(core, &dv, &mut Vec::new());
+        unwhiten_onto(Coordinates { objects, x: &mut *x, caches: &mut *caches }, &dx, moved);
+        shift(Coordinates { objects, x: &mut *x, caches: &mut *caches }, &dx, 1.0);
+        push(Coordinates { objects, x, caches }, &dv, &mut Vec::new());
     }
 }
 
@@ -448,12 +474,4 @@ fn solve(rows: &Rows, blocks: &[u32], c: &[f64], du: &mut [f64], tolerance: f64)
     zero(&mut lambda, rows.len);
     let solver_settings = SolverSettings { max_sweeps: SWEEPS, max_relaxations: u32::MAX, tolerance };
     GaussSeidel.solve(rows, blocks, c, &mut lambda, du, solver_settings);
-}
-
-/// Sites and caches of a state that is not the present one.
-pub(super) fn refresh_at(core: &mut Core, x: &[f64]) {
-    let now = core.state.x.to_vec();
-    core.state.x.copy_from_slice(x);
-    core.integration().refresh();
-    core.state.x.copy_from_slice(&now);
 }

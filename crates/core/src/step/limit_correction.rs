@@ -14,7 +14,7 @@
 //! A limit that would have let go within the sub-step is held to its end. Where contacts push in the same island velocities are left to them.
 
 use super::Workspace;
-use super::contacts::{build_rows, limits, push, row_velocities, shift, whiten, zero};
+use super::contacts::{lay_rows, limits, locate_limits, push, row_velocities, shift, whiten, zero};
 use super::joint_correction::is_joint;
 use crate::constraint::rows::RowSet;
 use crate::object::Level;
@@ -50,7 +50,7 @@ pub(super) fn pushing(work: &Workspace) -> Vec<ActiveLimit> {
 /// The limits that are passed at the present state, `h` seconds after the present time: their place alone is to be put right.
 pub(super) fn passed(core: &mut Core, probe: &mut Workspace, h: f64) -> Result<Vec<ActiveLimit>, StepError> {
     let time = core.state.time + h;
-    limits(core, time, &mut probe.limits)?;
+    limits(&core.view(time), &mut probe.limits)?;
     let least = core.settings.contact_tolerance;
     Ok(probe
         .limits
@@ -61,7 +61,7 @@ pub(super) fn passed(core: &mut Core, probe: &mut Workspace, h: f64) -> Result<V
 }
 
 /// Closes the limits `held` at the present state, `h` seconds after the present time; those that are off by more than `reach` are left alone: they have
-/// let go, or are to come back at a bounded speed. Sites and caches are left at the present.
+/// let go, or are to come back at a bounded speed. Part states and caches are those of the present afterwards.
 pub(super) fn hold(
     core: &mut Core,
     probe: &mut Workspace,
@@ -73,12 +73,11 @@ pub(super) fn hold(
         return Ok(());
     }
     core.integration().refresh();
-    let time = core.state.time;
-    core.state.time += h;
-    let laid = build_rows(core, probe, Level::Acceleration, 0.0);
-    core.state.time = time;
-    laid?;
-    whiten(core, &vec![0.0; core.dof], 0.0, &mut probe.u, &mut probe.du_force);
+    let time = core.state.time + h;
+    lay_rows(core.basis(None, time, None), probe, Level::Acceleration)?;
+    locate_limits(core, probe, time)?;
+    let rest = vec![0.0; core.dof];
+    whiten(core.coordinates(None), &rest, 0.0, &mut probe.u, &mut probe.du_force);
     row_velocities(&probe.rows, &probe.bias, &probe.u, &mut probe.c);
     let (mut place, mut speed) = (vec![0.0; probe.rows.len], vec![0.0; probe.rows.len]);
     let mut chosen = vec![false; probe.targets.len()];
@@ -105,8 +104,8 @@ pub(super) fn hold(
             GaussSeidel.solve(&probe.rows, blocks, c, &mut probe.lambda, du, solver_settings);
         }
     }
-    shift(core, &dx, 1.0);
-    push(core, &dv, &mut Vec::new());
+    shift(core.coordinates(None), &dx, 1.0);
+    push(core.coordinates(None), &dv, &mut Vec::new());
     core.integration().refresh();
     Ok(())
 }

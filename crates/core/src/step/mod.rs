@@ -6,6 +6,7 @@ mod event_location;
 mod impact;
 mod joint_correction;
 mod limit_correction;
+mod moment;
 mod projection;
 mod time_of_impact;
 mod time_stepping;
@@ -13,6 +14,7 @@ mod unreachable_joints;
 
 pub use backtracking::Backtracking;
 pub(crate) use contacts::Workspace;
+pub(crate) use moment::Moment;
 pub(crate) use time_of_impact::{pose_after_free_motion, shift_to_impact};
 pub use time_stepping::TimeStepping;
 

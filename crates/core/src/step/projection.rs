@@ -10,7 +10,7 @@
 //! about each other a joint does not move by the mean of its two velocities.
 
 use super::contacts::{Workspace, displace, limits};
-use super::joint_correction::{self, refresh_at};
+use super::{Moment, joint_correction};
 use crate::constraint::rows::{RowSet, Rows};
 use crate::object::RowTarget;
 use crate::solver::{GaussSeidel, RowSolver, SolverSettings};
@@ -18,8 +18,8 @@ use crate::world::{Core, StepError};
 
 /// What is to be projected.
 pub(crate) enum Displacement<'a> {
-    /// The displacement `h·mean` (whitened) of a step from the state `start` that ends here; led bodies and motors move with their own velocities.
-    Step { start: &'a [f64], mean: &'a [f64], h: f64 },
+    /// The displacement `h·mean` (whitened) of a step that ends here; led bodies and motors move with their own velocities.
+    Step { mean: &'a [f64], h: f64 },
     /// None: bodies are moved apart where they are.
     InPlace,
 }
@@ -28,6 +28,7 @@ pub(crate) enum Displacement<'a> {
 /// metres; an island that is wrong by no more than `least` metres is left alone.
 pub(crate) fn project(
     core: &mut Core,
+    acting: Option<&mut Moment>,
     work: &mut Workspace,
     displacement: Displacement,
     recovery: f64,
@@ -44,8 +45,8 @@ pub(crate) fn project(
             Displacement::InPlace => 0.0,
         };
     }
-    if let Displacement::Step { start, h, .. } = displacement {
-        ask_limits(core, work, start, h)?;
+    if let Displacement::Step { h, .. } = displacement {
+        ask_limits(core, work, h)?;
     }
     // in place, joints stay as they are: what is open of them is closed at the end of the sub-step
     let (contact_constraints, hold) = (work.contact_constraints.len(), core.settings.stabilize_positions && !in_place);
@@ -90,13 +91,13 @@ pub(crate) fn project(
             GaussSeidel.solve(&p.rows, blocks, &p.c, &mut p.lambda, &mut p.du, solver_settings);
         }
     }
-    displace(core, &p.du, h);
+    displace(core.coordinates(acting), &p.du, h);
     work.projection = p;
     Ok(())
 }
 
-/// Makes `h·c` of the limits what the step did to their gaps, where one is near enough to be passed. Sites and caches are those of `start` before and after.
-fn ask_limits(core: &mut Core, work: &mut Workspace, start: &[f64], h: f64) -> Result<(), StepError> {
+/// Makes `h·c` of the limits what the step did to their gaps, if one is near enough to be passed.
+fn ask_limits(core: &mut Core, work: &mut Workspace, h: f64) -> Result<(), StepError> {
     let contact_constraints = work.contact_constraints.len();
     let row = |target: u32| work.rows.blocks[contact_constraints + target as usize].row as usize;
     let near = |target: u32| {
@@ -105,11 +106,10 @@ fn ask_limits(core: &mut Core, work: &mut Workspace, start: &[f64], h: f64) -> R
     if !work.limits.iter().any(|limit| limit.target.is_some_and(near)) {
         return Ok(());
     }
-    let (pinned, mut ends) = (core.lift_pin(), Vec::new());
-    core.integration().refresh();
-    limits(core, core.state.time + h, &mut ends)?;
-    core.pin_again(pinned);
-    refresh_at(core, start);
+    let (mut end, mut ends) = (core.moment(), Vec::new());
+    end.refresh(core.objects());
+    limits(&end.view(core, core.state.time + h), &mut ends)?;
+    core.moments.push(end);
     for (limit, end) in work.limits.iter().zip(ends).filter(|(limit, end)| limit.key == end.key) {
         if let Some(target) = limit.target {
             work.c[row(target)] = (end.gap - work.targets[target as usize].error) / h;

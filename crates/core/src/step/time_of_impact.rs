@@ -30,7 +30,8 @@ pub(super) fn time_contacts(core: &Core, h: f64, contact_constraints: &mut Vec<C
     let near = core.settings.drift_tolerance;
     let mut found = Vec::new();
     contact_constraints.retain_mut(|constraint| {
-        let (a, b) = (&core.part_states[constraint.a as usize], &core.part_states[constraint.b as usize]);
+        let (a, b) =
+            (&core.derived.part_states[constraint.a as usize], &core.derived.part_states[constraint.b as usize]);
         let (Some(shape_a), Some(shape_b)) = (shape(core, constraint.a), shape(core, constraint.b)) else {
             return true;
         };

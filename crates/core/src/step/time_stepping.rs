@@ -26,7 +26,7 @@ use super::contacts::{
 };
 use super::impact::{self, Candidate};
 use super::projection::{self, Displacement};
-use super::{StepContext, Stepper, Workspace, time_of_impact};
+use super::{Moment, StepContext, Stepper, Workspace, time_of_impact};
 use super::{joint_correction, limit_correction, unreachable_joints};
 use crate::constraint::rows::RowSet;
 use crate::contact::detect::ContactConstraint;
@@ -34,7 +34,7 @@ use crate::contact::pair::PredictionMode;
 use crate::integrators::context::free_motion;
 use crate::object::Level;
 use crate::world::view::Entry;
-use crate::world::{Core, StepError};
+use crate::world::{Coordinates, Core, StepError};
 
 /// The default stepper, `time_stepping`.
 #[derive(Default)]
@@ -92,35 +92,43 @@ impl TimeStepping {
     /// One sub-step of `h` seconds.
     pub(crate) fn substep(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
         core.implicit = true;
-        self.smooth_forces(core, h)?;
-        detect(core, h, PredictionMode::Each, &mut self.work.contact_constraints);
-        time_of_impact::time_contacts(core, h, &mut self.work.contact_constraints);
-        build_rows(core, &mut self.work, Level::Velocity { h }, 0.5 * h)?;
-        let mut u = std::mem::take(&mut self.work.u);
-        let mut du_force = std::mem::take(&mut self.work.du_force);
-        whiten(core, &self.work.dp, h, &mut u, &mut du_force);
-        let mut after = std::mem::take(&mut self.buffers.after);
-        self.impacts(core, h, &mut u, &mut du_force, &mut after)?;
-        self.look_again(core, h, &u, &after)?;
-        self.contacts(core, h, &mut after, &du_force);
-        self.commit(core, h, &u, &after, &du_force)?;
-        (self.work.u, self.work.du_force, self.buffers.after) = (u, du_force, after);
+        let mut middle = core.moment();
+        self.advance(core, &mut middle, h)?;
+        core.moments.push(middle);
         core.finish_substep(h)
     }
 
-    /// Rate of momentum at the midpoint into `work.dp`; state and caches are left at the start.
-    fn smooth_forces(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
+    /// Writes the state at the end of the sub-step. `middle` becomes the moment at which impulses act.
+    fn advance(&mut self, core: &mut Core, middle: &mut Moment, h: f64) -> Result<(), StepError> {
+        self.smooth_forces(core, middle, h)?;
+        detect(core, None, (h, PredictionMode::Each), &mut self.work.contact_constraints);
+        time_of_impact::time_contacts(core, h, &mut self.work.contact_constraints);
+        build_rows(core, Some(&mut *middle), &mut self.work, Level::Velocity { h }, 0.5 * h)?;
+        let mut u = std::mem::take(&mut self.work.u);
+        let mut du_force = std::mem::take(&mut self.work.du_force);
+        whiten(middle.coordinates(core), &self.work.dp, h, &mut u, &mut du_force);
+        let mut after = std::mem::take(&mut self.buffers.after);
+        self.impacts(core, middle, h, &mut u, &mut du_force, &mut after)?;
+        self.look_again(core, middle, h, &u, &after)?;
+        self.contacts(core, middle, h, &mut after, &du_force);
+        self.commit(core, middle, h, &u, &after, &du_force)?;
+        (self.work.u, self.work.du_force, self.buffers.after) = (u, du_force, after);
+        Ok(())
+    }
+
+    /// Writes the rate of momentum at the midpoint into `work.dp`, and the midpoint into `middle`. The present gets its accelerations.
+    fn smooth_forces(&mut self, core: &mut Core, middle: &mut Moment, h: f64) -> Result<(), StepError> {
         core.state.x[..].clone_into(&mut self.x0);
         self.work.dp.resize(core.dof, 0.0);
         let time = core.state.time;
-        let mut motion = core.integration();
+        let mut motion = core.integration_of(Some(&mut *middle));
         motion.free_motion(0.5 * h);
         motion.evaluate(time + 0.5 * h, &mut self.work.dp);
         motion.subtract_free_motion(&mut self.work.dp);
-        core.check_finite(&self.work.dp)?;
-        core.pin();
-        core.state.x.copy_from_slice(&self.x0);
-        core.integration().refresh();
+        core.check_finite(&self.work.dp, Some(&mut *middle))?;
+        for (now, middle) in core.derived.part_states.iter_mut().zip(&middle.derived.part_states) {
+            (now.acceleration, now.angular_acceleration) = (middle.acceleration, middle.angular_acceleration);
+        }
         Ok(())
     }
 
@@ -129,6 +137,7 @@ impl TimeStepping {
     fn impacts(
         &mut self,
         core: &mut Core,
+        middle: &mut Moment,
         h: f64,
         u: &mut Vec<f64>,
         du_force: &mut Vec<f64>,
@@ -170,10 +179,10 @@ impl TimeStepping {
             return Ok(());
         }
         self.first_impacts(&impact_fractions);
-        self.pin_at_impacts(core, h);
+        self.go_to_impacts(core, middle, h);
         let work = &mut self.work;
-        build_rows(core, work, Level::Velocity { h }, 0.5 * h)?;
-        whiten(core, &work.dp, h, u, du_force);
+        build_rows(core, Some(&mut *middle), work, Level::Velocity { h }, 0.5 * h)?;
+        whiten(middle.coordinates(core), &work.dp, h, u, du_force);
         let at_impact: Vec<f64> = (0..u.len()).map(|i| u[i] + self.impact_fraction[i].max(0.0) * du_force[i]).collect();
         after.clone_from(&at_impact);
         impact::resolve(core, work, &self.candidates, IMPACT_PASSES, after, &mut self.impact);
@@ -181,34 +190,39 @@ impl TimeStepping {
         Ok(())
     }
 
-    /// Pins what meets something where it does so.
-    fn pin_at_impacts(&self, core: &mut Core, h: f64) {
-        let mut x = std::mem::take(&mut core.pinned.0);
-        for entry in core.objects().iter().filter(|e| !in_the_middle(e)) {
+    /// Moves the objects that meet something to where they do so.
+    fn go_to_impacts(&self, core: &Core, middle: &mut Moment, h: f64) {
+        let Coordinates { objects, x, caches } = middle.coordinates(core);
+        for entry in objects.iter().filter(|e| !in_the_middle(e)) {
             let impact_fraction = entry.state_range.v.clone().next().map_or(-1.0, |i| self.impact_fraction[i]);
             if impact_fraction >= 0.0 {
                 let x = &mut x[entry.state_range.x.clone()];
                 x.copy_from_slice(&self.x0[entry.state_range.x.clone()]);
-                free_motion(&entry, x, h * impact_fraction);
+                free_motion(&entry, &mut caches[entry.place], x, h * impact_fraction);
             }
         }
-        core.pinned.0 = x;
-        core.integration().refresh();
+        middle.refresh(core.objects());
     }
 
     /// What was struck may now reach what it did not before: finds those contacts too, and lays the rows anew. They push this step (nothing is
     /// passed through) and bounce in the next.
-    fn look_again(&mut self, core: &mut Core, h: f64, before: &[f64], after: &[f64]) -> Result<(), StepError> {
+    fn look_again(
+        &mut self,
+        core: &mut Core,
+        middle: &mut Moment,
+        h: f64,
+        before: &[f64],
+        after: &[f64],
+    ) -> Result<(), StepError> {
         if self.impact.iter().all(|i| *i == 0.0) {
             return Ok(());
         }
         let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
-        push(core, &change, &mut Vec::new());
-        core.integration().refresh();
-        let mut found = Vec::new();
-        detect(core, h, PredictionMode::Each, &mut found);
-        core.state.x.copy_from_slice(&self.x0);
-        core.integration().refresh();
+        let (mut struck, mut found) = (core.moment(), Vec::new());
+        push(struck.coordinates_by(core, &mut middle.derived.caches), &change, &mut Vec::new());
+        struck.refresh(core.objects());
+        detect(core, Some(&struck), (h, PredictionMode::Each), &mut found);
+        core.moments.push(struck);
         let work = &mut self.work;
         let old: Vec<[u32; 4]> = work.contact_constraints.iter().map(|t| t.key.pair).collect();
         found.retain(|t| old.binary_search(&t.key.pair).is_err());
@@ -230,7 +244,7 @@ impl TimeStepping {
         filed.sort_by_key(|(constraint, ..)| constraint.key.pair);
         work.contact_constraints.extend(filed.iter().map(|(constraint, ..)| constraint.clone()));
         self.candidates = filed.iter().map(|(_, candidate, _)| *candidate).collect();
-        build_rows(core, work, Level::Velocity { h }, 0.5 * h)?;
+        build_rows(core, Some(&mut *middle), work, Level::Velocity { h }, 0.5 * h)?;
         zero(&mut self.impact, work.rows.len);
         for ((_, _, impulse), block) in filed.iter().zip(&work.rows.blocks).filter(|((.., i), _)| !i.is_empty()) {
             self.impact[block.range()].copy_from_slice(impulse);
@@ -265,7 +279,7 @@ impl TimeStepping {
     }
 
     /// Adds the forces and solves all contacts and constraints of the step: `u` becomes the velocity at its end.
-    fn contacts(&mut self, core: &mut Core, h: f64, u: &mut [f64], du_force: &[f64]) {
+    fn contacts(&mut self, core: &mut Core, middle: &mut Moment, h: f64, u: &mut [f64], du_force: &[f64]) {
         let work = &mut self.work;
         u.iter_mut().zip(du_force).for_each(|(u, du)| *u += du);
         row_velocities(&work.rows, &work.bias, u, &mut work.c);
@@ -287,7 +301,7 @@ impl TimeStepping {
         let (turning, free_motion_change) = if work.targets.is_empty() {
             Default::default()
         } else {
-            (gyroscopic(core), free_motion_change(core, 0.5 * h))
+            (gyroscopic(middle.coordinates(core)), free_motion_change(middle.coordinates(core), 0.5 * h))
         };
         for (block, target) in work.rows.blocks[work.contact_constraints.len()..].iter().zip(&work.targets) {
             work.c[block.row as usize] += work.rows.row_velocity(block, 0, &free_motion_change)
@@ -304,7 +318,15 @@ impl TimeStepping {
     }
 
     /// Writes the state at the end of the step.
-    fn commit(&mut self, core: &mut Core, h: f64, u0: &[f64], u1: &[f64], du_force: &[f64]) -> Result<(), StepError> {
+    fn commit(
+        &mut self,
+        core: &mut Core,
+        middle: &mut Moment,
+        h: f64,
+        u0: &[f64],
+        u1: &[f64],
+        du_force: &[f64],
+    ) -> Result<(), StepError> {
         let impact_fraction = |i: usize| if self.impact_fraction[i] < 0.0 { 0.5 } else { self.impact_fraction[i] };
         let Buffers { change, dp, parabola, rest, mean, total, .. } = &mut self.buffers;
         let write = |out: &mut Vec<f64>, of: &dyn Fn(usize) -> f64| {
@@ -314,25 +336,30 @@ impl TimeStepping {
         write(change, &|i| u1[i] - u0[i]);
         let before =
             |e: &Entry| e.state_range.v.clone().next().filter(|_| !in_the_middle(e)).map_or(0.5, impact_fraction);
-        let (objects, x) = core.objects_and_x();
+        let Coordinates { objects, x, caches } = core.coordinates(Some(&mut *middle));
         for entry in objects.iter() {
-            free_motion(&entry, &mut x[entry.state_range.x.clone()], h * before(&entry));
+            free_motion(&entry, &mut caches[entry.place], &mut x[entry.state_range.x.clone()], h * before(&entry));
         }
-        push(core, change, dp);
-        let (objects, x) = core.objects_and_x();
+        push(core.coordinates(Some(&mut *middle)), change, dp);
+        let Coordinates { objects, x, caches } = core.coordinates(Some(&mut *middle));
         for entry in objects.iter() {
-            free_motion(&entry, &mut x[entry.state_range.x.clone()], h * (1.0 - before(&entry)));
+            free_motion(
+                &entry,
+                &mut caches[entry.place],
+                &mut x[entry.state_range.x.clone()],
+                h * (1.0 - before(&entry)),
+            );
         }
         write(parabola, &|i| (impact_fraction(i) - 0.5) * du_force[i]);
         rest.clone_from(parabola);
         for i in core.objects().iter().filter(|e| in_the_middle(e)).flat_map(|e| e.state_range.v.clone()) {
             rest[i] -= (impact_fraction(i) - 0.5) * change[i];
         }
-        shift(core, rest, h);
+        shift(core.coordinates(Some(&mut *middle)), rest, h);
         write(mean, &|i| impact_fraction(i) * u0[i] + (1.0 - impact_fraction(i)) * u1[i] + parabola[i]);
         let recovery = core.settings.recovery_speed * h;
         let least = core.settings.contact_tolerance;
-        projection::project(core, &mut self.work, Displacement::Step { start: &self.x0, mean, h }, recovery, least)?;
+        projection::project(core, Some(&mut *middle), &mut self.work, Displacement::Step { mean, h }, recovery, least)?;
         total.clear();
         total.extend(self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b));
         core.publish(
@@ -341,14 +368,13 @@ impl TimeStepping {
             impulses(&self.work, &self.work.lambda).map(|i| i / h),
         );
         let kept = unreachable_joints::left(&self.work, |i| self.work.targets[i].error, recovery);
-        joint_correction::close(core, &mut self.work, &self.x0, (h, Level::Velocity { h }), &kept)?;
-        core.unpin();
+        joint_correction::close(core, Some(&mut *middle), &mut self.work, &self.x0, (h, Level::Velocity { h }), &kept)?;
         if !self.work.limits.is_empty() {
             core.integration().refresh();
             let passed = limit_correction::passed(core, &mut self.probe, h)?;
             limit_correction::hold(core, &mut self.probe, &passed, h, recovery)?;
         }
-        core.check_finite(dp)
+        core.check_finite(dp, Some(&mut *middle))
     }
 }
 

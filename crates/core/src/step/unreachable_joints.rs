@@ -28,7 +28,7 @@ use super::joint_correction::is_joint;
 use crate::constraint::builder::{RowKind, constraints};
 use crate::report::UnreachableJoint;
 use crate::solver::smallest_pivot;
-use crate::world::Core;
+use crate::world::{Coordinates, Core};
 use std::ops::Range;
 
 /// Compliance of the velocity rows of what is out of reach, as a share of their response: nothing there is asked for more than half the speed that it is led with.
@@ -108,13 +108,12 @@ pub(super) fn left(work: &Workspace, errors: impl Fn(usize) -> f64, reach: f64) 
 /// Gives the objects with these stretches of the state the velocity that their way in `h` is: the mean of those of the states `start` and `arrived`, and what they
 /// were `moved` from there, generalized velocities times seconds.
 pub(super) fn go_as_moved(
-    core: &mut Core,
+    Coordinates { objects, x, .. }: Coordinates,
     stretches: &[(Range<usize>, Range<usize>)],
     [start, arrived]: [&[f64]; 2],
     moved: &[f64],
     h: f64,
 ) {
-    let (objects, x) = core.objects_and_x();
     for entry in objects.iter().filter(|e| e.moves() && stretches.iter().any(|(range, _)| *range == e.state_range.x)) {
         let Some(body) = entry.object.integratable() else { continue };
         let (mut v, mut first) = (vec![0.0; entry.state_range.v.len()], vec![0.0; entry.state_range.v.len()]);

@@ -1,6 +1,6 @@
 //! What a user does to the objects of a world between steps.
 
-use super::{World, WorldError};
+use super::{Coordinates, World, WorldError};
 use crate::object::part_state::PartState;
 use crate::object::{Integratable, Object};
 use crate::rigid::{RigidBody, orientation, vec3};
@@ -65,7 +65,7 @@ impl World {
     /// The site of one part: pose, velocity, acceleration.
     pub fn part_state(&self, id: ObjectId, part: usize) -> Option<&PartState> {
         let entry = self.core.table.get(id)?;
-        self.core.part_states[entry.state_range.parts.clone()].get(part)
+        self.core.derived.part_states[entry.state_range.parts.clone()].get(part)
     }
 
     /// Pose of the frame by which a part is placed: that of a rigid body, of whose mesh the file's frame is kept (its site is at the center of mass);
@@ -129,7 +129,7 @@ impl World {
     /// Applies a force (N) at a world point of one part during the next frame.
     pub fn apply_force(&mut self, id: ObjectId, part: usize, force: Vec3, point: &Vec3) -> Result<(), WorldError> {
         let index = self.part(id, part, &[force, *point])?;
-        let arm = point - self.core.part_states[index].position();
+        let arm = point - self.core.derived.part_states[index].position();
         self.core.state.applied[index].force += force;
         self.core.state.applied[index].torque += arm.cross(&force);
         Ok(())
@@ -166,8 +166,8 @@ impl World {
     pub fn apply_impulse(&mut self, id: ObjectId, part: usize, impulse: Vec3, point: &Vec3) -> Result<(), WorldError> {
         let index = self.part(id, part, &[impulse, *point])?;
         self.core.wake(id);
-        let core = &mut self.core;
-        let (objects, x) = (core.table.with(&core.state.objects), &mut core.state.x);
+        let part_state = self.core.derived.part_states[index];
+        let Coordinates { objects, x, caches } = self.core.coordinates(None);
         let entry = objects.get(id).ok_or(WorldError::Stale)?;
         let (Some(collidable), Some(body), true) =
             (entry.object.collidable(), entry.object.integratable(), entry.moves())
@@ -176,11 +176,12 @@ impl World {
         };
         let dof = entry.state_range.v.len();
         let (mut y, mut dp) = (vec![0.0; 3 * dof], vec![0.0; dof]);
-        collidable.test_impulse(part, &core.part_states[index], point, &[Vec3::x(), Vec3::y(), Vec3::z()], 1.0, &mut y);
+        let cache = &mut caches[entry.place];
+        collidable.test_impulse(cache, part, &part_state, point, &[Vec3::x(), Vec3::y(), Vec3::z()], 1.0, &mut y);
         let du: Vec<f64> = (0..dof).map(|k| (0..3).map(|r| impulse[r] * y[r * dof + k]).sum()).collect();
-        body.unwhiten_rate(&du, &mut dp);
+        body.unwhiten_rate(cache, &du, &mut dp);
         body.kick(&mut x[entry.state_range.x.clone()], &dp, 1.0);
-        core.integration().refresh_one(id);
+        self.core.integration().refresh_one(id);
         Ok(())
     }
 

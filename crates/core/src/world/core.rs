@@ -3,12 +3,14 @@
 use super::state::WorldState;
 use crate::contact::detect::{ContactConstraint, DetectorBuffers, Owner};
 use crate::contact::pair_material::PairMaterials;
+use crate::derived::{Cache, Derived};
 use crate::integrators::context::IntegrationContext;
 use crate::object::part_state::{Forces, PartState, Wrench};
 use crate::report::StepReport;
 use crate::settings::Settings;
 use crate::solver::RowSolver;
-use crate::world::view::{Entry, ObjectId, Objects, Table};
+use crate::step::Moment;
+use crate::world::view::{Entry, ObjectId, Objects, Table, WorldView};
 use tumble_collide::{BroadPhase, SweepAndPrune, Vec3};
 
 /// Why a step stopped. [`World::step`](crate::World::step) puts state and time back to where they were before the frame.
@@ -85,7 +87,7 @@ pub struct ContactPoint {
     pub force: Vec3,
 }
 
-/// A world without its stepper: the model, its state, what follows from the state, and the working memory of a step.
+/// A world without its stepper: the model, its state, the values derived from it, and the working memory of a step.
 pub struct Core {
     pub(crate) table: Table,
     pub(crate) settings: Settings,
@@ -93,17 +95,15 @@ pub struct Core {
     pub(crate) solver: Box<dyn RowSolver>,
     pub(crate) state: WorldState,
     pub(crate) dof: usize,
-    pub(crate) part_states: Vec<PartState>,
+    pub(crate) derived: Derived,
     pub(crate) owners: Vec<Owner>,
     /// See [`WorldView::implicit`](crate::WorldView::implicit).
     pub(crate) implicit: bool,
     pub(crate) held: Vec<f64>,
     /// Contact forces that hold over the sub-step, per site, of objects whose state holds velocities; empty for none.
     pub(crate) held_wrenches: Vec<Wrench>,
-    /// Where the caches of what moves are kept, whatever state is refreshed; empty for none. And the sites there.
-    pub(crate) pinned: (Vec<f64>, Vec<PartState>),
-    /// Memory of what was pinned last, for the next.
-    pub(crate) unpinned: (Vec<f64>, Vec<PartState>),
+    /// Moments that are not in use, whose memory is used again.
+    pub(crate) moments: Vec<Moment>,
     pub(crate) forces: Forces,
     pub(crate) broad: Box<dyn BroadPhase>,
     pub(crate) detect_scratch: DetectorBuffers,
@@ -113,10 +113,18 @@ pub struct Core {
     pub(crate) needs_wake: Vec<u32>,
 }
 
+/// Numbers of the objects, and the caches of the maps that change them.
+pub(crate) struct Coordinates<'a> {
+    pub objects: Objects<'a>,
+    pub x: &'a mut [f64],
+    pub caches: &'a mut [Cache],
+}
+
 impl Core {
     /// Returns a core without contacts, whose part table is yet to be written.
     pub(super) fn new(table: Table, settings: Settings, solver: Box<dyn RowSolver>, state: WorldState) -> Core {
         let (dof, parts) = (state.applied_generalized.len(), state.applied.len());
+        let caches = table.new_caches();
         let mut owners = Vec::with_capacity(parts);
         for (place, (placed, &id)) in (0..).zip(table.placed.iter().zip(&table.order)) {
             owners.extend((0..).zip(placed.state_range.parts.clone()).map(|(part, _)| Owner { id, place, part }));
@@ -128,13 +136,12 @@ impl Core {
             solver,
             state,
             dof,
-            part_states: vec![PartState::default(); parts],
+            derived: Derived { part_states: vec![PartState::default(); parts], caches },
             owners,
             implicit: false,
             held: vec![0.0; dof],
             held_wrenches: Vec::new(),
-            pinned: Default::default(),
-            unpinned: Default::default(),
+            moments: Vec::new(),
             forces: Forces::default(),
             broad: Box::<SweepAndPrune>::default(),
             detect_scratch: DetectorBuffers::default(),
@@ -146,13 +153,15 @@ impl Core {
 
     /// Returns a copy with working memory of its own.
     pub(super) fn fork(&self) -> Core {
-        Core {
+        let mut fork = Core {
             pair_materials: self.pair_materials.clone(),
-            part_states: self.part_states.clone(),
             contacts: self.contacts.clone(),
             report: self.report,
             ..Core::new(self.table.clone(), self.settings, self.solver.fork(), self.state.clone())
-        }
+        };
+        fork.integration().refresh();
+        fork.derived.part_states.clone_from(&self.derived.part_states); // accelerations, and poses that are shown
+        fork
     }
 
     /// Returns the objects with their switches.
@@ -160,17 +169,38 @@ impl Core {
         self.table.with(&self.state.objects)
     }
 
-    /// Returns the objects with their switches, beside their numbers in `X` to be changed.
-    pub(crate) fn objects_and_x(&mut self) -> (Objects<'_>, &mut [f64]) {
-        (self.table.with(&self.state.objects), &mut self.state.x)
+    /// Returns the present numbers, and the caches of `acting`, or else of the present.
+    pub(crate) fn coordinates<'a>(&'a mut self, acting: Option<&'a mut Moment>) -> Coordinates<'a> {
+        let objects = self.table.with(&self.state.objects);
+        let derived = acting.map_or(&mut self.derived, |moment| &mut moment.derived);
+        Coordinates { objects, x: &mut self.state.x, caches: &mut derived.caches }
     }
 
-    /// Writes a state of these objects over the present one, and everything that follows from it.
+    /// Returns a moment with the numbers and accelerations of the present, to be refreshed. Push it to `moments` after use.
+    pub(crate) fn moment(&mut self) -> Moment {
+        let mut moment = self.moments.pop().unwrap_or_else(|| Moment::new(&self.table));
+        self.state.x[..].clone_into(&mut moment.x);
+        moment.derived.part_states.clone_from(&self.derived.part_states);
+        moment
+    }
+
+    /// Returns the present state at a time, s, as objects see it.
+    pub(crate) fn view(&self, time: f64) -> WorldView<'_> {
+        WorldView {
+            time,
+            gravity: self.settings.gravity,
+            implicit: self.implicit,
+            x: &self.state.x,
+            part_states: &self.derived.part_states,
+            objects: self.objects(),
+        }
+    }
+
+    /// Copies a state of these objects over the present one, and derives part states and caches.
     pub(crate) fn set_state(&mut self, state: &WorldState) {
         self.state.clone_from(state);
-        self.unpin();
         self.clear_contact_forces();
-        self.state.write_accelerations(&mut self.part_states);
+        self.state.write_accelerations(&mut self.derived.part_states);
         self.integration().refresh();
     }
 
@@ -180,44 +210,22 @@ impl Core {
         self.held_wrenches.clear();
     }
 
-    /// Keeps the caches of what moves at the present state until [`unpin`](Self::unpin): where in a step impulses act. From the next refresh on; sites still
-    /// follow the state.
-    pub(crate) fn pin(&mut self) {
-        self.pinned = std::mem::take(&mut self.unpinned);
-        self.state.x[..].clone_into(&mut self.pinned.0);
-        self.pinned.1.clone_from(&self.part_states);
-    }
-
-    /// Lets the caches follow again from the next refresh on.
-    pub(crate) fn unpin(&mut self) {
-        self.unpinned = std::mem::take(&mut self.pinned);
-    }
-
-    /// The same for a while; what was pinned, to be put back.
-    pub(crate) fn lift_pin(&mut self) -> (Vec<f64>, Vec<PartState>) {
-        std::mem::take(&mut self.pinned)
-    }
-
-    pub(crate) fn pin_again(&mut self, pinned: (Vec<f64>, Vec<PartState>)) {
-        self.pinned = pinned;
-    }
-
-    /// The state of the pinned caches.
-    pub(crate) fn pinned(&self) -> Option<&[f64]> {
-        Some(&self.pinned.0[..]).filter(|x| !x.is_empty())
-    }
-
-    /// The sites of the pinned caches; only those of what moves are there.
-    pub(crate) fn pinned_part_states(&self) -> Option<&Vec<PartState>> {
-        Some(&self.pinned.1).filter(|x| !x.is_empty())
-    }
-
+    /// Lends the present state to the integrators.
     pub(crate) fn integration(&mut self) -> IntegrationContext<'_> {
+        self.integration_of(None)
+    }
+
+    /// Lends the state of `moment`, or else the present one, to the integrators.
+    pub(crate) fn integration_of<'a>(&'a mut self, moment: Option<&'a mut Moment>) -> IntegrationContext<'a> {
+        let (x, derived) = match moment {
+            Some(moment) => (&mut moment.x[..], &mut moment.derived),
+            None => (&mut self.state.x[..], &mut self.derived),
+        };
         IntegrationContext {
-            table: &mut self.table,
+            table: &self.table,
             states: &self.state.objects,
-            x: &mut self.state.x,
-            part_states: &mut self.part_states,
+            x,
+            derived,
             forces: &mut self.forces,
             gravity: self.settings.gravity,
             implicit: self.implicit,
@@ -225,8 +233,6 @@ impl Core {
             applied_generalized: &self.state.applied_generalized,
             held: &self.held,
             held_wrenches: &self.held_wrenches,
-            pinned: &self.pinned.0,
-            pinned_part_states: &mut self.pinned.1,
         }
     }
 
@@ -240,8 +246,10 @@ impl Core {
         self.contacts.clear();
         for ((constraint, impulse), force) in contact_constraints.iter().zip(impulses).zip(forces) {
             let (a, b) = (self.owners[constraint.a as usize], self.owners[constraint.b as usize]);
-            let velocity =
-                constraint.velocity(&self.part_states[constraint.a as usize], &self.part_states[constraint.b as usize]);
+            let velocity = constraint.velocity(
+                &self.derived.part_states[constraint.a as usize],
+                &self.derived.part_states[constraint.b as usize],
+            );
             self.contacts.push(ContactPoint {
                 a: a.id,
                 part_a: a.part as usize,
@@ -269,7 +277,7 @@ impl Core {
     pub(crate) fn finish_substep(&mut self, h: f64) -> Result<(), StepError> {
         self.state.time += h;
         self.report.substeps += 1;
-        let (objects, x) = self.objects_and_x();
+        let Coordinates { objects, x, .. } = self.coordinates(None);
         for entry in objects.iter().filter(|e| e.moves()) {
             if let Some(body) = entry.object.integratable() {
                 body.stabilize(&mut x[entry.state_range.x.clone()], h);
@@ -279,31 +287,30 @@ impl Core {
         let moves = |s: &PartState| s.velocity.iter().chain(s.angular_velocity.iter()).all(|x| x.is_finite());
         let fine = |e: &Entry| {
             self.state.x[e.state_range.x.clone()].iter().all(|x| x.is_finite())
-                && self.part_states[e.state_range.parts.clone()].iter().all(moves)
+                && self.derived.part_states[e.state_range.parts.clone()].iter().all(moves)
         };
         let bad = self.objects().iter().find(|e| !fine(e));
         bad.map_or(Ok(()), |e| Err(self.not_finite(e.object.name(), "its state")))
     }
 
-    /// Stops forces and impulses that are not numbers, and objects that cannot move.
-    pub(crate) fn check_finite(&self, dp: &[f64]) -> Result<(), StepError> {
-        let singularity = |e: Entry| {
-            Some(StepError::Singular {
-                why: e.object.integratable()?.singularity()?,
-                object: e.object.name().to_string(),
-                time: self.state.time,
-            })
-        };
-        if let Some(error) = self.objects().iter().filter(|e| e.moves()).find_map(singularity) {
-            return Err(error);
+    /// Checks that all forces and accelerations are finite, and that no mass matrix is singular, at the moment `acting`, or else at the
+    /// present.
+    pub(crate) fn check_finite(&mut self, dp: &[f64], acting: Option<&mut Moment>) -> Result<(), StepError> {
+        let time = self.state.time;
+        let objects = self.table.with(&self.state.objects);
+        let Derived { part_states, caches } = acting.map_or(&mut self.derived, |moment| &mut moment.derived);
+        for e in objects.iter().filter(|e| e.moves()) {
+            if let Some(why) = e.object.integratable().and_then(|body| body.singularity(&mut caches[e.place])) {
+                return Err(StepError::Singular { object: e.object.name().to_string(), why, time });
+            }
         }
         let accelerates =
             |s: &PartState| s.acceleration.iter().chain(s.angular_acceleration.iter()).all(|x| x.is_finite());
         let fine = |e: &Entry| {
             dp[e.state_range.v.clone()].iter().all(|x| x.is_finite())
-                && self.part_states[e.state_range.parts.clone()].iter().all(accelerates)
+                && part_states[e.state_range.parts.clone()].iter().all(accelerates)
         };
-        let bad = self.objects().iter().find(|e| !fine(e));
+        let bad = objects.iter().find(|e| !fine(e));
         bad.map_or(Ok(()), |e| Err(self.not_finite(e.object.name(), "the force on it")))
     }
 

@@ -37,7 +37,7 @@ impl World {
         if poses.iter().any(|p| !p.translation.vector.iter().chain(p.rotation.coords.iter()).all(|x| x.is_finite())) {
             return Err(WorldError::NotFinite(name.to_string()));
         }
-        for (part_state, pose) in self.core.part_states[state_range].iter_mut().zip(poses) {
+        for (part_state, pose) in self.core.derived.part_states[state_range].iter_mut().zip(poses) {
             *part_state = PartState { pose: *pose, ..PartState::default() };
         }
         Ok(())

@@ -12,6 +12,7 @@ mod state;
 mod state_memory;
 pub(crate) mod view;
 
+pub(crate) use self::core::Coordinates;
 pub use self::core::{ContactPoint, Core, StepError};
 pub use mirror::MirrorError;
 pub use overlaps::Overlap;
@@ -159,6 +160,7 @@ impl World {
         std::mem::swap(&mut self.contacts_before, &mut core.contacts);
         let report_before = std::mem::take(&mut core.report);
         core.needs_wake.clear();
+        core.integration().refresh(); // constants and switches may have changed
         core.wake_disturbed();
         loop {
             let requests = core.needs_wake.len();
@@ -182,7 +184,7 @@ impl World {
         core.fall_asleep();
         core.report.asleep = core.objects().iter().filter(|e| e.asleep).count() as u32;
         core.state.clear_applied();
-        core.state.keep_accelerations(&core.part_states);
+        core.state.keep_accelerations(&core.derived.part_states);
         core.state.frame += 1;
         Ok(&core.report)
     }
@@ -240,20 +242,12 @@ impl World {
 
     /// The site table.
     pub fn part_states(&self) -> &[PartState] {
-        &self.core.part_states
+        &self.core.derived.part_states
     }
 
     /// A read-only view, as objects get it.
     pub fn view(&self) -> WorldView<'_> {
-        let c = &self.core;
-        WorldView {
-            time: c.state.time,
-            gravity: c.settings.gravity,
-            implicit: false,
-            x: &c.state.x,
-            part_states: &c.part_states,
-            objects: c.objects(),
-        }
+        WorldView { implicit: false, ..self.core.view(self.core.state.time) }
     }
 
     /// Ids in the order in which the objects were added.
@@ -327,7 +321,7 @@ impl World {
         let state_range = StateRange {
             x: core.state.x.len()..core.state.x.len() + state_sizes.x,
             v: core.dof..core.dof + state_sizes.dof,
-            parts: core.part_states.len()..core.part_states.len() + state_sizes.parts,
+            parts: core.derived.part_states.len()..core.derived.part_states.len() + state_sizes.parts,
         };
         core.state.x.resize(state_range.x.end);
         if let Some(body) = object.integratable() {
@@ -337,10 +331,12 @@ impl World {
             core.state.x.resize(state_range.x.start);
             return Err(WorldError::NotFinite(name));
         }
+        core.moments.clear();
+        core.derived.caches.push(object.new_cache());
         let id = core.table.push(object, state_range.clone());
         core.dof = state_range.v.end;
         core.held.resize(core.dof, 0.0);
-        core.part_states.resize(state_range.parts.end, PartState::default());
+        core.derived.part_states.resize(state_range.parts.end, PartState::default());
         let place = core.state.objects.len() as u32;
         core.owners.extend((0..state_sizes.parts).map(|part| Owner { id, place, part: part as u32 }));
         core.state.add(Status { mode, ..Status::default() }, &state_range);
@@ -356,7 +352,9 @@ impl World {
         let (place, gone) = core.table.remove(id).ok_or(WorldError::Stale)?;
         self.names.remove(gone.object.name());
         core.state.remove(place, &gone.state_range);
-        core.part_states.drain(gone.state_range.parts.clone());
+        core.derived.part_states.drain(gone.state_range.parts.clone());
+        core.derived.caches.remove(place);
+        core.moments.clear();
         core.owners.drain(gone.state_range.parts.clone());
         core.dof -= gone.state_range.v.len();
         core.held.truncate(core.dof);

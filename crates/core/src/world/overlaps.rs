@@ -53,7 +53,12 @@ impl World {
         let entries = self.core.objects().iter().filter(|e| e.status.enabled && e.status.collidable);
         let parts = entries.filter_map(|entry| Some((entry, entry.object.collidable()?))).flat_map(|(entry, body)| {
             entry.state_range.parts.clone().enumerate().filter_map(move |(part, part_state)| {
-                Some(Part { entry, part, shape: body.shape(part)?, pose: self.core.part_states[part_state].pose })
+                Some(Part {
+                    entry,
+                    part,
+                    shape: body.shape(part)?,
+                    pose: self.core.derived.part_states[part_state].pose,
+                })
             })
         });
         parts.collect()
@@ -61,7 +66,7 @@ impl World {
 
     /// The greatest depth of the contacts of two parts that may meet, if they overlap.
     fn depth_of(&self, a: &Part<'_>, b: &Part<'_>) -> Option<f64> {
-        if !may_collide(&a.entry, a.part, &b.entry, b.part, &self.core.part_states) {
+        if !may_collide(&a.entry, a.part, &b.entry, b.part, &self.core.derived.part_states) {
             return None;
         }
         let (of_a, of_b) = (a.entry.object.collidable()?, b.entry.object.collidable()?);

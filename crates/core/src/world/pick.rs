@@ -20,7 +20,8 @@
 //! Stiffness and damping are in proportion to the mass that the point shows, so that a feather and a wrecking ball come to the hand alike, and each of the
 //! implicit steps is stable for any ω h. Under gravity g a body comes to rest g/ω² below the hand.
 
-use super::{World, WorldError};
+use super::{Coordinates, World, WorldError};
+use crate::derived::Cache;
 use crate::object::collidable::Collidable;
 use crate::object::part_state::{PartState, Wrench};
 use crate::world::view::ObjectId;
@@ -54,18 +55,21 @@ impl World {
     pub fn pick(&mut self, pick: &PickForce) -> Result<Wrench, WorldError> {
         let index = self.part(pick.id, pick.part, &[pick.point, pick.target, Vec3::repeat(pick.frequency)])?;
         self.core.wake(pick.id);
-        let entry = self.core.objects().get(pick.id).ok_or(WorldError::Stale)?;
+        let (h, part_state) = (self.core.settings.dt, self.core.derived.part_states[index]);
+        let Coordinates { objects, caches, .. } = self.core.coordinates(None);
+        let entry = objects.get(pick.id).ok_or(WorldError::Stale)?;
         let Some(collidable) = entry.object.collidable().filter(|c| entry.moves() && c.part_moves(pick.part)) else {
             return Ok(Wrench::default());
         };
-        let (part_state, dof, h) = (self.core.part_states[index], entry.state_range.v.len(), self.core.settings.dt);
+        let (dof, cache) = (entry.state_range.v.len(), &mut caches[entry.place]);
         let held = part_state.pose.rotation * pick.point + part_state.position();
         let (v, omega) = (part_state.velocity_at(&held), pick.frequency.max(0.0));
         let wanted = (v + (pick.target - held) * (h * omega * omega)) / (1.0 + h * omega).powi(2);
-        let impulses = responses(collidable, pick.part, &part_state, dof, &held, [Vec3::x(), Vec3::y(), Vec3::z()]);
+        let impulses =
+            responses((collidable, cache), pick.part, &part_state, dof, &held, [Vec3::x(), Vec3::y(), Vec3::z()]);
         let force = mass(&impulses, dof) * (wanted - v) / h;
         let slowed = part_state.angular_velocity * (1.0 / (1.0 + 0.5 * h * omega) - 1.0);
-        let torque = mass(&couples(collidable, pick.part, &part_state, dof), dof) * slowed / h;
+        let torque = mass(&couples((collidable, cache), pick.part, &part_state, dof), dof) * slowed / h;
         self.apply_force(pick.id, pick.part, force, &held)?;
         self.apply_torque(pick.id, pick.part, torque)?;
         Ok(Wrench { torque, force })
@@ -74,7 +78,7 @@ impl World {
 
 /// Whitened responses to unit impulses at a point, a row of `dof` numbers each.
 fn responses(
-    collidable: &dyn Collidable,
+    (collidable, cache): (&dyn Collidable, &mut Cache),
     part: usize,
     part_state: &PartState,
     dof: usize,
@@ -82,17 +86,22 @@ fn responses(
     axes: [Vec3; 3],
 ) -> Vec<f64> {
     let mut y = vec![0.0; 3 * dof];
-    collidable.test_impulse(part, part_state, point, &axes, 1.0, &mut y);
+    collidable.test_impulse(cache, part, part_state, point, &axes, 1.0, &mut y);
     y
 }
 
 /// The same of unit couples about x, y and z: a force along the next axis but one, an arm of 1 m along the next, and the force's opposite without it.
-fn couples(collidable: &dyn Collidable, part: usize, part_state: &PartState, dof: usize) -> Vec<f64> {
+fn couples(
+    (collidable, cache): (&dyn Collidable, &mut Cache),
+    part: usize,
+    part_state: &PartState,
+    dof: usize,
+) -> Vec<f64> {
     let mut z = vec![0.0; 3 * dof];
     for (k, row) in z.chunks_exact_mut(dof.max(1)).enumerate() {
         let (arm, axis) = (Vec3::ith((k + 1) % 3, 1.0), Vec3::ith((k + 2) % 3, 1.0));
-        collidable.test_impulse(part, part_state, &(part_state.position() + arm), &[axis], 1.0, row);
-        collidable.test_impulse(part, part_state, &part_state.position(), &[axis], -1.0, row);
+        collidable.test_impulse(cache, part, part_state, &(part_state.position() + arm), &[axis], 1.0, row);
+        collidable.test_impulse(cache, part, part_state, &part_state.position(), &[axis], -1.0, row);
     }
     z
 }

@@ -151,7 +151,7 @@ impl Core {
                 object.asleep = false;
                 object.rest.since = state.time;
                 write_poses(
-                    &self.part_states[self.table.placed[place].state_range.parts.clone()],
+                    &self.derived.part_states[self.table.placed[place].state_range.parts.clone()],
                     &mut object.rest.from,
                 );
             }
@@ -169,7 +169,7 @@ impl Core {
     fn disturbed(&self, group: &SleepGroup) -> bool {
         let changed = |support: &Support| {
             let Some(e) = self.by_serial(support.serial).map(|place| self.objects().at(place)) else { return true };
-            let part_states = &self.part_states[e.state_range.parts.clone()];
+            let part_states = &self.derived.part_states[e.state_range.parts.clone()];
             e.moves()
                 || !e.status.enabled
                 || !at_rest(part_states)
@@ -236,7 +236,8 @@ impl Core {
                 (false, false) => {}
                 (first_moves, _) => {
                     let (mover, support) = if first_moves { (i, j) } else { (j, i) };
-                    ready[mover] &= at_rest(&self.part_states[self.table.placed[support].state_range.parts.clone()]);
+                    ready[mover] &=
+                        at_rest(&self.derived.part_states[self.table.placed[support].state_range.parts.clone()]);
                     supports.push([mover, support]);
                 }
             }
@@ -263,7 +264,7 @@ impl Core {
                 ready.push(false);
                 continue;
             }
-            let part_states = &self.part_states[entry.state_range.parts.clone()];
+            let part_states = &self.derived.part_states[entry.state_range.parts.clone()];
             let radius = |part: usize| {
                 let shape = entry.object.collidable().and_then(|c| c.shape(part));
                 shape.map(|s| s.bounding_radius()).filter(|r| r.is_finite()).unwrap_or(0.0)
@@ -315,7 +316,7 @@ impl Core {
         supports.dedup();
         let support = |place: usize| Support {
             serial: self.state.objects[place].serial,
-            poses: poses(&self.part_states[self.table.placed[place].state_range.parts.clone()]).collect(),
+            poses: poses(&self.derived.part_states[self.table.placed[place].state_range.parts.clone()]).collect(),
         };
         group.supports = supports.into_iter().map(support).collect();
         let ours = |serial: &u32| group.members.binary_search(serial).is_ok();

@@ -30,7 +30,7 @@ pub enum SnapshotError {
 
 const MAGIC: [u8; 8] = *b"tumbleS4";
 
-/// What comes before the state.
+/// The objects of the world, before the state.
 #[derive(Serialize, Deserialize)]
 struct Header {
     magic: [u8; 8],

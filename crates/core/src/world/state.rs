@@ -30,9 +30,9 @@ pub struct WorldState {
     /// Angular (rad/s²), then linear acceleration (m/s²) of every part at the last evaluation of forces. Objects and the detector
     /// read them before forces are evaluated again.
     pub(crate) accelerations: Vec<[Vec3; 2]>,
-    /// What users apply to every part during the next frame.
+    /// Wrench that users apply to every part during the next frame.
     pub(crate) applied: Vec<Wrench>,
-    /// What users apply to every degree of freedom during the next frame.
+    /// Force that users apply to every degree of freedom during the next frame.
     pub(crate) applied_generalized: Vec<f64>,
     pub(crate) warm: WarmStarts,
     /// Inner step that the adaptive integrator goes on with, s; 0 before it has any.
@@ -55,7 +55,7 @@ clone_by_field!(WorldState {
     groups,
 });
 
-/// What of an object is state besides its numbers in `X`.
+/// State of an object besides its numbers in `X`.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(crate) struct ObjectState {
     /// Never used twice in a world: warm starts and sleepers are filed under it.
@@ -105,7 +105,7 @@ impl WorldState {
         self.applied_generalized.fill(0.0);
     }
 
-    /// Takes the accelerations of the part table over.
+    /// Copies the accelerations of the part table.
     pub(crate) fn keep_accelerations(&mut self, part_states: &[PartState]) {
         self.accelerations.clear();
         self.accelerations.extend(part_states.iter().map(|s| [s.angular_acceleration, s.acceleration]));

@@ -1,5 +1,6 @@
 //! The table of objects and the read-only view of the world that objects are given.
 
+use crate::derived::Cache;
 use crate::object::Object;
 use crate::object::part_state::{PartState, StateRange};
 use crate::world::ObjectState;
@@ -50,6 +51,8 @@ impl Status {
 /// An object, the ranges of its numbers in the world's tables, and its switches.
 #[derive(Clone, Copy)]
 pub(crate) struct Entry<'a> {
+    /// In the order of adding.
+    pub place: usize,
     pub object: &'a dyn Object,
     pub state_range: &'a StateRange,
     pub status: Status,
@@ -104,6 +107,16 @@ impl Table {
         Some(&self.placed[self.place(id)?])
     }
 
+    /// Returns the degrees of freedom of all objects.
+    pub fn dof(&self) -> usize {
+        self.placed.last().map_or(0, |placed| placed.state_range.v.end)
+    }
+
+    /// Makes a cache for every object.
+    pub fn new_caches(&self) -> Vec<Cache> {
+        self.placed.iter().map(|placed| placed.object.new_cache()).collect()
+    }
+
     /// Adds an object behind all others.
     pub fn push(&mut self, object: Box<dyn Object>, state_range: StateRange) -> ObjectId {
         let id = self.places.insert(self.placed.len());
@@ -138,12 +151,13 @@ pub(crate) struct Objects<'a> {
 impl<'a> Objects<'a> {
     /// Walks them in the order in which they were added.
     pub fn iter(self) -> impl Iterator<Item = Entry<'a>> + Clone {
-        self.table.placed.iter().zip(self.states).map(|(placed, state)| entry(placed, state))
+        let entries = self.table.placed.iter().zip(self.states).enumerate();
+        entries.map(|(place, (placed, state))| entry(place, placed, state))
     }
 
     /// Returns the object at a place in the order of adding.
     pub fn at(self, place: usize) -> Entry<'a> {
-        entry(&self.table.placed[place], &self.states[place])
+        entry(place, &self.table.placed[place], &self.states[place])
     }
 
     /// Returns an object by id.
@@ -152,8 +166,9 @@ impl<'a> Objects<'a> {
     }
 }
 
-fn entry<'a>(placed: &'a Placed, state: &ObjectState) -> Entry<'a> {
+fn entry<'a>(place: usize, placed: &'a Placed, state: &ObjectState) -> Entry<'a> {
     Entry {
+        place,
         object: placed.object.as_ref(),
         state_range: &placed.state_range,
         status: state.status,
@@ -163,6 +178,7 @@ fn entry<'a>(placed: &'a Placed, state: &ObjectState) -> Entry<'a> {
 }
 
 /// What an object may read while it accumulates forces or makes rows.
+#[derive(Clone, Copy)]
 pub struct WorldView<'a> {
     /// Simulated time of this stage, s.
     pub time: f64,

@@ -54,29 +54,29 @@ impl Integratable for Pendulum {
     fn write_velocity(&self, x: &mut [f64], v: &[f64]) {
         x[1] = v[0];
     }
-    fn derivative(&self, _x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
+    fn derivative(&self, _cache: &mut Cache, _x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
         dp[0] = f.generalized[0];
     }
-    fn accelerations(&self, _x: &[f64], _dp: &[f64], _sites: &mut [PartState]) {}
+    fn accelerations(&self, _cache: &mut Cache, _x: &[f64], _dp: &[f64], _sites: &mut [PartState]) {}
     fn kick(&self, x: &mut [f64], dp: &[f64], h: f64) {
         x[1] += h * dp[0];
     }
-    fn free_motion(&self, x: &mut [f64], h: f64) {
+    fn free_motion(&self, _cache: &mut Cache, x: &mut [f64], h: f64) {
         x[0] += h * x[1];
     }
     fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64) {
         x[0] += h * v[0];
     }
-    fn whiten(&self, x: &[f64], u: &mut [f64]) {
+    fn whiten(&self, _cache: &mut Cache, x: &[f64], u: &mut [f64]) {
         u[0] = x[1];
     }
-    fn unwhiten(&self, u: &[f64], v: &mut [f64]) {
+    fn unwhiten(&self, _cache: &mut Cache, u: &[f64], v: &mut [f64]) {
         v[0] = u[0];
     }
-    fn respond(&self, j: &[f64], y: &mut [f64]) {
+    fn respond(&self, _cache: &mut Cache, j: &[f64], y: &mut [f64]) {
         y[0] = j[0];
     }
-    fn recover(&self, du: &[f64], j: &mut [f64]) {
+    fn recover(&self, _cache: &mut Cache, du: &[f64], j: &mut [f64]) {
         j[0] = du[0];
     }
     fn energy(&self, x: &[f64], _gravity: &Vec3) -> Energy {

@@ -241,3 +241,28 @@ fn a_body_in_another_process_is_kept_in_step_by_messages() {
     }
     assert_eq!(bits(&world), bits(&replica));
 }
+
+/// `|L·v|² = vᵀMv = 2T` at either state, whichever was refreshed last; `T` is summed over the links.
+#[test]
+fn two_states_of_one_object_exist_at_once() {
+    let rod =
+        LinkMass { mass: 2.0, center: Vec3::new(0.0, 0.1, -0.5), inertia: tumble_core::collide::Mat3::identity() };
+    let mut builder = ModelBuilder::new();
+    let upper = builder.link("upper", None, Joint::revolute(Vec3::y()), Pose::identity(), rod);
+    builder.link("lower", Some(upper), Joint::revolute(Vec3::x()), Pose::translation(0.0, 0.0, -1.0), rod);
+    let arm = ArticulatedBody::new("arm", builder.build().unwrap());
+    let body = arm.integratable().unwrap();
+    let states = [[0.3, -0.4, 1.0, 2.0], [1.2, 0.9, -1.5, 0.5]];
+    let mut caches = [arm.new_cache(), arm.new_cache()];
+    let mut part_states = vec![PartState::default(); body.state_sizes().parts];
+    for (x, cache) in states.iter().zip(&mut caches) {
+        arm.refresh(x, cache, &mut part_states);
+    }
+    for (x, cache) in states.iter().zip(&mut caches) {
+        let mut u = [0.0; 2];
+        body.whiten(cache, x, &mut u);
+        let twice = 2.0 * body.energy(x, &Vec3::zeros()).kinetic;
+        let sum: f64 = u.iter().map(|u| u * u).sum();
+        assert!((sum - twice).abs() < 1e-12 * twice, "{sum} and {twice} at {x:?}");
+    }
+}

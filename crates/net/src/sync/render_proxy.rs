@@ -1,7 +1,7 @@
 //! An object that is drawn and nothing else: what came by name, and the scene file has not.
 
 use tumble_collide::{Shape, Vec3};
-use tumble_core::{Collidable, CollisionGroup, Material, Object, PartState, Renderable, Visual};
+use tumble_core::{Cache, Collidable, CollisionGroup, Material, Object, PartState, Renderable, Visual};
 
 /// Parts with pictures, which stand where they are shown.
 #[derive(Clone)]
@@ -50,7 +50,7 @@ impl Collidable for RenderProxy {
         false
     }
 
-    fn test_impulse(&self, _: usize, _: &PartState, _: &Vec3, _: &[Vec3], _: f64, _: &mut [f64]) {}
+    fn test_impulse(&self, _: &mut Cache, _: usize, _: &PartState, _: &Vec3, _: &[Vec3], _: f64, _: &mut [f64]) {}
 }
 
 impl Renderable for RenderProxy {

@@ -10,18 +10,18 @@
 //! order. Free motion then never gains energy, however long the step.
 
 use crate::articulated::algorithms::dynamics::{Dynamics, Scratch};
-use crate::articulated::body::Working;
+use crate::articulated::body::BodyCache;
 use crate::articulated::model::Model;
 use crate::articulated::model::coordinates::{integrate, read_vector};
 use crate::articulated::model::joint::Joint;
 
 /// Advances `x = [q, v]` by `h` seconds of free motion.
-pub(in crate::articulated) fn free_motion(model: &Model, working: &mut Working, x: &mut [f64], h: f64) {
+pub(in crate::articulated) fn free_motion(model: &Model, cache: &mut BodyCache, x: &mut [f64], h: f64) {
     let n = model.positions();
     if h == 0.0 || x[n..].iter().all(|v| *v == 0.0) {
         return;
     }
-    let Working { scratch, elsewhere, zeros, .. } = working;
+    let BodyCache { scratch, elsewhere, zeros, .. } = cache;
     let start = x.to_vec();
     let (mut k, mut stage): (Vec<Vec<f64>>, Vec<f64>) = (Vec::with_capacity(4), start.clone());
     let mut rates: Vec<Vec<f64>> = Vec::with_capacity(4);
@@ -77,7 +77,7 @@ pub(in crate::articulated) fn free_motion(model: &Model, working: &mut Working, 
 ///
 /// Kinetic energy is conserved, by a final scaling to rounding. So is linear momentum, which is the
 /// product of `v` with a parallel field.
-pub(in crate::articulated) fn transport(model: &Model, working: &mut Working, x: &mut [f64], d: &[f64], h: f64) {
+pub(in crate::articulated) fn transport(model: &Model, cache: &mut BodyCache, x: &mut [f64], d: &[f64], h: f64) {
     let n = model.positions();
     let size = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
     let stretch = size(&x[n..]) / size(d);
@@ -85,7 +85,7 @@ pub(in crate::articulated) fn transport(model: &Model, working: &mut Working, x:
         integrate(model, &mut x[..n], d, h);
         return;
     }
-    let Working { scratch, elsewhere, zeros, .. } = working;
+    let BodyCache { scratch, elsewhere, zeros, .. } = cache;
     elsewhere.refresh(&x[..n], &x[n..]);
     let before = energy_of(elsewhere, scratch, &x[n..]);
     let mut rate = |q: &[f64], v: &[f64]| {

@@ -68,7 +68,7 @@ impl Pairing {
             dof: self.dof,
         };
         let Pairing { table, states, x, part_states, .. } = &mut next;
-        for (entry, state) in table.placed.iter_mut().zip(states) {
+        for (entry, state) in table.placed.iter().zip(states) {
             let x = &mut x[entry.state_range.x.clone()];
             if let (Some(body), true) = (entry.object.integratable(), state.status.mode != Mode::Static) {
                 let mut v = vec![0.0; entry.state_range.v.len()];
@@ -77,7 +77,7 @@ impl Pairing {
                 body.write_velocity(x, &v);
             }
             let part_states = &mut part_states[entry.state_range.parts.clone()];
-            entry.object.refresh(x, part_states);
+            entry.object.refresh(x, &mut entry.object.new_cache(), part_states);
             if state.status.mode == Mode::Static {
                 part_states.iter_mut().for_each(|s| *s = PartState { pose: s.pose, ..PartState::default() });
             }
@@ -89,6 +89,11 @@ impl Pairing {
         let (mut rows, mut bias, mut targets, mut kinds, mut problem) =
             (Rows::default(), Vec::new(), Vec::new(), Vec::new(), None);
         rows.clear(self.dof);
+        let mut caches: Vec<_> = self.table.placed.iter().map(|placed| placed.object.new_cache()).collect();
+        for (placed, cache) in self.table.placed.iter().zip(&mut caches) {
+            let mut part_states = self.part_states[placed.state_range.parts.clone()].to_vec();
+            placed.object.refresh(&self.x[placed.state_range.x.clone()], cache, &mut part_states);
+        }
         let view = WorldView {
             time: 0.0,
             gravity: Vec3::zeros(),
@@ -104,6 +109,7 @@ impl Pairing {
             kinds: &mut kinds,
             objects: self.table.with(&self.states),
             x: &self.x,
+            caches: &mut caches,
             part_states: &self.part_states,
             problem: &mut problem,
             owner: ObjectId::default(),
@@ -113,7 +119,11 @@ impl Pairing {
         let mut u = vec![0.0; self.dof];
         for entry in self.table.with(&self.states).iter() {
             if let Some(body) = entry.object.integratable() {
-                body.whiten(&self.x[entry.state_range.x.clone()], &mut u[entry.state_range.v.clone()]);
+                body.whiten(
+                    &mut caches[entry.place],
+                    &self.x[entry.state_range.x.clone()],
+                    &mut u[entry.state_range.v.clone()],
+                );
             }
         }
         rows.add_velocity(&u, &mut bias);

@@ -1,0 +1,49 @@
+//! A second state of the objects within a step, with the values derived from it.
+
+use super::contacts::Basis;
+use crate::derived::{Cache, Derived};
+use crate::integrators::context::refresh_all;
+use crate::world::view::{Objects, Table, WorldView};
+use crate::world::{Coordinates, Core};
+
+/// A state of the objects other than the present one, its part states and its caches. Part states keep the accelerations of the
+/// present.
+pub(crate) struct Moment {
+    pub x: Vec<f64>,
+    pub derived: Derived,
+}
+
+impl Moment {
+    /// Returns a moment without numbers for these objects.
+    pub fn new(table: &Table) -> Moment {
+        Moment { x: Vec::new(), derived: Derived { part_states: Vec::new(), caches: table.new_caches() } }
+    }
+
+    /// Writes part states and caches from the state.
+    pub fn refresh(&mut self, objects: Objects) {
+        refresh_all(objects, &self.x, &mut self.derived);
+    }
+
+    /// Returns the view of it that objects are given, at a time, s.
+    pub fn view<'a>(&'a self, core: &'a Core, time: f64) -> WorldView<'a> {
+        WorldView { x: &self.x, part_states: &self.derived.part_states, ..core.view(time) }
+    }
+
+    /// Returns its numbers and its caches.
+    pub fn coordinates<'a>(&'a mut self, core: &'a Core) -> Coordinates<'a> {
+        Coordinates { objects: core.objects(), x: &mut self.x, caches: &mut self.derived.caches }
+    }
+
+    /// Returns its numbers, with caches of another state.
+    pub fn coordinates_by<'a>(&'a mut self, core: &'a Core, caches: &'a mut [Cache]) -> Coordinates<'a> {
+        Coordinates { objects: core.objects(), x: &mut self.x, caches }
+    }
+
+    /// Returns the basis of rows at it, at a time, s.
+    pub fn basis<'a>(&'a mut self, core: &'a Core, time: f64) -> Basis<'a> {
+        let Moment { x, derived: Derived { part_states, caches } } = self;
+        let (x, part_states) = (&x[..], &part_states[..]);
+        let view = WorldView { x, part_states, ..core.view(time) };
+        Basis { owners: &core.owners, found: (x, part_states), acting: None, caches, view }
+    }
+}
