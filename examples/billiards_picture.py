@@ -25,7 +25,7 @@ except tumble.PictureError as error:
     print(f"no picture: {error}")
 
 try:
-    ax = tumble.World.load("billiards").plot_paths(seconds=2.0, along="z")
+    ax = tumble.World.load("billiards").plot_paths(duration=2.0, along="z")
     ax.set_title("the first two seconds")
     ax.figure.savefig(folder / "paths.png", dpi=120)
 except ImportError as error:

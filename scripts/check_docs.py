@@ -224,14 +224,23 @@ def check_sources(name, lines, faults):
         faults.append(f"{name}:{cited[0]}: the page cites the thesis and does not link to references.md#the-thesis")
 
 
+def anchors(page):
+    """The anchors of the headings of a page."""
+    titles = [re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", line.lstrip("#").strip()) for line in without_fences(page.splitlines()) if line.startswith("#")]
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
 def check_links(name, lines, faults):
     for number, line in enumerate(without_fences(lines), 1):
         for target in LINK.findall(line):
-            if re.match(r"[a-z]+:|#", target):
+            if re.match(r"[a-z]+:", target):
                 continue
-            path = (ROOT / name).parent / target.split("#")[0]
+            to, _, anchor = target.partition("#")
+            path = (ROOT / name).parent / to if to else ROOT / name
             if not path.exists():
                 faults.append(f"{name}:{number}: the link {target} leads nowhere")
+            elif anchor and path.suffix == ".md" and anchor not in anchors(path.read_text()):
+                faults.append(f"{name}:{number}: there is no heading for the link {target}")
 
 
 def check_paths(name, lines, known, faults):

@@ -111,3 +111,13 @@ def test_a_page_that_cites_the_thesis_without_a_link_is_found():
     assert [fault.split(":")[1] for fault in faults] == ["2"]
     check_docs.check_sources("docs/some.md", ["[thesis](references.md#the-thesis) §IV.B"], faults)
     assert len(faults) == 1
+
+
+def test_anchors_are_those_of_the_headings():
+    assert check_docs.anchors("# One, `two` & three\n```sh\n# no\n```\n## [A b](c.md)") == {"one-two--three", "a-b"}
+
+
+def test_a_link_to_a_heading_that_does_not_exist_is_found():
+    faults = []
+    check_docs.check_links("docs/x.md", ["[a](references.md#the-thesis) [b](references.md#nowhere)", "[c](nowhere.md)"], faults)
+    assert [fault.split(":")[1] for fault in faults] == ["1", "2"]

@@ -109,13 +109,16 @@ def test_handles_keep_their_world():
 
 def test_a_step_that_fails_leaves_the_world_as_it_was(world):
     world.step(10)
-    before = world.state.copy()
+    saved, before = world.save(), world.state.copy()
     world["ball"].apply_force((1e308, 0, 0))
     world["ball"].apply_force((1e308, 0, 0))
+    applied = world.save()
     with pytest.raises(RuntimeError, match=r"'ball' at t = .* is not finite") as caught:
         world.step()
     assert isinstance(caught.value, tumble.StepError)
     assert (world.state == before).all() and world.time == pytest.approx(10 / 240)
+    assert world.save() == applied, "every byte, the applied forces too"
+    world.restore(saved)
     world.step()
 
 

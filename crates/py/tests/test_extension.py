@@ -234,7 +234,7 @@ def test_what_a_callback_does_wrong_is_told(act, error, said):
 
 def test_what_is_no_force_is_refused():
     world, ball = one_ball()
-    with pytest.raises(TypeError, match="subclass of tumble.Force, and not function"):
+    with pytest.raises(TypeError, match="subclass of tumble.Force, not function"):
         world.add_force("wind", lambda view: None)
     with pytest.raises(TypeError, match="the class Wind itself"):
         world.add_force("wind", Wind)

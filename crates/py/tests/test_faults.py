@@ -60,7 +60,7 @@ def test_a_panic_while_a_world_is_changed_ends_that_world_alone(during):
     with pytest.raises(tumble.InternalError, match="index out of bounds"):
         _panic(world, during)
     for use in (world.step, world.save, world.fork, world.energy, lambda: ball.position, lambda: world.state, lambda: world.remove(ball)):
-        with pytest.raises(tumble.InternalError, match="make it anew, or go on from a fork or a snapshot"):
+        with pytest.raises(tumble.InternalError, match="make a new one, or continue from a fork or a snapshot"):
             use()
     assert view[15] == 1.0  # views stay valid
     fork.step()

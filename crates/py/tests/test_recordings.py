@@ -64,7 +64,7 @@ def test_a_world_made_in_a_program_replays_into_one_like_it(tmp_path):
     world = thrown()
     with tumble.Recorder(tmp_path / "run.mcap") as recorder:
         recorder.run(world, 5)
-    with pytest.raises(ValueError, match="give one of the same bodies"):
+    with pytest.raises(ValueError, match="pass a world with the same bodies"):
         tumble.replay(tmp_path / "run.mcap")
     assert [each.frame for each in tumble.replay(tmp_path / "run.mcap", thrown())] == [0, 1, 2, 3, 4, 5]
     with pytest.raises(tumble.SnapshotError):

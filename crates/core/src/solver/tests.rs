@@ -109,7 +109,7 @@ pub(super) fn free(rows: &Rows, u: &[f64]) -> Vec<f64> {
     c
 }
 
-/// What a solver made of a problem.
+/// The solution of a problem by a solver.
 pub(super) struct Solved {
     pub lambda: Vec<f64>,
     pub du: Vec<f64>,

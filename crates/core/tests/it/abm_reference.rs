@@ -95,7 +95,7 @@ pub fn random_state(model: &Model, seed: u64) -> (Vec<f64>, Vec<f64>) {
     (q, v)
 }
 
-/// Where the links are.
+/// Poses of the links.
 pub fn poses(model: &Model, q: &[f64]) -> Vec<Pose> {
     let mut poses: Vec<Pose> = Vec::new();
     for link in model.links() {

@@ -1,4 +1,4 @@
-//! What acts on joints: limits, drives, friction, springs, recorded motions, couplings, torques;
+//! Forces on joints: limits, drives, friction, springs, recorded motions, couplings, torques;
 //! and joints that cannot move.
 
 use crate::articulated_world::{adaptive, chain, hinged, rod, run, world};

@@ -203,7 +203,7 @@ fn inverse_dynamics_is_the_mass_matrix_times_acceleration_plus_bias() {
     }
 }
 
-/// What wrenches do to the generalized forces is `−Jᵀ` times them.
+/// Wrenches change the generalized forces by `−Jᵀ` times them.
 #[test]
 fn wrenches_act_through_the_transposed_jacobians() {
     for mut case in cases(7) {

@@ -17,7 +17,7 @@ fn period(w: f64, amplitude: f64) -> f64 {
     2.0 * PI / (w * a)
 }
 
-/// Moments at which the first position rises through zero, within so many seconds: on the cubic
+/// Returns the times at which the first position rises through zero, within `seconds`: on the cubic
 /// through both ends of the frame.
 fn rises(world: &mut World, seconds: f64) -> Vec<f64> {
     let id = world.ids()[0];
@@ -120,8 +120,8 @@ fn a_cone_is_swung_at_its_own_pace() {
     assert!((down - want).norm() < 1e-6, "{down:?} {want:?}");
 }
 
-/// Greatest change of energy over so many seconds, as a share of the drop from horizontal to
-/// hanging.
+/// Returns the greatest change of energy within `seconds`, as a fraction of the drop from
+/// horizontal to hanging.
 fn drift(world: &mut World, links: usize, seconds: f64) -> f64 {
     world.add(chain(links, FRAC_PI_2)).unwrap();
     let (start, drop) = (world.energy().total(), G * 0.2 * (links * links) as f64 / 2.0);

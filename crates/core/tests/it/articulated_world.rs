@@ -1,4 +1,4 @@
-//! What tests of articulated bodies in a world share.
+//! Shared parts of the tests of articulated bodies in a world.
 
 use tumble_core::collide::{Mat3, Pose, Shape, Vec3};
 use tumble_core::{

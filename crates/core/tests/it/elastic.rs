@@ -27,8 +27,8 @@ fn shapes() -> [(&'static str, Shape); 5] {
     ]
 }
 
-/// What happened to the kinetic energy, as shares of that at the start: the most and the least of
-/// it, the most that a step added, and passes of the impact phase.
+/// Extremes of the kinetic energy as fractions of that at the start, the most that a step added,
+/// and passes of the impact phase.
 struct Swing {
     most: f64,
     least: f64,

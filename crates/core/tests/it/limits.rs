@@ -191,7 +191,7 @@ fn a_stop_acts_when_it_is_reached_and_not_before() {
     }
 }
 
-/// What a constraint does not tell is not located: the stop then brakes ahead, as it did, and never
+/// A limit without a reported gap is not located in time: it decelerates the joint early and never
 /// lets it through.
 #[test]
 fn a_limit_without_a_reported_gap_decelerates_early() {

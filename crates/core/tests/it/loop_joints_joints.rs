@@ -40,7 +40,7 @@ fn measured(stepper: &str, rate: f64, amplitude: f64) -> f64 {
     (downs[4] - downs[0]) / 4.0
 }
 
-/// Where the cubic with the given values and slopes at 0 and `h` is zero, by bisection.
+/// Returns the zero of the cubic with the given values and slopes at 0 and `h`, by bisection.
 fn zero_of_cubic((a, da): (f64, f64), (b, db): (f64, f64), h: f64) -> f64 {
     let value = |s: f64| {
         let r = 1.0 - s;

@@ -102,7 +102,7 @@ fn the_bunny_comes_to_rest_on_a_plane() {
     }
 }
 
-/// Its base is flat but for a micrometer, and has many vertices: those that carry it must all be
+/// Its base is flat except for a micrometer, and has many vertices: those that carry it must all be
 /// among the few contacts that are kept.
 #[test]
 fn the_fandisk_comes_to_rest_on_a_plane() {

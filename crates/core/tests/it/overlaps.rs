@@ -42,7 +42,7 @@ fn come_apart(label: &str, [a, b]: [&Shape; 2], off: Pose, apart: impl Fn(&Pose,
     }
 }
 
-/// No corner of one unit cube is inside the other by more than a millimeter, nor is its center.
+/// No corner and no center of one unit cube is inside the other by more than a millimeter.
 fn cubes_are_apart(a: &Pose, b: &Pose) -> bool {
     let inside = |from: &Pose, to: &Pose| {
         let steps = |n: i32| 0.1 * f64::from(n) - 0.5;

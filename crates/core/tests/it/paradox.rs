@@ -30,7 +30,7 @@ fn a_squeezed_body_ends_on_a_ray_which_is_reported_and_survived() {
     }
 }
 
-/// Painlevé's rod: pushed into the ground by its own friction. It must neither gain energy nor sink, whatever the solver.
+/// Painlevé's rod: pushed into the ground by its own friction. It must not gain energy and not sink, whatever the solver.
 #[test]
 fn painleves_rod_gains_no_energy_and_does_not_sink() {
     for stepper in STEPPERS {

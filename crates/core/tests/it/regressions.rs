@@ -1,4 +1,4 @@
-//! What once went wrong with contacts and impacts, each with the number that it should have been.
+//! Past faults of contacts and impacts, each with the correct number.
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Shape, Vec3};
@@ -352,7 +352,7 @@ fn a_thrust_within_the_frame_does_not_push_a_ball_through_the_ground() {
 
 #[test]
 fn energy_never_grows_in_impacts_with_friction_whether_or_not_something_is_led_far_away() {
-    // no gravity: kinetic energy is all there is, and neither e = 1 nor μ = 1 gives any.
+    // no gravity: kinetic energy is all there is, and e = 1 and μ = 1 add none.
     for stepper in STEPPERS {
         for led in [false, true] {
             for seed in 0..40 {

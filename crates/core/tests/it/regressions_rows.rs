@@ -1,4 +1,4 @@
-//! What once went wrong with constraint rows, refusals and failed steps.
+//! Past faults of constraint rows, refusals and failed steps.
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Shape, Vec3};

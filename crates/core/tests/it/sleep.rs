@@ -58,8 +58,8 @@ fn a_stack_falls_asleep_and_costs_nothing() {
     }
 }
 
-/// In a world without gravity a ball at rest is asleep at exactly its state: what strikes it cannot
-/// tell, to the last bit.
+/// In a world without gravity a ball at rest is asleep at exactly its state: a strike has the
+/// same result to the last bit.
 #[test]
 fn a_strike_on_sleepers_is_the_same_bits_as_on_the_waking() {
     for stepper in STEPPERS {

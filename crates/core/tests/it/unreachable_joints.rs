@@ -13,7 +13,7 @@ struct Led {
     hand: ObjectId,
     loop_joint: ObjectId,
     links: usize,
-    /// What was last said of it.
+    /// The last report of it.
     reported: Option<UnreachableJoint>,
 }
 

@@ -47,102 +47,113 @@ __all__ = [
 
 @disjoint_base
 class Shape:
-    """A solid that bodies are made of. Made by ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``HalfSpace`` or ``Mesh``."""
+    """A collision shape. The classes ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``HalfSpace`` and
+    ``Mesh`` make one.
+    """
     @property
     def volume(self) -> float:
         """Volume, m³; infinite for a half-space."""
     @property
     def bounding_radius(self) -> float:
-        """Radius of a ball about the shape's origin that holds it, metres; infinite for a half-space."""
+        """Radius of the smallest sphere about the shape's origin that contains it, meters; infinite
+        for a half-space.
+        """
 
 @final
 class Sphere(Shape):
-    """A ball. radius: metres."""
+    """A sphere. radius: meters."""
     def __new__(cls, radius: float) -> Sphere: ...
 
 @final
 class Box(Shape):
-    """A block about its centre. size: full edge lengths along x, y and z, metres; one number is a cube."""
+    """A box about its center. size: full edge lengths along x, y and z, meters; one number is a cube."""
     def __new__(cls, size: ArrayLike) -> Box: ...
 
 @final
 class Capsule(Shape):
-    """A capsule along z about its centre. radius: metres; length: of the straight part, without the caps, metres."""
+    """A capsule along z about its center. radius: meters; length: of the straight part, without the
+    caps, meters.
+    """
     def __new__(cls, radius: float, length: float) -> Capsule: ...
 
 @final
 class Cylinder(Shape):
-    """A cylinder along z about its centre. radius, length: metres."""
+    """A cylinder along z about its center. radius, length: meters."""
     def __new__(cls, radius: float, length: float) -> Cylinder: ...
 
 @final
 class HalfSpace(Shape):
-    """All points x with ``normal · x <= offset``. normal: of any length above 0, points out of the solid; offset: metres along the unit normal.
+    """All points x with ``normal · x <= offset``. normal: of any length above 0, points out of the
+    solid; offset: meters along the unit normal.
 
-    Only static and kinematic bodies can have it. The frame of such a body has its z axis along the normal and its origin on the plane.
+    Only static and kinematic bodies can have it. The frame of such a body has its z axis along the
+    normal and its origin on the plane.
     """
     def __new__(cls, normal: ArrayLike | None = (0.0, 0.0, 1.0), offset: float = 0.0) -> HalfSpace: ...
 
 @final
 class Mesh(Shape):
-    """A closed mesh. A body of it has the frame that its vertices are given in: ``position`` is where their origin is.
+    """A closed mesh. The frame of its body is that of its vertices, so ``position`` is the position of
+    their origin.
 
-    ``Mesh(vertices, faces)``: shapes (n, 3) in metres and (m, 3) of indices from 0, counter-clockwise seen from outside.
-    ``Mesh(path)``: an OBJ, STL or COLLADA file in metres; ``scale`` multiplies its coordinates. An object with ``vertices`` and ``faces``
-    (trimesh) is taken as such. What is open, or encloses nothing, is a ``ValueError`` that names the place.
+    ``Mesh(vertices, faces)``: shapes (n, 3) in meters and (m, 3) of indices from 0,
+    counter-clockwise seen from outside. ``Mesh(path)``: an OBJ, STL or COLLADA file in meters;
+    ``scale`` multiplies its coordinates. Also takes an object with ``vertices`` and ``faces``, such
+    as a trimesh. A mesh that is open or encloses nothing is a ``ValueError`` that names the place.
     """
     def __new__(cls, vertices: Any, faces: ArrayLike | None = None, *, scale: float = 1.0) -> Mesh: ...
     @property
     def center_of_mass(self) -> _Floats:
-        """The center of mass in the frame of the vertices, shape (3,), metres."""
+        """The center of mass in the frame of the vertices, shape (3,), meters."""
     @property
     def vertices(self) -> _Floats:
-        """The vertices after mending, to rounding as they were given, shape (n, 3), metres."""
+        """The vertices after repair, equal to the given ones up to rounding, shape (n, 3), meters."""
     @property
     def faces(self) -> NDArray[np.uint32]:
         """The triangles, shape (m, 3), indices into ``vertices``."""
 
 @final
 class RigidBody:
-    """A rigid body, or static geometry, of a world. Its frame is that of its shape, of a mesh that of its file; all vectors are in world axes.
+    """A rigid body, or static geometry, of a world. Its frame is that of its shape, for a mesh that of
+    its file. All vectors are in world axes.
 
-    A handle: it holds no numbers of its own. After the body was removed every use raises ``RemovedError``.
+    A handle without data of its own. After the body was removed every use raises ``RemovedError``.
     """
     @property
     def name(self) -> str:
-        """Unique in its world."""
+        """Name, unique in its world."""
     @property
     def exists(self) -> bool:
         """Whether its world still has it."""
     @property
     def mass(self) -> float:
-        """Mass, kg. Of static geometry it means nothing."""
+        """Mass, kg. Meaningless for static geometry."""
     @property
     def inertia(self) -> _Floats:
-        """Inertia about the centre of mass, body axes, shape (3, 3), kg·m²."""
+        """Inertia about the center of mass, body axes, shape (3, 3), kg·m²."""
     @property
     def position(self) -> _Floats:
-        """Where the origin of its frame is, shape (3,), metres: the middle of a sphere, box, capsule or cylinder, the origin of a mesh's file. Setting it
-        keeps the velocity.
+        """Position of the origin of its frame, shape (3,), meters: the center of a sphere, box,
+        capsule or cylinder, the origin of a mesh's file. Setting it keeps the velocity.
         """
     @position.setter
     def position(self, value: ArrayLike) -> None: ...
     @property
     def center_of_mass(self) -> _Floats:
-        """The center of mass in the body's frame, shape (3,), metres: zeros but for meshes."""
+        """The center of mass in the body's frame, shape (3,), meters: zero except for meshes."""
     @property
     def world_center_of_mass(self) -> _Floats:
-        """The center of mass in the world, shape (3,), metres."""
+        """The center of mass in the world, shape (3,), meters."""
     @property
     def orientation(self) -> _Floats:
-        """Orientation, body to world, unit quaternion (x, y, z, w), shape (4,). Setting it turns the body about the origin of its frame and keeps
-        the velocity.
+        """Orientation, body to world, unit quaternion (x, y, z, w), shape (4,). Setting it rotates the
+        body about the origin of its frame and keeps the velocity.
         """
     @orientation.setter
     def orientation(self, value: ArrayLike) -> None: ...
     @property
     def velocity(self) -> _Floats:
-        """Velocity of the centre of mass, shape (3,), m/s."""
+        """Velocity of the center of mass, shape (3,), m/s."""
     @velocity.setter
     def velocity(self, value: ArrayLike) -> None: ...
     @property
@@ -152,23 +163,27 @@ class RigidBody:
     def angular_velocity(self, value: ArrayLike) -> None: ...
     @property
     def acceleration(self) -> _Floats:
-        """Acceleration of the centre of mass at the last force evaluation, shape (3,), m/s²."""
+        """Acceleration of the center of mass at the last force evaluation, shape (3,), m/s²."""
     @property
     def mode(self) -> Mode:
-        """``"dynamic"``, ``"kinematic"`` (follows the velocity it is given and pushes others) or ``"static"``."""
+        """``"dynamic"``, ``"kinematic"`` (moves at its prescribed velocity and pushes dynamic bodies)
+        or ``"static"``.
+        """
     @mode.setter
     def mode(self, value: Mode) -> None: ...
     @property
     def enabled(self) -> bool:
-        """Whether it takes part in anything at all; its state stays while it does not."""
+        """Whether it takes part in the simulation. A disabled body keeps its state."""
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     @property
     def asleep(self) -> bool:
-        """Whether it sleeps: left out of the steps until something touches it (``World(sleep_after=…)``). What is done to it wakes it."""
+        """Whether it sleeps: the steps leave it out until something touches it
+        (``World(sleep_after=…)``). Any change wakes it.
+        """
     @property
     def collidable(self) -> bool:
-        """Whether it meets others."""
+        """Whether it collides."""
     @collidable.setter
     def collidable(self, value: bool) -> None: ...
     @property
@@ -183,7 +198,7 @@ class RigidBody:
     def friction(self, value: float) -> None: ...
     @property
     def color(self) -> _Floats:
-        """Colour that it is drawn in, sRGB, shape (3,), each 0 to 1. Setting it takes a pattern off."""
+        """Color, sRGB, shape (3,), each 0 to 1. Setting it removes a pattern."""
     @color.setter
     def color(self, value: ArrayLike) -> None: ...
     @property
@@ -197,15 +212,23 @@ class RigidBody:
     @angular_damping.setter
     def angular_damping(self, value: float) -> None: ...
     def apply_force(self, force: ArrayLike, point: ArrayLike | None = None) -> None:
-        """A force during the next frame alone. force: shape (3,), N, world axes; point: where in the world it acts, metres (default: the centre of mass)."""
+        """Applies a force during the next step only. force: shape (3,), N, world axes; point: where it
+        acts in the world, meters (default: the center of mass).
+        """
     def apply_torque(self, torque: ArrayLike) -> None:
-        """A torque during the next frame alone. torque: shape (3,), N·m, world axes."""
+        """Applies a torque during the next step only. torque: shape (3,), N·m, world axes."""
     def apply_impulse(self, impulse: ArrayLike, point: ArrayLike | None = None) -> None:
-        """An impulse, at once. impulse: shape (3,), N·s, world axes; point: where in the world it acts, metres (default: the centre of mass)."""
+        """Applies an impulse at once. impulse: shape (3,), N·s, world axes; point: where it acts in
+        the world, meters (default: the center of mass).
+        """
     def move_to(self, position: ArrayLike | None = None, orientation: ArrayLike | None = None) -> None:
-        """Gives a kinematic body the velocity that brings its frame to a pose by the end of the next frame. What is not given stays as it is."""
+        """Sets the velocity of a kinematic body such that its frame reaches a pose at the end of the
+        next step. An omitted argument keeps its present value.
+        """
     def to_world(self, point: ArrayLike | None = None) -> _Floats:
-        """Position of a point of the body in the world. point: shape (3,), in the body's frame, metres (default: its origin)."""
+        """Returns the position of a point of the body in the world. point: shape (3,), in the body's
+        frame, meters (default: its origin).
+        """
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
 
@@ -213,12 +236,16 @@ class RigidBody:
 class Articulation:
     """A tree of links: a robot, a chain, a skeleton.
 
-    ``Articulation.from_urdf`` gives a description, whose dynamics can be asked at once; ``World.add_articulation`` puts it into a world and gives a handle
-    of the one there. ``q`` has ``nq`` numbers: one per hinge (rad) or slider (m), a quaternion (x, y, z, w) per ball joint, position and quaternion of
-    a floating root. ``qd`` and ``tau`` have ``dof``: rad/s or m/s and N·m or N; of a floating root angular, then linear, world axes.
+    ``Articulation.from_urdf`` returns a description, whose dynamics functions work at once.
+    ``World.add_articulation`` adds it to a world and returns a handle of the body there. ``q`` has
+    ``nq`` numbers: one per revolute joint (rad) or prismatic joint (m), a quaternion (x, y, z, w)
+    per spherical joint, position and quaternion of a floating root. ``qd`` and ``tau`` have ``dof``
+    numbers: rad/s or m/s and N·m or N; those of a floating root are angular, then linear, world
+    axes.
 
-    All functions of ``q``, ``qd``, ``tau`` take one state or a batch of states, a leading axis: what has none stands for all of the batch. They know the
-    tree alone: no limits, damping, drives or contacts.
+    All functions of ``q``, ``qd``, ``tau`` take one state or a batch of states with a leading axis.
+    An argument without that axis applies to the whole batch. These functions ignore limits,
+    damping, drives and contacts.
     """
     @staticmethod
     def from_urdf(
@@ -229,35 +256,37 @@ class Articulation:
         missing_meshes: MissingMeshes = "error",
         collision_meshes: CollisionMeshes = "exact",
     ) -> Articulation:
-        """Reads a URDF: its tree at once, its collision shapes when it is added to a world, the meshes of its visuals when somebody draws them.
+        """Reads a URDF. The tree is read at once, collision shapes when it is added to a world, and
+        visual meshes when they are first drawn.
 
-        floating: whether the root floats, else it is fixed to the base; packages: folders by name, for ``package://NAME/…``; missing_meshes:
-        ``"error"`` or ``"skip"``, for collision meshes that are not there; collision_meshes: ``"exact"`` or ``"hull"``.
+        floating: whether the root floats; otherwise it is fixed to the base. packages: folders by
+        name, for ``package://NAME/…``. missing_meshes: ``"error"`` or ``"skip"``, for missing
+        collision meshes. collision_meshes: ``"exact"`` or ``"hull"``.
         """
     @property
     def name(self) -> str:
-        """The robot's name in its file, or the body's in its world."""
+        """Name of the robot in its file, or of the body in its world."""
     @property
     def placed_in_world(self) -> bool:
         """Whether it is in a world."""
     @property
     def exists(self) -> bool:
-        """Whether its world still has it; a description always exists."""
+        """Whether its world still has it; True for a description."""
     @property
     def joint_names(self) -> list[str]:
-        """Names of the moving joints, in the order of the coordinates."""
+        """Names of all joints that are not fixed, in the order of the coordinates."""
     @property
     def link_names(self) -> list[str]:
-        """Names of all links, the fixed ones too, in the order of ``link_poses``."""
+        """Names of all links, including fixed ones, in the order of ``link_poses``."""
     @property
     def dof(self) -> int:
-        """Length of ``qd`` and ``tau``: degrees of freedom."""
+        """Number of degrees of freedom: the length of ``qd`` and ``tau``."""
     @property
     def nq(self) -> int:
         """Length of ``q``."""
     @property
     def mass(self) -> float:
-        """Mass of all that moves, kg."""
+        """Mass of all links that can move, kg."""
     @property
     def q(self) -> _Floats:
         """Positions, shape (nq,), rad and m."""
@@ -270,45 +299,57 @@ class Articulation:
     def qd(self, value: ArrayLike) -> None: ...
     @property
     def tau(self) -> _Floats:
-        """Generalized forces, shape (dof,), N·m and N: they act in every step until they are set anew, beside drives and damping. ``save`` and forks take
-        them along; ``World.state`` does not hold them.
+        """Generalized forces, shape (dof,), N·m and N. They act in every step until they are changed,
+        in addition to drives and damping. ``save`` and forks include them; ``World.state`` does
+        not.
         """
     @tau.setter
     def tau(self, value: ArrayLike) -> None: ...
     @property
     def gravity(self) -> _Floats:
-        """Gravity that its functions count with, shape (3,), m/s². In a world it is the world's and set there."""
+        """Gravity used by its functions, shape (3,), m/s². In a world it is the world's gravity and
+        can only be set there.
+        """
     @gravity.setter
     def gravity(self, value: ArrayLike) -> None: ...
     @property
     def limits(self) -> _Floats:
-        """Least and greatest position of each freedom, shape (dof, 2), rad or m; infinite where there is no limit."""
+        """Lower and upper position limit of each degree of freedom, shape (dof, 2), rad or m; infinite
+        without a limit.
+        """
     def forward_dynamics(
         self, q: ArrayLike | None = None, qd: ArrayLike | None = None, tau: ArrayLike | None = None
     ) -> _Floats:
-        """Accelerations ``qdd`` that generalized forces ``tau`` cause. q: (nq,), qd, tau: (dof,), each also batched (batch, …); what is not given is
-        what it is now. Returns (dof,) or (batch, dof).
+        """Returns the accelerations ``qdd`` that generalized forces ``tau`` cause, shape (dof,) or
+        (batch, dof).
+
+        q: (nq,), qd, tau: (dof,), each optionally batched (batch, …). Omitted arguments have their
+        current values.
         """
     def inverse_dynamics(
         self, q: ArrayLike | None = None, qd: ArrayLike | None = None, qdd: ArrayLike | None = None
     ) -> _Floats:
-        """Generalized forces that accelerations ``qdd`` take, gravity included. q: (nq,), qd, qdd: (dof,), each also batched. Without ``qdd`` those that
-        hold the motion unaccelerated. Returns (dof,) or (batch, dof).
+        """Returns the generalized forces that accelerations ``qdd`` require, including gravity, shape
+        (dof,) or (batch, dof).
+
+        q: (nq,), qd, qdd: (dof,), each optionally batched. Without ``qdd`` the accelerations are
+        zero.
         """
     def mass_matrix(self, q: ArrayLike | None = None) -> _Floats:
-        """The mass matrix, shape (dof, dof) or (batch, dof, dof), symmetric."""
+        """Returns the mass matrix, symmetric, shape (dof, dof) or (batch, dof, dof)."""
     def jacobian(self, link: str, q: ArrayLike | None = None) -> _Floats:
-        """What velocities do to a link: shape (6, dof) or (batch, 6, dof). ``J @ qd`` is the angular velocity (first three rows) and the velocity of the
-        origin of the link's frame (last three), world axes.
+        """Returns the Jacobian of a link, shape (6, dof) or (batch, 6, dof). ``J @ qd`` is the angular
+        velocity (first three rows) and the velocity of the origin of the link's frame (last three),
+        world axes.
         """
     def link_poses(self, q: ArrayLike | None = None) -> _Floats:
-        """Poses of all links in the world: shape (links, 7) or (batch, links, 7), in the order of ``link_names``: position, m, and quaternion
-        (x, y, z, w).
+        """Returns the poses of all links in the world, in the order of ``link_names``: position, m,
+        and quaternion (x, y, z, w). Shape (links, 7) or (batch, links, 7).
         """
     def link_pose(self, link: str, q: ArrayLike | None = None) -> _Floats:
-        """The pose of one link in the world: shape (7,) or (batch, 7), as in ``link_poses``."""
+        """Returns the pose of one link in the world, shape (7,) or (batch, 7), as in ``link_poses``."""
     def center_of_mass(self, q: ArrayLike | None = None) -> _Floats:
-        """The centre of mass in the world, shape (3,) or (batch, 3), metres."""
+        """Returns the center of mass in the world, shape (3,) or (batch, 3), meters."""
     def set_drive(
         self,
         joint: str,
@@ -319,27 +360,33 @@ class Articulation:
         damping: float = 0.0,
         max_force: float | None = None,
     ) -> None:
-        """Puts a motor on a hinge or slider of one in a world, by the name of its joint.
+        """Sets the drive of a revolute or prismatic joint of a body in a world, by the name of the
+        joint.
 
-        With ``stiffness`` or ``damping`` it drives to position ``target`` (rad or m) and ``velocity``; with neither it holds ``velocity``; with nothing
-        given there is no motor. limit: greatest torque or force, N·m or N; None: none. Part of the body and no state: ``save`` leaves it out.
+        With ``stiffness`` or ``damping`` it drives to position ``target`` (rad or m) and
+        ``velocity``. With neither it holds ``velocity``. Without arguments the drive is removed.
+        max_force: largest torque or force, N·m or N; None: unlimited. The drive is a property of
+        the body and not part of the state, so ``save`` does not include it.
         """
     def apply_force(self, link: str, force: ArrayLike, point: ArrayLike | None = None) -> None:
-        """A force on a link of one in a world, during the next step alone. force: shape (3,), N; point: where in the world it acts, metres (default: the
-        origin of the link's frame). World axes.
+        """Applies a force to a link of a body in a world during the next step only. force: shape (3,),
+        N; point: where it acts, meters (default: the origin of the link's frame). World axes.
         """
     def apply_torque(self, link: str, torque: ArrayLike) -> None:
-        """A torque on a link, during the next step alone. torque: shape (3,), N·m, world axes."""
+        """Applies a torque to a link during the next step only. torque: shape (3,), N·m, world axes."""
     def apply_impulse(self, link: str, impulse: ArrayLike, point: ArrayLike | None = None) -> None:
-        """An impulse on a link, at once. impulse: shape (3,), N·s; point: as in ``apply_force``."""
+        """Applies an impulse to a link at once. impulse: shape (3,), N·s; point: as in
+        ``apply_force``.
+        """
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
 
 @final
 class Bodies:
-    """The bodies of a world in the order in which they were added: a sequence that also takes names, ``world.bodies["ball"]``.
+    """The bodies of a world in the order in which they were added: a sequence that also takes names,
+    ``world.bodies["ball"]``.
 
-    It follows the world. Constraints and forces are no bodies and not in it.
+    It follows the world. Constraints and forces are not bodies.
     """
     def __len__(self) -> int: ...
     @overload
@@ -349,26 +396,26 @@ class Bodies:
     def __contains__(self, key: object, /) -> bool: ...
     def __iter__(self) -> Iterator[Any]: ...
     def names(self) -> list[str]:
-        """Their names, in order."""
+        """Returns the names of all bodies, in order."""
 
 @final
 class StepReport:
-    """What one frame took and how well it went; see ``World.report``."""
+    """Statistics of one step; see ``World.report``."""
     @property
     def substeps(self) -> int:
         """Committed sub-steps."""
     @property
     def tries(self) -> int:
-        """``backtracking``: integrations tried, committed ones included."""
+        """``backtracking``: integrations, including those that were rolled back."""
     @property
     def inner_steps(self) -> int:
-        """``backtracking`` with ``dormand_prince``: inner steps, refused ones included."""
+        """``backtracking`` with ``dormand_prince``: inner steps, including rejected ones."""
     @property
     def floor_hits(self) -> int:
-        """``backtracking``: sub-steps at the floor, where a crossing was accepted and projected out."""
+        """``backtracking``: sub-steps of minimal length, which accept a crossing and project it out."""
     @property
     def contacts(self) -> int:
-        """Contacts at the last sub-step."""
+        """Contacts of the last sub-step."""
     @property
     def impact_passes(self) -> int:
         """Passes of the impact phase."""
@@ -377,7 +424,7 @@ class StepReport:
         """Largest residual of any solve, m/s."""
     @property
     def unconverged(self) -> int:
-        """Solves that did not reach the solver's own aim."""
+        """Solves that did not reach the solver's tolerance."""
     @property
     def rays(self) -> int:
         """Solves that ended on a secondary ray."""
@@ -386,22 +433,26 @@ class StepReport:
         """Iterations of the largest solve."""
     @property
     def asleep(self) -> int:
-        """Objects asleep at its end."""
+        """Objects asleep at the end of the step."""
     @property
     def max_penetration(self) -> float:
-        """Deepest penetration found, metres."""
+        """Deepest penetration found, meters."""
     @property
     def unreachable_joint(self) -> str | None:
-        """Name of the joint that was furthest open where it cannot be closed; None where all could."""
+        """Name of the loop joint with the largest gap among those that cannot be closed; None if all
+        can be.
+        """
     @property
     def unreachable_distance(self) -> float:
-        """How far that joint is open, metres."""
+        """Gap of that joint, meters."""
 
 @final
 class SphereTree:
-    """Nested balls around a closed mesh: every ball holds the balls of its children, and the balls of each level cover the surface.
+    """Nested spheres around a closed mesh. Every sphere contains those of its children, and the
+    spheres of each level cover the surface.
 
-    Made by ``SphereTree.build`` or ``SphereTree.load``. All numbers are in the axes of the mesh as it was given, metres.
+    Made by ``SphereTree.build`` or ``SphereTree.load``. All numbers are in the axes of the given
+    mesh, meters.
     """
     @staticmethod
     def build(
@@ -416,72 +467,89 @@ class SphereTree:
     ) -> SphereTree:
         """Builds a tree around a closed mesh, and checks that it covers the surface and is nested.
 
-        vertices: shape (n, 3), metres, and faces: shape (m, 3), indices from 0, counter-clockwise seen from outside; or the path of an OBJ, STL or
-        COLLADA file; or an object with ``vertices`` and ``faces``, such as a trimesh. method: ``"medial"`` (adaptive medial axis, the tightest),
-        ``"hubbard"``, ``"grid"`` or ``"octree"``; branching: most children of a ball, 2 to 64 (default 8); depth: most levels below the root, 1 to 9
-        (default 3, of the octree 7); max_error: no ball that reaches less than this outside is divided, as a part of the mesh's diagonal, 1e-4 to 1
-        (default 1e-4, of the octree 0.01); cache: keep the tree on disk and take it from there next time.
+        vertices: shape (n, 3), meters, and faces: shape (m, 3), indices from 0, counter-clockwise
+        seen from outside; or the path of an OBJ, STL or COLLADA file; or an object with
+        ``vertices`` and ``faces``, such as a trimesh. method: ``"medial"`` (adaptive medial axis,
+        the tightest), ``"hubbard"``, ``"grid"`` or ``"octree"``. branching: largest number of
+        children of a sphere, 2 to 64 (default 8). depth: largest number of levels below the root, 1
+        to 9 (default 3, for the octree 7). max_error: spheres that reach less than this outside are
+        not divided, as a fraction of the mesh's diagonal, 1e-4 to 1 (default 1e-4, for the octree
+        0.01). cache: whether to keep the tree on disk and read it from there next time.
 
-        A mesh that is open or encloses nothing, and settings out of range, are ``InvalidValueError``. The interpreter is let go meanwhile; Ctrl-C ends the build.
+        A mesh that is open or encloses nothing, and settings out of range, raise
+        ``InvalidValueError``. The interpreter is released meanwhile; Ctrl-C ends the build.
         """
     @staticmethod
     def load(path: _Path) -> SphereTree:
-        """Reads a tree that ``save`` or ``tumble spheretree --output`` wrote. What is no tree is an ``InvalidValueError`` that says what is wrong."""
+        """Reads a tree that ``save`` or ``tumble spheretree --output`` wrote. Any other file raises
+        ``InvalidValueError`` with the reason.
+        """
     def save(self, path: _Path) -> None:
-        """Writes the tree and its figures as JSON: the file of ``tumble spheretree --output``."""
+        """Writes the tree and its metrics as JSON: the file of ``tumble spheretree --output``."""
     def to_json(self) -> str:
-        """The same as a string."""
+        """Returns the JSON text that ``save`` writes."""
     @property
     def name(self) -> str:
         """Name of the mesh: that of its file, or ``"mesh"``."""
     @property
     def method(self) -> TreeMethod:
-        """How it was built."""
+        """The method that built it."""
     @property
     def branching(self) -> int:
-        """Most children of a ball that were allowed."""
+        """Largest allowed number of children of a sphere."""
     @property
     def depth(self) -> int:
-        """Most levels below the root that were allowed."""
+        """Largest allowed number of levels below the root."""
     @property
     def levels(self) -> tuple[SphereLevel, ...]:
-        """The levels, the root's first: each a ``SphereLevel`` of ``centers``, shape (n, 3), and ``radii``, shape (n,), metres. Every level stands for the
-        solid by itself: a leaf above the last level is repeated in the levels below.
+        """The levels, the root's first: each a ``SphereLevel`` of ``centers``, shape (n, 3), and
+        ``radii``, shape (n,), meters. Every level covers the solid by itself: a leaf above the last
+        level is repeated in the levels below.
         """
     @property
     def parents(self) -> tuple[NDArray[np.int64], ...]:
-        """For each level, of each ball the index of its parent in the level above, shape (n,); -1 for the root."""
+        """For each level, the index of each sphere's parent in the level above, shape (n,); -1 for the
+        root.
+        """
     @property
     def outward_error(self) -> float:
-        """How far the balls of the last level reach outside the solid at most, metres: a bound that is proved, not sampled."""
+        """Upper bound of the distance by which the spheres of the last level reach outside the solid,
+        meters. Proved, not sampled.
+        """
     @property
     def quality(self) -> dict[str, NDArray[Any]]:
-        """The figures of the levels, measured by samples: a dict of arrays with a number per level. Lengths are parts of the mesh's diagonal.
+        """The metrics of the levels, measured by samples: a dict of arrays with one number per level.
+        Lengths are fractions of the mesh's diagonal.
 
-        ``level``, ``spheres``; ``coverage``: share of the surface inside the balls; ``protrusion_mean``, ``protrusion_p95``, ``protrusion_max``: how far the
-        balls' surface is outside the solid; ``gap_mean``, ``gap_max``: how far bare surface is from the balls; ``volume_ratio``: volume of the
-        balls over that of the solid; ``nesting_broken``: balls that stick out of their parents.
+        ``level``, ``spheres``; ``coverage``: fraction of the surface inside the spheres;
+        ``protrusion_mean``, ``protrusion_p95``, ``protrusion_max``: distance of the spheres'
+        surface outside the solid; ``gap_mean``, ``gap_max``: distance of uncovered surface from the
+        spheres; ``volume_ratio``: volume of the spheres over that of the solid; ``nesting_broken``:
+        spheres that extend beyond their parents.
         """
     def report(self, verbose: bool = False) -> str:
-        """The figures as the table that ``tumble spheretree`` prints; verbose: with more columns and what the builder's stages did."""
+        """Returns the metrics as the table that ``tumble spheretree`` prints. verbose: with more
+        columns and the work of the builder's stages.
+        """
     def __len__(self) -> int: ...
 
 @final
 class View:
-    """The world as a force or a behavior sees it while it is called: a row for every rigid body and every link, in world axes.
+    """The world as a force or a behavior sees it during a call: a row for every rigid body and every
+    link, in world axes.
 
-    The arrays are copies of that moment and read-only, but ``force`` and ``torque``, which begin at zero and take what the callback adds. After the
-    callback has returned the view raises ``RemovedError``.
+    The arrays are read-only copies, except ``force`` and ``torque``, which start at zero and to
+    which the callback adds. After the callback has returned the view raises ``RemovedError``.
     """
     @property
     def time(self) -> float:
-        """Simulated time of this evaluation, s: within a step it may lie anywhere in it."""
+        """Simulated time of this evaluation, s. Within a step it may be anywhere in it."""
     @property
     def gravity(self) -> _Floats:
         """Gravity, shape (3,), m/s²."""
     @property
     def position(self) -> _Floats:
-        """Positions of the centres of mass, shape (n, 3), m."""
+        """Positions of the centers of mass, shape (n, 3), m."""
     @property
     def orientation(self) -> _Floats:
         """Orientations, body to world, unit quaternions (x, y, z, w), shape (n, 4)."""
@@ -493,76 +561,97 @@ class View:
         """Angular velocities, shape (n, 3), rad/s."""
     @property
     def acceleration(self) -> _Floats:
-        """Accelerations of the same points when forces were last evaluated, shape (n, 3), m/s²."""
+        """Accelerations of the same points at the last force evaluation, shape (n, 3), m/s²."""
     @property
     def angular_acceleration(self) -> _Floats:
         """Angular accelerations at the same time, shape (n, 3), rad/s²."""
     @property
     def mass(self) -> _Floats:
-        """Masses, shape (n,), kg; 0 of static geometry and of bases."""
+        """Masses, shape (n,), kg; 0 for static geometry and for bases."""
     @property
     def moves(self) -> NDArray[np.bool_]:
-        """Whether forces move it: neither static nor kinematic, and enabled. Shape (n,), bool."""
+        """Whether forces move it: dynamic and enabled. Shape (n,), bool."""
     @property
     def names(self) -> list[str]:
-        """Of each row the name of its body."""
+        """Name of the body of each row."""
     @property
     def force(self) -> _Floats:
-        """Forces at the centres of mass, which ``position`` tells, shape (n, 3), N, world axes: add to it."""
+        """Forces at the centers of mass (``position``), shape (n, 3), N, world axes. Callbacks add to
+        it.
+        """
     @force.setter
     def force(self, value: ArrayLike) -> None: ...
     @property
     def torque(self) -> _Floats:
-        """Torques, shape (n, 3), N·m, world axes: add to it."""
+        """Torques, shape (n, 3), N·m, world axes. Callbacks add to it."""
     @torque.setter
     def torque(self, value: ArrayLike) -> None: ...
     def row(self, body: _Body, part: int | str | None = None) -> int:
-        """The row of a rigid body, given by name or as a handle; of an articulated body that of a link, given by name, or the one of its rows with the number
-        ``part``. A link that is fixed to another has the row of that one.
+        """Returns the row of a rigid body, given by name or as a handle. For an articulated body
+        ``part`` is the name of a link or a row number among its rows. A link that is fixed to
+        another has the row of that one.
         """
     def rows(self, body: _Body) -> slice:
-        """The rows of a body as a slice: one of a rigid body; of an articulated body one of each moving link, parents first, and at last one of its base."""
+        """Returns the rows of a body as a slice: one for a rigid body; for an articulated body one for
+        each moving link, parents first, and one for its base at the end.
+        """
     def apply_force(self, row: int, force: ArrayLike, point: ArrayLike) -> None:
-        """Adds a force, shape (3,), N, that acts on a row at a point of the world, shape (3,), m: with the torque ``(point - position) × force``."""
+        """Adds a force, shape (3,), N, on a row at a point of the world, shape (3,), m: with the
+        torque ``(point - position) × force``.
+        """
     def __len__(self) -> int: ...
 
 @final
 class Recorder:
-    """Writes an MCAP file that Foxglove and ``tumble.read`` open: ``with tumble.Recorder("run.mcap") as recorder: recorder.frame(world)``.
+    """Writes an MCAP file that Foxglove and ``tumble.read`` open: ``with tumble.Recorder("run.mcap")
+    as recorder: recorder.frame(world)``.
 
-    The file begins with the first frame. A program that is killed leaves a file that is readable up to the last quarter of a simulated second.
+    The file is created by the first frame. After a crash the file is readable up to the last
+    quarter of a simulated second.
     """
     def __new__(cls, path: _Path) -> Recorder: ...
     def frame(self, world: World) -> None:
-        """Adds the world as it is: what is drawn, all poses, and the state. Frames must come in the order of time, each once."""
+        """Adds the present frame: visuals, poses and state. Frames must be added in the order of time,
+        each once.
+        """
     def run(self, world: World, n: int, *, every: int = 1) -> None:
-        """Steps the world ``n`` times and adds it after every ``every`` steps; before the first step too where nothing is recorded yet."""
+        """Steps the world ``n`` times and adds a frame after every ``every`` steps. If nothing is
+        recorded yet, a frame is also added before the first step.
+        """
     def close(self) -> None:
-        """Ends the file: index and checksums. Later calls do nothing. A recording without a frame leaves no file."""
+        """Writes index and checksums and closes the file. Later calls do nothing. A recording without
+        a frame leaves no file.
+        """
     @property
     def frames(self) -> int:
         """Frames added so far."""
     @property
     def path(self) -> Path:
-        """The file."""
+        """Path of the file."""
     def __enter__(self) -> Recorder: ...
     def __exit__(self, _kind: Any, _error: Any, _trace: Any, /) -> None: ...
 
 def read_recording(path: _Path) -> dict[str, Any]:
-    """All of a recording, as the arguments of `Recording`."""
+    """Returns all of a recording, as the arguments of `Recording`."""
 
 @final
 class World:
-    """A world of bodies that moves in steps of ``dt`` seconds. SI units, radians, z up; quaternions are (x, y, z, w).
+    """A world of bodies that moves in steps of ``dt`` seconds. SI units, radians, z up; quaternions
+    are (x, y, z, w).
 
-    gravity: shape (3,), m/s²; dt: length of a step, s; stepper: ``"time_stepping"`` or ``"backtracking"``; integrator: ``"verlet"``,
-    ``"symplectic_euler"``, ``"explicit_euler"``, ``"rk4"`` or ``"dormand_prince"``; solver: ``"gauss_seidel"``, ``"lcp_pyramid"`` or
-    ``"lcp_sliding"``: the words of scene files, with their defaults. integrator: acts in ``"backtracking"`` (``"time_stepping"`` has its own midpoint rule); substeps: parts of each step; iterations: sweeps of the solver at most;
-    contact_tolerance: metres; integrator_tolerance: of ``dormand_prince``. sleep_after: seconds after which islands that have moved by less than
-    sleep_within (metres) are left out of the steps until something touches them; None: never. combine_restitution, combine_friction: what the
-    coefficients of two bodies make for the pair, ``"min"``, ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``.
+    gravity: shape (3,), m/s². dt: length of a step, s. stepper: ``"time_stepping"`` or
+    ``"backtracking"``. integrator: ``"verlet"``, ``"symplectic_euler"``, ``"explicit_euler"``,
+    ``"rk4"`` or ``"dormand_prince"``; used by ``"backtracking"``, since ``"time_stepping"`` has its
+    own midpoint rule. solver: ``"gauss_seidel"``, ``"lcp_pyramid"`` or ``"lcp_sliding"``. substeps:
+    sub-steps of each step. iterations: largest number of solver sweeps. contact_tolerance: meters.
+    integrator_tolerance: for ``dormand_prince``. sleep_after: seconds after which islands that
+    moved by less than sleep_within (meters) sleep until something touches them; None: never.
+    combine_restitution, combine_friction: rule for the coefficients of a pair, ``"min"``,
+    ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``. Names and defaults are those of
+    scene files.
 
-    One thread at a time: while one steps a world, calls on it from another raise ``BusyError``. The interpreter is let go while a world steps.
+    One thread at a time: while one thread steps a world, calls on it from another raise
+    ``BusyError``. The interpreter is released while a world steps.
     """
     def __new__(
         cls,
@@ -590,26 +679,30 @@ class World:
         integrator: Integrator | None = None,
         solver: Solver | None = None,
     ) -> World:
-        """The world of a scene: the path of a ``scene.toml`` or of its folder, or the name of a shipped scene.
+        """Loads the world of a scene: the path of a ``scene.toml`` or of its folder, or the name of a
+        shipped scene.
 
-        What is given beside it stands instead of what the file says. A file that is not there, or an unknown name, is a ``MissingFileError``
-        (a ``FileNotFoundError``); a file with problems a ``SceneError`` (a ``ValueError``) that tells all of them with line and column.
+        Arguments override the settings of the file. A missing file or an unknown name raises
+        ``MissingFileError`` (a ``FileNotFoundError``); a file with problems raises ``SceneError``
+        (a ``ValueError``), which lists all of them with line and column.
         """
     @staticmethod
     def parse(text: str) -> World:
-        """The world of a scene that is given as the text of its file."""
+        """Builds the world of a scene from the text of its file."""
     @property
     def notes(self) -> list[str]:
-        """What is to be said of the world: a list of sentences.
+        """Notes about the world: a list of sentences.
 
-        Of the files of a scene and of articulations that were added, such as what was mended in a mesh or that a convex hull collides; of visual meshes
-        that could not be read, once something has drawn them; of bodies that overlap at the start, the deepest eight by name. Overlaps are looked for when
-        this is asked before the first step.
+        They are about the files of a scene and of added articulations, such as repairs of a mesh or
+        a convex hull in place of an open mesh; about visual meshes that could not be read, once
+        something has drawn them; and about bodies that overlap at the start, the deepest eight by
+        name. Overlaps are searched for if this is read before the first step.
         """
     def step(self, n: int = 1) -> None:
-        """Advances by ``n`` steps of ``dt``. The interpreter is let go meanwhile; Ctrl-C ends it between two steps.
+        """Advances by ``n`` steps of ``dt``. The interpreter is released meanwhile; Ctrl-C stops
+        between two steps.
 
-        On a ``StepError`` the world is as it was before the step that failed; the steps before that stand.
+        After a ``StepError`` the world is as before the step that failed; earlier steps are kept.
         """
     @property
     def time(self) -> float:
@@ -629,65 +722,86 @@ class World:
     def gravity(self, value: ArrayLike) -> None: ...
     @property
     def combine_restitution(self) -> Combine:
-        """Rule by which the restitution of two bodies in contact combines: ``"min"``, ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``."""
+        """Combination rule for restitution: ``"min"``, ``"max"``, ``"average"``, ``"product"`` or
+        ``"geometric_mean"``.
+        """
     @combine_restitution.setter
     def combine_restitution(self, value: Combine) -> None: ...
     @property
     def combine_friction(self) -> Combine:
-        """The same for friction."""
+        """Combination rule for friction."""
     @combine_friction.setter
     def combine_friction(self, value: Combine) -> None: ...
     def set_pair_material(
         self, a: _Body | str, b: _Body | str, *, restitution: float | None = None, friction: float | None = None
     ) -> None:
-        """Restitution and friction that contacts of two bodies have from the next step on, in place of what the rules make of their materials.
+        """Sets restitution and friction of the contacts of two bodies from the next step on,
+        overriding the combination rules.
 
-        a, b: handles or names in any order; a link of an articulation, with the links that are fixed to it, is ``"ARTICULATION/LINK"``. What is None goes by
-        the rule; with neither given the pair is as any other again. Forks have the same pairs; like materials they are not in ``save``.
+        a, b: handles or names in any order; ``"ARTICULATION/LINK"`` is a link of an articulation
+        with the links fixed to it. None keeps the rule; without both the pair has no constants of
+        its own any more. Forks have the same pairs. ``save`` does not include them, as it does not
+        include materials.
         """
     def pair_material(self, a: _Body | str, b: _Body | str) -> tuple[float, float]:
-        """Restitution and friction that contacts of two bodies have: by the pair's own constants where it has them, else by the rules.
+        """Returns restitution and friction of the contacts of two bodies: the pair's own constants if
+        set, else those of the combination rules.
 
-        a, b: as in ``set_pair_material``. Of an articulation the first shape answers.
+        a, b: as in ``set_pair_material``. An articulation is represented by its first shape.
         """
     @property
     def stepper(self) -> Stepper:
         """Name of the stepper."""
     @property
     def solver(self) -> Solver:
-        """Name of the solver of contacts."""
+        """Name of the contact solver."""
     @property
     def integrator(self) -> Integrator:
         """Name of the integrator."""
     @property
     def bodies(self) -> Bodies:
-        """All bodies, in the order in which they were added; by number or by name."""
+        """All bodies in the order in which they were added, by number or by name."""
     def body(self, name: str) -> RigidBody:
-        """The rigid body, or static geometry, of that name. An articulation, or a name that no body has, is an ``UnknownNameError``."""
+        """Returns the rigid body, or static geometry, of that name. An articulation or an unknown name
+        raises ``UnknownNameError``.
+        """
     def articulation(self, name: str) -> Articulation:
-        """The articulated body of that name. A rigid body, or a name that no body has, is an ``UnknownNameError``."""
+        """Returns the articulated body of that name. A rigid body or an unknown name raises
+        ``UnknownNameError``.
+        """
     def __getitem__(self, name: str, /) -> Any: ...
     @property
     def contacts(self) -> NDArray[np.void]:
         """The contacts of the last step: a structured array with one row each.
 
-        Fields: ``bodies`` (2,) numbers in ``world.bodies``, -1 for what is none; ``parts`` (2,) of articulated bodies the places of the links in their ``link_names``; ``point`` (3,), m; ``normal`` (3,),
-        unit, from the second body to the first; ``depth``, m, negative while apart; ``velocity`` (3,) of the first against the second before the
-        contact was solved, m/s; ``impulse`` (3,) on the first over the last sub-step, N·s; ``force`` (3,), N, without impacts. World axes.
+        Fields: ``bodies`` (2,), indices in ``world.bodies``, -1 for other objects; ``parts`` (2,),
+        for articulated bodies the indices of the links in their ``link_names``; ``point`` (3,), m;
+        ``normal`` (3,), unit, from the second body to the first; ``depth``, m, negative while
+        apart; ``velocity`` (3,) of the first relative to the second before the contact was solved,
+        m/s; ``impulse`` (3,) on the first over the last sub-step, N·s; ``force`` (3,), N, without
+        impacts. World axes.
         """
     def energy(self) -> Energy:
-        """Mechanical energy of everything that moves: ``kinetic``, ``potential`` (zero at the world's origin) and ``total``, J."""
+        """Returns the mechanical energy of everything that moves: ``kinetic``, ``potential`` (zero at
+        the world's origin) and ``total``, J.
+        """
     def momentum(self) -> Momentum:
-        """Momentum of everything that moves: ``linear`` (3,), N·s, and ``angular`` (3,) about the world's origin, N·m·s. World axes."""
+        """Returns the momentum of everything that moves: ``linear`` (3,), N·s, and ``angular`` (3,)
+        about the world's origin, N·m·s. World axes.
+        """
     @property
     def report(self) -> StepReport:
-        """What the last step took and how well it went."""
+        """Statistics of the last step."""
     def save(self) -> bytes:
-        """All that the next step reads, as bytes: for ``restore`` in a world of the same bodies. Shapes, masses, settings and drives are not in it."""
+        """Returns everything that the next step reads as bytes, for ``restore`` in a world of the same
+        bodies. Shapes, masses, settings and drives are not included.
+        """
     def restore(self, snapshot: bytes | bytearray) -> None:
-        """Goes back to what ``save`` gave. Bytes that are none, or of another world, are a ``SnapshotError`` and change nothing."""
+        """Restores the bytes of ``save``. Invalid bytes, or those of another world, raise
+        ``SnapshotError`` and change nothing.
+        """
     def fork(self) -> World:
-        """An independent copy: same state, same future.
+        """Returns an independent copy with the same state and the same future.
 
         Forces and behaviors are copied by their own ``fork``.
         """
@@ -702,20 +816,27 @@ class World:
         every: int = 1,
         threads: int | None = None,
     ) -> _Floats:
-        """The futures of many forks, each under forces of its own, on all cores with the interpreter let go. This world stays as it is.
+        """Runs many forks, each with its own controls, on all cores with the interpreter released.
+        This world does not change.
 
-        controls: shape (forks, steps, n): generalized forces of each step, N·m and N, for all ``articulations`` one after the other (by default all of the
-        world, in order; with none of them n is 0); states: where the forks start, shape (len(state),) or (forks, len(state)), by default where the world
-        is; every: every how many steps the state is kept; threads: at most so many (default: all cores). Returns the states, shape
-        (forks, steps // every, len(state)): the same bits on any number of threads. A fork that fails raises ``StepError`` and says which; Ctrl-C ends all of them between two steps.
+        controls: shape (forks, steps, n): generalized forces of each step, N·m and N, for all
+        ``articulations`` one after the other (by default all of the world, in order; without any, n
+        is 0). states: initial states of the forks, shape (len(state),) or (forks, len(state)), by
+        default the state of the world. every: interval in steps at which the state is kept.
+        threads: largest number of threads (default: all cores). Returns the states, shape (forks,
+        steps // every, len(state)): the same bits on any number of threads. A fork that fails
+        raises ``StepError`` with its number; Ctrl-C stops all of them between two steps.
         """
     @property
     def state(self) -> _Floats:
-        """The flat state, shape (n,): a read-only view of the world's own memory, until bodies are added or removed; then it keeps what it showed last.
+        """The flat state, shape (n,): a read-only view of the world's own memory until bodies are
+        added or removed; then it keeps its last numbers.
 
-        A rigid body has 13 numbers: position of the center of mass (``body.world_center_of_mass``), quaternion (x, y, z, w), linear and angular momentum; an articulated body its ``q`` and ``qd``. Nothing
-        is copied, neither here nor by steps. While a view is held, a step holds the interpreter but for other threads' turns between two frames.
-        Setting it writes every body's numbers.
+        A rigid body has 13 numbers: position of the center of mass (``body.world_center_of_mass``),
+        quaternion (x, y, z, w), linear and angular momentum. An articulated body has its ``q`` and
+        ``qd``. Nothing is copied, neither here nor by steps. While a view exists, a step keeps the
+        interpreter, except for turns of other threads between two frames. Setting it writes every
+        body's numbers.
         """
     @state.setter
     def state(self, value: ArrayLike) -> None: ...
@@ -740,9 +861,11 @@ class World:
     ) -> RigidBody:
         """Adds a body that moves.
 
-        mass: kg, or density: kg/m³, one of the two; position: of the shape's frame, the file's for a mesh, metres; orientation: unit quaternion (x, y, z, w); velocity,
-        m/s, and angular_velocity, rad/s, world axes; restitution: 0 to 1; friction: at least 0; kinematic: follows the velocity it is given.
-        contacts: by its ``"surface"``, or as in the thesis by the ``"spheres"`` of its tree; a pair goes by spheres if either asks for it.
+        mass: kg, or density: kg/m³, one of the two. position: of the shape's frame, for a mesh the
+        file's, meters. orientation: unit quaternion (x, y, z, w). velocity, m/s, and
+        angular_velocity, rad/s: world axes. restitution: 0 to 1. friction: at least 0. kinematic:
+        moves at its prescribed velocity. contacts: contact mode, ``"surface"``, or ``"spheres"``
+        for the spheres of its tree as in the thesis; a pair uses spheres if either body does.
         """
     def add_static(
         self,
@@ -756,28 +879,37 @@ class World:
         collidable: bool = True,
         contacts: Contacts = "surface",
     ) -> RigidBody:
-        """Adds geometry that never moves. position, orientation, restitution, friction, contacts: as in ``add_rigid``."""
+        """Adds geometry that never moves. position, orientation, restitution, friction, contacts: as
+        in ``add_rigid``.
+        """
     def add_articulation(
         self, articulation: Articulation | _Path, base: ArrayLike | None = None, *, name: str | None = None
     ) -> Articulation:
-        """Adds an articulated body, and gives the handle of it.
+        """Adds an articulated body and returns its handle.
 
-        articulation: a description, or the path of a URDF; base: where its base stands: a position (3,), or position and quaternion (7,), metres and
-        (x, y, z, w); name: by default the description's. It starts with the ``q``, ``qd`` and ``tau`` of the description; where a floating root is, is
-        said from the base.
+        articulation: a description, or the path of a URDF. base: pose of its base: a position (3,),
+        or position and quaternion (7,), meters and (x, y, z, w). name: by default the
+        description's. It starts with the ``q``, ``qd`` and ``tau`` of the description; the pose of
+        a floating root is relative to the base.
         """
     def remove(self, body: RigidBody | Articulation | str) -> None:
-        """Removes a body, given as a handle or by name, or a force or behavior by name. Handles of a body raise ``RemovedError`` from then on."""
+        """Removes a body, given as a handle or by name, or a force or behavior by name. Handles of a
+        removed body raise ``RemovedError``.
+        """
     def add_force(self, name: str, force: Force) -> None:
-        """Adds a force of your own: an object of a subclass of ``tumble.Force``. Its name is unique among bodies, forces and behaviors."""
+        """Adds a custom force: an object of a subclass of ``tumble.Force``. Its name must be unique
+        among bodies, forces and behaviors.
+        """
     def add_behavior(self, name: str, behavior: Behavior, bodies: _Body | Iterable[_Body]) -> None:
-        """Adds a behavior of your own, an object of a subclass of ``tumble.Behavior``, to bodies given by name or as handles."""
+        """Adds a custom behavior, an object of a subclass of ``tumble.Behavior``, to bodies given by
+        name or as handles.
+        """
     @property
     def forces(self) -> dict[str, Force]:
-        """Forces of your own by name: a new dict."""
+        """Custom forces by name: a new dict."""
     @property
     def behaviors(self) -> dict[str, Behavior]:
-        """Behaviors of your own by name: a new dict."""
+        """Custom behaviors by name: a new dict."""
     def render(
         self,
         width: int | None = None,
@@ -788,39 +920,46 @@ class World:
         cave: str | None = None,
         overlays: str | None = None,
     ) -> NDArray[np.uint8]:
-        """A picture of the world as it is: sRGB and alpha, shape (height, width, 4), uint8, rows from the top. Needs no window.
+        """Renders the world: sRGB and alpha, shape (height, width, 4), uint8, rows from the top. No
+        window is needed.
 
-        width, height: pixels, 640 x 480 unless told otherwise. From one of: camera, ``tumble.Camera`` or ``(eye, target)`` in metres; facet,
-        ``"cube4:front"``: a facet of a cave, given by path or name, at the size that the cave says; cave: all its facets unfolded into at most
-        width x height; else the scene's camera, or one that shows everything. overlays: words of ``tumble run --debug-draw``, such as
-        ``"contacts,forces"``. Without a graphics adapter ``PictureError``.
+        width, height: pixels, by default 640 x 480. The view is one of: camera, ``tumble.Camera``
+        or ``(eye, target)`` in meters; facet, ``"cube4:front"``: a facet of a cave, given by path
+        or name, at the size in the cave file; cave: all its facets unfolded into at most width x
+        height; else the scene's camera, or one that shows everything. overlays: names of ``tumble
+        run --debug-draw``, such as ``"contacts,forces"``. Without a graphics adapter it raises
+        ``PictureError``.
         """
     def _repr_png_(self) -> bytes | None:
-        """How a notebook shows the world: a PNG, or nothing where there is no graphics adapter."""
+        """Returns a PNG for notebooks, or None without a graphics adapter."""
     def plot_energy(self, duration: float = 5.0, *, ax: Any = None) -> Any:
-        """Steps a fork for ``duration`` seconds and plots its energy over time; the world stays as it is. Needs matplotlib, the extra ``plot``.
+        """Steps a fork for ``duration`` seconds and plots its energy over time. The world does not
+        change. Requires matplotlib, the extra ``plot``.
 
         ax: the axes to plot on, by default new ones. Returns the axes.
         """
     def plot_paths(
         self, duration: float = 5.0, *, bodies: _Body | Iterable[_Body] | None = None, along: Axis = "y", ax: Any = None
     ) -> Any:
-        """Steps a fork for ``duration`` seconds and plots the paths of bodies (default: all that move) as seen along an axis, ``"x"``, ``"y"`` or ``"z"``.
+        """Steps a fork for ``duration`` seconds and plots the paths of bodies (default: all dynamic
+        bodies) as seen along an axis, ``"x"``, ``"y"`` or ``"z"``.
 
-        As ``plot_energy`` otherwise.
+        Otherwise as ``plot_energy``.
         """
 
 def _panic(world: World, while_: str) -> None:
-    """Panics within a call on a world: while it is ``"read"``, ``"changed"`` or ``"stepped"``."""
+    """Panics within a call on a world that is ``"read"``, ``"changed"`` or ``"stepped"``."""
 def _choices() -> dict[str, list[str]]:
-    """Every set of words by the name of its type in ``tumble.typing``, in the library's order."""
+    """Returns the names of every choice by the name of its type in ``tumble.typing``, in the library's
+    order.
+    """
 def _unpickle_articulation(
     file: Path, floating: bool, packages: Mapping[str, Path], words: Sequence[str], numbers: Sequence[Sequence[float]]
 ) -> Articulation:
-    """What a pickled description becomes: its file is read anew."""
+    """Unpickles a description. Its file is read again."""
 def _unpickle_shape(data: bytes) -> Shape:
     """What a pickled shape becomes: an object of its class."""
 def _unpickle_tree(data: bytes) -> SphereTree:
-    """What a pickled sphere tree becomes."""
+    """Unpickles a sphere tree."""
 def _unpickle_world(data: bytes) -> World:
     """What a pickled world becomes; pickle then puts its forces and behaviors back."""

@@ -11,7 +11,7 @@ const KEYS: &[(&str, &str)] = &[
     ("limit_n_m", "max_torque_n_m"),
     ("quality", "detail"),
     ("seconds", "duration_s"),
-    ("sphere_tree_max_error", "sphere_tree_max_error"),
+    ("sphere_tree_error", "sphere_tree_max_error"),
     ("start", "initial_positions"),
     ("turned", "initial_rotation"),
 ];

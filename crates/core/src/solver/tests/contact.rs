@@ -74,7 +74,7 @@ fn a_cone_without_friction_is_a_half_line() {
     }
 }
 
-/// What a pyramid solution is, seen from the cone around it: inside it, and dissipating as much as the square within it must.
+/// A pyramid solution lies inside the cone around the pyramid and dissipates at least as much as the square within it.
 fn check_pyramid(rows: &Rows, solved: &Solved) {
     for block in &rows.blocks {
         let RowSet::Cone { mu } = block.set else { continue };
@@ -129,7 +129,7 @@ fn the_sliding_form_holds_on_random_frictional_contacts() {
     }
 }
 
-/// Welds, stops, motors and contacts in one problem: each row answers its own set.
+/// Fixed joints, stops, motors and contacts in one problem: each row satisfies its own set.
 #[test]
 fn all_kinds_of_rows_are_solved_together() {
     let mut random = Random(16);

@@ -135,7 +135,7 @@ fn dead_rows_get_no_multiplier() {
         let mut rows = crate::constraint::rows::Rows::default();
         rows.clear(2);
         rows.push_block(RowSet::Cone { mu: 0.5 });
-        // Freedoms x and z of 1 kg: normal z, first tangent x, second tangent dead.
+        // Degrees of freedom x and z of 1 kg: normal z, first tangent x, second tangent dead.
         rows.side(0, 2).expect("first side").copy_from_slice(&[0.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
         rows.push_block(RowSet::Cone { mu: 0.5 });
         rows.side(0, 2).expect("first side");

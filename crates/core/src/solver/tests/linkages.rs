@@ -5,7 +5,7 @@ use crate::constraint::rows::{RowSet, Rows};
 use crate::solver::{GaussSeidel, LcpPyramid, MAX_DIRECT_ROWS, SolverSettings, residual};
 use nalgebra::{DMatrix, DVector};
 
-/// What a step is given by default.
+/// The default settings of a step.
 const STEP: SolverSettings = SolverSettings { max_sweeps: 200, max_relaxations: 20_000, tolerance: 1e-9 };
 const GRAVITY: [f64; 6] = [0.0, 0.0, 0.0, 0.0, 0.0, -9.81 / 60.0];
 

@@ -81,7 +81,7 @@ fn springs_side_by_side_share_by_their_stiffness() {
     }
 }
 
-/// A weak spring must not make a weld beside it look redundant.
+/// A weak spring must not make a fixed joint beside it look redundant.
 #[test]
 fn a_weld_holds_beside_a_spring_a_million_million_times_weaker() {
     for solver in solvers() {
@@ -155,7 +155,7 @@ fn the_residual_sees_the_compliance() {
     }
 }
 
-/// What does not respond gets no multiplier, however soft.
+/// A row without response gets no multiplier, however soft.
 #[test]
 fn a_soft_row_without_response_does_nothing() {
     for solver in solvers() {
