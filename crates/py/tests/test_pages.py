@@ -97,7 +97,7 @@ def run_python(block, names):
 
 
 def commands(block):
-    """The commands of a block, without their comments, as they are run here: the command that is built in place of cargo."""
+    """The commands of a block, without their comments, as they are run here: the built command instead of cargo."""
     for line in block.text.replace("\\\n", " ").splitlines():
         line = re.sub(r"(^|\s)#\s.*$", "", line).strip()
         line = re.sub(r"^cargo run --release -- ", "tumble ", line)

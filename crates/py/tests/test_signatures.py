@@ -1,4 +1,4 @@
-"""What `inspect`, editors and type checkers are told: the signatures, the defaults and the docstrings are those of the library."""
+"""The signatures, defaults and docstrings that `inspect`, editors and type checkers read are those of the library."""
 
 import ast
 import importlib.util

@@ -1,14 +1,14 @@
 //! Scene files: TOML text to a typed, checked description of a world.
 //!
-//! A scene is read in one pass that finds all its problems. Each is reported with file, line, column,
-//! the value and the expected value; see [`SceneError`]. The result, a [`SceneFile`], has no unresolved
-//! references and no number that is not finite: meshes and materials are indices, defaults are filled
-//! in, grids are expanded to bodies.
+//! A scene is read in one pass that finds all its problems. Each is reported with file, line,
+//! column, the value and the expected value; see [`SceneError`]. The result, a [`SceneFile`], has
+//! no unresolved references and no number that is not finite: meshes and materials are indices,
+//! defaults are filled in, grids are expanded to bodies.
 //!
 //! # The format
 //!
-//! SI units, radians except in keys that end in `_deg`, z up, right-handed. Quaternions are
-//! `[x, y, z, w]`. Every table and key is optional unless it is marked *required*.
+//! SI units, radians except in keys that end in `_deg`, z up, right-handed. Quaternions are `[x, y,
+//! z, w]`. Every table and key is optional unless it is marked *required*.
 //!
 //! ```toml
 //! description = "A ball on a plane"
@@ -39,11 +39,12 @@
 //! target_m = [0, 0, 0.3]
 //! ```
 //!
-//! `[[articulated]]` is [`ArticulatedSpec`], a tree of links written out or read from a URDF ([`urdf`]),
-//! and `[[loop_joint]]` is [`LoopJointSpec`], which joins parts of any objects. `[meshes.NAME]` is
-//! [`MeshSpec`]; `[[grid]]` repeats a body, see [`BodySpec`] for its keys; `[[light]]`, `[sky]` and
-//! `[ground]` are [`LightSpec`], [`SkySpec`] and [`GroundSpec`]; `[cave]` is [`CavePlace`], and caves have
-//! files of their own ([`cave`]). `scenes/README.md` has a table of all keys.
+//! `[[articulated]]` is [`ArticulatedSpec`], a tree of links written out or read from a URDF
+//! ([`urdf`]), and `[[loop_joint]]` is [`LoopJointSpec`], which joins parts of any objects.
+//! `[meshes.NAME]` is [`MeshSpec`]; `[[grid]]` repeats a body, see [`BodySpec`] for its keys;
+//! `[[light]]`, `[sky]` and `[ground]` are [`LightSpec`], [`SkySpec`] and [`GroundSpec`]; `[cave]`
+//! is [`CavePlace`], and caves have files of their own ([`cave`]). `scenes/README.md` has a table
+//! of all keys.
 //!
 //! ```
 //! let scene = tumble_scene::resolve_scene("stack", &[])?.load()?;

@@ -64,7 +64,7 @@ impl SphereTree {
                 ));
             };
             let quality = py.detach(|| pool::run(|| Ok(self.file.tree.quality(mesh, &QualitySettings::default()))))?;
-            _ = self.quality.set(quality); // whoever came first measured the same
+            _ = self.quality.set(quality); // concurrent callers measure the same values
         }
         Ok(self.quality.get().map_or(&[], Vec::as_slice))
     }

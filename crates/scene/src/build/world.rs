@@ -20,7 +20,8 @@ use crate::parse::pair::{PairSideSpec, PairSpec};
 
 impl SceneFile {
     /// Builds the world at time 0. Also returns notes about its meshes and robots. Sphere trees are
-    /// taken from the cache that the environment names ([`TreeCache::of_environment`](tumble_core::collide::TreeCache::of_environment)) if it has
+    /// taken from the cache that the environment names
+    /// ([`TreeCache::of_environment`](tumble_core::collide::TreeCache::of_environment)) if it has
     /// them.
     ///
     /// # Errors

@@ -17,7 +17,8 @@ pub enum PairSideSpec {
     Articulated(usize),
     /// A link of an articulated body and the links that are fixed to it, by both indices.
     Link(usize, usize),
-    /// All shapes of a material, by its index in [`SceneFile::materials`](crate::SceneFile::materials).
+    /// All shapes of a material, by its index in
+    /// [`SceneFile::materials`](crate::SceneFile::materials).
     Material(usize),
 }
 

@@ -23,7 +23,8 @@ fn the_example_of_every_key_becomes_a_world_that_steps() {
     let crane = body(&world, "crane");
     // jib 1, trolley 1, rope 20·3, wheel 1, lamp 1; the hook is fixed
     assert_eq!((crane.model().links().len(), crane.model().dof()), (24, 64));
-    // jib 40 + 0.4·0.3·0.3·2000, trolley 5, hook 2, wheel 0.3, lamp 0.5, rope 20·1200·π(0.01²·0.04 + 4/3·0.01³)
+    // jib 40 + 0.4·0.3·0.3·2000, trolley 5, hook 2, wheel 0.3, lamp 0.5, rope 20·1200·π(0.01²·0.04
+    // + 4/3·0.01³)
     let rope = 20.0 * 1200.0 * std::f64::consts::PI * (4e-6 + 4.0 / 3.0 * 1e-6);
     assert!((crane.model().mass() - (40.0 + 72.0 + 5.0 + 2.0 + 0.3 + 0.5 + rope)).abs() < 1e-9);
     // base turned by 90° about z, jib by 0.3, trolley 1 m out

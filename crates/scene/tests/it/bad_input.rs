@@ -1,8 +1,10 @@
-//! One golden per kind of bad input: the whole of what is assert_errors, with file, line and column.
+//! One golden per kind of bad input: the whole of what is assert_errors, with file, line and
+//! column.
 
 use tumble_scene::SceneFile;
 
-/// Reads `text` as `s.toml` and compares all reported problems with `expected`, one line per problem.
+/// Reads `text` as `s.toml` and compares all reported problems with `expected`, one line per
+/// problem.
 pub fn assert_errors(text: &str, expected: &[&str]) {
     let error = SceneFile::parse(text, "s.toml").expect_err("the scene is wrong");
     let lines: Vec<String> = error.to_string().lines().map(str::to_owned).collect();

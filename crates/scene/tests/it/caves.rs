@@ -1,4 +1,5 @@
-//! Cave files: what is read, what is refused and where, what is only noted; the shipped ones and the schema.
+//! Cave files: what is read, what is refused and where, what is only noted; the shipped ones and
+//! the schema.
 
 use std::collections::BTreeSet;
 use toml::de::{DeTable, DeValue};
@@ -176,7 +177,8 @@ fn nothing_leaves_the_machine_without_a_key() {
 
 #[test]
 fn gaps_are_what_a_tape_measure_says() {
-    // a second screen to the right, turned by 90 degrees, 3 mm too far back and 4 mm too far right: 5 mm
+    // a second screen to the right, turned by 90 degrees, 3 mm too far back and 4 mm too far right:
+    // 5 mm
     let second = "[[screen]]\nname = \"t\"\nlower_left_m = [1.004, 1.997, 0.5]\nlower_right_m = [1.004, 0, 0.5]\nupper_left_m = [1.004, 1.997, 2.0]\n";
     let cave = Cave::parse(&format!("{SMALL}{second}"), "my.toml").unwrap();
     let found = gaps(&cave.screens);
@@ -195,7 +197,8 @@ fn gaps_are_what_a_tape_measure_says() {
     assert!(wide.contains("1.250 times denser horizontally than vertically; 1000 x 750 would be square"), "{wide}");
 }
 
-/// 2^25 pixels, rows filled up to multiples of 64, and a rim of 48: 16288 + 96 = 16384 = 2^14 leaves 2^11 - 96 rows.
+/// 2^25 pixels, rows filled up to multiples of 64, and a rim of 48: 16288 + 96 = 16384 = 2^14
+/// leaves 2^11 - 96 rows.
 #[test]
 fn the_largest_pictures_are_let_through_and_no_larger_ones() {
     let read = |size: &str, stereo: &str| {
@@ -222,7 +225,8 @@ fn beside(lower_left: [f64; 3], lower_right: [f64; 3], upper_left: [f64; 3]) -> 
 
 #[test]
 fn a_badly_placed_screen_is_reported_as_one_without_a_neighbor() {
-    // turned by 90 degrees, 0.4 m off to the right, and tilted by 8 degrees about the normal of its plane: 1.5 m high, its left edge leans back to y - 1.5 sin 8
+    // turned by 90 degrees, 0.4 m off to the right, and tilted by 8 degrees about the normal of its
+    // plane: 1.5 m high, its left edge leans back to y - 1.5 sin 8
     let (sin, cos) = 8f64.to_radians().sin_cos();
     let cave =
         beside([1.4, 2.0, 0.5], [1.4, 2.0 - 2.0 * cos, 0.5 - 2.0 * sin], [1.4, 2.0 - 1.5 * sin, 0.5 + 1.5 * cos]);
@@ -248,7 +252,8 @@ fn screens_that_cover_a_strip_twice_overlap() {
 
 #[test]
 fn shipped_caves_are_whole_and_found_from_anywhere() {
-    // screens, facets, and pairs of edges that meet: a cube's 12 edges, of which 4 and 6 faces share so many
+    // screens, facets, and pairs of edges that meet: a cube's 12 edges, of which 4 and 6 faces
+    // share so many
     let known = [("wall3", 3, 2), ("cube4", 4, 5), ("cube6", 6, 12), ("cylinder5", 5, 4), ("sphere5", 5, 4)];
     assert_eq!(shipped_caves().iter().map(|c| c.name).collect::<Vec<_>>(), known.map(|k| k.0));
     for (name, screens, edges) in known {
@@ -295,7 +300,8 @@ fn schema() -> serde_json::Value {
     serde_json::from_str(include_str!("../../../../caves/cave.schema.json")).unwrap()
 }
 
-/// What is wrong with a value by the few words of JSON Schema that ours uses; any other word is a mistake of ours.
+/// What is wrong with a value by the few words of JSON Schema that ours uses; any other word is a
+/// mistake of ours.
 fn violations(
     schema: &serde_json::Value,
     root: &serde_json::Value,
@@ -412,7 +418,8 @@ fn shipped_caves_satisfy_the_schema_and_wrong_ones_do_not() {
     }
 }
 
-/// The keys that the parser knows in a table, from what it says of an unknown one: those that are there, and those it names as free.
+/// The keys that the parser knows in a table, from what it says of an unknown one: those that are
+/// there, and those it names as free.
 fn known_keys(text: &str, table: &str) -> BTreeSet<String> {
     let error = Cave::parse(text, "my.toml").expect_err("there is an unknown key");
     let problem = error

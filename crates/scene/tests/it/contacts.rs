@@ -1,11 +1,13 @@
-//! The key `contacts`: the default, who overrides whom, what a wrong word is assert_errors, and that it reaches the world.
+//! The key `contacts`: the default, who overrides whom, what a wrong word is assert_errors, and
+//! that it reaches the world.
 
 use crate::bad_input::assert_errors;
 use tumble_core::World;
 use tumble_core::collide::ContactMode::{self, Spheres, Surface};
 use tumble_scene::SceneFile;
 
-/// A ball of triangles of 0.1 m just above the ground, with the lines given in `[world]` and in its `[[body]]`.
+/// A ball of triangles of 0.1 m just above the ground, with the lines given in `[world]` and in its
+/// `[[body]]`.
 fn ball(world: &str, body: &str) -> String {
     format!(
         "[world]\n{world}\n[meshes.ball]\ntype = \"icosphere\"\nradius_m = 0.1\nsubdivisions = 1\n[[body]]\nname = \"ground\"\nmode = \"static\"\n\
@@ -36,7 +38,8 @@ fn contacts_are_those_of_the_surface_unless_the_world_or_the_body_says_otherwise
     assert_eq!(built(spheres, surface).0.world.contacts, Spheres);
 }
 
-/// A body rests on its surface at its own height, and on its leaf balls, which reach beyond the surface, higher.
+/// A body rests on its surface at its own height, and on its leaf balls, which reach beyond the
+/// surface, higher.
 #[test]
 fn the_word_decides_what_touches() {
     let rests = |lines: &str| {

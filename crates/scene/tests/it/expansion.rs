@@ -195,8 +195,8 @@ fn orientations() {
     // 90 degrees about z, twice as long an axis.
     close(body("rotation = { axis = [0, 0, 2], angle_deg = 90 }").orientation_xyzw, [0.0, 0.0, half, half]);
     close(body("rotation_deg = [90, 0, 0]").orientation_xyzw, [half, 0.0, 0.0, half]);
-    // Roll first, then yaw, about fixed axes: x turned by 90 then z by 90 takes y to z to z, and x to y.
-    // That is the third of a turn about (1, 1, 1): x to y, y to z, z to x.
+    // Roll first, then yaw, about fixed axes: x turned by 90 then z by 90 takes y to z to z, and x
+    // to y. That is the third of a turn about (1, 1, 1): x to y, y to z, z to x.
     close(body("rotation_deg = [90, 0, 90]").orientation_xyzw, [0.5, 0.5, 0.5, 0.5]);
     // A quaternion off by rounding is made a unit one.
     let q = body("orientation_xyzw = [0.0, 0.6004, 0.0, 0.8]").orientation_xyzw;

@@ -1,5 +1,7 @@
-//! Against Pinocchio (the Python package `pin`): other programmers' dynamics of the same trees in the same states. Random trees of all joint kinds,
-//! and robots from the Python package `example-robot-data`. Python is `$TUMBLE_PYTHON`, else `python3`; without the packages the tests say so and pass.
+//! Against Pinocchio (the Python package `pin`): other programmers' dynamics of the same trees in
+//! the same states. Random trees of all joint kinds, and robots from the Python package
+//! `example-robot-data`. Python is `$TUMBLE_PYTHON`, else `python3`; without the packages the tests
+//! say so and pass.
 
 #[path = "../../../core/tests/it/articulated_random.rs"]
 #[allow(dead_code, reason = "shared with the tests of tumble-core")]
@@ -190,7 +192,8 @@ fn python(mode: &str, input: &str) -> Option<String> {
         Ok(child) => child,
         Err(error) => return skip(&format!("{python} does not run: {error}")),
     };
-    // The script reads all of a tree before it answers, but answers to the first states while the last are written: a thread of its own for that.
+    // The script reads all of a tree before it answers, but answers to the first states while the
+    // last are written: a thread of its own for that.
     let (mut pipe, input) = (child.stdin.take()?, input.to_string());
     let writer = std::thread::spawn(move || pipe.write_all(input.as_bytes()).is_ok());
     let output = child.wait_with_output().unwrap();

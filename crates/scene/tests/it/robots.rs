@@ -1,4 +1,5 @@
-//! Robots of the world outside, from the Python package `example-robot-data`, against `urdf-rs`, which shares no code with ours.
+//! Robots of the world outside, from the Python package `example-robot-data`, against `urdf-rs`,
+//! which shares no code with ours.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -6,7 +7,8 @@ use std::process::Command;
 use tumble_core::{Joint, Settings, World};
 use tumble_scene::urdf::{UrdfOptions, load, model};
 
-/// The folder: `TUMBLE_ROBOTS`, else that of the package in the Python that `TUMBLE_PYTHON` names (else `python3`); says so on stderr if there is none.
+/// The folder: `TUMBLE_ROBOTS`, else that of the package in the Python that `TUMBLE_PYTHON` names
+/// (else `python3`); says so on stderr if there is none.
 fn robots() -> Option<PathBuf> {
     let folder = std::env::var_os("TUMBLE_ROBOTS").map(PathBuf::from).or_else(|| {
         let python = std::env::var_os("TUMBLE_PYTHON").unwrap_or_else(|| "python3".into());

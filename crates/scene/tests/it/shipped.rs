@@ -235,7 +235,8 @@ fn check_hook(scene: &SceneFile) {
     assert_eq!((scene.world.stepper, scene.world.contacts), (Stepper::TimeStepping, ContactMode::Surface));
 }
 
-/// Asks each table what it knows, by a key that is near nothing, and looks for the answer in the README.
+/// Asks each table what it knows, by a key that is near nothing, and looks for the answer in the
+/// README.
 #[test]
 fn the_reference_names_every_key() {
     let readme = include_str!("../../../../scenes/README.md");

@@ -1,4 +1,5 @@
-//! Robots of spheres: what is replaced, what stays, and that no point of the collision surface is bare.
+//! Robots of spheres: what is replaced, what stays, and that no point of the collision surface is
+//! bare.
 
 use std::path::PathBuf;
 use tumble_core::Object;
@@ -103,7 +104,8 @@ fn surface(link: &str) -> Vec<Vec3> {
         vertices: mesh.vertices.iter().map(|v| v.component_mul(&by)).collect(),
         ..mesh
     };
-    // fine meshes whose vertices lie on the true cylinder and capsule; points within their triangles lie a little inside
+    // fine meshes whose vertices lie on the true cylinder and capsule; points within their
+    // triangles lie a little inside
     match link {
         "arm" => [
             points(&TriMesh::cuboid(Vec3::new(0.4, 0.2, 0.1)), at([0.1, -0.2, 0.3], [0.3, -0.4, 0.5])),
@@ -185,7 +187,8 @@ fn all_else_of_the_file_stays() {
     let text = folder.spherize(&options(60)).unwrap().text;
     let is_new = |line: &&str| line.trim_start().starts_with("<collision") && line.contains("<sphere");
     let spheres: Vec<&str> = text.lines().filter(is_new).collect();
-    // without the new lines, what stands before and after the replaced elements is there to the letter
+    // without the new lines, what stands before and after the replaced elements is there to the
+    // letter
     for kept in [
         "<!-- a robot of every shape -->",
         "<visual><geometry><box size=\"1 1 1\"/></geometry></visual>",

@@ -11,7 +11,8 @@ fn read(text: &str) -> UrdfModel {
     parse_model(text, "r.urdf", &UrdfOptions::default()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Reads `text` as `r.urdf` and compares all reported problems with `expected`, one line per problem.
+/// Reads `text` as `r.urdf` and compares all reported problems with `expected`, one line per
+/// problem.
 fn assert_errors(text: &str, expected: &[&str]) {
     let error = parse_model(text, "r.urdf", &UrdfOptions::default()).expect_err("the robot is wrong");
     let lines: Vec<String> = error.to_string().lines().map(str::to_owned).collect();

@@ -1,4 +1,5 @@
-//! Visual meshes of robots are pictures: read when they are drawn, whatever they are, and never solids.
+//! Visual meshes of robots are pictures: read when they are drawn, whatever they are, and never
+//! solids.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -133,7 +134,8 @@ fn limits_need_no_mesh() {
     assert_eq!(read.dofs[0].limits, Some([-1.0, 2.0]));
 }
 
-/// Three balls of radius 0.5 m in a row: the first two 0.9 m apart, the third 0.05 m deep in the ground.
+/// Three balls of radius 0.5 m in a row: the first two 0.9 m apart, the third 0.05 m deep in the
+/// ground.
 #[test]
 fn bodies_that_overlap_at_the_start_are_named() {
     let ball = |name: &str, x: f64, z: f64| {
