@@ -47,7 +47,7 @@ pub enum SceneError {
     /// A robot's URDF is invalid.
     #[error(transparent)]
     Urdf(#[from] UrdfError),
-    /// The name is neither a path nor a shipped scene.
+    /// The name is not a path and not a shipped scene.
     #[error("no scene `{name}`: {hint}")]
     Unknown {
         /// The given name.

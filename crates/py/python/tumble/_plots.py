@@ -60,11 +60,11 @@ def _follow(world: World, duration: float, ask: Any) -> tuple[list[float], list[
     return times, rows
 
 
-def _axes(ax: Any, who: str) -> Any:
+def _axes(ax: Any, name: str) -> Any:
     if ax is not None:
         return ax
     try:
         from matplotlib import pyplot
     except ImportError as error:
-        raise ImportError(f"{who} needs the package matplotlib: pip install matplotlib", name="matplotlib") from error
+        raise ImportError(f"{name} needs the package matplotlib: pip install matplotlib", name="matplotlib") from error
     return pyplot.subplots()[1]

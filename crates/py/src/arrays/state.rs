@@ -1,12 +1,12 @@
 //! The state as a numpy array over the world's own memory, without a copy. The only `unsafe` of the
 //! package is here.
 //!
-//! An array refers to the memory that the world steps in ([`World::hold_state_memory`]). Neither making
-//! one nor stepping under it copies anything. When a body is added or removed the world moves to
+//! An array refers to the memory that the world steps in ([`World::hold_state_memory`]). Making
+//! one copies nothing, and stepping under it copies nothing. When a body is added or removed the world moves to
 //! new memory once, and old arrays keep the old memory. Why this is sound:
 //!
 //! - *The memory stays.* The world writes it in place and does not free it while a hold exists;
-//!   each array keeps a [`Memory`] alive, which has one.
+//!   each array owns a [`Memory`], which has one.
 //! - *No write under a reader.* Python reads while it has the interpreter's lock. While an array
 //!   exists, every call that changes the world has that lock too: [`Shared`](crate::world::shared::Shared)
 //!   releases it while stepping only if there is none. If forces or behaviors in Python run during
@@ -27,7 +27,7 @@ use pyo3::types::{PyWeakrefMethods, PyWeakrefReference};
 use std::sync::Arc;
 use tumble::dynamics::{StateMemoryHold, World};
 
-/// Keeps the memory of an array alive.
+/// Holds the memory of an array.
 #[pyclass(frozen, module = "tumble", name = "_Memory")]
 struct Memory {
     _hold: Arc<StateMemoryHold>,
@@ -77,6 +77,6 @@ fn over<'py>(py: Python<'py>, world: &mut World) -> PyResult<Bound<'py, PyAny>> 
 
 /// Returns the reference count of an object.
 pub fn holders<T>(object: &Py<T>, _py: Python<'_>) -> isize {
-    // SAFETY: the pointer is to an object that is alive, and the interpreter is held.
+    // SAFETY: the pointer is to a live object, and the interpreter is held.
     unsafe { pyo3::ffi::Py_REFCNT(object.as_ptr()) }
 }

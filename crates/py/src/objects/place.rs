@@ -9,7 +9,7 @@ use std::sync::Arc;
 use tumble::collide::Pose;
 use tumble::dynamics::{ArticulatedBody, ObjectId, PartState, RigidBody as Rigid, Status, World as Core};
 
-/// Where a handle points: a world, an object of it, and the name it had.
+/// The target of a handle: a world, an object of it, and the name it had.
 #[derive(Clone)]
 pub struct Place {
     /// The world.

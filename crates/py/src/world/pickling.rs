@@ -16,7 +16,7 @@ use tumble::dynamics::archive::{open, seal};
 use tumble::dynamics::{ArchiveError, ArticulatedBody, ObjectId, World as Core};
 use tumble::scene::{CameraSpec, CavePlace, GroundSpec, LightSpec, SceneFile, SkySpec};
 
-/// What a pickled world and a pickled shape begin with. The number is raised with every change of what is in them.
+/// The first bytes of a pickled world and a pickled shape. The number is raised with every change of their content.
 const WORLD: &[u8; 8] = b"tumbleW2";
 const SHAPE: &[u8; 8] = b"tumbleG2";
 
@@ -31,7 +31,7 @@ struct Record {
     overlaps: Vec<String>,
 }
 
-/// What is kept of a scene: its name, and what pictures are taken with.
+/// The stored part of a scene: its name, and the settings of pictures.
 #[derive(Serialize, Deserialize)]
 struct SceneRecord {
     file: String,
@@ -111,14 +111,14 @@ pub fn write_shape(record: &ShapeRecord) -> Result<Vec<u8>> {
     Ok(seal(SHAPE, record)?)
 }
 
-/// What a pickled shape becomes: an object of its class.
+/// Returns the object of its class that a pickled shape becomes.
 #[pyfunction]
 pub fn _unpickle_shape(py: Python<'_>, data: PyBackedBytes) -> Result<Py<PyAny>> {
     let record: ShapeRecord = py.detach(|| caught(|| Ok(open(SHAPE, &data)?)))?;
     Shape::of_record(py, record)
 }
 
-/// What a pickled world becomes; pickle then puts its forces and behaviors back.
+/// Returns the world of a pickle; pickle then restores its forces and behaviors.
 #[pyfunction]
 pub fn _unpickle_world(py: Python<'_>, data: PyBackedBytes) -> Result<crate::world::world::World> {
     let read = py.detach(|| caught(|| self::read(&data)))?;

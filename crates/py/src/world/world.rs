@@ -154,7 +154,7 @@ impl World {
     /// Notes about the world: a list of sentences.
     ///
     /// They are about the files of a scene and of added articulations, such as repairs of a mesh or
-    /// a convex hull in place of an open mesh; about visual meshes that could not be read, once
+    /// a convex hull instead of an open mesh; about visual meshes that could not be read, once
     /// something has drawn them; and about bodies that overlap at the start, the deepest eight by
     /// name. Overlaps are searched for if this is read before the first step.
     #[getter]
@@ -429,7 +429,7 @@ impl World {
     ///
     /// A rigid body has 13 numbers: position of the center of mass (``body.world_center_of_mass``),
     /// quaternion (x, y, z, w), linear and angular momentum. An articulated body has its ``q`` and
-    /// ``qd``. Nothing is copied, neither here nor by steps. While a view exists, a step keeps the
+    /// ``qd``. Nothing is copied, here or by steps. While a view exists, a step keeps the
     /// interpreter, except for turns of other threads between two frames. Setting it writes every
     /// body's numbers.
     #[getter]

@@ -61,7 +61,7 @@ pub(crate) struct ShapeMaker<'m> {
     pub(crate) notes: NoteList,
 }
 
-/// What a world is built for.
+/// The purpose of a world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Purpose {
     /// To be stepped.

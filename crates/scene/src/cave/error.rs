@@ -35,7 +35,7 @@ pub enum CaveError {
         /// Offset of the first invalid byte, from 0.
         byte: usize,
     },
-    /// The name is neither a path nor a shipped cave.
+    /// The name is not a path and not a shipped cave.
     #[error("no cave `{name}`: {hint}")]
     Unknown {
         /// The given name.

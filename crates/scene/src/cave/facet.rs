@@ -33,7 +33,7 @@ pub enum Flip {
     Both,
 }
 
-/// Where the image is shown.
+/// The place where the image is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Output {
     /// A borderless window at a position of the desktop.
@@ -91,7 +91,7 @@ pub struct Facet {
     pub user: usize,
     /// Index of the node that draws it; `None` for the machine that runs the world.
     pub node: Option<usize>,
-    /// Where the image is shown. Default a window at 0, 0.
+    /// The place where the image is shown. Default a window at 0, 0.
     pub output: Output,
     /// Width and height of one eye's image, pixels, at least 1 each. The image with both eyes, and
     /// that with the rim of [`RIM_PX`](super::RIM_PX), must be within

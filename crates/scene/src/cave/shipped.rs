@@ -43,7 +43,7 @@ impl ShippedCave {
     }
 }
 
-/// Where a cave was found.
+/// The place where a cave was found.
 #[derive(Clone, Debug)]
 pub enum CaveSource {
     /// A file.

@@ -65,7 +65,7 @@ impl Shipped {
     }
 }
 
-/// Where a scene was found.
+/// The place where a scene was found.
 #[derive(Clone, Debug)]
 pub enum SceneSource {
     /// A file.

@@ -28,7 +28,7 @@ const MIN_MAGNITUDE: f64 = 1e-300;
 pub(crate) struct Fields<'a> {
     /// Receives the problems.
     pub(crate) log: &'a Log<'a>,
-    /// What the table is in messages: `[world]`, `body "crate"`.
+    /// The table's name in messages: `[world]`, `body "crate"`.
     pub(crate) what: String,
     /// The place of the table.
     pub(crate) span: Range<usize>,

@@ -11,7 +11,7 @@ use crate::parse::profile;
 pub struct MeshSpec {
     /// The NAME of `[meshes.NAME]`.
     pub name: String,
-    /// Where its triangles come from.
+    /// The source of its triangles.
     pub source: MeshSource,
     /// Whether holes, fins and other defects are repaired, with a note. Otherwise they are an
     /// error.

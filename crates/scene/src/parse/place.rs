@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-/// Where the files that a scene names are found.
+/// The place of the files that a scene names.
 pub(crate) struct Place<'a> {
     /// The folder of the scene.
     pub folder: &'a Path,

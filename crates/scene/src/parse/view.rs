@@ -126,7 +126,7 @@ pub struct LightSpec {
     pub casts_shadow: bool,
 }
 
-/// Where a light comes from.
+/// The kind and source of a light.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum LightKind {
     /// Parallel rays, like sunlight.

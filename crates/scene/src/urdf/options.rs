@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use crate::parse::link::Surface;
-/// What happens with collision meshes that do not exist or cannot be read. Visual meshes are never
+/// The treatment of collision meshes that do not exist or cannot be read. Visual meshes are never
 /// an error: missing ones are left out with a note, unreadable ones when they are drawn
 /// ([`visual_notes`](crate::visual_notes)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -46,7 +46,7 @@ pub struct SphereOptions {
     pub error: f64,
     /// How trees are built.
     pub tree: TreeSettings,
-    /// Where trees are cached.
+    /// The cache of trees.
     pub cache: TreeCache,
     /// How the URDF is read.
     pub urdf: UrdfOptions,

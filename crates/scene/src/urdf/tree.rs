@@ -227,7 +227,7 @@ impl<'t> TreeBuilder<'t> {
             let link = &self.links[k];
             if !heavy[k] && link.joint.kind != Joint::Fixed {
                 let message = format!(
-                    "\"{}\" moves link \"{}\", and neither that link nor its descendants have a mass",
+                    "\"{}\" moves link \"{}\", and that link and its descendants have no mass",
                     link.joint.name, link.name
                 );
                 self.log.report(self.spans[k].clone(), message, "expected <inertial> in one of them, or a fixed joint");

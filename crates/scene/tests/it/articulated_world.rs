@@ -67,7 +67,7 @@ fn a_mesh_on_a_link_is_drawn_and_collides_where_its_vertices_stand() {
          joint = \"revolute\"\naxis = [1, 0, 0]\nmass_kg = 1\nshape = { type = \"mesh\", mesh = \"cone\", position_m = [0, 0, 1] }\n",
     );
     let cone = body(&world, "a");
-    // the centre of a cone is a quarter of its height above its base
+    // the center of a cone is a quarter of its height above its base
     assert!((cone.part_pose(2).translation.vector - Vec3::new(0.0, 0.0, 1.1)).norm() < 1e-9);
     assert!((cone.model().links()[0].mass.center - Vec3::new(0.0, 0.0, 1.1)).norm() < 1e-9);
 }

@@ -10,7 +10,7 @@ pub fn assert_errors(text: &str, expected: &[&str]) {
     let lines: Vec<String> = error.to_string().lines().map(str::to_owned).collect();
     assert_eq!(lines, expected, "for:\n{text}");
     let report = error.report(false);
-    assert!(!report.contains('\u{1b}'), "no colour unless asked");
+    assert!(!report.contains('\u{1b}'), "no color unless asked");
     for problem in error.problems() {
         assert!(report.contains(&problem.message) && report.contains(&problem.expected), "{report}");
         assert!(report.contains(&format!("s.toml:{}:{}", problem.line, problem.column)), "{report}");
@@ -493,7 +493,7 @@ error: unknown key `frction` in body \"b\"
 s.toml: 1 error
 ";
     assert_eq!(error.report(false), expected);
-    assert!(error.report(true).contains('\u{1b}'), "colour when asked");
+    assert!(error.report(true).contains('\u{1b}'), "color when asked");
 }
 
 #[test]

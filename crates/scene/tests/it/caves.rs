@@ -42,7 +42,7 @@ fn a_small_cave_has_its_defaults() {
     );
     // 2 m x 1.5 m and 800 x 600: square pixels, one screen: nothing to say
     assert!(cave.notes().is_empty(), "{:?}", cave.notes());
-    // the right eye is 31.5 mm to the right of who faces y
+    // the right eye is 31.5 mm to the right of a user facing y
     let eye = cave.users[0].eye(1.0);
     assert!((eye.x - 0.0315).abs() < 1e-15 && eye.y == 0.0 && eye.z == 1.5);
 }
@@ -238,7 +238,7 @@ fn a_badly_placed_screen_is_reported_as_one_without_a_neighbor() {
             "screen \"s\" has no neighbor along its right edge: the nearest, the left edge of \"t\", is 451 mm and 8.0 degrees off"
         ]
     );
-    // a metre off it is another wall
+    // a meter off it is another wall
     assert!(beside([2.0, 2.0, 0.5], [2.0, 0.0, 0.5], [2.0, 2.0, 2.0]).notes().is_empty());
 }
 
@@ -252,8 +252,8 @@ fn screens_that_cover_a_strip_twice_overlap() {
 
 #[test]
 fn shipped_caves_are_whole_and_found_from_anywhere() {
-    // screens, facets, and pairs of edges that meet: a cube's 12 edges, of which 4 and 6 faces
-    // share so many
+    // screens, facets, and pairs of edges that meet: a cube's 12 edges, and the number of them
+    // that 4 and 6 faces share
     let known = [("wall3", 3, 2), ("cube4", 4, 5), ("cube6", 6, 12), ("cylinder5", 5, 4), ("sphere5", 5, 4)];
     assert_eq!(shipped_caves().iter().map(|c| c.name).collect::<Vec<_>>(), known.map(|k| k.0));
     for (name, screens, edges) in known {
@@ -300,7 +300,7 @@ fn schema() -> serde_json::Value {
     serde_json::from_str(include_str!("../../../../caves/cave.schema.json")).unwrap()
 }
 
-/// What is wrong with a value by the few words of JSON Schema that ours uses; any other word is a
+/// Returns the faults of a value by the few words of JSON Schema that ours uses; any other word is a
 /// mistake of ours.
 fn violations(
     schema: &serde_json::Value,

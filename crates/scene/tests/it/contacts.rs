@@ -1,4 +1,4 @@
-//! The key `contacts`: the default, who overrides whom, what a wrong word is assert_errors, and
+//! The key `contacts`: the default, precedence, what a wrong word is assert_errors, and
 //! that it reaches the world.
 
 use crate::bad_input::assert_errors;
@@ -38,7 +38,7 @@ fn contacts_are_those_of_the_surface_unless_the_world_or_the_body_says_otherwise
     assert_eq!(built(spheres, surface).0.world.contacts, Spheres);
 }
 
-/// A body rests on its surface at its own height, and on its leaf balls, which reach beyond the
+/// A body rests on its surface at its own height, and on its leaf spheres, which reach beyond the
 /// surface, higher.
 #[test]
 fn the_word_decides_what_touches() {

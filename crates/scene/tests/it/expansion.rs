@@ -1,4 +1,4 @@
-//! What a right file comes out as: defaults, materials, orientations and grids.
+//! The result of a valid file: defaults, materials, orientations and grids.
 
 use tumble_scene::{
     BodySpec, Combine, Integrator, LightKind, MassSpec, MeshSource, Mode, Pattern, SceneFile, ShapeSpec, Solver,
@@ -75,7 +75,7 @@ fn combine_rules_by_hand() {
     assert_eq!(rules.map(|rule| rule.of(0.25, 1.0)), [0.25, 1.0, 0.625, 0.25, 0.5]);
 }
 
-/// What contacts of two bodies have in the world of a scene.
+/// Properties of the contacts of two bodies in the world of a scene.
 fn between(scene: &SceneFile, a: &str, b: &str) -> (f64, f64) {
     let (world, _) = scene.build().unwrap();
     let id = |name: &str| (world.find(name).unwrap(), 0);

@@ -1,4 +1,4 @@
-//! What `tumble-scene` promises of scene files.
+//! The promises of `tumble-scene` about scene files.
 
 mod articulated;
 mod articulated_world;

@@ -177,7 +177,7 @@ fn read(links: &[&str]) -> Model {
     builder.build().unwrap()
 }
 
-/// What the script prints; `None`, said aloud, where it cannot run.
+/// Returns the output of the script, or reports that it cannot run and returns `None`.
 fn python(mode: &str, input: &str) -> Option<String> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pinocchio_reference.py");
     let python = std::env::var("TUMBLE_PYTHON").unwrap_or_else(|_| "python3".into());

@@ -3,7 +3,7 @@
 use tumble_collide::RepairSettings;
 use tumble_scene::{SceneFile, read_solid};
 
-/// A box of 1 m × 2 m × 3 m in millimetres, whose top (the last line) is missing.
+/// A box of 1 m × 2 m × 3 m in millimeters, whose top (the last line) is missing.
 const OPEN: &str = "# an open box\nv 0 0 0\nv 1000 0 0\nv 1000 2000 0\nv 0 2000 0\nv 0 0 3000\nv 1000 0 3000\nv 1000 2000 3000\nv 0 2000 3000\n\
                     f 4 3 2 1\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 

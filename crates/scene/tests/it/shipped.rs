@@ -30,7 +30,7 @@ fn turned([x, y, z, w]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     rows.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
-/// Volume and height of the centre of mass of a turned profile: sums of cone frusta.
+/// Volume and height of the center of mass of a turned profile: sums of cone frusta.
 fn frusta(profile: &[[f64; 2]]) -> (f64, f64) {
     let (mut volume, mut moment) = (0.0, 0.0);
     for pair in profile.windows(2) {
@@ -115,7 +115,7 @@ fn incline_lies_flat_on_the_ramp_and_stops_on_it() {
     let up = turned(ramp.orientation_xyzw, [0.0, 0.0, 1.0]);
     assert!(distance(up, [angle.sin(), 0.0, angle.cos()]) < 1e-15);
     assert_eq!(ramp.orientation_xyzw, block.orientation_xyzw);
-    // Half of each thickness between the centres along the normal: the faces touch.
+    // Half of each thickness between the centers along the normal: the faces touch.
     let between: f64 = (0..3).map(|k| (block.position_m[k] - ramp.position_m[k]) * up[k]).sum();
     assert!((between - 0.1).abs() < 1e-12, "{between}");
     let v = block.velocity_m_per_s;
@@ -200,7 +200,7 @@ fn bowling_is_regulation() {
     let MeshSource::Lathe { profile_m, .. } = &scene.meshes[0].source else { panic!("a lathe") };
     let widest = profile_m.iter().map(|p| p[0]).fold(0.0, f64::max);
     assert!((2.0 * widest - 0.12106).abs() < 1e-5 && profile_m.last().unwrap()[1] == 0.381);
-    // The rules want 3 lb 6 oz to 3 lb 10 oz, and the centre of mass 5 5/8 to 5 15/16 in high.
+    // The rules want 3 lb 6 oz to 3 lb 10 oz, and the center of mass 5 5/8 to 5 15/16 in high.
     let Some(MassSpec::Mass(mass)) = pins[0].mass else { panic!("a mass") };
     assert!((1.531..=1.645).contains(&mass));
     let (volume, height) = frusta(profile_m);

@@ -277,7 +277,7 @@ fn more_spheres_never_reach_further_and_are_never_too_many() {
 
 #[test]
 fn the_shape_that_is_covered_worst_gets_the_next_sphere() {
-    // a thin rod has 1.5 % of the surface, and one sphere about it reaches half a metre outside
+    // a thin rod has 1.5 % of the surface, and one sphere about it reaches half a meter outside
     let folder = Folder::new("rod", &one_link("<box size=\"1 1 0.1\"/>;<cylinder radius=\"0.005\" length=\"1\"/>"));
     for most in [16, 32, 64] {
         let link = folder.spherize(&options(most)).unwrap().links.remove(0);

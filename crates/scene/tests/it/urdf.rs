@@ -84,7 +84,7 @@ fn an_arm_means_what_it_says() {
     let inertia = Mat3::new(0.02, -0.01, 0.0, -0.01, 0.1, 0.0, 0.0, 0.0, 0.1);
     assert!((upper.mass.inertia - inertia).amax() < 1e-16);
     assert_eq!(rod.mass.mass, 0.75, "the tip is folded in");
-    // 0.5·0.25/0.75·0.2² about the common centre
+    // 0.5·0.25/0.75·0.2² about the common center
     assert!((rod.mass.inertia[(0, 0)] - (0.01 + 0.5 * 0.25 / 0.75 * 0.04)).abs() < 1e-16);
     assert_eq!(disc.joint, Joint::Revolute { axis: Vec3::x() });
 }
@@ -255,7 +255,7 @@ fn wrong_numbers() {
     assert_errors(
         &two("continuous", "").replace(BALL, ""),
         &[
-            "r.urdf:4:1: \"j\" moves link \"b\", and neither that link nor its descendants have a mass; expected <inertial> in one of them, or a fixed joint",
+            "r.urdf:4:1: \"j\" moves link \"b\", and that link and its descendants have no mass; expected <inertial> in one of them, or a fixed joint",
         ],
     );
 }
@@ -305,7 +305,7 @@ fn obj(mesh: &TriMesh, without: usize) -> String {
     vertices.chain(faces).collect()
 }
 
-/// A chain of balls 0.1 m apart on a fixed base, with radii that overlap their second neighbours.
+/// A chain of spheres 0.1 m apart on a fixed base, with radii that overlap their second neighbors.
 #[test]
 fn neighbours_and_links_that_overlap_at_the_start_never_meet() {
     let link = |name: &str, radius: f64| {
@@ -335,7 +335,7 @@ fn neighbours_and_links_that_overlap_at_the_start_never_meet() {
     let first = body.model().links().len() + 1;
     let collidable = body.collidable().unwrap();
     let meet = |a: usize, b: usize| collidable.parts_collide(first + a, first + b);
-    // 0.2 m between second neighbours: b reaches 0.12 and d 0.09, the others 0.04
+    // 0.2 m between second neighbors: b reaches 0.12 and d 0.09, the others 0.04
     assert!(!meet(0, 1) && !meet(1, 2) && !meet(2, 3) && !meet(3, 4), "joined, one pair through a stack");
     assert!(!meet(2, 4), "overlap");
     assert!(meet(0, 2) && meet(0, 3) && meet(1, 3) && meet(1, 4));
@@ -369,7 +369,7 @@ fn meshes_are_found_by_package_path_and_uri() {
         assert!((shape.volume() - 8.0 * 6.0).abs() < 1e-9, "scaled by 2 and not inside out, though mirrored");
         assert!(
             (body.part_pose(2).translation.vector - Vec3::new(2.0, 0.0, 0.0)).norm() < 1e-12,
-            "the centre of the scaled box"
+            "the center of the scaled box"
         );
     }
 }

@@ -101,7 +101,7 @@ fn a_link_whose_meshes_are_lost_is_drawn_as_it_collides() {
     for name in ["gone.obj", "pipe.obj"] {
         std::fs::remove_file(folder.0.join(name)).unwrap();
     }
-    // a pipe that nobody writes into keeps whoever opens it waiting for ever
+    // a pipe that nobody writes into blocks its reader forever
     assert!(Command::new("mkfifo").arg(folder.0.join("pipe.obj")).status().unwrap().success());
     let drawn: Vec<Drawn<'_>> = visuals(&body).iter().filter_map(Visual::drawn).collect();
     assert!(matches!(drawn[..], [Drawn::Shape(Shape::Sphere { radius: 0.25 })]), "{drawn:?}");
