@@ -55,10 +55,6 @@ TODO = (
     "crates/net/",
     "crates/tumble/src/cave/",
     "crates/tumble/tests/it/cave_",
-    "docs/caves.md",
-    "docs/netsync.md",
-    "docs/running_a_cave.md",
-    "docs/transports.md",
 )
 
 
