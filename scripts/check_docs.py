@@ -91,9 +91,7 @@ TODO = (
     "crates/core/src/world/core.rs",
     "crates/core/src/world/mirror.rs",
     "crates/core/src/world/mod.rs",
-    "crates/core/src/world/overlaps.rs",
     "crates/core/src/world/pick.rs",
-    "crates/core/src/world/sleep.rs",
     "crates/core/src/world/state_memory.rs",
     "crates/core/src/world/view.rs",
     "crates/core/tests/it/adaptive.rs",
@@ -128,7 +126,6 @@ TODO = (
     "crates/tumble/tests/it/cave_place.rs",
     "crates/tumble/tests/it/cave_recordings.rs",
     "crates/tumble/tests/it/cave_run_ends.rs",
-    "crates/tumble/tests/it/cave_tracker.rs",
     "crates/tumble/tests/it/cave_users.rs",
 )
 

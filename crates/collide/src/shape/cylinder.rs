@@ -14,7 +14,7 @@ pub struct CylinderShape {
     half_length: f64,
     mesh: TriMesh,
     tree: OnceLock<SphereTree>,
-    /// Of a cylinder around prism and leaves, metres.
+    /// Of a cylinder around prism and leaves, meters.
     outer_radius: f64,
     outer_half_length: f64,
 }
@@ -46,12 +46,12 @@ impl CylinderShape {
         Ok(CylinderShape { radius, half_length, mesh, tree: OnceLock::new(), outer_radius, outer_half_length })
     }
 
-    /// Metres.
+    /// Meters.
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// From the centre to a flat face, metres.
+    /// From the center to a flat face, meters.
     pub fn half_length(&self) -> f64 {
         self.half_length
     }

@@ -9,7 +9,7 @@ use crate::{
 };
 use std::sync::OnceLock;
 
-/// A closed mesh about its centre of mass, with its sphere tree.
+/// A closed mesh about its center of mass, with its sphere tree.
 #[derive(Clone, Debug)]
 pub struct MeshShape {
     pub(super) mesh: TriMesh,
@@ -28,7 +28,7 @@ pub struct MeshShape {
     pub(super) center: Vec3,
 }
 
-/// A tree, and the radius of the ball about the origin that holds its leaves, metres.
+/// A tree, and the radius of the ball about the origin that holds its leaves, meters.
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
     tree: SphereTree,
@@ -50,7 +50,7 @@ impl PartialEq for MeshShape {
 }
 
 impl MeshShape {
-    /// Checks and mends `mesh` ([`TriMesh::check_closed`]), moves its centre of mass to the origin and builds the
+    /// Checks and mends `mesh` ([`TriMesh::check_closed`]), moves its center of mass to the origin and builds the
     /// tree.
     ///
     /// # Errors
@@ -135,7 +135,7 @@ impl MeshShape {
         MeshShape::of_bytes(&body).map(Some).ok_or_else(|| entry.refused("it holds no shape"))
     }
 
-    /// The surface; its centre of mass is the origin.
+    /// The surface; its center of mass is the origin.
     pub fn mesh(&self) -> &TriMesh {
         &self.mesh
     }
@@ -175,17 +175,17 @@ impl MeshShape {
         self.unit_mass.mass
     }
 
-    /// The center of mass in the frame that the mesh came in, metres: what was subtracted from its vertices.
+    /// The center of mass in the frame that the mesh came in, meters: what was subtracted from its vertices.
     pub fn center_of_mass(&self) -> Vec3 {
         self.center
     }
 
-    /// Radius of the ball about the origin that holds the surface, metres.
+    /// Radius of the ball about the origin that holds the surface, meters.
     pub fn bounding_radius(&self) -> f64 {
         self.bounding_radius
     }
 
-    /// The box in world axes around the leaves: the turned local box, cut by the ball about the centre.
+    /// The box in world axes around the leaves: the turned local box, cut by the ball about the center.
     pub(crate) fn aabb(&self, pose: &Pose) -> Aabb {
         let Tree { tree, leaf_radius } = self.whole_tree();
         let (bounds, here) = (tree.bounds(), pose.translation.vector);

@@ -9,31 +9,31 @@ pub use cylinder::CylinderShape;
 pub use mesh::MeshShape;
 use std::sync::Arc;
 
-/// A solid in its own frame. Primitives are centred on the origin.
+/// A solid in its own frame. Primitives are centered on the origin.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub enum Shape {
     /// All points with local `z ≤ 0`; the outward normal is local `+z`.
     HalfSpace,
     /// A ball.
     Sphere {
-        /// Metres.
+        /// Meters.
         radius: f64,
     },
     /// A block with its faces across the local axes.
     Box {
-        /// From the centre to the faces, metres.
+        /// From the center to the faces, meters.
         half_extents: Vec3,
     },
     /// All points within `radius` of a segment on the local z axis.
     Capsule {
-        /// Metres.
+        /// Meters.
         radius: f64,
-        /// From the centre to an end of the segment (caps not counted), metres.
+        /// From the center to an end of the segment (caps not counted), meters.
         half_length: f64,
     },
     /// A cylinder along the local z axis; shared, because its tree is large.
     Cylinder(#[serde(with = "crate::archive::shared")] Arc<CylinderShape>),
-    /// A closed mesh about its centre of mass; shared.
+    /// A closed mesh about its center of mass; shared.
     Mesh(#[serde(with = "crate::archive::shared")] Arc<MeshShape>),
 }
 
@@ -43,7 +43,7 @@ impl Shape {
         Shape::HalfSpace
     }
 
-    /// A ball of `radius` metres.
+    /// A ball of `radius` meters.
     ///
     /// # Errors
     /// [`ShapeError::Length`] if the radius is not finite and above 0.
@@ -82,7 +82,7 @@ impl Shape {
         Ok(Shape::Cylinder(Arc::new(CylinderShape::new(radius, length)?)))
     }
 
-    /// A closed mesh (mended where that is harmless, see [`TriMesh::check_closed`]), moved so that its centre of mass
+    /// A closed mesh (mended where that is harmless, see [`TriMesh::check_closed`]), moved so that its center of mass
     /// is the origin; [`Shape::center_of_mass`] is where it was.
     ///
     /// # Errors
@@ -171,7 +171,7 @@ impl Shape {
         }
     }
 
-    /// The center of mass in the frame that the shape was described in, metres: that of its file for a mesh, which is kept about its center of mass;
+    /// The center of mass in the frame that the shape was described in, meters: that of its file for a mesh, which is kept about its center of mass;
     /// the origin for all others.
     pub fn center_of_mass(&self) -> Vec3 {
         match self {
@@ -194,7 +194,7 @@ impl Shape {
         }
     }
 
-    /// Radius of a ball about the local origin that holds the shape, metres; infinite for a half-space.
+    /// Radius of a ball about the local origin that holds the shape, meters; infinite for a half-space.
     pub fn bounding_radius(&self) -> f64 {
         match self {
             Shape::HalfSpace => f64::INFINITY,
@@ -226,7 +226,7 @@ fn half_space_aabb(pose: &Pose) -> Aabb {
     let mut all = Aabb { min: Vec3::repeat(f64::NEG_INFINITY), max: Vec3::repeat(f64::INFINITY) };
     let normal = axis(pose);
     for k in 0..3 {
-        // within rounding of the axis the plane rises less than 1e-12 m per metre; it is taken as level
+        // within rounding of the axis the plane rises less than 1e-12 m per meter; it is taken as level
         if normal[(k + 1) % 3].abs() < 1e-12 && normal[(k + 2) % 3].abs() < 1e-12 {
             let bound = if normal[k] > 0.0 { &mut all.max } else { &mut all.min };
             bound[k] = pose.translation.vector[k];

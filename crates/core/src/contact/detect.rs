@@ -33,7 +33,7 @@ pub(crate) struct ContactConstraint {
     pub a: u32,
     pub b: u32,
     pub contact: Contact,
-    /// From A's contact point to B's, metres: not zero where the bodies meet only later in the step.
+    /// From A's contact point to B's, meters: not zero where the bodies meet only later in the step.
     pub offset: Vec3,
     pub frame: ContactFrame,
     pub friction: f64,
@@ -316,7 +316,7 @@ pub(crate) fn may_collide(a: &Entry, part_a: usize, b: &Entry, part_b: usize, pa
 }
 
 impl ContactConstraint {
-    /// The contact point as B has it, metres.
+    /// The contact point as B has it, meters.
     pub fn point_b(&self) -> Vec3 {
         self.contact.point + self.offset
     }

@@ -1,4 +1,4 @@
-//! Restitution and friction of chosen pairs, in place of what [`Settings`] makes of the materials of two parts.
+//! Restitution and friction of chosen pairs, instead of what [`Settings`] makes of the materials of two parts.
 
 use crate::object::collidable::Material;
 use crate::settings::{Settings, SettingsError};

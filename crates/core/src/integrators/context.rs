@@ -154,7 +154,7 @@ impl IntegrationContext<'_> {
     }
 
     /// Integrates over `h` from time `t`: one step, or as many inner steps of `adaptive` as its tolerance asks for, which it records. Returns how far
-    /// it came, s: `h`, but for a record that is full. Sites and caches are left at the new state.
+    /// it came, s: `h`, except for a record that is full. Sites and caches are left at the new state.
     pub fn integrate(
         &mut self,
         integrator: Integrator,

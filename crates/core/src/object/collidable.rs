@@ -84,7 +84,7 @@ impl Combine {
 /// Where and along what a test impulse acts: a world point and orthonormal axes, normal first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactFrame {
-    /// World point, metres.
+    /// World point, meters.
     pub point: Vec3,
     /// Normal and two tangents, unit, right-handed.
     pub axes: [Vec3; 3],

@@ -1,6 +1,6 @@
 //! The interfaces of the thesis (§IV.A), as traits.
 //!
-//! Objects are open: a new kind of behaviour is a new type in anybody's crate that answers some of these. All that changes with time lives in
+//! Objects are open: a new kind of behavior is a new type in anybody's crate that answers some of these. All that changes with time lives in
 //! the world's flat state `X`; an object is a model that says how to read its slice, so that saving, forking and integrator stages are
 //! copies of a slice.
 
@@ -245,9 +245,9 @@ pub trait Constraint {
 pub struct RowTarget {
     /// What the multiplier may be.
     pub set: RowSet,
-    /// Position error of the row (metres or radians): the equality's drift, or the one-sided row's gap (negative where violated).
+    /// Position error of the row (meters or radians): the equality's drift, or the one-sided row's gap (negative where violated).
     pub error: f64,
-    /// Velocity that the row aims at (0 but for motors), m/s or rad/s.
+    /// Velocity that the row aims at (0 except for motors), m/s or rad/s.
     pub velocity: f64,
     /// The part of the row's acceleration that is there without any force or change of velocity (`J̇·v`); 0 where the row's direction stays.
     pub bias_acceleration: f64,
@@ -301,7 +301,7 @@ pub trait Renderable {
 /// How a surface looks: a shader by name and its properties, as the thesis's shader attributes.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Appearance {
-    /// Base colour, sRGB, each 0 to 1.
+    /// Base color, sRGB, each 0 to 1.
     pub color: [f32; 3],
     /// 0 is a mirror, 1 is chalk.
     pub roughness: f32,
@@ -311,7 +311,7 @@ pub struct Appearance {
     pub shader: String,
     /// Named properties of the shader, in the order given.
     pub properties: Vec<(String, f64)>,
-    /// A picture (PNG) over the base colour; opened by who draws.
+    /// A picture (PNG) over the base color; opened by who draws.
     #[serde(with = "texture")]
     pub texture: Option<Arc<Path>>,
     /// How much of it is drawn.

@@ -61,7 +61,7 @@ impl Default for PartState {
 }
 
 impl PartState {
-    /// Position of the frame's origin, metres.
+    /// Position of the frame's origin, meters.
     pub fn position(&self) -> Vec3 {
         self.pose.translation.vector
     }

@@ -2,12 +2,12 @@
 //!
 //! | numbers | meaning |
 //! |---|---|
-//! | 0–2 | position of the centre of mass `x`, metres |
+//! | 0–2 | position of the center of mass `x`, meters |
 //! | 3–6 | orientation `q` as `x, y, z, w` |
 //! | 7–9 | linear momentum `P`, N·s |
-//! | 10–12 | angular momentum `L` about the centre of mass, world axes, N·m·s |
+//! | 10–12 | angular momentum `L` about the center of mass, world axes, N·m·s |
 //!
-//! Generalized velocity `v = [ω; v]`, world axes at the centre of mass; mass matrix `M = diag(R·I·Rᵀ, m·1)`. Whitening takes
+//! Generalized velocity `v = [ω; v]`, world axes at the center of mass; mass matrix `M = diag(R·I·Rᵀ, m·1)`. Whitening takes
 //! `L = diag(I^½·Rᵀ, √m·1)`, with `I^½` the symmetric root of the body inertia, so that `M = LᵀL`.
 //!
 //! The site is at the center of mass (thesis §III.A.1), with the axes of the body. The body's *frame*, in which users place it, is that of its shape: a mesh
@@ -94,12 +94,12 @@ pub struct RigidBody {
     pub mask: u64,
     /// Pose of its frame at time 0.
     pub initial_pose: Pose,
-    /// Velocity of the centre of mass at time 0, m/s.
+    /// Velocity of the center of mass at time 0, m/s.
     pub initial_velocity: Vec3,
     /// Angular velocity at time 0, rad/s, world axes.
     pub initial_angular_velocity: Vec3,
     fixed: bool,
-    /// The center of mass in the body's frame, metres.
+    /// The center of mass in the body's frame, meters.
     center: Vec3,
     visuals: Vec<Visual>,
     cameras: Vec<CameraMount>,
@@ -226,7 +226,7 @@ impl RigidBody {
         self
     }
 
-    /// Sets what it looks like; by default its shape in grey.
+    /// Sets what it looks like; by default its shape in gray.
     #[must_use]
     pub fn drawn_as(mut self, visuals: Vec<Visual>) -> Self {
         self.visuals = visuals;
@@ -260,12 +260,12 @@ impl RigidBody {
         self.mass
     }
 
-    /// Inertia about the centre of mass in body axes, kg·m².
+    /// Inertia about the center of mass in body axes, kg·m².
     pub fn inertia(&self) -> &Mat3 {
         &self.inertia.tensor
     }
 
-    /// The center of mass in the body's frame, metres: the origin but for meshes.
+    /// The center of mass in the body's frame, meters: the origin except for meshes.
     pub fn center_of_mass(&self) -> Vec3 {
         self.center
     }

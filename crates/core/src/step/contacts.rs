@@ -49,7 +49,7 @@ pub(crate) struct Workspace {
 pub(crate) struct Limit {
     /// Place of the constraint in the order of constraints, and of the row among its one-sided ones.
     pub key: [u32; 2],
-    /// Metres or radians; negative where violated.
+    /// Meters or radians; negative where violated.
     pub gap: f64,
     /// Its target, where the rows made match the gaps told.
     pub target: Option<u32>,

@@ -8,7 +8,7 @@ use crate::contact::detect::ContactConstraint;
 use crate::object::part_state::PartState;
 use crate::settings::Settings;
 
-/// A margin of at least this is not measured, metres.
+/// A margin of at least this is not measured, meters.
 const FAR: f64 = 1e-4;
 /// What touches and is slower than this may drift like what lasts, m/s or rad/s.
 pub(super) const SLOW: f64 = 1e-3;
@@ -18,7 +18,7 @@ pub(super) const SLOW: f64 = 1e-3;
 pub(super) struct Role {
     pub lasts: bool,
     pub touching: bool,
-    /// Depth that does not make the step go back, metres.
+    /// Depth that does not make the step go back, meters.
     pub allowed: f64,
 }
 

@@ -37,7 +37,7 @@ const SWEEPS: u32 = 25;
 const FINEST: f64 = 1e-12;
 /// A round that leaves more of the error than this is the last of its kind.
 const SLOW: f64 = 0.2;
-/// Compliance of rows that are off by a metre, as a share of their response, and the most that is taken. What is redundant but for an error
+/// Compliance of rows that are off by a meter, as a share of their response, and the most that is taken. What is redundant except for an error
 /// responds with the square of it, far less, and is left alone; as the error goes so does the compliance (Levenberg and Marquardt).
 const SOFT: (f64, f64) = (10.0, 0.1);
 /// What a round that made things worse multiplies the compliance by, what one that did not divides it by, and where no more is tried.
@@ -355,7 +355,7 @@ impl Piece {
 struct JointErrors {
     place: Vec<f64>,
     speed: Vec<f64>,
-    /// What counts as closed: metres (or radians) and metres per second.
+    /// What counts as closed: meters (or radians) and meters per second.
     least: (f64, f64),
 }
 

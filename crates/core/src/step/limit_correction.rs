@@ -5,7 +5,7 @@
 //! brought back onto its stop, with the joints where they are:
 //!
 //! ```text
-//! x += M⁻¹Jᵀμ,  K·μ = −gap        v += M⁻¹Jᵀν,  K·ν = −J·v            rows J of the limits that pushed, and of joints with 0 in place of −gap, −J·v
+//! x += M⁻¹Jᵀμ,  K·μ = −gap        v += M⁻¹Jᵀν,  K·ν = −J·v            rows J of the limits that pushed, and of joints with 0 instead of −gap, −J·v
 //! ```
 //!
 //! The projection of `time_stepping` ends after so many sweeps, contacts and limits together; a limit that it leaves passed is put back in the same way,

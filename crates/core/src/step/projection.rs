@@ -6,7 +6,7 @@
 //!
 //! `v̄` is the displacement velocity of the step, less what led bodies and motors are meant to move (0 for a projection in place, with
 //! `h = 1`). What was wrong before is recovered at a bounded speed. Where nothing but joints moves an island, `closing.rs` does it at the end of the step.
-//! Limits that tell their gap at any state (of joints, of rods) are asked for it at the end of the step, in place of `gap + h·J·v̄`: as links swing
+//! Limits that tell their gap at any state (of joints, of rods) are asked for it at the end of the step, instead of `gap + h·J·v̄`: as links swing
 //! about each other a joint does not move by the mean of its two velocities.
 
 use super::contacts::{Workspace, displace, limits};
@@ -25,7 +25,7 @@ pub(crate) enum Displacement<'a> {
 }
 
 /// Corrects positions so that the displacement ends without overlap. `recovery` bounds how much of the error that was there before is undone,
-/// metres; an island that is wrong by no more than `least` metres is left alone.
+/// meters; an island that is wrong by no more than `least` meters is left alone.
 pub(crate) fn project(
     core: &mut Core,
     acting: Option<&mut Moment>,

@@ -1,7 +1,7 @@
 //! When and how bodies that are still apart meet within a step: conservative advancement along free motion.
 //!
 //! A speculative contact freezes the normal of the step's start. A ball that flies past another would be stopped by it, and one that
-//! strikes off centre would bounce along the wrong line. So, where bodies are fast, a contact that closes within the step is followed to where the surfaces meet:
+//! strikes off center would bounce along the wrong line. So, where bodies are fast, a contact that closes within the step is followed to where the surfaces meet:
 //!
 //! ```text
 //! t ← 0;  repeat   t += root of  gap + v_n·τ + ½·a_n·τ² = 0,   then gap and normal anew by the narrow phase at the poses coasted by t

@@ -120,7 +120,7 @@ impl World {
         })
     }
 
-    /// Gives a rigid body a velocity (m/s, of the centre of mass) and angular velocity (rad/s, world axes). A kinematic body follows it.
+    /// Gives a rigid body a velocity (m/s, of the center of mass) and angular velocity (rad/s, world axes). A kinematic body follows it.
     ///
     /// # Errors
     /// [`WorldError`]: the object was removed, is not a rigid body, or a number is not finite.

@@ -74,11 +74,11 @@ pub struct ContactPoint {
     pub b: ObjectId,
     /// Part of `b`.
     pub part_b: usize,
-    /// Contact point, metres.
+    /// Contact point, meters.
     pub point: Vec3,
     /// Unit normal from `b` to `a`.
     pub normal: Vec3,
-    /// Depth of the overlap when it was detected, metres; negative while apart.
+    /// Depth of the overlap when it was detected, meters; negative while apart.
     pub depth: f64,
     /// Relative velocity of `a` against `b` when it was detected, m/s.
     pub velocity: Vec3,

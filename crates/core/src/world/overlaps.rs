@@ -13,7 +13,7 @@ pub struct Overlap {
     pub objects: [ObjectId; 2],
     /// The parts that overlap most.
     pub parts: [usize; 2],
-    /// How far these would have to be moved apart along their contact's normal, metres.
+    /// How far these would have to be moved apart along their contact's normal, meters.
     pub depth: f64,
 }
 
@@ -26,7 +26,7 @@ struct Part<'w> {
 }
 
 impl World {
-    /// The pairs of objects that may meet and reach into each other by more than `depth` metres, in the order in which they were added. Changes nothing, and
+    /// The pairs of objects that may meet and reach into each other by more than `depth` meters, in the order in which they were added. Changes nothing, and
     /// costs a detection of contacts.
     pub fn overlaps(&self, depth: f64) -> Vec<Overlap> {
         let parts = self.overlapping_parts();

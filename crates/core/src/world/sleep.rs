@@ -34,12 +34,12 @@ use tumble_collide::Pose;
 pub struct Sleep {
     /// Simulated seconds that all of an island must have been still, above 0.
     pub after: f64,
-    /// Metres that the furthest point of a body may have moved in that time, above 0.
+    /// Meters that the furthest point of a body may have moved in that time, above 0.
     pub within: f64,
 }
 
 impl Default for Sleep {
-    /// Half a second within a hundredth of a millimetre.
+    /// Half a second within a hundredth of a millimeter.
     fn default() -> Sleep {
         Sleep { after: 0.5, within: 1e-5 }
     }
@@ -102,7 +102,7 @@ fn at_rest(part_states: &[PartState]) -> bool {
     part_states.iter().all(|s| s.velocity.norm_squared() + s.angular_velocity.norm_squared() == 0.0)
 }
 
-/// How far the furthest point of a body of this bounding radius has come at most, metres: the way of its middle, and the chord of its turn.
+/// How far the furthest point of a body of this bounding radius has come at most, meters: the way of its middle, and the chord of its turn.
 fn moved(from: &[f64; 7], to: &[f64; 7], radius: f64) -> f64 {
     let way: f64 = (0..3).map(|i| (to[i] - from[i]).powi(2)).sum::<f64>().sqrt();
     // the chord of the quaternions is half the turn; q and −q are one orientation

@@ -52,7 +52,7 @@ pub fn print(options: &Options, figures: &mut Figures, bytes: u64, counters: &[L
         .filter(|(_, count)| *count > 0)
         .map(|(why, count)| format!("{} {count}", why.name()))
         .collect();
-    // What arrives here was sent there, but for what was lost on its way: the facets' share is the
+    // What arrives here was sent there, except what was lost on its way: the facets' share is the
     // larger by that.
     println!(
         "{:.3} times the bytes of the states, both ways; {} pieces sent again; refused: {}",

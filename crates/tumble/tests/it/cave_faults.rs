@@ -98,7 +98,7 @@ fn without_a_launcher_its_facets_end_and_others_wait_for_a_server_in_vain() {
     place.assert_clean();
 }
 
-/// A second process is refused; one that is started in place of a killed one is let in.
+/// A second process is refused; one that is started instead of a killed one is let in.
 #[test]
 fn a_facet_is_shown_by_one_process() {
     rivals("shared_memory", 3..20);

@@ -69,7 +69,7 @@ fn a_tracker_moves_heads_and_hands_and_what_is_wrong_is_counted() {
         let world = server.facet.world();
         world.part_state(world.find(&format!("user 0 {side} hand")).unwrap(), 0).unwrap().position()
     };
-    // a quarter turn to the left about z, half a metre to the right; both hands beside the ball, in one bundle
+    // a quarter turn to the left about z, half a meter to the right; both hands beside the ball, in one bundle
     let half = std::f32::consts::FRAC_1_SQRT_2;
     let head = floats("/tumble/user/u/head", &[0.5, 0.25, 1.75, 0.0, 0.0, half, half]);
     let left = floats("/tumble/user/u/hand/left", &[-0.25, 1.5, 1.0, 0.0, 0.0, 0.0, 1.0]);
@@ -274,7 +274,7 @@ fn what_users_did_is_done_again_bit_by_bit() {
     assert!(first.len() > 150);
     assert_eq!((&counts["same"], &counts["different"]), (&first.len().into(), &0.into()));
     assert_eq!(counts["inputs"], first.iter().map(|(_, _, inputs)| inputs.len()).sum::<usize>());
-    // also the recordings are the same, but for what came when the first run had ended
+    // also the recordings are the same, except what came when the first run had ended
     let both = first.len() - 1;
     assert!(first[..both] == second[..both] && second.len() == first.len());
     // with another number of bodies it comes out otherwise, which is a failure

@@ -214,7 +214,7 @@ fn a_wand_pulls_what_it_points_at() {
     let (folder, scene, cave) = place("cave-pull");
     let mut server = Server::start(&folder, &scene, &cave, &[]);
     let from = |x: f64| Pose::from_parts(Vec3::new(x, 0.0, 1.0).into(), tumble::collide::Quat::identity());
-    // it points along y at the ball, then goes aside with it by half a metre
+    // it points along y at the ball, then goes aside with it by half a meter
     server.show_until(20, |input| (input.wand, input.buttons) = (Some(from(0.0)), 1));
     server.show_until(300, |input| (input.wand, input.buttons) = (Some(from(0.5)), 1));
     // the point that is held is the one nearest to the user, on the ball's surface; nothing keeps the ball from turning about it

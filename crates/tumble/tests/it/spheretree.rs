@@ -79,10 +79,7 @@ fn a_damaged_file_of_the_cache_is_told_and_built_anew() {
     std::fs::write(&file, &good[..good.len() / 2]).unwrap();
     let out = tumble(&words);
     let (said, messages) = (String::from_utf8_lossy(&out.stdout), String::from_utf8_lossy(&out.stderr));
-    assert!(
-        out.status.success() && said.contains("built in") && messages.contains("is rebuilt"),
-        "{said}{messages}"
-    );
+    assert!(out.status.success() && said.contains("built in") && messages.contains("is rebuilt"), "{said}{messages}");
     assert_eq!(std::fs::read(&file).unwrap(), good);
 }
 

@@ -80,7 +80,7 @@ fn a_replica_is_exact() {
         pair.send();
     }
     assert_eq!(pair.mirror.world().state(), pair.world.state());
-    // and goes on by itself as the server does, but for the contacts' memory: free flight
+    // and goes on by itself as the server does, except the contacts' memory: free flight
     let ball = pair.world.find("ball 4").unwrap();
     pair.world.set_pose(ball, Pose::translation(0.0, 0.0, 50.0)).unwrap();
     pair.send();
