@@ -1,26 +1,27 @@
-//! Shapes as data (serde): what cannot be made anew with the same bits is written, the rest is made anew.
+//! Serialization of shapes (serde): only data that cannot be computed again with the same bits is
+//! written.
 //!
 //! | shape | written |
 //! |---|---|
 //! | primitives | their sizes |
-//! | cylinder | radius and half length; the tree is built anew |
+//! | cylinder | radius and half length; the tree is rebuilt |
 //! | mesh | the bytes of the cache (`shape/stored.rs`), which are checked when they are read |
 
 use crate::{CylinderShape, MeshShape};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Shared values are written as if they were not shared.
+/// Serializes shared values like unshared ones.
 pub mod shared {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
     use std::sync::Arc;
 
-    /// As the value itself.
+    /// Writes the value itself.
     pub fn serialize<T: Serialize, S: Serializer>(value: &Arc<T>, serializer: S) -> Result<S::Ok, S::Error> {
         T::serialize(value, serializer)
     }
 
-    /// The value, shared by nobody yet.
+    /// Reads the value into a new `Arc`.
     pub fn deserialize<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<Arc<T>, D::Error> {
         T::deserialize(deserializer).map(Arc::new)
     }

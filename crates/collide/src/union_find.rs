@@ -1,7 +1,8 @@
 //! Disjoint sets of indices (union-find).
 //!
-//! Source: Tarjan, *Efficiency of a good but not linear set union algorithm* (1975), with path halving. The representative
-//! of a set is its smallest member, so the result does not depend on the order of the unions.
+//! Source: Tarjan, *Efficiency of a good but not linear set union algorithm* (1975), with path
+//! halving. The representative of a set is its smallest member, so the result does not depend on
+//! the order of the unions.
 
 /// Disjoint sets of the indices `0..count`.
 #[derive(Clone, Debug, Default)]
@@ -36,8 +37,8 @@ impl UnionFind {
         self.parent[a.max(b) as usize] = a.min(b);
     }
 
-    /// Numbers the sets from 0 in the order of their smallest members. Returns the number of each index's set and how many
-    /// sets there are.
+    /// Numbers the sets from 0 in the order of their smallest members. Returns the number of each
+    /// index's set and how many sets there are.
     pub fn numbered(&mut self) -> (Vec<u32>, usize) {
         let (mut number, mut count) = (vec![0; self.parent.len()], 0);
         for i in 0..self.parent.len() {

@@ -45,7 +45,8 @@ pub struct MeshDistance {
 }
 
 impl MeshDistance {
-    /// Prepares a closed, outward-wound mesh (see [`TriMesh::check_closed`]) of at least one triangle.
+    /// Prepares a closed, outward-wound mesh (see [`TriMesh::check_closed`]) of at least one
+    /// triangle.
     pub fn new(mesh: &TriMesh) -> MeshDistance {
         MeshDistance::from_boundary(mesh, Boundary::of(mesh))
     }

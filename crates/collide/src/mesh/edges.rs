@@ -35,7 +35,8 @@ pub(crate) fn edge_groups(mesh: &TriMesh) -> EdgeGroups {
     EdgeGroups(half_edges)
 }
 
-/// Groups whose half-edges in the two directions differ in number: the surface is open or wound inconsistently there.
+/// Groups whose half-edges in the two directions differ in number: the surface is open or wound
+/// inconsistently there.
 pub(super) fn unbalanced(groups: &EdgeGroups) -> impl Iterator<Item = &[HalfEdge]> {
     groups.iter().filter(|g| 2 * g.iter().filter(|u| u.forward).count() != g.len())
 }

@@ -1,15 +1,17 @@
-//! Closed meshes by formula, wound outwards. Angles by `libm`, so that every platform gets the same bits.
+//! Generators of closed, outward-wound meshes. Angles use `libm`, so every platform gets the same
+//! bits.
 
 use super::TriMesh;
 use crate::{MeshError, Vec3};
 use nalgebra::ComplexField;
 use std::f64::consts::PI;
 
-/// No generator makes more segments around than this.
+/// Maximum number of segments around an axis.
 const MAX_SEGMENTS: usize = 4096;
 
 impl TriMesh {
-    /// A box about the origin with edges of `size` meters, above 0: 8 vertices, 12 triangles.
+    /// Returns a box about the origin with edges of `size` meters, above 0: 8 vertices, 12
+    /// triangles.
     pub fn cuboid(size: Vec3) -> TriMesh {
         let half_extents = 0.5 * size;
         let vertices = (0..8_u32).map(|n| half_extents.zip_map(&signs(n), |h, s| h * s)).collect();
@@ -17,14 +19,15 @@ impl TriMesh {
         TriMesh { vertices, triangles: quads.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect() }
     }
 
-    /// A sphere by meridians and parallels, poles on z. At least 3 segments and 2 rings.
+    /// Returns a sphere of meridians and parallels, poles on z. At least 3 segments and 2 rings.
     pub fn uv_sphere(radius: f64, segments: usize, rings: usize) -> TriMesh {
         let rings = rings.clamp(2, MAX_SEGMENTS);
         let profile: Vec<_> = (0..=rings).map(|n| on_arc(radius, 0.0, PI * n as f64 / rings as f64)).collect();
         revolve(&profile, segments)
     }
 
-    /// A sphere from an icosahedron whose faces are split 1:4 `subdivisions` times (at most 7).
+    /// Returns a sphere from an icosahedron whose faces are split 1:4 `subdivisions` times (at most
+    /// 7).
     pub fn icosphere(radius: f64, subdivisions: u32) -> TriMesh {
         let mut mesh = icosahedron();
         for _ in 0..subdivisions.min(7) {
@@ -33,13 +36,14 @@ impl TriMesh {
         mesh.scaled(radius)
     }
 
-    /// A cylinder along z about the origin, in meters.
+    /// Returns a cylinder along z about the origin; meters.
     pub fn cylinder(radius: f64, length: f64, segments: usize) -> TriMesh {
         let half_length = 0.5 * length;
         revolve(&[(0.0, -half_length), (radius, -half_length), (radius, half_length), (0.0, half_length)], segments)
     }
 
-    /// A capsule along z about the origin, in meters; `length` without the caps, `rings` per cap.
+    /// Returns a capsule along z about the origin; meters, `length` without the caps, `rings` per
+    /// cap.
     pub fn capsule(radius: f64, length: f64, segments: usize, rings: usize) -> TriMesh {
         let half_length = 0.5 * length;
         let rings = rings.clamp(1, MAX_SEGMENTS);
@@ -49,7 +53,8 @@ impl TriMesh {
         revolve(&lower.chain(upper).collect::<Vec<_>>(), segments)
     }
 
-    /// A ring around z: `major` to the middle of the tube, `minor` the tube's radius (below `major`), meters.
+    /// Returns a torus around z: `major` is the radius of the tube's center line, `minor` the
+    /// tube's radius (below `major`), meters.
     pub fn torus(major: f64, minor: f64, segments: usize, sides: usize) -> TriMesh {
         let (segments, sides) = (segments.clamp(3, MAX_SEGMENTS), sides.clamp(3, MAX_SEGMENTS));
         let mut mesh = TriMesh::default();
@@ -70,9 +75,9 @@ impl TriMesh {
         mesh
     }
 
-    /// A closed solid of revolution about z. `profile` holds `(r, z)` in meters, first and last on the axis (`r =
-    /// 0`), all between off it, no two neighbors equal; either direction. The profile must not cross itself (not
-    /// checked here).
+    /// Returns a closed solid of revolution about z. `profile` lists `(r, z)` in meters, in either
+    /// direction: first and last point on the axis (`r = 0`), all others off it, no two neighbors
+    /// equal. The profile must not cross itself (not checked here).
     ///
     /// # Errors
     /// [`MeshError::Profile`] if the profile is not as described.
@@ -110,7 +115,7 @@ impl TriMesh {
         self.triangles.iter_mut().for_each(|t| t.swap(1, 2));
     }
 
-    /// Each face into four; new vertices are pushed out to the unit sphere.
+    /// Splits each face into four and projects new vertices to the unit sphere.
     fn split_on_sphere(&self) -> TriMesh {
         let mut vertices = self.vertices.clone();
         let mut edges: Vec<(u32, u32)> =
@@ -120,7 +125,7 @@ impl TriMesh {
         let base = vertices.len() as u32;
         vertices
             .extend(edges.iter().map(|(u, v)| (self.vertices[*u as usize] + self.vertices[*v as usize]).normalize()));
-        // every edge of a face is in the list that was made from the faces
+        // the list contains every edge of every face
         let middle = |u, v| base + edges.partition_point(|e| *e < edge(u, v)) as u32;
         let triangles = self.triangles.iter().flat_map(|&[a, b, c]| {
             let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
@@ -138,14 +143,15 @@ fn signs(n: u32) -> Vec3 {
     Vec3::from_fn(|k, _| if n >> k & 1 == 1 { 1.0 } else { -1.0 })
 }
 
-/// The point of a half circle of `radius` about `(0, z)`, `angle` from its lowest point. Exactly on the axis at both
-/// ends.
+/// Returns the point of a half circle of `radius` about `(0, z)`, `angle` from its lowest point.
+/// Exactly on the axis at both ends.
 fn on_arc(radius: f64, z: f64, angle: f64) -> (f64, f64) {
     let (sin, cos) = ComplexField::sin_cos(angle);
     (if sin.abs() < 1e-12 { 0.0 } else { radius * sin }, z - radius * cos)
 }
 
-/// Turns a profile that climbs from the axis to the axis around z: a pole at each end, a ring per point between.
+/// Revolves an ascending profile from axis to axis around z: a pole at each end, a ring per point
+/// between.
 fn revolve(profile: &[(f64, f64)], segments: usize) -> TriMesh {
     let segments = segments.clamp(3, MAX_SEGMENTS);
     let rings = profile.len() - 2;
@@ -176,7 +182,7 @@ fn icosahedron() -> TriMesh {
             [Vec3::new(0.0, s, t * g), Vec3::new(s, t * g, 0.0), Vec3::new(t * g, 0.0, s)].map(|v| v.normalize()),
         );
     }
-    // faces are the triples at the least mutual distance, wound outwards
+    // faces are the triples with the smallest mutual distance, wound outwards
     let side = (0..12)
         .flat_map(|i| (0..i).map(move |j| (i, j)))
         .map(|(i, j)| (vertices[i] - vertices[j]).norm())

@@ -96,10 +96,13 @@ impl RepairReport {
 }
 
 impl TriMesh {
-    /// Makes a closed, outward-wound solid of a surface with holes, fins, inner walls and debris, in place, and tells
-    /// what it did. A mesh that [`TriMesh::check_closed`] accepts comes out as from there. Errors leave the mesh as it
-    /// was: data that are no mesh ([`TriMesh::check_data`]), settings out of range, and surfaces that cannot be
-    /// repaired; these name the first face of the mesh as it was that keeps it from being a solid, from 1.
+    /// Makes a closed, outward-wound solid of a surface with holes, fins, inner walls and debris,
+    /// in place. A mesh that [`TriMesh::check_closed`] accepts gets the same result as there.
+    ///
+    /// # Errors
+    /// Errors leave the mesh unchanged: invalid data ([`TriMesh::check_data`]), settings out of
+    /// range, and surfaces that cannot be repaired. The last name the first face of the original
+    /// mesh that prevents a solid, from 1.
     ///
     /// ```
     /// use tumble_collide::{RepairSettings, TriMesh, Vec3};
@@ -111,9 +114,6 @@ impl TriMesh {
     /// assert!((report.closed.volume - 1.0).abs() < 1e-12);
     /// # Ok::<(), tumble_collide::MeshError>(())
     /// ```
-    ///
-    /// # Errors
-    /// [`MeshError`]: data that are no mesh, a setting out of its range, or a surface that cannot be repaired; the mesh is then unchanged.
     pub fn repair(&mut self, settings: &RepairSettings) -> Result<RepairReport, MeshError> {
         self.check_data()?;
         settings.check(self.diagonal())?;

@@ -47,7 +47,8 @@ pub(crate) struct Point {
     /// Range of its outward normals in [`Elements::normals`].
     pub first: u32,
     pub count: u32,
-    /// Range of the directions of the searched edges that start here, in [`Elements::edge_directions`].
+    /// Range of the directions of the searched edges that start here, in
+    /// [`Elements::edge_directions`].
     pub first_direction: u32,
     pub edge_directions: u32,
     /// Start of its edges in [`Elements::edges`], number of those that are always tested, number of

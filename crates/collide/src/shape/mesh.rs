@@ -16,19 +16,19 @@ pub struct MeshShape {
     pub(super) settings: TreeSettings,
     pub(super) cache: TreeCache,
     pub(super) tree: OnceLock<Tree>,
-    /// One; of shells that overlap, each; none where it collides by its balls.
+    /// The surface; one per shell if shells overlap; empty if the mesh collides by its spheres.
     pub(super) surfaces: OnceLock<Vec<Surface>>,
-    /// Whether some of its faces are no surface of the union of its shells.
+    /// Whether some of its faces lie inside the union of its shells.
     pub(super) buried: bool,
-    /// At density 1.
+    /// Mass properties at density 1.
     pub(super) unit_mass: MassProperties,
     pub(super) bounding_radius: f64,
     pub(super) report: ClosedReport,
-    /// Where the origin is in the frame that the mesh came in.
+    /// Position of the origin in the frame of the given mesh.
     pub(super) center: Vec3,
 }
 
-/// A tree, and the radius of the ball about the origin that holds its leaves, meters.
+/// A tree, and the radius of the sphere about the origin that contains its leaves, meters.
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
     tree: SphereTree,
@@ -42,7 +42,7 @@ impl From<SphereTree> for Tree {
     }
 }
 
-/// The rest is made of these two.
+/// All other fields are computed from these.
 impl PartialEq for MeshShape {
     fn eq(&self, other: &MeshShape) -> bool {
         (&self.mesh, self.tree()) == (&other.mesh, other.tree())
@@ -50,8 +50,8 @@ impl PartialEq for MeshShape {
 }
 
 impl MeshShape {
-    /// Checks and mends `mesh` ([`TriMesh::check_closed`]), moves its center of mass to the origin and builds the
-    /// tree.
+    /// Checks and repairs `mesh` ([`TriMesh::check_closed`]), moves its center of mass to the
+    /// origin and builds the tree.
     ///
     /// # Errors
     /// [`MeshError`]: a mesh that encloses no solid, a setting out of its range, or a tree that cannot be built.
@@ -70,7 +70,8 @@ impl MeshShape {
         Ok(SphereTree::build_by(&self.mesh, &distance, &self.settings, &())?.0)
     }
 
-    /// The same with tree and surface built when first asked for: for what is drawn and not stepped. A tree that cannot be built is then one ball.
+    /// Like [`MeshShape::new`], but builds tree and surface on first use: for shapes that are drawn
+    /// and not simulated. If the tree cannot be built, it is a single sphere.
     ///
     /// # Errors
     /// [`MeshError`]: a mesh that encloses no solid, or a setting out of its range.
@@ -81,7 +82,7 @@ impl MeshShape {
         let mass = if overlaps { mesh.union_mass_properties(1.0) } else { mesh.mass_properties(1.0) };
         let center = mass.center_of_mass;
         let mesh = mesh.translated(&-center);
-        // what rounding left of it is not worth a second shift
+        // the remaining rounding error does not justify a second shift
         let mass = if overlaps { mass } else { mesh.mass_properties(1.0) };
         let unit_mass = MassProperties { center_of_mass: Vec3::zeros(), ..mass };
         let (settings, cache) = (*settings, cache.clone());
@@ -105,7 +106,8 @@ impl MeshShape {
         }
     }
 
-    /// The same from the cache where it has it; also returns what is to be said of the cache.
+    /// Returns the shape from the cache, or else builds and stores it. Also returns a warning about
+    /// the cache, if any.
     ///
     /// # Errors
     /// [`MeshError`]: a mesh that encloses no solid, a setting out of its range, or a tree that cannot be built.
@@ -135,12 +137,12 @@ impl MeshShape {
         MeshShape::of_bytes(&body).map(Some).ok_or_else(|| entry.refused("it holds no shape"))
     }
 
-    /// The surface; its center of mass is the origin.
+    /// Returns the mesh; its center of mass is the origin.
     pub fn mesh(&self) -> &TriMesh {
         &self.mesh
     }
 
-    /// The balls around the surface.
+    /// Returns the spheres around the surface.
     pub fn tree(&self) -> &SphereTree {
         &self.whole_tree().tree
     }
@@ -150,42 +152,46 @@ impl MeshShape {
         self.tree.get_or_init(|| build().unwrap_or_else(|_| SphereTree::bounding_sphere(&self.mesh)).into())
     }
 
-    /// Whether tree and surface are built, which happens where a world is stepped.
+    /// Returns whether tree or surface is built, which the first step of a world does.
     pub fn is_built(&self) -> bool {
         self.tree.get().is_some() || self.surfaces.get().is_some()
     }
 
-    /// Elements and fields of the `surface` contact mode: one, or one for each of several shells that overlap; none where the surface crosses
-    /// itself in another way, which then collides by its balls.
+    /// Returns elements and fields for the `surface` contact mode: one, or one per shell if shells
+    /// overlap. Empty if the surface crosses itself in another way; such a mesh collides by its
+    /// spheres.
     pub(crate) fn surfaces(&self) -> &[Surface] {
-        // buried faces are no surface of the union: such a mesh goes shell by shell, or stands for itself by its balls
+        // faces inside the union are no surface: such a mesh is handled shell by shell, or collides
+        // by its spheres
         self.surfaces.get_or_init(|| match self.buried {
             true => shell_surfaces(&self.mesh, self.tree()).unwrap_or_default(),
             false => vec![Surface::new(&self.mesh, self.tree())],
         })
     }
 
-    /// What was found and mended when the mesh was read; its notes are for the user.
+    /// Returns the defects that were found and repaired; the notes are for users.
     pub fn report(&self) -> &ClosedReport {
         &self.report
     }
 
-    /// Volume, m³.
+    /// Returns the volume, m³.
     pub fn volume(&self) -> f64 {
         self.unit_mass.mass
     }
 
-    /// The center of mass in the frame that the mesh came in, meters: what was subtracted from its vertices.
+    /// Returns the center of mass in the frame of the given mesh, meters: the offset that was
+    /// subtracted from its vertices.
     pub fn center_of_mass(&self) -> Vec3 {
         self.center
     }
 
-    /// Radius of the ball about the origin that holds the surface, meters.
+    /// Returns the radius of the sphere about the origin that contains the surface, meters.
     pub fn bounding_radius(&self) -> f64 {
         self.bounding_radius
     }
 
-    /// The box in world axes around the leaves: the turned local box, cut by the ball about the center.
+    /// Returns the box in world axes around the leaves: the box of the rotated local box, clipped
+    /// by the box of the bounding sphere.
     pub(crate) fn aabb(&self, pose: &Pose) -> Aabb {
         let Tree { tree, leaf_radius } = self.whole_tree();
         let (bounds, here) = (tree.bounds(), pose.translation.vector);
@@ -197,7 +203,7 @@ impl MeshShape {
         }
     }
 
-    /// At a uniform `density`, kg/m³.
+    /// Returns the mass properties at a uniform `density`, kg/m³.
     pub(crate) fn mass_properties(&self, density: f64) -> MassProperties {
         MassProperties {
             inertia: self.unit_mass.inertia * density,

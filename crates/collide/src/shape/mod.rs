@@ -14,21 +14,21 @@ use std::sync::Arc;
 pub enum Shape {
     /// All points with local `z ≤ 0`; the outward normal is local `+z`.
     HalfSpace,
-    /// A ball.
+    /// A sphere.
     Sphere {
         /// Meters.
         radius: f64,
     },
-    /// A block with its faces across the local axes.
+    /// A box with its faces across the local axes.
     Box {
-        /// From the center to the faces, meters.
+        /// Distances from the center to the faces, meters.
         half_extents: Vec3,
     },
     /// All points within `radius` of a segment on the local z axis.
     Capsule {
         /// Meters.
         radius: f64,
-        /// From the center to an end of the segment (caps not counted), meters.
+        /// Distance from the center to an end of the segment (without the caps), meters.
         half_length: f64,
     },
     /// A cylinder along the local z axis; shared, because its tree is large.
@@ -38,12 +38,12 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// The half-space `z ≤ 0`.
+    /// Returns the half-space `z ≤ 0`.
     pub fn half_space() -> Shape {
         Shape::HalfSpace
     }
 
-    /// A ball of `radius` meters.
+    /// Returns a sphere of `radius` meters.
     ///
     /// # Errors
     /// [`ShapeError::Length`] if the radius is not finite and above 0.
@@ -52,7 +52,7 @@ impl Shape {
         Ok(Shape::Sphere { radius })
     }
 
-    /// A box with edges of `size` along x, y and z, meters.
+    /// Returns a box with edges of `size` along x, y and z, meters.
     ///
     /// # Errors
     /// [`ShapeError::Length`] if an edge is not finite and above 0.
@@ -63,7 +63,7 @@ impl Shape {
         Ok(Shape::Box { half_extents })
     }
 
-    /// A capsule along z: all points within `radius` of a segment of `length`, meters.
+    /// Returns a capsule along z: all points within `radius` of a segment of `length`, meters.
     ///
     /// # Errors
     /// [`ShapeError::Length`] if a size is not finite and above 0.
@@ -72,7 +72,7 @@ impl Shape {
         Ok(Shape::Capsule { radius, half_length: half("length of a capsule", length)? })
     }
 
-    /// A cylinder along z of `radius` and `length`, meters.
+    /// Returns a cylinder along z of `radius` and `length`, meters.
     ///
     /// # Errors
     /// [`ShapeError::Length`] if a size is not finite and above 0.
@@ -82,8 +82,9 @@ impl Shape {
         Ok(Shape::Cylinder(Arc::new(CylinderShape::new(radius, length)?)))
     }
 
-    /// A closed mesh (mended where that is harmless, see [`TriMesh::check_closed`]), moved so that its center of mass
-    /// is the origin; [`Shape::center_of_mass`] is where it was.
+    /// Returns a closed mesh, moved so that its center of mass is the origin;
+    /// [`Shape::center_of_mass`] is its original position. Harmless defects are repaired (see
+    /// [`TriMesh::check_closed`]).
     ///
     /// # Errors
     /// [`ShapeError::Mesh`]: a mesh that encloses no solid, a setting out of its range, or a tree that cannot be built.
@@ -91,11 +92,12 @@ impl Shape {
         Ok(Shape::Mesh(Arc::new(MeshShape::new(mesh, settings)?)))
     }
 
-    /// [`Shape::mesh`] from the cache, if it was made before of the same vertices, triangles and settings; else it is made and kept there. The same bits
-    /// either way. Also returns what is to be said of the cache.
+    /// Returns [`Shape::mesh`] from the cache if it was built before from the same vertices,
+    /// triangles and settings; otherwise builds and stores it. The bits are the same. Also returns
+    /// a warning about the cache, if any.
     ///
     /// # Errors
-    /// [`ShapeError::Mesh`], as [`Shape::mesh`]. A cache that cannot be used is no error.
+    /// [`ShapeError::Mesh`], as [`Shape::mesh`]. An unusable cache is not an error.
     pub fn mesh_cached(
         mesh: TriMesh,
         settings: &TreeSettings,
@@ -105,8 +107,8 @@ impl Shape {
         Ok((Shape::Mesh(Arc::new(shape)), note))
     }
 
-    /// [`Shape::mesh`] with its tree and surface built when first asked for: for a world that is drawn and not stepped. The tree then comes from the cache
-    /// where it has it.
+    /// Returns [`Shape::mesh`] with its tree and surface built on first use: for a world that is
+    /// drawn and not simulated. The tree then comes from the cache if it is there.
     ///
     /// # Errors
     /// [`ShapeError::Mesh`]: a mesh that encloses no solid, or a setting out of its range.
@@ -114,7 +116,7 @@ impl Shape {
         Ok(Shape::Mesh(Arc::new(MeshShape::new_lazy(mesh, settings, cache)?)))
     }
 
-    /// Whether a tree or surface of it is built; no other shape has any.
+    /// Returns whether a tree or surface is built; false for shapes without any.
     pub fn is_built(&self) -> bool {
         match self {
             Shape::Cylinder(cylinder) => cylinder.is_built(),
@@ -123,12 +125,12 @@ impl Shape {
         }
     }
 
-    /// Whether it has a sphere tree: meshes and cylinders.
+    /// Returns whether the shape has a sphere tree: meshes and cylinders.
     pub fn has_tree(&self) -> bool {
         matches!(self, Shape::Cylinder(_) | Shape::Mesh(_))
     }
 
-    /// The sphere tree of a mesh or cylinder; that of a cylinder is built when first asked for.
+    /// Returns the sphere tree of a mesh or cylinder, built on first use for a cylinder.
     pub fn tree(&self) -> Option<&SphereTree> {
         match self {
             Shape::Cylinder(cylinder) => Some(cylinder.tree()),
@@ -137,9 +139,9 @@ impl Shape {
         }
     }
 
-    /// The box in world axes around the shape at `pose`. A half-space that faces along an axis
-    /// is bounded on that side; any other is unbounded on all sides. Meshes and cylinders include the leaves of their
-    /// trees.
+    /// Returns the box in world axes around the shape at `pose`. A half-space that faces along an
+    /// axis is bounded on that side; any other is unbounded on all sides. The boxes of meshes and
+    /// cylinders include the leaves of their trees.
     pub fn aabb(&self, pose: &Pose) -> Aabb {
         let center = pose.translation.vector;
         let half = match self {
@@ -153,10 +155,11 @@ impl Shape {
         Aabb { min: center - half, max: center + half }
     }
 
-    /// Mass properties at a uniform `density` in kg/m³.
+    /// Returns the mass properties at a uniform `density` in kg/m³.
     ///
     /// # Errors
-    /// [`ShapeError::Density`] if the density is not finite and above 0, [`ShapeError::Unbounded`] for a half-space.
+    /// [`ShapeError::Density`] if the density is not finite and above 0, [`ShapeError::Unbounded`]
+    /// for a half-space.
     pub fn mass_properties(&self, density: f64) -> Result<MassProperties, ShapeError> {
         if !(density.is_finite() && density > 0.0) {
             return Err(ShapeError::Density(density));
@@ -171,8 +174,8 @@ impl Shape {
         }
     }
 
-    /// The center of mass in the frame that the shape was described in, meters: that of its file for a mesh, which is kept about its center of mass;
-    /// the origin for all others.
+    /// Returns the center of mass in the frame of the shape's description, meters: that of the file
+    /// for a mesh, which is stored about its center of mass; the origin for all others.
     pub fn center_of_mass(&self) -> Vec3 {
         match self {
             Shape::Mesh(mesh) => mesh.center_of_mass(),
@@ -180,7 +183,7 @@ impl Shape {
         }
     }
 
-    /// Volume in m³; infinite for a half-space.
+    /// Returns the volume in m³; infinite for a half-space.
     pub fn volume(&self) -> f64 {
         match self {
             Shape::HalfSpace => f64::INFINITY,
@@ -194,7 +197,8 @@ impl Shape {
         }
     }
 
-    /// Radius of a ball about the local origin that holds the shape, meters; infinite for a half-space.
+    /// Returns the radius of a sphere about the local origin that contains the shape, meters;
+    /// infinite for a half-space.
     pub fn bounding_radius(&self) -> f64 {
         match self {
             Shape::HalfSpace => f64::INFINITY,
@@ -211,13 +215,13 @@ fn positive(what: &'static str, value: f64) -> Result<(), ShapeError> {
     if value.is_finite() && value > 0.0 { Ok(()) } else { Err(ShapeError::Length { what, value }) }
 }
 
-/// Half a length, exact; both are above 0.
+/// Returns half a length, exactly; both are above 0.
 fn half(what: &'static str, value: f64) -> Result<f64, ShapeError> {
     let half = 0.5 * value;
     if half.is_finite() && half > 0.0 { Ok(half) } else { Err(ShapeError::Length { what, value }) }
 }
 
-/// The local z axis in the world.
+/// Returns the local z axis in the world.
 pub(crate) fn axis(pose: &Pose) -> Vec3 {
     pose.rotation * Vec3::z()
 }
@@ -226,7 +230,8 @@ fn half_space_aabb(pose: &Pose) -> Aabb {
     let mut all = Aabb { min: Vec3::repeat(f64::NEG_INFINITY), max: Vec3::repeat(f64::INFINITY) };
     let normal = axis(pose);
     for k in 0..3 {
-        // within rounding of the axis the plane rises less than 1e-12 m per meter; it is taken as level
+        // within rounding of the axis the plane rises less than 1e-12 m per meter and is treated as
+        // perpendicular to it
         if normal[(k + 1) % 3].abs() < 1e-12 && normal[(k + 2) % 3].abs() < 1e-12 {
             let bound = if normal[k] > 0.0 { &mut all.max } else { &mut all.min };
             bound[k] = pose.translation.vector[k];

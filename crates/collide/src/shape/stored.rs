@@ -1,7 +1,9 @@
-//! A mesh shape as bytes, for the cache and for archives: what the checks found, the tree, and how the surface's points are grouped.
+//! Binary encoding of mesh shapes, for the cache and for archives: the result of the checks, the
+//! tree, and the groups of the surface's points.
 //!
-//! What is quick to make of those (edges, normals) is made anew, and the cells of fields are made where they are asked for. What is read is checked
-//! as if it came from an enemy: counts are bounded by the bytes that are there, indices in range, nothing nested in itself.
+//! Data that is quick to compute (edges, normals) is computed again, and the cells of fields are
+//! built on demand. Input is not trusted: counts are limited by the available bytes, indices must
+//! be in range, and nothing may contain itself.
 
 use super::mesh::{MeshShape, Tree};
 use crate::bytes::{Reader, Write};
@@ -10,7 +12,7 @@ use crate::{ClosedReport, MassProperties, Mat3, SphereTree, TriMesh};
 use std::sync::OnceLock;
 
 impl MeshShape {
-    /// The whole shape; builds its tree and surface if they are not built yet.
+    /// Returns the whole shape as bytes; builds its tree and surface if they are not built yet.
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
         let mut to = Vec::new();
         to.vector(&self.center);
@@ -24,7 +26,7 @@ impl MeshShape {
         to
     }
 
-    /// `None` if the bytes are not those of a shape.
+    /// Returns `None` if the bytes are not a shape.
     pub(crate) fn of_bytes(bytes: &[u8]) -> Option<MeshShape> {
         let mut from = Reader(bytes);
         let center = from.vector()?;
@@ -79,7 +81,7 @@ impl TriMesh {
         to.list(&self.triangles, |to, t| t.iter().for_each(|v| to.u32(*v)));
     }
 
-    /// `None` where it has no triangle, or one that points nowhere.
+    /// Returns `None` for a mesh without triangles or with invalid indices.
     pub(crate) fn read(from: &mut Reader) -> Option<TriMesh> {
         let vertices = from.list(Reader::vector)?;
         let triangles = from.list(|from| Some([from.u32()?, from.u32()?, from.u32()?]))?;
@@ -107,13 +109,13 @@ mod tests {
         for mesh in shapes() {
             let shape = MeshShape::new(mesh, &TreeSettings::octree()).unwrap();
             let read = MeshShape::of_bytes(&shape.to_bytes()).unwrap();
-            // every number of every part, as text that tells all bits apart
+            // all numbers of all parts, as text that distinguishes all bits
             assert_eq!(format!("{read:?}"), format!("{shape:?}"));
             assert!(!shape.surfaces().is_empty());
         }
     }
 
-    /// Whatever stands in a file whose checksum is right: a shape that can be asked, or none.
+    /// Any content with a valid checksum gives a valid shape or none.
     #[test]
     fn no_bytes_are_a_panic() {
         let shape = MeshShape::new(shapes().remove(0), &TreeSettings::octree()).unwrap();

@@ -1,4 +1,5 @@
-//! The measured quality of a sphere tree as a text table, as `tumble spheretree` and Python's `SphereTree.report` print it.
+//! The measured quality of a sphere tree as a text table, as `tumble spheretree` and Python's
+//! `SphereTree.report` print it.
 
 use super::{LevelQuality, TreeFile};
 use std::fmt::Write;
@@ -28,8 +29,8 @@ const LONG: &[Column] = &[
 ];
 
 impl TreeFile {
-    /// Returns a table with one line per level. Lengths are percentages of the mesh's diagonal. With `verbose` the table has
-    /// more columns, and the stages of the builder follow it.
+    /// Returns a table with one line per level. Lengths are percentages of the mesh's diagonal.
+    /// With `verbose` the table has more columns, and the stages of the builder follow it.
     pub fn table(&self, verbose: bool) -> String {
         let columns: Vec<&Column> = SHORT.iter().chain(LONG.iter().filter(|_| verbose)).collect();
         let cells = self.quality.iter().map(|q| columns.iter().map(|c| (c.2)(self, q)).collect());

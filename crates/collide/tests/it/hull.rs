@@ -49,7 +49,8 @@ fn convex_meshes_are_their_own_hulls() {
 
 #[test]
 fn the_hull_of_a_torus_has_the_volume_of_disc_and_rim() {
-    // within the tube's radius r of a disc of radius R: π R² 2r + (π r²/2)·2π(R + 4r/3π), Pappus for the rounded rim
+    // within the tube's radius r of a disc of radius R: π R² 2r + (π r²/2)·2π(R + 4r/3π), Pappus
+    // for the rounded rim
     let (big, small, pi) = (1.0, 0.25, std::f64::consts::PI);
     let exact = pi * big * big * 2.0 * small + 0.5 * pi * small * small * 2.0 * pi * (big + 4.0 * small / (3.0 * pi));
     let mesh = TriMesh::torus(big, small, 96, 48);

@@ -269,7 +269,8 @@ fn damaged_files_are_read_or_refused() {
 
 #[test]
 fn errors_number_faces_as_the_user_sees_them() {
-    // an unused vertex, a degenerate face and a doubled vertex come before the box that lacks its last face
+    // an unused vertex, a degenerate face and a doubled vertex come before the box that lacks its
+    // last face
     let mut mesh = TriMesh::cuboid(Vec3::repeat(2.0));
     mesh.triangles.pop();
     mesh.triangles.iter_mut().flatten().for_each(|v| *v += 2);
@@ -281,7 +282,8 @@ fn errors_number_faces_as_the_user_sees_them() {
     assert!(corners.contains(&(from - 1)) && corners.contains(&(to - 1)), "{error}");
 }
 
-/// A prism of height 1 over a polygon, its faces as polygons, and the polygon's area by the shoelace formula.
+/// A prism of height 1 over a polygon, its faces as polygons, and the polygon's area by the
+/// shoelace formula.
 fn prism(outline: &[[f64; 2]]) -> (String, f64) {
     let n = outline.len();
     let vertices: String =
@@ -367,7 +369,7 @@ fn a_fan_that_is_right_stays_and_hostile_faces_end() {
         .chain((1..=5001).map(|k| format!(" {k}")))
         .collect();
     let error = TriMesh::from_obj(&zigzag).unwrap_err().to_string();
-    assert!(error.starts_with("line 5002: a concave face of 5001 corners; at most 5000"), "{error}");
+    assert!(error.starts_with("line 5002: a concave face has 5001 corners; at most 5000"), "{error}");
     let star: String =
         (0..7).map(|k| f64::from(3 * k) * PI / 3.5).map(|a| format!("v {} {} 0\n", a.cos(), a.sin())).collect();
     assert_eq!(TriMesh::from_obj(&(star + "f 1 2 3 4 5 6 7\n")).unwrap().triangles.len(), 5);
@@ -521,7 +523,7 @@ fn ply_errors_name_the_place() {
         ("ascii 1.0", "hex 1.0", "line 2: the format `hex`; wanted ascii"),
         ("vertex 3", "vertex 99999999999999999", "vertex 5: the file ends before it"),
         ("float y", "float q", "the element `vertex`: wanted properties x, y and z"),
-        ("float y", "real y", "line 5: `real` is no kind of number"),
+        ("float y", "real y", "line 5: `real` is not a number type"),
         ("vertex_index", "corners", "the element `face`: wanted `property list"),
         ("end_header\n", "", "line 9: `0` where format, element"),
         ("1 0 0", "1 a 0", "vertex 2: `a` where a number should be"),
@@ -600,7 +602,7 @@ fn ply_errors_of_strips_name_the_place() {
     );
     assert!(said(&[&[0, 2, -2, 3]]).contains(&format!("tristrips 1: it refers to vertex -2 (from 0), but {there}")));
     assert!(said(&[&[0, 2, 1, -1, 0, 1]]).contains("tristrips 1: a strip of 2 vertices, but it needs at least 3"));
-    assert!(said(&[&[0, 1, 1]]).contains("wanted elements `face` or `tristrips`; there are: 4 vertex, 1 tristrips"));
+    assert!(said(&[&[0, 1, 1]]).contains("wanted elements `face` or `tristrips`; found: 4 vertex, 1 tristrips"));
     let text = String::from_utf8(ply_of_strips("ascii", &[&[0, 2, 1, 3]])).unwrap();
     let cases = [
         ("vertex_indices", "corners", "the element `tristrips`: wanted `property list … vertex_indices`"),
@@ -608,7 +610,7 @@ fn ply_errors_of_strips_name_the_place() {
         ("4 0 2 1 3", "1000000000 0 2 1 3", "tristrips 1: the file ends before it"),
         ("4 0 2 1 3", "4 0 2 1 0.5", "tristrips 1: 0.5 where the number of a vertex should be"),
         ("tristrips 1", "tristrips 99999999999", "tristrips 2: the file ends before it"),
-        ("tristrips", "trifans", "wanted elements `face` or `tristrips`; there are: 4 vertex, 1 trifans"),
+        ("tristrips", "trifans", "wanted elements `face` or `tristrips`; found: 4 vertex, 1 trifans"),
     ];
     for (from, to, said) in cases {
         let error = TriMesh::from_ply(text.replacen(from, to, 1).as_bytes()).unwrap_err().to_string();

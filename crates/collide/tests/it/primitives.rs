@@ -122,7 +122,8 @@ fn coincident_centers_give_a_finite_normal() {
 
 #[test]
 fn mass_of_a_capsule_is_a_tube_and_a_sphere() {
-    // r = 1, l = 1, ρ = 3/π: tube 6, sphere 4; Izz = 6/2 + 8/5; Ixx = 6(1/4 + 1/3) + 4(2/5 + 1 + 3/4)
+    // r = 1, l = 1, ρ = 3/π: tube 6, sphere 4; Izz = 6/2 + 8/5; Ixx = 6(1/4 + 1/3) + 4(2/5 + 1 +
+    // 3/4)
     let mass = Shape::capsule(1.0, 2.0).unwrap().mass_properties(3.0 / std::f64::consts::PI).unwrap();
     assert!((mass.mass - 10.0).abs() < 1e-12);
     assert!((mass.inertia[(2, 2)] - 4.6).abs() < 1e-12);

@@ -22,7 +22,8 @@ fn over_square(f: impl Fn(f64, f64) -> f64) -> f64 {
     (0..n).flat_map(|j| (0..n).map(move |k| (j, k))).map(|(j, k)| f(at(j), at(k))).sum::<f64>() * 4.0 / (n * n) as f64
 }
 
-/// Mean over the sphere of radius `r` of the distance to the cube [−1, 1]³, by latitude and longitude.
+/// Mean over the sphere of radius `r` of the distance to the cube [−1, 1]³, by latitude and
+/// longitude.
 fn mean_distance_to_cube(r: f64) -> f64 {
     let distance = |z: f64, longitude: f64| {
         let s = (1.0 - z * z).sqrt();

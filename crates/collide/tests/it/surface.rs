@@ -79,7 +79,8 @@ fn a_rotated_box_on_another_touches_where_the_edges_cross() {
         for gap in [1e-4, 0.0, -1e-4] {
             let found = find_contacts(a, &turned(1.0 + gap, FRAC_PI_4), b, &Pose::identity(), 1e-3);
             assert!(found.len() >= 4, "{found:?}");
-            // the octagon in which the two squares overlap has its corners at (½, ½·tan 22.5°) and the like
+            // the octagon in which the two squares overlap has its corners at (½, ½·tan 22.5°) and
+            // the like
             for c in &found {
                 let (x, y) = (c.point.x.abs(), c.point.y.abs());
                 assert!(
@@ -215,7 +216,8 @@ fn the_round_side_of_a_cylinder_beside_an_edge_is_not_lost() {
 
 #[test]
 fn a_cylinder_across_the_straight_lines_of_a_smooth_surface_meets_their_middle() {
-    // lines 0.2 m long that turn by 2π/1000: their ends are 41 mm from the cylinder that touches their middles
+    // lines 0.2 m long that turn by 2π/1000: their ends are 41 mm from the cylinder that touches
+    // their middles
     let drum = Shape::mesh(TriMesh::cylinder(1.0, 0.2, 1000), &TreeSettings::octree()).unwrap();
     let across = Quat::from_scaled_axis(Vec3::x() * FRAC_PI_2);
     for gap in [1e-3, 1e-5, -1e-5] {

@@ -95,7 +95,8 @@ fn an_open_surface_has_the_share_of_directions_it_covers() {
     near(WindingNumber::new(&lid).exact(&Vec3::zeros()), 1.0 / 6.0, 1e-12, "lid");
 }
 
-/// Two boxes that overlap in a corner: their union has a closed form in volume, moments and distance.
+/// Two boxes that overlap in a corner: their union has a closed form in volume, moments and
+/// distance.
 #[test]
 fn overlapping_boxes_are_their_union_in_mass_and_distance() {
     let (half, shift) = (Vec3::new(1.0, 1.0, 1.0), Vec3::new(0.7, 0.9, 1.1));

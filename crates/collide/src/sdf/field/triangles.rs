@@ -115,7 +115,8 @@ impl Triangles {
         best
     }
 
-    /// Calls `each` with the triangles whose boxes are within `radius` of `p`, until it returns false.
+    /// Calls `each` with the triangles whose boxes are within `radius` of `p`, until it returns
+    /// false.
     pub fn each_within(&self, p: &Vec3, radius: f64, mut each: impl FnMut(u32) -> bool) {
         let tree = self.boxes();
         let mut open = vec![0];

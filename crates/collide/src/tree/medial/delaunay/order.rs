@@ -21,7 +21,8 @@ fn round(n: u64) -> u32 {
     64 - hash(n).trailing_zeros()
 }
 
-/// The finalizer of splitmix64 (Steele, Lea and Flood, *Fast splittable pseudorandom number generators*, 2014).
+/// The finalizer of splitmix64 (Steele, Lea and Flood, *Fast splittable pseudorandom number
+/// generators*, 2014).
 fn hash(n: u64) -> u64 {
     let x = (n + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
