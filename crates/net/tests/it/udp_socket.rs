@@ -57,7 +57,7 @@ fn sockets_on_loopback_carry_long_and_short_messages_both_ways() {
 #[test]
 fn without_a_key_only_loopback_is_used_and_that_is_said() {
     let server = UdpServer::bind(([127, 0, 0, 1], 0).into(), 1, None, Timing::default()).unwrap();
-    assert!(server.describe().contains("no key: only this machine is served"), "{}", server.describe());
+    assert!(server.describe().contains("no key: serves this machine only"), "{}", server.describe());
     for refused in [
         UdpServer::bind(([0, 0, 0, 0], 0).into(), 1, None, Timing::default()).err(),
         UdpFacet::connect(([192, 0, 2, 1], 7700).into(), 0, None, Timing::default()).err(),

@@ -958,8 +958,8 @@ def _unpickle_articulation(
 ) -> Articulation:
     """Unpickles a description. Its file is read again."""
 def _unpickle_shape(data: bytes) -> Shape:
-    """What a pickled shape becomes: an object of its class."""
+    """Returns the object of its class that a pickled shape becomes."""
 def _unpickle_tree(data: bytes) -> SphereTree:
     """Unpickles a sphere tree."""
 def _unpickle_world(data: bytes) -> World:
-    """What a pickled world becomes; pickle then puts its forces and behaviors back."""
+    """Returns the world of a pickle; pickle then restores its forces and behaviors."""

@@ -126,7 +126,7 @@ fn rivals(carrier: &str, joins: std::ops::Range<u64>) {
             &["--facet", "l", "--no-pictures", "--log-dir", &place.path("second"), "--connect-timeout", "60"],
         )
         .end();
-    assert!(code == Some(2) && wrong.contains("another process shows facet 'l' and answers"), "{code:?}: {wrong}");
+    assert!(code == Some(2) && wrong.contains("another process already shows facet 'l'"), "{code:?}: {wrong}");
     let at = *numbers(&place.log("out", "r")).last().unwrap();
     place.wait_for("out", "l", at);
     signal(l.pid(), Signal::KILL);

@@ -281,7 +281,7 @@ fn what_users_did_is_done_again_bit_by_bit() {
     let (counts, code, wrong) = again("third", &[]);
     assert_eq!((&counts["first_different"], code), (&0.into(), Some(1)), "{counts}");
     assert!(
-        wrong.contains(&format!("{} of {} frames came out otherwise", counts["different"], first.len())),
+        wrong.contains(&format!("{} of {} frames differ from the recording", counts["different"], first.len())),
         "{wrong}"
     );
     // another step is another matter

@@ -83,7 +83,7 @@ fn a_picture_with_another_ending_is_refused() {
         &["view", "stack", "--screenshot", "q.jpg"],
         &["caves", "--pattern", "grid", "--cave", "cube4", "--facet", "front", "--screenshot", "q.jpg"],
     ] {
-        assert!(fail_often(args, 2).contains("expected a file that ends in .png"), "{args:?}");
+        assert!(fail_often(args, 2).contains("wanted a file that ends in .png"), "{args:?}");
     }
 }
 

@@ -131,7 +131,7 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
             &[&mesh, "--method", "octree", "--depth", "2", "--screenshot", &level, "--level", "7"],
             "--level is 7; a tree with --depth 2 has at most levels 0 to 2",
         ),
-        (&[], "wanted a mesh, or --urdf ROBOT"),
+        (&[], "wanted a mesh or --urdf ROBOT"),
         (&[&mesh, "-o", &nowhere], "nowhere/tree.json cannot be written: there is no folder"),
         (&[&mesh, "-o", &here], "it is a folder; wanted the name of a file"),
         (&["--urdf", &bare], "bare.urdf: no link has a <collision>"),

@@ -134,7 +134,7 @@ fn rivals(
 #[test]
 fn of_two_processes_of_one_facet_the_first_that_answers_stays() {
     let process = |seed: u64| Some(FacetSession::new(FacetOptions::new("facet 0", SCENE, seed << 16), scene()));
-    let refused = |facet: &Option<FacetSession>| matches!(facet.as_ref().unwrap().task(), Task::Ended(EndReason::Refused(why)) if why.contains("another process shows facet 'facet 0'"));
+    let refused = |facet: &Option<FacetSession>| matches!(facet.as_ref().unwrap().task(), Task::Ended(EndReason::Refused(why)) if why.contains("another process already shows facet 'facet 0'"));
     let over = |facet: &Option<FacetSession>| matches!(facet.as_ref().unwrap().task(), Task::Ended(_));
     let mut server =
         ServerSession::new(Stage::new(1, NetworkConditions::PERFECT, 1, SyncMode::Lockstep).options, &scene());
