@@ -2,7 +2,7 @@
 //! program.
 
 use crate::errors::{Error, Result};
-use crate::world::world::World;
+use crate::world::class::World;
 use pyo3::prelude::*;
 
 /// Panics within a call on a world that is ``"read"``, ``"changed"`` or ``"stepped"``.

@@ -39,11 +39,11 @@ mod _native {
     #[pymodule_export]
     use super::objects::spheretree::{_unpickle_tree, SphereTree};
     #[pymodule_export]
+    use super::world::class::World;
+    #[pymodule_export]
     use super::world::pickling::{_unpickle_shape, _unpickle_world};
     #[pymodule_export]
     use super::world::report::StepReport;
-    #[pymodule_export]
-    use super::world::world::World;
 
     /// Adds everything that is not a class or a function.
     #[pymodule_init]

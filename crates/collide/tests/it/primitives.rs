@@ -156,8 +156,8 @@ fn half_space_boxes_are_bounded_only_along_an_axis() {
 /// contact was found.
 #[test]
 fn an_edge_just_within_the_margin_is_not_missed() {
-    let a = Shape::cuboid(Vec3::new(1.4168727883051754, 0.62337720159941246, 1.2295017198575758)).unwrap();
-    let b = Shape::cuboid(Vec3::new(1.1174804145274588, 0.53264872520447226, 0.8885734821960298)).unwrap();
+    let a = Shape::cuboid(Vec3::new(1.4168727883051754, 0.6233772015994125, 1.2295017198575758)).unwrap();
+    let b = Shape::cuboid(Vec3::new(1.1174804145274588, 0.5326487252044723, 0.8885734821960298)).unwrap();
     let pose = |t: [f64; 3], q: [f64; 4]| {
         let turn = tumble_collide::Quat::from_quaternion(nalgebra::Quaternion::new(q[3], q[0], q[1], q[2]));
         Pose::from_parts(Vec3::from(t).into(), turn)

@@ -1,4 +1,4 @@
-//! Articulated bodies in reduced coordinates (thesis §III.B, [RBDA]).
+//! Articulated bodies in reduced coordinates (thesis §III.B, RBDA).
 
 mod algorithms;
 mod body;

@@ -343,7 +343,7 @@ impl World {
         }
         let core = &mut self.core;
         let parts = object.collidable().map_or(0, |c| c.parts());
-        let state_sizes = object.integratable().map_or(StateSizes { x: 0, dof: 0, parts: parts }, |i| i.state_sizes());
+        let state_sizes = object.integratable().map_or(StateSizes { x: 0, dof: 0, parts }, |i| i.state_sizes());
         if object.collidable().is_some() && state_sizes.parts != parts {
             return Err(WorldError::Parts { name, parts, part_states: state_sizes.parts });
         }

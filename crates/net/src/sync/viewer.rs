@@ -40,7 +40,7 @@ impl Default for Viewer {
 
 impl Viewer {
     /// Appends pose (7 numbers), scale, count (u16), and 80 bytes per user. Users beyond
-    /// [`MAX_USERS`] are left out.
+    /// `MAX_USERS` are left out.
     pub fn write(&self, out: &mut Vec<u8>) {
         let users = &self.users[..self.users.len().min(MAX_USERS)];
         put_exact_pose(out, &self.cave);

@@ -2,9 +2,9 @@
 
 use crate::arrays::convert::{path, whole_number};
 use crate::errors::{Error, Result, caught};
+use crate::world::class::World;
 use crate::world::inner::Inner;
 use crate::world::shared::Shared;
-use crate::world::world::World;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};

@@ -1,6 +1,7 @@
 //! The Python class of the world and the functions behind its methods.
 
 pub mod add;
+pub mod class;
 pub mod contacts;
 pub mod gc;
 pub mod inner;
@@ -11,4 +12,3 @@ pub mod report;
 pub mod rollout;
 pub mod shared;
 pub mod snapshot;
-pub mod world;

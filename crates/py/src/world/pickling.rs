@@ -120,9 +120,9 @@ pub fn _unpickle_shape(py: Python<'_>, data: PyBackedBytes) -> Result<Py<PyAny>>
 
 /// Returns the world of a pickle; pickle then restores its forces and behaviors.
 #[pyfunction]
-pub fn _unpickle_world(py: Python<'_>, data: PyBackedBytes) -> Result<crate::world::world::World> {
+pub fn _unpickle_world(py: Python<'_>, data: PyBackedBytes) -> Result<crate::world::class::World> {
     let read = py.detach(|| caught(|| self::read(&data)))?;
-    crate::world::world::World::of(py, read)
+    crate::world::class::World::of(py, read)
 }
 
 impl From<ArchiveError> for Error {

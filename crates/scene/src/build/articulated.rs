@@ -128,7 +128,7 @@ fn attach(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Result
     if placed.visible {
         let appearance: Appearance = appearance(&surface.appearance, &placed.center());
         let (geometry, stands_in_for) = (placed.geometry.clone(), placed.stands_in_for.clone());
-        body.add_visual(link, Visual { part: 0, pose: placed.pose, geometry, appearance: appearance, stands_in_for })?;
+        body.add_visual(link, Visual { part: 0, pose: placed.pose, geometry, appearance, stands_in_for })?;
     }
     Ok(())
 }
