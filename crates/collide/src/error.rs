@@ -130,8 +130,8 @@ pub enum MeshError {
         /// Bytes in the file.
         size: usize,
     },
-    /// A file that is neither text nor binary STL.
-    #[error("not an STL file: {size} bytes, neither text that begins with `solid` nor a binary header of 84 bytes")]
+    /// A file that is not STL, as text or binary.
+    #[error("not an STL file: {size} bytes; expected text that begins with `solid`, or a binary header of 84 bytes")]
     StlShort {
         /// Bytes in the file.
         size: usize,

@@ -9,7 +9,7 @@
 //!   integrated.
 //! - [`SphereTree`]: nested spheres around a mesh, used for collision and level of detail.
 //!
-//! Invariants: this crate knows neither velocity nor time. The same input gives the same bits. Data
+//! Invariants: this crate knows no velocity and no time. The same input gives the same bits. Data
 //! from files and users never causes a panic. Lengths are in meters and directions in world axes,
 //! unless the item says otherwise.
 //!

@@ -95,7 +95,7 @@ impl Cells {
         self.cell_hints.get(handle as usize).copied().unwrap_or(0)
     }
 
-    /// Returns whether so many cells were split one by one that the tree may be unbalanced.
+    /// Returns whether enough cells were split one by one that the tree may be unbalanced.
     pub fn needs_rebuild(&self) -> bool {
         self.splits > self.built / 2 + 8
     }

@@ -68,7 +68,7 @@ pub(crate) enum Feature {
     Face,
     /// A straight edge, or a curved surface around a straight axis, along this direction.
     Line(Vec3),
-    /// An edge (its direction) that is one of the body's elements.
+    /// An edge among the body's elements, along this direction.
     Edge(Vec3),
     /// A corner, or a surface around a point.
     Point,

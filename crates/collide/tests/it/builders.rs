@@ -68,8 +68,8 @@ fn public_meshes_are_covered_and_nested() {
 }
 
 /// The reference toolkit's trees of spot, by the same methods and with as many spheres, have the
-/// errors .0725 (grid) and .0408 (Hubbard) of the diagonal at level 2, although they neither nest
-/// nor cover completely.
+/// errors .0725 (grid) and .0408 (Hubbard) of the diagonal at level 2. Those trees do not nest and
+/// do not cover completely.
 #[test]
 fn spot_is_tighter_than_the_references_trees() {
     let Some(text) = text("spot.obj") else { return };

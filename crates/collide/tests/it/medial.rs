@@ -146,7 +146,7 @@ fn the_same_bits_on_any_number_of_threads() {
 }
 
 /// Worst and mean outward error of the reference toolkit's leaves over the diagonal, as built
-/// (neither covering nor nested), and of its first level modified to nest.
+/// (without covering or nesting), and of its first level modified to nest.
 const TOOLKIT: [(&str, f64, f64, Option<f64>); 6] = [
     ("spot", 0.0228, 0.0094, Some(0.131)),
     ("panda_link5", 0.0244, 0.0093, Some(0.117)),

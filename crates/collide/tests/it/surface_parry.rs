@@ -90,7 +90,7 @@ fn meshes() -> Vec<Body> {
     all
 }
 
-/// Returns a sphere with a wavy surface: neither convex nor symmetric.
+/// Returns a sphere with a wavy surface: not convex, not symmetric.
 fn bumps() -> TriMesh {
     let mut mesh = TriMesh::icosphere(0.4, 3);
     for v in &mut mesh.vertices {

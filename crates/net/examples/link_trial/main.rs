@@ -6,7 +6,7 @@
 //! cargo run --release -p tumble-net --example link_trial -- --transport udp --facets 2 --bytes 16384 --rate 60 --frames 2000 --loss 0.05
 //! ```
 //!
-//! With `--stay-cpu_latency yes` the cores are kept from sleeping meanwhile
+//! With `--stay-awake yes` the cores are kept from sleeping meanwhile
 //! (`/dev/cpu_dma_latency`, usually root's).
 //!
 //! Each frame goes the whole way: STATE to all facets, READY from each, PRESENT to all, PRESENTED

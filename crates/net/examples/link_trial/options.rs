@@ -1,18 +1,18 @@
-//! What the command line says.
+//! Options of the command line.
 
 use super::Failure;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use tumble_net::sync::udp::network::Faults;
 
-/// Which process this is.
+/// The part of a trial that a process plays.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// Starts the others and is the server.
+    /// Starts the other processes and is the server.
     All,
     Server,
     Facet,
-    /// A bad network in a process: between the facets and the server.
+    /// A process between the server and the facets that simulates a bad network.
     Relay,
 }
 
@@ -61,19 +61,19 @@ impl Options {
         };
         while let Some(word) = words.next() {
             let value = words.next().ok_or_else(|| format!("{word} needs a value\n{USAGE}"))?;
-            let share = || {
+            let fraction = || {
                 value
                     .parse::<f64>()
                     .ok()
                     .filter(|x| (0.0..=1.0).contains(x))
-                    .ok_or_else(|| format!("{word} {value}: a share of 0 to 1"))
+                    .ok_or_else(|| format!("{word} {value}: expected a fraction from 0 to 1"))
             };
             let ms = || {
                 value
                     .parse::<f64>()
                     .ok()
                     .filter(|x| (0.0..=1e4).contains(x))
-                    .ok_or_else(|| format!("{word} {value}: milliseconds"))
+                    .ok_or_else(|| format!("{word} {value}: expected milliseconds, 0 to 10000"))
             };
             match word.as_str() {
                 "--role" => {
@@ -81,7 +81,7 @@ impl Options {
                         "server" => Role::Server,
                         "facet" => Role::Facet,
                         "relay" => Role::Relay,
-                        _ => return Err(format!("--role {value}: server, facet or relay").into()),
+                        _ => return Err(format!("--role {value}: expected server, facet or relay").into()),
                     }
                 }
                 "--transport" if ["shm", "udp"].contains(&value.as_str()) => o.transport = value,
@@ -95,21 +95,21 @@ impl Options {
                 "--connect" => o.connect = value.parse()?,
                 "--listen" => o.listen = value.parse()?,
                 "--key" => o.key = Some(value.into()),
-                "--loss" => o.faults.loss = share()?,
-                "--reorder" => o.faults.reorder = share()?,
-                "--duplicate" => o.faults.duplicate = share()?,
-                "--flip" => o.faults.flip = share()?,
+                "--loss" => o.faults.loss = fraction()?,
+                "--reorder" => o.faults.reorder = fraction()?,
+                "--duplicate" => o.faults.duplicate = fraction()?,
+                "--flip" => o.faults.flip = fraction()?,
                 "--delay-ms" => o.faults.delay_s = ms()? / 1e3,
                 "--jitter-ms" => o.faults.jitter_s = ms()? / 1e3,
                 "--seed" => o.seed = value.parse()?,
                 "--stay-awake" => o.stay_awake = value == "yes",
-                _ => return Err(format!("{word} {value} is not understood\n{USAGE}").into()),
+                _ => return Err(format!("unknown option or value: {word} {value}\n{USAGE}").into()),
             }
         }
         Ok(o)
     }
 
-    /// What the other processes need to know.
+    /// Returns the arguments that the other processes need.
     pub fn arguments(&self) -> Vec<String> {
         let mut words: Vec<String> = Vec::new();
         let mut add = |name: &str, value: String| words.extend([format!("--{name}"), value]);

@@ -1,4 +1,4 @@
-//! What a trial came to, as a table.
+//! The result of a trial, as a table.
 
 use super::Failure;
 use super::options::Options;
@@ -7,17 +7,18 @@ use tumble_net::sync::transport::{LinkCounters, Refused};
 
 #[derive(Default)]
 pub struct Figures {
-    /// From the server's send to the facet that has it, for each facet and frame.
+    /// Time from the server's send to the arrival at a facet, for each facet and frame.
     pub state_ns: Vec<u64>,
-    /// From the server's send to the last READY.
+    /// Time from the server's send to the last READY.
     pub ready_ns: Vec<u64>,
-    /// From the server's send to the last facet that has PRESENT.
+    /// Time from the server's send to the last arrival of PRESENT at a facet.
     pub barrier_ns: Vec<u64>,
-    /// Between the first and the last facet that has PRESENT.
+    /// Time between the first and the last arrival of PRESENT at a facet.
     pub skew_ns: Vec<u64>,
-    /// States that were missing, double, out of order or not whole: the largest count of any facet.
+    /// Number of states that were missing, repeated, out of order or incomplete: the largest count
+    /// of any facet.
     pub faults: u64,
-    /// Frames that began more than a frame late.
+    /// Number of frames that began more than a frame late.
     pub behind: u64,
     pub wall: Duration,
 }
@@ -35,14 +36,14 @@ pub fn print(options: &Options, figures: &mut Figures, bytes: u64, counters: &[L
         "{} frames of {} bytes to {} facets at {} Hz",
         options.frames, options.bytes, options.facets, options.rate
     );
-    println!("| microseconds | p50 | p99 | p99.9 | most |\n|---|---|---|---|---|");
+    println!("| microseconds | p50 | p99 | p99.9 | max |\n|---|---|---|---|---|");
     row("state to facet", &mut figures.state_ns);
     row("state to all ready", &mut figures.ready_ns);
-    row("whole barrier: state to all told to present", &mut figures.barrier_ns);
+    row("whole barrier: state to PRESENT at all facets", &mut figures.barrier_ns);
     row("skew of presentation", &mut figures.skew_ns);
     let rate = options.frames as f64 / figures.wall.as_secs_f64();
     println!(
-        "held {rate:.1} Hz, {} frames more than a frame late; missing, double, torn or out of order: {}",
+        "held {rate:.1} Hz, {} frames more than a frame late; missing, repeated, torn or out of order: {}",
         figures.behind, figures.faults
     );
     let sum = |of: fn(&LinkCounters) -> u64| counters.iter().map(of).sum::<u64>();
@@ -52,8 +53,7 @@ pub fn print(options: &Options, figures: &mut Figures, bytes: u64, counters: &[L
         .filter(|(_, count)| *count > 0)
         .map(|(why, count)| format!("{} {count}", why.name()))
         .collect();
-    // What arrives here was sent there, except what was lost on its way: the facets' share is the
-    // larger by that.
+    // the facets count bytes that they received: lost packets are missing there
     println!(
         "{:.3} times the bytes of the states, both ways; {} pieces sent again; refused: {}",
         bytes as f64 / states as f64,
@@ -61,7 +61,7 @@ pub fn print(options: &Options, figures: &mut Figures, bytes: u64, counters: &[L
         if refused.is_empty() { "nothing".into() } else { refused.join(", ") }
     );
     if figures.faults > 0 {
-        return Err(format!("{} states were missing, double, torn or out of order", figures.faults).into());
+        return Err(format!("{} states were missing, repeated, torn or out of order", figures.faults).into());
     }
     Ok(())
 }

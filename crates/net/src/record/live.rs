@@ -1,9 +1,9 @@
 //! Live stream of a recording's content: a WebSocket server that Foxglove connects to (feature
 //! `live`).
 //!
-//! The scene goes to a viewer when it comes, poses go with every frame. Each viewer has a queue of
-//! [`BACKLOG`] messages; where it is full, the oldest is dropped, so nobody who watches delays
-//! anybody. Nothing that a viewer sends is read but which topics it wants.
+//! A viewer gets the scene when it connects, and poses with every frame. Each viewer has a queue of
+//! [`BACKLOG`] messages. A full queue drops its oldest message, so a slow viewer does not delay the
+//! simulation or other viewers. The server reads only subscriptions from viewers.
 
 use super::error::Result;
 use super::messages::{nanoseconds, scene_update, set_transforms, transforms_for};
@@ -18,19 +18,19 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use tumble_core::World;
 
-/// Most messages that wait for one viewer: about a second.
+/// Maximum number of messages in the queue of a viewer: about a second.
 pub const BACKLOG: usize = 64;
 
-/// A server that shows a world.
+/// A server that streams a world to viewers.
 pub struct Live {
     server: Option<WebSocketServerHandle>,
     scene: Channel<SceneUpdate>,
     transforms: Channel<FrameTransforms>,
     message: FrameTransforms,
     names: Vec<String>,
-    /// A new viewer needs the scene.
+    /// Whether a viewer has subscribed since the last frame and needs the scene.
     wanted: Arc<Newcomers>,
-    // the channels are in it
+    // keeps the channels registered
     _context: Arc<Context>,
 }
 
@@ -46,10 +46,11 @@ impl ServerListener for Newcomers {
 }
 
 impl Live {
-    /// Listens. Every machine that reaches the address can watch: there is no key.
+    /// Starts the server on the address. There is no key: every machine that reaches the address
+    /// can watch.
     ///
     /// # Errors
-    /// The address is taken or not this machine's.
+    /// [`RecordError::Input`] if the address is in use or is not an address of this machine.
     pub fn start(at: SocketAddr, name: &str) -> Result<Live> {
         let (context, wanted) = (Context::new(), Arc::new(Newcomers::default()));
         let server = WebSocketServer::new()
@@ -74,21 +75,21 @@ impl Live {
         })
     }
 
-    /// The port; that is another than was asked for where this was 0.
+    /// Returns the port: a free one chosen by the system if `start` was given port 0.
     pub fn port(&self) -> u16 {
         self.server.as_ref().map_or(0, WebSocketServerHandle::port)
     }
 
-    /// How many watch.
+    /// Returns the number of connected viewers.
     pub fn viewers(&self) -> usize {
         self.server.as_ref().map_or(0, WebSocketServerHandle::client_count)
     }
 
-    /// A frame. Returns at once; where nobody watches nothing is done.
+    /// Sends a frame to all viewers, without waiting. Does nothing if there is no viewer.
     pub fn frame(&mut self, world: &World) {
         let newcomers = self.wanted.0.swap(false, Ordering::AcqRel);
         if self.viewers() == 0 {
-            // the next viewer gets all of it
+            // the next viewer needs the whole scene
             self.names.clear();
             return;
         }
@@ -107,7 +108,7 @@ impl Live {
 impl Drop for Live {
     fn drop(&mut self) {
         if let Some(server) = self.server.take() {
-            // viewers find the connection closed; nobody is waited for
+            // closes the connections without waiting for the viewers
             drop(server.stop());
         }
     }

@@ -1,4 +1,5 @@
-//! The fuzz targets of `fuzz/` for NetSync and datagrams, without a fuzzer: on their seeds, and on seeds that were cut, joined and flipped.
+//! The fuzz targets of `fuzz/` for NetSync and datagrams, run without a fuzzer: on their seeds, and
+//! on seeds that were cut, joined and flipped.
 
 use crate::udp::frames as count;
 use std::path::Path;
@@ -10,7 +11,7 @@ use tumble_net::sync::udp::frames;
 use tumble_net::sync::udp::network::Random;
 use tumble_net::sync::{Input, Viewer, wire};
 
-/// What a target's macro makes here: a function of its bytes.
+/// Replaces the macro of `libfuzzer_sys`: makes a target a function of its bytes.
 #[macro_export]
 macro_rules! fuzz_target {
     (|$bytes:ident: &[u8]| $body:block) => {
@@ -36,9 +37,10 @@ targets! {
     udp_session "../../../../fuzz/fuzz_targets/udp_session.rs"
 }
 
-/// A seed that is refused at its first bytes, as one of an older version is, leads nowhere.
+/// The seeds are of the current versions: a parser refuses another version at its first bytes, so
+/// such a seed would test nothing.
 #[test]
-fn seeds_are_of_the_versions_of_today() {
+fn seeds_are_of_the_current_versions() {
     let seed =
         |name: &str| std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/seeds").join(name)).unwrap();
     assert!(wire::open(&seed("netsync_frame/message")).is_ok());
@@ -69,7 +71,8 @@ fn seeds(name: &str) -> Vec<Vec<u8>> {
     files.iter().map(|file| std::fs::read(file).unwrap()).collect()
 }
 
-/// A seed with a few bits flipped, bytes set to corners, a piece of another seed put in, or an end cut off.
+/// Returns a seed with a few changes: bits flipped, bytes set to extreme values, a piece of another
+/// seed inserted, or the end cut off.
 fn changed(seeds: &[Vec<u8>], random: &mut Random) -> Vec<u8> {
     let mut bytes = seeds[random.below(seeds.len())].clone();
     for _ in 0..1 + random.below(4) {
@@ -90,7 +93,7 @@ fn changed(seeds: &[Vec<u8>], random: &mut Random) -> Vec<u8> {
 }
 
 #[test]
-fn no_target_panics_on_its_seeds_or_on_what_is_made_of_them_full_length() {
+fn no_target_panics_on_its_seeds_or_on_changed_seeds_full_length() {
     for (name, target) in TARGETS {
         let (seeds, mut random) = (seeds(name), Random::new(name.len() as u64));
         assert!(!seeds.is_empty());

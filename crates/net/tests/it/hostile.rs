@@ -131,7 +131,7 @@ fn definitions_are_counted_and_measured() {
 }
 
 #[test]
-fn other_files_are_told_apart() {
+fn other_files_are_recognized() {
     let scratch = Scratch::new("other");
     let path = scratch.file("a.mcap");
     assert!(matches!(read(&path), Err(RecordError::Io { .. })), "no such file");

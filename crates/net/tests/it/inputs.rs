@@ -1,4 +1,4 @@
-//! What the recorder refuses, and that refusing does no harm.
+//! Inputs that the recorder refuses, without damage to the recording.
 
 use crate::support::*;
 use tumble_net::record::*;
@@ -76,7 +76,7 @@ fn scenes_out_of_range_are_refused_before_a_file_is_made() {
     assert!(error.to_string().contains("no/such/folder.mcap: cannot create"), "{error}");
 }
 
-/// The scene is flushed at once, so that a disk without room is noticed before the run.
+/// The scene is flushed at once, so a disk without room is noticed before the run.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_full_disk_is_an_error() {

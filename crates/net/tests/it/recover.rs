@@ -1,4 +1,4 @@
-//! Mending.
+//! Recovery of damaged recordings.
 
 use crate::support::*;
 use std::fs::OpenOptions;
@@ -16,7 +16,7 @@ fn a_complete_file_comes_out_byte_for_byte() {
     }
 }
 
-/// Cut after n frames and mended, a file is the one that a run of n frames finishes.
+/// A file that is cut after n frames and recovered equals the finished file of a run of n frames.
 #[test]
 fn a_cut_file_becomes_that_of_a_shorter_run() {
     let scratch = Scratch::new("mend-cut");
@@ -25,7 +25,7 @@ fn a_cut_file_becomes_that_of_a_shorter_run() {
         let lengths = record(&path, 12, options(compression, 3));
         let file = OpenOptions::new().write(true).open(&path).unwrap();
         for frames in [9, 6, 3] {
-            file.set_len(lengths[frames - 1] + 5).unwrap(); // and a stump of the next record
+            file.set_len(lengths[frames - 1] + 5).unwrap(); // and the beginning of the next record
             let out = scratch.file(&format!("{compression:?}-{frames}.mcap"));
             let report = recover(&path, &out).unwrap();
             assert_eq!((report.frames, report.bytes_used), (frames as u64, lengths[frames - 1]));
@@ -42,7 +42,7 @@ fn an_empty_result_is_an_error_and_leaves_no_file() {
     let (path, out) = (scratch.file("a.mcap"), scratch.file("out.mcap"));
     let lengths = record(&path, 4, options(Compression::Lz4, 4));
     let file = OpenOptions::new().write(true).open(&path).unwrap();
-    // lengths[0] is the file with its scene and no frame yet.
+    // lengths[0] is the size of the file with the scene and no frame yet
     for n in [lengths[0] + 3, lengths[0], 300, 8] {
         file.set_len(n).unwrap();
         let error = recover(&path, &out).unwrap_err();
@@ -69,7 +69,8 @@ fn nothing_is_overwritten() {
     assert!(std::fs::read(&path).unwrap() == before);
 }
 
-/// Chunks are the flushes: with one damaged, three frames are lost and the rest stays.
+/// Each flush is a chunk of three frames: with one chunk damaged, three frames are lost and the
+/// rest stays.
 #[test]
 fn a_damaged_chunk_is_left_out_and_named() {
     let scratch = Scratch::new("mend-hole");
@@ -91,7 +92,7 @@ fn a_damaged_chunk_is_left_out_and_named() {
     assert!(frames.iter().all(|frame| frame.poses == poses(frame.frame) && frame.state == state(frame.frame)));
 }
 
-/// Bit flips in any place: a complete file comes out, or an error and no file.
+/// A bit flip in any place gives a complete file, or an error and no file.
 #[test]
 fn whatever_comes_out_is_complete() {
     let scratch = Scratch::new("mend-flip");
@@ -108,7 +109,8 @@ fn whatever_comes_out_is_complete() {
             Ok(report) => {
                 assert!(report.fault.is_some(), "a flipped bit was not noticed");
                 let ending = read_all(&out).1;
-                // A flip in the description survives mending, as nothing else tells what stood there.
+                // a flip in the description survives the recovery: no other record repeats its
+                // content
                 assert!(matches!(ending, Ok(Ending::Complete) | Err(RecordError::NotARecording { .. })), "{ending:?}");
                 std::fs::remove_file(&out).unwrap();
                 mended += 1;

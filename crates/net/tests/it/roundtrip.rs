@@ -1,4 +1,4 @@
-//! What goes in comes out, and the same in gives the same bytes.
+//! Recordings are read as they were written, and the same input gives the same bytes.
 
 use crate::support::*;
 use tumble_net::record::*;
@@ -33,7 +33,7 @@ fn the_same_run_gives_the_same_bytes() {
     }
 }
 
-/// A reader that shares no code with ours accepts the file, its index included.
+/// A reader that shares no code with this crate accepts the file and its index.
 #[test]
 fn the_container_is_valid_for_another_reader() {
     let scratch = Scratch::new("container");
@@ -54,7 +54,7 @@ fn the_container_is_valid_for_another_reader() {
 fn every_shape_is_drawn_where_it_stands() {
     let scratch = Scratch::new("shapes");
     let path = scratch.file("a.mcap");
-    // A quarter turn about y takes z to x.
+    // a quarter turn about y takes z to x
     let turned = Pose { position: [1.0, 2.0, 3.0], rotation: [0.0, 0.5f64.sqrt(), 0.0, 0.5f64.sqrt()] };
     let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
@@ -124,7 +124,8 @@ fn a_dropped_recorder_leaves_a_complete_file() {
     assert_frames(&frames);
 }
 
-/// 240 frames a second for a second: a flush every quarter leaves 60, 120, 180 (and the frame that completes it).
+/// 240 frames per second for a second: a flush every quarter second leaves 60, 120 and 180 frames,
+/// and the frame that completes it.
 #[test]
 fn flushes_follow_simulated_time_and_size() {
     let scratch = Scratch::new("flush");

@@ -15,7 +15,7 @@ fn message(k: u64, length: usize) -> Vec<u8> {
     (0..length as u64).map(|at| (k * 31 + at * 7 + at / 251) as u8).collect()
 }
 
-/// A server and its facets in one thread; everything that came.
+/// A server and its facets in one thread, with all events that they received.
 struct Cave {
     server: ShmServer,
     facets: Vec<ShmFacet>,
@@ -36,26 +36,26 @@ impl Cave {
         cave
     }
 
-    /// Looks in on all by turns until it is so.
-    fn until(&mut self, so: impl Fn(&Cave) -> bool) {
+    /// Polls server and facets in turn until `condition` holds; panics after 20 s.
+    fn until(&mut self, condition: impl Fn(&Cave) -> bool) {
         let end = Instant::now() + Duration::from_secs(20);
-        while !so(self) {
-            assert!(Instant::now() < end, "not so within 20 s");
-            self.look_in_on_server();
+        while !condition(self) {
+            assert!(Instant::now() < end, "the condition does not hold within 20 s");
+            self.poll_server();
             for k in 0..self.facets.len() {
-                self.look_in_on(k);
+                self.poll_facet(k);
             }
         }
     }
 
-    fn look_in_on_server(&mut self) {
+    fn poll_server(&mut self) {
         let mut message = Vec::new();
         if let Some((facet, event)) = self.server.recv(Duration::from_millis(1), &mut message).unwrap() {
             self.at_server.push((facet, event, message));
         }
     }
 
-    fn look_in_on(&mut self, k: usize) {
+    fn poll_facet(&mut self, k: usize) {
         let mut message = Message::default();
         if let Some(event) = self.facets[k].recv(Duration::from_millis(1), &mut message).unwrap() {
             self.at_facet[k].push((event, message.into_vec()));
@@ -85,15 +85,16 @@ fn messages_of_all_lengths_arrive_whole_and_in_order_both_ways() {
     );
 }
 
-/// The buffer holds eight; three hundred were sent, most of them for others, before the slow one looks in.
+/// The buffer holds eight messages. Of three hundred, most go to other facets before the slow one
+/// polls.
 #[test]
-fn a_facet_that_looks_in_late_asks_for_what_it_missed() {
+fn a_facet_that_polls_late_requests_missed_messages() {
     let mut cave = Cave::new("late", 3);
     for k in 0..300u64 {
         let to: &[FacetNumber] = if k % 3 == 0 { &[0, 1, 2] } else { &[2] };
         assert_eq!(cave.server.send_all(to, Delivery::Reliable, &message(k, 1000)).unwrap(), to.len());
-        // One looks in each time; both others later, with different gaps.
-        cave.look_in_on(2);
+        // facet 2 polls each time; the others later, with different gaps
+        cave.poll_facet(2);
     }
     for k in 0..20u64 {
         assert!(cave.facets[1].send(Delivery::Reliable, &message(k, 50)).unwrap());
@@ -128,14 +129,15 @@ fn of_newest_messages_the_last_arrives() {
     assert!(cave.at_facet[0].len() < 100);
 }
 
-/// As SIGSTOP and SIGCONT make it: one side does nothing for longer than the time of silence, the other goes on.
+/// One side does nothing for longer than the idle timeout, as between SIGSTOP and SIGCONT; the
+/// other goes on.
 #[test]
 fn a_facet_or_server_that_was_stopped_for_long_connects_anew() {
     let mut cave = Cave::new("stopped", 2);
     let end = Instant::now() + Duration::from_secs(20);
     while cave.at_server.is_empty() {
-        cave.look_in_on_server();
-        cave.look_in_on(1);
+        cave.poll_server();
+        cave.poll_facet(1);
         assert!(Instant::now() < end);
     }
     assert_eq!(
@@ -149,8 +151,8 @@ fn a_facet_or_server_that_was_stopped_for_long_connects_anew() {
     assert!(cave.at_facet[1].is_empty());
 
     while cave.at_facet[1].is_empty() || cave.at_facet[0].is_empty() {
-        cave.look_in_on(0);
-        cave.look_in_on(1);
+        cave.poll_facet(0);
+        cave.poll_facet(1);
         assert!(Instant::now() < end);
     }
     cave.until(|cave| cave.at_facet.iter().all(|events| events.len() == 2));
@@ -162,16 +164,16 @@ fn a_facet_or_server_that_was_stopped_for_long_connects_anew() {
     }
 }
 
-/// Two frozen facets: that of the server that was told to wait less is given up first.
+/// The server with the shorter idle timeout drops its frozen facet first.
 #[test]
-fn silence_is_as_long_as_was_said() {
-    let (mut usual, mut short) = (Cave::new("usual", 1), Cave::new("short", 1));
+fn the_idle_timeout_is_as_long_as_set() {
+    let (mut default, mut short) = (Cave::new("default", 1), Cave::new("short", 1));
     short.server = short.server.with_idle_timeout(Duration::from_millis(300));
     let end = Instant::now() + Duration::from_secs(20);
     while short.at_server.is_empty() {
-        short.look_in_on_server();
-        usual.look_in_on_server();
-        assert!(Instant::now() < end && usual.at_server.is_empty());
+        short.poll_server();
+        default.poll_server();
+        assert!(Instant::now() < end && default.at_server.is_empty());
     }
     assert_eq!(
         short.at_server.pop().map(|(facet, event, _)| (facet, event)),
@@ -192,7 +194,7 @@ fn a_server_started_again_in_the_same_run_is_found() {
     }
 }
 
-/// A facet in a process of its own that answers each message with the same message.
+/// A facet in its own process, which answers each message with the same message.
 #[test]
 #[ignore = "run by a_killed_facet_comes_back_and_nothing_is_left"]
 fn child_answers_until_killed() {
@@ -234,7 +236,8 @@ fn a_killed_facet_comes_back_and_nothing_is_left() {
         }
         child.kill().unwrap(); // SIGKILL
         child.wait().unwrap();
-        // The server never waits for the dead: far more than any buffer holds, within the time of silence.
+        // the server never waits for a dead facet: it sends far more than any buffer holds within
+        // the idle timeout
         let begin = Instant::now();
         for _ in 0..200 {
             server.send(0, Delivery::Reliable, &[7; 100_000]).unwrap();
@@ -242,7 +245,8 @@ fn a_killed_facet_comes_back_and_nothing_is_left() {
         assert!(begin.elapsed() < Duration::from_secs(20));
         assert_eq!(event(&mut server, 20).0, Some(LinkEvent::Closed(Closed::TimedOut)));
     }
-    // A server killed in mid-run leaves its facet alive, and the run's next server takes over: `a_server_started_again_in_the_same_run_is_found`.
+    // A server that is killed in mid-run leaves its facet running, and the next server of the run
+    // takes over: `a_server_started_again_in_the_same_run_is_found`.
     drop(server);
     tumble_net::sync::shm::clean_up().unwrap();
     let (folder, _) = tumble_net::sync::shm::folder().unwrap();
@@ -254,7 +258,7 @@ fn number(message: &[u8]) -> u64 {
     message.get(..8).map_or(u64::MAX, |bytes| u64::from_le_bytes(bytes.try_into().unwrap()))
 }
 
-/// The contents of the files of a folder.
+/// Returns the contents of the files of a folder.
 fn walk(folder: &std::path::Path) -> Vec<String> {
     let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
     files.filter_map(|file| Some(String::from_utf8_lossy(&std::fs::read(file.path()).ok()?).into_owned())).collect()

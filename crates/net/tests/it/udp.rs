@@ -1,4 +1,4 @@
-//! UDP's machines on a simulated network: what is delivered, when, and for how many bytes.
+//! The UDP state machines on a simulated network: messages delivered, their delay and their bytes.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use tumble_net::sync::udp::*;
 pub const SERVER: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::new(10, 0, 0, 1)), 7700);
 pub const KEY: [u8; 32] = [7; 32];
 
-/// 5 % loss each way, 10 % overtake, 2 % come twice; a millisecond one way.
+/// 5 % loss each way, 10 % reordered, 2 % duplicated; a millisecond one way.
 pub const BAD: Faults =
     Faults { loss: 0.05, reorder: 0.10, duplicate: 0.02, flip: 0.0, cut: 0.0, delay_s: 0.001, jitter_s: 0.0 };
 
@@ -20,13 +20,13 @@ pub fn facet_address(facet: FacetNumber) -> SocketAddr {
     ([10, 0, 1, facet as u8], 9000).into()
 }
 
-/// A server, facets, and a network between them; time goes from one event to the next.
+/// A server, facets, and a network between them; time advances from one event to the next.
 pub struct Cave {
     pub now: Duration,
     pub server: ServerMachine,
     pub facets: Vec<FacetMachine>,
     pub network: Network,
-    /// What the facets sent, while this is something.
+    /// Datagrams that the facets sent, if recording is on.
     pub recorded: Option<Vec<Vec<u8>>>,
 }
 
@@ -67,7 +67,7 @@ impl Cave {
         }
     }
 
-    /// To the next event, or to `until`.
+    /// Advances to the next event, or to `until`.
     pub fn advance(&mut self, until: Duration) {
         self.transmit();
         let wakes = self.facets.iter().map(FacetMachine::wake).chain(self.server.wake()).chain(self.network.next());
@@ -100,7 +100,7 @@ impl Cave {
     }
 }
 
-/// Message `k` of a length: its number, then bytes that follow from it.
+/// Message `k` of a length: its number, then bytes that are computed from it.
 pub fn message(k: u64, length: usize) -> Vec<u8> {
     let mut message = k.to_le_bytes().to_vec();
     let mut random = Random::new(k);
@@ -112,7 +112,7 @@ pub fn number(message: &[u8]) -> u64 {
     u64::from_le_bytes(message[..8].try_into().unwrap())
 }
 
-/// What a stream of frames at 60 Hz came to.
+/// Result of a stream of frames at 60 Hz.
 struct Outcome {
     latencies: Vec<Duration>,
     ratio: f64,
@@ -126,7 +126,8 @@ impl Outcome {
     }
 }
 
-/// Frames to one facet at 60 Hz, each answered; asserts that they arrive whole, once and in order.
+/// Sends frames to one facet at 60 Hz, each answered; asserts that they arrive whole, once and in
+/// order.
 fn stream(frames: u64, length: usize, seed: u64, faults: Faults, numbering: Numbering) -> Outcome {
     let mut cave = Cave::new(1, seed, faults, numbering);
     cave.connect();
@@ -181,7 +182,8 @@ fn a_bad_network_delivers_each_frame_once_in_order_and_soon_full_length() {
 fn a_quiet_network_carries_little_more_than_the_messages() {
     let quiet = Faults { delay_s: 0.0002, ..Faults::default() };
     let outcome = stream(500, 16 << 10, 4, quiet, Numbering::default());
-    // 15 fragments with 44 bytes around each, three acknowledgements of 48 and one answer of 63 bytes.
+    // 15 fragments with 44 bytes around each, three acknowledgements of 48 bytes and one answer of
+    // 63 bytes
     assert!(outcome.ratio < 1.0 + (15.0 * 44.0 + 3.0 * 48.0 + 63.0) / 16384.0, "{}", outcome.ratio);
     assert_eq!(outcome.quantile(1.0), Duration::from_micros(200));
 }
@@ -198,7 +200,7 @@ fn message_numbers_wrap_at_u32() {
     stream(1_000, 3000, 5, BAD, numbering);
 }
 
-/// Runs for a while; what the facet and the server reported.
+/// Runs for a while and returns the events of the facet and of the server.
 fn run_for(cave: &mut Cave, seconds: f64) -> (Vec<LinkEvent>, Vec<LinkEvent>) {
     let end = cave.now + Duration::from_secs_f64(seconds);
     let (mut facet, mut server) = (Vec::new(), Vec::new());
@@ -253,7 +255,7 @@ fn of_newest_messages_the_last_arrives_and_none_comes_late() {
     let mut cave = Cave::new(1, 12, BAD, Numbering::default());
     cave.connect();
     let (mut last, mut count) = (None, 0);
-    // More than the window lets through: 64 KiB a millisecond.
+    // more than the window admits: 64 KiB per millisecond
     for k in 0..1500u64 {
         if k < 1000 {
             assert!(cave.server.send(0, Delivery::Newest, &message(k, 64 << 10).into()));

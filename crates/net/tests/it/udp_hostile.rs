@@ -1,4 +1,5 @@
-//! Packets made to hurt: forged, replayed, cut, flipped, too long, of another version, of an old session, and noise.
+//! Hostile packets: forged, replayed, cut, flipped, too long, of another version, of an old
+//! session, and noise.
 
 use crate::udp::*;
 use std::sync::Arc;
@@ -15,8 +16,9 @@ use tumble_net::sync::udp::*;
 const QUIET: Faults =
     Faults { loss: 0.0, reorder: 0.0, duplicate: 0.0, flip: 0.0, cut: 0.0, delay_s: 0.001, jitter_s: 0.0 };
 
-/// Sets the checksum as a forger would, who knows the format and not the key. By CRC-32's definition, bit by bit.
-fn mend(datagram: &mut [u8]) {
+/// Sets the checksum as a forger would, with knowledge of the format but without the key. Computed
+/// by CRC-32's definition, bit by bit.
+fn set_checksum(datagram: &mut [u8]) {
     let mut crc = u32::MAX;
     for (at, byte) in datagram.iter().enumerate() {
         if (5..9).contains(&at) {
@@ -30,16 +32,17 @@ fn mend(datagram: &mut [u8]) {
     datagram[5..9].copy_from_slice(&(!crc).to_le_bytes());
 }
 
-fn changed(datagram: &[u8], change: impl FnOnce(&mut Vec<u8>), mended: bool) -> Vec<u8> {
+fn changed(datagram: &[u8], change: impl FnOnce(&mut Vec<u8>), valid_checksum: bool) -> Vec<u8> {
     let mut copy = datagram.to_vec();
     change(&mut copy);
-    if mended {
-        mend(&mut copy);
+    if valid_checksum {
+        set_checksum(&mut copy);
     }
     copy
 }
 
-/// What an attacker on the path makes of a genuine sealed packet, and why it must be refused.
+/// Returns packets that an attacker on the path makes from a genuine sealed packet, each with the
+/// reason of its refusal.
 fn attacks(genuine: &[u8], random: &mut Random) -> Vec<(Refused, Vec<u8>)> {
     let bit = |random: &mut Random, from: usize| (from + random.below(genuine.len() - from), 1u8 << random.below(8));
     let (at, mask) = bit(random, 17);
@@ -51,7 +54,8 @@ fn attacks(genuine: &[u8], random: &mut Random) -> Vec<(Refused, Vec<u8>)> {
         (Refused::Oversize, changed(genuine, |d| d.push(0), false)),
         (Refused::Oversize, changed(genuine, |d| d.resize(1201, 0), false)),
         (Refused::Torn, changed(genuine, |d| d[at] ^= mask, false)),
-        // A new number or other bytes under a good checksum. A number that was taken is refused as a replay before the seal is looked at.
+        // a new number or other bytes under a valid checksum; a number in use would be refused as a
+        // replay before the seal is checked
         (Refused::Forged, changed(genuine, |d| d[covered.max(17)] ^= covered_mask, true)).fresh(),
         (Refused::Foreign, changed(genuine, |d| d[2] = (packet::VERSION + 1) << 4 | d[2] & 15, true)),
         (Refused::Foreign, changed(genuine, |d| d[0] ^= 1, true)),
@@ -64,11 +68,11 @@ trait Fresh {
 }
 
 impl Fresh for (Refused, Vec<u8>) {
-    /// Under the number after next: not taken yet, so that only the seal can tell.
+    /// Uses a number that is not taken yet, so that only the seal can detect the forgery.
     fn fresh(mut self) -> Self {
         let sequence = u32::from_le_bytes(self.1[13..17].try_into().unwrap());
         self.1[13..17].copy_from_slice(&(sequence + 1000).to_le_bytes());
-        mend(&mut self.1);
+        set_checksum(&mut self.1);
         self
     }
 }
@@ -79,14 +83,14 @@ fn attacks_change_nothing_and_are_counted_by_reason() {
     cave.connect();
     let mut random = Random::new(2);
     let (mut delivered, mut answered) = (0u64, 0u64);
-    let mut wanted = [[0u64; Refused::ALL.len()]; 2];
+    let mut expected = [[0u64; Refused::ALL.len()]; 2];
     let base = [cave.server.counters(0), cave.facets[0].counters()];
     assert_eq!(cave.server.unknown_peers().refused, [0; Refused::ALL.len()]);
     for k in 0..200u64 {
         assert!(cave.server.send(0, Delivery::Reliable, &Arc::from(message(k, 2500))));
         let until = cave.now + Duration::from_millis(16);
         while cave.now < until {
-            // As `advance` does it, with an attacker who copies each packet.
+            // as `advance` does it, with an attacker that copies each packet
             cave.transmit();
             cave.now = cave.network.next().unwrap_or(until).clamp(cave.now, until);
             while let Some((from, to, datagram)) = cave.network.receive(cave.now) {
@@ -103,7 +107,7 @@ fn attacks_change_nothing_and_are_counted_by_reason() {
                 );
                 for (why, attack) in attacks(&datagram, &mut random) {
                     receive(&mut cave, &attack);
-                    wanted[usize::from(!to_server)][why as usize] += 1;
+                    expected[usize::from(!to_server)][why as usize] += 1;
                 }
             }
             while let Some((event, bytes)) = cave.facets[0].poll() {
@@ -119,16 +123,17 @@ fn attacks_change_nothing_and_are_counted_by_reason() {
         }
     }
     assert_eq!((delivered, answered), (200, 200));
-    // The facet's: all in one place. The server's: a packet of no known session is a stranger's.
+    // the facet counts all in one place; the server counts packets without a known session under
+    // unknown peers
     let facet = cave.facets[0].counters();
     let server = cave.server.counters(0);
     let unknown_peers = cave.server.unknown_peers();
     for why in Refused::ALL {
-        assert_eq!(facet.refused_for(why) - base[1].refused_for(why), wanted[1][why as usize], "facet: {why:?}");
+        assert_eq!(facet.refused_for(why) - base[1].refused_for(why), expected[1][why as usize], "facet: {why:?}");
         let at_server = server.refused_for(why) - base[0].refused_for(why) + unknown_peers.refused_for(why);
-        assert_eq!(at_server, wanted[0][why as usize], "server: {why:?}");
+        assert_eq!(at_server, expected[0][why as usize], "server: {why:?}");
     }
-    assert!(wanted.iter().all(|counts| counts[Refused::Forged as usize] >= 200), "{wanted:?}");
+    assert!(expected.iter().all(|counts| counts[Refused::Forged as usize] >= 200), "{expected:?}");
 }
 
 #[test]
@@ -155,7 +160,7 @@ fn a_server_keeps_nothing_for_strangers_and_never_answers_with_more_bytes() {
             assert!(to == from && reply.len() < largest);
             answered += reply.len();
         });
-        // Data of unknown sessions: the shortest that is taken for a packet.
+        // data of unknown sessions: the shortest valid packet
         packet::begin(
             &mut datagram,
             PacketHeader { kind: PacketKind::Data, session: random.next_u64() as u32 | 1, sequence: 1 },
@@ -163,12 +168,12 @@ fn a_server_keeps_nothing_for_strangers_and_never_answers_with_more_bytes() {
         datagram.push(0);
         handshake.tag(&mut datagram);
         server.receive(now, from, &datagram);
-        server.transmit(now, &mut |_, _| panic!("an answer to who has not shown the key"));
+        server.transmit(now, &mut |_, _| panic!("an answer to a peer that has not proved the key"));
     }
     assert!(server.wake().is_none(), "a session was prepared");
     assert!(answered * 2 < asked, "{answered} bytes answer {asked}");
     assert_eq!(server.unknown_peers().refused_for(Refused::Stale), 5_000 + 10_000);
-    // A facet that this cave has not, and one with another key.
+    // a facet that this cave does not have, and one with another key
     Hello { nonce: [1; 32], facet: 6, cookie: [0; 32], suspect_session: 0 }.write(
         PacketKind::Hello,
         &handshake,
@@ -186,7 +191,8 @@ fn a_server_keeps_nothing_for_strangers_and_never_answers_with_more_bytes() {
     server.transmit(now, &mut |_, _| panic!("an answer to a machine without the key"));
 }
 
-/// Every packet that the facet sent while it connected, from its own address and from another one, now and after the cookies are over.
+/// Replays every packet that the facet sent while it connected, from its own and from another
+/// address, before and after the cookies have expired.
 #[test]
 fn a_recorded_handshake_sent_again_does_not_touch_a_live_session() {
     let mut cave = Cave::new(1, 5, QUIET, Numbering::default());
@@ -218,8 +224,9 @@ fn a_recorded_handshake_sent_again_does_not_touch_a_live_session() {
     }
 }
 
-/// Another server has the same key file. Somebody between the networks, who has no key, asks it about a session that he saw, and brings its answers to the
-/// facet under the right server's address: at once, and when the facet hears nothing for a while and asks by itself.
+/// Another server has the same key file. An attacker on the path, without the key, sends it packets
+/// of a session and delivers its answers to the facet under the right server's address: at once,
+/// and while the facet hears nothing and tries to connect again.
 #[test]
 fn another_server_with_the_key_ends_no_session() {
     let mut cave = Cave::new(1, 21, QUIET, Numbering::default());
@@ -244,7 +251,7 @@ fn another_server_with_the_key_ends_no_session() {
         answers.iter().all(|answer| packet::parse(answer).unwrap().kind == PacketKind::Challenge),
         "Data is not answered"
     );
-    // and what a server once said of a session that it does not know: kind 5
+    // and the former answer of a server to an unknown session: kind 5
     let mut unknown = Vec::new();
     packet::begin(&mut unknown, PacketHeader { kind: PacketKind::Data, session, sequence: 0 });
     unknown[2] = packet::VERSION << 4 | 5;
@@ -255,7 +262,7 @@ fn another_server_with_the_key_ends_no_session() {
     }
     assert_eq!((cave.facets[0].poll(), cave.facets[0].counters().refused_for(Refused::Foreign) > 0), (None, true));
 
-    // Nothing comes through for 700 ms; the handshake of the other server does.
+    // nothing arrives for 700 ms except the handshake of the other server
     cave.network.partitioned = true;
     cave.recorded = Some(Vec::new());
     let (end, mut welcomed) = (cave.now + Duration::from_millis(700), 0);
@@ -273,7 +280,7 @@ fn another_server_with_the_key_ends_no_session() {
             cave.facets[0].receive(cave.now, SERVER, &answer);
         }
     }
-    assert!(welcomed > 0, "the facet has asked, and was answered by the wrong one");
+    assert!(welcomed > 0, "the facet has connected to the wrong server");
     cave.network.partitioned = false;
     let end = cave.now + Duration::from_secs(3);
     while cave.now < end {
@@ -290,7 +297,8 @@ fn another_server_with_the_key_ends_no_session() {
     assert_eq!((cave.server.counters(0).opened, cave.facets[0].counters().opened), (1, 1));
 }
 
-/// What a facet sent before it knew that its session is over is no attack. The same again is.
+/// Packets that a facet sent before it learned that its session is over are no attack. Their replay
+/// is.
 #[test]
 fn late_packets_of_a_session_that_is_over_are_no_refusals() {
     let mut cave = Cave::new(1, 22, QUIET, Numbering::default());
@@ -316,13 +324,13 @@ fn late_packets_of_a_session_that_is_over_are_no_refusals() {
     );
 }
 
-/// Resident memory of this process, bytes.
+/// Returns the resident memory of this process, bytes.
 fn resident() -> usize {
     let statm = std::fs::read_to_string("/proc/self/statm").unwrap();
     4096 * statm.split(' ').nth(1).unwrap().parse::<usize>().unwrap()
 }
 
-/// Noise, noise with a good header, and noise sealed by a peer that has the key and means harm.
+/// Noise, noise with a valid header, and noise sealed by a malicious peer that has the key.
 #[test]
 fn a_million_random_packets_per_parser_full_length() {
     let count = frames(20_000, 1_000_000);
@@ -345,7 +353,7 @@ fn a_million_random_packets_per_parser_full_length() {
         if k == count / 2 {
             before = resident();
         }
-        // As it is, and with a header that fits.
+        // as it is, and with a matching header
         for round in 0..2 {
             let now = cave.now + Duration::from_micros(k);
             cave.server.receive(now, facet_address(3), &noise);
@@ -364,14 +372,14 @@ fn a_million_random_packets_per_parser_full_length() {
                     length[0],
                     length[1],
                 ]);
-                mend(&mut noise);
+                set_checksum(&mut noise);
             }
         }
-        // Sealed: first bytes that are frames, so that the noise goes deep.
+        // sealed: the first bytes are frames, so that the noise gets past the first checks
         noise.truncate(1100);
         if let [kind, rest @ ..] = &mut noise[..] {
             *kind = 1 + (k % 6) as u8 + 16 * (*kind & 1);
-            // Small numbers, so that they meet.
+            // small numbers, so that they collide
             rest.iter_mut().take(12).enumerate().for_each(|(at, byte)| *byte = if at % 4 > 0 { 0 } else { *byte & 31 });
         }
         assert!(seal.close(&noise, &mut datagram));
@@ -414,6 +422,6 @@ fn sequence_numbers_end_before_u64_wraps_and_a_new_session_begins() {
         while cave.server.poll().is_some() {}
         assert!(cave.now < Duration::from_secs(120), "{sent} sent");
     }
-    // A hundred packets a session and direction.
+    // a hundred packets per session and direction
     assert!(opened >= 15, "{opened} sessions");
 }

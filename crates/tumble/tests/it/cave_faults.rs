@@ -1,4 +1,5 @@
-//! Caves under kill -9 and SIGSTOP: who goes on, who comes back, what is left.
+//! Caves under kill -9 and SIGSTOP: processes that go on, processes that come back, and files that
+//! are left.
 
 use crate::cave_place::*;
 use crate::common::{fail, json, text};
@@ -24,7 +25,7 @@ fn the_wall_goes_on_without_a_killed_facet_which_comes_back() {
     assert_eq!(code, Some(0), "{wrong}");
     assert!(wrong.contains("facet r ended (killed by signal 9)"), "{wrong}");
     let left = numbers(&place.log("out", "l"));
-    // who was not killed missed nothing
+    // the facet that was not killed missed nothing
     assert_eq!(left, (0..left.len() as u64).collect::<Vec<_>>());
     let right = place.log("out", "r");
     let left = place.log("out", "l");
@@ -73,7 +74,7 @@ fn without_a_launcher_its_facets_end_and_others_wait_for_a_server_in_vain() {
     signal(run.pid(), Signal::KILL);
     wait("the end of all facets", || facets.iter().all(|(_, pid)| !alive(*pid)));
     drop(run);
-    // by hand
+    // the processes are started one by one, without `tumble cave`
     let server = place.start("serve", &["--quiet"]);
     let l = place.start(
         "facet",
@@ -93,25 +94,25 @@ fn without_a_launcher_its_facets_end_and_others_wait_for_a_server_in_vain() {
     signal(r.pid(), Signal::INT);
     let (code, _, wrong) = r.end();
     assert_eq!(code, Some(0), "{wrong}");
-    // what kill -9 left is taken away by the next run
+    // the next run removes the files that kill -9 left
     place.succeed("cave", &["--no-pictures", "--duration", "0.1", "--quiet"]);
     place.assert_clean();
 }
 
-/// A second process is refused; one that is started instead of a killed one is let in.
+/// A second process of a facet is refused; a process that replaces a killed one is accepted.
 #[test]
 fn a_facet_is_shown_by_one_process() {
-    rivals("shared_memory", 3..20);
+    run_duplicates("shared_memory", 3..20);
 }
 
-/// The same by datagrams, where who comes last has the connection first.
+/// The same over UDP, where the newest process has the connection first.
 #[test]
 fn a_facet_is_shown_by_one_process_over_udp() {
-    rivals("udp", 3..20);
+    run_duplicates("udp", 3..20);
 }
 
-fn rivals(carrier: &str, joins: std::ops::Range<u64>) {
-    let place = Place::new(&format!("cave-rivals-{carrier}"), &wall());
+fn run_duplicates(carrier: &str, joins: std::ops::Range<u64>) {
+    let place = Place::new(&format!("cave-duplicates-{carrier}"), &wall());
     let server = place.start("serve", &["--transport", carrier, "--summary", &place.path("summary.json")]);
     let [l, r] = ["l", "r"].map(|name| {
         place.start(
@@ -144,7 +145,8 @@ fn rivals(carrier: &str, joins: std::ops::Range<u64>) {
     }
     let summary = json(&place.folder.path("summary.json"));
     let (facet, frames) = (&summary["facets"][0], summary["frames"].as_u64().unwrap());
-    // five if nobody took the other's connection before it could speak; without end if nobody was refused
+    // five if no process took the other's connection before it could answer; without end if none
+    // was refused
     assert!(joins.contains(&facet["joined"].as_u64().unwrap()), "{facet}");
     let logged: std::collections::BTreeSet<u64> =
         ["out", "second", "third"].iter().flat_map(|folder| numbers(&place.log(folder, "l"))).collect();
@@ -159,7 +161,7 @@ fn rivals(carrier: &str, joins: std::ops::Range<u64>) {
     );
 }
 
-/// A second Ctrl-C ends what a facet that does not answer holds up, and so does its process.
+/// A second Ctrl-C ends a run that waits for a facet without an answer, and kills the facet.
 #[test]
 fn a_second_signal_ends_a_run_at_once() {
     let place = Place::new("cave-forced", &wall());
@@ -168,14 +170,15 @@ fn a_second_signal_ends_a_run_at_once() {
     let facets = run.facets();
     signal(run.facet("r"), Signal::STOP);
     signal(run.pid(), Signal::INT);
-    // right behind the first it would be the same one; in order it would take 3 s to give the facet up
+    // directly after the first it would merge with it; in order it would take 3 s until the facet
+    // is dropped
     std::thread::sleep(Duration::from_millis(800));
     signal(run.pid(), Signal::INT);
     let (code, said, wrong) = run.end();
     assert_eq!(code, Some(130), "{said}{wrong}");
     assert!(!wrong.contains("does not end and was killed"), "{wrong}");
     wait("the end of all facets", || facets.iter().all(|(_, pid)| !alive(*pid)));
-    // the cave is free, and the next run takes away what is left
+    // the lock of the cave is free, and the next run removes the remaining files
     let locks = std::fs::read_dir(place.folder.path("run"))
         .unwrap()
         .flatten()
@@ -187,9 +190,9 @@ fn a_second_signal_ends_a_run_at_once() {
     place.assert_clean();
 }
 
-/// Kill -9 leaves the file that was begun; the next recording of that name takes it away.
+/// Kill -9 leaves the unfinished file; the next recording of that name removes it.
 #[test]
-fn what_a_killed_start_has_recorded_goes_with_the_next_recording() {
+fn the_next_recording_removes_the_file_of_a_killed_start() {
     let place = Place::new("cave-killed-start", &wall());
     let record = place.path("run.mcap");
     let hidden = || {
@@ -213,9 +216,11 @@ fn what_a_killed_start_has_recorded_goes_with_the_next_recording() {
     place.assert_clean();
 }
 
-/// Others could cut it to nothing, which ends every process that reads it. (The counter that iceoryx2 makes for all users was such a file.)
+/// The files that processes of a run share are open to this user only: another user could truncate
+/// one, which would crash every process that maps it. (The counter that iceoryx2 makes for all
+/// users was such a file.)
 #[test]
-fn what_a_run_shares_is_open_to_nobody_else() {
+fn shared_files_are_open_to_no_other_user() {
     let place = Place::new("cave-private", &wall());
     let run = place
         .start("cave", &["--no-pictures", "--log-dir", &place.path("out"), "--summary", &place.path("summary.json")]);
@@ -241,7 +246,8 @@ fn what_a_run_shares_is_open_to_nobody_else() {
     // samples and services in both directions, connections of two facets, the wakeup counters
     assert!(files.len() >= 10, "{files:?}");
     for file in &files {
-        // those of other tests may be gone by now, and one that is being made is less open still
+        // files of other tests may be gone by now, and a file under construction is even less
+        // accessible
         assert!(std::fs::metadata(file).map_or(0, |about| about.mode()) & 0o077 == 0, "{}", file.display());
     }
     if about.uid() == 0 {
@@ -264,7 +270,7 @@ fn what_a_run_shares_is_open_to_nobody_else() {
 #[test]
 fn a_node_that_cannot_be_reached_and_a_time_that_is_too_short_are_told() {
     let place = Place::new("cave-nowhere", &wall());
-    // of another kind than the addresses that are listened at, and no name server is asked
+    // not of the same family as the addresses of the server, and without a name lookup
     let nowhere = "2001:db8::1";
     let far = format!(
         "transport = \"udp\"\n[security]\nkey_file = \"cave.key\"\n[[node]]\nname = \"far\"\naddress = \"{nowhere}\"\nlaunch = [\"true\", \"{{arguments}}\"]\n"
@@ -288,7 +294,7 @@ fn a_node_that_cannot_be_reached_and_a_time_that_is_too_short_are_told() {
     assert!(wrong.contains("drop_timeout_ms") && wrong.contains("100"), "{wrong}");
 }
 
-/// Both sides say what a wrong key looks like, though no frame was ever shown.
+/// Both sides name a wrong key as a possible cause when no frame was shown.
 #[test]
 fn a_wrong_key_is_named() {
     use std::os::unix::fs::PermissionsExt;
@@ -299,7 +305,7 @@ fn a_wrong_key_is_named() {
     let place = Place::new("cave-key", &(wall() + "transport = \"udp\"\n[security]\nkey_file = \"cave.key\"\n"));
     key(&place, "1");
     let server = place.start("serve", &["--connect-timeout", "60", "--listen", "127.0.0.1:0"]);
-    // the key is read before the lock is taken, and the lock names the address last
+    // the key is read before the lock is taken, and the lock file gets the address last
     wait("the address", || lines(place.folder.path("run")).contains("127.0.0.1"));
     key(&place, "2");
     let (code, _, wrong) = place.start("facet", &["--facet", "l", "--no-pictures", "--connect-timeout", "1"]).end();
@@ -309,7 +315,7 @@ fn a_wrong_key_is_named() {
     assert!(code == Some(0) && wrong.contains("forged") && wrong.contains("another key file"), "{wrong}");
 }
 
-/// The text of all small files of a folder and of those in it.
+/// Returns the text of all small files of a folder and its subfolders.
 fn lines(folder: std::path::PathBuf) -> String {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     entries

@@ -1,4 +1,5 @@
-//! What a run measured and counted comes out in its summary: with facets of the test's own that are late by a known time, and packets that are wrong in known ways.
+//! The summary of a run contains its measurements and counts. The test's own facets are late by a
+//! known time, and packets have known faults.
 
 use crate::cave_place::{cave_of, in_place, make_runtime};
 use crate::cave_users::{SCENE, Server};
@@ -9,10 +10,10 @@ use tumble::net::sync::udp::UdpFacet;
 use tumble::net::sync::{Facet, Input, Task};
 
 const PATIENCE: Duration = Duration::from_secs(60);
-/// By so much the second facet shows each frame after the first.
+/// Delay of the second facet after the first, for each frame.
 const LATER: Duration = Duration::from_millis(40);
 
-/// Draws at once; whether a frame is to be shown now.
+/// Draws a pending frame at once. Returns whether a frame is to be shown now.
 fn is_to_present(facet: &mut Facet<UdpFacet>) -> bool {
     match facet.next(Duration::from_millis(2)).unwrap() {
         Task::Draw => {
@@ -28,7 +29,7 @@ fn is_to_present(facet: &mut Facet<UdpFacet>) -> bool {
 }
 
 #[test]
-fn the_summary_tells_how_late_a_facet_was_and_what_was_refused() {
+fn the_summary_has_the_delay_of_a_facet_and_the_refused_packets() {
     let folder = Folder::new("cave-figures");
     let sync = "transport = \"udp\"\nready_timeout_ms = 5000\ndrop_timeout_ms = 5000\nconnect_timeout_ms = 60000";
     let screens =
@@ -71,22 +72,24 @@ fn the_summary_tells_how_late_a_facet_was_and_what_was_refused() {
     });
     second.leave().unwrap();
     server.end();
-    let told = json(&summary);
-    assert_eq!(told["unknown_peers"], serde_json::json!({ "truncated": 3, "oversize": 2, "foreign": 4 }));
-    let ms = |what: &str| told[what]["p50_ms"].as_f64().unwrap();
-    // an input of one frame is shown by the next, and both wait for the second facet
+    let figures = json(&summary);
+    assert_eq!(figures["unknown_peers"], serde_json::json!({ "truncated": 3, "oversize": 2, "foreign": 4 }));
+    let ms = |what: &str| figures[what]["p50_ms"].as_f64().unwrap();
+    // an input at one frame is shown by the next, and both wait for the second facet
     let later = 1e3 * LATER.as_secs_f64();
-    assert!(ms("skew") > later - 5.0 && ms("skew") <= told["barrier"]["max_ms"].as_f64().unwrap(), "{told}");
+    assert!(ms("skew") > later - 5.0 && ms("skew") <= figures["barrier"]["max_ms"].as_f64().unwrap(), "{figures}");
     assert!(
-        ms("input_to_picture") > 2.0 * later - 5.0 && ms("input_to_picture") <= 1e3 * told["wall_s"].as_f64().unwrap(),
-        "{told}"
+        ms("input_to_picture") > 2.0 * later - 5.0
+            && ms("input_to_picture") <= 1e3 * figures["wall_s"].as_f64().unwrap(),
+        "{figures}"
     );
-    assert_eq!(told["facets"][1]["refused_packets"], serde_json::json!({}));
+    assert_eq!(figures["facets"][1]["refused_packets"], serde_json::json!({}));
 }
 
-/// A port that other machines reach is not opened without saying who is meant: datagrams of trackers are not sealed.
+/// A tracker port that other machines reach needs a list of senders: datagrams of trackers are not
+/// encrypted.
 #[test]
-fn a_tracker_from_other_machines_is_named_or_not_heard() {
+fn a_tracker_port_for_other_machines_needs_a_list_of_senders() {
     let (folder, scene, cave) = crate::cave_users::place("cave-tracker-open");
     let run = |more: &[&str]| {
         let args = ["serve", &scene, "--cave", &cave, "--connect-timeout", "0.2", "--tracker"];

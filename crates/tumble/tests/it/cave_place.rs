@@ -1,4 +1,5 @@
-//! What tests of caves share: their texts, a folder with a place of its own for locks and sockets, and processes that end with the test.
+//! Support for tests of caves: their files, a folder with its own locks and sockets, and processes
+//! that end with the test.
 
 use crate::common::*;
 use rustix::process::{Pid, Signal, kill_process};
@@ -9,10 +10,10 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Nothing here waits longer.
+/// Maximum time that a test waits for anything.
 pub const PATIENCE: Duration = Duration::from_secs(90);
 
-/// Two things that fall, without shadows.
+/// Two bodies that fall, without shadows.
 pub const SCENE: &str = "description = \"Things that fall\"
 [world]
 dt_s = 0.01
@@ -49,7 +50,8 @@ pub const ROOM: [(&str, [&str; 3]); 4] = [
     ("floor", ["[-1.5, -1.5, 0]", "[1.5, -1.5, 0]", "[-1.5, 1.5, 0]"]),
 ];
 
-/// A cave of one user and these screens, each with a facet of its name that has keys by its place among them, and keys of `[sync]`.
+/// Returns a cave with one user, these screens with a facet each of the same name, and the keys
+/// `sync` of the table `[sync]`. `facet` gives further keys of a facet by its index.
 pub fn cave_of(screens: &[(&str, [&str; 3])], facet: impl Fn(usize) -> String, sync: &str) -> String {
     let part = |(k, (name, [a, b, c])): (usize, &(&str, [&str; 3]))| {
         let facet = facet(k);
@@ -61,7 +63,7 @@ pub fn cave_of(screens: &[(&str, [&str; 3])], facet: impl Fn(usize) -> String, s
     format!("[[user]]\nname = \"u\"\neye_m = [0, 0, 1.5]\n{parts}[sync]\n{sync}\n")
 }
 
-/// The room, with small pictures. A frame waits for 2 s, so that a busy machine loses none.
+/// Returns the room, with small pictures. A frame waits for 2 s, so that a busy machine loses none.
 pub fn cube() -> String {
     cave_of(
         &ROOM,
@@ -70,7 +72,7 @@ pub fn cube() -> String {
     )
 }
 
-/// A wall of two screens. A frame waits for 200 ms, a facet is dropped after 500.
+/// Returns a wall of two screens. A frame waits for 200 ms; a facet is dropped after 500 ms.
 pub fn wall() -> String {
     let screens =
         [("l", ["[-2, 2, 0.5]", "[0, 2, 0.5]", "[-2, 2, 2.0]"]), ("r", ["[0, 2, 0.5]", "[2, 2, 0.5]", "[0, 2, 2.0]"])];
@@ -81,19 +83,19 @@ pub fn wall() -> String {
     )
 }
 
-/// A place for locks and sockets.
+/// Makes the folder for locks and sockets.
 pub fn make_runtime(folder: &Folder) {
     std::fs::DirBuilder::new().mode(0o700).create(folder.path("run")).unwrap();
 }
 
-/// The command with its locks and sockets in the folder, and without a display.
+/// Returns the command with its locks and sockets in the folder, and without a display.
 pub fn in_place(folder: &Folder, args: &[&str]) -> Command {
     let mut command = command(args);
     command.env("XDG_RUNTIME_DIR", folder.path("run")).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
     command
 }
 
-/// A folder with a scene and a cave, and a place of its own for locks and sockets.
+/// A folder with a scene and a cave, and with its own locks and sockets.
 pub struct Place {
     pub folder: Folder,
     pub scene: String,
@@ -112,7 +114,7 @@ impl Place {
         text(&self.folder.path(file))
     }
 
-    /// `tumble WHAT SCENE --cave CAVE ARGS`.
+    /// Returns the command `tumble WHAT SCENE --cave CAVE ARGS`.
     pub fn command(&self, what: &str, args: &[&str]) -> Command {
         in_place(&self.folder, &[&[what, &self.scene, "--cave", &self.cave], args].concat())
     }
@@ -129,7 +131,7 @@ impl Place {
         Process { child, said: Some(said), wrong: Some(wrong) }
     }
 
-    /// Runs to its end, with success; the summary.
+    /// Runs the command to its end, which must be a success; returns the summary.
     pub fn succeed(&self, what: &str, args: &[&str]) -> Value {
         let summary = self.path("summary.json");
         let (code, _, wrong) = self.start(what, &[args, &["--summary", &summary]].concat()).end();
@@ -137,22 +139,22 @@ impl Place {
         json(&self.folder.path("summary.json"))
     }
 
-    /// What facets wrote about the frames they have shown; an empty list before there is any.
+    /// Returns the records of a facet about its shown frames; empty before the first.
     pub fn log(&self, folder: &str, facet: &str) -> Vec<Value> {
         let text =
             std::fs::read_to_string(self.folder.path(folder).join(facet).join("frames.jsonl")).unwrap_or_default();
-        // the last line may be on its way
+        // the last line may be incomplete
         text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
     }
 
-    /// Waits until a facet has shown a frame beyond `frame`.
+    /// Waits until a facet has shown a frame after `frame`.
     pub fn wait_for(&self, folder: &str, facet: &str, frame: u64) {
         wait(&format!("frame {frame} of {facet}"), || {
             self.log(folder, facet).last().is_some_and(|line| line["frame"].as_u64() > Some(frame))
         });
     }
 
-    /// Locks, sockets, services: nothing may be left of them.
+    /// Asserts that no locks, sockets and services are left.
     pub fn assert_clean(&self) {
         fn files(folder: PathBuf) -> Vec<PathBuf> {
             let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
@@ -163,7 +165,7 @@ impl Place {
     }
 }
 
-/// Keeps what a pipe says.
+/// Collects the output of a pipe.
 fn reader(mut pipe: impl Read + Send + 'static) -> std::thread::JoinHandle<String> {
     std::thread::spawn(move || {
         let mut bytes = Vec::new();
@@ -172,7 +174,7 @@ fn reader(mut pipe: impl Read + Send + 'static) -> std::thread::JoinHandle<Strin
     })
 }
 
-/// A process that ends with the test.
+/// A process that is killed at the end of the test.
 pub struct Process {
     child: Child,
     said: Option<std::thread::JoinHandle<String>>,
@@ -184,7 +186,7 @@ impl Process {
         self.child.id() as i32
     }
 
-    /// Waits for its end: exit code, stdout, stderr.
+    /// Waits for the end; returns exit code, stdout and stderr.
     pub fn end(mut self) -> (Option<i32>, String, String) {
         let mut status = None;
         wait("the end of a process", || {
@@ -195,7 +197,7 @@ impl Process {
         (status.unwrap().code(), text(self.said.take()), text(self.wrong.take()))
     }
 
-    /// Its facets, by name.
+    /// Returns the names and process ids of its facets.
     pub fn facets(&self) -> Vec<(String, i32)> {
         let pid = self.pid();
         let children = std::fs::read_to_string(format!("/proc/{pid}/task/{pid}/children")).unwrap();
@@ -225,7 +227,7 @@ pub fn signal(pid: i32, signal: Signal) {
 }
 
 pub fn alive(pid: i32) -> bool {
-    // a process that ended and was not asked for yet is none any more
+    // a zombie, which has ended and was not waited for yet, does not count
     std::fs::read_to_string(format!("/proc/{pid}/stat"))
         .is_ok_and(|stat| !stat.rsplit(')').next().unwrap_or("").trim_start().starts_with('Z'))
 }

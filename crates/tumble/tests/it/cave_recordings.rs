@@ -6,7 +6,8 @@ use crate::common::*;
 use tumble::net::record::recover;
 use tumble::net::sync::{RecordedFrame, SessionReader};
 
-/// Of an MCAP file: opcode, begin and end of each record. (Magic of 8 bytes, then records of an opcode, a length of 8 bytes, and so many bytes.)
+/// Returns opcode, begin and end of each record of an MCAP file. The file has a magic of 8 bytes,
+/// then records of an opcode, a length of 8 bytes, and the content.
 fn records(bytes: &[u8]) -> Vec<(u8, usize, usize)> {
     let (mut at, mut out) = (8, Vec::new());
     while at + 9 <= bytes.len() - 8 {
@@ -17,7 +18,8 @@ fn records(bytes: &[u8]) -> Vec<(u8, usize, usize)> {
     out
 }
 
-/// Where each chunk ends, and how many frames are in it, by the index of messages behind it. The channel of states is known from the repetition at the end.
+/// Returns the end of each chunk and the number of frames in it, from the message index behind it.
+/// The id of the channel of states is read from the summary section.
 fn chunks(bytes: &[u8]) -> Vec<(usize, usize)> {
     let u16_at = |at: usize| u16::from_le_bytes(bytes[at..at + 2].try_into().unwrap());
     let u32_at = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
@@ -82,7 +84,7 @@ fn a_run_cut_at_every_structural_boundary_keeps_what_was_flushed() {
         let _ = std::fs::remove_file(&mended);
         let saved = match recover(&cut, &mended) {
             Ok(report) => report.frames as usize,
-            // so near to its beginning it is no recording yet
+            // cut so near the beginning, it is no recording yet
             Err(_) => 0,
         };
         assert_eq!(saved, expected, "cut at byte {at}");

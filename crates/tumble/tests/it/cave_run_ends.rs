@@ -1,4 +1,4 @@
-//! How runs in a cave end when something is in the way, and what they keep.
+//! Endings of runs in a cave under faults, and the files that they keep.
 
 use crate::cave_place::*;
 use crate::common::*;
@@ -7,7 +7,7 @@ use std::os::unix::fs::symlink;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// How a complete MCAP file ends.
+/// The end of a complete MCAP file.
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
 #[test]
@@ -39,7 +39,7 @@ fn a_signal_during_the_start_leaves_nothing() {
         let facets = run.facets();
         signal(run.pid(), Signal::INT);
         let (code, _, wrong) = run.end();
-        // the first may come before the command does anything
+        // the first signals may arrive before the command does anything
         assert!(code == Some(0) || code.is_none() && facets.is_empty(), "after {ms} ms: {code:?}, {wrong}");
         facets.iter().for_each(|(name, pid)| assert!(!alive(*pid), "facet {name} lives on"));
         place.assert_clean();
@@ -80,7 +80,7 @@ fn a_recording_that_is_played_or_whose_run_does_not_begin_is_not_written_over() 
         assert_eq!(code, Some(2), "{wrong}");
         assert!(wrong.contains("the same file"), "{wrong}");
     }
-    // nobody joins
+    // no facet joins
     let (code, _, wrong) = place.start("serve", &["--record", &record, "--connect-timeout", "0.3"]).end();
     assert_eq!(code, Some(1), "{wrong}");
     assert!(before == std::fs::read(&record).unwrap());
@@ -202,7 +202,7 @@ fn a_shipped_cave_is_one_from_every_folder() {
 #[test]
 fn a_run_of_long_paths_has_a_name_and_is_found() {
     let place = Place::new("cave-long", &wall());
-    // of bytes that a text writes as six each
+    // of bytes that are written as six characters each
     let deep = (0..6).fold(place.folder.path("deep"), |path, _| path.join("\u{1}".repeat(200)));
     std::fs::create_dir_all(&deep).unwrap();
     let (scene, cave) = (deep.join("scene.toml"), deep.join("cave.toml"));
@@ -226,7 +226,7 @@ fn a_run_of_long_paths_has_a_name_and_is_found() {
 }
 
 #[test]
-fn replacing_a_run_signals_nobody_who_only_has_its_number() {
+fn replacing_a_run_signals_no_other_process_with_its_number() {
     let place = Place::new("cave-bystander", &wall());
     let server = place.start("serve", &["--connect-timeout", "60"]);
     wait("the lock", || {
@@ -235,7 +235,8 @@ fn replacing_a_run_signals_nobody_who_only_has_its_number() {
     let path = lock_file(&place).unwrap();
     signal(server.pid(), Signal::KILL);
     let _ = server.end();
-    // the number in the file is another process's by now, and somebody holds the lock who has not written yet
+    // the number in the file is another process's by now, and a process that has not written yet
+    // holds the lock
     let mut bystander = Command::new("sleep").arg("60").spawn().unwrap();
     let mut stale = json(&path);
     stale["pid"] = bystander.id().into();
@@ -273,7 +274,7 @@ fn a_run_goes_on_when_nobody_reads_its_stderr() {
 #[test]
 fn the_others_go_on_when_a_facet_cannot_be_started_again() {
     let place = Place::new("cave-unstartable", &wall());
-    // a command that goes away
+    // a command whose program disappears
     let program = place.folder.path("tumble");
     std::fs::copy(env!("CARGO_BIN_EXE_tumble"), &program).unwrap();
     let mut command = Command::new(&program);

@@ -1,4 +1,5 @@
-//! What users do in a cave, by a facet of the test's own: keys walk, the wand pulls, bodies push; and recordings that are shown again.
+//! Actions of users in a cave, by a facet of the test's own: keys walk, the wand pulls, user
+//! colliders push; and replays of recordings.
 
 use crate::cave_place::{cave_of, in_place, make_runtime};
 use crate::common::{Folder, json, succeed, text};
@@ -10,10 +11,11 @@ use tumble::collide::{Pose, Vec3};
 use tumble::net::sync::udp::{Timing, UdpFacet};
 use tumble::net::sync::{EndReason, Facet, FacetOptions, Input, Task};
 
-/// Nothing here waits longer.
+/// Maximum time that a test waits for anything.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A ball of 2 kg that floats at 1 m height, 2 m in front of the user, whose cave is the world's frame. Nothing else acts.
+/// A ball of 2 kg that floats at 1 m height, 2 m in front of the user; the cave's frame is the
+/// world's. No force acts on it.
 pub const SCENE: &str = "description = \"A ball that floats\"
 [world]
 dt_s = 0.01
@@ -27,7 +29,7 @@ position_m = [0, 2, 1]
 origin_m = [0, 0, 0]
 ";
 
-/// One screen, by datagrams.
+/// A cave of one screen, over UDP.
 pub fn one_screen() -> String {
     let sync = "transport = \"udp\"\nready_timeout_ms = 2000\ndrop_timeout_ms = 4000\nconnect_timeout_ms = 60000";
     let screen = ("f", ["[-1, 3, 0.5]", "[1, 3, 0.5]", "[-1, 3, 2.0]"]);
@@ -39,7 +41,7 @@ pub struct Server {
     pub facet: Facet<UdpFacet>,
     pub address: SocketAddr,
     hash: [u8; 32],
-    // what is said goes on being taken
+    // keeps the pipe open, so that the server can go on writing
     _stderr: BufReader<ChildStderr>,
     sequence: u64,
 }
@@ -58,7 +60,7 @@ pub fn place(test: &str) -> (Folder, String, String) {
     (folder, scene, cave)
 }
 
-/// Starts a server that waits for its facets, and where it is.
+/// Starts a server that waits for its facets; returns its address too.
 fn serve(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> (Child, SocketAddr, BufReader<ChildStderr>) {
     let mut child = in_place(folder, &[&["serve", scene, "--cave", cave, "--no-realtime"], args].concat())
         .stderr(Stdio::piped())
@@ -76,7 +78,7 @@ fn serve(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> (Child, Soc
     (child, address, stderr)
 }
 
-/// The hash by which the server knows scene and cave: it tells a facet of another one.
+/// Returns the server's hash of scene and cave, from its refusal of a facet with another hash.
 fn joined_hash(folder: &Folder, scene: &str, cave: &str) -> [u8; 32] {
     let (mut child, address, _stderr) = serve(folder, scene, cave, &["--transport", "udp"]);
     let mut stranger = connect(address, "f", 0, [0; 32], scene);
@@ -106,12 +108,12 @@ impl Server {
         Server { child, facet: connect(address, "f", 0, hash, scene), address, hash, _stderr: stderr, sequence: 0 }
     }
 
-    /// One more facet.
+    /// Connects one more facet.
     pub fn another(&self, name: &str, number: u16, scene: &str) -> Facet<UdpFacet> {
         connect(self.address, name, number, self.hash, scene)
     }
 
-    /// Shows frames until one is numbered `frame` or more, and does this before each.
+    /// Shows frames until one has the number `frame` or more, and calls `doing` before each.
     pub fn show_until(&mut self, frame: u64, mut doing: impl FnMut(&mut Input)) {
         let start = Instant::now();
         loop {
@@ -146,20 +148,21 @@ impl Server {
         }
     }
 
-    /// Shows frames until something holds that comes by another way than frames do, as what a tracker says.
+    /// Shows frames until a condition holds that depends on other input than frames, such as a
+    /// tracker's.
     pub fn show_while(&mut self, what: &str, doing: impl Fn(), mut until: impl FnMut(&Server) -> bool) {
         let start = Instant::now();
         while !until(self) {
             assert!(start.elapsed() < PATIENCE, "{what} did not come");
             doing();
-            // more than some thousands a second are not heard
+            // the server reads at most some thousand datagrams per second
             std::thread::sleep(Duration::from_millis(2));
             let next = self.facet.session().shown().map_or(0, |(frame, _)| frame + 1);
             self.show_until(next, |_| {});
         }
     }
 
-    /// Ends it in order; it must have had no trouble.
+    /// Ends the session in order; no error may have occurred.
     pub fn end(mut self) {
         rustix::process::kill_process(
             rustix::process::Pid::from_raw(self.child.id() as i32).unwrap(),
@@ -167,7 +170,7 @@ impl Server {
         )
         .unwrap();
         let start = Instant::now();
-        // it hears us leave, and ends
+        // the server gets the good-bye, and ends
         self.facet.leave().unwrap();
         let status = loop {
             if let Some(status) = self.child.try_wait().unwrap() {
@@ -195,16 +198,16 @@ fn a_key_walks_the_cave_ahead_at_its_pace() {
     let mut server = Server::start(&folder, &scene, &cave, &[]);
     server.show_until(20, |_| {});
     assert_eq!((server.cave(), server.ball()), (Vec3::zeros(), Vec3::new(0.0, 2.0, 1.0)));
-    // 100 frames of 0.01 s at 1.5 m/s, along y; the frame at which it begins may be one later
+    // 100 frames of 0.01 s at 1.5 m/s, along y; the first may be one frame late
     server.show_until(120, |input| input.keys = vec![0x1A]);
     let walked = server.cave();
     assert!((walked.y - 1.5).abs() < 0.06 && walked.x == 0.0 && walked.z == 0.0, "{walked:?}");
-    // who lets go stands
+    // without a key the user stands
     server.show_until(130, |_| {});
     let stands = server.cave();
     server.show_until(150, |_| {});
     assert_eq!(server.cave(), stands);
-    // no body was asked for, so none pushes
+    // without `--user-colliders`, no collider pushes
     assert_eq!(server.ball(), Vec3::new(0.0, 2.0, 1.0));
     assert!(server.facet.viewer().users[0].input > 100);
 }
@@ -214,14 +217,15 @@ fn a_wand_pulls_what_it_points_at() {
     let (folder, scene, cave) = place("cave-pull");
     let mut server = Server::start(&folder, &scene, &cave, &[]);
     let from = |x: f64| Pose::from_parts(Vec3::new(x, 0.0, 1.0).into(), tumble::collide::Quat::identity());
-    // it points along y at the ball, then goes aside with it by half a meter
+    // the wand points along y at the ball, then moves sideways with it by half a meter
     server.show_until(20, |input| (input.wand, input.buttons) = (Some(from(0.0)), 1));
     server.show_until(300, |input| (input.wand, input.buttons) = (Some(from(0.5)), 1));
-    // the point that is held is the one nearest to the user, on the ball's surface; nothing keeps the ball from turning about it
+    // the grabbed point is the one nearest to the user, on the ball's surface; the ball is free to
+    // turn about it
     let ball = server.ball();
     let from_hand = (ball - Vec3::new(0.5, 1.8, 1.0)).norm();
     assert!((from_hand - 0.2).abs() < 0.005 && ball.x > 0.25, "{ball:?}, {from_hand} m from the hand");
-    // a wand that points past it pulls nothing
+    // a wand that points past the ball pulls nothing
     let (folder, scene, cave) = place("cave-miss");
     let mut server = Server::start(&folder, &scene, &cave, &[]);
     server.show_until(20, |input| (input.wand, input.buttons) = (Some(from(0.3)), 1));
@@ -233,7 +237,8 @@ fn a_wand_pulls_what_it_points_at() {
 fn a_body_pushes_what_it_walks_into() {
     let (folder, scene, cave) = place("cave-push");
     let mut server = Server::start(&folder, &scene, &cave, &["--user-colliders"]);
-    // the capsule of 0.25 m meets the ball of 0.2 m when the cave has gone 1.55 m; at 1.5 m/s after 1.03 s
+    // the capsule of 0.25 m touches the ball of 0.2 m when the cave has moved 1.55 m: at 1.5 m/s
+    // after 1.03 s
     server.show_until(90, |input| input.keys = vec![0x1A]);
     assert_eq!(server.ball(), Vec3::new(0.0, 2.0, 1.0));
     server.show_until(220, |input| input.keys = vec![0x1A]);
@@ -280,7 +285,7 @@ fn a_recording_is_shown_again_bit_by_bit_also_when_it_was_cut() {
         json(&folder.path("b.json"))["replay"],
         serde_json::json!({ "same": 61, "different": 0, "not_compared": 0 })
     );
-    // half of it, mended
+    // half of it, recovered
     let bytes = std::fs::read(&file).unwrap();
     let cut = folder.write("cut.mcap", &bytes[..bytes.len() / 2]);
     let said = succeed(&["recover", &cut, "-o", &path("mended.mcap")]);
@@ -288,7 +293,7 @@ fn a_recording_is_shown_again_bit_by_bit_also_when_it_was_cut() {
     run(&["replay", &path("mended.mcap"), &moving, "--log-dir", &path("d")]);
     let saved = lines("d");
     assert!(!saved.is_empty() && saved.len() < 61 && saved[..] == recorded[..saved.len()], "{} frames", saved.len());
-    // another scene is another matter
+    // a recording is refused for another scene
     let larger = folder.write("larger.toml", SCENE.replace("radius_m = 0.2", "radius_m = 0.21"));
     let out = in_place(&folder, &["replay", &file, &larger, "--cave", &cave]).output().unwrap();
     let wrong = String::from_utf8_lossy(&out.stderr);

@@ -236,7 +236,7 @@ mod tests {
         let server = Wakeup::serve(&run, NOBODY).unwrap();
         let facets: Vec<Wakeup> = (0..3).map(|_| Wakeup::join(&run, NOBODY).unwrap().unwrap()).collect();
         let (long, moment) = (Duration::from_secs(30), Duration::from_millis(50));
-        let cpu_latency = AtomicBool::new(false);
+        let woken = AtomicBool::new(false);
         std::thread::scope(|scope| {
             let waiting: Vec<_> = facets.iter().map(|facet| (facet.facet_notifications(), facet)).collect();
             let waiting: Vec<_> = waiting
@@ -246,10 +246,10 @@ mod tests {
             server.notify_facets();
             waiting.into_iter().for_each(|facet| facet.join().unwrap().unwrap());
             let seen = server.server_notifications();
-            let (server, cpu_latency) = (&server, &cpu_latency);
+            let (server, woken) = (&server, &woken);
             let waits = scope.spawn(move || {
                 server.wait_for_server_notifications(seen, 3, long).unwrap();
-                cpu_latency.store(true, SeqCst);
+                woken.store(true, SeqCst);
             });
             while server.counter(WANTED).load(SeqCst) != seen + 3 {
                 std::thread::sleep(Duration::from_millis(1));
@@ -258,7 +258,7 @@ mod tests {
             facets[0].notify_server(false);
             facets[1].notify_server(false);
             std::thread::sleep(moment);
-            assert!(!cpu_latency.load(SeqCst), "two of three answers woke it");
+            assert!(!woken.load(SeqCst), "two of three answers woke it");
             facets[2].notify_server(false);
             waits.join().unwrap();
             // a notification between reading and waiting is not lost

@@ -6,7 +6,7 @@ use std::time::Duration;
 use tumble_net::sync::simulated_network::NetworkConditions;
 use tumble_net::sync::{FacetSession, Membership, ServerEvent, ServerSession, SyncMode, Task, WaitReason};
 
-/// States of a session, as the facet that fails is in them.
+/// Conditions that hold in the states of a session, seen from the facet that fails.
 const MOMENTS: [fn(&Stage) -> bool; 5] = [
     |s| s.now > Duration::ZERO,                               // joining
     |s| s.facets[1].shown.len() >= 10 && s.facets[1].drawing, // drawing
@@ -22,7 +22,7 @@ pub fn task(stage: &Stage) -> Option<Task> {
 pub fn at(moment: usize, seed: u64) -> Stage {
     let conditions = if seed.is_multiple_of(2) { NetworkConditions::PERFECT } else { STORM };
     let mut stage = Stage::new(seed, conditions, 3, SyncMode::Lockstep);
-    stage.facets[0].takes = 4 * MS; // so that the others wait for somebody
+    stage.facets[0].takes = 4 * MS; // so that the others wait for a facet
     assert!(stage.until(Duration::from_secs(2), MOMENTS[moment]), "moment {moment}");
     stage
 }
@@ -31,8 +31,9 @@ fn shown(stage: &Stage) -> Vec<usize> {
     stage.facets.iter().map(|f| f.shown.len()).collect()
 }
 
-/// From moment and fault to its outcome: the wall stands still for at most the time that a frame waits, goes on with the others, drops the dead one after
-/// `drop_timeout`, and has it back within a second of its restart.
+/// Each kill from each state: the wall stands still for at most the timeout of a frame and goes on
+/// with the other facets. The server drops the dead facet after `drop_timeout`, and the restarted
+/// facet is in step within a second.
 #[test]
 fn a_facet_that_is_killed_is_dropped_and_comes_back() {
     for (moment, seed) in (1..MOMENTS.len()).flat_map(|m| [(m, 10 + 2 * m as u64), (m, 11 + 2 * m as u64)]) {
@@ -64,9 +65,10 @@ fn a_facet_that_is_killed_is_dropped_and_comes_back() {
     }
 }
 
-/// Where it is known that its process has ended nobody waits for it: the wall does not stand still, and it is gone at once.
+/// The server is notified that the process has ended: the wall does not stand still, and the facet
+/// is dropped at once.
 #[test]
-fn a_facet_whose_process_ended_is_waited_for_no_longer() {
+fn the_server_does_not_wait_for_a_facet_whose_process_ended() {
     for (moment, seed) in (1..MOMENTS.len()).flat_map(|m| [(m, 110 + 2 * m as u64), (m, 111 + 2 * m as u64)]) {
         let mut stage = at(moment, seed);
         let before = shown(&stage);
@@ -76,7 +78,7 @@ fn a_facet_whose_process_ended_is_waited_for_no_longer() {
         assert_eq!(stage.server.as_ref().unwrap().membership(1), Membership::Absent);
         stage.run(160 * MS);
         let after = shown(&stage);
-        // ten frames of 16 ms, and in a storm some that take longer
+        // ten frames of 16 ms; in a storm some take longer
         let least = if seed.is_multiple_of(2) { 9 } else { 6 };
         assert!(
             after[0] >= before[0] + least && after[2] >= before[2] + least,
@@ -91,13 +93,14 @@ fn a_facet_whose_process_ended_is_waited_for_no_longer() {
     }
 }
 
-/// A server that sleeps until a message comes or something is due does the same, at the same times, as one that looks ten thousand times a second.
+/// A server that sleeps until a message or a deadline does the same, at the same times, as one that
+/// polls ten thousand times a second.
 #[test]
 fn a_server_that_sleeps_until_something_is_due_misses_nothing() {
     for (seed, conditions, resend) in
         [(120, NetworkConditions::PERFECT, None), (121, STORM, Some(5 * MS)), (122, STORM, Some(5 * MS))]
     {
-        let [cpu_latency, asleep] = [false, true].map(|sleeps| {
+        let [awake, asleep] = [false, true].map(|sleeps| {
             let mut stage = Stage::new(seed, conditions, 3, SyncMode::Lockstep);
             stage.options.resend_interval = resend;
             (stage.sleeps, stage.server) = (sleeps, Some(ServerSession::new(stage.options.clone(), &stage.base)));
@@ -109,10 +112,10 @@ fn a_server_that_sleeps_until_something_is_due_misses_nothing() {
             (stage.events, stage.facets.iter().map(|f| (f.shown.clone(), f.shown_at.clone())).collect::<Vec<_>>())
         });
         assert!(
-            cpu_latency.0.iter().any(|e| matches!(e, ServerEvent::Late(1, _)))
-                && cpu_latency.0.iter().any(|e| matches!(e, ServerEvent::Gone(1, false)))
+            awake.0.iter().any(|e| matches!(e, ServerEvent::Late(1, _)))
+                && awake.0.iter().any(|e| matches!(e, ServerEvent::Gone(1, false)))
         );
-        assert!(cpu_latency == asleep, "seed {seed}");
+        assert!(awake == asleep, "seed {seed}");
     }
 }
 
@@ -129,7 +132,8 @@ fn a_facet_that_is_started_again_at_once_takes_its_old_place() {
     }
 }
 
-/// Frozen for less than `drop_timeout` it catches up; for longer, it is dropped, notices, and joins again. What it shows is never old news.
+/// A facet that is frozen for less than `drop_timeout` catches up. After a longer freeze it is
+/// dropped, notices it, and joins again. It never shows an older frame than before.
 #[test]
 fn a_facet_that_freezes_catches_up_or_joins_again() {
     for (moment, seed) in (1..MOMENTS.len()).flat_map(|m| [(m, 50 + 2 * m as u64), (m, 51 + 2 * m as u64)]) {
@@ -139,7 +143,7 @@ fn a_facet_that_freezes_catches_up_or_joins_again() {
             stage.facets[1].frozen_until = stage.now + freeze;
             stage.run(freeze);
             let after = shown(&stage);
-            let lost = if moment == 4 { 20 } else { 12 }; // frames of 16 ms in the 100 or 200 ms of standing still
+            let lost = if moment == 4 { 20 } else { 12 }; // frames of 16 ms in the 100 or 200 ms for which the wall stands still
             assert!(
                 after[0] + lost >= before[0] + (freeze.as_millis() / 17) as usize,
                 "the wall goes on: {before:?} {after:?} (moment {moment})"
@@ -156,9 +160,10 @@ fn a_facet_that_freezes_catches_up_or_joins_again() {
     }
 }
 
-/// A server that dies leaves facets that say so; the next one has them all within a second, though its frames are others.
+/// The facets of a dead server report it. The next server has all of them within a second, although
+/// its frame numbers differ.
 #[test]
-fn a_server_that_is_killed_is_missed_and_its_successor_found() {
+fn facets_notice_a_killed_server_and_find_its_successor() {
     for (moment, seed) in (1..MOMENTS.len()).flat_map(|m| [(m, 70 + 2 * m as u64), (m, 71 + 2 * m as u64)]) {
         for pause in [Duration::ZERO, 1000 * MS, 3000 * MS] {
             let mut stage = at(moment, seed);
@@ -171,7 +176,8 @@ fn a_server_that_is_killed_is_missed_and_its_successor_found() {
             let before = shown(&stage);
             stage.start_server();
             let all = |s: &Stage| s.facets.iter().zip(&before).all(|(f, n)| f.shown.len() >= n + 5);
-            // a facet that has not noticed yet is told by the new server when it beats, at the latest after half a second
+            // a facet that has not noticed yet learns of the new server by its heartbeat, after
+            // half a second at most
             assert!(
                 stage.until(1700 * MS, all),
                 "moment {moment}, seed {seed}, {pause:?}: {before:?} {:?}",
@@ -184,7 +190,7 @@ fn a_server_that_is_killed_is_missed_and_its_successor_found() {
     }
 }
 
-/// A partition is a freeze of the wire: nobody dies, both sides notice, and it heals.
+/// A partition of the network: both sides notice, and the session recovers.
 #[test]
 fn a_partition_heals() {
     for (seed, gap) in [(90, 300 * MS), (91, 300 * MS), (92, 4000 * MS), (93, 4000 * MS)] {

@@ -1,4 +1,5 @@
-//! The same session over each link: every facet shows every frame once, and the hashes are the same on all of them.
+//! The same session over each link: every facet shows every frame once, and the hashes are the same
+//! on all links.
 
 use super::simulated_session::{SCENE, scene, viewer};
 use super::threads::{facet, hashes, options};
@@ -14,7 +15,7 @@ use tumble_net::sync::{
 
 type Frames = Vec<(u64, [u8; 16], [u8; 16])>;
 
-/// Runs 60 frames; what each facet has shown.
+/// Runs 60 frames and returns the frames that each facet has shown.
 fn run<S: ServerLink, F: FacetLink + Send + 'static>(server: S, facets: Vec<F>) -> Frames {
     let stop = Arc::new(AtomicBool::new(false));
     let facets: Vec<_> = facets.into_iter().enumerate().map(|(k, link)| facet(link, k as u16, &stop)).collect();
@@ -61,7 +62,7 @@ fn a_session_is_the_same_over_every_link() {
     assert!(local == udp && local == shm);
 }
 
-/// A facet of another scene, until it is told why it is not let in.
+/// Runs a facet of another scene until the server refuses it; returns the reason.
 fn refused(link: impl FacetLink + Send + 'static) -> std::thread::JoinHandle<String> {
     std::thread::spawn(move || {
         let mut facet = Facet::new(link, FacetOptions::new("facet 0", [8; 32], 1), scene());
@@ -70,7 +71,7 @@ fn refused(link: impl FacetLink + Send + 'static) -> std::thread::JoinHandle<Str
                 return why;
             }
         }
-        "never told".into()
+        "no reason arrived".into()
     })
 }
 
@@ -80,9 +81,9 @@ fn refuse(link: impl ServerLink) {
     assert!(server.wait_for_facets(Duration::from_secs(3)).unwrap_err().to_string().contains("facet 0 did not join"));
 }
 
-/// The server closes right after it said why: what it said arrives first.
+/// The server closes right after it has sent the reason, and the reason arrives first.
 #[test]
-fn a_facet_of_another_scene_hears_why_it_is_refused_on_both_links() {
+fn a_refused_facet_gets_the_reason_over_both_links() {
     let run = format!("refused-{}", std::process::id());
     let udp = UdpServer::bind(([127, 0, 0, 1], 0).into(), 1, None, Timing::default()).unwrap();
     let facets = [

@@ -1,4 +1,4 @@
-//! Frames over a network at its worst: all of them, in order, the same on every facet.
+//! Frames over bad networks: all of them, in order, the same on every facet.
 
 use super::simulated_session::*;
 use std::time::Duration;
@@ -13,7 +13,7 @@ pub const STORM: NetworkConditions = NetworkConditions {
     delay: [Duration::from_micros(200), Duration::from_millis(1)],
 };
 
-/// As many frames as the test's length asks for.
+/// Number of frames: `long` if `TUMBLE_SLOW` is set.
 fn frames(short: u64, long: u64) -> u64 {
     if std::env::var_os("TUMBLE_SLOW").is_some() { long } else { short }
 }
@@ -39,12 +39,13 @@ fn run(seed: u64, conditions: NetworkConditions, count: u64, first: u64) -> Stag
     stage
 }
 
-/// What facets have shown is exactly `first..first + count`, in order, and true.
+/// Asserts that the facets have shown exactly the frames `first..first + count`, in order, with the
+/// right content.
 fn assert_whole(stage: &Stage, count: u64, first: u64) {
-    let wanted: Vec<u64> = (0..count).map(|k| first.wrapping_add(k)).collect();
+    let expected: Vec<u64> = (0..count).map(|k| first.wrapping_add(k)).collect();
     for k in 0..6 {
         let shown = stage.numbers(k);
-        assert_eq!(shown[..count as usize], wanted, "facet {k}");
+        assert_eq!(shown[..count as usize], expected, "facet {k}");
         assert_eq!(stage.facets[k].session.as_ref().unwrap().counts().missing, 0);
         let (counts, _) = stage.server.as_ref().unwrap().counts(k as u16);
         assert_eq!((counts.late, counts.mismatched, counts.dropped), (0, 0, 0), "facet {k}");
@@ -98,7 +99,8 @@ fn the_same_seed_gives_the_same_run_determinism() {
     assert!(log(4) != log(5));
 }
 
-/// Each facet shows what is newest: numbers rise, and what is shown is true; a slow one leaves frames out and holds nobody up.
+/// In the mode `latest` each facet shows the newest frame: numbers rise and the content is right. A
+/// slow facet skips frames and delays no other.
 #[test]
 fn latest_leaves_out_what_is_old() {
     let mut stage = Stage::new(6, STORM, 3, SyncMode::Latest);
@@ -118,7 +120,7 @@ fn latest_leaves_out_what_is_old() {
     assert!((40..=61).contains(&slow), "{slow} frames of 50 ms in 3 s");
 }
 
-/// A facet that is slower than the others is waited for, so long as it is within its time.
+/// The server waits for a facet that is slower than the others and within its timeout.
 #[test]
 fn the_slowest_gives_the_pace() {
     let mut stage = Stage::new(7, NetworkConditions::PERFECT, 6, SyncMode::Lockstep);

@@ -1,4 +1,4 @@
-//! A world and its copy: what is seen is the same, whatever is added, removed, switched off or moved.
+//! A world and its copy look the same after objects are added, removed, disabled or moved.
 
 use super::simulated_session::{scene, viewer};
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use tumble_net::sync::quantize::{POSITION_ERROR_M, ROTATION_ERROR_RAD};
 use tumble_net::sync::wire::MessageError;
 use tumble_net::sync::{Mirror, Publisher, VIEWER_NAME};
 
-/// A server's world and a client's, and what goes between.
+/// The worlds of a server and of a client, with the publisher and the mirror between them.
 struct Pair {
     world: World,
     publisher: Publisher,
@@ -23,7 +23,7 @@ impl Pair {
         Pair { publisher: Publisher::new(&world, exact, u32::MAX - 2), world, mirror: Mirror::new(scene()), frame: 0 }
     }
 
-    /// Sends a frame; whether the list of objects was new.
+    /// Sends a frame. Returns whether the list of objects was new.
     fn send(&mut self) -> bool {
         self.frame += 1;
         let published = self.publisher.publish(&self.world, &viewer(self.frame), self.frame).unwrap();
@@ -38,7 +38,7 @@ impl Pair {
         published.fresh
     }
 
-    /// Object by object, by name: the same are there, alive, and stand where they should.
+    /// Compares the worlds object by object, by name: existence, whether enabled, and pose.
     fn compare(&self) {
         let names = |w: &World| {
             let mut names: Vec<String> = w.ids().iter().map(|&id| w.object(id).unwrap().name().to_string()).collect();
@@ -71,7 +71,7 @@ fn a_copy_follows_frame_by_frame() {
     }
 }
 
-/// A replica has the very bits of the state.
+/// A replica has the exact bits of the state.
 #[test]
 fn a_replica_is_exact() {
     let mut pair = Pair::new(true);
@@ -80,7 +80,8 @@ fn a_replica_is_exact() {
         pair.send();
     }
     assert_eq!(pair.mirror.world().state(), pair.world.state());
-    // and goes on by itself as the server does, except the contacts' memory: free flight
+    // in free flight the replica also steps to the same bits; only the memory of contacts is
+    // missing
     let ball = pair.world.find("ball 4").unwrap();
     pair.world.set_pose(ball, Pose::translation(0.0, 0.0, 50.0)).unwrap();
     pair.send();
@@ -127,7 +128,7 @@ fn objects_come_and_go() {
         pair.world.remove(id).unwrap();
         assert!(pair.send(), "{name} is gone");
     }
-    // somebody else of an old name
+    // another object with a former name
     pair.world.add(RigidBody::with_mass("ball 2", Shape::sphere(0.5).unwrap(), 1.0).unwrap()).unwrap();
     assert!(pair.send());
     let ball = pair.mirror.world().find("ball 2").unwrap();
@@ -179,7 +180,7 @@ fn a_mesh_of_the_scene_is_not_sent_again() {
     mirror.apply_snapshot(&publisher.snapshot()).unwrap();
     mirror.apply_state(1, 0.0, &published.state).unwrap();
     assert_eq!(mirror.hash(), published.hash);
-    // one that the scene has not travels whole
+    // a mesh that is not in the scene is sent whole
     let mut other = tumble_core::collide::TriMesh { vertices: vec![], triangles: vec![] };
     if let Shape::Mesh(mesh) = &shape {
         other = mesh.mesh().clone();
@@ -193,7 +194,7 @@ fn a_mesh_of_the_scene_is_not_sent_again() {
     let Some(Drawn::Mesh(mesh)) = boulder.renderable().unwrap().visuals()[0].drawn() else { panic!("a mesh") };
     assert_eq!(mesh.triangles.len(), 4);
     assert!((mesh.diagonal() - 12.0f64.sqrt()).abs() < 1e-12, "{}", mesh.diagonal());
-    // an open one, which is drawn and nothing else
+    // an open mesh, which is only drawn
     let sheet = TriMesh { vertices: [Vec3::zeros(), Vec3::x(), Vec3::y()].to_vec(), triangles: vec![[0, 1, 2]] };
     let open = Arc::new(VisualMesh::new("sheet", sheet.clone()).unwrap());
     let drawn =
@@ -224,7 +225,8 @@ fn what_cannot_be_sent_is_said() {
     assert!(pair.send(), "and all is well again");
 }
 
-/// Another scene than the server's is noticed by what it lacks, and the copy stays as it was.
+/// A list of another scene is refused with the name of a missing object, and the copy stays as it
+/// was.
 #[test]
 fn a_list_that_does_not_fit_changes_nothing() {
     let mut pair = Pair::new(false);
@@ -238,7 +240,8 @@ fn a_list_that_does_not_fit_changes_nothing() {
     assert_eq!(mirror.revision(), None);
 }
 
-/// The hash is of the world that is shown, not of the message: whoever moves something in between is found out.
+/// The hash is computed from the world that is shown, not from the message, so it detects a change
+/// in between.
 #[test]
 fn the_hash_is_read_from_the_world() {
     let mut pair = Pair::new(false);
@@ -252,7 +255,7 @@ fn the_hash_is_read_from_the_world() {
     assert_ne!(pair.mirror.hash(), published.hash, "the time differs: 0 here, a step there");
 }
 
-/// One bit of anything that can be seen makes another scene; what cannot be seen does not.
+/// A visible change of one bit changes the hash of the scene; an invisible one does not.
 #[test]
 fn the_hash_of_a_scene_sees_what_can_be_seen() {
     use tumble_net::sync::scene_hash;
@@ -281,7 +284,8 @@ fn the_hash_of_a_scene_sees_what_can_be_seen() {
     assert_eq!(hash(&faster), same);
 }
 
-/// The same scene lies in another folder on another machine: a texture counts by the name of its file.
+/// The scene may lie in another folder on another machine: only the file name of a texture enters
+/// the hash.
 #[test]
 fn the_hash_of_a_scene_does_not_see_folders() {
     let hash = |texture: &str| {

@@ -1,4 +1,4 @@
-//! Facets that draw slower than frames come.
+//! Facets that draw more slowly than frames are published.
 
 use super::lockstep::STORM;
 use super::simulated_session::*;
@@ -6,7 +6,7 @@ use std::time::Duration;
 use tumble_net::sync::simulated_network::NetworkConditions;
 use tumble_net::sync::{Membership, SyncMode};
 
-/// Frames come every 16 ms; each facet draws so long.
+/// A session with a frame every 16 ms and facets that draw for `takes`.
 fn wall(seed: u64, conditions: NetworkConditions, takes: Duration) -> Stage {
     let mut stage = Stage::new(seed, conditions, 3, SyncMode::Lockstep);
     stage.facets.iter_mut().for_each(|facet| facet.takes = takes);
@@ -14,7 +14,7 @@ fn wall(seed: u64, conditions: NetworkConditions, takes: Duration) -> Stage {
     stage
 }
 
-/// How often each was waited for in vain, for its drawing or its showing.
+/// Returns how many frames of each facet were late, at drawing or at showing.
 fn late(stage: &Stage) -> Vec<u64> {
     (0..3).map(|k| stage.server.as_ref().unwrap().counts(k).0).map(|counts| counts.late + counts.missing).collect()
 }
@@ -23,12 +23,13 @@ fn in_step(stage: &Stage) -> bool {
     (0..3).all(|k| stage.server.as_ref().unwrap().membership(k) == Membership::InStep)
 }
 
-/// From here on all show the same frames, one after the other, each as long as the slowest draws, and nobody is late.
+/// Asserts that from now on all facets show the same consecutive frames, at the pace of the
+/// slowest, and none is late.
 fn assert_steady(stage: &mut Stage, takes: Duration, storm: bool, what: &str) {
     let (before, shown) = (late(stage), stage.facets[0].shown.len());
     stage.run(1000 * MS);
     let numbers: Vec<u64> = stage.numbers(0).split_off(shown);
-    // in a storm what is lost is sent again after 5 ms
+    // in a storm a lost message is sent again after 5 ms
     let least = 1000 / (takes.as_millis() as usize + if storm { 25 } else { 10 });
     assert!(numbers.len() >= least && numbers.windows(2).all(|w| w[1] == w[0] + 1), "{what}: {numbers:?}");
     assert_eq!(before, late(stage), "{what}");
@@ -42,7 +43,8 @@ fn assert_steady(stage: &mut Stage, takes: Duration, storm: bool, what: &str) {
     stage.assert_true();
 }
 
-/// While they are out of step the server goes on with the first, and frames come faster than they draw.
+/// While the slow facets are out of step the server goes on with the first one, and frames come
+/// faster than the others draw.
 #[test]
 fn slow_facets_that_stumbled_are_in_step_again() {
     for (seed, conditions) in [(1, NetworkConditions::PERFECT), (2, STORM)] {
@@ -61,9 +63,9 @@ fn slow_facets_that_stumbled_are_in_step_again() {
     }
 }
 
-/// Nobody is ready, so nobody is held up: all are waited for.
+/// If no facet is ready, none is delayed by another: the server waits for all.
 #[test]
-fn where_all_stumble_nobody_is_late() {
+fn no_facet_is_late_if_all_stumble() {
     for (seed, conditions, takes) in
         [(5, NetworkConditions::PERFECT, 20 * MS), (6, STORM, 20 * MS), (7, NetworkConditions::PERFECT, 150 * MS)]
     {
@@ -76,7 +78,7 @@ fn where_all_stumble_nobody_is_late() {
     }
 }
 
-/// All that were there are gone: the server goes on without them after `drop_timeout`, and not later.
+/// If all facets are gone, the server goes on without them after `drop_timeout`.
 #[test]
 fn a_wall_that_is_gone_holds_the_server_up_for_a_while_only() {
     let mut stage = wall(8, NetworkConditions::PERFECT, 2 * MS);
@@ -89,7 +91,7 @@ fn a_wall_that_is_gone_holds_the_server_up_for_a_while_only() {
     assert!(frames(&stage) >= before + 10, "it goes on");
 }
 
-/// Who draws too long for the others is waited for once, not again and again.
+/// The server waits for a facet that is too slow once, not for each frame.
 #[test]
 fn a_facet_that_is_too_slow_holds_the_wall_up_once() {
     for (seed, conditions) in [(3, NetworkConditions::PERFECT), (4, STORM)] {
@@ -102,7 +104,7 @@ fn a_facet_that_is_too_slow_holds_the_wall_up_once() {
         let frames = stage.facets[0].shown.len() - before;
         assert!(frames >= if seed == 3 { 180 } else { 110 }, "{frames} frames in 3 s");
         assert_eq!(late(&stage), [0, 1, 0]);
-        // it goes on showing what is newest, and in order
+        // it goes on showing the newest frames, in order
         let numbers = stage.numbers(1);
         assert!(numbers.is_sorted_by(|a, b| a < b) && numbers.len() > 30, "{numbers:?}");
         stage.assert_true();

@@ -1,4 +1,5 @@
-//! Whose place it is: good-byes, connections that close early, two processes of one facet.
+//! Places of facets in a session: good-byes, connections that close early, two processes of one
+//! facet.
 
 use super::faults::{at, task};
 use super::lockstep::STORM;
@@ -10,9 +11,9 @@ use tumble_net::sync::{
     EndReason, FacetOptions, FacetSession, Membership, ServerEvent, ServerSession, SyncMode, Task, WaitReason,
 };
 
-/// Good-byes are no deaths: END ends the facets, LEAVE frees the place at once.
+/// A good-bye differs from a death: END ends the facets, LEAVE frees the place at once.
 #[test]
-fn good_byes_are_told_from_deaths() {
+fn good_byes_are_not_deaths() {
     let mut stage = at(1, 96);
     let facet = stage.facets[1].session.as_mut().unwrap();
     facet.leave();
@@ -30,17 +31,18 @@ fn good_byes_are_told_from_deaths() {
     }
 }
 
-/// The link of facet 1 closes, as both ends report it.
+/// Closes the link of facet 1, as both ends report it.
 fn close_link(stage: &mut Stage, why: Closed) {
     let now = stage.now;
     stage.server.as_mut().unwrap().on_event(now, 1, LinkEvent::Closed(why), &[]);
     stage.facets[1].session.as_mut().unwrap().on_event(now, LinkEvent::Closed(why), Vec::new().into());
-    stage.net.set_partitioned(1, true); // what was under way is gone
+    stage.net.set_partitioned(1, true); // messages on the way are lost
     stage.run(50 * MS);
     stage.net.set_partitioned(1, false);
 }
 
-/// Joined and without a frame, before the first one and in mid-run: the number that the server knows is used up.
+/// A facet joins and loses its connection without a frame, before the first frame and in mid-run.
+/// The server accepts its next attempt although the attempt's number is used up.
 #[test]
 fn a_facet_that_loses_its_connection_before_its_first_frame_is_let_in_again() {
     let membership = |s: &Stage| s.server.as_ref().unwrap().membership(1);
@@ -65,7 +67,7 @@ fn a_facet_that_loses_its_connection_before_its_first_frame_is_let_in_again() {
     }
 }
 
-/// A server that drops a joining facet, whose link does not close, tells it to join anew.
+/// A server that drops a joining facet, whose link does not close, requests a new join.
 #[test]
 fn a_number_that_is_used_up_is_answered() {
     let mut stage = Stage::new(142, NetworkConditions::PERFECT, 2, SyncMode::Lockstep);
@@ -77,7 +79,7 @@ fn a_number_that_is_used_up_is_answered() {
     assert!(stage.until(500 * MS, |s| membership(s) == Membership::Following));
 }
 
-/// A run that ends before its first frame ends for those who have joined, too.
+/// A run that ends before its first frame also ends for the facets that have joined.
 #[test]
 fn the_end_is_understood_before_the_first_frame() {
     let mut stage = Stage::new(143, NetworkConditions::PERFECT, 2, SyncMode::Lockstep);
@@ -88,9 +90,10 @@ fn the_end_is_understood_before_the_first_frame() {
     assert_eq!(task(&stage), Some(Task::Ended(EndReason::Ended)));
 }
 
-/// Two processes of one facet, and a link that gives the connection to who came last, as shared memory and UDP do: the loser comes back at once. What each
-/// is told to do next, and how often somebody joined.
-fn rivals(
+/// Simulates several processes of one facet over a link that gives the connection to the newest, as
+/// shared memory and UDP do. The process that loses the connection reconnects within 20 ms. `has`
+/// is the process with the connection.
+fn run_duplicates(
     now: &mut Duration,
     server: &mut ServerSession,
     facets: &mut [Option<FacetSession>],
@@ -103,7 +106,7 @@ fn rivals(
         for k in 0..facets.len() {
             let Some(facet) = facets[k].as_mut().filter(|f| !matches!(f.task(), Task::Ended(_))) else { continue };
             if k != *has {
-                // who has lost the connection looks again within 20 ms, as who is new
+                // a process without the connection reconnects every 20 ms, as a new one
                 if !now.as_millis().is_multiple_of(20) {
                     continue;
                 }
@@ -132,31 +135,32 @@ fn rivals(
 }
 
 #[test]
-fn of_two_processes_of_one_facet_the_first_that_answers_stays() {
+fn the_first_process_of_a_facet_keeps_its_place() {
     let process = |seed: u64| Some(FacetSession::new(FacetOptions::new("facet 0", SCENE, seed << 16), scene()));
     let refused = |facet: &Option<FacetSession>| matches!(facet.as_ref().unwrap().task(), Task::Ended(EndReason::Refused(why)) if why.contains("another process already shows facet 'facet 0'"));
     let over = |facet: &Option<FacetSession>| matches!(facet.as_ref().unwrap().task(), Task::Ended(_));
     let mut server =
         ServerSession::new(Stage::new(1, NetworkConditions::PERFECT, 1, SyncMode::Lockstep).options, &scene());
     let (mut now, mut has, mut facets) = (MS, 0, vec![process(1)]);
-    rivals(&mut now, &mut server, &mut facets, 100 * MS, &mut has);
+    run_duplicates(&mut now, &mut server, &mut facets, 100 * MS, &mut has);
     facets.extend([process(2), process(3)]);
-    rivals(&mut now, &mut server, &mut facets, 400 * MS, &mut has);
+    run_duplicates(&mut now, &mut server, &mut facets, 400 * MS, &mut has);
     assert_eq!([over(&facets[0]), refused(&facets[1]), refused(&facets[2])], [false, true, true]);
     assert_eq!(server.membership(0), Membership::InStep);
     let joined = server.counts(0).0.joined;
     assert!(joined <= 6, "{joined}");
-    rivals(&mut now, &mut server, &mut facets, 1000 * MS, &mut has);
-    assert_eq!(server.counts(0).0.joined, joined, "there is peace");
+    run_duplicates(&mut now, &mut server, &mut facets, 1000 * MS, &mut has);
+    assert_eq!(server.counts(0).0.joined, joined, "no further joins");
 
-    // Killed and started again: at once. The one that was stopped meanwhile, and goes on, has lost its place for good.
+    // A process that is killed and started again gets the place at once. The process that was
+    // stopped meanwhile and goes on is refused.
     let stopped = facets[0].take();
     facets.push(process(4));
-    rivals(&mut now, &mut server, &mut facets, 100 * MS, &mut has);
+    run_duplicates(&mut now, &mut server, &mut facets, 100 * MS, &mut has);
     assert_eq!(server.membership(0), Membership::InStep);
-    rivals(&mut now, &mut server, &mut facets, 2500 * MS, &mut has);
+    run_duplicates(&mut now, &mut server, &mut facets, 2500 * MS, &mut has);
     facets[0] = stopped;
-    rivals(&mut now, &mut server, &mut facets, 400 * MS, &mut has);
+    run_duplicates(&mut now, &mut server, &mut facets, 400 * MS, &mut has);
     assert_eq!([refused(&facets[0]), over(&facets[3])], [true, false]);
     assert_eq!(server.membership(0), Membership::InStep);
 }

@@ -1,11 +1,12 @@
-//! A pose in 20 bytes: the stated error holds.
+//! A pose in 20 bytes stays within the stated error.
 
 use crate::support::Dice;
 use tumble_core::collide::{Pose, Quat, Vec3};
 use tumble_net::sync::Mirror;
 use tumble_net::sync::quantize::{POSE_BYTES, POSITION_ERROR_M, ROTATION_ERROR_RAD, put_pose};
 
-/// The pose that arrives, through a whole message: a world of one body, published and mirrored.
+/// Returns the pose that arrives after a whole message: a world of one body, published and
+/// mirrored.
 fn through(pose: Pose) -> Pose {
     use tumble_core::{RigidBody, Settings, World, collide::Shape};
     let world = |pose| {
@@ -14,7 +15,7 @@ fn through(pose: Pose) -> Pose {
         world
     };
     let (there, mut publisher) = (world(pose), tumble_net::sync::Publisher::new(&world(Pose::identity()), false, 0));
-    // the id of the base's body is that of the world's: both are the first of their world
+    // the id of the base's body equals that of the world's body: both are the first of their world
     let published = publisher.publish(&there, &Default::default(), 1).unwrap();
     let mut mirror = Mirror::new(world(Pose::identity()));
     mirror.apply_snapshot(&publisher.snapshot()).unwrap();
@@ -31,7 +32,8 @@ fn random(dice: &mut Dice) -> Pose {
     Pose::from_parts(p.into(), Quat::from_quaternion(if q.norm() > 0.1 { q } else { nalgebra::Quaternion::identity() }))
 }
 
-/// The angle between two rotations by the chord of their quaternions, which does not lose small angles as an arc cosine does.
+/// Returns the angle between two rotations, from the chord of their quaternions: an arc cosine
+/// would lose small angles.
 fn angle(a: &Quat, b: &Quat) -> f64 {
     let (a, b) = (a.coords, b.coords);
     4.0 * ((a - b).norm().min((a + b).norm()) / 2.0).asin()
@@ -54,7 +56,8 @@ fn the_error_of_a_pose_is_within_what_is_stated() {
     );
 }
 
-/// Where components are equal the choice of the one left out hangs on a bit; where three are the same the error is largest.
+/// If components are equal, one bit decides which one is left out; if three are equal, the error is
+/// largest.
 #[test]
 fn corners_of_the_range_are_within_it_too() {
     for signs in 0..16 {

@@ -1,4 +1,4 @@
-//! What is not accepted: another scene, name or version, another picture, a frame that does not fit.
+//! Refused input: another scene, name or version, another picture, a frame that does not fit.
 
 use super::simulated_session::*;
 use tumble_net::sync::messages::FrameAck;
@@ -20,7 +20,7 @@ fn other_scenes_names_and_versions_are_refused_by_name() {
             spoil(&mut bytes);
             server.on_event(MS, 1, LinkEvent::Message, &bytes);
         }
-        let told = server
+        let reason = server
             .events()
             .into_iter()
             .find_map(|e| if let ServerEvent::Refused(1, why) = e { Some(why) } else { None })
@@ -28,22 +28,26 @@ fn other_scenes_names_and_versions_are_refused_by_name() {
         for out in server.outgoing() {
             facet.on_event(MS, LinkEvent::Message, out.message.to_vec().into());
         }
-        (told, facet.task())
+        (reason, facet.task())
     };
     let over = |why: &str| Task::Ended(EndReason::Refused(why.to_owned()));
-    let (told, task) = refusal(FacetOptions::new("facet 1", [8; 32], 1), |_| {});
-    assert!(told.contains(&"07".repeat(32)) && told.contains(&"08".repeat(32)) && told.contains("facet 1"), "{told}");
-    assert_eq!(task, over(&told));
-    let (told, task) = refusal(FacetOptions::new("left", SCENE, 1), |_| {});
-    assert!(told.contains("'facet 1'") && told.contains("'left'"), "{told}");
-    assert_eq!(task, over(&told));
-    let (told, _) = refusal(FacetOptions::new("facet 1", SCENE, 1), |bytes| bytes[76] = 9);
-    assert!(told.contains("version 2") && told.contains("version 9"), "{told}");
+    let (reason, task) = refusal(FacetOptions::new("facet 1", [8; 32], 1), |_| {});
+    assert!(
+        reason.contains(&"07".repeat(32)) && reason.contains(&"08".repeat(32)) && reason.contains("facet 1"),
+        "{reason}"
+    );
+    assert_eq!(task, over(&reason));
+    let (reason, task) = refusal(FacetOptions::new("left", SCENE, 1), |_| {});
+    assert!(reason.contains("'facet 1'") && reason.contains("'left'"), "{reason}");
+    assert_eq!(task, over(&reason));
+    let (reason, _) = refusal(FacetOptions::new("facet 1", SCENE, 1), |bytes| bytes[76] = 9);
+    assert!(reason.contains("version 2") && reason.contains("version 9"), "{reason}");
 }
 
-/// A facet that draws something else than was sent is found out by its hash, and the wall goes on.
+/// The hash of a facet that draws something else than was sent does not match, and the wall goes
+/// on.
 #[test]
-fn a_facet_that_draws_something_else_is_found_out() {
+fn a_facet_that_draws_something_else_is_detected() {
     let base = scene();
     let mut server =
         ServerSession::new(Stage::new(1, NetworkConditions::PERFECT, 1, SyncMode::Lockstep).options, &base);
@@ -75,17 +79,17 @@ fn a_facet_that_draws_something_else_is_found_out() {
         server.outgoing().iter().for_each(|out| facet.on_event(now, LinkEvent::Message, out.message.to_vec().into()));
     }
     assert!(shown > 50 && wrong > 15, "{shown} {wrong}");
-    let told = server
+    let reported = server
         .events()
         .iter()
         .filter(|e| matches!(e, ServerEvent::Ready(0, frame, _, false) if frame % 3 == 0))
         .count();
-    assert_eq!((server.counts(0).0.mismatched, told), (wrong, wrong as usize));
+    assert_eq!((server.counts(0).0.mismatched, reported), (wrong, wrong as usize));
 }
 
-/// A frame that does not fit is refused, asked for again, and shown when it comes right.
+/// A frame that does not fit is refused, requested again, and shown once it is right.
 #[test]
-fn a_frame_that_does_not_fit_is_asked_for_again() {
+fn a_frame_that_does_not_fit_is_requested_again() {
     let base = scene();
     let mut server = ServerSession::new(
         ServerOptions {

@@ -1,4 +1,5 @@
-//! A server and its facets over a simulated network, by a clock of our own: the same seed gives the same run.
+//! A server and its facets over a simulated network with a simulated clock: the same seed gives the
+//! same run.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -12,7 +13,7 @@ use tumble_net::sync::*;
 pub const SCENE: [u8; 32] = [7; 32];
 pub const MS: Duration = Duration::from_millis(1);
 
-/// Balls that fall on a floor, a box that slides, a post that stands.
+/// Spheres that fall on a floor, a box that slides, a fixed post.
 pub fn scene() -> World {
     let mut world = World::new(Settings { dt: 1.0 / 60.0, ..Settings::default() }).unwrap();
     world.add_static(RigidBody::fixed("ground", Shape::half_space())).unwrap();
@@ -38,18 +39,18 @@ pub fn viewer(frame: u64) -> Viewer {
 pub struct Actor {
     pub session: Option<FacetSession>,
     pub frozen_until: Duration,
-    /// Until when it draws the frame it has begun.
+    /// End of the drawing of the frame it has begun.
     pub busy_until: Duration,
     pub drawing: bool,
     pub takes: Duration,
-    /// From being told to show a frame to showing it.
+    /// Time from the request to show a frame until it is shown.
     pub shows_after: Duration,
-    told: Option<Duration>,
-    /// Its clock is ahead by so much.
+    show_requested: Option<Duration>,
+    /// Offset of its clock.
     pub clock: Duration,
-    /// Frames shown, with what was answered, over all its lives.
+    /// Frames shown, with the acknowledgements, over all its lives.
     pub shown: Vec<(u64, FrameAck)>,
-    /// When, by the stage's clock.
+    /// Times of these frames, by the stage's clock.
     pub shown_at: Vec<Duration>,
     born: u64,
 }
@@ -62,11 +63,11 @@ pub struct Stage {
     pub options: ServerOptions,
     pub facets: Vec<Actor>,
     pub events: Vec<ServerEvent>,
-    /// Hash that the server expects of each frame, by a mirror of our own.
+    /// Expected hash of each frame, from an independent mirror.
     pub expected: BTreeMap<u64, [u8; 16]>,
     pub base: World,
     pub every: Duration,
-    /// The server is woken by messages and when something is due, and not at every tick.
+    /// Whether the server is woken by messages and deadlines only, and not at every tick.
     pub sleeps: bool,
     next_frame: Duration,
 }
@@ -83,7 +84,7 @@ impl Stage {
             drawing: false,
             takes: Duration::from_millis(2),
             shows_after: Duration::ZERO,
-            told: None,
+            show_requested: None,
             clock: Duration::ZERO,
             shown: Vec::new(),
             shown_at: Vec::new(),
@@ -127,7 +128,7 @@ impl Stage {
         self.server = Some(ServerSession::new(self.options.clone(), &self.base));
     }
 
-    /// Runs for so long, a tenth of a millisecond at a time.
+    /// Runs for `time`, in ticks of a tenth of a millisecond.
     pub fn run(&mut self, time: Duration) {
         let until = self.now + time;
         while self.now < until {
@@ -135,7 +136,7 @@ impl Stage {
         }
     }
 
-    /// Runs until it holds, at most `time`.
+    /// Runs until `holds` does, for at most `time`; returns whether it does.
     pub fn until(&mut self, time: Duration, mut holds: impl FnMut(&Stage) -> bool) -> bool {
         let until = self.now + time;
         while self.now < until && !holds(self) {
@@ -153,7 +154,8 @@ impl Stage {
                         server.on_event(self.now, k, LinkEvent::Message, &bytes);
                     }
                 }
-                // what comes to a frozen process waits in its socket; here it is lost, which is worse
+                // messages to a frozen process would wait in its socket; here they are lost, which
+                // is worse
                 Destination::Facet(k) if self.now >= self.facets[k as usize].frozen_until => {
                     let actor = &mut self.facets[k as usize];
                     if let Some(facet) = &mut actor.session {
@@ -196,11 +198,11 @@ impl Stage {
             Task::Draw if !actor.drawing => {
                 (actor.drawing, actor.busy_until) = (session.begin().is_some(), self.now + actor.takes)
             }
-            Task::Present(_) if self.now >= *actor.told.get_or_insert(self.now) + actor.shows_after => {
+            Task::Present(_) if self.now >= *actor.show_requested.get_or_insert(self.now) + actor.shows_after => {
                 session.presented(there);
                 actor.shown.extend(session.shown());
                 actor.shown_at.push(self.now);
-                actor.told = None;
+                actor.show_requested = None;
             }
             _ => {}
         }
@@ -216,7 +218,7 @@ impl Stage {
         self.facets[k].shown.iter().map(|(frame, _)| *frame).collect()
     }
 
-    /// Every frame that was shown showed what the server had.
+    /// Asserts that every frame shown has the content of the server's frame.
     pub fn assert_true(&self) {
         for (k, actor) in self.facets.iter().enumerate() {
             for (frame, done) in &actor.shown {
@@ -226,7 +228,8 @@ impl Stage {
     }
 }
 
-/// The hash of a frame by another way than the server's: a mirror that is new for each frame and gets messages over no network.
+/// Returns the hash of a frame by another way than the server's: by a new mirror for each frame,
+/// without a network.
 pub fn expected(base: &World, world: &World, viewer: &Viewer, frame: u64) -> [u8; 16] {
     let mut publisher = Publisher::new(base, false, 100);
     let published = publisher.publish(world, viewer, frame).unwrap();

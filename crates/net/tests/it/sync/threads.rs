@@ -1,4 +1,5 @@
-//! Server and facets on threads, over the in-process link, by the clock; recording and replay of it.
+//! Server and facets on threads, over the in-process link, by the real clock; recording and replay
+//! of the session.
 
 use super::simulated_session::{SCENE, scene, viewer};
 use crate::support::Scratch;
@@ -16,7 +17,7 @@ use tumble_net::sync::*;
 const SECOND: Duration = Duration::from_secs(1);
 pub type Shown = Vec<(u64, FrameAck)>;
 
-/// A stand-in for a picture: a hash of what its renderer would read.
+/// Returns a stand-in for a picture: a hash of the data that its renderer would read.
 fn picture(world: &World, viewer: &Viewer) -> [u8; 16] {
     let mut text = format!("{viewer:?}");
     for &id in world.ids() {
@@ -27,7 +28,7 @@ fn picture(world: &World, viewer: &Viewer) -> [u8; 16] {
     image
 }
 
-/// A facet that draws what it gets until the run is over, and what it has shown.
+/// Runs a facet until the end of the run and returns the frames it has shown.
 pub fn facet(
     link: impl FacetLink + Send + 'static,
     k: u16,
@@ -66,7 +67,7 @@ pub fn options() -> ServerOptions {
     ServerOptions { ready_timeout: 10 * SECOND, drop_timeout: 60 * SECOND, ..ServerOptions::new(5, SCENE, slots) }
 }
 
-/// Hashes of the states and of the pictures, frame by frame.
+/// Returns the hashes of the states and of the pictures, frame by frame.
 pub fn hashes(shown: &Shown) -> Vec<(u64, [u8; 16], [u8; 16])> {
     shown.iter().map(|(frame, done)| (*frame, done.hash, done.image)).collect()
 }
@@ -122,7 +123,7 @@ fn a_run_is_recorded_and_replays_to_the_same_hashes_twice() {
         for (k, facet) in facets.into_iter().enumerate() {
             assert_eq!(hashes(&facet.join().unwrap().0), hashes(&shown[k]), "replay {run}");
             assert_eq!(server.counts(k as u16).0.mismatched, 0);
-            // the recording has what this facet answered then
+            // the recording contains this facet's answers
             let then: Vec<_> =
                 presented.iter().filter(|(f, ..)| *f as usize == k).map(|(_, frame, done)| (*frame, *done)).collect();
             assert_eq!(then, shown[k]);
@@ -131,16 +132,16 @@ fn a_run_is_recorded_and_replays_to_the_same_hashes_twice() {
     }
 }
 
-/// What does not come is named, within the time given.
+/// Facets that do not join in time are named.
 #[test]
-fn who_does_not_join_is_named() {
+fn absent_facets_are_named() {
     let transport = LocalTransport::new(3);
     let mut server = Server::new(transport.server(), options(), &scene());
     let error = server.wait_for_facets(Duration::from_millis(30)).unwrap_err().to_string();
     assert!(error.contains("facet 0, facet 1, facet 2 did not join"), "{error}");
 }
 
-/// The link's own contract: order, newest, closing, and coming back.
+/// The contract of the link: order, newest, closing and reconnecting.
 #[test]
 fn the_local_link_keeps_its_contract() {
     let (transport, mut bytes, mut lent, no_time) =
@@ -173,9 +174,10 @@ fn the_local_link_keeps_its_contract() {
     assert_eq!(facet.recv(no_time, &mut lent).unwrap(), Some(LinkEvent::Closed(Closed::ByPeer)));
 }
 
-/// A facet that takes nothing loses its connection and not the others': nothing waits for it.
+/// A facet that reads nothing loses its connection, and the others keep theirs: the server never
+/// waits for it.
 #[test]
-fn who_does_not_read_is_closed() {
+fn a_facet_that_does_not_read_is_closed() {
     let transport = LocalTransport::new(2);
     let (mut server, _deaf) = (transport.server(), transport.facet(0).unwrap());
     let (message, mut bytes) = (vec![1; 8 << 20], Vec::new());
@@ -188,7 +190,7 @@ fn who_does_not_read_is_closed() {
     assert_eq!(events[..2], [LinkEvent::Opened, LinkEvent::Closed(Closed::Overrun)]);
 }
 
-/// A server that ends without a word, and another: the facets go over to it by themselves.
+/// A server ends without a word and another one starts: the facets change over by themselves.
 #[test]
 fn facets_find_the_next_server_over_a_link() {
     let (transport, stop) = (LocalTransport::new(3), Arc::new(AtomicBool::new(false)));

@@ -1,4 +1,5 @@
-//! When frames are shown, told by clocks that disagree: against the times of the stage's own clock.
+//! Times at which frames are shown, reported by clocks that disagree, compared with the stage's own
+//! clock.
 
 use super::lockstep::STORM;
 use super::simulated_session::*;
@@ -12,14 +13,15 @@ fn times(stage: &Stage) -> Vec<FrameTimes> {
     stage.events.iter().filter_map(|e| if let ServerEvent::Shown(times) = e { Some(*times) } else { None }).collect()
 }
 
-/// When each facet showed a frame first, by the stage's clock.
+/// Returns when each facet showed a frame first, by the stage's clock.
 fn truth(stage: &Stage, frame: u64) -> Vec<Duration> {
     let at =
         |k: usize| stage.facets[k].shown.iter().position(|(f, _)| *f == frame).map(|at| stage.facets[k].shown_at[at]);
     (0..stage.facets.len()).filter_map(at).collect()
 }
 
-/// Clocks seconds to weeks apart, screens that show 0, 3 and 7 ms after they are told.
+/// A session with clocks that are seconds to weeks apart, and screens that show a frame 0, 3 and 7
+/// ms after the request.
 fn stage(conditions: NetworkConditions, mode: SyncMode) -> Stage {
     let mut stage = Stage::new(11, conditions, 3, mode);
     for (facet, (clock_s, after_ms)) in stage.facets.iter_mut().zip([(0, 3), (1_000_000, 0), (7, 7)]) {
@@ -62,12 +64,12 @@ fn over_a_bad_network_the_skew_is_right_within_its_stated_error() {
     }
 }
 
-/// An input of a facet, and one that comes to the server by itself: each is timed once, to the last screen that shows it.
+/// An input at a facet and one at the server: each is timed once, to the last screen that shows it.
 #[test]
 fn from_what_a_user_does_to_the_picture_that_shows_it() {
     let mut stage = stage(NetworkConditions { delay: [500 * US; 2], ..NetworkConditions::PERFECT }, SyncMode::Lockstep);
     stage.run(200 * MS);
-    // the stage's viewer carries the number of the world's frame as that of the newest input
+    // the stage's viewer carries the number of the world's frame as the number of the newest input
     let (by_facet, by_server) = (stage.world.frame() + 5, stage.world.frame() + 10);
     let sent = stage.now;
     let there = sent + stage.facets[1].clock;
