@@ -44,7 +44,7 @@ fn main() {
         println!("{}", line(robot, rounds, scale));
     }
     println!();
-    println!("| robot | refresh | accelerate | whiten | test impulses in 3 directions at the last link |");
+    println!("| robot | refresh | accelerate | `mul_l` | test impulses in 3 directions at the last link |");
     println!("|---|---|---|---|---|");
     for robot in robots.iter().filter(|r| names.is_empty() || names.contains(&r.name)) {
         println!("{}", parts(robot, rounds));
@@ -142,7 +142,7 @@ fn parts(robot: &Robot, rounds: usize) -> String {
         &mut [
             &mut |k| maps.borrow_mut().refresh(black_box(&states[k % STATES].0), black_box(&states[k % STATES].1)),
             &mut |k| maps.borrow_mut().accelerate(black_box(&states[k % STATES].2)),
-            &mut |k| maps.borrow_mut().whiten(black_box(&states[k % STATES].1)),
+            &mut |k| maps.borrow_mut().mul_l(black_box(&states[k % STATES].1)),
             &mut |_| maps.borrow_mut().probe(),
         ],
     );

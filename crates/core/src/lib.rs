@@ -54,8 +54,8 @@ pub use object::mounts::{CameraCarrier, CameraMount, Detail, LightCarrier, Light
 pub use object::part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes, Wrench};
 pub use object::visual::{Drawn, Visual, VisualGeometry, VisualMesh};
 pub use object::{
-    Appearance, Constraint, Energy, ForceGenerator, Integratable, Level, Momentum, NetSync, Object, Renderable,
-    RowTarget, SyncError,
+    Appearance, Constraint, Energy, ForceGenerator, Integratable, Level, Momentum, MomentumKind, NetSync, Object,
+    Renderable, RowTarget, SyncError,
 };
 pub use report::{StepReport, UnreachableJoint};
 pub use rigid::{BodyError, RigidBody};

@@ -182,19 +182,19 @@ impl Integratable for Bead {
         x[0] += h * v[0];
     }
 
-    fn whiten(&self, cache: &mut Cache, x: &[f64], u: &mut [f64]) {
-        u[0] = x[1] / cache.get::<BeadCache>().root;
+    fn mul_l(&self, cache: &mut Cache, v: &[f64], u: &mut [f64]) {
+        u[0] = cache.get::<BeadCache>().root * v[0];
     }
 
-    fn unwhiten(&self, cache: &mut Cache, u: &[f64], v: &mut [f64]) {
+    fn solve_l(&self, cache: &mut Cache, u: &[f64], v: &mut [f64]) {
         v[0] = u[0] / cache.get::<BeadCache>().root;
     }
 
-    fn respond(&self, cache: &mut Cache, j: &[f64], y: &mut [f64]) {
+    fn solve_lt(&self, cache: &mut Cache, j: &[f64], y: &mut [f64]) {
         y[0] = j[0] / cache.get::<BeadCache>().root;
     }
 
-    fn recover(&self, cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
+    fn mul_lt(&self, cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
         dp[0] = cache.get::<BeadCache>().root * du[0];
     }
 

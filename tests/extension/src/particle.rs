@@ -125,19 +125,19 @@ impl Integratable for Particle {
         (0..3).for_each(|k| x[k] += h * v[k]);
     }
 
-    fn whiten(&self, _cache: &mut Cache, x: &[f64], u: &mut [f64]) {
-        scaled(&x[3..], 1.0 / self.mass.sqrt(), u);
+    fn mul_l(&self, _cache: &mut Cache, v: &[f64], u: &mut [f64]) {
+        scaled(v, self.mass.sqrt(), u);
     }
 
-    fn unwhiten(&self, _cache: &mut Cache, u: &[f64], v: &mut [f64]) {
+    fn solve_l(&self, _cache: &mut Cache, u: &[f64], v: &mut [f64]) {
         scaled(u, 1.0 / self.mass.sqrt(), v);
     }
 
-    fn respond(&self, _cache: &mut Cache, j: &[f64], y: &mut [f64]) {
+    fn solve_lt(&self, _cache: &mut Cache, j: &[f64], y: &mut [f64]) {
         scaled(j, 1.0 / self.mass.sqrt(), y);
     }
 
-    fn recover(&self, _cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
+    fn mul_lt(&self, _cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
         scaled(du, self.mass.sqrt(), dp);
     }
 

@@ -101,8 +101,8 @@ impl Maps {
     }
 
     /// Whitened velocity.
-    pub fn whiten(&mut self, v: &[f64]) {
-        self.dynamics.whiten(&mut self.scratch, v, &mut self.out);
+    pub fn mul_l(&mut self, v: &[f64]) {
+        self.dynamics.mul_l(&mut self.scratch, v, &mut self.out);
     }
 
     /// Test impulses in three directions at the last link.

@@ -14,7 +14,7 @@ use crate::object::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount
 use crate::object::part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes, Wrench};
 use crate::object::sync;
 use crate::object::visual::Visual;
-use crate::object::{Constraint, Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError};
+use crate::object::{Constraint, Energy, Integratable, Momentum, MomentumKind, NetSync, Object, Renderable, SyncError};
 use crate::rigid::rotation;
 use crate::rigid::vec3;
 use crate::world::view::WorldView;
@@ -180,8 +180,8 @@ impl Integratable for ArticulatedBody {
         }
     }
 
-    fn holds_velocity(&self) -> bool {
-        true
+    fn momentum_kind(&self) -> MomentumKind {
+        MomentumKind::Velocity
     }
 
     fn free_motion_rate(&self, cache: &mut Cache, _x: &[f64], out: &mut [f64]) {
@@ -219,34 +219,28 @@ impl Integratable for ArticulatedBody {
         }
     }
 
-    fn whiten(&self, cache: &mut Cache, x: &[f64], u: &mut [f64]) {
+    fn mul_l(&self, cache: &mut Cache, v: &[f64], u: &mut [f64]) {
         let BodyCache { dynamics, scratch, .. } = cache.get();
-        dynamics.whiten(scratch, &x[self.model.positions()..], u);
+        dynamics.mul_l(scratch, v, u);
     }
 
-    fn unwhiten(&self, cache: &mut Cache, u: &[f64], v: &mut [f64]) {
+    fn solve_l(&self, cache: &mut Cache, u: &[f64], v: &mut [f64]) {
         let BodyCache { dynamics, scratch, .. } = cache.get();
-        dynamics.unwhiten(scratch, u, v);
+        dynamics.solve_l(scratch, u, v);
     }
 
-    fn respond(&self, cache: &mut Cache, j: &[f64], y: &mut [f64]) {
+    fn solve_lt(&self, cache: &mut Cache, j: &[f64], y: &mut [f64]) {
         let BodyCache { dynamics, scratch, .. } = cache.get();
-        dynamics.respond(scratch, j, y);
+        dynamics.solve_lt(scratch, j, y);
     }
 
-    fn recover(&self, cache: &mut Cache, du: &[f64], j: &mut [f64]) {
+    fn mul_lt(&self, cache: &mut Cache, u: &[f64], j: &mut [f64]) {
         let BodyCache { dynamics, scratch, .. } = cache.get();
-        dynamics.recover(scratch, du, j);
+        dynamics.mul_lt(scratch, u, j);
     }
 
-    fn whiten_rate(&self, cache: &mut Cache, dp: &[f64], du: &mut [f64]) {
-        let BodyCache { dynamics, scratch, .. } = cache.get();
-        dynamics.whiten(scratch, dp, du);
-    }
-
-    fn unwhiten_rate(&self, cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
-        let BodyCache { dynamics, scratch, .. } = cache.get();
-        dynamics.unwhiten(scratch, du, dp);
+    fn whitened_velocity(&self, cache: &mut Cache, x: &[f64], u: &mut [f64]) {
+        self.mul_l(cache, &x[self.model.positions()..], u);
     }
 
     fn may_sleep(&self) -> bool {

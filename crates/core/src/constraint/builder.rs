@@ -130,7 +130,7 @@ impl RowBuilder<'_> {
                 return self.kinematic_coordinates(&entry, i, jacobian);
             }
             let mut y = vec![0.0; jacobian.len()];
-            i.respond(&mut self.caches[entry.place], jacobian, &mut y);
+            i.solve_lt(&mut self.caches[entry.place], jacobian, &mut y);
             let side = self.rows.side(entry.state_range.v.start, y.len());
             side.map(|side| side.iter_mut().zip(&y).for_each(|(s, y)| *s += y)).is_some()
         });

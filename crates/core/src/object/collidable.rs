@@ -156,7 +156,7 @@ pub fn rigid_test_impulse(
         let moment = r.cross(axis);
         let jacobian = [moment.x, moment.y, moment.z, axis.x, axis.y, axis.z];
         let mut response = [0.0; 6];
-        body.respond(cache, &jacobian, &mut response);
+        body.solve_lt(cache, &jacobian, &mut response);
         for (y, response) in y.iter_mut().zip(response) {
             *y += sign * response;
         }

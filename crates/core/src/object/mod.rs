@@ -127,32 +127,29 @@ pub trait Integratable {
     fn pull_back(&self, displacement: &[f64], v: &mut [f64]) {
         let _ = (displacement, v);
     }
-    /// `u = L·v` of the momentum in `x`.
-    fn whiten(&self, cache: &mut Cache, x: &[f64], u: &mut [f64]);
-    /// `v = L⁻¹·u`.
-    fn unwhiten(&self, cache: &mut Cache, u: &[f64], v: &mut [f64]);
-    /// `y = L⁻ᵀ·j`: the whitened response to a generalized impulse `j`.
-    fn respond(&self, cache: &mut Cache, j: &[f64], y: &mut [f64]);
-    /// `j = Lᵀ·du`: the generalized impulse that a change of `u` means.
-    fn recover(&self, cache: &mut Cache, du: &[f64], j: &mut [f64]);
-    /// Whether its state holds velocities instead of momenta, because its mass matrix turns with its pose. `time_stepping` then asks for everything that
-    /// pushes it (mass matrix, rows, the velocity before the push) in the middle of the step; of others where they meet something, if they do.
-    fn holds_velocity(&self) -> bool {
-        false
+    /// Writes `u = L·v`.
+    fn mul_l(&self, cache: &mut Cache, v: &[f64], u: &mut [f64]);
+    /// Writes `v = L⁻¹·u`.
+    fn solve_l(&self, cache: &mut Cache, u: &[f64], v: &mut [f64]);
+    /// Writes `y = L⁻ᵀ·j`: the whitened response to a generalized impulse `j`.
+    fn solve_lt(&self, cache: &mut Cache, j: &[f64], y: &mut [f64]);
+    /// Writes `j = Lᵀ·u`: the generalized impulse of a change of `u`.
+    fn mul_lt(&self, cache: &mut Cache, u: &[f64], j: &mut [f64]);
+    /// Writes the whitened velocity `u = L·v` of the state. An object that has the momentum at hand may write `L⁻ᵀ·p`, the same with less rounding.
+    fn whitened_velocity(&self, cache: &mut Cache, x: &[f64], u: &mut [f64]) {
+        let mut v = vec![0.0; u.len()];
+        self.velocity(x, &mut v);
+        self.mul_l(cache, &v, u);
     }
-    /// What of [`derivative`](Self::derivative) is already in [`free_motion`](Self::free_motion): zero where coasting leaves the state's momentum alone;
-    /// the acceleration without any force of an object whose state holds velocities.
+    /// Returns which quantity of motion the state holds.
+    fn momentum_kind(&self) -> MomentumKind {
+        MomentumKind::Conjugate
+    }
+    /// Writes the part of [`derivative`](Self::derivative) that [`free_motion`](Self::free_motion) applies by itself: zero if free motion keeps the numbers
+    /// that [`kick`](Self::kick) changes; the acceleration without forces of an object whose state holds velocities.
     fn free_motion_rate(&self, cache: &mut Cache, x: &[f64], out: &mut [f64]) {
         let _ = (cache, x);
         out.fill(0.0);
-    }
-    /// The change of whitened velocity that a change `dp` of the state's momentum means. An object whose state holds velocities answers `L·dp`.
-    fn whiten_rate(&self, cache: &mut Cache, dp: &[f64], du: &mut [f64]) {
-        self.respond(cache, dp, du);
-    }
-    /// The inverse of [`whiten_rate`](Self::whiten_rate); `L⁻¹·du` for an object whose state holds velocities.
-    fn unwhiten_rate(&self, cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
-        self.recover(cache, du, dp);
     }
     /// Whether it may be left out of the steps while it lies still (see [`Sleep`](crate::Sleep)): nothing that it feels of itself changes with time.
     fn may_sleep(&self) -> bool {
@@ -166,6 +163,40 @@ pub trait Integratable {
     fn energy(&self, x: &[f64], gravity: &Vec3) -> Energy;
     /// Linear momentum, N·s, and angular momentum about the world's origin, N·m·s.
     fn momentum(&self, x: &[f64]) -> Momentum;
+}
+
+/// The quantity of motion that a state holds, and that [`Integratable::kick`] changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MomentumKind {
+    /// The generalized momentum `p = M·v`. An impulse acts where it meets the object.
+    Conjugate,
+    /// The generalized velocity `v`: for objects whose mass matrix turns with their pose. `time_stepping` evaluates all that pushes such an object (mass
+    /// matrix, rows, the velocity before the push) in the middle of the step.
+    Velocity,
+}
+
+/// The maps between a change of the state's quantity of motion and a change of whitened velocity.
+impl dyn Integratable + '_ {
+    /// Returns whether the state holds velocities.
+    pub(crate) fn holds_velocity(&self) -> bool {
+        self.momentum_kind() == MomentumKind::Velocity
+    }
+
+    /// Writes the change `du` of whitened velocity for a change `dp` of the state: `L⁻ᵀ·dp` of a momentum, `L·dp` of a velocity.
+    pub(crate) fn whiten_change(&self, cache: &mut Cache, dp: &[f64], du: &mut [f64]) {
+        match self.momentum_kind() {
+            MomentumKind::Conjugate => self.solve_lt(cache, dp, du),
+            MomentumKind::Velocity => self.mul_l(cache, dp, du),
+        }
+    }
+
+    /// Writes the change `dp` of the state for a change `du` of whitened velocity: the inverse of [`whiten_change`](Self::whiten_change).
+    pub(crate) fn unwhiten_change(&self, cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
+        match self.momentum_kind() {
+            MomentumKind::Conjugate => self.mul_lt(cache, du, dp),
+            MomentumKind::Velocity => self.solve_l(cache, du, dp),
+        }
+    }
 }
 
 /// Mechanical energy, J.

@@ -7,7 +7,7 @@
 //! | 7–9 | linear momentum `P`, N·s |
 //! | 10–12 | angular momentum `L` about the center of mass, world axes, N·m·s |
 //!
-//! Generalized velocity `v = [ω; v]`, world axes at the center of mass; mass matrix `M = diag(R·I·Rᵀ, m·1)`. Whitening takes
+//! Generalized velocity `v = [ω; v]`, world axes at the center of mass; mass matrix `M = diag(R·I·Rᵀ, m·1)`. BodyCache takes
 //! `L = diag(I^½·Rᵀ, √m·1)`, with `I^½` the symmetric root of the body inertia, so that `M = LᵀL`.
 //!
 //! The site is at the center of mass (thesis §III.A.1), with the axes of the body. The body's *frame*, in which users place it, is that of its shape: a mesh
@@ -117,12 +117,12 @@ struct Inertia {
     principal: Quat,
 }
 
-/// What whitens at one orientation.
-struct Whitening {
-    /// `I^{-½}·Rᵀ`: whitens an angular impulse.
-    respond: Mat3,
-    /// `R·I^½`: what a whitened change means as angular momentum.
-    recover: Mat3,
+/// Blocks of the maps at one orientation.
+struct BodyCache {
+    /// Angular block of `L⁻ᵀ`: `I^{-½}·Rᵀ`.
+    solve_lt: Mat3,
+    /// Angular block of `Lᵀ`: `R·I^½`.
+    mul_lt: Mat3,
 }
 
 impl RigidBody {
@@ -392,19 +392,19 @@ impl Object for RigidBody {
     }
 
     fn new_cache(&self) -> Cache {
-        Cache::new(Whitening { respond: self.inertia.inverse_root, recover: self.inertia.root })
+        Cache::new(BodyCache { solve_lt: self.inertia.inverse_root, mul_lt: self.inertia.root })
     }
 
     fn refresh(&self, x: &[f64], cache: &mut Cache, part_states: &mut [PartState]) {
-        let cache: &mut Whitening = cache.get();
+        let cache: &mut BodyCache = cache.get();
         let q = orientation(x);
         let r = q.to_rotation_matrix().into_inner();
-        cache.respond = self.inertia.inverse_root * r.transpose();
-        cache.recover = r * self.inertia.root;
+        cache.solve_lt = self.inertia.inverse_root * r.transpose();
+        cache.mul_lt = r * self.inertia.root;
         let part_state = &mut part_states[0];
         part_state.pose = Pose::from_parts(Translation3::from(vec3(x)), q);
         part_state.velocity = vec3(&x[7..]) / self.mass;
-        part_state.angular_velocity = cache.respond.tr_mul(&(cache.respond * vec3(&x[10..])));
+        part_state.angular_velocity = cache.solve_lt.tr_mul(&(cache.solve_lt * vec3(&x[10..])));
     }
 
     fn integratable(&self) -> Option<&dyn Integratable> {
@@ -535,24 +535,30 @@ impl Integratable for RigidBody {
         v[..3].copy_from_slice(rate.as_slice());
     }
 
-    fn whiten(&self, cache: &mut Cache, x: &[f64], u: &mut [f64]) {
-        let cache: &mut Whitening = cache.get();
-        write6(u, &(cache.respond * vec3(&x[10..])), &(vec3(&x[7..]) / self.root_mass));
+    /// `L⁻ᵀ·p`.
+    fn whitened_velocity(&self, cache: &mut Cache, x: &[f64], u: &mut [f64]) {
+        let cache: &mut BodyCache = cache.get();
+        write6(u, &(cache.solve_lt * vec3(&x[10..])), &(vec3(&x[7..]) / self.root_mass));
     }
 
-    fn unwhiten(&self, cache: &mut Cache, u: &[f64], v: &mut [f64]) {
-        let cache: &mut Whitening = cache.get();
-        write6(v, &cache.respond.tr_mul(&vec3(u)), &(vec3(&u[3..]) / self.root_mass));
+    fn mul_l(&self, cache: &mut Cache, v: &[f64], u: &mut [f64]) {
+        let cache: &mut BodyCache = cache.get();
+        write6(u, &cache.mul_lt.tr_mul(&vec3(v)), &(self.root_mass * vec3(&v[3..])));
     }
 
-    fn respond(&self, cache: &mut Cache, j: &[f64], y: &mut [f64]) {
-        let cache: &mut Whitening = cache.get();
-        write6(y, &(cache.respond * vec3(j)), &(vec3(&j[3..]) / self.root_mass));
+    fn solve_l(&self, cache: &mut Cache, u: &[f64], v: &mut [f64]) {
+        let cache: &mut BodyCache = cache.get();
+        write6(v, &cache.solve_lt.tr_mul(&vec3(u)), &(vec3(&u[3..]) / self.root_mass));
     }
 
-    fn recover(&self, cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
-        let cache: &mut Whitening = cache.get();
-        write6(dp, &(cache.recover * vec3(du)), &(self.root_mass * vec3(&du[3..])));
+    fn solve_lt(&self, cache: &mut Cache, j: &[f64], y: &mut [f64]) {
+        let cache: &mut BodyCache = cache.get();
+        write6(y, &(cache.solve_lt * vec3(j)), &(vec3(&j[3..]) / self.root_mass));
+    }
+
+    fn mul_lt(&self, cache: &mut Cache, u: &[f64], j: &mut [f64]) {
+        let cache: &mut BodyCache = cache.get();
+        write6(j, &(cache.mul_lt * vec3(u)), &(self.root_mass * vec3(&u[3..])));
     }
 
     fn may_sleep(&self) -> bool {
@@ -606,11 +612,11 @@ impl Collidable for RigidBody {
         sign: f64,
         y: &mut [f64],
     ) {
-        let cache: &mut Whitening = cache.get();
+        let cache: &mut BodyCache = cache.get();
         let r = point - part_state.position();
         let linear = sign / self.root_mass;
         for (axis, y) in axes.iter().zip(y.chunks_exact_mut(6)) {
-            let angular = cache.respond * r.cross(axis);
+            let angular = cache.solve_lt * r.cross(axis);
             for k in 0..3 {
                 y[k] += sign * angular[k];
                 y[k + 3] += linear * axis[k];

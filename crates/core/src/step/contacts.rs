@@ -306,7 +306,11 @@ fn present_errors(Coordinates { objects, x, caches }: Coordinates, work: &mut Wo
     let mut u = vec![0.0; objects.table.dof()];
     for entry in objects.iter().filter(|e| e.moves()) {
         if let Some(body) = entry.object.integratable() {
-            body.whiten(&mut caches[entry.place], &x[entry.state_range.x.clone()], &mut u[entry.state_range.v.clone()]);
+            body.whitened_velocity(
+                &mut caches[entry.place],
+                &x[entry.state_range.x.clone()],
+                &mut u[entry.state_range.v.clone()],
+            );
         }
     }
     for (block, target) in work.rows.blocks[work.contact_constraints.len()..].iter().zip(&mut work.targets) {
@@ -328,8 +332,8 @@ pub(crate) fn whiten(
     for entry in objects.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
         let cache = &mut caches[entry.place];
-        body.whiten(cache, &x[entry.state_range.x.clone()], &mut u[v.clone()]);
-        body.whiten_rate(cache, &dp[v.clone()], &mut du[v.clone()]);
+        body.whitened_velocity(cache, &x[entry.state_range.x.clone()], &mut u[v.clone()]);
+        body.whiten_change(cache, &dp[v.clone()], &mut du[v.clone()]);
         du[v].iter_mut().for_each(|x| *x *= h);
     }
 }
@@ -344,7 +348,7 @@ pub(crate) fn free_motion_change(Coordinates { objects, x, caches }: Coordinates
         let cache = &mut caches[entry.place];
         body.free_motion_rate(cache, &x[entry.state_range.x.clone()], &mut rate);
         rate.iter_mut().for_each(|r| *r *= h);
-        body.whiten_rate(cache, &rate, &mut out[v]);
+        body.whiten_change(cache, &rate, &mut out[v]);
     }
     out
 }
@@ -356,7 +360,7 @@ pub(crate) fn gyroscopic(Coordinates { objects, x, caches }: Coordinates) -> Vec
         let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
         let mut turning = vec![0.0; v.len()];
         body.gyroscopic(&x[entry.state_range.x.clone()], &mut turning);
-        body.whiten_rate(&mut caches[entry.place], &turning, &mut out[v]);
+        body.whiten_change(&mut caches[entry.place], &turning, &mut out[v]);
     }
     out
 }
@@ -372,7 +376,7 @@ pub(crate) fn recover(Coordinates { objects, caches, .. }: Coordinates, du: &[f6
     j.fill(0.0);
     for entry in objects.iter().filter(|e| e.moves()) {
         if let Some(body) = entry.object.integratable() {
-            body.recover(
+            body.mul_lt(
                 &mut caches[entry.place],
                 &du[entry.state_range.v.clone()],
                 &mut j[entry.state_range.v.clone()],
@@ -386,7 +390,7 @@ pub(crate) fn push(Coordinates { objects, x, caches }: Coordinates, du: &[f64], 
     zero(dp, du.len());
     for entry in objects.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
-        body.unwhiten_rate(&mut caches[entry.place], &du[v.clone()], &mut dp[v.clone()]);
+        body.unwhiten_change(&mut caches[entry.place], &du[v.clone()], &mut dp[v.clone()]);
         body.kick(&mut x[entry.state_range.x.clone()], &dp[v], 1.0);
     }
 }
@@ -409,7 +413,7 @@ pub(crate) fn unwhiten_onto(Coordinates { objects, caches, .. }: Coordinates, u:
     for entry in objects.iter().filter(|e| e.moves()) {
         let (Some(body), range) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
         zero(&mut velocity, range.len());
-        body.unwhiten(&mut caches[entry.place], &u[range.clone()], &mut velocity);
+        body.solve_l(&mut caches[entry.place], &u[range.clone()], &mut velocity);
         v[range].iter_mut().zip(&velocity).for_each(|(v, more)| *v += more);
     }
 }
@@ -425,7 +429,7 @@ fn each_displaced(
         if u.iter().any(|u| *u != 0.0) {
             zero(&mut velocity, u.len());
             let cache = &mut caches[entry.place];
-            body.unwhiten(cache, u, &mut velocity);
+            body.solve_l(cache, u, &mut velocity);
             go(body, cache, &mut x[entry.state_range.x.clone()], &velocity);
         }
     }

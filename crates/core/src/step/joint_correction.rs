@@ -79,9 +79,9 @@ pub(super) fn middle(
         far = onto(core, &mut at_end, &mut end, (level, time), &aim);
         core.moments.push(at_end);
     }
-    map_sides(at.coordinates(core), &mut rows, |body, cache, y, j| body.recover(cache, y, j)); // Jᵀ = Lᵀ·Y
+    map_sides(at.coordinates(core), &mut rows, |body, cache, y, j| body.mul_lt(cache, y, j)); // Jᵀ = Lᵀ·Y
     core.moments.push(at);
-    map_sides(core.coordinates(acting), &mut rows, |body, cache, j, y| body.respond(cache, j, y));
+    map_sides(core.coordinates(acting), &mut rows, |body, cache, j, y| body.solve_lt(cache, j, y));
     unreachable_joints::soften(&mut rows, &far?, unreachable_joints::GIVING);
     Ok((errors, rows))
 }

@@ -212,7 +212,7 @@ impl World {
         let cache = &mut caches[entry.place];
         collidable.test_impulse(cache, part, &part_state, point, &[Vec3::x(), Vec3::y(), Vec3::z()], 1.0, &mut y);
         let du: Vec<f64> = (0..dof).map(|k| (0..3).map(|r| impulse[r] * y[r * dof + k]).sum()).collect();
-        body.unwhiten_rate(cache, &du, &mut dp);
+        body.unwhiten_change(cache, &du, &mut dp);
         body.kick(&mut x[entry.state_range.x.clone()], &dp, 1.0);
         self.core.integration().refresh_one(id);
         Ok(())

@@ -131,14 +131,14 @@ fn the_root_of_the_mass_matrix_is_one() {
     for (model, seed) in trees() {
         let (d, q, _) = refreshed(&model, seed);
         let (n, mut s, dense) = (d.dof(), d.scratch(), mass_matrix(&model, &q));
-        let l = matrix(n, |v, u| d.whiten(&mut s, v, u));
+        let l = matrix(n, |v, u| d.mul_l(&mut s, v, u));
         close("LᵀL = M", &(l.transpose() * &l), &dense, 1e-12);
-        let transposed = matrix(n, |u, j| d.recover(&mut s, u, j));
-        close("recover is Lᵀ", &transposed, &l.transpose(), 1e-12);
-        let inverse = matrix(n, |u, v| d.unwhiten(&mut s, u, v));
-        close("unwhiten is L⁻¹", &(&inverse * &l), &DMatrix::identity(n, n), 1e-10);
-        let response = matrix(n, |j, y| d.respond(&mut s, j, y));
-        close("respond is L⁻ᵀ", &response, &inverse.transpose(), 1e-12);
+        let transposed = matrix(n, |u, j| d.mul_lt(&mut s, u, j));
+        close("mul_lt is Lᵀ", &transposed, &l.transpose(), 1e-12);
+        let inverse = matrix(n, |u, v| d.solve_l(&mut s, u, v));
+        close("solve_l is L⁻¹", &(&inverse * &l), &DMatrix::identity(n, n), 1e-10);
+        let response = matrix(n, |j, y| d.solve_lt(&mut s, j, y));
+        close("solve_lt is L⁻ᵀ", &response, &inverse.transpose(), 1e-12);
     }
 }
 
@@ -167,7 +167,7 @@ fn probes_of_every_kind_see_the_dense_response() {
             dense.push(0.5 * jacobian(&model, &poses, link, &point).rows(0, 3).transpose() * axes[0]);
             let mut unit = DVector::zeros(d.dof());
             unit[n.below(d.dof())] = 1.0;
-            d.respond(&mut d.scratch(), unit.as_slice(), &mut y);
+            d.solve_lt(&mut d.scratch(), unit.as_slice(), &mut y);
             rows.push(y);
             dense.push(unit);
         }
@@ -178,7 +178,7 @@ fn probes_of_every_kind_see_the_dense_response() {
         close("Y Yᵀ = J M⁻¹ Jᵀ", &(&y * y.transpose()), &(&j * &inverse), 1e-10);
         let lambda = DVector::from_vec(n.list(rows.len(), 1.0));
         let mut dv = DVector::zeros(d.dof());
-        d.unwhiten(&mut d.scratch(), (y.transpose() * &lambda).as_slice(), dv.as_mut_slice());
+        d.solve_l(&mut d.scratch(), (y.transpose() * &lambda).as_slice(), dv.as_mut_slice());
         let wanted = inverse * lambda;
         let error = (&dv - &wanted).amax() / wanted.amax();
         assert!(error < 1e-10, "Δv = M⁻¹Jᵀλ, {} links: {error:e}", d.links());
@@ -271,9 +271,9 @@ fn gimbal_lock_is_named_and_finite() {
         assert_eq!(d.singular(), singular.then_some(0), "pitch {pitch}");
         let (mut qdd, mut u, mut y, mut w) = ([f64::NAN; 3], [f64::NAN; 3], [f64::NAN; 3], [f64::NAN; 3]);
         d.accelerate_in(&mut s, &-Vec3::z(), &[0.1, 0.2, 0.3], &[], &mut qdd);
-        d.whiten(&mut s, &v, &mut u);
-        d.unwhiten(&mut s, &v, &mut w);
-        d.respond(&mut s, &v, &mut y);
+        d.mul_l(&mut s, &v, &mut u);
+        d.solve_l(&mut s, &v, &mut w);
+        d.solve_lt(&mut s, &v, &mut y);
         d.point_response(2, &Vec3::x(), &[Vec3::y()], 1.0, &mut y);
         assert!(qdd.iter().chain(&u).chain(&y).chain(&w).all(|x| x.is_finite()), "{pitch}: {qdd:?} {u:?} {y:?}");
     }
@@ -350,7 +350,7 @@ fn energy_of_the_whitened_velocity_and_power() {
         let mut s = d.scratch();
         let mut kinetic = |d: &Dynamics, v: &[f64]| {
             let mut u = vec![0.0; v.len()];
-            d.whiten(&mut s, v, &mut u);
+            d.mul_l(&mut s, v, &mut u);
             0.5 * u.iter().map(|x| x * x).sum::<f64>()
         };
         let energy = kinetic(&d, &v);

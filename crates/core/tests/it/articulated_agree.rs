@@ -114,8 +114,8 @@ fn the_whitening_maps_are_a_root_of_the_mass_matrix() {
         let dof = case.model.dof();
         let v = random.numbers(dof, 2.0);
         let (mut s, mut u, mut j) = (case.dynamics.scratch(), vec![f64::NAN; dof], vec![f64::NAN; dof]);
-        case.dynamics.whiten(&mut s, &v, &mut u);
-        case.dynamics.recover(&mut s, &u, &mut j);
+        case.dynamics.mul_l(&mut s, &v, &mut u);
+        case.dynamics.mul_lt(&mut s, &u, &mut j);
         let momentum = case.mass_matrix() * DVector::from_column_slice(&v);
         assert!(apart(&j, momentum.as_slice()) < 1e-12);
         let (square, twice) = (u.iter().map(|u| u * u).sum::<f64>(), momentum.dot(&DVector::from_column_slice(&v)));

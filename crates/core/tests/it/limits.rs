@@ -67,16 +67,16 @@ impl Integratable for Pendulum {
     fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64) {
         x[0] += h * v[0];
     }
-    fn whiten(&self, _cache: &mut Cache, x: &[f64], u: &mut [f64]) {
-        u[0] = x[1];
+    fn mul_l(&self, _cache: &mut Cache, v: &[f64], u: &mut [f64]) {
+        u[0] = v[0];
     }
-    fn unwhiten(&self, _cache: &mut Cache, u: &[f64], v: &mut [f64]) {
+    fn solve_l(&self, _cache: &mut Cache, u: &[f64], v: &mut [f64]) {
         v[0] = u[0];
     }
-    fn respond(&self, _cache: &mut Cache, j: &[f64], y: &mut [f64]) {
+    fn solve_lt(&self, _cache: &mut Cache, j: &[f64], y: &mut [f64]) {
         y[0] = j[0];
     }
-    fn recover(&self, _cache: &mut Cache, du: &[f64], j: &mut [f64]) {
+    fn mul_lt(&self, _cache: &mut Cache, du: &[f64], j: &mut [f64]) {
         j[0] = du[0];
     }
     fn energy(&self, x: &[f64], _gravity: &Vec3) -> Energy {

@@ -260,7 +260,7 @@ fn two_states_of_one_object_exist_at_once() {
     }
     for (x, cache) in states.iter().zip(&mut caches) {
         let mut u = [0.0; 2];
-        body.whiten(cache, x, &mut u);
+        body.whitened_velocity(cache, x, &mut u);
         let twice = 2.0 * body.energy(x, &Vec3::zeros()).kinetic;
         let sum: f64 = u.iter().map(|u| u * u).sum();
         assert!((sum - twice).abs() < 1e-12 * twice, "{sum} and {twice} at {x:?}");

@@ -124,7 +124,7 @@ pub(in crate::articulated) fn transport(model: &Model, cache: &mut BodyCache, x:
 /// Returns `½|L·v|²`.
 fn energy_of(dynamics: &Dynamics, scratch: &mut Scratch, v: &[f64]) -> f64 {
     let mut u = vec![0.0; v.len()];
-    dynamics.whiten(scratch, v, &mut u);
+    dynamics.mul_l(scratch, v, &mut u);
     0.5 * u.iter().map(|u| u * u).sum::<f64>()
 }
 

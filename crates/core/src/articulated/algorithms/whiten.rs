@@ -32,7 +32,7 @@ const ROWS: usize = 3;
 
 impl Dynamics {
     /// Writes `u = L v`: velocities in coordinates in which every mass is 1.
-    pub fn whiten(&self, s: &mut Scratch, v: &[f64], u: &mut [f64]) {
+    pub fn mul_l(&self, s: &mut Scratch, v: &[f64], u: &mut [f64]) {
         self.propagate_velocities(s, v);
         for (i, body) in self.compiled.bodies.iter().enumerate() {
             let (slot, motion) = (&self.sweep.slots[i + 1], s.motions[i + 1]);
@@ -63,7 +63,7 @@ impl Dynamics {
     }
 
     /// Writes `v = L⁻¹ u`.
-    pub fn unwhiten(&self, s: &mut Scratch, u: &[f64], v: &mut [f64]) {
+    pub fn solve_l(&self, s: &mut Scratch, u: &[f64], v: &mut [f64]) {
         s.motions[0] = Motion::default();
         for (i, body) in self.compiled.bodies.iter().enumerate() {
             let slot = &self.sweep.slots[i + 1];
@@ -97,16 +97,16 @@ impl Dynamics {
     }
 
     /// Writes `y = L⁻ᵀ j`: the whitened response to generalized impulses.
-    pub fn respond(&self, s: &mut Scratch, j: &[f64], y: &mut [f64]) {
+    pub fn solve_lt(&self, s: &mut Scratch, j: &[f64], y: &mut [f64]) {
         s.forces.fill(Force::default());
         for (i, body) in self.compiled.bodies.iter().enumerate().rev() {
-            let passed = self.respond_link(i + 1, body, s.forces[i + 1], |k| j[k], |k, x| y[k] = x);
+            let passed = self.solve_lt_link(i + 1, body, s.forces[i + 1], |k| j[k], |k, x| y[k] = x);
             s.forces[body.parent] += passed;
         }
     }
 
     /// Writes `j = Lᵀ u`: the generalized impulse of a change of `u`.
-    pub fn recover(&self, s: &mut Scratch, u: &[f64], j: &mut [f64]) {
+    pub fn mul_lt(&self, s: &mut Scratch, u: &[f64], j: &mut [f64]) {
         s.forces.fill(Force::default());
         for (i, body) in self.compiled.bodies.iter().enumerate().rev() {
             let (slot, mut p) = (&self.sweep.slots[i + 1], s.forces[i + 1]);
@@ -166,7 +166,7 @@ impl Dynamics {
             while slot != 0 {
                 let body = &self.compiled.bodies[slot - 1];
                 for (row, p) in forces[..axes.len()].iter_mut().enumerate() {
-                    *p = self.respond_link(slot, body, *p, |_| 0.0, |k, x| y[row * dof + k] += x);
+                    *p = self.solve_lt_link(slot, body, *p, |_| 0.0, |k, x| y[row * dof + k] += x);
                 }
                 slot = body.parent;
             }
@@ -176,7 +176,7 @@ impl Dynamics {
     /// Writes `yᵢ` of one joint to `out` and returns the impulse that it passes to the parent,
     /// about the parent's origin.
     #[inline(always)]
-    fn respond_link(
+    fn solve_lt_link(
         &self,
         i: usize,
         body: &CompiledLink,

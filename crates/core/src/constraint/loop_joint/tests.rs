@@ -119,7 +119,7 @@ impl Pairing {
         let mut u = vec![0.0; self.dof];
         for entry in self.table.with(&self.states).iter() {
             if let Some(body) = entry.object.integratable() {
-                body.whiten(
+                body.whitened_velocity(
                     &mut caches[entry.place],
                     &self.x[entry.state_range.x.clone()],
                     &mut u[entry.state_range.v.clone()],
