@@ -447,10 +447,10 @@ def viewers(options):
             while time.time() - began < 5:
                 message = live.recv(timeout=5)
                 if isinstance(message, str):
-                    told = json.loads(message)
-                    if told["op"] == "advertise":
-                        wanted = [{"id": channel["id"], "channelId": channel["id"]} for channel in told["channels"]]
-                        topics.update({channel["id"]: channel["topic"] for channel in told["channels"]})
+                    received = json.loads(message)
+                    if received["op"] == "advertise":
+                        wanted = [{"id": channel["id"], "channelId": channel["id"]} for channel in received["channels"]]
+                        topics.update({channel["id"]: channel["topic"] for channel in received["channels"]})
                         live.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
                         idle.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
                 elif message[0] == 1:

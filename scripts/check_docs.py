@@ -80,12 +80,6 @@ TODO = (
     "crates/core/src/world/pick.rs",
     "crates/core/src/world/state_memory.rs",
     "crates/core/src/world/view.rs",
-    "crates/core/tests/it/adaptive.rs",
-    "crates/core/tests/it/articulated_contacts.rs",
-    "crates/core/tests/it/friction.rs",
-    "crates/core/tests/it/loop_joints.rs",
-    "crates/core/tests/it/loop_joints_joints.rs",
-    "crates/core/tests/it/regressions.rs",
 )
 
 

@@ -73,7 +73,7 @@ def paired(begin, rounds=ROUNDS, pairs=PAIRS):
     return median(ratios), ratios[out - 1], ratios[-out], median(plain)
 
 
-def told(what, found, steps=TURN):
+def report(what, found, steps=TURN):
     ratio, low, high, turn = found
     print(f"{what}: {100 * ratio:+.2f} % ({100 * low:+.2f} to {100 * high:+.2f}; {1e6 * turn / steps:.1f} µs a step)")
 
@@ -117,8 +117,8 @@ def of_two(one, other):
 
 def stepping():
     """100 bodies: one call per step, against one call for all steps, which is Rust's own loop in the same library."""
-    told("100 bodies, a loop in Python against step(n)", paired(of_two(each, together)))
-    told("the same against itself", paired(of_two(together, together)))
+    report("100 bodies, a loop in Python against step(n)", paired(of_two(each, together)))
+    report("the same against itself", paired(of_two(together, together)))
 
 
 class Child:
@@ -174,7 +174,7 @@ def against_rust():
                 a, b = Child(scene, one), Child(scene, other)
                 return a.turn, b.turn, lambda: (a.end(), b.end())
 
-            told(what, paired(start, STARTS, FEW), LONG)
+            report(what, paired(start, STARTS, FEW), LONG)
 
         compare("100 bodies, a program in Python against one in Rust", loop, rust)
         compare("the same, step(n) against one in Rust", once, rust)
@@ -189,7 +189,7 @@ def view_held():
         view = a.state
         return lambda: each(a), lambda: each(b), lambda: view.any()
 
-    told("a view of the state held against none", paired(begin))
+    report("a view of the state held against none", paired(begin))
 
 
 class Nothing(tumble.Force):

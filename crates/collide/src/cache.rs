@@ -171,17 +171,17 @@ impl<'a> Entry<'a> {
     pub fn write(&self, body: &[u8]) -> Result<(), String> {
         // the counter separates names within a process, the id separates processes
         static COUNTER: AtomicU64 = AtomicU64::new(0);
-        let told = |error: std::io::Error| {
+        let reason = |error: std::io::Error| {
             format!("the {} is not kept in {}: {error}", self.kind.word(), self.folder.display())
         };
-        fs::create_dir_all(self.folder).map_err(told)?;
+        fs::create_dir_all(self.folder).map_err(reason)?;
         let number = COUNTER.fetch_add(1, Ordering::Relaxed);
         let own = self.folder.join(format!("{}.{}.{number}.{UNFINISHED}", self.name, std::process::id()));
         let bytes = [self.first_line(body).as_bytes(), b"\n", body].concat();
         let written = fs::write(&own, bytes).and_then(|()| fs::rename(&own, self.path()));
         if let Err(error) = written {
             let _ = fs::remove_file(&own);
-            return Err(told(error));
+            return Err(reason(error));
         }
         remove_oldest(self.folder, self.max_bytes);
         Ok(())

@@ -114,7 +114,7 @@ def test_tau_acts_until_it_is_set_anew(pendulum):
     assert placed.qd[0] == pytest.approx(0.5 / (2 * 0.25), rel=1e-9)
 
 
-def test_a_drive_brings_its_joint_to_where_it_is_told(pendulum):
+def test_a_drive_brings_its_joint_to_its_target(pendulum):
     world = tumble.World()
     placed = world.add_articulation(pendulum, name="driven")
     placed.set_drive("hinge", target=0.8, stiffness=1e4, damping=200)

@@ -188,7 +188,7 @@ def test_views_hold_what_they_showed_when_their_world_is_gone():
         state[0] = 5.0
 
 
-def test_a_scene_with_problems_tells_all_of_them(tmp_path):
+def test_a_scene_with_problems_reports_all_of_them(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text('[world]\ndt = 0.1\n\n[[body]]\nname = "a"\nshape = { type = "ball" }\n')
     with pytest.raises(tumble.SceneError) as caught:

@@ -114,7 +114,7 @@ def test_what_is_only_shown_cannot_be_written_and_the_view_ends_with_the_call():
     assert kept["position"][0] == pytest.approx([1, 0, 0]) and (world.state == before).all()
 
 
-def test_a_push_off_centre_turns_the_body():
+def test_a_push_off_center_turns_the_body():
     world = tumble.World(gravity=(0, 0, 0), dt=1e-3)
     box = world.add_rigid("box", tumble.Box((1, 1, 1)), mass=6.0)
 
@@ -219,7 +219,7 @@ def test_another_thread_gets_an_error_while_a_callback_runs():
         (lambda view: setattr(view, "force", np.zeros((7, 3))), ValueError, "broadcast"),
     ],
 )
-def test_what_a_callback_does_wrong_is_told(act, error, said):
+def test_faults_of_a_callback_are_reported(act, error, said):
     world, _ = one_ball()
 
     class Wrong(tumble.Force):

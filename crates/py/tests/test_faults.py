@@ -373,7 +373,7 @@ def test_gravity_as_a_force_is_gravity(tmp_path):
     np.testing.assert_allclose(ends[1], ends[0], rtol=0, atol=1e-12)
 
 
-def test_the_link_that_is_touched_is_told(tmp_path):
+def test_the_touched_link_is_reported(tmp_path):
     world = tumble.World(gravity=(0, 0, 0))
     arm = world.add_articulation(two_links(tmp_path))
     pose = arm.link_poses()[arm.link_names.index("fore")]

@@ -73,7 +73,7 @@ def test_a_facet_has_the_size_its_cave_says(drawn, root, tmp_path):
         ({"width": 0}, ValueError, "0 x 480"),
     ],
 )
-def test_what_cannot_be_drawn_is_told(drawn, words, error, said):
+def test_objects_that_cannot_be_drawn_are_reported(drawn, words, error, said):
     with pytest.raises(error, match=said):
         drawn.render(**words)
 

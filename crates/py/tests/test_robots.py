@@ -55,7 +55,7 @@ def test_notes_of_a_robot_reach_the_world(tmp_path):
     assert [note for note in world.notes if "garbage.obj" in note and "left out" in note]
 
 
-def test_bodies_that_overlap_at_the_start_are_told():
+def test_bodies_that_overlap_at_the_start_are_reported():
     world = tumble.World()
     world.add_static("ground", tumble.HalfSpace())
     for name, x in [("left", 0.0), ("right", 0.8)]:

@@ -86,7 +86,7 @@ impl MeshData {
                     .map(|&(f, angle)| faces[f as usize].normal * angle)
                     .sum();
                 let normal: [f32; 3] = sum.try_normalize(1e-12).unwrap_or(face.normal).into();
-                let place = face.places.map(|places| [places[k][0], places[k][1], face.per_metre]);
+                let place = face.places.map(|places| [places[k][0], places[k][1], face.per_meter]);
                 let same = |&i: &u32| {
                     let i = i as usize;
                     (Vector3::from(mesh.normals[i]) - Vector3::from(normal)).norm() < 1e-4
@@ -315,7 +315,7 @@ struct Face {
     angles: [f32; 3],
     places: Option<[[f32; 2]; 3]>,
     /// Repetitions of the texture per meter: the root of the ratio of the areas.
-    per_metre: f32,
+    per_meter: f32,
 }
 
 impl Face {
@@ -323,10 +323,10 @@ impl Face {
         let area = (b - a).cross(&(c - a));
         let flat =
             places.map_or(0.0, |[p, q, r]| ((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])).abs());
-        let per_metre = (flat / area.norm()).sqrt().min(1e6);
+        let per_meter = (flat / area.norm()).sqrt().min(1e6);
         let normal = area.try_normalize(0.0).filter(|n| n.iter().all(|x| x.is_finite()))?;
         let angles = [(b - a).angle(&(c - a)), (a - b).angle(&(c - b)), (a - c).angle(&(b - c))];
-        Some(Face { vertices, normal, angles, places: places.copied(), per_metre })
+        Some(Face { vertices, normal, angles, places: places.copied(), per_meter })
     }
 }
 

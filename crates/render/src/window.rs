@@ -146,7 +146,7 @@ impl<A: WindowApp> Host<'_, A> {
         self.app.opened(screen)
     }
 
-    fn told(&mut self, event: &WindowEvent) -> Result<(), A::Error> {
+    fn dispatch(&mut self, event: &WindowEvent) -> Result<(), A::Error> {
         let Some(screen) = &mut self.screen else { return Ok(()) };
         match event {
             WindowEvent::Resized(size) => screen.resize([size.width, size.height])?,
@@ -174,8 +174,8 @@ impl<A: WindowApp> ApplicationHandler for Host<'_, A> {
     }
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _id: WindowId, event: WindowEvent) {
-        let told = self.told(&event);
-        self.checked(event_loop, told);
+        let outcome = self.dispatch(&event);
+        self.checked(event_loop, outcome);
         if self.next == Next::Event {
             self.next = Next::At(Instant::now());
         }

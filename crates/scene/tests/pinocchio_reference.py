@@ -105,25 +105,25 @@ class Tree:
         t, slip, where = self.turner(q), self.slip(q, v), self.positions(q)
         back = np.linalg.inv(t)
         speed, rise = t @ v, t @ a + slip
-        tell("qdd", back @ (pin.aba(model, data, where, speed, back.T @ tau).copy() - slip))
-        tell("tau", t.T @ pin.rnea(model, data, where, speed, rise))
+        emit("qdd", back @ (pin.aba(model, data, where, speed, back.T @ tau).copy() - slip))
+        emit("tau", t.T @ pin.rnea(model, data, where, speed, rise))
         mass = pin.crba(model, data, where).copy()
         mass = np.triu(mass) + np.triu(mass, 1).T
-        tell("mass", (t.T @ mass @ t).ravel())
-        tell("energy", [pin.computeKineticEnergy(model, data, where, speed), pin.computePotentialEnergy(model, data, where)])
+        emit("mass", (t.T @ mass @ t).ravel())
+        emit("energy", [pin.computeKineticEnergy(model, data, where, speed), pin.computePotentialEnergy(model, data, where)])
         pin.centerOfMass(model, data, where, speed)
-        tell("center", np.concatenate([data.com[0], data.vcom[0]]))
+        emit("center", np.concatenate([data.com[0], data.vcom[0]]))
         h = pin.computeCentroidalMomentum(model, data, where, speed)
-        tell("momentum", np.concatenate([h.linear, h.angular + np.cross(data.com[0], h.linear)]))
+        emit("momentum", np.concatenate([h.linear, h.angular + np.cross(data.com[0], h.linear)]))
         pin.forwardKinematics(model, data, where, speed, rise)
         rates = [pin.getClassicalAcceleration(model, data, j, pin.LOCAL_WORLD_ALIGNED) for j in self.joint]
-        tell("accelerations", np.concatenate([np.concatenate([r.angular, r.linear]) for r in rates]))
+        emit("accelerations", np.concatenate([np.concatenate([r.angular, r.linear]) for r in rates]))
         pin.computeJointJacobians(model, data, where)
         last = pin.getJointJacobian(model, data, self.joint[-1], pin.LOCAL_WORLD_ALIGNED).reshape(6, -1) @ t
-        tell("jacobian", np.vstack([last[3:], last[:3]]).ravel())
+        emit("jacobian", np.vstack([last[3:], last[:3]]).ravel())
 
 
-def tell(name, numbers):
+def emit(name, numbers):
     print(name, *[repr(float(x)) for x in numbers])
 
 

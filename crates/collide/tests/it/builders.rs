@@ -154,7 +154,7 @@ fn branching_of_two_and_of_many() {
 /// The sphere around a unit cube has the radius √3/2 and extends `(√3/2 − 1/2)/√3 = 21.13 %` of the
 /// diagonal outside.
 #[test]
-fn a_sphere_within_the_error_is_neither_divided_nor_grown() {
+fn a_sphere_within_the_error_is_not_divided_or_grown() {
     let cube = TriMesh::cuboid(Vec3::repeat(1.0));
     let bound = 0.5 - 0.5 / 3.0_f64.sqrt();
     for builder in [Builder::Octree, Builder::Medial, Builder::Hubbard, Builder::Grid] {

@@ -1,5 +1,5 @@
-//! The adaptive integrator: its order, its tolerance, its dense output, what it carries from frame
-//! to frame.
+//! The adaptive integrator: its order, its tolerance, its dense output, and the step size that it
+//! carries from frame to frame.
 
 use crate::common::*;
 use tumble_core::collide::{Mat3, Pose, Quat, Vec3};
@@ -32,7 +32,7 @@ impl ForceGenerator for Drive {
     }
 }
 
-/// A spring of `k` N/m and `c` N·s/m between the center of a body and a point.
+/// A spring of `k` N/m and a damper of `c` N·s/m between the center of a body and a point.
 #[derive(Clone)]
 struct Spring {
     name: String,
@@ -85,13 +85,13 @@ fn run(world: &mut World, seconds: f64) {
 
 const MOMENTS: [f64; 3] = [1.0, 2.0, 3.0];
 
-/// Body with I = (1, 2, 3) kg·m² that spins about its unstable axis.
+/// Adds a body with I = (1, 2, 3) kg·m² that spins about its unstable axis.
 fn top(world: &mut World) -> ObjectId {
     let body = RigidBody::new("top", sphere(1.0), 1.0, Mat3::from_diagonal(&Vec3::from(MOMENTS))).unwrap();
     world.add(body.moving(Vec3::zeros(), Vec3::new(0.01, 5.0, 0.01))).unwrap()
 }
 
-/// A torque that depends on time and on the attitude, and a force with it.
+/// Returns a torque that depends on time and attitude, and a force.
 fn torque(t: f64, q: &Quat) -> (Vec3, Vec3) {
     (Vec3::new(0.3, (2.0 * t).sin(), 0.0), Vec3::new((3.0 * t).cos(), 0.5, -0.4) + 2.0 * (q * Vec3::x()))
 }
@@ -100,7 +100,7 @@ fn attitude(world: &World, id: ObjectId) -> Quat {
     world.part_state(id, 0).unwrap().pose.rotation
 }
 
-/// Attitude and position at 2 s, by frames of `dt` that are one inner step each.
+/// Returns attitude and position at 2 s, computed with one inner step per frame of `dt`.
 fn one_step_a_frame(dt: f64, driven: bool) -> (Quat, Vec3) {
     let mut world = adaptive(dt, 0.1);
     let id = top(&mut world);
@@ -113,7 +113,7 @@ fn one_step_a_frame(dt: f64, driven: bool) -> (Quat, Vec3) {
     (attitude(&world, id), position(&world, id))
 }
 
-/// The same by RK4 with steps of 1/4096 s.
+/// Returns the same, computed with RK4 and steps of 1/4096 s.
 fn reference(driven: bool) -> (Quat, Vec3) {
     let mut world = no_gravity(world("backtracking", 1.0 / 4096.0));
     set(&mut world, |s| s.integrator = Integrator::Rk4);
@@ -125,7 +125,7 @@ fn reference(driven: bool) -> (Quat, Vec3) {
     (attitude(&world, id), position(&world, id))
 }
 
-/// Angle between two attitudes, rad; exact where it is small.
+/// Returns the angle between two attitudes, rad; exact for small angles.
 fn angle(a: &Quat, b: &Quat) -> f64 {
     2.0 * (a.inverse() * b).imag().norm().asin()
 }
@@ -148,8 +148,8 @@ fn it_is_of_fifth_order_on_a_free_and_on_a_driven_body() {
     }
 }
 
-/// Two links on spherical joints, the first of them on a floating base: every kind of joint that
-/// turns in space.
+/// Returns the final state of two links on spherical joints, the first on a floating base: every
+/// kind of joint that rotates in space.
 fn tangle(dt: f64, integrator: Integrator) -> Vec<f64> {
     let mut world = world("backtracking", dt);
     set(&mut world, |s| (s.integrator, s.integrator_tolerance) = (integrator, 0.1));
@@ -185,7 +185,7 @@ fn it_is_of_fifth_order_on_ball_joints_and_floating_bases() {
     assert!((orders.1 - 5.0).abs() < 0.4, "orders {orders:?}: {coarse:e} {middle:e} {fine:e}");
 }
 
-/// Angular momentum is held by the state itself; energy, as the tolerance asks.
+/// The state variables conserve angular momentum exactly, and energy within the tolerance.
 #[test]
 fn it_keeps_angular_momentum_and_energy_of_the_free_body() {
     for tolerance in [1e-6, 1e-9] {
@@ -242,8 +242,8 @@ fn the_error_of_an_oscillator_goes_with_the_tolerance() {
     }
 }
 
-/// The weights integrate polynomials of degree four exactly, if forces are asked for at the stages'
-/// times: `P = t⁵` under `F = 5t⁴`.
+/// The weights integrate polynomials of degree four exactly if forces are evaluated at the times of
+/// the stages: `P = t⁵` under `F = 5t⁴`.
 #[test]
 fn forces_are_taken_at_the_time_of_their_stage() {
     let mut world = adaptive(0.25, 0.1);
@@ -295,9 +295,9 @@ fn strokes_against_a_wall_are_located_within_inner_steps() {
     assert!(worst < 12.0 * 1e-7 && tries < 20, "off by {worst:e} m, at most {tries} tries a frame");
 }
 
-/// Pushed away from the middle between two walls, `x = ¼·cosh(κt)`: the parabola of the start
-/// arrives late, so every stroke is found in the dense output. At `e = 1` the way back is the same.
-/// `κ` is such that an inner step is as long as a frame.
+/// Pushed away from the middle between two walls, `x = ¼·cosh(κt)`. The parabola from the start of
+/// a step predicts a late stroke, so every stroke is found in the dense output. At `e = 1` the way
+/// back is the same. `κ` is such that an inner step is as long as a frame.
 #[test]
 fn a_stroke_that_comes_early_is_found_in_the_dense_output() {
     let (k, rate) = (50.0, 5.0);
@@ -323,7 +323,7 @@ fn a_stroke_that_comes_early_is_found_in_the_dense_output() {
             worst = worst.max((position(&world, id).x - 0.25 * (rate * from_rest).cosh()).abs());
         }
         println!("tolerance {tolerance:e}: {strokes} strokes, off by {worst:e}");
-        // what is wrong at a stroke grows by up to e^(2·1.317) = 14 until the next
+        // an error at a stroke grows by up to e^(2·1.317) = 14 until the next
         assert!(
             strokes == 2 && worst < 2.0 * tolerance,
             "tolerance {tolerance:e}: {strokes} strokes, off by {worst:e}"
@@ -331,9 +331,9 @@ fn a_stroke_that_comes_early_is_found_in_the_dense_output() {
     }
 }
 
-/// Two equal discs that strike off center exchange what they have along the line of centers.
+/// Two equal discs that collide off center exchange their velocities along the line of centers.
 #[test]
-fn balls_strike_where_and_as_they_should() {
+fn balls_collide_at_the_right_place_and_time() {
     let mut world = adaptive(1.0 / 60.0, 1e-6);
     let ball = |name: &str| RigidBody::with_mass(name, sphere(0.1), 1.0).unwrap().surface(1.0, 0.0);
     let a = world.add(ball("a").moving(Vec3::new(3.0, 0.0, 0.0), Vec3::new(0.0, 9.0, 4.0))).unwrap();
@@ -343,7 +343,7 @@ fn balls_strike_where_and_as_they_should() {
     let (n, time) = (Vec3::new(0.8, 0.6, 0.0), 0.28);
     let (vb, va) = (n * n.x * 3.0, Vec3::new(3.0, 0.0, 0.0) - n * n.x * 3.0);
     let (xa, xb) = (Vec3::new(0.84, 0.0, 0.0) + va * (1.0 - time), Vec3::new(1.0, 0.12, 0.0) + vb * (1.0 - time));
-    // the moment is right to 1e-7 m / 2.4 m/s
+    // the time of impact is accurate to 1e-7 m / 2.4 m/s
     for (id, x, v) in [(a, xa, va), (b, xb, vb)] {
         assert!(
             (position(&world, id) - x).norm() < 1e-6 && (velocity(&world, id) - v).norm() < 1e-6,
@@ -354,8 +354,8 @@ fn balls_strike_where_and_as_they_should() {
     }
 }
 
-/// A ball that bounces (`e = 1`) keeps its height, and a frame ends where it should whatever
-/// happened in it.
+/// A ball that bounces (`e = 1`) keeps its height, and an impact does not change the length of its
+/// frame.
 #[test]
 fn a_bouncing_ball_keeps_its_height_and_frames_their_length() {
     let mut world = world("backtracking", 1.0 / 60.0);
@@ -428,8 +428,8 @@ fn save_restore_run_and_fork_give_the_same_bytes() {
     }
 }
 
-/// The inner step is carried: a frame in the middle of the run refuses none. The spring's 100 rad/s
-/// need about seven a frame.
+/// The inner step is carried over: a frame in the middle of the run rejects no step. The spring's
+/// 100 rad/s need about seven steps per frame.
 #[test]
 fn the_inner_step_is_carried_from_frame_to_frame() {
     let mut world = adaptive(1.0 / 60.0, 1e-6);
@@ -441,7 +441,7 @@ fn the_inner_step_is_carried_from_frame_to_frame() {
     run(&mut world, 1.0);
     let saved = world.save();
     let carried = world.step().unwrap().inner_steps;
-    // the last eight bytes are the inner step: without it the frame begins as the first one did
+    // the last eight bytes are the inner step: without it, the frame begins like the first one
     let mut without = saved.clone();
     let end = without.len() - 8;
     without[end..].fill(0);
@@ -475,26 +475,27 @@ fn a_far_object_changes_nothing_but_the_steps() {
     let (alone, crowded) = (end(false), end(true));
     let (turned, moved) = (angle(&alone.0, &crowded.0), (alone.1 - crowded.1).norm());
     println!("{turned:e} {moved:e} {} {}", alone.2, crowded.2);
-    assert!(crowded.2 > 2 * alone.2, "the far one asks for more steps: {} against {}", crowded.2, alone.2);
+    assert!(crowded.2 > 2 * alone.2, "the far body needs more steps: {} against {}", crowded.2, alone.2);
     assert!(turned < 1e-6 && moved < 1e-6, "turned {turned:e}, moved {moved:e}");
 }
 
 /// A kinematic body keeps its velocity and acts on others: a body coupled to it by a damper alone
 /// follows `v·(1 − e^{−ct/m})`.
 #[test]
-fn what_is_led_keeps_its_velocity() {
+fn a_kinematic_body_keeps_its_velocity() {
     let mut world = adaptive(0.1, 1e-8);
-    let led =
-        world.add(RigidBody::new("led", sphere(0.2), 1.0, Mat3::from_diagonal(&Vec3::from(MOMENTS))).unwrap()).unwrap();
-    world.set_mode(led, Mode::Kinematic).unwrap();
+    let body = world
+        .add(RigidBody::new("body", sphere(0.2), 1.0, Mat3::from_diagonal(&Vec3::from(MOMENTS))).unwrap())
+        .unwrap();
+    world.set_mode(body, Mode::Kinematic).unwrap();
     let (v, w) = (Vec3::new(0.5, 0.0, 0.2), Vec3::new(0.3, 2.0, -0.4));
-    world.set_velocity(led, v, w).unwrap();
+    world.set_velocity(body, v, w).unwrap();
     let ball = world
         .add(RigidBody::with_mass("ball", sphere(0.1), 2.0).unwrap().at(Pose::translation(5.0, 0.0, 0.0)))
         .unwrap();
     world.add(Spring { name: "spring".into(), on: ball, to: Vec3::new(5.0, 1.0, 0.0), k: 30.0, c: 0.1 }).unwrap();
     run(&mut world, 2.0);
-    let part_state = *world.part_state(led, 0).unwrap();
+    let part_state = *world.part_state(body, 0).unwrap();
     assert!((part_state.position() - 2.0 * v).norm() < 1e-14 && (part_state.velocity - v).norm() < 1e-15);
     assert!((part_state.angular_velocity - w).norm() < 1e-13, "it turns with {}", part_state.angular_velocity);
     assert!(angle(&part_state.pose.rotation, &Quat::from_scaled_axis(2.0 * w)) < 1e-13);
@@ -502,7 +503,7 @@ fn what_is_led_keeps_its_velocity() {
 
 #[test]
 fn what_it_cannot_follow_is_an_error_with_a_name_and_changes_nothing() {
-    // 1e9 rad/s need some 1e7 steps a frame
+    // 1e9 rad/s need some 1e7 steps per frame
     let mut world = adaptive(1.0 / 60.0, 1e-6);
     let id = world.add(RigidBody::with_mass("calm", sphere(0.1), 1.0).unwrap()).unwrap();
     world.add(Spring { name: "soft".into(), on: id, to: Vec3::x(), k: 1.0, c: 0.0 }).unwrap();
@@ -514,7 +515,7 @@ fn what_it_cannot_follow_is_an_error_with_a_name_and_changes_nothing() {
     let error = world.step().unwrap_err();
     assert!(matches!(&error, StepError::Tolerance { object, steps: 100_000, .. } if object == "wild"), "{error}");
     assert!(world.save() == before);
-    // a blow that no step is short enough for
+    // no step is short enough for this blow
     let mut world = adaptive(1.0 / 60.0, 1e-6);
     let id = world.add(RigidBody::with_mass("struck", sphere(0.1), 1.0).unwrap()).unwrap();
     world
@@ -523,7 +524,7 @@ fn what_it_cannot_follow_is_an_error_with_a_name_and_changes_nothing() {
     let error = world.step().unwrap_err();
     let StepError::Tolerance { object, time, step, .. } = &error else { panic!("{error}") };
     assert!(object == "struck" && (time - 0.009).abs() < 1e-9 && *step <= 1e-12 / 60.0, "{error}");
-    // what is no number is found at once
+    // NaN is found at once
     let mut world = adaptive(1.0 / 60.0, 1e-6);
     let id = world.add(RigidBody::with_mass("lost", sphere(0.1), 1.0).unwrap()).unwrap();
     world.add(Drive(id, |_, _| (Vec3::new(f64::NAN, 0.0, 0.0), Vec3::zeros()))).unwrap();

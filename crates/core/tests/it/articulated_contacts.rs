@@ -1,4 +1,5 @@
-//! Links meet planes, rigid bodies, each other and other articulated bodies, in the same solver as everything else.
+//! Contacts of links with planes, rigid bodies, each other and other articulated bodies, in the
+//! same solver as all constraints.
 
 use crate::articulated_world::{adaptive, hinged, loose_chain, rod, run, world};
 use crate::common::{ground, sphere};
@@ -8,7 +9,7 @@ use tumble_core::{
     Settings, World,
 };
 
-/// A box that is thrown at the floor: a rigid body, or a floating link with nothing on it.
+/// Adds a box that is thrown at the floor: a rigid body, or a floating base without links.
 fn thrown(mut world: World, articulated: bool, lift: f64) -> (World, ObjectId) {
     ground(&mut world, 0.6, 0.5);
     let shape = Shape::cuboid(Vec3::new(0.2, 0.4, 0.6)).unwrap();
@@ -62,7 +63,7 @@ fn a_floating_link_and_a_rigid_body_are_the_same_thing() {
 
 #[test]
 fn the_same_contact_gives_the_same_impulse() {
-    // both are set down on the same state, a hair into the floor: one frame, an impact with friction
+    // both begin from the same state, slightly inside the floor: one frame, an impact with friction
     let [a, b] = [false, true].map(|articulated| {
         let (mut world, id) =
             thrown(world(1.0 / 240.0, "time_stepping", Integrator::Verlet), articulated, -0.6 + 0.352);
@@ -93,7 +94,8 @@ fn a_chain_that_slides_off_a_sphere_comes_to_rest() {
         highest = highest.max(world.energy().total());
     }
     assert!(highest < start + 1e-3, "energy grew from {start} to {highest} J");
-    // a straight piece may roll on, nothing resists rolling: what is left is small, and no contact that carries slides
+    // a straight piece may roll on without resistance; the remaining motion is small, and no loaded
+    // contact slides
     let pressed = world.contacts().iter().filter(|c| c.impulse.norm() > 1e-7);
     let slides = pressed.map(|c| c.velocity.norm()).fold(0.0, f64::max);
     println!("left: {:.1e} J of {start:.2} J, sliding at most {slides:.1e} m/s", world.energy().kinetic);
@@ -102,7 +104,8 @@ fn a_chain_that_slides_off_a_sphere_comes_to_rest() {
     joined(&world, id, 16);
 }
 
-/// The end of each link is the joint of the next: exact, because joints are coordinates.
+/// Asserts that the end of each link is the joint of the next: exact, because joints are
+/// coordinates.
 fn joined(world: &World, id: ObjectId, links: usize) {
     for i in 1..links {
         let [above, below] = [i - 1, i].map(|l| world.part_state(id, l).unwrap().pose);
@@ -132,7 +135,7 @@ fn a_chain_drapes_over_a_sphere() {
     }
 }
 
-/// Two pendulums with balls of 1 kg, side by side, just touching where they hang.
+/// Adds two pendulums with balls of 1 kg, side by side, which just touch at rest.
 fn pendulums(mut world: World, angle: f64) -> World {
     for (name, x, q) in [("left", -0.05, angle), ("right", 0.05, 0.0)] {
         let bob = LinkMass { inertia: 1e-3 * Mat3::identity(), ..LinkMass::point(1.0, Vec3::new(0.0, 0.0, -0.5)) };
@@ -160,7 +163,7 @@ fn two_equal_pendulums_swap_their_swings() {
     assert!((world.energy().total() / start - 1.0).abs() < 1e-6, "{} {start}", world.energy().total());
 }
 
-/// Three rods of 0.4 m with capsules; the last is folded back by a torque onto the first.
+/// Adds three rods of 0.4 m with capsules; a torque folds the last one back onto the first.
 fn folding(own: bool, apart: bool) -> (World, ObjectId) {
     let mut world = world(1.0 / 240.0, "time_stepping", Integrator::Verlet);
     world.set_settings(Settings { gravity: Vec3::zeros(), ..*world.settings() }).unwrap();
@@ -185,12 +188,12 @@ fn folding(own: bool, apart: bool) -> (World, ObjectId) {
 }
 
 #[test]
-fn links_meet_their_own_kind_unless_they_are_kept_apart() {
+fn links_of_a_body_collide_unless_disabled() {
     let (world, id) = folding(true, false);
     let (q, contacts) = (world.state_of(id).unwrap()[2], world.contacts().len());
     assert!(
         contacts > 0 && world.contacts().iter().all(|c| c.part_a.abs_diff(c.part_b) == 2),
-        "first against last, not neighbours"
+        "first against last, not neighbors"
     );
     assert!(q > 1.5 && q < 2.98, "stopped by the first link at {q} rad");
     for (own, apart) in [(false, false), (true, true)] {
@@ -201,7 +204,8 @@ fn links_meet_their_own_kind_unless_they_are_kept_apart() {
 
 #[test]
 fn a_ball_at_rest_on_a_held_arm_loads_its_joint() {
-    // a box of 1 kg rests on a plate that a joint with friction holds: the chain below feels its weight, nothing moves
+    // a box of 1 kg rests on a plate that joint friction holds: the chain below carries its weight,
+    // nothing moves
     let mut world = world(1.0 / 240.0, "time_stepping", Integrator::Verlet);
     let mut builder = ModelBuilder::new();
     let plate = LinkMass { mass: 1.0, center: Vec3::new(0.2, 0.0, 0.0), inertia: 0.01 * Mat3::identity() };

@@ -22,7 +22,7 @@ fn a_box_sliding_fast_at_60_hz_is_not_lifted() {
     }
 }
 
-/// Cube on a slope, released at rest.
+/// Releases a cube at rest on a slope.
 fn on_slope(stepper: &str, angle: f64, friction: f64, seconds: f64) -> (World, ObjectId) {
     let mut world = world(stepper, 1.0 / 240.0);
     slope(&mut world, angle, friction);
@@ -111,7 +111,7 @@ fn a_spinning_sphere_does_not_sink() {
         (0..300).for_each(|_| {
             world.step().unwrap();
         });
-        assert!((position(&world, id).z - 0.5).abs() < 1e-8, "{stepper}: centre at {}", position(&world, id).z);
+        assert!((position(&world, id).z - 0.5).abs() < 1e-8, "{stepper}: center at {}", position(&world, id).z);
         assert!((world.part_state(id, 0).unwrap().angular_velocity.x - 20.0).abs() < 1e-9);
     }
 }

@@ -6,16 +6,16 @@ use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::*;
 
 const RATE: f64 = 240.0;
-/// Hinges of a planar mechanism turn about −y, so that angles in the x-z plane grow from x towards
-/// z.
+/// The revolute joints of a planar mechanism turn about −y, so that angles in the x-z plane grow
+/// from x towards z.
 pub const AXIS: Vec3 = Vec3::new(0.0, -1.0, 0.0);
 
 fn at(angle: f64) -> Vec3 {
     Vec3::new(angle.cos(), 0.0, angle.sin())
 }
 
-/// A bar of 1 kg per meter between two points of the x-z plane, along its own x axis; it collides
-/// with nothing.
+/// Returns a bar of 1 kg per meter between two points of the x-z plane, along its own x axis,
+/// without collisions.
 pub fn bar(name: &str, from: Vec3, to: Vec3) -> RigidBody {
     let d = to - from;
     let shape = Shape::cuboid(Vec3::new(d.norm(), 0.02, 0.02)).unwrap();
@@ -30,7 +30,7 @@ pub fn hinge(world: &mut World, name: &str, a: ObjectId, b: Option<ObjectId>, po
     world.add(hinge).unwrap()
 }
 
-/// The end of a bar, from its pose alone: `side` −½ or ½.
+/// Returns the end of a bar, from its pose alone: `side` is −½ or ½.
 fn end(world: &World, bar: ObjectId, length: f64, side: f64) -> Vec3 {
     world.part_state(bar, 0).unwrap().pose * nalgebra::Point3::new(side * length, 0.0, 0.0) - nalgebra::Point3::origin()
 }
@@ -40,8 +40,8 @@ fn angle(world: &World, bar: ObjectId) -> f64 {
     x.z.atan2(x.x)
 }
 
-/// Crank, coupler and rocker on the ground. Shortest and longest together are shorter than the
-/// other two: by Grashof's law the crank goes round.
+/// Crank, coupler and rocker on the ground. The shortest and the longest bar together are shorter
+/// than the other two: by Grashof's law the crank makes full turns.
 pub struct FourBar {
     pub world: World,
     pub bars: [ObjectId; 3],
@@ -51,8 +51,8 @@ pub struct FourBar {
 pub const LENGTHS: [f64; 3] = [0.2, 0.5, 0.4];
 pub const GROUND: Vec3 = Vec3::new(0.4, 0.0, 0.0);
 
-/// The closed form: the pins between crank and coupler, and between coupler and rocker, at an angle
-/// of the crank (coupler above).
+/// Returns the pins between crank and coupler, and between coupler and rocker, at an angle of the
+/// crank, in closed form (coupler above).
 pub fn pins(crank: f64) -> (Vec3, Vec3) {
     let a = LENGTHS[0] * at(crank);
     let d = GROUND - a;
@@ -62,7 +62,7 @@ pub fn pins(crank: f64) -> (Vec3, Vec3) {
 }
 
 impl FourBar {
-    /// Released from rest near its highest point.
+    /// Returns the linkage at rest near its highest point.
     pub fn new(stepper: &str, dt: f64) -> FourBar {
         let mut world = world(stepper, dt);
         let (a, b) = pins(1.9);
@@ -81,27 +81,27 @@ impl FourBar {
         FourBar { world, bars, start }
     }
 
-    /// The largest distance between pins that should meet.
+    /// Returns the largest distance between pins that should coincide.
     fn gap(&self) -> f64 {
         let end = |k: usize, side| end(&self.world, self.bars[k], LENGTHS[k], side);
         let gaps = [end(0, -0.5), end(0, 0.5) - end(1, -0.5), end(1, 0.5) - end(2, -0.5), end(2, 0.5) - GROUND];
         gaps.iter().map(|d| d.norm()).fold(0.0, f64::max)
     }
 
-    /// How far the middle of the coupler is from where the closed form has it at the crank's angle.
+    /// Returns the distance of the coupler's middle from its closed form at the crank's angle.
     fn off(&self) -> f64 {
         let (a, b) = pins(angle(&self.world, self.bars[0]));
         (position(&self.world, self.bars[1]) - 0.5 * (a + b)).norm()
     }
 }
 
-/// The worst of a run.
+/// Largest errors of a run.
 #[derive(Debug, Default)]
 struct Worst {
     gap: f64,
     off: f64,
     energy: f64,
-    /// At the end, against the start.
+    /// Energy lost at the end.
     lost: f64,
     /// Largest kinetic energy.
     kinetic: f64,
@@ -135,7 +135,7 @@ fn a_four_bar_linkage_stays_closed_for_a_minute_and_keeps_its_energy() {
         // joints are closed to 1e-9 m along each axis
         assert!(worst.gap < 3e-9, "{stepper}: pins are {:e} m apart", worst.gap);
         assert!(worst.off < 1e-6, "{stepper}: the coupler is {:e} m off the closed form", worst.off);
-        // of second order, and no part of it adds up: less at the end of the minute than within a
+        // of second order and without accumulation: less at the end of the minute than within a
         // turn
         assert!(
             worst.energy < 5e-3 * worst.kinetic,
@@ -160,7 +160,7 @@ fn without_stabilization_the_same_linkage_drifts() {
     }
 }
 
-/// Piston of a slider-crank on the x axis, at an angle of the crank.
+/// Returns the position of a slider-crank's piston on the x axis at an angle of the crank.
 fn piston(crank: f64) -> f64 {
     let (r, l) = (CRANK, ROD);
     r * crank.cos() + (l * l - (r * crank.sin()).powi(2)).sqrt()
@@ -169,7 +169,7 @@ fn piston(crank: f64) -> f64 {
 const CRANK: f64 = 0.1;
 const ROD: f64 = 0.25;
 
-/// Rod and piston behind a given crank or wheel, whose pin is at (CRANK, 0, 0).
+/// Adds rod and piston to a crank or wheel whose pin is at (CRANK, 0, 0).
 fn engine(world: &mut World, crank: ObjectId) -> ObjectId {
     let (pin, gudgeon) = (Vec3::new(CRANK, 0.0, 0.0), Vec3::new(piston(0.0), 0.0, 0.0));
     let rod = world.add(bar("rod", pin, gudgeon)).unwrap();
@@ -215,9 +215,9 @@ fn a_slider_crank_follows_its_closed_form() {
 }
 
 #[test]
-fn a_wheel_that_is_led_drives_the_piston_as_asked() {
-    // it starts at once, with the engine at rest, and is where it should be from the first frame
-    // on: x(t) = r·cos ωt + √(l² − r²·sin² ωt), and the rate of that
+fn a_kinematic_wheel_drives_the_piston() {
+    // it starts at once, with the engine at rest, and is right from the first frame on: x(t) =
+    // r·cos ωt + √(l² − r²·sin² ωt), and its rate
     let spin = 10.0;
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / RATE);
@@ -242,7 +242,7 @@ fn a_wheel_that_is_led_drives_the_piston_as_asked() {
 
 #[test]
 fn steps_that_are_too_long_leave_the_linkage_closed() {
-    // the crank turns by up to 0.25 rad a frame: energy wanders, and nothing blows up
+    // the crank turns by up to 0.25 rad per frame: energy fluctuates, and nothing diverges
     for stepper in STEPPERS {
         let worst = run(&mut FourBar::new(stepper, 1.0 / 60.0), 60.0);
         println!("{stepper}, 60 s at 60 Hz: {worst:?}");
@@ -262,7 +262,7 @@ fn a_linkage_that_strikes_the_ground_stays_closed_and_out_of_it() {
         for (restitution, friction) in [(0.0, 0.5), (0.5, 0.0)] {
             let mut linkage = FourBar::new(stepper, 1.0 / RATE);
             for id in linkage.bars {
-                // bars overlap at their pins: they meet the ground alone
+                // bars overlap at their pins: they collide with the ground only
                 let body: &mut RigidBody = linkage.world.get_mut(id).unwrap();
                 (body.group, body.mask) = (CollisionGroup::new(1).unwrap(), CollisionGroup::default().bit());
                 (body.material.restitution, body.material.friction) = (restitution, friction);
@@ -291,7 +291,7 @@ fn a_linkage_that_strikes_the_ground_stays_closed_and_out_of_it() {
 
 #[test]
 fn joints_that_cannot_close_do_not_open_others() {
-    // a box welded to two places 10 mm apart, beside the linkage
+    // a box with fixed joints to two places 10 mm apart, beside the linkage
     for stepper in STEPPERS {
         let mut linkage = FourBar::new(stepper, 1.0 / RATE);
         let stuck = linkage.world.add(bar("stuck", Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.2, 1.0, 0.0))).unwrap();
@@ -299,11 +299,11 @@ fn joints_that_cannot_close_do_not_open_others() {
             let sides = (Anchor::on(stuck, 0, Pose::identity()), Anchor::world(Pose::from(place)));
             linkage
                 .world
-                .add(LoopJoint::new(format!("weld {i}"), LoopJointKind::Fixed, sides.0, sides.1).unwrap())
+                .add(LoopJoint::new(format!("joint {i}"), LoopJointKind::Fixed, sides.0, sides.1).unwrap())
                 .unwrap();
         }
         let worst = run(&mut linkage, 5.0);
-        println!("{stepper}, beside a box welded to two places: {worst:?}");
+        println!("{stepper}, beside a box fixed to two places: {worst:?}");
         assert!(worst.gap < 3e-9 && worst.off < 1e-6, "{stepper}: {worst:?}");
         let stuck = (position(&linkage.world, stuck) - Vec3::new(0.105, 1.0, 0.0)).norm();
         assert!(stuck < 6e-3, "{stepper}: the box is {stuck} m from between the two places");

@@ -1,4 +1,4 @@
-//! Single loop joints: pendulums, fixed joints, doors on two hinges, and a removed side.
+//! Single loop joints: pendulums, fixed joints, doors on two revolute joints, and a removed side.
 
 use crate::common::*;
 use crate::loop_joints::{AXIS, bar, hinge};
@@ -6,8 +6,8 @@ use std::f64::consts::PI;
 use tumble_core::collide::{Mat3, Pose, Shape, Vec3};
 use tumble_core::*;
 
-/// `4·√(L/g)·K(sin θ/2)` by the arithmetic-geometric mean, `L` the length of the simple pendulum of
-/// the same period.
+/// Returns `4·√(L/g)·K(sin θ/2)` by the arithmetic-geometric mean; `L` is the length of the simple
+/// pendulum with the same period.
 fn period(length: f64, amplitude: f64) -> f64 {
     let (mut a, mut b) = (1.0, (0.5 * amplitude).cos());
     for _ in 0..10 {
@@ -16,8 +16,8 @@ fn period(length: f64, amplitude: f64) -> f64 {
     2.0 * PI * (length / G).sqrt() / a
 }
 
-/// A bar of 0.6 m hinged to the world at its end, released at an angle from hanging; the mean
-/// period of four swings.
+/// Returns the mean period of four swings of a bar of 0.6 m, which hangs from a revolute joint at
+/// its end and is released at an angle.
 fn measured(stepper: &str, rate: f64, amplitude: f64) -> f64 {
     let mut world = world(stepper, 1.0 / rate);
     let rod = world.add(bar("bar", Vec3::zeros(), 0.6 * Vec3::new(amplitude.sin(), 0.0, -amplitude.cos()))).unwrap();
@@ -67,15 +67,16 @@ fn a_hinged_bar_swings_with_the_period_of_the_elliptic_integral() {
                 "{stepper}, {amplitude} rad: period off by {coarse:.3e} at 240 Hz, {fine:.3e} at 480 Hz, {extrapolated:.1e} extrapolated"
             );
             assert!(coarse.abs() < bound, "{stepper}, {amplitude} rad: {coarse:e}");
-            // second order: a quarter at half the step, and next to nothing when that is taken off
+            // second order: a quarter at half the step, and almost nothing when that term is
+            // subtracted
             assert!((coarse / fine - 4.0).abs() < 0.1, "{stepper}, {amplitude} rad: {coarse:e} then {fine:e}");
             assert!(extrapolated.abs() < 1e-7, "{stepper}, {amplitude} rad: {extrapolated:e}");
         }
     }
 }
 
-/// Mass, center and inertia about it of several boxes `(mass, half extents, center)` in common
-/// axes.
+/// Returns mass, center, and inertia about it of several boxes `(mass, half extents, center)` with
+/// common axes.
 fn sum(boxes: &[(f64, Vec3, Vec3)]) -> (f64, Vec3, Mat3) {
     let mass: f64 = boxes.iter().map(|b| b.0).sum();
     let center = boxes.iter().map(|b| b.0 * b.2).sum::<Vec3>() / mass;
@@ -88,7 +89,7 @@ fn sum(boxes: &[(f64, Vec3, Vec3)]) -> (f64, Vec3, Mat3) {
 }
 
 #[test]
-fn a_weld_of_two_bodies_is_one_body() {
+fn a_fixed_joint_makes_one_body_of_two() {
     let boxes =
         [(1.0, Vec3::new(0.3, 0.1, 0.05), Vec3::zeros()), (0.4, Vec3::new(0.1, 0.2, 0.15), Vec3::new(0.3, 0.2, 0.1))];
     let (mass, center, inertia) = sum(&boxes);
@@ -107,9 +108,10 @@ fn a_weld_of_two_bodies_is_one_body() {
                 world.add(body.moving(push + spin.cross(&(c - center)), spin)).unwrap()
             })
             .collect();
-        let weld = LoopJoint::fixed_at("weld", &world, Some((ids[0], 0)), Some((ids[1], 0)), Vec3::new(0.3, 0.1, 0.05))
-            .unwrap();
-        let weld = world.add(weld).unwrap();
+        let joint =
+            LoopJoint::fixed_at("joint", &world, Some((ids[0], 0)), Some((ids[1], 0)), Vec3::new(0.3, 0.1, 0.05))
+                .unwrap();
+        let joint = world.add(joint).unwrap();
         let about_center = |world: &World| {
             let (m, c) = (
                 world.momentum(),
@@ -133,13 +135,13 @@ fn a_weld_of_two_bodies_is_one_body() {
             inertial = inertial.max((part_state.angular_velocity - omega).norm());
             kept = kept.max((world.energy().total() - energy).abs() / spun);
         }
-        let position_error = world.get::<LoopJoint>(weld).unwrap().position_error(&world.view()).unwrap();
+        let position_error = world.get::<LoopJoint>(joint).unwrap().position_error(&world.view()).unwrap();
         println!(
-            "{stepper}: centre off by {fall:.1e} m, L by {angular:.1e}, ω by {inertial:.1e} rad/s, energy by {kept:.1e} of the spin, {position_error:?}"
+            "{stepper}: center off by {fall:.1e} m, L by {angular:.1e}, ω by {inertial:.1e} rad/s, energy by {kept:.1e} of the spin, {position_error:?}"
         );
-        assert!(fall < 1e-9, "{stepper}: the centre leaves the parabola by {fall:e} m");
-        // impulses keep it; moving the bodies together, with their momenta held, is of third order
-        // in a step
+        assert!(fall < 1e-9, "{stepper}: the center leaves the parabola by {fall:e} m");
+        // impulses conserve it; correcting the positions with momenta held has an error of third
+        // order in the step
         assert!(angular < 1e-5, "{stepper}: angular momentum changes by {angular:e}");
         assert!(inertial < 1e-7, "{stepper}: ω is {inertial:e} rad/s off that of one body");
         assert!(kept < 1e-4, "{stepper}: energy changes by {kept:e} of the spin's");
@@ -147,8 +149,8 @@ fn a_weld_of_two_bodies_is_one_body() {
     }
 }
 
-/// A door with its mass off center and its inertia askew, hung on `hinges` hinges along an inclined
-/// axis. The energy it starts with is kinetic.
+/// Adds a door with an eccentric mass and tilted principal axes, on `hinges` revolute joints along
+/// an inclined axis. Its initial energy is kinetic.
 fn door(stepper: &str, solver: &str, hinges: usize) -> (World, ObjectId) {
     let mut world = world(stepper, 1.0 / 240.0);
     world.set_solver(solver::by_name(solver).unwrap());
@@ -191,7 +193,7 @@ fn more_hinges_than_needed_swing_a_door_as_one_does() {
 }
 
 #[test]
-fn where_a_side_is_gone_or_not_alive_nothing_is_held() {
+fn a_loop_joint_without_one_of_its_sides_holds_nothing() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 240.0);
         let post =
@@ -200,7 +202,7 @@ fn where_a_side_is_gone_or_not_alive_nothing_is_held() {
             .add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().at(Pose::translation(0.0, 0.0, 0.5)))
             .unwrap();
         let joint =
-            LoopJoint::fixed_at("weld", &world, Some((ball, 0)), Some((post, 0)), Vec3::new(0.0, 0.0, 0.7)).unwrap();
+            LoopJoint::fixed_at("joint", &world, Some((ball, 0)), Some((post, 0)), Vec3::new(0.0, 0.0, 0.7)).unwrap();
         let joint = world.add(joint).unwrap();
         let falls = |world: &mut World| {
             let before = position(world, ball).z;
@@ -212,7 +214,7 @@ fn where_a_side_is_gone_or_not_alive_nothing_is_held() {
         assert!(falls(&mut world).abs() < 1e-9, "{stepper}: it hangs");
         world.set_enabled(post, false).unwrap();
         assert!(world.get::<LoopJoint>(joint).unwrap().position_error(&world.view()).is_none());
-        assert!((falls(&mut world) - 0.5 * G * 0.01).abs() < 1e-9, "{stepper}: it falls when the post is not alive");
+        assert!((falls(&mut world) - 0.5 * G * 0.01).abs() < 1e-9, "{stepper}: it falls when the post is disabled");
         world.remove(post).unwrap();
         world.set_velocity(ball, Vec3::zeros(), Vec3::zeros()).unwrap();
         assert!((falls(&mut world) - 0.5 * G * 0.01).abs() < 1e-9, "{stepper}: it falls when the post is gone");
@@ -220,7 +222,7 @@ fn where_a_side_is_gone_or_not_alive_nothing_is_held() {
 }
 
 #[test]
-fn closures_that_cannot_be_are_refused() {
+fn impossible_loop_joints_are_refused() {
     let mut world = world("time_stepping", 1.0 / 240.0);
     let ball = world.add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap()).unwrap();
     let (here, side) = (Vec3::zeros(), Some((ball, 0)));
@@ -257,7 +259,7 @@ fn closures_that_cannot_be_are_refused() {
 
 #[test]
 fn a_joint_that_starts_open_closes_at_the_recovery_speed() {
-    // 0.3 m apart at 3 m/s: 0.1 s; then it stays, and nothing has gained speed
+    // 0.3 m apart at 3 m/s: 0.1 s; then it stays, and no body has gained speed
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, 1.0 / 240.0));
         let ball = world
@@ -286,8 +288,8 @@ fn a_joint_that_starts_open_closes_at_the_recovery_speed() {
 
 #[test]
 fn hinged_boxes_come_to_rest_on_the_ground() {
-    // two boxes hinged edge to edge fall flat on the floor and lie there: the hinge is closed, and
-    // they stand in no surface
+    // two boxes joined edge to edge fall flat on the floor and rest there: the joint is closed, and
+    // no box is inside a surface
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 240.0);
         ground(&mut world, 0.0, 0.5);

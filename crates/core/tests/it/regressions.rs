@@ -1,4 +1,4 @@
-//! Past faults of contacts and impacts, each with the correct number.
+//! Regression tests of contacts and impacts, each with the correct number.
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Shape, Vec3};
@@ -13,7 +13,7 @@ fn billiard(world: &mut World, name: &str, at: [f64; 3], v: f64) -> ObjectId {
 }
 
 /// A kinematic plate with its top at z = 0.1.
-fn led_plate(world: &mut World) -> ObjectId {
+fn kinematic_plate(world: &mut World) -> ObjectId {
     let plate = RigidBody::fixed("plate", Shape::cuboid(Vec3::new(2.0, 2.0, 0.2)).unwrap()).surface(0.0, 0.5);
     world.add_boxed(Box::new(plate), Mode::Kinematic).unwrap()
 }
@@ -23,18 +23,18 @@ fn box_on_plate(world: &mut World) -> ObjectId {
     world.add(body.at(Pose::translation(0.0, 0.0, 0.2))).unwrap()
 }
 
-/// Distance between the box and the plate's top.
+/// Returns the distance between the box and the plate's top.
 fn gap(world: &World, body: ObjectId, plate: ObjectId) -> f64 {
     position(world, body).z - position(world, plate).z - 0.2
 }
 
 #[test]
 fn a_box_on_a_plate_that_starts_to_rise_is_not_thrown_off() {
-    // the plate's velocity already carries the box: pushing it out of the plate once more would
-    // lift it. e = 0: the gap stays 0.
+    // the plate's velocity already carries the box: a further push out of the plate would lift it.
+    // e = 0: the gap stays 0.
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);
-        let plate = led_plate(&mut world);
+        let plate = kinematic_plate(&mut world);
         let body = box_on_plate(&mut world);
         for frame in 0..60 {
             let v = if frame < 20 { 0.0 } else { 1.0 };
@@ -56,7 +56,7 @@ fn a_ball_that_starts_inside_a_rising_plate_ends_on_it() {
     // the plate's 1/60 m.
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);
-        let plate = led_plate(&mut world);
+        let plate = kinematic_plate(&mut world);
         let ball = RigidBody::with_mass("ball", sphere(0.1), 1.0)
             .unwrap()
             .surface(0.0, 0.5)
@@ -69,15 +69,15 @@ fn a_ball_that_starts_inside_a_rising_plate_ends_on_it() {
 }
 
 #[test]
-fn a_body_that_lands_elsewhere_does_not_lift_a_box_off_a_led_plate() {
-    // sub-steps and projections that the tumbler causes concern the tumbler alone: the gap stays 0.
+fn a_body_that_lands_elsewhere_does_not_lift_a_box_off_a_kinematic_plate() {
+    // sub-steps and projections caused by the tumbler change the tumbler alone: the gap stays 0.
     for stepper in STEPPERS {
         for v in [0.0, 0.5] {
             let mut world = world(stepper, 1.0 / 60.0);
             world
                 .add_static(RigidBody::fixed("ground", Shape::half_space()).at(Pose::translation(0.0, 0.0, -1.0)))
                 .unwrap();
-            let plate = led_plate(&mut world);
+            let plate = kinematic_plate(&mut world);
             let body = box_on_plate(&mut world);
             let tumbler = RigidBody::with_mass("tumbler", Shape::cuboid(Vec3::new(0.2, 0.4, 0.3)).unwrap(), 1.0)
                 .unwrap()
@@ -101,14 +101,14 @@ fn a_body_that_lands_elsewhere_does_not_lift_a_box_off_a_led_plate() {
 #[test]
 fn a_fast_off_center_hit_goes_along_the_line_of_centers_at_impact() {
     // Equal masses, e = 1, no friction, impact parameter b: at contact the line of centers makes
-    // the angle θ with the velocity, sin θ = b/2R. The struck ball takes v·cos θ along it: (cos²θ,
+    // the angle θ with the velocity, sin θ = b/2R. The struck ball gets v·cos θ along it: (cos²θ,
     // sin θ·cos θ)·v, and the other keeps the rest (sin²θ, −sin θ·cos θ)·v.
     //
-    // A stepper takes the normal where the gap is δ instead of 0: sin θ' = b/(2R + δ), so |δθ| =
-    // tan θ·δ/2R, and the velocities, v/2·(1 ± cos 2θ, sin 2θ), are off by v·|δθ|. Backtracking
-    // lands within its contact tolerance (1e-7 m: 6.5e-7·v); time_stepping follows the flight until
-    // the surfaces are within its drift tolerance (1e-4 m: 6.5e-4·v), because it sees contacts that
-    // near as touching.
+    // A stepper computes the normal at a gap of δ instead of 0: sin θ' = b/(2R + δ), so |δθ| = tan
+    // θ·δ/2R, and the velocities, v/2·(1 ± cos 2θ, sin 2θ), have an error of v·|δθ|. Backtracking
+    // ends within its contact tolerance (1e-7 m: 6.5e-7·v). time_stepping follows the flight until
+    // the surfaces are within its drift tolerance (1e-4 m: 6.5e-4·v), because it treats such
+    // contacts as touching.
     let (b, d) = (0.02, 2.0 * R);
     let (sin, cos) = (b / d, (1.0 - b * b / (d * d)).sqrt());
     for stepper in STEPPERS {
@@ -136,8 +136,8 @@ fn a_fast_off_center_hit_goes_along_the_line_of_centers_at_impact() {
 
 #[test]
 fn a_ball_that_misses_by_23_mm_strikes_nothing() {
-    // impact parameter 80 mm against 57.2 mm of two radii: no impulse at all, so the velocities are
-    // the same numbers.
+    // the impact parameter of 80 mm exceeds two radii, 57.2 mm: no impulse, so the velocities keep
+    // their bits.
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, 1.0 / 60.0));
         let a = billiard(&mut world, "flies", [0.0; 3], 10.0);
@@ -157,7 +157,7 @@ fn a_ball_that_misses_by_23_mm_strikes_nothing() {
 
 #[test]
 fn a_frozen_table_that_was_spinning_does_not_drag_what_lies_on_it() {
-    // static is at rest, whatever momentum it keeps: the box on it rests too.
+    // a static body is at rest, whatever momentum it has: the box on it rests too.
     for stepper in STEPPERS {
         for spin in [Vec3::zeros(), Vec3::new(10.0, 0.0, 0.0), Vec3::new(0.0, 0.0, 10.0)] {
             let mut world = world(stepper, 1.0 / 60.0);
@@ -178,8 +178,8 @@ fn a_frozen_table_that_was_spinning_does_not_drag_what_lies_on_it() {
     }
 }
 
-/// Three equal balls in a row with gaps, the first comes at `v`: velocities and positions along the
-/// row after `seconds`.
+/// Simulates three equal balls in a row with gaps, the first with velocity `v`. Returns velocities
+/// and positions along the row after `seconds`.
 fn shock(stepper: &str, dt: f64, v: f64, gaps: [f64; 2], seconds: f64) -> [(f64, f64); 3] {
     let mut world = no_gravity(world(stepper, dt));
     let second = 2.0 * R + gaps[0];
@@ -193,8 +193,8 @@ fn shock(stepper: &str, dt: f64, v: f64, gaps: [f64; 2], seconds: f64) -> [(f64,
 }
 
 fn assert_shock_passed(stepper: &str, dt: f64, v: f64, gaps: [f64; 2], seconds: f64) {
-    // Equal masses, e = 1, head on: each impact hands the velocity on. 0, 0, v; the balls stop a
-    // gap further, in order; the last flies for what is left.
+    // Equal masses, e = 1, head on: each impact passes the velocity on. 0, 0, v; the balls stop one
+    // gap further, in order; the last flies for the remaining time.
     let out = shock(stepper, dt, v, gaps, seconds);
     assert!(
         out.iter().zip([0.0, 0.0, v]).all(|(o, v)| (o.0 - v).abs() < 1e-9),
@@ -208,8 +208,8 @@ fn assert_shock_passed(stepper: &str, dt: f64, v: f64, gaps: [f64; 2], seconds: 
 
 #[test]
 fn a_shock_passes_through_separated_balls() {
-    // 12 m/s at 1/60 s goes 0.2 m in a frame: a ball struck in it crosses a gap of 20 mm and the
-    // next ball within the same frame.
+    // 12 m/s at 1/60 s is 0.2 m per frame: a ball that is struck crosses a gap of 20 mm and strikes
+    // the next ball within the same frame.
     assert_shock_passed("backtracking", 1.0 / 60.0, 12.0, [0.0028, 0.02], 0.05);
     for stepper in STEPPERS {
         assert_shock_passed(stepper, 1.0 / 240.0, 4.0, [0.001, 0.0048], 0.05);
@@ -225,8 +225,8 @@ fn a_ball_just_struck_does_not_tunnel_in_the_same_frame() {
 
 #[test]
 fn a_ball_sliding_along_a_capsule_is_carried_by_its_weight_in_every_frame() {
-    // The contact moves with the ball, not with a material point of the capsule: no curvature along
-    // the axis, so the resting force is m·g = 9.81 N.
+    // The contact moves with the ball, not with a material point of the capsule: there is no
+    // curvature along the axis, so the resting force is m·g = 9.81 N.
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 240.0);
         let lying = Pose::rotation(Vec3::new(0.0, std::f64::consts::FRAC_PI_2, 0.0));
@@ -250,14 +250,14 @@ fn a_ball_sliding_along_a_capsule_is_carried_by_its_weight_in_every_frame() {
     }
 }
 
-/// 1 kg without friction at 3 m/s along x, its lowest point at z = 0.1.
+/// Adds a ball of 1 kg without friction at 3 m/s along x, its lowest point at z = 0.1.
 fn sliding_ball(world: &mut World, x: f64) -> ObjectId {
     let ball =
         RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().surface(0.0, 0.0).at(Pose::translation(x, 0.0, 0.2));
     world.add(ball.moving(Vec3::new(3.0, 0.0, 0.0), Vec3::zeros())).unwrap()
 }
 
-/// Upward contact force on a body, N.
+/// Returns the upward contact force on a body, N.
 fn weight_carried(world: &World, body: ObjectId) -> f64 {
     let on = |c: &ContactPoint| if c.a == body { c.force.z } else { -c.force.z };
     world.contacts().iter().filter(|c| c.a == body || c.b == body).map(on).sum()
@@ -266,8 +266,8 @@ fn weight_carried(world: &World, body: ObjectId) -> f64 {
 #[test]
 fn a_ball_that_slides_off_a_box_is_carried_to_the_edge_and_then_falls() {
     // v²/r = 90 m/s² > g: it leaves the edge at once, on the parabola z = 0.2 − g·t²/2. It crosses
-    // in the middle of frame 60; a stepper may see that at either end of the frame, half a frame of
-    // fall: vz is off by at most g·h/2.
+    // the edge in the middle of frame 60. A stepper may detect that at either end of the frame,
+    // half a frame of fall: vz has an error of at most g·h/2.
     let h = 1.0 / 240.0;
     for stepper in STEPPERS {
         let mut world = world(stepper, h);
@@ -299,11 +299,12 @@ fn a_ball_that_slides_off_a_box_is_carried_to_the_edge_and_then_falls() {
     }
 }
 
-/// Two tops at the same height are one plane: straight on at 3 m/s, carried by m·g = 9.81 N.
+/// Two tops at the same height act as one plane: straight on at 3 m/s, with a contact force of m·g
+/// = 9.81 N.
 ///
-/// The ball meets the edge of the next box where that is nearer than the contact tolerance δ,
-/// tilted by θ = √(2δ/r): it may lose v·θ² = 6e-6 m/s there, and the force of that one frame is
-/// left out.
+/// The edge of the next box is in contact when it is nearer than the contact tolerance δ, tilted by
+/// θ = √(2δ/r). The ball may lose v·θ² = 6e-6 m/s there, and the force of that one frame is left
+/// out.
 fn slide_over_a_seam(stepper: &str) {
     let mut world = world(stepper, 1.0 / 240.0);
     for (name, x) in [("left", 0.0), ("right", 2.0)] {
@@ -333,8 +334,8 @@ fn a_ball_does_not_trip_over_the_seam_of_two_boxes_in_time_stepping() {
 
 #[test]
 fn a_thrust_within_the_frame_does_not_push_a_ball_through_the_ground() {
-    // 500 N on 1 kg over 1/60 s go 69 mm from rest; the ball is at rest when the frame begins, 10
-    // mm up and 40 mm thick.
+    // 500 N on 1 kg over 1/60 s move it 69 mm from rest; the ball is at rest when the frame begins,
+    // 10 mm above a plate of 40 mm.
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);
         ground(&mut world, 0.0, 0.5);
@@ -351,10 +352,10 @@ fn a_thrust_within_the_frame_does_not_push_a_ball_through_the_ground() {
 }
 
 #[test]
-fn energy_never_grows_in_impacts_with_friction_whether_or_not_something_is_led_far_away() {
-    // no gravity: kinetic energy is all there is, and e = 1 and μ = 1 add none.
+fn energy_never_grows_in_impacts_with_friction_with_or_without_a_far_kinematic_body() {
+    // without gravity all energy is kinetic, and e = 1 and μ = 1 add none.
     for stepper in STEPPERS {
-        for led in [false, true] {
+        for kinematic in [false, true] {
             for seed in 0..40 {
                 let s = seed as f64;
                 let mut world = no_gravity(world(stepper, 1.0 / 240.0));
@@ -364,15 +365,18 @@ fn energy_never_grows_in_impacts_with_friction_whether_or_not_something_is_led_f
                     .surface(1.0, 1.0);
                 let pose = Pose::new(Vec3::new(0.0, 0.0, 0.6), Vec3::new(0.0, 0.2 + 0.03 * s, 0.0));
                 let rod = world.add(rod.at(pose).moving(Vec3::new(6.0 - 0.3 * s, 0.0, -2.0), Vec3::zeros())).unwrap();
-                if led {
+                if kinematic {
                     let far = RigidBody::fixed("far", sphere(0.1)).at(Pose::translation(50.0, 50.0, 50.0));
                     world.add_boxed(Box::new(far), Mode::Kinematic).unwrap();
                 }
                 let start = world.energy().total();
                 for frame in 0..120 {
                     world.step().unwrap();
-                    let share = world.energy().total() / start - 1.0;
-                    assert!(share < 1e-9, "{stepper} led {led} seed {seed} frame {frame}: energy grew by {share:e}");
+                    let growth = world.energy().total() / start - 1.0;
+                    assert!(
+                        growth < 1e-9,
+                        "{stepper} kinematic {kinematic} seed {seed} frame {frame}: energy grew by {growth:e}"
+                    );
                 }
                 assert!(velocity(&world, rod).z > -1.9, "{stepper} seed {seed}: it struck");
             }
@@ -382,7 +386,7 @@ fn energy_never_grows_in_impacts_with_friction_whether_or_not_something_is_led_f
 
 #[test]
 fn a_ball_that_bounces_far_away_does_not_change_one_bit_of_a_stack() {
-    // islands share nothing: what is not touched by the bounce sees the same numbers.
+    // islands share nothing: the bounce does not change the bits of bodies that it does not touch.
     let run = |far: bool| -> Vec<Vec<u64>> {
         let mut world = world("time_stepping", 1.0 / 60.0);
         ground(&mut world, 1.0, 0.5);

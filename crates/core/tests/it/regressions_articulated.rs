@@ -49,7 +49,7 @@ fn a_chain_that_bounces_in_a_box_gains_no_energy() {
 }
 
 #[test]
-fn what_is_led_past_its_limit_goes_on_freely() {
+fn a_kinematic_joint_goes_past_its_limit_freely() {
     // the limit cannot push a kinematic body: every frame reached the maximum number of tries
     let mut world = no_gravity(world(1.0 / 60.0, "backtracking", Integrator::Verlet));
     let mut body = chain(2, 0.0).with_velocities(&[1.0, 0.0]).unwrap();
@@ -79,7 +79,7 @@ fn a_link_is_kept_apart_from_the_base() {
 }
 
 #[test]
-fn a_box_on_a_turning_arm_that_is_led_stays_on_its_circle() {
+fn a_box_on_a_turning_kinematic_arm_stays_on_its_circle() {
     // 1 rad/s at 0.6 m, held by friction: the carrier's centripetal acceleration was left out, and
     // the box crept out by 5 mm in 2 s
     let mut world = world(1.0 / 240.0, "backtracking", Integrator::Verlet);

@@ -139,7 +139,7 @@ fn whatever_is_done_to_a_sleeper_wakes_its_island() {
 /// A lift at rest supports sleeping bodies; when it starts it carries them along. A kinematic
 /// pusher from afar wakes them.
 #[test]
-fn what_is_led_wakes_those_it_carries_or_strikes() {
+fn a_kinematic_body_wakes_bodies_that_it_carries_or_strikes() {
     for stepper in STEPPERS {
         let mut world = sleepy(stepper);
         let lift = world
@@ -369,7 +369,7 @@ fn a_step_that_fails_after_it_woke_sleepers_leaves_every_byte_as_it_was() {
 }
 
 #[test]
-fn a_checkpoint_holds_who_sleeps_and_is_refused_after_an_object_came() {
+fn a_checkpoint_holds_sleep_and_is_refused_after_an_object_was_added() {
     for stepper in STEPPERS {
         let (mut world, ids) = bed(stepper);
         let (mut checkpoint, before) = (WorldState::default(), world.save());

@@ -7,7 +7,7 @@ use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::*;
 
 /// A chain of links of 0.2 m from the origin, whose end is joined to a kinematic hand.
-struct Led {
+struct KinematicHand {
     world: World,
     chain: ObjectId,
     hand: ObjectId,
@@ -19,9 +19,9 @@ struct Led {
 
 const LENGTH: f64 = 0.2;
 
-impl Led {
+impl KinematicHand {
     /// Hung up in a zigzag of `angle` from −z, and pinned to the hand where it ends.
-    fn new(stepper: &str, links: usize, angle: f64) -> Led {
+    fn new(stepper: &str, links: usize, angle: f64) -> KinematicHand {
         let mut world = world(1.0 / 240.0, stepper, Integrator::Verlet);
         let q: Vec<f64> = (0..links)
             .map(|i| {
@@ -43,7 +43,7 @@ impl Led {
         let hand = world.add_boxed(Box::new(hand), Mode::Kinematic).unwrap();
         let pin = LoopJoint::spherical_at("pin", &world, Some((chain, links - 1)), Some((hand, 0)), end).unwrap();
         let loop_joint = world.add(pin).unwrap();
-        Led { world, chain, hand, loop_joint, links, reported: None }
+        KinematicHand { world, chain, hand, loop_joint, links, reported: None }
     }
 
     fn position_error(&self) -> f64 {
@@ -87,20 +87,20 @@ fn a_chain_whose_hand_goes_out_of_reach_follows_it_straight_and_closes_again() {
             let reach = links as f64 * LENGTH;
             for along in [Vec3::new(0.0, 0.0, -1.0), Vec3::new(0.6, 0.0, -0.8), Vec3::new(0.0, 0.6, -0.8)] {
                 let name = format!("{stepper}, {links} links, along {along:?}");
-                let mut led = Led::new(stepper, links, 0.5);
-                let (across, _) = led.lead(speed * along, 1.0);
-                let (out, _) = led.lead(speed * along, 1.0);
-                let hand = position(&led.world, led.hand);
+                let mut hand = KinematicHand::new(stepper, links, 0.5);
+                let (across, _) = hand.lead(speed * along, 1.0);
+                let (out, _) = hand.lead(speed * along, 1.0);
+                let hand = position(&hand.world, hand.hand);
                 let (position_error, expected, reported) =
-                    (led.position_error(), lag(&hand, reach), led.reported.unwrap());
-                let end = led.world.part_state(led.chain, links - 1).unwrap().pose;
+                    (hand.position_error(), lag(&hand, reach), hand.reported.unwrap());
+                let end = hand.world.part_state(hand.chain, links - 1).unwrap().pose;
                 let bent = (end.rotation * -Vec3::z()).angle(&Vec3::new(hand.x, 0.0, hand.z));
-                let (back, _) = led.lead(-speed * along, 2.0);
-                let (rest, _) = led.lead(Vec3::zeros(), 0.5);
+                let (back, _) = hand.lead(-speed * along, 2.0);
+                let (rest, _) = hand.lead(Vec3::zeros(), 0.5);
                 println!(
                     "{name}: {across:.1} rad/s across, {out:.2} out, {back:.1} back; lags {position_error:.6} m, {:.1e} off, {bent:.1e} rad; closed to {:.1e} m, {rest:.1e} rad/s",
                     position_error - expected,
-                    led.position_error()
+                    hand.position_error()
                 );
                 // across the plane nothing is in reach from the start: there the chain is still
                 // coming to lie straight
@@ -114,10 +114,10 @@ fn a_chain_whose_hand_goes_out_of_reach_follows_it_straight_and_closes_again() {
                     "{name}: {position_error} m for {expected} m, bent by {bent} rad"
                 );
                 assert!(
-                    reported.loop_joint == led.loop_joint && reported.distance == position_error,
+                    reported.loop_joint == hand.loop_joint && reported.distance == position_error,
                     "{name}: {reported:?}"
                 );
-                assert!(led.position_error() < 2e-9, "{name}: open by {:e} m", led.position_error());
+                assert!(hand.position_error() < 2e-9, "{name}: open by {:e} m", hand.position_error());
             }
         }
     }

@@ -60,10 +60,10 @@ pub(crate) fn get_pose(bytes: &[u8; POSE_BYTES]) -> Result<Pose, MessageError> {
     let [x, y, z, low, high] = *bytes.as_chunks().0 else {
         return Err(MessageError::Malformed("a pose of another length"));
     };
-    let metres = |units: [u8; 4]| f64::from(i32::from_le_bytes(units)) * (1.0 / UNITS_PER_M);
+    let meters = |units: [u8; 4]| f64::from(i32::from_le_bytes(units)) * (1.0 / UNITS_PER_M);
     let packed = u64::from(u32::from_le_bytes(high)) << 32 | u64::from(u32::from_le_bytes(low));
     let rotation = unpack(packed).ok_or(MessageError::Malformed("an invalid rotation"))?;
-    Ok(Pose::from_parts(Vec3::new(metres(x), metres(y), metres(z)).into(), rotation))
+    Ok(Pose::from_parts(Vec3::new(meters(x), meters(y), meters(z)).into(), rotation))
 }
 
 /// Rounds to the nearest integer (ties to even) and saturates. Adding 1.5·2⁵² leaves no bit for a

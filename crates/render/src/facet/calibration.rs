@@ -52,7 +52,7 @@ impl fmt::Display for CalibrationPattern {
 
 const BLACK: [u8; 4] = [0, 0, 0, 255];
 const WHITE: [u8; 4] = [255, 255, 255, 255];
-const GREY: [u8; 4] = [96, 96, 96, 255];
+const GRAY: [u8; 4] = [96, 96, 96, 255];
 const DARK: [u8; 4] = [48, 48, 48, 255];
 const RED: [u8; 4] = [255, 64, 48, 255];
 const GREEN: [u8; 4] = [64, 220, 96, 255];
@@ -88,21 +88,21 @@ fn one_eye(cave: &Cave, facet: &Facet, screen: &Screen, pattern: CalibrationPatt
 /// Lines by meters from the middle, a circle that fits, and the diagonals.
 fn grid(image: &mut Image, screen: &Screen) {
     let [wide, high] = screen.size_m();
-    let per_metre = [f64::from(image.width) / wide, f64::from(image.height) / high];
+    let per_meter = [f64::from(image.width) / wide, f64::from(image.height) / high];
     let middle = [0.5 * f64::from(image.width), 0.5 * f64::from(image.height)];
     let circle = 0.48 * wide.min(high);
     for y in 0..image.height {
         for x in 0..image.width {
             let off = [f64::from(x) + 0.5 - middle[0], f64::from(y) + 0.5 - middle[1]];
-            let [mx, my] = [off[0] / per_metre[0], off[1] / per_metre[1]];
+            let [mx, my] = [off[0] / per_meter[0], off[1] / per_meter[1]];
             // distance in pixels from the nearest line of a spacing
             let near = |spacing: f64| {
                 (0..2)
-                    .map(|k| (off[k] - (off[k] / per_metre[k] / spacing).round() * spacing * per_metre[k]).abs())
+                    .map(|k| (off[k] - (off[k] / per_meter[k] / spacing).round() * spacing * per_meter[k]).abs())
                     .fold(f64::MAX, f64::min)
             };
             let (fine, coarse) = (near(0.1), near(0.5));
-            let ring = (mx.hypot(my) - circle).abs() * per_metre[0].min(per_metre[1]);
+            let ring = (mx.hypot(my) - circle).abs() * per_meter[0].min(per_meter[1]);
             let diagonal = (off[0] * middle[1]).abs() - (off[1] * middle[0]).abs();
             let diagonal = diagonal.abs() / middle[0].hypot(middle[1]);
             let color = match () {
@@ -111,7 +111,7 @@ fn grid(image: &mut Image, screen: &Screen) {
                 _ if ring < 1.2 => Some(GREEN),
                 _ if coarse < 1.1 => Some(WHITE),
                 _ if diagonal < 0.8 => Some(BLUE),
-                _ if fine < 0.6 => Some(GREY),
+                _ if fine < 0.6 => Some(GRAY),
                 _ => None,
             };
             if let Some(color) = color {

@@ -38,8 +38,8 @@ pub fn unfold(cave: &Cave, most: [u32; 2]) -> ([u32; 2], Vec<Tile>) {
     // the largest scale at which the rounded size fits, so that unfolding into its own size changes
     // nothing
     let fitting = |k: usize| (f64::from(most[k]) + 0.499) / extent[k];
-    let per_metre = fitting(0).min(fitting(1));
-    let edge = |metres: f64| (metres * per_metre).round().max(0.0) as u32;
+    let per_meter = fitting(0).min(fitting(1));
+    let edge = |meters: f64| (meters * per_meter).round().max(0.0) as u32;
     let whole = [0, 1].map(|k| edge(extent[k]).clamp(1, most[k].max(1)));
     let tile = |&(facet, (at, size)): &(usize, ([f64; 2], [f64; 2]))| {
         // both ends are rounded, so that neighbors meet
@@ -53,14 +53,14 @@ pub fn unfold(cave: &Cave, most: [u32; 2]) -> ([u32; 2], Vec<Tile>) {
 fn lay(cave: &Cave, facets: &[usize]) -> Placed {
     let drawn: Vec<usize> = facets.iter().map(|&i| cave.facets[i].screen).collect();
     let size = |screen: usize| cave.screens[screen].size_m();
-    let neighbours = gaps(&cave.screens);
+    let neighbors = gaps(&cave.screens);
     let mut placed: Placed = vec![None; cave.screens.len()];
     let mut queue = VecDeque::new();
     placed[drawn[0]] = Some(([0.0; 2], size(drawn[0])));
     queue.push_back(drawn[0]);
     while let Some(screen) = queue.pop_front() {
         let Some((at, own)) = placed[screen] else { continue };
-        for gap in &neighbours {
+        for gap in &neighbors {
             let (mine, other) = if gap.first.0 == screen { (gap.first, gap.second) } else { (gap.second, gap.first) };
             if mine.0 != screen || placed[other.0].is_some() || !drawn.contains(&other.0) || (mine.1 + 2) % 4 != other.1
             {

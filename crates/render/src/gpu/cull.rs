@@ -134,7 +134,7 @@ impl Picture<'_> {
         if !middle.iter().chain(&shape).all(|x| x.is_finite()) {
             return Place::Around;
         }
-        let error = 4.0 * f64::from(f32::EPSILON) * (c.amax() + eye.reach()) * eye.pixels_per_metre(depth);
+        let error = 4.0 * f64::from(f32::EPSILON) * (c.amax() + eye.reach()) * eye.pixels_per_meter(depth);
         let whole = near.is_some_and(|d| d < 1.0) && far.is_some_and(|d| d > 0.0);
         Place::Before(Outline { middle, shape, begin: depth - r, end: depth + r * eye.sine_beside(&c), error, whole })
     }

@@ -138,8 +138,8 @@ impl Eye {
     }
 
     /// Largest number of pixels that a meter covers at a depth.
-    pub fn pixels_per_metre(&self, view_depth: f64) -> f64 {
-        let [wide, high] = self.map_widths_per_metre();
+    pub fn pixels_per_meter(&self, view_depth: f64) -> f64 {
+        let [wide, high] = self.map_widths_per_meter();
         let depth = if self.perspective { view_depth.max(1e-9) } else { 1.0 };
         (wide * self.size[0]).max(high * self.size[1]) / depth
     }
@@ -151,8 +151,8 @@ impl Eye {
 
     /// Picture widths and heights that a meter across the view covers (at view depth 1, for
     /// perspective).
-    pub fn map_widths_per_metre(&self) -> [f64; 2] {
-        self.per_ndc.map(|metres| 0.5 / metres)
+    pub fn map_widths_per_meter(&self) -> [f64; 2] {
+        self.per_ndc.map(|meters| 0.5 / meters)
     }
 
     /// `struct View`.

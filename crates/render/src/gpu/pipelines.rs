@@ -356,7 +356,7 @@ impl Plan<'_> {
             Input::SphereBounds => vec![Some(wgpu::VertexBufferLayout {
                 array_stride: 4 * SPHERE_WORDS,
                 step_mode: wgpu::VertexStepMode::Instance,
-                attributes: &BALL,
+                attributes: &SPHERE_ATTRIBUTES,
             })],
             Input::Range => vec![Some(wgpu::VertexBufferLayout {
                 array_stride: 8,
@@ -414,7 +414,7 @@ impl Plan<'_> {
     }
 }
 
-const BALL: [wgpu::VertexAttribute; 2] = wgpu::vertex_attr_array![0 => Float32x4, 1 => Uint32];
+const SPHERE_ATTRIBUTES: [wgpu::VertexAttribute; 2] = wgpu::vertex_attr_array![0 => Float32x4, 1 => Uint32];
 const RANGE: [wgpu::VertexAttribute; 1] =
     [wgpu::VertexAttribute { format: VertexFormat::Uint32x2, offset: 0, shader_location: 0 }];
 

@@ -32,7 +32,7 @@ pub fn occlusion_reach(list: &DrawList, seen: Option<&Bounds>, part: bool) -> f3
         (_, false) => 0.0,
         (Some(reach), _) => reach,
         // the whole world may be wide: then the median size of the items gives the reach
-        (None, _) if part => seen.map_or(0.0, |b| (sphere_around(b).1 / 12.0).min(4.0 * list.usual_radius())),
+        (None, _) if part => seen.map_or(0.0, |b| (sphere_around(b).1 / 12.0).min(4.0 * list.default_radius())),
         (None, _) => seen.map_or(0.0, |b| sphere_around(b).1 / 12.0),
     }
 }

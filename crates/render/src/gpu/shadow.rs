@@ -146,7 +146,7 @@ pub fn floats(eye: &Eye, size: u32) -> Vec<f32> {
     let inverse = m.try_inverse().unwrap_or(Matrix4::identity());
     let mut out: Vec<f32> = m.iter().chain(inverse.iter()).map(|&x| x as f32).collect();
     out.extend(eye.depth.map(|x| x as f32));
-    let [wide, high] = eye.map_widths_per_metre();
+    let [wide, high] = eye.map_widths_per_meter();
     let texel = 1.0 / (wide.min(high) * f64::from(size));
     out.extend([wide as f32, high as f32, f32::from(u8::from(eye.perspective)), texel as f32]);
     out

@@ -120,12 +120,12 @@ pub fn read(gpu: &Gpu, from: &Texture) -> Result<Image, RenderError> {
         Extent3d { width, height, depth_or_array_layers: 1 },
     );
     gpu.queue.submit([encoder.finish()]);
-    let (tell, told) = std::sync::mpsc::channel();
+    let (sender, receiver) = std::sync::mpsc::channel();
     buffer.map_async(wgpu::MapMode::Read, .., move |r| {
-        let _ = tell.send(r); // the receiver waits below
+        let _ = sender.send(r); // the receiver waits below
     });
     wait(gpu)?;
-    told.recv().map_err(|e| gpu.failed(e.to_string()))?.map_err(|e| gpu.failed(e.to_string()))?;
+    receiver.recv().map_err(|e| gpu.failed(e.to_string()))?.map_err(|e| gpu.failed(e.to_string()))?;
     let mut rgba = Vec::with_capacity(4 * width as usize * height as usize);
     {
         let bytes = buffer.get_mapped_range(..).map_err(|e| gpu.failed(e.to_string()))?;

@@ -80,11 +80,11 @@ impl Screen {
     ) -> Result<Screen, RenderError> {
         let size = window.inner_size();
         let (width, height) = (size.width.max(1), size.height.max(1));
-        let usual = surface.get_default_config(&adapter, width, height);
+        let default = surface.get_default_config(&adapter, width, height);
         let format = surface.get_capabilities(&adapter).formats.iter().copied().find(TextureFormat::is_srgb);
         let software = adapter.get_info().device_type == wgpu::DeviceType::Cpu;
         let renderer = Renderer::on(adapter)?;
-        let mut config = usual.ok_or_else(|| renderer.gpu.failed("it cannot show pictures in this window".into()))?;
+        let mut config = default.ok_or_else(|| renderer.gpu.failed("it cannot show pictures in this window".into()))?;
         config.format = format.unwrap_or(config.format);
         config.present_mode = wgpu::PresentMode::Fifo;
         renderer.check_size(width, height)?;

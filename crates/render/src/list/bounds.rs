@@ -69,7 +69,7 @@ impl DrawList {
     }
 
     /// The median radius of the shadow casters, m; 0 if there are none.
-    pub(crate) fn usual_radius(&self) -> f32 {
+    pub(crate) fn default_radius(&self) -> f32 {
         median(self.items(true).map(|item| sphere_around(&item.1).1))
     }
 

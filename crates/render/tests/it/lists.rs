@@ -155,7 +155,7 @@ fn a_body_that_flew_off_does_not_make_the_rest_a_dot() {
 }
 
 #[test]
-fn rings_stand_where_the_scene_says_though_the_body_turns_about_its_centre_of_mass() {
+fn rings_stand_where_the_scene_says_though_the_body_turns_about_its_center_of_mass() {
     let text = "[meshes.cone]\ntype = \"lathe\"\nprofile_m = [[0, 0], [1, 0], [0, 4]]\n\
         [[body]]\nname = \"b\"\nmass_kg = 1\nshape = { type = \"mesh\", mesh = \"cone\" }\n\
         pattern = \"rings\"\npattern_offset_m = 3\npattern_scale_m = 0.5\nsecond_color = \"#ff0000\"\n";
@@ -247,7 +247,7 @@ fn quality_says_how_much_of_an_object_is_drawn() {
 }
 
 #[test]
-fn a_texture_is_listed_once_and_a_missing_one_is_told_with_its_line() {
+fn a_texture_is_listed_once_and_a_missing_one_is_reported_with_its_line() {
     let folder = std::env::temp_dir().join(format!("tumble-texture-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     tumble_render::Image { width: 2, height: 1, rgba: vec![255, 0, 0, 255, 0, 0, 255, 255] }
@@ -268,7 +268,7 @@ fn a_texture_is_listed_once_and_a_missing_one_is_told_with_its_line() {
 }
 
 #[test]
-fn islands_have_a_colour_each_and_joints_their_axes() {
+fn islands_have_a_color_each_and_joints_their_axes() {
     // two stacks of two boxes, apart, on the floor; a pendulum
     let text = "[[body]]\nname = \"floor\"\nmode = \"static\"\nshape = { type = \"half_space\" }\n\
         [[grid]]\nname = \"b\"\nmass_kg = 1\nshape = { type = \"box\", size_m = [1, 1, 1] }\nposition_m = [0, 0, 0.5]\ncount = [2, 1, 2]\nspacing_m = [3, 0, 1]\n\
@@ -293,7 +293,7 @@ fn islands_have_a_colour_each_and_joints_their_axes() {
 }
 
 #[test]
-fn what_stands_still_is_told_from_what_moves() {
+fn static_and_moving_objects_are_distinguished() {
     let text = "[world]\nsleep_after_s = 0.1\n[[body]]\nname = \"ground\"\nmode = \"static\"\nshape = { type = \"half_space\" }\nvisible = false\n[[body]]\nname = \"lies\"\nmass_kg = 1\nshape = { type = \"box\", size_m = [1, 1, 1] }\nposition_m = [0, 0, 0.5]\n\
         [[body]]\nname = \"falls\"\nmass_kg = 1\nshape = { type = \"sphere\", radius_m = 0.5 }\nposition_m = [3, 0, 50]\n\
         [[body]]\nname = \"stands\"\nmode = \"static\"\nshape = { type = \"capsule\", radius_m = 0.5, length_m = 1 }\nposition_m = [6, 0, 1]\ncolor = \"#00ff00\"\n";

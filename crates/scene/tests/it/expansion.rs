@@ -216,8 +216,8 @@ fn a_box_of_bodies_counts_along_x_then_y_then_z() {
     assert_eq!((bodies[1].name.as_str(), bodies[1].position_m), ("g_2", [11.0, 0.0, 0.0]));
     assert_eq!(bodies[2].position_m, [10.0, 10.0, 0.0]);
     assert_eq!((bodies[11].name.as_str(), bodies[11].position_m), ("g_12", [11.0, 20.0, 100.0]));
-    let centred = grid("count = [2, 3, 1]\nspacing_m = [1, 10, 100]\ncentered = true");
-    assert_eq!((centred[0].position_m, centred[5].position_m), ([-0.5, -10.0, 0.0], [0.5, 10.0, 0.0]));
+    let centered = grid("count = [2, 3, 1]\nspacing_m = [1, 10, 100]\ncentered = true");
+    assert_eq!((centered[0].position_m, centered[5].position_m), ([-0.5, -10.0, 0.0], [0.5, 10.0, 0.0]));
 }
 
 #[test]
@@ -236,7 +236,7 @@ fn a_triangle_is_numbered_from_its_apex_left_to_right() {
 }
 
 #[test]
-fn copies_take_colours_in_turn() {
+fn copies_take_colors_in_turn() {
     let bodies =
         grid("count = [3, 1, 1]\nspacing_m = [2, 2, 2]\ncolors = [\"#000000\", \"#ffffff\"]\npatterns = [\"felt\"]");
     let colors: Vec<f64> = bodies.iter().map(|body| body.appearance.color[0]).collect();

@@ -41,7 +41,7 @@ fn floating() -> UrdfOptions {
 }
 
 #[test]
-fn masses_and_freedoms_are_those_of_the_files() {
+fn masses_and_dofs_are_those_of_the_files() {
     let Some(robots) = robots() else { return };
     for (name, path, dof) in ROBOTS {
         let path = robots.join(path);

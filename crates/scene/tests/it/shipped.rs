@@ -96,7 +96,7 @@ fn reach(scene: &SceneFile, body: &BodySpec) -> f64 {
 }
 
 #[test]
-fn stack_is_ten_half_metre_cubes_each_on_the_next() {
+fn stack_is_ten_half_meter_cubes_each_on_the_next() {
     let scene = scene("stack");
     let crates = dynamic(&scene);
     assert_eq!(crates.len(), 10);

@@ -114,7 +114,7 @@ fn an_arm_is_a_body_with_what_acts_on_it() {
 }
 
 #[test]
-fn joints_of_several_freedoms_are_stacks() {
+fn joints_of_several_dofs_are_stacks() {
     let planar = read(&two("planar", "<axis xyz=\"0 0 1\"/>"));
     assert_eq!(planar.joints, ["j/x", "j/y", "j"]);
     let [x, y, turn] = planar.model.links() else { panic!() };
@@ -307,7 +307,7 @@ fn obj(mesh: &TriMesh, without: usize) -> String {
 
 /// A chain of spheres 0.1 m apart on a fixed base, with radii that overlap their second neighbors.
 #[test]
-fn neighbours_and_links_that_overlap_at_the_start_never_meet() {
+fn neighbors_and_links_that_overlap_at_the_start_never_collide() {
     let link = |name: &str, radius: f64| {
         format!(
             "<link name=\"{name}\">{BALL}<collision><geometry><sphere radius=\"{radius}\"/></geometry></collision></link>\n"

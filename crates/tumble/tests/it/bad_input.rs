@@ -98,7 +98,7 @@ fn every_bad_mesh_gets_one_clear_message() {
 }
 
 #[test]
-fn bad_usage_is_told_apart_from_failure() {
+fn bad_usage_and_failure_have_different_exit_codes() {
     let folder = Folder::new("bad-usage");
     let here = text(&folder.path("."));
     for (args, word) in [

@@ -268,7 +268,7 @@ fn shared_files_are_open_to_no_other_user() {
 }
 
 #[test]
-fn a_node_that_cannot_be_reached_and_a_time_that_is_too_short_are_told() {
+fn an_unreachable_node_and_a_timeout_that_is_too_short_are_reported() {
     let place = Place::new("cave-nowhere", &wall());
     // not of the same family as the addresses of the server, and without a name lookup
     let nowhere = "2001:db8::1";

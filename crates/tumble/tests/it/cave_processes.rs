@@ -197,7 +197,7 @@ fn a_facet_of_another_scene_is_refused_with_both_hashes() {
 }
 
 #[test]
-fn who_is_missing_at_the_start_is_named() {
+fn facets_that_are_missing_at_the_start_are_named() {
     let place = Place::new("cave-missing", &wall());
     let (code, _, wrong) = place.start("serve", &["--connect-timeout", "0.3"]).end();
     assert_eq!(code, Some(1), "{wrong}");

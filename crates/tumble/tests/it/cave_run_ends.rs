@@ -47,7 +47,7 @@ fn a_signal_during_the_start_leaves_nothing() {
 }
 
 #[test]
-fn a_full_disk_is_told_with_the_file_and_ends_the_run() {
+fn a_full_disk_is_reported_with_the_file_and_ends_the_run() {
     let place = Place::new("cave-full", &wall());
     for facet in ["l", "r"] {
         std::fs::create_dir_all(place.folder.path("out").join(facet)).unwrap();

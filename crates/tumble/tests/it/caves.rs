@@ -211,7 +211,7 @@ fn with_ffmpeg(folder: &Folder, script: Option<&str>) -> (Option<i32>, String) {
 
 #[cfg(unix)]
 #[test]
-fn a_video_gets_every_frame_and_its_failures_are_told() {
+fn a_video_gets_every_frame_and_its_failures_are_reported() {
     let folder = Folder::new("video");
     let (code, said) = with_ffmpeg(&folder, None);
     assert!(

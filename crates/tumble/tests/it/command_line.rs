@@ -31,13 +31,13 @@ fn options(text: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn every_help_tells_the_exit_codes() {
+fn every_help_names_the_exit_codes() {
     for name in COMMANDS {
         let help = succeed(&[name, "--help"]);
         let codes: Vec<&str> = help.lines().skip_while(|line| *line != "Exit codes:").skip(1).collect();
         let numbers: Vec<&str> = codes.iter().filter_map(|line| line.split_whitespace().next()).take(4).collect();
-        let wanted: &[&str] = if RUNS.contains(&name) { &["0", "1", "2", "130"] } else { &["0", "1", "2"] };
-        assert_eq!(numbers, wanted, "{name}: {help}");
+        let expected: &[&str] = if RUNS.contains(&name) { &["0", "1", "2", "130"] } else { &["0", "1", "2"] };
+        assert_eq!(numbers, expected, "{name}: {help}");
     }
     assert!(succeed(&["--help"]).contains("Exit codes:"));
 }
@@ -88,14 +88,14 @@ fn the_reference_names_every_option() {
     for name in COMMANDS {
         let section = sections.iter().find(|s| s.lines().next() == Some(&format!("tumble {name}")));
         let section = section.unwrap_or_else(|| panic!("docs/command.md has no section on tumble {name}"));
-        let mut wanted = options(&succeed(&[name, "--help"]));
+        let mut expected = options(&succeed(&[name, "--help"]));
         // options of every command, described once; and an option of features that are not always
         // built
-        wanted.remove("--help");
-        let mut told = options(section);
-        told.remove("--foxglove");
-        wanted.remove("--foxglove");
-        assert_eq!(told, wanted, "docs/command.md on tumble {name}");
+        expected.remove("--help");
+        let mut described = options(section);
+        described.remove("--foxglove");
+        expected.remove("--foxglove");
+        assert_eq!(described, expected, "docs/command.md on tumble {name}");
     }
     for line in succeed(&["cave", "--help"]).lines().skip_while(|l| *l != "Exit codes:").skip(1).take(4) {
         let (code, meaning) = line.trim().split_once("  ").unwrap();

@@ -80,10 +80,10 @@ fn pendulum_the_bob_and_the_rod_swing_in_the_time_of_the_elliptic_integral() {
     }
     // sphere: L + 2r²/5L; bar: 2l/3 + w²/6l
     let lengths = [1.0 + 0.4 * 0.07 * 0.07, 0.6 + 0.05 * 0.05 / 5.4];
-    let told = [2.1549834512555384, 2.7393315102684546];
+    let stated = [2.1549834512555384, 2.7393315102684546];
     for (k, degrees) in [60.0, 150.0].into_iter().enumerate() {
         let (times, exact) = (&crossings[k], period(lengths[k], degrees));
-        assert!((exact / told[k] - 1.0).abs() < 1e-12, "the page says {} s, it is {exact} s", told[k]);
+        assert!((exact / stated[k] - 1.0).abs() < 1e-12, "the page says {} s, it is {exact} s", stated[k]);
         assert!(times.len() > 20, "{} crossings", times.len());
         assert!((times[0] / (0.25 * exact) - 1.0).abs() < 1e-6, "{}: first at {} s", names[k], times[0]);
         let measured = 2.0 * (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64;

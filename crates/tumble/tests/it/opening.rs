@@ -99,7 +99,7 @@ fn an_energy_that_rounds_to_zero_has_no_sign() {
 }
 
 #[test]
-fn a_mesh_of_hundreds_of_metres_is_noted() {
+fn a_mesh_of_hundreds_of_meters_is_noted() {
     let folder = Folder::new("open-large");
     let path = folder.write("part.obj", cube(100));
     let said = succeed(&["run", &path, "--duration", "0"]);

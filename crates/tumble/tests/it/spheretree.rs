@@ -69,7 +69,7 @@ fn many_processes_share_a_cache_and_all_write_the_same() {
 }
 
 #[test]
-fn a_damaged_file_of_the_cache_is_told_and_built_anew() {
+fn a_damaged_file_of_the_cache_is_reported_and_built_again() {
     let folder = Folder::new("spheretree-damage");
     let (mesh, cache) = (folder.write("ring.obj", obj(&ring())), text(&folder.path("cache")));
     let words = [&["spheretree", &mesh, "--cache", &cache][..], &QUICK].concat();

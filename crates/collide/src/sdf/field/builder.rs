@@ -196,7 +196,7 @@ mod tests {
     /// Blocks have the same bits if built one by one, backwards, by five threads at once, or by
     /// scattered queries.
     #[test]
-    fn neither_order_nor_threads_change_a_bit() {
+    fn order_and_threads_change_no_bit() {
         let fields = [torus(), torus(), torus()];
         fields[0].tree.blocks.build_all(1, &fields[0].triangles);
         fields[1].tree.blocks.build_all(4095, &fields[1].triangles);

@@ -244,8 +244,8 @@ fn errors_of_rotations_are_the_rotation_that_is_left() {
                     .unwrap(),
             )
         };
-        let weld = recorded(LoopJointKind::Fixed);
-        assert!((Vec3::from_column_slice(&weld.errors[3..]) - turn).norm() < 1e-12, "{:?}", weld.errors);
+        let fixed = recorded(LoopJointKind::Fixed);
+        assert!((Vec3::from_column_slice(&fixed.errors[3..]) - turn).norm() < 1e-12, "{:?}", fixed.errors);
         // a hinge does not see the turn about its axis: z_B and the tilt make z_A
         let hinge = recorded(LoopJointKind::Revolute);
         let tilt = frame.rotation * Vec3::new(hinge.errors[3], hinge.errors[4], 0.0);

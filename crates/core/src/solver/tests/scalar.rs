@@ -56,7 +56,7 @@ fn a_motor_gives_what_it_needs_and_no_more_than_it_has() {
 
 /// Two sliders welded (three times over), the first driven by a motor: they move as one mass.
 #[test]
-fn a_weld_makes_one_mass_of_two() {
+fn a_fixed_joint_makes_one_mass_of_two() {
     let (a, b) = (2.0, 3.0);
     for solver in solvers() {
         for (wanted, strength, expected) in [(1.0, 100.0, 1.0), (1.0, 2.0, 0.4), (-1.0, 2.5, -0.5)] {
@@ -77,7 +77,7 @@ fn a_weld_makes_one_mass_of_two() {
 
 /// Welded to a slider that a stop holds: nothing moves, and the stop takes all the momentum.
 #[test]
-fn a_weld_passes_an_impulse_on_to_a_stop() {
+fn a_fixed_joint_passes_an_impulse_on_to_a_stop() {
     for solver in solvers() {
         let mut rows = sliders(2);
         row(&mut rows, RowSet::HalfLine, &[(1, 3.0, -1.0)]);
@@ -126,7 +126,7 @@ fn redundant_equalities_do_not_blow_up() {
 
 /// Equalities that contradict each other are reported.
 #[test]
-fn contradicting_welds_do_not_pass_for_solved() {
+fn contradicting_fixed_joints_do_not_pass_for_solved() {
     for solver in [&LcpPyramid as &dyn RowSolver, &LcpSliding] {
         let mut rows = sliders(1);
         row(&mut rows, RowSet::Equality, &[(0, 1.0, 1.0)]);

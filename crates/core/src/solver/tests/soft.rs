@@ -83,7 +83,7 @@ fn springs_side_by_side_share_by_their_stiffness() {
 
 /// A weak spring must not make a fixed joint beside it look redundant.
 #[test]
-fn a_weld_holds_beside_a_spring_a_million_million_times_weaker() {
+fn a_fixed_joint_holds_beside_a_spring_a_million_million_times_weaker() {
     for solver in solvers() {
         let mut rows = Rows::default();
         rows.clear(2);

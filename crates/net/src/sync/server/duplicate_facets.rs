@@ -50,12 +50,12 @@ impl DuplicateFacets {
             self.holder = Some(process);
             return true;
         };
-        match self.replaced_processes.iter().position(|(who, _)| *who == process) {
+        match self.replaced_processes.iter().position(|(other, _)| *other == process) {
             Some(k) if !replaced => _ = self.replaced_processes.remove(k),
             Some(k) if now < self.replaced_processes[k].1.saturating_add(grace) => {
                 let second: Vec<u32> =
-                    self.replaced_processes.drain(k..).skip(1).map(|(who, _)| who).chain([holder]).collect();
-                second.into_iter().for_each(|who| remember(&mut self.refused, who));
+                    self.replaced_processes.drain(k..).skip(1).map(|(other, _)| other).chain([holder]).collect();
+                second.into_iter().for_each(|other| remember(&mut self.refused, other));
             }
             Some(k) => {
                 self.replaced_processes.remove(k);

@@ -152,7 +152,7 @@ mod tests {
     use super::full_sequence;
 
     #[test]
-    fn the_upper_half_of_a_number_is_that_of_its_neighbours() {
+    fn the_upper_half_of_a_number_is_that_of_its_neighbors() {
         let corners = [
             0u64,
             1,

@@ -178,8 +178,8 @@ impl WindowApp for Window<'_> {
     type Error = Failure;
 
     fn opened(&mut self, screen: &mut Screen) -> Result<(), Failure> {
-        let usual = if screen.is_software() { Quality::fast() } else { Quality::default() };
-        self.window_setup.quality.get_or_insert(usual);
+        let default = if screen.is_software() { Quality::fast() } else { Quality::default() };
+        self.window_setup.quality.get_or_insert(default);
         // the first picture takes seconds to compile pipelines; the server does not know this facet
         // yet
         self.list =

@@ -92,8 +92,8 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
 
 fn listen(options: &ServeOptions, cave: &Cave) -> SocketAddr {
     let remote = cave.nodes.iter().any(|n| !n.is_local());
-    let usual = if remote { (Ipv4Addr::UNSPECIFIED, cave.sync.port) } else { (Ipv4Addr::LOCALHOST, 0) };
-    options.listen.unwrap_or(usual.into())
+    let default = if remote { (Ipv4Addr::UNSPECIFIED, cave.sync.port) } else { (Ipv4Addr::LOCALHOST, 0) };
+    options.listen.unwrap_or(default.into())
 }
 
 /// Returns the timeout for facets to join.
