@@ -1,5 +1,5 @@
-//! How long a frame takes from the server to all facets and back, within one process: no network,
-//! no pictures. What is left is the protocol's own work.
+//! Measures the time of a frame from the server to all facets and back, within one process. There
+//! is no network and no picture, so the remaining time is the protocol's.
 //!
 //! ```text
 //! cargo run --release -p tumble-net --example barrier -- [BODIES] [FACETS] [FRAMES]
@@ -37,7 +37,7 @@ fn facet(transport: &LocalTransport, k: usize, bodies: usize) -> Result<(), Fail
     }
 }
 
-/// Least, middle, and the last but one in a hundred.
+/// Returns the minimum, the median and the 99th percentile.
 fn percentiles(mut times: Vec<Duration>) -> String {
     times.sort();
     let at = |share: f64| times.get((times.len() as f64 * share) as usize).copied().unwrap_or_default();

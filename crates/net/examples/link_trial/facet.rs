@@ -1,4 +1,4 @@
-//! A facet that draws nothing: checks each state, says READY, waits for PRESENT, says PRESENTED.
+//! A facet that draws nothing: checks each state, sends READY, waits for PRESENT, sends PRESENTED.
 
 use super::options::Options;
 use super::{Failure, clock_ns};
@@ -7,19 +7,19 @@ use tumble_net::sync::shm::ShmFacet;
 use tumble_net::sync::transport::{Delivery, FacetLink, LinkEvent, Message};
 use tumble_net::sync::udp::{SharedKey, Timing, UdpFacet};
 
-/// Words of a message: what it is, and its frame.
+/// Words of a message: its kind, and its frame.
 pub const STATE: u64 = 1;
 pub const PRESENT: u64 = 2;
 pub const END: u64 = 3;
 pub const READY: u64 = 4;
 pub const PRESENTED: u64 = 5;
 
-/// Word `at` of a message; `u64::MAX` where there is none.
+/// Returns the word `at` of a message; `u64::MAX` if the message is shorter.
 pub fn word(message: &[u8], at: usize) -> u64 {
     message.get(8 * at..8 * at + 8).and_then(|bytes| bytes.try_into().ok()).map_or(u64::MAX, u64::from_le_bytes)
 }
 
-/// A message of words.
+/// Returns a message of these words.
 pub fn words(words: &[u64]) -> Vec<u8> {
     words.iter().flat_map(|word| word.to_le_bytes()).collect()
 }
@@ -32,7 +32,7 @@ pub fn connect(options: &Options) -> Result<Box<dyn FacetLink>, Failure> {
     Ok(Box::new(UdpFacet::connect(options.connect, options.facet, key, Timing::default())?))
 }
 
-/// Until the server says END or is gone, or nothing comes for 20 s.
+/// Runs until the server sends END or is gone, or nothing arrives for 20 s.
 pub fn run(options: &Options) -> Result<(), Failure> {
     let mut link = connect(options)?;
     let mut message = Message::default();
@@ -57,7 +57,7 @@ pub fn run(options: &Options) -> Result<(), Failure> {
                 let frame = word(&message, 1);
                 match word(&message, 0) {
                     STATE => {
-                        // Whole, in order, once: length, frame, and the frame again at the end.
+                        // whole, in order, once: length, frame, and the frame again at the end
                         let whole = message.len() == options.bytes && word(&message[message.len() - 8..], 0) == frame;
                         faults += u64::from(!whole) + u64::from(frame != expected);
                         expected = frame + 1;
@@ -70,7 +70,7 @@ pub fn run(options: &Options) -> Result<(), Failure> {
                         link.send(Delivery::Reliable, &words(&[PRESENTED, frame, now]))?;
                     }
                     _ => {
-                        // Gives the link time to acknowledge.
+                        // gives the link time to acknowledge
                         std::thread::sleep(Duration::from_millis(100));
                         return Ok(());
                     }

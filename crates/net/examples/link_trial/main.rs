@@ -1,17 +1,17 @@
-//! How fast and how sure a transport is: a server, facets in processes of their own, nothing
-//! simulated and nothing drawn.
+//! Measures speed and reliability of a transport: a server, and facets in processes of their own.
+//! Nothing is simulated or drawn.
 //!
 //! ```sh
 //! cargo run --release -p tumble-net --example link_trial -- --transport shm --facets 6 --bytes 65536 --rate 500 --frames 2000
 //! cargo run --release -p tumble-net --example link_trial -- --transport udp --facets 2 --bytes 16384 --rate 60 --frames 2000 --loss 0.05
 //! ```
 //!
-//! With `--stay-awake yes` the cores are kept from sleeping meanwhile
-//! (`/dev/cpu_dma_latency`, usually root's).
+//! `--stay-awake yes` prevents idle states of the cores during the trial (`/dev/cpu_dma_latency`,
+//! usually writable by root only).
 //!
 //! Each frame goes the whole way: STATE to all facets, READY from each, PRESENT to all, PRESENTED
-//! from each. Times are taken by the clock of this machine, which its processes share.
-//! `scripts/netns.sh` runs the same between network namespaces, with the roles apart (`--role
+//! from each. Times are taken by the clock of this machine, which all processes share.
+//! `scripts/netns.sh` runs the same between network namespaces, with separate roles (`--role
 //! server`, `facet`, `relay`).
 
 mod facet;
@@ -24,10 +24,10 @@ use options::{Options, Role};
 use std::process::{Child, Command};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// Whatever ends the trial, in words.
+/// An error that ends the trial, in words.
 type Failure = Box<dyn std::error::Error>;
 
-/// Nanoseconds of the clock that all processes of this machine share.
+/// Returns the time in nanoseconds, by a clock that all processes of this machine share.
 fn clock_ns() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as u64)
 }
@@ -49,7 +49,7 @@ fn run(options: Options) -> Result<(), Failure> {
     }
 }
 
-/// Processes that end with this one, after a second at most.
+/// Processes that end within a second after this one.
 struct Children(Vec<Child>);
 
 impl Drop for Children {
@@ -67,7 +67,8 @@ impl Drop for Children {
     }
 }
 
-/// Starts a process per facet, and a relay if there are faults; serves; ends them.
+/// Starts a process per facet, and a relay if there are faults; runs the server; ends the
+/// processes.
 fn run_all(mut options: Options) -> Result<(), Failure> {
     let mut children = Children(Vec::new());
     let program = std::env::current_exe()?;

@@ -1,5 +1,5 @@
-//! A bad network as a process: takes the facets' datagrams at `--listen`, hands them on to
-//! `--address`, and back, with the faults asked for.
+//! A bad network as a process: forwards the facets' datagrams from `--listen` to `--address`, and
+//! the answers back, with the given faults.
 
 use super::Failure;
 use super::options::Options;
@@ -9,7 +9,7 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tumble_net::sync::udp::network::Network;
 
-/// Most facets behind one relay.
+/// Maximum number of facets behind one relay.
 const MAX_FACETS: usize = 64;
 
 struct Relay {
@@ -24,7 +24,7 @@ impl Relay {
         self.earlier.notify_one();
     }
 
-    /// The next datagram, when it has arrived.
+    /// Returns the next datagram once it has arrived.
     fn next(&self) -> (SocketAddr, SocketAddr, Vec<u8>) {
         let mut network = self.network.lock().unwrap_or_else(PoisonError::into_inner);
         loop {
@@ -40,7 +40,7 @@ impl Relay {
 
 type Backs = Mutex<BTreeMap<SocketAddr, Arc<UdpSocket>>>;
 
-/// Until it is killed.
+/// Runs until it is killed.
 pub fn run(options: &Options) -> Result<(), Failure> {
     let server = options.address;
     let relay = Arc::new(Relay {
@@ -71,12 +71,12 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     }
 }
 
-/// Hands on what has arrived: to the server by the socket of the facet it comes from.
+/// Forwards the datagrams that have arrived: to the server through the socket of the sending facet.
 fn deliver(relay: &Relay, front: &UdpSocket, backs: &Backs, server: SocketAddr) {
     loop {
         let (from, to, datagram) = relay.next();
         let back = backs.lock().unwrap_or_else(PoisonError::into_inner).get(&from).cloned();
-        // What cannot be sent is lost, as on a network.
+        // a datagram that cannot be sent is lost, as on a network
         let _ = match back {
             Some(back) if to == server => back.send_to(&datagram, server),
             _ => front.send_to(&datagram, to),
@@ -84,7 +84,7 @@ fn deliver(relay: &Relay, front: &UdpSocket, backs: &Backs, server: SocketAddr) 
     }
 }
 
-/// Takes the server's answers to one facet.
+/// Receives the server's answers to one facet.
 fn bring_back(relay: &Relay, back: &UdpSocket, server: SocketAddr, facet: SocketAddr) {
     let mut buffer = [0; 2048];
     loop {

@@ -1,4 +1,4 @@
-//! The server: a frame at a time, at the given rate.
+//! The server: one frame after the other, at the given rate.
 
 use super::facet::{END, PRESENT, PRESENTED, READY, STATE, word, words};
 use super::options::Options;
@@ -67,7 +67,7 @@ impl Run {
         Ok(())
     }
 
-    /// STATE, all READY, PRESENT, all PRESENTED.
+    /// Runs a frame: STATE, all READY, PRESENT, all PRESENTED.
     fn frame(&mut self, frame: u64, state: &mut [u8]) -> Result<(), Failure> {
         let tail = state.len() - 8;
         state[tail..].copy_from_slice(&frame.to_le_bytes());
@@ -87,7 +87,7 @@ impl Run {
         Ok(())
     }
 
-    /// One reply of each facet.
+    /// Returns one reply of each facet.
     fn replies(&mut self, kind: u64, frame: u64) -> Result<Vec<Vec<u8>>, Failure> {
         let mut replies = Vec::new();
         let end = Instant::now() + Duration::from_secs(10);

@@ -1,7 +1,7 @@
-//! Memory that a decoded protobuf message will take, computed before decoding.
+//! Memory that a decoded protobuf message will need, computed before decoding.
 //!
-//! Two bytes on the wire are enough for an empty submessage that takes hundreds in memory, and
-//! compression makes the two bytes nearly free. This walk over the wire format (Protocol Buffers,
+//! Two bytes on the wire encode an empty submessage that needs hundreds of bytes in memory, and
+//! compression makes the two bytes nearly free. This scan of the wire format (Protocol Buffers,
 //! "Encoding") allocates nothing:
 //!
 //! ```text
@@ -13,12 +13,12 @@ use super::bytes::{Fields, Problem};
 use super::{MAX_ENTITIES, MAX_SCENE_MEMORY};
 use foxglove::messages as fox;
 
-/// Field numbers of `foxglove.SceneUpdate` and below that hold lists of lists.
+/// Numbers of the fields of `foxglove.SceneUpdate`, and of its messages, that hold lists of lists.
 const ENTITIES: u64 = 2;
 const LINES: u64 = 11;
 const TRIANGLES: u64 = 12;
 
-/// Refuses a `foxglove.SceneUpdate` that would take more than [`MAX_SCENE_MEMORY`].
+/// Refuses a `foxglove.SceneUpdate` that would need more than [`MAX_SCENE_MEMORY`].
 pub(crate) fn check_scene(message: &[u8]) -> Result<(), Problem> {
     let mut memory = message.len() as u64;
     each_field(message, |number, entity| {
@@ -53,7 +53,7 @@ pub(crate) fn check_transforms(message: &[u8]) -> Result<(), Problem> {
     if count > MAX_ENTITIES { Err(format!("{count} transforms, at most {MAX_ENTITIES} are read")) } else { Ok(()) }
 }
 
-/// The most that one element of an entity's lists takes.
+/// Maximum size of one element of an entity's lists.
 const LARGEST_PRIMITIVE: u64 = {
     let sizes = [
         size_of::<fox::ArrowPrimitive>(),
@@ -74,7 +74,7 @@ const LARGEST_PRIMITIVE: u64 = {
     largest as u64
 };
 
-/// Calls `visit` with number and content of every length-delimited field.
+/// Calls `visit` with the number and the content of every length-delimited field.
 fn each_field<'a>(
     message: &'a [u8],
     mut visit: impl FnMut(u64, &'a [u8]) -> Result<(), Problem>,
@@ -96,7 +96,8 @@ fn each_field<'a>(
     Ok(())
 }
 
-/// Seven bits a byte, least first; the top bit says that more follow. At most ten bytes.
+/// Reads a varint: seven bits per byte, least significant first; the top bit is set if more bytes
+/// follow. At most ten bytes.
 fn varint(rest: &mut Fields) -> Result<u64, Problem> {
     let mut value = 0;
     for k in 0..10 {

@@ -1,5 +1,5 @@
-//! Little-endian fields out of a slice. A length is believed only as far as the slice goes; nothing
-//! is allocated on the strength of a number.
+//! Little-endian fields of a slice. A length is checked against the slice before anything is
+//! allocated.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ pub(crate) type Problem = String;
 pub(crate) struct Fields<'a>(pub &'a [u8]);
 
 impl<'a> Fields<'a> {
-    /// The next `n` bytes.
+    /// Returns the next `n` bytes.
     pub fn take(&mut self, n: u64, what: &str) -> Result<&'a [u8], Problem> {
         let have = self.0.len();
         let n = usize::try_from(n)
@@ -27,38 +27,38 @@ impl<'a> Fields<'a> {
         bytes.try_into().map_err(|_| format!("{what} is cut"))
     }
 
-    /// A `u8`.
+    /// Reads a `u8`.
     pub fn u8(&mut self, what: &str) -> Result<u8, Problem> {
         self.array::<1>(what).map(|[b]| b)
     }
 
-    /// A `u16`.
+    /// Reads a `u16`.
     pub fn u16(&mut self, what: &str) -> Result<u16, Problem> {
         self.array(what).map(u16::from_le_bytes)
     }
 
-    /// A `u32`.
+    /// Reads a `u32`.
     pub fn u32(&mut self, what: &str) -> Result<u32, Problem> {
         self.array(what).map(u32::from_le_bytes)
     }
 
-    /// A `u64`.
+    /// Reads a `u64`.
     pub fn u64(&mut self, what: &str) -> Result<u64, Problem> {
         self.array(what).map(u64::from_le_bytes)
     }
 
-    /// Bytes behind their `u32` length.
+    /// Reads bytes after their `u32` length.
     pub fn sized(&mut self, what: &str) -> Result<&'a [u8], Problem> {
         let n = self.u32(what)?;
         self.take(n.into(), what)
     }
 
-    /// A string behind its `u32` length.
+    /// Reads a string after its `u32` length.
     pub fn string(&mut self, what: &str) -> Result<&'a str, Problem> {
         std::str::from_utf8(self.sized(what)?).map_err(|e| format!("{what} is not UTF-8: {e}"))
     }
 
-    /// A map of strings behind its `u32` length in bytes.
+    /// Reads a map of strings after its `u32` length in bytes.
     pub fn map(&mut self, what: &str) -> Result<BTreeMap<String, String>, Problem> {
         let mut inner = Fields(self.sized(what)?);
         let mut map = BTreeMap::new();
@@ -69,7 +69,7 @@ impl<'a> Fields<'a> {
         Ok(map)
     }
 
-    /// Refuses what is left over.
+    /// Refuses unread bytes.
     pub fn end(&self, what: &str) -> Result<(), Problem> {
         if self.0.is_empty() { Ok(()) } else { Err(format!("{} bytes too many after {what}", self.0.len())) }
     }

@@ -1,4 +1,4 @@
-//! Chunks: decompression under a bound, checksum, and the records inside (MCAP specification,
+//! Chunks: decompression with a bound, checksum, and the records inside (MCAP specification,
 //! "Records").
 
 use super::bytes::{Fields, Problem};
@@ -7,7 +7,7 @@ use mcap::records::op;
 use std::collections::BTreeMap;
 use std::io::Read;
 
-/// A schema as the file gives it.
+/// A schema as stored in the file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Schema {
     pub name: String,
@@ -15,7 +15,7 @@ pub(crate) struct Schema {
     pub data: Vec<u8>,
 }
 
-/// A channel as the file gives it.
+/// A channel as stored in the file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Channel {
     pub schema: u16,
@@ -24,8 +24,8 @@ pub(crate) struct Channel {
     pub metadata: BTreeMap<String, String>,
 }
 
-/// Notes a definition, if it is new to both. Another one under the same number is a fault, and so
-/// is one too many.
+/// Adds a definition unless it is already in `known` or `new`. A different one under the same
+/// number is a fault, and so are more than [`MAX_DEFINITIONS`](super::MAX_DEFINITIONS).
 pub(crate) fn define<T: PartialEq>(
     known: &BTreeMap<u16, T>,
     new: &mut BTreeMap<u16, T>,
@@ -45,7 +45,7 @@ pub(crate) fn define<T: PartialEq>(
     }
 }
 
-/// A record that can stand inside a chunk.
+/// A record that can occur in a chunk.
 #[derive(Debug)]
 pub(crate) enum Inner<'a> {
     Schema(u16, Schema),
@@ -57,7 +57,7 @@ pub(crate) enum Inner<'a> {
         publish_time: u64,
         data: &'a [u8],
     },
-    /// A kind that we do not read.
+    /// A record of an unused kind.
     Other,
 }
 
@@ -98,7 +98,7 @@ pub(crate) fn parse_inner(opcode: u8, body: &[u8]) -> Result<Inner<'_>, Problem>
     }
 }
 
-/// The next record of a chunk's content, or nothing at its end: opcode and body.
+/// Returns opcode and body of the next record of a chunk's content; `None` at its end.
 pub(crate) fn next_inner<'a>(content: &mut Fields<'a>) -> Result<Option<(u8, &'a [u8])>, Problem> {
     if content.0.is_empty() {
         return Ok(None);
@@ -108,15 +108,15 @@ pub(crate) fn next_inner<'a>(content: &mut Fields<'a>) -> Result<Option<(u8, &'a
     Ok(Some((opcode, content.take(length, "record in the chunk")?)))
 }
 
-/// A chunk record, opened.
+/// A decompressed chunk record.
 pub(crate) struct Chunk {
     /// `""`, `"lz4"` or `"zstd"`.
     pub compression: String,
-    /// Its records, one after the other.
+    /// Its records, in sequence.
     pub content: Vec<u8>,
 }
 
-/// Opens the body of a chunk record: sizes, compression and checksum are all checked.
+/// Decompresses the body of a chunk record; checks sizes, compression and checksum.
 pub(crate) fn open_chunk(body: &[u8]) -> Result<Chunk, Problem> {
     let mut f = Fields(body);
     let (_start, _end) = (f.u64("chunk start time")?, f.u64("chunk end time")?);
@@ -133,7 +133,7 @@ pub(crate) fn open_chunk(body: &[u8]) -> Result<Chunk, Problem> {
     if content.len() as u64 != size {
         return Err(format!("the chunk should hold {size} bytes and holds {}", content.len()));
     }
-    // Zero means that the writer made none.
+    // zero means that the writer computed none
     let actual = crc32fast::hash(&content);
     if checksum != 0 && checksum != actual {
         return Err(format!("chunk checksum is {actual:08x}, and should be {checksum:08x}"));
@@ -141,8 +141,8 @@ pub(crate) fn open_chunk(body: &[u8]) -> Result<Chunk, Problem> {
     Ok(Chunk { compression, content })
 }
 
-/// Decompresses to at most one byte more than `size`; memory grows with the bytes that come out,
-/// not with the claim.
+/// Decompresses to at most one byte more than `size`. Memory grows with the decompressed bytes, not
+/// with the stated size.
 fn decompress(compression: &str, stored: &[u8], size: u64) -> Result<Vec<u8>, Problem> {
     let fault = |e: std::io::Error| format!("{compression} data in the chunk: {e}");
     let mut out = Vec::new();

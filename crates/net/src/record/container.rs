@@ -5,8 +5,8 @@
 //! magic  Header  (Chunk MessageIndex* | Metadata | …)*  DataEnd(crc)  summary  Footer(crc)  magic
 //! ```
 //!
-//! A record is one byte of opcode, eight of length, then the body. Both checksums are verified on
-//! the way, so that after [`Ending::Complete`] every byte of the file was covered by one.
+//! A record is an opcode of one byte, a length of eight bytes, and the body. Both checksums are
+//! verified on the way: after [`Ending::Complete`] a checksum has covered every byte of the file.
 
 use super::MAX_RECORD_BYTES;
 use super::bytes::Fields;
@@ -17,12 +17,13 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
-/// How a file ends.
+/// The end of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// With its footer; all checksums agree.
+    /// The file has its footer; all checksums agree.
     Complete,
-    /// In the middle, as a killed run leaves it. Everything before `offset` was read.
+    /// The file is cut in the middle, as a killed run leaves it. Everything before `offset` was
+    /// read.
     Cut {
         /// First unusable byte.
         offset: u64,
@@ -51,7 +52,7 @@ enum Section {
     Summary,
 }
 
-/// Opcode and length.
+/// Bytes of opcode and length.
 const HEAD_BYTES: u64 = 9;
 
 /// Reads an MCAP file from start to end.
@@ -59,7 +60,7 @@ const HEAD_BYTES: u64 = 9;
 pub(crate) struct Container {
     path: PathBuf,
     file: BufReader<File>,
-    /// Length of the file when it was opened; what a run still appends is not looked at.
+    /// Length of the file when it was opened; later additions are not read.
     length: u64,
     offset: u64,
     crc: crc32fast::Hasher,
@@ -94,17 +95,17 @@ impl Container {
         }
     }
 
-    /// The file's name.
+    /// Returns the file's name.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// How far the file was read.
+    /// Returns the number of bytes read so far.
     pub fn offset(&self) -> u64 {
         self.offset
     }
 
-    /// The next record. Not to be asked again after an end or an error.
+    /// Reads the next record. Must not be called after an end or an error.
     pub fn next(&mut self) -> Result<Next> {
         let (offset, left) = (self.offset, self.length - self.offset);
         let cut = |what: String| Ok(Next::End(Ending::Cut { offset, what }));
@@ -148,7 +149,7 @@ impl Container {
         if !matches!(self.section, Section::Summary) {
             return Err(RecordError::corrupt(&self.path, offset, "a footer without an end of data before it"));
         }
-        // The summary's checksum covers the footer up to the checksum itself.
+        // the summary's checksum covers the footer up to the checksum itself
         crc.update(&[op::FOOTER]);
         crc.update(&(body.len() as u64).to_le_bytes());
         crc.update(&body[..body.len().min(16)]);
@@ -180,7 +181,7 @@ impl Container {
     }
 
     /// Compares a checksum with the one stored as the last field of `body`, after `skip` bytes.
-    /// Zero means none was made.
+    /// Zero means that none was computed.
     fn compare_crc(&self, offset: u64, body: &[u8], skip: u64, crc: crc32fast::Hasher, what: &str) -> Result<()> {
         let fault = |what: String| RecordError::corrupt(&self.path, offset, what);
         let mut fields = Fields(body);
@@ -202,7 +203,7 @@ impl Container {
         Ok(bytes)
     }
 
-    /// Reads `size` bytes, which the file was seen to have.
+    /// Reads `size` bytes, which must be within the file's length.
     fn bytes(&mut self, size: u64) -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
         (&mut self.file).take(size).read_to_end(&mut bytes).map_err(RecordError::io(&self.path, "cannot read"))?;

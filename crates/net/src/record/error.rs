@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 /// An error of this module. The message names the file, and for a damaged file the byte.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// The operating system refused.
+    /// The operating system reported an error.
     #[error("{}: {what}: {source}", path.display())]
     Io {
         /// The file.
@@ -15,7 +15,7 @@ pub enum RecordError {
         /// The system's error.
         source: std::io::Error,
     },
-    /// The container's writer refused (a full disk, usually).
+    /// The container's writer failed, usually because the disk is full.
     #[error("{}: cannot write the recording: {source}", path.display())]
     Write {
         /// The file.
@@ -26,9 +26,9 @@ pub enum RecordError {
     /// The input cannot be recorded.
     #[error("cannot record {what}: {why}")]
     Input {
-        /// Which entity, frame or option.
+        /// The entity, frame or option.
         what: String,
-        /// The value, and what would be right.
+        /// The value, and the valid values.
         why: String,
     },
     /// The file is not an MCAP file.
@@ -39,7 +39,7 @@ pub enum RecordError {
         /// Description of the content.
         why: String,
     },
-    /// An MCAP file, but not one of ours.
+    /// An MCAP file that is not a recording of tumble.
     #[error("{}: not a tumble recording: {why}", path.display())]
     NotARecording {
         /// The file.
@@ -57,14 +57,14 @@ pub enum RecordError {
         /// Description of the damage.
         what: String,
     },
-    /// A cut or damaged file holds no whole frame.
+    /// A cut or damaged file contains no whole frame.
     #[error("{}: nothing to recover: no whole frame before byte {offset} ({what})", path.display())]
     NothingToRecover {
         /// The file.
         path: PathBuf,
         /// Offset at which reading ended.
         offset: u64,
-        /// Why it ended.
+        /// The reason why it ended.
         what: String,
     },
 }

@@ -1,4 +1,4 @@
-//! Between our plain structs and Foxglove's messages, both ways.
+//! Conversion between the structs of this module and Foxglove's messages, both ways.
 
 use super::scene::{Entity, Pose, Shape, VisualPart};
 use super::schemas::ROOT_FRAME;
@@ -11,19 +11,20 @@ use std::collections::BTreeSet;
 
 const NANOS_PER_SECOND: u64 = 1_000_000_000;
 
-/// Simulated seconds to whole nanoseconds, to the nearest. `time_s` is within `0..=MAX_TIME_S`.
+/// Converts simulated seconds to whole nanoseconds, rounded to the nearest. `time_s` is within
+/// `0..=MAX_TIME_S`.
 pub(crate) fn nanoseconds(time_s: f64) -> u64 {
     (time_s * NANOS_PER_SECOND as f64).round() as u64
 }
 
-/// A log time as Foxglove's stamp. Below `MAX_TIME_S` the seconds fit 32 bits; beyond, they
-/// saturate.
+/// Converts a log time to Foxglove's time stamp. Below `MAX_TIME_S` the seconds fit 32 bits;
+/// beyond, they saturate.
 fn stamp(log_time: u64) -> Timestamp {
     let seconds = u32::try_from(log_time / NANOS_PER_SECOND).unwrap_or(u32::MAX);
     Timestamp::new(seconds, (log_time % NANOS_PER_SECOND) as u32)
 }
 
-/// The whole scene, and the removal by name of what was there before and is no more.
+/// Returns a message with all entities, and with the removal of names in `before` that are gone.
 pub(crate) fn scene_update(log_time: u64, entities: &[Entity], before: &[String]) -> SceneUpdate {
     let present: BTreeSet<&str> = entities.iter().map(|entity| entity.name.as_str()).collect();
     let gone = before.iter().filter(|name| !present.contains(name.as_str()));
@@ -110,7 +111,7 @@ fn triangle_list(
     }
 }
 
-/// The point `(0, 0, d)` of the frame `pose`, in its parent: `p + d·R(q)·e_z`.
+/// Returns the point `(0, 0, d)` of the frame `pose`, in its parent: `p + d·R(q)·e_z`.
 fn along_z(pose: &Pose, d: f64) -> [f64; 3] {
     let [x, y, z, w] = pose.rotation;
     let axis = [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)];
@@ -133,7 +134,7 @@ fn fox_color(c: [f32; 4]) -> Color {
     Color { r: c[0].into(), g: c[1].into(), b: c[2].into(), a: c[3].into() }
 }
 
-/// Transforms root → each entity, with the numbers still to be set.
+/// Returns transforms from the root to each entity, with the numbers still to be set.
 pub(crate) fn transforms_for(entities: &[Entity]) -> FrameTransforms {
     let blank = |entity: &Entity| FrameTransform {
         parent_frame_id: ROOT_FRAME.into(),
@@ -143,7 +144,7 @@ pub(crate) fn transforms_for(entities: &[Entity]) -> FrameTransforms {
     FrameTransforms { transforms: entities.iter().map(blank).collect() }
 }
 
-/// Sets the numbers of one frame; as many poses as transforms.
+/// Sets the numbers of one frame; `poses` has as many elements as the message has transforms.
 pub(crate) fn set_transforms(message: &mut FrameTransforms, log_time: u64, poses: &[Pose]) {
     for (transform, pose) in message.transforms.iter_mut().zip(poses) {
         transform.timestamp = Some(stamp(log_time));
@@ -152,8 +153,8 @@ pub(crate) fn set_transforms(message: &mut FrameTransforms, log_time: u64, poses
     }
 }
 
-/// Names and poses out of a message; a field left out is the identity's, as protobuf's zero would
-/// be no rotation.
+/// Returns names and poses of a message. An absent field means the identity, because protobuf's
+/// zeros would be no rotation.
 pub(crate) fn poses_of(message: FrameTransforms) -> Vec<(String, Pose)> {
     let read = |t: FrameTransform| (t.child_frame_id, read_pose(t.translation, t.rotation));
     message.transforms.into_iter().map(read).collect()
@@ -166,7 +167,7 @@ fn read_pose(position: Option<Vector3>, rotation: Option<Quaternion>) -> Pose {
     }
 }
 
-/// Entities out of a message; parts in the order spheres, boxes, cylinders, meshes.
+/// Returns the entities of a message; parts in the order spheres, boxes, cylinders, meshes.
 pub(crate) fn entities_of(message: SceneUpdate) -> Vec<Entity> {
     message.entities.into_iter().map(read_entity).collect()
 }

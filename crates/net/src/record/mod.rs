@@ -1,5 +1,5 @@
-//! Recordings: MCAP files that Foxglove and Rerun open as they are, and that a killed run leaves
-//! readable.
+//! Recordings: MCAP files that Foxglove and Rerun open without conversion, and that stay readable
+//! after a run was killed.
 //!
 //! ```
 //! use tumble_net::record::{Entity, Pose, Recorder, RecorderOptions, Shape, VisualPart, read};
@@ -22,39 +22,38 @@
 //! # }
 //! ```
 //!
-//! # What is in a file
+//! # Content of a file
 //!
 //! | topic | schema | when |
 //! |---|---|---|
-//! | [`TOPIC_SCENE`] | `foxglove.SceneUpdate` | at the start and whenever the list of entities changes; always the whole list |
+//! | [`TOPIC_SCENE`] | `foxglove.SceneUpdate` | at the start and at every change of the list of entities; always the whole list |
 //! | [`TOPIC_TRANSFORMS`] | `foxglove.FrameTransforms` | every frame: [`ROOT_FRAME`] → each entity's frame, named as the entity |
 //! | [`TOPIC_STATE`] | `tumble.State` | every frame: frame number, exact time and the caller's state bytes |
 //!
-//! All three are protobuf and carry their schema in the file; the text of `tumble.State` stands in
-//! the channel's metadata under `proto` as well. A metadata record named `tumble` says the version
-//! and the world's name.
+//! All three are protobuf, with their schemas in the file. The metadata of the state channel also
+//! contains the text of `tumble.State`, under `proto`. A metadata record named `tumble` contains
+//! the version and the world's name.
 //!
-//! **What viewers show.** Foxglove draws the entities and moves them. Rerun (0.41) reads all three
-//! topics and moves the frames, but does not draw `foxglove.SceneUpdate`; it lists the message's
-//! fields.
+//! **Viewers.** Foxglove draws the entities and moves them. Rerun (0.41) reads all three topics and
+//! moves the frames, but does not draw `foxglove.SceneUpdate`; it lists the message's fields.
 //!
-//! **Time.** Every time stamp is *simulated* time in nanoseconds from 0, rounded to the nearest; no
+//! **Time.** Every time stamp is *simulated* time in nanoseconds from 0, rounded to the nearest. No
 //! wall clock enters the file, so the same run gives the same bytes. A viewer that shows dates
-//! shows 1 January 1970. The unrounded `f64` is in `tumble.State`.
+//! shows 1 January 1970. `tumble.State` contains the unrounded `f64`.
 //!
-//! **Killed runs.** Chunks are built in memory and appended whole; nothing already written is
-//! touched again. A file that ends anywhere is readable up to its last flush ([`FlushEvery`]),
-//! which puts the bytes into the operating system's hands: they survive the death of the process,
-//! not a power cut. A chunk holds whole frames only. [`read`] accepts a cut file and says where it
-//! ends; [`recover`] turns it into a complete one, for programs that insist.
+//! **Killed runs.** Chunks are built in memory and appended whole; the recorder never changes bytes
+//! that it has written. A file that ends anywhere is readable up to its last flush
+//! ([`FlushEvery`]). A flush passes the bytes to the operating system: they survive the death of
+//! the process, but not a power cut. A chunk contains whole frames only. [`read`] accepts a cut
+//! file and reports where it ends; [`recover`] makes a complete file of it, for programs that need
+//! one.
 //!
 //! # Bounds
 //!
-//! No length in a file is believed before it was checked against the bytes that are there and
-//! against a cap: [`MAX_RECORD_BYTES`], [`MAX_CHUNK_BYTES`], [`MAX_DEFINITION_BYTES`],
-//! [`MAX_DEFINITIONS`], [`MAX_SCENE_MEMORY`], [`MAX_ENTITIES`], [`MAX_NAME_BYTES`]. The writer
-//! keeps to the same caps (and [`MAX_STATE_BYTES`], [`MAX_SCENE_BYTES`]), so whatever it writes can
-//! be read.
+//! Every length in a file is checked against the available bytes and against a limit before it is
+//! used: [`MAX_RECORD_BYTES`], [`MAX_CHUNK_BYTES`], [`MAX_DEFINITION_BYTES`], [`MAX_DEFINITIONS`],
+//! [`MAX_SCENE_MEMORY`], [`MAX_ENTITIES`], [`MAX_NAME_BYTES`]. The writer respects the same limits
+//! (and [`MAX_STATE_BYTES`], [`MAX_SCENE_BYTES`]), so every file that it writes can be read.
 
 mod budget;
 mod bytes;
@@ -78,23 +77,23 @@ pub use scene::{Entity, Pose, Shape, VisualPart};
 pub use schemas::{ROOT_FRAME, STATE_PROTO, TOPIC_SCENE, TOPIC_STATE, TOPIC_TRANSFORMS};
 pub use writer::{Compression, FlushEvery, Recorder, RecorderOptions, Summary};
 
-/// Most bytes in one record of a file (a chunk as stored, a metadata record).
+/// Maximum number of bytes in one record of a file (a stored chunk, a metadata record).
 pub const MAX_RECORD_BYTES: u64 = 256 << 20;
-/// Most bytes in one chunk after decompression.
+/// Maximum number of bytes in one chunk after decompression.
 pub const MAX_CHUNK_BYTES: u64 = 256 << 20;
-/// Most entities at a time.
+/// Maximum number of entities at a time.
 pub const MAX_ENTITIES: usize = 100_000;
-/// Most bytes (UTF-8) in a name.
+/// Maximum number of bytes (UTF-8) in a name.
 pub const MAX_NAME_BYTES: usize = 256;
-/// Most bytes of state in one frame.
+/// Maximum number of state bytes in one frame.
 pub const MAX_STATE_BYTES: usize = 64 << 20;
-/// Most bytes of one encoded scene (all entities with their meshes).
+/// Maximum number of bytes of one encoded scene (all entities with their meshes).
 pub const MAX_SCENE_BYTES: usize = 128 << 20;
-/// Most memory that a scene may take once decoded, by a count made before.
+/// Maximum memory of a decoded scene, in bytes, computed before decoding.
 pub const MAX_SCENE_MEMORY: u64 = 512 << 20;
-/// Most bytes in the definition of one schema or channel, or in one metadata record.
+/// Maximum number of bytes in the definition of one schema or channel, or in one metadata record.
 pub const MAX_DEFINITION_BYTES: usize = 1 << 20;
-/// Most schemas, channels and metadata records in a file, of each.
+/// Maximum number of schemas, of channels, and of metadata records in a file.
 pub const MAX_DEFINITIONS: usize = 256;
 /// Latest simulated time, s: Foxglove's time stamps count seconds in 32 bits.
 pub const MAX_TIME_S: f64 = 4.0e9;

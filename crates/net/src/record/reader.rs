@@ -1,4 +1,4 @@
-//! Reading a recording back, frame by frame.
+//! Reads a recording frame by frame.
 
 use super::budget;
 use super::bytes::Fields;
@@ -21,20 +21,24 @@ use std::path::Path;
 /// One frame of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
-    /// Simulated time, s, as it was recorded (not rounded).
+    /// Simulated time as recorded, s (not rounded).
     pub time_s: f64,
     /// Frame number.
     pub frame: u64,
     /// One pose per entity, in the order of [`Reader::entities`].
     pub poses: Vec<Pose>,
-    /// The state bytes as they were recorded.
+    /// The recorded state bytes.
     pub state: Vec<u8>,
 }
 
 /// Opens a recording, complete or cut, and reads up to its first scene.
 ///
-/// Errors: no file, not MCAP, not one of ours, or damaged before the first scene. A file cut there
-/// is not an error: it has no entities and no frames, and [`Reader::ending`] says where it stops.
+/// A file that is cut before its first scene is not an error: it has no entities and no frames, and
+/// [`Reader::ending`] reports where it ends.
+///
+/// # Errors
+/// [`RecordError`] for a missing file, a file that is not MCAP, an MCAP file that is not a
+/// recording, and damage before the first scene.
 pub fn read(path: impl AsRef<Path>) -> Result<Reader> {
     let mut reader = Reader {
         container: Container::open(path.as_ref())?,
@@ -72,13 +76,13 @@ pub struct Reader {
     channels: BTreeMap<u16, Channel>,
     world: Option<String>,
     entities: Vec<Entity>,
-    /// Records of the chunk being read, its unread part, and where it stands in the file.
+    /// Records of the open chunk, the position of its unread part, and its offset in the file.
     content: Vec<u8>,
     position: usize,
     chunk_offset: u64,
     /// Poses of the frame whose state comes next, with their log time.
     poses: Option<(u64, Vec<Pose>)>,
-    /// A frame that was met before the first scene.
+    /// A frame that was read before the first scene.
     ahead: Option<Frame>,
     last_frame: Option<u64>,
     ending: Option<Ending>,
@@ -92,28 +96,28 @@ enum Event {
 }
 
 impl Reader {
-    /// The world's name.
+    /// Returns the world's name.
     pub fn world(&self) -> &str {
         self.world.as_deref().unwrap_or_default()
     }
 
-    /// The entities that the last frame's poses belong to (before the first frame: the first
-    /// scene's). Their parts are as drawn: a capsule is a cylinder and two spheres, a plane is a
-    /// mesh. An entity whose scene was lost to damage has its name and no parts.
+    /// Returns the entities that the last frame's poses belong to; before the first frame, those of
+    /// the first scene. Their parts are as drawn: a capsule is a cylinder and two spheres, a plane
+    /// is a mesh. An entity whose scene was lost to damage has a name and no parts.
     pub fn entities(&self) -> &[Entity] {
         &self.entities
     }
 
-    /// How the file ends; `None` until all frames were read.
+    /// Returns how the file ends; `None` until all frames are read.
     pub fn ending(&self) -> Option<&Ending> {
         self.ending.as_ref()
     }
 
-    /// The next frame, or `None` at the end.
+    /// Returns the next frame; `None` at the end. Each returned frame has passed its chunk's
+    /// checksum. A missing chunk is only detected by the checksum at the end.
     ///
-    /// Errors: damage, with the byte where the damaged record begins. After an error there are no
-    /// more frames. Each frame handed out passed its chunk's checksum; that a whole chunk is
-    /// missing shows only in the checksum at the end.
+    /// # Errors
+    /// [`RecordError::Corrupt`] with the offset of the damaged record. No frames follow an error.
     pub fn next_frame(&mut self) -> Result<Option<Frame>> {
         if let Some(frame) = self.ahead.take() {
             return Ok(Some(frame));
@@ -151,7 +155,7 @@ impl Reader {
         RecordError::corrupt(self.container.path(), self.chunk_offset, what)
     }
 
-    /// Opens a chunk or takes a record that stands outside of one.
+    /// Opens a chunk, or handles a record outside of chunks.
     fn outer_record(&mut self, record: RawRecord) -> Result<()> {
         self.chunk_offset = record.offset;
         match record.opcode {
@@ -178,7 +182,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Goes on in the open chunk; `None` at its end.
+    /// Continues in the open chunk; `None` at its end.
     fn next_in_chunk(&mut self) -> std::result::Result<Option<Event>, String> {
         let content = std::mem::take(&mut self.content);
         let mut rest = Fields(content.get(self.position..).unwrap_or_default());
@@ -253,8 +257,8 @@ impl Reader {
         Ok(())
     }
 
-    /// Makes the list of entities that of these transforms. They differ only where a scene was
-    /// lost.
+    /// Changes the list of entities to the names of these transforms. They differ only if a scene
+    /// was lost.
     fn adopt_names(&mut self, named: &[(String, Pose)]) {
         if named.iter().map(|(name, _)| name).eq(self.entities.iter().map(|entity| &entity.name)) {
             return;
@@ -297,7 +301,7 @@ impl Iterator for Reader {
     }
 }
 
-/// Name and entries of a metadata record.
+/// Returns name and entries of a metadata record.
 pub(crate) fn metadata_of(body: &[u8]) -> std::result::Result<(String, BTreeMap<String, String>), String> {
     if body.len() > MAX_DEFINITION_BYTES {
         return Err(format!("a metadata record of {} bytes, at most {MAX_DEFINITION_BYTES} are read", body.len()));
@@ -309,7 +313,7 @@ pub(crate) fn metadata_of(body: &[u8]) -> std::result::Result<(String, BTreeMap<
     Ok((name, entries))
 }
 
-/// A record outside of any chunk, as a chunk's content of one.
+/// Returns a record from outside of a chunk in the form of a chunk's content.
 pub(crate) fn as_content(record: RawRecord) -> Vec<u8> {
     let mut content = vec![record.opcode];
     content.extend((record.body.len() as u64).to_le_bytes());

@@ -1,4 +1,4 @@
-//! Mending: whatever can be read of a cut or damaged file, written out as a complete one.
+//! Recovery: writes the readable part of a cut or damaged file as a complete file.
 
 use super::MAX_DEFINITIONS;
 use super::bytes::{Fields, Problem};
@@ -19,37 +19,40 @@ use std::path::Path;
 /// Result of [`recover`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecoverReport {
-    /// Frames kept.
+    /// Number of frames kept.
     pub frames: u64,
-    /// Messages kept, on all topics.
+    /// Number of messages kept, on all topics.
     pub messages: u64,
-    /// Chunks kept.
+    /// Number of chunks kept.
     pub chunks: u64,
-    /// Chunks whose content is damaged, left out.
+    /// Number of chunks left out because their content is damaged.
     pub damaged_chunks: u64,
-    /// Records of kinds that are not carried over (attachments, private records).
+    /// Number of records of kinds that are not copied (attachments, private records).
     pub dropped_records: u64,
-    /// Bytes of the old file that were walked through; the rest is of no use.
+    /// Number of bytes read from the old file; the rest could not be used.
     pub bytes_used: u64,
     /// First fault of the old file; `None` if it was complete.
     pub fault: Option<String>,
 }
 
-/// Reads `input` as far as it goes and writes a complete file `output`, which must not exist.
+/// Reads `input` up to the first structural damage and writes a complete file `output`, which must
+/// not exist.
 ///
-/// A chunk whose content is damaged is left out and reading goes on behind it; where the file's own
-/// structure is damaged, reading ends. Messages, their times and the division into chunks stay as
-/// they are, so that a complete file of ours comes out byte for byte.
+/// A chunk with damaged content is left out, and reading continues after it. Damage to the file's
+/// own structure ends reading. Messages, their times and the division into chunks stay as they are:
+/// a complete recording is copied byte for byte.
 ///
-/// Errors: `input` is no MCAP file; no frame can be read ([`RecordError::NothingToRecover`]);
-/// `output` exists or cannot be written. After an error there is no `output`.
+/// # Errors
+/// [`RecordError`] if `input` is no MCAP file, if no frame can be read
+/// ([`RecordError::NothingToRecover`]), or if `output` exists or cannot be written. After an error
+/// there is no `output`.
 pub fn recover(input: impl AsRef<Path>, output: impl AsRef<Path>) -> Result<RecoverReport> {
     let (input, output) = (input.as_ref(), output.as_ref());
     let container = Container::open(input)?;
     let file = File::create_new(output).map_err(RecordError::io(output, "cannot create"))?;
     let result = Mender::new(container, output, file).run(input);
     if result.is_err() {
-        // The first error is the one to report, not that of tidying up.
+        // the first error is returned, not one of the removal
         let _ = std::fs::remove_file(output);
     }
     result
@@ -63,7 +66,7 @@ struct Mender<'a> {
     library: String,
     schemas: BTreeMap<u16, Schema>,
     channels: BTreeMap<u16, Channel>,
-    /// Metadata met before the compression was known.
+    /// Metadata that was read before the compression was known.
     metadata: Vec<Metadata>,
     metadata_count: usize,
     report: RecoverReport,
@@ -136,13 +139,13 @@ impl<'a> Mender<'a> {
                 metadata_of(&record.body).map(|(name, metadata)| self.put_metadata(Metadata { name, metadata }))
             }
             op::CHUNK => open_chunk(&record.body).and_then(|chunk| self.content(&chunk.content, &chunk.compression)),
-            // Outside of chunks. The summary repeats schemas and channels, which changes nothing.
+            // outside of chunks; the summary repeats schemas and channels, which changes nothing
             op::SCHEMA | op::CHANNEL | op::MESSAGE => self.content(&as_content(record), ""),
             op::ATTACHMENT | 0x80.. => {
                 self.report.dropped_records += 1;
                 return Ok(());
             }
-            // Indexes and statistics are made anew.
+            // indexes and statistics are written again
             _ => return Ok(()),
         };
         match done {
@@ -162,7 +165,7 @@ impl<'a> Mender<'a> {
         Ok(())
     }
 
-    /// Takes over a chunk: all of it, or on a fault none of it.
+    /// Copies a chunk: all of it, or none of it if it has a fault.
     fn content(&mut self, content: &[u8], compression: &str) -> std::result::Result<Result<()>, Problem> {
         let parsed = self.parse(content)?;
         Ok(self.put_chunk(parsed, compression))
@@ -208,7 +211,7 @@ struct Parsed<'b> {
 }
 
 impl Mender<'_> {
-    /// The writer, made when the first chunk gives the compression.
+    /// Returns the writer, which the first chunk creates because it determines the compression.
     fn writer(&mut self, compression: &str) -> Result<&mut AppendWriter> {
         if let Some(file) = self.file.take() {
             let compression = match compression {
@@ -224,7 +227,7 @@ impl Mender<'_> {
             }
             self.writer = Some(writer);
         }
-        // Made above on the first call, and never taken before `finish`.
+        // the writer was created above on the first call, and only `finish` takes it
         self.writer.as_mut().ok_or_else(|| RecordError::input("a recovered file", "its writer is gone"))
     }
 

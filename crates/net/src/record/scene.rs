@@ -15,15 +15,15 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// No rotation, no translation.
+    /// The identity: no rotation, no translation.
     pub const IDENTITY: Pose = Pose { position: [0.0; 3], rotation: [0.0, 0.0, 0.0, 1.0] };
 
-    /// Translation alone, meters.
+    /// Returns a translation without rotation, meters.
     pub const fn at(position: [f64; 3]) -> Pose {
         Pose { position, ..Pose::IDENTITY }
     }
 
-    /// Why a viewer could not use this pose, if it could not: numbers not finite, quaternion not of
+    /// Returns why a viewer cannot use this pose, if so: numbers not finite, or a quaternion not of
     /// unit length (1e-3).
     pub(crate) fn fault(&self) -> Option<String> {
         let finite = self.position.iter().chain(&self.rotation).all(|x| x.is_finite());
@@ -40,7 +40,7 @@ impl Pose {
     }
 }
 
-/// The form of a part, about its own origin. All lengths in meters.
+/// The shape of a part, about its own origin. All lengths in meters.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// A sphere.
@@ -50,14 +50,14 @@ pub enum Shape {
     },
     /// A box, axes along x, y, z.
     Box {
-        /// Half of each edge.
+        /// Half of each edge length.
         half_extents: [f64; 3],
     },
     /// A cylinder along z.
     Cylinder {
         /// Radius.
         radius: f64,
-        /// Half of the length.
+        /// Half of its length.
         half_height: f64,
     },
     /// A cylinder along z with a hemisphere on each end. Stored as a cylinder and two spheres, and
@@ -65,12 +65,12 @@ pub enum Shape {
     Capsule {
         /// Radius of cylinder and caps.
         radius: f64,
-        /// Half of the cylinder's length, caps not counted.
+        /// Half of the cylinder's length without the caps.
         half_height: f64,
     },
     /// Triangles.
     Mesh {
-        /// Corners.
+        /// The vertices.
         vertices: Vec<[f64; 3]>,
         /// Three indices each, counter-clockwise from outside.
         triangles: Vec<[u32; 3]>,
@@ -83,10 +83,10 @@ pub enum Shape {
     },
 }
 
-/// A colored shape at a place in its entity's frame.
+/// A colored shape with a pose in its entity's frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VisualPart {
-    /// The form.
+    /// The shape.
     pub shape: Shape,
     /// The shape's pose in the entity's frame.
     pub pose: Pose,
@@ -94,10 +94,10 @@ pub struct VisualPart {
     pub color: [f32; 4],
 }
 
-/// Something with a name and a pose per frame: a body, a link, a piece of ground.
+/// A named object with one pose per frame: a body, a link, a piece of ground.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entity {
-    /// Name, unique in the recording at a time; 1 to [`MAX_NAME_BYTES`] bytes, and not `world`.
+    /// Name, unique at any time of the recording; 1 to [`MAX_NAME_BYTES`] bytes, and not `world`.
     pub name: String,
     /// Visible parts; may be empty.
     pub parts: Vec<VisualPart>,
@@ -129,7 +129,7 @@ pub(crate) fn check_entities(entities: &[Entity]) -> Result<()> {
     Ok(())
 }
 
-/// Why a name cannot be a frame's name.
+/// Returns why a name cannot be a frame's name, if so.
 pub(crate) fn name_fault(name: &str) -> Option<String> {
     match name.len() {
         0 => Some("the name is empty".into()),

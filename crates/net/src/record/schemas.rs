@@ -1,4 +1,4 @@
-//! Topics, and the schemas that go into the file with them.
+//! Topics, and the schemas that a recording contains.
 
 use super::error::{RecordError, Result};
 use foxglove::Encode;
@@ -11,30 +11,30 @@ use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 use std::path::Path;
 
-/// Topic of what is drawn.
+/// Topic of the drawn entities.
 pub const TOPIC_SCENE: &str = "/scene";
 /// Topic of the poses.
 pub const TOPIC_TRANSFORMS: &str = "/tf";
-/// Topic of our own state.
+/// Topic of the state.
 pub const TOPIC_STATE: &str = "/tumble/state";
-/// Name of the frame that all entities hang from: meters, z up, right-handed.
+/// Name of the parent frame of all entities: meters, z up, right-handed.
 pub const ROOT_FRAME: &str = "world";
 
 pub(crate) const STATE_SCHEMA: &str = "tumble.State";
 pub(crate) const SCENE_SCHEMA: &str = "foxglove.SceneUpdate";
 pub(crate) const TRANSFORMS_SCHEMA: &str = "foxglove.FrameTransforms";
 pub(crate) const PROTOBUF: &str = "protobuf";
-/// Name of the metadata record that marks a recording of ours.
+/// Name of the metadata record that marks a recording of tumble.
 pub(crate) const METADATA_NAME: &str = "tumble";
 /// Version of the recording's layout.
 pub(crate) const VERSION: u32 = 1;
 
-/// The state message, as text. It is in every file twice: compiled, as the channel's schema, and
-/// like this.
+/// The state message, as text. Every file contains it twice: compiled, as the channel's schema, and
+/// as this text.
 ///
-/// Protobuf rather than bare bytes, so that viewers open the channel without complaint and any
-/// protobuf tool decodes it. Fixed-width fields are little-endian on the wire; the payload is the
-/// caller's, by convention little-endian.
+/// It is protobuf instead of plain bytes, so viewers open the channel without a warning and any
+/// protobuf tool decodes it. Fixed-width fields are little-endian on the wire; the payload belongs
+/// to the caller and is little-endian by convention.
 pub const STATE_PROTO: &str = r#"syntax = "proto3";
 package tumble;
 
@@ -47,7 +47,7 @@ message State {
 }
 "#;
 
-/// One frame of our own channel; [`STATE_PROTO`] says what the fields mean.
+/// A message of the state channel; [`STATE_PROTO`] documents the fields.
 #[derive(Clone, PartialEq, prost::Message)]
 pub(crate) struct State {
     #[prost(fixed32, tag = "1")]
@@ -60,7 +60,7 @@ pub(crate) struct State {
     pub payload: Vec<u8>,
 }
 
-/// The compiled form of [`STATE_PROTO`], as `protoc --descriptor_set_out` would give it.
+/// Returns the compiled form of [`STATE_PROTO`], as `protoc --descriptor_set_out` writes it.
 fn state_descriptor() -> Vec<u8> {
     let field = |(number, name, kind): (i32, &str, Type)| FieldDescriptorProto {
         name: Some(name.into()),
@@ -112,9 +112,9 @@ pub(crate) fn add_channels<W: Write + Seek>(writer: &mut Writer<W>, path: &Path)
     all().map_err(RecordError::write(path))
 }
 
-/// The published schema of a Foxglove message: a compiled descriptor set.
+/// Returns the published schema of a Foxglove message: a compiled descriptor set.
 fn published<M: Encode>() -> Vec<u8> {
-    // Every generated message has a schema; `None` is for hand-written encoders only.
+    // every generated message has a schema; `None` occurs for hand-written encoders only
     M::get_schema().map(|schema| schema.data.into_owned()).unwrap_or_default()
 }
 
@@ -122,7 +122,7 @@ fn published<M: Encode>() -> Vec<u8> {
 mod tests {
     use super::*;
 
-    /// The text and its compiled form are two writings of one thing.
+    /// The text and its compiled form have the same content.
     #[test]
     fn text_and_descriptor_say_the_same() {
         let set = FileDescriptorSet::decode(&state_descriptor()[..]).unwrap();
@@ -142,7 +142,7 @@ mod tests {
         kind.as_str_name().trim_start_matches("TYPE_").to_lowercase()
     }
 
-    /// Wire bytes worked out by hand: key = number·8 + wire type (5 fixed32, 1 fixed64, 2 bytes),
+    /// Wire bytes computed by hand: key = number·8 + wire type (5 fixed32, 1 fixed64, 2 bytes),
     /// little-endian values.
     #[test]
     fn state_bytes_are_as_documented() {

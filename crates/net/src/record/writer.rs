@@ -1,4 +1,4 @@
-//! The recorder: frames in, an MCAP file out.
+//! The recorder: writes frames to an MCAP file.
 
 use super::budget;
 use super::error::{RecordError, Result};
@@ -16,14 +16,14 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-/// How chunks are stored.
+/// Compression of chunks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Compression {
-    /// As they are.
+    /// No compression.
     None,
-    /// Fast.
+    /// LZ4: faster.
     Lz4,
-    /// Smaller.
+    /// Zstandard: smaller.
     Zstd,
 }
 
@@ -37,12 +37,12 @@ impl Compression {
     }
 }
 
-/// How much a killed run may lose.
+/// Interval of flushes: a killed run loses at most the frames since the last one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FlushEvery {
     /// A flush after this number of frames, at least 1.
     Frames(u32),
-    /// A flush once this many seconds of simulated time have passed since the last one, above 0.
+    /// A flush after this many seconds of simulated time, above 0.
     SimulatedSeconds(f64),
 }
 
@@ -52,9 +52,9 @@ pub struct RecorderOptions {
     /// A chunk of this uncompressed size in bytes is written at once, even if no flush is due; 1 to
     /// 64 MiB.
     pub chunk_size: u64,
-    /// When the file is made readable up to here.
+    /// Interval of flushes.
     pub flush_every: FlushEvery,
-    /// How chunks are stored.
+    /// Compression of chunks.
     pub compression: Compression,
 }
 
@@ -65,7 +65,7 @@ impl Default for RecorderOptions {
     }
 }
 
-/// The largest `chunk_size` that can be asked for.
+/// Maximum of `chunk_size`.
 const MAX_CHUNK_SIZE: u64 = 64 << 20;
 
 impl RecorderOptions {
@@ -102,16 +102,16 @@ pub struct Summary {
     pub end_time_s: f64,
 }
 
-/// An MCAP writer that only ever appends: a chunk is built in memory and written whole.
+/// An MCAP writer that only appends: a chunk is built in memory and written whole.
 pub(crate) type AppendWriter = Writer<NoSeek<BufWriter<File>>>;
 
-/// Options that make bytes a function of the input: no threads, no seeking, and chunks end where we
-/// say.
+/// Returns options with which the bytes depend on the input only: no threads, no seeking, and
+/// chunks that end on request.
 pub(crate) fn append_options(compression: Option<mcap::Compression>) -> WriteOptions {
     WriteOptions::new().disable_seeking(true).chunk_size(None).compression(compression).compression_threads(0)
 }
 
-/// Writes a recording. Dropping it finishes the file as well as it can, errors unseen;
+/// Writes a recording. Dropping it finishes the file if possible and ignores errors;
 /// [`Recorder::finish`] reports them.
 pub struct Recorder {
     path: PathBuf,
@@ -130,9 +130,11 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Creates (or replaces) the file `path`, and writes the scene. `world` is a name for people.
+    /// Creates or replaces the file `path`, and writes the scene. `world` is a name for display.
     ///
-    /// Errors: the file cannot be created; an option, a name or a number is out of range.
+    /// # Errors
+    /// [`RecordError`] if the file cannot be created, or an option, a name or a number is out of
+    /// range.
     pub fn create(
         path: impl AsRef<Path>,
         world: &str,
@@ -172,10 +174,11 @@ impl Recorder {
         Ok(recorder)
     }
 
-    /// Replaces the list of entities from `time_s` on; later frames bring one pose for each of
+    /// Replaces the list of entities from `time_s` on; later frames have one pose for each of
     /// these.
     ///
-    /// Errors: as [`Recorder::create`]; a time before the last frame's.
+    /// # Errors
+    /// As [`Recorder::create`]; also a time before the last frame's.
     pub fn set_entities(&mut self, time_s: f64, entities: &[Entity]) -> Result<()> {
         check_entities(entities)?;
         self.check_time(time_s)?;
@@ -188,9 +191,12 @@ impl Recorder {
     /// - `time_s`: simulated time, s, finite, 0 to [`MAX_TIME_S`], never before the last frame's.
     /// - `frame`: its number, above the last frame's.
     /// - `poses`: one per entity in the order of the list, `X_WB`.
-    /// - `state`: whatever brings the world back, at most [`MAX_STATE_BYTES`]; may be empty.
+    /// - `state`: the caller's bytes to restore the world, at most [`MAX_STATE_BYTES`]; may be
+    ///   empty.
     ///
-    /// Errors: one of these is out of range (nothing is written then), or the disk refuses.
+    /// # Errors
+    /// [`RecordError`] if a value is out of range, in which case nothing is written, or if writing
+    /// fails.
     pub fn frame(&mut self, time_s: f64, frame: u64, poses: &[Pose], state: &[u8]) -> Result<()> {
         self.check_time(time_s)?;
         self.check_frame(frame, poses, state)?;
@@ -206,7 +212,7 @@ impl Recorder {
         if self.flush_is_due(time_s) { self.flush() } else { Ok(()) }
     }
 
-    /// Writes out all frames so far; a run killed from here on keeps them.
+    /// Writes all frames so far to the file; they survive if the run is killed.
     pub fn flush(&mut self) -> Result<()> {
         self.writer.flush().map_err(RecordError::write(&self.path))?;
         self.flushed_frames += self.pending_frames;
@@ -216,12 +222,12 @@ impl Recorder {
         Ok(())
     }
 
-    /// Number of frames that a kill can no longer take.
+    /// Returns the number of frames that survive if the run is killed.
     pub fn flushed_frames(&self) -> u64 {
         self.flushed_frames
     }
 
-    /// Ends the recording: index, checksums, and the file synced to the disk.
+    /// Ends the recording: index, checksums, and a sync to the disk.
     pub fn finish(mut self) -> Result<Summary> {
         self.flush()?;
         let summary = self.writer.finish().map_err(RecordError::write(&self.path))?;
@@ -268,7 +274,7 @@ impl Recorder {
         }
     }
 
-    /// The scene gets a chunk of its own, flushed at once: nothing later can be drawn without it.
+    /// Writes the scene as a chunk of its own and flushes it: without it nothing can be drawn.
     fn write_scene(&mut self, time_s: f64, entities: &[Entity]) -> Result<()> {
         let log_time = nanoseconds(time_s);
         let update = scene_update(log_time, entities, &self.names);
@@ -302,7 +308,7 @@ impl Recorder {
     }
 }
 
-/// The record that marks a file as ours and says how to read it.
+/// Returns the record that marks a file as a recording of tumble, with its version.
 fn description(world: &str) -> Metadata {
     let entries = [
         ("version", VERSION.to_string()),

@@ -10,13 +10,13 @@ fn read(text: &str) -> SceneFile {
     SceneFile::parse(text, "s.toml").unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The blocks of TOML in the reference of all keys.
+/// Returns the blocks of TOML in the reference of all keys.
 fn examples() -> Vec<&'static str> {
     let reference = include_str!("../../../../scenes/README.md");
     reference.split("```toml\n").skip(1).map(|rest| rest.split("```").next().unwrap()).collect()
 }
 
-/// A body with one revolute link, whose further keys begin at line 7.
+/// Returns a body with one revolute link, whose further keys begin at line 7.
 fn link_with(keys: &str) -> String {
     format!(
         "[[articulated]]\nname = \"a\"\n[[articulated.link]]\nname = \"l\"\njoint = \"revolute\"\naxis = [0, 0, 2]\n{keys}\n"

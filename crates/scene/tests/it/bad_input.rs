@@ -1,5 +1,4 @@
-//! One golden per kind of bad input: the whole of what is assert_errors, with file, line and
-//! column.
+//! One expected text per kind of bad input: all reported errors, with file, line and column.
 
 use tumble_scene::SceneFile;
 
@@ -17,12 +16,12 @@ pub fn assert_errors(text: &str, expected: &[&str]) {
     }
 }
 
-/// A right body around one line, which is line 5.
+/// Returns a valid body with one line added, which is line 5.
 fn body_with(line: &str) -> String {
     format!("[[body]]\nname = \"b\"\nshape = {{ type = \"sphere\", radius_m = 1 }}\nmass_kg = 1\n{line}\n")
 }
 
-/// A body with the shape given, on line 2.
+/// Returns a body with the given shape, on line 2.
 fn shape(shape: &str) -> String {
     format!("[[body]]\nshape = {shape}\nname = \"b\"\nmass_kg = 1\n")
 }
@@ -67,7 +66,7 @@ fn old_names_are_reported_with_the_new_ones() {
         "[[loop_joint]]\nname = \"c\"\ntype = \"weld\"\n",
         &["s.toml:3:8: `type` of loop_joint \"c\" is \"weld\"; this is now `fixed`"],
     );
-    // An old name where the new one has no meaning is as any other word.
+    // an old name in another context is treated like any unknown word
     assert_errors(
         "[sky]\nseconds = 1\n",
         &[
@@ -167,7 +166,7 @@ fn missing_keys() {
         "[[light]]\ntype = \"directional\"\n",
         &["s.toml:1:1: light 1 has no `direction`; expected a direction, such as [0, 0, -1]"],
     );
-    // A required key that is only mistyped is reported once, at its place.
+    // a required key that is misspelled is reported once, at its place
     assert_errors(
         &shape("{ type = \"sphere\", raduis_m = 1 }"),
         &["s.toml:2:28: unknown key `raduis_m` in the shape of body \"b\"; did you mean `radius_m`?"],
@@ -311,7 +310,7 @@ fn references_to_nothing() {
         &(two.to_owned() + &shape("{ type = \"mesh\", mesh = \"pin\" }")),
         &["s.toml:8:33: `mesh` of the shape of body \"b\" is \"pin\"; expected `bowl` or `vase`"],
     );
-    // A mesh that is itself wrong is reported once, and not again where it is used.
+    // an invalid mesh is reported once, and not again where it is used
     let wrong = "[meshes.vase]\ntype = \"icosphere\"\nradius_m = 0\n".to_owned()
         + &shape("{ type = \"mesh\", mesh = \"vase\" }");
     assert_eq!(SceneFile::parse(&wrong, "s.toml").unwrap_err().problems().len(), 1);

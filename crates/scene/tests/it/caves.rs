@@ -1,5 +1,5 @@
-//! Cave files: what is read, what is refused and where, what is only noted; the shipped ones and
-//! the schema.
+//! Cave files: values that are read, errors with their places, notes; the shipped caves and the
+//! schema.
 
 use std::collections::BTreeSet;
 use toml::de::{DeTable, DeValue};
@@ -21,7 +21,7 @@ screen = \"s\"
 size_px = [800, 600]
 ";
 
-/// The only problem of a text: its place, and what is said.
+/// Returns the only problem of a text: its place and its message.
 fn problem(text: &str) -> (usize, String) {
     let error = Cave::parse(text, "my.toml").expect_err("it is wrong");
     assert_eq!(error.problems().len(), 1, "{error}");
@@ -40,7 +40,7 @@ fn a_small_cave_has_its_defaults() {
         (cave.sync.transport, cave.sync.ready_timeout_ms, cave.users[0].interpupillary_m),
         (Transport::SharedMemory, 100, 0.063)
     );
-    // 2 m x 1.5 m and 800 x 600: square pixels, one screen: nothing to say
+    // 2 m x 1.5 m and 800 x 600: square pixels, one screen: no note
     assert!(cave.notes().is_empty(), "{:?}", cave.notes());
     // the right eye is 31.5 mm to the right of a user facing y
     let eye = cave.users[0].eye(1.0);
@@ -197,7 +197,7 @@ fn gaps_are_what_a_tape_measure_says() {
     assert!(wide.contains("1.250 times denser horizontally than vertically; 1000 x 750 would be square"), "{wide}");
 }
 
-/// 2^25 pixels, rows filled up to multiples of 64, and a rim of 48: 16288 + 96 = 16384 = 2^14
+/// 2^25 pixels, rows padded to multiples of 64, and a margin of 48: 16288 + 96 = 16384 = 2^14
 /// leaves 2^11 - 96 rows.
 #[test]
 fn the_largest_pictures_are_let_through_and_no_larger_ones() {
@@ -215,7 +215,8 @@ fn the_largest_pictures_are_let_through_and_no_larger_ones() {
     }
 }
 
-/// A second screen to the right of the first, which ends at x = 1 and is 1.5 m high.
+/// Returns a cave with a second screen to the right of the first, which ends at x = 1 and is 1.5 m
+/// high.
 fn beside(lower_left: [f64; 3], lower_right: [f64; 3], upper_left: [f64; 3]) -> Cave {
     let second = format!(
         "[[screen]]\nname = \"t\"\nlower_left_m = {lower_left:?}\nlower_right_m = {lower_right:?}\nupper_left_m = {upper_left:?}\n[[facet]]\nname = \"g\"\nscreen = \"t\"\nsize_px = [800, 600]\n"
@@ -238,7 +239,7 @@ fn a_badly_placed_screen_is_reported_as_one_without_a_neighbor() {
             "screen \"s\" has no neighbor along its right edge: the nearest, the left edge of \"t\", is 451 mm and 8.0 degrees off"
         ]
     );
-    // a meter off it is another wall
+    // at a distance of a meter it is another wall
     assert!(beside([2.0, 2.0, 0.5], [2.0, 0.0, 0.5], [2.0, 2.0, 2.0]).notes().is_empty());
 }
 
@@ -252,8 +253,8 @@ fn screens_that_cover_a_strip_twice_overlap() {
 
 #[test]
 fn shipped_caves_are_whole_and_found_from_anywhere() {
-    // screens, facets, and pairs of edges that meet: a cube's 12 edges, and the number of them
-    // that 4 and 6 faces share
+    // screens, facets, and pairs of edges that coincide: a cube has 12 edges, and 4 or 6 of its
+    // faces share these numbers of them
     let known = [("wall3", 3, 2), ("cube4", 4, 5), ("cube6", 6, 12), ("cylinder5", 5, 4), ("sphere5", 5, 4)];
     assert_eq!(shipped_caves().iter().map(|c| c.name).collect::<Vec<_>>(), known.map(|k| k.0));
     for (name, screens, edges) in known {
@@ -263,7 +264,7 @@ fn shipped_caves_are_whole_and_found_from_anywhere() {
             let found = gaps(&cave.screens);
             assert_eq!(found.len(), edges, "{name}");
             assert!(found.iter().all(|gap| gap.gap_m < 1e-8), "{name}: {found:?}");
-            // nothing but those edges is noted
+            // only those edges are noted
             assert_eq!(cave.notes().len(), edges, "{name}: {:?}", cave.notes());
         }
         assert!(!shipped_caves().iter().any(|c| c.description().is_empty()));
@@ -294,14 +295,14 @@ fn half_a_cave_is_an_error_and_never_a_panic() {
     }
 }
 
-// The schema.
+// the schema
 
 fn schema() -> serde_json::Value {
     serde_json::from_str(include_str!("../../../../caves/cave.schema.json")).unwrap()
 }
 
-/// Returns the faults of a value by the few words of JSON Schema that ours uses; any other word is a
-/// mistake of ours.
+/// Returns the violations of a schema by a value, for the few keywords of JSON Schema that ours
+/// uses; any other keyword is an error.
 fn violations(
     schema: &serde_json::Value,
     root: &serde_json::Value,
@@ -418,8 +419,8 @@ fn shipped_caves_satisfy_the_schema_and_wrong_ones_do_not() {
     }
 }
 
-/// The keys that the parser knows in a table, from what it says of an unknown one: those that are
-/// there, and those it names as free.
+/// Returns the keys that the parser knows in a table, from its message about an unknown key: the
+/// keys that are present, and the keys it names as available.
 fn known_keys(text: &str, table: &str) -> BTreeSet<String> {
     let error = Cave::parse(text, "my.toml").expect_err("there is an unknown key");
     let problem = error

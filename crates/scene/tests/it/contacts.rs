@@ -1,13 +1,13 @@
-//! The key `contacts`: the default, precedence, what a wrong word is assert_errors, and
-//! that it reaches the world.
+//! The key `contacts`: the default, precedence, errors for wrong values, and its effect in the
+//! world.
 
 use crate::bad_input::assert_errors;
 use tumble_core::World;
 use tumble_core::collide::ContactMode::{self, Spheres, Surface};
 use tumble_scene::SceneFile;
 
-/// A ball of triangles of 0.1 m just above the ground, with the lines given in `[world]` and in its
-/// `[[body]]`.
+/// Returns a scene with a triangle mesh of a sphere of 0.1 m just above the ground, and these lines
+/// in `[world]` and in its `[[body]]`.
 fn ball(world: &str, body: &str) -> String {
     format!(
         "[world]\n{world}\n[meshes.ball]\ntype = \"icosphere\"\nradius_m = 0.1\nsubdivisions = 1\n[[body]]\nname = \"ground\"\nmode = \"static\"\n\
@@ -38,10 +38,10 @@ fn contacts_are_those_of_the_surface_unless_the_world_or_the_body_says_otherwise
     assert_eq!(built(spheres, surface).0.world.contacts, Spheres);
 }
 
-/// A body rests on its surface at its own height, and on its leaf spheres, which reach beyond the
-/// surface, higher.
+/// In the mode `surface` a body rests at its own height; on its leaf spheres, which extend beyond
+/// the surface, it rests higher.
 #[test]
-fn the_word_decides_what_touches() {
+fn the_contact_mode_sets_the_resting_height() {
     let rests = |lines: &str| {
         let (_, mut world) = built(lines, "");
         (0..480).for_each(|_| {
@@ -51,7 +51,7 @@ fn the_word_decides_what_touches() {
         world.part_state(id, 0).unwrap().position().z
     };
     let (surface, spheres) = (rests("contacts = \"surface\""), rests("contacts = \"spheres\""));
-    // between the ball through the vertices and the one through the middles of the faces
+    // between the sphere through the vertices and the one through the centers of the faces
     assert!((0.085..=0.1 + 1e-6).contains(&surface), "by its surface it rests {surface} m above the ground");
     assert!(spheres > surface + 1e-4, "{spheres} m by its spheres, {surface} m by its surface");
 }

@@ -9,7 +9,7 @@ fn read(text: &str) -> SceneFile {
     SceneFile::parse(text, "s.toml").unwrap_or_else(|error| panic!("{}", error.report(false)))
 }
 
-/// The only body of a scene that has `lines` in it.
+/// Returns the only body of a scene with these lines in its `[[body]]`.
 fn body(lines: &str) -> BodySpec {
     let text = format!("[[body]]\nname = \"b\"\nshape = {{ type = \"sphere\", radius_m = 1 }}\nmass_kg = 2\n{lines}\n");
     read(&text).bodies.remove(0)
@@ -33,7 +33,7 @@ fn the_empty_scene_has_the_defaults_of_the_documentation() {
     assert_eq!(scene.world.combine_restitution, Combine::Max);
     assert_eq!(scene.world.combine_friction, Combine::GeometricMean);
     assert!(scene.bodies.is_empty() && scene.camera.is_none() && scene.ground.is_none());
-    // One sun, its direction a unit vector.
+    // one sun, with a unit vector as direction
     let LightKind::Directional { direction: [x, y, z] } = scene.lights[0].kind else { panic!("a sun") };
     assert!(scene.lights.len() == 1 && (x * x + y * y + z * z - 1.0).abs() < 1e-15 && z < 0.0);
 }
@@ -75,7 +75,7 @@ fn combine_rules_by_hand() {
     assert_eq!(rules.map(|rule| rule.of(0.25, 1.0)), [0.25, 1.0, 0.625, 0.25, 0.5]);
 }
 
-/// Properties of the contacts of two bodies in the world of a scene.
+/// Returns restitution and friction between two bodies in the world of a scene.
 fn between(scene: &SceneFile, a: &str, b: &str) -> (f64, f64) {
     let (world, _) = scene.build().unwrap();
     let id = |name: &str| (world.find(name).unwrap(), 0);
@@ -192,13 +192,13 @@ fn orientations() {
     let half = 0.5f64.sqrt();
     close(body("").orientation_xyzw, [0.0, 0.0, 0.0, 1.0]);
     close(body("orientation_xyzw = [0.0, 0.6, 0.0, 0.8]").orientation_xyzw, [0.0, 0.6, 0.0, 0.8]);
-    // 90 degrees about z, twice as long an axis.
+    // 90 degrees about z; the length of the axis does not matter
     close(body("rotation = { axis = [0, 0, 2], angle_deg = 90 }").orientation_xyzw, [0.0, 0.0, half, half]);
     close(body("rotation_deg = [90, 0, 0]").orientation_xyzw, [half, 0.0, 0.0, half]);
-    // Roll first, then yaw, about fixed axes: x turned by 90 then z by 90 takes y to z to z, and x
-    // to y. That is the third of a turn about (1, 1, 1): x to y, y to z, z to x.
+    // Roll first, then yaw, about fixed axes: a turn about x by 90, then about z by 90, takes y to
+    // z to z, and x to y. That is the third of a turn about (1, 1, 1): x to y, y to z, z to x.
     close(body("rotation_deg = [90, 0, 90]").orientation_xyzw, [0.5, 0.5, 0.5, 0.5]);
-    // A quaternion off by rounding is made a unit one.
+    // a quaternion with rounding errors is normalized
     let q = body("orientation_xyzw = [0.0, 0.6004, 0.0, 0.8]").orientation_xyzw;
     assert!((q.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() < 1e-15);
 }

@@ -1,4 +1,4 @@
-//! The promises of `tumble-scene` about scene files.
+//! Tests of `tumble-scene`.
 
 mod articulated;
 mod articulated_world;

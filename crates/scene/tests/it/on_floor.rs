@@ -34,7 +34,8 @@ fn link(name: &str, shape: &str) -> String {
     format!("<link name=\"{name}\"><inertial><mass value=\"1\"/>{inertia}</inertial>{shape}</link>\n")
 }
 
-/// A hinge about y at z = 3 whose limits leave 0 out, a slider that mimics it, and a mesh below.
+/// Returns a robot with a revolute joint about y at z = 3 whose limits exclude 0, a prismatic joint
+/// that mimics it, and a mesh below.
 fn robot() -> String {
     let ball = "<collision><geometry><sphere radius=\"0.25\"/></geometry></collision>";
     let mesh = "<collision><origin xyz=\"0 0 -8\"/><geometry><mesh filename=\"t.obj\" scale=\"1 1 0.5\"/></geometry></collision>";
@@ -64,7 +65,7 @@ fn the_floor_goes_through_the_lowest_point_of_a_robot_within_its_limits() {
     let scene = SceneFile::load(&path).unwrap();
     let spec = &scene.articulated[0];
     let start = |name: &str| spec.links[spec.link(name).unwrap()].joint.position[0];
-    // 0 is below the hinge's limits; the slider follows: 1 - 4 * 0.5
+    // 0 is below the limits of the revolute joint; the prismatic joint follows: 1 - 4 * 0.5
     assert_eq!((start("arm"), start("finger")), (0.5, -1.0));
     // the lowest vertex of the mesh is at 3 - 8 + 0.5 * 5
     assert_eq!(scene.bodies[0].position_m[2], -2.5);
@@ -87,7 +88,7 @@ fn the_camera_frames_what_stands_there() {
     // the box is 2 m wide and reaches from the floor to z = 7
     let height = 2.0 + 0.1 * 12f64.sqrt();
     assert!((0..3).all(|k| (camera.target_m[k] - [2.0, 2.0, 7.0 - 0.5 * height][k]).abs() < 1e-12));
-    // the ball around it fills the picture from edge to edge
+    // the sphere around it fills the picture from edge to edge
     let distance = (0..3).map(|k| (camera.eye_m[k] - camera.target_m[k]).powi(2)).sum::<f64>().sqrt();
     assert!((distance * 20f64.to_radians().sin() - 0.5 * (8.0 + height * height).sqrt()).abs() < 1e-9, "{distance}");
     assert!(camera.eye_m[2] > 7.0);

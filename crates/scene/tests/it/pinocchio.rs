@@ -1,7 +1,7 @@
-//! Against Pinocchio (the Python package `pin`): other programmers' dynamics of the same trees in
-//! the same states. Random trees of all joint kinds, and robots from the Python package
-//! `example-robot-data`. Python is `$TUMBLE_PYTHON`, else `python3`; without the packages the tests
-//! say so and pass.
+//! Comparison with Pinocchio (the Python package `pin`), an independent implementation of the
+//! dynamics, for the same trees in the same states: random trees of all joint kinds, and robots
+//! from the Python package `example-robot-data`. Python is `$TUMBLE_PYTHON`, else `python3`.
+//! Without the packages the tests print a note and pass.
 
 #[path = "../../../core/tests/it/articulated_random.rs"]
 #[allow(dead_code, reason = "shared with the tests of tumble-core")]
@@ -21,7 +21,7 @@ use tumble_core::{Joint, LinkMass, Model, ModelBuilder};
 const GRAVITY: Vec3 = Vec3::new(0.3, -0.7, -9.81);
 const STATES: usize = 4;
 
-/// A state, and the torques whose accelerations are asked for.
+/// A state, and torques for the forward dynamics.
 struct State {
     q: Vec<f64>,
     v: Vec<f64>,
@@ -59,7 +59,7 @@ fn robots_move_as_pinocchio_says() {
     }
 }
 
-/// Whether Pinocchio was there to be asked; panics where it does not agree to 1e-9.
+/// Returns whether Pinocchio is available; panics if the results differ by more than 1e-9.
 fn agrees(name: &str, model: &Model) -> bool {
     let mut random = Random(model.dof() as u64);
     let states: Vec<State> = (0..STATES)
@@ -89,7 +89,7 @@ fn agrees(name: &str, model: &Model) -> bool {
     true
 }
 
-/// Ours, in the order and under the names of the script.
+/// Returns our results, in the order and under the names of the script.
 fn answers(model: &Model, state: &State) -> Vec<(&'static str, Vec<f64>)> {
     let dof = model.dof();
     let (mut kin, mut work) = (Kinematics::new(model), InverseDynamics::new(model));
@@ -116,7 +116,7 @@ fn answers(model: &Model, state: &State) -> Vec<(&'static str, Vec<f64>)> {
     ]
 }
 
-/// The tree and its states in the script's words.
+/// Returns the tree and its states in the script's format.
 fn question(model: &Model, states: &[State]) -> String {
     let mut text = String::new();
     line(&mut text, "gravity", GRAVITY.as_slice());
@@ -155,7 +155,7 @@ fn line(text: &mut String, name: &str, numbers: &[f64]) {
     text.push('\n');
 }
 
-/// A tree from the script's words.
+/// Returns a tree from the script's format.
 fn read(links: &[&str]) -> Model {
     let mut builder = ModelBuilder::new();
     for (number, link) in links.iter().enumerate() {
@@ -192,8 +192,8 @@ fn python(mode: &str, input: &str) -> Option<String> {
         Ok(child) => child,
         Err(error) => return skip(&format!("{python} does not run: {error}")),
     };
-    // The script reads all of a tree before it answers, but answers to the first states while the
-    // last are written: a thread of its own for that.
+    // the script reads all of a tree before it answers, but it answers the first states while the
+    // last are written: so a thread writes
     let (mut pipe, input) = (child.stdin.take()?, input.to_string());
     let writer = std::thread::spawn(move || pipe.write_all(input.as_bytes()).is_ok());
     let output = child.wait_with_output().unwrap();
@@ -210,7 +210,7 @@ fn python(mode: &str, input: &str) -> Option<String> {
     }
 }
 
-/// Straight to the terminal: what a passing test prints with `println!` is swallowed.
+/// Prints a note to the terminal: the harness hides the `println!` output of a passing test.
 fn skip(why: &str) -> Option<String> {
     let _ = writeln!(std::io::stderr(), "SKIPPED: comparison with Pinocchio: {why}");
     None

@@ -23,7 +23,7 @@ fn scene(repair: &str) -> (std::path::PathBuf, SceneFile) {
 fn open_mesh_is_an_error_that_names_the_line_or_is_closed_on_request() {
     let (folder, strict) = scene("");
     let error = strict.build().err().unwrap().to_string();
-    // the first face at the rim is the second of five, `f 1 2 6 5`, whose second triangle has the
+    // the first face at the hole is the second of five, `f 1 2 6 5`, whose second triangle has the
     // open edge
     assert!(error.contains("open.obj") && error.contains("line 11: the mesh is open: 4 edges"), "{error}");
     let _ = std::fs::remove_dir_all(folder);

@@ -1,5 +1,5 @@
-//! Robots of the world outside, from the Python package `example-robot-data`, against `urdf-rs`,
-//! which shares no code with ours.
+//! Robots from the Python package `example-robot-data`, compared with `urdf-rs`, which shares no
+//! code with this crate.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -7,8 +7,8 @@ use std::process::Command;
 use tumble_core::{Joint, Settings, World};
 use tumble_scene::urdf::{UrdfOptions, load, model};
 
-/// The folder: `TUMBLE_ROBOTS`, else that of the package in the Python that `TUMBLE_PYTHON` names
-/// (else `python3`); says so on stderr if there is none.
+/// Returns the folder `TUMBLE_ROBOTS`, else that of the package in the Python that `TUMBLE_PYTHON`
+/// names (else `python3`); prints a note to stderr if there is none.
 fn robots() -> Option<PathBuf> {
     let folder = std::env::var_os("TUMBLE_ROBOTS").map(PathBuf::from).or_else(|| {
         let python = std::env::var_os("TUMBLE_PYTHON").unwrap_or_else(|| "python3".into());
@@ -22,7 +22,7 @@ fn robots() -> Option<PathBuf> {
     });
     let found = folder.filter(|folder| folder.is_dir());
     if found.is_none() {
-        // past the harness, which keeps what passing tests print
+        // directly to the terminal: the harness hides the output of passing tests
         let text = "\nSKIPPED: no robots; pip install example-robot-data and set TUMBLE_PYTHON, or set TUMBLE_ROBOTS to its folder `robots`\n";
         let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{text}"));
     }
@@ -62,7 +62,7 @@ fn joints_are_those_of_the_files() {
     for (name, path, _) in ROBOTS {
         let path = robots.join(path);
         let theirs = urdf_rs::read_file(&path).unwrap();
-        // joints do not depend on shapes, whose making takes minutes
+        // joints do not depend on shapes, which take minutes to build
         let bare = folder.join(format!("{name}.urdf"));
         std::fs::write(&bare, without_shapes(&std::fs::read_to_string(&path).unwrap())).unwrap();
         let (body, _) = load(&bare, &UrdfOptions::default()).unwrap();
@@ -86,7 +86,7 @@ fn joints_are_those_of_the_files() {
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
-/// The text without what is seen and touched.
+/// Returns the text without visual and collision elements.
 fn without_shapes(urdf: &str) -> String {
     ["visual", "collision"].into_iter().fold(urdf.to_string(), |text, element| {
         let (open, close) = (format!("<{element}"), format!("</{element}>"));

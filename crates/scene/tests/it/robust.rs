@@ -1,9 +1,9 @@
-//! Damaged files: an error or a scene, never a panic, and always with a report.
+//! Damaged files give an error or a scene, never a panic, and always a report.
 
 use proptest::prelude::*;
 use tumble_scene::{SceneFile, shipped};
 
-/// Reads `text`; every text gives a result, and every error can be displayed.
+/// Reads `text`: every text gives a result, and every error can be displayed.
 fn read(text: &str) {
     if let Err(error) = SceneFile::parse(text, "damaged.toml") {
         assert!(!error.problems().is_empty());
@@ -24,7 +24,7 @@ fn every_scene_cut_at_every_byte() {
     }
 }
 
-/// The example of every key of articulated bodies.
+/// Returns the example of every key of articulated bodies.
 fn articulated() -> &'static str {
     let reference = include_str!("../../../../scenes/README.md");
     reference.split("```toml\n").nth(1).unwrap().split("```").next().unwrap()
@@ -36,9 +36,9 @@ fn articulated_bodies_cut_at_every_byte() {
     (0..text.len()).filter(|&end| text.is_char_boundary(end)).for_each(|end| read(&text[..end]));
 }
 
-/// A damping of 1e-320 had an infinite compliance, and stopped the first step.
+/// A damping of 1e-320 had an infinite compliance, which stopped the first step.
 #[test]
-fn what_is_too_small_for_an_inverse_is_zero() {
+fn values_too_small_for_an_inverse_are_zero() {
     let with = |damping: &str| {
         articulated().replace("damping_n_m_s_per_rad = 0.001", &format!("damping_n_m_s_per_rad = {damping}"))
     };
@@ -91,7 +91,7 @@ fn articulated_bodies_with_each_value_swapped_for_others() {
             changed[at] = &line;
             let text = changed.join("\n");
             read(&text);
-            // what is right can also be built, or is refused with a reason
+            // a valid scene can be built, or is refused with a reason
             if let Ok(scene) = SceneFile::parse(&text, "changed.toml") {
                 let _ = scene.build().map_err(|error| assert!(!error.to_string().is_empty()));
             }

@@ -1,4 +1,5 @@
-//! The shipped scenes: each reads, and holds what its own description says, by hand-made numbers.
+//! The shipped scenes: each one reads, and has the properties that its description states, by
+//! numbers computed here.
 
 use tumble_core::collide::ContactMode;
 use tumble_scene::{BodySpec, Combine, MassSpec, MeshSource, Mode, SceneFile, ShapeSpec, Stepper, shipped};
@@ -20,7 +21,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// `v` turned by the unit quaternion `q`: the matrix of the textbook, row by row.
+/// Returns `v` rotated by the unit quaternion `q`, by the textbook's matrix, row by row.
 fn turned([x, y, z, w]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     let rows = [
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
@@ -30,7 +31,7 @@ fn turned([x, y, z, w]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     rows.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
-/// Volume and height of the center of mass of a turned profile: sums of cone frusta.
+/// Returns volume and height of the center of mass of a lathe profile: sums of cone frusta.
 fn frusta(profile: &[[f64; 2]]) -> (f64, f64) {
     let (mut volume, mut moment) = (0.0, 0.0);
     for pair in profile.windows(2) {
@@ -65,7 +66,7 @@ fn falling_has_a_dozen_solids_apart_from_each_other_above_a_box_of_five() {
     let walls = scene.bodies.iter().filter(|b| b.mode == Mode::Static && matches!(b.shape, ShapeSpec::Box { .. }));
     assert_eq!(walls.count(), 5);
     for (i, a) in solids.iter().enumerate() {
-        // Clear of the floor and the walls: inside 1.2 m of the middle by its own size.
+        // clear of the floor and the walls: inside 1.2 m of the middle by its own size
         assert!(
             a.position_m[2] > reach(&scene, a)
                 && a.position_m[0].abs().max(a.position_m[1].abs()) + reach(&scene, a) < 1.2
@@ -77,7 +78,7 @@ fn falling_has_a_dozen_solids_apart_from_each_other_above_a_box_of_five() {
     }
 }
 
-/// Radius of a ball about the shape's origin that holds the shape.
+/// Returns the radius of a sphere about the shape's origin that contains the shape.
 fn reach(scene: &SceneFile, body: &BodySpec) -> f64 {
     match &body.shape {
         ShapeSpec::Sphere { radius_m } => *radius_m,
@@ -115,7 +116,7 @@ fn incline_lies_flat_on_the_ramp_and_stops_on_it() {
     let up = turned(ramp.orientation_xyzw, [0.0, 0.0, 1.0]);
     assert!(distance(up, [angle.sin(), 0.0, angle.cos()]) < 1e-15);
     assert_eq!(ramp.orientation_xyzw, block.orientation_xyzw);
-    // Half of each thickness between the centers along the normal: the faces touch.
+    // half of each thickness between the centers along the normal: the faces touch
     let between: f64 = (0..3).map(|k| (block.position_m[k] - ramp.position_m[k]) * up[k]).sum();
     assert!((between - 0.1).abs() < 1e-12, "{between}");
     let v = block.velocity_m_per_s;
@@ -152,7 +153,7 @@ fn billiards_is_regulation() {
     let (cue, first) = (body(&scene, "cue_ball"), body(&scene, "ball_1"));
     assert!((distance(cue.velocity_m_per_s, [0.0; 3]) - 9.0).abs() < 1e-12);
     assert_eq!(first.position_m[0], 2.54 / 4.0);
-    // It is aimed at the first ball: the cross product of way and velocity vanishes.
+    // it is aimed at the first ball: the cross product of displacement and velocity vanishes
     let way = [first.position_m[0] - cue.position_m[0], first.position_m[1] - cue.position_m[1]];
     assert!((way[0] * cue.velocity_m_per_s[1] - way[1] * cue.velocity_m_per_s[0]).abs() < 1e-12);
     let pair = |combine: Combine, a: f64, b: f64| combine.of(a, b);
@@ -166,7 +167,8 @@ fn billiards_is_regulation() {
     check_cushions(&scene);
 }
 
-/// The six cushions stand on the edges of the playing surface, 36.5 mm high, and leave six mouths.
+/// Checks that the six cushions are on the edges of the playing surface, 36.5 mm high, and leave
+/// six mouths.
 fn check_cushions(scene: &SceneFile) {
     let cushions: Vec<&BodySpec> = scene.bodies.iter().filter(|b| b.name.starts_with("cushion_")).collect();
     assert_eq!(cushions.len(), 6);
@@ -193,14 +195,15 @@ fn bowling_is_regulation() {
         scene.bodies.iter().filter(|body| body.name.starts_with("pin_") && body.mode == Mode::Dynamic).collect();
     assert_eq!(pins.len(), 10);
     assert_eq!(pins[0].position_m, [18.288, 0.0, 0.0]);
-    // Pin 2 stands to the left (+y), 3 to the right; 7 and 10 end the last row, 3 x 12 in apart.
+    // pin 2 is on the left (+y), 3 on the right; 7 and 10 are the ends of the last row, 3 x 12 in
+    // apart
     assert!(pins[1].position_m[1] > 0.0 && pins[2].position_m[1] < 0.0);
     assert!((distance(pins[6].position_m, pins[9].position_m) - 3.0 * 0.3048).abs() < 1e-12);
     assert!((distance(pins[0].position_m, pins[6].position_m) - 3.0 * 0.3048).abs() < 1e-12);
     let MeshSource::Lathe { profile_m, .. } = &scene.meshes[0].source else { panic!("a lathe") };
     let widest = profile_m.iter().map(|p| p[0]).fold(0.0, f64::max);
     assert!((2.0 * widest - 0.12106).abs() < 1e-5 && profile_m.last().unwrap()[1] == 0.381);
-    // The rules want 3 lb 6 oz to 3 lb 10 oz, and the center of mass 5 5/8 to 5 15/16 in high.
+    // the rules require 3 lb 6 oz to 3 lb 10 oz, and a center of mass 5 5/8 to 5 15/16 in high
     let Some(MassSpec::Mass(mass)) = pins[0].mass else { panic!("a mass") };
     assert!((1.531..=1.645).contains(&mass));
     let (volume, height) = frusta(profile_m);
@@ -209,8 +212,8 @@ fn bowling_is_regulation() {
     check_hook(&scene);
 }
 
-/// While a uniform ball slips, its slip keeps its direction and falls at 7/2 mu g, so its path is a
-/// parabola; then it rolls straight on. It must meet pin 1 from the right, in the pocket.
+/// While a uniform ball slips, its slip keeps its direction and decreases at 7/2 mu g, so its path
+/// is a parabola; then it rolls straight on. It must reach pin 1 from the right, in the pocket.
 fn check_hook(scene: &SceneFile) {
     let (ball, lane) = (body(scene, "ball"), body(scene, "lane"));
     let (mu, g, r) = (scene.world.combine_friction.of(ball.friction, lane.friction), 9.81, 0.1085);
@@ -230,13 +233,13 @@ fn check_hook(scene: &SceneFile) {
     let touch = (0..400_000).map(|k| at(k as f64 * 1e-5)).find(|p| (18.288 - p[0]).hypot(p[1]) < r + 0.0600);
     let [x, y] = touch.expect("the ball reaches pin 1");
     assert!(x > 18.0 && (-0.085..-0.05).contains(&y), "{x} {y}");
-    // It never leaves the lane on its way.
+    // it never leaves the lane on its way
     assert!((0..2600).map(|k| at(k as f64 * 1e-3)).all(|p| p[1].abs() < 0.527));
     assert_eq!((scene.world.stepper, scene.world.contacts), (Stepper::TimeStepping, ContactMode::Surface));
 }
 
-/// Asks each table what it knows, by a key that is near nothing, and looks for the answer in the
-/// README.
+/// Gives each table an unknown key, reads the known keys from the error message, and searches the
+/// README for them.
 #[test]
 fn the_reference_names_every_key() {
     let readme = include_str!("../../../../scenes/README.md");

@@ -1,5 +1,5 @@
-//! Robots of spheres: what is replaced, what stays, and that no point of the collision surface is
-//! bare.
+//! Replacement of collision geometry by spheres: which elements are replaced, which stay, and that
+//! the spheres cover every point of the collision surface.
 
 use std::path::PathBuf;
 use tumble_core::Object;
@@ -45,7 +45,7 @@ fn ring() -> TriMesh {
     TriMesh::torus(1.0, 0.3, 24, 12)
 }
 
-/// The lower half of a ball, open above.
+/// Returns the lower half of a sphere, open above.
 fn bowl() -> TriMesh {
     let mut ball = TriMesh::uv_sphere(0.2, 16, 12);
     let below = |t: &[u32; 3]| t.iter().all(|&v| ball.vertices[v as usize].z < 1e-9);
@@ -81,12 +81,13 @@ fn options(most: usize) -> SphereOptions {
     SphereOptions { most, error: 1e-3, tree, cache: TreeCache::off(), urdf: UrdfOptions::default() }
 }
 
-/// The pose of an origin: roll, pitch and yaw about fixed axes.
+/// Returns the pose of an origin: roll, pitch and yaw about fixed axes.
 fn at(xyz: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Pose {
     Pose::from_parts(Vec3::from(xyz).into(), nalgebra::UnitQuaternion::from_euler_angles(roll, pitch, yaw))
 }
 
-/// Points of the surface of a mesh: the corners of its triangles, and points inside its triangles.
+/// Returns points of the surface of a mesh: the vertices of its triangles, and points inside its
+/// triangles.
 fn points(mesh: &TriMesh, pose: Pose) -> Vec<Vec3> {
     let inside = |t: usize| {
         let [a, b, c] = mesh.corners(t);
@@ -98,14 +99,14 @@ fn points(mesh: &TriMesh, pose: Pose) -> Vec<Vec3> {
     all.map(|p| (pose * nalgebra::Point3::from(p)).coords).collect()
 }
 
-/// Points of the surface by formula, as the text of [`ROBOT`] says.
+/// Returns points of the surface by formula, for the links in the text of [`ROBOT`].
 fn surface(link: &str) -> Vec<Vec3> {
     let scaled = |mesh: TriMesh, by: Vec3| TriMesh {
         vertices: mesh.vertices.iter().map(|v| v.component_mul(&by)).collect(),
         ..mesh
     };
-    // fine meshes whose vertices lie on the true cylinder and capsule; points within their
-    // triangles lie a little inside
+    // fine meshes whose vertices lie on the exact cylinder and capsule; points inside their
+    // triangles lie slightly inside
     match link {
         "arm" => [
             points(&TriMesh::cuboid(Vec3::new(0.4, 0.2, 0.1)), at([0.1, -0.2, 0.3], [0.3, -0.4, 0.5])),
@@ -145,7 +146,7 @@ fn no_point_of_the_collision_surface_is_bare_with_any_number_of_spheres() {
             assert_covered(link);
         }
         let worst = robot.links.iter().flat_map(|l| l.outward.iter().copied()).fold(0.0, f64::max);
-        // one sphere around all, then ever tighter ones
+        // one sphere around all, then tighter ones
         assert!(worst < last, "{most}: {worst} after {last}");
         last = worst;
         eprintln!(
@@ -165,7 +166,7 @@ fn what_is_written_is_what_our_own_reader_reads() {
     let (before, _) = load(folder.0.join("robot.urdf"), &UrdfOptions::default()).unwrap();
     let (body, notes) = load(&out, &UrdfOptions::default()).unwrap();
     assert_eq!((before.model(), notes), (body.model(), Vec::<String>::new()));
-    // the arm is fixed to the base, the tip is the one link that moves: two parts
+    // the arm is fixed to the base, the tip is the only link that moves: two parts
     let collidable = body.collidable().unwrap();
     let mut read: Vec<f64> = Vec::new();
     for part in 0..collidable.parts() {
@@ -187,8 +188,7 @@ fn all_else_of_the_file_stays() {
     let text = folder.spherize(&options(60)).unwrap().text;
     let is_new = |line: &&str| line.trim_start().starts_with("<collision") && line.contains("<sphere");
     let spheres: Vec<&str> = text.lines().filter(is_new).collect();
-    // without the new lines, what stands before and after the replaced elements is there to the
-    // letter
+    // without the new lines, the text before and after the replaced elements is unchanged
     for kept in [
         "<!-- a robot of every shape -->",
         "<visual><geometry><box size=\"1 1 1\"/></geometry></visual>",
@@ -211,7 +211,7 @@ fn all_else_of_the_file_stays() {
                 )
         );
     }
-    // a robot of spheres alone is left to the letter
+    // a robot that has spheres only stays unchanged
     let again = Folder::new("again", &text);
     assert_eq!(again.spherize(&options(60)).unwrap().text, text);
 }
@@ -227,7 +227,7 @@ fn a_capsule_is_covered_by_formula() {
         assert!(link.outward.iter().all(|o| (o - reach).abs() < 1e-12), "{:?} {reach}", link.outward);
         assert!(link.spheres.iter().all(|(c, r)| c.z.abs() <= 0.3 && (r - 0.1 - reach).abs() < 1e-8));
     }
-    // with an error it takes as many as that needs
+    // with `error`, it takes as many spheres as that needs
     let loose = SphereOptions { most: 1000, error: 0.01, ..options(1) };
     let link = folder.spherize(&loose).unwrap().links.remove(0);
     assert!(link.outward.iter().all(|o| *o <= 0.01 * 0.8) && link.spheres.len() < 20, "{}", link.spheres.len());
@@ -243,7 +243,7 @@ fn a_robot_with_faults_is_refused_as_by_the_reader() {
     assert!(error.contains("none.obj"), "{error}");
 }
 
-/// One link of box, cylinder, rod or several of them.
+/// Returns a robot with one link of a box, a cylinder, a rod, or several of them.
 fn one_link(shapes: &str) -> String {
     let collisions = shapes.split(';').map(|shape| format!("<collision><geometry>{shape}</geometry></collision>"));
     format!("<robot name=\"r\"><link name=\"l\">{}</link></robot>", collisions.collect::<String>())
@@ -277,7 +277,7 @@ fn more_spheres_never_reach_further_and_are_never_too_many() {
 
 #[test]
 fn the_shape_that_is_covered_worst_gets_the_next_sphere() {
-    // a thin rod has 1.5 % of the surface, and one sphere about it reaches half a meter outside
+    // a thin rod has 1.5 % of the surface, and one sphere around it extends half a meter outside
     let folder = Folder::new("rod", &one_link("<box size=\"1 1 0.1\"/>;<cylinder radius=\"0.005\" length=\"1\"/>"));
     for most in [16, 32, 64] {
         let link = folder.spherize(&options(most)).unwrap().links.remove(0);

@@ -1,14 +1,14 @@
-//! The state of every shipped scene after 1 s and 10 s, with both steppers, as hashes: a change
-//! that is meant to change no bit keeps this table. A change of the dynamics replaces the rows that
-//! it changes, and `CHANGELOG.md` says why.
+//! Hashes of the state of every shipped scene after 1 s and 10 s, with both steppers. A refactoring
+//! keeps this table. A change of the dynamics replaces the rows that it changes, and `CHANGELOG.md`
+//! states the reason.
 //!
 //! `TUMBLE_PRINT_HASHES=1 cargo test --release --workspace --test it state_hashes -- --nocapture`
 //! prints the table.
 
 use tumble_scene::{Stepper, shipped};
 
-/// BLAKE3 of the bytes of the flat state `X` (little-endian f64), the first 16 hexadecimal digits,
-/// after each of `seconds`.
+/// Returns the first 16 hexadecimal digits of BLAKE3 over the bytes of the flat state `X`
+/// (little-endian f64), after each of `seconds`.
 fn hashes(scene: &str, stepper: Stepper, seconds: &[f64]) -> Vec<String> {
     let shipped = shipped().iter().find(|s| s.name == scene).expect("the scene is shipped");
     let mut file = shipped.read().unwrap_or_else(|error| panic!("{}", error.report(false)));

@@ -21,7 +21,7 @@ fn assert_errors(text: &str, expected: &[&str]) {
 
 const BALL: &str = r#"<inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="1"/></inertial>"#;
 
-/// Two links and a joint between them, whose further elements are on line 4.
+/// Returns two links and a joint between them, whose further elements are on line 4.
 fn two(kind: &str, inside: &str) -> String {
     format!(
         "<robot name=\"two\">\n<link name=\"a\"/>\n<link name=\"b\">{BALL}</link>\n<joint name=\"j\" type=\"{kind}\"><parent link=\"a\"/><child link=\"b\"/>{inside}</joint>\n</robot>"
@@ -80,7 +80,8 @@ fn an_arm_means_what_it_says() {
     assert!((upper.placement.rotation * Vec3::x() - Vec3::y()).norm() < 1e-15, "yaw of a quarter turn");
     assert_eq!(upper.joint, Joint::Revolute { axis: Vec3::y() });
     assert_eq!((upper.mass.mass, upper.mass.center), (3.0, Vec3::new(0.0, 0.0, 0.3)));
-    // x and y of the inertial frame are y and −x of the link: xx and yy swap, and xy turns its sign
+    // x and y of the inertial frame are y and −x of the link: xx and yy swap, and xy changes its
+    // sign
     let inertia = Mat3::new(0.02, -0.01, 0.0, -0.01, 0.1, 0.0, 0.0, 0.0, 0.1);
     assert!((upper.mass.inertia - inertia).amax() < 1e-16);
     assert_eq!(rod.mass.mass, 0.75, "the tip is folded in");
@@ -272,7 +273,7 @@ fn an_inertia_of_no_body_is_corrected_with_a_note() {
     assert!((robot.model.links()[0].mass.inertia - Mat3::from_diagonal(&Vec3::new(0.0, 1.0, 1.0))).amax() < 1e-15);
 }
 
-/// A folder of a test's own, gone at its end.
+/// A folder for one test, removed when it goes out of scope.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -296,7 +297,7 @@ impl Drop for Folder {
     }
 }
 
-/// A mesh as the text of an OBJ file, without its last `without` triangles.
+/// Returns a mesh as the text of an OBJ file, without its last `without` triangles.
 fn obj(mesh: &TriMesh, without: usize) -> String {
     let vertices = mesh.vertices.iter().map(|v| format!("v {} {} {}\n", v.x, v.y, v.z));
     let faces = mesh.triangles[..mesh.triangles.len() - without]
@@ -342,7 +343,7 @@ fn neighbors_and_links_that_overlap_at_the_start_never_collide() {
     assert_eq!(notes, ["links that overlap at the start do not collide: b and d"]);
 }
 
-/// One link with a collision mesh and a picture.
+/// Returns one link with a collision mesh and a visual mesh.
 fn with_meshes(collision: &str, scale: &str, visual: &str) -> String {
     format!(
         "<robot name=\"r\"><link name=\"a\"/><joint name=\"j\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/></joint>\n<link name=\"b\">{BALL}<collision><geometry><mesh filename=\"{collision}\" scale=\"{scale}\"/></geometry></collision>\n<visual><geometry><mesh filename=\"{visual}\"/></geometry></visual></link></robot>"

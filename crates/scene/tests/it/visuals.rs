@@ -1,5 +1,5 @@
-//! Visual meshes of robots are pictures: read when they are drawn, whatever they are, and never
-//! solids.
+//! Visual meshes of robots: read when they are drawn, not checked as solids, and never collided
+//! with.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -10,7 +10,7 @@ use tumble_core::{ArticulatedBody, Drawn, Object, Settings, Visual, VisualGeomet
 use tumble_scene::urdf::{UrdfOptions, load, model};
 use tumble_scene::{SceneFile, overlap_notes, resolve_scene, shipped, visual_notes};
 
-/// A folder of one test, gone with it.
+/// A folder for one test, removed when it goes out of scope.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -35,7 +35,8 @@ impl Drop for Folder {
 
 const MASS: &str = r#"<inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="1"/></inertial>"#;
 
-/// A hinge with limits whose link collides as a ball and is drawn by these files.
+/// Returns a robot with one revolute joint with limits, whose link collides as a sphere and is
+/// drawn by these files.
 fn robot(visuals: &[&str]) -> String {
     let visual = |file: &&str| format!("<visual><geometry><mesh filename=\"{file}\"/></geometry></visual>");
     let visuals: String = visuals.iter().map(visual).collect();
@@ -57,7 +58,7 @@ fn meshes(body: &ArticulatedBody) -> Vec<Arc<VisualMesh>> {
     visuals(body).iter().filter_map(mesh).collect()
 }
 
-/// Two triangles that share an edge, each corner with a vertex of its own: no solid.
+/// Two triangles that share an edge, each with vertices of its own: no solid.
 const SHEET: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 4 5 6\n";
 
 #[test]
@@ -78,7 +79,7 @@ fn loading_reads_no_visual_mesh() {
     assert!(meshes(&body).iter().all(|mesh| !mesh.is_read()), "nobody has drawn it");
     assert_eq!(visual_notes(world.visuals()), Vec::<String>::new());
 
-    // what is drawn is what the file holds by then
+    // the file is read when it is drawn, with its content at that time
     std::fs::write(&sheet, SHEET.replace("f 4 5 6\n", "")).unwrap();
     let drawn: Vec<Drawn<'_>> = visuals(&body).iter().filter_map(Visual::drawn).collect();
     let [Drawn::Mesh(mesh)] = drawn[..] else { panic!("{drawn:?}") };
@@ -101,7 +102,7 @@ fn a_link_whose_meshes_are_lost_is_drawn_as_it_collides() {
     for name in ["gone.obj", "pipe.obj"] {
         std::fs::remove_file(folder.0.join(name)).unwrap();
     }
-    // a pipe that nobody writes into blocks its reader forever
+    // a pipe without a writer would block its reader forever
     assert!(Command::new("mkfifo").arg(folder.0.join("pipe.obj")).status().unwrap().success());
     let drawn: Vec<Drawn<'_>> = visuals(&body).iter().filter_map(Visual::drawn).collect();
     assert!(matches!(drawn[..], [Drawn::Shape(Shape::Sphere { radius: 0.25 })]), "{drawn:?}");
@@ -158,7 +159,7 @@ fn bodies_that_overlap_at_the_start_are_named() {
     assert_eq!(notes[8], "2 more pairs of bodies overlap at the start");
 }
 
-/// All shapes of a world, that collide or are drawn.
+/// Returns all shapes of a world, for collision or drawing.
 fn shapes(world: &World) -> impl Iterator<Item = &Shape> {
     let drawn = world.visuals().filter_map(|visual| match &visual.geometry {
         VisualGeometry::Shape(shape) => Some(shape),
