@@ -6,8 +6,8 @@ use crate::common::*;
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::*;
 
-/// A chain of links of 0.2 m from the origin, whose end is joined to a kinematic hand.
-struct KinematicHand {
+/// A chain of links of 0.2 m from the origin, whose end is attached to a kinematic hand.
+struct ReachMechanism {
     world: World,
     chain: ObjectId,
     hand: ObjectId,
@@ -19,9 +19,9 @@ struct KinematicHand {
 
 const LENGTH: f64 = 0.2;
 
-impl KinematicHand {
-    /// Hung up in a zigzag of `angle` from −z, and pinned to the hand where it ends.
-    fn new(stepper: &str, links: usize, angle: f64) -> KinematicHand {
+impl ReachMechanism {
+    /// Hangs up the chain in a zigzag of `angle` from −z, and attaches its end to the hand.
+    fn new(stepper: &str, links: usize, angle: f64) -> ReachMechanism {
         let mut world = world(1.0 / 240.0, stepper, Integrator::Verlet);
         let q: Vec<f64> = (0..links)
             .map(|i| {
@@ -43,7 +43,7 @@ impl KinematicHand {
         let hand = world.add_boxed(Box::new(hand), Mode::Kinematic).unwrap();
         let pin = LoopJoint::spherical_at("pin", &world, Some((chain, links - 1)), Some((hand, 0)), end).unwrap();
         let loop_joint = world.add(pin).unwrap();
-        KinematicHand { world, chain, hand, loop_joint, links, reported: None }
+        ReachMechanism { world, chain, hand, loop_joint, links, reported: None }
     }
 
     fn position_error(&self) -> f64 {
@@ -70,7 +70,7 @@ impl KinematicHand {
     }
 }
 
-/// How far a hand is from what the chain's end can come to: the chain turns in the plane y = 0.
+/// Returns the distance of a hand from the reach of the chain, which turns in the plane y = 0.
 fn lag(hand: &Vec3, reach: f64) -> f64 {
     hand.y.hypot((hand.x.hypot(hand.z) - reach).max(0.0))
 }
@@ -87,20 +87,20 @@ fn a_chain_whose_hand_goes_out_of_reach_follows_it_straight_and_closes_again() {
             let reach = links as f64 * LENGTH;
             for along in [Vec3::new(0.0, 0.0, -1.0), Vec3::new(0.6, 0.0, -0.8), Vec3::new(0.0, 0.6, -0.8)] {
                 let name = format!("{stepper}, {links} links, along {along:?}");
-                let mut hand = KinematicHand::new(stepper, links, 0.5);
-                let (across, _) = hand.lead(speed * along, 1.0);
-                let (out, _) = hand.lead(speed * along, 1.0);
-                let hand = position(&hand.world, hand.hand);
+                let mut mechanism = ReachMechanism::new(stepper, links, 0.5);
+                let (across, _) = mechanism.lead(speed * along, 1.0);
+                let (out, _) = mechanism.lead(speed * along, 1.0);
+                let hand = position(&mechanism.world, mechanism.hand);
                 let (position_error, expected, reported) =
-                    (hand.position_error(), lag(&hand, reach), hand.reported.unwrap());
-                let end = hand.world.part_state(hand.chain, links - 1).unwrap().pose;
+                    (mechanism.position_error(), lag(&hand, reach), mechanism.reported.unwrap());
+                let end = mechanism.world.part_state(mechanism.chain, links - 1).unwrap().pose;
                 let bent = (end.rotation * -Vec3::z()).angle(&Vec3::new(hand.x, 0.0, hand.z));
-                let (back, _) = hand.lead(-speed * along, 2.0);
-                let (rest, _) = hand.lead(Vec3::zeros(), 0.5);
+                let (back, _) = mechanism.lead(-speed * along, 2.0);
+                let (rest, _) = mechanism.lead(Vec3::zeros(), 0.5);
                 println!(
                     "{name}: {across:.1} rad/s across, {out:.2} out, {back:.1} back; lags {position_error:.6} m, {:.1e} off, {bent:.1e} rad; closed to {:.1e} m, {rest:.1e} rad/s",
                     position_error - expected,
-                    hand.position_error()
+                    mechanism.position_error()
                 );
                 // across the plane nothing is in reach from the start: there the chain is still
                 // coming to lie straight
@@ -114,10 +114,10 @@ fn a_chain_whose_hand_goes_out_of_reach_follows_it_straight_and_closes_again() {
                     "{name}: {position_error} m for {expected} m, bent by {bent} rad"
                 );
                 assert!(
-                    reported.loop_joint == hand.loop_joint && reported.distance == position_error,
+                    reported.loop_joint == mechanism.loop_joint && reported.distance == position_error,
                     "{name}: {reported:?}"
                 );
-                assert!(hand.position_error() < 2e-9, "{name}: open by {:e} m", hand.position_error());
+                assert!(mechanism.position_error() < 2e-9, "{name}: open by {:e} m", mechanism.position_error());
             }
         }
     }
