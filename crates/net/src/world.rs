@@ -1,15 +1,17 @@
 //! Conversion of a world to the entities and poses of a recording.
 
-use crate::record::{Entity, Pose, Shape, VisualPart};
+use crate::record::{Entity, MAX_NAME_BYTES, Pose, Shape, VisualPart};
 use nalgebra::Translation3;
 use tumble_collide::{Shape as Solid, TriMesh, Vec3};
 use tumble_core::{Drawn, ObjectId, RigidBody, World};
+use xxhash_rust::xxh3::xxh3_64;
 
 /// Half the side of the square that represents a half-space, m.
 const PLANE_M: f64 = 20.0;
 
 /// Returns every drawable part as one entity. It has the name of its object, followed by `/part` if
-/// the object has several parts.
+/// the object has several parts. A name of more than [`MAX_NAME_BYTES`] is replaced by its beginning
+/// and a hash of the whole.
 pub fn entities(world: &World) -> Vec<Entity> {
     sites(world).map(|(id, part)| entity(world, id, part)).collect()
 }
@@ -25,9 +27,21 @@ pub fn names(world: &World) -> Vec<String> {
 }
 
 fn name(world: &World, id: ObjectId, part: usize) -> String {
-    let name = world.object(id).map_or("", |o| o.name());
+    let name = world.name(id).unwrap_or_default();
     let several = world.view().state_range(id).is_some_and(|span| span.parts.len() > 1);
-    if several { format!("{name}/{part}") } else { name.to_owned() }
+    shortened(if several { format!("{name}/{part}") } else { name.to_owned() })
+}
+
+/// Returns a name of at most [`MAX_NAME_BYTES`]. A longer name is replaced by its beginning, `~`, and 16 hexadecimal digits, the XXH3
+/// of the whole name.
+fn shortened(name: String) -> String {
+    if name.len() <= MAX_NAME_BYTES {
+        return name;
+    }
+    let hash = format!("~{:016x}", xxh3_64(name.as_bytes()));
+    let room = MAX_NAME_BYTES - hash.len();
+    let end = (0..=room).rev().find(|&n| name.is_char_boundary(n)).unwrap_or(0);
+    name[..end].to_owned() + &hash
 }
 
 fn sites(world: &World) -> impl Iterator<Item = (ObjectId, usize)> + '_ {

@@ -261,3 +261,24 @@ def test_a_missing_scene_is_a_missing_file():
         with pytest.raises(FileNotFoundError, match="no") as caught:
             tumble.World.load(path)
         assert isinstance(caught.value, tumble.TumbleError)
+
+
+def test_names_are_optional_and_of_any_length():
+    world = tumble.World()
+    ground = world.add_static(tumble.HalfSpace())
+    ball = world.add_rigid(tumble.Sphere(0.1), mass=1.0, position=(0, 0, 1))
+    keyword = world.add_rigid(shape=tumble.Sphere(0.1), mass=1.0, position=(3, 0, 1))
+    long = world.add_rigid("x" * 200, tumble.Sphere(0.1), 1.0, position=(6, 0, 1))
+    assert [body.name for body in world.bodies] == ["body 0", "body 1", "body 2", "x" * 200] == [b.name for b in (ground, ball, keyword, long)]
+    assert world["body 1"] == ball
+    world.step(10)
+    saved = world.save()
+    world.step(10)
+    world.restore(saved)
+    assert world.save() == saved == pickle.loads(pickle.dumps(world)).save()
+    with pytest.raises(tumble.InvalidValueError, match="an object named 'body 1' is already in the world"):
+        world.add_rigid("body 1", tumble.Sphere(0.1), mass=1.0)
+    with pytest.raises(TypeError, match="a shape is missing"):
+        world.add_rigid("ball")
+    with pytest.raises(TypeError):
+        world.add_rigid(tumble.Sphere(0.1), tumble.Sphere(0.2))

@@ -28,7 +28,7 @@ pub fn visual_notes<'v>(visuals: impl IntoIterator<Item = &'v Visual>) -> Vec<St
 pub fn overlap_notes(world: &World) -> Vec<String> {
     let mut overlaps = world.overlaps(2.0 * world.settings().drift_tolerance);
     overlaps.sort_by(|a, b| b.depth.total_cmp(&a.depth));
-    let name = |id| world.object(id).map_or("", |object| object.name());
+    let name = |id| world.name(id).unwrap_or_default();
     let line = |[a, b]: [&str; 2], depth: f64| match a == b {
         true => format!("links of {a} overlap by {depth:.2e} m at the start"),
         false => format!("{a} and {b} overlap by {depth:.2e} m at the start"),

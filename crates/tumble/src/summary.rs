@@ -120,7 +120,7 @@ impl Tally {
             rays: self.rays,
             max_penetration_m: self.penetration,
             out_of_reach_max_m: self.out_of_reach.map_or(0.0, |o| o.distance),
-            out_of_reach: self.out_of_reach.and_then(|o| Some(world.object(o.loop_joint)?.name().to_string())),
+            out_of_reach: self.out_of_reach.and_then(|o| Some(world.name(o.loop_joint)?.to_string())),
             tries_mean: self.per_step(self.tries),
             tries_max: self.tries_max,
             floor_hits: self.floor_hits,
@@ -188,9 +188,9 @@ fn without_negative_zero(x: f64) -> f64 {
 
 fn bodies(world: &World) -> Vec<Body> {
     let body = |&id| {
-        let (object, pose) = (world.object(id)?, world.pose(id, 0)?);
+        let (name, pose) = (world.name(id)?, world.pose(id, 0)?);
         Some(Body {
-            name: object.name().to_string(),
+            name: name.to_string(),
             position_m: pose.translation.vector.into(),
             orientation_xyzw: pose.rotation.coords.into(),
             asleep: world.asleep(id),

@@ -2,7 +2,7 @@
 //!
 //! | part | bytes |
 //! |---|---|
-//! | `tumbleA4`; the last is the number of the format | 8 |
+//! | `tumbleA5`; the last is the number of the format | 8 |
 //! | XXH3 of the rest, little-endian | 8 |
 //! | settings, stepper, solver, shapes, visual meshes, objects, pairs, state, contacts, report in postcard | any |
 //!
@@ -32,7 +32,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 /// First bytes of an archive of a world. The last is the number of the format, which rises with
 /// every change of the content.
-const HEAD: &[u8; 8] = b"tumbleA4";
+const HEAD: &[u8; 8] = b"tumbleA5";
 
 /// Why an archive cannot be written or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -68,11 +68,18 @@ struct Archive {
     solver: String,
     shapes: Vec<Shape>,
     meshes: Vec<MeshRecord>,
-    objects: Vec<Record>,
+    objects: Vec<NamedRecord>,
     pairs: Vec<PairRecord>,
     state: WorldState,
     contacts: Vec<ContactRecord>,
     report: ReportRecord,
+}
+
+/// One object and its name in the world.
+#[derive(Serialize, Deserialize)]
+struct NamedRecord {
+    name: String,
+    record: Record,
 }
 
 /// One object.
@@ -81,7 +88,7 @@ enum Record {
     Rigid(RigidRecord),
     Articulated(Box<ArticulatedRecord>),
     LoopJoint(LoopJointRecord),
-    Foreign(String),
+    Foreign,
 }
 
 impl World {
@@ -98,11 +105,11 @@ impl World {
         let objects = self
             .ids()
             .iter()
-            .filter_map(|&id| self.object(id))
-            .map(|object| record(object, &mut tables, &indices))
-            .collect::<Vec<Record>>();
-        let unknown = self.ids().iter().zip(&objects).find_map(|(id, record)| match record {
-            Record::Foreign(name) if !foreign.contains(id) => Some(name.clone()),
+            .filter_map(|&id| Some((self.name(id)?, self.object(id)?)))
+            .map(|(name, object)| NamedRecord { name: name.into(), record: record(object, &mut tables, &indices) })
+            .collect::<Vec<NamedRecord>>();
+        let unknown = self.ids().iter().zip(&objects).find_map(|(id, object)| match object.record {
+            Record::Foreign if !foreign.contains(id) => Some(object.name.clone()),
             _ => None,
         });
         if let Some(name) = unknown {
@@ -142,14 +149,14 @@ impl World {
         world.set_solver(solver(&archive.solver)?);
         let tables = LoadedTables { shapes: archive.shapes, meshes: meshes(archive.meshes) };
         let mut ids = Vec::with_capacity(archive.objects.len());
-        for record in archive.objects {
+        for NamedRecord { name, record } in archive.objects {
             let object: Box<dyn Object> = match record {
                 Record::Rigid(rigid) => Box::new(rigid.body(&tables)?),
                 Record::Articulated(articulated) => Box::new(articulated.body(&tables)?),
                 Record::LoopJoint(loop_joint) => Box::new(loop_joint.loop_joint(&ids)?),
-                Record::Foreign(name) => foreign(&name).ok_or(ArchiveError::Foreign(name))?,
+                Record::Foreign => foreign(&name).ok_or_else(|| ArchiveError::Foreign(name.clone()))?,
             };
-            ids.push(world.add_boxed(object, Mode::Dynamic).map_err(damaged)?);
+            ids.push(world.add_named(name, object, Mode::Dynamic).map_err(damaged)?);
         }
         archive.pairs.into_iter().try_for_each(|pair| pair.put(&mut world, &ids)).map_err(damaged)?;
         world.restore_state(&archive.state).map_err(damaged)?;
@@ -210,6 +217,6 @@ fn record(object: &dyn Object, tables: &mut Tables, indices: &ObjectIndices) -> 
     } else if let Some(loop_joint) = any.downcast_ref::<LoopJoint>() {
         Record::LoopJoint(LoopJointRecord::of(loop_joint, indices))
     } else {
-        Record::Foreign(object.name().into())
+        Record::Foreign
     }
 }

@@ -109,7 +109,7 @@ impl RowBuilder<'_> {
         if part >= entry.state_range.parts.len() || !add(self, &entry) {
             self.refuse(format!(
                 "'{}' has no part {part} that answers impulses, or the row names a third object",
-                entry.object.name()
+                entry.name
             ));
         }
     }
@@ -137,7 +137,7 @@ impl RowBuilder<'_> {
         if !done {
             self.refuse(format!(
                 "'{}': the row's Jacobian has {} numbers, or it names a third object",
-                entry.object.name(),
+                entry.name,
                 jacobian.len()
             ));
         }

@@ -245,7 +245,7 @@ impl Adaptive {
     fn tolerance_error(&self, motion: &mut IntegrationContext, time: f64, step: f64, worst: Worst) -> StepError {
         let entry = motion.table.with(motion.states).at(worst.object);
         let cache = &mut motion.derived.caches[worst.object];
-        let object = entry.object.name().to_string();
+        let object = entry.name.to_string();
         match entry.object.integratable().and_then(|body| body.singularity(cache)) {
             Some(why) => StepError::Singular { object, why, time },
             None => StepError::Tolerance { object, time, step, steps: self.steps, tolerance: self.tolerance },

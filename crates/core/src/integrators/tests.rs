@@ -63,7 +63,7 @@ impl Bench {
         let objects: [Box<dyn Object>; 2] = [Box::new(body), Box::new(Spring)];
         let caches = objects.iter().map(|object| object.new_cache()).collect();
         for (object, state_range) in objects.into_iter().zip(state_ranges) {
-            table.push(object, state_range);
+            table.push("".into(), object, state_range);
         }
         Bench {
             table,

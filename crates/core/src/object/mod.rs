@@ -26,8 +26,11 @@ use tumble_collide::Vec3;
 /// Everything the world holds. One accessor per interface; the default answer is "not I" (the thesis's
 /// `ImplementsInterface`, §IV.B.1).
 pub trait Object: Any + Send + Sync {
-    /// Unique in its world; at most 63 bytes, so that it fits the network header.
-    fn name(&self) -> &str;
+    /// Returns the name that the object is to have in a world, of any length. By default it is empty, and the world makes one:
+    /// [`World::name`](crate::World::name) returns the name in the world.
+    fn name(&self) -> &str {
+        ""
+    }
     /// An independent copy.
     fn fork(&self) -> Box<dyn Object>;
     /// Makes the memory for a [`refresh`](Self::refresh) and for the calls that are given a cache; nothing by default.

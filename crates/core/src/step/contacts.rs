@@ -64,7 +64,7 @@ pub(crate) fn limits(view: &WorldView, out: &mut Vec<Limit>) -> Result<(), StepE
         constraint.gaps(entry.state_range, view, &mut gaps);
         if gaps.iter().any(|gap| !gap.is_finite()) {
             return Err(StepError::Row {
-                object: entry.object.name().to_string(),
+                object: entry.name.to_string(),
                 why: "a gap that it tells is not finite".into(),
             });
         }
@@ -213,7 +213,7 @@ pub(crate) fn lay_rows(mut basis: Basis, work: &mut Workspace, level: Level) -> 
         builder.owner = id;
         constraint.rows(entry.state_range, &view, level, &mut builder);
         if let Some(why) = builder.problem.take() {
-            return Err(StepError::Row { object: entry.object.name().to_string(), why });
+            return Err(StepError::Row { object: entry.name.to_string(), why });
         }
     }
     first.push(work.targets.len());

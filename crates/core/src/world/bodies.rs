@@ -13,6 +13,11 @@ impl World {
         self.core.table.get(id).map(|placed| placed.object.as_ref())
     }
 
+    /// Returns the name of an object: its own, or the one that the world made (see [`add`](Self::add)).
+    pub fn name(&self, id: ObjectId) -> Option<&str> {
+        self.core.table.get(id).map(|placed| &*placed.name)
+    }
+
     /// An object by id, as its own type.
     pub fn get<T: Object>(&self, id: ObjectId) -> Option<&T> {
         let object: &dyn std::any::Any = self.object(id)?;
@@ -98,7 +103,7 @@ impl World {
         let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
         let accepted = |body: &dyn Integratable| x.len() == entry.state_range.x.len() && body.accepts(x);
         if !entry.object.integratable().is_some_and(accepted) {
-            return Err(WorldError::BadState(entry.object.name().to_string()));
+            return Err(WorldError::BadState(entry.name.to_string()));
         }
         self.core.state.x[entry.state_range.x.clone()].copy_from_slice(x);
         self.core.integration().refresh_one(id);
@@ -136,7 +141,7 @@ impl World {
     pub fn move_to(&mut self, id: ObjectId, target: Pose) -> Result<(), WorldError> {
         let dt = self.core.settings.dt;
         if !target.to_homogeneous().iter().all(|x| x.is_finite()) {
-            let name = self.object(id).ok_or(WorldError::Stale)?.name().to_string();
+            let name = self.name(id).ok_or(WorldError::Stale)?.to_string();
             return Err(WorldError::NotFinite(name));
         }
         self.edit_rigid(id, |body, x| {
@@ -175,7 +180,7 @@ impl World {
     /// [`WorldError`]: the object was removed, the count is not its degrees of freedom, or a number is not finite.
     pub fn apply_generalized(&mut self, id: ObjectId, forces: &[f64]) -> Result<(), WorldError> {
         let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
-        let name = || entry.object.name().to_string();
+        let name = || entry.name.to_string();
         if forces.len() != entry.state_range.v.len() {
             return Err(WorldError::Freedoms { name: name(), dof: entry.state_range.v.len(), given: forces.len() });
         }
@@ -221,10 +226,10 @@ impl World {
     pub(super) fn part(&self, id: ObjectId, part: usize, numbers: &[Vec3]) -> Result<usize, WorldError> {
         let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
         if part >= entry.state_range.parts.len() {
-            return Err(WorldError::NoPart { name: entry.object.name().to_string(), part });
+            return Err(WorldError::NoPart { name: entry.name.to_string(), part });
         }
         if numbers.iter().flat_map(|v| v.iter()).any(|x| !x.is_finite()) {
-            return Err(WorldError::NotFinite(entry.object.name().to_string()));
+            return Err(WorldError::NotFinite(entry.name.to_string()));
         }
         Ok(entry.state_range.parts.start + part)
     }
@@ -234,12 +239,11 @@ impl World {
         let core = &mut self.core;
         let entry = core.table.get(id).ok_or(WorldError::Stale)?;
         let any: &dyn std::any::Any = entry.object.as_ref();
-        let body =
-            any.downcast_ref::<RigidBody>().ok_or_else(|| WorldError::NotRigid(entry.object.name().to_string()))?;
+        let body = any.downcast_ref::<RigidBody>().ok_or_else(|| WorldError::NotRigid(entry.name.to_string()))?;
         let mut x = core.state.x[entry.state_range.x.clone()].to_vec();
         edit(body, &mut x);
         if !body.accepts(&x) {
-            return Err(WorldError::BadState(entry.object.name().to_string()));
+            return Err(WorldError::BadState(entry.name.to_string()));
         }
         core.state.x[entry.state_range.x.clone()].copy_from_slice(&x);
         core.integration().refresh_one(id);

@@ -20,8 +20,8 @@ impl World {
     /// # Errors
     /// [`WorldError::Stale`] if the object was removed, [`WorldError::NoPart`] if it has no parts, as a force.
     pub fn body(&self, id: ObjectId) -> Result<BodyView<'_>, WorldError> {
-        let object = self.object(id).ok_or(WorldError::Stale)?;
-        let missing = || WorldError::NoPart { name: object.name().to_string(), part: 0 };
+        let name = self.name(id).ok_or(WorldError::Stale)?;
+        let missing = || WorldError::NoPart { name: name.to_string(), part: 0 };
         Ok(BodyView { world: self, id, part: 0, part_state: self.part_state(id, 0).ok_or_else(missing)? })
     }
 }
@@ -43,7 +43,7 @@ impl<'w> BodyView<'w> {
 
     /// Returns the object's name.
     pub fn name(&self) -> &'w str {
-        self.world.object(self.id).map_or("", |object| object.name())
+        self.world.name(self.id).unwrap_or_default()
     }
 
     /// Returns the pose of the frame by which the body is placed: for a mesh, that of its file.

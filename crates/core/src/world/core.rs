@@ -291,7 +291,7 @@ impl Core {
                 && self.derived.part_states[e.state_range.parts.clone()].iter().all(moves)
         };
         let bad = self.objects().iter().find(|e| !fine(e));
-        bad.map_or(Ok(()), |e| Err(self.not_finite(e.object.name(), "its state")))
+        bad.map_or(Ok(()), |e| Err(self.not_finite(e.name, "its state")))
     }
 
     /// Checks that all forces and accelerations are finite, and that no mass matrix is singular, at the moment `acting`, or else at the
@@ -302,7 +302,7 @@ impl Core {
         let Derived { part_states, caches } = acting.map_or(&mut self.derived, |moment| &mut moment.derived);
         for e in objects.iter().filter(|e| e.moves()) {
             if let Some(why) = e.object.integratable().and_then(|body| body.singularity(&mut caches[e.place])) {
-                return Err(StepError::Singular { object: e.object.name().to_string(), why, time });
+                return Err(StepError::Singular { object: e.name.to_string(), why, time });
             }
         }
         let accelerates =
@@ -312,7 +312,7 @@ impl Core {
                 && part_states[e.state_range.parts.clone()].iter().all(accelerates)
         };
         let bad = objects.iter().find(|e| !fine(e));
-        bad.map_or(Ok(()), |e| Err(self.not_finite(e.object.name(), "the force on it")))
+        bad.map_or(Ok(()), |e| Err(self.not_finite(e.name, "the force on it")))
     }
 
     fn not_finite(&self, object: &str, what: &'static str) -> StepError {

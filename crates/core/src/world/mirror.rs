@@ -34,7 +34,7 @@ impl World {
     /// [`WorldError`]: the object was removed, the count of poses is not that of its parts, or a pose is not finite.
     pub fn set_displayed_poses(&mut self, id: ObjectId, poses: &[Pose]) -> Result<(), WorldError> {
         let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
-        let (name, state_range) = (entry.object.name(), entry.state_range.parts.clone());
+        let (name, state_range) = (&entry.name, entry.state_range.parts.clone());
         if poses.len() != state_range.len() {
             return Err(WorldError::NoPart { name: name.to_string(), part: poses.len().min(state_range.len()) });
         }
@@ -65,7 +65,7 @@ impl World {
         self.core.wake(id);
         let core = &mut self.core;
         let entry = core.table.get(id).ok_or(WorldError::Stale)?;
-        let name = || entry.object.name().to_string();
+        let name = || entry.name.to_string();
         let sync = entry.object.net_sync().ok_or_else(|| MirrorError::NotSynchronizable(name()))?;
         sync.read_data(data, &mut core.state.x[entry.state_range.x.clone()])
             .map_err(|why| MirrorError::Message { name: name(), why })?;

@@ -36,6 +36,7 @@ use crate::solver::{GaussSeidel, RowSolver};
 use crate::step::{StepContext, Stepper, TimeStepping};
 use crate::world::view::{Mode, ObjectId, Placed, Status, Table, WorldView};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Why an object was not added or found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -44,9 +45,6 @@ pub enum WorldError {
     /// Names are unique.
     #[error("an object named '{0}' is already in the world; names must be unique")]
     DuplicateName(String),
-    /// Names travel in a 64-byte header.
-    #[error("the name '{0}' must have 1 to 63 bytes")]
-    Name(String),
     /// Constants of a body out of range.
     #[error(transparent)]
     Body(#[from] BodyError),
@@ -105,7 +103,7 @@ pub struct World {
     before: WorldState,
     /// Contacts of the frame before, for a frame that fails.
     contacts_before: Vec<ContactPoint>,
-    names: BTreeMap<String, ObjectId>,
+    names: BTreeMap<Arc<str>, ObjectId>,
 }
 
 impl Default for World {
@@ -129,7 +127,7 @@ impl World {
         Ok(World::of(core, Box::<TimeStepping>::default(), BTreeMap::new()))
     }
 
-    fn of(core: Core, stepper: Box<dyn Stepper>, names: BTreeMap<String, ObjectId>) -> World {
+    fn of(core: Core, stepper: Box<dyn Stepper>, names: BTreeMap<Arc<str>, ObjectId>) -> World {
         World { core, stepper, before: WorldState::default(), contacts_before: Vec::new(), names }
     }
 
@@ -307,7 +305,10 @@ impl World {
         moving.filter_map(|e| Some((&self.core.state.x[e.state_range.x.clone()], e.object.integratable()?)))
     }
 
-    /// Adds an object; it moves unless it is a [fixture](RigidBody::fixed), which is static, or [`set_mode`](Self::set_mode) says otherwise.
+    /// Adds an object. It is dynamic, or static if it is a [fixed](RigidBody::fixed) body; [`set_mode`](Self::set_mode) changes that.
+    ///
+    /// Names are unique and of any length. An object without a name gets one: `body`, `joint`, `force` or `object` and the count of
+    /// objects added before, `body 3`, or the next number if another object has that name. [`name`](Self::name) returns it.
     ///
     /// # Errors
     /// [`WorldError`]: a name that is taken, constants out of their range, or numbers that are not finite. Nothing is added then.
@@ -330,10 +331,35 @@ impl World {
     /// # Errors
     /// [`WorldError`], as [`add`](Self::add).
     pub fn add_boxed(&mut self, object: Box<dyn Object>, mode: Mode) -> Result<ObjectId, WorldError> {
-        let name = object.name().to_string();
-        if name.is_empty() || name.len() > 63 {
-            return Err(WorldError::Name(name));
-        }
+        let name = match object.name() {
+            "" => self.new_name(object.as_ref()),
+            name => name.to_string(),
+        };
+        self.add_named(name, object, mode)
+    }
+
+    /// Returns a name that no object has. It depends on the objects added so far alone.
+    fn new_name(&self, object: &dyn Object) -> String {
+        let kind = if object.integratable().is_some() || object.collidable().is_some() {
+            "body"
+        } else if object.constraint().is_some() {
+            "joint"
+        } else if object.force().is_some() {
+            "force"
+        } else {
+            "object"
+        };
+        let names = (self.core.state.next_serial..).map(|number| format!("{kind} {number}"));
+        names.into_iter().find(|name| self.find(name).is_none()).unwrap_or_default() // one of them is free
+    }
+
+    /// Adds an object under a name of the caller's choice.
+    pub(crate) fn add_named(
+        &mut self,
+        name: String,
+        object: Box<dyn Object>,
+        mode: Mode,
+    ) -> Result<ObjectId, WorldError> {
         if self.find(&name).is_some() {
             return Err(WorldError::DuplicateName(name));
         }
@@ -362,7 +388,8 @@ impl World {
         }
         core.moments.clear();
         core.derived.caches.push(object.new_cache());
-        let id = core.table.push(object, state_range.clone());
+        let name = Arc::<str>::from(name);
+        let id = core.table.push(name.clone(), object, state_range.clone());
         core.dof = state_range.v.end;
         core.held.resize(core.dof, 0.0);
         core.derived.part_states.resize(state_range.parts.end, PartState::default());
@@ -382,7 +409,7 @@ impl World {
         self.core.wake(id);
         let core = &mut self.core;
         let (place, gone) = core.table.remove(id).ok_or(WorldError::Stale)?;
-        self.names.remove(gone.object.name());
+        self.names.remove(&gone.name);
         core.state.remove(place, &gone.state_range);
         core.derived.part_states.drain(gone.state_range.parts.clone());
         core.derived.caches.remove(place);

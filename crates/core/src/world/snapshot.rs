@@ -87,7 +87,7 @@ impl World {
 
     fn labels(&self) -> Vec<Label> {
         let label = |e: crate::world::view::Entry| Label {
-            name: e.object.name().to_string(),
+            name: e.name.to_string(),
             sizes: [e.state_range.x.len() as u32, e.state_range.v.len() as u32, e.state_range.parts.len() as u32],
         };
         self.core.objects().iter().map(label).collect()

@@ -5,6 +5,7 @@ use crate::object::Object;
 use crate::object::part_state::{PartState, StateRange};
 use crate::world::ObjectState;
 use slotmap::{SlotMap, new_key_type};
+use std::sync::Arc;
 use tumble_collide::Vec3;
 
 new_key_type! {
@@ -53,6 +54,7 @@ impl Status {
 pub(crate) struct Entry<'a> {
     /// In the order of adding.
     pub place: usize,
+    pub name: &'a str,
     pub object: &'a dyn Object,
     pub state_range: &'a StateRange,
     pub status: Status,
@@ -76,13 +78,15 @@ impl Entry<'_> {
 
 /// An object and the ranges of its numbers in the world's tables.
 pub(crate) struct Placed {
+    /// Unique in the world.
+    pub name: Arc<str>,
     pub object: Box<dyn Object>,
     pub state_range: StateRange,
 }
 
 impl Clone for Placed {
     fn clone(&self) -> Placed {
-        Placed { object: self.object.fork(), state_range: self.state_range.clone() }
+        Placed { name: self.name.clone(), object: self.object.fork(), state_range: self.state_range.clone() }
     }
 }
 
@@ -118,9 +122,9 @@ impl Table {
     }
 
     /// Adds an object behind all others.
-    pub fn push(&mut self, object: Box<dyn Object>, state_range: StateRange) -> ObjectId {
+    pub fn push(&mut self, name: Arc<str>, object: Box<dyn Object>, state_range: StateRange) -> ObjectId {
         let id = self.places.insert(self.placed.len());
-        self.placed.push(Placed { object, state_range });
+        self.placed.push(Placed { name, object, state_range });
         self.order.push(id);
         id
     }
@@ -169,6 +173,7 @@ impl<'a> Objects<'a> {
 fn entry<'a>(place: usize, placed: &'a Placed, state: &ObjectState) -> Entry<'a> {
     Entry {
         place,
+        name: &placed.name,
         object: placed.object.as_ref(),
         state_range: &placed.state_range,
         status: state.status,
@@ -198,6 +203,11 @@ impl WorldView<'_> {
     /// An object by id.
     pub fn object(&self, id: ObjectId) -> Option<&dyn Object> {
         self.objects.get(id).map(|e| e.object)
+    }
+
+    /// Returns the name of an object.
+    pub fn name(&self, id: ObjectId) -> Option<&str> {
+        self.objects.get(id).map(|e| e.name)
     }
 
     /// An object by id, as its own type.

@@ -27,6 +27,43 @@ fn a_ball_at_rest_touches_the_ground_and_another_in_the_air_touches_nothing() {
 }
 
 #[test]
+fn an_object_without_a_name_gets_the_next_free_one() {
+    let mut world = World::default();
+    let add = |world: &mut World, name: &str| {
+        let id = world.add(ball(name, 1.0)).unwrap();
+        world.name(id).unwrap().to_string()
+    };
+    assert_eq!(add(&mut world, ""), "body 0");
+    assert_eq!(add(&mut world, "body 2"), "body 2");
+    assert_eq!(add(&mut world, ""), "body 3", "2 is taken");
+    world.remove(world.find("body 3").unwrap()).unwrap();
+    let mut fork = world.fork();
+    assert_eq!((add(&mut world, ""), add(&mut fork, "")), ("body 3".to_string(), "body 3".to_string()));
+    let wind = world.add_force("", |_, _| ()).unwrap();
+    assert_eq!(world.name(wind), Some("force 4"));
+}
+
+#[test]
+fn names_of_any_length_are_unique_and_survive_an_archive_and_a_snapshot() {
+    let mut world = World::default();
+    let long = "long ".repeat(40);
+    let (named, unnamed) = (world.add(ball(&long, 1.0)).unwrap(), world.add(ball("", 3.0)).unwrap());
+    assert_eq!(world.body(unnamed).unwrap().name(), "body 1");
+    assert_eq!(world.add(ball(&long, 2.0)), Err(WorldError::DuplicateName(long.clone())));
+    assert_eq!((world.find(&long), world.find("body 1")), (Some(named), Some(unnamed)));
+    world.step().unwrap();
+    let saved = world.save();
+    let mut copy = World::from_archive(&world.archive(&[]).unwrap(), &mut |_| None).unwrap();
+    let names: Vec<&str> = copy.ids().iter().map(|&id| copy.name(id).unwrap()).collect();
+    assert_eq!(names, [&long, "body 1"]);
+    assert_eq!(copy.save(), saved);
+    world.step().unwrap();
+    copy.step().unwrap();
+    copy.restore(&world.save()).unwrap();
+    assert_eq!(copy.save(), world.save());
+}
+
+#[test]
 fn a_contact_within_the_margin_touches_only_with_an_impulse() {
     let mut world = World::default();
     let (a, b) = (world.add(ball("a", 1.0)).unwrap(), world.add(ball("b", 2.0)).unwrap());

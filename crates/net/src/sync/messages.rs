@@ -18,7 +18,7 @@ pub struct Join {
 }
 
 impl Join {
-    /// Appends the payload: 32, 64 and 1 byte.
+    /// Appends the payload: hash, name, flag.
     pub fn write(&self, out: &mut Vec<u8>) {
         out.extend(self.scene);
         put_name(out, &self.name);

@@ -98,10 +98,10 @@ impl Mirror {
             return Err(MessageError::Malformed("a table that does not end with its only viewer"));
         }
         for &id in self.base.ids() {
-            let absent = self
-                .base
-                .object(id)
-                .is_some_and(|o| !names.contains(o.name()) && (has_parts(&self.base, id) || o.net_sync().is_some()));
+            let absent = self.base.object(id).is_some_and(|o| {
+                !self.base.name(id).is_some_and(|name| names.contains(name))
+                    && (has_parts(&self.base, id) || o.net_sync().is_some())
+            });
             if absent {
                 let _ = world.remove(id);
             }
@@ -266,7 +266,7 @@ impl Mirror {
         let mut hasher = std::mem::take(&mut self.scratch).table();
         for slot in &self.slots {
             let Some(id) = slot.id else { continue };
-            hasher.name(self.world.object(id).map_or("", |o| o.name()));
+            hasher.name(self.world.name(id).unwrap_or_default());
             hasher.enabled(slot.stationary && self.world.status(id).is_some_and(|s| s.enabled));
             if slot.stationary {
                 self.hash_object(id, slot, &mut hasher);

@@ -178,8 +178,8 @@ impl Publisher {
         put_snapshot_head(&mut out, self.revision, self.exact, self.rows.len() + 1);
         let (mut hasher, mut body) = (std::mem::take(&mut self.scratch).table(), Vec::new());
         for row in &self.rows {
-            let Some(object) = world.object(row.id) else { continue };
-            let (name, described) = (object.name(), self.base.object(row.id).is_none());
+            let (Some(name), Some(object)) = (world.name(row.id), world.object(row.id)) else { continue };
+            let described = self.base.object(row.id).is_none();
             if name == VIEWER_NAME {
                 return Err(PublishError::Name);
             }
@@ -238,7 +238,7 @@ fn put_row(
     for (part, pose) in poses(world, row.id).enumerate() {
         let sum = pose.translation.vector.sum() + pose.rotation.coords.sum(); // finite numbers of a world sum to a finite one
         if !sum.is_finite() {
-            let name = world.object(row.id).map_or(String::new(), |o| o.name().to_string());
+            let name = world.name(row.id).unwrap_or_default().to_string();
             return Err(PublishError::NotFinite { name, part });
         }
         *saturated += u32::from(!put_pose(out, &pose));

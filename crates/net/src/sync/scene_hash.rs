@@ -17,8 +17,8 @@ pub fn scene_hash(text: &str, world: &World) -> [u8; 32] {
     let mut out = Vec::new();
     for &id in world.ids() {
         out.clear();
-        let Some(object) = world.object(id) else { continue };
-        put_name(&mut out, object.name());
+        let (Some(name), Some(object)) = (world.name(id), world.object(id)) else { continue };
+        put_name(&mut out, name);
         out.extend(format!("{:?}", world.status(id)).bytes());
         let parts = world.view().state_range(id).map_or(0, |span| span.parts.len());
         (0..parts)

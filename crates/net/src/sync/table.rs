@@ -2,7 +2,8 @@
 //! state refers to them by index.
 //!
 //! ```text
-//! SNAPSHOT  revision u32 | exact u8 | 0 u8 | 0 u16 | count u32 | count times: name 64, size u64, body
+//! SNAPSHOT  revision u32 | exact u8 | 0 u8 | 0 u16 | count u32 | count times: name, size u64, body
+//!           name: length u32, UTF-8
 //!           body: kind u8 | flags u8 | parts u16 | 20 bytes per part if it is stationary | visuals if it is described
 //! STATE     revision u32 | count u32 | count times: index u32, size u32, body
 //!           body: 20 bytes per part | the object's own message | the viewer; nothing if it is not enabled
@@ -104,8 +105,8 @@ impl<'a> Snapshot<'a> {
         if count > MAX_OBJECTS || !matches!(exact, [0 | 1, 0, 0, 0]) {
             return Err(MessageError::Malformed("more than 100000 objects, or an unknown flag"));
         }
-        // the capacity is bounded by the bytes there: an entry has at least 76
-        let mut entries = Vec::with_capacity(count.min(payload.len() / 76));
+        // the capacity is bounded by the bytes there: an entry has at least 17
+        let mut entries = Vec::with_capacity(count.min(payload.len() / 17));
         for _ in 0..count {
             entries.push(entry(&mut rest)?);
         }

@@ -69,8 +69,10 @@ fn put_geometry(out: &mut Vec<u8>, drawn: Drawn<'_>, base: &World) {
 /// visual.
 fn place_of(base: &World, same: impl Fn(&VisualGeometry) -> bool) -> Option<(&str, usize)> {
     base.ids().iter().find_map(|&id| {
-        let object = base.object(id)?;
-        Some((object.name(), object.renderable()?.visuals().iter().position(|visual| same(&visual.geometry))?))
+        Some((
+            base.name(id)?,
+            base.object(id)?.renderable()?.visuals().iter().position(|visual| same(&visual.geometry))?,
+        ))
     })
 }
 

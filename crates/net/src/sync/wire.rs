@@ -23,13 +23,17 @@ use super::transport::MAX_MESSAGE_BYTES;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_128_with_seed};
 
 /// Version of all messages. Later versions keep the header up to this field.
-pub const VERSION: u16 = 2;
+pub const VERSION: u16 = 3;
 /// Length of the header, bytes.
 pub const HEADER_BYTES: usize = 128;
-/// Length of a name, bytes, the last one zero (thesis §IV.A.6).
-pub const NAME_BYTES: usize = 64;
+/// Length of the name in the header, bytes, the last one zero (thesis §IV.A.6).
+const ENGINE_BYTES: usize = 64;
 const MAGIC: [u8; 4] = *b"NSyn";
-const ENGINE: &str = "Engine";
+const ENGINE_FIELD: [u8; ENGINE_BYTES] = {
+    let (mut field, engine) = ([0; ENGINE_BYTES], b"Engine");
+    field.split_at_mut(engine.len()).0.copy_from_slice(engine);
+    field
+};
 
 /// Hash of 16 bytes: XXH3 of messages and drawn states, the first half of a BLAKE3 hash of
 /// pictures.
@@ -139,7 +143,7 @@ pub struct MessageHeader {
 /// Encodes a message: the header, then the payload that `write` appends.
 pub fn message(header: &MessageHeader, write: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     let mut out = Vec::with_capacity(HEADER_BYTES + 64);
-    put_name(&mut out, ENGINE);
+    out.extend(ENGINE_FIELD);
     out.extend([0; 8]);
     out.extend(MAGIC);
     out.extend(VERSION.to_le_bytes());
@@ -167,7 +171,7 @@ pub fn open(bytes: &[u8]) -> Result<(MessageHeader, &[u8]), MessageError> {
         return Err(MessageError::Oversize { got: bytes.len() as u64, max: MAX_MESSAGE_BYTES as u64 });
     }
     let mut rest = ByteReader(bytes);
-    if rest.name()? != ENGINE {
+    if rest.array()? != ENGINE_FIELD {
         return Err(MessageError::Foreign("the first name is not Engine"));
     }
     let size = rest.u64()?;
@@ -211,12 +215,10 @@ fn hash_of(message: &[u8]) -> Hash {
     xxh3_128_with_seed(&message[HEADER_BYTES..], xxh3_64(&message[72..112])).to_le_bytes()
 }
 
-/// Appends a name of at most 63 bytes, padded with zeros to 64. A longer name is cut; worlds refuse
-/// longer ones.
+/// Appends a name of any length: its number of bytes (u32), then the bytes.
 pub(crate) fn put_name(out: &mut Vec<u8>, name: &str) {
-    let end = out.len() + NAME_BYTES;
-    out.extend(name.bytes().take(NAME_BYTES - 1));
-    out.resize(end, 0);
+    out.extend((name.len() as u32).to_le_bytes());
+    out.extend(name.bytes());
 }
 
 /// Appends numbers.
@@ -275,13 +277,12 @@ impl<'a> ByteReader<'a> {
         Ok(out)
     }
 
-    /// Reads a name from its 64 bytes.
+    /// Reads a name.
     pub fn name(&mut self) -> Result<&'a str, MessageError> {
-        let field = self.take(NAME_BYTES as u64)?;
-        let end = field.iter().position(|&b| b == 0).ok_or(MessageError::Malformed("a name without an end"))?;
-        let (name, zeros) = field.split_at(end);
-        if name.is_empty() || zeros.iter().any(|&b| b != 0) {
-            return Err(MessageError::Malformed("an empty name, or something behind a name's end"));
+        let length = self.u32()?;
+        let name = self.take(length as u64)?;
+        if name.is_empty() {
+            return Err(MessageError::Malformed("an empty name"));
         }
         std::str::from_utf8(name).map_err(|_| MessageError::Malformed("a name that is not UTF-8"))
     }

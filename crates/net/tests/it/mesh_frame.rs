@@ -1,4 +1,4 @@
-//! A recording places a mesh by the frame of its file.
+//! Recordings of worlds: a mesh is placed by the frame of its file, and names may have any length.
 
 use crate::support::Scratch;
 use nalgebra::{Point3, Quaternion, UnitQuaternion};
@@ -36,4 +36,32 @@ fn a_recorded_mesh_stands_where_its_file_says() {
         let off = placed * Point3::from(*recorded) - frame * Point3::from(*file);
         assert!(off.norm() < 1e-6, "vertices are recorded in single precision: {off}");
     }
+}
+
+/// A name of 200 bytes is recorded as it is. Longer ones than a recording can hold keep their beginning and stay different.
+#[test]
+fn a_world_with_long_names_is_recorded() {
+    let long = "x".repeat(200);
+    let longer = ["é".repeat(200) + "1", "é".repeat(200) + "2"];
+    let mut world = World::default();
+    for name in [&long, &longer[0], &longer[1]] {
+        world.add(RigidBody::with_mass(name, Shape::sphere(0.1).unwrap(), 1.0).unwrap()).unwrap();
+    }
+    let scratch = Scratch::new("long_names");
+    let path = scratch.file("a.mcap");
+    let mut recorder = Recorder::create(&path, "", &entities(&world), RecorderOptions::default()).unwrap();
+    recorder.frame(world.time(), world.frame(), &poses(&world), &world.save()).unwrap();
+    recorder.finish().unwrap();
+    let mut reader = read(&path).unwrap();
+    let names: Vec<String> = reader.entities().iter().map(|e| e.name.clone()).collect();
+    assert_eq!(names[0], long);
+    assert_ne!(names[1], names[2]);
+    for (name, whole) in names[1..].iter().zip(&longer) {
+        let (beginning, hash) = name.split_once('~').unwrap();
+        assert!(whole.starts_with(beginning) && name.len() > record::MAX_NAME_BYTES - 2 && hash.len() == 16, "{name}");
+    }
+    let state = reader.next_frame().unwrap().unwrap().state;
+    world.step().unwrap();
+    world.restore(&state).unwrap();
+    assert_eq!(world.save(), state);
 }

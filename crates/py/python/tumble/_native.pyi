@@ -842,8 +842,8 @@ class World:
     def state(self, value: ArrayLike) -> None: ...
     def add_rigid(
         self,
-        name: str,
-        shape: Shape,
+        name: str | Shape | None = None,
+        shape: Shape | None = None,
         mass: float | None = None,
         density: float | None = None,
         position: ArrayLike | None = None,
@@ -869,8 +869,8 @@ class World:
         """
     def add_static(
         self,
-        name: str,
-        shape: Shape,
+        name: str | Shape | None = None,
+        shape: Shape | None = None,
         position: ArrayLike | None = None,
         orientation: ArrayLike | None = None,
         restitution: float = 0.0,

@@ -281,7 +281,7 @@ impl Inner {
     /// Returns all forces and behaviors with their arguments; `None` if there are none.
     pub fn pickled_extensions(&self, py: Python<'_>) -> Option<Extensions> {
         let [forces, _] = self.extensions(py);
-        let name = |&id: &ObjectId| Some(self.world.object(id)?.name().to_string());
+        let name = |&id: &ObjectId| Some(self.world.name(id)?.to_string());
         let of = |b: &Attached| {
             (b.code.name.clone(), b.code.object.clone_ref(py), b.bodies.iter().filter_map(name).collect())
         };

@@ -62,7 +62,7 @@ impl Layout {
             plain: true,
         };
         for &id in view.ids() {
-            let (Some(span), Some(object)) = (view.state_range(id), view.object(id)) else { continue };
+            let Some(span) = view.state_range(id) else { continue };
             if span.parts.is_empty() {
                 continue;
             }
@@ -96,7 +96,7 @@ impl Layout {
                     }));
                 }
             }
-            layout.objects.push((id, object.name().into(), first..layout.rows.len()));
+            layout.objects.push((id, view.name(id).unwrap_or_default().into(), first..layout.rows.len()));
         }
         layout
     }

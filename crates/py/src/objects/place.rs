@@ -80,7 +80,7 @@ pub struct Found {
 
 /// Returns what a handle of the object is made from.
 pub fn found(inner: &Inner, id: ObjectId) -> Option<Found> {
-    let name = inner.world.object(id)?.name().into();
+    let name = inner.world.name(id)?.into();
     Some(Found { id, name, robot: inner.robots.get(&id).cloned() })
 }
 
@@ -97,8 +97,7 @@ fn is_body(world: &Core, id: ObjectId) -> bool {
 pub fn by_name(inner: &Inner, name: &str) -> Result<Found> {
     let id = inner.world.find(name).filter(|&id| is_body(&inner.world, id));
     id.and_then(|id| found(inner, id)).ok_or_else(|| {
-        let names: Vec<&str> =
-            body_ids(&inner.world).iter().filter_map(|&id| Some(inner.world.object(id)?.name())).take(8).collect();
+        let names: Vec<&str> = body_ids(&inner.world).iter().filter_map(|&id| inner.world.name(id)).take(8).collect();
         let known =
             if names.is_empty() { "it has none".to_string() } else { format!("there are {}", names.join(", ")) };
         Error::Name(format!("the world has no body named '{name}'; {known}"))

@@ -11,7 +11,9 @@ use crate::objects::description::described;
 use crate::objects::place::{Place, by_name};
 use crate::objects::shapes::Shape;
 use crate::world::shared::Shared;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use pyo3::types::PyString;
 use std::sync::Arc;
 use tumble::collide::Pose;
 use tumble::dynamics::{Mode, RigidBody as Rigid};
@@ -31,6 +33,21 @@ pub fn own_place(shared: &Arc<Shared>, body: &Bound<'_, PyAny>) -> Result<Place>
     }
 }
 
+/// Returns the name, empty if there is none, and the shape of a body. The shape may take the place of the name.
+pub fn named_shape<'py>(
+    name: Option<&Bound<'py, PyAny>>,
+    shape: Option<&Bound<'py, PyAny>>,
+) -> PyResult<(String, PyRef<'py, Shape>)> {
+    let (name, shape) = match (name, shape) {
+        (Some(first), None) if !first.is_instance_of::<PyString>() => (None, Some(first)),
+        given => given,
+    };
+    let name = name.map_or(Ok(String::new()), |name| name.extract())?;
+    let shape = shape
+        .ok_or_else(|| PyTypeError::new_err("a shape is missing: add_rigid(\"name\", shape) or add_rigid(shape)"))?;
+    Ok((name, shape.extract()?))
+}
+
 /// Returns a body with a mass or a density. A kinematic body needs neither.
 pub fn rigid(name: &str, shape: &Shape, mass: Option<f64>, density: Option<f64>, kinematic: bool) -> Result<Rigid> {
     let solid = shape.solid.clone();
@@ -48,7 +65,7 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, body: Rigid, mode: Mode, collid
         let body = appearance::usual(body, inner.world.ids().len());
         let id = inner.world.add_boxed(Box::new(body), mode)?;
         inner.world.set_collidable(id, collidable)?;
-        let name = inner.world.object(id).map_or("", |o| o.name()).into();
+        let name = inner.world.name(id).unwrap_or_default().into();
         Ok(Place { shared: shared.clone(), id, name })
     })?;
     RigidBody::new(py, place)
@@ -71,7 +88,7 @@ pub fn articulated(
         let id = inner.world.add(body)?;
         inner.robots.insert(id, robot.clone());
         efforts.map(|tau| inner.efforts.insert(id, tau));
-        let name: Arc<str> = inner.world.object(id).map_or("", |o| o.name()).into();
+        let name: Arc<str> = inner.world.name(id).unwrap_or_default().into();
         inner.notes.extend(notes.iter().map(|note| format!("articulated \"{name}\": {note}")));
         Ok(Place { shared: shared.clone(), id, name })
     })?;

@@ -12,9 +12,8 @@ use crate::objects::bodies;
 use crate::objects::bodies::{Bodies, handle, place_of};
 use crate::objects::body::RigidBody;
 use crate::objects::place::{body_ids, by_name};
-use crate::objects::shapes::Shape;
 use crate::pool;
-use crate::world::add::{add, articulated, own_place, rigid};
+use crate::world::add::{add, articulated, named_shape, own_place, rigid};
 use crate::world::gc::{Anchor, anchor};
 use crate::world::inner::Inner;
 use crate::world::load::{Choices, build};
@@ -448,19 +447,21 @@ impl World {
 
     /// Adds a body that moves.
     ///
+    /// name: unique, of any length; without one, as in ``add_rigid(Sphere(0.1), mass=1)``, the world
+    /// makes one from the number of objects added before, such as ``"body 3"``.
     /// mass: kg, or density: kg/m³, one of the two. position: of the shape's frame, for a mesh the
     /// file's, meters. orientation: unit quaternion (x, y, z, w). velocity, m/s, and
     /// angular_velocity, rad/s: world axes. restitution: 0 to 1. friction: at least 0. kinematic:
     /// moves at its prescribed velocity. contacts: contact mode, ``"surface"``, or ``"spheres"``
     /// for the spheres of its tree as in the thesis; a pair uses spheres if either body does.
-    #[pyo3(signature = (name, shape, mass=None, density=None, position=None, orientation=None, velocity=None, angular_velocity=None, restitution=0.0,
+    #[pyo3(signature = (name=None, shape=None, mass=None, density=None, position=None, orientation=None, velocity=None, angular_velocity=None, restitution=0.0,
         friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface"))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_rigid(
         &self,
         py: Python<'_>,
-        name: &str,
-        shape: PyRef<'_, Shape>,
+        name: Option<&Bound<'_, PyAny>>,
+        shape: Option<&Bound<'_, PyAny>>,
         mass: Option<f64>,
         density: Option<f64>,
         position: Option<&Bound<'_, PyAny>>,
@@ -475,12 +476,13 @@ impl World {
         collidable: bool,
         contacts: &str,
     ) -> Result<RigidBody> {
+        let (name, shape) = named_shape(name, shape)?;
         let mode = if kinematic { Mode::Kinematic } else { Mode::Dynamic };
         let motion = [
             vec3_or(velocity, "velocity", Vec3::zeros())?,
             vec3_or(angular_velocity, "angular_velocity", Vec3::zeros())?,
         ];
-        let mut body = rigid(name, &shape, mass, density, kinematic)?
+        let mut body = rigid(&name, &shape, mass, density, kinematic)?
             .at(pose(position, orientation)? * shape.placement)
             .surface(restitution, friction);
         (body.linear_damping, body.angular_damping, body.contact_mode) =
@@ -488,15 +490,15 @@ impl World {
         add(&self.shared, py, body.moving(motion[0], motion[1]), mode, collidable)
     }
 
-    /// Adds geometry that never moves. position, orientation, restitution, friction, contacts: as
+    /// Adds geometry that never moves. name, position, orientation, restitution, friction, contacts: as
     /// in ``add_rigid``.
-    #[pyo3(signature = (name, shape, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true, contacts="surface"))]
+    #[pyo3(signature = (name=None, shape=None, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true, contacts="surface"))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_static(
         &self,
         py: Python<'_>,
-        name: &str,
-        shape: PyRef<'_, Shape>,
+        name: Option<&Bound<'_, PyAny>>,
+        shape: Option<&Bound<'_, PyAny>>,
         position: Option<&Bound<'_, PyAny>>,
         orientation: Option<&Bound<'_, PyAny>>,
         restitution: f64,
@@ -504,6 +506,7 @@ impl World {
         collidable: bool,
         contacts: &str,
     ) -> Result<RigidBody> {
+        let (name, shape) = named_shape(name, shape)?;
         let pose = pose(position, orientation)? * shape.placement;
         let body = Rigid::fixed(name, shape.solid.clone())
             .at(pose)

@@ -55,7 +55,7 @@ impl StepReport {
             unreachable_joint: out_of_reach,
             asleep,
         } = *world.report();
-        let name = out_of_reach.and_then(|o| Some(world.object(o.loop_joint)?.name().to_string()));
+        let name = out_of_reach.and_then(|o| Some(world.name(o.loop_joint)?.to_string()));
         StepReport {
             substeps,
             tries,

@@ -116,7 +116,7 @@ impl Drawing {
         let tints =
             if overlays.sleep { Some(sleep_colors(world)) } else { overlays.islands.then(|| island_colors(world)) };
         for &id in world.ids() {
-            let Some(object) = world.object(id) else { continue };
+            let (Some(name), Some(object)) = (world.name(id), world.object(id)) else { continue };
             if !world.status(id).is_some_and(|s| s.enabled) {
                 continue;
             }
@@ -130,7 +130,7 @@ impl Drawing {
             let tint = tints.as_ref().and_then(|tints| tints.get(&id)).copied();
             for visual in object.renderable().map_or(&[][..], |r| r.visuals()) {
                 let Some(part_state) = world.part_state(id, visual.part) else { continue };
-                self.place(&mut list, &mut placed, object.name(), visual, &(part_state.pose * visual.pose), tint)?;
+                self.place(&mut list, &mut placed, name, visual, &(part_state.pose * visual.pose), tint)?;
             }
         }
         self.spheres = list.spheres.len();

@@ -39,13 +39,10 @@ impl DrawList {
             let Some(object) = world.object(id).filter(|_| world.status(id).is_some_and(|s| s.enabled)) else {
                 continue;
             };
+            let owner = world.name(id).unwrap_or_default();
             for mount in object.camera().map_or(&[][..], |c| c.cameras()) {
                 let Some(part_state) = world.part_state(id, mount.part) else { continue };
-                let name = if mount.name.is_empty() {
-                    object.name().to_string()
-                } else {
-                    format!("{}/{}", object.name(), mount.name)
-                };
+                let name = if mount.name.is_empty() { owner.to_string() } else { format!("{owner}/{}", mount.name) };
                 out.push(NamedView { name, camera: seen_from(mount, &(part_state.pose * mount.pose)) });
             }
         }

@@ -11,7 +11,7 @@ use crate::build::{mesh_files, shapes};
 use crate::error::SceneError;
 use crate::parse::appearance::AppearanceSpec;
 use crate::parse::articulated::ArticulatedSpec;
-use crate::parse::body::{BodySpec, MAX_NAME_BYTES, MassSpec};
+use crate::parse::body::{BodySpec, MassSpec};
 use crate::parse::file::SceneFile;
 use crate::parse::link::{Geometry, LinkShape, LinkSpec};
 use crate::parse::mesh::{MeshSource, MeshSpec};
@@ -190,13 +190,10 @@ impl Extent {
     }
 }
 
-/// Returns the name of a file without its extension, shortened to a valid object name.
+/// Returns the name of a file without its extension and without control characters.
 fn stem(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let mut name: String = stem.chars().filter(|c| !c.is_control()).collect();
-    while name.len() > MAX_NAME_BYTES {
-        name.pop();
-    }
+    let name: String = stem.chars().filter(|c| !c.is_control()).collect();
     if name.is_empty() { "object".into() } else { name }
 }
 

@@ -22,7 +22,7 @@ const MAX_PAIRS: usize = 100_000;
 /// An articulated body at time 0 with all references resolved.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArticulatedSpec {
-    /// Unique in the scene, rigid bodies included; at most 63 bytes.
+    /// Unique in the scene, rigid bodies included; of any length.
     pub name: String,
     /// Pose of the base, world axes. Links without a parent are attached to it; a floating root
     /// starts there.

@@ -14,9 +14,6 @@ use crate::parse::rotation;
 use crate::parse::shape::ShapeSpec;
 use crate::parse::world::CONTACTS;
 
-/// Largest length of a body's name in bytes: 64 in network messages, with the final zero.
-pub(crate) const MAX_NAME_BYTES: usize = 63;
-
 const MODES: Names<Mode> = &[("dynamic", Mode::Dynamic), ("static", Mode::Static), ("kinematic", Mode::Kinematic)];
 
 /// The mass of a body or shape.
@@ -31,7 +28,7 @@ pub enum MassSpec {
 /// A rigid body at time 0 with all references resolved and all defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodySpec {
-    /// Unique in the scene; at most 63 bytes.
+    /// Unique in the scene; of any length.
     pub name: String,
     /// Default `dynamic`.
     pub mode: Mode,
@@ -129,8 +126,8 @@ pub(crate) fn read_name(f: &mut Fields<'_>) -> Option<String> {
         f.what.split(' ').next().unwrap_or("body"),
         f.log.quote(value.span()).trim_matches(['"', '\''])
     );
-    let expected = "a name of 1 to 63 bytes without control characters";
-    if name.is_empty() || name.len() > MAX_NAME_BYTES || name.chars().any(char::is_control) {
+    let expected = "a name that is not empty and has no control characters";
+    if name.is_empty() || name.chars().any(char::is_control) {
         f.wrong("name", value, expected);
     }
     Some(name.to_owned())

@@ -6,7 +6,7 @@
 //! left to right as seen along it, so the pins of a bowling lane get their usual numbers.
 
 use crate::parse::appearance::{as_color, as_pattern};
-use crate::parse::body::{BodySpec, Library, MAX_NAME_BYTES};
+use crate::parse::body::{BodySpec, Library};
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names, Value};
 use toml::de::DeValue;
@@ -35,12 +35,6 @@ pub(crate) fn read(mut f: Fields<'_>, library: &Library<'_>, room: usize, out: &
     let (Some(template), Some(offsets)) = (template, offsets) else {
         return f.finish();
     };
-    let longest = template.name.len() + 1 + offsets.len().to_string().len();
-    if longest > MAX_NAME_BYTES
-        && let Some(value) = f.value("name")
-    {
-        f.wrong("name", value, format!("a name that has at most {MAX_NAME_BYTES} bytes including the number"));
-    }
     f.finish();
     for (k, offset) in offsets.into_iter().enumerate() {
         let mut body = template.clone();

@@ -8,7 +8,7 @@ use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{ContactMode, Mat3, Pose, Vec3};
 
 use crate::parse::appearance::{AppearanceSpec, Color, as_color};
-use crate::parse::body::{Library, MAX_NAME_BYTES, MassSpec, read_material, read_name};
+use crate::parse::body::{Library, MassSpec, read_material, read_name};
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Value};
 use crate::parse::joint::JointSpec;
@@ -197,7 +197,7 @@ impl<'a> LinkRow<'a> {
         let shapes = read_shapes(f, &from);
         let mounts = Mounts::read(f);
         let mass = read_mass(f, &shapes, joint.as_ref().is_some_and(|j| j.kind == Joint::Fixed));
-        let (count, next, colors) = read_repeat(f, &name, from.room);
+        let (count, next, colors) = read_repeat(f, from.room);
         let mut joint = joint?;
         let mimic = joint.read_mimic(f);
         Some(LinkRow {
@@ -398,9 +398,8 @@ impl std::fmt::Display for InertiaFault {
 }
 
 /// Reads `repeat`: count, placement of each next link, and colors that the links take in turn.
-fn read_repeat(f: &mut Fields<'_>, name: &str, room: usize) -> (usize, Pose, Vec<Color>) {
-    let span = f.value("repeat").map(Value::span);
-    let (Some(mut repeat), Some(span)) = (f.table("repeat", "{ count = 10, position_m = [0, 0, -0.1] }"), span) else {
+fn read_repeat(f: &mut Fields<'_>, room: usize) -> (usize, Pose, Vec<Color>) {
+    let Some(mut repeat) = f.table("repeat", "{ count = 10, position_m = [0, 0, -0.1] }") else {
         return (1, Pose::identity(), Vec::new());
     };
     let most = room.clamp(1, 10_000) as u32;
@@ -408,9 +407,6 @@ fn read_repeat(f: &mut Fields<'_>, name: &str, room: usize) -> (usize, Pose, Vec
         Some(value) => repeat.as_integer("count", value, 1..=most) as usize,
         None => 1,
     };
-    if name.len() + 1 + count.to_string().len() > MAX_NAME_BYTES {
-        f.log.report(span, format!("the name of {} is too long to be numbered", f.what), "expected a shorter one");
-    }
     let next = rotation::read_pose(&mut repeat);
     let colors = repeat.list("colors", 1000, "a list of colors, which the links take in turn");
     let colors = colors.into_iter().map(|value| as_color(&repeat, "colors", value)).collect();

@@ -276,15 +276,25 @@ fn names_used_twice() {
 
 #[test]
 fn names_that_do_not_fit() {
-    let expected = "expected a name of 1 to 63 bytes without control characters";
+    let expected = "expected a name that is not empty and has no control characters";
     assert_errors(
         &body_with("").replace("\"b\"", "\"\""),
         &[&format!("s.toml:2:8: `name` of body \"\" is \"\"; {expected}")],
     );
-    let long = "x".repeat(64);
-    let error = SceneFile::parse(&body_with("").replace("\"b\"", &format!("{long:?}")), "s.toml").unwrap_err();
-    assert!(error.to_string().contains(expected), "{error}");
-    SceneFile::parse(&body_with("").replace("\"b\"", &format!("{:?}", &long[1..])), "s.toml").unwrap();
+    let bell = SceneFile::parse(&body_with("").replace("\"b\"", "\"\\u0007\""), "s.toml").unwrap_err();
+    assert!(bell.to_string().contains(expected), "{bell}");
+}
+
+#[test]
+fn a_name_may_have_any_length() {
+    let long = "x".repeat(200);
+    let grid = body_with("").replace("[[body]]", "[[grid]]").replace("\"b\"", &format!("{long:?}"))
+        + "count = [1, 1, 2]\nspacing_m = [0, 0, 2]\n";
+    let world = SceneFile::parse(&grid, "s.toml").unwrap().build().unwrap().0;
+    assert_eq!(
+        world.ids().iter().map(|&id| world.name(id).unwrap()).collect::<Vec<_>>(),
+        [format!("{long}_1"), format!("{long}_2")]
+    );
 }
 
 #[test]

@@ -53,7 +53,7 @@ impl Picker {
     pub fn picked(&self, world: &World) -> Option<(String, Vec3, Vec3)> {
         let part_state = world.part_state(self.force.id, self.force.part)?;
         let point = part_state.pose.rotation * self.force.point + part_state.position();
-        Some((world.object(self.force.id)?.name().to_string(), point, self.force.target))
+        Some((world.name(self.force.id)?.to_string(), point, self.force.target))
     }
 
     /// Draws a line from the picked point to the target.

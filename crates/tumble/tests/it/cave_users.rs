@@ -265,8 +265,9 @@ fn a_recording_is_shown_again_bit_by_bit_also_when_it_was_cut() {
             .map(|l| serde_json::json!([l["frame"], l["state"], l["image"]]))
             .collect()
     };
-    let moving =
-        folder.write("moving.toml", SCENE.replace("mass_kg = 2.0", "mass_kg = 2.0\nvelocity_m_per_s = [0.3, 0, 0.2]"));
+    let long = format!("name = \"{}\"", "ball ".repeat(40)); // 200 bytes
+    let motion = "mass_kg = 2.0\nvelocity_m_per_s = [0.3, 0, 0.2]";
+    let moving = folder.write("moving.toml", SCENE.replace("name = \"ball\"", &long).replace("mass_kg = 2.0", motion));
     let path = |name: &str| text(&folder.path(name));
     if tumble::render::Renderer::new().is_err() {
         let _ = std::io::Write::write_fmt(

@@ -180,7 +180,7 @@ fn falling_stays_in_its_box_and_comes_to_rest_with_few_tries() {
                 assert!(
                     x.z > 0.0 && x.x.abs() < 1.2 && x.y.abs() < 1.2,
                     "{method}: '{}' is at {x} at {} s",
-                    world.object(*id).unwrap().name(),
+                    world.name(*id).unwrap(),
                     world.time()
                 );
             }

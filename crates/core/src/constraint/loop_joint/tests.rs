@@ -52,7 +52,7 @@ impl Pairing {
             crate::object::Integratable::write_initial(&body, &mut all.x[state_range.x.clone()]);
             let status = Status { mode, ..Status::default() };
             all.states.push(ObjectState { serial: serial as u32, status, ..ObjectState::default() });
-            all.ids.push(all.table.push(Box::new(body), state_range));
+            all.ids.push(all.table.push("".into(), Box::new(body), state_range));
         }
         all
     }

@@ -124,8 +124,15 @@ fn counts_are_not_believed() {
     assert!(Snapshot::parse(&many).is_err());
     let snapshot = &payloads()[0];
     let mut long = snapshot.clone();
-    long[12 + 64..12 + 72].copy_from_slice(&u64::MAX.to_le_bytes()); // the first object's size
+    let name = u32::from_le_bytes(long[12..16].try_into().unwrap()) as usize;
+    let size = 16 + name; // behind the name's length and the name
+    long[size..size + 8].copy_from_slice(&u64::MAX.to_le_bytes());
     assert!(Snapshot::parse(&long).is_err());
+    for length in [0, u32::MAX] {
+        let mut long = snapshot.clone();
+        long[12..16].copy_from_slice(&length.to_le_bytes());
+        assert!(Snapshot::parse(&long).is_err(), "a name of {length} bytes");
+    }
     let mut mirror = Mirror::new(scene());
     mirror.apply_snapshot(snapshot).unwrap();
     let state = &payloads()[1];

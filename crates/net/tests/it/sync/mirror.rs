@@ -41,7 +41,7 @@ impl Pair {
     /// Compares the worlds object by object, by name: existence, whether enabled, and pose.
     fn compare(&self) {
         let names = |w: &World| {
-            let mut names: Vec<String> = w.ids().iter().map(|&id| w.object(id).unwrap().name().to_string()).collect();
+            let mut names: Vec<String> = w.ids().iter().map(|&id| w.name(id).unwrap().to_string()).collect();
             names.sort();
             names
         };
@@ -68,6 +68,33 @@ fn a_copy_follows_frame_by_frame() {
             pair.world.step().unwrap();
             assert!(!pair.send());
         }
+    }
+}
+
+/// Names of 200 and 70,000 bytes, of objects in the scene file and of objects added later, with characters of several bytes.
+#[test]
+fn names_of_any_length_are_sent_whole() {
+    let scene = || {
+        let mut world = scene();
+        for name in ["é".repeat(100), "x".repeat(199) + "1", "x".repeat(199) + "2", "y".repeat(70_000)] {
+            let body = RigidBody::with_mass(name, Shape::sphere(0.1).unwrap(), 1.0).unwrap();
+            world.add(body.at(Pose::translation(0.0, 0.0, 40.0))).unwrap();
+        }
+        world
+    };
+    for exact in [false, true] {
+        let publisher = Publisher::new(&scene(), exact, 0);
+        let mut pair = Pair { world: scene(), publisher, mirror: Mirror::new(scene()), frame: 0 };
+        assert!(pair.send());
+        for name in ["ü".repeat(100), String::new()] {
+            let body = RigidBody::with_mass(name, Shape::sphere(0.1).unwrap(), 1.0).unwrap();
+            pair.world.add(body.at(Pose::translation(1.0, 0.0, 40.0))).unwrap();
+            pair.world.step().unwrap();
+            assert!(pair.send());
+        }
+        let removed = pair.world.find(&"é".repeat(100)).unwrap();
+        pair.world.remove(removed).unwrap();
+        assert!(pair.send());
     }
 }
 

@@ -21,7 +21,7 @@ pub type Shown = Vec<(u64, FrameAck)>;
 fn picture(world: &World, viewer: &Viewer) -> [u8; 16] {
     let mut text = format!("{viewer:?}");
     for &id in world.ids() {
-        text += &format!("{:?} {:?}", world.object(id).map(|o| o.name()), world.part_state(id, 0).map(|s| s.pose));
+        text += &format!("{:?} {:?}", world.name(id), world.part_state(id, 0).map(|s| s.pose));
     }
     let mut image = [0; 16];
     image.copy_from_slice(&blake3::hash(text.as_bytes()).as_bytes()[..16]);
