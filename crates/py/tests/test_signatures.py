@@ -82,9 +82,9 @@ def test_defaults_shown_are_defaults_used(root, tmp_path):
     assert filled(**shown(tumble.World)) == filled()
     world = tumble.World()
     given, left_out = (world.fork() for _ in range(2))
-    given.add_rigid(**BALL | shown(tumble.World.add_rigid, "mass"))
+    given.add_rigid(**BALL | shown(tumble.World.add_rigid, "name", "shape", "mass"))
     left_out.add_rigid(**BALL)
-    given.add_static("floor", tumble.HalfSpace(**shown(tumble.HalfSpace)), **shown(tumble.World.add_static))
+    given.add_static("floor", tumble.HalfSpace(**shown(tumble.HalfSpace)), **shown(tumble.World.add_static, "name", "shape"))
     left_out.add_static("floor", tumble.HalfSpace())
     urdf = root / "scenes" / "robot" / "arm.urdf"
     arm = tumble.Articulation.from_urdf(urdf, **shown(tumble.Articulation.from_urdf))

@@ -861,6 +861,8 @@ class World:
     ) -> RigidBody:
         """Adds a body that moves.
 
+        name: unique, of any length; without one, as in ``add_rigid(Sphere(0.1), mass=1)``, the world
+        makes one from the number of objects added before, such as ``"body 3"``.
         mass: kg, or density: kg/m³, one of the two. position: of the shape's frame, for a mesh the
         file's, meters. orientation: unit quaternion (x, y, z, w). velocity, m/s, and
         angular_velocity, rad/s: world axes. restitution: 0 to 1. friction: at least 0. kinematic:
@@ -879,7 +881,7 @@ class World:
         collidable: bool = True,
         contacts: Contacts = "surface",
     ) -> RigidBody:
-        """Adds geometry that never moves. position, orientation, restitution, friction, contacts: as
+        """Adds geometry that never moves. name, position, orientation, restitution, friction, contacts: as
         in ``add_rigid``.
         """
     def add_articulation(
