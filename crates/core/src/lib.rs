@@ -49,13 +49,13 @@ pub use constraint::loop_joint::{Anchor, LoopJoint, LoopJointError, LoopJointKin
 pub use constraint::rows;
 pub use contact::pair_material::{PairMaterial, PairSide};
 pub use derived::Cache;
-pub use object::collidable::{Collidable, CollisionGroup, Combine, ContactFrame, Material, rigid_test_impulse};
-pub use object::mounts::{CameraCarrier, CameraMount, Detail, LightCarrier, LightMount, Spread};
+pub use object::collidable::{CollisionGroup, ContactFrame, rigid_test_impulse};
+pub use object::mounts::{CameraMount, Detail, LightMount, Spread};
 pub use object::part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes, Wrench};
 pub use object::visual::{Drawn, Visual, VisualGeometry, VisualMesh};
 pub use object::{
-    Appearance, Constraint, Energy, ForceGenerator, Integratable, Level, Momentum, MomentumKind, NetSync, Object,
-    Renderable, RowTarget, SyncError,
+    Appearance, CameraCarrier, Collidable, Combine, Constraint, Energy, ForceGenerator, Integratable, Level,
+    LightCarrier, Material, Momentum, MomentumKind, NetSync, Object, Renderable, RowTarget, SyncError,
 };
 pub use report::{StepReport, UnreachableJoint};
 pub use rigid::{BodyError, RigidBody};

@@ -1,6 +1,6 @@
 //! The constants of a world.
 
-use crate::object::collidable::Combine;
+use crate::object::Combine;
 use crate::solver::SolverSettings;
 use crate::world::sleep::Sleep;
 use tumble_collide::Vec3;

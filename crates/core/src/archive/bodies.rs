@@ -4,7 +4,8 @@
 use super::records::{LoadedTables, Tables, VisualRecord, shape};
 use super::{ArchiveError, damaged};
 use crate::articulated::{ArticulatedParts, Collider};
-use crate::object::collidable::{CollisionGroup, Material};
+use crate::object::Material;
+use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
 use crate::object::{Object, Renderable};
 use crate::{ArticulatedBody, Coupling, DofSettings, Model, RigidBody};

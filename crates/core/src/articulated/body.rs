@@ -14,7 +14,8 @@
 use crate::articulated::algorithms::dynamics::{Dynamics, Scratch};
 use crate::articulated::model::Model;
 use crate::articulated::model::dof::{Coupling, DofSettings};
-use crate::object::collidable::{CollisionGroup, Material};
+use crate::object::Material;
+use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraMount, LightMount};
 use crate::object::visual::Visual;
 use nalgebra::{Quaternion, Translation3};

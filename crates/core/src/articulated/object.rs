@@ -9,10 +9,11 @@ use crate::articulated::algorithms::kinematics::Kinematics;
 use crate::articulated::model::coordinates::integrate;
 use crate::articulated::model::joint::Joint;
 use crate::derived::Cache;
-use crate::object::collidable::{Collidable, CollisionGroup, Material};
+use crate::object::Material;
+use crate::object::collidable::{Collidable, CollisionGroup};
 use crate::object::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
+use crate::object::net_sync;
 use crate::object::part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes, Wrench};
-use crate::object::sync;
 use crate::object::visual::Visual;
 use crate::object::{Constraint, Energy, Integratable, Momentum, MomentumKind, NetSync, Object, Renderable, SyncError};
 use crate::rigid::rotation;
@@ -329,11 +330,11 @@ impl Renderable for ArticulatedBody {
 /// The state as little-endian `f64`: exact, for replicas.
 impl NetSync for ArticulatedBody {
     fn get_data(&self, me: &StateRange, view: &WorldView, out: &mut Vec<u8>) {
-        sync::write_state(&view.x[me.x.clone()], out);
+        net_sync::write_state(&view.x[me.x.clone()], out);
     }
 
     fn read_data(&self, data: &[u8], x: &mut [f64]) -> Result<(), SyncError> {
-        sync::read_state(data, x, |state| self.is_state(state))
+        net_sync::read_state(data, x, |state| self.is_state(state))
     }
 }
 

@@ -3,7 +3,8 @@
 use crate::clone_by_field::clone_by_field;
 use crate::contact::pair::{MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
 use crate::contact::pair_material::PairMaterials;
-use crate::object::collidable::{ContactFrame, Material};
+use crate::object::Material;
+use crate::object::collidable::ContactFrame;
 use crate::object::part_state::PartState;
 use crate::settings::Settings;
 use crate::step::shift_to_impact;

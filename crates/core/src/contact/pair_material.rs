@@ -1,6 +1,6 @@
 //! Restitution and friction of chosen pairs, instead of what [`Settings`] makes of the materials of two parts.
 
-use crate::object::collidable::Material;
+use crate::object::Material;
 use crate::settings::{Settings, SettingsError};
 use crate::world::view::ObjectId;
 use std::collections::BTreeMap;

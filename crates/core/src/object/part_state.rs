@@ -1,31 +1,31 @@
-//! The flat state's vocabulary: where an object's numbers lie, what readers see of it, and what acts on it.
+//! Ranges of the flat state, the state of parts, and the table of forces.
 
 use std::ops::Range;
 use tumble_collide::{Pose, Vec3};
 
-/// How many numbers an object needs.
+/// Numbers of entries that an object needs in the world's tables.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StateSizes {
-    /// Length of its stretch of the state `X`.
+    /// Length of its range of the state `X`.
     pub x: usize,
     /// Degrees of freedom: length of its generalized velocity `v` and of its whitened velocity `u`.
     pub dof: usize,
-    /// Rows in the site table: one per collidable part.
+    /// Rows in the table of part states: one per part.
     pub parts: usize,
 }
 
-/// An object's place in the world's tables, told by the world.
+/// An object's ranges in the world's tables. The world assigns them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct StateRange {
-    /// Its stretch of the state `X`.
+    /// Range of the state `X`.
     pub x: Range<usize>,
-    /// Its stretch of generalized velocities, forces and whitened velocities.
+    /// Range of generalized velocities, forces and whitened velocities.
     pub v: Range<usize>,
-    /// Its rows of the site table.
+    /// Rows of the table of part states.
     pub parts: Range<usize>,
 }
 
-/// One collidable part as readers see it: springs, boids, the detector, the renderer. World axes.
+/// Pose, velocity and acceleration of one part, which all readers use: forces, constraints, detection, renderers. World axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PartState {
     /// Pose of the part's frame in the world, `X_WB`.
@@ -38,10 +38,9 @@ pub struct PartState {
     pub angular_acceleration: Vec3,
     /// Acceleration of the frame's origin, m/s².
     pub acceleration: Vec3,
-    /// What the angular acceleration would be if the generalized velocity did not change (`J̇·v`), rad/s²: zero for a body whose generalized
-    /// velocity is `[ω; v]`.
+    /// Angular acceleration at constant generalized velocity (`J̇·v`), rad/s²: zero for a body whose generalized velocity is `[ω; v]`.
     pub bias_angular_acceleration: Vec3,
-    /// The same of the origin's acceleration, m/s².
+    /// Acceleration of the frame's origin at constant generalized velocity, m/s².
     pub bias_acceleration: Vec3,
 }
 
@@ -61,17 +60,17 @@ impl Default for PartState {
 }
 
 impl PartState {
-    /// Position of the frame's origin, meters.
+    /// Returns the position of the frame's origin, meters.
     pub fn position(&self) -> Vec3 {
         self.pose.translation.vector
     }
 
-    /// Velocity of the material point that is now at world point `p`, m/s: `v + ω × r`.
+    /// Returns the velocity of the material point at world point `p`, m/s: `v + ω × r`.
     pub fn velocity_at(&self, p: &Vec3) -> Vec3 {
         self.velocity + self.angular_velocity.cross(&(p - self.position()))
     }
 
-    /// Rate of change of [`velocity_at`](Self::velocity_at) seen from a point that is at `p` and moves at `p_rate`, m/s²:
+    /// Returns the rate of change of [`velocity_at`](Self::velocity_at) along a point that is at `p` and moves at `p_rate`, m/s²:
     /// `a + α × r + ω × (ṗ − v)`. With `p_rate = velocity_at(p)` this is the material point's acceleration.
     pub fn acceleration_following(&self, p: &Vec3, p_rate: &Vec3) -> Vec3 {
         let r = p - self.position();
@@ -79,12 +78,12 @@ impl PartState {
     }
 }
 
-/// Torque about a site's origin and force, world axes, N·m and N.
+/// A torque about the origin of a part's frame and a force, world axes, N·m and N.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Wrench {
-    /// Torque about the origin of the site's frame.
+    /// Torque about the origin of the part's frame, N·m.
     pub torque: Vec3,
-    /// Force.
+    /// Force, N.
     pub force: Vec3,
 }
 
@@ -94,17 +93,17 @@ impl Default for Wrench {
     }
 }
 
-/// The force table: accumulated anew at each stage of each integrator, at that stage's state and time.
+/// The table of forces, accumulated anew at each stage of an integrator, at the state and time of that stage.
 #[derive(Clone, Debug, Default)]
 pub struct Forces {
-    /// External wrench per site.
+    /// External wrench per part.
     pub wrenches: Vec<Wrench>,
-    /// Generalized force per coordinate.
+    /// Generalized force per degree of freedom.
     pub generalized: Vec<f64>,
 }
 
 impl Forces {
-    /// Adds a force (N, world axes) that acts at world point `p` on row `index` of the site table.
+    /// Adds a force (N, world axes) at world point `p` of the part in row `index` of the table of part states.
     pub fn add_at(&mut self, index: usize, part_state: &PartState, force: Vec3, p: &Vec3) {
         let wrench = &mut self.wrenches[index];
         wrench.force += force;
@@ -119,11 +118,11 @@ impl Forces {
     }
 }
 
-/// One object's part of the force table.
+/// The range of one object in the table of forces.
 #[derive(Clone, Copy, Debug)]
 pub struct ForceSlice<'a> {
-    /// Wrench per site of the object.
+    /// Wrench per part of the object.
     pub wrenches: &'a [Wrench],
-    /// Generalized force per coordinate of the object.
+    /// Generalized force per degree of freedom of the object.
     pub generalized: &'a [f64],
 }

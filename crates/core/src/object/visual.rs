@@ -4,10 +4,16 @@
 //! It is never checked for being closed. A mesh that cannot be read is not drawn, and
 //! [`VisualMesh::fault`] then returns the reason.
 
-use crate::object::Appearance;
+use super::Appearance;
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 use tumble_collide::{MeshError, Pose, Shape, TriMesh, Vec3};
+
+/// Can be drawn (thesis `Renderable` and `SidRenderable`, §IV.A.5). Visuals are data; a renderer decides how to draw them.
+pub trait Renderable {
+    /// Returns its visuals.
+    fn visuals(&self) -> &[Visual];
+}
 
 /// One visual, fixed to a part.
 #[derive(Clone, Debug)]

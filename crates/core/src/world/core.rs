@@ -274,16 +274,10 @@ impl Core {
         );
     }
 
-    /// Counts time, lets objects put right what they must, writes the sites anew and checks the state.
+    /// Advances time, refreshes the part states and checks the state.
     pub(crate) fn finish_substep(&mut self, h: f64) -> Result<(), StepError> {
         self.state.time += h;
         self.report.substeps += 1;
-        let Coordinates { objects, x, .. } = self.coordinates(None);
-        for entry in objects.iter().filter(|e| e.moves()) {
-            if let Some(body) = entry.object.integratable() {
-                body.stabilize(&mut x[entry.state_range.x.clone()], h);
-            }
-        }
         self.integration().refresh();
         let moves = |s: &PartState| s.velocity.iter().chain(s.angular_velocity.iter()).all(|x| x.is_finite());
         let fine = |e: &Entry| {

@@ -2,7 +2,7 @@
 
 use super::{World, WorldError};
 use crate::contact::pair_material::{PairMaterial, PairSide, Surface};
-use crate::object::collidable::Material;
+use crate::object::Material;
 use crate::world::view::ObjectId;
 
 impl World {
