@@ -14,7 +14,7 @@ pub struct Tumble {
 impl Tumble {
     /// Builds the scene.
     pub fn new(scene: &Scene) -> Tumble {
-        let mut world = World::new(Settings { dt: DT, ..Settings::default() }).expect("the default settings are valid");
+        let mut world = World::new(Settings::default().with_dt(DT)).expect("the default settings are valid");
         for (i, plane) in scene.planes.iter().enumerate() {
             let fixed = RigidBody::fixed(format!("plane{i}"), Shape::half_space())
                 .surface(RESTITUTION, FRICTION)

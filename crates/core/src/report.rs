@@ -4,6 +4,7 @@ use crate::solver::SolveReport;
 use crate::world::view::ObjectId;
 
 /// A loop joint that could not be closed at the pose that kinematic motion asked for.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnreachableJoint {
     /// The constraint.
@@ -14,7 +15,8 @@ pub struct UnreachableJoint {
     pub angle: f64,
 }
 
-/// Counts and residuals of one frame.
+/// Counts and residuals of one frame. Later versions can have more of them.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct StepReport {
     /// Number of committed sub-steps.

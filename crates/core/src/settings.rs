@@ -24,7 +24,18 @@ pub enum Integrator {
     DormandPrince,
 }
 
-/// The constants of a world. They may change between steps.
+/// The constants of a world. They may change between steps ([`World::set_settings`](crate::World::set_settings)).
+///
+/// Later versions can have more settings, so a program starts from the defaults, or from the settings of a world, and changes some:
+///
+/// ```
+/// use tumble_core::prelude::*;
+/// let settings = Settings::default().with_dt(1.0 / 60.0).with_gravity(Vec3::new(0.0, 0.0, -1.62));
+/// let mut world = World::new(settings)?;
+/// world.set_settings(world.settings().with_substeps(4))?;
+/// # Ok::<(), WorldError>(())
+/// ```
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Settings {
     /// Gravity, m/s².
@@ -95,6 +106,39 @@ pub struct SettingsError {
     pub value: f64,
     /// Admissible range.
     pub wanted: &'static str,
+}
+
+/// Methods that change one setting: name, field, type.
+macro_rules! setters {
+    ($($with:ident $field:ident: $type:ty),* $(,)?) => {
+        impl Settings {
+            $(
+                #[doc = concat!("Returns the settings with another [`", stringify!($field), "`](Self::", stringify!($field), ").")]
+                #[must_use]
+                pub fn $with(mut self, $field: $type) -> Settings {
+                    self.$field = $field;
+                    self
+                }
+            )*
+        }
+    };
+}
+
+setters! {
+    with_gravity gravity: Vec3,
+    with_dt dt: f64,
+    with_substeps substeps: u32,
+    with_integrator integrator: Integrator,
+    with_integrator_tolerance integrator_tolerance: f64,
+    with_solver_settings solver_settings: SolverSettings,
+    with_projection_sweeps projection_sweeps: u32,
+    with_stabilize_positions stabilize_positions: bool,
+    with_contact_tolerance contact_tolerance: f64,
+    with_drift_tolerance drift_tolerance: f64,
+    with_recovery_speed recovery_speed: f64,
+    with_sleep sleep: Option<Sleep>,
+    with_combine_friction combine_friction: Combine,
+    with_combine_restitution combine_restitution: Combine,
 }
 
 impl Settings {

@@ -533,7 +533,6 @@ fn what_it_cannot_follow_is_an_error_with_a_name_and_changes_nothing() {
 
 #[test]
 fn the_tolerance_has_a_range() {
-    let refused =
-        |tolerance: f64| World::new(Settings { integrator_tolerance: tolerance, ..Settings::default() }).is_err();
+    let refused = |tolerance: f64| World::new(Settings::default().with_integrator_tolerance(tolerance)).is_err();
     assert!(refused(0.9e-14) && refused(0.11) && refused(f64::NAN) && !refused(1e-14) && !refused(0.1));
 }

@@ -103,7 +103,7 @@ fn a_body_is_read_through_its_view() {
 /// relative error is at most `(c/m)²·t·h/2 = 0.47 %`.
 #[test]
 fn a_force_from_a_function_acts_as_its_formula_says() {
-    let mut world = World::new(Settings { gravity: Vec3::zeros(), ..Settings::default() }).unwrap();
+    let mut world = World::new(Settings::default().with_gravity(Vec3::zeros())).unwrap();
     let id = world.add(ball("ball", 0.0).moving(Vec3::x(), Vec3::zeros())).unwrap();
     let drag = world.add_force("drag", move |view, out| out.act_on(view, id, |state| -3.0 * state.velocity)).unwrap();
     let mut fork = world.fork();

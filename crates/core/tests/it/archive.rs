@@ -7,7 +7,7 @@ use tumble_core::*;
 /// Every shape, a chain of links with limits, drives and a coupling, loops, cameras; one body was removed, one sleeps.
 fn everything(stepper: &str) -> World {
     let mut world = world(stepper, 1.0 / 240.0);
-    let settings = Settings { combine_restitution: Combine::Min, ..*world.settings() };
+    let settings = world.settings().with_combine_restitution(Combine::Min);
     world.set_settings(settings).unwrap();
     ground(&mut world, 0.3, 0.4);
     let gone = world.add(RigidBody::with_mass("gone", sphere(0.1), 1.0).unwrap()).unwrap();

@@ -6,7 +6,7 @@ use crate::common::{ground, sphere};
 use tumble_core::collide::{Mat3, Pose, Shape, Vec3};
 use tumble_core::{
     ArticulatedBody, Collider, DofSettings, Integrator, Joint, LinkMass, Material, ModelBuilder, ObjectId, RigidBody,
-    Settings, World,
+    World,
 };
 
 /// Adds a box that is thrown at the floor: a rigid body, or a floating base without links.
@@ -67,7 +67,7 @@ fn the_same_contact_gives_the_same_impulse() {
     let [a, b] = [false, true].map(|articulated| {
         let (mut world, id) =
             thrown(world(1.0 / 240.0, "time_stepping", Integrator::Verlet), articulated, -0.6 + 0.352);
-        world.set_settings(Settings { gravity: Vec3::zeros(), ..*world.settings() }).unwrap();
+        world.set_settings(world.settings().with_gravity(Vec3::zeros())).unwrap();
         if articulated {
             let mut x = world.state_of(id).unwrap().to_vec();
             x[7..10].fill(0.0);
@@ -166,7 +166,7 @@ fn two_equal_pendulums_swap_their_swings() {
 /// Adds three rods of 0.4 m with capsules; a torque folds the last one back onto the first.
 fn folding(own: bool, apart: bool) -> (World, ObjectId) {
     let mut world = world(1.0 / 240.0, "time_stepping", Integrator::Verlet);
-    world.set_settings(Settings { gravity: Vec3::zeros(), ..*world.settings() }).unwrap();
+    world.set_settings(world.settings().with_gravity(Vec3::zeros())).unwrap();
     let mut body = ArticulatedBody::new("arm", hinged(3, 0.4, rod(1.0, 0.4))).with_positions(&[0.0, 1.5, 0.0]).unwrap();
     for i in 0..3 {
         let shape = Shape::capsule(0.03, 0.3).unwrap();

@@ -5,14 +5,14 @@ use crate::articulated_world::{adaptive, chain, hinged, rod, run, world};
 use std::sync::Arc;
 use tumble_core::collide::{Mat3, Pose, Vec3};
 use tumble_core::{
-    ArticulatedBody, Coupling, DofSettings, Drive, Integrator, Joint, LinkMass, ModelBuilder, Playback, Settings,
-    Spring, StepError, World,
+    ArticulatedBody, Coupling, DofSettings, Drive, Integrator, Joint, LinkMass, ModelBuilder, Playback, Spring,
+    StepError, World,
 };
 
 /// No gravity, and one rod of 1 kg and 0.6 m: its moment of inertia about the joint is 0.12 kg·m².
 fn arm(stepper: &str, dof: DofSettings) -> World {
     let mut world = world(1.0 / 240.0, stepper, Integrator::Verlet);
-    world.set_settings(Settings { gravity: Vec3::zeros(), ..*world.settings() }).unwrap();
+    world.set_settings(world.settings().with_gravity(Vec3::zeros())).unwrap();
     let mut body = ArticulatedBody::new("arm", hinged(1, 0.6, rod(1.0, 0.6)));
     body.set_dof(0, dof).unwrap();
     world.add(body).unwrap();
@@ -85,7 +85,7 @@ fn damping_decays_and_a_spring_swings() {
     let damped = DofSettings { damping: 0.24, ..DofSettings::default() };
     for (stepper, want) in [("time_stepping", (1.0_f64 + 2.0 / 240.0).powi(-240)), ("backtracking", (-2.0_f64).exp())] {
         let mut world = arm(stepper, damped.clone());
-        world.set_settings(Settings { integrator: Integrator::DormandPrince, ..*world.settings() }).unwrap();
+        world.set_settings(world.settings().with_integrator(Integrator::DormandPrince)).unwrap();
         let id = world.ids()[0];
         world.write_state_of(id, &[0.0, 1.0]).unwrap();
         run(&mut world, 1.0);

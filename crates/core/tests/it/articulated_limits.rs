@@ -26,7 +26,7 @@ fn whip(rates: &[f64; 6]) -> ArticulatedBody {
 #[test]
 fn links_that_swing_about_each_other_keep_to_their_limits() {
     for rate in [60.0, 120.0, 240.0] {
-        let mut world = World::new(Settings { dt: 1.0 / rate, ..Settings::default() }).unwrap();
+        let mut world = World::new(Settings::default().with_dt(1.0 / rate)).unwrap();
         let id = world.add(whip(&[12.0, 9.0, -14.0, 11.0, -8.0, 13.0])).unwrap();
         let (start, mut worst, mut highest) = (world.energy().total(), 0.0f64, f64::MIN);
         for _ in 0..(3.0 * rate) as usize {

@@ -66,7 +66,7 @@ pub fn loose_chain(links: usize, center: Vec3, friction: f64) -> ArticulatedBody
 
 /// An empty world with gravity along −z.
 pub fn world(dt: f64, stepper: &str, integrator: Integrator) -> World {
-    let mut world = World::new(Settings { dt, integrator, ..Settings::default() }).unwrap();
+    let mut world = World::new(Settings::default().with_dt(dt).with_integrator(integrator)).unwrap();
     world.set_stepper(stepper_by_name(stepper).unwrap());
     world
 }
@@ -74,7 +74,7 @@ pub fn world(dt: f64, stepper: &str, integrator: Integrator) -> World {
 /// The adaptive integrator in the backtracking stepper.
 pub fn adaptive(dt: f64, tolerance: f64) -> World {
     let mut world = world(dt, "backtracking", Integrator::DormandPrince);
-    world.set_settings(Settings { integrator_tolerance: tolerance, ..*world.settings() }).unwrap();
+    world.set_settings(world.settings().with_integrator_tolerance(tolerance)).unwrap();
     world
 }
 

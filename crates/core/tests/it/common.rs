@@ -5,13 +5,13 @@ use tumble_core::*;
 
 pub const G: f64 = 9.81;
 pub fn world(stepper: &str, dt: f64) -> World {
-    let mut world = World::new(Settings { dt, ..Settings::default() }).unwrap();
+    let mut world = World::new(Settings::default().with_dt(dt)).unwrap();
     world.set_stepper(stepper_by_name(stepper).unwrap());
     world
 }
 
 pub fn no_gravity(mut world: World) -> World {
-    let settings = Settings { gravity: Vec3::zeros(), ..*world.settings() };
+    let settings = world.settings().with_gravity(Vec3::zeros());
     world.set_settings(settings).unwrap();
     world
 }

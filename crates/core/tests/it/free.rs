@@ -8,7 +8,7 @@ use tumble_core::*;
 /// Body with I = (1, 2, 3) kg·m² spinning about its unstable axis.
 fn tumbling(integrator: Integrator, stepper: &str, dt: f64) -> (World, ObjectId) {
     let mut world = no_gravity(world(stepper, dt));
-    let settings = Settings { integrator, ..*world.settings() };
+    let settings = world.settings().with_integrator(integrator);
     world.set_settings(settings).unwrap();
     let body = RigidBody::new("top", sphere(1.0), 1.0, Mat3::from_diagonal(&Vec3::new(1.0, 2.0, 3.0))).unwrap();
     let id = world.add(body.moving(Vec3::zeros(), Vec3::new(0.01, 5.0, 0.01))).unwrap();
@@ -93,7 +93,7 @@ fn a_thrown_body_follows_the_parabola() {
 #[test]
 fn damping_is_exponential() {
     let mut world = no_gravity(world("backtracking", 1.0 / 240.0));
-    let settings = Settings { integrator: Integrator::Rk4, ..*world.settings() };
+    let settings = world.settings().with_integrator(Integrator::Rk4);
     world.set_settings(settings).unwrap();
     let mut body = RigidBody::with_mass("ball", sphere(0.1), 2.0).unwrap().moving(Vec3::x(), Vec3::z());
     (body.linear_damping, body.angular_damping) = (0.7, 0.3);
@@ -140,7 +140,7 @@ fn forces_are_taken_at_each_stage_so_a_spring_keeps_its_energy() {
         ("backtracking", Integrator::Rk4, 1e-4),
     ] {
         let mut world = no_gravity(world(stepper, 1.0 / 240.0));
-        let settings = Settings { integrator, ..*world.settings() };
+        let settings = world.settings().with_integrator(integrator);
         world.set_settings(settings).unwrap();
         let body =
             RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().moving(Vec3::new(10.0, 0.0, 0.0), Vec3::zeros());

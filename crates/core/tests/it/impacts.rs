@@ -42,7 +42,7 @@ fn a_bouncing_ball_comes_to_rest_when_the_series_says() {
         // sub-steps are not shown outside a frame: step single short frames once the bounces are small
         while world.time() < 1.5 {
             if world.time() > 1.345 {
-                let fine = Settings { dt: 1e-4, ..*world.settings() };
+                let fine = world.settings().with_dt(1e-4);
                 world.set_settings(fine).unwrap();
             }
             world.step().unwrap();

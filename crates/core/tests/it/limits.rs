@@ -103,7 +103,7 @@ impl Constraint for Pendulum {
 
 fn with(integrator: Integrator, pendulum: Pendulum) -> (World, ObjectId) {
     let mut world = world("backtracking", 1.0 / 60.0);
-    world.set_settings(Settings { integrator, ..*world.settings() }).unwrap();
+    world.set_settings(world.settings().with_integrator(integrator)).unwrap();
     let id = world.add(pendulum).unwrap();
     (world, id)
 }
@@ -238,7 +238,7 @@ fn a_gap_that_is_no_number_is_an_error() {
 fn a_joint_is_held_at_its_stop_while_the_next_one_swings() {
     for integrator in BOTH {
         let mut world = world("backtracking", 1.0 / 240.0);
-        world.set_settings(Settings { integrator, ..*world.settings() }).unwrap();
+        world.set_settings(world.settings().with_integrator(integrator)).unwrap();
         let mut body = ArticulatedBody::new(
             "chain",
             crate::articulated_world::hinged(2, 0.2, crate::articulated_world::rod(1.0, 0.2)),

@@ -152,7 +152,7 @@ fn a_four_bar_linkage_stays_closed_for_a_minute_and_keeps_its_energy() {
 fn without_stabilization_the_same_linkage_drifts() {
     for stepper in STEPPERS {
         let mut linkage = FourBar::new(stepper, 1.0 / RATE);
-        let settings = Settings { stabilize_positions: false, ..*linkage.world.settings() };
+        let settings = linkage.world.settings().with_stabilize_positions(false);
         linkage.world.set_settings(settings).unwrap();
         let worst = run(&mut linkage, 60.0);
         println!("{stepper}, 60 s at {RATE} Hz, not stabilized: {worst:?}");

@@ -97,7 +97,7 @@ fn a_chain_closed_at_its_end_and_three_joined_bars_are_the_same_machine() {
     for stepper in STEPPERS {
         let apart = |rate: f64| {
             let (mut bars, mut chain) = (FourBar::new(stepper, 1.0 / rate), one_chain(stepper));
-            let settings = Settings { dt: 1.0 / rate, ..*chain.world.settings() };
+            let settings = chain.world.settings().with_dt(1.0 / rate);
             chain.world.set_settings(settings).unwrap();
             let mut worst = 0.0f64;
             for _ in 0..(0.5 * rate) as usize {

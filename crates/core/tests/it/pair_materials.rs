@@ -8,7 +8,7 @@ const HEIGHT: f64 = 0.9;
 
 /// Ground and a ball whose underside is 0.9 m above it.
 fn dropped(settings: Settings, ball: f64, floor: f64) -> (World, ObjectId, ObjectId) {
-    let mut world = World::new(Settings { dt: 1.0 / 240.0, ..settings }).unwrap();
+    let mut world = World::new(settings.with_dt(1.0 / 240.0)).unwrap();
     let floor = ground(&mut world, floor, 0.5);
     let body = RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().surface(ball, 0.5);
     let ball = world.add(body.at(Pose::translation(0.0, 0.0, HEIGHT + 0.1))).unwrap();
@@ -38,7 +38,7 @@ fn each_rule_gives_its_bounce() {
     let (a, b) = (0.8, 0.2);
     let expected = [0.2, 0.8, 0.5, 0.16, 0.4];
     for ((name, rule), e) in Combine::NAMES.iter().zip(expected) {
-        let settings = Settings { combine_restitution: *rule, ..Settings::default() };
+        let settings = Settings::default().with_combine_restitution(*rule);
         let (mut world, ball, floor) = dropped(settings, a, b);
         assert!((world.pair_material((floor, 0), (ball, 0)).unwrap().restitution - e).abs() < 1e-15);
         let height = rebound(&mut world, ball);

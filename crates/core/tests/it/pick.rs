@@ -12,7 +12,7 @@ fn assert_near(what: &str, found: f64, wanted: f64, within: f64) {
 }
 
 fn world(gravity: f64, dt: f64) -> World {
-    World::new(Settings { gravity: Vec3::new(0.0, 0.0, -gravity), dt, ..Settings::default() }).unwrap()
+    World::new(Settings::default().with_gravity(Vec3::new(0.0, 0.0, -gravity)).with_dt(dt)).unwrap()
 }
 
 fn held(world: &World, pick: &PickForce) -> Vec3 {

@@ -9,7 +9,7 @@ const H: f64 = 1.0 / 60.0;
 
 fn sleepy(stepper: &str) -> World {
     let mut world = world(stepper, H);
-    let settings = Settings { sleep: Some(Sleep::default()), ..*world.settings() };
+    let settings = world.settings().with_sleep(Some(Sleep::default()));
     world.set_settings(settings).unwrap();
     world
 }
@@ -65,7 +65,7 @@ fn a_strike_on_sleepers_is_the_same_bits_as_on_the_waking() {
     for stepper in STEPPERS {
         let cradle = |sleep: Option<Sleep>| {
             let mut world = no_gravity(sleepy(stepper));
-            let settings = Settings { sleep, ..*world.settings() };
+            let settings = world.settings().with_sleep(sleep);
             world.set_settings(settings).unwrap();
             let ball = |name: String| RigidBody::with_mass(name, sphere(0.1), 1.0).unwrap().surface(1.0, 0.3);
             let ids: Vec<ObjectId> = (0..5)
@@ -117,7 +117,7 @@ fn whatever_is_done_to_a_sleeper_wakes_its_island() {
         ("a velocity", |w, ids| w.set_velocity(ids[0], Vec3::x(), Vec3::zeros()).unwrap()),
         ("a pose", |w, ids| w.set_pose(ids[2], Pose::translation(0.0, 0.0, 3.0)).unwrap()),
         ("gravity", |w, _| {
-            let settings = Settings { gravity: Vec3::new(3.0, 0.0, -9.81), ..*w.settings() };
+            let settings = w.settings().with_gravity(Vec3::new(3.0, 0.0, -9.81));
             w.set_settings(settings).unwrap();
         }),
         ("the ground goes", |w, _| drop(w.remove(w.find("ground").unwrap()).unwrap())),
@@ -205,7 +205,7 @@ fn a_force_that_changes_wakes_them_and_a_steady_one_does_not() {
     for stepper in STEPPERS {
         let blown = |sleep: Option<Sleep>| {
             let mut world = sleepy(stepper);
-            let settings = Settings { sleep, ..*world.settings() };
+            let settings = world.settings().with_sleep(sleep);
             world.set_settings(settings).unwrap();
             ground(&mut world, 0.0, 0.5);
             let ids = stack(&mut world, "box", 0.0, 1);

@@ -79,7 +79,7 @@ fn a_soft_equality_is_a_spring_and_no_joint() {
     let (h, m, k) = (1.0 / 60.0, 2.0, 100.0);
     for stepper in STEPPERS {
         let mut world = world(stepper, h);
-        world.set_settings(Settings { gravity: Vec3::new(-9.81, 0.0, 0.0), ..*world.settings() }).unwrap();
+        world.set_settings(world.settings().with_gravity(Vec3::new(-9.81, 0.0, 0.0))).unwrap();
         let body = ball(&mut world, m, 0.0);
         world.add(Drive { body, set: RowSet::Equality, stiffness: k, damping: 30.0, place: 0.0, h }).unwrap();
         for _ in 0..600 {

@@ -62,10 +62,11 @@ fn five_boxes_stand_with_every_solver() {
 fn pile(stepper: &str) -> World {
     let mut world = world(stepper, 1.0 / 240.0);
     world
-        .set_settings(Settings {
-            solver_settings: SolverSettings { max_sweeps: 200_000, max_relaxations: u32::MAX, tolerance: 1e-12 },
-            ..*world.settings()
-        })
+        .set_settings(world.settings().with_solver_settings(SolverSettings {
+            max_sweeps: 200_000,
+            max_relaxations: u32::MAX,
+            tolerance: 1e-12,
+        }))
         .unwrap();
     ground(&mut world, 0.0, 0.0);
     for i in 0..20 {

@@ -54,6 +54,7 @@ impl StepReport {
             max_penetration,
             unreachable_joint: out_of_reach,
             asleep,
+            ..
         } = *world.report();
         let name = out_of_reach.and_then(|o| Some(world.name(o.loop_joint)?.to_string()));
         StepReport {

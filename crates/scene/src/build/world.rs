@@ -133,20 +133,17 @@ impl SceneFile {
 
     fn settings(&self) -> Settings {
         let (w, base) = (&self.world, Settings::default());
-        Settings {
-            gravity: Vec3::from(w.gravity_m_per_s2),
-            dt: w.dt_s,
-            substeps: w.substeps,
-            integrator: w.integrator.into(),
-            integrator_tolerance: w.integrator_tolerance,
-            solver_settings: SolverSettings { max_sweeps: w.iterations, ..base.solver_settings },
-            contact_tolerance: w.contact_tolerance_m,
-            drift_tolerance: base.drift_tolerance.max(w.contact_tolerance_m),
-            sleep: w.sleep_after_s.map(|after| Sleep { after, within: w.sleep_within_m }),
-            combine_friction: w.combine_friction,
-            combine_restitution: w.combine_restitution,
-            ..base
-        }
+        base.with_gravity(Vec3::from(w.gravity_m_per_s2))
+            .with_dt(w.dt_s)
+            .with_substeps(w.substeps)
+            .with_integrator(w.integrator.into())
+            .with_integrator_tolerance(w.integrator_tolerance)
+            .with_solver_settings(SolverSettings { max_sweeps: w.iterations, ..base.solver_settings })
+            .with_contact_tolerance(w.contact_tolerance_m)
+            .with_drift_tolerance(base.drift_tolerance.max(w.contact_tolerance_m))
+            .with_sleep(w.sleep_after_s.map(|after| Sleep { after, within: w.sleep_within_m }))
+            .with_combine_friction(w.combine_friction)
+            .with_combine_restitution(w.combine_restitution)
     }
 
     fn body(&self, spec: &BodySpec, meshes: &[Shape]) -> Result<RigidBody, BuildError> {

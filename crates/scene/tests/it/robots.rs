@@ -128,7 +128,7 @@ fn a_panda_falls_into_its_limits_and_stays_whole() {
     let limits: Vec<[f64; 2]> = body.dofs().iter().map(|f| f.limits.unwrap()).collect();
     let middle: Vec<f64> = limits.iter().map(|[lower, upper]| 0.5 * (lower + upper)).collect();
     let body = body.with_positions(&middle).unwrap();
-    let mut world = World::new(Settings { dt: 1.0 / 240.0, ..Settings::default() }).unwrap();
+    let mut world = World::new(Settings::default().with_dt(1.0 / 240.0)).unwrap();
     let id = world.add(body).unwrap();
     for _ in 0..480 {
         world.step().unwrap();

@@ -10,7 +10,7 @@ pub use tumble_core::STEPPERS;
 /// A world of `DT` frames in the given stepper; gravity along −z, or none.
 pub fn world(stepper: &str, gravity: bool) -> World {
     let pull = if gravity { Vec3::new(0.0, 0.0, -G) } else { Vec3::zeros() };
-    let mut world = World::new(Settings { dt: DT, gravity: pull, ..Settings::default() }).unwrap();
+    let mut world = World::new(Settings::default().with_dt(DT).with_gravity(pull)).unwrap();
     world.set_stepper(stepper_by_name(stepper).unwrap());
     world
 }

@@ -10,7 +10,7 @@ use tumble_net::sync::quantize::{POSE_BYTES, POSITION_ERROR_M, ROTATION_ERROR_RA
 fn through(pose: Pose) -> Pose {
     use tumble_core::{RigidBody, Settings, World, collide::Shape};
     let world = |pose| {
-        let mut world = World::new(Settings { dt: 1.0 / 60.0, ..Settings::default() }).unwrap();
+        let mut world = World::new(Settings::default().with_dt(1.0 / 60.0)).unwrap();
         world.add(RigidBody::with_mass("b", Shape::sphere(1.0).unwrap(), 1.0).unwrap().at(pose)).unwrap();
         world
     };

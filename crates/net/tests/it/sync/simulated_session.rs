@@ -15,7 +15,7 @@ pub const MS: Duration = Duration::from_millis(1);
 
 /// Spheres that fall on a floor, a box that slides, a fixed post.
 pub fn scene() -> World {
-    let mut world = World::new(Settings { dt: 1.0 / 60.0, ..Settings::default() }).unwrap();
+    let mut world = World::new(Settings::default().with_dt(1.0 / 60.0)).unwrap();
     world.add_static(RigidBody::fixed("ground", Shape::half_space())).unwrap();
     world
         .add_static(RigidBody::fixed("post", Shape::capsule(0.1, 2.0).unwrap()).at(Pose::translation(3.0, 0.0, 1.0)))
