@@ -27,8 +27,8 @@ const KINDS: [MessageKind; 13] = [
 
 fn world() -> World {
     let mut world = World::new(Settings::default()).expect("the default settings are sound");
-    let ball = RigidBody::with_mass("ball", Shape::sphere(0.1).expect("a radius"), 1.0).expect("a mass");
-    world.add(ball.at(Pose::translation(0.0, 0.0, 0.1))).expect("a new name");
+    let ball = RigidBody::new(Shape::sphere(0.1).expect("a radius")).with_name("ball").with_mass(1.0);
+    world.add(ball.with_pose(Pose::translation(0.0, 0.0, 0.1))).expect("a new name");
     world
 }
 

@@ -8,9 +8,9 @@ use tumble_core::{RigidBody, Settings, World};
 /// A ball on the ground: the world that `seeds/snapshot` was saved from.
 fn world() -> World {
     let mut world = World::new(Settings::default()).expect("the default settings are sound");
-    world.add_static(RigidBody::fixed("ground", Shape::half_space())).expect("a new name");
-    let ball = RigidBody::with_mass("ball", Shape::sphere(0.1).expect("a radius"), 1.0).expect("a mass");
-    world.add(ball.at(Pose::translation(0.0, 0.0, 0.1))).expect("a new name");
+    world.add_static(RigidBody::fixed(Shape::half_space()).with_name("ground")).expect("a new name");
+    let ball = RigidBody::new(Shape::sphere(0.1).expect("a radius")).with_name("ball").with_mass(1.0);
+    world.add(ball.with_pose(Pose::translation(0.0, 0.0, 0.1))).expect("a new name");
     world
 }
 

@@ -3,7 +3,7 @@
 use crate::scene::{Body, EDGE, Plane, RADIUS, Scene};
 use crate::{DENSITY, DT, Engine, FRICTION, RESTITUTION};
 use tumble_collide::{Pose, Quat, Shape, Vec3};
-use tumble_core::{ObjectId, RigidBody, Settings, World};
+use tumble_core::{Material, ObjectId, RigidBody, Settings, World};
 
 /// A tumble world with a scene in it.
 pub struct Tumble {
@@ -16,9 +16,9 @@ impl Tumble {
     pub fn new(scene: &Scene) -> Tumble {
         let mut world = World::new(Settings::default().with_dt(DT)).expect("the default settings are valid");
         for (i, plane) in scene.planes.iter().enumerate() {
-            let fixed = RigidBody::fixed(format!("plane{i}"), Shape::half_space())
-                .surface(RESTITUTION, FRICTION)
-                .at(pose(plane));
+            let fixed = RigidBody::fixed(Shape::half_space()).with_name(format!("plane{i}"))
+                .with_material(Material { restitution: RESTITUTION, friction: FRICTION, ..Material::default() })
+                .with_pose(pose(plane));
             world.add_static(fixed).expect("a fixed body is valid");
         }
         let shape = match scene.body {
@@ -28,8 +28,8 @@ impl Tumble {
         let shape = shape.expect("the sizes are valid");
         let mut add = |(i, c): (usize, &[f64; 3])| {
             let body =
-                RigidBody::with_density(format!("body{i}"), shape.clone(), DENSITY).expect("the density is valid");
-            let body = body.surface(RESTITUTION, FRICTION).at(Pose::translation(c[0], c[1], c[2]));
+                RigidBody::new(shape.clone()).with_name(format!("body{i}")).with_density(DENSITY);
+            let body = body.with_material(Material { restitution: RESTITUTION, friction: FRICTION, ..Material::default() }).with_pose(Pose::translation(c[0], c[1], c[2]));
             world.add(body).expect("names are unique")
         };
         let ids = scene.centers.iter().enumerate().map(&mut add).collect();

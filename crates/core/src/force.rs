@@ -43,7 +43,7 @@ impl World {
     /// ```
     /// use tumble_core::prelude::*;
     /// let mut world = World::default();
-    /// let balloon = world.add(RigidBody::with_mass("balloon", Shape::sphere(0.2)?, 0.1)?)?;
+    /// let balloon = world.add(RigidBody::new(Shape::sphere(0.2)?).with_name("balloon").with_mass(0.1))?;
     /// let wind = Vec3::new(3.0, 0.0, 0.0);
     /// world.add_force("wind", move |view, out| out.act_on(view, balloon, |state| 0.5 * (wind - state.velocity)))?;
     /// world.step()?;

@@ -10,14 +10,15 @@
 //! the other conventions beside those of Python and of scene files.
 //!
 //! ```
-//! use tumble_core::{RigidBody, Settings, World, collide::{Pose, Shape}};
-//! let mut world = World::new(Settings::default())?;
-//! world.add_static(RigidBody::fixed("ground", Shape::half_space()))?;
-//! let ball = world.add(RigidBody::with_mass("ball", Shape::sphere(0.1)?, 2.0)?.at(Pose::translation(0.0, 0.0, 1.0)))?;
+//! use tumble_core::prelude::*;
+//! let mut world = World::default();
+//! world.add(RigidBody::fixed(Shape::half_space()))?;
+//! let ball = RigidBody::new(Shape::sphere(0.1)?).with_name("ball").with_mass(2.0);
+//! let ball = world.add(ball.with_pose(Pose::translation(0.0, 0.0, 1.0)))?;
 //! for _ in 0..240 {
 //!     world.step()?;
 //! }
-//! assert!((world.part_state(ball, 0).unwrap().position().z - 0.1).abs() < 1e-6);
+//! assert!((world.body(ball)?.position().z - 0.1).abs() < 1e-6);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

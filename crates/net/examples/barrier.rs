@@ -17,8 +17,8 @@ type Failure = Box<dyn std::error::Error + Send + Sync>;
 fn scene(bodies: usize) -> Result<World, Failure> {
     let mut world = World::new(Settings::default())?;
     for k in 0..bodies {
-        let body = RigidBody::with_mass(format!("body {k}"), Shape::sphere(0.1)?, 1.0)?;
-        world.add(body.at(Pose::translation(k as f64 * 0.37, (k % 17) as f64, 1.0)))?;
+        let body = RigidBody::new(Shape::sphere(0.1)?).with_name(format!("body {k}")).with_mass(1.0);
+        world.add(body.with_pose(Pose::translation(k as f64 * 0.37, (k % 17) as f64, 1.0)))?;
     }
     Ok(world)
 }

@@ -33,7 +33,7 @@ def world():
         (lambda w: tumble.World(gravity=(0, 0, float("inf"))), "gravity: number 2 is inf"),
         (lambda w: tumble.World(solver="newton"), "solver: `newton` is not known"),
         (lambda w: tumble.World(stepper="backtrack"), "stepper: `backtrack` is not known; did you mean `backtracking`"),
-        (lambda w: w.add_rigid("b", tumble.Sphere(1)), "body 'b': expected a mass or a density"),
+        (lambda w: w.add_rigid("b", tumble.Sphere(1), mass=1.0, density=2.0), "body 'b': expected a mass or a density, not both"),
         (lambda w: w.add_rigid("b", tumble.Sphere(1), mass=-2.0), "body 'b': mass is -2 kg"),
         (lambda w: w.add_rigid("b", tumble.Sphere(1), mass=1.0, position=(0, 0, np.nan)), "position: number 2 is NaN"),
         (lambda w: w.add_rigid("b", tumble.Sphere(1), mass=1.0, orientation=(0, 0, 0, 2)), "has length 2; it must be 1"),

@@ -67,9 +67,9 @@ impl Bead {
         self
     }
 
-    /// Sets restitution and friction.
-    pub fn surface(mut self, restitution: f64, friction: f64) -> Bead {
-        self.material = Material { restitution, friction, id: 0 };
+    /// Sets the constants of the surface.
+    pub fn with_material(mut self, material: Material) -> Bead {
+        self.material = material;
         self
     }
 

@@ -45,9 +45,9 @@ impl Particle {
         self
     }
 
-    /// Sets restitution and friction.
-    pub fn surface(mut self, restitution: f64, friction: f64) -> Particle {
-        self.material = Material { restitution, friction, id: 0 };
+    /// Sets the constants of the surface.
+    pub fn with_material(mut self, material: Material) -> Particle {
+        self.material = material;
         self
     }
 }

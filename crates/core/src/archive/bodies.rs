@@ -55,15 +55,20 @@ impl RigidRecord {
     pub fn body(self, tables: &LoadedTables) -> Result<RigidBody, ArchiveError> {
         let shape = shape(&tables.shapes, self.shape)?;
         let mut body = match self.mass {
-            Some((mass, inertia)) => RigidBody::new(self.name, shape, mass, inertia).map_err(damaged)?,
-            None => RigidBody::fixed(self.name, shape),
+            Some((mass, inertia)) => RigidBody::fixed(shape).with_mass_and_inertia(mass, inertia),
+            None => RigidBody::fixed(shape),
         };
         (body.material, body.contact_mode) = (self.material, self.contact_mode);
         (body.linear_damping, body.angular_damping) = (self.linear_damping, self.angular_damping);
         (body.group, body.mask) = (self.group, self.mask);
         let [velocity, angular_velocity] = self.initial_velocity;
         let visuals = self.visuals.into_iter().map(|v| v.visual(tables)).collect::<Result<_, _>>()?;
-        let body = body.at(self.initial_pose).moving(velocity, angular_velocity).drawn_as(visuals);
+        let body = body
+            .with_name(self.name)
+            .with_pose(self.initial_pose)
+            .with_velocity(velocity)
+            .with_angular_velocity(angular_velocity)
+            .with_visuals(visuals);
         Ok(body.carrying(self.cameras, self.lights))
     }
 }

@@ -123,7 +123,7 @@ pub(super) struct LinkCollider {
 /// let mut builder = ModelBuilder::new();
 /// let upper = builder.link("upper", None, Joint::revolute(Vec3::y()), Pose::identity(), rod);
 /// builder.link("lower", Some(upper), Joint::revolute(Vec3::y()), Pose::translation(0.0, 0.0, -1.0), rod);
-/// let mut arm = ArticulatedBody::new("arm", builder.build()?).at(Pose::translation(0.0, 0.0, 2.0));
+/// let mut arm = ArticulatedBody::new("arm", builder.build()?).with_pose(Pose::translation(0.0, 0.0, 2.0));
 /// arm.add_collider("lower", Collider::new(Shape::capsule(0.05, 0.8)?, Pose::translation(0.0, 0.0, -0.5)))?;
 /// arm.set_dof(0, DofSettings { limits: Some([-1.0, 1.0]), ..DofSettings::default() })?;
 /// world.add(arm)?;
@@ -204,7 +204,7 @@ impl ArticulatedBody {
     /// Sets the pose of the base in the world. Everything attached to the base moves along, and so
     /// does the start of every floating root.
     #[must_use]
-    pub fn at(mut self, pose: Pose) -> Self {
+    pub fn with_pose(mut self, pose: Pose) -> Self {
         let step = pose * self.base.inverse();
         for link in self.model.links().iter().filter(|l| l.joint == super::Joint::Floating) {
             let placed = step * read_pose(&self.start[link.q..link.q + 7]);
@@ -217,7 +217,7 @@ impl ArticulatedBody {
 
     /// Sets the name, so that one description can appear several times in a world.
     #[must_use]
-    pub fn named(mut self, name: impl Into<String>) -> Self {
+    pub fn with_name(mut self, name: impl Into<String>) -> Self {
         self.name = name.into();
         self
     }

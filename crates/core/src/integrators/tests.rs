@@ -52,9 +52,11 @@ struct Bench {
 impl Bench {
     fn new() -> Bench {
         let inertia = Mat3::from_diagonal(&Vec3::new(1.0, 2.0, 3.0));
-        let body = RigidBody::new("top", Shape::sphere(1.0).unwrap(), 1.0, inertia)
-            .unwrap()
-            .moving(Vec3::new(10.0, 0.0, 3.0), Vec3::new(0.1, 5.0, 2.0));
+        let body = RigidBody::new(Shape::sphere(1.0).unwrap())
+            .with_name("top")
+            .with_mass_and_inertia(1.0, inertia)
+            .with_velocity(Vec3::new(10.0, 0.0, 3.0))
+            .with_angular_velocity(Vec3::new(0.1, 5.0, 2.0));
         let mut table = Table::default();
         let mut x = vec![0.0; 13];
         crate::object::Integratable::write_initial(&body, &mut x);

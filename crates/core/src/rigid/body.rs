@@ -1,7 +1,7 @@
 //! The constants of a rigid body and how it is made.
 
 use super::BodyError;
-use super::inertia::Inertia;
+use super::inertia::{Inertia, symmetric};
 use crate::object::Material;
 use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraMount, LightMount};
@@ -18,6 +18,8 @@ pub struct RigidBody {
     /// `√m`.
     pub(super) root_mass: f64,
     pub(super) inertia: Inertia,
+    /// Why the mass or inertia that was set is not valid; mass and inertia are then those before.
+    error: Option<BodyError>,
     /// Surface constants.
     pub material: Material,
     /// Linear damping, 1/s: a force `−c·P`, evaluated at the stage's state like all forces; keep `c·dt` below 1.
@@ -45,25 +47,40 @@ pub struct RigidBody {
 }
 
 impl RigidBody {
-    /// Makes a body of the given mass (kg) and inertia (about the center of mass, body axes, kg·m²). Its frame is the shape's, for a mesh the frame of
-    /// its file.
+    /// Density of a body whose mass is not given, kg/m³: that of water.
+    pub const DEFAULT_DENSITY: f64 = 1000.0;
+
+    /// Makes a uniform body with the [default density](Self::DEFAULT_DENSITY) and the default [`Material`]. Its frame is the shape's, for a
+    /// mesh the frame of its file. Methods `with_…` set its constants:
     ///
-    /// # Errors
-    /// [`BodyError`]: the mass is not positive, or no body has this inertia.
-    pub fn new(name: impl Into<String>, shape: Shape, mass: f64, inertia: Mat3) -> Result<RigidBody, BodyError> {
-        let name = name.into();
-        if !(mass.is_finite() && mass > 0.0) {
-            return Err(BodyError::Mass { name, mass });
-        }
-        let inertia = Inertia::new(&name, inertia)?;
-        let visuals = vec![Visual::shape(0, Pose::identity(), shape.clone(), Default::default())];
-        Ok(RigidBody {
-            name,
+    /// ```
+    /// use tumble_core::prelude::*;
+    /// let mut world = World::default();
+    /// let rubber = Material { restitution: 0.8, friction: 0.9, ..Material::default() };
+    /// let ball = RigidBody::new(Shape::sphere(0.1)?).with_name("ball").with_mass(2.0).with_material(rubber);
+    /// let ball = world.add(ball.with_pose(Pose::translation(0.0, 0.0, 1.0)))?;
+    /// assert_eq!(world.body(ball)?.name(), "ball");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// [`World::add`](crate::World::add) checks all constants; [`validate`](Self::validate) does it before.
+    #[must_use]
+    pub fn new(shape: Shape) -> RigidBody {
+        RigidBody::fixed(shape).with_density(Self::DEFAULT_DENSITY)
+    }
+
+    /// Makes a body that stays static or kinematic. Its mass and inertia are 1 and have no effect, so the shape may be unbounded.
+    #[must_use]
+    pub fn fixed(shape: Shape) -> RigidBody {
+        RigidBody {
+            name: String::new(),
             center: shape.center_of_mass(),
+            visuals: vec![Visual::shape(0, Pose::identity(), shape.clone(), Default::default())],
             shape,
-            mass,
-            root_mass: mass.sqrt(),
-            inertia,
+            mass: 1.0,
+            root_mass: 1.0,
+            inertia: Inertia::unit(),
+            error: None,
             material: Material::default(),
             contact_mode: ContactMode::default(),
             linear_damping: 0.0,
@@ -73,45 +90,54 @@ impl RigidBody {
             initial_pose: Pose::identity(),
             initial_velocity: Vec3::zeros(),
             initial_angular_velocity: Vec3::zeros(),
-            fixed: false,
-            visuals,
+            fixed: true,
             cameras: Vec::new(),
             lights: Vec::new(),
-        })
+        }
     }
 
-    /// Makes a body of uniform density, kg/m³.
-    ///
-    /// # Errors
-    /// [`BodyError`]: the shape has no mass properties (a half-space), or the density is not positive.
-    pub fn with_density(name: impl Into<String>, shape: Shape, density: f64) -> Result<RigidBody, BodyError> {
-        let name = name.into();
-        let properties = match shape.mass_properties(density) {
-            Ok(properties) => properties,
-            Err(why) => return Err(BodyError::Shape { name, why: why.to_string() }),
+    /// Sets the name, unique in its world and of any length. Without one, the world makes a name.
+    #[must_use]
+    pub fn with_name(mut self, name: impl Into<String>) -> Self {
+        self.name = name.into();
+        self
+    }
+
+    /// Sets the density, kg/m³, of a uniform body: mass and inertia follow from the shape. The body is not [fixed](Self::is_fixed) any more.
+    #[must_use]
+    pub fn with_density(self, density: f64) -> Self {
+        let properties = self.shape.mass_properties(density).map_err(|why| BodyError::Shape(why.to_string()));
+        self.with_mass_properties(properties.map(|p| (p.mass, p.inertia)))
+    }
+
+    /// Sets the mass, kg, of a uniform body: the inertia follows from the shape. The body is not [fixed](Self::is_fixed) any more.
+    #[must_use]
+    pub fn with_mass(self, mass: f64) -> Self {
+        let properties = match self.shape.mass_properties(1.0) {
+            _ if !(mass.is_finite() && mass > 0.0) => Err(BodyError::Mass(mass)),
+            Ok(unit) => Ok((mass, symmetric(&unit.inertia) * (mass / unit.mass))),
+            Err(why) => Err(BodyError::Shape(why.to_string())),
         };
-        RigidBody::new(name, shape, properties.mass, properties.inertia)
+        self.with_mass_properties(properties)
     }
 
-    /// Makes a uniform body of the given mass, kg.
-    ///
-    /// # Errors
-    /// [`BodyError`]: the mass is not positive, or the shape has no mass properties (a half-space).
-    pub fn with_mass(name: impl Into<String>, shape: Shape, mass: f64) -> Result<RigidBody, BodyError> {
-        let name = name.into();
-        if !(mass.is_finite() && mass > 0.0) {
-            return Err(BodyError::Mass { name, mass });
-        }
-        let unit = RigidBody::with_density(name.clone(), shape.clone(), 1.0)?;
-        RigidBody::new(name, shape, mass, unit.inertia.tensor * (mass / unit.mass))
+    /// Sets mass (kg) and inertia (about the center of mass, body axes, kg·m²) of a body that is not uniform, whatever its shape. The body is
+    /// not [fixed](Self::is_fixed) any more.
+    #[must_use]
+    pub fn with_mass_and_inertia(self, mass: f64, inertia: Mat3) -> Self {
+        let valid = mass.is_finite() && mass > 0.0;
+        self.with_mass_properties(if valid { Ok((mass, inertia)) } else { Err(BodyError::Mass(mass)) })
     }
 
-    /// Makes a body that stays static or kinematic. Its mass and inertia are 1 and have no effect, so the shape may be unbounded.
-    pub fn fixed(name: impl Into<String>, shape: Shape) -> RigidBody {
-        match RigidBody::new(name, shape, 1.0, Mat3::identity()) {
-            Ok(body) => RigidBody { fixed: true, ..body },
-            Err(_) => unreachable!("unit mass and inertia are valid"),
+    fn with_mass_properties(mut self, properties: Result<(f64, Mat3), BodyError>) -> Self {
+        self.fixed = false;
+        match properties.and_then(|(mass, inertia)| Ok((mass, Inertia::new(&inertia)?))) {
+            Ok((mass, inertia)) => {
+                (self.mass, self.root_mass, self.inertia, self.error) = (mass, mass.sqrt(), inertia, None)
+            }
+            Err(error) => self.error = Some(error),
         }
+        self
     }
 
     /// Returns whether [`fixed`](Self::fixed) made it, so that its mass has no meaning.
@@ -121,43 +147,42 @@ impl RigidBody {
 
     /// Sets the pose of its frame at time 0.
     #[must_use]
-    pub fn at(mut self, pose: Pose) -> Self {
+    pub fn with_pose(mut self, pose: Pose) -> Self {
         self.initial_pose = pose;
         self
     }
 
-    /// Sets the velocity (m/s) and angular velocity (rad/s, world axes) at time 0.
+    /// Sets the velocity of the center of mass at time 0, m/s.
     #[must_use]
-    pub fn moving(mut self, velocity: Vec3, angular_velocity: Vec3) -> Self {
+    pub fn with_velocity(mut self, velocity: Vec3) -> Self {
         self.initial_velocity = velocity;
+        self
+    }
+
+    /// Sets the angular velocity at time 0, rad/s, world axes.
+    #[must_use]
+    pub fn with_angular_velocity(mut self, angular_velocity: Vec3) -> Self {
         self.initial_angular_velocity = angular_velocity;
         self
     }
 
-    /// Sets restitution (0 to 1) and friction (at least 0).
+    /// Sets the constants of its surface.
     #[must_use]
-    pub fn surface(mut self, restitution: f64, friction: f64) -> Self {
-        self.material = Material { restitution, friction, ..self.material };
-        self
-    }
-
-    /// Sets the number of its material, which selects it in pairs of materials (see [`Material::id`]).
-    #[must_use]
-    pub fn of_material(mut self, id: u32) -> Self {
-        self.material.id = id;
+    pub fn with_material(mut self, material: Material) -> Self {
+        self.material = material;
         self
     }
 
     /// Sets how its mesh or cylinder collides.
     #[must_use]
-    pub fn colliding_by(mut self, mode: ContactMode) -> Self {
+    pub fn with_contact_mode(mut self, mode: ContactMode) -> Self {
         self.contact_mode = mode;
         self
     }
 
     /// Sets its visuals; by default its shape in gray.
     #[must_use]
-    pub fn drawn_as(mut self, visuals: Vec<Visual>) -> Self {
+    pub fn with_visuals(mut self, visuals: Vec<Visual>) -> Self {
         self.visuals = visuals;
         self
     }
@@ -214,17 +239,17 @@ impl RigidBody {
         &self.shape
     }
 
-    /// Checks all constants that can be set freely: restitution in 0..=1, friction and damping at least 0, finite pose and velocity.
+    /// Checks all constants: a positive mass, an inertia that a body can have, restitution in 0..=1, friction and damping at least 0, finite pose
+    /// and velocity.
     ///
     /// # Errors
     /// [`BodyError`] names the first constant that is out of its range.
     pub fn validate(&self) -> Result<(), BodyError> {
+        if let Some(error) = &self.error {
+            return Err(error.clone());
+        }
         let range = |what, value: f64, right: bool, wanted| {
-            if right && value.is_finite() {
-                Ok(())
-            } else {
-                Err(BodyError::Range { name: self.name.clone(), what, value, wanted })
-            }
+            if right && value.is_finite() { Ok(()) } else { Err(BodyError::Range { what, value, wanted }) }
         };
         let (m, unit) = (&self.material, self.initial_pose.rotation.norm());
         range("restitution", m.restitution, (0.0..=1.0).contains(&m.restitution), "between 0 and 1")?;

@@ -4,29 +4,20 @@
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BodyError {
-    /// The mass is not a positive finite number.
-    #[error("body '{name}': mass is {mass} kg; it must be finite and above 0")]
-    Mass {
-        /// Body.
-        name: String,
-        /// Value given.
-        mass: f64,
-    },
+    /// The mass, kg, is not a positive finite number.
+    #[error("mass is {0} kg; it must be finite and above 0")]
+    Mass(f64),
     /// No body has this inertia.
     #[error(
-        "body '{name}': inertia has principal moments {moments:?} kg·m²; each must be finite and above 0, and none above the sum of the other two"
+        "inertia has principal moments {moments:?} kg·m²; each must be finite and above 0, and none above the sum of the other two"
     )]
     Inertia {
-        /// Body.
-        name: String,
         /// Principal moments of the value given.
         moments: [f64; 3],
     },
     /// A constant is out of its range.
-    #[error("body '{name}': {what} is {value}; it must be {wanted}")]
+    #[error("{what} is {value}; it must be {wanted}")]
     Range {
-        /// Body.
-        name: String,
         /// Name of the constant.
         what: &'static str,
         /// Value given.
@@ -34,12 +25,7 @@ pub enum BodyError {
         /// Admissible range.
         wanted: &'static str,
     },
-    /// The shape has no mass properties of its own.
-    #[error("body '{name}': {why}")]
-    Shape {
-        /// Body.
-        name: String,
-        /// Reason, from the shape.
-        why: String,
-    },
+    /// The shape has no mass properties of its own, for the reason that it gives.
+    #[error("{0}")]
+    Shape(String),
 }

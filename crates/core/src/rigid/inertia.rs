@@ -20,13 +20,19 @@ pub(super) struct Inertia {
 }
 
 impl Inertia {
+    /// Returns the unit inertia.
+    pub fn unit() -> Inertia {
+        let (unit, principal) = (Mat3::identity(), Quat::identity());
+        Inertia { tensor: unit, inverse: unit, root: unit, inverse_root: unit, moments: Vec3::repeat(1.0), principal }
+    }
+
     /// Checks and factors a tensor; only its symmetric part counts.
     ///
     /// # Errors
-    /// [`BodyError::Inertia`], with the name of the body.
-    pub fn new(name: &str, tensor: Mat3) -> Result<Inertia, BodyError> {
-        let symmetric = 0.5 * (tensor + tensor.transpose());
-        let bad = |moments: [f64; 3]| BodyError::Inertia { name: name.to_string(), moments };
+    /// [`BodyError::Inertia`].
+    pub fn new(tensor: &Mat3) -> Result<Inertia, BodyError> {
+        let symmetric = symmetric(tensor);
+        let bad = |moments: [f64; 3]| BodyError::Inertia { moments };
         if symmetric.iter().any(|x| !x.is_finite()) {
             return Err(bad([f64::NAN; 3]));
         }
@@ -49,6 +55,11 @@ impl Inertia {
             principal,
         })
     }
+}
+
+/// Returns the symmetric part.
+pub(super) fn symmetric(tensor: &Mat3) -> Mat3 {
+    0.5 * (tensor + tensor.transpose())
 }
 
 /// Returns eigenvectors (columns) and eigenvalues; a diagonal tensor keeps its own axes.

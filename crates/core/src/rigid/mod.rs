@@ -12,8 +12,8 @@
 //!
 //! The frame of the part has its origin at the center of mass (thesis §III.A.1) and the axes of the body. The *frame of the body*, in which
 //! users place it, is that of its shape: a mesh keeps the frame of its file, and [`RigidBody::center_of_mass`] is a point of it. State, velocities
-//! and parts refer to the center of mass; [`World::pose`](crate::World::pose), [`World::set_pose`](crate::World::set_pose) and [`RigidBody::at`]
-//! convert.
+//! and parts refer to the center of mass; [`World::pose`](crate::World::pose), [`World::set_pose`](crate::World::set_pose) and
+//! [`RigidBody::with_pose`] convert.
 
 mod body;
 mod error;

@@ -45,9 +45,14 @@ pub enum WorldError {
     /// Names are unique.
     #[error("an object named '{0}' is already in the world; names must be unique")]
     DuplicateName(String),
-    /// Constants of a body out of range.
-    #[error(transparent)]
-    Body(#[from] BodyError),
+    /// Constants of a body are out of range.
+    #[error("body '{name}': {why}")]
+    Body {
+        /// Body.
+        name: String,
+        /// Which constant, and its range.
+        why: BodyError,
+    },
     /// A setting out of range.
     #[error(transparent)]
     Settings(#[from] SettingsError),
@@ -365,7 +370,7 @@ impl World {
         }
         let any: &dyn std::any::Any = object.as_ref();
         if let Some(body) = any.downcast_ref::<RigidBody>() {
-            body.validate()?;
+            body.validate().map_err(|why| WorldError::Body { name: name.clone(), why })?;
         }
         let core = &mut self.core;
         let parts = object.collidable().map_or(0, |c| c.parts());

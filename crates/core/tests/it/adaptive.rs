@@ -87,8 +87,10 @@ const MOMENTS: [f64; 3] = [1.0, 2.0, 3.0];
 
 /// Adds a body with I = (1, 2, 3) kg·m² that spins about its unstable axis.
 fn top(world: &mut World) -> ObjectId {
-    let body = RigidBody::new("top", sphere(1.0), 1.0, Mat3::from_diagonal(&Vec3::from(MOMENTS))).unwrap();
-    world.add(body.moving(Vec3::zeros(), Vec3::new(0.01, 5.0, 0.01))).unwrap()
+    let body = RigidBody::new(sphere(1.0))
+        .with_name("top")
+        .with_mass_and_inertia(1.0, Mat3::from_diagonal(&Vec3::from(MOMENTS)));
+    world.add(body.with_angular_velocity(Vec3::new(0.01, 5.0, 0.01))).unwrap()
 }
 
 /// Returns a torque that depends on time and attitude, and a force.
@@ -210,11 +212,7 @@ fn the_error_of_an_oscillator_goes_with_the_tolerance() {
     let at = |tolerance: f64| {
         let mut world = adaptive(1.0 / 10.0, tolerance);
         let id = world
-            .add(
-                RigidBody::with_mass("ball", sphere(0.1), 1.0)
-                    .unwrap()
-                    .moving(Vec3::new(10.0, 0.0, 0.0), Vec3::zeros()),
-            )
+            .add(RigidBody::new(sphere(0.1)).with_name("ball").with_mass(1.0).with_velocity(Vec3::new(10.0, 0.0, 0.0)))
             .unwrap();
         world.add(Spring { name: "spring".into(), on: id, to: Vec3::zeros(), k: 100.0, c: 0.0 }).unwrap();
         let (mut steps, mut worst) = (0, 0.0f64);
@@ -247,7 +245,7 @@ fn the_error_of_an_oscillator_goes_with_the_tolerance() {
 #[test]
 fn forces_are_taken_at_the_time_of_their_stage() {
     let mut world = adaptive(0.25, 0.1);
-    let id = world.add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap()).unwrap();
+    let id = world.add(RigidBody::new(sphere(0.1)).with_name("ball").with_mass(1.0)).unwrap();
     world.add(Drive(id, |t, _| (Vec3::new(5.0 * t.powi(4), 0.0, 0.0), Vec3::zeros()))).unwrap();
     for frame in 1..=8 {
         let steps = world.step().unwrap().inner_steps;
@@ -268,10 +266,18 @@ fn strokes_against_a_wall_are_located_within_inner_steps() {
     let mut world = adaptive(0.1, 1e-10);
     let wall = Pose::new(Vec3::new(0.6, 0.0, 0.0), Vec3::new(0.0, -std::f64::consts::FRAC_PI_2, 0.0));
     world
-        .add_static(RigidBody::fixed("wall", tumble_core::collide::Shape::half_space()).surface(1.0, 0.0).at(wall))
+        .add_static(
+            RigidBody::fixed(tumble_core::collide::Shape::half_space())
+                .with_name("wall")
+                .with_material(Material { restitution: 1.0, friction: 0.0, ..Material::default() })
+                .with_pose(wall),
+        )
         .unwrap();
-    let body =
-        RigidBody::with_mass("ball", sphere(0.1), 2.0).unwrap().surface(1.0, 0.0).at(Pose::translation(-1.0, 0.0, 0.0));
+    let body = RigidBody::new(sphere(0.1))
+        .with_name("ball")
+        .with_mass(2.0)
+        .with_material(Material { restitution: 1.0, friction: 0.0, ..Material::default() })
+        .with_pose(Pose::translation(-1.0, 0.0, 0.0));
     let id = world.add(body).unwrap();
     world.add(Spring { name: "spring".into(), on: id, to: Vec3::zeros(), k: 50.0, c: 0.0 }).unwrap();
     // x = −cos(5t) up to 0.5 at 5t = 2π/3; then from phase −2π/3 again
@@ -305,12 +311,18 @@ fn a_stroke_that_comes_early_is_found_in_the_dense_output() {
         let mut world = adaptive(0.1, tolerance);
         let wall = Pose::new(Vec3::new(0.6, 0.0, 0.0), Vec3::new(0.0, -std::f64::consts::FRAC_PI_2, 0.0));
         world
-            .add_static(RigidBody::fixed("wall", tumble_core::collide::Shape::half_space()).surface(1.0, 0.0).at(wall))
+            .add_static(
+                RigidBody::fixed(tumble_core::collide::Shape::half_space())
+                    .with_name("wall")
+                    .with_material(Material { restitution: 1.0, friction: 0.0, ..Material::default() })
+                    .with_pose(wall),
+            )
             .unwrap();
-        let body = RigidBody::with_mass("ball", sphere(0.1), 2.0)
-            .unwrap()
-            .surface(1.0, 0.0)
-            .at(Pose::translation(0.25, 0.0, 0.0));
+        let body = RigidBody::new(sphere(0.1))
+            .with_name("ball")
+            .with_mass(2.0)
+            .with_material(Material { restitution: 1.0, friction: 0.0, ..Material::default() })
+            .with_pose(Pose::translation(0.25, 0.0, 0.0));
         let id = world.add(body).unwrap();
         world.add(Spring { name: "spring".into(), on: id, to: Vec3::zeros(), k: -k, c: 0.0 }).unwrap();
         let stroke = 2f64.acosh() / rate;
@@ -335,9 +347,17 @@ fn a_stroke_that_comes_early_is_found_in_the_dense_output() {
 #[test]
 fn balls_collide_at_the_right_place_and_time() {
     let mut world = adaptive(1.0 / 60.0, 1e-6);
-    let ball = |name: &str| RigidBody::with_mass(name, sphere(0.1), 1.0).unwrap().surface(1.0, 0.0);
-    let a = world.add(ball("a").moving(Vec3::new(3.0, 0.0, 0.0), Vec3::new(0.0, 9.0, 4.0))).unwrap();
-    let b = world.add(ball("b").at(Pose::translation(1.0, 0.12, 0.0))).unwrap();
+    let ball = |name: &str| {
+        RigidBody::new(sphere(0.1)).with_name(name).with_mass(1.0).with_material(Material {
+            restitution: 1.0,
+            friction: 0.0,
+            ..Material::default()
+        })
+    };
+    let a = world
+        .add(ball("a").with_velocity(Vec3::new(3.0, 0.0, 0.0)).with_angular_velocity(Vec3::new(0.0, 9.0, 4.0)))
+        .unwrap();
+    let b = world.add(ball("b").with_pose(Pose::translation(1.0, 0.12, 0.0))).unwrap();
     run(&mut world, 1.0);
     // centers 0.2 apart at x = 1 − √(0.04 − 0.0144) = 0.84: the normal is (0.8, 0.6)
     let (n, time) = (Vec3::new(0.8, 0.6, 0.0), 0.28);
@@ -361,8 +381,11 @@ fn a_bouncing_ball_keeps_its_height_and_frames_their_length() {
     let mut world = world("backtracking", 1.0 / 60.0);
     set(&mut world, |s| s.integrator = Integrator::DormandPrince);
     ground(&mut world, 1.0, 0.0);
-    let body =
-        RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().surface(1.0, 0.0).at(Pose::translation(0.0, 0.0, 1.1));
+    let body = RigidBody::new(sphere(0.1))
+        .with_name("ball")
+        .with_mass(1.0)
+        .with_material(Material { restitution: 1.0, friction: 0.0, ..Material::default() })
+        .with_pose(Pose::translation(0.0, 0.0, 1.1));
     let id = world.add(body).unwrap();
     let (fall, mut time) = ((2.0 / G).sqrt(), 0.0f64);
     for _ in 0..600 {
@@ -390,11 +413,14 @@ fn lively() -> World {
         } else {
             tumble_core::collide::Shape::cuboid(Vec3::new(0.2, 0.4, 0.6)).unwrap()
         };
-        let body = RigidBody::with_mass(format!("body{i}"), shape, 1.0 + i as f64).unwrap().surface(0.6, 0.3);
+        let body = RigidBody::new(shape)
+            .with_name(format!("body{i}"))
+            .with_mass(1.0 + i as f64)
+            .with_material(Material { restitution: 0.6, friction: 0.3, ..Material::default() });
         let id = world
             .add(
-                body.at(Pose::translation(0.9 * i as f64, 0.0, 1.0 + 0.2 * i as f64))
-                    .moving(Vec3::zeros(), Vec3::new(3.0, 7.0, i as f64)),
+                body.with_pose(Pose::translation(0.9 * i as f64, 0.0, 1.0 + 0.2 * i as f64))
+                    .with_angular_velocity(Vec3::new(3.0, 7.0, i as f64)),
             )
             .unwrap();
         let to = Vec3::new(0.9 * i as f64, 0.3, 1.0);
@@ -434,7 +460,7 @@ fn save_restore_run_and_fork_give_the_same_bytes() {
 fn the_inner_step_is_carried_from_frame_to_frame() {
     let mut world = adaptive(1.0 / 60.0, 1e-6);
     let id = world
-        .add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().moving(Vec3::new(10.0, 0.0, 0.0), Vec3::zeros()))
+        .add(RigidBody::new(sphere(0.1)).with_name("ball").with_mass(1.0).with_velocity(Vec3::new(10.0, 0.0, 0.0)))
         .unwrap();
     world.add(Spring { name: "spring".into(), on: id, to: Vec3::zeros(), k: 1e4, c: 0.0 }).unwrap();
     let first = world.step().unwrap().inner_steps;
@@ -459,10 +485,11 @@ fn a_far_object_changes_nothing_but_the_steps() {
         let id = top(&mut world);
         world.add(Drive(id, torque)).unwrap();
         if crowded {
-            let far = RigidBody::with_mass("far", sphere(0.1), 1.0)
-                .unwrap()
-                .at(Pose::translation(1000.0, 0.0, 0.0))
-                .moving(Vec3::x(), Vec3::zeros());
+            let far = RigidBody::new(sphere(0.1))
+                .with_name("far")
+                .with_mass(1.0)
+                .with_pose(Pose::translation(1000.0, 0.0, 0.0))
+                .with_velocity(Vec3::x());
             let far = world.add(far).unwrap();
             world
                 .add(Spring { name: "spring".into(), on: far, to: Vec3::new(1000.0, 1.0, 0.0), k: 2000.0, c: 0.0 })
@@ -485,13 +512,17 @@ fn a_far_object_changes_nothing_but_the_steps() {
 fn a_kinematic_body_keeps_its_velocity() {
     let mut world = adaptive(0.1, 1e-8);
     let body = world
-        .add(RigidBody::new("body", sphere(0.2), 1.0, Mat3::from_diagonal(&Vec3::from(MOMENTS))).unwrap())
+        .add(
+            RigidBody::new(sphere(0.2))
+                .with_name("body")
+                .with_mass_and_inertia(1.0, Mat3::from_diagonal(&Vec3::from(MOMENTS))),
+        )
         .unwrap();
     world.set_mode(body, Mode::Kinematic).unwrap();
     let (v, w) = (Vec3::new(0.5, 0.0, 0.2), Vec3::new(0.3, 2.0, -0.4));
     world.set_velocity(body, v, w).unwrap();
     let ball = world
-        .add(RigidBody::with_mass("ball", sphere(0.1), 2.0).unwrap().at(Pose::translation(5.0, 0.0, 0.0)))
+        .add(RigidBody::new(sphere(0.1)).with_name("ball").with_mass(2.0).with_pose(Pose::translation(5.0, 0.0, 0.0)))
         .unwrap();
     world.add(Spring { name: "spring".into(), on: ball, to: Vec3::new(5.0, 1.0, 0.0), k: 30.0, c: 0.1 }).unwrap();
     run(&mut world, 2.0);
@@ -505,10 +536,10 @@ fn a_kinematic_body_keeps_its_velocity() {
 fn what_it_cannot_follow_is_an_error_with_a_name_and_changes_nothing() {
     // 1e9 rad/s need some 1e7 steps per frame
     let mut world = adaptive(1.0 / 60.0, 1e-6);
-    let id = world.add(RigidBody::with_mass("calm", sphere(0.1), 1.0).unwrap()).unwrap();
+    let id = world.add(RigidBody::new(sphere(0.1)).with_name("calm").with_mass(1.0)).unwrap();
     world.add(Spring { name: "soft".into(), on: id, to: Vec3::x(), k: 1.0, c: 0.0 }).unwrap();
     let id = world
-        .add(RigidBody::with_mass("wild", sphere(0.1), 1.0).unwrap().at(Pose::translation(5.0, 3.0, 0.0)))
+        .add(RigidBody::new(sphere(0.1)).with_name("wild").with_mass(1.0).with_pose(Pose::translation(5.0, 3.0, 0.0)))
         .unwrap();
     world.add(Spring { name: "stiff".into(), on: id, to: Vec3::new(0.0, 3.0, 0.0), k: 1e18, c: 0.0 }).unwrap();
     let before = world.save();
@@ -517,7 +548,7 @@ fn what_it_cannot_follow_is_an_error_with_a_name_and_changes_nothing() {
     assert!(world.save() == before);
     // no step is short enough for this blow
     let mut world = adaptive(1.0 / 60.0, 1e-6);
-    let id = world.add(RigidBody::with_mass("struck", sphere(0.1), 1.0).unwrap()).unwrap();
+    let id = world.add(RigidBody::new(sphere(0.1)).with_name("struck").with_mass(1.0)).unwrap();
     world
         .add(Drive(id, |t, _| (if t > 0.009 { Vec3::new(1e20, 0.0, 0.0) } else { Vec3::zeros() }, Vec3::zeros())))
         .unwrap();
@@ -526,7 +557,7 @@ fn what_it_cannot_follow_is_an_error_with_a_name_and_changes_nothing() {
     assert!(object == "struck" && (time - 0.009).abs() < 1e-9 && *step <= 1e-12 / 60.0, "{error}");
     // NaN is found at once
     let mut world = adaptive(1.0 / 60.0, 1e-6);
-    let id = world.add(RigidBody::with_mass("lost", sphere(0.1), 1.0).unwrap()).unwrap();
+    let id = world.add(RigidBody::new(sphere(0.1)).with_name("lost").with_mass(1.0)).unwrap();
     world.add(Drive(id, |_, _| (Vec3::new(f64::NAN, 0.0, 0.0), Vec3::zeros()))).unwrap();
     assert!(matches!(world.step().unwrap_err(), StepError::NotFinite { object, .. } if object == "lost"));
 }

@@ -4,13 +4,13 @@ use tumble_core::prelude::*;
 
 fn ball(name: &str, height: f64) -> RigidBody {
     let shape = Shape::sphere(0.1).unwrap();
-    RigidBody::with_mass(name, shape, 2.0).unwrap().at(Pose::translation(0.0, 0.0, height))
+    RigidBody::new(shape).with_name(name).with_mass(2.0).with_pose(Pose::translation(0.0, 0.0, height))
 }
 
 #[test]
 fn a_ball_at_rest_touches_the_ground_and_another_in_the_air_touches_nothing() {
     let mut world = World::default();
-    let ground = world.add_static(RigidBody::fixed("ground", Shape::half_space())).unwrap();
+    let ground = world.add_static(RigidBody::fixed(Shape::half_space()).with_name("ground")).unwrap();
     let (low, high) = (world.add(ball("low", 0.1)).unwrap(), world.add(ball("high", 50.0)).unwrap());
     for _ in 0..240 {
         world.step().unwrap();
@@ -24,6 +24,41 @@ fn a_ball_at_rest_touches_the_ground_and_another_in_the_air_touches_nothing() {
     assert_eq!(world.body(ground).unwrap().contacts().count(), 1);
     assert_eq!(world.body(low).unwrap().contacts().count(), 1);
     assert_eq!(world.contacts_of(high).count(), 0);
+}
+
+/// A ball of water with a radius of 0.1 m: `m = 1000·4/3·π·r³`, `I = 2/5·m·r²`.
+#[test]
+fn a_body_without_a_mass_has_the_density_of_water() {
+    let body = RigidBody::new(Shape::sphere(0.1).unwrap());
+    let mass = 4.0 * std::f64::consts::PI / 3.0;
+    assert!((body.mass() - mass).abs() < 1e-12 && (body.inertia().m11 - 0.4 * mass * 0.01).abs() < 1e-13);
+    let body = RigidBody::fixed(Shape::sphere(0.1).unwrap());
+    assert!(body.is_fixed() && !body.clone().with_density(500.0).is_fixed());
+    assert!((body.with_density(500.0).mass() - 0.5 * mass).abs() < 1e-12);
+}
+
+#[test]
+fn a_body_with_a_wrong_constant_is_refused_by_its_name_in_the_world() {
+    let mut world = World::default();
+    let ball = || RigidBody::new(Shape::sphere(0.1).unwrap());
+    let material = Material { friction: -1.0, ..Material::default() };
+    for (body, why) in [
+        (ball().with_mass(-2.0), "body 'body 0': mass is -2 kg; it must be finite and above 0"),
+        (ball().with_name("b").with_density(0.0), "body 'b': density is 0, but must be finite and above 0"),
+        (
+            ball().with_name("b").with_mass_and_inertia(1.0, Mat3::from_diagonal(&Vec3::new(1.0, 1.0, 3.0))),
+            "body 'b': inertia",
+        ),
+        (ball().with_name("b").with_material(material), "body 'b': friction is -1; it must be at least 0"),
+        (RigidBody::new(Shape::half_space()), "body 'body 0': "),
+    ] {
+        let error = world.add(body).unwrap_err().to_string();
+        assert!(error.starts_with(why), "{error}");
+    }
+    assert!(world.ids().is_empty());
+    // a later value replaces a wrong one
+    world.add(ball().with_mass(-1.0).with_mass(1.0)).unwrap();
+    world.add(RigidBody::new(Shape::half_space()).with_mass_and_inertia(1.0, Mat3::identity())).unwrap();
 }
 
 #[test]
@@ -83,8 +118,10 @@ fn a_body_is_read_through_its_view() {
     let mesh = TriMesh::cuboid(Vec3::repeat(0.2)).translated(&Vec3::new(1.0, 0.0, 0.0));
     let shape = Shape::mesh(mesh, &TreeSettings::octree()).unwrap();
     let velocity = Vec3::new(1.0, 2.0, 3.0);
-    let body = RigidBody::with_mass("crate", shape, 1.0).unwrap();
-    let id = world.add(body.at(Pose::translation(4.0, 5.0, 6.0)).moving(velocity, Vec3::z())).unwrap();
+    let body = RigidBody::new(shape).with_name("crate").with_mass(1.0);
+    let id = world
+        .add(body.with_pose(Pose::translation(4.0, 5.0, 6.0)).with_velocity(velocity).with_angular_velocity(Vec3::z()))
+        .unwrap();
     let view = world.body(id).unwrap();
     assert_eq!((view.id(), view.name(), view.mode(), view.is_asleep()), (id, "crate", Mode::Dynamic, false));
     assert!((view.position() - Vec3::new(4.0, 5.0, 6.0)).norm() < 1e-12);
@@ -104,7 +141,7 @@ fn a_body_is_read_through_its_view() {
 #[test]
 fn a_force_from_a_function_acts_as_its_formula_says() {
     let mut world = World::new(Settings::default().with_gravity(Vec3::zeros())).unwrap();
-    let id = world.add(ball("ball", 0.0).moving(Vec3::x(), Vec3::zeros())).unwrap();
+    let id = world.add(ball("ball", 0.0).with_velocity(Vec3::x())).unwrap();
     let drag = world.add_force("drag", move |view, out| out.act_on(view, id, |state| -3.0 * state.velocity)).unwrap();
     let mut fork = world.fork();
     for _ in 0..240 {

@@ -10,15 +10,18 @@ fn everything(stepper: &str) -> World {
     let settings = world.settings().with_combine_restitution(Combine::Min);
     world.set_settings(settings).unwrap();
     ground(&mut world, 0.3, 0.4);
-    let gone = world.add(RigidBody::with_mass("gone", sphere(0.1), 1.0).unwrap()).unwrap();
+    let gone = world.add(RigidBody::new(sphere(0.1)).with_name("gone").with_mass(1.0)).unwrap();
     let mesh = Shape::mesh(TriMesh::torus(0.3, 0.1, 24, 12), &TreeSettings::octree()).unwrap();
     let shapes = [sphere(0.1), cube(0.2), Shape::capsule(0.1, 0.2).unwrap(), Shape::cylinder(0.1, 0.2).unwrap(), mesh];
     let ids: Vec<ObjectId> = (0..10)
         .map(|i| {
-            let body = RigidBody::with_density(format!("body{i}"), shapes[i % 5].clone(), 500.0 + i as f64).unwrap();
+            let body =
+                RigidBody::new(shapes[i % 5].clone()).with_name(format!("body{i}")).with_density(500.0 + i as f64);
             let pose = Pose::translation(0.3 * (i % 3) as f64, 0.0, 0.3 + 0.4 * i as f64);
-            let mut body =
-                body.at(pose).moving(Vec3::zeros(), Vec3::new(i as f64, 1.0, 0.0)).surface(0.1 * i as f64, 0.5);
+            let mut body = body
+                .with_pose(pose)
+                .with_angular_velocity(Vec3::new(i as f64, 1.0, 0.0))
+                .with_material(Material { restitution: 0.1 * i as f64, friction: 0.5, ..Material::default() });
             body.linear_damping = 0.01;
             world.add(body.with_camera(CameraMount::new("eye", 0, Pose::identity()))).unwrap()
         })
@@ -34,7 +37,7 @@ fn everything(stepper: &str) -> World {
         let mass = LinkMass { mass: 1.0, center: Vec3::new(0.0, 0.0, -0.2), inertia: 0.02 * Mat3::identity() };
         last = Some(links.link(format!("link{i}"), last, joint, Pose::translation(0.0, 0.0, -0.4), mass));
     }
-    let mut chain = ArticulatedBody::new("chain", links.build().unwrap()).at(Pose::translation(2.0, 0.0, 2.0));
+    let mut chain = ArticulatedBody::new("chain", links.build().unwrap()).with_pose(Pose::translation(2.0, 0.0, 2.0));
     chain.add_collider("link1", Collider::new(shapes[3].clone(), Pose::translation(0.0, 0.0, -0.2))).unwrap();
     chain.exclude_collisions("link0", "link3").unwrap();
     let motion = Playback::new(vec![0.0, 0.3, 1.0], vec![0.0, 0.4, -0.2]).unwrap();
@@ -89,7 +92,7 @@ fn shared_shapes_are_written_once_and_shared_again() {
     let of = |count: usize| {
         let mut world = world(STEPPERS[0], 1.0 / 240.0);
         (0..count).for_each(|i| {
-            world.add(RigidBody::with_mass(format!("body{i}"), mesh.clone(), 1.0).unwrap()).unwrap();
+            world.add(RigidBody::new(mesh.clone()).with_name(format!("body{i}")).with_mass(1.0)).unwrap();
         });
         world
     };
@@ -126,7 +129,9 @@ impl ForceGenerator for Lift {
 fn objects_of_other_kinds_are_made_by_the_caller() {
     let mut world = everything(STEPPERS[0]);
     let lift = world.add(Lift).unwrap();
-    world.add(RigidBody::with_mass("last", sphere(0.1), 1.0).unwrap().at(Pose::translation(9.0, 0.0, 1.0))).unwrap();
+    world
+        .add(RigidBody::new(sphere(0.1)).with_name("last").with_mass(1.0).with_pose(Pose::translation(9.0, 0.0, 1.0)))
+        .unwrap();
     assert_eq!(world.archive(&[]), Err(ArchiveError::Foreign("lift".into())));
     let bytes = world.archive(&[lift]).unwrap();
     let refused = World::from_archive(&bytes, &mut |_| None).map(|_| ());
@@ -171,7 +176,7 @@ fn visual_meshes_need_no_file_any_more() {
     };
     let visuals = vec![mesh(&there), mesh(&there), mesh(&gone), instead(&there), instead(&gone)];
     let mut world = world("time_stepping", 1.0 / 240.0);
-    world.add(RigidBody::with_mass("b", sphere(0.1), 1.0).unwrap().drawn_as(visuals)).unwrap();
+    world.add(RigidBody::new(sphere(0.1)).with_name("b").with_mass(1.0).with_visuals(visuals)).unwrap();
     let bytes = world.archive(&[]).unwrap();
     let copy = World::from_archive(&bytes, &mut |_| None).unwrap();
     assert_eq!(copy.archive(&[]).unwrap(), bytes);

@@ -13,7 +13,7 @@ use tumble_core::{
 fn thrown(mut world: World, articulated: bool, lift: f64) -> (World, ObjectId) {
     ground(&mut world, 0.6, 0.5);
     let shape = Shape::cuboid(Vec3::new(0.2, 0.4, 0.6)).unwrap();
-    let solid = RigidBody::with_mass("box", shape.clone(), 2.0).unwrap();
+    let solid = RigidBody::new(shape.clone()).with_name("box").with_mass(2.0);
     let pose = Pose::new(Vec3::new(0.0, 0.0, 0.6 + lift), Vec3::new(0.3, 0.5, 0.1));
     let (v, w) = (Vec3::new(0.5, 0.2, -1.0), Vec3::new(1.0, 2.0, 3.0));
     let id = if articulated {
@@ -26,7 +26,7 @@ fn thrown(mut world: World, articulated: bool, lift: f64) -> (World, ObjectId) {
             LinkMass { mass: 2.0, center: Vec3::zeros(), inertia: *solid.inertia() },
         );
         let mut body = ArticulatedBody::new("box", builder.build().unwrap())
-            .at(pose)
+            .with_pose(pose)
             .with_velocities(&[w.x, w.y, w.z, v.x, v.y, v.z])
             .unwrap();
         let mut collider = Collider::new(shape, Pose::identity());
@@ -34,7 +34,13 @@ fn thrown(mut world: World, articulated: bool, lift: f64) -> (World, ObjectId) {
         body.add_collider("box", collider).unwrap();
         world.add(body).unwrap()
     } else {
-        world.add(solid.at(pose).moving(v, w).surface(0.6, 0.5)).unwrap()
+        world
+            .add(solid.with_pose(pose).with_velocity(v).with_angular_velocity(w).with_material(Material {
+                restitution: 0.6,
+                friction: 0.5,
+                ..Material::default()
+            }))
+            .unwrap()
     };
     (world, id)
 }
@@ -86,7 +92,9 @@ fn the_same_contact_gives_the_same_impulse() {
 fn a_chain_that_slides_off_a_sphere_comes_to_rest() {
     let mut world = world(1.0 / 240.0, "time_stepping", Integrator::Verlet);
     ground(&mut world, 0.0, 0.5);
-    world.add_static(RigidBody::fixed("ball", sphere(0.3)).at(Pose::translation(0.0, 0.0, 0.6))).unwrap();
+    world
+        .add_static(RigidBody::fixed(sphere(0.3)).with_name("ball").with_pose(Pose::translation(0.0, 0.0, 0.6)))
+        .unwrap();
     let id = world.add(loose_chain(16, Vec3::new(0.03, 0.01, 1.0), 0.5)).unwrap();
     let (start, mut highest): (f64, f64) = (world.energy().total(), 0.0);
     for _ in 0..240 * 5 {
@@ -118,7 +126,13 @@ fn joined(world: &World, id: ObjectId, links: usize) {
 fn a_chain_drapes_over_a_sphere() {
     for stepper in ["time_stepping", "backtracking"] {
         let mut world = world(1.0 / 240.0, stepper, Integrator::Verlet);
-        world.add_static(RigidBody::fixed("ball", sphere(0.3)).surface(0.0, 1.0)).unwrap();
+        world
+            .add_static(
+                RigidBody::fixed(sphere(0.3))
+                    .with_name("ball")
+                    .with_material(Material { friction: 1.0, ..Material::default() }),
+            )
+            .unwrap();
         let id = world.add(loose_chain(10, Vec3::new(0.0, 0.0, 0.33), 1.0)).unwrap();
         let mut last = 0.0;
         run(&mut world, if stepper == "backtracking" { 2.0 } else { 8.0 });
@@ -140,7 +154,7 @@ fn pendulums(mut world: World, angle: f64) -> World {
     for (name, x, q) in [("left", -0.05, angle), ("right", 0.05, 0.0)] {
         let bob = LinkMass { inertia: 1e-3 * Mat3::identity(), ..LinkMass::point(1.0, Vec3::new(0.0, 0.0, -0.5)) };
         let mut body = ArticulatedBody::new(name, hinged(1, 0.5, bob))
-            .at(Pose::translation(x, 0.0, 0.0))
+            .with_pose(Pose::translation(x, 0.0, 0.0))
             .with_positions(&[q])
             .unwrap();
         let mut ball = Collider::new(sphere(0.05), Pose::translation(0.0, 0.0, -0.5));
@@ -220,9 +234,10 @@ fn a_ball_at_rest_on_a_held_arm_loads_its_joint() {
     let hold = |friction| DofSettings { friction, ..DofSettings::default() };
     body.set_dof(0, hold(4.95)).unwrap();
     let table = world.add(body).unwrap();
-    let cube = RigidBody::with_mass("cube", Shape::cuboid(Vec3::repeat(0.1)).unwrap(), 1.0)
-        .unwrap()
-        .at(Pose::translation(0.3, 0.0, 1.06));
+    let cube = RigidBody::new(Shape::cuboid(Vec3::repeat(0.1)).unwrap())
+        .with_name("cube")
+        .with_mass(1.0)
+        .with_pose(Pose::translation(0.3, 0.0, 1.06));
     world.add(cube).unwrap();
     run(&mut world, 3.0);
     assert!(world.state_of(table).unwrap()[0].abs() < 1e-6, "{:?}", world.state_of(table));

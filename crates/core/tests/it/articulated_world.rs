@@ -55,7 +55,7 @@ pub fn loose_chain(links: usize, center: Vec3, friction: f64) -> ArticulatedBody
         ));
     }
     let start = Pose::translation(center.x - 0.5 * links as f64 * length, center.y, center.z);
-    let mut body = ArticulatedBody::new("chain", builder.build().unwrap()).at(start);
+    let mut body = ArticulatedBody::new("chain", builder.build().unwrap()).with_pose(start);
     for i in 0..links {
         let mut collider = Collider::new(shape.clone(), along);
         collider.material.friction = friction;

@@ -66,11 +66,11 @@ fn festoon(stepper: &str, dt: f64, count: usize, pins: usize, heavy: f64) -> (Wo
     for i in 0..count {
         let angle = turn * (i as f64 + 0.5) - 0.5 * std::f64::consts::PI;
         let mass = if i + 1 == count { 0.5 * heavy } else { 0.5 };
-        let body =
-            RigidBody::with_mass(format!("bar{i}"), Shape::cuboid(Vec3::new(2.0 * HALF, 0.04, 0.04)).unwrap(), mass)
-                .unwrap();
+        let body = RigidBody::new(Shape::cuboid(Vec3::new(2.0 * HALF, 0.04, 0.04)).unwrap())
+            .with_name(format!("bar{i}"))
+            .with_mass(mass);
         let at = Pose::new(Vec3::new(radius * angle.sin(), 0.0, -radius * angle.cos()), Vec3::new(0.0, -angle, 0.0));
-        bars.push(world.add(body.at(at).moving(Vec3::new(0.0, 0.3 * angle.cos(), 0.0), Vec3::zeros())).unwrap());
+        bars.push(world.add(body.with_pose(at).with_velocity(Vec3::new(0.0, 0.3 * angle.cos(), 0.0))).unwrap());
         world.set_collidable(bars[i], false).unwrap();
     }
     let hook = |bar: usize, x: f64| end(world.part_state(bars[bar], 0).unwrap(), x).0;

@@ -17,13 +17,26 @@ pub fn no_gravity(mut world: World) -> World {
 }
 
 pub fn ground(world: &mut World, restitution: f64, friction: f64) -> ObjectId {
-    world.add_static(RigidBody::fixed("ground", Shape::half_space()).surface(restitution, friction)).unwrap()
+    world
+        .add_static(RigidBody::fixed(Shape::half_space()).with_name("ground").with_material(Material {
+            restitution,
+            friction,
+            ..Material::default()
+        }))
+        .unwrap()
 }
 
 /// Ground tilted about y so that downhill is +x.
 pub fn slope(world: &mut World, angle: f64, friction: f64) -> ObjectId {
     let pose = Pose::rotation(Vec3::new(0.0, angle, 0.0));
-    world.add_static(RigidBody::fixed("slope", Shape::half_space()).surface(0.0, friction).at(pose)).unwrap()
+    world
+        .add_static(
+            RigidBody::fixed(Shape::half_space())
+                .with_name("slope")
+                .with_material(Material { friction, ..Material::default() })
+                .with_pose(pose),
+        )
+        .unwrap()
 }
 
 pub fn sphere(radius: f64) -> Shape {
@@ -47,9 +60,12 @@ pub fn slide(stepper: &str, solver: &str, dt: f64) -> (f64, f64, f64) {
     let mut world = world(stepper, dt);
     world.set_solver(solver::by_name(solver).unwrap());
     ground(&mut world, 0.0, 0.5);
-    let body = RigidBody::with_mass("box", cube(0.2), 1.0).unwrap().surface(0.0, 0.5);
+    let body = RigidBody::new(cube(0.2))
+        .with_name("box")
+        .with_mass(1.0)
+        .with_material(Material { friction: 0.5, ..Material::default() });
     let id =
-        world.add(body.at(Pose::translation(0.0, 0.0, 0.1)).moving(Vec3::new(5.0, 0.0, 0.0), Vec3::zeros())).unwrap();
+        world.add(body.with_pose(Pose::translation(0.0, 0.0, 0.1)).with_velocity(Vec3::new(5.0, 0.0, 0.0))).unwrap();
     let (mut stop, mut gap) = (f64::NAN, 0.0f64);
     for _ in 0..(1.5 / dt) as usize {
         let (before, start) = (velocity(&world, id).x, world.time());

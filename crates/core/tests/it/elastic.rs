@@ -10,8 +10,14 @@ fn room(world: &mut World, half: f64, restitution: f64, friction: f64) {
     let turns = [(0.0, 0.0), (PI, 0.0), (FRAC_PI_2, 0.0), (-FRAC_PI_2, 0.0), (0.0, FRAC_PI_2), (0.0, -FRAC_PI_2)];
     for (k, (x, y)) in turns.into_iter().enumerate() {
         let rotation = Pose::rotation(Vec3::new(x, y, 0.0)).rotation;
-        let wall = RigidBody::fixed(format!("wall{k}"), Shape::half_space()).surface(restitution, friction);
-        world.add_static(wall.at(Pose::from_parts((rotation * Vec3::new(0.0, 0.0, -half)).into(), rotation))).unwrap();
+        let wall = RigidBody::fixed(Shape::half_space()).with_name(format!("wall{k}")).with_material(Material {
+            restitution,
+            friction,
+            ..Material::default()
+        });
+        world
+            .add_static(wall.with_pose(Pose::from_parts((rotation * Vec3::new(0.0, 0.0, -half)).into(), rotation)))
+            .unwrap();
     }
 }
 
@@ -54,8 +60,12 @@ fn watch(world: &mut World, seconds: f64) -> Swing {
 fn alone(shape: Shape, rate: f64, spin: Vec3, restitution: f64, friction: f64) -> World {
     let mut world = no_gravity(world("time_stepping", 1.0 / rate));
     room(&mut world, 0.6, restitution, friction);
-    let body = RigidBody::with_mass("body", shape, 1.0).unwrap().surface(restitution, friction);
-    world.add(body.moving(Vec3::new(1.0, 0.7, 0.4), spin)).unwrap();
+    let body = RigidBody::new(shape).with_name("body").with_mass(1.0).with_material(Material {
+        restitution,
+        friction,
+        ..Material::default()
+    });
+    world.add(body.with_velocity(Vec3::new(1.0, 0.7, 0.4)).with_angular_velocity(spin)).unwrap();
     world
 }
 
@@ -109,10 +119,17 @@ fn bodies_that_strike_each_other_and_the_walls_keep_their_energy() {
         room(&mut world, 0.6, 1.0, 0.0);
         for (i, (name, shape)) in shapes().into_iter().cycle().take(count).enumerate() {
             let (x, y) = ((i % 2) as f64 - 0.5, (i / 2) as f64 / 2.0 - 0.5);
-            let body = RigidBody::with_mass(format!("{name} {i}"), shape, 1.0 + i as f64).unwrap().surface(1.0, 0.0);
+            let body = RigidBody::new(shape)
+                .with_name(format!("{name} {i}"))
+                .with_mass(1.0 + i as f64)
+                .with_material(Material { restitution: 1.0, friction: 0.0, ..Material::default() });
             let spin = Vec3::new(5.0 - i as f64, 8.0, 3.0 + i as f64);
             world
-                .add(body.at(Pose::translation(0.6 * x, 0.7 * y, 0.1 * x)).moving(Vec3::new(-x, 0.7 * y, 0.4), spin))
+                .add(
+                    body.with_pose(Pose::translation(0.6 * x, 0.7 * y, 0.1 * x))
+                        .with_velocity(Vec3::new(-x, 0.7 * y, 0.4))
+                        .with_angular_velocity(spin),
+                )
                 .unwrap();
         }
         let swing = watch(&mut world, 60.0);
@@ -131,9 +148,12 @@ fn a_body_that_bounces_on_the_ground_keeps_its_energy() {
     for (name, shape) in shapes() {
         let mut world = world("time_stepping", 1.0 / 240.0);
         ground(&mut world, 1.0, 0.0);
-        let body =
-            RigidBody::with_mass("body", shape, 1.0).unwrap().surface(1.0, 0.0).at(Pose::translation(0.0, 0.0, 1.0));
-        world.add(body.moving(Vec3::zeros(), Vec3::new(3.0, 8.0, 5.0))).unwrap();
+        let body = RigidBody::new(shape)
+            .with_name("body")
+            .with_mass(1.0)
+            .with_material(Material { restitution: 1.0, friction: 0.0, ..Material::default() })
+            .with_pose(Pose::translation(0.0, 0.0, 1.0));
+        world.add(body.with_angular_velocity(Vec3::new(3.0, 8.0, 5.0))).unwrap();
         let start = world.energy().total();
         let (mut most, mut least, mut passes): (f64, f64, u32) = (0.0, 0.0, 0);
         for _ in 0..240 * 60 {
@@ -152,8 +172,10 @@ fn a_body_that_bounces_on_the_ground_keeps_its_energy() {
 fn a_free_body_of_three_moments_keeps_energy_and_angular_momentum() {
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, 1.0 / 60.0));
-        let body = RigidBody::new("top", sphere(1.0), 1.0, Mat3::from_diagonal(&Vec3::new(1.0, 2.0, 3.0))).unwrap();
-        world.add(body.moving(Vec3::zeros(), Vec3::new(0.01, 8.0, 0.01))).unwrap();
+        let body = RigidBody::new(sphere(1.0))
+            .with_name("top")
+            .with_mass_and_inertia(1.0, Mat3::from_diagonal(&Vec3::new(1.0, 2.0, 3.0)));
+        world.add(body.with_angular_velocity(Vec3::new(0.01, 8.0, 0.01))).unwrap();
         let (energy, momentum) = (world.energy().kinetic, world.momentum().angular);
         for _ in 0..60 * 20 {
             world.step().unwrap();

@@ -10,8 +10,10 @@ fn tumbling(integrator: Integrator, stepper: &str, dt: f64) -> (World, ObjectId)
     let mut world = no_gravity(world(stepper, dt));
     let settings = world.settings().with_integrator(integrator);
     world.set_settings(settings).unwrap();
-    let body = RigidBody::new("top", sphere(1.0), 1.0, Mat3::from_diagonal(&Vec3::new(1.0, 2.0, 3.0))).unwrap();
-    let id = world.add(body.moving(Vec3::zeros(), Vec3::new(0.01, 5.0, 0.01))).unwrap();
+    let body = RigidBody::new(sphere(1.0))
+        .with_name("top")
+        .with_mass_and_inertia(1.0, Mat3::from_diagonal(&Vec3::new(1.0, 2.0, 3.0)));
+    let id = world.add(body.with_angular_velocity(Vec3::new(0.01, 5.0, 0.01))).unwrap();
     (world, id)
 }
 
@@ -78,9 +80,7 @@ fn a_thrown_body_follows_the_parabola() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);
         let ball = world
-            .add(
-                RigidBody::with_mass("ball", sphere(0.1), 2.0).unwrap().moving(Vec3::new(3.0, 0.0, 4.0), Vec3::zeros()),
-            )
+            .add(RigidBody::new(sphere(0.1)).with_name("ball").with_mass(2.0).with_velocity(Vec3::new(3.0, 0.0, 4.0)))
             .unwrap();
         (0..60).for_each(|_| {
             world.step().unwrap();
@@ -95,7 +95,11 @@ fn damping_is_exponential() {
     let mut world = no_gravity(world("backtracking", 1.0 / 240.0));
     let settings = world.settings().with_integrator(Integrator::Rk4);
     world.set_settings(settings).unwrap();
-    let mut body = RigidBody::with_mass("ball", sphere(0.1), 2.0).unwrap().moving(Vec3::x(), Vec3::z());
+    let mut body = RigidBody::new(sphere(0.1))
+        .with_name("ball")
+        .with_mass(2.0)
+        .with_velocity(Vec3::x())
+        .with_angular_velocity(Vec3::z());
     (body.linear_damping, body.angular_damping) = (0.7, 0.3);
     let id = world.add(body).unwrap();
     (0..480).for_each(|_| {
@@ -143,7 +147,7 @@ fn forces_are_taken_at_each_stage_so_a_spring_keeps_its_energy() {
         let settings = world.settings().with_integrator(integrator);
         world.set_settings(settings).unwrap();
         let body =
-            RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().moving(Vec3::new(10.0, 0.0, 0.0), Vec3::zeros());
+            RigidBody::new(sphere(0.1)).with_name("ball").with_mass(1.0).with_velocity(Vec3::new(10.0, 0.0, 0.0));
         let id = world.add(body).unwrap();
         world.add(Spring(id, 100.0)).unwrap();
         let mut worst = 0.0f64;

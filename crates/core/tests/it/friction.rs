@@ -29,10 +29,11 @@ fn on_slope(stepper: &str, angle: f64, friction: f64, seconds: f64) -> (World, O
     let turn = Pose::rotation(Vec3::new(0.0, angle, 0.0));
     let id = world
         .add(
-            RigidBody::with_mass("box", cube(0.2), 1.0)
-                .unwrap()
-                .surface(0.0, friction)
-                .at(turn * Pose::translation(0.0, 0.0, 0.1)),
+            RigidBody::new(cube(0.2))
+                .with_name("box")
+                .with_mass(1.0)
+                .with_material(Material { friction, ..Material::default() })
+                .with_pose(turn * Pose::translation(0.0, 0.0, 0.1)),
         )
         .unwrap();
     (0..(seconds * 240.0) as usize).for_each(|_| {
@@ -82,9 +83,12 @@ fn a_sliding_sphere_ends_rolling_at_five_sevenths() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 240.0);
         ground(&mut world, 0.0, 0.3);
-        let ball = RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().surface(0.0, 0.3);
+        let ball = RigidBody::new(sphere(0.1))
+            .with_name("ball")
+            .with_mass(1.0)
+            .with_material(Material { friction: 0.3, ..Material::default() });
         let id = world
-            .add(ball.at(Pose::translation(0.0, 0.0, 0.1)).moving(Vec3::new(3.0, 0.0, 0.0), Vec3::zeros()))
+            .add(ball.with_pose(Pose::translation(0.0, 0.0, 0.1)).with_velocity(Vec3::new(3.0, 0.0, 0.0)))
             .unwrap();
         (0..480).for_each(|_| {
             world.step().unwrap();
@@ -104,9 +108,12 @@ fn a_spinning_sphere_does_not_sink() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);
         ground(&mut world, 0.0, 0.0);
-        let ball = RigidBody::with_mass("ball", sphere(0.5), 1.0).unwrap().surface(0.0, 0.0);
+        let ball = RigidBody::new(sphere(0.5))
+            .with_name("ball")
+            .with_mass(1.0)
+            .with_material(Material { friction: 0.0, ..Material::default() });
         let id = world
-            .add(ball.at(Pose::translation(0.0, 0.0, 0.5)).moving(Vec3::zeros(), Vec3::new(20.0, 0.0, 3.0)))
+            .add(ball.with_pose(Pose::translation(0.0, 0.0, 0.5)).with_angular_velocity(Vec3::new(20.0, 0.0, 3.0)))
             .unwrap();
         (0..300).for_each(|_| {
             world.step().unwrap();

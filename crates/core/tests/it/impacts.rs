@@ -8,8 +8,12 @@ use tumble_core::*;
 fn first_bounce(stepper: &str, e: f64, dt: f64) -> f64 {
     let mut world = world(stepper, dt);
     ground(&mut world, e, 0.0);
-    let ball = RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().surface(e, 0.0);
-    let id = world.add(ball.at(Pose::translation(0.0, 0.0, 1.1))).unwrap();
+    let ball = RigidBody::new(sphere(0.1)).with_name("ball").with_mass(1.0).with_material(Material {
+        restitution: e,
+        friction: 0.0,
+        ..Material::default()
+    });
+    let id = world.add(ball.with_pose(Pose::translation(0.0, 0.0, 1.1))).unwrap();
     let fall = (2.0 / G).sqrt();
     (0..((fall + 0.05) / dt) as usize).for_each(|_| {
         world.step().unwrap();
@@ -36,8 +40,12 @@ fn a_bouncing_ball_comes_to_rest_when_the_series_says() {
     for dt in [1.0 / 60.0, 1.0 / 240.0] {
         let mut world = world("backtracking", dt);
         ground(&mut world, 0.5, 0.0);
-        let ball = RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().surface(0.5, 0.0);
-        let id = world.add(ball.at(Pose::translation(0.0, 0.0, 1.1))).unwrap();
+        let ball = RigidBody::new(sphere(0.1)).with_name("ball").with_mass(1.0).with_material(Material {
+            restitution: 0.5,
+            friction: 0.0,
+            ..Material::default()
+        });
+        let id = world.add(ball.with_pose(Pose::translation(0.0, 0.0, 1.1))).unwrap();
         let mut rest = f64::NAN;
         // sub-steps are not shown outside a frame: step single short frames once the bounces are small
         while world.time() < 1.5 {
@@ -64,11 +72,14 @@ fn cradle(stepper: &str, masses: &[f64], speeds: &[f64], gap: f64) -> Vec<f64> {
         .enumerate()
         .map(|(i, (m, v))| {
             let shift = if *v > 0.0 { -gap } else { 0.0 };
-            let ball = RigidBody::with_mass(format!("ball{i}"), sphere(0.5), *m).unwrap().surface(1.0, 0.0);
+            let ball = RigidBody::new(sphere(0.5))
+                .with_name(format!("ball{i}"))
+                .with_mass(*m)
+                .with_material(Material { restitution: 1.0, friction: 0.0, ..Material::default() });
             world
                 .add(
-                    ball.at(Pose::translation(i as f64 + shift, 0.0, 0.0))
-                        .moving(Vec3::new(*v, 0.0, 0.0), Vec3::zeros()),
+                    ball.with_pose(Pose::translation(i as f64 + shift, 0.0, 0.0))
+                        .with_velocity(Vec3::new(*v, 0.0, 0.0)),
                 )
                 .unwrap()
         })
@@ -112,7 +123,11 @@ fn break_shot(stepper: &str, dt: f64) -> (World, Vec3, f64) {
     ground(&mut world, 0.0, 0.0);
     let r = 0.028575;
     let ball = |name: String, x: f64, y: f64| {
-        RigidBody::with_mass(name, sphere(r), 0.17).unwrap().surface(1.0, 0.0).at(Pose::translation(x, y, r))
+        RigidBody::new(sphere(r))
+            .with_name(name)
+            .with_mass(0.17)
+            .with_material(Material { restitution: 1.0, friction: 0.0, ..Material::default() })
+            .with_pose(Pose::translation(x, y, r))
     };
     for row in 0..5 {
         for k in 0..=row {
@@ -120,7 +135,7 @@ fn break_shot(stepper: &str, dt: f64) -> (World, Vec3, f64) {
             world.add(ball(format!("ball{row}{k}"), x, y)).unwrap();
         }
     }
-    world.add(ball("cue".into(), -0.5, 0.003).moving(Vec3::new(9.0, 0.0, 0.0), Vec3::zeros())).unwrap();
+    world.add(ball("cue".into(), -0.5, 0.003).with_velocity(Vec3::new(9.0, 0.0, 0.0))).unwrap();
     let (p, e) = (world.momentum().linear, world.energy().kinetic);
     (world, p, e)
 }

@@ -20,7 +20,7 @@ pub fn bar(name: &str, from: Vec3, to: Vec3) -> RigidBody {
     let d = to - from;
     let shape = Shape::cuboid(Vec3::new(d.norm(), 0.02, 0.02)).unwrap();
     let pose = Pose::new(0.5 * (from + to), AXIS * d.z.atan2(d.x));
-    let mut bar = RigidBody::with_mass(name, shape, d.norm()).unwrap().at(pose);
+    let mut bar = RigidBody::new(shape).with_name(name).with_mass(d.norm()).with_pose(pose);
     bar.mask = 0;
     bar
 }
@@ -173,7 +173,7 @@ const ROD: f64 = 0.25;
 fn engine(world: &mut World, crank: ObjectId) -> ObjectId {
     let (pin, gudgeon) = (Vec3::new(CRANK, 0.0, 0.0), Vec3::new(piston(0.0), 0.0, 0.0));
     let rod = world.add(bar("rod", pin, gudgeon)).unwrap();
-    let mut slug = RigidBody::with_mass("piston", cube(0.05), 0.5).unwrap().at(Pose::from(gudgeon));
+    let mut slug = RigidBody::new(cube(0.05)).with_name("piston").with_mass(0.5).with_pose(Pose::from(gudgeon));
     slug.mask = 0;
     let piston = world.add(slug).unwrap();
     hinge(world, "crank pin", rod, Some(crank), pin, AXIS);
@@ -192,7 +192,8 @@ fn a_slider_crank_follows_its_closed_form() {
         let crank = world
             .add(
                 bar("crank", Vec3::zeros(), Vec3::new(CRANK, 0.0, 0.0))
-                    .moving(flung.cross(&Vec3::new(0.5 * CRANK, 0.0, 0.0)), flung),
+                    .with_velocity(flung.cross(&Vec3::new(0.5 * CRANK, 0.0, 0.0)))
+                    .with_angular_velocity(flung),
             )
             .unwrap();
         hinge(&mut world, "main bearing", crank, None, Vec3::zeros(), AXIS);
@@ -221,7 +222,7 @@ fn a_kinematic_wheel_drives_the_piston() {
     let spin = 10.0;
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / RATE);
-        let wheel = RigidBody::fixed("wheel", sphere(0.12)).moving(Vec3::zeros(), Vec3::new(0.0, -spin, 0.0));
+        let wheel = RigidBody::fixed(sphere(0.12)).with_name("wheel").with_angular_velocity(Vec3::new(0.0, -spin, 0.0));
         let wheel = world.add_boxed(Box::new(wheel), Mode::Kinematic).unwrap();
         world.set_collidable(wheel, false).unwrap();
         let piston_id = engine(&mut world, wheel);
@@ -267,9 +268,10 @@ fn a_linkage_that_strikes_the_ground_stays_closed_and_out_of_it() {
                 (body.group, body.mask) = (CollisionGroup::new(1).unwrap(), CollisionGroup::default().bit());
                 (body.material.restitution, body.material.friction) = (restitution, friction);
             }
-            let floor = RigidBody::fixed("floor", Shape::half_space())
-                .surface(restitution, friction)
-                .at(Pose::translation(0.0, 0.0, -0.12));
+            let floor = RigidBody::fixed(Shape::half_space())
+                .with_name("floor")
+                .with_material(Material { restitution, friction, ..Material::default() })
+                .with_pose(Pose::translation(0.0, 0.0, -0.12));
             linkage.world.add_static(floor).unwrap();
             let (mut gap, mut deep, mut energy, mut touched) = (0.0f64, 0.0f64, f64::MIN, 0);
             for _ in 0..(10.0 * RATE) as usize {

@@ -101,11 +101,12 @@ fn a_fixed_joint_makes_one_body_of_two() {
             .iter()
             .enumerate()
             .map(|(i, &(m, half, c))| {
-                let mut body = RigidBody::with_mass(format!("box {i}"), Shape::cuboid(2.0 * half).unwrap(), m)
-                    .unwrap()
-                    .at(Pose::from(c));
+                let mut body = RigidBody::new(Shape::cuboid(2.0 * half).unwrap())
+                    .with_name(format!("box {i}"))
+                    .with_mass(m)
+                    .with_pose(Pose::from(c));
                 body.mask = 0;
-                world.add(body.moving(push + spin.cross(&(c - center)), spin)).unwrap()
+                world.add(body.with_velocity(push + spin.cross(&(c - center))).with_angular_velocity(spin)).unwrap()
             })
             .collect();
         let joint =
@@ -158,7 +159,11 @@ fn door(stepper: &str, solver: &str, hinges: usize) -> (World, ObjectId) {
     let inertia = Mat3::new(3.0, 0.4, 0.7, 0.4, 3.5, -0.3, 0.7, -0.3, 1.2);
     let (axis, foot) = (Vec3::new(0.1, 0.2, 1.0).normalize(), Vec3::new(-0.4, 0.0, -0.8));
     let spin = 4.0 * axis;
-    let mut body = RigidBody::new("door", shape, 10.0, inertia).unwrap().moving(spin.cross(&-foot), spin);
+    let mut body = RigidBody::new(shape)
+        .with_name("door")
+        .with_mass_and_inertia(10.0, inertia)
+        .with_velocity(spin.cross(&-foot))
+        .with_angular_velocity(spin);
     body.mask = 0;
     let id = world.add(body).unwrap();
     for i in 0..hinges {
@@ -196,10 +201,16 @@ fn more_hinges_than_needed_swing_a_door_as_one_does() {
 fn a_loop_joint_without_one_of_its_sides_holds_nothing() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 240.0);
-        let post =
-            world.add_static(RigidBody::fixed("post", sphere(0.1)).at(Pose::translation(0.0, 0.0, 1.0))).unwrap();
+        let post = world
+            .add_static(RigidBody::fixed(sphere(0.1)).with_name("post").with_pose(Pose::translation(0.0, 0.0, 1.0)))
+            .unwrap();
         let ball = world
-            .add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().at(Pose::translation(0.0, 0.0, 0.5)))
+            .add(
+                RigidBody::new(sphere(0.1))
+                    .with_name("ball")
+                    .with_mass(1.0)
+                    .with_pose(Pose::translation(0.0, 0.0, 0.5)),
+            )
             .unwrap();
         let joint =
             LoopJoint::fixed_at("joint", &world, Some((ball, 0)), Some((post, 0)), Vec3::new(0.0, 0.0, 0.7)).unwrap();
@@ -224,7 +235,7 @@ fn a_loop_joint_without_one_of_its_sides_holds_nothing() {
 #[test]
 fn impossible_loop_joints_are_refused() {
     let mut world = world("time_stepping", 1.0 / 240.0);
-    let ball = world.add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap()).unwrap();
+    let ball = world.add(RigidBody::new(sphere(0.1)).with_name("ball").with_mass(1.0)).unwrap();
     let (here, side) = (Vec3::zeros(), Some((ball, 0)));
     assert_eq!(LoopJoint::spherical_at("j", &world, None, None, here).unwrap_err(), LoopJointError::NoPart("j".into()));
     assert_eq!(
@@ -263,7 +274,12 @@ fn a_joint_that_starts_open_closes_at_the_recovery_speed() {
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, 1.0 / 240.0));
         let ball = world
-            .add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().at(Pose::translation(0.3, 0.0, 0.0)))
+            .add(
+                RigidBody::new(sphere(0.1))
+                    .with_name("ball")
+                    .with_mass(1.0)
+                    .with_pose(Pose::translation(0.3, 0.0, 0.0)),
+            )
             .unwrap();
         let joint = LoopJoint::new(
             "joint",
@@ -294,10 +310,15 @@ fn hinged_boxes_come_to_rest_on_the_ground() {
         let mut world = world(stepper, 1.0 / 240.0);
         ground(&mut world, 0.0, 0.5);
         let ids = [-0.2, 0.2].map(|x| {
-            let body =
-                RigidBody::with_mass(format!("box at {x}"), Shape::cuboid(Vec3::new(0.36, 0.2, 0.1)).unwrap(), 1.0)
-                    .unwrap();
-            world.add(body.at(Pose::translation(x, 0.0, 0.3)).surface(0.0, 0.5)).unwrap()
+            let body = RigidBody::new(Shape::cuboid(Vec3::new(0.36, 0.2, 0.1)).unwrap())
+                .with_name(format!("box at {x}"))
+                .with_mass(1.0);
+            world
+                .add(
+                    body.with_pose(Pose::translation(x, 0.0, 0.3))
+                        .with_material(Material { friction: 0.5, ..Material::default() }),
+                )
+                .unwrap()
         });
         let joint = hinge(&mut world, "hinge", ids[0], Some(ids[1]), Vec3::new(0.0, 0.0, 0.3), Vec3::y());
         let mut worst = PositionError::default();

@@ -57,7 +57,8 @@ fn bennett(stepper: &str, first: f64) -> Bennett {
     assert!((frame.to_homogeneous() - ground.to_homogeneous()).norm() < 1e-12);
     let bars = [0, 1, 2, 3].map(|bar| {
         let shape = Shape::cuboid(Vec3::new(sizes(bar).0, 0.02, 0.04)).unwrap();
-        let mut body = RigidBody::with_mass(format!("bar {bar}"), shape, 1.0).unwrap().at(frames[bar] * center(bar));
+        let mut body =
+            RigidBody::new(shape).with_name(format!("bar {bar}")).with_mass(1.0).with_pose(frames[bar] * center(bar));
         body.mask = 0;
         // the last one is the ground
         if bar == 3 { world.add_static(body).unwrap() } else { world.add(body).unwrap() }

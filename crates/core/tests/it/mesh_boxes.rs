@@ -9,7 +9,15 @@ fn mesh_cube(edge: f64) -> Shape {
 }
 
 fn add(world: &mut World, name: &str, shape: &Shape, pose: Pose) -> ObjectId {
-    world.add(RigidBody::with_mass(name, shape.clone(), 10.0).unwrap().surface(0.0, 0.5).at(pose)).unwrap()
+    world
+        .add(
+            RigidBody::new(shape.clone())
+                .with_name(name)
+                .with_mass(10.0)
+                .with_material(Material { friction: 0.5, ..Material::default() })
+                .with_pose(pose),
+        )
+        .unwrap()
 }
 
 fn run(world: &mut World, seconds: f64) {
@@ -89,13 +97,23 @@ fn a_cylinder_stands_and_rolls_on_a_block() {
             Shape::mesh(TriMesh::cuboid(Vec3::new(10.0, 2.0, 0.2)), &TreeSettings::octree()).unwrap(),
         ] {
             let mut world = world(stepper, 1.0 / 60.0);
-            world.add_static(RigidBody::fixed("floor", block).surface(0.0, 0.5)).unwrap();
+            world
+                .add_static(
+                    RigidBody::fixed(block)
+                        .with_name("floor")
+                        .with_material(Material { friction: 0.5, ..Material::default() }),
+                )
+                .unwrap();
             let shape = Shape::cylinder(0.1, 0.4).unwrap();
             let standing = add(&mut world, "standing", &shape, Pose::translation(-2.0, 0.5, 0.3));
             let lying = Pose::new(Vec3::new(-2.0, 0.0, 0.2), Vec3::x() * std::f64::consts::FRAC_PI_2);
-            let body = RigidBody::with_mass("rolling", shape, 10.0).unwrap().surface(0.0, 0.5).at(lying);
+            let body = RigidBody::new(shape)
+                .with_name("rolling")
+                .with_mass(10.0)
+                .with_material(Material { friction: 0.5, ..Material::default() })
+                .with_pose(lying);
             // rolls at 1 m/s: turns at 10 rad/s
-            let rolling = world.add(body.moving(Vec3::x(), Vec3::y() * 10.0)).unwrap();
+            let rolling = world.add(body.with_velocity(Vec3::x()).with_angular_velocity(Vec3::y() * 10.0)).unwrap();
             run(&mut world, 2.0);
             let part_state = world.part_state(standing, 0).unwrap();
             // the solver leaves this tall body's contacts with a residual of some 1e-4 m/s

@@ -37,10 +37,10 @@ fn a_body_is_placed_by_the_frame_of_its_file() {
     for fixed in [false, true] {
         let mut world = world("time_stepping", 1.0 / 240.0);
         let body = match fixed {
-            true => RigidBody::fixed("cube", shape.clone()),
-            false => RigidBody::with_mass("cube", shape.clone(), 2.0).unwrap(),
+            true => RigidBody::fixed(shape.clone()).with_name("cube"),
+            false => RigidBody::new(shape.clone()).with_name("cube").with_mass(2.0),
         };
-        let body = body.at(pose);
+        let body = body.with_pose(pose);
         assert!(off(&body.center_of_mass(), &half) < 1e-15);
         let id = world.add(body).unwrap();
         assert!(farthest(&world, id, 0, &file, &pose) < 1e-14);
@@ -63,7 +63,11 @@ fn it_spins_about_its_center_of_mass() {
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, 1.0 / 240.0));
         let spin = Vec3::new(0.7, -1.1, 2.3);
-        let body = RigidBody::with_mass("cube", shape.clone(), 2.0).unwrap().at(turned()).moving(Vec3::zeros(), spin);
+        let body = RigidBody::new(shape.clone())
+            .with_name("cube")
+            .with_mass(2.0)
+            .with_pose(turned())
+            .with_angular_velocity(spin);
         let id = world.add(body).unwrap();
         let (center, before) = (position(&world, id), world.momentum());
         (0..480).for_each(|_| {
@@ -84,7 +88,7 @@ fn it_spins_about_its_center_of_mass() {
 fn a_kinematic_body_brings_its_frame_to_the_target() {
     let (shape, file) = corner_cube();
     let mut world = world("time_stepping", 1.0 / 240.0);
-    let id = world.add_boxed(Box::new(RigidBody::fixed("cube", shape)), Mode::Kinematic).unwrap();
+    let id = world.add_boxed(Box::new(RigidBody::fixed(shape).with_name("cube")), Mode::Kinematic).unwrap();
     let target =
         Pose::from_parts(Vec3::new(0.01, 0.02, -0.03).into(), UnitQuaternion::from_euler_angles(0.02, 0.0, 0.01));
     world.move_to(id, target).unwrap();
@@ -111,7 +115,7 @@ fn a_mesh_on_a_link_keeps_its_frame() {
 #[test]
 fn what_a_body_carries_is_placed_in_its_frame() {
     let (shape, _) = corner_cube();
-    let body = RigidBody::with_mass("cube", shape, 1.0).unwrap().at(turned());
+    let body = RigidBody::new(shape).with_name("cube").with_mass(1.0).with_pose(turned());
     let at = Pose::translation(1.0, 0.0, 0.0);
     let mount = CameraMount::new("", 0, at);
     let mut world = world("time_stepping", 1.0 / 240.0);

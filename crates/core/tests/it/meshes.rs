@@ -39,8 +39,12 @@ fn falls(mode: ContactMode, rest: f64, name: &str, mesh: &TriMesh, turn: Vec3, h
         let corners = solid.mesh().vertices.clone();
         let mut world = world(stepper, 1.0 / 240.0);
         ground(&mut world, 0.2, 0.6);
-        let body = RigidBody::with_density(name, shape, 1000.0).unwrap().surface(0.2, 0.6).colliding_by(mode);
-        let id = world.add(body.at(Pose::new(Vec3::new(0.0, 0.0, height), turn))).unwrap();
+        let body = RigidBody::new(shape)
+            .with_name(name)
+            .with_density(1000.0)
+            .with_material(Material { restitution: 0.2, friction: 0.6, ..Material::default() })
+            .with_contact_mode(mode);
+        let id = world.add(body.with_pose(Pose::new(Vec3::new(0.0, 0.0, height), turn))).unwrap();
         let (mut deepest, mut touched, mut there) = (0.0f64, 0, Vec3::zeros());
         let frames = (seconds * 240.0) as usize;
         for frame in 0..frames {

@@ -13,7 +13,15 @@ fn mesh_cube() -> Shape {
 }
 
 fn add(world: &mut World, name: &str, shape: &Shape, pose: Pose) -> ObjectId {
-    world.add(RigidBody::with_mass(name, shape.clone(), 1.0).unwrap().surface(0.0, 0.5).at(pose)).unwrap()
+    world
+        .add(
+            RigidBody::new(shape.clone())
+                .with_name(name)
+                .with_mass(1.0)
+                .with_material(Material { friction: 0.5, ..Material::default() })
+                .with_pose(pose),
+        )
+        .unwrap()
 }
 
 /// How deep two objects are in each other, meters, by their contacts.
@@ -124,11 +132,14 @@ fn a_press_does_not_trap_a_cube() {
     for stepper in STEPPERS {
         let (mut world, shape) = (world(stepper, 1.0 / 60.0), mesh_cube());
         let a = add(&mut world, "free", &shape, Pose::identity());
-        world.add_static(RigidBody::fixed("under", shape.clone()).at(Pose::translation(0.0, 0.0, -1.0))).unwrap();
-        let press = RigidBody::with_mass("press", shape.clone(), 1.0)
-            .unwrap()
-            .at(Pose::translation(0.0, 0.0, 1.2))
-            .moving(-Vec3::z(), Vec3::zeros());
+        world
+            .add_static(RigidBody::fixed(shape.clone()).with_name("under").with_pose(Pose::translation(0.0, 0.0, -1.0)))
+            .unwrap();
+        let press = RigidBody::new(shape.clone())
+            .with_name("press")
+            .with_mass(1.0)
+            .with_pose(Pose::translation(0.0, 0.0, 1.2))
+            .with_velocity(-Vec3::z());
         let k = world.add_boxed(Box::new(press), Mode::Kinematic).unwrap();
         (0..240).for_each(|_| {
             world.step().unwrap();
@@ -151,10 +162,12 @@ fn fast_cubes_do_not_go_through_a_thin_plate() {
                 (seed >> 11) as f64 / (1_u64 << 52) as f64 * 3.0 - 3.0
             });
             let mut world = no_gravity(world("time_stepping", 1.0 / 240.0));
-            world.add_static(RigidBody::fixed("plate", plate.clone())).unwrap();
-            let body =
-                RigidBody::with_mass("cube", cube.clone(), 1.0).unwrap().at(Pose::new(Vec3::new(0.1, 0.07, 3.0), turn));
-            let id = world.add(body.moving(Vec3::z() * -speed, Vec3::zeros())).unwrap();
+            world.add_static(RigidBody::fixed(plate.clone()).with_name("plate")).unwrap();
+            let body = RigidBody::new(cube.clone())
+                .with_name("cube")
+                .with_mass(1.0)
+                .with_pose(Pose::new(Vec3::new(0.1, 0.07, 3.0), turn));
+            let id = world.add(body.with_velocity(Vec3::z() * -speed)).unwrap();
             for _ in 0..(6.0 / speed * 240.0) as usize + 3 {
                 world.step().unwrap();
             }

@@ -10,8 +10,12 @@ const HEIGHT: f64 = 0.9;
 fn dropped(settings: Settings, ball: f64, floor: f64) -> (World, ObjectId, ObjectId) {
     let mut world = World::new(settings.with_dt(1.0 / 240.0)).unwrap();
     let floor = ground(&mut world, floor, 0.5);
-    let body = RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().surface(ball, 0.5);
-    let ball = world.add(body.at(Pose::translation(0.0, 0.0, HEIGHT + 0.1))).unwrap();
+    let body = RigidBody::new(sphere(0.1)).with_name("ball").with_mass(1.0).with_material(Material {
+        restitution: ball,
+        friction: 0.5,
+        ..Material::default()
+    });
+    let ball = world.add(body.with_pose(Pose::translation(0.0, 0.0, HEIGHT + 0.1))).unwrap();
     (world, ball, floor)
 }
 
@@ -69,8 +73,11 @@ fn a_pair_has_a_bounce_of_its_own_whichever_side_is_named_first() {
 fn a_pair_has_a_friction_of_its_own() {
     let mut world = world("time_stepping", 1.0 / 240.0);
     let floor = ground(&mut world, 0.0, 0.9);
-    let body = RigidBody::with_mass("box", cube(0.2), 1.0).unwrap().surface(0.0, 0.9);
-    let body = body.at(Pose::translation(0.0, 0.0, 0.1)).moving(Vec3::new(2.0, 0.0, 0.0), Vec3::zeros());
+    let body = RigidBody::new(cube(0.2))
+        .with_name("box")
+        .with_mass(1.0)
+        .with_material(Material { friction: 0.9, ..Material::default() });
+    let body = body.with_pose(Pose::translation(0.0, 0.0, 0.1)).with_velocity(Vec3::new(2.0, 0.0, 0.0));
     let id = world.add(body).unwrap();
     world.set_pair_material(id, floor, PairMaterial { friction: Some(0.25), restitution: None }).unwrap();
     (0..480).for_each(|_| {

@@ -11,12 +11,22 @@ fn a_squeezed_body_ends_on_a_ray_which_is_reported_and_survived() {
         let mut world = no_gravity(world(stepper, 1.0 / 60.0));
         world.set_solver(solver::by_name("lcp").unwrap());
         for (name, side) in [("left", -1.0), ("right", 1.0)] {
-            let jaw = RigidBody::fixed(name, cube(0.4)).surface(0.0, 0.5).at(Pose::translation(0.3 * side, 0.0, 0.0));
+            let jaw = RigidBody::fixed(cube(0.4))
+                .with_name(name)
+                .with_material(Material { friction: 0.5, ..Material::default() })
+                .with_pose(Pose::translation(0.3 * side, 0.0, 0.0));
             let jaw = world.add(jaw).unwrap();
             world.set_mode(jaw, Mode::Kinematic).unwrap();
             world.set_velocity(jaw, Vec3::new(-0.1 * side, 0.0, 0.0), Vec3::zeros()).unwrap();
         }
-        let body = world.add(RigidBody::with_mass("box", cube(0.2), 1.0).unwrap().surface(0.0, 0.5)).unwrap();
+        let body = world
+            .add(
+                RigidBody::new(cube(0.2))
+                    .with_name("box")
+                    .with_mass(1.0)
+                    .with_material(Material { friction: 0.5, ..Material::default() }),
+            )
+            .unwrap();
         let mut rays = 0;
         for _ in 0..10 {
             rays += world.step().unwrap().rays;
@@ -39,13 +49,13 @@ fn painleves_rod_gains_no_energy_and_does_not_sink() {
             world.set_solver(solver::by_name(name).unwrap());
             ground(&mut world, 0.0, 2.0);
             let (radius, half, tilt) = (0.01, 0.5, 0.9f64);
-            let rod =
-                RigidBody::with_mass("rod", tumble_core::collide::Shape::capsule(radius, 2.0 * half).unwrap(), 1.0)
-                    .unwrap()
-                    .surface(0.0, 2.0);
+            let rod = RigidBody::new(tumble_core::collide::Shape::capsule(radius, 2.0 * half).unwrap())
+                .with_name("rod")
+                .with_mass(1.0)
+                .with_material(Material { friction: 2.0, ..Material::default() });
             // the upper end leans back from the sliding direction, so that friction presses the lower end down
             let pose = Pose::new(Vec3::new(0.0, 0.0, half * tilt.cos() + radius), Vec3::new(0.0, -tilt, 0.0));
-            let id = world.add(rod.at(pose).moving(Vec3::new(-3.0, 0.0, 0.0), Vec3::zeros())).unwrap();
+            let id = world.add(rod.with_pose(pose).with_velocity(Vec3::new(-3.0, 0.0, 0.0))).unwrap();
             let start = world.energy().total();
             let mut highest = start;
             for _ in 0..240 {

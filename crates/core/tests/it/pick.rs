@@ -30,7 +30,9 @@ fn drag(world: &mut World, pick: &PickForce, seconds: f64) {
 
 fn crate_of(world: &mut World, mass: f64) -> ObjectId {
     let shape = Shape::cuboid(Vec3::new(0.6, 0.4, 0.2)).unwrap();
-    world.add(RigidBody::with_mass("crate", shape, mass).unwrap().at(Pose::translation(0.0, 0.0, 5.0))).unwrap()
+    world
+        .add(RigidBody::new(shape).with_name("crate").with_mass(mass).with_pose(Pose::translation(0.0, 0.0, 5.0)))
+        .unwrap()
 }
 
 #[test]
@@ -88,7 +90,7 @@ fn a_pull_is_stable_at_any_length_of_the_step() {
 #[test]
 fn static_bodies_are_not_pulled_and_removed_ones_are_reported() {
     let mut world = world(9.81, 0.01);
-    let ground = world.add_static(RigidBody::fixed("ground", Shape::half_space())).unwrap();
+    let ground = world.add_static(RigidBody::fixed(Shape::half_space()).with_name("ground")).unwrap();
     let pick =
         PickForce { id: ground, part: 0, point: Vec3::zeros(), target: Vec3::new(0.0, 0.0, 9.0), frequency: OMEGA };
     assert_eq!(world.pick(&pick).unwrap().force, Vec3::zeros());

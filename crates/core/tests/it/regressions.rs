@@ -8,19 +8,28 @@ use tumble_core::*;
 const R: f64 = 0.0286;
 
 fn billiard(world: &mut World, name: &str, at: [f64; 3], v: f64) -> ObjectId {
-    let ball = RigidBody::with_mass(name, sphere(R), 0.17).unwrap().surface(1.0, 0.0);
-    world.add(ball.at(Pose::translation(at[0], at[1], at[2])).moving(Vec3::new(v, 0.0, 0.0), Vec3::zeros())).unwrap()
+    let ball = RigidBody::new(sphere(R)).with_name(name).with_mass(0.17).with_material(Material {
+        restitution: 1.0,
+        friction: 0.0,
+        ..Material::default()
+    });
+    world.add(ball.with_pose(Pose::translation(at[0], at[1], at[2])).with_velocity(Vec3::new(v, 0.0, 0.0))).unwrap()
 }
 
 /// A kinematic plate with its top at z = 0.1.
 fn kinematic_plate(world: &mut World) -> ObjectId {
-    let plate = RigidBody::fixed("plate", Shape::cuboid(Vec3::new(2.0, 2.0, 0.2)).unwrap()).surface(0.0, 0.5);
+    let plate = RigidBody::fixed(Shape::cuboid(Vec3::new(2.0, 2.0, 0.2)).unwrap())
+        .with_name("plate")
+        .with_material(Material { friction: 0.5, ..Material::default() });
     world.add_boxed(Box::new(plate), Mode::Kinematic).unwrap()
 }
 
 fn box_on_plate(world: &mut World) -> ObjectId {
-    let body = RigidBody::with_mass("box", cube(0.2), 1.0).unwrap().surface(0.0, 0.5);
-    world.add(body.at(Pose::translation(0.0, 0.0, 0.2))).unwrap()
+    let body = RigidBody::new(cube(0.2))
+        .with_name("box")
+        .with_mass(1.0)
+        .with_material(Material { friction: 0.5, ..Material::default() });
+    world.add(body.with_pose(Pose::translation(0.0, 0.0, 0.2))).unwrap()
 }
 
 /// Returns the distance between the box and the plate's top.
@@ -57,11 +66,12 @@ fn a_ball_that_starts_inside_a_rising_plate_ends_on_it() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);
         let plate = kinematic_plate(&mut world);
-        let ball = RigidBody::with_mass("ball", sphere(0.1), 1.0)
-            .unwrap()
-            .surface(0.0, 0.5)
-            .at(Pose::translation(0.0, 0.0, 0.199));
-        let ball = world.add(ball.moving(Vec3::z(), Vec3::zeros())).unwrap();
+        let ball = RigidBody::new(sphere(0.1))
+            .with_name("ball")
+            .with_mass(1.0)
+            .with_material(Material { friction: 0.5, ..Material::default() })
+            .with_pose(Pose::translation(0.0, 0.0, 0.199));
+        let ball = world.add(ball.with_velocity(Vec3::z())).unwrap();
         world.set_velocity(plate, Vec3::z(), Vec3::zeros()).unwrap();
         world.step().unwrap();
         assert!(gap(&world, ball, plate).abs() < 1e-6, "{stepper}: {} m above the plate", gap(&world, ball, plate));
@@ -75,14 +85,20 @@ fn a_body_that_lands_elsewhere_does_not_lift_a_box_off_a_kinematic_plate() {
         for v in [0.0, 0.5] {
             let mut world = world(stepper, 1.0 / 60.0);
             world
-                .add_static(RigidBody::fixed("ground", Shape::half_space()).at(Pose::translation(0.0, 0.0, -1.0)))
+                .add_static(
+                    RigidBody::fixed(Shape::half_space())
+                        .with_name("ground")
+                        .with_pose(Pose::translation(0.0, 0.0, -1.0)),
+                )
                 .unwrap();
             let plate = kinematic_plate(&mut world);
             let body = box_on_plate(&mut world);
-            let tumbler = RigidBody::with_mass("tumbler", Shape::cuboid(Vec3::new(0.2, 0.4, 0.3)).unwrap(), 1.0)
-                .unwrap()
-                .surface(0.2, 0.5);
-            let tumbler = tumbler.at(Pose::translation(4.0, 0.0, 0.0)).moving(Vec3::zeros(), Vec3::new(3.0, 2.0, 1.0));
+            let tumbler = RigidBody::new(Shape::cuboid(Vec3::new(0.2, 0.4, 0.3)).unwrap())
+                .with_name("tumbler")
+                .with_mass(1.0)
+                .with_material(Material { restitution: 0.2, friction: 0.5, ..Material::default() });
+            let tumbler =
+                tumbler.with_pose(Pose::translation(4.0, 0.0, 0.0)).with_angular_velocity(Vec3::new(3.0, 2.0, 1.0));
             let tumbler = world.add(tumbler).unwrap();
             world.set_velocity(plate, Vec3::new(0.0, 0.0, v), Vec3::zeros()).unwrap();
             for frame in 0..90 {
@@ -161,13 +177,17 @@ fn a_frozen_table_that_was_spinning_does_not_drag_what_lies_on_it() {
     for stepper in STEPPERS {
         for spin in [Vec3::zeros(), Vec3::new(10.0, 0.0, 0.0), Vec3::new(0.0, 0.0, 10.0)] {
             let mut world = world(stepper, 1.0 / 60.0);
-            let table = RigidBody::with_mass("table", Shape::cuboid(Vec3::new(2.0, 2.0, 0.2)).unwrap(), 10.0)
-                .unwrap()
-                .surface(0.0, 0.3);
-            let table = world.add(table.moving(Vec3::zeros(), spin)).unwrap();
+            let table = RigidBody::new(Shape::cuboid(Vec3::new(2.0, 2.0, 0.2)).unwrap())
+                .with_name("table")
+                .with_mass(10.0)
+                .with_material(Material { friction: 0.3, ..Material::default() });
+            let table = world.add(table.with_angular_velocity(spin)).unwrap();
             world.set_mode(table, Mode::Static).unwrap();
-            let body = RigidBody::with_mass("box", cube(0.2), 1.0).unwrap().surface(0.0, 0.3);
-            let body = world.add(body.at(Pose::translation(0.6, 0.0, 0.2))).unwrap();
+            let body = RigidBody::new(cube(0.2))
+                .with_name("box")
+                .with_mass(1.0)
+                .with_material(Material { friction: 0.3, ..Material::default() });
+            let body = world.add(body.with_pose(Pose::translation(0.6, 0.0, 0.2))).unwrap();
             (0..30).for_each(|_| {
                 world.step().unwrap();
             });
@@ -231,7 +251,12 @@ fn a_ball_sliding_along_a_capsule_is_carried_by_its_weight_in_every_frame() {
         let mut world = world(stepper, 1.0 / 240.0);
         let lying = Pose::rotation(Vec3::new(0.0, std::f64::consts::FRAC_PI_2, 0.0));
         world
-            .add_static(RigidBody::fixed("capsule", Shape::capsule(0.1, 10.0).unwrap()).surface(0.0, 0.0).at(lying))
+            .add_static(
+                RigidBody::fixed(Shape::capsule(0.1, 10.0).unwrap())
+                    .with_name("capsule")
+                    .with_material(Material { friction: 0.0, ..Material::default() })
+                    .with_pose(lying),
+            )
             .unwrap();
         let ball = sliding_ball(&mut world, 0.0);
         for frame in 0..60 {
@@ -252,9 +277,12 @@ fn a_ball_sliding_along_a_capsule_is_carried_by_its_weight_in_every_frame() {
 
 /// Adds a ball of 1 kg without friction at 3 m/s along x, its lowest point at z = 0.1.
 fn sliding_ball(world: &mut World, x: f64) -> ObjectId {
-    let ball =
-        RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().surface(0.0, 0.0).at(Pose::translation(x, 0.0, 0.2));
-    world.add(ball.moving(Vec3::new(3.0, 0.0, 0.0), Vec3::zeros())).unwrap()
+    let ball = RigidBody::new(sphere(0.1))
+        .with_name("ball")
+        .with_mass(1.0)
+        .with_material(Material { friction: 0.0, ..Material::default() })
+        .with_pose(Pose::translation(x, 0.0, 0.2));
+    world.add(ball.with_velocity(Vec3::new(3.0, 0.0, 0.0))).unwrap()
 }
 
 /// Returns the upward contact force on a body, N.
@@ -272,7 +300,11 @@ fn a_ball_that_slides_off_a_box_is_carried_to_the_edge_and_then_falls() {
     for stepper in STEPPERS {
         let mut world = world(stepper, h);
         world
-            .add_static(RigidBody::fixed("table", Shape::cuboid(Vec3::new(2.0, 2.0, 0.2)).unwrap()).surface(0.0, 0.0))
+            .add_static(
+                RigidBody::fixed(Shape::cuboid(Vec3::new(2.0, 2.0, 0.2)).unwrap())
+                    .with_name("table")
+                    .with_material(Material { friction: 0.0, ..Material::default() }),
+            )
             .unwrap();
         let ball = sliding_ball(&mut world, 1.0 - 60.5 * 3.0 * h);
         for frame in 0..120 {
@@ -308,8 +340,10 @@ fn a_ball_that_slides_off_a_box_is_carried_to_the_edge_and_then_falls() {
 fn slide_over_a_seam(stepper: &str) {
     let mut world = world(stepper, 1.0 / 240.0);
     for (name, x) in [("left", 0.0), ("right", 2.0)] {
-        let table = RigidBody::fixed(name, Shape::cuboid(Vec3::new(2.0, 2.0, 0.2)).unwrap()).surface(0.0, 0.0);
-        world.add_static(table.at(Pose::translation(x, 0.0, 0.0))).unwrap();
+        let table = RigidBody::fixed(Shape::cuboid(Vec3::new(2.0, 2.0, 0.2)).unwrap())
+            .with_name(name)
+            .with_material(Material { friction: 0.0, ..Material::default() });
+        world.add_static(table.with_pose(Pose::translation(x, 0.0, 0.0))).unwrap();
     }
     let ball = sliding_ball(&mut world, 0.503);
     for frame in 0..80 {
@@ -339,7 +373,8 @@ fn a_thrust_within_the_frame_does_not_push_a_ball_through_the_ground() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);
         ground(&mut world, 0.0, 0.5);
-        let ball = RigidBody::with_mass("ball", sphere(0.02), 1.0).unwrap().at(Pose::translation(0.0, 0.0, 0.03));
+        let ball =
+            RigidBody::new(sphere(0.02)).with_name("ball").with_mass(1.0).with_pose(Pose::translation(0.0, 0.0, 0.03));
         let ball = world.add(ball).unwrap();
         for _ in 0..3 {
             let at = position(&world, ball);
@@ -360,13 +395,15 @@ fn energy_never_grows_in_impacts_with_friction_with_or_without_a_far_kinematic_b
                 let s = seed as f64;
                 let mut world = no_gravity(world(stepper, 1.0 / 240.0));
                 ground(&mut world, 1.0, 1.0);
-                let rod = RigidBody::with_mass("rod", Shape::cuboid(Vec3::new(1.0, 0.04, 0.04)).unwrap(), 1.0)
-                    .unwrap()
-                    .surface(1.0, 1.0);
+                let rod = RigidBody::new(Shape::cuboid(Vec3::new(1.0, 0.04, 0.04)).unwrap())
+                    .with_name("rod")
+                    .with_mass(1.0)
+                    .with_material(Material { restitution: 1.0, friction: 1.0, ..Material::default() });
                 let pose = Pose::new(Vec3::new(0.0, 0.0, 0.6), Vec3::new(0.0, 0.2 + 0.03 * s, 0.0));
-                let rod = world.add(rod.at(pose).moving(Vec3::new(6.0 - 0.3 * s, 0.0, -2.0), Vec3::zeros())).unwrap();
+                let rod = world.add(rod.with_pose(pose).with_velocity(Vec3::new(6.0 - 0.3 * s, 0.0, -2.0))).unwrap();
                 if kinematic {
-                    let far = RigidBody::fixed("far", sphere(0.1)).at(Pose::translation(50.0, 50.0, 50.0));
+                    let far =
+                        RigidBody::fixed(sphere(0.1)).with_name("far").with_pose(Pose::translation(50.0, 50.0, 50.0));
                     world.add_boxed(Box::new(far), Mode::Kinematic).unwrap();
                 }
                 let start = world.energy().total();
@@ -392,16 +429,20 @@ fn a_ball_that_bounces_far_away_does_not_change_one_bit_of_a_stack() {
         ground(&mut world, 1.0, 0.5);
         let boxes: Vec<ObjectId> = (0..8)
             .map(|i| {
-                let body = RigidBody::with_mass(format!("box{i}"), cube(0.5), 1.0).unwrap().surface(0.0, 0.5);
-                world.add(body.at(Pose::translation(0.0, 0.0, 0.25 + 0.5 * i as f64))).unwrap()
+                let body = RigidBody::new(cube(0.5))
+                    .with_name(format!("box{i}"))
+                    .with_mass(1.0)
+                    .with_material(Material { friction: 0.5, ..Material::default() });
+                world.add(body.with_pose(Pose::translation(0.0, 0.0, 0.25 + 0.5 * i as f64))).unwrap()
             })
             .collect();
         if far {
-            let ball = RigidBody::with_mass("far", sphere(0.1), 1.0)
-                .unwrap()
-                .surface(1.0, 0.0)
-                .at(Pose::translation(30.0, 0.0, 0.3));
-            world.add(ball.moving(Vec3::new(0.0, 0.0, -3.0), Vec3::zeros())).unwrap();
+            let ball = RigidBody::new(sphere(0.1))
+                .with_name("far")
+                .with_mass(1.0)
+                .with_material(Material { restitution: 1.0, friction: 0.0, ..Material::default() })
+                .with_pose(Pose::translation(30.0, 0.0, 0.3));
+            world.add(ball.with_velocity(Vec3::new(0.0, 0.0, -3.0))).unwrap();
         }
         let mut passes = 0;
         let frames = (0..120)

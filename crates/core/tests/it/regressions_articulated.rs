@@ -12,7 +12,7 @@ fn elastic_chain(links: usize) -> ArticulatedBody {
     let model = loose_chain(links, Vec3::zeros(), 0.0).model().clone();
     let velocities: Vec<f64> =
         (0..model.dof()).map(|i| ((i * 7 + 3) % 5) as f64 - 2.0 + 0.3 * i as f64 / model.dof() as f64).collect();
-    let mut body = ArticulatedBody::new("chain", model).at(Pose::translation(-0.05 * links as f64, 0.0, 0.0));
+    let mut body = ArticulatedBody::new("chain", model).with_pose(Pose::translation(-0.05 * links as f64, 0.0, 0.0));
     body.self_collision = false;
     for i in 0..links {
         let along = Pose::new(Vec3::new(0.05, 0.0, 0.0), Vec3::new(0.0, FRAC_PI_2, 0.0));
@@ -32,9 +32,13 @@ fn a_chain_that_bounces_in_a_box_gains_no_energy() {
         let turns = [(0.0, 0.0), (PI, 0.0), (FRAC_PI_2, 0.0), (-FRAC_PI_2, 0.0), (0.0, FRAC_PI_2), (0.0, -FRAC_PI_2)];
         for (k, (x, y)) in turns.into_iter().enumerate() {
             let rotation = Pose::rotation(Vec3::new(x, y, 0.0)).rotation;
-            let wall = RigidBody::fixed(format!("wall{k}"), Shape::half_space()).surface(1.0, 0.0);
+            let wall = RigidBody::fixed(Shape::half_space()).with_name(format!("wall{k}")).with_material(Material {
+                restitution: 1.0,
+                friction: 0.0,
+                ..Material::default()
+            });
             world
-                .add_static(wall.at(Pose::from_parts((rotation * Vec3::new(0.0, 0.0, -0.6)).into(), rotation)))
+                .add_static(wall.with_pose(Pose::from_parts((rotation * Vec3::new(0.0, 0.0, -0.6)).into(), rotation)))
                 .unwrap();
         }
         world.add(elastic_chain(links)).unwrap();
@@ -91,8 +95,14 @@ fn a_box_on_a_turning_kinematic_arm_stays_on_its_circle() {
     plate.material.friction = 1.0;
     table.add_collider("table", plate).unwrap();
     world.add_boxed(Box::new(table), Mode::Kinematic).unwrap();
-    let cube = RigidBody::with_mass("box", Shape::cuboid(Vec3::repeat(0.1)).unwrap(), 1.0).unwrap().surface(0.0, 1.0);
-    let at = cube.at(Pose::translation(0.6, 0.0, 0.1)).moving(Vec3::new(0.0, 0.6, 0.0), Vec3::z());
+    let cube = RigidBody::new(Shape::cuboid(Vec3::repeat(0.1)).unwrap())
+        .with_name("box")
+        .with_mass(1.0)
+        .with_material(Material { friction: 1.0, ..Material::default() });
+    let at = cube
+        .with_pose(Pose::translation(0.6, 0.0, 0.1))
+        .with_velocity(Vec3::new(0.0, 0.6, 0.0))
+        .with_angular_velocity(Vec3::z());
     let id = world.add(at).unwrap();
     for _ in 0..480 {
         world.step().unwrap();
@@ -126,8 +136,12 @@ fn a_floating_chain_that_is_struck_keeps_its_linear_momentum() {
         body.add_collider(&format!("link {i}"), collider).unwrap();
     }
     world.add(body.with_velocities(&[0.0, 2.0, 1.0, 0.0, 0.0, 0.0, 1.0, -2.0]).unwrap()).unwrap();
-    let ball = RigidBody::with_mass("ball", Shape::sphere(0.05).unwrap(), 0.5).unwrap().surface(1.0, 0.3);
-    world.add(ball.at(Pose::translation(1.0, 0.01, -0.1)).moving(Vec3::new(-4.0, 0.0, 0.0), Vec3::zeros())).unwrap();
+    let ball = RigidBody::new(Shape::sphere(0.05).unwrap()).with_name("ball").with_mass(0.5).with_material(Material {
+        restitution: 1.0,
+        friction: 0.3,
+        ..Material::default()
+    });
+    world.add(ball.with_pose(Pose::translation(1.0, 0.01, -0.1)).with_velocity(Vec3::new(-4.0, 0.0, 0.0))).unwrap();
     let (start, mut passes) = (world.momentum().linear, 0);
     for _ in 0..240 {
         passes += world.step().unwrap().impact_passes;

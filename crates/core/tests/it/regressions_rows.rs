@@ -39,11 +39,12 @@ impl Constraint for AlongX {
 }
 
 fn unit_ball(world: &mut World, name: &str, at: [f64; 3], v: [f64; 3]) -> ObjectId {
-    let ball = RigidBody::with_mass(name, sphere(0.1), 1.0)
-        .unwrap()
-        .surface(0.0, 0.0)
-        .at(Pose::translation(at[0], at[1], at[2]));
-    world.add(ball.moving(Vec3::from(v), Vec3::zeros())).unwrap()
+    let ball = RigidBody::new(sphere(0.1))
+        .with_name(name)
+        .with_mass(1.0)
+        .with_material(Material { friction: 0.0, ..Material::default() })
+        .with_pose(Pose::translation(at[0], at[1], at[2]));
+    world.add(ball.with_velocity(Vec3::from(v))).unwrap()
 }
 
 fn bits(world: &World) -> Vec<u64> {
@@ -81,12 +82,13 @@ fn a_motor_of_6_newtons_gives_its_impulse_whatever_bounces_elsewhere() {
             let target = RowTarget { velocity: 100.0, ..RowTarget::new(RowSet::Interval { lo: -6.0, hi: 6.0 }, 0.0) };
             world.add(AlongX { body: ball, target }).unwrap();
             ground(&mut world, 1.0, 0.0);
-            let far = RigidBody::with_mass("far", sphere(0.1), 1.0)
-                .unwrap()
-                .surface(1.0, 0.0)
-                .at(Pose::translation(0.0, 0.0, 0.15));
+            let far = RigidBody::new(sphere(0.1))
+                .with_name("far")
+                .with_mass(1.0)
+                .with_material(Material { restitution: 1.0, friction: 0.0, ..Material::default() })
+                .with_pose(Pose::translation(0.0, 0.0, 0.15));
             let down = Vec3::new(0.0, 0.0, if bounces { -6.0 } else { 0.0 });
-            let far = world.add(far.moving(down, Vec3::zeros())).unwrap();
+            let far = world.add(far.with_velocity(down)).unwrap();
             world.step().unwrap();
             assert!((velocity(&world, far) + down).norm() < 1e-9, "{stepper}: the other one bounced with e = 1");
             let v = velocity(&world, ball).x;
@@ -131,7 +133,12 @@ fn a_snapshot_with_a_hostile_counter_is_refused_and_objects_can_still_be_added()
             assert_eq!(bits(&world), before, "byte {at}: refused, and yet changed");
         }
         let added = world
-            .add(RigidBody::with_mass("more", sphere(0.1), 1.0).unwrap().at(Pose::translation(5.0, 0.0, 0.0)))
+            .add(
+                RigidBody::new(sphere(0.1))
+                    .with_name("more")
+                    .with_mass(1.0)
+                    .with_pose(Pose::translation(5.0, 0.0, 0.0)),
+            )
             .unwrap();
         let _ = world.step(); // a state of 1e300 may end in an error, never in a panic
         world.remove(added).unwrap();
@@ -180,7 +187,10 @@ fn a_failed_step_leaves_time_state_and_contact_forces_as_they_were() {
             let mut world = world(failing, h);
             ground(&mut world, 0.0, 0.5);
             let rests = unit_ball(&mut world, "rests", [0.0, 0.0, 0.1], [0.0; 3]);
-            let light = RigidBody::with_mass("light", sphere(0.1), 1e-3).unwrap().at(Pose::translation(5.0, 0.0, 5.0));
+            let light = RigidBody::new(sphere(0.1))
+                .with_name("light")
+                .with_mass(1e-3)
+                .with_pose(Pose::translation(5.0, 0.0, 5.0));
             let light = world.add(light).unwrap();
             (0..10).for_each(|_| {
                 world.step().unwrap();
@@ -222,7 +232,8 @@ fn a_failed_step_names_the_body_whose_force_overflowed() {
         let mut world = world(stepper, 1.0 / 60.0);
         ground(&mut world, 0.0, 0.5);
         unit_ball(&mut world, "rests", [0.0, 0.0, 0.1], [0.0; 3]);
-        let light = RigidBody::with_mass("light", sphere(0.1), 1e-3).unwrap().at(Pose::translation(5.0, 0.0, 5.0));
+        let light =
+            RigidBody::new(sphere(0.1)).with_name("light").with_mass(1e-3).with_pose(Pose::translation(5.0, 0.0, 5.0));
         let light = world.add(light).unwrap();
         world.apply_force(light, 0, Vec3::new(1e308, 0.0, 0.0), &Vec3::new(5.0, 0.0, 5.0)).unwrap();
         let error = world.step().unwrap_err();
@@ -236,7 +247,7 @@ fn a_velocity_that_is_not_finite_is_no_state() {
     // can be read.
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, 1.0 / 60.0));
-        let light = world.add(RigidBody::with_mass("light", sphere(0.1), 1e-3).unwrap()).unwrap();
+        let light = world.add(RigidBody::new(sphere(0.1)).with_name("light").with_mass(1e-3)).unwrap();
         world.apply_force(light, 0, Vec3::new(1e308, 0.0, 0.0), &Vec3::zeros()).unwrap();
         let outcome = world.step().copied();
         assert!(
@@ -308,7 +319,7 @@ struct Spun {
 /// a pin that does not move: energy stays.
 fn spin_pinned_rod(stepper: &str, dt: f64) -> Spun {
     let mut world = no_gravity(world(stepper, dt));
-    let rod = RigidBody::with_mass("rod", Shape::cuboid(Vec3::new(1.0, 0.2, 0.4)).unwrap(), 1.0).unwrap();
+    let rod = RigidBody::new(Shape::cuboid(Vec3::new(1.0, 0.2, 0.4)).unwrap()).with_name("rod").with_mass(1.0);
     let rod = world.add(rod).unwrap();
     let spin = Vec3::new(0.0, 6.0, 6.0);
     world.set_velocity(rod, spin.cross(&-END), spin).unwrap();

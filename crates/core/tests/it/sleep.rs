@@ -25,8 +25,13 @@ fn bits(world: &World) -> Vec<u64> {
 }
 
 fn stack(world: &mut World, name: &str, x: f64, n: usize) -> Vec<ObjectId> {
-    let body = |i| RigidBody::with_mass(format!("{name}{i}"), cube(0.5), 10.0).unwrap().surface(0.0, 0.5);
-    (0..n).map(|i| world.add(body(i).at(Pose::translation(x, 0.0, 0.25 + 0.5 * i as f64))).unwrap()).collect()
+    let body = |i| {
+        RigidBody::new(cube(0.5))
+            .with_name(format!("{name}{i}"))
+            .with_mass(10.0)
+            .with_material(Material { friction: 0.5, ..Material::default() })
+    };
+    (0..n).map(|i| world.add(body(i).with_pose(Pose::translation(x, 0.0, 0.25 + 0.5 * i as f64))).unwrap()).collect()
 }
 
 /// A stack on the ground, asleep.
@@ -67,12 +72,20 @@ fn a_strike_on_sleepers_is_the_same_bits_as_on_the_waking() {
             let mut world = no_gravity(sleepy(stepper));
             let settings = world.settings().with_sleep(sleep);
             world.set_settings(settings).unwrap();
-            let ball = |name: String| RigidBody::with_mass(name, sphere(0.1), 1.0).unwrap().surface(1.0, 0.3);
+            let ball = |name: String| {
+                RigidBody::new(sphere(0.1)).with_name(name).with_mass(1.0).with_material(Material {
+                    restitution: 1.0,
+                    friction: 0.3,
+                    ..Material::default()
+                })
+            };
             let ids: Vec<ObjectId> = (0..5)
-                .map(|i| world.add(ball(format!("ball{i}")).at(Pose::translation(0.2 * i as f64, 0.0, 0.0))).unwrap())
+                .map(|i| {
+                    world.add(ball(format!("ball{i}")).with_pose(Pose::translation(0.2 * i as f64, 0.0, 0.0))).unwrap()
+                })
                 .collect();
             world
-                .add(ball("striker".into()).at(Pose::translation(-2.1, 0.02, 0.0)).moving(Vec3::x(), Vec3::zeros()))
+                .add(ball("striker".into()).with_pose(Pose::translation(-2.1, 0.02, 0.0)).with_velocity(Vec3::x()))
                 .unwrap();
             (world, ids)
         };
@@ -97,8 +110,8 @@ fn only_the_island_that_is_struck_wakes() {
         let (left, right) = (stack(&mut world, "left", -2.0, 3), stack(&mut world, "right", 2.0, 3));
         run(&mut world, 60);
         assert_eq!((asleep(&world, &left), asleep(&world, &right)), (3, 3), "{stepper}");
-        let ball = RigidBody::with_mass("ball", sphere(0.2), 5.0).unwrap();
-        world.add(ball.at(Pose::translation(-4.0, 0.0, 0.25)).moving(Vec3::new(6.0, 0.0, 0.0), Vec3::zeros())).unwrap();
+        let ball = RigidBody::new(sphere(0.2)).with_name("ball").with_mass(5.0);
+        world.add(ball.with_pose(Pose::translation(-4.0, 0.0, 0.25)).with_velocity(Vec3::new(6.0, 0.0, 0.0))).unwrap();
         run(&mut world, 40);
         assert_eq!((asleep(&world, &left), asleep(&world, &right)), (0, 3), "{stepper}");
     }
@@ -144,12 +157,20 @@ fn a_kinematic_body_wakes_bodies_that_it_carries_or_strikes() {
         let mut world = sleepy(stepper);
         let lift = world
             .add_boxed(
-                Box::new(RigidBody::with_mass("lift", cube(1.0), 1.0).unwrap().surface(0.0, 0.5)),
+                Box::new(
+                    RigidBody::new(cube(1.0))
+                        .with_name("lift")
+                        .with_mass(1.0)
+                        .with_material(Material { friction: 0.5, ..Material::default() }),
+                ),
                 Mode::Kinematic,
             )
             .unwrap();
-        let cargo = RigidBody::with_mass("cargo", cube(0.5), 10.0).unwrap().surface(0.0, 0.5);
-        let cargo = world.add(cargo.at(Pose::translation(0.0, 0.0, 0.75))).unwrap();
+        let cargo = RigidBody::new(cube(0.5))
+            .with_name("cargo")
+            .with_mass(10.0)
+            .with_material(Material { friction: 0.5, ..Material::default() });
+        let cargo = world.add(cargo.with_pose(Pose::translation(0.0, 0.0, 0.75))).unwrap();
         run(&mut world, 60);
         assert!(world.asleep(cargo), "{stepper}");
         world.set_velocity(lift, Vec3::new(0.0, 0.0, 0.5), Vec3::zeros()).unwrap();
@@ -162,7 +183,7 @@ fn a_kinematic_body_wakes_bodies_that_it_carries_or_strikes() {
         world.set_velocity(lift, Vec3::zeros(), Vec3::zeros()).unwrap();
         run(&mut world, 90);
         assert!(world.asleep(cargo), "{stepper}: not asleep again");
-        let pusher = RigidBody::with_mass("pusher", cube(0.4), 1.0).unwrap().at(Pose::translation(
+        let pusher = RigidBody::new(cube(0.4)).with_name("pusher").with_mass(1.0).with_pose(Pose::translation(
             -3.0,
             0.0,
             position(&world, cargo).z,
@@ -232,16 +253,20 @@ fn what_pauses_or_creeps_stays_awake() {
     for stepper in STEPPERS {
         let mut world = sleepy(stepper);
         ground(&mut world, 0.0, 0.5);
-        let bob = RigidBody::with_mass("bob", sphere(0.1), 1.0).unwrap().at(Pose::translation(5.0, 0.3, 2.0));
+        let bob =
+            RigidBody::new(sphere(0.1)).with_name("bob").with_mass(1.0).with_pose(Pose::translation(5.0, 0.3, 2.0));
         let bob = world.add(bob).unwrap();
         let hinge =
             LoopJoint::revolute_at("hinge", &world, Some((bob, 0)), None, Vec3::new(5.0, 0.0, 3.0), Vec3::x()).unwrap();
         world.add(hinge).unwrap();
-        let roller = RigidBody::with_mass("roller", sphere(0.2), 1.0)
-            .unwrap()
-            .surface(0.0, 0.5)
-            .at(Pose::translation(0.0, 0.0, 0.2));
-        let roller = world.add(roller.moving(Vec3::new(1e-3, 0.0, 0.0), Vec3::new(0.0, 1e-3 / 0.2, 0.0))).unwrap();
+        let roller = RigidBody::new(sphere(0.2))
+            .with_name("roller")
+            .with_mass(1.0)
+            .with_material(Material { friction: 0.5, ..Material::default() })
+            .with_pose(Pose::translation(0.0, 0.0, 0.2));
+        let roller = world
+            .add(roller.with_velocity(Vec3::new(1e-3, 0.0, 0.0)).with_angular_velocity(Vec3::new(0.0, 1e-3 / 0.2, 0.0)))
+            .unwrap();
         for _ in 0..300 {
             run(&mut world, 1);
             assert!(!world.asleep(bob) && !world.asleep(roller), "{stepper} at {} s", world.time());
@@ -257,7 +282,7 @@ fn joints_hold_an_island_together() {
     let mut above: Option<(ObjectId, usize)> = None;
     let mut ids = Vec::new();
     for i in 0..4 {
-        let rod = RigidBody::with_mass(format!("rod{i}"), cube(0.2), 1.0).unwrap().at(Pose::translation(
+        let rod = RigidBody::new(cube(0.2)).with_name(format!("rod{i}")).with_mass(1.0).with_pose(Pose::translation(
             0.0,
             0.0,
             -0.5 * i as f64,
@@ -289,8 +314,8 @@ fn joints_hold_an_island_together() {
 fn saved_and_forked_sleepers_wake_to_the_same_bytes() {
     for stepper in STEPPERS {
         let (mut world, ids) = bed(stepper);
-        let ball = RigidBody::with_mass("ball", sphere(0.2), 5.0).unwrap();
-        world.add(ball.at(Pose::translation(-4.0, 0.1, 0.6)).moving(Vec3::new(6.0, 0.0, 2.0), Vec3::zeros())).unwrap();
+        let ball = RigidBody::new(sphere(0.2)).with_name("ball").with_mass(5.0);
+        world.add(ball.with_pose(Pose::translation(-4.0, 0.1, 0.6)).with_velocity(Vec3::new(6.0, 0.0, 2.0))).unwrap();
         run(&mut world, 10);
         assert_eq!(asleep(&world, &ids), 3, "{stepper}");
         let (saved, mut fork) = (world.save(), world.fork());
@@ -333,10 +358,10 @@ impl ForceGenerator for Fault {
 fn a_step_that_fails_after_it_woke_sleepers_leaves_every_byte_as_it_was() {
     for stepper in STEPPERS {
         let (mut world, ids) = bed(stepper);
-        let roller = RigidBody::with_mass("roller", sphere(0.2), 1.0).unwrap();
-        world.add(roller.at(Pose::translation(0.0, 5.0, 0.2)).moving(Vec3::x(), Vec3::zeros())).unwrap();
-        let ball = RigidBody::with_mass("ball", sphere(0.2), 5.0).unwrap();
-        let ball = ball.at(Pose::translation(-4.0, 0.1, 0.6)).moving(Vec3::new(6.0, 0.0, 2.0), Vec3::zeros());
+        let roller = RigidBody::new(sphere(0.2)).with_name("roller").with_mass(1.0);
+        world.add(roller.with_pose(Pose::translation(0.0, 5.0, 0.2)).with_velocity(Vec3::x())).unwrap();
+        let ball = RigidBody::new(sphere(0.2)).with_name("ball").with_mass(5.0);
+        let ball = ball.with_pose(Pose::translation(-4.0, 0.1, 0.6)).with_velocity(Vec3::new(6.0, 0.0, 2.0));
         let ball = world.add(ball).unwrap();
         let mut ahead = world.fork();
         while asleep(&ahead, &ids) == 3 {
@@ -381,7 +406,7 @@ fn a_checkpoint_holds_sleep_and_is_refused_after_an_object_was_added() {
             assert!(world.roll_back(&checkpoint));
             assert!(world.save() == before && asleep(&world, &ids) == 3, "{stepper}");
         }
-        world.add(RigidBody::with_mass("late", sphere(0.2), 1.0).unwrap()).unwrap();
+        world.add(RigidBody::new(sphere(0.2)).with_name("late").with_mass(1.0)).unwrap();
         let now = world.save();
         assert!(!world.roll_back(&checkpoint) && world.save() == now, "{stepper}");
     }

@@ -43,9 +43,12 @@ impl Constraint for Drive {
 }
 
 fn ball(world: &mut World, mass: f64, v: f64) -> ObjectId {
-    let ball =
-        RigidBody::with_mass("ball", sphere(0.1), mass).unwrap().surface(0.0, 0.0).at(Pose::translation(0.0, 0.0, 0.0));
-    world.add(ball.moving(Vec3::new(v, 0.0, 0.0), Vec3::zeros())).unwrap()
+    let ball = RigidBody::new(sphere(0.1))
+        .with_name("ball")
+        .with_mass(mass)
+        .with_material(Material { friction: 0.0, ..Material::default() })
+        .with_pose(Pose::translation(0.0, 0.0, 0.0));
+    world.add(ball.with_velocity(Vec3::new(v, 0.0, 0.0))).unwrap()
 }
 
 /// `m·(v⁺ − v) = h·(kp·(q* − q − h·v⁺) − kd·v⁺)`; time stepping asks for `q` in the middle of the
@@ -98,11 +101,12 @@ fn a_spring_takes_no_part_in_an_impact() {
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, h));
         let at = |name: &str, x: f64, v: f64| {
-            let ball = RigidBody::with_mass(name, sphere(0.1), 1.0)
-                .unwrap()
-                .surface(1.0, 0.0)
-                .at(Pose::translation(x, 0.0, 0.0));
-            ball.moving(Vec3::new(v, 0.0, 0.0), Vec3::zeros())
+            let ball = RigidBody::new(sphere(0.1))
+                .with_name(name)
+                .with_mass(1.0)
+                .with_material(Material { restitution: 1.0, friction: 0.0, ..Material::default() })
+                .with_pose(Pose::translation(x, 0.0, 0.0));
+            ball.with_velocity(Vec3::new(v, 0.0, 0.0))
         };
         let held = world.add(at("held", 0.0, 0.0)).unwrap();
         let comes = world.add(at("comes", -0.201, 1.0)).unwrap();

@@ -39,8 +39,11 @@ fn five_boxes_stand_with_every_solver() {
             ground(&mut world, 0.0, 0.5);
             let ids: Vec<ObjectId> = (0..5)
                 .map(|i| {
-                    let body = RigidBody::with_mass(format!("box{i}"), cube(0.5), 10.0).unwrap().surface(0.0, 0.5);
-                    world.add(body.at(Pose::translation(0.0, 0.0, 0.25 + 0.5 * i as f64))).unwrap()
+                    let body = RigidBody::new(cube(0.5))
+                        .with_name(format!("box{i}"))
+                        .with_mass(10.0)
+                        .with_material(Material { friction: 0.5, ..Material::default() });
+                    world.add(body.with_pose(Pose::translation(0.0, 0.0, 0.25 + 0.5 * i as f64))).unwrap()
                 })
                 .collect();
             (0..60).for_each(|_| {
@@ -72,12 +75,16 @@ fn pile(stepper: &str) -> World {
     for i in 0..20 {
         let (x, y, z) = (0.19 * (i % 2) as f64, 0.19 * ((i / 2) % 2) as f64, 0.1 + 0.195 * (i / 4) as f64);
         let shape = if i % 3 == 0 { sphere(0.1) } else { cube(0.19) };
-        let body = RigidBody::with_mass(format!("body{i}"), shape, 1.0 + 0.1 * i as f64).unwrap().surface(0.0, 0.0);
+        let body = RigidBody::new(shape)
+            .with_name(format!("body{i}"))
+            .with_mass(1.0 + 0.1 * i as f64)
+            .with_material(Material { friction: 0.0, ..Material::default() });
         world
-            .add(
-                body.at(Pose::translation(x, y, z))
-                    .moving(Vec3::new(0.2 - 0.4 * (i % 2) as f64, 0.1 * (i % 3) as f64, -1.0), Vec3::zeros()),
-            )
+            .add(body.with_pose(Pose::translation(x, y, z)).with_velocity(Vec3::new(
+                0.2 - 0.4 * (i % 2) as f64,
+                0.1 * (i % 3) as f64,
+                -1.0,
+            )))
             .unwrap();
     }
     world

@@ -9,8 +9,11 @@ fn stack(stepper: &str, n: usize, dt: f64) -> (World, Vec<ObjectId>) {
     ground(&mut world, 0.0, 0.5);
     let ids = (0..n)
         .map(|i| {
-            let cube = RigidBody::with_mass(format!("box{i}"), cube(0.5), 10.0).unwrap().surface(0.0, 0.5);
-            world.add(cube.at(Pose::translation(0.0, 0.0, 0.25 + 0.5 * i as f64))).unwrap()
+            let cube = RigidBody::new(cube(0.5))
+                .with_name(format!("box{i}"))
+                .with_mass(10.0)
+                .with_material(Material { friction: 0.5, ..Material::default() });
+            world.add(cube.with_pose(Pose::translation(0.0, 0.0, 0.25 + 0.5 * i as f64))).unwrap()
         })
         .collect();
     (world, ids)

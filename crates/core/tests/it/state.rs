@@ -9,9 +9,12 @@ fn messy(stepper: &str) -> World {
     ground(&mut world, 0.3, 0.4);
     for i in 0..12 {
         let shape = if i % 2 == 0 { sphere(0.2) } else { cube(0.35) };
-        let body = RigidBody::with_mass(format!("body{i}"), shape, 1.0 + i as f64).unwrap().surface(0.3, 0.4);
+        let body = RigidBody::new(shape)
+            .with_name(format!("body{i}"))
+            .with_mass(1.0 + i as f64)
+            .with_material(Material { restitution: 0.3, friction: 0.4, ..Material::default() });
         let pose = Pose::translation(0.05 * (i % 3) as f64, 0.04 * (i % 4) as f64, 0.4 + 0.45 * i as f64);
-        world.add(body.at(pose).moving(Vec3::zeros(), Vec3::new(0.3 * i as f64, 1.0, 0.2))).unwrap();
+        world.add(body.with_pose(pose).with_angular_velocity(Vec3::new(0.3 * i as f64, 1.0, 0.2))).unwrap();
     }
     world
 }
@@ -83,12 +86,12 @@ fn objects_come_and_go_in_mid_run() {
     assert!(world.object(gone).is_none() && world.part_state(gone, 0).is_none());
     assert!(matches!(world.set_mode(gone, Mode::Static), Err(WorldError::Stale)));
     let added = world
-        .add(RigidBody::with_mass("late", sphere(0.1), 1.0).unwrap().at(Pose::translation(3.0, 0.0, 1.0)))
+        .add(RigidBody::new(sphere(0.1)).with_name("late").with_mass(1.0).with_pose(Pose::translation(3.0, 0.0, 1.0)))
         .unwrap();
     assert_ne!(gone, added);
     run(&mut world, 120);
     assert!((position(&world, added).z - 0.1).abs() < 1e-6, "the late one landed");
-    assert!(matches!(world.add(RigidBody::fixed("late", sphere(1.0))), Err(WorldError::DuplicateName(_))));
+    assert!(matches!(world.add(RigidBody::fixed(sphere(1.0)).with_name("late")), Err(WorldError::DuplicateName(_))));
 }
 
 #[test]
@@ -109,10 +112,11 @@ fn bodies_that_came_and_went_leave_no_trace_in_a_fork() {
                 let place = Pose::translation(0.1 * (frame % 3) as f64, 0.0, 1.0 + 0.1 * frame as f64);
                 world
                     .add(
-                        RigidBody::with_mass(format!("late{frame}"), cube(0.3), 2.0)
-                            .unwrap()
-                            .surface(0.2, 0.4)
-                            .at(place),
+                        RigidBody::new(cube(0.3))
+                            .with_name(format!("late{frame}"))
+                            .with_mass(2.0)
+                            .with_material(Material { restitution: 0.2, friction: 0.4, ..Material::default() })
+                            .with_pose(place),
                     )
                     .unwrap();
                 copies = vec![world.fork(), world.fork()];
@@ -136,12 +140,18 @@ fn a_kinematic_body_follows_its_motion_and_pushes() {
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);
         ground(&mut world, 0.0, 0.0);
-        let pusher = RigidBody::fixed("pusher", cube(0.4)).surface(0.0, 0.0).at(Pose::translation(-1.0, 0.0, 0.2));
+        let pusher = RigidBody::fixed(cube(0.4))
+            .with_name("pusher")
+            .with_material(Material { friction: 0.0, ..Material::default() })
+            .with_pose(Pose::translation(-1.0, 0.0, 0.2));
         let pusher = world.add(pusher).unwrap();
         world.set_mode(pusher, Mode::Kinematic).unwrap();
         world.set_velocity(pusher, Vec3::new(2.0, 0.0, 0.0), Vec3::zeros()).unwrap();
-        let ball =
-            RigidBody::with_mass("box", cube(0.2), 3.0).unwrap().surface(0.0, 0.0).at(Pose::translation(0.0, 0.0, 0.1));
+        let ball = RigidBody::new(cube(0.2))
+            .with_name("box")
+            .with_mass(3.0)
+            .with_material(Material { friction: 0.0, ..Material::default() })
+            .with_pose(Pose::translation(0.0, 0.0, 0.1));
         let ball = world.add(ball).unwrap();
         run(&mut world, 60);
         assert!((position(&world, pusher).x - 1.0).abs() < 1e-9, "{stepper}: pusher at {}", position(&world, pusher).x);
@@ -162,7 +172,7 @@ fn switches_take_a_body_out_and_back_in() {
     let mut world = world("time_stepping", 1.0 / 60.0);
     ground(&mut world, 0.0, 0.5);
     let id = world
-        .add(RigidBody::with_mass("ball", sphere(0.1), 1.0).unwrap().at(Pose::translation(0.0, 0.0, 0.1)))
+        .add(RigidBody::new(sphere(0.1)).with_name("ball").with_mass(1.0).with_pose(Pose::translation(0.0, 0.0, 0.1)))
         .unwrap();
     world.set_collidable(id, false).unwrap();
     run(&mut world, 60);
@@ -176,7 +186,7 @@ fn switches_take_a_body_out_and_back_in() {
 #[test]
 fn user_forces_act_for_one_frame_and_impulses_at_once() {
     let mut world = no_gravity(world("time_stepping", 0.01));
-    let id = world.add(RigidBody::with_mass("ball", sphere(0.5), 2.0).unwrap()).unwrap();
+    let id = world.add(RigidBody::new(sphere(0.5)).with_name("ball").with_mass(2.0)).unwrap();
     world.apply_force(id, 0, Vec3::new(4.0, 0.0, 0.0), &Vec3::new(0.0, 0.5, 0.0)).unwrap();
     run(&mut world, 2);
     assert!((velocity(&world, id).x - 0.02).abs() < 1e-14);
@@ -190,7 +200,7 @@ fn user_forces_act_for_one_frame_and_impulses_at_once() {
 #[test]
 fn a_state_that_is_not_finite_is_reported_with_its_object() {
     let mut world = no_gravity(world("time_stepping", 0.01));
-    let id = world.add(RigidBody::with_mass("ball", sphere(0.5), 2.0).unwrap()).unwrap();
+    let id = world.add(RigidBody::new(sphere(0.5)).with_name("ball").with_mass(2.0)).unwrap();
     world.apply_force(id, 0, Vec3::new(f64::MAX, f64::MAX, 0.0), &Vec3::new(f64::MAX, 0.0, 0.0)).unwrap();
     let error = world.step().unwrap_err();
     assert!(error.to_string().contains("'ball'"), "{error}");
@@ -201,9 +211,13 @@ fn kinds_that_do_not_meet_pass_through_each_other() {
     let mut world = no_gravity(world("time_stepping", 1.0 / 60.0));
     let ghost = CollisionGroup::new(5).unwrap();
     let mut add = |name: &str, x: f64, v: f64, group: CollisionGroup, mask: u64| {
-        let mut body = RigidBody::with_mass(name, sphere(0.5), 1.0).unwrap().surface(1.0, 0.0);
+        let mut body = RigidBody::new(sphere(0.5)).with_name(name).with_mass(1.0).with_material(Material {
+            restitution: 1.0,
+            friction: 0.0,
+            ..Material::default()
+        });
         (body.group, body.mask) = (group, mask);
-        world.add(body.at(Pose::translation(x, 0.0, 0.0)).moving(Vec3::new(v, 0.0, 0.0), Vec3::zeros())).unwrap()
+        world.add(body.with_pose(Pose::translation(x, 0.0, 0.0)).with_velocity(Vec3::new(v, 0.0, 0.0))).unwrap()
     };
     let solid = CollisionGroup::default();
     let ids = [

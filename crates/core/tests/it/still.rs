@@ -12,11 +12,18 @@ fn a_standing_cylinder_does_not_creep() {
         let mut world = world(stepper, 1.0 / 240.0);
         let block = Shape::cuboid(Vec3::new(1.0, 1.0, 0.2)).unwrap();
         world
-            .add_static(RigidBody::fixed("block", block).surface(0.0, 0.5).at(Pose::translation(0.0, 0.0, -0.1)))
+            .add_static(
+                RigidBody::fixed(block)
+                    .with_name("block")
+                    .with_material(Material { friction: 0.5, ..Material::default() })
+                    .with_pose(Pose::translation(0.0, 0.0, -0.1)),
+            )
             .unwrap();
-        let cylinder =
-            RigidBody::with_mass("cylinder", Shape::cylinder(0.05, 0.3).unwrap(), 1.0).unwrap().surface(0.0, 0.5);
-        let id = world.add(cylinder.at(Pose::translation(0.03, 0.02, 0.15))).unwrap();
+        let cylinder = RigidBody::new(Shape::cylinder(0.05, 0.3).unwrap())
+            .with_name("cylinder")
+            .with_mass(1.0)
+            .with_material(Material { friction: 0.5, ..Material::default() });
+        let id = world.add(cylinder.with_pose(Pose::translation(0.03, 0.02, 0.15))).unwrap();
         let start = position(&world, id);
         for _ in 0..480 {
             world.step().unwrap();
@@ -35,8 +42,11 @@ fn fly(beside: f64) -> (World, [ObjectId; 2]) {
     let mut world = no_gravity(world("time_stepping", 1.0 / 60.0));
     let shape = Shape::mesh(TriMesh::icosphere(0.1, 2), &TreeSettings::octree()).unwrap();
     let ids = [(-1.0, 0.0), (1.0, beside)].map(|(x, y)| {
-        let ball = RigidBody::with_mass(format!("ball {x}"), shape.clone(), 1.0).unwrap().surface(1.0, 0.0);
-        world.add(ball.at(Pose::translation(x, y, 0.0)).moving(Vec3::new(-50.0 * x, 0.0, 0.0), Vec3::zeros())).unwrap()
+        let ball = RigidBody::new(shape.clone())
+            .with_name(format!("ball {x}"))
+            .with_mass(1.0)
+            .with_material(Material { restitution: 1.0, friction: 0.0, ..Material::default() });
+        world.add(ball.with_pose(Pose::translation(x, y, 0.0)).with_velocity(Vec3::new(-50.0 * x, 0.0, 0.0))).unwrap()
     });
     (world, ids)
 }

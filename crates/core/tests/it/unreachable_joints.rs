@@ -38,7 +38,8 @@ impl ReachMechanism {
         let chain = world.add(chain).unwrap();
         let last = world.part_state(chain, links - 1).unwrap().pose;
         let end = last.translation.vector - LENGTH * (last.rotation * Vec3::z());
-        let mut hand = RigidBody::fixed("hand", sphere(0.01)).at(Pose::translation(end.x, end.y, end.z));
+        let mut hand =
+            RigidBody::fixed(sphere(0.01)).with_name("hand").with_pose(Pose::translation(end.x, end.y, end.z));
         hand.mask = 0;
         let hand = world.add_boxed(Box::new(hand), Mode::Kinematic).unwrap();
         let pin = LoopJoint::spherical_at("pin", &world, Some((chain, links - 1)), Some((hand, 0)), end).unwrap();
@@ -128,14 +129,14 @@ fn rigid_bars_pinned_in_a_row_share_what_is_out_of_reach() {
     for stepper in STEPPERS {
         let mut world = world(1.0 / 240.0, stepper, Integrator::Verlet);
         let bar = |i: usize| {
-            let mut body =
-                RigidBody::with_mass(format!("bar {i}"), Shape::cuboid(Vec3::new(0.2, 0.02, 0.02)).unwrap(), 1.0)
-                    .unwrap();
+            let mut body = RigidBody::new(Shape::cuboid(Vec3::new(0.2, 0.02, 0.02)).unwrap())
+                .with_name(format!("bar {i}"))
+                .with_mass(1.0);
             body.mask = 0;
-            body.at(Pose::translation(0.1 + 0.2 * i as f64, 0.0, 0.0))
+            body.with_pose(Pose::translation(0.1 + 0.2 * i as f64, 0.0, 0.0))
         };
         let bars: Vec<ObjectId> = (0..3).map(|i| world.add(bar(i)).unwrap()).collect();
-        let mut hand = RigidBody::fixed("hand", sphere(0.01)).at(Pose::translation(0.6, 0.0, 0.0));
+        let mut hand = RigidBody::fixed(sphere(0.01)).with_name("hand").with_pose(Pose::translation(0.6, 0.0, 0.0));
         hand.mask = 0;
         let hand = world.add_boxed(Box::new(hand), Mode::Kinematic).unwrap();
         let parts = [None, Some((bars[0], 0)), Some((bars[1], 0)), Some((bars[2], 0)), Some((hand, 0))];

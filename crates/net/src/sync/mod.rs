@@ -13,8 +13,8 @@
 //!
 //! fn scene() -> World {
 //!     let mut world = World::new(Settings::default()).unwrap();
-//!     let ball = RigidBody::with_mass("ball", Shape::sphere(0.1).unwrap(), 1.0).unwrap();
-//!     world.add(ball.at(Pose::translation(0.0, 0.0, 1.0))).unwrap();
+//!     let ball = RigidBody::new(Shape::sphere(0.1).unwrap()).with_name("ball").with_mass(1.0);
+//!     world.add(ball.with_pose(Pose::translation(0.0, 0.0, 1.0))).unwrap();
 //!     world
 //! }
 //!

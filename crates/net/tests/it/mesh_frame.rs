@@ -19,7 +19,7 @@ fn a_recorded_mesh_stands_where_its_file_says() {
     let shape = Shape::mesh(mesh, &TreeSettings::octree()).unwrap();
     let frame = Pose::from_parts(Vec3::new(3.0, -2.0, 5.0).into(), UnitQuaternion::from_euler_angles(0.3, -0.8, 1.9));
     let mut world = World::new(Settings::default()).unwrap();
-    world.add(RigidBody::with_mass("cube", shape, 1.0).unwrap().at(frame)).unwrap();
+    world.add(RigidBody::new(shape).with_name("cube").with_mass(1.0).with_pose(frame)).unwrap();
     let scratch = Scratch::new("mesh_frame");
     let path = scratch.file("a.mcap");
     let mut recorder = Recorder::create(&path, "", &entities(&world), RecorderOptions::default()).unwrap();
@@ -45,7 +45,7 @@ fn a_world_with_long_names_is_recorded() {
     let longer = ["é".repeat(200) + "1", "é".repeat(200) + "2"];
     let mut world = World::default();
     for name in [&long, &longer[0], &longer[1]] {
-        world.add(RigidBody::with_mass(name, Shape::sphere(0.1).unwrap(), 1.0).unwrap()).unwrap();
+        world.add(RigidBody::new(Shape::sphere(0.1).unwrap()).with_name(name).with_mass(1.0)).unwrap();
     }
     let scratch = Scratch::new("long_names");
     let path = scratch.file("a.mcap");

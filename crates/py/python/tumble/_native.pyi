@@ -863,7 +863,7 @@ class World:
 
         name: unique, of any length; without one, as in ``add_rigid(Sphere(0.1), mass=1)``, the world
         makes one from the number of objects added before, such as ``"body 3"``.
-        mass: kg, or density: kg/m³, one of the two. position: of the shape's frame, for a mesh the
+        mass: kg, or density: kg/m³; without both the density is 1000 kg/m³. position: of the shape's frame, for a mesh the
         file's, meters. orientation: unit quaternion (x, y, z, w). velocity, m/s, and
         angular_velocity, rad/s: world axes. restitution: 0 to 1. friction: at least 0. kinematic:
         moves at its prescribed velocity. contacts: contact mode, ``"surface"``, or ``"spheres"``

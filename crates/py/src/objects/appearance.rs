@@ -46,7 +46,7 @@ fn looking(body: Rigid, appearance: Appearance) -> Rigid {
         .cloned()
         .map(|visual| tumble::dynamics::Visual { appearance: appearance.clone(), ..visual })
         .collect();
-    body.drawn_as(visuals)
+    body.with_visuals(visuals)
 }
 
 /// Returns the color of its first visual.

@@ -29,7 +29,7 @@ impl Articulation {
             )));
         };
         let (body, notes) = py.detach(|| pool::run(|| source.body()))?;
-        let body = body.at(base).named(name.unwrap_or(&self.name));
+        let body = body.with_pose(base).with_name(name.unwrap_or(&self.name));
         let Now { mut q, qd, .. } = locked(now).clone();
         // The pose of a floating root is relative to the base.
         let model = body.model();

@@ -48,14 +48,15 @@ pub fn named_shape<'py>(
     Ok((name, shape.extract()?))
 }
 
-/// Returns a body with a mass or a density. A kinematic body needs neither.
+/// Returns a body with a mass or a density; without both it has the default density, or no mass if it is kinematic.
 pub fn rigid(name: &str, shape: &Shape, mass: Option<f64>, density: Option<f64>, kinematic: bool) -> Result<Rigid> {
-    let solid = shape.solid.clone();
+    let body = Rigid::fixed(shape.solid.clone()).with_name(name);
     match (mass, density) {
-        (Some(mass), None) => Ok(Rigid::with_mass(name, solid, mass)?),
-        (None, Some(density)) => Ok(Rigid::with_density(name, solid, density)?),
-        (None, None) if kinematic => Ok(Rigid::fixed(name, solid)),
-        _ => Err(Error::value(format!("body '{name}': expected a mass or a density, not both"))),
+        (Some(mass), None) => Ok(body.with_mass(mass)),
+        (None, density) if !kinematic => Ok(body.with_density(density.unwrap_or(Rigid::DEFAULT_DENSITY))),
+        (None, Some(density)) => Ok(body.with_density(density)),
+        (None, None) => Ok(body),
+        (Some(_), Some(_)) => Err(Error::value(format!("body '{name}': expected a mass or a density, not both"))),
     }
 }
 

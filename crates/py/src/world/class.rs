@@ -31,7 +31,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 use tumble::collide::{ContactMode, Vec3};
-use tumble::dynamics::{Mode, PairMaterial, RigidBody as Rigid, Settings};
+use tumble::dynamics::{Material, Mode, PairMaterial, RigidBody as Rigid, Settings};
 use tumble::scene::{SceneFile, resolve_scene};
 
 /// A world of bodies that moves in steps of ``dt`` seconds. SI units, radians, z up; quaternions
@@ -449,7 +449,7 @@ impl World {
     ///
     /// name: unique, of any length; without one, as in ``add_rigid(Sphere(0.1), mass=1)``, the world
     /// makes one from the number of objects added before, such as ``"body 3"``.
-    /// mass: kg, or density: kg/m³, one of the two. position: of the shape's frame, for a mesh the
+    /// mass: kg, or density: kg/m³; without both the density is 1000 kg/m³. position: of the shape's frame, for a mesh the
     /// file's, meters. orientation: unit quaternion (x, y, z, w). velocity, m/s, and
     /// angular_velocity, rad/s: world axes. restitution: 0 to 1. friction: at least 0. kinematic:
     /// moves at its prescribed velocity. contacts: contact mode, ``"surface"``, or ``"spheres"``
@@ -483,11 +483,11 @@ impl World {
             vec3_or(angular_velocity, "angular_velocity", Vec3::zeros())?,
         ];
         let mut body = rigid(&name, &shape, mass, density, kinematic)?
-            .at(pose(position, orientation)? * shape.placement)
-            .surface(restitution, friction);
+            .with_pose(pose(position, orientation)? * shape.placement)
+            .with_material(Material { restitution, friction, ..Material::default() });
         (body.linear_damping, body.angular_damping, body.contact_mode) =
             (linear_damping, angular_damping, meaning("contacts", contacts, ContactMode::NAMES)?);
-        add(&self.shared, py, body.moving(motion[0], motion[1]), mode, collidable)
+        add(&self.shared, py, body.with_velocity(motion[0]).with_angular_velocity(motion[1]), mode, collidable)
     }
 
     /// Adds geometry that never moves. name, position, orientation, restitution, friction, contacts: as
@@ -508,10 +508,11 @@ impl World {
     ) -> Result<RigidBody> {
         let (name, shape) = named_shape(name, shape)?;
         let pose = pose(position, orientation)? * shape.placement;
-        let body = Rigid::fixed(name, shape.solid.clone())
-            .at(pose)
-            .surface(restitution, friction)
-            .colliding_by(meaning("contacts", contacts, ContactMode::NAMES)?);
+        let body = Rigid::fixed(shape.solid.clone())
+            .with_name(name)
+            .with_pose(pose)
+            .with_material(Material { restitution, friction, ..Material::default() })
+            .with_contact_mode(meaning("contacts", contacts, ContactMode::NAMES)?);
         add(&self.shared, py, body, Mode::Static, collidable)
     }
 

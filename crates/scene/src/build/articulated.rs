@@ -66,7 +66,7 @@ fn assembled(
     let positions: Vec<f64> = moving.iter().flat_map(|link| position(link, &spec.base)).collect();
     let velocities: Vec<f64> = moving.iter().flat_map(|link| link.joint.velocity.clone()).collect();
     let mut body = ArticulatedBody::new(&spec.name, model)
-        .at(spec.base)
+        .with_pose(spec.base)
         .with_positions(&positions)?
         .with_velocities(&velocities)?;
     body.self_collision = spec.self_collision;

@@ -4,7 +4,8 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::solver::SolverSettings;
 use tumble_core::{
-    ArticulatedBody, LoopJoint, ObjectId, PairMaterial, PairSide, RigidBody, Settings, Sleep, Visual, World, WorldError,
+    ArticulatedBody, LoopJoint, Material, ObjectId, PairMaterial, PairSide, RigidBody, Settings, Sleep, Visual, World,
+    WorldError,
 };
 
 use crate::build::appearance::{appearance, material_id};
@@ -148,22 +149,25 @@ impl SceneFile {
 
     fn body(&self, spec: &BodySpec, meshes: &[Shape]) -> Result<RigidBody, BuildError> {
         let shape = shapes::make(&spec.shape, meshes).map_err(|e| self.body_error(spec, e))?;
+        let body = RigidBody::fixed(shape.clone());
         let body = match spec.mass {
-            Some(MassSpec::Mass(mass)) => RigidBody::with_mass(&spec.name, shape.clone(), mass),
-            Some(MassSpec::Density(density)) => RigidBody::with_density(&spec.name, shape.clone(), density),
-            None => Ok(RigidBody::fixed(&spec.name, shape.clone())),
+            Some(MassSpec::Mass(mass)) => body.with_mass(mass),
+            Some(MassSpec::Density(density)) => body.with_density(density),
+            None => body,
         };
         let [x, y, z, w] = spec.orientation_xyzw;
         let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
         let pose = Pose::from_parts(Translation3::from(Vec3::from(spec.position_m)), rotation);
+        let material =
+            Material { restitution: spec.restitution, friction: spec.friction, id: material_id(spec.material) };
         let mut body = body
-            .map_err(|e| self.body_error(spec, e))?
-            .at(pose)
-            .moving(Vec3::from(spec.velocity_m_per_s), Vec3::from(spec.angular_velocity_rad_per_s))
-            .surface(spec.restitution, spec.friction)
-            .of_material(material_id(spec.material))
-            .colliding_by(spec.contacts)
-            .drawn_as(visuals(spec, shape));
+            .with_name(&spec.name)
+            .with_pose(pose)
+            .with_velocity(Vec3::from(spec.velocity_m_per_s))
+            .with_angular_velocity(Vec3::from(spec.angular_velocity_rad_per_s))
+            .with_material(material)
+            .with_contact_mode(spec.contacts)
+            .with_visuals(visuals(spec, shape));
         if let Some(camera) = &spec.mounts.camera {
             body = body.with_camera(camera.clone());
         }

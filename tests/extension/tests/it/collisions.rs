@@ -2,12 +2,16 @@
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Shape, Vec3};
-use tumble_core::{Object, ObjectId, RigidBody, World};
+use tumble_core::{Material, Object, ObjectId, RigidBody, World};
 use tumble_extension::{Bead, Particle};
 
 fn rigid(name: &str, mass: f64, at: Vec3, velocity: Vec3, restitution: f64) -> RigidBody {
-    let body = RigidBody::with_mass(name, sphere(0.1), mass).unwrap().surface(restitution, 0.0);
-    body.at(Pose::translation(at.x, at.y, at.z)).moving(velocity, Vec3::zeros())
+    let body = RigidBody::new(sphere(0.1)).with_name(name).with_mass(mass).with_material(Material {
+        restitution,
+        friction: 0.0,
+        ..Material::default()
+    });
+    body.with_pose(Pose::translation(at.x, at.y, at.z)).with_velocity(velocity)
 }
 
 /// Two objects of `ma` and `mb` kg head on along x with restitution `e`: velocities after, by momentum and Newton's law.
@@ -29,7 +33,7 @@ fn a_particle_hits_a_rigid_body_head_on() {
         for e in [0.0, 0.5, 1.0] {
             let a = Particle::new("particle", 2.0, sphere(0.1))
                 .at(Vec3::new(-0.5, 0.0, 0.0), Vec3::new(3.0, 0.0, 0.0))
-                .surface(e, 0.0);
+                .with_material(Material { restitution: e, friction: 0.0, ..Material::default() });
             let (world, a, b) = collide(stepper, a, rigid("ball", 3.0, Vec3::zeros(), Vec3::new(-1.0, 0.0, 0.0), e));
             let (va, vb) = head_on(2.0, 3.0, 3.0, -1.0, e);
             let (got_a, got_b) = (velocity(&world, a), velocity(&world, b));
@@ -51,7 +55,7 @@ fn an_oblique_elastic_impact_keeps_everything() {
     for stepper in STEPPERS {
         let a = Particle::new("particle", 2.0, sphere(0.1))
             .at(Vec3::new(-0.5, 0.08, 0.03), Vec3::new(3.0, 0.0, 0.0))
-            .surface(1.0, 0.0);
+            .with_material(Material { restitution: 1.0, friction: 0.0, ..Material::default() });
         let (mut world, a, b) = collide(stepper, a, rigid("ball", 2.0, Vec3::zeros(), Vec3::zeros(), 1.0));
         let (va, vb) = (velocity(&world, a), velocity(&world, b));
         assert!(va.norm() > 0.1 && vb.norm() > 0.1 && va.dot(&vb).abs() < 1e-6, "{stepper}: {va} and {vb}");
@@ -74,7 +78,11 @@ fn an_oblique_elastic_impact_keeps_everything() {
 #[test]
 fn a_bead_at_the_lowest_point_swaps_velocities_with_a_ball() {
     for stepper in STEPPERS {
-        let bead = Bead::new("bead", 2.0, 0.25, sphere(0.1)).surface(1.0, 0.0);
+        let bead = Bead::new("bead", 2.0, 0.25, sphere(0.1)).with_material(Material {
+            restitution: 1.0,
+            friction: 0.0,
+            ..Material::default()
+        });
         let (world, bead, ball) =
             collide(stepper, bead, rigid("ball", 2.0, Vec3::new(0.5, 0.0, 0.0), Vec3::new(-1.5, 0.0, 0.0), 1.0));
         assert!(velocity(&world, ball).norm() < 1e-6, "{stepper}: the ball still has {}", velocity(&world, ball));
@@ -90,7 +98,7 @@ fn a_bead_at_the_lowest_point_swaps_velocities_with_a_ball() {
 fn a_particle_lands_and_rests() {
     for stepper in STEPPERS {
         let mut world = world(stepper, true);
-        world.add_static(RigidBody::fixed("ground", Shape::half_space())).unwrap();
+        world.add_static(RigidBody::fixed(Shape::half_space()).with_name("ground")).unwrap();
         let id =
             world.add(Particle::new("particle", 2.0, sphere(0.1)).at(Vec3::new(0.0, 0.0, 0.5), Vec3::zeros())).unwrap();
         step(&mut world, 240);
@@ -110,12 +118,18 @@ fn new_kinds_are_saved_and_restored() {
     for stepper in STEPPERS {
         let build = || {
             let mut world = world(stepper, true);
-            world.add_static(RigidBody::fixed("ground", Shape::half_space()).surface(0.5, 0.3)).unwrap();
+            world
+                .add_static(RigidBody::fixed(Shape::half_space()).with_name("ground").with_material(Material {
+                    restitution: 0.5,
+                    friction: 0.3,
+                    ..Material::default()
+                }))
+                .unwrap();
             world
                 .add(
                     Particle::new("particle", 2.0, sphere(0.1))
                         .at(Vec3::new(0.0, 0.05, 0.5), Vec3::zeros())
-                        .surface(0.5, 0.3),
+                        .with_material(Material { restitution: 0.5, friction: 0.3, ..Material::default() }),
                 )
                 .unwrap();
             world.add(Bead::new("bead", 1.0, 0.25, sphere(0.05)).at(1.0, 0.0).stopped_at(1.2)).unwrap();

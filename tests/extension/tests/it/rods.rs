@@ -25,7 +25,12 @@ fn pendulum(stepper: &str, rigid: bool) -> (World, ObjectId) {
     let id = if rigid {
         let at = bob(AMPLITUDE);
         world
-            .add(RigidBody::with_mass("bob", sphere(0.1), 2.0).unwrap().at(Pose::translation(at.x, at.y, at.z)))
+            .add(
+                RigidBody::new(sphere(0.1))
+                    .with_name("bob")
+                    .with_mass(2.0)
+                    .with_pose(Pose::translation(at.x, at.y, at.z)),
+            )
             .unwrap()
     } else {
         world.add(Particle::new("bob", 2.0, sphere(0.1)).at(bob(AMPLITUDE), Vec3::zeros())).unwrap()

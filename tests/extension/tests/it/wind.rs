@@ -11,7 +11,8 @@ fn wind_carries_what_it_blows_on_as_its_equation_says() {
     for stepper in STEPPERS {
         let mut world = world(stepper, false);
         let particle = world.add(Particle::new("particle", 2.0, sphere(0.1))).unwrap();
-        let body = RigidBody::with_mass("ball", sphere(0.1), 3.0).unwrap().at(Pose::translation(0.0, 5.0, 0.0));
+        let body =
+            RigidBody::new(sphere(0.1)).with_name("ball").with_mass(3.0).with_pose(Pose::translation(0.0, 5.0, 0.0));
         let ball = world.add(body).unwrap();
         let calm =
             world.add(Particle::new("calm", 2.0, sphere(0.1)).at(Vec3::new(0.0, -5.0, 0.0), Vec3::zeros())).unwrap();

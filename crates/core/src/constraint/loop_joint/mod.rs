@@ -114,7 +114,7 @@ pub struct PositionError {
 /// ```
 /// # use tumble_core::{LoopJoint, RigidBody, Settings, World, collide::{Shape, Vec3}};
 /// # let mut world = World::new(Settings::default())?;
-/// # let door = world.add(RigidBody::with_mass("door", Shape::cuboid(Vec3::new(0.8, 0.04, 2.0))?, 20.0)?)?;
+/// # let door = world.add(RigidBody::new(Shape::cuboid(Vec3::new(0.8, 0.04, 2.0))?).with_name("door").with_mass(20.0))?;
 /// # let (point, axis) = (Vec3::new(-0.4, 0.0, 0.0), Vec3::z());
 /// let hinge = LoopJoint::revolute_at("hinge", &world, Some((door, 0)), None, point, axis)?;
 /// world.add(hinge)?;

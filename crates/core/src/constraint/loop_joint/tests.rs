@@ -141,7 +141,12 @@ impl Pairing {
 
 fn body(name: &str, pose: Pose, velocity: Vec3, spin: Vec3) -> RigidBody {
     let shape = Shape::cuboid(Vec3::new(0.6, 0.4, 0.2)).unwrap();
-    RigidBody::with_mass(name, shape, 2.0).unwrap().at(pose).moving(velocity, spin)
+    RigidBody::new(shape)
+        .with_name(name)
+        .with_mass(2.0)
+        .with_pose(pose)
+        .with_velocity(velocity)
+        .with_angular_velocity(spin)
 }
 
 /// Two bodies whose frames are parallel (so that rotations are closed) and `offset` apart.

@@ -26,7 +26,7 @@ fn payloads() -> Vec<Vec<u8>> {
     };
     let (mut world, mut publisher) = (scene(), Publisher::new(&scene(), false, 0));
     let shape = tumble_core::collide::Shape::sphere(0.2).unwrap();
-    world.add(tumble_core::RigidBody::with_mass("guest", shape, 1.0).unwrap()).unwrap();
+    world.add(tumble_core::RigidBody::new(shape).with_name("guest").with_mass(1.0)).unwrap();
     let published = publisher.publish(&world, &viewer(1), 3).unwrap();
     let pose = tumble_core::collide::Pose::translation(1.0, 2.0, 3.0);
     let input = Input {

@@ -77,8 +77,8 @@ fn names_of_any_length_are_sent_whole() {
     let scene = || {
         let mut world = scene();
         for name in ["é".repeat(100), "x".repeat(199) + "1", "x".repeat(199) + "2", "y".repeat(70_000)] {
-            let body = RigidBody::with_mass(name, Shape::sphere(0.1).unwrap(), 1.0).unwrap();
-            world.add(body.at(Pose::translation(0.0, 0.0, 40.0))).unwrap();
+            let body = RigidBody::new(Shape::sphere(0.1).unwrap()).with_name(name).with_mass(1.0);
+            world.add(body.with_pose(Pose::translation(0.0, 0.0, 40.0))).unwrap();
         }
         world
     };
@@ -87,8 +87,8 @@ fn names_of_any_length_are_sent_whole() {
         let mut pair = Pair { world: scene(), publisher, mirror: Mirror::new(scene()), frame: 0 };
         assert!(pair.send());
         for name in ["ü".repeat(100), String::new()] {
-            let body = RigidBody::with_mass(name, Shape::sphere(0.1).unwrap(), 1.0).unwrap();
-            pair.world.add(body.at(Pose::translation(1.0, 0.0, 40.0))).unwrap();
+            let body = RigidBody::new(Shape::sphere(0.1).unwrap()).with_name(name).with_mass(1.0);
+            pair.world.add(body.with_pose(Pose::translation(1.0, 0.0, 40.0))).unwrap();
             pair.world.step().unwrap();
             assert!(pair.send());
         }
@@ -140,8 +140,8 @@ fn objects_come_and_go() {
     .enumerate()
     {
         let visual = Visual::shape(0, spun, shape.clone().unwrap(), appearance.clone());
-        let body = RigidBody::with_mass(format!("new {k}"), shape.unwrap(), 1.0).unwrap();
-        pair.world.add(body.at(spun).drawn_as(vec![visual])).unwrap();
+        let body = RigidBody::new(shape.unwrap()).with_name(format!("new {k}")).with_mass(1.0);
+        pair.world.add(body.with_pose(spun).with_visuals(vec![visual])).unwrap();
         assert!(pair.send(), "an object more");
         pair.world.step().unwrap();
         assert!(!pair.send());
@@ -156,7 +156,7 @@ fn objects_come_and_go() {
         assert!(pair.send(), "{name} is gone");
     }
     // another object with a former name
-    pair.world.add(RigidBody::with_mass("ball 2", Shape::sphere(0.5).unwrap(), 1.0).unwrap()).unwrap();
+    pair.world.add(RigidBody::new(Shape::sphere(0.5).unwrap()).with_name("ball 2").with_mass(1.0)).unwrap();
     assert!(pair.send());
     let ball = pair.mirror.world().find("ball 2").unwrap();
     let radius = |o: &dyn Object| {
@@ -191,7 +191,7 @@ fn a_mesh_of_the_scene_is_not_sent_again() {
         triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
     };
     let shape = Shape::mesh(tetrahedron, &TreeSettings::octree()).unwrap();
-    let body = |name: &str, shape: &Shape| RigidBody::with_mass(name, shape.clone(), 1.0).unwrap();
+    let body = |name: &str, shape: &Shape| RigidBody::new(shape.clone()).with_name(name).with_mass(1.0);
     let build = || {
         let mut world = scene();
         world.add(body("rock", &shape)).unwrap();
@@ -232,7 +232,7 @@ fn a_mesh_of_the_scene_is_not_sent_again() {
         Arc::new(VisualMesh::read_by("lost", || Err("gone".into()))),
         Appearance::default(),
     );
-    world.add(body("tent", &shape).drawn_as(drawn.into_iter().chain([lost]).collect())).unwrap();
+    world.add(body("tent", &shape).with_visuals(drawn.into_iter().chain([lost]).collect())).unwrap();
     publisher.publish(&world, &viewer(0), 3).unwrap();
     mirror.apply_snapshot(&publisher.snapshot()).unwrap();
     let tent = mirror.world().object(mirror.world().find("tent").unwrap()).unwrap();
@@ -244,7 +244,7 @@ fn a_mesh_of_the_scene_is_not_sent_again() {
 #[test]
 fn what_cannot_be_sent_is_said() {
     let mut pair = Pair::new(false);
-    pair.world.add(RigidBody::with_mass(VIEWER_NAME, Shape::sphere(1.0).unwrap(), 1.0).unwrap()).unwrap();
+    pair.world.add(RigidBody::new(Shape::sphere(1.0).unwrap()).with_name(VIEWER_NAME).with_mass(1.0)).unwrap();
     let error = pair.publisher.publish(&pair.world, &viewer(0), 0).unwrap_err();
     assert!(error.to_string().contains("SidData"), "{error}");
     let id = pair.world.find(VIEWER_NAME).unwrap();
@@ -302,7 +302,8 @@ fn the_hash_of_a_scene_sees_what_can_be_seen() {
         let id = find(w, "ball 4");
         w.remove(id).unwrap();
         let pose = Pose::translation(1.2, 0.0, 1.8);
-        w.add(RigidBody::with_mass("ball 4", Shape::sphere(0.1000001).unwrap(), 1.0).unwrap().at(pose)).unwrap();
+        w.add(RigidBody::new(Shape::sphere(0.1000001).unwrap()).with_name("ball 4").with_mass(1.0).with_pose(pose))
+            .unwrap();
     };
     let changes: [&dyn Fn(&mut World); 4] = [&up, &gone, &dead, &wider];
     let hashes: Vec<_> = changes.iter().map(|change| hash(*change)).collect();
@@ -320,7 +321,7 @@ fn the_hash_of_a_scene_does_not_see_folders() {
         let shape = Shape::sphere(0.1).unwrap();
         let appearance = Appearance { texture: Some(std::path::Path::new(texture).into()), ..Appearance::default() };
         let visual = Visual::shape(0, Pose::identity(), shape.clone(), appearance);
-        world.add(RigidBody::with_mass("textured", shape, 1.0).unwrap().drawn_as(vec![visual])).unwrap();
+        world.add(RigidBody::new(shape).with_name("textured").with_mass(1.0).with_visuals(vec![visual])).unwrap();
         tumble_net::sync::scene_hash("text", &world)
     };
     assert_eq!(hash("one/scenes/wood.png"), hash("elsewhere/wood.png"));

@@ -11,7 +11,7 @@ fn through(pose: Pose) -> Pose {
     use tumble_core::{RigidBody, Settings, World, collide::Shape};
     let world = |pose| {
         let mut world = World::new(Settings::default().with_dt(1.0 / 60.0)).unwrap();
-        world.add(RigidBody::with_mass("b", Shape::sphere(1.0).unwrap(), 1.0).unwrap().at(pose)).unwrap();
+        world.add(RigidBody::new(Shape::sphere(1.0).unwrap()).with_name("b").with_mass(1.0).with_pose(pose)).unwrap();
         world
     };
     let (there, mut publisher) = (world(pose), tumble_net::sync::Publisher::new(&world(Pose::identity()), false, 0));

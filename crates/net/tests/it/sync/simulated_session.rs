@@ -16,16 +16,20 @@ pub const MS: Duration = Duration::from_millis(1);
 /// Spheres that fall on a floor, a box that slides, a fixed post.
 pub fn scene() -> World {
     let mut world = World::new(Settings::default().with_dt(1.0 / 60.0)).unwrap();
-    world.add_static(RigidBody::fixed("ground", Shape::half_space())).unwrap();
+    world.add_static(RigidBody::fixed(Shape::half_space()).with_name("ground")).unwrap();
     world
-        .add_static(RigidBody::fixed("post", Shape::capsule(0.1, 2.0).unwrap()).at(Pose::translation(3.0, 0.0, 1.0)))
+        .add_static(
+            RigidBody::fixed(Shape::capsule(0.1, 2.0).unwrap())
+                .with_name("post")
+                .with_pose(Pose::translation(3.0, 0.0, 1.0)),
+        )
         .unwrap();
     for k in 0..5 {
-        let ball = RigidBody::with_mass(format!("ball {k}"), Shape::sphere(0.1).unwrap(), 1.0).unwrap();
-        world.add(ball.at(Pose::translation(0.3 * k as f64, 0.0, 1.0 + 0.2 * k as f64))).unwrap();
+        let ball = RigidBody::new(Shape::sphere(0.1).unwrap()).with_name(format!("ball {k}")).with_mass(1.0);
+        world.add(ball.with_pose(Pose::translation(0.3 * k as f64, 0.0, 1.0 + 0.2 * k as f64))).unwrap();
     }
-    let crate_ = RigidBody::with_mass("crate", Shape::cuboid([0.4, 0.4, 0.4].into()).unwrap(), 2.0).unwrap();
-    let crate_ = world.add(crate_.at(Pose::translation(0.0, 2.0, 0.2))).unwrap();
+    let crate_ = RigidBody::new(Shape::cuboid([0.4, 0.4, 0.4].into()).unwrap()).with_name("crate").with_mass(2.0);
+    let crate_ = world.add(crate_.with_pose(Pose::translation(0.0, 2.0, 0.2))).unwrap();
     world.set_velocity(crate_, [1.0, 0.0, 0.0].into(), [0.0, 0.0, 3.0].into()).unwrap();
     world
 }

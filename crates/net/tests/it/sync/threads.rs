@@ -86,7 +86,7 @@ fn a_run_is_recorded_and_replays_to_the_same_hashes_twice() {
     for frame in 0..count {
         world.step().unwrap();
         if frame == 30 {
-            world.add(RigidBody::with_mass("guest", Shape::sphere(0.3).unwrap(), 1.0).unwrap()).unwrap();
+            world.add(RigidBody::new(Shape::sphere(0.3).unwrap()).with_name("guest").with_mass(1.0)).unwrap();
         }
         assert_eq!(server.frame(&world, &viewer(frame)).unwrap(), frame);
         recorder.frame(&world, server.session().recorded(frame == 0).unwrap()).unwrap();

@@ -55,9 +55,9 @@ impl UserColliders {
         let mut all = UserColliders::default();
         for (k, user) in viewer.users.iter().enumerate() {
             let mut add = |name: String, shape: Shape, pose: Pose, drawn: bool| {
-                let body = RigidBody::fixed(name, shape).at(pose);
+                let body = RigidBody::fixed(shape).with_name(name).with_pose(pose);
                 // the capsule is not drawn, because the user stands in it
-                let body = if drawn { body } else { body.drawn_as(Vec::new()) };
+                let body = if drawn { body } else { body.with_visuals(Vec::new()) };
                 world.add_boxed(Box::new(body), Mode::Kinematic).map_err(|e| failed(&e))
             };
             let capsule = Shape::capsule(RADIUS_M * viewer.scale, 2.0 * half_length(user) * viewer.scale)
