@@ -42,7 +42,7 @@ for episode in range(3):
     total, over = 0.0, False
     while not over:
         push = -gains @ (x, angle, v, rate)
-        (x, v, angle, rate), reward, fallen, cut, _ = env.step(int(push > 0))  # all or nothing, to the side that is wanted
+        (x, v, angle, rate), reward, fallen, cut, _ = env.step(int(push > 0))  # all or nothing, towards the desired side
         total, over = total + reward, fallen or cut
     print(f"episode {episode}: {total:.0f} steps upright, the cart {x:+.2f} m from the middle")
     assert total == 500

@@ -23,7 +23,7 @@ def problems(wheel: Path) -> list[str]:
     metadata = Parser().parsestr(files[f"{info}/METADATA"].decode())
     tags = Parser().parsestr(files[f"{info}/WHEEL"].decode()).get_all("Tag") or []
     if not tags or not all("-abi3-manylinux_" in tag for tag in tags):
-        found.append(f"its tags are {tags}; wanted abi3 and manylinux")
+        found.append(f"its tags are {tags}; expected abi3 and manylinux")
     for license in metadata.get_all("License-File") or ["LICENSE-MIT"]:
         if f"{info}/licenses/{license}" not in files:
             found.append(f"{license} is not in it")

@@ -25,7 +25,7 @@ const REFERENCE: [(&str, u32, f64, f64, f64, f64); 7] = [
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut words = std::env::args().skip(1);
-    let folder = words.next().ok_or("wanted a folder of OBJ files")?;
+    let folder = words.next().ok_or("expected a folder of OBJ files")?;
     let depth = words.next().map_or(Ok(2), |word| word.parse())?;
     let named: Vec<String> = words.collect();
     let all = [

@@ -104,7 +104,7 @@ fn options() -> Result<Options, Failure> {
             "--readback" => options.readback = true,
             "--pictures" => options.pictures = Some(value()?.into()),
             "--stages" => options.stages = true,
-            _ => return Err(format!("no option {word}; wanted --duration S, --only WORDS, --quality WORDS, --readback, --stages or --pictures FOLDER").into()),
+            _ => return Err(format!("no option {word}; expected --duration S, --only WORDS, --quality WORDS, --readback, --stages or --pictures FOLDER").into()),
         }
     }
     Ok(options)

@@ -17,7 +17,7 @@ const PICTURES: [(&str, &str, u32); 8] = [
 ];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let folder = std::path::PathBuf::from(std::env::args().nth(1).ok_or("wanted a folder for the pictures")?);
+    let folder = std::path::PathBuf::from(std::env::args().nth(1).ok_or("expected a folder for the pictures")?);
     let mut renderer = Renderer::new()?;
     for (overlay, name, frames) in PICTURES {
         let scene = shipped().iter().find(|s| s.name == name).ok_or(name)?.read()?;

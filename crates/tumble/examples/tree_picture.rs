@@ -12,7 +12,7 @@ const LEVELS: [u32; 3] = [1, 2, 3];
 fn main() -> Result<(), Box<dyn Error>> {
     let mut words = std::env::args().skip(1);
     let (Some(mesh), Some(picture)) = (words.next(), words.next()) else {
-        return Err("wanted MESH.obj PICTURE.png".into());
+        return Err("expected MESH.obj PICTURE.png".into());
     };
     let mut mesh = TriMesh::from_obj(&std::fs::read_to_string(mesh)?)?;
     mesh.check_closed()?;

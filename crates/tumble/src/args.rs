@@ -407,7 +407,7 @@ impl std::str::FromStr for Overlays {
 fn number(text: &str, from: f64, to: f64) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if (from..=to).contains(&x) => Ok(x),
-        _ => Err(format!("wanted a number from {from} to {to}")),
+        _ => Err(format!("expected a number from {from} to {to}")),
     }
 }
 
@@ -438,14 +438,14 @@ fn method(text: &str) -> Result<Builder, String> {
 }
 
 fn folder(text: &str) -> Result<PathBuf, String> {
-    if text.trim().is_empty() { Err("wanted the name of a folder".into()) } else { Ok(PathBuf::from(text)) }
+    if text.trim().is_empty() { Err("expected the name of a folder".into()) } else { Ok(PathBuf::from(text)) }
 }
 
 fn package(text: &str) -> Result<(String, PathBuf), String> {
     let (name, folder) = text
         .split_once('=')
         .filter(|(name, folder)| !name.is_empty() && !folder.is_empty())
-        .ok_or("wanted NAME=DIR")?;
+        .ok_or("expected NAME=DIR")?;
     if Path::new(folder).is_dir() {
         Ok((name.into(), folder.into()))
     } else {
@@ -457,7 +457,7 @@ fn missing(text: &str) -> Result<MissingMeshes, String> {
     match text {
         "error" => Ok(MissingMeshes::Error),
         "skip" => Ok(MissingMeshes::Skip),
-        _ => Err("wanted error or skip".into()),
+        _ => Err("expected error or skip".into()),
     }
 }
 
@@ -466,7 +466,7 @@ fn png(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match path.extension() {
         Some(ending) if !ending.eq_ignore_ascii_case("png") => {
-            Err("pictures are written as PNG; wanted a file that ends in .png".into())
+            Err("pictures are written as PNG; expected a file that ends in .png".into())
         }
         _ => Ok(path),
     }
@@ -478,7 +478,7 @@ fn planner(text: &str) -> Result<PathBuf, String> {
     if ["yaml", "yml", "json"].contains(&ending) {
         Ok(path)
     } else {
-        Err("wanted yaml, json, or a file that ends in .yml, .yaml or .json".into())
+        Err("expected yaml, json, or a file that ends in .yml, .yaml or .json".into())
     }
 }
 
@@ -489,5 +489,5 @@ fn size(text: &str) -> Result<(u32, u32), String> {
         |(w, h): &(u32, u32)| side.contains(w) && side.contains(h) && u64::from(*w) * u64::from(*h) <= MAX_PIXELS;
     parsed
         .filter(fits)
-        .ok_or_else(|| format!("wanted WIDTHxHEIGHT in pixels, each 1 to {MAX_SIDE}, together at most {MAX_PIXELS}"))
+        .ok_or_else(|| format!("expected WIDTHxHEIGHT in pixels, each 1 to {MAX_SIDE}, together at most {MAX_PIXELS}"))
 }

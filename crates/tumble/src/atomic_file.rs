@@ -53,7 +53,7 @@ fn temporary_beside(path: &Path) -> PathBuf {
 pub fn check_writable(path: &Path) -> Result<(), String> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let problem = match folder {
-        _ if path.is_dir() => "it is a folder; wanted the name of a file".into(),
+        _ if path.is_dir() => "it is a folder; expected the name of a file".into(),
         folder if !folder.is_dir() => format!("there is no folder {}", folder.display()),
         _ => return Ok(()),
     };

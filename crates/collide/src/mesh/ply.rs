@@ -167,12 +167,12 @@ impl Element {
         match self.name.as_str() {
             "vertex" => match ["x", "y", "z"].map(|name| at(name, false)) {
                 [Some(x), Some(y), Some(z)] => Ok(ElementKind::Vertex([x, y, z])),
-                _ => Err(ply_error("the element `vertex`", "wanted properties x, y and z")),
+                _ => Err(ply_error("the element `vertex`", "expected properties x, y and z")),
             },
             name @ ("face" | "tristrips") => match at("vertex_indices", true).or_else(|| at("vertex_index", true)) {
                 Some(list) if name == "face" => Ok(ElementKind::Face(list)),
                 Some(list) => Ok(ElementKind::Strips(list)),
-                None => Err(ply_error(&format!("the element `{name}`"), "wanted `property list … vertex_indices`")),
+                None => Err(ply_error(&format!("the element `{name}`"), "expected `property list … vertex_indices`")),
             },
             _ => Ok(ElementKind::Other),
         }
@@ -196,7 +196,7 @@ impl Header {
             let wrong = |what: String| ply_error(&format!("line {number}"), &what);
             let words: Vec<&str> = line.split_ascii_whitespace().collect();
             match words.as_slice() {
-                _ if number == 1 && words != ["ply"] => return Err(wrong("wanted `ply`".into())),
+                _ if number == 1 && words != ["ply"] => return Err(wrong("expected `ply`".into())),
                 ["format", word, "1.0"] => {
                     encoding = Some(match *word {
                         "ascii" => Encoding::Ascii,
@@ -204,7 +204,7 @@ impl Header {
                         "binary_big_endian" => Encoding::BigEndian,
                         other => {
                             return Err(wrong(format!(
-                                "the format `{other}`; wanted ascii, binary_little_endian or binary_big_endian"
+                                "the format `{other}`; expected ascii, binary_little_endian or binary_big_endian"
                             )));
                         }
                     });
@@ -239,7 +239,7 @@ impl Header {
         let names: Vec<String> = self.elements.iter().take(10).map(|e| format!("{} {}", e.count, e.name)).collect();
         ply_error(
             "the file has no triangles",
-            &format!("wanted elements `face` or `tristrips`; found: {}", names.join(", ")),
+            &format!("expected elements `face` or `tristrips`; found: {}", names.join(", ")),
         )
     }
 }
@@ -247,7 +247,7 @@ impl Header {
 fn add_property(elements: &mut [Element], name: &str, kind: &str, length: Option<&str>) -> Result<(), String> {
     let number = |word: &str| {
         ScalarType::from_name(word).ok_or_else(|| {
-            format!("`{word}` is not a number type; wanted char, uchar, short, ushort, int, uint, float or double")
+            format!("`{word}` is not a number type; expected char, uchar, short, ushort, int, uint, float or double")
         })
     };
     let property = Property { name: name.into(), number: number(kind)?, length: length.map(number).transpose()? };

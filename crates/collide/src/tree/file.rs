@@ -93,14 +93,14 @@ pub enum TreeFileError {
     #[error("units are \"{0}\"; a sphere tree is in \"m\"")]
     Units(String),
     /// A count out of range.
-    #[error("there are {count} {what}; wanted {wanted}")]
+    #[error("there are {count} {what}; expected {expected}")]
     Count {
         /// The counted items.
         what: String,
         /// The count in the file.
         count: usize,
         /// The allowed counts.
-        wanted: String,
+        expected: String,
     },
     /// An invalid sphere.
     #[error("sphere {sphere} of level {level}: {what}")]
@@ -235,7 +235,7 @@ impl TreeFile {
             return Err(TreeFileError::Count {
                 what: "rows of `quality`".into(),
                 count: rows,
-                wanted: format!("one for each of the {levels} levels, or none"),
+                expected: format!("one for each of the {levels} levels, or none"),
             });
         }
         let mesh = text.mesh.unwrap_or_else(|| MeshId {
@@ -245,7 +245,7 @@ impl TreeFile {
         });
         if !(mesh.diagonal > 0.0 && mesh.diagonal <= MAX_COORDINATE) {
             return Err(TreeFileError::Tree(format!(
-                "`diagonal` of `mesh` is {}; wanted above 0, at most {MAX_COORDINATE:e} m",
+                "`diagonal` of `mesh` is {}; expected above 0, at most {MAX_COORDINATE:e} m",
                 mesh.diagonal
             )));
         }
@@ -271,7 +271,7 @@ fn lines(items: impl Iterator<Item = String>) -> String {
 }
 
 fn read_levels(levels: &[Vec<JsonSphere>]) -> Result<SphereTree, TreeFileError> {
-    let count = |what: &str, count, wanted: String| Err(TreeFileError::Count { what: what.into(), count, wanted });
+    let count = |what: &str, count, expected: String| Err(TreeFileError::Count { what: what.into(), count, expected });
     if levels.is_empty() || levels.len() > MAX_LEVELS {
         return count("levels", levels.len(), format!("1 to {MAX_LEVELS}"));
     }
@@ -348,11 +348,11 @@ fn read_level(
 fn read_sphere(number: usize, sphere: &JsonSphere) -> Result<SphereNode, String> {
     let [x, y, z] = sphere.c;
     if let Some(bad) = sphere.c.iter().find(|x| x.is_nan() || x.abs() > MAX_COORDINATE) {
-        return Err(format!("its center has the coordinate {bad}; wanted at most {MAX_COORDINATE:e} m"));
+        return Err(format!("its center has the coordinate {bad}; expected at most {MAX_COORDINATE:e} m"));
     }
     for (what, value) in [("radius `r`", sphere.r), ("outward error `out`", sphere.out())] {
         if !(0.0..=MAX_COORDINATE).contains(&value) {
-            return Err(format!("its {what} is {value}; wanted 0 to {MAX_COORDINATE:e} m"));
+            return Err(format!("its {what} is {value}; expected 0 to {MAX_COORDINATE:e} m"));
         }
     }
     Ok(SphereNode {
@@ -373,7 +373,7 @@ fn read_parent(number: usize, n: usize, level: &[JsonSphere], above: usize) -> R
         return if parent == -1 { Ok(None) } else { Err(format!("its parent is {parent}; the root has none")) };
     }
     let index = usize::try_from(parent).ok().filter(|p| *p < above);
-    let index = index.ok_or_else(|| format!("its parent is {parent}; wanted 0 to {}", above - 1))?;
+    let index = index.ok_or_else(|| format!("its parent is {parent}; expected 0 to {}", above - 1))?;
     if n > 0 && level[n - 1].parent > parent {
         return Err(format!(
             "its parent {parent} comes after {}; spheres must be ordered by parent",

@@ -9,6 +9,7 @@ mod buried;
 mod hull;
 mod medial;
 mod mesh_contacts;
+mod mesh_files;
 mod meshes;
 mod overlaps;
 mod primitives;

@@ -12,7 +12,7 @@ fn on_axis(spheres: &[(f64, f64)], mesh: &TriMesh) -> LevelQuality {
 }
 
 fn near(what: &str, value: f64, wanted: f64, tolerance: f64) {
-    assert!((value - wanted).abs() <= tolerance, "{what} is {value}, wanted {wanted} within {tolerance}");
+    assert!((value - wanted).abs() <= tolerance, "{what} is {value}, expected {wanted} within {tolerance}");
 }
 
 /// `∫` over [−1, 1]² by the midpoint rule.

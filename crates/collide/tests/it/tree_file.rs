@@ -86,13 +86,13 @@ fn invalid_files_are_rejected_with_place_and_remedy() {
         ("\"units\":\"m\"", "\"units\":\"mm\"", "units are \"mm\"; a sphere tree is in \"m\""),
         ("\"name\":\"\"", "\"nam\":\"\"", "unknown field `nam`"),
         ("\"octree\"", "\"oct\"", "unknown variant `oct`"),
-        ("\"r\":4", "\"r\":-4", "sphere 0 of level 0: its radius `r` is -4; wanted 0 to 1e10 m"),
+        ("\"r\":4", "\"r\":-4", "sphere 0 of level 0: its radius `r` is -4; expected 0 to 1e10 m"),
         ("\"r\":4", "\"r\":1e400", "number out of range"),
         ("\"r\":4", "\"r\":null", "invalid type: null"),
         (
             "[-2,0,0]",
             "[-2e11,0,0]",
-            "sphere 1 of level 2: its center has the coordinate -200000000000; wanted at most 1e10 m",
+            "sphere 1 of level 2: its center has the coordinate -200000000000; expected at most 1e10 m",
         ),
         ("[-2,0,0]", "[-2,0]", "invalid length 2"),
         ("[-2,0,0]", "[-5,0,0]", "sphere 1 of level 2: it extends beyond its parent, sphere 1 of level 1, by 3e0 m"),
@@ -101,28 +101,32 @@ fn invalid_files_are_rejected_with_place_and_remedy() {
         (
             "\"r\":3,\"out\":1,\"parent\":0",
             "\"r\":3,\"out\":1,\"parent\":1",
-            "sphere 1 of level 1: its parent is 1; wanted 0 to 0",
+            "sphere 1 of level 1: its parent is 1; expected 0 to 0",
         ),
-        ("\"r\":3,\"out\":1,\"parent\":0", "\"r\":3,\"out\":1", "sphere 1 of level 1: its parent is -1; wanted 0 to 0"),
+        (
+            "\"r\":3,\"out\":1,\"parent\":0",
+            "\"r\":3,\"out\":1",
+            "sphere 1 of level 1: its parent is -1; expected 0 to 0",
+        ),
         (
             "[0,0,0],\"r\":2,\"out\":1,\"parent\":1",
             "[0,0,0],\"r\":2,\"out\":1,\"parent\":0",
             "its parent 0 comes after 1; spheres must be ordered by parent",
         ),
         ("\"levels\":[[", "\"levels\":[],\"other\":[[", "unknown field"),
-        ("\"levels\":[[{", "\"levels\":[[],[{", "there are 0 spheres in level 0; wanted 1, the root"),
+        ("\"levels\":[[{", "\"levels\":[[],[{", "there are 0 spheres in level 0; expected 1, the root"),
         (
             "],\n[{\"c\":[1,0,0],\"r\":2,\"out\":1,\"parent\":0},{\"c\":[-2",
             "],[],[{\"c\":[1,0,0],\"r\":2,\"out\":1,\"parent\":0},{\"c\":[-2",
-            "there are 0 spheres in level 2; wanted at least 1",
+            "there are 0 spheres in level 2; expected at least 1",
         ),
-        ("]]}", "],[]]}", "there are 0 spheres in level 3; wanted at least 1"),
+        ("]]}", "],[]]}", "there are 0 spheres in level 3; expected at least 1"),
         (
             "\"quality\":[]",
             "\"quality\":[QUALITY]",
-            "there are 1 rows of `quality`; wanted one for each of the 3 levels, or none",
+            "there are 1 rows of `quality`; expected one for each of the 3 levels, or none",
         ),
-        ("\"diagonal\":1.0", "\"diagonal\":0", "`diagonal` of `mesh` is 0; wanted above 0"),
+        ("\"diagonal\":1.0", "\"diagonal\":0", "`diagonal` of `mesh` is 0; expected above 0"),
     ];
     for (from, to, reference_levels) in cases {
         assert!(GOOD.contains(from), "{from}");

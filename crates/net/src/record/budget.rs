@@ -27,7 +27,7 @@ pub(crate) fn check_scene(message: &[u8]) -> Result<(), Problem> {
             return Ok(());
         }
         each_field(entity, |number, primitive| {
-            memory += LARGEST_PRIMITIVE;
+            memory += MAX_PRIMITIVE_BYTES;
             if number == LINES || number == TRIANGLES {
                 each_field(primitive, |_, _| {
                     memory += size_of::<fox::Color>() as u64;
@@ -54,7 +54,7 @@ pub(crate) fn check_transforms(message: &[u8]) -> Result<(), Problem> {
 }
 
 /// Maximum size of one element of an entity's lists.
-const LARGEST_PRIMITIVE: u64 = {
+const MAX_PRIMITIVE_BYTES: u64 = {
     let sizes = [
         size_of::<fox::ArrowPrimitive>(),
         size_of::<fox::CubePrimitive>(),

@@ -36,7 +36,7 @@ pub struct DebugDraw {
 /// A word that names no overlay.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no overlay '{0}'; wanted contacts, normals, velocities, forces, joints, frames, islands, sleep, tree=LEVEL or all, separated by commas"
+    "no overlay '{0}'; expected contacts, normals, velocities, forces, joints, frames, islands, sleep, tree=LEVEL or all, separated by commas"
 )]
 pub struct UnknownOverlay(String);
 

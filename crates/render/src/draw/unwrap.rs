@@ -8,7 +8,7 @@ use std::path::Path;
 use tumble_collide::{PolygonTriangulator, Vec3, decode_text, obj_lines};
 
 /// Largest file that is read.
-const MOST_BYTES: u64 = 256 << 20;
+const MAX_BYTES: u64 = 256 << 20;
 
 /// The triangles of a file and the texture coordinates of their corners.
 pub(super) struct Unwrapped {
@@ -20,8 +20,7 @@ impl Unwrapped {
     /// Reads an OBJ file. Returns `None` for other files, and if a corner has no texture
     /// coordinates.
     pub fn load(path: &Path) -> Option<Unwrapped> {
-        if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) || path.metadata().ok()?.len() > MOST_BYTES
-        {
+        if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) || path.metadata().ok()?.len() > MAX_BYTES {
             return None;
         }
         Unwrapped::parse(&decode_text(&std::fs::read(path).ok()?).ok()?)

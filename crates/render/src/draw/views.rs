@@ -22,7 +22,7 @@ pub struct NamedView {
 
 /// A name that no camera has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no camera is named '{name}'; wanted one of {}", known.join(", "))]
+#[error("no camera is named '{name}'; expected one of {}", known.join(", "))]
 pub struct UnknownView {
     /// The requested name.
     pub name: String,

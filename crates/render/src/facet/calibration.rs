@@ -40,7 +40,7 @@ impl FromStr for CalibrationPattern {
             .iter()
             .find(|(name, _)| *name == word)
             .map(|(_, pattern)| *pattern)
-            .ok_or_else(|| "wanted grid, corners, colors or name".into())
+            .ok_or_else(|| "expected grid, corners, colors or name".into())
     }
 }
 

@@ -23,14 +23,14 @@ use crate::{Image, RenderError};
 use std::path::Path;
 
 /// Largest warp file, bytes.
-const MOST_BYTES: u64 = 64 << 20;
+const MAX_BYTES: u64 = 64 << 20;
 /// Largest number of triangles of a grid.
-const MOST_TRIANGLES: usize = 1 << 21;
+const MAX_TRIANGLES: usize = 1 << 21;
 
 /// Range of places; the picture itself is 0 to 1.
 const PLACES: std::ops::RangeInclusive<f64> = -0.5..=1.5;
 /// Largest sum of the areas of the triangles' upright boxes, in targets.
-const MOST_COVERS: f64 = 100.0;
+const MAX_COVERS: f64 = 100.0;
 
 /// A corner: place in the target, place in the drawn picture; both 0 to 1, y up.
 type Corner = ([f64; 2], [f64; 2]);
@@ -49,8 +49,8 @@ impl Warp {
     pub fn load(path: &Path) -> Result<Warp, RenderError> {
         let fail = |reason: String| RenderError::File { path: path.display().to_string(), reason };
         let length = std::fs::metadata(path).map_err(|e| fail(format!("the warp grid cannot be read: {e}")))?.len();
-        if length > MOST_BYTES {
-            return Err(fail(format!("the warp grid has {length} bytes, and at most {MOST_BYTES} are read")));
+        if length > MAX_BYTES {
+            return Err(fail(format!("the warp grid has {length} bytes, and at most {MAX_BYTES} are read")));
         }
         let bytes = std::fs::read(path).map_err(|e| fail(format!("the warp grid cannot be read: {e}")))?;
         let warp = if bytes.starts_with(b"PF") { Warp::from_pfm(&bytes) } else { Warp::from_obj(&bytes) };
@@ -69,26 +69,26 @@ impl Warp {
             let at = |what: String| format!("line {}: {what}", number + 1);
             let mut words = line.split('#').next().unwrap_or("").split_whitespace();
             match words.next() {
-                Some("v") => places.push(pair(words).ok_or_else(|| at(wanted("v x y")))?),
-                Some("vt") => sources.push(pair(words).ok_or_else(|| at(wanted("vt u v")))?),
+                Some("v") => places.push(pair(words).ok_or_else(|| at(expected("v x y")))?),
+                Some("vt") => sources.push(pair(words).ok_or_else(|| at(expected("vt u v")))?),
                 Some("f") => {
                     let corners = words
                         .map(|word| corner(word, &places, &sources))
                         .collect::<Result<Vec<Corner>, String>>()
                         .map_err(at)?;
                     if corners.len() < 3 {
-                        return Err(at(format!("a face of {} corners, wanted at least 3", corners.len())));
+                        return Err(at(format!("a face of {} corners, expected at least 3", corners.len())));
                     }
                     triangles.extend((1..corners.len() - 1).map(|i| [corners[0], corners[i], corners[i + 1]]));
-                    if triangles.len() > MOST_TRIANGLES {
-                        return Err(at(format!("more than {MOST_TRIANGLES} triangles")));
+                    if triangles.len() > MAX_TRIANGLES {
+                        return Err(at(format!("more than {MAX_TRIANGLES} triangles")));
                     }
                 }
                 _ => {}
             }
         }
         if triangles.is_empty() {
-            return Err("the warp grid has no faces; wanted lines `v x y`, `vt u v` and `f v/vt v/vt v/vt`".into());
+            return Err("the warp grid has no faces; expected lines `v x y`, `vt u v` and `f v/vt v/vt v/vt`".into());
         }
         Warp::of(triangles)
     }
@@ -133,9 +133,9 @@ impl Warp {
             along.iter().copied().fold(0.0, f64::max) - along.iter().copied().fold(1.0, f64::min)
         };
         let covers: f64 = triangles.iter().map(|t| side(t, 0) * side(t, 1)).sum();
-        if covers > MOST_COVERS {
+        if covers > MAX_COVERS {
             return Err(format!(
-                "the triangles of the warp grid cover the picture {covers:.0} times; wanted adjacent triangles, and at most {MOST_COVERS} times"
+                "the triangles of the warp grid cover the picture {covers:.0} times; expected adjacent triangles, and at most {MAX_COVERS} times"
             ));
         }
         Ok(Warp { triangles })
@@ -221,8 +221,8 @@ fn sample(image: &Image, x: f64, y: f64) -> [u8; 4] {
     [encoded(light(0)), encoded(light(1)), encoded(light(2)), 255]
 }
 
-fn wanted(line: &str) -> String {
-    format!("wanted `{line}` with numbers from 0 to 1 (shares of the picture, not pixels; at most -0.5 to 1.5)")
+fn expected(line: &str) -> String {
+    format!("expected `{line}` with numbers from 0 to 1 (fractions of the picture, not pixels; at most -0.5 to 1.5)")
 }
 
 fn pair<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<[f64; 2]> {
@@ -272,24 +272,24 @@ fn pfm_header(bytes: &[u8]) -> Result<(PfmHeader, &[u8]), String> {
         at = start + length;
     }
     if words[0] != "PF" {
-        return Err(format!("the PFM file is of kind {}, wanted PF (three floats)", words[0]));
+        return Err(format!("the PFM file is of kind {}, expected PF (three floats)", words[0]));
     }
     let side = |word: &str| {
         word.parse::<usize>()
             .ok()
             .filter(|n| (2..=1024).contains(n))
-            .ok_or_else(|| format!("the PFM grid has the side {word}, wanted 2 to 1024"))
+            .ok_or_else(|| format!("the PFM grid has the side {word}, expected 2 to 1024"))
     };
     let size = [side(words[1])?, side(words[2])?];
     let scale: f64 = words[3]
         .parse()
         .ok()
         .filter(|s: &f64| s.is_finite() && *s != 0.0)
-        .ok_or_else(|| format!("the PFM scale is {}, wanted a number", words[3]))?;
+        .ok_or_else(|| format!("the PFM scale is {}, expected a number", words[3]))?;
     let data = &bytes[at + 1..];
     let wanted = 12 * size[0] * size[1];
     if data.len() < wanted {
-        return Err(format!("the PFM grid has {} bytes of floats, wanted {wanted}", data.len()));
+        return Err(format!("the PFM grid has {} bytes of floats, expected {wanted}", data.len()));
     }
     Ok(((size, scale < 0.0), data))
 }

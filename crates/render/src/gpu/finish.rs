@@ -21,7 +21,7 @@ use wgpu::{
 
 const FINISH_WGSL: &str = include_str!("../shaders/finish.wgsl");
 /// Largest number of finishes whose textures are kept.
-const MOST_KEPT: usize = 64;
+const MAX_KEPT: usize = 64;
 /// Marks a pixel without a source in the texture of a warp.
 const NOWHERE: f32 = -1e9;
 
@@ -180,7 +180,7 @@ impl Finisher {
         });
         let views =
             [warp.unwrap_or_else(|| self.nothing[0].clone()), shares.unwrap_or_else(|| self.nothing[1].clone())];
-        if self.known.len() >= MOST_KEPT {
+        if self.known.len() >= MAX_KEPT {
             self.known.remove(0);
         }
         self.known.push((finish.clone(), views.clone()));

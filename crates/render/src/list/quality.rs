@@ -57,7 +57,7 @@ pub struct Quality {
 /// A word that names no quality.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no quality '{0}'; wanted default, fast, fastest, shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off or map=TEXELS (256 to 8192), separated by commas"
+    "no quality '{0}'; expected default, fast, fastest, shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off or map=TEXELS (256 to 8192), separated by commas"
 )]
 pub struct UnknownQuality(String);
 

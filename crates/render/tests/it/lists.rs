@@ -208,7 +208,7 @@ fn bodies_carry_cameras_and_lights_with_them() {
     let lamp = list.to_text().lines().find(|l| l.contains("point at")).unwrap().to_owned();
     assert_eq!(lamp, "light 1: point at (2 0 2) color (1 0 0) intensity 3.4 radius 0.1 no shadow");
     let error = list.look_from(&world, "crat").unwrap_err().to_string();
-    assert_eq!(error, "no camera is named 'crat'; wanted one of scene, cart");
+    assert_eq!(error, "no camera is named 'crat'; expected one of scene, cart");
     let wrong =
         SceneFile::parse(&CARRIER.replace("vertical_fov_deg = 60", "vertical_fov_deg = 60, up = [1, 0, 0]"), "s.toml")
             .unwrap_err()

@@ -80,13 +80,17 @@ fn a_place_slightly_outside_blacks_out_no_cell() {
 #[test]
 fn bad_warps_say_what_is_wrong_and_where() {
     let obj = |text: &str| Warp::from_obj(text.as_bytes()).unwrap_err();
-    assert!(obj("v 0 0\nv 1 zero\n").starts_with("line 2: wanted `v x y`"));
+    assert!(obj("v 0 0\nv 1 zero\n").starts_with("line 2: expected `v x y`"));
     assert!(
         obj(&format!("{UNIT}f 1/1 2/2 9/3\n"))
             .contains("line 9: the corner `9/3` names no `v` above it, of which there are 4")
     );
     for pixels in ["v 0 0\nv 480 320\n", "v 0 0\nvt 480 320\n", "v 0 0\nv 1.6 0\n", "v 0 0\nv 0 -0.6\n"] {
-        assert!(obj(pixels).starts_with("line 2: wanted `v") && obj(pixels).contains("not pixels"), "{}", obj(pixels));
+        assert!(
+            obj(pixels).starts_with("line 2: expected `v") && obj(pixels).contains("not pixels"),
+            "{}",
+            obj(pixels)
+        );
     }
     // a grid for a projector that throws past its screen
     assert!(Warp::from_obj(b"v -0.2 -0.2\nv 1.3 -0.2\nv 0.5 1.5\nvt -0.1 0\nvt 1.1 0\nvt 0.5 1.2\nf 1 2 3\n").is_ok());
@@ -99,8 +103,8 @@ fn bad_warps_say_what_is_wrong_and_where() {
     let pfm = |bytes: &[u8]| Warp::from_pfm(bytes).unwrap_err();
     assert!(pfm(b"PF\n3").contains("cut off"));
     assert!(pfm(b"PF\n1 9 -1.0\n").contains("the side 1"));
-    assert!(pfm(b"PF\n4 4 -1.0\nxx").contains("2 bytes of floats, wanted 192"));
-    assert!(pfm(b"PF\n9999999 4 -1.0\n").contains("wanted 2 to 1024"));
+    assert!(pfm(b"PF\n4 4 -1.0\nxx").contains("2 bytes of floats, expected 192"));
+    assert!(pfm(b"PF\n9999999 4 -1.0\n").contains("expected 2 to 1024"));
     let error = Warp::load(std::path::Path::new("/nowhere/a.obj")).unwrap_err().to_string();
     assert!(error.starts_with("/nowhere/a.obj: the warp grid cannot be read"), "{error}");
 }

@@ -21,7 +21,7 @@ pub fn spheretree(options: &SphereTreeOptions) -> Result<(), Failure> {
     match (&options.mesh, &options.urdf) {
         (_, Some(urdf)) => robot::spherize(urdf, options),
         (Some(mesh), None) => of_mesh(mesh, options),
-        (None, None) => Err(Failure::input("wanted a mesh or --urdf ROBOT")),
+        (None, None) => Err(Failure::input("expected a mesh or --urdf ROBOT")),
     }
 }
 

@@ -66,7 +66,7 @@ fn a_check_reads_the_files_that_caves_and_scenes_name() {
         assert!(said.contains(word) && said.contains("wall.toml"), "{lines}: {said}");
     }
     folder.write("pixels.obj", "v 0 0\nv 480 320\n");
-    assert!(fail(&["check", &with("warp_file = \"pixels.obj\"")], 2).contains("line 2: wanted `v x y`"));
+    assert!(fail(&["check", &with("warp_file = \"pixels.obj\"")], 2).contains("line 2: expected `v x y`"));
     folder.write("damaged.png", b"\x89PNG\r\n\x1a\nand no more");
     let look = "[[body]]\nname = \"b\"\nshape = { type = \"sphere\", radius_m = 0.5 }\nmass_kg = 1\ntexture = \"damaged.png\"\n";
     let said = fail(&["check", &folder.write("textured.toml", look)], 2);
@@ -83,7 +83,7 @@ fn a_picture_with_another_ending_is_refused() {
         &["view", "stack", "--screenshot", "q.jpg"],
         &["caves", "--pattern", "grid", "--cave", "cube4", "--facet", "front", "--screenshot", "q.jpg"],
     ] {
-        assert!(fail_often(args, 2).contains("wanted a file that ends in .png"), "{args:?}");
+        assert!(fail_often(args, 2).contains("expected a file that ends in .png"), "{args:?}");
     }
 }
 

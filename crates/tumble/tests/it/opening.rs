@@ -74,7 +74,7 @@ fn a_mesh_falls_on_a_floor() {
     let lost =
         run["start"]["potential_energy_j"].as_f64().unwrap() - run["end"]["potential_energy_j"].as_f64().unwrap();
     let wanted = 1000.0 * 9.81 * 0.1 * 3f64.sqrt();
-    assert!((lost / wanted - 1.0).abs() < 1e-3, "{lost} J lost, {wanted} J wanted");
+    assert!((lost / wanted - 1.0).abs() < 1e-3, "{lost} J lost, {wanted} J expected");
     assert!(run["end"]["kinetic_energy_j"].as_f64().unwrap() < 1e-6, "{run}");
     let names: Vec<&str> = run["bodies"].as_array().unwrap().iter().filter_map(|b| b["name"].as_str()).collect();
     assert_eq!(names, ["floor", "cube"]);

@@ -32,7 +32,7 @@ fn run(seed: u64, conditions: NetworkConditions, count: u64, first: u64) -> Stag
     }
     assert!(
         done(&stage),
-        "facets show {:?}, wanted {last}",
+        "facets show {:?}, expected {last}",
         stage.facets.iter().map(|f| f.shown.last().map(|s| s.0)).collect::<Vec<_>>()
     );
     stage.run(3 * MS); // the last answers are on their way

@@ -112,7 +112,7 @@ impl Viewer {
         if let Some(name) = &options.camera {
             if !presets.find(name) {
                 return Err(Failure::input(format!(
-                    "no camera `{name}`; wanted one of {}",
+                    "no camera `{name}`; expected one of {}",
                     presets.names().join(", ")
                 )));
             }
