@@ -1,4 +1,5 @@
-//! A cave file's text: parsed; where it is sound, what is said of it, the gaps between its screens, and the projections of its facets.
+//! The text of a cave file: parsed; if it is valid, its notes, the gaps between its screens, and
+//! the projections of its facets.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -12,7 +13,7 @@ fuzz_target!(|text: &str| {
             assert!(gaps(&cave.screens).iter().all(|gap| gap.gap_m.is_finite()));
             for facet in &cave.facets {
                 let (screen, user) = (&cave.screens[facet.screen], &cave.users[facet.user]);
-                // what the checks let through can be projected
+                // a valid facet can be projected
                 for side in facet.stereo.sides() {
                     assert!(screen.distance_m(&user.eye(*side)).is_finite());
                 }

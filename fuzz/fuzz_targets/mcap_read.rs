@@ -1,4 +1,5 @@
-//! A recording: read to its end or its first error. The reader works on files, so the bytes go through one in memory where the system has that.
+//! A recording: read to its end or its first error. The reader needs a file, so the bytes go
+//! through a file in memory if the system has one.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

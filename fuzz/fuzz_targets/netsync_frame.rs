@@ -1,4 +1,5 @@
-//! NetSync's frame and the payloads that stand by themselves: what is read is written back to the same bytes.
+//! NetSync's message frame and the independent payloads: accepted bytes are written back
+//! identically.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! A list of objects or a state, applied to a world: taken whole, or refused and nothing changed.
+//! An object list or a state, applied to a world: applied whole, or refused without a change.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! A frame of a recorded session, taken apart.
+//! A frame of a recorded session, parsed.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

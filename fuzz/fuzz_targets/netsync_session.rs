@@ -1,4 +1,5 @@
-//! Messages with a good frame, to a server and a facet in the middle of a run. The bytes are many of: kind, whose joining, frame, length, payload.
+//! Valid messages with random content, to a server and a facet in the middle of a run. The bytes are a
+//! sequence of: kind, flags (run, join, receiver), frame, length, payload.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -8,22 +9,6 @@ use tumble_core::{RigidBody, Settings, World};
 use tumble_net::sync::transport::LinkEvent;
 use tumble_net::sync::wire::{MessageHeader, MessageKind, message, open};
 use tumble_net::sync::{FacetOptions, FacetSession, FacetSlot, ServerOptions, ServerSession, Task, Viewer};
-
-const KINDS: [MessageKind; 13] = [
-    MessageKind::Join,
-    MessageKind::Refused,
-    MessageKind::Snapshot,
-    MessageKind::State,
-    MessageKind::Ready,
-    MessageKind::Present,
-    MessageKind::Presented,
-    MessageKind::Resync,
-    MessageKind::Rejoin,
-    MessageKind::Heartbeat,
-    MessageKind::End,
-    MessageKind::Leave,
-    MessageKind::Input,
-];
 
 fn world() -> World {
     let mut world = World::new(Settings::default()).expect("the default settings are sound");
@@ -37,7 +22,7 @@ fuzz_target!(|bytes: &[u8]| {
     let mut server = ServerSession::new(ServerOptions::new(1, [0; 32], slots), &world());
     let mut facet = FacetSession::new(FacetOptions::new("f", [0; 32], 1), world());
     let (mut rest, mut now, mut join) = (bytes, Duration::ZERO, 0);
-    while let [kind, whose, frame, length, tail @ ..] = rest {
+    while let [kind, flags, frame, length, tail @ ..] = rest {
         let payload;
         (payload, rest) = tail.split_at((*length as usize).min(tail.len()));
         now += Duration::from_millis(1);
@@ -57,14 +42,14 @@ fuzz_target!(|bytes: &[u8]| {
         }
         server.outgoing().iter().for_each(|out| facet.on_event(now, LinkEvent::Message, out.message.to_vec().into()));
         let header = MessageHeader {
-            kind: KINDS[*kind as usize % 13],
-            run: (*whose as u64) & 1,
-            join: if whose & 2 == 0 { join } else { 0 },
+            kind: MessageKind::ALL[*kind as usize % MessageKind::ALL.len()],
+            run: (*flags as u64) & 1,
+            join: if flags & 2 == 0 { join } else { 0 },
             frame: *frame as u64,
             time_s: 0.0,
         };
         let shot = message(&header, |out| out.extend(payload));
-        if whose & 4 == 0 {
+        if flags & 4 == 0 {
             server.on_event(now, 0, LinkEvent::Message, &shot);
         } else {
             facet.on_event(now, LinkEvent::Message, shot.clone().into());

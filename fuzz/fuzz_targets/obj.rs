@@ -1,4 +1,4 @@
-//! An OBJ mesh: read, checked, repaired, and where that makes it a solid and it is small, measured.
+//! An OBJ mesh: read, checked, repaired; if the result is a small solid, measured.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! A scene file's text: parsed, and where it is sound and small, built and stepped once.
+//! The text of a scene file: parsed; if it is valid and small, built and stepped once.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -7,7 +7,7 @@ use tumble_scene::{MeshSource, SceneFile};
 fuzz_target!(|text: &str| {
     match SceneFile::parse(text, "fuzz.toml") {
         Err(error) => assert!(!error.report(false).is_empty()),
-        // files named in the text stay closed, and building stays cheap
+        // files named in the text are not opened, and building stays cheap
         Ok(scene)
             if scene.bodies.len() <= 50
                 && scene.meshes.iter().all(|m| !matches!(m.source, MeshSource::File { .. }))

@@ -1,11 +1,11 @@
-//! A snapshot: refused and nothing changed, or restored, and then the world steps and saves.
+//! A snapshot: refused without a change, or restored; then the world steps and saves.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
 use tumble_core::collide::{Pose, Shape};
 use tumble_core::{RigidBody, Settings, World};
 
-/// A ball on the ground: the world that `seeds/snapshot` was saved from.
+/// Returns the world that `seeds/snapshot` was saved from: a ball on the ground.
 fn world() -> World {
     let mut world = World::new(Settings::default()).expect("the default settings are sound");
     world.add_static(RigidBody::fixed(Shape::half_space()).with_name("ground")).expect("a new name");

@@ -1,4 +1,4 @@
-//! An STL mesh, text or binary: read, checked, repaired, and where that makes it a solid and it is small, measured.
+//! An STL mesh, text or binary: read, checked, repaired; if the result is a small solid, measured.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

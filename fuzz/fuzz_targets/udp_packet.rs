@@ -1,4 +1,5 @@
-//! The outside and the inside of a datagram, the packets of a handshake, and the head of a sample in shared memory: what is read is written back to the same bytes.
+//! Header and frames of a datagram, the packets of a handshake, and the header of a sample in
+//! shared memory: accepted bytes are written back identically.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -21,7 +22,7 @@ fuzz_target!(|bytes: &[u8]| {
         let words = [0, 1, 2, 3, 4, 5].map(|k| words[k]);
         assert!(SampleHeader::parse(words).is_ok_and(|head| head.words() == words) || SampleHeader::parse(words).is_err());
     }
-    // a header and a checksum that fit, so that what comes behind them is reached
+    // a matching header and checksum, so that the checks behind them are reached
     let mut datagram = bytes[..bytes.len().min(packet::MAX_DATAGRAM - packet::TAG_BYTES)].to_vec();
     if datagram.len() < packet::HEADER_BYTES {
         assert!(packet::parse(bytes).is_err());

@@ -1,5 +1,5 @@
-//! A peer that has the key and means harm, and strangers: sealed frames to a session, and datagrams to a server and a facet. The bytes are many of: length,
-//! milliseconds, body.
+//! A malicious peer that has the key, and unknown peers: sealed frames to a session, and datagrams
+//! to a server and a facet. The bytes are a sequence of: length, milliseconds, body.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! A robot's text: the tree of its links and joints. No file is opened.
+//! The text of a robot: the tree of its links and joints. No file is opened.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

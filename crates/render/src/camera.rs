@@ -5,7 +5,7 @@
 //! depth internally for precision; callers never see that.)
 
 use crate::RenderError;
-use nalgebra::{Matrix4, Point3, Vector3, Vector4};
+use nalgebra::{Matrix4, Point3, RowVector4, Vector3, Vector4};
 
 /// A camera: either a look-at pinhole or raw matrices.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -153,51 +153,35 @@ impl Camera {
     }
 }
 
-/// Returns a frustum with depth 0 at `near` and 1 at `far`; view space looks along −z.
+/// Returns a symmetric perspective projection with depth 0 at `near` and 1 at `far`; view space
+/// looks along −z.
 pub(crate) fn perspective(vertical_fov_rad: f32, aspect: f32, near: f32, far: f32) -> Matrix4<f32> {
     let f = 1.0 / (0.5 * vertical_fov_rad).tan();
-    Matrix4::new(
-        f / aspect,
-        0.0,
-        0.0,
-        0.0, //
-        0.0,
-        f,
-        0.0,
-        0.0, //
-        0.0,
-        0.0,
-        far / (near - far),
-        near * far / (near - far), //
-        0.0,
-        0.0,
-        -1.0,
-        0.0,
-    )
+    frustum([f / aspect, 0.0], [f, 0.0], near, far)
+}
+
+/// Returns a perspective projection with depth 0 at `near` and 1 at `far`. A direction with slope
+/// `s` in x or y (from −z) has the coordinate `scale·s − offset` in the picture, by the
+/// `[scale, offset]` of its axis.
+pub(crate) fn frustum(x: [f32; 2], y: [f32; 2], near: f32, far: f32) -> Matrix4<f32> {
+    Matrix4::from_rows(&[
+        RowVector4::new(x[0], 0.0, x[1], 0.0),
+        RowVector4::new(0.0, y[0], y[1], 0.0),
+        RowVector4::new(0.0, 0.0, far / (near - far), near * far / (near - far)),
+        RowVector4::new(0.0, 0.0, -1.0, 0.0),
+    ])
 }
 
 /// Returns an orthographic projection of the box `[min, max]` of view space, with depth 0 at `z =
 /// max.z` (nearest) and 1 at `z = min.z`.
 pub(crate) fn orthographic(min: Vector3<f32>, max: Vector3<f32>) -> Matrix4<f32> {
     let size = max - min;
-    Matrix4::new(
-        2.0 / size.x,
-        0.0,
-        0.0,
-        -(max.x + min.x) / size.x, //
-        0.0,
-        2.0 / size.y,
-        0.0,
-        -(max.y + min.y) / size.y, //
-        0.0,
-        0.0,
-        -1.0 / size.z,
-        max.z / size.z, //
-        0.0,
-        0.0,
-        0.0,
-        1.0,
-    )
+    Matrix4::from_rows(&[
+        RowVector4::new(2.0 / size.x, 0.0, 0.0, -(max.x + min.x) / size.x),
+        RowVector4::new(0.0, 2.0 / size.y, 0.0, -(max.y + min.y) / size.y),
+        RowVector4::new(0.0, 0.0, -1.0 / size.z, max.z / size.z),
+        RowVector4::new(0.0, 0.0, 0.0, 1.0),
+    ])
 }
 
 fn check(ok: bool, field: &'static str, value: String, expected: &'static str) -> Result<(), RenderError> {

@@ -72,7 +72,8 @@ pub enum MessageKind {
 }
 
 impl MessageKind {
-    const ALL: [MessageKind; 13] = [
+    /// Every kind, in the order of their codes.
+    pub const ALL: [MessageKind; 13] = [
         MessageKind::Join,
         MessageKind::Refused,
         MessageKind::Snapshot,

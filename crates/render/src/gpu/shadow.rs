@@ -2,7 +2,7 @@
 //! inside their box.
 
 use super::data::Eye;
-use crate::camera::orthographic;
+use crate::camera::{frustum, orthographic};
 use crate::list::bounds::{Bounds, corners_of, union};
 use crate::{DrawList, Light, Shadows};
 use nalgebra::{Matrix4, Point3, Vector3, Vector4};
@@ -73,27 +73,9 @@ fn lamp(position: &Point3<f32>, casters: &Bounds, size: u32) -> Option<Eye> {
     let row = |k: usize| {
         let pad = 0.02 * (max[k] - min[k]) + 1e-3;
         let (a, b) = (min[k] - pad, max[k] + pad);
-        (2.0 / (b - a), (b + a) / (b - a))
+        [2.0 / (b - a), (b + a) / (b - a)]
     };
-    let ((sx, cx), (sy, cy)) = (row(0), row(1));
-    let projection = Matrix4::new(
-        sx,
-        0.0,
-        cx,
-        0.0, //
-        0.0,
-        sy,
-        cy,
-        0.0, //
-        0.0,
-        0.0,
-        far / (near - far),
-        near * far / (near - far), //
-        0.0,
-        0.0,
-        -1.0,
-        0.0,
-    );
+    let projection = frustum(row(0), row(1), near, far);
     Some(Eye::new(&view.cast(), &projection.cast(), size, size))
 }
 
@@ -106,25 +88,8 @@ const CUBE_TANGENT: f32 = 1.25;
 fn lamp_amid(position: &Point3<f32>, radius: f32, casters: &Bounds, size: u32) -> Vec<Eye> {
     let far = corners_of(casters).iter().map(|p| (p - position).norm()).fold(0.0, f32::max).max(1e-3) * 1.02;
     let near = radius.max(1e-3 * far).min(0.5 * far);
-    let t = 1.0 / CUBE_TANGENT;
-    let projection = Matrix4::new(
-        t,
-        0.0,
-        0.0,
-        0.0, //
-        0.0,
-        t,
-        0.0,
-        0.0, //
-        0.0,
-        0.0,
-        far / (near - far),
-        near * far / (near - far), //
-        0.0,
-        0.0,
-        -1.0,
-        0.0,
-    );
+    let scale = [1.0 / CUBE_TANGENT, 0.0];
+    let projection = frustum(scale, scale, near, far);
     let sides = [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::z(), -Vector3::z()];
     let view = |forward: Vector3<f32>| {
         let back = -forward;

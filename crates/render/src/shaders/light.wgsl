@@ -310,7 +310,7 @@ fn shade(s: Surface) -> vec3f {
 // Converts scene light to display light.
 fn tone(c: vec3f) -> vec3f {
     let x = max(c * scene.tone.x, vec3f(0.0));
-    // filmic curve (the rational fit by Narkowicz, 2015, to ACES), scaled so that middle gray stays
+    // filmic curve (the rational fit by Narkowicz, 2016, to ACES), scaled so that middle gray stays
     let y = x * 0.72;
     let filmic = (y * (2.51 * y + 0.03)) / (y * (2.43 * y + 0.59) + 0.14);
     return min(select(filmic, x, scene.tone.y < 0.5), vec3f(1.0));

@@ -184,27 +184,12 @@ fn a_million_random_packets_full_length() {
 fn a_session_under_fire_stays_true() {
     let (mut stage, mut dice, payloads) =
         (Stage::new(8, NetworkConditions::PERFECT, 2, SyncMode::Lockstep), Dice(3), payloads());
-    let kinds = [
-        MessageKind::Join,
-        MessageKind::Refused,
-        MessageKind::Snapshot,
-        MessageKind::State,
-        MessageKind::Ready,
-        MessageKind::Present,
-        MessageKind::Presented,
-        MessageKind::Resync,
-        MessageKind::Rejoin,
-        MessageKind::Heartbeat,
-        MessageKind::End,
-        MessageKind::Leave,
-        MessageKind::Input,
-    ];
     stage.run(100 * MS);
     for _ in 0..slow(2000, 50_000) {
         let payload = &payloads[dice.below(payloads.len() as u64) as usize];
         let near = stage.server.as_ref().unwrap().frame().unwrap().wrapping_add(dice.below(5)).wrapping_sub(2);
         let head = MessageHeader {
-            kind: kinds[dice.below(13) as usize],
+            kind: MessageKind::ALL[dice.below(MessageKind::ALL.len() as u64) as usize],
             run: 99,
             join: dice.below(3),
             frame: near,
