@@ -1,17 +1,19 @@
-//! Microseconds per forward dynamics (`q, q̇, τ → q̈`, sines and all), tumble beside dynibo in one run, one thread.
+//! Microseconds per forward dynamics (`q, q̇, τ → q̈`, with sines and cosines), tumble and dynibo
+//! in one run, on one thread.
 //!
 //! ```text
 //! cargo bench --bench articulated                       all shapes
 //! cargo bench --bench articulated -- "chain 7" --rounds 4000
 //! ```
 //!
-//! `best peer` is the best of Pinocchio, MuJoCo and dynibo, measured on another day, scaled by what dynibo's chain of 7 takes in this run. Lanes are
-//! microseconds per state with 1, 4 and 8 states side by side. A second table has what a step of the engine asks.
+//! `best peer` is the best of Pinocchio, MuJoCo and dynibo, measured on another day and scaled by
+//! the time of dynibo's chain of 7 in this run. Lanes are microseconds per state with 1, 4 and 8
+//! states side by side. A second table has the other maps of an engine's step.
 
 use std::hint::black_box;
 use tumble_peers::articulated::{Batch, Dynibo, Maps, Robot, Single, anymal, chain, in_turns, panda, talos};
 
-/// States that the calls go through in turn.
+/// Number of states that the calls cycle through.
 const STATES: usize = 8;
 
 /// Positions, velocities, forces.
@@ -51,7 +53,7 @@ fn main() {
     }
 }
 
-/// dynibo's chain of 7 in this run.
+/// Returns the time of dynibo's chain of 7 in this run.
 fn dynibo_now(rounds: usize) -> f64 {
     let robot = chain(7, 0.0);
     let (mut peer, states, mut qdd) = (Dynibo::new(&robot), states(&robot), vec![0.0; 7]);
@@ -125,7 +127,7 @@ fn line(robot: &Robot, rounds: usize, scale: f64) -> String {
     )
 }
 
-/// Times the maps that an engine calls at each step, µs.
+/// Returns the times of the maps that an engine evaluates in each step, µs.
 fn parts(robot: &Robot, rounds: usize) -> String {
     let mut maps = Maps::new(robot);
     let single = Single::new(robot);
@@ -149,7 +151,7 @@ fn parts(robot: &Robot, rounds: usize) -> String {
     format!("| {} | {:.3} | {:.3} | {:.3} | {:.3} |", robot.name, times[0], times[1], times[2], times[3])
 }
 
-/// States away from any limit. Forces are all zero on a floating base.
+/// Returns states away from all limits. All forces are zero on a floating base.
 fn states(robot: &Robot) -> Vec<State> {
     let (joints, head) = (robot.parts.len(), robot.dof() - robot.parts.len());
     (0..STATES)

@@ -1,20 +1,22 @@
-//! CPU time per step of the broad phase in one run: tumble, parry's bounding volume hierarchy, and a plain pass over what has to be read.
+//! CPU time per step of the broad phase in one run: tumble, parry's bounding volume hierarchy, and
+//! a plain pass over the data that must be read.
 //!
 //! ```text
 //! cargo bench --bench broad                                          the curve, and all kinds of crowds at 1,000, 10,000 and 100,000
-//! cargo bench --bench broad -- --svg ../../docs/images/broad.svg     the curve alone, as a picture too
-//! cargo bench --bench broad -- --curve                               the curve alone
-//! cargo bench --bench broad -- --tumble slow 100000                  one case of tumble alone, for a profiler
+//! cargo bench --bench broad -- --svg ../../docs/images/broad.svg     the curve only, also as a picture
+//! cargo bench --bench broad -- --curve                               the curve only
+//! cargo bench --bench broad -- --tumble slow 100000                  one case of tumble only, for a profiler
 //! ```
 //!
-//! A program that takes turns with it on a core leaves its own data in the caches, and large crowds pay for that: `chrt -f 1` in front keeps the core.
+//! Another program on the same core evicts data from the caches, which slows large crowds. `chrt -f
+//! 1` in front reserves the core.
 
 use tumble_peers::broad::{Cost, Follower, Kind, Plain, Sweep, Tree, follow, write_curve};
 use tumble_peers::scene::RADIUS;
 
-/// Share of a box's smallest extent by which both make boxes fat.
+/// Margin of fat boxes in both engines, as a fraction of a box's smallest extent.
 const ROOM: f64 = 0.1;
-/// Rounds of which the median counts; they take turns.
+/// Number of alternating rounds; the median is reported.
 const ROUNDS: usize = 3;
 
 fn main() {
@@ -35,7 +37,7 @@ fn main() {
     }
 }
 
-/// Slow crowds of growing size.
+/// Returns the curves of slow crowds of growing size.
 fn curves() -> [(&'static str, &'static str, Vec<(f64, f64)>); 3] {
     println!(
         "CPU µs per step, boxes in a cube of constant density that move by 1 % of their radius per step; medians of {ROUNDS} rounds.\n"
@@ -66,7 +68,7 @@ fn curves() -> [(&'static str, &'static str, Vec<(f64, f64)>); 3] {
     curves
 }
 
-/// The slope of the straight line that fits best where both scales are logarithmic.
+/// Returns the slope of the best straight line in logarithmic scales.
 fn exponent(points: &[(f64, f64)]) -> f64 {
     let logarithms: Vec<(f64, f64)> = points.iter().map(|(n, time)| (n.ln(), time.ln())).collect();
     let mean = |of: fn(&(f64, f64)) -> f64| logarithms.iter().map(of).sum::<f64>() / logarithms.len() as f64;
@@ -75,7 +77,7 @@ fn exponent(points: &[(f64, f64)]) -> f64 {
         / logarithms.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
 }
 
-/// Every kind of crowd.
+/// Prints the costs of every kind of crowd.
 fn kinds() {
     println!("\nCPU µs per step, tumble (parry).\n\n| crowd | 1,000 | 10,000 | 100,000 |\n|---|---|---|---|");
     for (kind, name) in Kind::ALL {
@@ -87,7 +89,7 @@ fn kinds() {
     }
 }
 
-/// Costs of tumble, parry and the plain pass.
+/// Returns the costs of tumble, parry and the plain pass.
 fn all(kind: Kind, n: usize) -> [Cost; 3] {
     let margin = ROOM * 2.0 * RADIUS;
     let mut costs = [Vec::new(), Vec::new(), Vec::new()];
@@ -104,7 +106,7 @@ fn all(kind: Kind, n: usize) -> [Cost; 3] {
     })
 }
 
-/// Enough that the resolution of the clock does not matter.
+/// Returns a number of steps that makes the clock's resolution irrelevant.
 fn steps(n: usize) -> usize {
     (2_000_000 / n).clamp(60, 1000)
 }

@@ -1,15 +1,19 @@
-//! CPU time of one query of two touching meshes: tumble's contact modes beside parry's queries of triangle meshes, in one run.
+//! CPU time of one query of two touching meshes: tumble's contact modes and parry's queries of
+//! triangle meshes, in one run.
 //!
 //! ```text
 //! cargo bench --bench narrow                                the table
-//! cargo bench --bench narrow -- --tumble 2000               the surface mode alone, that number of rounds, for a profiler
+//! cargo bench --bench narrow -- --tumble 2000               the surface mode only, with this number of rounds, for a profiler
 //! ```
 //!
-//! Two tori, and two bunnies where the public meshes are (`TUMBLE_MESHES`, or a `shared/meshes` above), each 0.1 m in diagonal. They are turned at
-//! random and brought together until they touch, then 1 mm apart, or 1 mm (1 % of the diagonal) into each other. Margin 1 mm.
+//! Two tori, and two bunnies if the public meshes are available (`TUMBLE_MESHES`, or a
+//! `shared/meshes` in a parent folder), each 0.1 m in diagonal. They are turned at random and
+//! brought together until they touch, then placed 1 mm apart, or 1 mm (1 % of the diagonal) into
+//! each other. Margin 1 mm.
 //!
-//! In the first rows a pose is asked for again and again, so that all it needs is in near memory and every branch is foretold. In the rows `changing` each
-//! query has another of 256 poses, turned at random: the mean over all.
+//! In the first rows the same pose is queried repeatedly, so that all data are in near caches and
+//! branches are predicted. In the rows `changing` each query has another of 256 poses, turned at
+//! random; the figure is the mean.
 
 use rapier3d_f64::parry::math::{Pose as ParryPose, Rotation, Vector};
 use rapier3d_f64::parry::query;
@@ -20,16 +24,16 @@ use std::path::PathBuf;
 use tumble_collide::{ContactMode, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts_in_mode};
 use tumble_peers::clock::Clock;
 
-/// Margin, and what the bodies are apart or overlap by, meters.
+/// Margin, and the gap or overlap of the bodies, meters.
 const MARGIN: f64 = 1e-3;
-/// Poses per row, of which the median counts.
+/// Number of poses per row; the median is reported.
 const POSES: u64 = 5;
-/// Poses of a row in which they change.
+/// Number of poses in a row with changing poses.
 const CHANGING: u64 = 256;
-/// Steps in which a body comes near, meters; in the end it touches to this by two to the power of this.
+/// Step of the approach, meters; the final precision is this times 2^-24.
 const STEP: f64 = 2e-3;
 const HALVINGS: u32 = 24;
-/// Seconds of CPU that one figure takes, about.
+/// Approximate CPU seconds per figure.
 const PATIENCE: f64 = 0.6;
 
 struct Body {
@@ -73,7 +77,7 @@ fn row(body: &Body, name: &str, into: f64) {
     println!("| two of {} | {name} |{cells} {:.1} |", body.name, medians[2].0 / medians[0].0);
 }
 
-/// A row of queries that never see a pose twice in a row.
+/// Prints a row of queries in which each pose differs from the one before.
 fn changing(body: &Body, name: &str, poses: &[Pose]) {
     let (fixed, theirs): (_, Vec<ParryPose>) = (ParryPose::IDENTITY, poses.iter().map(to_parry).collect());
     let mut found = Vec::new();
@@ -100,7 +104,7 @@ fn changing(body: &Body, name: &str, poses: &[Pose]) {
     );
 }
 
-/// µs of all queries of one pose.
+/// Returns the µs of all queries of one pose.
 fn measure(body: &Body, pose: &Pose) -> [f64; 4] {
     let (fixed, theirs) = (ParryPose::IDENTITY, to_parry(pose));
     let mut found = Vec::new();
@@ -122,7 +126,7 @@ fn measure(body: &Body, pose: &Pose) -> [f64; 4] {
     [surface, spheres, contact, distance]
 }
 
-/// CPU µs per call, the median of three runs; of one where a call takes long.
+/// Returns CPU µs per call, the median of three runs; of one run for a slow call.
 fn time(mut call: impl FnMut()) -> f64 {
     let clock = Clock::new();
     let mut run = |times: usize| {
@@ -130,7 +134,7 @@ fn time(mut call: impl FnMut()) -> f64 {
         (0..times).for_each(|_| call());
         clock.seconds() - before
     };
-    // the clock of the thread stands still for milliseconds, so a run must be long
+    // the clock of a thread advances in steps of milliseconds, so a run must be long
     let mut times = 1;
     let mut seconds = run(times);
     while seconds < PATIENCE / 3.0 && times < 1 << 20 {
@@ -145,7 +149,7 @@ fn time(mut call: impl FnMut()) -> f64 {
     1e6 * runs[1] / times as f64
 }
 
-/// The `n`th pose of the first body far away, and the way from the second to it.
+/// Returns the `n`th pose of the first body far away, and the displacement from the second to it.
 fn far(n: u64) -> (Pose, Vec3) {
     let mut state = n.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5851_f42d;
     let mut random = || {
@@ -162,10 +166,10 @@ fn moved(pose: &Pose, way: &Vec3, into: f64) -> Pose {
     Pose::from_parts((pose.translation.vector - way * into).into(), pose.rotation)
 }
 
-/// The `n`th pose of the first body where it touches the second, moved `into` it, meters.
+/// Returns the `n`th pose at which the first body touches the second, moved `into` it, meters.
 fn touching(body: &Body, n: u64, into: f64) -> Pose {
     let (mut pose, way) = far(n);
-    // parry's distance says how far the way is free
+    // parry's distance is a safe displacement
     for _ in 0..20 {
         let free = query::distance(&to_parry(&pose), &body.theirs, &ParryPose::IDENTITY, &body.theirs)
             .expect("two meshes")
@@ -178,7 +182,8 @@ fn touching(body: &Body, n: u64, into: f64) -> Pose {
     moved(&pose, &way, into)
 }
 
-/// The same by steps, then halves, with parry's test of intersection, which is faster by far; and the way.
+/// Returns the same by steps and bisection with parry's intersection test, which is much faster;
+/// also the direction of approach.
 fn approached(body: &Body, n: u64) -> (Pose, Vec3) {
     let (mut pose, way) = far(n);
     let meet = |pose: &Pose| {
@@ -200,7 +205,8 @@ fn approached(body: &Body, n: u64) -> (Pose, Vec3) {
     (pose, way)
 }
 
-/// The surface mode alone: µs per query apart, touching and overlapping, each pose again and again, then with poses that change.
+/// Prints the surface mode only: µs per query apart, touching and overlapping, with repeated and
+/// with changing poses.
 fn alone(body: &Body, rounds: usize) {
     let places = [-MARGIN, 0.0, MARGIN];
     let few = places.map(|into| (0..POSES).map(|n| touching(body, n, into)).collect::<Vec<_>>());

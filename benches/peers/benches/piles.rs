@@ -1,9 +1,9 @@
-//! CPU seconds per simulated second of piles and pyramids, tumble beside Rapier in one run.
+//! CPU seconds per simulated second of piles and pyramids, tumble and Rapier in one run.
 //!
 //! ```text
 //! cargo bench                              all cases, 5 runs each, medians
 //! cargo bench -- pyramid-55 --runs 9       one case
-//! cargo bench -- spheres-1000 --tumble     tumble alone, for a profiler
+//! cargo bench -- spheres-1000 --tumble     tumble only, for a profiler
 //! ```
 
 use tumble_peers::measure::{Run, run, stands};
@@ -50,7 +50,7 @@ fn main() {
     }
 }
 
-/// One row of the table; the engines take turns, so that both meet the same machine.
+/// Returns one row of the table. The engines alternate, so both see the same load of the machine.
 fn line(scene: &Scene, options: &Options) -> String {
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
     for _ in 0..options.runs {
@@ -81,7 +81,7 @@ fn checked(engine: &mut dyn Engine, scene: &Scene) -> Run {
     run
 }
 
-/// The run of median time; what else it holds is the same in every run of one engine.
+/// Returns the run of median time; its other numbers are the same in every run of one engine.
 fn median(mut runs: Vec<Run>) -> Run {
     runs.sort_by(|a, b| a.cpu.total_cmp(&b.cpu));
     runs[runs.len() / 2]

@@ -1,4 +1,4 @@
-//! tumble beside its peers: the same scenes, the same clock, the same measure of error.
+//! tumble and its peers: the same scenes, the same clock, the same measure of error.
 
 pub mod articulated;
 pub mod broad;

@@ -1,12 +1,13 @@
-//! One run of one engine: CPU time from t = 1 to 4 s and errors seen from the positions alone, the same for every engine.
+//! One run of one engine: CPU time from t = 1 to 4 s, and errors computed from the positions only,
+//! the same for every engine.
 
 use crate::clock::Clock;
 use crate::scene::{Body, EDGE, RADIUS, Scene};
 use crate::{DT, Engine};
 
-/// When measuring starts, s.
+/// Start of the measurement, s.
 const FROM: f64 = 1.0;
-/// When it ends, s.
+/// End of the measurement, s.
 const TO: f64 = 4.0;
 
 /// The result of a run.
@@ -14,8 +15,8 @@ const TO: f64 = 4.0;
 pub struct Run {
     /// CPU seconds per simulated second.
     pub cpu: f64,
-    /// Worst error of position, meters. Spheres: deepest overlap of two of them or of one with a plane. Boxes: how far the one
-    /// that sank most is below its place in the pyramid.
+    /// Largest error of position, meters. Spheres: the deepest overlap of two of them or of one
+    /// with a plane. Boxes: the depth of the lowest one below its place in the pyramid.
     pub penetration: f64,
     /// Largest movement of a body from `t = 1` to `t = 4 s`, meters.
     pub movement: f64,
@@ -23,7 +24,7 @@ pub struct Run {
     pub residual: Option<f64>,
 }
 
-/// Steps an engine through the whole time.
+/// Steps an engine through the whole time and measures it.
 pub fn run(engine: &mut dyn Engine, scene: &Scene) -> Run {
     let clock = Clock::new();
     let frames = |t: f64| (t / DT).round() as usize;
@@ -74,7 +75,8 @@ fn distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Height of the pyramid's top above its place, for a check that it still stands: negative where it sank.
+/// Returns whether the pyramid still stands, by the height of its top above its place: negative if
+/// it sank.
 pub fn stands(scene: &Scene, run: &Run) -> bool {
     scene.body == Body::Sphere || run.penetration < 0.5 * EDGE
 }

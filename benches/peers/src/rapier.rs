@@ -1,5 +1,5 @@
-//! A scene in Rapier: 4 solver iterations (its default), no sleep, the same density, friction and restitution on both sides of every pair (so that
-//! all of its combine rules give the same).
+//! A scene in Rapier: 4 solver iterations (its default), no sleep, the same density, friction and
+//! restitution on both sides of every pair, so that all of its combine rules agree.
 
 use crate::scene::{Body, EDGE, RADIUS, Scene};
 use crate::{DENSITY, DT, Engine, FRICTION, RESTITUTION};

@@ -8,7 +8,7 @@ pub const EDGE: f64 = 0.4;
 /// The shape of all bodies of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Body {
-    /// A ball of [`RADIUS`].
+    /// A sphere of [`RADIUS`].
     Sphere,
     /// A cube of [`EDGE`].
     Box,
@@ -23,7 +23,7 @@ pub struct Plane {
     pub normal: [f64; 3],
 }
 
-/// Equal bodies at rest, and the planes that hold them.
+/// Equal bodies at rest, and the planes around them.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// Name on the command line and in the table.
@@ -38,7 +38,8 @@ pub struct Scene {
 
 const FLOOR: Plane = Plane { point: [0.0; 3], normal: [0.0, 0.0, 1.0] };
 
-/// `n` spheres on a cubic grid of 0.24 m, each moved sideways by up to 15 mm so that no column stands, in a box as wide as the grid.
+/// Returns `n` spheres on a cubic grid of 0.24 m, in a box as wide as the grid. Each is shifted
+/// sideways by up to 15 mm, so that no column is stable.
 pub fn spheres(n: usize) -> Scene {
     let side = (1..).find(|s| s * s * s >= n).expect("some cube exceeds n");
     let half = 0.12 * side as f64;
@@ -59,7 +60,8 @@ pub fn spheres(n: usize) -> Scene {
     }
 }
 
-/// A wall of cubes on the floor, `rows` at its foot and one at its top, 20 mm between neighbors; 10 rows are 55 cubes, 20 are 210.
+/// Returns a wall of cubes on the floor, `rows` in its lowest row and one on top, 20 mm between
+/// neighbors; 10 rows are 55 cubes, 20 are 210.
 pub fn pyramid(rows: usize) -> Scene {
     let row = |k: usize| {
         let count = rows - k;
@@ -73,7 +75,7 @@ pub fn pyramid(rows: usize) -> Scene {
 pub(crate) struct Random(pub u64);
 
 impl Random {
-    /// Between `−bound` and `bound`.
+    /// Returns a number between `−bound` and `bound`.
     pub fn within(&mut self, bound: f64) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut x = self.0;

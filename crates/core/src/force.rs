@@ -37,8 +37,9 @@ impl ForceGenerator for ForceFunction {
 }
 
 impl World {
-    /// Adds a force from a function, which the integrator calls at each stage with the state and time of that stage. Forks share the function,
-    /// so it must depend on the view alone. Archives leave it out: whoever opens one passes it again.
+    /// Adds a force from a function, which the integrator calls at each stage with the state and
+    /// time of that stage. Forks share the function, so it must depend on the view alone. Archives
+    /// do not contain it: add it again after opening one.
     ///
     /// ```
     /// use tumble_core::prelude::*;
@@ -63,8 +64,9 @@ impl World {
 }
 
 impl Forces {
-    /// Adds a force (N, world axes) at the origin of an object's part 0, the center of mass of a rigid body; `force` computes it from the state of
-    /// that part. Does nothing if the object was removed or has no part.
+    /// Adds a force (N, world axes) at the origin of an object's part 0, which is the center of
+    /// mass of a rigid body. `force` computes it from the state of that part. Does nothing if the
+    /// object was removed or has no part.
     pub fn act_on(&mut self, view: &WorldView, id: ObjectId, force: impl FnOnce(&PartState) -> Vec3) {
         let part_state =
             view.state_range(id).and_then(|state_range| Some((state_range.parts.start, view.part_state(id, 0)?)));

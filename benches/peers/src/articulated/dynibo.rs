@@ -1,4 +1,4 @@
-//! The peer: a URDF of the robot, read by dynibo.
+//! The peer: dynibo with a URDF of the robot.
 
 use super::robot::{Motion, Robot, base};
 use dynibo::{BaseState, FloatingRobot, Frame, Twist};
@@ -6,14 +6,14 @@ use std::fmt::Write;
 
 /// dynibo's robot with its workspace.
 pub enum Dynibo {
-    /// On the ground.
+    /// A fixed base.
     Fixed(dynibo::Robot),
-    /// Floating, with the base at rest at the origin.
+    /// A floating base, at rest at the origin.
     Floating(FloatingRobot, BaseState),
 }
 
 impl Dynibo {
-    /// Through a file in the temporary directory.
+    /// Loads the robot through a file in the temporary directory.
     pub fn new(robot: &Robot) -> Dynibo {
         let path = std::env::temp_dir().join(format!("tumble-bench-{}-{}.urdf", std::process::id(), robot.dof()));
         std::fs::write(&path, urdf(robot)).expect("the temporary directory takes a file");
@@ -28,7 +28,7 @@ impl Dynibo {
         made
     }
 
-    /// The order of its joints, as numbers of parts.
+    /// Returns the order of its joints, as indices of parts.
     pub fn order(&self, robot: &Robot) -> Vec<usize> {
         let name = |i| match self {
             Dynibo::Fixed(r) => r.joint_name(i).map(str::to_owned).expect("a joint"),
@@ -37,7 +37,8 @@ impl Dynibo {
         (0..robot.parts.len()).map(|i| name(i)[1..].parse().expect("joints are named j0, j1, ..")).collect()
     }
 
-    /// `q̈` of joint positions, velocities and all forces; a floating base comes first in `tau` and `qdd`, in dynibo's order.
+    /// Computes `q̈` from joint positions, velocities and all forces; a floating base comes first
+    /// in `tau` and `qdd`, in dynibo's order.
     pub fn forward_dynamics(&mut self, q: &[f64], v: &[f64], tau: &[f64], qdd: &mut [f64]) {
         match self {
             Dynibo::Fixed(r) => r.forward_dynamics(q, v, tau, &[], qdd),

@@ -1,4 +1,4 @@
-//! Robots for both engines from one description, and the time of a forward dynamics in each.
+//! Robots for both engines from one description, and the time of forward dynamics in each.
 
 mod dynibo;
 mod robot;

@@ -1,15 +1,16 @@
-//! Shapes of robots: links, hinges, masses. Numbers that only look random, the same on every run.
+//! Robots: links, joints, masses. The numbers are pseudorandom and the same in every run.
 
-/// A link and the joint that carries it.
+/// A link and its joint.
 #[derive(Clone, Debug)]
 pub struct Part {
-    /// Earlier part that it hangs on; `None` on the base (the ground, or what floats).
+    /// Index of the parent, an earlier part; `None` for the base.
     pub parent: Option<usize>,
-    /// How it moves.
+    /// The joint's motion.
     pub motion: Motion,
     /// Joint's origin in the parent, meters.
     pub at: [f64; 3],
-    /// Turn of the joint's axes about the parent's x, y and z in this order (URDF's `rpy`), rad.
+    /// Rotation of the joint's axes about the parent's x, y and z in this order (URDF's `rpy`),
+    /// rad.
     pub turn: [f64; 3],
     /// Mass, kg.
     pub mass: f64,
@@ -22,9 +23,9 @@ pub struct Part {
 /// One degree of freedom about or along an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motion {
-    /// A hinge.
+    /// A revolute joint.
     Turns([f64; 3]),
-    /// A slider.
+    /// A prismatic joint.
     Slides([f64; 3]),
 }
 
@@ -33,27 +34,28 @@ pub enum Motion {
 pub struct Robot {
     /// Name of the row.
     pub name: String,
-    /// Whether the base floats; it then weighs as [`base`](fn@base) says.
+    /// Whether the base floats; it then has the mass properties of [`base`](fn@base).
     pub floating: bool,
     /// Parts, parents first.
     pub parts: Vec<Part>,
-    /// Best peer's time for this shape, µs, and dynibo's for a chain of 7 on that machine.
+    /// Time of the best peer for this shape, µs, and dynibo's time for a chain of 7 on the same
+    /// machine.
     pub best: (f64, f64),
 }
 
 impl Robot {
-    /// Degrees of freedom.
+    /// Returns the degrees of freedom.
     pub fn dof(&self) -> usize {
         self.parts.len() + if self.floating { 6 } else { 0 }
     }
 }
 
-/// Mass, center and moments of a floating base.
+/// Returns mass, center and moments of a floating base.
 pub fn base() -> (f64, [f64; 3], [f64; 3]) {
     (12.0, [0.01, -0.02, 0.03], [0.3, 0.5, 0.6])
 }
 
-/// In [-1, 1), by a xorshift.
+/// Numbers in [-1, 1), by a xorshift.
 struct Numbers(u64);
 
 impl Numbers {
@@ -94,17 +96,17 @@ fn limbs(name: &str, floating: bool, limbs: &[(Option<usize>, usize)], best: f64
     Robot { name: name.into(), floating, parts, best: (best, 1.10) }
 }
 
-/// A chain of hinges on the ground.
+/// Returns a chain of revolute joints on a fixed base.
 pub fn chain(length: usize, best: f64) -> Robot {
     limbs(&format!("chain {length}"), false, &[(None, length)], best)
 }
 
-/// Floating, four legs of three hinges, as ANYmal is.
+/// Returns a floating base with four legs of three revolute joints, like ANYmal.
 pub fn anymal() -> Robot {
     limbs("ANYmal shape (18)", true, &[(None, 3); 4], 1.75)
 }
 
-/// Seven hinges and two fingers that slide, as Franka's Panda is.
+/// Returns an arm of seven revolute joints and two prismatic fingers, like Franka's Panda.
 pub fn panda() -> Robot {
     let mut robot = limbs("Panda shape (9)", false, &[(None, 7), (Some(6), 1), (Some(6), 1)], 1.09);
     robot.parts[7].motion = Motion::Slides([0.0, 1.0, 0.0]);
@@ -112,7 +114,8 @@ pub fn panda() -> Robot {
     robot
 }
 
-/// Floating, two legs of 6, a torso of 2, two arms of 7 with a gripper each, a neck of 2, as the reduced Talos is: 38 degrees of freedom.
+/// Returns a floating base with two legs of 6, a torso of 2, two arms of 7 with a gripper each, and
+/// a neck of 2, like the reduced Talos: 38 degrees of freedom.
 pub fn talos() -> Robot {
     limbs(
         "Talos shape (38)",

@@ -1,14 +1,14 @@
-//! Our side: the same robot as a model, one state at a time or several in lanes.
+//! tumble: the robot as a model, with one state at a time or several in lanes.
 
 use super::robot::{Motion, Robot, base};
 use tumble_collide::{Mat3, Pose, Vec3};
 use tumble_core::articulated::{BatchDynamics, Dynamics, Lanes, Scratch, forward_dynamics};
 use tumble_core::{Joint, LinkMass, Model, ModelBuilder};
 
-/// dynibo's.
+/// Gravity as in dynibo.
 pub const GRAVITY: Vec3 = Vec3::new(0.0, 0.0, -9.80665);
 
-/// The model of a robot: one that floats has its base as link 0.
+/// Returns the model of a robot; a floating base is link 0.
 pub fn model(robot: &Robot) -> Model {
     let mut builder = ModelBuilder::new();
     let mass = |mass, center: [f64; 3], moments: [f64; 3]| LinkMass {
@@ -44,19 +44,20 @@ pub fn model(robot: &Robot) -> Model {
     builder.build().expect("a valid model")
 }
 
-/// One state at a time.
+/// Forward dynamics of one state at a time.
 pub struct Single {
     dynamics: Dynamics,
     head: usize,
 }
 
 impl Single {
-    /// Ready for a robot.
+    /// Makes the buffers for a robot.
     pub fn new(robot: &Robot) -> Single {
         Single { dynamics: Dynamics::new(&model(robot)), head: if robot.floating { 7 } else { 0 } }
     }
 
-    /// Whole positions and velocities of joint ones, the base at rest at the origin.
+    /// Returns full positions and velocities from those of the joints, with the base at rest at the
+    /// origin.
     pub fn state(&self, q: &[f64], v: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let (mut whole_q, mut whole_v) = (vec![0.0; self.head], vec![0.0; self.head.saturating_sub(1)]);
         if self.head > 0 {
@@ -67,13 +68,13 @@ impl Single {
         (whole_q, whole_v)
     }
 
-    /// `q̈`.
+    /// Computes `q̈`.
     pub fn forward_dynamics(&mut self, q: &[f64], v: &[f64], tau: &[f64], qdd: &mut [f64]) {
         forward_dynamics(&mut self.dynamics, &GRAVITY, q, v, tau, qdd);
     }
 }
 
-/// The parts of a step of the engine, at one state.
+/// The maps of an engine's step, at one state.
 pub struct Maps {
     dynamics: Dynamics,
     scratch: Scratch,
@@ -83,36 +84,36 @@ pub struct Maps {
 }
 
 impl Maps {
-    /// Ready for a robot.
+    /// Makes the buffers for a robot.
     pub fn new(robot: &Robot) -> Maps {
         let dynamics = Dynamics::new(&model(robot));
         let (scratch, links, dof) = (dynamics.scratch(), dynamics.links(), dynamics.dof());
         Maps { dynamics, scratch, links, y: vec![0.0; 3 * dof], out: vec![0.0; dof] }
     }
 
-    /// Takes a state.
+    /// Sets the state.
     pub fn refresh(&mut self, q: &[f64], v: &[f64]) {
         self.dynamics.refresh(q, v);
     }
 
-    /// `q̈` at the state taken.
+    /// Computes `q̈` at the state.
     pub fn accelerate(&mut self, tau: &[f64]) {
         self.dynamics.accelerate_in(&mut self.scratch, &GRAVITY, tau, &[], &mut self.out);
     }
 
-    /// Whitened velocity.
+    /// Computes the whitened velocity.
     pub fn mul_l(&mut self, v: &[f64]) {
         self.dynamics.mul_l(&mut self.scratch, v, &mut self.out);
     }
 
-    /// Test impulses in three directions at the last link.
+    /// Computes test impulses in three directions at the last link.
     pub fn probe(&mut self) {
         let axes = [Vec3::x(), Vec3::y(), Vec3::z()];
         self.dynamics.point_response(self.links - 1, &Vec3::new(0.1, 0.2, 0.3), &axes, 1.0, &mut self.y);
     }
 }
 
-/// `N` states at a time.
+/// Forward dynamics of `N` states at a time.
 pub struct Batch<const N: usize> {
     dynamics: BatchDynamics<N>,
     q: Vec<Lanes<N>>,
@@ -123,7 +124,7 @@ pub struct Batch<const N: usize> {
 }
 
 impl<const N: usize> Batch<N> {
-    /// Ready for a robot, with a state per lane.
+    /// Makes the buffers for a robot, with one state per lane.
     pub fn new(robot: &Robot, states: &[(Vec<f64>, Vec<f64>, Vec<f64>)]) -> Batch<N> {
         let gather = |pick: &dyn Fn(usize) -> f64| Lanes(std::array::from_fn(pick));
         let (q, v) = (states[0].0.len(), states[0].1.len());
@@ -136,7 +137,7 @@ impl<const N: usize> Batch<N> {
         }
     }
 
-    /// `q̈` of all.
+    /// Computes `q̈` of all lanes.
     pub fn forward_dynamics(&mut self) {
         self.dynamics.forward_dynamics(&GRAVITY, &self.q, &self.v, &self.tau, &mut self.qdd);
     }

@@ -1,34 +1,34 @@
-//! Boxes of balls that fly about in a closed space and turn back at its walls.
+//! Bounding boxes of spheres that fly in a closed space and reverse at its walls.
 
 use crate::scene::{RADIUS, Random};
 use tumble_collide::{Aabb, Vec3};
 
-/// Space per ball, an edge in meters: as dense as the piles' start.
+/// Space per sphere, as an edge in meters: the density of the piles at the start.
 const PITCH: f64 = 0.24;
 
 /// The kind of a crowd.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// In a cube, 1 % of a radius per step.
+    /// In a cube, moving by 1 % of a radius per step.
     Slow,
-    /// In a cube, a whole radius per step.
+    /// In a cube, moving by a whole radius per step.
     Fast,
-    /// Slow, but every other one does not move.
+    /// Slow, with every other one static.
     HalfStatic,
-    /// Slow, in a static box that overlaps all.
+    /// Slow, inside a static box that overlaps all.
     Huge,
-    /// Slow, one deep.
+    /// Slow, in a single layer.
     Layer,
-    /// Slow, ten by ten and as high as it takes.
+    /// Slow, ten by ten and as high as necessary.
     Tower,
-    /// Slow, one in a hundred taken out and put elsewhere at each step.
+    /// Slow, with one in a hundred removed and inserted elsewhere in each step.
     Churn,
     /// Slow, of sizes from 1 to 30, the large ones rare.
     Sizes,
 }
 
 impl Kind {
-    /// All of them, with what they are called.
+    /// All kinds, with their names.
     pub const ALL: [(Kind, &'static str); 8] = [
         (Kind::Slow, "slow"),
         (Kind::Fast, "fast"),
@@ -47,7 +47,7 @@ pub struct Crowd {
     pub boxes: Vec<Aabb>,
     /// Whether each moves.
     pub moving: Vec<bool>,
-    /// Whether each was taken out and put in anew by the last step.
+    /// Whether each was removed and inserted again by the last step.
     pub replaced: Vec<bool>,
     velocities: Vec<Vec3>,
     kind: Kind,
@@ -57,7 +57,7 @@ pub struct Crowd {
 }
 
 impl Crowd {
-    /// `n` balls in a space of constant density.
+    /// Makes `n` boxes in a space of constant density.
     pub fn new(kind: Kind, n: usize) -> Crowd {
         let side = |k: f64| 0.5 * PITCH * k;
         let half = match kind {
@@ -91,7 +91,7 @@ impl Crowd {
         crowd
     }
 
-    /// One step.
+    /// Advances by one step.
     pub fn advance(&mut self) {
         for ((b, v), _) in
             self.boxes.iter_mut().zip(&mut self.velocities).zip(&self.moving).filter(|(_, moves)| **moves)
@@ -120,7 +120,8 @@ fn ball(center: Vec3, radius: f64) -> Aabb {
     Aabb { min: center.add_scalar(-radius), max: center.add_scalar(radius) }
 }
 
-/// Half the width of a box: of mixed sizes, a share s^-3 is larger than s times the smallest.
+/// Returns half the width of a box; of mixed sizes, a fraction s^-3 is larger than s times the
+/// smallest.
 fn size(kind: Kind, random: &mut Random) -> f64 {
     let uniform = 0.5 * (1.0 + random.within(1.0));
     if kind == Kind::Sizes { 0.5 * RADIUS * (1.0 - uniform).max(1e-9).cbrt().recip().min(30.0) } else { RADIUS }

@@ -9,7 +9,8 @@ const RIGHT: f64 = 150.0;
 const TOP: f64 = 40.0;
 const BOTTOM: f64 = 60.0;
 
-/// An SVG of curves `(name, color, points)`, a point being boxes and microseconds; a dashed line is proportional to the boxes.
+/// Returns an SVG of curves `(name, color, points)`. A point is a number of boxes and microseconds;
+/// a dashed line is proportional to the boxes.
 pub fn write(curves: &[(&str, &str, Vec<(f64, f64)>)]) -> String {
     let points = || curves.iter().flat_map(|c| &c.2);
     let span = |of: fn(&(f64, f64)) -> f64| {

@@ -1,4 +1,5 @@
-//! Crowds of boxes in motion, and what follows them: tumble's broad phase, the bounding volume hierarchy of parry (Rapier's), and a plain pass over memory.
+//! Crowds of moving boxes, and the methods that track their pairs: tumble's broad phase, parry's
+//! bounding volume hierarchy (Rapier's), and a plain pass over memory.
 
 mod crowd;
 mod curve;
@@ -12,7 +13,7 @@ use rapier3d_f64::parry::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
 use std::time::Instant;
 use tumble_collide::{Aabb, BroadPhase, SweepAndPrune};
 
-/// A broad phase that follows a crowd of boxes and counts its pairs.
+/// A method that tracks a crowd of boxes and counts its pairs.
 pub trait Follower {
     /// Adds all boxes.
     fn start(&mut self, crowd: &Crowd);
@@ -20,7 +21,7 @@ pub trait Follower {
     fn step(&mut self, crowd: &Crowd) -> usize;
 }
 
-/// tumble: the pairs of the boxes themselves, sorted.
+/// tumble: the overlapping pairs of the exact boxes, sorted.
 #[derive(Default)]
 pub struct Sweep {
     broad: SweepAndPrune,
@@ -47,7 +48,8 @@ impl Follower for Sweep {
     }
 }
 
-/// parry's tree with the margin of its change detection; all pairs of leaves, in no order, those of two static boxes too.
+/// parry's tree with the margin of its change detection; all overlapping pairs of leaves,
+/// unordered, also those of two static boxes.
 pub struct Tree {
     tree: Bvh,
     workspace: BvhWorkspace,
@@ -57,13 +59,13 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// A margin in meters, the same as tumble's fat boxes have.
+    /// Makes a tree with a margin in meters, which equals that of tumble's fat boxes.
     pub fn new(margin: f64) -> Tree {
         Tree { tree: Bvh::new(), workspace: BvhWorkspace::default(), margin, pairs: Vec::new(), steps: 0 }
     }
 }
 
-/// Steps between two optimizations of the tree.
+/// Number of steps between two optimizations of the tree.
 const OPTIMIZED: u32 = 8;
 
 impl Follower for Tree {
@@ -92,8 +94,9 @@ impl Follower for Tree {
     }
 }
 
-/// The least work of any broad phase that keeps a list of near pairs. It writes every box in 32 bytes and reads both boxes of
-/// every pair. The list stays as it was at the start, so only the memory grows.
+/// A lower bound for the work of a broad phase that keeps a list of near pairs. It writes every box
+/// in 32 bytes and reads both boxes of every pair. The list stays as it was at the start, so only
+/// the memory grows.
 #[derive(Default)]
 pub struct Plain {
     boxes: Vec<[f32; 8]>,
@@ -103,7 +106,7 @@ pub struct Plain {
 }
 
 impl Plain {
-    /// Boxes are near if they overlap when grown by a margin, meters.
+    /// Makes the list of pairs that overlap when grown by a margin, meters.
     pub fn new(margin: f64) -> Plain {
         Plain { margin, ..Plain::default() }
     }
@@ -140,18 +143,19 @@ fn theirs(b: &Aabb) -> ParryBox {
     ParryBox::new(corner(&b.min), corner(&b.max))
 }
 
-/// The cost of following a crowd.
+/// The cost of tracking a crowd.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cost {
-    /// Microseconds of CPU per step, the motion of the boxes taken off.
+    /// Microseconds of CPU per step, without the motion of the boxes.
     pub step: f64,
-    /// Microseconds on the wall of the fastest tenth of the steps: those in which few boxes are filed anew and nothing else ran.
+    /// Wall-clock microseconds of the fastest tenth of the steps: those with few insertions and
+    /// without other load.
     pub tenth: f64,
     /// Pairs after the last step.
     pub pairs: usize,
 }
 
-/// Follows a crowd for `steps` after as many to settle in.
+/// Tracks a crowd for `steps` steps, after as many to warm up.
 pub fn follow(follower: &mut dyn Follower, kind: Kind, n: usize, steps: usize) -> Cost {
     let clock = Clock::new();
     let mut crowd = Crowd::new(kind, n);

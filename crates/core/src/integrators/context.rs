@@ -4,7 +4,7 @@
 //! |---|---|
 //! | explicit Euler | `x += h·v(x,p)`, `p += h·f(x,p,t)` |
 //! | symplectic Euler | `p += h·f(x,p,t)`, `x += h·v(x,p)` |
-//! | Verlet | `x` coasts `h/2`, `p += h·f(x,p,t+h/2)`, `x` coasts `h/2` |
+//! | Verlet | free motion of `x` over `h/2`, `p += h·f(x,p,t+h/2)`, free motion of `x` over `h/2` |
 //! | Dormand–Prince | fifth order, by inner steps that a tolerance chooses: [`crate::integrators`] |
 //! | RK4 | classical on `p`; on `x` the commutator-free method of Celledoni, Marthinsen and Owren (2003), two exponentials in the last stage |
 
@@ -16,7 +16,7 @@ use crate::world::view::{Entry, Mode, ObjectId, Objects, Table, WorldView};
 use crate::world::{ObjectState, StepError};
 use tumble_collide::Vec3;
 
-/// What the integrators work on, borrowed from the world.
+/// The objects, state and buffers of an integration, borrowed from the world.
 pub(crate) struct IntegrationContext<'a> {
     pub table: &'a Table,
     pub states: &'a [ObjectState],
@@ -26,13 +26,13 @@ pub(crate) struct IntegrationContext<'a> {
     pub gravity: Vec3,
     /// See [`WorldView::implicit`].
     pub implicit: bool,
-    /// Forces set by the user, per site.
+    /// Forces set by the user, per part.
     pub applied: &'a [Wrench],
     /// Generalized forces set by the user, per coordinate.
     pub applied_generalized: &'a [f64],
-    /// Generalized contact forces that hold over the sub-step.
+    /// Generalized contact forces that are constant over the sub-step.
     pub held: &'a [f64],
-    /// Contact forces that hold over the sub-step on links, per site; empty for none.
+    /// Contact forces on links that are constant over the sub-step, per part; empty for none.
     pub held_wrenches: &'a [Wrench],
 }
 
@@ -42,7 +42,7 @@ impl IntegrationContext<'_> {
         refresh_all(self.table.with(self.states), self.x, self.derived);
     }
 
-    /// The same for one object.
+    /// Writes part states and cache of one object from the state.
     pub fn refresh_one(&mut self, id: ObjectId) {
         if let Some(entry) = self.table.with(self.states).get(id) {
             refresh(&entry, &mut self.derived.caches[entry.place], self.x, &mut self.derived.part_states);
@@ -54,7 +54,8 @@ impl IntegrationContext<'_> {
         self.table.with(self.states)
     }
 
-    /// Forces at the present state and time `t`: rate of momentum of every object into `dp`, accelerations into the sites.
+    /// Evaluates all forces at the present state and time `t`: writes the rate of momentum of every
+    /// object to `dp`, and accelerations to the part states.
     pub fn evaluate(&mut self, t: f64, dp: &mut [f64]) {
         self.refresh();
         self.forces.wrenches.clear();
@@ -94,7 +95,8 @@ impl IntegrationContext<'_> {
                 body.derivative(cache, &self.x[state_range.x.clone()], &self.forces.slice(state_range), dp);
                 body.accelerations(cache, &self.x[state_range.x.clone()], dp, part_states);
             } else {
-                // what is led keeps its generalized velocity: a link that turns about another still has its centripetal acceleration
+                // a kinematic object keeps its generalized velocity: a link that turns about
+                // another still has its centripetal acceleration
                 part_states.iter_mut().for_each(|s| {
                     (s.acceleration, s.angular_acceleration) = (s.bias_acceleration, s.bias_angular_acceleration)
                 });
@@ -102,14 +104,14 @@ impl IntegrationContext<'_> {
         }
     }
 
-    /// Every object that moves goes on freely for `h`; what is led follows its velocity.
+    /// Moves every dynamic object freely for `h`, and every kinematic object with its velocity.
     pub fn free_motion(&mut self, h: f64) {
         for entry in self.table.with(self.states).iter() {
             free_motion(&entry, &mut self.derived.caches[entry.place], &mut self.x[entry.state_range.x.clone()], h);
         }
     }
 
-    /// Leaves of the rates what the coasts of a splitting do not do by themselves.
+    /// Subtracts from the rates the part that the free motion of a splitting already applies.
     pub fn subtract_free_motion(&mut self, dp: &mut [f64]) {
         let mut rate = Vec::new();
         for entry in self.table.with(self.states).iter().filter(|e| e.moves()) {
@@ -129,7 +131,7 @@ impl IntegrationContext<'_> {
         }
     }
 
-    /// Generalized velocities of everything that moves or is led; zero elsewhere.
+    /// Writes the generalized velocities of all dynamic and kinematic objects; zero elsewhere.
     pub fn velocities(&self, v: &mut [f64]) {
         v.fill(0.0);
         for entry in self.table.with(self.states).iter().filter(|e| e.status.enabled && e.status.mode != Mode::Static) {
@@ -153,8 +155,12 @@ impl IntegrationContext<'_> {
         }
     }
 
-    /// Integrates over `h` from time `t`: one step, or as many inner steps of `adaptive` as its tolerance asks for, which it records. Returns how far
-    /// it came, s: `h`, except for a record that is full. Sites and caches are left at the new state.
+    /// Integrates over `h` from time `t`, with one step, or with as many inner steps of `adaptive`
+    /// as its tolerance requires, which it records. Leaves part states and caches at the new state.
+    /// Returns the time integrated, s: `h`, or less if the record is full.
+    ///
+    /// # Errors
+    /// [`StepError`] if the adaptive integrator fails.
     pub fn integrate(
         &mut self,
         integrator: Integrator,
@@ -217,7 +223,7 @@ impl IntegrationContext<'_> {
         self.integrate_positions(&combine(&v, [-0.5, 0.0, 1.0, 0.0]), h);
         self.stage(t + h, &mut v[3], &mut f[3]);
         self.keep_kinematic_velocities(&kinematic, &mut v[3]);
-        // the step
+        // the whole step
         self.x.copy_from_slice(&start);
         let sixth = 1.0 / 6.0;
         dp.copy_from_slice(&combine(&f, [sixth, 2.0 * sixth, 2.0 * sixth, sixth]));
@@ -231,14 +237,14 @@ impl IntegrationContext<'_> {
         self.velocities(v);
     }
 
-    /// What is led has one velocity over the whole step.
+    /// Resets the velocities of kinematic objects to those at the start of the step.
     fn keep_kinematic_velocities(&self, kinematic: &[f64], v: &mut [f64]) {
         for entry in self.table.with(self.states).iter().filter(|e| e.status.mode == Mode::Kinematic) {
             v[entry.state_range.v.clone()].copy_from_slice(&kinematic[entry.state_range.v.clone()]);
         }
     }
 
-    /// What is led keeps the velocity it started with, whatever the stages made of it.
+    /// Writes the initial velocity back to kinematic objects, which the stages may have changed.
     fn restore_kinematic_velocities(&mut self, start: &[f64]) {
         for entry in
             self.table.with(self.states).iter().filter(|e| e.status.enabled && e.status.mode == Mode::Kinematic)
@@ -251,7 +257,8 @@ impl IntegrationContext<'_> {
     }
 }
 
-/// Writes part states and caches from a state. What is static or not alive is at rest, whatever momentum it keeps.
+/// Writes part states and caches from a state. Static and disabled objects are at rest, whatever
+/// momentum they store.
 pub(crate) fn refresh_all(objects: Objects, x: &[f64], derived: &mut Derived) {
     for (entry, cache) in objects.iter().zip(&mut derived.caches) {
         refresh(&entry, cache, x, &mut derived.part_states);
@@ -266,7 +273,8 @@ fn refresh(entry: &Entry, cache: &mut Cache, x: &[f64], part_states: &mut [PartS
     }
 }
 
-/// One object goes on for `h`: freely where it moves, with its given velocity where it is led, not at all where it is static.
+/// Moves one object over `h`: freely if dynamic, with its given velocity if kinematic, not at all
+/// if static.
 pub(crate) fn free_motion(entry: &Entry, cache: &mut Cache, x: &mut [f64], h: f64) {
     let Some(body) = entry.object.integratable().filter(|_| entry.status.enabled && !entry.asleep) else { return };
     match entry.status.mode {

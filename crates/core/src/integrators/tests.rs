@@ -1,5 +1,5 @@
-//! The record of a call against integrations that end where it is read; the exponential map's
-//! differential against differences.
+//! Comparison of the recorded path with integrations that end at the same times, and of the
+//! exponential map's differential with finite differences.
 
 use super::Adaptive;
 use crate::derived::Derived;
@@ -38,7 +38,7 @@ impl ForceGenerator for Spring {
     }
 }
 
-/// A world of one body and its spring, without steppers.
+/// A world of one body and its spring, without a stepper.
 struct Bench {
     table: Table,
     states: [ObjectState; 2],
@@ -95,7 +95,7 @@ impl Bench {
     }
 }
 
-/// Integrates over `h` and leaves the record.
+/// Integrates over `h` and keeps the record.
 fn integrate(bench: &mut Bench, tolerance: f64, h: f64) -> Adaptive {
     let mut adaptive = Adaptive::default();
     adaptive.set(&Settings { integrator_tolerance: tolerance, dt: 1.0, ..Settings::default() }, 0.0, 0);
@@ -131,7 +131,7 @@ fn dense_output_is_as_good_as_the_steps() {
     }
 }
 
-/// The turn from `exp(θ)` to `exp(θ + h·pull_back(θ, ω))` is `h·ω`, to second order in `h` by
+/// The rotation from `exp(θ)` to `exp(θ + h·pull_back(θ, ω))` is `h·ω`, to second order in `h` by
 /// central differences.
 #[test]
 fn the_pulled_back_rate_turns_with_the_velocity() {

@@ -1,7 +1,7 @@
-//! Solvers of the one contact problem, each behind [`RowSolver`].
+//! Solvers of the contact problem, each behind [`RowSolver`].
 //!
-//! Find `λ` in the rows' sets so that `w = c + (K + R)·λ` (`R`: compliance of soft rows) answers
-//! each set as [`RowSet`](crate::constraint::rows::RowSet) says.
+//! Find `λ` in the rows' sets so that `w = c + (K + R)·λ` (`R`: compliance of soft rows) satisfies
+//! each set as [`RowSet`](crate::constraint::rows::RowSet) defines it.
 
 mod dof6;
 mod equality;
@@ -69,7 +69,7 @@ pub struct SolveReport {
 /// Names of all solvers in files and on the command line; `lcp` is short for `lcp_pyramid`.
 pub const NAMES: [&str; 3] = ["gauss_seidel", "lcp_pyramid", "lcp_sliding"];
 
-/// Returns the solver of that name; `None` for a name that is neither in [`NAMES`] nor `lcp`.
+/// Returns the solver of that name; `lcp` is short for `lcp_pyramid`. `None` for other names.
 pub fn by_name(name: &str) -> Option<Box<dyn RowSolver>> {
     match name {
         "gauss_seidel" => Some(Box::new(GaussSeidel)),
