@@ -153,14 +153,14 @@ fn probes_of_every_kind_see_the_dense_response() {
         for _ in 0..6 {
             let (link, other) = (n.below(d.links()), n.below(d.links()));
             let (point, axes) = (0.3 * n.vector(), [n.vector(), n.vector(), n.vector(), n.vector()]);
-            // A point of one link against a point of another, along four directions.
+            // a point of one link against a point of another, along four directions
             let mut y = vec![0.0; 4 * d.dof()];
             d.point_response(link, &(poses[link].rotation * point), &axes, 1.0, &mut y);
             d.point_response(other, &(poses[other].rotation * -point), &axes, -1.0, &mut y);
             rows.extend(y.chunks(d.dof()).map(|row| row.to_vec()));
             let j = jacobian(&model, &poses, link, &point) - jacobian(&model, &poses, other, &-point);
             dense.extend(axes.iter().map(|n| j.rows(3, 3).transpose() * n));
-            // The turning of a link, and a joint by itself.
+            // the rotation of a link, and a single joint
             let mut y = vec![0.0; d.dof()];
             d.rotation_response(link, &axes[0], 0.5, &mut y);
             rows.push(y.clone());

@@ -15,7 +15,7 @@ fn gather<const N: usize>(states: &[State], pick: impl Fn(&State) -> &Vec<f64>) 
     (0..pick(&states[0]).len()).map(|k| Lanes(std::array::from_fn(|lane| pick(&states[lane])[k]))).collect()
 }
 
-/// Both ways of a batch against one state at a time.
+/// Compares both layouts of a batch with one state at a time.
 fn check<const N: usize>(model: &Model, states: &[State]) {
     let (q, v, tau) = (gather::<N>(states, |s| &s.0), gather::<N>(states, |s| &s.1), gather::<N>(states, |s| &s.2));
     let mut alone = Dynamics::new(model);
@@ -74,7 +74,8 @@ fn a_lane_of_far_angles_or_of_gimbal_lock_disturbs_no_other() {
     check_all(&model, &states);
 }
 
-/// Floats between two numbers of the same sign, or the sum of their distances to 0.
+/// Returns the number of floats between two numbers of the same sign, or the sum of their distances
+/// to 0.
 fn steps_between(a: f64, b: f64) -> u64 {
     let key =
         |x: f64| if x.is_sign_negative() { -((x.to_bits() & (u64::MAX >> 1)) as i64) } else { x.to_bits() as i64 };

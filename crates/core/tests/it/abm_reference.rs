@@ -6,7 +6,7 @@ use tumble_core::articulated::Link;
 use tumble_core::collide::{Mat3, Pose, Vec3};
 use tumble_core::{Joint, LinkMass, Model, ModelBuilder, Wrench};
 
-/// Numbers that only look random: the same on every run.
+/// Pseudorandom numbers, the same in every run.
 pub struct Numbers(u64);
 
 impl Numbers {
@@ -14,7 +14,7 @@ impl Numbers {
         Numbers(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
     }
 
-    /// In [-1, 1).
+    /// Returns a number in [-1, 1).
     pub fn next(&mut self) -> f64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
@@ -42,21 +42,21 @@ impl Numbers {
         (0..n).map(|_| size * self.next()).collect()
     }
 
-    /// A body of about 1 kg and 0.2 m, its mass spread over points.
+    /// Returns a body of about 1 kg and 0.2 m, its mass distributed over points.
     pub fn mass(&mut self) -> LinkMass {
         let point = |n: &mut Numbers| LinkMass::point(0.2 + 0.1 * n.next(), 0.2 * n.vector());
         (0..5).map(|_| point(self)).reduce(|a, b| a.with(&b)).unwrap()
     }
 }
 
-/// Which trees.
+/// The kinds of joints in a tree.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Kinds {
     Hinges,
     All,
 }
 
-/// A random tree: several roots, branches, chains.
+/// Returns a random tree with several roots, branches and chains.
 pub fn random_tree(links: usize, kinds: Kinds, seed: u64) -> Model {
     let mut n = Numbers::new(seed);
     let mut builder = ModelBuilder::new();
@@ -82,7 +82,7 @@ pub fn random_tree(links: usize, kinds: Kinds, seed: u64) -> Model {
     builder.build().unwrap()
 }
 
-/// A random state: positions and velocities.
+/// Returns a random state: positions and velocities.
 pub fn random_state(model: &Model, seed: u64) -> (Vec<f64>, Vec<f64>) {
     let mut n = Numbers::new(seed);
     let mut q = n.list(model.positions(), 2.0);

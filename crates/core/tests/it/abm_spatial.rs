@@ -37,7 +37,7 @@ fn body() -> impl Strategy<Value = (f64, Vec3, Mat3)> {
     })
 }
 
-/// Six numbers of either kind: only here, where a test compares.
+/// Six numbers of a motion or force vector; only here, for comparisons.
 fn six(a: Vector, b: Vector) -> Six {
     Six::from_column_slice(&[a.x, a.y, a.z, b.x, b.y, b.z])
 }
@@ -67,7 +67,7 @@ fn blocks(j: Mat3, h: Mat3, m: Mat3) -> SixSquare {
     out
 }
 
-/// Any symmetric positive 6×6 with its form of 21 numbers.
+/// A random symmetric positive 6×6 matrix and its form of 21 numbers.
 fn articulated() -> impl Strategy<Value = (ArticulatedInertia, SixSquare)> {
     prop::collection::vec(-1.0..1.0f64, 36).prop_map(|a| {
         let a = SixSquare::from_column_slice(&a);

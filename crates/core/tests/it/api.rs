@@ -1,4 +1,4 @@
-//! The parts of the interface that read a world and act on it in one line.
+//! Accessors and commands of the API that take one line.
 
 use tumble_core::prelude::*;
 
@@ -153,7 +153,7 @@ fn a_force_from_a_function_acts_as_its_formula_says() {
     assert!((speed - expected).abs() < 4.7e-3 * expected, "{speed} m/s, {expected} expected");
     assert_eq!(world.state(), fork.state());
     assert!(matches!(world.body(drag), Err(WorldError::NoPart { .. })));
-    // without what it acts on it does nothing
+    // without the body that it acts on, it does nothing
     world.remove(id).unwrap();
     world.step().unwrap();
     assert!(world.add_force("drag", |_, _| {}).is_err());

@@ -1,10 +1,11 @@
-//! A world that was written whole and read again goes the same way.
+//! A world that is written to an archive and read again continues with the same bits.
 
 use crate::common::*;
 use tumble_core::collide::{Mat3, Pose, Shape, TreeSettings, TriMesh, Vec3};
 use tumble_core::*;
 
-/// Every shape, a chain of links with limits, drives and a coupling, loops, cameras; one body was removed, one sleeps.
+/// A world with every shape, a chain of links with limits, drives and a coupling, loops and
+/// cameras; one body was removed, one sleeps.
 fn everything(stepper: &str) -> World {
     let mut world = world(stepper, 1.0 / 240.0);
     let settings = world.settings().with_combine_restitution(Combine::Min);
@@ -104,7 +105,7 @@ fn shared_shapes_are_written_once_and_shared_again() {
     assert!(std::sync::Arc::ptr_eq(a, b));
 }
 
-/// Pulls upwards.
+/// A force upwards.
 struct Lift;
 
 impl Object for Lift {
@@ -161,7 +162,8 @@ fn damage_is_found() {
     }
 }
 
-/// A mesh that is only drawn is read for the archive, and shared again; what cannot be read stays so, with the same reason.
+/// A mesh that is only drawn is read for the archive, and shared again afterwards; an unreadable
+/// one stays unreadable, with the same reason.
 #[test]
 fn visual_meshes_need_no_file_any_more() {
     let sheet = TriMesh { vertices: vec![Vec3::zeros(), Vec3::x(), Vec3::y()], triangles: vec![[0, 1, 2]] };

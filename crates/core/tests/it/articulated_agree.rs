@@ -66,7 +66,7 @@ fn forward_dynamics_undoes_inverse_dynamics() {
         let error = relative(&case.accelerations(&tau), &qdd);
         assert!(error < 1e-10, "{} links, {} dof: {error:e}", case.model.links().len(), case.model.dof());
         worst = worst.max(error);
-        // The fused pass takes no wrenches.
+        // the fused pass takes no wrenches
         case.wrenches.clear();
         let (tau, mut fused) = (case.torques(&qdd), vec![f64::NAN; qdd.len()]);
         forward_dynamics(&mut case.dynamics, &G, &case.q, &case.v, &tau, &mut fused);
@@ -82,7 +82,7 @@ fn inverse_dynamics_undoes_forward_dynamics() {
         let tau = random.numbers(case.model.dof(), 20.0);
         let qdd = case.accelerations(&tau);
         let size = qdd.iter().fold(1.0f64, |m, x| m.max(x.abs()));
-        // Torques are differences of numbers as large as the accelerations.
+        // torques are differences of numbers as large as the accelerations
         assert!(apart(&case.torques(&qdd), &tau) < 1e-12 * size);
     }
 }

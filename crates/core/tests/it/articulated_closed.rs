@@ -150,7 +150,7 @@ fn a_held_tree_hangs_on_its_root() {
     assert!((root.torque + arm.cross(&(model.mass() * DOWN))).norm() < 1e-12 * model.mass());
 }
 
-/// A fixed link weighs the same as a hinged one whose joint is held.
+/// A fixed link has the same weight as one on a revolute joint that is held.
 #[test]
 fn a_folded_link_is_a_hinged_one_that_does_not_turn() {
     let mut random = Random(10);

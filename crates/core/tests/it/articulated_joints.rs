@@ -134,7 +134,7 @@ fn dry_friction_holds_up_to_its_torque_and_slows_by_it() {
 #[test]
 fn drives_hold_turn_and_keep_to_their_torque() {
     for stepper in ["time_stepping", "backtracking"] {
-        // gravity off: a position drive comes to its target, stiff or soft
+        // without gravity, a position drive reaches its target, stiff or soft
         let position =
             Drive::Position { stiffness: 30.0, damping: 4.0, target: 0.7, velocity: 0.0, limit: f64::INFINITY };
         let mut world = arm(stepper, DofSettings { drive: position, ..DofSettings::default() });
@@ -150,7 +150,7 @@ fn drives_hold_turn_and_keep_to_their_torque() {
             "{stepper}: {:?}",
             state(&world)
         );
-        // 0.06 N·m on 0.12 kg·m² for one second are 0.5 rad/s, whatever is asked for
+        // 0.06 N·m on 0.12 kg·m² for one second give 0.5 rad/s, whatever the target
         for drive in [
             Drive::Velocity { target: 9.0, limit: 0.06 },
             Drive::Position { stiffness: 1e5, damping: 10.0, target: 50.0, velocity: 0.0, limit: 0.06 },
@@ -161,7 +161,7 @@ fn drives_hold_turn_and_keep_to_their_torque() {
             assert!((state(&world)[1] - 0.5).abs() < 1e-6, "{stepper} {drive:?}: {:?}", state(&world));
         }
     }
-    // as stiff as can be: k·h² is 10⁴ times the inertia
+    // extremely stiff: k·h² is 10⁴ times the inertia
     let stiff = Drive::Position { stiffness: 1e8, damping: 1e5, target: 0.7, velocity: 0.0, limit: f64::INFINITY };
     let mut world = arm("time_stepping", DofSettings { drive: stiff, ..DofSettings::default() });
     run(&mut world, 2.0);
@@ -250,7 +250,7 @@ fn gimbal_lock_is_an_error_that_says_so_and_nothing_is_lost() {
 
 #[test]
 fn a_stack_of_hinges_is_a_ball_joint_away_from_its_lock() {
-    // the same top on a spherical joint: same place of the top after a while, by two sets of
+    // the same top on a spherical joint: the same position after some time, by two sets of
     // coordinates
     let mut stacked = adaptive(1.0 / 60.0, 1e-10);
     let a = stacked.add(gimbals(0.3).with_velocities(&[1.0, 0.5, 2.0]).unwrap()).unwrap();

@@ -1,4 +1,5 @@
-//! Laws of the rigid links: what inverse dynamics, mass matrix, Jacobians and sums must satisfy on any tree, against differences of poses.
+//! Laws that inverse dynamics, mass matrix, Jacobians and sums satisfy on any tree, checked by
+//! finite differences of poses.
 
 use crate::articulated_random::*;
 use nalgebra::{DMatrix, DVector};
@@ -46,7 +47,8 @@ impl Case {
         kin
     }
 
-    /// The rate of change of some numbers along that motion: central differences, extrapolated, of fourth order.
+    /// Returns the rate of change of some numbers along that motion: central differences,
+    /// extrapolated to fourth order.
     fn rate(&self, qdd: &[f64], read: impl Fn(&Kinematics) -> Vec<f64>) -> Vec<f64> {
         let h = 1e-3;
         let central = |h: f64| {
@@ -131,7 +133,8 @@ fn accelerations_are_the_rates_of_link_velocities_and_j_qdd_plus_bias() {
     }
 }
 
-/// Jacobians against differences: each coordinate moved alone, and what that does to the pose of the link and to a point on it.
+/// Jacobians against finite differences: each coordinate is moved alone, and the pose of the link
+/// and a point on it are compared.
 #[test]
 fn jacobians_are_the_derivatives_of_poses() {
     let mut random = Random(44);
@@ -238,7 +241,8 @@ fn energy_changes_by_the_power_of_the_torques() {
     }
 }
 
-/// Newton and Euler for the whole: momentum changes by gravity, the wrenches and what passes through the roots.
+/// Newton's and Euler's equations of the whole tree: momentum changes by gravity, the wrenches, and
+/// the forces through the roots.
 #[test]
 fn momentum_changes_by_what_acts_from_outside() {
     for mut case in cases(9) {
@@ -335,7 +339,7 @@ fn positions_integrate_along_the_exponential_of_a_constant_turn() {
             assert!((turn(&q) - expected).norm() < 1e-13);
             assert!((q[link.q + k..link.q + k + 4].iter().map(|x| x * x).sum::<f64>() - 1.0).abs() < 1e-15);
         }
-        // Back the way it came, and the velocity that leads from the one to the other.
+        // back to the start, and the velocity that leads from one to the other
         let mut back = vec![f64::NAN; case.model.dof()];
         difference(&case.model, &case.q, &q, &mut back);
         assert!(apart(&back, &v.iter().map(|v| 0.7 * v).collect::<Vec<f64>>()) < 1e-13);
@@ -347,7 +351,8 @@ fn positions_integrate_along_the_exponential_of_a_constant_turn() {
     }
 }
 
-/// Half-turns are the edge of the short way round, and opposite quaternions are one rotation.
+/// Differences take the shorter way: half-turns are its limit, and opposite quaternions are the
+/// same rotation.
 #[test]
 fn a_difference_goes_the_short_way_round() {
     let mut builder = tumble_core::ModelBuilder::new();

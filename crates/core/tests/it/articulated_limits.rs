@@ -20,9 +20,9 @@ fn whip(rates: &[f64; 6]) -> ArticulatedBody {
     body
 }
 
-/// The end of a step was once guessed from the velocities of its middle, and the guess projected in
-/// 15 sweeps: limits were passed by 1e-3 rad and more, and what brought the joints back gained
-/// energy.
+/// An earlier version estimated the end of a step from the velocities of its middle and projected
+/// the estimate in 15 sweeps: limits were exceeded by 1e-3 rad and more, and the correction of the
+/// joints gained energy.
 #[test]
 fn links_that_swing_about_each_other_keep_to_their_limits() {
     for rate in [60.0, 120.0, 240.0] {

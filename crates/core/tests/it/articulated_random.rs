@@ -44,7 +44,7 @@ impl Random {
         Pose::from_parts(self.vector(size).into(), self.rotation())
     }
 
-    /// A block of up to 0.4 m and 0.2 to 3 kg, turned and set off from the origin.
+    /// Returns a box of up to 0.4 m and 0.2 to 3 kg, rotated and offset from the origin.
     pub fn mass(&mut self) -> LinkMass {
         let (mass, size) = (self.real(0.2, 3.0), Vec3::from_fn(|_, _| self.real(0.05, 0.4)));
         let square = size.component_mul(&size);
@@ -55,17 +55,17 @@ impl Random {
     }
 }
 
-/// Which joints a random tree has.
+/// The kinds of joints in a random tree.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Kinds {
-    /// Hinges alone.
+    /// Revolute joints only.
     Hinges,
-    /// Every kind, fixed links and stacks with massless links among them.
+    /// Every kind, including fixed links and stacks with massless links.
     All,
 }
 
-/// A tree of `count` added links (fixed ones among them), each on one of the last few or on any
-/// before it; root 0 floats if asked to.
+/// Returns a tree of `count` links (including fixed ones), each on one of the last few or on any
+/// earlier one; root 0 floats if `floating` is set.
 pub fn random_tree(random: &mut Random, count: usize, floating: bool, kinds: Kinds) -> Model {
     let mut builder = ModelBuilder::new();
     let root = if floating { Joint::Floating } else { Joint::revolute(random.axis()) };
@@ -108,8 +108,8 @@ fn stack(random: &mut Random, builder: &mut ModelBuilder, i: usize, parent: usiz
     i + 3
 }
 
-/// Positions all over, but hinges of massless stacks within 1 rad of zero; velocities up to
-/// `speed`.
+/// Returns arbitrary positions, except that joints of massless stacks are within 1 rad of zero, and
+/// velocities up to `speed`.
 pub fn random_state(random: &mut Random, model: &Model, speed: f64) -> (Vec<f64>, Vec<f64>) {
     let mut q = random.numbers(model.positions(), 1.0);
     for link in model.links() {
@@ -121,7 +121,7 @@ pub fn random_state(random: &mut Random, model: &Model, speed: f64) -> (Vec<f64>
     (q, random.numbers(model.dof(), speed))
 }
 
-/// Trees of many sizes and both bases, of every kind of joint.
+/// Returns trees of many sizes with both kinds of base and all kinds of joints.
 pub fn random_trees(seed: u64) -> Vec<Model> {
     let mut random = Random(seed);
     [(1, false), (1, true), (2, false), (5, true), (12, false), (12, true), (40, true), (100, false), (100, true)]
@@ -142,6 +142,6 @@ pub fn relative(a: &[f64], b: &[f64]) -> f64 {
 
 fn greatest_difference(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
-    // Not `max`, which forgets what is not a number.
+    // not `max`, which ignores NaN
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, |m, d| if d <= m { m } else { d })
 }

@@ -1,4 +1,4 @@
-//! Swings against closed forms, and the energy of chains that nothing damps.
+//! Swings against closed forms, and the energy of undamped chains.
 
 use crate::articulated_world::{adaptive, chain, hinged, rod, run, world};
 use std::f64::consts::{FRAC_PI_2, PI};

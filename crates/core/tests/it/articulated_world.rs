@@ -15,8 +15,8 @@ pub fn rod(mass: f64, length: f64) -> LinkMass {
     }
 }
 
-/// Equal links hung one on another by revolute joints about y, each `length` m below the one
-/// before; `link 0` is the first.
+/// Equal links in a chain of revolute joints about y, each `length` m below the previous one; `link
+/// 0` is the first.
 pub fn hinged(links: usize, length: f64, mass: LinkMass) -> Model {
     let mut builder = ModelBuilder::new();
     let mut parent = None;

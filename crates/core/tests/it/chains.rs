@@ -1,4 +1,4 @@
-//! Chains of rigid bodies pinned to each other by equality rows.
+//! Chains of rigid bodies joined by equality rows.
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Shape, Vec3};
@@ -55,9 +55,9 @@ impl Constraint for Pin {
     }
 }
 
-/// Bars along the lower half of a circle, pinned to each other and at both ends, and pushed
-/// sideways: with the world they are a closed chain. The last one has `heavy` times the mass of the
-/// others. Nothing collides.
+/// Adds bars along the lower half of a circle, joined to each other and to the world at both ends,
+/// and pushed sideways: with the world they form a closed chain. The last bar has `heavy` times the
+/// mass of the others. No bar collides.
 fn festoon(stepper: &str, dt: f64, count: usize, pins: usize, heavy: f64) -> (World, Vec<ObjectId>) {
     let mut world = world(stepper, dt);
     let turn = std::f64::consts::PI / count as f64;
@@ -84,7 +84,7 @@ fn festoon(stepper: &str, dt: f64, count: usize, pins: usize, heavy: f64) -> (Wo
     (world, bars)
 }
 
-/// Largest distance between ends that are pinned together, meters.
+/// Returns the largest distance between ends that are joined, meters.
 fn apart(world: &World, bars: &[ObjectId]) -> f64 {
     let of = |i: usize, x: f64| end(world.part_state(bars[i], 0).unwrap(), x).0;
     (1..bars.len()).map(|i| (of(i - 1, HALF) - of(i, -HALF)).norm()).fold(0.0, f64::max)
@@ -109,7 +109,8 @@ fn a_closed_chain_of_twenty_bars_swings_with_its_pins_solved() {
             "{stepper}, {pins} a joint, {heavy}: residual {residual:.1e} m/s, pins apart {gap:.1e} m, energy {lost:.1e} J"
         );
         assert!(residual < 1e-9 && unconverged == 0, "{stepper}: residual {residual:e}, {unconverged} unconverged");
-        // backtracking projects when the next step begins: until then a fall of ½·h²·2g is left
+        // backtracking projects at the beginning of the next step: until then a fall of ½·h²·2g
+        // remains
         let bound = if stepper == "time_stepping" { 1e-5 } else { G / (240.0 * 240.0) };
         assert!(gap < bound, "{stepper}: pins apart by {gap:e} m");
     }

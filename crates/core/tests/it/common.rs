@@ -55,7 +55,8 @@ pub fn velocity(world: &World, id: ObjectId) -> Vec3 {
     world.part_state(id, 0).unwrap().velocity
 }
 
-/// Slides a cube at 5 m/s, μ = 0.5; distance and time of its stop (time from the last two speeds), and the largest gap under it.
+/// Slides a cube at 5 m/s with μ = 0.5. Returns distance and time of its stop (the time from the
+/// last two speeds), and the largest gap under it.
 pub fn slide(stepper: &str, solver: &str, dt: f64) -> (f64, f64, f64) {
     let mut world = world(stepper, dt);
     world.set_solver(solver::by_name(solver).unwrap());

@@ -109,7 +109,7 @@ fn damping_is_exponential() {
     assert!((world.part_state(id, 0).unwrap().angular_velocity.z - (-0.6f64).exp()).abs() < 1e-10);
 }
 
-/// A spring between a body and the origin: a force generator of a user's own.
+/// A spring between a body and the origin: a custom force generator.
 #[derive(Clone)]
 struct Spring(ObjectId, f64);
 

@@ -4,7 +4,8 @@ use crate::common::*;
 use tumble_core::collide::{Pose, Vec3};
 use tumble_core::*;
 
-/// Drops a ball from 1 m (underside); the speed ratio of the first bounce from the rebound's energy.
+/// Drops a ball from 1 m (lowest point). Returns the speed ratio of the first bounce, from the
+/// energy of the rebound.
 fn first_bounce(stepper: &str, e: f64, dt: f64) -> f64 {
     let mut world = world(stepper, dt);
     ground(&mut world, e, 0.0);
@@ -47,7 +48,8 @@ fn a_bouncing_ball_comes_to_rest_when_the_series_says() {
         });
         let id = world.add(ball.with_pose(Pose::translation(0.0, 0.0, 1.1))).unwrap();
         let mut rest = f64::NAN;
-        // sub-steps are not shown outside a frame: step single short frames once the bounces are small
+        // sub-steps are not visible outside a frame: single short frames are stepped once the
+        // bounces are small
         while world.time() < 1.5 {
             if world.time() > 1.345 {
                 let fine = world.settings().with_dt(1e-4);

@@ -1,12 +1,12 @@
-//! One-sided rows of constraints, located in time as contacts are.
+//! One-sided rows of constraints, located in time like contacts.
 
 use crate::common::*;
 use tumble_core::collide::Vec3;
 use tumble_core::rows::RowSet;
 use tumble_core::*;
 
-/// A pendulum of one joint: `X = [θ, p]`, `M = 1 kg·m²`, torque `−pull·sin θ`, stops at `θ =
-/// stops`, one-sided.
+/// A pendulum with one joint: `X = [θ, p]`, `M = 1 kg·m²`, torque `−pull·sin θ`, one-sided stops at
+/// `θ = stops`.
 #[derive(Clone)]
 struct Pendulum {
     angle: f64,
@@ -110,8 +110,8 @@ fn with(integrator: Integrator, pendulum: Pendulum) -> (World, ObjectId) {
 
 const BOTH: [Integrator; 2] = [Integrator::Verlet, Integrator::DormandPrince];
 
-/// It falls from −1.5 rad to the stop at 0.5 at 3.4 rad/s, loses all it has there, and swings back
-/// from rest: its energy is that of the stop's height.
+/// It falls from −1.5 rad to the stop at 0.5 at 3.4 rad/s, loses its kinetic energy there, and
+/// swings back from rest: its energy is that of the stop's height.
 #[test]
 fn a_swing_ends_at_its_stop() {
     for integrator in BOTH {
@@ -142,10 +142,10 @@ fn a_swing_ends_at_its_stop() {
     }
 }
 
-/// Pressed against its stop it stays within 1e-6 rad of it, from the first frame after the stroke
-/// on, and costs no more than a try or two a frame.
+/// Pressed against its stop, it stays within 1e-6 rad of it from the first frame after the impact,
+/// and needs no more than two tries per frame.
 #[test]
-fn what_is_pressed_against_a_stop_rests_there() {
+fn a_joint_pressed_against_a_stop_rests_there() {
     for integrator in BOTH {
         // it falls over from 0.1 rad: e^{√g·t}
         let (mut world, id) =
@@ -171,8 +171,8 @@ fn what_is_pressed_against_a_stop_rests_there() {
     }
 }
 
-/// Without a force the moment is the distance by the speed, whatever the frame; nothing is felt
-/// before it.
+/// Without a force the time of impact is distance over speed, for any frame length; the stop has no
+/// effect before it.
 #[test]
 fn a_stop_acts_when_it_is_reached_and_not_before() {
     for integrator in BOTH {
@@ -206,7 +206,7 @@ fn a_limit_without_a_reported_gap_decelerates_early() {
     }
 }
 
-/// A world that begins beyond a stop goes on, and comes back at the speed of recovery.
+/// A world that begins beyond a stop runs, and returns at the recovery speed.
 #[test]
 fn a_start_beyond_a_stop_is_recovered_from() {
     for integrator in BOTH {
@@ -231,9 +231,9 @@ fn a_gap_that_is_no_number_is_an_error() {
     assert!(matches!(world.step().unwrap_err(), StepError::Row { object, .. } if object == "pendulum"));
 }
 
-/// A double pendulum whose first joint falls on a stop and is kept there by its weight, while the
-/// second swings on as a pendulum of its own from there: the first stays on the stop, and the
-/// energy is that of the stroke's end.
+/// The first joint of a double pendulum falls on a stop and is held there by its weight, while the
+/// second swings on as a pendulum: the first stays on the stop, and energy is conserved after the
+/// impact.
 #[test]
 fn a_joint_is_held_at_its_stop_while_the_next_one_swings() {
     for integrator in BOTH {
@@ -262,7 +262,7 @@ fn a_joint_is_held_at_its_stop_while_the_next_one_swings() {
             swing = [swing[0].min(x[1]), swing[1].max(x[1])];
         }
         println!("{integrator:?}: arrived {arrived:?}, off {off:e}, swing {swing:?}, drift {drift:e}, {tries} tries");
-        // 0.28 J go to and fro in the swing
+        // the swing exchanges 0.28 J
         assert!(arrived.is_some() && swing[1] - swing[0] > 1.0, "{integrator:?}: {arrived:?}, {swing:?}");
         assert!(
             off < 1e-9 && drift < 2e-4 && tries == 1,

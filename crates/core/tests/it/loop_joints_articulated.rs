@@ -1,5 +1,5 @@
 //! Loop joints between links of articulated bodies, and between links and rigid bodies: the same
-//! linkage cut open at different pins.
+//! linkage opened at different pins.
 
 use crate::common::*;
 use crate::loop_joints::{AXIS, FourBar, GROUND, LENGTHS, bar, hinge, pins};
@@ -13,8 +13,8 @@ fn turn(v: Vec3) -> f64 {
     v.z.atan2(v.x)
 }
 
-/// A chain of the bars named, each hung on the end of the one before it, that starts where the
-/// linkage does.
+/// Returns a chain of the named bars, each attached to the end of the previous one, in the
+/// linkage's initial configuration.
 fn chain(name: &str, bars: &[usize]) -> ArticulatedBody {
     let (a, b) = pins(CRANK);
     let angles = [turn(a), turn(b - a), turn(GROUND - b)];
@@ -39,7 +39,7 @@ struct Opened {
     loop_joints: Vec<ObjectId>,
 }
 
-/// All three bars in one chain, closed by a hinge at the ground.
+/// Returns all three bars as one chain, closed by a revolute joint at the ground.
 fn one_chain(stepper: &str) -> Opened {
     let mut world = world(stepper, 1.0 / RATE);
     let chain = world.add(chain("chain", &[0, 1, 2])).unwrap();
@@ -48,7 +48,7 @@ fn one_chain(stepper: &str) -> Opened {
     Opened { world, crank: (chain, 0), rocker: (chain, 2), loop_joints }
 }
 
-/// Crank and coupler in a chain, the rocker a rigid body.
+/// Returns crank and coupler as a chain, with the rocker as a rigid body.
 fn chain_and_body(stepper: &str) -> Opened {
     let mut world = world(stepper, 1.0 / RATE);
     let (_, b) = pins(CRANK);

@@ -1,8 +1,8 @@
-//! Bennett's linkage: four bars and four hinges in space that, by the count of degrees of freedom,
-//! should not move at all (6·3 − 5·4 = −2), and do.
+//! Bennett's linkage: four bars and four revolute joints in space. By the count of degrees of
+//! freedom (6·3 − 5·4 = −2) it should not move, but it does.
 //!
 //! Opposite bars are equal; lengths and twists are in proportion, `a/sin α = b/sin β`. Angles about
-//! neighboring hinges are then tied by `tan(θ₁/2)·tan(θ₂/2) = sin((β + α)/2)/sin((β − α)/2)`,
+//! neighboring joints are then related by `tan(θ₁/2)·tan(θ₂/2) = sin((β + α)/2)/sin((β − α)/2)`,
 //! opposite ones by `θ₃ = −θ₁`, `θ₄ = −θ₂` (Bennett 1903; Denavit–Hartenberg angles).
 
 use crate::common::*;
@@ -21,7 +21,8 @@ fn second_angle(first: f64) -> f64 {
     2.0 * ((0.5 * (BETA + ALPHA)).sin() / (0.5 * (BETA - ALPHA)).sin() / (0.5 * first).tan()).atan()
 }
 
-/// From a hinge's axes to those of the next: turned about z, along x, twisted about x.
+/// Returns the transform from a joint's axes to those of the next: rotated about z, translated
+/// along x, twisted about x.
 fn turned(angle: f64) -> Pose {
     Pose::rotation(Vec3::z() * angle)
 }
@@ -31,8 +32,8 @@ fn along(bar: usize) -> Pose {
     Pose::new(Vec3::x() * length, Vec3::x() * twist)
 }
 
-/// A bar lies along the x axis of its frame, from its hinge: its body frame is half-way, turned
-/// with it.
+/// Returns the center of a bar, which lies along the x axis of its joint's frame: half-way, with
+/// the same axes.
 fn center(bar: usize) -> Pose {
     Pose::translation(0.5 * sizes(bar).0, 0.0, 0.0)
 }
@@ -53,7 +54,7 @@ fn bennett(stepper: &str, first: f64) -> Bennett {
         frames.push(frame);
         frame *= along(bar);
     }
-    // the closed form closes
+    // the closed form closes the loop
     assert!((frame.to_homogeneous() - ground.to_homogeneous()).norm() < 1e-12);
     let bars = [0, 1, 2, 3].map(|bar| {
         let shape = Shape::cuboid(Vec3::new(sizes(bar).0, 0.02, 0.04)).unwrap();
@@ -82,7 +83,7 @@ fn bennett(stepper: &str, first: f64) -> Bennett {
 }
 
 impl Bennett {
-    /// Angle about a hinge, from the poses of the two bars alone.
+    /// Returns the angle about a joint, from the poses of the two bars only.
     fn angle(&self, bar: usize) -> f64 {
         let frame = |bar: usize| self.world.part_state(self.bars[bar], 0).unwrap().pose * center(bar).inverse();
         let before = (bar + 3) % 4;
@@ -105,7 +106,7 @@ fn bennetts_linkage_moves_as_its_closed_form_says() {
                 gap = PositionError { distance: gap.distance.max(now.distance), angle: gap.angle.max(now.angle) };
             }
             let angles = [0, 1, 2, 3].map(|bar| linkage.angle(bar));
-            // tan(θ/2) may be anything, its sine and cosine not
+            // tan(θ/2) is unbounded, sine and cosine are not
             let wrong = |one: f64, other: f64| (one - other).sin().abs();
             off = off
                 .max(wrong(angles[1], second_angle(angles[0])))

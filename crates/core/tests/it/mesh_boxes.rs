@@ -1,4 +1,5 @@
-//! Blocks that are meshes of twelve triangles, in the `surface` mode: they rest and stack as blocks do.
+//! Boxes that are meshes of twelve triangles, in the `surface` mode: they rest and stack like
+//! primitive boxes.
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Quat, Shape, TreeSettings, TriMesh, Vec3};
@@ -88,7 +89,7 @@ fn a_mesh_box_rests_on_another_however_it_lies() {
     }
 }
 
-/// A cylinder stands on a block and rolls along one, as on a plane.
+/// A cylinder stands on a mesh box and rolls along it, as on a plane.
 #[test]
 fn a_cylinder_stands_and_rolls_on_a_block() {
     for stepper in STEPPERS {
@@ -116,7 +117,7 @@ fn a_cylinder_stands_and_rolls_on_a_block() {
             let rolling = world.add(body.with_velocity(Vec3::x()).with_angular_velocity(Vec3::y() * 10.0)).unwrap();
             run(&mut world, 2.0);
             let part_state = world.part_state(standing, 0).unwrap();
-            // the solver leaves this tall body's contacts with a residual of some 1e-4 m/s
+            // the solver leaves a residual of about 1e-4 m/s in this tall body's contacts
             assert!(
                 (part_state.position() - Vec3::new(-2.0, 0.5, 0.3)).norm() < 2e-3,
                 "{stepper}: {:?}",

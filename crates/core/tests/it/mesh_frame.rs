@@ -21,7 +21,8 @@ fn off(a: &Vec3, b: &Vec3) -> f64 {
     (a - b).norm()
 }
 
-/// How far the farthest vertex of a part is from where the file's frame at `frame` would put it.
+/// Returns the largest distance of a vertex of a part from its place by the file's frame at
+/// `frame`.
 fn farthest(world: &World, id: ObjectId, part: usize, file: &[Vec3], frame: &Pose) -> f64 {
     let shape = world.object(id).unwrap().collidable().unwrap().shape(part).unwrap();
     let Shape::Mesh(mesh) = shape else { panic!("a mesh") };
@@ -55,8 +56,8 @@ fn a_body_is_placed_by_the_frame_of_its_file() {
     }
 }
 
-/// Spun about an axis through its center, the center stands still and the corner that the file
-/// calls the origin goes round; momentum holds.
+/// Spun about an axis through its center, the center stays in place and the corner at the file's
+/// origin circles it; momentum is conserved.
 #[test]
 fn it_spins_about_its_center_of_mass() {
     let (shape, file) = corner_cube();
@@ -75,7 +76,7 @@ fn it_spins_about_its_center_of_mass() {
         });
         assert!(off(&position(&world, id), &center) < 1e-12, "{stepper}");
         assert!((world.momentum().angular - before.angular).norm() < 1e-12, "{stepper}");
-        // a cube's inertia is a multiple of 1: it turns evenly about the axis of its spin
+        // a cube's inertia is a multiple of 1: it rotates evenly about the axis of its spin
         let turn = UnitQuaternion::from_scaled_axis(spin * world.time());
         let origin = center + turn * (turned().translation.vector - center);
         let frame = world.pose(id, 0).unwrap();
@@ -96,7 +97,7 @@ fn a_kinematic_body_brings_its_frame_to_the_target() {
     assert!(farthest(&world, id, 0, &file, &target) < 1e-12);
 }
 
-/// On a link the pose of a collider is that of the file's frame, too.
+/// On a link, too, the pose of a collider is that of the file's frame.
 #[test]
 fn a_mesh_on_a_link_keeps_its_frame() {
     let (shape, file) = corner_cube();
@@ -111,9 +112,9 @@ fn a_mesh_on_a_link_keeps_its_frame() {
     assert!(farthest(&world, id, part, &file, &turned()) < 1e-14);
 }
 
-/// Whether a camera on the body stands where the file's frame has it.
+/// A camera on the body is placed in the file's frame.
 #[test]
-fn what_a_body_carries_is_placed_in_its_frame() {
+fn mounts_of_a_body_are_placed_in_its_frame() {
     let (shape, _) = corner_cube();
     let body = RigidBody::new(shape).with_name("cube").with_mass(1.0).with_pose(turned());
     let at = Pose::translation(1.0, 0.0, 0.0);

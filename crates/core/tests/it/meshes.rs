@@ -13,17 +13,16 @@ fn folder() -> Option<PathBuf> {
     named.or_else(|| here.ancestors().map(|a| a.join("shared/meshes")).find(|p| p.is_dir()))
 }
 
-/// Below this a body rests in the `spheres` mode, m/s, at its furthest point. What carries a mesh
-/// changes from frame to frame among the spheres that are within a few micrometers of the plane,
-/// and a contact made or lost within a frame changes speeds by up to `g·h` = 41 mm/s: half of it is
-/// left to that.
+/// Speed of the fastest point of a resting body in the `spheres` mode, m/s. A mesh is supported by
+/// spheres within a few micrometers of the plane, which change from frame to frame. A contact made
+/// or lost within a frame changes speeds by up to `g·h` = 41 mm/s; half of that is allowed.
 const REST_ON_SPHERES: f64 = 0.5 * G / 240.0;
-/// The same in the `surface` mode: vertices carry it, and they stay.
+/// The same in the `surface` mode: vertices support it, and they do not change.
 const REST: f64 = 1e-4;
 
-/// Drops a mesh of 1000 kg/m³ over a half-space and runs: in the last second it is slower than
-/// `REST` everywhere on it and stays within 0.5 mm of where it was, and it never was deeper than
-/// the stated outward error of its tree.
+/// Drops a mesh of 1000 kg/m³ over a half-space and runs. In the last second every point of it is
+/// slower than `REST` and stays within 0.5 mm of its place, and it was never deeper than the stated
+/// outward error of its tree.
 fn comes_to_rest(name: &str, mesh: &TriMesh, turn: Vec3, height: f64, seconds: f64) {
     falls(ContactMode::Surface, REST, name, mesh, turn, height, seconds);
     falls(ContactMode::Spheres, REST_ON_SPHERES, name, mesh, turn, height, seconds);
@@ -81,10 +80,10 @@ fn falls(mode: ContactMode, rest: f64, name: &str, mesh: &TriMesh, turn: Vec3, h
 
 const ASKEW: Vec3 = Vec3::new(0.3, 0.2, 0.1);
 
-/// A public test mesh; `None`, and a word of it, where there is no folder.
+/// Returns a public test mesh; `None`, with a note, if there is no folder.
 fn public(file: &str) -> Option<TriMesh> {
     let Some(folder) = folder() else {
-        // past the harness, which keeps what passing tests print
+        // directly to the terminal: the harness hides the output of passing tests
         let _ = std::io::Write::write_fmt(
             &mut std::io::stderr(),
             format_args!(
@@ -106,8 +105,8 @@ fn the_bunny_comes_to_rest_on_a_plane() {
     }
 }
 
-/// Its base is flat except for a micrometer, and has many vertices: those that carry it must all be
-/// among the few contacts that are kept.
+/// Its base is flat to a micrometer, with many vertices: all supporting vertices must be among the
+/// few contacts that are kept.
 #[test]
 fn the_fandisk_comes_to_rest_on_a_plane() {
     if let Some(fandisk) = public("fandisk.obj") {

@@ -1,4 +1,4 @@
-//! Bodies that begin inside each other come apart, at a bounded speed, and stay apart.
+//! Bodies that begin inside each other are separated, at a bounded speed, and stay separated.
 
 use crate::common::*;
 use tumble_core::collide::{self, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3};
@@ -24,7 +24,7 @@ fn add(world: &mut World, name: &str, shape: &Shape, pose: Pose) -> ObjectId {
         .unwrap()
 }
 
-/// How deep two objects are in each other, meters, by their contacts.
+/// Returns the depth of two objects in each other, meters, from their contacts.
 fn depth(world: &World, shapes: [&Shape; 2], ids: [ObjectId; 2]) -> f64 {
     let [a, b] = ids.map(|id| world.part_state(id, 0).unwrap().pose);
     let mut found = Vec::new();
@@ -32,8 +32,8 @@ fn depth(world: &World, shapes: [&Shape; 2], ids: [ObjectId; 2]) -> f64 {
     found.iter().map(|c| -c.gap).fold(0.0, f64::max)
 }
 
-/// A pair floats for 2 s: apart at the end, by the referee too, and never faster than what is
-/// pushed out a second (3 m/s) allows.
+/// A pair floats for 2 s. At the end it is separated, also by an independent check, and it was
+/// never faster than the recovery speed (3 m/s) allows.
 fn come_apart(label: &str, [a, b]: [&Shape; 2], off: Pose, apart: impl Fn(&Pose, &Pose) -> bool) {
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, 1.0 / 240.0));
@@ -50,7 +50,8 @@ fn come_apart(label: &str, [a, b]: [&Shape; 2], off: Pose, apart: impl Fn(&Pose,
     }
 }
 
-/// No corner and no center of one unit cube is inside the other by more than a millimeter.
+/// Returns whether no corner and no center of one unit cube is inside the other by more than a
+/// millimeter.
 fn cubes_are_apart(a: &Pose, b: &Pose) -> bool {
     let inside = |from: &Pose, to: &Pose| {
         let steps = |n: i32| 0.1 * f64::from(n) - 0.5;
@@ -126,7 +127,7 @@ fn ten_cubes_of_meshes_that_overlap_stand_at_the_end() {
 }
 
 /// A kinematic cube moves down through a free one that lies on a third: the free cube is pushed out
-/// sideways and is not held inside.
+/// sideways and is not trapped.
 #[test]
 fn a_press_does_not_trap_a_cube() {
     for stepper in STEPPERS {
@@ -149,8 +150,8 @@ fn a_press_does_not_trap_a_cube() {
     }
 }
 
-/// Cubes, as meshes, are shot at a plate of 2 mm, a mesh too: at 500 m/s and 240 Hz they go two
-/// meters a step. None comes out on the other side.
+/// Cubes are shot at a plate of 2 mm; all are meshes. At 500 m/s and 240 Hz they move two meters
+/// per step. None comes out on the other side.
 #[test]
 fn fast_cubes_do_not_go_through_a_thin_plate() {
     let (cube, plate) = (mesh_cube(), mesh(TriMesh::cuboid(Vec3::new(6.0, 6.0, 2e-3))));

@@ -19,7 +19,7 @@ fn dropped(settings: Settings, ball: f64, floor: f64) -> (World, ObjectId, Objec
     (world, ball, floor)
 }
 
-/// Height of the first bounce, by the energy of the ball a little after it.
+/// Returns the height of the first bounce, from the energy of the ball shortly after it.
 fn rebound(world: &mut World, ball: ObjectId) -> f64 {
     let impact = (2.0 * HEIGHT / G).sqrt();
     while world.time() < impact + 0.01 {
@@ -29,7 +29,7 @@ fn rebound(world: &mut World, ball: ObjectId) -> f64 {
     z + v * v / (2.0 * G)
 }
 
-/// A ball that bounces on a floor of which nothing is said rises to e²h.
+/// A ball that bounces on a floor with default constants rises to e²h.
 #[test]
 fn a_ball_bounces_on_a_plain_floor() {
     let (mut world, ball, _) = dropped(Settings::default(), 0.5, Material::default().restitution);

@@ -1,10 +1,11 @@
-//! Contacts that no forces can satisfy: reported, bounded, never silent.
+//! Contacts that no forces can satisfy: bounded and always reported.
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Vec3};
 use tumble_core::*;
 
-/// A box between two kinematic jaws that close: no velocity answers both contacts, so pivoting ends on a ray.
+/// A box between two kinematic jaws that close: no velocity satisfies both contacts, so pivoting
+/// ends on a ray.
 #[test]
 fn a_squeezed_body_ends_on_a_ray_which_is_reported_and_survived() {
     for stepper in STEPPERS {
@@ -40,7 +41,8 @@ fn a_squeezed_body_ends_on_a_ray_which_is_reported_and_survived() {
     }
 }
 
-/// Painlevé's rod: pushed into the ground by its own friction. It must not gain energy and not sink, whatever the solver.
+/// Painlevé's rod is pushed into the ground by its own friction. It must not gain energy or sink,
+/// with any solver.
 #[test]
 fn painleves_rod_gains_no_energy_and_does_not_sink() {
     for stepper in STEPPERS {

@@ -1,4 +1,4 @@
-//! A hand that pulls: laws of the damped spring, whatever is pulled.
+//! Picking: laws of the damped spring, for any picked body.
 
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::{
@@ -58,10 +58,11 @@ fn a_body_hangs_at_rest_below_the_hand_by_g_over_omega_squared() {
     // held at a corner: it turns until the corner is straight above the middle
     let corner = Vec3::new(0.3, 0.2, 0.1);
     let pick = PickForce { id, part: 0, point: corner, target: Vec3::new(0.3, 0.2, 5.1), frequency: OMEGA };
-    // its swings die slowly: sideways the corner is light, and the spring in proportion
+    // its swings decay slowly: sideways the corner's effective mass is small, and the spring in
+    // proportion
     drag(&mut world, &pick, 150.0);
     let (point, middle) = (held(&world, &pick), world.part_state(id, 0).unwrap().position());
-    // the implicit step asks for (1 + ωh)² times that distance
+    // the implicit step requires (1 + ωh)² times that distance
     let sag = 9.81 / (OMEGA * OMEGA) * (1.0 + OMEGA / 240.0f64).powi(2);
     assert_near("sag", (pick.target - point).z, sag, 1e-6);
     assert_near("aside", (point - middle).xy().norm(), 0.0, 1e-4);
@@ -103,8 +104,8 @@ fn static_bodies_are_not_pulled_and_removed_ones_are_reported() {
 
 #[test]
 fn a_pendulum_swings_to_the_hand_in_the_plane_in_which_it_can() {
-    // hinged about y at the origin, the bob 0.5 m below; the hand is 30 degrees off the plane and
-    // farther out: the nearest direction in the plane wins
+    // a revolute joint about y at the origin, the bob 0.5 m below; the target is 30 degrees off the
+    // plane and farther out: the nearest direction in the plane is reached
     let mut world = world(0.0, 1.0 / 240.0);
     let mut builder = ModelBuilder::new();
     let bob =

@@ -1,4 +1,4 @@
-//! Faults of articulated bodies that were found and mended, each by the numbers that showed it.
+//! Regression tests of articulated bodies, each with the numbers that showed the fault.
 
 use crate::articulated_world::{chain, loose_chain, rod, world};
 use crate::common::no_gravity;
@@ -6,8 +6,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use tumble_core::collide::{Mat3, Pose, Shape, Vec3};
 use tumble_core::*;
 
-/// A floating chain of capsules that bounce and do not rub, whose links do not meet each other,
-/// moving anyhow.
+/// Returns a floating chain of elastic, frictionless capsules in arbitrary motion, whose links do
+/// not collide with each other.
 fn elastic_chain(links: usize) -> ArticulatedBody {
     let model = loose_chain(links, Vec3::zeros(), 0.0).model().clone();
     let velocities: Vec<f64> =
@@ -25,8 +25,8 @@ fn elastic_chain(links: usize) -> ArticulatedBody {
 
 #[test]
 fn a_chain_that_bounces_in_a_box_gains_no_energy() {
-    // the impact was given where the chain is at its moment, with the mass matrix of the middle of
-    // the step: 0.3 J became 55 J in 10 s
+    // the impact was applied in the configuration at its own time, with the mass matrix of the
+    // middle of the step: 0.3 J became 55 J in 10 s
     for links in [1, 2, 6] {
         let mut world = no_gravity(world(1.0 / 240.0, "time_stepping", Integrator::Verlet));
         let turns = [(0.0, 0.0), (PI, 0.0), (FRAC_PI_2, 0.0), (-FRAC_PI_2, 0.0), (0.0, FRAC_PI_2), (0.0, -FRAC_PI_2)];
@@ -84,7 +84,7 @@ fn a_link_is_kept_apart_from_the_base() {
 
 #[test]
 fn a_box_on_a_turning_kinematic_arm_stays_on_its_circle() {
-    // 1 rad/s at 0.6 m, held by friction: the carrier's centripetal acceleration was left out, and
+    // 1 rad/s at 0.6 m, held by friction: the support's centripetal acceleration was left out, and
     // the box crept out by 5 mm in 2 s
     let mut world = world(1.0 / 240.0, "backtracking", Integrator::Verlet);
     let mut builder = ModelBuilder::new();

@@ -1,4 +1,4 @@
-//! Past faults of constraint rows, refusals and failed steps.
+//! Regression tests of constraint rows, refusals and failed steps.
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Shape, Vec3};
@@ -53,9 +53,9 @@ fn bits(world: &World) -> Vec<u64> {
 
 #[test]
 fn a_velocity_motor_moves_by_velocity_times_time() {
-    // From rest the motor takes up to one frame to reach 1 m/s, in which 0 to h·v are covered: x =
-    // v·t less at most one frame's way; from frame to frame thereafter it is h·v exactly. The row's
-    // position error is 0: it holds no place.
+    // From rest the motor takes up to one frame to reach 1 m/s, in which it covers 0 to h·v: x =
+    // v·t less at most one frame's displacement. Thereafter each frame covers h·v exactly. The
+    // row's position error is 0: it prescribes no position.
     let h = 1.0 / 60.0;
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, h));
@@ -73,8 +73,8 @@ fn a_velocity_motor_moves_by_velocity_times_time() {
 
 #[test]
 fn a_motor_of_6_newtons_gives_its_impulse_whatever_bounces_elsewhere() {
-    // 6 N on 1 kg for 1/60 s: 0.1 m/s. The impacts of others are no time in which a force could act
-    // twice, or not at all.
+    // 6 N on 1 kg for 1/60 s: 0.1 m/s. During impacts of other bodies, the force must not act twice
+    // or be lost.
     for stepper in STEPPERS {
         for bounces in [false, true] {
             let mut world = no_gravity(world(stepper, 1.0 / 60.0));
@@ -118,9 +118,9 @@ fn a_row_with_nan_is_an_error_and_not_a_panic() {
 
 #[test]
 fn a_snapshot_with_a_hostile_counter_is_refused_and_objects_can_still_be_added() {
-    // Every byte but the magic is overwritten in turn by 0xffff_ffff as a variable-length number:
-    // whatever counter it hits, the outcome is an error that changes nothing or a world that still
-    // works (a counter at its end overflows when the next object is added).
+    // Every byte except the magic is overwritten in turn by 0xffff_ffff as a variable-length
+    // number. Whichever counter is hit, the outcome is an error that changes nothing, or a world
+    // that still works (a counter at its maximum overflows when the next object is added).
     let mut world = no_gravity(world("time_stepping", 1.0 / 60.0));
     unit_ball(&mut world, "ball", [0.0; 3], [0.0; 3]);
     let saved = world.save();
@@ -164,7 +164,7 @@ fn moving_to_a_pose_that_is_not_a_number_is_refused() {
 
 #[test]
 fn numbers_that_are_no_state_of_a_body_are_refused() {
-    // thirteen zeros hold a quaternion of length 0; three numbers are too few
+    // thirteen zeros contain a quaternion of length 0; three numbers are too few
     let mut world = no_gravity(world("time_stepping", 1.0 / 60.0));
     let ball = unit_ball(&mut world, "ball", [0.0; 3], [0.0; 3]);
     let before = bits(&world);
@@ -177,8 +177,8 @@ fn numbers_that_are_no_state_of_a_body_are_refused() {
 
 #[test]
 fn a_failed_step_leaves_time_state_and_contact_forces_as_they_were() {
-    // A resting ball is held by m·g; another's force overflows. Afterwards nothing of the failed
-    // frame may act: not the overflow, not the force that held the resting ball. Lifted to 5 m it
+    // A resting ball is supported by m·g; the force on another one overflows. Afterwards nothing of
+    // the failed frame may act: not the overflow, not the supporting force. Lifted to 5 m, the ball
     // falls freely: −g·h after one frame, and z = 5 − g·h²/2 (both steppers are exact on a
     // parabola).
     let h = 1.0 / 60.0;
@@ -226,8 +226,7 @@ fn a_failed_step_leaves_time_state_and_contact_forces_as_they_were() {
 
 #[test]
 fn a_failed_step_names_the_body_whose_force_overflowed() {
-    // 1e308 N is a number, 1e308 N / 1 g is none. The ball that rests 5 m away has nothing to do
-    // with it.
+    // 1e308 N is finite, 1e308 N / 1 g is not. The ball that rests 5 m away is not affected.
     for stepper in STEPPERS {
         let mut world = world(stepper, 1.0 / 60.0);
         ground(&mut world, 0.0, 0.5);
@@ -243,8 +242,8 @@ fn a_failed_step_names_the_body_whose_force_overflowed() {
 
 #[test]
 fn a_velocity_that_is_not_finite_is_no_state() {
-    // p = 1e308/60 N·s is a number, v = p/m = 1.7e309 m/s is none: the step fails, or its result
-    // can be read.
+    // p = 1e308/60 N·s is finite, v = p/m = 1.7e309 m/s is not: the step fails, or its result can
+    // be read.
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, 1.0 / 60.0));
         let light = world.add(RigidBody::new(sphere(0.1)).with_name("light").with_mass(1e-3)).unwrap();
@@ -260,7 +259,7 @@ fn a_velocity_that_is_not_finite_is_no_state() {
 
 #[test]
 fn a_limit_is_not_passed_between_two_looks_at_it() {
-    // x ≥ 0, from 50 mm at −10 m/s: 167 mm a frame. It stops at 0 and stays.
+    // x ≥ 0, from 50 mm at −10 m/s: 167 mm per frame. It stops at 0 and stays.
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, 1.0 / 60.0));
         let ball = unit_ball(&mut world, "ball", [0.05, 0.0, 0.0], [-10.0, 0.0, 0.0]);
@@ -315,8 +314,8 @@ struct Spun {
     speed: f64,
 }
 
-/// Two seconds of a rod of three different inertias that spins about its pinned end. No gravity and
-/// a pin that does not move: energy stays.
+/// Simulates two seconds of a rod with three different principal inertias that spins about its
+/// pinned end. There is no gravity and the pin is fixed, so energy is conserved.
 fn spin_pinned_rod(stepper: &str, dt: f64) -> Spun {
     let mut world = no_gravity(world(stepper, dt));
     let rod = RigidBody::new(Shape::cuboid(Vec3::new(1.0, 0.2, 0.4)).unwrap()).with_name("rod").with_mass(1.0);
@@ -343,16 +342,15 @@ fn spin_pinned_rod(stepper: &str, dt: f64) -> Spun {
 
 fn assert_pin_holds(stepper: &str) {
     let [coarse, middle, fine] = [240.0, 480.0, 960.0].map(|rate| spin_pinned_rod(stepper, 1.0 / rate));
-    // nothing does work: a thousandth in two seconds is far more than the 5e-5 that second order
-    // leaves at this step
+    // no work is done: a thousandth in two seconds is far more than the 5e-5 of a second-order
+    // method at this step
     assert!(coarse.energy < 1e-3, "{stepper}: energy off by {:e} at 1/240", coarse.energy);
     for spun in [&coarse, &middle, &fine] {
         // joints are closed to 1e-9 m and 1e-9 m/s along each axis
         assert!(spun.drift < 3f64.sqrt() * 1e-9, "{stepper}: drift {:e} m", spun.drift);
         assert!(spun.speed < 3f64.sqrt() * 1e-9, "{stepper}: the end moves at {:e} m/s", spun.speed);
     }
-    // second order: half the step, a quarter of the error (a tenth more for what is of higher
-    // order)
+    // second order: half the step, a quarter of the error (a tenth more for terms of higher order)
     for (a, b) in [(&coarse, &middle), (&middle, &fine)] {
         assert!(b.energy < 0.275 * a.energy, "{stepper}: energy {:e}, at half the step {:e}", a.energy, b.energy);
     }

@@ -34,8 +34,8 @@ fn stack(world: &mut World, name: &str, x: f64, n: usize) -> Vec<ObjectId> {
     (0..n).map(|i| world.add(body(i).with_pose(Pose::translation(x, 0.0, 0.25 + 0.5 * i as f64))).unwrap()).collect()
 }
 
-/// A stack on the ground, asleep.
-fn bed(stepper: &str) -> (World, Vec<ObjectId>) {
+/// Returns a sleeping stack on the ground.
+fn sleeping_stack(stepper: &str) -> (World, Vec<ObjectId>) {
     let mut world = sleepy(stepper);
     ground(&mut world, 0.0, 0.5);
     let ids = stack(&mut world, "box", 0.0, 3);
@@ -51,7 +51,7 @@ fn asleep(world: &World, ids: &[ObjectId]) -> usize {
 #[test]
 fn a_stack_falls_asleep_and_costs_nothing() {
     for stepper in STEPPERS {
-        let (mut world, _) = bed(stepper);
+        let (mut world, _) = sleeping_stack(stepper);
         let (state, energy) = (bits(&world), world.energy());
         assert!(
             energy.kinetic == 0.0 && (energy.potential - 10.0 * G * (0.25 + 0.75 + 1.25)).abs() < 1e-3,
@@ -63,8 +63,7 @@ fn a_stack_falls_asleep_and_costs_nothing() {
     }
 }
 
-/// In a world without gravity a ball at rest is asleep at exactly its state: a strike has the
-/// same result to the last bit.
+/// In a world without gravity a sleeping ball has exactly its state: a strike gives the same bits.
 #[test]
 fn a_strike_on_sleepers_is_the_same_bits_as_on_the_waking() {
     for stepper in STEPPERS {
@@ -117,10 +116,9 @@ fn only_the_island_that_is_struck_wakes() {
     }
 }
 
-/// Every action of a user or a neighbor on sleeping bodies wakes all of them in the frame in which
-/// it happens.
+/// Every action of a user or a neighbor on sleeping bodies wakes all of them in the same frame.
 #[test]
-fn whatever_is_done_to_a_sleeper_wakes_its_island() {
+fn every_action_on_a_sleeping_body_wakes_its_island() {
     type Deed = (&'static str, fn(&mut World, &[ObjectId]));
     let deeds: [Deed; 10] = [
         ("a force", |w, ids| w.apply_force(ids[2], 0, Vec3::x(), &Vec3::zeros()).unwrap()),
@@ -141,7 +139,7 @@ fn whatever_is_done_to_a_sleeper_wakes_its_island() {
     ];
     for stepper in STEPPERS {
         for (name, deed) in deeds {
-            let (mut world, ids) = bed(stepper);
+            let (mut world, ids) = sleeping_stack(stepper);
             deed(&mut world, &ids);
             run(&mut world, 1);
             assert_eq!(asleep(&world, &ids), 0, "{stepper}: {name}");
@@ -149,8 +147,8 @@ fn whatever_is_done_to_a_sleeper_wakes_its_island() {
     }
 }
 
-/// A lift at rest supports sleeping bodies; when it starts it carries them along. A kinematic
-/// pusher from afar wakes them.
+/// A lift at rest supports sleeping bodies, and carries them along when it starts. A kinematic
+/// pusher wakes them when it arrives.
 #[test]
 fn a_kinematic_body_wakes_bodies_that_it_carries_or_strikes() {
     for stepper in STEPPERS {
@@ -191,7 +189,8 @@ fn a_kinematic_body_wakes_bodies_that_it_carries_or_strikes() {
         let pusher = world.add_boxed(Box::new(pusher), Mode::Kinematic).unwrap();
         world.set_velocity(pusher, Vec3::new(2.0, 0.0, 0.0), Vec3::zeros()).unwrap();
         run(&mut world, 75);
-        // 2.5 m from -3 puts its face at -0.3; the cargo's was at -0.25: not yet. Then 0.3 m more.
+        // 2.5 m from -3 puts its face at -0.3, and the cargo's is at -0.25: no touch yet. Then 0.3
+        // m more.
         assert!(world.asleep(cargo), "{stepper}: woken without a touch");
         run(&mut world, 9);
         assert!(position(&world, cargo).x > 0.2, "{stepper}: the pusher went through: {}", position(&world, cargo));
@@ -219,8 +218,8 @@ impl ForceGenerator for Gust {
     }
 }
 
-/// A steady breeze lets them sleep; the gust of 2 s wakes them, and drives them as if they had
-/// never slept.
+/// Bodies sleep under a constant force. A change of the force after 2 s wakes them, and drives them
+/// as if they had never slept.
 #[test]
 fn a_force_that_changes_wakes_them_and_a_steady_one_does_not() {
     for stepper in STEPPERS {
@@ -238,7 +237,7 @@ fn a_force_that_changes_wakes_them_and_a_steady_one_does_not() {
         };
         let ((slept, x), (never, waking)) = (blown(Some(Sleep::default())), blown(None));
         assert!(slept && !never, "{stepper}");
-        // 80 N against μ·m·g = 49 N for a second; a gust that begins within a step may find the
+        // 80 N against μ·m·g = 49 N for a second; a step in which the force changes may use the
         // friction of its start for all of it: μ·g·h for a second
         assert!(
             (waking - 0.5 * (8.0 - 0.5 * G)).abs() < 1.2 * 0.5 * G * H && (x - waking).abs() < 1e-6,
@@ -247,9 +246,10 @@ fn a_force_that_changes_wakes_them_and_a_steady_one_does_not() {
     }
 }
 
-/// A pendulum at its turning points, and a ball that rolls at a millimeter a second, are not still.
+/// A pendulum at its turning points, and a ball that rolls at a millimeter per second, do not fall
+/// asleep.
 #[test]
-fn what_pauses_or_creeps_stays_awake() {
+fn pausing_and_creeping_bodies_stay_awake() {
     for stepper in STEPPERS {
         let mut world = sleepy(stepper);
         ground(&mut world, 0.0, 0.5);
@@ -275,7 +275,7 @@ fn what_pauses_or_creeps_stays_awake() {
     }
 }
 
-/// A chain hung from the world sleeps as one, and a pull at its end is felt by all.
+/// A chain that hangs from the world sleeps as one island, and a pull at its end wakes all of it.
 #[test]
 fn joints_hold_an_island_together() {
     let mut world = sleepy("time_stepping");
@@ -313,7 +313,7 @@ fn joints_hold_an_island_together() {
 #[test]
 fn saved_and_forked_sleepers_wake_to_the_same_bytes() {
     for stepper in STEPPERS {
-        let (mut world, ids) = bed(stepper);
+        let (mut world, ids) = sleeping_stack(stepper);
         let ball = RigidBody::new(sphere(0.2)).with_name("ball").with_mass(5.0);
         world.add(ball.with_pose(Pose::translation(-4.0, 0.1, 0.6)).with_velocity(Vec3::new(6.0, 0.0, 2.0))).unwrap();
         run(&mut world, 10);
@@ -330,7 +330,7 @@ fn saved_and_forked_sleepers_wake_to_the_same_bytes() {
     }
 }
 
-/// Adds a force that is not a number to a part of an object that is awake.
+/// Adds a NaN force to a part of an awake object.
 struct Fault(ObjectId);
 
 impl Object for Fault {
@@ -352,12 +352,11 @@ impl ForceGenerator for Fault {
     }
 }
 
-/// The ball wakes the stack within the frame that fails, so the frame is done a second time before
-/// it does.
+/// The ball wakes the stack within the failing frame, so the frame is repeated before it fails.
 #[test]
 fn a_step_that_fails_after_it_woke_sleepers_leaves_every_byte_as_it_was() {
     for stepper in STEPPERS {
-        let (mut world, ids) = bed(stepper);
+        let (mut world, ids) = sleeping_stack(stepper);
         let roller = RigidBody::new(sphere(0.2)).with_name("roller").with_mass(1.0);
         world.add(roller.with_pose(Pose::translation(0.0, 5.0, 0.2)).with_velocity(Vec3::x())).unwrap();
         let ball = RigidBody::new(sphere(0.2)).with_name("ball").with_mass(5.0);
@@ -396,7 +395,7 @@ fn a_step_that_fails_after_it_woke_sleepers_leaves_every_byte_as_it_was() {
 #[test]
 fn a_checkpoint_holds_sleep_and_is_refused_after_an_object_was_added() {
     for stepper in STEPPERS {
-        let (mut world, ids) = bed(stepper);
+        let (mut world, ids) = sleeping_stack(stepper);
         let (mut checkpoint, before) = (WorldState::default(), world.save());
         world.checkpoint(&mut checkpoint);
         for _ in 0..2 {

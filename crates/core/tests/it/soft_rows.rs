@@ -1,11 +1,12 @@
-//! Soft rows of constraints in a world: springs and drives that are solved with everything else.
+//! Soft rows of constraints in a world: springs and drives that are solved together with all other
+//! rows.
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Vec3};
 use tumble_core::rows::RowSet;
 use tumble_core::*;
 
-/// An implicit PD drive of a body's center along x, or any row that it is given.
+/// An implicit PD drive of a body's center along x, or any given row.
 #[derive(Clone)]
 struct Drive {
     body: ObjectId,
@@ -51,8 +52,8 @@ fn ball(world: &mut World, mass: f64, v: f64) -> ObjectId {
     world.add(ball.with_velocity(Vec3::new(v, 0.0, 0.0))).unwrap()
 }
 
-/// `m·(v⁺ − v) = h·(kp·(q* − q − h·v⁺) − kd·v⁺)`; time stepping asks for `q` in the middle of the
-/// step, where free motion has it.
+/// `m·(v⁺ − v) = h·(kp·(q* − q − h·v⁺) − kd·v⁺)`; `time_stepping` evaluates `q` in the middle of
+/// the step, after free motion.
 #[test]
 fn a_drive_gives_the_velocity_found_by_hand() {
     let (h, m, v, place) = (0.01, 2.0, 0.5, 0.3);
@@ -75,7 +76,7 @@ fn a_drive_gives_the_velocity_found_by_hand() {
     }
 }
 
-/// Under its weight a spring gives by `m·g/k`: it is in no way pulled to its place as a joint would
+/// Under its weight a spring extends by `m·g/k`: it is not corrected in position as a joint would
 /// be.
 #[test]
 fn a_soft_equality_is_a_spring_and_no_joint() {
@@ -93,7 +94,7 @@ fn a_soft_equality_is_a_spring_and_no_joint() {
     }
 }
 
-/// An impact takes no time, in which a spring does nothing: two balls of one mass change their
+/// An impact takes no time, so a spring has no effect in it: two balls of equal mass exchange their
 /// velocities.
 #[test]
 fn a_spring_takes_no_part_in_an_impact() {
@@ -110,7 +111,7 @@ fn a_spring_takes_no_part_in_an_impact() {
         };
         let held = world.add(at("held", 0.0, 0.0)).unwrap();
         let comes = world.add(at("comes", -0.201, 1.0)).unwrap();
-        // 1e-6 N·s/m: next to nothing in a step, and everything if the row were rigid
+        // 1e-6 N·s/m: negligible in a step, but decisive if the row were rigid
         world.add(Drive { body: held, set: RowSet::Equality, stiffness: 0.0, damping: 1e-6, place: 0.0, h }).unwrap();
         world.step().unwrap();
         let (a, b) = (velocity(&world, held).x, velocity(&world, comes).x);

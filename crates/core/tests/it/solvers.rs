@@ -1,4 +1,5 @@
-//! Every solver in the same worlds: friction that does not lift, stops where it should, and agreement where there is no friction.
+//! Every solver in the same worlds: friction does not lift, bodies stop at the right place, and
+//! solvers agree without friction.
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Vec3};
@@ -90,7 +91,7 @@ fn pile(stepper: &str) -> World {
     world
 }
 
-/// Without friction the problem is convex: the velocities after a step are unique, whatever the solver.
+/// Without friction the problem is convex: the velocities after a step are unique for all solvers.
 #[test]
 fn pivoting_and_gauss_seidel_agree_on_a_frictionless_pile() {
     for stepper in STEPPERS {

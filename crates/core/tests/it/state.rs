@@ -1,4 +1,4 @@
-//! Saving, forking, removing, switching: what changes with time lives in the world.
+//! Saving, forking, removing, disabling: all changing data are in the world.
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Vec3};
@@ -98,7 +98,8 @@ fn objects_come_and_go_in_mid_run() {
 fn bodies_that_came_and_went_leave_no_trace_in_a_fork() {
     for stepper in STEPPERS {
         let mut world = messy(stepper);
-        // what the broad phase remembers is of bodies that are gone, switched off or elsewhere; a fork and a restored world begin without
+        // the broad phase has cached bodies that are now removed, disabled or elsewhere; forks and
+        // restored worlds begin without its cache
         let mut copies: Vec<World> = Vec::new();
         let mut contacts = 0;
         for frame in 0..60 {
@@ -226,7 +227,8 @@ fn kinds_that_do_not_meet_pass_through_each_other() {
         add("b", 2.0, -1.0, solid, u64::MAX),
     ];
     run(&mut world, 180);
-    // b meets the ghost at t = 1 s, x = 1 and stops; the ghost flies off at -1 m/s through a; a meets b at t = 2 s, x = 0 and stops.
+    // b collides with the ghost at t = 1 s, x = 1 and stops; the ghost flies off at -1 m/s through
+    // a; a collides with b at t = 2 s, x = 0 and stops.
     let x: Vec<f64> = ids.iter().map(|id| position(&world, *id).x).collect();
     assert!(x.iter().zip([0.0, -2.0, 2.0]).all(|(x, e)| (x - e).abs() < 1e-9), "{x:?}");
     assert!(CollisionGroup::new(64).is_none());

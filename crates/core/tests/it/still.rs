@@ -5,7 +5,7 @@ use crate::common::*;
 use tumble_core::collide::{Pose, Shape, TreeSettings, TriMesh, Vec3};
 use tumble_core::*;
 
-/// A cylinder on a block: its rim has nearly redundant contacts.
+/// A cylinder on a box: its rim has nearly redundant contacts.
 #[test]
 fn a_standing_cylinder_does_not_creep() {
     for stepper in STEPPERS {
@@ -36,8 +36,8 @@ fn a_standing_cylinder_does_not_creep() {
     }
 }
 
-/// Two mesh balls of 0.1 m that fly at each other at 50 m/s each, 0.8 m a step, `beside` each
-/// other; A and B.
+/// Returns two mesh spheres of 0.1 m, A and B, that fly at each other at 50 m/s each, 0.8 m per
+/// step, offset by `beside`.
 fn fly(beside: f64) -> (World, [ObjectId; 2]) {
     let mut world = no_gravity(world("time_stepping", 1.0 / 60.0));
     let shape = Shape::mesh(TriMesh::icosphere(0.1, 2), &TreeSettings::octree()).unwrap();
@@ -51,8 +51,8 @@ fn fly(beside: f64) -> (World, [ObjectId; 2]) {
     (world, ids)
 }
 
-/// No frictionless elastic impact takes momentum or energy, and no ball goes through another: they
-/// are followed to where they meet.
+/// No frictionless elastic impact loses momentum or energy, and no ball passes through another:
+/// they are followed to the time of contact.
 #[test]
 fn meshes_that_fly_at_each_other_bounce() {
     let (mut world, [a, b]) = fly(0.03);
@@ -71,7 +71,7 @@ fn meshes_that_fly_at_each_other_bounce() {
     assert!((world.energy().kinetic / 2500.0 - 1.0).abs() < 1e-9, "energy {} J", world.energy().kinetic);
 }
 
-/// 0.22 m apart they miss, and neither feels anything of it.
+/// 0.22 m apart they miss, and neither is affected.
 #[test]
 fn meshes_that_fly_past_each_other_are_left_alone() {
     let (mut world, [a, b]) = fly(0.22);

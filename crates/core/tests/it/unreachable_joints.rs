@@ -13,7 +13,7 @@ struct ReachMechanism {
     hand: ObjectId,
     loop_joint: ObjectId,
     links: usize,
-    /// The last report of it.
+    /// The last report of this joint.
     reported: Option<UnreachableJoint>,
 }
 
@@ -51,7 +51,7 @@ impl ReachMechanism {
         self.world.get::<LoopJoint>(self.loop_joint).unwrap().position_error(&self.world.view()).unwrap().distance
     }
 
-    /// Fastest joint, rad/s.
+    /// Returns the speed of the fastest joint, rad/s.
     fn fastest(&self) -> f64 {
         self.world.state_of(self.chain).unwrap()[self.links..].iter().fold(0.0, |a: f64, v| a.max(v.abs()))
     }
@@ -78,10 +78,10 @@ fn lag(hand: &Vec3, reach: f64) -> f64 {
 
 #[test]
 fn a_chain_whose_hand_goes_out_of_reach_follows_it_straight_and_closes_again() {
-    // it was flung about at 1e10 rad/s, stayed folded where that left it, and nothing was said
+    // before the fix, the chain turned at 1e10 rad/s, stayed folded, and nothing was reported
     let speed = 0.5;
-    // the last bend of two links, L·θ²/4 = v·h, is gone in one step; of more, that many times as
-    // fast
+    // the last bend of two links of length ℓ, ℓ·θ²/4 = v·h, disappears in one step; with more
+    // links, proportionally faster
     let crossing = |links: usize| links as f64 * (4.0 * speed * 240.0 / LENGTH).sqrt();
     for stepper in STEPPERS {
         for links in [2, 5] {
@@ -103,8 +103,8 @@ fn a_chain_whose_hand_goes_out_of_reach_follows_it_straight_and_closes_again() {
                     position_error - expected,
                     mechanism.position_error()
                 );
-                // across the plane nothing is in reach from the start: there the chain is still
-                // coming to lie straight
+                // across the plane the hand is out of reach from the start: the chain is still
+                // straightening
                 let straight = if along.y == 0.0 { 4.0 * speed / LENGTH } else { crossing(links) };
                 assert!(
                     across < crossing(links) && back < crossing(links) && out < straight,
