@@ -97,7 +97,7 @@ fn random_damage_never_panics() {
     }
 }
 
-/// With the checksums out of the way, damage reaches the parsers behind them.
+/// With all checksums disabled, damage reaches the parsers behind them.
 #[test]
 fn damage_behind_the_checksums_never_panics() {
     let scratch = Scratch::new("behind");
@@ -122,7 +122,7 @@ fn damage_behind_the_checksums_never_panics() {
             mended += 1;
         }
     }
-    // Much of a file is schema text and numbers, where a change is no fault in itself.
+    // much of a file is schema text and numbers, in which a change is no error
     assert!(refused > 1000 && mended > 100, "{refused} refused, {mended} mended");
 }
 

@@ -1,4 +1,5 @@
-//! Files made to hurt. Built by hand from the MCAP specification, so that no writer's checks stand in between.
+//! Hostile recordings, built by hand from the MCAP specification, because the writer would refuse
+//! them.
 
 use crate::support::*;
 use tumble_net::record::*;
@@ -60,7 +61,7 @@ fn lengths_are_not_believed() {
         (chunk(1 << 28, "", b"x"), "should hold 268435456 bytes and holds 1"),
         (chunk(5, "brotli", b"x"), "compression \"brotli\""),
         (whole(6, &[0; 20]), "chunk size takes 8 bytes, but 4 are left"),
-        // A record in a chunk that would reach beyond it.
+        // a record in a chunk that would extend beyond it
         (chunk(9, "", &raw(5, 1, b"")), "record in the chunk takes 1 bytes, but 0 are left"),
         (chunk(9, "", &raw(5, u64::MAX, b"")), "takes 18446744073709551615 bytes"),
         (chunk(4, "", b"\x05abc"), "record length in the chunk takes 8 bytes, but 3 are left"),
@@ -74,7 +75,8 @@ fn lengths_are_not_believed() {
     }
 }
 
-/// 64 MiB of zeros in a few kilobytes, said to be ten bytes: decompression stops at the eleventh.
+/// 64 MiB of zeros in a few kilobytes, with a stated size of ten bytes: decompression stops at the
+/// eleventh.
 #[test]
 fn a_bomb_does_not_go_off() {
     let scratch = Scratch::new("bomb");
@@ -97,7 +99,8 @@ fn on_topic(topic: &str, schema: &str, message: &[u8]) -> Vec<u8> {
     [whole(3, &schema), whole(4, &channel), whole(5, &message)].concat()
 }
 
-/// Empty submessages take two bytes on the wire, hundreds in memory, and next to nothing when compressed.
+/// Empty submessages take two bytes on the wire, hundreds in memory, and almost none when
+/// compressed.
 #[test]
 fn messages_that_swell_are_refused_before_they_are_decoded() {
     let scratch = Scratch::new("swell");
@@ -143,7 +146,7 @@ fn other_files_are_recognized() {
         let error = read(&path).err().unwrap().to_string();
         assert!(error.contains(wanted) && error.contains("a.mcap"), "{error}");
     }
-    // A good MCAP file of somebody else's.
+    // a valid MCAP file of another program
     let mut writer = mcap::Writer::new(std::fs::File::create(&path).unwrap()).unwrap();
     writer.add_channel(0, "/chat", "json", &Default::default()).unwrap();
     writer.finish().unwrap();

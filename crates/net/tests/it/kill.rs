@@ -1,4 +1,4 @@
-//! A run killed without warning, or out of room, leaves everything it had flushed.
+//! A run that is killed, or that runs out of disk space, leaves all flushed frames.
 
 use crate::support::*;
 use std::io::{BufRead, BufReader};
@@ -8,7 +8,8 @@ use tumble_net::record::*;
 const TARGET: &str = "TUMBLE_NET_TEST_RECORD_TO";
 const FLUSH: u64 = 7;
 
-/// The victim, run by the test below in a process of its own: records and says after every frame what is safe.
+/// The process that the test below kills: records, and reports after every frame how many frames
+/// are flushed.
 #[test]
 #[ignore = "run by a_killed_run_keeps_what_was_flushed"]
 fn child_records_until_killed() {
@@ -53,7 +54,7 @@ fn a_killed_run_keeps_what_was_flushed() {
     }
 }
 
-/// Run by the test below in a process that may write no more than some kilobytes to a file.
+/// Runs in a process whose files are limited to some kilobytes by the test below.
 #[test]
 #[ignore = "run by a_disk_that_fills_up_in_mid_run_loses_nothing_flushed"]
 fn child_records_until_refused() {
@@ -62,7 +63,7 @@ fn child_records_until_refused() {
     let refused = (0..10_000).find_map(|k| Some((k, recorder.frame(time(k), k, &poses(k), &state(k)).err()?)));
     let (k, error) = refused.expect("there was room for 10,000 frames");
     assert!(error.to_string().contains("cannot write: File too large"), "{error}");
-    // Going on fails again, when the next flush is due at the latest, and does not panic.
+    // further frames fail again, at the next flush at the latest, and do not panic
     let is_later: Vec<bool> =
         (k + 1..k + 8).map(|k| recorder.frame(time(k), k, &poses(k), &state(k)).is_ok()).collect();
     assert!(!is_later[6], "{is_later:?}");
@@ -75,7 +76,7 @@ fn child_records_until_refused() {
 fn a_disk_that_fills_up_in_mid_run_loses_nothing_flushed() {
     let scratch = Scratch::new("full");
     let path = scratch.file("full.mcap");
-    // Without the trap the limit would kill; with it, writing fails as on a full disk.
+    // without the trap the limit would kill the process; with it, writing fails as on a full disk
     let output = Command::new("sh")
         .args(["-c", "trap '' XFSZ; ulimit -f 100; exec \"$0\" \"$@\""])
         .arg(std::env::current_exe().unwrap())

@@ -1,9 +1,9 @@
-//! A little world with closed forms, and a folder that goes away.
+//! A small world with closed forms, and a temporary folder.
 
 use std::path::{Path, PathBuf};
 use tumble_net::record::*;
 
-/// A folder of this test's own, removed at the end.
+/// A folder for one test, removed at the end.
 pub struct Scratch(PathBuf);
 
 impl Scratch {
@@ -32,7 +32,7 @@ pub fn part(shape: Shape) -> VisualPart {
     VisualPart { shape, pose: Pose::IDENTITY, color: [0.25, 0.5, 0.75, 1.0] }
 }
 
-/// A ball that is thrown, a box that turns, ground that rests.
+/// A ball that is thrown, a box that rotates, a static ground.
 pub fn entities() -> Vec<Entity> {
     vec![
         Entity { name: "ball".into(), parts: vec![part(Shape::Sphere { radius: 0.125 })] },
@@ -64,7 +64,8 @@ pub fn options(compression: Compression, frames: u32) -> RecorderOptions {
     RecorderOptions { flush_every: FlushEvery::Frames(frames), compression, ..Default::default() }
 }
 
-/// Records frames `0..count` and returns the file's length after each frame (what a kill there leaves), frame 0 first.
+/// Records frames `0..count` and returns the file's length after each frame, frame 0 first: what a
+/// kill at that time leaves.
 pub fn record(path: &Path, count: u64, options: RecorderOptions) -> Vec<u64> {
     let mut recorder = Recorder::create(path, WORLD, &entities(), options).unwrap();
     let mut lengths = Vec::new();

@@ -14,7 +14,8 @@ fn stamped(image: &tumble::render::Image) -> u64 {
     })
 }
 
-/// Five processes, lockstep: each facet shows each frame once and in order, of the same states, and the pictures are those of the frames they name.
+/// Five processes in lockstep: each facet shows each frame once and in order, with the same states,
+/// and the pictures are those of the frames that they name.
 fn all_facets_show_the_same_frames(test: &str, frames: u64) {
     let place = Place::new(test, &cube());
     let seconds = (frames as f64 * 0.01).to_string();
@@ -67,7 +68,7 @@ fn all_facets_show_the_same_frames(test: &str, frames: u64) {
         }
         assert_eq!(facet["presented"], frames + 1);
     }
-    // the same picture as without any of this, below the stamp
+    // the same picture as without a cave, below the stamp
     let alone = place.path("alone.png");
     succeed(&[
         "run",
@@ -88,7 +89,7 @@ fn all_facets_show_the_same_frames(test: &str, frames: u64) {
             .unwrap();
     let below = 4 * 80 * 24;
     let worst = alone.rgba[below..].iter().zip(&ours.rgba[below..]).map(|(a, b)| a.abs_diff(*b)).max();
-    // poses travel in steps of 1/65536 m
+    // poses are sent in steps of 1/65536 m
     let differing = alone.rgba[below..].iter().zip(&ours.rgba[below..]).filter(|(a, b)| a.abs_diff(**b) > 2).count();
     assert!(differing < 60, "{differing} of {} values differ, at most by {worst:?}", ours.rgba.len() - below);
     place.assert_clean();
@@ -165,7 +166,7 @@ fn a_run_that_goes_on_is_refused_by_name_or_replaced() {
     for word in [format!("process {}", first.pid()), place.scene.clone(), "since 20".into(), "--replace".into()] {
         assert!(wrong.contains(&word), "'{word}' is not said: {wrong}");
     }
-    // another cave is another matter
+    // another cave has another lock
     let elsewhere = place.folder.write("elsewhere.toml", wall());
     let mut other =
         command(&["cave", &place.scene, "--cave", &elsewhere, "--no-pictures", "--duration", "0.1", "--quiet"]);
@@ -205,7 +206,7 @@ fn facets_that_are_missing_at_the_start_are_named() {
     let (code, _, wrong) = place.start("facet", &["--facet", "l", "--no-pictures", "--connect-timeout", "0.3"]).end();
     assert_eq!(code, Some(1), "{wrong}");
     assert!(wrong.contains("no run was in progress"), "{wrong}");
-    // a facet that cannot start ends the start, not the patience
+    // a facet that cannot start ends the start before the timeout
     let (code, _, wrong) = place.start("cave", &["--frames-dir", "/proc/nowhere", "--no-pictures"]).end();
     assert_eq!(code, Some(2), "{wrong}");
     let (code, _, wrong) = place.start("cave", &["--log-dir", "/proc/nowhere", "--no-pictures"]).end();
@@ -228,7 +229,7 @@ fn an_environment_brings_lights_camera_and_what_stands_still() {
     );
     assert!(wrong.contains("1 objects that move are left out"), "{wrong}");
     assert_eq!(place.log("with", "l").len(), 21);
-    // one body that stands in the way of the other: names meet
+    // two bodies with the same name: the names clash
     let clash = place.folder.write("clash.toml", hall.replace("column", "ball"));
     let (code, _, wrong) = place.start("cave", &["--environment", &clash]).end();
     assert_eq!(code, Some(2), "{wrong}");

@@ -1,5 +1,5 @@
-//! A tracker moves users: real datagrams, written here byte by byte as the format's specification has them (Open Sound Control 1.0). And what users did in a
-//! recorded run, done again.
+//! A tracker moves users: real datagrams, built byte by byte from the specification (Open Sound
+//! Control 1.0). Also replays of recorded user input.
 
 use crate::cave_place::in_place;
 use crate::cave_users::{SCENE, Server, one_screen, place};
@@ -12,7 +12,7 @@ use tumble::net::sync::SessionReader;
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A text, ended by a zero and filled up with more to a multiple of four bytes.
+/// Returns a text, ended by a zero and padded with zeros to a multiple of four bytes.
 fn padded(text: &str) -> Vec<u8> {
     let mut bytes = text.as_bytes().to_vec();
     bytes.resize(text.len() / 4 * 4 + 4, 0);
@@ -30,7 +30,7 @@ fn ints(address: &str, numbers: &[i32]) -> Vec<u8> {
     [padded(address), padded(&tags), numbers.iter().flat_map(|x| x.to_be_bytes()).collect()].concat()
 }
 
-/// Messages that belong together.
+/// Returns a bundle of messages.
 fn bundle(messages: &[Vec<u8>]) -> Vec<u8> {
     let element = |m: &Vec<u8>| [&(m.len() as u32).to_be_bytes()[..], m].concat();
     [padded("#bundle"), vec![0, 0, 0, 0, 0, 0, 0, 1], messages.iter().flat_map(element).collect()].concat()
@@ -42,7 +42,7 @@ struct Sender {
 }
 
 impl Sender {
-    /// To a port that is free now.
+    /// Makes a sender to a port that is free now.
     fn new() -> Sender {
         let free = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
         Sender { socket: UdpSocket::bind("127.0.0.1:0").unwrap(), to: free }
@@ -69,12 +69,14 @@ fn a_tracker_moves_heads_and_hands_and_what_is_wrong_is_counted() {
         let world = server.facet.world();
         world.part_state(world.find(&format!("user 0 {side} hand")).unwrap(), 0).unwrap().position()
     };
-    // a quarter turn to the left about z, half a meter to the right; both hands beside the ball, in one bundle
+    // a quarter turn to the left about z, half a meter to the right; both hands beside the ball, in
+    // one bundle
     let half = std::f32::consts::FRAC_1_SQRT_2;
     let head = floats("/tumble/user/u/head", &[0.5, 0.25, 1.75, 0.0, 0.0, half, half]);
     let left = floats("/tumble/user/u/hand/left", &[-0.25, 1.5, 1.0, 0.0, 0.0, 0.0, 1.0]);
     let near = |a: Vec3, x: f64, y: f64, z: f64| (a - Vec3::new(x, y, z)).norm() < 1e-4;
-    // the other one hangs within the body: 0.15 m to the user's right, which is y now, and 0.7 m below the eyes; poses travel in steps of 1/65536 m
+    // the other hand is inside the body: 0.15 m to the user's right, which is now y, and 0.7 m
+    // below the eyes; poses are sent in steps of 1/65536 m
     let both = bundle(&[head, left]);
     server.show_while(
         "the hand",
@@ -83,10 +85,11 @@ fn a_tracker_moves_heads_and_hands_and_what_is_wrong_is_counted() {
     );
     let viewer = server.facet.viewer();
     assert_eq!(viewer.users[0].head.translation.vector, Vec3::new(0.5, 0.25, 1.75));
-    // ahead was y, and is −x now
+    // forward was y, and is now −x
     assert!((viewer.users[0].head.rotation * Vec3::y() + Vec3::x()).norm() < 1e-6);
     assert_eq!(server.ball(), Vec3::new(0.0, 2.0, 1.0));
-    // a hand of 6 cm goes through where the ball of 20 cm was: it is pushed to at least 26 cm from the hand
+    // a hand of 6 cm passes through the former place of the ball of 20 cm, which is pushed to at
+    // least 26 cm from the hand
     let before = server.facet.viewer().users[0].input;
     for step in 1..=40 {
         let y = 1.5 + 0.0125 * f64::from(step);
@@ -99,7 +102,7 @@ fn a_tracker_moves_heads_and_hands_and_what_is_wrong_is_counted() {
         "the ball is at {ball:?}, the hand at {left:?}"
     );
     assert!(server.facet.viewer().users[0].input > before);
-    // one of each that is wrong
+    // one of each kind of invalid message
     let unit = [0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 1.0];
     let with = |k: usize, x: f32| {
         let mut numbers = unit;
@@ -128,7 +131,7 @@ fn a_tracker_moves_heads_and_hands_and_what_is_wrong_is_counted() {
         with(1, 3.5),                         // behind the screen: taken, and not followed
     ];
     wrong.iter().for_each(|bytes| sender.send(bytes));
-    // heard in order: what is good comes last
+    // datagrams are read in order: the valid one comes last
     let last = floats("/tumble/user/u/wand", &unit);
     let seen = server.facet.viewer().users[0].input;
     sender.send(&last);
@@ -182,7 +185,7 @@ fn the_picture_follows_the_tracked_eye() {
         let text = std::fs::read_to_string(folder.path(name).join("f").join("frames.jsonl")).unwrap_or_default();
         text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
     };
-    // what is seen from there by the cave file
+    // the same view by the cave file
     let moved = folder.write("moved.toml", one_screen().replace("eye_m = [0, 0, 1.5]", "eye_m = [0.5, -0.25, 1.25]"));
     let args = |cave: &str, log: &str| {
         ["cave", &scene, "--cave", cave, "--offscreen", "--quiet", "--log-dir", &text(&folder.path(log))]
@@ -194,7 +197,7 @@ fn the_picture_follows_the_tracked_eye() {
     }
     let (before, after) = (lines("before")[0]["image"].clone(), lines("after")[0]["image"].clone());
     assert_ne!(before, after);
-    // and by the tracker, in a space with y up: [x, z up, −y ahead]
+    // and by the tracker, in a space with y up: [x, z up, −y forward]
     let tracked =
         folder.write("tracked.toml", format!("{}[tracker]\nusers = [\"glasses\"]\naxes = \"y_up\"\n", one_screen()));
     let sender = Sender::new();
@@ -274,17 +277,17 @@ fn what_users_did_is_done_again_bit_by_bit() {
     assert!(first.len() > 150);
     assert_eq!((&counts["same"], &counts["different"]), (&first.len().into(), &0.into()));
     assert_eq!(counts["inputs"], first.iter().map(|(_, _, inputs)| inputs.len()).sum::<usize>());
-    // also the recordings are the same, except what came when the first run had ended
+    // the recordings are the same too, except input that came after the end of the first run
     let both = first.len() - 1;
     assert!(first[..both] == second[..both] && second.len() == first.len());
-    // with another number of bodies it comes out otherwise, which is a failure
+    // with another number of bodies the result differs, which is a failure
     let (counts, code, wrong) = again("third", &[]);
     assert_eq!((&counts["first_different"], code), (&0.into(), Some(1)), "{counts}");
     assert!(
         wrong.contains(&format!("{} of {} frames differ from the recording", counts["different"], first.len())),
         "{wrong}"
     );
-    // another step is another matter
+    // another step length is refused
     let out = in_place(
         &folder,
         &[

@@ -1,4 +1,5 @@
-//! A cave on a desktop: an X server of the test's own (Xvfb), a window per facet where the cave says.
+//! A cave on a desktop: an X server for the test (Xvfb), and a window per facet at the place in the
+//! cave file.
 
 use crate::cave_place::{ROOM, cave_of, in_place, make_runtime, wait};
 use crate::common::{Folder, json, text};
@@ -8,7 +9,7 @@ use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{AtomEnum, ClientMessageEvent, ConnectionExt, EventMask, MapState};
 use x11rb::rust_connection::RustConnection;
 
-/// A ball that turns without end.
+/// A ball that rotates forever.
 const SCENE: &str = "description = \"A ball that turns\"
 [world]
 dt_s = 0.02
@@ -34,7 +35,7 @@ fn cave() -> String {
     cave_of(&ROOM, place, "ready_timeout_ms = 2000\ndrop_timeout_ms = 4000\nconnect_timeout_ms = 90000")
 }
 
-/// Title, number, and place of every window that is shown and has a title.
+/// Returns title, id, position and size of every visible window with a title.
 fn windows(server: &RustConnection, root: u32) -> Vec<(String, u32, [i16; 2], [u16; 2])> {
     let children = server.query_tree(root).unwrap().reply().unwrap().children;
     let one = |window: u32| {
@@ -97,7 +98,7 @@ fn four_windows_open_where_the_cave_says_and_the_others_go_on_when_one_is_closed
         lines.map(|line| line["frame"].as_u64().unwrap()).collect()
     };
     wait("some frames", || ["front", "left", "right", "floor"].iter().all(|facet| frames(facet).len() > 3));
-    // the cross of one window: that facet leaves, the others go on
+    // closing one window ends that facet; the others go on
     let close = |facet: &str| {
         let window =
             windows(&server, root).into_iter().find(|(title, ..)| title.ends_with(&format!(" on {facet}"))).unwrap().1;
@@ -112,7 +113,7 @@ fn four_windows_open_where_the_cave_says_and_the_others_go_on_when_one_is_closed
     let (at, left) = (*frames("front").last().unwrap(), frames("right").len());
     wait("more frames", || frames("front").last().is_some_and(|frame| *frame > at + 5));
     assert_eq!(frames("right").len(), left, "the closed window goes on");
-    // all closed: that is the end, and no failure
+    // closing all windows ends the run, without a failure
     ["front", "left", "floor"].into_iter().for_each(close);
     wait("the end", || run.0.try_wait().unwrap().is_some());
     assert_eq!(run.0.wait().unwrap().code(), Some(0), "{}", std::fs::read_to_string(folder.path("stderr")).unwrap());
@@ -135,7 +136,7 @@ fn a_desktop_that_does_not_answer_is_said_and_drawn_for_in_memory() {
     make_runtime(&folder);
     let (scene, cave) = (folder.write("scene.toml", SCENE), folder.write("cave.toml", cave()));
     let args = ["cave", &scene, "--cave", &cave, "--duration", "0.04", "--no-realtime", "--quality", "fastest"];
-    // one that nobody has here, and one that there cannot be
+    // a display that does not exist here, and one that cannot exist
     for display in [":4711", ":59999"] {
         let out = in_place(&folder, &args).env("DISPLAY", display).output().unwrap();
         let wrong = String::from_utf8_lossy(&out.stderr);

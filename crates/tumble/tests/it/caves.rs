@@ -7,10 +7,10 @@ fn small() -> String {
     cave("size_px = [80, 60]")
 }
 
-/// Whether there is an adapter; without one the test prints that it is skipped.
+/// Returns whether there is an adapter; without one the test prints that it is skipped.
 fn pictured(said: &str) -> bool {
     if said.contains("no picture:") {
-        // past the harness, which keeps what passing tests print
+        // directly to the terminal: the harness hides the output of passing tests
         let _ = std::io::Write::write_fmt(
             &mut std::io::stderr(),
             format_args!("\nSKIPPED: this machine has no graphics adapter; {said}\n"),

@@ -7,7 +7,7 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Longest wait.
+/// Maximum time that a test waits for anything.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Ends a process when the test ends in any way.
@@ -27,7 +27,7 @@ pub struct Desktop {
 }
 
 pub fn skip(why: &str) {
-    // past the harness, which keeps what passing tests print
+    // directly to the terminal: the harness hides the output of passing tests
     let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: {why}\n"));
 }
 

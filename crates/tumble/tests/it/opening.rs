@@ -41,7 +41,7 @@ fn a_urdf_stands_on_a_floor_through_its_lowest_point() {
         let run = summary(&folder, &[&path, "--duration", "0.5"]);
         let floor = run["bodies"].as_array().unwrap().iter().find(|b| b["name"] == "floor").unwrap();
         assert!((floor["position_m"][2].as_f64().unwrap() - 1.0).abs() < 1e-12, "{shape}: {floor}");
-        // it hangs in its rest position
+        // the pendulum is in its rest position
         assert!(run["end"]["kinetic_energy_j"].as_f64().unwrap() < 1e-12, "{run}");
     }
     let said = succeed(&["run", &folder.write("p.urdf", pendulum("visual")), "--duration", "0"]);
@@ -65,7 +65,7 @@ fn a_root_that_floats_falls_as_free_bodies_do() {
     assert!(succeed(&["check", &path, "--floating"]).contains("7 degrees of freedom on a floating base"));
 }
 
-/// A mesh of 1000 kg/m³ falls by a tenth of its diagonal and lies there: `m g h` is gone.
+/// A mesh of 1000 kg/m³ falls by a tenth of its diagonal and comes to rest: `m g h` is lost.
 #[test]
 fn a_mesh_falls_on_a_floor() {
     let folder = Folder::new("open-mesh");

@@ -43,7 +43,7 @@ fn without_an_adapter_everything_but_the_picture_succeeds_and_the_message_names_
     assert_eq!(tumble::net::record::read(&recording).unwrap().count(), 25);
     assert_eq!(json(summary.as_ref())["steps"], 24);
     if Path::new(&picture).exists() {
-        // past the harness, which keeps what passing tests print
+        // directly to the terminal: the harness hides the output of passing tests
         let _ = std::io::Write::write_fmt(
             &mut std::io::stderr(),
             format_args!("\nSKIPPED: a driver was found all the same, so there is no message to check\n"),
@@ -75,7 +75,7 @@ fn with_an_adapter_every_scene_gets_a_picture() {
         let said = String::from_utf8(out.stderr).unwrap();
         assert!(out.status.success(), "{scene}: {said}");
         if said.contains("no picture:") {
-            // past the harness, which keeps what passing tests print
+            // directly to the terminal: the harness hides the output of passing tests
             let _ = std::io::Write::write_fmt(
                 &mut std::io::stderr(),
                 format_args!("\nSKIPPED: this machine has no graphics adapter; {said}\n"),

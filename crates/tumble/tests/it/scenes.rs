@@ -61,8 +61,8 @@ fn billiards_the_cue_ball_arrives_as_its_page_says() {
     assert!(part_state(&world, cue).1.norm() < 0.8 * speed, "it meets the rack within the next frame");
 }
 
-/// Without friction, damping and loss, the break keeps momentum and energy until a billiard ball
-/// reaches a cushion.
+/// Without friction, damping and loss, the break conserves momentum and energy until a billiard
+/// ball reaches a cushion.
 #[test]
 fn billiards_the_break_keeps_momentum_and_energy_before_the_first_cushion() {
     let mut scene = load("billiards");
@@ -162,8 +162,8 @@ fn incline_the_block_stops_where_and_when_its_page_says_and_stays() {
     });
 }
 
-/// Everything stays in the box and above its floor, and nearly all the energy is lost. Bodies that
-/// can roll still do, because nothing resists rolling.
+/// All bodies stay in the box and above its floor, and lose nearly all their energy. Bodies that
+/// can roll go on rolling, because nothing resists it.
 #[test]
 fn falling_stays_in_its_box_and_comes_to_rest_with_few_tries() {
     in_both("falling", |scene, mut world| {

@@ -1,4 +1,4 @@
-//! Bytes made to hurt: no message changes anything but a good one, and none makes anything grow.
+//! Hostile bytes: only valid messages have an effect, and no message causes unbounded growth.
 
 use super::simulated_session::{MS, SCENE, Stage, scene, viewer};
 use crate::support::Dice;
@@ -17,7 +17,7 @@ fn slow(short: u64, long: u64) -> u64 {
     if std::env::var_os("TUMBLE_SLOW").is_some() { long } else { short }
 }
 
-/// Good payloads, one per parser.
+/// Returns valid payloads, one per parser.
 fn payloads() -> Vec<Vec<u8>> {
     let write = |f: &dyn Fn(&mut Vec<u8>)| {
         let mut out = Vec::new();
@@ -53,7 +53,7 @@ fn payloads() -> Vec<Vec<u8>> {
     ]
 }
 
-/// Every parser on the same bytes; whether any took them.
+/// Runs every parser on the same bytes; returns whether any accepted them.
 fn parse_all(bytes: &[u8], mirror: &mut Mirror) -> bool {
     let all = [
         open(bytes).is_ok(),
@@ -97,7 +97,7 @@ fn what_is_written_is_read_back() {
     assert_eq!(Refusal::read(&out).unwrap().0, "a b");
 }
 
-/// Any flipped bit, and any cut, is found: nothing of a message is outside of what is checked.
+/// Any flipped bit and any truncation is detected: the checks cover all of a message.
 #[test]
 fn any_damage_to_a_message_is_found() {
     let good = message(&header(MessageKind::Ready), |out| out.extend([5; 36]));
@@ -115,7 +115,7 @@ fn any_damage_to_a_message_is_found() {
     assert!(matches!(open(&message(&not_finite, |_| {})), Err(MessageError::Malformed(_))));
 }
 
-/// Counts and lengths that promise more than is there are refused without asking for memory.
+/// Counts and lengths beyond the available bytes are refused without an allocation.
 #[test]
 fn counts_are_not_believed() {
     let huge = [&1u32.to_le_bytes()[..], &[0; 4], &u32::MAX.to_le_bytes()].concat();
@@ -146,8 +146,8 @@ fn counts_are_not_believed() {
     }
 }
 
-/// Random bytes, and good messages with random damage behind a good frame (so that the hash does not stand guard): no panic, and what is refused changes
-/// nothing.
+/// Random bytes, and valid messages with random damage to the payload under a valid hash: no panic,
+/// and refused messages change nothing.
 #[test]
 fn a_million_random_packets_full_length() {
     let (mut dice, payloads) = (Dice(9), payloads());
@@ -179,7 +179,8 @@ fn a_million_random_packets_full_length() {
     assert!(taken > count / 100 && taken < count, "{taken} of {count} were still good by chance");
 }
 
-/// A session in the middle of a run is shot at: good frames with damaged payloads, old and foreign ones. The frames that are shown stay right.
+/// A running session receives valid headers with damaged payloads, and old and foreign messages.
+/// The frames that are shown stay right.
 #[test]
 fn a_session_under_fire_stays_true() {
     let (mut stage, mut dice, payloads) =
@@ -212,7 +213,7 @@ fn a_session_under_fire_stays_true() {
     assert!(stage.facets[0].shown.len() > 10);
 }
 
-/// The server counts by reason what a joined facet sends that is none of its business.
+/// The server counts invalid messages of a joined facet by reason.
 #[test]
 fn refusals_are_counted_by_reason() {
     let mut server =
