@@ -50,9 +50,6 @@ FORMER = (
 )
 # Files and folders whose words are not clean yet. Remove an entry when `--todo` counts no fault in it.
 TODO = (
-    "crates/core/src/articulated/algorithms/abm.rs",
-    "crates/core/src/articulated/body.rs",
-    "crates/core/src/articulated/parts.rs",
     "crates/core/src/contact/detect.rs",
     "crates/core/src/contact/pair/tests.rs",
     "crates/core/src/contact/pair_material.rs",
@@ -66,13 +63,10 @@ TODO = (
     "crates/core/src/step/time_of_impact.rs",
     "crates/core/src/step/time_stepping.rs",
     "crates/core/src/step/unreachable_joints.rs",
-    "crates/core/src/world/bodies.rs",
-    "crates/core/src/world/core.rs",
     "crates/core/src/world/mirror.rs",
     "crates/core/src/world/mod.rs",
     "crates/core/src/world/pick.rs",
     "crates/core/src/world/state_memory.rs",
-    "crates/core/src/world/view.rs",
 )
 
 

@@ -21,7 +21,7 @@ use crate::object::visual::Visual;
 use nalgebra::{Quaternion, Translation3};
 use tumble_collide::{ContactMode, Pose, Quat, Shape, Vec3};
 
-/// Why an articulated body is not valid.
+/// An invalid articulated body.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ArticulatedError {
@@ -40,7 +40,7 @@ pub enum ArticulatedError {
         body: String,
         /// Link moved by the joint.
         link: String,
-        /// Which constant.
+        /// The name of the constant.
         what: &'static str,
         /// Value given.
         value: f64,
@@ -149,13 +149,13 @@ pub struct ArticulatedBody {
     pub(super) start: Vec<f64>,
 }
 
-/// What a body computes from one state, and the working memory of its calls.
+/// Data that a body computes from one state, and working memory.
 pub(super) struct BodyCache {
     pub dynamics: Dynamics,
     pub scratch: Scratch,
-    /// For states other than that of `dynamics`.
+    /// Dynamics at other states than that of `dynamics`.
     pub elsewhere: Dynamics,
-    /// No joint forces, no accelerations.
+    /// Zeros for absent joint forces and accelerations.
     pub zeros: Vec<f64>,
     pub wrenches: Vec<crate::object::part_state::Wrench>,
     pub accelerations: Vec<(Vec3, Vec3)>,
@@ -215,7 +215,7 @@ impl ArticulatedBody {
         self
     }
 
-    /// Sets the name, so that one description can appear several times in a world.
+    /// Sets the name. So one description can appear several times in a world.
     #[must_use]
     pub fn with_name(mut self, name: impl Into<String>) -> Self {
         self.name = name.into();

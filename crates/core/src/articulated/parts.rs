@@ -1,4 +1,4 @@
-//! The parts of an articulated body that are neither its model nor its dof settings, for archives.
+//! The parts of an articulated body besides its model and its dof settings, for archives.
 
 use super::body::{ArticulatedBody, ArticulatedError, Collider, LinkCollider};
 use crate::articulated::model::dof::Coupling;

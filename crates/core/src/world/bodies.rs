@@ -1,4 +1,4 @@
-//! What a user does to the objects of a world between steps.
+//! Access to the objects of a world between steps.
 
 use super::{Coordinates, World, WorldError};
 use crate::object::part_state::PartState;
@@ -8,7 +8,7 @@ use crate::world::view::{Mode, ObjectId, Status};
 use tumble_collide::{Pose, Vec3};
 
 impl World {
-    /// An object by id.
+    /// Returns an object by id.
     pub fn object(&self, id: ObjectId) -> Option<&dyn Object> {
         self.core.table.get(id).map(|placed| placed.object.as_ref())
     }
@@ -18,13 +18,13 @@ impl World {
         self.core.table.get(id).map(|placed| &*placed.name)
     }
 
-    /// An object by id, as its own type.
+    /// Returns an object by id, as its own type.
     pub fn get<T: Object>(&self, id: ObjectId) -> Option<&T> {
         let object: &dyn std::any::Any = self.object(id)?;
         object.downcast_ref()
     }
 
-    /// An object's constants, to be changed between steps. What of it is state lies in the world.
+    /// Returns an object's constants, to be changed between steps. Its state is in the world.
     pub fn get_mut<T: Object>(&mut self, id: ObjectId) -> Option<&mut T> {
         self.core.wake(id);
         let place = self.core.table.place(id)?;
@@ -32,12 +32,12 @@ impl World {
         object.downcast_mut()
     }
 
-    /// An object's switches.
+    /// Returns the settings of an object: mode, enabled, collidable.
     pub fn status(&self, id: ObjectId) -> Option<Status> {
         self.core.objects().get(id).map(|e| e.status)
     }
 
-    /// Switches an object between static, kinematic and dynamic.
+    /// Sets an object's mode: static, kinematic or dynamic.
     ///
     /// # Errors
     /// [`WorldError::Stale`] if the object was removed.
@@ -46,7 +46,8 @@ impl World {
         Ok(())
     }
 
-    /// Takes an object out of the world's doings, or back in; its state stays.
+    /// Enables or disables an object. A disabled object does not move, collide or act, and keeps
+    /// its state.
     ///
     /// # Errors
     /// [`WorldError::Stale`] if the object was removed.
@@ -55,7 +56,7 @@ impl World {
         Ok(())
     }
 
-    /// Switches an object's collisions.
+    /// Enables or disables an object's collisions.
     ///
     /// # Errors
     /// [`WorldError::Stale`] if the object was removed.
@@ -64,40 +65,42 @@ impl World {
         Ok(())
     }
 
-    /// Wakes an object and gives its switches.
+    /// Wakes an object and returns its settings.
     fn status_mut(&mut self, id: ObjectId) -> Result<&mut Status, WorldError> {
         self.core.wake(id);
         let place = self.core.table.place(id).ok_or(WorldError::Stale)?;
         Ok(&mut self.core.state.objects[place].status)
     }
 
-    /// Whether an object sleeps (see [`Sleep`](crate::Sleep)); what is done to it wakes it.
+    /// Returns whether an object sleeps (see [`Sleep`](crate::Sleep)); any change of it wakes it.
     pub fn asleep(&self, id: ObjectId) -> bool {
         self.view().asleep(id)
     }
 
-    /// The site of one part: pose, velocity, acceleration.
+    /// Returns the state of one part: pose, velocity, acceleration.
     pub fn part_state(&self, id: ObjectId, part: usize) -> Option<&PartState> {
         let entry = self.core.table.get(id)?;
         self.core.derived.part_states[entry.state_range.parts.clone()].get(part)
     }
 
-    /// Pose of the frame by which a part is placed: that of a rigid body, of whose mesh the file's frame is kept (its site is at the center of mass);
-    /// the site's for any other part.
+    /// Returns the pose of the frame that places a part. For a mesh of a rigid body it is the frame
+    /// of the mesh file, whereas the part state is at the center of mass. For other parts it is the
+    /// pose of the part state.
     pub fn pose(&self, id: ObjectId, part: usize) -> Option<Pose> {
         let pose = self.part_state(id, part)?.pose;
         Some(self.get::<RigidBody>(id).map_or(pose, |body| body.frame_of(&pose)))
     }
 
-    /// An object's slice of the state.
+    /// Returns an object's range of the state.
     pub fn state_of(&self, id: ObjectId) -> Option<&[f64]> {
         Some(&self.core.state.x[self.core.table.get(id)?.state_range.x.clone()])
     }
 
-    /// Writes an object's slice of the state, all of it (see the object's type for what the numbers mean). Refused where it is no state of it.
+    /// Writes an object's whole range of the state; the object's type documents its numbers.
     ///
     /// # Errors
-    /// [`WorldError::Stale`], or [`WorldError::BadState`] if the numbers are no state of the object.
+    /// [`WorldError::Stale`], or [`WorldError::BadState`] if the numbers are no state of the
+    /// object.
     pub fn write_state_of(&mut self, id: ObjectId, x: &[f64]) -> Result<(), WorldError> {
         self.core.wake(id);
         let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
@@ -110,7 +113,8 @@ impl World {
         Ok(())
     }
 
-    /// Puts the frame of a rigid body at a pose; the velocity of its center of mass stays what it was.
+    /// Moves the frame of a rigid body to a pose; the velocity of its center of mass does not
+    /// change.
     ///
     /// # Errors
     /// [`WorldError`]: the object was removed, is not a rigid body, or the pose is not finite.
@@ -125,7 +129,8 @@ impl World {
         })
     }
 
-    /// Gives a rigid body a velocity (m/s, of the center of mass) and angular velocity (rad/s, world axes). A kinematic body follows it.
+    /// Sets velocity (m/s, of the center of mass) and angular velocity (rad/s, world axes) of a
+    /// rigid body. A kinematic body follows them.
     ///
     /// # Errors
     /// [`WorldError`]: the object was removed, is not a rigid body, or a number is not finite.
@@ -134,7 +139,8 @@ impl World {
         self.edit_rigid(id, |body, x| body.write_velocity(x, &[w.x, w.y, w.z, v.x, v.y, v.z]))
     }
 
-    /// Gives a kinematic body the velocity that brings its frame to `target` at the end of the next step.
+    /// Sets the velocity of a kinematic body so that its frame is at `target` at the end of the
+    /// next step.
     ///
     /// # Errors
     /// [`WorldError`]: the object was removed, is not a rigid body, or the target is not finite.

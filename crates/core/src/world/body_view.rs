@@ -5,7 +5,8 @@ use crate::object::part_state::PartState;
 use crate::world::view::{Mode, ObjectId};
 use tumble_collide::{Pose, Quat, Vec3};
 
-/// One part of an object: that of a rigid body, or a link of an articulated body. World axes, SI units.
+/// One part of an object: the whole of a rigid body, or a link of an articulated body. World axes,
+/// SI units.
 #[derive(Clone, Copy)]
 pub struct BodyView<'w> {
     world: &'w World,
@@ -18,7 +19,8 @@ impl World {
     /// Returns part 0 of an object for reading; [`BodyView::part`] returns the others.
     ///
     /// # Errors
-    /// [`WorldError::Stale`] if the object was removed, [`WorldError::NoPart`] if it has no parts, as a force.
+    /// [`WorldError::Stale`] if the object was removed, [`WorldError::NoPart`] if it has no parts,
+    /// such as a force.
     pub fn body(&self, id: ObjectId) -> Result<BodyView<'_>, WorldError> {
         let name = self.name(id).ok_or(WorldError::Stale)?;
         let missing = || WorldError::NoPart { name: name.to_string(), part: 0 };

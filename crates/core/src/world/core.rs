@@ -1,4 +1,4 @@
-//! The inside of a world: what the steppers work on.
+//! The core of a world, on which the steppers work.
 
 use super::state::WorldState;
 use crate::contact::detect::{ContactConstraint, DetectorBuffers, Owner};
@@ -13,11 +13,12 @@ use crate::step::Moment;
 use crate::world::view::{Entry, ObjectId, Objects, Table, WorldView};
 use tumble_collide::{BroadPhase, SweepAndPrune, Vec3};
 
-/// Why a step stopped. [`World::step`](crate::World::step) puts state and time back to where they were before the frame.
+/// An error that stopped a step. [`World::step`](crate::World::step) restores state and time to
+/// those before the frame.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StepError {
-    /// A force, a momentum or a position is no longer a number.
+    /// A force, a momentum or a position is not finite.
     #[error("'{object}' at t = {time} s: {what} is not finite; look at the forces and impulses given to it")]
     NotFinite {
         /// Object.
@@ -27,12 +28,12 @@ pub enum StepError {
         /// Simulated time, s.
         time: f64,
     },
-    /// An object's mass matrix has no inverse where it is.
+    /// An object's mass matrix is singular.
     #[error("'{object}' at t = {time} s: {why}")]
     Singular {
         /// Object.
         object: String,
-        /// What is singular, and what helps.
+        /// The singular joint, and a remedy.
         why: String,
         /// Simulated time, s.
         time: f64,
@@ -42,28 +43,28 @@ pub enum StepError {
         "'{object}' at t = {time} s: its motion needs more than the {steps} inner steps of this frame (the last of {step} s) at the integrator's tolerance {tolerance}; soften what acts on it, or loosen the tolerance"
     )]
     Tolerance {
-        /// The object whose error is greatest.
+        /// The object with the largest error.
         object: String,
         /// Simulated time, s.
         time: f64,
         /// Length of the last inner step tried, s.
         step: f64,
-        /// Inner steps of this frame, refused ones included.
+        /// Inner steps of this frame, rejected ones included.
         steps: u32,
         /// `Settings::integrator_tolerance`.
         tolerance: f64,
     },
-    /// A constraint made a row that cannot be.
+    /// A constraint made an invalid row.
     #[error("constraint '{object}': {why}")]
     Row {
         /// Object.
         object: String,
-        /// What is wrong with the row.
+        /// The fault of the row.
         why: String,
     },
 }
 
-/// One contact as the world shows it after a step. World axes.
+/// One contact after a step, in world axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactPoint {
     /// The object that the normal points to.
@@ -84,7 +85,7 @@ pub struct ContactPoint {
     pub velocity: Vec3,
     /// Impulse on `a` over the last sub-step, N·s.
     pub impulse: Vec3,
-    /// Force on `a` that it stands for, N; impacts left out.
+    /// Force on `a` over the last sub-step, N, without impacts.
     pub force: Vec3,
 }
 
@@ -101,20 +102,21 @@ pub struct Core {
     /// See [`WorldView::implicit`](crate::WorldView::implicit).
     pub(crate) implicit: bool,
     pub(crate) held: Vec<f64>,
-    /// Contact forces that hold over the sub-step, per site, of objects whose state holds velocities; empty for none.
+    /// Contact forces that are constant over the sub-step, per part, of objects whose state
+    /// contains velocities; empty for none.
     pub(crate) held_wrenches: Vec<Wrench>,
-    /// Moments that are not in use, whose memory is used again.
+    /// Unused moments, kept for their memory.
     pub(crate) moments: Vec<Moment>,
     pub(crate) forces: Forces,
     pub(crate) broad: Box<dyn BroadPhase>,
     pub(crate) detect_scratch: DetectorBuffers,
     pub(crate) contacts: Vec<ContactPoint>,
     pub(crate) report: StepReport,
-    /// Serials of sleepers that the frame disturbs.
+    /// Serial numbers of sleeping objects that the frame disturbs.
     pub(crate) needs_wake: Vec<u32>,
 }
 
-/// Numbers of the objects, and the caches of the maps that change them.
+/// The state of the objects, and the caches for the maps that change it.
 pub(crate) struct Coordinates<'a> {
     pub objects: Objects<'a>,
     pub x: &'a mut [f64],
@@ -122,7 +124,7 @@ pub(crate) struct Coordinates<'a> {
 }
 
 impl Core {
-    /// Returns a core without contacts, whose part table is yet to be written.
+    /// Returns a core without contacts, whose part states are not computed yet.
     pub(super) fn new(table: Table, settings: Settings, solver: Box<dyn RowSolver>, state: WorldState) -> Core {
         let (dof, parts) = (state.applied_generalized.len(), state.applied.len());
         let caches = table.new_caches();
@@ -152,7 +154,7 @@ impl Core {
         }
     }
 
-    /// Returns a copy with working memory of its own.
+    /// Returns a copy with its own working memory.
     pub(super) fn fork(&self) -> Core {
         let mut fork = Core {
             pair_materials: self.pair_materials.clone(),
@@ -170,14 +172,15 @@ impl Core {
         self.table.with(&self.state.objects)
     }
 
-    /// Returns the present numbers, and the caches of `acting`, or else of the present.
+    /// Returns the present state, and the caches of `acting`, or else of the present.
     pub(crate) fn coordinates<'a>(&'a mut self, acting: Option<&'a mut Moment>) -> Coordinates<'a> {
         let objects = self.table.with(&self.state.objects);
         let derived = acting.map_or(&mut self.derived, |moment| &mut moment.derived);
         Coordinates { objects, x: &mut self.state.x, caches: &mut derived.caches }
     }
 
-    /// Returns a moment with the numbers and accelerations of the present, to be refreshed. Push it to `moments` after use.
+    /// Returns a moment with the present state and accelerations, to be refreshed. Push it to
+    /// `moments` after use.
     pub(crate) fn moment(&mut self) -> Moment {
         let mut moment = self.moments.pop().unwrap_or_else(|| Moment::new(&self.table));
         self.state.x[..].clone_into(&mut moment.x);
@@ -205,7 +208,7 @@ impl Core {
         self.integration().refresh();
     }
 
-    /// No contact or joint forces hold any more.
+    /// Clears all contact and joint forces.
     pub(crate) fn clear_contact_forces(&mut self) {
         self.held.fill(0.0);
         self.held_wrenches.clear();
@@ -237,7 +240,7 @@ impl Core {
         }
     }
 
-    /// Shows the contacts of the sub-step and files their forces as warm starts.
+    /// Publishes the contacts of the sub-step and stores their forces as warm starts.
     pub(crate) fn publish(
         &mut self,
         contact_constraints: &[ContactConstraint],

@@ -1,4 +1,4 @@
-//! Which objects reach into each other as the world stands.
+//! Pairs of objects that overlap in the present state.
 
 use crate::contact::detect::may_collide;
 use crate::world::World;
@@ -6,18 +6,19 @@ use crate::world::view::{Entry, Mode, ObjectId};
 use std::collections::BTreeMap;
 use tumble_collide::{Aabb, BroadPhase, Contact, Pose, Shape, SweepAndPrune, contacts_in_mode};
 
-/// Two objects that overlap, or one twice whose own parts do; the one added first stands first.
+/// Two objects that overlap, in the order in which they were added; the same object twice if its
+/// own parts overlap.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Overlap {
     /// The objects.
     pub objects: [ObjectId; 2],
-    /// The parts that overlap most.
+    /// The parts with the deepest overlap.
     pub parts: [usize; 2],
-    /// How far these would have to be moved apart along their contact's normal, meters.
+    /// Distance by which these must be moved apart along their contact's normal, meters.
     pub depth: f64,
 }
 
-/// A part that takes part.
+/// A part that is examined.
 struct Part<'w> {
     entry: Entry<'w>,
     part: usize,
@@ -26,8 +27,8 @@ struct Part<'w> {
 }
 
 impl World {
-    /// The pairs of objects that may meet and reach into each other by more than `depth` meters, in the order in which they were added. Changes nothing, and
-    /// costs a detection of contacts.
+    /// Returns the pairs of objects that may collide and overlap by more than `depth` meters, in
+    /// the order in which they were added. Changes nothing; costs one detection of contacts.
     pub fn overlaps(&self, depth: f64) -> Vec<Overlap> {
         let parts = self.overlapping_parts();
         let mut broad = SweepAndPrune::default();
@@ -64,7 +65,7 @@ impl World {
         parts.collect()
     }
 
-    /// The greatest depth of the contacts of two parts that may meet, if they overlap.
+    /// Returns the greatest depth of the contacts of two parts that may collide, if they overlap.
     fn depth_of(&self, a: &Part<'_>, b: &Part<'_>) -> Option<f64> {
         if !may_collide(&a.entry, a.part, &b.entry, b.part, &self.core.derived.part_states) {
             return None;

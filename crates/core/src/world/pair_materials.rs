@@ -6,10 +6,12 @@ use crate::object::Material;
 use crate::world::view::ObjectId;
 
 impl World {
-    /// Gives the contacts of two sides restitution and friction of their own, from the next step on: two objects, two parts `(id, part)`, or two
-    /// materials ([`PairSide::Material`]), in any order. A part goes before its object, an object before its material. A constant that is `None` goes by
-    /// the rule of [`Settings`](crate::Settings); both `None` take the pair off. Forks have the same pairs; like materials they are not in
-    /// [`save`](World::save). They go with their objects.
+    /// Sets restitution and friction for the contacts of two sides, from the next step on: two
+    /// objects, two parts `(id, part)`, or two materials ([`PairSide::Material`]), in any order. A
+    /// part takes precedence over its object, an object over its material. A constant that is
+    /// `None` follows the rule of [`Settings`](crate::Settings); both `None` remove the pair. Forks
+    /// have the same pairs; like materials they are not in [`save`](World::save). Removing an
+    /// object removes its pairs.
     ///
     /// # Errors
     /// [`WorldError`]: an object that was removed, a part that it does not have, or a constant out of its range.
@@ -27,12 +29,12 @@ impl World {
         Ok(())
     }
 
-    /// All pairs that were chosen, in the order of their sides.
+    /// Returns all pairs that were set, in the order of their sides.
     pub(crate) fn pair_materials(&self) -> impl Iterator<Item = (&[PairSide; 2], &PairMaterial)> {
         self.core.pair_materials.iter()
     }
 
-    /// Restitution and friction that contacts of these two parts have.
+    /// Returns restitution and friction of contacts between these two parts.
     ///
     /// # Errors
     /// [`WorldError`]: an object that was removed, or a part that it does not have.

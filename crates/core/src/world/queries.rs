@@ -1,4 +1,4 @@
-//! Questions about contacts.
+//! Queries of contacts.
 
 use super::{ContactPoint, World};
 use crate::world::view::ObjectId;

@@ -1,24 +1,26 @@
-//! Sleep: islands that lie still are left out of the steps until something touches them. Off by default; see
+//! Sleep: islands at rest are left out of the steps until they are disturbed. Off by default; see
 //! [`Settings::sleep`](crate::Settings::sleep).
 //!
 //! ```text
 //! still(b, t)   = no point of b was further than `within` from where it was, since t₀ ≤ t − `after`
-//! asleep(G)     ⇐ still(b) for all b of G, G a component of the graph of contacts and constraints among what moves
-//! awake(G)      ⇐ a dynamic or kinematic mover comes within a contact's margin of G · the forces on G change · G or a support of it is changed
+//! asleep(G)     ⇐ still(b) for all b of G, G a component of the graph of contacts and constraints among moving objects
+//! awake(G)      ⇐ a dynamic or moving kinematic object comes within a contact's margin of G · the forces on G change · G or a support of it is changed
 //! ```
 //!
-//! A frame is rolled back and done again with the whole island awake if something touches a sleeper in it, or if the forces on a
-//! sleeper differ from those with which it fell asleep: no impulse ever meets a sleeper as if it were a wall. An island wakes with the
-//! contact forces with which it fell asleep.
+//! A frame is rolled back and repeated with the whole island awake if an object touches it, or if
+//! the forces on a sleeping object differ from those with which it fell asleep. So a sleeping
+//! object never acts as a wall in an impact. An island wakes with the contact forces with which it
+//! fell asleep.
 //!
 //! | symbol | meaning |
 //! |---|---|
 //! | within, after | [`Sleep::within`], [`Sleep::after`] |
 //! | G | a group: objects that fell asleep together, and wake together |
 //!
-//! The error of sleep is the velocity that a sleeper had: at most `within/after`. Objects of other crates sleep if
-//! [`Integratable::may_sleep`](crate::Integratable::may_sleep) returns true. Nothing sleeps beside a constraint that does not name its
-//! objects ([`Constraint::partners`](crate::Constraint::partners)).
+//! The error of sleep is the velocity that a sleeping object had: at most `within/after`. Objects
+//! of other crates sleep if [`Integratable::may_sleep`](crate::Integratable::may_sleep) returns
+//! true. No object sleeps while a constraint does not name its objects
+//! ([`Constraint::partners`](crate::Constraint::partners)).
 
 use crate::clone_by_field::clone_by_field;
 use crate::constraint::builder::constraints;
@@ -29,23 +31,24 @@ use crate::world::view::{Entry, Mode, ObjectId};
 use serde::{Deserialize, Serialize};
 use tumble_collide::Pose;
 
-/// When islands fall asleep.
+/// Conditions under which islands fall asleep.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sleep {
-    /// Simulated seconds that all of an island must have been still, above 0.
+    /// Simulated seconds for which a whole island must have been still, above 0.
     pub after: f64,
-    /// Meters that the furthest point of a body may have moved in that time, above 0.
+    /// Maximum displacement of any point of a body in that time, meters, above 0.
     pub within: f64,
 }
 
 impl Default for Sleep {
-    /// Half a second within a hundredth of a millimeter.
+    /// Returns half a second and a hundredth of a millimeter.
     fn default() -> Sleep {
         Sleep { after: 0.5, within: 1e-5 }
     }
 }
 
-/// Since when (s) an object has been still, and the poses of its parts then: position and quaternion `x, y, z, w`.
+/// Time (s) since which an object has been still, and the poses of its parts then: position and
+/// quaternion `x, y, z, w`.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(crate) struct RestTimer {
     pub since: f64,
@@ -61,12 +64,13 @@ impl RestTimer {
     }
 }
 
-/// Objects that fell asleep together. Serials, ascending.
+/// Objects that fell asleep together, by ascending serial numbers.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(crate) struct SleepGroup {
     pub members: Vec<u32>,
     pub supports: Vec<Support>,
-    /// Forces and torques on the members' parts and degrees of freedom by others than themselves; `None` until the first frame asleep.
+    /// External forces and torques on the members' parts and degrees of freedom; `None` until the
+    /// first frame asleep.
     pub load: Option<Vec<f64>>,
     /// Contact forces with which they fell asleep.
     pub warm: Vec<(ContactKey, [f64; 3])>,
@@ -74,8 +78,8 @@ pub(crate) struct SleepGroup {
 
 clone_by_field!(SleepGroup { members, supports, load, warm });
 
-/// Something that does not move and that members of a group lie on or hang from: its serial, and the poses of its parts as in
-/// [`RestTimer`].
+/// An object at rest on which members of a group lie or hang: its serial number, and the poses of
+/// its parts as in [`RestTimer`].
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Support {
     pub serial: u32,
@@ -102,16 +106,17 @@ fn at_rest(part_states: &[PartState]) -> bool {
     part_states.iter().all(|s| s.velocity.norm_squared() + s.angular_velocity.norm_squared() == 0.0)
 }
 
-/// How far the furthest point of a body of this bounding radius has come at most, meters: the way of its middle, and the chord of its turn.
+/// Returns an upper bound of the displacement of any point of a body with this bounding radius,
+/// meters: the displacement of its center, and the chord of its rotation.
 fn moved(from: &[f64; 7], to: &[f64; 7], radius: f64) -> f64 {
     let way: f64 = (0..3).map(|i| (to[i] - from[i]).powi(2)).sum::<f64>().sqrt();
-    // the chord of the quaternions is half the turn; q and −q are one orientation
+    // the chord of the quaternions is half the rotation; q and −q are one orientation
     let chord = |sign: f64| (3..7).map(|i| (to[i] - sign * from[i]).powi(2)).sum::<f64>().sqrt();
     way + 2.0 * chord(1.0).min(chord(-1.0)) * radius
 }
 
 impl SleepGroup {
-    /// Whether a snapshot may hold it.
+    /// Returns whether it is valid in a snapshot.
     pub fn sound(&self) -> bool {
         let finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
         let fine = self.load.iter().all(|load| finite(load))
@@ -122,18 +127,18 @@ impl SleepGroup {
 }
 
 impl Core {
-    /// Returns the place of the object with a serial.
+    /// Returns the index of the object with a serial number.
     fn by_serial(&self, serial: u32) -> Option<usize> {
         self.state.objects.binary_search_by_key(&serial, |o| o.serial).ok()
     }
 
-    /// Wakes the object, and everything that sleeps with it or on it.
+    /// Wakes the object, and all objects that sleep with it or on it.
     pub(crate) fn wake(&mut self, id: ObjectId) {
         let Some(serial) = self.table.place(id).map(|place| self.state.objects[place].serial) else { return };
         self.wake_groups(|g| g.members.binary_search(&serial).is_ok() || g.supports.iter().any(|s| s.serial == serial));
     }
 
-    /// Wakes everything.
+    /// Wakes all objects.
     pub(crate) fn wake_all(&mut self) {
         self.wake_groups(|_| true);
     }
@@ -159,7 +164,8 @@ impl Core {
         }
     }
 
-    /// Before a frame: wakes groups that are pushed, and those whose support has moved, moves, or is gone.
+    /// Before a frame: wakes groups with applied forces, and groups whose support has moved, moves,
+    /// or is gone.
     pub(crate) fn wake_disturbed(&mut self) {
         let disturbed = self.state.groups.iter().filter(|g| self.disturbed(g));
         let disturbed: Vec<u32> = disturbed.map(|g| g.members[0]).collect();
@@ -179,14 +185,14 @@ impl Core {
             || group.supports.iter().any(changed)
     }
 
-    /// Returns whether a user pushes the object during this frame.
+    /// Returns whether a force is applied to the object during this frame.
     fn pushed(&self, e: Entry) -> bool {
         let generalized = self.state.applied_generalized[e.state_range.v.clone()].iter().any(|f| *f != 0.0);
         generalized || self.state.applied[e.state_range.parts.clone()].iter().any(|w| *w != Wrench::default())
     }
 
-    /// After a frame: requests to wake the groups on which other forces act than before. Notes the forces on groups that sleep their
-    /// first frame.
+    /// After a frame: requests to wake the groups whose external forces have changed. Stores the
+    /// forces on groups that sleep their first frame.
     pub(crate) fn request_wake_by_load(&mut self) {
         for at in 0..self.state.groups.len() {
             let load = self.load(&self.state.groups[at]);
@@ -215,7 +221,7 @@ impl Core {
         self.needs_wake = requests;
     }
 
-    /// After a frame: the islands that have been still for long enough fall asleep.
+    /// After a frame: puts islands to sleep that have been still for long enough.
     pub(crate) fn fall_asleep(&mut self) {
         let Some(sleep) = self.settings.sleep else { return };
         let ready = self.at_rest_for(&sleep);
@@ -255,7 +261,8 @@ impl Core {
         self.integration().refresh();
     }
 
-    /// Returns which objects, in their order, have been still for as long as `sleep` says; restarts the timers of those that moved.
+    /// Returns which objects, in their order, have been still for the time in `sleep`; restarts the
+    /// timers of those that moved.
     fn at_rest_for(&mut self, sleep: &Sleep) -> Vec<bool> {
         let mut ready = Vec::with_capacity(self.table.placed.len());
         for place in 0..self.table.placed.len() {
@@ -333,7 +340,7 @@ fn root(parent: &[usize], mut i: usize) -> usize {
 }
 
 impl Entry<'_> {
-    /// Returns whether it moves towards others by itself: under forces, or kinematic with a velocity.
+    /// Returns whether it can move towards others: under forces, or kinematic with a velocity.
     pub fn approaches(&self, part_states: &[PartState]) -> bool {
         self.moves()
             || (self.status.enabled

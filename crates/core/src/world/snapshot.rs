@@ -1,13 +1,14 @@
 //! Saving and restoring.
 //!
-//! A snapshot is a header and the [`WorldState`]. Shapes, masses and settings are the scene's and are not in it: it is restored into a
-//! world of the same objects, which the header checks by their names and sizes. The sweep order of the broad phase is left out because
-//! its pairs come sorted: no result depends on it.
+//! A snapshot is a header and the [`WorldState`]. Shapes, masses and settings belong to the scene
+//! and are not in it. It is restored into a world of the same objects, which the header checks by
+//! their names and sizes. The sweep order of the broad phase is left out: its pairs come sorted, so
+//! no result depends on it.
 
 use super::{World, WorldState};
 use serde::{Deserialize, Serialize};
 
-/// Why a snapshot was refused. The world is unchanged.
+/// An error of restoring a snapshot. The world is unchanged.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SnapshotError {
@@ -17,7 +18,7 @@ pub enum SnapshotError {
     /// Another set of objects.
     #[error("the snapshot is of another world: object {index} is {theirs} there and {ours} here")]
     Objects {
-        /// Place in the order of adding.
+        /// Index in the order of adding.
         index: usize,
         /// Name and size in the snapshot.
         theirs: String,
@@ -53,13 +54,13 @@ impl std::fmt::Display for Label {
 }
 
 impl World {
-    /// Returns everything that the next step reads, as bytes: the same bytes for the same state.
+    /// Returns the complete state of the world as bytes: the same bytes for the same state.
     pub fn save(&self) -> Vec<u8> {
         let snapshot = (Header { magic: MAGIC, objects: self.labels() }, &self.core.state);
         postcard::to_stdvec(&snapshot).unwrap_or_default() // writing plain numbers to memory cannot fail
     }
 
-    /// Puts a saved state back. The world must hold the same objects in the same order.
+    /// Restores a saved state. The world must have the same objects in the same order.
     ///
     /// # Errors
     /// [`SnapshotError`]. The world is then unchanged.
@@ -77,7 +78,7 @@ impl World {
         self.restore_state(&state)
     }
 
-    /// The same for a state that comes from outside, of these objects.
+    /// Restores a state of these objects that was read from outside.
     pub(crate) fn restore_state(&mut self, state: &WorldState) -> Result<(), SnapshotError> {
         self.check_state(state)?;
         self.core.set_state(state);

@@ -9,20 +9,21 @@ use crate::world::view::Status;
 use serde::{Deserialize, Serialize};
 use tumble_collide::Vec3;
 
-/// Objects that a world may have seen, at most; frames are capped by its square.
+/// Maximum number of objects ever added to a world; frames are limited by its square.
 const MAX_OBJECTS: u32 = 1 << 31;
 
-/// Everything that the next step of a world reads besides its objects' constants and its settings, and nothing else.
+/// All data that the next step of a world reads besides its objects' constants and its settings.
 ///
-/// A fork clones it, [`World::checkpoint`](super::World::checkpoint) clones it into memory that is there, and
-/// [`World::save`](super::World::save) serializes it. All tables are in the order in which the objects were added.
+/// A fork clones it, [`World::checkpoint`](super::World::checkpoint) clones it into existing
+/// memory, and [`World::save`](super::World::save) serializes it. All tables are in the order in
+/// which the objects were added.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct WorldState {
     /// Simulated time, s.
     pub(crate) time: f64,
     /// Frames stepped.
     pub(crate) frame: u64,
-    /// The serial that the next object gets.
+    /// The serial number of the next object.
     pub(crate) next_serial: u32,
     pub(crate) objects: Vec<ObjectState>,
     /// The flat state `X`.
@@ -35,9 +36,9 @@ pub struct WorldState {
     /// Force that users apply to every degree of freedom during the next frame.
     pub(crate) applied_generalized: Vec<f64>,
     pub(crate) warm: WarmStarts,
-    /// Inner step that the adaptive integrator goes on with, s; 0 before it has any.
+    /// Inner step with which the adaptive integrator continues, s; 0 before the first.
     pub(crate) inner_step: f64,
-    /// The islands that sleep.
+    /// The sleeping islands.
     pub(crate) groups: Vec<SleepGroup>,
 }
 
@@ -58,10 +59,10 @@ clone_by_field!(WorldState {
 /// State of an object besides its numbers in `X`.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(crate) struct ObjectState {
-    /// Never used twice in a world: warm starts and sleepers are filed under it.
+    /// Serial number, used once in a world: the key of warm starts and sleeping objects.
     pub serial: u32,
     pub status: Status,
-    /// Left out of the steps until something wakes it.
+    /// Whether it sleeps: it is left out of the steps until it is woken.
     pub asleep: bool,
     pub rest: RestTimer,
 }
@@ -74,7 +75,7 @@ impl WorldState {
         [self.objects.len(), self.x.len(), self.accelerations.len(), self.applied.len(), self.applied_generalized.len()]
     }
 
-    /// Adds an object of the given ranges at the end; its numbers in `X` are there already.
+    /// Adds an object with the given ranges at the end; its numbers are already in `X`.
     pub(crate) fn add(&mut self, status: Status, state_range: &StateRange) {
         self.objects.push(ObjectState { serial: self.next_serial, status, asleep: false, rest: RestTimer::default() });
         self.next_serial += 1;
@@ -126,7 +127,8 @@ impl WorldState {
         steps && numbers.all(|x| x.is_finite()) && self.warm.finite()
     }
 
-    /// Returns whether the objects that sleep are those of its groups, and all numbers of sleepers are finite.
+    /// Returns whether the sleeping objects are those of the sleep groups, and all their numbers
+    /// are finite.
     pub(crate) fn sleepers_are_sound(&self) -> bool {
         let mut members: Vec<u32> = self.groups.iter().flat_map(|g| &g.members).copied().collect();
         members.sort_unstable();
@@ -135,7 +137,8 @@ impl WorldState {
         timers && self.groups.iter().all(SleepGroup::sound) && asleep.eq(members)
     }
 
-    /// Returns whether serials ascend, nothing is counted too far, and warm starts are sorted.
+    /// Returns whether serial numbers ascend, counters are within their limits, and warm starts are
+    /// sorted.
     pub(crate) fn counters_are_sound(&self) -> bool {
         let serials = self.objects.is_sorted_by(|a, b| a.serial < b.serial)
             && self.objects.iter().all(|o| o.serial < self.next_serial);

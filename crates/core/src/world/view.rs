@@ -1,4 +1,4 @@
-//! The table of objects and the read-only view of the world that objects are given.
+//! The table of objects, and the read-only view of the world for objects.
 
 use crate::derived::Cache;
 use crate::object::Object;
@@ -9,30 +9,33 @@ use std::sync::Arc;
 use tumble_collide::Vec3;
 
 new_key_type! {
-    /// Names an object of a world. After the object is removed the id is `None` everywhere, never somebody else.
+    /// The id of an object of a world. After the object is removed, the id gives `None`, never another
+    /// object.
     pub struct ObjectId;
 }
 
-/// How a body takes part; switched between steps.
+/// How the world moves an object; changed between steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Mode {
-    /// Never moves; its velocity counts as zero.
+    /// Never moves; its velocity is zero.
     Static,
-    /// Follows the pose and velocity it is given, and pushes others (the thesis's scripted motion).
+    /// Follows the given pose and velocity, and pushes dynamic objects (the thesis's scripted
+    /// motion).
     Kinematic,
     /// Moved by forces and impulses.
     #[default]
     Dynamic,
 }
 
-/// An object's switches.
+/// Settings of an object that change between steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Status {
-    /// How it takes part.
+    /// The mode of motion.
     pub mode: Mode,
-    /// Not alive: neither moves, nor collides, nor acts, until it is alive again.
+    /// Whether it is part of the simulation. A disabled object does not move, collide or act, and
+    /// keeps its state.
     pub enabled: bool,
-    /// Whether its parts meet others.
+    /// Whether its parts collide.
     pub collidable: bool,
 }
 
@@ -43,7 +46,7 @@ impl Default for Status {
 }
 
 impl Status {
-    /// Whether impulses move it.
+    /// Returns whether impulses move it.
     pub fn moves(&self) -> bool {
         self.enabled && self.mode == Mode::Dynamic
     }
@@ -52,20 +55,21 @@ impl Status {
 /// An object, the ranges of its numbers in the world's tables, and its switches.
 #[derive(Clone, Copy)]
 pub(crate) struct Entry<'a> {
-    /// In the order of adding.
+    /// Index in the order of adding.
     pub place: usize,
     pub name: &'a str,
     pub object: &'a dyn Object,
     pub state_range: &'a StateRange,
     pub status: Status,
-    /// Never used twice in a world: warm starts are filed under it.
+    /// Serial number, used once in a world: the key of warm starts.
     pub serial: u32,
-    /// Left out of the steps until something wakes it.
+    /// Whether it sleeps: it is left out of the steps until it is woken.
     pub asleep: bool,
 }
 
 impl Entry<'_> {
-    /// Returns whether it takes part in dynamics: dynamic, alive, and with a state; awake or asleep.
+    /// Returns whether it takes part in the dynamics: dynamic, enabled, and with a state; awake or
+    /// asleep.
     pub fn dynamic(&self) -> bool {
         self.status.moves() && !self.state_range.v.is_empty()
     }
@@ -182,25 +186,26 @@ fn entry<'a>(place: usize, placed: &'a Placed, state: &ObjectState) -> Entry<'a>
     }
 }
 
-/// What an object may read while it accumulates forces or makes rows.
+/// Data that an object may read while it accumulates forces or makes rows.
 #[derive(Clone, Copy)]
 pub struct WorldView<'a> {
     /// Simulated time of this stage, s.
     pub time: f64,
     /// Gravity, m/s².
     pub gravity: Vec3,
-    /// Whether this step's rows are at the velocity level, so that drives and damping are implicit rows of a [`Constraint`](crate::Constraint); where
-    /// they are not, such forces belong to the force table.
+    /// Whether this step's rows are at the velocity level: drives and damping are then implicit
+    /// rows of a [`Constraint`](crate::Constraint). Otherwise such forces belong to the force
+    /// table.
     pub implicit: bool,
     /// The state `X` at this stage.
     pub x: &'a [f64],
-    /// The site table at this stage.
+    /// The part states at this stage.
     pub part_states: &'a [PartState],
     pub(crate) objects: Objects<'a>,
 }
 
 impl WorldView<'_> {
-    /// An object by id.
+    /// Returns an object by id.
     pub fn object(&self, id: ObjectId) -> Option<&dyn Object> {
         self.objects.get(id).map(|e| e.object)
     }
@@ -210,33 +215,33 @@ impl WorldView<'_> {
         self.objects.get(id).map(|e| e.name)
     }
 
-    /// An object by id, as its own type.
+    /// Returns an object by id, as its own type.
     pub fn get<T: Object>(&self, id: ObjectId) -> Option<&T> {
         let object: &dyn std::any::Any = self.object(id)?;
         object.downcast_ref()
     }
 
-    /// Where an object's numbers lie.
+    /// Returns the ranges of an object's numbers in the world's tables.
     pub fn state_range(&self, id: ObjectId) -> Option<&StateRange> {
         self.objects.get(id).map(|e| e.state_range)
     }
 
-    /// The site of one part.
+    /// Returns the state of one part.
     pub fn part_state(&self, id: ObjectId, part: usize) -> Option<&PartState> {
         self.part_states[self.state_range(id)?.parts.clone()].get(part)
     }
 
-    /// An object's switches.
+    /// Returns the settings of an object: mode, enabled, collidable.
     pub fn status(&self, id: ObjectId) -> Option<Status> {
         self.objects.get(id).map(|e| e.status)
     }
 
-    /// Whether an object sleeps (see [`Sleep`](crate::Sleep)).
+    /// Returns whether an object sleeps (see [`Sleep`](crate::Sleep)).
     pub fn asleep(&self, id: ObjectId) -> bool {
         self.objects.get(id).is_some_and(|e| e.asleep)
     }
 
-    /// All ids in the order in which the objects were added.
+    /// Returns all ids in the order in which the objects were added.
     pub fn ids(&self) -> &[ObjectId] {
         &self.objects.table.order
     }

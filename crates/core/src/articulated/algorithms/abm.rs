@@ -37,8 +37,8 @@ use tumble_collide::Vec3;
 /// `M`).
 pub(in crate::articulated) const SINGULAR: f64 = 1e-12;
 
-/// Input of a sweep: state and forces. A trait instead of closures, so that all of it is compiled
-/// for the instruction set of the sweep.
+/// Input of a sweep: state and forces. It is a trait and not a set of Rust closures, so that all of
+/// it is compiled for the instruction set of the sweep.
 pub(in crate::articulated) trait Input<T> {
     /// Returns sine and cosine of the revolute joint of a link, whose angle is position number `q`.
     fn joint_angle_sin_cos(&self, link: usize, q: usize) -> (T, T);
