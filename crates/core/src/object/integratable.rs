@@ -40,7 +40,7 @@ pub trait Integratable {
     }
     /// Writes the accelerations of the parts for a rate `dp` of the state's quantity of motion.
     fn accelerations(&self, cache: &mut Cache, x: &[f64], dp: &[f64], part_states: &mut [PartState]);
-    /// Writes `dp − M·v̇`, the part of the rate of momentum that changes directions but no velocity: `ω × L` of a rigid
+    /// Writes `dp − M·v̇`, the part of the rate of momentum that changes directions but no velocity: `ω × H` of a rigid
     /// body, Coriolis terms. Rows at the acceleration level need `v̇`. Zero by default, for a constant mass matrix.
     fn gyroscopic(&self, x: &[f64], out: &mut [f64]) {
         let _ = x;

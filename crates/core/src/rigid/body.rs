@@ -24,7 +24,7 @@ pub struct RigidBody {
     pub material: Material,
     /// Linear damping, 1/s: a force `−c·P`, evaluated at the stage's state like all forces; keep `c·dt` below 1.
     pub linear_damping: f64,
-    /// Angular damping, 1/s: a torque `−c·L`.
+    /// Angular damping, 1/s: a torque `−c·H`.
     pub angular_damping: f64,
     /// How its mesh or cylinder collides.
     pub contact_mode: ContactMode,

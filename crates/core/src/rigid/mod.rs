@@ -1,11 +1,11 @@
-//! The rigid body (thesis §III.A): state `X = [x, q, P, L]`.
+//! The rigid body (thesis §III.A): state `X = [x, q, P, H]`.
 //!
 //! | numbers | meaning |
 //! |---|---|
 //! | 0–2 | position of the center of mass `x`, meters |
 //! | 3–6 | orientation `q` as `x, y, z, w` |
 //! | 7–9 | linear momentum `P`, N·s |
-//! | 10–12 | angular momentum `L` about the center of mass, world axes, N·m·s |
+//! | 10–12 | angular momentum `H` about the center of mass, world axes, N·m·s |
 //!
 //! Generalized velocity `v = [ω; v]`, world axes at the center of mass; mass matrix `M = diag(R·I·Rᵀ, m·1)`. Its root is
 //! `diag(I^½·Rᵀ, √m·1)`, with `I^½` the symmetric root of the body inertia.

@@ -145,7 +145,7 @@ impl Integratable for RigidBody {
     fn accelerations(&self, _cache: &mut Cache, x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
         let (q, l, part_state) = (orientation(x), vec3(&x[10..]), &mut part_states[0]);
         part_state.acceleration = vec3(&dp[3..]) / self.mass;
-        // α = I⁻¹(τ − ω × L)
+        // α = I⁻¹(τ − ω × H)
         part_state.angular_acceleration = self.omega(&q, &(vec3(dp) - part_state.angular_velocity.cross(&l)));
     }
 

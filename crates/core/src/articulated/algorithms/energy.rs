@@ -2,10 +2,10 @@
 //!
 //! ```text
 //! T = Σ ½m·|v + ω×c|² + ½ω·I_c·ω = Σ ½m·|v|² + m·v·(ω×c) + ½ω·I·ω         V = −Σ m·g·(p + c)
-//! P = Σ m·(v + ω×c)                                                     L = Σ I·ω + m·c×v + p×m·(v + ω×c)
+//! P = Σ m·(v + ω×c)                                                     H = Σ I·ω + m·c×v + p×m·(v + ω×c)
 //! ```
 //!
-//! Symbols as in `kinematics.rs`; `g` is gravity, `L` is about the world's origin.
+//! Symbols as in `kinematics.rs`; `g` is gravity, `H` is about the world's origin.
 
 use crate::articulated::algorithms::kinematics::Kinematics;
 use crate::articulated::model::Model;
