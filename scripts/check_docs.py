@@ -60,7 +60,6 @@ TODO = (
     "crates/core/src/step/joint_correction.rs",
     "crates/core/src/step/limit_correction.rs",
     "crates/core/src/step/projection.rs",
-    "crates/core/src/step/time_of_impact.rs",
     "crates/core/src/step/time_stepping.rs",
     "crates/core/src/step/unreachable_joints.rs",
     "crates/core/src/world/mirror.rs",

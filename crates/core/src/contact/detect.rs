@@ -1,13 +1,12 @@
 //! Which parts touch or nearly do: broad phase, filters, narrow phase, warm starts.
 
-use crate::clone_by_field::clone_by_field;
 use crate::contact::pair::{MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
 use crate::contact::pair_material::PairMaterials;
+use crate::contact::time_of_impact::MovingPair;
 use crate::object::Material;
 use crate::object::collidable::ContactFrame;
 use crate::object::part_state::PartState;
 use crate::settings::Settings;
-use crate::step::shift_to_impact;
 use crate::world::view::{Entry, Mode, ObjectId, Objects};
 use tumble_collide::{BroadPhase, Contact, NormalFrom, Vec3};
 
@@ -40,78 +39,6 @@ pub(crate) struct ContactConstraint {
     pub friction: f64,
     pub restitution: f64,
     pub key: ContactKey,
-}
-
-/// Last step's impulse (or force) per contact, world axes, on A.
-#[derive(Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub(crate) struct WarmStarts {
-    entries: Vec<(ContactKey, [f64; 3])>,
-}
-
-clone_by_field!(WarmStarts { entries });
-
-impl WarmStarts {
-    /// Takes out what is filed under the keys that `which` picks.
-    pub fn take(&mut self, which: impl Fn(&ContactKey) -> bool) -> Vec<(ContactKey, [f64; 3])> {
-        let (taken, kept) = std::mem::take(&mut self.entries).into_iter().partition(|e| which(&e.0));
-        self.entries = kept;
-        taken
-    }
-
-    /// Files what was taken.
-    pub fn add(&mut self, entries: Vec<(ContactKey, [f64; 3])>) {
-        self.entries.extend(entries);
-        self.entries.sort_by_key(|e| e.0);
-        self.entries.dedup_by_key(|e| e.0);
-    }
-
-    /// Files anew; `entries` may come in any order.
-    pub fn replace(&mut self, entries: impl Iterator<Item = (ContactKey, Vec3)>) {
-        self.entries.clear();
-        self.entries.extend(entries.map(|(k, v)| (k, [v.x, v.y, v.z])));
-        if !self.in_order() {
-            self.entries.sort_by_key(|e| e.0);
-        }
-    }
-
-    /// What was filed under `key`. `place` is where the last search ended: keys that come in order are found in a step or two.
-    pub fn get(&self, key: &ContactKey, place: &mut usize) -> Option<Vec3> {
-        let before = self.entries[..*place].last().is_some_and(|e| e.0 >= *key);
-        let from = if before { 0 } else { *place };
-        *place = from + exponential_search(&self.entries[from..], key);
-        let found = self.entries.get(*place).filter(|e| e.0 == *key)?;
-        Some(Vec3::from(found.1))
-    }
-
-    /// Whether any contact of the key's pair carried a force.
-    pub fn carries(&self, key: &ContactKey) -> bool {
-        let first = self.entries.partition_point(|e| e.0.pair < key.pair);
-        self.entries[first..].iter().take_while(|e| e.0.pair == key.pair).any(|e| e.1 != [0.0; 3])
-    }
-
-    /// Sorted by key, as the look-ups need it.
-    pub fn in_order(&self) -> bool {
-        self.entries.is_sorted_by(|a, b| a.0 < b.0)
-    }
-
-    pub fn finite(&self) -> bool {
-        self.entries.iter().flat_map(|e| e.1).all(f64::is_finite)
-    }
-
-    pub fn forget(&mut self, serial: u32) {
-        self.entries.retain(|(k, _)| k.pair[0] != serial && k.pair[2] != serial);
-    }
-}
-
-/// How many entries come before `key`, searched for at doubling distances from the start.
-fn exponential_search(entries: &[(ContactKey, [f64; 3])], key: &ContactKey) -> usize {
-    let (mut low, mut step) = (0, 1);
-    while entries.get(low + step - 1).is_some_and(|e| e.0 < *key) {
-        low += step;
-        step *= 2;
-    }
-    let high = (low + step).min(entries.len());
-    low + entries[low..high].partition_point(|e| e.0 < *key)
 }
 
 /// The detector's working memory.
@@ -245,9 +172,7 @@ impl Detector<'_> {
         let mode = body_a.contact_mode(part_a).of_pair(body_b.contact_mode(part_b));
         let near = 2.0 * self.settings.drift_tolerance;
         let pair = PairQuery {
-            mode,
-            shapes: [shape_a, shape_b],
-            part_states: [state_a, state_b],
+            parts: MovingPair { mode, shapes: [shape_a, shape_b], part_states: [state_a, state_b] },
             motion_bounds: [self.scratch.motion_bounds[i], self.scratch.motion_bounds[j]],
             near,
             prediction,
@@ -256,7 +181,7 @@ impl Detector<'_> {
             return;
         }
         let found = &mut self.scratch.found;
-        let moment = pair.contacts([a, b], horizon, &mut self.scratch.narrow_phase_cache, found);
+        let time = pair.contacts([a, b], horizon, &mut self.scratch.narrow_phase_cache, found);
         let first = out.len();
         if let Some(sleeper) = [entry_a, entry_b].into_iter().find(|e| e.asleep) {
             // the frame will be done again with it awake
@@ -284,9 +209,9 @@ impl Detector<'_> {
             restitution,
             key: ContactKey { pair, feature: contact.feature },
         }));
-        if moment > 0.0 {
+        if time > 0.0 {
             out[first..].iter_mut().for_each(|constraint| {
-                shift_to_impact(constraint, &constraint.contact.clone(), state_a, state_b, moment)
+                constraint.move_to_impact(&constraint.contact.clone(), [state_a, state_b], time)
             });
         }
     }

@@ -4,3 +4,5 @@ pub(crate) mod detect;
 pub(crate) mod pair;
 pub(crate) mod pair_material;
 mod separation;
+pub(crate) mod time_of_impact;
+pub(crate) mod warm_starts;

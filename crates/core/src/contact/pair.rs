@@ -7,8 +7,8 @@
 //! along free motion instead.
 
 use crate::contact::separation::{OrientedBox, are_separated};
+use crate::contact::time_of_impact::{Approach, MovingPair, Search};
 use crate::object::part_state::PartState;
-use crate::step::pose_after_free_motion;
 use tumble_collide::{Aabb, Contact, ContactMode, Pose, Shape, Vec3};
 
 /// Margin of two sphere trees in the `spheres` mode, as a fraction of the smaller bounding radius.
@@ -84,9 +84,7 @@ impl MotionBounds {
 
 /// Two parts that may touch, A first.
 pub(crate) struct PairQuery<'a> {
-    pub mode: ContactMode,
-    pub shapes: [&'a Shape; 2],
-    pub part_states: [&'a PartState; 2],
+    pub parts: MovingPair<'a>,
     pub motion_bounds: [MotionBounds; 2],
     /// Distance that counts as near, m.
     pub near: f64,
@@ -96,20 +94,20 @@ pub(crate) struct PairQuery<'a> {
 impl PairQuery<'_> {
     /// Returns whether a mesh or cylinder takes part.
     pub fn is_expensive(&self) -> bool {
-        self.shapes.iter().any(|shape| shape.has_tree())
+        self.parts.shapes.iter().any(|shape| shape.has_tree())
     }
 
     /// Returns whether the bounding boxes cannot come near each other.
     pub fn is_separated(&self) -> bool {
-        let [a, b] = [0, 1].map(|k| OrientedBox::around(self.shapes[k], &self.part_states[k].pose));
+        let [a, b] = [0, 1].map(|k| OrientedBox::around(self.parts.shapes[k], &self.parts.part_states[k].pose));
         are_separated(&a, &b, |n| self.near + self.motion_bounds[0].along(n, &self.motion_bounds[1], self.prediction))
     }
 
     /// Returns the margin of the query, and the distance by which the gap may close.
     fn margins(&self) -> (f64, f64) {
         let closing = self.near + self.motion_bounds[0].between(&self.motion_bounds[1], self.prediction);
-        let size = self.shapes.iter().map(|shape| shape.bounding_radius()).fold(f64::INFINITY, f64::min);
-        let margin = match (self.mode, self.shapes.map(|shape| shape.has_tree())) {
+        let size = self.parts.shapes.iter().map(|shape| shape.bounding_radius()).fold(f64::INFINITY, f64::min);
+        let margin = match (self.parts.mode, self.parts.shapes.map(|shape| shape.has_tree())) {
             // two trees within a wide margin have contacts by the million, so the margin is bounded
             (ContactMode::Spheres, [true, true]) => closing.min(self.near + TREE_MARGIN * size),
             (ContactMode::Surface, [true, true]) if !self.has_simple_mesh() => {
@@ -123,7 +121,8 @@ impl PairQuery<'_> {
     /// Returns whether one shape is a mesh of few vertices: a wide margin is then cheap, as for a
     /// box.
     fn has_simple_mesh(&self) -> bool {
-        self.shapes
+        self.parts
+            .shapes
             .iter()
             .any(|shape| matches!(shape, Shape::Mesh(mesh) if mesh.mesh().vertices.len() <= SIMPLE_MESH_VERTICES))
     }
@@ -139,55 +138,32 @@ impl PairQuery<'_> {
         found: &mut Vec<Contact>,
     ) -> f64 {
         let (margin, closing) = self.margins();
-        let poses = self.part_states.map(|part_state| part_state.pose);
+        let poses = self.parts.part_states.map(|part_state| part_state.pose);
         found.clear();
         if !self.is_expensive() {
-            self.query(&poses, margin, found);
+            self.parts.contacts_at(&poses, margin, found);
             return 0.0;
         }
         if !narrow_phase_cache.look_up(rows, &poses, margin, found) {
-            self.query(&poses, margin, found);
+            self.parts.contacts_at(&poses, margin, found);
         }
         narrow_phase_cache.store(rows, poses, margin, found);
-        if !found.is_empty() || self.mode == ContactMode::Spheres || margin >= closing {
+        if !found.is_empty() || self.parts.mode == ContactMode::Spheres || margin >= closing {
             return 0.0;
         }
-        self.advance_conservatively((margin, closing), horizon, found)
-    }
-
-    /// Finds contacts by conservative advancement. No gap closes faster than `closing/horizon`, so
-    /// a query without a contact within its margin, or its least gap, allows that much time to
-    /// pass.
-    fn advance_conservatively(&self, (margin, closing): (f64, f64), horizon: f64, found: &mut Vec<Contact>) -> f64 {
-        let (speed, wide) = (closing / horizon, margin.max(closing / MAX_SAMPLES));
-        let mut moment = margin / speed;
-        for appearance in 1.. {
+        let search = Search {
+            horizon,
+            margin: margin.max(closing / MAX_SAMPLES),
+            near: margin,
+            max_advances: 2 * MAX_SAMPLES as u32,
+        };
+        let start = Approach::Bounded { gap: margin, speed: closing / horizon };
+        let Some((time, nearest)) = self.parts.time_of_impact(start, &search, found) else {
             found.clear();
-            if moment > horizon {
-                break;
-            }
-            self.query(&self.part_states.map(|part_state| pose_after_free_motion(part_state, moment)), wide, found);
-            let least = found.iter().map(|contact| contact.gap).fold(f64::INFINITY, f64::min);
-            if least <= margin || (least.is_finite() && appearance >= 2 * MAX_SAMPLES as u32) {
-                found.retain(|contact| contact.gap <= least.max(margin));
-                return moment;
-            }
-            moment += least.min(wide) / speed;
-        }
-        0.0
-    }
-
-    fn query(&self, poses: &[Pose; 2], margin: f64, found: &mut Vec<Contact>) {
-        tumble_collide::contacts_in_mode(
-            self.mode,
-            self.shapes[0],
-            &poses[0],
-            self.shapes[1],
-            &poses[1],
-            margin,
-            found,
-        );
-        found.sort_by_key(|contact| contact.feature);
+            return 0.0;
+        };
+        found.retain(|contact| contact.gap <= nearest.gap.max(margin));
+        time
     }
 }
 

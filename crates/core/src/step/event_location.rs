@@ -5,6 +5,7 @@
 
 use super::contacts::Limit;
 use crate::contact::detect::ContactConstraint;
+use crate::contact::time_of_impact::time_to_close;
 use crate::object::part_state::PartState;
 use crate::settings::Settings;
 
@@ -74,14 +75,15 @@ impl Watch {
         let contacts = contact_constraints.iter().zip(&self.roles).filter(|(_, role)| !role.touching).filter_map(
             |(constraint, _)| {
                 let (a, b) = (&part_states[constraint.a as usize], &part_states[constraint.b as usize]);
-                closing(
+                time_to_close(
                     constraint.contact.gap,
                     constraint.velocity(a, b).dot(&constraint.contact.normal),
                     constraint.acceleration(a, b).x,
                 )
             },
         );
-        let limits = self.limits.iter().filter(|l| !l.touching).filter_map(|l| closing(l.gap, l.rate, l.acceleration));
+        let limits =
+            self.limits.iter().filter(|l| !l.touching).filter_map(|l| time_to_close(l.gap, l.rate, l.acceleration));
         contacts.chain(limits).chain(self.guesses.iter().copied()).fold(left, f64::min)
     }
 
@@ -113,13 +115,6 @@ impl Watch {
         };
         after.iter().map(contact).chain(limits.iter().map(limit)).fold(FAR, f64::min)
     }
-}
-
-/// When `gap + rate·t + ½·acceleration·t²` first reaches 0, s; `None` where it never does.
-fn closing(gap: f64, rate: f64, acceleration: f64) -> Option<f64> {
-    let root = rate * rate - 2.0 * acceleration * gap;
-    let t = 2.0 * gap / (-rate + root.max(0.0).sqrt());
-    (root >= 0.0 && t > 0.0).then_some(t)
 }
 
 /// The moment of a crossing, between a sub-step that ended before it and one that ended after: (length, margin) each.

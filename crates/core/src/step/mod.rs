@@ -8,14 +8,12 @@ mod joint_correction;
 mod limit_correction;
 mod moment;
 mod projection;
-mod time_of_impact;
 mod time_stepping;
 mod unreachable_joints;
 
 pub use backtracking::Backtracking;
 pub(crate) use contacts::Workspace;
 pub(crate) use moment::Moment;
-pub(crate) use time_of_impact::{pose_after_free_motion, shift_to_impact};
 pub use time_stepping::TimeStepping;
 
 use crate::world::{Core, StepError};

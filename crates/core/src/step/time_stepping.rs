@@ -26,11 +26,12 @@ use super::contacts::{
 };
 use super::impact::{self, Candidate};
 use super::projection::{self, Displacement};
-use super::{Moment, StepContext, Stepper, Workspace, time_of_impact};
+use super::{Moment, StepContext, Stepper, Workspace};
 use super::{joint_correction, limit_correction, unreachable_joints};
 use crate::constraint::rows::RowSet;
 use crate::contact::detect::ContactConstraint;
 use crate::contact::pair::PredictionMode;
+use crate::contact::time_of_impact::{time_contacts, time_to_close};
 use crate::integrators::context::free_motion;
 use crate::object::Level;
 use crate::world::view::Entry;
@@ -102,7 +103,8 @@ impl TimeStepping {
     fn advance(&mut self, core: &mut Core, middle: &mut Moment, h: f64) -> Result<(), StepError> {
         self.smooth_forces(core, middle, h)?;
         detect(core, None, (h, PredictionMode::Each), &mut self.work.contact_constraints);
-        time_of_impact::time_contacts(core, h, &mut self.work.contact_constraints);
+        let parts = (&core.owners[..], &core.derived.part_states[..]);
+        time_contacts(core.objects(), parts, &core.settings, h, &mut self.work.contact_constraints);
         build_rows(core, Some(&mut *middle), &mut self.work, Level::Velocity { h }, 0.5 * h)?;
         let mut u = std::mem::take(&mut self.work.u);
         let mut du_force = std::mem::take(&mut self.work.du_force);
@@ -160,7 +162,7 @@ impl TimeStepping {
             let (v, dv, gap) = (before[block.row as usize], gain[block.row as usize], constraint.contact.gap);
             let rest_speed = (-dv).max(impact::SLOWEST_BOUNCE);
             let impact_fraction = if constraint.restitution > 0.0 {
-                meeting(gap / h, v, dv).filter(|s| -(v + s * dv) > rest_speed)
+                time_to_close(gap / h, v, dv).filter(|s| *s <= 1.0 && -(v + s * dv) > rest_speed)
             } else {
                 None
             };
@@ -381,18 +383,4 @@ impl TimeStepping {
 /// Whether all that pushes the object does so in the middle of the step, impacts too: links, whose caches cost more than to be made twice.
 fn in_the_middle(entry: &Entry) -> bool {
     entry.moves() && entry.object.integratable().is_some_and(|b| b.holds_velocity())
-}
-
-/// The share of the step after which `gap + v·t + ½·(dv/h)·t²` first reaches 0 while closing, for `gap/h`, `v` and `dv`; `None` if it does not.
-fn meeting(gap_over_h: f64, v: f64, dv: f64) -> Option<f64> {
-    if gap_over_h <= 0.0 {
-        return (v < 0.0).then_some(0.0);
-    }
-    // ½dv·s² + v·s + g = 0: the smaller positive root, in the form that does not cancel.
-    let discriminant = v * v - 2.0 * dv * gap_over_h;
-    if discriminant < 0.0 {
-        return None;
-    }
-    let s = 2.0 * gap_over_h / (-v + discriminant.sqrt());
-    (s > 0.0 && s <= 1.0).then_some(s)
 }

@@ -2,7 +2,7 @@
 
 use super::state_memory::StateVector;
 use crate::clone_by_field::clone_by_field;
-use crate::contact::detect::WarmStarts;
+use crate::contact::warm_starts::WarmStarts;
 use crate::object::part_state::{PartState, StateRange, Wrench};
 use crate::world::sleep::{RestTimer, SleepGroup};
 use crate::world::view::Status;

@@ -1,8 +1,8 @@
 //! Skipped queries must not matter: separated pairs, followed along their motion.
 
 use super::{MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
+use crate::contact::time_of_impact::{MovingPair, pose_after_free_motion};
 use crate::object::part_state::PartState;
-use crate::step::pose_after_free_motion;
 use tumble_collide::{ContactMode, Pose, Shape, Vec3, contacts};
 
 const H: f64 = 1.0 / 60.0;
@@ -66,20 +66,22 @@ fn separated_pairs_do_not_touch_during_the_step() {
         let meets = meets.any(|m| m);
         for prediction in [PredictionMode::Relative, PredictionMode::Each] {
             let queries = PairQuery {
-                mode: ContactMode::Surface,
-                shapes: pair,
-                part_states: [&part_states[0], &part_states[1]],
+                parts: MovingPair {
+                    mode: ContactMode::Surface,
+                    shapes: pair,
+                    part_states: [&part_states[0], &part_states[1]],
+                },
                 motion_bounds,
                 near: 1e-4,
                 prediction,
             };
             let are_separated = queries.is_separated();
-            assert!(!(are_separated && meets), "{n}, {prediction:?}: told apart, and they meet");
+            assert!(!(are_separated && meets), "{n}, {prediction:?}: separated, and they meet");
             recorded += usize::from(are_separated);
         }
         touched += usize::from(meets);
     }
-    assert!(recorded > 1000 && touched > 200, "{recorded} told apart, {touched} met");
+    assert!(recorded > 1000 && touched > 200, "{recorded} separated, {touched} met");
 }
 
 /// The second query at the same poses is not made, gives the same contacts, and a wider one is.
@@ -89,9 +91,11 @@ fn contacts_of_pairs_that_did_not_move_are_cached() {
     let at = |z: f64| PartState { pose: Pose::translation(0.0, 0.0, z), ..PartState::default() };
     let part_states = [at(0.7001), at(0.0)];
     let pair = |near: f64| PairQuery {
-        mode: ContactMode::Surface,
-        shapes: [&cylinder, &block],
-        part_states: [&part_states[0], &part_states[1]],
+        parts: MovingPair {
+            mode: ContactMode::Surface,
+            shapes: [&cylinder, &block],
+            part_states: [&part_states[0], &part_states[1]],
+        },
         motion_bounds: [MotionBounds::default(); 2],
         near,
         prediction: PredictionMode::Relative,
@@ -109,7 +113,7 @@ fn contacts_of_pairs_that_did_not_move_are_cached() {
     // the stored contacts are returned
     narrow_phase_cache.last.contacts.iter_mut().for_each(|c| c.core_b = 42.0);
     let again = query(1e-3, &mut narrow_phase_cache);
-    assert!(again.len() == first.len() && again.iter().all(|c| c.core_b == 42.0), "asked again: {again:?}");
-    assert!(query(1e-5, &mut narrow_phase_cache).is_empty(), "further away than asked");
-    assert_eq!(query(2e-3, &mut narrow_phase_cache), first, "a wider look is a new one");
+    assert!(again.len() == first.len() && again.iter().all(|c| c.core_b == 42.0), "queried again: {again:?}");
+    assert!(query(1e-5, &mut narrow_phase_cache).is_empty(), "further away than the margin");
+    assert_eq!(query(2e-3, &mut narrow_phase_cache), first, "a wider query is a new one");
 }

@@ -1,0 +1,281 @@
+//! Time of impact: when and how parts that are apart meet within a step, by conservative
+//! advancement along free motion.
+//!
+//! A contact that is predicted at the start of a step has the normal of that start. It would stop a
+//! ball that flies past another, and deflect one that strikes off center along the wrong line. Two
+//! meshes of many vertices cannot be queried with the margin that a fast step needs. In both cases
+//! the pair is advanced to the time at which its surfaces are near:
+//!
+//! ```text
+//! t ← 0;   repeat   t += Δt,   then the contacts at the poses after free motion of t
+//!
+//! convex shapes    Δt = root of  g + v_n·τ + ½·a_n·τ² = 0      along the normal of the nearest contact
+//! any shapes       Δt = g / V
+//! ```
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `g` | gap of the nearest contact, less half of the distance that counts as near; if no contact is within the margin of the query, that margin |
+//! | `v_n`, `a_n` | relative velocity and acceleration along its normal |
+//! | `V` | bound on the speed at which any gap of the pair can close |
+//!
+//! The gap between convex shapes along the present normal closes no later than the shapes meet, so
+//! no advance overshoots. Another part of a mesh may come first, so meshes advance by the bound.
+
+use super::detect::{ContactConstraint, Owner};
+use crate::object::collidable::{Collidable, ContactFrame};
+use crate::object::part_state::PartState;
+use crate::rigid::rotation::turn;
+use crate::settings::Settings;
+use crate::world::view::Objects;
+use nalgebra::Translation3;
+use tumble_collide::{Contact, ContactMode, NormalFrom, Pose, Shape, Vec3};
+
+/// A relative displacement in the step below this fraction of the smaller bounding radius needs no
+/// search: the normal of the start is accurate enough.
+const SHORT_MOTION: f64 = 0.1;
+/// Maximum number of queries between the impact and the end of the step.
+const MAX_SAMPLES: f64 = 32.0;
+/// Maximum number of advances of convex shapes; the state after them is near enough.
+const MAX_ADVANCES: u32 = 12;
+
+/// Returns the first time at which `gap + rate·t + ½·acceleration·t²` reaches zero while it
+/// decreases; 0 if the gap is closed and decreases, `None` if it stays open or opens.
+///
+/// The form of the root does not cancel. Any units that agree are allowed.
+pub(crate) fn time_to_close(gap: f64, rate: f64, acceleration: f64) -> Option<f64> {
+    if gap <= 0.0 {
+        return (rate < 0.0).then_some(0.0);
+    }
+    let discriminant = rate * rate - 2.0 * acceleration * gap;
+    let time = 2.0 * gap / (-rate + discriminant.max(0.0).sqrt());
+    (discriminant >= 0.0 && time > 0.0).then_some(time)
+}
+
+/// Returns a pose after `t` seconds of free motion.
+pub(crate) fn pose_after_free_motion(part_state: &PartState, t: f64) -> Pose {
+    let position = part_state.position() + t * part_state.velocity + 0.5 * t * t * part_state.acceleration;
+    Pose::from_parts(Translation3::from(position), turn(&part_state.pose.rotation, &part_state.angular_velocity, t))
+}
+
+/// Two parts in free motion, A first; the states are those of the start of the step.
+#[derive(Clone, Copy)]
+pub(crate) struct MovingPair<'a> {
+    pub mode: ContactMode,
+    pub shapes: [&'a Shape; 2],
+    pub part_states: [&'a PartState; 2],
+}
+
+/// Distance between two parts at some time of a search.
+#[derive(Clone, Copy)]
+pub(crate) enum Approach {
+    /// The nearest contact of convex shapes.
+    Convex(Contact),
+    /// Any shapes: a gap (m) that closes no faster than `speed` (m/s).
+    Bounded { gap: f64, speed: f64 },
+}
+
+/// Limits of a search.
+#[derive(Clone, Copy)]
+pub(crate) struct Search {
+    /// Time at which it ends, s.
+    pub horizon: f64,
+    /// Margin of its queries, m.
+    pub margin: f64,
+    /// Gap at which the parts have met, m.
+    pub near: f64,
+    /// Number of advances after which parts with a contact within the margin have met.
+    pub max_advances: u32,
+}
+
+impl MovingPair<'_> {
+    /// Finds the contacts after `t` seconds of free motion, ordered by feature.
+    fn contacts_after(&self, t: f64, margin: f64, found: &mut Vec<Contact>) {
+        self.contacts_at(&self.part_states.map(|part_state| pose_after_free_motion(part_state, t)), margin, found);
+    }
+
+    /// Finds the contacts at two poses, ordered by feature.
+    pub fn contacts_at(&self, poses: &[Pose; 2], margin: f64, found: &mut Vec<Contact>) {
+        let [a, b] = self.shapes;
+        found.clear();
+        tumble_collide::contacts_in_mode(self.mode, a, &poses[0], b, &poses[1], margin, found);
+        found.sort_by_key(|contact| contact.feature);
+    }
+
+    /// Returns the time at which the parts meet, s, and the contact there; `None` if they do not
+    /// meet within the horizon. `found` receives all contacts of that time.
+    pub fn time_of_impact(
+        &self,
+        mut approach: Approach,
+        search: &Search,
+        found: &mut Vec<Contact>,
+    ) -> Option<(f64, Contact)> {
+        let mut time = 0.0;
+        for advances in 1.. {
+            time += self.advance(&approach, time, 0.5 * search.near)?;
+            if time.is_nan() || time > search.horizon {
+                break;
+            }
+            self.contacts_after(time, search.margin, found);
+            let least = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).copied();
+            let nearest = match (&mut approach, least) {
+                (Approach::Convex(known), least) => {
+                    *known = *found.iter().find(|c| c.feature == known.feature).or(least.as_ref())?;
+                    *known
+                }
+                (Approach::Bounded { gap, .. }, Some(least)) => {
+                    *gap = least.gap.min(search.margin);
+                    least
+                }
+                (Approach::Bounded { gap, .. }, None) => {
+                    *gap = search.margin;
+                    continue;
+                }
+            };
+            if nearest.gap <= search.near || advances >= search.max_advances {
+                return Some((time, nearest));
+            }
+        }
+        None
+    }
+
+    /// Returns a time span after `time` in which the parts cannot meet, s; `None` if they never do.
+    /// Convex shapes aim at a gap of `aim`, so that the last advance does not end just short of
+    /// "near".
+    fn advance(&self, approach: &Approach, time: f64, aim: f64) -> Option<f64> {
+        match approach {
+            Approach::Convex(contact) => self.time_to_close(contact, contact.gap - aim, time),
+            Approach::Bounded { gap, speed } => Some(gap / speed),
+        }
+    }
+
+    /// Returns the time from `t` until `gap` closes along the contact's normal in free motion, s.
+    fn time_to_close(&self, contact: &Contact, gap: f64, t: f64) -> Option<f64> {
+        let [a, b] = self.part_states;
+        let spin = |s: &PartState| s.velocity_at(&contact.point) - s.velocity;
+        let velocity = a.velocity - b.velocity + t * (a.acceleration - b.acceleration) + spin(a) - spin(b);
+        time_to_close(gap, contact.normal.dot(&velocity), contact.normal.dot(&(a.acceleration - b.acceleration)))
+    }
+
+    /// Returns the contact at the end of the step if the parts, which have met at `time`, move on
+    /// to there without overlap: a ball that rolls over the seam of two boxes does not strike the
+    /// edge that it meets. `None` if they overlap on the way.
+    fn contact_after_glance(
+        &self,
+        time: f64,
+        samples: f64,
+        search: &Search,
+        found: &mut Vec<Contact>,
+    ) -> Option<Contact> {
+        let mut end = None;
+        for sample in 1..=samples as u32 {
+            self.contacts_after(time + (search.horizon - time) * sample as f64 / samples, search.near, found);
+            end = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).copied();
+            if end.is_none_or(|contact| contact.gap < -search.near) {
+                return None;
+            }
+        }
+        end
+    }
+
+    /// Finds the contact with which an open contact of convex shapes closes within `horizon`, and
+    /// its time, s; `None` if it does not close. A glancing impact is checked at `samples`
+    /// times.
+    fn follow(
+        &self,
+        contact: Contact,
+        (horizon, near, samples): (f64, f64, f64),
+        found: &mut Vec<Contact>,
+    ) -> Option<(f64, Contact)> {
+        let search = Search { horizon, margin: contact.gap + near, near, max_advances: MAX_ADVANCES };
+        let (time, met) = if contact.gap <= near {
+            (0.0, contact)
+        } else {
+            self.time_of_impact(Approach::Convex(contact), &search, found)?
+        };
+        let rounded =
+            matches!(met.normal_from, NormalFrom::CorePoints | NormalFrom::LineOfA(_) | NormalFrom::LineOfB(_));
+        let end = if rounded { self.contact_after_glance(time, samples, &search, found) } else { None };
+        Some(end.map_or((time, met), |end| (horizon, end)))
+    }
+}
+
+/// Replaces every contact of fast convex parts that is open and closes within `h` by the contact at
+/// the time of impact. Removes those that do not close on the way.
+pub(crate) fn time_contacts(
+    objects: Objects,
+    (owners, part_states): (&[Owner], &[PartState]),
+    settings: &Settings,
+    h: f64,
+    contact_constraints: &mut Vec<ContactConstraint>,
+) {
+    let mut found = Vec::new();
+    let part = |index: u32| {
+        let owner = owners[index as usize];
+        let body: &dyn Collidable = objects.at(owner.place as usize).object.collidable()?;
+        Some((body.shape(owner.part as usize)?, body.contact_mode(owner.part as usize)))
+    };
+    contact_constraints.retain_mut(|constraint| {
+        let states = [constraint.a, constraint.b].map(|index| &part_states[index as usize]);
+        let (Some((a, mode_a)), Some((b, mode_b))) = (part(constraint.a), part(constraint.b)) else { return true };
+        let size = a.bounding_radius().min(b.bounding_radius());
+        let motion = h * (states[0].velocity - states[1].velocity).norm();
+        if motion < SHORT_MOTION * size {
+            return true;
+        }
+        let pair = MovingPair { mode: mode_a.of_pair(mode_b), shapes: [a, b], part_states: states };
+        if pair.time_to_close(&constraint.contact, constraint.contact.gap, 0.0).is_none_or(|t| t > h) {
+            return true;
+        }
+        if a.has_tree() || b.has_tree() {
+            return true; // contacts of a mesh begin and end with its features
+        }
+        let samples = (motion / (SHORT_MOTION * size)).min(MAX_SAMPLES).ceil();
+        let limits = (h, settings.drift_tolerance, samples);
+        let Some((time, contact)) = pair.follow(constraint.contact, limits, &mut found) else { return false };
+        if time > 0.0 {
+            constraint.move_to_impact(&contact, states, time);
+        }
+        true
+    });
+}
+
+impl ContactConstraint {
+    /// Replaces the contact by that of the time `t` of impact, s, as seen from the start of the
+    /// step: lever arms and normal of the impact, and the gap that free motion closes until then.
+    pub fn move_to_impact(&mut self, contact: &Contact, [a, b]: [&PartState; 2], t: f64) {
+        let moved = |s: &PartState| pose_after_free_motion(s, t).translation.vector - s.position();
+        let (move_a, move_b): (Vec3, Vec3) = (moved(a), moved(b));
+        let closed = contact.normal.dot(&(move_a - move_b));
+        self.contact = Contact {
+            point: contact.point - move_a,
+            gap: contact.gap - closed,
+            feature: self.contact.feature,
+            ..*contact
+        };
+        self.offset = move_a - move_b;
+        self.frame = ContactFrame::new(contact.point, contact.normal);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::time_to_close;
+
+    /// `g + v·t + ½·a·t²` with roots placed by hand: `(t − 2)(t − 3) = 6 − 5t + t²`.
+    #[test]
+    fn a_gap_closes_at_the_first_root_of_its_parabola() {
+        assert_eq!(time_to_close(6.0, -5.0, 2.0), Some(2.0));
+        assert_eq!(time_to_close(6.0, -3.0, 0.0), Some(2.0), "without acceleration");
+        assert_eq!(time_to_close(4.0, 0.0, -2.0), Some(2.0), "from rest");
+        assert_eq!(time_to_close(3.0, 2.0, -2.0), Some(3.0), "opens first");
+        assert_eq!(time_to_close(1.0, -1.0, 2.0), None, "turns back before");
+        assert_eq!(time_to_close(1.0, 1.0, 0.0), None, "opens");
+        assert_eq!(time_to_close(1.0, 0.0, 0.0), None, "rests");
+        assert_eq!(time_to_close(-1.0, -1.0, 0.0), Some(0.0), "overlaps and approaches");
+        assert_eq!(time_to_close(0.0, 1.0, -9.0), None, "touches and separates");
+        assert_eq!(time_to_close(f64::NAN, -1.0, 0.0), None);
+        // a slow closing beside a large rate: the textbook form would cancel to 0
+        assert!((time_to_close(1e-12, -1.0, 1e-3).unwrap() - 1e-12).abs() < 1e-26);
+    }
+}
