@@ -50,18 +50,6 @@ FORMER = (
 )
 # Files and folders whose words are not clean yet. Remove an entry when `--todo` counts no fault in it.
 TODO = (
-    "crates/core/src/contact/detect.rs",
-    "crates/core/src/contact/pair/tests.rs",
-    "crates/core/src/contact/pair_material.rs",
-    "crates/core/src/step/backtracking.rs",
-    "crates/core/src/step/contacts.rs",
-    "crates/core/src/step/event_location.rs",
-    "crates/core/src/step/impact.rs",
-    "crates/core/src/step/joint_correction.rs",
-    "crates/core/src/step/limit_correction.rs",
-    "crates/core/src/step/projection.rs",
-    "crates/core/src/step/time_stepping.rs",
-    "crates/core/src/step/unreachable_joints.rs",
     "crates/core/src/world/mirror.rs",
     "crates/core/src/world/mod.rs",
     "crates/core/src/world/pick.rs",

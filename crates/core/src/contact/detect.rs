@@ -1,4 +1,4 @@
-//! Which parts touch or nearly do: broad phase, filters, narrow phase, warm starts.
+//! Contact detection: broad phase, filters, narrow phase.
 
 use crate::contact::pair::{MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
 use crate::contact::pair_material::PairMaterials;
@@ -19,7 +19,7 @@ pub(crate) struct Owner {
     pub part: u32,
 }
 
-/// Names a contact across steps.
+/// Identifies a contact across steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub(crate) struct ContactKey {
     /// Serial and part of either side, A first.
@@ -27,13 +27,13 @@ pub(crate) struct ContactKey {
     pub feature: u64,
 }
 
-/// A contact between two sites, with the constants of the pair.
+/// A contact between two parts, with the constants of the pair.
 #[derive(Clone, Debug)]
 pub(crate) struct ContactConstraint {
     pub a: u32,
     pub b: u32,
     pub contact: Contact,
-    /// From A's contact point to B's, meters: not zero where the bodies meet only later in the step.
+    /// From A's contact point to B's, m: not zero if the bodies meet later in the step.
     pub offset: Vec3,
     pub frame: ContactFrame,
     pub friction: f64,
@@ -47,7 +47,8 @@ pub(crate) struct DetectorBuffers {
     proxies: Vec<u32>,
     motion_bounds: Vec<MotionBounds>,
     narrow_phase_cache: NarrowPhaseCache,
-    /// Who has which box of the broad phase: those of the last detection, and of this one. Ascending, as the site table is.
+    /// Boxes of the broad phase: those of the last detection, and of this one. Ascending, like the
+    /// part table.
     registered: Vec<BroadPhaseProxy>,
     gathered: Vec<BroadPhaseProxy>,
     /// Place in `proxies` of every handle.
@@ -57,7 +58,7 @@ pub(crate) struct DetectorBuffers {
 }
 
 impl DetectorBuffers {
-    /// Drops what was found: a frame knows nothing of the one before.
+    /// Drops the cached contacts: a frame does not depend on the one before.
     pub fn forget(&mut self) {
         self.narrow_phase_cache.forget();
     }
@@ -67,11 +68,11 @@ impl DetectorBuffers {
 #[derive(Clone, Copy)]
 struct BroadPhaseProxy {
     /// Serial and part.
-    who: [u32; 2],
+    key: [u32; 2],
     handle: u32,
 }
 
-/// What the detector reads.
+/// Inputs and working memory of a detection.
 pub(crate) struct Detector<'a> {
     pub objects: Objects<'a>,
     pub owners: &'a [Owner],
@@ -80,12 +81,13 @@ pub(crate) struct Detector<'a> {
     pub pair_materials: &'a PairMaterials,
     pub broad: &'a mut dyn BroadPhase,
     pub scratch: &'a mut DetectorBuffers,
-    /// Serials of sleepers that something comes near.
+    /// Serials of sleeping objects that something comes near.
     pub needs_wake: &'a mut Vec<u32>,
 }
 
 impl Detector<'_> {
-    /// All contacts whose gap is at most what the pair may close within `horizon` seconds, plus the drift tolerance.
+    /// Finds all contacts whose gap is at most the distance that the pair may close within
+    /// `horizon` seconds, plus the drift tolerance.
     pub fn detect(&mut self, horizon: f64, prediction: PredictionMode, out: &mut Vec<ContactConstraint>) {
         out.clear();
         self.gather(horizon);
@@ -100,7 +102,8 @@ impl Detector<'_> {
         self.scratch.pairs = pairs;
     }
 
-    /// One box per part that can meet anything, around all its way, filed in the broad phase.
+    /// Puts one box per collidable part, around its motion within the horizon, into the broad
+    /// phase.
     fn gather(&mut self, horizon: f64) {
         let s = &mut *self.scratch;
         s.proxies.clear();
@@ -117,11 +120,11 @@ impl Detector<'_> {
                 let motion_bounds = MotionBounds::new(part_state, shape.bounding_radius(), around, horizon);
                 let bounds = motion_bounds.swept(&tight, self.settings.drift_tolerance);
                 let moving = entry.status.mode != Mode::Static && !entry.asleep;
-                let who = [entry.serial, part as u32];
-                while let Some(gone) = registered.next_if(|f| f.who < who) {
+                let key = [entry.serial, part as u32];
+                while let Some(gone) = registered.next_if(|f| f.key < key) {
                     self.broad.remove(gone.handle);
                 }
-                let handle = match registered.next_if(|f| f.who == who) {
+                let handle = match registered.next_if(|f| f.key == key) {
                     Some(known) => {
                         self.broad.set(known.handle, &bounds, moving);
                         known.handle
@@ -130,14 +133,15 @@ impl Detector<'_> {
                 };
                 s.proxies.push(index as u32);
                 s.motion_bounds.push(motion_bounds);
-                s.gathered.push(BroadPhaseProxy { who, handle });
+                s.gathered.push(BroadPhaseProxy { key, handle });
             }
         }
         registered.for_each(|gone| self.broad.remove(gone.handle));
         std::mem::swap(&mut s.registered, &mut s.gathered);
     }
 
-    /// Pairs of handles as pairs of places in `proxies`, ascending: what the broad phase remembers does not show. Already in order, as a rule.
+    /// Converts pairs of handles to pairs of places in `proxies`, ascending, so the result does not
+    /// depend on the cache of the broad phase.
     fn order_by_part(&mut self, pairs: &mut [[u32; 2]]) {
         let s = &mut *self.scratch;
         let handles = s.registered.iter().map(|f| f.handle as usize + 1).max().unwrap_or(0);
@@ -152,7 +156,7 @@ impl Detector<'_> {
         pairs.sort_unstable();
     }
 
-    /// The contacts of one pair.
+    /// Adds the contacts of one pair.
     fn narrow(
         &mut self,
         [i, j]: [usize; 2],
@@ -184,7 +188,7 @@ impl Detector<'_> {
         let time = pair.contacts([a, b], horizon, &mut self.scratch.narrow_phase_cache, found);
         let first = out.len();
         if let Some(sleeper) = [entry_a, entry_b].into_iter().find(|e| e.asleep) {
-            // the frame will be done again with it awake
+            // the frame will be repeated with it awake
             self.needs_wake.extend((!found.is_empty()).then_some(sleeper.serial));
             return;
         }
@@ -217,18 +221,20 @@ impl Detector<'_> {
     }
 }
 
-/// Rate of a normal that points from B's core point to A's, for the relative velocity of the two.
+/// Returns the rate of a normal that points from B's core point to A's, for the relative velocity
+/// of the two.
 fn turning(c: &Contact, relative: Vec3) -> Vec3 {
     let distance = c.core_a + c.core_b + c.gap;
     if distance > 0.0 { across(relative, &c.normal) / distance } else { Vec3::zeros() }
 }
 
-/// The part of `v` across a unit direction.
+/// Returns the part of `v` across a unit direction.
 fn across(v: Vec3, along: &Vec3) -> Vec3 {
     v - along * along.dot(&v)
 }
 
-/// Whether two parts are to be tested: one of them moves (or is led towards a sleeper), and both kinds say yes.
+/// Returns whether two parts are to be tested: one of them moves (or is kinematic and approaches a
+/// sleeping object), and both collision groups allow it.
 pub(crate) fn may_collide(a: &Entry, part_a: usize, b: &Entry, part_b: usize, part_states: &[PartState]) -> bool {
     let (Some(ca), Some(cb)) = (a.object.collidable(), b.object.collidable()) else { return false };
     let wakes = a.asleep && b.approaches(part_states) || b.asleep && a.approaches(part_states);
@@ -242,20 +248,23 @@ pub(crate) fn may_collide(a: &Entry, part_a: usize, b: &Entry, part_b: usize, pa
 }
 
 impl ContactConstraint {
-    /// The contact point as B has it, meters.
+    /// Returns the contact point of B, m.
     pub fn point_b(&self) -> Vec3 {
         self.contact.point + self.offset
     }
 
-    /// Relative velocity of A against B at the contact, m/s; negative along the normal where they approach.
+    /// Returns the relative velocity of A against B at the contact, m/s; negative along the normal
+    /// if they approach.
     pub fn velocity(&self, a: &PartState, b: &PartState) -> Vec3 {
         a.velocity_at(&self.contact.point) - b.velocity_at(&self.point_b())
     }
 
-    /// Rate of the relative velocity along the contact's axes, as the *contact* moves, m/s²; the first is the second derivative of the gap.
+    /// Returns the rate of the relative velocity along the contact's axes, as the *contact* moves,
+    /// m/s²; the first is the second derivative of the gap.
     ///
-    /// The contact point is not a material point of a rounded surface: a ball that spins in place has a centripetal acceleration at its
-    /// lowest point, and yet does not rise (thesis Fig. 17). So the point's own velocity `ṗ` and the normal's `ṅ` are taken from the core
+    /// The contact point is not a material point of a rounded surface: a sphere that spins in place
+    /// has a centripetal acceleration at its lowest point, and yet does not rise (thesis Fig. 17).
+    /// So the velocity `ṗ` of the point and the rate `ṅ` of the normal follow from the core
     /// features that carry the contact:
     ///
     /// ```text

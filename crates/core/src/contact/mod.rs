@@ -1,4 +1,5 @@
-//! Contact detection: broad phase, filters and narrow phase for pairs of parts, and the constants of the pairs.
+//! Contact detection: broad phase, filters and narrow phase for pairs of parts, and the constants
+//! of the pairs.
 
 pub(crate) mod detect;
 pub(crate) mod pair;

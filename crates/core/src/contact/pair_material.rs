@@ -1,11 +1,12 @@
-//! Restitution and friction of chosen pairs, instead of what [`Settings`] makes of the materials of two parts.
+//! Restitution and friction of chosen pairs, instead of what [`Settings`] makes of the materials of
+//! two parts.
 
 use crate::object::Material;
 use crate::settings::{Settings, SettingsError};
 use crate::world::view::ObjectId;
 use std::collections::BTreeMap;
 
-/// One side of a pair that has surface constants of its own.
+/// One side of a pair with surface constants of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum PairSide {
     /// One part of an object.
@@ -61,7 +62,7 @@ pub(crate) struct PairMaterials {
 }
 
 impl PairMaterials {
-    /// Files the constants of a pair; constants that are both `None` take the pair off.
+    /// Sets the constants of a pair; constants that are both `None` remove the pair.
     pub fn set(&mut self, mut sides: [PairSide; 2], material: PairMaterial) {
         sides.sort_unstable();
         match material == PairMaterial::default() {
@@ -70,18 +71,19 @@ impl PairMaterials {
         };
     }
 
-    /// All chosen pairs, in the order of their keys.
+    /// Returns all chosen pairs, in the order of their keys.
     pub fn iter(&self) -> impl Iterator<Item = (&[PairSide; 2], &PairMaterial)> {
         self.entries.iter()
     }
 
-    /// Takes off all pairs of an object.
+    /// Removes all pairs of an object.
     pub fn forget(&mut self, id: ObjectId) {
         let of = |side: &PairSide| matches!(side, PairSide::Part(other, _) | PairSide::Object(other) if *other == id);
         self.entries.retain(|sides, _| !sides.iter().any(of));
     }
 
-    /// What a contact of two parts has, `a` the one that was added first: for each constant the entry that names the pair most closely, or else the rule.
+    /// Returns the constants of a contact of two parts, `a` the one that was added first: for each
+    /// constant the entry that names the pair most closely, or else the combination rule.
     pub fn combine(&self, settings: &Settings, a: Surface, b: Surface) -> Material {
         let chosen = if self.entries.is_empty() { PairMaterial::default() } else { self.of(a, b) };
         let rule = |combine: crate::Combine, of: fn(&Material) -> f64| combine.of(of(&a.2), of(&b.2));
@@ -92,8 +94,8 @@ impl PairMaterials {
         }
     }
 
-    /// A part goes before its object, and that before its material; between entries that name a pair equally closely the one that names `a` more
-    /// closely decides.
+    /// A part goes before its object, and that before its material; between entries that name a
+    /// pair equally closely the one that names `a` more closely decides.
     fn of(&self, a: Surface, b: Surface) -> PairMaterial {
         let sides = |(id, part, m): Surface| [PairSide::Part(id, part), PairSide::Object(id), PairSide::Material(m.id)];
         let (a, b) = (sides(a), sides(b));

@@ -49,7 +49,7 @@ pub(crate) fn time_to_close(gap: f64, rate: f64, acceleration: f64) -> Option<f6
     }
     let discriminant = rate * rate - 2.0 * acceleration * gap;
     let time = 2.0 * gap / (-rate + discriminant.max(0.0).sqrt());
-    (discriminant >= 0.0 && time > 0.0).then_some(time)
+    (discriminant >= 0.0 && time > 0.0 && time.is_finite()).then_some(time)
 }
 
 /// Returns a pose after `t` seconds of free motion.

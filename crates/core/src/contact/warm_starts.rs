@@ -36,7 +36,8 @@ impl WarmStarts {
         }
     }
 
-    /// Returns the force of a contact. `place` is where the last search ended, so keys in ascending order are found in a step or two.
+    /// Returns the force of a contact. `place` is where the last search ended, so keys in ascending
+    /// order are found in a step or two.
     pub fn get(&self, key: &ContactKey, place: &mut usize) -> Option<Vec3> {
         let before = self.entries[..*place].last().is_some_and(|e| e.0 >= *key);
         let from = if before { 0 } else { *place };

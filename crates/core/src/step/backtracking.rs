@@ -1,32 +1,38 @@
-//! The backtracking stepper: Algorithm 4 of the thesis (§IV.B.4), made to end and to land on the moment of contact.
+//! The backtracking stepper: Algorithm 4 of the thesis (§IV.B.4), with event location and a bound
+//! on its tries.
 //!
 //! ```text
 //! while the frame has time left:
+//!     correct        overlap beyond the contact tolerance
 //!     impacts        at the touching contacts that approach                       (reflections)
 //!     resting        forces f at the acceleration level:  a + v/h + K f ≥ 0 ⟂ f ≥ 0, friction; they hold over the sub-step
-//!     try h          integrate; go back while a new contact is deeper than the contact tolerance; land where it just touches
-//!     commit
+//!     try h          integrate; go back while a new contact is deeper than the contact tolerance; land when it just touches
+//!     correct        joints, and limits that had a force
 //! ```
 //!
-//! Where the thesis halves, the time of contact is bracketed: the first guess is where the parabola of each nearing contact closes, then false
-//! position with bisection as its guard. With `dormand_prince` a sub-step is integrated once and the tries are read from its dense output; the
-//! state that is committed is then integrated to the moment found. Limits that tell their gaps ([`Constraint::gaps`](crate::Constraint::gaps))
-//! are located like contacts. The rules that make a frame end:
+//! The thesis halves the sub-step; here the time of contact is bracketed. The first guess is the
+//! time at which the first parabola of a gap closes. False position follows, guarded by bisection.
+//! With `dormand_prince` a sub-step is integrated once and the tries are read from its dense
+//! output; the committed state is then integrated to the located time. Limits with a reported gap
+//! ([`Constraint::gaps`](crate::Constraint::gaps)) are located like contacts. These rules make a
+//! frame end:
 //!
-//! - a contact that *lasts* (its pair carried a resting force in the sub-step before) may drift by the drift tolerance; it is projected out
-//!   afterwards and never makes the step go back; depth that was there before is no reason either;
-//! - a rebound that would be lower than the contact tolerance rests: the cut-off `√(2·a·tol)/e`, with `a` the contact's own pressing
-//!   acceleration, is tied to the tolerance and not to the frame (but never above what `a` gives in a frame);
-//! - the sub-step has a floor, and a frame has a cap on tries; beyond it the rest of the frame is one time-stepping sub-step. Both are
-//!   counted as floor hits.
+//! - a contact that *lasts* (its pair carried a resting force in the sub-step before) may drift by
+//!   the drift tolerance; its overlap is corrected afterwards and never ends the sub-step, and
+//!   neither does depth from before the sub-step;
+//! - a rebound that would be lower than the contact tolerance rests: the cut-off `√(2·a·tol)/e`,
+//!   with `a` the contact's own pressing acceleration, depends on the tolerance and not on the
+//!   frame (but is at most the speed that `a` gives in a frame);
+//! - the sub-step has a floor, and a frame has a cap on tries; beyond it the rest of the frame is
+//!   one time-stepping sub-step. Both are counted as floor hits.
 
 use super::contacts::{
     Limit, build_rows, detect, gyroscopic, impulses, limits, push, recover, row_velocities, solve, warm_start, whiten,
 };
+use super::correction::{self, ActiveLimit, Contacts, Limits, Options};
 use super::event_location::{Bracket, LimitRole, Role, SLOW, Watch};
 use super::impact::{self, Candidate};
-use super::limit_correction::{self, ActiveLimit};
-use super::{StepContext, Stepper, TimeStepping, Workspace, joint_correction, projection, unreachable_joints};
+use super::{StepContext, Stepper, TimeStepping, Workspace};
 use crate::constraint::rows::RowSet;
 use crate::contact::detect::ContactConstraint;
 use crate::contact::pair::PredictionMode;
@@ -42,26 +48,24 @@ use crate::world::{Core, StepError};
 #[derive(Default)]
 pub struct Backtracking {
     work: Workspace,
-    /// Contacts and limits of the state tried.
+    /// Contacts and limits of the tried state.
     after: Vec<ContactConstraint>,
     limits_after: Vec<Limit>,
     watch: Watch,
-    /// Limits that push in this sub-step, and where their rows at its end are made.
+    /// Limits with a force in this sub-step, and the rows at its end.
     held: Vec<ActiveLimit>,
     probe: Workspace,
     adaptive: Adaptive,
-    /// Error of every constraint row that is not to be taken back in this sub-step.
-    kept: Vec<f64>,
     fallback: TimeStepping,
 }
 
-/// Tries in a frame after which the rest of it is one time-stepping sub-step.
+/// Number of tries in a frame after which the rest of it is one time-stepping sub-step.
 const TRIES: u32 = 200;
-/// Least sub-step, as a share of the frame.
+/// Least sub-step, as a fraction of the frame.
 const FLOOR: f64 = 1.0 / (1 << 28) as f64;
-/// Passes of the impact phase at most.
+/// Maximum number of passes of the impact phase.
 const IMPACT_PASSES: u32 = 200;
-/// Corrections at most of a moment that dense output found, before its own state is taken.
+/// Maximum number of corrections of a time found by dense output, before the dense state is taken.
 const CORRECTIONS: u32 = 2;
 
 impl Stepper for Backtracking {
@@ -99,26 +103,27 @@ impl Stepper for Backtracking {
 }
 
 impl Backtracking {
-    /// Contacts, rows and smooth accelerations at the present state; overlap beyond the contact tolerance is projected out first.
+    /// Corrects overlap beyond the contact tolerance, then computes contacts, rows and smooth
+    /// accelerations at the present state.
     fn gather(&mut self, core: &mut Core, left: f64) -> Result<(), StepError> {
         detect(core, None, (left, PredictionMode::Relative), &mut self.work.contact_constraints);
         build_rows(core, None, &mut self.work, Level::Acceleration, 0.0)?;
         let off = |e: f64| e < -core.settings.contact_tolerance;
         let drifted = |t: &RowTarget| t.set == RowSet::HalfLine && off(t.error);
         if self.work.targets.iter().any(drifted) || self.work.contact_constraints.iter().any(|t| off(t.contact.gap)) {
-            projection::project(
-                core,
-                None,
-                &mut self.work,
-                projection::Displacement::InPlace,
-                core.settings.recovery_speed * left,
-                1e-2 * core.settings.contact_tolerance,
-            )?;
+            let options = Options {
+                h: left,
+                level: Level::Acceleration,
+                start: &[],
+                contacts: Contacts::InPlace,
+                limits: Limits::Free,
+                recovery: core.settings.recovery_speed * left,
+                tolerance: 1e-2 * core.settings.contact_tolerance,
+            };
+            correction::correct(core, None, &mut self.work, &mut self.probe, &options)?;
             core.integration().refresh();
             detect(core, None, (left, PredictionMode::Relative), &mut self.work.contact_constraints);
         }
-        let recovery = core.settings.recovery_speed * left;
-        self.kept = unreachable_joints::left(&self.work, |i| self.work.targets[i].error, recovery);
         self.work.dp.resize(core.dof, 0.0);
         let time = core.state.time;
         core.integration().evaluate(time, &mut self.work.dp);
@@ -126,6 +131,7 @@ impl Backtracking {
         build_rows(core, None, &mut self.work, Level::Acceleration, 0.5 * left)
     }
 
+    /// Writes the role of every contact in the sub-step.
     fn roles(&mut self, core: &Core) {
         let s = &core.settings;
         let role = |constraint: &ContactConstraint| {
@@ -145,7 +151,8 @@ impl Backtracking {
         self.watch.roles.extend(self.work.contact_constraints.iter().map(role));
     }
 
-    /// Thesis `ResolveImpacts`; whether anything was struck, so that other contacts may be near now.
+    /// Resolves impacts (thesis `ResolveImpacts`). Returns whether any velocity changed, so that
+    /// other contacts may be near now.
     fn resolve_impacts(&mut self, core: &mut Core) -> bool {
         let work = &mut self.work;
         let s = core.settings;
@@ -179,7 +186,8 @@ impl Backtracking {
         struck
     }
 
-    /// Thesis `ResolveContacts`: the generalized contact forces that hold over the sub-step.
+    /// Resolves contacts (thesis `ResolveContacts`). Returns the generalized contact forces that
+    /// hold over the sub-step.
     fn resolve_contacts(&mut self, core: &mut Core, left: f64) -> Result<Vec<f64>, StepError> {
         let mut dp = std::mem::take(&mut self.work.dp);
         let time = core.state.time;
@@ -211,7 +219,7 @@ impl Backtracking {
         let contact_constraints = work.contact_constraints.len();
         for (i, target) in work.targets.iter().enumerate() {
             let row = work.rows.blocks[contact_constraints + i].row as usize;
-            // rows are those of the middle of the step, and go on turning for the other half
+            // rows are those of the middle of the step, and turn further in its second half
             work.c[row] += 0.5 * target.bias_acceleration + (velocity[row] - target.velocity) / left;
             if target.set == RowSet::HalfLine {
                 work.c[row] += target.error.max(0.0) / (left * left);
@@ -226,10 +234,11 @@ impl Backtracking {
             tolerance: s.tolerance / left,
         };
         let ray = solve(core, work, solver_settings, left, |b| keep[b]);
-        self.held = limit_correction::pushing(work);
+        self.held = correction::limits_with_force(work);
         let mut held = vec![0.0; core.dof];
         if ray {
-            // no force at the acceleration level keeps the contacts: an impulse without collision does
+            // no force at the acceleration level keeps the contacts closed; an impulse without
+            // collision does
             let after: Vec<f64> = u.iter().zip(&work.du).map(|(u, du)| u + left * du).collect();
             push_to(core, &after, &u);
         } else {
@@ -243,7 +252,8 @@ impl Backtracking {
         Ok(held)
     }
 
-    /// What limits do in the sub-step: those that are located act once they are reached, the others act ahead. `velocity` has the rows' velocities,
+    /// Assigns the roles of limits: those with a reported gap are active from the time at which
+    /// they are reached, others over the whole sub-step. `velocity` has the velocities of the rows,
     /// `work.c` their accelerations.
     fn watch_limits(&mut self, core: &Core, velocity: &[f64], keep: &mut [bool]) {
         let (work, contact_constraints, watch) = (&self.work, self.work.contact_constraints.len(), &mut self.watch);
@@ -276,7 +286,8 @@ impl Backtracking {
         }
     }
 
-    /// Integrates as far as nothing new crosses, `left` at most; the time taken.
+    /// Integrates to the next event, at most for `left` seconds. Returns the length of the
+    /// sub-step, s.
     fn advance(&mut self, core: &mut Core, held: &[f64], left: f64) -> Result<f64, StepError> {
         core.held.copy_from_slice(held);
         self.adaptive.path.clear();
@@ -301,9 +312,7 @@ impl Backtracking {
                     h = self.settle(core, h, &bracket, if landed { f } else { f64::NAN })?;
                 }
                 core.clear_contact_forces();
-                let reach = core.settings.drift_tolerance;
-                limit_correction::hold(core, &mut self.probe, &self.held, h, reach)?;
-                joint_correction::close(core, None, &mut self.work, &start, (h, Level::Acceleration), &self.kept)?;
+                self.correct(core, &start, (h, left))?;
                 core.finish_substep(h)?;
                 return Ok(h);
             }
@@ -318,7 +327,23 @@ impl Backtracking {
         }
     }
 
-    /// The state `h` after `start`: from the dense output where this sub-step has been integrated that far, else by the integrator. How far it came.
+    /// Corrects joints, and limits that had a force, at the end of a sub-step of `h` seconds;
+    /// `left` is the time until the end of the frame.
+    fn correct(&mut self, core: &mut Core, start: &[f64], (h, left): (f64, f64)) -> Result<(), StepError> {
+        let options = Options {
+            h,
+            level: Level::Acceleration,
+            start,
+            contacts: Contacts::Ignored,
+            limits: Limits::Listed { limits: &self.held, reach: core.settings.drift_tolerance },
+            recovery: core.settings.recovery_speed * left,
+            tolerance: core.settings.contact_tolerance,
+        };
+        correction::correct(core, None, &mut self.work, &mut self.probe, &options)
+    }
+
+    /// Computes the state `h` after `start`: from the dense output if this sub-step has been
+    /// integrated that far, else by the integrator. Returns the time that it covers, s.
     fn go_to(&mut self, core: &mut Core, start: &[f64], h: f64) -> Result<f64, StepError> {
         if self.adaptive.path.reaches(h) {
             self.adaptive.path.write(&mut core.integration(), h);
@@ -337,9 +362,11 @@ impl Backtracking {
         Ok(came)
     }
 
-    /// Replaces the state of the dense output at `h`, whose margin is `f`, by one that is integrated from the start of the inner step to there: it has the
-    /// full order, and forces and accelerations of its own. Where that one has not landed, because the two differ by more than the contact
-    /// tolerance, the moment is corrected; if that does not help (or `f` is not known) the dense state stays. The time taken.
+    /// Replaces the state of the dense output at `h`, whose margin is `f`, by one that is
+    /// integrated from the start of the inner step: it has the full order, and forces and
+    /// accelerations of its own. If it has not landed, because the two differ by more than the
+    /// contact tolerance, the time is corrected; if that does not help (or `f` is NaN), the dense
+    /// state stays. Returns the length of the sub-step, s.
     fn settle(&mut self, core: &mut Core, h: f64, bracket: &Bracket, f: f64) -> Result<f64, StepError> {
         let (dense, tolerance, time) = (core.state.x.to_vec(), core.settings.contact_tolerance, core.state.time);
         let deepest = core.report.max_penetration;
@@ -368,7 +395,8 @@ impl Backtracking {
         Ok(h)
     }
 
-    /// The margin of the present state, `h` after the start of the sub-step: one try.
+    /// Returns the margin of the present state, `h` after the start of the sub-step, m. It counts
+    /// as a try.
     fn margin(&mut self, core: &mut Core, h: f64) -> Result<f64, StepError> {
         core.report.tries += 1;
         detect(core, None, (0.0, PredictionMode::Relative), &mut self.after);
@@ -382,8 +410,9 @@ impl Backtracking {
     }
 }
 
-/// The forces that hold over the sub-step: generalized ones into `held`. What contacts do to an object whose state holds velocities is kept as wrenches on
-/// its parts: its coordinates turn with its links, and a force in them would turn too.
+/// Writes the forces that hold over the sub-step to `held`, as generalized forces. Contact forces
+/// on an object whose state holds velocities are stored as wrenches on its parts: its coordinates
+/// turn with its links, and a generalized force would turn too.
 fn hold_forces(core: &mut Core, work: &Workspace, held: &mut [f64]) {
     recover(core.coordinates(None), &work.du, held);
     core.held_wrenches.clear();
@@ -415,7 +444,7 @@ fn hold_forces(core: &mut Core, work: &Workspace, held: &mut [f64]) {
     }
 }
 
-/// Makes the whitened velocity `after` where it was `before`, and refreshes what readers see.
+/// Changes the whitened velocity from `before` to `after`, and refreshes part states and caches.
 fn push_to(core: &mut Core, after: &[f64], before: &[f64]) {
     let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
     push(core.coordinates(None), &change, &mut Vec::new());

@@ -1,7 +1,7 @@
-//! From touches to rows, and from multipliers back to momentum: what both steppers share.
+//! Contacts and constraints to rows, and multipliers to momentum: shared by both steppers.
 
-use super::projection::Projection;
-use super::{Moment, joint_correction};
+use super::Moment;
+use super::correction::{self, Frictionless};
 use crate::constraint::builder::{RowBuilder, RowKind, constraints};
 use crate::constraint::rows::{RowSet, Rows};
 use crate::contact::detect::{ContactConstraint, Detector, Owner};
@@ -15,19 +15,20 @@ use crate::world::view::{ObjectId, WorldView};
 use crate::world::{Coordinates, Core, StepError};
 use tumble_collide::Vec3;
 
-/// Buffers of a step, kept from one to the next. Rows of touches come first, in the order of `contact_constraints`, then those of constraints.
+/// Buffers of a step. Rows of contacts come first, in the order of `contact_constraints`, then
+/// those of constraints.
 #[derive(Default)]
 pub(crate) struct Workspace {
     pub contact_constraints: Vec<ContactConstraint>,
     pub rows: Rows,
     pub islands: Islands,
-    /// Row velocities that come from led and static sides.
+    /// Row velocities due to kinematic and static sides.
     pub bias: Vec<f64>,
-    /// Targets of the constraints' rows, after those of the touches.
+    /// Targets of the constraints' rows.
     pub targets: Vec<RowTarget>,
-    /// What each target is of.
+    /// Kind of each target.
     pub kinds: Vec<RowKind>,
-    /// One-sided rows that their constraints locate, at the present state.
+    /// Limits with a reported gap, at the present state.
     pub limits: Vec<Limit>,
     /// First target of each constraint, and the end.
     pub first: Vec<usize>,
@@ -36,26 +37,26 @@ pub(crate) struct Workspace {
     pub lambda: Vec<f64>,
     /// `Y·λ` of the last solve.
     pub du: Vec<f64>,
-    /// Whitened velocity at the start, and what the forces add in a step.
+    /// Whitened velocity at the start, and its change in a step due to forces.
     pub u: Vec<f64>,
     pub du_force: Vec<f64>,
     pub dp: Vec<f64>,
-    /// What the projection solves.
-    pub projection: Projection,
+    /// The rows of the first round of the correction.
+    pub frictionless: Frictionless,
 }
 
-/// A one-sided row of a constraint, whose gap is told at any state.
+/// A half-line row of a constraint that reports its gap at any state.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limit {
-    /// Place of the constraint in the order of constraints, and of the row among its one-sided ones.
+    /// Place of the constraint in the order of constraints, and of the row among its half-lines.
     pub key: [u32; 2],
-    /// Meters or radians; negative where violated.
+    /// Gap, m or rad; negative if violated.
     pub gap: f64,
-    /// Its target, where the rows made match the gaps told.
+    /// Its target; `None` if the numbers of rows and gaps differ.
     pub target: Option<u32>,
 }
 
-/// Writes the one-sided rows that constraints locate in a view; sorted by key.
+/// Writes the gaps that constraints report in a view, sorted by key.
 pub(crate) fn limits(view: &WorldView, out: &mut Vec<Limit>) -> Result<(), StepError> {
     out.clear();
     let mut gaps = Vec::new();
@@ -65,7 +66,7 @@ pub(crate) fn limits(view: &WorldView, out: &mut Vec<Limit>) -> Result<(), StepE
         if gaps.iter().any(|gap| !gap.is_finite()) {
             return Err(StepError::Row {
                 object: entry.name.to_string(),
-                why: "a gap that it tells is not finite".into(),
+                why: "a gap that it reports is not finite".into(),
             });
         }
         out.extend(gaps.iter().enumerate().map(|(row, gap)| Limit {
@@ -77,7 +78,8 @@ pub(crate) fn limits(view: &WorldView, out: &mut Vec<Limit>) -> Result<(), StepE
     Ok(())
 }
 
-/// Finds the contacts at `moment`, or else at the present, within reach of the next `horizon` seconds.
+/// Finds the contacts at `moment`, or else at the present, within reach of the next `horizon`
+/// seconds.
 pub(crate) fn detect(
     core: &mut Core,
     moment: Option<&Moment>,
@@ -100,7 +102,8 @@ pub(crate) fn detect(
     core.report.contacts = out.len() as u32;
 }
 
-/// Returns the state in `ahead` seconds if no momentum changes (or no velocity, of objects whose state holds velocities).
+/// Returns the state in `ahead` seconds if no momentum changes (or no velocity, of objects whose
+/// state holds velocities).
 fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
     let mut moment = core.moment();
     let Coordinates { objects, x, caches } = moment.coordinates(core);
@@ -122,19 +125,19 @@ fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
 /// The states from which rows are made.
 pub(crate) struct Basis<'a> {
     pub owners: &'a [Owner],
-    /// State and part states at which the contacts were found.
+    /// State and part states of the detection.
     pub found: (&'a [f64], &'a [PartState]),
     /// Part states at which contacts act on dynamic objects, if other than `found`.
     pub acting: Option<&'a [PartState]>,
-    /// The caches by which all rows respond.
+    /// The caches that compute the responses.
     pub caches: &'a mut [Cache],
-    /// The view that constraints are given.
+    /// The view of constraints.
     pub view: WorldView<'a>,
 }
 
 impl Core {
-    /// Returns the basis of rows of contacts at the present and of constraints at a time (s) and a moment, or else the present.
-    /// Rows respond at the moment `acting`, or else at the present.
+    /// Returns the basis of rows of contacts at the present and of constraints at a time (s) and a
+    /// moment, or else the present. Rows respond at the moment `acting`, or else at the present.
     pub(super) fn basis<'a>(
         &'a mut self,
         acting: Option<&'a mut Moment>,
@@ -154,12 +157,13 @@ impl Core {
     }
 }
 
-/// Makes the rows of all touches and constraints: the thesis's test impulses. Rows respond at the moment `acting`, or else at the
-/// present.
+/// Builds the rows of all contacts and constraints: the thesis's test impulses. Rows respond at the
+/// moment `acting`, or else at the present.
 ///
-/// Touches are as they were found. Constraints see the state that free motion makes in `ahead` seconds, half the step to come: a
-/// direction that turns is then right to second order, whereas one taken at the start feeds energy to every pendulum (`g·h/2ℓ` of it a
-/// second). Joints are closed at that state first. Errors are those of the present state all the same.
+/// Contacts are those of the detection. Constraints see the state after free motion of `ahead`
+/// seconds, half the step to come: a direction that turns is then accurate to second order, and
+/// rows of the start would feed energy to every pendulum (`g·h/2ℓ` of it a second). Joints are
+/// closed at that state first. Errors are nevertheless those of the present state.
 pub(crate) fn build_rows(
     core: &mut Core,
     mut acting: Option<&mut Moment>,
@@ -176,8 +180,8 @@ pub(crate) fn build_rows(
     lay_rows(core.basis(acting.as_deref_mut(), time + ahead, Some(&middle)), work, level)?;
     core.moments.push(middle);
     let mut present = Vec::new();
-    if work.targets.iter().any(joint_correction::is_joint) {
-        let (errors, made) = joint_correction::middle(core, acting.as_deref_mut(), level, ahead)?;
+    if work.targets.iter().any(correction::is_joint) {
+        let (errors, made) = correction::middle(core, acting.as_deref_mut(), level, ahead)?;
         adopt(core.basis(acting.as_deref_mut(), time, None), work, made);
         present = errors;
     }
@@ -189,7 +193,7 @@ pub(crate) fn build_rows(
     locate_limits(core, work, time)
 }
 
-/// Makes the rows of the touches and of the constraints; errors are those of the view.
+/// Builds the rows of the contacts and of the constraints; errors are those of the view.
 pub(crate) fn lay_rows(mut basis: Basis, work: &mut Workspace, level: Level) -> Result<(), StepError> {
     lay_contact_rows(&mut basis, work);
     let mut problem = None;
@@ -228,7 +232,7 @@ fn make_room(work: &mut Workspace) {
     zero(&mut work.lambda, n);
 }
 
-/// Makes the rows of the touches, and no others.
+/// Builds the rows of the contacts alone.
 fn lay_contact_rows(basis: &mut Basis, work: &mut Workspace) {
     let (objects, (x, found)) = (basis.view.objects, basis.found);
     work.rows.clear(objects.table.dof());
@@ -258,7 +262,8 @@ fn lay_contact_rows(basis: &mut Basis, work: &mut Workspace) {
             let (owner, index) = (basis.owners[part_state as usize], part_state as usize);
             let entry = objects.at(owner.place as usize);
             let acting = basis.acting.filter(|_| entry.moves());
-            // the arm stays as it was found: the lowest point of a ball that spins does not turn with it
+            // the lever arm stays that of the detection: the lowest point of a spinning sphere does
+            // not turn with it
             let point =
                 acting.map_or(point, |part_states| point + part_states[index].position() - found[index].position());
             builder.part_states = acting.unwrap_or(found);
@@ -267,7 +272,7 @@ fn lay_contact_rows(basis: &mut Basis, work: &mut Workspace) {
     }
 }
 
-/// The touches' rows, and after them the constraints' rows of another workspace.
+/// Builds the rows of the contacts, and appends the constraints' rows of another workspace.
 fn adopt(mut basis: Basis, work: &mut Workspace, made: Workspace) {
     lay_contact_rows(&mut basis, work);
     for block in &made.rows.blocks {
@@ -283,7 +288,8 @@ fn adopt(mut basis: Basis, work: &mut Workspace, made: Workspace) {
     make_room(work);
 }
 
-/// Gives one-sided rows the gaps that their constraints report for the present state and a time (s).
+/// Sets the errors of half-lines to the gaps that their constraints report at the present state and
+/// a time (s).
 pub(super) fn locate_limits(core: &Core, work: &mut Workspace, time: f64) -> Result<(), StepError> {
     limits(&core.view(time), &mut work.limits)?;
     let first = &work.first;
@@ -301,7 +307,8 @@ pub(super) fn locate_limits(core: &Core, work: &mut Workspace, time: f64) -> Res
     Ok(())
 }
 
-/// Takes back from the errors of the constraints what free motion does to them in `ahead` seconds, to second order.
+/// Subtracts from the errors of the constraints their change by free motion of `ahead` seconds, to
+/// second order.
 fn present_errors(Coordinates { objects, x, caches }: Coordinates, work: &mut Workspace, ahead: f64) {
     let mut u = vec![0.0; objects.table.dof()];
     for entry in objects.iter().filter(|e| e.moves()) {
@@ -319,7 +326,8 @@ fn present_errors(Coordinates { objects, x, caches }: Coordinates, work: &mut Wo
     }
 }
 
-/// Writes the whitened velocities and what `dp` (rate of momentum) adds to them in `h`, of everything that moves.
+/// Writes the whitened velocities of all dynamic objects, and their change in `h` seconds by the
+/// rate of momentum `dp`.
 pub(crate) fn whiten(
     Coordinates { objects, x, caches }: Coordinates,
     dp: &[f64],
@@ -338,8 +346,9 @@ pub(crate) fn whiten(
     }
 }
 
-/// Returns what `h` seconds of free motion add to the whitened velocity of objects whose state holds velocities. Rows of joints hold at
-/// the end of the step and aim ahead by it; the point of a contact does not go with the part as it turns, so its rows do not.
+/// Returns the change of whitened velocity by `h` seconds of free motion, of objects whose state
+/// holds velocities. Rows of joints hold at the end of the step and take it into account. The point
+/// of a contact does not turn with the part, so its rows do not.
 pub(crate) fn free_motion_change(Coordinates { objects, x, caches }: Coordinates, h: f64) -> Vec<f64> {
     let mut out = vec![0.0; objects.table.dof()];
     for entry in objects.iter().filter(|e| e.moves()) {
@@ -353,7 +362,8 @@ pub(crate) fn free_motion_change(Coordinates { objects, x, caches }: Coordinates
     out
 }
 
-/// What of the whitened rate of momentum turns velocities and is no acceleration of theirs: `L⁻ᵀ(ṗ − M·v̇)`. Rows of constraints need it taken off.
+/// Returns the part of the whitened rate of momentum that is no acceleration, `L⁻ᵀ(ṗ − M·v̇)`. Rows
+/// of constraints exclude it.
 pub(crate) fn gyroscopic(Coordinates { objects, x, caches }: Coordinates) -> Vec<f64> {
     let mut out = vec![0.0; objects.table.dof()];
     for entry in objects.iter().filter(|e| e.moves()) {
@@ -371,7 +381,8 @@ pub(crate) fn zero(v: &mut Vec<f64>, n: usize) {
     v.resize(n, 0.0);
 }
 
-/// The generalized impulse (or force) that a change `du` of whitened velocity (or acceleration) means.
+/// Writes the generalized impulse (or force) of a change `du` of whitened velocity (or
+/// acceleration).
 pub(crate) fn recover(Coordinates { objects, caches, .. }: Coordinates, du: &[f64], j: &mut [f64]) {
     j.fill(0.0);
     for entry in objects.iter().filter(|e| e.moves()) {
@@ -385,7 +396,8 @@ pub(crate) fn recover(Coordinates { objects, caches, .. }: Coordinates, du: &[f6
     }
 }
 
-/// Changes the whitened velocity of the state by `du`; `dp` is the momentum (or velocity) that this is.
+/// Changes the whitened velocity of the state by `du`. `dp` becomes the change of momentum (or
+/// velocity).
 pub(crate) fn push(Coordinates { objects, x, caches }: Coordinates, du: &[f64], dp: &mut Vec<f64>) {
     zero(dp, du.len());
     for entry in objects.iter().filter(|e| e.moves()) {
@@ -395,19 +407,20 @@ pub(crate) fn push(Coordinates { objects, x, caches }: Coordinates, du: &[f64], 
     }
 }
 
-/// Moves positions by `h·L⁻¹u`, with no effect on kinetic energy: what overlaps goes apart and takes nothing from it.
+/// Moves positions by `h·L⁻¹u` and keeps the kinetic energy: for overlap.
 pub(crate) fn displace(at: Coordinates, u: &[f64], h: f64) {
     each_displaced(at, u, |body, cache, x, v| body.displace(cache, x, v, h));
 }
 
-/// The same along the rows of a step, which is how joints are closed: momenta stay, and what that does to the energy the next step undoes.
+/// Moves positions by `h·L⁻¹u` and keeps momenta: for joints. The change of energy is reversed in
+/// the next step.
 pub(crate) fn shift(at: Coordinates, u: &[f64], h: f64) {
     each_displaced(at, u, |body, cache, x, v| {
         if body.holds_velocity() { body.displace(cache, x, v, h) } else { body.integrate_positions(x, v, h) }
     });
 }
 
-/// `v += L⁻¹·u`.
+/// Adds `L⁻¹·u` to `v`.
 pub(crate) fn unwhiten_onto(Coordinates { objects, caches, .. }: Coordinates, u: &[f64], v: &mut [f64]) {
     let mut velocity = Vec::new();
     for entry in objects.iter().filter(|e| e.moves()) {
@@ -435,15 +448,16 @@ fn each_displaced(
     }
 }
 
-/// `c = Yᵀu + bias`.
+/// Computes `c = Yᵀu + bias`.
 pub(crate) fn row_velocities(rows: &Rows, bias: &[f64], u: &[f64], c: &mut Vec<f64>) {
     c.clear();
     c.extend_from_slice(bias);
     rows.add_velocity(u, c);
 }
 
-/// Solves the blocks that `keep` names, island by island, from `work.c` and the warm start in `work.lambda`, into `work.du`. `unit` is what
-/// one unit of `c` is in m/s, for the report: 1, or the step's length where `c` holds accelerations. Whether any solve ended on a ray.
+/// Solves the blocks that satisfy `keep`, island by island, from `work.c` and the warm start in
+/// `work.lambda`; `work.du` receives `Y·λ`. `unit` converts `c` to m/s for the report: 1, or the
+/// length of the step if `c` holds accelerations. Returns whether any solve ended on a ray.
 pub(crate) fn solve(
     core: &mut Core,
     work: &mut Workspace,
@@ -462,7 +476,8 @@ pub(crate) fn solve(
     ray
 }
 
-/// Multipliers from last time, turned into the present contact frames and scaled; what is no longer allowed by the cone is left to the solver.
+/// Sets multipliers to the forces of the last sub-step, in the present contact frames, times
+/// `scale`. The solver projects them onto the cone.
 pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
     let mut place = 0;
     for (constraint, block) in work.contact_constraints.iter().zip(&work.rows.blocks) {
@@ -475,7 +490,7 @@ pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
     }
 }
 
-/// The impulse on A of each touch, world axes, for given multipliers.
+/// Returns the impulse on A of each contact, world axes, for given multipliers.
 pub(crate) fn impulses<'a>(work: &'a Workspace, lambda: &'a [f64]) -> impl Iterator<Item = Vec3> + 'a {
     work.contact_constraints.iter().zip(&work.rows.blocks).map(|(constraint, block)| {
         block.range().zip(&constraint.frame.axes).map(|(row, axis)| lambda[row] * axis).sum()

@@ -1,7 +1,9 @@
-//! Where a sub-step of `backtracking` ends: what is near, when it should close, how far a tried state is from the first crossing.
+//! Event location for sub-steps of `backtracking`: when the next gap should close, and how far a
+//! tried state is from the first crossing.
 //!
-//! A *margin* is a gap, less the depth that its pair (or limit) is allowed, plus the contact tolerance: it is 0 where the crossing is, and a state whose
-//! margin is within the tolerance on either side has landed.
+//! A *margin* is a gap plus the depth that its pair (or limit) is allowed, less the contact
+//! tolerance. It is 0 at the crossing. A state whose margin is within the tolerance on either side
+//! has landed.
 
 use super::contacts::Limit;
 use crate::contact::detect::ContactConstraint;
@@ -9,21 +11,22 @@ use crate::contact::time_of_impact::time_to_close;
 use crate::object::part_state::PartState;
 use crate::settings::Settings;
 
-/// A margin of at least this is not measured, meters.
+/// A larger margin is not measured, m.
 const FAR: f64 = 1e-4;
-/// What touches and is slower than this may drift like what lasts, m/s or rad/s.
+/// A contact or limit that touches and is slower than this may drift like a lasting one, m/s or
+/// rad/s.
 pub(super) const SLOW: f64 = 1e-3;
 
-/// A touch's part in the sub-step that begins.
+/// The role of a contact in the sub-step that begins.
 #[derive(Clone, Copy)]
 pub(super) struct Role {
     pub lasts: bool,
     pub touching: bool,
-    /// Depth that does not make the step go back, meters.
+    /// Depth that does not end the sub-step, m.
     pub allowed: f64,
 }
 
-/// The part of a one-sided row that its constraint locates.
+/// The role of a limit with a reported gap.
 #[derive(Clone, Copy)]
 pub(super) struct LimitRole {
     key: [u32; 2],
@@ -35,12 +38,13 @@ pub(super) struct LimitRole {
 }
 
 impl LimitRole {
-    /// `rate` and `acceleration` are those of the gap; without a force of the limit's own.
+    /// Makes the role for a rate and an acceleration of the gap, those without a force of the
+    /// limit.
     pub fn new(limit: &Limit, rate: f64, acceleration: f64, s: &Settings) -> LimitRole {
         let slow = rate.abs() < SLOW;
         let touching = limit.gap <= s.contact_tolerance || (slow && limit.gap <= s.drift_tolerance);
         let allowed = match (touching, slow) {
-            (true, _) if limit.target.is_none() => f64::INFINITY, // there is no row to hold it
+            (true, _) if limit.target.is_none() => f64::INFINITY, // it has no row
             (true, true) => s.drift_tolerance,
             _ => s.contact_tolerance,
         };
@@ -54,23 +58,25 @@ impl LimitRole {
         }
     }
 
-    /// Whether its force belongs to the sub-step that begins: it is reached and not left.
+    /// Returns whether the limit is active in the sub-step that begins: its gap is closed and does
+    /// not open.
     pub fn acts(&self) -> bool {
         self.touching && self.rate < SLOW
     }
 }
 
-/// Everything that can end a sub-step, as it is at the start.
+/// Contacts and limits that can end a sub-step, as they are at its start.
 #[derive(Default)]
 pub(super) struct Watch {
     pub roles: Vec<Role>,
     pub limits: Vec<LimitRole>,
-    /// When limits that no constraint locates should be reached, s.
+    /// Predicted times until limits without a reported gap are reached, s.
     pub guesses: Vec<f64>,
 }
 
 impl Watch {
-    /// Where the parabola of the first nearing contact or limit closes, s; `left` at most.
+    /// Returns the time at which the first parabola of a contact or limit closes, s; at most
+    /// `left`.
     pub fn first_guess(&self, contact_constraints: &[ContactConstraint], part_states: &[PartState], left: f64) -> f64 {
         let contacts = contact_constraints.iter().zip(&self.roles).filter(|(_, role)| !role.touching).filter_map(
             |(constraint, _)| {
@@ -87,7 +93,7 @@ impl Watch {
         contacts.chain(limits).chain(self.guesses.iter().copied()).fold(left, f64::min)
     }
 
-    /// Least gap of what does not touch yet.
+    /// Returns the least gap of contacts and limits that do not touch.
     pub fn nearest(&self, contact_constraints: &[ContactConstraint], tolerance: f64) -> f64 {
         let contacts =
             contact_constraints.iter().zip(&self.roles).filter(|(_, r)| !r.touching).map(|(t, _)| t.contact.gap);
@@ -95,7 +101,8 @@ impl Watch {
         contacts.chain(limits).fold(FAR, f64::min).max(tolerance)
     }
 
-    /// How far a tried state, with the contacts and limits `after`, is from the first crossing. `before` are the contacts of the start.
+    /// Returns the least margin of a tried state, m, from its contacts `after` and its limits.
+    /// `before` are the contacts of the start.
     pub fn margin(
         &self,
         before: &[ContactConstraint],
@@ -117,29 +124,31 @@ impl Watch {
     }
 }
 
-/// The moment of a crossing, between a sub-step that ended before it and one that ended after: (length, margin) each.
+/// The time of a crossing, between a sub-step that ended before it and one that ended after:
+/// (length, margin) each.
 pub(super) struct Bracket {
     low: (f64, f64),
     high: Option<(f64, f64)>,
-    /// How often in a row the low end moved (positive) or the high end (negative).
+    /// Number of consecutive moves of the low end (positive) or of the high end (negative).
     same_side: i32,
     /// The last two tries.
     tries: [(f64, f64); 2],
 }
 
 impl Bracket {
-    /// At the start of a sub-step the margin is `margin`.
+    /// Makes a bracket for the margin at the start of the sub-step.
     pub fn new(margin: f64) -> Bracket {
         Bracket { low: (0.0, margin), high: None, same_side: 0, tries: [(0.0, margin); 2] }
     }
 
-    /// Whether any try was beyond the crossing.
+    /// Returns whether any try was beyond the crossing.
     pub fn crossed(&self) -> bool {
         self.high.is_some()
     }
 
-    /// Takes a try in that did not land, and gives the next one. False position by the Illinois rule (an end that stays twice
-    /// counts half), bisection every fourth time and wherever the margin before the crossing is only known to be large.
+    /// Records a try that did not land and returns the next one: false position by the Illinois
+    /// rule (an end that stays twice counts half), or bisection every fourth time and while the
+    /// margin before the crossing is only known to be large.
     pub fn narrow(&mut self, h: f64, f: f64, crossed: bool) -> f64 {
         self.tries = [self.tries[1], (h, f)];
         if crossed {
@@ -160,7 +169,8 @@ impl Bracket {
         self.low.0 + width * if bisect { 0.5 } else { share.clamp(1e-3, 1.0 - 1e-3) }
     }
 
-    /// How fast the margin changes between the last try and a landing at `h` with margin `f`, per second.
+    /// Returns the rate of the margin between the last try and a landing at `h` with margin `f`,
+    /// m/s.
     pub fn slope(&self, h: f64, f: f64) -> f64 {
         let (h0, f0) = self.tries[1];
         (f - f0) / (h - h0)

@@ -1,7 +1,8 @@
-//! Impacts: what happens in no time when surfaces meet with speed.
+//! Impacts: changes of velocity at the time at which surfaces meet.
 //!
-//! Generalized reflections (Smith et al., *Reflections on simultaneous impact*, 2012): reflect the set of contacts that approach **now**, and
-//! repeat until none does. This passes a shock along Newton's cradle, which one simultaneous solve does not.
+//! Generalized reflections (Smith et al., *Reflections on simultaneous impact*, 2012): reflect the
+//! set of contacts that approach **now**, and repeat until none does. This propagates a shock along
+//! Newton's cradle, which one simultaneous solve does not.
 //!
 //! ```text
 //! repeat   A = { i : c_i < 0 },  c = Yᵀu + bias
@@ -9,10 +10,12 @@
 //!          u += Yλ
 //! ```
 //!
-//! A contact slower than its rest speed has `e = 0`. When only such contacts approach, or after the cap, all candidates are solved at once with
-//! `e = 0`, which ends the phase. With equal `e` on `A` and no friction the energy of a pass cannot grow; with friction or unequal `e` Newton's law can
-//! create energy, so a pass that does is blended with its `e = 0` solution just as far as the energy allows. A one-sided row of a constraint takes
-//! part where its gap is within the contact tolerance, always with `e = 0`.
+//! A contact slower than its rest speed has `e = 0`. When only such contacts approach, or after the
+//! cap, all candidates are solved at once with `e = 0`, which ends the phase. With equal `e` on `A`
+//! and no friction the energy of a pass cannot grow; with friction or unequal `e` Newton's law can
+//! create energy, so a pass that does is blended with its `e = 0` solution as far as the energy
+//! requires. A half-line of a constraint takes part if its gap is within the contact tolerance,
+//! always with `e = 0`.
 
 use super::contacts::{Workspace, row_velocities, zero};
 use crate::constraint::rows::{Block, RowSet, Rows};
@@ -20,10 +23,10 @@ use crate::object::RowTarget;
 use crate::solver::{RowSolver, SolverSettings, residual};
 use crate::world::Core;
 
-/// What the phase is told of each touch.
+/// A contact in the impact phase.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
-    /// Whether the touch may take part.
+    /// Whether the contact may take part.
     pub takes_part: bool,
     /// Approach speed up to which it rests instead of bouncing, m/s.
     pub rest_speed: f64,
@@ -31,11 +34,12 @@ pub(crate) struct Candidate {
     pub restitution: f64,
 }
 
-/// Impacts are solved to this share of the fastest row velocity, so that a reflection keeps energy to about this share.
+/// Impacts are solved to this fraction of the fastest row velocity, so a reflection keeps energy to
+/// about this fraction.
 const PRECISION: f64 = 1e-13;
-/// An approach slower than this is none, m/s.
+/// A slower approach does not count, m/s.
 const APPROACH: f64 = 1e-9;
-/// An impact slower than this never bounces, m/s: bodies wedged between others would chatter for ever.
+/// A slower impact never bounces, m/s: bodies wedged between others would chatter forever.
 pub(crate) const SLOWEST_BOUNCE: f64 = 1e-4;
 
 /// Resolves impacts at whitened velocity `u` and adds the multipliers to `total`.
@@ -84,19 +88,19 @@ pub(crate) fn resolve(
     }
 }
 
-/// Whether a row is a rigid stop that is within `reach`; springs do nothing in no time.
+/// Returns whether a row is a rigid limit within `reach` of its stop. Springs exert no impulse.
 fn at_stop(t: &RowTarget, reach: f64) -> bool {
     t.set == RowSet::HalfLine && t.error <= reach && t.compliance == 0.0
 }
 
-/// Velocities of the constraints' rows against their targets.
+/// Subtracts the target velocities of the constraints' rows.
 fn aim_constraints(work: &Workspace, c: &mut [f64]) {
     for (block, target) in work.rows.blocks[work.contact_constraints.len()..].iter().zip(&work.targets) {
         c[block.row as usize] -= target.velocity;
     }
 }
 
-/// One pass: leaves the multipliers in `work.lambda` and their effect in `work.du`.
+/// Solves one pass: the multipliers are in `work.lambda`, their effect in `work.du`.
 fn reflect(
     core: &mut Core,
     work: &mut Workspace,
@@ -121,7 +125,7 @@ fn reflect(
         let outcome = core.solver.solve(&work.rows, blocks, &work.c, &mut work.lambda, &mut work.du, solver_settings);
         core.report.solved(outcome, residual(&work.rows, blocks, &work.c, &work.lambda, &work.du));
         let bounces = blocks.iter().any(|&b| bounce.get(b as usize).is_some_and(|e| *e > 0.0));
-        // Where something led or a motor takes part, energy may rightly grow.
+        // kinematic bodies and motors may add energy
         let kinematic = |&b: &u32| {
             let target = (b as usize).checked_sub(contact_constraints).map_or(0.0, |i| targets[i].velocity);
             target != 0.0 || work.rows.blocks[b as usize].range().any(|row| work.bias[row] != 0.0)
@@ -138,7 +142,7 @@ fn rows_of<'a>(rows: &'a Rows, blocks: &'a [u32]) -> impl Iterator<Item = usize>
     blocks.iter().flat_map(|&b| rows.blocks[b as usize].range())
 }
 
-/// Kinetic energy that the multipliers add, J: `λᵀc + ½λᵀKλ = ½ Σ λ·(c + w)`.
+/// Returns the kinetic energy that the multipliers add, J: `λᵀc + ½λᵀKλ = ½ Σ λ·(c + w)`.
 fn work_done(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], du: &[f64]) -> f64 {
     let pairs = blocks.iter().flat_map(|&b| {
         let block = &rows.blocks[b as usize];
@@ -147,9 +151,11 @@ fn work_done(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], du: &[f64])
     pairs.sum()
 }
 
-/// Goes from the plastic solution (`e = 0`, which never adds energy) towards the bouncing one as far as no energy is made.
+/// Blends the plastic solution (`e = 0`, which never adds energy) with the bouncing one, as far
+/// towards the latter as no energy is created.
 ///
-/// With `δ = λ_e − λ_0` the energy is `W(s) = W_0 + s·B + s²·A`, `B = δᵀ(c + Kλ_0)`, `A = W_e − W_0 − B`; `s` is its positive root.
+/// With `δ = λ_e − λ_0` the energy is `W(s) = W_0 + s·B + s²·A`, `B = δᵀ(c + Kλ_0)`, `A = W_e − W_0
+/// − B`; `s` is its positive root.
 fn blend(
     solver: &dyn RowSolver,
     rows: &Rows,

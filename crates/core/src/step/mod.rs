@@ -2,12 +2,10 @@
 
 mod backtracking;
 mod contacts;
+mod correction;
 mod event_location;
 mod impact;
-mod joint_correction;
-mod limit_correction;
 mod moment;
-mod projection;
 mod time_stepping;
 mod unreachable_joints;
 
@@ -18,13 +16,13 @@ pub use time_stepping::TimeStepping;
 
 use crate::world::{Core, StepError};
 
-/// A way to advance a world by one frame.
+/// A method that advances a world by one frame.
 pub trait Stepper: Send + Sync {
-    /// The name that `--stepper` takes.
+    /// Returns the name of the stepper on the command line (`--stepper`).
     fn name(&self) -> &'static str;
-    /// Advances by one frame. On an error the world puts state and time back.
+    /// Advances by one frame. After an error the world restores state and time.
     fn step(&mut self, frame: StepContext) -> Result<(), StepError>;
-    /// An independent copy.
+    /// Returns an independent copy.
     fn fork(&self) -> Box<dyn Stepper>;
 }
 

@@ -6,8 +6,8 @@ use crate::integrators::context::refresh_all;
 use crate::world::view::{Objects, Table, WorldView};
 use crate::world::{Coordinates, Core};
 
-/// A state of the objects other than the present one, its part states and its caches. Part states keep the accelerations of the
-/// present.
+/// A state of the objects besides the present one, with its part states and caches. Part states
+/// have the accelerations of the present.
 pub(crate) struct Moment {
     pub x: Vec<f64>,
     pub derived: Derived,

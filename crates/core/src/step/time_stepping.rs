@@ -1,33 +1,39 @@
-//! The time-stepping stepper: fixed cost, one detection and one solve per sub-step (Moreau's midpoint rule with impacts timed inside the step).
+//! The time-stepping stepper: fixed cost, one detection and one solve per sub-step (Moreau's
+//! midpoint rule with impacts timed inside the step).
 //!
 //! ```text
-//! x_½  = x_0 coasted h/2;   a = forces at x_½                           (so that free motion is the Verlet step: symplectic, second order)
-//! detect at x_0 within reach of the step; once more with the velocities after the impacts, if there are any
-//! u_f  = u_0 + Δu_impact + h·a                                            impacts by reflection, those that free motion meets within the step
+//! x_½  = x_0 after free motion of h/2;   a = forces at x_½              (a body without contacts takes a Verlet step: symplectic, second order)
+//! detect at x_0 within reach of the step; again with the velocities after the impacts, if there are any
+//! u_f  = u_0 + Δu_impact + h·a                                            impacts by reflection, of contacts that free motion closes within the step
 //! find λ:  w = Yᵀ(u_f + Yλ),   w_n + gap/h ≥ 0 ⟂ λ_n ≥ 0,   friction       (u_1 = u_f + Yλ)
-//! x_1  = x_0 coasted τ with u_0, then h − τ with u_1                        τ = the time of the body's first impact, else h/2
-//! project: gap_1 ≥ 0
+//! x_1  = x_0 after free motion of t_i with u_0, then of h − t_i with u_1    t_i = time of the body's first impact, else h/2
+//! correct: gap_1 ≥ 0, joints, limits
 //! ```
 //!
-//! With `τ = h/2` the displacement is the mean of the old and the new velocity: second order on lasting contacts too (a block slides to its
-//! stop as it should). With an impact the two coasts and the term `(τ − h/2)·h·a` add up to the parabola before and the parabola after.
+//! With `t_i = h/2` the displacement is the mean of the old and the new velocity: second order on
+//! lasting contacts too (a box slides to its stop with the right deceleration). With an impact the
+//! two free motions and the term `(t_i − h/2)·h·a` add up to the parabola before and the parabola
+//! after.
 //!
-//! What is pushed is pushed where it is then: mass matrix, rows and the velocity before the push are those of `x_½`, or of `x_0` coasted τ where there is an
-//! impact. Coasting keeps kinetic energy, a push by contacts takes some, and displacement leaves it: nothing here feeds it.
-//! Objects whose state holds velocities (articulated bodies) are pushed at `x_½` whenever their impacts are, so as to have their caches made once; they
-//! coast h/2 and h/2, and are displaced by the rest, (τ − h/2)·(v_0 − v_1), at the end.
+//! Impulses act where the body is at that time: mass matrix, rows and the velocity before the
+//! impulse are those of `x_½`, or of `x_0` after free motion of `t_i` if there is an impact. Free
+//! motion keeps kinetic energy, contact impulses dissipate some, and displacements keep it, so no
+//! stage adds energy. Impulses on objects whose state holds velocities (articulated bodies) always
+//! act at `x_½`, so that their caches are computed once. These objects take free motions of h/2 and
+//! h/2, and are displaced by the rest, (t_i − h/2)·(v_0 − v_1), at the end.
 //!
-//! A contact bounces only if it approaches faster than its own pressing acceleration gives in a step, and only within the step in which free
-//! motion meets it; one that a fresh impact sends on its way is left to the next step, so that no restitution is lost to a speculative row.
+//! A contact bounces only if it approaches faster than its own pressing acceleration gives in a
+//! step, and only within the step in which free motion closes it. A contact that approaches because
+//! of an impact in this step is left to the next step, so that no restitution is lost to a
+//! speculative row.
 
 use super::contacts::{
     build_rows, detect, free_motion_change, gyroscopic, impulses, push, row_velocities, shift, solve, warm_start,
     whiten, zero,
 };
+use super::correction::{self, Contacts, Limits, Options};
 use super::impact::{self, Candidate};
-use super::projection::{self, Displacement};
 use super::{Moment, StepContext, Stepper, Workspace};
-use super::{joint_correction, limit_correction, unreachable_joints};
 use crate::constraint::rows::RowSet;
 use crate::contact::detect::ContactConstraint;
 use crate::contact::pair::PredictionMode;
@@ -43,7 +49,7 @@ pub struct TimeStepping {
     work: Workspace,
     probe: Workspace,
     x0: Vec<f64>,
-    /// Share of the step before the first impact, per coordinate; negative where there is none.
+    /// Fraction of the step before the first impact, per coordinate; negative without an impact.
     impact_fraction: Vec<f64>,
     candidates: Vec<Candidate>,
     /// Impact impulse per row.
@@ -51,12 +57,12 @@ pub struct TimeStepping {
     buffers: Buffers,
 }
 
-/// Memory of a step, kept for the next: whitened velocities, and what is made of them.
+/// Working memory of a step: whitened velocities and sums of them.
 #[derive(Default)]
 struct Buffers {
-    /// After the impacts, then at the end.
+    /// Velocity after the impacts, then at the end.
     after: Vec<f64>,
-    /// Row velocities before the impacts, and what the forces add to them.
+    /// Row velocities before the impacts, and their change due to forces.
     before: Vec<f64>,
     gain: Vec<f64>,
     change: Vec<f64>,
@@ -66,11 +72,11 @@ struct Buffers {
     mean: Vec<f64>,
     /// Multipliers of impacts and contacts.
     total: Vec<f64>,
-    /// Which blocks are solved.
+    /// Whether each block is solved.
     keep: Vec<bool>,
 }
 
-/// Passes of the impact phase at most.
+/// Maximum number of passes of the impact phase.
 const IMPACT_PASSES: u32 = 50;
 
 impl Stepper for TimeStepping {
@@ -90,7 +96,7 @@ impl Stepper for TimeStepping {
 }
 
 impl TimeStepping {
-    /// One sub-step of `h` seconds.
+    /// Takes one sub-step of `h` seconds.
     pub(crate) fn substep(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
         core.implicit = true;
         let mut middle = core.moment();
@@ -99,7 +105,8 @@ impl TimeStepping {
         core.finish_substep(h)
     }
 
-    /// Writes the state at the end of the sub-step. `middle` becomes the moment at which impulses act.
+    /// Writes the state at the end of the sub-step. `middle` becomes the moment at which impulses
+    /// act.
     fn advance(&mut self, core: &mut Core, middle: &mut Moment, h: f64) -> Result<(), StepError> {
         self.smooth_forces(core, middle, h)?;
         detect(core, None, (h, PredictionMode::Each), &mut self.work.contact_constraints);
@@ -118,7 +125,8 @@ impl TimeStepping {
         Ok(())
     }
 
-    /// Writes the rate of momentum at the midpoint into `work.dp`, and the midpoint into `middle`. The present gets its accelerations.
+    /// Writes the rate of momentum at the midpoint to `work.dp`, and the midpoint to `middle`. The
+    /// present part states receive its accelerations.
     fn smooth_forces(&mut self, core: &mut Core, middle: &mut Moment, h: f64) -> Result<(), StepError> {
         core.state.x[..].clone_into(&mut self.x0);
         self.work.dp.resize(core.dof, 0.0);
@@ -134,8 +142,9 @@ impl TimeStepping {
         Ok(())
     }
 
-    /// Times the impacts that free motion meets within the step and resolves them: `after` is the whitened velocity after them, forces not yet added. Where there are
-    /// any, rows and whitened velocities are made anew for where they are.
+    /// Resolves the impacts within the step. `after` becomes the whitened velocity after them,
+    /// without forces. If there are any, rows and whitened velocities are computed again at the
+    /// places of the impacts.
     fn impacts(
         &mut self,
         core: &mut Core,
@@ -192,7 +201,7 @@ impl TimeStepping {
         Ok(())
     }
 
-    /// Moves the objects that meet something to where they do so.
+    /// Moves the objects that have an impact to where it happens.
     fn go_to_impacts(&self, core: &Core, middle: &mut Moment, h: f64) {
         let Coordinates { objects, x, caches } = middle.coordinates(core);
         for entry in objects.iter().filter(|e| !in_the_middle(e)) {
@@ -206,8 +215,8 @@ impl TimeStepping {
         middle.refresh(core.objects());
     }
 
-    /// What was struck may now reach what it did not before: finds those contacts too, and lays the rows anew. They push this step (nothing is
-    /// passed through) and bounce in the next.
+    /// Adds the contacts that bodies may reach because of their impacts, and builds the rows again.
+    /// These contacts prevent overlap in this step and bounce in the next.
     fn look_again(
         &mut self,
         core: &mut Core,
@@ -254,8 +263,9 @@ impl TimeStepping {
         Ok(())
     }
 
-    /// Who takes part in the impacts: those that are the first of both their bodies, and what touches them. A later one waits for the next
-    /// step; an island without an impact is left alone.
+    /// Selects the contacts that take part in the impacts: those that are the first of both their
+    /// bodies, and those that touch the same island. Later ones wait for the next step; islands
+    /// without an impact take no part.
     fn first_impacts(&mut self, impact_fractions: &[Option<f64>]) {
         let work = &mut self.work;
         let first = |i: usize| {
@@ -280,7 +290,8 @@ impl TimeStepping {
         }
     }
 
-    /// Adds the forces and solves all contacts and constraints of the step: `u` becomes the velocity at its end.
+    /// Adds the forces and solves all contacts and constraints of the step: `u` becomes the
+    /// velocity at its end.
     fn contacts(&mut self, core: &mut Core, middle: &mut Moment, h: f64, u: &mut [f64], du_force: &[f64]) {
         let work = &mut self.work;
         u.iter_mut().zip(du_force).for_each(|(u, du)| *u += du);
@@ -359,9 +370,16 @@ impl TimeStepping {
         }
         shift(core.coordinates(Some(&mut *middle)), rest, h);
         write(mean, &|i| impact_fraction(i) * u0[i] + (1.0 - impact_fraction(i)) * u1[i] + parabola[i]);
-        let recovery = core.settings.recovery_speed * h;
-        let least = core.settings.contact_tolerance;
-        projection::project(core, Some(&mut *middle), &mut self.work, Displacement::Step { mean, h }, recovery, least)?;
+        let options = Options {
+            h,
+            level: Level::Velocity { h },
+            start: &self.x0,
+            contacts: Contacts::Moved { mean },
+            limits: Limits::Violated,
+            recovery: core.settings.recovery_speed * h,
+            tolerance: core.settings.contact_tolerance,
+        };
+        correction::correct(core, Some(&mut *middle), &mut self.work, &mut self.probe, &options)?;
         total.clear();
         total.extend(self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b));
         core.publish(
@@ -369,18 +387,12 @@ impl TimeStepping {
             impulses(&self.work, total),
             impulses(&self.work, &self.work.lambda).map(|i| i / h),
         );
-        let kept = unreachable_joints::left(&self.work, |i| self.work.targets[i].error, recovery);
-        joint_correction::close(core, Some(&mut *middle), &mut self.work, &self.x0, (h, Level::Velocity { h }), &kept)?;
-        if !self.work.limits.is_empty() {
-            core.integration().refresh();
-            let passed = limit_correction::passed(core, &mut self.probe, h)?;
-            limit_correction::hold(core, &mut self.probe, &passed, h, recovery)?;
-        }
         core.check_finite(dp, Some(&mut *middle))
     }
 }
 
-/// Whether all that pushes the object does so in the middle of the step, impacts too: links, whose caches cost more than to be made twice.
+/// Returns whether all impulses on an object act in the middle of the step, impacts too: links,
+/// whose caches are expensive.
 fn in_the_middle(entry: &Entry) -> bool {
     entry.moves() && entry.object.integratable().is_some_and(|b| b.holds_velocity())
 }

@@ -1,44 +1,52 @@
-//! Joints that are led to where they cannot be: a chain at full stretch whose end is pulled on.
+//! Joints that cannot be closed, such as those of a straight chain whose end is pulled further: the
+//! fallback of the correction.
 //!
-//! The rows of such a joint lose their hold in the direction that is out of reach: what a unit of multiplier does there, an eigenvalue `σ` of `K`, goes to 0 while
-//! the speed asked for does not, and `λ = −c/σ` makes joint speeds without bound. So where closing finds no place the rows give way,
+//! In the direction that is out of reach the response of the rows, an eigenvalue `σ` of `K`, goes
+//! to 0 while the demanded speed does not, so `λ = −c/σ` makes joint speeds without bound. If the
+//! correction finds no closed configuration, the rows therefore become soft,
 //!
 //! ```text
-//! (K + R)·λ = −c          R = ρ·k            most that a row is amplified:  max_σ √(σk)/(σ + ρk) = 1/(2√ρ)
+//! (K + R)·λ = −c          R = ρ·k            largest gain of a row:  max_σ √(σk)/(σ + ρk) = 1/(2√ρ)
 //! ```
 //!
-//! and the velocity of what they join is the way that it went: `x*` and `v*` are where free motion and softened rows lead to, `x₁` is the nearest to closed that
-//! closing found from there (Levenberg and Marquardt: `R` grows while a round makes things worse),
+//! and the velocity of the joined objects is their displacement over the step divided by its
+//! length:
 //!
 //! ```text
 //! v₁ = ½(v₀ + v*) + (x₁ ⊖ x*)/h
 //! ```
 //!
-//! So what is out of reach hangs where it is nearest, straight and towards what leads it, and goes as fast as that place does. Whether it is out of reach is
-//! asked at the middle of the step, and at its end where rows are weak already.
+//! So the chain stays at the nearest configuration, straight and pointing at its goal, and moves as
+//! fast as that configuration does. Whether joints are unreachable is tested at the middle of the
+//! step, and at its end if their rows are already weak.
 //!
 //! | symbol | meaning |
 //! |---|---|
-//! | `k` | the largest response `Y·Y` among the rows of one constraint that have one unit: one row's own may be what is lost |
+//! | `x₀`, `v₀` | state and velocity at the start of the step |
+//! | `x*`, `v*` | the same after free motion and impulses of the soft rows |
+//! | `x₁` | the configuration nearest to closed that the correction finds from `x*` (Levenberg and Marquardt) |
+//! | `k` | the largest response `Y·Y` among the rows of one constraint and unit: that of a single row may be the one that vanishes |
 //! | `ρ` | [`GIVING`] for velocities |
 //! | `⊖` | displacement, generalized velocity times seconds |
 
 use super::Workspace;
-use super::joint_correction::is_joint;
+use super::correction::is_joint;
 use crate::constraint::builder::{RowKind, constraints};
 use crate::report::UnreachableJoint;
 use crate::solver::smallest_pivot;
 use crate::world::{Coordinates, Core};
 use std::ops::Range;
 
-/// Compliance of the velocity rows of what is out of reach, as a share of their response: nothing there is asked for more than half the speed that it is led with.
-/// Where it goes is left to closing. Held harder, what is led back would make a straight chain buckle before its end is in reach.
+/// Compliance of the velocity rows of unreachable joints, as a fraction of their response: they
+/// move by at most half the demanded speed, and the correction moves them to their place. Stiffer
+/// rows would make a straight chain buckle on the way back, before its end is in reach.
 pub(super) const GIVING: f64 = 1.0;
 
-/// A piece whose rows respond in some direction by less than this share may be at its full stretch before the step ends.
+/// A group whose rows respond in some direction by less than this fraction may reach its full
+/// stretch before the step ends.
 const WEAK: f64 = 3e-2;
 
-/// Joint rows of one constraint that have one unit, as ranges of targets.
+/// Returns the joint rows of one constraint and unit, as ranges of targets.
 fn alike(work: &Workspace) -> Vec<Range<usize>> {
     let mut out: Vec<Range<usize>> = Vec::new();
     let kind = |i: usize| (work.kinds[i], is_joint(&work.targets[i]));
@@ -59,7 +67,8 @@ fn alike(work: &Workspace) -> Vec<Range<usize>> {
     out
 }
 
-/// Gives the rows of the targets named a compliance: `share` of the largest response among those like them.
+/// Gives the rows of `targets` a compliance: `share` of the largest response among rows of the same
+/// constraint and unit.
 pub(super) fn soften(work: &mut Workspace, targets: &[u32], share: f64) {
     let contact_constraints = work.contact_constraints.len();
     if !targets.is_empty() {
@@ -71,7 +80,7 @@ pub(super) fn soften(work: &mut Workspace, targets: &[u32], share: f64) {
     }
 }
 
-/// The largest response among the rows like each target's.
+/// Returns, for each target, the largest response among rows of the same constraint and unit.
 fn references(work: &Workspace) -> Vec<f64> {
     let mut out = vec![0.0; work.targets.len()];
     for range in alike(work) {
@@ -82,7 +91,8 @@ fn references(work: &Workspace) -> Vec<f64> {
     out
 }
 
-/// Whether the joint rows named, of a workspace without touches, hold weakly in some direction: a pivot of `K` is small against the rows' references.
+/// Returns whether the joint rows of `targets`, in a workspace without contacts, have a weak
+/// response in some direction: a pivot of `K` is small against the references of the rows.
 pub(super) fn weak(work: &Workspace, targets: &[u32]) -> bool {
     let (references, e) = (references(work), targets.len());
     let scale = |i: usize| 1.0 / references[targets[i] as usize].max(f64::MIN_POSITIVE).sqrt();
@@ -91,7 +101,8 @@ pub(super) fn weak(work: &Workspace, targets: &[u32]) -> bool {
     smallest_pivot(&k, e).is_some_and(|pivot| pivot < WEAK)
 }
 
-/// What is left of the errors of joint rows when each joint is closed by `reach` at most, straight; of other rows each is by itself.
+/// Returns the errors of constraint rows after a reduction by at most `reach`, m or rad: of all
+/// rows of a joint along a straight line, of any other row by itself.
 pub(super) fn left(work: &Workspace, errors: impl Fn(usize) -> f64, reach: f64) -> Vec<f64> {
     let mut out = vec![0.0; work.targets.len()];
     for range in alike(work) {
@@ -105,16 +116,17 @@ pub(super) fn left(work: &Workspace, errors: impl Fn(usize) -> f64, reach: f64) 
     out
 }
 
-/// Gives the objects with these stretches of the state the velocity that their way in `h` is: the mean of those of the states `start` and `arrived`, and what they
-/// were `moved` from there, generalized velocities times seconds.
+/// Sets each listed object's velocity to its net displacement over the step divided by `h`: the
+/// mean of its velocities in the states `start` and `arrived`, plus the correction `moved`
+/// (generalized velocity times seconds). `ranges` are those of its state and its velocities.
 pub(super) fn go_as_moved(
     Coordinates { objects, x, .. }: Coordinates,
-    stretches: &[(Range<usize>, Range<usize>)],
+    ranges: &[(Range<usize>, Range<usize>)],
     [start, arrived]: [&[f64]; 2],
     moved: &[f64],
     h: f64,
 ) {
-    for entry in objects.iter().filter(|e| e.moves() && stretches.iter().any(|(range, _)| *range == e.state_range.x)) {
+    for entry in objects.iter().filter(|e| e.moves() && ranges.iter().any(|(range, _)| *range == e.state_range.x)) {
         let Some(body) = entry.object.integratable() else { continue };
         let (mut v, mut first) = (vec![0.0; entry.state_range.v.len()], vec![0.0; entry.state_range.v.len()]);
         body.velocity(&start[entry.state_range.x.clone()], &mut first);
@@ -127,7 +139,7 @@ pub(super) fn go_as_moved(
     }
 }
 
-/// Files the joint among the targets named that is furthest open, by the rows of `probe`.
+/// Reports the joint among `targets` that is furthest open, by the rows of `probe`.
 pub(super) fn report(core: &mut Core, probe: &Workspace, targets: &[u32]) {
     let ids: Vec<_> = constraints(core.objects()).map(|(id, ..)| id).collect();
     for range in alike(probe).into_iter().filter(|r| targets.binary_search(&(r.start as u32)).is_ok()) {

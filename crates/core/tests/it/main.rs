@@ -18,6 +18,7 @@ mod articulated_swings;
 mod articulated_world;
 mod chains;
 mod common;
+mod correction;
 mod elastic;
 mod free;
 mod friction;

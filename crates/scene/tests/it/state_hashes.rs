@@ -66,7 +66,7 @@ table! {
     piston_backtracking: "piston", Backtracking, "e4bc1f04bccfbd8a", "0b86e6820d08239f";
     robot_time_stepping: "robot", TimeStepping, "bc43b6f0651f6c15", "8b4bb457452fe429";
     robot_backtracking: "robot", Backtracking, "d74075084d60492f", "01e064e5abc85f17";
-    skeleton_time_stepping: "skeleton", TimeStepping, "ecf6d99012cbf66b", "8ac858a80f30719d";
+    skeleton_time_stepping: "skeleton", TimeStepping, "ee202d377892c7b8", "5e22c6193fcbd3ef";
     skeleton_backtracking: "skeleton", Backtracking, "bdf4cdbeda75f036", "895179911225c2cb";
     stack_time_stepping: "stack", TimeStepping, "faa858303ba3c2af", "accd4da77adb66fe";
     stack_backtracking: "stack", Backtracking, "ac1fb8bad736bd44", "c91438f922aca6c6";

@@ -1,0 +1,151 @@
+//! The first round of a correction, in which contacts take part: positions move by the displacement
+//! of least kinetic norm after which nothing overlaps. Velocities stay, and so does the kinetic
+//! energy.
+//!
+//! ```text
+//! find Δ = M⁻¹Jᵀλ of least kinetic norm with   gap + h·n·(v̄ + Δ) ≥ 0 ⟂ λ ≥ 0   and, for joints,   error + h·J(v̄ + Δ) = 0
+//! ```
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `v̄` | displacement velocity of the step, less the motion that kinematic bodies and motors prescribe; 0 in place, where `h = 1` |
+//!
+//! The gap of a contact is known to first order only: to measure it again takes another detection,
+//! which costs as much as the step. So contacts take part in one round. Joints next to them are
+//! predicted in the same way here, and measured in the rounds that follow. Limits are measured from
+//! the start, because a joint between two links that swing does not move by the mean of its two
+//! velocities. An island without a contact or limit is left to the following rounds.
+//!
+//! Errors from before the step are reduced by a bounded amount. Friction takes no part.
+
+use super::super::Moment;
+use super::super::contacts::{Limit, Workspace, displace};
+use super::{Contacts, Options, is_joint};
+use crate::constraint::rows::{RowSet, Rows};
+use crate::object::RowTarget;
+use crate::solver::SolverSettings;
+use crate::world::Core;
+
+/// Moves the objects of islands with a violation above the tolerance. `gaps` are those of the
+/// limits at the present numbers. Returns whether anything moved.
+pub(super) fn separate(
+    core: &mut Core,
+    acting: Option<&mut Moment>,
+    work: &mut Workspace,
+    gaps: &[Limit],
+    options: &Options,
+) -> bool {
+    let (in_place, h) = match options.contacts {
+        Contacts::Ignored => return false,
+        Contacts::InPlace => (true, 1.0),
+        Contacts::Moved { .. } => (false, options.h),
+    };
+    predict(work, gaps, options.contacts, h);
+    let (recovery, least) = (options.recovery, options.tolerance);
+    // joints stay as they are in place: their errors are corrected at the end of the sub-step
+    let (contacts, hold) = (work.contact_constraints.len(), core.settings.stabilize_positions && !in_place);
+    let violation = |b: usize, c: &[f64]| -> f64 {
+        let v = c[work.rows.blocks[b].row as usize];
+        match (work.contact_constraints.get(b), b.checked_sub(contacts).map(|i| work.targets[i])) {
+            (Some(constraint), _) => -(allowed(constraint.contact.gap, recovery) + h * v),
+            (None, Some(t)) if t.compliance > 0.0 => 0.0,
+            (None, Some(t)) if t.set == RowSet::Equality && hold => (t.error.clamp(-recovery, recovery) + h * v).abs(),
+            (None, Some(t)) if t.set == RowSet::HalfLine => -(allowed(t.error, recovery) + h * v),
+            _ => 0.0,
+        }
+    };
+    let worst = (0..work.rows.blocks.len()).map(|b| violation(b, &work.c)).fold(0.0, f64::max);
+    if worst <= least {
+        return false;
+    }
+    let mut p = std::mem::take(&mut work.frictionless);
+    p.fill(work, h, recovery, hold);
+    let targets = &work.targets;
+    // a motor holds no position, and a spring may have any
+    let rigid = |t: &RowTarget| t.compliance == 0.0 && !matches!(t.set, RowSet::Interval { .. });
+    work.islands.build(&work.rows, |b| b < contacts || rigid(&targets[b - contacts]));
+    let waits = |t: &RowTarget| is_joint(t) && t.velocity == 0.0;
+    let later = |&b: &u32| !in_place && (b as usize) >= contacts && waits(&targets[b as usize - contacts]);
+    let mut moved = false;
+    for blocks in work.islands.iter() {
+        if blocks.iter().all(later) || blocks.iter().all(|&b| violation(b as usize, &work.c) <= least) {
+            continue;
+        }
+        // limits and contacts of a body depend on each other through all its links; those of a pile
+        // do not
+        let jointed = blocks.iter().any(|&b| b as usize >= contacts);
+        let min_sweeps = if jointed { core.settings.solver_settings.max_sweeps } else { 0 };
+        let solver_settings = SolverSettings {
+            max_sweeps: core.settings.projection_sweeps.max(min_sweeps),
+            max_relaxations: u32::MAX,
+            tolerance: 0.1 * least / h,
+        };
+        core.solver.solve(&p.rows, blocks, &p.c, &mut p.lambda, &mut p.du, solver_settings);
+        moved = true;
+    }
+    displace(core.coordinates(acting), &p.du, h);
+    work.frictionless = p;
+    moved
+}
+
+/// Writes the rate of every row's error in the step to `work.c`: to first order, or the mean rate
+/// of the measured gaps.
+fn predict(work: &mut Workspace, gaps: &[Limit], contacts: Contacts, h: f64) {
+    let first = work.contact_constraints.len();
+    for (b, block) in work.rows.blocks.iter().enumerate() {
+        let target = b.checked_sub(first).map_or(0.0, |i| work.targets[i].velocity);
+        work.c[block.row as usize] = match contacts {
+            Contacts::Moved { mean } => work.bias[block.row as usize] + work.rows.row_velocity(block, 0, mean) - target,
+            Contacts::InPlace | Contacts::Ignored => 0.0,
+        };
+    }
+    for (limit, end) in work.limits.iter().zip(gaps).filter(|(limit, end)| limit.key == end.key) {
+        if let Some(target) = limit.target.map(|t| t as usize) {
+            let row = work.rows.blocks[first + target].row as usize;
+            work.c[row] = (end.gap - work.targets[target].error) / h;
+        }
+    }
+}
+
+fn allowed(gap: f64, recovery: f64) -> f64 {
+    gap.max(-recovery)
+}
+
+/// The rows without friction, and the right-hand side.
+#[derive(Default)]
+pub(crate) struct Frictionless {
+    rows: Rows,
+    c: Vec<f64>,
+    lambda: Vec<f64>,
+    du: Vec<f64>,
+}
+
+impl Frictionless {
+    /// Copies the normal rows of contacts and all rows of constraints. Equalities keep their error
+    /// unless `hold`.
+    fn fill(&mut self, work: &Workspace, h: f64, recovery: f64, hold: bool) {
+        self.rows.clear(work.rows.dof);
+        self.c.clear();
+        for (b, block) in work.rows.blocks.iter().enumerate() {
+            let (set, error) = match work.contact_constraints.get(b) {
+                Some(constraint) => (RowSet::HalfLine, allowed(constraint.contact.gap, recovery)),
+                None => match work.targets[b - work.contact_constraints.len()] {
+                    t if t.set == RowSet::HalfLine => (t.set, allowed(t.error, recovery)),
+                    t => (t.set, t.error.clamp(-recovery, recovery)),
+                },
+            };
+            self.rows.push_soft(set, block.compliance); // unreachable joints yield here too
+            for side in block.sides() {
+                let response = work.rows.response(side, 0);
+                if let Some(y) = self.rows.side(side.u as usize, side.dof as usize) {
+                    y.copy_from_slice(response);
+                }
+            }
+            self.c.push(if set == RowSet::Equality && !hold { 0.0 } else { work.c[block.row as usize] + error / h });
+        }
+        self.lambda.clear();
+        self.lambda.resize(self.rows.len, 0.0);
+        self.du.clear();
+        self.du.resize(work.rows.dof, 0.0);
+    }
+}
