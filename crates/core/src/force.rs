@@ -21,10 +21,6 @@ impl Object for ForceFunction {
         &self.name
     }
 
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
-    }
-
     fn force(&self) -> Option<&dyn ForceGenerator> {
         Some(self)
     }

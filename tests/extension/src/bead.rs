@@ -1,4 +1,4 @@
-//! A bead that slides without friction on a wire bent to a cycloid (Huygens' pendulum): one freedom whose inertia changes with it.
+//! A bead that slides without friction on a wire bent to a cycloid (Huygens' pendulum): one degree of freedom whose inertia depends on it.
 //!
 //! ```text
 //! r(φ) = R·(φ + sin φ, 0, 1 − cos φ)                    |r'|² = 4R²·cos²(φ/2)
@@ -6,7 +6,7 @@
 //! ℓ(φ) = 4R·sin(φ/2)         σ = ℓ̇ = 2R·cos(φ/2)·φ̇      arc length from the lowest point, and speed along the wire
 //! ```
 //!
-//! Left alone the bead keeps `σ` while `p` changes with `M`: [`Bead::free_motion`](Integratable::free_motion) is exact. Under gravity
+//! Without forces the bead keeps `σ`, and `p` changes with `M`: [`Bead::free_motion`](Integratable::free_motion) is exact. Under gravity
 //! `ℓ̈ = −(g/4R)·ℓ`: harmonic at *every* amplitude, with the period `4π√(R/g)` (Huygens, *Horologium Oscillatorium*, 1673).
 //!
 //! | symbol | meaning |
@@ -15,10 +15,10 @@
 //! | `R` | radius of the rolling circle, m |
 //! | `L = √M` | so that `u = p/√M = √m·σ` |
 
-use tumble_core::collide::{Pose, Shape, Vec3};
+use tumble_core::collide::{Pose, Quat, Shape, Vec3};
 use tumble_core::{
-    Cache, Collidable, CollisionGroup, Constraint, Energy, ForceSlice, Forces, Integratable, Level, Material, Momentum,
-    Object, PartState, RowBuilder, RowTarget, StateRange, StateSizes, WorldView, rows::RowSet,
+    Cache, Collidable, Constraint, Integratable, Level, Material, MomentumKind, Object, PartPoint, PartState,
+    RowBuilder, RowTarget, StateRange, StateSizes, WorldView, rows::RowSet,
 };
 
 /// A bead on a cycloid in the x–z plane, lowest at the origin; its ends are at `|φ| = π`.
@@ -102,10 +102,6 @@ impl Object for Bead {
         &self.name
     }
 
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
-    }
-
     fn new_cache(&self) -> Cache {
         Cache::new(BeadCache { root: 0.0, tangent: Vec3::zeros() })
     }
@@ -113,8 +109,10 @@ impl Object for Bead {
     fn refresh(&self, x: &[f64], cache: &mut Cache, part_states: &mut [PartState]) {
         let cache: &mut BeadCache = cache.get();
         (cache.root, cache.tangent) = (self.inertia(x[0]).sqrt(), self.tangent(x[0]));
-        part_states[0].pose = Pose::from_parts(self.position(x[0]).into(), tumble_core::collide::Quat::identity());
-        part_states[0].velocity = cache.tangent * (x[1] / cache.root.powi(2));
+        let (bend, rate) = (self.radius * Vec3::new(-x[0].sin(), 0.0, x[0].cos()), x[1] / cache.root.powi(2));
+        part_states[0].pose = Pose::from_parts(self.position(x[0]).into(), Quat::identity());
+        part_states[0].velocity = cache.tangent * rate;
+        part_states[0].bias_acceleration = bend * (rate * rate);
     }
 
     fn integratable(&self) -> Option<&dyn Integratable> {
@@ -139,8 +137,12 @@ impl Integratable for Bead {
         x.copy_from_slice(&[self.angle, self.mass * self.stretch(self.angle) * self.speed]);
     }
 
-    fn accumulate_forces(&self, me: &StateRange, view: &WorldView, out: &mut Forces) {
-        out.wrenches[me.parts.start].force += self.mass * view.gravity;
+    fn part_mass(&self, _part: usize) -> f64 {
+        self.mass
+    }
+
+    fn momentum_kind(&self) -> MomentumKind {
+        MomentumKind::Conjugate
     }
 
     fn velocity(&self, x: &[f64], v: &mut [f64]) {
@@ -151,25 +153,6 @@ impl Integratable for Bead {
         x[1] = self.inertia(x[0]) * v[0];
     }
 
-    /// `Q = F·r'`; the part of `ṗ` that comes from `M'(φ)` belongs to free motion.
-    fn derivative(&self, _cache: &mut Cache, x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
-        dp[0] = f.wrenches[0].force.dot(&self.tangent(x[0])) + f.generalized[0];
-    }
-
-    /// `r̈ = r'·φ̈ + r''·φ̇²` with `φ̈ = (Q + ½·M'·φ̇² − M'·φ̇²)/M`.
-    fn accelerations(&self, _cache: &mut Cache, x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
-        let (phi, m) = (x[0], self.inertia(x[0]));
-        let rate = x[1] / m;
-        let slope = -2.0 * self.mass * self.radius.powi(2) * phi.sin();
-        let second = (dp[0] - 0.5 * slope * rate * rate) / m;
-        let bend = self.radius * Vec3::new(-phi.sin(), 0.0, phi.cos());
-        part_states[0].acceleration = self.tangent(phi) * second + bend * (rate * rate);
-    }
-
-    fn kick(&self, x: &mut [f64], dp: &[f64], h: f64) {
-        x[1] += h * dp[0];
-    }
-
     /// Exact: the arc length grows by `σ·h`, and `p` follows `M`.
     fn free_motion(&self, _cache: &mut Cache, x: &mut [f64], h: f64) {
         let sigma = x[1] / (self.mass * self.stretch(x[0]));
@@ -178,8 +161,15 @@ impl Integratable for Bead {
         x[1] = self.mass * self.stretch(x[0]) * sigma;
     }
 
-    fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64) {
-        x[0] += h * v[0];
+    /// `½·M'·φ̇²`, because `M·φ̈ = Q − ½·M'·φ̇²`.
+    fn gyroscopic(&self, x: &[f64], out: &mut [f64]) {
+        out[0] = -self.mass * self.radius.powi(2) * x[0].sin() * (x[1] / self.inertia(x[0])).powi(2);
+    }
+
+    /// `J = axisᵀ·r'`.
+    fn jacobian(&self, cache: &mut Cache, at: &PartPoint, j: &mut [f64]) {
+        let cache: &mut BeadCache = cache.get();
+        at.axes.iter().zip(j).for_each(|(axis, j)| *j += axis.dot(&cache.tangent));
     }
 
     fn mul_l(&self, cache: &mut Cache, v: &[f64], u: &mut [f64]) {
@@ -194,28 +184,12 @@ impl Integratable for Bead {
         y[0] = j[0] / cache.get::<BeadCache>().root;
     }
 
-    fn mul_lt(&self, cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
-        dp[0] = cache.get::<BeadCache>().root * du[0];
-    }
-
-    fn energy(&self, x: &[f64], gravity: &Vec3) -> Energy {
-        Energy {
-            kinetic: 0.5 * x[1] * x[1] / self.inertia(x[0]),
-            potential: -self.mass * gravity.dot(&self.position(x[0])),
-        }
-    }
-
-    fn momentum(&self, x: &[f64]) -> Momentum {
-        let linear = self.mass * self.tangent(x[0]) * (x[1] / self.inertia(x[0]));
-        Momentum { linear, angular: self.position(x[0]).cross(&linear) }
+    fn mul_lt(&self, cache: &mut Cache, u: &[f64], j: &mut [f64]) {
+        j[0] = cache.get::<BeadCache>().root * u[0];
     }
 }
 
 impl Collidable for Bead {
-    fn parts(&self) -> usize {
-        1
-    }
-
     fn shape(&self, _part: usize) -> Option<&Shape> {
         Some(&self.shape)
     }
@@ -223,44 +197,13 @@ impl Collidable for Bead {
     fn material(&self, _part: usize) -> Material {
         self.material
     }
-
-    fn collision_group(&self, _part: usize) -> CollisionGroup {
-        CollisionGroup::default()
-    }
-
-    fn collides_with(&self, _part: usize, _other: CollisionGroup) -> bool {
-        true
-    }
-
-    /// `J = axisᵀ·r'`.
-    fn test_impulse(
-        &self,
-        cache: &mut Cache,
-        _part: usize,
-        _part_state: &PartState,
-        _point: &Vec3,
-        axes: &[Vec3],
-        sign: f64,
-        y: &mut [f64],
-    ) {
-        let cache: &mut BeadCache = cache.get();
-        for (axis, y) in axes.iter().zip(y) {
-            *y += sign * axis.dot(&cache.tangent) / cache.root;
-        }
-    }
 }
 
 /// The stop: `0 ≤ (φ_stop − φ) ⟂ λ ≥ 0`.
 impl Constraint for Bead {
     fn rows(&self, me: &StateRange, view: &WorldView, _level: Level, out: &mut RowBuilder) {
-        let Some(stop) = self.stop else { return };
-        let x = &view.x[me.x.clone()];
-        let (rate, slope) = (x[1] / self.inertia(x[0]), -2.0 * self.mass * self.radius.powi(2) * x[0].sin());
-        // φ̈ without force: −½·M'·φ̇²/M; the row looks the other way
-        let bias = 0.5 * slope * rate * rate / self.inertia(x[0]);
-        let target = RowTarget { bias_acceleration: bias, ..RowTarget::new(RowSet::HalfLine, stop - x[0]) };
-        let me = out.owner();
-        out.row(target).on_coordinates(me, &[-1.0]);
+        let (Some(stop), owner) = (self.stop, out.owner()) else { return };
+        out.row(RowTarget::new(RowSet::HalfLine, stop - view.x[me.x.start])).on_coordinates(owner, &[-1.0]);
     }
 
     fn gaps(&self, me: &StateRange, view: &WorldView, out: &mut Vec<f64>) {

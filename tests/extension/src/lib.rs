@@ -2,8 +2,8 @@
 //!
 //! | object | integrates | collides | constrains | acts |
 //! |---|---|---|---|---|
-//! | [`Particle`] | 3 degrees of freedom, state `[x, P]` | a sphere that cannot turn | | |
-//! | [`Bead`] | 1 degree of freedom on a cycloid, inertia depends on the angle | a sphere | itself: a stop on the wire | |
+//! | [`Particle`] | 3 degrees of freedom, state `[x, v]` | a sphere that never rotates | | |
+//! | [`Bead`] | 1 degree of freedom on a cycloid, state `[φ, p]`, inertia depends on the angle | a sphere | itself: a stop on the wire | |
 //! | [`Rod`] | | | two objects, or one and a point: fixed distance, or a rope | |
 //! | [`Lookout`] | as a particle | | | carries a camera and a lamp |
 //! | [`Wind`] | | | | drag on the listed objects |

@@ -9,6 +9,7 @@ use tumble_core::{
 /// A [`Particle`] with a camera that looks along the world's x axis and a white lamp.
 #[derive(Clone)]
 pub struct Lookout {
+    name: String,
     particle: Particle,
     cameras: [CameraMount; 1],
     lights: [LightMount; 1],
@@ -16,7 +17,7 @@ pub struct Lookout {
 
 impl Lookout {
     /// A lookout; the camera is `height` m above its particle.
-    pub fn new(particle: Particle, height: f64) -> Lookout {
+    pub fn new(name: impl Into<String>, particle: Particle, height: f64) -> Lookout {
         let pose = Pose::translation(0.0, 0.0, height);
         let lamp = LightMount {
             part: 0,
@@ -26,21 +27,13 @@ impl Lookout {
             intensity: 1.0,
             casts_shadow: false,
         };
-        Lookout { particle, cameras: [CameraMount::new("", 0, pose)], lights: [lamp] }
+        Lookout { name: name.into(), particle, cameras: [CameraMount::new("", 0, pose)], lights: [lamp] }
     }
 }
 
 impl Object for Lookout {
     fn name(&self) -> &str {
-        self.particle.name()
-    }
-
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
-    }
-
-    fn new_cache(&self) -> Cache {
-        self.particle.new_cache()
+        &self.name
     }
 
     fn refresh(&self, x: &[f64], cache: &mut Cache, part_states: &mut [PartState]) {

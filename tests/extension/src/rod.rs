@@ -51,10 +51,6 @@ impl Object for Rod {
         &self.name
     }
 
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
-    }
-
     fn constraint(&self) -> Option<&dyn Constraint> {
         Some(self)
     }

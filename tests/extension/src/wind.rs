@@ -27,10 +27,6 @@ impl Object for Wind {
         &self.name
     }
 
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
-    }
-
     fn force(&self) -> Option<&dyn ForceGenerator> {
         Some(self)
     }

@@ -12,11 +12,13 @@
 //! LᵀL`.
 
 use crate::articulated::algorithms::dynamics::{Dynamics, Scratch};
+use crate::articulated::algorithms::free_motion::FreeMotion;
 use crate::articulated::model::Model;
 use crate::articulated::model::dof::{Coupling, DofSettings};
 use crate::object::Material;
 use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraMount, LightMount};
+use crate::object::part_state::Wrench;
 use crate::object::visual::Visual;
 use nalgebra::{Quaternion, Translation3};
 use tumble_collide::{ContactMode, Pose, Quat, Shape, Vec3};
@@ -149,15 +151,15 @@ pub struct ArticulatedBody {
     pub(super) start: Vec<f64>,
 }
 
-/// Data that a body computes from one state, and working memory.
+/// Values that a body derives from one state, and the working memory of its calls.
 pub(super) struct BodyCache {
+    /// Dynamics at the state of the last refresh.
     pub dynamics: Dynamics,
     pub scratch: Scratch,
-    /// Dynamics at other states than that of `dynamics`.
-    pub elsewhere: Dynamics,
-    /// Zeros for absent joint forces and accelerations.
+    pub free_motion: FreeMotion,
+    /// Zero joint forces or accelerations.
     pub zeros: Vec<f64>,
-    pub wrenches: Vec<crate::object::part_state::Wrench>,
+    pub wrenches: Vec<Wrench>,
     pub accelerations: Vec<(Vec3, Vec3)>,
 }
 
@@ -166,7 +168,7 @@ impl BodyCache {
         let dynamics = Dynamics::new(model);
         BodyCache {
             scratch: dynamics.scratch(),
-            elsewhere: dynamics.clone(),
+            free_motion: FreeMotion::new(&dynamics),
             zeros: vec![0.0; model.dof()],
             wrenches: vec![Default::default(); model.links().len()],
             accelerations: vec![(Vec3::zeros(), Vec3::zeros()); model.links().len()],

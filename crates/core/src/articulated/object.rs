@@ -4,7 +4,6 @@
 use super::body::{ArticulatedBody, BodyCache, LinkCollider};
 use crate::articulated::algorithms::dynamics::Dynamics;
 use crate::articulated::algorithms::energy::{energy, momentum};
-use crate::articulated::algorithms::free_motion;
 use crate::articulated::algorithms::kinematics::Kinematics;
 use crate::articulated::model::coordinates::integrate;
 use crate::articulated::model::joint::Joint;
@@ -13,9 +12,9 @@ use crate::object::Material;
 use crate::object::collidable::{Collidable, CollisionGroup};
 use crate::object::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
 use crate::object::net_sync;
-use crate::object::part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes, Wrench};
+use crate::object::part_state::{ForceSlice, Forces, PartPoint, PartState, StateRange, StateSizes, Wrench};
 use crate::object::visual::Visual;
-use crate::object::{Constraint, Energy, Integratable, Momentum, MomentumKind, NetSync, Object, Renderable, SyncError};
+use crate::object::{Constraint, Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError};
 use crate::rigid::rotation;
 use crate::rigid::vec3;
 use crate::world::view::WorldView;
@@ -24,10 +23,6 @@ use tumble_collide::{ContactMode, Pose, Shape, Vec3};
 impl Object for ArticulatedBody {
     fn name(&self) -> &str {
         &self.name
-    }
-
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
     }
 
     fn new_cache(&self) -> Cache {
@@ -139,14 +134,6 @@ impl Integratable for ArticulatedBody {
         self.joint_forces(&view.x[me.x.clone()], view.implicit, &mut out.generalized[me.v.clone()]);
     }
 
-    fn velocity(&self, x: &[f64], v: &mut [f64]) {
-        v.copy_from_slice(&x[self.model.positions()..]);
-    }
-
-    fn write_velocity(&self, x: &mut [f64], v: &[f64]) {
-        x[self.model.positions()..].copy_from_slice(v);
-    }
-
     fn derivative(&self, cache: &mut Cache, _x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
         let BodyCache { dynamics, scratch, wrenches, .. } = cache.get();
         self.gather(dynamics, f.wrenches, wrenches);
@@ -181,21 +168,13 @@ impl Integratable for ArticulatedBody {
         }
     }
 
-    fn momentum_kind(&self) -> MomentumKind {
-        MomentumKind::Velocity
-    }
-
     fn free_motion_rate(&self, cache: &mut Cache, _x: &[f64], out: &mut [f64]) {
         let BodyCache { dynamics, scratch, zeros, .. } = cache.get();
         dynamics.accelerate(scratch, zeros, &[], out);
     }
 
-    fn kick(&self, x: &mut [f64], dp: &[f64], h: f64) {
-        x[self.model.positions()..].iter_mut().zip(dp).for_each(|(v, dp)| *v += h * dp);
-    }
-
     fn free_motion(&self, cache: &mut Cache, x: &mut [f64], h: f64) {
-        free_motion::free_motion(&self.model, cache.get(), x, h);
+        cache.get::<BodyCache>().free_motion.advance(&self.model, x, h);
     }
 
     fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64) {
@@ -203,7 +182,7 @@ impl Integratable for ArticulatedBody {
     }
 
     fn displace(&self, cache: &mut Cache, x: &mut [f64], v: &[f64], h: f64) {
-        free_motion::transport(&self.model, cache.get(), x, v, h);
+        cache.get::<BodyCache>().free_motion.transport(&self.model, x, v, h);
     }
 
     fn pull_back(&self, displacement: &[f64], v: &mut [f64]) {
@@ -218,6 +197,26 @@ impl Integratable for ArticulatedBody {
             let rate = rotation::pull_back(&(sign * vec3(&displacement[link.v..])), &vec3(&v[link.v..]));
             v[link.v..link.v + 3].copy_from_slice(rate.as_slice());
         }
+    }
+
+    /// `J = (Lᵀ·L⁻ᵀJᵀ)ᵀ`: the whitened response, mapped back.
+    fn jacobian(&self, cache: &mut Cache, at: &PartPoint, j: &mut [f64]) {
+        let dof = self.model.dof();
+        let mut y = vec![0.0; j.len()];
+        self.test_impulse(cache, at, 1.0, &mut y);
+        let mut row = vec![0.0; dof];
+        for (y, j) in y.chunks_exact(dof.max(1)).zip(j.chunks_exact_mut(dof.max(1))) {
+            self.mul_lt(cache, y, &mut row);
+            j.iter_mut().zip(&row).for_each(|(j, row)| *j += row);
+        }
+    }
+
+    fn test_impulse(&self, cache: &mut Cache, at: &PartPoint, sign: f64, y: &mut [f64]) {
+        let dynamics = &cache.get::<BodyCache>().dynamics;
+        let Some(link) = self.link_of(at.part) else { return };
+        let carried = self.collider(at.part).map_or(Vec3::zeros(), |p| p.collider.pose.translation.vector);
+        let arm = at.arm() + dynamics.link_pose(link).rotation * carried;
+        dynamics.point_response(link, &arm, at.axes, sign, y);
     }
 
     fn mul_l(&self, cache: &mut Cache, v: &[f64], u: &mut [f64]) {
@@ -289,23 +288,6 @@ impl Collidable for ArticulatedBody {
 
     fn parts_collide(&self, part_a: usize, part_b: usize) -> bool {
         self.links_collide(self.link_of(part_a), self.link_of(part_b))
-    }
-
-    fn test_impulse(
-        &self,
-        cache: &mut Cache,
-        part: usize,
-        part_state: &PartState,
-        point: &Vec3,
-        axes: &[Vec3],
-        sign: f64,
-        y: &mut [f64],
-    ) {
-        let dynamics = &cache.get::<BodyCache>().dynamics;
-        let Some(link) = self.link_of(part) else { return };
-        let carried = self.collider(part).map_or(Vec3::zeros(), |p| p.collider.pose.translation.vector);
-        let arm = point - part_state.position() + dynamics.link_pose(link).rotation * carried;
-        dynamics.point_response(link, &arm, axes, sign, y);
     }
 }
 

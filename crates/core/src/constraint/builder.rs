@@ -3,7 +3,7 @@
 use crate::constraint::rows::{RowSet, Rows};
 use crate::derived::Cache;
 use crate::object::collidable::ContactFrame;
-use crate::object::part_state::PartState;
+use crate::object::part_state::{PartPoint, PartState};
 use crate::object::{Constraint, Integratable, RowTarget};
 use crate::world::view::{Entry, Mode, ObjectId, Objects};
 use tumble_collide::Vec3;
@@ -168,10 +168,10 @@ impl RowBuilder<'_> {
     /// other.
     pub(crate) fn point_side(&mut self, entry: &Entry, part: usize, p: &Vec3, axes: &[Vec3], sign: f64) -> bool {
         let part_state = &self.part_states[entry.state_range.parts.start + part];
-        let Some(collidable) = entry.object.collidable() else { return false };
         if entry.moves() {
+            let Some(body) = entry.object.integratable() else { return false };
             let Some(y) = self.rows.side(entry.state_range.v.start, entry.state_range.v.len()) else { return false };
-            collidable.test_impulse(&mut self.caches[entry.place], part, part_state, p, axes, sign, y);
+            body.test_impulse(&mut self.caches[entry.place], &PartPoint { part, part_state, point: *p, axes }, sign, y);
         } else {
             let velocity = part_state.velocity_at(p);
             let first = self.bias.len() - axes.len();

@@ -92,7 +92,8 @@ impl IntegrationContext<'_> {
                 (entry.state_range, &mut part_states[entry.state_range.parts.clone()], &mut caches[entry.place]);
             if entry.moves() {
                 let dp = &mut dp[state_range.v.clone()];
-                body.derivative(cache, &self.x[state_range.x.clone()], &self.forces.slice(state_range), dp);
+                let forces = self.forces.slice(state_range, part_states);
+                body.derivative(cache, &self.x[state_range.x.clone()], &forces, dp);
                 body.accelerations(cache, &self.x[state_range.x.clone()], dp, part_states);
             } else {
                 // a kinematic object keeps its generalized velocity: a link that turns about

@@ -1,8 +1,6 @@
-//! The trait of objects with parts that collide: shapes, materials, filters, and the test impulse (thesis §IV.A.3).
+//! The trait of objects with parts that collide: shapes, materials and filters (thesis §IV.A.3).
 
-use super::part_state::PartState;
-use super::{Integratable, Material};
-use crate::derived::Cache;
+use super::Material;
 use tumble_collide::{ContactMode, Shape, Vec3};
 
 /// Collision group of a part, 0 to 63 (thesis `CollisionObjectType`). Pairs are filtered by group.
@@ -41,16 +39,28 @@ impl ContactFrame {
 
 /// An object with parts that collide.
 pub trait Collidable {
-    /// Returns the number of parts; each has a row in the table of part states.
-    fn parts(&self) -> usize;
+    /// Returns the number of parts, each with a row in the table of part states: [`StateSizes::parts`](super::part_state::StateSizes::parts) of an object with a
+    /// state. One by default.
+    fn parts(&self) -> usize {
+        1
+    }
     /// Returns the shape of a part, in the part's frame; `None` for a part that never collides: one for forces, joints or visuals.
     fn shape(&self, part: usize) -> Option<&Shape>;
     /// Returns the surface constants of a part.
-    fn material(&self, part: usize) -> Material;
+    fn material(&self, part: usize) -> Material {
+        let _ = part;
+        Material::default()
+    }
     /// Returns the collision group of a part.
-    fn collision_group(&self, part: usize) -> CollisionGroup;
+    fn collision_group(&self, part: usize) -> CollisionGroup {
+        let _ = part;
+        CollisionGroup::default()
+    }
     /// Returns whether a part collides with parts of group `other`. Two parts collide if this is true for both.
-    fn collides_with(&self, part: usize, other: CollisionGroup) -> bool;
+    fn collides_with(&self, part: usize, other: CollisionGroup) -> bool {
+        let _ = (part, other);
+        true
+    }
     /// Returns how a part's mesh or cylinder collides. A pair collides by spheres if either part does.
     fn contact_mode(&self, part: usize) -> ContactMode {
         let _ = part;
@@ -65,40 +75,5 @@ pub trait Collidable {
     fn parts_collide(&self, part_a: usize, part_b: usize) -> bool {
         let _ = (part_a, part_b);
         false
-    }
-    /// Adds the whitened response to unit impulses along these axes at this world point (thesis `ApplyTestImpulse`): `sign · L⁻ᵀJᵀ`, one
-    /// row of `dof` numbers per axis.
-    #[allow(clippy::too_many_arguments)]
-    fn test_impulse(
-        &self,
-        cache: &mut Cache,
-        part: usize,
-        part_state: &PartState,
-        point: &Vec3,
-        axes: &[Vec3],
-        sign: f64,
-        y: &mut [f64],
-    );
-}
-
-/// Adds the test impulse of a single rigid part with generalized velocity `[ω; v]` at the part's origin.
-pub fn rigid_test_impulse(
-    body: &dyn Integratable,
-    cache: &mut Cache,
-    part_state: &PartState,
-    point: &Vec3,
-    axes: &[Vec3],
-    sign: f64,
-    y: &mut [f64],
-) {
-    let r = point - part_state.position();
-    for (axis, y) in axes.iter().zip(y.chunks_exact_mut(6)) {
-        let moment = r.cross(axis);
-        let jacobian = [moment.x, moment.y, moment.z, axis.x, axis.y, axis.z];
-        let mut response = [0.0; 6];
-        body.solve_lt(cache, &jacobian, &mut response);
-        for (y, response) in y.iter_mut().zip(response) {
-            *y += sign * response;
-        }
     }
 }

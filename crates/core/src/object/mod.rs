@@ -5,6 +5,7 @@
 //! stages of integrators copy a slice.
 
 mod appearance;
+mod by_jacobian;
 pub(crate) mod collidable;
 mod conserved;
 mod constraint;
@@ -33,14 +34,12 @@ use std::any::Any;
 
 /// Anything in a world. Each accessor returns one of the object's other traits, `None` by default (the thesis's `ImplementsInterface`,
 /// §IV.B.1).
-pub trait Object: Any + Send + Sync {
+pub trait Object: Fork + Any + Send + Sync {
     /// Returns the name that the object is to have in a world, of any length. By default it is empty, and the world makes one:
     /// [`World::name`](crate::World::name) returns the name in the world.
     fn name(&self) -> &str {
         ""
     }
-    /// Returns an independent copy.
-    fn fork(&self) -> Box<dyn Object>;
     /// Makes the cache for [`refresh`](Self::refresh) and for all calls with a cache; empty by default.
     fn new_cache(&self) -> Cache {
         Cache::default()
@@ -81,5 +80,17 @@ pub trait Object: Any + Send + Sync {
     /// For an object that can be synchronized with copies of itself in other processes.
     fn net_sync(&self) -> Option<&dyn NetSync> {
         None
+    }
+}
+
+/// Makes an independent copy of an object. Every object that is [`Clone`] has it.
+pub trait Fork {
+    /// Returns the copy.
+    fn fork(&self) -> Box<dyn Object>;
+}
+
+impl<T: Object + Clone> Fork for T {
+    fn fork(&self) -> Box<dyn Object> {
+        Box::new(self.clone())
     }
 }

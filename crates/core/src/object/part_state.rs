@@ -78,6 +78,26 @@ impl PartState {
     }
 }
 
+/// A material point of a part, and directions at it.
+#[derive(Clone, Copy, Debug)]
+pub struct PartPoint<'a> {
+    /// Part of the object.
+    pub part: usize,
+    /// State of the part.
+    pub part_state: &'a PartState,
+    /// World point, m.
+    pub point: Vec3,
+    /// Directions, world axes, at least one.
+    pub axes: &'a [Vec3],
+}
+
+impl PartPoint<'_> {
+    /// Returns the vector from the part's origin to the point, m.
+    pub fn arm(&self) -> Vec3 {
+        self.point - self.part_state.position()
+    }
+}
+
 /// A torque about the origin of a part's frame and a force, world axes, N·m and N.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Wrench {
@@ -110,8 +130,9 @@ impl Forces {
         wrench.torque += (p - part_state.position()).cross(&force);
     }
 
-    pub(crate) fn slice(&self, state_range: &StateRange) -> ForceSlice<'_> {
+    pub(crate) fn slice<'a>(&'a self, state_range: &StateRange, part_states: &'a [PartState]) -> ForceSlice<'a> {
         ForceSlice {
+            part_states,
             wrenches: &self.wrenches[state_range.parts.clone()],
             generalized: &self.generalized[state_range.v.clone()],
         }
@@ -121,6 +142,8 @@ impl Forces {
 /// The range of one object in the table of forces.
 #[derive(Clone, Copy, Debug)]
 pub struct ForceSlice<'a> {
+    /// State per part of the object.
+    pub part_states: &'a [PartState],
     /// Wrench per part of the object.
     pub wrenches: &'a [Wrench],
     /// Generalized force per degree of freedom of the object.

@@ -7,11 +7,11 @@ use crate::derived::Cache;
 use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraMount, LightMount};
 use crate::object::net_sync;
-use crate::object::part_state::{ForceSlice, Forces, PartState, StateRange, StateSizes};
+use crate::object::part_state::{ForceSlice, Forces, PartPoint, PartState, StateRange, StateSizes};
 use crate::object::visual::Visual;
 use crate::object::{
-    CameraCarrier, Collidable, Energy, Integratable, LightCarrier, Material, Momentum, NetSync, Object, Renderable,
-    SyncError,
+    CameraCarrier, Collidable, Energy, Integratable, LightCarrier, Material, Momentum, MomentumKind, NetSync, Object,
+    Renderable, SyncError,
 };
 use crate::world::view::WorldView;
 use nalgebra::{Translation3, Unit};
@@ -41,10 +41,6 @@ impl RigidBody {
 impl Object for RigidBody {
     fn name(&self) -> &str {
         &self.name
-    }
-
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
     }
 
     fn new_cache(&self) -> Cache {
@@ -112,6 +108,10 @@ impl Integratable for RigidBody {
         write_orientation(x, &q);
         x[7..10].copy_from_slice((self.mass * self.initial_velocity).as_slice());
         x[10..13].copy_from_slice(l.as_slice());
+    }
+
+    fn momentum_kind(&self) -> MomentumKind {
+        MomentumKind::Conjugate
     }
 
     fn accepts(&self, x: &[f64]) -> bool {
@@ -197,6 +197,27 @@ impl Integratable for RigidBody {
         write6(u, &(cache.solve_lt * vec3(&x[10..])), &(vec3(&x[7..]) / self.root_mass));
     }
 
+    fn jacobian(&self, _cache: &mut Cache, at: &PartPoint, j: &mut [f64]) {
+        let r = at.arm();
+        for (axis, j) in at.axes.iter().zip(j.chunks_exact_mut(6)) {
+            add(&mut j[..3], &r.cross(axis), 1.0);
+            add(&mut j[3..], axis, 1.0);
+        }
+    }
+
+    fn test_impulse(&self, cache: &mut Cache, at: &PartPoint, sign: f64, y: &mut [f64]) {
+        let cache: &mut BodyCache = cache.get();
+        let r = at.arm();
+        let linear = sign / self.root_mass;
+        for (axis, y) in at.axes.iter().zip(y.chunks_exact_mut(6)) {
+            let angular = cache.solve_lt * r.cross(axis);
+            for k in 0..3 {
+                y[k] += sign * angular[k];
+                y[k + 3] += linear * axis[k];
+            }
+        }
+    }
+
     fn mul_l(&self, cache: &mut Cache, v: &[f64], u: &mut [f64]) {
         let cache: &mut BodyCache = cache.get();
         write6(u, &cache.mul_lt.tr_mul(&vec3(v)), &(self.root_mass * vec3(&v[3..])));
@@ -234,10 +255,6 @@ impl Integratable for RigidBody {
 }
 
 impl Collidable for RigidBody {
-    fn parts(&self) -> usize {
-        1
-    }
-
     fn shape(&self, _part: usize) -> Option<&Shape> {
         Some(&self.shape)
     }
@@ -256,28 +273,6 @@ impl Collidable for RigidBody {
 
     fn collides_with(&self, _part: usize, other: CollisionGroup) -> bool {
         self.mask & other.bit() != 0
-    }
-
-    fn test_impulse(
-        &self,
-        cache: &mut Cache,
-        _part: usize,
-        part_state: &PartState,
-        point: &Vec3,
-        axes: &[Vec3],
-        sign: f64,
-        y: &mut [f64],
-    ) {
-        let cache: &mut BodyCache = cache.get();
-        let r = point - part_state.position();
-        let linear = sign / self.root_mass;
-        for (axis, y) in axes.iter().zip(y.chunks_exact_mut(6)) {
-            let angular = cache.solve_lt * r.cross(axis);
-            for k in 0..3 {
-                y[k] += sign * angular[k];
-                y[k + 3] += linear * axis[k];
-            }
-        }
     }
 }
 

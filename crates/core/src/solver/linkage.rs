@@ -34,6 +34,7 @@
 use super::equality::{Equalities, VANISHED};
 use super::one_contact::Symmetric3;
 use crate::constraint::rows::{Block, RowSet, Rows, Side, dot};
+use tumble_collide::UnionFind;
 
 /// Maximum number of equality rows of a linkage that are solved directly.
 pub const MAX_DIRECT_ROWS: usize = 200;
@@ -288,25 +289,18 @@ fn objects_of(rows: &Rows, blocks: &[u32]) -> Vec<(u32, u32)> {
 /// Returns the joints grouped by connected objects, in the order of each group's first joint.
 fn groups(rows: &Rows, joints: &[u32]) -> Vec<Vec<u32>> {
     let objects = objects_of(rows, joints);
-    let place = |s: &Side| objects.binary_search(&(s.u, s.dof)).unwrap_or(0);
-    let mut parent: Vec<usize> = (0..objects.len()).collect();
-    let root = |parent: &[usize], mut i: usize| {
-        while parent[i] != i {
-            i = parent[i];
-        }
-        i
-    };
+    let place = |s: &Side| objects.binary_search(&(s.u, s.dof)).unwrap_or(0) as u32;
+    let mut sets = UnionFind::new(objects.len());
     for joint in island(rows, joints) {
         if let [first, second] = joint.sides() {
-            let (a, b) = (root(&parent, place(first)), root(&parent, place(second)));
-            parent[a.max(b)] = a.min(b);
+            sets.union(place(first), place(second));
         }
     }
     let mut group_of = vec![usize::MAX; objects.len()];
     let mut groups: Vec<Vec<u32>> = Vec::new();
     for (&b, joint) in joints.iter().zip(island(rows, joints)) {
         // a joint has a response and therefore a side
-        let root = joint.sides().first().map_or(0, |s| root(&parent, place(s)));
+        let root = joint.sides().first().map_or(0, |s| sets.find(place(s)) as usize);
         if group_of[root] == usize::MAX {
             group_of[root] = groups.len();
             groups.push(Vec::new());

@@ -1,7 +1,7 @@
 //! Access to the objects of a world between steps.
 
 use super::{Coordinates, World, WorldError};
-use crate::object::part_state::PartState;
+use crate::object::part_state::{PartPoint, PartState};
 use crate::object::{Integratable, Object};
 use crate::rigid::{RigidBody, orientation, vec3};
 use crate::world::view::{Mode, ObjectId, Status};
@@ -213,15 +213,12 @@ impl World {
         let part_state = self.core.derived.part_states[index];
         let Coordinates { objects, x, caches } = self.core.coordinates(None);
         let entry = objects.get(id).ok_or(WorldError::Stale)?;
-        let (Some(collidable), Some(body), true) =
-            (entry.object.collidable(), entry.object.integratable(), entry.moves())
-        else {
-            return Ok(());
-        };
+        let Some(body) = entry.object.integratable().filter(|_| entry.moves()) else { return Ok(()) };
         let dof = entry.state_range.v.len();
         let (mut y, mut dp) = (vec![0.0; 3 * dof], vec![0.0; dof]);
         let cache = &mut caches[entry.place];
-        collidable.test_impulse(cache, part, &part_state, point, &[Vec3::x(), Vec3::y(), Vec3::z()], 1.0, &mut y);
+        let axes = [Vec3::x(), Vec3::y(), Vec3::z()];
+        body.test_impulse(cache, &PartPoint { part, part_state: &part_state, point: *point, axes: &axes }, 1.0, &mut y);
         let du: Vec<f64> = (0..dof).map(|k| (0..3).map(|r| impulse[r] * y[r * dof + k]).sum()).collect();
         body.unwhiten_change(cache, &du, &mut dp);
         body.kick(&mut x[entry.state_range.x.clone()], &dp, 1.0);

@@ -22,14 +22,16 @@
 
 use super::{Coordinates, World, WorldError};
 use crate::derived::Cache;
-use crate::object::collidable::Collidable;
-use crate::object::part_state::{PartState, Wrench};
+use crate::object::Integratable;
+use crate::object::part_state::{PartPoint, Wrench};
 use crate::world::view::ObjectId;
 use nalgebra::Matrix3;
 use tumble_collide::Vec3;
 
 /// Directions in which the part is this many times harder to move than in the easiest count as closed to it.
 const CLOSED: f64 = 1e9;
+
+const AXES: [Vec3; 3] = [Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)];
 
 /// What is pulled, where at, where to, how hard.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,50 +60,33 @@ impl World {
         let (h, part_state) = (self.core.settings.dt, self.core.derived.part_states[index]);
         let Coordinates { objects, caches, .. } = self.core.coordinates(None);
         let entry = objects.get(pick.id).ok_or(WorldError::Stale)?;
-        let Some(collidable) = entry.object.collidable().filter(|c| entry.moves() && c.part_moves(pick.part)) else {
-            return Ok(Wrench::default());
-        };
+        let reached = entry.moves() && entry.object.collidable().is_none_or(|c| c.part_moves(pick.part));
+        let Some(body) = entry.object.integratable().filter(|_| reached) else { return Ok(Wrench::default()) };
         let (dof, cache) = (entry.state_range.v.len(), &mut caches[entry.place]);
         let held = part_state.pose.rotation * pick.point + part_state.position();
         let (v, omega) = (part_state.velocity_at(&held), pick.frequency.max(0.0));
         let wanted = (v + (pick.target - held) * (h * omega * omega)) / (1.0 + h * omega).powi(2);
-        let impulses =
-            responses((collidable, cache), pick.part, &part_state, dof, &held, [Vec3::x(), Vec3::y(), Vec3::z()]);
+        let at = PartPoint { part: pick.part, part_state: &part_state, point: held, axes: &AXES };
+        let mut impulses = vec![0.0; 3 * dof];
+        body.test_impulse(cache, &at, 1.0, &mut impulses);
         let force = mass(&impulses, dof) * (wanted - v) / h;
         let slowed = part_state.angular_velocity * (1.0 / (1.0 + 0.5 * h * omega) - 1.0);
-        let torque = mass(&couples((collidable, cache), pick.part, &part_state, dof), dof) * slowed / h;
+        let torque = mass(&couples(body, cache, &at, dof), dof) * slowed / h;
         self.apply_force(pick.id, pick.part, force, &held)?;
         self.apply_torque(pick.id, pick.part, torque)?;
         Ok(Wrench { torque, force })
     }
 }
 
-/// Whitened responses to unit impulses at a point, a row of `dof` numbers each.
-fn responses(
-    (collidable, cache): (&dyn Collidable, &mut Cache),
-    part: usize,
-    part_state: &PartState,
-    dof: usize,
-    point: &Vec3,
-    axes: [Vec3; 3],
-) -> Vec<f64> {
-    let mut y = vec![0.0; 3 * dof];
-    collidable.test_impulse(cache, part, part_state, point, &axes, 1.0, &mut y);
-    y
-}
-
-/// The same of unit couples about x, y and z: a force along the next axis but one, an arm of 1 m along the next, and the force's opposite without it.
-fn couples(
-    (collidable, cache): (&dyn Collidable, &mut Cache),
-    part: usize,
-    part_state: &PartState,
-    dof: usize,
-) -> Vec<f64> {
+/// Returns the whitened responses of a part to unit couples about x, y and z, a row of `dof` numbers each. A couple is a force along the next axis but one
+/// with an arm of 1 m along the next axis, and the opposite force at the origin.
+fn couples(body: &dyn Integratable, cache: &mut Cache, at: &PartPoint, dof: usize) -> Vec<f64> {
     let mut z = vec![0.0; 3 * dof];
+    let origin = at.part_state.position();
     for (k, row) in z.chunks_exact_mut(dof.max(1)).enumerate() {
-        let (arm, axis) = (Vec3::ith((k + 1) % 3, 1.0), Vec3::ith((k + 2) % 3, 1.0));
-        collidable.test_impulse(cache, part, part_state, &(part_state.position() + arm), &[axis], 1.0, row);
-        collidable.test_impulse(cache, part, part_state, &part_state.position(), &[axis], -1.0, row);
+        let (arm, axes) = (AXES[(k + 1) % 3], &[AXES[(k + 2) % 3]]);
+        body.test_impulse(cache, &PartPoint { point: origin + arm, axes, ..*at }, 1.0, row);
+        body.test_impulse(cache, &PartPoint { point: origin, axes, ..*at }, -1.0, row);
     }
     z
 }

@@ -29,7 +29,7 @@ use crate::object::part_state::{PartState, Wrench};
 use crate::world::Core;
 use crate::world::view::{Entry, Mode, ObjectId};
 use serde::{Deserialize, Serialize};
-use tumble_collide::Pose;
+use tumble_collide::{Pose, UnionFind};
 
 /// Conditions under which islands fall asleep.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -230,15 +230,12 @@ impl Core {
         }
         let Some(bonds) = self.bonds() else { return };
         let mut ready = ready;
-        let mut parent: Vec<usize> = (0..ready.len()).collect();
+        let mut sets = UnionFind::new(ready.len());
         let mut supports: Vec<[usize; 2]> = Vec::new();
         for [a, b] in bonds {
             let (Some(i), Some(j)) = (self.table.place(a), self.table.place(b)) else { continue };
             match (self.objects().at(i).moves(), self.objects().at(j).moves()) {
-                (true, true) => {
-                    let (i, j) = (root(&parent, i), root(&parent, j));
-                    parent[i.max(j)] = i.min(j);
-                }
+                (true, true) => sets.union(i as u32, j as u32),
                 (false, false) => {}
                 (first_moves, _) => {
                     let (mover, support) = if first_moves { (i, j) } else { (j, i) };
@@ -248,13 +245,13 @@ impl Core {
                 }
             }
         }
-        let roots: Vec<usize> = (0..parent.len()).map(|i| root(&parent, i)).collect();
-        let mut calm = vec![true; parent.len()];
+        let roots: Vec<usize> = (0..ready.len()).map(|i| sets.find(i as u32) as usize).collect();
+        let mut calm = vec![true; ready.len()];
         for (i, _) in self.objects().iter().enumerate().filter(|(_, e)| e.moves()) {
             calm[roots[i]] &= ready[i];
         }
-        for r in (0..parent.len()).filter(|&r| roots[r] == r && calm[r] && ready[r]) {
-            let members: Vec<usize> = (r..parent.len()).filter(|&i| roots[i] == r).collect();
+        for r in (0..ready.len()).filter(|&r| roots[r] == r && calm[r] && ready[r]) {
+            let members: Vec<usize> = (r..ready.len()).filter(|&i| roots[i] == r).collect();
             let supports = supports.iter().filter(|[mover, _]| roots[*mover] == r).map(|[_, support]| *support);
             self.put_to_sleep(&members, supports.collect());
         }
@@ -330,13 +327,6 @@ impl Core {
         group.warm = self.state.warm.take(|key| ours(&key.pair[0]) || ours(&key.pair[2]));
         self.state.groups.push(group);
     }
-}
-
-fn root(parent: &[usize], mut i: usize) -> usize {
-    while parent[i] != i {
-        i = parent[i];
-    }
-    i
 }
 
 impl Entry<'_> {

@@ -13,9 +13,6 @@ impl Object for Drive {
     fn name(&self) -> &str {
         "drive"
     }
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
-    }
     fn force(&self) -> Option<&dyn ForceGenerator> {
         Some(self)
     }
@@ -45,9 +42,6 @@ struct Spring {
 impl Object for Spring {
     fn name(&self) -> &str {
         &self.name
-    }
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
     }
     fn force(&self) -> Option<&dyn ForceGenerator> {
         Some(self)

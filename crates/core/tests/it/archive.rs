@@ -106,14 +106,12 @@ fn shared_shapes_are_written_once_and_shared_again() {
 }
 
 /// A force upwards.
+#[derive(Clone)]
 struct Lift;
 
 impl Object for Lift {
     fn name(&self) -> &str {
         "lift"
-    }
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(Lift)
     }
     fn force(&self) -> Option<&dyn ForceGenerator> {
         Some(self)

@@ -20,9 +20,6 @@ impl Object for Pin {
     fn name(&self) -> &str {
         &self.name
     }
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
-    }
     fn constraint(&self) -> Option<&dyn Constraint> {
         Some(self)
     }

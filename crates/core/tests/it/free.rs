@@ -117,9 +117,6 @@ impl Object for Spring {
     fn name(&self) -> &str {
         "spring"
     }
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
-    }
     fn force(&self) -> Option<&dyn ForceGenerator> {
         Some(self)
     }

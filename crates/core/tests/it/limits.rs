@@ -5,7 +5,7 @@ use tumble_core::collide::Vec3;
 use tumble_core::rows::RowSet;
 use tumble_core::*;
 
-/// A pendulum with one joint: `X = [θ, p]`, `M = 1 kg·m²`, torque `−pull·sin θ`, one-sided stops at
+/// A pendulum with one joint: `X = [θ, ω]`, `M = 1 kg·m²`, torque `−pull·sin θ`, one-sided stops at
 /// `θ = stops`.
 #[derive(Clone)]
 struct Pendulum {
@@ -27,9 +27,6 @@ impl Object for Pendulum {
     fn name(&self) -> &str {
         "pendulum"
     }
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
-    }
     fn integratable(&self) -> Option<&dyn Integratable> {
         Some(self)
     }
@@ -48,25 +45,7 @@ impl Integratable for Pendulum {
     fn accumulate_forces(&self, me: &StateRange, view: &WorldView, out: &mut Forces) {
         out.generalized[me.v.start] -= self.pull * view.x[me.x.start].sin();
     }
-    fn velocity(&self, x: &[f64], v: &mut [f64]) {
-        v[0] = x[1];
-    }
-    fn write_velocity(&self, x: &mut [f64], v: &[f64]) {
-        x[1] = v[0];
-    }
-    fn derivative(&self, _cache: &mut Cache, _x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
-        dp[0] = f.generalized[0];
-    }
-    fn accelerations(&self, _cache: &mut Cache, _x: &[f64], _dp: &[f64], _sites: &mut [PartState]) {}
-    fn kick(&self, x: &mut [f64], dp: &[f64], h: f64) {
-        x[1] += h * dp[0];
-    }
-    fn free_motion(&self, _cache: &mut Cache, x: &mut [f64], h: f64) {
-        x[0] += h * x[1];
-    }
-    fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64) {
-        x[0] += h * v[0];
-    }
+    fn jacobian(&self, _cache: &mut Cache, _at: &PartPoint, _j: &mut [f64]) {}
     fn mul_l(&self, _cache: &mut Cache, v: &[f64], u: &mut [f64]) {
         u[0] = v[0];
     }
@@ -81,9 +60,6 @@ impl Integratable for Pendulum {
     }
     fn energy(&self, x: &[f64], _gravity: &Vec3) -> Energy {
         Energy { kinetic: 0.5 * x[1] * x[1], potential: self.energy_at(x[0]) }
-    }
-    fn momentum(&self, _x: &[f64]) -> Momentum {
-        Momentum::default()
     }
 }
 

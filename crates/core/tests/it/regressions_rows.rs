@@ -16,9 +16,6 @@ impl Object for AlongX {
     fn name(&self) -> &str {
         "along x"
     }
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
-    }
     fn constraint(&self) -> Option<&dyn Constraint> {
         Some(self)
     }
@@ -282,9 +279,6 @@ const END: Vec3 = Vec3::new(0.5, 0.0, 0.0);
 impl Object for Pin {
     fn name(&self) -> &str {
         "pin"
-    }
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
     }
     fn constraint(&self) -> Option<&dyn Constraint> {
         Some(self)

@@ -197,14 +197,12 @@ fn a_kinematic_body_wakes_bodies_that_it_carries_or_strikes() {
     }
 }
 
+#[derive(Clone)]
 struct Gust;
 
 impl Object for Gust {
     fn name(&self) -> &str {
         "gust"
-    }
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(Gust)
     }
     fn force(&self) -> Option<&dyn ForceGenerator> {
         Some(self)
@@ -331,14 +329,12 @@ fn saved_and_forked_sleepers_wake_to_the_same_bytes() {
 }
 
 /// Adds a NaN force to a part of an awake object.
+#[derive(Clone)]
 struct Fault(ObjectId);
 
 impl Object for Fault {
     fn name(&self) -> &str {
         "fault"
-    }
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(Fault(self.0))
     }
     fn force(&self) -> Option<&dyn ForceGenerator> {
         Some(self)

@@ -22,9 +22,6 @@ impl Object for Drive {
     fn name(&self) -> &str {
         "drive"
     }
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
-    }
     fn constraint(&self) -> Option<&dyn Constraint> {
         Some(self)
     }
@@ -121,13 +118,11 @@ fn a_spring_takes_no_part_in_an_impact() {
 
 #[test]
 fn a_compliance_that_is_none_is_refused() {
+    #[derive(Clone)]
     struct Row(ObjectId, f64);
     impl Object for Row {
         fn name(&self) -> &str {
             "row"
-        }
-        fn fork(&self) -> Box<dyn Object> {
-            Box::new(Row(self.0, self.1))
         }
         fn constraint(&self) -> Option<&dyn Constraint> {
             Some(self)

@@ -1,8 +1,8 @@
 //! An object that is only drawn. It represents an object of the server that the scene file does not
 //! have.
 
-use tumble_collide::{Shape, Vec3};
-use tumble_core::{Cache, Collidable, CollisionGroup, Material, Object, PartState, Renderable, Visual};
+use tumble_collide::Shape;
+use tumble_core::{Collidable, Object, Renderable, Visual};
 
 /// Parts with visuals, at the poses that were set for display.
 #[derive(Clone)]
@@ -15,10 +15,6 @@ pub(crate) struct RenderProxy {
 impl Object for RenderProxy {
     fn name(&self) -> &str {
         &self.name
-    }
-
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
     }
 
     fn collidable(&self) -> Option<&dyn Collidable> {
@@ -38,20 +34,6 @@ impl Collidable for RenderProxy {
     fn shape(&self, _: usize) -> Option<&Shape> {
         None
     }
-
-    fn material(&self, _: usize) -> Material {
-        Material::default()
-    }
-
-    fn collision_group(&self, _: usize) -> CollisionGroup {
-        CollisionGroup::default()
-    }
-
-    fn collides_with(&self, _: usize, _: CollisionGroup) -> bool {
-        false
-    }
-
-    fn test_impulse(&self, _: &mut Cache, _: usize, _: &PartState, _: &Vec3, _: &[Vec3], _: f64, _: &mut [f64]) {}
 }
 
 impl Renderable for RenderProxy {

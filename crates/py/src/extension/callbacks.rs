@@ -111,13 +111,16 @@ struct PythonForce {
     code: Code,
 }
 
+impl Clone for PythonForce {
+    /// Copies the Python object, as a fork of the world requires.
+    fn clone(&self) -> PythonForce {
+        PythonForce { code: self.code.fork("apply") }
+    }
+}
+
 impl Object for PythonForce {
     fn name(&self) -> &str {
         &self.code.name
-    }
-
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(PythonForce { code: self.code.fork("apply") })
     }
 
     fn force(&self) -> Option<&dyn ForceGenerator> {

@@ -3,7 +3,7 @@
 use crate::common::*;
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::{Material, Object, ObjectId, RigidBody, World};
-use tumble_extension::{Bead, Particle};
+use tumble_extension::Bead;
 
 fn rigid(name: &str, mass: f64, at: Vec3, velocity: Vec3, restitution: f64) -> RigidBody {
     let body = RigidBody::new(sphere(0.1)).with_name(name).with_mass(mass).with_material(Material {
@@ -31,9 +31,7 @@ fn collide(stepper: &str, a: impl Object, b: impl Object) -> (World, ObjectId, O
 fn a_particle_hits_a_rigid_body_head_on() {
     for stepper in STEPPERS {
         for e in [0.0, 0.5, 1.0] {
-            let a = Particle::new("particle", 2.0, sphere(0.1))
-                .at(Vec3::new(-0.5, 0.0, 0.0), Vec3::new(3.0, 0.0, 0.0))
-                .with_material(Material { restitution: e, friction: 0.0, ..Material::default() });
+            let a = with_material(particle(2.0, 0.1, Vec3::new(-0.5, 0.0, 0.0), Vec3::new(3.0, 0.0, 0.0)), e, 0.0);
             let (world, a, b) = collide(stepper, a, rigid("ball", 3.0, Vec3::zeros(), Vec3::new(-1.0, 0.0, 0.0), e));
             let (va, vb) = head_on(2.0, 3.0, 3.0, -1.0, e);
             let (got_a, got_b) = (velocity(&world, a), velocity(&world, b));
@@ -53,9 +51,7 @@ fn a_particle_hits_a_rigid_body_head_on() {
 #[test]
 fn an_oblique_elastic_impact_keeps_everything() {
     for stepper in STEPPERS {
-        let a = Particle::new("particle", 2.0, sphere(0.1))
-            .at(Vec3::new(-0.5, 0.08, 0.03), Vec3::new(3.0, 0.0, 0.0))
-            .with_material(Material { restitution: 1.0, friction: 0.0, ..Material::default() });
+        let a = with_material(particle(2.0, 0.1, Vec3::new(-0.5, 0.08, 0.03), Vec3::new(3.0, 0.0, 0.0)), 1.0, 0.0);
         let (mut world, a, b) = collide(stepper, a, rigid("ball", 2.0, Vec3::zeros(), Vec3::zeros(), 1.0));
         let (va, vb) = (velocity(&world, a), velocity(&world, b));
         assert!(va.norm() > 0.1 && vb.norm() > 0.1 && va.dot(&vb).abs() < 1e-6, "{stepper}: {va} and {vb}");
@@ -99,8 +95,7 @@ fn a_particle_lands_and_rests() {
     for stepper in STEPPERS {
         let mut world = world(stepper, true);
         world.add_static(RigidBody::fixed(Shape::half_space()).with_name("ground")).unwrap();
-        let id =
-            world.add(Particle::new("particle", 2.0, sphere(0.1)).at(Vec3::new(0.0, 0.0, 0.5), Vec3::zeros())).unwrap();
+        let id = world.add(particle(2.0, 0.1, Vec3::new(0.0, 0.0, 0.5), Vec3::zeros())).unwrap();
         step(&mut world, 240);
         assert!(
             (position(&world, id).z - 0.1).abs() < 1e-6 && velocity(&world, id).norm() < 1e-9,
@@ -118,20 +113,9 @@ fn new_kinds_are_saved_and_restored() {
     for stepper in STEPPERS {
         let build = || {
             let mut world = world(stepper, true);
-            world
-                .add_static(RigidBody::fixed(Shape::half_space()).with_name("ground").with_material(Material {
-                    restitution: 0.5,
-                    friction: 0.3,
-                    ..Material::default()
-                }))
-                .unwrap();
-            world
-                .add(
-                    Particle::new("particle", 2.0, sphere(0.1))
-                        .at(Vec3::new(0.0, 0.05, 0.5), Vec3::zeros())
-                        .with_material(Material { restitution: 0.5, friction: 0.3, ..Material::default() }),
-                )
-                .unwrap();
+            let material = Material { restitution: 0.5, friction: 0.3, ..Material::default() };
+            world.add_static(RigidBody::fixed(Shape::half_space()).with_name("ground").with_material(material)).unwrap();
+            world.add(with_material(particle(2.0, 0.1, Vec3::new(0.0, 0.05, 0.5), Vec3::zeros()), 0.5, 0.3)).unwrap();
             world.add(Bead::new("bead", 1.0, 0.25, sphere(0.05)).at(1.0, 0.0).stopped_at(1.2)).unwrap();
             world.add(rigid("ball", 1.0, Vec3::new(0.0, 0.0, 0.9), Vec3::zeros(), 0.5)).unwrap();
             world

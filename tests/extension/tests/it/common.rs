@@ -2,6 +2,7 @@
 
 use tumble_core::collide::{Shape, Vec3};
 use tumble_core::*;
+use tumble_extension::Particle;
 
 pub const G: f64 = 9.81;
 pub const DT: f64 = 1.0 / 240.0;
@@ -17,6 +18,17 @@ pub fn world(stepper: &str, gravity: bool) -> World {
 
 pub fn sphere(radius: f64) -> Shape {
     Shape::sphere(radius).unwrap()
+}
+
+/// A particle of `mass` kg in a sphere of that radius (m), at a position (m) with a velocity (m/s), with the default material.
+pub fn particle(mass: f64, radius: f64, at: Vec3, velocity: Vec3) -> Particle {
+    let start = [at.x, at.y, at.z, velocity.x, velocity.y, velocity.z];
+    Particle { mass, shape: sphere(radius), material: Material::default(), start }
+}
+
+/// The same particle with other restitution and friction.
+pub fn with_material(particle: Particle, restitution: f64, friction: f64) -> Particle {
+    Particle { material: Material { restitution, friction, id: 0 }, ..particle }
 }
 
 pub fn step(world: &mut World, frames: usize) {

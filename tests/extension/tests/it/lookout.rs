@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use tumble_core::collide::Vec3;
-use tumble_extension::{Lookout, Particle};
+use tumble_extension::Lookout;
 use tumble_render::{Camera, DebugDraw, Drawing, Light};
 use tumble_scene::SceneFile;
 
@@ -11,10 +11,7 @@ fn pictures_are_taken_from_where_an_object_flies_and_its_lamp_flies_with_it() {
     let mut world = world(STEPPERS[0], false);
     // 2 m/s along y for a second; 40 degrees of picture, 0.5 m above the particle
     world
-        .add(Lookout::new(
-            Particle::new("bird", 1.0, sphere(0.1)).at(Vec3::new(1.0, 0.0, 3.0), Vec3::new(0.0, 2.0, 0.0)),
-            0.5,
-        ))
+        .add(Lookout::new("bird", particle(1.0, 0.1, Vec3::new(1.0, 0.0, 3.0), Vec3::new(0.0, 2.0, 0.0)), 0.5))
         .unwrap();
     let steps = (1.0 / DT).round() as usize;
     step(&mut world, steps);

@@ -3,6 +3,7 @@
 mod bead;
 mod collisions;
 mod common;
+mod laws;
 mod lookout;
 mod rods;
 mod wind;

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use tumble_core::collide::{Pose, Vec3};
 use tumble_core::solver::{NAMES, by_name};
 use tumble_core::{ObjectId, RigidBody, World};
-use tumble_extension::{End, Particle, Rod};
+use tumble_extension::{End, Rod};
 
 const LENGTH: f64 = 1.0;
 const AMPLITUDE: f64 = 0.1;
@@ -33,7 +33,7 @@ fn pendulum(stepper: &str, rigid: bool) -> (World, ObjectId) {
             )
             .unwrap()
     } else {
-        world.add(Particle::new("bob", 2.0, sphere(0.1)).at(bob(AMPLITUDE), Vec3::zeros())).unwrap()
+        world.add(particle(2.0, 0.1, bob(AMPLITUDE), Vec3::zeros())).unwrap()
     };
     world.add(Rod::new("rod", End::Object(id), End::Point(Vec3::zeros()), LENGTH)).unwrap();
     (world, id)
@@ -69,7 +69,7 @@ fn a_rod_carries_a_full_turn() {
     for stepper in STEPPERS {
         let mut world = world(stepper, true);
         let v = (5.2 * G * LENGTH).sqrt();
-        let id = world.add(Particle::new("bob", 2.0, sphere(0.1)).at(bob(0.0), Vec3::new(v, 0.0, 0.0))).unwrap();
+        let id = world.add(particle(2.0, 0.1, bob(0.0), Vec3::new(v, 0.0, 0.0))).unwrap();
         world.add(Rod::new("rod", End::Object(id), End::Point(Vec3::zeros()), LENGTH)).unwrap();
         let (start, mut highest, mut stretch) = (world.energy().total(), -LENGTH, 0.0f64);
         for _ in 0..480 {
@@ -89,8 +89,7 @@ fn a_rod_carries_a_full_turn() {
 fn a_rope_is_slack_and_then_holds() {
     for stepper in STEPPERS {
         let mut world = world(stepper, true);
-        let id =
-            world.add(Particle::new("bob", 2.0, sphere(0.1)).at(Vec3::new(0.0, 0.0, -0.4), Vec3::zeros())).unwrap();
+        let id = world.add(particle(2.0, 0.1, Vec3::new(0.0, 0.0, -0.4), Vec3::zeros())).unwrap();
         world.add(Rod::rope("rope", End::Object(id), End::Point(Vec3::zeros()), LENGTH)).unwrap();
         step(&mut world, 72); // 0.3 s: 0.6 m need √(2·0.6/g) = 0.3497 s
         let free = -0.4 - 0.5 * G * 0.09;
@@ -126,9 +125,7 @@ fn all_solvers_agree_on_equality_rows() {
                 } else {
                     Vec3::new(0.5 * i as f64, 0.1 * (i - 1) as f64, -0.1 * (i - 1) as f64)
                 };
-                let id = world
-                    .add(Particle::new(format!("bob{i}"), 1.0 + i as f64, sphere(0.05)).at(at, Vec3::zeros()))
-                    .unwrap();
+                let id = world.add(particle(1.0 + i as f64, 0.05, at, Vec3::zeros())).unwrap();
                 world.add(Rod::new(format!("rod{i}"), End::Object(id), above, (at - before).norm())).unwrap();
                 above = End::Object(id);
             }

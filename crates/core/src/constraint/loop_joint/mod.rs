@@ -410,10 +410,6 @@ impl Object for LoopJoint {
         &self.name
     }
 
-    fn fork(&self) -> Box<dyn Object> {
-        Box::new(self.clone())
-    }
-
     fn constraint(&self) -> Option<&dyn Constraint> {
         Some(self)
     }
