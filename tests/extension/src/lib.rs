@@ -1,4 +1,4 @@
-//! New kinds of objects for tumble, made in a crate of their own by the public interface alone.
+//! New kinds of objects and a stepper for tumble, made in a crate of their own by the public interface alone.
 //!
 //! | object | integrates | collides | constrains | acts |
 //! |---|---|---|---|---|
@@ -7,14 +7,18 @@
 //! | [`Rod`] | | | two objects, or one and a point: fixed distance, or a rope | |
 //! | [`Lookout`] | as a particle | | | carries a camera and a lamp |
 //! | [`Wind`] | | | | drag on the listed objects |
+//!
+//! [`Graded`] is a stepper.
 
 mod bead;
+mod graded;
 mod lookout;
 mod particle;
 mod rod;
 mod wind;
 
 pub use bead::Bead;
+pub use graded::Graded;
 pub use lookout::Lookout;
 pub use particle::Particle;
 pub use rod::{End, Rod};

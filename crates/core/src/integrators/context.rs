@@ -1,4 +1,4 @@
-//! Smooth motion: forces at a stage, and the integrators that use them (thesis §IV.B.2).
+//! Smooth motion: forces at a stage, and the integrators (thesis §IV.B.2).
 //!
 //! | integrator | one step of `h` |
 //! |---|---|
@@ -28,7 +28,7 @@ pub(crate) struct IntegrationContext<'a> {
     pub implicit: bool,
     /// Forces set by the user, per part.
     pub applied: &'a [Wrench],
-    /// Generalized forces set by the user, per coordinate.
+    /// Generalized forces set by the user, per degree of freedom.
     pub applied_generalized: &'a [f64],
     /// Generalized contact forces that are constant over the sub-step.
     pub held: &'a [f64],

@@ -2,6 +2,7 @@
 
 mod backtracking;
 mod contacts;
+mod context;
 mod correction;
 mod event_location;
 mod impact;
@@ -20,7 +21,7 @@ use crate::world::{Core, StepError};
 pub trait Stepper: Send + Sync {
     /// Returns the name of the stepper on the command line (`--stepper`).
     fn name(&self) -> &'static str;
-    /// Advances by one frame. After an error the world restores state and time.
+    /// Advances by one frame: [`Settings::dt`](crate::Settings::dt) seconds. After an error the world restores state and time.
     fn step(&mut self, frame: StepContext) -> Result<(), StepError>;
     /// Returns an independent copy.
     fn fork(&self) -> Box<dyn Stepper>;
@@ -38,7 +39,7 @@ pub fn stepper_by_name(name: &str) -> Option<Box<dyn Stepper>> {
     }
 }
 
-/// The inside of a world, lent to a stepper for one frame.
+/// A world during one frame of a [`Stepper`].
 pub struct StepContext<'a> {
     pub(crate) core: &'a mut Core,
 }

@@ -54,6 +54,16 @@ pub enum StepError {
         /// `Settings::integrator_tolerance`.
         tolerance: f64,
     },
+    /// The stepper did not advance the world by the length of a frame.
+    #[error("stepper '{stepper}' advanced the world by {advanced} s; a frame has {dt} s")]
+    Duration {
+        /// Name of the stepper.
+        stepper: &'static str,
+        /// Time that it advanced, s.
+        advanced: f64,
+        /// `Settings::dt`.
+        dt: f64,
+    },
     /// A constraint made an invalid row.
     #[error("constraint '{object}': {why}")]
     Row {

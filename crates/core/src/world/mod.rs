@@ -189,7 +189,8 @@ impl World {
             let requests = core.needs_wake.len();
             core.clear_contact_forces();
             core.detect_scratch.forget();
-            if let Err(error) = self.stepper.step(StepContext { core }) {
+            let done = self.stepper.step(StepContext { core });
+            if let Err(error) = done.and_then(|()| check_duration(self.stepper.name(), core, self.before.time)) {
                 core.set_state(&self.before);
                 std::mem::swap(&mut self.contacts_before, &mut core.contacts);
                 core.report = report_before;
@@ -440,4 +441,13 @@ impl World {
     pub fn fork(&self) -> World {
         World::of(self.core.fork(), self.stepper.fork(), self.names.clone())
     }
+}
+
+/// Checks that the stepper advanced the world from time `before` by a frame, up to rounding.
+fn check_duration(stepper: &'static str, core: &Core, before: f64) -> Result<(), StepError> {
+    let (advanced, dt) = (core.state.time - before, core.settings.dt);
+    if (advanced - dt).abs() <= 1e-3 * dt {
+        return Ok(());
+    }
+    Err(StepError::Duration { stepper, advanced, dt })
 }

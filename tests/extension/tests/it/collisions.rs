@@ -114,7 +114,9 @@ fn new_kinds_are_saved_and_restored() {
         let build = || {
             let mut world = world(stepper, true);
             let material = Material { restitution: 0.5, friction: 0.3, ..Material::default() };
-            world.add_static(RigidBody::fixed(Shape::half_space()).with_name("ground").with_material(material)).unwrap();
+            world
+                .add_static(RigidBody::fixed(Shape::half_space()).with_name("ground").with_material(material))
+                .unwrap();
             world.add(with_material(particle(2.0, 0.1, Vec3::new(0.0, 0.05, 0.5), Vec3::zeros()), 0.5, 0.3)).unwrap();
             world.add(Bead::new("bead", 1.0, 0.25, sphere(0.05)).at(1.0, 0.0).stopped_at(1.2)).unwrap();
             world.add(rigid("ball", 1.0, Vec3::new(0.0, 0.0, 0.9), Vec3::zeros(), 0.5)).unwrap();

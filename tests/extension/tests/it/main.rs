@@ -6,4 +6,5 @@ mod common;
 mod laws;
 mod lookout;
 mod rods;
+mod stepper;
 mod wind;
