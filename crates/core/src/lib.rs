@@ -66,6 +66,6 @@ pub use tumble_collide as collide;
 pub use world::sleep::Sleep;
 pub use world::view::{Mode, ObjectId, Status, WorldView};
 pub use world::{
-    BodyView, ContactPoint, MirrorError, Overlap, PickForce, SnapshotError, StateMemoryHold, StepError, World,
-    WorldError, WorldState,
+    BodyView, ContactPoint, Overlap, PickForce, Replica, ReplicaError, SnapshotError, StateMemory, StateMemoryHold,
+    StepError, World, WorldError, WorldState,
 };

@@ -1,13 +1,14 @@
 //! Conversion of a world to the entities and poses of a recording.
 
-use crate::record::{Entity, MAX_NAME_BYTES, Pose, Shape, VisualPart};
+use crate::record::{Contact, Entity, MAX_CONTACTS, MAX_NAME_BYTES, Pose, Shape, VisualPart};
 use nalgebra::Translation3;
+use std::collections::BTreeMap;
 use tumble_collide::{Shape as Solid, TriMesh, Vec3};
-use tumble_core::{Drawn, ObjectId, RigidBody, World};
+use tumble_core::{ContactPoint, Drawn, ObjectId, RigidBody, World};
 use xxhash_rust::xxh3::xxh3_64;
 
-/// Half the side of the square that represents a half-space, m.
-const PLANE_M: f64 = 20.0;
+/// Side of the square that represents a half-space, m.
+const PLANE_M: f64 = 40.0;
 
 /// Returns every drawable part as one entity. It has the name of its object, followed by `/part` if
 /// the object has several parts. A name of more than [`MAX_NAME_BYTES`] is replaced by its beginning
@@ -19,6 +20,49 @@ pub fn entities(world: &World) -> Vec<Entity> {
 /// Returns the poses of the entities, in the order of [`entities`].
 pub fn poses(world: &World) -> Vec<Pose> {
     sites(world).filter_map(|(id, part)| world.pose(id, part)).map(|frame| pose(&frame)).collect()
+}
+
+/// Returns the contacts of the last step between the [`entities`] whose surfaces touch. Of more than [`MAX_CONTACTS`], those with the
+/// largest forces are kept, the largest first.
+pub fn contacts(world: &World) -> Vec<Contact> {
+    let index: BTreeMap<(ObjectId, usize), u32> = sites(world).zip(0..).collect();
+    let contact = |c: &ContactPoint| {
+        Some(Contact {
+            a: *index.get(&(c.a, c.part_a))?,
+            b: *index.get(&(c.b, c.part_b))?,
+            point: c.point.into(),
+            normal: c.normal.into(),
+            depth: c.depth,
+            force: c.force.into(),
+        })
+    };
+    strongest(world, MAX_CONTACTS).into_iter().filter_map(contact).collect()
+}
+
+/// Shows recorded contacts in a world that has the same entities, as those of its last step. Velocities and impulses are not recorded
+/// and are zero.
+pub fn show_contacts(world: &mut World, contacts: &[Contact]) {
+    let entities: Vec<(ObjectId, usize)> = sites(world).collect();
+    let point = |c: &Contact| {
+        let (&(a, part_a), &(b, part_b)) = (entities.get(c.a as usize)?, entities.get(c.b as usize)?);
+        let (point, normal, force, zero) = (c.point.into(), c.normal.into(), c.force.into(), Vec3::zeros());
+        Some(ContactPoint { a, part_a, b, part_b, point, normal, depth: c.depth, velocity: zero, impulse: zero, force })
+    };
+    world.replica().set_contacts(contacts.iter().filter_map(point));
+}
+
+/// Returns the contacts of the last step whose surfaces touch. If there are more than `max`, those with the largest forces are kept, the
+/// largest first.
+pub(crate) fn strongest(world: &World, max: usize) -> Vec<&ContactPoint> {
+    if max == 0 {
+        return Vec::new();
+    }
+    let mut contacts: Vec<&ContactPoint> = world.contacts().iter().filter(|c| c.is_touching()).collect();
+    if contacts.len() > max {
+        contacts.sort_by(|a, b| b.force.norm_squared().total_cmp(&a.force.norm_squared()));
+        contacts.truncate(max);
+    }
+    contacts
 }
 
 /// Returns the names of the entities, in the order of [`entities`].
@@ -72,11 +116,11 @@ fn drawn(drawn: Drawn<'_>) -> Shape {
         Drawn::Shape(shape) => shape,
     };
     match shape {
-        Solid::HalfSpace => Shape::Plane { half_size: PLANE_M },
+        Solid::HalfSpace => Shape::Plane { size: PLANE_M },
         Solid::Sphere { radius } => Shape::Sphere { radius: *radius },
-        Solid::Box { half_extents } => Shape::Box { half_extents: (*half_extents).into() },
-        Solid::Capsule { radius, half_length } => Shape::Capsule { radius: *radius, half_height: *half_length },
-        Solid::Cylinder(c) => Shape::Cylinder { radius: c.radius(), half_height: c.half_length() },
+        Solid::Box { half_extents } => Shape::Box { size: (2.0 * half_extents).into() },
+        Solid::Capsule { radius, half_length } => Shape::Capsule { radius: *radius, length: 2.0 * half_length },
+        Solid::Cylinder(c) => Shape::Cylinder { radius: c.radius(), length: 2.0 * c.half_length() },
         Solid::Mesh(mesh) => triangles(mesh.mesh()),
     }
 }

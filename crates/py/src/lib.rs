@@ -25,7 +25,7 @@ mod _native {
     #[pymodule_export]
     use super::faults::_panic;
     #[pymodule_export]
-    use super::io::recording::{Recorder, read_recording};
+    use super::io::recording::{Recorder, read_recording, show_contacts};
     #[pymodule_export]
     use super::objects::articulation::Articulation;
     #[pymodule_export]

@@ -60,6 +60,26 @@ def test_a_replay_visits_every_frame(tmp_path):
     assert middle.save() == world.save()
 
 
+def test_contacts_are_recorded_and_replayed(tmp_path):
+    def resting():
+        world = tumble.World()
+        world.add_static("ground", tumble.HalfSpace())
+        world.add_rigid("ball", tumble.Sphere(0.1), mass=2.0, position=(0, 0, 0.1))
+        return world
+
+    world = resting()
+    with tumble.Recorder(tmp_path / "run.mcap") as recorder:
+        recorder.run(world, 60)
+    run = tumble.read(tmp_path / "run.mcap")
+    assert len(run.contacts) == len(run) and len(run.contacts[0]) == 0
+    (contact,) = run.contacts[-1]
+    assert sorted(run.names[k] for k in contact["bodies"]) == ["ball", "ground"]
+    assert abs(contact["force"][2]) == pytest.approx(2 * 9.81) and contact["point"] == pytest.approx([0, 0, 0], abs=1e-6)
+    *_, last = tumble.replay(tmp_path / "run.mcap", resting())
+    for field in ("bodies", "parts", "point", "normal", "depth", "force"):
+        assert (last.contacts[field] == world.contacts[field]).all()
+
+
 def test_a_world_made_in_a_program_replays_into_one_like_it(tmp_path):
     world = thrown()
     with tumble.Recorder(tmp_path / "run.mcap") as recorder:

@@ -39,7 +39,7 @@ fn billiards() -> DrawList {
     let mut list = DrawList::default();
     let r = 0.028575;
     let (long, wide) = (2.54, 1.27);
-    let slab = list.add_mesh(MeshData::cuboid([long / 2.0 + 0.1, wide / 2.0 + 0.1, 0.02]));
+    let slab = list.add_mesh(MeshData::cuboid([long + 0.2, wide + 0.2, 0.04]));
     list.add_instance(slab, Isometry3::translation(0.0, 0.0, -0.02), Material::felt()).casts_shadow = false;
     let wood = Material { clearcoat: 0.5, ..Material::walnut() };
     let rails = [
@@ -47,7 +47,7 @@ fn billiards() -> DrawList {
         (wide / 2.0, long / 2.0 + 0.07, 0.0, std::f32::consts::FRAC_PI_2),
     ];
     for (half, x, y, angle) in rails {
-        let rail = list.add_mesh(MeshData::rounded_cuboid([half, 0.07, 0.045], 0.015, 4));
+        let rail = list.add_mesh(MeshData::rounded_cuboid([2.0 * half, 0.14, 0.09], 0.015, 4));
         for sign in [-1.0, 1.0] {
             list.add_instance(rail, Isometry3::new(Vector3::new(sign * x, sign * y, 0.0), Vector3::z() * angle), wood);
         }
@@ -106,10 +106,10 @@ const PIN: [[f32; 2]; 19] = [
 
 fn bowling() -> DrawList {
     let mut list = DrawList::default();
-    let lane = list.add_mesh(MeshData::cuboid([4.0, 0.527, 0.03]));
+    let lane = list.add_mesh(MeshData::cuboid([8.0, 1.054, 0.06]));
     list.add_instance(lane, Isometry3::translation(2.2, 0.0, -0.03), Material::lane_wood()).casts_shadow = false;
-    let gutter = list.add_mesh(MeshData::cuboid([4.0, 0.12, 0.02]));
-    let divider = list.add_mesh(MeshData::rounded_cuboid([4.0, 0.05, 0.07], 0.015, 3));
+    let gutter = list.add_mesh(MeshData::cuboid([8.0, 0.24, 0.04]));
+    let divider = list.add_mesh(MeshData::rounded_cuboid([8.0, 0.1, 0.14], 0.015, 3));
     for side in [-1.0, 1.0] {
         list.add_instance(
             gutter,
@@ -185,7 +185,7 @@ fn many() -> DrawList {
 
 fn boxes(debug: bool) -> DrawList {
     let mut list = DrawList::default();
-    let cube = list.add_mesh(MeshData::rounded_cuboid([0.25; 3], 0.02, 3));
+    let cube = list.add_mesh(MeshData::rounded_cuboid([0.5; 3], 0.02, 3));
     let colors = [
         [0.80, 0.27, 0.20],
         [0.93, 0.69, 0.25],
@@ -206,13 +206,13 @@ fn boxes(debug: bool) -> DrawList {
             i += 1;
         }
     }
-    let capsule = list.add_mesh(MeshData::capsule(0.15, 0.3, 48));
+    let capsule = list.add_mesh(MeshData::capsule(0.15, 0.6, 48));
     list.add_instance(
         capsule,
         Isometry3::new(Vector3::new(-0.9, -0.5, 0.15), Vector3::new(0.0, std::f32::consts::FRAC_PI_2, 0.0)),
         Material::glossy([0.85, 0.35, 0.15]),
     );
-    let cylinder = list.add_mesh(MeshData::cylinder(0.2, 0.3, 64));
+    let cylinder = list.add_mesh(MeshData::cylinder(0.2, 0.6, 64));
     list.add_instance(cylinder, Isometry3::translation(-0.8, 0.7, 0.3), Material::metal([0.90, 0.75, 0.45]));
     list.add_sphere(
         Point3::new(-1.1, 0.15, 0.2),

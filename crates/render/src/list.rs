@@ -55,10 +55,10 @@ pub struct Sphere {
 pub struct Capsule {
     /// Pose of its frame in the world: the middle of the segment, which lies along z.
     pub pose: Isometry3<f32>,
-    /// Half the length of the segment, m, 0 or more.
-    pub half_length: f32,
     /// Radius, m, above 0.
     pub radius: f32,
+    /// Length of the segment, m, 0 or more.
+    pub length: f32,
     /// The material.
     pub material: Material,
     /// Whether it casts a shadow.
@@ -313,15 +313,9 @@ impl DrawList {
         &mut self.spheres[last]
     }
 
-    /// Adds a capsule that casts a shadow.
-    pub fn add_capsule(
-        &mut self,
-        pose: Isometry3<f32>,
-        half_length: f32,
-        radius: f32,
-        material: Material,
-    ) -> &mut Capsule {
-        self.capsules.push(Capsule { pose, half_length, radius, material, casts_shadow: true });
+    /// Adds a capsule of this radius (m) around a segment of this length (m). It casts a shadow.
+    pub fn add_capsule(&mut self, pose: Isometry3<f32>, radius: f32, length: f32, material: Material) -> &mut Capsule {
+        self.capsules.push(Capsule { pose, radius, length, material, casts_shadow: true });
         let last = self.capsules.len() - 1;
         &mut self.capsules[last]
     }

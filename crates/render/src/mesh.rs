@@ -107,8 +107,9 @@ impl MeshData {
         mesh
     }
 
-    /// A box with the given half extents and flat faces.
-    pub fn cuboid(half: [f32; 3]) -> Self {
+    /// A box with the given edges and flat faces.
+    pub fn cuboid(size: [f32; 3]) -> Self {
+        let half = size.map(|edge| 0.5 * edge);
         let mut mesh = MeshData::default();
         for axis in 0..3 {
             for sign in [-1.0, 1.0] {
@@ -131,12 +132,13 @@ impl MeshData {
 
     /// A box from −½ to ½ on every axis.
     pub fn unit_box() -> Self {
-        Self::cuboid([0.5; 3])
+        Self::cuboid([1.0; 3])
     }
 
-    /// A box whose edges are rounded with `radius`, at most the smallest half extent. Highlights on
-    /// the edges make its form visible.
-    pub fn rounded_cuboid(half: [f32; 3], radius: f32, segments: usize) -> Self {
+    /// A box of the given size whose edges are rounded with `radius`, at most half of the shortest
+    /// edge. Highlights on the edges make its form visible.
+    pub fn rounded_cuboid(size: [f32; 3], radius: f32, segments: usize) -> Self {
+        let half = size.map(|edge| 0.5 * edge);
         let radius = radius.clamp(0.0, half[0].min(half[1]).min(half[2]));
         let n = segments.clamp(1, 32) as i32;
         let mut mesh = MeshData::default();
@@ -175,14 +177,15 @@ impl MeshData {
         Self::revolve(&profile.collect::<Vec<_>>(), 2 * rings)
     }
 
-    /// A closed cylinder around z from `-half_length` to `half_length`.
-    pub fn cylinder(radius: f32, half_length: f32, segments: usize) -> Self {
-        let (r, h) = (radius, half_length);
+    /// A closed cylinder around z, centered at the origin.
+    pub fn cylinder(radius: f32, length: f32, segments: usize) -> Self {
+        let (r, h) = (radius, 0.5 * length);
         Self::lathe(&[[0.0, -h], [r, -h], [r, h], [0.0, h]], segments, 0.5)
     }
 
-    /// A capsule around z: a cylinder of length `2 * half_length` closed by hemispheres.
-    pub fn capsule(radius: f32, half_length: f32, segments: usize) -> Self {
+    /// A capsule around z, centered at the origin: a cylinder of this length closed by hemispheres.
+    pub fn capsule(radius: f32, length: f32, segments: usize) -> Self {
+        let half_length = 0.5 * length;
         let quarter = (segments / 4).clamp(2, 512);
         let arc = |i: usize, from: f32, shift: f32| {
             let a = from + PI / 2.0 * i as f32 / quarter as f32;
@@ -217,9 +220,9 @@ impl MeshData {
         Self::revolve(&points, segments)
     }
 
-    /// A square in the plane `z = 0`, normal up, from `-half_extent` to `half_extent`.
-    pub fn ground_quad(half_extent: f32) -> Self {
-        let h = half_extent;
+    /// A square of this side in the plane `z = 0`, centered at the origin, normal up.
+    pub fn ground_quad(size: f32) -> Self {
+        let h = 0.5 * size;
         MeshData {
             positions: vec![[-h, -h, 0.0], [h, -h, 0.0], [h, h, 0.0], [-h, h, 0.0]],
             normals: vec![[0.0, 0.0, 1.0]; 4],

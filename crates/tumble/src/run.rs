@@ -11,7 +11,7 @@ use std::path::Path;
 use std::time::Instant;
 use tumble::dynamics::World;
 use tumble::net::record::{Recorder, RecorderOptions};
-use tumble::net::world::{entities, poses};
+use tumble::net::world::{contacts, entities, poses};
 use tumble::scene::{SceneFile, visual_notes};
 
 /// Largest saved state that is read: a thousand times the size of one of ten thousand bodies.
@@ -79,9 +79,9 @@ fn simulate(
     let (begin, mut tally, mut wall) = (world.time(), Tally::default(), 0.0);
     let mut progress = Progress::new(frames, options.quiet);
     let mut record = |world: &World| match &mut recorder {
-        Some(r) => {
-            r.frame(world.time(), world.frame(), &poses(world), &world.save()).map_err(|e| Failure::run("recording", e))
-        }
+        Some(r) => r
+            .frame(world.time(), world.frame(), &poses(world), &contacts(world), &world.save())
+            .map_err(|e| Failure::run("recording", e)),
         None => Ok(()),
     };
     let mut shoot = |world: &World| capture.as_mut().map_or(Ok(()), |capture| capture.frame(world, begin));

@@ -48,32 +48,32 @@ pub struct PickForce {
     pub frequency: f64,
 }
 
-impl World {
-    /// Pulls during the next frame. Returns the force, N, and the torque about the point that is held, N·m, world axes; zero on what does not move or has
-    /// no parts that impulses reach.
+impl PickForce {
+    /// Applies the force during the next frame. Returns the force, N, and the torque about the point that is held, N·m, world axes; both are zero
+    /// for a part that does not move or that no impulse reaches.
     ///
     /// # Errors
     /// [`WorldError::Stale`], [`WorldError::NoPart`], [`WorldError::NotFinite`].
-    pub fn pick(&mut self, pick: &PickForce) -> Result<Wrench, WorldError> {
-        let index = self.part(pick.id, pick.part, &[pick.point, pick.target, Vec3::repeat(pick.frequency)])?;
-        self.core.wake(pick.id);
-        let (h, part_state) = (self.core.settings.dt, self.core.derived.part_states[index]);
-        let Coordinates { objects, caches, .. } = self.core.coordinates(None);
-        let entry = objects.get(pick.id).ok_or(WorldError::Stale)?;
-        let reached = entry.moves() && entry.object.collidable().is_none_or(|c| c.part_moves(pick.part));
+    pub fn apply(&self, world: &mut World) -> Result<Wrench, WorldError> {
+        let index = world.part(self.id, self.part, &[self.point, self.target, Vec3::repeat(self.frequency)])?;
+        world.core.wake(self.id);
+        let (h, part_state) = (world.core.settings.dt, world.core.derived.part_states[index]);
+        let Coordinates { objects, caches, .. } = world.core.coordinates(None);
+        let entry = objects.get(self.id).ok_or(WorldError::Stale)?;
+        let reached = entry.moves() && entry.object.collidable().is_none_or(|c| c.part_moves(self.part));
         let Some(body) = entry.object.integratable().filter(|_| reached) else { return Ok(Wrench::default()) };
         let (dof, cache) = (entry.state_range.v.len(), &mut caches[entry.place]);
-        let held = part_state.pose.rotation * pick.point + part_state.position();
-        let (v, omega) = (part_state.velocity_at(&held), pick.frequency.max(0.0));
-        let wanted = (v + (pick.target - held) * (h * omega * omega)) / (1.0 + h * omega).powi(2);
-        let at = PartPoint { part: pick.part, part_state: &part_state, point: held, axes: &AXES };
+        let held = part_state.pose.rotation * self.point + part_state.position();
+        let (v, omega) = (part_state.velocity_at(&held), self.frequency.max(0.0));
+        let wanted = (v + (self.target - held) * (h * omega * omega)) / (1.0 + h * omega).powi(2);
+        let at = PartPoint { part: self.part, part_state: &part_state, point: held, axes: &AXES };
         let mut impulses = vec![0.0; 3 * dof];
         body.test_impulse(cache, &at, 1.0, &mut impulses);
         let force = mass(&impulses, dof) * (wanted - v) / h;
         let slowed = part_state.angular_velocity * (1.0 / (1.0 + 0.5 * h * omega) - 1.0);
         let torque = mass(&couples(body, cache, &at, dof), dof) * slowed / h;
-        self.apply_force(pick.id, pick.part, force, &held)?;
-        self.apply_torque(pick.id, pick.part, torque)?;
+        world.apply_force(self.id, self.part, force, &held)?;
+        world.apply_torque(self.id, self.part, torque)?;
         Ok(Wrench { torque, force })
     }
 }

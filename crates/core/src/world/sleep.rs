@@ -23,13 +23,12 @@
 //! ([`Constraint::partners`](crate::Constraint::partners)).
 
 use crate::clone_by_field::clone_by_field;
-use crate::constraint::builder::constraints;
 use crate::contact::detect::ContactKey;
 use crate::object::part_state::{PartState, Wrench};
 use crate::world::Core;
 use crate::world::view::{Entry, Mode, ObjectId};
 use serde::{Deserialize, Serialize};
-use tumble_collide::{Pose, UnionFind};
+use tumble_collide::Pose;
 
 /// Conditions under which islands fall asleep.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -128,7 +127,7 @@ impl SleepGroup {
 
 impl Core {
     /// Returns the index of the object with a serial number.
-    fn by_serial(&self, serial: u32) -> Option<usize> {
+    pub(super) fn by_serial(&self, serial: u32) -> Option<usize> {
         self.state.objects.binary_search_by_key(&serial, |o| o.serial).ok()
     }
 
@@ -228,32 +227,32 @@ impl Core {
         if !ready.contains(&true) {
             return;
         }
-        let Some(bonds) = self.bonds() else { return };
+        let (pairs, all_named) = self.connections();
+        if !all_named {
+            return;
+        }
         let mut ready = ready;
-        let mut sets = UnionFind::new(ready.len());
         let mut supports: Vec<[usize; 2]> = Vec::new();
-        for [a, b] in bonds {
+        for &[a, b] in &pairs {
             let (Some(i), Some(j)) = (self.table.place(a), self.table.place(b)) else { continue };
-            match (self.objects().at(i).moves(), self.objects().at(j).moves()) {
-                (true, true) => sets.union(i as u32, j as u32),
-                (false, false) => {}
-                (first_moves, _) => {
-                    let (mover, support) = if first_moves { (i, j) } else { (j, i) };
-                    ready[mover] &=
-                        at_rest(&self.derived.part_states[self.table.placed[support].state_range.parts.clone()]);
-                    supports.push([mover, support]);
-                }
+            let (first_moves, second_moves) = (self.objects().at(i).moves(), self.objects().at(j).moves());
+            if first_moves != second_moves {
+                let (mover, support) = if first_moves { (i, j) } else { (j, i) };
+                ready[mover] &=
+                    at_rest(&self.derived.part_states[self.table.placed[support].state_range.parts.clone()]);
+                supports.push([mover, support]);
             }
         }
-        let roots: Vec<usize> = (0..ready.len()).map(|i| sets.find(i as u32) as usize).collect();
-        let mut calm = vec![true; ready.len()];
-        for (i, _) in self.objects().iter().enumerate().filter(|(_, e)| e.moves()) {
-            calm[roots[i]] &= ready[i];
+        let (island, count) = self.components(pairs, |e| e.moves());
+        let mut members: Vec<Vec<usize>> = vec![Vec::new(); count];
+        for entry in self.objects().iter().filter(|e| e.moves()) {
+            members[island[entry.place] as usize].push(entry.place);
         }
-        for r in (0..ready.len()).filter(|&r| roots[r] == r && calm[r] && ready[r]) {
-            let members: Vec<usize> = (r..ready.len()).filter(|&i| roots[i] == r).collect();
-            let supports = supports.iter().filter(|[mover, _]| roots[*mover] == r).map(|[_, support]| *support);
-            self.put_to_sleep(&members, supports.collect());
+        for (number, members) in members.iter().enumerate() {
+            if !members.is_empty() && members.iter().all(|&place| ready[place]) {
+                let supports = supports.iter().filter(|[mover, _]| island[*mover] as usize == number);
+                self.put_to_sleep(members, supports.map(|[_, support]| *support).collect());
+            }
         }
         self.integration().refresh();
     }
@@ -286,21 +285,6 @@ impl Core {
             }
         }
         ready
-    }
-
-    /// Returns pairs of objects that touch or are joined; `None` if a constraint does not name the objects that it joins.
-    fn bonds(&self) -> Option<Vec<[ObjectId; 2]>> {
-        let mut bonds: Vec<[ObjectId; 2]> = self.contacts.iter().map(|c| [c.a, c.b]).collect();
-        let mut partners = Vec::new();
-        for (_, _, constraint) in constraints(self.objects()).filter(|(_, _, c)| !c.on_itself()) {
-            partners.clear();
-            if !constraint.partners(&mut partners) {
-                return None;
-            }
-            partners.retain(|&id| self.table.place(id).is_some());
-            bonds.extend(partners.windows(2).map(|w| [w[0], w[1]]));
-        }
-        Some(bonds)
     }
 
     fn put_to_sleep(&mut self, members: &[usize], mut supports: Vec<usize>) {

@@ -1,8 +1,8 @@
-//! Where the flat state `X` lies in memory: in one place, from one coming or going of an object to the next.
+//! The memory of the flat state `X`: one place from one addition or removal of an object to the next.
 //!
-//! Who shows the state to others without copying it, as the Python module does, wants memory that neither moves nor goes away under a reader.
-//! So the numbers are only ever written where they are; when an object comes or goes they move to new memory, and the old is left to those who
-//! [hold](World::hold_state_memory) it. There is no way to put another vector in their place.
+//! A program that shows the state to others without copying it, as the Python module does, needs memory that neither moves nor goes away
+//! under a reader. So the numbers are only written in place. When an object is added or removed they move to new memory, and
+//! [holds](StateMemory::hold) keep the old one.
 
 use super::World;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -99,36 +99,43 @@ impl StateVector {
     }
 }
 
+/// Access to the memory of a world's state.
+pub struct StateMemory<'w>(&'w mut StateVector);
+
 impl World {
-    /// Keeps the memory that the state lies in: it stays there, and is written there by every call that moves something, until an object is added or
-    /// removed or the world is dropped; then it stays as it was last for as long as the hold lives. Calls of the same state give the same hold.
-    pub fn hold_state_memory(&mut self) -> Arc<StateMemoryHold> {
-        self.core.state.x.hold.get_or_insert_default().clone()
+    /// Lends the memory of the state, for programs that show it without copying it.
+    pub fn state_memory(&mut self) -> StateMemory<'_> {
+        StateMemory(&mut self.core.state.x)
+    }
+}
+
+impl StateMemory<'_> {
+    /// Keeps the memory in place: every call that moves something writes there, until an object is added or removed or the world is dropped.
+    /// From then on the memory keeps its last numbers for as long as the hold lives. Calls at the same state return the same hold.
+    pub fn hold(&mut self) -> Arc<StateMemoryHold> {
+        self.0.hold.get_or_insert_default().clone()
     }
 
-    /// Where the state lies, and how many numbers it has; see [`hold_state_memory`](Self::hold_state_memory). Who reads through it has to see to it that no call
-    /// changes the world meanwhile.
-    pub fn state_address(&mut self) -> (*const f64, usize) {
-        let x = &mut self.core.state.x;
-        let shown = x.aside.as_mut().unwrap_or(&mut x.numbers);
+    /// Returns the address of the state and its count of numbers. It stays valid under a [`hold`](Self::hold). A reader must make sure that
+    /// no call changes the world meanwhile.
+    pub fn address(&mut self) -> (*const f64, usize) {
+        let shown = self.0.aside.as_mut().unwrap_or(&mut self.0.numbers);
         (shown.as_mut_ptr(), shown.len())
     }
 
-    /// Leaves the held memory as it is, and works on a copy until [`thaw_state_memory`](Self::thaw_state_memory): readers then see the state as it was.
-    pub fn freeze_state_memory(&mut self) {
-        let x = &mut self.core.state.x;
-        if x.hold.is_some() && x.aside.is_none() {
-            let copy = x.numbers.clone();
-            x.aside = Some(std::mem::replace(&mut x.numbers, copy));
+    /// Leaves the held memory as it is and works on a copy until [`thaw`](Self::thaw), so that readers see the present state meanwhile.
+    pub fn freeze(&mut self) {
+        if self.0.hold.is_some() && self.0.aside.is_none() {
+            let copy = self.0.numbers.clone();
+            self.0.aside = Some(std::mem::replace(&mut self.0.numbers, copy));
         }
     }
 
-    /// Writes the state to the memory that was put aside, and works there again.
-    pub fn thaw_state_memory(&mut self) {
-        let x = &mut self.core.state.x;
-        if let Some(mut shown) = x.aside.take() {
-            shown.copy_from_slice(&x.numbers);
-            x.numbers = shown;
+    /// Writes the state to the held memory, and works there again.
+    pub fn thaw(&mut self) {
+        if let Some(mut shown) = self.0.aside.take() {
+            shown.copy_from_slice(&self.0.numbers);
+            self.0.numbers = shown;
         }
     }
 }

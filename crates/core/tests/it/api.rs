@@ -158,3 +158,69 @@ fn a_force_from_a_function_acts_as_its_formula_says() {
     world.step().unwrap();
     assert!(world.add_force("drag", |_, _| {}).is_err());
 }
+
+/// Two balls that touch over static ground, one in the air, and two that a joint connects: three islands.
+#[test]
+fn islands_are_what_contacts_and_joints_connect() {
+    let mut world = World::default();
+    world.add(RigidBody::fixed(Shape::half_space())).unwrap();
+    let at = |name: &str, x: f64, z: f64| ball(name, z).with_pose(Pose::translation(x, 0.0, z));
+    let ids: Vec<ObjectId> = [("a", 0.0, 0.1), ("b", 5.0, 3.0), ("c", 0.199, 0.1), ("d", 9.0, 3.0), ("e", 9.5, 3.0)]
+        .into_iter()
+        .map(|(name, x, z)| world.add(at(name, x, z)).unwrap())
+        .collect();
+    let [a, b, c, d, e] = ids[..] else { unreachable!() };
+    let (one, other) = (Some((d, 0)), Some((e, 0)));
+    let joint = LoopJoint::spherical_at("pin", &world, one, other, Vec3::new(9.25, 0.0, 3.0)).unwrap();
+    world.add(joint).unwrap();
+    world.step().unwrap();
+    assert_eq!(world.islands(), [vec![a, c], vec![b], vec![d, e]]);
+    world.remove(c).unwrap();
+    world.set_mode(d, Mode::Static).unwrap();
+    assert_eq!(world.islands(), [vec![a], vec![b], vec![e]]);
+}
+
+/// Objects that sleep have no contacts and stay the island that they fell asleep as.
+#[test]
+fn a_sleeping_stack_is_one_island() {
+    let mut world = World::new(Settings::default().with_sleep(Some(tumble_core::Sleep::default()))).unwrap();
+    world.add(RigidBody::fixed(Shape::half_space())).unwrap();
+    let cube =
+        |z: f64| RigidBody::new(Shape::cuboid(Vec3::repeat(0.2)).unwrap()).with_pose(Pose::translation(0.0, 0.0, z));
+    let stack = [world.add(cube(0.1)).unwrap(), world.add(cube(0.3)).unwrap()];
+    let far = world.add(cube(0.1).with_pose(Pose::translation(3.0, 0.0, 0.1))).unwrap();
+    for _ in 0..480 {
+        world.step().unwrap();
+    }
+    assert!(world.asleep(stack[0]) && world.asleep(far));
+    assert_eq!(world.islands(), [stack.to_vec(), vec![far]]);
+}
+
+#[test]
+fn a_replica_shows_what_it_is_given() {
+    let mut world = World::default();
+    let id = world.add(ball("ball", 1.0)).unwrap();
+    let gone = world.add(ball("gone", 3.0)).unwrap();
+    world.remove(gone).unwrap();
+    let (zero, up) = (Vec3::zeros(), Vec3::z());
+    let contact = |b| ContactPoint {
+        a: id,
+        part_a: 0,
+        b,
+        part_b: 0,
+        point: up,
+        normal: up,
+        depth: 0.1,
+        velocity: zero,
+        impulse: zero,
+        force: up,
+    };
+    let mut replica = world.replica();
+    replica.set_poses(id, &[Pose::translation(7.0, 0.0, 0.0)]).unwrap();
+    replica.set_time(2.5);
+    replica.set_time(f64::NAN);
+    replica.set_contacts([contact(id), contact(gone)]);
+    assert!(matches!(replica.set_poses(id, &[]), Err(WorldError::NoPart { part: 0, .. })));
+    assert_eq!((world.body(id).unwrap().position().x, world.time()), (7.0, 2.5));
+    assert_eq!(world.contacts(), [contact(id)]);
+}

@@ -23,7 +23,7 @@ fn held(world: &World, pick: &PickForce) -> Vec3 {
 fn drag(world: &mut World, pick: &PickForce, seconds: f64) {
     let steps = (seconds / world.settings().dt).round() as usize;
     for _ in 0..steps {
-        world.pick(pick).unwrap();
+        pick.apply(world).unwrap();
         world.step().unwrap();
     }
 }
@@ -94,12 +94,12 @@ fn static_bodies_are_not_pulled_and_removed_ones_are_reported() {
     let ground = world.add_static(RigidBody::fixed(Shape::half_space()).with_name("ground")).unwrap();
     let pick =
         PickForce { id: ground, part: 0, point: Vec3::zeros(), target: Vec3::new(0.0, 0.0, 9.0), frequency: OMEGA };
-    assert_eq!(world.pick(&pick).unwrap().force, Vec3::zeros());
+    assert_eq!(pick.apply(&mut world).unwrap().force, Vec3::zeros());
     let id = crate_of(&mut world, 1.0);
-    assert!(world.pick(&PickForce { id, part: 1, ..pick }).is_err(), "no such part");
-    assert!(world.pick(&PickForce { id, target: Vec3::repeat(f64::NAN), ..pick }).is_err(), "not finite");
+    assert!(PickForce { id, part: 1, ..pick }.apply(&mut world).is_err(), "no such part");
+    assert!(PickForce { id, target: Vec3::repeat(f64::NAN), ..pick }.apply(&mut world).is_err(), "not finite");
     world.remove(id).unwrap();
-    assert!(world.pick(&PickForce { id, ..pick }).is_err(), "gone");
+    assert!(PickForce { id, ..pick }.apply(&mut world).is_err(), "gone");
 }
 
 #[test]

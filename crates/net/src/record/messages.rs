@@ -61,22 +61,19 @@ fn push_part(out: &mut SceneEntity, part: &VisualPart) {
     let color = Some(fox_color(part.color));
     match &part.shape {
         Shape::Sphere { radius } => out.spheres.push(ball(&part.pose, part.color, *radius)),
-        Shape::Box { half_extents } => {
-            out.cubes.push(CubePrimitive { pose, size: Some(vector(half_extents.map(|h| 2.0 * h))), color })
-        }
-        Shape::Cylinder { radius, half_height } => {
-            out.cylinders.push(tube(&part.pose, part.color, *radius, *half_height))
-        }
-        Shape::Capsule { radius, half_height } => {
-            out.cylinders.push(tube(&part.pose, part.color, *radius, *half_height));
-            for end in [-*half_height, *half_height] {
+        Shape::Box { size } => out.cubes.push(CubePrimitive { pose, size: Some(vector(*size)), color }),
+        Shape::Cylinder { radius, length } => out.cylinders.push(tube(&part.pose, part.color, *radius, *length)),
+        Shape::Capsule { radius, length } => {
+            out.cylinders.push(tube(&part.pose, part.color, *radius, *length));
+            for end in [-0.5 * length, 0.5 * length] {
                 let cap = Pose { position: along_z(&part.pose, end), ..part.pose };
                 out.spheres.push(ball(&cap, part.color, *radius));
             }
         }
         Shape::Mesh { vertices, triangles } => out.triangles.push(triangle_list(pose, color, vertices, triangles)),
-        Shape::Plane { half_size: s } => {
-            let corners = [[-s, -s, 0.0], [*s, -s, 0.0], [*s, *s, 0.0], [-s, *s, 0.0]];
+        Shape::Plane { size } => {
+            let s = 0.5 * size;
+            let corners = [[-s, -s, 0.0], [s, -s, 0.0], [s, s, 0.0], [-s, s, 0.0]];
             out.triangles.push(triangle_list(pose, color, &corners, &[[0, 1, 2], [0, 2, 3]]));
         }
     }
@@ -86,10 +83,10 @@ fn ball(pose: &Pose, color: [f32; 4], radius: f64) -> SpherePrimitive {
     SpherePrimitive { pose: Some(fox_pose(pose)), size: Some(vector([2.0 * radius; 3])), color: Some(fox_color(color)) }
 }
 
-fn tube(pose: &Pose, color: [f32; 4], radius: f64, half_height: f64) -> CylinderPrimitive {
+fn tube(pose: &Pose, color: [f32; 4], radius: f64, length: f64) -> CylinderPrimitive {
     CylinderPrimitive {
         pose: Some(fox_pose(pose)),
-        size: Some(vector([2.0 * radius, 2.0 * radius, 2.0 * half_height])),
+        size: Some(vector([2.0 * radius, 2.0 * radius, length])),
         bottom_scale: 1.0,
         top_scale: 1.0,
         color: Some(fox_color(color)),
@@ -173,17 +170,17 @@ pub(crate) fn entities_of(message: SceneUpdate) -> Vec<Entity> {
 }
 
 fn read_entity(entity: SceneEntity) -> Entity {
-    let half = |size: Option<Vector3>| size.map_or([0.0; 3], |v| [v.x / 2.0, v.y / 2.0, v.z / 2.0]);
+    let numbers = |size: Option<Vector3>| size.map_or([0.0; 3], |v| [v.x, v.y, v.z]);
     let mut parts = Vec::new();
     for p in entity.spheres {
-        parts.push(read_part(Shape::Sphere { radius: half(p.size)[0] }, p.pose, p.color));
+        parts.push(read_part(Shape::Sphere { radius: numbers(p.size)[0] / 2.0 }, p.pose, p.color));
     }
     for p in entity.cubes {
-        parts.push(read_part(Shape::Box { half_extents: half(p.size) }, p.pose, p.color));
+        parts.push(read_part(Shape::Box { size: numbers(p.size) }, p.pose, p.color));
     }
     for p in entity.cylinders {
-        let [radius, _, half_height] = half(p.size);
-        parts.push(read_part(Shape::Cylinder { radius, half_height }, p.pose, p.color));
+        let [diameter, _, length] = numbers(p.size);
+        parts.push(read_part(Shape::Cylinder { radius: diameter / 2.0, length }, p.pose, p.color));
     }
     for p in entity.triangles {
         let vertices = p.points.iter().map(|v| [v.x, v.y, v.z]).collect();

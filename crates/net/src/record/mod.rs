@@ -11,7 +11,7 @@
 //! let mut recorder = Recorder::create(&path, "falling", &entities, RecorderOptions::default())?;
 //! for frame in 0..60 {
 //!     let t = frame as f64 / 60.0;
-//!     recorder.frame(t, frame, &[Pose::at([0.0, 0.0, 5.0 - 4.905 * t * t])], b"state")?;
+//!     recorder.frame(t, frame, &[Pose::at([0.0, 0.0, 5.0 - 4.905 * t * t])], &[], b"state")?;
 //! }
 //! recorder.finish()?;
 //!
@@ -28,7 +28,7 @@
 //! |---|---|---|
 //! | [`TOPIC_SCENE`] | `foxglove.SceneUpdate` | at the start and at every change of the list of entities; always the whole list |
 //! | [`TOPIC_TRANSFORMS`] | `foxglove.FrameTransforms` | every frame: [`ROOT_FRAME`] → each entity's frame, named as the entity |
-//! | [`TOPIC_STATE`] | `tumble.State` | every frame: frame number, exact time and the caller's state bytes |
+//! | [`TOPIC_STATE`] | `tumble.State` | every frame: frame number, exact time and the caller's state bytes and contacts |
 //!
 //! All three are protobuf, with their schemas in the file. The metadata of the state channel also
 //! contains the text of `tumble.State`, under `proto`. A metadata record named `tumble` contains
@@ -73,7 +73,7 @@ pub use container::Ending;
 pub use error::RecordError;
 pub use reader::{Frame, Reader, read};
 pub use recover::{RecoverReport, recover};
-pub use scene::{Entity, Pose, Shape, VisualPart};
+pub use scene::{Contact, Entity, Pose, Shape, VisualPart, decode_contacts, encode_contacts};
 pub use schemas::{ROOT_FRAME, STATE_PROTO, TOPIC_SCENE, TOPIC_STATE, TOPIC_TRANSFORMS};
 pub use writer::{Compression, FlushEvery, Recorder, RecorderOptions, Summary};
 
@@ -83,6 +83,8 @@ pub const MAX_RECORD_BYTES: u64 = 256 << 20;
 pub const MAX_CHUNK_BYTES: u64 = 256 << 20;
 /// Maximum number of entities at a time.
 pub const MAX_ENTITIES: usize = 100_000;
+/// Most contacts in one frame.
+pub const MAX_CONTACTS: usize = 4096;
 /// Maximum number of bytes (UTF-8) in a name.
 pub const MAX_NAME_BYTES: usize = 256;
 /// Maximum number of state bytes in one frame.

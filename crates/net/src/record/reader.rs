@@ -6,7 +6,7 @@ use super::chunk::{Channel, Inner, Schema, define, next_inner, open_chunk, parse
 use super::container::{Container, Ending, Next, RawRecord};
 use super::error::{RecordError, Result};
 use super::messages::{entities_of, nanoseconds, poses_of};
-use super::scene::{Entity, Pose, name_fault};
+use super::scene::{Contact, Entity, Pose, decode_contacts, name_fault};
 use super::schemas::{
     METADATA_NAME, PROTOBUF, SCENE_SCHEMA, STATE_SCHEMA, State, TOPIC_SCENE, TOPIC_STATE, TOPIC_TRANSFORMS,
     TRANSFORMS_SCHEMA, VERSION,
@@ -27,6 +27,8 @@ pub struct Frame {
     pub frame: u64,
     /// One pose per entity, in the order of [`Reader::entities`].
     pub poses: Vec<Pose>,
+    /// Contacts; each refers to two entities by their indices in [`Reader::entities`].
+    pub contacts: Vec<Contact>,
     /// The recorded state bytes.
     pub state: Vec<u8>,
 }
@@ -272,7 +274,8 @@ impl Reader {
     }
 
     fn state(&mut self, log_time: u64, data: &[u8]) -> std::result::Result<Frame, String> {
-        let State { version, frame, time_s, payload } = State::decode(data).map_err(|e| format!("state: {e}"))?;
+        let State { version, frame, time_s, payload, contacts } =
+            State::decode(data).map_err(|e| format!("state: {e}"))?;
         if version != VERSION {
             return Err(format!("state of version {version}, {VERSION} is what is read here"));
         }
@@ -288,8 +291,12 @@ impl Reader {
             Some((at, poses)) if at == log_time => poses,
             _ => return Err(format!("frame {frame} has a state and no transforms")),
         };
+        let contacts = decode_contacts(&contacts).map_err(|why| format!("frame {frame}: {why}"))?;
+        if let Some(why) = contacts.iter().find_map(|contact| contact.fault(poses.len())) {
+            return Err(format!("frame {frame}: {why}"));
+        }
         self.last_frame = Some(frame);
-        Ok(Frame { time_s, frame, poses, state: payload })
+        Ok(Frame { time_s, frame, poses, contacts, state: payload })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::error::{RecordError, Result};
 use super::schemas::ROOT_FRAME;
-use super::{MAX_ENTITIES, MAX_NAME_BYTES};
+use super::{MAX_CONTACTS, MAX_ENTITIES, MAX_NAME_BYTES};
 use std::collections::BTreeSet;
 
 /// Pose of a frame in its parent: rotate, then translate.
@@ -50,23 +50,23 @@ pub enum Shape {
     },
     /// A box, axes along x, y, z.
     Box {
-        /// Half of each edge length.
-        half_extents: [f64; 3],
+        /// Edge lengths.
+        size: [f64; 3],
     },
     /// A cylinder along z.
     Cylinder {
         /// Radius.
         radius: f64,
-        /// Half of its length.
-        half_height: f64,
+        /// Its length.
+        length: f64,
     },
     /// A cylinder along z with a hemisphere on each end. Stored as a cylinder and two spheres, and
     /// read back as these.
     Capsule {
         /// Radius of cylinder and caps.
         radius: f64,
-        /// Half of the cylinder's length without the caps.
-        half_height: f64,
+        /// Length of the cylinder without the caps.
+        length: f64,
     },
     /// Triangles.
     Mesh {
@@ -78,8 +78,8 @@ pub enum Shape {
     /// The plane z = 0 with normal +z, drawn as a square. Stored as two triangles, and read back as
     /// a mesh.
     Plane {
-        /// Half of the square's edge.
-        half_size: f64,
+        /// Edge of the square.
+        size: f64,
     },
 }
 
@@ -101,6 +101,73 @@ pub struct Entity {
     pub name: String,
     /// Visible parts; may be empty.
     pub parts: Vec<VisualPart>,
+}
+
+/// A contact of two entities in a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// Index of the entity that the normal points to.
+    pub a: u32,
+    /// Index of the entity that the normal points from.
+    pub b: u32,
+    /// Contact point, m.
+    pub point: [f64; 3],
+    /// Unit normal from `b` to `a`.
+    pub normal: [f64; 3],
+    /// Depth of the overlap, m; negative while apart.
+    pub depth: f64,
+    /// Force on `a`, N.
+    pub force: [f64; 3],
+}
+
+impl Contact {
+    /// Length of an encoded contact, bytes.
+    const BYTES: usize = 88;
+
+    fn numbers(&self) -> [f64; 10] {
+        let Contact { point: p, normal: n, depth, force: f, .. } = self;
+        [p[0], p[1], p[2], n[0], n[1], n[2], *depth, f[0], f[1], f[2]]
+    }
+
+    /// Why it does not fit a frame with this number of entities, if it does not.
+    pub(crate) fn fault(&self, entities: usize) -> Option<String> {
+        let known = |index: u32| (index as usize) < entities;
+        match (known(self.a) && known(self.b), self.numbers().iter().all(|x| x.is_finite())) {
+            (false, _) => Some(format!("a contact of entities {} and {}, of {entities}", self.a, self.b)),
+            (true, false) => Some("a contact with a number that is not finite".into()),
+            (true, true) => None,
+        }
+    }
+}
+
+/// Encodes contacts: the two indices (u32), then point, normal, depth and force (f64), little-endian.
+pub fn encode_contacts(contacts: &[Contact]) -> Vec<u8> {
+    let mut out = Vec::with_capacity(Contact::BYTES * contacts.len());
+    for contact in contacts {
+        out.extend([contact.a, contact.b].iter().flat_map(|i| i.to_le_bytes()));
+        out.extend(contact.numbers().iter().flat_map(|x| x.to_le_bytes()));
+    }
+    out
+}
+
+/// Decodes contacts.
+pub fn decode_contacts(bytes: &[u8]) -> std::result::Result<Vec<Contact>, String> {
+    let (contacts, rest) = bytes.as_chunks::<{ Contact::BYTES }>();
+    if !rest.is_empty() || contacts.len() > MAX_CONTACTS {
+        return Err(format!(
+            "{} bytes of contacts, expected at most {MAX_CONTACTS} of {} bytes",
+            bytes.len(),
+            Contact::BYTES
+        ));
+    }
+    let read = |bytes: &[u8; Contact::BYTES]| {
+        let (indices, numbers) = bytes.split_at(8);
+        let index = |i: usize| indices.as_chunks().0.get(i).map_or(0, |b| u32::from_le_bytes(*b));
+        let number = |i: usize| numbers.as_chunks().0.get(i).map_or(0.0, |b| f64::from_le_bytes(*b));
+        let vector = |i: usize| [number(i), number(i + 1), number(i + 2)];
+        Contact { a: index(0), b: index(1), point: vector(0), normal: vector(3), depth: number(6), force: vector(7) }
+    };
+    Ok(contacts.iter().map(read).collect())
 }
 
 /// Checks a list before it is recorded: count, names, numbers, indices.
@@ -149,9 +216,9 @@ fn part_fault(part: &VisualPart) -> Option<String> {
 fn shape_fault(shape: &Shape) -> Option<String> {
     let lengths: &[f64] = match shape {
         Shape::Sphere { radius } => &[*radius],
-        Shape::Box { half_extents } => half_extents,
-        Shape::Cylinder { radius, half_height } | Shape::Capsule { radius, half_height } => &[*radius, *half_height],
-        Shape::Plane { half_size } => &[*half_size],
+        Shape::Box { size } => size,
+        Shape::Cylinder { radius, length } | Shape::Capsule { radius, length } => &[*radius, *length],
+        Shape::Plane { size } => &[*size],
         Shape::Mesh { vertices, triangles } => return mesh_fault(vertices, triangles),
     };
     let bad = lengths.iter().find(|x| !(x.is_finite() && **x >= 0.0))?;

@@ -3,9 +3,9 @@
 use super::budget;
 use super::error::{RecordError, Result};
 use super::messages::{nanoseconds, scene_update, set_transforms, transforms_for};
-use super::scene::{Entity, Pose, check_entities};
+use super::scene::{Contact, Entity, Pose, check_entities, encode_contacts};
 use super::schemas::{Channels, METADATA_NAME, State, VERSION, add_channels};
-use super::{MAX_NAME_BYTES, MAX_SCENE_BYTES, MAX_STATE_BYTES, MAX_TIME_S};
+use super::{MAX_CONTACTS, MAX_NAME_BYTES, MAX_SCENE_BYTES, MAX_STATE_BYTES, MAX_TIME_S};
 use foxglove::messages::FrameTransforms;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
@@ -191,21 +191,23 @@ impl Recorder {
     /// - `time_s`: simulated time, s, finite, 0 to [`MAX_TIME_S`], never before the last frame's.
     /// - `frame`: its number, above the last frame's.
     /// - `poses`: one per entity in the order of the list, `X_WB`.
+    /// - `contacts`: between entities of the list, at most [`MAX_CONTACTS`].
     /// - `state`: the caller's bytes to restore the world, at most [`MAX_STATE_BYTES`]; may be
     ///   empty.
     ///
     /// # Errors
     /// [`RecordError`] if a value is out of range, in which case nothing is written, or if writing
     /// fails.
-    pub fn frame(&mut self, time_s: f64, frame: u64, poses: &[Pose], state: &[u8]) -> Result<()> {
+    pub fn frame(&mut self, time_s: f64, frame: u64, poses: &[Pose], contacts: &[Contact], state: &[u8]) -> Result<()> {
         self.check_time(time_s)?;
-        self.check_frame(frame, poses, state)?;
+        self.check_frame(frame, poses, contacts, state)?;
         let log_time = nanoseconds(time_s);
         let sequence = frame as u32; // for people; the whole number is in the state message
         set_transforms(&mut self.transforms, log_time, poses);
         let transforms = self.transforms.encode_to_vec();
         self.write(self.channels.transforms, sequence, log_time, &transforms)?;
-        let state = State { version: VERSION, frame, time_s, payload: state.to_vec() };
+        let state =
+            State { version: VERSION, frame, time_s, payload: state.to_vec(), contacts: encode_contacts(contacts) };
         self.write(self.channels.state, sequence, log_time, &state.encode_to_vec())?;
         self.pending_frames += 1;
         self.last = Some((time_s, frame));
@@ -255,7 +257,7 @@ impl Recorder {
         ))
     }
 
-    fn check_frame(&self, frame: u64, poses: &[Pose], state: &[u8]) -> Result<()> {
+    fn check_frame(&self, frame: u64, poses: &[Pose], contacts: &[Contact], state: &[u8]) -> Result<()> {
         let refuse = |why: String| Err(RecordError::input(format!("frame {frame}"), why));
         if let Some((_, last)) = self.last
             && frame <= last
@@ -264,6 +266,12 @@ impl Recorder {
         }
         if poses.len() != self.names.len() {
             return refuse(format!("{} poses for {} entities", poses.len(), self.names.len()));
+        }
+        if contacts.len() > MAX_CONTACTS {
+            return refuse(format!("{} contacts, at most {MAX_CONTACTS} are allowed", contacts.len()));
+        }
+        if let Some(why) = contacts.iter().find_map(|contact| contact.fault(self.names.len())) {
+            return refuse(why);
         }
         if state.len() > MAX_STATE_BYTES {
             return refuse(format!("{} bytes of state, at most {MAX_STATE_BYTES} are allowed", state.len()));

@@ -1,7 +1,9 @@
 //! A facet's copy of the world: built from the scene file, updated by messages, drawn and never
 //! stepped.
 
+use super::contacts::{get_contacts, put_contacts};
 use super::frame_hash::FrameHasher;
+use super::publisher::put_message;
 use super::quantize::get_pose;
 use super::render_proxy::RenderProxy;
 use super::table::{Entry, EntryKind, Snapshot, parse_state, poses_bytes};
@@ -29,6 +31,8 @@ pub struct Mirror {
     base: World,
     world: World,
     slots: Vec<MirroredObject>,
+    /// Objects of the slots; `None` for the viewer.
+    ids: Vec<Option<ObjectId>>,
     /// Number of objects that are not stationary.
     moving: usize,
     /// Scratch memory for the poses of a frame.
@@ -48,6 +52,7 @@ impl Mirror {
             base,
             world,
             slots: Vec::new(),
+            ids: Vec::new(),
             moving: 0,
             poses: Vec::new(),
             revision: None,
@@ -110,6 +115,7 @@ impl Mirror {
             slots.push(self.slot(&mut world, entry)?);
         }
         self.moving = slots.iter().filter(|slot| !slot.stationary).count();
+        self.ids = slots.iter().map(|slot| slot.id).collect();
         (self.world, self.slots, self.revision) = (world, slots, Some(snapshot.revision));
         self.hash_table();
         Ok(())
@@ -149,7 +155,7 @@ impl Mirror {
         if stationary {
             let mut stand = Vec::new();
             read_poses(poses, parts, &mut stand)?;
-            world.set_displayed_poses(id, &stand).map_err(|why| unfit(&why.to_string()))?;
+            world.replica().set_poses(id, &stand).map_err(|why| unfit(&why.to_string()))?;
         }
         Ok(MirroredObject { id: Some(id), kind: entry.kind, stationary, parts })
     }
@@ -191,7 +197,7 @@ impl Mirror {
                 }
             }
         }
-        records.next().map_or(Ok(()), |more| more.map(drop))?; // what follows the last
+        let contacts = get_contacts(records.rest(), &self.ids, &self.world)?;
         let viewer = viewer.ok_or(MessageError::Malformed("no viewer"))?;
         self.apply_messages(&messages)?;
         for (id, range) in shown {
@@ -200,10 +206,11 @@ impl Mirror {
                 let _ = self.world.set_enabled(id, enabled); // ids of our own list are there
             }
             if enabled {
-                let _ = self.world.set_displayed_poses(id, &poses[range]); // as many as there are parts, and finite
+                let _ = self.world.replica().set_poses(id, &poses[range]); // as many as there are parts, and finite
             }
         }
-        self.world.set_displayed_time(time_s);
+        self.world.replica().set_time(time_s);
+        self.world.replica().set_contacts(contacts);
         (self.viewer, self.frame, self.poses) = (viewer, frame, poses);
         Ok(())
     }
@@ -213,7 +220,7 @@ impl Mirror {
         let before: Vec<Vec<f64>> =
             messages.iter().map(|(id, _)| self.world.state_of(*id).unwrap_or_default().to_vec()).collect();
         for (done, (id, data)) in messages.iter().enumerate() {
-            if let Err(why) = self.world.read_data(*id, data) {
+            if let Err(why) = self.world.replica().read_data(*id, data) {
                 for ((id, _), x) in messages[..done].iter().zip(&before) {
                     let _ = self.world.write_state_of(*id, x); // it held these numbers before
                 }
@@ -241,6 +248,10 @@ impl Mirror {
                 self.hash_object(id, slot, &mut hasher);
             }
         }
+        let shown = self.world.contacts();
+        let ids = self.ids.iter().zip(0..).filter(|_| !shown.is_empty());
+        let indices = ids.filter_map(|(id, index)| Some(((*id)?, index))).collect();
+        hasher.bytes(|out| put_contacts(out, shown, &indices));
         let (hash, scratch) = hasher.hash();
         self.scratch = scratch;
         hash
@@ -248,9 +259,7 @@ impl Mirror {
 
     fn hash_object(&self, id: ObjectId, slot: &MirroredObject, hasher: &mut FrameHasher) {
         if slot.kind == EntryKind::Exact {
-            hasher.bytes(|out| {
-                self.world.get_data(id, out);
-            });
+            hasher.bytes(|out| put_message(&self.world, id, out));
             return;
         }
         let part_states = self

@@ -55,6 +55,7 @@
 //! and `input.rs` the small messages, `quantize.rs` the poses with the bound on their error.
 //! `docs/netsync.md` describes the protocol.
 
+mod contacts;
 pub mod cpu_latency;
 mod driver;
 mod facet;
@@ -93,6 +94,7 @@ pub mod wire;
 #[cfg(not(feature = "fuzzing"))]
 mod wire;
 
+pub use contacts::MAX_CONTACTS;
 pub use driver::{Facet, Server, SessionError};
 pub use facet::{EndReason, FacetOptions, FacetSession, Task, WaitReason};
 pub use input::{Input, MAX_KEYS};

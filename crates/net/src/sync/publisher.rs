@@ -1,6 +1,7 @@
 //! The server's side of a frame: turns a world into payloads, and computes the hash that a facet
 //! must acknowledge.
 
+use super::contacts::{MAX_CONTACTS, put_contacts};
 use super::frame_hash::FrameHasher;
 use super::quantize::{get_pose, put_pose};
 use super::table::{Entry, EntryKind, MAX_OBJECTS, put_record, put_snapshot_head, put_state_head};
@@ -8,6 +9,8 @@ use super::transport::MAX_MESSAGE_BYTES;
 use super::viewer::{VIEWER_NAME, Viewer};
 use super::visuals::put_visuals;
 use super::wire::{HEADER_BYTES, Hash};
+use crate::world::strongest;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use tumble_collide::Pose;
 use tumble_core::{Mode, ObjectId, World};
@@ -69,10 +72,14 @@ struct TableRow {
 /// messages.
 pub struct Publisher {
     exact: bool,
+    /// Largest number of contacts in a frame.
+    contacts: usize,
     base: World,
     /// Objects of the world at the last rebuild of the table.
     ids: Vec<ObjectId>,
     rows: Vec<TableRow>,
+    /// Index of each row's object.
+    indices: BTreeMap<ObjectId, u32>,
     revision: u32,
     snapshot: Arc<Vec<u8>>,
     table: Hash,
@@ -85,14 +92,24 @@ impl Publisher {
     pub fn new(base: &World, exact: bool, revision: u32) -> Publisher {
         Publisher {
             exact,
+            contacts: 0,
             base: base.fork(),
             ids: Vec::new(),
             rows: Vec::new(),
+            indices: BTreeMap::new(),
             revision,
             snapshot: Arc::default(),
             table: [0; 16],
             scratch: FrameHasher::default(),
         }
+    }
+
+    /// Sends contacts with every frame: those that touch, at most `max` and [`MAX_CONTACTS`]. If there are more, those with the largest
+    /// forces are sent. By default there are none.
+    #[must_use]
+    pub fn with_contacts(mut self, max: usize) -> Publisher {
+        self.contacts = max.min(MAX_CONTACTS);
+        self
     }
 
     /// Returns the SNAPSHOT payload of the last [`publish`](Self::publish); empty before the first.
@@ -128,6 +145,9 @@ impl Publisher {
         }
         hasher.bytes(|out| viewer.write(out));
         put_record(&mut state, self.rows.len(), |out| viewer.write(out));
+        let start = state.len();
+        put_contacts(&mut state, strongest(world, self.contacts), &self.indices);
+        hasher.bytes(|out| out.extend(&state[start..]));
         let (hash, scratch) = hasher.hash();
         self.scratch = scratch;
         check_limit("bytes of a frame", state.len() + HEADER_BYTES, MAX_MESSAGE_BYTES)?;
@@ -172,6 +192,7 @@ impl Publisher {
                 self.rows.push(TableRow { id, kind, fixed, stationary, enabled, parts, poses });
             }
         }
+        self.indices = self.rows.iter().map(|row| row.id).zip(0..).collect();
         self.ids = world.ids().to_vec();
         check_limit("objects", self.rows.len() + 1, MAX_OBJECTS)?;
         let mut out = Vec::new();
@@ -231,7 +252,7 @@ fn put_row(
 ) -> Result<(), PublishError> {
     let start = out.len();
     if row.kind == EntryKind::Exact {
-        world.get_data(row.id, out);
+        put_message(world, row.id, out);
         hasher.bytes(|seen| seen.extend(&out[start..]));
         return Ok(());
     }
@@ -247,6 +268,14 @@ fn put_row(
         }
     }
     Ok(())
+}
+
+/// Appends an object's own message (thesis `GetData`); nothing for an object that has none.
+pub(super) fn put_message(world: &World, id: ObjectId, out: &mut Vec<u8>) {
+    let view = world.view();
+    if let (Some(sync), Some(range)) = (world.object(id).and_then(|o| o.net_sync()), view.state_range(id)) {
+        sync.get_data(range, &view, out);
+    }
 }
 
 fn poses(world: &World, id: ObjectId) -> impl Iterator<Item = Pose> + '_ {

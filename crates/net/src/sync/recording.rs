@@ -18,8 +18,8 @@ use super::messages::{FrameAck, Join};
 use super::server::ServerEvent;
 use super::transport::{FacetNumber, MAX_MESSAGE_BYTES};
 use super::wire::{ByteReader, HEADER_BYTES, Hash, MessageError, MessageHeader, MessageKind, message, open};
-use crate::record::{MAX_STATE_BYTES, Pose, Reader, RecordError, Recorder, RecorderOptions, Summary, read};
-use crate::world::{entities, names, poses};
+use crate::record::{Contact, MAX_STATE_BYTES, Pose, Reader, RecordError, Recorder, RecorderOptions, Summary, read};
+use crate::world::{contacts, entities, names, poses};
 use std::path::Path;
 use std::sync::Arc;
 use tumble_core::World;
@@ -39,14 +39,24 @@ pub struct FrameRecord {
     pub hash: Hash,
 }
 
+/// A frame that waits for its acknowledgements.
+struct WaitingFrame {
+    frame: u64,
+    time_s: f64,
+    poses: Vec<Pose>,
+    contacts: Vec<Contact>,
+    /// Messages so far.
+    messages: Vec<u8>,
+}
+
 /// Writes the recording of a session. A frame is written when the next one arrives, together with
 /// its acknowledgements.
 pub struct SessionRecorder {
     recorder: Recorder,
     every: u32,
     count: u64,
-    /// The frame that waits for its acknowledgements: number, time, poses, messages so far.
-    waiting: Option<(u64, f64, Vec<Pose>, Vec<u8>)>,
+    /// The frame that waits for its acknowledgements.
+    waiting: Option<WaitingFrame>,
     /// Inputs and acknowledgements of frames that are not recorded.
     notes: Vec<u8>,
     list: Option<Arc<Vec<u8>>>,
@@ -115,7 +125,9 @@ impl SessionRecorder {
         out.extend(message(&head(MessageKind::State), |out| out.extend(&recorded.state)));
         let done = FrameAck { hash: recorded.hash, ..FrameAck::default() };
         out.extend(message(&head(MessageKind::Ready), |out| done.write(out)));
-        self.waiting = Some((recorded.frame, recorded.time_s, poses(world), out));
+        let (frame, time_s) = (recorded.frame, recorded.time_s);
+        let (poses, contacts) = (poses(world), contacts(world));
+        self.waiting = Some(WaitingFrame { frame, time_s, poses, contacts, messages: out });
         Ok(())
     }
 
@@ -154,9 +166,10 @@ impl SessionRecorder {
     }
 
     fn write_waiting(&mut self) -> Result<(), RecordError> {
-        let Some((frame, time_s, poses, mut messages)) = self.waiting.take() else { return Ok(()) };
-        messages.append(&mut self.notes);
-        self.recorder.frame(time_s, frame, &poses, &messages)
+        let Some(mut waiting) = self.waiting.take() else { return Ok(()) };
+        waiting.messages.append(&mut self.notes);
+        let WaitingFrame { frame, time_s, poses, contacts, messages } = waiting;
+        self.recorder.frame(time_s, frame, &poses, &contacts, &messages)
     }
 }
 

@@ -5,7 +5,7 @@
 //! SNAPSHOT  revision u32 | exact u8 | 0 u8 | 0 u16 | count u32 | count times: name, size u64, body
 //!           name: length u32, UTF-8
 //!           body: kind u8 | flags u8 | parts u16 | 20 bytes per part if it is stationary | visuals if it is described
-//! STATE     revision u32 | count u32 | count times: index u32, size u32, body
+//! STATE     revision u32 | count u32 | count times: index u32, size u32, body | contacts
 //!           body: 20 bytes per part | the object's own message | the viewer; nothing if it is not enabled
 //! ```
 //!
@@ -163,14 +163,19 @@ pub(crate) struct Records<'a> {
     left: u32,
 }
 
+impl<'a> Records<'a> {
+    /// Returns the bytes behind the records, after the last one was read.
+    pub fn rest(self) -> &'a [u8] {
+        self.rest.0
+    }
+}
+
 impl<'a> Iterator for Records<'a> {
     type Item = Result<(usize, &'a [u8]), MessageError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.left == 0 {
-            let end = self.rest.end();
-            self.rest = ByteReader(&[]);
-            return end.err().map(Err);
+            return None;
         }
         self.left -= 1;
         let mut record = || {

@@ -8,8 +8,8 @@ fn frames_out_of_range_are_refused_and_not_written() {
     let scratch = Scratch::new("frames");
     let path = scratch.file("a.mcap");
     let mut recorder = Recorder::create(&path, WORLD, &entities(), options(Compression::None, 1)).unwrap();
-    recorder.frame(time(0), 0, &poses(0), &state(0)).unwrap();
-    recorder.frame(time(1), 1, &poses(1), &state(1)).unwrap();
+    recorder.frame(time(0), 0, &poses(0), &[], &state(0)).unwrap();
+    recorder.frame(time(1), 1, &poses(1), &[], &state(1)).unwrap();
     let with = |pose: Pose| vec![Pose::IDENTITY, pose, Pose::IDENTITY];
     let nan = with(Pose::at([0.0, f64::NAN, 0.0]));
     let zero = with(Pose { position: [0.0; 3], rotation: [0.0; 4] });
@@ -28,10 +28,10 @@ fn frames_out_of_range_are_refused_and_not_written() {
         (1.0, 2, &good, &big, "67108865 bytes of state"),
     ];
     for (t, k, poses, state, wanted) in bad {
-        let error = recorder.frame(t, k, poses, state).unwrap_err().to_string();
+        let error = recorder.frame(t, k, poses, &[], state).unwrap_err().to_string();
         assert!(error.contains(wanted), "got: {error}\nwanted: {wanted}");
     }
-    recorder.frame(time(2), 2, &good, &state(2)).unwrap();
+    recorder.frame(time(2), 2, &good, &[], &state(2)).unwrap();
     assert_eq!(recorder.finish().unwrap().frames, 3);
     let (frames, ending) = read_all(&path);
     assert_eq!((frames.len(), ending.unwrap()), (3, Ending::Complete));
@@ -55,7 +55,7 @@ fn scenes_out_of_range_are_refused_before_a_file_is_made() {
         (twice, "entity \"a\": this name is used twice"),
         (glaring, "color [2.0"),
         (one("a", Shape::Sphere { radius: -1.0 }), "part 0: length -1"),
-        (one("a", Shape::Box { half_extents: [1.0, f64::NAN, 1.0] }), "length NaN"),
+        (one("a", Shape::Box { size: [1.0, f64::NAN, 1.0] }), "length NaN"),
         (one("a", open), "triangle 0 is [0, 1, 3], but there are only 3 vertices"),
     ];
     for (entities, wanted) in cases {

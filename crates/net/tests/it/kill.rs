@@ -16,7 +16,7 @@ fn child_records_until_killed() {
     let path = std::env::var_os(TARGET).expect("only the killing test runs this");
     let mut recorder = Recorder::create(path, WORLD, &entities(), options(Compression::Lz4, FLUSH as u32)).unwrap();
     for k in 0..1_000_000 {
-        recorder.frame(time(k), k, &poses(k), &state(k)).unwrap();
+        recorder.frame(time(k), k, &poses(k), &[], &state(k)).unwrap();
         println!("safe {}", recorder.flushed_frames());
     }
     panic!("nobody killed this run");
@@ -60,12 +60,12 @@ fn a_killed_run_keeps_what_was_flushed() {
 fn child_records_until_refused() {
     let path = std::env::var_os(TARGET).expect("only the test of the full disk runs this");
     let mut recorder = Recorder::create(&path, WORLD, &entities(), options(Compression::None, FLUSH as u32)).unwrap();
-    let refused = (0..10_000).find_map(|k| Some((k, recorder.frame(time(k), k, &poses(k), &state(k)).err()?)));
+    let refused = (0..10_000).find_map(|k| Some((k, recorder.frame(time(k), k, &poses(k), &[], &state(k)).err()?)));
     let (k, error) = refused.expect("there was room for 10,000 frames");
     assert!(error.to_string().contains("cannot write: File too large"), "{error}");
     // further frames fail again, at the next flush at the latest, and do not panic
     let is_later: Vec<bool> =
-        (k + 1..k + 8).map(|k| recorder.frame(time(k), k, &poses(k), &state(k)).is_ok()).collect();
+        (k + 1..k + 8).map(|k| recorder.frame(time(k), k, &poses(k), &[], &state(k)).is_ok()).collect();
     assert!(!is_later[6], "{is_later:?}");
     println!("safe {}", recorder.flushed_frames());
     assert!(recorder.finish().is_err());

@@ -5,7 +5,7 @@ use nalgebra::{Point3, Quaternion, UnitQuaternion};
 use tumble_core::collide::{Pose, Shape, TreeSettings, TriMesh, Vec3};
 use tumble_core::{RigidBody, Settings, World};
 use tumble_net::record::{self, Recorder, RecorderOptions, read};
-use tumble_net::world::{entities, poses};
+use tumble_net::world::{contacts, entities, poses, show_contacts};
 
 fn isometry(pose: &record::Pose) -> Pose {
     let [x, y, z, w] = pose.rotation;
@@ -23,7 +23,7 @@ fn a_recorded_mesh_stands_where_its_file_says() {
     let scratch = Scratch::new("mesh_frame");
     let path = scratch.file("a.mcap");
     let mut recorder = Recorder::create(&path, "", &entities(&world), RecorderOptions::default()).unwrap();
-    recorder.frame(world.time(), world.frame(), &poses(&world), &world.save()).unwrap();
+    recorder.frame(world.time(), world.frame(), &poses(&world), &contacts(&world), &world.save()).unwrap();
     recorder.finish().unwrap();
     let mut reader = read(&path).unwrap();
     let entity = reader.entities()[0].clone();
@@ -50,7 +50,7 @@ fn a_world_with_long_names_is_recorded() {
     let scratch = Scratch::new("long_names");
     let path = scratch.file("a.mcap");
     let mut recorder = Recorder::create(&path, "", &entities(&world), RecorderOptions::default()).unwrap();
-    recorder.frame(world.time(), world.frame(), &poses(&world), &world.save()).unwrap();
+    recorder.frame(world.time(), world.frame(), &poses(&world), &contacts(&world), &world.save()).unwrap();
     recorder.finish().unwrap();
     let mut reader = read(&path).unwrap();
     let names: Vec<String> = reader.entities().iter().map(|e| e.name.clone()).collect();
@@ -64,4 +64,44 @@ fn a_world_with_long_names_is_recorded() {
     world.step().unwrap();
     world.restore(&state).unwrap();
     assert_eq!(world.save(), state);
+}
+
+/// Contacts of a ball at rest are recorded exactly, and can be shown in a world whose snapshot was restored.
+#[test]
+fn contacts_are_recorded_and_shown_again() {
+    let mut world = World::default();
+    world.add(RigidBody::fixed(Shape::half_space()).with_name("ground")).unwrap();
+    world.add(RigidBody::new(Shape::sphere(0.1).unwrap()).with_pose(Pose::translation(0.0, 0.0, 0.1))).unwrap();
+    let scratch = Scratch::new("contacts");
+    let path = scratch.file("a.mcap");
+    let mut recorder = Recorder::create(&path, "", &entities(&world), RecorderOptions::default()).unwrap();
+    for _ in 0..60 {
+        world.step().unwrap();
+        recorder.frame(world.time(), world.frame(), &poses(&world), &contacts(&world), &world.save()).unwrap();
+    }
+    let wrong = record::Contact { a: 2, ..contacts(&world)[0] };
+    let error = recorder.frame(world.time(), 99, &poses(&world), &[wrong], &[]).unwrap_err().to_string();
+    assert!(error.contains("a contact of entities 2 and"), "{error}");
+    let wrong = record::Contact { depth: f64::NAN, ..contacts(&world)[0] };
+    assert!(recorder.frame(world.time(), 99, &poses(&world), &[wrong], &[]).is_err());
+    let many = vec![contacts(&world)[0]; record::MAX_CONTACTS + 1];
+    assert!(recorder.frame(world.time(), 99, &poses(&world), &many, &[]).is_err());
+    recorder.finish().unwrap();
+    let last = read(&path).unwrap().last().unwrap().unwrap();
+    assert_eq!(last.contacts, contacts(&world));
+    assert!((last.contacts[0].force[2].abs() - weight()).abs() < 1e-6);
+    let shown = world.contacts().to_vec();
+    world.restore(&last.state).unwrap();
+    assert!(world.contacts().is_empty());
+    show_contacts(&mut world, &last.contacts);
+    for (shown, before) in world.contacts().iter().zip(&shown) {
+        assert_eq!((shown.a, shown.b, shown.point, shown.normal), (before.a, before.b, before.point, before.normal));
+        assert_eq!((shown.depth, shown.force), (before.depth, before.force));
+    }
+    assert_eq!(world.contacts().len(), shown.len());
+}
+
+/// Weight of a ball of water with a radius of 0.1 m, N.
+fn weight() -> f64 {
+    9.81 * 4.0 * std::f64::consts::PI / 3.0
 }

@@ -59,11 +59,8 @@ fn every_shape_is_drawn_where_it_stands() {
     let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
     let mesh = part(Shape::Mesh { vertices, triangles });
-    let capsule = VisualPart {
-        shape: Shape::Capsule { radius: 0.25, half_height: 2.0 },
-        pose: turned,
-        color: [1.0, 0.0, 0.0, 0.5],
-    };
+    let capsule =
+        VisualPart { shape: Shape::Capsule { radius: 0.25, length: 4.0 }, pose: turned, color: [1.0, 0.0, 0.0, 0.5] };
     let all = [
         Entity { name: "mesh".into(), parts: vec![mesh.clone()] },
         Entity { name: "capsule".into(), parts: vec![capsule] },
@@ -75,7 +72,7 @@ fn every_shape_is_drawn_where_it_stands() {
     assert_eq!(a.parts, [mesh]);
     assert!(c.parts.is_empty());
     let [first, second, tube] = &b.parts[..] else { panic!("two spheres and a cylinder") };
-    assert_eq!(tube.shape, Shape::Cylinder { radius: 0.25, half_height: 2.0 });
+    assert_eq!(tube.shape, Shape::Cylinder { radius: 0.25, length: 4.0 });
     assert_eq!((tube.pose, tube.color), (turned, [1.0, 0.0, 0.0, 0.5]));
     for (cap, x) in [(first, -1.0), (second, 3.0)] {
         assert_eq!(cap.shape, Shape::Sphere { radius: 0.25 });
@@ -91,11 +88,11 @@ fn objects_come_and_go() {
     let path = scratch.file("a.mcap");
     let all = entities();
     let mut recorder = Recorder::create(&path, WORLD, &all[..2], RecorderOptions::default()).unwrap();
-    recorder.frame(0.0, 0, &poses(0)[..2], b"two").unwrap();
+    recorder.frame(0.0, 0, &poses(0)[..2], &[], b"two").unwrap();
     recorder.set_entities(0.5, &all).unwrap();
-    recorder.frame(0.5, 1, &poses(1), b"three").unwrap();
+    recorder.frame(0.5, 1, &poses(1), &[], b"three").unwrap();
     recorder.set_entities(0.75, &all[2..]).unwrap();
-    recorder.frame(0.75, 2, &poses(2)[2..], b"one").unwrap();
+    recorder.frame(0.75, 2, &poses(2)[2..], &[], b"one").unwrap();
     recorder.finish().unwrap();
     let mut reader = read(&path).unwrap();
     for (names, state) in
@@ -115,7 +112,7 @@ fn a_dropped_recorder_leaves_a_complete_file() {
     let path = scratch.file("a.mcap");
     let mut recorder = Recorder::create(&path, WORLD, &entities(), options(Compression::Lz4, 1000)).unwrap();
     for k in 0..10 {
-        recorder.frame(time(k), k, &poses(k), &state(k)).unwrap();
+        recorder.frame(time(k), k, &poses(k), &[], &state(k)).unwrap();
     }
     assert_eq!(recorder.flushed_frames(), 0);
     drop(recorder);
@@ -133,12 +130,12 @@ fn flushes_follow_simulated_time_and_size() {
     let mut recorder = Recorder::create(scratch.file("t.mcap"), WORLD, &entities(), by_time).unwrap();
     let mut flushed = Vec::new();
     for k in 0..240 {
-        recorder.frame(time(k), k, &poses(k), &state(k)).unwrap();
+        recorder.frame(time(k), k, &poses(k), &[], &state(k)).unwrap();
         flushed.push(recorder.flushed_frames());
     }
     assert_eq!((flushed[59], flushed[60], flushed[119], flushed[120], flushed[180]), (0, 61, 61, 121, 181));
     let by_size = RecorderOptions { chunk_size: 1, flush_every: FlushEvery::Frames(u32::MAX), ..Default::default() };
     let mut recorder = Recorder::create(scratch.file("s.mcap"), WORLD, &entities(), by_size).unwrap();
-    recorder.frame(0.0, 0, &poses(0), &[]).unwrap();
+    recorder.frame(0.0, 0, &poses(0), &[], &[]).unwrap();
     assert_eq!(recorder.flushed_frames(), 1);
 }

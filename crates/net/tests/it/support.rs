@@ -36,8 +36,8 @@ pub fn part(shape: Shape) -> VisualPart {
 pub fn entities() -> Vec<Entity> {
     vec![
         Entity { name: "ball".into(), parts: vec![part(Shape::Sphere { radius: 0.125 })] },
-        Entity { name: "crate".into(), parts: vec![part(Shape::Box { half_extents: [0.5, 1.0, 1.5] })] },
-        Entity { name: "ground".into(), parts: vec![part(Shape::Plane { half_size: 10.0 })] },
+        Entity { name: "crate".into(), parts: vec![part(Shape::Box { size: [1.0, 2.0, 3.0] })] },
+        Entity { name: "ground".into(), parts: vec![part(Shape::Plane { size: 20.0 })] },
     ]
 }
 
@@ -70,7 +70,7 @@ pub fn record(path: &Path, count: u64, options: RecorderOptions) -> Vec<u64> {
     let mut recorder = Recorder::create(path, WORLD, &entities(), options).unwrap();
     let mut lengths = Vec::new();
     for k in 0..count {
-        recorder.frame(time(k), k, &poses(k), &state(k)).unwrap();
+        recorder.frame(time(k), k, &poses(k), &[], &state(k)).unwrap();
         lengths.push(std::fs::metadata(path).unwrap().len());
     }
     assert_eq!(recorder.finish().unwrap().frames, count);

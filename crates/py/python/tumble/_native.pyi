@@ -37,6 +37,7 @@ __all__ = [
     "World",
     "__version__",
     "read_recording",
+    "show_contacts",
     "_panic",
     "_unpickle_articulation",
     "_unpickle_shape",
@@ -611,7 +612,7 @@ class Recorder:
     """
     def __new__(cls, path: _Path) -> Recorder: ...
     def frame(self, world: World) -> None:
-        """Adds the present frame: visuals, poses and state. Frames must be added in the order of time,
+        """Adds the present frame: visuals, poses, contacts and state. Frames must be added in the order of time,
         each once.
         """
     def run(self, world: World, n: int, *, every: int = 1) -> None:
@@ -630,6 +631,11 @@ class Recorder:
         """Path of the file."""
     def __enter__(self) -> Recorder: ...
     def __exit__(self, _kind: Any, _error: Any, _trace: Any, /) -> None: ...
+
+def show_contacts(world: World, names: list[str], contacts: bytes) -> None:
+    """Shows recorded contacts as those of a world's last step. They refer to bodies by their indices in
+    ``names``.
+    """
 
 def read_recording(path: _Path) -> dict[str, Any]:
     """Returns all of a recording, as the arguments of `Recording`."""

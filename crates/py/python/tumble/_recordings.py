@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tumble._errors import InvalidValueError, UnknownNameError
-from tumble._native import World, read_recording
+from tumble._native import World, read_recording, show_contacts
+
+_CONTACT = np.dtype([("bodies", "<u4", (2,)), ("point", "<f8", (3,)), ("normal", "<f8", (3,)), ("depth", "<f8"), ("force", "<f8", (3,))])
 
 
 @dataclass(frozen=True, repr=False)
@@ -32,6 +34,9 @@ class Recording:
     """Unit quaternions (x, y, z, w), shape (n, m, 4); NaN while a body did not exist."""
     states: list[bytes]
     """Snapshot of each frame for ``World.restore``."""
+    contacts: list[NDArray[np.void]]
+    """Contacts of each frame whose surfaces touch, at most 4096, those with the largest forces: a structured array with ``bodies`` (2,),
+    indices in ``names``; ``point`` (3,), m; ``normal`` (3,), from the second body to the first; ``depth``, m; ``force`` (3,) on the first, N."""
     note: str | None
     """Where the file was cut; None for a complete one."""
 
@@ -62,14 +67,16 @@ def read(path: str | PathLike[str]) -> Recording:
 
     A truncated file gives its complete frames and a ``note``. A damaged or different file raises ``RecordingError`` with the place.
     """
-    return Recording(**read_recording(path))
+    arrays = read_recording(path)
+    arrays["contacts"] = [np.frombuffer(contacts, _CONTACT) for contacts in arrays["contacts"]]
+    return Recording(**arrays)
 
 
 def replay(path: str | PathLike[str], world: World | None = None) -> Iterator[World]:
     """Sets a world to each frame of a recording in turn and yields it, the same object each time: ``for world in tumble.replay(path): ...``.
 
-    world: a world with the same bodies; by default that of the scene which the recording names, loaded again. It can be read, rendered, and
-    stepped from any frame. Different bodies raise ``SnapshotError``.
+    world: a world with the same bodies; by default that of the scene which the recording names, loaded again. Its contacts are those of the recording. It can be read,
+    rendered, and stepped from any frame. Different bodies raise ``SnapshotError``.
     """
     recording = read(path)
     if world is None:
@@ -88,6 +95,7 @@ def _scene_of(recording: Recording) -> str:
 
 
 def _frames(world: World, recording: Recording) -> Iterator[World]:
-    for state in recording.states:
+    for state, contacts in zip(recording.states, recording.contacts):
         world.restore(state)
+        show_contacts(world, recording.names, contacts.tobytes())
         yield world

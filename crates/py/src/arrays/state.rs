@@ -1,7 +1,7 @@
 //! The state as a numpy array over the world's own memory, without a copy. The only `unsafe` of the
 //! package is here.
 //!
-//! An array refers to the memory that the world steps in ([`World::hold_state_memory`]). Making
+//! An array refers to the memory that the world steps in ([`World::state_memory`]). Making
 //! one copies nothing, and stepping under it copies nothing. When a body is added or removed the world moves to
 //! new memory once, and old arrays keep the old memory. Why this is sound:
 //!
@@ -40,7 +40,7 @@ pub struct Shown(Option<(Py<PyWeakrefReference>, usize)>);
 impl Shown {
     /// Returns a read-only view that follows the world.
     pub fn view<'py>(&mut self, py: Python<'py>, world: &mut World) -> PyResult<Bound<'py, PyAny>> {
-        let now = world.state_address().0.addr();
+        let now = world.state_memory().address().0.addr();
         let base = match self.array(py).filter(|(_, address)| *address == now) {
             Some((base, _)) => base,
             None => {
@@ -66,8 +66,8 @@ impl Shown {
 
 /// Returns an array over the memory of a world's state.
 fn over<'py>(py: Python<'py>, world: &mut World) -> PyResult<Bound<'py, PyAny>> {
-    let keeper = Bound::new(py, Memory { _hold: world.hold_state_memory() })?.into_any();
-    let (start, len) = world.state_address();
+    let keeper = Bound::new(py, Memory { _hold: world.state_memory().hold() })?.into_any();
+    let (start, len) = world.state_memory().address();
     // SAFETY: `start` is the start of `len` initialized numbers that stay there while `keeper`
     // lives; the module's comment says when they are written. No reference to them is made: the
     // view is taken apart into pointer, length and stride.

@@ -7,13 +7,16 @@ use crate::world::inner::Inner;
 use crate::world::shared::Shared;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::{PyBytes, PyDict, PyList};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use tumble::dynamics::ObjectId;
-use tumble::net::record::{Ending, Pose, Recorder as Writer, RecorderOptions, read};
-use tumble::net::world::{entities, poses};
+use tumble::net::record::{
+    Contact, Ending, Pose, Recorder as Writer, RecorderOptions, decode_contacts, encode_contacts, read,
+};
+use tumble::net::world::{self as net_world, contacts, entities, names as entity_names, poses};
 
 /// Largest count of numbers, and of bytes of states, of a recording that is read at once.
 const MAX_NUMBERS: usize = 1 << 29;
@@ -57,7 +60,7 @@ impl Open {
             self.writer.set_entities(core.time(), &entities(core))?;
             (self.world, self.objects) = (world.clone(), core.ids().to_vec());
         }
-        Ok(self.writer.frame(core.time(), core.frame(), &poses(core), &core.save())?)
+        Ok(self.writer.frame(core.time(), core.frame(), &poses(core), &contacts(core), &core.save())?)
     }
 }
 
@@ -93,7 +96,7 @@ impl Recorder {
         Ok(Recorder { path, stage: Mutex::new(Stage::Empty), frames: Mutex::new(0) })
     }
 
-    /// Adds the present frame: visuals, poses and state. Frames must be added in the order of time,
+    /// Adds the present frame: visuals, poses, contacts and state. Frames must be added in the order of time,
     /// each once.
     fn frame(&self, py: Python<'_>, world: &Bound<'_, World>) -> Result<()> {
         let shared = world.get().shared.clone();
@@ -179,6 +182,7 @@ struct Frames {
     frames: Vec<u64>,
     poses: Vec<(Arc<Vec<usize>>, Vec<Pose>)>,
     states: Vec<Vec<u8>>,
+    contacts: Vec<Vec<u8>>,
     bytes: usize,
 }
 
@@ -223,8 +227,16 @@ pub fn read_recording<'py>(py: Python<'py>, path: &Bound<'py, PyAny>) -> Result<
     dict.set_item("positions", PyArray1::from_vec(py, positions).reshape([frames, names, 3])?)?;
     dict.set_item("orientations", PyArray1::from_vec(py, rotations).reshape([frames, names, 4])?)?;
     dict.set_item("states", PyList::new(py, all.states.iter().map(|state| PyBytes::new(py, state)))?)?;
+    dict.set_item("contacts", PyList::new(py, all.contacts.iter().map(|contacts| PyBytes::new(py, contacts)))?)?;
     dict.set_item("note", note)?;
     Ok(dict)
+}
+
+/// Encodes contacts whose bodies are columns of the arrays.
+fn named_contacts(contacts: &[Contact], columns: &[usize]) -> Vec<u8> {
+    let column = |index: u32| columns.get(index as usize).map_or(0, |column| *column as u32);
+    let named: Vec<Contact> = contacts.iter().map(|c| Contact { a: column(c.a), b: column(c.b), ..*c }).collect();
+    encode_contacts(&named)
 }
 
 fn whole(file: &PathBuf) -> Result<(String, Frames, Option<String>)> {
@@ -236,7 +248,8 @@ fn whole(file: &PathBuf) -> Result<(String, Frames, Option<String>)> {
             names = now.iter().map(|entity| entity.name.clone()).collect();
             columns = all.columns(&names);
         }
-        all.bytes += frame.state.len();
+        let contacts = named_contacts(&frame.contacts, &columns);
+        all.bytes += frame.state.len() + contacts.len();
         if (all.times.len() + 1) * all.names.len() * 7 > MAX_NUMBERS || all.bytes > MAX_NUMBERS {
             return Err(Error::value(format!(
                 "{}: too many frames to read at once ({MAX_NUMBERS} numbers or bytes)",
@@ -247,10 +260,30 @@ fn whole(file: &PathBuf) -> Result<(String, Frames, Option<String>)> {
         all.frames.push(frame.frame);
         all.poses.push((columns.clone(), frame.poses));
         all.states.push(frame.state);
+        all.contacts.push(contacts);
     }
     let note = match reader.ending() {
         Some(Ending::Cut { offset, what }) => Some(format!("cut at byte {offset}: {what}")),
         _ => None,
     };
     Ok((reader.world().to_owned(), all, note))
+}
+
+/// Shows recorded contacts as those of a world's last step. They refer to bodies by their indices in
+/// ``names``.
+#[pyfunction]
+pub fn show_contacts(
+    py: Python<'_>,
+    world: &Bound<'_, World>,
+    names: Vec<String>,
+    contacts: PyBackedBytes,
+) -> Result<()> {
+    let contacts = decode_contacts(&contacts).map_err(Error::value)?;
+    world.get().shared.write(py, |inner| {
+        let here: BTreeMap<String, u32> = entity_names(&inner.world).into_iter().zip(0..).collect();
+        let index = |column: u32| here.get(names.get(column as usize)?).copied();
+        let contacts = contacts.iter().filter_map(|c| Some(Contact { a: index(c.a)?, b: index(c.b)?, ..*c }));
+        net_world::show_contacts(&mut inner.world, &contacts.collect::<Vec<_>>());
+        Ok(())
+    })
 }

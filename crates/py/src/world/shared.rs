@@ -114,9 +114,9 @@ fn apart<T>(py: Python<'_>, inner: &mut Inner, call: impl FnOnce(Python<'_>, &mu
     if inner.extension.is_empty() || !inner.shown.alive(py) {
         return call(py, inner);
     }
-    inner.world.freeze_state_memory();
+    inner.world.state_memory().freeze();
     let outcome = call(py, inner);
-    inner.world.thaw_state_memory();
+    inner.world.state_memory().thaw();
     outcome
 }
 

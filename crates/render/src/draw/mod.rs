@@ -180,7 +180,7 @@ impl Drawing {
         if let Drawn::Shape(Shape::Capsule { radius, half_length }) = drawn
             && !simple
         {
-            list.add_capsule(pose.cast(), *half_length as f32, *radius as f32, material);
+            list.add_capsule(pose.cast(), *radius as f32, 2.0 * *half_length as f32, material);
             return Ok(());
         }
         let textured = material.texture.is_some();
@@ -232,7 +232,7 @@ impl Drawing {
         if !self.edges.contains_key(&key) {
             let mesh = match drawn {
                 // without rounded edges, which would double the lines
-                Drawn::Shape(Shape::Box { half_extents }) => MeshData::cuboid(small(half_extents).into()),
+                Drawn::Shape(Shape::Box { half_extents }) => MeshData::cuboid((2.0 * small(half_extents)).into()),
                 other => mesh_of(other)?,
             };
             self.sources.push(visual.geometry.clone());
@@ -294,20 +294,20 @@ fn mesh_of(drawn: Drawn<'_>) -> Result<MeshData, RenderError> {
         Drawn::Shape(shape) => shape,
     };
     Ok(match shape {
-        Shape::HalfSpace => MeshData::ground_quad(PLANE_M),
+        Shape::HalfSpace => MeshData::ground_quad(2.0 * PLANE_M),
         Shape::Sphere { radius } => MeshData::uv_sphere(*radius as f32, 24),
         Shape::Box { half_extents } => {
             let half = small(half_extents);
             let (half, radius) = ([half.x, half.y, half.z], ROUNDING * half.min());
             // on long thin boxes the rounding would be finer than a pixel and flicker
             if radius < 0.2 * ROUNDING * half[0].max(half[1]).max(half[2]) {
-                MeshData::cuboid(half)
+                MeshData::cuboid(half.map(|h| 2.0 * h))
             } else {
-                MeshData::rounded_cuboid(half, radius, 2)
+                MeshData::rounded_cuboid(half.map(|h| 2.0 * h), radius, 2)
             }
         }
-        Shape::Capsule { radius, half_length } => MeshData::capsule(*radius as f32, *half_length as f32, 32),
-        Shape::Cylinder(c) => MeshData::cylinder(c.radius() as f32, c.half_length() as f32, 48),
+        Shape::Capsule { radius, half_length } => MeshData::capsule(*radius as f32, 2.0 * *half_length as f32, 32),
+        Shape::Cylinder(c) => MeshData::cylinder(c.radius() as f32, 2.0 * c.half_length() as f32, 48),
         Shape::Mesh(mesh) => triangles(mesh.mesh())?,
     })
 }

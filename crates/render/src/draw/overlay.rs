@@ -6,7 +6,7 @@ use crate::{DebugStyle, DrawList};
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::str::FromStr;
-use tumble_core::collide::{Pose, Shape, UnionFind, Vec3};
+use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::{ArticulatedBody, ContactPoint, Joint, LoopJoint, LoopJointKind, Mode, ObjectId, World};
 
 /// The overlays to draw.
@@ -200,32 +200,19 @@ fn joints(world: &World, list: &mut DrawList, length: f32) {
     }
 }
 
-/// Returns a color for each dynamic object. Objects share it if contacts or loop joints connect
-/// them, directly or through other dynamic objects. Objects without connections are gray.
+/// Returns a color for each dynamic object: one for each [island](World::islands) of several objects, in their order; gray for objects
+/// without connections.
 pub(super) fn island_colors(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
-    let moves = |id: ObjectId| world.status(id).is_some_and(|s| s.mode == Mode::Dynamic);
-    let loop_joints = world.ids().iter().filter_map(|&id| world.get::<LoopJoint>(id)).filter_map(|c| {
-        let [a, b] = c.sides();
-        Some((a.part?.0, b.part?.0))
-    });
-    let contacts = world.contacts().iter().filter(|c| c.depth >= -1e-3 || c.force.norm() > 0.0).map(|c| (c.a, c.b));
-    // in the order of the world, so that colors stay while islands do
-    let moving: Vec<ObjectId> = world.ids().iter().copied().filter(|&id| moves(id)).collect();
-    let index: BTreeMap<ObjectId, u32> = moving.iter().copied().zip(0..).collect();
-    let mut sets = UnionFind::new(moving.len());
-    for (a, b) in contacts.chain(loop_joints) {
-        if let (Some(&a), Some(&b)) = (index.get(&a), index.get(&b)) {
-            sets.union(a, b);
-        }
-    }
-    let (island, count) = sets.numbered();
-    let mut size = vec![0; count];
-    island.iter().for_each(|&n| size[n as usize] += 1);
-    let mut palette = SHELL_COLORS.iter().cycle();
-    let mut color =
-        |size: &i32| if *size == 1 { [0.55, 0.56, 0.58] } else { *palette.next().unwrap_or(&SHELL_COLORS[0]) };
-    let colors: Vec<[f32; 3]> = size.iter().map(&mut color).collect();
-    moving.into_iter().zip(island).map(|(id, n)| (id, colors[n as usize])).collect()
+    let mut palette = SHELL_COLORS.iter().copied().cycle();
+    let mut color = |island: &[ObjectId]| if island.len() == 1 { None } else { palette.next() };
+    let islands = world.islands();
+    islands
+        .iter()
+        .flat_map(|island| {
+            let color = color(island).unwrap_or([0.55, 0.56, 0.58]);
+            island.iter().map(move |&id| (id, color))
+        })
+        .collect()
 }
 
 /// An object rests below this speed of each of its parts, m/s and rad/s.

@@ -208,7 +208,7 @@ pub fn capsule(c: &Capsule, out: &mut Vec<f32>) {
     let (t, q) = (c.pose.translation.vector, c.pose.rotation.coords);
     out.extend([t.x, t.y, t.z, c.radius, q.x, q.y, q.z, q.w]);
     material(&c.material, c.material.texture.map_or(0.0, |t| t.repeat_m), out);
-    out.extend([c.half_length, 0.0, 0.0, 0.0]);
+    out.extend([0.5 * c.length, 0.0, 0.0, 0.0]);
 }
 
 /// A translucent sphere; its opacity replaces the roughness.

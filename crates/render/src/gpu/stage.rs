@@ -333,7 +333,7 @@ type GroundBatch = (MeshBuffers, Buffer, (u32, Option<usize>));
 fn ground(gpu: &Gpu, list: &DrawList, seen: Option<&Bounds>) -> Result<Option<GroundBatch>, RenderError> {
     let Some(ground) = &list.ground else { return Ok(None) };
     let [x, y, reach, _] = scene::floor(list, seen);
-    let mut quad = MeshData::ground_quad(reach);
+    let mut quad = MeshData::ground_quad(2.0 * reach);
     quad.positions.iter_mut().for_each(|p| *p = [p[0] + x, p[1] + y, ground.height_m]);
     let mut floats = Vec::new();
     let placed = Instance {

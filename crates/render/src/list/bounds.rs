@@ -97,7 +97,7 @@ impl DrawList {
             (Corners([s.center; 8], 1), (s.center - r, s.center + r), s.radius)
         });
         let capsules = self.capsules.iter().filter(move |c| c.casts_shadow || !casters).map(|c| {
-            let [a, b] = [-1.0, 1.0].map(|end| c.pose * Point3::new(0.0, 0.0, end * c.half_length));
+            let [a, b] = [-1.0, 1.0].map(|end| c.pose * Point3::new(0.0, 0.0, end * 0.5 * c.length));
             let r = Vector3::repeat(c.radius);
             (Corners([a, b, a, a, a, a, a, a], 2), (a.inf(&b) - r, a.sup(&b) + r), c.radius)
         });

@@ -75,13 +75,7 @@ impl Display for DrawList {
         }
         for (i, c) in self.capsules.iter().enumerate() {
             let (t, q) = (c.pose.translation.vector, c.pose.rotation.coords);
-            write!(
-                f,
-                "capsule {i}: at {} turned {} half length {}",
-                v(t.as_slice()),
-                v(q.as_slice()),
-                n(c.half_length)
-            )?;
+            write!(f, "capsule {i}: at {} turned {} length {}", v(t.as_slice()), v(q.as_slice()), n(c.length))?;
             writeln!(f, " radius {} {}{}", n(c.radius), material(&c.material), shadow(c.casts_shadow))?;
         }
         for (i, l) in self.lines.iter().enumerate() {

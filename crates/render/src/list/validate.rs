@@ -47,12 +47,7 @@ impl DrawList {
             at.finite("pose", c.pose.translation.vector.as_slice())?;
             at.finite("pose", c.pose.rotation.coords.as_slice())?;
             at.check(c.radius > 0.0 && c.radius.is_finite(), "radius", &c.radius, "finite and above 0")?;
-            at.check(
-                c.half_length >= 0.0 && c.half_length.is_finite(),
-                "half_length",
-                &c.half_length,
-                "finite and not negative",
-            )?;
+            at.check(c.length >= 0.0 && c.length.is_finite(), "length", &c.length, "finite and not negative")?;
             at.material(&c.material)?;
             at.texture(&c.material, self.textures.len())?;
         }

@@ -23,7 +23,7 @@ fn a_capsule_covers_a_disc_and_a_strip() {
     let view = Matrix4::look_at_rh(&Point3::new(0.0, 0.0, 5.0), &Point3::origin(), &Vector3::y());
     for (half, angle) in [(0.5f32, PI / 2.0), (0.5, 0.6), (0.5, 0.0), (0.0, 0.3)] {
         let mut list = bare(Camera::Raw { view, projection });
-        list.add_capsule(tipped(angle as f32, [0.1, 0.2, 0.0]), half, 0.3, Material::unlit(WHITE));
+        list.add_capsule(tipped(angle as f32, [0.1, 0.2, 0.0]), 0.3, 2.0 * half, Material::unlit(WHITE));
         let Some(image) = picture(&list, 400, 400) else { return };
         let expected = 1e4 * (PI * 0.09 + 0.6 * 2.0 * f64::from(half) * angle.sin());
         assert!(
@@ -52,9 +52,9 @@ fn a_cast_capsule_and_a_tessellated_one_agree() {
             let mut list = bare(camera);
             list.lights.push(Light::sun(Vector3::new(0.3, 0.4, -1.0), 0.6));
             if cast {
-                list.add_capsule(pose, 0.5, 0.3, lit);
+                list.add_capsule(pose, 0.3, 1.0, lit);
             } else {
-                let mesh = list.add_mesh(MeshData::capsule(0.3, 0.5, 400));
+                let mesh = list.add_mesh(MeshData::capsule(0.3, 1.0, 400));
                 list.add_instance(mesh, pose, lit);
             }
             picture(&list, 300, 200)
@@ -78,14 +78,14 @@ fn the_shadow_of_a_capsule_lies_where_the_light_leaves_it() {
     // along y at height 2, light leaning 45 degrees towards +x: around x = 2, 0.3 sqrt 2 wide to
     // both sides, from y = -0.8 to 0.8
     let mut list = bare(from_above(10.0));
-    let floor = list.add_mesh(MeshData::ground_quad(3.5));
+    let floor = list.add_mesh(MeshData::ground_quad(7.0));
     list.add_instance(floor, Isometry3::identity(), Material { roughness: 1.0, ..Material::matte(WHITE) })
         .casts_shadow = false;
     let along_y = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI as f32 / 2.0);
     list.add_capsule(
         Isometry3::from_parts(Vector3::new(0.0, 0.0, 2.0).into(), along_y),
-        0.5,
         0.3,
+        1.0,
         Material::unlit([0.0; 3]),
     );
     list.lights.push(crate::support::white_sun([1.0, 0.0, -1.0], 1.0, true));
@@ -109,7 +109,7 @@ fn the_shadow_of_a_capsule_lies_where_the_light_leaves_it() {
 /// Spheres, capsules and boxes that hide and cut each other, over a floor, in unlit colors.
 fn medley() -> DrawList {
     let mut list = bare(Camera::look_at(Point3::new(3.0, -2.5, 2.0), Point3::new(0.0, 0.0, 0.3)));
-    let cube = list.add_mesh(MeshData::cuboid([0.4, 0.3, 0.35]));
+    let cube = list.add_mesh(MeshData::cuboid([0.8, 0.6, 0.7]));
     for i in 0..6 {
         let (x, y, shade) = (-1.2 + 0.5 * i as f32, 0.4 * (i % 3) as f32 - 0.4, 0.15 * i as f32);
         list.add_instance(
@@ -123,7 +123,7 @@ fn medley() -> DrawList {
             UnitQuaternion::identity(),
             Material::unlit([1.0, shade, 0.1]),
         );
-        list.add_capsule(tipped(0.4 * i as f32, [x, y + 0.3, 0.6]), 0.5, 0.15, Material::unlit([0.1, shade, 1.0]));
+        list.add_capsule(tipped(0.4 * i as f32, [x, y + 0.3, 0.6]), 0.15, 1.0, Material::unlit([0.1, shade, 1.0]));
     }
     list.ground =
         Some(tumble_render::Ground { height_m: 0.0, reach_m: 30.0, material: Material::unlit([0.5, 0.5, 0.4]) });
@@ -157,10 +157,10 @@ fn a_lamp_amid_posts_throws_a_shadow_behind_each() {
     // the shadow of each reaches from 1 to 1 / (1 - 0.5) = 2, and is 0.2 times the distance wide to
     // both sides
     let mut list = bare(from_above(10.0));
-    let floor = list.add_mesh(MeshData::ground_quad(3.5));
+    let floor = list.add_mesh(MeshData::ground_quad(7.0));
     list.add_instance(floor, Isometry3::identity(), Material { roughness: 1.0, ..Material::matte(WHITE) })
         .casts_shadow = false;
-    let plate = list.add_mesh(MeshData::cuboid([0.005, 0.2, 0.25]));
+    let plate = list.add_mesh(MeshData::cuboid([0.01, 0.4, 0.5]));
     let directions: Vec<f64> = (0..8).map(|i| f64::from(i) * PI / 4.0 + 0.1).collect();
     for &a in &directions {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), a as f32);

@@ -245,7 +245,7 @@ fn still_life() -> DrawList {
     let mut list = bare(tumble_render::Camera::default());
     (list.sky, list.settings) = Default::default();
     list.settings.shadow_map_size = 1024;
-    let cube = list.add_mesh(MeshData::rounded_cuboid([0.5, 0.5, 0.5], 0.05, 2));
+    let cube = list.add_mesh(MeshData::rounded_cuboid([1.0, 1.0, 1.0], 0.05, 2));
     for i in 0..9 {
         let (x, y) = (-3.6 + 0.9 * i as f32, 4.0 + 1.3 * (i % 3) as f32);
         let turn = UnitQuaternion::from_euler_angles(0.1 * i as f32, 0.3, 0.5 * i as f32);

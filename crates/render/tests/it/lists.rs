@@ -15,7 +15,7 @@ fn sample() -> DrawList {
     list.add_sphere(Point3::new(0.0, 0.0, 0.25), 0.25, UnitQuaternion::identity(), Material::billiard_ball(11));
     list.textures.push(std::sync::Arc::new(Image { width: 2, height: 1, rgba: vec![255; 8] }));
     let worn = Material { texture: Some(Texture { id: 0, repeat_m: 0.25 }), metallic: 1.0, ..Material::walnut() };
-    list.add_capsule(Isometry3::translation(0.0, 2.0, 1.0), 0.5, 0.125, worn).casts_shadow = false;
+    list.add_capsule(Isometry3::translation(0.0, 2.0, 1.0), 0.125, 1.0, worn).casts_shadow = false;
     let square = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]];
     let sign = list.add_mesh(
         MeshData::from_unwrapped(&square, &[[0, 1, 2]], &[[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]], 0.0)
@@ -56,7 +56,7 @@ texture 0: 2 x 1
 instance 0: mesh 0 at (1 0 0.5) turned (0 0 0 1) scale (1 1 1) color (0.8 0.3 0.2) rough 0.45 metal 0 coat 0 no shadow
 instance 1: mesh 1 at (0 0 0) turned (0 0 0 1) scale (1 1 2) color (1 1 1) rough 0.45 metal 0 coat 0 unlit texture 0 every 1
 sphere 0: at (0 0 0.25) radius 0.25 turned (0 0 0 1) color (0.82 0.08 0.07) rough 0.25 metal 0 coat 1 pattern billiard_ball (0 0 0) (11 1)
-capsule 0: at (0 2 1) turned (0 0 0 1) half length 0.5 radius 0.125 color (0.42 0.25 0.14) rough 0.5 metal 1 coat 0.2 pattern wood (0.2 0.1 0.05) (0.012 0) texture 0 every 0.25 no shadow
+capsule 0: at (0 2 1) turned (0 0 0 1) length 1 radius 0.125 color (0.42 0.25 0.14) rough 0.5 metal 1 coat 0.2 pattern wood (0.2 0.1 0.05) (0.012 0) texture 0 every 0.25 no shadow
 arrow 0: from (0 0 0) to (0 0 1) color (1 0 0) opacity 1 width 2 on top
 line 1: from (0 0 0) to (1 2 3) color (0 1 0) opacity 1 width 2
 point 0: at (0.1235 0 0) color (0 0 1) opacity 1 width 8
@@ -138,7 +138,7 @@ fn a_wide_floor_does_not_widen_the_framing() {
     let mut list = DrawList::default();
     list.add_sphere(Point3::new(1.0, 2.0, 3.0), 0.5, UnitQuaternion::identity(), Material::default());
     let alone = list.framing_camera(Vector3::y());
-    let floor = list.add_mesh(MeshData::ground_quad(60.0));
+    let floor = list.add_mesh(MeshData::ground_quad(120.0));
     list.add_instance(floor, Isometry3::identity(), Material::default()).casts_shadow = false;
     assert_eq!(list.framing_camera(Vector3::y()), alone);
 }

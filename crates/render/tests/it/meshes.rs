@@ -33,13 +33,13 @@ fn worst_normal(mesh: &MeshData) -> f32 {
 fn solids_have_their_volume_and_outward_normals() {
     let (r, h) = (0.7f32, 1.1f32);
     let solids = [
-        ("box", MeshData::cuboid([1.0, 2.0, 3.0]), 48.0, 88.0, 1e-3),
+        ("box", MeshData::cuboid([2.0, 4.0, 6.0]), 48.0, 88.0, 1e-3),
         ("unit box", MeshData::unit_box(), 1.0, 6.0, 1e-3),
         ("sphere", MeshData::uv_sphere(r, 64), 4.0 / 3.0 * PI * r * r * r, 4.0 * PI * r * r, 0.05),
-        ("cylinder", MeshData::cylinder(r, h, 128), PI * r * r * 2.0 * h, 2.0 * PI * r * (r + 2.0 * h), 0.05),
+        ("cylinder", MeshData::cylinder(r, 2.0 * h, 128), PI * r * r * 2.0 * h, 2.0 * PI * r * (r + 2.0 * h), 0.05),
         (
             "capsule",
-            MeshData::capsule(r, h, 128),
+            MeshData::capsule(r, 2.0 * h, 128),
             PI * r * r * (2.0 * h + 4.0 / 3.0 * r),
             2.0 * PI * r * (2.0 * h + 2.0 * r),
             0.05,
@@ -65,7 +65,7 @@ fn a_rounded_box_is_the_sum_of_a_box_and_a_ball() {
     let [a, b, c] = half.map(|h| 2.0 * (h - r));
     let expected =
         a * b * c + 2.0 * (a * b + b * c + c * a) * r + (a + b + c) * PI * r * r + 4.0 / 3.0 * PI * r * r * r;
-    let mesh = MeshData::rounded_cuboid(half, r, 12);
+    let mesh = MeshData::rounded_cuboid(half.map(|h| 2.0 * h), r, 12);
     assert!((volume(&mesh) / expected - 1.0).abs() < 2e-3, "{} not {expected}", volume(&mesh));
     assert!(worst_normal(&mesh) < 0.1, "{}", worst_normal(&mesh));
 }

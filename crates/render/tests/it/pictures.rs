@@ -12,7 +12,7 @@ fn ball(list: &mut DrawList, center: [f32; 3], radius: f32, color: [f32; 3]) {
 }
 
 fn block(list: &mut DrawList, half: [f32; 3], at: [f32; 3], color: [f32; 3]) -> &mut Instance {
-    let mesh = list.add_mesh(MeshData::cuboid(half));
+    let mesh = list.add_mesh(MeshData::cuboid(half.map(|h| 2.0 * h)));
     list.add_instance(mesh, Isometry3::translation(at[0], at[1], at[2]), Material::unlit(color))
 }
 
@@ -156,7 +156,7 @@ fn a_ball_sinks_into_a_floor_at_its_waterline() {
     // sticks out
     let mut list = bare(from_above(10.0));
     ball(&mut list, [0.0, 0.0, -0.6], 1.0, [1.0, 0.0, 0.0]);
-    let plate = list.add_mesh(MeshData::ground_quad(3.0));
+    let plate = list.add_mesh(MeshData::ground_quad(6.0));
     list.add_instance(plate, Isometry3::identity(), Material::unlit([0.0, 0.0, 1.0]));
     let Some(image) = picture(&list, 400, 400) else { return };
     let radius = 0.8 / 10.0 * 200.0 / 0.4f64.tan();
@@ -266,7 +266,7 @@ fn what_lies_in_the_plane_of_the_ground_is_seen() {
     let mut list = bare(Camera::look_at(Point3::new(3.0, -2.0, 1.0), Point3::origin()));
     list.ground =
         Some(tumble_render::Ground { height_m: 0.0, reach_m: 80.0, material: Material::unlit([1.0, 0.0, 0.0]) });
-    let quad = list.add_mesh(MeshData::ground_quad(60.0));
+    let quad = list.add_mesh(MeshData::ground_quad(120.0));
     list.add_instance(quad, Isometry3::rotation(Vector3::z() * 0.3), Material::unlit([0.0, 0.0, 1.0])).casts_shadow =
         false;
     let Some(image) = picture(&list, 300, 200) else { return };

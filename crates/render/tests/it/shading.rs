@@ -6,7 +6,7 @@ use tumble_render::{Camera, DrawList, Image, Light, Material, MeshData, Sky};
 
 /// A matte floor of sRGB white and nothing else on it.
 fn floor(list: &mut DrawList, half: f32) {
-    let quad = list.add_mesh(MeshData::ground_quad(half));
+    let quad = list.add_mesh(MeshData::ground_quad(2.0 * half));
     let dull = Material { roughness: 1.0, ..Material::matte([1.0; 3]) };
     list.add_instance(quad, Isometry3::identity(), dull).casts_shadow = false;
 }
@@ -88,7 +88,7 @@ fn the_shadow_of_a_box_under_a_lamp_is_its_central_projection() {
     // (0.745 for the lower rim at 0.99)
     let mut list = bare(from_above(10.0));
     floor(&mut list, 3.5);
-    let plate = list.add_mesh(MeshData::cuboid([0.5, 0.5, 0.01]));
+    let plate = list.add_mesh(MeshData::cuboid([1.0, 1.0, 0.02]));
     list.add_instance(plate, Isometry3::translation(0.0, 0.0, 1.0), Material::unlit([0.0; 3]));
     let position = Point3::new(0.0, 0.0, 3.0);
     list.lights.push(Light::Point { position, color: [1.0; 3], intensity: 9.0, radius_m: 0.0, casts_shadow: true });
@@ -113,7 +113,7 @@ fn penumbra_width_is_the_gap_times_the_size_of_the_sun() {
     // light rises from 0 to 1 over 0.2 m, half at the edge
     let mut list = bare(from_above(10.0));
     floor(&mut list, 3.5);
-    let plate = list.add_mesh(MeshData::cuboid([1.0, 1.5, 0.005]));
+    let plate = list.add_mesh(MeshData::cuboid([2.0, 3.0, 0.01]));
     list.add_instance(plate, Isometry3::translation(-1.0, 0.0, 1.0), Material::unlit([0.0; 3]));
     list.lights.push(Light::Directional {
         direction: -Vector3::z(),
@@ -194,10 +194,10 @@ fn a_wide_floor_that_throws_shadows_shades_itself_nowhere() {
     // 20 m of floor in one shadow map (a texel is 1 cm), under a sun 20 degrees high: light sin 20
     // degrees everywhere except in the box's shadow
     let mut list = bare(from_above(10.0));
-    let slab = list.add_mesh(MeshData::cuboid([10.0, 10.0, 0.1]));
+    let slab = list.add_mesh(MeshData::cuboid([20.0, 20.0, 0.2]));
     let dull = Material { roughness: 1.0, ..Material::matte([1.0; 3]) };
     list.add_instance(slab, Isometry3::translation(0.0, 0.0, -0.1), dull);
-    let cube = list.add_mesh(MeshData::cuboid([0.2; 3]));
+    let cube = list.add_mesh(MeshData::cuboid([0.4; 3]));
     list.add_instance(cube, Isometry3::translation(0.0, 0.0, 0.2), Material::unlit([0.0; 3]));
     let high = 20f64.to_radians();
     list.lights.push(white_sun([high.cos() as f32, 0.0, -high.sin() as f32], 2.0, true));
@@ -223,7 +223,7 @@ fn ambient_occlusion_darkens_creases_and_leaves_open_ground() {
     list.sky = Sky { zenith: [0.7; 3], horizon: [0.7; 3], ground: [0.7; 3], ambient: 1.0, ..Sky::flat([0.0; 3]) };
     list.settings.occlusion_m = Some(0.5);
     floor(&mut list, 3.0);
-    let wall = list.add_mesh(MeshData::cuboid([0.2, 2.0, 0.5]));
+    let wall = list.add_mesh(MeshData::cuboid([0.4, 4.0, 1.0]));
     list.add_instance(wall, Isometry3::translation(-0.2, 0.0, 0.5), Material::unlit([0.0; 3]));
     let camera = list.camera;
     let at = |image: &Image, x: f32| {

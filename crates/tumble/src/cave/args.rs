@@ -1,10 +1,10 @@
 //! Options of `tumble cave`, `tumble serve`, `tumble facet`, `tumble replay` and `tumble recover`.
 
-use crate::args::{OpeningOptions, SceneOptions};
+use crate::args::{OpeningOptions, Overlays, SceneOptions};
 use clap::{Args, ValueEnum};
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use tumble::render::Quality;
+use tumble::render::{DebugDraw, Quality, UnknownOverlay};
 
 /// The cave and the environment of the scene. Server and facets must get the same.
 #[derive(Args, Clone)]
@@ -89,9 +89,48 @@ pub struct ServeOptions {
     /// processes faster, at the cost of electric power.
     #[arg(long)]
     pub stay_awake: bool,
+    /// Send the contacts of every frame, at most the 256 with the largest forces, for overlays of
+    /// facets.
+    #[arg(long)]
+    pub contacts: bool,
     /// Print errors only.
     #[arg(long, short)]
     pub quiet: bool,
+}
+
+/// Overlays of a facet, which knows poses and contacts; no words mean none.
+#[derive(Clone, Default)]
+pub struct FacetOverlays {
+    words: String,
+    /// The overlays to draw.
+    pub draw: DebugDraw,
+}
+
+impl FacetOverlays {
+    /// Returns whether an overlay shows contacts.
+    pub fn needs_contacts(&self) -> bool {
+        self.draw.contacts || self.draw.normals || self.draw.forces
+    }
+}
+
+impl std::str::FromStr for FacetOverlays {
+    type Err = String;
+
+    fn from_str(words: &str) -> Result<FacetOverlays, String> {
+        if let Some(word) = words.split(',').map(str::trim).find(|w| ["velocities", "islands", "sleep"].contains(w)) {
+            return Err(format!(
+                "a facet of a cave cannot draw {word}; wanted contacts, normals, forces, joints, frames, tree=LEVEL or all"
+            ));
+        }
+        let Overlays(draw) = words.parse().map_err(|e: UnknownOverlay| e.to_string())?;
+        Ok(FacetOverlays { words: words.to_owned(), draw: DebugDraw { velocities: false, ..draw } })
+    }
+}
+
+impl std::fmt::Display for FacetOverlays {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.words)
+    }
 }
 
 /// Options of drawing facets.
@@ -113,6 +152,10 @@ pub struct DrawOptions {
     /// windows with a software driver).
     #[arg(long, value_name = "NAME")]
     pub quality: Option<Quality>,
+    /// Overlays: contacts, normals, forces (the server sends them with --contacts, which `tumble cave`
+    /// implies), joints, frames, tree=LEVEL, all; separated by commas.
+    #[arg(long, value_name = "WHAT", default_value = "")]
+    pub debug_draw: FacetOverlays,
     /// Draw into memory even if there is a display.
     #[arg(long)]
     pub offscreen: bool,

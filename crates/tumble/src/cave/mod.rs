@@ -42,7 +42,8 @@ use args::{CaveOptions, FacetOptions, RecoverOptions, ReplayOptions, ServeOption
 
 /// Runs the server and the facets of this machine.
 pub fn cave(options: &CaveOptions) -> Result<(), Failure> {
-    server::run(&options.serve, Some(options), None)
+    let contacts = options.serve.contacts || options.draw.debug_draw.needs_contacts();
+    server::run(&ServeOptions { contacts, ..options.serve.clone() }, Some(options), None)
 }
 
 /// Runs the server alone.
@@ -62,9 +63,9 @@ pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
     let scene = &serve.scene;
     let stepping =
         scene.dt.is_some() || scene.stepper.is_some() || scene.solver.is_some() || scene.integrator.is_some();
-    if serve.record.is_some() || users || stepping {
+    if serve.record.is_some() || users || stepping || serve.contacts {
         return Err(Failure::input(
-            "a replay shows what was recorded; --record, --user-colliders, --tracker, --replay-input, --dt, --stepper, --solver and --integrator go with tumble cave",
+            "a replay shows what was recorded; --record, --user-colliders, --tracker, --replay-input, --contacts, --dt, --stepper, --solver and --integrator go with tumble cave",
         ));
     }
     server::run(serve, Some(&options.cave), Some(&options.file))

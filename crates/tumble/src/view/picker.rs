@@ -46,7 +46,7 @@ impl Picker {
 
     /// Pulls during the next step.
     pub fn pull(&self, world: &mut World) -> Result<(), WorldError> {
-        world.pick(&self.force).map(drop)
+        self.force.apply(world).map(drop)
     }
 
     /// Returns the body's name, the picked point and the target, world axes, m.

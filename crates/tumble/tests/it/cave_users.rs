@@ -300,3 +300,35 @@ fn a_recording_is_shown_again_bit_by_bit_also_when_it_was_cut() {
     let wrong = String::from_utf8_lossy(&out.stderr);
     assert!(out.status.code() == Some(2) && wrong.contains("the recording is of a scene with the hash"), "{wrong}");
 }
+
+/// Gravity presses a ball against a wall: facets draw the contact, and so does the replay.
+#[test]
+fn contacts_are_drawn_in_a_cave_and_in_its_replay() {
+    let (folder, _, cave) = place("cave-contacts");
+    if tumble::render::Renderer::new().is_err() {
+        let _ = std::io::Write::write_fmt(
+            &mut std::io::stderr(),
+            format_args!("\nSKIPPED: this machine has no graphics adapter\n"),
+        );
+        return;
+    }
+    let wall = "[[body]]\nname = \"wall\"\nmode = \"static\"\nshape = { type = \"box\", size_m = [1, 0.2, 1] }\nposition_m = [0, 2.299, 1]\n[cave]";
+    let scene = folder.write("wall.toml", SCENE.replace("[cave]", wall).replace("= [0, 0, 0]\n[[body]]", "= [0, 9.81, 0]\n[[body]]"));
+    let path = |name: &str| text(&folder.path(name));
+    let run = |args: &[&str]| {
+        let common = [&scene[..], "--cave", &cave, "--duration", "0.05", "--no-realtime", "--quiet", "--offscreen"];
+        let out = in_place(&folder, &[args, &common].concat()).output().unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    };
+    let images = |name: &str| -> Vec<serde_json::Value> {
+        let text = std::fs::read_to_string(folder.path(name).join("f").join("frames.jsonl")).unwrap();
+        text.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap()["image"].clone()).collect()
+    };
+    run(&["cave", "--log-dir", &path("plain")]);
+    run(&["cave", "--log-dir", &path("drawn"), "--debug-draw", "contacts,forces", "--record", &path("run.mcap")]);
+    run(&["replay", &path("run.mcap"), "--log-dir", &path("again"), "--debug-draw", "contacts,forces"]);
+    let (plain, drawn, again) = (images("plain"), images("drawn"), images("again"));
+    assert_eq!(plain.len(), drawn.len());
+    assert!(plain.last() != drawn.last() && plain.len() > 3, "the contact is in the picture");
+    assert_eq!(drawn, again);
+}

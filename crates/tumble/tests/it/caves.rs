@@ -121,6 +121,17 @@ fn what_is_wrong_with_a_cave_ends_with_code_2_before_anything_runs() {
     assert!(fail(&["caves", "--pattern", "grid"], 2).contains("--cave"));
 }
 
+/// Facets have poses and contacts; overlays that need the simulation are refused.
+#[test]
+fn an_overlay_that_a_facet_cannot_draw_is_refused() {
+    for word in ["velocities", "contacts,islands", "sleep"] {
+        let said = fail(&["cave", "stack", "--cave", "cube4", "--debug-draw", word], 2);
+        assert!(said.contains("a facet of a cave cannot draw") && said.contains("frames"), "{said}");
+    }
+    let said = fail(&["cave", "stack", "--cave", "cube4", "--debug-draw", "smoke"], 2);
+    assert!(said.contains("no overlay 'smoke'"), "{said}");
+}
+
 #[test]
 fn facets_have_their_size_and_unfolded_caves_fit() {
     let folder = Folder::new("cave-pictures");

@@ -76,6 +76,8 @@ pub struct ServerOptions {
     pub resend_interval: Option<Duration>,
     /// Number of the first frame.
     pub first_frame: u64,
+    /// Largest number of contacts that are sent with a frame ([`Publisher::with_contacts`]); 0 by default.
+    pub contacts: usize,
 }
 
 impl ServerOptions {
@@ -93,6 +95,7 @@ impl ServerOptions {
             history: 8,
             resend_interval: None,
             first_frame: 0,
+            contacts: 0,
         }
     }
 }
@@ -264,8 +267,9 @@ impl ServerSession {
             present_requested: None,
         };
         let facets = options.slots.iter().map(facet_state).collect();
+        let contacts = options.contacts;
         let stream = |exact| Stream {
-            publisher: Publisher::new(base, exact, 0),
+            publisher: Publisher::new(base, exact, 0).with_contacts(contacts),
             snapshot: Arc::default(),
             listed: None,
             state: Arc::default(),

@@ -4,7 +4,7 @@ use super::simulated_session::{scene, viewer};
 use std::sync::Arc;
 use tumble_core::collide::TriMesh;
 use tumble_core::collide::{Pose, Quat, Shape, Vec3};
-use tumble_core::{Appearance, Drawn, Mode, Object, RigidBody, Visual, VisualMesh, World};
+use tumble_core::{Appearance, ContactPoint, Drawn, Mode, Object, RigidBody, Visual, VisualMesh, World};
 use tumble_net::sync::quantize::{POSITION_ERROR_M, ROTATION_ERROR_RAD};
 use tumble_net::sync::wire::MessageError;
 use tumble_net::sync::{Mirror, Publisher, VIEWER_NAME};
@@ -326,4 +326,69 @@ fn the_hash_of_a_scene_does_not_see_folders() {
     };
     assert_eq!(hash("one/scenes/wood.png"), hash("elsewhere/wood.png"));
     assert_ne!(hash("one/scenes/wood.png"), hash("one/scenes/felt.png"));
+}
+
+/// A heavy and a light ball rest on the ground: their contacts are sent in single precision, or only the one with the larger force.
+#[test]
+fn contacts_are_sent_up_to_a_number() {
+    let scene = || {
+        let mut world = World::default();
+        world.add(RigidBody::fixed(Shape::half_space()).with_name("ground")).unwrap();
+        for (name, mass) in [("light", 1.0), ("heavy", 2.0)] {
+            let body = RigidBody::new(Shape::sphere(0.1).unwrap()).with_name(name).with_mass(mass);
+            world.add(body.with_pose(Pose::translation(mass, 0.0, 0.1))).unwrap();
+        }
+        world
+    };
+    for (max, wanted) in [(0, &[][..]), (1, &["heavy"]), (usize::MAX, &["light", "heavy"])] {
+        let publisher = Publisher::new(&scene(), false, 0).with_contacts(max);
+        let mut pair = Pair { world: scene(), publisher, mirror: Mirror::new(scene()), frame: 0 };
+        for _ in 0..240 {
+            pair.world.step().unwrap();
+        }
+        pair.send();
+        let (here, there) = (&pair.world, pair.mirror.world());
+        let of = |world: &World, name: &str| *world.contacts_of(world.find(name).unwrap()).next().unwrap();
+        let name = |c: &ContactPoint| [c.a, c.b].map(|id| there.name(id).unwrap().to_string());
+        assert_eq!(there.contacts().len(), wanted.len());
+        for (contact, wanted) in there.contacts().iter().zip(wanted) {
+            assert!(name(contact).contains(&wanted.to_string()) && name(contact).contains(&"ground".to_string()));
+            let sent = of(here, wanted);
+            assert!((contact.force - sent.force).amax() < 2e-6 * sent.force.amax() && sent.force.norm() > 9.0);
+            assert!((contact.point - sent.point).amax() < 1e-6 && (contact.normal - sent.normal).amax() < 1e-6);
+            assert!((contact.depth - sent.depth).abs() < 1e-6);
+        }
+        // the next frame has none
+        let heavy = pair.world.find("heavy").unwrap();
+        let light = pair.world.find("light").unwrap();
+        for id in [heavy, light] {
+            pair.world.set_pose(id, Pose::translation(0.0, 0.0, if id == heavy { 50.0 } else { 70.0 })).unwrap();
+        }
+        pair.world.step().unwrap();
+        pair.send();
+        assert!(pair.mirror.world().contacts().is_empty());
+    }
+}
+
+/// A contact of an unknown object or part, a number that is not finite, or a wrong count: nothing is applied.
+#[test]
+fn wrong_contacts_are_refused_with_their_frame() {
+    let mut pair = Pair::new(false);
+    pair.send();
+    pair.world.step().unwrap();
+    let mut good = pair.publisher.publish(&pair.world, &viewer(1), 2).unwrap().state;
+    let before = pair.mirror.hash();
+    good.truncate(good.len() - 4); // the count, 0
+    let entry = |object: u32, part: u32, x: f32| {
+        let indices = [object, part, 0, 0].map(u32::to_le_bytes).concat();
+        [&1u32.to_le_bytes()[..], &indices, &[x; 10].map(f32::to_le_bytes).concat()].concat()
+    };
+    let cut = entry(0, 0, 1.0)[..59].to_vec();
+    let many = 257u32.to_le_bytes().to_vec();
+    for bad in [entry(99, 0, 1.0), entry(0, 7, 1.0), entry(0, 0, f32::NAN), cut, many, vec![], vec![0; 5]] {
+        assert!(pair.mirror.apply_state(2, 0.5, &[&good[..], &bad].concat()).is_err());
+        assert!(pair.mirror.hash() == before && pair.mirror.frame() == 1);
+    }
+    pair.mirror.apply_state(2, 0.5, &[&good[..], &entry(0, 0, 1.0)].concat()).unwrap();
+    assert_eq!(pair.mirror.world().contacts().len(), 1);
 }

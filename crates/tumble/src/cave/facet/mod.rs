@@ -47,8 +47,12 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     let (mut render_thread, mut window_setup) = (None, None);
     match (draw.no_pictures, offscreen) {
         (true, _) => {}
-        (false, true) => render_thread = Some(RenderThread::new(&setup, description.as_ref(), draw.quality)?),
-        (false, false) => window_setup = Some(WindowSetup::new(&setup, description.as_ref(), draw.quality)?),
+        (false, true) => {
+            render_thread = Some(RenderThread::new(&setup, description.as_ref(), draw.quality, draw.debug_draw.draw)?)
+        }
+        (false, false) => {
+            window_setup = Some(WindowSetup::new(&setup, description.as_ref(), draw.quality, draw.debug_draw.draw)?)
+        }
     }
     let mut control = FacetControl {
         name: name.clone(),

@@ -27,13 +27,19 @@ struct RenderRequest {
 pub struct RenderThread {
     drawing: Drawing,
     quality: Option<Quality>,
+    overlays: DebugDraw,
     requests: SyncSender<RenderRequest>,
     pictures: Receiver<Result<Image, RenderError>>,
 }
 
 impl RenderThread {
     /// Starts the thread for a facet, or for all facets unfolded if there is none.
-    pub fn new(setup: &RunSetup, facet: Option<&Facet>, quality: Option<Quality>) -> Result<RenderThread, Failure> {
+    pub fn new(
+        setup: &RunSetup,
+        facet: Option<&Facet>,
+        quality: Option<Quality>,
+        overlays: DebugDraw,
+    ) -> Result<RenderThread, Failure> {
         let (view, facet) = (setup.view()?, facet.cloned());
         let (requests, incoming) = sync_channel::<RenderRequest>(1);
         let (done, pictures) = sync_channel(1);
@@ -53,7 +59,8 @@ impl RenderThread {
             })
             .map_err(|e| Failure::run("drawing", e))?;
         started.recv().map_err(|e| Failure::run("drawing", e))?.map_err(|e| Failure::run("drawing", e))?;
-        let mut render_thread = RenderThread { drawing: Drawing::new(&setup.scene), quality, requests, pictures };
+        let mut render_thread =
+            RenderThread { drawing: Drawing::new(&setup.scene), quality, overlays, requests, pictures };
         // the first picture takes seconds to compile pipelines, and nothing waits for it yet
         render_thread.begin(&setup.world, &setup.viewer()?, None)?;
         while render_thread.finished(Duration::from_secs(1))?.is_none() {}
@@ -62,7 +69,7 @@ impl RenderThread {
 
     /// Starts a picture of the world, with the frame number in it if `burn_in` is given.
     pub fn begin(&mut self, world: &World, viewer: &Viewer, burn_in: Option<u64>) -> Result<(), Failure> {
-        let list = draw_list(&mut self.drawing, world, self.quality.as_ref())?;
+        let list = draw_list(&mut self.drawing, world, self.quality.as_ref(), &self.overlays)?;
         self.requests
             .send(RenderRequest { list, viewer: viewer.clone(), burn_in })
             .map_err(|_| Failure::run("drawing", "the render thread has ended"))
@@ -79,8 +86,13 @@ impl RenderThread {
 }
 
 /// Makes the draw list of a picture of a cave.
-pub fn draw_list(drawing: &mut Drawing, world: &World, quality: Option<&Quality>) -> Result<DrawList, Failure> {
-    let mut list = drawing.list(world, &DebugDraw::default()).map_err(|e| Failure::run("drawing", e))?;
+pub fn draw_list(
+    drawing: &mut Drawing,
+    world: &World,
+    quality: Option<&Quality>,
+    overlays: &DebugDraw,
+) -> Result<DrawList, Failure> {
+    let mut list = drawing.list(world, overlays).map_err(|e| Failure::run("drawing", e))?;
     if let Some(quality) = quality {
         quality.apply(&mut list.settings);
     }

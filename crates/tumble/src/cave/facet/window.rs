@@ -15,7 +15,9 @@ use tumble::dynamics::World;
 use tumble::net::sync::{Input, Task, WaitReason};
 use tumble::render::winit::event::{ElementState, MouseButton, WindowEvent};
 use tumble::render::winit::keyboard::{KeyCode, PhysicalKey};
-use tumble::render::{DrawList, Drawing, Next, Quality, Screen, WindowApp, WindowOptions, caption, run_window};
+use tumble::render::{
+    DebugDraw, DrawList, Drawing, Next, Quality, Screen, WindowApp, WindowOptions, caption, run_window,
+};
 use tumble::scene::cave::{Facet, Output};
 
 /// Wait for a message between two polls of the window's input.
@@ -28,13 +30,19 @@ pub struct WindowSetup {
     view_mode: ViewMode,
     drawing: Drawing,
     quality: Option<Quality>,
+    overlays: DebugDraw,
     options: WindowOptions,
     user: u16,
 }
 
 impl WindowSetup {
     /// Prepares the window of a facet, or of all facets if there is none.
-    pub fn new(setup: &RunSetup, facet: Option<&Facet>, quality: Option<Quality>) -> Result<WindowSetup, Failure> {
+    pub fn new(
+        setup: &RunSetup,
+        facet: Option<&Facet>,
+        quality: Option<Quality>,
+        overlays: DebugDraw,
+    ) -> Result<WindowSetup, Failure> {
         let view = Box::new(setup.view()?);
         let title = format!("tumble: {} on {}", setup.scene.file, slot_name(facet));
         let plain = WindowOptions::new(title, view.size_px(facet, PREVIEW_PX));
@@ -49,7 +57,7 @@ impl WindowSetup {
             Some(facet) => ViewMode::Facet(view, Box::new(facet.clone())),
             None => ViewMode::Unfolded(view),
         };
-        Ok(WindowSetup { view_mode, drawing: Drawing::new(&setup.scene), quality, options, user })
+        Ok(WindowSetup { view_mode, drawing: Drawing::new(&setup.scene), quality, overlays, options, user })
     }
 
     /// Opens the window and runs the facet until the run ends or the window is closed.
@@ -95,7 +103,8 @@ impl Window<'_> {
         let Some(frame) = self.runner.facet.begin() else { return Ok(()) };
         let (world, viewer): (&World, _) = (self.runner.facet.world(), self.runner.facet.viewer());
         let time_s = world.time();
-        self.list = draw_list(&mut self.window_setup.drawing, world, self.window_setup.quality.as_ref())?;
+        let WindowSetup { drawing, quality, overlays, .. } = &mut self.window_setup;
+        self.list = draw_list(drawing, world, quality.as_ref(), overlays)?;
         let (ViewMode::Facet(view, _) | ViewMode::Unfolded(view)) = &mut self.window_setup.view_mode else {
             return Ok(());
         };
@@ -182,8 +191,10 @@ impl WindowApp for Window<'_> {
         self.window_setup.quality.get_or_insert(default);
         // the first picture takes seconds to compile pipelines; the server does not know this facet
         // yet
-        self.list =
-            draw_list(&mut self.window_setup.drawing, self.runner.facet.world(), self.window_setup.quality.as_ref())?;
+        self.list = {
+            let WindowSetup { drawing, quality, overlays, .. } = &mut self.window_setup;
+            draw_list(drawing, self.runner.facet.world(), quality.as_ref(), overlays)?
+        };
         self.window_setup.view_mode.draw(screen, &self.list)?;
         Ok(screen.renderer().wait()?)
     }

@@ -361,6 +361,12 @@ fn parent_watch(launcher: &CaveOptions, name: &str, address: &ServerAddress) -> 
     args.extend(folder("--frames-dir", &draw.frames_dir));
     args.extend(folder("--log-dir", &draw.log_dir));
     args.extend(draw.quality.iter().flat_map(|q| ["--quality".to_owned(), q.to_string()]));
+    args.extend(
+        Some(draw.debug_draw.to_string())
+            .filter(|w| !w.is_empty())
+            .iter()
+            .flat_map(|w| ["--debug-draw".to_owned(), w.clone()]),
+    );
     let switches = [("--burn-in", draw.burn_in), ("--offscreen", draw.offscreen), ("--no-pictures", draw.no_pictures)];
     args.extend(switches.iter().filter(|(_, on)| *on).map(|(name, _)| (*name).to_owned()));
     // the launcher times out before its facets

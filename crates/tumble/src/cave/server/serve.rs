@@ -26,7 +26,7 @@ use tumble::net::sync::shm::{ShmServer, clean_up};
 use tumble::net::sync::transport::FacetNumber;
 use tumble::net::sync::udp::{Entropy, UdpServer};
 use tumble::net::sync::{
-    FacetSlot, Input, Server, ServerEvent, ServerOptions, SessionError, SessionRecorder, SyncMode,
+    FacetSlot, Input, MAX_CONTACTS, Server, ServerEvent, ServerOptions, SessionError, SessionRecorder, SyncMode,
 };
 use tumble::scene::cave::{Cave, Mode};
 
@@ -111,6 +111,7 @@ fn session_options(options: &ServeOptions, setup: &RunSetup, run: u64, slots: &[
         first_frame_timeout: wait,
         drop_timeout: ms(sync.drop_timeout_ms),
         history: sync.history_frames as usize,
+        contacts: if options.contacts { MAX_CONTACTS } else { 0 },
         ..ServerOptions::new(run, setup.join_hash, slots.to_vec())
     }
 }

@@ -109,7 +109,7 @@ impl Users {
             }
             if let Some(held) = self.held.get_mut(&device) {
                 held.pull.target = origin + direction * held.distance;
-                world.pick(&held.pull).map_err(failed)?;
+                held.pull.apply(world).map_err(failed)?;
             }
         }
         self.colliders.follow_users(&self.viewer, |user| self.hands(user), world, dt).map_err(failed)

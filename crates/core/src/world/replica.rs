@@ -1,0 +1,92 @@
+//! A world that shows what another process simulates (thesis §IV.A.6). Nothing in here steps.
+
+use super::{ContactPoint, World, WorldError};
+use crate::object::SyncError;
+use crate::object::part_state::PartState;
+use crate::world::view::ObjectId;
+use tumble_collide::Pose;
+
+/// The reason why an object refused a message. The world is unchanged.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReplicaError {
+    /// No such object, or no such part.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// The object refuses the message.
+    #[error("'{name}': {why}")]
+    Message {
+        /// Object.
+        name: String,
+        /// Its reason.
+        why: SyncError,
+    },
+    /// The object cannot be kept in step: it has no `NetSync`.
+    #[error("'{0}' cannot be kept in step by messages")]
+    NotSynchronizable(String),
+}
+
+/// Access to a world that shows what another process, or a recording, has simulated. It is drawn and never stepped: its next step or change
+/// of state would put everything back to where its own state says.
+pub struct Replica<'w>(&'w mut World);
+
+impl World {
+    /// Lends the world as a replica of another one.
+    pub fn replica(&mut self) -> Replica<'_> {
+        Replica(self)
+    }
+}
+
+impl Replica<'_> {
+    /// Shows an object's parts at these poses, one per part, at rest.
+    ///
+    /// # Errors
+    /// [`WorldError`]: the object was removed, the count of poses is not that of its parts, or a pose is not finite.
+    pub fn set_poses(&mut self, id: ObjectId, poses: &[Pose]) -> Result<(), WorldError> {
+        let core = &mut self.0.core;
+        let entry = core.table.get(id).ok_or(WorldError::Stale)?;
+        let (name, parts) = (&entry.name, entry.state_range.parts.clone());
+        if poses.len() != parts.len() {
+            return Err(WorldError::NoPart { name: name.to_string(), part: poses.len().min(parts.len()) });
+        }
+        if poses.iter().any(|p| !p.translation.vector.iter().chain(p.rotation.coords.iter()).all(|x| x.is_finite())) {
+            return Err(WorldError::NotFinite(name.to_string()));
+        }
+        for (part_state, pose) in core.derived.part_states[parts].iter_mut().zip(poses) {
+            *part_state = PartState { pose: *pose, ..PartState::default() };
+        }
+        Ok(())
+    }
+
+    /// Applies a message of the object's copy elsewhere (thesis `ReadData`). The message is not trusted: numbers that are no state of the object
+    /// are refused.
+    ///
+    /// # Errors
+    /// [`ReplicaError`]: the object was removed, takes no messages, or refuses this one.
+    pub fn read_data(&mut self, id: ObjectId, data: &[u8]) -> Result<(), ReplicaError> {
+        self.0.core.wake(id);
+        let core = &mut self.0.core;
+        let entry = core.table.get(id).ok_or(WorldError::Stale)?;
+        let name = || entry.name.to_string();
+        let sync = entry.object.net_sync().ok_or_else(|| ReplicaError::NotSynchronizable(name()))?;
+        sync.read_data(data, &mut core.state.x[entry.state_range.x.clone()])
+            .map_err(|why| ReplicaError::Message { name: name(), why })?;
+        core.integration().refresh_one(id);
+        Ok(())
+    }
+
+    /// Shows a simulated time, s. A time that is not finite is left out.
+    pub fn set_time(&mut self, time: f64) {
+        if time.is_finite() {
+            self.0.core.state.time = time;
+        }
+    }
+
+    /// Shows contacts as those of the last step. Contacts of objects that are not in the world are left out.
+    pub fn set_contacts(&mut self, contacts: impl IntoIterator<Item = ContactPoint>) {
+        let core = &mut self.0.core;
+        core.contacts.clear();
+        let present = |c: &ContactPoint| core.table.place(c.a).is_some() && core.table.place(c.b).is_some();
+        core.contacts.extend(contacts.into_iter().filter(present));
+    }
+}

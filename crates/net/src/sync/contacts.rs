@@ -1,0 +1,77 @@
+//! Contacts in a STATE message, for overlays of facets.
+//!
+//! ```text
+//! count u32 | count times: object a u32, part u32, object b u32, part u32, point 3 f32, normal 3 f32, depth f32, force 3 f32
+//! ```
+//!
+//! Objects are indices of the object table; the normal points from b to a, and the force acts on a (N, m, world axes). Contacts with
+//! objects that are not in the table are left out. A facet shows them and computes nothing with them.
+
+use super::wire::{ByteReader, MessageError};
+use std::collections::BTreeMap;
+use tumble_collide::Vec3;
+use tumble_core::{ContactPoint, ObjectId, World};
+
+/// Maximum number of contacts in a message: those with the largest forces.
+pub const MAX_CONTACTS: usize = 256;
+
+/// Appends these contacts. `index` has the place of each object in the table.
+pub(crate) fn put_contacts<'a>(
+    out: &mut Vec<u8>,
+    contacts: impl IntoIterator<Item = &'a ContactPoint>,
+    index: &BTreeMap<ObjectId, u32>,
+) {
+    let start = out.len();
+    out.extend([0; 4]);
+    let mut count = 0u32;
+    for c in contacts {
+        let (Some(a), Some(b)) = (index.get(&c.a), index.get(&c.b)) else { continue };
+        out.extend([*a, c.part_a as u32, *b, c.part_b as u32].iter().flat_map(|i| i.to_le_bytes()));
+        let numbers = c.point.iter().chain(&c.normal).chain([&c.depth]).chain(&c.force);
+        out.extend(numbers.flat_map(|x| (*x as f32).to_le_bytes()));
+        count += 1;
+    }
+    out[start..start + 4].copy_from_slice(&count.to_le_bytes());
+}
+
+/// Reads the contacts of a message. `ids` are the objects of the table; the viewer has none.
+///
+/// # Errors
+/// [`MessageError::Malformed`].
+pub(crate) fn get_contacts(
+    bytes: &[u8],
+    ids: &[Option<ObjectId>],
+    world: &World,
+) -> Result<Vec<ContactPoint>, MessageError> {
+    let mut rest = ByteReader(bytes);
+    let count = rest.u32()? as usize;
+    if count > MAX_CONTACTS {
+        return Err(MessageError::Malformed("more than 256 contacts"));
+    }
+    let mut contacts = Vec::with_capacity(count);
+    for _ in 0..count {
+        let (a, part_a) = part(&mut rest, ids, world)?;
+        let (b, part_b) = part(&mut rest, ids, world)?;
+        let (point, normal, depth, force) =
+            (vector(&mut rest)?, vector(&mut rest)?, number(&mut rest)?, vector(&mut rest)?);
+        let (velocity, impulse) = (Vec3::zeros(), Vec3::zeros());
+        contacts.push(ContactPoint { a, part_a, b, part_b, point, normal, depth, velocity, impulse, force });
+    }
+    rest.end()?;
+    Ok(contacts)
+}
+
+fn part(rest: &mut ByteReader<'_>, ids: &[Option<ObjectId>], world: &World) -> Result<(ObjectId, usize), MessageError> {
+    let (object, part) = (rest.u32()? as usize, rest.u32()? as usize);
+    let id = ids.get(object).copied().flatten().filter(|&id| world.part_state(id, part).is_some());
+    id.map(|id| (id, part)).ok_or(MessageError::Malformed("a contact of an unknown part"))
+}
+
+fn number(rest: &mut ByteReader<'_>) -> Result<f64, MessageError> {
+    let x = f32::from_le_bytes(rest.array()?);
+    if x.is_finite() { Ok(x.into()) } else { Err(MessageError::Malformed("a number that is not finite")) }
+}
+
+fn vector(rest: &mut ByteReader<'_>) -> Result<Vec3, MessageError> {
+    Ok(Vec3::new(number(rest)?, number(rest)?, number(rest)?))
+}
