@@ -313,7 +313,8 @@ fn contacts_are_drawn_in_a_cave_and_in_its_replay() {
         return;
     }
     let wall = "[[body]]\nname = \"wall\"\nmode = \"static\"\nshape = { type = \"box\", size_m = [1, 0.2, 1] }\nposition_m = [0, 2.299, 1]\n[cave]";
-    let scene = folder.write("wall.toml", SCENE.replace("[cave]", wall).replace("= [0, 0, 0]\n[[body]]", "= [0, 9.81, 0]\n[[body]]"));
+    let scene = folder
+        .write("wall.toml", SCENE.replace("[cave]", wall).replace("= [0, 0, 0]\n[[body]]", "= [0, 9.81, 0]\n[[body]]"));
     let path = |name: &str| text(&folder.path(name));
     let run = |args: &[&str]| {
         let common = [&scene[..], "--cave", &cave, "--duration", "0.05", "--no-realtime", "--quiet", "--offscreen"];
