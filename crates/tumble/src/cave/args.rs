@@ -119,7 +119,7 @@ impl std::str::FromStr for FacetOverlays {
     fn from_str(words: &str) -> Result<FacetOverlays, String> {
         if let Some(word) = words.split(',').map(str::trim).find(|w| ["velocities", "islands", "sleep"].contains(w)) {
             return Err(format!(
-                "a facet of a cave cannot draw {word}; wanted contacts, normals, forces, joints, frames, tree=LEVEL or all"
+                "a facet of a cave cannot draw {word}; expected contacts, normals, forces, joints, frames, tree=LEVEL or all"
             ));
         }
         let Overlays(draw) = words.parse().map_err(|e: UnknownOverlay| e.to_string())?;
@@ -152,8 +152,8 @@ pub struct DrawOptions {
     /// windows with a software driver).
     #[arg(long, value_name = "NAME")]
     pub quality: Option<Quality>,
-    /// Overlays: contacts, normals, forces (the server sends them with --contacts, which `tumble cave`
-    /// implies), joints, frames, tree=LEVEL, all; separated by commas.
+    /// Overlays: contacts, normals, forces, joints, frames, tree=LEVEL, all; separated by commas. The
+    /// first three need a server that sends contacts, as that of `tumble cave` then does.
     #[arg(long, value_name = "WHAT", default_value = "")]
     pub debug_draw: FacetOverlays,
     /// Draw into memory even if there is a display.
