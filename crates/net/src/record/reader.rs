@@ -177,7 +177,7 @@ impl Reader {
         }
         let version = entries.remove("version").unwrap_or_default();
         if version != VERSION.to_string() {
-            let why = format!("its version is \"{version}\", and {VERSION} is what is read here");
+            let why = format!("its version is \"{version}\"; expected {VERSION}");
             return Err(RecordError::NotARecording { path: self.container.path().to_owned(), why });
         }
         self.world = Some(entries.remove("world").unwrap_or_default());
@@ -277,7 +277,7 @@ impl Reader {
         let State { version, frame, time_s, payload, contacts } =
             State::decode(data).map_err(|e| format!("state: {e}"))?;
         if version != VERSION {
-            return Err(format!("state of version {version}, {VERSION} is what is read here"));
+            return Err(format!("state of version {version}; expected {VERSION}"));
         }
         if !(0.0..=MAX_TIME_S).contains(&time_s) || nanoseconds(time_s) != log_time {
             return Err(format!("frame {frame} is of time {time_s} s, but was logged at {log_time} ns"));
