@@ -7,8 +7,6 @@ Looks at every file that git tracks or would track, and prints each fault as `fi
 - No doc comment of Rust begins with "What", "Who", "Whose", "Where" or "Of".
 - No word that `docs/glossary.md` rules out stands in a page, a comment, a string of Rust or Python, a TOML file or a script.
 - No sentence of the README, ARCHITECTURE.md, CONTRIBUTING.md or `docs/` has more than 45 words.
-
-`--todo` also prints the faults of the files in `TODO`, with their number per entry.
 """
 
 import io
@@ -47,13 +45,6 @@ FORMER = (
     "tests/migrate/",
     "crates/scene/src/parse/renamed.rs",
     "crates/scene/tests/it/bad_input.rs",
-)
-# Files and folders whose words are not clean yet. Remove an entry when `--todo` counts no fault in it.
-TODO = (
-    "crates/core/src/world/mirror.rs",
-    "crates/core/src/world/mod.rs",
-    "crates/core/src/world/pick.rs",
-    "crates/core/src/world/state_memory.rs",
 )
 
 
@@ -317,7 +308,6 @@ def main():
     functions = {found for text in sources for found in re.findall(r"\bfn (\w+)", text)}
     pages = [documentation(text) for text in sources]
     rules = rules_of((ROOT / GLOSSARY).read_text())
-    todo = {entry: [] for entry in TODO}
     pages_checked = 0
     for name in names:
         text = text_of(name)
@@ -327,17 +317,15 @@ def main():
         for number, line in enumerate(lines, 1):
             for path in MACHINE.findall(line) if name != "scripts/check_docs.py" else ():
                 faults.append(f"{name}:{number}: the path {path or line.strip()} is of one machine")
-        entry = next((entry for entry in TODO if name.startswith(entry)), None)
-        found = faults if entry is None else todo[entry]
         if not name.startswith(FORMER):
-            check_words(name, text, rules, found)
+            check_words(name, text, rules, faults)
             if name.endswith(".rs"):
-                check_doc_comments(name, lines, found)
+                check_doc_comments(name, lines, faults)
         if BOOK.fullmatch(name):
-            check_sentences(name, text, found)
-            check_sources(name, lines, found if name != "docs/references.md" else [])
+            check_sentences(name, text, faults)
+            check_sources(name, lines, faults if name != "docs/references.md" else [])
         if name in NAMING:
-            check_names(name, lines, identifiers, found)
+            check_names(name, lines, identifiers, faults)
         if name.endswith(".md"):
             pages_checked += 1
             check_links(name, lines, faults)
@@ -348,8 +336,6 @@ def main():
     for scene in sorted(scenes):
         if not (ROOT / "scenes" / scene / "README.md").exists():
             faults.append(f"scenes/{scene}: no README.md")
-    for entry, found in todo.items() if "--todo" in sys.argv else ():
-        print("\n".join(found), f"{entry}: {len(found)} faults to mend", sep="\n")
     print("\n".join(faults) if faults else f"{pages_checked} pages and {len(names)} files: paths, links, commands and words are right.")
     return 1 if faults else 0
 

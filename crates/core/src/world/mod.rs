@@ -1,4 +1,4 @@
-//! The world: objects in, frames out (the thesis's `Engine`, §IV.B).
+//! The world: holds the objects, their state and the settings, and advances them by frames (`Engine` in the thesis, §IV.B).
 
 mod bodies;
 mod body_view;
@@ -39,65 +39,65 @@ use crate::world::view::{Mode, ObjectId, Placed, Status, Table, WorldView};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Why an object was not added or found.
+/// Reason why a call to a world failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WorldError {
-    /// Names are unique.
+    /// Another object has the name.
     #[error("an object named '{0}' is already in the world; names must be unique")]
     DuplicateName(String),
-    /// Constants of a body are out of range.
+    /// A constant of a body is out of its range.
     #[error("body '{name}': {why}")]
     Body {
-        /// Body.
+        /// Name of the body.
         name: String,
-        /// Which constant, and its range.
+        /// The constant and its range.
         why: BodyError,
     },
-    /// A setting out of range.
+    /// A setting is out of its range.
     #[error(transparent)]
     Settings(#[from] SettingsError),
     /// The id belongs to no object of this world.
     #[error("no such object: it was removed, or belongs to another world")]
     Stale,
-    /// What was asked for needs a rigid body.
+    /// The call needs a rigid body.
     #[error("'{0}' is not a rigid body")]
     NotRigid(String),
-    /// Every collidable part has one row in the site table.
-    #[error("'{name}' has {parts} collidable parts and {part_states} sites; the numbers must be equal")]
+    /// The object has more or fewer collidable parts than part states.
+    #[error("'{name}' has {parts} collidable parts and {part_states} part states; the numbers must be equal")]
     Parts {
-        /// Object.
+        /// Name of the object.
         name: String,
-        /// Parts that its `Collidable` names.
+        /// Number of parts of its `Collidable`.
         parts: usize,
-        /// Sites that its `StateSizes` name.
+        /// Number of part states in its `StateSizes`.
         part_states: usize,
     },
     /// The object has no such part.
     #[error("'{name}' has no part {part}")]
     NoPart {
-        /// Object.
+        /// Name of the object.
         name: String,
-        /// Part asked for.
+        /// Index of the part.
         part: usize,
     },
-    /// As many numbers are wanted as the object has degrees of freedom.
+    /// The slice does not have one number per degree of freedom of the object.
     #[error("'{name}' has {dof} degrees of freedom, and {given} numbers were given")]
     Freedoms {
-        /// Object.
+        /// Name of the object.
         name: String,
         /// Its degrees of freedom.
         dof: usize,
-        /// Numbers given.
+        /// Length of the slice.
         given: usize,
     },
-    /// Numbers that are no state of this object: wrong length, not finite, or an orientation that is not of unit length.
+    /// The numbers are not a state of this object: wrong length, not finite, or an orientation that is not of unit length.
     #[error(
-        "'{0}': these numbers are no state of it (wrong length, not finite, or an orientation that is not of unit length)"
+        "'{0}': the numbers are not a state of this object (wrong length, not finite, or an orientation that is not of unit length)"
     )]
     BadState(String),
-    /// A number given is not finite.
-    #[error("'{0}': a number given is not finite")]
+    /// A number is not finite.
+    #[error("'{0}': a number is not finite")]
     NotFinite(String),
 }
 
@@ -157,15 +157,15 @@ impl World {
         self.core.solver.name()
     }
 
-    /// The constants in use.
+    /// Returns the settings in use.
     pub fn settings(&self) -> &Settings {
         &self.core.settings
     }
 
-    /// Changes the constants from the next step on.
+    /// Changes the settings from the next step on.
     ///
     /// # Errors
-    /// [`WorldError::Settings`] names a setting that is out of its range; nothing has changed then.
+    /// [`WorldError::Settings`] names a setting that is out of its range. The settings then stay as they are.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), WorldError> {
         settings.validate()?;
         self.core.wake_all();
@@ -173,7 +173,7 @@ impl World {
         Ok(())
     }
 
-    /// Advances by one frame; forces applied for the frame are spent.
+    /// Advances by one frame of [`Settings::dt`] seconds, then clears the forces that were applied for the frame.
     ///
     /// # Errors
     /// [`StepError`]. The world is then as it was before: [`save`](Self::save) writes the same bytes. Forces applied for the frame are
@@ -230,67 +230,67 @@ impl World {
         fits
     }
 
-    /// Everything that the next step reads.
+    /// Returns everything that the next step reads.
     pub(crate) fn state_value(&self) -> &WorldState {
         &self.core.state
     }
 
-    /// Simulated time, s.
+    /// Returns the simulated time, s.
     pub fn time(&self) -> f64 {
         self.core.state.time
     }
 
-    /// Frames stepped since the world was made.
+    /// Returns the number of frames since the world was made.
     pub fn frame(&self) -> u64 {
         self.core.state.frame
     }
 
-    /// The report of the last step.
+    /// Returns the report of the last step.
     pub fn report(&self) -> &StepReport {
         &self.core.report
     }
 
-    /// Shows contacts and a report as those of the last step.
+    /// Sets the contacts and the report of the last step.
     pub(crate) fn publish(&mut self, contacts: Vec<ContactPoint>, report: StepReport) {
         (self.core.contacts, self.core.report) = (contacts, report);
     }
 
-    /// The contacts of the last sub-step.
+    /// Returns the contacts of the last sub-step.
     pub fn contacts(&self) -> &[ContactPoint] {
         &self.core.contacts
     }
 
-    /// The flat state `X`.
+    /// Returns the state `X`: the slices of all objects one after the other, in the order of addition.
     pub fn state(&self) -> &[f64] {
         &self.core.state.x
     }
 
-    /// The site table.
+    /// Returns the state of every part, in the order of addition of the objects.
     pub fn part_states(&self) -> &[PartState] {
         &self.core.derived.part_states
     }
 
-    /// A read-only view, as objects get it.
+    /// Returns the read-only view that objects get.
     pub fn view(&self) -> WorldView<'_> {
         WorldView { implicit: false, ..self.core.view(self.core.state.time) }
     }
 
-    /// Ids in the order in which the objects were added.
+    /// Returns the ids in the order in which the objects were added.
     pub fn ids(&self) -> &[ObjectId] {
         &self.core.table.order
     }
 
-    /// The object of that name.
+    /// Returns the id of the object that has this name.
     pub fn find(&self, name: &str) -> Option<ObjectId> {
         self.names.get(name).copied()
     }
 
-    /// All visuals, object by object in the order of adding.
+    /// Returns all visuals, object by object in the order of addition.
     pub fn visuals(&self) -> impl Iterator<Item = &Visual> {
         self.core.objects().iter().filter_map(|e| e.object.renderable()).flat_map(|renderable| renderable.visuals())
     }
 
-    /// Mechanical energy of everything that moves, J.
+    /// Returns the mechanical energy of all dynamic objects, J.
     pub fn energy(&self) -> Energy {
         let g = self.core.settings.gravity;
         self.moving().fold(Energy::default(), |sum, (x, body)| {
@@ -299,7 +299,7 @@ impl World {
         })
     }
 
-    /// Momentum of everything that moves, about the world's origin.
+    /// Returns the momentum of all dynamic objects: linear, kg·m/s, and angular about the world's origin, kg·m²/s, world axes.
     pub fn momentum(&self) -> Momentum {
         self.moving().fold(Momentum::default(), |sum, (x, body)| {
             let m = body.momentum(x);
@@ -345,7 +345,7 @@ impl World {
         self.add_named(name, object, mode)
     }
 
-    /// Returns a name that no object has. It depends on the objects added so far alone.
+    /// Returns a name that no object has. It depends only on the objects added so far.
     fn new_name(&self, object: &dyn Object) -> String {
         let kind = if object.integratable().is_some() || object.collidable().is_some() {
             "body"
@@ -360,7 +360,7 @@ impl World {
         names.into_iter().find(|name| self.find(name).is_none()).unwrap_or_default() // one of them is free
     }
 
-    /// Adds an object under a name of the caller's choice.
+    /// Adds an object under this name.
     pub(crate) fn add_named(
         &mut self,
         name: String,
@@ -408,10 +408,10 @@ impl World {
         Ok(id)
     }
 
-    /// Removes an object and gives it back; its state goes, and the slices behind it move up.
+    /// Removes an object and returns it. Its slice of the state goes, and the slices behind it move up.
     ///
     /// # Errors
-    /// [`WorldError::Stale`] if it was removed before.
+    /// [`WorldError::Stale`] if the object was removed before.
     pub fn remove(&mut self, id: ObjectId) -> Result<Box<dyn Object>, WorldError> {
         self.core.wake(id);
         let core = &mut self.core;
@@ -438,7 +438,7 @@ impl World {
         Ok(gone.object)
     }
 
-    /// Returns an independent copy: same state, same future.
+    /// Returns an independent copy, which moves as this world does, bit for bit.
     pub fn fork(&self) -> World {
         World::of(self.core.fork(), self.stepper.fork(), self.names.clone())
     }

@@ -3,22 +3,23 @@
 //! ```text
 //! K = Y Yᵀ                        inverse mass of the point, 3 x 3, from test impulses: the same for rigid bodies and links
 //! v⁺ = (v + h ω² d) / (1 + h ω)²   one implicit step of the critically damped spring d̈ = −ω² d − 2 ω ḋ
-//! F = K⁺ (v⁺ − v) / h             the force that gives the point this velocity, were it alone
+//! F = K⁺ (v⁺ − v) / h             the force that gives the point this velocity if no other force acts
 //! C = Z Zᵀ                        inverse inertia of the part, from test couples
-//! τ = C⁺ (w⁺ − w) / h             w⁺ = w / (1 + h ω/2): the grip takes the turning away, which no force at one point can
+//! τ = C⁺ (w⁺ − w) / h             w⁺ = w / (1 + h ω/2): the grip damps the rotation, which a force at one point cannot do
 //! ```
 //!
 //! | symbol | meaning |
 //! |---|---|
-//! | d | from the point to where it is wanted, m |
+//! | d | from the point to its target, m |
 //! | v, w | velocity of the point, angular velocity of the part |
 //! | ω | the spring's frequency, rad/s |
 //! | h | length of a frame, s |
 //! | Y, Z | whitened responses to unit impulses at the point, and to unit couples |
-//! | ⁺ of a matrix | pseudo-inverse: nothing is asked of directions in which the part cannot move |
+//! | ⁺ of a matrix | pseudo-inverse: there is no force along directions in which the part cannot move |
 //!
-//! Stiffness and damping are in proportion to the mass that the point shows, so that a feather and a wrecking ball come to the hand alike, and each of the
-//! implicit steps is stable for any ω h. Under gravity g a body comes to rest g/ω² below the hand.
+//! Stiffness and damping are proportional to the effective mass at the point. A light and a heavy body
+//! therefore follow the hand alike, and the implicit step is stable for any ω h. Under gravity g a
+//! body comes to rest g/ω² below the hand.
 
 use super::{Coordinates, World, WorldError};
 use crate::derived::Cache;
@@ -28,29 +29,29 @@ use crate::world::view::ObjectId;
 use nalgebra::Matrix3;
 use tumble_collide::Vec3;
 
-/// Directions in which the part is this many times harder to move than in the easiest count as closed to it.
+/// The part cannot move along directions of an effective mass that is this many times the smallest.
 const CLOSED: f64 = 1e9;
 
 const AXES: [Vec3; 3] = [Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)];
 
-/// What is pulled, where at, where to, how hard.
+/// A damped spring between a point of a part and a point of the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PickForce {
     /// The object.
     pub id: ObjectId,
-    /// Its part.
+    /// Index of its part.
     pub part: usize,
-    /// The point that is held, in the part's frame, m.
+    /// The held point, in the part's frame, m.
     pub point: Vec3,
-    /// Where it is wanted, world axes, m.
+    /// The target of that point, world frame, m.
     pub target: Vec3,
     /// Frequency of the spring, rad/s, above 0; from rest a distance shrinks to 5 % in 4.7/ω.
     pub frequency: f64,
 }
 
 impl PickForce {
-    /// Applies the force during the next frame. Returns the force, N, and the torque about the point that is held, N·m, world axes; both are zero
-    /// for a part that does not move or that no impulse reaches.
+    /// Applies the force during the next frame. Returns the force, N, and the torque about the held point,
+    /// N·m, world axes. Both are zero if the part does not move.
     ///
     /// # Errors
     /// [`WorldError::Stale`], [`WorldError::NoPart`], [`WorldError::NotFinite`].
@@ -78,8 +79,9 @@ impl PickForce {
     }
 }
 
-/// Returns the whitened responses of a part to unit couples about x, y and z, a row of `dof` numbers each. A couple is a force along the next axis but one
-/// with an arm of 1 m along the next axis, and the opposite force at the origin.
+/// Returns the whitened responses of a part to unit couples about x, y and z, a row of `dof` numbers
+/// each. The couple about an axis is a force along the third axis with an arm of 1 m along the second,
+/// and the opposite force at the origin.
 fn couples(body: &dyn Integratable, cache: &mut Cache, at: &PartPoint, dof: usize) -> Vec<f64> {
     let mut z = vec![0.0; 3 * dof];
     let origin = at.part_state.position();
@@ -91,7 +93,7 @@ fn couples(body: &dyn Integratable, cache: &mut Cache, at: &PartPoint, dof: usiz
     z
 }
 
-/// The pseudo-inverse of `Y Yᵀ`.
+/// Returns the pseudo-inverse of `Y Yᵀ`.
 fn mass(y: &[f64], dof: usize) -> Matrix3<f64> {
     let k = Matrix3::from_fn(|r, c| (0..dof).map(|i| y[r * dof + i] * y[c * dof + i]).sum());
     let mut eigen = k.symmetric_eigen();

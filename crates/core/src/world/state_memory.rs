@@ -1,23 +1,23 @@
-//! The memory of the flat state `X`: one place from one addition or removal of an object to the next.
+//! The memory of the state `X`. Its address changes only when an object is added or removed.
 //!
-//! A program that shows the state to others without copying it, as the Python module does, needs memory that neither moves nor goes away
-//! under a reader. So the numbers are only written in place. When an object is added or removed they move to new memory, and
-//! [holds](StateMemory::hold) keep the old one.
+//! A program that shares the state without copying it, as the Python module does, needs memory that is
+//! not moved or freed under a reader. The world therefore writes the numbers in place. When an object is
+//! added or removed they move to new memory, and [holds](StateMemory::hold) keep the old one.
 
 use super::World;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::ops::{Deref, DerefMut, Range};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A hold on the memory of a state: while it lives that memory is not given back.
+/// A hold on the memory of a state, which is not freed as long as the hold lives.
 #[derive(Debug, Default)]
 pub struct StateMemoryHold {
     /// The memory, after the world has left it.
     left: Mutex<Vec<f64>>,
 }
 
-/// The numbers of the state, the hold on their memory, and that memory while it is put aside. A clone has memory of its own that
-/// nobody holds; `clone_from` writes into the memory that is there.
+/// The numbers of the state, the hold on their memory, and that memory while it is frozen. A clone has
+/// memory of its own without a hold; `clone_from` writes to the present memory.
 #[derive(Debug, Default)]
 pub(crate) struct StateVector {
     numbers: Vec<f64>,
@@ -68,7 +68,7 @@ impl<'de> Deserialize<'de> for StateVector {
 }
 
 impl StateVector {
-    /// Makes room at the end, filled with zeros, or cuts it off.
+    /// Changes the length at the end; new numbers are zero.
     pub fn resize(&mut self, len: usize) {
         if len != self.numbers.len() {
             self.leave(len);
@@ -76,7 +76,7 @@ impl StateVector {
         }
     }
 
-    /// Takes a stretch out.
+    /// Removes a range.
     pub fn cut(&mut self, range: Range<usize>) {
         if !range.is_empty() {
             self.leave(self.numbers.len());
@@ -84,7 +84,7 @@ impl StateVector {
         }
     }
 
-    /// Moves to new memory with room for `room` numbers, if anybody holds this one.
+    /// Moves to new memory with a capacity of `room` numbers if the present memory is held.
     fn leave(&mut self, room: usize) {
         let Some(hold) = self.hold.take().filter(|hold| Arc::strong_count(hold) > 1) else {
             self.aside = None;
@@ -103,27 +103,29 @@ impl StateVector {
 pub struct StateMemory<'w>(&'w mut StateVector);
 
 impl World {
-    /// Lends the memory of the state, for programs that show it without copying it.
+    /// Gives access to the memory of the state, for programs that share it without copying it.
     pub fn state_memory(&mut self) -> StateMemory<'_> {
         StateMemory(&mut self.core.state.x)
     }
 }
 
 impl StateMemory<'_> {
-    /// Keeps the memory in place: every call that moves something writes there, until an object is added or removed or the world is dropped.
-    /// From then on the memory keeps its last numbers for as long as the hold lives. Calls at the same state return the same hold.
+    /// Keeps the memory in place: the world writes there until an object is added or removed or the world
+    /// is dropped. From then on the memory keeps its last numbers as long as the hold lives. Calls between
+    /// two such changes return the same hold.
     pub fn hold(&mut self) -> Arc<StateMemoryHold> {
         self.0.hold.get_or_insert_default().clone()
     }
 
-    /// Returns the address of the state and its count of numbers. It stays valid under a [`hold`](Self::hold). A reader must make sure that
-    /// no call changes the world meanwhile.
+    /// Returns the address of the state and its length. The address stays valid under a
+    /// [`hold`](Self::hold). A reader must not read while a call changes the world.
     pub fn address(&mut self) -> (*const f64, usize) {
         let shown = self.0.aside.as_mut().unwrap_or(&mut self.0.numbers);
         (shown.as_mut_ptr(), shown.len())
     }
 
-    /// Leaves the held memory as it is and works on a copy until [`thaw`](Self::thaw), so that readers see the present state meanwhile.
+    /// Keeps the held memory as it is and works on a copy until [`thaw`](Self::thaw). Readers see the
+    /// present state meanwhile.
     pub fn freeze(&mut self) {
         if self.0.hold.is_some() && self.0.aside.is_none() {
             let copy = self.0.numbers.clone();
@@ -131,7 +133,7 @@ impl StateMemory<'_> {
         }
     }
 
-    /// Writes the state to the held memory, and works there again.
+    /// Writes the state to the held memory and works there again.
     pub fn thaw(&mut self) {
         if let Some(mut shown) = self.0.aside.take() {
             shown.copy_from_slice(&self.0.numbers);
