@@ -19,6 +19,12 @@ use super::clip::Polygon;
 use super::{box_closest, reduce};
 use crate::{Contact, Mat3, NormalFrom, Pose, Vec3};
 
+/// Cosine of the angle between a single contact and a face up to which the points of the face may
+/// follow.
+const FLAT: f64 = 0.9;
+/// Points closer to the contact than this fraction of the smallest half extent are the same.
+const SAME_PLACE: f64 = 0.1;
+
 /// A face axis: which box, which axis, its separation.
 struct FaceAxis {
     of_b: bool,
@@ -63,7 +69,9 @@ fn in_frame_of_a(f: &BoxPair, margin: f64, out: &mut Vec<Contact>) {
     let bias = 1e-3 * smallest + 0.05 * greatest.abs();
     if greatest <= 0.0 {
         match edge {
-            Some(edge) if edge.separation > face.separation + bias => out.push(edge_contact(f, &edge)),
+            Some(edge) if edge.separation > face.separation + bias => {
+                push_with_face(f, edge_contact(f, &edge), &face, margin, out);
+            }
             _ => face_or_support(f, &face, margin, out),
         }
         return;
@@ -73,10 +81,31 @@ fn in_frame_of_a(f: &BoxPair, margin: f64, out: &mut Vec<Contact>) {
     if least > (greatest + bias).min(margin) || face.separation < greatest - bias {
         out.truncate(start);
         match box_closest::closest(f) {
-            Some(contact) if contact.gap <= margin => out.push(contact),
+            Some(contact) if contact.gap <= margin => push_with_face(f, contact, &face, margin, out),
             _ => {}
         }
     }
+}
+
+/// Appends a contact and those points of a face manifold that may follow it: tilted boxes meet at
+/// one point, and turn until they lie flat, within one step if they are fast.
+fn push_with_face(f: &BoxPair, contact: Contact, face: &FaceAxis, margin: f64, out: &mut Vec<Contact>) {
+    out.push(contact);
+    let start = out.len();
+    face_manifold(f, face, margin, out);
+    let same_place = SAME_PLACE * f.a.min().min(f.b.min());
+    let mut n = start;
+    for i in start..out.len() {
+        let other = out[i];
+        let follows = other.gap > contact.gap
+            && other.normal.dot(&contact.normal) > FLAT
+            && (other.point - contact.point).norm() > same_place;
+        if follows {
+            out[n] = other;
+            n += 1;
+        }
+    }
+    out.truncate(n);
 }
 
 /// Returns the face axis of greatest separation (A's unless B's is greater by `bias`); `None` if

@@ -172,3 +172,30 @@ fn an_edge_just_within_the_margin_is_not_missed() {
     // parry: 0.24936547
     assert!(found.len() == 1 && (found[0].gap - 0.24936547).abs() < 1e-6, "{found:?}");
 }
+
+/// A box that is tilted by an angle about two axes meets a face with one corner. The other corners
+/// of its lower side are contacts too if they are within the margin, with their distances from the
+/// face.
+#[test]
+fn corners_of_a_tilted_box_follow_the_one_that_touches() {
+    let (base, cube) = (Shape::cuboid(Vec3::new(2.0, 2.0, 1.0)).unwrap(), Shape::cuboid(Vec3::repeat(0.2)).unwrap());
+    for angle in [1e-4, 1e-3, 0.01, 0.1, 0.3] {
+        for gap in [-1e-4, 1e-5, 0.01] {
+            let tilt = Vec3::new(angle, -0.7 * angle, 0.0);
+            let corners = |pose: &Pose| {
+                [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]]
+                    .map(|[x, y]| pose * nalgebra::Point3::new(0.1 * x, 0.1 * y, -0.1))
+            };
+            let lowest = corners(&turned(0.0, 0.0, 0.0, tilt)).iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+            let pose = turned(0.3, 0.2, 0.5 - lowest + gap, tilt);
+            let found = query(&cube, &pose, &base, &at(0.0, 0.0, 0.0), 0.2);
+            assert_eq!(found.len(), 4, "angle {angle}, gap {gap}: {found:?}");
+            for corner in corners(&pose) {
+                let near = found.iter().find(|c| (c.point.xy() - corner.xy().coords).norm() < 1e-3 + 0.5 * angle * 0.2);
+                let contact =
+                    near.unwrap_or_else(|| panic!("angle {angle}, gap {gap}: no contact at {corner}: {found:?}"));
+                assert!((contact.gap - (corner.z - 0.5)).abs() < 1e-3 * angle, "{contact:?} at {corner}");
+            }
+        }
+    }
+}

@@ -200,8 +200,9 @@ impl MovingPair<'_> {
     }
 }
 
-/// Replaces every contact of fast convex parts that is open and closes within `h` by the contact at
-/// the time of impact. Removes those that do not close on the way.
+/// Replaces the contacts of fast convex parts that close within `h` by those at the time at which
+/// the parts meet: the first contact, and the others of that place that may follow it in the rest
+/// of the step. Removes contacts that do not close on the way.
 pub(crate) fn time_contacts(
     objects: Objects,
     (owners, part_states): (&[Owner], &[PartState]),
@@ -209,35 +210,80 @@ pub(crate) fn time_contacts(
     h: f64,
     contact_constraints: &mut Vec<ContactConstraint>,
 ) {
-    let mut found = Vec::new();
     let part = |index: u32| {
         let owner = owners[index as usize];
         let body: &dyn Collidable = objects.at(owner.place as usize).object.collidable()?;
         Some((body.shape(owner.part as usize)?, body.contact_mode(owner.part as usize)))
     };
-    contact_constraints.retain_mut(|constraint| {
-        let states = [constraint.a, constraint.b].map(|index| &part_states[index as usize]);
-        let (Some((a, mode_a)), Some((b, mode_b))) = (part(constraint.a), part(constraint.b)) else { return true };
-        let size = a.bounding_radius().min(b.bounding_radius());
+    let mut found = Vec::new();
+    let predicted = std::mem::take(contact_constraints);
+    for contacts in predicted.chunk_by(|x, y| x.key.pair == y.key.pair) {
+        let states = [contacts[0].a, contacts[0].b].map(|index| &part_states[index as usize]);
         let motion = h * (states[0].velocity - states[1].velocity).norm();
-        if motion < SHORT_MOTION * size {
-            return true;
+        let pair = part(contacts[0].a).zip(part(contacts[0].b)).and_then(|((a, mode_a), (b, mode_b))| {
+            let size = a.bounding_radius().min(b.bounding_radius());
+            // contacts of a mesh begin and end with its features
+            let timed = motion >= SHORT_MOTION * size && !a.has_tree() && !b.has_tree();
+            let pair = MovingPair { mode: mode_a.of_pair(mode_b), shapes: [a, b], part_states: states };
+            timed.then_some((pair, (motion / (SHORT_MOTION * size)).min(MAX_SAMPLES).ceil()))
+        });
+        match pair {
+            Some((pair, samples)) => {
+                pair.time_contacts(contacts, (h, settings.drift_tolerance, samples), &mut found, contact_constraints);
+            }
+            None => contact_constraints.extend_from_slice(contacts),
         }
-        let pair = MovingPair { mode: mode_a.of_pair(mode_b), shapes: [a, b], part_states: states };
-        if pair.time_to_close(&constraint.contact, constraint.contact.gap, 0.0).is_none_or(|t| t > h) {
-            return true;
+    }
+}
+
+impl MovingPair<'_> {
+    /// Writes the contacts of the pair to `out`, for those that are predicted at the start of a step.
+    fn time_contacts(
+        &self,
+        predicted: &[ContactConstraint],
+        limits: (f64, f64, f64),
+        found: &mut Vec<Contact>,
+        out: &mut Vec<ContactConstraint>,
+    ) {
+        let horizon = limits.0;
+        let closes =
+            |c: &ContactConstraint| self.time_to_close(&c.contact, c.contact.gap, 0.0).filter(|t| *t <= horizon);
+        let mut order: Vec<(f64, &ContactConstraint)> =
+            predicted.iter().filter_map(|c| Some((closes(c)?, c))).collect();
+        order.sort_by(|(s, _), (t, _)| s.total_cmp(t));
+        let met = order.iter().find_map(|(_, c)| self.follow(c.contact, limits, found));
+        match met {
+            Some((time, first)) if time > 0.0 => {
+                let begin = out.len();
+                self.contacts_after(time, self.reach(&first.point, horizon - time), found);
+                if !found.iter().any(|contact| contact.feature == first.feature) {
+                    found.push(first);
+                }
+                out.extend(found.iter().map(|contact| {
+                    let mut constraint = predicted[0].clone();
+                    constraint.move_to_impact(contact, self.part_states, time);
+                    constraint
+                }));
+                out[begin..].sort_by_key(|constraint| constraint.key.feature);
+            }
+            Some(_) => out.extend_from_slice(predicted),
+            None => out.extend(predicted.iter().filter(|c| closes(c).is_none()).cloned()),
         }
-        if a.has_tree() || b.has_tree() {
-            return true; // contacts of a mesh begin and end with its features
-        }
-        let samples = (motion / (SHORT_MOTION * size)).min(MAX_SAMPLES).ceil();
-        let limits = (h, settings.drift_tolerance, samples);
-        let Some((time, contact)) = pair.follow(constraint.contact, limits, &mut found) else { return false };
-        if time > 0.0 {
-            constraint.move_to_impact(&contact, states, time);
-        }
-        true
-    });
+    }
+
+    /// Returns a bound on the distance that the parts close in `t` seconds at their present speeds
+    /// within the size of the smaller one from a point, m.
+    fn reach(&self, point: &Vec3, t: f64) -> f64 {
+        let [a, b] = self.part_states;
+        let spin = a.angular_velocity.norm() + b.angular_velocity.norm();
+        t * ((a.velocity_at(point) - b.velocity_at(point)).norm() + spin * 2.0 * self.size())
+    }
+
+    /// Returns the smaller bounding radius, m.
+    fn size(&self) -> f64 {
+        let [a, b] = self.shapes.map(Shape::bounding_radius);
+        a.min(b)
+    }
 }
 
 impl ContactConstraint {
@@ -247,12 +293,8 @@ impl ContactConstraint {
         let moved = |s: &PartState| pose_after_free_motion(s, t).translation.vector - s.position();
         let (move_a, move_b): (Vec3, Vec3) = (moved(a), moved(b));
         let closed = contact.normal.dot(&(move_a - move_b));
-        self.contact = Contact {
-            point: contact.point - move_a,
-            gap: contact.gap - closed,
-            feature: self.contact.feature,
-            ..*contact
-        };
+        self.contact = Contact { point: contact.point - move_a, gap: contact.gap - closed, ..*contact };
+        self.key.feature = contact.feature;
         self.offset = move_a - move_b;
         self.frame = ContactFrame::new(contact.point, contact.normal);
     }

@@ -40,23 +40,6 @@ impl Extrapolation {
         Extrapolation { theta: 1.0, beta: 0.0, stretches, last }
     }
 
-    /// Returns the number of degrees of freedom of the island.
-    pub fn size(&self) -> usize {
-        self.last.len()
-    }
-
-    /// Returns the index within the island of a degree of freedom given by its index in `du`.
-    pub fn place(&self, index: u32) -> usize {
-        let mut before = 0;
-        for &(start, end) in &self.stretches {
-            if index < end {
-                return (before + index - start) as usize;
-            }
-            before += end - start;
-        }
-        before as usize
-    }
-
     pub fn extrapolate(&mut self, restart: bool, du: &mut [f64]) {
         let next = 0.5 * (1.0 + (1.0 + 4.0 * self.theta * self.theta).sqrt());
         self.beta = if restart { 0.0 } else { (self.theta - 1.0) / next };

@@ -19,15 +19,16 @@
 //! hundred with extrapolation.
 //!
 //! With friction the problem is not convex and extrapolated sweeps can cycle, so there is no
-//! extrapolation after [`ACCELERATED`] sweeps. Nearly redundant contacts and high mass ratios still
-//! converge slowly. Newton's method finishes them on small islands (`newton.rs`); the residual
-//! reports the error on others. Plain sweeps can also cycle; if they stagnate, `relaxation.rs`
-//! shortens their steps.
+//! extrapolation after [`ACCELERATED`] sweeps. Plain sweeps can also cycle; if they stagnate,
+//! `relaxation.rs` shortens their steps.
+//!
+//! An island that is not finished when its sweeps have cost as much as [`FACTORIZATIONS`] is solved
+//! as a whole (`direct/`); an island too large for that is left to the sweeps.
 
+use super::direct::Plan;
 use super::extrapolation::Extrapolation;
 use super::linkage::Linkages;
 use super::local::{INLINE_BLOCKS, Local, Progress, apply, write_back};
-use super::newton::Newton;
 use super::relaxation::Relaxation;
 use super::{RowSolver, SolveReport, SolverSettings};
 use crate::constraint::rows::Rows;
@@ -35,6 +36,11 @@ use smallvec::SmallVec;
 
 /// Number of sweeps with extrapolation.
 const ACCELERATED: u32 = 200;
+
+/// Minimum number of sweeps before an island is solved directly.
+const FIRST_SWEEPS: u32 = 25;
+/// Sweeps go on until they have cost as much as this number of factorizations.
+const FACTORIZATIONS: f64 = 3.0;
 
 /// The block Gauss–Seidel solver, `gauss_seidel`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -64,9 +70,9 @@ impl RowSolver for GaussSeidel {
         apply(&locals, &linkages, rows, c, lambda, du);
         let sweeps = settings.max_sweeps_for(locals.len());
         let mut extrapolation = Extrapolation::new(&locals, &linkages, du);
-        let mut newton = linkages.is_empty().then(|| Newton::new(&extrapolation));
         let mut outcome = SolveReport { iterations: sweeps, converged: false, ray: false };
         let mut relaxation = Relaxation::new(ACCELERATED);
+        let (mut plan, mut due, mut direct) = (None, 0, false);
         for sweep in 1..=sweeps {
             let mut progress = Progress::default();
             for local in &mut locals {
@@ -77,11 +83,19 @@ impl RowSolver for GaussSeidel {
                 break;
             }
             relaxation.record(sweep, progress.change);
-            if let Some(newton) = &mut newton
-                && newton.try_step(sweep..sweeps, progress.change, &mut locals, rows, &extrapolation, du)
-            {
+            if sweep == FIRST_SWEEPS.min(sweeps) {
+                plan = Plan::new(rows, blocks, c);
+                due = plan.as_ref().map_or(u32::MAX, |plan| (FACTORIZATIONS * plan.cost()) as u32).max(sweep);
+            }
+            if let Some(plan) = plan.take_if(|_| sweep == due.min(sweeps)) {
                 extrapolation.rebuild(&locals, &linkages, rows, c, lambda, du);
-                continue;
+                let solved = plan.solve(lambda, settings.tolerance);
+                locals.iter_mut().for_each(|local| local.read(lambda));
+                extrapolation.rebuild(&locals, &linkages, rows, c, lambda, du);
+                outcome.iterations = sweep + solved.factorizations;
+                outcome.converged = solved.converged;
+                direct = true;
+                break;
             }
             if sweep < sweeps {
                 let plain = sweep > ACCELERATED || sweep + FINAL_PLAIN_SWEEPS >= sweeps;
@@ -94,7 +108,8 @@ impl RowSolver for GaussSeidel {
         write_back(&locals, lambda);
         if !linkages.is_empty() {
             extrapolation.clear(du);
-            outcome.converged &= apply(&locals, &linkages, rows, c, lambda, du);
+            let joints_hold = apply(&locals, &linkages, rows, c, lambda, du);
+            outcome.converged &= joints_hold || direct;
         }
         outcome
     }

@@ -202,12 +202,11 @@ impl<'a> Local<'a> {
         }
     }
 
-    /// Projects the multipliers onto their set.
-    pub fn bound(&mut self) {
-        match &self.step {
-            BlockSolver::Unresponsive => self.lambda = [0.0; 3],
-            BlockSolver::Scalar(scalar) => self.lambda[0] = clamp(self.lambda[0], scalar.lo, scalar.hi),
-            BlockSolver::Contact(contact) => self.lambda = contact.bounded(self.lambda),
+    /// Reads the multipliers of this block, unless it has no response.
+    pub fn read(&mut self, lambda: &[f64]) {
+        if !matches!(self.step, BlockSolver::Unresponsive) {
+            let range = self.block.range();
+            self.lambda[..range.len()].copy_from_slice(&lambda[range]);
         }
     }
 

@@ -3,6 +3,7 @@
 //! Find `λ` in the rows' sets so that `w = c + (K + R)·λ` (`R`: compliance of soft rows) satisfies
 //! each set as [`RowSet`](crate::constraint::rows::RowSet) defines it.
 
+mod direct;
 mod dof6;
 mod equality;
 mod extrapolation;
@@ -12,7 +13,6 @@ mod lcp;
 mod lemke;
 mod linkage;
 mod local;
-mod newton;
 mod one_contact;
 mod relaxation;
 mod residual;

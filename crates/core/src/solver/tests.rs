@@ -10,6 +10,7 @@ mod residuals;
 mod scalar;
 mod soft;
 mod stubborn;
+mod whole_islands;
 
 use super::{RowSolver, SolveReport, SolverSettings};
 use crate::constraint::rows::{RowSet, Rows};

@@ -178,7 +178,7 @@ impl Backtracking {
         let (mut u, mut total) = (Vec::new(), vec![0.0; work.rows.len]);
         whiten(core.coordinates(None), &work.dp, 0.0, &mut u, &mut work.du_force);
         let before = u.clone();
-        impact::resolve(core, work, &candidates, IMPACT_PASSES, &mut u, &mut total);
+        impact::resolve(core, work, &candidates, (IMPACT_PASSES, true), &mut u, &mut total);
         let struck = total.iter().any(|l| *l != 0.0);
         if struck {
             push_to(core, &u, &before);

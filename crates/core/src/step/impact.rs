@@ -10,9 +10,11 @@
 //!          u += Yλ
 //! ```
 //!
-//! A contact slower than its rest speed has `e = 0`. When only such contacts approach, or after the
-//! cap, all candidates are solved at once with `e = 0`, which ends the phase. With equal `e` on `A`
-//! and no friction the energy of a pass cannot grow; with friction or unequal `e` Newton's law can
+//! A contact slower than its rest speed has `e = 0`, as has one whose bounces have left less than a
+//! hundredth of its approach speed. A pass leaves out islands in which only such contacts approach.
+//! When no others are left, or after the cap, all candidates are solved at once with `e = 0`, which
+//! ends the phase; `time_stepping` leaves that to its solve of all contacts. With equal `e` on `A`
+//! and no friction the energy of a pass cannot grow. With friction or unequal `e` Newton's law can
 //! create energy, so a pass that does is blended with its `e = 0` solution as far as the energy
 //! requires. A half-line of a constraint takes part if its gap is within the contact tolerance,
 //! always with `e = 0`.
@@ -34,25 +36,41 @@ pub(crate) struct Candidate {
     pub restitution: f64,
 }
 
-/// Impacts are solved to this fraction of the fastest row velocity, so a reflection keeps energy to
-/// about this fraction.
-const PRECISION: f64 = 1e-13;
+/// The part of a contact in one pass.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Part {
+    /// Whether the contact is in the pass.
+    pub member: bool,
+    /// Separation speed after the pass, m/s, at least.
+    pub rebound: f64,
+    /// Energy that the contact took from the bodies before, J. A pass may give it back.
+    pub energy: f64,
+}
+
+/// Error of an impact relative to the fastest row velocity: of elastic ones, which keep energy to about this fraction, and of others.
+const PRECISION: (f64, f64) = (1e-13, 1e-9);
+/// Contacts of a larger restitution are elastic.
+pub(crate) const ELASTIC: f64 = 0.99;
+/// A contact rests after bounces that have left less than this fraction of its approach speed.
+const FAINT: f64 = 0.01;
 /// A slower approach does not count, m/s.
 const APPROACH: f64 = 1e-9;
 /// A slower impact never bounces, m/s: bodies wedged between others would chatter forever.
 pub(crate) const SLOWEST_BOUNCE: f64 = 1e-4;
 
-/// Resolves impacts at whitened velocity `u` and adds the multipliers to `total`.
+/// Resolves impacts at whitened velocity `u` and adds the multipliers to `total`. With `finish` the
+/// last pass stops every contact that still approaches; without it a solve of all contacts follows.
 pub(crate) fn resolve(
     core: &mut Core,
     work: &mut Workspace,
     candidates: &[Candidate],
-    cap: u32,
+    (cap, finish): (u32, bool),
     u: &mut [f64],
     total: &mut [f64],
 ) {
-    let (set, reach) = (core.settings.solver_settings, core.settings.contact_tolerance);
+    let reach = core.settings.contact_tolerance;
     let mut c = Vec::new();
+    let mut left = vec![1.0; candidates.len()];
     for pass in 0..=cap {
         row_velocities(&work.rows, &work.bias, u, &mut c);
         aim_constraints(work, &mut c);
@@ -60,6 +78,7 @@ pub(crate) fn resolve(
         let bounces = |i: usize| {
             approach(i)
                 && candidates[i].restitution > 0.0
+                && left[i] > FAINT
                 && -c[work.rows.blocks[i].row as usize] > candidates[i].rest_speed
         };
         let limits = work.rows.blocks[candidates.len()..].iter().zip(&work.targets);
@@ -67,25 +86,43 @@ pub(crate) fn resolve(
         if !(0..candidates.len()).any(approach) && !limits.clone().any(at_limit) {
             return;
         }
-        core.report.impact_passes += 1;
-        let fastest = c.iter().fold(0.0, |f: f64, c| f.max(c.abs()));
-        let solver_settings = SolverSettings {
-            max_sweeps: set.max_sweeps.max(1000),
-            max_relaxations: set.max_relaxations.max(100_000),
-            tolerance: PRECISION * fastest,
-        };
         let last = pass == cap || !(0..candidates.len()).any(bounces);
-        let member: Vec<bool> =
-            (0..candidates.len()).map(|i| if last { candidates[i].takes_part } else { approach(i) }).collect();
-        let bounce: Vec<f64> =
-            (0..candidates.len()).map(|i| if !last && bounces(i) { candidates[i].restitution } else { 0.0 }).collect();
-        reflect(core, work, &c, &member, &bounce, solver_settings);
+        if last && !finish {
+            return;
+        }
+        core.report.impact_passes += 1;
+        let elastic = !last && (0..candidates.len()).any(|i| bounces(i) && candidates[i].restitution > ELASTIC);
+        let part = |i: usize| {
+            let restitution = if !last && bounces(i) { candidates[i].restitution } else { 0.0 };
+            let approach_speed = -c[work.rows.blocks[i].row as usize];
+            Part {
+                member: if last { candidates[i].takes_part } else { approach(i) },
+                rebound: restitution * approach_speed,
+                energy: 0.0,
+            }
+        };
+        let parts: Vec<Part> = (0..candidates.len()).map(part).collect();
+        for (left, (candidate, part)) in left.iter_mut().zip(candidates.iter().zip(&parts)) {
+            *left *= if part.rebound > 0.0 { candidate.restitution } else { 1.0 };
+        }
+        reflect(core, work, &c, &parts, elastic);
         u.iter_mut().zip(&work.du).for_each(|(u, du)| *u += du);
         total.iter_mut().zip(&work.lambda).for_each(|(t, l)| *t += l);
         if last {
             return;
         }
     }
+}
+
+/// Resolves the rebound of contacts whose approach the solve of all contacts has stopped: velocity
+/// `u`, impulses of that solve in `work.lambda`. Writes the multipliers to `work.lambda` and their
+/// effect to `work.du`.
+pub(crate) fn rebound(core: &mut Core, work: &mut Workspace, parts: &[Part], u: &[f64]) {
+    let mut c = Vec::new();
+    row_velocities(&work.rows, &work.bias, u, &mut c);
+    aim_constraints(work, &mut c);
+    core.report.impact_passes += 1;
+    reflect(core, work, &c, parts, false);
 }
 
 /// Returns whether a row is a rigid limit within `reach` of its stop. Springs exert no impulse.
@@ -101,39 +138,45 @@ fn aim_constraints(work: &Workspace, c: &mut [f64]) {
 }
 
 /// Solves one pass: the multipliers are in `work.lambda`, their effect in `work.du`.
-fn reflect(
-    core: &mut Core,
-    work: &mut Workspace,
-    c: &[f64],
-    member: &[bool],
-    bounce: &[f64],
-    solver_settings: SolverSettings,
-) {
+fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], parts: &[Part], elastic: bool) {
     let contact_constraints = work.contact_constraints.len();
-    let (targets, reach) = (&work.targets, core.settings.contact_tolerance);
+    let (targets, reach, set) = (&work.targets, core.settings.contact_tolerance, core.settings.solver_settings);
+    let fastest = c.iter().fold(0.0, |f: f64, c| f.max(c.abs()));
+    let solver_settings = SolverSettings {
+        max_sweeps: set.max_sweeps.max(1000),
+        max_relaxations: set.max_relaxations.max(100_000),
+        tolerance: fastest * if elastic { PRECISION.0 } else { PRECISION.1 },
+    };
     work.islands.build(&work.rows, |b| {
         let takes_part = |t: &RowTarget| (t.set == RowSet::Equality && t.compliance == 0.0) || at_stop(t, reach);
-        if b < contact_constraints { member[b] } else { takes_part(&targets[b - contact_constraints]) }
+        if b < contact_constraints { parts[b].member } else { takes_part(&targets[b - contact_constraints]) }
     });
     work.c.copy_from_slice(c);
-    for (block, bounce) in work.rows.blocks.iter().zip(bounce) {
-        work.c[block.row as usize] *= 1.0 + bounce;
+    for (block, part) in work.rows.blocks.iter().zip(parts) {
+        work.c[block.row as usize] -= part.rebound;
     }
     work.lambda.fill(0.0);
     zero(&mut work.du, core.dof);
+    let plastic = parts.iter().all(|part| part.rebound <= 0.0);
     for blocks in work.islands.iter() {
+        let of_island = || blocks.iter().filter_map(|&b| parts.get(b as usize));
+        let rebounds = of_island().any(|part| part.rebound > 0.0);
+        if !plastic && !rebounds {
+            continue; // the solve that ends the phase stops these contacts
+        }
         let outcome = core.solver.solve(&work.rows, blocks, &work.c, &mut work.lambda, &mut work.du, solver_settings);
         core.report.solved(outcome, residual(&work.rows, blocks, &work.c, &work.lambda, &work.du));
-        let bounces = blocks.iter().any(|&b| bounce.get(b as usize).is_some_and(|e| *e > 0.0));
         // kinematic bodies and motors may add energy
         let kinematic = |&b: &u32| {
             let target = (b as usize).checked_sub(contact_constraints).map_or(0.0, |i| targets[i].velocity);
             target != 0.0 || work.rows.blocks[b as usize].range().any(|row| work.bias[row] != 0.0)
         };
-        let guard = !blocks.iter().any(kinematic);
+        let guard = rebounds && !blocks.iter().any(kinematic);
         let scale: f64 = rows_of(&work.rows, blocks).map(|i| (work.lambda[i] * c[i]).abs()).sum();
-        if guard && bounces && work_done(&work.rows, blocks, c, &work.lambda, &work.du) > 1e-12 * scale {
-            blend(core.solver.as_ref(), &work.rows, blocks, c, &mut work.lambda, &mut work.du, solver_settings);
+        let energy: f64 = of_island().map(|part| part.energy).sum();
+        if guard && work_done(&work.rows, blocks, c, &work.lambda, &work.du) > energy + 1e-12 * scale {
+            let island = (&work.rows, blocks, c);
+            blend(core.solver.as_ref(), island, energy, &mut work.lambda, &mut work.du, solver_settings);
         }
     }
 }
@@ -152,15 +195,14 @@ fn work_done(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], du: &[f64])
 }
 
 /// Blends the plastic solution (`e = 0`, which never adds energy) with the bouncing one, as far
-/// towards the latter as no energy is created.
+/// towards the latter as the energy that is added does not exceed `energy`, J.
 ///
 /// With `δ = λ_e − λ_0` the energy is `W(s) = W_0 + s·B + s²·A`, `B = δᵀ(c + Kλ_0)`, `A = W_e − W_0
-/// − B`; `s` is its positive root.
+/// − B`; `s` is the positive root of `W(s) = energy`.
 fn blend(
     solver: &dyn RowSolver,
-    rows: &Rows,
-    blocks: &[u32],
-    c: &[f64],
+    (rows, blocks, c): (&Rows, &[u32], &[f64]),
+    energy: f64,
     lambda: &mut [f64],
     du: &mut [f64],
     solver_settings: SolverSettings,
@@ -172,7 +214,7 @@ fn blend(
         du[side.u as usize..(side.u + side.dof) as usize].fill(0.0);
     }
     solver.solve(rows, blocks, c, lambda, du, solver_settings);
-    let energy_plastic = work_done(rows, blocks, c, lambda, du).min(0.0);
+    let energy_plastic = work_done(rows, blocks, c, lambda, du).min(energy);
     let plastic_velocity = blocks.iter().flat_map(|&b| {
         let block = &rows.blocks[b as usize];
         let du = &*du;
@@ -181,7 +223,8 @@ fn blend(
     let delta: Vec<f64> = rows_of(rows, blocks).zip(&bounce).map(|(i, b)| b - lambda[i]).collect();
     let slope: f64 = delta.iter().zip(plastic_velocity).map(|(d, w)| d * w).sum();
     let curve = energy_bounce - energy_plastic - slope;
-    let root = (-slope + (slope * slope - 4.0 * curve * energy_plastic).max(0.0).sqrt()) / (2.0 * curve);
+    let excess = energy_plastic - energy;
+    let root = (-slope + (slope * slope - 4.0 * curve * excess).max(0.0).sqrt()) / (2.0 * curve);
     let s = if root.is_finite() { root.clamp(0.0, 1.0) } else { 0.0 };
     let mut step = vec![0.0; lambda.len()];
     for (i, d) in rows_of(rows, blocks).zip(&delta) {

@@ -7,6 +7,7 @@
 //! u_f  = u_0 + Δu_impact + h·a                                            impacts by reflection, of contacts that free motion closes within the step
 //! find λ:  w = Yᵀ(u_f + Yλ),   w_n + gap/h ≥ 0 ⟂ λ_n ≥ 0,   friction       (u_1 = u_f + Yλ)
 //! x_1  = x_0 after free motion of t_i with u_0, then of h − t_i with u_1    t_i = time of the body's first impact, else h/2
+//! u_1 += Δu_rebound,  without the displacement by it                       contacts that closed after t_i
 //! correct: gap_1 ≥ 0, joints, limits
 //! ```
 //!
@@ -23,16 +24,20 @@
 //! h/2, and are displaced by the rest, (t_i − h/2)·(v_0 − v_1), at the end.
 //!
 //! A contact bounces only if it approaches faster than its own pressing acceleration gives in a
-//! step, and only within the step in which free motion closes it. A contact that approaches because
-//! of an impact in this step is left to the next step, so that no restitution is lost to a
-//! speculative row.
+//! step. Bodies that impacts of one step connect share the time `t_i` of the first of them. The
+//! contacts that close later in the step have speculative rows, with the gap at `t_i` over the time
+//! that is left, so they arrive at the surface at the end of the step and do not overlap. Their
+//! restitution follows there: `Δu_rebound` gives them the separation speed `e·v` of the speed `v`
+//! that the rows have stopped, as far as their energy before allows. A shock thus passes one such
+//! gap per step. Elastic contacts keep the energy exactly: they have no row in this step, their
+//! overlap is corrected at its end, and they strike at the start of the next.
 
 use super::contacts::{
-    build_rows, detect, free_motion_change, gyroscopic, impulses, push, row_velocities, shift, solve, warm_start,
-    whiten, zero,
+    build_rows, detect, displace, free_motion_change, gyroscopic, impulses, push, row_velocities, shift, solve,
+    warm_start, whiten, zero,
 };
 use super::correction::{self, Contacts, Limits, Options};
-use super::impact::{self, Candidate};
+use super::impact::{self, Candidate, Part};
 use super::{Moment, StepContext, Stepper, Workspace};
 use crate::constraint::rows::RowSet;
 use crate::contact::detect::ContactConstraint;
@@ -74,6 +79,10 @@ struct Buffers {
     total: Vec<f64>,
     /// Whether each block is solved.
     keep: Vec<bool>,
+    /// Parts of the contacts in the rebound.
+    parts: Vec<Part>,
+    /// Change of velocity by the rebound.
+    late: Vec<f64>,
 }
 
 /// Maximum number of passes of the impact phase.
@@ -119,7 +128,8 @@ impl TimeStepping {
         let mut after = std::mem::take(&mut self.buffers.after);
         self.impacts(core, middle, h, &mut u, &mut du_force, &mut after)?;
         self.look_again(core, middle, h, &u, &after)?;
-        self.contacts(core, middle, h, &mut after, &du_force);
+        self.contacts(core, middle, h, &u, &mut after, &du_force);
+        self.rebound(core, &after);
         self.commit(core, middle, h, &u, &after, &du_force)?;
         (self.work.u, self.work.du_force, self.buffers.after) = (u, du_force, after);
         Ok(())
@@ -175,10 +185,6 @@ impl TimeStepping {
             } else {
                 None
             };
-            for i in block.sides().iter().flat_map(|s| s.u..s.u + s.dof) {
-                let slot = &mut self.impact_fraction[i as usize];
-                *slot = impact_fraction.map_or(*slot, |s| if *slot < 0.0 { s } else { slot.min(s) });
-            }
             impact_fractions.push(impact_fraction);
             self.candidates.push(Candidate {
                 takes_part: gap <= core.settings.drift_tolerance,
@@ -186,7 +192,7 @@ impl TimeStepping {
                 restitution: constraint.restitution,
             });
         }
-        if self.impact_fraction.iter().all(|s| *s < 0.0) {
+        if impact_fractions.iter().all(Option::is_none) {
             return Ok(());
         }
         self.first_impacts(&impact_fractions);
@@ -196,7 +202,7 @@ impl TimeStepping {
         whiten(middle.coordinates(core), &work.dp, h, u, du_force);
         let at_impact: Vec<f64> = (0..u.len()).map(|i| u[i] + self.impact_fraction[i].max(0.0) * du_force[i]).collect();
         after.clone_from(&at_impact);
-        impact::resolve(core, work, &self.candidates, IMPACT_PASSES, after, &mut self.impact);
+        impact::resolve(core, work, &self.candidates, (IMPACT_PASSES, false), after, &mut self.impact);
         (0..u.len()).for_each(|i| after[i] = u[i] + (after[i] - at_impact[i]));
         Ok(())
     }
@@ -263,11 +269,18 @@ impl TimeStepping {
         Ok(())
     }
 
-    /// Selects the contacts that take part in the impacts: those that are the first of both their
-    /// bodies, and those that touch the same island. Later ones wait for the next step; islands
-    /// without an impact take no part.
+    /// Selects the contacts that take part in the impacts: the first ones among bodies that impacts
+    /// of this step connect, and those that touch the same island. Later ones rebound at the end of
+    /// the step; islands without an impact take no part.
     fn first_impacts(&mut self, impact_fractions: &[Option<f64>]) {
         let work = &mut self.work;
+        work.islands.build(&work.rows, |b| impact_fractions.get(b).is_some_and(Option::is_some));
+        for blocks in work.islands.iter() {
+            let first = blocks.iter().filter_map(|&b| impact_fractions[b as usize]).fold(1.0, f64::min);
+            for side in blocks.iter().flat_map(|&b| work.rows.blocks[b as usize].sides()) {
+                self.impact_fraction[side.u as usize..(side.u + side.dof) as usize].fill(first);
+            }
+        }
         let first = |i: usize| {
             let sides = work.rows.blocks[i].sides();
             impact_fractions[i]
@@ -292,24 +305,29 @@ impl TimeStepping {
 
     /// Adds the forces and solves all contacts and constraints of the step: `u` becomes the
     /// velocity at its end.
-    fn contacts(&mut self, core: &mut Core, middle: &mut Moment, h: f64, u: &mut [f64], du_force: &[f64]) {
+    fn contacts(&mut self, core: &mut Core, middle: &mut Moment, h: f64, u0: &[f64], u: &mut [f64], du_force: &[f64]) {
         let work = &mut self.work;
+        let Buffers { before, gain: first, parts, keep, .. } = &mut self.buffers;
+        row_velocities(&work.rows, &work.bias, u0, first);
         u.iter_mut().zip(du_force).for_each(|(u, du)| *u += du);
         row_velocities(&work.rows, &work.bias, u, &mut work.c);
-        let keep = &mut self.buffers.keep;
+        before.clone_from(&work.c);
+        parts.clear();
+        parts.resize(work.contact_constraints.len(), Part::default());
         keep.clear();
         keep.resize(work.rows.blocks.len(), true);
         for (i, constraint) in work.contact_constraints.iter().enumerate() {
-            let (row, gap) = (work.rows.blocks[i].row as usize, constraint.contact.gap);
-            let struck = self.impact[row] > 0.0;
-            if !struck
-                && gap > core.settings.drift_tolerance
-                && constraint.restitution > 0.0
-                && work.c[row] < -2.0 * self.candidates[i].rest_speed
-            {
-                keep[i] = gap + h * work.c[row] >= 0.0;
+            let block = &work.rows.blocks[i];
+            let (row, struck) = (block.row as usize, self.impact[block.row as usize] > 0.0);
+            let s = block.sides().iter().map(|side| self.impact_fraction[side.u as usize]).fold(0.0, f64::max);
+            let (gap, left) = (constraint.contact.gap + h * s * first[row], h * (1.0 - s).max(1e-9));
+            let rest_speed = self.candidates.get(i).map_or(f64::INFINITY, |candidate| candidate.rest_speed);
+            let apart = !struck && constraint.contact.gap > core.settings.drift_tolerance;
+            if apart && work.c[row] < -2.0 * rest_speed && gap + left * work.c[row] < 0.0 {
+                keep[i] = constraint.restitution <= impact::ELASTIC;
+                parts[i].rebound = if keep[i] { -constraint.restitution * work.c[row] } else { 0.0 };
             }
-            work.c[row] += if struck { 0.0 } else { gap.max(0.0) / h };
+            work.c[row] += if struck { 0.0 } else { gap.max(0.0) / left };
         }
         let (turning, free_motion_change) = if work.targets.is_empty() {
             Default::default()
@@ -330,6 +348,31 @@ impl TimeStepping {
         u.iter_mut().zip(&work.du).for_each(|(u, du)| *u += du);
     }
 
+    /// Resolves the rebound of contacts that were not among the first of their bodies: the solve of
+    /// all contacts has stopped them at the surface. `late` becomes the change of whitened velocity
+    /// at the end of the step.
+    fn rebound(&mut self, core: &mut Core, u: &[f64]) {
+        let (work, Buffers { before, gain, parts, late, .. }) = (&mut self.work, &mut self.buffers);
+        zero(late, core.dof);
+        if parts.iter().all(|part| part.rebound <= 0.0) {
+            return;
+        }
+        row_velocities(&work.rows, &work.bias, u, gain);
+        for (part, block) in parts.iter_mut().zip(&work.rows.blocks) {
+            part.member = part.rebound > 0.0 && work.lambda[block.row as usize] > 0.0;
+            part.rebound = if part.member { part.rebound } else { 0.0 };
+            let taken = |row: usize| -0.5 * work.lambda[row] * (before[row] + gain[row]);
+            part.energy = block.range().map(taken).sum::<f64>().max(0.0);
+        }
+        if parts.iter().any(|part| part.member) {
+            let forces = work.lambda.clone();
+            impact::rebound(core, work, parts, u);
+            late.copy_from_slice(&work.du);
+            self.impact.iter_mut().zip(&work.lambda).for_each(|(total, late)| *total += late);
+            work.lambda = forces;
+        }
+    }
+
     /// Writes the state at the end of the step.
     fn commit(
         &mut self,
@@ -341,7 +384,7 @@ impl TimeStepping {
         du_force: &[f64],
     ) -> Result<(), StepError> {
         let impact_fraction = |i: usize| if self.impact_fraction[i] < 0.0 { 0.5 } else { self.impact_fraction[i] };
-        let Buffers { change, dp, parabola, rest, mean, total, .. } = &mut self.buffers;
+        let Buffers { change, dp, parabola, rest, mean, total, late, .. } = &mut self.buffers;
         let write = |out: &mut Vec<f64>, of: &dyn Fn(usize) -> f64| {
             out.clear();
             out.extend((0..u0.len()).map(of));
@@ -353,7 +396,8 @@ impl TimeStepping {
         for entry in objects.iter() {
             free_motion(&entry, &mut caches[entry.place], &mut x[entry.state_range.x.clone()], h * before(&entry));
         }
-        push(core.coordinates(Some(&mut *middle)), change, dp);
+        write(rest, &|i| change[i] + late[i]);
+        push(core.coordinates(Some(&mut *middle)), rest, dp);
         let Coordinates { objects, x, caches } = core.coordinates(Some(&mut *middle));
         for entry in objects.iter() {
             free_motion(
@@ -363,6 +407,10 @@ impl TimeStepping {
                 h * (1.0 - before(&entry)),
             );
         }
+        for entry in core.objects().iter() {
+            late[entry.state_range.v.clone()].iter_mut().for_each(|du| *du *= before(&entry) - 1.0);
+        }
+        displace(core.coordinates(Some(&mut *middle)), late, h);
         write(parabola, &|i| (impact_fraction(i) - 0.5) * du_force[i]);
         rest.clone_from(parabola);
         for i in core.objects().iter().filter(|e| in_the_middle(e)).flat_map(|e| e.state_range.v.clone()) {

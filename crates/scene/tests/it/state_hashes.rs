@@ -50,24 +50,24 @@ macro_rules! table {
 }
 
 table! {
-    billiards_time_stepping: "billiards", TimeStepping, "3ca1386bb28e1886", "a386b6fae8c2ca18";
-    billiards_backtracking: "billiards", Backtracking, "8bf8a8a281a45c6e", "a4a7a94dc8f6f00b";
-    bowling_time_stepping: "bowling", TimeStepping, "831fef8c21f98e6d", "4ccea108f8751a7e";
-    bowling_backtracking: "bowling", Backtracking, "1694972672f0e977", "07b57402831fedfa";
-    chain_time_stepping: "chain", TimeStepping, "49fdbafba0881a53", "f257620a3e674865";
-    chain_backtracking: "chain", Backtracking, "85fd5ed3103d35f0", "f28f2703750f5882";
-    falling_time_stepping: "falling", TimeStepping, "b22911ae99dd32f5", "f6e0a54c835c7e7c";
-    falling_backtracking: "falling", Backtracking, "bef8512f81633516", "9b4d8f0e1d6dc2ce";
+    billiards_time_stepping: "billiards", TimeStepping, "c39b4ffc0ed54e69", "922602f0d4fa1d41";
+    billiards_backtracking: "billiards", Backtracking, "dde525a4d714d38e", "453edf585fcd7eb4";
+    bowling_time_stepping: "bowling", TimeStepping, "8d26c897f46dbc46", "2ca0d556e3f7eb82";
+    bowling_backtracking: "bowling", Backtracking, "846800afe7b1beb4", "fe68682ed17fe9a4";
+    chain_time_stepping: "chain", TimeStepping, "55520b3ef294f056", "f31820fcfa7e4b07";
+    chain_backtracking: "chain", Backtracking, "cf938a3028a77cdf", "aec0064e0240df39";
+    falling_time_stepping: "falling", TimeStepping, "7f3fab86920b4c64", "184050a8714af340";
+    falling_backtracking: "falling", Backtracking, "b01cec868f27cec6", "811b0cdbf0bb3fed";
     incline_time_stepping: "incline", TimeStepping, "c8d35ebc2e29a12a", "7b8c108360d8ae2c";
     incline_backtracking: "incline", Backtracking, "e55d9c0fdc513c1e", "a93b5ab540a60671";
     pendulum_time_stepping: "pendulum", TimeStepping, "d403df437fc48e8e", "07a9ea1905d7c967";
     pendulum_backtracking: "pendulum", Backtracking, "69fe4156518a0013", "692b5de118331942";
     piston_time_stepping: "piston", TimeStepping, "c8bdbe2dbb4d6e92", "d28c654b599622b8";
     piston_backtracking: "piston", Backtracking, "e4bc1f04bccfbd8a", "0b86e6820d08239f";
-    robot_time_stepping: "robot", TimeStepping, "bc43b6f0651f6c15", "8b4bb457452fe429";
-    robot_backtracking: "robot", Backtracking, "d74075084d60492f", "01e064e5abc85f17";
-    skeleton_time_stepping: "skeleton", TimeStepping, "ee202d377892c7b8", "5e22c6193fcbd3ef";
-    skeleton_backtracking: "skeleton", Backtracking, "bdf4cdbeda75f036", "895179911225c2cb";
-    stack_time_stepping: "stack", TimeStepping, "faa858303ba3c2af", "accd4da77adb66fe";
-    stack_backtracking: "stack", Backtracking, "ac1fb8bad736bd44", "c91438f922aca6c6";
+    robot_time_stepping: "robot", TimeStepping, "d2ff6677a2f25e68", "adb089e37546dc9b";
+    robot_backtracking: "robot", Backtracking, "d9bdae46cf681082", "028d82e132b8fc13";
+    skeleton_time_stepping: "skeleton", TimeStepping, "95653dbd8afb16f0", "e841a2993e74097d";
+    skeleton_backtracking: "skeleton", Backtracking, "0e2f5c508d2186ba", "4e0ec40c6147e865";
+    stack_time_stepping: "stack", TimeStepping, "20ad0965d34e48bf", "ecd253fcdb6efb2e";
+    stack_backtracking: "stack", Backtracking, "f3e4e18dc66cf3d0", "e2c70bafe5205c09";
 }

@@ -1,4 +1,4 @@
-//! Nearly redundant contacts: what Newton's method is there for.
+//! Nearly redundant contacts, which sweeps alone do not finish.
 
 use super::{Bodies, Random, UP, all, free, solve};
 use crate::constraint::rows::{RowSet, Rows};

@@ -1,0 +1,124 @@
+//! Direct solution of a whole island: sparse factorizations over the graph of its objects.
+//!
+//! Sweeps carry load from one body to the next, so a tower of a hundred boxes needs tens of thousands
+//! of them. Here all rows of an island are solved at once, and the number of factorizations does not
+//! grow with the island:
+//!
+//! 1. from multipliers that are near, a few steps of semismooth Newton (`proximal.rs`);
+//! 2. else the interior point method from the beginning (`interior_point.rs`);
+//! 3. and semismooth Newton for the digits that it leaves.
+//!
+//! Both factor matrices `1 + Σ Y·G·Yᵀ` with a 3×3 matrix `G` per contact (`lu.rs`), with one block
+//! row per object (`structure.rs`): linear cost in a chain or a tower, more where contacts form
+//! loops. Islands whose factorization costs more than [`MAX_WORK`] are left to the sweeps.
+
+mod cone;
+mod interior_point;
+mod island;
+mod lu;
+mod proximal;
+mod structure;
+
+use crate::constraint::rows::Rows;
+use island::Island;
+use lu::Factor;
+use structure::Structure;
+
+/// Maximum number of multiplications of one factorization.
+const MAX_WORK: f64 = 5e7;
+/// Error, relative to the fastest row, below which multipliers are near.
+const NEAR: f64 = 1e-2;
+/// Maximum number of factorizations from multipliers that are near, and of the last phase for a
+/// small and a large island.
+const FACTORS: (u32, u32, u32) = (8, 30, 8);
+/// Degrees of freedom of a small island, on which no effort is spared.
+const SMALL: usize = 120;
+/// Error, relative to the fastest row, that ends the interior point method of a large island early.
+const ENOUGH: f64 = 1e-5;
+/// Errors relative to the fastest row: what rounding leaves at best, and what counts as solved.
+const ROUNDING: (f64, f64) = (1e-13, 1e-10);
+
+/// The errors to reach, m/s.
+#[derive(Clone, Copy)]
+struct Tolerance {
+    /// Below this nothing is left to do.
+    goal: f64,
+    /// Below this, ten times the tolerance of a sweep, the island is solved, and only steps that
+    /// gain a digit are worth their cost.
+    solved: f64,
+}
+
+/// Matrix and rows of an island.
+struct System<'a> {
+    island: Island<'a>,
+    structure: Structure,
+    factor: Factor,
+}
+
+/// Result of a direct solve.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Direct {
+    pub factorizations: u32,
+    /// Whether the error is within ten times the tolerance.
+    pub converged: bool,
+}
+
+/// A direct solve of an island that is not too large for it.
+pub(super) struct Plan<'a>(System<'a>);
+
+impl<'a> Plan<'a> {
+    /// Returns `None` if the island is too large.
+    pub fn new(rows: &'a Rows, blocks: &[u32], c: &[f64]) -> Option<Plan<'a>> {
+        let island = Island::new(rows, blocks, c);
+        let dof: Vec<usize> = island.objects.iter().map(|o| o.dof).collect();
+        let structure = Structure::new(&dof, &island.couplings(), MAX_WORK)?;
+        let factor = Factor::new(&structure);
+        Some(Plan(System { island, structure, factor }))
+    }
+
+    /// Returns the cost of a factorization in sweeps.
+    pub fn cost(&self) -> f64 {
+        let System { island, structure, .. } = &self.0;
+        let (mut assembly, mut sweep) = (0.0, 1.0);
+        for block in &island.blocks {
+            let dof: usize = block.sides().iter().map(|s| s.dof).sum();
+            assembly += (block.rows * dof * dof) as f64;
+            sweep += (2 * block.rows * dof) as f64;
+        }
+        (structure.work + assembly) / sweep
+    }
+
+    /// Solves from the multipliers in `lambda`, which it replaces if it finds better ones.
+    pub fn solve(mut self, lambda: &mut [f64], tolerance: f64) -> Direct {
+        let system = &mut self.0;
+        let fastest = system.island.fastest;
+        let small = system.island.dof <= SMALL;
+        let (enough, last) = if small { (0.0, FACTORS.1) } else { (ENOUGH * fastest, FACTORS.2) };
+        let tolerance = Tolerance {
+            goal: tolerance.max(ROUNDING.0 * fastest),
+            solved: (10.0 * tolerance).max(ROUNDING.1 * fastest),
+        };
+        let mut own = system.island.read(lambda);
+        let start = system.island.error_of(&own);
+        let (mut error, mut taken) = (start, 0);
+        if error > tolerance.goal && error <= NEAR * fastest {
+            (error, taken) = proximal::solve(system, &mut own, error, tolerance, FACTORS.0);
+        }
+        if error.is_nan() || error > tolerance.solved {
+            let mut interior = own.clone();
+            let (reached, factors) = interior_point::solve(system, &mut interior, tolerance.solved, enough);
+            taken += factors;
+            if reached < error || error.is_nan() {
+                (error, own) = (reached, interior);
+            }
+        }
+        if error > tolerance.goal && error.is_finite() {
+            let (reached, factors) = proximal::solve(system, &mut own, error, tolerance, last);
+            (error, taken) = (reached, taken + factors);
+        }
+        if error < start || start.is_nan() {
+            system.island.write(&own, lambda);
+        }
+        Direct { factorizations: taken, converged: error <= tolerance.solved }
+    }
+}
