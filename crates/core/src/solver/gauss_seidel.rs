@@ -23,7 +23,8 @@
 //! `relaxation.rs` shortens their steps.
 //!
 //! An island that is not finished when its sweeps have cost as much as [`FACTORIZATIONS`] is solved
-//! as a whole (`direct/`); an island too large for that is left to the sweeps.
+//! as a whole (`direct/`). Islands whose factorization is too expensive are left to the sweeps. The
+//! bound is lower for large islands that are not at rest and for solves of less than [`FIRST_SWEEPS`].
 
 use super::direct::Plan;
 use super::extrapolation::Extrapolation;
@@ -84,7 +85,7 @@ impl RowSolver for GaussSeidel {
             }
             relaxation.record(sweep, progress.change);
             if sweep == FIRST_SWEEPS.min(sweeps) {
-                plan = Plan::new(rows, blocks, c);
+                plan = Plan::new(rows, blocks, c, sweeps < FIRST_SWEEPS);
                 due = plan.as_ref().map_or(u32::MAX, |plan| (FACTORIZATIONS * plan.cost()) as u32).max(sweep);
             }
             if let Some(plan) = plan.take_if(|_| sweep == due.min(sweeps)) {

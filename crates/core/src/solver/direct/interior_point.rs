@@ -39,10 +39,11 @@ use super::island::{Island, Kind, LocalBlock};
 
 /// Maximum number of iterations, and the number after which [`super::ENOUGH`] is enough.
 const ITERATIONS: (u32, u32) = (40, 15);
-/// Number of iterations that may fail to lower the error by [`PROGRESS`].
-const PATIENCE: u32 = 4;
-/// Factor of the error that counts as progress.
-const PROGRESS: f64 = 0.8;
+/// Number of iterations that must lower the error, or the mean of `l·z`, and by which factor: of cheap
+/// factorizations, and of expensive ones, where the method converges fast or not at all.
+const PROGRESS: [(usize, f64); 2] = [(5, 0.8), (2, 0.03)];
+/// Number of iterations before progress is judged.
+const FIRST: usize = 3;
 /// Multipliers at the start, relative to what stops one object and to the root of the number of
 /// objects: the loads of a tower add up, and larger multipliers are found sooner from above.
 const LOAD: f64 = 3.0;
@@ -84,20 +85,22 @@ fn epsilon_of(b: &LocalBlock) -> f64 {
 }
 
 /// Writes multipliers into `lambda`. Returns their error and the number of factorizations.
-pub(super) fn solve(system: &mut System, lambda: &mut [f64], tolerance: f64, enough: f64) -> (f64, u32) {
-    let mut best = f64::INFINITY;
-    let (mut waited, mut taken, mut least) = (0, 0, f64::INFINITY);
+pub(super) fn solve(system: &mut System, lambda: &mut [f64], tolerance: f64, enough: f64, cheap: bool) -> (f64, u32) {
+    let (mut best, mut taken, mut history) = (f64::INFINITY, 0, Vec::new());
     let mut state = Interior::new(&system.island);
     loop {
         let error = state.linearize(&system.island);
-        waited = if error < PROGRESS * best || state.mean < PROGRESS * least { 0 } else { waited + 1 };
-        least = least.min(state.mean);
+        let (span, progress) = PROGRESS[usize::from(!cheap)];
+        let slow = |before: &(f64, f64)| error > progress * before.0 && state.mean > progress * before.1;
+        let stalled = history.len() >= FIRST.max(span) && slow(&history[history.len() - span]);
+        let (e, m) = history.last().copied().unwrap_or((f64::INFINITY, f64::INFINITY));
+        history.push((error.min(e), state.mean.min(m)));
         if error < best {
             best = error;
             lambda.copy_from_slice(&state.lambda);
         }
         let finished = best <= tolerance || taken >= ITERATIONS.1 && best <= enough;
-        if finished || waited > PATIENCE || taken == ITERATIONS.0 || error.is_nan() {
+        if finished || stalled || taken == ITERATIONS.0 || error.is_nan() {
             return (best, taken);
         }
         let System { island, structure, factor } = &mut *system;

@@ -26,6 +26,14 @@ use structure::Structure;
 
 /// Maximum number of multiplications of one factorization.
 const MAX_WORK: f64 = 5e7;
+/// Maximum cost of a factorization in sweeps: in heaps, where contacts form loops in all directions,
+/// sweeps are the better use of the time.
+const MAX_COST: f64 = 150.0;
+/// A factorization of a lower cost, in sweeps, is cheap. Others must gain much.
+const CHEAP: f64 = 15.0;
+/// A large island is at rest if fewer contacts than this share slide. A contact slides if its
+/// tangential speed is above this fraction of the fastest row.
+const SLIDING: (f64, f64) = (0.1, 0.002);
 /// Error, relative to the fastest row, below which multipliers are near.
 const NEAR: f64 = 1e-2;
 /// Maximum number of factorizations from multipliers that are near, and of the last phase for a
@@ -67,31 +75,30 @@ pub(super) struct Direct {
 pub(super) struct Plan<'a>(System<'a>);
 
 impl<'a> Plan<'a> {
-    /// Returns `None` if the island is too large.
-    pub fn new(rows: &'a Rows, blocks: &[u32], c: &[f64]) -> Option<Plan<'a>> {
+    /// Returns `None` if a factorization of the island is too expensive: for a solve that need not be
+    /// exact (`coarse`), for a large island that is not at rest, or at all.
+    pub fn new(rows: &'a Rows, blocks: &[u32], c: &[f64], coarse: bool) -> Option<Plan<'a>> {
         let island = Island::new(rows, blocks, c);
+        let moving = island.dof > SMALL && island.sliding(SLIDING.1) > SLIDING.0;
+        let max_cost = if coarse || moving { CHEAP } else { MAX_COST };
         let dof: Vec<usize> = island.objects.iter().map(|o| o.dof).collect();
-        let structure = Structure::new(&dof, &island.couplings(), MAX_WORK)?;
+        let (assembly, sweep) = work_of_blocks(&island);
+        let structure = Structure::new(&dof, &island.couplings(), MAX_WORK.min(max_cost * sweep - assembly))?;
         let factor = Factor::new(&structure);
         Some(Plan(System { island, structure, factor }))
     }
 
     /// Returns the cost of a factorization in sweeps.
     pub fn cost(&self) -> f64 {
-        let System { island, structure, .. } = &self.0;
-        let (mut assembly, mut sweep) = (0.0, 1.0);
-        for block in &island.blocks {
-            let dof: usize = block.sides().iter().map(|s| s.dof).sum();
-            assembly += (block.rows * dof * dof) as f64;
-            sweep += (2 * block.rows * dof) as f64;
-        }
-        (structure.work + assembly) / sweep
+        let (assembly, sweep) = work_of_blocks(&self.0.island);
+        (self.0.structure.work + assembly) / sweep
     }
 
     /// Solves from the multipliers in `lambda`, which it replaces if it finds better ones.
     pub fn solve(mut self, lambda: &mut [f64], tolerance: f64) -> Direct {
+        let fastest = self.0.island.fastest;
+        let cheap = self.0.island.dof <= SMALL || self.cost() < CHEAP;
         let system = &mut self.0;
-        let fastest = system.island.fastest;
         let small = system.island.dof <= SMALL;
         let (enough, last) = if small { (0.0, FACTORS.1) } else { (ENOUGH * fastest, FACTORS.2) };
         let tolerance = Tolerance {
@@ -101,19 +108,19 @@ impl<'a> Plan<'a> {
         let mut own = system.island.read(lambda);
         let start = system.island.error_of(&own);
         let (mut error, mut taken) = (start, 0);
-        if error > tolerance.goal && error <= NEAR * fastest {
-            (error, taken) = proximal::solve(system, &mut own, error, tolerance, FACTORS.0);
+        if error > tolerance.goal && error.is_finite() && (cheap || error <= NEAR * fastest) {
+            (error, taken) = proximal::solve(system, &mut own, error, tolerance, (FACTORS.0, cheap));
         }
         if error.is_nan() || error > tolerance.solved {
             let mut interior = own.clone();
-            let (reached, factors) = interior_point::solve(system, &mut interior, tolerance.solved, enough);
+            let (reached, factors) = interior_point::solve(system, &mut interior, tolerance.solved, enough, cheap);
             taken += factors;
             if reached < error || error.is_nan() {
                 (error, own) = (reached, interior);
             }
         }
-        if error > tolerance.goal && error.is_finite() {
-            let (reached, factors) = proximal::solve(system, &mut own, error, tolerance, last);
+        if error > tolerance.goal && error.is_finite() && (cheap || error <= NEAR * fastest) {
+            let (reached, factors) = proximal::solve(system, &mut own, error, tolerance, (last, cheap));
             (error, taken) = (reached, taken + factors);
         }
         if error < start || start.is_nan() {
@@ -121,4 +128,16 @@ impl<'a> Plan<'a> {
         }
         Direct { factorizations: taken, converged: error <= tolerance.solved }
     }
+}
+
+/// Returns the multiplications that the blocks take in the assembly of a factorization, and in a
+/// sweep.
+fn work_of_blocks(island: &Island) -> (f64, f64) {
+    let (mut assembly, mut sweep) = (0.0, 1.0);
+    for block in &island.blocks {
+        let dof: usize = block.sides().iter().map(|s| s.dof).sum();
+        assembly += (block.rows * dof * dof) as f64;
+        sweep += (2 * block.rows * dof) as f64;
+    }
+    (assembly, sweep)
 }

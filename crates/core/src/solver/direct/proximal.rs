@@ -32,18 +32,20 @@ const INNER: f64 = 0.002;
 const HALVINGS: u32 = 8;
 /// Number of inner steps that may fail to make `F` smaller.
 const FAILURES: u32 = 3;
+/// An expensive step must reduce `F`, and an outer step the error, to this fraction.
+const PROGRESS: f64 = 0.5;
 /// Speed below which the direction of sliding has no meaning, relative to the fastest row.
 const STILL: f64 = 1e-14;
 
-/// Improves `lambda`, whose error is `error`, with at most `factors` factorizations. Returns the
-/// error of the best multipliers found, which it leaves in `lambda`, and the number of
-/// factorizations.
+/// Improves `lambda`, whose error is `error`, with at most `factors` factorizations; expensive ones
+/// end as soon as they gain little. Returns the error of the best multipliers found, which it leaves
+/// in `lambda`, and the number of factorizations.
 pub(super) fn solve(
     system: &mut System,
     lambda: &mut [f64],
     mut error: f64,
     tolerance: Tolerance,
-    factors: u32,
+    (factors, cheap): (u32, bool),
 ) -> (f64, u32) {
     let mut p = Proximal::new(system, lambda);
     let (mut taken, mut last) = (0, error);
@@ -51,7 +53,7 @@ pub(super) fn solve(
         if error <= tolerance.goal || taken >= factors {
             break;
         }
-        taken += p.inner(INNER * last, factors - taken);
+        taken += p.inner(INNER * last, factors - taken, cheap);
         std::mem::swap(&mut p.center, &mut p.projected);
         p.system.island.apply(&p.center, &mut p.u);
         let reached = p.system.island.error(&p.u, &p.center);
@@ -60,7 +62,7 @@ pub(super) fn solve(
             error = reached;
             lambda.copy_from_slice(&p.center);
         }
-        if slow && error <= tolerance.solved {
+        if slow && error <= tolerance.solved || !cheap && reached > PROGRESS * last {
             break;
         }
         if reached.is_nan() || reached > 0.1 * last {
@@ -99,7 +101,7 @@ impl<'s, 'a> Proximal<'s, 'a> {
 
     /// Solves `F(u) = 0` to row velocities of about `tolerance`. Returns the number of
     /// factorizations.
-    fn inner(&mut self, tolerance: f64, factors: u32) -> u32 {
+    fn inner(&mut self, tolerance: f64, factors: u32, cheap: bool) -> u32 {
         let (mut taken, mut failures, mut tried, mut work) = (0, 0, Vec::new(), Vec::new());
         let mut size = self.evaluate(true);
         while taken < factors.min(STEPS.1) && size * self.largest > tolerance {
@@ -119,8 +121,8 @@ impl<'s, 'a> Proximal<'s, 'a> {
                 self.u.iter_mut().zip(tried.iter().zip(&step)).for_each(|(u, (from, s))| *u = from - s);
                 failures += 1;
             }
-            size = self.evaluate(true);
-            if failures > FAILURES || size.is_nan() {
+            let before = std::mem::replace(&mut size, self.evaluate(true));
+            if failures > FAILURES || size.is_nan() || !cheap && size > PROGRESS * before {
                 break;
             }
         }
