@@ -77,6 +77,11 @@ impl Constraint for Rod {
         }
     }
 
+    fn partners(&self, out: &mut Vec<ObjectId>) -> bool {
+        out.extend(self.ends.iter().filter_map(|end| if let End::Object(id) = end { Some(*id) } else { None }));
+        true
+    }
+
     fn gaps(&self, _me: &StateRange, view: &WorldView, out: &mut Vec<f64>) {
         if let (true, Some((pa, _)), Some((pb, _))) =
             (self.rope, motion(self.ends[0], view), motion(self.ends[1], view))
