@@ -208,17 +208,6 @@ impl<'a> Island<'a> {
         self.error(&u, lambda)
     }
 
-    /// Returns the share of contacts with friction that slide before the solve: the tangential speed
-    /// in `c` is above `fraction` of the fastest row.
-    pub fn sliding(&self, fraction: f64) -> f64 {
-        let cones = || self.blocks.iter().filter(|b| matches!(b.kind, Kind::Cone { .. }));
-        let slides = |b: &&LocalBlock| {
-            let c = &self.c[b.range()];
-            c[1].hypot(c[2]) > fraction * self.fastest
-        };
-        cones().filter(slides).count() as f64 / cones().count().max(1) as f64
-    }
-
     fn block_error(&self, block: &LocalBlock, w: [f64; 3], lambda: &[f64]) -> f64 {
         let d = block.diagonal;
         let scalar = |lo: f64, hi: f64| (lambda[0] - (lambda[0] - w[0] / d).max(lo).min(hi)).abs() * d;

@@ -19,7 +19,7 @@ mod lu;
 mod proximal;
 mod structure;
 
-use crate::constraint::rows::Rows;
+use crate::constraint::rows::{RowSet, Rows};
 use island::Island;
 use lu::Factor;
 use structure::Structure;
@@ -31,6 +31,8 @@ const MAX_WORK: f64 = 5e7;
 const MAX_COST: f64 = 150.0;
 /// A factorization of a lower cost, in sweeps, is cheap. Others must gain much.
 const CHEAP: f64 = 15.0;
+/// Islands of more blocks are solved directly only at rest.
+const MANY: usize = 500;
 /// A large island is at rest if fewer contacts than this share slide. A contact slides if its
 /// tangential speed is above this fraction of the fastest row.
 const SLIDING: (f64, f64) = (0.1, 0.002);
@@ -78,9 +80,12 @@ impl<'a> Plan<'a> {
     /// Returns `None` if a factorization of the island is too expensive: for a solve that need not be
     /// exact (`coarse`), for a large island that is not at rest, or at all.
     pub fn new(rows: &'a Rows, blocks: &[u32], c: &[f64], coarse: bool) -> Option<Plan<'a>> {
+        let at_rest = sliding(rows, blocks, c) <= SLIDING.0;
+        if blocks.len() > MANY && (coarse || !at_rest) {
+            return None;
+        }
         let island = Island::new(rows, blocks, c);
-        let moving = island.dof > SMALL && island.sliding(SLIDING.1) > SLIDING.0;
-        let max_cost = if coarse || moving { CHEAP } else { MAX_COST };
+        let max_cost = if coarse || island.dof > SMALL && !at_rest { CHEAP } else { MAX_COST };
         let dof: Vec<usize> = island.objects.iter().map(|o| o.dof).collect();
         let (assembly, sweep) = work_of_blocks(&island);
         let structure = Structure::new(&dof, &island.couplings(), MAX_WORK.min(max_cost * sweep - assembly))?;
@@ -128,6 +133,16 @@ impl<'a> Plan<'a> {
         }
         Direct { factorizations: taken, converged: error <= tolerance.solved }
     }
+}
+
+/// Returns the share of contacts with friction that slide before the solve: their tangential speed in
+/// `c` is above a fraction of the fastest row.
+fn sliding(rows: &Rows, blocks: &[u32], c: &[f64]) -> f64 {
+    let island = || blocks.iter().map(|&b| &rows.blocks[b as usize]);
+    let fastest = island().flat_map(|b| &c[b.range()]).fold(0.0, |f: f64, c| f.max(c.abs()));
+    let cones = || island().filter(|b| matches!(b.set, RowSet::Cone { .. })).map(|b| &c[b.range()]);
+    let slides = |c: &&[f64]| c[1].hypot(c[2]) > SLIDING.1 * fastest;
+    cones().filter(slides).count() as f64 / cones().count().max(1) as f64
 }
 
 /// Returns the multiplications that the blocks take in the assembly of a factorization, and in a
