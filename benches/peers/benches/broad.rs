@@ -106,7 +106,7 @@ fn all(kind: Kind, n: usize) -> [Cost; 3] {
     })
 }
 
-/// Returns a number of steps that makes the clock's resolution irrelevant.
+/// Returns the number of steps of a round.
 fn steps(n: usize) -> usize {
     (2_000_000 / n).clamp(60, 1000)
 }

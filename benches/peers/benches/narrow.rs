@@ -22,7 +22,7 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::path::PathBuf;
 use tumble_collide::{ContactMode, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts_in_mode};
-use tumble_peers::clock::Clock;
+use tumble_peers::clock::cpu_seconds;
 
 /// Margin, and the gap or overlap of the bodies, meters.
 const MARGIN: f64 = 1e-3;
@@ -128,13 +128,11 @@ fn measure(body: &Body, pose: &Pose) -> [f64; 4] {
 
 /// Returns CPU µs per call, the median of three runs; of one run for a slow call.
 fn time(mut call: impl FnMut()) -> f64 {
-    let clock = Clock::new();
     let mut run = |times: usize| {
-        let before = clock.seconds();
+        let before = cpu_seconds();
         (0..times).for_each(|_| call());
-        clock.seconds() - before
+        cpu_seconds() - before
     };
-    // the clock of a thread advances in steps of milliseconds, so a run must be long
     let mut times = 1;
     let mut seconds = run(times);
     while seconds < PATIENCE / 3.0 && times < 1 << 20 {
@@ -212,7 +210,7 @@ fn alone(body: &Body, rounds: usize) {
     let few = places.map(|into| (0..POSES).map(|n| touching(body, n, into)).collect::<Vec<_>>());
     let ways: Vec<(Pose, Vec3)> = (0..CHANGING).map(|n| approached(body, n)).collect();
     let many = places.map(|into| ways.iter().map(|(pose, way)| moved(pose, way, into)).collect::<Vec<_>>());
-    let (clock, mut found) = (Clock::new(), Vec::new());
+    let mut found = Vec::new();
     let mut query = |pose: &Pose| {
         found.clear();
         contacts_in_mode(ContactMode::Surface, &body.ours, pose, &body.ours, &Pose::identity(), MARGIN, &mut found);
@@ -220,15 +218,15 @@ fn alone(body: &Body, rounds: usize) {
     };
     let mut figures = Vec::new();
     for poses in &few {
-        let before = clock.seconds();
+        let before = cpu_seconds();
         poses.iter().for_each(|pose| (0..rounds).for_each(|_| query(pose)));
-        figures.push(1e6 * (clock.seconds() - before) / (rounds * poses.len()) as f64);
+        figures.push(1e6 * (cpu_seconds() - before) / (rounds * poses.len()) as f64);
     }
     for poses in &many {
-        let before = clock.seconds();
+        let before = cpu_seconds();
         let times = rounds / 10 + 1;
         (0..times).for_each(|_| poses.iter().for_each(&mut query));
-        figures.push(1e6 * (clock.seconds() - before) / (times * poses.len()) as f64);
+        figures.push(1e6 * (cpu_seconds() - before) / (times * poses.len()) as f64);
     }
     let figures: Vec<String> = figures.iter().map(|f| format!("{f:.1}")).collect();
     println!("{} µs per query, means: apart, touching, overlap; the same with poses that change", figures.join(" "));
@@ -250,12 +248,11 @@ fn bunny() -> Option<Body> {
 fn body(name: &str, mesh: TriMesh) -> Body {
     let scale = 0.1 / mesh.diagonal();
     let mesh = mesh.scaled(scale);
-    let clock = Clock::new();
-    let before = clock.seconds();
+    let before = cpu_seconds();
     let ours = Shape::mesh(mesh, &TreeSettings::octree()).expect("a closed mesh");
     let Shape::Mesh(solid) = &ours else { unreachable!("a mesh was made") };
     let mesh = solid.mesh();
-    println!("{name}: {} triangles, shape made in {:.2} s of CPU", mesh.triangles.len(), clock.seconds() - before);
+    println!("{name}: {} triangles, shape made in {:.2} s of CPU", mesh.triangles.len(), cpu_seconds() - before);
     let theirs = ParryMesh::new(mesh.vertices.iter().map(vector).collect(), mesh.triangles.clone()).expect("a mesh");
     Body { name: format!("{name} ({} triangles)", mesh.triangles.len()), ours, theirs }
 }

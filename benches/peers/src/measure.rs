@@ -1,7 +1,7 @@
 //! One run of one engine: CPU time from t = 1 to 4 s, and errors computed from the positions only,
 //! the same for every engine.
 
-use crate::clock::Clock;
+use crate::clock::cpu_seconds;
 use crate::scene::{Body, EDGE, RADIUS, Scene};
 use crate::{DT, Engine};
 
@@ -26,7 +26,6 @@ pub struct Run {
 
 /// Steps an engine through the whole time and measures it.
 pub fn run(engine: &mut dyn Engine, scene: &Scene) -> Run {
-    let clock = Clock::new();
     let frames = |t: f64| (t / DT).round() as usize;
     (0..frames(FROM)).for_each(|_| engine.step());
     let centers =
@@ -34,9 +33,9 @@ pub fn run(engine: &mut dyn Engine, scene: &Scene) -> Run {
     let start = centers(engine);
     let mut run = Run::default();
     for _ in frames(FROM)..frames(TO) {
-        let before = clock.seconds();
+        let before = cpu_seconds();
         engine.step();
-        run.cpu += clock.seconds() - before;
+        run.cpu += cpu_seconds() - before;
         run.penetration = run.penetration.max(penetration(scene, &centers(engine)));
         run.residual = engine.residual().map(|r| run.residual.unwrap_or(0.0).max(r));
     }

@@ -16,7 +16,8 @@ impl Tumble {
     pub fn new(scene: &Scene) -> Tumble {
         let mut world = World::new(Settings::default().with_dt(DT)).expect("the default settings are valid");
         for (i, plane) in scene.planes.iter().enumerate() {
-            let fixed = RigidBody::fixed(Shape::half_space()).with_name(format!("plane{i}"))
+            let fixed = RigidBody::fixed(Shape::half_space())
+                .with_name(format!("plane{i}"))
                 .with_material(Material { restitution: RESTITUTION, friction: FRICTION, ..Material::default() })
                 .with_pose(pose(plane));
             world.add_static(fixed).expect("a fixed body is valid");
@@ -27,9 +28,10 @@ impl Tumble {
         };
         let shape = shape.expect("the sizes are valid");
         let mut add = |(i, c): (usize, &[f64; 3])| {
-            let body =
-                RigidBody::new(shape.clone()).with_name(format!("body{i}")).with_density(DENSITY);
-            let body = body.with_material(Material { restitution: RESTITUTION, friction: FRICTION, ..Material::default() }).with_pose(Pose::translation(c[0], c[1], c[2]));
+            let body = RigidBody::new(shape.clone()).with_name(format!("body{i}")).with_density(DENSITY);
+            let body = body
+                .with_material(Material { restitution: RESTITUTION, friction: FRICTION, ..Material::default() })
+                .with_pose(Pose::translation(c[0], c[1], c[2]));
             world.add(body).expect("names are unique")
         };
         let ids = scene.centers.iter().enumerate().map(&mut add).collect();

@@ -7,7 +7,7 @@ mod curve;
 pub use crowd::{Crowd, Kind};
 pub use curve::write as write_curve;
 
-use crate::clock::Clock;
+use crate::clock::cpu_seconds;
 use rapier3d_f64::parry::bounding_volume::Aabb as ParryBox;
 use rapier3d_f64::parry::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
 use std::time::Instant;
@@ -157,7 +157,6 @@ pub struct Cost {
 
 /// Tracks a crowd for `steps` steps, after as many to warm up.
 pub fn follow(follower: &mut dyn Follower, kind: Kind, n: usize, steps: usize) -> Cost {
-    let clock = Clock::new();
     let mut crowd = Crowd::new(kind, n);
     follower.start(&crowd);
     let mut pairs = 0;
@@ -166,18 +165,18 @@ pub fn follow(follower: &mut dyn Follower, kind: Kind, n: usize, steps: usize) -
         pairs = follower.step(&crowd);
     }
     let mut walls = Vec::with_capacity(steps);
-    let start = clock.seconds();
+    let start = cpu_seconds();
     for _ in 0..steps {
         crowd.advance();
         let begun = Instant::now();
         pairs = follower.step(&crowd);
         walls.push(begun.elapsed().as_secs_f64());
     }
-    let followed = clock.seconds();
+    let followed = cpu_seconds();
     for _ in 0..steps {
         crowd.advance();
     }
-    let moved = clock.seconds() - followed;
+    let moved = cpu_seconds() - followed;
     walls.sort_unstable_by(f64::total_cmp);
     Cost { step: 1e6 * (followed - start - moved) / steps as f64, tenth: 1e6 * walls[steps / 10], pairs }
 }
