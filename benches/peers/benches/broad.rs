@@ -12,7 +12,7 @@
 //! 1` in front reserves the core.
 
 use tumble_peers::broad::{Cost, Follower, Kind, Plain, Sweep, Tree, follow, write_curve};
-use tumble_peers::scene::RADIUS;
+use tumble_peers::scenes::RADIUS;
 
 /// Margin of fat boxes in both engines, as a fraction of a box's smallest extent.
 const ROOM: f64 = 0.1;

@@ -1,24 +1,31 @@
-//! CPU seconds per simulated second of piles and pyramids, tumble and Rapier in one run.
+//! CPU seconds per simulated second of piles, pyramids and towers, tumble and Rapier in one run.
 //!
 //! ```text
-//! cargo bench                              all cases, 5 runs each, medians
-//! cargo bench -- pyramid-55 --runs 9       one case
-//! cargo bench -- spheres-1000 --tumble     tumble only, for a profiler
+//! cargo bench --bench piles                              the scenes that take seconds, medians of 3 runs
+//! cargo bench --bench piles -- pyramid-55 --runs 9       one scene
+//! cargo bench --bench piles -- --large --runs 1          all scenes
+//! cargo bench --bench piles -- spheres-1000 --tumble     tumble only, for a profiler
 //! ```
 
-use tumble_peers::measure::{Run, run, stands};
-use tumble_peers::scene::{Scene, pyramid, spheres};
-use tumble_peers::{Engine, rapier::Rapier, tumble::Tumble};
+use tumble_peers::measure::{Run, run};
+use tumble_peers::rapier::{Rapier32, Rapier64};
+use tumble_peers::scene::Scene;
+use tumble_peers::tumble::Tumble;
+use tumble_peers::{Engine, Solves, scenes};
+
+/// Builds a scene in an engine.
+type Load = fn(&Scene) -> Box<dyn Engine>;
 
 /// Options of the command line.
 struct Options {
     names: Vec<String>,
     runs: usize,
+    large: bool,
     alone: bool,
 }
 
 fn options() -> Options {
-    let mut options = Options { names: Vec::new(), runs: 5, alone: false };
+    let mut options = Options { names: Vec::new(), runs: 3, large: false, alone: false };
     let mut arguments = std::env::args().skip(1).filter(|a| a != "--bench");
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
@@ -29,6 +36,7 @@ fn options() -> Options {
                     .filter(|n| *n > 0)
                     .expect("--runs wants a number above 0")
             }
+            "--large" => options.large = true,
             "--tumble" => options.alone = true,
             _ => options.names.push(argument),
         }
@@ -38,47 +46,63 @@ fn options() -> Options {
 
 fn main() {
     let options = options();
-    let scenes = [spheres(100), spheres(500), spheres(1000), pyramid(10), pyramid(20)];
+    let scenes = scenes::all();
+    for name in &options.names {
+        assert!(scenes.iter().any(|s| s.name == *name), "no scene is called {name}");
+    }
+    let chosen = |scene: &&Scene| match options.names.is_empty() {
+        true => options.large || !scene.large,
+        false => options.names.contains(&scene.name),
+    };
+    println!("CPU s per simulated s, median of {} runs; errors in mm; tumble (Rapier f64, f32).", options.runs);
     println!(
-        "CPU s per simulated s, t = 1 to 4 s, dt 1/60, median of {} runs. Errors in mm; residual in m/s.",
-        options.runs
+        "| case | tumble | Rapier f64 | f32 | ratio f64 | f32 | overlap | at the end | movement | speed at end, m/s | unconverged | residual, m/s |"
     );
-    println!("| case | tumble | Rapier f64 | ratio | penetration (Rapier) | movement (Rapier) | residual |");
-    println!("|---|---|---|---|---|---|---|");
-    for scene in scenes.iter().filter(|s| options.names.is_empty() || options.names.contains(&s.name)) {
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
+    for scene in scenes.iter().filter(chosen) {
         println!("{}", line(scene, &options));
     }
 }
 
-/// Returns one row of the table. The engines alternate, so both see the same load of the machine.
+/// Returns one row of the table. The engines alternate, so all see the same load of the machine.
 fn line(scene: &Scene, options: &Options) -> String {
-    let (mut ours, mut theirs) = (Vec::new(), Vec::new());
+    let engines: [Load; 3] =
+        [|s| Box::new(Tumble::new(s)), |s| Box::new(Rapier64::new(s)), |s| Box::new(Rapier32::new(s))];
+    let engines = if options.alone { &engines[..1] } else { &engines };
+    let mut runs = vec![Vec::new(); engines.len()];
     for _ in 0..options.runs {
-        ours.push(checked(&mut Tumble::new(scene), scene));
-        if !options.alone {
-            theirs.push(checked(&mut Rapier::new(scene), scene));
+        for (runs, engine) in runs.iter_mut().zip(engines) {
+            runs.push(run(engine(scene).as_mut(), scene));
         }
     }
-    let (a, b) = (median(ours), if theirs.is_empty() { Run::default() } else { median(theirs) });
-    let mm = |x: f64, y: f64| format!("{:.3} ({:.3})", 1e3 * x, 1e3 * y);
+    let runs: Vec<Run> = runs.into_iter().map(median).collect();
+    let cpu = |i: usize| runs.get(i).map_or(f64::NAN, |run: &Run| run.cpu);
+    let Solves { residual, unconverged } = runs[0].solves.expect("tumble reports its solves");
     format!(
-        "| {} | {:.4} | {:.4} | {:.2} | {} | {} | {:.1e} |",
+        "| {} | {:.4} | {:.4} | {:.4} | {:.2} | {:.2} | {} | {} | {} | {} | {unconverged} | {residual:.1e} |",
         scene.name,
-        a.cpu,
-        b.cpu,
-        a.cpu / b.cpu,
-        mm(a.penetration, b.penetration),
-        mm(a.movement, b.movement),
-        a.residual.unwrap_or(0.0)
+        cpu(0),
+        cpu(1),
+        cpu(2),
+        cpu(0) / cpu(1),
+        cpu(0) / cpu(2),
+        cell(&runs, |run| mm(run.overlap)),
+        cell(&runs, |run| mm(run.overlap_at_end)),
+        if scene.stands { cell(&runs, |run| mm(run.movement)) } else { "–".into() },
+        cell(&runs, |run| format!("{:.3}", run.speed)),
     )
 }
 
-fn checked(engine: &mut dyn Engine, scene: &Scene) -> Run {
-    let run = run(engine, scene);
-    if !stands(scene, &run) {
-        println!("{}: the pyramid fell", scene.name);
-    }
-    run
+/// Returns a length in millimeters.
+fn mm(meters: f64) -> String {
+    format!("{:.3}", 1e3 * meters)
+}
+
+/// Returns the figure of tumble, and those of its peers in brackets.
+fn cell(runs: &[Run], figure: impl Fn(&Run) -> String) -> String {
+    let peers: Vec<String> = runs[1..].iter().map(&figure).collect();
+    let peers = if peers.is_empty() { String::new() } else { format!(" ({})", peers.join(", ")) };
+    figure(&runs[0]) + &peers
 }
 
 /// Returns the run of median time; its other numbers are the same in every run of one engine.

@@ -4,27 +4,41 @@ pub mod articulated;
 pub mod broad;
 pub mod clock;
 pub mod measure;
+pub mod overlap;
+mod random;
 pub mod rapier;
 pub mod scene;
+pub mod scenes;
 pub mod tumble;
 
-/// Length of a frame, s.
-pub const DT: f64 = 1.0 / 60.0;
-/// Friction and restitution of every body and pair.
-pub const FRICTION: f64 = 0.5;
-/// See [`FRICTION`].
-pub const RESTITUTION: f64 = 0.0;
-/// Density of every body, kg/m³.
-pub const DENSITY: f64 = 1000.0;
+/// Motion of a body at one time.
+#[derive(Clone, Copy, Debug)]
+pub struct Motion {
+    /// Center, meters.
+    pub center: [f64; 3],
+    /// Rotation matrix, body to world.
+    pub rotation: [[f64; 3]; 3],
+    /// Speed of the center, m/s.
+    pub speed: f64,
+}
+
+/// The solves of a frame, as an engine reports them.
+#[derive(Clone, Copy, Debug)]
+pub struct Solves {
+    /// Largest residual, m/s.
+    pub residual: f64,
+    /// Number of solves that did not reach their tolerance.
+    pub unconverged: u32,
+}
 
 /// An engine with one scene loaded.
 pub trait Engine {
-    /// Advances by one frame of [`DT`].
+    /// Advances by one frame.
     fn step(&mut self);
-    /// Center of body `i` (in the order of the scene), meters.
-    fn center(&self, i: usize) -> [f64; 3];
-    /// Returns the residual that the engine reports for its last solve, m/s; `None` if it reports none.
-    fn residual(&self) -> Option<f64> {
+    /// Returns the motion of body `i` of the scene.
+    fn motion(&self, i: usize) -> Motion;
+    /// Returns the report on the last frame; `None` if the engine has none.
+    fn solves(&self) -> Option<Solves> {
         None
     }
 }

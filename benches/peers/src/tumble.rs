@@ -1,7 +1,7 @@
 //! A scene in tumble: `time_stepping`, `gauss_seidel`, default settings.
 
-use crate::scene::{Body, EDGE, Plane, RADIUS, Scene};
-use crate::{DENSITY, DT, Engine, FRICTION, RESTITUTION};
+use crate::scene::{self, DENSITY, FRICTION, Plane, Scene};
+use crate::{Engine, Motion, Solves};
 use tumble_collide::{Pose, Quat, Shape, Vec3};
 use tumble_core::{Material, ObjectId, RigidBody, Settings, World};
 
@@ -14,27 +14,20 @@ pub struct Tumble {
 impl Tumble {
     /// Builds the scene.
     pub fn new(scene: &Scene) -> Tumble {
-        let mut world = World::new(Settings::default().with_dt(DT)).expect("the default settings are valid");
+        let mut world = World::new(Settings::default().with_dt(scene.dt())).expect("the default settings are valid");
+        let material = Material { restitution: scene.restitution, friction: FRICTION, ..Material::default() };
         for (i, plane) in scene.planes.iter().enumerate() {
-            let fixed = RigidBody::fixed(Shape::half_space())
-                .with_name(format!("plane{i}"))
-                .with_material(Material { restitution: RESTITUTION, friction: FRICTION, ..Material::default() })
-                .with_pose(pose(plane));
+            let fixed = RigidBody::fixed(Shape::half_space()).with_name(format!("plane{i}"));
+            let fixed = fixed.with_material(material).with_pose(pose(plane));
             world.add_static(fixed).expect("a fixed body is valid");
         }
-        let shape = match scene.body {
-            Body::Sphere => Shape::sphere(RADIUS),
-            Body::Box => Shape::cuboid(Vec3::repeat(EDGE)),
-        };
-        let shape = shape.expect("the sizes are valid");
-        let mut add = |(i, c): (usize, &[f64; 3])| {
-            let body = RigidBody::new(shape.clone()).with_name(format!("body{i}")).with_density(DENSITY);
-            let body = body
-                .with_material(Material { restitution: RESTITUTION, friction: FRICTION, ..Material::default() })
-                .with_pose(Pose::translation(c[0], c[1], c[2]));
+        let mut add = |(i, body): (usize, &scene::Body)| {
+            let [x, y, z] = body.center;
+            let body = RigidBody::new(shape(body.shape)).with_name(format!("body{i}")).with_density(DENSITY);
+            let body = body.with_material(material).with_pose(Pose::translation(x, y, z));
             world.add(body).expect("names are unique")
         };
-        let ids = scene.centers.iter().enumerate().map(&mut add).collect();
+        let ids = scene.bodies.iter().enumerate().map(&mut add).collect();
         Tumble { world, ids }
     }
 }
@@ -44,13 +37,28 @@ impl Engine for Tumble {
         self.world.step().expect("all numbers are finite");
     }
 
-    fn center(&self, i: usize) -> [f64; 3] {
-        self.world.part_state(self.ids[i], 0).expect("the body is there").position().into()
+    fn motion(&self, i: usize) -> Motion {
+        let part = self.world.part_state(self.ids[i], 0).expect("the body is there");
+        let rotation = part.pose.rotation.to_rotation_matrix();
+        Motion {
+            center: part.position().into(),
+            rotation: [0, 1, 2].map(|r| [0, 1, 2].map(|c| rotation[(r, c)])),
+            speed: part.velocity.norm(),
+        }
     }
 
-    fn residual(&self) -> Option<f64> {
-        Some(self.world.report().residual)
+    fn solves(&self) -> Option<Solves> {
+        let report = self.world.report();
+        Some(Solves { residual: report.residual, unconverged: report.unconverged })
     }
+}
+
+fn shape(shape: scene::Shape) -> Shape {
+    match shape {
+        scene::Shape::Sphere(radius) => Shape::sphere(radius),
+        scene::Shape::Box(size) => Shape::cuboid(size.into()),
+    }
+    .expect("the sizes are valid")
 }
 
 /// The pose whose local z axis is the plane's normal.

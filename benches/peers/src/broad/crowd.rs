@@ -1,6 +1,7 @@
 //! Bounding boxes of spheres that fly in a closed space and reverse at its walls.
 
-use crate::scene::{RADIUS, Random};
+use crate::random::Random;
+use crate::scenes::RADIUS;
 use tumble_collide::{Aabb, Vec3};
 
 /// Space per sphere, as an edge in meters: the density of the piles at the start.
