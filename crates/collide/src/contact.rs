@@ -13,10 +13,16 @@ pub struct Contact {
     pub gap: f64,
     /// Identifier of the features that touch. The same features keep it while they stay in contact.
     pub feature: u64,
-    /// Distance from A's surface back along the normal to its core feature, meters: the radius of a
-    /// sphere, capsule or leaf sphere; 0 for a vertex, edge or face.
+    /// Distance from A's surface along the normal, into A, to its core feature, meters, at least 0.
+    ///
+    /// The core feature moves with A as a material point, while the contact point slides over a
+    /// rounded surface. It is the center of a sphere or leaf sphere, the nearest point on the axis
+    /// of a capsule or of a cylinder's side, and the surface itself for a vertex, edge or face. So
+    /// this is a radius of curvature, or 0. In world axes the feature is at
+    /// `point + (gap/2 + core_a)·normal`. Only the acceleration of the gap depends on it.
     pub core_a: f64,
-    /// Distance from B's surface along the normal to its core feature, meters.
+    /// The same distance for B, against the normal: B's core feature is at
+    /// `point − (gap/2 + core_b)·normal`.
     pub core_b: f64,
     /// The feature that determines the normal.
     pub normal_from: NormalFrom,

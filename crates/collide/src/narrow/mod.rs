@@ -45,10 +45,13 @@ pub fn contacts_in_mode(
         return;
     }
     let start = out.len();
-    if rank(a) <= rank(b) {
-        dispatch(mode, a, pose_a, b, pose_b, margin, out);
-    } else {
-        dispatch(mode, b, pose_b, a, pose_a, margin, out);
+    let ordered = rank(a) <= rank(b);
+    let [(first, pose_first), (second, pose_second)] =
+        if ordered { [(a, pose_a), (b, pose_b)] } else { [(b, pose_b), (a, pose_a)] };
+    if !exact(first, pose_first, second, pose_second, margin, out) {
+        general(mode, first, pose_first, second, pose_second, margin, out);
+    }
+    if !ordered {
         out[start..].iter_mut().for_each(|c| *c = c.flipped());
     }
 }
@@ -58,7 +61,9 @@ fn is_finite(pose: &Pose) -> bool {
     (pose.translation.vector.sum() + pose.rotation.coords.sum()).is_finite()
 }
 
-/// Pairs are ordered by rank, lower rank first.
+/// Returns the place of a shape in a pair: the shape of lower rank is A in [`exact`] and
+/// [`general`], which know each pair in that order only. Shapes with a sphere tree have rank 0, so
+/// in a pair with one tree the tree is A's. All others have a rank of their own, above 0.
 fn rank(shape: &Shape) -> u8 {
     match shape {
         Shape::Mesh(_) | Shape::Cylinder(_) => 0,
@@ -69,15 +74,9 @@ fn rank(shape: &Shape) -> u8 {
     }
 }
 
-fn dispatch(
-    mode: ContactMode,
-    a: &Shape,
-    pose_a: &Pose,
-    b: &Shape,
-    pose_b: &Pose,
-    margin: f64,
-    out: &mut Vec<Contact>,
-) {
+/// Appends the contacts of a pair with a formula of its own, which all modes share. Returns false
+/// for other pairs.
+fn exact(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) -> bool {
     use Shape::{Box, Capsule, Cylinder, HalfSpace, Sphere};
     match (a, b) {
         (Sphere { radius: ra }, Sphere { radius: rb }) => sphere::sphere_sphere(*ra, pose_a, *rb, pose_b, margin, out),
@@ -101,18 +100,30 @@ fn dispatch(
         (Box { half_extents }, HalfSpace) => half_space::cuboid(half_extents, pose_a, pose_b, margin, out),
         (HalfSpace, HalfSpace) => {}
         (Cylinder(c), HalfSpace) => cylinder::half_space((c.radius(), c.half_length()), pose_a, pose_b, margin, out),
-        _ if mode == ContactMode::Surface && part_count(a) == 1 && part_count(b) == 1 => {
-            with_body(a, 0, &mut |a| with_body(b, 0, &mut |b| sdf_contact::contacts(a, pose_a, b, pose_b, margin, out)))
-        }
-        _ if mode == ContactMode::Surface && part_count(a) > 0 && part_count(b) > 0 => {
-            parts::contacts_of_parts(a, pose_a, b, pose_b, margin, out)
-        }
-        _ => match (a.tree(), b.tree()) {
-            (Some(tree_a), Some(tree_b)) => tree::tree_tree(tree_a, pose_a, tree_b, pose_b, margin, out),
-            (Some(tree_a), None) => tree::tree_primitive(tree_a, pose_a, b, pose_b, margin, out),
-            // the ranks exclude all other combinations
-            _ => debug_assert!(false, "pair out of order"),
-        },
+        _ => return false,
+    }
+    true
+}
+
+/// Appends the contacts of any pair: by sphere trees in the mode `spheres`, and for a mesh without
+/// surfaces; by surfaces otherwise. A pair without trees has surfaces, and collides by them in
+/// every mode.
+fn general(mode: ContactMode, a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+    let has_surfaces = part_count(a) > 0 && part_count(b) > 0;
+    let trees = if mode == ContactMode::Surface && has_surfaces { (None, None) } else { (a.tree(), b.tree()) };
+    match trees {
+        (Some(tree_a), Some(tree_b)) => tree::tree_tree(tree_a, pose_a, tree_b, pose_b, margin, out),
+        (Some(tree_a), None) => tree::tree_primitive(tree_a, pose_a, b, pose_b, margin, out),
+        (None, _) => by_surfaces(a, pose_a, b, pose_b, margin, out),
+    }
+}
+
+/// Appends the contacts of the surfaces of two shapes.
+fn by_surfaces(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
+    if part_count(a) == 1 && part_count(b) == 1 {
+        with_body(a, 0, &mut |a| with_body(b, 0, &mut |b| sdf_contact::contacts(a, pose_a, b, pose_b, margin, out)));
+    } else {
+        parts::contacts_of_parts(a, pose_a, b, pose_b, margin, out);
     }
 }
 
@@ -146,6 +157,40 @@ fn with_body(shape: &Shape, part: usize, visit: &mut dyn FnMut(&Body)) {
             let Some(surface) = mesh.surfaces().get(part) else { return };
             let elements = BodyElements::Mesh(&surface.elements);
             visit(&Body { elements, field: &surface.field, mesh: Some(&surface.field), radius })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ContactMode::{Spheres, Surface};
+    use crate::{Quat, Vec3};
+
+    /// The formulas of [`exact`] are the reference: a new shape without a tree has the contacts of
+    /// [`general`] beside every primitive.
+    #[test]
+    fn pairs_without_trees_have_their_contacts_by_surfaces_in_every_mode() {
+        let shapes = [
+            (Shape::sphere(0.5).unwrap(), 0.5),
+            (Shape::capsule(0.3, 0.6).unwrap(), 0.6),
+            (Shape::cuboid(Vec3::repeat(1.0)).unwrap(), 0.5),
+            (Shape::half_space(), 0.0),
+        ];
+        let below = Pose::from_parts(Vec3::new(0.3, -0.7, 0.2).into(), Quat::from_euler_angles(0.4, -0.9, 1.3));
+        for (i, (a, half_a)) in shapes[..3].iter().enumerate() {
+            for (b, half_b) in &shapes[i..] {
+                for (mode, gap) in [(Surface, -0.02), (Surface, 0.02), (Spheres, -0.02), (Spheres, 0.02)] {
+                    let above = below * Pose::translation(0.0, 0.0, half_a + half_b + gap);
+                    let [mut reference, mut found] = [Vec::new(), Vec::new()];
+                    assert!(exact(a, &above, b, &below, 0.1, &mut reference));
+                    general(mode, a, &above, b, &below, 0.1, &mut found);
+                    for contacts in [reference, found] {
+                        let least = contacts.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
+                        assert!((least - gap).abs() < 1e-12, "{a:?} on {b:?}, {mode:?}, {gap}: {contacts:?}");
+                    }
+                }
+            }
         }
     }
 }

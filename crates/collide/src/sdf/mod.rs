@@ -84,7 +84,9 @@ pub(crate) struct Hit {
     pub nearest: f64,
     /// Outward unit normal: from the surface to the point, or back if it is inside.
     pub normal: Vec3,
-    /// Distance from the surface back along the normal to its core: a radius, or 0.
+    /// Distance from the surface back along the normal to its core feature, meters, at least 0: the
+    /// radius of a sphere, capsule or cylinder's side, 0 for a face, edge or corner. It becomes
+    /// [`Contact::core_b`](crate::Contact::core_b) if the field is B's.
     pub core: f64,
     pub feature: Feature,
     /// Whether an element with the given normals can touch this part of the surface.
@@ -113,9 +115,13 @@ pub(crate) const OVERHANG: f64 = 1e-4;
 /// The same distance for a place on an edge: rounding.
 pub(crate) const TOUCHING: f64 = 1e-6;
 
-/// Signed distance field of a solid.
+/// Signed distance field of a solid, in the solid's own frame, meters: negative inside.
+///
+/// The provided methods describe the surface, so that queries can skip work. A polyhedron keeps
+/// their answers; overrides are `RoundField` (sphere, capsule), `CylinderField` and
+/// `HalfSpaceField`.
 pub(crate) trait DistanceField {
-    /// Returns a lower bound of the signed distance at `p`; cheap.
+    /// Returns a lower bound of the signed distance at `p`, meters; cheaper than [`hit`](Self::hit).
     fn bound(&self, p: &Vec3) -> f64;
     /// Returns the closest part of the surface that an element with `normals` can touch (`facing`),
     /// or the closest of all if there is none.
@@ -125,16 +131,31 @@ pub(crate) trait DistanceField {
     fn hit(&self, p: &Vec3, normals: &[Vec3], beside: f64) -> Hit;
     /// Returns whether the solid is convex, which makes its signed distance a convex function.
     fn is_convex(&self) -> bool;
-    /// Returns whether the surface is round about an axis: it has no edges that could meet another
-    /// axis.
+    /// Returns whether the surface is round about its local z axis, or about its center: sphere,
+    /// capsule, cylinder.
+    ///
+    /// True has three effects. The axis of a cylinder is tested against this field as an edge with
+    /// the cylinder's radius: two round sides have no edges that could find each other. Searches
+    /// along an edge do not use the closed form for the distance from a straight edge or a corner.
+    /// Directions of separation are refined numerically, since a round surface has no finite set of
+    /// normals.
+    ///
+    /// Override it for a solid whose sides are curved and belong to no straight edge or corner.
     fn is_round(&self) -> bool {
         false
     }
-    /// Returns whether the surface is curved and its own elements do not find every edge near it.
+    /// Returns whether the surface falls away from a tangent line, by `L²/8R` over a length `L`, and
+    /// has no elements of its own that find the edges near it: the side of a cylinder.
+    ///
+    /// If true, all edges of a mesh are tested against this field, also those that its vertices
+    /// replace elsewhere (see [`elements`]), and all its faces in deep overlaps. A sphere and a capsule answer false although they are curved: their core point and
+    /// axis are elements, and find the edges of the mesh.
     fn is_curved(&self) -> bool {
         false
     }
-    /// Returns whether the signed distance is linear: only points need to be tested.
+    /// Returns whether the signed distance is a linear function of the point: a half-space. Then
+    /// the points of the other body find all contacts, and its edges, axes and faces are not
+    /// tested.
     fn is_linear(&self) -> bool {
         false
     }

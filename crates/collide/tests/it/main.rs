@@ -12,6 +12,7 @@ mod mesh_contacts;
 mod mesh_files;
 mod meshes;
 mod overlaps;
+mod pairs;
 mod primitives;
 mod quality;
 mod rays;
