@@ -17,7 +17,7 @@ mod records;
 use crate::report::StepReport;
 use crate::settings::Settings;
 use crate::solver::{self, RowSolver};
-use crate::step::{Stepper, stepper_by_name};
+use crate::step::{STEPPERS, Stepper, stepper_by_name};
 use crate::world::view::{Mode, ObjectId};
 use crate::world::{ContactPoint, World, WorldState};
 use crate::{ArticulatedBody, LoopJoint, Object, RigidBody, UnreachableJoint};
@@ -58,6 +58,26 @@ pub enum ArchiveError {
     /// An object of a user-defined type that the caller does not write, or does not make.
     #[error("'{0}' is an object of a user-defined type, and the caller gave nothing to write or to make it")]
     Foreign(String),
+    /// A stepper of a user-defined type, or of another version of tumble: its name.
+    #[error(
+        "the stepper '{0}' cannot be archived; expected {expected}: set one of these before the world is written, \
+         and '{0}' again on the world that is read",
+        expected = any_of(&STEPPERS)
+    )]
+    Stepper(String),
+    /// A solver of a user-defined type, or of another version of tumble: its name.
+    #[error(
+        "the solver '{0}' cannot be archived; expected {expected}: set one of these before the world is written, \
+         and '{0}' again on the world that is read",
+        expected = any_of(&solver::NAMES)
+    )]
+    Solver(String),
+}
+
+/// Returns the names in quotes, the last one after "or".
+fn any_of(names: &[&str]) -> String {
+    let quoted: Vec<String> = names.iter().map(|name| format!("'{name}'")).collect();
+    quoted.split_last().map_or_else(String::new, |(last, rest)| format!("{} or {last}", rest.join(", ")))
 }
 
 /// Content of an archive.
@@ -98,10 +118,13 @@ impl World {
     ///
     /// # Errors
     /// [`ArchiveError::Foreign`] for an object of a user-defined type that is not among `foreign`;
+    /// [`ArchiveError::Stepper`] and [`ArchiveError::Solver`] for a stepper and a solver of a
+    /// user-defined type, since [`from_archive`](World::from_archive) could not make them;
     /// [`ArchiveError::Unwritable`] for a value that cannot be written.
     pub fn archive(&self, foreign: &[ObjectId]) -> Result<Vec<u8>, ArchiveError> {
         let (mut tables, indices) = (Tables::default(), ObjectIndices::of(self.ids()));
-        let (stepper, solver) = (self.stepper_name(), self.solver_name());
+        // only what can be read again is written
+        let (stepper, solver) = (stepper(self.stepper_name())?.name(), solver(self.solver_name())?.name());
         let objects = self
             .ids()
             .iter()
@@ -137,8 +160,9 @@ impl World {
     /// object of a user-defined type from its name.
     ///
     /// # Errors
-    /// [`ArchiveError`] for bytes that are no archive, of another format or damaged, and for an
-    /// object that `foreign` does not make.
+    /// [`ArchiveError`] for bytes that are no archive, of another format or damaged, for an object
+    /// that `foreign` does not make, and for a stepper or solver without a name in [`STEPPERS`] or
+    /// [`solver::NAMES`].
     pub fn from_archive(
         bytes: &[u8],
         foreign: &mut dyn FnMut(&str) -> Option<Box<dyn Object>>,
@@ -201,11 +225,11 @@ fn damaged(why: impl ToString) -> ArchiveError {
 }
 
 fn stepper(name: &str) -> Result<Box<dyn Stepper>, ArchiveError> {
-    stepper_by_name(name).ok_or_else(|| damaged(format!("there is no stepper '{name}'")))
+    stepper_by_name(name).ok_or_else(|| ArchiveError::Stepper(name.into()))
 }
 
 fn solver(name: &str) -> Result<Box<dyn RowSolver>, ArchiveError> {
-    solver::by_name(name).ok_or_else(|| damaged(format!("there is no solver '{name}'")))
+    solver::by_name(name).ok_or_else(|| ArchiveError::Solver(name.into()))
 }
 
 fn record(object: &dyn Object, tables: &mut Tables, indices: &ObjectIndices) -> Record {
@@ -218,5 +242,31 @@ fn record(object: &dyn Object, tables: &mut Tables, indices: &ObjectIndices) -> 
         Record::LoopJoint(LoopJointRecord::of(loop_joint, indices))
     } else {
         Record::Foreign
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the error of reading the archive of an empty world after a change.
+    fn refused(change: impl Fn(&mut Archive)) -> String {
+        let mut archive: Archive = open(HEAD, &World::default().archive(&[]).unwrap()).unwrap();
+        change(&mut archive);
+        World::from_archive(&seal(HEAD, &archive).unwrap(), &mut |_| None).map(|_| ()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn unknown_steppers_and_solvers_are_errors_of_their_own() {
+        assert_eq!(
+            refused(|archive| archive.stepper = "graded".into()),
+            "the stepper 'graded' cannot be archived; expected 'time_stepping' or 'backtracking': set one of these \
+             before the world is written, and 'graded' again on the world that is read"
+        );
+        assert_eq!(
+            refused(|archive| archive.solver = "jacobi".into()),
+            "the solver 'jacobi' cannot be archived; expected 'gauss_seidel', 'lcp_pyramid' or 'lcp_sliding': set one \
+             of these before the world is written, and 'jacobi' again on the world that is read"
+        );
     }
 }

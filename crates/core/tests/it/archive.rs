@@ -2,6 +2,8 @@
 
 use crate::common::*;
 use tumble_core::collide::{Mat3, Pose, Shape, TreeSettings, TriMesh, Vec3};
+use tumble_core::rows::Rows;
+use tumble_core::solver::{NAMES, RowSolver, SolveReport, SolverSettings, by_name};
 use tumble_core::*;
 
 /// A world with every shape, a chain of links with limits, drives and a coupling, loops and
@@ -141,6 +143,47 @@ fn objects_of_other_kinds_are_made_by_the_caller() {
         other.step().unwrap();
     }
     assert_eq!(other.save(), world.save());
+}
+
+/// A solver and a stepper of another crate.
+#[derive(Clone)]
+struct Idle;
+
+impl RowSolver for Idle {
+    fn name(&self) -> &'static str {
+        "idle"
+    }
+    fn solve(&self, _: &Rows, _: &[u32], _: &[f64], _: &mut [f64], _: &mut [f64], _: SolverSettings) -> SolveReport {
+        SolveReport { iterations: 0, converged: true, ray: false }
+    }
+    fn fork(&self) -> Box<dyn RowSolver> {
+        Box::new(Idle)
+    }
+}
+
+impl Stepper for Idle {
+    fn name(&self) -> &'static str {
+        "idle"
+    }
+    fn step(&mut self, _: StepContext) -> Result<(), StepError> {
+        Ok(())
+    }
+    fn fork(&self) -> Box<dyn Stepper> {
+        Box::new(Idle)
+    }
+}
+
+/// The bytes could not be read again, so they are not written.
+#[test]
+fn a_world_with_a_foreign_solver_or_stepper_is_not_written() {
+    let mut world = everything(STEPPERS[0]);
+    world.set_solver(Box::new(Idle));
+    assert_eq!(world.archive(&[]), Err(ArchiveError::Solver("idle".into())));
+    world.set_solver(by_name(NAMES[0]).unwrap());
+    world.set_stepper(Box::new(Idle));
+    assert_eq!(world.archive(&[]), Err(ArchiveError::Stepper("idle".into())));
+    world.set_stepper(stepper_by_name(STEPPERS[0]).unwrap());
+    assert!(World::from_archive(&world.archive(&[]).unwrap(), &mut |_| None).is_ok());
 }
 
 #[test]
