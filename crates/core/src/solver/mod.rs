@@ -66,7 +66,7 @@ pub struct SolveReport {
     pub ray: bool,
 }
 
-/// Names of all solvers in files and on the command line; `lcp` is short for `lcp_pyramid`.
+/// Names of all solvers of this crate, as scene files, archives, Python and the command line use them.
 pub const NAMES: [&str; 3] = ["gauss_seidel", "lcp_pyramid", "lcp_sliding"];
 
 /// Returns the solver of that name; `lcp` is short for `lcp_pyramid`. `None` for other names.
@@ -85,7 +85,8 @@ pub fn by_name(name: &str) -> Option<Box<dyn RowSolver>> {
 /// is added to `du`, which holds the sum over other islands on entry (0 on this island's own
 /// ranges). A block without sides, or a row without response, gets no multiplier.
 pub trait RowSolver: Send + Sync {
-    /// Returns the name of the solver on the command line (`--solver`).
+    /// Returns the solver's name in reports and archives: one of [`NAMES`] for the solvers of this
+    /// crate, any other for those of other crates.
     fn name(&self) -> &'static str;
     /// Solves the island of the given `blocks` (indices into `rows.blocks`).
     fn solve(

@@ -19,7 +19,8 @@ use crate::world::{Core, StepError};
 
 /// A method that advances a world by one frame.
 pub trait Stepper: Send + Sync {
-    /// Returns the name of the stepper on the command line (`--stepper`).
+    /// Returns the stepper's name in reports and archives: one of [`STEPPERS`] for the steppers of
+    /// this crate, any other for those of other crates.
     fn name(&self) -> &'static str;
     /// Advances by one frame: [`Settings::dt`](crate::Settings::dt) seconds. After an error the world restores state and time.
     fn step(&mut self, frame: StepContext) -> Result<(), StepError>;
@@ -27,10 +28,10 @@ pub trait Stepper: Send + Sync {
     fn fork(&self) -> Box<dyn Stepper>;
 }
 
-/// Names of all steppers, as files and the command line take them.
+/// Names of all steppers of this crate, as scene files, archives, Python and the command line use them.
 pub const STEPPERS: [&str; 2] = ["time_stepping", "backtracking"];
 
-/// The stepper of that name; `None` for a name that is not in [`STEPPERS`].
+/// Returns the stepper of that name; `None` for a name that is not in [`STEPPERS`].
 pub fn stepper_by_name(name: &str) -> Option<Box<dyn Stepper>> {
     match name {
         "time_stepping" => Some(Box::<TimeStepping>::default()),

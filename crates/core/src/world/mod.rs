@@ -137,12 +137,13 @@ impl World {
         World { core, stepper, before: WorldState::default(), contacts_before: Vec::new(), names }
     }
 
-    /// Replaces the stepper.
+    /// Replaces the stepper. A world is archived only with one of [`STEPPERS`](crate::STEPPERS).
     pub fn set_stepper(&mut self, stepper: Box<dyn Stepper>) {
         self.stepper = stepper;
     }
 
-    /// Replaces the solver of contact rows.
+    /// Replaces the solver of contact rows. A world is archived only with one of
+    /// [`solver::NAMES`](crate::solver::NAMES).
     pub fn set_solver(&mut self, solver: Box<dyn RowSolver>) {
         self.core.solver = solver;
     }

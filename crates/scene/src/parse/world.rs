@@ -48,7 +48,8 @@ pub enum Solver {
 }
 
 impl Stepper {
-    /// All steppers with their names in scene files and Python.
+    /// All steppers with their names in scene files, Python and on the command line: those of
+    /// [`tumble_core::STEPPERS`], in the same order.
     pub const NAMES: &[(&str, Self)] =
         &[("time_stepping", Stepper::TimeStepping), ("backtracking", Stepper::Backtracking)];
 
@@ -62,7 +63,8 @@ impl Stepper {
 }
 
 impl Integrator {
-    /// All integrators with their names in scene files and Python.
+    /// All integrators with their names in scene files, Python and on the command line: one for
+    /// each of [`tumble_core::Integrator`].
     pub const NAMES: &[(&str, Self)] = &[
         ("verlet", Integrator::Verlet),
         ("symplectic_euler", Integrator::SymplecticEuler),
@@ -73,7 +75,8 @@ impl Integrator {
 }
 
 impl Solver {
-    /// All solvers with their names in scene files and Python.
+    /// All solvers with their names in scene files, Python and on the command line: those of
+    /// [`tumble_core::solver::NAMES`], in the same order.
     pub const NAMES: &[(&str, Self)] = &[
         ("gauss_seidel", Solver::GaussSeidel),
         ("lcp_pyramid", Solver::LcpPyramid),

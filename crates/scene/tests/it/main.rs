@@ -8,6 +8,7 @@ mod caves;
 mod contacts;
 mod expansion;
 mod finding;
+mod names;
 mod on_floor;
 mod pinocchio;
 mod repair;
