@@ -5,6 +5,7 @@ mod data;
 mod finish;
 mod frame;
 mod meshes;
+mod pipeline_plan;
 mod pipelines;
 mod scene;
 mod shadow;

@@ -3,6 +3,7 @@
 mod bodies;
 mod body_view;
 mod core;
+mod error;
 mod islands;
 mod overlaps;
 mod pair_materials;
@@ -18,6 +19,7 @@ pub(crate) mod view;
 pub(crate) use self::core::Coordinates;
 pub use self::core::{ContactPoint, Core, StepError};
 pub use body_view::BodyView;
+pub use error::WorldError;
 pub use overlaps::Overlap;
 pub use pick::PickForce;
 pub use replica::{Replica, ReplicaError};
@@ -31,75 +33,13 @@ use crate::object::part_state::{PartState, StateRange, StateSizes};
 use crate::object::visual::Visual;
 use crate::object::{Energy, Momentum, Object};
 use crate::report::StepReport;
-use crate::rigid::{BodyError, RigidBody};
-use crate::settings::{Settings, SettingsError};
+use crate::rigid::RigidBody;
+use crate::settings::Settings;
 use crate::solver::{GaussSeidel, RowSolver};
 use crate::step::{StepContext, Stepper, TimeStepping};
 use crate::world::view::{Mode, ObjectId, Placed, Status, Table, WorldView};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// Reason why a call to a world failed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum WorldError {
-    /// Another object has the name.
-    #[error("an object named '{0}' is already in the world; names must be unique")]
-    DuplicateName(String),
-    /// A constant of a body is out of its range.
-    #[error("body '{name}': {why}")]
-    Body {
-        /// Name of the body.
-        name: String,
-        /// The constant and its range.
-        why: BodyError,
-    },
-    /// A setting is out of its range.
-    #[error(transparent)]
-    Settings(#[from] SettingsError),
-    /// The id belongs to no object of this world.
-    #[error("no such object: it was removed, or belongs to another world")]
-    Stale,
-    /// The call needs a rigid body.
-    #[error("'{0}' is not a rigid body")]
-    NotRigid(String),
-    /// The object has more or fewer collidable parts than part states.
-    #[error("'{name}' has {parts} collidable parts and {part_states} part states; the numbers must be equal")]
-    Parts {
-        /// Name of the object.
-        name: String,
-        /// Number of parts of its `Collidable`.
-        parts: usize,
-        /// Number of part states in its `StateSizes`.
-        part_states: usize,
-    },
-    /// The object has no such part.
-    #[error("'{name}' has no part {part}")]
-    NoPart {
-        /// Name of the object.
-        name: String,
-        /// Index of the part.
-        part: usize,
-    },
-    /// The slice does not have one number per degree of freedom of the object.
-    #[error("'{name}' has {dof} degrees of freedom, and {given} numbers were given")]
-    Freedoms {
-        /// Name of the object.
-        name: String,
-        /// Its degrees of freedom.
-        dof: usize,
-        /// Length of the slice.
-        given: usize,
-    },
-    /// The numbers are not a state of this object: wrong length, not finite, or an orientation that is not of unit length.
-    #[error(
-        "'{0}': the numbers are not a state of this object (wrong length, not finite, or an orientation that is not of unit length)"
-    )]
-    BadState(String),
-    /// A number is not finite.
-    #[error("'{0}': a number is not finite")]
-    NotFinite(String),
-}
 
 /// A world of objects that moves in frames of `settings.dt` seconds.
 pub struct World {

@@ -1,0 +1,66 @@
+//! Errors of calls to a world.
+
+use crate::rigid::BodyError;
+use crate::settings::SettingsError;
+
+/// Reason why a call to a world failed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum WorldError {
+    /// Another object has the name.
+    #[error("an object named '{0}' is already in the world; names must be unique")]
+    DuplicateName(String),
+    /// A constant of a body is out of its range.
+    #[error("body '{name}': {why}")]
+    Body {
+        /// Name of the body.
+        name: String,
+        /// The constant and its range.
+        why: BodyError,
+    },
+    /// A setting is out of its range.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// The id belongs to no object of this world.
+    #[error("no such object: it was removed, or belongs to another world")]
+    Stale,
+    /// The call needs a rigid body.
+    #[error("'{0}' is not a rigid body")]
+    NotRigid(String),
+    /// The object has more or fewer collidable parts than part states.
+    #[error("'{name}' has {parts} collidable parts and {part_states} part states; the numbers must be equal")]
+    Parts {
+        /// Name of the object.
+        name: String,
+        /// Number of parts of its `Collidable`.
+        parts: usize,
+        /// Number of part states in its `StateSizes`.
+        part_states: usize,
+    },
+    /// The object has no such part.
+    #[error("'{name}' has no part {part}")]
+    NoPart {
+        /// Name of the object.
+        name: String,
+        /// Index of the part.
+        part: usize,
+    },
+    /// The slice does not have one number per degree of freedom of the object.
+    #[error("'{name}' has {dof} degrees of freedom, and {given} numbers were given")]
+    Freedoms {
+        /// Name of the object.
+        name: String,
+        /// Its degrees of freedom.
+        dof: usize,
+        /// Length of the slice.
+        given: usize,
+    },
+    /// The numbers are not a state of this object: wrong length, not finite, or an orientation that is not of unit length.
+    #[error(
+        "'{0}': the numbers are not a state of this object (wrong length, not finite, or an orientation that is not of unit length)"
+    )]
+    BadState(String),
+    /// A number is not finite.
+    #[error("'{0}': a number is not finite")]
+    NotFinite(String),
+}
