@@ -6,6 +6,7 @@ Looks at every file that git tracks or would track, and prints each fault as `fi
 - Paths, links, commands and names of tests in pages exist, and so do types named in ARCHITECTURE.md. No path of one machine stands anywhere.
 - No doc comment of Rust begins with "What", "Who", "Whose", "Where" or "Of".
 - No word that `docs/glossary.md` rules out stands in a page, a comment, a string of Rust or Python, a TOML file or a script.
+- No line ends in a blank.
 - No sentence of the README, ARCHITECTURE.md, CONTRIBUTING.md or `docs/` has more than 45 words.
 """
 
@@ -172,6 +173,13 @@ def check_doc_comments(name, lines, faults):
             faults.append(f"{name}:{number}: a doc comment begins with '{found.group(1)}': begin with a noun, or a verb in the third person")
 
 
+def check_line_ends(name, lines, faults):
+    """Refuses blanks at the end of a line. A line break in Markdown is a backslash."""
+    for number, line in enumerate(lines, 1):
+        if line != line.rstrip(" \t"):
+            faults.append(f"{name}:{number}: the line ends in a blank")
+
+
 def sentences(text):
     """(line, words) of every sentence of a page: of paragraphs, items of lists, quotes and cells of tables."""
     paragraph, first = [], 0
@@ -300,7 +308,7 @@ def main():
     known = folders()
     scenes = {path.parent.name for path in ROOT.glob("scenes/*/scene.toml")}
     targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.M))
-    source = (ROOT / "crates/tumble/src/args.rs").read_text()
+    source = (ROOT / "crates/tumble/src/args/mod.rs").read_text()
     enum = re.search(r"pub enum Command \{(.*?)\n\}", source, re.S)
     subcommands = {word.lower() for word in re.findall(r"^    (\w+)", enum.group(1), re.M)} if enum else set()
     sources = [text for text in (text_of(name) for name in names if name.endswith(".rs")) if text]
@@ -317,6 +325,7 @@ def main():
         for number, line in enumerate(lines, 1):
             for path in MACHINE.findall(line) if name != "scripts/check_docs.py" else ():
                 faults.append(f"{name}:{number}: the path {path or line.strip()} is of one machine")
+        check_line_ends(name, lines, faults)
         if not name.startswith(FORMER):
             check_words(name, text, rules, faults)
             if name.endswith(".rs"):

@@ -121,3 +121,9 @@ def test_a_link_to_a_heading_that_does_not_exist_is_found():
     faults = []
     check_docs.check_links("docs/x.md", ["[a](references.md#the-thesis) [b](references.md#nowhere)", "[c](nowhere.md)"], faults)
     assert [fault.split(":")[1] for fault in faults] == ["1", "2"]
+
+
+def test_a_blank_at_the_end_of_a_line_is_found():
+    faults = []
+    check_docs.check_line_ends("docs/some.md", ["good", "", " indented", "blank ", "break  ", "tab\t"], faults)
+    assert [fault.split(": ")[0] for fault in faults] == ["docs/some.md:4", "docs/some.md:5", "docs/some.md:6"]
