@@ -188,7 +188,7 @@ impl World {
         let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
         let name = || entry.name.to_string();
         if forces.len() != entry.state_range.v.len() {
-            return Err(WorldError::Freedoms { name: name(), dof: entry.state_range.v.len(), given: forces.len() });
+            return Err(WorldError::DofCount { name: name(), dof: entry.state_range.v.len(), given: forces.len() });
         }
         if forces.iter().any(|x| !x.is_finite()) {
             return Err(WorldError::NotFinite(name()));

@@ -47,7 +47,7 @@ pub enum WorldError {
     },
     /// The slice does not have one number per degree of freedom of the object.
     #[error("'{name}' has {dof} degrees of freedom, and {given} numbers were given")]
-    Freedoms {
+    DofCount {
         /// Name of the object.
         name: String,
         /// Its degrees of freedom.
