@@ -99,7 +99,7 @@ fi
 wanted="$(sed -n 's/^rust-version = "1\.\([0-9]*\).*"/\1/p' Cargo.toml)"
 found="$(rustc -V | sed -n 's/^rustc 1\.\([0-9]*\).*/\1/p')"
 if [ "${found:-0}" -lt "${wanted:-0}" ]; then
-    echo "error: Rust 1.$wanted or newer is wanted, and $(rustc -V) is here; run: rustup update stable" >&2
+    echo "error: Rust 1.$wanted or newer is required, and $(rustc -V) is here; run: rustup update stable" >&2
     exit 1
 fi
 

@@ -1,5 +1,5 @@
-//! Valid messages with random content, to a server and a facet in the middle of a run. The bytes are a
-//! sequence of: kind, flags (run, join, receiver), frame, length, payload.
+//! Valid messages with random content, to a server and a facet in the middle of a run. The bytes
+//! are a sequence of: kind, flags (run, join, receiver), frame, length, payload.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

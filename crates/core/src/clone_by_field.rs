@@ -1,7 +1,7 @@
 //! `Clone` for structs of tables that are copied every frame.
 
-/// Implements `Clone` for a struct, given all of its fields. `clone_from` clones every field into the memory that the old one has,
-/// which the derived `clone_from` does not.
+/// Implements `Clone` for a struct, given all of its fields. `clone_from` clones every field into
+/// the memory that the old one has, which the derived `clone_from` does not.
 macro_rules! clone_by_field {
     ($type:ident { $($field:ident),* $(,)? }) => {
         impl Clone for $type {

@@ -3,10 +3,13 @@
 use crate::object::part_state::PartState;
 use std::any::Any;
 
-/// Values that an object derives from one state besides its part states (mass matrix, factors), and the working memory of its calls.
+/// Values that an object derives from one state besides its part states (mass matrix, factors), and
+/// the working memory of its calls.
 ///
-/// [`Object::new_cache`](crate::Object::new_cache) makes it, [`Object::refresh`](crate::Object::refresh) writes it, the maps of
-/// [`Integratable`](crate::Integratable) read it. An object may have several at once, each for another state.
+/// [`Object::new_cache`](crate::Object::new_cache) makes it,
+/// [`Object::refresh`](crate::Object::refresh) writes it, the maps of
+/// [`Integratable`](crate::Integratable) read it. An object may have several at once, each for
+/// another state.
 pub struct Cache(Box<dyn Any + Send + Sync>);
 
 impl Cache {

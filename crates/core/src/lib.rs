@@ -2,9 +2,9 @@
 //! integrators, steppers and the world.
 //!
 //! A step reads the state, accumulates forces, finds contacts, turns test impulses into rows,
-//! solves all rows together and writes the state. Equal inputs give equal bits: this crate has no
-//! IO, clock, threads, file format or GPU. `docs/references.md` lists the thesis, RBDA and all other
-//! sources that the modules cite.
+//! solves all rows together and writes the state. Equal inputs give equal bits: this crate reads
+//! no file and no clock, starts no thread and uses no GPU. `docs/references.md` lists the thesis,
+//! RBDA and all other sources that the modules cite.
 //!
 //! SI units, radians, z up; sizes of shapes are full lengths. `docs/conventions.md` has these and
 //! the other conventions beside those of Python and of scene files.

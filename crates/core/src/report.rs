@@ -7,7 +7,7 @@ use crate::world::view::ObjectId;
 #[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnreachableJoint {
-    /// The constraint.
+    /// The loop joint.
     pub loop_joint: ObjectId,
     /// Distance between its sides, m; 0 if the largest error is an angle.
     pub distance: f64,

@@ -24,9 +24,11 @@ pub enum Integrator {
     DormandPrince,
 }
 
-/// The constants of a world. They may change between steps ([`World::set_settings`](crate::World::set_settings)).
+/// The constants of a world. They may change between steps
+/// ([`World::set_settings`](crate::World::set_settings)).
 ///
-/// Later versions can have more settings, so a program starts from the defaults, or from the settings of a world, and changes some:
+/// Later versions can have more settings, so a program starts from the defaults, or from the
+/// settings of a world, and changes some:
 ///
 /// ```
 /// use tumble_core::prelude::*;
@@ -52,8 +54,9 @@ pub struct Settings {
     pub integrator_tolerance: f64,
     /// Limits of the iterative solvers.
     pub solver_settings: SolverSettings,
-    /// Maximum number of sweeps of the position projection. Groups with joints get at least as many
-    /// as [`Settings::solver_settings`] allows a solve.
+    /// Maximum number of sweeps of the projection, the round of a position correction that removes
+    /// overlap. Islands with joints or limits get at least as many as in a solve
+    /// ([`Settings::solver_settings`]).
     pub projection_sweeps: u32,
     /// Whether positions of equality rows (joints) are corrected. If not, only velocities are
     /// constrained and positions drift.
@@ -61,7 +64,7 @@ pub struct Settings {
     /// `backtracking`: surfaces closer than this are in contact, m. A new contact deeper than this
     /// makes the step go back, and a rebound lower than this comes to rest.
     pub contact_tolerance: f64,
-    /// Depth to which a lasting contact may drift within a sub-step before it is projected out, m.
+    /// Depth that a lasting contact may reach within a sub-step; the projection removes the rest, m.
     pub drift_tolerance: f64,
     /// Maximum speed at which existing penetration is corrected, m/s.
     pub recovery_speed: f64,
@@ -98,14 +101,14 @@ impl Default for Settings {
 
 /// A setting out of its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{what} is {value}; it must be {wanted}")]
+#[error("{what} is {value}; it must be {expected}")]
 pub struct SettingsError {
     /// Which setting.
     pub what: &'static str,
     /// Value given.
     pub value: f64,
     /// Admissible range.
-    pub wanted: &'static str,
+    pub expected: &'static str,
 }
 
 /// Methods that change one setting: name, field, type.
@@ -147,8 +150,8 @@ impl Settings {
     /// # Errors
     /// The first setting that is out of its range.
     pub fn validate(&self) -> Result<(), SettingsError> {
-        let check = |what, value: f64, right: bool, wanted| {
-            if right && value.is_finite() { Ok(()) } else { Err(SettingsError { what, value, wanted }) }
+        let check = |what, value: f64, right: bool, expected| {
+            if right && value.is_finite() { Ok(()) } else { Err(SettingsError { what, value, expected }) }
         };
         self.gravity.iter().try_for_each(|&g| check("gravity", g, true, "finite"))?;
         check("dt", self.dt, self.dt > 0.0 && self.dt <= 1.0, "above 0 and at most 1 s")?;

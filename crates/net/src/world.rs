@@ -11,8 +11,8 @@ use xxhash_rust::xxh3::xxh3_64;
 const PLANE_M: f64 = 40.0;
 
 /// Returns every drawable part as one entity. It has the name of its object, followed by `/part` if
-/// the object has several parts. A name of more than [`MAX_NAME_BYTES`] is replaced by its beginning
-/// and a hash of the whole.
+/// the object has several parts. A name of more than [`MAX_NAME_BYTES`] is replaced by its
+/// beginning and a hash of the whole.
 pub fn entities(world: &World) -> Vec<Entity> {
     sites(world).map(|(id, part)| entity(world, id, part)).collect()
 }
@@ -22,8 +22,8 @@ pub fn poses(world: &World) -> Vec<Pose> {
     sites(world).filter_map(|(id, part)| world.pose(id, part)).map(|frame| pose(&frame)).collect()
 }
 
-/// Returns the contacts of the last step between the [`entities`] whose surfaces touch. Of more than [`MAX_CONTACTS`], those with the
-/// largest forces are kept, the largest first.
+/// Returns the contacts of the last step between the [`entities`] whose surfaces touch. Of more
+/// than [`MAX_CONTACTS`], those with the largest forces are kept, the largest first.
 pub fn contacts(world: &World) -> Vec<Contact> {
     let index: BTreeMap<(ObjectId, usize), u32> = sites(world).zip(0..).collect();
     let contact = |c: &ContactPoint| {
@@ -39,8 +39,8 @@ pub fn contacts(world: &World) -> Vec<Contact> {
     strongest(world, MAX_CONTACTS).into_iter().filter_map(contact).collect()
 }
 
-/// Shows recorded contacts in a world that has the same entities, as those of its last step. Velocities and impulses are not recorded
-/// and are zero.
+/// Shows recorded contacts in a world that has the same entities, as those of its last step.
+/// Velocities and impulses are not recorded and are zero.
 pub fn show_contacts(world: &mut World, contacts: &[Contact]) {
     let entities: Vec<(ObjectId, usize)> = sites(world).collect();
     let point = |c: &Contact| {
@@ -51,8 +51,8 @@ pub fn show_contacts(world: &mut World, contacts: &[Contact]) {
     world.replica().set_contacts(contacts.iter().filter_map(point));
 }
 
-/// Returns the contacts of the last step whose surfaces touch. If there are more than `max`, those with the largest forces are kept, the
-/// largest first.
+/// Returns the contacts of the last step whose surfaces touch. If there are more than `max`, those
+/// with the largest forces are kept, the largest first.
 pub(crate) fn strongest(world: &World, max: usize) -> Vec<&ContactPoint> {
     if max == 0 {
         return Vec::new();
@@ -76,8 +76,8 @@ fn name(world: &World, id: ObjectId, part: usize) -> String {
     shortened(if several { format!("{name}/{part}") } else { name.to_owned() })
 }
 
-/// Returns a name of at most [`MAX_NAME_BYTES`]. A longer name is replaced by its beginning, `~`, and 16 hexadecimal digits, the XXH3
-/// of the whole name.
+/// Returns a name of at most [`MAX_NAME_BYTES`]. A longer name is replaced by its beginning, `~`,
+/// and 16 hexadecimal digits, the XXH3 of the whole name.
 fn shortened(name: String) -> String {
     if name.len() <= MAX_NAME_BYTES {
         return name;

@@ -1,4 +1,5 @@
-//! A bead that slides without friction on a wire bent to a cycloid (Huygens' pendulum): one degree of freedom whose inertia depends on it.
+//! A bead that slides without friction on a wire bent to a cycloid (Huygens' pendulum): one degree
+//! of freedom whose inertia depends on it.
 //!
 //! ```text
 //! r(φ) = R·(φ + sin φ, 0, 1 − cos φ)                    |r'|² = 4R²·cos²(φ/2)
@@ -6,8 +7,10 @@
 //! ℓ(φ) = 4R·sin(φ/2)         σ = ℓ̇ = 2R·cos(φ/2)·φ̇      arc length from the lowest point, and speed along the wire
 //! ```
 //!
-//! Without forces the bead keeps `σ`, and `p` changes with `M`: [`Bead::free_motion`](Integratable::free_motion) is exact. Under gravity
-//! `ℓ̈ = −(g/4R)·ℓ`: harmonic at *every* amplitude, with the period `4π√(R/g)` (Huygens, *Horologium Oscillatorium*, 1673).
+//! Without forces the bead keeps `σ`, and `p` changes with `M`:
+//! [`Bead::free_motion`](Integratable::free_motion) is exact. Under gravity `ℓ̈ = −(g/4R)·ℓ`:
+//! harmonic at *every* amplitude, with the period `4π√(R/g)` (Huygens, *Horologium Oscillatorium*,
+//! 1673).
 //!
 //! | symbol | meaning |
 //! |---|---|
@@ -47,7 +50,8 @@ struct BeadCache {
 }
 
 impl Bead {
-    /// A bead of `mass` kg and the given shape on the cycloid of a circle of `radius` m (both above 0).
+    /// A bead of `mass` kg and the given shape on the cycloid of a circle of `radius` m (both above
+    /// 0).
     pub fn new(name: impl Into<String>, mass: f64, radius: f64, shape: Shape) -> Bead {
         Bead {
             name: name.into(),

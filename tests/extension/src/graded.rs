@@ -9,7 +9,8 @@ use tumble_core::{StepContext, StepError, Stepper, TimeStepping};
 /// Maximum number of sub-steps of a frame.
 const MAX_SUBSTEPS: f64 = 64.0;
 
-/// `time_stepping` with sub-steps in which no part travels further than a distance, at its velocity when the frame begins.
+/// `time_stepping` with sub-steps in which no part travels further than a distance, at its velocity
+/// when the frame begins.
 pub struct Graded {
     /// Distance per sub-step, m, above 0.
     pub travel: f64,

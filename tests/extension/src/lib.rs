@@ -1,4 +1,5 @@
-//! New kinds of objects and a stepper for tumble, made in a crate of their own by the public interface alone.
+//! New kinds of objects and a stepper for tumble, made in a crate of their own by the public
+//! interface alone.
 //!
 //! | object | integrates | collides | constrains | acts |
 //! |---|---|---|---|---|

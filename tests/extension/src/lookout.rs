@@ -1,4 +1,5 @@
-//! A particle that carries a camera and a lamp: what the bird sees of its flock (thesis §III.A: cameras and lights are interfaces of objects).
+//! A particle that carries a camera and a lamp: what the bird sees of its flock (thesis §III.A:
+//! cameras and lights are interfaces of objects).
 
 use crate::Particle;
 use tumble_core::collide::Pose;

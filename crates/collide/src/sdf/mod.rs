@@ -121,7 +121,8 @@ pub(crate) const TOUCHING: f64 = 1e-6;
 /// their answers; overrides are `RoundField` (sphere, capsule), `CylinderField` and
 /// `HalfSpaceField`.
 pub(crate) trait DistanceField {
-    /// Returns a lower bound of the signed distance at `p`, meters; cheaper than [`hit`](Self::hit).
+    /// Returns a lower bound of the signed distance at `p`, meters; cheaper than
+    /// [`hit`](Self::hit).
     fn bound(&self, p: &Vec3) -> f64;
     /// Returns the closest part of the surface that an element with `normals` can touch (`facing`),
     /// or the closest of all if there is none.
@@ -144,12 +145,13 @@ pub(crate) trait DistanceField {
     fn is_round(&self) -> bool {
         false
     }
-    /// Returns whether the surface falls away from a tangent line, by `L²/8R` over a length `L`, and
-    /// has no elements of its own that find the edges near it: the side of a cylinder.
+    /// Returns whether the surface falls away from a tangent line, by `L²/8R` over a length `L`,
+    /// and has no elements of its own that find the edges near it: the side of a cylinder.
     ///
     /// If true, all edges of a mesh are tested against this field, also those that its vertices
-    /// replace elsewhere (see [`elements`]), and all its faces in deep overlaps. A sphere and a capsule answer false although they are curved: their core point and
-    /// axis are elements, and find the edges of the mesh.
+    /// replace elsewhere (see [`elements`]), and all its faces in deep overlaps. A sphere and a
+    /// capsule answer false although they are curved: their core point and axis are elements, and
+    /// find the edges of the mesh.
     fn is_curved(&self) -> bool {
         false
     }

@@ -54,7 +54,8 @@ impl MeshShape {
     /// origin and builds the tree.
     ///
     /// # Errors
-    /// [`MeshError`]: a mesh that encloses no solid, a setting out of its range, or a tree that cannot be built.
+    /// [`MeshError`]: a mesh that encloses no solid, a setting out of its range, or a tree that
+    /// cannot be built.
     pub fn new(mesh: TriMesh, settings: &TreeSettings) -> Result<MeshShape, MeshError> {
         let shape = MeshShape::new_lazy(mesh, settings, &TreeCache::off())?;
         let tree = shape.build_tree()?;
@@ -110,7 +111,8 @@ impl MeshShape {
     /// the cache, if any.
     ///
     /// # Errors
-    /// [`MeshError`]: a mesh that encloses no solid, a setting out of its range, or a tree that cannot be built.
+    /// [`MeshError`]: a mesh that encloses no solid, a setting out of its range, or a tree that
+    /// cannot be built.
     pub fn new_cached(
         mesh: TriMesh,
         settings: &TreeSettings,

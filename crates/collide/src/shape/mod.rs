@@ -87,7 +87,8 @@ impl Shape {
     /// [`TriMesh::check_closed`]).
     ///
     /// # Errors
-    /// [`ShapeError::Mesh`]: a mesh that encloses no solid, a setting out of its range, or a tree that cannot be built.
+    /// [`ShapeError::Mesh`]: a mesh that encloses no solid, a setting out of its range, or a tree
+    /// that cannot be built.
     pub fn mesh(mesh: TriMesh, settings: &TreeSettings) -> Result<Shape, ShapeError> {
         Ok(Shape::Mesh(Arc::new(MeshShape::new(mesh, settings)?)))
     }

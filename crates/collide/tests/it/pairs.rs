@@ -52,8 +52,8 @@ fn pieces() -> Vec<Piece> {
     ]
 }
 
-/// Returns the direction from `lower` to `upper`, which stands on it with this gap, and the contacts
-/// of the pair in both orders, upper first. The direction lies along no axis of the world.
+/// Returns the direction from `lower` to `upper`, which stands on it with this gap, and the
+/// contacts of the pair in both orders, upper first. The direction lies along no axis of the world.
 fn stacked(mode: ContactMode, upper: &Piece, lower: &Piece, gap: f64) -> (Vec3, [Vec<Contact>; 2]) {
     let below = Pose::from_parts(Vec3::new(0.3, -0.7, 0.2).into(), Quat::from_euler_angles(0.4, -0.9, 1.3));
     let above = below * Pose::translation(0.0, 0.0, lower.half + upper.half + gap);
@@ -63,8 +63,8 @@ fn stacked(mode: ContactMode, upper: &Piece, lower: &Piece, gap: f64) -> (Vec3, 
     (below.rotation * Vec3::z(), [first, second])
 }
 
-/// Calls `visit` with each pair and mode, and with the sum of the outward errors of the sphere trees
-/// by which the pair collides in that mode: meters, 0 without trees.
+/// Calls `visit` with each pair and mode, and with the sum of the outward errors of the sphere
+/// trees by which the pair collides in that mode: meters, 0 without trees.
 fn each_pair(visit: &mut dyn FnMut(&str, ContactMode, [&Piece; 2], f64)) {
     let pieces = pieces();
     for lower in &pieces {

@@ -36,7 +36,7 @@ pub enum ArticulatedError {
         link: String,
     },
     /// A constant of a joint is out of its range.
-    #[error("articulated body '{body}', link '{link}': {what} is {value}; it must be {wanted}")]
+    #[error("articulated body '{body}', link '{link}': {what} is {value}; it must be {expected}")]
     Range {
         /// Body.
         body: String,
@@ -47,7 +47,7 @@ pub enum ArticulatedError {
         /// Value given.
         value: f64,
         /// Admissible range.
-        wanted: &'static str,
+        expected: &'static str,
     },
     /// A coupling is not valid.
     #[error(
@@ -64,14 +64,14 @@ pub enum ArticulatedError {
         count: usize,
     },
     /// Numbers are not valid positions or velocities.
-    #[error("articulated body '{body}': {what} must be {wanted} finite numbers, quaternions of unit length")]
+    #[error("articulated body '{body}': {what} must be {expected} finite numbers, quaternions of unit length")]
     Start {
         /// Body.
         body: String,
         /// Positions or velocities.
         what: &'static str,
         /// Required number of values.
-        wanted: usize,
+        expected: usize,
     },
 }
 
@@ -79,7 +79,8 @@ pub enum ArticulatedError {
 #[derive(Clone, Debug)]
 pub struct Collider {
     /// Pose of the shape in the frame of its link; for a mesh, the pose of its file's frame.
-    /// Colliders of a body have the pose of the part's frame.
+    /// [`add_collider`](ArticulatedBody::add_collider) replaces it by the pose of the part's frame
+    /// in the frame of the moving link; for a mesh that frame is at the center of mass.
     pub pose: Pose,
     /// Geometry.
     pub shape: Shape,
@@ -229,13 +230,13 @@ impl ArticulatedBody {
     /// # Errors
     /// [`ArticulatedError::Start`] for another number of values or values that are no state.
     pub fn with_positions(mut self, q: &[f64]) -> Result<Self, ArticulatedError> {
-        let wanted = self.model.positions();
+        let expected = self.model.positions();
         let mut start = self.start.clone();
-        if q.len() == wanted {
-            start[..wanted].copy_from_slice(q);
+        if q.len() == expected {
+            start[..expected].copy_from_slice(q);
         }
-        if q.len() != wanted || !self.is_state(&start) {
-            return Err(ArticulatedError::Start { body: self.name, what: "positions", wanted });
+        if q.len() != expected || !self.is_state(&start) {
+            return Err(ArticulatedError::Start { body: self.name, what: "positions", expected });
         }
         self.start = start;
         Ok(self)
@@ -246,15 +247,16 @@ impl ArticulatedBody {
     /// # Errors
     /// [`ArticulatedError::Start`] for another number of values or values that are not finite.
     pub fn with_velocities(mut self, v: &[f64]) -> Result<Self, ArticulatedError> {
-        let (wanted, n) = (self.model.dof(), self.model.positions());
-        if v.len() != wanted || v.iter().any(|x| !x.is_finite()) {
-            return Err(ArticulatedError::Start { body: self.name, what: "velocities", wanted });
+        let (expected, n) = (self.model.dof(), self.model.positions());
+        if v.len() != expected || v.iter().any(|x| !x.is_finite()) {
+            return Err(ArticulatedError::Start { body: self.name, what: "velocities", expected });
         }
         self.start[n..].copy_from_slice(v);
         Ok(self)
     }
 
-    /// Adds a shape to the link of that name, which may be a folded link.
+    /// Adds a shape to the link of that name, which may be a fixed link that is folded into its
+    /// parent.
     ///
     /// # Errors
     /// [`ArticulatedError::NoLink`].
@@ -303,8 +305,8 @@ impl ArticulatedBody {
         Ok((frame.link.unwrap_or(self.model.links().len()), frame.pose * pose))
     }
 
-    /// Disables collisions between two links. A folded link stands for the link or base that it is
-    /// folded into.
+    /// Disables collisions between two links. A fixed link stands for the link or base into which it
+    /// is folded.
     ///
     /// # Errors
     /// [`ArticulatedError::NoLink`].
@@ -327,13 +329,13 @@ impl ArticulatedBody {
         let Some(link) = self.model.links().iter().find(|l| (l.v..l.v + l.joint.dof()).contains(&index)) else {
             return Err(self.no_link(&format!("of degree of freedom {index}")));
         };
-        if let Some((what, value, wanted)) = dof.range_error(link.joint.dof() == 1) {
+        if let Some((what, value, expected)) = dof.range_error(link.joint.dof() == 1) {
             return Err(ArticulatedError::Range {
                 body: self.name.clone(),
                 link: link.name.clone(),
                 what,
                 value,
-                wanted,
+                expected,
             });
         }
         self.dofs[index] = dof;

@@ -35,7 +35,7 @@ impl ArticulatedBody {
     /// Adds the parts to a body without any, whose model is already placed on `base`.
     pub(crate) fn with_parts(mut self, base: Pose, parts: ArticulatedParts) -> Result<Self, ArticulatedError> {
         if !self.is_state(&parts.start) {
-            return Err(ArticulatedError::Start { body: self.name, what: "positions", wanted: self.start.len() });
+            return Err(ArticulatedError::Start { body: self.name, what: "positions", expected: self.start.len() });
         }
         let ArticulatedParts { colliders, visuals, cameras, lights, couplings, excluded_pairs, start } = parts;
         self.colliders = colliders.into_iter().map(|(link, collider)| LinkCollider { link, collider }).collect();

@@ -70,7 +70,8 @@ impl RowBuilder<'_> {
         self
     }
 
-    /// Adds `sign` (±1, or any factor) times the velocity along `axis` of the material point of a part at world point `p`.
+    /// Adds `sign` (±1, or any factor) times the velocity along `axis` of the material point of a
+    /// part at world point `p`.
     pub fn on_point(&mut self, id: ObjectId, part: usize, p: &Vec3, axis: &Vec3, sign: f64) -> &mut Self {
         let objects = self.objects;
         if !self.open(p.iter().chain(axis.iter())) {
@@ -80,7 +81,8 @@ impl RowBuilder<'_> {
         self
     }
 
-    /// Adds `sign` (±1, or a factor such as a gear ratio) times the angular velocity of a part along the unit vector `axis`.
+    /// Adds `sign` (±1, or a factor such as a gear ratio) times the angular velocity of a part
+    /// along the unit vector `axis`.
     ///
     /// Two test impulses of opposite sign express the rotation, so every part supports it: for unit
     /// `b ⟂ c` with `b × c = axis` it is exactly `(v(p + b) − v(p))·c`.

@@ -41,9 +41,9 @@ pub struct PairMaterial {
 impl PairMaterial {
     /// Checks both ranges.
     pub(crate) fn validate(&self) -> Result<(), SettingsError> {
-        let check = |what, value: Option<f64>, most: f64, wanted| match value {
+        let check = |what, value: Option<f64>, most: f64, expected| match value {
             Some(value) if !(value.is_finite() && (0.0..=most).contains(&value)) => {
-                Err(SettingsError { what, value, wanted })
+                Err(SettingsError { what, value, expected })
             }
             _ => Ok(()),
         };

@@ -6,7 +6,8 @@
 //! y = L⁻ᵀ·Jᵀ             T = ½|L·v|²
 //! ```
 //!
-//! A Jacobian gives velocities of points. Angular velocity along `e_k` is that of two points: `(v(p + e_i) − v(p))·e_j` with `e_i × e_j = e_k`.
+//! A Jacobian gives velocities of points. Angular velocity along `e_k` is that of two points:
+//! `(v(p + e_i) − v(p))·e_j` with `e_i × e_j = e_k`.
 
 use super::part_state::{ForceSlice, PartPoint, PartState};
 use super::{Energy, Integratable, Momentum, MomentumKind};

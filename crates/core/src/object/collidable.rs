@@ -39,12 +39,13 @@ impl ContactFrame {
 
 /// An object with parts that collide.
 pub trait Collidable {
-    /// Returns the number of parts, each with a row in the table of part states: [`StateSizes::parts`](super::part_state::StateSizes::parts) of an object with a
-    /// state. One by default.
+    /// Returns the number of parts; 1 by default. Each has a row in the table of part states, so an
+    /// object with a state returns its [`StateSizes::parts`](super::part_state::StateSizes::parts).
     fn parts(&self) -> usize {
         1
     }
-    /// Returns the shape of a part, in the part's frame; `None` for a part that never collides: one for forces, joints or visuals.
+    /// Returns the shape of a part, in the part's frame; `None` for a part that never collides: one
+    /// for forces, joints or visuals.
     fn shape(&self, part: usize) -> Option<&Shape>;
     /// Returns the surface constants of a part.
     fn material(&self, part: usize) -> Material {
@@ -56,17 +57,20 @@ pub trait Collidable {
         let _ = part;
         CollisionGroup::default()
     }
-    /// Returns whether a part collides with parts of group `other`. Two parts collide if this is true for both.
+    /// Returns whether a part collides with parts of group `other`. Two parts collide if this is
+    /// true for both.
     fn collides_with(&self, part: usize, other: CollisionGroup) -> bool {
         let _ = (part, other);
         true
     }
-    /// Returns how a part's mesh or cylinder collides. A pair collides by spheres if either part does.
+    /// Returns how a part's mesh or cylinder collides. A pair collides by spheres if either part
+    /// does.
     fn contact_mode(&self, part: usize) -> ContactMode {
         let _ = part;
         ContactMode::Surface
     }
-    /// Returns whether impulses can move a part; false for a part of a moving object that is fixed to the world.
+    /// Returns whether impulses can move a part; false for a part of a moving object that is fixed
+    /// to the world.
     fn part_moves(&self, part: usize) -> bool {
         let _ = part;
         true

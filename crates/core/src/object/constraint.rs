@@ -17,25 +17,30 @@ pub enum Level {
     Acceleration,
 }
 
-/// Constrains itself or others: joint limits, loop joints, rods. Its rows are solved together with all contacts.
+/// Constrains itself or others: joint limits, loop joints, rods. Its rows are solved together with
+/// all contacts.
 pub trait Constraint {
-    /// Adds its rows; see [`RowBuilder`]. The view shows the state in the middle of the next step under free motion, where directions are right to
-    /// second order. Errors are those of the same state; the stepper converts them to the present. A stepper with rigid equality rows calls this
-    /// several times in a step, at its start, middle and end, so rows must depend on the view alone.
+    /// Adds its rows; see [`RowBuilder`]. The view shows the state in the middle of the next step
+    /// under free motion, where directions are right to second order. Errors are those of the same
+    /// state; the stepper converts them to the present. A stepper with rigid equality rows calls
+    /// this several times in a step, at its start, middle and end, so rows must depend on the view
+    /// alone.
     fn rows(&self, me: &StateRange, view: &WorldView, level: Level, out: &mut RowBuilder);
-    /// Appends the gap of every one-sided row ([`RowSet::HalfLine`]) at the view's state, in the order of the rows. `backtracking` uses gaps for event
-    /// detection, as it does for contacts: it ends the sub-step when a limit is reached and enforces the limit from there. A limit without a
-    /// reported gap is active over the whole sub-step in which it would be reached.
+    /// Appends the gap of every one-sided row ([`RowSet::HalfLine`]) at the view's state, in the
+    /// order of the rows. `backtracking` uses gaps for event detection, as it does for contacts: it
+    /// ends the sub-step when a limit is reached and enforces the limit from there. A limit without
+    /// a reported gap is active over the whole sub-step in which it would be reached.
     fn gaps(&self, me: &StateRange, view: &WorldView, out: &mut Vec<f64>) {
         let _ = (me, view, out);
     }
-    /// Appends all objects that its rows can act on and returns true. Returns false if it does not know them; then nothing in the world falls asleep.
+    /// Appends all objects that its rows can act on and returns true. Returns false if it does not
+    /// know them; then nothing in the world falls asleep.
     fn partners(&self, out: &mut Vec<ObjectId>) -> bool {
         let _ = out;
         false
     }
-    /// Returns whether its rows act on the object itself alone. Such rows are left out while impulses do not move the object: a kinematic object may
-    /// pass its own limits.
+    /// Returns whether its rows act on the object itself alone. Such rows are left out while
+    /// impulses do not move the object: a kinematic object may pass its own limits.
     fn on_itself(&self) -> bool {
         false
     }
@@ -46,17 +51,22 @@ pub trait Constraint {
 pub struct RowTarget {
     /// Set of admissible multipliers.
     pub set: RowSet,
-    /// Position error of the row, m or rad: the drift of an equality, or the gap of a one-sided row (negative if violated).
+    /// Position error of the row, m or rad: the drift of an equality, or the gap of a one-sided row
+    /// (negative if violated).
     pub error: f64,
     /// Target velocity of the row, m/s or rad/s; 0 except for motors.
     pub velocity: f64,
-    /// Acceleration of the row without any force or change of velocity (`J̇·v`), m/s² or rad/s²; 0 if the row's direction is constant.
+    /// Acceleration of the row without any force or change of velocity (`J̇·v`), m/s² or rad/s²; 0
+    /// if the row's direction is constant.
     pub bias_acceleration: f64,
     /// Compliance `R` of the row, at least 0, in `w = c + (K + R)·λ`. In (m/s)/(N·s); at the
-    /// acceleration level (m/s²)/N. 0 is rigid. A soft row is a spring: it takes part in no impact and in no position correction.
+    /// acceleration level (m/s²)/N. 0 is rigid. A soft row is a spring: it takes part in no impact
+    /// and in no position correction.
     ///
-    /// An implicit PD drive `F = kp·(q* − q⁺) + kd·(v* − v⁺)` with `q⁺ = q + h·v⁺` is `compliance = 1/(h·(kd + h·kp))` with the target
-    /// velocity `(kp·(q* − q) + kd·v*)/(kd + h·kp)`; the same at the acceleration level, for a sub-step of `h`.
+    /// An implicit PD drive `F = kp·(q* − q⁺) + kd·(v* − v⁺)` with `q⁺ = q + h·v⁺` is
+    /// `compliance = 1/(h·(kd + h·kp))` with the target velocity
+    /// `(kp·(q* − q) + kd·v*)/(kd + h·kp)`; the same at the acceleration level, for a sub-step of
+    /// `h`.
     pub compliance: f64,
 }
 

@@ -3,7 +3,8 @@
 use super::part_state::{Forces, StateRange};
 use crate::world::view::WorldView;
 
-/// Applies forces to others without a state of its own, such as wind, a spring or a flock (thesis §IV.A.2).
+/// Applies forces to others without a state of its own, such as wind, a spring or a flock (thesis
+/// §IV.A.2).
 pub trait ForceGenerator {
     /// Adds forces for the view's state and time to the table.
     fn apply(&self, me: &StateRange, view: &WorldView, out: &mut Forces);

@@ -7,7 +7,8 @@ pub struct Material {
     pub restitution: f64,
     /// Coefficient of Coulomb friction, at least 0.
     pub friction: f64,
-    /// Number by which [`World::set_pair_material`](crate::World::set_pair_material) selects parts of this material; 0 for none.
+    /// Number by which [`World::set_pair_material`](crate::World::set_pair_material) selects parts
+    /// of this material; 0 for none.
     pub id: u32,
 }
 

@@ -1,8 +1,9 @@
 //! Objects: the traits of the thesis (§IV.A).
 //!
-//! A new kind of object is a type of any crate that implements [`Object`] and some of the other traits. All numbers that change
-//! with time are in the world's flat state `X`. An object is a model that reads its own range of it, so that saving, forking and the
-//! stages of integrators copy a slice.
+//! A new kind of object is a type of any crate that implements [`Object`] and some of the other
+//! traits. All numbers that change with time are in the world's flat state `X`. An object is a
+//! model that reads its own range of it, so that saving, forking and the stages of integrators copy
+//! a slice.
 
 mod appearance;
 mod by_jacobian;
@@ -32,52 +33,57 @@ use crate::derived::Cache;
 use part_state::PartState;
 use std::any::Any;
 
-/// Anything in a world. Each accessor returns one of the object's other traits, `None` by default (the thesis's `ImplementsInterface`,
-/// §IV.B.1).
+/// Anything in a world. Eight accessors return its other traits; all are `None` by default (the
+/// thesis's `ImplementsInterface`, §IV.B.1).
 pub trait Object: Fork + Any + Send + Sync {
-    /// Returns the name that the object is to have in a world, of any length. By default it is empty, and the world makes one:
-    /// [`World::name`](crate::World::name) returns the name in the world.
+    /// Returns the name that the object is to have in a world, of any length. By default it is
+    /// empty, and the world makes one: [`World::name`](crate::World::name) returns the name in the
+    /// world.
     fn name(&self) -> &str {
         ""
     }
-    /// Makes the cache for [`refresh`](Self::refresh) and for all calls with a cache; empty by default.
+    /// Makes the cache for [`refresh`](Self::refresh) and for all calls with a cache; empty by
+    /// default.
     fn new_cache(&self) -> Cache {
         Cache::default()
     }
-    /// Writes the cache and the poses and velocities of the parts from the object's range `x` of the state, and depends on nothing else (thesis
-    /// `UpdateState`). [`Integratable::accelerations`] writes the accelerations.
+    /// Writes the cache and the poses and velocities of the parts from the object's range `x` of
+    /// the state, and depends on nothing else (thesis `UpdateState`).
+    /// [`Integratable::accelerations`] writes the accelerations.
     fn refresh(&self, x: &[f64], cache: &mut Cache, part_states: &mut [PartState]) {
         let _ = (x, cache, part_states);
     }
-    /// For an object with a state that the integrator advances.
+    /// Returns the interface of an object with a state that the integrator advances.
     fn integratable(&self) -> Option<&dyn Integratable> {
         None
     }
-    /// For an object with parts that collide.
+    /// Returns the interface of an object with parts that collide.
     fn collidable(&self) -> Option<&dyn Collidable> {
         None
     }
-    /// For an object that constrains itself or others.
+    /// Returns the interface of an object that constrains itself or others.
     fn constraint(&self) -> Option<&dyn Constraint> {
         None
     }
-    /// For an object that applies forces to others ("live" but not necessarily integrated, thesis §IV.B.2).
+    /// Returns the interface of an object that applies forces to others; it need not have a state
+    /// (thesis §IV.B.2: "live").
     fn force(&self) -> Option<&dyn ForceGenerator> {
         None
     }
-    /// For an object that can be drawn.
+    /// Returns the interface of an object that can be drawn.
     fn renderable(&self) -> Option<&dyn Renderable> {
         None
     }
-    /// For an object that carries cameras.
+    /// Returns the interface of an object that carries cameras.
     fn camera(&self) -> Option<&dyn CameraCarrier> {
         None
     }
-    /// For an object that carries lights.
+    /// Returns the interface of an object that carries lights.
     fn light(&self) -> Option<&dyn LightCarrier> {
         None
     }
-    /// For an object that can be synchronized with copies of itself in other processes.
+    /// Returns the interface of an object that is synchronized with copies of itself in other
+    /// processes.
     fn net_sync(&self) -> Option<&dyn NetSync> {
         None
     }

@@ -25,7 +25,8 @@ pub struct StateRange {
     pub parts: Range<usize>,
 }
 
-/// Pose, velocity and acceleration of one part, which all readers use: forces, constraints, detection, renderers. World axes.
+/// Pose, velocity and acceleration of one part, which all readers use: forces, constraints,
+/// detection, renderers. World axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PartState {
     /// Pose of the part's frame in the world, `X_WB`.
@@ -38,7 +39,8 @@ pub struct PartState {
     pub angular_acceleration: Vec3,
     /// Acceleration of the frame's origin, m/s².
     pub acceleration: Vec3,
-    /// Angular acceleration at constant generalized velocity (`J̇·v`), rad/s²: zero for a body whose generalized velocity is `[ω; v]`.
+    /// Angular acceleration at constant generalized velocity (`J̇·v`), rad/s²: zero for a body
+    /// whose generalized velocity is `[ω; v]`.
     pub bias_angular_acceleration: Vec3,
     /// Acceleration of the frame's origin at constant generalized velocity, m/s².
     pub bias_acceleration: Vec3,
@@ -70,8 +72,9 @@ impl PartState {
         self.velocity + self.angular_velocity.cross(&(p - self.position()))
     }
 
-    /// Returns the rate of change of [`velocity_at`](Self::velocity_at) along a point that is at `p` and moves at `p_rate`, m/s²:
-    /// `a + α × r + ω × (ṗ − v)`. With `p_rate = velocity_at(p)` this is the material point's acceleration.
+    /// Returns the rate of change of [`velocity_at`](Self::velocity_at) along a point that is at
+    /// `p` and moves at `p_rate`, m/s²: `a + α × r + ω × (ṗ − v)`. With `p_rate = velocity_at(p)`
+    /// this is the material point's acceleration.
     pub fn acceleration_following(&self, p: &Vec3, p_rate: &Vec3) -> Vec3 {
         let r = p - self.position();
         self.acceleration + self.angular_acceleration.cross(&r) + self.angular_velocity.cross(&(p_rate - self.velocity))
@@ -113,7 +116,8 @@ impl Default for Wrench {
     }
 }
 
-/// The table of forces, accumulated anew at each stage of an integrator, at the state and time of that stage.
+/// The table of forces, accumulated anew at each stage of an integrator, at the state and time of
+/// that stage.
 #[derive(Clone, Debug, Default)]
 pub struct Forces {
     /// External wrench per part.
@@ -123,7 +127,8 @@ pub struct Forces {
 }
 
 impl Forces {
-    /// Adds a force (N, world axes) at world point `p` of the part in row `index` of the table of part states.
+    /// Adds a force (N, world axes) at world point `p` of the part in row `index` of the table of
+    /// part states.
     pub fn add_at(&mut self, index: usize, part_state: &PartState, force: Vec3, p: &Vec3) {
         let wrench = &mut self.wrenches[index];
         wrench.force += force;

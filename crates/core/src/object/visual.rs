@@ -9,7 +9,8 @@ use std::fmt;
 use std::sync::{Arc, OnceLock};
 use tumble_collide::{MeshError, Pose, Shape, TriMesh, Vec3};
 
-/// Can be drawn (thesis `Renderable` and `SidRenderable`, §IV.A.5). Visuals are data; a renderer decides how to draw them.
+/// Can be drawn (thesis `Renderable` and `SidRenderable`, §IV.A.5). Visuals are data; a renderer
+/// decides how to draw them.
 pub trait Renderable {
     /// Returns its visuals.
     fn visuals(&self) -> &[Visual];

@@ -22,7 +22,8 @@ pub struct RigidBody {
     error: Option<BodyError>,
     /// Surface constants.
     pub material: Material,
-    /// Linear damping, 1/s: a force `−c·P`, evaluated at the stage's state like all forces; keep `c·dt` below 1.
+    /// Linear damping, 1/s: a force `−c·P`, evaluated at the stage's state like all forces; keep
+    /// `c·dt` below 1.
     pub linear_damping: f64,
     /// Angular damping, 1/s: a torque `−c·H`.
     pub angular_damping: f64,
@@ -50,8 +51,9 @@ impl RigidBody {
     /// Density of a body whose mass is not given, kg/m³: that of water.
     pub const DEFAULT_DENSITY: f64 = 1000.0;
 
-    /// Makes a uniform body with the [default density](Self::DEFAULT_DENSITY) and the default [`Material`]. Its frame is the shape's, for a
-    /// mesh the frame of its file. Methods `with_…` set its constants:
+    /// Makes a uniform body with the [default density](Self::DEFAULT_DENSITY) and the default
+    /// [`Material`]. Its frame is the shape's, for a mesh the frame of its file. Methods `with_…`
+    /// set its constants:
     ///
     /// ```
     /// use tumble_core::prelude::*;
@@ -63,13 +65,15 @@ impl RigidBody {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
-    /// [`World::add`](crate::World::add) checks all constants; [`validate`](Self::validate) does it before.
+    /// [`World::add`](crate::World::add) checks all constants; [`validate`](Self::validate) does it
+    /// before.
     #[must_use]
     pub fn new(shape: Shape) -> RigidBody {
         RigidBody::fixed(shape).with_density(Self::DEFAULT_DENSITY)
     }
 
-    /// Makes a body that stays static or kinematic. Its mass and inertia are 1 and have no effect, so the shape may be unbounded.
+    /// Makes a body that stays static or kinematic. Its mass and inertia are 1 and have no effect,
+    /// so the shape may be unbounded.
     #[must_use]
     pub fn fixed(shape: Shape) -> RigidBody {
         RigidBody {
@@ -103,14 +107,16 @@ impl RigidBody {
         self
     }
 
-    /// Sets the density, kg/m³, of a uniform body: mass and inertia follow from the shape. The body is not [fixed](Self::is_fixed) any more.
+    /// Sets the density, kg/m³, of a uniform body: mass and inertia follow from the shape. The body
+    /// is not [fixed](Self::is_fixed) any more.
     #[must_use]
     pub fn with_density(self, density: f64) -> Self {
         let properties = self.shape.mass_properties(density).map_err(|why| BodyError::Shape(why.to_string()));
         self.with_mass_properties(properties.map(|p| (p.mass, p.inertia)))
     }
 
-    /// Sets the mass, kg, of a uniform body: the inertia follows from the shape. The body is not [fixed](Self::is_fixed) any more.
+    /// Sets the mass, kg, of a uniform body: the inertia follows from the shape. The body is not
+    /// [fixed](Self::is_fixed) any more.
     #[must_use]
     pub fn with_mass(self, mass: f64) -> Self {
         let properties = match self.shape.mass_properties(1.0) {
@@ -121,8 +127,8 @@ impl RigidBody {
         self.with_mass_properties(properties)
     }
 
-    /// Sets mass (kg) and inertia (about the center of mass, body axes, kg·m²) of a body that is not uniform, whatever its shape. The body is
-    /// not [fixed](Self::is_fixed) any more.
+    /// Sets mass (kg) and inertia (about the center of mass, body axes, kg·m²) of a body that is
+    /// not uniform, whatever its shape. The body is not [fixed](Self::is_fixed) any more.
     #[must_use]
     pub fn with_mass_and_inertia(self, mass: f64, inertia: Mat3) -> Self {
         let valid = mass.is_finite() && mass > 0.0;
@@ -239,8 +245,8 @@ impl RigidBody {
         &self.shape
     }
 
-    /// Checks all constants: a positive mass, an inertia that a body can have, restitution in 0..=1, friction and damping at least 0, finite pose
-    /// and velocity.
+    /// Checks all constants: a positive mass, an inertia that a body can have, restitution in
+    /// 0..=1, friction and damping at least 0, finite pose and velocity.
     ///
     /// # Errors
     /// [`BodyError`] names the first constant that is out of its range.
@@ -248,8 +254,8 @@ impl RigidBody {
         if let Some(error) = &self.error {
             return Err(error.clone());
         }
-        let range = |what, value: f64, right: bool, wanted| {
-            if right && value.is_finite() { Ok(()) } else { Err(BodyError::Range { what, value, wanted }) }
+        let range = |what, value: f64, right: bool, expected| {
+            if right && value.is_finite() { Ok(()) } else { Err(BodyError::Range { what, value, expected }) }
         };
         let (m, unit) = (&self.material, self.initial_pose.rotation.norm());
         range("restitution", m.restitution, (0.0..=1.0).contains(&m.restitution), "between 0 and 1")?;

@@ -16,14 +16,14 @@ pub enum BodyError {
         moments: [f64; 3],
     },
     /// A constant is out of its range.
-    #[error("{what} is {value}; it must be {wanted}")]
+    #[error("{what} is {value}; it must be {expected}")]
     Range {
         /// Name of the constant.
         what: &'static str,
         /// Value given.
         value: f64,
         /// Admissible range.
-        wanted: &'static str,
+        expected: &'static str,
     },
     /// The shape has no mass properties of its own, for the reason that it gives.
     #[error("{0}")]

@@ -7,13 +7,15 @@
 //! | 7–9 | linear momentum `P`, N·s |
 //! | 10–12 | angular momentum `H` about the center of mass, world axes, N·m·s |
 //!
-//! Generalized velocity `v = [ω; v]`, world axes at the center of mass; mass matrix `M = diag(R·I·Rᵀ, m·1)`. Its root is
-//! `diag(I^½·Rᵀ, √m·1)`, with `I^½` the symmetric root of the body inertia.
+//! Generalized velocity `v = [ω; v]`, world axes at the center of mass; mass matrix
+//! `M = diag(R·I·Rᵀ, m·1)`. Its root is `diag(I^½·Rᵀ, √m·1)`, with `I^½` the symmetric root of the
+//! body inertia.
 //!
-//! The frame of the part has its origin at the center of mass (thesis §III.A.1) and the axes of the body. The *frame of the body*, in which
-//! users place it, is that of its shape: a mesh keeps the frame of its file, and [`RigidBody::center_of_mass`] is a point of it. State, velocities
-//! and parts refer to the center of mass; [`World::pose`](crate::World::pose), [`World::set_pose`](crate::World::set_pose) and
-//! [`RigidBody::with_pose`] convert.
+//! The frame of the part has its origin at the center of mass (thesis §III.A.1) and the axes of the
+//! body. The *frame of the body*, in which users place it, is that of its shape: a mesh keeps the
+//! frame of its file, and [`RigidBody::center_of_mass`] is a point of it. State, velocities and
+//! parts refer to the center of mass; [`World::pose`](crate::World::pose),
+//! [`World::set_pose`](crate::World::set_pose) and [`RigidBody::with_pose`] convert.
 
 mod body;
 mod error;

@@ -84,7 +84,8 @@ impl Object for RigidBody {
     }
 }
 
-/// The whole state, 13 little-endian `f64`: exact, for replicas. A process that only draws needs less.
+/// The whole state, 13 little-endian `f64`: exact, for replicas. A process that only draws needs
+/// less.
 impl NetSync for RigidBody {
     fn get_data(&self, me: &StateRange, view: &WorldView, out: &mut Vec<u8>) {
         net_sync::write_state(&view.x[me.x.clone()], out);

@@ -8,7 +8,8 @@ pub(crate) fn vec3(x: &[f64]) -> Vec3 {
     Vec3::new(x[0], x[1], x[2])
 }
 
-/// Returns the orientation in a rigid body's range of the state. Every writer keeps it at unit length.
+/// Returns the orientation in a rigid body's range of the state. Every writer keeps it at unit
+/// length.
 pub(crate) fn orientation(x: &[f64]) -> Quat {
     Unit::new_unchecked(Quaternion::new(x[6], x[3], x[4], x[5]))
 }

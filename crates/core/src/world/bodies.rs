@@ -8,23 +8,25 @@ use crate::world::view::{Mode, ObjectId, Status};
 use tumble_collide::{Pose, Vec3};
 
 impl World {
-    /// Returns an object by id.
+    /// Returns an object by id; `None` if it was removed.
     pub fn object(&self, id: ObjectId) -> Option<&dyn Object> {
         self.core.table.get(id).map(|placed| placed.object.as_ref())
     }
 
-    /// Returns the name of an object: its own, or the one that the world made (see [`add`](Self::add)).
+    /// Returns the name of an object: its own, or the one that the world made (see
+    /// [`add`](Self::add)).
     pub fn name(&self, id: ObjectId) -> Option<&str> {
         self.core.table.get(id).map(|placed| &*placed.name)
     }
 
-    /// Returns an object by id, as its own type.
+    /// Returns an object by id, as its own type; `None` if it was removed or has another type.
     pub fn get<T: Object>(&self, id: ObjectId) -> Option<&T> {
         let object: &dyn std::any::Any = self.object(id)?;
         object.downcast_ref()
     }
 
-    /// Returns an object's constants, to be changed between steps. Its state is in the world.
+    /// Returns an object by id, as its own type, for changes of its constants between steps. Its
+    /// state is in the world. `None` if it was removed or has another type.
     pub fn get_mut<T: Object>(&mut self, id: ObjectId) -> Option<&mut T> {
         self.core.wake(id);
         let place = self.core.table.place(id)?;
@@ -32,7 +34,7 @@ impl World {
         object.downcast_mut()
     }
 
-    /// Returns the settings of an object: mode, enabled, collidable.
+    /// Returns the settings of an object: mode, enabled, collidable; `None` if it was removed.
     pub fn status(&self, id: ObjectId) -> Option<Status> {
         self.core.objects().get(id).map(|e| e.status)
     }
@@ -65,7 +67,7 @@ impl World {
         Ok(())
     }
 
-    /// Wakes an object and returns its settings.
+    /// Wakes an object and returns its settings for a change.
     fn status_mut(&mut self, id: ObjectId) -> Result<&mut Status, WorldError> {
         self.core.wake(id);
         let place = self.core.table.place(id).ok_or(WorldError::Stale)?;
@@ -77,7 +79,8 @@ impl World {
         self.view().asleep(id)
     }
 
-    /// Returns the state of one part: pose, velocity, acceleration.
+    /// Returns the state of one part: pose, velocity, acceleration. `None` if the object was removed
+    /// or has no such part.
     pub fn part_state(&self, id: ObjectId, part: usize) -> Option<&PartState> {
         let entry = self.core.table.get(id)?;
         self.core.derived.part_states[entry.state_range.parts.clone()].get(part)
@@ -91,7 +94,7 @@ impl World {
         Some(self.get::<RigidBody>(id).map_or(pose, |body| body.frame_of(&pose)))
     }
 
-    /// Returns an object's range of the state.
+    /// Returns an object's range of the state; `None` if it was removed.
     pub fn state_of(&self, id: ObjectId) -> Option<&[f64]> {
         Some(&self.core.state.x[self.core.table.get(id)?.state_range.x.clone()])
     }
@@ -180,10 +183,12 @@ impl World {
         Ok(())
     }
 
-    /// Applies generalized forces during the next frame, one per degree of freedom of the object: joint torques (N·m) and forces (N).
+    /// Applies generalized forces during the next frame, one per degree of freedom of the object:
+    /// joint torques (N·m) and forces (N).
     ///
     /// # Errors
-    /// [`WorldError`]: the object was removed, the count is not its degrees of freedom, or a number is not finite.
+    /// [`WorldError`]: the object was removed, the count is not its degrees of freedom, or a number
+    /// is not finite.
     pub fn apply_generalized(&mut self, id: ObjectId, forces: &[f64]) -> Result<(), WorldError> {
         let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
         let name = || entry.name.to_string();

@@ -53,7 +53,7 @@ impl<'w> BodyView<'w> {
         self.world.pose(self.id, self.part).unwrap_or(self.part_state.pose)
     }
 
-    /// Returns the origin of that frame, meters.
+    /// Returns the origin of the frame of [`pose`](Self::pose), meters.
     pub fn position(&self) -> Vec3 {
         self.pose().translation.vector
     }

@@ -23,7 +23,7 @@ pub enum StepError {
     NotFinite {
         /// Object.
         object: String,
-        /// Force or state.
+        /// The quantity: a force or the state.
         what: &'static str,
         /// Simulated time, s.
         time: f64,
@@ -99,7 +99,8 @@ pub struct ContactPoint {
     pub force: Vec3,
 }
 
-/// A world without its stepper: the model, its state, the values derived from it, and the working memory of a step.
+/// A world without its stepper: the model, its state, the values derived from it, and the working
+/// memory of a step.
 pub struct Core {
     pub(crate) table: Table,
     pub(crate) settings: Settings,
@@ -301,8 +302,8 @@ impl Core {
         bad.map_or(Ok(()), |e| Err(self.not_finite(e.name, "its state")))
     }
 
-    /// Checks that all forces and accelerations are finite, and that no mass matrix is singular, at the moment `acting`, or else at the
-    /// present.
+    /// Checks that all forces and accelerations are finite, and that no mass matrix is singular, at
+    /// the moment `acting`, or else at the present.
     pub(crate) fn check_finite(&mut self, dp: &[f64], acting: Option<&mut Moment>) -> Result<(), StepError> {
         let time = self.state.time;
         let objects = self.table.with(&self.state.objects);

@@ -55,7 +55,8 @@ pub enum WorldError {
         /// Length of the slice.
         given: usize,
     },
-    /// The numbers are not a state of this object: wrong length, not finite, or an orientation that is not of unit length.
+    /// The numbers are not a state of this object: wrong length, not finite, or an orientation that
+    /// is not of unit length.
     #[error(
         "'{0}': the numbers are not a state of this object (wrong length, not finite, or an orientation that is not of unit length)"
     )]

@@ -1,6 +1,7 @@
 //! Islands: sets of objects that contacts and constraints connect.
 //!
-//! Static and kinematic objects connect nothing. Objects that fell asleep together stay one island, since sleepers have no contacts.
+//! Static and kinematic objects connect nothing. Objects that fell asleep together stay one island,
+//! since sleepers have no contacts.
 
 use super::{Core, World};
 use crate::constraint::builder::constraints;
@@ -8,11 +9,13 @@ use crate::world::view::{Entry, ObjectId};
 use tumble_collide::UnionFind;
 
 impl World {
-    /// Returns the islands after the last step: sets of dynamic objects that contacts of the last sub-step or constraints connect,
-    /// directly or through other dynamic objects. An object without connections is an island of its own. Objects are in the order of their
-    /// addition, islands in the order of their first objects.
+    /// Returns the islands after the last step: sets of dynamic objects that contacts of the last
+    /// sub-step or constraints connect, directly or through other dynamic objects. An object
+    /// without connections is an island of its own. Objects are in the order of their addition,
+    /// islands in the order of their first objects.
     ///
-    /// A constraint that does not name its objects ([`Constraint::partners`](crate::Constraint::partners)) connects nothing here.
+    /// A constraint that does not name its objects
+    /// ([`Constraint::partners`](crate::Constraint::partners)) connects nothing here.
     pub fn islands(&self) -> Vec<Vec<ObjectId>> {
         let core = &self.core;
         let asleep = core.state.groups.iter().flat_map(|group| group.members.windows(2)).filter_map(|serials| {
@@ -31,7 +34,8 @@ impl World {
 }
 
 impl Core {
-    /// Returns pairs of objects that have a contact or share a constraint, and whether every constraint names its objects.
+    /// Returns pairs of objects that have a contact or share a constraint, and whether every
+    /// constraint names its objects.
     pub(super) fn connections(&self) -> (Vec<[ObjectId; 2]>, bool) {
         let mut pairs: Vec<[ObjectId; 2]> = self.contacts.iter().map(|c| [c.a, c.b]).collect();
         let (mut partners, mut all_named) = (Vec::new(), true);
@@ -44,8 +48,9 @@ impl Core {
         (pairs, all_named)
     }
 
-    /// Joins the objects that satisfy `member` along these pairs. Returns the number of each object's set, in the order of addition, and how
-    /// many sets there are; the sets are numbered by their first objects. Every other object is a set of its own.
+    /// Joins the objects that satisfy `member` along these pairs. Returns the number of each
+    /// object's set, in the order of addition, and how many sets there are; the sets are numbered
+    /// by their first objects. Every other object is a set of its own.
     pub(super) fn components(
         &self,
         pairs: impl IntoIterator<Item = [ObjectId; 2]>,

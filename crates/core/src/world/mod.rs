@@ -1,4 +1,5 @@
-//! The world: holds the objects, their state and the settings, and advances them by frames (`Engine` in the thesis, §IV.B).
+//! The world: holds the objects, their state and the settings, and advances them by frames
+//! (`Engine` in the thesis, §IV.B).
 
 mod bodies;
 mod body_view;
@@ -45,7 +46,8 @@ use std::sync::Arc;
 pub struct World {
     core: Core,
     stepper: Box<dyn Stepper>,
-    /// The state before the frame: a frame that fails, or that wakes a sleeper, is rolled back to it.
+    /// The state before the frame: a frame that fails, or that wakes a sleeper, is rolled back to
+    /// it.
     before: WorldState,
     /// Contacts of the frame before, for a frame that fails.
     contacts_before: Vec<ContactPoint>,
@@ -63,7 +65,8 @@ impl Default for World {
 }
 
 impl World {
-    /// Returns an empty world with the default solver (`gauss_seidel`) and stepper (`time_stepping`).
+    /// Returns an empty world with the default solver (`gauss_seidel`) and stepper
+    /// (`time_stepping`).
     ///
     /// # Errors
     /// [`WorldError::Settings`] names a setting that is out of its range.
@@ -106,7 +109,8 @@ impl World {
     /// Changes the settings from the next step on.
     ///
     /// # Errors
-    /// [`WorldError::Settings`] names a setting that is out of its range. The settings then stay as they are.
+    /// [`WorldError::Settings`] names a setting that is out of its range. The settings then stay as
+    /// they are.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), WorldError> {
         settings.validate()?;
         self.core.wake_all();
@@ -114,11 +118,13 @@ impl World {
         Ok(())
     }
 
-    /// Advances by one frame of [`Settings::dt`] seconds, then clears the forces that were applied for the frame.
+    /// Advances by one frame of [`Settings::dt`] seconds, then clears the forces that were applied
+    /// for the frame.
     ///
     /// # Errors
-    /// [`StepError`]. The world is then as it was before: [`save`](Self::save) writes the same bytes. Forces applied for the frame are
-    /// still applied; [`clear_applied`](Self::clear_applied) removes them.
+    /// [`StepError`]. The world is then as it was before: [`save`](Self::save) writes the same
+    /// bytes. Forces applied for the frame are still applied;
+    /// [`clear_applied`](Self::clear_applied) removes them.
     pub fn step(&mut self) -> Result<&StepReport, StepError> {
         let core = &mut self.core;
         self.before.clone_from(&core.state);
@@ -160,8 +166,9 @@ impl World {
         at.clone_from(&self.core.state);
     }
 
-    /// Goes back to the state at a [`checkpoint`](Self::checkpoint); there are no contacts until the next step. Constants of objects and
-    /// settings stay as they are. Returns false, and changes nothing, if objects were added or removed since.
+    /// Goes back to the state at a [`checkpoint`](Self::checkpoint); there are no contacts until
+    /// the next step. Constants of objects and settings stay as they are. Returns false, and
+    /// changes nothing, if objects were added or removed since.
     pub fn roll_back(&mut self, to: &WorldState) -> bool {
         let fits = self.core.state.fits(to);
         if fits {
@@ -186,7 +193,7 @@ impl World {
         self.core.state.frame
     }
 
-    /// Returns the report of the last step.
+    /// Returns counts and residuals of the last step.
     pub fn report(&self) -> &StepReport {
         &self.core.report
     }
@@ -201,7 +208,8 @@ impl World {
         &self.core.contacts
     }
 
-    /// Returns the state `X`: the slices of all objects one after the other, in the order of addition.
+    /// Returns the state `X`: the ranges of all objects one after the other, in the order of
+    /// addition.
     pub fn state(&self) -> &[f64] {
         &self.core.state.x
     }
@@ -211,7 +219,7 @@ impl World {
         &self.core.derived.part_states
     }
 
-    /// Returns the read-only view that objects get.
+    /// Returns the read-only view that objects get in a step.
     pub fn view(&self) -> WorldView<'_> {
         WorldView { implicit: false, ..self.core.view(self.core.state.time) }
     }
@@ -240,7 +248,8 @@ impl World {
         })
     }
 
-    /// Returns the momentum of all dynamic objects: linear, kg·m/s, and angular about the world's origin, kg·m²/s, world axes.
+    /// Returns the momentum of all dynamic objects: linear, kg·m/s, and angular about the world's
+    /// origin, kg·m²/s, world axes.
     pub fn momentum(&self) -> Momentum {
         self.moving().fold(Momentum::default(), |sum, (x, body)| {
             let m = body.momentum(x);
@@ -253,20 +262,23 @@ impl World {
         moving.filter_map(|e| Some((&self.core.state.x[e.state_range.x.clone()], e.object.integratable()?)))
     }
 
-    /// Adds an object. It is dynamic, or static if it is a [fixed](RigidBody::fixed) body; [`set_mode`](Self::set_mode) changes that.
+    /// Adds an object. It is dynamic, or static if it is a [fixed](RigidBody::fixed) body;
+    /// [`set_mode`](Self::set_mode) changes that.
     ///
-    /// Names are unique and of any length. An object without a name gets one: `body`, `joint`, `force` or `object` and the count of
-    /// objects added before, `body 3`, or the next number if another object has that name. [`name`](Self::name) returns it.
+    /// Names are unique and of any length. An object without a name gets one: `body`, `joint`,
+    /// `force` or `object` and the count of objects added before, `body 3`, or the next number if
+    /// another object has that name. [`name`](Self::name) returns it.
     ///
     /// # Errors
-    /// [`WorldError`]: a name that is taken, constants out of their range, or numbers that are not finite. Nothing is added then.
+    /// [`WorldError`]: a name that is taken, constants out of their range, or numbers that are not
+    /// finite. Nothing is added then.
     pub fn add(&mut self, object: impl Object) -> Result<ObjectId, WorldError> {
         let any: &dyn std::any::Any = &object;
         let fixed = any.downcast_ref::<RigidBody>().is_some_and(RigidBody::is_fixed);
         self.add_boxed(Box::new(object), if fixed { Mode::Static } else { Mode::Dynamic })
     }
 
-    /// Adds an object that never moves.
+    /// Adds an object in the mode `Static`: it never moves.
     ///
     /// # Errors
     /// [`WorldError`], as [`add`](Self::add).
@@ -349,7 +361,8 @@ impl World {
         Ok(id)
     }
 
-    /// Removes an object and returns it. Its slice of the state goes, and the slices behind it move up.
+    /// Removes an object and returns it. Its range of the state is removed, and the ranges
+    /// behind it move up.
     ///
     /// # Errors
     /// [`WorldError::Stale`] if the object was removed before.

@@ -14,7 +14,8 @@ impl World {
     /// object removes its pairs.
     ///
     /// # Errors
-    /// [`WorldError`]: an object that was removed, a part that it does not have, or a constant out of its range.
+    /// [`WorldError`]: an object that was removed, a part that it does not have, or a constant out
+    /// of its range.
     pub fn set_pair_material(
         &mut self,
         a: impl Into<PairSide>,
@@ -57,7 +58,7 @@ impl World {
             PairSide::Material(0) => Err(crate::SettingsError {
                 what: "number of a pair's material",
                 value: 0.0,
-                wanted: "above 0; 0 stands for none",
+                expected: "above 0; 0 stands for none",
             }
             .into()),
             PairSide::Material(_) => Ok(()),

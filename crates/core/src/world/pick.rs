@@ -17,9 +17,9 @@
 //! | Y, Z | whitened responses to unit impulses at the point, and to unit couples |
 //! | ⁺ of a matrix | pseudo-inverse: there is no force along directions in which the part cannot move |
 //!
-//! Stiffness and damping are proportional to the effective mass at the point. A light and a heavy body
-//! therefore follow the hand alike, and the implicit step is stable for any ω h. Under gravity g a
-//! body comes to rest g/ω² below the hand.
+//! Stiffness and damping are proportional to the effective mass at the point. A light and a heavy
+//! body therefore follow the hand alike, and the implicit step is stable for any ω h. Under gravity
+//! g a body comes to rest g/ω² below the hand.
 
 use super::{Coordinates, World, WorldError};
 use crate::derived::Cache;
@@ -50,8 +50,8 @@ pub struct PickForce {
 }
 
 impl PickForce {
-    /// Applies the force during the next frame. Returns the force, N, and the torque about the held point,
-    /// N·m, world axes. Both are zero if the part does not move.
+    /// Applies the force during the next frame. Returns the force, N, and the torque about the held
+    /// point, N·m, world axes. Both are zero if the part does not move.
     ///
     /// # Errors
     /// [`WorldError::Stale`], [`WorldError::NoPart`], [`WorldError::NotFinite`].
@@ -79,9 +79,9 @@ impl PickForce {
     }
 }
 
-/// Returns the whitened responses of a part to unit couples about x, y and z, a row of `dof` numbers
-/// each. The couple about an axis is a force along the third axis with an arm of 1 m along the second,
-/// and the opposite force at the origin.
+/// Returns the whitened responses of a part to unit couples about x, y and z, a row of `dof`
+/// numbers each. The couple about an axis is a force along the third axis with an arm of 1 m along
+/// the second, and the opposite force at the origin.
 fn couples(body: &dyn Integratable, cache: &mut Cache, at: &PartPoint, dof: usize) -> Vec<f64> {
     let mut z = vec![0.0; 3 * dof];
     let origin = at.part_state.position();

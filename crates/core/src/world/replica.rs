@@ -1,4 +1,4 @@
-//! A world that shows what another process simulates (thesis §IV.A.6). Nothing in here steps.
+//! A world that shows the simulation of another process (thesis §IV.A.6). Nothing here steps.
 
 use super::{ContactPoint, World, WorldError};
 use crate::object::SyncError;
@@ -26,12 +26,13 @@ pub enum ReplicaError {
     NotSynchronizable(String),
 }
 
-/// Access to a world that shows what another process, or a recording, has simulated. It is drawn and never stepped: its next step or change
-/// of state would put everything back to where its own state says.
+/// Access to a world that shows the state of another process, or of a recording. Such a world is
+/// drawn and never stepped. Its own state stays as it was, so a step, or a change of that state,
+/// replaces the displayed poses.
 pub struct Replica<'w>(&'w mut World);
 
 impl World {
-    /// Lends the world as a replica of another one.
+    /// Returns access to the world as a replica of another one.
     pub fn replica(&mut self) -> Replica<'_> {
         Replica(self)
     }
@@ -41,7 +42,8 @@ impl Replica<'_> {
     /// Shows an object's parts at these poses, one per part, at rest.
     ///
     /// # Errors
-    /// [`WorldError`]: the object was removed, the count of poses is not that of its parts, or a pose is not finite.
+    /// [`WorldError`]: the object was removed, the count of poses is not that of its parts, or a
+    /// pose is not finite.
     pub fn set_poses(&mut self, id: ObjectId, poses: &[Pose]) -> Result<(), WorldError> {
         let core = &mut self.0.core;
         let entry = core.table.get(id).ok_or(WorldError::Stale)?;
@@ -58,8 +60,8 @@ impl Replica<'_> {
         Ok(())
     }
 
-    /// Applies a message of the object's copy elsewhere (thesis `ReadData`). The message is not trusted: numbers that are no state of the object
-    /// are refused.
+    /// Applies a message of the object's copy elsewhere (thesis `ReadData`). The message is not
+    /// trusted: numbers that are no state of the object are refused.
     ///
     /// # Errors
     /// [`ReplicaError`]: the object was removed, takes no messages, or refuses this one.
@@ -82,7 +84,8 @@ impl Replica<'_> {
         }
     }
 
-    /// Shows contacts as those of the last step. Contacts of objects that are not in the world are left out.
+    /// Shows contacts as those of the last step. Contacts of objects that are not in the world are
+    /// left out.
     pub fn set_contacts(&mut self, contacts: impl IntoIterator<Item = ContactPoint>) {
         let core = &mut self.0.core;
         core.contacts.clear();

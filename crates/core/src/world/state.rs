@@ -28,8 +28,8 @@ pub struct WorldState {
     pub(crate) objects: Vec<ObjectState>,
     /// The flat state `X`.
     pub(crate) x: StateVector,
-    /// Angular (rad/s²), then linear acceleration (m/s²) of every part at the last evaluation of forces. Objects and the detector
-    /// read them before forces are evaluated again.
+    /// Angular (rad/s²), then linear acceleration (m/s²) of every part at the last evaluation of
+    /// forces. Objects and the detector read them before forces are evaluated again.
     pub(crate) accelerations: Vec<[Vec3; 2]>,
     /// Wrench that users apply to every part during the next frame.
     pub(crate) applied: Vec<Wrench>,

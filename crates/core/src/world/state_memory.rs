@@ -1,8 +1,9 @@
 //! The memory of the state `X`. Its address changes only when an object is added or removed.
 //!
-//! A program that shares the state without copying it, as the Python module does, needs memory that is
-//! not moved or freed under a reader. The world therefore writes the numbers in place. When an object is
-//! added or removed they move to new memory, and [holds](StateMemory::hold) keep the old one.
+//! A program that shares the state without copying it, as the Python module does, needs memory that
+//! is not moved or freed under a reader. The world therefore writes the numbers in place. When an
+//! object is added or removed they move to new memory, and [holds](StateMemory::hold) keep the old
+//! one.
 
 use super::World;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -16,8 +17,8 @@ pub struct StateMemoryHold {
     left: Mutex<Vec<f64>>,
 }
 
-/// The numbers of the state, the hold on their memory, and that memory while it is frozen. A clone has
-/// memory of its own without a hold; `clone_from` writes to the present memory.
+/// The numbers of the state, the hold on their memory, and that memory while it is frozen. A clone
+/// has memory of its own without a hold; `clone_from` writes to the present memory.
 #[derive(Debug, Default)]
 pub(crate) struct StateVector {
     numbers: Vec<f64>,
@@ -110,9 +111,9 @@ impl World {
 }
 
 impl StateMemory<'_> {
-    /// Keeps the memory in place: the world writes there until an object is added or removed or the world
-    /// is dropped. From then on the memory keeps its last numbers as long as the hold lives. Calls between
-    /// two such changes return the same hold.
+    /// Keeps the memory in place: the world writes there until an object is added or removed or the
+    /// world is dropped. From then on the memory keeps its last numbers as long as the hold lives.
+    /// Calls between two such changes return the same hold.
     pub fn hold(&mut self) -> Arc<StateMemoryHold> {
         self.0.hold.get_or_insert_default().clone()
     }
@@ -124,8 +125,8 @@ impl StateMemory<'_> {
         (shown.as_mut_ptr(), shown.len())
     }
 
-    /// Keeps the held memory as it is and works on a copy until [`thaw`](Self::thaw). Readers see the
-    /// present state meanwhile.
+    /// Keeps the held memory as it is and works on a copy until [`thaw`](Self::thaw). Readers see
+    /// the present state meanwhile.
     pub fn freeze(&mut self) {
         if self.0.hold.is_some() && self.0.aside.is_none() {
             let copy = self.0.numbers.clone();

@@ -9,8 +9,8 @@ use std::sync::Arc;
 use tumble_collide::Vec3;
 
 new_key_type! {
-    /// The id of an object of a world. After the object is removed, the id gives `None`, never another
-    /// object.
+    /// The id of an object of a world. After the object is removed, the id gives `None`, never
+    /// another object.
     pub struct ObjectId;
 }
 
@@ -94,8 +94,8 @@ impl Clone for Placed {
     }
 }
 
-/// The objects of a world, in the order in which they were added, and their ids. Nothing in it changes in a step but the objects'
-/// caches.
+/// The objects of a world, in the order in which they were added, and their ids. A step changes
+/// nothing in it.
 #[derive(Clone, Default)]
 pub(crate) struct Table {
     pub placed: Vec<Placed>,

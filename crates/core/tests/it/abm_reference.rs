@@ -1,5 +1,7 @@
-//! Dense mechanics of a tree of links, straight from the definitions and slow: poses by composing isometries, Jacobians by summing over the path to the
-//! root, the mass matrix as a sum over links, velocity terms by numerical differentiation along the motion. Shares no code with the library's sweeps.
+//! Dense mechanics of a tree of links, straight from the definitions and slow: poses by composing
+//! isometries, Jacobians by summing over the path to the root, the mass matrix as a sum over links,
+//! velocity terms by numerical differentiation along the motion. Shares no code with the library's
+//! sweeps.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use tumble_core::articulated::Link;
@@ -179,7 +181,8 @@ pub fn mass_matrix(model: &Model, q: &[f64]) -> DMatrix<f64> {
     mass
 }
 
-/// Acceleration `[α; a]` of a point of a link for `q̈ = 0`: the derivative of `J v` along the motion, by central differences of sixth order.
+/// Acceleration `[α; a]` of a point of a link for `q̈ = 0`: the derivative of `J v` along the
+/// motion, by central differences of sixth order.
 pub fn drift(model: &Model, q: &[f64], v: &[f64], link: usize, point: &Vec3) -> DVector<f64> {
     const H: f64 = 2e-3;
     let rate = DVector::from_column_slice(v);

@@ -136,8 +136,8 @@ fn a_body_is_read_through_its_view() {
     assert!(matches!(world.body(id), Err(WorldError::Stale)));
 }
 
-/// Linear drag `F = −c·v` on a free body: `v(t) = v₀·e^(−c·t/m)`. A force that depends on velocity is of first order in the step `h`, so the
-/// relative error is at most `(c/m)²·t·h/2 = 0.47 %`.
+/// Linear drag `F = −c·v` on a free body: `v(t) = v₀·e^(−c·t/m)`. A force that depends on velocity
+/// is of first order in the step `h`, so the relative error is at most `(c/m)²·t·h/2 = 0.47 %`.
 #[test]
 fn a_force_from_a_function_acts_as_its_formula_says() {
     let mut world = World::new(Settings::default().with_gravity(Vec3::zeros())).unwrap();
@@ -159,7 +159,8 @@ fn a_force_from_a_function_acts_as_its_formula_says() {
     assert!(world.add_force("drag", |_, _| {}).is_err());
 }
 
-/// Two balls that touch over static ground, one in the air, and two that a joint connects: three islands.
+/// Two balls that touch over static ground, one in the air, and two that a joint connects: three
+/// islands.
 #[test]
 fn islands_are_what_contacts_and_joints_connect() {
     let mut world = World::default();

@@ -1,5 +1,5 @@
-//! Two families of algorithms that share no code: the articulated-body method with its factors (`Dynamics`), and inverse dynamics, mass matrix and
-//! Jacobians (`Kinematics`).
+//! Two families of algorithms that share no code: the articulated-body method with its factors
+//! (`Dynamics`), and inverse dynamics, mass matrix and Jacobians (`Kinematics`).
 
 use crate::articulated_random::*;
 use nalgebra::{DMatrix, DVector};
@@ -123,7 +123,8 @@ fn the_whitening_maps_are_a_root_of_the_mass_matrix() {
     }
 }
 
-/// `Y·Yᵀ = J·M⁻¹·Jᵀ` for three axes at a point and three turns of a link, with the Jacobians and the mass matrix from here.
+/// `Y·Yᵀ = J·M⁻¹·Jᵀ` for three axes at a point and three turns of a link, with the Jacobians and
+/// the mass matrix from here.
 #[test]
 fn responses_at_points_are_those_of_jacobian_and_mass_matrix() {
     let (mut random, cases) = all(55);

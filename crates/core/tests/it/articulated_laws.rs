@@ -36,7 +36,8 @@ fn cases(seed: u64) -> Vec<Case> {
 }
 
 impl Case {
-    /// The kinematics `t` seconds later, on a motion of velocity `v` and acceleration `qdd` (to second order in `t`).
+    /// The kinematics `t` seconds later, on a motion of velocity `v` and acceleration `qdd` (to
+    /// second order in `t`).
     fn later(&self, qdd: &[f64], t: f64) -> Kinematics {
         let mean: Vec<f64> = self.v.iter().zip(qdd).map(|(v, a)| v + 0.5 * t * a).collect();
         let end: Vec<f64> = self.v.iter().zip(qdd).map(|(v, a)| v + t * a).collect();
@@ -165,7 +166,8 @@ fn column(rows: &[f64], dof: usize, k: usize) -> Vec<f64> {
     rows.iter().skip(k).step_by(dof).copied().collect()
 }
 
-/// `½v·Mv` against `Σ ½m|ċ|² + ½ω·I·ω` with `ċ` and `ω` from differences of poses; positive definite by Cholesky.
+/// `½v·Mv` against `Σ ½m|ċ|² + ½ω·I·ω` with `ċ` and `ω` from differences of poses; positive
+/// definite by Cholesky.
 #[test]
 fn the_mass_matrix_is_that_of_the_kinetic_energy() {
     for case in cases(5) {

@@ -1,4 +1,5 @@
-//! The position correction: it solves with the solver of the world, and corrects overlap, joints and limits.
+//! The position correction: it solves with the solver of the world, and corrects overlap, joints
+//! and limits.
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Vec3};
@@ -32,7 +33,8 @@ impl RowSolver for Idle {
     }
 }
 
-/// Overlap of a sphere with the ground, and distance of an open pin of another sphere, after 0.1 s without gravity. Both are 1 cm at the start.
+/// Overlap of a sphere with the ground, and distance of an open pin of another sphere, after 0.1 s
+/// without gravity. Both are 1 cm at the start.
 fn overlap_and_opening(stepper: &str, solver: Box<dyn RowSolver>) -> [f64; 2] {
     let mut world = no_gravity(world(stepper, 1.0 / 240.0));
     world.set_solver(solver);

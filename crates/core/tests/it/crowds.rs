@@ -39,7 +39,8 @@ fn a_shock_passes_several_gaps_in_a_step() {
                 world.step().unwrap();
                 for pair in balls.windows(2) {
                     let gap = position(&world, pair[1]).x - position(&world, pair[0]).x - 0.1;
-                    // the second gap in a step is closed exactly, the third is noticed in the next step
+                    // the second gap in a step is closed exactly, the third is noticed in the next
+                    // step
                     assert!(gap > -1.0 / rate, "e = {e} at {rate} Hz: an overlap of {} m", -gap);
                 }
             }

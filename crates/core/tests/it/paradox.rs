@@ -55,7 +55,8 @@ fn painleves_rod_gains_no_energy_and_does_not_sink() {
                 .with_name("rod")
                 .with_mass(1.0)
                 .with_material(Material { friction: 2.0, ..Material::default() });
-            // the upper end leans back from the sliding direction, so that friction presses the lower end down
+            // the upper end leans back from the sliding direction, so that friction presses the
+            // lower end down
             let pose = Pose::new(Vec3::new(0.0, 0.0, half * tilt.cos() + radius), Vec3::new(0.0, -tilt, 0.0));
             let id = world.add(rod.with_pose(pose).with_velocity(Vec3::new(-3.0, 0.0, 0.0))).unwrap();
             let start = world.energy().total();

@@ -248,7 +248,7 @@ fn a_body_in_another_process_is_kept_in_step_by_messages() {
         );
         let mut x = replica.state_of(ours).unwrap().to_vec();
         let sync = replica.object(ours).unwrap().net_sync().unwrap();
-        assert_eq!(sync.read_data(&message[1..], &mut x), Err(SyncError::Length { got: 103, wanted: 104 }));
+        assert_eq!(sync.read_data(&message[1..], &mut x), Err(SyncError::Length { got: 103, expected: 104 }));
         let mut bad = message.clone();
         bad[24..32].copy_from_slice(&f64::NAN.to_le_bytes());
         assert_eq!(sync.read_data(&bad, &mut x), Err(SyncError::Value));
@@ -258,7 +258,8 @@ fn a_body_in_another_process_is_kept_in_step_by_messages() {
     assert_eq!(bits(&world), bits(&replica));
 }
 
-/// `|L·v|² = vᵀMv = 2T` at either state, whichever was refreshed last; `T` is summed over the links.
+/// `|L·v|² = vᵀMv = 2T` at either state, whichever was refreshed last; `T` is summed over the
+/// links.
 #[test]
 fn two_states_of_one_object_exist_at_once() {
     let rod =

@@ -140,7 +140,8 @@ impl Contact {
     }
 }
 
-/// Encodes contacts: the two indices (u32), then point, normal, depth and force (f64), little-endian.
+/// Encodes contacts: the two indices (u32), then point, normal, depth and force (f64),
+/// little-endian.
 pub fn encode_contacts(contacts: &[Contact]) -> Vec<u8> {
     let mut out = Vec::with_capacity(Contact::BYTES * contacts.len());
     for contact in contacts {

@@ -4,8 +4,9 @@
 //! count u32 | count times: object a u32, part u32, object b u32, part u32, point 3 f32, normal 3 f32, depth f32, force 3 f32
 //! ```
 //!
-//! Objects are indices of the object table; the normal points from b to a, and the force acts on a (N, m, world axes). Contacts with
-//! objects that are not in the table are left out. A facet shows them and computes nothing with them.
+//! Objects are indices of the object table; the normal points from b to a, and the force acts on a
+//! (N, m, world axes). Contacts with objects that are not in the table are left out. A facet shows
+//! them and computes nothing with them.
 
 use super::wire::{ByteReader, MessageError};
 use std::collections::BTreeMap;

@@ -104,8 +104,8 @@ impl Publisher {
         }
     }
 
-    /// Sends contacts with every frame: those that touch, at most `max` and [`MAX_CONTACTS`]. If there are more, those with the largest
-    /// forces are sent. By default there are none.
+    /// Sends contacts with every frame: those that touch, at most `max` and [`MAX_CONTACTS`]. If
+    /// there are more, those with the largest forces are sent. By default there are none.
     #[must_use]
     pub fn with_contacts(mut self, max: usize) -> Publisher {
         self.contacts = max.min(MAX_CONTACTS);

@@ -94,12 +94,12 @@ impl MessageKind {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MessageError {
     /// Shorter than its header, or than the header says.
-    #[error("a message of {got} bytes, expected {wanted}")]
+    #[error("a message of {got} bytes, expected {expected}")]
     Truncated {
         /// Bytes received.
         got: usize,
         /// Bytes expected.
-        wanted: u64,
+        expected: u64,
     },
     /// Longer than allowed, or than the header says.
     #[error("a message of {got} bytes, at most {max} are allowed")]
@@ -166,7 +166,7 @@ pub fn message(header: &MessageHeader, write: impl FnOnce(&mut Vec<u8>)) -> Vec<
 /// Every [`MessageError`] except `Unfit`.
 pub fn open(bytes: &[u8]) -> Result<(MessageHeader, &[u8]), MessageError> {
     if bytes.len() < HEADER_BYTES {
-        return Err(MessageError::Truncated { got: bytes.len(), wanted: HEADER_BYTES as u64 });
+        return Err(MessageError::Truncated { got: bytes.len(), expected: HEADER_BYTES as u64 });
     }
     if bytes.len() > MAX_MESSAGE_BYTES {
         return Err(MessageError::Oversize { got: bytes.len() as u64, max: MAX_MESSAGE_BYTES as u64 });
@@ -184,7 +184,7 @@ pub fn open(bytes: &[u8]) -> Result<(MessageHeader, &[u8]), MessageError> {
         return Err(MessageError::Version(version));
     }
     if (bytes.len() as u64) < size {
-        return Err(MessageError::Truncated { got: bytes.len(), wanted: size });
+        return Err(MessageError::Truncated { got: bytes.len(), expected: size });
     }
     if (bytes.len() as u64) > size {
         return Err(MessageError::Oversize { got: bytes.len() as u64, max: size });

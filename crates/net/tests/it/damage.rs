@@ -18,7 +18,8 @@ fn cut_at_every_byte_it_reads_up_to_the_last_flush() {
             file.set_len(n).unwrap();
             let safe =
                 lengths.iter().rposition(|length| *length <= n && *length != lengths[0]).map_or(0, |k| k / 2 * 2);
-            // Frame k is on disk once frame k | 1 is recorded, and lengths[1] is the first length with frames.
+            // Frame k is on disk once frame k | 1 is recorded, and lengths[1] is the first length
+            // with frames.
             let safe = if n >= lengths[1] { safe.max(2) } else { 0 };
             match read_all(&path) {
                 (frames, Ok(Ending::Cut { offset, .. })) => {
@@ -126,7 +127,8 @@ fn damage_behind_the_checksums_never_panics() {
     assert!(refused > 1000 && mended > 100, "{refused} refused, {mended} mended");
 }
 
-/// Sets the checksums of all chunks and of the data to "none made"; returns where each chunk's body begins and ends.
+/// Sets the checksums of all chunks and of the data to "none made"; returns where each chunk's body
+/// begins and ends.
 fn forget_checksums(bytes: &mut [u8]) -> Vec<(usize, usize)> {
     let mut chunks = Vec::new();
     let mut at = 8;

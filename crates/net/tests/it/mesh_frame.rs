@@ -38,7 +38,8 @@ fn a_recorded_mesh_stands_where_its_file_says() {
     }
 }
 
-/// A name of 200 bytes is recorded as it is. Longer ones than a recording can hold keep their beginning and stay different.
+/// A name of 200 bytes is recorded as it is. Longer ones than a recording can hold keep their
+/// beginning and stay different.
 #[test]
 fn a_world_with_long_names_is_recorded() {
     let long = "x".repeat(200);
@@ -66,7 +67,8 @@ fn a_world_with_long_names_is_recorded() {
     assert_eq!(world.save(), state);
 }
 
-/// Contacts of a ball at rest are recorded exactly, and can be shown in a world whose snapshot was restored.
+/// Contacts of a ball at rest are recorded exactly, and can be shown in a world whose snapshot was
+/// restored.
 #[test]
 fn contacts_are_recorded_and_shown_again() {
     let mut world = World::default();

@@ -1,4 +1,5 @@
-//! Python's `mcap` and `mcap-protobuf-support` read the file: other programmers' code, and the schemas in the file alone.
+//! Python's `mcap` and `mcap-protobuf-support` read the file: other programmers' code, and the
+//! schemas in the file alone.
 
 use crate::support::*;
 use std::io::Write;

@@ -86,7 +86,8 @@ pub fn assert_frames(frames: &[Frame]) {
     }
 }
 
-/// Asserts that each of these frames is right by its own number, and that numbers increase; some may be missing.
+/// Asserts that each of these frames is right by its own number, and that numbers increase; some
+/// may be missing.
 pub fn assert_true_frames(frames: &[Frame]) {
     assert!(frames.is_sorted_by(|a, b| a.frame < b.frame));
     for frame in frames {

@@ -200,8 +200,8 @@ fn joints(world: &World, list: &mut DrawList, length: f32) {
     }
 }
 
-/// Returns a color for each dynamic object: one for each [island](World::islands) of several objects, in their order; gray for objects
-/// without connections.
+/// Returns a color for each dynamic object: one for each [island](World::islands) of several
+/// objects, in their order; gray for objects without connections.
 pub(super) fn island_colors(world: &World) -> BTreeMap<ObjectId, [f32; 3]> {
     let mut palette = SHELL_COLORS.iter().copied().cycle();
     let mut color = |island: &[ObjectId]| if island.len() == 1 { None } else { palette.next() };

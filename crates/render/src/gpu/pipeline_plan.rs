@@ -52,7 +52,8 @@ pub(super) struct Plan<'a> {
 }
 
 impl Plan<'_> {
-    /// Creates the pipeline of a shader module, with these binding layouts in the order of their groups.
+    /// Creates the pipeline of a shader module, with these binding layouts in the order of their
+    /// groups.
     pub fn build(
         &self,
         device: &Device,

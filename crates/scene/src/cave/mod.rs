@@ -1,7 +1,7 @@
 //! Cave files: positions of screens and users, and the processes that draw.
 //!
 //! A cave is read like a scene: in one pass that finds all its problems, each with file, line,
-//! column, the value and what is expected. The result, a [`Cave`], has references resolved to
+//! column, the value and the expected value. The result, a [`Cave`], has references resolved to
 //! indices and files to paths. [`Cave::notes`] reports conditions that are not errors, such as gaps
 //! between screens and pixels that are not square.
 //!
@@ -84,7 +84,8 @@ impl Cave {
     /// Reads the cave file at `path`.
     ///
     /// # Errors
-    /// [`CaveError`]: the file cannot be read, is larger than 1 MiB or not UTF-8, or has problems. All problems are reported at once.
+    /// [`CaveError`]: the file cannot be read, is larger than 1 MiB or not UTF-8, or has problems.
+    /// All problems are reported at once.
     pub fn load(path: impl AsRef<Path>) -> Result<Cave, CaveError> {
         let path = path.as_ref();
         let unread = |source| CaveError::Read { file: path.to_path_buf(), source };

@@ -27,7 +27,8 @@ impl SceneFile {
     /// `.dae`) becomes a dynamic body of 1000 kg/m³ above a floor, in the frame of its file.
     ///
     /// # Errors
-    /// [`SceneError`]: the file cannot be read, is larger than 16 MiB, not UTF-8 or of another format, or has problems. All problems are reported at once.
+    /// [`SceneError`]: the file cannot be read, is larger than 16 MiB, not UTF-8 or of another
+    /// format, or has problems. All problems are reported at once.
     pub fn load(path: impl AsRef<Path>) -> Result<SceneFile, SceneError> {
         SceneFile::load_with(path, &LoadOptions::default())
     }

@@ -59,7 +59,8 @@ pub(crate) trait Parts {
     /// Returns all names, for messages.
     fn names(&self) -> Vec<String>;
 
-    /// Returns the sides that `a` and `b` name; reports an unknown name and two equal sides. `expected` says what `b` may be.
+    /// Returns the sides that `a` and `b` name; reports an unknown name and two equal sides.
+    /// `expected` says what `b` may be.
     fn sides<T: Copy + PartialEq>(
         &self,
         f: &Fields<'_>,

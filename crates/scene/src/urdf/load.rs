@@ -16,7 +16,8 @@ use crate::parse::link::LinkSpec;
 /// meshes are read when they are first drawn. Also returns notes about the file.
 ///
 /// # Errors
-/// [`UrdfError`]: a file cannot be read, or has problems. All problems of the XML are reported at once, with line and column.
+/// [`UrdfError`]: a file cannot be read, or has problems. All problems of the XML are reported at
+/// once, with line and column.
 pub fn load(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<(ArticulatedBody, Notes), UrdfError> {
     let path = path.as_ref();
     let robot = read_file(path, options, Content::Body)?;
@@ -45,7 +46,8 @@ pub struct UrdfModel {
 /// Reads the tree of a URDF without its shapes. No mesh is searched for.
 ///
 /// # Errors
-/// [`UrdfError`]: the file cannot be read, or has problems. All problems are reported at once, with line and column.
+/// [`UrdfError`]: the file cannot be read, or has problems. All problems are reported at once, with
+/// line and column.
 pub fn model(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<UrdfModel, UrdfError> {
     let path = path.as_ref();
     let robot = read_file(path, options, Content::Tree)?;

@@ -152,8 +152,8 @@ pub struct DrawOptions {
     /// windows with a software driver).
     #[arg(long, value_name = "NAME")]
     pub quality: Option<Quality>,
-    /// Overlays: contacts, normals, forces, joints, frames, tree=LEVEL, all; separated by commas. The
-    /// first three need a server that sends contacts, as that of `tumble cave` then does.
+    /// Overlays: contacts, normals, forces, joints, frames, tree=LEVEL, all; separated by commas.
+    /// The first three need a server that sends contacts, as that of `tumble cave` then does.
     #[arg(long, value_name = "WHAT", default_value = "")]
     pub debug_draw: FacetOverlays,
     /// Draw into memory even if there is a display.

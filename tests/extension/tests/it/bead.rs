@@ -26,7 +26,8 @@ fn the_cycloid_is_isochronous_and_keeps_energy() {
     }
 }
 
-/// The bead comes to its stop, loses what it had (a stop has no restitution), and swings back from rest: its energy is then that of the stop's height.
+/// The bead comes to its stop, loses what it had (a stop has no restitution), and swings back from
+/// rest: its energy is then that of the stop's height.
 #[test]
 fn a_stop_on_the_wire_holds_the_bead_and_lets_it_go() {
     for stepper in STEPPERS {

@@ -14,7 +14,8 @@ fn rigid(name: &str, mass: f64, at: Vec3, velocity: Vec3, restitution: f64) -> R
     body.with_pose(Pose::translation(at.x, at.y, at.z)).with_velocity(velocity)
 }
 
-/// Two objects of `ma` and `mb` kg head on along x with restitution `e`: velocities after, by momentum and Newton's law.
+/// Two objects of `ma` and `mb` kg head on along x with restitution `e`: velocities after, by
+/// momentum and Newton's law.
 fn head_on(ma: f64, mb: f64, va: f64, vb: f64, e: f64) -> (f64, f64) {
     let common = (ma * va + mb * vb) / (ma + mb);
     (common - e * mb / (ma + mb) * (va - vb), common + e * ma / (ma + mb) * (va - vb))
@@ -47,7 +48,8 @@ fn a_particle_hits_a_rigid_body_head_on() {
     }
 }
 
-/// Off the middle, elastic, without friction: all of momentum, angular momentum and energy stays, and equal masses part at a right angle.
+/// Off the middle, elastic, without friction: all of momentum, angular momentum and energy stays,
+/// and equal masses part at a right angle.
 #[test]
 fn an_oblique_elastic_impact_keeps_everything() {
     for stepper in STEPPERS {
@@ -58,7 +60,8 @@ fn an_oblique_elastic_impact_keeps_everything() {
         let (m, e) = (world.momentum(), world.energy().total());
         // before: P = 2·3 along x; about the origin x × P = (0.08, 0.03) × 6
         assert!((m.linear - Vec3::new(6.0, 0.0, 0.0)).norm() < 1e-12, "{stepper}: momentum {}", m.linear);
-        // time_stepping gives the impulse where linear motion meets the surface, backtracking where the surfaces are within 1e-7 m
+        // time_stepping gives the impulse where linear motion meets the surface, backtracking where
+        // the surfaces are within 1e-7 m
         let slack = if stepper == "backtracking" { 1e-6 } else { 1e-3 };
         assert!(
             (m.angular - Vec3::new(0.0, 0.18, -0.48)).norm() < slack,
@@ -70,7 +73,8 @@ fn an_oblique_elastic_impact_keeps_everything() {
     }
 }
 
-/// At the lowest point the wire is level: along x the bead is a mass of its own, and equal masses swap velocities.
+/// At the lowest point the wire is level: along x the bead is a mass of its own, and equal masses
+/// swap velocities.
 #[test]
 fn a_bead_at_the_lowest_point_swaps_velocities_with_a_ball() {
     for stepper in STEPPERS {

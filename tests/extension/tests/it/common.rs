@@ -20,7 +20,8 @@ pub fn sphere(radius: f64) -> Shape {
     Shape::sphere(radius).unwrap()
 }
 
-/// A particle of `mass` kg in a sphere of that radius (m), at a position (m) with a velocity (m/s), with the default material.
+/// A particle of `mass` kg in a sphere of that radius (m), at a position (m) with a velocity (m/s),
+/// with the default material.
 pub fn particle(mass: f64, radius: f64, at: Vec3, velocity: Vec3) -> Particle {
     let start = [at.x, at.y, at.z, velocity.x, velocity.y, velocity.z];
     Particle { mass, shape: sphere(radius), material: Material::default(), start }
@@ -45,8 +46,8 @@ pub fn velocity(world: &World, id: ObjectId) -> Vec3 {
     world.part_state(id, 0).unwrap().velocity
 }
 
-/// Runs for `seconds` and returns the mean period of `x` of an object, from its first to its last rise through 0 (interpolated), and the
-/// largest deviation of the energy from its start, J.
+/// Runs for `seconds` and returns the mean period of `x` of an object, from its first to its last
+/// rise through 0 (interpolated), and the largest deviation of the energy from its start, J.
 pub fn swing(world: &mut World, id: ObjectId, seconds: f64) -> (f64, f64) {
     let (start, mut drift) = (world.energy().total(), 0.0f64);
     let (mut rises, mut before) = (Vec::new(), position(world, id).x);

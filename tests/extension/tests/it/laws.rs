@@ -1,4 +1,5 @@
-//! Laws of `Integratable` that hold for every object with a state, of this crate and of the engine. An object of a new kind is checked by one more line.
+//! Laws of `Integratable` that hold for every object with a state, of this crate and of the engine.
+//! An object of a new kind is checked by one more line.
 
 use crate::common::*;
 use nalgebra::DMatrix;
@@ -70,7 +71,8 @@ fn check(name: &str, object: &dyn Object, x: &[f64]) {
     accelerations(name, object, x, &wrenches);
 }
 
-/// Accelerations of the parts are the rates of their velocities along the motion, by central differences.
+/// Accelerations of the parts are the rates of their velocities along the motion, by central
+/// differences.
 fn accelerations(name: &str, object: &dyn Object, x: &[f64], wrenches: &[Wrench]) {
     let body = object.integratable().unwrap();
     let (n, (mut cache, mut part_states)) = (body.state_sizes().dof, parts_at(object, x));

@@ -1,4 +1,5 @@
-//! An object of another crate carries a camera and a lamp: the draw list looks and is lit from where it flies.
+//! An object of another crate carries a camera and a lamp: the draw list looks and is lit from
+//! where it flies.
 
 use crate::common::*;
 use tumble_core::collide::Vec3;

@@ -19,7 +19,8 @@ fn period() -> f64 {
     2.0 * PI * (LENGTH / G).sqrt() * (1.0 + AMPLITUDE.powi(2) / 16.0 + 11.0 * AMPLITUDE.powi(4) / 3072.0)
 }
 
-/// A pendulum of a particle (its own kind of object) or of a rigid body hung by its center, which then moves the same.
+/// A pendulum of a particle (its own kind of object) or of a rigid body hung by its center, which
+/// then moves the same.
 fn pendulum(stepper: &str, rigid: bool) -> (World, ObjectId) {
     let mut world = world(stepper, true);
     let id = if rigid {
@@ -63,7 +64,8 @@ fn a_rod_makes_a_pendulum_of_the_right_period_that_keeps_energy_and_length() {
     }
 }
 
-/// A large swing: once round needs `v² = 5gℓ` at the bottom on a rope; with 4 % more the energy at the top is the bottom's less `2mgℓ`.
+/// A large swing: once round needs `v² = 5gℓ` at the bottom on a rope; with 4 % more the energy at
+/// the top is the bottom's less `2mgℓ`.
 #[test]
 fn a_rod_carries_a_full_turn() {
     for stepper in STEPPERS {
@@ -84,7 +86,8 @@ fn a_rod_carries_a_full_turn() {
     }
 }
 
-/// A rope is slack until the fall has used it up, and then stops the fall without a rebound (`e = 0`).
+/// A rope is slack until the fall has used it up, and then stops the fall without a rebound
+/// (`e = 0`).
 #[test]
 fn a_rope_is_slack_and_then_holds() {
     for stepper in STEPPERS {
@@ -110,7 +113,8 @@ fn a_rope_is_slack_and_then_holds() {
     }
 }
 
-/// Three bobs on three rods: equality rows are linear equations, so all solvers give the same velocities.
+/// Three bobs on three rods: equality rows are linear equations, so all solvers give the same
+/// velocities.
 #[test]
 fn all_solvers_agree_on_equality_rows() {
     for stepper in STEPPERS {

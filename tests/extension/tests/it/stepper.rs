@@ -16,8 +16,9 @@ fn thrown(settings: Settings, stepper: Box<dyn Stepper>) -> World {
     world
 }
 
-/// 3 m/s in 1/60 s are 50 mm: four sub-steps of 12.6 mm, bit for bit those of the setting. In the end the ball rolls at 5/7 of 2.4 m/s (the angular
-/// momentum about the ground stays), 28.6 mm: three sub-steps.
+/// 3 m/s in 1/60 s are 50 mm: four sub-steps of 12.6 mm, bit for bit those of the setting. In the
+/// end the ball rolls at 5/7 of 2.4 m/s (the angular momentum about the ground stays), 28.6 mm:
+/// three sub-steps.
 #[test]
 fn a_stepper_of_another_crate_chooses_its_substeps() {
     let still = Settings::default().with_gravity(Vec3::zeros());

@@ -20,7 +20,8 @@ fn wind_carries_what_it_blows_on_as_its_equation_says() {
         step(&mut world, 480);
         for (id, mass) in [(windy, 2.0f64), (ball, 3.0)] {
             let expected = wind * (1.0 - (-1.5 * 2.0 / mass).exp());
-            // one evaluation per step where the force depends on the velocity: first order, h·c/2m of the speed at most
+            // one evaluation per step where the force depends on the velocity: first order, h·c/2m
+            // of the speed at most
             let off = (velocity(&world, id) - expected).norm();
             assert!(off < DT * 1.5 / mass * wind.norm(), "{stepper}: {} m/s, by hand {expected}", velocity(&world, id));
         }

@@ -14,8 +14,9 @@ use crate::articulated::model::Model;
 use crate::articulated::model::coordinates::{integrate, read_vector};
 use crate::articulated::model::joint::Joint;
 
-/// Free motion of one model, with its working memory: the dynamics at the stages of a step, which leave those at the refreshed state as they are, and
-/// the numbers of the stages. No call allocates memory.
+/// Free motion of one model, with its working memory: the dynamics at the stages of a step, which
+/// leave those at the refreshed state as they are, and the numbers of the stages. No call allocates
+/// memory.
 #[derive(Clone, Debug)]
 pub(in crate::articulated) struct FreeMotion {
     dynamics: Dynamics,
@@ -92,8 +93,8 @@ impl FreeMotion {
         self.scale_to(energy, n, x);
     }
 
-    /// Moves the positions of `x = [q, v]` by `h·d` and transports `v` in parallel in the metric `M`
-    /// (Levi-Civita):
+    /// Moves the positions of `x = [q, v]` by `h·d` and transports `v` in parallel in the metric
+    /// `M` (Levi-Civita):
     ///
     /// ```text
     /// v̇ = −Γ(d, v) = ¼(a(v + d) − a(v − d)) − ½[d, v]        a(v) = q̈ of free motion, quadratic in v;   [d, v] = ±d×v of spherical joints and floating roots

@@ -1,5 +1,5 @@
-//! Dynamics of a tree of links, one algorithm per file: kinematics, the articulated-body method and what its factors give, the mass matrix and
-//! inverse dynamics.
+//! Dynamics of a tree of links, one algorithm per file: kinematics, the articulated-body method and
+//! what its factors give, the mass matrix and inverse dynamics.
 
 pub(in crate::articulated) mod abm;
 pub(in crate::articulated) mod crba;

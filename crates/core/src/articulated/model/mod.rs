@@ -54,7 +54,7 @@ pub enum ModelError {
     #[error("link '{0}': its placement must be finite, with a rotation of unit length")]
     Placement(String),
     /// Mass or inertia is out of its range.
-    #[error("link '{link}': {what} is {value}; it must be {wanted}")]
+    #[error("link '{link}': {what} is {value}; it must be {expected}")]
     Inertia {
         /// Link.
         link: String,
@@ -63,7 +63,7 @@ pub enum ModelError {
         /// Value given.
         value: f64,
         /// Admissible range.
-        wanted: &'static str,
+        expected: &'static str,
     },
     /// A joint moves no inertia.
     #[error(
@@ -124,7 +124,7 @@ impl LinkMass {
 
     fn validate(&self, link: &str) -> Result<(), ModelError> {
         let range_error =
-            |what, value, wanted| Err(ModelError::Inertia { link: link.to_string(), what, value, wanted });
+            |what, value, expected| Err(ModelError::Inertia { link: link.to_string(), what, value, expected });
         if !(self.mass.is_finite() && self.mass >= 0.0) {
             return range_error("mass", self.mass, "finite and at least 0 kg");
         }

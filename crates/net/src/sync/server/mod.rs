@@ -76,7 +76,8 @@ pub struct ServerOptions {
     pub resend_interval: Option<Duration>,
     /// Number of the first frame.
     pub first_frame: u64,
-    /// Largest number of contacts that are sent with a frame ([`Publisher::with_contacts`]); 0 by default.
+    /// Largest number of contacts that are sent with a frame ([`Publisher::with_contacts`]); 0 by
+    /// default.
     pub contacts: usize,
 }
 

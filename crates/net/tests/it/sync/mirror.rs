@@ -71,7 +71,8 @@ fn a_copy_follows_frame_by_frame() {
     }
 }
 
-/// Names of 200 and 70,000 bytes, of objects in the scene file and of objects added later, with characters of several bytes.
+/// Names of 200 and 70,000 bytes, of objects in the scene file and of objects added later, with
+/// characters of several bytes.
 #[test]
 fn names_of_any_length_are_sent_whole() {
     let scene = || {
@@ -328,7 +329,8 @@ fn the_hash_of_a_scene_does_not_see_folders() {
     assert_ne!(hash("one/scenes/wood.png"), hash("one/scenes/felt.png"));
 }
 
-/// A heavy and a light ball rest on the ground: their contacts are sent in single precision, or only the one with the larger force.
+/// A heavy and a light ball rest on the ground: their contacts are sent in single precision, or
+/// only the one with the larger force.
 #[test]
 fn contacts_are_sent_up_to_a_number() {
     let scene = || {
@@ -370,7 +372,8 @@ fn contacts_are_sent_up_to_a_number() {
     }
 }
 
-/// A contact of an unknown object or part, a number that is not finite, or a wrong count: nothing is applied.
+/// A contact of an unknown object or part, a number that is not finite, or a wrong count: nothing
+/// is applied.
 #[test]
 fn wrong_contacts_are_refused_with_their_frame() {
     let mut pair = Pair::new(false);
