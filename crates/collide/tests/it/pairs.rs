@@ -63,22 +63,34 @@ fn stacked(mode: ContactMode, upper: &Piece, lower: &Piece, gap: f64) -> (Vec3, 
     (below.rotation * Vec3::z(), [first, second])
 }
 
-/// Calls `visit` with each pair and mode, and with the sum of the outward errors of the sphere
-/// trees by which the pair collides in that mode: meters, 0 without trees.
-fn each_pair(visit: &mut dyn FnMut(&str, ContactMode, [&Piece; 2], f64)) {
-    let pieces = pieces();
-    for lower in &pieces {
+/// A pair in one contact mode.
+struct Case<'a> {
+    label: String,
+    mode: ContactMode,
+    upper: &'a Piece,
+    lower: &'a Piece,
+    /// Sum of the outward errors of the sphere trees by which the pair collides, meters; 0 without
+    /// trees.
+    error: f64,
+}
+
+/// Returns every pair in every mode.
+fn cases(pieces: &[Piece]) -> Vec<Case<'_>> {
+    let mut cases = Vec::new();
+    for lower in pieces {
         for upper in pieces.iter().filter(|piece| piece.name != "half-space") {
             let exact = upper.name == "cylinder" && lower.name == "half-space";
             let only_tree = upper.only_tree || lower.only_tree;
-            for (word, mode) in ContactMode::NAMES {
-                let by_tree = !exact && (only_tree || *mode == ContactMode::Spheres);
+            for &(word, mode) in ContactMode::NAMES {
+                let by_tree = !exact && (only_tree || mode == ContactMode::Spheres);
                 let error = |piece: &Piece| piece.shape.tree().map_or(0.0, SphereTree::outward_error);
                 let error = if by_tree { error(upper) + error(lower) } else { 0.0 };
-                visit(&format!("{} on {} in mode {word}", upper.name, lower.name), *mode, [upper, lower], error);
+                let label = format!("{} on {} in mode {word}", upper.name, lower.name);
+                cases.push(Case { label, mode, upper, lower, error });
             }
         }
     }
+    cases
 }
 
 fn deepest(found: &[Contact]) -> Option<&Contact> {
@@ -90,7 +102,7 @@ const ROUNDING: f64 = 1e-12;
 
 #[test]
 fn every_overlap_has_a_contact_of_its_depth() {
-    each_pair(&mut |label, mode, [upper, lower], error| {
+    for Case { label, mode, upper, lower, error } in cases(&pieces()) {
         // leaf spheres tilt the normal where the other surface is curved
         let least_cosine = if error > 0.0 { 0.97 } else { 1.0 - ROUNDING };
         for depth in [0.01, 0.03] {
@@ -102,12 +114,12 @@ fn every_overlap_has_a_contact_of_its_depth() {
                 assert!(deepest.normal.dot(&direction) > least_cosine, "{label}: {direction:?}, but {deepest:?}");
             }
         }
-    });
+    }
 }
 
 #[test]
 fn separated_shapes_have_no_contact_below_zero() {
-    each_pair(&mut |label, mode, [upper, lower], error| {
+    for Case { label, mode, upper, lower, error } in cases(&pieces()) {
         let gap = 0.05;
         assert!(error < gap, "{label}: the trees are too coarse for this test");
         for found in &stacked(mode, upper, lower, gap).1 {
@@ -116,5 +128,5 @@ fn separated_shapes_have_no_contact_below_zero() {
             let bounds = gap - error - ROUNDING..gap + ROUNDING;
             assert!(bounds.contains(&nearest.gap), "{label}: gap {gap}, error {error}, but {nearest:?}");
         }
-    });
+    }
 }
