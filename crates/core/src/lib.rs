@@ -28,6 +28,7 @@ mod clone_by_field;
 mod constraint;
 mod contact;
 mod derived;
+mod each_object;
 mod force;
 mod integrators;
 mod object;
@@ -38,6 +39,7 @@ mod settings;
 pub mod solver;
 pub mod spatial;
 mod step;
+mod threads;
 mod world;
 
 pub use archive::ArchiveError;

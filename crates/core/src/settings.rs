@@ -2,6 +2,7 @@
 
 use crate::object::Combine;
 use crate::solver::SolverSettings;
+use crate::threads::MAX_THREADS;
 use crate::world::sleep::Sleep;
 use tumble_collide::Vec3;
 
@@ -76,6 +77,18 @@ pub struct Settings {
     /// Combination of the restitution coefficients of two bodies. The default is the larger, so
     /// that a ball bounces off a floor without settings of its own.
     pub combine_restitution: Combine,
+    /// Number of threads of a step, 0 to 256: 1 by default, 0 for as many as cores. The results are the
+    /// same bits for every number, so it is no part of a saved world: a world that is read has 1.
+    ///
+    /// All worlds of a process share the threads. A world that is stepped on a thread of rayon, or
+    /// while another world uses the threads, uses the calling thread alone; so does small work.
+    #[serde(skip, default = "one_thread")]
+    pub threads: u32,
+}
+
+/// Returns the default number of threads.
+fn one_thread() -> u32 {
+    1
 }
 
 impl Default for Settings {
@@ -95,6 +108,7 @@ impl Default for Settings {
             sleep: None,
             combine_friction: Combine::GeometricMean,
             combine_restitution: Combine::Max,
+            threads: one_thread(),
         }
     }
 }
@@ -142,6 +156,7 @@ setters! {
     with_sleep sleep: Option<Sleep>,
     with_combine_friction combine_friction: Combine,
     with_combine_restitution combine_restitution: Combine,
+    with_threads threads: u32,
 }
 
 impl Settings {
@@ -172,6 +187,7 @@ impl Settings {
             self.drift_tolerance >= self.contact_tolerance,
             "at least the contact tolerance",
         )?;
+        check("threads", self.threads as f64, self.threads <= MAX_THREADS, "0 to 256")?;
         if let Some(sleep) = &self.sleep {
             check("sleep: seconds", sleep.after, sleep.after > 0.0, "above 0 s")?;
             check("sleep: distance", sleep.within, sleep.within > 0.0, "above 0 m")?;

@@ -79,6 +79,28 @@ def test_each_rule_gives_its_bounce(rule, restitution):
     assert rebound(world, ball, 0.9) == pytest.approx(restitution**2 * 0.9, abs=1e-3)
 
 
+def test_the_number_of_threads_changes_no_bit():
+    def run(threads):
+        world = tumble.World(threads=threads)
+        assert world.threads == world.fork().threads == threads
+        world.add_static("ground", tumble.HalfSpace())
+        for i in range(100):
+            world.add_rigid(f"b{i}", tumble.Box((0.1, 0.1, 0.1)), mass=1.0, position=(0.3 * (i // 4), 0, 0.05 + 0.11 * (i % 4)))
+        world.step(30)
+        assert pickle.loads(pickle.dumps(world)).threads == 1
+        return world.state.copy()
+
+    alone = run(1)
+    for threads in (2, 3, 0):
+        assert (run(threads) == alone).all()
+    world = tumble.World.load("stack", threads=2)
+    assert world.threads == 2
+    world.threads = 1
+    assert world.threads == 1
+    with pytest.raises(ValueError, match="threads is 257; it must be 0 to 256"):
+        world.threads = 257
+
+
 def test_a_pair_has_restitution_and_friction_of_its_own():
     world = tumble.World(combine_friction="min")
     assert world.combine_friction == "min"

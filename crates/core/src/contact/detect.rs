@@ -1,12 +1,13 @@
 //! Contact detection: broad phase, filters, narrow phase.
 
-use crate::contact::pair::{MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
+use crate::contact::pair::{CachedContacts, KnownContacts, MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
 use crate::contact::pair_material::PairMaterials;
 use crate::contact::time_of_impact::MovingPair;
 use crate::object::Material;
 use crate::object::collidable::ContactFrame;
 use crate::object::part_state::PartState;
 use crate::settings::Settings;
+use crate::threads::Threads;
 use crate::world::view::{Entry, Mode, ObjectId, Objects};
 use tumble_collide::{BroadPhase, Contact, NormalFrom, Vec3};
 
@@ -18,6 +19,9 @@ pub(crate) struct Owner {
     pub place: u32,
     pub part: u32,
 }
+
+/// Minimum number of pairs of a piece of the narrow phase, about 10 µs.
+const PAIRS: usize = 32;
 
 /// Identifies a contact across steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
@@ -54,7 +58,18 @@ pub(crate) struct DetectorBuffers {
     /// Place in `proxies` of every handle.
     place: Vec<u32>,
     pairs: Vec<[u32; 2]>,
-    found: Vec<Contact>,
+    /// Results of the pieces of the narrow phase.
+    found: Vec<Found>,
+}
+
+/// Results of consecutive pairs.
+#[derive(Default)]
+struct Found {
+    contact_constraints: Vec<ContactConstraint>,
+    needs_wake: Vec<u32>,
+    cached: CachedContacts,
+    /// Contacts of the last pair.
+    contacts: Vec<Contact>,
 }
 
 impl DetectorBuffers {
@@ -81,6 +96,7 @@ pub(crate) struct Detector<'a> {
     pub pair_materials: &'a PairMaterials,
     pub broad: &'a mut dyn BroadPhase,
     pub scratch: &'a mut DetectorBuffers,
+    pub threads: &'a Threads,
     /// Serials of sleeping objects that something comes near.
     pub needs_wake: &'a mut Vec<u32>,
 }
@@ -94,11 +110,36 @@ impl Detector<'_> {
         let mut pairs = std::mem::take(&mut self.scratch.pairs);
         self.broad.pairs(&mut pairs);
         self.order_by_part(&mut pairs);
-        self.scratch.narrow_phase_cache.begin();
-        for &[i, j] in &pairs {
-            self.narrow([i as usize, j as usize], (horizon, prediction), out);
+        let mut found = std::mem::take(&mut self.scratch.found);
+        let pieces = self.threads.pieces(pairs.len(), PAIRS);
+        found.resize_with(pieces.len().max(found.len()), Found::default);
+        let narrow = NarrowPhase {
+            objects: self.objects,
+            owners: self.owners,
+            part_states: self.part_states,
+            settings: self.settings,
+            pair_materials: self.pair_materials,
+            proxies: &self.scratch.proxies,
+            motion_bounds: &self.scratch.motion_bounds,
+            horizon,
+            prediction,
+        };
+        // the first piece writes to the results at once
+        std::mem::swap(out, &mut found[0].contact_constraints);
+        let last = &self.scratch.narrow_phase_cache;
+        let work: Vec<(&[[u32; 2]], &mut Found)> =
+            pieces.into_iter().map(|piece| &pairs[piece]).zip(&mut found).collect();
+        self.threads.each(work, |(pairs, found)| {
+            let mut known = last.from(pairs.first().map_or([0; 2], |pair| narrow.rows(*pair)));
+            pairs.iter().for_each(|&pair| narrow.add_pair(pair, &mut known, found));
+        });
+        std::mem::swap(out, &mut found[0].contact_constraints);
+        self.scratch.narrow_phase_cache.replace(found.iter_mut().map(|found| &mut found.cached));
+        for found in &mut found {
+            out.append(&mut found.contact_constraints);
+            self.needs_wake.append(&mut found.needs_wake);
         }
-        self.scratch.narrow_phase_cache.end();
+        self.scratch.found = found;
         self.scratch.pairs = pairs;
     }
 
@@ -155,15 +196,32 @@ impl Detector<'_> {
         }
         pairs.sort_unstable();
     }
+}
+
+/// The narrow phase: constant inputs of all pairs.
+struct NarrowPhase<'a> {
+    objects: Objects<'a>,
+    owners: &'a [Owner],
+    part_states: &'a [PartState],
+    settings: &'a Settings,
+    pair_materials: &'a PairMaterials,
+    /// Rows of the part table, and bounds on their motion.
+    proxies: &'a [u32],
+    motion_bounds: &'a [MotionBounds],
+    /// s.
+    horizon: f64,
+    prediction: PredictionMode,
+}
+
+impl NarrowPhase<'_> {
+    /// Returns the rows of the part table of a pair of proxies.
+    fn rows(&self, pair: [u32; 2]) -> [u32; 2] {
+        pair.map(|i| self.proxies[i as usize])
+    }
 
     /// Adds the contacts of one pair.
-    fn narrow(
-        &mut self,
-        [i, j]: [usize; 2],
-        (horizon, prediction): (f64, PredictionMode),
-        out: &mut Vec<ContactConstraint>,
-    ) {
-        let (a, b) = (self.scratch.proxies[i], self.scratch.proxies[j]);
+    fn add_pair(&self, pair: [u32; 2], known: &mut KnownContacts, results: &mut Found) {
+        let ([a, b], [i, j]) = (self.rows(pair), pair.map(|i| i as usize));
         let (owner_a, owner_b) = (self.owners[a as usize], self.owners[b as usize]);
         let [entry_a, entry_b] = [owner_a, owner_b].map(|owner| self.objects.at(owner.place as usize));
         if !may_collide(&entry_a, owner_a.part as usize, &entry_b, owner_b.part as usize, self.part_states) {
@@ -177,19 +235,19 @@ impl Detector<'_> {
         let near = 2.0 * self.settings.drift_tolerance;
         let pair = PairQuery {
             parts: MovingPair { mode, shapes: [shape_a, shape_b], part_states: [state_a, state_b] },
-            motion_bounds: [self.scratch.motion_bounds[i], self.scratch.motion_bounds[j]],
+            motion_bounds: [self.motion_bounds[i], self.motion_bounds[j]],
             near,
-            prediction,
+            prediction: self.prediction,
         };
         if pair.is_expensive() && pair.is_separated() {
             return;
         }
-        let found = &mut self.scratch.found;
-        let time = pair.contacts([a, b], horizon, &mut self.scratch.narrow_phase_cache, found);
+        let Found { contact_constraints: out, needs_wake, cached, contacts: found } = results;
+        let time = pair.contacts([a, b], self.horizon, (known, cached), found);
         let first = out.len();
         if let Some(sleeper) = [entry_a, entry_b].into_iter().find(|e| e.asleep) {
             // the frame will be repeated with it awake
-            self.needs_wake.extend((!found.is_empty()).then_some(sleeper.serial));
+            needs_wake.extend((!found.is_empty()).then_some(sleeper.serial));
             return;
         }
         let surface_a = (owner_a.id, part_a, body_a.material(part_a));

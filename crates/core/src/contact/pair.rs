@@ -134,7 +134,7 @@ impl PairQuery<'_> {
         &self,
         rows: [u32; 2],
         horizon: f64,
-        narrow_phase_cache: &mut NarrowPhaseCache,
+        (known, cached): (&mut KnownContacts, &mut CachedContacts),
         found: &mut Vec<Contact>,
     ) -> f64 {
         let (margin, closing) = self.margins();
@@ -144,10 +144,10 @@ impl PairQuery<'_> {
             self.parts.contacts_at(&poses, margin, found);
             return 0.0;
         }
-        if !narrow_phase_cache.look_up(rows, &poses, margin, found) {
+        if !known.look_up(rows, &poses, margin, found) {
             self.parts.contacts_at(&poses, margin, found);
         }
-        narrow_phase_cache.store(rows, poses, margin, found);
+        cached.store(rows, poses, margin, found);
         if !found.is_empty() || self.parts.mode == ContactMode::Spheres || margin >= closing {
             return 0.0;
         }
@@ -167,18 +167,22 @@ impl PairQuery<'_> {
     }
 }
 
-/// Results of expensive queries in this frame: of the last detection, and of the present one. Pairs
-/// come in ascending order.
+/// Results of the expensive queries of the last detection in this frame.
 #[derive(Default)]
 pub(crate) struct NarrowPhaseCache {
     last: CachedContacts,
-    now: CachedContacts,
-    /// Position in the pairs of the last detection.
+}
+
+/// Results of the last detection, for pairs in ascending order.
+pub(crate) struct KnownContacts<'a> {
+    last: &'a CachedContacts,
+    /// Position in its queries.
     place: usize,
 }
 
+/// Results of expensive queries, in ascending order of the pairs.
 #[derive(Default)]
-struct CachedContacts {
+pub(crate) struct CachedContacts {
     queries: Vec<CachedQuery>,
     contacts: Vec<Contact>,
 }
@@ -196,6 +200,21 @@ impl CachedContacts {
         self.queries.clear();
         self.contacts.clear();
     }
+
+    fn store(&mut self, rows: [u32; 2], poses: [Pose; 2], margin: f64, found: &[Contact]) {
+        self.contacts.extend_from_slice(found);
+        self.queries.push(CachedQuery { rows, poses, margin, end: self.contacts.len() });
+    }
+
+    /// Moves the results of later pairs here.
+    fn append(&mut self, later: &mut CachedContacts) {
+        if self.queries.is_empty() {
+            return std::mem::swap(self, later);
+        }
+        let before = self.contacts.len();
+        self.contacts.append(&mut later.contacts);
+        self.queries.extend(later.queries.drain(..).map(|query| CachedQuery { end: before + query.end, ..query }));
+    }
 }
 
 impl NarrowPhaseCache {
@@ -203,17 +222,20 @@ impl NarrowPhaseCache {
         self.last.clear();
     }
 
-    /// Starts a detection.
-    pub fn begin(&mut self) {
-        self.now.clear();
-        self.place = 0;
+    /// Returns the results for pairs from `first` on.
+    pub fn from(&self, first: [u32; 2]) -> KnownContacts<'_> {
+        KnownContacts { last: &self.last, place: self.last.queries.partition_point(|k| k.rows < first) }
     }
 
-    /// Ends a detection, which becomes the last one.
-    pub fn end(&mut self) {
-        std::mem::swap(&mut self.last, &mut self.now);
+    /// Replaces the results by those of a new detection, in parts of ascending pairs, which are left
+    /// empty.
+    pub fn replace<'a>(&mut self, parts: impl Iterator<Item = &'a mut CachedContacts>) {
+        self.last.clear();
+        parts.for_each(|part| self.last.append(part));
     }
+}
 
+impl KnownContacts<'_> {
     /// Writes the cached contacts of a pair to `found`, if neither part has moved and the margin
     /// was at least as large. Returns whether it did.
     fn look_up(&mut self, rows: [u32; 2], poses: &[Pose; 2], margin: f64, found: &mut Vec<Contact>) -> bool {
@@ -228,11 +250,6 @@ impl NarrowPhaseCache {
         let start = self.place.checked_sub(1).map_or(0, |before| queries[before].end);
         found.extend(self.last.contacts[start..known.end].iter().filter(|contact| contact.gap <= margin));
         true
-    }
-
-    fn store(&mut self, rows: [u32; 2], poses: [Pose; 2], margin: f64, found: &[Contact]) {
-        self.now.contacts.extend_from_slice(found);
-        self.now.queries.push(CachedQuery { rows, poses, margin, end: self.now.contacts.len() });
     }
 }
 

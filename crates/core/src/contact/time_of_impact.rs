@@ -27,6 +27,7 @@ use crate::object::collidable::{Collidable, ContactFrame};
 use crate::object::part_state::PartState;
 use crate::rigid::rotation::turn;
 use crate::settings::Settings;
+use crate::threads::Threads;
 use crate::world::view::Objects;
 use nalgebra::Translation3;
 use tumble_collide::{Contact, ContactMode, NormalFrom, Pose, Shape, Vec3};
@@ -36,6 +37,8 @@ use tumble_collide::{Contact, ContactMode, NormalFrom, Pose, Shape, Vec3};
 const SHORT_MOTION: f64 = 0.1;
 /// Maximum number of queries between the impact and the end of the step.
 const MAX_SAMPLES: f64 = 32.0;
+/// Minimum number of contacts of a piece on one thread.
+const CONTACTS: usize = 64;
 /// Maximum number of advances of convex shapes; the state after them is near enough.
 const MAX_ADVANCES: u32 = 12;
 
@@ -206,7 +209,7 @@ impl MovingPair<'_> {
 pub(crate) fn time_contacts(
     objects: Objects,
     (owners, part_states): (&[Owner], &[PartState]),
-    settings: &Settings,
+    (settings, threads): (&Settings, &Threads),
     h: f64,
     contact_constraints: &mut Vec<ContactConstraint>,
 ) {
@@ -215,9 +218,8 @@ pub(crate) fn time_contacts(
         let body: &dyn Collidable = objects.at(owner.place as usize).object.collidable()?;
         Some((body.shape(owner.part as usize)?, body.contact_mode(owner.part as usize)))
     };
-    let mut found = Vec::new();
     let predicted = std::mem::take(contact_constraints);
-    for contacts in predicted.chunk_by(|x, y| x.key.pair == y.key.pair) {
+    let time_pair = |contacts: &[ContactConstraint], found: &mut Vec<Contact>, out: &mut Vec<ContactConstraint>| {
         let states = [contacts[0].a, contacts[0].b].map(|index| &part_states[index as usize]);
         let motion = h * (states[0].velocity - states[1].velocity).norm();
         let pair = part(contacts[0].a).zip(part(contacts[0].b)).and_then(|((a, mode_a), (b, mode_b))| {
@@ -229,11 +231,35 @@ pub(crate) fn time_contacts(
         });
         match pair {
             Some((pair, samples)) => {
-                pair.time_contacts(contacts, (h, settings.drift_tolerance, samples), &mut found, contact_constraints);
+                pair.time_contacts(contacts, (h, settings.drift_tolerance, samples), found, out);
             }
-            None => contact_constraints.extend_from_slice(contacts),
+            None => out.extend_from_slice(contacts),
         }
+    };
+    let mut pieces: Vec<(&[ContactConstraint], Vec<ContactConstraint>)> =
+        pieces_of_pairs(threads, &predicted).into_iter().map(|piece| (piece, Vec::new())).collect();
+    threads.each(pieces.iter_mut(), |(piece, out)| {
+        let mut found = Vec::new();
+        let pairs = piece.chunk_by(|x, y| x.key.pair == y.key.pair);
+        pairs.for_each(|contacts| time_pair(contacts, &mut found, out));
+    });
+    let mut timed = pieces.into_iter().map(|(_, out)| out);
+    *contact_constraints = timed.next().unwrap_or_default();
+    timed.for_each(|mut more| contact_constraints.append(&mut more));
+}
+
+/// Returns pieces of the contacts; no pair is divided.
+fn pieces_of_pairs<'a>(threads: &Threads, contacts: &'a [ContactConstraint]) -> Vec<&'a [ContactConstraint]> {
+    let (mut pieces, mut start) = (Vec::new(), 0);
+    for piece in threads.pieces(contacts.len(), CONTACTS) {
+        let mut end = piece.end.max(start);
+        while end > 0 && end < contacts.len() && contacts[end].key.pair == contacts[end - 1].key.pair {
+            end += 1;
+        }
+        pieces.push(&contacts[start..end]);
+        start = end;
     }
+    pieces
 }
 
 impl MovingPair<'_> {

@@ -9,9 +9,11 @@
 //! | RK4 | classical on `p`; on `x` the commutator-free method of Celledoni, Marthinsen and Owren (2003), two exponentials in the last stage |
 
 use crate::derived::{Cache, Derived};
+use crate::each_object::{Numbers, Own, each_object};
 use crate::integrators::Adaptive;
 use crate::object::part_state::{Forces, PartState, Wrench};
 use crate::settings::Integrator;
+use crate::threads::Threads;
 use crate::world::view::{Entry, Mode, ObjectId, Objects, Table, WorldView};
 use crate::world::{ObjectState, StepError};
 use tumble_collide::Vec3;
@@ -20,6 +22,7 @@ use tumble_collide::Vec3;
 pub(crate) struct IntegrationContext<'a> {
     pub table: &'a Table,
     pub states: &'a [ObjectState],
+    pub threads: &'a Threads,
     pub x: &'a mut [f64],
     pub derived: &'a mut Derived,
     pub forces: &'a mut Forces,
@@ -39,13 +42,15 @@ pub(crate) struct IntegrationContext<'a> {
 impl IntegrationContext<'_> {
     /// Writes part states and caches from the state.
     pub fn refresh(&mut self) {
-        refresh_all(self.table.with(self.states), self.x, self.derived);
+        refresh_all(self.threads, self.table.with(self.states), self.x, self.derived);
     }
 
     /// Writes part states and cache of one object from the state.
     pub fn refresh_one(&mut self, id: ObjectId) {
         if let Some(entry) = self.table.with(self.states).get(id) {
-            refresh(&entry, &mut self.derived.caches[entry.place], self.x, &mut self.derived.part_states);
+            let Derived { part_states, caches } = &mut *self.derived;
+            let part_states = &mut part_states[entry.state_range.parts.clone()];
+            refresh(&entry, &mut caches[entry.place], self.x, part_states);
         }
     }
 
@@ -85,16 +90,15 @@ impl IntegrationContext<'_> {
             }
         }
         dp.fill(0.0);
-        for entry in self.table.with(self.states).iter() {
-            let Some(body) = entry.object.integratable() else { continue };
-            let Derived { part_states, caches } = &mut *self.derived;
-            let (state_range, part_states, cache) =
-                (entry.state_range, &mut part_states[entry.state_range.parts.clone()], &mut caches[entry.place]);
+        let Derived { part_states, caches } = &mut *self.derived;
+        let (objects, x, forces) = (self.table.with(self.states), &*self.x, &*self.forces);
+        let numbers = Numbers { caches, v: dp, part_states, ..Numbers::default() };
+        each_object(self.threads, objects, numbers, |entry, Own { cache, v: dp, part_states, .. }| {
+            let (state_range, Some(body)) = (entry.state_range, entry.object.integratable()) else { return };
             if entry.moves() {
-                let dp = &mut dp[state_range.v.clone()];
-                let forces = self.forces.slice(state_range, part_states);
-                body.derivative(cache, &self.x[state_range.x.clone()], &forces, dp);
-                body.accelerations(cache, &self.x[state_range.x.clone()], dp, part_states);
+                let forces = forces.slice(state_range, part_states);
+                body.derivative(cache, &x[state_range.x.clone()], &forces, dp);
+                body.accelerations(cache, &x[state_range.x.clone()], dp, part_states);
             } else {
                 // a kinematic object keeps its generalized velocity: a link that turns about
                 // another still has its centripetal acceleration
@@ -102,14 +106,15 @@ impl IntegrationContext<'_> {
                     (s.acceleration, s.angular_acceleration) = (s.bias_acceleration, s.bias_angular_acceleration)
                 });
             }
-        }
+        });
     }
 
     /// Moves every dynamic object freely for `h`, and every kinematic object with its velocity.
     pub fn free_motion(&mut self, h: f64) {
-        for entry in self.table.with(self.states).iter() {
-            free_motion(&entry, &mut self.derived.caches[entry.place], &mut self.x[entry.state_range.x.clone()], h);
-        }
+        let numbers = Numbers { caches: &mut self.derived.caches, x: &mut *self.x, ..Numbers::default() };
+        each_object(self.threads, self.table.with(self.states), numbers, |entry, own| {
+            free_motion(entry, own.cache, own.x, h);
+        });
     }
 
     /// Subtracts from the rates the part that the free motion of a splitting already applies.
@@ -260,14 +265,14 @@ impl IntegrationContext<'_> {
 
 /// Writes part states and caches from a state. Static and disabled objects are at rest, whatever
 /// momentum they store.
-pub(crate) fn refresh_all(objects: Objects, x: &[f64], derived: &mut Derived) {
-    for (entry, cache) in objects.iter().zip(&mut derived.caches) {
-        refresh(&entry, cache, x, &mut derived.part_states);
-    }
+pub(crate) fn refresh_all(threads: &Threads, objects: Objects, x: &[f64], derived: &mut Derived) {
+    let Derived { part_states, caches } = derived;
+    let numbers = Numbers { caches, part_states, ..Numbers::default() };
+    each_object(threads, objects, numbers, |entry, own| refresh(entry, own.cache, x, own.part_states));
 }
 
+/// Writes the cache and the part states of one object.
 fn refresh(entry: &Entry, cache: &mut Cache, x: &[f64], part_states: &mut [PartState]) {
-    let part_states = &mut part_states[entry.state_range.parts.clone()];
     entry.object.refresh(&x[entry.state_range.x.clone()], cache, part_states);
     if entry.status.mode == Mode::Static || !entry.status.enabled {
         part_states.iter_mut().for_each(|s| *s = PartState { pose: s.pose, ..PartState::default() });

@@ -9,6 +9,7 @@ use crate::object::{ForceGenerator, Object};
 use crate::rigid::RigidBody;
 use crate::rigid::rotation;
 use crate::settings::Settings;
+use crate::threads::Threads;
 use crate::world::ObjectState;
 use crate::world::view::{Table, WorldView};
 use tumble_collide::{Mat3, Quat, Shape, Vec3};
@@ -77,6 +78,7 @@ impl Bench {
 
     fn integration(&mut self) -> IntegrationContext<'_> {
         IntegrationContext {
+            threads: &Threads::NONE,
             table: &self.table,
             states: &self.states,
             x: &mut self.x,

@@ -2,17 +2,20 @@
 
 use super::Moment;
 use super::correction::{self, Frictionless};
+use super::islands::each_island;
 use crate::constraint::builder::{RowBuilder, RowKind, constraints};
 use crate::constraint::rows::{RowSet, Rows};
 use crate::contact::detect::{ContactConstraint, Detector, Owner};
 use crate::contact::pair::PredictionMode;
 use crate::derived::{Cache, Derived};
+use crate::each_object::{Numbers, Own, each_object};
 use crate::integrators::context::free_motion;
 use crate::object::part_state::PartState;
 use crate::object::{Integratable, Level, RowTarget};
 use crate::solver::{Islands, SolverSettings, residual};
 use crate::world::view::{ObjectId, WorldView};
 use crate::world::{Coordinates, Core, StepError};
+use smallvec::SmallVec;
 use tumble_collide::Vec3;
 
 /// Buffers of a step. Rows of contacts come first, in the order of `contact_constraints`, then
@@ -94,6 +97,7 @@ pub(crate) fn detect(
         pair_materials: &core.pair_materials,
         broad: core.broad.as_mut(),
         scratch: &mut core.detect_scratch,
+        threads: &core.threads,
         needs_wake: &mut core.needs_wake,
     };
     detector.detect(horizon, prediction, out);
@@ -106,7 +110,7 @@ pub(crate) fn detect(
 /// state holds velocities).
 fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
     let mut moment = core.moment();
-    let Coordinates { objects, x, caches } = moment.coordinates(core);
+    let Coordinates { objects, x, caches, .. } = moment.coordinates(core);
     for entry in objects.iter() {
         let x = &mut x[entry.state_range.x.clone()];
         match entry.object.integratable().filter(|b| b.holds_velocity() && entry.moves()) {
@@ -118,7 +122,7 @@ fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
             None => free_motion(&entry, &mut caches[entry.place], x, ahead),
         }
     }
-    moment.refresh(core.objects());
+    moment.refresh(core);
     moment
 }
 
@@ -309,7 +313,7 @@ pub(super) fn locate_limits(core: &Core, work: &mut Workspace, time: f64) -> Res
 
 /// Subtracts from the errors of the constraints their change by free motion of `ahead` seconds, to
 /// second order.
-fn present_errors(Coordinates { objects, x, caches }: Coordinates, work: &mut Workspace, ahead: f64) {
+fn present_errors(Coordinates { objects, x, caches, .. }: Coordinates, work: &mut Workspace, ahead: f64) {
     let mut u = vec![0.0; objects.table.dof()];
     for entry in objects.iter().filter(|e| e.moves()) {
         if let Some(body) = entry.object.integratable() {
@@ -329,7 +333,7 @@ fn present_errors(Coordinates { objects, x, caches }: Coordinates, work: &mut Wo
 /// Writes the whitened velocities of all dynamic objects, and their change in `h` seconds by the
 /// rate of momentum `dp`.
 pub(crate) fn whiten(
-    Coordinates { objects, x, caches }: Coordinates,
+    Coordinates { objects, x, caches, threads }: Coordinates,
     dp: &[f64],
     h: f64,
     u: &mut Vec<f64>,
@@ -337,19 +341,19 @@ pub(crate) fn whiten(
 ) {
     zero(u, dp.len());
     zero(du, dp.len());
-    for entry in objects.iter().filter(|e| e.moves()) {
-        let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
-        let cache = &mut caches[entry.place];
-        body.whitened_velocity(cache, &x[entry.state_range.x.clone()], &mut u[v.clone()]);
-        body.whiten_change(cache, &dp[v.clone()], &mut du[v.clone()]);
-        du[v].iter_mut().for_each(|x| *x *= h);
-    }
+    let numbers = Numbers { caches, v: u, w: du, ..Numbers::default() };
+    each_object(threads, objects, numbers, |entry, Own { cache, v: u, w: du, .. }| {
+        let Some(body) = entry.object.integratable().filter(|_| entry.moves()) else { return };
+        body.whitened_velocity(cache, &x[entry.state_range.x.clone()], u);
+        body.whiten_change(cache, &dp[entry.state_range.v.clone()], du);
+        du.iter_mut().for_each(|x| *x *= h);
+    });
 }
 
 /// Returns the change of whitened velocity by `h` seconds of free motion, of objects whose state
 /// holds velocities. Rows of joints hold at the end of the step and take it into account. The point
 /// of a contact does not turn with the part, so its rows do not.
-pub(crate) fn free_motion_change(Coordinates { objects, x, caches }: Coordinates, h: f64) -> Vec<f64> {
+pub(crate) fn free_motion_change(Coordinates { objects, x, caches, .. }: Coordinates, h: f64) -> Vec<f64> {
     let mut out = vec![0.0; objects.table.dof()];
     for entry in objects.iter().filter(|e| e.moves()) {
         let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
@@ -364,7 +368,7 @@ pub(crate) fn free_motion_change(Coordinates { objects, x, caches }: Coordinates
 
 /// Returns the part of the whitened rate of momentum that is no acceleration, `L⁻ᵀ(ṗ − M·v̇)`. Rows
 /// of constraints exclude it.
-pub(crate) fn gyroscopic(Coordinates { objects, x, caches }: Coordinates) -> Vec<f64> {
+pub(crate) fn gyroscopic(Coordinates { objects, x, caches, .. }: Coordinates) -> Vec<f64> {
     let mut out = vec![0.0; objects.table.dof()];
     for entry in objects.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
@@ -398,13 +402,14 @@ pub(crate) fn recover(Coordinates { objects, caches, .. }: Coordinates, du: &[f6
 
 /// Changes the whitened velocity of the state by `du`. `dp` becomes the change of momentum (or
 /// velocity).
-pub(crate) fn push(Coordinates { objects, x, caches }: Coordinates, du: &[f64], dp: &mut Vec<f64>) {
+pub(crate) fn push(Coordinates { objects, x, caches, threads }: Coordinates, du: &[f64], dp: &mut Vec<f64>) {
     zero(dp, du.len());
-    for entry in objects.iter().filter(|e| e.moves()) {
-        let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
-        body.unwhiten_change(&mut caches[entry.place], &du[v.clone()], &mut dp[v.clone()]);
-        body.kick(&mut x[entry.state_range.x.clone()], &dp[v], 1.0);
-    }
+    let numbers = Numbers { caches, x, v: dp, ..Numbers::default() };
+    each_object(threads, objects, numbers, |entry, Own { cache, x, v: dp, .. }| {
+        let Some(body) = entry.object.integratable().filter(|_| entry.moves()) else { return };
+        body.unwhiten_change(cache, &du[entry.state_range.v.clone()], dp);
+        body.kick(x, dp, 1.0);
+    });
 }
 
 /// Moves positions by `h·L⁻¹u` and keeps the kinetic energy: for overlap.
@@ -432,20 +437,23 @@ pub(crate) fn unwhiten_onto(Coordinates { objects, caches, .. }: Coordinates, u:
 }
 
 fn each_displaced(
-    Coordinates { objects, x, caches }: Coordinates,
+    Coordinates { objects, x, caches, threads }: Coordinates,
     u: &[f64],
-    go: impl Fn(&dyn Integratable, &mut Cache, &mut [f64], &[f64]),
+    go: impl Fn(&dyn Integratable, &mut Cache, &mut [f64], &[f64]) + Sync,
 ) {
-    let mut velocity = Vec::new();
-    for entry in objects.iter().filter(|e| e.moves()) {
-        let (Some(body), u) = (entry.object.integratable(), &u[entry.state_range.v.clone()]) else { continue };
-        if u.iter().any(|u| *u != 0.0) {
-            zero(&mut velocity, u.len());
-            let cache = &mut caches[entry.place];
-            body.solve_l(cache, u, &mut velocity);
-            go(body, cache, &mut x[entry.state_range.x.clone()], &velocity);
-        }
+    if u.iter().all(|u| *u == 0.0) {
+        return;
     }
+    let numbers = Numbers { caches, x, ..Numbers::default() };
+    each_object(threads, objects, numbers, |entry, Own { cache, x, .. }| {
+        let Some(body) = entry.object.integratable().filter(|_| entry.moves()) else { return };
+        let u = &u[entry.state_range.v.clone()];
+        if u.iter().any(|u| *u != 0.0) {
+            let mut velocity = SmallVec::<[f64; 6]>::from_elem(0.0, u.len());
+            body.solve_l(cache, u, &mut velocity);
+            go(body, cache, x, &velocity);
+        }
+    });
 }
 
 /// Computes `c = Yᵀu + bias`.
@@ -468,11 +476,16 @@ pub(crate) fn solve(
     zero(&mut work.du, core.dof);
     work.islands.build(&work.rows, keep);
     let mut ray = false;
-    for blocks in work.islands.iter() {
-        let outcome = core.solver.solve(&work.rows, blocks, &work.c, &mut work.lambda, &mut work.du, solver_settings);
-        core.report.solved(outcome, unit * residual(&work.rows, blocks, &work.c, &work.lambda, &work.du));
+    let Workspace { rows, islands, c, lambda, du, .. } = work;
+    let (solver, report) = (&core.solver, &mut core.report);
+    let solve = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {
+        let outcome = solver.solve(rows, blocks, c, lambda, du, solver_settings);
+        (outcome, unit * residual(rows, blocks, c, lambda, du))
+    };
+    each_island(&core.threads, rows, islands.iter(), (lambda, du), solve, |(outcome, residual)| {
+        report.solved(outcome, residual);
         ray |= outcome.ray;
-    }
+    });
     ray
 }
 

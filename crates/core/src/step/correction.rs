@@ -39,6 +39,7 @@ mod group;
 mod overlap;
 
 use super::contacts::{Limit, lay_rows, limits, push, shift, unwhiten_onto, zero};
+use super::islands::each_island;
 use super::{Moment, Workspace, unreachable_joints};
 use crate::constraint::rows::{RowSet, Rows};
 use crate::derived::Cache;
@@ -118,7 +119,7 @@ pub(super) fn correct(
         None if joints => {
             let moment = at_start.insert(core.moment());
             moment.x.copy_from_slice(options.start);
-            moment.refresh(core.objects());
+            moment.refresh(core);
             Some(moment)
         }
         acting => acting.filter(|_| joints),
@@ -135,7 +136,7 @@ fn measure_gaps(core: &mut Core, work: &Workspace, options: &Options, time: f64)
     let mut gaps = Vec::new();
     if !work.limits.is_empty() && matches!(options.limits, Limits::Violated) {
         let mut end = core.moment();
-        end.refresh(core.objects());
+        end.refresh(core);
         limits(&end.view(core, time), &mut gaps)?;
         core.moments.push(end);
     }
@@ -252,7 +253,7 @@ fn round_of_step(
 /// objects.
 fn apply(
     core: &Core,
-    Coordinates { objects, x, caches }: Coordinates,
+    Coordinates { objects, x, caches, threads }: Coordinates,
     rows: &Rows,
     first: usize,
     errors: &Errors,
@@ -268,22 +269,25 @@ fn apply(
         (position[block.row as usize], velocity[block.row as usize]) = (errors.position[i], errors.velocity[i]);
     }
     let mut lambda = Vec::new();
-    for &Round { blocks, positions_only, always } in parts {
-        for (c, du, tolerance, wanted) in
-            [(&position, &mut dx, errors.tolerance.0, true), (&velocity, &mut dv, errors.tolerance.1, !positions_only)]
-        {
-            let least = if always { 0.0 } else { tolerance };
-            if wanted && blocks.iter().any(|&b| c[rows.blocks[b as usize].row as usize].abs() > least) {
-                zero(&mut lambda, rows.len);
-                let settings =
-                    SolverSettings { max_sweeps: SWEEPS, max_relaxations: u32::MAX, tolerance: 0.1 * tolerance };
-                core.solver.solve(rows, blocks, c, &mut lambda, du, settings);
-            }
-        }
+    for (c, du, tolerance, positions) in
+        [(&position, &mut dx, errors.tolerance.0, true), (&velocity, &mut dv, errors.tolerance.1, false)]
+    {
+        let violated = |part: &&Round| {
+            let least = if part.always { 0.0 } else { tolerance };
+            let above = |&b: &u32| c[rows.blocks[b as usize].row as usize].abs() > least;
+            (positions || !part.positions_only) && part.blocks.iter().any(above)
+        };
+        let settings = SolverSettings { max_sweeps: SWEEPS, max_relaxations: u32::MAX, tolerance: 0.1 * tolerance };
+        let solve = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {
+            core.solver.solve(rows, blocks, c, lambda, du, settings);
+        };
+        zero(&mut lambda, rows.len);
+        let islands = parts.iter().filter(violated).map(|part| part.blocks);
+        each_island(&core.threads, rows, islands, (&mut lambda, du), solve, |()| ());
     }
-    unwhiten_onto(Coordinates { objects, x: &mut *x, caches: &mut *caches }, &dx, moved);
-    shift(Coordinates { objects, x: &mut *x, caches: &mut *caches }, &dx, 1.0);
-    push(Coordinates { objects, x, caches }, &dv, &mut Vec::new());
+    unwhiten_onto(Coordinates { objects, x: &mut *x, caches: &mut *caches, threads }, &dx, moved);
+    shift(Coordinates { objects, x: &mut *x, caches: &mut *caches, threads }, &dx, 1.0);
+    push(Coordinates { objects, x, caches, threads }, &dv, &mut Vec::new());
 }
 
 /// Returns which coordinates belong to objects of an island in which a contact has a force.

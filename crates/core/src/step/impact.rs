@@ -20,6 +20,7 @@
 //! always with `e = 0`.
 
 use super::contacts::{Workspace, row_velocities, zero};
+use super::islands::each_island;
 use crate::constraint::rows::{Block, RowSet, Rows};
 use crate::object::RowTarget;
 use crate::solver::{RowSolver, SolverSettings, residual};
@@ -158,27 +159,32 @@ fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], parts: &[Part], ela
     work.lambda.fill(0.0);
     zero(&mut work.du, core.dof);
     let plastic = parts.iter().all(|part| part.rebound <= 0.0);
-    for blocks in work.islands.iter() {
+    let Workspace { rows, islands, bias, targets, lambda, du, c: aimed, .. } = &mut *work;
+    let (rows, bias, aimed, solver) = (&*rows, &*bias, &*aimed, core.solver.as_ref());
+    let solve = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {
         let of_island = || blocks.iter().filter_map(|&b| parts.get(b as usize));
         let rebounds = of_island().any(|part| part.rebound > 0.0);
         if !plastic && !rebounds {
-            continue; // the solve that ends the phase stops these contacts
+            return None; // the solve that ends the phase stops these contacts
         }
-        let outcome = core.solver.solve(&work.rows, blocks, &work.c, &mut work.lambda, &mut work.du, solver_settings);
-        core.report.solved(outcome, residual(&work.rows, blocks, &work.c, &work.lambda, &work.du));
+        let outcome = solver.solve(rows, blocks, aimed, lambda, du, solver_settings);
+        let left = residual(rows, blocks, aimed, lambda, du);
         // kinematic bodies and motors may add energy
         let kinematic = |&b: &u32| {
             let target = (b as usize).checked_sub(contact_constraints).map_or(0.0, |i| targets[i].velocity);
-            target != 0.0 || work.rows.blocks[b as usize].range().any(|row| work.bias[row] != 0.0)
+            target != 0.0 || rows.blocks[b as usize].range().any(|row| bias[row] != 0.0)
         };
         let guard = rebounds && !blocks.iter().any(kinematic);
-        let scale: f64 = rows_of(&work.rows, blocks).map(|i| (work.lambda[i] * c[i]).abs()).sum();
+        let scale: f64 = rows_of(rows, blocks).map(|i| (lambda[i] * c[i]).abs()).sum();
         let energy: f64 = of_island().map(|part| part.energy).sum();
-        if guard && work_done(&work.rows, blocks, c, &work.lambda, &work.du) > energy + 1e-12 * scale {
-            let island = (&work.rows, blocks, c);
-            blend(core.solver.as_ref(), island, energy, &mut work.lambda, &mut work.du, solver_settings);
+        if guard && work_done(rows, blocks, c, lambda, du) > energy + 1e-12 * scale {
+            blend(solver, (rows, blocks, c), energy, lambda, du, solver_settings);
         }
-    }
+        Some((outcome, left))
+    };
+    each_island(&core.threads, rows, islands.iter(), (lambda, du), solve, |solved| {
+        solved.into_iter().for_each(|(outcome, left)| core.report.solved(outcome, left));
+    });
 }
 
 fn rows_of<'a>(rows: &'a Rows, blocks: &'a [u32]) -> impl Iterator<Item = usize> + 'a {

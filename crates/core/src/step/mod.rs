@@ -6,6 +6,7 @@ mod context;
 mod correction;
 mod event_location;
 mod impact;
+mod islands;
 mod moment;
 mod time_stepping;
 mod unreachable_joints;

@@ -3,7 +3,7 @@
 use super::contacts::Basis;
 use crate::derived::{Cache, Derived};
 use crate::integrators::context::refresh_all;
-use crate::world::view::{Objects, Table, WorldView};
+use crate::world::view::{Table, WorldView};
 use crate::world::{Coordinates, Core};
 
 /// A state of the objects besides the present one, with its part states and caches. Part states
@@ -20,8 +20,8 @@ impl Moment {
     }
 
     /// Writes part states and caches from the state.
-    pub fn refresh(&mut self, objects: Objects) {
-        refresh_all(objects, &self.x, &mut self.derived);
+    pub fn refresh(&mut self, core: &Core) {
+        refresh_all(&core.threads, core.objects(), &self.x, &mut self.derived);
     }
 
     /// Returns the view of it that objects are given, at a time, s.
@@ -31,12 +31,17 @@ impl Moment {
 
     /// Returns its numbers and its caches.
     pub fn coordinates<'a>(&'a mut self, core: &'a Core) -> Coordinates<'a> {
-        Coordinates { objects: core.objects(), x: &mut self.x, caches: &mut self.derived.caches }
+        Coordinates {
+            objects: core.objects(),
+            x: &mut self.x,
+            caches: &mut self.derived.caches,
+            threads: &core.threads,
+        }
     }
 
     /// Returns its numbers, with caches of another state.
     pub fn coordinates_by<'a>(&'a mut self, core: &'a Core, caches: &'a mut [Cache]) -> Coordinates<'a> {
-        Coordinates { objects: core.objects(), x: &mut self.x, caches }
+        Coordinates { objects: core.objects(), x: &mut self.x, caches, threads: &core.threads }
     }
 
     /// Returns the basis of rows at it, at a time, s.

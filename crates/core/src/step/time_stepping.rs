@@ -43,6 +43,7 @@ use crate::constraint::rows::RowSet;
 use crate::contact::detect::ContactConstraint;
 use crate::contact::pair::PredictionMode;
 use crate::contact::time_of_impact::{time_contacts, time_to_close};
+use crate::each_object::{Numbers, each_object};
 use crate::integrators::context::free_motion;
 use crate::object::Level;
 use crate::world::view::Entry;
@@ -120,7 +121,7 @@ impl TimeStepping {
         self.smooth_forces(core, middle, h)?;
         detect(core, None, (h, PredictionMode::Each), &mut self.work.contact_constraints);
         let parts = (&core.owners[..], &core.derived.part_states[..]);
-        time_contacts(core.objects(), parts, &core.settings, h, &mut self.work.contact_constraints);
+        time_contacts(core.objects(), parts, (&core.settings, &core.threads), h, &mut self.work.contact_constraints);
         build_rows(core, Some(&mut *middle), &mut self.work, Level::Velocity { h }, 0.5 * h)?;
         let mut u = std::mem::take(&mut self.work.u);
         let mut du_force = std::mem::take(&mut self.work.du_force);
@@ -209,7 +210,7 @@ impl TimeStepping {
 
     /// Moves the objects that have an impact to where it happens.
     fn go_to_impacts(&self, core: &Core, middle: &mut Moment, h: f64) {
-        let Coordinates { objects, x, caches } = middle.coordinates(core);
+        let Coordinates { objects, x, caches, .. } = middle.coordinates(core);
         for entry in objects.iter().filter(|e| !in_the_middle(e)) {
             let impact_fraction = entry.state_range.v.clone().next().map_or(-1.0, |i| self.impact_fraction[i]);
             if impact_fraction >= 0.0 {
@@ -218,7 +219,7 @@ impl TimeStepping {
                 free_motion(&entry, &mut caches[entry.place], x, h * impact_fraction);
             }
         }
-        middle.refresh(core.objects());
+        middle.refresh(core);
     }
 
     /// Adds the contacts that bodies may reach because of their impacts, and builds the rows again.
@@ -237,7 +238,7 @@ impl TimeStepping {
         let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
         let (mut struck, mut found) = (core.moment(), Vec::new());
         push(struck.coordinates_by(core, &mut middle.derived.caches), &change, &mut Vec::new());
-        struck.refresh(core.objects());
+        struck.refresh(core);
         detect(core, Some(&struck), (h, PredictionMode::Each), &mut found);
         core.moments.push(struck);
         let work = &mut self.work;
@@ -392,21 +393,15 @@ impl TimeStepping {
         write(change, &|i| u1[i] - u0[i]);
         let before =
             |e: &Entry| e.state_range.v.clone().next().filter(|_| !in_the_middle(e)).map_or(0.5, impact_fraction);
-        let Coordinates { objects, x, caches } = core.coordinates(Some(&mut *middle));
-        for entry in objects.iter() {
-            free_motion(&entry, &mut caches[entry.place], &mut x[entry.state_range.x.clone()], h * before(&entry));
-        }
+        let move_freely = |Coordinates { objects, x, caches, threads }: Coordinates,
+                           share: &(dyn Fn(&Entry) -> f64 + Sync)| {
+            let numbers = Numbers { caches, x, ..Numbers::default() };
+            each_object(threads, objects, numbers, |entry, own| free_motion(entry, own.cache, own.x, h * share(entry)));
+        };
+        move_freely(core.coordinates(Some(&mut *middle)), &before);
         write(rest, &|i| change[i] + late[i]);
         push(core.coordinates(Some(&mut *middle)), rest, dp);
-        let Coordinates { objects, x, caches } = core.coordinates(Some(&mut *middle));
-        for entry in objects.iter() {
-            free_motion(
-                &entry,
-                &mut caches[entry.place],
-                &mut x[entry.state_range.x.clone()],
-                h * (1.0 - before(&entry)),
-            );
-        }
+        move_freely(core.coordinates(Some(&mut *middle)), &|entry| 1.0 - before(entry));
         for entry in core.objects().iter() {
             late[entry.state_range.v.clone()].iter_mut().for_each(|du| *du *= before(&entry) - 1.0);
         }

@@ -216,7 +216,7 @@ impl World {
         let index = self.part(id, part, &[impulse, *point])?;
         self.core.wake(id);
         let part_state = self.core.derived.part_states[index];
-        let Coordinates { objects, x, caches } = self.core.coordinates(None);
+        let Coordinates { objects, x, caches, .. } = self.core.coordinates(None);
         let entry = objects.get(id).ok_or(WorldError::Stale)?;
         let Some(body) = entry.object.integratable().filter(|_| entry.moves()) else { return Ok(()) };
         let dof = entry.state_range.v.len();

@@ -10,6 +10,7 @@ use crate::report::StepReport;
 use crate::settings::Settings;
 use crate::solver::RowSolver;
 use crate::step::Moment;
+use crate::threads::Threads;
 use crate::world::view::{Entry, ObjectId, Objects, Table, WorldView};
 use tumble_collide::{BroadPhase, SweepAndPrune, Vec3};
 
@@ -119,6 +120,7 @@ pub struct Core {
     /// Unused moments, kept for their memory.
     pub(crate) moments: Vec<Moment>,
     pub(crate) forces: Forces,
+    pub(crate) threads: Threads,
     pub(crate) broad: Box<dyn BroadPhase>,
     pub(crate) detect_scratch: DetectorBuffers,
     pub(crate) contacts: Vec<ContactPoint>,
@@ -132,6 +134,7 @@ pub(crate) struct Coordinates<'a> {
     pub objects: Objects<'a>,
     pub x: &'a mut [f64],
     pub caches: &'a mut [Cache],
+    pub threads: &'a Threads,
 }
 
 impl Core {
@@ -157,6 +160,7 @@ impl Core {
             held_wrenches: Vec::new(),
             moments: Vec::new(),
             forces: Forces::default(),
+            threads: Threads::NONE,
             broad: Box::<SweepAndPrune>::default(),
             detect_scratch: DetectorBuffers::default(),
             contacts: Vec::new(),
@@ -187,7 +191,7 @@ impl Core {
     pub(crate) fn coordinates<'a>(&'a mut self, acting: Option<&'a mut Moment>) -> Coordinates<'a> {
         let objects = self.table.with(&self.state.objects);
         let derived = acting.map_or(&mut self.derived, |moment| &mut moment.derived);
-        Coordinates { objects, x: &mut self.state.x, caches: &mut derived.caches }
+        Coordinates { objects, x: &mut self.state.x, caches: &mut derived.caches, threads: &self.threads }
     }
 
     /// Returns a moment with the present state and accelerations, to be refreshed. Push it to
@@ -239,6 +243,7 @@ impl Core {
         IntegrationContext {
             table: &self.table,
             states: &self.state.objects,
+            threads: &self.threads,
             x,
             derived,
             forces: &mut self.forces,

@@ -113,7 +113,9 @@ impl World {
     /// they are.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), WorldError> {
         settings.validate()?;
-        self.core.wake_all();
+        if settings.with_threads(self.core.settings.threads) != self.core.settings {
+            self.core.wake_all();
+        }
         self.core.settings = settings;
         Ok(())
     }
@@ -127,6 +129,7 @@ impl World {
     /// [`clear_applied`](Self::clear_applied) removes them.
     pub fn step(&mut self) -> Result<&StepReport, StepError> {
         let core = &mut self.core;
+        core.threads.set(core.settings.threads);
         self.before.clone_from(&core.state);
         std::mem::swap(&mut self.contacts_before, &mut core.contacts);
         let report_before = std::mem::take(&mut core.report);

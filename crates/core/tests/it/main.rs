@@ -46,4 +46,5 @@ mod solvers;
 mod stacks;
 mod state;
 mod still;
+mod threads;
 mod unreachable_joints;

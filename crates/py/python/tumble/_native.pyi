@@ -653,8 +653,8 @@ class World:
     integrator_tolerance: for ``dormand_prince``. sleep_after: seconds after which islands that
     moved by less than sleep_within (meters) sleep until something touches them; None: never.
     combine_restitution, combine_friction: rule for the coefficients of a pair, ``"min"``,
-    ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``. Names and defaults are those of
-    scene files.
+    ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``. threads: threads of a step, 0 for
+    as many as cores; no number changes the result. Names and defaults are those of scene files.
 
     One thread at a time: while one thread steps a world, calls on it from another raise
     ``BusyError``. The interpreter is released while a world steps.
@@ -675,6 +675,7 @@ class World:
         sleep_within: float = 1e-5,
         combine_restitution: Combine = "max",
         combine_friction: Combine = "geometric_mean",
+        threads: int = 1,
     ) -> World: ...
     @staticmethod
     def load(
@@ -684,6 +685,7 @@ class World:
         stepper: Stepper | None = None,
         integrator: Integrator | None = None,
         solver: Solver | None = None,
+        threads: int | None = None,
     ) -> World:
         """Loads the world of a scene: the path of a ``scene.toml`` or of its folder, or the name of a
         shipped scene.
@@ -726,6 +728,13 @@ class World:
         """Gravity, shape (3,), m/s²."""
     @gravity.setter
     def gravity(self, value: ArrayLike) -> None: ...
+    @property
+    def threads(self) -> int:
+        """Threads of a step, 0 for as many as cores. No number changes the result. Forks have the same
+        number; an unpickled world has 1.
+        """
+    @threads.setter
+    def threads(self, value: int) -> None: ...
     @property
     def combine_restitution(self) -> Combine:
         """Combination rule for restitution: ``"min"``, ``"max"``, ``"average"``, ``"product"`` or

@@ -45,8 +45,8 @@ use tumble::scene::{SceneFile, resolve_scene};
 /// integrator_tolerance: for ``dormand_prince``. sleep_after: seconds after which islands that
 /// moved by less than sleep_within (meters) sleep until something touches them; None: never.
 /// combine_restitution, combine_friction: rule for the coefficients of a pair, ``"min"``,
-/// ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``. Names and defaults are those of
-/// scene files.
+/// ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``. threads: threads of a step, 0 for
+/// as many as cores; no number changes the result. Names and defaults are those of scene files.
 ///
 /// One thread at a time: while one thread steps a world, calls on it from another raise
 /// ``BusyError``. The interpreter is released while a world steps.
@@ -83,10 +83,10 @@ impl World {
     #[pyo3(
         text_signature = "(gravity=(0.0, 0.0, -9.81), dt=0.004166666666666667, stepper='time_stepping', integrator='verlet', \
         solver='gauss_seidel', *, substeps=1, iterations=200, contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, \
-        combine_restitution='max', combine_friction='geometric_mean')"
+        combine_restitution='max', combine_friction='geometric_mean', threads=1)"
     )]
     #[pyo3(signature = (gravity=None, dt=0.004166666666666667, stepper="time_stepping", integrator="verlet", solver="gauss_seidel", *, substeps=1, iterations=200,
-        contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, combine_restitution="max", combine_friction="geometric_mean"))]
+        contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, combine_restitution="max", combine_friction="geometric_mean", threads=1))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
         py: Python<'_>,
@@ -103,12 +103,13 @@ impl World {
         sleep_within: f64,
         combine_restitution: &str,
         combine_friction: &str,
+        #[pyo3(from_py_with = whole_number)] threads: u32,
     ) -> Result<World> {
         let mut scene = SceneFile::parse("", "World")?;
         let world = &mut scene.world;
         world.gravity_m_per_s2 = vec3_or(gravity, "gravity", Vec3::from(world.gravity_m_per_s2))?.into();
-        Choices { stepper: Some(stepper), integrator: Some(integrator), solver: Some(solver), dt: Some(dt) }
-            .apply(world)?;
+        let (stepper, integrator, solver) = (Some(stepper), Some(integrator), Some(solver));
+        Choices { stepper, integrator, solver, dt: Some(dt), threads: Some(threads) }.apply(world)?;
         (world.substeps, world.iterations) = (substeps, iterations);
         (world.contact_tolerance_m, world.integrator_tolerance) = (contact_tolerance, integrator_tolerance);
         (world.sleep_after_s, world.sleep_within_m) = (sleep_after, sleep_within);
@@ -124,7 +125,7 @@ impl World {
     /// ``MissingFileError`` (a ``FileNotFoundError``); a file with problems raises ``SceneError``
     /// (a ``ValueError``), which lists all of them with line and column.
     #[staticmethod]
-    #[pyo3(signature = (path_or_name, *, dt=None, stepper=None, integrator=None, solver=None))]
+    #[pyo3(signature = (path_or_name, *, dt=None, stepper=None, integrator=None, solver=None, threads=None))]
     fn load(
         py: Python<'_>,
         path_or_name: &Bound<'_, PyAny>,
@@ -132,12 +133,13 @@ impl World {
         stepper: Option<&str>,
         integrator: Option<&str>,
         solver: Option<&str>,
+        threads: Option<u32>,
     ) -> Result<World> {
         let asked = path(path_or_name)?;
         let built = py.detach(|| {
             pool::run(|| {
                 let mut scene = resolve_scene(&asked.to_string_lossy(), &[])?.load()?;
-                Choices { stepper, integrator, solver, dt }.apply(&mut scene.world)?;
+                Choices { stepper, integrator, solver, dt, threads }.apply(&mut scene.world)?;
                 build(scene)
             })
         })?;
@@ -216,6 +218,18 @@ impl World {
     fn set_gravity(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
         let gravity = vec3(value, "gravity")?;
         self.set(py, |s| s.gravity = gravity)
+    }
+
+    /// Threads of a step, 0 for as many as cores. No number changes the result. Forks have the same
+    /// number; an unpickled world has 1.
+    #[getter]
+    fn threads(&self) -> Result<u32> {
+        self.settings(|s| s.threads)
+    }
+
+    #[setter]
+    fn set_threads(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] value: u32) -> Result<()> {
+        self.set(py, |s| s.threads = value)
     }
 
     /// Combination rule for restitution: ``"min"``, ``"max"``, ``"average"``, ``"product"`` or

@@ -13,12 +13,14 @@ pub struct Choices<'a> {
     pub integrator: Option<&'a str>,
     pub solver: Option<&'a str>,
     pub dt: Option<f64>,
+    pub threads: Option<u32>,
 }
 
 impl Choices<'_> {
     /// Writes them into a scene's settings.
     pub fn apply(&self, world: &mut WorldSettings) -> Result<()> {
         world.dt_s = self.dt.unwrap_or(world.dt_s);
+        world.threads = self.threads.unwrap_or(world.threads);
         let invalid = |what: &str| {
             let what = what.to_string();
             move |e: tumble::scene::UnknownName| Error::value(format!("{what}: {e}"))

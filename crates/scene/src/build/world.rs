@@ -145,6 +145,7 @@ impl SceneFile {
             .with_sleep(w.sleep_after_s.map(|after| Sleep { after, within: w.sleep_within_m }))
             .with_combine_friction(w.combine_friction)
             .with_combine_restitution(w.combine_restitution)
+            .with_threads(w.threads)
     }
 
     fn body(&self, spec: &BodySpec, meshes: &[Shape]) -> Result<RigidBody, BuildError> {

@@ -199,6 +199,8 @@ pub struct WorldSettings {
     pub combine_friction: Combine,
     /// Contact mode of meshes and cylinders without their own. Default `surface`.
     pub contacts: ContactMode,
+    /// Threads of a step, 0 for as many as cores; no number changes the result. Default 1.
+    pub threads: u32,
 }
 
 impl Default for WorldSettings {
@@ -219,6 +221,7 @@ impl Default for WorldSettings {
             combine_restitution: Combine::Max,
             combine_friction: Combine::GeometricMean,
             contacts: ContactMode::Surface,
+            threads: 1,
         }
     }
 }
@@ -248,6 +251,7 @@ impl WorldSettings {
             combine_restitution: f.choice_or("combine_restitution", Combine::NAMES, default.combine_restitution),
             combine_friction: f.choice_or("combine_friction", Combine::NAMES, default.combine_friction),
             contacts: f.choice_or("contacts", CONTACTS, default.contacts),
+            threads: f.integer_or("threads", 0..=256, default.threads),
         };
         f.finish();
         world

@@ -228,6 +228,10 @@ fn numbers_out_of_range() {
         &["s.toml:2:14: `iterations` of [world] is 99999999999999999999; expected an integer from 1 to 100000"],
     );
     assert_errors(
+        "[world]\nthreads = 1000\n",
+        &["s.toml:2:11: `threads` of [world] is 1000; expected an integer from 0 to 256"],
+    );
+    assert_errors(
         "[sky]\nzenith_color = \"blue\"\n",
         &[
             "s.toml:2:16: `zenith_color` of [sky] is \"blue\"; expected a color: \"#rrggbb\", or [r, g, b] with numbers from 0 to 1",

@@ -24,7 +24,7 @@ fn the_empty_scene_has_the_defaults_of_the_documentation() {
     let scene = read("");
     assert_eq!(scene.world.gravity_m_per_s2, [0.0, 0.0, -9.81]);
     assert_eq!(scene.world.dt_s, 1.0 / 240.0);
-    assert_eq!((scene.world.substeps, scene.world.iterations), (1, 200));
+    assert_eq!((scene.world.substeps, scene.world.iterations, scene.world.threads), (1, 200, 1));
     assert_eq!((scene.world.duration_s, scene.world.contact_tolerance_m), (5.0, 1e-7));
     assert_eq!((scene.world.sleep_after_s, scene.world.sleep_within_m), (None, 1e-5));
     assert_eq!(scene.world.stepper, Stepper::TimeStepping);
@@ -42,8 +42,9 @@ fn the_empty_scene_has_the_defaults_of_the_documentation() {
 fn every_word_of_the_world() {
     let scene = read(
         "[world]\nstepper = \"backtracking\"\nintegrator = \"dormand_prince\"\nintegrator_tolerance = 1e-9\nsolver = \"lcp_sliding\"\nsubsteps = 4\niterations = 7\n\
-         duration_s = 2\ncontact_tolerance_m = 1e-5\ncombine_restitution = \"average\"\ncombine_friction = \"product\"\ngravity_m_per_s2 = [1, 2, 3]\nsleep_after_s = 0.25\nsleep_within_m = 1e-6\n",
+         duration_s = 2\ncontact_tolerance_m = 1e-5\ncombine_restitution = \"average\"\ncombine_friction = \"product\"\ngravity_m_per_s2 = [1, 2, 3]\nsleep_after_s = 0.25\nsleep_within_m = 1e-6\nthreads = 3\n",
     );
+    assert_eq!(scene.build().unwrap().0.settings().threads, 3);
     let world = scene.world;
     assert_eq!(
         (world.stepper, world.integrator, world.solver),

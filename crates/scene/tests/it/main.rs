@@ -17,5 +17,6 @@ mod robust;
 mod shipped;
 mod spheres;
 mod state_hashes;
+mod threads;
 mod urdf;
 mod visuals;

@@ -71,6 +71,10 @@ pub struct SceneOptions {
     /// the midpoint rule.
     #[arg(long, help_heading = "Stepping", value_name = "NAME")]
     pub integrator: Option<Integrator>,
+    /// Threads of a step, 0 for as many as cores (default: from the scene); no number changes the
+    /// result.
+    #[arg(long, help_heading = "Stepping", value_name = "N", value_parser = clap::value_parser!(u32).range(0..=256))]
+    pub threads: Option<u32>,
     #[command(flatten)]
     pub opening: OpeningOptions,
 }
@@ -84,6 +88,7 @@ impl SceneOptions {
         w.stepper = self.stepper.unwrap_or(w.stepper);
         w.solver = self.solver.unwrap_or(w.solver);
         w.integrator = self.integrator.unwrap_or(w.integrator);
+        w.threads = self.threads.unwrap_or(w.threads);
         Ok(scene)
     }
 }

@@ -146,7 +146,7 @@ impl<'a> Errors<'a> {
     /// Refreshes the moment and measures the errors there. All are 0 if the rows are not those of
     /// the step.
     pub fn measure(&mut self, core: &Core, at: &mut Moment) -> Result<(), StepError> {
-        at.refresh(core.objects());
+        at.refresh(core);
         lay_rows(at.basis(core, self.goal.time), self.probe, self.goal.level)?;
         if self.goal.velocities.is_some() {
             let Workspace { rows, bias, u, du_force, c, .. } = &mut *self.probe;

@@ -20,6 +20,7 @@
 
 use super::super::Moment;
 use super::super::contacts::{Limit, Workspace, displace};
+use super::super::islands::each_island;
 use super::{Contacts, Options, is_joint};
 use crate::constraint::rows::{RowSet, Rows};
 use crate::object::RowTarget;
@@ -67,9 +68,10 @@ pub(super) fn separate(
     let waits = |t: &RowTarget| is_joint(t) && t.velocity == 0.0;
     let later = |&b: &u32| !in_place && (b as usize) >= contacts && waits(&targets[b as usize - contacts]);
     let mut moved = false;
-    for blocks in work.islands.iter() {
+    let Frictionless { rows, c, lambda, du } = &mut p;
+    let solve = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {
         if blocks.iter().all(later) || blocks.iter().all(|&b| violation(b as usize, &work.c) <= least) {
-            continue;
+            return false;
         }
         // limits and contacts of a body depend on each other through all its links; those of a pile
         // do not
@@ -80,9 +82,10 @@ pub(super) fn separate(
             max_relaxations: u32::MAX,
             tolerance: 0.1 * least / h,
         };
-        core.solver.solve(&p.rows, blocks, &p.c, &mut p.lambda, &mut p.du, solver_settings);
-        moved = true;
-    }
+        core.solver.solve(rows, blocks, c, lambda, du, solver_settings);
+        true
+    };
+    each_island(&core.threads, rows, work.islands.iter(), (lambda, du), solve, |solved| moved |= solved);
     displace(core.coordinates(acting), &p.du, h);
     work.frictionless = p;
     moved
