@@ -7,7 +7,7 @@ mkdir -p out
 rm -f "out/$scene.mcap" "out/$scene.png" "out/$scene.json"
 
 stage set-up scripts/setup.sh
-# The Python package below is made of what the command is made of, and the tests use the same.
+# One build of the crates serves the command, the Python package below and the tests.
 stage build cargo build --release --locked -p tumble
 stage run target/release/tumble run "$scene" --record "out/$scene.mcap" --screenshot "out/$scene.png" --summary "out/$scene.json"
 

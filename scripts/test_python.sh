@@ -21,7 +21,7 @@ export PATH PIP_DISABLE_PIP_VERSION_CHECK=1 MPLBACKEND=Agg PYTHONSAFEPATH=1
 # maturin is in the environment: nothing is fetched, and the dependencies are those of the workspace's release build.
 "$python" -m pip install --quiet --no-build-isolation --no-deps --force-reinstall . || exit 1
 
-# Outside the sources, so that what is installed is what is imported.
+# Outside the sources, so that the installed package is imported.
 "$python" -m pytest --rootdir=. -p no:cacheprovider "$@" || exit 1
 [ $# -eq 0 ] || exit 0
 "$python" -m mypy.stubtest tumble --mypy-config-file pyproject.toml --allowlist crates/py/tests/typed/stubtest_allowlist.txt

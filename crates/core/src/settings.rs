@@ -65,7 +65,8 @@ pub struct Settings {
     /// `backtracking`: surfaces closer than this are in contact, m. A new contact deeper than this
     /// makes the step go back, and a rebound lower than this comes to rest.
     pub contact_tolerance: f64,
-    /// Depth that a lasting contact may reach within a sub-step; the projection removes the rest, m.
+    /// Depth that a lasting contact may reach within a sub-step; the projection removes the rest,
+    /// m.
     pub drift_tolerance: f64,
     /// Maximum speed at which existing penetration is corrected, m/s.
     pub recovery_speed: f64,
@@ -77,8 +78,9 @@ pub struct Settings {
     /// Combination of the restitution coefficients of two bodies. The default is the larger, so
     /// that a ball bounces off a floor without settings of its own.
     pub combine_restitution: Combine,
-    /// Number of threads of a step, 0 to 256: 1 by default, 0 for as many as cores. The results are the
-    /// same bits for every number, so it is no part of a saved world: a world that is read has 1.
+    /// Number of threads of a step, 0 to 256: 1 by default, 0 for as many as cores. The results are
+    /// the same bits for every number, so it is no part of a saved world: a world that is read has
+    /// 1.
     ///
     /// All worlds of a process share the threads. A world that is stepped on a thread of rayon, or
     /// while another world uses the threads, uses the calling thread alone; so does small work.

@@ -10,7 +10,8 @@
 //!
 //! - the setting is 1, or the work is small,
 //! - another world is using the pool at the time,
-//! - it belongs to a pool itself, such as that of a batch of worlds, which has work for every core, or
+//! - it belongs to a pool itself, such as that of a batch of worlds, which has work for every core,
+//!   or
 //! - the operating system starts no further threads.
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -69,8 +70,8 @@ impl Threads {
         self.pool.as_ref().map_or(1, |pool| pool.threads)
     }
 
-    /// Returns the ranges of the pieces of `0..len`, each of at least `least` but the last; one range
-    /// if there is one thread.
+    /// Returns the ranges of the pieces of `0..len`, each of at least `least` but the last; one
+    /// range if there is one thread.
     pub fn pieces(&self, len: usize, least: usize) -> Vec<Range<usize>> {
         let most = if self.count() > 1 { PIECES_PER_THREAD * self.count() } else { 1 };
         let pieces = (len / least.max(1)).clamp(1, most);

@@ -5,10 +5,10 @@
 //! computation using the angle weighted pseudonormal*, 2005). At features next to crossing faces,
 //! or where the surface is pinched, it comes from the winding number.
 //!
-//! If shells overlap or the surface crosses itself, the solid is what the surface encloses at least
-//! once: the union. Surface inside the union is not boundary and is skipped. Faces that cross too
-//! many others to be cut are kept whole: next to them, the depth of an inside point can be too
-//! small, never too large.
+//! If shells overlap or the surface crosses itself, the solid is the space that the surface
+//! encloses at least once: the union. Surface inside the union is not boundary and is skipped.
+//! Faces that cross too many others to be cut are kept whole: next to them, the depth of an inside
+//! point can be too small, never too large.
 
 use super::TriMesh;
 use super::aabb_tree::AabbTree;

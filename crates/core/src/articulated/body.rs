@@ -305,8 +305,8 @@ impl ArticulatedBody {
         Ok((frame.link.unwrap_or(self.model.links().len()), frame.pose * pose))
     }
 
-    /// Disables collisions between two links. A fixed link stands for the link or base into which it
-    /// is folded.
+    /// Disables collisions between two links. A fixed link stands for the link or base into which
+    /// it is folded.
     ///
     /// # Errors
     /// [`ArticulatedError::NoLink`].

@@ -167,8 +167,9 @@ pub trait Integratable: Object {
 /// The quantity of motion that a state holds, and that [`Integratable::kick`] changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MomentumKind {
-    /// The generalized momentum `p = M·v`. `time_stepping` applies impulses at the object's position
-    /// at the time of its first impact in the step, or in the middle of a step without one.
+    /// The generalized momentum `p = M·v`. `time_stepping` applies impulses at the object's
+    /// position at the time of its first impact in the step, or in the middle of a step without
+    /// one.
     Conjugate,
     /// The generalized velocity `v`. `time_stepping` applies all impulses in the middle of the
     /// step, so that the cache of an object whose mass matrix depends on its pose is computed once.

@@ -79,8 +79,8 @@ impl World {
         self.view().asleep(id)
     }
 
-    /// Returns the state of one part: pose, velocity, acceleration. `None` if the object was removed
-    /// or has no such part.
+    /// Returns the state of one part: pose, velocity, acceleration. `None` if the object was
+    /// removed or has no such part.
     pub fn part_state(&self, id: ObjectId, part: usize) -> Option<&PartState> {
         let entry = self.core.table.get(id)?;
         self.core.derived.part_states[entry.state_range.parts.clone()].get(part)

@@ -1,5 +1,5 @@
-//! The number of threads changes no bit: of piles and of many islands, after a restored snapshot, an
-//! archive, a fork and a roll-back, with both steppers.
+//! The number of threads changes no bit: of piles and of many islands, after a restored snapshot,
+//! an archive, a fork and a roll-back, with both steppers.
 
 use tumble_core::prelude::*;
 use tumble_core::{STEPPERS, WorldState, stepper_by_name};

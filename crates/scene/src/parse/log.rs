@@ -33,7 +33,7 @@ impl<'a> Log<'a> {
         &self.folder
     }
 
-    /// Records that the text at `span` is wrong as `message` says, and what was expected.
+    /// Records that the text at `span` is wrong as `message` says, and the expected value.
     pub(crate) fn report(&self, span: Range<usize>, message: impl Into<String>, expected: impl Into<String>) {
         let mut found = self.found.borrow_mut();
         if found.len() < MAX_PROBLEMS {

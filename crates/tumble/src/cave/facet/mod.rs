@@ -1,5 +1,5 @@
 //! `tumble facet`: draws the server's frames, shows each when the server says so, and acknowledges
-//! the hash of what it drew.
+//! the hash of its image.
 
 mod burn_in;
 mod control;
