@@ -5,8 +5,10 @@
 //! cargo bench --bench piles -- pyramid-55 --runs 9       one scene
 //! cargo bench --bench piles -- --large --runs 1          all scenes
 //! cargo bench --bench piles -- spheres-1000 --tumble     tumble only, for a profiler
+//! cargo bench --bench piles -- spheres-1000 --threads 2  tumble on one and two threads, time of the day, best of the runs
 //! ```
 
+use tumble_peers::clock::{cpu_seconds, wall_seconds};
 use tumble_peers::measure::{Run, run};
 use tumble_peers::rapier::{Rapier32, Rapier64};
 use tumble_peers::scene::Scene;
@@ -22,10 +24,12 @@ struct Options {
     runs: usize,
     large: bool,
     alone: bool,
+    /// Compares this number of threads with one.
+    threads: Option<u32>,
 }
 
 fn options() -> Options {
-    let mut options = Options { names: Vec::new(), runs: 3, large: false, alone: false };
+    let mut options = Options { names: Vec::new(), runs: 3, large: false, alone: false, threads: None };
     let mut arguments = std::env::args().skip(1).filter(|a| a != "--bench");
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
@@ -38,6 +42,10 @@ fn options() -> Options {
             }
             "--large" => options.large = true,
             "--tumble" => options.alone = true,
+            "--threads" => {
+                let threads = arguments.next().and_then(|n| n.parse().ok());
+                options.threads = Some(threads.expect("--threads wants a number"));
+            }
             _ => options.names.push(argument),
         }
     }
@@ -54,6 +62,9 @@ fn main() {
         true => options.large || !scene.large,
         false => options.names.contains(&scene.name),
     };
+    if let Some(threads) = options.threads {
+        return scenes.iter().filter(chosen).for_each(|scene| compare_threads(scene, threads, options.runs));
+    }
     println!("CPU s per simulated s, median of {} runs; errors in mm; tumble (Rapier f64, f32).", options.runs);
     println!(
         "| case | tumble | Rapier f64 | f32 | ratio f64 | f32 | overlap | at the end | movement | speed at end, m/s | unconverged | residual, m/s |"
@@ -72,7 +83,7 @@ fn line(scene: &Scene, options: &Options) -> String {
     let mut runs = vec![Vec::new(); engines.len()];
     for _ in 0..options.runs {
         for (runs, engine) in runs.iter_mut().zip(engines) {
-            runs.push(run(engine(scene).as_mut(), scene));
+            runs.push(run(engine(scene).as_mut(), scene, cpu_seconds));
         }
     }
     let runs: Vec<Run> = runs.into_iter().map(median).collect();
@@ -91,6 +102,18 @@ fn line(scene: &Scene, options: &Options) -> String {
         if scene.stands { cell(&runs, |run| mm(run.movement)) } else { "–".into() },
         cell(&runs, |run| format!("{:.3}", run.speed)),
     )
+}
+
+/// Prints the time of the day per simulated second on one thread and on `threads`, in alternation, the
+/// best of the runs.
+fn compare_threads(scene: &Scene, threads: u32, runs: usize) {
+    let (mut one, mut many) = (f64::INFINITY, f64::INFINITY);
+    for _ in 0..runs {
+        for (threads, best) in [(1, &mut one), (threads, &mut many)] {
+            *best = run(&mut Tumble::on(scene, threads), scene, wall_seconds).cpu.min(*best);
+        }
+    }
+    println!("{}: {one:.4} s on 1 thread, {many:.4} s on {threads}: {:.2} times", scene.name, one / many);
 }
 
 /// Returns a length in millimeters.

@@ -1,7 +1,6 @@
 //! One run of one engine: CPU time, and errors computed from shapes and poses only, the same for
 //! every engine.
 
-use crate::clock::cpu_seconds;
 use crate::overlap::deepest;
 use crate::scene::Scene;
 use crate::{Engine, Motion, Solves};
@@ -12,7 +11,7 @@ const SAMPLES: usize = 60;
 /// The result of a run, over the measured time of its scene.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Run {
-    /// CPU seconds per simulated second.
+    /// Seconds of the clock per simulated second.
     pub cpu: f64,
     /// Largest depth of two bodies, or of a body in a plane, meters.
     pub overlap: f64,
@@ -26,15 +25,15 @@ pub struct Run {
     pub solves: Option<Solves>,
 }
 
-/// Steps an engine through the whole time and measures it.
-pub fn run(engine: &mut dyn Engine, scene: &Scene) -> Run {
+/// Steps an engine through the whole time and measures it by a clock, which returns seconds.
+pub fn run(engine: &mut dyn Engine, scene: &Scene, clock: fn() -> f64) -> Run {
     let [first, last] = scene.measured.map(|t| (t * scene.rate as f64).round() as usize);
     (0..first).for_each(|_| engine.step());
     let mut run = Run::default();
     for frame in first + 1..=last {
-        let before = cpu_seconds();
+        let before = clock();
         engine.step();
-        run.cpu += cpu_seconds() - before;
+        run.cpu += clock() - before;
         run.record(engine.solves());
         if frame.is_multiple_of(scene.rate / SAMPLES) {
             let motions: Vec<Motion> = (0..scene.bodies.len()).map(|i| engine.motion(i)).collect();

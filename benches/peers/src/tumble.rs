@@ -12,9 +12,14 @@ pub struct Tumble {
 }
 
 impl Tumble {
-    /// Builds the scene.
+    /// Builds the scene, to be stepped on one thread.
     pub fn new(scene: &Scene) -> Tumble {
-        let mut world = World::new(Settings::default().with_dt(scene.dt())).expect("the default settings are valid");
+        Tumble::on(scene, 1)
+    }
+
+    /// Builds the scene, to be stepped on a number of threads.
+    pub fn on(scene: &Scene, threads: u32) -> Tumble {
+        let mut world = World::new(Settings::default().with_dt(scene.dt()).with_threads(threads)).expect("the default settings are valid");
         let material = Material { restitution: scene.restitution, friction: FRICTION, ..Material::default() };
         for (i, plane) in scene.planes.iter().enumerate() {
             let fixed = RigidBody::fixed(Shape::half_space()).with_name(format!("plane{i}"));
