@@ -30,6 +30,19 @@ impl Cache {
     }
 }
 
+impl Cache {
+    /// Returns the value of a cache for reading; like [`get`](Self::get).
+    ///
+    /// # Panics
+    /// If it was made of another type.
+    pub fn read<T: Any>(&self) -> &T {
+        match self.0.downcast_ref() {
+            Some(value) => value,
+            None => unreachable!("an object is given the caches that it made"),
+        }
+    }
+}
+
 impl Default for Cache {
     /// A cache of nothing.
     fn default() -> Cache {

@@ -13,6 +13,11 @@
 //! | `λ`  | multiplier of every row: impulse in N·s, or force in N at the acceleration level |
 //! | `R`  | compliance of a scalar row, at least 0: the row yields by `R·λ` |
 
+use crate::threads::Threads;
+
+/// Minimum number of blocks of a piece on one thread.
+const BLOCKS: usize = 256;
+
 /// The set of admissible multipliers of a block, and the condition on its row velocities `w = c +
 /// (K + R)·λ`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -153,6 +158,27 @@ impl Rows {
                 c[row] += self.row_velocity(block, k, u);
             }
         }
+    }
+
+    /// Adds `(Yᵀu)_i` to `c_i` for every row, on several threads.
+    pub(crate) fn add_velocity_on(&self, threads: &Threads, u: &[f64], c: &mut [f64]) {
+        let mut rest = c;
+        let pieces = threads.pieces(self.blocks.len(), BLOCKS).into_iter().map(|piece| {
+            let blocks = &self.blocks[piece];
+            let rows: usize = blocks.iter().map(|block| block.set.rows()).sum();
+            let (c, after) = std::mem::take(&mut rest).split_at_mut(rows);
+            rest = after;
+            (blocks, c)
+        });
+        let pieces: Vec<(&[Block], &mut [f64])> = pieces.collect();
+        threads.each(pieces, |(blocks, c)| {
+            let start = blocks.first().map_or(0, |block| block.row as usize);
+            for block in blocks {
+                for (k, row) in block.range().enumerate() {
+                    c[row - start] += self.row_velocity(block, k, u);
+                }
+            }
+        });
     }
 
     /// Returns `(Yᵀu)` of row `k` of one block.

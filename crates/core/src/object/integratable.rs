@@ -141,6 +141,12 @@ pub trait Integratable: Object {
     fn test_impulse(&self, cache: &mut Cache, at: &PartPoint, sign: f64, y: &mut [f64]) {
         by_jacobian::test_impulse(self, cache, at, sign, y);
     }
+    /// Does what [`test_impulse`](Self::test_impulse) does, with the same bits, and leaves the cache unchanged; returns true. The rows of
+    /// contacts of such objects are made on several threads at once. The default does nothing and returns false.
+    fn test_impulse_shared(&self, cache: &Cache, at: &PartPoint, sign: f64, y: &mut [f64]) -> bool {
+        let _ = (cache, at, sign, y);
+        false
+    }
     /// Returns the reason why the state of the last refresh has no motion (a singular mass matrix).
     /// The step then ends with this as its error.
     fn singularity(&self, cache: &mut Cache) -> Option<String> {

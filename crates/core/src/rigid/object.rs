@@ -207,7 +207,11 @@ impl Integratable for RigidBody {
     }
 
     fn test_impulse(&self, cache: &mut Cache, at: &PartPoint, sign: f64, y: &mut [f64]) {
-        let cache: &mut BodyCache = cache.get();
+        self.test_impulse_shared(cache, at, sign, y);
+    }
+
+    fn test_impulse_shared(&self, cache: &Cache, at: &PartPoint, sign: f64, y: &mut [f64]) -> bool {
+        let cache: &BodyCache = cache.read();
         let r = at.arm();
         let linear = sign / self.root_mass;
         for (axis, y) in at.axes.iter().zip(y.chunks_exact_mut(6)) {
@@ -217,6 +221,7 @@ impl Integratable for RigidBody {
                 y[k + 3] += linear * axis[k];
             }
         }
+        true
     }
 
     fn mul_l(&self, cache: &mut Cache, v: &[f64], u: &mut [f64]) {

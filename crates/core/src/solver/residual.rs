@@ -7,11 +7,28 @@
 //! Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008, ch. 13.
 
 use crate::constraint::rows::{Block, RowSet, Rows, dot};
+use crate::threads::Threads;
+
+/// Minimum number of blocks of a piece on one thread.
+const BLOCKS: usize = 256;
 
 /// Returns the largest residual of any block, m/s (m/s² if `c` holds accelerations). `du` must be
 /// `Y·λ` of all blocks.
 pub fn residual(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], du: &[f64]) -> f64 {
     blocks.iter().map(|&b| block_residual(rows, &rows.blocks[b as usize], c, lambda, du)).fold(0.0, f64::max)
+}
+
+/// Returns the [`residual`] of an island, computed on several threads.
+pub(crate) fn residual_on(
+    threads: &Threads,
+    rows: &Rows,
+    blocks: &[u32],
+    (c, lambda, du): (&[f64], &[f64], &[f64]),
+) -> f64 {
+    let pieces = threads.pieces(blocks.len(), BLOCKS).into_iter();
+    let mut largest: Vec<(&[u32], f64)> = pieces.map(|piece| (&blocks[piece], 0.0)).collect();
+    threads.each(largest.iter_mut(), |(blocks, largest)| *largest = residual(rows, blocks, c, lambda, du));
+    largest.into_iter().fold(0.0, |most, (_, largest)| most.max(largest))
 }
 
 fn block_residual(rows: &Rows, block: &Block, c: &[f64], lambda: &[f64], du: &[f64]) -> f64 {

@@ -197,10 +197,10 @@ impl Backtracking {
         whiten(core.coordinates(None), &dp, 1.0, &mut u, &mut work.du_force);
         work.dp = dp;
         let mut velocity = Vec::new();
-        row_velocities(&work.rows, &work.bias, &u, &mut velocity);
+        row_velocities(&core.threads, &work.rows, &work.bias, &u, &mut velocity);
         let acceleration: Vec<f64> =
             gyroscopic(core.coordinates(None)).iter().zip(&work.du_force).map(|(g, rate)| rate - g).collect();
-        row_velocities(&work.rows, &vec![0.0; work.rows.len], &acceleration, &mut work.c);
+        row_velocities(&core.threads, &work.rows, &vec![0.0; work.rows.len], &acceleration, &mut work.c);
         let mut keep = vec![true; work.rows.blocks.len()];
         for (i, (constraint, role)) in work.contact_constraints.iter().zip(&self.watch.roles).enumerate() {
             let range = work.rows.blocks[i].range();

@@ -1,6 +1,7 @@
 //! Contacts and constraints to rows, and multipliers to momentum: shared by both steppers.
 
 use super::Moment;
+use super::contact_rows::lay_contact_rows;
 use super::correction::{self, Frictionless};
 use super::islands::each_island;
 use crate::constraint::builder::{RowBuilder, RowKind, constraints};
@@ -12,7 +13,8 @@ use crate::each_object::{Numbers, Own, each_object};
 use crate::integrators::context::free_motion;
 use crate::object::part_state::PartState;
 use crate::object::{Integratable, Level, RowTarget};
-use crate::solver::{Islands, SolverSettings, residual};
+use crate::solver::{Islands, SolverSettings, residual_on};
+use crate::threads::Threads;
 use crate::world::view::{ObjectId, WorldView};
 use crate::world::{Coordinates, Core, StepError};
 use smallvec::SmallVec;
@@ -135,6 +137,7 @@ pub(crate) struct Basis<'a> {
     pub acting: Option<&'a [PartState]>,
     /// The caches that compute the responses.
     pub caches: &'a mut [Cache],
+    pub threads: &'a Threads,
     /// The view of constraints.
     pub view: WorldView<'a>,
 }
@@ -157,7 +160,7 @@ impl Core {
             Some(Moment { derived: Derived { part_states, caches }, .. }) => (Some(&part_states[..]), caches),
             None => (None, caches),
         };
-        Basis { owners: &self.owners, found, acting, caches, view }
+        Basis { owners: &self.owners, found, acting, caches, threads: &self.threads, view }
     }
 }
 
@@ -234,46 +237,6 @@ fn make_room(work: &mut Workspace) {
     let n = work.rows.len;
     work.c.resize(n, 0.0);
     zero(&mut work.lambda, n);
-}
-
-/// Builds the rows of the contacts alone.
-fn lay_contact_rows(basis: &mut Basis, work: &mut Workspace) {
-    let (objects, (x, found)) = (basis.view.objects, basis.found);
-    work.rows.clear(objects.table.dof());
-    work.bias.clear();
-    work.targets.clear();
-    work.kinds.clear();
-    let mut builder = RowBuilder {
-        rows: &mut work.rows,
-        bias: &mut work.bias,
-        targets: &mut work.targets,
-        kinds: &mut work.kinds,
-        objects,
-        x,
-        caches: basis.caches,
-        part_states: found,
-        problem: &mut None,
-        owner: ObjectId::default(),
-    };
-    for constraint in &work.contact_constraints {
-        let set = if constraint.friction > 0.0 { RowSet::Cone { mu: constraint.friction } } else { RowSet::HalfLine };
-        builder.rows.push_block(set);
-        builder.bias.resize(builder.bias.len() + set.rows(), 0.0);
-        let axes = &constraint.frame.axes[..set.rows()];
-        for (part_state, point, sign) in
-            [(constraint.a, constraint.contact.point, 1.0), (constraint.b, constraint.point_b(), -1.0)]
-        {
-            let (owner, index) = (basis.owners[part_state as usize], part_state as usize);
-            let entry = objects.at(owner.place as usize);
-            let acting = basis.acting.filter(|_| entry.moves());
-            // the lever arm stays that of the detection: the lowest point of a spinning sphere does
-            // not turn with it
-            let point =
-                acting.map_or(point, |part_states| point + part_states[index].position() - found[index].position());
-            builder.part_states = acting.unwrap_or(found);
-            builder.point_side(&entry, owner.part as usize, &point, axes, sign);
-        }
-    }
 }
 
 /// Builds the rows of the contacts, and appends the constraints' rows of another workspace.
@@ -457,10 +420,10 @@ fn each_displaced(
 }
 
 /// Computes `c = Yᵀu + bias`.
-pub(crate) fn row_velocities(rows: &Rows, bias: &[f64], u: &[f64], c: &mut Vec<f64>) {
+pub(crate) fn row_velocities(threads: &Threads, rows: &Rows, bias: &[f64], u: &[f64], c: &mut Vec<f64>) {
     c.clear();
     c.extend_from_slice(bias);
-    rows.add_velocity(u, c);
+    rows.add_velocity_on(threads, u, c);
 }
 
 /// Solves the blocks that satisfy `keep`, island by island, from `work.c` and the warm start in
@@ -477,12 +440,12 @@ pub(crate) fn solve(
     work.islands.build(&work.rows, keep);
     let mut ray = false;
     let Workspace { rows, islands, c, lambda, du, .. } = work;
-    let (solver, report) = (&core.solver, &mut core.report);
+    let (solver, report, threads) = (&core.solver, &mut core.report, &core.threads);
     let solve = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {
         let outcome = solver.solve(rows, blocks, c, lambda, du, solver_settings);
-        (outcome, unit * residual(rows, blocks, c, lambda, du))
+        (outcome, unit * residual_on(threads, rows, blocks, (c, lambda, du)))
     };
-    each_island(&core.threads, rows, islands.iter(), (lambda, du), solve, |(outcome, residual)| {
+    each_island(threads, rows, islands.iter(), (lambda, du), solve, |(outcome, residual)| {
         report.solved(outcome, residual);
         ray |= outcome.ray;
     });

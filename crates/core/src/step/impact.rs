@@ -73,7 +73,7 @@ pub(crate) fn resolve(
     let mut c = Vec::new();
     let mut left = vec![1.0; candidates.len()];
     for pass in 0..=cap {
-        row_velocities(&work.rows, &work.bias, u, &mut c);
+        row_velocities(&core.threads, &work.rows, &work.bias, u, &mut c);
         aim_constraints(work, &mut c);
         let approach = |i: usize| candidates[i].takes_part && c[work.rows.blocks[i].row as usize] < -APPROACH;
         let bounces = |i: usize| {
@@ -120,7 +120,7 @@ pub(crate) fn resolve(
 /// effect to `work.du`.
 pub(crate) fn rebound(core: &mut Core, work: &mut Workspace, parts: &[Part], u: &[f64]) {
     let mut c = Vec::new();
-    row_velocities(&work.rows, &work.bias, u, &mut c);
+    row_velocities(&core.threads, &work.rows, &work.bias, u, &mut c);
     aim_constraints(work, &mut c);
     core.report.impact_passes += 1;
     reflect(core, work, &c, parts, false);

@@ -1,6 +1,7 @@
 //! One frame of simulated time, by either of two steppers.
 
 mod backtracking;
+mod contact_rows;
 mod contacts;
 mod context;
 mod correction;

@@ -49,6 +49,6 @@ impl Moment {
         let Moment { x, derived: Derived { part_states, caches } } = self;
         let (x, part_states) = (&x[..], &part_states[..]);
         let view = WorldView { x, part_states, ..core.view(time) };
-        Basis { owners: &core.owners, found: (x, part_states), acting: None, caches, view }
+        Basis { owners: &core.owners, found: (x, part_states), acting: None, caches, threads: &core.threads, view }
     }
 }

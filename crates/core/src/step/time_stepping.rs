@@ -175,7 +175,7 @@ impl TimeStepping {
             return Ok(());
         }
         let (before, gain, mut impact_fractions) = (&mut self.buffers.before, &mut self.buffers.gain, Vec::new());
-        row_velocities(&work.rows, &work.bias, u, before);
+        row_velocities(&core.threads, &work.rows, &work.bias, u, before);
         zero(gain, work.rows.len);
         work.rows.add_velocity(du_force, gain);
         for (constraint, block) in work.contact_constraints.iter().zip(&work.rows.blocks) {
@@ -309,9 +309,9 @@ impl TimeStepping {
     fn contacts(&mut self, core: &mut Core, middle: &mut Moment, h: f64, u0: &[f64], u: &mut [f64], du_force: &[f64]) {
         let work = &mut self.work;
         let Buffers { before, gain: first, parts, keep, .. } = &mut self.buffers;
-        row_velocities(&work.rows, &work.bias, u0, first);
+        row_velocities(&core.threads, &work.rows, &work.bias, u0, first);
         u.iter_mut().zip(du_force).for_each(|(u, du)| *u += du);
-        row_velocities(&work.rows, &work.bias, u, &mut work.c);
+        row_velocities(&core.threads, &work.rows, &work.bias, u, &mut work.c);
         before.clone_from(&work.c);
         parts.clear();
         parts.resize(work.contact_constraints.len(), Part::default());
@@ -358,7 +358,7 @@ impl TimeStepping {
         if parts.iter().all(|part| part.rebound <= 0.0) {
             return;
         }
-        row_velocities(&work.rows, &work.bias, u, gain);
+        row_velocities(&core.threads, &work.rows, &work.bias, u, gain);
         for (part, block) in parts.iter_mut().zip(&work.rows.blocks) {
             part.member = part.rebound > 0.0 && work.lambda[block.row as usize] > 0.0;
             part.rebound = if part.member { part.rebound } else { 0.0 };

@@ -151,7 +151,7 @@ impl<'a> Errors<'a> {
         if self.goal.velocities.is_some() {
             let Workspace { rows, bias, u, du_force, c, .. } = &mut *self.probe;
             whiten(at.coordinates(core), &vec![0.0; core.dof], 0.0, u, du_force);
-            row_velocities(rows, bias, u, c);
+            row_velocities(&core.threads, rows, bias, u, c);
         }
         self.compare();
         Ok(())
