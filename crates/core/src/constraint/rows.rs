@@ -184,7 +184,13 @@ impl Rows {
     /// Returns `(Yᵀu)` of row `k` of one block.
     #[inline]
     pub fn row_velocity(&self, block: &Block, k: usize, u: &[f64]) -> f64 {
-        block.sides().iter().map(|s| dot(self.response(s, k), &u[s.u as usize..(s.u + s.dof) as usize])).sum()
+        block.sides().iter().map(|s| self.side_velocity(s, k, u)).sum()
+    }
+
+    /// Returns the part of one side in [`row_velocity`](Self::row_velocity).
+    #[inline]
+    pub fn side_velocity(&self, side: &Side, k: usize, u: &[f64]) -> f64 {
+        dot(self.response(side, k), &u[side.u as usize..(side.u + side.dof) as usize])
     }
 
     /// Adds `Y·λ` of one block to `u`.

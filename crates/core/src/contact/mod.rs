@@ -7,3 +7,4 @@ pub(crate) mod pair_material;
 mod separation;
 pub(crate) mod time_of_impact;
 pub(crate) mod warm_starts;
+pub(crate) mod wrench;

@@ -2,79 +2,94 @@
 
 use crate::clone_by_field::clone_by_field;
 use crate::contact::detect::ContactKey;
-use tumble_collide::Vec3;
 
-/// Force of every contact in the last sub-step, N, world axes, on A; sorted by key.
+/// Force of a contact in the last sub-step.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(crate) struct WarmStart {
+    pub key: ContactKey,
+    /// Force on A, N, world axes.
+    pub force: [f64; 3],
+    /// The contact point in the frame of A's part, m.
+    pub point: [f64; 3],
+}
+
+impl WarmStart {
+    /// Returns whether all of its numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        self.force.iter().chain(&self.point).all(|x| x.is_finite())
+    }
+}
+
+/// Forces of the last sub-step, sorted by key.
 #[derive(Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct WarmStarts {
-    entries: Vec<(ContactKey, [f64; 3])>,
+    entries: Vec<WarmStart>,
 }
 
 clone_by_field!(WarmStarts { entries });
 
 impl WarmStarts {
     /// Removes and returns the entries of the keys that `which` selects.
-    pub fn take(&mut self, which: impl Fn(&ContactKey) -> bool) -> Vec<(ContactKey, [f64; 3])> {
-        let (taken, kept) = std::mem::take(&mut self.entries).into_iter().partition(|e| which(&e.0));
+    pub fn take(&mut self, which: impl Fn(&ContactKey) -> bool) -> Vec<WarmStart> {
+        let (taken, kept) = std::mem::take(&mut self.entries).into_iter().partition(|e| which(&e.key));
         self.entries = kept;
         taken
     }
 
     /// Inserts entries that [`take`](Self::take) returned.
-    pub fn add(&mut self, entries: Vec<(ContactKey, [f64; 3])>) {
+    pub fn add(&mut self, entries: Vec<WarmStart>) {
         self.entries.extend(entries);
-        self.entries.sort_by_key(|e| e.0);
-        self.entries.dedup_by_key(|e| e.0);
+        self.entries.sort_by_key(|e| e.key);
+        self.entries.dedup_by_key(|e| e.key);
     }
 
     /// Replaces all entries; they may come in any order.
-    pub fn replace(&mut self, entries: impl Iterator<Item = (ContactKey, Vec3)>) {
+    pub fn replace(&mut self, entries: impl Iterator<Item = WarmStart>) {
         self.entries.clear();
-        self.entries.extend(entries.map(|(k, v)| (k, [v.x, v.y, v.z])));
+        self.entries.extend(entries);
         if !self.in_order() {
-            self.entries.sort_by_key(|e| e.0);
+            self.entries.sort_by_key(|e| e.key);
         }
     }
 
-    /// Returns the force of a contact. `place` is where the last search ended, so keys in ascending
+    /// Returns the forces of a pair. `place` is where the last search ended, so pairs in ascending
     /// order are found in a step or two.
-    pub fn get(&self, key: &ContactKey, place: &mut usize) -> Option<Vec3> {
-        let before = self.entries[..*place].last().is_some_and(|e| e.0 >= *key);
+    pub fn of_pair(&self, pair: [u32; 4], place: &mut usize) -> &[WarmStart] {
+        let before = self.entries[..*place].last().is_some_and(|e| e.key.pair >= pair);
         let from = if before { 0 } else { *place };
-        *place = from + exponential_search(&self.entries[from..], key);
-        let found = self.entries.get(*place).filter(|e| e.0 == *key)?;
-        Some(Vec3::from(found.1))
+        *place = from + exponential_search(&self.entries[from..], pair);
+        let count = self.entries[*place..].iter().take_while(|e| e.key.pair == pair).count();
+        &self.entries[*place..*place + count]
     }
 
     /// Returns whether any contact of the key's pair carried a force.
     pub fn carries(&self, key: &ContactKey) -> bool {
-        let first = self.entries.partition_point(|e| e.0.pair < key.pair);
-        self.entries[first..].iter().take_while(|e| e.0.pair == key.pair).any(|e| e.1 != [0.0; 3])
+        self.of_pair(key.pair, &mut 0).iter().any(|e| e.force != [0.0; 3])
     }
 
     /// Returns whether the entries are sorted by key, as searches require.
     pub fn in_order(&self) -> bool {
-        self.entries.is_sorted_by(|a, b| a.0 < b.0)
+        self.entries.is_sorted_by(|a, b| a.key < b.key)
     }
 
     /// Returns whether all forces are finite.
     pub fn finite(&self) -> bool {
-        self.entries.iter().flat_map(|e| e.1).all(f64::is_finite)
+        self.entries.iter().all(WarmStart::is_finite)
     }
 
     /// Removes the contacts of an object.
     pub fn forget(&mut self, serial: u32) {
-        self.entries.retain(|(k, _)| k.pair[0] != serial && k.pair[2] != serial);
+        self.entries.retain(|e| e.key.pair[0] != serial && e.key.pair[2] != serial);
     }
 }
 
-/// Returns the number of entries before `key`, searched at doubling distances from the start.
-fn exponential_search(entries: &[(ContactKey, [f64; 3])], key: &ContactKey) -> usize {
+/// Returns the number of entries before `pair`, searched at doubling distances from the start.
+fn exponential_search(entries: &[WarmStart], pair: [u32; 4]) -> usize {
     let (mut low, mut step) = (0, 1);
-    while entries.get(low + step - 1).is_some_and(|e| e.0 < *key) {
+    while entries.get(low + step - 1).is_some_and(|e| e.key.pair < pair) {
         low += step;
         step *= 2;
     }
     let high = (low + step).min(entries.len());
-    low + entries[low..high].partition_point(|e| e.0 < *key)
+    low + entries[low..high].partition_point(|e| e.key.pair < pair)
 }

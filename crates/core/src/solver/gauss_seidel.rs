@@ -23,15 +23,16 @@
 //! `relaxation.rs` shortens their steps.
 //!
 //! An island that is not finished when its sweeps have cost as much as [`FACTORIZATIONS`] is solved
-//! as a whole (`direct/`). Islands whose factorization is too expensive are left to the sweeps. The
-//! bound is lower for large islands that are not at rest and for solves of less than [`FIRST_SWEEPS`].
+//! as a whole (`direct/`). Islands whose factorization is too expensive are left to the sweeps, and
+//! so are large islands in motion. A solve that ends unfinished is scaled so that it adds no energy
+//! ([`optimal_scale`]).
 
 use super::direct::Plan;
 use super::extrapolation::Extrapolation;
 use super::linkage::Linkages;
 use super::local::{INLINE_BLOCKS, Local, Progress, apply, write_back};
 use super::relaxation::Relaxation;
-use super::{RowSolver, SolveReport, SolverSettings};
+use super::{RowSolver, SolveReport, SolverSettings, residual};
 use crate::constraint::rows::Rows;
 use smallvec::SmallVec;
 
@@ -42,6 +43,11 @@ const ACCELERATED: u32 = 200;
 const FIRST_SWEEPS: u32 = 25;
 /// Sweeps go on until they have cost as much as this number of factorizations.
 const FACTORIZATIONS: f64 = 3.0;
+
+/// Islands of more blocks are solved if their residual is at most [`SOLVED`] tolerances; from smaller
+/// ones the direct solution gains more digits for little.
+const LARGE: usize = 500;
+const SOLVED: f64 = 10.0;
 
 /// The block Gauss–Seidel solver, `gauss_seidel`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -85,6 +91,11 @@ impl RowSolver for GaussSeidel {
             }
             relaxation.record(sweep, progress.change);
             if sweep == FIRST_SWEEPS.min(sweeps) {
+                write_back(&locals, lambda);
+                if locals.len() > LARGE && residual(rows, blocks, c, lambda, du) <= SOLVED * settings.tolerance {
+                    outcome = SolveReport { iterations: sweep, converged: true, ray: false };
+                    break;
+                }
                 plan = Plan::new(rows, blocks, c, sweeps < FIRST_SWEEPS);
                 due = plan.as_ref().map_or(u32::MAX, |plan| (FACTORIZATIONS * plan.cost()) as u32).max(sweep);
             }
@@ -106,6 +117,14 @@ impl RowSolver for GaussSeidel {
                 extrapolation.rebuild(&locals, &linkages, rows, c, lambda, du);
             }
         }
+        if !outcome.converged && !direct && linkages.is_empty() {
+            let share = optimal_scale(&locals, rows, du);
+            if share < 1.0 {
+                locals.iter_mut().for_each(|local| local.lambda = local.lambda.map(|x| share * x));
+                extrapolation.clear(du);
+                apply(&locals, &linkages, rows, c, lambda, du);
+            }
+        }
         write_back(&locals, lambda);
         if !linkages.is_empty() {
             extrapolation.clear(du);
@@ -118,6 +137,21 @@ impl RowSolver for GaussSeidel {
     fn fork(&self) -> Box<dyn RowSolver> {
         Box::new(*self)
     }
+}
+
+/// Returns the factor of the multipliers at which `½λᵀ(K + R)λ + cᵀλ` is least. A solution has `λᵀw ≤
+/// 0` and so a factor of at least 1. A smaller factor means that the iterate overshoots and may add
+/// energy; multipliers that are scaled by it add none.
+fn optimal_scale(locals: &[Local], rows: &Rows, du: &[f64]) -> f64 {
+    let (mut slope, mut curve) = (0.0, 0.0);
+    for local in locals {
+        for k in 0..local.block.set.rows() {
+            let own = if k == 0 { local.block.compliance * local.lambda[0] } else { 0.0 };
+            slope -= local.lambda[k] * local.c[k];
+            curve += local.lambda[k] * (rows.row_velocity(local.block, k, du) + own);
+        }
+    }
+    if curve > 0.0 { (slope / curve).max(0.0) } else { 1.0 }
 }
 
 /// Number of plain sweeps at the end: an extrapolated iterate may overshoot far just before it

@@ -35,9 +35,9 @@ use crate::constraint::rows::Rows;
 pub struct SolverSettings {
     /// Maximum number of sweeps, at least 1.
     pub max_sweeps: u32,
-    /// Maximum number of block relaxations in all sweeps of an island. It bounds the cost of a
-    /// step: large islands get fewer sweeps, but at least [`MIN_SWEEPS`] (or `max_sweeps` if that
-    /// is less).
+    /// Maximum number of block relaxations of a step, in all sweeps of all islands but the smallest.
+    /// It bounds the cost of a step: large islands get fewer sweeps, but at least [`MIN_SWEEPS`] (or
+    /// `max_sweeps` if that is less).
     pub max_relaxations: u32,
     /// A sweep that changes no row velocity by more than this ends the solve (m/s; m/s² at the
     /// acceleration level).
@@ -48,6 +48,14 @@ pub struct SolverSettings {
 pub const MIN_SWEEPS: u32 = 25;
 
 impl SolverSettings {
+    /// Returns the settings of an island of `blocks` blocks that shares the relaxations with others,
+    /// `all` blocks in total.
+    pub fn shared_by(mut self, blocks: usize, all: usize) -> SolverSettings {
+        let share = blocks as f64 / all.max(1) as f64;
+        self.max_relaxations = (share * f64::from(self.max_relaxations)) as u32;
+        self
+    }
+
     /// Returns the maximum number of sweeps of an island with `blocks` blocks.
     pub fn max_sweeps_for(&self, blocks: usize) -> u32 {
         let share = self.max_relaxations / (blocks.max(1) as u32);

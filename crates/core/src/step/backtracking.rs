@@ -27,11 +27,12 @@
 //!   one time-stepping sub-step. Both are counted as floor hits.
 
 use super::contacts::{
-    Limit, build_rows, detect, gyroscopic, impulses, limits, push, recover, row_velocities, solve, warm_start, whiten,
+    Limit, build_rows, detect, gyroscopic, impulses, limits, push, recover, row_velocities, solve, whiten,
 };
 use super::correction::{self, ActiveLimit, Contacts, Limits, Options};
 use super::event_location::{Bracket, LimitRole, Role, SLOW, Watch};
 use super::impact::{self, Candidate};
+use super::warm_start::warm_start;
 use super::{StepContext, Stepper, TimeStepping, Workspace};
 use crate::constraint::rows::RowSet;
 use crate::contact::detect::ContactConstraint;
@@ -172,7 +173,7 @@ impl Backtracking {
                     (2.0 * pressing * if role.lasts { s.drift_tolerance } else { s.contact_tolerance }).sqrt();
                 let rest_speed =
                     (rebound / constraint.restitution.max(1e-3)).min(pressing * s.dt).max(impact::SLOWEST_BOUNCE);
-                Candidate { takes_part: role.touching, rest_speed, restitution: constraint.restitution }
+                Candidate { takes_part: role.touching, rest_speed, restitution: constraint.restitution, crowd: false }
             })
             .collect();
         let (mut u, mut total) = (Vec::new(), vec![0.0; work.rows.len]);

@@ -426,6 +426,9 @@ pub(crate) fn row_velocities(threads: &Threads, rows: &Rows, bias: &[f64], u: &[
     rows.add_velocity_on(threads, u, c);
 }
 
+/// Islands of more blocks share the relaxations of the settings; smaller ones have as many each.
+const OWN_BUDGET: usize = 40;
+
 /// Solves the blocks that satisfy `keep`, island by island, from `work.c` and the warm start in
 /// `work.lambda`; `work.du` receives `Y·λ`. `unit` converts `c` to m/s for the report: 1, or the
 /// length of the step if `c` holds accelerations. Returns whether any solve ended on a ray.
@@ -440,9 +443,12 @@ pub(crate) fn solve(
     work.islands.build(&work.rows, keep);
     let mut ray = false;
     let Workspace { rows, islands, c, lambda, du, .. } = work;
+    let shared = islands.iter().map(<[u32]>::len).filter(|n| *n > OWN_BUDGET).sum();
     let (solver, report, threads) = (&core.solver, &mut core.report, &core.threads);
     let solve = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {
-        let outcome = solver.solve(rows, blocks, c, lambda, du, solver_settings);
+        let settings =
+            if blocks.len() > OWN_BUDGET { solver_settings.shared_by(blocks.len(), shared) } else { solver_settings };
+        let outcome = solver.solve(rows, blocks, c, lambda, du, settings);
         (outcome, unit * residual_on(threads, rows, blocks, (c, lambda, du)))
     };
     each_island(threads, rows, islands.iter(), (lambda, du), solve, |(outcome, residual)| {
@@ -450,20 +456,6 @@ pub(crate) fn solve(
         ray |= outcome.ray;
     });
     ray
-}
-
-/// Sets multipliers to the forces of the last sub-step, in the present contact frames, times
-/// `scale`. The solver projects them onto the cone.
-pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
-    let mut place = 0;
-    for (constraint, block) in work.contact_constraints.iter().zip(&work.rows.blocks) {
-        if let Some(impulse) = core.state.warm.get(&constraint.key, &mut place) {
-            for (row, axis) in block.range().zip(&constraint.frame.axes) {
-                work.lambda[row] = scale * axis.dot(&impulse);
-            }
-            work.lambda[block.row as usize] = work.lambda[block.row as usize].max(0.0);
-        }
-    }
 }
 
 /// Returns the impulse on A of each contact, world axes, for given multipliers.

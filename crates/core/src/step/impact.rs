@@ -35,6 +35,8 @@ pub(crate) struct Candidate {
     pub rest_speed: f64,
     /// Coefficient of restitution of the pair.
     pub restitution: f64,
+    /// Whether it belongs to a large group of touching bodies, which rebounds at the end of the step.
+    pub crowd: bool,
 }
 
 /// The part of a contact in one pass.

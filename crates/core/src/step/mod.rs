@@ -11,6 +11,7 @@ mod islands;
 mod moment;
 mod time_stepping;
 mod unreachable_joints;
+mod warm_start;
 
 pub use backtracking::Backtracking;
 pub(crate) use contacts::Workspace;

@@ -24,7 +24,8 @@
 //! h/2, and are displaced by the rest, (t_i − h/2)·(v_0 − v_1), at the end.
 //!
 //! A contact bounces only if it approaches faster than its own pressing acceleration gives in a
-//! step. Bodies that impacts of one step connect share the time `t_i` of the first of them. The
+//! step, or, if it carried a force before, faster than the forces of the step move either body. Large
+//! groups of touching bodies have no impact phase (`time_stepping/impacts.rs`). Bodies that impacts of one step connect share the time `t_i` of the first of them. The
 //! contacts that close later in the step have speculative rows, with the gap at `t_i` over the time
 //! that is left, so they arrive at the surface at the end of the step and do not overlap. Their
 //! restitution follows there: `Δu_rebound` gives them the separation speed `e·v` of the speed `v`
@@ -32,17 +33,18 @@
 //! gap per step. Elastic contacts keep the energy exactly: they have no row in this step, their
 //! overlap is corrected at its end, and they strike at the start of the next.
 
+mod impacts;
+
 use super::contacts::{
-    build_rows, detect, displace, free_motion_change, gyroscopic, impulses, push, row_velocities, shift, solve,
-    warm_start, whiten, zero,
+    build_rows, detect, displace, free_motion_change, gyroscopic, impulses, push, row_velocities, shift, solve, whiten,
 };
 use super::correction::{self, Contacts, Limits, Options};
 use super::impact::{self, Candidate, Part};
+use super::warm_start::warm_start;
 use super::{Moment, StepContext, Stepper, Workspace};
 use crate::constraint::rows::RowSet;
-use crate::contact::detect::ContactConstraint;
 use crate::contact::pair::PredictionMode;
-use crate::contact::time_of_impact::{time_contacts, time_to_close};
+use crate::contact::time_of_impact::time_contacts;
 use crate::each_object::{Numbers, each_object};
 use crate::integrators::context::free_motion;
 use crate::object::Level;
@@ -85,9 +87,6 @@ struct Buffers {
     /// Change of velocity by the rebound.
     late: Vec<f64>,
 }
-
-/// Maximum number of passes of the impact phase.
-const IMPACT_PASSES: u32 = 50;
 
 impl Stepper for TimeStepping {
     fn name(&self) -> &'static str {
@@ -153,157 +152,6 @@ impl TimeStepping {
         Ok(())
     }
 
-    /// Resolves the impacts within the step. `after` becomes the whitened velocity after them,
-    /// without forces. If there are any, rows and whitened velocities are computed again at the
-    /// places of the impacts.
-    fn impacts(
-        &mut self,
-        core: &mut Core,
-        middle: &mut Moment,
-        h: f64,
-        u: &mut Vec<f64>,
-        du_force: &mut Vec<f64>,
-        after: &mut Vec<f64>,
-    ) -> Result<(), StepError> {
-        let work = &mut self.work;
-        after.clone_from(u);
-        self.impact_fraction.clear();
-        self.impact_fraction.resize(core.dof, -1.0);
-        zero(&mut self.impact, work.rows.len);
-        self.candidates.clear();
-        if work.contact_constraints.iter().all(|t| t.restitution <= 0.0) {
-            return Ok(());
-        }
-        let (before, gain, mut impact_fractions) = (&mut self.buffers.before, &mut self.buffers.gain, Vec::new());
-        row_velocities(&core.threads, &work.rows, &work.bias, u, before);
-        zero(gain, work.rows.len);
-        work.rows.add_velocity(du_force, gain);
-        for (constraint, block) in work.contact_constraints.iter().zip(&work.rows.blocks) {
-            let (v, dv, gap) = (before[block.row as usize], gain[block.row as usize], constraint.contact.gap);
-            let rest_speed = (-dv).max(impact::SLOWEST_BOUNCE);
-            let impact_fraction = if constraint.restitution > 0.0 {
-                time_to_close(gap / h, v, dv).filter(|s| *s <= 1.0 && -(v + s * dv) > rest_speed)
-            } else {
-                None
-            };
-            impact_fractions.push(impact_fraction);
-            self.candidates.push(Candidate {
-                takes_part: gap <= core.settings.drift_tolerance,
-                rest_speed,
-                restitution: constraint.restitution,
-            });
-        }
-        if impact_fractions.iter().all(Option::is_none) {
-            return Ok(());
-        }
-        self.first_impacts(&impact_fractions);
-        self.go_to_impacts(core, middle, h);
-        let work = &mut self.work;
-        build_rows(core, Some(&mut *middle), work, Level::Velocity { h }, 0.5 * h)?;
-        whiten(middle.coordinates(core), &work.dp, h, u, du_force);
-        let at_impact: Vec<f64> = (0..u.len()).map(|i| u[i] + self.impact_fraction[i].max(0.0) * du_force[i]).collect();
-        after.clone_from(&at_impact);
-        impact::resolve(core, work, &self.candidates, (IMPACT_PASSES, false), after, &mut self.impact);
-        (0..u.len()).for_each(|i| after[i] = u[i] + (after[i] - at_impact[i]));
-        Ok(())
-    }
-
-    /// Moves the objects that have an impact to where it happens.
-    fn go_to_impacts(&self, core: &Core, middle: &mut Moment, h: f64) {
-        let Coordinates { objects, x, caches, .. } = middle.coordinates(core);
-        for entry in objects.iter().filter(|e| !in_the_middle(e)) {
-            let impact_fraction = entry.state_range.v.clone().next().map_or(-1.0, |i| self.impact_fraction[i]);
-            if impact_fraction >= 0.0 {
-                let x = &mut x[entry.state_range.x.clone()];
-                x.copy_from_slice(&self.x0[entry.state_range.x.clone()]);
-                free_motion(&entry, &mut caches[entry.place], x, h * impact_fraction);
-            }
-        }
-        middle.refresh(core);
-    }
-
-    /// Adds the contacts that bodies may reach because of their impacts, and builds the rows again.
-    /// These contacts prevent overlap in this step and bounce in the next.
-    fn look_again(
-        &mut self,
-        core: &mut Core,
-        middle: &mut Moment,
-        h: f64,
-        before: &[f64],
-        after: &[f64],
-    ) -> Result<(), StepError> {
-        if self.impact.iter().all(|i| *i == 0.0) {
-            return Ok(());
-        }
-        let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
-        let (mut struck, mut found) = (core.moment(), Vec::new());
-        push(struck.coordinates_by(core, &mut middle.derived.caches), &change, &mut Vec::new());
-        struck.refresh(core);
-        detect(core, Some(&struck), (h, PredictionMode::Each), &mut found);
-        core.moments.push(struck);
-        let work = &mut self.work;
-        let old: Vec<[u32; 4]> = work.contact_constraints.iter().map(|t| t.key.pair).collect();
-        found.retain(|t| old.binary_search(&t.key.pair).is_err());
-        if found.is_empty() {
-            return Ok(());
-        }
-        let mut filed: Vec<(ContactConstraint, Candidate, Vec<f64>)> = Vec::new();
-        for ((constraint, candidate), block) in
-            work.contact_constraints.drain(..).zip(&self.candidates).zip(&work.rows.blocks)
-        {
-            filed.push((constraint, *candidate, self.impact[block.range()].to_vec()));
-        }
-        let fresh = |t: &ContactConstraint| Candidate {
-            takes_part: false,
-            rest_speed: impact::SLOWEST_BOUNCE,
-            restitution: t.restitution,
-        };
-        filed.extend(found.into_iter().map(|t| (t.clone(), fresh(&t), Vec::new())));
-        filed.sort_by_key(|(constraint, ..)| constraint.key.pair);
-        work.contact_constraints.extend(filed.iter().map(|(constraint, ..)| constraint.clone()));
-        self.candidates = filed.iter().map(|(_, candidate, _)| *candidate).collect();
-        build_rows(core, Some(&mut *middle), work, Level::Velocity { h }, 0.5 * h)?;
-        zero(&mut self.impact, work.rows.len);
-        for ((_, _, impulse), block) in filed.iter().zip(&work.rows.blocks).filter(|((.., i), _)| !i.is_empty()) {
-            self.impact[block.range()].copy_from_slice(impulse);
-        }
-        Ok(())
-    }
-
-    /// Selects the contacts that take part in the impacts: the first ones among bodies that impacts
-    /// of this step connect, and those that touch the same island. Later ones rebound at the end of
-    /// the step; islands without an impact take no part.
-    fn first_impacts(&mut self, impact_fractions: &[Option<f64>]) {
-        let work = &mut self.work;
-        work.islands.build(&work.rows, |b| impact_fractions.get(b).is_some_and(Option::is_some));
-        for blocks in work.islands.iter() {
-            let first = blocks.iter().filter_map(|&b| impact_fractions[b as usize]).fold(1.0, f64::min);
-            for side in blocks.iter().flat_map(|&b| work.rows.blocks[b as usize].sides()) {
-                self.impact_fraction[side.u as usize..(side.u + side.dof) as usize].fill(first);
-            }
-        }
-        let first = |i: usize| {
-            let sides = work.rows.blocks[i].sides();
-            impact_fractions[i]
-                .is_some_and(|s| sides.iter().all(|side| s <= self.impact_fraction[side.u as usize] + 1e-9))
-        };
-        let strikes: Vec<bool> = (0..impact_fractions.len()).map(first).collect();
-        for (candidate, strikes) in self.candidates.iter_mut().zip(&strikes) {
-            candidate.takes_part |= strikes;
-        }
-        let (candidates, contact_constraints) = (&mut self.candidates, work.contact_constraints.len());
-        work.islands.build(&work.rows, |b| b >= contact_constraints || candidates[b].takes_part);
-        for blocks in
-            work.islands.iter().filter(|blocks| !blocks.iter().any(|&b| strikes.get(b as usize) == Some(&true)))
-        {
-            blocks
-                .iter()
-                .map(|&b| b as usize)
-                .filter(|b| *b < contact_constraints)
-                .for_each(|b| candidates[b].takes_part = false);
-        }
-    }
-
     /// Adds the forces and solves all contacts and constraints of the step: `u` becomes the
     /// velocity at its end.
     fn contacts(&mut self, core: &mut Core, middle: &mut Moment, h: f64, u0: &[f64], u: &mut [f64], du_force: &[f64]) {
@@ -322,8 +170,10 @@ impl TimeStepping {
             let (row, struck) = (block.row as usize, self.impact[block.row as usize] > 0.0);
             let s = block.sides().iter().map(|side| self.impact_fraction[side.u as usize]).fold(0.0, f64::max);
             let (gap, left) = (constraint.contact.gap + h * s * first[row], h * (1.0 - s).max(1e-9));
-            let rest_speed = self.candidates.get(i).map_or(f64::INFINITY, |candidate| candidate.rest_speed);
-            let apart = !struck && constraint.contact.gap > core.settings.drift_tolerance;
+            let candidate = self.candidates.get(i);
+            let rest_speed = candidate.map_or(f64::INFINITY, |candidate| candidate.rest_speed);
+            let crowd = candidate.is_some_and(|candidate| candidate.crowd);
+            let apart = !struck && (crowd || constraint.contact.gap > core.settings.drift_tolerance);
             if apart && work.c[row] < -2.0 * rest_speed && gap + left * work.c[row] < 0.0 {
                 keep[i] = constraint.restitution <= impact::ELASTIC;
                 parts[i].rebound = if keep[i] { -constraint.restitution * work.c[row] } else { 0.0 };
@@ -347,31 +197,6 @@ impl TimeStepping {
         solve(core, work, core.settings.solver_settings, 1.0, |b| keep[b]);
         keep.iter().zip(&work.rows.blocks).filter(|(k, _)| !**k).for_each(|(_, b)| work.lambda[b.range()].fill(0.0));
         u.iter_mut().zip(&work.du).for_each(|(u, du)| *u += du);
-    }
-
-    /// Resolves the rebound of contacts that were not among the first of their bodies: the solve of
-    /// all contacts has stopped them at the surface. `late` becomes the change of whitened velocity
-    /// at the end of the step.
-    fn rebound(&mut self, core: &mut Core, u: &[f64]) {
-        let (work, Buffers { before, gain, parts, late, .. }) = (&mut self.work, &mut self.buffers);
-        zero(late, core.dof);
-        if parts.iter().all(|part| part.rebound <= 0.0) {
-            return;
-        }
-        row_velocities(&core.threads, &work.rows, &work.bias, u, gain);
-        for (part, block) in parts.iter_mut().zip(&work.rows.blocks) {
-            part.member = part.rebound > 0.0 && work.lambda[block.row as usize] > 0.0;
-            part.rebound = if part.member { part.rebound } else { 0.0 };
-            let taken = |row: usize| -0.5 * work.lambda[row] * (before[row] + gain[row]);
-            part.energy = block.range().map(taken).sum::<f64>().max(0.0);
-        }
-        if parts.iter().any(|part| part.member) {
-            let forces = work.lambda.clone();
-            impact::rebound(core, work, parts, u);
-            late.copy_from_slice(&work.du);
-            self.impact.iter_mut().zip(&work.lambda).for_each(|(total, late)| *total += late);
-            work.lambda = forces;
-        }
     }
 
     /// Writes the state at the end of the step.

@@ -3,6 +3,7 @@
 use super::state::WorldState;
 use crate::contact::detect::{ContactConstraint, DetectorBuffers, Owner};
 use crate::contact::pair_material::PairMaterials;
+use crate::contact::warm_starts::WarmStart;
 use crate::derived::{Cache, Derived};
 use crate::integrators::context::IntegrationContext;
 use crate::object::part_state::{Forces, PartState, Wrench};
@@ -283,14 +284,13 @@ impl Core {
                 depth: -constraint.contact.gap,
             });
         }
-        let contacts = &self.contacts;
-        self.state.warm.replace(
-            contact_constraints
-                .iter()
-                .zip(contacts)
-                .filter(|(_, c)| c.force != Vec3::zeros())
-                .map(|(t, c)| (t.key, c.force)),
-        );
+        let (contacts, part_states) = (&self.contacts, &self.derived.part_states);
+        let carrying = contact_constraints.iter().zip(contacts).filter(|(_, c)| c.force != Vec3::zeros());
+        self.state.warm.replace(carrying.map(|(t, c)| WarmStart {
+            key: t.key,
+            force: c.force.into(),
+            point: part_states[t.a as usize].pose.inverse_transform_point(&c.point.into()).into(),
+        }));
     }
 
     /// Advances time, refreshes the part states and checks the state.

@@ -23,7 +23,7 @@
 //! ([`Constraint::partners`](crate::Constraint::partners)).
 
 use crate::clone_by_field::clone_by_field;
-use crate::contact::detect::ContactKey;
+use crate::contact::warm_starts::WarmStart;
 use crate::object::part_state::{PartState, Wrench};
 use crate::world::Core;
 use crate::world::view::{Entry, Mode, ObjectId};
@@ -72,7 +72,7 @@ pub(crate) struct SleepGroup {
     /// first frame asleep.
     pub load: Option<Vec<f64>>,
     /// Contact forces with which they fell asleep.
-    pub warm: Vec<(ContactKey, [f64; 3])>,
+    pub warm: Vec<WarmStart>,
 }
 
 clone_by_field!(SleepGroup { members, supports, load, warm });
@@ -119,7 +119,7 @@ impl SleepGroup {
     pub fn sound(&self) -> bool {
         let finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
         let fine = self.load.iter().all(|load| finite(load))
-            && self.warm.iter().all(|w| finite(&w.1))
+            && self.warm.iter().all(WarmStart::is_finite)
             && self.supports.iter().flat_map(|s| &s.poses).all(|p| finite(p));
         fine && !self.members.is_empty() && self.members.is_sorted_by(|a, b| a < b)
     }

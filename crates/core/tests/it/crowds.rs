@@ -1,7 +1,7 @@
 //! Several impacts within one step.
 
 use crate::common::{ground, no_gravity, position, world};
-use tumble_collide::{Pose, Shape, Vec3};
+use tumble_collide::{Pose, Quat, Shape, Vec3};
 use tumble_core::{Material, ObjectId, RigidBody, World};
 
 fn add(world: &mut World, shape: Shape, restitution: f64, friction: f64, at: [f64; 3]) -> ObjectId {
@@ -78,4 +78,41 @@ fn boxes_that_bounce_in_a_crowd_gain_no_energy_and_hardly_overlap() {
         println!("{rate} Hz: energy {start} to {before} J, overlap {overlap} m");
         assert!(overlap < deepest, "{rate} Hz: an overlap of {overlap} m");
     }
+}
+
+/// A heap of boxes that bounce comes to rest like one of boxes that do not: its contacts rattle no
+/// further, and no step takes more than a few passes of impacts.
+#[test]
+fn a_heap_of_boxes_that_bounce_comes_to_rest() {
+    let rate = 120.0;
+    let mut world = world("time_stepping", 1.0 / rate);
+    ground(&mut world, 0.2, 0.5);
+    for (x, y) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
+        let normal = Vec3::new(x, y, 0.0);
+        let turn = Quat::rotation_between(&Vec3::z(), &normal).unwrap();
+        let material = Material { restitution: 0.2, friction: 0.5, ..Material::default() };
+        let wall = RigidBody::fixed(Shape::half_space()).with_material(material);
+        world.add(wall.with_pose(Pose::from_parts((-0.45 * normal).into(), turn))).unwrap();
+    }
+    let size = |i: usize, k: usize| 0.08 + 0.12 * ((i * 37 + k * 53) % 101) as f64 / 100.0;
+    let place = |i: usize, k: usize| -0.3 + 0.3 * (i % 3) as f64 + 0.04 * ((i * 61 + k * 29) % 97) as f64 / 97.0;
+    let boxes: Vec<_> = (0..72)
+        .map(|i| {
+            let shape = Shape::cuboid(Vec3::new(size(i, 0), size(i, 1), size(i, 2))).unwrap();
+            add(&mut world, shape, 0.2, 0.5, [place(i, 0), place(i / 3, 1), 0.2 + 0.3 * (i / 9) as f64])
+        })
+        .collect();
+    let energy = |world: &World| world.energy().kinetic + world.energy().potential;
+    let (start, mut before, mut passes) = (energy(&world), energy(&world), 0);
+    for frame in 0..(5.0 * rate) as usize {
+        world.step().unwrap();
+        let now = energy(&world);
+        assert!(now < before + 1e-4 * start, "frame {frame}: from {before} to {now} J");
+        before = now;
+        passes += if frame as f64 >= 4.0 * rate { world.report().impact_passes } else { 0 };
+    }
+    let fast = boxes.iter().filter(|b| world.part_state(**b, 0).unwrap().velocity.norm() > 0.05).count();
+    println!("{fast} boxes move at the end, {passes} passes in the last second");
+    assert!(fast <= 3, "{fast} of 72 boxes move faster than 5 cm/s");
+    assert!(passes <= 120, "{passes} passes in the 120 frames of the last second");
 }

@@ -10,7 +10,9 @@
 //!
 //! Both factor matrices `1 + Σ Y·G·Yᵀ` with a 3×3 matrix `G` per contact (`lu.rs`), with one block
 //! row per object (`structure.rs`): linear cost in a chain or a tower, more where contacts form
-//! loops. Islands whose factorization costs more than [`MAX_WORK`] are left to the sweeps.
+//! loops. Islands whose factorization costs more than [`MAX_WORK`]
+//! or [`MAX_COST`] are left to the sweeps, and so are islands of more than [`SMALL`] degrees of freedom
+//! in motion.
 
 mod cone;
 mod interior_point;
@@ -24,20 +26,21 @@ use island::Island;
 use lu::Factor;
 use structure::Structure;
 
-/// Maximum number of multiplications of one factorization.
-const MAX_WORK: f64 = 5e7;
-/// Maximum cost of a factorization in sweeps: in heaps, where contacts form loops in all directions,
-/// sweeps are the better use of the time.
-const MAX_COST: f64 = 150.0;
+/// Maximum number of multiplications of one factorization, and if nothing slides: a wall at rest is
+/// solved once, and later steps start from its multipliers.
+const MAX_WORK: (f64, f64) = (5e7, 3e9);
+/// Maximum cost of a factorization in sweeps, and if nothing slides. In heaps, where contacts form
+/// loops in all directions, sweeps are the better use of the time.
+const MAX_COST: (f64, f64) = (150.0, 1000.0);
 /// A factorization of a lower cost, in sweeps, is cheap. Others must gain much.
 const CHEAP: f64 = 15.0;
 /// Islands of more blocks are solved directly only at rest.
 const MANY: usize = 500;
 /// A large island is at rest if fewer contacts than this share slide. A contact slides if its
 /// tangential speed is above this fraction of the fastest row.
-const SLIDING: (f64, f64) = (0.1, 0.002);
-/// Error, relative to the fastest row, below which multipliers are near.
-const NEAR: f64 = 1e-2;
+const SLIDING: (f64, f64) = (0.02, 0.002);
+/// Error, relative to the fastest row, below which multipliers are near: at rest, and in motion.
+const NEAR: (f64, f64) = (1e-2, 1e-5);
 /// Maximum number of factorizations from multipliers that are near, and of the last phase for a
 /// small and a large island.
 const FACTORS: (u32, u32, u32) = (8, 30, 8);
@@ -74,36 +77,48 @@ pub(super) struct Direct {
 }
 
 /// A direct solve of an island that is not too large for it.
-pub(super) struct Plan<'a>(System<'a>);
+pub(super) struct Plan<'a> {
+    system: System<'a>,
+    at_rest: bool,
+}
 
 impl<'a> Plan<'a> {
     /// Returns `None` if a factorization of the island is too expensive: for a solve that need not be
     /// exact (`coarse`), for a large island that is not at rest, or at all.
     pub fn new(rows: &'a Rows, blocks: &[u32], c: &[f64], coarse: bool) -> Option<Plan<'a>> {
-        let at_rest = sliding(rows, blocks, c) <= SLIDING.0;
+        let sliding = sliding(rows, blocks, c);
+        let at_rest = sliding <= SLIDING.0;
         if blocks.len() > MANY && (coarse || !at_rest) {
             return None;
         }
         let island = Island::new(rows, blocks, c);
-        let max_cost = if coarse || island.dof > SMALL && !at_rest { CHEAP } else { MAX_COST };
+        if island.dof > SMALL && !at_rest {
+            return None;
+        }
+        let (max_work, max_cost) = match sliding {
+            _ if coarse => (MAX_WORK.0, CHEAP),
+            0.0 => (MAX_WORK.1, MAX_COST.1),
+            _ => (MAX_WORK.0, MAX_COST.0),
+        };
         let dof: Vec<usize> = island.objects.iter().map(|o| o.dof).collect();
         let (assembly, sweep) = work_of_blocks(&island);
-        let structure = Structure::new(&dof, &island.couplings(), MAX_WORK.min(max_cost * sweep - assembly))?;
+        let structure = Structure::new(&dof, &island.couplings(), max_work.min(max_cost * sweep - assembly))?;
         let factor = Factor::new(&structure);
-        Some(Plan(System { island, structure, factor }))
+        Some(Plan { system: System { island, structure, factor }, at_rest })
     }
 
     /// Returns the cost of a factorization in sweeps.
     pub fn cost(&self) -> f64 {
-        let (assembly, sweep) = work_of_blocks(&self.0.island);
-        (self.0.structure.work + assembly) / sweep
+        let (assembly, sweep) = work_of_blocks(&self.system.island);
+        (self.system.structure.work + assembly) / sweep
     }
 
     /// Solves from the multipliers in `lambda`, which it replaces if it finds better ones.
     pub fn solve(mut self, lambda: &mut [f64], tolerance: f64) -> Direct {
-        let fastest = self.0.island.fastest;
-        let cheap = self.0.island.dof <= SMALL || self.cost() < CHEAP;
-        let system = &mut self.0;
+        let fastest = self.system.island.fastest;
+        let cheap = self.system.island.dof <= SMALL || self.cost() < CHEAP;
+        let near = if self.at_rest { NEAR.0 } else { NEAR.1 };
+        let system = &mut self.system;
         let small = system.island.dof <= SMALL;
         let (enough, last) = if small { (0.0, FACTORS.1) } else { (ENOUGH * fastest, FACTORS.2) };
         let tolerance = Tolerance {
@@ -112,8 +127,11 @@ impl<'a> Plan<'a> {
         };
         let mut own = system.island.read(lambda);
         let start = system.island.error_of(&own);
+        if start <= tolerance.solved && !cheap {
+            return Direct { factorizations: 0, converged: true };
+        }
         let (mut error, mut taken) = (start, 0);
-        if error > tolerance.goal && error.is_finite() && (cheap || error <= NEAR * fastest) {
+        if error > tolerance.goal && error.is_finite() && (self.at_rest && cheap || error <= near * fastest) {
             (error, taken) = proximal::solve(system, &mut own, error, tolerance, (FACTORS.0, cheap));
         }
         if error.is_nan() || error > tolerance.solved {
@@ -124,7 +142,7 @@ impl<'a> Plan<'a> {
                 (error, own) = (reached, interior);
             }
         }
-        if error > tolerance.goal && error.is_finite() && (cheap || error <= NEAR * fastest) {
+        if error > tolerance.goal && error.is_finite() && (cheap || error <= NEAR.0 * fastest) {
             let (reached, factors) = proximal::solve(system, &mut own, error, tolerance, (last, cheap));
             (error, taken) = (reached, taken + factors);
         }

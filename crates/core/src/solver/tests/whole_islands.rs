@@ -148,3 +148,24 @@ fn numbers_that_are_not_finite_are_reported() {
     let (blocks, mut lambda, mut du) = (all(&bodies.rows), vec![0.0; bodies.rows.len], vec![0.0; bodies.rows.dof]);
     assert!(!GaussSeidel.solve(&bodies.rows, &blocks, &c, &mut lambda, &mut du, SETTINGS).converged);
 }
+
+/// A solve that ends early, from multipliers that are far too large, adds no energy: `λᵀ(c + w)/2`.
+#[test]
+fn a_solve_that_is_not_finished_adds_no_energy() {
+    let bodies = pyramid(20);
+    let c = falling(&bodies, 0.3);
+    let blocks = all(&bodies.rows);
+    let mut random = Random(11);
+    for max_sweeps in [1, 2, 5, 20] {
+        let mut lambda: Vec<f64> = c.iter().map(|_| random.real(0.0, 1e4)).collect();
+        let mut du = vec![0.0; bodies.rows.dof];
+        let settings = SolverSettings { max_sweeps, ..SETTINGS };
+        let outcome = GaussSeidel.solve(&bodies.rows, &blocks, &c, &mut lambda, &mut du, settings);
+        let mut w = c.clone();
+        bodies.rows.add_velocity(&du, &mut w);
+        let energy: f64 = lambda.iter().zip(c.iter().zip(&w)).map(|(l, (c, w))| 0.5 * l * (c + w)).sum();
+        let scale: f64 = lambda.iter().zip(&c).map(|(l, c)| (l * c).abs()).sum();
+        println!("{max_sweeps} sweeps: {energy} J of {scale}, {outcome:?}");
+        assert!(!outcome.converged && energy <= 1e-9 * scale, "{max_sweeps} sweeps: {energy} J of {scale}");
+    }
+}

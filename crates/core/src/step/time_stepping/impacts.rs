@@ -1,0 +1,233 @@
+//! Impacts within a step of `time_stepping`: which contacts strike, when, and what follows.
+//!
+//! A group of touching bodies with an impact has a phase of reflections (`step/impact.rs`) at the
+//! time of its first impact. A group with more than [`CROWD`] contacts has none: in a heap every
+//! reflection strikes others, and passes would go on through the whole heap in every step. Its
+//! contacts are stopped by the solve of all contacts, like those that close later in the step, and
+//! rebound at its end, all at once and with no more energy than that solve took from them.
+//!
+//! A contact that carried a force in the last sub-step bounces only if it approaches faster than the
+//! forces of a step change the speed of either body along its normal: what is below is load that
+//! comes and goes, not an impact.
+
+use super::{Buffers, TimeStepping, in_the_middle};
+use crate::constraint::rows::Side;
+use crate::contact::detect::ContactConstraint;
+use crate::contact::pair::PredictionMode;
+use crate::contact::time_of_impact::time_to_close;
+use crate::integrators::context::free_motion;
+use crate::object::Level;
+use crate::step::Moment;
+use crate::step::contacts::{build_rows, detect, push, row_velocities, whiten, zero};
+use crate::step::impact::{self, Candidate};
+use crate::world::{Coordinates, Core, StepError};
+
+/// Maximum number of passes of the impact phase.
+const IMPACT_PASSES: u32 = 50;
+/// Groups of touching bodies with more contacts have no impact phase: their contacts rebound at the
+/// end of the step, all at once.
+const CROWD: usize = 100;
+
+impl TimeStepping {
+    /// Resolves the impacts within the step. `after` becomes the whitened velocity after them,
+    /// without forces. If there are any, rows and whitened velocities are computed again at the
+    /// places of the impacts.
+    pub(super) fn impacts(
+        &mut self,
+        core: &mut Core,
+        middle: &mut Moment,
+        h: f64,
+        u: &mut Vec<f64>,
+        du_force: &mut Vec<f64>,
+        after: &mut Vec<f64>,
+    ) -> Result<(), StepError> {
+        let work = &mut self.work;
+        after.clone_from(u);
+        self.impact_fraction.clear();
+        self.impact_fraction.resize(core.dof, -1.0);
+        zero(&mut self.impact, work.rows.len);
+        self.candidates.clear();
+        if work.contact_constraints.iter().all(|t| t.restitution <= 0.0) {
+            return Ok(());
+        }
+        let (before, gain, mut impact_fractions) = (&mut self.buffers.before, &mut self.buffers.gain, Vec::new());
+        row_velocities(&core.threads, &work.rows, &work.bias, u, before);
+        zero(gain, work.rows.len);
+        work.rows.add_velocity(du_force, gain);
+        for (constraint, block) in work.contact_constraints.iter().zip(&work.rows.blocks) {
+            let (v, dv, gap) = (before[block.row as usize], gain[block.row as usize], constraint.contact.gap);
+            let pressed = if core.state.warm.carries(&constraint.key) {
+                let side = |s: &Side| work.rows.side_velocity(s, 0, du_force).abs();
+                block.sides().iter().map(side).fold(0.0, f64::max)
+            } else {
+                -dv
+            };
+            let rest_speed = pressed.max(impact::SLOWEST_BOUNCE);
+            let impact_fraction = if constraint.restitution > 0.0 {
+                time_to_close(gap / h, v, dv).filter(|s| *s <= 1.0 && -(v + s * dv) > rest_speed)
+            } else {
+                None
+            };
+            impact_fractions.push(impact_fraction);
+            self.candidates.push(Candidate {
+                takes_part: gap <= core.settings.drift_tolerance,
+                rest_speed,
+                restitution: constraint.restitution,
+                crowd: false,
+            });
+        }
+        self.leave_crowds(&mut impact_fractions);
+        if impact_fractions.iter().all(Option::is_none) {
+            return Ok(());
+        }
+        self.first_impacts(&impact_fractions);
+        self.go_to_impacts(core, middle, h);
+        let work = &mut self.work;
+        build_rows(core, Some(&mut *middle), work, Level::Velocity { h }, 0.5 * h)?;
+        whiten(middle.coordinates(core), &work.dp, h, u, du_force);
+        let at_impact: Vec<f64> = (0..u.len()).map(|i| u[i] + self.impact_fraction[i].max(0.0) * du_force[i]).collect();
+        after.clone_from(&at_impact);
+        impact::resolve(core, work, &self.candidates, (IMPACT_PASSES, false), after, &mut self.impact);
+        (0..u.len()).for_each(|i| after[i] = u[i] + (after[i] - at_impact[i]));
+        Ok(())
+    }
+
+    /// Moves the objects that have an impact to where it happens.
+    fn go_to_impacts(&self, core: &Core, middle: &mut Moment, h: f64) {
+        let Coordinates { objects, x, caches, .. } = middle.coordinates(core);
+        for entry in objects.iter().filter(|e| !in_the_middle(e)) {
+            let impact_fraction = entry.state_range.v.clone().next().map_or(-1.0, |i| self.impact_fraction[i]);
+            if impact_fraction >= 0.0 {
+                let x = &mut x[entry.state_range.x.clone()];
+                x.copy_from_slice(&self.x0[entry.state_range.x.clone()]);
+                free_motion(&entry, &mut caches[entry.place], x, h * impact_fraction);
+            }
+        }
+        middle.refresh(core);
+    }
+
+    /// Adds the contacts that bodies may reach because of their impacts, and builds the rows again.
+    /// These contacts prevent overlap in this step and bounce in the next.
+    pub(super) fn look_again(
+        &mut self,
+        core: &mut Core,
+        middle: &mut Moment,
+        h: f64,
+        before: &[f64],
+        after: &[f64],
+    ) -> Result<(), StepError> {
+        if self.impact.iter().all(|i| *i == 0.0) {
+            return Ok(());
+        }
+        let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
+        let (mut struck, mut found) = (core.moment(), Vec::new());
+        push(struck.coordinates_by(core, &mut middle.derived.caches), &change, &mut Vec::new());
+        struck.refresh(core);
+        detect(core, Some(&struck), (h, PredictionMode::Each), &mut found);
+        core.moments.push(struck);
+        let work = &mut self.work;
+        let old: Vec<[u32; 4]> = work.contact_constraints.iter().map(|t| t.key.pair).collect();
+        found.retain(|t| old.binary_search(&t.key.pair).is_err());
+        if found.is_empty() {
+            return Ok(());
+        }
+        let mut filed: Vec<(ContactConstraint, Candidate, Vec<f64>)> = Vec::new();
+        for ((constraint, candidate), block) in
+            work.contact_constraints.drain(..).zip(&self.candidates).zip(&work.rows.blocks)
+        {
+            filed.push((constraint, *candidate, self.impact[block.range()].to_vec()));
+        }
+        let fresh = |t: &ContactConstraint| Candidate {
+            takes_part: false,
+            rest_speed: impact::SLOWEST_BOUNCE,
+            restitution: t.restitution,
+            crowd: false,
+        };
+        filed.extend(found.into_iter().map(|t| (t.clone(), fresh(&t), Vec::new())));
+        filed.sort_by_key(|(constraint, ..)| constraint.key.pair);
+        work.contact_constraints.extend(filed.iter().map(|(constraint, ..)| constraint.clone()));
+        self.candidates = filed.iter().map(|(_, candidate, _)| *candidate).collect();
+        build_rows(core, Some(&mut *middle), work, Level::Velocity { h }, 0.5 * h)?;
+        zero(&mut self.impact, work.rows.len);
+        for ((_, _, impulse), block) in filed.iter().zip(&work.rows.blocks).filter(|((.., i), _)| !i.is_empty()) {
+            self.impact[block.range()].copy_from_slice(impulse);
+        }
+        Ok(())
+    }
+
+    /// Leaves the impacts of large groups of touching bodies to the rebound at the end of the step.
+    fn leave_crowds(&mut self, impact_fractions: &mut [Option<f64>]) {
+        let work = &mut self.work;
+        let candidates = &mut self.candidates;
+        work.islands
+            .build(&work.rows, |b| b >= candidates.len() || candidates[b].takes_part || impact_fractions[b].is_some());
+        for blocks in work.islands.iter().filter(|blocks| blocks.len() > CROWD) {
+            let contacts = || blocks.iter().map(|&b| b as usize).filter(|b| *b < impact_fractions.len());
+            if contacts().any(|b| impact_fractions[b].is_some() && candidates[b].restitution > impact::ELASTIC) {
+                continue;
+            }
+            for b in contacts().collect::<Vec<_>>() {
+                (impact_fractions[b], candidates[b].crowd) = (None, true);
+            }
+        }
+    }
+
+    /// Selects the contacts that take part in the impacts: the first ones among bodies that impacts
+    /// of this step connect, and those that touch the same island. Later ones rebound at the end of
+    /// the step; islands without an impact take no part.
+    fn first_impacts(&mut self, impact_fractions: &[Option<f64>]) {
+        let work = &mut self.work;
+        work.islands.build(&work.rows, |b| impact_fractions.get(b).is_some_and(Option::is_some));
+        for blocks in work.islands.iter() {
+            let first = blocks.iter().filter_map(|&b| impact_fractions[b as usize]).fold(1.0, f64::min);
+            for side in blocks.iter().flat_map(|&b| work.rows.blocks[b as usize].sides()) {
+                self.impact_fraction[side.u as usize..(side.u + side.dof) as usize].fill(first);
+            }
+        }
+        let first = |i: usize| {
+            let sides = work.rows.blocks[i].sides();
+            impact_fractions[i]
+                .is_some_and(|s| sides.iter().all(|side| s <= self.impact_fraction[side.u as usize] + 1e-9))
+        };
+        let strikes: Vec<bool> = (0..impact_fractions.len()).map(first).collect();
+        for (candidate, strikes) in self.candidates.iter_mut().zip(&strikes) {
+            candidate.takes_part |= strikes;
+        }
+        let (candidates, contact_constraints) = (&mut self.candidates, work.contact_constraints.len());
+        work.islands.build(&work.rows, |b| b >= contact_constraints || candidates[b].takes_part);
+        for blocks in
+            work.islands.iter().filter(|blocks| !blocks.iter().any(|&b| strikes.get(b as usize) == Some(&true)))
+        {
+            blocks
+                .iter()
+                .map(|&b| b as usize)
+                .filter(|b| *b < contact_constraints)
+                .for_each(|b| candidates[b].takes_part = false);
+        }
+    }
+
+    /// Resolves the rebound of contacts that were not among the first of their bodies: the solve of
+    /// all contacts has stopped them at the surface. `late` becomes the change of whitened velocity
+    /// at the end of the step.
+    pub(super) fn rebound(&mut self, core: &mut Core, u: &[f64]) {
+        let (work, Buffers { before, gain, parts, late, .. }) = (&mut self.work, &mut self.buffers);
+        zero(late, core.dof);
+        if parts.iter().all(|part| part.rebound <= 0.0) {
+            return;
+        }
+        row_velocities(&core.threads, &work.rows, &work.bias, u, gain);
+        for (part, block) in parts.iter_mut().zip(&work.rows.blocks) {
+            part.member = part.rebound > 0.0 && work.lambda[block.row as usize] > 0.0;
+            part.rebound = if part.member { part.rebound } else { 0.0 };
+            let taken = |row: usize| -0.5 * work.lambda[row] * (before[row] + gain[row]);
+            part.energy = block.range().map(taken).sum::<f64>().max(0.0);
+        }
+        if parts.iter().any(|part| part.member) {
+            let forces = work.lambda.clone();
+            impact::rebound(core, work, parts, u);
+            late.copy_from_slice(&work.du);
+            self.impact.iter_mut().zip(&work.lambda).for_each(|(total, late)| *total += late);
+            work.lambda = forces;
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! Warm start of the contacts of a step from the forces of the last one.
+
+use super::Workspace;
+use crate::contact::detect::ContactConstraint;
+use crate::contact::wrench::Wrench;
+use crate::world::Core;
+use tumble_collide::Vec3;
+
+/// Sets multipliers to the forces of the last sub-step, in the present contact frames, times
+/// `scale`. Contacts that are gone leave their force and torque to those of their pair that touch.
+/// The solver projects the multipliers onto the cone.
+pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
+    let (mut place, mut first) = (0, 0);
+    let mut forces = Vec::new();
+    for contacts in work.contact_constraints.chunk_by(|a, b| a.key.pair == b.key.pair) {
+        let blocks = &work.rows.blocks[first..first + contacts.len()];
+        first += contacts.len();
+        let pose = &core.derived.part_states[contacts[0].a as usize].pose;
+        forces.clear();
+        forces.resize(contacts.len(), Vec3::zeros());
+        let mut gone = Wrench::default();
+        for warm in core.state.warm.of_pair(contacts[0].key.pair, &mut place) {
+            match contacts.iter().position(|t| t.key == warm.key) {
+                Some(i) => forces[i] = Vec3::from(warm.force),
+                None => gone.add(&pose.transform_point(&warm.point.into()).coords, &Vec3::from(warm.force)),
+            }
+        }
+        if gone.force != Vec3::zeros() {
+            let touches = |t: &ContactConstraint| t.contact.gap <= core.settings.drift_tolerance;
+            gone.spread(|i| contacts[i].contact.point, |i| touches(&contacts[i]), &mut forces);
+        }
+        for ((constraint, block), force) in contacts.iter().zip(blocks).zip(&forces) {
+            for (row, axis) in block.range().zip(&constraint.frame.axes) {
+                work.lambda[row] = scale * axis.dot(force);
+            }
+            work.lambda[block.row as usize] = work.lambda[block.row as usize].max(0.0);
+        }
+    }
+}
