@@ -50,24 +50,24 @@ macro_rules! table {
 }
 
 table! {
-    billiards_time_stepping: "billiards", TimeStepping, "c39b4ffc0ed54e69", "922602f0d4fa1d41";
+    billiards_time_stepping: "billiards", TimeStepping, "d7521db61a4044f1", "dde13f97df02c7af";
     billiards_backtracking: "billiards", Backtracking, "dde525a4d714d38e", "453edf585fcd7eb4";
-    bowling_time_stepping: "bowling", TimeStepping, "8d26c897f46dbc46", "b7bd7e472b6f34a3";
-    bowling_backtracking: "bowling", Backtracking, "846800afe7b1beb4", "d5e9743a0a44f826";
-    chain_time_stepping: "chain", TimeStepping, "55520b3ef294f056", "f31820fcfa7e4b07";
+    bowling_time_stepping: "bowling", TimeStepping, "ed36688f395747c2", "96c774922092da23";
+    bowling_backtracking: "bowling", Backtracking, "53db2850eca4d504", "3968829bfd6d9f63";
+    chain_time_stepping: "chain", TimeStepping, "a9d265bcd59cde4d", "c77dcc987d556a82";
     chain_backtracking: "chain", Backtracking, "cf938a3028a77cdf", "aec0064e0240df39";
-    falling_time_stepping: "falling", TimeStepping, "d91aaad2d9cc7e36", "45c8aeb77366c483";
-    falling_backtracking: "falling", Backtracking, "d7580d610d0c5242", "c4487c9f4240a8f1";
+    falling_time_stepping: "falling", TimeStepping, "d30b150920d659ba", "77731db98e3ce6e3";
+    falling_backtracking: "falling", Backtracking, "54717a0ec921de2b", "302e74142fd2c4bd";
     incline_time_stepping: "incline", TimeStepping, "c8d35ebc2e29a12a", "7b8c108360d8ae2c";
     incline_backtracking: "incline", Backtracking, "e55d9c0fdc513c1e", "a93b5ab540a60671";
     pendulum_time_stepping: "pendulum", TimeStepping, "d403df437fc48e8e", "07a9ea1905d7c967";
     pendulum_backtracking: "pendulum", Backtracking, "69fe4156518a0013", "692b5de118331942";
     piston_time_stepping: "piston", TimeStepping, "c8bdbe2dbb4d6e92", "d28c654b599622b8";
     piston_backtracking: "piston", Backtracking, "e4bc1f04bccfbd8a", "0b86e6820d08239f";
-    robot_time_stepping: "robot", TimeStepping, "d2ff6677a2f25e68", "8740593f67339732";
-    robot_backtracking: "robot", Backtracking, "d9bdae46cf681082", "213eb1421cf20b59";
-    skeleton_time_stepping: "skeleton", TimeStepping, "95653dbd8afb16f0", "86fd8489f790314a";
-    skeleton_backtracking: "skeleton", Backtracking, "0e2f5c508d2186ba", "97865d8d0fa4d876";
+    robot_time_stepping: "robot", TimeStepping, "d2ff6677a2f25e68", "d7993967865d7389";
+    robot_backtracking: "robot", Backtracking, "d9bdae46cf681082", "e3f2d884e335d1a2";
+    skeleton_time_stepping: "skeleton", TimeStepping, "4601701823a7deff", "00287ccc74d46029";
+    skeleton_backtracking: "skeleton", Backtracking, "baf4468ab9526f27", "897dd5b4b2713228";
     stack_time_stepping: "stack", TimeStepping, "20ad0965d34e48bf", "ecd253fcdb6efb2e";
     stack_backtracking: "stack", Backtracking, "f3e4e18dc66cf3d0", "e2c70bafe5205c09";
 }
