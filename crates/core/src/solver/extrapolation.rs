@@ -71,6 +71,12 @@ impl Extrapolation {
         self.extrapolate(true, du);
     }
 
+    /// Returns the square of `du` on all ranges of the island.
+    pub fn square(&self, du: &[f64]) -> f64 {
+        let ranges = self.stretches.iter().map(|&(start, end)| &du[start as usize..end as usize]);
+        ranges.flatten().map(|u| u * u).sum()
+    }
+
     /// Sets `du` to zero on all ranges of the island.
     pub fn clear(&self, du: &mut [f64]) {
         self.stretches.iter().for_each(|&(start, end)| du[start as usize..end as usize].fill(0.0));

@@ -48,6 +48,8 @@ const FACTORIZATIONS: f64 = 3.0;
 /// ones the direct solution gains more digits for little.
 const LARGE: usize = 500;
 const SOLVED: f64 = 10.0;
+/// The residual is computed if the last sweep changed nothing by more than this many tolerances.
+const NEARLY_SOLVED: f64 = 100.0;
 
 /// The block Gauss–Seidel solver, `gauss_seidel`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -92,7 +94,9 @@ impl RowSolver for GaussSeidel {
             relaxation.record(sweep, progress.change);
             if sweep == FIRST_SWEEPS.min(sweeps) {
                 write_back(&locals, lambda);
-                if locals.len() > LARGE && residual(rows, blocks, c, lambda, du) <= SOLVED * settings.tolerance {
+                let near = progress.change <= NEARLY_SOLVED * settings.tolerance;
+                if locals.len() > LARGE && near && residual(rows, blocks, c, lambda, du) <= SOLVED * settings.tolerance
+                {
                     outcome = SolveReport { iterations: sweep, converged: true, ray: false };
                     break;
                 }
@@ -118,7 +122,7 @@ impl RowSolver for GaussSeidel {
             }
         }
         if !outcome.converged && !direct && linkages.is_empty() {
-            let share = optimal_scale(&locals, rows, du);
+            let share = optimal_scale(&locals, extrapolation.square(du));
             if share < 1.0 {
                 locals.iter_mut().for_each(|local| local.lambda = local.lambda.map(|x| share * x));
                 extrapolation.clear(du);
@@ -142,14 +146,13 @@ impl RowSolver for GaussSeidel {
 /// Returns the factor of the multipliers at which `½λᵀ(K + R)λ + cᵀλ` is least. A solution has `λᵀw ≤
 /// 0` and so a factor of at least 1. A smaller factor means that the iterate overshoots and may add
 /// energy; multipliers that are scaled by it add none.
-fn optimal_scale(locals: &[Local], rows: &Rows, du: &[f64]) -> f64 {
-    let (mut slope, mut curve) = (0.0, 0.0);
+///
+/// `square` is `λᵀKλ`, the square of `Yλ`.
+fn optimal_scale(locals: &[Local], square: f64) -> f64 {
+    let (mut slope, mut curve) = (0.0, square);
     for local in locals {
-        for k in 0..local.block.set.rows() {
-            let own = if k == 0 { local.block.compliance * local.lambda[0] } else { 0.0 };
-            slope -= local.lambda[k] * local.c[k];
-            curve += local.lambda[k] * (rows.row_velocity(local.block, k, du) + own);
-        }
+        slope -= local.lambda.iter().zip(&local.c).map(|(l, c)| l * c).sum::<f64>();
+        curve += local.block.compliance * local.lambda[0] * local.lambda[0];
     }
     if curve > 0.0 { (slope / curve).max(0.0) } else { 1.0 }
 }

@@ -36,6 +36,8 @@ const MAX_COST: (f64, f64) = (150.0, 1000.0);
 const CHEAP: f64 = 15.0;
 /// Islands of more blocks are solved directly only at rest.
 const MANY: usize = 500;
+/// A small island has no more blocks, as a rule.
+const MANY_OF_SMALL: usize = 250;
 /// A large island is at rest if fewer contacts than this share slide. A contact slides if its
 /// tangential speed is above this fraction of the fastest row.
 const SLIDING: (f64, f64) = (0.02, 0.002);
@@ -88,7 +90,7 @@ impl<'a> Plan<'a> {
     pub fn new(rows: &'a Rows, blocks: &[u32], c: &[f64], coarse: bool) -> Option<Plan<'a>> {
         let sliding = sliding(rows, blocks, c);
         let at_rest = sliding <= SLIDING.0;
-        if blocks.len() > MANY && (coarse || !at_rest) {
+        if blocks.len() > MANY && (coarse || !at_rest) || !at_rest && blocks.len() > MANY_OF_SMALL {
             return None;
         }
         let island = Island::new(rows, blocks, c);
