@@ -10,9 +10,8 @@
 //!
 //! Both factor matrices `1 + Σ Y·G·Yᵀ` with a 3×3 matrix `G` per contact (`lu.rs`), with one block
 //! row per object (`structure.rs`): linear cost in a chain or a tower, more where contacts form
-//! loops. Islands whose factorization costs more than [`MAX_WORK`]
-//! or [`MAX_COST`] are left to the sweeps, and so are islands of more than [`SMALL`] degrees of freedom
-//! in motion.
+//! loops. Islands whose factorization costs more than [`MAX_WORK`] or [`MAX_COST`] are left to the
+//! sweeps, and so are islands of more than [`SMALL`] degrees of freedom in motion.
 
 mod cone;
 mod interior_point;
@@ -34,10 +33,9 @@ const MAX_WORK: (f64, f64) = (5e7, 3e9);
 const MAX_COST: (f64, f64) = (150.0, 1000.0);
 /// A factorization of a lower cost, in sweeps, is cheap. Others must gain much.
 const CHEAP: f64 = 15.0;
-/// Islands of more blocks are solved directly only at rest.
-const MANY: usize = 500;
-/// A small island has no more blocks, as a rule.
-const MANY_OF_SMALL: usize = 250;
+/// Maximum number of blocks of a solve that need not be exact, and of an island in motion: more belong
+/// to more than [`SMALL`] degrees of freedom, as a rule.
+const MANY: (usize, usize) = (500, 250);
 /// A large island is at rest if fewer contacts than this share slide. A contact slides if its
 /// tangential speed is above this fraction of the fastest row.
 const SLIDING: (f64, f64) = (0.02, 0.002);
@@ -90,7 +88,7 @@ impl<'a> Plan<'a> {
     pub fn new(rows: &'a Rows, blocks: &[u32], c: &[f64], coarse: bool) -> Option<Plan<'a>> {
         let sliding = sliding(rows, blocks, c);
         let at_rest = sliding <= SLIDING.0;
-        if blocks.len() > MANY && (coarse || !at_rest) || !at_rest && blocks.len() > MANY_OF_SMALL {
+        if coarse && blocks.len() > MANY.0 || !at_rest && blocks.len() > MANY.1 {
             return None;
         }
         let island = Island::new(rows, blocks, c);

@@ -76,7 +76,9 @@ impl TimeStepping {
                 crowd: false,
             });
         }
-        self.leave_crowds(&mut impact_fractions);
+        if impact_fractions.iter().any(Option::is_some) {
+            self.leave_crowds(&mut impact_fractions);
+        }
         if impact_fractions.iter().all(Option::is_none) {
             return Ok(());
         }
