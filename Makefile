@@ -11,7 +11,7 @@ help:
 	@echo "make goldens    draws the kept pictures of crates/render/tests/goldens anew; look at them before committing"
 	@echo "make references installs Pinocchio, MuJoCo and real robots into target/python; tests that compare with them then run"
 	@echo "make lint       format, clippy, rustdoc, ruff and mypy; warnings are errors"
-	@echo "make bench      step times beside Rapier, and articulated bodies; two minutes (benches/peers, a workspace of its own: it has more)"
+	@echo "make bench      step times beside Rapier, and articulated bodies; five minutes (benches/peers, a workspace of its own: it has more)"
 	@echo "make clean      remove everything built"
 
 demo:

@@ -67,9 +67,9 @@ fn main() {
     }
     println!("CPU s per simulated s, median of {} runs; errors in mm; tumble (Rapier f64, f32).", options.runs);
     println!(
-        "| case | tumble | Rapier f64 | f32 | ratio f64 | f32 | overlap | at the end | movement | speed at end, m/s | unconverged | residual, m/s |"
+        "| case | tumble | Rapier f64 | f32 | ratio f64 | f32 | overlap | at the end | movement | joint gap | speed at end, m/s | unconverged | residual, m/s |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for scene in scenes.iter().filter(chosen) {
         println!("{}", line(scene, &options));
     }
@@ -90,16 +90,17 @@ fn line(scene: &Scene, options: &Options) -> String {
     let cpu = |i: usize| runs.get(i).map_or(f64::NAN, |run: &Run| run.cpu);
     let Solves { residual, unconverged } = runs[0].solves.expect("tumble reports its solves");
     format!(
-        "| {} | {:.4} | {:.4} | {:.4} | {:.2} | {:.2} | {} | {} | {} | {} | {unconverged} | {residual:.1e} |",
+        "| {} | {:.4} | {:.4} | {:.4} | {:.2} | {:.2} | {} | {} | {} | {} | {} | {unconverged} | {residual:.1e} |",
         scene.name,
         cpu(0),
         cpu(1),
         cpu(2),
         cpu(0) / cpu(1),
         cpu(0) / cpu(2),
-        cell(&runs, |run| mm(run.overlap)),
-        cell(&runs, |run| mm(run.overlap_at_end)),
+        if scene.joints.is_empty() { cell(&runs, |run| mm(run.overlap)) } else { "–".into() },
+        if scene.joints.is_empty() { cell(&runs, |run| mm(run.overlap_at_end)) } else { "–".into() },
         if scene.stands { cell(&runs, |run| mm(run.movement)) } else { "–".into() },
+        if scene.joints.is_empty() { "–".into() } else { cell(&runs, |run| mm(run.joint_gap)) },
         cell(&runs, |run| format!("{:.3}", run.speed)),
     )
 }

@@ -22,6 +22,13 @@ pub struct Motion {
     pub speed: f64,
 }
 
+impl Motion {
+    /// Returns a point of the body in the world for its place in the axes of the body, meters.
+    pub fn point(&self, local: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|i| self.center[i] + (0..3).map(|k| self.rotation[i][k] * local[k]).sum::<f64>())
+    }
+}
+
 /// The solves of a frame, as an engine reports them.
 #[derive(Clone, Copy, Debug)]
 pub struct Solves {

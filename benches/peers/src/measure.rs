@@ -2,7 +2,7 @@
 //! every engine.
 
 use crate::overlap::deepest;
-use crate::scene::Scene;
+use crate::scene::{Joint, Mode, Scene};
 use crate::{Engine, Motion, Solves};
 
 /// Samples of the errors per second.
@@ -19,6 +19,8 @@ pub struct Run {
     pub overlap_at_end: f64,
     /// Largest distance of a body from its place at the start of the scene, meters.
     pub movement: f64,
+    /// Largest distance of the two points of a joint, meters.
+    pub joint_gap: f64,
     /// Largest speed of a body at the end, m/s.
     pub speed: f64,
     /// Largest residual and number of unconverged solves, if the engine reports them.
@@ -55,10 +57,18 @@ impl Run {
     fn sample(&mut self, scene: &Scene, motions: &[Motion]) {
         self.overlap_at_end = deepest(scene, motions);
         self.overlap = self.overlap.max(self.overlap_at_end);
-        let moved = scene.bodies.iter().zip(motions).map(|(body, motion)| distance(&body.center, &motion.center));
+        let bodies = scene.bodies.iter().zip(motions).filter(|(body, _)| body.mode == Mode::Dynamic);
+        let moved = bodies.clone().map(|(body, motion)| distance(&body.center, &motion.center));
         self.movement = moved.fold(self.movement, f64::max);
-        self.speed = motions.iter().map(|motion| motion.speed).fold(0.0, f64::max);
+        self.speed = bodies.map(|(_, motion)| motion.speed).fold(0.0, f64::max);
+        let gaps = scene.joints.iter().map(|joint| gap(joint, motions));
+        self.joint_gap = gaps.fold(self.joint_gap, f64::max);
     }
+}
+
+fn gap(joint: &Joint, motions: &[Motion]) -> f64 {
+    let [a, b] = [0, 1].map(|side| motions[joint.bodies[side]].point(joint.anchors[side]));
+    distance(&a, &b)
 }
 
 fn distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {

@@ -1,8 +1,10 @@
-//! A scene: bodies at rest and the planes around them.
+//! A scene: bodies, the planes around them and the joints between them.
 
-/// Density of every body, kg/m³.
+use tumble_collide::TriMesh;
+
+/// Density of every body without another one, kg/m³.
 pub const DENSITY: f64 = 1000.0;
-/// Friction of every body and plane.
+/// Friction of every body and plane of scenes without another one.
 pub const FRICTION: f64 = 0.5;
 
 /// The shape of a body.
@@ -12,15 +14,59 @@ pub enum Shape {
     Sphere(f64),
     /// A box with these edges, meters.
     Box([f64; 3]),
+    /// A convex polyhedron: index into [`Scene::hulls`].
+    Hull(usize),
 }
 
-/// A body that is parallel to the axes at the start.
+/// How a body moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mode {
+    /// By forces.
+    Dynamic,
+    /// Not at all.
+    Fixed,
+    /// About the y axis of the world at this angular velocity, rad/s.
+    Turning(f64),
+}
+
+/// A body.
 #[derive(Clone, Copy, Debug)]
 pub struct Body {
     /// The shape.
     pub shape: Shape,
-    /// Center at the start, meters.
+    /// Center of mass at the start, meters.
     pub center: [f64; 3],
+    /// Angle about the y axis at the start, rad.
+    pub turn: f64,
+    /// Density, kg/m³.
+    pub density: f64,
+    /// How it moves.
+    pub mode: Mode,
+}
+
+impl Body {
+    /// Returns a dynamic body that is parallel to the axes, with the common density.
+    pub fn new(shape: Shape, center: [f64; 3]) -> Body {
+        Body { shape, center, turn: 0.0, density: DENSITY, mode: Mode::Dynamic }
+    }
+
+    /// Returns the center and the angle about the y axis at a time (s) of a body that no force
+    /// moves.
+    pub fn place(&self, time: f64) -> ([f64; 3], f64) {
+        let Mode::Turning(rate) = self.mode else { return (self.center, self.turn) };
+        let (s, c) = (rate * time).sin_cos();
+        let [x, y, z] = self.center;
+        ([c * x + s * z, y, c * z - s * x], self.turn + rate * time)
+    }
+}
+
+/// A spherical joint of two bodies.
+#[derive(Clone, Copy, Debug)]
+pub struct Joint {
+    /// The bodies.
+    pub bodies: [usize; 2],
+    /// The joined point in the axes of each body from its center, meters.
+    pub anchors: [[f64; 3]; 2],
 }
 
 /// A half-space: everything with `(p − point)·normal ≤ 0` is solid.
@@ -39,8 +85,14 @@ pub struct Scene {
     pub name: String,
     /// The bodies.
     pub bodies: Vec<Body>,
+    /// Convex polyhedra about their centers of mass, meters.
+    pub hulls: Vec<TriMesh>,
+    /// Joints of the bodies. Bodies of a scene with joints do not collide with each other.
+    pub joints: Vec<Joint>,
     /// The planes.
     pub planes: Vec<Plane>,
+    /// Friction of every body and plane.
+    pub friction: f64,
     /// Restitution of every body and plane.
     pub restitution: f64,
     /// Frames per second, a multiple of 60.

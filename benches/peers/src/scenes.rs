@@ -1,7 +1,11 @@
 //! The scenes of the benchmark `piles`.
 
+mod mechanisms;
+mod published;
+mod standing;
+
 use crate::random::Random;
-use crate::scene::{Body, Plane, Scene, Shape};
+use crate::scene::{Body, FRICTION, Plane, Scene, Shape};
 
 /// Radius of every sphere, meters.
 pub const RADIUS: f64 = 0.1;
@@ -28,6 +32,9 @@ pub fn all() -> Vec<Scene> {
     for (e, rate) in [(0.0, 60), (0.0, 240), (0.2, 60), (0.2, 240)] {
         scenes.push(large(boxes(1000, e, rate)));
     }
+    scenes.extend(published::all());
+    scenes.extend(mechanisms::all());
+    scenes.extend(standing::all());
     scenes
 }
 
@@ -39,7 +46,10 @@ fn scene(name: String, bodies: Vec<Body>) -> Scene {
     Scene {
         name,
         bodies,
+        hulls: Vec::new(),
+        joints: Vec::new(),
         planes: vec![FLOOR],
+        friction: FRICTION,
         restitution: 0.0,
         rate: 60,
         measured: [1.0, 4.0],
@@ -58,7 +68,7 @@ fn spheres(n: usize) -> Scene {
     let body = |i: usize| {
         let (x, y, z) = (i % side, i / side % side, i / (side * side));
         let center = [place(x) + random.within(0.015), place(y) + random.within(0.015), 0.12 + 0.24 * z as f64];
-        Body { shape: Shape::Sphere(RADIUS), center }
+        Body::new(Shape::Sphere(RADIUS), center)
     };
     let bodies = (0..n).map(body).collect();
     Scene { planes: walled(half), stands: false, ..scene(format!("spheres-{n}"), bodies) }
@@ -82,7 +92,7 @@ fn tower(floors: usize) -> Scene {
 }
 
 fn cube(center: [f64; 3]) -> Body {
-    Body { shape: Shape::Box([EDGE; 3]), center }
+    Body::new(Shape::Box([EDGE; 3]), center)
 }
 
 /// Returns 16 towers, 1 m apart, of 12 boxes of random size.
@@ -93,7 +103,7 @@ fn random_towers() -> Scene {
         let mut top = 0.0;
         for _ in 0..12 {
             let size = random_size(&mut random);
-            bodies.push(Body { shape: Shape::Box(size), center: [tower as f64, 0.0, top + 0.5 * size[2]] });
+            bodies.push(Body::new(Shape::Box(size), [tower as f64, 0.0, top + 0.5 * size[2]]));
             top += size[2];
         }
     }
@@ -110,7 +120,7 @@ fn boxes(n: usize, restitution: f64, rate: usize) -> Scene {
     let body = |i: usize| {
         let size = random_size(&mut random);
         let (x, y) = (place(i % side) + random.within(0.04), place(i / side % side) + random.within(0.04));
-        Body { shape: Shape::Box(size), center: [x, y, 0.2 + LOOSE * (i / (side * side)) as f64] }
+        Body::new(Shape::Box(size), [x, y, 0.2 + LOOSE * (i / (side * side)) as f64])
     };
     let bodies = (0..n).map(body).collect();
     let name = format!("boxes-{n}-e{restitution}-{rate}hz");

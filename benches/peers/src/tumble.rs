@@ -1,14 +1,18 @@
 //! A scene in tumble: `time_stepping`, `gauss_seidel`, default settings.
 
-use crate::scene::{self, DENSITY, FRICTION, Plane, Scene};
+use crate::scene::{self, Body, Joint, Mode, Plane, Scene};
 use crate::{Engine, Motion, Solves};
-use tumble_collide::{Pose, Quat, Shape, Vec3};
-use tumble_core::{Material, ObjectId, RigidBody, Settings, World};
+use tumble_collide::{Pose, Quat, Shape, TreeSettings, TriMesh, Vec3};
+use tumble_core::{
+    Anchor, LoopJoint, LoopJointKind, Material, Mode as WorldMode, ObjectId, RigidBody, Settings, World,
+};
 
 /// A tumble world with a scene in it.
 pub struct Tumble {
     world: World,
     ids: Vec<ObjectId>,
+    /// Kinematic bodies.
+    turning: Vec<(ObjectId, Body)>,
 }
 
 impl Tumble {
@@ -19,26 +23,47 @@ impl Tumble {
 
     /// Builds the scene, to be stepped on a number of threads.
     pub fn on(scene: &Scene, threads: u32) -> Tumble {
-        let mut world = World::new(Settings::default().with_dt(scene.dt()).with_threads(threads)).expect("the default settings are valid");
-        let material = Material { restitution: scene.restitution, friction: FRICTION, ..Material::default() };
+        let mut world = World::new(Settings::default().with_dt(scene.dt()).with_threads(threads))
+            .expect("the default settings are valid");
+        let material = Material { restitution: scene.restitution, friction: scene.friction, ..Material::default() };
         for (i, plane) in scene.planes.iter().enumerate() {
             let fixed = RigidBody::fixed(Shape::half_space()).with_name(format!("plane{i}"));
             let fixed = fixed.with_material(material).with_pose(pose(plane));
             world.add_static(fixed).expect("a fixed body is valid");
         }
-        let mut add = |(i, body): (usize, &scene::Body)| {
-            let [x, y, z] = body.center;
-            let body = RigidBody::new(shape(body.shape)).with_name(format!("body{i}")).with_density(DENSITY);
-            let body = body.with_material(material).with_pose(Pose::translation(x, y, z));
-            world.add(body).expect("names are unique")
+        let hulls: Vec<Shape> = scene.hulls.iter().map(hull).collect();
+        let mut turning = Vec::new();
+        let mut add = |(i, body): (usize, &Body)| {
+            let (shape, name) = (shape(body.shape, &hulls), format!("body{i}"));
+            let (object, mode) = match body.mode {
+                Mode::Dynamic => (RigidBody::new(shape).with_density(body.density), WorldMode::Dynamic),
+                Mode::Fixed => (RigidBody::fixed(shape), WorldMode::Static),
+                Mode::Turning(_) => (RigidBody::fixed(shape), WorldMode::Kinematic),
+            };
+            let object = object.with_name(name).with_material(material).with_pose(placed(body, 0.0));
+            let id = world.add_boxed(Box::new(object), mode).expect("names are unique");
+            if mode == WorldMode::Kinematic {
+                turning.push((id, *body));
+            }
+            if !scene.joints.is_empty() {
+                world.set_collidable(id, false).expect("the body is there");
+            }
+            id
         };
-        let ids = scene.bodies.iter().enumerate().map(&mut add).collect();
-        Tumble { world, ids }
+        let ids: Vec<ObjectId> = scene.bodies.iter().enumerate().map(&mut add).collect();
+        for (i, joint) in scene.joints.iter().enumerate() {
+            world.add(spherical(i, joint, &ids)).expect("names are unique");
+        }
+        Tumble { world, ids, turning }
     }
 }
 
 impl Engine for Tumble {
     fn step(&mut self) {
+        let next = self.world.time() + self.world.settings().dt;
+        for (id, body) in &self.turning {
+            self.world.move_to(*id, placed(body, next)).expect("the body is there");
+        }
         self.world.step().expect("all numbers are finite");
     }
 
@@ -58,12 +83,32 @@ impl Engine for Tumble {
     }
 }
 
-fn shape(shape: scene::Shape) -> Shape {
+fn shape(shape: scene::Shape, hulls: &[Shape]) -> Shape {
     match shape {
-        scene::Shape::Sphere(radius) => Shape::sphere(radius),
-        scene::Shape::Box(size) => Shape::cuboid(size.into()),
+        scene::Shape::Sphere(radius) => Shape::sphere(radius).expect("the radius is valid"),
+        scene::Shape::Box(size) => Shape::cuboid(size.into()).expect("the sizes are valid"),
+        scene::Shape::Hull(i) => hulls[i].clone(),
     }
-    .expect("the sizes are valid")
+}
+
+/// Returns a closed mesh. Its sphere tree is coarse, since contacts of surfaces make no use of it.
+fn hull(mesh: &TriMesh) -> Shape {
+    let coarse = TreeSettings { depth: 2, error: 0.1, ..TreeSettings::octree() };
+    Shape::mesh(mesh.clone(), &coarse).expect("a hull is closed")
+}
+
+fn spherical(i: usize, joint: &Joint, ids: &[ObjectId]) -> LoopJoint {
+    let side = |k: usize| {
+        let [x, y, z] = joint.anchors[k];
+        Anchor::on(ids[joint.bodies[k]], 0, Pose::translation(x, y, z))
+    };
+    LoopJoint::new(format!("joint{i}"), LoopJointKind::Spherical, side(0), side(1)).expect("two finite frames")
+}
+
+/// Returns the pose of a body that no force has moved, at a time.
+fn placed(body: &Body, time: f64) -> Pose {
+    let (center, turn) = body.place(time);
+    Pose::from_parts(Vec3::from(center).into(), Quat::from_axis_angle(&Vec3::y_axis(), turn))
 }
 
 /// The pose whose local z axis is the plane's normal.
