@@ -7,6 +7,7 @@ pub mod measure;
 pub mod overlap;
 mod random;
 pub mod rapier;
+pub mod residuals;
 pub mod scene;
 pub mod scenes;
 pub mod tumble;

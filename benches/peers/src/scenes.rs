@@ -86,7 +86,7 @@ fn pyramid(rows: usize) -> Scene {
 }
 
 /// Returns one tower of cubes.
-fn tower(floors: usize) -> Scene {
+pub fn tower(floors: usize) -> Scene {
     let bodies = (0..floors).map(|i| cube([0.0, 0.0, EDGE * (i as f64 + 0.5)])).collect();
     Scene { measured: [0.0, 10.0], ..scene(format!("tower-{floors}"), bodies) }
 }

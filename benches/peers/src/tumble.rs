@@ -3,6 +3,7 @@
 use crate::scene::{self, Body, Joint, Mode, Plane, Scene};
 use crate::{Engine, Motion, Solves};
 use tumble_collide::{Pose, Quat, Shape, TreeSettings, TriMesh, Vec3};
+use tumble_core::solver::RowSolver;
 use tumble_core::{
     Anchor, LoopJoint, LoopJointKind, Material, Mode as WorldMode, ObjectId, RigidBody, Settings, World,
 };
@@ -55,6 +56,11 @@ impl Tumble {
             world.add(spherical(i, joint, &ids)).expect("names are unique");
         }
         Tumble { world, ids, turning }
+    }
+
+    /// Replaces the solver.
+    pub fn set_solver(&mut self, solver: Box<dyn RowSolver>) {
+        self.world.set_solver(solver);
     }
 }
 
