@@ -117,9 +117,9 @@ fn compare_threads(scene: &Scene, threads: u32, runs: usize) {
     println!("{}: {one:.4} s on 1 thread, {many:.4} s on {threads}: {:.2} times", scene.name, one / many);
 }
 
-/// Returns a length in millimeters.
+/// Returns a length in millimeters, with a power of ten from 1000 km on.
 fn mm(meters: f64) -> String {
-    format!("{:.3}", 1e3 * meters)
+    if meters < 1e6 { format!("{:.3}", 1e3 * meters) } else { format!("{:.1e}", 1e3 * meters) }
 }
 
 /// Returns the figure of tumble, and those of its peers in brackets.

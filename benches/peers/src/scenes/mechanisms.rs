@@ -4,22 +4,23 @@ use super::scene;
 use crate::scene::{Body, Joint, Mode, Scene, Shape};
 
 pub(super) fn all() -> Vec<Scene> {
-    let swing = rope(20, false);
-    let slow = Scene { name: format!("{}-960hz", swing.name), rate: 960, ..swing.clone() };
-    vec![rope(20, true), swing, slow, cubes(1e3), cubes(1e6)]
+    let faster = |rate: usize, scene: &Scene| Scene { name: format!("{}-{rate}hz", scene.name), rate, ..scene.clone() };
+    let (heavy, light) = (rope(20, false, 72.0), rope(20, false, 0.4));
+    let ropes = vec![rope(20, true, 72.0), heavy.clone(), faster(960, &heavy), light.clone(), faster(240, &light)];
+    ropes.into_iter().chain([cubes(1e3), cubes(1e6)]).collect()
 }
 
-/// Returns a rope of links of 0.1 m and 40 g with a cube of 72 kg at its end: it hangs at rest, or
+/// Returns a rope of links of 0.1 m and 40 g with a cube of `mass` kg at its end: it hangs at rest, or
 /// it is held level and falls.
-fn rope(links: usize, hangs: bool) -> Scene {
-    let (length, width, load) = (0.1, 0.02, 0.2);
+fn rope(links: usize, hangs: bool, mass: f64) -> Scene {
+    let (length, width, load): (f64, f64, f64) = (0.1, 0.02, 0.2);
     let along = |t: f64| if hangs { [0.0, 0.0, -t] } else { [t, 0.0, 0.0] };
     let size = if hangs { [width, width, length] } else { [length, width, width] };
     let support = Body { mode: Mode::Fixed, ..Body::new(Shape::Box([width; 3]), [0.0; 3]) };
     let link = |i: usize| Body::new(Shape::Box(size), along(length * (i as f64 + 0.5)));
     let mut bodies: Vec<Body> = [support].into_iter().chain((0..links).map(link)).collect();
     let end = length * links as f64;
-    bodies.push(Body { density: 9000.0, ..Body::new(Shape::Box([load; 3]), along(end + 0.5 * load)) });
+    bodies.push(Body { density: mass / load.powi(3), ..Body::new(Shape::Box([load; 3]), along(end + 0.5 * load)) });
     let half = |i: usize| match i {
         0 => 0.0,
         i if i <= links => 0.5 * length,
@@ -27,7 +28,10 @@ fn rope(links: usize, hangs: bool) -> Scene {
     };
     let joint = |i: usize| Joint { bodies: [i, i + 1], anchors: [along(half(i)), along(-half(i + 1))] };
     let joints = (0..=links).map(joint).collect();
-    let name = format!("rope-{links}{}", if hangs { "" } else { "-swing" });
+    let name = match hangs {
+        true => format!("rope-{links}"),
+        false => format!("rope-{links}-swing-{mass}kg"),
+    };
     Scene { joints, planes: Vec::new(), measured: [0.0, 10.0], stands: hangs, ..scene(name, bodies) }
 }
 
