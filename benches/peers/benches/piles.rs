@@ -5,6 +5,7 @@
 //! cargo bench --bench piles -- pyramid-55 --runs 9       one scene
 //! cargo bench --bench piles -- --large --runs 1          all scenes
 //! cargo bench --bench piles -- spheres-1000 --tumble     tumble only, for a profiler
+//! cargo bench --bench piles -- cards-5 --sweeps 100000   tumble with this limit of sweeps
 //! cargo bench --bench piles -- spheres-1000 --threads 2  tumble on one and two threads, time of the day, best of the runs
 //! ```
 
@@ -16,7 +17,7 @@ use tumble_peers::tumble::Tumble;
 use tumble_peers::{Engine, Solves, scenes};
 
 /// Builds a scene in an engine.
-type Load = fn(&Scene) -> Box<dyn Engine>;
+type Load = Box<dyn Fn(&Scene) -> Box<dyn Engine>>;
 
 /// Options of the command line.
 struct Options {
@@ -24,12 +25,14 @@ struct Options {
     runs: usize,
     large: bool,
     alone: bool,
+    /// Replaces tumble's limit of sweeps.
+    sweeps: Option<u32>,
     /// Compares this number of threads with one.
     threads: Option<u32>,
 }
 
 fn options() -> Options {
-    let mut options = Options { names: Vec::new(), runs: 3, large: false, alone: false, threads: None };
+    let mut options = Options { names: Vec::new(), runs: 3, large: false, alone: false, sweeps: None, threads: None };
     let mut arguments = std::env::args().skip(1).filter(|a| a != "--bench");
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
@@ -42,6 +45,10 @@ fn options() -> Options {
             }
             "--large" => options.large = true,
             "--tumble" => options.alone = true,
+            "--sweeps" => {
+                let sweeps = arguments.next().and_then(|n| n.parse().ok());
+                options.sweeps = Some(sweeps.expect("--sweeps wants a number"));
+            }
             "--threads" => {
                 let threads = arguments.next().and_then(|n| n.parse().ok());
                 options.threads = Some(threads.expect("--threads wants a number"));
@@ -77,8 +84,14 @@ fn main() {
 
 /// Returns one row of the table. The engines alternate, so all see the same load of the machine.
 fn line(scene: &Scene, options: &Options) -> String {
+    let sweeps = options.sweeps;
+    let ours = move |s: &Scene| -> Box<dyn Engine> {
+        let mut tumble = Tumble::new(s);
+        sweeps.into_iter().for_each(|sweeps| tumble.set_max_sweeps(sweeps));
+        Box::new(tumble)
+    };
     let engines: [Load; 3] =
-        [|s| Box::new(Tumble::new(s)), |s| Box::new(Rapier64::new(s)), |s| Box::new(Rapier32::new(s))];
+        [Box::new(ours), Box::new(|s| Box::new(Rapier64::new(s))), Box::new(|s| Box::new(Rapier32::new(s)))];
     let engines = if options.alone { &engines[..1] } else { &engines };
     let mut runs = vec![Vec::new(); engines.len()];
     for _ in 0..options.runs {

@@ -58,6 +58,14 @@ impl Tumble {
         Tumble { world, ids, turning }
     }
 
+    /// Replaces the limit of sweeps, and lifts that of relaxations.
+    pub fn set_max_sweeps(&mut self, sweeps: u32) {
+        let mut settings = *self.world.settings();
+        settings.solver_settings.max_sweeps = sweeps;
+        settings.solver_settings.max_relaxations = u32::MAX;
+        self.world.set_settings(settings).expect("at least one sweep");
+    }
+
     /// Replaces the solver.
     pub fn set_solver(&mut self, solver: Box<dyn RowSolver>) {
         self.world.set_solver(solver);
