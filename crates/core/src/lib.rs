@@ -60,7 +60,7 @@ pub use object::{
     Appearance, CameraCarrier, Collidable, Combine, Constraint, Energy, ForceGenerator, Fork, Integratable, Level,
     LightCarrier, Material, Momentum, MomentumKind, NetSync, Object, Renderable, RowTarget, SyncError,
 };
-pub use report::{StepReport, UnreachableJoint};
+pub use report::{StepReport, UnreachableJoint, WorstSolve};
 pub use rigid::{BodyError, RigidBody};
 pub use settings::{Integrator, Settings, SettingsError};
 pub use step::{Backtracking, STEPPERS, StepContext, Stepper, TimeStepping, stepper_by_name};

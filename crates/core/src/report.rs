@@ -15,6 +15,25 @@ pub struct UnreachableJoint {
     pub angle: f64,
 }
 
+/// The solve of a frame with the largest residual, and the place of that residual.
+#[non_exhaustive]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorstSolve {
+    /// An object that the row with the largest residual acts on; the first one in the order of the
+    /// row. [`World::islands`](crate::World::islands) lists the objects connected to it.
+    pub object: ObjectId,
+    /// The other object that this row acts on, if it can move.
+    pub other: Option<ObjectId>,
+    /// Number of objects of the island.
+    pub objects: u32,
+    /// Number of rows of the island: three per contact, one per joint row, limit or drive.
+    pub rows: u32,
+    /// Largest residual with which the solve counts as converged, m/s.
+    pub tolerance: f64,
+    /// Whether the solver reached its tolerance.
+    pub converged: bool,
+}
+
 /// Counts and residuals of one frame. Later versions can have more of them.
 #[non_exhaustive]
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -39,6 +58,10 @@ pub struct StepReport {
     pub residual: f64,
     /// Number of solves that did not reach the solver's tolerance.
     pub unconverged: u32,
+    /// The solve whose residual is [`residual`](Self::residual); `None` if nothing was solved, or
+    /// without any error.
+    #[serde(skip)]
+    pub worst_solve: Option<WorstSolve>,
     /// Number of solves that ended on a secondary ray and were resolved at the impulse level.
     pub rays: u32,
     /// Maximum number of iterations of a solve.
@@ -51,8 +74,8 @@ pub struct StepReport {
 }
 
 impl StepReport {
-    pub(crate) fn solved(&mut self, outcome: SolveReport, residual: f64) {
-        self.residual = self.residual.max(residual);
+    /// Counts a solve. The caller sets [`residual`](Self::residual) and the place of the worst one.
+    pub(crate) fn solved(&mut self, outcome: SolveReport) {
         self.unconverged += !outcome.converged as u32;
         self.rays += outcome.ray as u32;
         self.iterations = self.iterations.max(outcome.iterations);

@@ -1,7 +1,7 @@
 //! `--summary`: cost and accuracy of a run, as JSON.
 
 use serde::Serialize;
-use tumble::dynamics::{Energy, StepReport, UnreachableJoint, World};
+use tumble::dynamics::{Energy, StepReport, UnreachableJoint, World, WorstSolve};
 
 /// The summary. Names carry the units; quaternions are `x, y, z, w`.
 #[derive(Serialize)]
@@ -21,6 +21,8 @@ pub struct Summary {
     contacts_max: u32,
     solver_residual_max_m_per_s: f64,
     unconverged_solves: u64,
+    /// The solve with the largest residual; none if nothing was solved.
+    worst_solve: Option<Worst>,
     rays: u64,
     max_penetration_m: f64,
     /// Largest opening of a joint whose sides could not reach each other, and its name; 0 and none
@@ -33,6 +35,20 @@ pub struct Summary {
     start: State,
     end: State,
     bodies: Vec<Body>,
+}
+
+/// The solve of a run with the largest residual.
+#[derive(Serialize)]
+struct Worst {
+    /// End of its frame, simulated time.
+    time_s: f64,
+    /// Names of the objects, one or two, on which its row with the largest residual acts.
+    objects: Vec<String>,
+    island_objects: u32,
+    island_rows: u32,
+    /// Largest residual with which it counts as converged.
+    tolerance_m_per_s: f64,
+    converged: bool,
 }
 
 /// Sums over all dynamic objects at one moment.
@@ -59,6 +75,8 @@ pub struct Tally {
     contacts: u64,
     contacts_max: u32,
     residual: f64,
+    /// The solve with this residual, and the number of its frame.
+    worst: Option<(WorstSolve, u64)>,
     unconverged: u64,
     rays: u64,
     penetration: f64,
@@ -76,7 +94,10 @@ impl Tally {
         self.frames_s.push(wall_s);
         self.contacts += report.contacts as u64;
         self.contacts_max = self.contacts_max.max(report.contacts);
-        self.residual = self.residual.max(report.residual);
+        if report.residual > self.residual {
+            self.residual = report.residual;
+            self.worst = report.worst_solve.map(|worst| (worst, self.steps));
+        }
         self.unconverged += report.unconverged as u64;
         self.rays += report.rays as u64;
         self.penetration = self.penetration.max(report.max_penetration);
@@ -102,6 +123,15 @@ impl Tally {
     /// Returns the summary at the end of a run that took `wall_s` seconds of wall-clock time.
     pub fn summary(&self, scene: &str, world: &World, start: State, simulated_s: f64, wall_s: f64) -> Summary {
         let (stepper, solver) = (world.stepper_name(), world.solver_name());
+        let name = |id| world.name(id).map(str::to_string);
+        let worst = |(worst, frame): (WorstSolve, u64)| Worst {
+            time_s: world.time() - (self.steps - frame) as f64 * world.settings().dt,
+            objects: [name(worst.object), worst.other.and_then(name)].into_iter().flatten().collect(),
+            island_objects: worst.objects,
+            island_rows: worst.rows,
+            tolerance_m_per_s: worst.tolerance,
+            converged: worst.converged,
+        };
         Summary {
             scene: scene.to_string(),
             stepper,
@@ -117,6 +147,7 @@ impl Tally {
             contacts_max: self.contacts_max,
             solver_residual_max_m_per_s: self.residual,
             unconverged_solves: self.unconverged,
+            worst_solve: self.worst.map(worst),
             rays: self.rays,
             max_penetration_m: self.penetration,
             out_of_reach_max_m: self.out_of_reach.map_or(0.0, |o| o.distance),
@@ -144,6 +175,21 @@ impl State {
     }
 }
 
+impl Worst {
+    /// Formats the place as a line of text.
+    fn line(&self) -> String {
+        let objects: Vec<String> = self.objects.iter().map(|name| format!("'{name}'")).collect();
+        format!(
+            "the largest residual is at {} at {:.3} s, in an island of {} objects and {} rows; {:.1e} m/s counts as converged",
+            objects.join(" and "),
+            self.time_s,
+            self.island_objects,
+            self.island_rows,
+            self.tolerance_m_per_s
+        )
+    }
+}
+
 impl Summary {
     /// Formats the summary as a few lines of text.
     pub fn lines(&self) -> String {
@@ -167,6 +213,9 @@ impl Summary {
             self.rays,
             self.max_penetration_m
         );
+        if let Some(worst) = self.worst_solve.as_ref().filter(|_| self.unconverged_solves > 0) {
+            text += &format!("{}\n", worst.line());
+        }
         if let Some(name) = &self.out_of_reach {
             text += &format!("'{name}' is out of reach: open by {:.3} m at most\n", self.out_of_reach_max_m);
         }

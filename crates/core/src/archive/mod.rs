@@ -2,7 +2,7 @@
 //!
 //! | part | bytes |
 //! |---|---|
-//! | `tumbleA5`; the last is the number of the format | 8 |
+//! | `tumbleA6`; the last is the number of the format | 8 |
 //! | XXH3 of the rest, little-endian | 8 |
 //! | settings, stepper, solver, shapes, visual meshes, objects, pairs, state, contacts, report in postcard | any |
 //!
@@ -20,7 +20,7 @@ use crate::solver::{self, RowSolver};
 use crate::step::{STEPPERS, Stepper, stepper_by_name};
 use crate::world::view::{Mode, ObjectId};
 use crate::world::{ContactPoint, World, WorldState};
-use crate::{ArticulatedBody, LoopJoint, Object, RigidBody, UnreachableJoint};
+use crate::{ArticulatedBody, LoopJoint, Object, RigidBody, UnreachableJoint, WorstSolve};
 use bodies::{ArticulatedRecord, RigidRecord};
 use records::{
     ContactRecord, LoadedTables, LoopJointRecord, MeshRecord, ObjectIndices, PairRecord, ReportRecord, Tables, meshes,
@@ -32,7 +32,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 /// First bytes of an archive of a world. The last is the number of the format, which rises with
 /// every change of the content.
-const HEAD: &[u8; 8] = b"tumbleA5";
+const HEAD: &[u8; 8] = b"tumbleA6";
 
 /// Why an archive cannot be written or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

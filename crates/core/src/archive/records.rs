@@ -1,6 +1,6 @@
 //! Records of an archive that refer to objects by index, and to shapes by index in a table.
 
-use super::{ArchiveError, ContactPoint, StepReport, UnreachableJoint, damaged};
+use super::{ArchiveError, ContactPoint, StepReport, UnreachableJoint, WorstSolve, damaged};
 use crate::constraint::loop_joint::{Anchor, LoopJoint, LoopJointKind};
 use crate::contact::pair_material::{PairMaterial, PairSide};
 use crate::object::visual::{Visual, VisualGeometry, VisualMesh};
@@ -197,22 +197,54 @@ impl PairRecord {
     }
 }
 
-/// The report of the last step; its loop joint by index, with distance and angle.
+/// The report of the last step; its loop joint by index, with distance and angle, and the objects of
+/// its worst solve by index.
 #[derive(Serialize, Deserialize)]
 pub(super) struct ReportRecord {
     report: StepReport,
     unreachable_joint: Option<(Option<u32>, f64, f64)>,
+    worst_solve: Option<WorstSolveRecord>,
+}
+
+/// The worst solve of a report.
+#[derive(Serialize, Deserialize)]
+struct WorstSolveRecord {
+    /// Object and other object of the row.
+    sides: [Option<u32>; 2],
+    objects: u32,
+    rows: u32,
+    tolerance: f64,
+    converged: bool,
+}
+
+impl WorstSolveRecord {
+    fn of(worst: &WorstSolve, indices: &ObjectIndices) -> WorstSolveRecord {
+        let WorstSolve { object, other, objects, rows, tolerance, converged } = *worst;
+        let sides = [indices.of_id(object), other.and_then(|other| indices.of_id(other))];
+        WorstSolveRecord { sides, objects, rows, tolerance, converged }
+    }
+
+    fn worst_solve(self, ids: &[ObjectId]) -> WorstSolve {
+        let WorstSolveRecord { sides: [object, other], objects, rows, tolerance, converged } = self;
+        let other = other.map(|other| id(ids, Some(other)));
+        WorstSolve { object: id(ids, object), other, objects, rows, tolerance, converged }
+    }
 }
 
 impl ReportRecord {
     pub fn of(report: &StepReport, indices: &ObjectIndices) -> ReportRecord {
         let unreachable_joint = report.unreachable_joint.map(|o| (indices.of_id(o.loop_joint), o.distance, o.angle));
-        ReportRecord { report: *report, unreachable_joint }
+        let worst_solve = report.worst_solve.map(|worst| WorstSolveRecord::of(&worst, indices));
+        ReportRecord { report: *report, unreachable_joint, worst_solve }
     }
 
     pub fn report(self, ids: &[ObjectId]) -> StepReport {
         let joint = |(index, distance, angle)| UnreachableJoint { loop_joint: id(ids, index), distance, angle };
-        StepReport { unreachable_joint: self.unreachable_joint.map(joint), ..self.report }
+        StepReport {
+            unreachable_joint: self.unreachable_joint.map(joint),
+            worst_solve: self.worst_solve.map(|worst| worst.worst_solve(ids)),
+            ..self.report
+        }
     }
 }
 

@@ -26,7 +26,7 @@ pub use lcp::{LcpPyramid, LcpSliding, MAX_UNKNOWNS};
 pub use lemke::{LcpResult, lemke};
 pub use linkage::MAX_DIRECT_ROWS;
 pub use residual::residual;
-pub(crate) use residual::residual_on;
+pub(crate) use residual::{LargestResidual, largest_residual, largest_residual_on};
 
 use crate::constraint::rows::Rows;
 

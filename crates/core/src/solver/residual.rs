@@ -12,23 +12,48 @@ use crate::threads::Threads;
 /// Minimum number of blocks of a piece on one thread.
 const BLOCKS: usize = 256;
 
+/// The largest residual of some blocks.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct LargestResidual {
+    /// Residual, m/s.
+    pub residual: f64,
+    /// The first block with it; 0 if no block has any error.
+    pub block: u32,
+}
+
+impl LargestResidual {
+    fn or(self, other: LargestResidual) -> LargestResidual {
+        if other.residual > self.residual { other } else { self }
+    }
+}
+
 /// Returns the largest residual of any block, m/s (m/s² if `c` holds accelerations). `du` must be
 /// `Y·λ` of all blocks.
 pub fn residual(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], du: &[f64]) -> f64 {
-    blocks.iter().map(|&b| block_residual(rows, &rows.blocks[b as usize], c, lambda, du)).fold(0.0, f64::max)
+    largest_residual(rows, blocks, c, lambda, du).residual
 }
 
-/// Returns the [`residual`] of an island, computed on several threads.
-pub(crate) fn residual_on(
+/// Returns the [`residual`] with its block.
+pub(crate) fn largest_residual(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], du: &[f64]) -> LargestResidual {
+    let residual = |&block: &u32| LargestResidual {
+        residual: block_residual(rows, &rows.blocks[block as usize], c, lambda, du),
+        block,
+    };
+    blocks.iter().map(residual).fold(LargestResidual::default(), LargestResidual::or)
+}
+
+/// Returns the [`residual`] of an island with its block, computed on several threads.
+pub(crate) fn largest_residual_on(
     threads: &Threads,
     rows: &Rows,
     blocks: &[u32],
     (c, lambda, du): (&[f64], &[f64], &[f64]),
-) -> f64 {
+) -> LargestResidual {
+    let none = LargestResidual::default();
     let pieces = threads.pieces(blocks.len(), BLOCKS).into_iter();
-    let mut largest: Vec<(&[u32], f64)> = pieces.map(|piece| (&blocks[piece], 0.0)).collect();
-    threads.each(largest.iter_mut(), |(blocks, largest)| *largest = residual(rows, blocks, c, lambda, du));
-    largest.into_iter().fold(0.0, |most, (_, largest)| most.max(largest))
+    let mut largest: Vec<(&[u32], LargestResidual)> = pieces.map(|piece| (&blocks[piece], none)).collect();
+    threads.each(largest.iter_mut(), |(blocks, largest)| *largest = largest_residual(rows, blocks, c, lambda, du));
+    largest.into_iter().fold(none, |most, (_, largest)| most.or(largest))
 }
 
 fn block_residual(rows: &Rows, block: &Block, c: &[f64], lambda: &[f64], du: &[f64]) -> f64 {

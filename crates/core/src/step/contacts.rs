@@ -4,6 +4,7 @@ use super::Moment;
 use super::contact_rows::lay_contact_rows;
 use super::correction::{self, Frictionless};
 use super::islands::each_island;
+use super::solves::Solves;
 use crate::constraint::builder::{RowBuilder, RowKind, constraints};
 use crate::constraint::rows::{RowSet, Rows};
 use crate::contact::detect::{ContactConstraint, Detector, Owner};
@@ -13,7 +14,7 @@ use crate::each_object::{Numbers, Own, each_object};
 use crate::integrators::context::free_motion;
 use crate::object::part_state::PartState;
 use crate::object::{Integratable, Level, RowTarget};
-use crate::solver::{Islands, SolverSettings, residual_on};
+use crate::solver::{Islands, SolverSettings, largest_residual_on};
 use crate::threads::Threads;
 use crate::world::view::{ObjectId, WorldView};
 use crate::world::{Coordinates, Core, StepError};
@@ -444,17 +445,20 @@ pub(crate) fn solve(
     let mut ray = false;
     let Workspace { rows, islands, c, lambda, du, .. } = work;
     let shared = islands.iter().map(<[u32]>::len).filter(|n| *n > OWN_BUDGET).sum();
-    let (solver, report, threads) = (&core.solver, &mut core.report, &core.threads);
+    let (solver, threads, mut solves) = (&core.solver, &core.threads, Solves::new(&mut core.report));
     let solve = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {
         let settings =
             if blocks.len() > OWN_BUDGET { solver_settings.shared_by(blocks.len(), shared) } else { solver_settings };
         let outcome = solver.solve(rows, blocks, c, lambda, du, settings);
-        (outcome, unit * residual_on(threads, rows, blocks, (c, lambda, du)))
+        let mut largest = largest_residual_on(threads, rows, blocks, (c, lambda, du));
+        largest.residual *= unit;
+        (outcome, largest)
     };
-    each_island(threads, rows, islands.iter(), (lambda, du), solve, |(outcome, residual)| {
-        report.solved(outcome, residual);
+    each_island(threads, rows, islands.iter(), (lambda, du), solve, |(outcome, largest)| {
+        solves.add(Some((outcome, largest)));
         ray |= outcome.ray;
     });
+    solves.finish(core.table.with(&core.state.objects), rows, islands, unit * solver_settings.tolerance);
     ray
 }
 

@@ -21,9 +21,10 @@
 
 use super::contacts::{Workspace, row_velocities, zero};
 use super::islands::each_island;
+use super::solves::Solves;
 use crate::constraint::rows::{Block, RowSet, Rows};
 use crate::object::RowTarget;
-use crate::solver::{RowSolver, SolverSettings, residual};
+use crate::solver::{RowSolver, SolverSettings, largest_residual};
 use crate::world::Core;
 
 /// A contact in the impact phase.
@@ -170,7 +171,7 @@ fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], parts: &[Part], ela
             return None; // the solve that ends the phase stops these contacts
         }
         let outcome = solver.solve(rows, blocks, aimed, lambda, du, solver_settings);
-        let left = residual(rows, blocks, aimed, lambda, du);
+        let left = largest_residual(rows, blocks, aimed, lambda, du);
         // kinematic bodies and motors may add energy
         let kinematic = |&b: &u32| {
             let target = (b as usize).checked_sub(contact_constraints).map_or(0.0, |i| targets[i].velocity);
@@ -184,9 +185,9 @@ fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], parts: &[Part], ela
         }
         Some((outcome, left))
     };
-    each_island(&core.threads, rows, islands.iter(), (lambda, du), solve, |solved| {
-        solved.into_iter().for_each(|(outcome, left)| core.report.solved(outcome, left));
-    });
+    let mut solves = Solves::new(&mut core.report);
+    each_island(&core.threads, rows, islands.iter(), (lambda, du), solve, |solved| solves.add(solved));
+    solves.finish(core.table.with(&core.state.objects), rows, islands, solver_settings.tolerance);
 }
 
 fn rows_of<'a>(rows: &'a Rows, blocks: &'a [u32]) -> impl Iterator<Item = usize> + 'a {

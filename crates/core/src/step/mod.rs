@@ -9,6 +9,7 @@ mod event_location;
 mod impact;
 mod islands;
 mod moment;
+mod solves;
 mod time_stepping;
 mod unreachable_joints;
 mod warm_start;

@@ -48,3 +48,4 @@ mod state;
 mod still;
 mod threads;
 mod unreachable_joints;
+mod worst_solve;

@@ -427,6 +427,23 @@ class StepReport:
     def unconverged(self) -> int:
         """Solves that did not reach the solver's tolerance."""
     @property
+    def worst_objects(self) -> list[str]:
+        """Names of the objects, one or two, on which the row with the largest residual acts; empty if
+        nothing was solved, or without any error.
+        """
+    @property
+    def worst_island_objects(self) -> int:
+        """Objects of the island of that row (``World.islands`` lists them)."""
+    @property
+    def worst_island_rows(self) -> int:
+        """Rows of that island."""
+    @property
+    def worst_tolerance(self) -> float:
+        """Largest residual with which that solve counts as converged, m/s."""
+    @property
+    def worst_converged(self) -> bool:
+        """Whether that solve reached its tolerance."""
+    @property
     def rays(self) -> int:
         """Solves that ended on a secondary ray."""
     @property

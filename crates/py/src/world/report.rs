@@ -22,6 +22,17 @@ pub struct StepReport {
     residual: f64,
     /// Solves that did not reach the solver's tolerance.
     unconverged: u32,
+    /// Names of the objects, one or two, on which the row with the largest residual acts; empty if
+    /// nothing was solved, or without any error.
+    worst_objects: Vec<String>,
+    /// Objects of the island of that row (``World.islands`` lists them).
+    worst_island_objects: u32,
+    /// Rows of that island.
+    worst_island_rows: u32,
+    /// Largest residual with which that solve counts as converged, m/s.
+    worst_tolerance: f64,
+    /// Whether that solve reached its tolerance.
+    worst_converged: bool,
     /// Solves that ended on a secondary ray.
     rays: u32,
     /// Iterations of the largest solve.
@@ -49,6 +60,7 @@ impl StepReport {
             impact_passes,
             residual,
             unconverged,
+            worst_solve: worst,
             rays,
             iterations,
             max_penetration,
@@ -57,7 +69,13 @@ impl StepReport {
             ..
         } = *world.report();
         let name = out_of_reach.and_then(|o| Some(world.name(o.loop_joint)?.to_string()));
+        let objects = worst.iter().flat_map(|w| [Some(w.object), w.other]).flatten();
         StepReport {
+            worst_objects: objects.filter_map(|id| world.name(id).map(str::to_string)).collect(),
+            worst_island_objects: worst.map_or(0, |w| w.objects),
+            worst_island_rows: worst.map_or(0, |w| w.rows),
+            worst_tolerance: worst.map_or(0.0, |w| w.tolerance),
+            worst_converged: worst.is_none_or(|w| w.converged),
             substeps,
             tries,
             inner_steps,

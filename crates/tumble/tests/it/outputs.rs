@@ -6,7 +6,7 @@ use serde_json::Value;
 use tumble::net::record::read;
 
 /// The keys that users may rely on.
-const KEYS: [&str; 22] = [
+const KEYS: [&str; 23] = [
     "scene",
     "stepper",
     "solver",
@@ -19,6 +19,7 @@ const KEYS: [&str; 22] = [
     "contacts_max",
     "solver_residual_max_m_per_s",
     "unconverged_solves",
+    "worst_solve",
     "rays",
     "max_penetration_m",
     "tries_mean",

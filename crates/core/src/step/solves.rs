@@ -1,0 +1,62 @@
+//! The solves of one stage of a step, and which of them is the worst.
+
+use crate::constraint::rows::Rows;
+use crate::report::{StepReport, WorstSolve};
+use crate::solver::{Islands, LargestResidual, SolveReport};
+use crate::world::view::{ObjectId, Objects};
+
+/// A solve counts as converged below this number of tolerances, the change that ends the sweeps.
+const SOLVED: f64 = 10.0;
+
+/// Enters the solves of a stage in the report.
+pub(super) struct Solves<'a> {
+    report: &'a mut StepReport,
+    /// Number of islands so far.
+    islands: usize,
+    /// Island, largest residual and outcome of the worst solve of this stage, if it is the worst of
+    /// the frame.
+    worst: Option<(usize, LargestResidual, SolveReport)>,
+}
+
+impl<'a> Solves<'a> {
+    pub fn new(report: &'a mut StepReport) -> Solves<'a> {
+        Solves { report, islands: 0, worst: None }
+    }
+
+    /// Adds the solve of the next island; `None` if it was not solved.
+    pub fn add(&mut self, solved: Option<(SolveReport, LargestResidual)>) {
+        let island = self.islands;
+        self.islands += 1;
+        let Some((outcome, largest)) = solved else { return };
+        self.report.solved(outcome);
+        if largest.residual > self.report.residual {
+            self.report.residual = largest.residual;
+            self.worst = Some((island, largest, outcome));
+        }
+    }
+
+    /// Names the objects of the worst solve. `tolerance`: change of a row velocity that ends the
+    /// sweeps, m/s.
+    pub fn finish(self, objects: Objects, rows: &Rows, islands: &Islands, tolerance: f64) {
+        let Some((island, largest, outcome)) = self.worst else { return };
+        let blocks = || islands.get(island).iter().map(|&b| &rows.blocks[b as usize]);
+        let mut starts: Vec<u32> = blocks().flat_map(|block| block.sides()).map(|side| side.u).collect();
+        starts.sort_unstable();
+        starts.dedup();
+        let object = |u: u32| -> Option<ObjectId> {
+            let place = objects.iter().find(|e| e.moves() && e.state_range.v.start == u as usize)?.place;
+            Some(objects.table.order[place])
+        };
+        let mut sides = rows.blocks[largest.block as usize].sides().iter().map(|side| object(side.u));
+        let (first, other) = (sides.next().flatten(), sides.next().flatten());
+        let worst = |object| WorstSolve {
+            object,
+            other,
+            objects: starts.len() as u32,
+            rows: blocks().map(|block| block.set.rows() as u32).sum(),
+            tolerance: SOLVED * tolerance,
+            converged: outcome.converged,
+        };
+        self.report.worst_solve = first.map(worst);
+    }
+}
