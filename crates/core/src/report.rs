@@ -66,6 +66,9 @@ pub struct StepReport {
     pub rays: u32,
     /// Maximum number of iterations of a solve.
     pub iterations: u32,
+    /// Work of all solves in block relaxations, which
+    /// [`SolverSettings::budget`](crate::solver::SolverSettings::budget) bounds.
+    pub relaxations: u64,
     /// Deepest penetration that the narrow phase found, m.
     pub max_penetration: f64,
     /// The unreachable joint with the largest error; `None` if all joints could be closed.

@@ -101,7 +101,7 @@ impl Default for Settings {
             substeps: 1,
             integrator: Integrator::default(),
             integrator_tolerance: 1e-6,
-            solver_settings: SolverSettings { max_sweeps: 200, max_relaxations: 20_000, tolerance: 1e-9 },
+            solver_settings: SolverSettings { max_sweeps: 200, max_relaxations: 20_000, tolerance: 1e-9, budget: None },
             projection_sweeps: 15,
             stabilize_positions: true,
             contact_tolerance: 1e-7,
@@ -162,6 +162,13 @@ setters! {
 }
 
 impl Settings {
+    /// Returns the settings with another [`SolverSettings::budget`].
+    #[must_use]
+    pub fn with_budget(mut self, budget: Option<u32>) -> Settings {
+        self.solver_settings.budget = budget;
+        self
+    }
+
     /// Checks the range of every setting.
     ///
     /// # Errors
@@ -181,6 +188,9 @@ impl Settings {
             (1..=1_000_000).contains(&self.solver_settings.max_sweeps),
             "1 to 1000000",
         )?;
+        if let Some(budget) = self.solver_settings.budget {
+            check("budget", budget.into(), budget > 0, "above 0 relaxations")?;
+        }
         check("solver tolerance", self.solver_settings.tolerance, self.solver_settings.tolerance >= 0.0, "at least 0")?;
         check("contact tolerance", self.contact_tolerance, self.contact_tolerance > 0.0, "above 0 m")?;
         check(

@@ -44,6 +44,10 @@ const FIRST_SWEEPS: u32 = 25;
 /// Sweeps go on until they have cost as much as this number of factorizations.
 const FACTORIZATIONS: f64 = 3.0;
 
+/// Under a budget an island is solved directly only if it can pay for this number of factorizations:
+/// the interior point method gives little before its end.
+const AFFORDABLE: f64 = 12.0;
+
 /// Islands of more blocks are solved if their residual is at most [`SOLVED`] tolerances; from smaller
 /// ones the direct solution gains more digits for little.
 const LARGE: usize = 500;
@@ -79,16 +83,17 @@ impl RowSolver for GaussSeidel {
         apply(&locals, &linkages, rows, c, lambda, du);
         let sweeps = settings.max_sweeps_for(locals.len());
         let mut extrapolation = Extrapolation::new(&locals, &linkages, du);
-        let mut outcome = SolveReport { iterations: sweeps, converged: false, ray: false };
+        let mut outcome = SolveReport { iterations: sweeps, converged: false, ray: false, relaxations: 0 };
+        let affordable = settings.budget.map(|budget| f64::from(budget) / locals.len().max(1) as f64);
         let mut relaxation = Relaxation::new(ACCELERATED);
-        let (mut plan, mut due, mut direct) = (None, 0, false);
+        let (mut plan, mut due, mut direct, mut swept) = (None, 0, false, 0);
         for sweep in 1..=sweeps {
             let mut progress = Progress::default();
             for local in &mut locals {
                 local.relax(extrapolation.beta, relaxation.factor, rows, &linkages, du, &mut progress);
             }
             if progress.change <= settings.tolerance {
-                outcome = SolveReport { iterations: sweep, converged: true, ray: false };
+                (outcome.iterations, outcome.converged) = (sweep, true);
                 break;
             }
             relaxation.record(sweep, progress.change);
@@ -97,18 +102,26 @@ impl RowSolver for GaussSeidel {
                 let near = progress.change <= NEARLY_SOLVED * settings.tolerance;
                 if locals.len() > LARGE && near && residual(rows, blocks, c, lambda, du) <= SOLVED * settings.tolerance
                 {
-                    outcome = SolveReport { iterations: sweep, converged: true, ray: false };
+                    (outcome.iterations, outcome.converged) = (sweep, true);
                     break;
                 }
                 plan = Plan::new(rows, blocks, c, sweeps < FIRST_SWEEPS);
                 due = plan.as_ref().map_or(u32::MAX, |plan| (FACTORIZATIONS * plan.cost()) as u32).max(sweep);
+                if let Some(affordable) = affordable {
+                    let spare = |plan: &Plan| affordable - AFFORDABLE * plan.cost();
+                    plan = plan.filter(|plan| spare(plan) >= f64::from(sweep));
+                    due = plan.as_ref().map_or(u32::MAX, |plan| due.min(spare(plan) as u32));
+                }
             }
             if let Some(plan) = plan.take_if(|_| sweep == due.min(sweeps)) {
                 extrapolation.rebuild(&locals, &linkages, rows, c, lambda, du);
-                let solved = plan.solve(lambda, settings.tolerance);
+                let cost = plan.cost();
+                let most = affordable.map_or(u32::MAX, |affordable| ((affordable - f64::from(sweep)) / cost) as u32);
+                let solved = plan.solve(lambda, settings.tolerance, most);
+                outcome.relaxations = (f64::from(solved.factorizations) * cost * locals.len() as f64) as u32;
                 locals.iter_mut().for_each(|local| local.read(lambda));
                 extrapolation.rebuild(&locals, &linkages, rows, c, lambda, du);
-                outcome.iterations = sweep + solved.factorizations;
+                (outcome.iterations, swept) = (sweep + solved.factorizations, sweep);
                 outcome.converged = solved.converged;
                 direct = true;
                 break;
@@ -129,6 +142,7 @@ impl RowSolver for GaussSeidel {
                 apply(&locals, &linkages, rows, c, lambda, du);
             }
         }
+        outcome.relaxations += if direct { swept } else { outcome.iterations } * locals.len() as u32;
         write_back(&locals, lambda);
         if !linkages.is_empty() {
             extrapolation.clear(du);

@@ -120,15 +120,15 @@ fn solve(
     settings: SolverSettings,
 ) -> SolveReport {
     let fall_back = |lambda: &mut [f64], du: &mut [f64], pivots: u32, ray: bool| {
-        let sweeps = GaussSeidel.solve(rows, blocks, c, lambda, du, settings).iterations;
-        SolveReport { iterations: pivots + sweeps, converged: false, ray }
+        let swept = GaussSeidel.solve(rows, blocks, c, lambda, du, settings);
+        SolveReport { iterations: pivots + swept.iterations, converged: false, ray, ..swept }
     };
     if unknowns_at_most(friction, rows, blocks) > MAX_UNKNOWNS {
         return fall_back(lambda, du, 0, false);
     }
     if !finite(rows, blocks, c) {
         blocks.iter().for_each(|&b| lambda[rows.blocks[b as usize].range()].fill(0.0));
-        return SolveReport { iterations: 0, converged: false, ray: false };
+        return SolveReport { iterations: 0, converged: false, ray: false, relaxations: 0 };
     }
     let problem = Problem::new(friction, rows, blocks, c);
     let (m, q) = problem.matrix();
@@ -149,7 +149,7 @@ fn solve(
         rows.apply_block(block, lambda, du);
         first += count;
     }
-    SolveReport { iterations: pivots, converged, ray: false }
+    SolveReport { iterations: pivots, converged, ray: false, relaxations: 0 }
 }
 
 /// Returns whether all numbers of the island's problem are finite; bounds of an interval may be

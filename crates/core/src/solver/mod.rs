@@ -42,6 +42,10 @@ pub struct SolverSettings {
     /// A sweep that changes no row velocity by more than this ends the solve (m/s; m/s² at the
     /// acceleration level).
     pub tolerance: f64,
+    /// Maximum work of a step in block relaxations: sweeps and factorizations of all solves, impacts
+    /// and corrections too, but at least one sweep of each solve. In a call of
+    /// [`RowSolver::solve`], the maximum work of this solve. `None`: no bound.
+    pub budget: Option<u32>,
 }
 
 /// Number of sweeps that every island gets, whatever its size.
@@ -59,7 +63,8 @@ impl SolverSettings {
     /// Returns the maximum number of sweeps of an island with `blocks` blocks.
     pub fn max_sweeps_for(&self, blocks: usize) -> u32 {
         let share = self.max_relaxations / (blocks.max(1) as u32);
-        share.max(MIN_SWEEPS).min(self.max_sweeps).max(1)
+        let affordable = self.budget.map_or(u32::MAX, |budget| budget / blocks.max(1) as u32);
+        share.max(MIN_SWEEPS).min(self.max_sweeps).min(affordable).max(1)
     }
 }
 
@@ -73,6 +78,9 @@ pub struct SolveReport {
     /// Whether a pivoting solver ended on a secondary ray. With friction there may be no solution
     /// (Painlevé); the caller then resolves the contacts at the impulse level.
     pub ray: bool,
+    /// Work of sweeps and factorizations, in block relaxations. A factorization counts as the sweeps
+    /// with as many multiplications. Pivots do not count.
+    pub relaxations: u32,
 }
 
 /// Names of all solvers of this crate, as scene files, archives, Python and the command line use them.

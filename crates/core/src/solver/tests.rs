@@ -17,7 +17,7 @@ use crate::constraint::rows::{RowSet, Rows};
 
 /// As far as rounding lets an iteration go.
 pub(super) const FAR: SolverSettings =
-    SolverSettings { max_sweeps: 200_000, max_relaxations: u32::MAX, tolerance: 1e-14 };
+    SolverSettings { max_sweeps: 200_000, max_relaxations: u32::MAX, tolerance: 1e-14, budget: None };
 
 /// A repeatable stream of numbers (splitmix64).
 pub(super) struct Random(pub u64);

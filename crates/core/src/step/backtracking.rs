@@ -26,6 +26,7 @@
 //! - the sub-step has a floor, and a frame has a cap on tries; beyond it the rest of the frame is
 //!   one time-stepping sub-step. Both are counted as floor hits.
 
+use super::budget::IMPACTS;
 use super::contacts::{
     Limit, build_rows, detect, gyroscopic, impulses, limits, push, recover, row_velocities, solve, whiten,
 };
@@ -79,7 +80,7 @@ impl Stepper for Backtracking {
         let dt = core.settings.dt;
         let (mut left, end) = (dt, core.state.time + dt);
         while left > 1e-12 * dt {
-            if core.report.tries >= TRIES {
+            if core.report.tries >= TRIES || !core.meter.start_try(core.settings.solver_settings.budget) {
                 core.report.floor_hits += 1;
                 self.fallback.substep(core, left)?;
                 break;
@@ -179,7 +180,8 @@ impl Backtracking {
         let (mut u, mut total) = (Vec::new(), vec![0.0; work.rows.len]);
         whiten(core.coordinates(None), &work.dp, 0.0, &mut u, &mut work.du_force);
         let before = u.clone();
-        impact::resolve(core, work, &candidates, (IMPACT_PASSES, true), &mut u, &mut total);
+        let budget = core.meter.left(IMPACTS);
+        impact::resolve(core, work, &candidates, (IMPACT_PASSES, true, budget), &mut u, &mut total);
         let struck = total.iter().any(|l| *l != 0.0);
         if struck {
             push_to(core, &u, &before);
@@ -233,6 +235,7 @@ impl Backtracking {
             max_sweeps: s.max_sweeps.max(2000),
             max_relaxations: s.max_relaxations.max(1_000_000),
             tolerance: s.tolerance / left,
+            budget: core.meter.for_solve(work.rows.blocks.len()),
         };
         let ray = solve(core, work, solver_settings, left, |b| keep[b]);
         self.held = correction::limits_with_force(work);

@@ -1,6 +1,7 @@
 //! Contacts and constraints to rows, and multipliers to momentum: shared by both steppers.
 
 use super::Moment;
+use super::budget::{Allotment, Open};
 use super::contact_rows::lay_contact_rows;
 use super::correction::{self, Frictionless};
 use super::islands::each_island;
@@ -14,7 +15,7 @@ use crate::each_object::{Numbers, Own, each_object};
 use crate::integrators::context::free_motion;
 use crate::object::part_state::PartState;
 use crate::object::{Integratable, Level, RowTarget};
-use crate::solver::{Islands, SolverSettings, largest_residual_on};
+use crate::solver::{Islands, LargestResidual, SolveReport, SolverSettings, largest_residual_on};
 use crate::threads::Threads;
 use crate::world::view::{ObjectId, WorldView};
 use crate::world::{Coordinates, Core, StepError};
@@ -432,7 +433,8 @@ const OWN_BUDGET: usize = 40;
 
 /// Solves the blocks that satisfy `keep`, island by island, from `work.c` and the warm start in
 /// `work.lambda`; `work.du` receives `Y·λ`. `unit` converts `c` to m/s for the report: 1, or the
-/// length of the step if `c` holds accelerations. Returns whether any solve ended on a ray.
+/// length of the step if `c` holds accelerations. Returns whether any solve ended on a ray. With a
+/// budget in the settings this solve costs no more, or one sweep.
 pub(crate) fn solve(
     core: &mut Core,
     work: &mut Workspace,
@@ -446,21 +448,77 @@ pub(crate) fn solve(
     let Workspace { rows, islands, c, lambda, du, .. } = work;
     let shared = islands.iter().map(<[u32]>::len).filter(|n| *n > OWN_BUDGET).sum();
     let (solver, threads, mut solves) = (&core.solver, &core.threads, Solves::new(&mut core.report));
-    let solve = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {
-        let settings =
-            if blocks.len() > OWN_BUDGET { solver_settings.shared_by(blocks.len(), shared) } else { solver_settings };
-        let outcome = solver.solve(rows, blocks, c, lambda, du, settings);
-        let mut largest = largest_residual_on(threads, rows, blocks, (c, lambda, du));
-        largest.residual *= unit;
-        (outcome, largest)
+    let settings_of = |blocks: usize| {
+        if blocks > OWN_BUDGET { solver_settings.shared_by(blocks, shared) } else { solver_settings }
     };
-    each_island(threads, rows, islands.iter(), (lambda, du), solve, |(outcome, largest)| {
+    let solve = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64], settings: SolverSettings| {
+        let outcome = solver.solve(rows, blocks, c, lambda, du, settings);
+        core.meter.count(outcome.relaxations);
+        (outcome, largest_residual_on(threads, rows, blocks, (c, lambda, du)))
+    };
+    let add = |(outcome, mut largest): Solved| {
+        largest.residual *= unit;
         solves.add(Some((outcome, largest)));
         ray |= outcome.ray;
-    });
+    };
+    match solver_settings.budget {
+        None => {
+            let solve = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {
+                solve(blocks, lambda, du, settings_of(blocks.len()))
+            };
+            each_island(threads, rows, islands.iter(), (lambda, du), solve, add);
+        }
+        Some(budget) => {
+            let keep_warm = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {
+                blocks.iter().for_each(|&b| rows.apply_block(&rows.blocks[b as usize], lambda, du));
+                largest_residual_on(threads, rows, blocks, (c, lambda, du))
+            };
+            let mut solved: Vec<Solved> = Vec::with_capacity(islands.len());
+            each_island(threads, rows, islands.iter(), (&mut *lambda, &mut *du), keep_warm, |largest| {
+                let converged = largest.residual <= solver_settings.tolerance;
+                solved.push((SolveReport { iterations: 0, converged, ray: false, relaxations: 0 }, largest));
+            });
+            let mut left = budget;
+            for round in 0..ROUNDS {
+                let open = |(island, (outcome, largest)): (usize, &Solved)| {
+                    let goes_on = !outcome.converged && !outcome.ray && (round == 0 || outcome.relaxations > 0);
+                    let blocks = islands.get(island).len();
+                    goes_on.then_some(Open { island, blocks, residual: largest.residual })
+                };
+                let open: Vec<Open> = solved.iter().enumerate().filter_map(open).collect();
+                if open.is_empty() {
+                    break;
+                }
+                let allotted = Allotment::new(open, left, round == 0, solver_settings.max_sweeps).islands;
+                let first_blocks: Vec<u32> = allotted.iter().map(|(island, _)| islands.get(*island)[0]).collect();
+                let solve = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {
+                    for side in blocks.iter().flat_map(|&b| rows.blocks[b as usize].sides()) {
+                        du[side.u as usize..(side.u + side.dof) as usize].fill(0.0);
+                    }
+                    let budget = first_blocks.binary_search(&blocks[0]).map_or(0, |i| allotted[i].1);
+                    solve(blocks, lambda, du, SolverSettings { budget: Some(budget), ..settings_of(blocks.len()) })
+                };
+                let mut next = allotted.iter();
+                let some = allotted.iter().map(|(island, _)| islands.get(*island));
+                each_island(threads, rows, some, (&mut *lambda, &mut *du), solve, |(outcome, largest)| {
+                    left = left.saturating_sub(outcome.relaxations);
+                    if let Some((island, _)) = next.next() {
+                        solved[*island] = (outcome, largest);
+                    }
+                });
+            }
+            solved.into_iter().for_each(add);
+        }
+    }
     solves.finish(core.table.with(&core.state.objects), rows, islands, unit * solver_settings.tolerance);
     ray
 }
+
+/// Result of a solve, with its largest residual.
+type Solved = (SolveReport, LargestResidual);
+
+/// Number of rounds in which islands that do not converge get what others leave of a budget.
+const ROUNDS: u32 = 8;
 
 /// Returns the impulse on A of each contact, world axes, for given multipliers.
 pub(crate) fn impulses<'a>(work: &'a Workspace, lambda: &'a [f64]) -> impl Iterator<Item = Vec3> + 'a {

@@ -38,6 +38,7 @@ mod errors;
 mod group;
 mod overlap;
 
+use super::budget::shared;
 use super::contacts::{Limit, lay_rows, limits, push, shift, unwhiten_onto, zero};
 use super::islands::each_island;
 use super::{Moment, Workspace, unreachable_joints};
@@ -54,6 +55,8 @@ pub(crate) use overlap::Frictionless;
 
 /// Number of sweeps per round in a group that is too large for a direct solve.
 const SWEEPS: u32 = 25;
+/// Share of the work that is left in one half of a round.
+const ROUND: f64 = 0.25;
 /// Maximum number of active sets.
 const MAX_ACTIVE_SETS: usize = 4;
 
@@ -277,12 +280,17 @@ fn apply(
             let above = |&b: &u32| c[rows.blocks[b as usize].row as usize].abs() > least;
             (positions || !part.positions_only) && part.blocks.iter().any(above)
         };
-        let settings = SolverSettings { max_sweeps: SWEEPS, max_relaxations: u32::MAX, tolerance: 0.1 * tolerance };
+        let settings =
+            SolverSettings { max_sweeps: SWEEPS, max_relaxations: u32::MAX, tolerance: 0.1 * tolerance, budget: None };
+        let (solver, meter) = (core.solver.as_ref(), &core.meter);
+        let budget = meter.left(ROUND);
+        let islands = parts.iter().filter(violated).map(|part| part.blocks);
+        let all = islands.clone().map(<[u32]>::len).sum();
         let solve = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {
-            core.solver.solve(rows, blocks, c, lambda, du, settings);
+            let settings = shared(settings, budget, blocks.len(), all);
+            meter.count(solver.solve(rows, blocks, c, lambda, du, settings).relaxations);
         };
         zero(&mut lambda, rows.len);
-        let islands = parts.iter().filter(violated).map(|part| part.blocks);
         each_island(&core.threads, rows, islands, (&mut lambda, du), solve, |()| ());
     }
     unwhiten_onto(Coordinates { objects, x: &mut *x, caches: &mut *caches, threads }, &dx, moved);

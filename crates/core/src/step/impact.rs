@@ -19,12 +19,13 @@
 //! requires. A half-line of a constraint takes part if its gap is within the contact tolerance,
 //! always with `e = 0`.
 
+use super::budget::shared;
 use super::contacts::{Workspace, row_velocities, zero};
 use super::islands::each_island;
 use super::solves::Solves;
 use crate::constraint::rows::{Block, RowSet, Rows};
 use crate::object::RowTarget;
-use crate::solver::{RowSolver, SolverSettings, largest_residual};
+use crate::solver::{RowSolver, SolveReport, SolverSettings, largest_residual};
 use crate::world::Core;
 
 /// A contact in the impact phase.
@@ -57,6 +58,8 @@ const PRECISION: (f64, f64) = (1e-13, 1e-9);
 pub(crate) const ELASTIC: f64 = 0.99;
 /// A contact rests after bounces that have left less than this fraction of its approach speed.
 const FAINT: f64 = 0.01;
+/// Minimum number of sweeps of a pass under a budget.
+const FEW_SWEEPS: usize = 4;
 /// A slower approach does not count, m/s.
 const APPROACH: f64 = 1e-9;
 /// A slower impact never bounces, m/s: bodies wedged between others would chatter forever.
@@ -64,17 +67,19 @@ pub(crate) const SLOWEST_BOUNCE: f64 = 1e-4;
 
 /// Resolves impacts at whitened velocity `u` and adds the multipliers to `total`. With `finish` the
 /// last pass stops every contact that still approaches; without it a solve of all contacts follows.
+/// The phase ends early if its `budget` is spent.
 pub(crate) fn resolve(
     core: &mut Core,
     work: &mut Workspace,
     candidates: &[Candidate],
-    (cap, finish): (u32, bool),
+    (cap, finish, budget): (u32, bool, Option<u32>),
     u: &mut [f64],
     total: &mut [f64],
 ) {
     let reach = core.settings.contact_tolerance;
     let mut c = Vec::new();
     let mut left = vec![1.0; candidates.len()];
+    let end = budget.map(|budget| core.meter.done() + u64::from(budget));
     for pass in 0..=cap {
         row_velocities(&core.threads, &work.rows, &work.bias, u, &mut c);
         aim_constraints(work, &mut c);
@@ -90,7 +95,10 @@ pub(crate) fn resolve(
         if !(0..candidates.len()).any(approach) && !limits.clone().any(at_limit) {
             return;
         }
-        let last = pass == cap || !(0..candidates.len()).any(bounces);
+        let budget = end.map(|end| end.saturating_sub(core.meter.done()) as u32);
+        let approaching = (0..candidates.len()).filter(|&i| approach(i)).count();
+        let spent = budget.is_some_and(|budget| !pays(budget, approaching + work.targets.len()));
+        let last = pass == cap || spent || !(0..candidates.len()).any(bounces);
         if last && !finish {
             return;
         }
@@ -109,7 +117,7 @@ pub(crate) fn resolve(
         for (left, (candidate, part)) in left.iter_mut().zip(candidates.iter().zip(&parts)) {
             *left *= if part.rebound > 0.0 { candidate.restitution } else { 1.0 };
         }
-        reflect(core, work, &c, &parts, elastic);
+        reflect(core, work, &c, &parts, (elastic, budget));
         u.iter_mut().zip(&work.du).for_each(|(u, du)| *u += du);
         total.iter_mut().zip(&work.lambda).for_each(|(t, l)| *t += l);
         if last {
@@ -120,13 +128,24 @@ pub(crate) fn resolve(
 
 /// Resolves the rebound of contacts whose approach the solve of all contacts has stopped: velocity
 /// `u`, impulses of that solve in `work.lambda`. Writes the multipliers to `work.lambda` and their
-/// effect to `work.du`.
-pub(crate) fn rebound(core: &mut Core, work: &mut Workspace, parts: &[Part], u: &[f64]) {
+/// effect to `work.du`. Returns false, and does nothing, if the budget does not pay for it.
+pub(crate) fn rebound(core: &mut Core, work: &mut Workspace, parts: &[Part], u: &[f64], budget: Option<u32>) -> bool {
+    let blocks = parts.iter().filter(|part| part.member).count() + work.targets.len();
+    if budget.is_some_and(|budget| !pays(budget, blocks)) {
+        return false;
+    }
     let mut c = Vec::new();
     row_velocities(&core.threads, &work.rows, &work.bias, u, &mut c);
     aim_constraints(work, &mut c);
     core.report.impact_passes += 1;
-    reflect(core, work, &c, parts, false);
+    reflect(core, work, &c, parts, (false, budget));
+    true
+}
+
+/// Returns whether a budget pays for a pass of some blocks: a few sweeps of the pass and of the
+/// plastic solution for the energy guard.
+fn pays(budget: u32, blocks: usize) -> bool {
+    budget as usize >= 2 * FEW_SWEEPS * blocks
 }
 
 /// Returns whether a row is a rigid limit within `reach` of its stop. Springs exert no impulse.
@@ -142,7 +161,7 @@ fn aim_constraints(work: &Workspace, c: &mut [f64]) {
 }
 
 /// Solves one pass: the multipliers are in `work.lambda`, their effect in `work.du`.
-fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], parts: &[Part], elastic: bool) {
+fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], parts: &[Part], (elastic, budget): (bool, Option<u32>)) {
     let contact_constraints = work.contact_constraints.len();
     let (targets, reach, set) = (&work.targets, core.settings.contact_tolerance, core.settings.solver_settings);
     let fastest = c.iter().fold(0.0, |f: f64, c| f.max(c.abs()));
@@ -150,6 +169,7 @@ fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], parts: &[Part], ela
         max_sweeps: set.max_sweeps.max(1000),
         max_relaxations: set.max_relaxations.max(100_000),
         tolerance: fastest * if elastic { PRECISION.0 } else { PRECISION.1 },
+        budget: None,
     };
     work.islands.build(&work.rows, |b| {
         let takes_part = |t: &RowTarget| (t.set == RowSet::Equality && t.compliance == 0.0) || at_stop(t, reach);
@@ -164,13 +184,17 @@ fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], parts: &[Part], ela
     let plastic = parts.iter().all(|part| part.rebound <= 0.0);
     let Workspace { rows, islands, bias, targets, lambda, du, c: aimed, .. } = &mut *work;
     let (rows, bias, aimed, solver) = (&*rows, &*bias, &*aimed, core.solver.as_ref());
+    let all: usize = islands.iter().map(<[u32]>::len).sum();
     let solve = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {
         let of_island = || blocks.iter().filter_map(|&b| parts.get(b as usize));
         let rebounds = of_island().any(|part| part.rebound > 0.0);
         if !plastic && !rebounds {
             return None; // the solve that ends the phase stops these contacts
         }
+        // half of it for the energy guard
+        let solver_settings = shared(solver_settings, budget.map(|budget| budget / 2), blocks.len(), all);
         let outcome = solver.solve(rows, blocks, aimed, lambda, du, solver_settings);
+        core.meter.count(outcome.relaxations);
         let left = largest_residual(rows, blocks, aimed, lambda, du);
         // kinematic bodies and motors may add energy
         let kinematic = |&b: &u32| {
@@ -181,7 +205,8 @@ fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], parts: &[Part], ela
         let scale: f64 = rows_of(rows, blocks).map(|i| (lambda[i] * c[i]).abs()).sum();
         let energy: f64 = of_island().map(|part| part.energy).sum();
         if guard && work_done(rows, blocks, c, lambda, du) > energy + 1e-12 * scale {
-            blend(solver, (rows, blocks, c), energy, lambda, du, solver_settings);
+            let outcome = blend(solver, (rows, blocks, c), energy, lambda, du, solver_settings);
+            core.meter.count(outcome.relaxations);
         }
         Some((outcome, left))
     };
@@ -206,7 +231,7 @@ fn work_done(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], du: &[f64])
 /// Blends the plastic solution (`e = 0`, which never adds energy) with the bouncing one, as far
 /// towards the latter as the energy that is added does not exceed `energy`, J.
 ///
-/// With `δ = λ_e − λ_0` the energy is `W(s) = W_0 + s·B + s²·A`, `B = δᵀ(c + Kλ_0)`, `A = W_e − W_0
+/// Returns the report of the plastic solve. With `δ = λ_e − λ_0` the energy is `W(s) = W_0 + s·B + s²·A`, `B = δᵀ(c + Kλ_0)`, `A = W_e − W_0
 /// − B`; `s` is the positive root of `W(s) = energy`.
 fn blend(
     solver: &dyn RowSolver,
@@ -215,14 +240,14 @@ fn blend(
     lambda: &mut [f64],
     du: &mut [f64],
     solver_settings: SolverSettings,
-) {
+) -> SolveReport {
     let energy_bounce = work_done(rows, blocks, c, lambda, du);
     let bounce: Vec<f64> = rows_of(rows, blocks).map(|i| lambda[i]).collect();
     rows_of(rows, blocks).for_each(|i| lambda[i] = 0.0);
     for side in blocks.iter().flat_map(|&b| rows.blocks[b as usize].sides()) {
         du[side.u as usize..(side.u + side.dof) as usize].fill(0.0);
     }
-    solver.solve(rows, blocks, c, lambda, du, solver_settings);
+    let outcome = solver.solve(rows, blocks, c, lambda, du, solver_settings);
     let energy_plastic = work_done(rows, blocks, c, lambda, du).min(energy);
     let plastic_velocity = blocks.iter().flat_map(|&b| {
         let block = &rows.blocks[b as usize];
@@ -241,4 +266,5 @@ fn blend(
         lambda[i] += s * d;
     }
     blocks.iter().for_each(|&b| rows.apply_block(&rows.blocks[b as usize], &step, du));
+    outcome
 }

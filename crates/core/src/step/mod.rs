@@ -1,6 +1,7 @@
 //! One frame of simulated time, by either of two steppers.
 
 mod backtracking;
+mod budget;
 mod contact_rows;
 mod contacts;
 mod context;
@@ -15,6 +16,7 @@ mod unreachable_joints;
 mod warm_start;
 
 pub use backtracking::Backtracking;
+pub(crate) use budget::WorkMeter;
 pub(crate) use contacts::Workspace;
 pub(crate) use moment::Moment;
 pub use time_stepping::TimeStepping;

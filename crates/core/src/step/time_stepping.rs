@@ -48,6 +48,7 @@ use crate::contact::time_of_impact::time_contacts;
 use crate::each_object::{Numbers, each_object};
 use crate::integrators::context::free_motion;
 use crate::object::Level;
+use crate::solver::SolverSettings;
 use crate::world::view::Entry;
 use crate::world::{Coordinates, Core, StepError};
 
@@ -108,6 +109,7 @@ impl TimeStepping {
     /// Takes one sub-step of `h` seconds.
     pub(crate) fn substep(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
         core.implicit = true;
+        core.meter.start_substep(core.state.time, h);
         let mut middle = core.moment();
         self.advance(core, &mut middle, h)?;
         core.moments.push(middle);
@@ -194,7 +196,9 @@ impl TimeStepping {
             work.c[block.row as usize] += reach + turning - target.velocity;
         }
         warm_start(core, work, h);
-        solve(core, work, core.settings.solver_settings, 1.0, |b| keep[b]);
+        let settings =
+            SolverSettings { budget: core.meter.for_solve(work.rows.blocks.len()), ..core.settings.solver_settings };
+        solve(core, work, settings, 1.0, |b| keep[b]);
         keep.iter().zip(&work.rows.blocks).filter(|(k, _)| !**k).for_each(|(_, b)| work.lambda[b.range()].fill(0.0));
         u.iter_mut().zip(&work.du).for_each(|(u, du)| *u += du);
     }

@@ -10,7 +10,7 @@ use crate::object::part_state::{Forces, PartState, Wrench};
 use crate::report::StepReport;
 use crate::settings::Settings;
 use crate::solver::RowSolver;
-use crate::step::Moment;
+use crate::step::{Moment, WorkMeter};
 use crate::threads::Threads;
 use crate::world::view::{Entry, ObjectId, Objects, Table, WorldView};
 use tumble_collide::{BroadPhase, SweepAndPrune, Vec3};
@@ -126,6 +126,8 @@ pub struct Core {
     pub(crate) detect_scratch: DetectorBuffers,
     pub(crate) contacts: Vec<ContactPoint>,
     pub(crate) report: StepReport,
+    /// Work of the frame, and its budget.
+    pub(crate) meter: WorkMeter,
     /// Serial numbers of sleeping objects that the frame disturbs.
     pub(crate) needs_wake: Vec<u32>,
 }
@@ -166,6 +168,7 @@ impl Core {
             detect_scratch: DetectorBuffers::default(),
             contacts: Vec::new(),
             report: StepReport::default(),
+            meter: WorkMeter::default(),
             needs_wake: Vec::new(),
         }
     }

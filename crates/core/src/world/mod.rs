@@ -113,7 +113,8 @@ impl World {
     /// they are.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), WorldError> {
         settings.validate()?;
-        if settings.with_threads(self.core.settings.threads) != self.core.settings {
+        let now = &self.core.settings;
+        if settings.with_threads(now.threads).with_budget(now.solver_settings.budget) != *now {
             self.core.wake_all();
         }
         self.core.settings = settings;
@@ -134,12 +135,14 @@ impl World {
         std::mem::swap(&mut self.contacts_before, &mut core.contacts);
         let report_before = std::mem::take(&mut core.report);
         core.needs_wake.clear();
+        core.meter.reset();
         core.integration().refresh(); // constants and switches may have changed
         core.wake_disturbed();
         loop {
             let requests = core.needs_wake.len();
             core.clear_contact_forces();
             core.detect_scratch.forget();
+            core.meter.start_frame(core.settings.solver_settings.budget, self.before.time + core.settings.dt);
             let done = self.stepper.step(StepContext { core });
             if let Err(error) = done.and_then(|()| check_duration(self.stepper.name(), core, self.before.time)) {
                 core.set_state(&self.before);
@@ -158,6 +161,7 @@ impl World {
         }
         core.fall_asleep();
         core.report.asleep = core.objects().iter().filter(|e| e.asleep).count() as u32;
+        core.report.relaxations = core.meter.done();
         core.state.clear_applied();
         core.state.keep_accelerations(&core.derived.part_states);
         core.state.frame += 1;

@@ -154,7 +154,7 @@ impl RowSolver for Idle {
         "idle"
     }
     fn solve(&self, _: &Rows, _: &[u32], _: &[f64], _: &mut [f64], _: &mut [f64], _: SolverSettings) -> SolveReport {
-        SolveReport { iterations: 0, converged: true, ray: false }
+        SolveReport { iterations: 0, converged: true, ray: false, relaxations: 0 }
     }
     fn fork(&self) -> Box<dyn RowSolver> {
         Box::new(Idle)

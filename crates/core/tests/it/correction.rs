@@ -25,7 +25,7 @@ impl RowSolver for Idle {
         _: SolverSettings,
     ) -> SolveReport {
         blocks.iter().for_each(|&b| lambda[rows.blocks[b as usize].range()].fill(0.0));
-        SolveReport { iterations: 0, converged: true, ray: false }
+        SolveReport { iterations: 0, converged: true, ray: false, relaxations: 0 }
     }
 
     fn fork(&self) -> Box<dyn RowSolver> {

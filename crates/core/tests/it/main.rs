@@ -16,6 +16,7 @@ mod articulated_limits;
 mod articulated_random;
 mod articulated_swings;
 mod articulated_world;
+mod budget;
 mod chains;
 mod common;
 mod correction;

@@ -70,6 +70,7 @@ fn pile(stepper: &str) -> World {
             max_sweeps: 200_000,
             max_relaxations: u32::MAX,
             tolerance: 1e-12,
+            budget: None,
         }))
         .unwrap();
     ground(&mut world, 0.0, 0.0);

@@ -450,6 +450,9 @@ class StepReport:
     def iterations(self) -> int:
         """Iterations of the largest solve."""
     @property
+    def relaxations(self) -> int:
+        """Work of all solves in block relaxations, which ``World.budget`` bounds."""
+    @property
     def asleep(self) -> int:
         """Objects asleep at the end of the step."""
     @property
@@ -671,7 +674,8 @@ class World:
     moved by less than sleep_within (meters) sleep until something touches them; None: never.
     combine_restitution, combine_friction: rule for the coefficients of a pair, ``"min"``,
     ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``. threads: threads of a step, 0 for
-    as many as cores; no number changes the result. Names and defaults are those of scene files.
+    as many as cores; no number changes the result. budget: largest work of a step in block
+    relaxations, None for no bound. Names and defaults are those of scene files.
 
     One thread at a time: while one thread steps a world, calls on it from another raise
     ``BusyError``. The interpreter is released while a world steps.
@@ -693,6 +697,7 @@ class World:
         combine_restitution: Combine = "max",
         combine_friction: Combine = "geometric_mean",
         threads: int = 1,
+        budget: int | None = None,
     ) -> World: ...
     @staticmethod
     def load(
@@ -703,6 +708,7 @@ class World:
         integrator: Integrator | None = None,
         solver: Solver | None = None,
         threads: int | None = None,
+        budget: int | None = None,
     ) -> World:
         """Loads the world of a scene: the path of a ``scene.toml`` or of its folder, or the name of a
         shipped scene.
@@ -752,6 +758,15 @@ class World:
         """
     @threads.setter
     def threads(self, value: int) -> None: ...
+    @property
+    def budget(self) -> int | None:
+        """Largest work of a step in block relaxations (``report.relaxations`` is the work of the last
+        one), None for no bound. A step that needs more is less accurate, and ``report.residual`` says by
+        how much. The same budget gives the same result on every machine. It may change between any two
+        steps, and wakes nothing.
+        """
+    @budget.setter
+    def budget(self, value: int | None) -> None: ...
     @property
     def combine_restitution(self) -> Combine:
         """Combination rule for restitution: ``"min"``, ``"max"``, ``"average"``, ``"product"`` or

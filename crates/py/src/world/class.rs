@@ -46,7 +46,8 @@ use tumble::scene::{SceneFile, resolve_scene};
 /// moved by less than sleep_within (meters) sleep until something touches them; None: never.
 /// combine_restitution, combine_friction: rule for the coefficients of a pair, ``"min"``,
 /// ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``. threads: threads of a step, 0 for
-/// as many as cores; no number changes the result. Names and defaults are those of scene files.
+/// as many as cores; no number changes the result. budget: largest work of a step in block
+/// relaxations, None for no bound. Names and defaults are those of scene files.
 ///
 /// One thread at a time: while one thread steps a world, calls on it from another raise
 /// ``BusyError``. The interpreter is released while a world steps.
@@ -83,10 +84,10 @@ impl World {
     #[pyo3(
         text_signature = "(gravity=(0.0, 0.0, -9.81), dt=0.004166666666666667, stepper='time_stepping', integrator='verlet', \
         solver='gauss_seidel', *, substeps=1, iterations=200, contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, \
-        combine_restitution='max', combine_friction='geometric_mean', threads=1)"
+        combine_restitution='max', combine_friction='geometric_mean', threads=1, budget=None)"
     )]
     #[pyo3(signature = (gravity=None, dt=0.004166666666666667, stepper="time_stepping", integrator="verlet", solver="gauss_seidel", *, substeps=1, iterations=200,
-        contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, combine_restitution="max", combine_friction="geometric_mean", threads=1))]
+        contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, combine_restitution="max", combine_friction="geometric_mean", threads=1, budget=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
         py: Python<'_>,
@@ -104,12 +105,13 @@ impl World {
         combine_restitution: &str,
         combine_friction: &str,
         #[pyo3(from_py_with = whole_number)] threads: u32,
+        budget: Option<u32>,
     ) -> Result<World> {
         let mut scene = SceneFile::parse("", "World")?;
         let world = &mut scene.world;
         world.gravity_m_per_s2 = vec3_or(gravity, "gravity", Vec3::from(world.gravity_m_per_s2))?.into();
         let (stepper, integrator, solver) = (Some(stepper), Some(integrator), Some(solver));
-        Choices { stepper, integrator, solver, dt: Some(dt), threads: Some(threads) }.apply(world)?;
+        Choices { stepper, integrator, solver, dt: Some(dt), threads: Some(threads), budget }.apply(world)?;
         (world.substeps, world.iterations) = (substeps, iterations);
         (world.contact_tolerance_m, world.integrator_tolerance) = (contact_tolerance, integrator_tolerance);
         (world.sleep_after_s, world.sleep_within_m) = (sleep_after, sleep_within);
@@ -125,7 +127,7 @@ impl World {
     /// ``MissingFileError`` (a ``FileNotFoundError``); a file with problems raises ``SceneError``
     /// (a ``ValueError``), which lists all of them with line and column.
     #[staticmethod]
-    #[pyo3(signature = (path_or_name, *, dt=None, stepper=None, integrator=None, solver=None, threads=None))]
+    #[pyo3(signature = (path_or_name, *, dt=None, stepper=None, integrator=None, solver=None, threads=None, budget=None))]
     fn load(
         py: Python<'_>,
         path_or_name: &Bound<'_, PyAny>,
@@ -134,12 +136,13 @@ impl World {
         integrator: Option<&str>,
         solver: Option<&str>,
         threads: Option<u32>,
+        budget: Option<u32>,
     ) -> Result<World> {
         let asked = path(path_or_name)?;
         let built = py.detach(|| {
             pool::run(|| {
                 let mut scene = resolve_scene(&asked.to_string_lossy(), &[])?.load()?;
-                Choices { stepper, integrator, solver, dt, threads }.apply(&mut scene.world)?;
+                Choices { stepper, integrator, solver, dt, threads, budget }.apply(&mut scene.world)?;
                 build(scene)
             })
         })?;
@@ -230,6 +233,20 @@ impl World {
     #[setter]
     fn set_threads(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] value: u32) -> Result<()> {
         self.set(py, |s| s.threads = value)
+    }
+
+    /// Largest work of a step in block relaxations (``report.relaxations`` is the work of the last
+    /// one), None for no bound. A step that needs more is less accurate, and ``report.residual`` says by
+    /// how much. The same budget gives the same result on every machine. It may change between any two
+    /// steps, and wakes nothing.
+    #[getter]
+    fn budget(&self) -> Result<Option<u32>> {
+        self.settings(|s| s.solver_settings.budget)
+    }
+
+    #[setter]
+    fn set_budget(&self, py: Python<'_>, value: Option<u32>) -> Result<()> {
+        self.set(py, |s| s.solver_settings.budget = value)
     }
 
     /// Combination rule for restitution: ``"min"``, ``"max"``, ``"average"``, ``"product"`` or

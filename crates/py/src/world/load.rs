@@ -14,6 +14,7 @@ pub struct Choices<'a> {
     pub solver: Option<&'a str>,
     pub dt: Option<f64>,
     pub threads: Option<u32>,
+    pub budget: Option<u32>,
 }
 
 impl Choices<'_> {
@@ -21,6 +22,7 @@ impl Choices<'_> {
     pub fn apply(&self, world: &mut WorldSettings) -> Result<()> {
         world.dt_s = self.dt.unwrap_or(world.dt_s);
         world.threads = self.threads.unwrap_or(world.threads);
+        world.budget = self.budget.or(world.budget);
         let invalid = |what: &str| {
             let what = what.to_string();
             move |e: tumble::scene::UnknownName| Error::value(format!("{what}: {e}"))

@@ -37,6 +37,8 @@ pub struct StepReport {
     rays: u32,
     /// Iterations of the largest solve.
     iterations: u32,
+    /// Work of all solves in block relaxations, which ``World.budget`` bounds.
+    relaxations: u64,
     /// Objects asleep at the end of the step.
     asleep: u32,
     /// Deepest penetration found, meters.
@@ -63,6 +65,7 @@ impl StepReport {
             worst_solve: worst,
             rays,
             iterations,
+            relaxations,
             max_penetration,
             unreachable_joint: out_of_reach,
             asleep,
@@ -86,6 +89,7 @@ impl StepReport {
             unconverged,
             rays,
             iterations,
+            relaxations,
             max_penetration,
             asleep,
             unreachable_joint: name,

@@ -139,7 +139,7 @@ impl SceneFile {
             .with_substeps(w.substeps)
             .with_integrator(w.integrator.into())
             .with_integrator_tolerance(w.integrator_tolerance)
-            .with_solver_settings(SolverSettings { max_sweeps: w.iterations, ..base.solver_settings })
+            .with_solver_settings(SolverSettings { max_sweeps: w.iterations, budget: w.budget, ..base.solver_settings })
             .with_contact_tolerance(w.contact_tolerance_m)
             .with_drift_tolerance(base.drift_tolerance.max(w.contact_tolerance_m))
             .with_sleep(w.sleep_after_s.map(|after| Sleep { after, within: w.sleep_within_m }))

@@ -185,6 +185,12 @@ impl<'a> Fields<'a> {
         }
     }
 
+    /// Returns an integer in `range`, or `None` without the key.
+    pub(crate) fn optional_integer(&mut self, key: &'static str, range: RangeInclusive<u32>) -> Option<u32> {
+        let value = self.value(key)?;
+        Some(self.as_integer(key, value, range))
+    }
+
     /// Returns `value` as an integer in `range`.
     pub(crate) fn as_integer(&self, key: &str, value: &Value<'_>, range: RangeInclusive<u32>) -> u32 {
         let expected = format!("an integer from {} to {}", range.start(), range.end());

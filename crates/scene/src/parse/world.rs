@@ -184,6 +184,8 @@ pub struct WorldSettings {
     pub solver: Solver,
     /// Largest number of sweeps of the iterative solver per solve, 1 to 100 000. Default 200.
     pub iterations: u32,
+    /// Largest work of a step in block relaxations, 1 to 4e9. Default: no bound.
+    pub budget: Option<u32>,
     /// `backtracking`: surfaces closer than this are in contact, and lower rebounds end, meters.
     /// Default 1e-7.
     pub contact_tolerance_m: f64,
@@ -215,6 +217,7 @@ impl Default for WorldSettings {
             integrator_tolerance: 1e-6,
             solver: Solver::GaussSeidel,
             iterations: 200,
+            budget: None,
             contact_tolerance_m: 1e-7,
             sleep_after_s: None,
             sleep_within_m: Sleep::default().within,
@@ -245,6 +248,7 @@ impl WorldSettings {
             integrator_tolerance: f.number_or("integrator_tolerance", ACCURACY, default.integrator_tolerance),
             solver: f.choice_or("solver", Solver::NAMES, default.solver),
             iterations: f.integer_or("iterations", 1..=100_000, default.iterations),
+            budget: f.optional_integer("budget", 1..=4_000_000_000),
             contact_tolerance_m: f.number_or("contact_tolerance_m", TOLERANCE, default.contact_tolerance_m),
             sleep_after_s: f.optional_number("sleep_after_s", AFTER),
             sleep_within_m: f.number_or("sleep_within_m", TOLERANCE, default.sleep_within_m),

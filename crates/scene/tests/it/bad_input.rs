@@ -228,6 +228,10 @@ fn numbers_out_of_range() {
         &["s.toml:2:14: `iterations` of [world] is 99999999999999999999; expected an integer from 1 to 100000"],
     );
     assert_errors(
+        "[world]\nbudget = 0\n",
+        &["s.toml:2:10: `budget` of [world] is 0; expected an integer from 1 to 4000000000"],
+    );
+    assert_errors(
         "[world]\nthreads = 1000\n",
         &["s.toml:2:11: `threads` of [world] is 1000; expected an integer from 0 to 256"],
     );

@@ -75,6 +75,10 @@ pub struct SceneOptions {
     /// result.
     #[arg(long, help_heading = "Stepping", value_name = "N", value_parser = clap::value_parser!(u32).range(0..=256))]
     pub threads: Option<u32>,
+    /// Largest work of a step in block relaxations (default: from the scene, or no bound). A step that
+    /// needs more is less accurate.
+    #[arg(long, help_heading = "Stepping", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4_000_000_000))]
+    pub budget: Option<u32>,
     #[command(flatten)]
     pub opening: OpeningOptions,
 }
@@ -89,6 +93,7 @@ impl SceneOptions {
         w.solver = self.solver.unwrap_or(w.solver);
         w.integrator = self.integrator.unwrap_or(w.integrator);
         w.threads = self.threads.unwrap_or(w.threads);
+        w.budget = self.budget.or(w.budget);
         Ok(scene)
     }
 }

@@ -62,10 +62,10 @@ pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
     let users = serve.user_colliders || serve.tracker.is_some() || serve.replay_input.is_some();
     let scene = &serve.scene;
     let method = scene.stepper.is_some() || scene.solver.is_some() || scene.integrator.is_some();
-    let stepping = scene.dt.is_some() || scene.threads.is_some() || method;
+    let stepping = scene.dt.is_some() || scene.threads.is_some() || scene.budget.is_some() || method;
     if serve.record.is_some() || users || stepping || serve.contacts {
         return Err(Failure::input(
-            "a replay shows what was recorded; --record, --user-colliders, --tracker, --replay-input, --contacts, --dt, --stepper, --solver, --integrator and --threads go with tumble cave",
+            "a replay shows what was recorded; --record, --user-colliders, --tracker, --replay-input, --contacts, --dt, --stepper, --solver, --integrator, --threads and --budget go with tumble cave",
         ));
     }
     server::run(serve, Some(&options.cave), Some(&options.file))

@@ -84,8 +84,15 @@ fn epsilon_of(b: &LocalBlock) -> f64 {
     REGULAR * b.diagonal
 }
 
-/// Writes multipliers into `lambda`. Returns their error and the number of factorizations.
-pub(super) fn solve(system: &mut System, lambda: &mut [f64], tolerance: f64, enough: f64, cheap: bool) -> (f64, u32) {
+/// Writes multipliers into `lambda`, with at most `most` factorizations. Returns their error and the
+/// number of factorizations.
+pub(super) fn solve(
+    system: &mut System,
+    lambda: &mut [f64],
+    (tolerance, enough): (f64, f64),
+    cheap: bool,
+    most: u32,
+) -> (f64, u32) {
     let (mut best, mut taken, mut history) = (f64::INFINITY, 0, Vec::new());
     let mut state = Interior::new(&system.island);
     loop {
@@ -100,7 +107,7 @@ pub(super) fn solve(system: &mut System, lambda: &mut [f64], tolerance: f64, eno
             lambda.copy_from_slice(&state.lambda);
         }
         let finished = best <= tolerance || taken >= ITERATIONS.1 && best <= enough;
-        if finished || stalled || taken == ITERATIONS.0 || error.is_nan() {
+        if finished || stalled || taken == ITERATIONS.0.min(most) || error.is_nan() {
             return (best, taken);
         }
         let System { island, structure, factor } = &mut *system;

@@ -113,8 +113,9 @@ impl<'a> Plan<'a> {
         (self.system.structure.work + assembly) / sweep
     }
 
-    /// Solves from the multipliers in `lambda`, which it replaces if it finds better ones.
-    pub fn solve(mut self, lambda: &mut [f64], tolerance: f64) -> Direct {
+    /// Solves from the multipliers in `lambda`, which it replaces if it finds better ones, by at most
+    /// `most` factorizations.
+    pub fn solve(mut self, lambda: &mut [f64], tolerance: f64, most: u32) -> Direct {
         let fastest = self.system.island.fastest;
         let cheap = self.system.island.dof <= SMALL || self.cost() < CHEAP;
         let near = if self.at_rest { NEAR.0 } else { NEAR.1 };
@@ -132,18 +133,20 @@ impl<'a> Plan<'a> {
         }
         let (mut error, mut taken) = (start, 0);
         if error > tolerance.goal && error.is_finite() && (self.at_rest && cheap || error <= near * fastest) {
-            (error, taken) = proximal::solve(system, &mut own, error, tolerance, (FACTORS.0, cheap));
+            (error, taken) = proximal::solve(system, &mut own, error, tolerance, (FACTORS.0.min(most), cheap));
         }
         if error.is_nan() || error > tolerance.solved {
             let mut interior = own.clone();
-            let (reached, factors) = interior_point::solve(system, &mut interior, tolerance.solved, enough, cheap);
+            let tolerances = (tolerance.solved, enough);
+            let (reached, factors) = interior_point::solve(system, &mut interior, tolerances, cheap, most - taken);
             taken += factors;
             if reached < error || error.is_nan() {
                 (error, own) = (reached, interior);
             }
         }
         if error > tolerance.goal && error.is_finite() && (cheap || error <= NEAR.0 * fastest) {
-            let (reached, factors) = proximal::solve(system, &mut own, error, tolerance, (last, cheap));
+            let (reached, factors) =
+                proximal::solve(system, &mut own, error, tolerance, (last.min(most - taken), cheap));
             (error, taken) = (reached, taken + factors);
         }
         if error < start || start.is_nan() {

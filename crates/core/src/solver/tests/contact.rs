@@ -251,7 +251,7 @@ fn walls_that_touch_are_no_contradiction_and_walls_that_crush_are() {
         &LcpPyramid,
         &bodies.rows,
         &vec![-1.0; bodies.rows.len],
-        SolverSettings { max_sweeps: 10, max_relaxations: u32::MAX, tolerance: 1e-9 },
+        SolverSettings { max_sweeps: 10, max_relaxations: u32::MAX, tolerance: 1e-9, budget: None },
     );
     assert!(crushed.outcome.ray && !crushed.outcome.converged);
     assert!(crushed.lambda.iter().all(|l| l.is_finite() && *l >= 0.0));

@@ -6,7 +6,7 @@ use crate::solver::{GaussSeidel, LcpPyramid, MAX_DIRECT_ROWS, SolverSettings, re
 use nalgebra::{DMatrix, DVector};
 
 /// The default settings of a step.
-const STEP: SolverSettings = SolverSettings { max_sweeps: 200, max_relaxations: 20_000, tolerance: 1e-9 };
+const STEP: SolverSettings = SolverSettings { max_sweeps: 200, max_relaxations: 20_000, tolerance: 1e-9, budget: None };
 const GRAVITY: [f64; 6] = [0.0, 0.0, 0.0, 0.0, 0.0, -9.81 / 60.0];
 
 /// Bars of 0.2 m along the sides of a regular polygon in a vertical plane (`closed`), or along a line.
@@ -175,7 +175,7 @@ fn linkages_among_other_rows_agree_with_pivoting() {
             &GaussSeidel,
             rows,
             &c,
-            SolverSettings { tolerance: 1e-12, max_sweeps: 20_000, max_relaxations: u32::MAX },
+            SolverSettings { tolerance: 1e-12, max_sweeps: 20_000, max_relaxations: u32::MAX, budget: None },
         );
         let pivoted = solve(&LcpPyramid, rows, &c, STEP);
         assert!(relaxed.outcome.converged && pivoted.outcome.converged, "{:?}", relaxed.outcome);
@@ -215,7 +215,7 @@ fn a_linkage_that_is_too_large_for_a_dense_factor_is_solved() {
     for links in [links + 1, 10 * links] {
         let large = Chain::hang(vec![1.0; links]);
         let c = large.pulled();
-        let settings = SolverSettings { max_sweeps: 200, max_relaxations: u32::MAX, tolerance: 1e-9 };
+        let settings = SolverSettings { max_sweeps: 200, max_relaxations: u32::MAX, tolerance: 1e-9, budget: None };
         let solved = solve(&GaussSeidel, &large.bodies.rows, &c, settings);
         let left = residual(&large.bodies.rows, &all(&large.bodies.rows), &c, &solved.lambda, &solved.du);
         assert!(solved.outcome.converged && left <= 1e-8, "{links} links: {left}");

@@ -4,7 +4,8 @@ use super::{Bodies, Random, UP, all, free, solve};
 use crate::constraint::rows::{RowSet, Rows};
 use crate::solver::{GaussSeidel, RowSolver, SolverSettings, residual};
 
-const USUAL: SolverSettings = SolverSettings { max_sweeps: 200, max_relaxations: 20_000, tolerance: 1e-9 };
+const USUAL: SolverSettings =
+    SolverSettings { max_sweeps: 200, max_relaxations: 20_000, tolerance: 1e-9, budget: None };
 const IMPULSE: f64 = 1.55 * 9.81 / 240.0;
 
 /// A bowling pin on its foot: on the middle of it and on five points of the rim.

@@ -17,7 +17,7 @@ fn of_two_feet_that_conflict_the_one_that_carries_less_slides() {
     for conflict in [1e-2, 1e-4, 1e-6] {
         let c = [-9.81, -conflict, 0.0, -9.81, 0.0, 0.0];
         let (mut lambda, mut du) = (vec![0.0; 6], vec![0.0; 6]);
-        let settings = SolverSettings { max_sweeps: 2000, max_relaxations: 1_000_000, tolerance: 1e-9 };
+        let settings = SolverSettings { max_sweeps: 2000, max_relaxations: 1_000_000, tolerance: 1e-9, budget: None };
         let outcome = GaussSeidel.solve(&bodies.rows, &all(&bodies.rows), &c, &mut lambda, &mut du, settings);
         // levers, and Coulomb at the foot that slides
         let (light, heavy) = (9.81 * near / (near + far), 9.81 * far / (near + far));
@@ -53,8 +53,12 @@ fn recorded_problems_are_solved() {
         }
         let blocks = all(&rows);
         let mut du = vec![0.0; 200];
-        let settings =
-            SolverSettings { max_sweeps: head[0] as u32, max_relaxations: head[1] as u32, tolerance: head[2] };
+        let settings = SolverSettings {
+            max_sweeps: head[0] as u32,
+            max_relaxations: head[1] as u32,
+            tolerance: head[2],
+            budget: None,
+        };
         let outcome = GaussSeidel.solve(&rows, &blocks, &c, &mut lambda, &mut du, settings);
         let left = residual(&rows, &blocks, &c, &lambda, &du);
         assert!(

@@ -5,7 +5,8 @@ use crate::constraint::rows::RowSet;
 use crate::solver::{GaussSeidel, LcpPyramid, RowSolver, SolverSettings, residual};
 
 const EDGE: f64 = 0.4;
-const SETTINGS: SolverSettings = SolverSettings { max_sweeps: 200, max_relaxations: 20_000, tolerance: 1e-9 };
+const SETTINGS: SolverSettings =
+    SolverSettings { max_sweeps: 200, max_relaxations: 20_000, tolerance: 1e-9, budget: None };
 const FALL: f64 = 9.81 / 60.0;
 
 /// Four corners of the face between cube `upper` and what is below it, `shift` to its side.

@@ -19,6 +19,7 @@
 //! Errors from before the step are reduced by a bounded amount. Friction takes no part.
 
 use super::super::Moment;
+use super::super::budget::shared;
 use super::super::contacts::{Limit, Workspace, displace};
 use super::super::islands::each_island;
 use super::{Contacts, Options, is_joint};
@@ -26,6 +27,9 @@ use crate::constraint::rows::{RowSet, Rows};
 use crate::object::RowTarget;
 use crate::solver::SolverSettings;
 use crate::world::Core;
+
+/// Share of the work that is left in a correction before a sub-step of `backtracking`.
+const IN_PLACE: f64 = 0.25;
 
 /// Moves the objects of islands with a violation above the tolerance. `gaps` are those of the
 /// limits at the present numbers. Returns whether anything moved.
@@ -69,8 +73,12 @@ pub(super) fn separate(
     let later = |&b: &u32| !in_place && (b as usize) >= contacts && waits(&targets[b as usize - contacts]);
     let mut moved = false;
     let Frictionless { rows, c, lambda, du } = &mut p;
+    let left_alone =
+        |blocks: &[u32]| blocks.iter().all(later) || blocks.iter().all(|&b| violation(b as usize, &work.c) <= least);
+    let budget = core.meter.left(if in_place { IN_PLACE } else { 1.0 });
+    let all = budget.map_or(0, |_| work.islands.iter().filter(|blocks| !left_alone(blocks)).map(<[u32]>::len).sum());
     let solve = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {
-        if blocks.iter().all(later) || blocks.iter().all(|&b| violation(b as usize, &work.c) <= least) {
+        if left_alone(blocks) {
             return false;
         }
         // limits and contacts of a body depend on each other through all its links; those of a pile
@@ -81,8 +89,10 @@ pub(super) fn separate(
             max_sweeps: core.settings.projection_sweeps.max(min_sweeps),
             max_relaxations: u32::MAX,
             tolerance: 0.1 * least / h,
+            budget: None,
         };
-        core.solver.solve(rows, blocks, c, lambda, du, solver_settings);
+        let solver_settings = shared(solver_settings, budget, blocks.len(), all);
+        core.meter.count(core.solver.solve(rows, blocks, c, lambda, du, solver_settings).relaxations);
         true
     };
     each_island(&core.threads, rows, work.islands.iter(), (lambda, du), solve, |solved| moved |= solved);

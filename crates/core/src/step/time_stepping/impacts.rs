@@ -18,6 +18,7 @@ use crate::contact::time_of_impact::time_to_close;
 use crate::integrators::context::free_motion;
 use crate::object::Level;
 use crate::step::Moment;
+use crate::step::budget::{IMPACTS, REBOUND};
 use crate::step::contacts::{build_rows, detect, push, row_velocities, whiten, zero};
 use crate::step::impact::{self, Candidate};
 use crate::world::{Coordinates, Core, StepError};
@@ -89,7 +90,8 @@ impl TimeStepping {
         whiten(middle.coordinates(core), &work.dp, h, u, du_force);
         let at_impact: Vec<f64> = (0..u.len()).map(|i| u[i] + self.impact_fraction[i].max(0.0) * du_force[i]).collect();
         after.clone_from(&at_impact);
-        impact::resolve(core, work, &self.candidates, (IMPACT_PASSES, false), after, &mut self.impact);
+        let budget = core.meter.left(IMPACTS);
+        impact::resolve(core, work, &self.candidates, (IMPACT_PASSES, false, budget), after, &mut self.impact);
         (0..u.len()).for_each(|i| after[i] = u[i] + (after[i] - at_impact[i]));
         Ok(())
     }
@@ -226,7 +228,11 @@ impl TimeStepping {
         }
         if parts.iter().any(|part| part.member) {
             let forces = work.lambda.clone();
-            impact::rebound(core, work, parts, u);
+            let budget = core.meter.left(REBOUND);
+            if !impact::rebound(core, work, parts, u, budget) {
+                work.lambda = forces;
+                return;
+            }
             late.copy_from_slice(&work.du);
             self.impact.iter_mut().zip(&work.lambda).for_each(|(total, late)| *total += late);
             work.lambda = forces;

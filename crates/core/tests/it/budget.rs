@@ -1,0 +1,133 @@
+//! The budget bounds the work of a frame, and quality degrades in a way that stands.
+
+use crate::common::{G, cube, ground, position, world};
+use tumble_core::collide::{Pose, Shape, Vec3};
+use tumble_core::{Material, ObjectId, RigidBody, World};
+
+/// Drops 200 boxes of various sizes in columns onto the ground, and stands a tower of 10 boxes beside
+/// them. Returns the boxes and the tower.
+fn heap_and_tower(stepper: &str, budget: Option<u32>) -> (World, Vec<ObjectId>, Vec<ObjectId>) {
+    let mut world = world(stepper, 1.0 / 60.0);
+    world.set_settings(world.settings().with_budget(budget)).unwrap();
+    ground(&mut world, 0.0, 0.5);
+    let size = |i: usize, k: usize| 0.08 + 0.12 * ((i * 37 + k * 53) % 101) as f64 / 100.0;
+    let mut add = |shape: Shape, at: [f64; 3]| {
+        let body = RigidBody::new(shape).with_material(Material { restitution: 0.2, ..Material::default() });
+        world.add(body.with_pose(Pose::translation(at[0], at[1], at[2]))).unwrap()
+    };
+    let tower = (0..10).map(|i| add(cube(0.4), [3.0, 0.0, 0.4 * (i as f64 + 0.5)])).collect();
+    let heap = (0..200)
+        .map(|i| {
+            let shape = Shape::cuboid(Vec3::new(size(i, 0), size(i, 1), size(i, 2))).unwrap();
+            add(shape, [-0.5 + 0.22 * (i % 5) as f64, -0.5 + 0.22 * (i / 5 % 5) as f64, 0.15 + 0.25 * (i / 25) as f64])
+        })
+        .collect();
+    (world, heap, tower)
+}
+
+const BUDGET: u32 = 20_000;
+
+/// Returns the largest displacement of any body, m.
+fn moved(world: &World, bodies: &[ObjectId], start: &[Vec3]) -> f64 {
+    bodies.iter().zip(start).map(|(b, start)| (position(world, *b) - start).norm()).fold(0.0, f64::max)
+}
+
+/// Four seconds of 200 boxes that fall, with an eighteenth of the work that their worst frame takes
+/// without a budget (370,000). Then the budget is lifted.
+#[test]
+fn a_heap_under_a_tight_budget_is_less_accurate_and_stands() {
+    let (mut world, heap, tower) = heap_and_tower("time_stepping", Some(BUDGET));
+    let start: Vec<Vec3> = tower.iter().map(|b| position(&world, *b)).collect();
+    let weight: f64 = heap.iter().map(|b| G * world.get::<RigidBody>(*b).unwrap().mass()).sum();
+    let (first, mut unconverged) = (world.energy().total(), 0);
+    let step = |world: &mut World| {
+        let before = world.energy().total();
+        let report = *world.step().unwrap();
+        let grown = world.energy().total() - before;
+        // a correction lifts bodies by what they overlapped, and nothing else adds energy
+        assert!(grown <= weight * report.max_penetration + 1e-6, "{grown} J, {report:?}");
+        report
+    };
+    for frame in 0..240 {
+        let report = step(&mut world);
+        assert!(report.relaxations <= u64::from(BUDGET), "{report:?}");
+        let deepest = if frame < 60 { 0.05 } else { 0.02 };
+        assert!(report.max_penetration < deepest, "frame {frame}: {report:?}");
+        unconverged += report.unconverged;
+    }
+    assert!(unconverged > 240, "{unconverged}: the budget is not tight");
+    assert!(world.energy().total() < first);
+    assert!(moved(&world, &tower, &start) < 1e-6);
+    world.set_settings(world.settings().with_budget(None)).unwrap();
+    let rests = (0..600).any(|_| step(&mut world).max_penetration < 1e-6);
+    assert!(rests, "{:?}", world.report());
+}
+
+/// `backtracking` takes the rest of a frame as one sub-step of `time_stepping` when its work is spent.
+#[test]
+fn backtracking_keeps_to_its_budget() {
+    let (mut world, _, tower) = heap_and_tower("backtracking", Some(50_000));
+    let start: Vec<Vec3> = tower.iter().map(|b| position(&world, *b)).collect();
+    for _ in 0..60 {
+        let report = *world.step().unwrap();
+        assert!(report.relaxations <= 50_000 && report.max_penetration < 0.05, "{report:?}");
+    }
+    assert!(moved(&world, &tower, &start) < 1e-6);
+}
+
+/// The same budget gives the same bits on one and two threads, after a fork and from an archive.
+#[test]
+fn the_same_budget_gives_the_same_bits_on_any_number_of_threads() {
+    let bits = |world: &World| -> Vec<u64> {
+        let report = world.report();
+        let counts = [report.relaxations, report.unconverged.into(), report.residual.to_bits()];
+        world.state().iter().map(|x| x.to_bits()).chain(counts).collect()
+    };
+    let record = |world: &mut World, frames: usize| -> Vec<Vec<u64>> {
+        let step = |_| {
+            world.step().unwrap();
+            bits(world)
+        };
+        (0..frames).map(step).collect()
+    };
+    let alone = record(&mut heap_and_tower("time_stepping", Some(BUDGET)).0, 60);
+    let (mut world, ..) = heap_and_tower("time_stepping", Some(BUDGET));
+    world.set_settings(world.settings().with_threads(2)).unwrap();
+    assert!(record(&mut world, 30) == alone[..30]);
+    let mut read = World::from_archive(&world.archive(&[]).unwrap(), &mut |_| None).unwrap();
+    assert_eq!(read.settings().solver_settings.budget, Some(BUDGET));
+    assert!(record(&mut read, 30) == alone[30..], "from an archive");
+    assert!(record(&mut world.fork(), 30) == alone[30..], "a fork");
+    assert!(record(&mut world, 30) == alone[30..]);
+}
+
+/// One sweep of a solve is the least, whatever the budget.
+#[test]
+fn a_budget_of_one_relaxation_still_holds_boxes_up() {
+    let (mut world, ..) = heap_and_tower("time_stepping", Some(1));
+    for _ in 0..120 {
+        let report = *world.step().unwrap();
+        assert!(report.relaxations <= 2 * u64::from(report.contacts) && report.max_penetration < 0.2, "{report:?}");
+    }
+}
+
+#[test]
+fn a_new_budget_wakes_nothing() {
+    let sleep = tumble_core::Sleep { after: 0.1, ..Default::default() };
+    let mut world = world("time_stepping", 1.0 / 240.0);
+    world.set_settings(world.settings().with_sleep(Some(sleep))).unwrap();
+    ground(&mut world, 0.0, 0.5);
+    let body = world.add(RigidBody::new(cube(0.2)).with_pose(Pose::translation(0.0, 0.0, 0.1))).unwrap();
+    (0..100).for_each(|_| {
+        world.step().unwrap();
+    });
+    assert!(world.asleep(body));
+    world.set_settings(world.settings().with_budget(Some(5000))).unwrap();
+    assert!(world.asleep(body));
+}
+
+#[test]
+fn a_budget_of_nothing_is_an_error() {
+    let error = World::new(tumble_core::Settings::default().with_budget(Some(0))).err().unwrap();
+    assert_eq!(error.to_string(), "budget is 0; it must be above 0 relaxations");
+}
