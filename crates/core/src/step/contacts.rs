@@ -447,7 +447,11 @@ pub(crate) fn solve(
     let mut ray = false;
     let Workspace { rows, islands, c, lambda, du, .. } = work;
     let shared = islands.iter().map(<[u32]>::len).filter(|n| *n > OWN_BUDGET).sum();
-    let (solver, threads, mut solves) = (&core.solver, &core.threads, Solves::new(&mut core.report));
+    let (solver, threads, mut solves) = (
+        &core.solver,
+        &core.threads,
+        Solves::new(&mut core.report, core.solver.as_ref(), unit * solver_settings.tolerance),
+    );
     let settings_of = |blocks: usize| {
         if blocks > OWN_BUDGET { solver_settings.shared_by(blocks, shared) } else { solver_settings }
     };
@@ -510,7 +514,7 @@ pub(crate) fn solve(
             solved.into_iter().for_each(add);
         }
     }
-    solves.finish(core.table.with(&core.state.objects), rows, islands, unit * solver_settings.tolerance);
+    solves.finish(core.table.with(&core.state.objects), rows, islands);
     ray
 }
 

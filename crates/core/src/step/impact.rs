@@ -210,9 +210,9 @@ fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], parts: &[Part], (el
         }
         Some((outcome, left))
     };
-    let mut solves = Solves::new(&mut core.report);
+    let mut solves = Solves::new(&mut core.report, solver, solver_settings.tolerance);
     each_island(&core.threads, rows, islands.iter(), (lambda, du), solve, |solved| solves.add(solved));
-    solves.finish(core.table.with(&core.state.objects), rows, islands, solver_settings.tolerance);
+    solves.finish(core.table.with(&core.state.objects), rows, islands);
 }
 
 fn rows_of<'a>(rows: &'a Rows, blocks: &'a [u32]) -> impl Iterator<Item = usize> + 'a {

@@ -2,15 +2,22 @@
 
 use crate::constraint::rows::Rows;
 use crate::report::{StepReport, WorstSolve};
-use crate::solver::{Islands, LargestResidual, SolveReport};
+use crate::solver::{Islands, LargestResidual, LcpPyramid, LcpSliding, RowSolver, SolveReport};
 use crate::world::view::{ObjectId, Objects};
 
 /// A solve counts as converged below this number of tolerances, the change that ends the sweeps.
 const SOLVED: f64 = 10.0;
+/// Least tolerance, m/s: that of impacts is relative to their speed, and may be near rounding.
+const LEAST_TOLERANCE: f64 = 1e-9;
 
 /// Enters the solves of a stage in the report.
 pub(super) struct Solves<'a> {
     report: &'a mut StepReport,
+    /// Largest residual of a converged solve, m/s.
+    tolerance: f64,
+    /// Whether a larger residual means that a solve did not converge. Pivoting solvers solve another
+    /// model, so their residuals say nothing about that.
+    exact_cone: bool,
     /// Number of islands so far.
     islands: usize,
     /// Island, largest residual and outcome of the worst solve of this stage, if it is the worst of
@@ -19,15 +26,19 @@ pub(super) struct Solves<'a> {
 }
 
 impl<'a> Solves<'a> {
-    pub fn new(report: &'a mut StepReport) -> Solves<'a> {
-        Solves { report, islands: 0, worst: None }
+    /// `tolerance`: change of a row velocity that ends the sweeps of `solver`, m/s.
+    pub fn new(report: &'a mut StepReport, solver: &dyn RowSolver, tolerance: f64) -> Solves<'a> {
+        let exact_cone = ![LcpPyramid.name(), LcpSliding.name()].contains(&solver.name());
+        Solves { report, tolerance: SOLVED * tolerance.max(LEAST_TOLERANCE), exact_cone, islands: 0, worst: None }
     }
 
     /// Adds the solve of the next island; `None` if it was not solved.
     pub fn add(&mut self, solved: Option<(SolveReport, LargestResidual)>) {
         let island = self.islands;
         self.islands += 1;
-        let Some((outcome, largest)) = solved else { return };
+        let Some((mut outcome, largest)) = solved else { return };
+        // sweeps that change little may still be far from the solution
+        outcome.converged &= !self.exact_cone || largest.residual <= self.tolerance;
         self.report.solved(outcome);
         if largest.residual > self.report.residual {
             self.report.residual = largest.residual;
@@ -35,9 +46,8 @@ impl<'a> Solves<'a> {
         }
     }
 
-    /// Names the objects of the worst solve. `tolerance`: change of a row velocity that ends the
-    /// sweeps, m/s.
-    pub fn finish(self, objects: Objects, rows: &Rows, islands: &Islands, tolerance: f64) {
+    /// Names the objects of the worst solve.
+    pub fn finish(self, objects: Objects, rows: &Rows, islands: &Islands) {
         let Some((island, largest, outcome)) = self.worst else { return };
         let blocks = || islands.get(island).iter().map(|&b| &rows.blocks[b as usize]);
         let mut starts: Vec<u32> = blocks().flat_map(|block| block.sides()).map(|side| side.u).collect();
@@ -54,7 +64,7 @@ impl<'a> Solves<'a> {
             other,
             objects: starts.len() as u32,
             rows: blocks().map(|block| block.set.rows() as u32).sum(),
-            tolerance: SOLVED * tolerance,
+            tolerance: self.tolerance,
             converged: outcome.converged,
         };
         self.report.worst_solve = first.map(worst);

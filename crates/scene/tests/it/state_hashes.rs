@@ -52,12 +52,12 @@ macro_rules! table {
 table! {
     billiards_time_stepping: "billiards", TimeStepping, "d7521db61a4044f1", "dde13f97df02c7af";
     billiards_backtracking: "billiards", Backtracking, "dde525a4d714d38e", "453edf585fcd7eb4";
-    bowling_time_stepping: "bowling", TimeStepping, "ed36688f395747c2", "96c774922092da23";
+    bowling_time_stepping: "bowling", TimeStepping, "ed36688f395747c2", "4ea80a7f29117a6d";
     bowling_backtracking: "bowling", Backtracking, "53db2850eca4d504", "3968829bfd6d9f63";
     chain_time_stepping: "chain", TimeStepping, "a9d265bcd59cde4d", "c77dcc987d556a82";
     chain_backtracking: "chain", Backtracking, "cf938a3028a77cdf", "aec0064e0240df39";
     falling_time_stepping: "falling", TimeStepping, "d30b150920d659ba", "77731db98e3ce6e3";
-    falling_backtracking: "falling", Backtracking, "54717a0ec921de2b", "302e74142fd2c4bd";
+    falling_backtracking: "falling", Backtracking, "f5e89fe4764d71d9", "3101f005da0aeac5";
     incline_time_stepping: "incline", TimeStepping, "c8d35ebc2e29a12a", "7b8c108360d8ae2c";
     incline_backtracking: "incline", Backtracking, "e55d9c0fdc513c1e", "a93b5ab540a60671";
     pendulum_time_stepping: "pendulum", TimeStepping, "d403df437fc48e8e", "07a9ea1905d7c967";
@@ -67,7 +67,7 @@ table! {
     robot_time_stepping: "robot", TimeStepping, "d2ff6677a2f25e68", "d7993967865d7389";
     robot_backtracking: "robot", Backtracking, "d9bdae46cf681082", "e3f2d884e335d1a2";
     skeleton_time_stepping: "skeleton", TimeStepping, "4601701823a7deff", "00287ccc74d46029";
-    skeleton_backtracking: "skeleton", Backtracking, "baf4468ab9526f27", "897dd5b4b2713228";
+    skeleton_backtracking: "skeleton", Backtracking, "438f18ce0bbb9bdd", "2ac456022b491e61";
     stack_time_stepping: "stack", TimeStepping, "20ad0965d34e48bf", "ecd253fcdb6efb2e";
     stack_backtracking: "stack", Backtracking, "f3e4e18dc66cf3d0", "e2c70bafe5205c09";
 }

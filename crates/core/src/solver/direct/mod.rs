@@ -6,7 +6,9 @@
 //!
 //! 1. from multipliers that are near, a few steps of semismooth Newton (`proximal.rs`);
 //! 2. else the interior point method from the beginning (`interior_point.rs`);
-//! 3. and semismooth Newton for the digits that it leaves.
+//! 3. and semismooth Newton for the digits that it leaves;
+//! 4. of a small island that is still not solved, semismooth Newton from the forces with which all
+//!    contacts stick.
 //!
 //! Both factor matrices `1 + Σ Y·G·Yᵀ` with a 3×3 matrix `G` per contact (`lu.rs`), with one block
 //! row per object (`structure.rs`): linear cost in a chain or a tower, more where contacts form
@@ -44,6 +46,8 @@ const NEAR: (f64, f64) = (1e-2, 1e-5);
 /// Maximum number of factorizations from multipliers that are near, and of the last phase for a
 /// small and a large island.
 const FACTORS: (u32, u32, u32) = (8, 30, 8);
+/// Penalties of the forces with which all contacts stick, in the order in which they are tried.
+const STICKING: [f64; 3] = [1e9, 1e6, 1e4];
 /// Degrees of freedom of a small island, on which no effort is spared.
 const SMALL: usize = 120;
 /// Error, relative to the fastest row, that ends the interior point method of a large island early.
@@ -148,6 +152,22 @@ impl<'a> Plan<'a> {
             let (reached, factors) =
                 proximal::solve(system, &mut own, error, tolerance, (last.min(most - taken), cheap));
             (error, taken) = (reached, taken + factors);
+        }
+        for penalty in STICKING.into_iter().filter(|_| small) {
+            if error <= tolerance.solved || taken + 1 >= most {
+                break;
+            }
+            taken += 1;
+            let Some(mut stuck) = proximal::sticking(system, &own, penalty) else { continue };
+            let near = system.island.error_of(&stuck);
+            if near.is_finite() {
+                let left = last.min(most - taken);
+                let (reached, factors) = proximal::solve(system, &mut stuck, near, tolerance, (left, cheap));
+                taken += factors;
+                if reached < error || error.is_nan() {
+                    (error, own) = (reached, stuck);
+                }
+            }
         }
         if error < start || start.is_nan() {
             system.island.write(&own, lambda);
