@@ -205,6 +205,14 @@ impl Rows {
         }
     }
 
+    /// Adds `Y·λ` of row `k` of one block to `u`.
+    pub(crate) fn push_row(&self, block: &Block, k: usize, lambda: f64, u: &mut [f64]) {
+        for s in block.sides() {
+            let u = &mut u[s.u as usize..(s.u + s.dof) as usize];
+            u.iter_mut().zip(self.response(s, k)).for_each(|(u, y)| *u += lambda * y);
+        }
+    }
+
     /// Returns `K + R`, with `K = YᵀY`, of the given blocks: dense, row-major, in the order of
     /// their rows. For the pivoting solvers and tests.
     pub fn dense(&self, blocks: &[u32]) -> Vec<f64> {
@@ -246,14 +254,25 @@ impl Rows {
     }
 }
 
-/// Returns `a·b`. Six numbers (a rigid body) are added in two sums, which the processor computes in
-/// parallel.
+/// Returns `a·b`, in several sums that the processor computes in parallel: two for the six numbers of a
+/// rigid body, eight for more.
 #[inline]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    if let (Some(a), Some(b)) = (a.as_array::<6>(), b.as_array::<6>()) {
-        return dot6(a, b);
+    match (a.as_array::<6>(), b.as_array::<6>()) {
+        (Some(a), Some(b)) => dot6(a, b),
+        _ if a.len() < 8 => a.iter().zip(b).map(|(a, b)| a * b).sum(),
+        _ => long_dot(a, b),
     }
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn long_dot(a: &[f64], b: &[f64]) -> f64 {
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
+    let mut sums = [0.0; 8];
+    for (a, b) in a.iter().zip(b) {
+        (0..8).for_each(|k| sums[k] += a[k] * b[k]);
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7])) + rest
 }
 
 #[inline(always)]

@@ -205,47 +205,57 @@ impl MovingPair<'_> {
 
 /// Replaces the contacts of fast convex parts that close within `h` by those at the time at which
 /// the parts meet: the first contact, and the others of that place that may follow it in the rest
-/// of the step. Removes contacts that do not close on the way.
+/// of the step. Removes contacts that do not close on the way. `predicted` is working memory.
 pub(crate) fn time_contacts(
     objects: Objects,
     (owners, part_states): (&[Owner], &[PartState]),
     (settings, threads): (&Settings, &Threads),
     h: f64,
     contact_constraints: &mut Vec<ContactConstraint>,
+    predicted: &mut Vec<ContactConstraint>,
 ) {
     let part = |index: u32| {
         let owner = owners[index as usize];
         let body: &dyn Collidable = objects.at(owner.place as usize).object.collidable()?;
         Some((body.shape(owner.part as usize)?, body.contact_mode(owner.part as usize)))
     };
-    let predicted = std::mem::take(contact_constraints);
-    let time_pair = |contacts: &[ContactConstraint], found: &mut Vec<Contact>, out: &mut Vec<ContactConstraint>| {
-        let states = [contacts[0].a, contacts[0].b].map(|index| &part_states[index as usize]);
+    // the pair of a contact, and the number of samples of its motion, if it is fast
+    let timed = |contact: &ContactConstraint| {
+        let states = [contact.a, contact.b].map(|index| &part_states[index as usize]);
         let motion = h * (states[0].velocity - states[1].velocity).norm();
-        let pair = part(contacts[0].a).zip(part(contacts[0].b)).and_then(|((a, mode_a), (b, mode_b))| {
-            let size = a.bounding_radius().min(b.bounding_radius());
-            // contacts of a mesh begin and end with its features
-            let timed = motion >= SHORT_MOTION * size && !a.has_tree() && !b.has_tree();
-            let pair = MovingPair { mode: mode_a.of_pair(mode_b), shapes: [a, b], part_states: states };
-            timed.then_some((pair, (motion / (SHORT_MOTION * size)).min(MAX_SAMPLES).ceil()))
-        });
-        match pair {
-            Some((pair, samples)) => {
-                pair.time_contacts(contacts, (h, settings.drift_tolerance, samples), found, out);
-            }
-            None => out.extend_from_slice(contacts),
-        }
+        let ((a, mode_a), (b, mode_b)) = part(contact.a).zip(part(contact.b))?;
+        let size = a.bounding_radius().min(b.bounding_radius());
+        // contacts of a mesh begin and end with its features
+        let timed = motion >= SHORT_MOTION * size && !a.has_tree() && !b.has_tree();
+        let pair = MovingPair { mode: mode_a.of_pair(mode_b), shapes: [a, b], part_states: states };
+        timed.then_some((pair, (motion / (SHORT_MOTION * size)).min(MAX_SAMPLES).ceil()))
     };
+    let same_pair = |x: &ContactConstraint, y: &ContactConstraint| x.key.pair == y.key.pair;
+    let slow = contact_constraints.chunk_by(same_pair).take_while(|contacts| timed(&contacts[0]).is_none());
+    let slow: usize = slow.map(<[ContactConstraint]>::len).sum();
+    if slow == contact_constraints.len() {
+        return;
+    }
+    predicted.clear();
+    predicted.extend(contact_constraints.drain(slow..));
+    let pieces = pieces_of_pairs(threads, predicted);
     let mut pieces: Vec<(&[ContactConstraint], Vec<ContactConstraint>)> =
-        pieces_of_pairs(threads, &predicted).into_iter().map(|piece| (piece, Vec::new())).collect();
+        pieces.into_iter().map(|piece| (piece, Vec::new())).collect();
+    // the first piece follows the contacts that stay
+    std::mem::swap(contact_constraints, &mut pieces[0].1);
     threads.each(pieces.iter_mut(), |(piece, out)| {
         let mut found = Vec::new();
-        let pairs = piece.chunk_by(|x, y| x.key.pair == y.key.pair);
-        pairs.for_each(|contacts| time_pair(contacts, &mut found, out));
+        for contacts in piece.chunk_by(same_pair) {
+            match timed(&contacts[0]) {
+                Some((pair, samples)) => {
+                    pair.time_contacts(contacts, (h, settings.drift_tolerance, samples), &mut found, out);
+                }
+                None => out.extend_from_slice(contacts),
+            }
+        }
     });
-    let mut timed = pieces.into_iter().map(|(_, out)| out);
-    *contact_constraints = timed.next().unwrap_or_default();
-    timed.for_each(|mut more| contact_constraints.append(&mut more));
+    std::mem::swap(contact_constraints, &mut pieces[0].1);
+    pieces.into_iter().for_each(|(_, mut timed)| contact_constraints.append(&mut timed));
 }
 
 /// Returns pieces of the contacts; no pair is divided.
@@ -281,7 +291,7 @@ impl MovingPair<'_> {
         match met {
             Some((time, first)) if time > 0.0 => {
                 let begin = out.len();
-                self.contacts_after(time, self.reach(&first.point, horizon - time), found);
+                self.contacts_after(time, self.reach(&first.point, (horizon - time).max(0.5 * horizon)), found);
                 if !found.iter().any(|contact| contact.feature == first.feature) {
                     found.push(first);
                 }

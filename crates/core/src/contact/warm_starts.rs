@@ -1,4 +1,4 @@
-//! Warm starts: multipliers of the contacts of the last sub-step, with which the next solve begins.
+//! Warm starts: multipliers of the last sub-step, with which the next solve begins.
 
 use crate::clone_by_field::clone_by_field;
 use crate::contact::detect::ContactKey;
@@ -20,13 +20,25 @@ impl WarmStart {
     }
 }
 
-/// Forces of the last sub-step, sorted by key.
-#[derive(Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub(crate) struct WarmStarts {
-    entries: Vec<WarmStart>,
+/// Multiplier of a constraint's row in the last sub-step.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(crate) struct RowStart {
+    /// Serial of the object that has the constraint.
+    pub owner: u32,
+    /// N or N·m.
+    pub force: f64,
 }
 
-clone_by_field!(WarmStarts { entries });
+/// Forces of the last sub-step.
+#[derive(Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(crate) struct WarmStarts {
+    /// Those of contacts, sorted by key.
+    entries: Vec<WarmStart>,
+    /// Those of constraints, in the order of their rows: the owners ascend.
+    rows: Vec<RowStart>,
+}
+
+clone_by_field!(WarmStarts { entries, rows });
 
 impl WarmStarts {
     /// Removes and returns the entries of the keys that `which` selects.
@@ -43,7 +55,20 @@ impl WarmStarts {
         self.entries.dedup_by_key(|e| e.key);
     }
 
-    /// Replaces all entries; they may come in any order.
+    /// Replaces the forces of constraints; the owners must ascend.
+    pub fn replace_rows(&mut self, rows: impl Iterator<Item = RowStart>) {
+        self.rows.clear();
+        self.rows.extend(rows);
+    }
+
+    /// Returns the forces of an object's constraint, in the order of its rows.
+    pub fn of_owner(&self, owner: u32) -> &[RowStart] {
+        let start = self.rows.partition_point(|row| row.owner < owner);
+        let count = self.rows[start..].iter().take_while(|row| row.owner == owner).count();
+        &self.rows[start..start + count]
+    }
+
+    /// Replaces the forces of contacts; they may come in any order.
     pub fn replace(&mut self, entries: impl Iterator<Item = WarmStart>) {
         self.entries.clear();
         self.entries.extend(entries);
@@ -69,17 +94,18 @@ impl WarmStarts {
 
     /// Returns whether the entries are sorted by key, as searches require.
     pub fn in_order(&self) -> bool {
-        self.entries.is_sorted_by(|a, b| a.key < b.key)
+        self.entries.is_sorted_by(|a, b| a.key < b.key) && self.rows.is_sorted_by_key(|row| row.owner)
     }
 
     /// Returns whether all forces are finite.
     pub fn finite(&self) -> bool {
-        self.entries.iter().all(WarmStart::is_finite)
+        self.entries.iter().all(WarmStart::is_finite) && self.rows.iter().all(|row| row.force.is_finite())
     }
 
-    /// Removes the contacts of an object.
+    /// Removes the contacts and the constraint of an object.
     pub fn forget(&mut self, serial: u32) {
         self.entries.retain(|e| e.key.pair[0] != serial && e.key.pair[2] != serial);
+        self.rows.retain(|row| row.owner != serial);
     }
 }
 

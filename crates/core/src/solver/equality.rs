@@ -14,6 +14,8 @@
 //! skipped. Pivots of equal rank are taken in order, which takes every second joint of a chain
 //! first.
 
+use crate::constraint::rows::dot;
+
 /// A row depends on others if its pivot is below this fraction of its own diagonal. Rounding is
 /// relative to the diagonal, however large other rows are.
 pub(super) const RANK: f64 = 1e-11;
@@ -131,15 +133,4 @@ pub(crate) fn smallest_pivot(k: &[f64], e: usize) -> Option<f64> {
 
 fn add_multiple(x: &[f64], scale: f64, to: &mut [f64]) {
     to.iter_mut().zip(x).for_each(|(to, x)| *to += scale * x);
-}
-
-/// Returns `a·b`, computed in four sums in parallel.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
-    let mut sums = [0.0; 4];
-    for (a, b) in a.iter().zip(b) {
-        (0..4).for_each(|k| sums[k] += a[k] * b[k]);
-    }
-    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }

@@ -2,7 +2,7 @@
 
 use super::linkage::Linkages;
 use super::local::{INLINE_BLOCKS, Local, apply, extrapolate_value};
-use crate::constraint::rows::Rows;
+use crate::constraint::rows::{Rows, Side};
 use smallvec::SmallVec;
 
 /// The extrapolation between sweeps, on the ranges of `du` that the island acts on. Multipliers are
@@ -18,15 +18,16 @@ pub(super) struct Extrapolation {
 }
 
 impl Extrapolation {
-    pub fn new(locals: &[Local], linkages: &Linkages, du: &[f64]) -> Extrapolation {
+    pub fn new(locals: &[Local], linkages: &Linkages, rows: &Rows, du: &[f64]) -> Extrapolation {
         let mut stretches: SmallVec<[(u32, u32); 2 * INLINE_BLOCKS]> = linkages.stretches().collect();
-        for (i, local) in locals.iter().enumerate() {
+        let mut before: &[Side] = &[];
+        for local in locals {
+            let sides = local.block(rows).sides();
             // contacts of a pair are consecutive: one of them is enough
-            let same =
-                |other: &Local| other.block.sides().iter().map(|s| s.u).eq(local.block.sides().iter().map(|s| s.u));
-            if i == 0 || !same(&locals[i - 1]) {
-                stretches.extend(local.block.sides().iter().map(|s| (s.u, s.u + s.dof)));
+            if !sides.iter().map(|s| s.u).eq(before.iter().map(|s| s.u)) {
+                stretches.extend(sides.iter().map(|s| (s.u, s.u + s.dof)));
             }
+            before = sides;
         }
         stretches.sort_unstable();
         stretches.dedup_by(|next, before| {

@@ -22,6 +22,9 @@
 //! extrapolation after [`ACCELERATED`] sweeps. Plain sweeps can also cycle; if they stagnate,
 //! `relaxation.rs` shortens their steps.
 //!
+//! Scalar rows along one direction, such as the limits and the friction of a joint, are one block
+//! (`joint_row.rs`).
+//!
 //! An island that is not finished when its sweeps have cost as much as [`FACTORIZATIONS`] is solved
 //! as a whole (`direct/`). Islands whose factorization is too expensive are left to the sweeps, and
 //! so are large islands in motion. A solve that ends unfinished is scaled so that it adds no energy
@@ -29,12 +32,13 @@
 
 use super::direct::Plan;
 use super::extrapolation::Extrapolation;
+use super::joint_row::parallel_rows;
 use super::linkage::Linkages;
-use super::local::{INLINE_BLOCKS, Local, Progress, apply, write_back};
+use super::local::{Local, Progress, apply, with_memory, write_back};
 use super::relaxation::Relaxation;
 use super::{RowSolver, SolveReport, SolverSettings, residual};
-use crate::constraint::rows::Rows;
-use smallvec::SmallVec;
+use crate::constraint::rows::{Rows, dot};
+use std::collections::BTreeMap;
 
 /// Number of sweeps with extrapolation.
 const ACCELERATED: u32 = 200;
@@ -43,6 +47,10 @@ const ACCELERATED: u32 = 200;
 const FIRST_SWEEPS: u32 = 25;
 /// Sweeps go on until they have cost as much as this number of factorizations.
 const FACTORIZATIONS: f64 = 3.0;
+
+/// A few sweeps follow a direct solution that is not finished, in islands of at most this number of
+/// blocks.
+const FEW: usize = 120;
 
 /// Under a budget an island is solved directly only if it can pay for this number of factorizations:
 /// the interior point method gives little before its end.
@@ -73,39 +81,51 @@ impl RowSolver for GaussSeidel {
         du: &mut [f64],
         settings: SolverSettings,
     ) -> SolveReport {
-        let mut linkages = Linkages::new(rows, blocks);
-        let mut locals: SmallVec<[Local; INLINE_BLOCKS]> = SmallVec::with_capacity(blocks.len());
-        for block in blocks.iter().map(|&b| &rows.blocks[b as usize]) {
-            if !linkages.contains_row(rows, block) {
-                locals.push(Local::new(rows, &mut linkages, block, c, lambda));
-            }
-        }
-        apply(&locals, &linkages, rows, c, lambda, du);
-        let sweeps = settings.max_sweeps_for(locals.len());
-        let mut extrapolation = Extrapolation::new(&locals, &linkages, du);
+        with_memory(|locals| {
+            let mut linkages = Linkages::new(rows, blocks);
+            add_blocks(rows, blocks, (c, lambda), &mut linkages, locals);
+            apply(locals, &linkages, rows, c, lambda, du);
+            let extrapolation = Extrapolation::new(locals, &linkages, rows, du);
+            Solve { rows, blocks, c, lambda, du, settings, locals, linkages, extrapolation }.run()
+        })
+    }
+
+    fn fork(&self) -> Box<dyn RowSolver> {
+        Box::new(*self)
+    }
+}
+
+/// An island while it is solved.
+struct Solve<'a> {
+    rows: &'a Rows,
+    blocks: &'a [u32],
+    c: &'a [f64],
+    lambda: &'a mut [f64],
+    du: &'a mut [f64],
+    settings: SolverSettings,
+    locals: &'a mut Vec<Local>,
+    linkages: Linkages,
+    extrapolation: Extrapolation,
+}
+
+impl Solve<'_> {
+    fn run(mut self) -> SolveReport {
+        let count = self.locals.len();
+        let sweeps = self.settings.max_sweeps_for(count);
         let mut outcome = SolveReport { iterations: sweeps, converged: false, ray: false, relaxations: 0 };
-        let affordable = settings.budget.map(|budget| f64::from(budget) / locals.len().max(1) as f64);
+        let affordable = self.settings.budget.map(|budget| f64::from(budget) / count.max(1) as f64);
         let mut relaxation = Relaxation::new(ACCELERATED);
-        let (mut plan, mut due, mut direct, mut swept) = (None, 0, false, 0);
+        let (mut plan, mut due, mut direct) = (None, 0, false);
         for sweep in 1..=sweeps {
-            let mut progress = Progress::default();
-            for local in &mut locals {
-                local.relax(extrapolation.beta, relaxation.factor, rows, &linkages, du, &mut progress);
-            }
-            if progress.change <= settings.tolerance {
+            let progress = self.sweep(relaxation.factor);
+            let first = sweep == FIRST_SWEEPS.min(sweeps);
+            if progress.change <= self.settings.tolerance || first && self.is_solved(progress.change) {
                 (outcome.iterations, outcome.converged) = (sweep, true);
                 break;
             }
             relaxation.record(sweep, progress.change);
-            if sweep == FIRST_SWEEPS.min(sweeps) {
-                write_back(&locals, lambda);
-                let near = progress.change <= NEARLY_SOLVED * settings.tolerance;
-                if locals.len() > LARGE && near && residual(rows, blocks, c, lambda, du) <= SOLVED * settings.tolerance
-                {
-                    (outcome.iterations, outcome.converged) = (sweep, true);
-                    break;
-                }
-                plan = Plan::new(rows, blocks, c, sweeps < FIRST_SWEEPS);
+            if first {
+                plan = Plan::new(self.rows, self.blocks, self.c, sweeps < FIRST_SWEEPS);
                 due = plan.as_ref().map_or(u32::MAX, |plan| (FACTORIZATIONS * plan.cost()) as u32).max(sweep);
                 if let Some(affordable) = affordable {
                     let spare = |plan: &Plan| affordable - AFFORDABLE * plan.cost();
@@ -114,46 +134,137 @@ impl RowSolver for GaussSeidel {
                 }
             }
             if let Some(plan) = plan.take_if(|_| sweep == due.min(sweeps)) {
-                extrapolation.rebuild(&locals, &linkages, rows, c, lambda, du);
                 let cost = plan.cost();
                 let most = affordable.map_or(u32::MAX, |affordable| ((affordable - f64::from(sweep)) / cost) as u32);
-                let solved = plan.solve(lambda, settings.tolerance, most);
-                outcome.relaxations = (f64::from(solved.factorizations) * cost * locals.len() as f64) as u32;
-                locals.iter_mut().for_each(|local| local.read(lambda));
-                extrapolation.rebuild(&locals, &linkages, rows, c, lambda, du);
-                (outcome.iterations, swept) = (sweep + solved.factorizations, sweep);
-                outcome.converged = solved.converged;
+                outcome = self.solve_whole(plan, most);
+                outcome.relaxations = (f64::from(outcome.iterations) * cost * count as f64) as u32;
+                self.finish_rows(&mut outcome);
+                outcome.iterations += sweep;
+                outcome.relaxations += sweep * count as u32;
                 direct = true;
                 break;
             }
             if sweep < sweeps {
                 let plain = sweep > ACCELERATED || sweep + FINAL_PLAIN_SWEEPS >= sweeps;
-                extrapolation.extrapolate(progress.against > 0.0 || plain, du);
+                self.extrapolation.extrapolate(progress.against > 0.0 || plain, self.du);
             }
             if sweep % REBUILD_INTERVAL == 0 {
-                extrapolation.rebuild(&locals, &linkages, rows, c, lambda, du);
+                self.rebuild();
             }
         }
-        if !outcome.converged && !direct && linkages.is_empty() {
-            let share = optimal_scale(&locals, extrapolation.square(du));
-            if share < 1.0 {
-                locals.iter_mut().for_each(|local| local.lambda = local.lambda.map(|x| share * x));
-                extrapolation.clear(du);
-                apply(&locals, &linkages, rows, c, lambda, du);
-            }
+        if !direct {
+            outcome.relaxations = outcome.iterations * count as u32;
         }
-        outcome.relaxations += if direct { swept } else { outcome.iterations } * locals.len() as u32;
-        write_back(&locals, lambda);
-        if !linkages.is_empty() {
-            extrapolation.clear(du);
-            let joints_hold = apply(&locals, &linkages, rows, c, lambda, du);
-            outcome.converged &= joints_hold || direct;
+        write_back(self.locals, self.lambda);
+        if !outcome.converged && !direct && self.linkages.is_empty() {
+            self.limit_energy();
+        }
+        if !self.linkages.is_empty() {
+            self.extrapolation.clear(self.du);
+            let left = apply(self.locals, &self.linkages, self.rows, self.c, self.lambda, self.du);
+            outcome.converged &= direct || left <= self.settings.tolerance;
         }
         outcome
     }
 
-    fn fork(&self) -> Box<dyn RowSolver> {
-        Box::new(*self)
+    /// Relaxes every block once.
+    fn sweep(&mut self, factor: f64) -> Progress {
+        let mut progress = Progress::default();
+        for local in self.locals.iter_mut() {
+            local.relax(self.extrapolation.beta, factor, self.rows, &self.linkages, self.du, &mut progress);
+        }
+        progress
+    }
+
+    /// Returns whether a large island, whose last sweep changed row velocities by at most `change`, is
+    /// solved well enough.
+    fn is_solved(&mut self, change: f64) -> bool {
+        if self.locals.len() <= LARGE || change > NEARLY_SOLVED * self.settings.tolerance {
+            return false;
+        }
+        write_back(self.locals, self.lambda);
+        self.residual() <= SOLVED * self.settings.tolerance
+    }
+
+    fn residual(&self) -> f64 {
+        residual(self.rows, self.blocks, self.c, self.lambda, self.du)
+    }
+
+    /// Computes `du` anew from the multipliers.
+    fn rebuild(&mut self) {
+        self.extrapolation.rebuild(self.locals, &self.linkages, self.rows, self.c, self.lambda, self.du);
+    }
+
+    /// Reads the multipliers from `lambda`.
+    fn read(&mut self) {
+        self.locals.iter_mut().for_each(|local| local.read(self.lambda));
+        self.rebuild();
+    }
+
+    /// Solves the island directly, by at most `most` factorizations: the iterations of the report.
+    fn solve_whole(&mut self, plan: Plan, most: u32) -> SolveReport {
+        self.rebuild();
+        let solved = plan.solve(self.lambda, self.settings.tolerance, most);
+        self.read();
+        SolveReport { iterations: solved.factorizations, converged: solved.converged, ray: false, relaxations: 0 }
+    }
+
+    /// Sweeps a few times over a small island whose direct solution is not finished: sweeps find the
+    /// shares of parallel rows at once, which factorizations only approach.
+    fn finish_rows(&mut self, outcome: &mut SolveReport) {
+        if outcome.converged || self.locals.len() > FEW || self.settings.budget.is_some() {
+            return;
+        }
+        let (error, found) = (self.residual(), self.lambda.to_vec());
+        for _ in 0..FIRST_SWEEPS {
+            outcome.iterations += 1;
+            outcome.relaxations += self.locals.len() as u32;
+            if self.sweep(1.0).change <= self.settings.tolerance {
+                outcome.converged = true;
+                return;
+            }
+        }
+        write_back(self.locals, self.lambda);
+        if self.residual() > error {
+            self.lambda.copy_from_slice(&found);
+            self.read();
+        }
+    }
+
+    /// Scales the multipliers so that they add no energy.
+    fn limit_energy(&mut self) {
+        let share = optimal_scale(self.rows, self.blocks, self.c, self.lambda, self.extrapolation.square(self.du));
+        if share < 1.0 {
+            self.locals.iter_mut().for_each(|local| local.scale(share));
+            self.extrapolation.clear(self.du);
+            apply(self.locals, &self.linkages, self.rows, self.c, self.lambda, self.du);
+        }
+    }
+}
+
+/// Adds the blocks of an island to `locals`: parallel scalar rows as one, equality rows of the linkages
+/// not at all.
+fn add_blocks(
+    rows: &Rows,
+    blocks: &[u32],
+    (c, lambda): (&[f64], &[f64]),
+    linkages: &mut Linkages,
+    locals: &mut Vec<Local>,
+) {
+    locals.reserve(blocks.len());
+    let groups = parallel_rows(rows, blocks, |block| !linkages.contains_row(rows, block));
+    let members = groups.iter().enumerate().flat_map(|(i, group)| group.iter().map(move |(b, _)| (*b, i)));
+    let group_of: BTreeMap<u32, usize> = members.collect();
+    for &block in blocks {
+        match group_of.get(&block).map(|i| &groups[*i]) {
+            Some(group) if group[0].0 != block => {}
+            Some(group) => match Local::joint(rows, linkages, group, c, lambda) {
+                Some(local) => locals.push(local),
+                None => locals.extend(group.iter().map(|(b, _)| Local::new(rows, linkages, *b, c, lambda))),
+            },
+            None if linkages.contains_row(rows, &rows.blocks[block as usize]) => {}
+            None => locals.push(Local::new(rows, linkages, block, c, lambda)),
+        }
     }
 }
 
@@ -162,11 +273,12 @@ impl RowSolver for GaussSeidel {
 /// energy; multipliers that are scaled by it add none.
 ///
 /// `square` is `λᵀKλ`, the square of `Yλ`.
-fn optimal_scale(locals: &[Local], square: f64) -> f64 {
+fn optimal_scale(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], square: f64) -> f64 {
     let (mut slope, mut curve) = (0.0, square);
-    for local in locals {
-        slope -= local.lambda.iter().zip(&local.c).map(|(l, c)| l * c).sum::<f64>();
-        curve += local.block.compliance * local.lambda[0] * local.lambda[0];
+    for block in blocks.iter().map(|&b| &rows.blocks[b as usize]) {
+        slope -= dot(&lambda[block.range()], &c[block.range()]);
+        let first = lambda[block.row as usize];
+        curve += block.compliance * first * first;
     }
     if curve > 0.0 { (slope / curve).max(0.0) } else { 1.0 }
 }

@@ -224,10 +224,10 @@ impl Linkages {
         Symmetric3 { m00: k(0, 0), m10: k(1, 0), m20: k(2, 0), m11: k(1, 1), m21: k(2, 1), m22: k(2, 2) }
     }
 
-    /// Solves all `λ_E` for the `du` of the other rows and adds their effect. Returns whether all
-    /// rows then have no velocity.
-    pub fn solve_equalities(&self, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> bool {
-        self.linkages.iter().map(|l| l.solve_equalities(rows, c, lambda, du)).fold(true, |all, settled| all & settled)
+    /// Solves all `λ_E` for the `du` of the other rows and adds their effect. Returns the largest
+    /// velocity that is left, m/s; 0 if that is rounding.
+    pub fn solve_equalities(&self, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> f64 {
+        self.linkages.iter().map(|l| l.solve_equalities(rows, c, lambda, du)).fold(0.0, f64::max)
     }
 }
 
@@ -237,7 +237,7 @@ impl Linkage {
         Linkage { rows: joints, factor, objects }
     }
 
-    fn solve_equalities(&self, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> bool {
+    fn solve_equalities(&self, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> f64 {
         island(rows, &self.rows).for_each(|joint| lambda[joint.row as usize] = 0.0);
         let velocities = |lambda: &[f64], du: &[f64]| -> Vec<f64> {
             let w = |joint: &Block| {
@@ -259,7 +259,8 @@ impl Linkage {
             }
             w = velocities(lambda, du);
         }
-        largest(&w) <= SOLVED * before
+        let left = largest(&w);
+        if left <= SOLVED * before { 0.0 } else { left }
     }
 }
 

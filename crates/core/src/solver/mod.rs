@@ -9,6 +9,7 @@ mod equality;
 mod extrapolation;
 mod gauss_seidel;
 mod island;
+mod joint_row;
 mod lcp;
 mod lemke;
 mod linkage;

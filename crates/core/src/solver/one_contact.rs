@@ -78,6 +78,7 @@ impl ContactBlock {
     }
 
     /// Returns the solution without sticking, the rarer case in a pile.
+    #[inline(always)]
     fn open_or_slide(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
         if !self.coupled {
             return self.projected_step(old, w);
@@ -129,6 +130,7 @@ impl ContactBlock {
 
     /// Returns one projected step: `λ_n ← max(0, λ_n − w_n/k_nn)`, then `λ_t ← Π(λ_t − ρ·w_t)` onto
     /// the disk of radius `μ·λ_n`.
+    #[inline(always)]
     fn projected_step(&self, old: [f64; 3], w: [f64; 3]) -> [f64; 3] {
         let normal = (old[0] - w[0] / self.k.m00).max(0.0);
         let dn = normal - old[0];

@@ -3,6 +3,7 @@
 mod contact;
 mod friction;
 mod islands;
+mod joint_rows;
 mod linkages;
 mod pivoting;
 mod redundant;

@@ -33,7 +33,7 @@ use super::contacts::{
 use super::correction::{self, ActiveLimit, Contacts, Limits, Options};
 use super::event_location::{Bracket, LimitRole, Role, SLOW, Watch};
 use super::impact::{self, Candidate};
-use super::warm_start::warm_start;
+use super::warm_start::{row_starts, warm_start};
 use super::{StepContext, Stepper, TimeStepping, Workspace};
 use crate::constraint::rows::RowSet;
 use crate::contact::detect::ContactConstraint;
@@ -252,6 +252,7 @@ impl Backtracking {
             &work.contact_constraints,
             impulses(work, &work.lambda).map(|f| f * left),
             impulses(work, &work.lambda),
+            row_starts(work, &work.lambda, 1.0),
         );
         Ok(held)
     }

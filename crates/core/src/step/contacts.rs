@@ -39,6 +39,8 @@ pub(crate) struct Workspace {
     pub limits: Vec<Limit>,
     /// First target of each constraint, and the end.
     pub first: Vec<usize>,
+    /// Serial of the object that has each constraint.
+    pub owners: Vec<u32>,
     /// Right-hand side of a solve.
     pub c: Vec<f64>,
     pub lambda: Vec<f64>,
@@ -221,8 +223,10 @@ pub(crate) fn lay_rows(mut basis: Basis, work: &mut Workspace, level: Level) -> 
     };
     let mut first = std::mem::take(&mut work.first);
     first.clear();
+    work.owners.clear();
     for (id, entry, constraint) in constraints(view.objects) {
         first.push(builder.targets.len());
+        work.owners.push(entry.serial);
         builder.owner = id;
         constraint.rows(entry.state_range, &view, level, &mut builder);
         if let Some(why) = builder.problem.take() {
@@ -253,7 +257,7 @@ fn adopt(mut basis: Basis, work: &mut Workspace, made: Workspace) {
         }
     }
     work.bias.extend(made.bias);
-    (work.targets, work.kinds, work.first) = (made.targets, made.kinds, made.first);
+    (work.targets, work.kinds, work.first, work.owners) = (made.targets, made.kinds, made.first, made.owners);
     make_room(work);
 }
 

@@ -40,9 +40,10 @@ use super::contacts::{
 };
 use super::correction::{self, Contacts, Limits, Options};
 use super::impact::{self, Candidate, Part};
-use super::warm_start::warm_start;
+use super::warm_start::{row_starts, warm_start};
 use super::{Moment, StepContext, Stepper, Workspace};
 use crate::constraint::rows::RowSet;
+use crate::contact::detect::ContactConstraint;
 use crate::contact::pair::PredictionMode;
 use crate::contact::time_of_impact::time_contacts;
 use crate::each_object::{Numbers, each_object};
@@ -69,6 +70,8 @@ pub struct TimeStepping {
 /// Working memory of a step: whitened velocities and sums of them.
 #[derive(Default)]
 struct Buffers {
+    /// Contacts at the start of the step, before fast pairs are followed.
+    predicted: Vec<ContactConstraint>,
     /// Velocity after the impacts, then at the end.
     after: Vec<f64>,
     /// Row velocities before the impacts, and their change due to forces.
@@ -122,7 +125,8 @@ impl TimeStepping {
         self.smooth_forces(core, middle, h)?;
         detect(core, None, (h, PredictionMode::Each), &mut self.work.contact_constraints);
         let parts = (&core.owners[..], &core.derived.part_states[..]);
-        time_contacts(core.objects(), parts, (&core.settings, &core.threads), h, &mut self.work.contact_constraints);
+        let (found, predicted) = (&mut self.work.contact_constraints, &mut self.buffers.predicted);
+        time_contacts(core.objects(), parts, (&core.settings, &core.threads), h, found, predicted);
         build_rows(core, Some(&mut *middle), &mut self.work, Level::Velocity { h }, 0.5 * h)?;
         let mut u = std::mem::take(&mut self.work.u);
         let mut du_force = std::mem::take(&mut self.work.du_force);
@@ -258,6 +262,7 @@ impl TimeStepping {
             &self.work.contact_constraints,
             impulses(&self.work, total),
             impulses(&self.work, &self.work.lambda).map(|i| i / h),
+            row_starts(&self.work, &self.work.lambda, 1.0 / h),
         );
         core.check_finite(dp, Some(&mut *middle))
     }

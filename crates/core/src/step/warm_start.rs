@@ -1,12 +1,13 @@
-//! Warm start of the contacts of a step from the forces of the last one.
+//! Warm start of the rows of a step from the forces of the last one.
 
 use super::Workspace;
 use crate::contact::detect::ContactConstraint;
+use crate::contact::warm_starts::RowStart;
 use crate::contact::wrench::Wrench;
 use crate::world::Core;
 use tumble_collide::Vec3;
 
-/// Sets multipliers to the forces of the last sub-step, in the present contact frames, times
+/// Sets multipliers of contacts to the forces of the last sub-step, in the present contact frames, times
 /// `scale`. Contacts that are gone leave their force and torque to those of their pair that touch.
 /// The solver projects the multipliers onto the cone.
 pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
@@ -36,4 +37,23 @@ pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
             work.lambda[block.row as usize] = work.lambda[block.row as usize].max(0.0);
         }
     }
+    let contacts = work.contact_constraints.len();
+    for (owner, ends) in work.owners.iter().zip(work.first.windows(2)) {
+        let (blocks, forces) = (&work.rows.blocks[contacts..][ends[0]..ends[1]], core.state.warm.of_owner(*owner));
+        // a constraint with another number of rows than in the last step starts from nothing
+        for (block, start) in blocks.iter().zip(forces).filter(|_| blocks.len() == forces.len()) {
+            work.lambda[block.row as usize] = scale * start.force;
+        }
+    }
+}
+
+/// Returns the forces of the constraints' rows: multipliers `lambda` times `scale`.
+pub(super) fn row_starts(work: &Workspace, lambda: &[f64], scale: f64) -> Vec<RowStart> {
+    let blocks = &work.rows.blocks[work.contact_constraints.len()..];
+    let mut starts = Vec::with_capacity(blocks.len());
+    for (owner, ends) in work.owners.iter().zip(work.first.windows(2)) {
+        let forces = blocks[ends[0]..ends[1]].iter().map(|block| scale * lambda[block.row as usize]);
+        starts.extend(forces.map(|force| RowStart { owner: *owner, force }));
+    }
+    starts
 }

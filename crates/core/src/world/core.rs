@@ -3,7 +3,7 @@
 use super::state::WorldState;
 use crate::contact::detect::{ContactConstraint, DetectorBuffers, Owner};
 use crate::contact::pair_material::PairMaterials;
-use crate::contact::warm_starts::WarmStart;
+use crate::contact::warm_starts::{RowStart, WarmStart};
 use crate::derived::{Cache, Derived};
 use crate::integrators::context::IntegrationContext;
 use crate::object::part_state::{Forces, PartState, Wrench};
@@ -266,6 +266,7 @@ impl Core {
         contact_constraints: &[ContactConstraint],
         impulses: impl Iterator<Item = Vec3>,
         forces: impl Iterator<Item = Vec3>,
+        rows: Vec<RowStart>,
     ) {
         self.contacts.clear();
         for ((constraint, impulse), force) in contact_constraints.iter().zip(impulses).zip(forces) {
@@ -287,6 +288,7 @@ impl Core {
                 depth: -constraint.contact.gap,
             });
         }
+        self.state.warm.replace_rows(rows.into_iter());
         let (contacts, part_states) = (&self.contacts, &self.derived.part_states);
         let carrying = contact_constraints.iter().zip(contacts).filter(|(_, c)| c.force != Vec3::zeros());
         self.state.warm.replace(carrying.map(|(t, c)| WarmStart {

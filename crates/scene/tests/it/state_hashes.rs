@@ -52,22 +52,22 @@ macro_rules! table {
 table! {
     billiards_time_stepping: "billiards", TimeStepping, "d7521db61a4044f1", "dde13f97df02c7af";
     billiards_backtracking: "billiards", Backtracking, "dde525a4d714d38e", "453edf585fcd7eb4";
-    bowling_time_stepping: "bowling", TimeStepping, "ed36688f395747c2", "4ea80a7f29117a6d";
-    bowling_backtracking: "bowling", Backtracking, "53db2850eca4d504", "3968829bfd6d9f63";
-    chain_time_stepping: "chain", TimeStepping, "a9d265bcd59cde4d", "c77dcc987d556a82";
-    chain_backtracking: "chain", Backtracking, "cf938a3028a77cdf", "aec0064e0240df39";
-    falling_time_stepping: "falling", TimeStepping, "d30b150920d659ba", "77731db98e3ce6e3";
-    falling_backtracking: "falling", Backtracking, "f5e89fe4764d71d9", "3101f005da0aeac5";
+    bowling_time_stepping: "bowling", TimeStepping, "ed36688f395747c2", "00ad4d4029bdfdba";
+    bowling_backtracking: "bowling", Backtracking, "53db2850eca4d504", "b2be3e8f1177313a";
+    chain_time_stepping: "chain", TimeStepping, "269e2944ada62119", "f61bdc87b0d6177a";
+    chain_backtracking: "chain", Backtracking, "dd07677ce4aa11c1", "6b8d1b78dea2c669";
+    falling_time_stepping: "falling", TimeStepping, "55a2efd3019cb810", "7a1963c792f4dfdb";
+    falling_backtracking: "falling", Backtracking, "ccf7421bdf27a52b", "1ff36ae6912bb8fc";
     incline_time_stepping: "incline", TimeStepping, "c8d35ebc2e29a12a", "7b8c108360d8ae2c";
     incline_backtracking: "incline", Backtracking, "e55d9c0fdc513c1e", "a93b5ab540a60671";
     pendulum_time_stepping: "pendulum", TimeStepping, "d403df437fc48e8e", "07a9ea1905d7c967";
     pendulum_backtracking: "pendulum", Backtracking, "69fe4156518a0013", "692b5de118331942";
-    piston_time_stepping: "piston", TimeStepping, "c8bdbe2dbb4d6e92", "d28c654b599622b8";
-    piston_backtracking: "piston", Backtracking, "e4bc1f04bccfbd8a", "0b86e6820d08239f";
-    robot_time_stepping: "robot", TimeStepping, "d2ff6677a2f25e68", "d7993967865d7389";
-    robot_backtracking: "robot", Backtracking, "d9bdae46cf681082", "e3f2d884e335d1a2";
-    skeleton_time_stepping: "skeleton", TimeStepping, "4601701823a7deff", "00287ccc74d46029";
-    skeleton_backtracking: "skeleton", Backtracking, "438f18ce0bbb9bdd", "2ac456022b491e61";
+    piston_time_stepping: "piston", TimeStepping, "e970a95bc604c769", "69f85217f1250e61";
+    piston_backtracking: "piston", Backtracking, "eec51fdb3e6e2809", "0b86e6820d08239f";
+    robot_time_stepping: "robot", TimeStepping, "d12ab164c366e431", "11bf070e1ec3ca35";
+    robot_backtracking: "robot", Backtracking, "889eeadcdf2d375a", "9f75d04f6450b9fc";
+    skeleton_time_stepping: "skeleton", TimeStepping, "27999ed81927a3e1", "55ee0abd73f04eef";
+    skeleton_backtracking: "skeleton", Backtracking, "e437ef505593c8ae", "4762dfaff6cb956c";
     stack_time_stepping: "stack", TimeStepping, "20ad0965d34e48bf", "ecd253fcdb6efb2e";
     stack_backtracking: "stack", Backtracking, "f3e4e18dc66cf3d0", "e2c70bafe5205c09";
 }

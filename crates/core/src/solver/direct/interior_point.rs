@@ -152,7 +152,11 @@ impl Interior {
         let impulse = LOAD * (island.objects.len() as f64).sqrt() * speed / diagonal.max(f64::MIN_POSITIVE);
         let start = |b: &LocalBlock| match b.kind {
             Kind::Held | Kind::Equality => Point::default(),
-            Kind::HalfLine | Kind::Cone { .. } => Point { l: [impulse, 0.0, 0.0], z: [speed, 0.0, 0.0] },
+            Kind::HalfLine | Kind::Cone { .. } => {
+                // open rows start open, with the same product
+                let z = speed.max(island.c[b.row]);
+                Point { l: [impulse * speed / z, 0.0, 0.0], z: [z, 0.0, 0.0] }
+            }
             Kind::Interval { lo, hi } => {
                 let middle = match (lo.is_finite(), hi.is_finite()) {
                     (true, true) => 0.5 * (lo + hi),

@@ -66,6 +66,15 @@ impl LocalBlock<'_> {
     }
 }
 
+/// Returns the largest free value of a block. The normals of contacts and the limits that open do not
+/// count: `c` of those contains their gap over the length of the step.
+pub(super) fn fastest_row(block: &Block, c: &[f64]) -> f64 {
+    let c = &c[block.range()];
+    let one_sided = matches!(block.set, RowSet::Cone { .. } | RowSet::HalfLine);
+    let first = if one_sided { c[0].min(0.0) } else { c[0] };
+    c[1..].iter().fold(first.abs(), |f, c| f.max(c.abs()))
+}
+
 /// The rows of an island.
 pub(super) struct Island<'a> {
     pub objects: Vec<Object>,
@@ -74,7 +83,7 @@ pub(super) struct Island<'a> {
     pub c: Vec<f64>,
     /// Number of velocities.
     pub dof: usize,
-    /// Largest free value.
+    /// Largest [`fastest_row`].
     pub fastest: f64,
     y: &'a [f64],
 }
@@ -98,8 +107,7 @@ impl<'a> Island<'a> {
             let block = &rows.blocks[b as usize];
             let local = island.local(rows, block);
             if local.diagonal > f64::MIN_POSITIVE {
-                let fastest = c[block.range()].iter().fold(island.fastest, |f: f64, c| f.max(c.abs()));
-                island.fastest = fastest;
+                island.fastest = island.fastest.max(fastest_row(block, c));
             }
             island.blocks.push(local);
             island.c.extend_from_slice(&c[block.range()]);

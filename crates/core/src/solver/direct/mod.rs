@@ -23,7 +23,7 @@ mod proximal;
 mod structure;
 
 use crate::constraint::rows::{RowSet, Rows};
-use island::Island;
+use island::{Island, fastest_row};
 use lu::Factor;
 use structure::Structure;
 
@@ -180,9 +180,10 @@ impl<'a> Plan<'a> {
 /// `c` is above a fraction of the fastest row.
 fn sliding(rows: &Rows, blocks: &[u32], c: &[f64]) -> f64 {
     let island = || blocks.iter().map(|&b| &rows.blocks[b as usize]);
-    let fastest = island().flat_map(|b| &c[b.range()]).fold(0.0, |f: f64, c| f.max(c.abs()));
+    let fastest = island().map(|b| fastest_row(b, c)).fold(0.0, f64::max);
+    let square = (SLIDING.1 * fastest) * (SLIDING.1 * fastest);
     let cones = || island().filter(|b| matches!(b.set, RowSet::Cone { .. })).map(|b| &c[b.range()]);
-    let slides = |c: &&[f64]| c[1].hypot(c[2]) > SLIDING.1 * fastest;
+    let slides = |c: &&[f64]| c[1] * c[1] + c[2] * c[2] > square;
     cones().filter(slides).count() as f64 / cones().count().max(1) as f64
 }
 

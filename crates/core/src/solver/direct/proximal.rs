@@ -34,6 +34,11 @@ const HALVINGS: u32 = 8;
 const FAILURES: u32 = 3;
 /// An expensive step must reduce `F`, and an outer step the error, to this fraction.
 const PROGRESS: f64 = 0.5;
+/// An outer step that multiplies the error by more has diverged; the next starts again with a smaller
+/// penalty.
+const DIVERGED: f64 = 10.0;
+/// Number of outer steps that may diverge.
+const DIVERGENCES: u32 = 2;
 /// Speed below which the direction of sliding has no meaning, relative to the fastest row.
 const STILL: f64 = 1e-14;
 
@@ -48,7 +53,7 @@ pub(super) fn solve(
     (factors, cheap): (u32, bool),
 ) -> (f64, u32) {
     let mut p = Proximal::new(system, lambda);
-    let (mut taken, mut last) = (0, error);
+    let (mut taken, mut last, mut diverged) = (0, error, 0);
     for _ in 0..STEPS.0 {
         if error <= tolerance.goal || taken >= factors {
             break;
@@ -61,6 +66,15 @@ pub(super) fn solve(
         if reached < error {
             error = reached;
             lambda.copy_from_slice(&p.center);
+        } else if reached.is_nan() || reached > DIVERGED * error {
+            diverged += 1;
+            if diverged > DIVERGENCES {
+                break;
+            }
+            p.center.copy_from_slice(lambda);
+            p.system.island.apply(&p.center, &mut p.u);
+            p.penalty = (p.penalty / PENALTY.1).max(PENALTY.0);
+            continue;
         }
         if slow && error <= tolerance.solved || !cheap && reached > PROGRESS * last {
             break;
