@@ -44,8 +44,8 @@ fn a_heap_under_a_tight_budget_is_less_accurate_and_stands() {
         let before = world.energy().total();
         let report = *world.step().unwrap();
         let grown = world.energy().total() - before;
-        // a correction lifts bodies by what they overlapped, and nothing else adds energy; of overlap that
-        // the same step made no report tells
+        // a correction lifts bodies by what they overlapped, and nothing else adds energy; the report does
+        // not contain overlap that the same step made
         assert!(grown <= weight * report.max_penetration + 1e-4 * first.abs(), "{grown} J, {report:?}");
         report
     };
