@@ -128,6 +128,7 @@ impl World {
     /// (a ``ValueError``), which lists all of them with line and column.
     #[staticmethod]
     #[pyo3(signature = (path_or_name, *, dt=None, stepper=None, integrator=None, solver=None, threads=None, budget=None))]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn load(
         py: Python<'_>,
         path_or_name: &Bound<'_, PyAny>,
