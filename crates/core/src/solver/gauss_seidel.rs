@@ -37,7 +37,7 @@ use super::linkage::Linkages;
 use super::local::{Local, Progress, apply, with_memory, write_back};
 use super::relaxation::Relaxation;
 use super::{RowSolver, SolveReport, SolverSettings, residual};
-use crate::constraint::rows::{Rows, dot};
+use crate::constraint::rows::{RowSet, Rows, dot};
 use std::collections::BTreeMap;
 
 /// Number of sweeps with extrapolation.
@@ -252,6 +252,9 @@ fn add_blocks(
     locals: &mut Vec<Local>,
 ) {
     locals.reserve(blocks.len());
+    if blocks.iter().all(|&block| matches!(rows.blocks[block as usize].set, RowSet::Cone { .. })) {
+        return locals.extend(blocks.iter().map(|&block| Local::new(rows, linkages, block, c, lambda)));
+    }
     let groups = parallel_rows(rows, blocks, |block| !linkages.contains_row(rows, block));
     let members = groups.iter().enumerate().flat_map(|(i, group)| group.iter().map(move |(b, _)| (*b, i)));
     let group_of: BTreeMap<u32, usize> = members.collect();

@@ -50,19 +50,19 @@ impl<'a> Solves<'a> {
     pub fn finish(self, objects: Objects, rows: &Rows, islands: &Islands) {
         let Some((island, largest, outcome)) = self.worst else { return };
         let blocks = || islands.get(island).iter().map(|&b| &rows.blocks[b as usize]);
-        let mut starts: Vec<u32> = blocks().flat_map(|block| block.sides()).map(|side| side.u).collect();
-        starts.sort_unstable();
-        starts.dedup();
+        let mut acted_on = vec![false; rows.dof];
+        blocks().flat_map(|block| block.sides()).for_each(|side| acted_on[side.u as usize] = true);
         let object = |u: u32| -> Option<ObjectId> {
-            let place = objects.iter().find(|e| e.moves() && e.state_range.v.start == u as usize)?.place;
-            Some(objects.table.order[place])
+            let placed = &objects.table.placed;
+            let place = placed.partition_point(|entry| entry.state_range.v.end <= u as usize);
+            (place < placed.len()).then(|| objects.table.order[place])
         };
         let mut sides = rows.blocks[largest.block as usize].sides().iter().map(|side| object(side.u));
         let (first, other) = (sides.next().flatten(), sides.next().flatten());
         let worst = |object| WorstSolve {
             object,
             other,
-            objects: starts.len() as u32,
+            objects: acted_on.iter().filter(|&&is| is).count() as u32,
             rows: blocks().map(|block| block.set.rows() as u32).sum(),
             tolerance: self.tolerance,
             converged: outcome.converged,
