@@ -5,7 +5,7 @@ pub mod broad;
 pub mod clock;
 pub mod measure;
 pub mod overlap;
-mod random;
+pub mod random;
 pub mod rapier;
 pub mod residuals;
 pub mod scene;

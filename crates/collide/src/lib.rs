@@ -28,6 +28,7 @@ mod broad;
 mod bytes;
 mod cache;
 mod contact;
+mod distance;
 mod error;
 mod mass;
 mod mesh;
@@ -44,6 +45,7 @@ pub use archive::shared;
 pub use broad::{BroadPhase, BruteForce, SweepAndPrune};
 pub use cache::TreeCache;
 pub use contact::{Contact, ContactMode, NormalFrom};
+pub use distance::{ClosestPair, SurfacePoint, closest_points};
 pub use error::{MeshError, ShapeError};
 pub use mass::MassProperties;
 pub use mesh::{
@@ -52,6 +54,7 @@ pub use mesh::{
 };
 pub use narrow::{contacts, contacts_in_mode};
 pub use pose::{Aabb, Mat3, Pose, Quat, Vec3};
+pub use ray::{BoxTree, RayHit};
 pub use shape::{CylinderShape, MeshShape, Shape};
 pub use tree::{
     Builder, CachedTree, Covering, LevelQuality, LevelSphere, MeshId, Progress, QualitySettings, SphereNode,

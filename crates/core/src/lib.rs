@@ -68,6 +68,7 @@ pub use tumble_collide as collide;
 pub use world::sleep::Sleep;
 pub use world::view::{Mode, ObjectId, Status, WorldView};
 pub use world::{
-    BodyView, ContactPoint, Overlap, PickForce, Replica, ReplicaError, SnapshotError, StateMemory, StateMemoryHold,
-    StepError, World, WorldError, WorldState,
+    BodyDistance, BodyView, ContactPoint, Overlap, PickForce, PointDepth, QueryFilter, Ray, RayCastHit, Replica,
+    ReplicaError, ShapeCastHit, ShapeOverlap, SnapshotError, StateMemory, StateMemoryHold, StepError, World,
+    WorldError, WorldState,
 };

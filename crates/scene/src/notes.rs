@@ -26,7 +26,7 @@ pub fn visual_notes<'v>(visuals: impl IntoIterator<Item = &'v Visual>) -> Vec<St
 /// contacts. Each step pushes such bodies apart. The deepest come first; beyond the first few they
 /// are counted.
 pub fn overlap_notes(world: &World) -> Vec<String> {
-    let mut overlaps = world.overlaps(2.0 * world.settings().drift_tolerance);
+    let mut overlaps = world.overlapping_pairs(2.0 * world.settings().drift_tolerance);
     overlaps.sort_by(|a, b| b.depth.total_cmp(&a.depth));
     let name = |id| world.name(id).unwrap_or_default();
     let line = |[a, b]: [&str; 2], depth: f64| match a == b {

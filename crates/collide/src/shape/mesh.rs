@@ -1,6 +1,7 @@
 //! The shape of a closed mesh, with its sphere tree and its signed distance field.
 
 use crate::cache::{Entry, Kind};
+use crate::ray::RayMesh;
 use crate::sdf::Surface;
 use crate::sdf::shells::shell_surfaces;
 use crate::{
@@ -18,6 +19,10 @@ pub struct MeshShape {
     pub(super) tree: OnceLock<Tree>,
     /// The surface; one per shell if shells overlap; empty if the mesh collides by its spheres.
     pub(super) surfaces: OnceLock<Vec<Surface>>,
+    /// The triangles for rays, built on first use.
+    pub(super) ray_mesh: OnceLock<RayMesh>,
+    /// The triangles for distances, built on first use.
+    pub(super) distance: OnceLock<MeshDistance>,
     /// Whether some of its faces lie inside the union of its shells.
     pub(super) buried: bool,
     /// Mass properties at density 1.
@@ -65,10 +70,22 @@ impl MeshShape {
     }
 
     fn build_tree(&self) -> Result<SphereTree, MeshError> {
+        Ok(SphereTree::build_by(&self.mesh, &self.new_distance(), &self.settings, &())?.0)
+    }
+
+    fn new_distance(&self) -> MeshDistance {
         let crosses = self.report.crossing_faces > 0 || self.report.crossing_capped;
-        let distance =
-            if crosses { MeshDistance::new(&self.mesh) } else { MeshDistance::without_crossings(&self.mesh) };
-        Ok(SphereTree::build_by(&self.mesh, &distance, &self.settings, &())?.0)
+        if crosses { MeshDistance::new(&self.mesh) } else { MeshDistance::without_crossings(&self.mesh) }
+    }
+
+    /// Returns the triangles for rays, built on first use.
+    pub(crate) fn ray_mesh(&self) -> &RayMesh {
+        self.ray_mesh.get_or_init(|| RayMesh::new(&self.mesh))
+    }
+
+    /// Returns the triangles for distances, built on first use.
+    pub(crate) fn distance(&self) -> &MeshDistance {
+        self.distance.get_or_init(|| self.new_distance())
     }
 
     /// Like [`MeshShape::new`], but builds tree and surface on first use: for shapes that are drawn
@@ -99,6 +116,8 @@ impl MeshShape {
             cache: TreeCache::off(),
             tree: OnceLock::new(),
             surfaces: OnceLock::new(),
+            ray_mesh: OnceLock::new(),
+            distance: OnceLock::new(),
             buried,
             unit_mass,
             bounding_radius,

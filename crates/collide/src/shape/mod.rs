@@ -156,6 +156,27 @@ impl Shape {
         Aabb { min: center - half, max: center + half }
     }
 
+    /// Returns the box in world axes around the surface of the shape at `pose`, without the leaves
+    /// of its tree. The first call builds the tree of triangles of a mesh.
+    pub fn tight_aabb(&self, pose: &Pose) -> Aabb {
+        let (center, half) = match self {
+            Shape::Cylinder(c) => {
+                let axis = axis(pose);
+                let disk = axis.map(|x| (1.0 - x * x).max(0.0).sqrt() * c.radius());
+                (pose.translation.vector, axis.abs() * c.half_length() + disk)
+            }
+            Shape::Mesh(mesh) => {
+                let Some(bounds) = mesh.ray_mesh().bounds() else { return self.aabb(pose) };
+                let half = pose.rotation.to_rotation_matrix().matrix().abs() * (0.5 * (bounds.max - bounds.min));
+                (pose.transform_point(&(0.5 * (bounds.min + bounds.max)).into()).coords, half)
+            }
+            _ => return self.aabb(pose),
+        };
+        // room for rounding
+        let half = half * (1.0 + 1e-12) + center.abs() * 1e-15;
+        Aabb { min: center - half, max: center + half }
+    }
+
     /// Returns the mass properties at a uniform `density` in kg/m³.
     ///
     /// # Errors

@@ -6,6 +6,7 @@ mod broad;
 mod brute_force;
 mod builders;
 mod buried;
+mod distances;
 mod hull;
 mod medial;
 mod mesh_contacts;

@@ -78,7 +78,7 @@ impl Visual {
     pub fn ray(&self, part: &Pose, origin: &Vec3, direction: &Vec3) -> Option<f64> {
         let pose = part * self.pose;
         match self.drawn()? {
-            Drawn::Shape(shape) => shape.ray(&pose, origin, direction),
+            Drawn::Shape(shape) => shape.cast_ray(&pose, origin, direction, f64::INFINITY).map(|hit| hit.distance),
             Drawn::Mesh(mesh) => mesh.ray(&pose, origin, direction),
         }
     }

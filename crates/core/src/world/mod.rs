@@ -3,13 +3,13 @@
 
 mod bodies;
 mod body_view;
+mod contacts_of;
 mod core;
 mod error;
 mod islands;
-mod overlaps;
 mod pair_materials;
 mod pick;
-mod queries;
+mod query;
 mod replica;
 pub(crate) mod sleep;
 mod snapshot;
@@ -21,8 +21,8 @@ pub(crate) use self::core::Coordinates;
 pub use self::core::{ContactPoint, Core, StepError};
 pub use body_view::BodyView;
 pub use error::WorldError;
-pub use overlaps::Overlap;
 pub use pick::PickForce;
+pub use query::{BodyDistance, Overlap, PointDepth, QueryFilter, Ray, RayCastHit, ShapeCastHit, ShapeOverlap};
 pub use replica::{Replica, ReplicaError};
 pub use snapshot::SnapshotError;
 pub(crate) use state::ObjectState;

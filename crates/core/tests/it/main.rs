@@ -38,6 +38,7 @@ mod pair_materials;
 mod paradox;
 mod pick;
 mod piles;
+mod queries;
 mod random_scenes;
 mod regressions;
 mod regressions_articulated;

@@ -828,6 +828,61 @@ class World:
         m/s; ``impulse`` (3,) on the first over the last sub-step, N·s; ``force`` (3,), N, without
         impacts. World axes.
         """
+    def cast_rays(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        max_distance: ArrayLike | None = None,
+        *,
+        group: int = 0,
+        mask: int | None = None,
+        ignore: _Body | Sequence[_Body] | None = None,
+    ) -> NDArray[np.void]:
+        """ """
+    def cast_shape(
+        self,
+        shape: Shape,
+        direction: ArrayLike,
+        max_distance: float,
+        position: ArrayLike | None = None,
+        orientation: ArrayLike | None = None,
+        *,
+        group: int = 0,
+        mask: int | None = None,
+        ignore: _Body | Sequence[_Body] | None = None,
+    ) -> np.void | None:
+        """ """
+    def overlaps(
+        self,
+        shape: Shape,
+        position: ArrayLike | None = None,
+        orientation: ArrayLike | None = None,
+        *,
+        group: int = 0,
+        mask: int | None = None,
+        ignore: _Body | Sequence[_Body] | None = None,
+    ) -> NDArray[np.void]:
+        """ """
+    def closest_points(
+        self,
+        a: _Body | Shape,
+        b: _Body | None = None,
+        *,
+        position: ArrayLike | None = None,
+        orientation: ArrayLike | None = None,
+        group: int = 0,
+        mask: int | None = None,
+        ignore: _Body | Sequence[_Body] | None = None,
+    ) -> np.void | None:
+        """ """
+    def contains(
+        self, point: ArrayLike, *, group: int = 0, mask: int | None = None, ignore: _Body | Sequence[_Body] | None = None
+    ) -> NDArray[np.int64]:
+        """ """
+    def point_depth(
+        self, points: ArrayLike, *, group: int = 0, mask: int | None = None, ignore: _Body | Sequence[_Body] | None = None
+    ) -> Any:
+        """ """
     def energy(self) -> Energy:
         """Returns the mechanical energy of everything that moves: ``kinetic``, ``potential`` (zero at
         the world's origin) and ``total``, J.

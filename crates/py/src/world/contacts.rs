@@ -40,7 +40,7 @@ pub fn bytes(inner: &Inner) -> Vec<u8> {
 
 /// Returns the index of the touched link in the `link_names` of its articulation. A rigid body has
 /// only one part.
-fn link(inner: &Inner, id: ObjectId, part: usize) -> i64 {
+pub fn link(inner: &Inner, id: ObjectId, part: usize) -> i64 {
     let Some(body) = inner.world.get::<ArticulatedBody>(id) else { return part as i64 };
     let name = body.link_of(part).map(|link| &body.model().links()[link].name);
     let frames = body.model().frames();

@@ -8,6 +8,7 @@ pub mod inner;
 pub mod load;
 pub mod pairs;
 pub mod pickling;
+pub mod query;
 pub mod report;
 pub mod rollout;
 pub mod shared;

@@ -1,10 +1,11 @@
 //! Pairs of objects that overlap in the present state.
 
+use super::Part;
 use crate::contact::detect::may_collide;
 use crate::world::World;
-use crate::world::view::{Entry, Mode, ObjectId};
+use crate::world::view::{Mode, ObjectId};
 use std::collections::BTreeMap;
-use tumble_collide::{Aabb, BroadPhase, Contact, Pose, Shape, SweepAndPrune, contacts_in_mode};
+use tumble_collide::{Aabb, BroadPhase, Contact, SweepAndPrune, contacts_in_mode};
 
 /// Two objects that overlap, in the order in which they were added; the same object twice if its
 /// own parts overlap.
@@ -18,19 +19,11 @@ pub struct Overlap {
     pub depth: f64,
 }
 
-/// A part that is examined.
-struct Part<'w> {
-    entry: Entry<'w>,
-    part: usize,
-    shape: &'w Shape,
-    pose: Pose,
-}
-
 impl World {
     /// Returns the pairs of objects that may collide and overlap by more than `depth` meters, in
     /// the order in which they were added. Changes nothing; costs one detection of contacts.
-    pub fn overlaps(&self, depth: f64) -> Vec<Overlap> {
-        let parts = self.overlapping_parts();
+    pub fn overlapping_pairs(&self, depth: f64) -> Vec<Overlap> {
+        let parts = self.parts().collect::<Vec<_>>();
         let mut broad = SweepAndPrune::default();
         let places: BTreeMap<u32, usize> =
             parts.iter().enumerate().map(|(n, part)| (broad.insert(&part.bounds(), part.moves()), n)).collect();
@@ -41,7 +34,7 @@ impl World {
             let [i, j] = pair.map(|handle| places[&handle]);
             let (a, b) = (&parts[i.min(j)], &parts[i.max(j)]);
             let Some(found) = self.depth_of(a, b).filter(|found| *found > depth) else { continue };
-            let overlap = Overlap { objects: [a.id(self), b.id(self)], parts: [a.part, b.part], depth: found };
+            let overlap = Overlap { objects: [a.id, b.id], parts: [a.part, b.part], depth: found };
             let known = deepest.entry([a.entry.serial, b.entry.serial]).or_insert(overlap);
             if found > known.depth {
                 *known = overlap;
@@ -50,28 +43,12 @@ impl World {
         deepest.into_values().collect()
     }
 
-    fn overlapping_parts(&self) -> Vec<Part<'_>> {
-        let entries = self.core.objects().iter().filter(|e| e.status.enabled && e.status.collidable);
-        let parts = entries.filter_map(|entry| Some((entry, entry.object.collidable()?))).flat_map(|(entry, body)| {
-            entry.state_range.parts.clone().enumerate().filter_map(move |(part, part_state)| {
-                Some(Part {
-                    entry,
-                    part,
-                    shape: body.shape(part)?,
-                    pose: self.core.derived.part_states[part_state].pose,
-                })
-            })
-        });
-        parts.collect()
-    }
-
     /// Returns the greatest depth of the contacts of two parts that may collide, if they overlap.
     fn depth_of(&self, a: &Part<'_>, b: &Part<'_>) -> Option<f64> {
         if !may_collide(&a.entry, a.part, &b.entry, b.part, &self.core.derived.part_states) {
             return None;
         }
-        let (of_a, of_b) = (a.entry.object.collidable()?, b.entry.object.collidable()?);
-        let mode = of_a.contact_mode(a.part).of_pair(of_b.contact_mode(b.part));
+        let mode = a.mode.of_pair(b.mode);
         let mut found: Vec<Contact> = Vec::new();
         contacts_in_mode(mode, a.shape, &a.pose, b.shape, &b.pose, 0.0, &mut found);
         found.iter().map(|contact| -contact.gap).max_by(f64::total_cmp)
@@ -85,9 +62,5 @@ impl Part<'_> {
 
     fn moves(&self) -> bool {
         self.entry.status.mode != Mode::Static
-    }
-
-    fn id(&self, world: &World) -> ObjectId {
-        world.core.owners[self.entry.state_range.parts.start + self.part].id
     }
 }

@@ -1,0 +1,352 @@
+//! Queries of the geometry: conversion of arguments and results.
+
+use crate::arrays::convert::{Numbers, number, numbers, pose, shown, vec3};
+use crate::errors::{Error, Result};
+use crate::objects::place::body_ids;
+use crate::objects::shapes::Shape;
+use crate::world::add::own_place;
+use crate::world::contacts::link;
+use crate::world::inner::Inner;
+use crate::world::shared::Shared;
+use nalgebra::Translation3;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::{PyList, PyTuple};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use tumble::collide::{Pose, Vec3};
+use tumble::dynamics::{BodyDistance, CollisionGroup, ObjectId, QueryFilter, Ray};
+
+/// A field of a structured array: name, whether it holds integers, shape.
+type Field = (&'static str, bool, &'static [usize]);
+
+const BODY: Field = ("body", true, &[]);
+const PART: Field = ("part", true, &[]);
+const NORMAL: Field = ("normal", false, &[3]);
+const POINT: Field = ("point", false, &[3]);
+const DISTANCE: Field = ("distance", false, &[]);
+const DEPTH: Field = ("depth", false, &[]);
+
+/// Rows of a structured array; all numbers have 8 bytes.
+struct Rows {
+    fields: &'static [Field],
+    bytes: Vec<u8>,
+}
+
+impl Rows {
+    fn new(fields: &'static [Field]) -> Rows {
+        Rows { fields, bytes: Vec::new() }
+    }
+
+    fn whole(&mut self, numbers: &[i64]) {
+        numbers.iter().for_each(|k| self.bytes.extend_from_slice(&k.to_le_bytes()));
+    }
+
+    fn real<'a>(&mut self, numbers: impl IntoIterator<Item = &'a f64>) {
+        numbers.into_iter().for_each(|x| self.bytes.extend_from_slice(&x.to_le_bytes()));
+    }
+
+    /// Returns the array, in one dimension.
+    fn array<'py>(self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
+        let fields = self.fields.iter().map(|&(name, whole, shape)| {
+            let kind = if whole { "<i8" } else { "<f8" };
+            (name, kind, PyTuple::new(py, shape)?).into_pyobject(py)
+        });
+        let fields = fields.collect::<PyResult<Vec<_>>>()?;
+        let kind = py.import("numpy")?.call_method1("dtype", (PyList::new(py, fields)?,))?;
+        Ok(PyArray1::from_vec(py, self.bytes).call_method1("view", (kind,))?)
+    }
+
+    /// Returns the first row, or None.
+    fn first<'py>(self, py: Python<'py>) -> Result<Option<Bound<'py, PyAny>>> {
+        match self.bytes.is_empty() {
+            true => Ok(None),
+            false => Ok(Some(self.array(py)?.get_item(0)?)),
+        }
+    }
+}
+
+/// The numbers of the bodies in `world.bodies`.
+struct Numbering(BTreeMap<ObjectId, i64>);
+
+impl Numbering {
+    fn of(inner: &Inner) -> Numbering {
+        Numbering((0..).zip(body_ids(&inner.world)).map(|(number, id)| (id, number)).collect())
+    }
+
+    /// Returns the number of a body, and the index of its link.
+    fn sides(&self, inner: &Inner, id: ObjectId, part: usize) -> [i64; 2] {
+        [self.0.get(&id).copied().unwrap_or(-1), link(inner, id, part)]
+    }
+}
+
+/// The arguments that select bodies.
+pub struct Selection<'a, 'py> {
+    pub group: u8,
+    pub mask: Option<u64>,
+    pub ignore: Option<&'a Bound<'py, PyAny>>,
+}
+
+impl Selection<'_, '_> {
+    /// Returns the filter of these arguments.
+    fn filter(&self, shared: &Arc<Shared>) -> Result<QueryFilter> {
+        let mut filter =
+            QueryFilter { group: group(self.group)?, mask: self.mask.unwrap_or(u64::MAX), ..QueryFilter::default() };
+        if let Some(ignore) = self.ignore {
+            match own_place(shared, ignore) {
+                Ok(one) => filter.ignored.push(one.id),
+                Err(_) if !ignore.is_instance_of::<pyo3::types::PyString>() && ignore.try_iter().is_ok() => {
+                    for body in ignore.try_iter()? {
+                        filter.ignored.push(own_place(shared, &body?)?.id);
+                    }
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(filter)
+    }
+}
+
+/// Converts the number of a collision group.
+pub fn group(number: u8) -> Result<CollisionGroup> {
+    CollisionGroup::new(number).ok_or_else(|| Error::value(format!("group is {number}; it must be 0 to 63")))
+}
+
+/// Returns vectors in a row, and whether there was more than one dimension.
+fn vectors(value: &Bound<'_, PyAny>, what: &str) -> Result<(Vec<Vec3>, bool)> {
+    let Numbers { shape, data } = numbers(value, what)?;
+    let many = match shape.as_slice() {
+        [3] => false,
+        [_, 3] => true,
+        _ => return Err(Error::value(format!("{what}: expected shape (3,) or (n, 3), got {}", shown(&shape)))),
+    };
+    Ok((data.chunks_exact(3).map(Vec3::from_column_slice).collect(), many))
+}
+
+/// Checks a distance, which may be infinite.
+fn length(value: f64, what: &str) -> Result<f64> {
+    if value >= 0.0 { Ok(value) } else { Err(Error::value(format!("{what} is {value}; it must be at least 0"))) }
+}
+
+/// Returns the pose of a shape's solid, for a pose of the frame that the user places.
+fn placed(shape: &Shape, at: Pose) -> Pose {
+    at * shape.placement * Translation3::from(shape.solid.center_of_mass())
+}
+
+/// Returns the hits of rays.
+pub fn cast_rays<'py>(
+    shared: &Arc<Shared>,
+    py: Python<'py>,
+    origins: &Bound<'_, PyAny>,
+    directions: &Bound<'_, PyAny>,
+    max_distance: Option<&Bound<'_, PyAny>>,
+    selection: &Selection<'_, '_>,
+) -> Result<Bound<'py, PyAny>> {
+    let ((origins, _), (directions, _)) = (vectors(origins, "origins")?, vectors(directions, "directions")?);
+    let count = if origins.len() == 1 { directions.len() } else { origins.len() };
+    if directions.len() != count && directions.len() != 1 {
+        let (n, m) = (origins.len(), directions.len());
+        return Err(Error::value(format!("{n} origins and {m} directions; expected as many, or one of either")));
+    }
+    if let Some(k) = directions.iter().position(|d| d.norm() == 0.0) {
+        return Err(Error::value(format!("directions: number {k} has no length")));
+    }
+    let lengths = match max_distance {
+        None => vec![f64::INFINITY],
+        Some(value) => match value.extract::<f64>() {
+            Ok(one) => vec![length(one, "max_distance")?],
+            Err(_) => {
+                let Numbers { shape, data } = numbers(value, "max_distance")?;
+                if shape != [count] {
+                    let shape = shown(&shape);
+                    return Err(Error::value(format!("max_distance: expected one number or ({count},), got {shape}")));
+                }
+                data.into_iter().map(|x| length(x, "max_distance")).collect::<Result<_>>()?
+            }
+        },
+    };
+    let pick = |k: usize, len: usize| if len == 1 { 0 } else { k };
+    let rays: Vec<Ray> = (0..count)
+        .map(|k| Ray {
+            origin: origins[pick(k, origins.len())],
+            direction: directions[pick(k, directions.len())],
+            max_distance: lengths[pick(k, lengths.len())],
+        })
+        .collect();
+    let filter = selection.filter(shared)?;
+    const FIELDS: &[Field] = &[DISTANCE, BODY, PART, ("face", true, &[]), NORMAL];
+    let rows = py.detach(|| {
+        shared.read(|inner| {
+            let (hits, numbering) = (inner.world.cast_rays(&rays, &filter), Numbering::of(inner));
+            let mut rows = Rows { fields: FIELDS, bytes: Vec::with_capacity(hits.len() * 7 * 8) };
+            for hit in hits {
+                match hit {
+                    Some(hit) => {
+                        let [body, part] = numbering.sides(inner, hit.id, hit.part);
+                        rows.real([&hit.distance]);
+                        rows.whole(&[body, part, i64::from(hit.face)]);
+                        rows.real(hit.normal.iter());
+                    }
+                    None => {
+                        rows.real([&f64::INFINITY]);
+                        rows.whole(&[-1, -1, -1]);
+                        rows.real(Vec3::zeros().iter());
+                    }
+                }
+            }
+            Ok(rows)
+        })
+    })?;
+    rows.array(py)
+}
+
+/// Returns the bodies that overlap a shape.
+pub fn overlaps<'py>(
+    shared: &Arc<Shared>,
+    py: Python<'py>,
+    shape: &Shape,
+    (position, orientation): (Option<&Bound<'_, PyAny>>, Option<&Bound<'_, PyAny>>),
+    selection: &Selection<'_, '_>,
+) -> Result<Bound<'py, PyAny>> {
+    let (at, filter) = (placed(shape, pose(position, orientation)?), selection.filter(shared)?);
+    let rows = shared.read(|inner| {
+        let (mut rows, numbering) = (Rows::new(&[BODY, PART, DEPTH]), Numbering::of(inner));
+        for found in inner.world.overlaps(&shape.solid, &at, &filter) {
+            rows.whole(&numbering.sides(inner, found.id, found.part));
+            rows.real([&found.depth]);
+        }
+        Ok(rows)
+    })?;
+    rows.array(py)
+}
+
+/// Returns the numbers of the bodies that contain a point.
+pub fn contains<'py>(
+    shared: &Arc<Shared>,
+    py: Python<'py>,
+    point: &Bound<'_, PyAny>,
+    selection: &Selection<'_, '_>,
+) -> Result<Bound<'py, PyArray1<i64>>> {
+    let (point, filter) = (vec3(point, "point")?, selection.filter(shared)?);
+    let mut bodies = shared.read(|inner| {
+        let numbering = Numbering::of(inner);
+        Ok(inner
+            .world
+            .contains(&point, &filter)
+            .into_iter()
+            .map(|(id, part)| numbering.sides(inner, id, part)[0])
+            .collect::<Vec<i64>>())
+    })?;
+    bodies.dedup();
+    Ok(PyArray1::from_vec(py, bodies))
+}
+
+/// Returns the depth of points.
+pub fn point_depth<'py>(
+    shared: &Arc<Shared>,
+    py: Python<'py>,
+    points: &Bound<'_, PyAny>,
+    selection: &Selection<'_, '_>,
+) -> Result<Bound<'py, PyAny>> {
+    let ((points, many), filter) = (vectors(points, "points")?, selection.filter(shared)?);
+    let rows = py.detach(|| {
+        shared.read(|inner| {
+            let (mut rows, numbering) = (Rows::new(&[DEPTH, BODY, PART, POINT, NORMAL]), Numbering::of(inner));
+            for point in &points {
+                match inner.world.point_depth(point, &filter) {
+                    Some(found) => {
+                        rows.real([&found.depth]);
+                        rows.whole(&numbering.sides(inner, found.id, found.part));
+                        rows.real(found.point.iter().chain(found.normal.iter()));
+                    }
+                    None => {
+                        rows.real([&f64::NEG_INFINITY]);
+                        rows.whole(&[-1, -1]);
+                        rows.real([&0.0; 6]);
+                    }
+                }
+            }
+            Ok(rows)
+        })
+    })?;
+    let array = rows.array(py)?;
+    if many { Ok(array) } else { Ok(array.get_item(0)?) }
+}
+
+/// Returns the closest points of two bodies, or of a shape and a body.
+pub fn closest_points<'py>(
+    shared: &Arc<Shared>,
+    py: Python<'py>,
+    a: &Bound<'_, PyAny>,
+    b: Option<&Bound<'_, PyAny>>,
+    (position, orientation): (Option<&Bound<'_, PyAny>>, Option<&Bound<'_, PyAny>>),
+    selection: &Selection<'_, '_>,
+) -> Result<Option<Bound<'py, PyAny>>> {
+    const FIELDS: &[Field] =
+        &[DISTANCE, ("bodies", true, &[2]), ("parts", true, &[2]), ("points", false, &[2, 3]), NORMAL];
+    let row = |inner: &Inner, found: Option<BodyDistance>| {
+        let mut rows = Rows::new(FIELDS);
+        if let Some(found) = found {
+            let numbering = Numbering::of(inner);
+            let sides = [found.a.map_or([-1, -1], |(id, part)| numbering.sides(inner, id, part)), {
+                let (id, part) = found.b;
+                numbering.sides(inner, id, part)
+            }];
+            rows.real([&found.distance]);
+            rows.whole(&[sides[0][0], sides[1][0], sides[0][1], sides[1][1]]);
+            rows.real(found.points.iter().flat_map(|p| p.iter()).chain(found.normal.iter()));
+        }
+        Ok(rows)
+    };
+    let rows = match a.extract::<PyRef<'_, Shape>>() {
+        Ok(shape) => {
+            let (at, mut filter) = (placed(&shape, pose(position, orientation)?), selection.filter(shared)?);
+            if let Some(b) = b {
+                let only = own_place(shared, b)?.id;
+                shared.read(|inner| {
+                    filter.ignored.extend(inner.world.ids().iter().filter(|&&id| id != only));
+                    Ok(())
+                })?;
+            }
+            shared.read(|inner| row(inner, inner.world.closest_to_shape(&shape.solid, &at, f64::INFINITY, &filter)))?
+        }
+        Err(_) => {
+            let Some(b) = b else { return Err(Error::value("closest_points: b is missing; expected a body")) };
+            if position.is_some() || orientation.is_some() {
+                return Err(Error::value("closest_points: position and orientation are those of a shape; a is a body"));
+            }
+            let (a, b) = (own_place(shared, a)?.id, own_place(shared, b)?.id);
+            shared.read(|inner| row(inner, inner.world.closest_points(a, b)?))?
+        }
+    };
+    rows.first(py)
+}
+
+/// Returns the first body that a moved shape touches.
+#[allow(clippy::too_many_arguments, reason = "Python's arguments")]
+pub fn cast_shape<'py>(
+    shared: &Arc<Shared>,
+    py: Python<'py>,
+    shape: &Shape,
+    direction: &Bound<'_, PyAny>,
+    max_distance: f64,
+    (position, orientation): (Option<&Bound<'_, PyAny>>, Option<&Bound<'_, PyAny>>),
+    selection: &Selection<'_, '_>,
+) -> Result<Option<Bound<'py, PyAny>>> {
+    let (direction, max_distance) = (vec3(direction, "direction")?, number(max_distance, "max_distance")?);
+    if direction.norm() == 0.0 {
+        return Err(Error::value("direction has no length"));
+    }
+    let max_distance = length(max_distance, "max_distance")?;
+    let (at, filter) = (placed(shape, pose(position, orientation)?), selection.filter(shared)?);
+    let rows = shared.read(|inner| {
+        let mut rows = Rows::new(&[DISTANCE, BODY, PART, POINT, NORMAL]);
+        if let Some(hit) = inner.world.cast_shape(&shape.solid, &at, &direction, max_distance, &filter) {
+            rows.real([&hit.distance]);
+            rows.whole(&Numbering::of(inner).sides(inner, hit.id, hit.part));
+            rows.real(hit.point.iter().chain(hit.normal.iter()));
+        }
+        Ok(rows)
+    })?;
+    rows.first(py)
+}
