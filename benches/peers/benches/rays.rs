@@ -11,7 +11,7 @@
 
 use rapier3d_f64::parry::math::{Pose as ParryPose, Rotation, Vector};
 use rapier3d_f64::parry::partitioning::{Bvh, BvhBuildStrategy};
-use rapier3d_f64::parry::query::{Ray as ParryRay, RayCast};
+use rapier3d_f64::parry::query::Ray as ParryRay;
 use rapier3d_f64::parry::shape::{Ball, Capsule, Cuboid, Shape as ParryShape, TriMesh as ParryMesh};
 use tumble_collide::{Pose, Quat, Shape, TreeSettings, TriMesh, Vec3};
 use tumble_core::{QueryFilter, Ray, RigidBody, World};
@@ -101,7 +101,14 @@ fn main() {
     let filter = QueryFilter::default();
     let mut times = [Vec::new(), Vec::new()];
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
-    let poses: Vec<ParryPose> = scene.iter().map(|body| parry_pose(&body.pose)).collect();
+    let poses: Vec<ParryPose> = scene
+        .iter()
+        .map(|body| {
+            // the vertices of a mesh are about its center of mass
+            let center = body.ours.center_of_mass();
+            parry_pose(&(body.pose * Pose::translation(center.x, center.y, center.z)))
+        })
+        .collect();
     // the trees of the mesh are built before
     world.cast_rays(&rays[..10], &filter);
     for _ in 0..SCANS {

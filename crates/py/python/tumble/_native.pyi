@@ -838,7 +838,21 @@ class World:
         mask: int | None = None,
         ignore: _Body | Sequence[_Body] | None = None,
     ) -> NDArray[np.void]:
-        """ """
+        """Returns where rays enter bodies: a structured array with one row per ray.
+
+        origins, directions: shape (3,) or (n, 3), m; directions of any length above 0. One of either
+        serves all. max_distance: length of the rays, m, a number or shape (n,); None: unlimited.
+
+        Fields: ``distance``, m, infinite for a miss; ``body``, its number in ``world.bodies``, -1 for
+        a miss; ``part``, for an articulation the index of the link in its ``link_names``; ``face``,
+        the index of a mesh's triangle, 0 to 5 for -x, +x, -y, +y, -z and +z of a box, 0 to 2 for side,
+        -z end and +z end of a cylinder, else 0; ``normal`` (3,), unit, outward, world axes.
+
+        A ray that starts inside a convex shape does not meet that shape; a mesh is hit on its outside
+        only. group, mask, ignore: the query has a collision group (0 to 63) and a mask (one bit per
+        group, None for all) like a body, and does not find the ignored bodies (a handle, a name or a
+        list of them). Sensors are not found. Runs on ``threads`` threads, which change no bit.
+        """
     def cast_shape(
         self,
         shape: Shape,
@@ -851,7 +865,14 @@ class World:
         mask: int | None = None,
         ignore: _Body | Sequence[_Body] | None = None,
     ) -> np.void | None:
-        """ """
+        """Returns the first body that a shape touches if it moves along a direction without rotation, or
+        None.
+
+        direction: shape (3,), of any length above 0, world axes. max_distance: how far it moves, m,
+        finite. position, orientation: where it starts. Fields: ``distance``, m, 0 if it overlaps at
+        the start; ``body``, ``part`` and the filter as in ``cast_rays``; ``point`` (3,), m;
+        ``normal`` (3,), unit, from the body towards the shape.
+        """
     def overlaps(
         self,
         shape: Shape,
@@ -862,7 +883,11 @@ class World:
         mask: int | None = None,
         ignore: _Body | Sequence[_Body] | None = None,
     ) -> NDArray[np.void]:
-        """ """
+        """Returns the bodies that overlap a shape at a pose: a structured array with the fields ``body``
+        and ``part``, as in ``cast_rays``, and ``depth``, that of the deepest contact, m.
+
+        position, orientation: as in ``add_rigid``. group, mask, ignore: as in ``cast_rays``.
+        """
     def closest_points(
         self,
         a: _Body | Shape,
@@ -874,15 +899,32 @@ class World:
         mask: int | None = None,
         ignore: _Body | Sequence[_Body] | None = None,
     ) -> np.void | None:
-        """ """
+        """Returns the closest points of two bodies, or of a shape at a pose and a body, the nearest one
+        if ``b`` is None. None if a body has no shape or is disabled.
+
+        a: a handle, a name or a shape. position, orientation: of a shape. Fields: ``distance``, m, the
+        negative depth if they overlap; ``bodies`` (2,) and ``parts`` (2,) as in ``contacts``, -1 for a
+        shape; ``points`` (2, 3), on the surfaces, world, m; ``normal`` (3,), unit, from the second to
+        the first. group, mask, ignore: of a shape, as in ``cast_rays``.
+        """
     def contains(
         self, point: ArrayLike, *, group: int = 0, mask: int | None = None, ignore: _Body | Sequence[_Body] | None = None
     ) -> NDArray[np.int64]:
-        """ """
+        """Returns the numbers in ``world.bodies`` of the bodies that contain a point: shape (k,).
+
+        point: shape (3,), m. The surface belongs to a body. group, mask, ignore: as in ``cast_rays``.
+        """
     def point_depth(
         self, points: ArrayLike, *, group: int = 0, mask: int | None = None, ignore: _Body | Sequence[_Body] | None = None
     ) -> Any:
-        """ """
+        """Returns how deep points lie in the bodies: one row for a point of shape (3,), a structured
+        array for points of shape (n, 3), m.
+
+        Fields: ``depth``, m, below the surface of the body in which the point is deepest, and for a
+        point outside of all bodies minus the distance from the nearest one, minus infinity if there
+        is none; ``body``, ``part`` and the filter as in ``cast_rays``; ``point`` (3,), the closest
+        point of the surface, m; ``normal`` (3,), unit, outward.
+        """
     def energy(self) -> Energy:
         """Returns the mechanical energy of everything that moves: ``kinetic``, ``potential`` (zero at
         the world's origin) and ``total``, J.

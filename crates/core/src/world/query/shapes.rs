@@ -148,7 +148,7 @@ impl World {
     /// it overlaps at the start is hit at distance 0. `max_distance` is finite.
     ///
     /// The shape advances by conservative steps until the gap is below 1e-9 of the smaller bounding
-    /// radius; cylinders and meshes can overlap by 1e-6 m there. A shape that passes a mesh at less than a thousandth of its way counts as touching.
+    /// radius. A shape that passes a mesh at less than a thousandth of its way counts as touching.
     pub fn cast_shape(
         &self,
         shape: &Shape,
@@ -174,23 +174,29 @@ impl World {
 }
 
 /// Advances a shape along a unit direction until it touches a part. The distance of convex shapes
-/// closes along the normal of their closest points at most; that of others along the direction.
+/// closes along the normal of their closest points at most; that of others along the direction. The
+/// normals of some pairs have a tolerance, so a step that went too far is halved.
 fn cast(shape: &Shape, pose: &Pose, direction: &Vec3, max: f64, part: &Part<'_>) -> Option<ShapeCastHit> {
     let convex = |shape: &Shape| !matches!(shape, Shape::Mesh(_));
     let both_convex = convex(shape) && convex(part.shape);
     let met = MET * shape.bounding_radius().min(part.shape.bounding_radius()).min(1e9);
-    let mut distance = 0.0;
+    let (mut clear, mut distance) = (0.0, 0.0);
     for advance in 1.. {
         let pair = closest_points(shape, &moved(pose, &(direction * distance)), part.shape, &part.pose)?;
-        let closing = -direction.dot(&pair.normal);
+        if pair.distance < -met && distance - clear > met {
+            distance = 0.5 * (clear + distance);
+            continue;
+        }
         if pair.distance <= met || advance >= MAX_ADVANCES {
             let point = 0.5 * (pair.points[0] + pair.points[1]);
             return Some(ShapeCastHit { id: part.id, part: part.part, distance, point, normal: pair.normal });
         }
+        let closing = -direction.dot(&pair.normal);
         let speed = if both_convex { closing } else { 1.0 };
         if speed <= 0.0 {
             return None; // a plane between the two is not approached
         }
+        clear = distance;
         // half of the tolerance remains, so that the shape does not stop just short of it
         distance += (pair.distance - 0.5 * met) / speed;
         if distance > max {
