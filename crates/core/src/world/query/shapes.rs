@@ -148,7 +148,8 @@ impl World {
     /// it overlaps at the start is hit at distance 0. `max_distance` is finite.
     ///
     /// The shape advances by conservative steps until the gap is below 1e-9 of the smaller bounding
-    /// radius. A shape that passes a mesh at less than a thousandth of its way counts as touching.
+    /// radius; with cylinders and meshes it can overlap by some 1e-5 m, the error of their distances
+    /// ([`closest_points`]). A shape that passes a mesh at less than a thousandth of its way counts as touching.
     pub fn cast_shape(
         &self,
         shape: &Shape,
