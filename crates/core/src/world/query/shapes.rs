@@ -149,7 +149,8 @@ impl World {
     ///
     /// The shape advances by conservative steps until the gap is below 1e-9 of the smaller bounding
     /// radius; with cylinders and meshes it can overlap by some 1e-5 m, the error of their distances
-    /// ([`closest_points`]). A shape that passes a mesh at less than a thousandth of its way counts as touching.
+    /// ([`closest_points`]). A shape that passes a
+    /// cylinder or a mesh at less than a thousandth of its way counts as touching.
     pub fn cast_shape(
         &self,
         shape: &Shape,
@@ -175,11 +176,11 @@ impl World {
 }
 
 /// Advances a shape along a unit direction until it touches a part. The distance of convex shapes
-/// closes along the normal of their closest points at most; that of others along the direction. The
-/// normals of some pairs have a tolerance, so a step that went too far is halved.
+/// with exact normals closes along the normal of their closest points at most; that of others along
+/// the direction. A step that went too far by the error of a distance is halved.
 fn cast(shape: &Shape, pose: &Pose, direction: &Vec3, max: f64, part: &Part<'_>) -> Option<ShapeCastHit> {
-    let convex = |shape: &Shape| !matches!(shape, Shape::Mesh(_));
-    let both_convex = convex(shape) && convex(part.shape);
+    let exact = |shape: &Shape| !matches!(shape, Shape::Mesh(_) | Shape::Cylinder(_));
+    let by_normal = exact(shape) && exact(part.shape);
     let met = MET * shape.bounding_radius().min(part.shape.bounding_radius()).min(1e9);
     let (mut clear, mut distance) = (0.0, 0.0);
     for advance in 1.. {
@@ -193,7 +194,7 @@ fn cast(shape: &Shape, pose: &Pose, direction: &Vec3, max: f64, part: &Part<'_>)
             return Some(ShapeCastHit { id: part.id, part: part.part, distance, point, normal: pair.normal });
         }
         let closing = -direction.dot(&pair.normal);
-        let speed = if both_convex { closing } else { 1.0 };
+        let speed = if by_normal { closing } else { 1.0 };
         if speed <= 0.0 {
             return None; // a plane between the two is not approached
         }
