@@ -111,11 +111,16 @@ pub fn closest_points(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Opt
     let margin = start.distance.max(0.0);
     let mut found = Vec::new();
     contacts(a, pose_a, b, pose_b, margin * (1.0 + ROUNDING) + f64::MIN_POSITIVE, &mut found);
-    let least = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap));
-    let Some(least) = least else { return start.distance.is_finite().then_some(start) };
-    if least.gap <= 0.0 {
-        return Some(ClosestPair::of(least));
+    // a corner that is slightly beside a face has a contact with that face, but is not below it
+    let size = a.bounding_radius().min(b.bounding_radius());
+    let inside = |shape: &Shape, pose: &Pose, p: &Vec3| shape.closest_point(pose, p).distance <= ROUNDING * size;
+    let overlaps = |c: &&Contact| c.gap <= 0.0 && inside(a, pose_a, &c.point) && inside(b, pose_b, &c.point);
+    let deepest = found.iter().filter(overlaps).min_by(|x, y| x.gap.total_cmp(&y.gap));
+    if let Some(deepest) = deepest {
+        return Some(ClosestPair::of(deepest));
     }
+    let least = found.iter().min_by(|x, y| x.gap.abs().total_cmp(&y.gap.abs()));
+    let Some(least) = least else { return start.distance.is_finite().then_some(start) };
     let polished = between(least.point + least.normal * (0.5 * least.gap));
     Some(if polished.distance <= start.distance { polished } else { start })
 }
