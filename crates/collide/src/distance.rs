@@ -6,6 +6,8 @@ use crate::{Contact, Pose, Shape, Vec3, contacts};
 const PROJECTIONS: usize = 16;
 /// Relative margin of a bound.
 const ROUNDING: f64 = 1e-9;
+/// Depth of a contact that can be that of a corner beside a face, in sizes of the smaller body.
+const BESIDE: f64 = 0.02;
 
 /// The point of a shape's surface that is closest to a given point, world axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -113,8 +115,11 @@ pub fn closest_points(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Opt
     contacts(a, pose_a, b, pose_b, margin * (1.0 + ROUNDING) + f64::MIN_POSITIVE, &mut found);
     // a corner that is slightly beside a face has a contact with that face, but is not below it
     let size = a.bounding_radius().min(b.bounding_radius());
-    let inside = |shape: &Shape, pose: &Pose, p: &Vec3| shape.closest_point(pose, p).distance <= ROUNDING * size;
-    let overlaps = |c: &&Contact| c.gap <= 0.0 && inside(a, pose_a, &c.point) && inside(b, pose_b, &c.point);
+    let inside = |p: &Vec3| {
+        [(a, pose_a), (b, pose_b)].iter().all(|(shape, pose)| shape.closest_point(pose, p).distance <= ROUNDING * size)
+    };
+    let overlaps =
+        |c: &&Contact| c.gap < -BESIDE * size || c.gap <= 0.0 && ClosestPair::of(c).points.iter().any(inside);
     let deepest = found.iter().filter(overlaps).min_by(|x, y| x.gap.total_cmp(&y.gap));
     if let Some(deepest) = deepest {
         return Some(ClosestPair::of(deepest));
