@@ -3,14 +3,13 @@
 import numpy as np
 import tumble
 
-ROD = 'joint = "revolute", axis = [0, 1, 0], mass_kg = 1, center_m = [0, 0, -1], inertia_kg_m2 = [0, 0, 0]'  # a point of 1 kg, 1 m from a hinge
-SCENE = f"""
-world = {{ stepper = "backtracking", integrator = "dormand_prince", integrator_tolerance = 1e-9 }}
-[[articulated]]
-name = "arm"
-link = [{{ name = "upper", {ROD} }}, {{ name = "lower", parent = "upper", position_m = [0, 0, -1], {ROD} }}]"""
-world = tumble.World.parse(SCENE)
-arm, rest, errors, energies = world.articulation("arm"), world.save(), [], []
+builder = tumble.ArticulationBuilder("arm")
+rod = {"axis": (0, 1, 0), "mass": 1, "center_of_mass": (0, 0, -1)}  # a point of 1 kg, 1 m from a hinge
+builder.add_link("upper", **rod)
+builder.add_link("lower", "upper", position=(0, 0, -1), **rod)
+world = tumble.World(stepper="backtracking", integrator="dormand_prince", integrator_tolerance=1e-9)
+arm, errors, energies = world.add_articulation(builder), [], []
+rest = world.save()
 for root in (2**0.5, -(2**0.5)):  # the lower rod leans by ±√2 of the upper; q holds the upper's angle and the one between them
     world.restore(rest)
     arm.q = 1e-4, 1e-4 * (root - 1)

@@ -33,7 +33,8 @@ pub struct ClosestPair {
 
 impl Shape {
     /// Returns the point of the shape's surface at `pose` that is closest to the world point `point`.
-    /// Of several equally close ones it is any. The first call builds the tree of a mesh.
+    /// Of several equally close ones it is any. Inside overlapping parts of a compound it is the point
+    /// of the part in which the given point is deepest. The first call builds the tree of a mesh.
     pub fn closest_point(&self, pose: &Pose, point: &Vec3) -> SurfacePoint {
         let p = pose.inverse_transform_point(&(*point).into()).coords;
         let (q, distance, normal) = self.closest_local(&p);
@@ -86,6 +87,16 @@ impl Shape {
                 let flat = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_else(Vec3::z);
                 let offset = (p - closest.point) * closest.signed_distance.signum();
                 (closest.point, closest.signed_distance, offset.try_normalize(0.0).unwrap_or(flat))
+            }
+            Shape::Compound(compound) => {
+                let mut least = (*p, f64::INFINITY, Vec3::z());
+                for (part, own) in compound.placed() {
+                    let found = part.closest_point(own, p);
+                    if found.distance < least.1 {
+                        least = (found.point, found.distance, found.normal);
+                    }
+                }
+                least
             }
         }
     }

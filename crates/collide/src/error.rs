@@ -20,6 +20,34 @@ pub enum ShapeError {
     /// A half-space has no volume, mass or center.
     #[error("a half-space is unbounded and has no mass properties; make the body static")]
     Unbounded,
+    /// A compound without parts, or with too many.
+    #[error("a compound of {count} parts; it must have 1 to {most}")]
+    Parts {
+        /// Number of parts.
+        count: usize,
+        /// Largest allowed number.
+        most: usize,
+    },
+    /// A half-space as a part of a compound.
+    #[error("part {number} of a compound is a half-space, which is unbounded; make it a static body")]
+    UnboundedPart {
+        /// Number of the part, from 1.
+        number: usize,
+    },
+    /// A part of a compound at a pose that is not finite.
+    #[error("part {number} of a compound has a pose that is not finite")]
+    PartPose {
+        /// Number of the part, from 1.
+        number: usize,
+    },
+    /// A compound of parts with and without a density.
+    #[error("part {number} of a compound has {} density, unlike part 1; give all parts one or none", if *has { "a" } else { "no" })]
+    PartDensity {
+        /// Number of the part, from 1.
+        number: usize,
+        /// Whether it has a density.
+        has: bool,
+    },
     /// A mesh that cannot be made a shape.
     #[error(transparent)]
     Mesh(#[from] MeshError),

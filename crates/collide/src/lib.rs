@@ -52,10 +52,12 @@ pub use mesh::{
     ClosedReport, ClosestPoint, MeshDistance, PolygonTriangulator, RepairReport, RepairSettings, TriMesh,
     WindingNumber, decode_text, obj_lines,
 };
+#[doc(hidden)]
+pub use narrow::closest_point_within;
 pub use narrow::{contacts, contacts_in_mode};
 pub use pose::{Aabb, Mat3, Pose, Quat, Vec3};
 pub use ray::{BoxTree, RayHit};
-pub use shape::{CylinderShape, MeshShape, Shape};
+pub use shape::{CompoundPart, CompoundShape, CylinderShape, MeshShape, Shape};
 pub use tree::{
     Builder, CachedTree, Covering, LevelQuality, LevelSphere, MeshId, Progress, QualitySettings, SphereNode,
     SphereTree, StageCount, TreeFile, TreeFileError, TreeSettings, align_columns, grow_to_cover,

@@ -44,11 +44,13 @@ mod world;
 
 pub use archive::ArchiveError;
 pub use articulated::{
-    ArticulatedBody, ArticulatedError, Collider, Coupling, DofSettings, Drive, Joint, LinkMass, Model, ModelBuilder,
-    ModelError, Playback, Spring,
+    ArticulatedBody, ArticulatedError, ArticulationBuilder, ArticulationError, Collider, Coupling, DofSettings, Drive,
+    Joint, LinkBuilder, LinkMass, Model, ModelBuilder, ModelError, Playback, Spring,
 };
 pub use constraint::builder::RowBuilder;
-pub use constraint::loop_joint::{Anchor, LoopJoint, LoopJointError, LoopJointKind, PositionError};
+pub use constraint::loop_joint::{
+    Anchor, JointForce, JointPlace, LoopJoint, LoopJointError, LoopJointKind, PositionError, Transmission,
+};
 pub use constraint::rows;
 pub use contact::pair_material::{PairMaterial, PairSide};
 pub use derived::Cache;
@@ -61,14 +63,14 @@ pub use object::{
     LightCarrier, Material, Momentum, MomentumKind, NetSync, Object, Renderable, RowTarget, SyncError,
 };
 pub use report::{StepReport, UnreachableJoint, WorstSolve};
-pub use rigid::{BodyError, RigidBody};
+pub use rigid::{BodyError, LockedAxes, RigidBody};
 pub use settings::{Integrator, Settings, SettingsError};
 pub use step::{Backtracking, STEPPERS, StepContext, Stepper, TimeStepping, stepper_by_name};
 pub use tumble_collide as collide;
 pub use world::sleep::Sleep;
 pub use world::view::{Mode, ObjectId, Status, WorldView};
 pub use world::{
-    BodyDistance, BodyView, ContactPoint, Overlap, PickForce, PointDepth, QueryFilter, Ray, RayCastHit, Replica,
-    ReplicaError, ShapeCastHit, ShapeOverlap, SnapshotError, StateMemory, StateMemoryHold, StepError, World,
-    WorldError, WorldState,
+    BodyDistance, BodyView, ContactPoint, Event, EventKind, Overlap, PickForce, PointDepth, QueryFilter, Ray,
+    RayCastHit, Replica, ReplicaError, ShapeCastHit, ShapeOverlap, SnapshotError, StateMemory, StateMemoryHold,
+    StepError, World, WorldError, WorldState,
 };

@@ -11,4 +11,4 @@ pub use crate::{
     ArticulatedBody, BodyView, Collider, ContactPoint, Joint, LinkMass, LoopJoint, Material, Mode, ModelBuilder,
     Object, ObjectId, RigidBody, Settings, StepError, StepReport, World, WorldError,
 };
-pub use tumble_collide::{Mat3, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3};
+pub use tumble_collide::{CompoundPart, Mat3, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3};

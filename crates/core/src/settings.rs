@@ -78,6 +78,9 @@ pub struct Settings {
     /// Combination of the restitution coefficients of two bodies. The default is the larger, so
     /// that a ball bounces off a floor without settings of its own.
     pub combine_restitution: Combine,
+    /// Smallest impulse of a pair of parts in a frame with which they count as in contact, N·s, at
+    /// least 0: weaker contacts make no [`Event`](crate::Event)s. 0 by default: every touch counts.
+    pub event_impulse: f64,
     /// Number of threads of a step, 0 to 256: 1 by default, 0 for as many as cores. The results are
     /// the same bits for every number, so it is no part of a saved world: a world that is read has
     /// 1.
@@ -110,6 +113,7 @@ impl Default for Settings {
             sleep: None,
             combine_friction: Combine::GeometricMean,
             combine_restitution: Combine::Max,
+            event_impulse: 0.0,
             threads: one_thread(),
         }
     }
@@ -158,6 +162,7 @@ setters! {
     with_sleep sleep: Option<Sleep>,
     with_combine_friction combine_friction: Combine,
     with_combine_restitution combine_restitution: Combine,
+    with_event_impulse event_impulse: f64,
     with_threads threads: u32,
 }
 
@@ -200,6 +205,7 @@ impl Settings {
             "at least the contact tolerance",
         )?;
         check("threads", self.threads as f64, self.threads <= MAX_THREADS, "0 to 256")?;
+        check("event impulse", self.event_impulse, self.event_impulse >= 0.0, "at least 0 N·s")?;
         if let Some(sleep) = &self.sleep {
             check("sleep: seconds", sleep.after, sleep.after > 0.0, "above 0 s")?;
             check("sleep: distance", sleep.within, sleep.within > 0.0, "above 0 m")?;

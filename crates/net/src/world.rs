@@ -122,6 +122,7 @@ fn drawn(drawn: Drawn<'_>) -> Shape {
         Solid::Capsule { radius, half_length } => Shape::Capsule { radius: *radius, length: 2.0 * half_length },
         Solid::Cylinder(c) => Shape::Cylinder { radius: c.radius(), length: 2.0 * c.half_length() },
         Solid::Mesh(mesh) => triangles(mesh.mesh()),
+        Solid::Compound(compound) => triangles(&compound.mesh()),
     }
 }
 

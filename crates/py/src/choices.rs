@@ -5,7 +5,7 @@ use crate::errors::{Error, Result};
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use tumble::collide::{Builder, ContactMode};
-use tumble::dynamics::{Combine, Mode};
+use tumble::dynamics::{Combine, EventKind, LockedAxes, LoopJointKind, Mode};
 use tumble::scene::urdf::{CollisionMeshes, MissingMeshes};
 use tumble::scene::{Integrator, Solver, Stepper};
 
@@ -23,6 +23,25 @@ pub const COLLISION_MESHES: Choices<CollisionMeshes> =
 /// Builders of sphere trees.
 pub const BUILDERS: Choices<Builder> =
     &[("medial", Builder::Medial), ("hubbard", Builder::Hubbard), ("grid", Builder::Grid), ("octree", Builder::Octree)];
+
+/// Kinds of joints of articulated bodies.
+#[derive(Clone, Copy, PartialEq)]
+pub enum JointType {
+    Revolute,
+    Prismatic,
+    Spherical,
+    Fixed,
+    Floating,
+}
+
+/// Joints of articulated bodies.
+pub const JOINT_TYPES: Choices<JointType> = &[
+    ("revolute", JointType::Revolute),
+    ("prismatic", JointType::Prismatic),
+    ("spherical", JointType::Spherical),
+    ("fixed", JointType::Fixed),
+    ("floating", JointType::Floating),
+];
 
 /// Returns the value of a name; `what` names the argument in the error.
 pub fn meaning<T: Copy>(what: &str, word: &str, words: &[(&str, T)]) -> Result<T> {
@@ -51,6 +70,10 @@ pub fn _choices() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("Combine", names(Combine::NAMES)),
         ("Contacts", names(ContactMode::NAMES)),
         ("Mode", names(MODES)),
+        ("EventKind", names(EventKind::NAMES)),
+        ("LockedAxis", LockedAxes::NAMES.to_vec()),
+        ("JointKind", names(LoopJointKind::NAMES)),
+        ("JointType", names(JOINT_TYPES)),
         ("MissingMeshes", names(MISSING_MESHES)),
         ("CollisionMeshes", names(COLLISION_MESHES)),
         ("TreeMethod", names(BUILDERS)),

@@ -8,7 +8,8 @@ use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use tumble::collide::{MeshError, ShapeError};
 use tumble::dynamics::{
-    ArchiveError, ArticulatedError, BodyError, ModelError, SettingsError, SnapshotError, StepError, WorldError,
+    ArchiveError, ArticulatedError, ArticulationError, BodyError, LoopJointError, ModelError, SettingsError,
+    SnapshotError, StepError, WorldError,
 };
 use tumble::net::record::RecordError;
 use tumble::render::RenderError;
@@ -31,6 +32,10 @@ pub enum Error {
     Mesh(#[from] MeshError),
     #[error(transparent)]
     Articulated(#[from] ArticulatedError),
+    #[error(transparent)]
+    Articulation(#[from] ArticulationError),
+    #[error(transparent)]
+    Joint(#[from] LoopJointError),
     #[error(transparent)]
     Model(#[from] ModelError),
     #[error(transparent)]

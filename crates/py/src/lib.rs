@@ -33,9 +33,13 @@ mod _native {
     #[pymodule_export]
     use super::objects::body::RigidBody;
     #[pymodule_export]
-    use super::objects::description::_unpickle_articulation;
+    use super::objects::builder::ArticulationBuilder;
     #[pymodule_export]
-    use super::objects::shapes::{Block, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere};
+    use super::objects::description::{_unpickle_articulation, _unpickle_built_articulation};
+    #[pymodule_export]
+    use super::objects::joint::Joint;
+    #[pymodule_export]
+    use super::objects::shapes::{Block, Capsule, Compound, Cylinder, HalfSpace, Mesh, Shape, Sphere};
     #[pymodule_export]
     use super::objects::spheretree::{_unpickle_tree, SphereTree};
     #[pymodule_export]

@@ -70,6 +70,7 @@ def with_every_shape(**words):
         "cylinder": tumble.Cylinder(0.1, 0.2),
         "mesh": mesh,
         "mesh too": mesh,
+        "compound": tumble.Compound([(tumble.Box(0.1), (0, 0, 0)), (mesh, (0.2, 0, 0), (0, 0, 1, 0))]),
     }
     for k, (name, shape) in enumerate(shapes.items()):
         body = world.add_rigid(name, shape, density=700.0 + k, position=(0.1 * k, 0, 0.13 + 0.4 * k), angular_velocity=(1, k, 2), restitution=0.1 * k)
@@ -227,6 +228,7 @@ def test_snapshots_pickle():
         tumble.Box((1, 2, 3)),
         tumble.Capsule(0.1, 0.5),
         tumble.Cylinder(0.1, 0.5),
+        tumble.Compound([(tumble.Sphere(0.1), (0, 0, 0), None, 500.0), (tumble.Box(0.2), (1, 0, 0), (0, 0, 0, 1), 700.0)]),
         tumble.HalfSpace((1, 2, 3), 0.3),
         tumble.Mesh(CORNERS, SIDES),
     ],

@@ -103,11 +103,21 @@ CHOICES = {
     "Solver": lambda word: tumble.World(solver=word),
     "Contacts": lambda word: tumble.World().add_rigid(**BALL, contacts=word),
     "Mode": lambda word: setattr(tumble.World().add_rigid(**BALL), "mode", word),
+    "JointKind": lambda word: add_joint(word),
+    "JointType": lambda word: tumble.ArticulationBuilder().add_link("link", joint=word),
     "MissingMeshes": lambda word: tumble.Articulation.from_urdf("scenes/robot/arm.urdf", missing_meshes=word),
     "CollisionMeshes": lambda word: tumble.Articulation.from_urdf("scenes/robot/arm.urdf", collision_meshes=word),
     "TreeMethod": lambda word: tumble.SphereTree.build(*cube(), method=word, depth=1, cache=False),
     "Axis": lambda word: tumble.World().plot_paths(0.1, bodies=[], along=word),
 }
+
+
+def add_joint(kind):
+    world = tumble.World()
+    two = (world.add_rigid(**BALL), world.add_rigid(tumble.Sphere(1), mass=1))
+    world.add_joint(
+        kind, *two, point=(0, 0, 0), second_point=(0, 0, 1), second_axis=(1, 0, 0), teeth=(1, 2), radius=1, pitch=1, ground=np.eye(3)[:2]
+    )
 
 
 def cube():

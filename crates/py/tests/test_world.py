@@ -141,10 +141,42 @@ def test_a_link_has_a_pair_of_its_own():
         (tumble.Box(2.0), 8.0),
         (tumble.Capsule(0.5, 2.0), math.pi * 0.25 * 2.0 + 4 / 3 * math.pi * 0.125),
         (tumble.Cylinder(0.5, 2.0), math.pi * 0.25 * 2.0),
+        (tumble.Compound([(tumble.Box(1), (0, 0, 0)), (tumble.Box(2), (9, 0, 0))]), 9.0),
     ],
 )
 def test_sizes_of_shapes_are_full_lengths(shape, volume):
     assert shape.volume == pytest.approx(volume)
+
+
+def test_a_compound_has_the_densities_of_its_parts():
+    world = tumble.World()
+    parts = [(tumble.Sphere(0.1), (0, 0, 0), None, 1000), (tumble.Sphere(0.1), (0.4, 0, 0), (0, 0, 0, 1), 3000)]
+    bell = tumble.Compound(parts)
+    assert repr(bell) == "Compound(2 parts)"
+    assert bell.center_of_mass == pytest.approx([0.3, 0, 0])
+    body = world.add_rigid("bell", bell, position=(0, 0, 2))
+    volume = 4 / 3 * math.pi * 0.1**3
+    assert body.mass == pytest.approx(4000 * volume)
+    assert body.position == pytest.approx([0, 0, 2])
+    assert world.add_rigid("even", tumble.Compound([part[:2] for part in parts])).mass == pytest.approx(2000 * volume)
+    assert world.cast_rays((0.4, 0, 9), (0, 0, -1))["face"].tolist() == [1]
+
+
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        ([], "a compound of 0 parts; it must have 1 to 4096"),
+        ([tumble.Sphere(1)], r"part 0 of a compound: expected \(shape, position\)"),
+        ([(tumble.Sphere(1), (0, 0, 0)), (1, (0, 0, 0))], "part 1 of a compound: expected"),
+        ([(tumble.Sphere(1), (0, 0, 0), None, -1)], "density is -1, but must be finite and above 0"),
+        ([(tumble.HalfSpace(), (0, 0, 0))], "part 1 of a compound is a half-space"),
+        ([(tumble.Sphere(1), (0, 0, 0)), (tumble.Sphere(1), (0, 0, 0), None, 5)], "part 2 of a compound has a density, unlike part 1"),
+        ([(tumble.Sphere(1), (0, 0, math.nan))], "position"),
+    ],
+)
+def test_wrong_compounds(parts, message):
+    with pytest.raises(ValueError, match=message):
+        tumble.Compound(parts)
 
 
 def test_capsules_and_cylinders_lie_along_z():

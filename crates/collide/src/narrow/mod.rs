@@ -5,6 +5,7 @@ mod box_closest;
 mod box_pair;
 mod capsule;
 mod clip;
+mod compound;
 mod cylinder;
 mod half_space;
 mod parts;
@@ -16,7 +17,7 @@ mod tree;
 
 use crate::sdf::DistanceField;
 use crate::sdf::primitive::{BoxField, CylinderField, HalfSpaceField, RoundField};
-use crate::{Contact, ContactMode, Pose, Shape};
+use crate::{Contact, ContactMode, Pose, Shape, SurfacePoint, Vec3};
 use sdf_contact::{Body, BodyElements};
 
 /// Calls [`contacts_in_mode`] with the default mode, `surface`.
@@ -44,6 +45,9 @@ pub fn contacts_in_mode(
     if !(is_finite(pose_a) && is_finite(pose_b)) {
         return;
     }
+    if let Some(side) = compound::Side::of(a, b) {
+        return compound::contacts_of_compound(side, mode, (a, pose_a), (b, pose_b), margin, out);
+    }
     let start = out.len();
     let ordered = rank(a) <= rank(b);
     let [(first, pose_first), (second, pose_second)] =
@@ -54,6 +58,34 @@ pub fn contacts_in_mode(
     if !ordered {
         out[start..].iter_mut().for_each(|c| *c = c.flipped());
     }
+}
+
+/// Returns the closest point of a shape's surface, like [`Shape::closest_point`], if it is at most
+/// `limit` meters away; by the fields of the `surface` mode, which are built where contacts are.
+/// Inside several overlapping shells of a mesh it is a point of one of them. `None` for a mesh that
+/// collides by its spheres.
+pub fn closest_point_within(shape: &Shape, pose: &Pose, point: &Vec3, limit: f64) -> Option<SurfacePoint> {
+    if let Shape::Compound(compound) = shape {
+        let parts = compound.placed().filter_map(|(part, own)| closest_point_within(part, &(pose * own), point, limit));
+        return parts.min_by(|x, y| x.distance.total_cmp(&y.distance));
+    }
+    let local = pose.inverse_transform_point(&(*point).into()).coords;
+    let mut least: Option<(f64, Vec3)> = None;
+    for part in 0..part_count(shape) {
+        with_body(shape, part, &mut |body| {
+            let nearest = least.map_or(limit, |least| least.0);
+            if body.field.bound(&local) <= nearest {
+                let hit = body.field.hit(&local, &[], 0.0);
+                if hit.nearest <= nearest {
+                    least = Some((hit.nearest, hit.normal));
+                }
+            }
+        });
+    }
+    least.map(|(distance, normal)| {
+        let normal = pose.rotation * normal;
+        SurfacePoint { point: point - normal * distance, distance, normal }
+    })
 }
 
 /// A sum is finite only if all its terms are.
@@ -71,6 +103,8 @@ fn rank(shape: &Shape) -> u8 {
         Shape::Capsule { .. } => 2,
         Shape::Box { .. } => 3,
         Shape::HalfSpace => 4,
+        // its parts are ordered
+        Shape::Compound(_) => 5,
     }
 }
 
@@ -128,9 +162,13 @@ fn by_surfaces(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, 
 }
 
 /// Returns the number of surfaces of a shape: several for a mesh of overlapping shells, none for
-/// other meshes that cross themselves.
+/// other meshes that cross themselves, and for compounds.
 fn part_count(shape: &Shape) -> usize {
-    if let Shape::Mesh(mesh) = shape { mesh.surfaces().len() } else { 1 }
+    match shape {
+        Shape::Mesh(mesh) => mesh.surfaces().len(),
+        Shape::Compound(_) => 0,
+        _ => 1,
+    }
 }
 
 /// Calls `visit` with the data of a shape, or of one part of it, for the `surface` mode.
@@ -158,6 +196,8 @@ fn with_body(shape: &Shape, part: usize, visit: &mut dyn FnMut(&Body)) {
             let elements = BodyElements::Mesh(&surface.elements);
             visit(&Body { elements, field: &surface.field, mesh: Some(&surface.field), radius })
         }
+        // by its parts
+        Shape::Compound(_) => {}
     }
 }
 
@@ -165,7 +205,7 @@ fn with_body(shape: &Shape, part: usize, visit: &mut dyn FnMut(&Body)) {
 mod tests {
     use super::*;
     use crate::ContactMode::{Spheres, Surface};
-    use crate::{Quat, Vec3};
+    use crate::Quat;
 
     /// The formulas of [`exact`] are the reference: a new shape without a tree has the contacts of
     /// [`general`] beside every primitive.

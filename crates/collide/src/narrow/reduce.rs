@@ -118,6 +118,15 @@ impl<'a> Collector<'a> {
         self.out[self.start..].iter().min_by(|x, y| x.gap.total_cmp(&y.gap))
     }
 
+    /// Returns the contact with the smallest gap; if none overlaps, the one that no element faces.
+    pub fn deepest_mut(&mut self) -> Option<&mut Contact> {
+        let deepest = self.out[self.start..].iter_mut().min_by(|x, y| x.gap.total_cmp(&y.gap));
+        match deepest {
+            Some(deepest) if deepest.gap < 0.0 => Some(deepest),
+            _ => self.fallback.as_mut(),
+        }
+    }
+
     /// Drops all contacts and sets a new limit. Returns the old limit.
     pub fn restart(&mut self, limit: f64) -> f64 {
         self.out.truncate(self.start);

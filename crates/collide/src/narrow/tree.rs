@@ -121,7 +121,7 @@ fn sample_primitive(primitive: &Shape, p: &Vec3) -> Option<PrimitiveSample> {
             core: 0.0,
             face: f.face,
         }),
-        Shape::Cylinder(_) | Shape::Mesh(_) => None,
+        Shape::Cylinder(_) | Shape::Mesh(_) | Shape::Compound(_) => None,
     }
 }
 

@@ -8,7 +8,7 @@
 mod box_tree;
 mod triangles;
 
-use crate::{Pose, Shape, TriMesh, Vec3};
+use crate::{CompoundShape, Pose, Shape, TriMesh, Vec3};
 pub use box_tree::BoxTree;
 pub(crate) use triangles::RayMesh;
 use triangles::ShearedRay;
@@ -21,9 +21,15 @@ pub struct RayHit {
     /// Outward unit normal of the surface there, world axes.
     pub normal: Vec3,
     /// The face: the index of a mesh's triangle; 0 to 5 for −x, +x, −y, +y, −z and +z of a box; 0,
-    /// 1 and 2 for the side, the −z end and the +z end of a cylinder; 0 for all others.
+    /// 1 and 2 for the side, the −z end and the +z end of a cylinder; the index of a compound's part;
+    /// 0 for all others.
     pub face: u32,
 }
+
+/// Maximum number of entries into one part of a compound that are inside other parts.
+const MAX_ENTRIES: usize = 64;
+/// Step behind such an entry, in radii of the compound.
+const STEP: f64 = 1e-9;
 
 /// A hit in the frame of the shape.
 type LocalHit = (f64, Vec3, u32);
@@ -80,8 +86,36 @@ impl Shape {
                 let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_else(Vec3::z);
                 Some((hit.distance, normal, hit.triangle))
             }
+            Shape::Compound(compound) => compound_entry(compound, o, d, max),
         }
     }
+}
+
+/// Returns where a ray enters a part from outside of all others.
+fn compound_entry(compound: &CompoundShape, o: &Vec3, d: &Vec3, max: f64) -> Option<LocalHit> {
+    let nearest = o - d * o.dot(d);
+    if nearest.norm() > compound.bounding_radius() {
+        return None;
+    }
+    let step = STEP * compound.bounding_radius();
+    let mut best: Option<LocalHit> = None;
+    for (n, (part, own)) in compound.placed().enumerate() {
+        let mut start = 0.0;
+        for _ in 0..MAX_ENTRIES {
+            let limit = best.map_or(max, |best| best.0) - start;
+            let Some(hit) = part.cast_ray(own, &(o + d * start), d, limit) else { break };
+            let distance = start + hit.distance;
+            if !compound.is_buried(n, &(o + d * distance)) {
+                if best.is_none_or(|best| distance < best.0) {
+                    best = Some((distance, hit.normal, n as u32));
+                }
+                break;
+            }
+            // a part that is not convex may be entered again
+            start = distance + step;
+        }
+    }
+    best
 }
 
 impl TriMesh {

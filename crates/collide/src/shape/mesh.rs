@@ -190,6 +190,16 @@ impl MeshShape {
         })
     }
 
+    /// Returns the number of vertices at which convex edges of different directions meet: 8 for a box,
+    /// however finely its sides are divided; all for a smooth convex surface, and for a mesh that
+    /// collides by its spheres.
+    pub fn corner_count(&self) -> usize {
+        match self.surfaces() {
+            [] => self.mesh.vertices.len(),
+            surfaces => surfaces.iter().map(|surface| surface.elements.corners).sum(),
+        }
+    }
+
     /// Returns the defects that were found and repaired; the notes are for users.
     pub fn report(&self) -> &ClosedReport {
         &self.report

@@ -1,10 +1,12 @@
 //! The shapes that a part of a body can have.
 
+mod compound;
 mod cylinder;
 mod mesh;
 mod stored;
 
 use crate::{Aabb, MassProperties, Pose, ShapeError, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3, mass};
+pub use compound::{CompoundPart, CompoundShape};
 pub use cylinder::CylinderShape;
 pub use mesh::MeshShape;
 use std::sync::Arc;
@@ -35,6 +37,8 @@ pub enum Shape {
     Cylinder(#[serde(with = "crate::archive::shared")] Arc<CylinderShape>),
     /// A closed mesh about its center of mass; shared.
     Mesh(#[serde(with = "crate::archive::shared")] Arc<MeshShape>),
+    /// Several shapes of one body about their common center of mass; shared.
+    Compound(#[serde(with = "crate::archive::shared")] Arc<CompoundShape>),
 }
 
 impl Shape {
@@ -82,6 +86,27 @@ impl Shape {
         Ok(Shape::Cylinder(Arc::new(CylinderShape::new(radius, length)?)))
     }
 
+    /// Returns a compound of several shapes, moved so that its center of mass is the origin;
+    /// [`Shape::center_of_mass`] is its position in the frame of the parts.
+    ///
+    /// ```
+    /// use tumble_collide::{CompoundPart, Pose, Shape, Vec3};
+    /// let (head, handle) = (Shape::cuboid(Vec3::new(0.1, 0.04, 0.04))?, Shape::cylinder(0.015, 0.3)?);
+    /// let hammer = Shape::compound(vec![
+    ///     CompoundPart::new(head, Pose::translation(0.0, 0.0, 0.15)).with_density(7800.0),
+    ///     CompoundPart::new(handle, Pose::identity()).with_density(700.0),
+    /// ])?;
+    /// assert!((hammer.center_of_mass().z - 0.134).abs() < 1e-3);
+    /// # Ok::<(), tumble_collide::ShapeError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`ShapeError`]: no part or more than 4096, a half-space, a pose that is not finite, a density
+    /// that is not above 0, or parts with and without a density.
+    pub fn compound(parts: Vec<CompoundPart>) -> Result<Shape, ShapeError> {
+        Ok(Shape::Compound(Arc::new(CompoundShape::new(parts)?)))
+    }
+
     /// Returns a closed mesh, moved so that its center of mass is the origin;
     /// [`Shape::center_of_mass`] is its original position. Harmless defects are repaired (see
     /// [`TriMesh::check_closed`]).
@@ -122,13 +147,23 @@ impl Shape {
         match self {
             Shape::Cylinder(cylinder) => cylinder.is_built(),
             Shape::Mesh(mesh) => mesh.is_built(),
+            Shape::Compound(compound) => compound.parts().iter().any(|part| part.shape.is_built()),
             _ => false,
         }
     }
 
-    /// Returns whether the shape has a sphere tree: meshes and cylinders.
+    /// Returns whether the shape, or a part of it, has a sphere tree: meshes and cylinders.
     pub fn has_tree(&self) -> bool {
-        matches!(self, Shape::Cylinder(_) | Shape::Mesh(_))
+        match self {
+            Shape::Cylinder(_) | Shape::Mesh(_) => true,
+            Shape::Compound(compound) => compound.parts().iter().any(|part| part.shape.has_tree()),
+            _ => false,
+        }
+    }
+
+    /// Returns the mean density of a compound whose parts have densities of their own, kg/m³.
+    pub fn own_density(&self) -> Option<f64> {
+        if let Shape::Compound(compound) = self { compound.own_density() } else { None }
     }
 
     /// Returns the sphere tree of a mesh or cylinder, built on first use for a cylinder.
@@ -152,6 +187,7 @@ impl Shape {
             Shape::Capsule { radius, half_length } => (axis(pose).abs() * *half_length).add_scalar(*radius),
             Shape::Cylinder(cylinder) => return cylinder.aabb(pose),
             Shape::Mesh(mesh) => return mesh.aabb(pose),
+            Shape::Compound(compound) => return compound.aabb(pose),
         };
         Aabb { min: center - half, max: center + half }
     }
@@ -170,6 +206,7 @@ impl Shape {
                 let half = pose.rotation.to_rotation_matrix().matrix().abs() * (0.5 * (bounds.max - bounds.min));
                 (pose.transform_point(&(0.5 * (bounds.min + bounds.max)).into()).coords, half)
             }
+            Shape::Compound(compound) => return compound.tight_aabb(pose),
             _ => return self.aabb(pose),
         };
         // room for rounding
@@ -177,7 +214,8 @@ impl Shape {
         Aabb { min: center - half, max: center + half }
     }
 
-    /// Returns the mass properties at a uniform `density` in kg/m³.
+    /// Returns the mass properties at a uniform `density` in kg/m³; of a compound whose parts have
+    /// densities of their own, it is the mean.
     ///
     /// # Errors
     /// [`ShapeError::Density`] if the density is not finite and above 0, [`ShapeError::Unbounded`]
@@ -193,19 +231,22 @@ impl Shape {
             Shape::Capsule { radius, half_length } => Ok(mass::capsule(*radius, *half_length, density)),
             Shape::Cylinder(c) => Ok(mass::cylinder(c.radius(), c.half_length(), density)),
             Shape::Mesh(mesh) => Ok(mesh.mass_properties(density)),
+            Shape::Compound(compound) => Ok(compound.mass_properties(density)),
         }
     }
 
     /// Returns the center of mass in the frame of the shape's description, meters: that of the file
-    /// for a mesh, which is stored about its center of mass; the origin for all others.
+    /// for a mesh, that of the parts for a compound, which are stored about their centers of mass; the
+    /// origin for all others.
     pub fn center_of_mass(&self) -> Vec3 {
         match self {
             Shape::Mesh(mesh) => mesh.center_of_mass(),
+            Shape::Compound(compound) => compound.center_of_mass(),
             _ => Vec3::zeros(),
         }
     }
 
-    /// Returns the volume in m³; infinite for a half-space.
+    /// Returns the volume in m³; infinite for a half-space, the sum of its parts for a compound.
     pub fn volume(&self) -> f64 {
         match self {
             Shape::HalfSpace => f64::INFINITY,
@@ -216,6 +257,7 @@ impl Shape {
             }
             Shape::Cylinder(c) => mass::cylinder_volume(c.radius(), c.half_length()),
             Shape::Mesh(mesh) => mesh.volume(),
+            Shape::Compound(compound) => compound.volume(),
         }
     }
 
@@ -229,6 +271,7 @@ impl Shape {
             Shape::Capsule { radius, half_length } => radius + half_length,
             Shape::Cylinder(c) => (c.radius().powi(2) + c.half_length().powi(2)).sqrt(),
             Shape::Mesh(mesh) => mesh.bounding_radius(),
+            Shape::Compound(compound) => compound.bounding_radius(),
         }
     }
 }

@@ -6,6 +6,8 @@ mod broad;
 mod brute_force;
 mod builders;
 mod buried;
+mod compound;
+mod deep_overlaps;
 mod distances;
 mod hull;
 mod medial;

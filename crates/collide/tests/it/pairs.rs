@@ -2,7 +2,7 @@
 //! of about that depth, and separated shapes have no contact below 0.
 
 use tumble_collide::{
-    Contact, ContactMode, Pose, Quat, Shape, SphereTree, TreeSettings, TriMesh, Vec3, contacts_in_mode,
+    CompoundPart, Contact, ContactMode, Pose, Quat, Shape, SphereTree, TreeSettings, TriMesh, Vec3, contacts_in_mode,
 };
 
 /// A shape whose highest and lowest points lie on its z axis, or on a flat face across it.
@@ -34,6 +34,15 @@ fn crossed_bars() -> Shape {
     mesh(&bars)
 }
 
+/// Returns two flush boxes on each other.
+fn stacked_boxes() -> Shape {
+    let half = |z: f64| {
+        let shape = Shape::cuboid(Vec3::new(1.0, 1.0, 0.5)).unwrap();
+        CompoundPart::new(shape, Pose::translation(0.0, 0.0, z))
+    };
+    Shape::compound(vec![half(-0.25), half(0.25)]).unwrap()
+}
+
 fn pieces() -> Vec<Piece> {
     let spool = [(0.0, -0.5), (0.5, -0.5), (0.2, -0.1), (0.2, 0.1), (0.5, 0.5), (0.0, 0.5)];
     // the sides of the waist cross each other
@@ -45,6 +54,7 @@ fn pieces() -> Vec<Piece> {
         piece("capsule", Shape::capsule(0.3, 0.6).unwrap(), 0.6),
         piece("box", Shape::cuboid(Vec3::repeat(1.0)).unwrap(), 0.5),
         piece("cylinder", Shape::cylinder(0.5, 1.0).unwrap(), 0.5),
+        piece("compound", stacked_boxes(), 0.5),
         piece("cube mesh", mesh(&TriMesh::cuboid(Vec3::repeat(1.0))), 0.5),
         piece("spool", lathe(&spool), 0.5),
         piece("crossed bars", crossed_bars(), 0.5),

@@ -8,7 +8,7 @@ use crate::object::Material;
 use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
 use crate::object::{Object, Renderable};
-use crate::{ArticulatedBody, Coupling, DofSettings, Model, RigidBody};
+use crate::{ArticulatedBody, Coupling, DofSettings, LockedAxes, Model, RigidBody};
 use serde::{Deserialize, Serialize};
 use tumble_collide::{ContactMode, Mat3, Pose, Vec3};
 
@@ -22,9 +22,14 @@ pub(super) struct RigidRecord {
     material: Material,
     linear_damping: f64,
     angular_damping: f64,
+    gravity_scale: f64,
+    locked: LockedAxes,
+    /// Center of mass in the frame of the part.
+    center: Vec3,
     contact_mode: ContactMode,
     group: CollisionGroup,
     mask: u64,
+    sensor: bool,
     initial_pose: Pose,
     initial_velocity: [Vec3; 2],
     visuals: Vec<VisualRecord>,
@@ -41,9 +46,13 @@ impl RigidRecord {
             material: body.material,
             linear_damping: body.linear_damping,
             angular_damping: body.angular_damping,
+            gravity_scale: body.gravity_scale,
+            locked: body.locked,
+            center: body.center_in_part(),
             contact_mode: body.contact_mode,
             group: body.group,
             mask: body.mask,
+            sensor: body.sensor,
             initial_pose: body.initial_pose,
             initial_velocity: [body.initial_velocity, body.initial_angular_velocity],
             visuals: body.visuals().iter().map(|visual| VisualRecord::of(visual, tables)).collect(),
@@ -54,13 +63,15 @@ impl RigidRecord {
 
     pub fn body(self, tables: &LoadedTables) -> Result<RigidBody, ArchiveError> {
         let shape = shape(&tables.shapes, self.shape)?;
-        let mut body = match self.mass {
+        let body = match self.mass {
             Some((mass, inertia)) => RigidBody::fixed(shape).with_mass_and_inertia(mass, inertia),
             None => RigidBody::fixed(shape),
         };
+        let mut body = body.with_center_in_part(self.center);
         (body.material, body.contact_mode) = (self.material, self.contact_mode);
         (body.linear_damping, body.angular_damping) = (self.linear_damping, self.angular_damping);
-        (body.group, body.mask) = (self.group, self.mask);
+        (body.gravity_scale, body.locked) = (self.gravity_scale, self.locked);
+        (body.group, body.mask, body.sensor) = (self.group, self.mask, self.sensor);
         let [velocity, angular_velocity] = self.initial_velocity;
         let visuals = self.visuals.into_iter().map(|v| v.visual(tables)).collect::<Result<_, _>>()?;
         let body = body

@@ -2,7 +2,7 @@
 //!
 //! | part | bytes |
 //! |---|---|
-//! | `tumbleA7`; the last is the number of the format | 8 |
+//! | `tumbleAA`; the last is the number of the format | 8 |
 //! | XXH3 of the rest, little-endian | 8 |
 //! | settings, stepper, solver, shapes, visual meshes, objects, pairs, state, contacts, report in postcard | any |
 //!
@@ -19,11 +19,12 @@ use crate::settings::Settings;
 use crate::solver::{self, RowSolver};
 use crate::step::{STEPPERS, Stepper, stepper_by_name};
 use crate::world::view::{Mode, ObjectId};
-use crate::world::{ContactPoint, World, WorldState};
+use crate::world::{ContactPoint, Event, EventKind, World, WorldState};
 use crate::{ArticulatedBody, LoopJoint, Object, RigidBody, UnreachableJoint, WorstSolve};
 use bodies::{ArticulatedRecord, RigidRecord};
 use records::{
-    ContactRecord, LoadedTables, LoopJointRecord, MeshRecord, ObjectIndices, PairRecord, ReportRecord, Tables, meshes,
+    ContactRecord, EventRecord, LoadedTables, LoopJointRecord, MeshRecord, ObjectIndices, PairRecord, ReportRecord,
+    Tables, meshes,
 };
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -32,7 +33,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 /// First bytes of an archive of a world. The last is the number of the format, which rises with
 /// every change of the content.
-const HEAD: &[u8; 8] = b"tumbleA7";
+const HEAD: &[u8; 8] = b"tumbleAA";
 
 /// Why an archive cannot be written or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -92,6 +93,7 @@ struct Archive {
     pairs: Vec<PairRecord>,
     state: WorldState,
     contacts: Vec<ContactRecord>,
+    events: Vec<EventRecord>,
     report: ReportRecord,
 }
 
@@ -105,9 +107,9 @@ struct NamedRecord {
 /// One object.
 #[derive(Serialize, Deserialize)]
 enum Record {
-    Rigid(RigidRecord),
+    Rigid(Box<RigidRecord>),
     Articulated(Box<ArticulatedRecord>),
-    LoopJoint(LoopJointRecord),
+    LoopJoint(Box<LoopJointRecord>),
     Foreign,
 }
 
@@ -151,6 +153,7 @@ impl World {
             pairs,
             state: self.state_value().clone(),
             contacts: self.contacts().iter().map(|c| ContactRecord::of(c, &indices)).collect(),
+            events: self.events().iter().map(|event| EventRecord::of(event, &indices)).collect(),
             report: ReportRecord::of(self.report(), &indices),
         };
         seal(HEAD, &archive)
@@ -185,7 +188,8 @@ impl World {
         archive.pairs.into_iter().try_for_each(|pair| pair.put(&mut world, &ids)).map_err(damaged)?;
         world.restore_state(&archive.state).map_err(damaged)?;
         let contacts = archive.contacts.into_iter().map(|c| c.contact(&ids)).collect();
-        world.publish(contacts, archive.report.report(&ids));
+        let events = archive.events.into_iter().map(|event| event.event(&ids)).collect();
+        world.publish(contacts, events, archive.report.report(&ids));
         Ok(world)
     }
 }
@@ -235,11 +239,11 @@ fn solver(name: &str) -> Result<Box<dyn RowSolver>, ArchiveError> {
 fn record(object: &dyn Object, tables: &mut Tables, indices: &ObjectIndices) -> Record {
     let any: &dyn std::any::Any = object;
     if let Some(body) = any.downcast_ref::<RigidBody>() {
-        Record::Rigid(RigidRecord::of(body, tables))
+        Record::Rigid(Box::new(RigidRecord::of(body, tables)))
     } else if let Some(body) = any.downcast_ref::<ArticulatedBody>() {
         Record::Articulated(Box::new(ArticulatedRecord::of(body, tables)))
     } else if let Some(loop_joint) = any.downcast_ref::<LoopJoint>() {
-        Record::LoopJoint(LoopJointRecord::of(loop_joint, indices))
+        Record::LoopJoint(Box::new(LoopJointRecord::of(loop_joint, indices)))
     } else {
         Record::Foreign
     }

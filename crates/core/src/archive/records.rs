@@ -1,7 +1,8 @@
 //! Records of an archive that refer to objects by index, and to shapes by index in a table.
 
-use super::{ArchiveError, ContactPoint, StepReport, UnreachableJoint, WorstSolve, damaged};
-use crate::constraint::loop_joint::{Anchor, LoopJoint, LoopJointKind};
+use super::{ArchiveError, ContactPoint, Event, EventKind, StepReport, UnreachableJoint, WorstSolve, damaged};
+use crate::articulated::DofSettings;
+use crate::constraint::loop_joint::{Anchor, LoopJoint, LoopJointKind, Transmission};
 use crate::contact::pair_material::{PairMaterial, PairSide};
 use crate::object::visual::{Visual, VisualGeometry, VisualMesh};
 use crate::object::{Appearance, Object};
@@ -26,6 +27,7 @@ impl ShapeTable {
         let address = match shape {
             Shape::Mesh(mesh) => Some(Arc::as_ptr(mesh).addr()),
             Shape::Cylinder(cylinder) => Some(Arc::as_ptr(cylinder).addr()),
+            Shape::Compound(compound) => Some(Arc::as_ptr(compound).addr()),
             _ => None,
         };
         let index = address.map_or(next, |address| *self.tables.entry(address).or_insert(next));
@@ -100,12 +102,24 @@ pub(super) struct LoopJointRecord {
     name: String,
     kind: LoopJointKind,
     sides: [Side; 2],
+    dof: DofSettings,
+    length: f64,
+    breaking: [f64; 2],
+    transmission: Transmission,
 }
 
 impl LoopJointRecord {
     pub fn of(loop_joint: &LoopJoint, indices: &ObjectIndices) -> LoopJointRecord {
         let side = |a: Anchor| (a.part.map(|(id, part)| (indices.of_id(id), part)), a.frame);
-        LoopJointRecord { name: loop_joint.name().into(), kind: loop_joint.kind(), sides: loop_joint.sides().map(side) }
+        LoopJointRecord {
+            name: loop_joint.name().into(),
+            kind: loop_joint.kind(),
+            sides: loop_joint.sides().map(side),
+            dof: loop_joint.dof().clone(),
+            length: loop_joint.length(),
+            breaking: loop_joint.breaking(),
+            transmission: *loop_joint.transmission(),
+        }
     }
 
     pub fn loop_joint(self, ids: &[ObjectId]) -> Result<LoopJoint, ArchiveError> {
@@ -113,7 +127,15 @@ impl LoopJointRecord {
             let part = part.map(|(index, part)| (id(ids, index), part));
             Anchor { part, frame }
         });
-        LoopJoint::new(self.name, self.kind, a, b).map_err(damaged)
+        let mut joint = LoopJoint::new(self.name, self.kind, a, b).map_err(damaged)?;
+        if self.kind.has_length() {
+            joint.set_length(self.length).map_err(damaged)?;
+        }
+        joint.set_dof(self.dof).map_err(damaged)?;
+        let [force, torque] = self.breaking;
+        joint.set_breaking(force, torque).map_err(damaged)?;
+        joint.set_transmission(self.transmission).map_err(damaged)?;
+        Ok(joint)
     }
 }
 
@@ -153,6 +175,32 @@ impl ContactRecord {
     }
 }
 
+/// An event of the last frame; objects by index.
+#[derive(Serialize, Deserialize)]
+pub(super) struct EventRecord {
+    kind: EventKind,
+    sides: [(Option<u32>, usize); 2],
+    /// Impulse, point.
+    vectors: [Vec3; 2],
+}
+
+impl EventRecord {
+    pub fn of(e: &Event, indices: &ObjectIndices) -> EventRecord {
+        EventRecord {
+            kind: e.kind,
+            sides: [(indices.of_id(e.a), e.part_a), (e.b.and_then(|b| indices.of_id(b)), e.part_b)],
+            vectors: [e.impulse, e.point],
+        }
+    }
+
+    pub fn event(self, ids: &[ObjectId]) -> Event {
+        let [(a, part_a), (b, part_b)] = self.sides;
+        let [impulse, point] = self.vectors;
+        let b = b.map(|b| id(ids, Some(b)));
+        Event { kind: self.kind, a: id(ids, a), part_a, b, part_b, impulse, point }
+    }
+}
+
 /// One side of a pair with its own surface constants; objects by index.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(super) enum PairSideRecord {
@@ -168,6 +216,7 @@ pub(super) struct PairRecord {
     pub sides: [PairSideRecord; 2],
     restitution: Option<f64>,
     friction: Option<f64>,
+    collides: Option<bool>,
 }
 
 impl PairRecord {
@@ -180,10 +229,10 @@ impl PairRecord {
                 PairSide::Material(material) => PairSideRecord::Material(material),
             })
         };
-        let PairMaterial { restitution, friction } = *material;
+        let PairMaterial { restitution, friction, collides } = *material;
         let mut sides = [side(sides[0])?, side(sides[1])?];
         sides.sort_unstable();
-        Some(PairRecord { sides, restitution, friction })
+        Some(PairRecord { sides, restitution, friction, collides })
     }
 
     /// Adds the pair to a world with these objects.
@@ -193,7 +242,11 @@ impl PairRecord {
             PairSideRecord::Object(index) => PairSide::Object(id(ids, Some(index))),
             PairSideRecord::Material(material) => PairSide::Material(material),
         });
-        world.set_pair_material(a, b, PairMaterial { restitution: self.restitution, friction: self.friction })
+        world.set_pair_material(
+            a,
+            b,
+            PairMaterial { restitution: self.restitution, friction: self.friction, collides: self.collides },
+        )
     }
 }
 

@@ -431,7 +431,7 @@ impl ArticulatedBody {
         x.len() == self.start.len() && x.iter().all(|x| x.is_finite()) && self.model.links().iter().all(unit)
     }
 
-    fn no_link(&self, link: &str) -> ArticulatedError {
+    pub(super) fn no_link(&self, link: &str) -> ArticulatedError {
         ArticulatedError::NoLink { body: self.name.clone(), link: link.to_string() }
     }
 }

@@ -2,6 +2,7 @@
 
 mod algorithms;
 mod body;
+mod builder;
 mod joint_rows;
 mod model;
 mod object;
@@ -15,6 +16,7 @@ pub use algorithms::jacobian::{link_jacobian, point_jacobian};
 pub use algorithms::kinematics::{Kinematics, LinkMotion, Rates};
 pub use algorithms::rnea::{InverseDynamics, inverse_dynamics};
 pub use body::{ArticulatedBody, ArticulatedError, Collider};
+pub use builder::{ArticulationBuilder, ArticulationError, LinkBuilder};
 pub use model::coordinates::{difference, integrate, normalize};
 pub use model::dof::{Coupling, DofSettings, Drive, Spring};
 pub use model::joint::Joint;

@@ -1,5 +1,6 @@
 //! Constraint rows, how constraints and contacts lay them, and loop joints.
 
 pub(crate) mod builder;
+pub(crate) mod dof_rows;
 pub(crate) mod loop_joint;
 pub mod rows;

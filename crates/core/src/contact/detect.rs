@@ -1,5 +1,6 @@
 //! Contact detection: broad phase, filters, narrow phase.
 
+use crate::contact::internal_edges::{InternalEdges, Surroundings};
 use crate::contact::pair::{CachedContacts, KnownContacts, MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
 use crate::contact::pair_material::PairMaterials;
 use crate::contact::time_of_impact::MovingPair;
@@ -60,6 +61,7 @@ pub(crate) struct DetectorBuffers {
     pairs: Vec<[u32; 2]>,
     /// Results of the pieces of the narrow phase.
     found: Vec<Found>,
+    internal_edges: InternalEdges,
 }
 
 /// Results of consecutive pairs.
@@ -103,7 +105,7 @@ pub(crate) struct Detector<'a> {
 
 impl Detector<'_> {
     /// Finds all contacts whose gap is at most the distance that the pair may close within
-    /// `horizon` seconds, plus the drift tolerance.
+    /// `horizon` seconds, plus the drift tolerance; without those at internal edges of flush bodies.
     pub fn detect(&mut self, horizon: f64, prediction: PredictionMode, out: &mut Vec<ContactConstraint>) {
         out.clear();
         self.gather(horizon);
@@ -141,6 +143,13 @@ impl Detector<'_> {
         }
         self.scratch.found = found;
         self.scratch.pairs = pairs;
+        let around = Surroundings {
+            objects: self.objects,
+            owners: self.owners,
+            part_states: self.part_states,
+            drift_tolerance: self.settings.drift_tolerance,
+        };
+        self.scratch.internal_edges.remove(&around, out);
     }
 
     /// Puts one box per collidable part, around its motion within the horizon, into the broad
@@ -231,6 +240,11 @@ impl NarrowPhase<'_> {
         let (part_a, part_b) = (owner_a.part as usize, owner_b.part as usize);
         let (state_a, state_b) = (&self.part_states[a as usize], &self.part_states[b as usize]);
         let (Some(shape_a), Some(shape_b)) = (body_a.shape(part_a), body_b.shape(part_b)) else { return };
+        let surface_a = (owner_a.id, part_a, body_a.material(part_a));
+        let surface_b = (owner_b.id, part_b, body_b.material(part_b));
+        if self.pair_materials.ignores(surface_a, surface_b) {
+            return;
+        }
         let mode = body_a.contact_mode(part_a).of_pair(body_b.contact_mode(part_b));
         let near = 2.0 * self.settings.drift_tolerance;
         let pair = PairQuery {
@@ -250,8 +264,6 @@ impl NarrowPhase<'_> {
             needs_wake.extend((!found.is_empty()).then_some(sleeper.serial));
             return;
         }
-        let surface_a = (owner_a.id, part_a, body_a.material(part_a));
-        let surface_b = (owner_b.id, part_b, body_b.material(part_b));
         let Material { restitution, friction, .. } = self.pair_materials.combine(self.settings, surface_a, surface_b);
         let pair = [entry_a.serial, owner_a.part, entry_b.serial, owner_b.part];
         let mut frame = ContactFrame { point: Vec3::zeros(), axes: [Vec3::zeros(); 3] };
@@ -292,14 +304,14 @@ fn across(v: Vec3, along: &Vec3) -> Vec3 {
 }
 
 /// Returns whether two parts are to be tested: one of them moves (or is kinematic and approaches a
-/// sleeping object), and both collision groups allow it.
+/// sleeping object), none is a sensor, and both collision groups allow it.
 pub(crate) fn may_collide(a: &Entry, part_a: usize, b: &Entry, part_b: usize, part_states: &[PartState]) -> bool {
     let (Some(ca), Some(cb)) = (a.object.collidable(), b.object.collidable()) else { return false };
     let wakes = a.asleep && b.approaches(part_states) || b.asleep && a.approaches(part_states);
     if !(wakes || a.moves() && ca.part_moves(part_a) || b.moves() && cb.part_moves(part_b)) {
         return false;
     }
-    if a.serial == b.serial && !ca.parts_collide(part_a, part_b) {
+    if ca.is_sensor(part_a) || cb.is_sensor(part_b) || a.serial == b.serial && !ca.parts_collide(part_a, part_b) {
         return false;
     }
     ca.collides_with(part_a, cb.collision_group(part_b)) && cb.collides_with(part_b, ca.collision_group(part_a))

@@ -2,6 +2,7 @@
 //! of the pairs.
 
 pub(crate) mod detect;
+mod internal_edges;
 pub(crate) mod pair;
 pub(crate) mod pair_material;
 mod separation;

@@ -16,8 +16,8 @@ const TREE_MARGIN: f64 = 0.02;
 /// Margin of two meshes in the `surface` mode, as a fraction of the smaller bounding radius. Beyond
 /// it they are followed along free motion: a wide margin includes most of both surfaces.
 const MESH_MARGIN: f64 = 0.05;
-/// Maximum number of vertices of a mesh that is queried with the full margin.
-const SIMPLE_MESH_VERTICES: usize = 64;
+/// Maximum number of corners of a mesh that is queried with the full margin.
+const SIMPLE_MESH_CORNERS: usize = 64;
 /// Number of samples along free motion; twice as many if the bodies come near and do not touch.
 const MAX_SAMPLES: f64 = 16.0;
 
@@ -118,13 +118,13 @@ impl PairQuery<'_> {
         (margin, closing)
     }
 
-    /// Returns whether one shape is a mesh of few vertices: a wide margin is then cheap, as for a
+    /// Returns whether one shape is a mesh of few corners: a wide margin is then cheap, as for a
     /// box.
     fn has_simple_mesh(&self) -> bool {
         self.parts
             .shapes
             .iter()
-            .any(|shape| matches!(shape, Shape::Mesh(mesh) if mesh.mesh().vertices.len() <= SIMPLE_MESH_VERTICES))
+            .any(|shape| matches!(shape, Shape::Mesh(mesh) if mesh.corner_count() <= SIMPLE_MESH_CORNERS))
     }
 
     /// Finds the present contacts, ordered by feature, and returns 0. Two meshes without any within

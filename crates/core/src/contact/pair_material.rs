@@ -36,6 +36,9 @@ pub struct PairMaterial {
     pub restitution: Option<f64>,
     /// Coefficient of Coulomb friction, at least 0.
     pub friction: Option<f64>,
+    /// Whether the two collide at all; `None`: if their groups and masks allow it. A pair that does
+    /// not collide is not seen by sensors of the pair either. `true` does not override the groups.
+    pub collides: Option<bool>,
 }
 
 impl PairMaterial {
@@ -62,7 +65,7 @@ pub(crate) struct PairMaterials {
 }
 
 impl PairMaterials {
-    /// Sets the constants of a pair; constants that are both `None` remove the pair.
+    /// Sets the constants of a pair; constants that are all `None` remove the pair.
     pub fn set(&mut self, mut sides: [PairSide; 2], material: PairMaterial) {
         sides.sort_unstable();
         match material == PairMaterial::default() {
@@ -94,6 +97,11 @@ impl PairMaterials {
         }
     }
 
+    /// Returns whether a chosen pair keeps two parts from colliding.
+    pub fn ignores(&self, a: Surface, b: Surface) -> bool {
+        !self.entries.is_empty() && self.of(a, b).collides == Some(false)
+    }
+
     /// A part goes before its object, and that before its material; between entries that name a
     /// pair equally closely the one that names `a` more closely decides.
     fn of(&self, a: Surface, b: Surface) -> PairMaterial {
@@ -111,6 +119,7 @@ impl PairMaterials {
         PairMaterial {
             restitution: found().find_map(|entry| entry.restitution),
             friction: found().find_map(|entry| entry.friction),
+            collides: found().find_map(|entry| entry.collides),
         }
     }
 }

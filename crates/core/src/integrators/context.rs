@@ -129,6 +129,15 @@ impl IntegrationContext<'_> {
         }
     }
 
+    /// Replaces the rates of momentum by their means over `h`.
+    pub fn average(&mut self, dp: &mut [f64], h: f64) {
+        for entry in self.table.with(self.states).iter().filter(|e| e.moves()) {
+            if let Some(body) = entry.object.integratable() {
+                body.mean_rate(h, &mut dp[entry.state_range.v.clone()]);
+            }
+        }
+    }
+
     fn kick(&mut self, dp: &[f64], h: f64) {
         for entry in self.table.with(self.states).iter().filter(|e| e.moves()) {
             if let Some(body) = entry.object.integratable() {
@@ -181,11 +190,13 @@ impl IntegrationContext<'_> {
                 self.free_motion(0.5 * h);
                 self.evaluate(t + 0.5 * h, dp);
                 self.subtract_free_motion(dp);
+                self.average(dp, h);
                 self.kick(dp, h);
                 self.free_motion(0.5 * h);
             }
             Integrator::SymplecticEuler => {
                 self.evaluate(t, dp);
+                self.average(dp, h);
                 self.kick(dp, h);
                 let mut v = vec![0.0; dp.len()];
                 self.velocities(&mut v);
@@ -195,6 +206,7 @@ impl IntegrationContext<'_> {
                 self.evaluate(t, dp);
                 let mut v = vec![0.0; dp.len()];
                 self.velocities(&mut v);
+                self.average(dp, h);
                 self.kick(dp, h);
                 self.integrate_positions(&v, h);
             }

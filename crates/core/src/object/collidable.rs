@@ -63,6 +63,12 @@ pub trait Collidable {
         let _ = (part, other);
         true
     }
+    /// Returns whether a part is a sensor: it has no contacts, and the world reports the parts of
+    /// other objects that overlap it ([`World::events`](crate::World::events)).
+    fn is_sensor(&self, part: usize) -> bool {
+        let _ = part;
+        false
+    }
     /// Returns how a part's mesh or cylinder collides. A pair collides by spheres if either part
     /// does.
     fn contact_mode(&self, part: usize) -> ContactMode {

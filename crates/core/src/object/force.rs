@@ -8,4 +8,10 @@ use crate::world::view::WorldView;
 pub trait ForceGenerator {
     /// Adds forces for the view's state and time to the table.
     fn apply(&self, me: &StateRange, view: &WorldView, out: &mut Forces);
+    /// Returns the potential energy of the forces, J; 0 by default. It is part of
+    /// [`World::energy`](crate::World::energy).
+    fn potential(&self, view: &WorldView) -> f64 {
+        let _ = view;
+        0.0
+    }
 }

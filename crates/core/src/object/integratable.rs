@@ -124,6 +124,13 @@ pub trait Integratable: Object {
     fn derivative(&self, cache: &mut Cache, x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
         by_jacobian::derivative(self, cache, x, f, dp);
     }
+    /// Replaces the rate `dp` of the state's quantity of motion at one time by its mean over a step of
+    /// `h` seconds, as far as the object knows it. Integrators of first and second order use it: a
+    /// rigid body with damping `c` decays by `exp(−c·h)`, since `dp/dt = f − c·p` has the mean
+    /// `(f − c·p)·(1 − exp(−c·h))/(c·h)`. The default keeps the rate.
+    fn mean_rate(&self, h: f64, dp: &mut [f64]) {
+        let _ = (h, dp);
+    }
     /// Writes `dp − M·v̇`, the part of the rate of momentum that changes directions but no
     /// velocity: `ω × L` of a rigid body, Coriolis terms. Rows at the acceleration level need `v̇`.
     /// Zero by default.

@@ -1,7 +1,7 @@
 //! The constants of a rigid body and how it is made.
 
-use super::BodyError;
 use super::inertia::{Inertia, symmetric};
+use super::{BodyError, LockedAxes};
 use crate::object::Material;
 use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraMount, LightMount};
@@ -22,17 +22,25 @@ pub struct RigidBody {
     error: Option<BodyError>,
     /// Surface constants.
     pub material: Material,
-    /// Linear damping, 1/s: a force `−c·P`, evaluated at the stage's state like all forces; keep
-    /// `c·dt` below 1.
+    /// Linear damping, 1/s, at least 0: a force `−c·P`. Without other forces the velocity decays by
+    /// `exp(−c·t)`, at any length of a step.
     pub linear_damping: f64,
-    /// Angular damping, 1/s: a torque `−c·H`.
+    /// Angular damping, 1/s, at least 0: a torque `−c·H`.
     pub angular_damping: f64,
+    /// Factor of the world's gravity, any finite number; 1 by default.
+    pub gravity_scale: f64,
+    /// Axes of the world along which it does not move, or about which it does not turn; none by
+    /// default. Change it by [`World::change_body`](crate::World::change_body), which clears the
+    /// velocity along these axes.
+    pub locked: LockedAxes,
     /// How its mesh or cylinder collides.
     pub contact_mode: ContactMode,
     /// Its collision group.
     pub group: CollisionGroup,
     /// Groups that it collides with, one bit each.
     pub mask: u64,
+    /// Whether it is a sensor: it has no contacts, and the world reports the bodies that overlap it.
+    pub sensor: bool,
     /// Pose of its frame at time 0.
     pub initial_pose: Pose,
     /// Velocity of the center of mass at time 0, m/s.
@@ -40,8 +48,10 @@ pub struct RigidBody {
     /// Angular velocity at time 0, rad/s, world axes.
     pub initial_angular_velocity: Vec3,
     fixed: bool,
-    /// Center of mass in the body's frame, meters.
+    /// Center of mass of the uniform shape in the body's frame, meters: the origin of the part.
     center: Vec3,
+    /// Center of mass in the frame of the part, meters.
+    pub(super) offset: Vec3,
     pub(super) visuals: Vec<Visual>,
     pub(super) cameras: Vec<CameraMount>,
     pub(super) lights: Vec<LightMount>,
@@ -51,8 +61,8 @@ impl RigidBody {
     /// Density of a body whose mass is not given, kg/m³: that of water.
     pub const DEFAULT_DENSITY: f64 = 1000.0;
 
-    /// Makes a uniform body with the [default density](Self::DEFAULT_DENSITY) and the default
-    /// [`Material`]. Its frame is the shape's, for a mesh the frame of its file. Methods `with_…`
+    /// Makes a uniform body with the [default density](Self::DEFAULT_DENSITY), or the densities of
+    /// the parts of a compound, and the default [`Material`]. Its frame is the shape's, for a mesh the frame of its file. Methods `with_…`
     /// set its constants:
     ///
     /// ```
@@ -69,7 +79,8 @@ impl RigidBody {
     /// before.
     #[must_use]
     pub fn new(shape: Shape) -> RigidBody {
-        RigidBody::fixed(shape).with_density(Self::DEFAULT_DENSITY)
+        let density = shape.own_density().unwrap_or(Self::DEFAULT_DENSITY);
+        RigidBody::fixed(shape).with_density(density)
     }
 
     /// Makes a body that stays static or kinematic. Its mass and inertia are 1 and have no effect,
@@ -79,6 +90,7 @@ impl RigidBody {
         RigidBody {
             name: String::new(),
             center: shape.center_of_mass(),
+            offset: Vec3::zeros(),
             visuals: vec![Visual::shape(0, Pose::identity(), shape.clone(), Default::default())],
             shape,
             mass: 1.0,
@@ -89,8 +101,11 @@ impl RigidBody {
             contact_mode: ContactMode::default(),
             linear_damping: 0.0,
             angular_damping: 0.0,
+            gravity_scale: 1.0,
+            locked: LockedAxes::default(),
             group: CollisionGroup::default(),
             mask: u64::MAX,
+            sensor: false,
             initial_pose: Pose::identity(),
             initial_velocity: Vec3::zeros(),
             initial_angular_velocity: Vec3::zeros(),
@@ -133,6 +148,49 @@ impl RigidBody {
     pub fn with_mass_and_inertia(self, mass: f64, inertia: Mat3) -> Self {
         let valid = mass.is_finite() && mass > 0.0;
         self.with_mass_properties(if valid { Ok((mass, inertia)) } else { Err(BodyError::Mass(mass)) })
+    }
+
+    /// Sets the inertia about the center of mass (body axes, kg·m²) and keeps the mass.
+    #[must_use]
+    pub fn with_inertia(self, inertia: Mat3) -> Self {
+        let mass = self.mass;
+        self.with_mass_properties(Ok((mass, inertia)))
+    }
+
+    /// Sets the center of mass, a point of the body's frame, meters. The inertia stays as it is: it
+    /// is about the new center. [`World::set_center_of_mass`](crate::World::set_center_of_mass)
+    /// changes that of a body in a world.
+    #[must_use]
+    pub fn with_center_of_mass(mut self, center: Vec3) -> Self {
+        self.offset = center - self.center;
+        self
+    }
+
+    /// Sets the center of mass in the frame of the part, meters.
+    pub(crate) fn with_center_in_part(mut self, offset: Vec3) -> Self {
+        self.offset = offset;
+        self
+    }
+
+    /// Sets the factor of the world's gravity.
+    #[must_use]
+    pub fn with_gravity_scale(mut self, scale: f64) -> Self {
+        self.gravity_scale = scale;
+        self
+    }
+
+    /// Sets linear and angular damping, 1/s.
+    #[must_use]
+    pub fn with_damping(mut self, linear: f64, angular: f64) -> Self {
+        (self.linear_damping, self.angular_damping) = (linear, angular);
+        self
+    }
+
+    /// Locks axes of the world.
+    #[must_use]
+    pub fn with_locked(mut self, locked: LockedAxes) -> Self {
+        self.locked = locked;
+        self
     }
 
     fn with_mass_properties(mut self, properties: Result<(f64, Mat3), BodyError>) -> Self {
@@ -186,6 +244,22 @@ impl RigidBody {
         self
     }
 
+    /// Sets its collision group and the groups that it collides with, one bit each. Two bodies
+    /// collide if the group of each is in the mask of the other.
+    #[must_use]
+    pub fn with_groups(mut self, group: CollisionGroup, mask: u64) -> Self {
+        (self.group, self.mask) = (group, mask);
+        self
+    }
+
+    /// Makes it a sensor: it has no contacts, and the world reports the bodies that overlap it
+    /// ([`World::events`](crate::World::events), [`World::touching`](crate::World::touching)).
+    #[must_use]
+    pub fn with_sensor(mut self, sensor: bool) -> Self {
+        self.sensor = sensor;
+        self
+    }
+
     /// Sets its visuals; by default its shape in gray.
     #[must_use]
     pub fn with_visuals(mut self, visuals: Vec<Visual>) -> Self {
@@ -225,19 +299,27 @@ impl RigidBody {
         &self.inertia.tensor
     }
 
-    /// Returns the center of mass in the body's frame, meters: the origin except for meshes.
+    /// Returns the center of mass in the body's frame, meters: the origin except for meshes, and
+    /// bodies with a center of [their own](Self::with_center_of_mass).
     pub fn center_of_mass(&self) -> Vec3 {
-        self.center
+        self.center + self.offset
     }
 
-    /// Returns the pose of the body's frame for a pose of its center of mass (that of the part).
+    /// Returns the center of mass in the frame of the part, meters: zero except for bodies with a
+    /// center of [their own](Self::with_center_of_mass).
+    pub fn center_in_part(&self) -> Vec3 {
+        self.offset
+    }
+
+    /// Returns the pose of the body's frame for a pose of its part.
     pub fn frame_of(&self, part_state: &Pose) -> Pose {
         part_state * Translation3::from(-self.center)
     }
 
-    /// Returns the pose of the center of mass (that of the part) for a pose of the body's frame.
+    /// Returns the pose of the center of mass, with the axes of the body, for a pose of the body's
+    /// frame.
     pub fn center_pose_of(&self, frame: &Pose) -> Pose {
-        frame * Translation3::from(self.center)
+        frame * Translation3::from(self.center_of_mass())
     }
 
     /// Returns its shape, in the frame of its part.
@@ -262,6 +344,8 @@ impl RigidBody {
         range("friction", m.friction, m.friction >= 0.0, "at least 0")?;
         range("linear damping", self.linear_damping, self.linear_damping >= 0.0, "at least 0")?;
         range("angular damping", self.angular_damping, self.angular_damping >= 0.0, "at least 0")?;
+        range("gravity scale", self.gravity_scale, true, "finite")?;
+        self.offset.iter().try_for_each(|&x| range("center of mass", x, true, "finite"))?;
         range("norm of the orientation", unit, (unit - 1.0).abs() < 1e-6, "1")?;
         let numbers = [self.initial_pose.translation.vector, self.initial_velocity, self.initial_angular_velocity];
         numbers

@@ -1,41 +1,111 @@
 //! The traits of objects for the rigid body.
 
-use super::RigidBody;
 use super::rotation;
 use super::state::{add, orientation, vec3, write_orientation, write6};
+use super::{LockedAxes, RigidBody};
 use crate::derived::Cache;
 use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraMount, LightMount};
 use crate::object::net_sync;
-use crate::object::part_state::{ForceSlice, Forces, PartPoint, PartState, StateRange, StateSizes};
+use crate::object::part_state::{ForceSlice, Forces, PartPoint, PartState, StateRange, StateSizes, Wrench};
 use crate::object::visual::Visual;
 use crate::object::{
     CameraCarrier, Collidable, Energy, Integratable, LightCarrier, Material, Momentum, MomentumKind, NetSync, Object,
     Renderable, SyncError,
 };
 use crate::world::view::WorldView;
-use nalgebra::{Translation3, Unit};
+use nalgebra::{ComplexField, Translation3, Unit};
 use tumble_collide::{ContactMode, Mat3, Pose, Quat, Shape, Vec3};
 
 /// Blocks of the maps at one orientation.
 struct BodyCache {
-    /// Angular block of `L⁻ᵀ`: `I^{-½}·Rᵀ`.
+    /// Angular block of `L⁻ᵀ`: `I^{-½}·Rᵀ`, or that of the free axes.
     solve_lt: Mat3,
-    /// Angular block of `Lᵀ`: `R·I^½`.
+    /// Angular block of `Lᵀ`: `R·I^½`, or that of the free axes.
     mul_lt: Mat3,
 }
 
 impl RigidBody {
     /// Returns twice the kinetic energy of rotation, J.
     fn spinning(&self, x: &[f64]) -> f64 {
+        if !self.locked.rotates_freely() {
+            let l = vec3(&x[10..]);
+            return l.dot(&self.omega(&orientation(x), &l));
+        }
         let m = orientation(x).inverse_transform_vector(&vec3(&x[10..]));
         m.dot(&(self.inertia.inverse * m))
     }
 
     /// Returns the angular velocity for an orientation and an angular momentum, world axes.
     fn omega(&self, q: &Quat, l: &Vec3) -> Vec3 {
+        if !self.locked.rotates_freely() {
+            return self.locked.inverse(&self.world_inertia(q)) * l;
+        }
         q * (self.inertia.inverse * q.inverse_transform_vector(l))
     }
+
+    /// Returns the inertia in world axes.
+    fn world_inertia(&self, q: &Quat) -> Mat3 {
+        let r = q.to_rotation_matrix().into_inner();
+        r * self.inertia.tensor * r.transpose()
+    }
+
+    /// Returns the angular momentum of the state for an orientation and an angular velocity, world
+    /// axes.
+    fn angular_momentum(&self, q: &Quat, omega: &Vec3) -> Vec3 {
+        let omega = self.locked.free_rotation(omega);
+        self.locked.free_rotation(&(q * (self.inertia.tensor * q.inverse_transform_vector(&omega))))
+    }
+
+    /// Returns the velocity of the center of mass, world axes.
+    fn center_velocity(&self, x: &[f64]) -> Vec3 {
+        (vec3(&x[7..]) / self.mass).component_mul(&self.locked.free_translation())
+    }
+
+    /// Returns the rate of the angular momentum that turns the body without a change of its angular
+    /// velocity, `ω × I·ω`, about the free axes.
+    fn turning(&self, q: &Quat, omega: &Vec3, l: &Vec3) -> Vec3 {
+        match self.locked.rotates_freely() {
+            true => omega.cross(l),
+            false => self.locked.free_rotation(&omega.cross(&(self.world_inertia(q) * omega))),
+        }
+    }
+
+    /// Returns the vector from the center of mass to the origin of the part, world axes.
+    fn part_arm(&self, q: &Quat) -> Vec3 {
+        -(q * self.offset)
+    }
+
+    /// Returns the lever arm of a point about the center of mass, world axes.
+    fn arm(&self, at: &PartPoint) -> Vec3 {
+        match self.offset == Vec3::zeros() {
+            true => at.arm(),
+            false => at.arm() + self.part_arm(&at.part_state.pose.rotation),
+        }
+    }
+
+    /// Turns the body for `h` seconds at constant angular momentum about the free axes: exactly if
+    /// one is free, else by the implicit midpoint rule, which is symmetric and of second order.
+    fn turn_locked(&self, q: &Quat, l: &Vec3, h: f64) -> Quat {
+        let mut omega = self.omega(q, l);
+        for _ in 0..MIDPOINT_ITERATIONS {
+            let middle = self.omega(&rotation::turn(q, &omega, 0.5 * h), l);
+            let change = (middle - omega).norm();
+            omega = middle;
+            if change <= 1e-15 * omega.norm() {
+                break;
+            }
+        }
+        rotation::turn(q, &omega, h)
+    }
+}
+
+/// Maximum number of iterations of the midpoint rule.
+const MIDPOINT_ITERATIONS: usize = 30;
+
+/// Returns the mean of `exp(−z·s)` for `s` from 0 to 1, `(1 − exp(−z))/z`.
+fn mean_decay(z: f64) -> f64 {
+    if z == 0.0 { 1.0 } else { -ComplexField::exp_m1(-z) / z }
 }
 
 impl Object for RigidBody {
@@ -51,12 +121,25 @@ impl Object for RigidBody {
         let cache: &mut BodyCache = cache.get();
         let q = orientation(x);
         let r = q.to_rotation_matrix().into_inner();
-        cache.solve_lt = self.inertia.inverse_root * r.transpose();
-        cache.mul_lt = r * self.inertia.root;
+        if self.locked.rotates_freely() {
+            cache.solve_lt = self.inertia.inverse_root * r.transpose();
+            cache.mul_lt = r * self.inertia.root;
+        } else {
+            let roots = self.locked.roots(&(r * self.inertia.tensor * r.transpose()));
+            (cache.solve_lt, cache.mul_lt) = (roots.inverse_root, roots.root);
+        }
         let part_state = &mut part_states[0];
         part_state.pose = Pose::from_parts(Translation3::from(vec3(x)), q);
-        part_state.velocity = vec3(&x[7..]) / self.mass;
+        part_state.velocity = self.center_velocity(x);
         part_state.angular_velocity = cache.solve_lt.tr_mul(&(cache.solve_lt * vec3(&x[10..])));
+        if self.offset != Vec3::zeros() {
+            let (arm, omega) = (self.part_arm(&q), part_state.angular_velocity);
+            part_state.pose.translation.vector += arm;
+            part_state.velocity += omega.cross(&arm);
+            part_state.bias_acceleration = omega.cross(&omega.cross(&arm));
+        } else {
+            part_state.bias_acceleration = Vec3::zeros();
+        }
     }
 
     fn integratable(&self) -> Option<&dyn Integratable> {
@@ -104,10 +187,11 @@ impl Integratable for RigidBody {
     fn write_initial(&self, x: &mut [f64]) {
         let (q, at) =
             (Unit::new_normalize(self.initial_pose.rotation.into_inner()), self.center_pose_of(&self.initial_pose));
-        let l = q * (self.inertia.tensor * q.inverse_transform_vector(&self.initial_angular_velocity));
+        let l = self.angular_momentum(&q, &self.initial_angular_velocity);
         x[..3].copy_from_slice(at.translation.vector.as_slice());
         write_orientation(x, &q);
-        x[7..10].copy_from_slice((self.mass * self.initial_velocity).as_slice());
+        let velocity = self.initial_velocity.component_mul(&self.locked.free_translation());
+        x[7..10].copy_from_slice((self.mass * velocity).as_slice());
         x[10..13].copy_from_slice(l.as_slice());
     }
 
@@ -123,36 +207,64 @@ impl Integratable for RigidBody {
     fn accumulate_forces(&self, me: &StateRange, view: &WorldView, out: &mut Forces) {
         let x = &view.x[me.x.clone()];
         let wrench = &mut out.wrenches[me.parts.start];
-        wrench.force += self.mass * view.gravity - self.linear_damping * vec3(&x[7..]);
+        let force = (self.mass * self.gravity_scale) * view.gravity - self.linear_damping * vec3(&x[7..]);
+        wrench.force += force;
         wrench.torque -= self.angular_damping * vec3(&x[10..]);
+        if self.offset != Vec3::zeros() {
+            // both act at the center of mass, and the table is about the origin of the part
+            wrench.torque -= self.part_arm(&orientation(x)).cross(&force);
+        }
     }
 
     fn velocity(&self, x: &[f64], v: &mut [f64]) {
-        write6(v, &self.omega(&orientation(x), &vec3(&x[10..])), &(vec3(&x[7..]) / self.mass));
+        write6(v, &self.omega(&orientation(x), &vec3(&x[10..])), &self.center_velocity(x));
     }
 
     fn write_velocity(&self, x: &mut [f64], v: &[f64]) {
         let q = orientation(x);
-        let l = q * (self.inertia.tensor * q.inverse_transform_vector(&vec3(v)));
-        x[7..10].copy_from_slice((self.mass * vec3(&v[3..])).as_slice());
+        let l = self.angular_momentum(&q, &vec3(v));
+        let velocity = vec3(&v[3..]).component_mul(&self.locked.free_translation());
+        x[7..10].copy_from_slice((self.mass * velocity).as_slice());
         x[10..13].copy_from_slice(l.as_slice());
     }
 
-    fn derivative(&self, _cache: &mut Cache, _x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
-        write6(dp, &f.wrenches[0].torque, &f.wrenches[0].force);
+    fn derivative(&self, _cache: &mut Cache, x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
+        let Wrench { mut torque, force } = f.wrenches[0];
+        if self.offset != Vec3::zeros() {
+            torque += self.part_arm(&orientation(x)).cross(&force);
+        }
+        write6(dp, &torque, &force);
         dp.iter_mut().zip(f.generalized).for_each(|(dp, f)| *dp += f);
+        if self.locked != LockedAxes::default() {
+            let (angular, linear) = (vec3(dp), vec3(&dp[3..]));
+            let linear = linear.component_mul(&self.locked.free_translation());
+            write6(dp, &self.locked.free_rotation(&angular), &linear);
+        }
+    }
+
+    fn mean_rate(&self, h: f64, dp: &mut [f64]) {
+        let (angular, linear) = dp.split_at_mut(3);
+        for (dp, damping) in [(angular, self.angular_damping), (linear, self.linear_damping)] {
+            let mean = mean_decay(damping * h);
+            dp.iter_mut().for_each(|dp| *dp *= mean);
+        }
     }
 
     fn accelerations(&self, _cache: &mut Cache, x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
         let (q, l, part_state) = (orientation(x), vec3(&x[10..]), &mut part_states[0]);
         part_state.acceleration = vec3(&dp[3..]) / self.mass;
         // α = I⁻¹(τ − ω × H)
-        part_state.angular_acceleration = self.omega(&q, &(vec3(dp) - part_state.angular_velocity.cross(&l)));
+        let omega = part_state.angular_velocity;
+        part_state.angular_acceleration = self.omega(&q, &(vec3(dp) - self.turning(&q, &omega, &l)));
+        if self.offset != Vec3::zeros() {
+            part_state.acceleration +=
+                part_state.angular_acceleration.cross(&self.part_arm(&q)) + part_state.bias_acceleration;
+        }
     }
 
     fn gyroscopic(&self, x: &[f64], out: &mut [f64]) {
-        let l = vec3(&x[10..]);
-        write6(out, &self.omega(&orientation(x), &l).cross(&l), &Vec3::zeros());
+        let (q, l) = (orientation(x), vec3(&x[10..]));
+        write6(out, &self.turning(&q, &self.omega(&q, &l), &l), &Vec3::zeros());
     }
 
     fn kick(&self, x: &mut [f64], dp: &[f64], h: f64) {
@@ -161,9 +273,12 @@ impl Integratable for RigidBody {
     }
 
     fn free_motion(&self, _cache: &mut Cache, x: &mut [f64], h: f64) {
-        let (p, l) = (vec3(&x[7..]), vec3(&x[10..]));
+        let (p, l) = (vec3(&x[7..]).component_mul(&self.locked.free_translation()), vec3(&x[10..]));
         add(&mut x[..3], &p, h / self.mass);
-        if l != Vec3::zeros() {
+        if !self.locked.rotates_freely() {
+            let turned = self.turn_locked(&orientation(x), &l, h);
+            write_orientation(x, &turned);
+        } else if l != Vec3::zeros() {
             let principal = orientation(x) * self.inertia.principal;
             let turned =
                 rotation::free_motion(&principal, &l, &self.inertia.moments, h) * self.inertia.principal.inverse();
@@ -195,11 +310,12 @@ impl Integratable for RigidBody {
     /// `L⁻ᵀ·p`.
     fn whitened_velocity(&self, cache: &mut Cache, x: &[f64], u: &mut [f64]) {
         let cache: &mut BodyCache = cache.get();
-        write6(u, &(cache.solve_lt * vec3(&x[10..])), &(vec3(&x[7..]) / self.root_mass));
+        let linear = (vec3(&x[7..]) / self.root_mass).component_mul(&self.locked.free_translation());
+        write6(u, &(cache.solve_lt * vec3(&x[10..])), &linear);
     }
 
     fn jacobian(&self, _cache: &mut Cache, at: &PartPoint, j: &mut [f64]) {
-        let r = at.arm();
+        let r = self.arm(at);
         for (axis, j) in at.axes.iter().zip(j.chunks_exact_mut(6)) {
             add(&mut j[..3], &r.cross(axis), 1.0);
             add(&mut j[3..], axis, 1.0);
@@ -212,13 +328,13 @@ impl Integratable for RigidBody {
 
     fn test_impulse_shared(&self, cache: &Cache, at: &PartPoint, sign: f64, y: &mut [f64]) -> bool {
         let cache: &BodyCache = cache.read();
-        let r = at.arm();
-        let linear = sign / self.root_mass;
+        let r = self.arm(at);
+        let linear = self.locked.free_translation() * (sign / self.root_mass);
         for (axis, y) in at.axes.iter().zip(y.chunks_exact_mut(6)) {
             let angular = cache.solve_lt * r.cross(axis);
             for k in 0..3 {
                 y[k] += sign * angular[k];
-                y[k + 3] += linear * axis[k];
+                y[k + 3] += linear[k] * axis[k];
             }
         }
         true
@@ -226,22 +342,38 @@ impl Integratable for RigidBody {
 
     fn mul_l(&self, cache: &mut Cache, v: &[f64], u: &mut [f64]) {
         let cache: &mut BodyCache = cache.get();
-        write6(u, &cache.mul_lt.tr_mul(&vec3(v)), &(self.root_mass * vec3(&v[3..])));
+        write6(
+            u,
+            &cache.mul_lt.tr_mul(&vec3(v)),
+            &(self.root_mass * vec3(&v[3..])).component_mul(&self.locked.free_translation()),
+        );
     }
 
     fn solve_l(&self, cache: &mut Cache, u: &[f64], v: &mut [f64]) {
         let cache: &mut BodyCache = cache.get();
-        write6(v, &cache.solve_lt.tr_mul(&vec3(u)), &(vec3(&u[3..]) / self.root_mass));
+        write6(
+            v,
+            &cache.solve_lt.tr_mul(&vec3(u)),
+            &(vec3(&u[3..]) / self.root_mass).component_mul(&self.locked.free_translation()),
+        );
     }
 
     fn solve_lt(&self, cache: &mut Cache, j: &[f64], y: &mut [f64]) {
         let cache: &mut BodyCache = cache.get();
-        write6(y, &(cache.solve_lt * vec3(j)), &(vec3(&j[3..]) / self.root_mass));
+        write6(
+            y,
+            &(cache.solve_lt * vec3(j)),
+            &(vec3(&j[3..]) / self.root_mass).component_mul(&self.locked.free_translation()),
+        );
     }
 
     fn mul_lt(&self, cache: &mut Cache, u: &[f64], j: &mut [f64]) {
         let cache: &mut BodyCache = cache.get();
-        write6(j, &(cache.mul_lt * vec3(u)), &(self.root_mass * vec3(&u[3..])));
+        write6(
+            j,
+            &(cache.mul_lt * vec3(u)),
+            &(self.root_mass * vec3(&u[3..])).component_mul(&self.locked.free_translation()),
+        );
     }
 
     fn may_sleep(&self) -> bool {
@@ -251,12 +383,16 @@ impl Integratable for RigidBody {
     fn energy(&self, x: &[f64], gravity: &Vec3) -> Energy {
         let (p, l) = (vec3(&x[7..]), vec3(&x[10..]));
         let kinetic = 0.5 * (p.norm_squared() / self.mass + l.dot(&self.omega(&orientation(x), &l)));
-        Energy { kinetic, potential: -self.mass * gravity.dot(&vec3(x)) }
+        Energy { kinetic, potential: -(self.mass * self.gravity_scale) * gravity.dot(&vec3(x)) }
     }
 
     fn momentum(&self, x: &[f64]) -> Momentum {
-        let p = vec3(&x[7..]);
-        Momentum { linear: p, angular: vec3(&x[10..]) + vec3(x).cross(&p) }
+        let (p, mut l) = (vec3(&x[7..]), vec3(&x[10..]));
+        if !self.locked.rotates_freely() {
+            let q = orientation(x);
+            l = self.world_inertia(&q) * self.omega(&q, &l);
+        }
+        Momentum { linear: p, angular: l + vec3(x).cross(&p) }
     }
 }
 
@@ -271,6 +407,10 @@ impl Collidable for RigidBody {
 
     fn collision_group(&self, _part: usize) -> CollisionGroup {
         self.group
+    }
+
+    fn is_sensor(&self, _part: usize) -> bool {
+        self.sensor
     }
 
     fn contact_mode(&self, _part: usize) -> ContactMode {

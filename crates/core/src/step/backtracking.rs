@@ -184,6 +184,10 @@ impl Backtracking {
         impact::resolve(core, work, &candidates, (IMPACT_PASSES, true, budget), &mut u, &mut total);
         let struck = total.iter().any(|l| *l != 0.0);
         if struck {
+            core.touch_impacts(&work.contact_constraints, impulses(work, &total));
+            if core.has_breakable_joints() {
+                core.break_joints(&row_starts(work, &total, 1.0 / core.settings.dt));
+            }
             push_to(core, &u, &before);
         }
         struck
@@ -247,6 +251,9 @@ impl Backtracking {
             push_to(core, &after, &u);
         } else {
             hold_forces(core, work, &mut held);
+        }
+        if core.has_breakable_joints() {
+            core.break_joints(&row_starts(work, &work.lambda, 1.0));
         }
         core.publish(
             &work.contact_constraints,

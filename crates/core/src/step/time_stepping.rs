@@ -151,6 +151,7 @@ impl TimeStepping {
         motion.free_motion(0.5 * h);
         motion.evaluate(time + 0.5 * h, &mut self.work.dp);
         motion.subtract_free_motion(&mut self.work.dp);
+        motion.average(&mut self.work.dp, h);
         core.check_finite(&self.work.dp, Some(&mut *middle))?;
         for (now, middle) in core.derived.part_states.iter_mut().zip(&middle.derived.part_states) {
             (now.acceleration, now.angular_acceleration) = (middle.acceleration, middle.angular_acceleration);
@@ -258,6 +259,9 @@ impl TimeStepping {
         correction::correct(core, Some(&mut *middle), &mut self.work, &mut self.probe, &options)?;
         total.clear();
         total.extend(self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b));
+        if core.has_breakable_joints() {
+            core.break_joints(&row_starts(&self.work, total, 1.0 / h));
+        }
         core.publish(
             &self.work.contact_constraints,
             impulses(&self.work, total),

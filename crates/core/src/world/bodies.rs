@@ -5,7 +5,7 @@ use crate::object::part_state::{PartPoint, PartState};
 use crate::object::{Integratable, Object};
 use crate::rigid::{RigidBody, orientation, vec3};
 use crate::world::view::{Mode, ObjectId, Status};
-use tumble_collide::{Pose, Vec3};
+use tumble_collide::{Mat3, Pose, Vec3};
 
 impl World {
     /// Returns an object by id; `None` if it was removed.
@@ -159,6 +159,83 @@ impl World {
             let w = (target.rotation * orientation(x).inverse()).scaled_axis() / dt;
             body.write_velocity(x, &[w.x, w.y, w.z, v.x, v.y, v.z]);
         })
+    }
+
+    /// Changes constants of a rigid body: mass, inertia, center of mass, damping, locked axes. The
+    /// pose of its frame stays, and so does its motion, except along axes that are locked now; the
+    /// velocity is that of the new center of mass.
+    ///
+    /// # Errors
+    /// [`WorldError`]: the object was removed, is not a rigid body, or a constant is out of its
+    /// range. Nothing is changed then.
+    pub fn change_body(&mut self, id: ObjectId, change: impl FnOnce(&mut RigidBody)) -> Result<(), WorldError> {
+        self.core.wake(id);
+        let core = &mut self.core;
+        let entry = core.table.get(id).ok_or(WorldError::Stale)?;
+        let any: &dyn std::any::Any = entry.object.as_ref();
+        let old = any.downcast_ref::<RigidBody>().ok_or_else(|| WorldError::NotRigid(entry.name.to_string()))?;
+        let mut new = old.clone();
+        change(&mut new);
+        new.validate().map_err(|why| WorldError::Body { name: entry.name.to_string(), why })?;
+        let x = &mut core.state.x[entry.state_range.x.clone()];
+        let (mut v, q) = ([0.0; 6], orientation(x));
+        old.velocity(x, &mut v);
+        let moved = q * (new.center_of_mass() - old.center_of_mass());
+        if moved != Vec3::zeros() {
+            let (center, along) = (vec3(x) + moved, vec3(&v[3..]) + vec3(&v).cross(&moved));
+            x[..3].copy_from_slice(center.as_slice());
+            v[3..].copy_from_slice(along.as_slice());
+        }
+        new.write_velocity(x, &v);
+        let place = core.table.place(id).ok_or(WorldError::Stale)?;
+        core.table.placed[place].object = Box::new(new);
+        core.integration().refresh_one(id);
+        Ok(())
+    }
+
+    /// Sets the mass of a rigid body, kg; its inertia changes by the same factor. The velocity stays.
+    ///
+    /// # Errors
+    /// [`WorldError`], as [`change_body`](Self::change_body).
+    pub fn set_mass(&mut self, id: ObjectId, mass: f64) -> Result<(), WorldError> {
+        self.change_body(id, |body| {
+            let inertia = body.inertia() * (mass / body.mass());
+            *body = body.clone().with_mass_and_inertia(mass, inertia);
+        })
+    }
+
+    /// Sets the inertia of a rigid body, about its center of mass, body axes, kg·m². The angular
+    /// velocity stays.
+    ///
+    /// # Errors
+    /// [`WorldError`], as [`change_body`](Self::change_body).
+    pub fn set_inertia(&mut self, id: ObjectId, inertia: Mat3) -> Result<(), WorldError> {
+        self.change_body(id, |body| *body = body.clone().with_inertia(inertia))
+    }
+
+    /// Sets the center of mass of a rigid body, a point of its frame, meters. Its inertia is that
+    /// about the new center.
+    ///
+    /// # Errors
+    /// [`WorldError`], as [`change_body`](Self::change_body).
+    pub fn set_center_of_mass(&mut self, id: ObjectId, center: Vec3) -> Result<(), WorldError> {
+        self.change_body(id, |body| *body = body.clone().with_center_of_mass(center))
+    }
+
+    /// Returns the state of a part with its origin at the center of mass of a rigid body: other than
+    /// [`part_state`](Self::part_state) if the body has a center of mass of its own. Its acceleration
+    /// then has an error of first order in the step, since forces are evaluated within the step.
+    pub fn center_state(&self, id: ObjectId) -> Option<PartState> {
+        let part = *self.part_state(id, 0)?;
+        let offset = self.get::<RigidBody>(id).map_or_else(Vec3::zeros, RigidBody::center_in_part);
+        if offset == Vec3::zeros() {
+            return Some(part);
+        }
+        let center = part.pose.transform_point(&offset.into()).coords;
+        let (velocity, mut pose) = (part.velocity_at(&center), part.pose);
+        pose.translation.vector = center;
+        let acceleration = part.acceleration_following(&center, &velocity);
+        Some(PartState { pose, velocity, acceleration, bias_acceleration: Vec3::zeros(), ..part })
     }
 
     /// Applies a force (N) at a world point of one part during the next frame.

@@ -65,7 +65,7 @@ impl<'w> BodyView<'w> {
 
     /// Returns the velocity of the center of mass of a rigid body, or of the origin of a link, m/s.
     pub fn velocity(&self) -> Vec3 {
-        self.part_state.velocity
+        self.center().velocity
     }
 
     /// Returns the angular velocity, rad/s.
@@ -80,7 +80,12 @@ impl<'w> BodyView<'w> {
 
     /// Returns the rate of change of [`velocity`](Self::velocity) in the last step, m/s².
     pub fn acceleration(&self) -> Vec3 {
-        self.part_state.acceleration
+        self.center().acceleration
+    }
+
+    fn center(&self) -> PartState {
+        let center = if self.part == 0 { self.world.center_state(self.id) } else { None };
+        center.unwrap_or(*self.part_state)
     }
 
     /// Returns the angular acceleration in the last step, rad/s².

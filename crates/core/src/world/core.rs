@@ -1,5 +1,6 @@
 //! The core of a world, on which the steppers work.
 
+use super::events::{Event, Touches};
 use super::state::WorldState;
 use crate::contact::detect::{ContactConstraint, DetectorBuffers, Owner};
 use crate::contact::pair_material::PairMaterials;
@@ -125,6 +126,12 @@ pub struct Core {
     pub(crate) broad: Box<dyn BroadPhase>,
     pub(crate) detect_scratch: DetectorBuffers,
     pub(crate) contacts: Vec<ContactPoint>,
+    /// Touches of the present frame.
+    pub(crate) touches: Touches,
+    /// Serials of the loop joints that break in the present frame.
+    pub(crate) broken: Vec<u32>,
+    /// Events of the last frame.
+    pub(crate) events: Vec<Event>,
     pub(crate) report: StepReport,
     /// Work of the frame, and its budget.
     pub(crate) meter: WorkMeter,
@@ -167,6 +174,9 @@ impl Core {
             broad: Box::<SweepAndPrune>::default(),
             detect_scratch: DetectorBuffers::default(),
             contacts: Vec::new(),
+            touches: Touches::default(),
+            broken: Vec::new(),
+            events: Vec::new(),
             report: StepReport::default(),
             meter: WorkMeter::default(),
             needs_wake: Vec::new(),
@@ -178,6 +188,7 @@ impl Core {
         let mut fork = Core {
             pair_materials: self.pair_materials.clone(),
             contacts: self.contacts.clone(),
+            events: self.events.clone(),
             report: self.report,
             ..Core::new(self.table.clone(), self.settings, self.solver.fork(), self.state.clone())
         };
@@ -288,6 +299,7 @@ impl Core {
                 depth: -constraint.contact.gap,
             });
         }
+        self.touch_contacts(contact_constraints);
         self.state.warm.replace_rows(rows.into_iter());
         let (contacts, part_states) = (&self.contacts, &self.derived.part_states);
         let carrying = contact_constraints.iter().zip(contacts).filter(|(_, c)| c.force != Vec3::zeros());
@@ -302,6 +314,7 @@ impl Core {
     pub(crate) fn finish_substep(&mut self, h: f64) -> Result<(), StepError> {
         self.state.time += h;
         self.report.substeps += 1;
+        self.keep_touches(h);
         self.integration().refresh();
         let moves = |s: &PartState| s.velocity.iter().chain(s.angular_velocity.iter()).all(|x| x.is_finite());
         let fine = |e: &Entry| {

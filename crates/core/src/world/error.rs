@@ -27,6 +27,9 @@ pub enum WorldError {
     /// The call needs a rigid body.
     #[error("'{0}' is not a rigid body")]
     NotRigid(String),
+    /// The call needs a loop joint.
+    #[error("'{0}' is not a loop joint")]
+    NotJoint(String),
     /// The object has more or fewer collidable parts than part states.
     #[error("'{name}' has {parts} collidable parts and {part_states} part states; the numbers must be equal")]
     Parts {

@@ -6,7 +6,9 @@ mod body_view;
 mod contacts_of;
 mod core;
 mod error;
+pub(crate) mod events;
 mod islands;
+mod joints;
 mod pair_materials;
 mod pick;
 mod query;
@@ -21,6 +23,7 @@ pub(crate) use self::core::Coordinates;
 pub use self::core::{ContactPoint, Core, StepError};
 pub use body_view::BodyView;
 pub use error::WorldError;
+pub use events::{Event, EventKind};
 pub use pick::PickForce;
 pub use query::{BodyDistance, Overlap, PointDepth, QueryFilter, Ray, RayCastHit, ShapeCastHit, ShapeOverlap};
 pub use replica::{Replica, ReplicaError};
@@ -142,6 +145,8 @@ impl World {
             let requests = core.needs_wake.len();
             core.clear_contact_forces();
             core.detect_scratch.forget();
+            core.touches.clear();
+            core.broken.clear();
             core.meter.start_frame(core.settings.solver_settings.budget, self.before.time + core.settings.dt);
             let done = self.stepper.step(StepContext { core });
             if let Err(error) = done.and_then(|()| check_duration(self.stepper.name(), core, self.before.time)) {
@@ -159,9 +164,11 @@ impl World {
             core.wake_disturbed();
             core.wake_requested();
         }
+        core.disable_broken();
         core.fall_asleep();
         core.report.asleep = core.objects().iter().filter(|e| e.asleep).count() as u32;
         core.report.relaxations = core.meter.done();
+        core.collect_events(&self.before);
         core.state.clear_applied();
         core.state.keep_accelerations(&core.derived.part_states);
         core.state.frame += 1;
@@ -181,6 +188,7 @@ impl World {
         if fits {
             self.core.set_state(to);
             self.core.contacts.clear();
+            self.core.events.clear();
         }
         fits
     }
@@ -205,9 +213,9 @@ impl World {
         &self.core.report
     }
 
-    /// Sets the contacts and the report of the last step.
-    pub(crate) fn publish(&mut self, contacts: Vec<ContactPoint>, report: StepReport) {
-        (self.core.contacts, self.core.report) = (contacts, report);
+    /// Sets the contacts, the events and the report of the last step.
+    pub(crate) fn publish(&mut self, contacts: Vec<ContactPoint>, events: Vec<Event>, report: StepReport) {
+        (self.core.contacts, self.core.events, self.core.report) = (contacts, events, report);
     }
 
     /// Returns the contacts of the last sub-step.
@@ -246,13 +254,16 @@ impl World {
         self.core.objects().iter().filter_map(|e| e.object.renderable()).flat_map(|renderable| renderable.visuals())
     }
 
-    /// Returns the mechanical energy of all dynamic objects, J.
+    /// Returns the mechanical energy of all dynamic objects and of the springs between them, J.
     pub fn energy(&self) -> Energy {
         let g = self.core.settings.gravity;
-        self.moving().fold(Energy::default(), |sum, (x, body)| {
+        let bodies = self.moving().fold(Energy::default(), |sum, (x, body)| {
             let e = body.energy(x, &g);
             Energy { kinetic: sum.kinetic + e.kinetic, potential: sum.potential + e.potential }
-        })
+        });
+        let (view, enabled) = (self.view(), self.core.objects().iter().filter(|e| e.status.enabled));
+        let springs: f64 = enabled.filter_map(|e| e.object.force()).map(|force| force.potential(&view)).sum();
+        Energy { potential: bodies.potential + springs, ..bodies }
     }
 
     /// Returns the momentum of all dynamic objects: linear, kg·m/s, and angular about the world's
@@ -396,6 +407,7 @@ impl World {
         core.owners[gone.state_range.parts.start..].iter_mut().for_each(|owner| owner.place -= 1);
         core.pair_materials.forget(id);
         core.contacts.retain(|c| c.a != id && c.b != id);
+        core.events.retain(|event| !event.names(id));
         Ok(gone.object)
     }
 

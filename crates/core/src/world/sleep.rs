@@ -133,8 +133,18 @@ impl Core {
 
     /// Wakes the object, and all objects that sleep with it or on it.
     pub(crate) fn wake(&mut self, id: ObjectId) {
-        let Some(serial) = self.table.place(id).map(|place| self.state.objects[place].serial) else { return };
-        self.wake_groups(|g| g.members.binary_search(&serial).is_ok() || g.supports.iter().any(|s| s.serial == serial));
+        let Some(place) = self.table.place(id) else { return };
+        let mut ids = vec![id];
+        if let Some(constraint) = self.table.placed[place].object.constraint() {
+            constraint.partners(&mut ids);
+        }
+        let serials = ids.iter().filter_map(|id| Some(self.state.objects[self.table.place(*id)?].serial));
+        let serials: Vec<u32> = serials.collect();
+        self.wake_groups(|g| {
+            serials
+                .iter()
+                .any(|serial| g.members.binary_search(serial).is_ok() || g.supports.iter().any(|s| s.serial == *serial))
+        });
     }
 
     /// Wakes all objects.

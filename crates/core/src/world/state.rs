@@ -4,6 +4,7 @@ use super::state_memory::StateVector;
 use crate::clone_by_field::clone_by_field;
 use crate::contact::warm_starts::WarmStarts;
 use crate::object::part_state::{PartState, StateRange, Wrench};
+use crate::world::events::Touching;
 use crate::world::sleep::{RestTimer, SleepGroup};
 use crate::world::view::Status;
 use serde::{Deserialize, Serialize};
@@ -40,6 +41,8 @@ pub struct WorldState {
     pub(crate) inner_step: f64,
     /// The sleeping islands.
     pub(crate) groups: Vec<SleepGroup>,
+    /// Pairs of parts that touch, and of sensors with parts that overlap them; sorted.
+    pub(crate) touching: Vec<Touching>,
 }
 
 clone_by_field!(WorldState {
@@ -54,6 +57,7 @@ clone_by_field!(WorldState {
     warm,
     inner_step,
     groups,
+    touching,
 });
 
 /// State of an object besides its numbers in `X`.
@@ -92,6 +96,7 @@ impl WorldState {
         self.applied.drain(state_range.parts.clone());
         self.applied_generalized.drain(state_range.v.clone());
         self.warm.forget(gone.serial);
+        self.touching.retain(|touching| !touching.names(gone.serial));
     }
 
     /// Returns whether both are states of the same objects.
@@ -143,6 +148,7 @@ impl WorldState {
         let serials = self.objects.is_sorted_by(|a, b| a.serial < b.serial)
             && self.objects.iter().all(|o| o.serial < self.next_serial);
         let most_frames = MAX_OBJECTS as u64 * MAX_OBJECTS as u64;
-        serials && self.next_serial < MAX_OBJECTS && self.frame < most_frames && self.warm.in_order()
+        let touching = self.touching.is_sorted_by(|a, b| a < b);
+        serials && self.next_serial < MAX_OBJECTS && self.frame < most_frames && self.warm.in_order() && touching
     }
 }

@@ -1,7 +1,7 @@
 //! A world that is written to an archive and read again continues with the same bits.
 
 use crate::common::*;
-use tumble_core::collide::{Mat3, Pose, Shape, TreeSettings, TriMesh, Vec3};
+use tumble_core::collide::{CompoundPart, Mat3, Pose, Shape, TreeSettings, TriMesh, Vec3};
 use tumble_core::rows::Rows;
 use tumble_core::solver::{NAMES, RowSolver, SolveReport, SolverSettings, by_name};
 use tumble_core::*;
@@ -15,11 +15,18 @@ fn everything(stepper: &str) -> World {
     ground(&mut world, 0.3, 0.4);
     let gone = world.add(RigidBody::new(sphere(0.1)).with_name("gone").with_mass(1.0)).unwrap();
     let mesh = Shape::mesh(TriMesh::torus(0.3, 0.1, 24, 12), &TreeSettings::octree()).unwrap();
-    let shapes = [sphere(0.1), cube(0.2), Shape::capsule(0.1, 0.2).unwrap(), Shape::cylinder(0.1, 0.2).unwrap(), mesh];
+    let compound = Shape::compound(vec![
+        CompoundPart::new(cube(0.1), Pose::translation(0.1, 0.0, 0.0)).with_density(900.0),
+        CompoundPart::new(mesh.clone(), Pose::translation(0.0, 0.1, 0.0)).with_density(700.0),
+        CompoundPart::new(Shape::cylinder(0.05, 0.2).unwrap(), Pose::identity()).with_density(800.0),
+    ])
+    .unwrap();
+    let (capsule, cylinder) = (Shape::capsule(0.1, 0.2).unwrap(), Shape::cylinder(0.1, 0.2).unwrap());
+    let shapes = [sphere(0.1), cube(0.2), capsule, cylinder, mesh, compound];
     let ids: Vec<ObjectId> = (0..10)
         .map(|i| {
             let body =
-                RigidBody::new(shapes[i % 5].clone()).with_name(format!("body{i}")).with_density(500.0 + i as f64);
+                RigidBody::new(shapes[i % 6].clone()).with_name(format!("body{i}")).with_density(500.0 + i as f64);
             let pose = Pose::translation(0.3 * (i % 3) as f64, 0.0, 0.3 + 0.4 * i as f64);
             let mut body = body
                 .with_pose(pose)
@@ -49,9 +56,15 @@ fn everything(stepper: &str) -> World {
     chain.set_dof(1, DofSettings { limits: Some([-0.3, 0.2]), friction: 0.05, ..DofSettings::default() }).unwrap();
     chain.couple(Coupling { dof: 5, of: 1, multiplier: 0.5, offset: 0.1 }).unwrap();
     world.add(chain).unwrap();
-    world.set_pair_material(ids[2], ids[0], PairMaterial { restitution: Some(0.7), friction: Some(0.1) }).unwrap();
     world
-        .set_pair_material(PairSide::Material(3), (ids[4], 0), PairMaterial { restitution: None, friction: Some(0.9) })
+        .set_pair_material(ids[2], ids[0], PairMaterial { restitution: Some(0.7), friction: Some(0.1), collides: None })
+        .unwrap();
+    world
+        .set_pair_material(
+            PairSide::Material(3),
+            (ids[4], 0),
+            PairMaterial { friction: Some(0.9), ..PairMaterial::default() },
+        )
         .unwrap();
     world.set_mode(ids[9], Mode::Kinematic).unwrap();
     world.set_enabled(ids[8], false).unwrap();

@@ -53,7 +53,7 @@ fn each_rule_gives_its_bounce() {
 
 #[test]
 fn a_pair_has_a_bounce_of_its_own_whichever_side_is_named_first() {
-    let own = |e| PairMaterial { restitution: Some(e), friction: None };
+    let own = |e| PairMaterial { restitution: Some(e), ..PairMaterial::default() };
     for swapped in [false, true] {
         let (mut world, ball, floor) = dropped(Settings::default(), 0.0, 0.0);
         let (a, b) = if swapped { (floor, ball) } else { (ball, floor) };
@@ -79,7 +79,7 @@ fn a_pair_has_a_friction_of_its_own() {
         .with_material(Material { friction: 0.9, ..Material::default() });
     let body = body.with_pose(Pose::translation(0.0, 0.0, 0.1)).with_velocity(Vec3::new(2.0, 0.0, 0.0));
     let id = world.add(body).unwrap();
-    world.set_pair_material(id, floor, PairMaterial { friction: Some(0.25), restitution: None }).unwrap();
+    world.set_pair_material(id, floor, PairMaterial { friction: Some(0.25), ..PairMaterial::default() }).unwrap();
     (0..480).for_each(|_| {
         world.step().unwrap();
     });
@@ -92,7 +92,7 @@ fn parts_go_before_objects_and_objects_before_materials() {
     let (mut world, ball, floor) = dropped(Settings::default(), 0.3, 0.1);
     world.get_mut::<RigidBody>(ball).unwrap().material.id = 7;
     world.get_mut::<RigidBody>(floor).unwrap().material.id = 9;
-    let both = |restitution, friction| PairMaterial { restitution, friction };
+    let both = |restitution, friction| PairMaterial { restitution, friction, collides: None };
     let found = |world: &World| {
         let found = world.pair_material((ball, 0), (floor, 0)).unwrap();
         (found.restitution, found.friction)
@@ -111,10 +111,10 @@ fn parts_go_before_objects_and_objects_before_materials() {
 #[test]
 fn pairs_that_cannot_be_are_refused_and_go_with_their_objects() {
     let (mut world, ball, floor) = dropped(Settings::default(), 0.3, 0.1);
-    let e = |e| PairMaterial { restitution: Some(e), friction: None };
+    let e = |e| PairMaterial { restitution: Some(e), ..PairMaterial::default() };
     let wrong = world.set_pair_material(ball, floor, e(1.5)).unwrap_err();
     assert_eq!(wrong.to_string(), "restitution of a pair is 1.5; it must be 0 to 1");
-    let rough = PairMaterial { friction: Some(f64::INFINITY), restitution: None };
+    let rough = PairMaterial { friction: Some(f64::INFINITY), ..PairMaterial::default() };
     assert!(world.set_pair_material(ball, floor, rough).is_err());
     assert!(world.set_pair_material(PairSide::Material(0), floor, e(0.5)).is_err());
     assert!(world.set_pair_material((ball, 1), floor, e(0.5)).is_err());

@@ -31,6 +31,7 @@ pub fn scene_hash(text: &str, world: &World) -> [u8; 32] {
             match drawn {
                 Drawn::Mesh(mesh) => put_mesh(&mut out, mesh),
                 Drawn::Shape(Shape::Mesh(mesh)) => put_mesh(&mut out, mesh.mesh()),
+                Drawn::Shape(Shape::Compound(compound)) => put_mesh(&mut out, &compound.mesh()),
                 Drawn::Shape(Shape::Cylinder(c)) => put_f64(&mut out, &[4.0, c.radius(), c.half_length()]),
                 Drawn::Shape(other) => out.extend(format!("{other:?}").bytes()), // plain numbers, written so that they read back the same
             }

@@ -62,6 +62,14 @@ fn put_geometry(out: &mut Vec<u8>, drawn: Drawn<'_>, base: &World) {
                 |other| matches!(other, VisualGeometry::Shape(Shape::Mesh(other)) if Arc::ptr_eq(mesh, other)),
             ),
         ),
+        Shape::Compound(compound) => put_triangles(
+            out,
+            &compound.mesh(),
+            place_of(
+                base,
+                |other| matches!(other, VisualGeometry::Shape(Shape::Compound(other)) if Arc::ptr_eq(compound, other)),
+            ),
+        ),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::support::Scratch;
 use nalgebra::{Point3, Quaternion, UnitQuaternion};
-use tumble_core::collide::{Pose, Shape, TreeSettings, TriMesh, Vec3};
+use tumble_core::collide::{CompoundPart, Pose, Shape, TreeSettings, TriMesh, Vec3};
 use tumble_core::{RigidBody, Settings, World};
 use tumble_net::record::{self, Recorder, RecorderOptions, read};
 use tumble_net::world::{contacts, entities, poses, show_contacts};
@@ -36,6 +36,21 @@ fn a_recorded_mesh_stands_where_its_file_says() {
         let off = placed * Point3::from(*recorded) - frame * Point3::from(*file);
         assert!(off.norm() < 1e-6, "vertices are recorded in single precision: {off}");
     }
+}
+
+#[test]
+fn a_recorded_compound_stands_where_its_parts_are() {
+    let block = Shape::cuboid(Vec3::repeat(0.2)).unwrap();
+    let part = |x: f64| CompoundPart::new(block.clone(), Pose::translation(x, 0.0, 0.0));
+    let shape = Shape::compound(vec![part(0.0), part(1.0)]).unwrap();
+    let mut world = World::new(Settings::default()).unwrap();
+    world.add(RigidBody::new(shape).with_pose(Pose::translation(0.0, 0.0, 2.0))).unwrap();
+    let (entity, at) = (&entities(&world)[0], isometry(&poses(&world)[0]));
+    let record::Shape::Mesh { vertices, .. } = &entity.parts[0].shape else { panic!("a mesh") };
+    let placed = at * isometry(&entity.parts[0].pose);
+    let bounds = vertices.iter().map(|v| (placed * Point3::from(*v)).coords);
+    let (low, high) = bounds.fold((Vec3::repeat(9.0), Vec3::repeat(-9.0)), |(l, h), v| (l.inf(&v), h.sup(&v)));
+    assert!((low - Vec3::new(-0.1, -0.1, 1.9)).norm() < 1e-9 && (high - Vec3::new(1.1, 0.1, 2.1)).norm() < 1e-9);
 }
 
 /// A name of 200 bytes is recorded as it is. Longer ones than a recording can hold keep their

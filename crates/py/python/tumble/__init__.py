@@ -21,11 +21,14 @@ from tumble._errors import (
 from tumble._extension import Behavior, Force
 from tumble._native import (
     Articulation,
+    ArticulationBuilder,
     Bodies,
     Box,
     Capsule,
+    Compound,
     Cylinder,
     HalfSpace,
+    Joint,
     Mesh,
     Recorder,
     RigidBody,
@@ -39,22 +42,26 @@ from tumble._native import (
 )
 from tumble._pictures import Camera, save_png
 from tumble._recordings import Recording, read, replay
-from tumble._values import Energy, Momentum, SphereLevel
+from tumble._values import Energy, Event, Momentum, SphereLevel
 
 __all__ = [
     "Articulation",
+    "ArticulationBuilder",
     "Behavior",
     "Bodies",
     "Box",
     "BusyError",
     "Camera",
     "Capsule",
+    "Compound",
     "Cylinder",
     "Energy",
+    "Event",
     "Force",
     "HalfSpace",
     "InternalError",
     "InvalidValueError",
+    "Joint",
     "Mesh",
     "MissingFileError",
     "Momentum",

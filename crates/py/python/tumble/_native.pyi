@@ -10,22 +10,26 @@ from numpy.typing import ArrayLike, NDArray
 from typing_extensions import disjoint_base
 
 from tumble._extension import Behavior, Force
-from tumble._values import Energy, Momentum, SphereLevel
-from tumble.typing import Axis, CollisionMeshes, Combine, Contacts, Integrator, MissingMeshes, Mode, Solver, Stepper, TreeMethod
+from tumble._values import Energy, Event, Momentum, SphereLevel
+from tumble.typing import Axis, CollisionMeshes, Combine, Contacts, Integrator, JointKind, JointType, LockedAxis, MissingMeshes, Mode, Solver, Stepper, TreeMethod
 
 _Floats: TypeAlias = NDArray[np.float64]
 _Path: TypeAlias = str | PathLike[str]
 _Body: TypeAlias = RigidBody | Articulation | str
+_Side: TypeAlias = _Body | tuple[Articulation | str, str] | None
 
 __version__: str
 
 __all__ = [
     "Articulation",
+    "ArticulationBuilder",
     "Bodies",
     "Box",
     "Capsule",
+    "Compound",
     "Cylinder",
     "HalfSpace",
+    "Joint",
     "Mesh",
     "Recorder",
     "RigidBody",
@@ -40,6 +44,7 @@ __all__ = [
     "show_contacts",
     "_panic",
     "_unpickle_articulation",
+    "_unpickle_built_articulation",
     "_unpickle_shape",
     "_unpickle_tree",
     "_unpickle_world",
@@ -48,8 +53,8 @@ __all__ = [
 
 @disjoint_base
 class Shape:
-    """A collision shape. The classes ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``HalfSpace`` and
-    ``Mesh`` make one.
+    """A collision shape. The classes ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``HalfSpace``,
+    ``Mesh`` and ``Compound`` make one.
     """
     @property
     def volume(self) -> float:
@@ -76,6 +81,21 @@ class Capsule(Shape):
     caps, meters.
     """
     def __new__(cls, radius: float, length: float) -> Capsule: ...
+
+@final
+class Compound(Shape):
+    """Several shapes of one body.
+
+    parts: tuples ``(shape, position)``, ``(shape, position, orientation)`` or ``(shape, position,
+    orientation, density)``: position of the shape's origin, meters; orientation: quaternion
+    (x, y, z, w) or None; density: kg/m³, for all parts or for none. A body made without mass and
+    density has these densities. Parts may overlap; mass and volume of an overlap then count for
+    each. The frame of its body is that of the positions.
+    """
+    def __new__(cls, parts: Sequence[tuple[Any, ...]]) -> Compound: ...
+    @property
+    def center_of_mass(self) -> _Floats:
+        """The center of mass in the frame of the parts, shape (3,), meters."""
 
 @final
 class Cylinder(Shape):
@@ -128,10 +148,18 @@ class RigidBody:
         """Whether its world still has it."""
     @property
     def mass(self) -> float:
-        """Mass, kg. Meaningless for static geometry."""
+        """Mass, kg, above 0. Meaningless for static geometry. Setting it keeps the velocity and changes
+        the inertia by the same factor.
+        """
+    @mass.setter
+    def mass(self, value: float) -> None: ...
     @property
     def inertia(self) -> _Floats:
-        """Inertia about the center of mass, body axes, shape (3, 3), kg·m²."""
+        """Inertia about the center of mass, body axes, shape (3, 3), kg·m². Setting it, also by three
+        moments, keeps the velocities.
+        """
+    @inertia.setter
+    def inertia(self, value: ArrayLike) -> None: ...
     @property
     def position(self) -> _Floats:
         """Position of the origin of its frame, shape (3,), meters: the center of a sphere, box,
@@ -141,7 +169,11 @@ class RigidBody:
     def position(self, value: ArrayLike) -> None: ...
     @property
     def center_of_mass(self) -> _Floats:
-        """The center of mass in the body's frame, shape (3,), meters: zero except for meshes."""
+        """The center of mass in the body's frame, shape (3,), meters: zero except for meshes, unless it
+        is set. Setting it keeps the motion of the body; the inertia is then about the new center.
+        """
+    @center_of_mass.setter
+    def center_of_mass(self, value: ArrayLike) -> None: ...
     @property
     def world_center_of_mass(self) -> _Floats:
         """The center of mass in the world, shape (3,), meters."""
@@ -188,6 +220,30 @@ class RigidBody:
     @collidable.setter
     def collidable(self, value: bool) -> None: ...
     @property
+    def group(self) -> int:
+        """Collision group, 0 to 63. Two bodies collide if the group of each is in the mask of the other."""
+    @group.setter
+    def group(self, value: int) -> None: ...
+    @property
+    def mask(self) -> int:
+        """Groups that it collides with, one bit each. May be set to a sequence of groups, or None for
+        all.
+        """
+    @mask.setter
+    def mask(self, value: int | Sequence[int] | None) -> None: ...
+    @property
+    def sensor(self) -> bool:
+        """Whether it is a sensor: it has no contacts, and ``world.events`` reports the bodies that overlap
+        it at the end of a step.
+        """
+    @sensor.setter
+    def sensor(self, value: bool) -> None: ...
+    @property
+    def touching(self) -> list[RigidBody | Articulation]:
+        """The bodies in contact with it after the last step, or in it if it is a sensor: a list of
+        handles in the order of ``world.bodies``.
+        """
+    @property
     def restitution(self) -> float:
         """Coefficient of restitution, 0 to 1."""
     @restitution.setter
@@ -203,13 +259,28 @@ class RigidBody:
     @color.setter
     def color(self, value: ArrayLike) -> None: ...
     @property
+    def gravity_scale(self) -> float:
+        """Factor of the world's gravity, 1 by default."""
+    @gravity_scale.setter
+    def gravity_scale(self, value: float) -> None: ...
+    @property
+    def locked(self) -> tuple[LockedAxis, ...]:
+        """Locked axes of the world: a tuple of ``"x"``, ``"y"``, ``"z"`` (the center of mass does not move
+        along them), ``"rotation_x"``, ``"rotation_y"``, ``"rotation_z"`` (the body does not turn about
+        them). Setting it clears the velocity along these axes.
+        """
+    @locked.setter
+    def locked(self, value: Sequence[LockedAxis]) -> None: ...
+    @property
     def linear_damping(self) -> float:
-        """Linear damping, 1/s: a force of ``-damping · momentum``."""
+        """Linear damping, 1/s, at least 0: a force of ``-damping · momentum``. Without other forces the
+        velocity decays by ``exp(-damping · t)``.
+        """
     @linear_damping.setter
     def linear_damping(self, value: float) -> None: ...
     @property
     def angular_damping(self) -> float:
-        """Angular damping, 1/s: a torque of ``-damping · angular momentum``."""
+        """Angular damping, 1/s, at least 0: a torque of ``-damping · angular momentum``."""
     @angular_damping.setter
     def angular_damping(self, value: float) -> None: ...
     def apply_force(self, force: ArrayLike, point: ArrayLike | None = None) -> None:
@@ -232,6 +303,215 @@ class RigidBody:
         """
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
+
+@final
+class Joint:
+    """A joint between two bodies, or a body and the world, made by ``World.add_joint``.
+
+    Its position is an angle (rad), a displacement (m) or a length (m); ``"spherical"``, ``"fixed"``,
+    ``"universal"`` and ``"planar"`` joints have none. Everything can change between steps. All vectors
+    are in world axes.
+    """
+    @property
+    def name(self) -> str:
+        """Name, unique in its world."""
+    @property
+    def exists(self) -> bool:
+        """Whether its world still has it."""
+    @property
+    def kind(self) -> JointKind:
+        """Kind of the joint."""
+    @property
+    def a(self) -> RigidBody | Articulation | None:
+        """The body on its first side."""
+    @property
+    def b(self) -> RigidBody | Articulation | None:
+        """The body on its second side; None for the world."""
+    @property
+    def enabled(self) -> bool:
+        """Whether it acts. A joint that broke is not enabled; setting True mends it."""
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
+    @property
+    def position(self) -> float:
+        """Position, rad or m: the angle of ``a`` about the axis, its displacement along the axis, or the
+        length. Zero where the joint was made, except for a length. An angle is in (-π, π], or within π
+        of the middle of its limits.
+        """
+    @property
+    def velocity(self) -> float:
+        """Rate of the position, rad/s or m/s."""
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """Limits of the position, (lower, upper), rad or m, or None."""
+    @limits.setter
+    def limits(self, value: ArrayLike | None) -> None: ...
+    @property
+    def damping(self) -> float:
+        """Viscous damping along the position, N·m·s/rad or N·s/m."""
+    @damping.setter
+    def damping(self, value: float) -> None: ...
+    @property
+    def friction(self) -> float:
+        """Dry friction along the position: largest torque or force, N·m or N."""
+    @friction.setter
+    def friction(self, value: float) -> None: ...
+    @property
+    def stiffness(self) -> float:
+        """Stiffness of its spring, N·m/rad or N/m; 0 without one."""
+    @stiffness.setter
+    def stiffness(self, value: float) -> None: ...
+    @property
+    def rest(self) -> float:
+        """Position at which its spring is at rest, rad or m; for a ``"spring"`` its ``length``."""
+    @rest.setter
+    def rest(self, value: float) -> None: ...
+    @property
+    def length(self) -> float:
+        """Length of a ``"distance"``, largest length of a ``"rope"``, length of a ``"spring"`` at rest,
+        largest length of the rope of a ``"pulley"``, m.
+        """
+    @length.setter
+    def length(self, value: float) -> None: ...
+    @property
+    def teeth(self) -> tuple[int, int]:
+        """Teeth of the gears ``a`` and ``b``, not 0; negative for inner teeth."""
+    @teeth.setter
+    def teeth(self, value: tuple[int, int]) -> None: ...
+    @property
+    def radius(self) -> float:
+        """Displacement of a ``"rack"`` per radian of its pinion ``a``, m, not 0."""
+    @radius.setter
+    def radius(self, value: float) -> None: ...
+    @property
+    def pitch(self) -> float:
+        """Displacement of a ``"screw"`` per turn, m, not 0; positive for a right-handed one."""
+    @pitch.setter
+    def pitch(self, value: float) -> None: ...
+    @property
+    def ratio(self) -> float:
+        """Weight of the side of ``b`` in the length of a ``"pulley"``, above 0."""
+    @ratio.setter
+    def ratio(self, value: float) -> None: ...
+    @property
+    def breaking_force(self) -> float:
+        """Force above which it breaks, N; infinite if it does not."""
+    @breaking_force.setter
+    def breaking_force(self, value: float) -> None: ...
+    @property
+    def breaking_torque(self) -> float:
+        """Torque about its point above which it breaks, N·m; infinite if it does not."""
+    @breaking_torque.setter
+    def breaking_torque(self, value: float) -> None: ...
+    def set_drive(
+        self,
+        *,
+        target: float | None = None,
+        velocity: float | None = None,
+        stiffness: float = 0.0,
+        damping: float = 0.0,
+        max_force: float | None = None,
+    ) -> None:
+        """Sets its drive; the arguments are those of ``Articulation.set_drive``. A drive to an angle goes
+        the shorter way if the joint has no limits.
+        """
+    @property
+    def force(self) -> _Floats:
+        """Force on ``a`` in the last sub-step, shape (3,), N; the opposite acts on ``b``. It includes those
+        of limits, spring, damping, friction and drive. Zero while the joint is not enabled, and while
+        its bodies sleep.
+        """
+    @property
+    def torque(self) -> _Floats:
+        """Torque on ``a`` about its point of the joint, shape (3,), N·m; otherwise as ``force``."""
+    @property
+    def drive_force(self) -> float:
+        """Force or torque of the drive along the position, N or N·m."""
+    @property
+    def error(self) -> tuple[float, float]:
+        """How far it is open: distance, m, and angle, rad, without the motion that it leaves free."""
+    def __repr__(self) -> str: ...
+    def __eq__(self, value: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class ArticulationBuilder:
+    """Makes an articulated body link by link, without a file.
+
+    name: of the body. self_collision: whether its links collide with each other; links that a joint
+    connects never do. ``build`` returns a description; ``World.add_articulation`` takes the builder
+    too.
+    """
+    def __new__(cls, name: str = "articulation", *, self_collision: bool = True) -> ArticulationBuilder: ...
+    def add_link(
+        self,
+        name: str,
+        parent: str | None = None,
+        *,
+        joint: JointType = "revolute",
+        axis: ArrayLike = (0.0, 0.0, 1.0),
+        position: ArrayLike | None = None,
+        orientation: ArrayLike | None = None,
+        shape: Shape | None = None,
+        shape_position: ArrayLike | None = None,
+        shape_orientation: ArrayLike | None = None,
+        mass: float | None = None,
+        density: float | None = None,
+        center_of_mass: ArrayLike | None = None,
+        inertia: ArrayLike | None = None,
+        limits: ArrayLike | None = None,
+        joint_damping: float = 0.0,
+        joint_friction: float = 0.0,
+        stiffness: float = 0.0,
+        rest: float = 0.0,
+        drive: Mapping[str, float] | None = None,
+        q: float | None = None,
+        qd: float | None = None,
+        friction: float = 0.5,
+        restitution: float = 0.0,
+        collides: bool = True,
+        color: ArrayLike | None = None,
+    ) -> None:
+        """Adds a link. Its joint has the same name.
+
+        parent: a link that was added before; None: the base. joint: ``"revolute"``, ``"prismatic"``,
+        ``"spherical"``, ``"fixed"``, or ``"floating"`` without a parent. axis: of a revolute or
+        prismatic joint, shape (3,), any length above 0. position, orientation: the frame of the joint
+        in the frame of the parent, shape (3,), m, and (4,); with the joint at zero it is the frame of
+        the link.
+
+        shape: collides and is drawn, at shape_position and shape_orientation in the frame of the link;
+        ``add_shape`` adds others. mass, kg: spread over the volumes of all shapes; or density, kg/m³,
+        by default that of water. A link without shapes has no mass. center_of_mass, shape (3,), m, and
+        inertia about it, shape (3, 3) or (3,), kg·m²: numbers for ``mass``, without regard to the shapes;
+        a point mass without inertia.
+
+        limits: (lower, upper), rad or m. joint_damping: N·m·s/rad or N·s/m. joint_friction: N·m or N.
+        stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
+        ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the
+        start. friction, restitution, collides: of the shapes. color: sRGB, shape (3,).
+        """
+    def add_shape(
+        self,
+        link: str,
+        shape: Shape,
+        position: ArrayLike | None = None,
+        orientation: ArrayLike | None = None,
+        *,
+        collides: bool = True,
+    ) -> None:
+        """Adds a shape to a link. position, orientation: in the frame of the link. collides: whether it
+        collides, or is only drawn; both count for the mass.
+        """
+    def mimic(self, link: str, of: str, multiplier: float = 1.0, offset: float = 0.0) -> None:
+        """Couples the joint of a link to that of another: ``q = multiplier · q_of + offset``."""
+    def exclude_collisions(self, a: str, b: str) -> None:
+        """Disables collisions between two links."""
+    def build(self) -> Articulation:
+        """Returns a description of the body, whose dynamics functions work at once. Later links do not
+        change it.
+        """
+    def __repr__(self) -> str: ...
 
 @final
 class Articulation:
@@ -675,7 +955,8 @@ class World:
     combine_restitution, combine_friction: rule for the coefficients of a pair, ``"min"``,
     ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``. threads: threads of a step, 0 for
     as many as cores; no number changes the result. budget: largest work of a step in block
-    relaxations, None for no bound. Names and defaults are those of scene files.
+    relaxations, None for no bound. event_impulse: N·s, see ``events``. Names and defaults are those
+    of scene files.
 
     One thread at a time: while one thread steps a world, calls on it from another raise
     ``BusyError``. The interpreter is released while a world steps.
@@ -698,6 +979,7 @@ class World:
         combine_friction: Combine = "geometric_mean",
         threads: int = 1,
         budget: int | None = None,
+        event_impulse: float = 0.0,
     ) -> World: ...
     @staticmethod
     def load(
@@ -780,14 +1062,20 @@ class World:
     @combine_friction.setter
     def combine_friction(self, value: Combine) -> None: ...
     def set_pair_material(
-        self, a: _Body | str, b: _Body | str, *, restitution: float | None = None, friction: float | None = None
+        self,
+        a: _Body | str,
+        b: _Body | str,
+        *,
+        restitution: float | None = None,
+        friction: float | None = None,
+        collides: bool | None = None,
     ) -> None:
         """Sets restitution and friction of the contacts of two bodies from the next step on,
-        overriding the combination rules.
+        overriding the combination rules, and whether they collide at all.
 
         a, b: handles or names in any order; ``"ARTICULATION/LINK"`` is a link of an articulation
-        with the links fixed to it. None keeps the rule; without both the pair has no constants of
-        its own any more. Forks have the same pairs. ``save`` does not include them, as it does not
+        with the links fixed to it. None keeps the rule; without all the pair has no constants of
+        its own any more. collides: False ignores the pair; True does not override groups and masks. Forks have the same pairs. ``save`` does not include them, as it does not
         include materials.
         """
     def pair_material(self, a: _Body | str, b: _Body | str) -> tuple[float, float]:
@@ -828,6 +1116,53 @@ class World:
         m/s; ``impulse`` (3,) on the first over the last sub-step, N·s; ``force`` (3,), N, without
         impacts. World axes.
         """
+    @property
+    def positions(self) -> _Floats:
+        """Positions of all bodies, as ``body.position``, in the order of ``bodies``: a copy of shape
+        (n, 3), m; for an articulation that of its first link. Setting it moves the rigid bodies whose
+        rows change and keeps their velocities; rows of articulations must stay as they are.
+        """
+    @positions.setter
+    def positions(self, value: ArrayLike) -> None: ...
+    @property
+    def orientations(self) -> _Floats:
+        """Orientations of all bodies, quaternions (x, y, z, w), shape (n, 4); otherwise as ``positions``."""
+    @orientations.setter
+    def orientations(self, value: ArrayLike) -> None: ...
+    @property
+    def velocities(self) -> _Floats:
+        """Velocities of the centers of mass of all bodies, for an articulation of the origin of its first
+        link, shape (n, 3), m/s; otherwise as ``positions``.
+        """
+    @velocities.setter
+    def velocities(self, value: ArrayLike) -> None: ...
+    @property
+    def angular_velocities(self) -> _Floats:
+        """Angular velocities of all bodies, world axes, shape (n, 3), rad/s; otherwise as ``positions``."""
+    @angular_velocities.setter
+    def angular_velocities(self, value: ArrayLike) -> None: ...
+    @property
+    def events(self) -> list[Event]:
+        """The events of the last step, a list of ``Event`` tuples: ``kind``, ``a``, ``b``, ``parts``,
+        ``impulse``, ``point``.
+
+        kind: ``"contact_begin"``, ``"contact_persist"`` (in contact in the step before too),
+        ``"contact_end"``, ``"sensor_begin"``, ``"sensor_end"``, ``"asleep"``, ``"awake"``, ``"joint_broken"``. a, b: handles
+        of the bodies, the sensor first, or the joint; b is None for sleep and joints. parts: the touched links, as in
+        ``contacts``. impulse: on ``a`` over the step, shape (3,), N·s; point: where the largest one
+        acts, shape (3,), m; both zero for all but contacts that begin or persist. World axes.
+
+        Two bodies are in contact in a step if their surfaces touch or an impulse acts between them, of
+        at least ``event_impulse`` of the world. Of ``step(n)`` the last step counts. Pairs in contact
+        are part of ``save``; a restored world has no events before its next step.
+        """
+    @property
+    def event_impulse(self) -> float:
+        """Smallest impulse of a pair in a step with which it counts as in contact, N·s, at least 0:
+        weaker contacts make no ``events``.
+        """
+    @event_impulse.setter
+    def event_impulse(self, value: float) -> None: ...
     def cast_rays(
         self,
         origins: ArrayLike,
@@ -835,7 +1170,7 @@ class World:
         max_distance: ArrayLike | None = None,
         *,
         group: int = 0,
-        mask: int | None = None,
+        mask: int | Sequence[int] | None = None,
         ignore: _Body | Sequence[_Body] | None = None,
     ) -> NDArray[np.void]:
         """Returns where rays enter bodies: a structured array with one row per ray.
@@ -849,8 +1184,8 @@ class World:
         -z end and +z end of a cylinder, else 0; ``normal`` (3,), unit, outward, world axes.
 
         A ray that starts inside a convex shape does not meet that shape; a mesh is hit on its outside
-        only. group, mask, ignore: the query has a collision group (0 to 63) and a mask (one bit per
-        group, None for all) like a body, and does not find the ignored bodies (a handle, a name or a
+        only. group, mask, ignore: the query has a collision group (0 to 63) and a mask (the
+        groups that it finds, as bits of an integer or a sequence; None for all) like a body, and does not find the ignored bodies (a handle, a name or a
         list of them). Sensors are not found. Runs on ``threads`` threads, which change no bit.
         """
     def cast_shape(
@@ -862,7 +1197,7 @@ class World:
         orientation: ArrayLike | None = None,
         *,
         group: int = 0,
-        mask: int | None = None,
+        mask: int | Sequence[int] | None = None,
         ignore: _Body | Sequence[_Body] | None = None,
     ) -> np.void | None:
         """Returns the first body that a shape touches if it moves along a direction without rotation, or
@@ -880,7 +1215,7 @@ class World:
         orientation: ArrayLike | None = None,
         *,
         group: int = 0,
-        mask: int | None = None,
+        mask: int | Sequence[int] | None = None,
         ignore: _Body | Sequence[_Body] | None = None,
     ) -> NDArray[np.void]:
         """Returns the bodies that overlap a shape at a pose: a structured array with the fields ``body``
@@ -896,7 +1231,7 @@ class World:
         position: ArrayLike | None = None,
         orientation: ArrayLike | None = None,
         group: int = 0,
-        mask: int | None = None,
+        mask: int | Sequence[int] | None = None,
         ignore: _Body | Sequence[_Body] | None = None,
     ) -> np.void | None:
         """Returns the closest points of two bodies, or of a shape at a pose and a body, the nearest one
@@ -908,14 +1243,14 @@ class World:
         the first. group, mask, ignore: of a shape, as in ``cast_rays``.
         """
     def contains(
-        self, point: ArrayLike, *, group: int = 0, mask: int | None = None, ignore: _Body | Sequence[_Body] | None = None
+        self, point: ArrayLike, *, group: int = 0, mask: int | Sequence[int] | None = None, ignore: _Body | Sequence[_Body] | None = None
     ) -> NDArray[np.int64]:
         """Returns the numbers in ``world.bodies`` of the bodies that contain a point: shape (k,).
 
         point: shape (3,), m. The surface belongs to a body. group, mask, ignore: as in ``cast_rays``.
         """
     def point_depth(
-        self, points: ArrayLike, *, group: int = 0, mask: int | None = None, ignore: _Body | Sequence[_Body] | None = None
+        self, points: ArrayLike, *, group: int = 0, mask: int | Sequence[int] | None = None, ignore: _Body | Sequence[_Body] | None = None
     ) -> Any:
         """Returns how deep points lie in the bodies: one row for a point of shape (3,), a structured
         array for points of shape (n, 3), m.
@@ -1002,6 +1337,13 @@ class World:
         kinematic: bool = False,
         collidable: bool = True,
         contacts: Contacts = "surface",
+        group: int = 0,
+        mask: int | Sequence[int] | None = None,
+        sensor: bool = False,
+        inertia: ArrayLike | None = None,
+        center_of_mass: ArrayLike | None = None,
+        gravity_scale: float = 1.0,
+        locked: Sequence[LockedAxis] | None = None,
     ) -> RigidBody:
         """Adds a body that moves.
 
@@ -1011,7 +1353,12 @@ class World:
         file's, meters. orientation: unit quaternion (x, y, z, w). velocity, m/s, and
         angular_velocity, rad/s: world axes. restitution: 0 to 1. friction: at least 0. kinematic:
         moves at its prescribed velocity. contacts: contact mode, ``"surface"``, or ``"spheres"``
-        for the spheres of its tree as in the thesis; a pair uses spheres if either body does.
+        for the spheres of its tree as in the thesis; a pair uses spheres if either body does. group, mask:
+        collision group, 0 to 63, and the groups that it collides with, as bits of an integer or a
+        sequence, None for all; two bodies collide if the group of each is in the mask of the other.
+        sensor: no contacts; ``events`` reports the bodies that overlap it. inertia: about the center of
+        mass, shape (3, 3) or (3,), kg·m², by default that of a uniform body; center_of_mass: in the
+        frame of the shape, shape (3,), m; gravity_scale, locked: as the properties of a body.
         """
     def add_static(
         self,
@@ -1024,23 +1371,81 @@ class World:
         *,
         collidable: bool = True,
         contacts: Contacts = "surface",
+        group: int = 0,
+        mask: int | Sequence[int] | None = None,
+        sensor: bool = False,
     ) -> RigidBody:
-        """Adds geometry that never moves. name, position, orientation, restitution, friction, contacts: as
-        in ``add_rigid``.
+        """Adds geometry that never moves. name, position, orientation, restitution, friction, contacts,
+        group, mask, sensor: as in ``add_rigid``.
         """
     def add_articulation(
-        self, articulation: Articulation | _Path, base: ArrayLike | None = None, *, name: str | None = None
+        self, articulation: Articulation | ArticulationBuilder | _Path, base: ArrayLike | None = None, *, name: str | None = None
     ) -> Articulation:
         """Adds an articulated body and returns its handle.
 
-        articulation: a description, or the path of a URDF. base: pose of its base: a position (3,),
+        articulation: a description, a builder, or the path of a URDF. base: pose of its base: a position (3,),
         or position and quaternion (7,), meters and (x, y, z, w). name: by default the
         description's. It starts with the ``q``, ``qd`` and ``tau`` of the description; the pose of
         a floating root is relative to the base.
         """
-    def remove(self, body: RigidBody | Articulation | str) -> None:
-        """Removes a body, given as a handle or by name, or a force or behavior by name. Handles of a
-        removed body raise ``RemovedError``.
+    @property
+    def joints(self) -> list[Joint]:
+        """All joints made by ``add_joint`` or ``[[loop_joint]]``, in the order in which they were added."""
+    def joint(self, name: str) -> Joint:
+        """Returns the joint of that name, made by ``add_joint`` or ``[[loop_joint]]``."""
+    def add_joint(
+        self,
+        kind: JointKind,
+        a: _Side,
+        b: _Side = None,
+        point: ArrayLike | None = None,
+        axis: ArrayLike = (0.0, 0.0, 1.0),
+        limits: ArrayLike | None = None,
+        drive: Mapping[str, float] | None = None,
+        breaking_force: float | None = None,
+        *,
+        name: str = "",
+        second_point: ArrayLike | None = None,
+        second_axis: ArrayLike | None = None,
+        length: float | None = None,
+        stiffness: float = 0.0,
+        rest: float | None = None,
+        damping: float = 0.0,
+        friction: float = 0.0,
+        breaking_torque: float | None = None,
+        teeth: tuple[int, int] | None = None,
+        radius: float | None = None,
+        pitch: float | None = None,
+        ratio: float = 1.0,
+        ground: ArrayLike | None = None,
+    ) -> Joint:
+        """Joins two bodies, or a body and the world, in their present poses, and returns the joint.
+
+        kind: ``"fixed"``, ``"revolute"`` (turns about the axis), ``"prismatic"`` (slides along it),
+        ``"spherical"``, ``"cylindrical"`` (both turns and slides), ``"universal"`` (turns about the axis,
+        which is fixed to a, and second_axis, fixed to b), ``"planar"`` (slides across the axis and turns
+        about it), ``"distance"``, ``"rope"`` (at most a length), ``"spring"``, ``"gear"``, ``"rack"``, ``"screw"`` or ``"pulley"``. a, b: handles or names;
+        a link is ``"ARTICULATION/LINK"`` or ``(articulation, "LINK")``; None is the world.
+
+        point: shape (3,), m, by default the center of mass of a, or the origin of a link; second_point:
+        the end on b of a distance, rope or spring, by default likewise of b. axis: shape (3,), any length
+        above 0. length: of a distance, rope or spring, m, by default the present one.
+
+        teeth: of the gears a and b, negative for inner teeth; they turn about axis and second_axis, which
+        do not move in the world. radius, m: a rack b moves along second_axis by it per radian of a
+        about axis. pitch, m: displacement of a screw per turn. ground: the points of the world over which the rope of
+        a pulley runs, shape (2, 3), m; ratio: the weight of b's side in its length.
+
+        limits: (lower, upper) of the position, rad or m. drive: a dict with the arguments of
+        ``Joint.set_drive``. stiffness, rest: a spring along the position, N·m/rad or N/m, and rad or m.
+        damping: N·m·s/rad or N·s/m. friction: N·m or N. breaking_force, N, and breaking_torque about the
+        point, N·m: above one of them the joint breaks; ``events`` has a ``"joint_broken"`` then. The
+        bodies still collide with each other: ``set_pair_material(a, b, collides=False)``. Points and axes
+        are in the world.
+        """
+    def remove(self, body: RigidBody | Articulation | Joint | str) -> None:
+        """Removes a body or a joint, given as a handle or by name, or a force or behavior by name. Handles
+        of a removed object raise ``RemovedError``. Joints of a removed body stay, without effect.
         """
     def add_force(self, name: str, force: Force) -> None:
         """Adds a custom force: an object of a subclass of ``tumble.Force``. Its name must be unique
@@ -1103,6 +1508,8 @@ def _unpickle_articulation(
     file: Path, floating: bool, packages: Mapping[str, Path], words: Sequence[str], numbers: Sequence[Sequence[float]]
 ) -> Articulation:
     """Unpickles a description. Its file is read again."""
+def _unpickle_built_articulation(data: bytes, numbers: Sequence[Sequence[float]]) -> Articulation:
+    """Unpickles a description of a body made by a program."""
 def _unpickle_shape(data: bytes) -> Shape:
     """Returns the object of its class that a pickled shape becomes."""
 def _unpickle_tree(data: bytes) -> SphereTree:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from tumble._native import Articulation, Joint, RigidBody
+    from tumble.typing import EventKind
 
 
 class Energy(NamedTuple):
@@ -14,7 +18,7 @@ class Energy(NamedTuple):
     kinetic: float
     """Kinetic energy, J."""
     potential: float
-    """Potential energy in the world's gravity, zero at the origin, J."""
+    """Potential energy in the world's gravity, zero at the origin, and of springs, J."""
     total: float
     """Sum of the two, J."""
 
@@ -38,6 +42,23 @@ def _item(values: tuple[Any, ...], key: Any) -> Any:
     if isinstance(key, str) and key in values._fields:  # type: ignore[attr-defined]
         return getattr(values, key)
     return tuple.__getitem__(values, key)
+
+
+class Event(NamedTuple):
+    """An event of the last step: see ``World.events``."""
+
+    kind: EventKind
+    """What happened."""
+    a: RigidBody | Articulation | Joint
+    """The body that was added first, the sensor, the body that fell asleep or woke, or the joint that broke."""
+    b: RigidBody | Articulation | None
+    """The other body; None for sleep and joints."""
+    parts: tuple[int, int]
+    """For articulations the indices of the links in their ``link_names``, else 0."""
+    impulse: NDArray[np.float64]
+    """Impulse on ``a`` over the step, world axes, shape (3,), N·s; zero for all but contacts that begin or persist."""
+    point: NDArray[np.float64]
+    """The contact point with the largest impulse, world, shape (3,), m; zero like the impulse."""
 
 
 class SphereLevel(NamedTuple):

@@ -20,6 +20,35 @@ Contacts: TypeAlias = Literal["surface", "spheres"]
 Mode: TypeAlias = Literal["dynamic", "kinematic", "static"]
 """``RigidBody.mode``."""
 
+EventKind: TypeAlias = Literal[
+    "contact_begin", "contact_persist", "contact_end", "sensor_begin", "sensor_end", "asleep", "awake", "joint_broken"
+]
+"""``Event.kind``."""
+
+LockedAxis: TypeAlias = Literal["x", "y", "z", "rotation_x", "rotation_y", "rotation_z"]
+"""``RigidBody.locked``: axes of the world along which a body does not move, or about which it does not turn."""
+
+JointKind: TypeAlias = Literal[
+    "fixed",
+    "revolute",
+    "prismatic",
+    "spherical",
+    "cylindrical",
+    "universal",
+    "planar",
+    "distance",
+    "rope",
+    "spring",
+    "gear",
+    "rack",
+    "screw",
+    "pulley",
+]
+"""``World.add_joint(kind=…)``: the motion that a joint between two bodies leaves free."""
+
+JointType: TypeAlias = Literal["revolute", "prismatic", "spherical", "fixed", "floating"]
+"""``ArticulationBuilder.add_link(joint=…)``: the joint of a link."""
+
 MissingMeshes: TypeAlias = Literal["error", "skip"]
 """``Articulation.from_urdf(missing_meshes=…)``: treatment of missing collision meshes."""
 

@@ -14,6 +14,11 @@ const PALETTE: [[f32; 3]; 7] = [
     [0.80, 0.46, 0.60],
 ];
 
+/// Returns the `count`th color of new bodies, sRGB.
+pub fn palette(count: usize) -> [f32; 3] {
+    PALETTE[count % PALETTE.len()]
+}
+
 /// Returns a body with its default appearance: the `count`th color. Planes have a gray checkerboard
 /// of half a meter; other static geometry is gray.
 pub fn usual(body: Rigid, count: usize) -> Rigid {
@@ -29,7 +34,7 @@ pub fn usual(body: Rigid, count: usize) -> Rigid {
             ..Appearance::default()
         },
         (_, true) => return body,
-        _ => Appearance { color: PALETTE[count % PALETTE.len()], ..Appearance::default() },
+        _ => Appearance { color: palette(count), ..Appearance::default() },
     };
     looking(body, appearance)
 }

@@ -11,14 +11,16 @@ use crate::objects::place::{Place, hash};
 use crate::objects::robot::Robot;
 use crate::pool;
 use crate::world::gc::{Anchor, anchor};
+use crate::world::pickling::write_body;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use tumble::collide::{Pose, Vec3};
-use tumble::dynamics::{ArticulatedBody, DofSettings};
+use tumble::dynamics::{ArticulatedBody, DofSettings, Object};
 use tumble::scene::urdf::{self, UrdfOptions};
 
 /// A tree of links: a robot, a chain, a skeleton.
@@ -50,6 +52,26 @@ impl Articulation {
             anchor: Some(anchor(py, &place.shared)?),
             spot: Binding::Placed(place),
         })
+    }
+
+    /// Returns the description of a body made by a program. Its joints have the names of their links.
+    pub fn described(body: ArticulatedBody) -> Articulation {
+        let joints = body.model().links().iter().map(|link| link.name.clone()).collect();
+        Articulation::of_source(Source::Built(Box::new(body.clone())), &body, joints)
+    }
+
+    /// Returns the description of a body, in its initial state.
+    fn of_source(source: Source, body: &ArticulatedBody, joints: Vec<String>) -> Articulation {
+        let start = start(body);
+        let (q, qd) = start.split_at(body.model().positions());
+        let now = Now { gravity: Vec3::new(0.0, 0.0, -9.81), q: q.to_vec(), qd: qd.to_vec(), tau: vec![0.0; qd.len()] };
+        let robot = Robot { model: body.model().clone(), base: Pose::identity(), joints };
+        Articulation {
+            name: body.name().into(),
+            robot: Arc::new(robot),
+            spot: Binding::Free { source, now: Mutex::new(now) },
+            anchor: None,
+        }
     }
 
     /// Returns the place of the body, if it is in a world.
@@ -91,16 +113,9 @@ impl Articulation {
             ..UrdfOptions::default()
         };
         let read = py.detach(|| pool::run(|| Ok(urdf::model(&file, &options)?)))?;
-        let start = start(&ArticulatedBody::new("", read.model.clone()));
-        let (q, qd) = start.split_at(read.model.positions());
-        let now = Now { gravity: Vec3::new(0.0, 0.0, -9.81), q: q.to_vec(), qd: qd.to_vec(), tau: vec![0.0; qd.len()] };
-        let robot = Robot { model: read.model, base: Pose::identity(), joints: read.joints };
-        Ok(Articulation {
-            name: read.name.into(),
-            robot: Arc::new(robot),
-            spot: Binding::Free { source: Source { file, options, dofs: read.dofs }, now: Mutex::new(now) },
-            anchor: None,
-        })
+        let body = ArticulatedBody::new(read.name, read.model);
+        let source = Source::File { file, options, dofs: read.dofs };
+        Ok(Articulation::of_source(source, &body, read.joints))
     }
 
     /// Name of the robot in its file, or of the body in its world.
@@ -378,22 +393,28 @@ impl Articulation {
         }
     }
 
-    /// Pickles the file of a description and its numbers. A handle of a body in a world cannot be
-    /// pickled.
-    #[allow(clippy::type_complexity, reason = "the parts of a description, once")]
-    fn __reduce__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> Result<(Bound<'py, PyAny>, (PathBuf, bool, BTreeMap<String, PathBuf>, [&'static str; 2], [Vec<f64>; 4]))> {
+    /// Pickles the file of a description, or the body made by a program, and its numbers. A handle of a
+    /// body in a world cannot be pickled.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Result<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let Binding::Free { source, now } = &self.spot else {
             return Err(alone(&self.name));
         };
-        let file = std::path::absolute(&source.file).unwrap_or_else(|_| source.file.clone());
-        let UrdfOptions { floating, packages, missing_meshes, collision_meshes, .. } = source.options.clone();
-        let words = [word(missing_meshes, MISSING_MESHES), word(collision_meshes, COLLISION_MESHES)];
         let Now { gravity, q, qd, tau } = locked(now).clone();
-        let unpickle = py.import("tumble._native")?.getattr("_unpickle_articulation")?;
-        Ok((unpickle, (file, floating, packages, words, [gravity.as_slice().to_vec(), q, qd, tau])))
+        let numbers = [gravity.as_slice().to_vec(), q, qd, tau];
+        let native = py.import("tumble._native")?;
+        Ok(match source {
+            Source::File { file, options, .. } => {
+                let file = std::path::absolute(file).unwrap_or_else(|_| file.clone());
+                let UrdfOptions { floating, packages, missing_meshes, collision_meshes, .. } = options.clone();
+                let words = [word(missing_meshes, MISSING_MESHES), word(collision_meshes, COLLISION_MESHES)];
+                let arguments = (file, floating, packages, words, numbers).into_pyobject(py)?;
+                (native.getattr("_unpickle_articulation")?, arguments.into_any())
+            }
+            Source::Built(body) => {
+                let arguments = (PyBytes::new(py, &write_body(body)?), numbers).into_pyobject(py)?;
+                (native.getattr("_unpickle_built_articulation")?, arguments.into_any())
+            }
+        })
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {

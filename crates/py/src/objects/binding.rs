@@ -19,12 +19,14 @@ pub enum Binding {
     Placed(Place),
 }
 
-/// Source of a description. Its shapes are read when it is added to a world.
+/// Source of a description.
 #[derive(Clone)]
-pub struct Source {
-    pub file: PathBuf,
-    pub options: UrdfOptions,
-    pub dofs: Vec<DofSettings>,
+#[allow(clippy::large_enum_variant, reason = "each is the inside of one Python object")]
+pub enum Source {
+    /// A file. Its shapes are read when it is added to a world.
+    File { file: PathBuf, options: UrdfOptions, dofs: Vec<DofSettings> },
+    /// A body made by a program.
+    Built(Box<ArticulatedBody>),
 }
 
 /// The state of a description.
@@ -70,7 +72,17 @@ impl Which {
 impl Source {
     /// Returns the body with its shapes, and notes about its files.
     pub fn body(&self) -> Result<(ArticulatedBody, Vec<String>)> {
-        caught(|| Ok(urdf::load(&self.file, &self.options)?))
+        match self {
+            Source::File { file, options, .. } => caught(|| Ok(urdf::load(file, options)?)),
+            Source::Built(body) => Ok((body.as_ref().clone(), Vec::new())),
+        }
+    }
+
+    fn dofs(&self) -> &[DofSettings] {
+        match self {
+            Source::File { dofs, .. } => dofs,
+            Source::Built(body) => body.dofs(),
+        }
     }
 }
 
@@ -143,7 +155,7 @@ impl Binding {
     /// Returns the settings of its degrees of freedom.
     pub fn dofs(&self) -> Result<Vec<DofSettings>> {
         match self {
-            Binding::Free { source, .. } => Ok(source.dofs.clone()),
+            Binding::Free { source, .. } => Ok(source.dofs().to_vec()),
             Binding::Placed(place) => {
                 place.read(|inner| Some(inner.world.get::<ArticulatedBody>(place.id)?.dofs().to_vec()))
             }

@@ -3,6 +3,7 @@
 use crate::errors::{Error, Result};
 use crate::objects::articulation::Articulation;
 use crate::objects::body::RigidBody;
+use crate::objects::joint::Joint;
 use crate::objects::place::{Found, Place, body_ids, by_name, found};
 use crate::world::gc::{Anchor, anchor};
 use crate::world::shared::Shared;
@@ -27,6 +28,7 @@ pub fn handle(py: Python<'_>, shared: &Arc<Shared>, found: Found) -> Result<Py<P
     let place = Place { shared: shared.clone(), id: found.id, name: found.name };
     Ok(match found.robot {
         Some(robot) => Py::new(py, Articulation::placed(py, place, robot)?)?.into_any(),
+        None if found.joint => Py::new(py, Joint::new(py, place)?)?.into_any(),
         None => Py::new(py, RigidBody::new(py, place)?)?.into_any(),
     })
 }
@@ -50,7 +52,7 @@ impl Bodies {
 
 /// Returns the handle of the rigid body of that name.
 pub fn rigid_body(py: Python<'_>, shared: &Arc<Shared>, name: &str) -> Result<RigidBody> {
-    let Found { id, name, robot } = shared.read(|inner| by_name(inner, name))?;
+    let Found { id, name, robot, .. } = shared.read(|inner| by_name(inner, name))?;
     match robot {
         None => RigidBody::new(py, Place { shared: shared.clone(), id, name }),
         Some(_) => Err(Error::Name(format!(
@@ -61,7 +63,7 @@ pub fn rigid_body(py: Python<'_>, shared: &Arc<Shared>, name: &str) -> Result<Ri
 
 /// Returns the handle of the articulated body of that name.
 pub fn articulation(py: Python<'_>, shared: &Arc<Shared>, name: &str) -> Result<Articulation> {
-    let Found { id, name, robot } = shared.read(|inner| by_name(inner, name))?;
+    let Found { id, name, robot, .. } = shared.read(|inner| by_name(inner, name))?;
     match robot {
         Some(robot) => Articulation::placed(py, Place { shared: shared.clone(), id, name }, robot),
         None => Err(Error::Name(format!(

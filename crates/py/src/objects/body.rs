@@ -1,17 +1,21 @@
 //! A rigid body of a world: a handle that reads from the world at each use.
 
-use crate::arrays::convert::{array, pose, quaternion, rotation, some, symmetric, vec3, vec3_or, vector};
+use crate::arrays::convert::{
+    Numbers, array, numbers, pose, quaternion, rotation, shown, some, symmetric, vec3, vec3_or, vector, whole_number,
+};
 use crate::choices::{MODES, meaning, word};
 use crate::errors::{Error, Result};
 use crate::objects::appearance;
 use crate::objects::description::alone;
 use crate::objects::place::{Place, hash};
 use crate::world::gc::{Anchor, anchor};
+use crate::world::{contacts, query};
 use numpy::{PyArray1, PyArray2};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
-use tumble::collide::{Pose, Vec3};
-use tumble::dynamics::{Mode, RigidBody as Rigid};
+use pyo3::types::PyTuple;
+use tumble::collide::{Mat3, Pose, Vec3};
+use tumble::dynamics::{LockedAxes, Mode, RigidBody as Rigid};
 
 /// A rigid body, or static geometry, of a world. Its frame is that of its shape, for a mesh that of
 /// its file. All vectors are in world axes.
@@ -35,20 +39,21 @@ impl RigidBody {
 
     /// Changes a constant. An invalid value changes nothing.
     fn change(&self, py: Python<'_>, set: impl FnOnce(&mut Rigid)) -> Result<()> {
-        self.place.write(py, |inner| {
-            let body = inner.world.get_mut::<Rigid>(self.place.id).ok_or_else(|| self.place.removed())?;
-            let mut changed = body.clone();
-            set(&mut changed);
-            changed.validate()?;
-            *body = changed;
-            Ok(())
-        })
+        self.place.write(py, |inner| Ok(inner.world.change_body(self.place.id, set)?))
+    }
+
+    /// Returns an error for static geometry.
+    fn with_mass(&self) -> Result<()> {
+        match self.constant(Rigid::is_fixed)? {
+            true => Err(Error::value(format!("'{}' has no mass: it was added as static", self.place.name))),
+            false => Ok(()),
+        }
     }
 
     fn set_motion(&self, py: Python<'_>, velocity: Option<Vec3>, angular: Option<Vec3>) -> Result<()> {
         let place = &self.place;
         place.write(py, |inner| {
-            let part_state = *inner.world.part_state(place.id, 0).ok_or_else(|| place.removed())?;
+            let part_state = inner.world.center_state(place.id).ok_or_else(|| place.removed())?;
             Ok(inner.world.set_velocity(
                 place.id,
                 velocity.unwrap_or(part_state.velocity),
@@ -66,6 +71,23 @@ impl RigidBody {
     }
 }
 
+/// Converts an inertia: a matrix or three moments.
+pub fn inertia(value: &Bound<'_, PyAny>) -> Result<Mat3> {
+    let Numbers { shape, data } = numbers(value, "inertia")?;
+    match shape.as_slice() {
+        [3] => Ok(Mat3::from_diagonal(&Vec3::from_column_slice(&data))),
+        [3, 3] => Ok(Mat3::from_row_slice(&data)),
+        _ => Err(Error::value(format!("inertia: expected shape (3, 3) or (3,), got {}", shown(&shape)))),
+    }
+}
+
+/// Converts names of axes.
+pub fn locked(names: &[String]) -> Result<LockedAxes> {
+    LockedAxes::of_names(names.iter().map(String::as_str)).map_err(|wrong| {
+        Error::value(format!("locked: `{wrong}` is not known; there are {}", LockedAxes::NAMES.join(", ")))
+    })
+}
+
 #[pymethods]
 impl RigidBody {
     /// Name, unique in its world.
@@ -80,16 +102,31 @@ impl RigidBody {
         self.place.shared.read(|inner| Ok(inner.world.status(self.place.id).is_some()))
     }
 
-    /// Mass, kg. Meaningless for static geometry.
+    /// Mass, kg, above 0. Meaningless for static geometry. Setting it keeps the velocity and changes
+    /// the inertia by the same factor.
     #[getter]
     fn mass(&self) -> Result<f64> {
         self.constant(Rigid::mass)
     }
 
-    /// Inertia about the center of mass, body axes, shape (3, 3), kg·m².
+    #[setter]
+    fn set_mass(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.with_mass()?;
+        self.place.write(py, |inner| Ok(inner.world.set_mass(self.place.id, value)?))
+    }
+
+    /// Inertia about the center of mass, body axes, shape (3, 3), kg·m². Setting it, also by three
+    /// moments, keeps the velocities.
     #[getter]
     fn inertia<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
         symmetric(py, &self.constant(|body| *body.inertia())?)
+    }
+
+    #[setter]
+    fn set_inertia(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.with_mass()?;
+        let inertia = inertia(value)?;
+        self.place.write(py, |inner| Ok(inner.world.set_inertia(self.place.id, inertia)?))
     }
 
     /// Position of the origin of its frame, shape (3,), meters: the center of a sphere, box,
@@ -105,16 +142,24 @@ impl RigidBody {
         self.set_place(py, |now| Pose::from_parts(position.into(), now.rotation))
     }
 
-    /// The center of mass in the body's frame, shape (3,), meters: zero except for meshes.
+    /// The center of mass in the body's frame, shape (3,), meters: zero except for meshes, unless it
+    /// is set. Setting it keeps the motion of the body; the inertia is then about the new center.
     #[getter]
     fn center_of_mass<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
         Ok(vector(py, &self.constant(Rigid::center_of_mass)?))
     }
 
+    #[setter]
+    fn set_center_of_mass(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.with_mass()?;
+        let center = vec3(value, "center_of_mass")?;
+        self.place.write(py, |inner| Ok(inner.world.set_center_of_mass(self.place.id, center)?))
+    }
+
     /// The center of mass in the world, shape (3,), meters.
     #[getter]
     fn world_center_of_mass<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
-        Ok(vector(py, &self.place.part_state(0)?.position()))
+        Ok(vector(py, &self.place.center_state()?.position()))
     }
 
     /// Orientation, body to world, unit quaternion (x, y, z, w), shape (4,). Setting it rotates the
@@ -133,7 +178,7 @@ impl RigidBody {
     /// Velocity of the center of mass, shape (3,), m/s.
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
-        Ok(vector(py, &self.place.part_state(0)?.velocity))
+        Ok(vector(py, &self.place.center_state()?.velocity))
     }
 
     #[setter]
@@ -144,7 +189,7 @@ impl RigidBody {
     /// Angular velocity, world axes, shape (3,), rad/s.
     #[getter]
     fn angular_velocity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
-        Ok(vector(py, &self.place.part_state(0)?.angular_velocity))
+        Ok(vector(py, &self.place.center_state()?.angular_velocity))
     }
 
     #[setter]
@@ -155,7 +200,7 @@ impl RigidBody {
     /// Acceleration of the center of mass at the last force evaluation, shape (3,), m/s².
     #[getter]
     fn acceleration<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
-        Ok(vector(py, &self.place.part_state(0)?.acceleration))
+        Ok(vector(py, &self.place.center_state()?.acceleration))
     }
 
     /// ``"dynamic"``, ``"kinematic"`` (moves at its prescribed velocity and pushes dynamic bodies)
@@ -207,6 +252,51 @@ impl RigidBody {
         self.place.write(py, |inner| Ok(inner.world.set_collidable(self.place.id, value)?))
     }
 
+    /// Collision group, 0 to 63. Two bodies collide if the group of each is in the mask of the other.
+    #[getter]
+    fn group(&self) -> Result<u32> {
+        self.constant(|body| body.group.bit().trailing_zeros())
+    }
+
+    #[setter]
+    fn set_group(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] value: u8) -> Result<()> {
+        let group = query::group(value)?;
+        self.change(py, |body| body.group = group)
+    }
+
+    /// Groups that it collides with, one bit each. May be set to a sequence of groups, or None for
+    /// all.
+    #[getter]
+    fn mask(&self) -> Result<u64> {
+        self.constant(|body| body.mask)
+    }
+
+    #[setter]
+    fn set_mask(&self, py: Python<'_>, value: Option<&Bound<'_, PyAny>>) -> Result<()> {
+        let mask = query::mask(value)?;
+        self.change(py, |body| body.mask = mask)
+    }
+
+    /// Whether it is a sensor: it has no contacts, and ``world.events`` reports the bodies that overlap
+    /// it at the end of a step.
+    #[getter]
+    fn sensor(&self) -> Result<bool> {
+        self.constant(|body| body.sensor)
+    }
+
+    #[setter]
+    fn set_sensor(&self, py: Python<'_>, value: bool) -> Result<()> {
+        self.change(py, |body| body.sensor = value)
+    }
+
+    /// The bodies in contact with it after the last step, or in it if it is a sensor: a list of
+    /// handles in the order of ``world.bodies``.
+    #[getter]
+    fn touching(&self, py: Python<'_>) -> Result<Vec<Py<PyAny>>> {
+        self.place.status()?;
+        contacts::touching(&self.place.shared, py, self.place.id)
+    }
+
     /// Coefficient of restitution, 0 to 1.
     #[getter]
     fn restitution(&self) -> Result<f64> {
@@ -244,7 +334,33 @@ impl RigidBody {
         self.change(py, |body| *body = appearance::colored(body.clone(), color))
     }
 
-    /// Linear damping, 1/s: a force of ``-damping · momentum``.
+    /// Factor of the world's gravity, 1 by default.
+    #[getter]
+    fn gravity_scale(&self) -> Result<f64> {
+        self.constant(|body| body.gravity_scale)
+    }
+
+    #[setter]
+    fn set_gravity_scale(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |body| body.gravity_scale = value)
+    }
+
+    /// Locked axes of the world: a tuple of ``"x"``, ``"y"``, ``"z"`` (the center of mass does not move
+    /// along them), ``"rotation_x"``, ``"rotation_y"``, ``"rotation_z"`` (the body does not turn about
+    /// them). Setting it clears the velocity along these axes.
+    #[getter]
+    fn locked<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyTuple>> {
+        Ok(PyTuple::new(py, self.constant(|body| body.locked.names().collect::<Vec<_>>())?)?)
+    }
+
+    #[setter]
+    fn set_locked(&self, py: Python<'_>, value: Vec<String>) -> Result<()> {
+        let axes = locked(&value)?;
+        self.change(py, |body| body.locked = axes)
+    }
+
+    /// Linear damping, 1/s, at least 0: a force of ``-damping · momentum``. Without other forces the
+    /// velocity decays by ``exp(-damping · t)``.
     #[getter]
     fn linear_damping(&self) -> Result<f64> {
         self.constant(|body| body.linear_damping)
@@ -255,7 +371,7 @@ impl RigidBody {
         self.change(py, |body| body.linear_damping = value)
     }
 
-    /// Angular damping, 1/s: a torque of ``-damping · angular momentum``.
+    /// Angular damping, 1/s, at least 0: a torque of ``-damping · angular momentum``.
     #[getter]
     fn angular_damping(&self) -> Result<f64> {
         self.constant(|body| body.angular_damping)
@@ -273,7 +389,7 @@ impl RigidBody {
         let (force, point) = (vec3(force, "force")?, point.map(|p| vec3(p, "point")).transpose()?);
         self.place.write(py, |inner| {
             let at = point
-                .unwrap_or(inner.world.part_state(self.place.id, 0).ok_or_else(|| self.place.removed())?.position());
+                .unwrap_or(inner.world.center_state(self.place.id).ok_or_else(|| self.place.removed())?.position());
             Ok(inner.world.apply_force(self.place.id, 0, force, &at)?)
         })
     }
@@ -296,7 +412,7 @@ impl RigidBody {
         let (impulse, point) = (vec3(impulse, "impulse")?, point.map(|p| vec3(p, "point")).transpose()?);
         self.place.write(py, |inner| {
             let at = point
-                .unwrap_or(inner.world.part_state(self.place.id, 0).ok_or_else(|| self.place.removed())?.position());
+                .unwrap_or(inner.world.center_state(self.place.id).ok_or_else(|| self.place.removed())?.position());
             Ok(inner.world.apply_impulse(self.place.id, 0, impulse, &at)?)
         })
     }

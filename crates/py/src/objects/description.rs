@@ -1,13 +1,16 @@
 //! Descriptions of articulated bodies from paths and pickles.
 
 use crate::arrays::convert::{array, path};
-use crate::errors::{Error, Result};
+use crate::errors::{Error, Result, caught};
 use crate::objects::articulation::Articulation;
 use crate::objects::binding::{Binding, Now, Which, locked};
+use crate::objects::builder::ArticulationBuilder;
 use crate::objects::robot::Robot;
 use crate::pool;
+use crate::world::pickling::read_body;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use tumble::collide::{Pose, Vec3};
@@ -59,6 +62,20 @@ pub fn _unpickle_articulation(
     let file = file.into_pyobject(py)?.into_any();
     let [missing, collision] = words;
     let description = Articulation::from_urdf(py, &file, floating, Some(packages), &missing, &collision)?;
+    with_numbers(py, description, numbers)
+}
+
+/// Unpickles a description of a body made by a program.
+#[pyfunction]
+pub fn _unpickle_built_articulation(
+    py: Python<'_>,
+    data: PyBackedBytes,
+    numbers: [Vec<f64>; 4],
+) -> Result<Articulation> {
+    with_numbers(py, Articulation::described(caught(|| read_body(&data))?), numbers)
+}
+
+fn with_numbers(py: Python<'_>, description: Articulation, numbers: [Vec<f64>; 4]) -> Result<Articulation> {
     let [gravity, q, qd, tau] = numbers.map(|row| array(py, &row).into_any());
     description.set_gravity(&gravity)?;
     for (which, row) in [(Which::Q, q), (Which::Qd, qd), (Which::Tau, tau)] {
@@ -75,10 +92,13 @@ pub fn alone(name: &str) -> Error {
     .into()
 }
 
-/// Returns the description of a URDF, from a path.
+/// Returns a description, also of a builder or of the path of a URDF.
 pub fn described<'py>(value: &Bound<'py, PyAny>) -> Result<Bound<'py, Articulation>> {
     if let Ok(own) = value.cast::<Articulation>() {
         return Ok(own.clone());
+    }
+    if let Ok(builder) = value.cast::<ArticulationBuilder>() {
+        return Ok(Bound::new(value.py(), builder.get().description()?)?);
     }
     path(value)?;
     Ok(Bound::new(value.py(), Articulation::from_urdf(value.py(), value, false, None, "error", "exact")?)?)

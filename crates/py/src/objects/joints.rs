@@ -10,6 +10,7 @@ use crate::objects::robot::Rows;
 use crate::world::inner::Inner;
 use numpy::{IxDyn, PyArray1, PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use tumble::collide::Vec3;
 use tumble::dynamics::Drive;
 
@@ -105,4 +106,19 @@ pub fn drive(target: Option<f64>, velocity: Option<f64>, stiffness: f64, damping
             limit,
         },
     })
+}
+
+/// Returns the drive of a dict with the arguments of ``set_drive``.
+pub fn drive_of(given: &Bound<'_, PyDict>) -> Result<Drive> {
+    const KEYS: [&str; 5] = ["target", "velocity", "stiffness", "damping", "max_force"];
+    let mut values = [None; 5];
+    for (key, value) in given {
+        let key: String = key.extract()?;
+        let Some(index) = KEYS.iter().position(|known| *known == key) else {
+            return Err(Error::value(format!("drive: `{key}` is not known; there are {}", KEYS.join(", "))));
+        };
+        values[index] = value.extract()?;
+    }
+    let [target, velocity, stiffness, damping, max_force] = values;
+    drive(target, velocity, stiffness.unwrap_or(0.0), damping.unwrap_or(0.0), max_force.unwrap_or(f64::INFINITY))
 }

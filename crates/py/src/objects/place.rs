@@ -7,7 +7,7 @@ use crate::world::shared::Shared;
 use pyo3::prelude::*;
 use std::sync::Arc;
 use tumble::collide::Pose;
-use tumble::dynamics::{ArticulatedBody, ObjectId, PartState, RigidBody as Rigid, Status, World as Core};
+use tumble::dynamics::{ArticulatedBody, LoopJoint, ObjectId, PartState, RigidBody as Rigid, Status, World as Core};
 
 /// The target of a handle: a world, an object of it, and the name it had.
 #[derive(Clone)]
@@ -49,6 +49,11 @@ impl Place {
         self.read(|inner| inner.world.part_state(self.id, part).copied())
     }
 
+    /// Returns the state of a rigid body at its center of mass.
+    pub fn center_state(&self) -> Result<PartState> {
+        self.read(|inner| inner.world.center_state(self.id))
+    }
+
     /// Returns the pose of a rigid body's frame.
     pub fn pose(&self) -> Result<Pose> {
         self.read(|inner| inner.world.pose(self.id, 0))
@@ -76,12 +81,15 @@ pub struct Found {
     pub name: Arc<str>,
     /// The model of an articulated body.
     pub robot: Option<Arc<Robot>>,
+    /// Whether it is a joint.
+    pub joint: bool,
 }
 
 /// Returns what a handle of the object is made from.
 pub fn found(inner: &Inner, id: ObjectId) -> Option<Found> {
     let name = inner.world.name(id)?.into();
-    Some(Found { id, name, robot: inner.robots.get(&id).cloned() })
+    let joint = inner.world.get::<LoopJoint>(id).is_some();
+    Some(Found { id, name, robot: inner.robots.get(&id).cloned(), joint })
 }
 
 /// Returns the ids of all bodies, in the order of addition.

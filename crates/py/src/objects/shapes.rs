@@ -1,6 +1,6 @@
 //! Collision shapes. Sizes are full sizes: edge lengths, and lengths without caps.
 
-use crate::arrays::convert::{number, numbers, path, shown, some, vec3_or};
+use crate::arrays::convert::{number, numbers, path, rotation, shown, some, vec3, vec3_or};
 use crate::errors::{Error, Result, caught};
 use crate::io::slow;
 use crate::pool;
@@ -10,11 +10,11 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::PyClass;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use tumble::collide::{Pose, Quat, Shape as Solid, TreeCache, TreeSettings, TriMesh, Vec3};
+use tumble::collide::{CompoundPart, Pose, Quat, Shape as Solid, TreeCache, TreeSettings, TriMesh, Vec3};
 use tumble::scene::{building_surface, read_solid};
 
-/// A collision shape. The classes ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``HalfSpace`` and
-/// ``Mesh`` make one.
+/// A collision shape. The classes ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``HalfSpace``,
+/// ``Mesh`` and ``Compound`` make one.
 #[pyclass(frozen, subclass, module = "tumble")]
 pub struct Shape {
     /// In its own frame.
@@ -41,6 +41,7 @@ impl Shape {
             Solid::Cylinder(_) => Py::new(py, shape.into_a(Cylinder))?.into_any(),
             Solid::HalfSpace => Py::new(py, shape.into_a(HalfSpace))?.into_any(),
             Solid::Mesh(_) => Py::new(py, shape.into_a(Mesh))?.into_any(),
+            Solid::Compound(_) => Py::new(py, shape.into_a(Compound))?.into_any(),
         })
     }
 
@@ -232,6 +233,53 @@ impl Mesh {
         let flat: Vec<u32> = mesh.mesh().triangles.iter().flatten().copied().collect();
         Ok(PyArray1::from_vec(slf.py(), flat).reshape([mesh.mesh().triangles.len(), 3])?)
     }
+}
+
+/// Several shapes of one body.
+///
+/// parts: tuples ``(shape, position)``, ``(shape, position, orientation)`` or ``(shape, position,
+/// orientation, density)``: position of the shape's origin, meters; orientation: quaternion
+/// (x, y, z, w) or None; density: kg/m³, for all parts or for none. A body made without mass and
+/// density has these densities. Parts may overlap; mass and volume of an overlap then count for
+/// each. The frame of its body is that of the positions.
+#[pyclass(frozen, extends = Shape, module = "tumble")]
+pub struct Compound;
+
+#[pymethods]
+impl Compound {
+    #[new]
+    fn new(parts: Vec<Bound<'_, PyAny>>) -> Result<PyClassInitializer<Compound>> {
+        let count = parts.len();
+        let parts = parts.iter().enumerate().map(|(n, part)| compound_part(n, part)).collect::<Result<_>>()?;
+        Ok(Shape::new(Solid::compound(parts)?, format!("Compound({count} parts)")).into_a(Compound))
+    }
+
+    /// The center of mass in the frame of the parts, shape (3,), meters.
+    #[getter]
+    fn center_of_mass<'py>(slf: &Bound<'py, Self>) -> Result<Bound<'py, PyArray1<f64>>> {
+        let base: PyRef<'py, Shape> = slf.clone().into_any().extract().map_err(PyErr::from)?;
+        Ok(crate::arrays::convert::vector(slf.py(), &base.solid.center_of_mass()))
+    }
+}
+
+fn compound_part(n: usize, part: &Bound<'_, PyAny>) -> Result<CompoundPart> {
+    let wrong = || {
+        let expected =
+            "expected (shape, position), (shape, position, orientation) or (shape, position, orientation, density)";
+        Error::value(format!("part {n} of a compound: {expected}"))
+    };
+    let fields: Vec<Bound<'_, PyAny>> = part.extract().map_err(|_| wrong())?;
+    let [shape, position, rest @ ..] = fields.as_slice() else { return Err(wrong()) };
+    if rest.len() > 2 {
+        return Err(wrong());
+    }
+    let shape: PyRef<'_, Shape> = shape.extract().map_err(|_| wrong())?;
+    let given = |k: usize| rest.get(k).filter(|value| !value.is_none());
+    let turn = given(0).map_or(Ok(Quat::identity()), |q| rotation(q, "orientation"))?;
+    let density =
+        given(1).map(|density| number(density.extract::<f64>().map_err(|_| wrong())?, "density")).transpose()?;
+    let pose = Pose::from_parts(vec3(position, "position")?.into(), turn);
+    Ok(CompoundPart { shape: shape.solid.clone(), pose, density })
 }
 
 /// Returns triangles from arrays, from an object that has them (trimesh), or from a file.

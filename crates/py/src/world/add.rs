@@ -48,12 +48,15 @@ pub fn named_shape<'py>(
     Ok((name, shape.extract()?))
 }
 
-/// Returns a body with a mass or a density; without both it has the default density, or no mass if it is kinematic.
+/// Returns a body with a mass or a density; without both it has the densities of the parts of a compound, the default density, or no mass if it is kinematic.
 pub fn rigid(name: &str, shape: &Shape, mass: Option<f64>, density: Option<f64>, kinematic: bool) -> Result<Rigid> {
     let body = Rigid::fixed(shape.solid.clone()).with_name(name);
     match (mass, density) {
         (Some(mass), None) => Ok(body.with_mass(mass)),
-        (None, density) if !kinematic => Ok(body.with_density(density.unwrap_or(Rigid::DEFAULT_DENSITY))),
+        (None, density) if !kinematic => {
+            let own = || shape.solid.own_density().unwrap_or(Rigid::DEFAULT_DENSITY);
+            Ok(body.with_density(density.unwrap_or_else(own)))
+        }
         (None, Some(density)) => Ok(body.with_density(density)),
         (None, None) => Ok(body),
         (Some(_), Some(_)) => Err(Error::value(format!("body '{name}': expected a mass or a density, not both"))),

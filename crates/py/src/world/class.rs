@@ -10,13 +10,16 @@ use crate::io::slow;
 use crate::objects::articulation::Articulation;
 use crate::objects::bodies;
 use crate::objects::bodies::{Bodies, handle, place_of};
-use crate::objects::body::RigidBody;
+use crate::objects::body::{self, RigidBody};
+use crate::objects::joint::Joint;
 use crate::objects::place::{body_ids, by_name};
 use crate::objects::shapes::Shape;
 use crate::pool;
 use crate::world::add::{add, articulated, named_shape, own_place, rigid};
+use crate::world::bulk::{self, Bulk};
 use crate::world::gc::{Anchor, anchor};
 use crate::world::inner::Inner;
+use crate::world::joints;
 use crate::world::load::{Choices, build};
 use crate::world::pairs::{self, combine};
 use crate::world::query::{self, Selection};
@@ -24,11 +27,11 @@ use crate::world::report::StepReport;
 use crate::world::rollout::Plan;
 use crate::world::shared::Shared;
 use crate::world::{contacts, pickling, snapshot};
-use numpy::{PyArray1, PyArray3, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyDict};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
@@ -49,7 +52,8 @@ use tumble::scene::{SceneFile, resolve_scene};
 /// combine_restitution, combine_friction: rule for the coefficients of a pair, ``"min"``,
 /// ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``. threads: threads of a step, 0 for
 /// as many as cores; no number changes the result. budget: largest work of a step in block
-/// relaxations, None for no bound. Names and defaults are those of scene files.
+/// relaxations, None for no bound. event_impulse: N·s, see ``events``. Names and defaults are those
+/// of scene files.
 ///
 /// One thread at a time: while one thread steps a world, calls on it from another raise
 /// ``BusyError``. The interpreter is released while a world steps.
@@ -80,16 +84,27 @@ impl World {
     }
 }
 
+impl World {
+    fn bulk<'py>(&self, py: Python<'py>, bulk: Bulk) -> Result<Bound<'py, PyArray2<f64>>> {
+        bulk::array(py, bulk, self.shared.read(|inner| bulk::get(inner, bulk))?)
+    }
+
+    fn set_bulk(&self, py: Python<'_>, bulk: Bulk, value: &Bound<'_, PyAny>) -> Result<()> {
+        let rows = bulk::rows(bulk, value)?;
+        self.shared.write(py, |inner| bulk::set(inner, bulk, rows))
+    }
+}
+
 #[pymethods]
 impl World {
     #[new]
     #[pyo3(
         text_signature = "(gravity=(0.0, 0.0, -9.81), dt=0.004166666666666667, stepper='time_stepping', integrator='verlet', \
         solver='gauss_seidel', *, substeps=1, iterations=200, contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, \
-        combine_restitution='max', combine_friction='geometric_mean', threads=1, budget=None)"
+        combine_restitution='max', combine_friction='geometric_mean', threads=1, budget=None, event_impulse=0.0)"
     )]
     #[pyo3(signature = (gravity=None, dt=0.004166666666666667, stepper="time_stepping", integrator="verlet", solver="gauss_seidel", *, substeps=1, iterations=200,
-        contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, combine_restitution="max", combine_friction="geometric_mean", threads=1, budget=None))]
+        contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, combine_restitution="max", combine_friction="geometric_mean", threads=1, budget=None, event_impulse=0.0))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
         py: Python<'_>,
@@ -108,6 +123,7 @@ impl World {
         combine_friction: &str,
         #[pyo3(from_py_with = whole_number)] threads: u32,
         budget: Option<u32>,
+        event_impulse: f64,
     ) -> Result<World> {
         let mut scene = SceneFile::parse("", "World")?;
         let world = &mut scene.world;
@@ -117,6 +133,7 @@ impl World {
         (world.substeps, world.iterations) = (substeps, iterations);
         (world.contact_tolerance_m, world.integrator_tolerance) = (contact_tolerance, integrator_tolerance);
         (world.sleep_after_s, world.sleep_within_m) = (sleep_after, sleep_within);
+        world.event_impulse_n_s = event_impulse;
         world.combine_restitution = combine(combine_restitution, "combine_restitution")?;
         world.combine_friction = combine(combine_friction, "combine_friction")?;
         World::of(py, build(scene)?)
@@ -278,13 +295,13 @@ impl World {
     }
 
     /// Sets restitution and friction of the contacts of two bodies from the next step on,
-    /// overriding the combination rules.
+    /// overriding the combination rules, and whether they collide at all.
     ///
     /// a, b: handles or names in any order; ``"ARTICULATION/LINK"`` is a link of an articulation
-    /// with the links fixed to it. None keeps the rule; without both the pair has no constants of
-    /// its own any more. Forks have the same pairs. ``save`` does not include them, as it does not
+    /// with the links fixed to it. None keeps the rule; without all the pair has no constants of
+    /// its own any more. collides: False ignores the pair; True does not override groups and masks. Forks have the same pairs. ``save`` does not include them, as it does not
     /// include materials.
-    #[pyo3(signature = (a, b, *, restitution=None, friction=None))]
+    #[pyo3(signature = (a, b, *, restitution=None, friction=None, collides=None))]
     fn set_pair_material(
         &self,
         py: Python<'_>,
@@ -292,8 +309,9 @@ impl World {
         b: &Bound<'_, PyAny>,
         restitution: Option<f64>,
         friction: Option<f64>,
+        collides: Option<bool>,
     ) -> Result<()> {
-        pairs::set(&self.shared, py, [a, b], PairMaterial { restitution, friction })
+        pairs::set(&self.shared, py, [a, b], PairMaterial { restitution, friction, collides })
     }
 
     /// Returns restitution and friction of the contacts of two bodies: the pair's own constants if
@@ -340,6 +358,17 @@ impl World {
         bodies::articulation(py, &self.shared, name)
     }
 
+    /// All joints made by ``add_joint`` or ``[[loop_joint]]``, in the order in which they were added.
+    #[getter]
+    fn joints(&self, py: Python<'_>) -> Result<Vec<Joint>> {
+        joints::all(&self.shared, py)
+    }
+
+    /// Returns the joint of that name, made by ``add_joint`` or ``[[loop_joint]]``.
+    fn joint(&self, py: Python<'_>, name: &str) -> Result<Joint> {
+        Joint::new(py, joints::place_by_name(&self.shared, name)?)
+    }
+
     /// ``world[name]``: the body of that name, a ``RigidBody`` or an ``Articulation``.
     fn __getitem__(&self, py: Python<'_>, name: &str) -> Result<Py<PyAny>> {
         handle(py, &self.shared, self.shared.read(|inner| by_name(inner, name))?)
@@ -358,6 +387,82 @@ impl World {
         contacts::array(py, self.shared.read(|inner| Ok(contacts::bytes(inner)))?)
     }
 
+    /// Positions of all bodies, as ``body.position``, in the order of ``bodies``: a copy of shape
+    /// (n, 3), m; for an articulation that of its first link. Setting it moves the rigid bodies whose
+    /// rows change and keeps their velocities; rows of articulations must stay as they are.
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
+        self.bulk(py, Bulk::Positions)
+    }
+
+    #[setter]
+    fn set_positions(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.set_bulk(py, Bulk::Positions, value)
+    }
+
+    /// Orientations of all bodies, quaternions (x, y, z, w), shape (n, 4); otherwise as ``positions``.
+    #[getter]
+    fn orientations<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
+        self.bulk(py, Bulk::Orientations)
+    }
+
+    #[setter]
+    fn set_orientations(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.set_bulk(py, Bulk::Orientations, value)
+    }
+
+    /// Velocities of the centers of mass of all bodies, for an articulation of the origin of its first
+    /// link, shape (n, 3), m/s; otherwise as ``positions``.
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
+        self.bulk(py, Bulk::Velocities)
+    }
+
+    #[setter]
+    fn set_velocities(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.set_bulk(py, Bulk::Velocities, value)
+    }
+
+    /// Angular velocities of all bodies, world axes, shape (n, 3), rad/s; otherwise as ``positions``.
+    #[getter]
+    fn angular_velocities<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
+        self.bulk(py, Bulk::AngularVelocities)
+    }
+
+    #[setter]
+    fn set_angular_velocities(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.set_bulk(py, Bulk::AngularVelocities, value)
+    }
+
+    /// The events of the last step, a list of ``Event`` tuples: ``kind``, ``a``, ``b``, ``parts``,
+    /// ``impulse``, ``point``.
+    ///
+    /// kind: ``"contact_begin"``, ``"contact_persist"`` (in contact in the step before too),
+    /// ``"contact_end"``, ``"sensor_begin"``, ``"sensor_end"``, ``"asleep"``, ``"awake"``, ``"joint_broken"``. a, b: handles
+    /// of the bodies, the sensor first, or the joint; b is None for sleep and joints. parts: the touched links, as in
+    /// ``contacts``. impulse: on ``a`` over the step, shape (3,), N·s; point: where the largest one
+    /// acts, shape (3,), m; both zero for all but contacts that begin or persist. World axes.
+    ///
+    /// Two bodies are in contact in a step if their surfaces touch or an impulse acts between them, of
+    /// at least ``event_impulse`` of the world. Of ``step(n)`` the last step counts. Pairs in contact
+    /// are part of ``save``; a restored world has no events before its next step.
+    #[getter]
+    fn events(&self, py: Python<'_>) -> Result<Vec<Py<PyAny>>> {
+        contacts::events(&self.shared, py)
+    }
+
+    /// Smallest impulse of a pair in a step with which it counts as in contact, N·s, at least 0:
+    /// weaker contacts make no ``events``.
+    #[getter]
+    fn event_impulse(&self) -> Result<f64> {
+        self.settings(|s| s.event_impulse)
+    }
+
+    #[setter]
+    fn set_event_impulse(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.set(py, |s| s.event_impulse = value)
+    }
+
     /// Returns where rays enter bodies: a structured array with one row per ray.
     ///
     /// origins, directions: shape (3,) or (n, 3), m; directions of any length above 0. One of either
@@ -369,8 +474,8 @@ impl World {
     /// -z end and +z end of a cylinder, else 0; ``normal`` (3,), unit, outward, world axes.
     ///
     /// A ray that starts inside a convex shape does not meet that shape; a mesh is hit on its outside
-    /// only. group, mask, ignore: the query has a collision group (0 to 63) and a mask (one bit per
-    /// group, None for all) like a body, and does not find the ignored bodies (a handle, a name or a
+    /// only. group, mask, ignore: the query has a collision group (0 to 63) and a mask (the
+    /// groups that it finds, as bits of an integer or a sequence; None for all) like a body, and does not find the ignored bodies (a handle, a name or a
     /// list of them). Sensors are not found. Runs on ``threads`` threads, which change no bit.
     #[pyo3(signature = (origins, directions, max_distance=None, *, group=0, mask=None, ignore=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
@@ -381,7 +486,7 @@ impl World {
         directions: &Bound<'_, PyAny>,
         max_distance: Option<&Bound<'_, PyAny>>,
         #[pyo3(from_py_with = whole_number)] group: u8,
-        mask: Option<u64>,
+        mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
     ) -> Result<Bound<'py, PyAny>> {
         query::cast_rays(&self.shared, py, origins, directions, max_distance, &Selection { group, mask, ignore })
@@ -405,7 +510,7 @@ impl World {
         position: Option<&Bound<'_, PyAny>>,
         orientation: Option<&Bound<'_, PyAny>>,
         #[pyo3(from_py_with = whole_number)] group: u8,
-        mask: Option<u64>,
+        mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
     ) -> Result<Option<Bound<'py, PyAny>>> {
         let (at, selection) = ((position, orientation), Selection { group, mask, ignore });
@@ -425,7 +530,7 @@ impl World {
         position: Option<&Bound<'_, PyAny>>,
         orientation: Option<&Bound<'_, PyAny>>,
         #[pyo3(from_py_with = whole_number)] group: u8,
-        mask: Option<u64>,
+        mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
     ) -> Result<Bound<'py, PyAny>> {
         query::overlaps(&self.shared, py, &shape, (position, orientation), &Selection { group, mask, ignore })
@@ -448,7 +553,7 @@ impl World {
         position: Option<&Bound<'_, PyAny>>,
         orientation: Option<&Bound<'_, PyAny>>,
         #[pyo3(from_py_with = whole_number)] group: u8,
-        mask: Option<u64>,
+        mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
     ) -> Result<Option<Bound<'py, PyAny>>> {
         query::closest_points(&self.shared, py, a, b, (position, orientation), &Selection { group, mask, ignore })
@@ -463,7 +568,7 @@ impl World {
         py: Python<'py>,
         point: &Bound<'_, PyAny>,
         #[pyo3(from_py_with = whole_number)] group: u8,
-        mask: Option<u64>,
+        mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
     ) -> Result<Bound<'py, PyArray1<i64>>> {
         query::contains(&self.shared, py, point, &Selection { group, mask, ignore })
@@ -482,7 +587,7 @@ impl World {
         py: Python<'py>,
         points: &Bound<'_, PyAny>,
         #[pyo3(from_py_with = whole_number)] group: u8,
-        mask: Option<u64>,
+        mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
     ) -> Result<Bound<'py, PyAny>> {
         query::point_depth(&self.shared, py, points, &Selection { group, mask, ignore })
@@ -617,9 +722,14 @@ impl World {
     /// file's, meters. orientation: unit quaternion (x, y, z, w). velocity, m/s, and
     /// angular_velocity, rad/s: world axes. restitution: 0 to 1. friction: at least 0. kinematic:
     /// moves at its prescribed velocity. contacts: contact mode, ``"surface"``, or ``"spheres"``
-    /// for the spheres of its tree as in the thesis; a pair uses spheres if either body does.
+    /// for the spheres of its tree as in the thesis; a pair uses spheres if either body does. group, mask:
+    /// collision group, 0 to 63, and the groups that it collides with, as bits of an integer or a
+    /// sequence, None for all; two bodies collide if the group of each is in the mask of the other.
+    /// sensor: no contacts; ``events`` reports the bodies that overlap it. inertia: about the center of
+    /// mass, shape (3, 3) or (3,), kg·m², by default that of a uniform body; center_of_mass: in the
+    /// frame of the shape, shape (3,), m; gravity_scale, locked: as the properties of a body.
     #[pyo3(signature = (name=None, shape=None, mass=None, density=None, position=None, orientation=None, velocity=None, angular_velocity=None, restitution=0.0,
-        friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface"))]
+        friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface", group=0, mask=None, sensor=false, inertia=None, center_of_mass=None, gravity_scale=1.0, locked=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_rigid(
         &self,
@@ -639,6 +749,13 @@ impl World {
         kinematic: bool,
         collidable: bool,
         contacts: &str,
+        #[pyo3(from_py_with = whole_number)] group: u8,
+        mask: Option<&Bound<'_, PyAny>>,
+        sensor: bool,
+        inertia: Option<&Bound<'_, PyAny>>,
+        center_of_mass: Option<&Bound<'_, PyAny>>,
+        gravity_scale: f64,
+        locked: Option<Vec<String>>,
     ) -> Result<RigidBody> {
         let (name, shape) = named_shape(name, shape)?;
         let mode = if kinematic { Mode::Kinematic } else { Mode::Dynamic };
@@ -651,12 +768,26 @@ impl World {
             .with_material(Material { restitution, friction, ..Material::default() });
         (body.linear_damping, body.angular_damping, body.contact_mode) =
             (linear_damping, angular_damping, meaning("contacts", contacts, ContactMode::NAMES)?);
+        let mut body = body
+            .with_groups(query::group(group)?, query::mask(mask)?)
+            .with_sensor(sensor)
+            .with_gravity_scale(gravity_scale)
+            .with_locked(body::locked(&locked.unwrap_or_default())?);
+        if let Some(inertia) = inertia {
+            if body.is_fixed() {
+                return Err(Error::value("inertia: expected a mass or a density with it"));
+            }
+            body = body.with_inertia(body::inertia(inertia)?);
+        }
+        if let Some(center) = center_of_mass {
+            body = body.with_center_of_mass(vec3(center, "center_of_mass")?);
+        }
         add(&self.shared, py, body.with_velocity(motion[0]).with_angular_velocity(motion[1]), mode, collidable)
     }
 
-    /// Adds geometry that never moves. name, position, orientation, restitution, friction, contacts: as
-    /// in ``add_rigid``.
-    #[pyo3(signature = (name=None, shape=None, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true, contacts="surface"))]
+    /// Adds geometry that never moves. name, position, orientation, restitution, friction, contacts,
+    /// group, mask, sensor: as in ``add_rigid``.
+    #[pyo3(signature = (name=None, shape=None, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true, contacts="surface", group=0, mask=None, sensor=false))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_static(
         &self,
@@ -669,6 +800,9 @@ impl World {
         friction: f64,
         collidable: bool,
         contacts: &str,
+        #[pyo3(from_py_with = whole_number)] group: u8,
+        mask: Option<&Bound<'_, PyAny>>,
+        sensor: bool,
     ) -> Result<RigidBody> {
         let (name, shape) = named_shape(name, shape)?;
         let pose = pose(position, orientation)? * shape.placement;
@@ -676,13 +810,15 @@ impl World {
             .with_name(name)
             .with_pose(pose)
             .with_material(Material { restitution, friction, ..Material::default() })
-            .with_contact_mode(meaning("contacts", contacts, ContactMode::NAMES)?);
+            .with_contact_mode(meaning("contacts", contacts, ContactMode::NAMES)?)
+            .with_groups(query::group(group)?, query::mask(mask)?)
+            .with_sensor(sensor);
         add(&self.shared, py, body, Mode::Static, collidable)
     }
 
     /// Adds an articulated body and returns its handle.
     ///
-    /// articulation: a description, or the path of a URDF. base: pose of its base: a position (3,),
+    /// articulation: a description, a builder, or the path of a URDF. base: pose of its base: a position (3,),
     /// or position and quaternion (7,), meters and (x, y, z, w). name: by default the
     /// description's. It starts with the ``q``, ``qd`` and ``tau`` of the description; the pose of
     /// a floating root is relative to the base.
@@ -697,15 +833,98 @@ impl World {
         articulated(&self.shared, py, articulation, base, name)
     }
 
-    /// Removes a body, given as a handle or by name, or a force or behavior by name. Handles of a
-    /// removed body raise ``RemovedError``.
+    /// Joins two bodies, or a body and the world, in their present poses, and returns the joint.
+    ///
+    /// kind: ``"fixed"``, ``"revolute"`` (turns about the axis), ``"prismatic"`` (slides along it),
+    /// ``"spherical"``, ``"cylindrical"`` (both turns and slides), ``"universal"`` (turns about the axis,
+    /// which is fixed to a, and second_axis, fixed to b), ``"planar"`` (slides across the axis and turns
+    /// about it), ``"distance"``, ``"rope"`` (at most a length), ``"spring"``, ``"gear"``, ``"rack"``, ``"screw"`` or ``"pulley"``. a, b: handles or names;
+    /// a link is ``"ARTICULATION/LINK"`` or ``(articulation, "LINK")``; None is the world.
+    ///
+    /// point: shape (3,), m, by default the center of mass of a, or the origin of a link; second_point:
+    /// the end on b of a distance, rope or spring, by default likewise of b. axis: shape (3,), any length
+    /// above 0. length: of a distance, rope or spring, m, by default the present one.
+    ///
+    /// teeth: of the gears a and b, negative for inner teeth; they turn about axis and second_axis, which
+    /// do not move in the world. radius, m: a rack b moves along second_axis by it per radian of a
+    /// about axis. pitch, m: displacement of a screw per turn. ground: the points of the world over which the rope of
+    /// a pulley runs, shape (2, 3), m; ratio: the weight of b's side in its length.
+    ///
+    /// limits: (lower, upper) of the position, rad or m. drive: a dict with the arguments of
+    /// ``Joint.set_drive``. stiffness, rest: a spring along the position, N·m/rad or N/m, and rad or m.
+    /// damping: N·m·s/rad or N·s/m. friction: N·m or N. breaking_force, N, and breaking_torque about the
+    /// point, N·m: above one of them the joint breaks; ``events`` has a ``"joint_broken"`` then. The
+    /// bodies still collide with each other: ``set_pair_material(a, b, collides=False)``. Points and axes
+    /// are in the world.
+    #[pyo3(signature = (kind, a, b=None, point=None, axis=None, limits=None, drive=None, breaking_force=None, *, name="", second_point=None,
+        second_axis=None, length=None, stiffness=0.0, rest=None, damping=0.0, friction=0.0, breaking_torque=None, teeth=None, radius=None, pitch=None, ratio=1.0, ground=None))]
+    #[pyo3(
+        text_signature = "($self, kind, a, b=None, point=None, axis=(0.0, 0.0, 1.0), limits=None, drive=None, breaking_force=None, *, name='', \
+        second_point=None, second_axis=None, length=None, stiffness=0.0, rest=None, damping=0.0, friction=0.0, breaking_torque=None, teeth=None, radius=None, \
+        pitch=None, ratio=1.0, ground=None)"
+    )]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn add_joint(
+        &self,
+        py: Python<'_>,
+        kind: &str,
+        a: Option<&Bound<'_, PyAny>>,
+        b: Option<&Bound<'_, PyAny>>,
+        point: Option<&Bound<'_, PyAny>>,
+        axis: Option<&Bound<'_, PyAny>>,
+        limits: Option<&Bound<'_, PyAny>>,
+        drive: Option<&Bound<'_, PyDict>>,
+        breaking_force: Option<f64>,
+        name: &str,
+        second_point: Option<&Bound<'_, PyAny>>,
+        second_axis: Option<&Bound<'_, PyAny>>,
+        length: Option<f64>,
+        stiffness: f64,
+        rest: Option<f64>,
+        damping: f64,
+        friction: f64,
+        breaking_torque: Option<f64>,
+        teeth: Option<[i32; 2]>,
+        radius: Option<f64>,
+        pitch: Option<f64>,
+        ratio: f64,
+        ground: Option<&Bound<'_, PyAny>>,
+    ) -> Result<Joint> {
+        let given = joints::Arguments {
+            kind,
+            sides: [a, b],
+            points: [point, second_point],
+            axes: [axis, second_axis],
+            limits,
+            drive,
+            breaking: [breaking_force, breaking_torque],
+            name,
+            length,
+            stiffness,
+            rest,
+            damping,
+            friction,
+            teeth,
+            radius,
+            pitch,
+            ratio,
+            ground,
+        };
+        joints::add(&self.shared, py, &given)
+    }
+
+    /// Removes a body or a joint, given as a handle or by name, or a force or behavior by name. Handles
+    /// of a removed object raise ``RemovedError``. Joints of a removed body stay, without effect.
     fn remove(&self, py: Python<'_>, body: &Bound<'_, PyAny>) -> Result<()> {
         if let Ok(name) = body.extract::<String>()
             && self.shared.extend(py, |inner| inner.remove_extension(&name))?
         {
             return Ok(());
         }
-        let place = own_place(&self.shared, body)?;
+        let place = match joints::place_of(&self.shared, body)? {
+            Some(place) => place,
+            None => own_place(&self.shared, body)?,
+        };
         place.write(py, |inner| {
             inner.world.remove(place.id)?;
             inner.forget(place.id);

@@ -1,13 +1,18 @@
 //! The contacts of the last step as one structured numpy array.
 
+use crate::arrays::convert::vector;
+use crate::choices::word;
 use crate::errors::Result;
-use crate::objects::place::body_ids;
+use crate::objects::bodies::handle;
+use crate::objects::place::{body_ids, found};
 use crate::world::inner::Inner;
+use crate::world::shared::Shared;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyList;
-use tumble::dynamics::{ArticulatedBody, ObjectId};
+use std::sync::Arc;
+use tumble::dynamics::{ArticulatedBody, Event, EventKind, ObjectId};
 
 /// Fields of a contact: name, format, count. All have 8 bytes, so there is no padding.
 const FIELDS: [(&str, &str, usize); 8] = [
@@ -65,4 +70,35 @@ pub fn kind<'py>(py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         PyResult::Ok(py.import("numpy")?.call_method1("dtype", (PyList::new(py, fields)?,))?.unbind())
     })?;
     Ok(kind.bind(py).clone())
+}
+
+/// Returns the events of the last step.
+pub fn events(shared: &Arc<Shared>, py: Python<'_>) -> Result<Vec<Py<PyAny>>> {
+    let all = shared.read(|inner| {
+        let found = |e: &Event| {
+            let a = found(inner, e.a)?;
+            let b = e.b.and_then(|id| found(inner, id));
+            let part_b = e.b.map_or(0, |id| link(inner, id, e.part_b));
+            Some((*e, a, b, (link(inner, e.a, e.part_a), part_b)))
+        };
+        Ok(inner.world.events().iter().filter_map(found).collect::<Vec<_>>())
+    })?;
+    let class = py.import("tumble._values")?.getattr("Event")?;
+    let tuple = |(event, a, b, parts): (Event, _, Option<_>, (i64, i64))| {
+        let a = handle(py, shared, a)?;
+        let b = b.map(|b| handle(py, shared, b)).transpose()?;
+        let kind = word(event.kind, EventKind::NAMES);
+        Ok(class.call1((kind, a, b, parts, vector(py, &event.impulse), vector(py, &event.point)))?.unbind())
+    };
+    all.into_iter().map(tuple).collect()
+}
+
+/// Returns the handles of the bodies in contact with a body, or in a sensor.
+pub fn touching(shared: &Arc<Shared>, py: Python<'_>, id: ObjectId) -> Result<Vec<Py<PyAny>>> {
+    let others = shared.read(|inner| {
+        let mut ids: Vec<ObjectId> = inner.world.touching(id).into_iter().map(|(other, _)| other).collect();
+        ids.dedup();
+        Ok(ids.into_iter().filter_map(|id| found(inner, id)).collect::<Vec<_>>())
+    })?;
+    others.into_iter().map(|other| handle(py, shared, other)).collect()
 }

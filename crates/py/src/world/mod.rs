@@ -1,10 +1,12 @@
 //! The Python class of the world and the functions behind its methods.
 
 pub mod add;
+pub mod bulk;
 pub mod class;
 pub mod contacts;
 pub mod gc;
 pub mod inner;
+pub mod joints;
 pub mod load;
 pub mod pairs;
 pub mod pickling;

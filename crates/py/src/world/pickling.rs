@@ -98,6 +98,20 @@ pub fn read(bytes: &[u8]) -> Result<Inner> {
     Ok(inner)
 }
 
+/// The bytes of an articulated body: those of a world that has nothing else.
+pub fn write_body(body: &ArticulatedBody) -> Result<Vec<u8>> {
+    let mut world = Core::default();
+    world.add(body.clone())?;
+    Ok(world.archive(&[])?)
+}
+
+/// Returns the body of such bytes.
+pub fn read_body(bytes: &[u8]) -> Result<ArticulatedBody> {
+    let world = Core::from_archive(bytes, &mut |_| None)?;
+    let body = world.ids().first().and_then(|id| world.get::<ArticulatedBody>(*id));
+    Ok(body.cloned().ok_or_else(|| ArchiveError::Damaged("it has no articulated body".into()))?)
+}
+
 /// A shape: its solid, where that stands in the body's frame, and how it is written.
 #[derive(Serialize, Deserialize)]
 pub struct ShapeRecord {

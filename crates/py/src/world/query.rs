@@ -11,7 +11,7 @@ use crate::world::shared::Shared;
 use nalgebra::Translation3;
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use pyo3::types::{PyList, PyTuple};
+use pyo3::types::{PyInt, PyList, PyTuple};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use tumble::collide::{Pose, Vec3};
@@ -83,15 +83,14 @@ impl Numbering {
 /// The arguments that select bodies.
 pub struct Selection<'a, 'py> {
     pub group: u8,
-    pub mask: Option<u64>,
+    pub mask: Option<&'a Bound<'py, PyAny>>,
     pub ignore: Option<&'a Bound<'py, PyAny>>,
 }
 
 impl Selection<'_, '_> {
     /// Returns the filter of these arguments.
     fn filter(&self, shared: &Arc<Shared>) -> Result<QueryFilter> {
-        let mut filter =
-            QueryFilter { group: group(self.group)?, mask: self.mask.unwrap_or(u64::MAX), ..QueryFilter::default() };
+        let mut filter = QueryFilter { group: group(self.group)?, mask: mask(self.mask)?, ..QueryFilter::default() };
         if let Some(ignore) = self.ignore {
             match own_place(shared, ignore) {
                 Ok(one) => filter.ignored.push(one.id),
@@ -110,6 +109,17 @@ impl Selection<'_, '_> {
 /// Converts the number of a collision group.
 pub fn group(number: u8) -> Result<CollisionGroup> {
     CollisionGroup::new(number).ok_or_else(|| Error::value(format!("group is {number}; it must be 0 to 63")))
+}
+
+/// Converts a mask: None for all groups, the bits of an integer, or a sequence of groups.
+pub fn mask(value: Option<&Bound<'_, PyAny>>) -> Result<u64> {
+    let Some(value) = value else { return Ok(u64::MAX) };
+    if value.is_instance_of::<PyInt>() {
+        return value.extract::<u64>().map_err(|_| Error::value("mask: expected an integer of at most 64 bits"));
+    }
+    let wrong = |_| Error::value("mask: expected the bits of an integer, or a sequence of groups from 0 to 63");
+    let groups: Vec<u8> = value.extract().map_err(wrong)?;
+    groups.into_iter().try_fold(0, |mask, number| Ok(mask | group(number)?.bit()))
 }
 
 /// Returns vectors in a row, and whether there was more than one dimension.

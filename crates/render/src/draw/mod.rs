@@ -283,6 +283,7 @@ fn key(drawn: Drawn<'_>) -> String {
     match drawn {
         Drawn::Mesh(mesh) => format!("triangles {:p}", Arc::as_ptr(mesh)),
         Drawn::Shape(Shape::Mesh(mesh)) => format!("mesh {:p}", Arc::as_ptr(mesh)),
+        Drawn::Shape(Shape::Compound(compound)) => format!("compound {:p}", Arc::as_ptr(compound)),
         Drawn::Shape(Shape::Cylinder(c)) => format!("cylinder {} {}", c.radius(), c.half_length()),
         Drawn::Shape(other) => format!("{other:?}"),
     }
@@ -309,6 +310,7 @@ fn mesh_of(drawn: Drawn<'_>) -> Result<MeshData, RenderError> {
         Shape::Capsule { radius, half_length } => MeshData::capsule(*radius as f32, 2.0 * *half_length as f32, 32),
         Shape::Cylinder(c) => MeshData::cylinder(c.radius() as f32, 2.0 * c.half_length() as f32, 48),
         Shape::Mesh(mesh) => triangles(mesh.mesh())?,
+        Shape::Compound(compound) => triangles(&compound.mesh())?,
     })
 }
 

@@ -191,9 +191,11 @@ fn joints(world: &World, list: &mut DrawList, length: f32) {
                 let axis = Some(small(&(frame.rotation * Vec3::z())));
                 let at = Point3::from(small(&frame.translation.vector));
                 match loop_joint.kind() {
-                    LoopJointKind::Revolute => joint(at, axis, REVOLUTE_COLOR),
-                    LoopJointKind::Prismatic => joint(at, axis, PRISMATIC_COLOR),
-                    LoopJointKind::Spherical | LoopJointKind::Fixed => joint(at, None, SPHERICAL_COLOR),
+                    LoopJointKind::Revolute | LoopJointKind::Universal => joint(at, axis, REVOLUTE_COLOR),
+                    LoopJointKind::Prismatic | LoopJointKind::Cylindrical | LoopJointKind::Planar => {
+                        joint(at, axis, PRISMATIC_COLOR)
+                    }
+                    _ => joint(at, None, SPHERICAL_COLOR),
                 }
             }
         }

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use tumble_core::articulated::LinkMass;
-use tumble_core::collide::{Pose, Shape, ShapeError, TreeCache, TreeSettings, TriMesh, Vec3};
+use tumble_core::collide::{CompoundPart, Pose, Shape, ShapeError, TreeCache, TreeSettings, TriMesh, Vec3};
 use tumble_core::{VisualGeometry, VisualMesh};
 
 use crate::build::mesh_files::{read_file, stretched};
@@ -20,7 +20,7 @@ use crate::build::visual_mesh;
 use crate::notes::NoteList;
 use crate::parse::body::MassSpec;
 use crate::parse::link::{Geometry, LinkMassSpec, LinkShape, LinkSpec};
-use crate::parse::shape::ShapeSpec;
+use crate::parse::shape::{CompoundPartSpec, ShapeSpec};
 
 /// A shape or visual with its pose on a link.
 #[derive(Clone)]
@@ -93,6 +93,12 @@ type SolidKey = (FileKey, bool);
 /// Makes the shape of a description.
 pub(crate) fn make(spec: &ShapeSpec, meshes: &[Shape]) -> Result<Shape, ShapeError> {
     match *spec {
+        ShapeSpec::Compound { ref parts } => {
+            let part = |part: &CompoundPartSpec| {
+                Ok(CompoundPart { shape: make(&part.shape, meshes)?, pose: part.pose, density: part.density_kg_per_m3 })
+            };
+            Shape::compound(parts.iter().map(part).collect::<Result<_, ShapeError>>()?)
+        }
         ShapeSpec::Mesh { mesh } => Ok(meshes[mesh].clone()),
         ShapeSpec::HalfSpace => Ok(Shape::half_space()),
         ShapeSpec::Sphere { radius_m } => Shape::sphere(radius_m),

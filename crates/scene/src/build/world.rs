@@ -4,8 +4,8 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::solver::SolverSettings;
 use tumble_core::{
-    ArticulatedBody, LoopJoint, Material, ObjectId, PairMaterial, PairSide, RigidBody, Settings, Sleep, Visual, World,
-    WorldError,
+    ArticulatedBody, Drive, JointPlace, LoopJoint, LoopJointError, LoopJointKind, Material, ObjectId, PairMaterial,
+    PairSide, RigidBody, Settings, Sleep, Visual, World, WorldError,
 };
 
 use crate::build::appearance::{appearance, material_id};
@@ -16,7 +16,7 @@ use crate::notes::Notes;
 use crate::parse::articulated::ArticulatedSpec;
 use crate::parse::body::{BodySpec, MassSpec};
 use crate::parse::file::SceneFile;
-use crate::parse::loop_joint::{LoopJointKind, LoopJointSpec, PartSpec};
+use crate::parse::loop_joint::{LoopJointSpec, PartSpec};
 use crate::parse::pair::{PairSideSpec, PairSpec};
 
 impl SceneFile {
@@ -84,19 +84,21 @@ impl SceneFile {
     fn add_loop_joint(&self, spec: &LoopJointSpec, world: &mut World) -> Result<(), BuildError> {
         let wrong = |why: String| BuildError::LoopJoint { scene: self.file.clone(), why };
         let (a, b) = (self.part(world, &spec.a), spec.b.and_then(|b| self.part(world, &b)));
-        let (point, axis, name) = (Vec3::from(spec.position_m), Vec3::from(spec.axis), spec.name.as_str());
-        let joint = match spec.kind {
-            LoopJointKind::Spherical => LoopJoint::spherical_at(name, world, a, b, point),
-            LoopJointKind::Revolute => LoopJoint::revolute_at(name, world, a, b, point, axis),
-            LoopJointKind::Fixed => LoopJoint::fixed_at(name, world, a, b, point),
-            LoopJointKind::Prismatic => LoopJoint::prismatic_at(name, world, a, b, point, axis),
+        let place = JointPlace {
+            point: Vec3::from(spec.position_m),
+            second_point: spec.second_position_m.map(Vec3::from),
+            axis: Vec3::from(spec.axis),
+            second_axis: spec.second_axis.map(Vec3::from),
+            ground: spec.ground_m.map(Vec3::from),
         };
-        world.add(joint.map_err(|e| wrong(e.to_string()))?).map(drop).map_err(|e| wrong(e.to_string()))
+        let made = LoopJoint::joining(spec.name.as_str(), spec.kind, world, a, b, place);
+        let joint = made.and_then(|joint| with_settings(joint, spec)).map_err(|e| wrong(e.to_string()))?;
+        world.add(joint).map(drop).map_err(|e| wrong(e.to_string()))
     }
 
     fn add_pair(&self, spec: &PairSpec, world: &mut World) -> Result<(), WorldError> {
         let [a, b] = spec.sides.map(|side| self.sides(world, side));
-        let material = PairMaterial { restitution: spec.restitution, friction: spec.friction };
+        let material = PairMaterial { restitution: spec.restitution, friction: spec.friction, collides: spec.collides };
         for (a, b) in a.iter().flat_map(|a| b.iter().map(move |b| (*a, *b))) {
             world.set_pair_material(a, b, material)?;
         }
@@ -145,6 +147,7 @@ impl SceneFile {
             .with_sleep(w.sleep_after_s.map(|after| Sleep { after, within: w.sleep_within_m }))
             .with_combine_friction(w.combine_friction)
             .with_combine_restitution(w.combine_restitution)
+            .with_event_impulse(w.event_impulse_n_s)
             .with_threads(w.threads)
     }
 
@@ -154,8 +157,10 @@ impl SceneFile {
         let body = match spec.mass {
             Some(MassSpec::Mass(mass)) => body.with_mass(mass),
             Some(MassSpec::Density(density)) => body.with_density(density),
-            None => body,
+            None => shape.own_density().into_iter().fold(body, RigidBody::with_density),
         };
+        let body = spec.inertia_kg_m2.into_iter().fold(body, RigidBody::with_inertia);
+        let body = spec.center_m.into_iter().fold(body, |body, center| body.with_center_of_mass(Vec3::from(center)));
         let [x, y, z, w] = spec.orientation_xyzw;
         let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
         let pose = Pose::from_parts(Translation3::from(Vec3::from(spec.position_m)), rotation);
@@ -177,6 +182,8 @@ impl SceneFile {
         }
         body.linear_damping = spec.linear_damping_per_s;
         body.angular_damping = spec.angular_damping_per_s;
+        (body.gravity_scale, body.locked) = (spec.gravity_scale, spec.locked);
+        (body.group, body.mask, body.sensor) = (spec.group, spec.mask, spec.sensor);
         Ok(body)
     }
 
@@ -191,4 +198,24 @@ fn visuals(spec: &BodySpec, shape: Shape) -> Vec<Visual> {
     }
     let appearance = appearance(&spec.appearance, &shape.center_of_mass());
     vec![Visual::shape(0, Pose::identity(), shape, appearance)]
+}
+
+/// Returns a loop joint with the length, the settings and the strength of its description.
+fn with_settings(joint: LoopJoint, spec: &LoopJointSpec) -> Result<LoopJoint, LoopJointError> {
+    let joint = joint.with_transmission(|t| {
+        (t.teeth, t.radius, t.pitch, t.ratio) = (spec.teeth, spec.radius_m, spec.pitch_m, spec.ratio);
+    })?;
+    let start = joint.length();
+    let joint = match spec.length_m {
+        Some(length) => joint.with_length(length)?,
+        None => joint,
+    };
+    let mut dof = spec.dof.clone();
+    if let (LoopJointKind::Spring, Some(spring)) = (spec.kind, &mut dof.spring) {
+        spring.rest = joint.length();
+    }
+    if let (true, Drive::Position { target, .. }) = (spec.holds_start && spec.kind.has_length(), &mut dof.drive) {
+        *target = start;
+    }
+    joint.with_dof(dof)?.with_breaking_force(spec.breaking_force_n)?.with_breaking_torque(spec.breaking_torque_n_m)
 }

@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use tumble_core::Mode;
 use tumble_core::collide::ContactMode;
+use tumble_core::collide::Mat3;
+use tumble_core::{CollisionGroup, LockedAxes, Mode};
 
 use crate::parse::appearance::AppearanceSpec;
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names};
+use crate::parse::link::read_inertia;
 use crate::parse::material::{DEFAULT_FRICTION, DEFAULT_RESTITUTION, FRICTION, MaterialSpec, RESTITUTION};
 use crate::parse::mount::Mounts;
 use crate::parse::rotation;
@@ -15,6 +17,9 @@ use crate::parse::shape::ShapeSpec;
 use crate::parse::world::CONTACTS;
 
 const MODES: Names<Mode> = &[("dynamic", Mode::Dynamic), ("static", Mode::Static), ("kinematic", Mode::Kinematic)];
+
+/// Numbers of collision groups.
+const GROUPS: std::ops::RangeInclusive<u32> = 0..=63;
 
 /// The mass of a body or shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +39,7 @@ pub struct BodySpec {
     pub mode: Mode,
     /// The shape in body axes.
     pub shape: ShapeSpec,
-    /// Present for every dynamic body.
+    /// Present for every dynamic body, except compounds whose parts have densities.
     pub mass: Option<MassSpec>,
     /// Position of the origin of the *shape*, world axes, m. The center of mass of a mesh or a
     /// profile may be elsewhere: at `position_m` + R·(its position in the shape).
@@ -54,12 +59,27 @@ pub struct BodySpec {
     pub restitution: f64,
     /// Contact mode of a mesh or cylinder. Default: that of the world.
     pub contacts: ContactMode,
+    /// Center of mass in the shape's frame, m. Default: that of the uniform shape.
+    pub center_m: Option<[f64; 3]>,
+    /// Inertia about the center of mass, body axes, kg·m². Default: that of the uniform shape.
+    pub inertia_kg_m2: Option<Mat3>,
+    /// Factor of the world's gravity. Default 1.
+    pub gravity_scale: f64,
+    /// Axes of the world along which it does not move, or about which it does not turn. Default none.
+    pub locked: LockedAxes,
     /// Rate at which velocity decays, 1/s: `dv/dt = −c v`. Default 0.
     pub linear_damping_per_s: f64,
     /// Rate at which angular velocity decays, 1/s. Default 0.
     pub angular_damping_per_s: f64,
     /// Takes part in contacts. Default true.
     pub collides: bool,
+    /// Collision group, 0 to 63. Default 0.
+    pub group: CollisionGroup,
+    /// Groups that it collides with, one bit each. Default all.
+    pub mask: u64,
+    /// Is a sensor: it has no contacts, and the world reports the bodies that overlap it. Default
+    /// false.
+    pub sensor: bool,
     /// Takes part in the simulation. Default true.
     pub enabled: bool,
     /// Is drawn. Default true.
@@ -85,7 +105,7 @@ impl BodySpec {
         let name = read_name(f);
         let mode = read_mode(f);
         let shape = ShapeSpec::read(f, &library.meshes);
-        let mass = read_mass(f, mode);
+        let mass = read_mass(f, mode, shape.as_ref().is_some_and(ShapeSpec::has_density));
         let material = read_material(f, library);
         let base = material.map(|index| &library.materials[index]);
         let (friction, restitution) =
@@ -105,15 +125,27 @@ impl BodySpec {
             friction: f.number_or("friction", FRICTION, friction),
             restitution: f.number_or("restitution", RESTITUTION, restitution),
             contacts: f.choice_or("contacts", CONTACTS, library.contacts),
+            center_m: f.optional_vector("center_m", Bound::ANY),
+            inertia_kg_m2: read_inertia(f),
+            gravity_scale: f.number_or("gravity_scale", Bound::ANY, 1.0),
+            locked: read_locked(f),
             linear_damping_per_s: f.number_or("linear_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
             angular_damping_per_s: f.number_or("angular_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
             collides: f.flag_or("collides", true),
+            group: CollisionGroup::new(f.integer_or("group", GROUPS, 0) as u8).unwrap_or_default(),
+            mask: read_mask(f),
+            sensor: f.flag_or("sensor", false),
             enabled: f.flag_or("enabled", true),
             visible: f.flag_or("visible", true),
             appearance: AppearanceSpec::read(f, &appearance),
             mounts: Mounts::read(f),
         };
         let shape = shape?;
+        let no_mass = mass.is_none() && !shape.has_density();
+        if (body.center_m.is_some() || body.inertia_kg_m2.is_some()) && no_mass {
+            let message = format!("{} has `center_m` or `inertia_kg_m2` but no mass", f.what);
+            f.log.report(f.span.clone(), message, "expected `mass_kg` or `density_kg_per_m3` with them");
+        }
         check_half_space(f, &shape, mode);
         Some(BodySpec { shape, ..body })
     }
@@ -133,6 +165,30 @@ pub(crate) fn read_name(f: &mut Fields<'_>) -> Option<String> {
     Some(name.to_owned())
 }
 
+/// Reads the groups of a mask as one bit each; all without the key.
+fn read_mask(f: &mut Fields<'_>) -> u64 {
+    let Some(value) = f.value("mask") else { return u64::MAX };
+    let Some(groups) = value.get_ref().as_array() else {
+        f.wrong("mask", value, "a list of collision groups, such as [0, 3]");
+        return u64::MAX;
+    };
+    groups.iter().fold(0, |mask, group| mask | 1 << f.as_integer("mask", group, GROUPS))
+}
+
+/// Reads the names of locked axes.
+fn read_locked(f: &mut Fields<'_>) -> LockedAxes {
+    let Some(value) = f.value("locked") else { return LockedAxes::default() };
+    let expected = "a list of \"x\", \"y\", \"z\", \"rotation_x\", \"rotation_y\" and \"rotation_z\"";
+    let names: Option<Vec<&str>> =
+        value.get_ref().as_array().and_then(|items| items.iter().map(|item| item.get_ref().as_str()).collect());
+    match names.map(LockedAxes::of_names) {
+        Some(Ok(locked)) => return locked,
+        Some(Err(_)) => f.wrong("locked", value, expected),
+        None => f.wrong("locked", value, expected),
+    }
+    LockedAxes::default()
+}
+
 /// Reads the mode. A wrong value counts as kinematic, the mode that requires no other key.
 fn read_mode(f: &mut Fields<'_>) -> Mode {
     match f.value("mode") {
@@ -141,7 +197,8 @@ fn read_mode(f: &mut Fields<'_>) -> Mode {
     }
 }
 
-fn read_mass(f: &mut Fields<'_>, mode: Mode) -> Option<MassSpec> {
+/// Reads the mass; a dynamic body requires it, unless its shape has densities of its own.
+fn read_mass(f: &mut Fields<'_>, mode: Mode, has_density: bool) -> Option<MassSpec> {
     let mass = f.optional_number("mass_kg", Bound::POSITIVE);
     let density = f.optional_number("density_kg_per_m3", Bound::POSITIVE);
     match (mass, density) {
@@ -153,7 +210,7 @@ fn read_mass(f: &mut Fields<'_>, mode: Mode) -> Option<MassSpec> {
         (Some(mass), None) => Some(MassSpec::Mass(mass)),
         (None, Some(density)) => Some(MassSpec::Density(density)),
         (None, None) => {
-            if mode == Mode::Dynamic {
+            if mode == Mode::Dynamic && !has_density {
                 f.missing(
                     "mass_kg",
                     "`mass_kg` or `density_kg_per_m3`, or mode = \"static\" for a body that never moves",

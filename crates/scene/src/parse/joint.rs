@@ -172,15 +172,26 @@ impl JointSpec {
     /// Reads the initial state and the settings. Keys that are absent change nothing.
     pub(crate) fn read_effects(&mut self, f: &mut Fields<'_>) {
         let keys = self.keys();
-        if self.kind.dof() > 0 {
-            self.dof.damping = f.number_or(keys.damping, Bound::NOT_NEGATIVE, self.dof.damping);
-            self.dof.friction = f.number_or(keys.friction, Bound::NOT_NEGATIVE, self.dof.friction);
-        }
         match self.kind {
-            Joint::Spherical => self.read_spherical_start(f),
-            _ if self.is_single() => self.read_single(f, keys),
+            Joint::Spherical => {
+                self.read_resistance(f, keys);
+                self.read_spherical_start(f);
+            }
+            _ if self.is_single() => {
+                if let Some(position) = number(f, keys.start) {
+                    self.position = vec![position];
+                }
+                self.velocity[0] = f.number_or(keys.rate, Bound::ANY, self.velocity[0]);
+                self.read_settings(f, true);
+            }
+            _ if self.kind.dof() > 0 => self.read_resistance(f, keys),
             _ => {}
         }
+    }
+
+    fn read_resistance(&mut self, f: &mut Fields<'_>, keys: &'static JointKeys) {
+        self.dof.damping = f.number_or(keys.damping, Bound::NOT_NEGATIVE, self.dof.damping);
+        self.dof.friction = f.number_or(keys.friction, Bound::NOT_NEGATIVE, self.dof.friction);
     }
 
     fn read_spherical_start(&mut self, f: &mut Fields<'_>) {
@@ -192,16 +203,16 @@ impl JointSpec {
         }
     }
 
-    fn read_single(&mut self, f: &mut Fields<'_>, keys: &'static JointKeys) {
-        if let Some(position) = number(f, keys.start) {
-            self.position = vec![position];
-        }
-        self.velocity[0] = f.number_or(keys.rate, Bound::ANY, self.velocity[0]);
+    /// Reads the settings of a joint with one degree of freedom; its spring if `springs`. Keys that are
+    /// absent change nothing.
+    pub(crate) fn read_settings(&mut self, f: &mut Fields<'_>, springs: bool) {
+        let keys = self.keys();
+        self.read_resistance(f, keys);
         if let Some(limits) = read_limits(f, keys.limits) {
             self.dof.limits = limits;
         }
         let example = format!("{{ {} = 10 }}", keys.stiffness);
-        if let Some(mut spring) = f.table("spring", &example) {
+        if let Some(mut spring) = springs.then(|| f.table("spring", &example)).flatten() {
             let stiffness = spring.number(keys.stiffness, Bound::NOT_NEGATIVE);
             let rest = number(&mut spring, keys.rest).unwrap_or(0.0);
             spring.finish();

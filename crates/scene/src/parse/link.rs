@@ -341,7 +341,7 @@ fn read_mass(f: &mut Fields<'_>, shapes: &[LinkShape], fixed: bool) -> LinkMassS
 }
 
 /// Reads `inertia_kg_m2`: `[xx, yy, zz]` or `[xx, yy, zz, xy, xz, yz]` about the center of mass.
-fn read_inertia(f: &mut Fields<'_>) -> Option<Mat3> {
+pub(crate) fn read_inertia(f: &mut Fields<'_>) -> Option<Mat3> {
     let value = f.value("inertia_kg_m2")?;
     let problems = f.log.count();
     let long = matches!(value.get_ref(), DeValue::Array(items) if items.len() == 6);

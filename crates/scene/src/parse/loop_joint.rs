@@ -1,28 +1,13 @@
 //! `[[loop_joint]]`: a joint between two parts of any objects. It may close a loop.
 
+use tumble_core::articulated::{DofSettings, Spring};
+use tumble_core::collide::Vec3;
+use tumble_core::{Joint, LoopJointKind};
+
 use crate::parse::body::read_name;
 use crate::parse::bound::Bound;
-use crate::parse::fields::{Fields, Names, Value};
-
-/// Which relative motion a loop joint removes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LoopJointKind {
-    /// Holds a point: three rotations are free.
-    Spherical,
-    /// Holds a point and an axis: the rotation about the axis is free.
-    Revolute,
-    /// Holds position and orientation.
-    Fixed,
-    /// Holds all but the translation along an axis.
-    Prismatic,
-}
-
-const KINDS: Names<LoopJointKind> = &[
-    ("spherical", LoopJointKind::Spherical),
-    ("revolute", LoopJointKind::Revolute),
-    ("fixed", LoopJointKind::Fixed),
-    ("prismatic", LoopJointKind::Prismatic),
-];
+use crate::parse::fields::{Fields, Value};
+use crate::parse::joint::JointSpec;
 
 /// A part of an object in the description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,16 +23,41 @@ pub enum PartSpec {
 pub struct LoopJointSpec {
     /// Unique in the scene, bodies included.
     pub name: String,
-    /// Which motion it removes.
+    /// Which motion it leaves free.
     pub kind: LoopJointKind,
     /// One side.
     pub a: PartSpec,
     /// The other side; `None` is the world.
     pub b: Option<PartSpec>,
-    /// Position of the joint, world axes at time 0, m.
+    /// Position of the joint, world axes at time 0, m; for kinds with a length its end on `a`.
     pub position_m: [f64; 3],
-    /// Unit axis of a revolute or prismatic joint, world axes at time 0.
+    /// Its end on `b` for kinds with a length, world axes at time 0, m.
+    pub second_position_m: Option<[f64; 3]>,
+    /// Unit axis of kinds that have one, world axes at time 0.
     pub axis: [f64; 3],
+    /// Axis of a universal joint that is fixed to `b`, axis of the second gear, direction of a rack; world
+    /// axes at time 0.
+    pub second_axis: Option<[f64; 3]>,
+    /// Points of the world over which the rope of a pulley runs, m.
+    pub ground_m: [[f64; 3]; 2],
+    /// Numbers of teeth of two gears, not 0; negative for inner teeth.
+    pub teeth: [i32; 2],
+    /// Displacement of a rack per radian of its pinion, m, not 0.
+    pub radius_m: f64,
+    /// Displacement of a screw per turn, m, not 0.
+    pub pitch_m: f64,
+    /// Weight of the side of `b` in the length of a pulley. Default 1.
+    pub ratio: f64,
+    /// Length of a distance, a rope or a spring, m. Default: that at time 0.
+    pub length_m: Option<f64>,
+    /// Limits, damping, friction, spring and drive of kinds with a position.
+    pub dof: DofSettings,
+    /// Whether a position drive without a target holds the initial position.
+    pub(crate) holds_start: bool,
+    /// Force above which it breaks, N. Default infinite.
+    pub breaking_force_n: f64,
+    /// Torque above which it breaks, N·m. Default infinite.
+    pub breaking_torque_n_m: f64,
 }
 
 /// Looks up the parts that a loop joint or a pair names.
@@ -89,20 +99,90 @@ pub(crate) trait Parts {
 impl LoopJointSpec {
     pub(crate) fn read(mut f: Fields<'_>, parts: &impl Parts) -> Option<LoopJointSpec> {
         let name = read_name(&mut f).unwrap_or_default();
-        let Some(kind) = f.choice("type", KINDS) else {
+        let Some(kind) = f.choice("type", LoopJointKind::NAMES) else {
             f.give_up();
             return None;
         };
         let a = f.text("a", "the name of a body, or \"OBJECT/LINK\"");
         let b = f.optional_text("b");
         let position_m = f.vector("position_m", Bound::ANY);
-        let axis = match kind {
-            LoopJointKind::Revolute | LoopJointKind::Prismatic => f.direction("axis"),
-            LoopJointKind::Spherical | LoopJointKind::Fixed => [0.0, 0.0, 1.0],
+        let second_position_m = kind.has_length().then(|| f.vector("second_position_m", Bound::ANY));
+        let axis = if kind.has_axis() { f.direction("axis") } else { [0.0, 0.0, 1.0] };
+        let second_axis = match kind {
+            LoopJointKind::Universal | LoopJointKind::Rack => Some(f.direction("second_axis")),
+            LoopJointKind::Gear => Some(f.direction_or("second_axis", axis)),
+            _ => None,
         };
+        let pulley = kind == LoopJointKind::Pulley;
+        let ground_m = ["ground_position_m", "second_ground_position_m"]
+            .map(|key| if pulley { f.vector(key, Bound::ANY) } else { [0.0; 3] });
+        let ratio = if pulley { f.number_or("ratio", Bound::POSITIVE, 1.0) } else { 1.0 };
+        let teeth = if kind == LoopJointKind::Gear { read_teeth(&mut f) } else { [1; 2] };
+        let radius_m = if kind == LoopJointKind::Rack { read_not_zero(&mut f, "radius_m") } else { 1.0 };
+        let pitch_m = if kind == LoopJointKind::Screw { read_not_zero(&mut f, "pitch_m") } else { 1.0 };
+        let length_m = if kind.has_length() { f.optional_number("length_m", Bound::NOT_NEGATIVE) } else { None };
+        let settings = read_settings(&mut f, kind, Vec3::from(axis));
+        let breaking_force_n = f.number_or("breaking_force_n", Bound::POSITIVE, f64::INFINITY);
+        let breaking_torque_n_m = f.number_or("breaking_torque_n_m", Bound::POSITIVE, f64::INFINITY);
         let expected = "a part other than `a`; or no `b`, which is the world";
         let sides = parts.sides(&f, [a, b], |name| parts.part(name), expected);
         f.finish();
-        Some(LoopJointSpec { name, kind, a: sides[0]?, b: sides[1], position_m, axis })
+        Some(LoopJointSpec {
+            name,
+            kind,
+            a: sides[0]?,
+            b: sides[1],
+            position_m,
+            second_position_m,
+            axis,
+            second_axis,
+            ground_m,
+            teeth,
+            radius_m,
+            pitch_m,
+            ratio,
+            length_m,
+            holds_start: settings.holds_start,
+            dof: settings.dof,
+            breaking_force_n,
+            breaking_torque_n_m,
+        })
     }
+}
+
+/// Reads the settings of the position of a joint, if it has one.
+fn read_settings(f: &mut Fields<'_>, kind: LoopJointKind, axis: Vec3) -> JointSpec {
+    let turns = kind == LoopJointKind::Revolute;
+    let mut joint = JointSpec::new("", if turns { Joint::Revolute { axis } } else { Joint::Prismatic { axis } });
+    if kind == LoopJointKind::Spring {
+        let stiffness = f.number("stiffness_n_per_m", Bound::NOT_NEGATIVE);
+        joint.dof.spring = Some(Spring { stiffness, rest: 0.0 });
+    }
+    if kind.has_position() {
+        joint.read_settings(f, kind != LoopJointKind::Spring);
+    }
+    joint
+}
+
+/// Reads the numbers of teeth of two gears.
+fn read_teeth(f: &mut Fields<'_>) -> [i32; 2] {
+    const EXPECTED: &str = "two whole numbers of teeth, such as [20, 45]; negative for inner teeth";
+    let Some(value) = f.required("teeth", EXPECTED) else { return [1; 2] };
+    let problems = f.log.count();
+    let teeth: [f64; 2] = f.as_vector("teeth", value, Bound::ANY);
+    if teeth.iter().any(|n| n.fract() != 0.0 || *n == 0.0 || n.abs() > 1e6) && f.log.count() == problems {
+        f.wrong("teeth", value, EXPECTED);
+    }
+    teeth.map(|n| n as i32)
+}
+
+/// Reads a required number other than 0.
+fn read_not_zero(f: &mut Fields<'_>, key: &'static str) -> f64 {
+    let Some(value) = f.required(key, "a number of meters other than 0") else { return 1.0 };
+    let problems = f.log.count();
+    let number = f.as_number(key, value, Bound::ANY);
+    if number == 0.0 && f.log.count() == problems {
+        f.wrong(key, value, "a number of meters other than 0");
+    }
+    number
 }

@@ -1,5 +1,5 @@
 //! `[[pair]]`: restitution and friction of two bodies or two materials, which override the
-//! combination rules of `[world]`.
+//! combination rules of `[world]`, and whether they collide.
 
 use std::collections::BTreeMap;
 
@@ -31,6 +31,8 @@ pub struct PairSpec {
     pub restitution: Option<f64>,
     /// 0 to 100; `None` for the combination rule.
     pub friction: Option<f64>,
+    /// Whether the two collide; `None` if their groups decide.
+    pub collides: Option<bool>,
 }
 
 impl PairSpec {
@@ -48,8 +50,9 @@ impl PairSpec {
         };
         let restitution = f.optional_number("restitution", RESTITUTION);
         let friction = f.optional_number("friction", FRICTION);
-        if restitution.is_none() && friction.is_none() {
-            f.missing("friction", "`restitution`, `friction` or both");
+        let collides = f.value("collides").is_some().then(|| f.flag_or("collides", true));
+        if restitution.is_none() && friction.is_none() && collides.is_none() {
+            f.missing("friction", "`restitution`, `friction`, `collides` or several of them");
         }
         let (log, what, span) = (f.log, f.what.clone(), f.span.clone());
         f.finish();
@@ -59,7 +62,7 @@ impl PairSpec {
             let message = format!("{what} names the same two as the pair at line {line}");
             log.report(span, message, "expected each pair once");
         }
-        Some(PairSpec { sides, restitution, friction })
+        Some(PairSpec { sides, restitution, friction, collides })
     }
 }
 

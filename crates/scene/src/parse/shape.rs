@@ -2,8 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use tumble_core::collide::Pose;
+
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names};
+use crate::parse::rotation;
+
+/// Maximum number of parts of a compound.
+const MAX_PARTS: usize = 4096;
 
 /// The shape of a body in its own axes and about its own origin.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,6 +45,22 @@ pub enum ShapeSpec {
         /// Index into [`SceneFile::meshes`](crate::SceneFile::meshes).
         mesh: usize,
     },
+    /// Several shapes of one body.
+    Compound {
+        /// At least one.
+        parts: Vec<CompoundPartSpec>,
+    },
+}
+
+/// A part of a compound.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CompoundPartSpec {
+    /// The shape; no half-space.
+    pub shape: ShapeSpec,
+    /// Pose of its origin and axes in the frame of the compound.
+    pub pose: Pose,
+    /// Density, kg/m³; all parts have one or none has.
+    pub density_kg_per_m3: Option<f64>,
 }
 
 #[derive(Clone, Copy)]
@@ -49,6 +71,7 @@ enum Kind {
     Cylinder,
     HalfSpace,
     Mesh,
+    Compound,
 }
 
 const KINDS: Names<Kind> = &[
@@ -58,6 +81,7 @@ const KINDS: Names<Kind> = &[
     ("cylinder", Kind::Cylinder),
     ("half_space", Kind::HalfSpace),
     ("mesh", Kind::Mesh),
+    ("compound", Kind::Compound),
 ];
 
 impl ShapeSpec {
@@ -95,8 +119,63 @@ impl ShapeSpec {
             }),
             Kind::HalfSpace => Some(ShapeSpec::HalfSpace),
             Kind::Mesh => read_mesh(f, meshes),
+            Kind::Compound => read_compound(f, meshes),
         }
     }
+
+    /// Returns whether the shape has densities of its own.
+    pub(crate) fn has_density(&self) -> bool {
+        let has = |part: &CompoundPartSpec| part.density_kg_per_m3.is_some() || part.shape.has_density();
+        matches!(self, ShapeSpec::Compound { parts } if parts.iter().any(has))
+    }
+
+    /// Adds `by` to the indices of its meshes.
+    pub fn shift_meshes(&mut self, by: usize) {
+        match self {
+            ShapeSpec::Mesh { mesh } => *mesh += by,
+            ShapeSpec::Compound { parts } => parts.iter_mut().for_each(|part| part.shape.shift_meshes(by)),
+            _ => {}
+        }
+    }
+}
+
+/// Returns the compound of the list `parts`; `None` if a part is wrong.
+fn read_compound(f: &mut Fields<'_>, meshes: &BTreeMap<&str, Option<usize>>) -> Option<ShapeSpec> {
+    let example = "{ type = \"sphere\", radius_m = 0.5, position_m = [1, 0, 0] }";
+    let expected = format!("a list of shapes, such as [{example}]");
+    let given = f.required("parts", &expected)?;
+    let values = f.list("parts", MAX_PARTS, &expected);
+    if values.is_empty() {
+        if given.get_ref().as_array().is_some_and(|items| items.is_empty()) {
+            f.wrong("parts", given, expected);
+        }
+        return None;
+    }
+    let (what, count) = (f.what.clone(), values.len());
+    let named = |n: usize| format!("part {} of {what}", n + 1);
+    let mut parts = Vec::with_capacity(count);
+    for (n, value) in values.into_iter().enumerate() {
+        let Some(mut part) = Fields::of(f.log, value, named(n), example) else { continue };
+        let Some(shape) = ShapeSpec::read_part(&mut part, meshes) else {
+            part.give_up();
+            continue;
+        };
+        if shape == ShapeSpec::HalfSpace {
+            let message = format!("{} is a half-space, which is unbounded", part.what);
+            let expected = "expected a shape of finite size; make the half-space a static [[body]]";
+            part.log.report(part.span.clone(), message, expected);
+        }
+        let pose = rotation::read_pose(&mut part);
+        let density_kg_per_m3 = part.optional_number("density_kg_per_m3", Bound::POSITIVE);
+        part.finish();
+        parts.push(CompoundPartSpec { shape, pose, density_kg_per_m3 });
+    }
+    let own = |part: &CompoundPartSpec| part.density_kg_per_m3.is_some() || part.shape.has_density();
+    if let Some(n) = parts.iter().position(|part| own(part) != own(&parts[0])) {
+        let message = format!("{} has {} density, unlike part 1", named(n), if own(&parts[n]) { "a" } else { "no" });
+        f.log.report(f.span.clone(), message, "expected a density for all parts, or for none");
+    }
+    (parts.len() == count).then_some(ShapeSpec::Compound { parts })
 }
 
 /// Returns the mesh named by `mesh`; `None` if there is no such mesh or it is itself wrong.

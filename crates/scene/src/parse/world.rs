@@ -199,6 +199,8 @@ pub struct WorldSettings {
     pub combine_restitution: Combine,
     /// Rule for the friction of a pair. Default `geometric_mean`.
     pub combine_friction: Combine,
+    /// Smallest impulse in a step with which a pair counts as in contact, N·s. Default 0.
+    pub event_impulse_n_s: f64,
     /// Contact mode of meshes and cylinders without their own. Default `surface`.
     pub contacts: ContactMode,
     /// Threads of a step, 0 for as many as cores; no number changes the result. Default 1.
@@ -223,6 +225,7 @@ impl Default for WorldSettings {
             sleep_within_m: Sleep::default().within,
             combine_restitution: Combine::Max,
             combine_friction: Combine::GeometricMean,
+            event_impulse_n_s: 0.0,
             contacts: ContactMode::Surface,
             threads: 1,
         }
@@ -254,6 +257,7 @@ impl WorldSettings {
             sleep_within_m: f.number_or("sleep_within_m", TOLERANCE, default.sleep_within_m),
             combine_restitution: f.choice_or("combine_restitution", Combine::NAMES, default.combine_restitution),
             combine_friction: f.choice_or("combine_friction", Combine::NAMES, default.combine_friction),
+            event_impulse_n_s: f.number_or("event_impulse_n_s", Bound::NOT_NEGATIVE, default.event_impulse_n_s),
             contacts: f.choice_or("contacts", CONTACTS, default.contacts),
             threads: f.integer_or("threads", 0..=256, default.threads),
         };

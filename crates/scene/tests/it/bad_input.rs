@@ -53,6 +53,55 @@ fn toml_that_is_not() {
 }
 
 #[test]
+fn compounds() {
+    let sphere = "{ type = \"sphere\", radius_m = 1 }";
+    let with = |parts: &str| shape(&format!("{{ type = \"compound\", parts = {parts} }}"));
+    SceneFile::parse(&with(&format!("[{sphere}]")), "s.toml").unwrap();
+    let what = "the shape of body \"b\"";
+    let expected = "expected a list of shapes, such as [{ type = \"sphere\", radius_m = 0.5, position_m = [1, 0, 0] }]";
+    assert_errors(&shape("{ type = \"compound\" }"), &[&format!("s.toml:2:9: {what} has no `parts`; {expected}")]);
+    assert_errors(&with("[]"), &[&format!("s.toml:2:38: `parts` of {what} is []; {expected}")]);
+    assert_errors(&with("3"), &[&format!("s.toml:2:38: `parts` of {what} is 3; {expected}")]);
+    assert_errors(
+        &with("[{ type = \"half_space\" }]"),
+        &[&format!(
+            "s.toml:2:39: part 1 of {what} is a half-space, which is unbounded; expected a shape of finite size; make the half-space a static [[body]]"
+        )],
+    );
+    assert_errors(
+        &with(&format!("[{sphere}, {{ type = \"sphere\", radius_m = 1, density_kg_per_m3 = 7 }}]")),
+        &[&format!(
+            "s.toml:2:9: part 2 of {what} has a density, unlike part 1; expected a density for all parts, or for none"
+        )],
+    );
+    assert_errors(
+        &with("[{ type = \"sphere\", radius_m = -1 }]"),
+        &[&format!(
+            "s.toml:2:69: `radius_m` of part 1 of {what} is -1; expected a number greater than 0 (from 1e-9 to 1e12)"
+        )],
+    );
+}
+
+/// A compound whose parts have densities needs no mass.
+#[test]
+fn a_compound_has_the_densities_of_its_parts() {
+    let ball = |x: f64, density: f64| {
+        format!("{{ type = \"sphere\", radius_m = 0.1, position_m = [{x}, 0, 0], density_kg_per_m3 = {density} }}")
+    };
+    let text = format!(
+        "[[body]]\nname = \"b\"\nposition_m = [0, 0, 5]\nshape = {{ type = \"compound\", parts = [{}, {}] }}\n",
+        ball(0.0, 1000.0),
+        ball(0.4, 3000.0)
+    );
+    let (world, _) = SceneFile::parse(&text, "s.toml").unwrap().build().unwrap();
+    let object: &dyn std::any::Any = world.object(world.ids()[0]).unwrap();
+    let body = object.downcast_ref::<tumble_core::RigidBody>().unwrap();
+    let volume = 4.0 / 3.0 * std::f64::consts::PI * 1e-3;
+    assert!((body.mass() - 4000.0 * volume).abs() < 1e-9);
+    assert!((body.center_of_mass().x - 0.3).abs() < 1e-12 && body.initial_pose.translation.vector.z == 5.0);
+}
+
+#[test]
 fn old_names_are_reported_with_the_new_ones() {
     assert_errors(
         "[world]\nseconds = 1\n",
@@ -155,7 +204,7 @@ fn missing_keys() {
     assert_errors(
         &shape("{ radius_m = 1 }"),
         &[
-            "s.toml:2:9: the shape of body \"b\" has no `type`; expected `sphere`, `box`, `capsule`, `cylinder`, `half_space` or `mesh`",
+            "s.toml:2:9: the shape of body \"b\" has no `type`; expected `sphere`, `box`, `capsule`, `cylinder`, `half_space`, `mesh` or `compound`",
         ],
     );
     assert_errors(
@@ -548,7 +597,7 @@ fn pairs() {
     );
     assert_errors(
         &pair("materials = [\"ice\", \"ice\"]\n"),
-        &["s.toml:6:1: pair 1 has no `friction`; expected `restitution`, `friction` or both"],
+        &["s.toml:6:1: pair 1 has no `friction`; expected `restitution`, `friction`, `collides` or several of them"],
     );
     let twice = "materials = [\"ice\", \"ice\"]\nfriction = 0.1\n";
     assert_errors(

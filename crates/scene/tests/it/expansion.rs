@@ -42,10 +42,11 @@ fn the_empty_scene_has_the_defaults_of_the_documentation() {
 fn every_word_of_the_world() {
     let scene = read(
         "[world]\nstepper = \"backtracking\"\nintegrator = \"dormand_prince\"\nintegrator_tolerance = 1e-9\nsolver = \"lcp_sliding\"\nsubsteps = 4\niterations = 7\n\
-         duration_s = 2\ncontact_tolerance_m = 1e-5\ncombine_restitution = \"average\"\ncombine_friction = \"product\"\ngravity_m_per_s2 = [1, 2, 3]\nsleep_after_s = 0.25\nsleep_within_m = 1e-6\nthreads = 3\nbudget = 5000\n",
+         duration_s = 2\ncontact_tolerance_m = 1e-5\ncombine_restitution = \"average\"\ncombine_friction = \"product\"\ngravity_m_per_s2 = [1, 2, 3]\nsleep_after_s = 0.25\nsleep_within_m = 1e-6\nthreads = 3\nbudget = 5000\nevent_impulse_n_s = 0.5\n",
     );
     assert_eq!(scene.build().unwrap().0.settings().threads, 3);
     assert_eq!(scene.build().unwrap().0.settings().solver_settings.budget, Some(5000));
+    assert_eq!(scene.build().unwrap().0.settings().event_impulse, 0.5);
     let world = scene.world;
     assert_eq!(
         (world.stepper, world.integrator, world.solver),
@@ -158,13 +159,20 @@ fn a_body_takes_what_its_material_says_unless_it_says_otherwise() {
 fn a_body_with_every_key() {
     let it = body(
         "mode = \"kinematic\"\nposition_m = [1, 2, 3]\nvelocity_m_per_s = [4, 5, 6]\nangular_velocity_rad_per_s = [7, 8, 9]\n\
-         linear_damping_per_s = 0.1\nangular_damping_per_s = 0.2\ncollides = false\nenabled = false\nvisible = false\nclearcoat = 1\nmetallic = 0.5",
+         linear_damping_per_s = 0.1\nangular_damping_per_s = 0.2\ncollides = false\nenabled = false\nvisible = false\nclearcoat = 1\nmetallic = 0.5\n\
+         group = 5\nmask = [0, 63]\nsensor = true\ncenter_m = [0, 0, 0.5]\n\
+         inertia_kg_m2 = [1, 2, 2.5, 0, 0, 0.1]\ngravity_scale = -0.5\nlocked = [\"x\", \"rotation_z\"]",
     );
     assert_eq!((it.mode, it.mass), (Mode::Kinematic, Some(MassSpec::Mass(2.0))));
     assert_eq!((it.position_m, it.velocity_m_per_s), ([1.0, 2.0, 3.0], [4.0, 5.0, 6.0]));
     assert_eq!(it.angular_velocity_rad_per_s, [7.0, 8.0, 9.0]);
     assert_eq!((it.linear_damping_per_s, it.angular_damping_per_s), (0.1, 0.2));
     assert!(!it.collides && !it.enabled && !it.visible);
+    assert_eq!((it.center_m, it.gravity_scale), (Some([0.0, 0.0, 0.5]), -0.5));
+    let inertia = it.inertia_kg_m2.unwrap();
+    assert_eq!((inertia.m11, inertia.m22, inertia.m33, inertia.m23, inertia.m12), (1.0, 2.0, 2.5, 0.1, 0.0));
+    assert_eq!((it.locked.translation, it.locked.rotation), ([true, false, false], [false, false, true]));
+    assert_eq!((it.group.bit(), it.mask, it.sensor), (1 << 5, 1 | 1 << 63, true));
     assert_eq!((it.appearance.clearcoat, it.appearance.metallic), (1.0, 0.5));
 }
 

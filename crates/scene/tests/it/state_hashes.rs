@@ -50,14 +50,14 @@ macro_rules! table {
 }
 
 table! {
-    billiards_time_stepping: "billiards", TimeStepping, "d7521db61a4044f1", "dde13f97df02c7af";
-    billiards_backtracking: "billiards", Backtracking, "dde525a4d714d38e", "453edf585fcd7eb4";
-    bowling_time_stepping: "bowling", TimeStepping, "ed36688f395747c2", "00ad4d4029bdfdba";
-    bowling_backtracking: "bowling", Backtracking, "53db2850eca4d504", "b2be3e8f1177313a";
+    billiards_time_stepping: "billiards", TimeStepping, "33c170c167dc1596", "68443c48afff146a";
+    billiards_backtracking: "billiards", Backtracking, "4fc9ffdc997b30de", "18ac71f99f03a8c1";
+    bowling_time_stepping: "bowling", TimeStepping, "ed36688f395747c2", "c5c7dc3bb443bc78";
+    bowling_backtracking: "bowling", Backtracking, "53db2850eca4d504", "bedfe9242da3cf67";
     chain_time_stepping: "chain", TimeStepping, "269e2944ada62119", "f61bdc87b0d6177a";
     chain_backtracking: "chain", Backtracking, "dd07677ce4aa11c1", "6b8d1b78dea2c669";
     falling_time_stepping: "falling", TimeStepping, "55a2efd3019cb810", "7a1963c792f4dfdb";
-    falling_backtracking: "falling", Backtracking, "ccf7421bdf27a52b", "1ff36ae6912bb8fc";
+    falling_backtracking: "falling", Backtracking, "de16ab88f496d86d", "9d4b8e1ceee06e06";
     incline_time_stepping: "incline", TimeStepping, "c8d35ebc2e29a12a", "7b8c108360d8ae2c";
     incline_backtracking: "incline", Backtracking, "e55d9c0fdc513c1e", "a93b5ab540a60671";
     pendulum_time_stepping: "pendulum", TimeStepping, "d403df437fc48e8e", "07a9ea1905d7c967";

@@ -9,7 +9,7 @@ use tumble::net::sync::transport::MAX_FACETS;
 use tumble::net::sync::{User, Viewer, scene_hash};
 use tumble::render::CaveView;
 use tumble::scene::cave::{Cave, CaveSource, resolve_cave};
-use tumble::scene::{CavePlace, SceneFile, ShapeSpec, resolve_scene, visual_notes};
+use tumble::scene::{CavePlace, SceneFile, resolve_scene, visual_notes};
 
 /// Name of the slot of the process that draws a preview.
 pub const PREVIEW: &str = "preview";
@@ -182,9 +182,7 @@ fn merge_environment(scene: &mut SceneFile, from: SceneFile, notes: &mut Vec<Str
         }
         body.collides = false;
         body.material = body.material.map(|m| m + materials);
-        if let ShapeSpec::Mesh { mesh } = &mut body.shape {
-            *mesh += meshes;
-        }
+        body.shape.shift_meshes(meshes);
         scene.bodies.push(body);
     }
     Ok(())

@@ -315,7 +315,12 @@ impl Query<'_> {
         let nearest = if low.hit.distance < high.hit.distance { low } else { high };
         // two faces at depth `level` meet in an edge further up
         let distance = level * (a + b) / length;
-        self.bottom(line, s, Hit { distance, normal: sum / length, ..nearest.hit }, found);
+        let edge = Hit { distance, normal: sum / length, ..nearest.hit };
+        if distance >= 0.0 || self.is_surface(&line.at(s), &edge) {
+            self.bottom(line, s, edge, found);
+        } else {
+            self.bottom(line, nearest.s, nearest.hit, found);
+        }
     }
 
     fn bottom(&self, line: &Line, s: f64, hit: Hit, found: &mut Collector) {

@@ -1,5 +1,5 @@
-//! Deep overlaps of two meshes: the deepest point of one surface below the other, by branch and
-//! bound.
+//! Deep overlaps of two meshes, or of a box and a mesh: the deepest point of one surface below the
+//! other, by branch and bound.
 //!
 //! ```text
 //! D(p) = − d_B(p) ≤ dist_t(p)                            depth below B's surface: at most the distance from any of its triangles t
@@ -39,25 +39,34 @@ impl Query<'_> {
     /// Adds one contact at the deepest point of the mesh's faces below the other mesh's surface, if
     /// that is deeper than the other contacts.
     pub(super) fn deepest(&self, mesh: &MeshField, other: &MeshField, found: &mut Collector) {
-        let mut search = DepthSearch {
-            query: self,
-            mesh,
-            other,
-            deepest: (-found.min_gap()).max(0.0),
-            gain: MIN_GAIN * self.size,
-            best: None,
-        };
+        let mut search = DepthSearch::new(self, mesh.faces(), other, found);
         mesh.search_faces(&mut search);
-        if let Some((t, at)) = search.best {
-            let hit = self.field.hit(&at, &[], TOUCHING);
-            self.push(&at, 0.0, &hit, point_normal(&hit), 1 << 56 | t as u64, found);
-        }
+        search.push(found);
+    }
+
+    /// Adds one contact at the deepest point of a box's faces below the surface of the field's mesh,
+    /// if that is deeper than the other contacts.
+    pub(super) fn faces_of_box(&self, half: &Vec3, found: &mut Collector) {
+        let Some(other) = self.mesh else { return };
+        let faces: [[Vec3; 3]; 12] = std::array::from_fn(|t| {
+            let (k, side) = (t / 4, if t & 1 == 0 { 1.0 } else { -1.0 });
+            let corner = |u: f64, v: f64| {
+                let (u, v) = (Vec3::ith((k + 1) % 3, u), Vec3::ith((k + 2) % 3, v));
+                (Vec3::ith(k, side) + u + v).component_mul(half)
+            };
+            let last = if t & 2 == 0 { corner(1.0, -1.0) } else { corner(-1.0, 1.0) };
+            [corner(1.0, 1.0), corner(-1.0, -1.0), last]
+        });
+        let mut search = DepthSearch::new(self, &faces, other, found);
+        (0..faces.len()).for_each(|t| search.visit_triangle(t));
+        search.push(found);
     }
 }
 
 struct DepthSearch<'a, 'b> {
     query: &'a Query<'b>,
-    mesh: &'a MeshField,
+    /// Corners, in the frame of the element.
+    faces: &'a [[Vec3; 3]],
     other: &'a MeshField,
     /// Best depth so far, and the required gain, meters.
     deepest: f64,
@@ -101,12 +110,29 @@ impl BestFirstSearch for DepthSearch<'_, '_> {
     }
 
     fn visit_triangle(&mut self, t: usize) {
-        let corners = self.mesh.faces()[t].map(|c| self.sample(t, self.query.to_field(&c)));
+        let corners = self.faces[t].map(|c| self.sample(t, self.query.to_field(&c)));
         self.refine_part(t, corners, MAX_HALVINGS);
     }
 }
 
-impl DepthSearch<'_, '_> {
+impl<'a, 'b> DepthSearch<'a, 'b> {
+    fn new(
+        query: &'a Query<'b>,
+        faces: &'a [[Vec3; 3]],
+        other: &'a MeshField,
+        found: &Collector,
+    ) -> DepthSearch<'a, 'b> {
+        let deepest = (-found.min_gap()).max(0.0);
+        DepthSearch { query, faces, other, deepest, gain: MIN_GAIN * query.size, best: None }
+    }
+
+    /// Adds the contact of the deepest point, if there is one.
+    fn push(&self, found: &mut Collector) {
+        let Some((t, at)) = self.best else { return };
+        let hit = self.query.field.hit(&at, &[], TOUCHING);
+        self.query.push(&at, 0.0, &hit, point_normal(&hit), 1 << 56 | t as u64, found);
+    }
+
     fn sample(&mut self, t: usize, at: Vec3) -> DepthSample {
         let (distance, closest) = self.other.closest_face(&at);
         let depth = -distance;

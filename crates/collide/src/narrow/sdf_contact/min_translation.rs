@@ -47,6 +47,8 @@ const SAME_DEPTH: f64 = 1e-4;
 const MIN_DEPTH: f64 = 2e-3;
 /// Largest ratio of the translation along a contact's normal to its depth.
 const MAX_TRANSLATION_RATIO: f64 = 1.1;
+/// Maximum number of contacts of which the depth is limited.
+const MAX_LIMITED: usize = 32;
 /// Gap at which the two touch.
 const TOUCH_GAP: f64 = 1e-5;
 /// Margin of the contacts at which they touch.
@@ -64,19 +66,34 @@ const IMPROVEMENT: f64 = 1.0 - 1e-6;
 const MAX_POINTS: usize = 128;
 /// Fraction of the points inside the other body above which two bodies are inside each other.
 const MIN_INSIDE_FRACTION: f64 = 0.2;
+/// Largest ratio of a translation to the minimum.
+const MAX_EXCESS: f64 = 1.005;
+/// Maximum number of halvings of a cone of directions, and of cones that wait.
+const MAX_HALVINGS: u32 = 10;
+const MAX_CONES: usize = 8 + 3 * (MAX_HALVINGS as usize + 1);
+/// Maximum number of directions of branch and bound.
+const MAX_SUPPORTS: usize = 4096;
+/// Maximum number of vertices of meshes that they are compared with.
+const MAX_POINT_TESTS: usize = 1 << 20;
 /// First and last step of the local search, radians; steps are halved.
 const FIRST_STEP: f64 = 0.1;
 const LAST_STEP: f64 = 1e-4;
 const MAX_STEPS: usize = 60;
 
-/// Replaces the contacts if they do not separate the bodies.
+/// Replaces the contacts if they do not separate the bodies. No contact stays deeper than the
+/// translation along its normal that separates the bodies.
 pub(super) fn separate(a: &Body, b: &Body, a_in_b: &Pose, size: f64, sampled: &SampledDistance, found: &mut Collector) {
     let (contact_depth, sampled_depth) = (-found.min_gap(), -sampled.min);
     let missing = sampled_depth >= -OVERLAP_TOLERANCE * size && contact_depth < sampled_depth - SAME_DEPTH * size;
-    if !(missing || contact_depth.max(sampled_depth) > MIN_DEPTH * size) || a.field.is_linear() || b.field.is_linear() {
+    if a.field.is_linear() || b.field.is_linear() {
         return;
     }
     let pair = BodyPair { a, b, pose: a_in_b, rotation: *a_in_b.rotation.to_rotation_matrix().matrix(), size };
+    if !(missing || contact_depth.max(sampled_depth) > MIN_DEPTH * size || pair.is_crossed(found)) {
+        return;
+    }
+    pair.limit_depths(found);
+    let contact_depth = -found.min_gap();
     if !(a.field.is_convex() && b.field.is_convex()) {
         if (missing && contact_depth < SAME_DEPTH * size)
             || (contact_depth > DEEP_OVERLAP * size && pair.inside_fraction() > MIN_INSIDE_FRACTION)
@@ -85,14 +102,36 @@ pub(super) fn separate(a: &Body, b: &Body, a_in_b: &Pose, size: f64, sampled: &S
         }
         return;
     }
-    if found.deepest().is_some_and(|c| {
-        pair.overlap_along(&c.normal) <= contact_depth.max(MAX_TRANSLATION_RATIO * contact_depth) + SAME_DEPTH * size
-    }) {
+    let along = found.deepest().map_or(f64::INFINITY, |c| pair.overlap_along(&c.normal));
+    let resolved = along <= contact_depth.max(MAX_TRANSLATION_RATIO * contact_depth) + SAME_DEPTH * size;
+    if resolved && (contact_depth <= DEEP_OVERLAP * size || !pair.is_curved()) {
         return;
     }
     let (direction, depth) = pair.min_overlap();
+    if resolved && along <= MAX_EXCESS * depth.min(contact_depth) {
+        return;
+    }
     if depth > SAME_DEPTH * size {
         pair.touching_contacts(direction, depth, found);
+    }
+}
+
+/// Removes deep contacts that lie outside both bodies, if others overlap.
+pub(super) fn remove_distant(a: &Body, b: &Body, a_in_b: &Pose, size: f64, found: &mut Collector) {
+    if found.min_gap() >= -DEEP_OVERLAP * size || a.field.is_linear() || b.field.is_linear() {
+        return;
+    }
+    let (of_a, of_b) = (a.bounds(), b.bounds());
+    let is_near = |c: &Contact| {
+        let at_a = a_in_b.inverse_transform_point(&c.point.into()).coords;
+        let reach = (0.5 * -c.gap).max(0.0) + OVERLAP_TOLERANCE * size;
+        let outside = |p: &Vec3, [low, high]: &[Vec3; 2]| (p - p.sup(low).inf(high)).norm();
+        c.gap >= -DEEP_OVERLAP * size
+            || c.feature == SEPARATION_FEATURE
+            || outside(&at_a, &of_a).max(outside(&c.point, &of_b)) <= reach
+    };
+    if found.contains_like(|c| !is_near(c)) && found.contains_like(|c| c.gap < 0.0 && is_near(c)) {
+        found.map_and_retain(found.limit(), |c| is_near(c));
     }
 }
 
@@ -110,6 +149,28 @@ impl BodyPair<'_> {
     fn overlap_along(&self, n: &Vec3) -> f64 {
         self.b.elements.support(n) + self.a.elements.support(&-self.rotation.tr_mul(n))
             - n.dot(&self.pose.translation.vector)
+    }
+
+    /// Returns whether two primitives overlap along the normal of their deepest contact, although that
+    /// is shallow: a side of one crosses the other between the elements. Meshes are not tested.
+    fn is_crossed(&self, found: &Collector) -> bool {
+        let convex = |body: &Body| body.mesh.is_none() && body.field.is_convex();
+        convex(self.a)
+            && convex(self.b)
+            && found.deepest().is_some_and(|c| self.overlap_along(&c.normal) > MIN_DEPTH * self.size)
+    }
+
+    /// Limits the depth of the deepest contacts to the translation along their normals that separates
+    /// the bodies, or their hulls.
+    fn limit_depths(&self, found: &mut Collector) {
+        for _ in 0..MAX_LIMITED {
+            let Some(deepest) = found.deepest_mut().filter(|c| c.gap < -MIN_DEPTH * self.size) else { return };
+            let depth = self.overlap_along(&deepest.normal).max(0.0);
+            if -deepest.gap <= depth + OVERLAP_TOLERANCE * self.size {
+                return;
+            }
+            deepest.gap = -depth;
+        }
     }
 
     /// Returns the best direction of those tried, and its translation.
@@ -144,12 +205,54 @@ impl BodyPair<'_> {
             (off - axis * axis.dot(&off)).try_normalize(1e-9 * self.size).into_iter().for_each(&mut either);
         }
         off.try_normalize(1e-9 * self.size).into_iter().for_each(&mut either);
-        let many = |body: &Body| {
+        if self.is_curved() { self.refine(self.search_directions(best)) } else { best }
+    }
+
+    /// Returns whether the directions of separation are more than the candidates: a round surface, or
+    /// a mesh of many sides.
+    fn is_curved(&self) -> bool {
+        [self.a, self.b].iter().any(|body| {
             body.field.is_round()
                 || body.mesh.is_some_and(|mesh| mesh.faces().len() > MAX_FACES)
                 || body.edge_directions().is_empty()
-        };
-        if many(self.a) || many(self.b) { self.refine(best) } else { best }
+        })
+    }
+
+    /// Returns the point of `C` that is furthest along a unit direction.
+    fn support_of_difference(&self, n: &Vec3) -> Vec3 {
+        let of_a = self.rotation * self.a.elements.support_point(&-self.rotation.tr_mul(n));
+        self.b.elements.support_point(n) - of_a - self.pose.translation.vector
+    }
+
+    /// Returns the best direction by branch and bound, and its translation.
+    fn search_directions(&self, mut best: (Vec3, f64)) -> (Vec3, f64) {
+        let axes = |octant: u32| std::array::from_fn(|k| Vec3::ith(k, if octant >> k & 1 == 0 { 1.0 } else { -1.0 }));
+        let mut cones: ArrayVec<([Vec3; 3], u32), MAX_CONES> = (0..8).map(|octant| (axes(octant), 0)).collect();
+        let points =
+            |body: &Body| if let BodyElements::Mesh(elements) = &body.elements { elements.points.len() } else { 1 };
+        let mut left = (MAX_POINT_TESTS / (points(self.a) + points(self.b))).min(MAX_SUPPORTS);
+        while let Some((cone, halvings)) = cones.pop() {
+            if left == 0 {
+                break;
+            }
+            left -= 1;
+            let middle = (cone[0] + cone[1] + cone[2]).normalize();
+            let furthest = self.support_of_difference(&middle);
+            let depth = furthest.dot(&middle);
+            if depth < IMPROVEMENT * best.1 {
+                best = (middle, depth);
+            }
+            let bound = cone.iter().map(|n| n.dot(&furthest)).fold(f64::INFINITY, f64::min);
+            if bound >= best.1 / MAX_EXCESS || halvings == MAX_HALVINGS {
+                continue;
+            }
+            let [a, b, c] = cone;
+            let [ab, bc, ca] = [a + b, b + c, c + a].map(|n| n.normalize());
+            for part in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
+                cones.push((part, halvings + 1));
+            }
+        }
+        best
     }
 
     /// Separates two bodies of which one is not convex: by the deepest point, or by their hulls.
@@ -222,11 +325,19 @@ impl BodyPair<'_> {
             contact.gap -= shift * along;
             along > MIN_ALIGNMENT
         });
-        if found.min_gap() > -(1.0 - TOUCH_MARGIN) * depth {
-            // no flat parts touch, so the support points do
+        self.limit_depths(found);
+        let convex = self.a.field.is_convex() && self.b.field.is_convex();
+        let excessive = |c: &Contact| convex && self.overlap_along(&c.normal) > MAX_EXCESS * depth;
+        if found.min_gap() > -(1.0 - TOUCH_MARGIN) * depth || found.deepest().is_some_and(excessive) {
+            // no flat parts touch across the direction, so the support points do
             let lowest = self.pose.translation.vector
                 + self.rotation * self.a.elements.support_point(&-self.rotation.tr_mul(&direction));
-            let point = 0.5 * (lowest + self.b.elements.support_point(&direction));
+            let highest = self.b.elements.support_point(&direction);
+            // midway from the one that is deeper in the other body
+            let of_a = self.b.field.bound(&lowest);
+            let of_b = self.a.field.bound(&self.pose.inverse_transform_point(&highest.into()).coords);
+            let half = 0.5 * depth * direction;
+            let point = if of_a <= of_b { lowest + half } else { highest - half };
             found.push(Contact {
                 point,
                 normal: direction,
@@ -253,6 +364,11 @@ fn inside_fraction(of: &Body, within: &Body, pose: &Pose, size: f64) -> f64 {
 const SEPARATION_FEATURE: u64 = 5 << 56;
 
 impl Body<'_> {
+    /// Returns the least and largest coordinates in its own frame.
+    fn bounds(&self) -> [Vec3; 2] {
+        [-1.0, 1.0].map(|sign| Vec3::from_fn(|k, _| sign * self.elements.support(&Vec3::ith(k, sign))))
+    }
+
     /// Calls `visit` for the normals of flat faces.
     fn for_each_normal(&self, visit: &mut dyn FnMut(Vec3)) {
         match (&self.elements, self.mesh) {

@@ -66,6 +66,7 @@ pub(in crate::narrow) fn contacts(
     let mut found = Collector::new(margin, size, out);
     let sampled = elements(a, b, &a_in_b, size, &mut found);
     min_translation::separate(a, b, &a_in_b, size, &sampled, &mut found);
+    min_translation::remove_distant(a, b, &a_in_b, size, &mut found);
     found.finish(pose_b);
 }
 
@@ -85,11 +86,14 @@ fn elements(a: &Body, b: &Body, a_in_b: &Pose, size: f64, found: &mut Collector)
     SampledDistance { min: first.min_distance().min(second.min_distance()) }
 }
 
-/// Adds the deepest point of the faces of each mesh in the other body.
+/// Adds the deepest point of the faces of each mesh in the other body, and of a box in a mesh that is
+/// not convex.
 fn faces(queries: [&Query; 2], bodies: [&Body; 2], found: &mut Collector) {
     for (query, body) in queries.into_iter().zip(bodies) {
-        if let Some(mesh) = body.mesh {
-            query.faces(mesh, found);
+        match (&body.elements, body.mesh) {
+            (_, Some(mesh)) => query.faces(mesh, found),
+            (BodyElements::Box(half), None) if !query.field.is_convex() => query.faces_of_box(half, found),
+            _ => {}
         }
     }
 }

@@ -26,6 +26,9 @@ struct PointBound {
 /// of the smaller body's radius.
 const SAME_DEPTH: f64 = 1e-6;
 const SAME_POINT: f64 = 1e-3;
+/// Distance from the surface at which two extended faces still meet in an edge of it, as a fraction
+/// of the smaller body's radius.
+const RIDGE_TOLERANCE: f64 = 1e-4;
 
 /// The elements of one body against the field of the other.
 pub(super) struct Query<'a> {
@@ -277,7 +280,20 @@ impl<'a> Query<'a> {
                 (self.field.hit(at, &transformed(), OVERHANG), seen)
             }
         };
-        self.push_point(at, 0.0, hit, elements.edge_directions_of(point), point.index, found);
+        let down = self.rotation.tr_mul(&hit.normal);
+        // an edge that leads closer, over a face that this vertex does not touch first, or to an edge
+        // of the other body, whose own search finds the contact
+        let max_slope = f64::from(match hit.feature {
+            Feature::Face => point.max_slope,
+            Feature::Edge(_) => 0.0,
+            _ if self.mesh.is_none() => 0.0,
+            _ => point.max_slope,
+        })
+        .max(SLOPE_ROUNDING);
+        let first = max_slope.is_infinite() || elements.ring_of(point).all(|edge| down.dot(&edge) >= -max_slope);
+        let edges = if first { elements.edge_directions_of(point) } else { &[] };
+        let hit = Hit { facing: hit.facing && first, ..hit };
+        self.push_point(at, 0.0, hit, edges, point.index, found);
         seen
     }
 
@@ -374,6 +390,12 @@ impl<'a> Query<'a> {
             None => contact,
             Some(pose) => transformed(contact, pose).flipped(),
         }
+    }
+
+    /// Returns whether a place to which two faces were extended, at a hit of a point inside, is no
+    /// more than rounding outside the surface: the faces end where they meet.
+    pub(super) fn is_surface(&self, at: &Vec3, hit: &Hit) -> bool {
+        self.field.bound(&(at - hit.normal * hit.distance)) <= RIDGE_TOLERANCE * self.size
     }
 
     /// Returns whether there is a contact of the same depth at nearly the same place.

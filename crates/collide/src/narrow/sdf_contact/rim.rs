@@ -247,7 +247,10 @@ impl Query<'_> {
         {
             // two faces at depth `level` meet in an edge further up
             let faces = facing(&[at, rim.up], &normal.0);
-            (direction, hit) = (at, Hit { distance: level * normal.1, normal: normal.0, facing: faces, ..hit });
+            let edge = Hit { distance: level * normal.1, normal: normal.0, facing: faces, ..hit };
+            if self.is_surface(&rim.at(&at), &edge) {
+                (direction, hit) = (at, edge);
+            }
         }
         let tilt = across(&hit.normal, &rim.up).norm();
         if !hit.facing || tilt < MIN_TILT {

@@ -18,6 +18,11 @@
 //! A short edge with a small angle has an [`Edge::end_tolerance`]: it makes no contact of its own
 //! if one of its ends is on a face and at most `ε` further from the other body. The gap then has
 //! the same error `ε`.
+//!
+//! **Selection of vertices.** A vertex without a convex edge, inside a flat part or in a valley, is
+//! no element: another body is as close or closer to one of its faces. Any other vertex is closest
+//! to another body only if no edge leads closer from it, so it stores the directions of all its
+//! edges. Without that test the vertices ahead of a body would stop its motion over a flat part.
 
 mod groups;
 
@@ -32,6 +37,14 @@ pub(crate) const EDGE_ERROR: f64 = 2e-4;
 /// smooth surface.
 const SMOOTH_ANGLE: f64 = 0.5;
 const SMOOTH_LENGTH: f64 = 0.03;
+/// Turn of an edge, radians, from which the vertices at its ends make contacts above any face.
+const SHARP_TURN: f64 = 0.25;
+/// At smaller turns a vertex makes a contact above a face that is inclined to its own normals by at
+/// most this many turns, and by at least the sine below: the body may rock onto it.
+const TURNS_BEYOND: f64 = 4.0;
+const MIN_FLAT_SLOPE: f64 = 1e-3;
+/// Difference from 1 of the cosine between edges along one line.
+const STRAIGHT: f64 = 1e-9;
 /// Normals of a vertex within this cosine of another one are left out.
 const SAME_NORMAL_COSINE: f64 = 0.98;
 /// Maximum number of normals per vertex.
@@ -50,6 +63,12 @@ pub(crate) struct Point {
     /// [`Elements::edge_directions`].
     pub first_direction: u32,
     pub edge_directions: u32,
+    /// Range of the directions of its other edges in [`Elements::ring`].
+    pub first_ring: u32,
+    pub ring: u32,
+    /// Largest slope towards the other body, along any of its edges, with which it makes a contact
+    /// above or below a face: infinite at sharp edges.
+    pub max_slope: f32,
     /// Start of its edges in [`Elements::edges`], number of those that are always tested, number of
     /// fine ones.
     pub first_edge: u32,
@@ -84,6 +103,10 @@ pub(crate) struct Elements {
     pub edges: Vec<Edge>,
     pub normals: Vec<Vec3>,
     pub edge_directions: Vec<Vec3>,
+    /// Unit directions of the edges that are not searched, in single precision.
+    pub ring: Vec<[f32; 3]>,
+    /// Number of vertices at which convex edges of different directions meet.
+    pub corners: usize,
     /// Nodes and groups. The first contains all; the children of each are adjacent.
     pub groups: Vec<Group>,
 }
@@ -143,7 +166,7 @@ impl Elements {
         let face = face_normals(mesh);
         let mut all = Elements::default();
         let (mut edges, searched) = gather_edges(mesh, groups, &face);
-        all.gather_points(mesh, &face, &searched);
+        all.gather_points(mesh, &face, &searched, &edges);
         edges.sort_by_key(|e| (e.points[0], e.fine, e.index));
         for point in &mut all.points {
             let of = |fine: bool| {
@@ -235,16 +258,38 @@ impl Elements {
         &self.edge_directions[point.first_direction as usize..(point.first_direction + point.edge_directions) as usize]
     }
 
-    /// Collects the vertices.
-    fn gather_points(&mut self, mesh: &TriMesh, face: &[Vec3], searched: &[[bool; 3]]) {
+    /// Returns the unit directions of the edges of a vertex that are not searched.
+    pub fn ring_of(&self, point: &Point) -> impl Iterator<Item = Vec3> {
+        let ring = &self.ring[point.first_ring as usize..(point.first_ring + point.ring) as usize];
+        ring.iter().map(|direction| Vec3::from(direction.map(f64::from)))
+    }
+
+    /// Collects the vertices of the convex edges.
+    fn gather_points(&mut self, mesh: &TriMesh, face: &[Vec3], searched: &[[bool; 3]], edges: &[Edge]) {
         let mut edge_directions: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.vertices.len()];
+        let mut ring: Vec<Vec<[f32; 3]>> = vec![Vec::new(); mesh.vertices.len()];
         for (t, triangle) in mesh.triangles.iter().enumerate() {
-            for k in (0..3).filter(|&k| searched[t][k]) {
+            for k in 0..3 {
                 let (from, to) = (triangle[k] as usize, triangle[(k + 1) % 3] as usize);
                 // the neighboring triangle has the same edge in the opposite direction
-                edge_directions[from].push((mesh.vertices[to] - mesh.vertices[from]).normalize());
+                let direction = (mesh.vertices[to] - mesh.vertices[from]).normalize();
+                match searched[t][k] {
+                    true => edge_directions[from].push(direction),
+                    false => ring[from].push([direction.x, direction.y, direction.z].map(|x| x as f32)),
+                }
             }
         }
+        // the largest turn of the convex edges at each vertex, below 0 without any; one of their
+        // directions, zero at corners
+        let mut turns = vec![-1.0_f64; mesh.vertices.len()];
+        let mut directions = vec![Vec3::zeros(); mesh.vertices.len()];
+        for (edge, v) in edges.iter().flat_map(|edge| edge.points.map(|v| (edge, v as usize))) {
+            let direction = (edge.ends[1] - edge.ends[0]) / edge.length;
+            let bends = turns[v] >= 0.0 && directions[v].dot(&direction).abs() < 1.0 - STRAIGHT;
+            directions[v] = if turns[v] < 0.0 { direction } else { directions[v] * f64::from(u8::from(!bends)) };
+            turns[v] = turns[v].max(edge.turn());
+        }
+        self.corners = (0..turns.len()).filter(|&v| turns[v] >= 0.0 && directions[v] == Vec3::zeros()).count();
         let mut around: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.vertices.len()];
         for (t, triangle) in mesh.triangles.iter().enumerate() {
             for &v in triangle {
@@ -255,7 +300,7 @@ impl Elements {
             }
         }
         for (v, normals) in around.iter().enumerate() {
-            if normals.is_empty() {
+            if normals.is_empty() || turns[v] < 0.0 {
                 continue;
             }
             let at = mesh.vertices[v];
@@ -266,15 +311,31 @@ impl Elements {
                 count: normals.len() as u32,
                 first_direction: self.edge_directions.len() as u32,
                 edge_directions: edge_directions[v].len() as u32,
+                first_ring: self.ring.len() as u32,
+                ring: ring[v].len() as u32,
+                max_slope: max_slope(turns[v]),
                 first_edge: 0,
                 edges: [0; 2],
                 longest: [0.0; 2],
             };
             self.normals.extend(normals);
             self.edge_directions.extend(&edge_directions[v]);
+            self.ring.extend(&ring[v]);
             self.points.push(point);
         }
     }
+}
+
+impl Edge {
+    /// Returns the angle between the normals of its faces, radians.
+    fn turn(&self) -> f64 {
+        ComplexField::acos(self.normals[0].dot(&self.normals[1]).clamp(-1.0, 1.0))
+    }
+}
+
+/// Returns [`Point::max_slope`] for the largest turn of the convex edges at a vertex, radians.
+fn max_slope(turn: f64) -> f32 {
+    if turn < SHARP_TURN { (TURNS_BEYOND * turn).max(MIN_FLAT_SLOPE) as f32 } else { f32::INFINITY }
 }
 
 /// Returns the convex edges.
@@ -289,31 +350,32 @@ fn gather_edges(mesh: &TriMesh, groups: &EdgeGroups, face: &[Vec3]) -> (Vec<Edge
         let apart = mesh.corners(group[group.len() - 1].face);
         // more than two faces, or a convex edge: the other face is below the plane of the first
         let reach = apart.iter().map(|c| normals[0].dot(&(c - ends[0]))).fold(0.0, f64::min);
-        let turn = ComplexField::acos(normals[0].dot(&normals[1]).clamp(-1.0, 1.0));
         let length = (ends[1] - ends[0]).norm();
         let convex = reach < -1e-9 * length;
         if group.len() == 2 && !convex {
             continue;
         }
-        let fine = group.len() == 2 && 0.25 * turn * length <= error;
+        let mut edge = Edge {
+            ends,
+            length,
+            points: [group[0].low, group[0].high],
+            end_tolerance: 0.0,
+            fine: false,
+            normals,
+            index: index as u32,
+        };
+        let turn = edge.turn();
         let smooth = group.len() == 2 && turn < SMOOTH_ANGLE && length < SMOOTH_LENGTH * diagonal;
-        let end_tolerance = if smooth { error } else { 0.0 };
-        for u in group.iter().filter(|_| !fine) {
+        edge.fine = group.len() == 2 && 0.25 * turn * length <= error;
+        edge.end_tolerance = if smooth { error } else { 0.0 };
+        for u in group.iter().filter(|_| !edge.fine) {
             let t = mesh.triangles[u.face];
             let from = if u.forward { u.low } else { u.high };
             if let Some(k) = (0..3).find(|&k| t[k] == from && t[(k + 1) % 3] == u.low + u.high - from) {
                 searched[u.face][k] = true;
             }
         }
-        edges.push(Edge {
-            ends,
-            length,
-            points: [group[0].low, group[0].high],
-            end_tolerance,
-            fine,
-            normals,
-            index: index as u32,
-        });
+        edges.push(edge);
     }
     (edges, searched)
 }

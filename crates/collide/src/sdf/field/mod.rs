@@ -291,6 +291,7 @@ impl MeshField {
             return each(closest.triangle as u64, self.hit_on(p, closest.triangle));
         }
         near.sort_unstable();
+        let mut found = false;
         for same in near.chunk_by(|a, b| a.0 == b.0) {
             let wanted = match same[0].0 >> 62 {
                 0 => 1,
@@ -300,9 +301,14 @@ impl MeshField {
             if same.len() >= wanted {
                 let hit = self.hit_on(p, same[0].1 as usize);
                 if hit.distance >= 0.0 {
+                    found = true;
                     each(same[0].0, hit);
                 }
             }
+        }
+        // rounding may assign a point above an edge or corner to different features of its triangles
+        if !found && least <= radius {
+            each(closest.triangle as u64, self.hit_on(p, closest.triangle));
         }
     }
 

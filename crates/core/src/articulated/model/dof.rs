@@ -103,7 +103,7 @@ pub struct Coupling {
 
 impl DofSettings {
     /// Returns the first setting out of its range: name, value, admissible range.
-    pub(in crate::articulated) fn range_error(&self, positional: bool) -> Option<(&'static str, f64, &'static str)> {
+    pub(crate) fn range_error(&self, positional: bool) -> Option<(&'static str, f64, &'static str)> {
         let least =
             |what, value: f64| (!(value.is_finite() && value >= 0.0)).then_some((what, value, "finite and at least 0"));
         let finite = |what, value: f64| (!value.is_finite()).then_some((what, value, "finite"));
@@ -146,13 +146,13 @@ impl DofSettings {
     }
 
     /// Returns the generalized force of the spring, which is explicit in every stepper.
-    pub(in crate::articulated) fn spring_force(&self, q: f64) -> f64 {
+    pub(crate) fn spring_force(&self, q: f64) -> f64 {
         self.spring.map_or(0.0, |s| s.stiffness * (s.rest - q))
     }
 
     /// Returns the generalized force of damping and of a position drive, for steps whose rows are
     /// not implicit.
-    pub(in crate::articulated) fn explicit_force(&self, q: f64, v: f64) -> f64 {
+    pub(crate) fn explicit_force(&self, q: f64, v: f64) -> f64 {
         let drive = match &self.drive {
             Drive::Position { stiffness, damping, target, velocity, limit } => {
                 (stiffness * (target - q) + damping * (velocity - v)).clamp(-limit, *limit)

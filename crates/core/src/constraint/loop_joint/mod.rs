@@ -2,22 +2,32 @@
 //! the thesis, §VI).
 //!
 //! Each side has a frame in its part's axes: origin `p`, axes `x y z`. `s(q) = v_A(q) − v_B(q)` is
-//! the velocity of A's material point at `q` relative to B's, and `ω = ω_A − ω_B`:
+//! the velocity of A's material point at `q` relative to B's, `ω = ω_A − ω_B`, and `d = p_A − p_B`:
 //!
 //! ```text
 //! rows                        error                       velocity           bias J̇·v
-//! origins     e = X, Y, Z     e·(p_A − p_B)               e·ṗ_A − e·ṗ_B      e·(p̈_A − p̈_B)
-//! line        t = x_B, y_B    t·(p_A − p_B)               t·s(p_A)           t·ds/dt + (ω_B × t)·s
+//! origins     e = X, Y, Z     e·d                         e·ṗ_A − e·ṗ_B      e·(p̈_A − p̈_B)
+//! line        t = x_B, y_B    t·d                         t·s(p_A)           t·ds/dt + (ω_B × t)·s
+//! plane       t = z_B         as a line
 //! rotation    e = X, Y, Z     e·log(R_A·R_Bᵀ)             e·ω                e·(α_A − α_B)
 //! axis        t = x_B, y_B    t·(z_B × z_A)·θ/sin θ       t·ω                t·(α_A − α_B) + (ω_B × t)·ω
+//! across      n = z_A × x_B   asin(z_A·x_B)               n·ω/|n|            n·(α_A − α_B)/|n| + d(n/|n|)/dt·ω
+//! distance    n = d/|d|       |d| − length                n·ḋ                n·d̈ + (|ḋ|² − (n·ḋ)²)/|d|
+//! gear        z_A, z_B        θ_A + θ_B·n_B/n_A           z_A·ω_A + z_B·ω_B·n_B/n_A
+//! rack        z_A, z_B        radius·θ_A − s_B            radius·z_A·ω_A − z_B·ṗ_B
+//! screw       t = z_B         t·d − pitch·θ/2π            t·s(p_A) − t·ω·pitch/2π
 //!
 //! spherical = origins    revolute = origins + axis    fixed = origins + rotation    prismatic = line + rotation
+//! cylindrical = line + axis    planar = plane + axis    universal = origins + across
+//!
+//! Angles have no count of turns. The errors of gears, racks and screws need none: they are taken modulo a
+//! tooth or a turn, so the ratio is exact over any number of turns.
 //! ```
 //!
 //! | symbol | meaning |
 //! |---|---|
 //! | `X, Y, Z` | axes of the world: they do not turn, so these rows are smooth in any pose |
-//! | `x_B, y_B, z_B` | axes of B's frame; revolute and prismatic joints keep `z_A` on `z_B` |
+//! | `x_B, y_B, z_B` | axes of B's frame; most joints keep `z_A` on `z_B` |
 //! | `p̈`, `α` | accelerations at constant generalized velocities: `ω × (ω × r)` of a rigid body, plus the terms of the joints above a link |
 //! | `θ` | the angle between `z_A` and `z_B` |
 //!
@@ -25,91 +35,57 @@
 //! derivatives of their errors (`s(p_A)` contains the arm on which B's axes turn). The error of a
 //! rotation is exact to first order and vanishes only at the solution: the position correction
 //! reaches it in Newton steps.
+//!
+//! **Position.** Some kinds have one: the angle of A about `z_B` from `x_B`, the displacement
+//! `z_B·d`, or the length `|d|`. It has the settings of a degree of freedom ([`DofSettings`]), whose
+//! rows are those of a joint of an articulated body. Only the spring differs: with implicit rows it
+//! is the implicit midpoint rule, which is stable at any stiffness and keeps energy,
+//!
+//! ```text
+//! λ = −h·k·(q_½ − rest),    q_½ = q₀ + ½h·(q̇₀ + q̇₁)/2    as a soft row:    R = 4/(k·h²),    q̇* = q̇₀ − 4·(q_f − rest)/h
+//! ```
+//!
+//! with `q_f = q₀ + ½h·q̇₀`, the position in the view. Otherwise springs, damping and position drives
+//! are forces.
 
+mod at;
+mod error;
+mod force;
+mod kind;
+mod pair;
+mod transmission;
+
+pub use at::{Anchor, JointPlace};
+pub use error::LoopJointError;
+pub use force::JointForce;
+pub use kind::LoopJointKind;
+pub use transmission::Transmission;
+
+use crate::articulated::DofSettings;
 use crate::constraint::builder::RowBuilder;
+use crate::constraint::dof_rows::DofState;
 use crate::constraint::rows::RowSet;
-use crate::object::part_state::{PartState, StateRange};
-use crate::object::{Constraint, Level, Object, RowTarget};
-use crate::world::World;
+use crate::object::part_state::{Forces, StateRange};
+use crate::object::{Constraint, ForceGenerator, Level, Object, RowTarget};
 use crate::world::view::{ObjectId, WorldView};
-use nalgebra::{RealField, Rotation3, Translation3};
-use tumble_collide::{Mat3, Pose, Quat, Vec3};
+use pair::{Coordinate, EndPair, JointRow, Motion, Term};
+use std::f64::consts::{PI, TAU};
 
 #[cfg(test)]
 mod tests;
 
-/// The motion that a loop joint leaves free.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub enum LoopJointKind {
-    /// The origins coincide; all rotations are free. Three rows.
-    Spherical,
-    /// The origins and the z axes coincide; one rotation is free. Five rows.
-    Revolute,
-    /// Both frames coincide. Six rows.
-    Fixed,
-    /// All but the displacement along the z axes is held: a piston in its cylinder. Five rows.
-    Prismatic,
-}
-
-/// One side of a loop joint: a frame fixed to a part, or to the world.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Anchor {
-    /// Object and part; `None` for the world.
-    pub part: Option<(ObjectId, usize)>,
-    /// The frame in the part's axes, or in the world's if there is no part; m.
-    pub frame: Pose,
-}
-
-impl Anchor {
-    /// Returns a frame of the world.
-    pub fn world(frame: Pose) -> Anchor {
-        Anchor { part: None, frame }
-    }
-
-    /// Returns a frame fixed to one part of an object.
-    pub fn on(id: ObjectId, part: usize, frame: Pose) -> Anchor {
-        Anchor { part: Some((id, part)), frame }
-    }
-}
-
-/// Why a loop joint cannot be made.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum LoopJointError {
-    /// Both sides are the world.
-    #[error("loop joint '{0}' joins the world to itself; one side must be a part of an object")]
-    NoPart(String),
-    /// Both sides are the same part.
-    #[error("loop joint '{0}' joins a part to itself; its sides must be two parts, or a part and the world")]
-    SamePart(String),
-    /// The object or part of a side does not exist.
-    #[error("loop joint '{name}': there is no such object, or it has no part {part}")]
-    Gone {
-        /// Loop joint.
-        name: String,
-        /// Part of the side.
-        part: usize,
-    },
-    /// A frame, point or axis is not finite.
-    #[error("loop joint '{0}': a frame, point or axis is not finite")]
-    NotFinite(String),
-    /// The axis has length 0.
-    #[error("loop joint '{0}': the axis has length 0; it must have a direction")]
-    Axis(String),
-}
-
 /// Deviation of the two sides from the constraint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PositionError {
-    /// Distance of the origins, m; of a prismatic joint, the distance from its line.
+    /// Distance of the origins, m, without the displacements that are free. For a rope, its excess
+    /// length.
     pub distance: f64,
-    /// Angle between the frames, rad; of a revolute joint, between its axes; 0 for a spherical
-    /// joint.
+    /// Angle between the frames, rad, without the rotations that are free.
     pub angle: f64,
 }
 
-/// A joint between two parts of any objects. It has no state. It makes no rows while a side is
-/// missing or not enabled.
+/// A joint between two parts of any objects. It makes no rows while a side is missing or not
+/// enabled. A broken joint is disabled; [`World::set_enabled`](crate::World::set_enabled) mends it.
 ///
 /// ```
 /// # use tumble_core::{LoopJoint, RigidBody, Settings, World, collide::{Shape, Vec3}};
@@ -117,7 +93,7 @@ pub struct PositionError {
 /// # let door = world.add(RigidBody::new(Shape::cuboid(Vec3::new(0.8, 0.04, 2.0))?).with_name("door").with_mass(20.0))?;
 /// # let (point, axis) = (Vec3::new(-0.4, 0.0, 0.0), Vec3::z());
 /// let hinge = LoopJoint::revolute_at("hinge", &world, Some((door, 0)), None, point, axis)?;
-/// world.add(hinge)?;
+/// world.add(hinge.with_limits([-1.0, 1.0])?.with_breaking_force(5000.0)?)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -126,13 +102,19 @@ pub struct LoopJoint {
     kind: LoopJointKind,
     a: Anchor,
     b: Anchor,
+    dof: DofSettings,
+    length: f64,
+    breaking_force: f64,
+    breaking_torque: f64,
+    transmission: Transmission,
 }
 
 type PartRef = Option<(ObjectId, usize)>;
 
 impl LoopJoint {
     /// Joins two frames. Frames that do not coincide are brought together at
-    /// [`recovery_speed`](crate::Settings::recovery_speed).
+    /// [`recovery_speed`](crate::Settings::recovery_speed). The length of a distance, a rope or a spring
+    /// is 1 m until it is [set](Self::with_length).
     ///
     /// # Errors
     /// [`LoopJointError::NoPart`] or [`LoopJointError::SamePart`] for sides that are the same,
@@ -147,105 +129,159 @@ impl LoopJoint {
         if a.part.is_none() && b.part.is_none() {
             return Err(LoopJointError::NoPart(name));
         }
+        if kind.joins_two_parts() && (a.part.is_none() || b.part.is_none()) {
+            return Err(LoopJointError::OnePart(name, kind.name()));
+        }
         if a.part == b.part {
             return Err(LoopJointError::SamePart(name));
         }
         if [a, b].iter().any(|side| side.frame.to_homogeneous().iter().any(|x| !x.is_finite())) {
             return Err(LoopJointError::NotFinite(name));
         }
-        Ok(LoopJoint { name, kind, a, b })
+        Ok(LoopJoint {
+            name,
+            kind,
+            a,
+            b,
+            dof: DofSettings::default(),
+            length: 1.0,
+            breaking_force: f64::INFINITY,
+            breaking_torque: f64::INFINITY,
+            transmission: Transmission::default(),
+        })
     }
 
-    /// Joins two parts in their present poses by a spherical joint at a world point (m).
+    /// Sets the constants of a gear, a rack, a screw or a pulley.
     ///
     /// # Errors
-    /// [`LoopJointError`] if the sides are the same, a part does not exist, or the point is not
-    /// finite.
-    pub fn spherical_at(
-        name: impl Into<String>,
-        world: &World,
-        a: PartRef,
-        b: PartRef,
-        point: Vec3,
-    ) -> Result<LoopJoint, LoopJointError> {
-        LoopJoint::at(name.into(), LoopJointKind::Spherical, world, [a, b], point, Vec3::z())
-    }
-
-    /// Joins two parts in their present poses by a revolute joint at a world point (m) about a
-    /// world axis (any length but 0).
-    ///
-    /// # Errors
-    /// [`LoopJointError`] if the sides are the same, a part does not exist, or the point or axis is
-    /// not valid.
-    pub fn revolute_at(
-        name: impl Into<String>,
-        world: &World,
-        a: PartRef,
-        b: PartRef,
-        point: Vec3,
-        axis: Vec3,
-    ) -> Result<LoopJoint, LoopJointError> {
-        LoopJoint::at(name.into(), LoopJointKind::Revolute, world, [a, b], point, axis)
-    }
-
-    /// Joins two parts rigidly in their present poses. The world point (m) is the origin of both
-    /// frames; it affects only the reported errors.
-    ///
-    /// # Errors
-    /// [`LoopJointError`] if the sides are the same, a part does not exist, or the point is not
-    /// finite.
-    pub fn fixed_at(
-        name: impl Into<String>,
-        world: &World,
-        a: PartRef,
-        b: PartRef,
-        point: Vec3,
-    ) -> Result<LoopJoint, LoopJointError> {
-        LoopJoint::at(name.into(), LoopJointKind::Fixed, world, [a, b], point, Vec3::z())
-    }
-
-    /// Joins two parts in their present poses by a prismatic joint along a world axis (any length
-    /// but 0) through a world point (m).
-    ///
-    /// # Errors
-    /// [`LoopJointError`] if the sides are the same, a part does not exist, or the point or axis is
-    /// not valid.
-    pub fn prismatic_at(
-        name: impl Into<String>,
-        world: &World,
-        a: PartRef,
-        b: PartRef,
-        point: Vec3,
-        axis: Vec3,
-    ) -> Result<LoopJoint, LoopJointError> {
-        LoopJoint::at(name.into(), LoopJointKind::Prismatic, world, [a, b], point, axis)
-    }
-
-    fn at(
-        name: String,
-        kind: LoopJointKind,
-        world: &World,
-        parts: [PartRef; 2],
-        point: Vec3,
-        axis: Vec3,
-    ) -> Result<LoopJoint, LoopJointError> {
-        if point.iter().chain(axis.iter()).any(|x| !x.is_finite()) {
-            return Err(LoopJointError::NotFinite(name));
+    /// [`LoopJointError::Range`] for a constant out of its range.
+    pub fn set_transmission(&mut self, transmission: Transmission) -> Result<(), LoopJointError> {
+        if let Some((what, value, expected)) = transmission.range_error() {
+            return Err(LoopJointError::Range { name: self.name.clone(), what, value, expected });
         }
-        let Some(z) = axis.try_normalize(0.0) else { return Err(LoopJointError::Axis(name)) };
-        let x = z.cross(&Vec3::ith(z.iamin(), 1.0)).normalize();
-        let axes = Mat3::from_columns(&[x, z.cross(&x), z]);
-        let rotation = Quat::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
-        let frame = Pose::from_parts(Translation3::from(point), rotation);
-        let mut sides = [Anchor::world(frame); 2];
-        for (side, part) in sides.iter_mut().zip(parts) {
-            if let Some((id, part)) = part {
-                let part_state =
-                    world.part_state(id, part).ok_or_else(|| LoopJointError::Gone { name: name.clone(), part })?;
-                *side = Anchor::on(id, part, part_state.pose.inverse() * frame);
-            }
+        self.transmission = transmission;
+        Ok(())
+    }
+
+    /// Sets the teeth of two gears, the radius of a pinion, m, the pitch of a screw, m, or the ratio of a
+    /// pulley, by a change of its constants.
+    ///
+    /// # Errors
+    /// As [`set_transmission`](Self::set_transmission).
+    pub fn with_transmission(mut self, change: impl FnOnce(&mut Transmission)) -> Result<Self, LoopJointError> {
+        let mut transmission = self.transmission;
+        change(&mut transmission);
+        self.set_transmission(transmission)?;
+        Ok(self)
+    }
+
+    /// Returns the constants of a gear, a rack, a screw or a pulley.
+    pub fn transmission(&self) -> &Transmission {
+        &self.transmission
+    }
+
+    /// Sets the settings of its position: limits, damping, friction, spring and drive. Those of a
+    /// revolute joint are about an angle in (−π, π] without limits, and within π of the middle of its
+    /// limits with them.
+    ///
+    /// # Errors
+    /// [`LoopJointError::Range`] for a setting out of its range, [`LoopJointError::Kind`] for a joint
+    /// without a position.
+    pub fn set_dof(&mut self, dof: DofSettings) -> Result<(), LoopJointError> {
+        if dof != DofSettings::default() && !self.kind.has_position() {
+            return Err(self.wrong_kind("limits, damping, friction, springs and drives"));
         }
-        LoopJoint::new(name, kind, sides[0], sides[1])
+        if let Some((what, value, expected)) = dof.range_error(true) {
+            return Err(LoopJointError::Range { name: self.name.clone(), what, value, expected });
+        }
+        let span = dof.limits.map_or(0.0, |[lo, hi]| hi - lo);
+        if self.kind == LoopJointKind::Revolute && span > TAU {
+            return Err(LoopJointError::Range {
+                name: self.name.clone(),
+                what: "the range of its limits",
+                value: span,
+                expected: "at most 2π: its angle has no count of turns",
+            });
+        }
+        if let (LoopJointKind::Spring, Some(spring)) = (self.kind, dof.spring) {
+            self.length = spring.rest;
+        }
+        self.dof = dof;
+        Ok(())
+    }
+
+    /// Sets the length of a distance, a rope or a spring, m.
+    ///
+    /// # Errors
+    /// [`LoopJointError::Range`] for a length that is not finite and at least 0,
+    /// [`LoopJointError::Kind`] for a joint without a length.
+    pub fn set_length(&mut self, length: f64) -> Result<(), LoopJointError> {
+        if !self.kind.has_length() {
+            return Err(self.wrong_kind("length"));
+        }
+        self.check("the length", length, length.is_finite() && length >= 0.0, "finite and at least 0")?;
+        self.length = length;
+        if let (LoopJointKind::Spring, Some(spring)) = (self.kind, &mut self.dof.spring) {
+            spring.rest = length;
+        }
+        Ok(())
+    }
+
+    /// Sets the force, N, and the torque about its point, N·m, above which the joint breaks; infinite
+    /// if it does not.
+    ///
+    /// # Errors
+    /// [`LoopJointError::Range`] for a number that is not above 0.
+    pub fn set_breaking(&mut self, force: f64, torque: f64) -> Result<(), LoopJointError> {
+        self.check("the breaking force", force, force > 0.0, "above 0; infinite for none")?;
+        self.check("the breaking torque", torque, torque > 0.0, "above 0; infinite for none")?;
+        (self.breaking_force, self.breaking_torque) = (force, torque);
+        Ok(())
+    }
+
+    /// Sets the settings of its position.
+    ///
+    /// # Errors
+    /// As [`set_dof`](Self::set_dof).
+    pub fn with_dof(mut self, dof: DofSettings) -> Result<Self, LoopJointError> {
+        self.set_dof(dof)?;
+        Ok(self)
+    }
+
+    /// Sets the limits of its position, rad or m.
+    ///
+    /// # Errors
+    /// As [`set_dof`](Self::set_dof).
+    pub fn with_limits(self, limits: [f64; 2]) -> Result<Self, LoopJointError> {
+        let dof = DofSettings { limits: Some(limits), ..self.dof.clone() };
+        self.with_dof(dof)
+    }
+
+    /// Sets the length of a distance, a rope or a spring, m.
+    ///
+    /// # Errors
+    /// As [`set_length`](Self::set_length).
+    pub fn with_length(mut self, length: f64) -> Result<Self, LoopJointError> {
+        self.set_length(length)?;
+        Ok(self)
+    }
+
+    /// Sets the force above which it breaks, N.
+    ///
+    /// # Errors
+    /// As [`set_breaking`](Self::set_breaking).
+    pub fn with_breaking_force(mut self, force: f64) -> Result<Self, LoopJointError> {
+        self.set_breaking(force, self.breaking_torque)?;
+        Ok(self)
+    }
+
+    /// Sets the torque above which it breaks, N·m.
+    ///
+    /// # Errors
+    /// As [`set_breaking`](Self::set_breaking).
+    pub fn with_breaking_torque(mut self, torque: f64) -> Result<Self, LoopJointError> {
+        self.set_breaking(self.breaking_force, torque)?;
+        Ok(self)
     }
 
     /// Returns the motion that the joint leaves free.
@@ -258,152 +294,132 @@ impl LoopJoint {
         [self.a, self.b]
     }
 
+    /// Returns the settings of its position.
+    pub fn dof(&self) -> &DofSettings {
+        &self.dof
+    }
+
+    /// Returns the length of a distance, a rope or a spring, m.
+    pub fn length(&self) -> f64 {
+        self.length
+    }
+
+    /// Returns the force, N, and the torque, N·m, above which it breaks.
+    pub fn breaking(&self) -> [f64; 2] {
+        [self.breaking_force, self.breaking_torque]
+    }
+
     /// Returns the deviation of the sides in a view of the world; `None` while the joint makes no
     /// rows.
     pub fn position_error(&self, view: &WorldView) -> Option<PositionError> {
-        let pair = EndPair { a: JointEnd::of(&self.a, view)?, b: JointEnd::of(&self.b, view)? };
-        let mut d = pair.a.p() - pair.b.p();
-        if self.kind == LoopJointKind::Prismatic {
-            let z = pair.b.axis(2);
-            d -= z * z.dot(&d);
+        let pair = self.pair(view)?;
+        let (mut distance, mut angle) = (0.0, 0.0);
+        pair.held(self.kind, self.length, &self.transmission, &mut |row| {
+            let turns = row.terms.iter().flatten().all(|term| term.motion == Motion::Rotation);
+            *(if turns { &mut angle } else { &mut distance }) += row.target.error.powi(2);
+        });
+        let mut error = PositionError { distance: distance.sqrt(), angle: angle.sqrt() };
+        if matches!(self.kind, LoopJointKind::Rope | LoopJointKind::Pulley) {
+            error.distance =
+                pair.coordinate(self.kind, &self.transmission).map_or(0.0, |c| (c.position - self.length).max(0.0));
         }
-        let angle = match self.kind {
-            LoopJointKind::Spherical => 0.0,
-            LoopJointKind::Revolute => pair.axis_deviation().norm(),
-            LoopJointKind::Fixed | LoopJointKind::Prismatic => pair.rotation_error().norm(),
+        Some(error)
+    }
+
+    /// Returns its position, rad or m, and its rate in a view of the world; `None` if it has none, or
+    /// makes no rows.
+    pub fn position(&self, view: &WorldView) -> Option<[f64; 2]> {
+        let coordinate = self.coordinate(&self.pair(view)?)?;
+        Some([coordinate.position, coordinate.rate])
+    }
+
+    fn pair(&self, view: &WorldView) -> Option<EndPair> {
+        EndPair::of([&self.a, &self.b], view)
+    }
+
+    /// Returns its position with the angle of a revolute joint near its limits or its target.
+    fn coordinate(&self, pair: &EndPair) -> Option<Coordinate> {
+        let mut coordinate = pair.coordinate(self.kind, &self.transmission)?;
+        if self.kind == LoopJointKind::Revolute {
+            let middle = self.dof.limits.map_or(0.0, |[lo, hi]| 0.5 * (lo + hi));
+            coordinate.position = near(coordinate.position, middle);
+        }
+        Some(coordinate)
+    }
+
+    /// Returns the angle that the drive turns about: without limits it goes the shorter way.
+    fn driven(&self, position: f64) -> f64 {
+        use crate::articulated::Drive;
+        match (&self.dof.drive, self.dof.limits, self.kind) {
+            (Drive::Position { target, .. }, None, LoopJointKind::Revolute) => near(position, *target),
+            _ => position,
+        }
+    }
+
+    fn limits(&self) -> Option<[f64; 2]> {
+        match (self.kind, self.dof.limits) {
+            (LoopJointKind::Rope | LoopJointKind::Pulley, limits) => {
+                let [lo, hi] = limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+                Some([lo, hi.min(self.length)])
+            }
+            (_, limits) => limits,
+        }
+    }
+
+    /// Calls `row` with all rows, in their order: held, limits, friction, damping, spring, drive.
+    fn lay(&self, pair: &EndPair, level: Level, time: f64, row: &mut dyn FnMut(JointRow)) {
+        pair.held(self.kind, self.length, &self.transmission, row);
+        let Some(coordinate) = self.coordinate(pair) else { return };
+        let Coordinate { position, rate, terms, bias } = coordinate;
+        let mut along = |sign: f64, target: RowTarget| {
+            let target = RowTarget { bias_acceleration: sign * bias, ..target };
+            let terms = terms.map(|term| term.map(|term| Term { factor: sign * term.factor, ..term }));
+            row(JointRow { terms, target, drives: false });
         };
-        Some(PositionError { distance: d.norm(), angle })
-    }
-}
-
-/// One side in a view of the world.
-struct JointEnd {
-    part: PartRef,
-    /// State of the part, with the accelerations at zero force.
-    part_state: PartState,
-    frame: Pose,
-}
-
-impl JointEnd {
-    fn of(anchor: &Anchor, view: &WorldView) -> Option<JointEnd> {
-        let Some((id, part)) = anchor.part else {
-            return Some(JointEnd { part: None, part_state: PartState::default(), frame: anchor.frame });
-        };
-        view.status(id).filter(|s| s.enabled)?;
-        // a missing part is reported by the row, which refuses it by name
-        let mut part_state = view.part_state(id, part).copied().unwrap_or_default();
-        (part_state.angular_acceleration, part_state.acceleration) =
-            (part_state.bias_angular_acceleration, part_state.bias_acceleration);
-        Some(JointEnd { part: Some((id, part)), frame: part_state.pose * anchor.frame, part_state })
-    }
-
-    fn p(&self) -> Vec3 {
-        self.frame.translation.vector
-    }
-
-    fn axis(&self, k: usize) -> Vec3 {
-        self.frame.rotation * Vec3::ith(k, 1.0)
-    }
-
-    /// Returns `p̈` of the side's material point at `p`.
-    fn bias_acceleration_at(&self, p: &Vec3) -> Vec3 {
-        self.part_state.acceleration_following(p, &self.part_state.velocity_at(p))
-    }
-}
-
-struct EndPair {
-    a: JointEnd,
-    b: JointEnd,
-}
-
-impl EndPair {
-    fn sides(&self) -> [(&JointEnd, f64); 2] {
-        [(&self.a, 1.0), (&self.b, -1.0)]
-    }
-
-    fn omega(&self) -> Vec3 {
-        self.a.part_state.angular_velocity - self.b.part_state.angular_velocity
-    }
-
-    fn alpha(&self) -> Vec3 {
-        self.a.part_state.angular_acceleration - self.b.part_state.angular_acceleration
-    }
-
-    /// Returns `log(R_A·R_Bᵀ)`, world axes.
-    fn rotation_error(&self) -> Vec3 {
-        (self.a.frame.rotation * self.b.frame.rotation.inverse()).scaled_axis()
-    }
-
-    /// Returns the shortest rotation vector that takes `z_B` to `z_A`.
-    fn axis_deviation(&self) -> Vec3 {
-        let (za, zb) = (self.a.axis(2), self.b.axis(2));
-        let (cross, cos) = (zb.cross(&za), zb.dot(&za));
-        let sin = cross.norm();
-        match sin {
-            0.0 if cos < 0.0 => self.b.axis(0) * std::f64::consts::PI,
-            0.0 => cross,
-            _ => cross * (RealField::atan2(sin, cos) / sin),
+        for (sign, gap) in self.gaps_of(position) {
+            along(sign, RowTarget::new(RowSet::HalfLine, gap));
+        }
+        let state = DofState { q: self.driven(position), v: rate, settings: &self.dof };
+        state.resistance(level, |target| along(1.0, target));
+        if let (Some(spring), Some(h)) = (self.dof.spring.filter(|s| s.stiffness > 0.0), level.step()) {
+            let velocity = rate - 4.0 * (position - spring.rest) / h;
+            let compliance = 4.0 / (spring.stiffness * h * h);
+            along(1.0, RowTarget { velocity, compliance, ..RowTarget::new(RowSet::Equality, 0.0) });
+        }
+        if let Some(target) = state.drive(level, time) {
+            let target = RowTarget { bias_acceleration: bias, ..target };
+            row(JointRow { terms, target, drives: true });
         }
     }
 
-    /// Adds the rows that keep the origins together.
-    fn coincident_origins(&self, out: &mut RowBuilder) {
-        let (pa, pb) = (self.a.p(), self.b.p());
-        let (error, bias) = (pa - pb, self.a.bias_acceleration_at(&pa) - self.b.bias_acceleration_at(&pb));
-        for (k, e) in WORLD_AXES.iter().enumerate() {
-            self.translation(out, [&pa, &pb], e, error[k], bias[k]);
-        }
+    fn gaps_of(&self, position: f64) -> impl Iterator<Item = (f64, f64)> + use<> {
+        let gaps = self.limits().map(|[lo, hi]| [(1.0, position - lo), (-1.0, hi - position)]);
+        gaps.into_iter().flatten().filter(|(_, gap)| gap.is_finite())
     }
 
-    /// Adds the rows that keep A's origin on the line through B's origin along `z_B`.
-    fn origin_on_line(&self, out: &mut RowBuilder) {
-        let (p, state_b) = (self.a.p(), &self.b.part_state);
-        let (d, rate) = (p - self.b.p(), self.a.part_state.velocity_at(&p));
-        let slip = rate - state_b.velocity_at(&p);
-        let slip_rate = self.a.bias_acceleration_at(&p) - state_b.acceleration_following(&p, &rate);
-        for t in [self.b.axis(0), self.b.axis(1)] {
-            let bias = t.dot(&slip_rate) + state_b.angular_velocity.cross(&t).dot(&slip);
-            self.translation(out, [&p, &p], &t, t.dot(&d), bias);
-        }
+    /// Returns the force along the position of springs, damping and drives that are no rows.
+    fn explicit_force(&self, coordinate: &Coordinate) -> f64 {
+        self.dof.spring_force(coordinate.position)
+            + self.dof.explicit_force(self.driven(coordinate.position), coordinate.rate)
     }
 
-    /// Adds the rows that keep the rotations of the frames equal.
-    fn equal_rotations(&self, out: &mut RowBuilder) {
-        let (error, bias) = (self.rotation_error(), self.alpha());
-        for (k, e) in WORLD_AXES.iter().enumerate() {
-            self.rotation(out, e, error[k], bias[k]);
-        }
+    fn wrong_kind(&self, what: &'static str) -> LoopJointError {
+        LoopJointError::Kind { name: self.name.clone(), kind: self.kind.name(), what }
     }
 
-    /// Adds the rows that keep `z_A` along `z_B`.
-    fn axis(&self, out: &mut RowBuilder) {
-        let (error, omega, alpha) = (self.axis_deviation(), self.omega(), self.alpha());
-        for t in [self.b.axis(0), self.b.axis(1)] {
-            let bias = t.dot(&alpha) + self.b.part_state.angular_velocity.cross(&t).dot(&omega);
-            self.rotation(out, &t, t.dot(&error), bias);
-        }
-    }
-
-    fn translation(&self, out: &mut RowBuilder, points: [&Vec3; 2], axis: &Vec3, error: f64, bias: f64) {
-        let row = out.row(RowTarget { bias_acceleration: bias, ..RowTarget::new(RowSet::Equality, error) });
-        for ((end, sign), p) in self.sides().into_iter().zip(points) {
-            end.part.into_iter().for_each(|(id, part)| {
-                row.on_point(id, part, p, axis, sign);
-            });
-        }
-    }
-
-    fn rotation(&self, out: &mut RowBuilder, axis: &Vec3, error: f64, bias: f64) {
-        let row = out.row(RowTarget { bias_acceleration: bias, ..RowTarget::new(RowSet::Equality, error) });
-        for (end, sign) in self.sides() {
-            end.part.into_iter().for_each(|(id, part)| {
-                row.on_rotation(id, part, axis, sign);
-            });
+    fn check(&self, what: &'static str, value: f64, fine: bool, expected: &'static str) -> Result<(), LoopJointError> {
+        match fine {
+            true => Ok(()),
+            false => Err(LoopJointError::Range { name: self.name.clone(), what, value, expected }),
         }
     }
 }
 
-const WORLD_AXES: [Vec3; 3] = [Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)];
+/// Returns an angle plus the number of turns that takes it within π of `middle`.
+fn near(angle: f64, middle: f64) -> f64 {
+    let turns = ((middle - angle + PI) / TAU).floor();
+    angle + TAU * turns
+}
 
 impl Object for LoopJoint {
     fn name(&self) -> &str {
@@ -413,6 +429,10 @@ impl Object for LoopJoint {
     fn constraint(&self) -> Option<&dyn Constraint> {
         Some(self)
     }
+
+    fn force(&self) -> Option<&dyn ForceGenerator> {
+        (self.dof != DofSettings::default()).then_some(self)
+    }
 }
 
 impl Constraint for LoopJoint {
@@ -421,17 +441,39 @@ impl Constraint for LoopJoint {
         true
     }
 
-    fn rows(&self, _me: &StateRange, view: &WorldView, _level: Level, out: &mut RowBuilder) {
-        let (Some(a), Some(b)) = (JointEnd::of(&self.a, view), JointEnd::of(&self.b, view)) else { return };
-        let pair = EndPair { a, b };
-        match self.kind {
-            LoopJointKind::Prismatic => pair.origin_on_line(out),
-            _ => pair.coincident_origins(out),
+    fn rows(&self, _me: &StateRange, view: &WorldView, level: Level, out: &mut RowBuilder) {
+        let Some(pair) = self.pair(view) else { return };
+        self.lay(&pair, level, view.time, &mut |row| pair.add(&row, out));
+    }
+
+    fn gaps(&self, _me: &StateRange, view: &WorldView, out: &mut Vec<f64>) {
+        let coordinate = self.limits().and_then(|_| self.coordinate(&self.pair(view)?));
+        out.extend(coordinate.into_iter().flat_map(|c| self.gaps_of(c.position)).map(|(_, gap)| gap));
+    }
+}
+
+impl ForceGenerator for LoopJoint {
+    fn apply(&self, _me: &StateRange, view: &WorldView, out: &mut Forces) {
+        if view.implicit {
+            return;
         }
-        match self.kind {
-            LoopJointKind::Spherical => {}
-            LoopJointKind::Revolute => pair.axis(out),
-            LoopJointKind::Fixed | LoopJointKind::Prismatic => pair.equal_rotations(out),
+        let Some(pair) = self.pair(view) else { return };
+        let Some(coordinate) = self.coordinate(&pair) else { return };
+        let force = self.explicit_force(&coordinate);
+        for Term { side, motion, axis, factor } in coordinate.terms.into_iter().flatten() {
+            let end = [&pair.a, &pair.b][side];
+            let Some((id, part)) = end.part else { continue };
+            let Some(index) = view.state_range(id).map(|range| range.parts.start + part) else { continue };
+            match motion {
+                Motion::Point(p) => out.add_at(index, &end.part_state, factor * force * axis, &p),
+                Motion::Rotation => out.wrenches[index].torque += factor * force * axis,
+            }
         }
+    }
+
+    fn potential(&self, view: &WorldView) -> f64 {
+        let Some(spring) = self.dof.spring else { return 0.0 };
+        let coordinate = self.pair(view).and_then(|pair| self.coordinate(&pair));
+        coordinate.map_or(0.0, |c| 0.5 * spring.stiffness * (c.position - spring.rest).powi(2))
     }
 }

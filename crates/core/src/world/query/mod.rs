@@ -82,7 +82,8 @@ impl World {
     fn parts_by(&self, filter: &QueryFilter) -> impl Iterator<Item = Part<'_>> {
         self.parts().filter(|part| {
             part.entry.object.collidable().is_some_and(|body| {
-                filter.mask & body.collision_group(part.part).bit() != 0
+                !body.is_sensor(part.part)
+                    && filter.mask & body.collision_group(part.part).bit() != 0
                     && body.collides_with(part.part, filter.group)
                     && !filter.ignored.contains(&part.id)
             })

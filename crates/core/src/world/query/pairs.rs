@@ -48,6 +48,10 @@ impl World {
         if !may_collide(&a.entry, a.part, &b.entry, b.part, &self.core.derived.part_states) {
             return None;
         }
+        let surface = |p: &Part<'_>| Some((p.id, p.part, p.entry.object.collidable()?.material(p.part)));
+        if self.core.pair_materials.ignores(surface(a)?, surface(b)?) {
+            return None;
+        }
         let mode = a.mode.of_pair(b.mode);
         let mut found: Vec<Contact> = Vec::new();
         contacts_in_mode(mode, a.shape, &a.pose, b.shape, &b.pose, 0.0, &mut found);

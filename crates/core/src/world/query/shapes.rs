@@ -179,7 +179,7 @@ impl World {
 /// with exact normals closes along the normal of their closest points at most; that of others along
 /// the direction. A step that went too far by the error of a distance is halved.
 fn cast(shape: &Shape, pose: &Pose, direction: &Vec3, max: f64, part: &Part<'_>) -> Option<ShapeCastHit> {
-    let exact = |shape: &Shape| !matches!(shape, Shape::Mesh(_) | Shape::Cylinder(_));
+    let exact = |shape: &Shape| !(shape.has_tree() || matches!(shape, Shape::Compound(_)));
     let by_normal = exact(shape) && exact(part.shape);
     let met = MET * shape.bounding_radius().min(part.shape.bounding_radius()).min(1e9);
     let (mut clear, mut distance) = (0.0, 0.0);

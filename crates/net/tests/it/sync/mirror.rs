@@ -2,7 +2,7 @@
 
 use super::simulated_session::{scene, viewer};
 use std::sync::Arc;
-use tumble_core::collide::TriMesh;
+use tumble_core::collide::{CompoundPart, TriMesh};
 use tumble_core::collide::{Pose, Quat, Shape, Vec3};
 use tumble_core::{Appearance, ContactPoint, Drawn, Mode, Object, RigidBody, Visual, VisualMesh, World};
 use tumble_net::sync::quantize::{POSITION_ERROR_M, ROTATION_ERROR_RAD};
@@ -151,6 +151,16 @@ fn objects_come_and_go() {
         let visuals = |w: &World, id| format!("{:?}", w.object(id).unwrap().renderable().unwrap().visuals());
         assert_eq!(visuals(here, a), visuals(&pair.world, b), "it looks the same");
     }
+    let part = |x: f64| CompoundPart::new(Shape::sphere(0.1).unwrap(), Pose::translation(x, 0.0, 0.0));
+    let bell = Shape::compound(vec![part(0.0), part(0.4)]).unwrap();
+    let Shape::Compound(parts) = &bell else { panic!("a compound") };
+    let surface = parts.mesh();
+    pair.world.add(RigidBody::new(bell).with_name("bell")).unwrap();
+    assert!(pair.send(), "a compound more");
+    let copy = pair.mirror.world();
+    let visual = &copy.object(copy.find("bell").unwrap()).unwrap().renderable().unwrap().visuals()[0];
+    let Some(Drawn::Mesh(mesh)) = visual.drawn() else { panic!("triangles") };
+    assert_eq!(mesh.triangles, surface.triangles);
     for name in ["new 1", "ball 2", "post"] {
         let id = pair.world.find(name).unwrap();
         pair.world.remove(id).unwrap();

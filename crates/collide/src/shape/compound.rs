@@ -1,0 +1,334 @@
+//! Several shapes of one body.
+//!
+//! ```text
+//! m = Σ ρᵢ Vᵢ      c = Σ ρᵢ Vᵢ cᵢ / m      I = Σ (Rᵢ Iᵢ Rᵢᵀ + mᵢ (|dᵢ|² 1 − dᵢ dᵢᵀ)),  dᵢ = cᵢ − c
+//! ```
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `ρᵢ`, `Vᵢ`, `mᵢ` | density (kg/m³), volume (m³) and mass (kg) of part `i` |
+//! | `cᵢ`, `Rᵢ`, `Iᵢ` | its center of mass (m), rotation, and inertia in its own axes (kg·m²) |
+
+use super::Shape;
+use crate::{Aabb, CylinderShape, MassProperties, Mat3, MeshShape, Pose, ShapeError, TriMesh, Vec3};
+use nalgebra::Translation3;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::sync::{Arc, OnceLock};
+
+/// Maximum number of parts: each is compared with all others once.
+const MAX_PARTS: usize = 4096;
+/// Number of parts up to which the box of a compound is that of the boxes of its parts.
+const FEW_PARTS: usize = 16;
+/// Number of sides of a round part, and of subdivisions of a sphere, in [`CompoundShape::mesh`].
+const SIDES: usize = 48;
+const SUBDIVISIONS: u32 = 3;
+/// Depth above which a point is inside a part, in radii of the compound.
+const BURIED: f64 = 1e-7;
+/// Distance of a point beside a contact, in the same.
+const BESIDE: f64 = 1e-5;
+
+/// A shape at a pose in a [`CompoundShape`].
+#[derive(Clone, Debug)]
+pub struct CompoundPart {
+    /// The shape; no half-space.
+    pub shape: Shape,
+    /// Pose of the shape's frame (for a mesh that of its vertices) in the frame of the compound.
+    pub pose: Pose,
+    /// Density, kg/m³; all parts of a compound have one or none has.
+    pub density: Option<f64>,
+}
+
+impl CompoundPart {
+    /// Returns a part without a density of its own.
+    pub fn new(shape: Shape, pose: Pose) -> CompoundPart {
+        CompoundPart { shape, pose, density: None }
+    }
+
+    /// Sets the density, kg/m³.
+    #[must_use]
+    pub fn with_density(mut self, density: f64) -> Self {
+        self.density = Some(density);
+        self
+    }
+}
+
+/// Several shapes of one body, about their common center of mass. Parts may overlap; mass and volume
+/// of an overlap then count for each.
+#[derive(Clone, Debug)]
+pub struct CompoundShape {
+    parts: Vec<CompoundPart>,
+    /// Poses of the parts' shapes about the center of mass.
+    poses: Vec<Pose>,
+    /// Mass properties at a mean density of 1.
+    unit_mass: MassProperties,
+    own_density: Option<f64>,
+    /// Position of the origin in the frame of the parts.
+    center: Vec3,
+    bounding_radius: f64,
+    /// Boxes of the parts, built on first use.
+    boxes: OnceLock<Vec<Aabb>>,
+    /// Parts whose boxes overlap that of each part.
+    neighbors: OnceLock<Vec<Vec<u32>>>,
+}
+
+impl CompoundShape {
+    /// Returns a compound; parts that are compounds are replaced by their own parts.
+    ///
+    /// # Errors
+    /// [`ShapeError`]: no part or more than 4096, a half-space, a pose that is not finite, a density
+    /// that is not above 0, or parts with and without a density.
+    pub fn new(parts: Vec<CompoundPart>) -> Result<CompoundShape, ShapeError> {
+        let parts = flattened(parts)?;
+        if parts.is_empty() || parts.len() > MAX_PARTS {
+            return Err(ShapeError::Parts { count: parts.len(), most: MAX_PARTS });
+        }
+        for (n, part) in parts.iter().enumerate() {
+            if matches!(part.shape, Shape::HalfSpace) {
+                return Err(ShapeError::UnboundedPart { number: n + 1 });
+            }
+            if !(part.pose.translation.vector.sum() + part.pose.rotation.coords.sum()).is_finite() {
+                return Err(ShapeError::PartPose { number: n + 1 });
+            }
+            if part.density.is_some() != parts[0].density.is_some() {
+                return Err(ShapeError::PartDensity { number: n + 1, has: part.density.is_some() });
+            }
+        }
+        let placed = |part: &CompoundPart| part.pose * Translation3::from(part.shape.center_of_mass());
+        let (mut mass, mut volume, mut moment) = (0.0, 0.0, Vec3::zeros());
+        let mut own = Vec::with_capacity(parts.len());
+        for part in &parts {
+            let properties = part.shape.mass_properties(part.density.unwrap_or(1.0))?;
+            mass += properties.mass;
+            volume += part.shape.volume();
+            moment += properties.mass * placed(part).translation.vector;
+            own.push(properties);
+        }
+        let (center, mean) = (moment / mass, mass / volume);
+        let poses: Vec<Pose> = parts.iter().map(|part| Translation3::from(-center) * placed(part)).collect();
+        let mut inertia = Mat3::zeros();
+        for (properties, pose) in own.iter().zip(&poses) {
+            let (r, d) = (pose.rotation.to_rotation_matrix().into_inner(), pose.translation.vector);
+            inertia += r * properties.inertia * r.transpose()
+                + properties.mass * (Mat3::identity() * d.norm_squared() - d * d.transpose());
+        }
+        let radius = |(part, pose): (&CompoundPart, &Pose)| {
+            let corner = |d: f64| part.shape.bounding_radius() + d;
+            match &part.shape {
+                Shape::Box { half_extents: h } => (pose.rotation.inverse() * pose.translation.vector).abs() + h,
+                Shape::Capsule { radius, half_length } => {
+                    let across = Vec3::new(0.0, 0.0, *half_length);
+                    let offset = (pose.rotation.inverse() * pose.translation.vector).abs() + across;
+                    return offset.norm() + radius;
+                }
+                _ => return corner(pose.translation.vector.norm()),
+            }
+            .norm()
+        };
+        let bounding_radius = parts.iter().zip(&poses).map(radius).fold(0.0, f64::max);
+        if !(mass > 0.0 && (mass + volume + bounding_radius + inertia.sum()).is_finite()) {
+            return Err(ShapeError::Length { what: "size of a compound", value: bounding_radius });
+        }
+        Ok(CompoundShape {
+            own_density: parts[0].density.map(|_| mean),
+            parts,
+            poses,
+            unit_mass: MassProperties { mass: volume, center_of_mass: Vec3::zeros(), inertia: inertia / mean },
+            center,
+            bounding_radius,
+            boxes: OnceLock::new(),
+            neighbors: OnceLock::new(),
+        })
+    }
+
+    /// Returns the parts, in the frame in which they were given.
+    pub fn parts(&self) -> &[CompoundPart] {
+        &self.parts
+    }
+
+    /// Returns each part's shape with its pose about the center of mass.
+    pub fn placed(&self) -> impl Iterator<Item = (&Shape, &Pose)> {
+        self.parts.iter().map(|part| &part.shape).zip(&self.poses)
+    }
+
+    /// Returns the mean density of parts with densities of their own, kg/m³.
+    pub fn own_density(&self) -> Option<f64> {
+        self.own_density
+    }
+
+    /// Returns the sum of the volumes of the parts, m³.
+    pub fn volume(&self) -> f64 {
+        self.unit_mass.mass
+    }
+
+    /// Returns the center of mass in the frame of the parts, meters.
+    pub fn center_of_mass(&self) -> Vec3 {
+        self.center
+    }
+
+    /// Returns the radius of a sphere about the center of mass that contains all parts, meters.
+    pub fn bounding_radius(&self) -> f64 {
+        self.bounding_radius
+    }
+
+    /// Returns the mass properties at a mean density, kg/m³.
+    pub(crate) fn mass_properties(&self, density: f64) -> MassProperties {
+        MassProperties {
+            inertia: self.unit_mass.inertia * density,
+            ..self.unit_mass.with_mass(self.unit_mass.mass * density)
+        }
+    }
+
+    /// Returns the boxes of the parts in the frame of the compound.
+    pub(crate) fn boxes(&self) -> &[Aabb] {
+        self.boxes.get_or_init(|| self.placed().map(|(shape, pose)| shape.aabb(pose)).collect())
+    }
+
+    /// Returns the box in world axes around the boxes of the parts.
+    pub(crate) fn aabb(&self, pose: &Pose) -> Aabb {
+        if self.parts.len() <= FEW_PARTS {
+            return joined(self.placed().map(|(shape, own)| shape.aabb(&(pose * own))));
+        }
+        turned(&joined(self.boxes().iter().copied()), pose)
+    }
+
+    /// Returns the box in world axes around the surfaces of the parts.
+    pub(crate) fn tight_aabb(&self, pose: &Pose) -> Aabb {
+        joined(self.placed().map(|(shape, own)| shape.tight_aabb(&(pose * own))))
+    }
+
+    /// Returns whether a point, in the compound's frame, on part `part` lies inside another part.
+    pub(crate) fn is_buried(&self, part: usize, point: &Vec3) -> bool {
+        let depth = BURIED * self.bounding_radius;
+        let inside = |other: u32| {
+            let other = other as usize;
+            self.parts[other].shape.closest_point(&self.poses[other], point).distance < -depth
+        };
+        self.neighbors()[part].iter().any(|other| inside(*other))
+    }
+
+    /// Returns whether a contact of part `part`, at a point of its surface with this outward normal, is
+    /// inside another part: the point, or the surface beside it towards the middle of the part. The
+    /// latter is true at the end of a face that another part covers.
+    pub(crate) fn has_no_contact(&self, part: usize, point: &Vec3, outward: &Vec3) -> bool {
+        let arm = point - self.poses[part].translation.vector;
+        let across = arm - outward * outward.dot(&arm);
+        let inward = across.try_normalize(BESIDE * self.bounding_radius).map_or(Vec3::zeros(), |across| -across);
+        let beside = point + (outward + inward) * (BESIDE * self.bounding_radius);
+        self.is_buried(part, point) || self.is_buried(part, &beside)
+    }
+
+    fn neighbors(&self) -> &[Vec<u32>] {
+        self.neighbors.get_or_init(|| {
+            let boxes = self.boxes();
+            let meets = |a: &Aabb, b: &Aabb| (0..3).all(|k| a.min[k] <= b.max[k] && b.min[k] <= a.max[k]);
+            let others = |n: usize| (0..boxes.len()).filter(move |m| *m != n && meets(&boxes[n], &boxes[*m]));
+            (0..boxes.len()).map(|n| others(n).map(|m| m as u32).collect()).collect()
+        })
+    }
+
+    /// Returns the surfaces of all parts as triangles, in the frame of the compound; round parts with
+    /// 48 sides. For drawing.
+    pub fn mesh(&self) -> TriMesh {
+        let mut all = TriMesh { vertices: Vec::new(), triangles: Vec::new() };
+        for (shape, pose) in self.placed() {
+            let mesh = surface(shape);
+            let first = all.vertices.len() as u32;
+            all.vertices.extend(mesh.vertices.iter().map(|v| pose.transform_point(&(*v).into()).coords));
+            all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
+        }
+        all
+    }
+}
+
+/// Returns the surface of a shape as triangles; a half-space and a compound have none.
+fn surface(shape: &Shape) -> TriMesh {
+    match shape {
+        Shape::Sphere { radius } => TriMesh::icosphere(*radius, SUBDIVISIONS),
+        Shape::Box { half_extents } => TriMesh::cuboid(2.0 * half_extents),
+        Shape::Capsule { radius, half_length } => TriMesh::capsule(*radius, 2.0 * half_length, SIDES, SIDES / 4),
+        Shape::Cylinder(c) => TriMesh::cylinder(c.radius(), 2.0 * c.half_length(), SIDES),
+        Shape::Mesh(mesh) => mesh.mesh().clone(),
+        Shape::HalfSpace | Shape::Compound(_) => TriMesh { vertices: Vec::new(), triangles: Vec::new() },
+    }
+}
+
+/// Replaces compounds by their parts. A density of a compound is the mean of its parts'.
+fn flattened(parts: Vec<CompoundPart>) -> Result<Vec<CompoundPart>, ShapeError> {
+    let mut flat = Vec::with_capacity(parts.len());
+    for part in parts {
+        if let Some(density) = part.density.filter(|density| !(density.is_finite() && *density > 0.0)) {
+            return Err(ShapeError::Density(density));
+        }
+        let Shape::Compound(inner) = &part.shape else {
+            flat.push(part);
+            continue;
+        };
+        let mean = inner.own_density;
+        flat.extend(inner.parts.iter().map(|own| CompoundPart {
+            shape: own.shape.clone(),
+            pose: part.pose * own.pose,
+            density: match (part.density, mean) {
+                (Some(density), Some(mean)) => own.density.map(|own| own * density / mean),
+                (given, None) => given,
+                (None, Some(_)) => own.density,
+            },
+        }));
+    }
+    Ok(flat)
+}
+
+fn joined(boxes: impl Iterator<Item = Aabb>) -> Aabb {
+    let none = Aabb { min: Vec3::repeat(f64::INFINITY), max: Vec3::repeat(f64::NEG_INFINITY) };
+    boxes.fold(none, |all, one| Aabb { min: all.min.inf(&one.min), max: all.max.sup(&one.max) })
+}
+
+fn turned(own: &Aabb, pose: &Pose) -> Aabb {
+    let center = pose.transform_point(&(0.5 * (own.min + own.max)).into()).coords;
+    let half = pose.rotation.to_rotation_matrix().matrix().abs() * (0.5 * (own.max - own.min));
+    Aabb { min: center - half, max: center + half }
+}
+
+/// A part's shape in an archive. Without compounds, so that bytes cannot nest.
+#[derive(Serialize, Deserialize)]
+enum StoredShape {
+    Sphere(f64),
+    Box(Vec3),
+    Capsule(f64, f64),
+    Cylinder(#[serde(with = "crate::archive::shared")] Arc<CylinderShape>),
+    Mesh(#[serde(with = "crate::archive::shared")] Arc<MeshShape>),
+}
+
+impl Serialize for CompoundShape {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let stored = |part: &CompoundPart| {
+            let shape = match &part.shape {
+                Shape::Sphere { radius } => StoredShape::Sphere(*radius),
+                Shape::Box { half_extents } => StoredShape::Box(*half_extents),
+                Shape::Capsule { radius, half_length } => StoredShape::Capsule(*radius, *half_length),
+                Shape::Cylinder(cylinder) => StoredShape::Cylinder(cylinder.clone()),
+                Shape::Mesh(mesh) => StoredShape::Mesh(mesh.clone()),
+                // neither is a part
+                Shape::HalfSpace | Shape::Compound(_) => StoredShape::Sphere(0.0),
+            };
+            (shape, part.pose, part.density)
+        };
+        self.parts.iter().map(stored).collect::<Vec<_>>().serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for CompoundShape {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<CompoundShape, D::Error> {
+        let stored = Vec::<(StoredShape, Pose, Option<f64>)>::deserialize(deserializer)?;
+        let part = |(shape, pose, density)| {
+            let shape = match shape {
+                StoredShape::Sphere(radius) => Shape::Sphere { radius },
+                StoredShape::Box(half_extents) => Shape::Box { half_extents },
+                StoredShape::Capsule(radius, half_length) => Shape::Capsule { radius, half_length },
+                StoredShape::Cylinder(cylinder) => Shape::Cylinder(cylinder),
+                StoredShape::Mesh(mesh) => Shape::Mesh(mesh),
+            };
+            CompoundPart { shape, pose, density }
+        };
+        CompoundShape::new(stored.into_iter().map(part).collect()).map_err(serde::de::Error::custom)
+    }
+}

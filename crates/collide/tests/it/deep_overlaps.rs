@@ -1,0 +1,253 @@
+//! Random deep overlaps of all pairs of shapes: every contact lies at both bodies and is no deeper
+//! than the two overlap along its normal, and convex bodies have the depth of the least translation.
+//! `TUMBLE_SLOW=1` runs a million overlaps.
+
+use crate::against_parry::to_parry;
+use crate::rng::Rng;
+use parry3d_f64::query;
+use parry3d_f64::shape::{Capsule, Cuboid, Cylinder, Shape as ParryShape};
+use tumble_collide::{Contact, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts};
+
+fn slow() -> bool {
+    std::env::var_os("TUMBLE_SLOW").is_some()
+}
+
+fn mesh(mesh: &TriMesh) -> Shape {
+    Shape::mesh(mesh.clone(), &TreeSettings::octree()).unwrap()
+}
+
+/// A prism over an L.
+fn angle() -> TriMesh {
+    let profile = [(0.0, 0.0), (0.6, 0.0), (0.6, 0.2), (0.2, 0.2), (0.2, 0.6), (0.0, 0.6)];
+    let n = profile.len() as u32;
+    let vertices = [0.0, 0.5].iter().flat_map(|&z| profile.map(|(x, y)| Vec3::new(x, y, z))).collect();
+    let mut triangles = Vec::new();
+    for [a, b, c] in [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]] {
+        triangles.extend([[a, c, b], [n + a, n + b, n + c]]);
+    }
+    for a in 0..n {
+        let b = (a + 1) % n;
+        triangles.extend([[a, b, n + b], [a, n + b, n + a]]);
+    }
+    TriMesh { vertices, triangles }
+}
+
+fn shapes() -> Vec<(&'static str, Shape)> {
+    let spool = [(0.0, -0.5), (0.5, -0.5), (0.2, -0.1), (0.2, 0.1), (0.5, 0.5), (0.0, 0.5)];
+    vec![
+        ("half-space", Shape::half_space()),
+        ("sphere", Shape::sphere(0.4).unwrap()),
+        ("capsule", Shape::capsule(0.25, 0.8).unwrap()),
+        ("box", Shape::cuboid(Vec3::new(0.6, 0.8, 1.1)).unwrap()),
+        ("plate", Shape::cuboid(Vec3::new(1.0, 1.2, 0.1)).unwrap()),
+        ("cylinder", Shape::cylinder(0.4, 0.9).unwrap()),
+        ("disc", Shape::cylinder(0.6, 0.12).unwrap()),
+        ("rod", Shape::cylinder(0.1, 1.6).unwrap()),
+        ("cube mesh", mesh(&TriMesh::cuboid(Vec3::repeat(0.8)))),
+        ("sphere mesh", mesh(&TriMesh::icosphere(0.4, 2))),
+        ("prism mesh", mesh(&TriMesh::cylinder(0.4, 0.8, 24))),
+        ("torus mesh", mesh(&TriMesh::torus(0.4, 0.15, 24, 12))),
+        ("angle mesh", mesh(&angle())),
+        ("spool mesh", mesh(&TriMesh::lathe(&spool, 16).unwrap())),
+    ]
+}
+
+/// Returns the largest height of a shape along a direction of the world, m, by formula.
+fn height(shape: &Shape, pose: &Pose, n: &Vec3) -> f64 {
+    let local = pose.rotation.inverse() * n;
+    let own = match shape {
+        Shape::Sphere { radius } => *radius,
+        Shape::Capsule { radius, half_length } => radius + half_length * local.z.abs(),
+        Shape::Box { half_extents } => half_extents.dot(&local.abs()),
+        Shape::Cylinder(c) => c.radius() * local.xy().norm() + c.half_length() * local.z.abs(),
+        Shape::Mesh(mesh) => mesh.mesh().vertices.iter().map(|v| v.dot(&local)).fold(f64::NEG_INFINITY, f64::max),
+        Shape::HalfSpace if local.z > 1.0 - 1e-9 => 0.0,
+        _ => f64::INFINITY,
+    };
+    own + n.dot(&pose.translation.vector)
+}
+
+/// Returns the translation of A along `n` that separates the two, m.
+fn translation(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose, n: &Vec3) -> f64 {
+    height(b, pb, n) + height(a, pa, &-n)
+}
+
+/// Feature of the contact of two hulls.
+const HULLS: u64 = 5 << 56;
+
+/// Checks that a contact is no deeper than the two overlap along its normal, and lies at both bodies:
+/// midway between two surfaces, so up to half its depth outside the bounds of either. The contact of
+/// two hulls, of bodies that are not convex, may be its depth away.
+fn is_plausible(c: &Contact, (a, pa): (&Shape, &Pose), (b, pb): (&Shape, &Pose), margin: f64) -> Result<(), String> {
+    let slack = 1e-6;
+    for (shape, pose) in [(a, pa), (b, pb)] {
+        let bounds = shape.aabb(pose);
+        let outside = (bounds.min - c.point).sup(&(c.point - bounds.max)).max();
+        let reach = if c.feature == HULLS { 1.0 } else { 0.5 };
+        let near = outside <= margin + slack + reach * c.gap.abs();
+        if !near {
+            return Err(format!("{outside} m outside"));
+        }
+    }
+    let most = translation(a, pa, b, pb, &c.normal);
+    let valid = -c.gap <= most + slack && c.gap <= margin && (c.normal.norm() - 1.0).abs() < 1e-9;
+    if !valid {
+        return Err(format!("a translation by {most} m separates them"));
+    }
+    Ok(())
+}
+
+fn random_pair(rng: &mut Rng, a: &Shape, b: &Shape) -> [Pose; 2] {
+    let reach = |shape: &Shape| if matches!(shape, Shape::HalfSpace) { 0.0 } else { shape.bounding_radius() };
+    let below = rng.pose(1.0);
+    let turn = match rng.below(3) {
+        // aligned, nearly aligned, any
+        0 => below.rotation,
+        1 => below.rotation * Quat::from_scaled_axis(rng.direction() * 1e-6),
+        _ => rng.pose(1.0).rotation,
+    };
+    let off = rng.direction() * (rng.unit() * 0.7 * (reach(a) + reach(b)));
+    [Pose::from_parts((below.translation.vector + off).into(), turn), below]
+}
+
+#[test]
+fn contacts_of_deep_overlaps_lie_at_both_bodies() {
+    let (shapes, margin) = (shapes(), 0.01);
+    let pairs: Vec<_> = (0..shapes.len()).flat_map(|i| (i.max(1)..shapes.len()).map(move |j| (i, j))).collect();
+    let each = if slow() { 1_000_000 / pairs.len() + 1 } else { 200 };
+    let (mut rng, mut found, mut wrong, mut count) = (Rng::new(84), Vec::new(), Vec::new(), 0);
+    for (i, j) in pairs {
+        let ((name_a, a), (name_b, b)) = (&shapes[j], &shapes[i]);
+        for _ in 0..each {
+            let [pa, pb] = random_pair(&mut rng, a, b);
+            found.clear();
+            contacts(a, &pa, b, &pb, margin, &mut found);
+            count += found.len();
+            for c in &found {
+                if let Err(why) = is_plausible(c, (a, &pa), (b, &pb), margin) {
+                    wrong.push(format!("{name_a} in {name_b}: {why}: {c:?}, {pa:?}, {pb:?}"));
+                }
+            }
+        }
+    }
+    println!("{count} contacts, {} implausible", wrong.len());
+    assert!(wrong.is_empty(), "{} of {count}:\n{}", wrong.len(), wrong[..wrong.len().min(20)].join("\n"));
+}
+
+/// Returns the least translation over directions on a spiral, improved locally.
+fn least_translation(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> f64 {
+    let count = 2000;
+    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let direction = |i: usize| {
+        let z = 1.0 - (2 * i + 1) as f64 / count as f64;
+        let (r, phi) = ((1.0 - z * z).sqrt(), golden * i as f64);
+        Vec3::new(r * phi.cos(), r * phi.sin(), z)
+    };
+    let value = |n: &Vec3| translation(a, pa, b, pb, n);
+    let mut tried: Vec<(f64, Vec3)> = (0..count).map(direction).map(|n| (value(&n), n)).collect();
+    tried.sort_by(|x, y| x.0.total_cmp(&y.0));
+    let mut least = f64::INFINITY;
+    for (mut depth, mut n) in tried.into_iter().take(8) {
+        let mut step = 0.05;
+        while step > 1e-6 {
+            let u = n.cross(&Vec3::ith(n.iamin(), 1.0)).normalize();
+            let v = n.cross(&u);
+            let around = (0..8).map(|k| f64::from(k) * std::f64::consts::FRAC_PI_4);
+            let better = around
+                .map(|phi| (n + (u * phi.cos() + v * phi.sin()) * step).normalize())
+                .map(|m| (value(&m), m))
+                .min_by(|x, y| x.0.total_cmp(&y.0))
+                .filter(|m| m.0 < depth);
+            match better {
+                Some(better) => (depth, n) = better,
+                None => step *= 0.5,
+            }
+        }
+        least = least.min(depth);
+    }
+    least
+}
+
+/// Pairs of convex shapes of which one is round, overlapping by more than 5 % of the smaller one's
+/// radius: the deepest contact is as deep as the translation along its normal, which is least. Also
+/// no deeper than parry's, which is EPA.
+#[test]
+fn deep_curved_pairs_have_the_least_translation() {
+    let shapes = shapes();
+    let find = |name: &str| &shapes.iter().find(|s| s.0 == name).unwrap().1;
+    let round = ["cylinder", "disc", "rod"];
+    let others = ["cylinder", "disc", "rod", "capsule", "box", "plate", "cube mesh", "prism mesh"];
+    let (mut rng, mut wrong, mut count) = (Rng::new(7), Vec::new(), 0);
+    let mut worst = [0.0_f64; 2];
+    for (name_a, name_b) in round.iter().flat_map(|a| others.map(|b| (*a, b))) {
+        let (a, b) = (find(name_a), find(name_b));
+        let size = a.bounding_radius().min(b.bounding_radius());
+        for _ in 0..if slow() { 400 } else { 20 } {
+            let [pa, pb] = random_pair(&mut rng, a, b);
+            let least = least_translation(a, &pa, b, &pb);
+            if least < 0.05 * size {
+                continue;
+            }
+            let mut found = Vec::new();
+            contacts(a, &pa, b, &pb, 0.01, &mut found);
+            let deepest = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap));
+            let (depth, along) = deepest.map_or((0.0, 0.0), |c| (-c.gap, translation(a, &pa, b, &pb, &c.normal)));
+            count += 1;
+            worst = [worst[0].max(along / least - 1.0), worst[1].max(1.0 - depth / along)];
+            let parry = parry_depth((a, &pa), (b, &pb)).unwrap_or(f64::INFINITY);
+            // parry misses some overlaps of aligned cylinders: less than the least translation
+            let parry = if parry < 0.99 * least { f64::INFINITY } else { parry };
+            let right = along <= 1.01 * least && depth >= 0.98 * along && depth <= 1.01 * parry + 1e-5;
+            if !right {
+                wrong.push(format!(
+                    "{name_a} in {name_b}: {depth} deep, {along} along its normal, least {least}, parry {parry}: {pa:?}, {pb:?}"
+                ));
+            }
+        }
+    }
+    println!(
+        "{count} overlaps: above the least translation by up to {:.1e}, too shallow by up to {:.1e}",
+        worst[0], worst[1]
+    );
+    assert!(wrong.is_empty(), "{} of {count}:\n{}", wrong.len(), wrong[..wrong.len().min(20)].join("\n"));
+}
+
+/// Returns parry's depth of two primitives.
+fn parry_depth((a, pa): (&Shape, &Pose), (b, pb): (&Shape, &Pose)) -> Option<f64> {
+    let upright = Quat::from_scaled_axis(Vec3::x() * std::f64::consts::FRAC_PI_2);
+    let theirs = |shape: &Shape, pose: &Pose| -> Option<(Box<dyn ParryShape>, Pose)> {
+        Some(match shape {
+            Shape::Capsule { radius, half_length } => (Box::new(Capsule::new_z(*half_length, *radius)), *pose),
+            Shape::Box { half_extents: h } => (Box::new(Cuboid::new(crate::against_parry::vector(h))), *pose),
+            // parry's is along y
+            Shape::Cylinder(c) => (Box::new(Cylinder::new(c.half_length(), c.radius())), pose * upright),
+            _ => return None,
+        })
+    };
+    let ((a, pa), (b, pb)) = (theirs(a, pa)?, theirs(b, pb)?);
+    let contact = query::contact(&to_parry(&pa), &*a, &to_parry(&pb), &*b, 0.0).ok()??;
+    Some(-contact.dist)
+}
+
+/// The side of a rod that crosses a box near its corner was overlooked: the only contact was one of
+/// a rim, 0.8 mm apart.
+#[test]
+fn a_rod_through_a_corner_of_a_box_overlaps_it() {
+    let (rod, block) = (Shape::cylinder(0.1, 1.6).unwrap(), Shape::cuboid(Vec3::new(0.6, 0.8, 1.1)).unwrap());
+    let pose = |at: [f64; 3], [x, y, z, w]: [f64; 4]| {
+        let turn = Quat::new_normalize(nalgebra::Quaternion::new(w, x, y, z));
+        Pose::from_parts(Vec3::from(at).into(), turn)
+    };
+    let at_rod = pose(
+        [0.48360638916696863, 0.06129435611964429, 1.212575056808812],
+        [0.3921172790988866, -0.04050266563297842, -0.9080525149033862, 0.14157755361053756],
+    );
+    let at_block = pose(
+        [0.5920659061159075, 0.3307108297990675, 0.8174067675326719],
+        [-0.48274061328094836, -0.1500873993082567, -0.10474083426060184, 0.8564254961737249],
+    );
+    let mut found = Vec::new();
+    contacts(&rod, &at_rod, &block, &at_block, 0.01, &mut found);
+    let depth = -found.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
+    assert!((depth - 0.2799).abs() < 1e-3, "{depth}");
+}

@@ -1,0 +1,428 @@
+//! An articulated body from links with shapes, in code.
+
+use super::body::{ArticulatedBody, ArticulatedError, Collider};
+use super::model::dof::{Coupling, DofSettings, Drive, Spring};
+use super::model::joint::Joint;
+use super::model::{LinkMass, ModelBuilder, ModelError};
+use crate::RigidBody;
+use crate::object::visual::Visual;
+use crate::object::{Appearance, Material};
+use nalgebra::Translation3;
+use tumble_collide::{Pose, Shape, ShapeError};
+
+/// Why an articulated body cannot be built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ArticulationError {
+    /// The parent of a link was not added before it.
+    #[error("articulated body '{body}', link '{link}': its parent '{parent}' was not added before it; {known}")]
+    Parent {
+        /// Body.
+        body: String,
+        /// Link.
+        link: String,
+        /// Name given as the parent.
+        parent: String,
+        /// A sentence with the names of the links before it.
+        known: String,
+    },
+    /// The mass of a shape cannot be computed.
+    #[error("articulated body '{body}', link '{link}': {why}")]
+    Shape {
+        /// Body.
+        body: String,
+        /// Link.
+        link: String,
+        /// Reason.
+        why: ShapeError,
+    },
+    /// A link has a mass, and no shape over which it is distributed.
+    #[error(
+        "articulated body '{body}', link '{link}': it has a mass but no shape over which it is distributed; give it a shape, or mass, center and inertia"
+    )]
+    NoShape {
+        /// Body.
+        body: String,
+        /// Link.
+        link: String,
+    },
+    /// A setting does not fit the joint of a link.
+    #[error("articulated body '{body}', link '{link}': {what}, and its joint has {dof} degrees of freedom")]
+    Joint {
+        /// Body.
+        body: String,
+        /// Link.
+        link: String,
+        /// The setting.
+        what: &'static str,
+        /// Degrees of freedom of the joint.
+        dof: usize,
+    },
+    /// The tree of links is not valid.
+    #[error("articulated body '{body}': {why}")]
+    Model {
+        /// Body.
+        body: String,
+        /// Reason.
+        why: ModelError,
+    },
+    /// A constant is not valid.
+    #[error(transparent)]
+    Body(#[from] ArticulatedError),
+}
+
+/// The mass of a link.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Mass {
+    /// kg/m³, of all shapes.
+    Density(f64),
+    /// kg, distributed over the volumes of all shapes.
+    Total(f64),
+    /// In numbers.
+    Given(LinkMass),
+}
+
+/// A link of an [`ArticulationBuilder`]: its joint, its shapes and its mass.
+///
+/// A link with shapes has by default the density of water; a link without shapes has no mass.
+#[derive(Clone, Debug)]
+#[must_use]
+pub struct LinkBuilder {
+    name: String,
+    parent: Option<String>,
+    joint: Joint,
+    pose: Pose,
+    shapes: Vec<(Collider, bool)>,
+    mass: Mass,
+    dof: DofSettings,
+    appearance: Appearance,
+    material: Material,
+    position: Option<f64>,
+    velocity: Option<f64>,
+}
+
+impl LinkBuilder {
+    /// Makes a link that a joint attaches to the base.
+    pub fn new(name: impl Into<String>, joint: Joint) -> LinkBuilder {
+        LinkBuilder {
+            name: name.into(),
+            parent: None,
+            joint,
+            pose: Pose::identity(),
+            shapes: Vec::new(),
+            mass: Mass::Density(RigidBody::DEFAULT_DENSITY),
+            dof: DofSettings::default(),
+            appearance: Appearance::default(),
+            material: Material::default(),
+            position: None,
+            velocity: None,
+        }
+    }
+
+    /// Attaches it to a link that was added before, instead of the base.
+    pub fn with_parent(mut self, parent: impl Into<String>) -> Self {
+        self.parent = Some(parent.into());
+        self
+    }
+
+    /// Sets the frame of the joint in the frame of the parent link, or of the base: m. With the joint
+    /// at zero it is also the frame of the link.
+    pub fn with_pose(mut self, pose: Pose) -> Self {
+        self.pose = pose;
+        self
+    }
+
+    /// Adds a shape that collides and is drawn, at a pose in the frame of the link.
+    pub fn with_shape(mut self, shape: Shape, pose: Pose) -> Self {
+        self.shapes.push((Collider::new(shape, pose), true));
+        self
+    }
+
+    /// Adds a shape that is drawn and has mass, and does not collide.
+    pub fn with_visual_shape(mut self, shape: Shape, pose: Pose) -> Self {
+        self.shapes.push((Collider::new(shape, pose), false));
+        self
+    }
+
+    /// Distributes a mass, kg, over the volumes of its shapes.
+    pub fn with_mass(mut self, mass: f64) -> Self {
+        self.mass = Mass::Total(mass);
+        self
+    }
+
+    /// Sets the density of its shapes, kg/m³.
+    pub fn with_density(mut self, density: f64) -> Self {
+        self.mass = Mass::Density(density);
+        self
+    }
+
+    /// Sets mass, center of mass and inertia in numbers, in the frame of the link.
+    pub fn with_mass_properties(mut self, mass: LinkMass) -> Self {
+        self.mass = Mass::Given(mass);
+        self
+    }
+
+    /// Sets the limits of the position of its joint, rad or m.
+    pub fn with_limits(mut self, limits: [f64; 2]) -> Self {
+        self.dof.limits = Some(limits);
+        self
+    }
+
+    /// Sets the viscous damping of its joint, N·m·s/rad or N·s/m.
+    pub fn with_joint_damping(mut self, damping: f64) -> Self {
+        self.dof.damping = damping;
+        self
+    }
+
+    /// Sets the dry friction of its joint, N·m or N.
+    pub fn with_joint_friction(mut self, friction: f64) -> Self {
+        self.dof.friction = friction;
+        self
+    }
+
+    /// Sets a spring of its joint: stiffness, N·m/rad or N/m, and rest position, rad or m.
+    pub fn with_spring(mut self, stiffness: f64, rest: f64) -> Self {
+        self.dof.spring = Some(Spring { stiffness, rest });
+        self
+    }
+
+    /// Sets the drive of its joint.
+    pub fn with_drive(mut self, drive: Drive) -> Self {
+        self.dof.drive = drive;
+        self
+    }
+
+    /// Sets all settings of its joint.
+    pub fn with_dof(mut self, dof: DofSettings) -> Self {
+        self.dof = dof;
+        self
+    }
+
+    /// Sets the position of a revolute or prismatic joint at time 0, rad or m.
+    pub fn with_position(mut self, position: f64) -> Self {
+        self.position = Some(position);
+        self
+    }
+
+    /// Sets the velocity of a revolute or prismatic joint at time 0, rad/s or m/s.
+    pub fn with_velocity(mut self, velocity: f64) -> Self {
+        self.velocity = Some(velocity);
+        self
+    }
+
+    /// Sets the surface constants of its shapes.
+    pub fn with_material(mut self, material: Material) -> Self {
+        self.material = material;
+        self
+    }
+
+    /// Sets the appearance of its shapes.
+    pub fn with_appearance(mut self, appearance: Appearance) -> Self {
+        self.appearance = appearance;
+        self
+    }
+
+    /// Returns its name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn mass(&self, body: &str) -> Result<LinkMass, ArticulationError> {
+        let names = || (body.to_string(), self.name.clone());
+        let shape_error = |why| {
+            let (body, link) = names();
+            ArticulationError::Shape { body, link, why }
+        };
+        let density = match self.mass {
+            Mass::Given(mass) => return Ok(mass),
+            Mass::Density(density) => density,
+            Mass::Total(_) if self.shapes.is_empty() => {
+                let (body, link) = names();
+                return Err(ArticulationError::NoShape { body, link });
+            }
+            // the mass is scaled below, where its value is checked
+            Mass::Total(_) => 1.0,
+        };
+        let mut sum = LinkMass::none();
+        for (collider, _) in &self.shapes {
+            let own = collider.shape.mass_properties(density).map_err(shape_error)?;
+            let center = Pose::from(Translation3::from(collider.shape.center_of_mass()));
+            let own = LinkMass { mass: own.mass, center: own.center_of_mass, inertia: own.inertia };
+            sum = sum.with(&own.seen_from(&(collider.pose * center)));
+        }
+        if let Mass::Total(mass) = self.mass {
+            sum.inertia *= mass / sum.mass;
+            sum.mass = mass;
+        }
+        Ok(sum)
+    }
+}
+
+/// Collects links with shapes and makes an [`ArticulatedBody`].
+///
+/// ```
+/// # use tumble_core::prelude::*;
+/// # use tumble_core::{ArticulationBuilder, Joint, LinkBuilder};
+/// # let mut world = World::default();
+/// let (rod, middle) = (Shape::capsule(0.05, 0.9)?, Pose::translation(0.0, 0.0, -0.5));
+/// let upper = LinkBuilder::new("upper", Joint::revolute(Vec3::y())).with_shape(rod.clone(), middle).with_mass(1.0);
+/// let lower = LinkBuilder::new("lower", Joint::revolute(Vec3::y())).with_shape(rod, middle).with_mass(1.0);
+/// let lower = lower.with_parent("upper").with_pose(Pose::translation(0.0, 0.0, -1.0)).with_limits([-1.0, 1.0]);
+/// let arm = ArticulationBuilder::new("arm").link(upper).link(lower).build()?;
+/// world.add(arm.with_pose(Pose::translation(0.0, 0.0, 2.0)))?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+#[must_use]
+pub struct ArticulationBuilder {
+    name: String,
+    links: Vec<LinkBuilder>,
+    mimics: Vec<(String, String, f64, f64)>,
+    excluded: Vec<[String; 2]>,
+    self_collision: bool,
+}
+
+impl ArticulationBuilder {
+    /// Makes a builder without links.
+    pub fn new(name: impl Into<String>) -> ArticulationBuilder {
+        ArticulationBuilder {
+            name: name.into(),
+            links: Vec::new(),
+            mimics: Vec::new(),
+            excluded: Vec::new(),
+            self_collision: true,
+        }
+    }
+
+    /// Adds a link. [`build`](Self::build) checks everything.
+    pub fn link(mut self, link: LinkBuilder) -> Self {
+        self.links.push(link);
+        self
+    }
+
+    /// Couples the joint of a link to that of another: `q = multiplier·q_of + offset`.
+    pub fn mimic(mut self, link: impl Into<String>, of: impl Into<String>, multiplier: f64, offset: f64) -> Self {
+        self.mimics.push((link.into(), of.into(), multiplier, offset));
+        self
+    }
+
+    /// Disables collisions between two links. Links that a joint connects never collide.
+    pub fn exclude_collisions(mut self, a: impl Into<String>, b: impl Into<String>) -> Self {
+        self.excluded.push([a.into(), b.into()]);
+        self
+    }
+
+    /// Sets whether links collide with other links of the same body; by default they do.
+    pub fn with_self_collision(mut self, self_collision: bool) -> Self {
+        self.self_collision = self_collision;
+        self
+    }
+
+    /// Returns the links added so far.
+    pub fn links(&self) -> &[LinkBuilder] {
+        &self.links
+    }
+
+    /// Returns the link of that name, to change it.
+    pub fn link_mut(&mut self, name: &str) -> Option<&mut LinkBuilder> {
+        self.links.iter_mut().find(|link| link.name == name)
+    }
+
+    /// Builds the body.
+    ///
+    /// # Errors
+    /// [`ArticulationError`] for the first property that is not valid; it names the link.
+    pub fn build(&self) -> Result<ArticulatedBody, ArticulationError> {
+        let name = &self.name;
+        let mut model = ModelBuilder::new();
+        for (k, link) in self.links.iter().enumerate() {
+            let parent =
+                link.parent.as_deref().map(|parent| self.number(&self.links[..k], link, parent)).transpose()?;
+            model.link(&link.name, parent, link.joint, link.pose, link.mass(name)?);
+        }
+        let model = model.build().map_err(|why| ArticulationError::Model { body: name.clone(), why })?;
+        let mut body = ArticulatedBody::new(name, model);
+        body.self_collision = self.self_collision;
+        for link in &self.links {
+            add_shapes(&mut body, link)?;
+        }
+        self.set_joints(&mut body)?;
+        for (link, of, multiplier, offset) in &self.mimics {
+            let dof = |link: &String| body.dof_of(link).ok_or_else(|| self.no_dof(&body, link));
+            let coupling = Coupling { dof: dof(link)?, of: dof(of)?, multiplier: *multiplier, offset: *offset };
+            body.couple(coupling)?;
+        }
+        for [a, b] in &self.excluded {
+            body.exclude_collisions(a, b)?;
+        }
+        Ok(body)
+    }
+
+    /// Returns the number of the parent of a link.
+    fn number(&self, before: &[LinkBuilder], link: &LinkBuilder, parent: &str) -> Result<usize, ArticulationError> {
+        before.iter().position(|other| other.name == parent).ok_or_else(|| {
+            let names: Vec<&str> = before.iter().map(|other| other.name.as_str()).take(12).collect();
+            let known = match names.is_empty() {
+                true => "no link was; without a parent it hangs on the base".into(),
+                false => format!("there are {}", names.join(", ")),
+            };
+            ArticulationError::Parent { body: self.name.clone(), link: link.name.clone(), parent: parent.into(), known }
+        })
+    }
+
+    /// Sets the settings of all joints, and the state at time 0.
+    fn set_joints(&self, body: &mut ArticulatedBody) -> Result<(), ArticulationError> {
+        let mut start = body.start.clone();
+        let velocities = body.model().positions();
+        for link in &self.links {
+            let Some((q, v)) =
+                body.model().link(&link.name).map(|k| (body.model().links()[k].q, body.model().links()[k].v))
+            else {
+                match link.dof == DofSettings::default() && link.position.is_none() && link.velocity.is_none() {
+                    true => continue,
+                    false => return Err(self.wrong_joint(link, "it has settings of a joint")),
+                }
+            };
+            for index in v..v + link.joint.dof() {
+                body.set_dof(index, link.dof.clone())?;
+            }
+            for (value, index) in [(link.position, q), (link.velocity, velocities + v)] {
+                let Some(value) = value else { continue };
+                if link.joint.dof() != 1 {
+                    return Err(self.wrong_joint(link, "it has a position or a velocity, which needs one"));
+                }
+                start[index] = value;
+            }
+        }
+        if !body.is_state(&start) {
+            let expected = start.len();
+            let (body, what) = (self.name.clone(), "positions and velocities");
+            return Err(ArticulatedError::Start { body, what, expected }.into());
+        }
+        body.start = start;
+        Ok(())
+    }
+
+    fn wrong_joint(&self, link: &LinkBuilder, what: &'static str) -> ArticulationError {
+        ArticulationError::Joint { body: self.name.clone(), link: link.name.clone(), what, dof: link.joint.dof() }
+    }
+
+    fn no_dof(&self, body: &ArticulatedBody, link: &str) -> ArticulationError {
+        match self.links.iter().find(|known| known.name == link) {
+            Some(link) => self.wrong_joint(link, "it takes part in a coupling, which needs one"),
+            None => body.no_link(link).into(),
+        }
+    }
+}
+
+fn add_shapes(body: &mut ArticulatedBody, link: &LinkBuilder) -> Result<(), ArticulatedError> {
+    for (collider, collides) in &link.shapes {
+        let center = Translation3::from(collider.shape.center_of_mass());
+        let visual = Visual::shape(0, collider.pose * center, collider.shape.clone(), link.appearance.clone());
+        body.add_visual(&link.name, visual)?;
+        if *collides {
+            body.add_collider(&link.name, Collider { material: link.material, ..collider.clone() })?;
+        }
+    }
+    Ok(())
+}

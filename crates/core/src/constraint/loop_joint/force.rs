@@ -1,0 +1,69 @@
+//! Forces of loop joints: what they carry, and when they break.
+
+use super::LoopJoint;
+use super::pair::{Motion, Term, Terms};
+use crate::contact::warm_starts::RowStart;
+use crate::object::Level;
+use crate::world::view::WorldView;
+use tumble_collide::Vec3;
+
+/// The force and torque that a loop joint transmits, with those of its limits, spring, friction,
+/// damping and drive. World axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointForce {
+    /// Force on side A, N; the opposite acts on B.
+    pub force: Vec3,
+    /// Torque on side A about A's point of the joint, N·m.
+    pub torque: Vec3,
+    /// Force or torque of its drive along its position, N or N·m; positive forces increase the position.
+    pub drive: f64,
+}
+
+impl LoopJoint {
+    /// Returns the force for the forces of its rows; zero if these are not the rows that it has in
+    /// the view.
+    pub(crate) fn transmitted(&self, view: &WorldView, forces: &[RowStart]) -> JointForce {
+        let mut sum = JointForce::default();
+        let Some(pair) = self.pair(view) else { return sum };
+        // the rows of the last step: soft rows are absent at the level of accelerations
+        let levels = [Level::Velocity { h: 1.0 }, Level::Acceleration];
+        let rows = levels.map(|level| {
+            let mut rows = Vec::new();
+            self.lay(&pair, level, view.time, &mut |row| rows.push(row));
+            rows
+        });
+        let Some(level) = rows.iter().position(|rows| rows.len() == forces.len()) else { return sum };
+        for (row, start) in rows[level].iter().zip(forces) {
+            add(&mut sum, &row.terms, start.force);
+            if row.drives {
+                sum.drive += start.force;
+            }
+        }
+        let explicit = levels[level] == Level::Acceleration && rows[0].len() != rows[1].len();
+        if let Some(coordinate) = self.coordinate(&pair).filter(|_| explicit) {
+            let (force, spring) = (self.explicit_force(&coordinate), self.dof.spring_force(coordinate.position));
+            add(&mut sum, &coordinate.terms, force);
+            sum.drive += force - spring + self.dof.damping * coordinate.rate;
+        }
+        sum
+    }
+
+    pub(crate) fn breaks(&self, force: &JointForce) -> bool {
+        let [most, most_torque] = self.breaking();
+        force.force.norm() > most || force.torque.norm() > most_torque
+    }
+
+    pub(crate) fn is_breakable(&self) -> bool {
+        self.breaking().iter().any(|most| most.is_finite())
+    }
+}
+
+/// Adds a force along the velocity of a row: that on A, whose points are A's point of the joint.
+fn add(sum: &mut JointForce, terms: &Terms, force: f64) {
+    for Term { motion, axis, factor, .. } in terms.iter().flatten().filter(|term| term.side == 0) {
+        match motion {
+            Motion::Point(_) => sum.force += factor * force * axis,
+            Motion::Rotation => sum.torque += factor * force * axis,
+        }
+    }
+}

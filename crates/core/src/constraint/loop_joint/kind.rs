@@ -1,0 +1,87 @@
+//! Kinds of loop joints.
+
+/// The motion that a loop joint leaves free.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub enum LoopJointKind {
+    /// The origins coincide; all rotations are free. Three rows.
+    Spherical,
+    /// The origins and the z axes coincide; one rotation is free. Five rows.
+    Revolute,
+    /// Both frames coincide. Six rows.
+    Fixed,
+    /// All but the displacement along the z axes is held: a piston in its cylinder. Five rows.
+    Prismatic,
+    /// The z axes coincide: displacement along them and rotation about them are free. Four rows.
+    Cylindrical,
+    /// The origins coincide, and A's z axis is perpendicular to B's x axis: rotations about these two
+    /// are free, as of a Cardan shaft. Four rows.
+    Universal,
+    /// A's origin is in the plane of B's x and y axes, and the z axes are parallel: displacements in
+    /// the plane and the rotation about its normal are free. Three rows.
+    Planar,
+    /// The origins keep their distance. One row.
+    Distance,
+    /// The distance of the origins is at most the length. One row, active while it is taut.
+    Rope,
+    /// A spring between the origins. No row is held.
+    Spring,
+    /// A and B turn about their z axes in the ratio of their teeth; the axes do not move in the world.
+    /// One row, between two parts that other joints hold.
+    Gear,
+    /// A turns about its z axis, and B moves along its own by `radius` per radian; the axes do not move
+    /// in the world. One row, between two parts that other joints hold.
+    Rack,
+    /// A cylindrical joint whose displacement is `pitch` per turn. Five rows.
+    Screw,
+    /// A rope from A over two points of the world to B: the length on the side of A plus `ratio` times
+    /// that on the side of B is at most the length. One row, active while it is taut.
+    Pulley,
+}
+
+impl LoopJointKind {
+    /// All kinds with their names in Python and in scene files.
+    pub const NAMES: &[(&str, LoopJointKind)] = &[
+        ("fixed", LoopJointKind::Fixed),
+        ("revolute", LoopJointKind::Revolute),
+        ("prismatic", LoopJointKind::Prismatic),
+        ("spherical", LoopJointKind::Spherical),
+        ("cylindrical", LoopJointKind::Cylindrical),
+        ("universal", LoopJointKind::Universal),
+        ("planar", LoopJointKind::Planar),
+        ("distance", LoopJointKind::Distance),
+        ("rope", LoopJointKind::Rope),
+        ("spring", LoopJointKind::Spring),
+        ("gear", LoopJointKind::Gear),
+        ("rack", LoopJointKind::Rack),
+        ("screw", LoopJointKind::Screw),
+        ("pulley", LoopJointKind::Pulley),
+    ];
+
+    /// Returns the name.
+    pub fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
+    }
+
+    /// Returns whether it has one position: an angle, a displacement or a length.
+    pub fn has_position(self) -> bool {
+        use LoopJointKind::*;
+        matches!(self, Revolute | Prismatic | Cylindrical | Screw) || self.has_length()
+    }
+
+    /// Returns whether its position is a length: the distance of its origins, or that of a pulley.
+    pub fn has_length(self) -> bool {
+        use LoopJointKind::*;
+        matches!(self, Distance | Rope | Spring | Pulley)
+    }
+
+    /// Returns whether it needs a part on both sides.
+    pub fn joins_two_parts(self) -> bool {
+        matches!(self, LoopJointKind::Gear | LoopJointKind::Rack | LoopJointKind::Pulley)
+    }
+
+    /// Returns whether it has an axis.
+    pub fn has_axis(self) -> bool {
+        use LoopJointKind::*;
+        matches!(self, Revolute | Prismatic | Cylindrical | Universal | Planar | Screw | Gear | Rack)
+    }
+}

@@ -1,0 +1,203 @@
+//! Contacts at edges inside a surface that several bodies form together: flush boxes of a floor. The
+//! bodies that form it do not move; in heaps of moving ones all contacts stay.
+//!
+//! The narrow phase knows one pair at a time. For a body `A` on a box `B₁`, the edge of the next
+//! box `B₂` is a corner that sticks out; in the surface of both together it does not exist. A
+//! contact of `A` and `B₂` at the point `y` is removed if `A` can reach `y` only through `B₁`:
+//!
+//! ```text
+//! d₁(y) ≤ tolerance                              y is on B₁, or inside
+//! n₁·(y − y₁) ≤ flush                            y is not above the plane of the contact of A and B₁
+//! d₂(q) ≥ lift − flush,  q = y raised along n₁ to the height `lift` above that plane      B₂ does not protrude there
+//! ```
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `d₁`, `d₂` | signed distances from `B₁` and `B₂` |
+//! | `y₁`, `n₁` | point on `B₁` and normal of the nearest contact of `A` and `B₁`; the normal points to `A` |
+//!
+//! The contact with `B₁` must be the nearer one, so two never remove each other. The plane of `B₁`
+//! carries `A` across the seam. A wall that stands on `B₁` protrudes and keeps its
+//! contacts, also those at its foot. So does a ramp of more than 4°, and a step higher than `flush`.
+
+use crate::contact::detect::{ContactConstraint, Owner};
+use crate::object::part_state::PartState;
+use crate::world::view::Objects;
+use tumble_collide::{Shape, SurfacePoint, Vec3, closest_point_within};
+
+/// Height above the plane at which `B₂` must be absent, in drift tolerances.
+const LIFT: f64 = 10.0;
+/// Difference of height of flush surfaces, as a fraction of the lift: a ramp of 4° rises so much.
+const FLUSH: f64 = 2e-3;
+/// Distance by which the points of a contact may lie beside the surface, in bounding radii.
+const MAX_OVERHANG: f64 = 2e-3;
+/// Difference of equal normals.
+const SAME_NORMAL: f64 = 1e-7;
+/// Difference of equal gaps, in drift tolerances.
+const SAME_GAP: f64 = 1e-8;
+/// Maximum number of contacts of a part that are compared; those of a part with more all stay.
+const MAX_CONTACTS: usize = 256;
+
+/// Working memory.
+#[derive(Default)]
+pub(crate) struct InternalEdges {
+    /// Start of the entries of each part, and the entries: contacts of a moving part.
+    starts: Vec<u32>,
+    entries: Vec<Entry>,
+    /// The nearest contact with each other part.
+    nearest: Vec<Entry>,
+    removed: Vec<bool>,
+}
+
+/// A contact as one of its parts, `A`, sees it.
+#[derive(Clone, Copy)]
+struct Entry {
+    contact: u32,
+    /// The row of the other part.
+    other: u32,
+    gap: f64,
+    /// Unit normal, towards `A`.
+    normal: Vec3,
+    /// Point on the other part, m.
+    point: Vec3,
+}
+
+impl Entry {
+    /// Returns a contact as seen by its first or second part.
+    fn new(contact: u32, constraint: &ContactConstraint, second: bool) -> Entry {
+        let c = &constraint.contact;
+        let (sign, other) = if second { (-1.0, constraint.a) } else { (1.0, constraint.b) };
+        let normal = sign * c.normal;
+        Entry { contact, other, gap: c.gap, normal, point: c.point - normal * (0.5 * c.gap) }
+    }
+}
+
+/// Inputs of the search.
+pub(crate) struct Surroundings<'a> {
+    pub objects: Objects<'a>,
+    pub owners: &'a [Owner],
+    pub part_states: &'a [PartState],
+    /// m.
+    pub drift_tolerance: f64,
+}
+
+impl Surroundings<'_> {
+    fn shape(&self, part: u32) -> Option<&Shape> {
+        let owner = &self.owners[part as usize];
+        self.objects.at(owner.place as usize).object.collidable()?.shape(owner.part as usize)
+    }
+
+    fn moves(&self, part: u32) -> bool {
+        let owner = &self.owners[part as usize];
+        let entry = self.objects.at(owner.place as usize);
+        entry.moves() && entry.object.collidable().is_some_and(|body| body.part_moves(owner.part as usize))
+    }
+
+    /// Returns the point of a part's surface that is closest to a point; `None` if it is more than
+    /// `limit` away, m.
+    fn closest(&self, part: u32, point: &Vec3, limit: f64) -> Option<SurfacePoint> {
+        let shape = self.shape(part)?;
+        let pose = &self.part_states[part as usize].pose;
+        let reach = shape.bounding_radius() + limit;
+        if (point - pose.translation.vector).norm_squared() > reach * reach {
+            return None;
+        }
+        closest_point_within(shape, pose, point, limit)
+    }
+
+    /// Returns whether the contact `c` of `A` can only be reached through the part of `first`.
+    fn is_internal(&self, c: &Entry, first: &Entry) -> bool {
+        let (lift, tolerance) = (LIFT * self.drift_tolerance, self.drift_tolerance);
+        // bodies that rest on both surfaces keep the contacts with both
+        let same_normal = (c.normal - first.normal).norm_squared() < SAME_NORMAL * SAME_NORMAL;
+        let nearer = if same_normal { SAME_GAP * tolerance } else { 0.0 };
+        if (first.gap + nearer).total_cmp(&c.gap).then(first.contact.cmp(&c.contact)).is_ge() {
+            return false;
+        }
+        // manifolds extend a little beyond a face; a point outside is moved to the surface
+        let overhang = MAX_OVERHANG * self.shape(c.other).map_or(0.0, Shape::bounding_radius);
+        let height = |point: &Vec3| first.normal.dot(&(point - first.point));
+        if height(&c.point) > overhang || self.closest(first.other, &c.point, tolerance + overhang).is_none() {
+            return false;
+        }
+        let Some(surface) = self.closest(c.other, &c.point, f64::INFINITY) else { return false };
+        let point = if surface.distance > 0.0 { surface.point } else { c.point };
+        if height(&point) > FLUSH * lift || self.closest(first.other, &point, tolerance).is_none() {
+            return false;
+        }
+        let above = point + first.normal * (lift - height(&point));
+        self.closest(c.other, &above, (1.0 - FLUSH) * lift).is_none()
+    }
+}
+
+impl InternalEdges {
+    /// Removes the contacts at internal edges.
+    pub fn remove(&mut self, around: &Surroundings, contacts: &mut Vec<ContactConstraint>) {
+        self.collect(around, contacts);
+        self.removed.clear();
+        self.removed.resize(contacts.len(), false);
+        let mut any = false;
+        for range in self.starts.windows(2) {
+            let entries = &self.entries[range[0] as usize..range[1] as usize];
+            if entries.len() > MAX_CONTACTS || entries.iter().all(|e| e.other == entries[0].other) {
+                continue;
+            }
+            // contacts are ordered by pair
+            self.nearest.clear();
+            self.nearest.extend(
+                entries
+                    .chunk_by(|x, y| x.other == y.other)
+                    .filter_map(|same| same.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).copied()),
+            );
+            for c in entries {
+                let internal = |first: &Entry| first.other != c.other && around.is_internal(c, first);
+                if self.nearest.iter().any(internal) {
+                    self.removed[c.contact as usize] = true;
+                    any = true;
+                }
+            }
+        }
+        if any {
+            let mut removed = self.removed.iter();
+            contacts.retain(|_| removed.next().is_none_or(|removed| !removed));
+        }
+    }
+
+    /// Collects the contacts of each moving part, by counting.
+    fn collect(&mut self, around: &Surroundings, contacts: &[ContactConstraint]) {
+        // the moving part of a contact with one that does not move
+        let seen = |index: usize| {
+            let constraint = &contacts[index];
+            // the contacts of followed meshes belong to later poses
+            let present = constraint.offset == Vec3::zeros();
+            let (a, b) = (constraint.a, constraint.b);
+            match (present && around.moves(a), present && around.moves(b)) {
+                (true, false) => Some((a, false)),
+                (false, true) => Some((b, true)),
+                _ => None,
+            }
+        };
+        self.starts.clear();
+        self.starts.resize(around.owners.len() + 1, 0);
+        for (part, _) in (0..contacts.len()).filter_map(seen) {
+            self.starts[part as usize] += 1;
+        }
+        // to the ends of the ranges
+        let mut end = 0;
+        for start in &mut self.starts[..around.owners.len()] {
+            end += *start;
+            *start = end;
+        }
+        self.starts[around.owners.len()] = end;
+        let empty = Entry { contact: 0, other: 0, gap: 0.0, normal: Vec3::zeros(), point: Vec3::zeros() };
+        self.entries.clear();
+        self.entries.resize(end as usize, empty);
+        // and from the last contact back to their starts
+        for index in (0..contacts.len()).rev() {
+            if let Some((part, second)) = seen(index) {
+                self.starts[part as usize] -= 1;
+                self.entries[self.starts[part as usize] as usize] = Entry::new(index as u32, &contacts[index], second);
+            }
+        }
+    }
+}

@@ -1,0 +1,407 @@
+//! Events of a frame: contacts that begin, persist and end, sensors, joints that break, sleep.
+//!
+//! Two parts are in contact in a frame if their surfaces touch, or an impulse acts between them, in
+//! any of its sub-steps. The pairs in contact are part of the state, so a restored world, a fork
+//! and an archive have the same events in the next frame. A pair with a sleeping side stays in
+//! contact without events.
+//!
+//! Sensors are compared with the parts of other objects at the end of the frame. An object that
+//! passes through a sensor within one frame is not seen.
+
+use super::{ContactPoint, Core, World, WorldState};
+use crate::contact::detect::ContactConstraint;
+use crate::world::view::{Entry, Mode, ObjectId};
+use serde::{Deserialize, Serialize};
+use tumble_collide::{Aabb, Contact, Pose, Shape, Vec3, contacts_in_mode};
+
+/// Kind of an event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum EventKind {
+    /// Two parts came into contact.
+    ContactBegin,
+    /// Two parts were in contact in this frame and the one before.
+    ContactPersist,
+    /// Two parts parted, or one of them stopped colliding.
+    ContactEnd,
+    /// A part of another object entered a sensor.
+    SensorBegin,
+    /// It left the sensor.
+    SensorEnd,
+    /// An object fell asleep.
+    Asleep,
+    /// An object woke.
+    Awake,
+    /// A loop joint broke.
+    JointBroken,
+}
+
+impl EventKind {
+    /// All kinds with their names in Python.
+    pub const NAMES: &[(&str, EventKind)] = &[
+        ("contact_begin", EventKind::ContactBegin),
+        ("contact_persist", EventKind::ContactPersist),
+        ("contact_end", EventKind::ContactEnd),
+        ("sensor_begin", EventKind::SensorBegin),
+        ("sensor_end", EventKind::SensorEnd),
+        ("asleep", EventKind::Asleep),
+        ("awake", EventKind::Awake),
+        ("joint_broken", EventKind::JointBroken),
+    ];
+}
+
+/// An event of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event {
+    /// Kind of the event.
+    pub kind: EventKind,
+    /// The object that was added first; the sensor; the object that fell asleep or woke; the joint that
+    /// broke.
+    pub a: ObjectId,
+    /// Part of `a`.
+    pub part_a: usize,
+    /// The other object; `None` for sleep and joints.
+    pub b: Option<ObjectId>,
+    /// Part of `b`.
+    pub part_b: usize,
+    /// Impulse on `a` over the frame, N·s, world axes; zero for all but contacts that begin or
+    /// persist.
+    pub impulse: Vec3,
+    /// The contact point with the largest impulse, world axes, meters; zero like the impulse.
+    pub point: Vec3,
+}
+
+impl Event {
+    /// Returns whether an object takes part.
+    pub(crate) fn names(&self, id: ObjectId) -> bool {
+        self.a == id || self.b == Some(id)
+    }
+}
+
+/// A pair of parts that touch, or a sensor and a part in it. Sorted by sensors, then by the order of
+/// addition.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub(crate) struct Touching {
+    /// Whether the first side is a sensor.
+    sensor: bool,
+    /// Serial and part of either side.
+    pair: [u32; 4],
+}
+
+impl Touching {
+    /// Returns whether an object with this serial takes part.
+    pub fn names(&self, serial: u32) -> bool {
+        self.pair[0] == serial || self.pair[2] == serial
+    }
+}
+
+/// A contact of a sub-step.
+#[derive(Clone, Copy, Debug)]
+struct Touch {
+    pair: [u32; 4],
+    ids: [ObjectId; 2],
+    /// On the first side, N·s.
+    impulse: Vec3,
+    point: Vec3,
+}
+
+/// The contacts of the sub-steps of a frame.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Touches {
+    list: Vec<Touch>,
+    /// Number of those of sub-steps that are done, and of impacts. Those behind are of the present
+    /// sub-step; their impulses are forces in `backtracking`, N.
+    done: usize,
+}
+
+impl Touches {
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.list.clear();
+        self.done = 0;
+    }
+}
+
+/// A pair that touched in a frame.
+struct Pair {
+    pair: [u32; 4],
+    ids: [ObjectId; 2],
+    impulse: Vec3,
+    point: Vec3,
+    /// Norm of the impulse at the point.
+    most: f64,
+}
+
+impl World {
+    /// Returns the events of the last frame: contacts that ended, began or persisted, by the order
+    /// in which their objects were added, then sensors, joints that broke, and sleep. Objects that were removed since
+    /// have none.
+    ///
+    /// ```
+    /// use tumble_core::EventKind;
+    /// use tumble_core::prelude::*;
+    /// let mut world = World::default();
+    /// world.add(RigidBody::fixed(Shape::half_space()))?;
+    /// let ball = world.add(RigidBody::new(Shape::sphere(0.1)?).with_pose(Pose::translation(0.0, 0.0, 0.2)))?;
+    /// while world.events().is_empty() {
+    ///     world.step()?;
+    /// }
+    /// let event = world.events()[0];
+    /// assert_eq!((event.kind, event.b), (EventKind::ContactBegin, Some(ball)));
+    /// assert!(event.impulse.z < 0.0); // on the ground
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn events(&self) -> &[Event] {
+        &self.core.events
+    }
+
+    /// Returns the objects and parts in contact with an object after the last frame, or in it if it
+    /// is a sensor; each once, in the order of addition.
+    pub fn touching(&self, id: ObjectId) -> Vec<(ObjectId, usize)> {
+        let Some(serial) = self.core.table.place(id).map(|place| self.core.state.objects[place].serial) else {
+            return Vec::new();
+        };
+        let others = self.core.state.touching.iter().filter_map(|touching| {
+            let [a, part_a, b, part_b] = touching.pair;
+            let other = match (a == serial, b == serial) {
+                (true, _) => (b, part_b),
+                (_, true) if !touching.sensor => (a, part_a),
+                _ => return None,
+            };
+            Some((self.core.table.order[self.core.by_serial(other.0)?], other.1 as usize))
+        });
+        let mut others: Vec<(ObjectId, usize)> = others.collect();
+        others.sort_by_key(|(id, part)| (self.core.table.place(*id), *part));
+        others.dedup();
+        others
+    }
+}
+
+impl Core {
+    /// Adds the published contacts of a sub-step that touch; those that were added before in the same
+    /// sub-step are dropped.
+    pub(crate) fn touch_contacts(&mut self, constraints: &[ContactConstraint]) {
+        let Touches { list, done } = &mut self.touches;
+        list.truncate(*done);
+        // `backtracking` ends a sub-step at an event that is not known yet
+        let impulse = |c: &ContactPoint| if self.implicit { c.impulse } else { c.force };
+        let touching = constraints.iter().zip(&self.contacts).filter(|(_, contact)| contact.is_touching());
+        list.extend(touching.map(|(constraint, c)| Touch {
+            pair: constraint.key.pair,
+            ids: [c.a, c.b],
+            impulse: impulse(c),
+            point: c.point,
+        }));
+    }
+
+    /// Ends a sub-step of `h` seconds.
+    pub(crate) fn keep_touches(&mut self, h: f64) {
+        let Touches { list, done } = &mut self.touches;
+        if !self.implicit {
+            list[*done..].iter_mut().for_each(|touch| touch.impulse *= h);
+        }
+        *done = list.len();
+    }
+
+    /// Adds impacts with their impulses, N·s, on A.
+    pub(crate) fn touch_impacts(&mut self, constraints: &[ContactConstraint], impulses: impl Iterator<Item = Vec3>) {
+        let (owners, touches) = (&self.owners, &mut self.touches);
+        touches.list.truncate(touches.done);
+        let struck = constraints.iter().zip(impulses).filter(|(_, impulse)| *impulse != Vec3::zeros());
+        touches.list.extend(struck.map(|(constraint, impulse)| Touch {
+            pair: constraint.key.pair,
+            ids: [constraint.a, constraint.b].map(|part| owners[part as usize].id),
+            impulse,
+            point: constraint.contact.point,
+        }));
+        touches.done = touches.list.len();
+    }
+
+    /// After a frame: compares what touches with the frame before, whose state is `before`, and
+    /// writes the events.
+    pub(crate) fn collect_events(&mut self, before: &WorldState) {
+        self.events.clear();
+        let pairs = self.touched_pairs();
+        let known = std::mem::take(&mut self.state.touching);
+        let contact = |pair: [u32; 4]| Touching { sensor: false, pair };
+        let mut touching: Vec<Touching> = pairs.iter().map(|p| contact(p.pair)).collect();
+        let mut later = pairs.iter().map(|p| p.pair).peekable();
+        for &old in known.iter().filter(|t| !t.sensor) {
+            while later.next_if(|pair| *pair < old.pair).is_some() {}
+            if later.peek() != Some(&old.pair) {
+                match self.sleeps(&old) {
+                    true => touching.push(old),
+                    false => self.add_event(EventKind::ContactEnd, old.pair),
+                }
+            }
+        }
+        let mut earlier = known.iter().peekable();
+        for p in &pairs {
+            let now = contact(p.pair);
+            while earlier.next_if(|old| **old < now).is_some() {}
+            let kind = match earlier.next_if(|old| **old == now) {
+                Some(_) => EventKind::ContactPersist,
+                None => EventKind::ContactBegin,
+            };
+            let ([a, b], [_, part_a, _, part_b]) = (p.ids, p.pair);
+            self.events.push(Event {
+                kind,
+                a,
+                part_a: part_a as usize,
+                b: Some(b),
+                part_b: part_b as usize,
+                impulse: p.impulse,
+                point: p.point,
+            });
+        }
+        let sensed = self.sensed_pairs();
+        for &old in known.iter().filter(|t| t.sensor && sensed.binary_search(t).is_err()) {
+            self.add_event(EventKind::SensorEnd, old.pair);
+        }
+        for &new in sensed.iter().filter(|t| known.binary_search(t).is_err()) {
+            self.add_event(EventKind::SensorBegin, new.pair);
+        }
+        touching.extend(sensed);
+        touching.sort_unstable();
+        self.state.touching = touching;
+        let broken = self.broken.iter().filter_map(|serial| self.by_serial(*serial));
+        let broken: Vec<Event> = broken.map(|place| self.event_of_one(EventKind::JointBroken, place)).collect();
+        self.events.extend(broken);
+        self.add_sleep_events(before);
+    }
+
+    /// Returns the pairs that touched in the frame, sorted, with their impulses.
+    fn touched_pairs(&mut self) -> Vec<Pair> {
+        let touches = &mut self.touches.list;
+        // the order of addition, whatever the order of the sides in a contact
+        for touch in touches.iter_mut().filter(|t| (t.pair[2], t.pair[3]) < (t.pair[0], t.pair[1])) {
+            let [a, part_a, b, part_b] = touch.pair;
+            (touch.pair, touch.impulse) = ([b, part_b, a, part_a], -touch.impulse);
+            touch.ids.swap(0, 1);
+        }
+        touches.sort_by_key(|touch| touch.pair);
+        let mut pairs: Vec<Pair> = Vec::new();
+        for touch in touches.iter() {
+            let norm = touch.impulse.norm();
+            match pairs.last_mut().filter(|last| last.pair == touch.pair) {
+                Some(last) => {
+                    last.impulse += touch.impulse;
+                    if norm > last.most {
+                        (last.most, last.point) = (norm, touch.point);
+                    }
+                }
+                None => {
+                    let Touch { pair, ids, impulse, point } = *touch;
+                    pairs.push(Pair { pair, ids, impulse, point, most: norm });
+                }
+            }
+        }
+        let least = self.settings.event_impulse;
+        if least > 0.0 {
+            pairs.retain(|pair| pair.impulse.norm() >= least);
+        }
+        pairs
+    }
+
+    fn sleeps(&self, touching: &Touching) -> bool {
+        let asleep = |serial: u32| {
+            self.by_serial(serial).map(|place| &self.state.objects[place]).is_some_and(|o| o.asleep && o.status.enabled)
+        };
+        let there = |serial: u32| {
+            self.by_serial(serial).is_some_and(|place| {
+                let status = self.state.objects[place].status;
+                status.enabled && status.collidable
+            })
+        };
+        let [a, _, b, _] = touching.pair;
+        (asleep(a) || asleep(b)) && there(a) && there(b)
+    }
+
+    /// Adds an event without an impulse.
+    fn add_event(&mut self, kind: EventKind, [a, part_a, b, part_b]: [u32; 4]) {
+        let (Some(a), Some(b)) = (self.by_serial(a), self.by_serial(b)) else { return };
+        let (a, b) = (self.table.order[a], Some(self.table.order[b]));
+        let zero = Vec3::zeros();
+        let (part_a, part_b) = (part_a as usize, part_b as usize);
+        self.events.push(Event { kind, a, part_a, b, part_b, impulse: zero, point: zero });
+    }
+
+    fn add_sleep_events(&mut self, before: &WorldState) {
+        for (place, (was, is)) in before.objects.iter().zip(&self.state.objects).enumerate() {
+            if was.asleep != is.asleep {
+                let kind = if is.asleep { EventKind::Asleep } else { EventKind::Awake };
+                let event = self.event_of_one(kind, place);
+                self.events.push(event);
+            }
+        }
+    }
+
+    /// Returns an event of one object.
+    fn event_of_one(&self, kind: EventKind, place: usize) -> Event {
+        let (a, zero) = (self.table.order[place], Vec3::zeros());
+        Event { kind, a, part_a: 0, b: None, part_b: 0, impulse: zero, point: zero }
+    }
+
+    /// Returns the pairs of a sensor and a part that overlaps it, sorted.
+    fn sensed_pairs(&self) -> Vec<Touching> {
+        let parts = |sensors: bool| {
+            let entries = self.objects().iter().filter(|e| e.status.enabled && e.status.collidable);
+            entries.filter_map(|e| Some((e, e.object.collidable()?))).flat_map(move |(entry, body)| {
+                let parts = entry.state_range.parts.clone().enumerate();
+                parts.filter(move |(part, _)| body.is_sensor(*part) == sensors).filter_map(move |(part, row)| {
+                    let pose = self.derived.part_states[row].pose;
+                    Some(SensedPart { entry, part, shape: body.shape(part)?, pose })
+                })
+            })
+        };
+        let sensors: Vec<(SensedPart<'_>, Aabb)> =
+            parts(true).map(|sensor| (sensor, sensor.shape.aabb(&sensor.pose))).collect();
+        let mut found = Vec::new();
+        if sensors.is_empty() {
+            return found;
+        }
+        let mut contacts = Vec::new();
+        for part in parts(false) {
+            let bounds = part.shape.aabb(&part.pose);
+            for (sensor, around) in &sensors {
+                if around.overlaps(&bounds) && self.senses(sensor, &part, &mut contacts) {
+                    let (a, b) = (sensor.entry.serial, part.entry.serial);
+                    found.push(Touching { sensor: true, pair: [a, sensor.part as u32, b, part.part as u32] });
+                }
+            }
+        }
+        found.sort_unstable();
+        found
+    }
+
+    fn senses(&self, sensor: &SensedPart<'_>, other: &SensedPart<'_>, contacts: &mut Vec<Contact>) -> bool {
+        let (Some(a), Some(b)) = (sensor.entry.object.collidable(), other.entry.object.collidable()) else {
+            return false;
+        };
+        let fixed = |entry: &Entry<'_>| entry.status.mode == Mode::Static;
+        let (part_a, part_b) = (sensor.part, other.part);
+        if fixed(&sensor.entry) && fixed(&other.entry)
+            || sensor.entry.serial == other.entry.serial
+            || !a.collides_with(part_a, b.collision_group(part_b))
+            || !b.collides_with(part_b, a.collision_group(part_a))
+        {
+            return false;
+        }
+        let surface = |p: &SensedPart<'_>, material| (self.table.order[p.entry.place], p.part, material);
+        if self.pair_materials.ignores(surface(sensor, a.material(part_a)), surface(other, b.material(part_b))) {
+            return false;
+        }
+        contacts.clear();
+        let mode = a.contact_mode(part_a).of_pair(b.contact_mode(part_b));
+        contacts_in_mode(mode, sensor.shape, &sensor.pose, other.shape, &other.pose, 0.0, contacts);
+        !contacts.is_empty()
+    }
+}
+
+/// A part of the search for sensors.
+#[derive(Clone, Copy)]
+struct SensedPart<'a> {
+    entry: Entry<'a>,
+    part: usize,
+    shape: &'a Shape,
+    pose: Pose,
+}

@@ -1,0 +1,262 @@
+//! Makes descriptions of articulated bodies link by link.
+
+use crate::arrays::convert::{Numbers, numbers, pose, shown, vec3, vec3_or};
+use crate::choices::{JOINT_TYPES, JointType, meaning};
+use crate::errors::{Error, Result};
+use crate::objects::appearance::palette;
+use crate::objects::articulation::Articulation;
+use crate::objects::body::inertia;
+use crate::objects::joints::drive_of;
+use crate::objects::shapes::Shape;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::sync::{Mutex, MutexGuard};
+use tumble::collide::{Mat3, Vec3};
+use tumble::dynamics::{Appearance, ArticulationBuilder as Builder, Joint, LinkBuilder, LinkMass, Material};
+
+/// Makes an articulated body link by link, without a file.
+///
+/// name: of the body. self_collision: whether its links collide with each other; links that a joint
+/// connects never do. ``build`` returns a description; ``World.add_articulation`` takes the builder
+/// too.
+#[pyclass(frozen, module = "tumble")]
+pub struct ArticulationBuilder {
+    builder: Mutex<Builder>,
+}
+
+impl ArticulationBuilder {
+    fn builder(&self) -> MutexGuard<'_, Builder> {
+        self.builder.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+
+    fn change(&self, change: impl FnOnce(Builder) -> Builder) {
+        let mut builder = self.builder();
+        *builder = change(builder.clone());
+    }
+
+    fn has(&self, link: &str) -> Result<()> {
+        let builder = self.builder();
+        if builder.links().iter().any(|known| known.name() == link) {
+            return Ok(());
+        }
+        let names: Vec<&str> = builder.links().iter().map(LinkBuilder::name).take(12).collect();
+        Err(Error::Name(match names.is_empty() {
+            true => format!("there is no link named '{link}'; there are none yet"),
+            false => format!("there is no link named '{link}'; there are {}", names.join(", ")),
+        }))
+    }
+
+    /// Returns the description.
+    pub fn description(&self) -> Result<Articulation> {
+        let body = self.builder().build()?;
+        Ok(Articulation::described(body))
+    }
+}
+
+#[pymethods]
+impl ArticulationBuilder {
+    #[new]
+    #[pyo3(signature = (name="articulation", *, self_collision=true))]
+    fn new(name: &str, self_collision: bool) -> ArticulationBuilder {
+        ArticulationBuilder { builder: Mutex::new(Builder::new(name).with_self_collision(self_collision)) }
+    }
+
+    /// Adds a link. Its joint has the same name.
+    ///
+    /// parent: a link that was added before; None: the base. joint: ``"revolute"``, ``"prismatic"``,
+    /// ``"spherical"``, ``"fixed"``, or ``"floating"`` without a parent. axis: of a revolute or
+    /// prismatic joint, shape (3,), any length above 0. position, orientation: the frame of the joint
+    /// in the frame of the parent, shape (3,), m, and (4,); with the joint at zero it is the frame of
+    /// the link.
+    ///
+    /// shape: collides and is drawn, at shape_position and shape_orientation in the frame of the link;
+    /// ``add_shape`` adds others. mass, kg: spread over the volumes of all shapes; or density, kg/m³,
+    /// by default that of water. A link without shapes has no mass. center_of_mass, shape (3,), m, and
+    /// inertia about it, shape (3, 3) or (3,), kg·m²: numbers for ``mass``, without regard to the shapes;
+    /// a point mass without inertia.
+    ///
+    /// limits: (lower, upper), rad or m. joint_damping: N·m·s/rad or N·s/m. joint_friction: N·m or N.
+    /// stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
+    /// ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the
+    /// start. friction, restitution, collides: of the shapes. color: sRGB, shape (3,).
+    #[pyo3(signature = (name, parent=None, *, joint="revolute", axis=None, position=None, orientation=None, shape=None, shape_position=None,
+        shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, joint_friction=0.0,
+        stiffness=0.0, rest=0.0, drive=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=true, color=None))]
+    #[pyo3(
+        text_signature = "($self, name, parent=None, *, joint='revolute', axis=(0.0, 0.0, 1.0), position=None, orientation=None, shape=None, \
+        shape_position=None, shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, \
+        joint_friction=0.0, stiffness=0.0, rest=0.0, drive=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=True, color=None)"
+    )]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn add_link(
+        &self,
+        name: &str,
+        parent: Option<&str>,
+        joint: &str,
+        axis: Option<&Bound<'_, PyAny>>,
+        position: Option<&Bound<'_, PyAny>>,
+        orientation: Option<&Bound<'_, PyAny>>,
+        shape: Option<PyRef<'_, Shape>>,
+        shape_position: Option<&Bound<'_, PyAny>>,
+        shape_orientation: Option<&Bound<'_, PyAny>>,
+        mass: Option<f64>,
+        density: Option<f64>,
+        center_of_mass: Option<&Bound<'_, PyAny>>,
+        inertia: Option<&Bound<'_, PyAny>>,
+        limits: Option<&Bound<'_, PyAny>>,
+        joint_damping: f64,
+        joint_friction: f64,
+        stiffness: f64,
+        rest: f64,
+        drive: Option<&Bound<'_, PyDict>>,
+        q: Option<f64>,
+        qd: Option<f64>,
+        friction: f64,
+        restitution: f64,
+        collides: bool,
+        color: Option<&Bound<'_, PyAny>>,
+    ) -> Result<()> {
+        if self.builder().links().iter().any(|known| known.name() == name) {
+            return Err(Error::value(format!("there is a link named '{name}' already")));
+        }
+        let axis = vec3_or(axis, "axis", Vec3::z())?;
+        let joint = match meaning("joint", joint, JOINT_TYPES)? {
+            JointType::Revolute => Joint::revolute(axis),
+            JointType::Prismatic => Joint::prismatic(axis),
+            JointType::Spherical => Joint::Spherical,
+            JointType::Fixed => Joint::Fixed,
+            JointType::Floating => Joint::Floating,
+        };
+        let mut link = LinkBuilder::new(name, joint)
+            .with_pose(pose(position, orientation)?)
+            .with_joint_damping(joint_damping)
+            .with_joint_friction(joint_friction)
+            .with_material(Material { restitution, friction, ..Material::default() });
+        if let Some(parent) = parent {
+            self.has(parent)?;
+            link = link.with_parent(parent);
+        }
+        if stiffness != 0.0 {
+            link = link.with_spring(stiffness, rest);
+        }
+        if let Some(limits) = limits {
+            link = link.with_limits(pair(limits)?);
+        }
+        if let Some(drive) = drive {
+            link = link.with_drive(drive_of(drive)?);
+        }
+        link = q.into_iter().fold(link, LinkBuilder::with_position);
+        link = qd.into_iter().fold(link, LinkBuilder::with_velocity);
+        let color = match color {
+            Some(color) => vec3(color, "color")?.map(|c| c as f32).into(),
+            None => palette(self.builder().links().len()),
+        };
+        link = link.with_appearance(Appearance { color, ..Appearance::default() });
+        link = with_mass(link, (mass, density), center_of_mass, inertia)?;
+        if let Some(shape) = shape {
+            link = with_shape(link, &shape, shape_position, shape_orientation, collides)?;
+        }
+        self.change(|builder| builder.link(link));
+        Ok(())
+    }
+
+    /// Adds a shape to a link. position, orientation: in the frame of the link. collides: whether it
+    /// collides, or is only drawn; both count for the mass.
+    #[pyo3(signature = (link, shape, position=None, orientation=None, *, collides=true))]
+    fn add_shape(
+        &self,
+        link: &str,
+        shape: PyRef<'_, Shape>,
+        position: Option<&Bound<'_, PyAny>>,
+        orientation: Option<&Bound<'_, PyAny>>,
+        collides: bool,
+    ) -> Result<()> {
+        self.has(link)?;
+        let mut builder = self.builder();
+        if let Some(known) = builder.link_mut(link) {
+            *known = with_shape(known.clone(), &shape, position, orientation, collides)?;
+        }
+        Ok(())
+    }
+
+    /// Couples the joint of a link to that of another: ``q = multiplier · q_of + offset``.
+    #[pyo3(signature = (link, of, multiplier=1.0, offset=0.0))]
+    fn mimic(&self, link: &str, of: &str, multiplier: f64, offset: f64) -> Result<()> {
+        self.has(link)?;
+        self.has(of)?;
+        self.change(|builder| builder.mimic(link, of, multiplier, offset));
+        Ok(())
+    }
+
+    /// Disables collisions between two links.
+    fn exclude_collisions(&self, a: &str, b: &str) -> Result<()> {
+        self.has(a)?;
+        self.has(b)?;
+        self.change(|builder| builder.exclude_collisions(a, b));
+        Ok(())
+    }
+
+    /// Returns a description of the body, whose dynamics functions work at once. Later links do not
+    /// change it.
+    fn build(&self) -> Result<Articulation> {
+        self.description()
+    }
+
+    fn __repr__(&self) -> String {
+        let builder = self.builder();
+        let links: Vec<&str> = builder.links().iter().map(LinkBuilder::name).collect();
+        format!("<tumble.ArticulationBuilder {links:?}>")
+    }
+}
+
+fn with_shape(
+    link: LinkBuilder,
+    shape: &Shape,
+    position: Option<&Bound<'_, PyAny>>,
+    orientation: Option<&Bound<'_, PyAny>>,
+    collides: bool,
+) -> Result<LinkBuilder> {
+    let (solid, pose) = (shape.solid.clone(), pose(position, orientation)? * shape.placement);
+    Ok(if collides { link.with_shape(solid, pose) } else { link.with_visual_shape(solid, pose) })
+}
+
+fn with_mass(
+    link: LinkBuilder,
+    mass: (Option<f64>, Option<f64>),
+    center: Option<&Bound<'_, PyAny>>,
+    tensor: Option<&Bound<'_, PyAny>>,
+) -> Result<LinkBuilder> {
+    let numbers = center.is_some() || tensor.is_some();
+    Ok(match mass {
+        (Some(_), Some(_)) => {
+            let name = link.name();
+            return Err(Error::value(format!("link '{name}': expected a mass or a density, not both")));
+        }
+        (Some(mass), None) if numbers => {
+            let inertia = tensor.map_or(Ok(Mat3::zeros()), inertia)?;
+            link.with_mass_properties(LinkMass {
+                mass,
+                center: vec3_or(center, "center_of_mass", Vec3::zeros())?,
+                inertia,
+            })
+        }
+        _ if numbers => {
+            let name = link.name();
+            return Err(Error::value(format!("link '{name}': center_of_mass and inertia need a mass")));
+        }
+        (Some(mass), None) => link.with_mass(mass),
+        (None, Some(density)) => link.with_density(density),
+        (None, None) => link,
+    })
+}
+
+/// Converts limits.
+pub fn pair(value: &Bound<'_, PyAny>) -> Result<[f64; 2]> {
+    let wrong = |shape: &[usize]| Error::value(format!("limits: expected (lower, upper), got shape {}", shown(shape)));
+    // infinite numbers are limits that are not there
+    if let Ok([lower, upper]) = value.extract::<[f64; 2]>() {
+        return Ok([lower, upper]);
+    }
+    let Numbers { shape, data } = numbers(value, "limits")?;
+    <[f64; 2]>::try_from(data).map_err(|_| wrong(&shape))
+}

@@ -1,0 +1,372 @@
+//! A loop joint of a world: a handle that reads from the world at each use.
+
+use crate::arrays::convert::vector;
+use crate::errors::{Error, Result};
+use crate::objects::bodies::handle;
+use crate::objects::builder::pair;
+use crate::objects::joints::drive;
+use crate::objects::place::{Place, found, hash};
+use crate::world::gc::{Anchor, anchor};
+use numpy::PyArray1;
+use pyo3::gc::{PyTraverseError, PyVisit};
+use pyo3::prelude::*;
+use tumble::dynamics::{DofSettings, JointForce, LoopJoint, LoopJointKind, Spring, Transmission};
+
+/// A joint between two bodies, or a body and the world, made by ``World.add_joint``.
+///
+/// Its position is an angle (rad), a displacement (m) or a length (m); ``"spherical"``, ``"fixed"``,
+/// ``"universal"`` and ``"planar"`` joints have none. Everything can change between steps. All vectors
+/// are in world axes.
+#[pyclass(frozen, module = "tumble")]
+pub struct Joint {
+    pub place: Place,
+    anchor: Py<Anchor>,
+}
+
+impl Joint {
+    /// Returns a handle.
+    pub fn new(py: Python<'_>, place: Place) -> Result<Joint> {
+        Ok(Joint { anchor: anchor(py, &place.shared)?, place })
+    }
+
+    fn constant<T>(&self, get: impl FnOnce(&LoopJoint) -> T) -> Result<T> {
+        self.place.read(|inner| inner.world.get::<LoopJoint>(self.place.id).map(get))
+    }
+
+    /// Changes constants. An invalid value changes nothing.
+    fn change(&self, py: Python<'_>, change: impl FnOnce(&mut LoopJoint) -> Result<()>) -> Result<()> {
+        self.place.write(py, |inner| inner.world.change_joint(self.place.id, change))
+    }
+
+    fn change_dof(&self, py: Python<'_>, change: impl FnOnce(&mut DofSettings)) -> Result<()> {
+        self.change(py, |joint| {
+            let mut dof = joint.dof().clone();
+            change(&mut dof);
+            Ok(joint.set_dof(dof)?)
+        })
+    }
+
+    fn transmission<T>(&self, kind: LoopJointKind, get: impl FnOnce(&Transmission) -> T) -> Result<T> {
+        self.constant(|joint| {
+            is_of(joint, kind)?;
+            Ok(get(joint.transmission()))
+        })?
+    }
+
+    fn change_transmission(
+        &self,
+        py: Python<'_>,
+        kind: LoopJointKind,
+        change: impl FnOnce(&mut Transmission),
+    ) -> Result<()> {
+        self.change(py, |joint| {
+            is_of(joint, kind)?;
+            let mut constants = *joint.transmission();
+            change(&mut constants);
+            Ok(joint.set_transmission(constants)?)
+        })
+    }
+
+    fn carried(&self) -> Result<JointForce> {
+        self.place.read(|inner| inner.world.joint_force(self.place.id))
+    }
+
+    fn motion(&self) -> Result<[f64; 2]> {
+        self.place.read(|inner| {
+            let joint = inner.world.get::<LoopJoint>(self.place.id)?;
+            Some(match joint.kind().has_position() {
+                // it has none while a body is gone or disabled
+                true => Ok(joint.position(&inner.world.view()).unwrap_or([f64::NAN; 2])),
+                false => Err(Error::value(format!(
+                    "'{}' is a {} joint, which has no position",
+                    self.place.name,
+                    joint.kind().name()
+                ))),
+            })
+        })?
+    }
+
+    fn side(&self, py: Python<'_>, side: usize) -> Result<Option<Py<PyAny>>> {
+        let found = self.place.read(|inner| {
+            let anchor = inner.world.get::<LoopJoint>(self.place.id)?.sides()[side];
+            Some(anchor.part.and_then(|(id, _)| found(inner, id)))
+        })?;
+        found.map(|found| handle(py, &self.place.shared, found)).transpose()
+    }
+}
+
+#[pymethods]
+impl Joint {
+    /// Name, unique in its world.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.place.name
+    }
+
+    /// Whether its world still has it.
+    #[getter]
+    fn exists(&self) -> Result<bool> {
+        self.place.shared.read(|inner| Ok(inner.world.status(self.place.id).is_some()))
+    }
+
+    /// Kind of the joint.
+    #[getter]
+    fn kind(&self) -> Result<&'static str> {
+        self.constant(|joint| joint.kind().name())
+    }
+
+    /// The body on its first side.
+    #[getter]
+    fn a(&self, py: Python<'_>) -> Result<Option<Py<PyAny>>> {
+        self.side(py, 0)
+    }
+
+    /// The body on its second side; None for the world.
+    #[getter]
+    fn b(&self, py: Python<'_>) -> Result<Option<Py<PyAny>>> {
+        self.side(py, 1)
+    }
+
+    /// Whether it acts. A joint that broke is not enabled; setting True mends it.
+    #[getter]
+    fn enabled(&self) -> Result<bool> {
+        Ok(self.place.status()?.enabled)
+    }
+
+    #[setter]
+    fn set_enabled(&self, py: Python<'_>, value: bool) -> Result<()> {
+        self.place.write(py, |inner| Ok(inner.world.set_enabled(self.place.id, value)?))
+    }
+
+    /// Position, rad or m: the angle of ``a`` about the axis, its displacement along the axis, or the
+    /// length. Zero where the joint was made, except for a length. An angle is in (-π, π], or within π
+    /// of the middle of its limits.
+    #[getter]
+    fn position(&self) -> Result<f64> {
+        Ok(self.motion()?[0])
+    }
+
+    /// Rate of the position, rad/s or m/s.
+    #[getter]
+    fn velocity(&self) -> Result<f64> {
+        Ok(self.motion()?[1])
+    }
+
+    /// Limits of the position, (lower, upper), rad or m, or None.
+    #[getter]
+    fn limits(&self) -> Result<Option<(f64, f64)>> {
+        self.constant(|joint| joint.dof().limits.map(|[lower, upper]| (lower, upper)))
+    }
+
+    #[setter]
+    fn set_limits(&self, py: Python<'_>, value: Option<&Bound<'_, PyAny>>) -> Result<()> {
+        let limits = value.map(pair).transpose()?;
+        self.change_dof(py, |dof| dof.limits = limits)
+    }
+
+    /// Viscous damping along the position, N·m·s/rad or N·s/m.
+    #[getter]
+    fn damping(&self) -> Result<f64> {
+        self.constant(|joint| joint.dof().damping)
+    }
+
+    #[setter]
+    fn set_damping(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change_dof(py, |dof| dof.damping = value)
+    }
+
+    /// Dry friction along the position: largest torque or force, N·m or N.
+    #[getter]
+    fn friction(&self) -> Result<f64> {
+        self.constant(|joint| joint.dof().friction)
+    }
+
+    #[setter]
+    fn set_friction(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change_dof(py, |dof| dof.friction = value)
+    }
+
+    /// Stiffness of its spring, N·m/rad or N/m; 0 without one.
+    #[getter]
+    fn stiffness(&self) -> Result<f64> {
+        self.constant(|joint| joint.dof().spring.map_or(0.0, |spring| spring.stiffness))
+    }
+
+    #[setter]
+    fn set_stiffness(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |joint| {
+            let rest =
+                joint.dof().spring.map_or(if joint.kind().has_length() { joint.length() } else { 0.0 }, |s| s.rest);
+            let dof = DofSettings { spring: Some(Spring { stiffness: value, rest }), ..joint.dof().clone() };
+            Ok(joint.set_dof(dof)?)
+        })
+    }
+
+    /// Position at which its spring is at rest, rad or m; for a ``"spring"`` its ``length``.
+    #[getter]
+    fn rest(&self) -> Result<f64> {
+        self.constant(|joint| joint.dof().spring.map_or(0.0, |spring| spring.rest))
+    }
+
+    #[setter]
+    fn set_rest(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change_dof(py, |dof| {
+            let stiffness = dof.spring.map_or(0.0, |spring| spring.stiffness);
+            dof.spring = Some(Spring { stiffness, rest: value });
+        })
+    }
+
+    /// Length of a ``"distance"``, largest length of a ``"rope"``, length of a ``"spring"`` at rest,
+    /// largest length of the rope of a ``"pulley"``, m.
+    #[getter]
+    fn length(&self) -> Result<f64> {
+        self.constant(|joint| match joint.kind().has_length() {
+            true => Ok(joint.length()),
+            false => Err(Error::value(format!("a {} joint has no length", joint.kind().name()))),
+        })?
+    }
+
+    #[setter]
+    fn set_length(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |joint| Ok(joint.set_length(value)?))
+    }
+
+    /// Teeth of the gears ``a`` and ``b``, not 0; negative for inner teeth.
+    #[getter]
+    fn teeth(&self) -> Result<(i32, i32)> {
+        self.transmission(LoopJointKind::Gear, |t| t.teeth.into())
+    }
+
+    #[setter]
+    fn set_teeth(&self, py: Python<'_>, value: [i32; 2]) -> Result<()> {
+        self.change_transmission(py, LoopJointKind::Gear, |t| t.teeth = value)
+    }
+
+    /// Displacement of a ``"rack"`` per radian of its pinion ``a``, m, not 0.
+    #[getter]
+    fn radius(&self) -> Result<f64> {
+        self.transmission(LoopJointKind::Rack, |t| t.radius)
+    }
+
+    #[setter]
+    fn set_radius(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change_transmission(py, LoopJointKind::Rack, |t| t.radius = value)
+    }
+
+    /// Displacement of a ``"screw"`` per turn, m, not 0; positive for a right-handed one.
+    #[getter]
+    fn pitch(&self) -> Result<f64> {
+        self.transmission(LoopJointKind::Screw, |t| t.pitch)
+    }
+
+    #[setter]
+    fn set_pitch(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change_transmission(py, LoopJointKind::Screw, |t| t.pitch = value)
+    }
+
+    /// Weight of the side of ``b`` in the length of a ``"pulley"``, above 0.
+    #[getter]
+    fn ratio(&self) -> Result<f64> {
+        self.transmission(LoopJointKind::Pulley, |t| t.ratio)
+    }
+
+    #[setter]
+    fn set_ratio(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change_transmission(py, LoopJointKind::Pulley, |t| t.ratio = value)
+    }
+
+    /// Force above which it breaks, N; infinite if it does not.
+    #[getter]
+    fn breaking_force(&self) -> Result<f64> {
+        self.constant(|joint| joint.breaking()[0])
+    }
+
+    #[setter]
+    fn set_breaking_force(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |joint| Ok(joint.set_breaking(value, joint.breaking()[1])?))
+    }
+
+    /// Torque about its point above which it breaks, N·m; infinite if it does not.
+    #[getter]
+    fn breaking_torque(&self) -> Result<f64> {
+        self.constant(|joint| joint.breaking()[1])
+    }
+
+    #[setter]
+    fn set_breaking_torque(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |joint| Ok(joint.set_breaking(joint.breaking()[0], value)?))
+    }
+
+    /// Sets its drive; the arguments are those of ``Articulation.set_drive``. A drive to an angle goes
+    /// the shorter way if the joint has no limits.
+    #[pyo3(signature = (*, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None))]
+    fn set_drive(
+        &self,
+        py: Python<'_>,
+        target: Option<f64>,
+        velocity: Option<f64>,
+        stiffness: f64,
+        damping: f64,
+        max_force: Option<f64>,
+    ) -> Result<()> {
+        let drive = drive(target, velocity, stiffness, damping, max_force.unwrap_or(f64::INFINITY))?;
+        self.change_dof(py, |dof| dof.drive = drive)
+    }
+
+    /// Force on ``a`` in the last sub-step, shape (3,), N; the opposite acts on ``b``. It includes those
+    /// of limits, spring, damping, friction and drive. Zero while the joint is not enabled, and while
+    /// its bodies sleep.
+    #[getter]
+    fn force<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.carried()?.force))
+    }
+
+    /// Torque on ``a`` about its point of the joint, shape (3,), N·m; otherwise as ``force``.
+    #[getter]
+    fn torque<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.carried()?.torque))
+    }
+
+    /// Force or torque of the drive along the position, N or N·m.
+    #[getter]
+    fn drive_force(&self) -> Result<f64> {
+        Ok(self.carried()?.drive)
+    }
+
+    /// How far it is open: distance, m, and angle, rad, without the motion that it leaves free.
+    #[getter]
+    fn error(&self) -> Result<(f64, f64)> {
+        self.place.read(|inner| {
+            let joint = inner.world.get::<LoopJoint>(self.place.id)?;
+            let error = joint.position_error(&inner.world.view()).unwrap_or_default();
+            Some((error.distance, error.angle))
+        })
+    }
+
+    fn __repr__(&self) -> String {
+        match self.kind() {
+            Ok(kind) => format!("<tumble.Joint '{}', {kind}>", self.place.name),
+            Err(_) => format!("<tumble.Joint '{}', removed>", self.place.name),
+        }
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Joint>().is_ok_and(|other| self.place.same(&other.get().place))
+    }
+
+    fn __hash__(&self) -> u64 {
+        hash(&self.place)
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.anchor)
+    }
+}
+
+/// Returns an error for a joint of another kind.
+fn is_of(joint: &LoopJoint, kind: LoopJointKind) -> Result<()> {
+    match joint.kind() == kind {
+        true => Ok(()),
+        false => Err(Error::value(format!("it is a {} joint, and not a {}", joint.kind().name(), kind.name()))),
+    }
+}

@@ -1,0 +1,181 @@
+//! Joints of a world: how they are added and found.
+
+use crate::arrays::convert::{Numbers, numbers, shown, vec3, vec3_or};
+use crate::choices::meaning;
+use crate::errors::{Error, Result};
+use crate::objects::builder::pair;
+use crate::objects::joint::Joint;
+use crate::objects::joints::drive_of;
+use crate::objects::place::{Place, by_name};
+use crate::world::add::own_place;
+use crate::world::inner::Inner;
+use crate::world::shared::Shared;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::sync::Arc;
+use tumble::collide::Vec3;
+use tumble::dynamics::{ArticulatedBody, DofSettings, Drive, JointPlace, LoopJoint, LoopJointKind, ObjectId, Spring};
+
+/// The arguments of ``add_joint``.
+pub struct Arguments<'a, 'py> {
+    pub kind: &'a str,
+    pub sides: [Option<&'a Bound<'py, PyAny>>; 2],
+    pub points: [Option<&'a Bound<'py, PyAny>>; 2],
+    pub axes: [Option<&'a Bound<'py, PyAny>>; 2],
+    pub limits: Option<&'a Bound<'py, PyAny>>,
+    pub drive: Option<&'a Bound<'py, PyDict>>,
+    pub breaking: [Option<f64>; 2],
+    pub name: &'a str,
+    pub length: Option<f64>,
+    pub stiffness: f64,
+    pub rest: Option<f64>,
+    pub damping: f64,
+    pub friction: f64,
+    pub teeth: Option<[i32; 2]>,
+    pub radius: Option<f64>,
+    pub pitch: Option<f64>,
+    pub ratio: f64,
+    pub ground: Option<&'a Bound<'py, PyAny>>,
+}
+
+/// Adds a joint and returns its handle.
+pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> Result<Joint> {
+    let kind = meaning("kind", given.kind, LoopJointKind::NAMES)?;
+    let [a, b] = given.sides.map(|value| value.map(|value| side(shared, value)).transpose());
+    let (a, b) = (a?, b?);
+    let drive = given.drive.map_or(Ok(Drive::None), drive_of)?;
+    let limits = given.limits.map(pair).transpose()?;
+    let points = [("point", given.points[0], a), ("second_point", given.points[1], b)].map(|(name, point, side)| {
+        if let Some(point) = point {
+            return vec3(point, name).map(Some);
+        }
+        shared.read(|inner| Ok(side.and_then(|(id, part)| center(inner, id, part))))
+    });
+    let [first, second] = points;
+    let (first, second) = (first?, second?);
+    let point = first.or(second).ok_or_else(|| Error::value("a: expected a body on one side at least"))?;
+    if kind.has_length() && second.is_none() {
+        return Err(Error::value("second_point: expected the point of the world at which the joint ends"));
+    }
+    if kind == LoopJointKind::Universal && given.axes[1].is_none() {
+        return Err(Error::value("second_axis: expected the axis of a universal joint that is fixed to b"));
+    }
+    let missing = |what: &str| Err(Error::value(format!("{what}: a {} needs it", kind.name())));
+    match kind {
+        LoopJointKind::Gear if given.teeth.is_none() => return missing("teeth"),
+        LoopJointKind::Rack if given.radius.is_none() => return missing("radius"),
+        LoopJointKind::Rack if given.axes[1].is_none() => return missing("second_axis"),
+        LoopJointKind::Screw if given.pitch.is_none() => return missing("pitch"),
+        LoopJointKind::Pulley if given.ground.is_none() => return missing("ground"),
+        _ => {}
+    }
+    let place = JointPlace {
+        ground: given.ground.map_or(Ok(Default::default()), points_of)?,
+        point,
+        second_point: second.filter(|_| kind.has_length()),
+        axis: vec3_or(given.axes[0], "axis", Vec3::z())?,
+        second_axis: given.axes[1].map(|axis| vec3(axis, "second_axis")).transpose()?,
+    };
+    let added = shared.write(py, |inner| {
+        let mut joint = LoopJoint::joining(given.name, kind, &inner.world, a, b, place)?;
+        let mut constants = *joint.transmission();
+        constants.ratio = given.ratio;
+        constants.teeth = given.teeth.unwrap_or(constants.teeth);
+        constants.radius = given.radius.unwrap_or(constants.radius);
+        constants.pitch = given.pitch.unwrap_or(constants.pitch);
+        joint.set_transmission(constants)?;
+        if let Some(length) = given.length {
+            joint.set_length(length)?;
+        }
+        let rest = given.rest.unwrap_or(if kind.has_length() { joint.length() } else { 0.0 });
+        let springs = given.stiffness != 0.0 || kind == LoopJointKind::Spring;
+        let spring = springs.then_some(Spring { stiffness: given.stiffness, rest });
+        joint.set_dof(DofSettings { limits, damping: given.damping, friction: given.friction, spring, drive })?;
+        let [force, torque] = given.breaking.map(|most| most.unwrap_or(f64::INFINITY));
+        joint.set_breaking(force, torque)?;
+        let id = inner.world.add(joint)?;
+        let name = inner.world.name(id).unwrap_or_default().into();
+        Ok(Place { shared: shared.clone(), id, name })
+    })?;
+    Joint::new(py, added)
+}
+
+/// Converts the two points of a pulley.
+fn points_of(value: &Bound<'_, PyAny>) -> Result<[Vec3; 2]> {
+    let Numbers { shape, data } = numbers(value, "ground")?;
+    match shape.as_slice() {
+        [2, 3] => Ok([Vec3::from_column_slice(&data[..3]), Vec3::from_column_slice(&data[3..])]),
+        _ => Err(Error::value(format!("ground: expected two points, shape (2, 3), got {}", shown(&shape)))),
+    }
+}
+
+/// Returns the center of mass of a rigid body, or the origin of a link.
+fn center(inner: &Inner, id: ObjectId, part: usize) -> Option<Vec3> {
+    let state = if part == 0 { inner.world.center_state(id) } else { inner.world.part_state(id, part).copied() };
+    state.map(|state| state.position())
+}
+
+/// Converts a handle, a name, ``"ARTICULATION/LINK"``, or a tuple of an articulation and the name of a
+/// link.
+fn side(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<(ObjectId, usize)> {
+    if let Ok((body, link)) = value.extract::<(Bound<'_, PyAny>, String)>() {
+        let place = own_place(shared, &body)?;
+        return link_part(shared, &place, &link);
+    }
+    if let Ok(name) = value.extract::<String>()
+        && let Some((object, link)) = name.split_once('/')
+        && shared.read(|inner| Ok(inner.world.find(&name).is_none()))?
+    {
+        let found = shared.read(|inner| by_name(inner, object))?;
+        return link_part(shared, &Place { shared: shared.clone(), id: found.id, name: object.into() }, link);
+    }
+    let place = own_place(shared, value)?;
+    match place.read(|inner| Some(inner.world.get::<ArticulatedBody>(place.id).is_some()))? {
+        false => Ok((place.id, 0)),
+        true => Err(Error::value(format!(
+            "'{0}' is an articulation; name a link of it: \"{0}/LINK\", or (articulation, \"LINK\")",
+            place.name
+        ))),
+    }
+}
+
+fn link_part(shared: &Arc<Shared>, place: &Place, link: &str) -> Result<(ObjectId, usize)> {
+    shared.read(|inner| {
+        let body = inner.world.get::<ArticulatedBody>(place.id);
+        let frame = body.and_then(|body| Some(body.model().frame(link)?.link.unwrap_or(body.model().links().len())));
+        let part = frame.ok_or_else(|| Error::Name(format!("'{}' has no link named '{link}'", place.name)))?;
+        Ok((place.id, part))
+    })
+}
+
+/// Returns the handles of all joints of a world, in the order of their addition.
+pub fn all(shared: &Arc<Shared>, py: Python<'_>) -> Result<Vec<Joint>> {
+    let places = shared.read(|inner| {
+        let ids = inner.world.ids().iter().filter(|id| inner.world.get::<LoopJoint>(**id).is_some());
+        Ok(ids.map(|id| (*id, inner.world.name(*id).unwrap_or_default().into())).collect::<Vec<(ObjectId, Arc<str>)>>())
+    })?;
+    places.into_iter().map(|(id, name)| Joint::new(py, Place { shared: shared.clone(), id, name })).collect()
+}
+
+/// Returns the place of the joint of that name.
+pub fn place_by_name(shared: &Arc<Shared>, name: &str) -> Result<Place> {
+    shared.read(|inner| {
+        let id = inner.world.find(name).filter(|id| inner.world.get::<LoopJoint>(*id).is_some());
+        match id {
+            Some(id) => Ok(Place { shared: shared.clone(), id, name: name.into() }),
+            None => Err(Error::Name(format!("the world has no joint named '{name}'"))),
+        }
+    })
+}
+
+/// Returns the place of a joint of this world, given as a handle or by name; `None` for anything else.
+pub fn place_of(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<Option<Place>> {
+    if let Ok(joint) = value.cast::<Joint>() {
+        let place = joint.get().place.clone();
+        return match Arc::ptr_eq(&place.shared, shared) {
+            true => place.status().map(|_| Some(place)),
+            false => Err(Error::value(format!("'{}' belongs to another world", place.name))),
+        };
+    }
+    Ok(value.extract::<String>().ok().and_then(|name| place_by_name(shared, &name).ok()))
+}
