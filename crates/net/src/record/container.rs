@@ -70,12 +70,15 @@ pub(crate) struct Container {
 impl Container {
     /// Opens a file and checks its first bytes.
     pub fn open(path: &Path) -> Result<Container> {
-        let file = File::open(path).map_err(RecordError::io(path, "cannot open"))?;
-        let metadata = file.metadata().map_err(RecordError::io(path, "cannot ask for its size"))?;
         let not_mcap = |why: String| RecordError::NotMcap { path: path.to_owned(), why };
-        if !metadata.is_file() {
-            return Err(not_mcap("it is not a plain file".into()));
-        }
+        let plain = |about: std::fs::Metadata| match about.is_file() {
+            true => Ok(about),
+            false => Err(not_mcap("it is not a plain file".into())),
+        };
+        // before the opening, which waits for a writer if the file is a pipe
+        plain(std::fs::metadata(path).map_err(RecordError::io(path, "cannot open"))?)?;
+        let file = File::open(path).map_err(RecordError::io(path, "cannot open"))?;
+        let metadata = plain(file.metadata().map_err(RecordError::io(path, "cannot ask for its size"))?)?;
         let mut container = Container {
             path: path.to_owned(),
             file: BufReader::new(file),

@@ -71,7 +71,7 @@ mod writer;
 
 pub use container::Ending;
 pub use error::RecordError;
-pub use reader::{Frame, Reader, read};
+pub use reader::{Frame, Reader, is_recording, read};
 pub use recover::{RecoverReport, recover};
 pub use scene::{Contact, Entity, Pose, Shape, VisualPart, decode_contacts, encode_contacts};
 pub use schemas::{ROOT_FRAME, STATE_PROTO, TOPIC_SCENE, TOPIC_STATE, TOPIC_TRANSFORMS};

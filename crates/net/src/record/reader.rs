@@ -70,6 +70,27 @@ pub fn read(path: impl AsRef<Path>) -> Result<Reader> {
     Ok(reader)
 }
 
+/// Number of records, from the beginning of a file, among which its description must be.
+const DESCRIPTION_WITHIN: usize = 8;
+
+/// Returns whether a file is a recording of tumble, complete or cut: an MCAP file that begins with
+/// the description of one. Its frames are not read.
+pub fn is_recording(path: impl AsRef<Path>) -> bool {
+    let Ok(mut container) = Container::open(path.as_ref()) else { return false };
+    for _ in 0..DESCRIPTION_WITHIN {
+        match container.next() {
+            Ok(Next::Record(record)) if record.opcode == op::METADATA => {
+                if metadata_of(&record.body).is_ok_and(|(name, _)| name == METADATA_NAME) {
+                    return true;
+                }
+            }
+            Ok(Next::Record(_)) => {}
+            Ok(Next::End(_)) | Err(_) => return false,
+        }
+    }
+    false
+}
+
 /// Reads frames in order; also an iterator over them.
 #[derive(Debug)]
 pub struct Reader {

@@ -6,7 +6,7 @@ use super::chunk::{Channel, Inner, Schema, define, next_inner, open_chunk, parse
 use super::container::{Container, Ending, Next, RawRecord};
 use super::error::{RecordError, Result};
 use super::reader::{as_content, metadata_of};
-use super::schemas::TOPIC_STATE;
+use super::schemas::{Definitions, METADATA_NAME, TOPIC_STATE, VERSION, standard_definitions};
 use super::writer::{AppendWriter, append_options};
 use mcap::Compression;
 use mcap::records::{MessageHeader, Metadata, op};
@@ -38,8 +38,9 @@ pub struct RecoverReport {
 /// Reads `input` up to the first structural damage and writes a complete file `output`, which must
 /// not exist.
 ///
-/// A chunk with damaged content is left out, and reading continues after it. Damage to the file's
-/// own structure ends reading. Messages, their times and the division into chunks stay as they are:
+/// A chunk with damaged content is left out, and reading continues after it. If the first chunk is
+/// damaged, the definitions of channels are those that every recording of this version has, and
+/// the drawn entities have names and no parts. Damage to the file's own structure ends reading. Messages, their times and the division into chunks stay as they are:
 /// a complete recording is copied byte for byte.
 ///
 /// # Errors
@@ -66,6 +67,9 @@ struct Mender<'a> {
     library: String,
     schemas: BTreeMap<u16, Schema>,
     channels: BTreeMap<u16, Channel>,
+    /// Definitions for channels that the readable part does not define; empty unless the file is a
+    /// recording of this version.
+    standard: Definitions,
     /// Metadata that was read before the compression was known.
     metadata: Vec<Metadata>,
     metadata_count: usize,
@@ -91,6 +95,7 @@ impl<'a> Mender<'a> {
             library: String::new(),
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
+            standard: Definitions::default(),
             metadata: Vec::new(),
             metadata_count: 0,
             report,
@@ -136,7 +141,12 @@ impl<'a> Mender<'a> {
                 Err(format!("more than {MAX_DEFINITIONS} metadata records"))
             }
             op::METADATA => {
-                metadata_of(&record.body).map(|(name, metadata)| self.put_metadata(Metadata { name, metadata }))
+                metadata_of(&record.body).map(|(name, metadata)| {
+                    if name == METADATA_NAME && metadata.get("version") == Some(&VERSION.to_string()) {
+                        self.standard = standard_definitions();
+                    }
+                    self.put_metadata(Metadata { name, metadata })
+                })
             }
             op::CHUNK => open_chunk(&record.body).and_then(|chunk| self.content(&chunk.content, &chunk.compression)),
             // outside of chunks; the summary repeats schemas and channels, which changes nothing
@@ -191,7 +201,9 @@ impl<'a> Mender<'a> {
                 }
                 Inner::Message { channel, sequence, log_time, publish_time, data } => {
                     if !self.channels.contains_key(&channel) && !new.channels.contains_key(&channel) {
-                        return Err(format!("a message on channel {channel}, which the readable part does not define"));
+                        self.define_standard(channel, &mut new).ok_or_else(|| {
+                            format!("a message on channel {channel}, which the readable part does not define")
+                        })?;
                     }
                     new.messages.push((MessageHeader { channel_id: channel, sequence, log_time, publish_time }, data));
                 }
@@ -199,6 +211,15 @@ impl<'a> Mender<'a> {
             }
         }
         Ok(new)
+    }
+
+    /// Adds the standard definition of a channel; `None` if there is none, or if it contradicts
+    /// what was read.
+    fn define_standard(&self, id: u16, new: &mut Parsed) -> Option<()> {
+        let channel = self.standard.channels.get(&id)?;
+        let schema = self.standard.schemas.get(&channel.schema)?;
+        define(&self.schemas, &mut new.schemas, channel.schema, schema.clone()).ok()?;
+        define(&self.channels, &mut new.channels, id, channel.clone()).ok()
     }
 }
 

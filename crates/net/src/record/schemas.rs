@@ -1,14 +1,18 @@
 //! Topics, and the schemas that a recording contains.
 
+use super::bytes::Fields;
+use super::chunk::{Channel, Inner, Schema, next_inner, parse_inner};
 use super::error::{RecordError, Result};
+use super::writer::append_options;
 use foxglove::Encode;
 use foxglove::messages::{FrameTransforms, SceneUpdate};
 use mcap::Writer;
+use mcap::write::NoSeek;
 use prost::Message;
 use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
 use std::collections::BTreeMap;
-use std::io::{Seek, Write};
+use std::io::{Cursor, Seek, Write};
 use std::path::Path;
 
 /// Topic of the drawn entities.
@@ -114,6 +118,39 @@ pub(crate) fn add_channels<W: Write + Seek>(writer: &mut Writer<W>, path: &Path)
         })
     };
     all().map_err(RecordError::write(path))
+}
+
+/// Schemas and channels by their numbers in a file.
+#[derive(Debug, Default)]
+pub(crate) struct Definitions {
+    pub schemas: BTreeMap<u16, Schema>,
+    pub channels: BTreeMap<u16, Channel>,
+}
+
+/// Returns the definitions that every recording of this [`VERSION`] has, for files in which they
+/// are damaged. They are read from an empty file, so they are what the recorder writes.
+pub(crate) fn standard_definitions() -> Definitions {
+    let mut found = Definitions::default();
+    let Some(bytes) = empty_file() else { return found };
+    let mut records = Fields(bytes.get(mcap::MAGIC.len()..).unwrap_or_default());
+    // the signature at the end is no record
+    while let Ok(Some((opcode, body))) = next_inner(&mut records) {
+        match parse_inner(opcode, body) {
+            Ok(Inner::Schema(id, schema)) => _ = found.schemas.insert(id, schema),
+            Ok(Inner::Channel(id, channel)) => _ = found.channels.insert(id, channel),
+            _ => {}
+        }
+    }
+    found
+}
+
+/// Returns the bytes of a recording without metadata and messages: its summary lists the
+/// definitions.
+fn empty_file() -> Option<Vec<u8>> {
+    let mut writer = append_options(None).create(NoSeek::new(Cursor::new(Vec::new()))).ok()?;
+    add_channels(&mut writer, Path::new("")).ok()?;
+    writer.finish().ok()?;
+    Some(writer.into_inner().into_inner().into_inner())
 }
 
 /// Returns the published schema of a Foxglove message: a compiled descriptor set.

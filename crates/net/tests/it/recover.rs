@@ -120,3 +120,53 @@ fn whatever_comes_out_is_complete() {
     }
     assert!(mended > 10, "{mended}");
 }
+
+/// The first chunk has the scene and the definitions of all channels. Without it the frames are
+/// whole, and the entities have their names.
+#[test]
+fn damage_in_the_first_chunk_loses_no_frame() {
+    let scratch = Scratch::new("mend-first");
+    let (path, out) = (scratch.file("a.mcap"), scratch.file("out.mcap"));
+    record(&path, 12, options(Compression::Lz4, 3));
+    let whole = std::fs::read(&path).unwrap();
+    let names: Vec<String> = {
+        let mut reader = read(&path).unwrap();
+        reader.next_frame().unwrap();
+        reader.entities().iter().map(|entity| entity.name.clone()).collect()
+    };
+    // records are an opcode, a length of 8 bytes, and a body
+    let mut at = 8;
+    let length = |at: usize| u64::from_le_bytes(whole[at + 1..at + 9].try_into().unwrap()) as usize;
+    while whole[at] != 0x06 {
+        at += 9 + length(at);
+    }
+    let chunk = at + 9..at + 9 + length(at);
+    let step = chunk.len() / 60;
+    // the first 16 bytes are times, which are not needed
+    for flipped in chunk.clone().skip(16).step_by(step.max(1)) {
+        let mut bytes = whole.clone();
+        bytes[flipped] ^= 0x04;
+        std::fs::write(&path, &bytes).unwrap();
+        let report = recover(&path, &out).unwrap_or_else(|e| panic!("byte {flipped}: {e}"));
+        assert_eq!((report.frames, report.damaged_chunks), (12, 1), "byte {flipped}");
+        let (frames, ending) = read_all(&out);
+        assert_eq!((frames.len(), ending.unwrap()), (12, Ending::Complete), "byte {flipped}");
+        assert!(frames.iter().all(|f| f.poses == poses(f.frame) && f.state == state(f.frame)), "byte {flipped}");
+        let mut reader = read(&out).unwrap();
+        reader.next_frame().unwrap();
+        assert_eq!(reader.entities().iter().map(|e| &e.name).collect::<Vec<_>>(), names.iter().collect::<Vec<_>>());
+        std::fs::remove_file(&out).unwrap();
+    }
+}
+
+#[test]
+fn a_pipe_is_no_recording_and_is_not_waited_for() {
+    let scratch = Scratch::new("mend-pipe");
+    let (path, out) = (scratch.file("pipe"), scratch.file("out.mcap"));
+    assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+    let (sent, answer) = std::sync::mpsc::channel();
+    std::thread::spawn(move || sent.send((recover(&path, &out).map(drop), is_recording(&path))));
+    let (recovered, recording) = answer.recv_timeout(std::time::Duration::from_secs(20)).expect("it waits for a writer");
+    assert!(matches!(recovered, Err(RecordError::NotMcap { .. })), "{recovered:?}");
+    assert!(!recording);
+}
