@@ -104,6 +104,12 @@ impl Renderer {
         &self.gpu.adapter
     }
 
+    /// Whether the adapter is a software driver; [`Quality::fast`](crate::Quality::fast) is made for
+    /// those.
+    pub fn is_software(&self) -> bool {
+        self.gpu.choosy
+    }
+
     /// Draws the list into a picture of `width` x `height` pixels.
     ///
     /// # Errors

@@ -4,6 +4,7 @@ use crate::RenderError;
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
 use std::path::Path;
+use tumble_scene::open_file;
 
 /// A picture: 8-bit sRGB with alpha, rows from the top, four bytes `r, g, b, a` per pixel.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,15 +49,40 @@ impl Image {
         Ok(bytes)
     }
 
+    /// Writes the picture as [`Image::write_png`] does, in parts of at most 64 rows. After each,
+    /// `done` gets the number of its rows, so that a program sees the progress of a large picture.
+    ///
+    /// # Errors
+    /// [`RenderError::Png`] for an image without pixels or without four bytes for each, and for
+    /// errors of `to`.
+    pub fn encode_png(&self, to: impl Write, mut done: impl FnMut(u32)) -> Result<(), RenderError> {
+        let encode = || {
+            let mut writer = self.encoder(to).write_header()?;
+            let mut stream = writer.stream_writer()?;
+            for part in self.rgba.chunks(4 * 64 * self.width.max(1) as usize) {
+                stream.write_all(part)?;
+                done(part.len() as u32 / (4 * self.width.max(1)));
+            }
+            stream.finish()?;
+            writer.finish()
+        };
+        let encoded: Result<(), png::EncodingError> = encode();
+        encoded.map_err(|e| RenderError::Png(e.to_string()))
+    }
+
     fn encode(&self, to: impl Write) -> Result<(), png::EncodingError> {
+        let mut writer = self.encoder(to).write_header()?;
+        writer.write_image_data(&self.rgba)?;
+        writer.finish()
+    }
+
+    fn encoder<W: Write>(&self, to: W) -> png::Encoder<'static, W> {
         let mut encoder = png::Encoder::new(to, self.width, self.height);
         encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_compression(png::Compression::High);
         encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(&self.rgba)?;
-        writer.finish()
+        encoder
     }
 
     /// Reads any PNG as a texture. Gray, palettes and 16 bits become 8-bit RGBA. Sides are at most
@@ -67,7 +93,7 @@ impl Image {
     pub fn load_png(path: impl AsRef<Path>) -> Result<Image, RenderError> {
         let path = path.as_ref();
         let fail = |reason: String| RenderError::File { path: path.display().to_string(), reason };
-        let file = File::open(path).map_err(|e| fail(format!("the texture cannot be read: {e}")))?;
+        let file = open_file(path).map_err(|e| fail(format!("the texture cannot be read: {e}")))?;
         let mut decoder = png::Decoder::new(BufReader::new(file));
         decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::STRIP_16);
         let mut reader = decoder.read_info().map_err(|e| fail(format!("the texture is no PNG: {e}")))?;
@@ -91,7 +117,7 @@ impl Image {
     pub fn read_png(path: impl AsRef<Path>) -> Result<Image, RenderError> {
         let path = path.as_ref();
         let fail = |reason: String| RenderError::File { path: path.display().to_string(), reason };
-        let file = File::open(path).map_err(|e| fail(e.to_string()))?;
+        let file = open_file(path).map_err(|e| fail(e.to_string()))?;
         let mut reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(|e| fail(e.to_string()))?;
         let info = reader.info();
         let (width, height) = (info.width, info.height);

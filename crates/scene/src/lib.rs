@@ -70,6 +70,7 @@ pub use error::SceneError;
 pub use notes::{Notes, overlap_notes, visual_notes};
 pub use open::LoadOptions;
 pub use open::format::FileKind;
+pub use open::plain::{open_file, read_file};
 pub use open::shipped::{SceneSource, Shipped, resolve_scene, shipped};
 pub use parse::appearance::{AppearanceSpec, Color, Pattern};
 pub use parse::articulated::ArticulatedSpec;

@@ -140,14 +140,12 @@ impl<'a> Mender<'a> {
             op::METADATA if self.metadata_count >= MAX_DEFINITIONS => {
                 Err(format!("more than {MAX_DEFINITIONS} metadata records"))
             }
-            op::METADATA => {
-                metadata_of(&record.body).map(|(name, metadata)| {
-                    if name == METADATA_NAME && metadata.get("version") == Some(&VERSION.to_string()) {
-                        self.standard = standard_definitions();
-                    }
-                    self.put_metadata(Metadata { name, metadata })
-                })
-            }
+            op::METADATA => metadata_of(&record.body).map(|(name, metadata)| {
+                if name == METADATA_NAME && metadata.get("version") == Some(&VERSION.to_string()) {
+                    self.standard = standard_definitions();
+                }
+                self.put_metadata(Metadata { name, metadata })
+            }),
             op::CHUNK => open_chunk(&record.body).and_then(|chunk| self.content(&chunk.content, &chunk.compression)),
             // outside of chunks; the summary repeats schemas and channels, which changes nothing
             op::SCHEMA | op::CHANNEL | op::MESSAGE => self.content(&as_content(record), ""),

@@ -18,7 +18,9 @@ use super::messages::{FrameAck, Join};
 use super::server::ServerEvent;
 use super::transport::{FacetNumber, MAX_MESSAGE_BYTES};
 use super::wire::{ByteReader, HEADER_BYTES, Hash, MessageError, MessageHeader, MessageKind, message, open};
-use crate::record::{Contact, MAX_STATE_BYTES, Pose, Reader, RecordError, Recorder, RecorderOptions, Summary, read};
+use crate::record::{
+    Contact, Ending, MAX_STATE_BYTES, Pose, Reader, RecordError, Recorder, RecorderOptions, Summary, read,
+};
 use crate::world::{contacts, entities, names, poses};
 use std::path::Path;
 use std::sync::Arc;
@@ -193,6 +195,9 @@ pub enum SessionReadError {
     /// A frame of the recording holds no session.
     #[error("frame {0} of the recording holds no session ({1}); record one with `[recording]` in the cave file")]
     Frame(u64, MessageError),
+    /// The recording ends before its first frame.
+    #[error("the recording has no frame{}", .0.as_ref().map_or(String::new(), |cut| format!(": it is {cut}")))]
+    Empty(Option<String>),
     /// The recording was made with another scene.
     #[error("the recording is of a scene with the hash {theirs}; this scene has {ours}")]
     Scene {
@@ -229,10 +234,17 @@ impl SessionReader {
     /// Checks that the recording was made with the scene of this hash.
     ///
     /// # Errors
-    /// [`SessionReadError::Scene`].
+    /// [`SessionReadError::Scene`], and [`SessionReadError::Empty`] before the first call of
+    /// [`next_frame`](Self::next_frame) of a recording without frames.
     pub fn check_scene(&self, ours: [u8; 32]) -> Result<(), SessionReadError> {
         let hex = super::server::hex;
-        if self.scene == ours {
+        if self.ahead.is_none() && self.scene == [0; 32] {
+            let cut = match self.reader.ending() {
+                Some(Ending::Cut { offset, .. }) => Some(format!("cut at byte {offset}, before the first frame")),
+                _ => None,
+            };
+            Err(SessionReadError::Empty(cut))
+        } else if self.scene == ours {
             Ok(())
         } else {
             Err(SessionReadError::Scene { theirs: hex(&self.scene), ours: hex(&ours) })

@@ -166,7 +166,8 @@ fn a_pipe_is_no_recording_and_is_not_waited_for() {
     assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
     let (sent, answer) = std::sync::mpsc::channel();
     std::thread::spawn(move || sent.send((recover(&path, &out).map(drop), is_recording(&path))));
-    let (recovered, recording) = answer.recv_timeout(std::time::Duration::from_secs(20)).expect("it waits for a writer");
+    let (recovered, recording) =
+        answer.recv_timeout(std::time::Duration::from_secs(20)).expect("it waits for a writer");
     assert!(matches!(recovered, Err(RecordError::NotMcap { .. })), "{recovered:?}");
     assert!(!recording);
 }

@@ -23,7 +23,7 @@ impl Unwrapped {
         if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) || path.metadata().ok()?.len() > MAX_BYTES {
             return None;
         }
-        Unwrapped::parse(&decode_text(&std::fs::read(path).ok()?).ok()?)
+        Unwrapped::parse(&decode_text(&tumble_scene::read_file(path).ok()?).ok()?)
     }
 
     /// Parses the text; polygons are triangulated as in [`tumble_collide::TriMesh::from_obj`].

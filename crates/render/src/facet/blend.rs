@@ -20,7 +20,7 @@ impl Blend {
     /// [`RenderError::File`] if it cannot be read or has another size.
     pub fn load(path: &Path, [width, height]: [u32; 2]) -> Result<Blend, RenderError> {
         let fail = |reason: String| RenderError::File { path: path.display().to_string(), reason };
-        let file = std::fs::File::open(path).map_err(|e| fail(format!("the blend mask cannot be read: {e}")))?;
+        let file = tumble_scene::open_file(path).map_err(|e| fail(format!("the blend mask cannot be read: {e}")))?;
         let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
         decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::STRIP_16);
         let mut reader = decoder.read_info().map_err(|e| fail(format!("the blend mask is no PNG: {e}")))?;

@@ -52,7 +52,7 @@ impl Warp {
         if length > MAX_BYTES {
             return Err(fail(format!("the warp grid has {length} bytes, and at most {MAX_BYTES} are read")));
         }
-        let bytes = std::fs::read(path).map_err(|e| fail(format!("the warp grid cannot be read: {e}")))?;
+        let bytes = tumble_scene::read_file(path).map_err(|e| fail(format!("the warp grid cannot be read: {e}")))?;
         let warp = if bytes.starts_with(b"PF") { Warp::from_pfm(&bytes) } else { Warp::from_obj(&bytes) };
         warp.map_err(fail)
     }

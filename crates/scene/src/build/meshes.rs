@@ -96,7 +96,7 @@ impl SceneFile {
         if size > MAX_MESH_BYTES {
             return Err(wrong(format!("the file has {size} bytes; the limit is {MAX_MESH_BYTES}")));
         }
-        let bytes = std::fs::read(path).map_err(unread)?;
+        let bytes = crate::read_file(path).map_err(unread)?;
         read_with_lines(path, &bytes).map_err(wrong)
     }
 }

@@ -93,6 +93,9 @@ pub struct Facet {
     pub node: Option<usize>,
     /// The place where the image is shown. Default a window at 0, 0.
     pub output: Output,
+    /// Whether the file says that it is a window (`output = "window"`). A facet without a window is
+    /// then a failure; otherwise it may draw into memory.
+    pub window_required: bool,
     /// Width and height of one eye's image, pixels, at least 1 each. The image with both eyes, and
     /// that with the rim of [`RIM_PX`](super::RIM_PX), must be within
     /// [`MAX_SIDE_PX`](super::MAX_SIDE_PX) and [`MAX_PIXELS`](super::MAX_PIXELS).
@@ -135,7 +138,9 @@ impl Facet {
         let node = f
             .optional_text("node")
             .map(|(typed, value)| reference(&f, "node", typed, value, nodes.iter().map(|n| n.name.as_str()).collect()));
-        let output = match f.choice_or("output", TARGETS, Target::Window) {
+        let target = f.optional_choice("output", TARGETS);
+        let window_required = matches!(target, Some(Target::Window));
+        let output = match target.unwrap_or(Target::Window) {
             Target::Window => Output::Window { position_px: position(&mut f) },
             Target::Offscreen => Output::Offscreen,
         };
@@ -146,6 +151,7 @@ impl Facet {
             user: user.unwrap_or(usize::MAX),
             node: node.flatten(),
             output,
+            window_required,
             size_px,
             near_m: f.number_or("near_m", NEAR, 0.05),
             far_m: f.number_or("far_m", Bound::POSITIVE, 500.0),

@@ -40,6 +40,7 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
+use crate::open::plain::open_file;
 use crate::parse::fields::Fields;
 use crate::parse::file::{parse_toml, read_table};
 use crate::parse::log::Log;
@@ -90,7 +91,7 @@ impl Cave {
         let path = path.as_ref();
         let unread = |source| CaveError::Read { file: path.to_path_buf(), source };
         let mut bytes = Vec::new();
-        std::fs::File::open(path).map_err(unread)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unread)?;
+        open_file(path).map_err(unread)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unread)?;
         if bytes.len() as u64 > MAX_BYTES {
             return Err(CaveError::TooLarge { file: path.to_path_buf(), limit: MAX_BYTES });
         }
@@ -141,7 +142,7 @@ impl Cave {
         let sync = read_table(&mut f, "sync", Sync::read).unwrap_or_default();
         let security = read_table(&mut f, "security", |table| Security::read(table, folder)).flatten();
         let recording = read_table(&mut f, "recording", |table| Recording::read(table, folder)).flatten();
-        let tracker = read_table(&mut f, "tracker", |table| Tracker::read(table, &users));
+        let tracker = read_table(&mut f, "tracker", |table| Tracker::read(table, &users, security.is_some()));
         let place = f.value("sync").map_or(0..0, |value| value.span());
         f.finish();
         let cave = Cave {

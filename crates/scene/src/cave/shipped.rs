@@ -81,7 +81,7 @@ pub fn resolve_cave(name_or_path: &str) -> Result<CaveSource, CaveError> {
         return Ok(CaveSource::Shipped(*cave));
     }
     if name_or_path.contains(['/', '\\']) || name_or_path.ends_with(".toml") {
-        let source = std::fs::metadata(path).err().unwrap_or(std::io::ErrorKind::InvalidInput.into());
+        let source = std::fs::metadata(path).err().unwrap_or_else(crate::open::plain::no_regular_file);
         return Err(CaveError::Read { file: path.to_path_buf(), source });
     }
     let names = SHIPPED.iter().map(|cave| cave.name);

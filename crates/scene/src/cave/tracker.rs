@@ -34,8 +34,11 @@ pub struct Tracker {
     /// names.
     pub users: Vec<String>,
     /// Accepted senders. Default: every sender that reaches `address`. Required if `address` is not
-    /// local.
+    /// local, unless datagrams are sealed.
     pub senders: Vec<IpAddr>,
+    /// Whether datagrams are sealed with the key of `[security]`, as `tumble relay` sends them.
+    /// Default false.
+    pub sealed: bool,
     /// Default `z_up`.
     pub axes: Axes,
     /// Origin of the tracker's frame in the cave, m. Default 0, 0, 0.
@@ -50,6 +53,7 @@ impl Tracker {
             port: TRACKER_PORT,
             users: users.iter().map(|u| u.name.clone()).collect(),
             senders: Vec::new(),
+            sealed: false,
             axes: Axes::ZUp,
             origin_m: [0.0; 3],
         }
@@ -60,7 +64,8 @@ impl Tracker {
         (self.address, self.port).into()
     }
 
-    pub(crate) fn read(mut f: Fields<'_>, users: &[User]) -> Tracker {
+    /// Reads the table. `has_key`: the cave has a `[security]`.
+    pub(crate) fn read(mut f: Fields<'_>, users: &[User], has_key: bool) -> Tracker {
         let default = Tracker::of(users);
         let problems = f.log.count();
         let address = f
@@ -73,12 +78,18 @@ impl Tracker {
             port: f.integer_or("port", 1..=65535, port) as u16,
             users: read_users(&mut f, users).unwrap_or(default.users),
             senders: read_senders(&mut f),
+            sealed: f.flag_or("sealed", default.sealed),
             axes: f.choice_or("axes", AXES, default.axes),
             origin_m: f.vector_or("origin_m", crate::parse::bound::Bound::ANY, default.origin_m),
         };
-        if f.log.count() == problems && !tracker.address.is_loopback() && tracker.senders.is_empty() {
+        if f.log.count() == problems && !tracker.address.is_loopback() && tracker.senders.is_empty() && !tracker.sealed
+        {
             let message = format!("{} listens at {} without `senders`", f.what, tracker.address);
-            f.log.report(f.span.clone(), message, "expected the IP addresses of accepted senders, such as senders = [\"10.0.0.7\"]; datagrams of trackers are not authenticated");
+            f.log.report(f.span.clone(), message, "expected the IP addresses of accepted senders, such as senders = [\"10.0.0.7\"], or sealed = true; other datagrams of trackers are not authenticated");
+        }
+        if f.log.count() == problems && tracker.sealed && !has_key {
+            let message = format!("{} is sealed and the cave has no key", f.what);
+            f.log.report(f.span.clone(), message, "expected a [security] with a key_file");
         }
         f.finish();
         tracker

@@ -2,6 +2,7 @@
 
 pub(crate) mod format;
 pub(crate) mod on_floor;
+pub(crate) mod plain;
 pub(crate) mod shipped;
 
 use std::io::Read;
@@ -66,7 +67,7 @@ impl SceneFile {
 /// Reads a file of at most [`MAX_BYTES`].
 fn read_capped(path: &Path) -> Result<Vec<u8>, SceneError> {
     let unread = |source| SceneError::Read { file: path.to_path_buf(), source };
-    let file = std::fs::File::open(path).map_err(unread)?;
+    let file = plain::open_file(path).map_err(unread)?;
     let mut bytes = Vec::new();
     file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unread)?;
     if bytes.len() as u64 > MAX_BYTES {

@@ -111,7 +111,7 @@ pub fn resolve_scene(name_or_path: &str, search_dirs: &[PathBuf]) -> Result<Scen
     if like_a_path {
         let file = if path.is_dir() { path.join("scene.toml") } else { path.to_path_buf() };
         // The system's reason why it cannot be opened, if there is one.
-        let source = std::fs::metadata(&file).err().unwrap_or(std::io::ErrorKind::InvalidInput.into());
+        let source = std::fs::metadata(&file).err().unwrap_or_else(crate::open::plain::no_regular_file);
         return Err(SceneError::Read { file, source });
     }
     let in_folders = search_dirs.iter().map(|dir| dir.join(name_or_path).join("scene.toml")).find(|p| p.is_file());

@@ -313,10 +313,13 @@ impl<'a> Fields<'a> {
 
     /// Returns one of `names`, or `default` if the key is absent.
     pub(crate) fn choice_or<T: Copy>(&mut self, key: &'static str, names: Names<T>, default: T) -> T {
-        match self.value(key) {
-            Some(value) => self.as_choice(key, value, names).unwrap_or(default),
-            None => default,
-        }
+        self.optional_choice(key, names).unwrap_or(default)
+    }
+
+    /// Reads one of `names`; `None` if the key is missing, or after a reported problem.
+    pub(crate) fn optional_choice<T: Copy>(&mut self, key: &'static str, names: Names<T>) -> Option<T> {
+        let value = self.value(key)?;
+        self.as_choice(key, value, names)
     }
 
     /// Returns `value` as one of `names`.

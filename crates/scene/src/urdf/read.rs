@@ -45,7 +45,7 @@ pub(crate) fn read_file(path: &Path, options: &UrdfOptions, content: Content) ->
 pub(super) fn text_of(path: &Path) -> Result<String, UrdfError> {
     let unread = |source| UrdfError::Read { file: path.to_path_buf(), source };
     let mut bytes = Vec::new();
-    std::fs::File::open(path).map_err(unread)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unread)?;
+    crate::open_file(path).map_err(unread)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unread)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(UrdfError::TooLarge { file: path.to_path_buf() });
     }

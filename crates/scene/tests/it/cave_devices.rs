@@ -29,6 +29,7 @@ fn a_tracker_is_heard_on_this_machine_and_elsewhere_by_name() {
     let cases = [
         ("[tracker]\naddress = \"0.0.0.0\"\n", "without `senders`"),
         ("[tracker]\naddress = \"here\"\n", "expected an IP address"),
+        ("[tracker]\nsealed = true\n", "expected a [security] with a key_file"),
         ("[tracker]\nport = 0\n", "an integer from 1 to 65535"),
         ("[tracker]\nusers = [\"a\", \"b\"]\n", "one unique name without / for each of the cave's 1 users"),
         ("[tracker]\nusers = [\"a/b\"]\n", "without /"),

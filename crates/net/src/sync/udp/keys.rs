@@ -19,6 +19,7 @@ use std::path::Path;
 const HANDSHAKE: &str = "tumble-net udp v2 handshake";
 const TO_SERVER: &str = "tumble-net udp v2 facet to server";
 const TO_FACET: &str = "tumble-net udp v2 server to facet";
+const TRACKERS: &str = "tumble-net udp v2 trackers";
 const SEEDED: &str = "tumble-net udp v1 random numbers of one process";
 
 /// The pre-shared key.
@@ -49,6 +50,12 @@ impl SharedKey {
     /// Returns whether the key is secret.
     pub fn is_secret(&self) -> bool {
         self.secret
+    }
+
+    /// Returns the key that links of trackers use: another one, so that no packet of theirs is one of
+    /// a facet.
+    pub fn for_trackers(&self) -> SharedKey {
+        SharedKey { bytes: blake3::derive_key(TRACKERS, &self.bytes), secret: self.secret }
     }
 
     /// Reads a key file: 64 hexadecimal digits (32 bytes), with optional white space around them.

@@ -215,8 +215,7 @@ fn bind(address: SocketAddr) -> Result<UdpSocket, LinkError> {
 
 /// Describes an address for the user, and whether its packets are encrypted.
 fn describe(socket: &UdpSocket, sealed: bool) -> String {
-    let state =
-        if sealed { "sealed by the key file" } else { "no key: serves this machine only, without authentication" };
+    let state = if sealed { "sealed" } else { "no key: serves this machine only, without authentication" };
     format!("udp {}, {state}", name(socket))
 }
 
