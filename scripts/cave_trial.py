@@ -157,6 +157,35 @@ def frames(options):
     return whole and same and faults == 0
 
 
+def cube_cave(facets, size):
+    """A cube with the first screens of cube6, one mono facet each, on this machine."""
+    screens = re.findall(r"\[\[screen\]\][^\[]*(?:\[[^\[]*){3}", (ROOT / "caves/cube6.toml").read_text())[:facets]
+    names = [re.search(r'name = "(\w+)"', screen)[1] for screen in screens]
+    parts = [f'{screen}\n[[facet]]\nname = "{name}"\nscreen = "{name}"\nsize_px = [{size[0]}, {size[1]}]\n' for screen, name in zip(screens, names)]
+    path = OUT / f"cube_{facets}_{size[0]}.toml"
+    sync = "[sync]\nready_timeout_ms = 20000\ndrop_timeout_ms = 20000\nconnect_timeout_ms = 60000\n"
+    path.write_text('[[user]]\nname = "viewer"\neye_m = [0, 0, 1.6]\n' + "".join(parts) + sync)
+    return path
+
+
+def rates(options):
+    """Frames per second of real caves: one process per facet, in lockstep, as fast as they can."""
+    print("rates: frames per second of billiards, one process per facet; in brackets the load before the run")
+    whole = True
+    for size in [(640, 480), (1024, 768)]:
+        for facets in [1, 4, 6]:
+            line = []
+            for quality in ["fastest", "fast", "default"]:
+                load, file = os.getloadavg()[0], OUT / "rates.json"
+                tumble("cave", "billiards", "--cave", cube_cave(facets, size), "--duration", options.rates / 60, "--no-realtime", "--offscreen", "--quality", quality, "--quiet",
+                       "--summary", file)
+                summary = json.loads(file.read_text())
+                whole &= all(facet["presented"] == options.rates + 1 for facet in summary["facets"])
+                line.append(f"{quality} {(summary['frames'] - 1) / summary['wall_s']:.1f} ({load:.1f})")
+            print(f"rates: {size[0]} x {size[1]}, {facets} facets: {', '.join(line)}", flush=True)
+    return whole
+
+
 def bowling(options):
     """The pin strike: the worst frame."""
     tumble("cave", "bowling", "--cave", "cube4", "--duration", 5, "--no-realtime", "--no-pictures", "--connect-timeout", 60, "--quiet", "--summary", OUT / "bowling.json")
@@ -465,7 +494,7 @@ def viewers(options):
     return code == 0 and counts.get("/scene", 0) >= 1 and counts.get("/tf", 0) > 30
 
 
-TRIALS = [frames, bowling, kills, drawn_kills, freezes, launchers, servers, soak, minute, cuts, namespace, viewers]
+TRIALS = [frames, rates, bowling, kills, drawn_kills, freezes, launchers, servers, soak, minute, cuts, namespace, viewers]
 SHORT = [frames, kills, freezes, launchers, servers, minute, cuts]
 
 
@@ -473,6 +502,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--long", action="store_true", help="the full numbers, and all trials")
     parser.add_argument("--frames", type=int, help="frames of `frames` and `namespace` (30; long 600)")
+    parser.add_argument("--rates", type=int, help="frames of each run of `rates` (20; long 60)")
     parser.add_argument("--kills", type=int, help="kills and freezes of each kind (2; long 20)")
     parser.add_argument("--soak", type=int, help="frames of `soak` (6,000; long 108,000)")
     parser.add_argument("--minute", type=int, help="frames of `minute` (120; long 3,600)")
@@ -482,7 +512,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("trials", nargs="*", help=", ".join(trial.__name__ for trial in TRIALS))
     options = parser.parse_args()
-    usual = {"frames": (30, 600), "kills": (2, 20), "soak": (6000, 108000), "minute": (120, 3600), "cuts": (100, 1 << 30)}
+    usual = {"frames": (30, 600), "rates": (20, 60), "kills": (2, 20), "soak": (6000, 108000), "minute": (120, 3600), "cuts": (100, 1 << 30)}
     for name, numbers in usual.items():
         if getattr(options, name) is None:
             setattr(options, name, numbers[options.long])

@@ -38,6 +38,8 @@ NOT_RUN = {
     "tumble view …": "opens a window: crates/tumble/tests/it/view_windows.rs and view_sliders.rs",
     "tumble cave bowling --cave cube4": "opens windows: crates/tumble/tests/it/cave_windows.rs",
     "tumble cave billiards --cave cube4": "opens windows: crates/tumble/tests/it/cave_windows.rs",
+    "tumble relay --cave my.toml --to 10.0.0.1:47200": "another machine: crates/tumble/tests/it/cave_relay.rs",
+    "tumble relay --cave my.toml --to 10.0.0.1:47200 --listen 10.0.1.2:47200 --from 10.0.1.7": "other machines: crates/tumble/tests/it/cave_relay.rs",
     "sudo scripts/netns.sh --frames 6000": "root, 100 s",
     "cargo build --release --locked -p tumble --features foxglove": "another build of everything",
 }

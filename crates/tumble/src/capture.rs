@@ -109,7 +109,7 @@ impl Capture {
         while due(frames) {
             if let Some(folder) = &frames.folder {
                 let path = folder.join(format!("frame_{:06}.png", frames.taken));
-                image.write_png(path).map_err(|e| Failure::run("the frames", e))?;
+                write_png(&image, &path)?;
             }
             if let Some(video) = &mut frames.video {
                 video.add(&image)?;

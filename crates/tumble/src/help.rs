@@ -6,14 +6,14 @@ use clap::{Command, CommandFactory};
 /// The commands, grouped by purpose; clap would print one list.
 const GROUPS: [(&str, &[&str]); 5] = [
     ("Simulate", &["run", "view"]),
-    ("Caves", &["cave", "serve", "facet", "caves"]),
+    ("Caves", &["cave", "serve", "facet", "relay", "caves"]),
     ("Recordings", &["replay", "recover"]),
     ("Files", &["check", "spheretree", "scenes"]),
     ("Shell", &["completions", "help"]),
 ];
 
 /// Commands that a signal ends, and a second signal ends at once.
-const SIGNALED: [&str; 4] = ["cave", "serve", "facet", "replay"];
+const SIGNALED: [&str; 5] = ["cave", "serve", "facet", "relay", "replay"];
 
 const EXIT_CODES: &str = "Exit codes:
   0    success

@@ -9,6 +9,7 @@ mod capture;
 mod cave;
 mod caves;
 mod check;
+mod divergence;
 mod failure;
 mod help;
 mod progress;
@@ -39,6 +40,7 @@ fn main() -> ExitCode {
         Command::Cave(options) => cave::cave(&options),
         Command::Serve(options) => cave::serve(&options),
         Command::Facet(options) => cave::facet(&options),
+        Command::Relay(options) => cave::relay(&options),
         Command::Replay(options) => cave::replay(&options),
         Command::Recover(options) => cave::recover(&options),
         Command::Check(options) => check::check(&options),

@@ -3,6 +3,7 @@
 use crate::args::RunOptions;
 use crate::atomic_file::{check_writable, write_file};
 use crate::capture::{Capture, write_png};
+use crate::divergence;
 use crate::failure::Failure;
 use crate::progress::Progress;
 use crate::summary::{State, Summary, Tally};
@@ -12,7 +13,7 @@ use std::time::Instant;
 use tumble::dynamics::World;
 use tumble::net::record::{Recorder, RecorderOptions};
 use tumble::net::world::{contacts, entities, poses};
-use tumble::scene::{SceneFile, visual_notes};
+use tumble::scene::{SceneFile, open_file, visual_notes};
 
 /// Largest saved state that is read: a thousand times the size of one of ten thousand bodies.
 const MAX_STATE_BYTES: u64 = 1 << 30;
@@ -34,17 +35,30 @@ pub fn run(options: &RunOptions) -> Result<(), Failure> {
     // the capture and the recorder have read the visual meshes by now
     visual_notes(world.visuals()).iter().filter(|_| !options.quiet).for_each(|note| println!("{note}"));
     let start = State::of(&world);
-    let (tally, simulated, wall) = simulate(&mut world, recorder.as_mut(), capture.as_mut(), &scene, options)?;
+    let simulated = simulate(&mut world, recorder.as_mut(), capture.as_mut(), &scene, options)?;
     finish_recording(recorder, options)?;
     if let Some(path) = &options.save {
         write_file(path, &world.save())?;
     }
-    let summary = tally.summary(&scene.file, &world, start, simulated, wall);
+    let summary = simulated.tally.summary(&scene.file, &world, start, simulated.time_s, simulated.wall_s);
     if !options.quiet {
         print!("{}", summary.lines());
     }
     write_summary(&summary, options)?;
-    pictures(&world, capture, options)
+    pictures(&world, capture, options)?;
+    // what was computed is written all the same
+    simulated.outcome
+}
+
+/// A run without its outputs.
+struct Simulated {
+    tally: Tally,
+    /// Simulated time, s.
+    time_s: f64,
+    /// Wall-clock time spent in steps, s.
+    wall_s: f64,
+    /// An error if the simulation has diverged, which ends it.
+    outcome: Result<(), Failure>,
 }
 
 fn restore(world: &mut World, options: &RunOptions) -> Result<(), Failure> {
@@ -52,7 +66,7 @@ fn restore(world: &mut World, options: &RunOptions) -> Result<(), Failure> {
     let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
     let mut bytes = Vec::new();
     // an endless file, such as a device, is read no further
-    let read = std::fs::File::open(path).and_then(|file| file.take(MAX_STATE_BYTES + 1).read_to_end(&mut bytes));
+    let read = open_file(path).and_then(|file| file.take(MAX_STATE_BYTES + 1).read_to_end(&mut bytes));
     read.map_err(|e| wrong(format!("cannot be read: {e}")))?;
     if bytes.len() as u64 > MAX_STATE_BYTES {
         return Err(wrong(format!("is larger than {MAX_STATE_BYTES} bytes, the largest size of a saved state")));
@@ -66,15 +80,14 @@ fn recorder(world: &World, scene: &SceneFile, options: &RunOptions) -> Result<Op
     recorder.map(Some).map_err(|e| Failure::run("recording", e))
 }
 
-/// Steps to the end. Returns the tally, the simulated time and the wall-clock time spent in steps,
-/// both in s.
+/// Steps to the end, or until the simulation diverges.
 fn simulate(
     world: &mut World,
     mut recorder: Option<&mut Recorder>,
     mut capture: Option<&mut Capture>,
     scene: &SceneFile,
     options: &RunOptions,
-) -> Result<(Tally, f64, f64), Failure> {
+) -> Result<Simulated, Failure> {
     let frames = (scene.world.duration_s / scene.world.dt_s).round() as u64;
     let (begin, mut tally, mut wall) = (world.time(), Tally::default(), 0.0);
     let mut progress = Progress::new(frames, options.quiet);
@@ -87,6 +100,7 @@ fn simulate(
     let mut shoot = |world: &World| capture.as_mut().map_or(Ok(()), |capture| capture.frame(world, begin));
     record(world)?;
     shoot(world)?;
+    let mut outcome = divergence::check(world);
     for frame in 1..=frames {
         let clock = Instant::now();
         let report = *world.step().map_err(|e| Failure::run("the simulation stopped", e))?;
@@ -96,9 +110,13 @@ fn simulate(
         record(world)?;
         shoot(world)?;
         progress.at(frame, world.time());
+        outcome = divergence::check(world);
+        if outcome.is_err() {
+            break;
+        }
     }
     progress.done();
-    Ok((tally, world.time() - begin, wall))
+    Ok(Simulated { tally, time_s: world.time() - begin, wall_s: wall, outcome })
 }
 
 fn finish_recording(recorder: Option<Recorder>, options: &RunOptions) -> Result<(), Failure> {

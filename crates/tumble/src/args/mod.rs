@@ -4,7 +4,7 @@ mod values;
 
 pub use values::{rate, seconds};
 
-use crate::cave::args::{CaveOptions, FacetOptions, RecoverOptions, ReplayOptions, ServeOptions};
+use crate::cave::args::{CaveOptions, FacetOptions, RecoverOptions, RelayOptions, ReplayOptions, ServeOptions};
 use crate::failure::Failure;
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
@@ -34,6 +34,8 @@ pub enum Command {
     Serve(Box<ServeOptions>),
     /// Draw one facet of a cave, from a server that runs or will run
     Facet(Box<FacetOptions>),
+    /// Forward the datagrams of a tracker to the server of a cave, sealed
+    Relay(RelayOptions),
     /// Show a recording in a cave, and compare its pictures with those recorded
     Replay(Box<ReplayOptions>),
     /// Save the intact part of a recording that was cut or damaged

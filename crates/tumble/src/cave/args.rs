@@ -1,6 +1,7 @@
 //! Options of `tumble cave`, `tumble serve`, `tumble facet`, `tumble replay` and `tumble recover`.
 
 use crate::args::{OpeningOptions, Overlays, SceneOptions};
+use crate::cave::tracker::sealed::MAX_RELAYS;
 use clap::{Args, ValueEnum};
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -53,8 +54,9 @@ pub struct ServeOptions {
     /// and the cave's port if the cave has remote nodes).
     #[arg(long, value_name = "ADDR:PORT")]
     pub listen: Option<SocketAddr>,
-    /// Timeout for facets to join at the start, s (default: connect_timeout_ms of the cave).
-    #[arg(long, value_name = "S", value_parser = crate::args::seconds)]
+    /// Timeout for facets to join at the start, s (default: connect_timeout_ms of the cave). It
+    /// begins when the facets that this command has started have compiled their pipelines.
+    #[arg(long, visible_alias = "wait", value_name = "S", value_parser = crate::args::seconds)]
     pub connect_timeout: Option<f64>,
     /// End the run in progress in this cave and take its place.
     #[arg(long)]
@@ -145,11 +147,15 @@ pub struct DrawOptions {
     /// frame.
     #[arg(long, value_name = "DIR", conflicts_with = "frames_dir")]
     pub log_dir: Option<PathBuf>,
+    /// Remove the frames of an earlier run from the folder of --frames-dir or --log-dir. Without it
+    /// such a folder is refused.
+    #[arg(long)]
+    pub overwrite: bool,
     /// Draw the frame number into the picture: as digits, and as squares for programs.
     #[arg(long)]
     pub burn_in: bool,
-    /// default, fast or fastest, or parts of it as for tumble view (default: default; fast in
-    /// windows with a software driver).
+    /// default, fast or fastest, or parts of it as for tumble view (default: default; fast with a
+    /// software driver).
     #[arg(long, value_name = "NAME")]
     pub quality: Option<Quality>,
     /// Overlays: contacts, normals, forces, joints, frames, tree=LEVEL, all; separated by commas.
@@ -199,6 +205,27 @@ pub struct RecoverOptions {
     pub output: PathBuf,
 }
 
+/// Options of `tumble relay`.
+#[derive(Args, Clone)]
+pub struct RelayOptions {
+    /// Cave file, or name of a shipped cave. The key file of its [security] seals the datagrams.
+    #[arg(long, value_name = "CAVE")]
+    pub cave: String,
+    /// Address of the server's tracker, as this machine reaches it.
+    #[arg(long, value_name = "ADDR:PORT")]
+    pub to: SocketAddr,
+    /// Address at which the tracker's datagrams arrive.
+    #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:47200")]
+    pub listen: SocketAddr,
+    /// Addresses from which datagrams are accepted; required if others than this machine reach the
+    /// address of --listen.
+    #[arg(long, value_name = "IP,…", value_delimiter = ',')]
+    pub from: Vec<std::net::IpAddr>,
+    /// Number of this relay, 0 to 7; each relay of a server has another one.
+    #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u16).range(0..i64::from(MAX_RELAYS)))]
+    pub number: u16,
+}
+
 /// Options of `tumble facet`.
 #[derive(Args, Clone)]
 pub struct FacetOptions {
@@ -223,11 +250,15 @@ pub struct FacetOptions {
     #[arg(long, value_name = "NUMBER", conflicts_with = "server")]
     pub run: Option<String>,
     /// Timeout for a server, at the start and after its loss, s.
-    #[arg(long, value_name = "S", default_value = "10", value_parser = crate::args::seconds)]
+    #[arg(long, visible_alias = "wait", value_name = "S", default_value = "10", value_parser = crate::args::seconds)]
     pub connect_timeout: f64,
     #[command(flatten)]
     pub draw: DrawOptions,
     /// End when stdin ends. A launcher sets it, so that a facet ends with its launcher in any case.
     #[arg(long, hide = true)]
     pub parent_watch: bool,
+    /// Continue the frames that this run has written before. A launcher sets it when it starts a
+    /// facet again.
+    #[arg(long, hide = true, conflicts_with = "overwrite")]
+    pub continue_frames: bool,
 }

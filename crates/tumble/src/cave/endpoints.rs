@@ -1,6 +1,6 @@
 //! Endpoints of a run's transport, chosen at run time.
 
-use super::address::ServerAddress;
+use super::address::{RunKey, RunServer, ServerAddress};
 use super::run_setup::RunSetup;
 use crate::failure::Failure;
 use std::path::Path;
@@ -36,7 +36,9 @@ struct ServerLookup {
     place: String,
     cave: Cave,
     facet: FacetNumber,
-    address: ServerAddress,
+    server: RunServer,
+    /// Whether a run at another address is another run, because the user gave the address.
+    only_here: bool,
     connected: bool,
     last_lookup: Instant,
 }
@@ -58,52 +60,56 @@ pub fn key(cave: &Cave) -> Result<Option<SharedKey>, Failure> {
 
 impl FacetEndpoint {
     /// Starts to connect to the server. With `again`, the address is read from the cave's lock file
-    /// while there is no connection; otherwise it never changes.
+    /// while there is no connection; otherwise it never changes. A key of the run is read there in
+    /// any case, since each run has another one.
     pub fn open(
-        address: &ServerAddress,
+        server: &RunServer,
         facet: FacetNumber,
         setup: &RunSetup,
         again: bool,
     ) -> Result<FacetEndpoint, Failure> {
-        let link = Link::open(address, facet, &setup.cave)?;
+        let link = Link::open(server, facet, &setup.cave)?;
         let lookup = || ServerLookup {
             place: setup.place.clone(),
             cave: setup.cave.clone(),
             facet,
-            address: address.clone(),
+            server: server.clone(),
+            only_here: !again,
             connected: false,
             last_lookup: Instant::now(),
         };
-        Ok(FacetEndpoint { link, lookup: again.then(lookup) })
+        Ok(FacetEndpoint { link, lookup: (again || server.key.is_some()).then(lookup) })
     }
 
     /// Reconnects if the server's address has changed.
     fn follow_server(&mut self) {
-        let Some(lookup) = self.lookup.as_mut().filter(|l| !l.connected && l.last_lookup.elapsed() >= LOOKUP_INTERVAL)
-        else {
-            return;
+        // a run with another key is another server, which this link cannot recognize
+        let due = |l: &&mut ServerLookup| {
+            (!l.connected || l.server.key.is_some()) && l.last_lookup.elapsed() >= LOOKUP_INTERVAL
         };
+        let Some(lookup) = self.lookup.as_mut().filter(due) else { return };
         lookup.last_lookup = Instant::now();
-        let Ok(Some(address)) = super::lock::find_run(&lookup.place) else { return };
-        if address == lookup.address {
+        let Ok(Some(server)) = super::lock::find_run(&lookup.place) else { return };
+        if server == lookup.server || lookup.only_here && server.address != lookup.server.address {
             return;
         }
         // a failure is retried for as long as the facet waits
-        if let Ok(link) = Link::open(&address, lookup.facet, &lookup.cave) {
-            (self.link, lookup.address) = (link, address);
+        if let Ok(link) = Link::open(&server, lookup.facet, &lookup.cave) {
+            (self.link, lookup.server) = (link, server);
         }
     }
 }
 
 impl Link {
-    fn open(address: &ServerAddress, facet: FacetNumber, cave: &Cave) -> Result<Link, Failure> {
+    fn open(server: &RunServer, facet: FacetNumber, cave: &Cave) -> Result<Link, Failure> {
         let failed = |e: LinkError| Failure::run("the connection to the server", e);
-        Ok(match address {
+        Ok(match &server.address {
             ServerAddress::Memory(run) => {
                 Link::Shm(Box::new(ShmFacet::new(run, facet).map_err(failed)?.with_idle_timeout(idle_timeout(cave))))
             }
-            ServerAddress::Udp(server) => {
-                Link::Udp(Box::new(UdpFacet::connect(*server, facet, key(cave)?, timing(cave)).map_err(failed)?))
+            ServerAddress::Udp(address) => {
+                let key = key(cave)?.or(server.key.as_ref().map(RunKey::shared));
+                Link::Udp(Box::new(UdpFacet::connect(*address, facet, key, timing(cave)).map_err(failed)?))
             }
         })
     }

@@ -3,7 +3,7 @@
 //! The system releases the lock with the process, however that ends. Facets that are started by
 //! hand read the address of the server from the file.
 
-use super::address::ServerAddress;
+use super::address::{RunKey, RunServer, ServerAddress};
 use super::run_setup::RunSetup;
 use crate::failure::Failure;
 use serde::{Deserialize, Serialize};
@@ -31,6 +31,9 @@ pub struct RunInfo {
     pub start_ticks: u64,
     /// Address of the server; `None` before facets can join.
     pub address: Option<ServerAddress>,
+    /// Key of the run over UDP without a key file.
+    #[serde(default)]
+    pub key: Option<RunKey>,
 }
 
 impl RunInfo {
@@ -45,6 +48,7 @@ impl RunInfo {
             since_unix_s: since.as_secs(),
             start_ticks: start_ticks(pid).unwrap_or(0),
             address: None,
+            key: None,
         }
     }
 
@@ -128,11 +132,12 @@ impl Drop for RunLock {
     }
 }
 
-/// Returns the server's address of the run in progress in the cave at `place` ([`RunSetup::place`])
+/// Returns the server of the run in progress in the cave at `place` ([`RunSetup::place`])
 /// on this machine, if facets can join it. It takes no lock, which a starting run would mistake for
 /// a run in progress.
-pub fn find_run(place: &str) -> Result<Option<ServerAddress>, Failure> {
-    Ok(read(&path(place)?).filter(RunInfo::is_running).and_then(|run| run.address))
+pub fn find_run(place: &str) -> Result<Option<RunServer>, Failure> {
+    let run = read(&path(place)?).filter(RunInfo::is_running);
+    Ok(run.and_then(|run| Some(RunServer { address: run.address?, key: run.key })))
 }
 
 /// Returns when a process started, ticks since boot. Returns `None` if there is no such process, or

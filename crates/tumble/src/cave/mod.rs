@@ -30,6 +30,8 @@ mod address;
 pub mod args;
 mod endpoints;
 mod facet;
+mod facet_report;
+mod frames_folder;
 mod lock;
 mod replay;
 mod run_setup;
@@ -38,7 +40,7 @@ mod signals;
 mod tracker;
 
 use crate::failure::Failure;
-use args::{CaveOptions, FacetOptions, RecoverOptions, ReplayOptions, ServeOptions};
+use args::{CaveOptions, FacetOptions, RecoverOptions, RelayOptions, ReplayOptions, ServeOptions};
 
 /// Runs the server and the facets of this machine.
 pub fn cave(options: &CaveOptions) -> Result<(), Failure> {
@@ -69,6 +71,11 @@ pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
         ));
     }
     server::run(serve, Some(&options.cave), Some(&options.file))
+}
+
+/// Forwards the datagrams of a tracker to a server, sealed.
+pub fn relay(options: &RelayOptions) -> Result<(), Failure> {
+    tracker::relay::relay(options)
 }
 
 /// Copies everything readable of a recording to a new file.

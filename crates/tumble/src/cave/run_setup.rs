@@ -187,8 +187,3 @@ fn merge_environment(scene: &mut SceneFile, from: SceneFile, notes: &mut Vec<Str
     }
     Ok(())
 }
-
-/// Returns a facet's folder. A name may contain dots, and none leads out of `folder`.
-pub fn facet_folder(folder: &Path, name: &str) -> std::path::PathBuf {
-    folder.join(if name.starts_with('.') { format!("_{name}") } else { name.to_owned() })
-}

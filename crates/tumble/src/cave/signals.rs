@@ -23,6 +23,8 @@ const EXIT_CODE: i32 = 130;
 #[derive(Clone)]
 pub struct Signals {
     stop_requested: Arc<AtomicBool>,
+    /// Whether the timeout of an orderly end begins again.
+    postponed: Arc<AtomicBool>,
     cleanup: Arc<Mutex<Cleanup>>,
 }
 
@@ -42,17 +44,23 @@ impl Signals {
             signal_hook::flag::register(signal, came.clone()).map_err(|e| Failure::run("signals", e))?;
         }
         let cleanup = Arc::new(Mutex::new(Cleanup::default()));
-        let (raised, kept) = (stop_requested.clone(), cleanup.clone());
+        let postponed = Arc::new(AtomicBool::new(false));
+        let (raised, later, kept) = (stop_requested.clone(), postponed.clone(), cleanup.clone());
         std::thread::Builder::new()
             .name("signals".into())
-            .spawn(move || watch(&came, &raised, &kept))
+            .spawn(move || watch(&came, &raised, &later, &kept))
             .map_err(|e| Failure::run("signals", e))?;
-        Ok(Signals { stop_requested, cleanup })
+        Ok(Signals { stop_requested, postponed, cleanup })
     }
 
     /// Returns whether a signal arrived.
     pub fn stop_requested(&self) -> bool {
         self.stop_requested.load(Ordering::Relaxed)
+    }
+
+    /// Begins the timeout of an orderly end again, because the end makes progress.
+    pub fn postpone(&self) {
+        self.postponed.store(true, Ordering::Relaxed);
     }
 
     /// Notes a started process that leads a process group.
@@ -84,17 +92,20 @@ fn end(cleanup: &Mutex<Cleanup>) -> ! {
     std::process::exit(EXIT_CODE)
 }
 
-fn watch(came: &AtomicBool, stop_requested: &AtomicBool, cleanup: &Mutex<Cleanup>) {
-    let mut first: Option<Instant> = None;
+fn watch(came: &AtomicBool, stop_requested: &AtomicBool, postponed: &AtomicBool, cleanup: &Mutex<Cleanup>) {
+    let (mut first, mut timeout_begins) = (None::<Instant>, Instant::now());
     loop {
         std::thread::sleep(POLL_INTERVAL);
         let came = came.swap(false, Ordering::Relaxed);
         match first {
             None if came => {
                 stop_requested.store(true, Ordering::Relaxed);
-                first = Some(Instant::now());
+                timeout_begins = Instant::now();
+                first = Some(timeout_begins);
             }
-            Some(since) if since.elapsed() > SHUTDOWN_TIMEOUT || came && since.elapsed() > DEBOUNCE => end(cleanup),
+            Some(since) if came && since.elapsed() > DEBOUNCE => end(cleanup),
+            Some(_) if postponed.swap(false, Ordering::Relaxed) => timeout_begins = Instant::now(),
+            Some(_) if timeout_begins.elapsed() > SHUTDOWN_TIMEOUT => end(cleanup),
             _ => {}
         }
     }

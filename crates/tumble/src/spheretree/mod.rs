@@ -13,7 +13,7 @@ use std::time::Instant;
 use tumble::collide::{
     Builder, MeshId, QualitySettings, RepairSettings, SphereTree, TreeCache, TreeFile, TreeSettings, TriMesh,
 };
-use tumble::scene::read_solid;
+use tumble::scene::{read_mesh_bytes, read_solid};
 
 /// Builds, measures, prints and writes.
 pub fn spheretree(options: &SphereTreeOptions) -> Result<(), Failure> {
@@ -77,7 +77,7 @@ fn of_mesh(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
 /// Reads the mesh. Harmless defects are repaired, with notes.
 fn read(path: &Path, options: &SphereTreeOptions) -> Result<TriMesh, Failure> {
     let wrong = |why: String| Failure::input(format!("{}: {why}", path.display()));
-    let bytes = std::fs::read(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
+    let bytes = read_mesh_bytes(path).map_err(wrong)?;
     let (mesh, notes) =
         read_solid(path, &bytes, options.repair.then(RepairSettings::default).as_ref()).map_err(wrong)?;
     notes.iter().filter(|_| !options.quiet).for_each(|note| println!("{}: {note}", path.display()));

@@ -294,6 +294,29 @@ fn an_unreachable_node_and_a_timeout_that_is_too_short_are_reported() {
     assert!(wrong.contains("drop_timeout_ms") && wrong.contains("100"), "{wrong}");
 }
 
+#[test]
+fn a_facet_that_is_given_up_fails_the_run() {
+    let place = Place::new("cave-given-up", &wall());
+    let run = place.start("cave", &["--no-pictures", "--restart", "--log-dir", &place.path("out")]);
+    let mut before = 0;
+    // the first process, and five that are started again
+    for _ in 0..6 {
+        wait("frames of the facet", || place.log("out", "r").len() > before + 5);
+        signal(run.facet("r"), Signal::KILL);
+        before = place.log("out", "r").len();
+    }
+    // longer than the pause before a restart
+    std::thread::sleep(Duration::from_secs(4));
+    assert!(run.facets().iter().all(|(name, _)| name != "r"));
+    let at = *numbers(&place.log("out", "l")).last().unwrap();
+    place.wait_for("out", "l", at + 20);
+    signal(run.pid(), Signal::INT);
+    let (code, _, wrong) = run.end();
+    assert_eq!(code, Some(1), "{wrong}");
+    assert!(wrong.contains("r (given up after 5 restarts within a minute)"), "{wrong}");
+    place.assert_clean();
+}
+
 /// Both sides name a wrong key as a possible cause when no frame was shown.
 #[test]
 fn a_wrong_key_is_named() {

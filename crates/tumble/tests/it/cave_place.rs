@@ -95,6 +95,28 @@ pub fn in_place(folder: &Folder, args: &[&str]) -> Command {
     command
 }
 
+/// Returns the lock file of the run whose runtime folder is in this one.
+pub fn lock_file(folder: &Folder) -> Option<PathBuf> {
+    let folders = std::fs::read_dir(folder.path("run")).ok()?.flatten();
+    let files = folders.filter_map(|folder| std::fs::read_dir(folder.path()).ok()).flat_map(|files| files.flatten());
+    files.map(|file| file.path()).find(|path| {
+        path.extension().is_some_and(|e| e == "lock")
+            && path.file_name().unwrap().to_str().unwrap().starts_with("cave-")
+    })
+}
+
+/// Returns the content of the lock file; null while there is none.
+pub fn run_info(folder: &Folder) -> Value {
+    let text = lock_file(folder).and_then(|file| std::fs::read(file).ok()).unwrap_or_default();
+    serde_json::from_slice(&text).unwrap_or_default()
+}
+
+/// Returns the key of a run over UDP; waits for it.
+pub fn run_key(folder: &Folder) -> [u8; 32] {
+    wait("the key of the run", || run_info(folder)["key"].is_array());
+    serde_json::from_value(run_info(folder)["key"].clone()).unwrap()
+}
+
 /// A folder with a scene and a cave, and with its own locks and sockets.
 pub struct Place {
     pub folder: Folder,

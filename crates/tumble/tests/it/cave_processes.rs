@@ -26,6 +26,8 @@ fn all_facets_show_the_same_frames(test: &str, frames: u64) {
                 "--duration",
                 &seconds,
                 "--no-realtime",
+                "--quality",
+                "default",
                 "--burn-in",
                 "--frames-dir",
                 &place.path("out"),
@@ -234,4 +236,20 @@ fn an_environment_brings_lights_camera_and_what_stands_still() {
     let (code, _, wrong) = place.start("cave", &["--environment", &clash]).end();
     assert_eq!(code, Some(2), "{wrong}");
     assert!(wrong.contains("\"ball\"") && wrong.contains("rename one"), "{wrong}");
+}
+
+/// Processes that compile pipelines and draw need longer than this timeout in any case.
+#[test]
+fn facets_that_prepare_are_waited_for_beyond_the_timeout() {
+    if tumble::render::Renderer::new().is_err() {
+        return crate::desktop::skip("this machine has no graphics adapter");
+    }
+    let place = Place::new("cave-slow-start", &wall());
+    let args = ["--offscreen", "--no-realtime", "--duration", "0.02", "--quality", "fastest", "--wait", "0.05"];
+    let summary = place.succeed("cave", &args);
+    assert_eq!(summary["frames"], 3);
+    // nobody says that the facets of this server prepare
+    let (code, _, wrong) = place.start("serve", &["--wait", "0.05"]).end();
+    assert_eq!(code, Some(1), "{wrong}");
+    assert!(wrong.contains("did not join within 0.1 s") && wrong.contains("--wait SECONDS"), "{wrong}");
 }

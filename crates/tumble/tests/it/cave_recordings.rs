@@ -95,3 +95,25 @@ fn a_run_cut_at_every_structural_boundary_keeps_what_was_flushed() {
     }
     assert!(partly > 10, "{partly} cuts within the run");
 }
+
+#[test]
+fn a_recording_without_frames_is_named_as_such() {
+    let (folder, scene, cave) = place("cave-no-frames");
+    let (file, cut) = (folder.path("run.mcap"), folder.path("cut.mcap"));
+    let fixed = ["--no-pictures", "--no-realtime", "--quiet", "--duration", "0.3"];
+    let run = |first: &[&str]| in_place(&folder, &[first, &["--cave", &cave], &fixed].concat()).output().unwrap();
+    assert!(run(&["cave", &scene, "--record", &text(&file)]).status.success());
+    let bytes = std::fs::read(&file).unwrap();
+    // right after the first chunk, which has the scene, and within the next record
+    let first = records(&bytes).into_iter().find(|(opcode, ..)| *opcode == 0x06).unwrap();
+    for at in [first.2, first.2 + 3] {
+        std::fs::write(&cut, &bytes[..at]).unwrap();
+        for args in [&["replay", &text(&cut), &scene][..], &["cave", &scene, "--replay-input", &text(&cut)]] {
+            let out = run(args);
+            let wrong = String::from_utf8_lossy(&out.stderr);
+            assert_eq!(out.status.code(), Some(2), "{wrong}");
+            let why = format!("cut.mcap: the recording has no frame: it is cut at byte {}", first.2);
+            assert!(wrong.contains(&why) && !wrong.contains("hash"), "{wrong}");
+        }
+    }
+}

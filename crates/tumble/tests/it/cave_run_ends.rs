@@ -53,7 +53,8 @@ fn a_full_disk_is_reported_with_the_file_and_ends_the_run() {
         std::fs::create_dir_all(place.folder.path("out").join(facet)).unwrap();
         symlink("/dev/full", place.folder.path("out").join(facet).join("frames.jsonl")).unwrap();
     }
-    let (code, _, wrong) = place.start("cave", &["--no-pictures", "--log-dir", &place.path("out")]).end();
+    let (code, _, wrong) =
+        place.start("cave", &["--no-pictures", "--log-dir", &place.path("out"), "--overwrite"]).end();
     assert_eq!(code, Some(1), "{wrong}");
     for facet in ["l", "r"] {
         assert!(
@@ -97,7 +98,8 @@ fn a_facet_of_another_cave_is_not_let_in() {
     let place = Place::new("cave-other-cave", &wall());
     let server = place.start("serve", &["--connect-timeout", "60"]);
     wait("the server's lock", || {
-        lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory"))
+        lock_file(&place.folder)
+            .is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory"))
     });
     std::fs::write(&place.cave, wall().replace("[-2, 2, 2.0]", "[-2, 2, 2.2]")).unwrap();
     let (code, _, wrong) = place.start("facet", &["--facet", "r", "--no-pictures"]).end();
@@ -128,7 +130,8 @@ fn a_facet_with_another_texture_of_the_same_name_is_not_let_in() {
         .unwrap();
     let server = place.start("serve", &["--connect-timeout", "60"]);
     wait("the server's lock", || {
-        lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory"))
+        lock_file(&place.folder)
+            .is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory"))
     });
     picture(128);
     let (code, _, wrong) = place.start("facet", &["--facet", "r", "--no-pictures"]).end();
@@ -169,15 +172,6 @@ fn facets_by_hand_find_the_server_that_was_started_again() {
     }
 }
 
-fn lock_file(place: &Place) -> Option<std::path::PathBuf> {
-    let folders = std::fs::read_dir(place.folder.path("run")).ok()?.flatten();
-    let files = folders.filter_map(|folder| std::fs::read_dir(folder.path()).ok()).flat_map(|files| files.flatten());
-    files.map(|file| file.path()).find(|path| {
-        path.extension().is_some_and(|e| e == "lock")
-            && path.file_name().unwrap().to_str().unwrap().starts_with("cave-")
-    })
-}
-
 #[test]
 fn a_shipped_cave_is_one_from_every_folder() {
     let place = Place::new("cave-one", &wall());
@@ -188,7 +182,8 @@ fn a_shipped_cave_is_one_from_every_folder() {
     };
     let mut first = start(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).stderr(Stdio::null()).spawn().unwrap();
     wait("the lock", || {
-        lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory"))
+        lock_file(&place.folder)
+            .is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory"))
     });
     let out = start("/").output().unwrap();
     signal(first.id() as i32, Signal::INT);
@@ -214,7 +209,8 @@ fn a_run_of_long_paths_has_a_name_and_is_found() {
     };
     let mut server = start("serve", &["--duration", "0.3", "--quiet"]);
     wait("the lock", || {
-        lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory"))
+        lock_file(&place.folder)
+            .is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory"))
     });
     let second = start("serve", &[]).wait_with_output().unwrap();
     let wrong = String::from_utf8_lossy(&second.stderr);
@@ -230,9 +226,10 @@ fn replacing_a_run_signals_no_other_process_with_its_number() {
     let place = Place::new("cave-bystander", &wall());
     let server = place.start("serve", &["--connect-timeout", "60"]);
     wait("the lock", || {
-        lock_file(&place).is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory"))
+        lock_file(&place.folder)
+            .is_some_and(|file| std::fs::read_to_string(file).unwrap_or_default().contains("Memory"))
     });
-    let path = lock_file(&place).unwrap();
+    let path = lock_file(&place.folder).unwrap();
     signal(server.pid(), Signal::KILL);
     let _ = server.end();
     // the number in the file is another process's by now, and a process that has not written yet

@@ -1,14 +1,14 @@
 //! Actions of users in a cave, by a facet of the test's own: keys walk, the wand pulls, user
 //! colliders push; and replays of recordings.
 
-use crate::cave_place::{cave_of, in_place, make_runtime};
+use crate::cave_place::{cave_of, in_place, make_runtime, run_key};
 use crate::common::{Folder, json, succeed, text};
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
 use std::process::{Child, ChildStderr, Stdio};
 use std::time::{Duration, Instant};
 use tumble::collide::{Pose, Vec3};
-use tumble::net::sync::udp::{Timing, UdpFacet};
+use tumble::net::sync::udp::{SharedKey, Timing, UdpFacet};
 use tumble::net::sync::{EndReason, Facet, FacetOptions, Input, Task};
 
 /// Maximum time that a test waits for anything.
@@ -40,6 +40,7 @@ pub struct Server {
     child: Child,
     pub facet: Facet<UdpFacet>,
     pub address: SocketAddr,
+    key: [u8; 32],
     hash: [u8; 32],
     // keeps the pipe open, so that the server can go on writing
     _stderr: BufReader<ChildStderr>,
@@ -62,7 +63,7 @@ pub fn place(test: &str) -> (Folder, String, String) {
 
 /// Starts a server that waits for its facets; returns its address too.
 fn serve(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> (Child, SocketAddr, BufReader<ChildStderr>) {
-    let mut child = in_place(folder, &[&["serve", scene, "--cave", cave, "--no-realtime"], args].concat())
+    let mut child = in_place(folder, &[&["serve", scene, "--cave", cave], args].concat())
         .stderr(Stdio::piped())
         .stdout(Stdio::null())
         .spawn()
@@ -81,7 +82,7 @@ fn serve(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> (Child, Soc
 /// Returns the server's hash of scene and cave, from its refusal of a facet with another hash.
 fn joined_hash(folder: &Folder, scene: &str, cave: &str) -> [u8; 32] {
     let (mut child, address, _stderr) = serve(folder, scene, cave, &["--transport", "udp"]);
-    let mut stranger = connect(address, "f", 0, [0; 32], scene);
+    let mut stranger = connect(address, run_key(folder), "f", 0, [0; 32], scene);
     let start = Instant::now();
     let why = loop {
         assert!(start.elapsed() < PATIENCE, "no answer came");
@@ -95,22 +96,36 @@ fn joined_hash(folder: &Folder, scene: &str, cave: &str) -> [u8; 32] {
     std::array::from_fn(|k| u8::from_str_radix(&hash[2 * k..2 * k + 2], 16).unwrap())
 }
 
-fn connect(address: SocketAddr, name: &str, number: u16, hash: [u8; 32], scene: &str) -> Facet<UdpFacet> {
-    let link = UdpFacet::connect(address, number, None, Timing::default()).unwrap();
+fn connect(
+    address: SocketAddr,
+    key: [u8; 32],
+    name: &str,
+    number: u16,
+    hash: [u8; 32],
+    scene: &str,
+) -> Facet<UdpFacet> {
+    let link = UdpFacet::connect(address, number, Some(SharedKey::new(key)), Timing::default()).unwrap();
     let (world, _) = tumble::scene::SceneFile::load(scene).unwrap().build().unwrap();
     Facet::new(link, FacetOptions::new(name, hash, 1), world)
 }
 
 impl Server {
+    /// Starts a server that waits for its facet with each frame, and its facet.
     pub fn start(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> Server {
+        Server::start_in_real_time(folder, scene, cave, &[&["--no-realtime"], args].concat())
+    }
+
+    pub fn start_in_real_time(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> Server {
         let hash = joined_hash(folder, scene, cave);
         let (child, address, stderr) = serve(folder, scene, cave, args);
-        Server { child, facet: connect(address, "f", 0, hash, scene), address, hash, _stderr: stderr, sequence: 0 }
+        let key = run_key(folder);
+        let facet = connect(address, key, "f", 0, hash, scene);
+        Server { child, facet, address, key, hash, _stderr: stderr, sequence: 0 }
     }
 
     /// Connects one more facet.
     pub fn another(&self, name: &str, number: u16, scene: &str) -> Facet<UdpFacet> {
-        connect(self.address, name, number, self.hash, scene)
+        connect(self.address, self.key, name, number, self.hash, scene)
     }
 
     /// Shows frames until one has the number `frame` or more, and calls `doing` before each.
@@ -187,7 +202,7 @@ impl Server {
         world.part_state(world.find("ball").unwrap(), 0).unwrap().position()
     }
 
-    fn cave(&self) -> Vec3 {
+    pub fn cave(&self) -> Vec3 {
         self.facet.viewer().cave.translation.vector
     }
 }

@@ -127,6 +127,95 @@ fn four_windows_open_where_the_cave_says_and_the_others_go_on_when_one_is_closed
     }
 }
 
+/// A bare X server without other clients resets when a connection ends, which cuts the others.
+#[test]
+fn all_windows_open_on_a_server_that_resets() {
+    let Some(desktop) = Desktop::that_resets() else { return };
+    if tumble::render::Renderer::new().is_err() {
+        return skip("this machine has no graphics adapter");
+    }
+    let folder = Folder::new("cave-reset");
+    make_runtime(&folder);
+    let cave = cave().replace("position_px", "output = \"window\"\nposition_px");
+    let (scene, cave) = (folder.write("scene.toml", SCENE), folder.write("cave.toml", cave));
+    for round in 0..3 {
+        let (out, log) = (text(&folder.path(&format!("out{round}"))), folder.path(&format!("stderr{round}")));
+        let args = ["cave", &scene, "--cave", &cave, "--quality", "fastest", "--log-dir", &out];
+        let mut run = Running(
+            in_place(&folder, &args)
+                .env("DISPLAY", &desktop.display)
+                .stderr(std::fs::File::create(&log).unwrap())
+                .stdout(Stdio::null())
+                .spawn()
+                .unwrap(),
+        );
+        let frames = |facet: &str| std::fs::read_to_string(format!("{out}/{facet}/frames.jsonl")).unwrap_or_default();
+        wait("frames on all facets", || {
+            if let Some(status) = run.0.try_wait().unwrap() {
+                panic!("it ended with {status}: {}", std::fs::read_to_string(&log).unwrap());
+            }
+            ["front", "left", "right", "floor"].iter().all(|facet| frames(facet).lines().count() > 3)
+        });
+        // not before: this connection would keep the server from resetting
+        let (server, screen) = x11rb::connect(Some(&desktop.display)).unwrap();
+        assert_eq!(windows(&server, server.setup().roots[screen].root).len(), 4);
+        drop(server);
+        let pid = rustix::process::Pid::from_raw(run.0.id() as i32).unwrap();
+        rustix::process::kill_process(pid, rustix::process::Signal::INT).unwrap();
+        wait("the end", || run.0.try_wait().unwrap().is_some());
+        let wrong = std::fs::read_to_string(&log).unwrap();
+        assert_eq!(run.0.wait().unwrap().code(), Some(0), "{wrong}");
+        assert!(!wrong.contains("draws into memory"), "{wrong}");
+    }
+}
+
+#[test]
+fn a_desktop_that_is_lost_during_the_run_fails_it() {
+    let Some(mut desktop) = Desktop::open() else { return };
+    if tumble::render::Renderer::new().is_err() {
+        return skip("this machine has no graphics adapter");
+    }
+    let folder = Folder::new("cave-lost-desktop");
+    make_runtime(&folder);
+    let cave = cave().replace("position_px", "output = \"window\"\nposition_px");
+    let (scene, cave, out) =
+        (folder.write("scene.toml", SCENE), folder.write("cave.toml", cave), text(&folder.path("out")));
+    let log = folder.path("stderr");
+    let args = ["cave", &scene, "--cave", &cave, "--quality", "fastest", "--log-dir", &out];
+    let mut command = in_place(&folder, &args);
+    command.env("DISPLAY", &desktop.display).stderr(std::fs::File::create(&log).unwrap()).stdout(Stdio::null());
+    let mut run = Running(command.spawn().unwrap());
+    let frames = |facet: &str| std::fs::read_to_string(format!("{out}/{facet}/frames.jsonl")).unwrap_or_default();
+    wait("frames on all facets", || {
+        ["front", "left", "right", "floor"].iter().all(|facet| frames(facet).lines().count() > 3)
+    });
+    desktop.server.0.kill().unwrap();
+    wait("the end", || run.0.try_wait().unwrap().is_some());
+    let wrong = std::fs::read_to_string(&log).unwrap();
+    assert_eq!(run.0.wait().unwrap().code(), Some(1), "{wrong}");
+    assert!(wrong.contains("no facet is left"), "{wrong}");
+}
+
+#[test]
+fn a_facet_that_must_be_a_window_fails_without_one() {
+    let folder = Folder::new("cave-must-be-window");
+    make_runtime(&folder);
+    let cave = cave().replace("position_px", "output = \"window\"\nposition_px");
+    let (scene, cave) = (folder.write("scene.toml", SCENE), folder.write("cave.toml", cave));
+    let args = ["cave", &scene, "--cave", &cave, "--duration", "0.04", "--no-realtime", "--quality", "fastest"];
+    for (display, why) in [(Some(":4711"), "does not answer (DISPLAY=:4711"), (None, "there is no desktop")] {
+        let mut command = in_place(&folder, &args);
+        display.map(|display| command.env("DISPLAY", display));
+        let out = command.output().unwrap();
+        let wrong = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(1), "{wrong}");
+        assert!(wrong.contains("no window: ") && wrong.contains(why), "{wrong}");
+    }
+    // in memory only on request
+    let offscreen = [&args[..], &["--no-pictures"]].concat();
+    assert!(in_place(&folder, &offscreen).output().unwrap().status.success());
+}
+
 #[test]
 fn a_desktop_that_does_not_answer_is_said_and_drawn_for_in_memory() {
     if tumble::render::Renderer::new().is_err() {

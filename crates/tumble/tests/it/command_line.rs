@@ -4,12 +4,13 @@ use crate::common::*;
 use std::collections::BTreeSet;
 use std::process::Command;
 
-const COMMANDS: [&str; 12] = [
+const COMMANDS: [&str; 13] = [
     "run",
     "view",
     "cave",
     "serve",
     "facet",
+    "relay",
     "caves",
     "replay",
     "recover",
@@ -19,7 +20,7 @@ const COMMANDS: [&str; 12] = [
     "completions",
 ];
 /// Commands that end with 130 at a second signal.
-const RUNS: [&str; 4] = ["cave", "serve", "facet", "replay"];
+const RUNS: [&str; 5] = ["cave", "serve", "facet", "relay", "replay"];
 
 /// Long options in a text.
 fn options(text: &str) -> BTreeSet<String> {

@@ -34,6 +34,17 @@ pub fn skip(why: &str) {
 impl Desktop {
     /// Returns `None` if a program is missing, which is printed.
     pub fn open() -> Option<Desktop> {
+        // without -noreset the server restarts when the last window closes, and refuses connections
+        // in that moment
+        Desktop::start(&["-noreset"])
+    }
+
+    /// The same as servers are without further options: it resets when its last client leaves.
+    pub fn that_resets() -> Option<Desktop> {
+        Desktop::start(&[])
+    }
+
+    fn start(more: &[&str]) -> Option<Desktop> {
         let has = |program: &str| {
             std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default())
                 .any(|folder| folder.join(program).is_file())
@@ -45,10 +56,9 @@ impl Desktop {
             return None;
         }
         let mut command = Command::new("Xvfb");
-        // without -noreset the server restarts when the last window closes, and refuses connections
-        // in that moment
         command
-            .args(["-displayfd", "1", "-screen", "0", "1000x700x24", "-nolisten", "tcp", "-noreset"])
+            .args(["-displayfd", "1", "-screen", "0", "1000x700x24", "-nolisten", "tcp"])
+            .args(more)
             .stdout(Stdio::piped())
             .stderr(Stdio::null());
         let mut server = Running(command.spawn().unwrap());

@@ -1,10 +1,11 @@
 //! `frames.jsonl`: one line per shown frame of a facet.
 
-use crate::cave::run_setup::facet_folder;
+use crate::cave::facet_report::Reporter;
+use crate::cave::frames_folder::{LIST, begin, facet_folder, picture_paths};
 use crate::failure::Failure;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions};
-use std::io::Write;
+use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -37,35 +38,48 @@ pub struct FrameLog {
     writer: Option<JoinHandle<Result<(), Failure>>>,
     waiting: Arc<AtomicUsize>,
     pictures: bool,
+    reporter: Reporter,
+}
+
+/// Treatment of the frames of an earlier run in the same folder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Earlier {
+    /// They are an error.
+    Refuse,
+    /// They are removed.
+    Remove,
+    /// They are of this run: the facet was started again.
+    Continue,
 }
 
 impl FrameLog {
-    /// Creates the folder and continues after the lines that this run has written before. Pictures
-    /// of earlier runs are removed.
-    pub fn open(folder: &Path, facet: &str, pictures: bool, anew: bool) -> Result<FrameLog, Failure> {
+    /// Creates the folder. It must have no frames of an earlier run, which `Earlier::Remove`
+    /// removes; `Earlier::Continue` appends to those that this run has written before.
+    pub fn open(
+        folder: &Path,
+        facet: &str,
+        pictures: bool,
+        earlier: Earlier,
+        reporter: Reporter,
+    ) -> Result<FrameLog, Failure> {
         let folder = facet_folder(folder, facet);
         let failed = |e: std::io::Error| Failure::input(format!("{}: cannot be written: {e}", folder.display()));
         std::fs::create_dir_all(&folder).map_err(failed)?;
-        let file = OpenOptions::new().create(true).append(true).open(folder.join("frames.jsonl")).map_err(failed)?;
-        if anew {
-            file.set_len(0).map_err(failed)?;
-            let all = std::fs::read_dir(&folder).map_err(failed)?;
-            let old = |name: &str| {
-                name.strip_prefix("frame_")
-                    .and_then(|n| n.strip_suffix(".png"))
-                    .is_some_and(|n| n.parse::<u64>().is_ok())
-            };
-            for entry in all.flatten().filter(|e| e.file_name().to_str().is_some_and(old)) {
-                std::fs::remove_file(entry.path()).map_err(failed)?;
-            }
+        if earlier != Earlier::Continue {
+            begin(&folder, earlier == Earlier::Remove)?;
         }
+        let (truncate, append) = (earlier == Earlier::Remove, earlier != Earlier::Remove);
+        let mut options = OpenOptions::new();
+        options.create(true).write(true).truncate(truncate).append(append);
+        let file = options.open(folder.join(LIST)).map_err(failed)?;
         let (frames, incoming) = sync_channel(MAX_WAITING + 1);
         let waiting = Arc::new(AtomicUsize::new(0));
-        let left = waiting.clone();
-        let writer =
-            std::thread::Builder::new().name("frames".into()).spawn(move || write_all(&folder, file, &incoming, &left));
+        let (left, reports) = (waiting.clone(), reporter.clone());
+        let writer = std::thread::Builder::new()
+            .name("frames".into())
+            .spawn(move || write_all(&folder, file, &incoming, &left, &reports));
         let writer = writer.map_err(|e| Failure::run("the frames", e))?;
-        Ok(FrameLog { frames: Some(frames), writer: Some(writer), waiting, pictures })
+        Ok(FrameLog { frames: Some(frames), writer: Some(writer), waiting, pictures, reporter })
     }
 
     /// Returns whether another frame may be drawn.
@@ -91,6 +105,7 @@ impl FrameLog {
         let line =
             FrameLine { frame, time_s, state: hex(state), image: hex(hash), shown_unix_us: shown.as_micros() as u64 };
         self.waiting.fetch_add(1, Ordering::AcqRel);
+        self.reporter.update(|report| report.waiting += 1);
         let sent =
             self.frames.as_ref().is_some_and(|frames| frames.send((line, image.filter(|_| self.pictures))).is_ok());
         if sent { Ok(()) } else { self.finish() }
@@ -105,25 +120,39 @@ impl FrameLog {
     }
 }
 
-/// Writes each picture, and then its line.
+/// Writes each picture, and then its line. A picture has its name when it is whole.
 fn write_all(
     folder: &Path,
     mut file: File,
     incoming: &Receiver<(FrameLine, Option<Image>)>,
     waiting: &AtomicUsize,
+    reporter: &Reporter,
 ) -> Result<(), Failure> {
     let wrong = |file: &Path, why: &dyn std::fmt::Display| Failure::run(&format!("writing {}", file.display()), why);
-    let lines = folder.join("frames.jsonl");
+    let lines = folder.join(LIST);
     while let Ok((line, image)) = incoming.recv() {
         if let Some(image) = image {
-            let path = folder.join(format!("frame_{:06}.png", line.frame));
-            image.write_png(&path).map_err(|e| wrong(&path, &e))?;
+            let [path, unfinished] = picture_paths(folder, line.frame);
+            write_picture(&image, &unfinished, reporter)
+                .and_then(|()| std::fs::rename(&unfinished, &path).map_err(|e| e.to_string()))
+                .map_err(|e| {
+                    let _ = std::fs::remove_file(&unfinished); // it may not have been created
+                    wrong(&path, &e)
+                })?;
         }
         let text = serde_json::to_string(&line).map_err(|e| wrong(&lines, &e))? + "\n";
         file.write_all(text.as_bytes()).map_err(|e| wrong(&lines, &e))?;
         waiting.fetch_sub(1, Ordering::AcqRel);
+        reporter.update(|report| (report.written, report.waiting) = (report.written + 1, report.waiting - 1));
     }
     Ok(())
+}
+
+/// Writes a picture and reports its progress, because one picture can take seconds.
+fn write_picture(image: &Image, path: &Path, reporter: &Reporter) -> Result<(), String> {
+    let file = File::create(path).map_err(|e| e.to_string())?;
+    let rows = |rows: u32| reporter.update(|report| report.progress += u64::from(rows));
+    image.encode_png(BufWriter::new(file), rows).map_err(|e| e.to_string())
 }
 
 /// Returns the bytes in hexadecimal.

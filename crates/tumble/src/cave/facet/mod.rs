@@ -5,20 +5,22 @@ mod burn_in;
 mod control;
 mod desktop;
 mod frame_log;
+mod priority;
 mod render_thread;
 mod runner;
 mod window;
 
-use super::address::ServerAddress;
+use super::address::{RunServer, ServerAddress};
 use super::args::FacetOptions;
 use super::endpoints::FacetEndpoint;
+use super::facet_report::Reporter;
 use super::lock;
 use super::run_setup::{Role, RunSetup};
 use super::signals::Signals;
 use crate::failure::Failure;
 use control::{FacetControl, POLL_INTERVAL, watch_parent};
-use desktop::{Desktop, desktop};
-use frame_log::FrameLog;
+use desktop::{Desktop, Probe, desktop};
+use frame_log::{Earlier, FrameLog};
 use render_thread::{RenderThread, slot_name};
 use runner::FacetRunner;
 use std::time::{Duration, Instant};
@@ -31,6 +33,7 @@ use window::WindowSetup;
 pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     let signals = Signals::watch()?;
     let parent_gone = options.parent_watch.then(watch_parent).transpose()?;
+    let reporter = Reporter::start(options.parent_watch)?;
     let scene = options.opening.read(&options.scene)?;
     let setup = RunSetup::load(scene, &options.surroundings, Role::Facet)?;
     let description = options.facet.as_deref().map(|name| setup.cave.facet(name).cloned()).transpose()?;
@@ -40,10 +43,11 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
         as FacetNumber;
     let name = slot_name(description.as_ref()).to_owned();
     let draw = &options.draw;
-    let offscreen = draw.no_pictures
-        || draw.offscreen
-        || description.as_ref().is_some_and(|f| f.output == Output::Offscreen)
-        || lacks_desktop(&name);
+    let in_memory =
+        draw.no_pictures || draw.offscreen || description.as_ref().is_some_and(|f| f.output == Output::Offscreen);
+    let window_required = description.as_ref().is_some_and(|f| f.window_required);
+    let mut desktop = if in_memory { None } else { reach_desktop(&name, window_required)? };
+    let offscreen = desktop.is_none();
     let (mut render_thread, mut window_setup) = (None, None);
     match (draw.no_pictures, offscreen) {
         (true, _) => {}
@@ -61,38 +65,58 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
         connect_timeout: Duration::from_secs_f64(options.connect_timeout),
         sealed: false,
     };
-    let address = address(options, &setup, &control)?;
-    control.sealed = matches!(address, ServerAddress::Udp(_));
+    let server = find_server(options, &setup, &control)?;
+    control.sealed = setup.cave.security.is_some() && matches!(server.address, ServerAddress::Udp(_));
     let again = options.server.is_none() && options.run.is_none();
-    let link = FacetEndpoint::open(&address, number, &setup, again)?;
+    let link = FacetEndpoint::open(&server, number, &setup, again)?;
     let session_options = session_options(&setup, &name)?;
-    let log = match (&draw.frames_dir, &draw.log_dir) {
-        (Some(folder), _) => Some(FrameLog::open(folder, &name, true, !options.parent_watch)?),
-        (None, Some(folder)) => Some(FrameLog::open(folder, &name, false, !options.parent_watch)?),
-        (None, None) => None,
-    };
+    let log = frame_log(options, &name, &reporter)?;
     let facet = Facet::new(link, session_options, setup.world);
-    let mut runner = FacetRunner::new(facet, render_thread, log, draw.burn_in, control);
+    let mut runner = FacetRunner::new(facet, render_thread, log, draw.burn_in, control, reporter.clone());
     let outcome = match window_setup {
-        Some(window_setup) => window_setup.show(&mut runner, draw.burn_in),
+        Some(window_setup) => window_setup.show(&mut runner, draw.burn_in, desktop.take()),
         None => runner.run_offscreen(),
     };
     // in any case, the server need not wait for the timeout
     let _ = runner.facet.leave();
     // a write error is the cause of other errors
-    runner.log.as_mut().map_or(Ok(()), FrameLog::finish).and(outcome)
+    let written = runner.log.as_mut().map_or(Ok(()), FrameLog::finish);
+    reporter.flush();
+    written.and(outcome)
 }
 
-/// Returns whether there is no desktop for a window. Reports one that is named and does not answer.
-fn lacks_desktop(name: &str) -> bool {
-    match desktop() {
-        Desktop::Available => return false,
-        Desktop::Unreachable(why) => {
-            eprintln!("facet {name}: draws into memory, because the desktop does not answer ({why})")
-        }
-        Desktop::None => {}
+/// Opens the facet's folder for frames, if there is one.
+fn frame_log(options: &FacetOptions, name: &str, reporter: &Reporter) -> Result<Option<FrameLog>, Failure> {
+    let draw = &options.draw;
+    let earlier = match (options.continue_frames, draw.overwrite) {
+        (true, _) => Earlier::Continue,
+        (false, true) => Earlier::Remove,
+        (false, false) => Earlier::Refuse,
+    };
+    let open = |folder| FrameLog::open(folder, name, draw.frames_dir.is_some(), earlier, reporter.clone());
+    draw.frames_dir.as_deref().or(draw.log_dir.as_deref()).map(open).transpose()
+}
+
+/// Connects to the desktop. Returns `None` if there is none, so that the facet draws into memory,
+/// and prints why if one is named and does not answer.
+///
+/// # Errors
+/// There is none, and the cave file requires a window.
+fn reach_desktop(name: &str, required: bool) -> Result<Option<Probe>, Failure> {
+    let why = match desktop() {
+        Desktop::Available(probe) => return Ok(Some(probe)),
+        Desktop::Unreachable(why) => Some(format!("the desktop does not answer ({why})")),
+        Desktop::None => None,
+    };
+    if required {
+        let why = why.unwrap_or("there is no desktop (DISPLAY and WAYLAND_DISPLAY are not set)".into());
+        let hint = "the cave file says output = \"window\"; --offscreen draws into memory";
+        return Err(Failure::run(&format!("facet {name}"), format!("no window: {why}; {hint}")));
     }
-    true
+    if let Some(why) = why {
+        eprintln!("facet {name}: draws into memory, because {why}");
+    }
+    Ok(None)
 }
 
 /// Returns the session's options from the cave file.
@@ -107,20 +131,20 @@ fn session_options(setup: &RunSetup, name: &str) -> Result<SessionOptions, Failu
     })
 }
 
-/// Returns the server's address: from the command line, or from the run in progress on this
-/// machine, for which it waits.
-fn address(options: &FacetOptions, setup: &RunSetup, control: &FacetControl) -> Result<ServerAddress, Failure> {
-    if let Some(server) = options.server {
-        return Ok(ServerAddress::Udp(server));
-    }
-    if let Some(run) = &options.run {
-        return Ok(ServerAddress::Memory(run.clone()));
+/// Returns the server: from the command line, or from the run in progress on this machine, for
+/// which it waits. It waits too for the key of a run on this machine if the cave has no key file.
+fn find_server(options: &FacetOptions, setup: &RunSetup, control: &FacetControl) -> Result<RunServer, Failure> {
+    let given = options.server.map(ServerAddress::Udp).or(options.run.clone().map(ServerAddress::Memory));
+    let needs_key = setup.cave.security.is_none() && options.server.is_some_and(|at| at.ip().is_loopback());
+    if let Some(address) = given.clone().filter(|_| !needs_key) {
+        return Ok(RunServer { address, key: None });
     }
     let until = Instant::now() + control.connect_timeout;
     let mut said = false;
     loop {
-        if let Some(address) = lock::find_run(&setup.place)? {
-            return Ok(address);
+        let found = lock::find_run(&setup.place)?;
+        if let Some(server) = found.filter(|server| given.as_ref().is_none_or(|given| *given == server.address)) {
+            return Ok(server);
         }
         if control.should_stop() {
             return Err(Failure::run(&control.title(), "ended while it waited for a run"));
@@ -128,10 +152,11 @@ fn address(options: &FacetOptions, setup: &RunSetup, control: &FacetControl) -> 
         if Instant::now() > until {
             let far = setup.cave.nodes.iter().any(|n| !n.is_local());
             let hint = if far { "; for a run on another machine use --server ADDR:PORT" } else { "" };
+            let at = options.server.map_or(String::new(), |at| format!(" at {at} by this user"));
             return Err(Failure::run(
                 &control.title(),
                 format!(
-                    "no run was in progress in {} on this machine for {:.0} s{hint}",
+                    "no run was in progress in {} on this machine{at} for {:.0} s{hint}",
                     setup.cave.file, options.connect_timeout
                 ),
             ));

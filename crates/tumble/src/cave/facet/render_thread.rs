@@ -30,6 +30,7 @@ pub struct RenderThread {
     overlays: DebugDraw,
     requests: SyncSender<RenderRequest>,
     pictures: Receiver<Result<Image, RenderError>>,
+    software: bool,
 }
 
 impl RenderThread {
@@ -54,17 +55,25 @@ impl RenderThread {
                         return;
                     }
                 };
-                let _ = ready.send(Ok(()));
+                let _ = ready.send(Ok(renderer.is_software()));
                 render_all(view, facet, &mut renderer, &incoming, &done);
             })
             .map_err(|e| Failure::run("drawing", e))?;
-        started.recv().map_err(|e| Failure::run("drawing", e))?.map_err(|e| Failure::run("drawing", e))?;
+        let software =
+            started.recv().map_err(|e| Failure::run("drawing", e))?.map_err(|e| Failure::run("drawing", e))?;
+        // as in windows: a software driver is slow
+        let quality = quality.or(software.then(Quality::fast));
         let mut render_thread =
-            RenderThread { drawing: Drawing::new(&setup.scene), quality, overlays, requests, pictures };
+            RenderThread { drawing: Drawing::new(&setup.scene), quality, overlays, requests, pictures, software };
         // the first picture takes seconds to compile pipelines, and nothing waits for it yet
         render_thread.begin(&setup.world, &setup.viewer()?, None)?;
         while render_thread.finished(Duration::from_secs(1))?.is_none() {}
         Ok(render_thread)
+    }
+
+    /// Returns whether a software driver draws.
+    pub fn is_software(&self) -> bool {
+        self.software
     }
 
     /// Starts a picture of the world, with the frame number in it if `burn_in` is given.

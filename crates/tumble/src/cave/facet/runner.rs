@@ -2,8 +2,10 @@
 
 use super::control::{FacetControl, POLL_INTERVAL, ServerWait};
 use super::frame_log::FrameLog;
+use super::priority;
 use super::render_thread::{RenderThread, image_hash};
 use crate::cave::endpoints::FacetEndpoint;
+use crate::cave::facet_report::Reporter;
 use crate::failure::Failure;
 use std::time::Duration;
 use tumble::net::sync::{EndReason, Facet, SessionError, Task};
@@ -19,6 +21,7 @@ pub struct FacetRunner {
     pub log: Option<FrameLog>,
     burn_in: bool,
     control: FacetControl,
+    reporter: Reporter,
     server_wait: ServerWait,
     /// The frame being drawn, and its simulated time.
     drawing: Option<(u64, f64)>,
@@ -46,9 +49,20 @@ impl FacetRunner {
         log: Option<FrameLog>,
         burn_in: bool,
         control: FacetControl,
+        reporter: Reporter,
     ) -> FacetRunner {
         let server_wait = ServerWait::default();
-        FacetRunner { facet, render_thread, log, burn_in, control, server_wait, drawing: None, picture: None }
+        FacetRunner { facet, render_thread, log, burn_in, control, reporter, server_wait, drawing: None, picture: None }
+    }
+
+    /// Reports that the facet is ready to join. With a software driver it has begun to draw by now,
+    /// and the driver's threads exist.
+    pub fn prepared(&self, software: bool) {
+        if software && let Err(why) = priority::lower_drawing_threads() {
+            self.control.say(&format!("draws with real-time priority, which delays the sessions: {why}"));
+        }
+        self.reporter.update(|report| report.preparing = false);
+        self.reporter.flush();
     }
 
     /// Waits at most `timeout` for the next task. Returns `None` when the facet must end.
@@ -83,6 +97,7 @@ impl FacetRunner {
 
     /// Draws into memory, or nothing, until the end.
     pub fn run_offscreen(&mut self) -> Result<(), Failure> {
+        self.prepared(self.render_thread.as_ref().is_some_and(RenderThread::is_software));
         while let Some(task) = self.next(if self.drawing.is_some() { Duration::ZERO } else { POLL_INTERVAL })? {
             match task {
                 // a started picture is finished first, even if no frame waits for it any more

@@ -1,9 +1,10 @@
 //! A facet in a window of its own. Keys and mouse are sent to the server as a user's input.
 //!
-//! W A S D, Q E and the arrow keys move the cave. R and F stretch out the left and the right hand
+//! W A S D, Q E and the arrow keys move the cave. V and B stretch out the left and the right hand
 //! (`--user-colliders`). The left mouse button pulls a body. Escape ends the facet.
 
 use super::burn_in;
+use super::desktop::Probe;
 use super::render_thread::{PREVIEW_PX, draw_list, slot_name};
 use super::runner::{FacetRunner, failed};
 use crate::cave::run_setup::{RunSetup, apply_viewer};
@@ -61,7 +62,8 @@ impl WindowSetup {
     }
 
     /// Opens the window and runs the facet until the run ends or the window is closed.
-    pub fn show(self, runner: &mut FacetRunner, burn_in: bool) -> Result<(), Failure> {
+    /// `probe` is a connection to the desktop, which ends when the window is open.
+    pub fn show(self, runner: &mut FacetRunner, burn_in: bool, probe: Option<Probe>) -> Result<(), Failure> {
         let options = self.options.clone();
         let mut window = Window {
             window_setup: self,
@@ -75,6 +77,7 @@ impl WindowSetup {
             sequence: 0,
             warned: None,
             ended: false,
+            probe,
         };
         run_window(&options, &mut window)
     }
@@ -96,6 +99,8 @@ struct Window<'a> {
     /// Number of seconds without a server in the last warning.
     warned: Option<u64>,
     ended: bool,
+    /// Keeps the desktop from resetting until the window is open.
+    probe: Option<Probe>,
 }
 
 impl Window<'_> {
@@ -196,7 +201,10 @@ impl WindowApp for Window<'_> {
             draw_list(drawing, self.runner.facet.world(), quality.as_ref(), overlays)?
         };
         self.window_setup.view_mode.draw(screen, &self.list)?;
-        Ok(screen.renderer().wait()?)
+        screen.renderer().wait()?;
+        self.probe = None;
+        self.runner.prepared(screen.is_software());
+        Ok(())
     }
 
     fn event(&mut self, _: &mut Screen, event: &WindowEvent) -> Result<(), Failure> {
@@ -241,12 +249,12 @@ impl WindowApp for Window<'_> {
 fn usage(code: KeyCode) -> Option<u16> {
     Some(match code {
         KeyCode::KeyA => 0x04,
+        KeyCode::KeyB => 0x05,
         KeyCode::KeyD => 0x07,
         KeyCode::KeyE | KeyCode::PageUp => 0x08,
-        KeyCode::KeyF => 0x09,
         KeyCode::KeyQ | KeyCode::PageDown => 0x14,
-        KeyCode::KeyR => 0x15,
         KeyCode::KeyS => 0x16,
+        KeyCode::KeyV => 0x19,
         KeyCode::KeyW => 0x1A,
         KeyCode::ArrowRight => 0x4F,
         KeyCode::ArrowLeft => 0x50,

@@ -1,9 +1,10 @@
 //! The processes of a run's facets. Those of this machine, and of nodes with a launch command, are
 //! started, monitored and ended. For all others the command line is printed.
 
-use crate::cave::address::{ServerAddress, address_towards};
-use crate::cave::args::{CaveOptions, ServeOptions, TransportKind};
-use crate::cave::run_setup::PREVIEW;
+use super::facet_commands::{address_for, facet_args, launch, scene_args, shell_quoted, slots};
+use crate::cave::address::ServerAddress;
+use crate::cave::args::{CaveOptions, ServeOptions};
+use crate::cave::facet_report::{Received, ReportReader};
 use crate::cave::signals::Signals;
 use crate::failure::Failure;
 use std::collections::VecDeque;
@@ -11,15 +12,24 @@ use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
-use tumble::net::sync::FacetSlot;
 use tumble::net::sync::transport::FacetNumber;
-use tumble::scene::cave::{Cave, Node};
+use tumble::scene::cave::Cave;
 
 /// Time for facets to end by themselves after END, to write their last pictures. Together with the
 /// next it is well below the shutdown timeout of signals.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(3);
-/// The same after their pipe was closed, and for facets that were still starting.
+/// Time without progress after which a facet that writes frames is no longer waited for. Below the
+/// shutdown timeout of signals.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(8);
+/// Time for the last report of a process that has ended.
+const LAST_REPORT_TIMEOUT: Duration = Duration::from_millis(50);
+/// The same as the exit timeout after their pipe was closed, and for facets that were still
+/// starting.
 const FINAL_EXIT_TIMEOUT: Duration = Duration::from_secs(1);
+/// Time without a report after which a facet no longer counts as preparing.
+const REPORT_TIMEOUT: Duration = Duration::from_secs(10);
+/// Exit codes of a facet that failed by itself: the command's own, and that of a panic.
+const OWN_FAILURES: [i32; 3] = [1, 2, 101];
 /// Maximum number of restarts of a facet within the window.
 const MAX_RESTARTS: usize = 5;
 const RESTART_WINDOW: Duration = Duration::from_secs(60);
@@ -38,14 +48,23 @@ pub struct FacetProcesses {
 struct FacetProcess {
     slot: FacetNumber,
     name: String,
-    /// Program and arguments.
+    /// Program and arguments of the first start.
     command: Vec<OsString>,
+    /// The same of further starts.
+    command_again: Vec<OsString>,
     child: Option<Child>,
+    /// Start of the process.
+    began: Option<Instant>,
+    reports: Option<ReportReader>,
+    /// Frames written by earlier processes of this facet.
+    written_before: u64,
     ended: Option<Instant>,
     /// Ended for good: closed by the user, or failed too often.
     over: bool,
     /// Whether its last end was a failure.
     failed: bool,
+    /// Whether it failed too often to be started again.
+    given_up: bool,
     /// Description of its last end if that was an exit code of its own failure. Codes by which
     /// shells and ssh report a killed process do not count.
     fault: Option<String>,
@@ -69,14 +88,6 @@ pub enum ProcessStatus {
     AllLeft,
     /// All have ended, at least one by a failure.
     AllFailed,
-}
-
-/// Returns the facet slots of a run: all facets, or the preview alone.
-pub fn slots(cave: &Cave, preview: bool) -> Vec<FacetSlot> {
-    if preview {
-        return vec![FacetSlot { name: PREVIEW.into(), critical: true }];
-    }
-    cave.facets.iter().map(|f| FacetSlot { name: f.name.clone(), critical: f.critical }).collect()
 }
 
 impl FacetProcesses {
@@ -108,30 +119,23 @@ impl FacetProcesses {
                 }
                 (Some(launcher), None) => {
                     let program = std::env::current_exe().map_err(|e| Failure::run("starting a facet", e))?;
-                    let words = parent_watch(launcher, &slot.name, address).into_iter().map(OsString::from);
-                    processes.processes.push(FacetProcess::new(
-                        k,
-                        &slot.name,
-                        std::iter::once(program.into_os_string()).chain(words).collect(),
-                    ));
+                    let command = |again| {
+                        let words = facet_args(launcher, &slot.name, address, again).into_iter().map(OsString::from);
+                        std::iter::once(program.clone().into_os_string()).chain(words).collect()
+                    };
+                    processes.processes.push(FacetProcess::new(k, &slot.name, command));
                 }
                 (Some(launcher), Some(node)) if !node.launch.is_empty() => {
-                    let words = launch(
-                        node,
-                        &slot.name,
-                        &parent_watch(launcher, &slot.name, server_address.as_ref().unwrap_or(address)),
-                    );
+                    let server = server_address.as_ref().unwrap_or(address);
+                    let words = |again| launch(node, &slot.name, &facet_args(launcher, &slot.name, server, again));
                     processes.report(&format!(
                         "facet {}: starting it on {}: {}",
                         slot.name,
                         node.name,
-                        words.iter().map(|w| shell_quoted(w)).collect::<Vec<_>>().join(" ")
+                        words(false).iter().map(|w| shell_quoted(w)).collect::<Vec<_>>().join(" ")
                     ));
-                    processes.processes.push(FacetProcess::new(
-                        k,
-                        &slot.name,
-                        words.into_iter().map(OsString::from).collect(),
-                    ));
+                    let command = |again| words(again).into_iter().map(OsString::from).collect();
+                    processes.processes.push(FacetProcess::new(k, &slot.name, command));
                 }
                 (_, node) => {
                     let server = match (&server_address, address) {
@@ -189,7 +193,7 @@ impl FacetProcesses {
                 && !process.over;
             if due {
                 if process.restarts.len() >= MAX_RESTARTS {
-                    process.over = true;
+                    (process.over, process.given_up) = (true, true);
                     let text = format!(
                         "facet {} ended {MAX_RESTARTS} times within a minute and is not started again",
                         process.name
@@ -214,23 +218,35 @@ impl FacetProcesses {
         Ok(ProcessReport { processes, ended })
     }
 
-    /// Waits for the facets after END, and kills those that do not end. `started`: they had joined
-    /// and can have received END.
+    /// Returns the names of the facets that prepare to join: those that report it, and those that
+    /// were started a moment ago and have not reported yet.
+    pub fn preparing(&self) -> Vec<&str> {
+        self.processes.iter().filter(|process| process.is_preparing()).map(|process| process.name.as_str()).collect()
+    }
+
+    /// Waits for the facets after END, and kills those that do not end. A facet that writes frames
+    /// is waited for as long as it makes progress. `started`: they had joined and can have received
+    /// END.
     ///
     /// # Errors
-    /// A facet ended by a failure of its own and was not restarted.
+    /// A facet ended by a failure of its own and was not restarted, failed too often, or was killed
+    /// before it had written all frames that it had shown.
     pub fn end(&mut self, started: bool) -> Result<(), Failure> {
         self.wait(if started { EXIT_TIMEOUT } else { FINAL_EXIT_TIMEOUT / 2 });
-        let faults: Vec<String> =
-            self.processes.iter().filter_map(|m| Some(format!("{} ({})", m.name, m.fault.as_ref()?))).collect();
+        let mut faults: Vec<String> =
+            self.processes.iter().filter_map(|m| Some(format!("{} ({})", m.name, m.fault()?))).collect();
         // a facet that missed END finds its pipe closed
         self.processes.iter_mut().filter_map(|m| m.child.as_mut()).for_each(|child| drop(child.stdin.take()));
         self.wait(FINAL_EXIT_TIMEOUT);
         // all are killed before any is waited for: graphics drivers take time to release a process
         for process in &mut self.processes {
+            let waiting = process.received().report.waiting;
             let Some(child) = &mut process.child else { continue };
             if let Ok(None) = child.try_wait() {
                 eprintln!("facet {}: does not end and was killed", process.name);
+                if waiting > 0 {
+                    faults.push(format!("{} ({waiting} shown frames are not written)", process.name));
+                }
             }
             let _ = child.kill();
         }
@@ -247,27 +263,48 @@ impl FacetProcesses {
         }
     }
 
-    /// Waits at most `max` until all have ended.
+    /// Waits at most `most` until all have ended, and longer for those that write.
     fn wait(&mut self, most: Duration) {
         let until = Instant::now() + most;
-        while Instant::now() < until {
+        loop {
             self.processes.iter_mut().for_each(|m| _ = m.poll_exit(&self.signals));
-            if self.processes.iter().all(|m| m.child.is_none()) {
+            let writing = self.processes.iter().any(FacetProcess::is_writing);
+            if self.processes.iter().all(|m| m.child.is_none()) || Instant::now() >= until && !writing {
                 return;
+            }
+            if writing {
+                self.signals.postpone();
             }
             std::thread::sleep(Duration::from_millis(10));
         }
     }
 
+    /// Returns by slot how many frames have been written; `None` for a facet that this process did
+    /// not start.
+    pub fn written(&self, slots: usize) -> Vec<Option<u64>> {
+        let mut written = vec![None; slots];
+        for process in &self.processes {
+            if let Some(entry) = written.get_mut(process.slot as usize) {
+                *entry = Some(process.written());
+            }
+        }
+        written
+    }
+
     fn spawn(&mut self, k: usize) -> Result<(), Failure> {
         let process = &mut self.processes[k];
+        let words = if process.restarts.is_empty() { &process.command } else { &process.command_again };
         // never empty: the program is this one, or the first word of a launch command
-        let mut command = Command::new(&process.command[0]);
+        let mut command = Command::new(&words[0]);
         // a group of its own, because Ctrl-C is for the launcher, which ends the run in order
-        command.args(&process.command[1..]).stdin(Stdio::piped()).stdout(Stdio::null()).process_group(0);
-        let child = command.spawn().map_err(|e| Failure::run(&format!("starting facet {}", process.name), e))?;
+        command.args(&words[1..]).stdin(Stdio::piped()).stdout(Stdio::piped()).process_group(0);
+        let failed = |e: std::io::Error| Failure::run(&format!("starting facet {}", process.name), e);
+        let mut child = command.spawn().map_err(failed)?;
         self.signals.started(child.id());
-        (process.child, process.ended, process.fault) = (Some(child), None, None);
+        let reports = child.stdout.take().map(ReportReader::start).transpose();
+        process.written_before = process.written();
+        (process.child, process.began, process.ended, process.fault) = (Some(child), Some(Instant::now()), None, None);
+        process.reports = reports.map_err(|e| Failure::run(&format!("starting facet {}", process.name), e))?;
         Ok(())
     }
 
@@ -289,18 +326,52 @@ impl Drop for FacetProcesses {
 }
 
 impl FacetProcess {
-    fn new(slot: usize, name: &str, command: Vec<OsString>) -> FacetProcess {
+    /// Creates a facet without a process. `command` returns the command of the first start, or of
+    /// further ones.
+    fn new(slot: usize, name: &str, command: impl Fn(bool) -> Vec<OsString>) -> FacetProcess {
         FacetProcess {
             slot: slot as FacetNumber,
             name: name.to_owned(),
-            command,
+            command: command(false),
+            command_again: command(true),
             child: None,
+            began: None,
+            reports: None,
+            written_before: 0,
             ended: None,
             over: false,
             failed: false,
+            given_up: false,
             fault: None,
             restarts: VecDeque::new(),
         }
+    }
+
+    fn received(&self) -> Received {
+        self.reports.as_ref().map_or_else(Received::default, ReportReader::received)
+    }
+
+    /// Returns the number of frames written by all processes of this facet.
+    fn written(&self) -> u64 {
+        self.written_before + self.received().report.written
+    }
+
+    fn is_preparing(&self) -> bool {
+        let Received { report, heard, .. } = self.received();
+        let recent = heard.or(self.began).is_some_and(|at| at.elapsed() < REPORT_TIMEOUT);
+        self.child.is_some() && recent && (heard.is_none() || report.preparing)
+    }
+
+    /// Returns whether the process still writes frames and makes progress.
+    fn is_writing(&self) -> bool {
+        let Received { report, proceeded, .. } = self.received();
+        self.child.is_some() && report.waiting > 0 && proceeded.is_some_and(|at| at.elapsed() < WRITE_TIMEOUT)
+    }
+
+    /// Returns why the run fails by this facet, if it does.
+    fn fault(&self) -> Option<String> {
+        let given_up = || self.given_up.then(|| format!("given up after {MAX_RESTARTS} restarts within a minute"));
+        self.fault.clone().or_else(given_up)
     }
 
     /// Returns how the process ended, if it did since the last poll.
@@ -309,97 +380,11 @@ impl FacetProcess {
         let status = child.try_wait().ok().flatten()?;
         signals.ended(child.id());
         self.child = None;
+        // only another holder of the pipe can make this wait
+        self.reports.iter().for_each(|reports| reports.wait_for_end(LAST_REPORT_TIMEOUT));
         self.failed = !status.success();
-        self.fault = status.code().filter(|code| matches!(code, 1 | 2)).map(|_| describe_exit(status));
+        self.fault = status.code().filter(|code| OWN_FAILURES.contains(code)).map(|_| describe_exit(status));
         Some(status)
-    }
-}
-
-/// Returns the server's address as a node reaches it; `None` if there is no route to the node.
-fn address_for(node: &Node, address: &ServerAddress) -> Option<ServerAddress> {
-    match *address {
-        ServerAddress::Udp(at) if at.ip().is_unspecified() => {
-            address_towards(&node.address, at.port()).map(|ip| ServerAddress::Udp((ip, at.port()).into()))
-        }
-        _ => Some(address.clone()),
-    }
-}
-
-/// Returns the launch command of a node with all placeholders filled in. Its stdin is a pipe that
-/// ends with the launcher, and the facet ends with the pipe.
-fn launch(node: &Node, facet: &str, arguments: &[String]) -> Vec<String> {
-    let line = arguments.iter().map(|a| shell_quoted(a)).collect::<Vec<_>>().join(" ");
-    let fill = |word: &String| match word.as_str() {
-        "{arguments}" => arguments.to_vec(),
-        _ => vec![
-            word.replace("{address}", &node.address)
-                .replace("{node}", &node.name)
-                .replace("{facet}", facet)
-                .replace("{line}", &line),
-        ],
-    };
-    node.launch.iter().flat_map(fill).collect()
-}
-
-/// Returns the arguments of a facet's process.
-fn parent_watch(launcher: &CaveOptions, name: &str, address: &ServerAddress) -> Vec<String> {
-    let mut args = vec!["facet".to_owned()];
-    args.extend(scene_args(&launcher.serve));
-    if name == PREVIEW && launcher.preview {
-        args.push("--preview".into())
-    } else {
-        args.extend(["--facet".into(), name.to_owned()])
-    }
-    args.extend(match address {
-        ServerAddress::Memory(run) => ["--run".into(), run.clone()],
-        ServerAddress::Udp(server) => ["--server".into(), local(*server).to_string()],
-    });
-    let draw = &launcher.draw;
-    let folder = |option: &str, path: &Option<std::path::PathBuf>| {
-        path.iter().flat_map(|p| [option.to_owned(), p.display().to_string()]).collect::<Vec<_>>()
-    };
-    args.extend(folder("--frames-dir", &draw.frames_dir));
-    args.extend(folder("--log-dir", &draw.log_dir));
-    args.extend(draw.quality.iter().flat_map(|q| ["--quality".to_owned(), q.to_string()]));
-    args.extend(
-        Some(draw.debug_draw.to_string())
-            .filter(|w| !w.is_empty())
-            .iter()
-            .flat_map(|w| ["--debug-draw".to_owned(), w.clone()]),
-    );
-    let switches = [("--burn-in", draw.burn_in), ("--offscreen", draw.offscreen), ("--no-pictures", draw.no_pictures)];
-    args.extend(switches.iter().filter(|(_, on)| *on).map(|(name, _)| (*name).to_owned()));
-    // the launcher times out before its facets
-    let wait = launcher.serve.connect_timeout.map_or("600".to_owned(), |s| (s + 10.0).to_string());
-    args.extend(["--connect-timeout".into(), wait, "--parent-watch".into()]);
-    args
-}
-
-fn scene_args(serve: &ServeOptions) -> Vec<String> {
-    let surroundings = &serve.surroundings;
-    let mut args = vec![serve.scene.name.clone()];
-    args.extend(serve.scene.opening.to_args());
-    args.extend(["--cave".into(), surroundings.cave.clone()]);
-    args.extend(surroundings.environment.iter().flat_map(|e| ["--environment".into(), e.clone()]));
-    args
-}
-
-/// Returns an address on which this machine listens, as this machine reaches it.
-fn local(at: std::net::SocketAddr) -> std::net::SocketAddr {
-    match at.ip().is_unspecified() {
-        true if at.is_ipv4() => (std::net::Ipv4Addr::LOCALHOST, at.port()).into(),
-        true => (std::net::Ipv6Addr::LOCALHOST, at.port()).into(),
-        false => at,
-    }
-}
-
-/// Quotes a word for a shell.
-fn shell_quoted(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "_-./=:".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', "'\\''"))
     }
 }
 
@@ -410,14 +395,4 @@ fn describe_exit(status: ExitStatus) -> String {
         (None, Some(signal)) => format!("killed by signal {signal}"),
         _ => "of unknown cause".into(),
     }
-}
-
-/// Returns the transport: from the command line, else from the cave.
-pub fn transport_kind(serve: &ServeOptions, cave: &Cave) -> TransportKind {
-    let of_cave = if cave.sync.transport == tumble::scene::cave::Transport::Udp {
-        TransportKind::Udp
-    } else {
-        TransportKind::SharedMemory
-    };
-    serve.transport.unwrap_or(of_cave)
 }

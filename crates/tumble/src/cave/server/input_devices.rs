@@ -2,6 +2,7 @@
 //! all live input.
 
 use crate::cave::args::ServeOptions;
+use crate::cave::endpoints::key;
 use crate::cave::replay::replayed_input::{self, ReplayedInput};
 use crate::cave::tracker::osc;
 use crate::cave::tracker::socket::{TrackerSocket, configured};
@@ -27,10 +28,11 @@ impl InputDevices {
         scene: [u8; 32],
         simulating: bool,
     ) -> Result<InputDevices, Failure> {
+        let key = key(cave)?;
         let replayed_input = options.replay_input.as_ref().map(|path| ReplayedInput::open(path, scene)).transpose()?;
         let wanted = configured(cave, options.tracker, &options.tracker_from)?
             .filter(|_| replayed_input.is_none() && simulating);
-        let tracker = wanted.as_ref().map(TrackerSocket::open).transpose()?;
+        let tracker = wanted.as_ref().map(|tracker| TrackerSocket::open(tracker, key.as_ref())).transpose()?;
         if let (Some(socket), Some(tracker), false) = (&tracker, &wanted, options.quiet) {
             eprintln!("{}", socket.describe(tracker));
         }

@@ -1,11 +1,14 @@
 //! The server's process of a run: it simulates the scene, publishes frames, starts the facets'
 //! processes and writes the recording and the summary.
 
+mod ending;
+mod facet_commands;
 mod facet_processes;
 mod histogram;
 mod input_devices;
 mod live_viewers;
 mod outputs;
+mod recording;
 mod serve;
 mod summary;
 mod user_colliders;

@@ -1,37 +1,41 @@
 //! The server's process: simulates, publishes, keeps real time, and serves facets, recording and
 //! users.
 
-use super::facet_processes::{FacetProcesses, ProcessStatus, slots, transport_kind};
+use super::facet_commands::{slots, transport_kind};
+use super::facet_processes::{FacetProcesses, ProcessStatus};
 use super::input_devices::InputDevices;
 use super::live_viewers::LiveViewers;
-use super::outputs::{self, Recording};
-use super::summary::{Metrics, Status, Summary, refused, unknown_peers_line};
-use super::users::Users;
-use crate::atomic_file::write_file;
-use crate::cave::address::ServerAddress;
+use super::outputs;
+use super::recording::{RunRecorder, Target};
+use super::summary::{Metrics, Status};
+use super::users::{PACE_SOURCE, Users};
+use crate::cave::address::{RunKey, ServerAddress};
 use crate::cave::args::{CaveOptions, ServeOptions, TransportKind};
 use crate::cave::endpoints::{ServerEndpoint, idle_timeout, key, timing};
 use crate::cave::lock::{RunInfo, RunLock};
 use crate::cave::replay::frames::Replay;
 use crate::cave::run_setup::{Role, RunSetup};
 use crate::cave::signals::Signals;
+use crate::divergence;
 use crate::failure::Failure;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use tumble::dynamics::World;
-use tumble::net::record::RecorderOptions;
 use tumble::net::sync::cpu_latency::CpuLatencyRequest;
 use tumble::net::sync::shm::{ShmServer, clean_up};
 use tumble::net::sync::transport::FacetNumber;
 use tumble::net::sync::udp::{Entropy, UdpServer};
-use tumble::net::sync::{
-    FacetSlot, Input, MAX_CONTACTS, Server, ServerEvent, ServerOptions, SessionError, SessionRecorder, SyncMode,
-};
+use tumble::net::sync::{FacetSlot, Input, MAX_CONTACTS, Server, ServerEvent, ServerOptions, SessionError, SyncMode};
 use tumble::scene::cave::{Cave, Mode};
 
 /// Interval at which signals and processes are polled.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
+
+/// Maximum time for facets to compile their pipelines and draw one picture.
+const PREPARATION_TIMEOUT: Duration = Duration::from_secs(300);
+/// Time after which a start is reported as slow.
+const SLOW_START: Duration = Duration::from_secs(5);
 
 /// Runs a scene in a cave, or replays a recording of one. With a launcher's options it also runs
 /// the facets of this machine.
@@ -40,10 +44,11 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
     let setup = RunSetup::load(options.scene.load()?, &options.surroundings, Role::Server)?;
     let say = |what: &str| (!options.quiet).then(|| eprintln!("{what}"));
     setup.notes.iter().for_each(|note| _ = say(note));
-    outputs::check(options, &setup.cave)?;
+    outputs::check(options, launcher, &setup.cave, recording.is_some())?;
     let replay = recording.map(|path| Replay::open(path, setup.hash)).transpose()?;
     let key = key(&setup.cave)?;
-    let number = Entropy::system().map_err(|e| Failure::run("the run", e))?.next_u64();
+    let mut entropy = Entropy::system().map_err(|e| Failure::run("the run", e))?;
+    let number = entropy.next_u64();
     let name = format!("{number:016x}");
     if signals.stop_requested() {
         return Ok(());
@@ -60,10 +65,14 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
             (ServerEndpoint::Shm(Box::new(server)), ServerAddress::Memory(name))
         }
         TransportKind::Udp => {
-            let server =
-                UdpServer::bind(listen(options, &setup.cave), count, key, timing(&setup.cave)).map_err(failed)?;
+            let at = listen(options, &setup.cave);
+            // without a key file the run has a key of its own, by which this user's processes join
+            run.key = (key.is_none() && at.ip().is_loopback()).then(|| RunKey::new(entropy.next_bytes()));
+            let by = if run.key.is_some() { "a key of this run, for this user alone" } else { "the key file" };
+            let key = key.or(run.key.as_ref().map(RunKey::shared));
+            let server = UdpServer::bind(at, count, key, timing(&setup.cave)).map_err(failed)?;
             let address = ServerAddress::Udp(server.address().map_err(failed)?);
-            say(&format!("server: {}", server.describe()));
+            say(&format!("server: {} by {by}", server.describe()));
             (ServerEndpoint::Udp(Box::new(server)), address)
         }
     };
@@ -76,7 +85,7 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
     let _awake = options
         .stay_awake
         .then(|| CpuLatencyRequest::ask().inspect_err(|why| _ = say(&format!("the cores may fall asleep: {why}"))));
-    let outcome = RunLoop::new(options, setup, server, slots, &signals, replay).and_then(|mut run_loop| {
+    let outcome = RunLoop::new(options, launcher, setup, server, slots, &signals, replay).and_then(|mut run_loop| {
         let outcome = run_loop.run_frames(&mut processes);
         let ended = run_loop.end(&mut processes);
         outcome.and(ended)
@@ -116,33 +125,38 @@ fn session_options(options: &ServeOptions, setup: &RunSetup, run: u64, slots: &[
     }
 }
 
-struct RunLoop<'a> {
-    options: &'a ServeOptions,
+/// A run in progress. [`ending`](super::ending) has its end.
+pub(super) struct RunLoop<'a> {
+    pub options: &'a ServeOptions,
+    /// Options of the launcher, if this process starts the facets.
+    pub launcher: Option<&'a CaveOptions>,
     signals: &'a Signals,
-    server: Server<ServerEndpoint>,
+    pub server: Server<ServerEndpoint>,
     world: World,
-    users: Users,
-    input_devices: InputDevices,
+    pub users: Users,
+    pub input_devices: InputDevices,
     live_viewers: LiveViewers,
-    recorder: Option<(SessionRecorder, Recording)>,
-    recorded: bool,
-    cave: Cave,
-    scene: String,
+    pub recorder: RunRecorder,
+    pub cave: Cave,
+    pub scene: String,
     duration: Option<f64>,
-    slots: Vec<FacetSlot>,
-    metrics: Metrics,
+    pub slots: Vec<FacetSlot>,
+    pub metrics: Metrics,
     status: Status,
     /// The recording to replay instead of simulating.
-    replay: Option<Replay>,
-    time_s: f64,
-    began: Instant,
-    behind_s: f64,
-    frames: u64,
+    pub replay: Option<Replay>,
+    pub time_s: f64,
+    pub began: Instant,
+    /// Begin of the last frame's simulation.
+    frame_began: Option<Instant>,
+    pub behind_s: f64,
+    pub frames: u64,
 }
 
 impl<'a> RunLoop<'a> {
     fn new(
         options: &'a ServeOptions,
+        launcher: Option<&'a CaveOptions>,
         setup: RunSetup,
         server: Server<ServerEndpoint>,
         slots: Vec<FacetSlot>,
@@ -154,32 +168,18 @@ impl<'a> RunLoop<'a> {
         let users = Users::new(viewer, &cave, &mut world, options.user_colliders)?;
         let input_devices = InputDevices::open(options, &cave, hash, replay.is_none())?;
         let live_viewers = LiveViewers::open(options)?;
-        let from_cave = cave.recording.as_ref().filter(|_| replay.is_none()).map(|r| (r.file.clone(), r.every_frames));
-        let recorder = options.record.clone().map(|file| (file, 1)).or(from_cave).map(|(file, every)| {
-            let recording = Recording::new(file)?;
-            if !recording.has_begun() {
-                signals.remove_at_the_end(recording.begins_at().to_owned());
-            }
-            let recorder = SessionRecorder::create(
-                recording.begins_at(),
-                &scene.file,
-                hash,
-                &world,
-                every,
-                RecorderOptions::default(),
-            );
-            recorder.map(|r| (r, recording)).map_err(|e| Failure::run("recording", e))
-        });
+        let target = Target::of(options, cave.recording.as_ref(), replay.is_some());
+        let recorder = RunRecorder::open(target.as_ref(), &scene.file, hash, &world, signals)?;
         Ok(RunLoop {
             options,
+            launcher,
             signals,
             server,
             world,
             users,
             input_devices,
             live_viewers,
-            recorder: recorder.transpose()?,
-            recorded: false,
+            recorder,
             cave,
             scene: scene.file,
             duration: options.duration,
@@ -189,6 +189,7 @@ impl<'a> RunLoop<'a> {
             replay,
             time_s: 0.0,
             began: Instant::now(),
+            frame_began: None,
             behind_s: 0.0,
             frames: 0,
         })
@@ -199,9 +200,7 @@ impl<'a> RunLoop<'a> {
         if !self.wait_for_facets(processes)? {
             return Ok(());
         }
-        if let Some((_, recording)) = &mut self.recorder {
-            recording.begin()?;
-        }
+        self.recorder.begin()?;
         let step_s = self.world.settings().dt;
         let steps = ((1.0 / (self.options.fps * step_s) + 1e-9).floor() as u32).max(1);
         let dt = self.frame_length(step_s * f64::from(steps));
@@ -230,21 +229,37 @@ impl<'a> RunLoop<'a> {
     /// Waits for the critical facets. Returns `false` if the end was requested meanwhile.
     fn wait_for_facets(&mut self, processes: &mut FacetProcesses) -> Result<bool, Failure> {
         let wait = connect_timeout(self.options, &self.cave);
-        let until = self.server.now() + wait;
+        let (mut until, at_most) = (self.server.now() + wait, self.server.now() + wait + PREPARATION_TIMEOUT);
+        let mut said = false;
         while !self.server.session().all_critical_joined() {
             if self.signals.stop_requested() {
                 return Ok(false);
             }
-            let now = self.server.now();
+            let (now, preparing) = (self.server.now(), processes.preparing());
+            if !preparing.is_empty() {
+                if now > SLOW_START && !std::mem::replace(&mut said, true) && !self.options.quiet {
+                    eprintln!("facets that compile their pipelines are waited for: {}", preparing.join(", "));
+                }
+                until = (now + wait).min(at_most);
+            }
             if now > until {
                 let missing_facets = self.server.session().missing_facets().into_iter().map(str::to_owned).collect();
-                return Err(Failure::run("the start", SessionError::Missing(missing_facets, wait)));
+                let missing = SessionError::Missing(missing_facets, wait);
+                return Err(Failure::run("the start", format!("{missing}; --wait SECONDS gives them more time")));
             }
             self.server.idle_until(now + POLL_INTERVAL).map_err(failed)?;
             self.take_events(0.0);
             processes.watch(true)?;
         }
         Ok(true)
+    }
+
+    /// Returns the pace at which users walk in a frame of this number of steps, if it is that of
+    /// live users in real time.
+    fn pace(&mut self, steps: u32) -> Option<Input> {
+        let wall_s = self.frame_began.replace(Instant::now())?.elapsed().as_secs_f64();
+        let live = !self.options.no_realtime && self.input_devices.live();
+        self.users.pace(wall_s, f64::from(steps) * self.world.settings().dt).filter(|_| live)
     }
 
     /// Simulates the steps of one frame.
@@ -255,7 +270,7 @@ impl<'a> RunLoop<'a> {
             self.world.step().map_err(|e| Failure::run("the simulation stopped", e))?;
         }
         self.metrics.step.add(clock.elapsed().as_secs_f64(), frame, self.world.time());
-        Ok(())
+        divergence::check(&self.world)
     }
 
     /// Returns the frame length, s: of a recording, or the simulated one.
@@ -292,6 +307,9 @@ impl<'a> RunLoop<'a> {
             // inputs since the last frame take effect in this one
             self.take_events(self.time_s);
             self.input_devices.tracker_inputs().into_iter().for_each(|(from, input)| self.take_input(from, input));
+            if let Some(pace) = self.pace(steps) {
+                self.take_input(PACE_SOURCE, pace);
+            }
             self.simulate(frame, steps)?;
         }
         let clock = Instant::now();
@@ -311,12 +329,7 @@ impl<'a> RunLoop<'a> {
         }
         self.metrics.barrier.add(clock.elapsed().as_secs_f64(), frame, self.time_s);
         self.frames += 1;
-        if let Some((recorder, _)) = &mut self.recorder
-            && let Some(recorded) = self.server.session().recorded(!self.recorded)
-        {
-            recorder.frame(&self.world, recorded).map_err(|e| Failure::run("recording", e))?;
-            self.recorded = true;
-        }
+        self.recorder.frame(&self.world, self.server.session());
         let session = self.server.session();
         let replayed_input = self.input_devices.after(|| session.recorded(false))?;
         replayed_input.into_iter().for_each(|(from, input)| self.take_input(from, input));
@@ -343,9 +356,7 @@ impl<'a> RunLoop<'a> {
     fn take_events(&mut self, time_s: f64) {
         let mut events = self.server.events();
         events.retain(|event| self.input_devices.live() || !matches!(event, ServerEvent::Input(..)));
-        if let Some((recorder, _)) = &mut self.recorder {
-            recorder.events(&events);
-        }
+        self.recorder.events(&events);
         for event in events {
             self.metrics.take(&event, time_s);
             self.replay.iter_mut().for_each(|replay| replay.take(&event));
@@ -373,79 +384,18 @@ impl<'a> RunLoop<'a> {
 
     /// Takes an input of a device other than a facet's window.
     fn take_input(&mut self, from: FacetNumber, input: Input) {
-        self.server.note_input(input.user, input.sequence);
-        let event = ServerEvent::Input(from, input);
-        if let Some((recorder, _)) = &mut self.recorder {
-            recorder.events(std::slice::from_ref(&event));
+        if from != PACE_SOURCE {
+            self.server.note_input(input.user, input.sequence);
         }
+        let event = ServerEvent::Input(from, input);
+        self.recorder.events(std::slice::from_ref(&event));
         if let ServerEvent::Input(from, input) = event {
             self.users.take(from, input, self.time_s);
         }
     }
-
-    /// Ends the run: recording, summary, facets. Every part is done even if another fails, and
-    /// files come first because facets may not answer.
-    fn end(&mut self, processes: &mut FacetProcesses) -> Result<(), Failure> {
-        let wall_s = self.began.elapsed().as_secs_f64();
-        let session_options = self.server.end().map_err(failed);
-        let recorded = match self.recorder.take() {
-            Some((recorder, recording)) if recording.has_begun() => {
-                recorder.finish().map(|_| Some(recording)).map_err(|e| Failure::run("recording", e))
-            }
-            _ => Ok(None),
-        };
-        let summed = self.write_summary(wall_s);
-        let processes = processes.end(self.frames > 0);
-        if let (Ok(Some(recording)), false) = (&recorded, self.options.quiet) {
-            outputs::say(&format!("recording: {}\n", recording.file().display()))?;
-        }
-        session_options.and(recorded.map(drop)).and(summed).and(processes).and(self.input_devices.check())
-    }
-
-    /// Prints the summary and writes its file.
-    fn write_summary(&self, wall_s: f64) -> Result<(), Failure> {
-        if self.frames > 0 {
-            let summary = Summary {
-                scene: self.scene.clone(),
-                cave: self.cave.file.clone(),
-                transport: if transport_kind(self.options, &self.cave) == TransportKind::Udp {
-                    "udp"
-                } else {
-                    "shared memory"
-                },
-                mode: if self.cave.sync.mode == Mode::Lockstep { "lockstep" } else { "latest" },
-                frames: self.frames,
-                simulated_s: self.time_s,
-                wall_s,
-                behind_s: self.behind_s,
-                simulation: self.metrics.step.quantiles(),
-                barrier: self.metrics.barrier.quantiles(),
-                frame: self.metrics.frame.quantiles(),
-                skew: self.metrics.skew.non_empty(),
-                input_to_picture: self.metrics.input.non_empty(),
-                replay: self.replay.as_ref().map(|replay| replay.counts),
-                replay_input: self.input_devices.replayed_counts(),
-                tracker: self.input_devices.tracker_counts(),
-                heads_rejected: self.users.heads_rejected,
-                unknown_peers: refused(&self.server.unknown_peers()),
-                facets: self.metrics.facets(&self.server, &self.slots, self.frames),
-            };
-            if !self.options.quiet {
-                outputs::say(&summary.lines())?;
-            }
-            if let Some(path) = &self.options.summary {
-                let text = serde_json::to_string_pretty(&summary).map_err(|e| Failure::run("the summary", e))? + "\n";
-                write_file(path, text.as_bytes())?;
-            }
-        }
-        if self.frames == 0 {
-            // explains why no facet joined
-            eprint!("{}", unknown_peers_line(&refused(&self.server.unknown_peers())));
-        }
-        Ok(())
-    }
 }
 
-fn failed(error: SessionError) -> Failure {
+/// Reports an error of the session.
+pub(super) fn failed(error: SessionError) -> Failure {
     Failure::run("the server", error)
 }

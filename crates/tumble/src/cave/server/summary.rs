@@ -86,6 +86,11 @@ pub struct FacetSummary {
     pub counts: SlotCounts,
     /// Frames of the run that it did not show: absent, behind, or in `latest` superseded.
     pub not_shown: u64,
+    /// Shown frames that are written: a line in `frames.jsonl`, and the picture with `--frames-dir`.
+    /// `None` if the facet writes none, or was not started by this process.
+    pub written: Option<u64>,
+    /// Shown frames that are not written.
+    pub not_written: Option<u64>,
     pub draw: Quantiles,
     pub bytes_out: u64,
     pub bytes_in: u64,
@@ -129,13 +134,22 @@ impl Metrics {
         }
     }
 
-    /// Returns the summaries of all facets after this number of frames.
-    pub fn facets(&self, server: &Server<ServerEndpoint>, slots: &[FacetSlot], frames: u64) -> Vec<FacetSummary> {
+    /// Returns the summaries of all facets after this number of frames; `written` by slot.
+    pub fn facets(
+        &self,
+        server: &Server<ServerEndpoint>,
+        slots: &[FacetSlot],
+        frames: u64,
+        written: &[Option<u64>],
+    ) -> Vec<FacetSummary> {
         let one = |(k, slot): (usize, &FacetSlot)| {
             let (counts, _, link) = server.counts(k as FacetNumber);
+            let written = written.get(k).copied().flatten();
             FacetSummary {
                 name: slot.name.clone(),
                 not_shown: frames.saturating_sub(self.shown[k].1),
+                written,
+                not_written: written.map(|written| self.shown[k].1.saturating_sub(written)),
                 counts,
                 draw: self.draw[k].quantiles(),
                 bytes_out: link.bytes_out,
@@ -192,9 +206,10 @@ impl Summary {
         if self.heads_rejected > 0 {
             text += &format!("{} head poses rejected: an eye would be behind a screen\n", self.heads_rejected);
         }
-        for FacetSummary { name, counts: c, not_shown, refused_packets, .. } in &self.facets {
+        for FacetSummary { name, counts: c, not_shown, not_written, refused_packets, .. } in &self.facets {
+            let lost = not_written.filter(|n| *n > 0).map_or(String::new(), |n| format!(", {n} NOT WRITTEN"));
             text += &format!(
-                "facet {name}: {} shown, {not_shown} not shown, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times{}\n",
+                "facet {name}: {} shown, {not_shown} not shown{lost}, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times{}\n",
                 c.presented,
                 c.late,
                 c.missing,

@@ -18,6 +18,10 @@ const WALK_M_PER_S: f64 = 1.5;
 const TURN_RAD_PER_S: f64 = 1.0;
 /// Frequency of the wand's spring, rad/s.
 const PULL_RAD_PER_S: f64 = 10.0;
+/// Source of the pace of walking; no facet and no other device has the number.
+pub const PACE_SOURCE: FacetNumber = FacetNumber::MAX - 1;
+/// Fastest pace, s of wall time per simulated s.
+const MAX_PACE: f64 = 20.0;
 /// Time after which an input that was not renewed expires, simulated s.
 const INPUT_TIMEOUT_S: f64 = 1.0;
 /// Minimum distance of an eye from the plane of a screen that is drawn for it, m.
@@ -26,12 +30,12 @@ const MIN_EYE_DISTANCE_M: f64 = 0.02;
 /// Keys by USB HID usage.
 mod key {
     pub const A: u16 = 0x04;
+    pub const B: u16 = 0x05;
     pub const D: u16 = 0x07;
     pub const E: u16 = 0x08;
-    pub const F: u16 = 0x09;
     pub const Q: u16 = 0x14;
-    pub const R: u16 = 0x15;
     pub const S: u16 = 0x16;
+    pub const V: u16 = 0x19;
     pub const W: u16 = 0x1A;
     pub const RIGHT: u16 = 0x4F;
     pub const LEFT: u16 = 0x50;
@@ -40,7 +44,7 @@ mod key {
 }
 
 /// Keys that extend the left and the right hand.
-const HAND_KEYS: [u16; 2] = [key::R, key::F];
+const HAND_KEYS: [u16; 2] = [key::V, key::B];
 
 /// Source of an input, and its user.
 type Device = (FacetNumber, u16);
@@ -57,6 +61,9 @@ pub struct Users {
     inputs: BTreeMap<Device, (Input, f64)>,
     held: BTreeMap<Device, Grabbed>,
     colliders: UserColliders,
+    /// Time by which users walk, s per simulated s. Users live in wall time: where the simulation is
+    /// slower, they walk more in each step.
+    pace: f64,
 }
 
 /// A body grabbed by a wand.
@@ -74,11 +81,33 @@ impl Users {
         };
         let screens = (0..viewer.users.len()).map(drawn).collect();
         let colliders = if user_colliders { UserColliders::add(&viewer, world)? } else { UserColliders::default() };
-        Ok(Users { viewer, heads_rejected: 0, screens, inputs: BTreeMap::new(), held: BTreeMap::new(), colliders })
+        Ok(Users {
+            viewer,
+            heads_rejected: 0,
+            screens,
+            inputs: BTreeMap::new(),
+            held: BTreeMap::new(),
+            colliders,
+            pace: 1.0,
+        })
     }
 
-    /// Takes an input of a facet's window or another device.
+    /// Returns the pace as an input for [`take`](Self::take), by which recordings have it too: walking
+    /// depends on the wall time, and a replay on the recording alone. `None` if nobody walks. `wall_s`
+    /// is the wall time of a frame of `frame_s` simulated seconds.
+    pub fn pace(&self, wall_s: f64, frame_s: f64) -> Option<Input> {
+        let walks = |input: &Input| input.keys.iter().any(|key| !HAND_KEYS.contains(key));
+        let sequence = ((wall_s / frame_s).clamp(1.0, MAX_PACE) * 1e6).round() as u64;
+        let pace = Input { sequence, user: 0, head: None, wand: None, hands: [None; 2], buttons: 0, keys: Vec::new() };
+        self.inputs.values().any(|(input, _)| walks(input)).then_some(pace)
+    }
+
+    /// Takes an input of a facet's window or another device, or the pace.
     pub fn take(&mut self, from: FacetNumber, input: Input, time_s: f64) {
+        if from == PACE_SOURCE {
+            self.pace = (input.sequence as f64 * 1e-6).clamp(1.0, MAX_PACE);
+            return;
+        }
         let Some(user) = self.viewer.users.get_mut(input.user as usize) else { return };
         if let Some(head) = input.head {
             let aside = 0.5 * user.interpupillary_m;
@@ -96,7 +125,7 @@ impl Users {
         let failed = |e: WorldError| Failure::run("what a user does", e);
         self.inputs.retain(|_, (_, since)| world.time() - *since < INPUT_TIMEOUT_S);
         let keys: Vec<u16> = self.inputs.values().flat_map(|(input, _)| input.keys.iter().copied()).collect();
-        self.walk(&keys, dt);
+        self.walk(&keys, dt * self.pace);
         self.held.retain(|device, _| self.inputs.get(device).is_some_and(|(input, _)| input.buttons & 1 == 1));
         for (&device, (input, _)) in &self.inputs {
             let Some(wand) = input.wand.filter(|_| input.buttons & 1 == 1) else { continue };

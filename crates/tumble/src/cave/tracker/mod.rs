@@ -1,4 +1,7 @@
 //! Input of a tracker: OSC messages over UDP.
 
+pub mod budget;
 pub mod osc;
+pub mod relay;
+pub mod sealed;
 pub mod socket;

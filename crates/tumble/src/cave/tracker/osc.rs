@@ -120,10 +120,16 @@ impl OscDecoder {
         }
     }
 
-    /// Counts a datagram that is dropped unread, because too many arrive.
-    pub fn skip(&mut self) {
+    /// Returns whether datagrams from this address are accepted: it is among the senders, or there
+    /// are none.
+    pub fn knows(&self, from: IpAddr) -> bool {
+        self.senders.is_empty() || self.senders.iter().any(|known| known.to_canonical() == from.to_canonical())
+    }
+
+    /// Counts a datagram that is dropped unread.
+    pub fn skip(&mut self, why: Dropped) {
         self.counts.datagrams = self.counts.datagrams.wrapping_add(1);
-        self.drop(Dropped::TooMany);
+        self.drop(why);
     }
 
     fn drop(&mut self, why: Dropped) {
@@ -135,7 +141,7 @@ impl OscDecoder {
     /// length.
     pub fn take(&mut self, from: IpAddr, bytes: &[u8]) {
         self.counts.datagrams = self.counts.datagrams.wrapping_add(1);
-        if !self.senders.is_empty() && !self.senders.iter().any(|known| known.to_canonical() == from.to_canonical()) {
+        if !self.knows(from) {
             return self.drop(Dropped::UnknownSender);
         }
         if bytes.len() > MAX_DATAGRAM_BYTES {

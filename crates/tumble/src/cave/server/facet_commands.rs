@@ -1,0 +1,120 @@
+//! Commands that start facets: arguments, launch commands of nodes, addresses.
+
+use crate::cave::address::{ServerAddress, address_towards};
+use crate::cave::args::{CaveOptions, ServeOptions, TransportKind};
+use crate::cave::run_setup::PREVIEW;
+use tumble::net::sync::FacetSlot;
+use tumble::scene::cave::{Cave, Node};
+
+/// Returns the facet slots of a run: all facets, or the preview alone.
+pub fn slots(cave: &Cave, preview: bool) -> Vec<FacetSlot> {
+    if preview {
+        return vec![FacetSlot { name: PREVIEW.into(), critical: true }];
+    }
+    cave.facets.iter().map(|f| FacetSlot { name: f.name.clone(), critical: f.critical }).collect()
+}
+
+/// Returns the server's address as a node reaches it; `None` if there is no route to the node.
+pub fn address_for(node: &Node, address: &ServerAddress) -> Option<ServerAddress> {
+    match *address {
+        ServerAddress::Udp(at) if at.ip().is_unspecified() => {
+            address_towards(&node.address, at.port()).map(|ip| ServerAddress::Udp((ip, at.port()).into()))
+        }
+        _ => Some(address.clone()),
+    }
+}
+
+/// Returns the launch command of a node with all placeholders filled in. Its stdin is a pipe that
+/// ends with the launcher, and the facet ends with the pipe.
+pub fn launch(node: &Node, facet: &str, arguments: &[String]) -> Vec<String> {
+    let line = arguments.iter().map(|a| shell_quoted(a)).collect::<Vec<_>>().join(" ");
+    let fill = |word: &String| match word.as_str() {
+        "{arguments}" => arguments.to_vec(),
+        _ => vec![
+            word.replace("{address}", &node.address)
+                .replace("{node}", &node.name)
+                .replace("{facet}", facet)
+                .replace("{line}", &line),
+        ],
+    };
+    node.launch.iter().flat_map(fill).collect()
+}
+
+/// Returns the arguments of a facet's process; `again` for one that is started again.
+pub fn facet_args(launcher: &CaveOptions, name: &str, address: &ServerAddress, again: bool) -> Vec<String> {
+    let mut args = vec!["facet".to_owned()];
+    args.extend(scene_args(&launcher.serve));
+    if name == PREVIEW && launcher.preview {
+        args.push("--preview".into())
+    } else {
+        args.extend(["--facet".into(), name.to_owned()])
+    }
+    args.extend(match address {
+        ServerAddress::Memory(run) => ["--run".into(), run.clone()],
+        ServerAddress::Udp(server) => ["--server".into(), local(*server).to_string()],
+    });
+    let draw = &launcher.draw;
+    let folder = |option: &str, path: &Option<std::path::PathBuf>| {
+        path.iter().flat_map(|p| [option.to_owned(), p.display().to_string()]).collect::<Vec<_>>()
+    };
+    args.extend(folder("--frames-dir", &draw.frames_dir));
+    args.extend(folder("--log-dir", &draw.log_dir));
+    args.extend(draw.quality.iter().flat_map(|q| ["--quality".to_owned(), q.to_string()]));
+    args.extend(
+        Some(draw.debug_draw.to_string())
+            .filter(|w| !w.is_empty())
+            .iter()
+            .flat_map(|w| ["--debug-draw".to_owned(), w.clone()]),
+    );
+    let switches = [
+        ("--overwrite", draw.overwrite && !again),
+        ("--continue-frames", again),
+        ("--burn-in", draw.burn_in),
+        ("--offscreen", draw.offscreen),
+        ("--no-pictures", draw.no_pictures),
+    ];
+    args.extend(switches.iter().filter(|(_, on)| *on).map(|(name, _)| (*name).to_owned()));
+    // the launcher times out before its facets
+    let wait = launcher.serve.connect_timeout.map_or("600".to_owned(), |s| (s + 10.0).to_string());
+    args.extend(["--connect-timeout".into(), wait, "--parent-watch".into()]);
+    args
+}
+
+/// Returns the arguments that name scene and cave.
+pub fn scene_args(serve: &ServeOptions) -> Vec<String> {
+    let surroundings = &serve.surroundings;
+    let mut args = vec![serve.scene.name.clone()];
+    args.extend(serve.scene.opening.to_args());
+    args.extend(["--cave".into(), surroundings.cave.clone()]);
+    args.extend(surroundings.environment.iter().flat_map(|e| ["--environment".into(), e.clone()]));
+    args
+}
+
+/// Returns an address on which this machine listens, as this machine reaches it.
+fn local(at: std::net::SocketAddr) -> std::net::SocketAddr {
+    match at.ip().is_unspecified() {
+        true if at.is_ipv4() => (std::net::Ipv4Addr::LOCALHOST, at.port()).into(),
+        true => (std::net::Ipv6Addr::LOCALHOST, at.port()).into(),
+        false => at,
+    }
+}
+
+/// Quotes a word for a shell.
+pub fn shell_quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "_-./=:".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
+    }
+}
+
+/// Returns the transport: from the command line, else from the cave.
+pub fn transport_kind(serve: &ServeOptions, cave: &Cave) -> TransportKind {
+    let of_cave = if cave.sync.transport == tumble::scene::cave::Transport::Udp {
+        TransportKind::Udp
+    } else {
+        TransportKind::SharedMemory
+    };
+    serve.transport.unwrap_or(of_cave)
+}
