@@ -44,7 +44,7 @@ struct ServerLookup {
 }
 
 /// Interval between two searches for the server's address.
-const LOOKUP_INTERVAL: Duration = Duration::from_millis(250);
+const LOOKUP_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Reads the cave's key, if the cave has one.
 pub fn key(cave: &Cave) -> Result<Option<SharedKey>, Failure> {
