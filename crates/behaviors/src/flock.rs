@@ -1,0 +1,105 @@
+//! A flock: the list of its boids and the forces on them (thesis §V.B.5, appendix A).
+//!
+//! A flock has no state. It is a force: at each stage of a step it reads the positions, velocities
+//! and noses of its boids, and adds the force that [`Steering`] computes to each. Boids are added and
+//! removed between steps; ids of boids that were removed from the world are ignored.
+
+use crate::boid::Boid;
+use crate::error::FlockError;
+use crate::steering::{Flyer, Search, Steering};
+use tumble_collide::Vec3;
+use tumble_core::{ForceGenerator, Forces, Object, ObjectId, StateRange, World, WorldView};
+
+/// A flock of [`Boid`]s in one world.
+#[derive(Clone, Debug)]
+pub struct Flock {
+    name: String,
+    steering: Steering,
+    search: Search,
+    boids: Vec<ObjectId>,
+}
+
+impl Flock {
+    /// Makes a flock without boids.
+    ///
+    /// # Errors
+    /// As [`Steering::validate`].
+    pub fn new(name: impl Into<String>, steering: Steering) -> Result<Flock, FlockError> {
+        steering.validate()?;
+        Ok(Flock { name: name.into(), steering, search: Search::Grid, boids: Vec::new() })
+    }
+    /// Sets how neighbors are found; the forces have the same bits.
+    pub fn with_search(self, search: Search) -> Flock {
+        Flock { search, ..self }
+    }
+    /// Returns the constants.
+    pub fn steering(&self) -> &Steering {
+        &self.steering
+    }
+    /// Changes the constants from the next step on.
+    ///
+    /// # Errors
+    /// As [`Steering::validate`]. The constants then stay as they are.
+    pub fn set_steering(&mut self, steering: Steering) -> Result<(), FlockError> {
+        steering.validate()?;
+        self.steering = steering;
+        Ok(())
+    }
+    /// Returns the ids of the boids, in the order in which they were added. Boids that were removed
+    /// by [`World::remove`] stay in the list until the next change of it.
+    pub fn boids(&self) -> &[ObjectId] {
+        &self.boids
+    }
+
+    /// Adds a boid to the world and to a flock of it, and returns its id.
+    ///
+    /// # Errors
+    /// [`FlockError::NoFlock`], or [`FlockError::World`] as of [`World::add`]. Nothing is added then.
+    pub fn add(world: &mut World, flock: ObjectId, boid: Boid) -> Result<ObjectId, FlockError> {
+        world.get::<Flock>(flock).ok_or(FlockError::NoFlock)?;
+        let id = world.add(boid)?;
+        world.get_mut::<Flock>(flock).ok_or(FlockError::NoFlock)?.boids.push(id);
+        Ok(id)
+    }
+
+    /// Removes a boid from a flock and from the world.
+    ///
+    /// # Errors
+    /// [`FlockError::NoFlock`]; [`FlockError::NoBoid`] if the object is not in the flock or was
+    /// removed from the world before.
+    pub fn remove(world: &mut World, flock: ObjectId, boid: ObjectId) -> Result<(), FlockError> {
+        let boids = &mut world.get_mut::<Flock>(flock).ok_or(FlockError::NoFlock)?.boids;
+        let place = boids.iter().position(|id| *id == boid).ok_or(FlockError::NoBoid)?;
+        boids.remove(place);
+        world.remove(boid).map(drop).map_err(|_| FlockError::NoBoid)
+    }
+}
+
+impl Object for Flock {
+    fn name(&self) -> &str {
+        &self.name
+    }
+    fn force(&self) -> Option<&dyn ForceGenerator> {
+        Some(self)
+    }
+}
+
+impl ForceGenerator for Flock {
+    fn apply(&self, _me: &StateRange, view: &WorldView, out: &mut Forces) {
+        let (mut rows, mut flyers) = (Vec::new(), Vec::new());
+        for &id in self.boids.iter().filter(|id| view.status(**id).is_some_and(|status| status.enabled)) {
+            let (Some(boid), Some(range)) = (view.get::<Boid>(id), view.state_range(id)) else { continue };
+            let state = &view.part_states[range.parts.start];
+            rows.push(range.parts.start);
+            flyers.push(Flyer {
+                position: state.position(),
+                velocity: state.velocity,
+                forward: state.pose.rotation * Vec3::x(),
+                mass: boid.mass(),
+            });
+        }
+        for (row, force) in rows.iter().zip(self.steering.forces(self.search, &flyers)) {
+            out.wrenches[*row].force += force;
+        }
+    }
+}

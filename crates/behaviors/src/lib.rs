@@ -1,0 +1,31 @@
+//! Behaviors on the public interfaces of tumble-core (thesis §V.B.5).
+//!
+//! Nothing here needs a change of a stepper or a solver. [`non_spinning`] is a constructor: the
+//! locked axes of a rigid body already are this behavior. [`Boid`] is an object with a state of its
+//! own. [`Flock`] is a force on its boids, computed by [`Steering`].
+//!
+//! ```
+//! use tumble_behaviors::{Boid, Flock, Steering};
+//! use tumble_core::prelude::*;
+//! let mut world = World::default();
+//! let flock = world.add(Flock::new("flock", Steering::default())?)?;
+//! for k in 0..20 {
+//!     let boid = Boid::new(Shape::sphere(0.2)?, 1.0)?;
+//!     Flock::add(&mut world, flock, boid.with_position(Vec3::new(2.0 * k as f64, 0.0, 0.0)))?;
+//! }
+//! world.step()?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod boid;
+mod error;
+mod flock;
+mod grid;
+mod non_spinning;
+mod steering;
+
+pub use boid::Boid;
+pub use error::FlockError;
+pub use flock::Flock;
+pub use non_spinning::non_spinning;
+pub use steering::{Flyer, Search, Steering};

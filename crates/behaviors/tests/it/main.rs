@@ -1,0 +1,43 @@
+//! The behaviors against closed forms, hand computations and brute force.
+
+mod boids;
+mod flights;
+mod neighbors;
+mod non_spinning;
+mod steering;
+
+use tumble_behaviors::Boid;
+use tumble_core::prelude::*;
+
+/// A world without gravity, in frames of 1/120 s, on one thread.
+pub fn world() -> World {
+    World::new(Settings::default().with_dt(1.0 / 120.0).with_gravity(Vec3::zeros())).unwrap()
+}
+
+/// A boid of 1 kg in a sphere of 1 cm.
+pub fn boid(position: Vec3, velocity: Vec3) -> Boid {
+    Boid::new(Shape::sphere(0.01).unwrap(), 1.0).unwrap().with_position(position).with_velocity(velocity)
+}
+
+/// Numbers of a fixed sequence, from −1 to 1.
+pub struct Numbers(pub u64);
+
+impl Numbers {
+    /// Returns the next number.
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    /// Returns a vector with entries up to `size`.
+    pub fn vector(&mut self, size: f64) -> Vec3 {
+        size * Vec3::new(self.next(), self.next(), self.next())
+    }
+}
+
+/// Steps a world.
+pub fn steps(world: &mut World, count: usize) {
+    (0..count).for_each(|_| {
+        world.step().unwrap();
+    });
+}
