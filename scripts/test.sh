@@ -25,7 +25,7 @@ stage build cargo test $tests --no-run
 stage tests cargo test $tests --no-fail-fast
 # shellcheck disable=SC2086
 [ "${1:-}" != --slow ] || stage "slow tests" env TUMBLE_SLOW=1 cargo test $tests --no-fail-fast -- determinism full_length
-[ "${1:-}" != --slow ] || stage assertions cargo test --profile checked --locked -p tumble-collide -p tumble-core -p tumble-scene --no-fail-fast
+[ "${1:-}" != --slow ] || stage assertions cargo test --profile checked --locked -p tumble-collide -p tumble-core -p tumble-behaviors -p tumble-scene --no-fail-fast
 stage "doc tests" cargo test --no-fail-fast --release --workspace --locked --doc
 stage python scripts/test_python.sh
 stage docs python3 scripts/check_docs.py

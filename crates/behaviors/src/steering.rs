@@ -230,7 +230,7 @@ struct Eye<'a> {
 
 impl Eye<'_> {
     fn new(steering: &Steering) -> Eye<'_> {
-        let cosine = |angle: f64, margin: f64| if angle < PI { angle.cos() + margin } else { -2.0 };
+        let cosine = |angle: f64, margin: f64| if angle <= PI { angle.cos() + margin } else { -2.0 };
         let cosines = [
             cosine(steering.inner_visibility_angle.min(steering.visibility_angle), MARGIN),
             cosine(steering.visibility_angle, -MARGIN),

@@ -2,6 +2,7 @@
 
 mod boids;
 mod flights;
+mod laws;
 mod neighbors;
 mod non_spinning;
 mod steering;
@@ -24,14 +25,14 @@ pub struct Numbers(pub u64);
 
 impl Numbers {
     /// Returns the next number.
-    pub fn next(&mut self) -> f64 {
+    pub fn number(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
 
     /// Returns a vector with entries up to `size`.
     pub fn vector(&mut self, size: f64) -> Vec3 {
-        size * Vec3::new(self.next(), self.next(), self.next())
+        size * Vec3::new(self.number(), self.number(), self.number())
     }
 }
 

@@ -7,7 +7,7 @@ use tumble_core::prelude::*;
 fn crowd(numbers: &mut Numbers, count: usize, size: f64) -> Vec<Flyer> {
     let one = |_| {
         let velocity = numbers.vector(10.0);
-        let mass = 1.0 + 0.5 * numbers.next();
+        let mass = 1.0 + 0.5 * numbers.number();
         Flyer { position: numbers.vector(size), velocity, forward: velocity.normalize(), mass }
     };
     (0..count).map(one).collect()
