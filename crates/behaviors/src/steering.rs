@@ -155,14 +155,17 @@ impl Steering {
         let eye = Eye::new(self);
         match search {
             Search::BruteForce => {
-                (0..flyers.len()).for_each(|me| forces[me] = self.force(&eye, flyers, me, 0..flyers.len()));
+                let all = || flyers.iter().map(|flyer| flyer.position).enumerate();
+                (0..flyers.len()).for_each(|me| forces[me] = self.force(&eye, flyers, me, all()));
             }
             Search::Grid => {
+                let mut around: Vec<(usize, Vec3)> = Vec::new();
                 let grid = Grid::new(flyers.iter().map(|flyer| flyer.position), self.visibility_distance);
                 grid.each_cell(|own, near| {
+                    around.clear(); // one piece of memory for all boids of the cell
+                    around.extend(near.iter().map(|&other| (other as usize, flyers[other as usize].position)));
                     for &(_, me) in own {
-                        let near = near.iter().map(|&other| other as usize);
-                        forces[me as usize] = self.force(&eye, flyers, me as usize, near);
+                        forces[me as usize] = self.force(&eye, flyers, me as usize, around.iter().copied());
                     }
                 });
             }
@@ -170,12 +173,16 @@ impl Steering {
         forces
     }
 
-    /// Returns the force on one boid, N.
-    fn force(&self, eye: &Eye, flyers: &[Flyer], me: usize, near: impl Iterator<Item = usize>) -> Vec3 {
+    /// Returns the force on one boid, N. `near` has indices and positions, ascending by index.
+    fn force(&self, eye: &Eye, flyers: &[Flyer], me: usize, near: impl Iterator<Item = (usize, Vec3)>) -> Vec3 {
         let own = &flyers[me];
         let [mut avoidance, mut matching, mut clustering] = [Vec3::zeros(); 3];
-        for other in near.filter(|other| *other != me) {
-            let Some(seen) = eye.sight(flyers, me, other) else { continue };
+        for (other, position) in near {
+            let arm = position - own.position;
+            if arm.norm_squared() > eye.unseen || other == me {
+                continue;
+            }
+            let Some(seen) = eye.sight(&arm, &own.forward, other > me) else { continue };
             avoidance -= (seen.weight / seen.distance.max(CLOSEST)) * seen.direction;
             matching += seen.weight * (flyers[other].velocity - own.velocity);
             clustering += (seen.weight * seen.distance) * seen.direction;
@@ -238,20 +245,17 @@ impl Eye<'_> {
         Eye { steering, unseen: steering.visibility_distance.powi(2) * (1.0 + MARGIN), cosines }
     }
 
-    /// Returns how boid `me` sees another; `None` if it does not.
-    fn sight(&self, flyers: &[Flyer], me: usize, other: usize) -> Option<Sight> {
-        let arm = flyers[other].position - flyers[me].position;
-        if arm.norm_squared() > self.unseen {
-            return None;
-        }
+    /// Returns how a boid sees another one, `arm` away; `None` if it does not. `later` states whether
+    /// the other one is behind it in the list.
+    fn sight(&self, arm: &Vec3, forward: &Vec3, later: bool) -> Option<Sight> {
         let steering = self.steering;
         let distance = arm.norm();
         let by_distance = fade(distance, steering.inner_visibility_distance, steering.visibility_distance)?;
         if distance == 0.0 {
-            let direction = if other > me { Vec3::x() } else { -Vec3::x() };
+            let direction = if later { Vec3::x() } else { -Vec3::x() };
             return Some(Sight { weight: by_distance, distance, direction });
         }
-        let (direction, forward) = (arm / distance, &flyers[me].forward);
+        let direction = arm / distance;
         let weight = by_distance * self.by_angle(&direction, forward)?;
         Some(Sight { weight, distance, direction })
     }

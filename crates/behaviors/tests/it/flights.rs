@@ -155,17 +155,23 @@ fn boids_come_and_go_in_flight() {
 }
 
 #[test]
-fn a_removed_boid_is_seen_no_more() {
-    // the first of two would brake for the second; without it, it flies on as if alone
-    let mut world = world();
-    let steering = Steering { speed_rate: 0.0, ..Steering::default() };
-    let id = flock(&mut world, steering, Search::Grid, 0, 0.0);
-    let first = Flock::add(&mut world, id, boid(Vec3::zeros(), Vec3::x())).unwrap();
-    let second = Flock::add(&mut world, id, boid(Vec3::new(4.0, 0.0, 0.0), Vec3::x())).unwrap();
-    steps(&mut world, 1);
-    let braked = world.part_state(first, 0).unwrap().velocity;
-    assert!(braked.x < 1.0);
-    Flock::remove(&mut world, id, second).unwrap();
-    steps(&mut world, 120);
-    assert_eq!(world.part_state(first, 0).unwrap().velocity, braked);
+fn removed_and_disabled_boids_are_seen_no_more() {
+    // the first of two brakes for the second; without it, it flies on as if alone
+    for disabled in [true, false] {
+        let mut world = world();
+        let steering = Steering { speed_rate: 0.0, ..Steering::default() };
+        let id = flock(&mut world, steering, Search::Grid, 0, 0.0);
+        let first = Flock::add(&mut world, id, boid(Vec3::zeros(), Vec3::x())).unwrap();
+        let second = Flock::add(&mut world, id, boid(Vec3::new(4.0, 0.0, 0.0), Vec3::x())).unwrap();
+        steps(&mut world, 1);
+        let braked = world.part_state(first, 0).unwrap().velocity;
+        assert!(braked.x < 1.0);
+        if disabled {
+            world.set_enabled(second, false).unwrap();
+        } else {
+            Flock::remove(&mut world, id, second).unwrap();
+        }
+        steps(&mut world, 120);
+        assert_eq!(world.part_state(first, 0).unwrap().velocity, braked);
+    }
 }
