@@ -1,6 +1,6 @@
 //! Behaviors on the public interfaces of tumble-core (thesis §V.B.5).
 //!
-//! Nothing here needs a change of a stepper or a solver. [`non_spinning`] is a constructor: the
+//! Nothing here needs a change of a stepper or a solver. [`non_spinning()`] is a constructor: the
 //! locked axes of a rigid body already are this behavior. [`Boid`] is an object with a state of its
 //! own. [`Flock`] is a force on its boids, computed by [`Steering`].
 //!
