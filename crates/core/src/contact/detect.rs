@@ -1,6 +1,7 @@
 //! Contact detection: broad phase, filters, narrow phase.
 
 use crate::contact::internal_edges::{InternalEdges, Surroundings};
+use crate::contact::motion::Moved;
 use crate::contact::pair::{CachedContacts, KnownContacts, MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
 use crate::contact::pair_material::PairMaterials;
 use crate::contact::time_of_impact::MovingPair;
@@ -10,7 +11,7 @@ use crate::object::part_state::PartState;
 use crate::settings::Settings;
 use crate::threads::Threads;
 use crate::world::view::{Entry, Mode, ObjectId, Objects};
-use tumble_collide::{BroadPhase, Contact, NormalFrom, Vec3};
+use tumble_collide::{BroadPhase, Contact, Vec3};
 
 /// The object of a row of the part table, and the part of it.
 #[derive(Clone, Copy, Debug)]
@@ -40,6 +41,10 @@ pub(crate) struct ContactConstraint {
     pub contact: Contact,
     /// From A's contact point to B's, m: not zero if the bodies meet later in the step.
     pub offset: Vec3,
+    /// Time after the start of the step at which normal and lever arms were found, s.
+    pub found_at: f64,
+    /// Where frame and point are, if not where the contact was found.
+    pub moved: Moved,
     pub frame: ContactFrame,
     pub friction: f64,
     pub restitution: f64,
@@ -278,6 +283,8 @@ impl NarrowPhase<'_> {
             b,
             contact: *contact,
             offset: Vec3::zeros(),
+            found_at: 0.0,
+            moved: Moved::default(),
             frame: frame_of(contact),
             friction,
             restitution,
@@ -289,18 +296,6 @@ impl NarrowPhase<'_> {
             });
         }
     }
-}
-
-/// Returns the rate of a normal that points from B's core point to A's, for the relative velocity
-/// of the two.
-fn turning(c: &Contact, relative: Vec3) -> Vec3 {
-    let distance = c.core_a + c.core_b + c.gap;
-    if distance > 0.0 { across(relative, &c.normal) / distance } else { Vec3::zeros() }
-}
-
-/// Returns the part of `v` across a unit direction.
-fn across(v: Vec3, along: &Vec3) -> Vec3 {
-    v - along * along.dot(&v)
 }
 
 /// Returns whether two parts are to be tested: one of them moves (or is kinematic and approaches a
@@ -327,48 +322,5 @@ impl ContactConstraint {
     /// if they approach.
     pub fn velocity(&self, a: &PartState, b: &PartState) -> Vec3 {
         a.velocity_at(&self.contact.point) - b.velocity_at(&self.point_b())
-    }
-
-    /// Returns the rate of the relative velocity along the contact's axes, as the *contact* moves,
-    /// m/s²; the first is the second derivative of the gap.
-    ///
-    /// The contact point is not a material point of a rounded surface: a sphere that spins in place
-    /// has a centripetal acceleration at its lowest point, and yet does not rise (thesis Fig. 17).
-    /// So the velocity `ṗ` of the point and the rate `ṅ` of the normal follow from the core
-    /// features that carry the contact:
-    ///
-    /// ```text
-    /// s = v_A(p) − v_B(p)        ds/dt = [a + α×r + ω×(ṗ − v)]_A − [ … ]_B        d²gap/dt² = n·ds/dt + ṅ·s
-    /// ```
-    pub fn acceleration(&self, a: &PartState, b: &PartState) -> Vec3 {
-        let (c, n) = (&self.contact, &self.contact.normal);
-        let (core_a, core_b) = (c.point + n * (0.5 * c.gap + c.core_a), c.point - n * (0.5 * c.gap + c.core_b));
-        let (va, vb) = (a.velocity_at(&core_a), b.velocity_at(&core_b));
-        let (n_rate, p_rate) = match c.normal_from {
-            NormalFrom::FaceOfA => {
-                let n_rate = a.angular_velocity.cross(n);
-                (n_rate, vb + c.core_b * n_rate)
-            }
-            NormalFrom::FaceOfB => {
-                let n_rate = b.angular_velocity.cross(n);
-                (n_rate, va - c.core_a * n_rate)
-            }
-            NormalFrom::CorePoints => {
-                let n_rate = turning(c, va - vb);
-                (n_rate, va - c.core_a * n_rate)
-            }
-            NormalFrom::LineOfA(along) => {
-                let n_rate = turning(c, across(va - vb, &along)) + along * along.dot(&a.angular_velocity.cross(n));
-                (n_rate, vb + c.core_b * n_rate)
-            }
-            NormalFrom::LineOfB(along) => {
-                let n_rate = turning(c, across(va - vb, &along)) + along * along.dot(&b.angular_velocity.cross(n));
-                (n_rate, va - c.core_a * n_rate)
-            }
-            NormalFrom::Edges => (Vec3::zeros(), 0.5 * (va + vb)),
-        };
-        let rate = a.acceleration_following(&c.point, &p_rate) - b.acceleration_following(&c.point, &p_rate);
-        let [n, t1, t2] = &self.frame.axes;
-        Vec3::new(n.dot(&rate) + n_rate.dot(&self.velocity(a, b)), t1.dot(&rate), t2.dot(&rate))
     }
 }

@@ -46,6 +46,8 @@ pub(crate) struct InternalEdges {
     entries: Vec<Entry>,
     /// The nearest contact with each other part.
     nearest: Vec<Entry>,
+    /// The contacts of a part, nearest first.
+    order: Vec<Entry>,
     removed: Vec<bool>,
 }
 
@@ -149,8 +151,14 @@ impl InternalEdges {
                     .chunk_by(|x, y| x.other == y.other)
                     .filter_map(|same| same.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).copied()),
             );
-            for c in entries {
-                let internal = |first: &Entry| first.other != c.other && around.is_internal(c, first);
+            // a contact that is removed removes no other: the nearer ones come first
+            self.order.clear();
+            self.order.extend_from_slice(entries);
+            self.order.sort_by(|x, y| x.gap.total_cmp(&y.gap).then(x.contact.cmp(&y.contact)));
+            for c in &self.order {
+                let internal = |first: &Entry| {
+                    first.other != c.other && !self.removed[first.contact as usize] && around.is_internal(c, first)
+                };
                 if self.nearest.iter().any(internal) {
                     self.removed[c.contact as usize] = true;
                     any = true;

@@ -3,8 +3,10 @@
 
 pub(crate) mod detect;
 mod internal_edges;
+pub(crate) mod motion;
 pub(crate) mod pair;
 pub(crate) mod pair_material;
+mod rim;
 mod separation;
 pub(crate) mod time_of_impact;
 pub(crate) mod warm_starts;

@@ -332,6 +332,7 @@ impl ContactConstraint {
         self.contact = Contact { point: contact.point - move_a, gap: contact.gap - closed, ..*contact };
         self.key.feature = contact.feature;
         self.offset = move_a - move_b;
+        self.found_at = t;
         self.frame = ContactFrame::new(contact.point, contact.normal);
     }
 }

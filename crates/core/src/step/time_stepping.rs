@@ -34,6 +34,7 @@
 //! overlap is corrected at its end, and they strike at the start of the next.
 
 mod impacts;
+mod moving;
 
 use super::contacts::{
     build_rows, detect, displace, free_motion_change, gyroscopic, impulses, push, row_velocities, shift, solve, whiten,
@@ -52,6 +53,7 @@ use crate::object::Level;
 use crate::solver::SolverSettings;
 use crate::world::view::Entry;
 use crate::world::{Coordinates, Core, StepError};
+use tumble_collide::Vec3;
 
 /// The default stepper, `time_stepping`.
 #[derive(Default)]
@@ -127,6 +129,7 @@ impl TimeStepping {
         let parts = (&core.owners[..], &core.derived.part_states[..]);
         let (found, predicted) = (&mut self.work.contact_constraints, &mut self.buffers.predicted);
         time_contacts(core.objects(), parts, (&core.settings, &core.threads), h, found, predicted);
+        moving::move_contacts(core, found, 0.5 * h);
         build_rows(core, Some(&mut *middle), &mut self.work, Level::Velocity { h }, 0.5 * h)?;
         let mut u = std::mem::take(&mut self.work.u);
         let mut du_force = std::mem::take(&mut self.work.du_force);
@@ -164,6 +167,12 @@ impl TimeStepping {
     fn contacts(&mut self, core: &mut Core, middle: &mut Moment, h: f64, u0: &[f64], u: &mut [f64], du_force: &[f64]) {
         let work = &mut self.work;
         let Buffers { before, gain: first, parts, keep, .. } = &mut self.buffers;
+        let moves = work.contact_constraints.iter().any(|t| t.moved.rate != Vec3::zeros());
+        let (turning, free_motion_change) = if work.targets.is_empty() && !moves {
+            Default::default()
+        } else {
+            (gyroscopic(middle.coordinates(core)), free_motion_change(middle.coordinates(core), 0.5 * h))
+        };
         row_velocities(&core.threads, &work.rows, &work.bias, u0, first);
         u.iter_mut().zip(du_force).for_each(|(u, du)| *u += du);
         row_velocities(&core.threads, &work.rows, &work.bias, u, &mut work.c);
@@ -176,7 +185,9 @@ impl TimeStepping {
             let block = &work.rows.blocks[i];
             let (row, struck) = (block.row as usize, self.impact[block.row as usize] > 0.0);
             let s = block.sides().iter().map(|side| self.impact_fraction[side.u as usize]).fold(0.0, f64::max);
-            let (gap, left) = (constraint.contact.gap + h * s * first[row], h * (1.0 - s).max(1e-9));
+            let turned = 0.5 * constraint.moved.time * moving::row_rates(work, i, &turning).x;
+            let closed = h * s * (first[row] - turned);
+            let (gap, left) = (constraint.contact.gap + closed, h * (1.0 - s).max(1e-9));
             let candidate = self.candidates.get(i);
             let rest_speed = candidate.map_or(f64::INFINITY, |candidate| candidate.rest_speed);
             let crowd = candidate.is_some_and(|candidate| candidate.crowd);
@@ -187,11 +198,15 @@ impl TimeStepping {
             }
             work.c[row] += if struck { 0.0 } else { gap.max(0.0) / left };
         }
-        let (turning, free_motion_change) = if work.targets.is_empty() {
-            Default::default()
-        } else {
-            (gyroscopic(middle.coordinates(core)), free_motion_change(middle.coordinates(core), 0.5 * h))
-        };
+        for (i, constraint) in work.contact_constraints.iter().enumerate() {
+            if moving::touches(core, constraint) && constraint.moved.rate != Vec3::zeros() {
+                let (block, rates) = (&work.rows.blocks[i], moving::row_rates(work, i, &turning));
+                for (k, row) in block.range().enumerate() {
+                    let free = work.rows.row_velocity(block, k, &free_motion_change);
+                    work.c[row] += free + (h - constraint.moved.time) * rates[k];
+                }
+            }
+        }
         for (block, target) in work.rows.blocks[work.contact_constraints.len()..].iter().zip(&work.targets) {
             work.c[block.row as usize] += work.rows.row_velocity(block, 0, &free_motion_change)
                 - 0.5 * h * work.rows.row_velocity(block, 0, &turning);
@@ -219,7 +234,7 @@ impl TimeStepping {
         du_force: &[f64],
     ) -> Result<(), StepError> {
         let impact_fraction = |i: usize| if self.impact_fraction[i] < 0.0 { 0.5 } else { self.impact_fraction[i] };
-        let Buffers { change, dp, parabola, rest, mean, total, late, .. } = &mut self.buffers;
+        let Buffers { change, dp, parabola, rest, mean, total, late, keep, .. } = &mut self.buffers;
         let write = |out: &mut Vec<f64>, of: &dyn Fn(usize) -> f64| {
             out.clear();
             out.extend((0..u0.len()).map(of));
@@ -234,6 +249,7 @@ impl TimeStepping {
         };
         move_freely(core.coordinates(Some(&mut *middle)), &before);
         write(rest, &|i| change[i] + late[i]);
+        let end: Vec<f64> = u0.iter().zip(&*rest).map(|(u, du)| u + du).collect();
         push(core.coordinates(Some(&mut *middle)), rest, dp);
         move_freely(core.coordinates(Some(&mut *middle)), &|entry| 1.0 - before(entry));
         for entry in core.objects().iter() {
@@ -256,7 +272,10 @@ impl TimeStepping {
             recovery: core.settings.recovery_speed * h,
             tolerance: core.settings.contact_tolerance,
         };
+        self.work.frictionless.du.clear();
         correction::correct(core, Some(&mut *middle), &mut self.work, &mut self.probe, &options)?;
+        let late = (&self.work, &keep[..]);
+        pay_for_lift(core.coordinates(Some(middle)), late, &end, du_force);
         total.clear();
         total.extend(self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b));
         if core.has_breakable_joints() {
@@ -270,6 +289,27 @@ impl TimeStepping {
         );
         core.check_finite(dp, Some(&mut *middle))
     }
+}
+
+/// Takes the potential energy by which the correction has lifted bodies out of contacts that are not
+/// kept, elastic ones that closed late in the step, from their kinetic energy. `u` is the whitened
+/// velocity at the end.
+fn pay_for_lift(at: Coordinates, (work, keep): (&Workspace, &[bool]), u: &[f64], du_force: &[f64]) {
+    let moved = &work.frictionless.du;
+    if moved.is_empty() || keep.iter().all(|keep| *keep) {
+        return;
+    }
+    let mut du = vec![0.0; u.len()];
+    for (block, _) in work.rows.blocks.iter().zip(keep).filter(|(_, keep)| !**keep) {
+        let coordinates = || block.sides().iter().flat_map(|side| side.u as usize..(side.u + side.dof) as usize);
+        let lift: f64 = -coordinates().map(|i| du_force[i] * moved[i]).sum::<f64>();
+        let kinetic: f64 = coordinates().map(|i| 0.5 * u[i] * u[i]).sum();
+        if lift > 0.0 && lift < kinetic {
+            let scale = (1.0 - lift / kinetic).sqrt() - 1.0;
+            coordinates().for_each(|i| du[i] = scale * u[i]);
+        }
+    }
+    push(at, &du, &mut Vec::new());
 }
 
 /// Returns whether all impulses on an object act in the middle of the step, impacts too: links,

@@ -40,6 +40,7 @@ mod loop_joints_transmissions;
 mod mesh_boxes;
 mod mesh_frame;
 mod meshes;
+mod moving_contact;
 mod overlaps;
 mod pair_materials;
 mod paradox;

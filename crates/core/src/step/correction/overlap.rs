@@ -130,7 +130,8 @@ pub(crate) struct Frictionless {
     rows: Rows,
     c: Vec<f64>,
     lambda: Vec<f64>,
-    du: Vec<f64>,
+    /// Displacement per second of the step, whitened.
+    pub du: Vec<f64>,
 }
 
 impl Frictionless {

@@ -10,7 +10,7 @@
 //! forces of a step change the speed of either body along its normal: what is below is load that
 //! comes and goes, not an impact.
 
-use super::{Buffers, TimeStepping, in_the_middle};
+use super::{Buffers, TimeStepping, in_the_middle, moving};
 use crate::constraint::rows::Side;
 use crate::contact::detect::ContactConstraint;
 use crate::contact::pair::PredictionMode;
@@ -19,7 +19,7 @@ use crate::integrators::context::free_motion;
 use crate::object::Level;
 use crate::step::Moment;
 use crate::step::budget::{IMPACTS, REBOUND};
-use crate::step::contacts::{build_rows, detect, push, row_velocities, whiten, zero};
+use crate::step::contacts::{build_rows, detect, gyroscopic, push, row_velocities, whiten, zero};
 use crate::step::impact::{self, Candidate};
 use crate::world::{Coordinates, Core, StepError};
 
@@ -28,6 +28,20 @@ const IMPACT_PASSES: u32 = 50;
 /// Groups of touching bodies with more contacts have no impact phase: their contacts rebound at the
 /// end of the step, all at once.
 const CROWD: usize = 100;
+
+/// A gap (m) in free motion, with its rate and the change of the rate, per step.
+struct Approach {
+    gap: f64,
+    rate: f64,
+    gain: f64,
+}
+
+impl Approach {
+    /// Returns the gap at a fraction of the step, m.
+    fn gap_at(&self, fraction: f64) -> f64 {
+        self.gap + fraction * (self.rate + 0.5 * fraction * self.gain)
+    }
+}
 
 impl TimeStepping {
     /// Resolves the impacts within the step. `after` becomes the whitened velocity after them,
@@ -51,12 +65,16 @@ impl TimeStepping {
         if work.contact_constraints.iter().all(|t| t.restitution <= 0.0) {
             return Ok(());
         }
-        let (before, gain, mut impact_fractions) = (&mut self.buffers.before, &mut self.buffers.gain, Vec::new());
+        let (before, gain) = (&mut self.buffers.before, &mut self.buffers.gain);
+        let (mut impact_fractions, mut approaches) = (Vec::new(), Vec::new());
         row_velocities(&core.threads, &work.rows, &work.bias, u, before);
         zero(gain, work.rows.len);
         work.rows.add_velocity(du_force, gain);
-        for (constraint, block) in work.contact_constraints.iter().zip(&work.rows.blocks) {
-            let (v, dv, gap) = (before[block.row as usize], gain[block.row as usize], constraint.contact.gap);
+        let turning = gyroscopic(middle.coordinates(core));
+        for (i, constraint) in work.contact_constraints.iter().enumerate() {
+            let (block, rate) = (&work.rows.blocks[i], moving::row_rates(work, i, &turning).x);
+            let (row, gap) = (block.row as usize, constraint.contact.gap);
+            let (v, dv) = (before[row] - constraint.moved.time * rate, gain[row]);
             let pressed = if core.state.warm.carries(&constraint.key) {
                 let side = |s: &Side| work.rows.side_velocity(s, 0, du_force).abs();
                 block.sides().iter().map(side).fold(0.0, f64::max)
@@ -65,11 +83,13 @@ impl TimeStepping {
             };
             let rest_speed = pressed.max(impact::SLOWEST_BOUNCE);
             let impact_fraction = if constraint.restitution > 0.0 {
-                time_to_close(gap / h, v, dv).filter(|s| *s <= 1.0 && -(v + s * dv) > rest_speed)
+                let gain = dv + h * rate;
+                time_to_close(gap / h, v, gain).filter(|s| *s <= 1.0 && -(v + s * gain) > rest_speed)
             } else {
                 None
             };
             impact_fractions.push(impact_fraction);
+            approaches.push(Approach { gap, rate: h * v, gain: h * (dv + h * rate) });
             self.candidates.push(Candidate {
                 takes_part: gap <= core.settings.drift_tolerance,
                 rest_speed,
@@ -83,9 +103,10 @@ impl TimeStepping {
         if impact_fractions.iter().all(Option::is_none) {
             return Ok(());
         }
-        self.first_impacts(&impact_fractions);
+        self.first_impacts(&impact_fractions, &approaches, core.settings.contact_tolerance);
         self.go_to_impacts(core, middle, h);
         let work = &mut self.work;
+        moving::move_to_impacts(core, work, &self.impact_fraction, h);
         build_rows(core, Some(&mut *middle), work, Level::Velocity { h }, 0.5 * h)?;
         whiten(middle.coordinates(core), &work.dp, h, u, du_force);
         let at_impact: Vec<f64> = (0..u.len()).map(|i| u[i] + self.impact_fraction[i].max(0.0) * du_force[i]).collect();
@@ -177,9 +198,10 @@ impl TimeStepping {
     }
 
     /// Selects the contacts that take part in the impacts: the first ones among bodies that impacts
-    /// of this step connect, and those that touch the same island. Later ones rebound at the end of
+    /// of this step connect, those whose gap is within the tolerance (m) then, and those that touch
+    /// the same island. Later ones rebound at the end of
     /// the step; islands without an impact take no part.
-    fn first_impacts(&mut self, impact_fractions: &[Option<f64>]) {
+    fn first_impacts(&mut self, impact_fractions: &[Option<f64>], approaches: &[Approach], tolerance: f64) {
         let work = &mut self.work;
         work.islands.build(&work.rows, |b| impact_fractions.get(b).is_some_and(Option::is_some));
         for blocks in work.islands.iter() {
@@ -190,8 +212,8 @@ impl TimeStepping {
         }
         let first = |i: usize| {
             let sides = work.rows.blocks[i].sides();
-            impact_fractions[i]
-                .is_some_and(|s| sides.iter().all(|side| s <= self.impact_fraction[side.u as usize] + 1e-9))
+            let now = |s: f64, first: f64| s <= first + 1e-9 || approaches[i].gap_at(first) <= tolerance;
+            impact_fractions[i].is_some_and(|s| sides.iter().all(|side| now(s, self.impact_fraction[side.u as usize])))
         };
         let strikes: Vec<bool> = (0..impact_fractions.len()).map(first).collect();
         for (candidate, strikes) in self.candidates.iter_mut().zip(&strikes) {

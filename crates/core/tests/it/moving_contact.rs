@@ -1,0 +1,158 @@
+//! Contact that moves: what sweeps, rolls and slides keeps its energy, with the second order of the
+//! step.
+
+use crate::common::*;
+use nalgebra::{UnitQuaternion, Vector3};
+use tumble_core::collide::{Pose, Shape, Vec3};
+use tumble_core::*;
+
+fn smooth() -> Material {
+    Material { restitution: 0.0, friction: 0.0, ..Material::default() }
+}
+
+/// Relative change of energy of a free bar that turns at 10 rad/s and sweeps a ball outwards, after
+/// 0.5 s; energy is a constant of the motion.
+fn sweeping_bar(stepper: &str, dt: f64) -> f64 {
+    let mut world = no_gravity(world(stepper, dt));
+    let bar = RigidBody::new(Shape::cuboid(Vec3::new(2.0, 0.1, 0.1)).unwrap()).with_mass(1.0).with_material(smooth());
+    world.add(bar.with_name("bar").with_angular_velocity(Vec3::new(0.0, 0.0, 10.0))).unwrap();
+    let ball = RigidBody::new(sphere(0.05)).with_mass(0.2).with_material(smooth()).with_name("ball");
+    let velocity = Vec3::new(0.0, 3.0, 0.0);
+    world.add(ball.with_pose(Pose::translation(0.3, 0.1, 0.0)).with_velocity(velocity)).unwrap();
+    let before = world.energy().total();
+    (0..(0.5 / dt).round() as usize).for_each(|_| {
+        world.step().unwrap();
+    });
+    world.energy().total() / before - 1.0
+}
+
+/// Relative change of energy of a disc that rolls on its rim, its center nearly at rest.
+fn rolling_disc(stepper: &str, dt: f64, seconds: f64) -> f64 {
+    let (a, half, tilt) = (0.1f64, 1e-3, 0.5f64);
+    let mut world = world(stepper, dt);
+    ground(&mut world, 0.0, 10.0);
+    let rough = Material { restitution: 0.0, friction: 10.0, ..Material::default() };
+    let precession = (4.0 * G / (a * tilt.sin())).sqrt();
+    let rotation = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), tilt);
+    let height = a * tilt.sin() + half * tilt.cos();
+    // from the lowest point of the rim to the center
+    let up = Vec3::new(0.0, tilt.cos(), tilt.sin());
+    let body = RigidBody::new(Shape::cylinder(a, 2.0 * half).unwrap())
+        .with_mass(0.5)
+        .with_material(rough)
+        .with_name("disc")
+        .with_pose(Pose::from_parts(Vec3::new(0.0, 0.0, height).into(), rotation))
+        .with_angular_velocity(precession * tilt.sin() * up);
+    world.add(body).unwrap();
+    let before = world.energy().total();
+    (0..(seconds / dt).round() as usize).for_each(|_| {
+        world.step().unwrap();
+    });
+    world.energy().total() / before - 1.0
+}
+
+/// Error of the speed of a ball that slides without friction from near the top of a fixed dome, after
+/// 0.6 s, by the energy of its height.
+fn dome(stepper: &str, dt: f64) -> f64 {
+    let (radius, ball) = (1.0, 0.1);
+    let mut world = world(stepper, dt);
+    world.add_static(RigidBody::fixed(sphere(radius)).with_name("dome").with_material(smooth())).unwrap();
+    let start = 0.3f64;
+    let place = (radius + ball) * Vec3::new(start.sin(), 0.0, start.cos());
+    let body = RigidBody::new(sphere(ball)).with_mass(1.0).with_material(smooth()).with_name("ball");
+    let id = world.add(body.with_pose(Pose::translation(place.x, place.y, place.z))).unwrap();
+    let before = world.energy().total();
+    (0..(0.4 / dt).round() as usize).for_each(|_| {
+        world.step().unwrap();
+    });
+    assert!((position(&world, id).norm() - 1.1).abs() < 0.01, "left the dome");
+    (world.energy().total() - before) / (0.5 * velocity(&world, id).norm_squared())
+}
+
+/// Relative error of the spin of a ball after an oblique impact on rough ground. An impact that sticks
+/// leaves the contact point at rest and keeps the angular momentum about it: `ω = v/(r·(1 + 2/5))`.
+fn spin_after_impact(stepper: &str, dt: f64) -> f64 {
+    let mut world = no_gravity(world(stepper, dt));
+    ground(&mut world, 0.5, 10.0);
+    let rough = Material { restitution: 0.5, friction: 10.0, ..Material::default() };
+    let r = 0.1;
+    let body = RigidBody::new(sphere(r)).with_mass(1.0).with_material(rough).with_name("ball");
+    let id = world
+        .add(body.with_pose(Pose::translation(0.0, 0.0, 0.2234)).with_velocity(Vec3::new(3.0, 0.0, -2.0)))
+        .unwrap();
+    (0..(0.2 / dt).round() as usize).for_each(|_| {
+        world.step().unwrap();
+    });
+    let expected = 3.0 / (r * 1.4);
+    world.part_state(id, 0).unwrap().angular_velocity.y / expected - 1.0
+}
+
+/// Relative change of the angular momentum of two rough balls that strike off center.
+fn two_balls(stepper: &str, dt: f64) -> f64 {
+    let mut world = no_gravity(world(stepper, dt));
+    let rough = Material { restitution: 0.7, friction: 0.4, ..Material::default() };
+    let ball = |name: &str, x: f64, y: f64, v: f64| {
+        let body = RigidBody::new(sphere(0.1)).with_mass(1.0).with_material(rough).with_name(name);
+        body.with_pose(Pose::translation(x, y, 0.0)).with_velocity(Vec3::new(v, 0.0, 0.0))
+    };
+    let ids = [ball("a", -0.5, 0.0, 4.0), ball("b", 0.5, 0.13, -1.0)].map(|body| world.add(body).unwrap());
+    let momentum = |world: &World| -> Vec3 {
+        let of = |id: &ObjectId| {
+            let s = world.part_state(*id, 0).unwrap();
+            s.position().cross(&s.velocity) + 0.4 * 0.01 * s.angular_velocity
+        };
+        ids.iter().map(of).sum()
+    };
+    let before = momentum(&world);
+    (0..(0.4 / dt).round() as usize).for_each(|_| {
+        world.step().unwrap();
+    });
+    (momentum(&world) - before).norm() / before.norm()
+}
+
+/// Errors at 60, 120, 240, 480 and 960 Hz.
+fn errors(stepper: &str, of: fn(&str, f64) -> f64) -> [f64; 5] {
+    let errors = [60.0, 120.0, 240.0, 480.0, 960.0].map(|hz| of(stepper, 1.0 / hz));
+    println!("{stepper}: {errors:?}");
+    errors
+}
+
+#[test]
+fn a_bar_that_sweeps_a_ball_keeps_its_energy_to_second_order() {
+    let errors = errors("time_stepping", sweeping_bar);
+    assert!(errors[2].abs() < 1e-4);
+    assert!(errors.windows(2).all(|pair| pair[0].abs() > 3.6 * pair[1].abs()));
+}
+
+#[test]
+fn a_ball_that_slides_down_a_dome_keeps_its_energy_to_second_order() {
+    let errors = errors("time_stepping", dome);
+    assert!(errors[2].abs() < 5e-5);
+    assert!(errors.windows(2).all(|pair| pair[0].abs() > 3.2 * pair[1].abs()));
+}
+
+#[test]
+fn a_disc_rolls_on_its_rim_without_loss() {
+    let loss = rolling_disc("time_stepping", 1.0 / 240.0, 5.0);
+    assert!(loss.abs() < 5e-3, "{loss}");
+}
+
+#[test]
+fn the_spin_after_an_impact_is_exact_at_any_step() {
+    for stepper in STEPPERS {
+        for hz in [60.0, 100.0, 240.0, 300.0, 400.0, 1000.0, 4000.0] {
+            let error = spin_after_impact(stepper, 1.0 / hz);
+            assert!(error.abs() < 1e-12, "{stepper} at {hz} Hz: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_collision_off_center_keeps_angular_momentum() {
+    for stepper in STEPPERS {
+        for hz in [60.0, 240.0, 400.0, 1000.0] {
+            let error = two_balls(stepper, 1.0 / hz);
+            assert!(error < 1e-12, "{stepper} at {hz} Hz: {error}");
+        }
+    }
+}
