@@ -16,9 +16,11 @@
 //! | `d₁`, `d₂` | signed distances from `B₁` and `B₂` |
 //! | `y₁`, `n₁` | point on `B₁` and normal of the nearest contact of `A` and `B₁`; the normal points to `A` |
 //!
-//! The contact with `B₁` must be the nearer one, so two never remove each other. The plane of `B₁`
-//! carries `A` across the seam. A wall that stands on `B₁` protrudes and keeps its
-//! contacts, also those at its foot. So does a ramp of more than 4°, and a step higher than `flush`.
+//! The contact with `B₁` must be the nearer one, so two never remove each other. Of contacts with one
+//! normal, one that `B₂` has removed removes none of `B₂`'s either: of two supports at a seam, one
+//! stays. The plane of `B₁` carries `A` across the seam. A wall that stands on `B₁` protrudes and
+//! keeps its contacts, also those at its foot. So does a ramp of more than 4°, and a step higher than
+//! `flush`.
 
 use crate::contact::detect::{ContactConstraint, Owner};
 use crate::object::part_state::PartState;
@@ -33,6 +35,8 @@ const FLUSH: f64 = 2e-3;
 const MAX_OVERHANG: f64 = 2e-3;
 /// Difference of equal normals.
 const SAME_NORMAL: f64 = 1e-7;
+/// Difference of the normals of contacts that support alike.
+const LEVEL: f64 = 1e-3;
 /// Difference of equal gaps, in drift tolerances.
 const SAME_GAP: f64 = 1e-8;
 /// Maximum number of contacts of a part that are compared; those of a part with more all stay.
@@ -48,7 +52,8 @@ pub(crate) struct InternalEdges {
     nearest: Vec<Entry>,
     /// The contacts of a part, nearest first.
     order: Vec<Entry>,
-    removed: Vec<bool>,
+    /// The row of the part whose surface has removed each contact.
+    removed_by: Vec<Option<u32>>,
 }
 
 /// A contact as one of its parts, `A`, sees it.
@@ -136,8 +141,8 @@ impl InternalEdges {
     /// Removes the contacts at internal edges.
     pub fn remove(&mut self, around: &Surroundings, contacts: &mut Vec<ContactConstraint>) {
         self.collect(around, contacts);
-        self.removed.clear();
-        self.removed.resize(contacts.len(), false);
+        self.removed_by.clear();
+        self.removed_by.resize(contacts.len(), None);
         let mut any = false;
         for range in self.starts.windows(2) {
             let entries = &self.entries[range[0] as usize..range[1] as usize];
@@ -151,23 +156,25 @@ impl InternalEdges {
                     .chunk_by(|x, y| x.other == y.other)
                     .filter_map(|same| same.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).copied()),
             );
-            // a contact that is removed removes no other: the nearer ones come first
+            // nearer ones first, so it is known by whom they are removed
             self.order.clear();
             self.order.extend_from_slice(entries);
             self.order.sort_by(|x, y| x.gap.total_cmp(&y.gap).then(x.contact.cmp(&y.contact)));
             for c in &self.order {
-                let internal = |first: &Entry| {
-                    first.other != c.other && !self.removed[first.contact as usize] && around.is_internal(c, first)
+                let internal = |first: &&Entry| {
+                    let level = (c.normal - first.normal).norm_squared() < LEVEL * LEVEL;
+                    let mutual = level && self.removed_by[first.contact as usize] == Some(c.other);
+                    first.other != c.other && !mutual && around.is_internal(c, first)
                 };
-                if self.nearest.iter().any(internal) {
-                    self.removed[c.contact as usize] = true;
+                if let Some(first) = self.nearest.iter().find(internal) {
+                    self.removed_by[c.contact as usize] = Some(first.other);
                     any = true;
                 }
             }
         }
         if any {
-            let mut removed = self.removed.iter();
-            contacts.retain(|_| removed.next().is_none_or(|removed| !removed));
+            let mut removed = self.removed_by.iter();
+            contacts.retain(|_| removed.next().is_none_or(Option::is_none));
         }
     }
 
