@@ -103,14 +103,19 @@ impl ContactConstraint {
 
     /// Returns the velocity of the contact point over the material of a cylinder's rim on a plane,
     /// m/s.
-    fn along_rim(&self, motion: &ContactMotion, [a, b]: [&PartState; 2], shapes: [Option<&Shape>; 2]) -> Vec3 {
+    fn along_rim<'s>(
+        &self,
+        motion: &ContactMotion,
+        [a, b]: [&PartState; 2],
+        shape: impl Fn(u32) -> Option<&'s Shape>,
+    ) -> Vec3 {
         let (c, n) = (&self.contact, &self.contact.normal);
         let rate = match c.normal_from {
-            NormalFrom::FaceOfA if c.core_b == 0.0 => shapes[1].and_then(|shape| {
+            NormalFrom::FaceOfA if c.core_b == 0.0 => shape(self.b).and_then(|shape| {
                 let point = self.point_b() - 0.5 * self.gap_found() * n;
                 rim_rate(shape, b, &point, &-n, &-motion.normal_rate)
             }),
-            NormalFrom::FaceOfB if c.core_a == 0.0 => shapes[0].and_then(|shape| {
+            NormalFrom::FaceOfB if c.core_a == 0.0 => shape(self.a).and_then(|shape| {
                 let point = c.point + 0.5 * self.gap_found() * n;
                 rim_rate(shape, a, &point, n, &motion.normal_rate)
             }),
@@ -126,10 +131,10 @@ impl ContactConstraint {
 
     /// Moves frame and point to `time` seconds after the start of the step, in free motion that closes
     /// the gap until then. A contact that does not last until then stays where it was found.
-    pub fn move_to(&mut self, time: f64, [a, b]: [&PartState; 2], shapes: [Option<&Shape>; 2]) {
+    pub fn move_to<'s>(&mut self, time: f64, [a, b]: [&PartState; 2], shape: impl Fn(u32) -> Option<&'s Shape>) {
         let Contact { point, normal, .. } = self.contact;
         let mut motion = self.motion(a, b);
-        motion.point_rate += self.along_rim(&motion, [a, b], shapes);
+        motion.point_rate += self.along_rim(&motion, [a, b], shape);
         let rate = self.rate(&motion, [a, b], PartState::bias_acceleration_following);
         let left = time - self.found_at;
         if left.abs() * motion.normal_rate.norm() > MAX_TURN {

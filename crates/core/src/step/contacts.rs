@@ -339,11 +339,15 @@ pub(crate) fn free_motion_change(Coordinates { objects, x, caches, .. }: Coordin
 /// of constraints exclude it.
 pub(crate) fn gyroscopic(Coordinates { objects, x, caches, .. }: Coordinates) -> Vec<f64> {
     let mut out = vec![0.0; objects.table.dof()];
+    let mut turning = SmallVec::<[f64; 6]>::new();
     for entry in objects.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
-        let mut turning = vec![0.0; v.len()];
+        turning.clear();
+        turning.resize(v.len(), 0.0);
         body.gyroscopic(&x[entry.state_range.x.clone()], &mut turning);
-        body.whiten_change(&mut caches[entry.place], &turning, &mut out[v]);
+        if turning.iter().any(|t| *t != 0.0) {
+            body.whiten_change(&mut caches[entry.place], &turning, &mut out[v]);
+        }
     }
     out
 }

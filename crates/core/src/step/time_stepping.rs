@@ -36,9 +36,7 @@
 mod impacts;
 mod moving;
 
-use super::contacts::{
-    build_rows, detect, displace, free_motion_change, gyroscopic, impulses, push, row_velocities, shift, solve, whiten,
-};
+use super::contacts::{build_rows, detect, displace, impulses, push, row_velocities, shift, solve, whiten};
 use super::correction::{self, Contacts, Limits, Options};
 use super::impact::{self, Candidate, Part};
 use super::warm_start::{row_starts, warm_start};
@@ -53,6 +51,7 @@ use crate::object::Level;
 use crate::solver::SolverSettings;
 use crate::world::view::Entry;
 use crate::world::{Coordinates, Core, StepError};
+use moving::FreeTerms;
 use tumble_collide::Vec3;
 
 /// The default stepper, `time_stepping`.
@@ -168,11 +167,8 @@ impl TimeStepping {
         let work = &mut self.work;
         let Buffers { before, gain: first, parts, keep, .. } = &mut self.buffers;
         let moves = work.contact_constraints.iter().any(|t| t.moved.rate != Vec3::zeros());
-        let (turning, free_motion_change) = if work.targets.is_empty() && !moves {
-            Default::default()
-        } else {
-            (gyroscopic(middle.coordinates(core)), free_motion_change(middle.coordinates(core), 0.5 * h))
-        };
+        let free =
+            if work.targets.is_empty() && !moves { FreeTerms::default() } else { FreeTerms::new(middle, core, h) };
         row_velocities(&core.threads, &work.rows, &work.bias, u0, first);
         u.iter_mut().zip(du_force).for_each(|(u, du)| *u += du);
         row_velocities(&core.threads, &work.rows, &work.bias, u, &mut work.c);
@@ -185,7 +181,7 @@ impl TimeStepping {
             let block = &work.rows.blocks[i];
             let (row, struck) = (block.row as usize, self.impact[block.row as usize] > 0.0);
             let s = block.sides().iter().map(|side| self.impact_fraction[side.u as usize]).fold(0.0, f64::max);
-            let turned = 0.5 * constraint.moved.time * moving::row_rates(work, i, &turning).x;
+            let turned = if s > 0.0 { 0.5 * constraint.moved.time * moving::normal_rate(work, i, &free) } else { 0.0 };
             let closed = h * s * (first[row] - turned);
             let (gap, left) = (constraint.contact.gap + closed, h * (1.0 - s).max(1e-9));
             let candidate = self.candidates.get(i);
@@ -198,18 +194,15 @@ impl TimeStepping {
             }
             work.c[row] += if struck { 0.0 } else { gap.max(0.0) / left };
         }
-        for (i, constraint) in work.contact_constraints.iter().enumerate() {
-            if moving::touches(core, constraint) && constraint.moved.rate != Vec3::zeros() {
-                let (block, rates) = (&work.rows.blocks[i], moving::row_rates(work, i, &turning));
-                for (k, row) in block.range().enumerate() {
-                    let free = work.rows.row_velocity(block, k, &free_motion_change);
-                    work.c[row] += free + (h - constraint.moved.time) * rates[k];
-                }
+        for i in 0..work.contact_constraints.len() {
+            let constraint = &work.contact_constraints[i];
+            if constraint.moved.rate != Vec3::zeros() && moving::touches(core, constraint) {
+                moving::add_motion(work, i, &free, h);
             }
         }
         for (block, target) in work.rows.blocks[work.contact_constraints.len()..].iter().zip(&work.targets) {
-            work.c[block.row as usize] += work.rows.row_velocity(block, 0, &free_motion_change)
-                - 0.5 * h * work.rows.row_velocity(block, 0, &turning);
+            let (change, turning) = free.of_row(&work.rows, block, 0);
+            work.c[block.row as usize] += change - 0.5 * h * turning;
             let reach = if target.set == RowSet::HalfLine { target.error.max(0.0) / h } else { 0.0 };
             // rows are those of the middle of the step, and go on turning for the other half
             let turning = if target.set == RowSet::Equality { 0.5 * h * target.bias_acceleration } else { 0.0 };

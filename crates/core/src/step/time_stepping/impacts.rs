@@ -10,6 +10,7 @@
 //! forces of a step change the speed of either body along its normal: what is below is load that
 //! comes and goes, not an impact.
 
+use super::moving::FreeTerms;
 use super::{Buffers, TimeStepping, in_the_middle, moving};
 use crate::constraint::rows::Side;
 use crate::contact::detect::ContactConstraint;
@@ -19,7 +20,7 @@ use crate::integrators::context::free_motion;
 use crate::object::Level;
 use crate::step::Moment;
 use crate::step::budget::{IMPACTS, REBOUND};
-use crate::step::contacts::{build_rows, detect, gyroscopic, push, row_velocities, whiten, zero};
+use crate::step::contacts::{build_rows, detect, push, row_velocities, whiten, zero};
 use crate::step::impact::{self, Candidate};
 use crate::world::{Coordinates, Core, StepError};
 
@@ -70,9 +71,9 @@ impl TimeStepping {
         row_velocities(&core.threads, &work.rows, &work.bias, u, before);
         zero(gain, work.rows.len);
         work.rows.add_velocity(du_force, gain);
-        let turning = gyroscopic(middle.coordinates(core));
+        let free = FreeTerms::new(middle, core, h);
         for (i, constraint) in work.contact_constraints.iter().enumerate() {
-            let (block, rate) = (&work.rows.blocks[i], moving::row_rates(work, i, &turning).x);
+            let (block, rate) = (&work.rows.blocks[i], moving::normal_rate(work, i, &free));
             let (row, gap) = (block.row as usize, constraint.contact.gap);
             let (v, dv) = (before[row] - constraint.moved.time * rate, gain[row]);
             let pressed = if core.state.warm.carries(&constraint.key) {
