@@ -43,7 +43,7 @@ pub(crate) struct ContactConstraint {
     pub offset: Vec3,
     /// Time after the start of the step at which normal and lever arms were found, s.
     pub found_at: f64,
-    /// Where frame and point are, if not where the contact was found.
+    /// Time and place of frame and point, if not those at which the contact was found.
     pub moved: Moved,
     pub frame: ContactFrame,
     pub friction: f64,

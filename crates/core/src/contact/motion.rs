@@ -20,6 +20,7 @@ use super::detect::ContactConstraint;
 use super::rim::rim_rate;
 use crate::object::collidable::ContactFrame;
 use crate::object::part_state::PartState;
+use crate::world::Core;
 use tumble_collide::{Contact, NormalFrom, Shape, Vec3};
 
 /// Rates of a contact's normal and point, world axes.
@@ -33,20 +34,40 @@ pub(crate) struct ContactMotion {
     side: f64,
 }
 
-/// Where a contact is at another time than that of the detection.
+/// Time and place of a contact, if not those of the detection.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Moved {
     /// Time since the detection, s.
     pub time: f64,
     /// Displacement of the contact point until then, m.
     pub way: Vec3,
-    /// Rate of the relative velocity in free motion, as the contact moves, m/s², world axes.
+    /// Rate of the relative velocity as the contact moves, without the next two, m/s², world axes.
     pub rate: Vec3,
+    /// That by the accelerations of links at constant generalized velocity.
+    pub of_links: Vec3,
+    /// That by the accelerations of parts that no force moves.
+    pub of_driven: Vec3,
+}
+
+impl Moved {
+    /// Returns whether rows change during the step.
+    pub fn changes(&self) -> bool {
+        [self.rate, self.of_links, self.of_driven].into_iter().any(|rate| rate != Vec3::zeros())
+    }
 }
 
 /// Maximum angle by which the normal of a contact that lasts turns, rad: an edge that slides past a corner has
 /// a contact for a moment.
 const MAX_TURN: f64 = 0.5;
+
+/// The accelerations of a part.
+#[derive(Clone, Copy)]
+enum Carried {
+    /// The present ones.
+    Now,
+    /// Those at constant generalized velocity.
+    AtConstantVelocity,
+}
 
 /// Returns the rate of a normal that points from B's core point to A's, for the relative velocity
 /// of the two.
@@ -86,19 +107,24 @@ impl ContactConstraint {
     /// Returns the rate of the relative velocity along the contact's axes, as the *contact* moves,
     /// m/s²; the first is the second derivative of the gap.
     pub fn acceleration(&self, a: &PartState, b: &PartState) -> Vec3 {
-        let rate = self.rate(&self.motion(a, b), [a, b], PartState::acceleration_following);
+        let rate =
+            self.rate(&self.motion(a, b), [a, b]) + self.carried(a, Carried::Now) - self.carried(b, Carried::Now);
         Vec3::from(self.frame.axes.map(|axis| axis.dot(&rate)))
     }
 
-    fn rate(
-        &self,
-        motion: &ContactMotion,
-        [a, b]: [&PartState; 2],
-        following: impl Fn(&PartState, &Vec3, &Vec3) -> Vec3,
-    ) -> Vec3 {
-        let Contact { point, normal, .. } = &self.contact;
-        let of = |s: &PartState| following(s, point, &motion.point_rate);
-        of(a) - of(b) + normal * motion.normal_rate.dot(&self.velocity(a, b))
+    /// Returns the rate of the relative velocity by the motion of the contact alone, m/s².
+    fn rate(&self, motion: &ContactMotion, [a, b]: [&PartState; 2]) -> Vec3 {
+        let slides = |s: &PartState| s.angular_velocity.cross(&(motion.point_rate - s.velocity));
+        slides(a) - slides(b) + self.contact.normal * motion.normal_rate.dot(&self.velocity(a, b))
+    }
+
+    /// Returns the acceleration of a part's frame at the contact point, m/s²: `a + α×r`.
+    fn carried(&self, s: &PartState, which: Carried) -> Vec3 {
+        let (linear, angular) = match which {
+            Carried::Now => (s.acceleration, s.angular_acceleration),
+            Carried::AtConstantVelocity => (s.bias_acceleration, s.bias_angular_acceleration),
+        };
+        linear + angular.cross(&(self.contact.point - s.position()))
     }
 
     /// Returns the velocity of the contact point over the material of a cylinder's rim on a plane,
@@ -124,24 +150,66 @@ impl ContactConstraint {
         rate.unwrap_or_default()
     }
 
+    /// Returns the point of the contact on a part that is at `state`, the start of the step, m: where
+    /// the lever arm is that of the contact's time.
+    pub fn point_on(&self, part: u32, state: &PartState) -> Vec3 {
+        match self.moved {
+            Moved { time: 0.0, .. } if part == self.a => self.contact.point,
+            Moved { time: 0.0, .. } => self.point_b(),
+            Moved { time, way, .. } => self.contact.point + way - time * state.velocity,
+        }
+    }
+
     /// Returns the gap at the time at which the contact was found, m.
     fn gap_found(&self) -> f64 {
         self.contact.gap + self.contact.normal.dot(&self.offset)
     }
 
     /// Moves frame and point to `time` seconds after the start of the step, in free motion that closes
-    /// the gap until then. A contact that does not last until then stays where it was found.
-    pub fn move_to<'s>(&mut self, time: f64, [a, b]: [&PartState; 2], shape: impl Fn(u32) -> Option<&'s Shape>) {
+    /// the gap until then. A contact that does not last until then stays where it was found, and
+    /// so does one of two edges: it does not say how it moves along them.
+    fn move_to<'s>(
+        &mut self,
+        time: f64,
+        [a, b]: [&PartState; 2],
+        moves: impl Fn(u32) -> bool,
+        shape: impl Fn(u32) -> Option<&'s Shape>,
+    ) {
         let Contact { point, normal, .. } = self.contact;
         let mut motion = self.motion(a, b);
         motion.point_rate += self.along_rim(&motion, [a, b], shape);
-        let rate = self.rate(&motion, [a, b], PartState::bias_acceleration_following);
+        let (rate, mut of_links, mut of_driven) = (self.rate(&motion, [a, b]), Vec3::zeros(), Vec3::zeros());
+        for (sign, part, state) in [(1.0, self.a, a), (-1.0, self.b, b)] {
+            if moves(part) {
+                of_links += sign * self.carried(state, Carried::AtConstantVelocity);
+            } else {
+                of_driven += sign * self.carried(state, Carried::Now);
+            }
+        }
         let left = time - self.found_at;
-        if left.abs() * motion.normal_rate.norm() > MAX_TURN {
+        if left.abs() * motion.normal_rate.norm() > MAX_TURN || self.contact.normal_from == NormalFrom::Edges {
             return;
         }
         let way = self.found_at * a.velocity + left * motion.point_rate - motion.side * self.gap_found() * normal;
-        self.moved = Moved { time, way, rate };
+        self.moved = Moved { time, way, rate, of_links, of_driven };
         self.frame = ContactFrame::new(point + way, (normal + left * motion.normal_rate).normalize());
     }
+}
+
+/// Parts that are slower, m/s and rad/s, keep their contacts where they are.
+const STILL: f64 = 1e-6;
+
+/// Moves a contact to `time` seconds after the start of the step, unless both parts are still. Returns
+/// whether it has moved.
+pub(crate) fn move_in_step(core: &Core, constraint: &mut ContactConstraint, time: f64) -> bool {
+    let parts = [constraint.a, constraint.b].map(|part| &core.derived.part_states[part as usize]);
+    let speed = |s: &PartState| s.velocity.norm_squared().max(s.angular_velocity.norm_squared());
+    if parts.into_iter().all(|part| speed(part) < STILL * STILL) {
+        return false;
+    }
+    let owner = |part: u32| core.owners[part as usize];
+    let entry = |part: u32| core.objects().at(owner(part).place as usize);
+    let shape = |part: u32| entry(part).object.collidable()?.shape(owner(part).part as usize);
+    constraint.move_to(time, parts, |part| entry(part).moves(), shape);
+    constraint.moved.time > 0.0
 }

@@ -40,7 +40,7 @@ pub(crate) fn rim_rate(
         return None;
     }
     let d = across / length;
-    let end = state.position() - u * u.dot(normal).signum() * half_length;
+    let end = state.position() + u * u.dot(&(point - state.position())).signum() * half_length;
     let rim = end - radius * d;
     if (point - rim).norm() > SAME_POINT * radius {
         return None;

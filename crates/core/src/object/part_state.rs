@@ -79,14 +79,6 @@ impl PartState {
         let r = p - self.position();
         self.acceleration + self.angular_acceleration.cross(&r) + self.angular_velocity.cross(&(p_rate - self.velocity))
     }
-
-    /// Returns the same at constant generalized velocity, m/s².
-    pub(crate) fn bias_acceleration_following(&self, p: &Vec3, p_rate: &Vec3) -> Vec3 {
-        let r = p - self.position();
-        self.bias_acceleration
-            + self.bias_angular_acceleration.cross(&r)
-            + self.angular_velocity.cross(&(p_rate - self.velocity))
-    }
 }
 
 /// A material point of a part, and directions at it.

@@ -27,24 +27,23 @@
 //!   one time-stepping sub-step. Both are counted as floor hits.
 
 use super::budget::IMPACTS;
-use super::contacts::{
-    Limit, build_rows, detect, gyroscopic, impulses, limits, push, recover, row_velocities, solve, whiten,
-};
+use super::contacts::{Limit, build_rows, detect, gyroscopic, impulses, limits, push, row_velocities, solve, whiten};
 use super::correction::{self, ActiveLimit, Contacts, Limits, Options};
 use super::event_location::{Bracket, LimitRole, Role, SLOW, Watch};
+use super::held_forces::{hold_forces, push_to};
 use super::impact::{self, Candidate};
 use super::warm_start::{row_starts, warm_start};
 use super::{StepContext, Stepper, TimeStepping, Workspace};
 use crate::constraint::rows::RowSet;
 use crate::contact::detect::ContactConstraint;
+use crate::contact::motion;
 use crate::contact::pair::PredictionMode;
 use crate::integrators::Adaptive;
-use crate::object::part_state::Wrench;
 use crate::object::{Level, RowTarget};
 use crate::settings::Integrator;
 use crate::solver::SolverSettings;
-use crate::world::view::Entry;
 use crate::world::{Core, StepError};
+use tumble_collide::NormalFrom;
 
 /// The stepper of the thesis, `backtracking`.
 #[derive(Default)]
@@ -193,12 +192,29 @@ impl Backtracking {
         struck
     }
 
+    /// Moves the contacts that touch to the middle of the rest of the frame, so that their forces act
+    /// where they do in the mean. They stay if an event is to end the sub-step before, or if two edges
+    /// touch, whose contact cannot be moved with the others.
+    fn move_contacts(&mut self, core: &mut Core, left: f64) -> Result<(), StepError> {
+        let (contacts, roles) = (&mut self.work.contact_constraints, &self.watch.roles);
+        let held = contacts.iter().zip(roles).any(|(c, r)| r.touching && c.contact.normal_from == NormalFrom::Edges);
+        if held || self.watch.first_guess(contacts, &core.derived.part_states, left) < left {
+            return Ok(());
+        }
+        let mut moves = false;
+        for (constraint, _) in contacts.iter_mut().zip(roles).filter(|(_, role)| role.touching) {
+            moves |= motion::move_in_step(core, constraint, 0.5 * left);
+        }
+        if moves { build_rows(core, None, &mut self.work, Level::Acceleration, 0.5 * left) } else { Ok(()) }
+    }
+
     /// Resolves contacts (thesis `ResolveContacts`). Returns the generalized contact forces that
     /// hold over the sub-step.
     fn resolve_contacts(&mut self, core: &mut Core, left: f64) -> Result<Vec<f64>, StepError> {
         let mut dp = std::mem::take(&mut self.work.dp);
         let time = core.state.time;
         core.integration().evaluate(time, &mut dp);
+        self.move_contacts(core, left)?;
         let work = &mut self.work;
         let mut u = Vec::new();
         whiten(core.coordinates(None), &dp, 1.0, &mut u, &mut work.du_force);
@@ -216,7 +232,14 @@ impl Backtracking {
                 &core.derived.part_states[constraint.b as usize],
             );
             for (k, row) in range.clone().enumerate() {
-                work.c[row] = acceleration[k] + velocity[row] / left;
+                let moved = &constraint.moved;
+                let rate = if moved.time > 0.0 {
+                    // the contact is that of the middle of the sub-step, links are at its start
+                    work.c[row] + constraint.frame.axes[k].dot(&(0.5 * moved.rate + moved.of_links + moved.of_driven))
+                } else {
+                    acceleration[k]
+                };
+                work.c[row] = rate + velocity[row] / left;
             }
             work.c[range.start] += constraint.contact.gap.max(0.0) / (left * left);
             keep[i] = role.touching && (role.lasts || velocity[range.start] < 1e-7);
@@ -420,45 +443,4 @@ impl Backtracking {
             core.settings.contact_tolerance,
         ))
     }
-}
-
-/// Writes the forces that hold over the sub-step to `held`, as generalized forces. Contact forces
-/// on an object whose state holds velocities are stored as wrenches on its parts: its coordinates
-/// turn with its links, and a generalized force would turn too.
-fn hold_forces(core: &mut Core, work: &Workspace, held: &mut [f64]) {
-    recover(core.coordinates(None), &work.du, held);
-    core.held_wrenches.clear();
-    let on_links = |e: &Entry| e.moves() && e.object.integratable().is_some_and(|b| b.holds_velocity());
-    if work.contact_constraints.is_empty() || !core.objects().iter().any(|e| on_links(&e)) {
-        return;
-    }
-    let mut joined = vec![0.0; core.dof];
-    work.rows.blocks[work.contact_constraints.len()..]
-        .iter()
-        .for_each(|block| work.rows.apply_block(block, &work.lambda, &mut joined));
-    let mut generalized = vec![0.0; core.dof];
-    recover(core.coordinates(None), &joined, &mut generalized);
-    for entry in core.objects().iter().filter(|e| on_links(e)) {
-        held[entry.state_range.v.clone()].copy_from_slice(&generalized[entry.state_range.v.clone()]);
-    }
-    core.held_wrenches.resize(core.derived.part_states.len(), Wrench::default());
-    for (constraint, force) in work.contact_constraints.iter().zip(impulses(work, &work.lambda)) {
-        for (part_state, point, force) in
-            [(constraint.a, constraint.contact.point, force), (constraint.b, constraint.point_b(), -force)]
-        {
-            if on_links(&core.objects().at(core.owners[part_state as usize].place as usize)) {
-                let arm = point - core.derived.part_states[part_state as usize].position();
-                let wrench = &mut core.held_wrenches[part_state as usize];
-                wrench.force += force;
-                wrench.torque += arm.cross(&force);
-            }
-        }
-    }
-}
-
-/// Changes the whitened velocity from `before` to `after`, and refreshes part states and caches.
-fn push_to(core: &mut Core, after: &[f64], before: &[f64]) {
-    let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
-    push(core.coordinates(None), &change, &mut Vec::new());
-    core.integration().refresh();
 }

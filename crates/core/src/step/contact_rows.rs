@@ -7,7 +7,6 @@
 use super::contacts::{Basis, Workspace};
 use crate::constraint::rows::{Block, RowSet, Rows};
 use crate::contact::detect::ContactConstraint;
-use crate::contact::motion::Moved;
 use crate::derived::Cache;
 use crate::object::Integratable;
 use crate::object::part_state::{PartPoint, PartState};
@@ -122,37 +121,34 @@ fn moving<'a>(entry: &Entry<'a>) -> Option<&'a dyn Integratable> {
 
 /// Returns both sides of a contact.
 fn sides<'a>(basis: &Basis<'a>, constraint: &ContactConstraint) -> [ContactSide<'a>; 2] {
-    let second = if constraint.moved.time > 0.0 { constraint.contact.point } else { constraint.point_b() };
-    let ends = [(constraint.a, constraint.contact.point, 1.0), (constraint.b, second, -1.0)];
-    ends.map(|(part_state, point, sign)| {
+    [(constraint.a, 1.0), (constraint.b, -1.0)].map(|(part_state, sign)| {
         let (owner, index) = (basis.owners[part_state as usize], part_state as usize);
         let (entry, (_, found)) = (basis.view.objects.at(owner.place as usize), basis.found);
         let acting = basis.acting.filter(|_| entry.moves()).map(|part_states| &part_states[index]);
-        let point = acting_point(constraint, point, &found[index], acting, &entry);
+        let point = acting_point(constraint, part_state, &found[index], acting, &entry);
         ContactSide { entry, part: owner.part as usize, part_state: acting.unwrap_or(&found[index]), point, sign }
     })
 }
 
-/// Returns the point of a contact on a side, for the state at which the side acts: `found` if
-/// `acting` is `None`.
+/// Returns the point of a contact on a part, for the state at which the part acts: `found` if `acting`
+/// is `None`.
 fn acting_point(
     constraint: &ContactConstraint,
-    point: Vec3,
+    part: u32,
     found: &PartState,
     acting: Option<&PartState>,
     entry: &Entry,
 ) -> Vec3 {
-    let gone = acting.map_or(Vec3::zeros(), |acting| acting.position() - found.position());
-    let Moved { time, way, .. } = constraint.moved;
-    if time == 0.0 {
-        // the lever arm stays that of the detection: the lowest point of a spinning sphere does not
-        // turn with it
-        return point + gone;
+    match acting {
+        // a rigid body acts where the contact has moved to, with its own pose of that time
+        Some(_) if constraint.moved.time > 0.0 && entry.object.integratable().is_some_and(|b| !b.holds_velocity()) => {
+            constraint.contact.point + constraint.moved.way
+        }
+        // the lever arm stays that of the contact: the lowest point of a spinning sphere does not turn
+        // with it
+        Some(acting) => constraint.point_on(part, found) + acting.position() - found.position(),
+        None => constraint.point_on(part, found),
     }
-    // a rigid body acts where the contact has moved to, with its own pose of that time; the others
-    // act elsewhere and keep the lever arm of that time
-    let there = acting.is_some() && entry.object.integratable().is_some_and(|body| !body.holds_velocity());
-    if there { point + way } else { point + way + gone - time * found.velocity }
 }
 
 /// Returns the range of the responses of an object in a block.

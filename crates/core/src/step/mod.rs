@@ -7,6 +7,7 @@ mod contacts;
 mod context;
 mod correction;
 mod event_location;
+mod held_forces;
 mod impact;
 mod islands;
 mod moment;

@@ -52,7 +52,6 @@ use crate::solver::SolverSettings;
 use crate::world::view::Entry;
 use crate::world::{Coordinates, Core, StepError};
 use moving::FreeTerms;
-use tumble_collide::Vec3;
 
 /// The default stepper, `time_stepping`.
 #[derive(Default)]
@@ -166,7 +165,7 @@ impl TimeStepping {
     fn contacts(&mut self, core: &mut Core, middle: &mut Moment, h: f64, u0: &[f64], u: &mut [f64], du_force: &[f64]) {
         let work = &mut self.work;
         let Buffers { before, gain: first, parts, keep, .. } = &mut self.buffers;
-        let moves = work.contact_constraints.iter().any(|t| t.moved.rate != Vec3::zeros());
+        let moves = work.contact_constraints.iter().any(|t| t.moved.changes());
         let free =
             if work.targets.is_empty() && !moves { FreeTerms::default() } else { FreeTerms::new(middle, core, h) };
         row_velocities(&core.threads, &work.rows, &work.bias, u0, first);
@@ -181,8 +180,7 @@ impl TimeStepping {
             let block = &work.rows.blocks[i];
             let (row, struck) = (block.row as usize, self.impact[block.row as usize] > 0.0);
             let s = block.sides().iter().map(|side| self.impact_fraction[side.u as usize]).fold(0.0, f64::max);
-            let turned = if s > 0.0 { 0.5 * constraint.moved.time * moving::normal_rate(work, i, &free) } else { 0.0 };
-            let closed = h * s * (first[row] - turned);
+            let closed = h * s * 0.5 * (first[row] + moving::gap_rate(work, i, &free, (first[row], h)).0);
             let (gap, left) = (constraint.contact.gap + closed, h * (1.0 - s).max(1e-9));
             let candidate = self.candidates.get(i);
             let rest_speed = candidate.map_or(f64::INFINITY, |candidate| candidate.rest_speed);
@@ -196,7 +194,7 @@ impl TimeStepping {
         }
         for i in 0..work.contact_constraints.len() {
             let constraint = &work.contact_constraints[i];
-            if constraint.moved.rate != Vec3::zeros() && moving::touches(core, constraint) {
+            if constraint.moved.changes() && moving::touches(core, constraint) {
                 moving::add_motion(work, i, &free, h);
             }
         }

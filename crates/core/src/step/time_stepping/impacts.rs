@@ -73,9 +73,10 @@ impl TimeStepping {
         work.rows.add_velocity(du_force, gain);
         let free = FreeTerms::new(middle, core, h);
         for (i, constraint) in work.contact_constraints.iter().enumerate() {
-            let (block, rate) = (&work.rows.blocks[i], moving::normal_rate(work, i, &free));
+            let block = &work.rows.blocks[i];
             let (row, gap) = (block.row as usize, constraint.contact.gap);
-            let (v, dv) = (before[row] - constraint.moved.time * rate, gain[row]);
+            let dv = gain[row];
+            let (v, rate) = moving::gap_rate(work, i, &free, (before[row], h));
             let pressed = if core.state.warm.carries(&constraint.key) {
                 let side = |s: &Side| work.rows.side_velocity(s, 0, du_force).abs();
                 block.sides().iter().map(side).fold(0.0, f64::max)

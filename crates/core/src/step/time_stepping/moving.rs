@@ -3,36 +3,27 @@
 
 use crate::constraint::rows::{Block, Rows};
 use crate::contact::detect::ContactConstraint;
-use crate::contact::motion::Moved;
-use crate::object::part_state::PartState;
+use crate::contact::motion::{Moved, move_in_step};
 use crate::step::contacts::{free_motion_change, gyroscopic};
 use crate::step::{Moment, Workspace};
 use crate::world::Core;
-use tumble_collide::{Shape, Vec3};
-
-/// Parts that are slower, m/s and rad/s, keep their contacts where they are.
-const STILL: f64 = 1e-6;
+use tumble_collide::Vec3;
 
 /// Moves the contacts that touch to `time` seconds after the start of the step. Others stay, so that
 /// what passes them keeps its distance; those that may bounce get their rates.
 pub(super) fn move_contacts(core: &Core, contacts: &mut [ContactConstraint], time: f64) {
     for constraint in contacts {
-        let parts = parts(core, constraint);
         let touches = touches(core, constraint);
         let may_bounce = constraint.restitution > 0.0 && constraint.found_at == 0.0;
-        if (touches || may_bounce) && !parts.into_iter().all(is_still) {
+        if touches || may_bounce {
             let before = constraint.frame;
-            constraint.move_to(time, parts, |part| shape(core, part));
+            move_in_step(core, constraint, time);
             if !touches {
                 constraint.frame = before;
-                constraint.moved = Moved { rate: constraint.moved.rate, ..Moved::default() };
+                constraint.moved = Moved { time: 0.0, way: Vec3::zeros(), ..constraint.moved };
             }
         }
     }
-}
-
-fn is_still(part: &PartState) -> bool {
-    part.velocity.norm_squared().max(part.angular_velocity.norm_squared()) < STILL * STILL
 }
 
 /// Returns whether a contact is closed at the start of the step.
@@ -65,23 +56,29 @@ impl FreeTerms {
     }
 }
 
-/// Returns the rate of the normal velocity of a contact in free motion, m/s².
-pub(super) fn normal_rate(work: &Workspace, contact: usize, free: &FreeTerms) -> f64 {
-    let constraint = &work.contact_constraints[contact];
-    if constraint.moved.rate == Vec3::zeros() {
-        return 0.0;
+/// Returns the velocity (m/s) of the gap of a contact at the start of a step of `h` seconds, from that
+/// of its row, and the rate of it in free motion, m/s².
+pub(super) fn gap_rate(work: &Workspace, contact: usize, free: &FreeTerms, (row, h): (f64, f64)) -> (f64, f64) {
+    let ContactConstraint { moved, frame, .. } = &work.contact_constraints[contact];
+    if !moved.changes() {
+        return (row, 0.0);
     }
     let (_, turning) = free.of_row(&work.rows, &work.rows.blocks[contact], 0);
-    constraint.frame.axes[0].dot(&constraint.moved.rate) - turning
+    let [rate, links, driven] = [moved.rate, moved.of_links, moved.of_driven].map(|rate| frame.axes[0].dot(&rate));
+    let rate = rate - turning;
+    (row - moved.time * rate - 0.5 * h * links, rate + links + driven)
 }
 
 /// Adds to the right-hand side of a contact that touches what its rows still change until the end
-/// of the step.
+/// of the step. Rows of links are those of the middle of the step, velocities of driven parts those of
+/// its start.
 pub(super) fn add_motion(work: &mut Workspace, contact: usize, free: &FreeTerms, h: f64) {
     let (constraint, block) = (&work.contact_constraints[contact], &work.rows.blocks[contact]);
+    let moved = &constraint.moved;
+    let left = (h - moved.time) * moved.rate + 0.5 * h * moved.of_links + h * moved.of_driven;
     for (k, (row, axis)) in block.range().zip(&constraint.frame.axes).enumerate() {
         let (change, turning) = free.of_row(&work.rows, block, k);
-        work.c[row] += change + (h - constraint.moved.time) * (axis.dot(&constraint.moved.rate) - turning);
+        work.c[row] += change + axis.dot(&left) - (h - moved.time) * turning;
     }
 }
 
@@ -92,17 +89,9 @@ pub(super) fn move_to_impacts(core: &Core, work: &mut Workspace, fraction: &[f64
     for (constraint, block) in work.contact_constraints.iter_mut().zip(&work.rows.blocks) {
         let s = block.sides().iter().map(|side| fraction[side.u as usize]).fold(-1.0, f64::max);
         if s >= 0.0 {
-            constraint.move_to(s * h, parts(core, constraint), |part| shape(core, part));
-            constraint.moved.rate = Vec3::zeros();
+            move_in_step(core, constraint, s * h);
+            let Moved { time, way, .. } = constraint.moved;
+            constraint.moved = Moved { time, way, ..Moved::default() };
         }
     }
-}
-
-fn parts<'a>(core: &'a Core, constraint: &ContactConstraint) -> [&'a PartState; 2] {
-    [constraint.a, constraint.b].map(|part| &core.derived.part_states[part as usize])
-}
-
-fn shape(core: &Core, part: u32) -> Option<&Shape> {
-    let owner = core.owners[part as usize];
-    core.objects().at(owner.place as usize).object.collidable()?.shape(owner.part as usize)
 }
