@@ -27,7 +27,7 @@
 //!   one time-stepping sub-step. Both are counted as floor hits.
 
 use super::budget::IMPACTS;
-use super::contacts::{Limit, build_rows, detect, gyroscopic, impulses, limits, push, row_velocities, solve, whiten};
+use super::contacts::{Limit, build_rows, detect, gyroscopic, impulses, limits, row_velocities, solve, whiten};
 use super::correction::{self, ActiveLimit, Contacts, Limits, Options};
 use super::event_location::{Bracket, LimitRole, Role, SLOW, Watch};
 use super::held_forces::{hold_forces, push_to};

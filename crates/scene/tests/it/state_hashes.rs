@@ -50,24 +50,24 @@ macro_rules! table {
 }
 
 table! {
-    billiards_time_stepping: "billiards", TimeStepping, "33c170c167dc1596", "68443c48afff146a";
-    billiards_backtracking: "billiards", Backtracking, "4fc9ffdc997b30de", "18ac71f99f03a8c1";
-    bowling_time_stepping: "bowling", TimeStepping, "ed36688f395747c2", "c5c7dc3bb443bc78";
-    bowling_backtracking: "bowling", Backtracking, "53db2850eca4d504", "bedfe9242da3cf67";
-    chain_time_stepping: "chain", TimeStepping, "269e2944ada62119", "f61bdc87b0d6177a";
-    chain_backtracking: "chain", Backtracking, "dd07677ce4aa11c1", "6b8d1b78dea2c669";
-    falling_time_stepping: "falling", TimeStepping, "55a2efd3019cb810", "7a1963c792f4dfdb";
-    falling_backtracking: "falling", Backtracking, "de16ab88f496d86d", "9d4b8e1ceee06e06";
-    incline_time_stepping: "incline", TimeStepping, "c8d35ebc2e29a12a", "7b8c108360d8ae2c";
-    incline_backtracking: "incline", Backtracking, "e55d9c0fdc513c1e", "a93b5ab540a60671";
+    billiards_time_stepping: "billiards", TimeStepping, "31018d04b3052457", "99394a3d919f7c04";
+    billiards_backtracking: "billiards", Backtracking, "b5a27eda6855859e", "bf300238bd656f9e";
+    bowling_time_stepping: "bowling", TimeStepping, "f6721937cb4d54f4", "d314bc084d8f191f";
+    bowling_backtracking: "bowling", Backtracking, "e677eac272ba7de7", "639dcb1ba70e5e70";
+    chain_time_stepping: "chain", TimeStepping, "da183284df94ce40", "7c050bf315c18be7";
+    chain_backtracking: "chain", Backtracking, "1605050ff516ff97", "84bb4478ecfdda29";
+    falling_time_stepping: "falling", TimeStepping, "11be3b5e263e3343", "5de6da994ffffcee";
+    falling_backtracking: "falling", Backtracking, "c681059d5c6a16b9", "7987e4897adeb92d";
+    incline_time_stepping: "incline", TimeStepping, "e279621724363969", "85a12d59b2107f19";
+    incline_backtracking: "incline", Backtracking, "dba991e4803cfe34", "95407557393acae5";
     pendulum_time_stepping: "pendulum", TimeStepping, "d403df437fc48e8e", "07a9ea1905d7c967";
     pendulum_backtracking: "pendulum", Backtracking, "69fe4156518a0013", "692b5de118331942";
     piston_time_stepping: "piston", TimeStepping, "e970a95bc604c769", "69f85217f1250e61";
     piston_backtracking: "piston", Backtracking, "eec51fdb3e6e2809", "0b86e6820d08239f";
-    robot_time_stepping: "robot", TimeStepping, "d12ab164c366e431", "11bf070e1ec3ca35";
-    robot_backtracking: "robot", Backtracking, "889eeadcdf2d375a", "9f75d04f6450b9fc";
-    skeleton_time_stepping: "skeleton", TimeStepping, "27999ed81927a3e1", "55ee0abd73f04eef";
-    skeleton_backtracking: "skeleton", Backtracking, "e437ef505593c8ae", "4762dfaff6cb956c";
+    robot_time_stepping: "robot", TimeStepping, "d12ab164c366e431", "1ba51d3713f4089e";
+    robot_backtracking: "robot", Backtracking, "e468ef66569eaf16", "0df5728780acbe50";
+    skeleton_time_stepping: "skeleton", TimeStepping, "f0ff31d36e418576", "98b6b85d09cd0b1b";
+    skeleton_backtracking: "skeleton", Backtracking, "41dc63582d89a300", "384f159aeb1cdee9";
     stack_time_stepping: "stack", TimeStepping, "20ad0965d34e48bf", "ecd253fcdb6efb2e";
-    stack_backtracking: "stack", Backtracking, "f3e4e18dc66cf3d0", "e2c70bafe5205c09";
+    stack_backtracking: "stack", Backtracking, "8bf0d645b39a693b", "3d204eae8525be65";
 }
