@@ -45,7 +45,7 @@ impl DofState<'_> {
         if self.settings.friction > 0.0 {
             row(RowTarget::new(level.bounded(self.settings.friction), 0.0));
         }
-        if let (Some(h), true) = (level.step(), self.settings.damping > 0.0) {
+        if let (Some(h), true) = (level.soft_step(), self.settings.damping > 0.0) {
             let compliance = 1.0 / (h * self.settings.damping);
             row(RowTarget { compliance, ..RowTarget::new(RowSet::Equality, 0.0) });
         }
@@ -73,11 +73,12 @@ impl DofState<'_> {
         Some(match &self.settings.drive {
             Drive::None => return None,
             Drive::Position { stiffness, damping, target, velocity, limit } => {
-                let h = level.step()?;
+                let h = level.soft_step()?;
+                let start = self.q - 0.5 * level.h() * self.v;
                 // the view is that of the middle of the step: the position at its start is half a
                 // step behind
-                let (q, gain) = (self.q - 0.5 * h * self.v, damping + h * stiffness);
-                let aim = (stiffness * (target - q) + damping * velocity) / gain;
+                let gain = damping + h * stiffness;
+                let aim = (stiffness * (target - start) + damping * velocity) / gain;
                 RowTarget { velocity: aim, compliance: 1.0 / (h * gain), ..RowTarget::new(set(*limit), 0.0) }
             }
             Drive::Velocity { target, limit } => {

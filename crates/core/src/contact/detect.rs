@@ -3,7 +3,7 @@
 use crate::contact::internal_edges::{InternalEdges, Surroundings};
 use crate::contact::motion::Moved;
 use crate::contact::pair::{CachedContacts, KnownContacts, MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
-use crate::contact::pair_material::PairMaterials;
+use crate::contact::pair_material::{PairMaterials, Surface};
 use crate::contact::time_of_impact::MovingPair;
 use crate::object::Material;
 use crate::object::collidable::ContactFrame;
@@ -48,6 +48,8 @@ pub(crate) struct ContactConstraint {
     pub frame: ContactFrame,
     pub friction: f64,
     pub restitution: f64,
+    /// Velocity of A's surface over A, less that of B's, m/s, world axes.
+    pub surface_velocity: Vec3,
     pub key: ContactKey,
 }
 
@@ -270,6 +272,8 @@ impl NarrowPhase<'_> {
             return;
         }
         let Material { restitution, friction, .. } = self.pair_materials.combine(self.settings, surface_a, surface_b);
+        let of_surface = |state: &PartState, (.., material): Surface| state.pose.rotation * material.surface_velocity;
+        let surface_velocity = of_surface(state_a, surface_a) - of_surface(state_b, surface_b);
         let pair = [entry_a.serial, owner_a.part, entry_b.serial, owner_b.part];
         let mut frame = ContactFrame { point: Vec3::zeros(), axes: [Vec3::zeros(); 3] };
         let mut frame_of = |contact: &Contact| {
@@ -288,6 +292,7 @@ impl NarrowPhase<'_> {
             frame: frame_of(contact),
             friction,
             restitution,
+            surface_velocity,
             key: ContactKey { pair, feature: contact.feature },
         }));
         if time > 0.0 {

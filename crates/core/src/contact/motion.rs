@@ -47,6 +47,8 @@ pub(crate) struct Moved {
     pub of_links: Vec3,
     /// That by the accelerations of parts that no force moves.
     pub of_driven: Vec3,
+    /// Change of the gap until then that the row does not have, m: its normal turns, and its bodies rotate.
+    pub turned: f64,
 }
 
 impl Moved {
@@ -160,9 +162,23 @@ impl ContactConstraint {
         }
     }
 
+    /// Returns the gap at the start of the step as the row of the contact sees it, m: its velocity
+    /// times the time since then adds up to the gap.
+    pub fn gap_of_row(&self) -> f64 {
+        self.contact.gap + self.moved.turned
+    }
+
     /// Returns the gap at the time at which the contact was found, m.
     fn gap_found(&self) -> f64 {
-        self.contact.gap + self.contact.normal.dot(&self.offset)
+        self.gap_of_row() + self.contact.normal.dot(&self.offset)
+    }
+
+    /// Takes back a motion of the contact within the step.
+    pub fn stay(&mut self) {
+        if self.moved.time > 0.0 {
+            self.moved = Moved::default();
+            self.frame = ContactFrame::new(self.contact.point, self.contact.normal);
+        }
     }
 
     /// Moves frame and point to `time` seconds after the start of the step, in free motion that closes
@@ -191,7 +207,7 @@ impl ContactConstraint {
             return;
         }
         let way = self.found_at * a.velocity + left * motion.point_rate - motion.side * self.gap_found() * normal;
-        self.moved = Moved { time, way, rate, of_links, of_driven };
+        self.moved = Moved { time, way, rate, of_links, of_driven, ..self.moved };
         self.frame = ContactFrame::new(point + way, (normal + left * motion.normal_rate).normalize());
     }
 }

@@ -93,7 +93,7 @@ impl PairMaterials {
         Material {
             restitution: chosen.restitution.unwrap_or_else(|| rule(settings.combine_restitution, |m| m.restitution)),
             friction: chosen.friction.unwrap_or_else(|| rule(settings.combine_friction, |m| m.friction)),
-            id: 0,
+            ..Material::default()
         }
     }
 

@@ -93,7 +93,7 @@ pub(crate) struct Search {
 
 impl MovingPair<'_> {
     /// Finds the contacts after `t` seconds of free motion, ordered by feature.
-    fn contacts_after(&self, t: f64, margin: f64, found: &mut Vec<Contact>) {
+    pub fn contacts_after(&self, t: f64, margin: f64, found: &mut Vec<Contact>) {
         self.contacts_at(&self.part_states.map(|part_state| pose_after_free_motion(part_state, t)), margin, found);
     }
 
@@ -203,6 +203,23 @@ impl MovingPair<'_> {
     }
 }
 
+/// Returns the parts of a contact; `None` if one has no shape.
+pub(crate) fn moving_pair<'a>(
+    objects: Objects<'a>,
+    owners: &[Owner],
+    part_states: &'a [PartState],
+    contact: &ContactConstraint,
+) -> Option<MovingPair<'a>> {
+    let part = |index: u32| {
+        let owner = owners[index as usize];
+        let body: &dyn Collidable = objects.at(owner.place as usize).object.collidable()?;
+        Some((body.shape(owner.part as usize)?, body.contact_mode(owner.part as usize)))
+    };
+    let ((a, mode_a), (b, mode_b)) = part(contact.a).zip(part(contact.b))?;
+    let part_states = [contact.a, contact.b].map(|index| &part_states[index as usize]);
+    Some(MovingPair { mode: mode_a.of_pair(mode_b), shapes: [a, b], part_states })
+}
+
 /// Replaces the contacts of fast convex parts that close within `h` by those at the time at which
 /// the parts meet: the first contact, and the others of that place that may follow it in the rest
 /// of the step. Removes contacts that do not close on the way. `predicted` is working memory.
@@ -214,29 +231,23 @@ pub(crate) fn time_contacts(
     contact_constraints: &mut Vec<ContactConstraint>,
     predicted: &mut Vec<ContactConstraint>,
 ) {
-    let part = |index: u32| {
-        let owner = owners[index as usize];
-        let body: &dyn Collidable = objects.at(owner.place as usize).object.collidable()?;
-        Some((body.shape(owner.part as usize)?, body.contact_mode(owner.part as usize)))
-    };
     // the pair of a contact, and the number of samples of its motion, if it is fast
     let timed = |contact: &ContactConstraint| {
         let states = [contact.a, contact.b].map(|index| &part_states[index as usize]);
         let motion = h * (states[0].velocity - states[1].velocity).norm();
-        let ((a, mode_a), (b, mode_b)) = part(contact.a).zip(part(contact.b))?;
-        let size = a.bounding_radius().min(b.bounding_radius());
+        let pair = moving_pair(objects, owners, part_states, contact)?;
+        let short = SHORT_MOTION * pair.size();
         // contacts of a mesh begin and end with its features
-        let timed = motion >= SHORT_MOTION * size && !a.has_tree() && !b.has_tree();
-        let pair = MovingPair { mode: mode_a.of_pair(mode_b), shapes: [a, b], part_states: states };
-        timed.then_some((pair, (motion / (SHORT_MOTION * size)).min(MAX_SAMPLES).ceil()))
+        let timed = motion >= short && !pair.shapes.iter().any(|shape| shape.has_tree());
+        timed.then_some((pair, (motion / short).min(MAX_SAMPLES).ceil()))
     };
     let same_pair = |x: &ContactConstraint, y: &ContactConstraint| x.key.pair == y.key.pair;
     let slow = contact_constraints.chunk_by(same_pair).take_while(|contacts| timed(&contacts[0]).is_none());
     let slow: usize = slow.map(<[ContactConstraint]>::len).sum();
+    predicted.clear();
     if slow == contact_constraints.len() {
         return;
     }
-    predicted.clear();
     predicted.extend(contact_constraints.drain(slow..));
     let pieces = pieces_of_pairs(threads, predicted);
     let mut pieces: Vec<(&[ContactConstraint], Vec<ContactConstraint>)> =
@@ -295,9 +306,15 @@ impl MovingPair<'_> {
                 if !found.iter().any(|contact| contact.feature == first.feature) {
                     found.push(first);
                 }
+                let least = predicted.iter().map(|c| c.contact.gap).fold(f64::INFINITY, f64::min);
                 out.extend(found.iter().map(|contact| {
-                    let mut constraint = predicted[0].clone();
-                    constraint.move_to_impact(contact, self.part_states, time);
+                    let known = predicted.iter().find(|c| c.key.feature == contact.feature);
+                    let mut constraint = known.unwrap_or(&predicted[0]).clone();
+                    constraint.find_again(contact, self.part_states, time, known.is_some());
+                    // contacts that were not predicted are further away
+                    let nearer = (least - constraint.contact.gap).max(0.0);
+                    constraint.contact.gap += nearer;
+                    constraint.moved.turned -= nearer;
                     constraint
                 }));
                 out[begin..].sort_by_key(|constraint| constraint.key.feature);
@@ -309,7 +326,7 @@ impl MovingPair<'_> {
 
     /// Returns a bound on the distance that the parts close in `t` seconds at their present speeds
     /// within the size of the smaller one from a point, m.
-    fn reach(&self, point: &Vec3, t: f64) -> f64 {
+    pub fn reach(&self, point: &Vec3, t: f64) -> f64 {
         let [a, b] = self.part_states;
         let spin = a.angular_velocity.norm() + b.angular_velocity.norm();
         t * ((a.velocity_at(point) - b.velocity_at(point)).norm() + spin * 2.0 * self.size())
@@ -324,10 +341,31 @@ impl MovingPair<'_> {
 
 impl ContactConstraint {
     /// Replaces the contact by that of the time `t` of impact, s, as seen from the start of the
-    /// step: lever arms and normal of the impact, and the gap that free motion closes until then.
+    /// step: lever arms and normal of the impact, and the gap that the velocities of its points close
+    /// until then.
     pub fn move_to_impact(&mut self, contact: &Contact, [a, b]: [&PartState; 2], t: f64) {
         let moved = |s: &PartState| pose_after_free_motion(s, t).translation.vector - s.position();
-        let (move_a, move_b): (Vec3, Vec3) = (moved(a), moved(b));
+        let ways: [Vec3; 2] = [moved(a), moved(b)];
+        let turned = |s: &PartState, way: Vec3| t * s.angular_velocity.cross(&(contact.point - s.position() - way));
+        let closed = contact.normal.dot(&(turned(a, ways[0]) - turned(b, ways[1])));
+        self.place_at(&Contact { gap: contact.gap - closed, ..*contact }, ways, t);
+    }
+
+    /// Replaces point and normal by those of a contact of the time `t`, s, in free motion. The gap stays
+    /// that of the start of the step if it is of the same feature.
+    pub fn find_again(&mut self, contact: &Contact, parts: [&PartState; 2], t: f64, same: bool) {
+        let gap = self.contact.gap;
+        self.move_to_impact(contact, parts, t);
+        self.moved.turned = 0.0;
+        if same {
+            self.moved.turned = self.contact.gap - gap;
+            self.contact.gap = gap;
+        }
+    }
+
+    /// Replaces the contact by one of the time `t`, s, at which the parts have moved by `move_a` and
+    /// `move_b`, m, and not turned.
+    pub fn place_at(&mut self, contact: &Contact, [move_a, move_b]: [Vec3; 2], t: f64) {
         let closed = contact.normal.dot(&(move_a - move_b));
         self.contact = Contact { point: contact.point - move_a, gap: contact.gap - closed, ..*contact };
         self.key.feature = contact.feature;

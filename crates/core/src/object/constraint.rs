@@ -14,7 +14,37 @@ pub enum Level {
         h: f64,
     },
     /// Multipliers are forces that correct accelerations.
-    Acceleration,
+    Acceleration {
+        /// Length of the sub-step, s.
+        h: f64,
+        /// Time after its start, s, at which soft forces (damping, position drives, springs of loop
+        /// joints) act, if they are rows; `None` if they are forces.
+        soft: Option<f64>,
+    },
+}
+
+impl Default for Level {
+    fn default() -> Level {
+        Level::Acceleration { h: 0.0, soft: None }
+    }
+}
+
+impl Level {
+    /// Returns the length of the step, s.
+    pub fn h(self) -> f64 {
+        match self {
+            Level::Velocity { h } | Level::Acceleration { h, .. } => h,
+        }
+    }
+
+    /// Returns the time after the start of the step at which the forces of soft rows act, s: its end, or its
+    /// middle if the step resolves them. `None` if soft forces are no rows.
+    pub fn soft_step(self) -> Option<f64> {
+        match self {
+            Level::Velocity { h } => Some(h),
+            Level::Acceleration { soft, .. } => soft,
+        }
+    }
 }
 
 /// Constrains itself or others: joint limits, loop joints, rods. Its rows are solved together with
@@ -65,8 +95,8 @@ pub struct RowTarget {
     ///
     /// An implicit PD drive `F = kp·(q* − q⁺) + kd·(v* − v⁺)` with `q⁺ = q + h·v⁺` is
     /// `compliance = 1/(h·(kd + h·kp))` with the target velocity
-    /// `(kp·(q* − q) + kd·v*)/(kd + h·kp)`; the same at the acceleration level, for a sub-step of
-    /// `h`.
+    /// `(kp·(q* − q) + kd·v*)/(kd + h·kp)`; the same at the acceleration level. `h` is
+    /// [`Level::soft_step`], or the length of the step if that is `None`.
     pub compliance: f64,
 }
 

@@ -1,5 +1,7 @@
 //! Surface constants of bodies and of pairs.
 
+use tumble_collide::Vec3;
+
 /// Surface constants of one body.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Material {
@@ -7,6 +9,10 @@ pub struct Material {
     pub restitution: f64,
     /// Coefficient of Coulomb friction, at least 0.
     pub friction: f64,
+    /// Velocity of the surface over the body that carries it, in the frame of the part, m/s: a conveyor
+    /// belt. Friction acts against the velocity of the other body over the surface; the component along the
+    /// normal has no effect.
+    pub surface_velocity: Vec3,
     /// Number by which [`World::set_pair_material`](crate::World::set_pair_material) selects parts
     /// of this material; 0 for none.
     pub id: u32,
@@ -14,7 +20,7 @@ pub struct Material {
 
 impl Default for Material {
     fn default() -> Material {
-        Material { restitution: 0.0, friction: 0.5, id: 0 }
+        Material { restitution: 0.0, friction: 0.5, surface_velocity: Vec3::zeros(), id: 0 }
     }
 }
 

@@ -345,6 +345,7 @@ impl RigidBody {
         range("linear damping", self.linear_damping, self.linear_damping >= 0.0, "at least 0")?;
         range("angular damping", self.angular_damping, self.angular_damping >= 0.0, "at least 0")?;
         range("gravity scale", self.gravity_scale, true, "finite")?;
+        m.surface_velocity.iter().try_for_each(|&x| range("surface velocity", x, true, "finite"))?;
         self.offset.iter().try_for_each(|&x| range("center of mass", x, true, "finite"))?;
         range("norm of the orientation", unit, (unit - 1.0).abs() < 1e-6, "1")?;
         let numbers = [self.initial_pose.translation.vector, self.initial_velocity, self.initial_angular_velocity];

@@ -34,7 +34,7 @@ use super::held_forces::{hold_forces, push_to};
 use super::impact::{self, Candidate};
 use super::warm_start::{row_starts, warm_start};
 use super::{StepContext, Stepper, TimeStepping, Workspace};
-use crate::constraint::rows::RowSet;
+use crate::constraint::rows::{Block, RowSet};
 use crate::contact::detect::ContactConstraint;
 use crate::contact::motion;
 use crate::contact::pair::PredictionMode;
@@ -49,6 +49,8 @@ use tumble_collide::NormalFrom;
 #[derive(Default)]
 pub struct Backtracking {
     work: Workspace,
+    /// Level of the rows of the sub-step.
+    level: Level,
     /// Contacts and limits of the tried state.
     after: Vec<ContactConstraint>,
     limits_after: Vec<Limit>,
@@ -62,12 +64,20 @@ pub struct Backtracking {
 
 /// Number of tries in a frame after which the rest of it is one time-stepping sub-step.
 const TRIES: u32 = 200;
+/// Soft forces are implicit rows if any of them changes its own velocity by more than this fraction of
+/// it in the sub-step: explicit integration loses its accuracy there and, at about 2, its stability.
+const STIFF: f64 = 0.5;
 /// Least sub-step, as a fraction of the frame.
 const FLOOR: f64 = 1.0 / (1 << 28) as f64;
 /// Maximum number of passes of the impact phase.
 const IMPACT_PASSES: u32 = 200;
 /// Maximum number of corrections of a time found by dense output, before the dense state is taken.
 const CORRECTIONS: u32 = 2;
+
+/// Returns whether a row is a spring, a damper or a drive of finite gain.
+fn is_soft(target: &RowTarget) -> bool {
+    target.compliance > 0.0
+}
 
 impl Stepper for Backtracking {
     fn name(&self) -> &'static str {
@@ -84,7 +94,7 @@ impl Stepper for Backtracking {
                 self.fallback.substep(core, left)?;
                 break;
             }
-            core.implicit = false;
+            core.by_impulses = false;
             self.gather(core, left)?;
             self.roles(core);
             if self.resolve_impacts(core) {
@@ -108,13 +118,24 @@ impl Backtracking {
     /// accelerations at the present state.
     fn gather(&mut self, core: &mut Core, left: f64) -> Result<(), StepError> {
         detect(core, None, (left, PredictionMode::Relative), &mut self.work.contact_constraints);
-        build_rows(core, None, &mut self.work, Level::Acceleration, 0.0)?;
+        let soft = Some(left);
+        build_rows(core, None, &mut self.work, Level::Acceleration { h: left, soft }, 0.0)?;
+        let soft = match core.settings.integrator {
+            _ if self.is_stiff() => soft,
+            Integrator::Verlet => Some(0.5 * left),
+            _ => None,
+        };
+        core.implicit = soft.is_some();
+        self.level = Level::Acceleration { h: left, soft };
+        if soft != Some(left) && self.work.targets.iter().any(is_soft) {
+            build_rows(core, None, &mut self.work, self.level, 0.0)?;
+        }
         let off = |e: f64| e < -core.settings.contact_tolerance;
         let drifted = |t: &RowTarget| t.set == RowSet::HalfLine && off(t.error);
         if self.work.targets.iter().any(drifted) || self.work.contact_constraints.iter().any(|t| off(t.contact.gap)) {
             let options = Options {
                 h: left,
-                level: Level::Acceleration,
+                level: self.level,
                 start: &[],
                 contacts: Contacts::InPlace,
                 limits: Limits::Free,
@@ -129,7 +150,15 @@ impl Backtracking {
         let time = core.state.time;
         core.integration().evaluate(time, &mut self.work.dp);
         core.check_finite(&self.work.dp, None)?;
-        build_rows(core, None, &mut self.work, Level::Acceleration, 0.5 * left)
+        build_rows(core, None, &mut self.work, self.level, 0.5 * left)
+    }
+
+    /// Returns whether a soft row is too stiff to be a force over the sub-step.
+    fn is_stiff(&self) -> bool {
+        let work = &self.work;
+        let blocks = &work.rows.blocks[work.contact_constraints.len()..];
+        let stiff = |(block, t): (&Block, &RowTarget)| is_soft(t) && work.rows.own(block, 0, 0) > STIFF * t.compliance;
+        blocks.iter().zip(&work.targets).any(stiff)
     }
 
     /// Writes the role of every contact in the sub-step.
@@ -205,7 +234,7 @@ impl Backtracking {
         for (constraint, _) in contacts.iter_mut().zip(roles).filter(|(_, role)| role.touching) {
             moves |= motion::move_in_step(core, constraint, 0.5 * left);
         }
-        if moves { build_rows(core, None, &mut self.work, Level::Acceleration, 0.5 * left) } else { Ok(()) }
+        if moves { build_rows(core, None, &mut self.work, self.level, 0.5 * left) } else { Ok(()) }
     }
 
     /// Resolves contacts (thesis `ResolveContacts`). Returns the generalized contact forces that
@@ -250,7 +279,8 @@ impl Backtracking {
         for (i, target) in work.targets.iter().enumerate() {
             let row = work.rows.blocks[contact_constraints + i].row as usize;
             // rows are those of the middle of the step, and turn further in its second half
-            work.c[row] += 0.5 * target.bias_acceleration + (velocity[row] - target.velocity) / left;
+            let over = self.level.soft_step().filter(|_| is_soft(target)).unwrap_or(left);
+            work.c[row] += 0.5 * target.bias_acceleration + (velocity[row] - target.velocity) / over;
             if target.set == RowSet::HalfLine {
                 work.c[row] += target.error.max(0.0) / (left * left);
             }
@@ -367,7 +397,7 @@ impl Backtracking {
     fn correct(&mut self, core: &mut Core, start: &[f64], (h, left): (f64, f64)) -> Result<(), StepError> {
         let options = Options {
             h,
-            level: Level::Acceleration,
+            level: self.level,
             start,
             contacts: Contacts::Ignored,
             limits: Limits::Listed { limits: &self.held, reach: core.settings.drift_tolerance },

@@ -91,6 +91,7 @@ fn add_contact(basis: &mut Basis, constraint: &ContactConstraint, rows: &mut Row
     let first = bias.len();
     bias.resize(rows.len, 0.0);
     let axes = &constraint.frame.axes[..rows.len - first];
+    add_surface_velocity(constraint, axes, &mut bias[first..]);
     for ContactSide { entry, part, part_state, point, sign } in sides(basis, constraint) {
         if !entry.moves() {
             add_velocity(part_state, &point, (axes, sign), &mut bias[first..]);
@@ -107,6 +108,13 @@ fn add_velocity(part_state: &PartState, point: &Vec3, (axes, sign): (&[Vec3], f6
     let velocity = part_state.velocity_at(point);
     for (bias, axis) in bias.iter_mut().zip(axes) {
         *bias += sign * velocity.dot(axis);
+    }
+}
+
+/// Adds the velocity of the surfaces over their bodies, along the tangents.
+fn add_surface_velocity(constraint: &ContactConstraint, axes: &[Vec3], bias: &mut [f64]) {
+    for (bias, axis) in bias.iter_mut().zip(axes).skip(1) {
+        *bias += constraint.surface_velocity.dot(axis);
     }
 }
 
@@ -166,6 +174,7 @@ fn fill(
     (y_start, bias_start): (usize, usize),
 ) {
     let axes = &constraint.frame.axes[..block.set.rows()];
+    add_surface_velocity(constraint, axes, &mut piece.bias[block.row as usize - bias_start..]);
     for (k, ContactSide { entry, part, part_state, point, sign }) in sides(basis, constraint).into_iter().enumerate() {
         if entry.moves() {
             let Some((body, range)) = moving(&entry).zip(y_range(block, &entry)) else { continue };

@@ -261,6 +261,26 @@ fn adopt(mut basis: Basis, work: &mut Workspace, made: Workspace) {
     make_room(work);
 }
 
+/// Builds the rows of the contacts again, which were `old` in number, and keeps those of the
+/// constraints. Rows respond at the moment `acting`.
+pub(crate) fn lay_contacts_again(core: &mut Core, acting: &mut Moment, work: &mut Workspace, old: usize) {
+    let mut rows = std::mem::take(&mut work.rows);
+    let constraints = rows.blocks.split_off(old);
+    let first = constraints.first().map_or(rows.len, |block| block.row as usize);
+    rows.blocks = constraints;
+    let made = Workspace {
+        rows,
+        bias: work.bias[first..].to_vec(),
+        targets: std::mem::take(&mut work.targets),
+        kinds: std::mem::take(&mut work.kinds),
+        first: std::mem::take(&mut work.first),
+        owners: std::mem::take(&mut work.owners),
+        ..Workspace::default()
+    };
+    let time = core.state.time;
+    adopt(core.basis(Some(acting), time, None), work, made);
+}
+
 /// Sets the errors of half-lines to the gaps that their constraints report at the present state and
 /// a time (s).
 pub(super) fn locate_limits(core: &Core, work: &mut Workspace, time: f64) -> Result<(), StepError> {

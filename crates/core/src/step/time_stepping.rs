@@ -35,9 +35,9 @@
 
 mod impacts;
 mod moving;
+mod passing;
 
 use super::contacts::{build_rows, detect, displace, impulses, push, row_velocities, shift, solve, whiten};
-use super::correction::{self, Contacts, Limits, Options};
 use super::impact::{self, Candidate, Part};
 use super::warm_start::{row_starts, warm_start};
 use super::{Moment, StepContext, Stepper, Workspace};
@@ -82,6 +82,8 @@ struct Buffers {
     parabola: Vec<f64>,
     rest: Vec<f64>,
     mean: Vec<f64>,
+    /// Displacement by the correction of overlap, per second.
+    moved: Vec<f64>,
     /// Multipliers of impacts and contacts.
     total: Vec<f64>,
     /// Whether each block is solved.
@@ -111,7 +113,7 @@ impl Stepper for TimeStepping {
 impl TimeStepping {
     /// Takes one sub-step of `h` seconds.
     pub(crate) fn substep(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
-        core.implicit = true;
+        (core.implicit, core.by_impulses) = (true, true);
         core.meter.start_substep(core.state.time, h);
         let mut middle = core.moment();
         self.advance(core, &mut middle, h)?;
@@ -134,7 +136,7 @@ impl TimeStepping {
         whiten(middle.coordinates(core), &self.work.dp, h, &mut u, &mut du_force);
         let mut after = std::mem::take(&mut self.buffers.after);
         self.impacts(core, middle, h, &mut u, &mut du_force, &mut after)?;
-        self.look_again(core, middle, h, &u, &after)?;
+        self.look_again(core, middle, h, &u, &after);
         self.contacts(core, middle, h, &u, &mut after, &du_force);
         self.rebound(core, &after);
         self.commit(core, middle, h, &u, &after, &du_force)?;
@@ -181,7 +183,7 @@ impl TimeStepping {
             let (row, struck) = (block.row as usize, self.impact[block.row as usize] > 0.0);
             let s = block.sides().iter().map(|side| self.impact_fraction[side.u as usize]).fold(0.0, f64::max);
             let closed = h * s * 0.5 * (first[row] + moving::gap_rate(work, i, &free, (first[row], h)).0);
-            let (gap, left) = (constraint.contact.gap + closed, h * (1.0 - s).max(1e-9));
+            let (gap, left) = (constraint.gap_of_row() + closed, h * (1.0 - s).max(1e-9));
             let candidate = self.candidates.get(i);
             let rest_speed = candidate.map_or(f64::INFINITY, |candidate| candidate.rest_speed);
             let crowd = candidate.is_some_and(|candidate| candidate.crowd);
@@ -190,6 +192,9 @@ impl TimeStepping {
                 keep[i] = constraint.restitution <= impact::ELASTIC;
                 parts[i].rebound = if keep[i] { -constraint.restitution * work.c[row] } else { 0.0 };
             }
+            // nothing presses an elastic contact, so it has no force but that of its impact
+            let unpressed = constraint.restitution > impact::ELASTIC && rest_speed <= impact::SLOWEST_BOUNCE;
+            keep[i] &= struck || !unpressed;
             work.c[row] += if struck { 0.0 } else { gap.max(0.0) / left };
         }
         for i in 0..work.contact_constraints.len() {
@@ -225,7 +230,7 @@ impl TimeStepping {
         du_force: &[f64],
     ) -> Result<(), StepError> {
         let impact_fraction = |i: usize| if self.impact_fraction[i] < 0.0 { 0.5 } else { self.impact_fraction[i] };
-        let Buffers { change, dp, parabola, rest, mean, total, late, keep, .. } = &mut self.buffers;
+        let Buffers { change, dp, parabola, rest, mean, late, .. } = &mut self.buffers;
         let write = |out: &mut Vec<f64>, of: &dyn Fn(usize) -> f64| {
             out.clear();
             out.extend((0..u0.len()).map(of));
@@ -254,19 +259,10 @@ impl TimeStepping {
         }
         shift(core.coordinates(Some(&mut *middle)), rest, h);
         write(mean, &|i| impact_fraction(i) * u0[i] + (1.0 - impact_fraction(i)) * u1[i] + parabola[i]);
-        let options = Options {
-            h,
-            level: Level::Velocity { h },
-            start: &self.x0,
-            contacts: Contacts::Moved { mean },
-            limits: Limits::Violated,
-            recovery: core.settings.recovery_speed * h,
-            tolerance: core.settings.contact_tolerance,
-        };
         self.work.frictionless.du.clear();
-        correction::correct(core, Some(&mut *middle), &mut self.work, &mut self.probe, &options)?;
-        let late = (&self.work, &keep[..]);
-        pay_for_lift(core.coordinates(Some(middle)), late, &end, du_force);
+        self.correct(core, middle, h)?;
+        let Buffers { dp, total, keep, moved, .. } = &mut self.buffers;
+        pay_for_lift(core.coordinates(Some(&mut *middle)), (&self.work, keep, moved), &end, du_force);
         total.clear();
         total.extend(self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b));
         if core.has_breakable_joints() {
@@ -284,10 +280,9 @@ impl TimeStepping {
 
 /// Takes the potential energy by which the correction has lifted bodies out of contacts that are not
 /// kept, elastic ones that closed late in the step, from their kinetic energy. `u` is the whitened
-/// velocity at the end.
-fn pay_for_lift(at: Coordinates, (work, keep): (&Workspace, &[bool]), u: &[f64], du_force: &[f64]) {
-    let moved = &work.frictionless.du;
-    if moved.is_empty() || keep.iter().all(|keep| *keep) {
+/// velocity at the end, `moved` the displacement by the correction, per second.
+fn pay_for_lift(at: Coordinates, (work, keep, moved): (&Workspace, &[bool], &[f64]), u: &[f64], du_force: &[f64]) {
+    if keep.iter().all(|keep| *keep) || moved.iter().all(|du| *du == 0.0) {
         return;
     }
     let mut du = vec![0.0; u.len()];

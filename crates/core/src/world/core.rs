@@ -115,6 +115,8 @@ pub struct Core {
     pub(crate) owners: Vec<Owner>,
     /// See [`WorldView::implicit`](crate::WorldView::implicit).
     pub(crate) implicit: bool,
+    /// Whether the rows of the sub-step are at the velocity level.
+    pub(crate) by_impulses: bool,
     pub(crate) held: Vec<f64>,
     /// Contact forces that are constant over the sub-step, per part, of objects whose state
     /// contains velocities; empty for none.
@@ -166,6 +168,7 @@ impl Core {
             derived: Derived { part_states: vec![PartState::default(); parts], caches },
             owners,
             implicit: false,
+            by_impulses: false,
             held: vec![0.0; dof],
             held_wrenches: Vec::new(),
             moments: Vec::new(),

@@ -183,7 +183,7 @@ impl Core {
         let Touches { list, done } = &mut self.touches;
         list.truncate(*done);
         // `backtracking` ends a sub-step at an event that is not known yet
-        let impulse = |c: &ContactPoint| if self.implicit { c.impulse } else { c.force };
+        let impulse = |c: &ContactPoint| if self.by_impulses { c.impulse } else { c.force };
         let touching = constraints.iter().zip(&self.contacts).filter(|(_, contact)| contact.is_touching());
         list.extend(touching.map(|(constraint, c)| Touch {
             pair: constraint.key.pair,
@@ -196,7 +196,7 @@ impl Core {
     /// Ends a sub-step of `h` seconds.
     pub(crate) fn keep_touches(&mut self, h: f64) {
         let Touches { list, done } = &mut self.touches;
-        if !self.implicit {
+        if !self.by_impulses {
             list[*done..].iter_mut().for_each(|touch| touch.impulse *= h);
         }
         *done = list.len();

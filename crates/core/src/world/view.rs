@@ -193,9 +193,9 @@ pub struct WorldView<'a> {
     pub time: f64,
     /// Gravity, m/s².
     pub gravity: Vec3,
-    /// Whether this step's rows are at the velocity level: drives and damping are then implicit
-    /// rows of a [`Constraint`](crate::Constraint). Otherwise such forces belong to the force
-    /// table.
+    /// Whether soft forces (damping, position drives, springs of loop joints) are implicit rows of a
+    /// [`Constraint`](crate::Constraint) in this step: see [`Level::soft_step`](crate::Level::soft_step).
+    /// Otherwise such forces belong to the force table.
     pub implicit: bool,
     /// The state `X` at this stage.
     pub x: &'a [f64],

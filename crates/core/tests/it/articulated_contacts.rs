@@ -30,7 +30,7 @@ fn thrown(mut world: World, articulated: bool, lift: f64) -> (World, ObjectId) {
             .with_velocities(&[w.x, w.y, w.z, v.x, v.y, v.z])
             .unwrap();
         let mut collider = Collider::new(shape, Pose::identity());
-        collider.material = Material { restitution: 0.6, friction: 0.5, id: 0 };
+        collider.material = Material { restitution: 0.6, friction: 0.5, ..Material::default() };
         body.add_collider("box", collider).unwrap();
         world.add(body).unwrap()
     } else {
@@ -158,7 +158,7 @@ fn pendulums(mut world: World, angle: f64) -> World {
             .with_positions(&[q])
             .unwrap();
         let mut ball = Collider::new(sphere(0.05), Pose::translation(0.0, 0.0, -0.5));
-        ball.material = Material { restitution: 1.0, friction: 0.0, id: 0 };
+        ball.material = Material { restitution: 1.0, friction: 0.0, ..Material::default() };
         body.add_collider("link 0", ball).unwrap();
         world.add(body).unwrap();
     }

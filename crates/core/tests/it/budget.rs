@@ -33,7 +33,7 @@ fn moved(world: &World, bodies: &[ObjectId], start: &[Vec3]) -> f64 {
 }
 
 /// Four seconds of 200 boxes that fall, with an eighteenth of the work that their worst frame takes
-/// without a budget (370,000). Then the budget is lifted.
+/// without a budget (370,000).
 #[test]
 fn a_heap_under_a_tight_budget_is_less_accurate_and_stands() {
     let (mut world, heap, tower) = heap_and_tower("time_stepping", Some(BUDGET));
@@ -59,9 +59,6 @@ fn a_heap_under_a_tight_budget_is_less_accurate_and_stands() {
     assert!(world.energy().total() < first);
     let off = moved(&world, &tower, &start);
     assert!(off < 1e-6, "the tower has moved by {off} m");
-    world.set_settings(world.settings().with_budget(None)).unwrap();
-    let rests = (0..600).any(|_| step(&mut world).max_penetration < 1e-6);
-    assert!(rests, "{:?}", world.report());
 }
 
 /// Which boxes fall onto which is chance, so the largest overlap after the fall is that of the middle one
@@ -78,6 +75,22 @@ fn heaps_under_a_tight_budget_overlap_little() {
     deepest.sort_by(f64::total_cmp);
     println!("{deepest:.4?} m");
     assert!(deepest[3] < 0.02, "{deepest:?}");
+}
+
+/// Heaps whose budget is lifted after the fall come to rest without overlap. Which do so within ten
+/// seconds is chance, so most of five have to.
+#[test]
+fn heaps_rest_when_the_budget_is_lifted() {
+    let rests = [16_000, 18_000, 20_000, 22_000, 24_000].map(|budget| {
+        let (mut world, ..) = heap_and_tower("time_stepping", Some(budget));
+        (0..240).for_each(|_| {
+            world.step().unwrap();
+        });
+        world.set_settings(world.settings().with_budget(None)).unwrap();
+        (0..600).find(|_| world.step().unwrap().max_penetration < 1e-6)
+    });
+    println!("frames until no overlap is left: {rests:?}");
+    assert!(rests.iter().flatten().count() >= 3, "{rests:?}");
 }
 
 /// `backtracking` takes the rest of a frame as one sub-step of `time_stepping` when its work is spent.

@@ -1,7 +1,7 @@
 //! Coulomb friction against closed forms.
 
 use crate::common::*;
-use tumble_core::collide::{Pose, Vec3};
+use tumble_core::collide::{Pose, Quat, Shape, Vec3};
 use tumble_core::*;
 
 #[test]
@@ -120,5 +120,61 @@ fn a_spinning_sphere_does_not_sink() {
         });
         assert!((position(&world, id).z - 0.5).abs() < 1e-8, "{stepper}: center at {}", position(&world, id).z);
         assert!((world.part_state(id, 0).unwrap().angular_velocity.x - 20.0).abs() < 1e-9);
+    }
+}
+
+/// A box falls on a belt: it slides for v/(μ·g) seconds and has then moved by half of what the belt has. A
+/// belt that turns with its body moves things along its own axis.
+#[test]
+fn a_belt_takes_a_box_with_it() {
+    let (speed, friction) = (1.5, 0.4);
+    let time = speed / (friction * G);
+    for stepper in ["time_stepping", "backtracking"] {
+        for turn in [0.0, 0.7] {
+            let mut world = world(stepper, 1.0 / 240.0);
+            let rotation = Quat::from_axis_angle(&Vec3::z_axis(), turn);
+            let material = Material { friction, surface_velocity: Vec3::new(speed, 0.0, 5.0), ..Material::default() };
+            let belt = RigidBody::fixed(Shape::cuboid(Vec3::new(10.0, 10.0, 0.2)).unwrap()).with_material(material);
+            world.add(belt.with_pose(Pose::from_parts(Vec3::new(0.0, 0.0, -0.1).into(), rotation))).unwrap();
+            let body = RigidBody::new(cube(0.2)).with_material(Material { friction, ..Material::default() });
+            let id = world.add(body.with_pose(Pose::translation(0.0, 0.0, 0.1))).unwrap();
+            let along = rotation * Vec3::x();
+            let mut reached = None;
+            for k in 1..=240 {
+                world.step().unwrap();
+                let v = velocity(&world, id);
+                assert!((v - along * along.dot(&v)).norm() < 1e-6, "{stepper}: {v}");
+                assert!(along.dot(&v) < speed + 1e-6, "{stepper}: {v}");
+                let gained = friction * G * k as f64 / 240.0;
+                if gained < speed {
+                    assert!((along.dot(&v) - gained).abs() < 1e-4 * speed, "{stepper}: {v}, expected {gained}");
+                }
+                if reached.is_none() && along.dot(&v) > speed * (1.0 - 1e-9) {
+                    reached = Some(k as f64 / 240.0);
+                }
+            }
+            assert!((reached.unwrap() - time).abs() <= 1.0 / 240.0, "{stepper}: {reached:?}, expected {time}");
+            let (way, expected) = (along.dot(&position(&world, id)), speed * (1.0 - 0.5 * time));
+            println!("{stepper}, turned by {turn}: {way}, expected {expected}");
+            assert!((way - expected).abs() < 1e-4 * expected, "{stepper}: {way}, expected {expected}");
+        }
+    }
+}
+
+/// A belt that runs around a free wheel: action and reaction, no net momentum.
+#[test]
+fn a_belt_on_a_free_body_keeps_the_momentum() {
+    for stepper in ["time_stepping", "backtracking"] {
+        let mut world = no_gravity(world(stepper, 1.0 / 240.0));
+        let belt = Material { surface_velocity: Vec3::new(2.0, 0.0, 0.0), ..Material::default() };
+        let a = world.add(RigidBody::new(cube(0.4)).with_mass(3.0).with_material(belt)).unwrap();
+        let b = RigidBody::new(cube(0.2)).with_mass(1.0).with_pose(Pose::translation(0.0, 0.0, 0.31));
+        let b = world.add(b.with_velocity(Vec3::new(0.0, 0.0, -1.0))).unwrap();
+        (0..60).for_each(|_| {
+            world.step().unwrap();
+        });
+        let [va, vb] = [a, b].map(|id| velocity(&world, id));
+        assert!((3.0 * va + vb - Vec3::new(0.0, 0.0, -1.0)).norm() < 1e-12, "{stepper}: {va} {vb}");
+        assert!(vb.x > 0.1 && va.x < -0.03, "{stepper}: {va} {vb}");
     }
 }

@@ -24,6 +24,7 @@ mod common;
 mod compound;
 mod correction;
 mod crowds;
+mod drives;
 mod elastic;
 mod events;
 mod free;

@@ -254,6 +254,12 @@ class RigidBody:
     @friction.setter
     def friction(self, value: float) -> None: ...
     @property
+    def surface_velocity(self) -> _Floats:
+        """Velocity of the surface over the body, frame of the shape, shape (3,), m/s: a conveyor belt. Friction
+        acts against the velocity of other bodies over the surface. Zero by default."""
+    @surface_velocity.setter
+    def surface_velocity(self, value: ArrayLike) -> None: ...
+    @property
     def color(self) -> _Floats:
         """Color, sRGB, shape (3,), each 0 to 1. Setting it removes a pattern."""
     @color.setter

@@ -319,6 +319,19 @@ impl RigidBody {
         self.change(py, |body| body.material.friction = value)
     }
 
+    /// Velocity of the surface over the body, frame of the shape, shape (3,), m/s: a conveyor belt. Friction
+    /// acts against the velocity of other bodies over the surface. Zero by default.
+    #[getter]
+    fn surface_velocity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(array(py, self.constant(|body| body.material.surface_velocity)?.as_slice()))
+    }
+
+    #[setter]
+    fn set_surface_velocity(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        let velocity = some::<3>(value, "surface_velocity")?;
+        self.change(py, |body| body.material.surface_velocity = velocity.into())
+    }
+
     /// Color, sRGB, shape (3,), each 0 to 1. Setting it removes a pattern.
     #[getter]
     fn color<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {

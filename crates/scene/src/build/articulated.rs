@@ -119,7 +119,8 @@ fn attach(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Result
     let surface = &placed.spec.surface;
     if let Some(shape) = placed.solid().filter(|_| placed.spec.collides) {
         let id = material_id(surface.material);
-        let material = Material { restitution: surface.restitution, friction: surface.friction, id };
+        let material =
+            Material { restitution: surface.restitution, friction: surface.friction, id, ..Material::default() };
         body.add_collider(
             link,
             Collider { material, contact_mode: surface.contacts, ..Collider::new(shape.clone(), placed.spec.pose) },

@@ -57,6 +57,8 @@ pub struct BodySpec {
     pub friction: f64,
     /// The body's own, else its material's, else 0.
     pub restitution: f64,
+    /// Velocity of its surface over it, frame of the shape, m/s: a conveyor belt. Default `[0, 0, 0]`.
+    pub surface_velocity_m_per_s: [f64; 3],
     /// Contact mode of a mesh or cylinder. Default: that of the world.
     pub contacts: ContactMode,
     /// Center of mass in the shape's frame, m. Default: that of the uniform shape.
@@ -124,6 +126,7 @@ impl BodySpec {
             material,
             friction: f.number_or("friction", FRICTION, friction),
             restitution: f.number_or("restitution", RESTITUTION, restitution),
+            surface_velocity_m_per_s: f.vector_or("surface_velocity_m_per_s", Bound::ANY, [0.0; 3]),
             contacts: f.choice_or("contacts", CONTACTS, library.contacts),
             center_m: f.optional_vector("center_m", Bound::ANY),
             inertia_kg_m2: read_inertia(f),

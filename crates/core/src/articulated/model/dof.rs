@@ -11,8 +11,11 @@
 //! dry friction      against the motion, |τ| ≤ τ_f            row  q̇⁺ = 0,                                     |λ| ≤ h·τ_f
 //! ```
 //!
-//! so no gain is too stiff for the step. In `backtracking` damping and position drives are forces,
-//! as accurate as the integrator. Springs are forces in both steppers.
+//! so no gain is too stiff for the step. `backtracking` does the same, with forces that hold over
+//! the sub-step, if any soft row changes its velocity by more than half of it. Otherwise the rows are
+//! those of the middle of the sub-step with `verlet` (implicit midpoint rule), and with the other
+//! integrators damping and position drives are forces, as accurate as the integrator. Springs are
+//! forces in both steppers.
 //!
 //! | symbol | meaning |
 //! |---|---|

@@ -25,8 +25,8 @@ impl LoopJoint {
     pub(crate) fn transmitted(&self, view: &WorldView, forces: &[RowStart]) -> JointForce {
         let mut sum = JointForce::default();
         let Some(pair) = self.pair(view) else { return sum };
-        // the rows of the last step: soft rows are absent at the level of accelerations
-        let levels = [Level::Velocity { h: 1.0 }, Level::Acceleration];
+        // the rows of the last step, in which soft forces were rows or not
+        let levels = [Level::Velocity { h: 1.0 }, Level::Acceleration { h: 1.0, soft: None }];
         let rows = levels.map(|level| {
             let mut rows = Vec::new();
             self.lay(&pair, level, view.time, &mut |row| rows.push(row));
@@ -39,7 +39,7 @@ impl LoopJoint {
                 sum.drive += start.force;
             }
         }
-        let explicit = levels[level] == Level::Acceleration && rows[0].len() != rows[1].len();
+        let explicit = level == 1 && rows[0].len() != rows[1].len();
         if let Some(coordinate) = self.coordinate(&pair).filter(|_| explicit) {
             let (force, spring) = (self.explicit_force(&coordinate), self.dof.spring_force(coordinate.position));
             add(&mut sum, &coordinate.terms, force);

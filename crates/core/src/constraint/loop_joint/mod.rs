@@ -381,8 +381,9 @@ impl LoopJoint {
         }
         let state = DofState { q: self.driven(position), v: rate, settings: &self.dof };
         state.resistance(level, |target| along(1.0, target));
-        if let (Some(spring), Some(h)) = (self.dof.spring.filter(|s| s.stiffness > 0.0), level.step()) {
-            let velocity = rate - 4.0 * (position - spring.rest) / h;
+        if let (Some(spring), Some(soft)) = (self.dof.spring.filter(|s| s.stiffness > 0.0), level.soft_step()) {
+            let h = level.h();
+            let velocity = rate - 4.0 * (position - spring.rest) * soft / (h * h);
             let compliance = 4.0 / (spring.stiffness * h * h);
             along(1.0, RowTarget { velocity, compliance, ..RowTarget::new(RowSet::Equality, 0.0) });
         }

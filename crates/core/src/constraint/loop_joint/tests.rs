@@ -135,7 +135,9 @@ impl Pairing {
     }
 
     fn record_loop_joint(&self, loop_joint: &LoopJoint) -> RecordedRows {
-        self.record(|view, out| loop_joint.rows(&StateRange::default(), view, Level::Acceleration, out))
+        self.record(|view, out| {
+            loop_joint.rows(&StateRange::default(), view, Level::Acceleration { h: 1.0, soft: None }, out)
+        })
     }
 }
 

@@ -52,7 +52,7 @@ pub(super) fn separate(
     let violation = |b: usize, c: &[f64]| -> f64 {
         let v = c[work.rows.blocks[b].row as usize];
         match (work.contact_constraints.get(b), b.checked_sub(contacts).map(|i| work.targets[i])) {
-            (Some(constraint), _) => -(allowed(constraint.contact.gap, recovery) + h * v),
+            (Some(constraint), _) => -(allowed(constraint.gap_of_row(), recovery) + h * v),
             (None, Some(t)) if t.compliance > 0.0 => 0.0,
             (None, Some(t)) if t.set == RowSet::Equality && hold => (t.error.clamp(-recovery, recovery) + h * v).abs(),
             (None, Some(t)) if t.set == RowSet::HalfLine => -(allowed(t.error, recovery) + h * v),
@@ -142,7 +142,7 @@ impl Frictionless {
         self.c.clear();
         for (b, block) in work.rows.blocks.iter().enumerate() {
             let (set, error) = match work.contact_constraints.get(b) {
-                Some(constraint) => (RowSet::HalfLine, allowed(constraint.contact.gap, recovery)),
+                Some(constraint) => (RowSet::HalfLine, allowed(constraint.gap_of_row(), recovery)),
                 None => match work.targets[b - work.contact_constraints.len()] {
                     t if t.set == RowSet::HalfLine => (t.set, allowed(t.error, recovery)),
                     t => (t.set, t.error.clamp(-recovery, recovery)),

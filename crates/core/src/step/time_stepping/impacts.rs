@@ -13,7 +13,6 @@
 use super::moving::FreeTerms;
 use super::{Buffers, TimeStepping, in_the_middle, moving};
 use crate::constraint::rows::Side;
-use crate::contact::detect::ContactConstraint;
 use crate::contact::pair::PredictionMode;
 use crate::contact::time_of_impact::time_to_close;
 use crate::integrators::context::free_motion;
@@ -67,14 +66,14 @@ impl TimeStepping {
             return Ok(());
         }
         let (before, gain) = (&mut self.buffers.before, &mut self.buffers.gain);
-        let (mut impact_fractions, mut approaches) = (Vec::new(), Vec::new());
+        let (mut impact_fractions, mut approaches, mut rates) = (Vec::new(), Vec::new(), Vec::new());
         row_velocities(&core.threads, &work.rows, &work.bias, u, before);
         zero(gain, work.rows.len);
         work.rows.add_velocity(du_force, gain);
         let free = FreeTerms::new(middle, core, h);
         for (i, constraint) in work.contact_constraints.iter().enumerate() {
             let block = &work.rows.blocks[i];
-            let (row, gap) = (block.row as usize, constraint.contact.gap);
+            let (row, gap) = (block.row as usize, constraint.gap_of_row());
             let dv = gain[row];
             let (v, rate) = moving::gap_rate(work, i, &free, (before[row], h));
             let pressed = if core.state.warm.carries(&constraint.key) {
@@ -91,9 +90,10 @@ impl TimeStepping {
                 None
             };
             impact_fractions.push(impact_fraction);
+            rates.push(rate);
             approaches.push(Approach { gap, rate: h * v, gain: h * (dv + h * rate) });
             self.candidates.push(Candidate {
-                takes_part: gap <= core.settings.drift_tolerance,
+                takes_part: constraint.contact.gap <= core.settings.drift_tolerance,
                 rest_speed,
                 restitution: constraint.restitution,
                 crowd: false,
@@ -108,7 +108,7 @@ impl TimeStepping {
         self.first_impacts(&impact_fractions, &approaches, core.settings.contact_tolerance);
         self.go_to_impacts(core, middle, h);
         let work = &mut self.work;
-        moving::move_to_impacts(core, work, &self.impact_fraction, h);
+        moving::move_to_impacts(core, work, (&self.impact_fraction, &rates), h);
         build_rows(core, Some(&mut *middle), work, Level::Velocity { h }, 0.5 * h)?;
         whiten(middle.coordinates(core), &work.dp, h, u, du_force);
         let at_impact: Vec<f64> = (0..u.len()).map(|i| u[i] + self.impact_fraction[i].max(0.0) * du_force[i]).collect();
@@ -135,16 +135,9 @@ impl TimeStepping {
 
     /// Adds the contacts that bodies may reach because of their impacts, and builds the rows again.
     /// These contacts prevent overlap in this step and bounce in the next.
-    pub(super) fn look_again(
-        &mut self,
-        core: &mut Core,
-        middle: &mut Moment,
-        h: f64,
-        before: &[f64],
-        after: &[f64],
-    ) -> Result<(), StepError> {
+    pub(super) fn look_again(&mut self, core: &mut Core, middle: &mut Moment, h: f64, before: &[f64], after: &[f64]) {
         if self.impact.iter().all(|i| *i == 0.0) {
-            return Ok(());
+            return;
         }
         let change: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
         let (mut struck, mut found) = (core.moment(), Vec::new());
@@ -152,34 +145,12 @@ impl TimeStepping {
         struck.refresh(core);
         detect(core, Some(&struck), (h, PredictionMode::Each), &mut found);
         core.moments.push(struck);
-        let work = &mut self.work;
+        let work = &self.work;
         let old: Vec<[u32; 4]> = work.contact_constraints.iter().map(|t| t.key.pair).collect();
         found.retain(|t| old.binary_search(&t.key.pair).is_err());
-        if found.is_empty() {
-            return Ok(());
+        if !found.is_empty() {
+            self.file(core, middle, found);
         }
-        let mut filed: Vec<(ContactConstraint, Candidate, Vec<f64>)> = Vec::new();
-        for ((constraint, candidate), block) in
-            work.contact_constraints.drain(..).zip(&self.candidates).zip(&work.rows.blocks)
-        {
-            filed.push((constraint, *candidate, self.impact[block.range()].to_vec()));
-        }
-        let fresh = |t: &ContactConstraint| Candidate {
-            takes_part: false,
-            rest_speed: impact::SLOWEST_BOUNCE,
-            restitution: t.restitution,
-            crowd: false,
-        };
-        filed.extend(found.into_iter().map(|t| (t.clone(), fresh(&t), Vec::new())));
-        filed.sort_by_key(|(constraint, ..)| constraint.key.pair);
-        work.contact_constraints.extend(filed.iter().map(|(constraint, ..)| constraint.clone()));
-        self.candidates = filed.iter().map(|(_, candidate, _)| *candidate).collect();
-        build_rows(core, Some(&mut *middle), work, Level::Velocity { h }, 0.5 * h)?;
-        zero(&mut self.impact, work.rows.len);
-        for ((_, _, impulse), block) in filed.iter().zip(&work.rows.blocks).filter(|((.., i), _)| !i.is_empty()) {
-            self.impact[block.range()].copy_from_slice(impulse);
-        }
-        Ok(())
     }
 
     /// Leaves the impacts of large groups of touching bodies to the rebound at the end of the step.

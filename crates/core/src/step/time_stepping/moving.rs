@@ -4,6 +4,7 @@
 use crate::constraint::rows::{Block, Rows};
 use crate::contact::detect::ContactConstraint;
 use crate::contact::motion::{Moved, move_in_step};
+use crate::contact::time_of_impact::moving_pair;
 use crate::step::contacts::{free_motion_change, gyroscopic};
 use crate::step::{Moment, Workspace};
 use crate::world::Core;
@@ -84,14 +85,30 @@ pub(super) fn add_motion(work: &mut Workspace, contact: usize, free: &FreeTerms,
 
 /// Moves the contacts of objects that have an impact to the time of it, a `fraction` of `h` seconds
 /// per coordinate. Velocities change there, so their rates before it do not hold for the rest of the
-/// step.
-pub(super) fn move_to_impacts(core: &Core, work: &mut Workspace, fraction: &[f64], h: f64) {
-    for (constraint, block) in work.contact_constraints.iter_mut().zip(&work.rows.blocks) {
+/// step. Contacts of convex shapes are found again in their places of that time: a row that is exact
+/// at any place on the way never allows overlap.
+pub(super) fn move_to_impacts(core: &Core, work: &mut Workspace, (fraction, rates): (&[f64], &[f64]), h: f64) {
+    let part_states = &core.derived.part_states;
+    let mut found = Vec::new();
+    let contacts = work.contact_constraints.iter_mut().zip(&work.rows.blocks);
+    for ((constraint, block), rate) in contacts.zip(rates) {
         let s = block.sides().iter().map(|side| fraction[side.u as usize]).fold(-1.0, f64::max);
-        if s >= 0.0 {
-            move_in_step(core, constraint, s * h);
+        if s < 0.0 {
+            continue;
+        }
+        let pair = moving_pair(core.objects(), &core.owners, part_states, constraint);
+        if let Some(pair) = pair.filter(|pair| !pair.shapes.iter().any(|shape| shape.has_tree())) {
+            let reach = pair.reach(&constraint.contact.point, s * h);
+            let margin = constraint.contact.gap.abs() + reach + core.settings.drift_tolerance;
+            pair.contacts_after(s * h, margin, &mut found);
+            constraint.stay();
+            if let Some(contact) = found.iter().find(|contact| contact.feature == constraint.key.feature) {
+                constraint.find_again(contact, pair.part_states, s * h, true);
+            }
+        } else if move_in_step(core, constraint, s * h) {
             let Moved { time, way, .. } = constraint.moved;
-            constraint.moved = Moved { time, way, ..Moved::default() };
+            let turned = if time == s * h { -0.5 * time * time * rate } else { 0.0 };
+            constraint.moved = Moved { time, way, turned, ..Moved::default() };
         }
     }
 }
