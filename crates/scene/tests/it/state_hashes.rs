@@ -50,24 +50,24 @@ macro_rules! table {
 }
 
 table! {
-    billiards_time_stepping: "billiards", TimeStepping, "31018d04b3052457", "99394a3d919f7c04";
+    billiards_time_stepping: "billiards", TimeStepping, "41c9d6a80a4215d2", "a62d36da0e7f5ce2";
     billiards_backtracking: "billiards", Backtracking, "b5a27eda6855859e", "bf300238bd656f9e";
-    bowling_time_stepping: "bowling", TimeStepping, "f6721937cb4d54f4", "d314bc084d8f191f";
-    bowling_backtracking: "bowling", Backtracking, "e677eac272ba7de7", "639dcb1ba70e5e70";
-    chain_time_stepping: "chain", TimeStepping, "da183284df94ce40", "7c050bf315c18be7";
+    bowling_time_stepping: "bowling", TimeStepping, "f6721937cb4d54f4", "8c68902f614f0847";
+    bowling_backtracking: "bowling", Backtracking, "e677eac272ba7de7", "098bcebdb2ce128e";
+    chain_time_stepping: "chain", TimeStepping, "5c6dd6a2da8cd267", "71ce81d7214691ac";
     chain_backtracking: "chain", Backtracking, "1605050ff516ff97", "84bb4478ecfdda29";
-    falling_time_stepping: "falling", TimeStepping, "11be3b5e263e3343", "5de6da994ffffcee";
-    falling_backtracking: "falling", Backtracking, "c681059d5c6a16b9", "7987e4897adeb92d";
+    falling_time_stepping: "falling", TimeStepping, "b502e3d757eeef41", "8787b18645b7223e";
+    falling_backtracking: "falling", Backtracking, "cbb914d607445f21", "253502563aa8576c";
     incline_time_stepping: "incline", TimeStepping, "e279621724363969", "85a12d59b2107f19";
     incline_backtracking: "incline", Backtracking, "dba991e4803cfe34", "95407557393acae5";
     pendulum_time_stepping: "pendulum", TimeStepping, "d403df437fc48e8e", "07a9ea1905d7c967";
     pendulum_backtracking: "pendulum", Backtracking, "69fe4156518a0013", "692b5de118331942";
     piston_time_stepping: "piston", TimeStepping, "e970a95bc604c769", "69f85217f1250e61";
     piston_backtracking: "piston", Backtracking, "eec51fdb3e6e2809", "0b86e6820d08239f";
-    robot_time_stepping: "robot", TimeStepping, "d12ab164c366e431", "1ba51d3713f4089e";
-    robot_backtracking: "robot", Backtracking, "e468ef66569eaf16", "0df5728780acbe50";
-    skeleton_time_stepping: "skeleton", TimeStepping, "f0ff31d36e418576", "98b6b85d09cd0b1b";
-    skeleton_backtracking: "skeleton", Backtracking, "41dc63582d89a300", "384f159aeb1cdee9";
+    robot_time_stepping: "robot", TimeStepping, "d12ab164c366e431", "ae3d5e99cb1f24ee";
+    robot_backtracking: "robot", Backtracking, "7035f548d6be08f1", "fe2e079d2c4e1554";
+    skeleton_time_stepping: "skeleton", TimeStepping, "b3e1eba18237ceac", "bafd9bc8f366c7af";
+    skeleton_backtracking: "skeleton", Backtracking, "2cf09fd4046b402d", "d1eaf2ebb053a147";
     stack_time_stepping: "stack", TimeStepping, "20ad0965d34e48bf", "ecd253fcdb6efb2e";
     stack_backtracking: "stack", Backtracking, "8bf0d645b39a693b", "3d204eae8525be65";
 }
