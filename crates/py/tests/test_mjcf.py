@@ -35,6 +35,8 @@ def test_errors_have_places():
         tumble.Articulation.from_mjcf(MODELS / "scene.xml")
     with pytest.raises(tumble.SceneError, match="cartpole.xml:1:1: <mujoco> has no keyframe"):
         tumble.World.load(MODELS / "cartpole.xml", keyframe="upright")
+    with pytest.raises(ValueError, match="only a model of MuJoCo"):
+        tumble.World.load("stack", keyframe="0")
     with pytest.raises(FileNotFoundError):
         tumble.Articulation.from_mjcf(MODELS / "none.xml")
 

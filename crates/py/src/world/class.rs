@@ -38,7 +38,7 @@ use std::time::Instant;
 use tumble::collide::{ContactMode, Vec3};
 use tumble::dynamics::{Material, Mode, PairMaterial, RigidBody as Rigid, Settings};
 use tumble::scene::mjcf::MjcfOptions;
-use tumble::scene::{LoadOptions, SceneFile, resolve_scene};
+use tumble::scene::{FileKind, LoadOptions, SceneFile, resolve_scene};
 
 /// A world of bodies that moves in steps of ``dt`` seconds. SI units, radians, z up; quaternions
 /// are (x, y, z, w).
@@ -162,6 +162,9 @@ impl World {
         keyframe: Option<String>,
     ) -> Result<World> {
         let asked = path(path_or_name)?;
+        if keyframe.is_some() && !matches!(FileKind::of(&asked), Ok(FileKind::Mjcf)) {
+            return Err(Error::value("keyframe: only a model of MuJoCo (.xml) has keyframes"));
+        }
         let built = py.detach(|| {
             pool::run(|| {
                 let mjcf = MjcfOptions { keyframe, ..MjcfOptions::default() };
