@@ -14,6 +14,7 @@ use tumble::dynamics::{
 use tumble::net::record::RecordError;
 use tumble::render::RenderError;
 use tumble::scene::cave::CaveError;
+use tumble::scene::mjcf::MjcfError;
 use tumble::scene::urdf::UrdfError;
 use tumble::scene::{BuildError, SceneError, UnknownName};
 
@@ -44,6 +45,8 @@ pub enum Error {
     Build(#[from] BuildError),
     #[error(transparent)]
     Urdf(#[from] UrdfError),
+    #[error(transparent)]
+    Mjcf(#[from] MjcfError),
     #[error(transparent)]
     Cave(#[from] CaveError),
     #[error(transparent)]
@@ -111,7 +114,12 @@ impl Error {
             Error::World(WorldError::Stale) | Error::Removed(_) => "RemovedError",
             Error::Scene(SceneError::Unknown { .. }) => "MissingFileError",
             Error::Scene(SceneError::Read { source, .. }) => of_file(source),
+            Error::Scene(SceneError::Mjcf(error)) => match error.as_ref() {
+                MjcfError::Read { source, .. } => of_file(source),
+                _ => "SceneError",
+            },
             Error::Urdf(UrdfError::Read { source, .. }) => of_file(source),
+            Error::Mjcf(MjcfError::Read { source, .. }) => of_file(source),
             Error::Build(BuildError::MeshFile { source, .. }) => of_file(source),
             Error::File { source, .. } => of_file(source),
             Error::Record(RecordError::Io { source, .. }) => of_file(source),
@@ -123,7 +131,7 @@ impl Error {
             Error::Record(RecordError::Input { .. }) => "InvalidValueError",
             Error::Record(_) => "RecordingError",
             Error::Build(BuildError::World { .. }) => "InvalidValueError",
-            Error::Scene(_) | Error::Build(_) | Error::Urdf(_) => "SceneError",
+            Error::Scene(_) | Error::Build(_) | Error::Urdf(_) | Error::Mjcf(_) => "SceneError",
             Error::Snapshot(_) | Error::Archive(_) => "SnapshotError",
             Error::Step(_) => "StepError",
             Error::Fork { source, .. } => source.class(),

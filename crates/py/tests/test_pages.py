@@ -182,6 +182,7 @@ def folder(tmp_path, command, monkeypatch):
     (tmp_path / "my").mkdir()
     shutil.copy(ROOT / "scenes" / "stack" / "scene.toml", tmp_path / "my" / "scene.toml")
     (tmp_path / "robot.urdf").write_text(ARM)
+    shutil.copy(ROOT / "crates" / "scene" / "tests" / "mjcf" / "cartpole.xml", tmp_path / "my")
     tree = tmp_path / "bunny.obj"  # a cube stands for it
     corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
     sides = "013 032 467 475 045 051 237 276 026 064 157 173".split()

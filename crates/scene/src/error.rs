@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::mjcf::MjcfError;
 use crate::parse::problem::{Invalid, Problem};
 use crate::urdf::UrdfError;
 
@@ -47,6 +48,9 @@ pub enum SceneError {
     /// A robot's URDF is invalid.
     #[error(transparent)]
     Urdf(#[from] UrdfError),
+    /// A model of MuJoCo is invalid.
+    #[error(transparent)]
+    Mjcf(Box<MjcfError>),
     /// The name is not a path and not a shipped scene.
     #[error("no scene `{name}`: {hint}")]
     Unknown {
@@ -67,6 +71,7 @@ impl SceneError {
         match self {
             SceneError::Invalid(invalid) => invalid.report(color),
             SceneError::Urdf(error) => error.report(color),
+            SceneError::Mjcf(error) => error.report(color),
             other => format!("error: {other}\n"),
         }
     }

@@ -58,10 +58,12 @@
 mod build;
 pub mod cave;
 mod error;
+pub mod mjcf;
 mod notes;
 mod open;
 mod parse;
 pub mod urdf;
+mod xml;
 
 pub use build::error::BuildError;
 pub use build::mesh_files::{read_mesh_bytes, read_solid, read_triangles};

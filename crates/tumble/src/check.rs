@@ -33,6 +33,7 @@ fn one(file: &str, opening: &OpeningOptions) -> Result<String, Failure> {
     match kind(file) {
         FileKind::Mesh => mesh(Path::new(file), opening.repair),
         FileKind::Urdf => robot(file, opening),
+        FileKind::Mjcf => model(file, opening),
         FileKind::Scene if looks_like_cave(file) => cave(file),
         FileKind::Scene => scene(file),
     }
@@ -50,6 +51,22 @@ fn robot(name: &str, opening: &OpeningOptions) -> Result<String, Failure> {
         model.dof(),
         if scene.has_fixed_base() { "fixed" } else { "floating" },
         model.mass()
+    ))
+}
+
+fn model(name: &str, opening: &OpeningOptions) -> Result<String, Failure> {
+    let scene = OpeningOptions { repair: false, ..opening.clone() }.read(name)?;
+    let (world, notes) = scene.build().map_err(Failure::input)?;
+    let overlaps = overlap_notes(&world);
+    notes.into_iter().chain(read_visuals(&world)).chain(overlaps).for_each(|note| println!("{note}"));
+    let body = |name: &str| world.get::<ArticulatedBody>(world.find(name)?);
+    let dof: usize = scene.articulated.iter().filter_map(|spec| body(&spec.name)).map(|body| body.model().dof()).sum();
+    Ok(format!(
+        "a model of {} rigid and static bodies, {} articulated bodies with {} degrees of freedom, and {} actuators",
+        scene.bodies.len(),
+        scene.articulated.len(),
+        dof,
+        scene.actuators.len()
     ))
 }
 

@@ -7,6 +7,7 @@ mod abm_spatial;
 mod adaptive;
 mod api;
 mod archive;
+mod armature;
 mod articulated_agree;
 mod articulated_closed;
 mod articulated_contacts;

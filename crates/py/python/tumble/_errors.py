@@ -10,7 +10,7 @@ class InvalidValueError(TumbleError, ValueError):
 
 
 class SceneError(TumbleError, ValueError):
-    """A scene, URDF or mesh file with problems; all of them are listed with line and column."""
+    """A scene, URDF, MJCF or mesh file with problems; all of them are listed with line and column."""
 
 
 class MissingFileError(TumbleError, FileNotFoundError):

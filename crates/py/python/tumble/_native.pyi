@@ -550,6 +550,20 @@ class Articulation:
         name, for ``package://NAME/…``. missing_meshes: ``"error"`` or ``"skip"``, for missing
         collision meshes. collision_meshes: ``"exact"`` or ``"hull"``.
         """
+    @staticmethod
+    def from_mjcf(
+        path: _Path,
+        *,
+        keyframe: str | None = None,
+        missing_meshes: MissingMeshes = "error",
+        collision_meshes: CollisionMeshes = "hull",
+    ) -> Articulation:
+        """Reads the only articulated body of a model of MuJoCo, at the place that it has there.
+        ``World.load`` reads a whole model: bodies, floors, gravity and time step.
+
+        keyframe: name or number of the keyframe that it starts in. missing_meshes: ``"error"`` or
+        ``"skip"``, for missing collision meshes. collision_meshes: ``"exact"`` or ``"hull"``.
+        """
     @property
     def name(self) -> str:
         """Name of the robot in its file, or of the body in its world."""
@@ -997,11 +1011,13 @@ class World:
         solver: Solver | None = None,
         threads: int | None = None,
         budget: int | None = None,
+        keyframe: str | None = None,
     ) -> World:
-        """Loads the world of a scene: the path of a ``scene.toml`` or of its folder, or the name of a
-        shipped scene.
+        """Loads the world of a scene: the path of a ``scene.toml`` or of its folder, the name of a
+        shipped scene, or the path of a robot (``.urdf``), a model of MuJoCo (``.xml``) or a mesh.
 
-        Arguments override the settings of the file. A missing file or an unknown name raises
+        keyframe: name or number of the keyframe that a model of MuJoCo starts in. The other arguments
+        override the settings of the file. A missing file or an unknown name raises
         ``MissingFileError`` (a ``FileNotFoundError``); a file with problems raises ``SceneError``
         (a ``ValueError``), which lists all of them with line and column.
         """
@@ -1389,8 +1405,8 @@ class World:
     ) -> Articulation:
         """Adds an articulated body and returns its handle.
 
-        articulation: a description, a builder, or the path of a URDF. base: pose of its base: a position (3,),
-        or position and quaternion (7,), meters and (x, y, z, w). name: by default the
+        articulation: a description, a builder, or the path of a URDF or a model of MuJoCo. base: pose
+        of its base: a position (3,), or position and quaternion (7,), meters and (x, y, z, w). name: by default the
         description's. It starts with the ``q``, ``qd`` and ``tau`` of the description; the pose of
         a floating root is relative to the base.
         """

@@ -21,6 +21,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use tumble::collide::{Pose, Vec3};
 use tumble::dynamics::{ArticulatedBody, DofSettings, Object};
+use tumble::scene::mjcf::{self, MjcfOptions};
 use tumble::scene::urdf::{self, UrdfOptions};
 
 /// A tree of links: a robot, a chain, a skeleton.
@@ -116,6 +117,30 @@ impl Articulation {
         let body = ArticulatedBody::new(read.name, read.model);
         let source = Source::File { file, options, dofs: read.dofs };
         Ok(Articulation::of_source(source, &body, read.joints))
+    }
+
+    /// Reads the only articulated body of a model of MuJoCo, at the place that it has there.
+    /// ``World.load`` reads a whole model: bodies, floors, gravity and time step.
+    ///
+    /// keyframe: name or number of the keyframe that it starts in. missing_meshes: ``"error"`` or
+    /// ``"skip"``, for missing collision meshes. collision_meshes: ``"exact"`` or ``"hull"``.
+    #[staticmethod]
+    #[pyo3(signature = (path, *, keyframe=None, missing_meshes="error", collision_meshes="hull"))]
+    pub fn from_mjcf(
+        py: Python<'_>,
+        path: &Bound<'_, PyAny>,
+        keyframe: Option<String>,
+        missing_meshes: &str,
+        collision_meshes: &str,
+    ) -> Result<Articulation> {
+        let file = crate::arrays::convert::path(path)?;
+        let options = MjcfOptions {
+            keyframe,
+            missing_meshes: meaning("missing_meshes", missing_meshes, MISSING_MESHES)?,
+            collision_meshes: meaning("collision_meshes", collision_meshes, COLLISION_MESHES)?,
+        };
+        let (body, joints, _) = py.detach(|| pool::run(|| Ok(mjcf::articulation(&file, &options)?)))?;
+        Ok(Articulation::of_source(Source::Built(Box::new(body.clone())), &body, joints))
     }
 
     /// Name of the robot in its file, or of the body in its world.

@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use tumble::collide::{Pose, Vec3};
 use tumble::dynamics::ArticulatedBody;
+use tumble::scene::FileKind;
 
 impl Articulation {
     /// Returns the body to add to a world, in the state of the description, and notes about its
@@ -92,7 +93,7 @@ pub fn alone(name: &str) -> Error {
     .into()
 }
 
-/// Returns a description, also of a builder or of the path of a URDF.
+/// Returns a description, also of a builder or of the path of a URDF or a model of MuJoCo.
 pub fn described<'py>(value: &Bound<'py, PyAny>) -> Result<Bound<'py, Articulation>> {
     if let Ok(own) = value.cast::<Articulation>() {
         return Ok(own.clone());
@@ -100,6 +101,8 @@ pub fn described<'py>(value: &Bound<'py, PyAny>) -> Result<Bound<'py, Articulati
     if let Ok(builder) = value.cast::<ArticulationBuilder>() {
         return Ok(Bound::new(value.py(), builder.get().description()?)?);
     }
-    path(value)?;
+    if matches!(FileKind::of(&path(value)?), Ok(FileKind::Mjcf)) {
+        return Ok(Bound::new(value.py(), Articulation::from_mjcf(value.py(), value, None, "error", "hull")?)?);
+    }
     Ok(Bound::new(value.py(), Articulation::from_urdf(value.py(), value, false, None, "error", "exact")?)?)
 }

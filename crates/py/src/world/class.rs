@@ -37,7 +37,8 @@ use std::sync::Arc;
 use std::time::Instant;
 use tumble::collide::{ContactMode, Vec3};
 use tumble::dynamics::{Material, Mode, PairMaterial, RigidBody as Rigid, Settings};
-use tumble::scene::{SceneFile, resolve_scene};
+use tumble::scene::mjcf::MjcfOptions;
+use tumble::scene::{FileKind, LoadOptions, SceneFile, resolve_scene};
 
 /// A world of bodies that moves in steps of ``dt`` seconds. SI units, radians, z up; quaternions
 /// are (x, y, z, w).
@@ -139,14 +140,15 @@ impl World {
         World::of(py, build(scene)?)
     }
 
-    /// Loads the world of a scene: the path of a ``scene.toml`` or of its folder, or the name of a
-    /// shipped scene.
+    /// Loads the world of a scene: the path of a ``scene.toml`` or of its folder, the name of a
+    /// shipped scene, or the path of a robot (``.urdf``), a model of MuJoCo (``.xml``) or a mesh.
     ///
-    /// Arguments override the settings of the file. A missing file or an unknown name raises
+    /// keyframe: name or number of the keyframe that a model of MuJoCo starts in. The other arguments
+    /// override the settings of the file. A missing file or an unknown name raises
     /// ``MissingFileError`` (a ``FileNotFoundError``); a file with problems raises ``SceneError``
     /// (a ``ValueError``), which lists all of them with line and column.
     #[staticmethod]
-    #[pyo3(signature = (path_or_name, *, dt=None, stepper=None, integrator=None, solver=None, threads=None, budget=None))]
+    #[pyo3(signature = (path_or_name, *, dt=None, stepper=None, integrator=None, solver=None, threads=None, budget=None, keyframe=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn load(
         py: Python<'_>,
@@ -157,11 +159,17 @@ impl World {
         solver: Option<&str>,
         threads: Option<u32>,
         budget: Option<u32>,
+        keyframe: Option<String>,
     ) -> Result<World> {
         let asked = path(path_or_name)?;
+        if keyframe.is_some() && !matches!(FileKind::of(&asked), Ok(FileKind::Mjcf)) {
+            return Err(Error::value("keyframe: only a model of MuJoCo (.xml) has keyframes"));
+        }
         let built = py.detach(|| {
             pool::run(|| {
-                let mut scene = resolve_scene(&asked.to_string_lossy(), &[])?.load()?;
+                let mjcf = MjcfOptions { keyframe, ..MjcfOptions::default() };
+                let options = LoadOptions { mjcf, ..LoadOptions::default() };
+                let mut scene = resolve_scene(&asked.to_string_lossy(), &[])?.load_with(&options)?;
                 Choices { stepper, integrator, solver, dt, threads, budget }.apply(&mut scene.world)?;
                 build(scene)
             })
@@ -818,8 +826,8 @@ impl World {
 
     /// Adds an articulated body and returns its handle.
     ///
-    /// articulation: a description, a builder, or the path of a URDF. base: pose of its base: a position (3,),
-    /// or position and quaternion (7,), meters and (x, y, z, w). name: by default the
+    /// articulation: a description, a builder, or the path of a URDF or a model of MuJoCo. base: pose
+    /// of its base: a position (3,), or position and quaternion (7,), meters and (x, y, z, w). name: by default the
     /// description's. It starts with the ``q``, ``qd`` and ``tau`` of the description; the pose of
     /// a floating root is relative to the base.
     #[pyo3(signature = (articulation, base=None, *, name=None))]

@@ -19,7 +19,8 @@ const MAX_LISTED_PAIRS: usize = 8;
 pub(crate) fn model(links: &[LinkSpec], masses: &[LinkMass]) -> Result<Model, ModelError> {
     let mut builder = ModelBuilder::new();
     for (link, mass) in links.iter().zip(masses) {
-        builder.link(&link.name, link.parent, link.joint.kind, link.placement, *mass);
+        let number = builder.link(&link.name, link.parent, link.joint.kind, link.placement, *mass);
+        builder.set_armature(number, link.joint.armature);
     }
     builder.build()
 }
@@ -123,7 +124,13 @@ fn attach(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Result
             Material { restitution: surface.restitution, friction: surface.friction, id, ..Material::default() };
         body.add_collider(
             link,
-            Collider { material, contact_mode: surface.contacts, ..Collider::new(shape.clone(), placed.spec.pose) },
+            Collider {
+                material,
+                contact_mode: surface.contacts,
+                group: surface.group,
+                mask: surface.mask,
+                ..Collider::new(shape.clone(), placed.spec.pose)
+            },
         )?;
     }
     if placed.visible {

@@ -75,6 +75,7 @@ impl SceneFile {
             MeshSource::Capsule { radius_m, length_m, segments } => {
                 TriMesh::capsule(*radius_m, *length_m, *segments as usize, (*segments as usize / 4).max(2))
             }
+            MeshSource::Triangles { mesh } => mesh.as_ref().clone(),
             MeshSource::Box { size_m } => TriMesh::cuboid(Vec3::from(*size_m)),
         };
         Ok((made, Vec::new()))

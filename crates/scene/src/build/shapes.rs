@@ -168,6 +168,14 @@ impl<'m> ShapeMaker<'m> {
                 let mesh = self.visuals.entry(key).or_insert_with(|| Arc::new(visual_mesh::of_file(path, *scale)));
                 Ok(Some(VisualGeometry::Mesh(mesh.clone())))
             }
+            Geometry::Solid { name, mesh } => {
+                let key = ((PathBuf::from(name), [1.0_f64.to_bits(); 3]), false);
+                if !self.solids.contains_key(&key) {
+                    let made = self.solid(Path::new(name), mesh.as_ref().clone()).map_err(|e| e.to_string());
+                    self.solids.insert(key.clone(), made);
+                }
+                self.solids[&key].clone().map(as_shape).map_err(|why| format!("mesh \"{name}\": {why}"))
+            }
             Geometry::File { path, scale, place, hull, required } => {
                 let key = ((path.clone(), scale.map(f64::to_bits)), *hull);
                 if !self.solids.contains_key(&key) {

@@ -9,6 +9,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::error::SceneError;
+use crate::mjcf::{self, MjcfOptions};
 use crate::open::format::FileKind;
 use crate::parse::file::{MAX_BYTES, SceneFile};
 use crate::urdf::UrdfOptions;
@@ -18,13 +19,16 @@ use crate::urdf::UrdfOptions;
 pub struct LoadOptions {
     /// How a URDF is read.
     pub urdf: UrdfOptions,
+    /// How a model of MuJoCo is read.
+    pub mjcf: MjcfOptions,
     /// Whether holes and other defects of a mesh are repaired. Otherwise they are an error.
     pub repair: bool,
 }
 
 impl SceneFile {
     /// Reads the file at `path`, or `scene.toml` in the folder `path`. A URDF (`.urdf`) becomes a
-    /// scene with the robot on a floor through its lowest point. A mesh (`.obj`, `.stl`, `.ply`,
+    /// scene with the robot on a floor through its lowest point. A model of MuJoCo (`.xml`, `.mjcf`)
+    /// becomes a scene with all its bodies. A mesh (`.obj`, `.stl`, `.ply`,
     /// `.dae`) becomes a dynamic body of 1000 kg/m³ above a floor, in the frame of its file.
     ///
     /// # Errors
@@ -46,6 +50,7 @@ impl SceneFile {
         match FileKind::of(&path).map_err(|why| SceneError::Format { file: path.clone(), why })? {
             FileKind::Scene => {}
             FileKind::Urdf => return on_floor::robot(&path, &options.urdf),
+            FileKind::Mjcf => return Ok(mjcf::load(&path, &options.mjcf)?),
             FileKind::Mesh => return on_floor::mesh(&path, options.repair),
         }
         let bytes = read_capped(&path)?;

@@ -179,6 +179,9 @@ impl Extent {
                 let made = shapes::make(spec, &[]).ok();
                 points.extend(made.map(|shape| shape.aabb(pose)).into_iter().flat_map(|b| [b.min, b.max]));
             }
+            Geometry::Solid { mesh, .. } => {
+                points.extend(mesh.vertices.iter().map(|v| pose.transform_point(&(*v).into()).coords));
+            }
             Geometry::File { path, scale, .. } => {
                 let read = self.files.entry(path.clone()).or_insert_with(|| mesh_files::read_file(path).ok());
                 let Some(mesh) = read else { return };

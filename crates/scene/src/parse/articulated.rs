@@ -1,5 +1,5 @@
 //! `[[articulated]]`: a tree of links in reduced coordinates, written out in the scene or read from
-//! a URDF.
+//! a URDF or a model of MuJoCo.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,6 +8,7 @@ use tumble_core::Joint;
 use tumble_core::articulated::MAX_LINKS;
 use tumble_core::collide::Pose;
 
+use crate::mjcf::MjcfOptions;
 use crate::parse::body::{Library, read_name};
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names, Value, number_of};
@@ -87,9 +88,10 @@ impl ArticulatedSpec {
             collides: f.flag_or("collides", true),
             visible: f.flag_or("visible", true),
         };
-        match f.value("urdf") {
-            Some(_) => spec.read_urdf(&mut f, &from, place)?,
-            None => spec.read_links(&mut f, &from),
+        match (f.value("urdf"), f.value("mjcf")) {
+            (Some(_), _) => spec.read_urdf(&mut f, &from, place)?,
+            (None, Some(_)) => spec.read_mjcf(&mut f, &from, place)?,
+            (None, None) => spec.read_links(&mut f, &from),
         }
         spec.read_joints(&mut f);
         spec.read_start(&mut f);
@@ -103,7 +105,7 @@ impl ArticulatedSpec {
     fn read_links(&mut self, f: &mut Fields<'_>, from: &Inherited<'_, '_>) {
         let tables = f.tables("link", MAX_LINKS);
         if tables.is_empty() && f.value("link").is_none() {
-            f.missing("link", "links, each under a line [[articulated.link]], or `urdf`");
+            f.missing("link", "links, each under a line [[articulated.link]], or `urdf` or `mjcf`");
         }
         let mut mimics = Vec::new();
         let mut lines: BTreeMap<String, usize> = BTreeMap::new();
@@ -185,6 +187,45 @@ impl ArticulatedSpec {
                 None
             }
         }
+    }
+
+    /// Reads `mjcf` and the keys that belong to it. Surface keys replace those of the file.
+    fn read_mjcf(&mut self, f: &mut Fields<'_>, from: &Inherited<'_, '_>, place: &Place<'_>) -> Option<()> {
+        let (path, value) = f.optional_text("mjcf")?;
+        if let Some(floating) = f.value("floating").filter(|_| from.floating) {
+            f.wrong("floating", floating, "no `floating` with `mjcf`: the file says whether its root floats");
+        }
+        let options = MjcfOptions {
+            missing_meshes: f.choice_or("missing_meshes", MISSING, MissingMeshes::Error),
+            collision_meshes: f.choice_or("collision_meshes", COLLISION, CollisionMeshes::Hull),
+            keyframe: f.optional_text("keyframe").map(|(name, _)| name.to_owned()),
+        };
+        let read = crate::mjcf::one_body(&place.folder.join(path), &options);
+        let (read, notes) = match read {
+            Ok(read) => read,
+            Err(error) => {
+                for line in error.to_string().lines() {
+                    f.log.report(value.span(), format!("`mjcf` of {}: {line}", f.what), "expected a valid model");
+                }
+                return None;
+            }
+        };
+        (self.links, self.exclude_collisions, self.notes) = (read.links, read.exclude_collisions, notes);
+        let [named, friction, restitution, color] =
+            ["material", "friction", "restitution", "color"].map(|key| f.value(key).is_some());
+        for shape in self.links.iter_mut().flat_map(|link| &mut link.shapes) {
+            shape.collides &= from.collides;
+            shape.visible &= from.visible;
+            let (own, new) = (&mut shape.surface, from.surface);
+            own.material = new.material;
+            own.contacts = new.contacts;
+            own.friction = if named || friction { new.friction } else { own.friction };
+            own.restitution = if named || restitution { new.restitution } else { own.restitution };
+            if named || color {
+                own.appearance = new.appearance.clone();
+            }
+        }
+        Some(())
     }
 
     /// Reads `[[articulated.joint]]`: limits, drives, damping and friction of existing joints.

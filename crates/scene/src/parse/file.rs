@@ -7,6 +7,7 @@ use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
 use crate::error::SceneError;
+use crate::mjcf::ActuatorSpec;
 use crate::parse::articulated::ArticulatedSpec;
 use crate::parse::body::{BodySpec, Library};
 use crate::parse::fields::Fields;
@@ -57,6 +58,8 @@ pub struct SceneFile {
     pub articulated: Vec<ArticulatedSpec>,
     /// `[[loop_joint]]` in the order of the file.
     pub loop_joints: Vec<LoopJointSpec>,
+    /// Actuators of a model of MuJoCo; scene files have none.
+    pub actuators: Vec<ActuatorSpec>,
     /// `[[pair]]` in the order of the file.
     pub pairs: Vec<PairSpec>,
     /// `[camera]`; `None` leaves the view to the renderer.
@@ -133,6 +136,7 @@ impl SceneFile {
             bodies,
             articulated,
             loop_joints,
+            actuators: Vec::new(),
             pairs,
             camera,
             cave,

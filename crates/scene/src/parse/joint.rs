@@ -32,6 +32,8 @@ pub struct JointSpec {
     /// Largest torque or force of its motor, N·m or N, if a URDF has one. It is the default force
     /// limit of drives.
     pub effort: Option<f64>,
+    /// Inertia of its rotor, kg·m² or kg, at least 0; 0 unless it has one degree of freedom.
+    pub armature: f64,
     /// Largest speed that the file allows, rad/s or m/s. Stored, not enforced.
     pub speed: Option<f64>,
     /// Whether a position drive without a target holds the initial position.
@@ -140,6 +142,7 @@ impl JointSpec {
             position,
             velocity,
             effort: None,
+            armature: 0.0,
             speed: None,
             holds_start: false,
         }

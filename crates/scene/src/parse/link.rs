@@ -1,11 +1,12 @@
 //! `[[articulated.link]]`: a link with its joint, shapes and mass.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use toml::de::DeValue;
-use tumble_core::Joint;
 use tumble_core::articulated::LinkMass;
-use tumble_core::collide::{ContactMode, Mat3, Pose, Vec3};
+use tumble_core::collide::{ContactMode, Mat3, Pose, TriMesh, Vec3};
+use tumble_core::{CollisionGroup, Joint};
 
 use crate::parse::appearance::{AppearanceSpec, Color, as_color};
 use crate::parse::body::{Library, MassSpec, read_material, read_name};
@@ -105,6 +106,13 @@ pub enum Geometry {
         /// Whether an unreadable mesh is an error. Otherwise it is left out.
         required: bool,
     },
+    /// A closed mesh that was read or made with the file that names it.
+    Solid {
+        /// The name; each has one mesh.
+        name: String,
+        /// Closed and wound outwards, meters.
+        mesh: Arc<TriMesh>,
+    },
 }
 
 /// Contact constants and appearance of a shape.
@@ -118,6 +126,10 @@ pub struct Surface {
     pub restitution: f64,
     /// Contact mode of meshes and cylinders.
     pub contacts: ContactMode,
+    /// Collision group.
+    pub group: CollisionGroup,
+    /// Groups that it collides with, one bit each.
+    pub mask: u64,
     /// Appearance.
     pub appearance: AppearanceSpec,
 }
@@ -129,6 +141,8 @@ impl Default for Surface {
             friction: DEFAULT_FRICTION,
             restitution: DEFAULT_RESTITUTION,
             contacts: ContactMode::default(),
+            group: CollisionGroup::default(),
+            mask: u64::MAX,
             appearance: AppearanceSpec::default(),
         }
     }
@@ -148,6 +162,8 @@ impl Surface {
             friction: f.number_or("friction", FRICTION, friction),
             restitution: f.number_or("restitution", RESTITUTION, restitution),
             contacts: f.choice_or("contacts", CONTACTS, base.contacts),
+            group: base.group,
+            mask: base.mask,
             appearance: AppearanceSpec::read(f, appearance),
         }
     }

@@ -14,18 +14,30 @@ const MAX_QUOTED_CHARS: usize = 48;
 pub(crate) struct Log<'a> {
     text: &'a str,
     folder: std::path::PathBuf,
+    file: String,
     found: RefCell<Vec<(Range<usize>, String, String)>>,
 }
 
 impl<'a> Log<'a> {
     pub(crate) fn new(text: &'a str) -> Self {
-        Log { text, folder: Default::default(), found: RefCell::new(Vec::new()) }
+        Log { text, folder: Default::default(), file: String::new(), found: RefCell::new(Vec::new()) }
     }
 
     /// Sets the folder that file names in the text are relative to.
     pub(crate) fn in_folder(mut self, folder: &std::path::Path) -> Self {
         self.folder = folder.to_path_buf();
         self
+    }
+
+    /// Sets the name of the file as notes show it.
+    pub(crate) fn named(mut self, file: &str) -> Self {
+        self.file = file.to_owned();
+        self
+    }
+
+    /// Returns the name of the file; empty if none was set.
+    pub(crate) fn file(&self) -> &str {
+        &self.file
     }
 
     /// Returns the folder that file names in the text are relative to.

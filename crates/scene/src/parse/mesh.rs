@@ -1,6 +1,9 @@
 //! `[meshes.NAME]`: closed surfaces, from a file or generated.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use tumble_core::collide::TriMesh;
 
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names};
@@ -83,6 +86,11 @@ pub enum MeshSource {
     Box {
         /// Full edge lengths along x, y and z, meters.
         size_m: [f64; 3],
+    },
+    /// A closed mesh of a model that was read; scene files have none.
+    Triangles {
+        /// Closed and wound outwards, meters.
+        mesh: Arc<TriMesh>,
     },
 }
 

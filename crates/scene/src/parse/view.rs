@@ -229,17 +229,21 @@ pub struct GroundSpec {
 
 impl GroundSpec {
     pub(crate) fn read(mut f: Fields<'_>) -> Self {
-        let base = AppearanceSpec {
+        let height_m = f.number_or("height_m", Bound::ANY, 0.0);
+        let ground = GroundSpec { height_m, appearance: AppearanceSpec::read(&mut f, &Self::default_appearance()) };
+        f.finish();
+        ground
+    }
+
+    /// Returns a gray checkerboard of 1 m.
+    pub(crate) fn default_appearance() -> AppearanceSpec {
+        AppearanceSpec {
             color: [0.40, 0.41, 0.42],
             second_color: [0.46, 0.47, 0.48],
             pattern: Pattern::Checker,
             pattern_scale_m: 1.0,
             roughness: 0.9,
             ..AppearanceSpec::default()
-        };
-        let height_m = f.number_or("height_m", Bound::ANY, 0.0);
-        let ground = GroundSpec { height_m, appearance: AppearanceSpec::read(&mut f, &base) };
-        f.finish();
-        ground
+        }
     }
 }

@@ -8,9 +8,9 @@ use tumble_core::articulated::DofSettings;
 use tumble_core::collide::{Pose, Vec3};
 
 use super::link::read_origin;
-use super::xml::Element;
 use crate::parse::bound::Bound;
 use crate::parse::joint::JointSpec;
+use crate::xml::Element;
 
 /// The joint types of a URDF. `spherical` is not in its specification, but some files have it.
 #[derive(Clone, Copy, Debug, PartialEq)]

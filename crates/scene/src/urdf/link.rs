@@ -11,13 +11,13 @@ use tumble_core::collide::{Mat3, Pose, Vec3};
 use super::files::{Found, find};
 use super::options::{CollisionMeshes, MissingMeshes, UrdfOptions};
 use super::read::Content;
-use super::xml::Element;
 use crate::notes::NoteList;
 use crate::parse::appearance::Color;
 use crate::parse::bound::Bound;
 use crate::parse::link::{Geometry, InertiaFault, LinkShape, inertia_fault};
 use crate::parse::rotation;
 use crate::parse::shape::ShapeSpec;
+use crate::xml::Element;
 
 /// Context shared by all links of a file.
 pub(crate) struct Context<'c> {

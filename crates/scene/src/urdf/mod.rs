@@ -34,7 +34,6 @@ mod read;
 mod share;
 mod spheres;
 mod tree;
-mod xml;
 
 pub use error::UrdfError;
 pub use load::{UrdfModel, load, model, parse_model};

@@ -12,11 +12,14 @@ use super::joint::JointElement;
 use super::link::{Context, LinkElement, read_color};
 use super::options::UrdfOptions;
 use super::tree::{self, TreeBuilder};
-use super::xml::{self, Element};
 use crate::notes::NoteList;
 use crate::parse::link::LinkSpec;
 use crate::parse::log::Log;
 use crate::parse::problem::Invalid;
+use crate::xml::{self, Element};
+/// The format, for messages about a text that is no XML.
+pub(super) const EXPECTED: &str = "a URDF: an XML document with one element <robot>";
+
 /// The content of a URDF.
 pub(crate) struct Robot {
     pub(crate) name: String,
@@ -58,9 +61,9 @@ pub(super) fn text_of(path: &Path) -> Result<String, UrdfError> {
 
 /// Reads a text. `path` is shown in messages, and meshes are relative to its folder.
 pub(crate) fn read_text(text: &str, path: &Path, options: &UrdfOptions, content: Content) -> Result<Robot, UrdfError> {
-    let log = Log::new(text);
     let file = path.display().to_string();
-    let document = xml::parse(&log, text);
+    let log = Log::new(text).named(&file);
+    let document = xml::parse(&log, text, EXPECTED);
     let robot = document.as_ref().and_then(|document| {
         let context = Context {
             folder: path.parent().unwrap_or(Path::new("")),

@@ -23,12 +23,12 @@ use super::link::{Context, read_shape};
 use super::options::UrdfOptions;
 use super::read::{Content, read_text, text_of};
 use super::share::{self, Share};
-use super::xml::{self, Element};
 use crate::build::mesh_files::{read_file, stretched};
 use crate::notes::NoteList;
 use crate::parse::link::{Geometry, LinkShape};
 use crate::parse::log::Log;
 use crate::parse::shape::ShapeSpec;
+use crate::xml::{self, Element};
 
 /// Sides of the prism around a cylinder.
 const SIDES: usize = 48;
@@ -116,7 +116,7 @@ pub fn spherize(
     let log = Log::new(&text);
     let file = path.display().to_string();
     let wrong = |why: String| UrdfError::Body { file: path.to_path_buf(), why };
-    let document = xml::parse(&log, &text).ok_or_else(|| wrong("it is not XML".into()))?;
+    let document = xml::parse(&log, &text, super::read::EXPECTED).ok_or_else(|| wrong("it is not XML".into()))?;
     let mut context = Context {
         folder: path.parent().unwrap_or(Path::new("")),
         file: &file,
@@ -165,6 +165,7 @@ fn surface(geometry: &Geometry, context: &mut Context<'_>) -> Result<Surface, St
             Ok(closed(TriMesh::cylinder(outer, *length_m, SIDES), outer - radius_m))
         }
         Geometry::Shape(other) => Err(format!("{other:?} is not a shape of a URDF")),
+        Geometry::Solid { name, .. } => Err(format!("{name} is not a shape of a URDF")),
         Geometry::File { path, scale, hull, .. } => {
             let given = read_file(path)
                 .map(|mesh| stretched(mesh, *scale))

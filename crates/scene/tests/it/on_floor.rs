@@ -76,7 +76,8 @@ fn the_floor_goes_through_the_lowest_point_of_a_robot_within_its_limits() {
     let (world, _) = scene.build().unwrap();
     assert_eq!(world.ids().len(), 2);
 
-    let options = LoadOptions { urdf: UrdfOptions { floating: true, ..UrdfOptions::default() }, repair: false };
+    let options =
+        LoadOptions { urdf: UrdfOptions { floating: true, ..UrdfOptions::default() }, ..LoadOptions::default() };
     assert!(!SceneFile::load_with(&path, &options).unwrap().has_fixed_base());
 }
 

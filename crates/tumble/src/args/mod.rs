@@ -10,6 +10,7 @@ use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use tumble::collide::Builder;
 use tumble::render::{CalibrationPattern, DebugDraw, Quality};
+use tumble::scene::mjcf::MjcfOptions;
 use tumble::scene::urdf::{MissingMeshes, UrdfOptions};
 use tumble::scene::{FileKind, Integrator, LoadOptions, SceneFile, Solver, Stepper, resolve_scene};
 use values::{folder, fraction, method, missing, package, planner, png, size, solver, time_step};
@@ -56,8 +57,8 @@ pub enum Command {
 /// The scene and its stepping.
 #[derive(Args, Clone)]
 pub struct SceneOptions {
-    /// A scene file, a folder with a scene.toml, the name of a shipped scene, a robot (.urdf) or a
-    /// mesh (.obj, .stl, .ply, .dae).
+    /// A scene file, a folder with a scene.toml, the name of a shipped scene, a robot (.urdf), a model
+    /// of MuJoCo (.xml, .mjcf) or a mesh (.obj, .stl, .ply, .dae).
     #[arg(value_name = "SCENE")]
     pub name: String,
     /// Length of a step, s (default: from the scene).
@@ -114,9 +115,12 @@ pub struct OpeningOptions {
     /// searched in the folders above the URDF.
     #[arg(long = "package", value_name = "NAME=DIR", value_parser = package)]
     pub packages: Vec<(String, PathBuf)>,
-    /// If a collision mesh of a URDF is missing: error, or skip it with a note.
+    /// If a collision mesh of a URDF or a model of MuJoCo is missing: error, or skip it with a note.
     #[arg(long, value_name = "error|skip", value_parser = missing)]
     pub missing_meshes: Option<MissingMeshes>,
+    /// The keyframe that a model of MuJoCo starts in: its name, or its number from 0.
+    #[arg(long, value_name = "NAME")]
+    pub keyframe: Option<String>,
     /// Repair a mesh that is not a closed solid: holes, fins, inner walls, debris. Notes list the
     /// repairs; the file stays unchanged.
     #[arg(long)]
@@ -142,7 +146,12 @@ impl OpeningOptions {
             missing_meshes: self.missing_meshes.unwrap_or_default(),
             ..UrdfOptions::default()
         };
-        Ok(resolve_scene(name, &[])?.load_with(&LoadOptions { urdf, repair: self.repair })?)
+        let mjcf = MjcfOptions {
+            missing_meshes: self.missing_meshes.unwrap_or_default(),
+            keyframe: self.keyframe.clone(),
+            ..MjcfOptions::default()
+        };
+        Ok(resolve_scene(name, &[])?.load_with(&LoadOptions { urdf, mjcf, repair: self.repair })?)
     }
 
     /// Returns the options as they are typed, for a process that opens the same file.
@@ -157,18 +166,27 @@ impl OpeningOptions {
             MissingMeshes::Skip => "skip",
         });
         args.extend(missing.iter().flat_map(|word| ["--missing-meshes".to_owned(), (*word).to_owned()]));
+        args.extend(self.keyframe.iter().map(|name| format!("--keyframe={name}")));
         args
     }
 
     /// Refuses options that have no effect on a file of this kind.
     fn check(&self, kind: FileKind) -> Result<(), &'static str> {
-        let robot = self.floating || self.fixed_base || !self.packages.is_empty() || self.missing_meshes.is_some();
+        let urdf = self.floating || self.fixed_base || !self.packages.is_empty();
+        let robot = urdf || self.missing_meshes.is_some();
         match kind {
+            FileKind::Urdf | FileKind::Mesh | FileKind::Scene if self.keyframe.is_some() => {
+                Err("--keyframe needs a model of MuJoCo (.xml)")
+            }
+            FileKind::Mjcf if urdf => Err("--floating, --fixed-base and --package need a .urdf file"),
+            FileKind::Mjcf if self.repair => {
+                Err("--repair needs a mesh file; meshes of a model of MuJoCo collide by their convex hulls")
+            }
             FileKind::Urdf if self.repair => {
                 Err("--repair needs a mesh file; an open mesh of a URDF collides by its convex hull")
             }
             FileKind::Mesh | FileKind::Scene if robot => Err(
-                "--floating, --fixed-base, --package and --missing-meshes need a .urdf file; a scene has these settings under [[articulated]]",
+                "--floating, --fixed-base, --package and --missing-meshes need a .urdf file (--missing-meshes also takes a .xml one); a scene has these settings under [[articulated]]",
             ),
             FileKind::Scene if self.repair => {
                 Err("--repair needs a mesh file; a scene has `repair = true` under [meshes.NAME]")
@@ -306,7 +324,7 @@ pub struct ViewOptions {
 #[derive(Args)]
 pub struct CheckOptions {
     /// Scene files, folders, names of shipped scenes; cave files, names of shipped caves; .urdf
-    /// robots; .obj, .stl, .ply and .dae meshes.
+    /// robots; .xml models of MuJoCo; .obj, .stl, .ply and .dae meshes.
     #[arg(required = true)]
     pub files: Vec<String>,
     #[command(flatten)]

@@ -9,7 +9,7 @@
 //! place  (outward)    o = oₚ + r                       ω = ωₚ + ω_J          v = vₚ + ωₚ × r + v_J
 //!                     α⁰ = α⁰ₚ + ωₚ × ω_J              a⁰ = a⁰ₚ + α⁰ₚ × r + ωₚ × (ωₚ × r + 2 v_J)
 //!                     p = [J α⁰ + ω × J ω + h × a⁰;    m a⁰ + α⁰ × h + ω × (ω × h)]
-//! fold   (inward)     U = IA S     D = Sᵀ U     Ia = IA − U D⁻¹ Uᵀ              IAₚ += Xᵀ Ia X
+//! fold   (inward)     U = IA S     D = Sᵀ U + a    Ia = IA − U D⁻¹ Uᵀ              IAₚ += Xᵀ Ia X
 //! push   (inward)     e = τ − Sᵀ p              p' = p + U D⁻¹ e                pₚ += Xᵀ p'
 //! spread (outward)    Â' = X Âₚ                 q̈ = D⁻¹ (e − Uᵀ Â')             Â = Â' + S q̈
 //! ```
@@ -20,6 +20,7 @@
 //! | `α⁰`, `a⁰` | acceleration of the link with `q̈ = 0`: all centripetal and Coriolis terms |
 //! | `J`, `h`, `m` | rigid inertia about the origin, first moment, mass |
 //! | `IA`, `p` | articulated inertia, and the force that holds the subtree at `Â = 0`; external wrenches are subtracted from `p` |
+//! | `a` | armature of a revolute or prismatic joint: the inertia of its rotor, as the joint meets it |
 //! | `S` | `[s; 0]` of a revolute joint, `[0; s]` of a prismatic one, `[R; 0]` of a spherical one, `1` of a floating root |
 //! | `X` | `[1 0; −r× 1]`: motion of the parent at the child's origin |
 //! | `Â` | acceleration minus `[α⁰; a⁰]`. Uniform gravity `g` enters as `Â = [0; −g]` of the world |
@@ -196,7 +197,7 @@ impl<T: Scalar> Sweep<T> {
             JointKind::Revolute => {
                 let s = slot.rotation.z;
                 slot.column = slot.inertia.times_angular(s);
-                slot.pivot = s.dot(slot.column.torque);
+                slot.pivot = with_armature(s.dot(slot.column.torque), body.armature);
                 slot.inverse = slot.pivot.reciprocal_above(slot.inertia.rotational.trace() * SINGULAR);
                 if body.parent == 0 {
                     return;
@@ -206,7 +207,7 @@ impl<T: Scalar> Sweep<T> {
             JointKind::Prismatic => {
                 let s = slot.rotation.z;
                 slot.column = slot.inertia.times_linear(s);
-                slot.pivot = s.dot(slot.column.force);
+                slot.pivot = with_armature(s.dot(slot.column.force), body.armature);
                 slot.inverse = slot.pivot.reciprocal_above(slot.inertia.mass.trace() * SINGULAR);
                 if body.parent == 0 {
                     return;
@@ -343,6 +344,12 @@ pub(in crate::articulated) fn solve_floating<T: Scalar>(block: &JointFactor<T>, 
     let n = e.torque - rows_transposed_times(w, first.divide(f));
     let angular = second.backward(second.divide(second.forward(n)));
     Motion { angular, linear: first.backward(first.divide(f - rows_times(w, angular))) }
+}
+
+/// Returns `D` of a joint with an armature.
+#[inline(always)]
+fn with_armature<T: Scalar>(pivot: T, armature: f64) -> T {
+    pivot + pivot.constant(armature)
 }
 
 /// Sets the rigid inertia and the bias `p` of a placed link.

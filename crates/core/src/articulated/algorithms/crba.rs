@@ -5,13 +5,13 @@
 //! joint is then carried to every ancestor, whose columns of `S` give the entries:
 //!
 //! ```text
-//! f = m·S_v + S_ω×h          n = I·S_ω + h×S_v                       M[k, k] = S_kᵀ·[n; f]
+//! f = m·S_v + S_ω×h          n = I·S_ω + h×S_v                       M[k, k] = S_kᵀ·[n; f] + a
 //! to the parent: n += r×f                                            M[j, k] = S_jᵀ·[n; f]
 //! composite of the parent:  m_λ += m,  h_λ += h + m·r,
 //!                           I_λ += I + 2(r·h)·1 − r·hᵀ − h·rᵀ + m·(|r|²·1 − r·rᵀ)
 //! ```
 //!
-//! Symbols as in `kinematics.rs`.
+//! `a` is the armature of the joint. Other symbols as in `kinematics.rs`.
 
 use crate::articulated::algorithms::kinematics::{Kinematics, Rates};
 use crate::articulated::model::{Link, Model};
@@ -60,6 +60,7 @@ impl MassMatrix {
                     momentum.angular += kin.links()[at].arm.cross(&momentum.linear);
                     at = parent;
                 }
+                out[k * dof + k] += link.armature;
             }
         }
     }

@@ -1,11 +1,11 @@
 //! Sums over the links: energy, momentum, center of mass [RBDA §2.13, §5.3].
 //!
 //! ```text
-//! T = Σ ½m·|v + ω×c|² + ½ω·I_c·ω = Σ ½m·|v|² + m·v·(ω×c) + ½ω·I·ω         V = −Σ m·g·(p + c)
+//! T = Σ ½m·|v + ω×c|² + ½ω·I_c·ω + ½a·q̇² = Σ ½m·|v|² + m·v·(ω×c) + ½ω·I·ω + ½a·q̇²         V = −Σ m·g·(p + c)
 //! P = Σ m·(v + ω×c)                                                     H = Σ I·ω + m·c×v + p×m·(v + ω×c)
 //! ```
 //!
-//! Symbols as in `kinematics.rs`; `g` is gravity, `H` is about the world's origin.
+//! Symbols as in `kinematics.rs`; `a` is the armature of a joint, `g` is gravity, `H` is about the world's origin.
 
 use crate::articulated::algorithms::kinematics::Kinematics;
 use crate::articulated::model::Model;
@@ -16,8 +16,11 @@ use tumble_collide::Vec3;
 /// world's origin), J, for the refreshed motion.
 pub fn energy(model: &Model, kin: &Kinematics, gravity: &Vec3) -> Energy {
     let mut sum = Energy::default();
-    for (link, own) in model.links().iter().zip(kin.links()) {
+    for ((link, own), rate) in model.links().iter().zip(kin.links()).zip(kin.joint_rates()) {
         let (m, turn) = (link.mass.mass, own.angular);
+        if link.armature != 0.0 {
+            sum.kinetic += 0.5 * link.armature * (rate.angular.norm_squared() + rate.linear.norm_squared());
+        }
         let translation = 0.5 * m * own.linear.norm_squared() + m * own.linear.dot(&turn.cross(&own.center));
         sum.kinetic += translation + 0.5 * turn.dot(&(own.inertia * turn));
         sum.potential -= m * gravity.dot(&(own.pose.translation.vector + own.center));

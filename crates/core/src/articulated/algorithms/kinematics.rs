@@ -122,6 +122,11 @@ impl Kinematics {
         &self.links
     }
 
+    /// Returns the velocity of each link relative to its parent, `S·q̇`.
+    pub(super) fn joint_rates(&self) -> &[Rates] {
+        &self.joint_rates
+    }
+
     /// Returns the columns of `S`, one per velocity number: the motion of its link relative to the
     /// parent at unit velocity.
     pub fn columns(&self) -> &[Rates] {

@@ -7,13 +7,14 @@
 //!
 //! ```text
 //! f = m·(a + α×c + ω×(ω×c)) − f_ext           n = I·α + ω×I·ω + m·c×a − n_ext
-//! τ = S_ωᵀ·n + S_vᵀ·f                         f_λ += f,   n_λ += n + r×f
+//! τ = S_ωᵀ·n + S_vᵀ·f + a·q̈               f_λ += f,   n_λ += n + r×f
 //! ```
 //!
 //! | symbol | meaning |
 //! |---|---|
 //! | `f`, `n` | force, and torque about the link's origin, that the joint transmits to the link |
 //! | `f_ext`, `n_ext` | external wrench on the link |
+//! | `a` | armature of the joint |
 //! | `τ` | generalized force, one number per velocity number |
 //!
 //! Others as in `kinematics.rs`.
@@ -56,6 +57,9 @@ impl InverseDynamics {
             for k in link.v..link.v + link.joint.dof() {
                 let column = &kin.columns()[k];
                 tau[k] = column.angular.dot(&load.torque) + column.linear.dot(&load.force);
+                if link.armature != 0.0 {
+                    tau[k] += link.armature * qdd.get(k).copied().unwrap_or(0.0);
+                }
             }
             if let Some(parent) = link.parent {
                 self.loads[parent].force += load.force;

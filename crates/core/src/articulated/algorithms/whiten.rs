@@ -37,9 +37,9 @@ impl Dynamics {
         for (i, body) in self.compiled.bodies.iter().enumerate() {
             let (slot, motion) = (&self.sweep.slots[i + 1], s.motions[i + 1]);
             match body.kind {
-                // Gᵀ V' + Cᵀ v = Gᵀ V, because Gᵀ S = Cᵀ.
+                // Gᵀ V' + Cᵀ v = Gᵀ V + a v/√D, because Gᵀ S = Cᵀ − a/√D.
                 JointKind::Revolute | JointKind::Prismatic => {
-                    u[body.v] = self.roots[i + 1][1] * motion.power(slot.column)
+                    u[body.v] = self.roots[i + 1][1] * (motion.power(slot.column) + body.armature * v[body.v])
                 }
                 JointKind::Spherical(block) => {
                     let JointFactor { first, w, .. } = &self.sweep.blocks[block];

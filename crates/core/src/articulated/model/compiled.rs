@@ -49,6 +49,8 @@ pub(in crate::articulated) struct CompiledLink {
     /// Inner axes in the link's axes.
     pub own: Mat3,
     pub mass: f64,
+    /// Inertia that the joint adds to its pivot `D`.
+    pub armature: f64,
     /// First moment of mass, kg·m.
     pub moment: Vector<f64>,
     /// `λ`.
@@ -112,6 +114,7 @@ fn body(link: &Link, kind: JointKind, outer: &Mat3) -> CompiledLink {
         offset: (outer.transpose() * link.placement.translation.vector).into(),
         own,
         mass: link.mass.mass,
+        armature: link.armature,
         moment: (link.mass.mass * (own.transpose() * link.mass.center)).into(),
         sphere,
         pair,

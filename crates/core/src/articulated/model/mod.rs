@@ -165,6 +165,9 @@ pub struct Link {
     pub q: usize,
     /// Index of its first velocity number.
     pub v: usize,
+    /// Inertia of the rotor that drives its joint, as the joint meets it: added to the diagonal of
+    /// the mass matrix. kg·m² of a revolute joint, kg of a prismatic one, 0 of all others.
+    pub armature: f64,
 }
 
 /// A named frame that moves with a link. There is one for every link, folded ones included.
@@ -265,6 +268,7 @@ struct Added {
     joint: Joint,
     placement: Pose,
     mass: LinkMass,
+    armature: f64,
 }
 
 impl ModelBuilder {
@@ -284,8 +288,16 @@ impl ModelBuilder {
         placement: Pose,
         mass: LinkMass,
     ) -> usize {
-        self.added.push(Added { name: name.into(), parent, joint, placement, mass });
+        self.added.push(Added { name: name.into(), parent, joint, placement, mass, armature: 0.0 });
         self.added.len() - 1
+    }
+
+    /// Sets the [`armature`](Link::armature) of the revolute or prismatic joint of a link that was
+    /// added; a number of no link has no effect.
+    pub fn set_armature(&mut self, link: usize, armature: f64) {
+        if let Some(added) = self.added.get_mut(link) {
+            added.armature = armature;
+        }
     }
 
     /// Builds the model: checks everything, folds fixed links into their parents and numbers the
@@ -315,7 +327,7 @@ impl ModelBuilder {
 
 impl Model {
     fn add(&mut self, number: usize, added: Added) -> Result<(), ModelError> {
-        let Added { name, parent, joint, mut placement, mass } = added;
+        let Added { name, parent, joint, mut placement, mass, armature } = added;
         if parent.is_some_and(|p| p >= number) {
             return Err(ModelError::Parent { link: name, parent: parent.unwrap_or(number) });
         }
@@ -327,6 +339,7 @@ impl Model {
             return Err(ModelError::Placement(name));
         }
         mass.validate(&name)?;
+        check_armature(&name, &joint, armature)?;
         let mut carrier = None;
         if let Some(frame) = parent.map(|p| &self.frames[p]) {
             (carrier, placement) = (frame.link, frame.pose * placement);
@@ -344,7 +357,7 @@ impl Model {
         let (q, v) = (self.positions, self.dof);
         self.positions += joint.positions();
         self.dof += joint.dof();
-        self.links.push(Link { name, parent: carrier, joint, placement, mass, q, v });
+        self.links.push(Link { name, parent: carrier, joint, placement, mass, q, v, armature });
         Ok(())
     }
 
@@ -352,28 +365,41 @@ impl Model {
     /// moves some inertia. A builder ensures this; a damaged archive may violate it.
     pub(crate) fn is_sound(&self) -> bool {
         let mut ends = (0, 0);
+        let armatures = self.links.iter().all(|link| check_armature(&link.name, &link.joint, link.armature).is_ok());
         let links = self.links.iter().enumerate().all(|(i, link)| {
             let starts = std::mem::replace(&mut ends, (link.q + link.joint.positions(), link.v + link.joint.dof()));
             link.parent.is_none_or(|parent| parent < i) && (link.q, link.v) == starts && link.joint.dof() > 0
         });
         let frames = self.frames.iter().all(|frame| frame.link.is_none_or(|link| link < self.links.len()));
-        links && frames && ends == (self.positions, self.dof) && self.check_masses().is_ok()
+        links && armatures && frames && ends == (self.positions, self.dof) && self.check_masses().is_ok()
     }
 
-    /// Checks that every joint moves a link with mass or inertia.
+    /// Checks that every joint moves a link with mass or inertia, or has an armature.
     fn check_masses(&self) -> Result<(), ModelError> {
         let mut heavy: Vec<bool> =
             self.links.iter().map(|l| l.mass.mass > 0.0 || l.mass.inertia.amax() > 0.0).collect();
         for i in (0..self.links.len()).rev() {
-            if !heavy[i] {
+            if !heavy[i] && self.links[i].armature == 0.0 {
                 return Err(ModelError::Massless(self.links[i].name.clone()));
             }
             if let Some(parent) = self.links[i].parent {
-                heavy[parent] = true;
+                heavy[parent] |= heavy[i];
             }
         }
         Ok(())
     }
+}
+
+fn check_armature(link: &str, joint: &Joint, armature: f64) -> Result<(), ModelError> {
+    let single = joint.dof() == 1;
+    if armature.is_finite() && (armature == 0.0 || single && armature > 0.0) {
+        return Ok(());
+    }
+    let expected = match single {
+        true => "finite and at least 0",
+        false => "0: only revolute and prismatic joints have one",
+    };
+    Err(ModelError::Inertia { link: link.to_string(), what: "the armature of its joint", value: armature, expected })
 }
 
 fn unit_axis(joint: Joint, link: &str) -> Result<Joint, ModelError> {

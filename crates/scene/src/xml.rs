@@ -9,7 +9,7 @@ use crate::parse::bound::Bound;
 use crate::parse::log::Log;
 
 /// Largest number of nodes of a file.
-const MAX_NODES: u32 = 2_000_000;
+pub(crate) const MAX_NODES: u32 = 2_000_000;
 /// Largest magnitude of a number. Limits beyond it count as no limit.
 pub(crate) const MAX_MAGNITUDE: f64 = 1e12;
 
@@ -20,8 +20,9 @@ pub(crate) struct Element<'a, 'd> {
     node: Node<'a, 'd>,
 }
 
-/// Parses an XML text. Returns `None`, with the problem recorded, if it is not XML.
-pub(crate) fn parse<'d>(log: &Log<'_>, text: &'d str) -> Option<Document<'d>> {
+/// Parses an XML text. Returns `None`, with the problem recorded, if it is not XML. `expected` names
+/// the format and its outermost element.
+pub(crate) fn parse<'d>(log: &Log<'_>, text: &'d str, expected: &str) -> Option<Document<'d>> {
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
     Document::parse_with_options(text, options)
         .map_err(|error| {
@@ -31,7 +32,7 @@ pub(crate) fn parse<'d>(log: &Log<'_>, text: &'d str) -> Option<Document<'d>> {
             let message = error.to_string();
             let words = message.strip_suffix(&format!(" at {place}")).unwrap_or(&message);
             let at = if end { text.len() } else { at };
-            log.report(at..at, format!("XML: {words}"), "expected a URDF: an XML document with one element <robot>");
+            log.report(at..at, format!("XML: {words}"), format!("expected {expected}"));
         })
         .ok()
 }
@@ -105,6 +106,32 @@ impl<'a, 'd> Element<'a, 'd> {
             self.problem(format_args!("has no <{tag}>"), format!("expected {expected}"));
         }
         child
+    }
+
+    /// Returns between one and `most` numbers separated by white space, if present and valid.
+    pub(crate) fn list(&self, name: &str, most: usize, bound: Bound) -> Option<Vec<f64>> {
+        let words: Vec<&str> = self.text(name)?.split_whitespace().take(most + 1).collect();
+        let numbers: Option<Vec<f64>> = words.iter().map(|w| w.parse().ok().filter(|x| bound.holds(*x))).collect();
+        let numbers = numbers.filter(|numbers| (1..=most).contains(&numbers.len()));
+        if numbers.is_none() {
+            self.wrong(name, format_args!("1 to {most} numbers separated by spaces; each {}", bound.expected()));
+        }
+        numbers
+    }
+
+    /// Returns the meaning of a word, if present and valid.
+    pub(crate) fn word<T: Copy>(&self, name: &str, words: &[(&'static str, T)]) -> Option<T> {
+        let typed = self.text(name)?.trim();
+        let found = words.iter().find(|(word, _)| *word == typed).map(|(_, meaning)| *meaning);
+        if found.is_none() {
+            self.wrong(name, crate::parse::suggest::listed(words.iter().map(|(word, _)| *word), "or"));
+        }
+        found
+    }
+
+    /// Returns the file and the line of the element.
+    pub(crate) fn place(&self) -> String {
+        format!("{}:{}", self.log.file(), self.log.line(self.node.range().start))
     }
 
     /// Returns the first child element.

@@ -1,0 +1,286 @@
+//! Bodies of a model as bodies of a scene: static ones, rigid ones and trees of links.
+
+use nalgebra::{Translation3, one};
+use tumble_core::articulated::LinkMass;
+use tumble_core::collide::{Pose, Vec3};
+use tumble_core::{Joint, LockedAxes, Mode};
+
+use super::compiler::about;
+use super::geom::{Form, Geom};
+use super::joint::{JointItem, Kind};
+use super::names::Taken;
+use super::scene::{Assembly, Place};
+use super::shapes::{is_level, make, on_link};
+use crate::parse::appearance::AppearanceSpec;
+use crate::parse::articulated::ArticulatedSpec;
+use crate::parse::body::{BodySpec, MassSpec};
+use crate::parse::joint::JointSpec;
+use crate::parse::link::{LinkMassSpec, LinkSpec};
+use crate::parse::mount::Mounts;
+use crate::parse::shape::{CompoundPartSpec, ShapeSpec};
+use crate::parse::view::GroundSpec;
+
+impl Assembly<'_, '_> {
+    /// Adds all bodies.
+    pub(super) fn add_bodies(&mut self) {
+        let mut order: Vec<usize> = (0..self.bodies.len()).collect();
+        // Moving bodies keep their names where static geoms have the same.
+        order.sort_by_key(|body| self.fixed[*body]);
+        let roots = order.iter().copied().filter(|&b| !self.fixed[b] && self.fixed[self.bodies[b].parent]);
+        for body in roots.collect::<Vec<_>>() {
+            if !(self.is_free_leaf(body) && self.add_rigid(body)) {
+                self.add_tree(body);
+            }
+        }
+        for body in 0..self.bodies.len() {
+            match self.fixed[body] {
+                true if self.bodies[body].mocap => self.add_mocap(body),
+                true => self.add_static(body),
+                false => {}
+            }
+        }
+    }
+
+    /// Returns the name of a body: its own, or one with its number.
+    fn name_of(&self, body: usize) -> String {
+        self.bodies[body].name.clone().unwrap_or_else(|| format!("body{body}"))
+    }
+
+    /// Adds a static body for each geom of a body that is fixed to the world.
+    fn add_static(&mut self, body: usize) {
+        let (bodies, pose) = (self.bodies, self.poses[body]);
+        for (k, geom) in bodies[body].geoms.iter().enumerate() {
+            let collides = self.groups.collides(geom);
+            if !collides && !geom.visible {
+                continue;
+            }
+            let Some(made) = make(geom, self.reader) else { continue };
+            let owner = if body == 0 { "world".to_owned() } else { self.name_of(body) };
+            let name = geom.name.clone().unwrap_or_else(|| format!("{owner}/geom{k}"));
+            let (name, shape) = (self.taken.unique(name), self.meshes.shape(made));
+            let spec = self.body_spec(name, Mode::Static, shape, &(pose * geom.pose), geom);
+            let spec = BodySpec { collides, visible: geom.visible, ..spec };
+            self.statics[body].push((k, self.scene.bodies.len()));
+            let spec = self.with_ground(spec, geom, &(pose * geom.pose));
+            self.scene.bodies.push(spec);
+        }
+    }
+
+    /// Draws the first level plane as the ground of the scene.
+    fn with_ground(&mut self, spec: BodySpec, geom: &Geom<'_>, pose: &Pose) -> BodySpec {
+        if geom.form != Form::Plane || !is_level(pose) || !geom.visible || self.scene.ground.is_some() {
+            return spec;
+        }
+        let plain = geom.appearance.pattern == AppearanceSpec::default().pattern;
+        let appearance = if plain { GroundSpec::default_appearance() } else { geom.appearance.clone() };
+        self.scene.ground = Some(GroundSpec { height_m: pose.translation.z, appearance });
+        BodySpec { visible: false, ..spec }
+    }
+
+    /// Adds a kinematic body.
+    fn add_mocap(&mut self, body: usize) {
+        let mut parts = Vec::new();
+        for geom in self.bodies[body].geoms.iter().filter(|geom| geom.visible || self.groups.collides(geom)) {
+            match make(geom, self.reader) {
+                Some(made) => parts.push((geom, self.meshes.shape(made))),
+                None => continue,
+            }
+        }
+        let Some((first, _)) = parts.first() else { return };
+        let first = *first;
+        let shape = joined(parts.iter().map(|(geom, shape)| (geom.pose, shape.clone())).collect());
+        let name = self.taken.unique(self.name_of(body));
+        let spec = self.body_spec(name, Mode::Kinematic, shape, &self.poses[body], first);
+        let collides = self.groups.collides(first);
+        self.statics[body] = (0..self.bodies[body].geoms.len()).map(|k| (k, self.scene.bodies.len())).collect();
+        self.scene.bodies.push(BodySpec { collides, ..spec });
+    }
+
+    /// Adds a free body as a rigid body. Returns whether that can express it.
+    fn add_rigid(&mut self, body: usize) -> bool {
+        let own = &self.bodies[body];
+        let alike = |geom: &Geom<'_>| {
+            self.groups.collides(geom)
+                && geom.visible
+                && self.groups.surface(geom) == self.groups.surface(&own.geoms[0])
+                && !matches!(geom.form, Form::Plane | Form::Field(_))
+        };
+        let plain = own.sites.is_empty() && own.cameras.is_empty() && own.lights.is_empty();
+        let damped = own.joints[0].dof.damping > 0.0 || own.joints[0].dof.friction > 0.0;
+        let mass = self.masses[body];
+        if own.geoms.is_empty() || !plain || damped || mass.mass <= 0.0 || !own.geoms.iter().all(alike) {
+            return false;
+        }
+        let mut parts = Vec::new();
+        for geom in &own.geoms {
+            let Some(made) = make(geom, self.reader) else { return false };
+            parts.push((geom.pose, self.meshes.shape(made)));
+        }
+        let name = self.taken.unique(self.name_of(body));
+        let spec = self.body_spec(name, Mode::Dynamic, joined(parts), &self.poses[body], &own.geoms[0]);
+        self.places[body] = Place::Rigid(self.scene.bodies.len());
+        self.scene.bodies.push(BodySpec {
+            mass: Some(MassSpec::Mass(mass.mass)),
+            center_m: Some(mass.center.into()),
+            inertia_kg_m2: Some(mass.inertia),
+            gravity_scale: own.gravity_scale,
+            ..spec
+        });
+        true
+    }
+
+    fn body_spec(&self, name: String, mode: Mode, shape: ShapeSpec, pose: &Pose, geom: &Geom<'_>) -> BodySpec {
+        let surface = self.groups.surface(geom);
+        let q = pose.rotation.coords;
+        BodySpec {
+            name,
+            mode,
+            shape,
+            mass: None,
+            position_m: pose.translation.vector.into(),
+            orientation_xyzw: [q.x, q.y, q.z, q.w],
+            velocity_m_per_s: [0.0; 3],
+            angular_velocity_rad_per_s: [0.0; 3],
+            material: None,
+            friction: surface.friction,
+            restitution: surface.restitution,
+            contacts: surface.contacts,
+            center_m: None,
+            inertia_kg_m2: None,
+            gravity_scale: 1.0,
+            locked: LockedAxes::default(),
+            linear_damping_per_s: 0.0,
+            angular_damping_per_s: 0.0,
+            collides: true,
+            group: surface.group,
+            mask: surface.mask,
+            sensor: false,
+            enabled: true,
+            visible: true,
+            appearance: surface.appearance,
+            mounts: Mounts::default(),
+        }
+    }
+
+    /// Adds a body that moves and all below it as an articulated body.
+    fn add_tree(&mut self, root: usize) {
+        let tree = self.scene.articulated.len();
+        let name = self.taken.unique(self.name_of(root));
+        // Bodies below a root follow it in the order of the file.
+        let inside = |body: &usize| *body == root || self.bodies[*body].parent >= root;
+        let members: Vec<usize> = (root..self.bodies.len()).take_while(inside).collect();
+        let (mut links, mut taken) = (Vec::new(), Taken::default());
+        let names: Vec<String> = members.iter().map(|body| taken.unique(self.name_of(*body))).collect();
+        for (body, name) in members.into_iter().zip(names) {
+            let base = match self.places[self.bodies[body].parent] {
+                Place::Link(_, link) if body != root => Some(link),
+                _ => None,
+            };
+            let pose = if base.is_some() { self.bodies[body].pose } else { self.poses[body] };
+            self.add_links(body, name, (base, pose), tree, (&mut links, &mut taken));
+            if self.bodies[body].gravity_scale != 1.0 {
+                self.reader.notes.add(&self.bodies[body].element, "`gravcomp` of articulated bodies is left out");
+            }
+        }
+        self.scene.articulated.push(ArticulatedSpec::of(name, links));
+    }
+
+    /// Adds the links of one body: a chain of massless links for all joints but the last, then the
+    /// body itself. Its frame is that of the model.
+    fn add_links(
+        &mut self,
+        body: usize,
+        name: String,
+        (mut parent, mut placement): (Option<usize>, Pose),
+        tree: usize,
+        (links, taken): (&mut Vec<LinkSpec>, &mut Taken),
+    ) {
+        let own = &self.bodies[body];
+        // The joint's origin in the frame of the body, so far.
+        let mut at = Vec3::zeros();
+        let last = own.joints.len().wrapping_sub(1);
+        for (k, joint) in own.joints.iter().enumerate() {
+            let label = joint.name.clone().unwrap_or_else(|| match own.joints.len() {
+                1 => name.clone(),
+                _ => format!("{name}/joint{k}"),
+            });
+            let ends = k == last && joint.anchor == Vec3::zeros();
+            let link = if ends { name.clone() } else { taken.unique(format!("{name}/{label}")) };
+            let step = Pose::from_parts(Translation3::from(joint.anchor - at), one());
+            let spec = self.joint_spec(joint, label);
+            at = joint.anchor;
+            let mass = if ends { self.masses[body] } else { LinkMass::none() };
+            self.joints[body].push((tree, links.len()));
+            links.push(link_spec(link, parent, placement * step * before(joint), spec, mass));
+            (parent, placement) = (Some(links.len() - 1), Pose::identity());
+        }
+        if own.joints.last().is_none_or(|joint| joint.anchor != Vec3::zeros()) {
+            let back = placement * Pose::from_parts(Translation3::from(-at), one());
+            let joint = JointSpec::new(name.clone(), Joint::Fixed);
+            links.push(link_spec(name, parent, back, joint, self.masses[body]));
+        }
+        let carrier = links.len() - 1;
+        self.places[body] = Place::Link(tree, carrier);
+        for geom in &own.geoms {
+            if matches!(geom.form, Form::Plane | Form::Field(_)) {
+                geom.element.problem("is on a body that moves", "expected planes and height fields on static bodies");
+            }
+            links[carrier].shapes.extend(on_link(geom, &self.groups, self.reader));
+        }
+        for (k, site) in own.sites.iter().enumerate() {
+            let label = site.name.clone().unwrap_or_else(|| format!("{}/site{k}", links[carrier].name));
+            add_frame(links, taken, carrier, label, site.pose, Mounts::default());
+        }
+        for (label, pose, mounts) in super::views::mounts(own) {
+            let label = label.unwrap_or_else(|| format!("{}/view", links[carrier].name));
+            add_frame(links, taken, carrier, label, pose, mounts);
+        }
+    }
+
+    fn joint_spec(&self, joint: &JointItem<'_>, name: String) -> JointSpec {
+        let mut spec = JointSpec::new(name, joint.joint());
+        spec.dof = joint.dof.clone();
+        if joint.is_single() {
+            spec.position = vec![joint.reference];
+            spec.armature = joint.armature;
+        } else if joint.kind == Kind::Ball && joint.armature > 0.0 {
+            self.reader.notes.add(&joint.element, "armatures of ball joints are left out");
+        }
+        spec.effort = joint.actuator_range.map(|[low, high]| high.max(-low)).filter(|most| *most > 0.0);
+        spec
+    }
+}
+
+/// Returns the motion of a joint from its reference position back to 0.
+fn before(joint: &JointItem<'_>) -> Pose {
+    let back = -joint.reference;
+    match joint.kind {
+        Kind::Hinge => {
+            let turn = about(&nalgebra::Unit::new_unchecked(joint.axis), back);
+            if back == 0.0 { Pose::identity() } else { Pose::from_parts(Translation3::identity(), turn) }
+        }
+        Kind::Slide => Pose::from_parts(Translation3::from(back * joint.axis), one()),
+        _ => Pose::identity(),
+    }
+}
+
+fn link_spec(name: String, parent: Option<usize>, placement: Pose, joint: JointSpec, mass: LinkMass) -> LinkSpec {
+    let (shapes, mounts) = (Vec::new(), Mounts::default());
+    LinkSpec { name, parent, placement, joint, mass: LinkMassSpec::Given(mass), shapes, mounts }
+}
+
+/// Adds a frame that is fixed to a link.
+fn add_frame(links: &mut Vec<LinkSpec>, taken: &mut Taken, carrier: usize, label: String, pose: Pose, mounts: Mounts) {
+    let name = taken.unique(label);
+    let joint = JointSpec::new(name.clone(), Joint::Fixed);
+    links.push(LinkSpec { mounts, ..link_spec(name, Some(carrier), pose, joint, LinkMass::none()) });
+}
+
+/// Returns one shape of several in the same frame.
+fn joined(mut parts: Vec<(Pose, ShapeSpec)>) -> ShapeSpec {
+    if parts.len() == 1 && parts[0].0 == Pose::identity() {
+        return parts.remove(0).1;
+    }
+    let part = |(pose, shape)| CompoundPartSpec { shape, pose, density_kg_per_m3: None };
+    ShapeSpec::Compound { parts: parts.into_iter().map(part).collect() }
+}

@@ -1,0 +1,191 @@
+//! Geoms as shapes of bodies and links, and their collision groups.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use tumble_core::CollisionGroup;
+use tumble_core::collide::{Pose, TriMesh, Vec3};
+
+use super::Reader;
+use super::asset::MeshFrom;
+use super::geom::{Form, Geom};
+use super::tree::Body;
+use crate::build::mesh_files::stretched;
+use crate::parse::link::{Geometry, LinkShape, Surface};
+use crate::parse::mesh::{MeshSource, MeshSpec};
+use crate::parse::shape::ShapeSpec;
+use crate::urdf::MissingMeshes;
+
+/// Subdivisions of the sphere that an ellipsoid is made of: 1280 triangles.
+const ELLIPSOID: u32 = 3;
+/// Number of collision groups.
+const GROUPS: usize = 64;
+
+/// Collision groups for the combinations of `contype` and `conaffinity` of a model.
+pub(super) struct Groups {
+    kinds: Vec<[u32; 2]>,
+}
+
+impl Groups {
+    pub(super) fn of(bodies: &[Body<'_>]) -> Groups {
+        let mut groups = Groups { kinds: Vec::new() };
+        for geom in bodies.iter().flat_map(|body| &body.geoms).filter(|geom| geom.collides()) {
+            if groups.kinds.contains(&geom.bits) {
+                continue;
+            }
+            groups.kinds.push(geom.bits);
+            if groups.kinds.len() == GROUPS + 1 {
+                let message = "has one combination of `contype` and `conaffinity` too many";
+                geom.element.problem(message, format!("expected at most {GROUPS} different combinations"));
+                break;
+            }
+        }
+        groups
+    }
+
+    /// Returns the group of a geom and the groups that it collides with. Groups that the model does
+    /// not use collide with all.
+    pub(super) fn group(&self, geom: &Geom<'_>) -> (CollisionGroup, u64) {
+        let [kind, affinity] = geom.bits;
+        let Some(at) = self.kinds.iter().position(|bits| *bits == geom.bits) else {
+            return (CollisionGroup::default(), 0);
+        };
+        let meets = |other: &[u32; 2]| kind & other[1] != 0 || other[0] & affinity != 0;
+        let unused = u64::MAX.checked_shl(self.kinds.len() as u32).unwrap_or(0);
+        let mask = self.kinds.iter().take(GROUPS).enumerate().filter(|(_, other)| meets(other));
+        let mask = mask.fold(unused, |mask, (k, _)| mask | 1 << k);
+        (CollisionGroup::new(at as u8).unwrap_or_default(), mask)
+    }
+
+    /// Returns whether a geom collides with any geom of the model or of another object.
+    pub(super) fn collides(&self, geom: &Geom<'_>) -> bool {
+        let (_, mask) = self.group(geom);
+        geom.collides() && mask & !u64::MAX.checked_shl(self.kinds.len() as u32).unwrap_or(0) != 0
+    }
+
+    /// Returns the surface of a geom.
+    pub(super) fn surface(&self, geom: &Geom<'_>) -> Surface {
+        let (group, mask) = self.group(geom);
+        let friction = if geom.frictionless { 0.0 } else { geom.friction };
+        Surface { friction, group, mask, appearance: geom.appearance.clone(), ..Surface::default() }
+    }
+}
+
+/// Meshes of rigid bodies, each once.
+#[derive(Default)]
+pub(super) struct Meshes {
+    pub(super) specs: Vec<MeshSpec>,
+    known: BTreeMap<String, usize>,
+}
+
+/// A shape of a geom, or its solid.
+pub(super) enum Made {
+    Primitive(ShapeSpec),
+    /// A name and the solid in the frame of the geom.
+    Solid(String, Arc<TriMesh>),
+}
+
+/// Returns the shape of a geom. `None` if it is left out, with a note or a problem.
+pub(super) fn make(geom: &Geom<'_>, reader: &Reader<'_>) -> Option<Made> {
+    Some(match &geom.form {
+        Form::Plane => Made::Primitive(ShapeSpec::HalfSpace),
+        Form::Sphere(radius_m) => Made::Primitive(ShapeSpec::Sphere { radius_m: *radius_m }),
+        Form::Capsule(radius_m, half) => {
+            Made::Primitive(ShapeSpec::Capsule { radius_m: *radius_m, length_m: 2.0 * half })
+        }
+        Form::Cylinder(radius_m, half) => {
+            Made::Primitive(ShapeSpec::Cylinder { radius_m: *radius_m, length_m: 2.0 * half })
+        }
+        Form::Box(half) => Made::Primitive(ShapeSpec::Box { size_m: half.map(|x| 2.0 * x) }),
+        Form::Ellipsoid(radii) => {
+            let [a, b, c] = radii;
+            let mesh = stretched(TriMesh::icosphere(1.0, ELLIPSOID), *radii);
+            Made::Solid(format!("ellipsoid {a} {b} {c}"), Arc::new(mesh))
+        }
+        Form::Field(name) => Made::Solid(format!("hfield {name}"), reader.assets.fields.get(name)?.clone()),
+        Form::Mesh(name) => match reader.solid(name) {
+            Ok(mesh) => Made::Solid(name.clone(), mesh),
+            Err(why) if reader.options.missing_meshes == MissingMeshes::Error && reader.files => {
+                if let Some(mesh) = reader.assets.meshes.get(name) {
+                    let expected = "expected an existing mesh with a volume; missing_meshes = \"skip\" leaves it out";
+                    mesh.element.problem(format!("cannot be used for collision: {why}"), expected);
+                }
+                return None;
+            }
+            Err(why) => {
+                reader.notes.add(&geom.element, format!("its mesh is left out: {why}"));
+                return None;
+            }
+        },
+    })
+}
+
+impl Meshes {
+    /// Returns the shape of a body.
+    pub(super) fn shape(&mut self, made: Made) -> ShapeSpec {
+        let (name, mesh) = match made {
+            Made::Primitive(shape) => return shape,
+            Made::Solid(name, mesh) => (name, mesh),
+        };
+        let next = self.specs.len();
+        let index = *self.known.entry(name.clone()).or_insert(next);
+        if index == next {
+            let source = MeshSource::Triangles { mesh };
+            let (sphere_tree_depth, sphere_tree_max_error) = (None, None);
+            self.specs.push(MeshSpec { name, source, repair: false, sphere_tree_depth, sphere_tree_max_error });
+        }
+        ShapeSpec::Mesh { mesh: index }
+    }
+}
+
+/// Returns the shapes and visuals of a geom on a link; none if it is left out. `offset` is the pose
+/// of the body in the frame of the link.
+pub(super) fn on_link(geom: &Geom<'_>, groups: &Groups, reader: &Reader<'_>) -> Vec<LinkShape> {
+    let collides = groups.collides(geom);
+    if !collides && !geom.visible {
+        return Vec::new();
+    }
+    let surface = groups.surface(geom);
+    let part = |pose: Pose, geometry: Geometry, collides: bool, visible: bool| LinkShape {
+        pose,
+        geometry,
+        mass: None,
+        surface: surface.clone(),
+        collides,
+        visible,
+    };
+    let mut shapes = Vec::new();
+    let mut visible = geom.visible;
+    if let (Form::Mesh(name), true) = (&geom.form, geom.visible)
+        && let Some(mesh) = reader.assets.meshes.get(name)
+    {
+        match &mesh.from {
+            MeshFrom::File(path) => {
+                let place = mesh.element.place();
+                let file =
+                    Geometry::File { path: path.clone(), scale: mesh.scale, place, hull: false, required: false };
+                shapes.push(part(geom.pose * mesh.file_pose(), file, false, true));
+                visible = false;
+            }
+            MeshFrom::Missing(why) if !collides => {
+                reader.notes.add(&mesh.element, format!("left out of the picture: {why}"));
+                return shapes;
+            }
+            _ => {}
+        }
+    }
+    if collides || visible {
+        let geometry = match make(geom, reader) {
+            Some(Made::Primitive(ShapeSpec::HalfSpace)) | None => return shapes,
+            Some(Made::Primitive(shape)) => Geometry::Shape(shape),
+            Some(Made::Solid(name, mesh)) => Geometry::Solid { name, mesh },
+        };
+        shapes.push(part(geom.pose, geometry, collides, visible));
+    }
+    shapes
+}
+
+/// Returns whether the normal of a plane at this pose points straight up.
+pub(super) fn is_level(pose: &Pose) -> bool {
+    (pose.rotation * Vec3::z()).z > 1.0 - 1e-12
+}
