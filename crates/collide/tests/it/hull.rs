@@ -108,3 +108,24 @@ fn rounded_points_of_a_box_in_any_pose_are_its_corners() {
         assert!(hull.vertices.iter().all(|v| points.contains(v)), "vertices are given points");
     }
 }
+
+#[test]
+fn hulls_of_points_with_many_ties_are_solids() {
+    let mut solids = 0;
+    for seed in 0..3000 {
+        let mut rng = Rng::new(seed);
+        let turn = rng.pose(1.0);
+        let stretch = Vec3::from_fn(|_, _| [1.0, 1e-3, 1e-5][rng.below(3)]);
+        let noise = [0.0, 1e-15, 1e-9, 3e-7][rng.below(4)];
+        let side = 2.0 + 2.0 * rng.unit();
+        let points: Vec<Vec3> = (0..4 + rng.below(60))
+            .map(|_| Vec3::from_fn(|k, _| (side * rng.unit()).floor() * stretch[k]))
+            .map(|p| turn.transform_point(&p.into()).coords + rng.vec(noise + 1e-300))
+            .collect();
+        if let Ok(hull) = TriMesh::hull_of(&points) {
+            check(&points, &hull);
+            solids += 1;
+        }
+    }
+    assert!(solids > 1000, "{solids}");
+}
