@@ -164,7 +164,7 @@ impl TriMesh {
 fn check_heights(heights: &[f64], columns: usize) -> Result<(), MeshError> {
     let wrong = |what: String| Err(MeshError::HeightField { what });
     let count = heights.len();
-    if columns < 2 || count < 2 * columns || count % columns != 0 {
+    if columns < 2 || count / columns < 2 || !count.is_multiple_of(columns) {
         return wrong(format!(
             "has {count} heights in rows of {columns}, but needs at least 2 full rows of at least 2"
         ));
@@ -172,7 +172,7 @@ fn check_heights(heights: &[f64], columns: usize) -> Result<(), MeshError> {
     if count > MAX_HEIGHTS {
         return wrong(format!("has {count} heights, but at most {MAX_HEIGHTS} are allowed"));
     }
-    match heights.iter().position(|h| !(h.abs() <= FARTHEST)) {
+    match heights.iter().position(|h| !h.is_finite() || h.abs() > FARTHEST) {
         Some(n) => wrong(format!(
             "has a height of {} m in row {}, column {}, but heights must be finite and within 1e9 m",
             heights[n],
