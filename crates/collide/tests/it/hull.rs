@@ -118,9 +118,12 @@ fn hulls_of_points_with_many_ties_are_solids() {
         let stretch = Vec3::from_fn(|_, _| [1.0, 1e-3, 1e-5][rng.below(3)]);
         let noise = [0.0, 1e-15, 1e-9, 3e-7][rng.below(4)];
         let side = 2.0 + 2.0 * rng.unit();
-        let points: Vec<Vec3> = (0..4 + rng.below(60))
-            .map(|_| Vec3::from_fn(|k, _| (side * rng.unit()).floor() * stretch[k]))
-            .map(|p| turn.transform_point(&p.into()).coords + rng.vec(noise + 1e-300))
+        let count = 4 + rng.below(60);
+        let points: Vec<Vec3> = (0..count)
+            .map(|_| {
+                let p = Vec3::from_fn(|k, _| (side * rng.unit()).floor() * stretch[k]);
+                turn.transform_point(&p.into()).coords + noise * rng.vec(1.0)
+            })
             .collect();
         if let Ok(hull) = TriMesh::hull_of(&points) {
             check(&points, &hull);

@@ -55,7 +55,7 @@ impl ConvexHull {
                     None => of_array(points)?,
                 };
                 let points: Vec<Vec3> = points.into_iter().map(|p| p * scale).collect();
-                py.detach(|| caught(|| Ok(TriMesh::hull_of(&points).map_err(|e| Error::value(e.to_string()))?)))?
+                py.detach(|| caught(|| TriMesh::hull_of(&points).map_err(|e| Error::value(e.to_string()))))?
             }
         };
         let words = format!("ConvexHull({} vertices)", hull.vertices.len());
