@@ -14,20 +14,26 @@
 //!
 //! A point becomes a vertex only if it is more than [`FLAT`] outside the hull of those before it, so
 //! that the rounding of a file adds no facets to a flat side. At the end all points left out are
-//! compared with all faces.
+//! compared with all faces, and vertices on an edge between two others are removed.
 //!
 //! Departure from the paper: points in the plane of a face are not merged into it, so a flat side
 //! consists of several triangles.
 
 use super::{FARTHEST, SMALLEST, TriMesh};
 use crate::{Aabb, MeshError, Vec3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Number of grid cells along the longest side.
 const GRID_CELLS: f64 = 1_099_511_627_776.0;
 /// Largest distance by which a point may be outside the hull, as a fraction of the longest side:
 /// about the rounding of `f32` and of files with six digits.
 const FLAT: f64 = 5e-7;
+/// Height of a triangle below which one of its corners is on its longest side, as a fraction of the
+/// longest side of the hull: its normal would be rounding.
+const SLIVER: f64 = 5e-10;
+/// Least volume, in cubes of the diagonal: a little above that of
+/// [`check_closed`](TriMesh::check_closed).
+const LEAST_VOLUME: f64 = 2e-12;
 /// Maximum number of points.
 const MAX_POINTS: usize = 10_000_000;
 
@@ -67,8 +73,8 @@ impl TriMesh {
     /// # Errors
     /// [`MeshError::Points`] if there are less than 4 points or more than 10 million,
     /// [`MeshError::NotFinite`] and [`MeshError::TooFar`] for the first wrong one,
-    /// [`MeshError::Coplanar`] if all lie in a plane (to that accuracy), and
-    /// [`MeshError::TooSmall`].
+    /// [`MeshError::Coplanar`] if all lie in a plane (to that accuracy), [`MeshError::NoVolume`] for a
+    /// needle, and [`MeshError::TooSmall`].
     pub fn hull_of(points: &[Vec3]) -> Result<TriMesh, MeshError> {
         check_points(points)?;
         let bounds = Aabb::around(points.iter().copied());
@@ -81,10 +87,42 @@ impl TriMesh {
         cells.extend(points.iter().zip(0..).map(|(p, n)| (((p - least) / cell).map(|x| x.round() as i64).into(), n)));
         cells.sort_unstable();
         cells.dedup_by_key(|(cell, _)| *cell);
-        let grid: Vec<Point> = cells.iter().map(|(cell, _)| *cell).collect();
-        let triangles = Hull::of(&grid).ok_or(MeshError::Coplanar { points: points.len() })?.triangles();
-        Ok(TriMesh { vertices: cells.iter().map(|(_, n)| points[*n as usize]).collect(), triangles }.welded())
+        loop {
+            let grid: Vec<Point> = cells.iter().map(|(cell, _)| *cell).collect();
+            let triangles = Hull::of(&grid).ok_or(MeshError::Coplanar { points: points.len() })?.triangles();
+            let redundant = on_edges(&grid, &triangles);
+            if redundant.is_empty() {
+                let vertices = cells.iter().map(|(_, n)| points[*n as usize]).collect();
+                let hull = TriMesh { vertices, triangles }.welded();
+                let volume = hull.clone().translated(&-least).signed_volume();
+                return if volume > LEAST_VOLUME * hull.diagonal().powi(3) {
+                    Ok(hull)
+                } else {
+                    Err(MeshError::NoVolume { volume })
+                };
+            }
+            let mut kept: Vec<u32> = triangles.into_iter().flatten().filter(|v| !redundant.contains(v)).collect();
+            kept.sort_unstable();
+            kept.dedup();
+            cells = kept.into_iter().map(|v| cells[v as usize]).collect();
+        }
     }
+}
+
+/// Returns vertices that lie on the longest side of a triangle within [`SLIVER`]; of neighbors, one.
+fn on_edges(points: &[Point], triangles: &[[u32; 3]]) -> BTreeSet<u32> {
+    let (mut found, mut touched) = (BTreeSet::<u32>::new(), BTreeSet::<u32>::new());
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|v| points[v as usize]);
+        let sides = [(b, c), (c, a), (a, b)].map(|(u, v)| length(&difference(u, v)));
+        let opposite = if sides[0] >= sides[1].max(sides[2]) { 0 } else { 1 + usize::from(sides[2] > sides[1]) };
+        let flat = length(&cross(a, b, c)) < SLIVER * GRID_CELLS * sides[opposite];
+        if flat && triangle.iter().all(|v| !touched.contains(v)) {
+            found.insert(triangle[opposite]);
+            touched.extend(triangle);
+        }
+    }
+    found
 }
 
 fn check_points(points: &[Vec3]) -> Result<(), MeshError> {
