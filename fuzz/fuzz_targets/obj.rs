@@ -1,4 +1,4 @@
-//! An OBJ mesh: read, checked, repaired; if the result is a small solid, measured.
+//! An OBJ mesh: read, checked, repaired, its hull and the solid below it; if the result is a small solid, measured.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -14,6 +14,12 @@ fuzz_target!(|text: &str| {
         assert!(mended.check_closed().is_ok(), "what comes out of repair is a solid");
         let _ = mended.union_mass_properties(1.0);
         let _ = MeshDistance::new(&mended).closest(&mended.vertices[0]);
+    }
+    if let Ok(mut hull) = mesh.convex_hull() {
+        assert!(hull.check_closed().is_ok(), "a hull is a solid");
+    }
+    if let Ok(mut solid) = mesh.terrain(None) {
+        let _ = solid.check_closed();
     }
     if mesh.check_closed().is_ok() {
         let _ = mesh.mass_properties(1.0);

@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tumble_scene::{MeshSource, SceneFile};
+use tumble_scene::SceneFile;
 
 fuzz_target!(|text: &str| {
     match SceneFile::parse(text, "fuzz.toml") {
@@ -10,7 +10,7 @@ fuzz_target!(|text: &str| {
         // files named in the text are not opened, and building stays cheap
         Ok(scene)
             if scene.bodies.len() <= 50
-                && scene.meshes.iter().all(|m| !matches!(m.source, MeshSource::File { .. }))
+                && scene.meshes.iter().all(|m| m.source.file().is_none())
                 && scene.meshes.is_empty() =>
         {
             if let Ok((mut world, _)) = scene.build() {

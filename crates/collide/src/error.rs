@@ -216,6 +216,34 @@ pub enum MeshError {
         /// The computed volume, m³.
         volume: f64,
     },
+    /// Too few or too many points for a convex hull.
+    #[error("a convex hull of {count} points; it must have 4 to {most}")]
+    Points {
+        /// Number of points.
+        count: usize,
+        /// Largest allowed number.
+        most: usize,
+    },
+    /// Points of a convex hull that lie in a plane, on a line or at one place.
+    #[error("the {points} points of a convex hull lie in one plane; they must span a solid")]
+    Coplanar {
+        /// Number of points.
+        points: usize,
+    },
+    /// Heights, a size or a thickness that do not make a solid.
+    #[error("the height field {what}")]
+    HeightField {
+        /// The fault.
+        what: String,
+    },
+    /// An open surface that cannot be extruded to a solid.
+    #[error("{what}")]
+    Extrusion {
+        /// The fault.
+        what: String,
+        /// The face at fault, from 1.
+        face: Option<usize>,
+    },
     /// A lathe profile that does not make a solid.
     #[error("the profile {what}")]
     Profile {
@@ -252,6 +280,7 @@ impl MeshError {
             | MeshError::IndexOutOfRange { face, .. }
             | MeshError::Open { face, .. }
             | MeshError::NonManifold { face, .. } => Some(*face),
+            MeshError::Extrusion { face, .. } => *face,
             _ => None,
         }
     }

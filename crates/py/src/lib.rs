@@ -43,6 +43,8 @@ mod _native {
     #[pymodule_export]
     use super::objects::spheretree::{_unpickle_tree, SphereTree};
     #[pymodule_export]
+    use super::objects::terrain::{ConvexHull, HeightField, Terrain};
+    #[pymodule_export]
     use super::world::class::World;
     #[pymodule_export]
     use super::world::pickling::{_unpickle_shape, _unpickle_world};

@@ -66,6 +66,7 @@ pub mod urdf;
 mod xml;
 
 pub use build::error::BuildError;
+pub use build::heights::{HeightGrid, read_heights};
 pub use build::mesh_files::{read_mesh_bytes, read_solid, read_triangles};
 pub use build::slow::{building_surface, set_slow_load_listener};
 pub use error::SceneError;
@@ -87,6 +88,7 @@ pub use parse::mount::Mounts;
 pub use parse::pair::{PairSideSpec, PairSpec};
 pub use parse::problem::{Invalid, Problem};
 pub use parse::shape::{CompoundPartSpec, ShapeSpec};
+pub use parse::terrain::{Heights, HullPoints};
 pub use parse::view::{CameraSpec, CavePlace, GroundSpec, LightKind, LightSpec, SkySpec};
 pub use parse::world::{Integrator, Solver, Stepper, UnknownName, WorldSettings, combine_by_name};
 pub use tumble_core::LoopJointKind;

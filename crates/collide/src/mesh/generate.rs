@@ -106,7 +106,7 @@ impl TriMesh {
         Ok(mesh)
     }
 
-    fn push_quad(&mut self, [a, b, c, d]: [u32; 4]) {
+    pub(super) fn push_quad(&mut self, [a, b, c, d]: [u32; 4]) {
         self.triangles.extend([[a, b, c], [a, c, d]]);
     }
 

@@ -19,6 +19,7 @@ mod repair;
 mod shells;
 mod stl;
 mod strip;
+mod terrain;
 mod text;
 mod triangle;
 mod union;

@@ -47,6 +47,11 @@ impl Shape {
         Shape::HalfSpace
     }
 
+    /// Returns [`Shape::half_space`] under its other name: a plane is solid below.
+    pub fn plane() -> Shape {
+        Shape::HalfSpace
+    }
+
     /// Returns a sphere of `radius` meters.
     ///
     /// # Errors
@@ -116,6 +121,50 @@ impl Shape {
     /// that cannot be built.
     pub fn mesh(mesh: TriMesh, settings: &TreeSettings) -> Result<Shape, ShapeError> {
         Ok(Shape::Mesh(Arc::new(MeshShape::new(mesh, settings)?)))
+    }
+
+    /// Returns the convex hull of points in meters, as a mesh ([`TriMesh::hull_of`]).
+    ///
+    /// ```
+    /// use tumble_collide::{Shape, Vec3};
+    /// let roof = [[0, 0, 0], [4, 0, 0], [4, 3, 0], [0, 3, 0], [0, 1, 2], [4, 1, 2]];
+    /// let roof = Shape::convex_hull(&roof.map(|p| Vec3::from(p.map(f64::from))))?;
+    /// assert!((roof.volume() - 12.0).abs() < 1e-12);
+    /// # Ok::<(), tumble_collide::ShapeError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`ShapeError::Mesh`]: less than 4 points or more than 10 million, one that is not finite or
+    /// beyond 1e9 m, or all in one plane.
+    pub fn convex_hull(points: &[Vec3]) -> Result<Shape, ShapeError> {
+        Shape::mesh(TriMesh::hull_of(points)?, &TreeSettings::octree())
+    }
+
+    /// Returns the solid under a grid of heights, as a mesh ([`TriMesh::height_field`]): rows of
+    /// `columns` heights along x, `size` meters along x and y, the bottom `thickness` meters below the
+    /// lowest height (`None`: a tenth of the longer side).
+    ///
+    /// # Errors
+    /// [`ShapeError::Mesh`]: less than 2 rows or columns, an incomplete row, a height that is not
+    /// finite, or a length that is not above 0.
+    pub fn height_field(
+        heights: &[f64],
+        columns: usize,
+        size: [f64; 2],
+        thickness: Option<f64>,
+    ) -> Result<Shape, ShapeError> {
+        Shape::mesh(TriMesh::height_field(heights, columns, size, thickness)?, &TreeSettings::octree())
+    }
+
+    /// Returns an open surface as a solid that reaches `thickness` meters below it (`None`: a tenth
+    /// of its longer horizontal side), as a mesh ([`TriMesh::terrain`]). Every face must look up, or
+    /// every face down.
+    ///
+    /// # Errors
+    /// [`ShapeError::Mesh`]: wrong data, a thickness that is not above 0, a vertical face, or faces
+    /// that look up and down.
+    pub fn terrain(surface: &TriMesh, thickness: Option<f64>) -> Result<Shape, ShapeError> {
+        Shape::mesh(surface.terrain(thickness)?, &TreeSettings::octree())
     }
 
     /// Returns [`Shape::mesh`] from the cache if it was built before from the same vertices,

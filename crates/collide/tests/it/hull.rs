@@ -1,7 +1,7 @@
 //! Convex hulls: against parry's, against known volumes, and against the definition of convexity.
 
 use crate::rng::Rng;
-use tumble_collide::{TriMesh, Vec3};
+use tumble_collide::{Pose, Quat, TriMesh, Vec3};
 
 /// Returns a mesh with these vertices; its triangles are arbitrary.
 fn cloud(vertices: Vec<Vec3>) -> TriMesh {
@@ -84,4 +84,51 @@ fn nearly_coplanar_and_coplanar_clouds() {
     check(&noisy, &cloud(noisy.clone()).convex_hull().unwrap());
     assert!(cloud(vec![Vec3::zeros(); 5]).convex_hull().is_err());
     assert!(cloud((0..9).map(|n| Vec3::new(n as f64, 2.0 * n as f64, 0.0)).collect()).convex_hull().is_err());
+}
+
+#[test]
+fn rounded_points_of_a_box_in_any_pose_are_its_corners() {
+    for seed in 0..40 {
+        let mut rng = Rng::new(seed);
+        let size = Vec3::from_fn(|_, _| rng.between(0.1, 2.0));
+        let turn = Pose::from_parts(
+            Vec3::from_fn(|_, _| rng.between(-3.0, 3.0)).into(),
+            Quat::from_euler_angles(rng.between(-3.0, 3.0), rng.between(-1.5, 1.5), rng.between(-3.0, 3.0)),
+        );
+        let rounding = [0.0, 1e-15, 1e-12, 1e-8][seed as usize % 4];
+        let points: Vec<Vec3> = (0..11 * 11 * 11)
+            .map(|n| Vec3::new((n % 11) as f64, (n / 11 % 11) as f64, (n / 121) as f64) / 10.0 - Vec3::repeat(0.5))
+            .map(|p| turn.transform_point(&p.component_mul(&size).into()).coords)
+            .map(|p| p + Vec3::from_fn(|_, _| rng.between(-rounding, rounding)))
+            .collect();
+        let hull = TriMesh::hull_of(&points).unwrap();
+        let volume = check(&points, &hull);
+        assert!((volume - size.product()).abs() < 1e-5 * size.product(), "seed {seed}: {volume} {size:?}");
+        assert_eq!(hull.vertices.len(), 8, "seed {seed}: {:?}", hull.vertices);
+        assert!(hull.vertices.iter().all(|v| points.contains(v)), "vertices are given points");
+    }
+}
+
+#[test]
+fn hulls_of_points_with_many_ties_are_solids() {
+    let mut solids = 0;
+    for seed in 0..3000 {
+        let mut rng = Rng::new(seed);
+        let turn = rng.pose(1.0);
+        let stretch = Vec3::from_fn(|_, _| [1.0, 1e-3, 1e-5][rng.below(3)]);
+        let noise = [0.0, 1e-15, 1e-9, 3e-7][rng.below(4)];
+        let side = 2.0 + 2.0 * rng.unit();
+        let count = 4 + rng.below(60);
+        let points: Vec<Vec3> = (0..count)
+            .map(|_| {
+                let p = Vec3::from_fn(|k, _| (side * rng.unit()).floor() * stretch[k]);
+                turn.transform_point(&p.into()).coords + noise * rng.vec(1.0)
+            })
+            .collect();
+        if let Ok(hull) = TriMesh::hull_of(&points) {
+            check(&points, &hull);
+            solids += 1;
+        }
+    }
+    assert!(solids > 1000, "{solids}");
 }

@@ -56,6 +56,8 @@ fn pieces() -> Vec<Piece> {
         piece("cylinder", Shape::cylinder(0.5, 1.0).unwrap(), 0.5),
         piece("compound", stacked_boxes(), 0.5),
         piece("cube mesh", mesh(&TriMesh::cuboid(Vec3::repeat(1.0))), 0.5),
+        piece("hull", Shape::convex_hull(&TriMesh::cylinder(0.4, 1.0, 9).vertices).unwrap(), 0.5),
+        piece("height field", Shape::height_field(&[0.5; 12], 4, [1.2, 1.0], Some(1.0)).unwrap(), 0.5),
         piece("spool", lathe(&spool), 0.5),
         piece("crossed bars", crossed_bars(), 0.5),
         Piece { only_tree: true, ..piece("spool with a crossing", lathe(&crossing), 0.5) },

@@ -23,6 +23,15 @@ enum Floor {
         yaw: f64,
         jitter: f64,
     },
+    /// A flat height field of this many heights a side, turned by an angle about z.
+    HeightField {
+        count: usize,
+        yaw: f64,
+    },
+    /// An open surface of two triangles a cell, extruded.
+    Terrain {
+        cells: usize,
+    },
     /// Rows of flush boxes: along x, and along y, meters.
     Boxes {
         size: [f64; 2],
@@ -120,8 +129,21 @@ fn slab(cells: usize, jitter: f64) -> TriMesh {
 impl Floor {
     /// Returns the shape of a mesh.
     fn shape(self) -> Option<Shape> {
-        let Floor::Slab { cells, jitter, .. } = self else { return None };
-        Some(Shape::mesh(slab(cells, jitter), &TreeSettings::octree()).unwrap())
+        match self {
+            Floor::Slab { cells, jitter, .. } => {
+                Some(Shape::mesh(slab(cells, jitter), &TreeSettings::octree()).unwrap())
+            }
+            Floor::HeightField { count, .. } => {
+                Some(Shape::height_field(&vec![0.0; count * count], count, [FLOOR; 2], Some(0.2)).unwrap())
+            }
+            Floor::Terrain { cells } => {
+                let slab = slab(cells, 0.6);
+                let top = |t: &&[u32; 3]| t.iter().all(|v| slab.vertices[*v as usize].z > 0.0);
+                let triangles = slab.triangles.iter().filter(top).copied().collect();
+                Some(Shape::terrain(&TriMesh { vertices: slab.vertices, triangles }, Some(0.2)).unwrap())
+            }
+            Floor::HalfSpace | Floor::Boxes { .. } => None,
+        }
     }
 
     /// Adds the floor; `shape` is its own.
@@ -133,8 +155,13 @@ impl Floor {
         };
         match self {
             Floor::HalfSpace => add_body("floor", Shape::half_space(), Pose::identity()),
-            Floor::Slab { yaw, .. } => {
-                let middle = Vec3::new(FLOOR_START + 0.5 * FLOOR, 0.0, -0.1);
+            Floor::Slab { .. } | Floor::HeightField { .. } | Floor::Terrain { .. } => {
+                let (yaw, z) = match self {
+                    Floor::Slab { yaw, .. } => (yaw, -0.1),
+                    Floor::HeightField { yaw, .. } => (yaw, 0.0),
+                    _ => (0.0, -0.1),
+                };
+                let middle = Vec3::new(FLOOR_START + 0.5 * FLOOR, 0.0, z);
                 let turn = Quat::from_euler_angles(0.0, 0.0, yaw);
                 add_body("floor", shape.clone().unwrap(), Pose::from_parts(middle.into(), turn));
             }
@@ -264,6 +291,16 @@ fn a_flat_mesh_acts_like_a_half_space() {
         Floor::Slab { cells: 37, yaw: 1.0, jitter: 0.9 },
     ];
     acts_like_a_half_space(if slow() { &floors } else { &floors[..2] }, 1e-6, |_, _| true);
+}
+
+#[test]
+fn a_flat_height_field_and_a_flat_terrain_act_like_a_half_space() {
+    let floors = [
+        Floor::HeightField { count: 64, yaw: 0.0 },
+        Floor::HeightField { count: 101, yaw: 0.4 },
+        Floor::Terrain { cells: 50 },
+    ];
+    acts_like_a_half_space(if slow() { &floors } else { &floors[1..] }, 1e-6, |_, _| true);
 }
 
 const ROWS: [Floor; 2] = [Floor::Boxes { size: [0.25, 4.0] }, Floor::Boxes { size: [0.25, 0.25] }];

@@ -30,6 +30,7 @@ mod elastic;
 mod events;
 mod free;
 mod friction;
+mod hulls;
 mod impacts;
 mod internal_edges;
 mod limits;

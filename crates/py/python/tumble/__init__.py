@@ -26,8 +26,10 @@ from tumble._native import (
     Box,
     Capsule,
     Compound,
+    ConvexHull,
     Cylinder,
     HalfSpace,
+    HeightField,
     Joint,
     Mesh,
     Recorder,
@@ -36,6 +38,7 @@ from tumble._native import (
     Sphere,
     SphereTree,
     StepReport,
+    Terrain,
     View,
     World,
     __version__,
@@ -43,6 +46,8 @@ from tumble._native import (
 from tumble._pictures import Camera, save_png
 from tumble._recordings import Recording, read, replay
 from tumble._values import Energy, Event, Momentum, SphereLevel
+
+Plane = HalfSpace
 
 __all__ = [
     "Articulation",
@@ -54,11 +59,13 @@ __all__ = [
     "Camera",
     "Capsule",
     "Compound",
+    "ConvexHull",
     "Cylinder",
     "Energy",
     "Event",
     "Force",
     "HalfSpace",
+    "HeightField",
     "InternalError",
     "InvalidValueError",
     "Joint",
@@ -66,6 +73,7 @@ __all__ = [
     "MissingFileError",
     "Momentum",
     "PictureError",
+    "Plane",
     "Recorder",
     "Recording",
     "RecordingError",
@@ -79,6 +87,7 @@ __all__ = [
     "SphereTree",
     "StepError",
     "StepReport",
+    "Terrain",
     "TumbleError",
     "UnknownNameError",
     "UnreadableFileError",

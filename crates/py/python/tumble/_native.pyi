@@ -27,8 +27,10 @@ __all__ = [
     "Box",
     "Capsule",
     "Compound",
+    "ConvexHull",
     "Cylinder",
     "HalfSpace",
+    "HeightField",
     "Joint",
     "Mesh",
     "Recorder",
@@ -37,6 +39,7 @@ __all__ = [
     "Sphere",
     "SphereTree",
     "StepReport",
+    "Terrain",
     "View",
     "World",
     "__version__",
@@ -54,7 +57,7 @@ __all__ = [
 @disjoint_base
 class Shape:
     """A collision shape. The classes ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``HalfSpace``,
-    ``Mesh`` and ``Compound`` make one.
+    ``Mesh``, ``ConvexHull``, ``HeightField``, ``Terrain`` and ``Compound`` make one.
     """
     @property
     def volume(self) -> float:
@@ -112,7 +115,7 @@ class HalfSpace(Shape):
     """
     def __new__(cls, normal: ArrayLike | None = (0.0, 0.0, 1.0), offset: float = 0.0) -> HalfSpace: ...
 
-@final
+@disjoint_base
 class Mesh(Shape):
     """A closed mesh. The frame of its body is that of its vertices, so ``position`` is the position of
     their origin.
@@ -132,6 +135,50 @@ class Mesh(Shape):
     @property
     def faces(self) -> NDArray[np.uint32]:
         """The triangles, shape (m, 3), indices into ``vertices``."""
+
+@final
+class ConvexHull(Mesh):
+    """The convex hull of points, a ``Mesh``. points: shape (n, 3), meters; an object with ``vertices``
+    and ``faces``; or the path of an OBJ, STL, PLY or COLLADA file, which need not be closed.
+    ``scale`` multiplies the coordinates. The frame of its body is that of the points.
+
+    At least 4 points, not all in one plane. A point is outside by at most half a millionth of the
+    longest side.
+    """
+    def __new__(cls, points: Any, *, scale: float = 1.0) -> ConvexHull: ...
+
+@final
+class HeightField(Mesh):
+    """The solid under a grid of heights, a ``Mesh``; for static bodies. heights: shape (rows, columns),
+    meters, with rows along x, from the smallest y to the largest; or the path of a gray PNG, whose
+    upper edge has the largest y, or of a text with a row in each line. size: of the grid along x and
+    y, meters; its center is the origin of the body. thickness: distance of the bottom from the
+    lowest height, meters; None: a tenth of the longer side. height_range: heights of black and white
+    in a PNG, meters.
+    """
+    def __new__(
+        cls,
+        heights: ArrayLike | _Path,
+        size: ArrayLike,
+        thickness: float | None = None,
+        *,
+        height_range: ArrayLike | None = (0.0, 1.0),
+    ) -> HeightField: ...
+
+@final
+class Terrain(Mesh):
+    """The solid below an open surface, a ``Mesh``; for static bodies. Takes what ``Mesh`` takes; all
+    faces must look up, or all down. thickness: distance that the solid reaches straight down,
+    meters; None: a tenth of the longer horizontal side.
+    """
+    def __new__(
+        cls,
+        vertices: Any,
+        faces: ArrayLike | None = None,
+        thickness: float | None = None,
+        *,
+        scale: float = 1.0,
+    ) -> Terrain: ...
 
 @final
 class RigidBody:

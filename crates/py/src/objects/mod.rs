@@ -13,3 +13,4 @@ pub mod place;
 pub mod robot;
 pub mod shapes;
 pub mod spheretree;
+pub mod terrain;

@@ -3,6 +3,7 @@
 use crate::arrays::convert::{number, numbers, path, rotation, shown, some, vec3, vec3_or};
 use crate::errors::{Error, Result, caught};
 use crate::io::slow;
+use crate::objects::terrain::mesh_of_record;
 use crate::pool;
 use crate::world::pickling::{ShapeRecord, write_shape};
 use nalgebra::Translation3;
@@ -14,7 +15,7 @@ use tumble::collide::{CompoundPart, Pose, Quat, Shape as Solid, TreeCache, TreeS
 use tumble::scene::{building_surface, read_solid};
 
 /// A collision shape. The classes ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``HalfSpace``,
-/// ``Mesh`` and ``Compound`` make one.
+/// ``Mesh``, ``ConvexHull``, ``HeightField``, ``Terrain`` and ``Compound`` make one.
 #[pyclass(frozen, subclass, module = "tumble")]
 pub struct Shape {
     /// In its own frame.
@@ -22,11 +23,11 @@ pub struct Shape {
     /// Pose of that frame in the body's frame, which the user places.
     pub placement: Pose,
     /// Its Python expression.
-    words: String,
+    pub(super) words: String,
 }
 
 impl Shape {
-    fn new(solid: Solid, words: String) -> Shape {
+    pub(super) fn new(solid: Solid, words: String) -> Shape {
         Shape { solid, placement: Pose::identity(), words }
     }
 
@@ -40,13 +41,13 @@ impl Shape {
             Solid::Capsule { .. } => Py::new(py, shape.into_a(Capsule))?.into_any(),
             Solid::Cylinder(_) => Py::new(py, shape.into_a(Cylinder))?.into_any(),
             Solid::HalfSpace => Py::new(py, shape.into_a(HalfSpace))?.into_any(),
-            Solid::Mesh(_) => Py::new(py, shape.into_a(Mesh))?.into_any(),
+            Solid::Mesh(_) => mesh_of_record(py, shape)?,
             Solid::Compound(_) => Py::new(py, shape.into_a(Compound))?.into_any(),
         })
     }
 
     /// Returns the shape as an object of one of its classes.
-    fn into_a<C: PyClass<BaseType = Shape>>(self, class: C) -> PyClassInitializer<C> {
+    pub(super) fn into_a<C: PyClass<BaseType = Shape>>(self, class: C) -> PyClassInitializer<C> {
         PyClassInitializer::from(self).add_subclass(class)
     }
 }
@@ -183,7 +184,7 @@ impl HalfSpace {
 /// counter-clockwise seen from outside. ``Mesh(path)``: an OBJ, STL or COLLADA file in meters;
 /// ``scale`` multiplies its coordinates. Also takes an object with ``vertices`` and ``faces``, such
 /// as a trimesh. A mesh that is open or encloses nothing is a ``ValueError`` that names the place.
-#[pyclass(frozen, extends = Shape, module = "tumble")]
+#[pyclass(frozen, subclass, extends = Shape, module = "tumble")]
 pub struct Mesh;
 
 #[pymethods]
@@ -196,15 +197,10 @@ impl Mesh {
         faces: Option<&Bound<'_, PyAny>>,
         scale: f64,
     ) -> Result<PyClassInitializer<Mesh>> {
-        if !(scale.is_finite() && scale > 0.0) {
-            return Err(Error::value(format!("scale is {scale}; it must be finite and above 0")));
-        }
-        let mesh = triangles(py, vertices, faces)?.scaled(scale);
+        let mesh = triangles(py, vertices, faces)?.scaled(checked_scale(scale)?);
         let count = mesh.triangles.len();
-        let build = || Ok(Solid::mesh_cached(mesh, &TreeSettings::octree(), &TreeCache::of_environment())?);
         let name = vertices.extract::<std::path::PathBuf>().unwrap_or_else(|_| "Mesh".into());
-        let (solid, _) = py.detach(|| pool::run(|| building_surface(&name.display().to_string(), count, build)))?;
-        slow::warn(py)?;
+        let solid = built(py, &name.display().to_string(), mesh)?;
         Ok(Shape::new(solid, format!("Mesh({count} triangles)")).into_a(Mesh))
     }
 
@@ -233,6 +229,23 @@ impl Mesh {
         let flat: Vec<u32> = mesh.mesh().triangles.iter().flatten().copied().collect();
         Ok(PyArray1::from_vec(slf.py(), flat).reshape([mesh.mesh().triangles.len(), 3])?)
     }
+}
+
+pub(super) fn checked_scale(scale: f64) -> Result<f64> {
+    if scale.is_finite() && scale > 0.0 {
+        Ok(scale)
+    } else {
+        Err(Error::value(format!("scale is {scale}; it must be finite and above 0")))
+    }
+}
+
+/// Returns a closed mesh as a solid; `name` is that of the message about slow loading.
+pub(super) fn built(py: Python<'_>, name: &str, mesh: TriMesh) -> Result<Solid> {
+    let count = mesh.triangles.len();
+    let build = || Ok(Solid::mesh_cached(mesh, &TreeSettings::octree(), &TreeCache::of_environment())?);
+    let (solid, _) = py.detach(|| pool::run(|| building_surface(name, count, build)))?;
+    slow::warn(py)?;
+    Ok(solid)
 }
 
 /// Several shapes of one body.
@@ -284,11 +297,8 @@ fn compound_part(n: usize, part: &Bound<'_, PyAny>) -> Result<CompoundPart> {
 
 /// Returns triangles from arrays, from an object that has them (trimesh), or from a file.
 pub fn triangles(py: Python<'_>, vertices: &Bound<'_, PyAny>, faces: Option<&Bound<'_, PyAny>>) -> Result<TriMesh> {
-    if let Some(faces) = faces {
-        return of_arrays(vertices, faces);
-    }
-    if let (Ok(own), Ok(faces)) = (vertices.getattr("vertices"), vertices.getattr("faces")) {
-        return of_arrays(&own, &faces);
+    if let Some(mesh) = given(vertices, faces)? {
+        return Ok(mesh);
     }
     let file = path(vertices)?;
     py.detach(|| {
@@ -298,6 +308,17 @@ pub fn triangles(py: Python<'_>, vertices: &Bound<'_, PyAny>, faces: Option<&Bou
         })?;
         Ok(mesh)
     })
+}
+
+/// Returns triangles from arrays or from an object that has them; `None` for a path.
+pub(super) fn given(vertices: &Bound<'_, PyAny>, faces: Option<&Bound<'_, PyAny>>) -> Result<Option<TriMesh>> {
+    if let Some(faces) = faces {
+        return of_arrays(vertices, faces).map(Some);
+    }
+    match (vertices.getattr("vertices"), vertices.getattr("faces")) {
+        (Ok(own), Ok(faces)) => of_arrays(&own, &faces).map(Some),
+        _ => Ok(None),
+    }
 }
 
 fn of_arrays(vertices: &Bound<'_, PyAny>, faces: &Bound<'_, PyAny>) -> Result<TriMesh> {

@@ -5,20 +5,19 @@ use std::path::PathBuf;
 use tumble_core::collide::{RepairSettings, Shape, ShapeError, TreeCache, TreeSettings, TriMesh, Vec3};
 
 use crate::build::error::BuildError;
+use crate::build::heights::{HeightGrid, read_heights};
 use crate::build::mesh_files::{MAX_MESH_BYTES, make_solid, read_with_lines};
 use crate::build::shapes::Purpose;
 use crate::build::slow::building_surface;
 use crate::notes::Notes;
 use crate::parse::file::SceneFile;
 use crate::parse::mesh::{MeshSource, MeshSpec};
+use crate::parse::terrain::{Heights, HullPoints};
 
 impl SceneFile {
     /// Builds a mesh as a solid about its center of mass.
     pub(crate) fn solid(&self, spec: &MeshSpec, purpose: Purpose, notes: &mut Notes) -> Result<Shape, BuildError> {
-        let file = match &spec.source {
-            MeshSource::File { path, .. } => Some(path.clone()),
-            _ => None,
-        };
+        let file = spec.source.file().map(PathBuf::from);
         let wrong = |why: String| BuildError::Mesh {
             scene: self.file.clone(),
             mesh: spec.name.clone(),
@@ -77,8 +76,39 @@ impl SceneFile {
             }
             MeshSource::Triangles { mesh } => mesh.as_ref().clone(),
             MeshSource::Box { size_m } => TriMesh::cuboid(Vec3::from(*size_m)),
+            MeshSource::ConvexHull(HullPoints::Given(points)) => {
+                let points: Vec<Vec3> = points.iter().copied().map(Vec3::from).collect();
+                TriMesh::hull_of(&points).map_err(|e| wrong(e.to_string()))?
+            }
+            MeshSource::ConvexHull(HullPoints::File { path, scale }) => {
+                let (mesh, lines) = self.read_mesh(spec, path, wrong)?;
+                mesh.scaled(*scale).convex_hull().map_err(|e| wrong(e.at_line(&lines).to_string()))?
+            }
+            MeshSource::HeightField { heights, size_m, thickness_m } => {
+                let grid = self.heights(spec, heights, wrong)?;
+                TriMesh::height_field(&grid.heights_m, grid.columns, *size_m, *thickness_m)
+                    .map_err(|e| wrong(e.to_string()))?
+            }
+            MeshSource::Terrain { path, scale, thickness_m } => {
+                let (mesh, lines) = self.read_mesh(spec, path, wrong)?;
+                mesh.scaled(*scale).terrain(*thickness_m).map_err(|e| wrong(e.at_line(&lines).to_string()))?
+            }
         };
         Ok((made, Vec::new()))
+    }
+
+    fn heights(
+        &self,
+        spec: &MeshSpec,
+        heights: &Heights,
+        wrong: &impl Fn(String) -> BuildError,
+    ) -> Result<HeightGrid, BuildError> {
+        match heights {
+            Heights::Given { heights_m, columns } => Ok(HeightGrid { heights_m: heights_m.clone(), columns: *columns }),
+            Heights::File { path, range_m } => {
+                read_heights(path, &self.read_bytes(spec, path, wrong)?, *range_m).map_err(wrong)
+            }
+        }
     }
 
     fn read_mesh(
@@ -87,6 +117,15 @@ impl SceneFile {
         path: &PathBuf,
         wrong: &impl Fn(String) -> BuildError,
     ) -> Result<(TriMesh, Vec<usize>), BuildError> {
+        read_with_lines(path, &self.read_bytes(spec, path, wrong)?).map_err(wrong)
+    }
+
+    fn read_bytes(
+        &self,
+        spec: &MeshSpec,
+        path: &PathBuf,
+        wrong: &impl Fn(String) -> BuildError,
+    ) -> Result<Vec<u8>, BuildError> {
         let unread = |source| BuildError::MeshFile {
             scene: self.file.clone(),
             mesh: spec.name.clone(),
@@ -97,7 +136,6 @@ impl SceneFile {
         if size > MAX_MESH_BYTES {
             return Err(wrong(format!("the file has {size} bytes; the limit is {MAX_MESH_BYTES}")));
         }
-        let bytes = crate::read_file(path).map_err(unread)?;
-        read_with_lines(path, &bytes).map_err(wrong)
+        crate::read_file(path).map_err(unread)
     }
 }

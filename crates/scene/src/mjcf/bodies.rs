@@ -144,6 +144,7 @@ impl Assembly<'_, '_> {
             material: None,
             friction: surface.friction,
             restitution: surface.restitution,
+            surface_velocity_m_per_s: [0.0; 3],
             contacts: surface.contacts,
             center_m: None,
             inertia_kg_m2: None,

@@ -8,6 +8,7 @@ use tumble_core::collide::TriMesh;
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names};
 use crate::parse::profile;
+use crate::parse::terrain::{self, Heights, HullPoints};
 
 /// A named mesh.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,6 +93,28 @@ pub enum MeshSource {
         /// Closed and wound outwards, meters.
         mesh: Arc<TriMesh>,
     },
+    /// The convex hull of points, in their frame.
+    ConvexHull(HullPoints),
+    /// The solid under a grid of heights along z, centered on the origin in x and y.
+    HeightField {
+        /// The heights.
+        heights: Heights,
+        /// Size of the grid along x and y, meters.
+        size_m: [f64; 2],
+        /// Distance of the bottom from the lowest height, meters; `None` for a tenth of the longer
+        /// side.
+        thickness_m: Option<f64>,
+    },
+    /// The solid below an open surface, in the frame of its file.
+    Terrain {
+        /// An OBJ, STL, PLY or COLLADA file, prefixed with the folder of the scene.
+        path: PathBuf,
+        /// Meters per unit of the file.
+        scale: f64,
+        /// Distance that the solid reaches down, meters; `None` for a tenth of the longer horizontal
+        /// side.
+        thickness_m: Option<f64>,
+    },
 }
 
 const TREE_ERROR: Bound = Bound::new(1e-4, 1.0, "a fraction of the mesh's diagonal, from 1e-4 to 1");
@@ -105,6 +128,9 @@ enum Kind {
     Cylinder,
     Capsule,
     Box,
+    ConvexHull,
+    HeightField,
+    Terrain,
 }
 
 const KINDS: Names<Kind> = &[
@@ -115,14 +141,17 @@ const KINDS: Names<Kind> = &[
     ("cylinder", Kind::Cylinder),
     ("capsule", Kind::Capsule),
     ("box", Kind::Box),
+    ("convex_hull", Kind::ConvexHull),
+    ("height_field", Kind::HeightField),
+    ("terrain", Kind::Terrain),
 ];
 
 impl MeshSpec {
     /// Returns the name of its file, else its own name.
     pub(crate) fn called(&self) -> String {
-        match &self.source {
-            MeshSource::File { path, .. } => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-            _ => self.name.clone(),
+        match self.source.file() {
+            Some(path) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            None => self.name.clone(),
         }
     }
 
@@ -142,6 +171,17 @@ impl MeshSpec {
 }
 
 impl MeshSource {
+    /// Returns the file that it is read from, if any.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            MeshSource::File { path, .. }
+            | MeshSource::Terrain { path, .. }
+            | MeshSource::ConvexHull(HullPoints::File { path, .. })
+            | MeshSource::HeightField { heights: Heights::File { path, .. }, .. } => Some(path),
+            _ => None,
+        }
+    }
+
     fn read(f: &mut Fields<'_>, kind: Kind, folder: &Path) -> Option<Self> {
         Some(match kind {
             Kind::File => {
@@ -168,6 +208,9 @@ impl MeshSource {
                 segments: read_segments(f, "segments", 48),
             },
             Kind::Box => MeshSource::Box { size_m: f.vector("size_m", Bound::POSITIVE) },
+            Kind::ConvexHull => terrain::read_hull(f, folder)?,
+            Kind::HeightField => terrain::read_height_field(f, folder)?,
+            Kind::Terrain => terrain::read_terrain(f, folder)?,
         })
     }
 }
@@ -189,7 +232,7 @@ fn read_torus(f: &mut Fields<'_>) -> MeshSource {
 }
 
 /// Reads the path of a mesh file: an existing OBJ, STL, PLY or COLLADA file.
-fn read_path(f: &mut Fields<'_>, folder: &Path) -> Option<PathBuf> {
+pub(super) fn read_path(f: &mut Fields<'_>, folder: &Path) -> Option<PathBuf> {
     let (text, value) = f.text("file", "the path of an .obj, .stl, .ply or .dae file")?;
     let path = folder.join(text);
     let known = path

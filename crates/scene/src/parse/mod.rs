@@ -23,5 +23,6 @@ pub(crate) mod renamed;
 pub(crate) mod rotation;
 pub(crate) mod shape;
 pub(crate) mod suggest;
+pub(crate) mod terrain;
 pub(crate) mod view;
 pub(crate) mod world;

@@ -38,7 +38,7 @@ pub enum ShapeSpec {
         /// Full length, meters.
         length_m: f64,
     },
-    /// All points at and below z = 0.
+    /// All points at and below z = 0; `plane` is another name of it.
     HalfSpace,
     /// A mesh with the vertices of its source.
     Mesh {
@@ -80,6 +80,7 @@ const KINDS: Names<Kind> = &[
     ("capsule", Kind::Capsule),
     ("cylinder", Kind::Cylinder),
     ("half_space", Kind::HalfSpace),
+    ("plane", Kind::HalfSpace),
     ("mesh", Kind::Mesh),
     ("compound", Kind::Compound),
 ];

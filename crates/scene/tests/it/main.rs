@@ -20,6 +20,7 @@ mod robust;
 mod shipped;
 mod spheres;
 mod state_hashes;
+mod terrain;
 mod threads;
 mod urdf;
 mod visuals;

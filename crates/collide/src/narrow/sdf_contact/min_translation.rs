@@ -26,7 +26,6 @@ use super::query::{NearestCache, Query};
 use super::tolerances::DEEP_OVERLAP;
 use super::{Body, BodyElements, elements, faces};
 use crate::sdf::TOUCHING;
-use crate::sdf::elements::Elements;
 use crate::sdf::field::MeshField;
 use crate::{Contact, Mat3, NormalFrom, Pose, Vec3};
 use arrayvec::ArrayVec;
@@ -417,7 +416,7 @@ impl BodyElements<'_> {
     /// Returns the support function: the maximum of `n·x` over the body.
     fn support(&self, n: &Vec3) -> f64 {
         match self {
-            BodyElements::Mesh(elements) => support(elements, n).dot(n),
+            BodyElements::Mesh(elements) => elements.support(n).dot(n),
             BodyElements::Box(half) => half.dot(&n.abs()),
             BodyElements::Round { radius, half_length } => radius * n.norm() + half_length * n.z.abs(),
             BodyElements::Cylinder { radius, half_length } => radius * n.xy().norm() + half_length * n.z.abs(),
@@ -429,7 +428,7 @@ impl BodyElements<'_> {
     fn support_point(&self, n: &Vec3) -> Vec3 {
         let sign = |x: f64| if x.abs() < 1e-9 { 0.0 } else { x.signum() };
         match self {
-            BodyElements::Mesh(elements) => support(elements, n),
+            BodyElements::Mesh(elements) => elements.support(n),
             BodyElements::Box(half) => n.map(sign).component_mul(half),
             BodyElements::Round { radius, half_length } => n * *radius + Vec3::z() * (sign(n.z) * half_length),
             BodyElements::Cylinder { radius, half_length } => {
@@ -439,10 +438,4 @@ impl BodyElements<'_> {
             BodyElements::Empty => Vec3::zeros(),
         }
     }
-}
-
-/// Returns the vertex of a mesh that is furthest along `n`.
-fn support(elements: &Elements, n: &Vec3) -> Vec3 {
-    let further = |best: (f64, Vec3), p: Vec3| if p.dot(n) > best.0 { (p.dot(n), p) } else { best };
-    elements.points.iter().map(|p| p.at).fold((f64::NEG_INFINITY, Vec3::zeros()), further).1
 }

@@ -25,6 +25,7 @@
 //! edges. Without that test the vertices ahead of a body would stop its motion over a flat part.
 
 mod groups;
+mod support;
 
 use crate::bytes::{Reader, Write};
 use crate::mesh::{EdgeGroups, face_normals};
