@@ -74,6 +74,7 @@ inertia_kg_m2 = [0.3, 0.4, 0.5, 0.01, 0, 0]
 gravity_scale = 0.5
 locked = ["y", "rotation_z"]
 linear_damping_per_s = 1.5
+surface_velocity_m_per_s = [1, 0, 0]
 shape = { type = "box", size_m = [0.2, 0.2, 0.2] }
 """
 
@@ -90,6 +91,7 @@ def test_the_words_of_scene_files():
         locked=["y", "rotation_z"],
         linear_damping=1.5,
     )
+    assert body.surface_velocity.tolist() == [1, 0, 0] and other.surface_velocity.tolist() == [0, 0, 0]
     for name in ("mass", "gravity_scale", "locked", "linear_damping"):
         assert getattr(body, name) == getattr(other, name)
     assert (body.inertia == other.inertia).all() and (body.center_of_mass == other.center_of_mass).all()

@@ -43,6 +43,7 @@ axis = [0, 1, 0]
 limits_rad = [-0.3, 2]
 damping_n_m_s_per_rad = 0.2
 friction_n_m = 0.1
+armature_kg_m2 = 0.05
 spring = { stiffness_n_m_per_rad = 3, rest_rad = 0.5 }
 shape = { type = "capsule", radius_m = 0.05, length_m = 0.8, position_m = [0, 0, -0.5] }
 mass_kg = 2
@@ -55,6 +56,7 @@ joint = "prismatic"
 axis = [0, 0, 1]
 displacement_m = 0.1
 rate_m_per_s = 0.2
+armature_kg = 0.3
 drive = { type = "position", stiffness_n_per_m = 500, damping_n_s_per_m = 20, target_m = 0.2, max_force_n = 40 }
 shapes = [ { type = "box", size_m = [0.1, 0.1, 0.3] }, { type = "sphere", radius_m = 0.1, position_m = [0, 0, -0.2] } ]
 density_kg_per_m3 = 500
@@ -64,11 +66,11 @@ density_kg_per_m3 = 500
 def arm():
     builder = tumble.ArticulationBuilder("arm")
     builder.add_link(
-        "upper", axis=(0, 1, 0), limits=(-0.3, 2), joint_damping=0.2, joint_friction=0.1, stiffness=3, rest=0.5,
+        "upper", axis=(0, 1, 0), limits=(-0.3, 2), joint_damping=0.2, joint_friction=0.1, armature=0.05, stiffness=3, rest=0.5,
         shape=tumble.Capsule(0.05, 0.8), shape_position=(0, 0, -0.5), mass=2, friction=0.7,
     )
     builder.add_link(
-        "lower", "upper", joint="prismatic", position=(0, 0, -1), q=0.1, qd=0.2, shape=tumble.Box((0.1, 0.1, 0.3)), density=500,
+        "lower", "upper", joint="prismatic", armature=0.3, position=(0, 0, -1), q=0.1, qd=0.2, shape=tumble.Box((0.1, 0.1, 0.3)), density=500,
         drive={"target": 0.2, "stiffness": 500, "damping": 20, "max_force": 40},
     )
     builder.add_shape("lower", tumble.Sphere(0.1), (0, 0, -0.2))
@@ -89,6 +91,18 @@ def test_it_is_the_body_of_a_scene_file():
     assert len(code.contacts) > 0
     # the mass of the upper link is rounded in another order
     assert ours.q == pytest.approx(theirs.q, abs=1e-9) and ours.qd == pytest.approx(theirs.qd, abs=1e-9) and abs(ours.q).max() > 0.1
+
+
+def test_armature_is_on_the_diagonal_of_the_mass_matrix():
+    def matrix(armature):
+        builder = tumble.ArticulationBuilder("arm")
+        builder.add_link("upper", axis=(0, 1, 0), shape=tumble.Sphere(0.1), shape_position=(0, 0, -1), mass=2, armature=armature[0])
+        builder.add_link("lower", "upper", joint="prismatic", position=(0, 0, -1), shape=tumble.Sphere(0.1), mass=1, armature=armature[1])
+        return builder.build().mass_matrix()
+
+    assert matrix((0.5, 3)) - matrix((0, 0)) == pytest.approx(np.diag([0.5, 3]), abs=1e-12)
+    with pytest.raises(tumble.TumbleError, match="armature"):
+        matrix((-1, 0))
 
 
 def test_copies_of_a_description_and_of_its_world():

@@ -95,6 +95,7 @@ pub struct LinkBuilder {
     shapes: Vec<(Collider, bool)>,
     mass: Mass,
     dof: DofSettings,
+    armature: f64,
     appearance: Appearance,
     material: Material,
     position: Option<f64>,
@@ -112,6 +113,7 @@ impl LinkBuilder {
             shapes: Vec::new(),
             mass: Mass::Density(RigidBody::DEFAULT_DENSITY),
             dof: DofSettings::default(),
+            armature: 0.0,
             appearance: Appearance::default(),
             material: Material::default(),
             position: None,
@@ -177,6 +179,13 @@ impl LinkBuilder {
     /// Sets the dry friction of its joint, N·m or N.
     pub fn with_joint_friction(mut self, friction: f64) -> Self {
         self.dof.friction = friction;
+        self
+    }
+
+    /// Sets the inertia of the rotor that drives its revolute or prismatic joint, as the joint meets it, kg·m² or kg:
+    /// [`Link::armature`](crate::articulated::Link::armature).
+    pub fn with_armature(mut self, armature: f64) -> Self {
+        self.armature = armature;
         self
     }
 
@@ -338,7 +347,8 @@ impl ArticulationBuilder {
         for (k, link) in self.links.iter().enumerate() {
             let parent =
                 link.parent.as_deref().map(|parent| self.number(&self.links[..k], link, parent)).transpose()?;
-            model.link(&link.name, parent, link.joint, link.pose, link.mass(name)?);
+            let number = model.link(&link.name, parent, link.joint, link.pose, link.mass(name)?);
+            model.set_armature(number, link.armature);
         }
         let model = model.build().map_err(|why| ArticulationError::Model { body: name.clone(), why })?;
         let mut body = ArticulatedBody::new(name, model);

@@ -515,6 +515,7 @@ class ArticulationBuilder:
         limits: ArrayLike | None = None,
         joint_damping: float = 0.0,
         joint_friction: float = 0.0,
+        armature: float = 0.0,
         stiffness: float = 0.0,
         rest: float = 0.0,
         drive: Mapping[str, float] | None = None,
@@ -540,6 +541,7 @@ class ArticulationBuilder:
         a point mass without inertia.
 
         limits: (lower, upper), rad or m. joint_damping: N·m·s/rad or N·s/m. joint_friction: N·m or N.
+        armature: inertia of the rotor of a revolute or prismatic joint, as the joint meets it, kg·m² or kg.
         stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
         ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the
         start. friction, restitution, collides: of the shapes. color: sRGB, shape (3,).

@@ -76,16 +76,17 @@ impl ArticulationBuilder {
     /// a point mass without inertia.
     ///
     /// limits: (lower, upper), rad or m. joint_damping: N·m·s/rad or N·s/m. joint_friction: N·m or N.
+    /// armature: inertia of the rotor of a revolute or prismatic joint, as the joint meets it, kg·m² or kg.
     /// stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
     /// ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the
     /// start. friction, restitution, collides: of the shapes. color: sRGB, shape (3,).
     #[pyo3(signature = (name, parent=None, *, joint="revolute", axis=None, position=None, orientation=None, shape=None, shape_position=None,
         shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, joint_friction=0.0,
-        stiffness=0.0, rest=0.0, drive=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=true, color=None))]
+        armature=0.0, stiffness=0.0, rest=0.0, drive=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=true, color=None))]
     #[pyo3(
         text_signature = "($self, name, parent=None, *, joint='revolute', axis=(0.0, 0.0, 1.0), position=None, orientation=None, shape=None, \
         shape_position=None, shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, \
-        joint_friction=0.0, stiffness=0.0, rest=0.0, drive=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=True, color=None)"
+        joint_friction=0.0, armature=0.0, stiffness=0.0, rest=0.0, drive=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=True, color=None)"
     )]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_link(
@@ -106,6 +107,7 @@ impl ArticulationBuilder {
         limits: Option<&Bound<'_, PyAny>>,
         joint_damping: f64,
         joint_friction: f64,
+        armature: f64,
         stiffness: f64,
         rest: f64,
         drive: Option<&Bound<'_, PyDict>>,
@@ -131,6 +133,7 @@ impl ArticulationBuilder {
             .with_pose(pose(position, orientation)?)
             .with_joint_damping(joint_damping)
             .with_joint_friction(joint_friction)
+            .with_armature(armature)
             .with_material(Material { restitution, friction, ..Material::default() });
         if let Some(parent) = parent {
             self.has(parent)?;

@@ -86,6 +86,7 @@ struct JointKeys {
     limits: Key,
     damping: &'static str,
     friction: &'static str,
+    armature: &'static str,
     stiffness: &'static str,
     rest: Key,
     target: Key,
@@ -101,6 +102,7 @@ const REVOLUTE_KEYS: JointKeys = JointKeys {
     limits: ("limits_rad", Some("limits_deg")),
     damping: "damping_n_m_s_per_rad",
     friction: "friction_n_m",
+    armature: "armature_kg_m2",
     stiffness: "stiffness_n_m_per_rad",
     rest: ("rest_rad", Some("rest_deg")),
     target: ("target_rad", Some("target_deg")),
@@ -116,6 +118,7 @@ const PRISMATIC_KEYS: JointKeys = JointKeys {
     limits: ("limits_m", None),
     damping: "damping_n_s_per_m",
     friction: "friction_n",
+    armature: "armature_kg",
     stiffness: "stiffness_n_per_m",
     rest: ("rest_m", None),
     target: ("target_m", None),
@@ -185,6 +188,7 @@ impl JointSpec {
                     self.position = vec![position];
                 }
                 self.velocity[0] = f.number_or(keys.rate, Bound::ANY, self.velocity[0]);
+                self.armature = f.number_or(keys.armature, Bound::NOT_NEGATIVE, self.armature);
                 self.read_settings(f, true);
             }
             _ if self.kind.dof() > 0 => self.read_resistance(f, keys),

@@ -156,6 +156,10 @@ fn wrong_joints_are_reported() {
         &["s.toml:7:25: `damping_n_m_s_per_rad` of link \"l\" is -1; expected a number of at least 0"],
     );
     assert_errors(
+        &link_with("armature_kg_m2 = -0.1"),
+        &["s.toml:7:18: `armature_kg_m2` of link \"l\" is -0.1; expected a number of at least 0"],
+    );
+    assert_errors(
         &link_with("drive = { type = \"position\" }"),
         &[
             "s.toml:7:9: the `drive` of link \"l\" has no stiffness and no damping; expected `stiffness_n_m_per_rad` or `damping_n_m_s_per_rad` greater than 0",

@@ -29,7 +29,7 @@ pub fn particle(mass: f64, radius: f64, at: Vec3, velocity: Vec3) -> Particle {
 
 /// The same particle with other restitution and friction.
 pub fn with_material(particle: Particle, restitution: f64, friction: f64) -> Particle {
-    Particle { material: Material { restitution, friction, id: 0 }, ..particle }
+    Particle { material: Material { restitution, friction, ..Material::default() }, ..particle }
 }
 
 pub fn step(world: &mut World, frames: usize) {
