@@ -24,7 +24,7 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-TUMBLE = Path(os.environ.get("TUMBLE", ROOT / "target/release/tumble"))
+TUMBLE = Path(os.environ.get("TUMBLE", ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release/tumble"))
 OUT = Path(os.environ.get("OUT", ROOT / "out/cave_trial"))
 FACETS = ["front", "left", "right", "floor"]
 

@@ -9,7 +9,8 @@ rm -f "out/$scene.mcap" "out/$scene.png" "out/$scene.json"
 stage set-up scripts/setup.sh
 # One build of the crates serves the command, the Python package below and the tests.
 stage build cargo build --release --locked -p tumble
-stage run target/release/tumble run "$scene" --record "out/$scene.mcap" --screenshot "out/$scene.png" --summary "out/$scene.json"
+built="${CARGO_TARGET_DIR:-target}/release"
+stage run "$built/tumble" run "$scene" --record "out/$scene.mcap" --screenshot "out/$scene.png" --summary "out/$scene.json"
 
 echo
 echo "In $(pwd):"

@@ -28,7 +28,7 @@ done
 command -v ip >/dev/null || { echo "error: no ip command; on Debian: apt-get install iproute2" >&2; exit 1; }
 
 cargo build --quiet --release --locked -p tumble-net --example link_trial
-trial="$PWD/target/release/examples/link_trial"
+trial="$(realpath "${CARGO_TARGET_DIR:-target}")/release/examples/link_trial"
 server="tumble-s$$" middle="tumble-m$$" facet="tumble-f$$"
 key=$(mktemp)
 children=""
