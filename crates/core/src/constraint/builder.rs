@@ -58,6 +58,10 @@ impl RowBuilder<'_> {
             self.refuse(format!("a row's compliance is {}; it must be finite and at least 0", target.compliance));
             return self;
         }
+        if !(target.share > 0.0 && target.share <= 1.0) {
+            self.refuse(format!("a row's share of the step is {}; it must be above 0 and at most 1", target.share));
+            return self;
+        }
         let finite = [target.error, target.velocity, target.bias_acceleration].iter().all(|x| x.is_finite());
         if target.set.rows() != 1 || !finite || !bounds {
             self.refuse("a constraint's row must be Equality, HalfLine or Interval (lo ≤ hi), with finite error, velocity and bias".into());

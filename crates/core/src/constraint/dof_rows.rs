@@ -47,7 +47,7 @@ impl DofState<'_> {
         }
         if let (Some(h), true) = (level.soft_step(), self.settings.damping > 0.0) {
             let compliance = 1.0 / (h * self.settings.damping);
-            row(RowTarget { compliance, ..RowTarget::new(RowSet::Equality, 0.0) });
+            row(RowTarget { compliance, share: level.share(), ..RowTarget::new(RowSet::Equality, 0.0) });
         }
     }
 
@@ -79,7 +79,8 @@ impl DofState<'_> {
                 // step behind
                 let gain = damping + h * stiffness;
                 let aim = (stiffness * (target - start) + damping * velocity) / gain;
-                RowTarget { velocity: aim, compliance: 1.0 / (h * gain), ..RowTarget::new(set(*limit), 0.0) }
+                let (compliance, share) = (1.0 / (h * gain), level.share());
+                RowTarget { velocity: aim, compliance, share, ..RowTarget::new(set(*limit), 0.0) }
             }
             Drive::Velocity { target, limit } => {
                 RowTarget { velocity: self.within_limits(level, *target), ..RowTarget::new(set(*limit), 0.0) }

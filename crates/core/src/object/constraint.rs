@@ -37,6 +37,11 @@ impl Level {
         }
     }
 
+    /// Returns [`RowTarget::share`] of rows whose `h` is [`soft_step`](Self::soft_step).
+    pub(crate) fn share(self) -> f64 {
+        self.soft_step().map_or(1.0, |soft| soft / self.h())
+    }
+
     /// Returns the time after the start of the step at which the forces of soft rows act, s: its end, or its
     /// middle if the step resolves them. `None` if soft forces are no rows.
     pub fn soft_step(self) -> Option<f64> {
@@ -95,14 +100,17 @@ pub struct RowTarget {
     ///
     /// An implicit PD drive `F = kp·(q* − q⁺) + kd·(v* − v⁺)` with `q⁺ = q + h·v⁺` is
     /// `compliance = 1/(h·(kd + h·kp))` with the target velocity
-    /// `(kp·(q* − q) + kd·v*)/(kd + h·kp)`; the same at the acceleration level. `h` is
-    /// [`Level::soft_step`], or the length of the step if that is `None`.
+    /// `(kp·(q* − q) + kd·v*)/(kd + h·kp)`; the same at the acceleration level, for a sub-step of
+    /// `h` ([`Level::h`]).
     pub compliance: f64,
+    /// Share of the step after which a soft row at the acceleration level has its target velocity:
+    /// 1, or ½ for the implicit midpoint rule.
+    pub share: f64,
 }
 
 impl RowTarget {
     /// Makes a rigid row with target velocity 0 and the given set and position error.
     pub fn new(set: RowSet, error: f64) -> RowTarget {
-        RowTarget { set, error, velocity: 0.0, bias_acceleration: 0.0, compliance: 0.0 }
+        RowTarget { set, error, velocity: 0.0, bias_acceleration: 0.0, compliance: 0.0, share: 1.0 }
     }
 }

@@ -279,7 +279,7 @@ impl Backtracking {
         for (i, target) in work.targets.iter().enumerate() {
             let row = work.rows.blocks[contact_constraints + i].row as usize;
             // rows are those of the middle of the step, and turn further in its second half
-            let over = self.level.soft_step().filter(|_| is_soft(target)).unwrap_or(left);
+            let over = if is_soft(target) { target.share * left } else { left };
             work.c[row] += 0.5 * target.bias_acceleration + (velocity[row] - target.velocity) / over;
             if target.set == RowSet::HalfLine {
                 work.c[row] += target.error.max(0.0) / (left * left);

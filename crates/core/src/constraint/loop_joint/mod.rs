@@ -385,7 +385,8 @@ impl LoopJoint {
             let h = level.h();
             let velocity = rate - 4.0 * (position - spring.rest) * soft / (h * h);
             let compliance = 4.0 / (spring.stiffness * h * h);
-            along(1.0, RowTarget { velocity, compliance, ..RowTarget::new(RowSet::Equality, 0.0) });
+            let share = level.share();
+            along(1.0, RowTarget { velocity, compliance, share, ..RowTarget::new(RowSet::Equality, 0.0) });
         }
         if let Some(target) = state.drive(level, time) {
             let target = RowTarget { bias_acceleration: bias, ..target };
