@@ -303,7 +303,8 @@ class RigidBody:
     @property
     def surface_velocity(self) -> _Floats:
         """Velocity of the surface over the body, frame of the shape, shape (3,), m/s: a conveyor belt. Friction
-        acts against the velocity of other bodies over the surface. Zero by default."""
+        acts against the velocity of other bodies over the surface. Zero by default.
+        """
     @surface_velocity.setter
     def surface_velocity(self, value: ArrayLike) -> None: ...
     @property
