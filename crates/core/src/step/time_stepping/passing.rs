@@ -2,8 +2,8 @@
 //!
 //! Contacts are predicted for bodies in free motion. Other contacts may deflect fast bodies into what
 //! they would have passed. So if fast bodies have left their free motion by more than a small part of
-//! their size, contacts are detected again at the end of the step. Pairs that overlap there get the contacts of that place, and
-//! positions are corrected again:
+//! their size, contacts are detected again at the end of the step. Pairs that overlap there get the
+//! contacts of that place, and positions are corrected again:
 //!
 //! ```text
 //! gap(Δ) = gap_1 + n·(Δ_A − Δ_B) ≥ 0        Δ: displacement after the first correction
