@@ -127,9 +127,6 @@ impl Backtracking {
         };
         core.implicit = soft.is_some();
         self.level = Level::Acceleration { h: left, soft };
-        if soft != Some(left) && self.work.targets.iter().any(is_soft) {
-            build_rows(core, None, &mut self.work, self.level, 0.0)?;
-        }
         let off = |e: f64| e < -core.settings.contact_tolerance;
         let drifted = |t: &RowTarget| t.set == RowSet::HalfLine && off(t.error);
         if self.work.targets.iter().any(drifted) || self.work.contact_constraints.iter().any(|t| off(t.contact.gap)) {

@@ -115,7 +115,6 @@ class HalfSpace(Shape):
     """
     def __new__(cls, normal: ArrayLike | None = (0.0, 0.0, 1.0), offset: float = 0.0) -> HalfSpace: ...
 
-@disjoint_base
 class Mesh(Shape):
     """A closed mesh. The frame of its body is that of its vertices, so ``position`` is the position of
     their origin.

@@ -233,13 +233,21 @@ fn read_torus(f: &mut Fields<'_>) -> MeshSource {
 
 /// Reads the path of a mesh file: an existing OBJ, STL, PLY or COLLADA file.
 pub(super) fn read_path(f: &mut Fields<'_>, folder: &Path) -> Option<PathBuf> {
-    let (text, value) = f.text("file", "the path of an .obj, .stl, .ply or .dae file")?;
+    read_file(f, folder, &["obj", "stl", "ply", "dae"], "the path of an .obj, .stl, .ply or .dae file")
+}
+
+/// Reads the path of an existing file with one of these extensions.
+pub(super) fn read_file(
+    f: &mut Fields<'_>,
+    folder: &Path,
+    extensions: &[&str],
+    expected: &'static str,
+) -> Option<PathBuf> {
+    let (text, value) = f.text("file", expected)?;
     let path = folder.join(text);
-    let known = path
-        .extension()
-        .is_some_and(|e| ["obj", "stl", "ply", "dae"].iter().any(|known| e.eq_ignore_ascii_case(known)));
-    if !known {
-        f.wrong("file", value, "the path of an .obj, .stl, .ply or .dae file");
+    let known = |e: &std::ffi::OsStr| extensions.iter().any(|known| e.eq_ignore_ascii_case(known));
+    if !path.extension().is_some_and(known) {
+        f.wrong("file", value, expected);
         return None;
     }
     if !path.is_file() {

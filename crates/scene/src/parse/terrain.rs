@@ -6,7 +6,7 @@ use toml::de::DeValue;
 
 use crate::parse::bound::Bound;
 use crate::parse::fields::Fields;
-use crate::parse::mesh::{MeshSource, read_path};
+use crate::parse::mesh::{MeshSource, read_file, read_path};
 
 /// Maximum number of points of a hull and of heights in a scene file; there may be more in files of
 /// their own.
@@ -114,18 +114,5 @@ pub(super) fn read_terrain(f: &mut Fields<'_>, folder: &Path) -> Option<MeshSour
 }
 
 fn read_height_path(f: &mut Fields<'_>, folder: &Path) -> Option<PathBuf> {
-    let expected = "the path of a .png, .txt or .csv file";
-    let (text, value) = f.text("file", expected)?;
-    let path = folder.join(text);
-    let known = |e: &std::ffi::OsStr| ["png", "txt", "csv"].iter().any(|known| e.eq_ignore_ascii_case(known));
-    if !path.extension().is_some_and(known) {
-        f.wrong("file", value, expected);
-        return None;
-    }
-    if !path.is_file() {
-        let message = format!("`file` of {}: there is no file {}", f.what, path.display());
-        f.log.report(value.span(), message, "expected a path relative to the folder of the scene");
-        return None;
-    }
-    Some(path)
+    read_file(f, folder, &["png", "txt", "csv"], "the path of a .png, .txt or .csv file")
 }
