@@ -83,4 +83,10 @@ impl StepReport {
         self.rays += outcome.ray as u32;
         self.iterations = self.iterations.max(outcome.iterations);
     }
+
+    /// Counts a solve whose friction laws were missed by a row velocity, m/s.
+    pub(crate) fn missed(&mut self, residual: f64) {
+        self.unconverged += 1;
+        self.residual = self.residual.max(residual);
+    }
 }

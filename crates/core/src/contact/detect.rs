@@ -1,11 +1,11 @@
 //! Contact detection: broad phase, filters, narrow phase.
 
 use crate::contact::internal_edges::{InternalEdges, Surroundings};
+use crate::contact::laws::ContactLaws;
 use crate::contact::motion::Moved;
 use crate::contact::pair::{CachedContacts, KnownContacts, MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
 use crate::contact::pair_material::{PairMaterials, Surface};
 use crate::contact::time_of_impact::MovingPair;
-use crate::object::Material;
 use crate::object::collidable::ContactFrame;
 use crate::object::part_state::PartState;
 use crate::settings::Settings;
@@ -50,6 +50,8 @@ pub(crate) struct ContactConstraint {
     pub restitution: f64,
     /// Velocity of A's surface over A, less that of B's, m/s, world axes.
     pub surface_velocity: Vec3,
+    /// What the pair has beside Coulomb's law, if anything.
+    pub laws: Option<Box<ContactLaws>>,
     pub key: ContactKey,
 }
 
@@ -271,14 +273,15 @@ impl NarrowPhase<'_> {
             needs_wake.extend((!found.is_empty()).then_some(sleeper.serial));
             return;
         }
-        let Material { restitution, friction, .. } = self.pair_materials.combine(self.settings, surface_a, surface_b);
+        let material = self.pair_materials.combine(self.settings, surface_a, surface_b);
+        let laws = ContactLaws::of_pair(&material, [(state_a, &surface_a.2), (state_b, &surface_b.2)]);
         let of_surface = |state: &PartState, (.., material): Surface| state.pose.rotation * material.surface_velocity;
         let surface_velocity = of_surface(state_a, surface_a) - of_surface(state_b, surface_b);
         let pair = [entry_a.serial, owner_a.part, entry_b.serial, owner_b.part];
         let mut frame = ContactFrame { point: Vec3::zeros(), axes: [Vec3::zeros(); 3] };
         let mut frame_of = |contact: &Contact| {
             if contact.normal != frame.axes[0] {
-                frame = ContactFrame::new(contact.point, contact.normal);
+                frame = ContactLaws::frame(laws.as_deref(), contact.point, contact.normal);
             }
             ContactFrame { point: contact.point, ..frame }
         };
@@ -290,9 +293,10 @@ impl NarrowPhase<'_> {
             found_at: 0.0,
             moved: Moved::default(),
             frame: frame_of(contact),
-            friction,
-            restitution,
+            friction: material.friction,
+            restitution: material.restitution,
             surface_velocity,
+            laws: laws.clone(),
             key: ContactKey { pair, feature: contact.feature },
         }));
         if time > 0.0 {
@@ -321,6 +325,16 @@ impl ContactConstraint {
     /// Returns the contact point of B, m.
     pub fn point_b(&self) -> Vec3 {
         self.contact.point + self.offset
+    }
+
+    /// Returns the coefficient of tangential restitution.
+    pub fn reversal(&self) -> f64 {
+        self.laws.as_ref().map_or(0.0, |laws| laws.tangential_restitution)
+    }
+
+    /// Returns the frame of the contact at a point, m, with a normal.
+    pub fn frame_at(&self, point: Vec3, normal: Vec3) -> ContactFrame {
+        ContactLaws::frame(self.laws.as_deref(), point, normal)
     }
 
     /// Returns the relative velocity of A against B at the contact, m/s; negative along the normal

@@ -3,6 +3,7 @@
 
 pub(crate) mod detect;
 mod internal_edges;
+pub(crate) mod laws;
 pub(crate) mod motion;
 pub(crate) mod pair;
 pub(crate) mod pair_material;

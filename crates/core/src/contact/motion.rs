@@ -18,7 +18,6 @@
 
 use super::detect::ContactConstraint;
 use super::rim::rim_rate;
-use crate::object::collidable::ContactFrame;
 use crate::object::part_state::PartState;
 use crate::world::Core;
 use tumble_collide::{Contact, NormalFrom, Shape, Vec3};
@@ -177,7 +176,7 @@ impl ContactConstraint {
     pub fn stay(&mut self) {
         if self.moved.time > 0.0 {
             self.moved = Moved::default();
-            self.frame = ContactFrame::new(self.contact.point, self.contact.normal);
+            self.frame = self.frame_at(self.contact.point, self.contact.normal);
         }
     }
 
@@ -208,7 +207,7 @@ impl ContactConstraint {
         }
         let way = self.found_at * a.velocity + left * motion.point_rate - motion.side * self.gap_found() * normal;
         self.moved = Moved { time, way, rate, of_links, of_driven, ..self.moved };
-        self.frame = ContactFrame::new(point + way, (normal + left * motion.normal_rate).normalize());
+        self.frame = self.frame_at(point + way, (normal + left * motion.normal_rate).normalize());
     }
 }
 

@@ -90,9 +90,17 @@ impl PairMaterials {
     pub fn combine(&self, settings: &Settings, a: Surface, b: Surface) -> Material {
         let chosen = if self.entries.is_empty() { PairMaterial::default() } else { self.of(a, b) };
         let rule = |combine: crate::Combine, of: fn(&Material) -> f64| combine.of(of(&a.2), of(&b.2));
+        let larger = |of: fn(&Material) -> f64| of(&a.2).max(of(&b.2));
+        let at_rest = || rule(settings.combine_friction, Material::friction_at_rest);
         Material {
             restitution: chosen.restitution.unwrap_or_else(|| rule(settings.combine_restitution, |m| m.restitution)),
             friction: chosen.friction.unwrap_or_else(|| rule(settings.combine_friction, |m| m.friction)),
+            static_friction: chosen.friction.unwrap_or_else(at_rest),
+            stribeck_speed: larger(|m| m.stribeck_speed),
+            rolling_friction: larger(|m| m.rolling_friction),
+            torsional_friction: larger(|m| m.torsional_friction),
+            tangential_restitution: larger(|m| m.tangential_restitution),
+            adhesion: larger(|m| m.adhesion),
             ..Material::default()
         }
     }

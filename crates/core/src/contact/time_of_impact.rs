@@ -23,7 +23,7 @@
 //! no advance overshoots. Another part of a mesh may come first, so meshes advance by the bound.
 
 use super::detect::{ContactConstraint, Owner};
-use crate::object::collidable::{Collidable, ContactFrame};
+use crate::object::collidable::Collidable;
 use crate::object::part_state::PartState;
 use crate::rigid::rotation::turn;
 use crate::settings::Settings;
@@ -371,7 +371,7 @@ impl ContactConstraint {
         self.key.feature = contact.feature;
         self.offset = move_a - move_b;
         self.found_at = t;
-        self.frame = ContactFrame::new(contact.point, contact.normal);
+        self.frame = self.frame_at(contact.point, contact.normal);
     }
 }
 

@@ -339,13 +339,11 @@ impl RigidBody {
         let range = |what, value: f64, right: bool, expected| {
             if right && value.is_finite() { Ok(()) } else { Err(BodyError::Range { what, value, expected }) }
         };
-        let (m, unit) = (&self.material, self.initial_pose.rotation.norm());
-        range("restitution", m.restitution, (0.0..=1.0).contains(&m.restitution), "between 0 and 1")?;
-        range("friction", m.friction, m.friction >= 0.0, "at least 0")?;
+        let unit = self.initial_pose.rotation.norm();
+        self.material.validate().map_err(|(what, value, expected)| BodyError::Range { what, value, expected })?;
         range("linear damping", self.linear_damping, self.linear_damping >= 0.0, "at least 0")?;
         range("angular damping", self.angular_damping, self.angular_damping >= 0.0, "at least 0")?;
         range("gravity scale", self.gravity_scale, true, "finite")?;
-        m.surface_velocity.iter().try_for_each(|&x| range("surface velocity", x, true, "finite"))?;
         self.offset.iter().try_for_each(|&x| range("center of mass", x, true, "finite"))?;
         range("norm of the orientation", unit, (unit - 1.0).abs() < 1e-6, "1")?;
         let numbers = [self.initial_pose.translation.vector, self.initial_velocity, self.initial_angular_velocity];

@@ -26,12 +26,14 @@
 //! - the sub-step has a floor, and a frame has a cap on tries; beyond it the rest of the frame is
 //!   one time-stepping sub-step. Both are counted as floor hits.
 
+use super::adhesion::adhere;
 use super::budget::IMPACTS;
-use super::contacts::{Limit, build_rows, detect, gyroscopic, impulses, limits, row_velocities, solve, whiten};
+use super::contacts::{Limit, build_rows, detect, gyroscopic, impulses, limits, row_velocities, whiten};
 use super::correction::{self, ActiveLimit, Contacts, Limits, Options};
 use super::event_location::{Bracket, LimitRole, Role, SLOW, Watch};
 use super::held_forces::{hold_forces, push_to};
 use super::impact::{self, Candidate};
+use super::patch::solve_patches;
 use super::warm_start::{row_starts, warm_start};
 use super::{StepContext, Stepper, TimeStepping, Workspace};
 use crate::constraint::rows::{Block, RowSet};
@@ -209,7 +211,7 @@ impl Backtracking {
         impact::resolve(core, work, &candidates, (IMPACT_PASSES, true, budget), &mut u, &mut total);
         let struck = total.iter().any(|l| *l != 0.0);
         if struck {
-            core.touch_impacts(&work.contact_constraints, impulses(work, &total));
+            core.touch_impacts(&work.contact_constraints, impulses(work, &total, 0.0));
             if core.has_breakable_joints() {
                 core.break_joints(&row_starts(work, &total, 1.0 / core.settings.dt));
             }
@@ -270,6 +272,11 @@ impl Backtracking {
             work.c[range.start] += constraint.contact.gap.max(0.0) / (left * left);
             keep[i] = role.touching && (role.lasts || velocity[range.start] < 1e-7);
         }
+        let mut adhesion = vec![0.0; core.dof];
+        adhere(work, core.settings.drift_tolerance, 1.0, &mut adhesion);
+        if adhesion.iter().any(|du| *du != 0.0) {
+            work.rows.add_velocity(&adhesion, &mut work.c);
+        }
         self.watch_limits(core, &velocity, &mut keep);
         let work = &mut self.work;
         let contact_constraints = work.contact_constraints.len();
@@ -291,7 +298,10 @@ impl Backtracking {
             tolerance: s.tolerance / left,
             budget: core.meter.for_solve(work.rows.blocks.len()),
         };
-        let ray = solve(core, work, solver_settings, left, |b| keep[b]);
+        let rate = |i: usize| acceleration[i] + adhesion[i];
+        let free: Vec<f64> = (0..u.len()).map(|i| u[i] + left * rate(i)).collect();
+        let ray = solve_patches(core, None, work, (solver_settings, left), &keep, &free)?;
+        work.du.iter_mut().zip(&adhesion).for_each(|(du, pull)| *du += pull);
         self.held = correction::limits_with_force(work);
         let mut held = vec![0.0; core.dof];
         if ray {
@@ -307,8 +317,8 @@ impl Backtracking {
         }
         core.publish(
             &work.contact_constraints,
-            impulses(work, &work.lambda).map(|f| f * left),
-            impulses(work, &work.lambda),
+            impulses(work, &work.lambda, 1.0).map(|f| f * left),
+            impulses(work, &work.lambda, 1.0),
             row_starts(work, &work.lambda, 1.0),
         );
         Ok(held)

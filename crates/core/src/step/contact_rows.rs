@@ -119,7 +119,8 @@ fn add_surface_velocity(constraint: &ContactConstraint, axes: &[Vec3], bias: &mu
 }
 
 fn set_of(constraint: &ContactConstraint) -> RowSet {
-    if constraint.friction > 0.0 { RowSet::Cone { mu: constraint.friction } } else { RowSet::HalfLine }
+    let mu = constraint.laws.as_ref().map_or(0.0, |laws| laws.static_friction).max(constraint.friction);
+    if mu > 0.0 { RowSet::Cone { mu } } else { RowSet::HalfLine }
 }
 
 /// Returns the object's interface if impulses move it.

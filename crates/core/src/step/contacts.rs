@@ -5,10 +5,12 @@ use super::budget::{Allotment, Open};
 use super::contact_rows::lay_contact_rows;
 use super::correction::{self, Frictionless};
 use super::islands::each_island;
+use super::patch::PatchMoment;
 use super::solves::Solves;
 use crate::constraint::builder::{RowBuilder, RowKind, constraints};
 use crate::constraint::rows::{RowSet, Rows};
 use crate::contact::detect::{ContactConstraint, Detector, Owner};
+use crate::contact::laws::ContactLaws;
 use crate::contact::pair::PredictionMode;
 use crate::derived::{Cache, Derived};
 use crate::each_object::{Numbers, Own, each_object};
@@ -50,6 +52,8 @@ pub(crate) struct Workspace {
     pub u: Vec<f64>,
     pub du_force: Vec<f64>,
     pub dp: Vec<f64>,
+    /// Moments of patches in the last solve.
+    pub moments: Vec<PatchMoment>,
     /// The rows of the first round of the correction.
     pub frictionless: Frictionless,
 }
@@ -552,9 +556,11 @@ type Solved = (SolveReport, LargestResidual);
 /// Number of rounds in which islands that do not converge get what others leave of a budget.
 const ROUNDS: u32 = 8;
 
-/// Returns the impulse on A of each contact, world axes, for given multipliers.
-pub(crate) fn impulses<'a>(work: &'a Workspace, lambda: &'a [f64]) -> impl Iterator<Item = Vec3> + 'a {
-    work.contact_constraints.iter().zip(&work.rows.blocks).map(|(constraint, block)| {
-        block.range().zip(&constraint.frame.axes).map(|(row, axis)| lambda[row] * axis).sum()
+/// Returns the impulse on A of each contact, world axes, for given multipliers, with that of its adhesion
+/// in `h` seconds.
+pub(crate) fn impulses<'a>(work: &'a Workspace, lambda: &'a [f64], h: f64) -> impl Iterator<Item = Vec3> + 'a {
+    work.contact_constraints.iter().zip(&work.rows.blocks).map(move |(constraint, block)| {
+        let pull = h * ContactLaws::pull(&constraint.laws) * constraint.frame.axes[0];
+        block.range().zip(&constraint.frame.axes).map(|(row, axis)| lambda[row] * axis).sum::<Vec3>() - pull
     })
 }

@@ -26,9 +26,18 @@ pub(super) fn hold_forces(core: &mut Core, work: &Workspace, held: &mut [f64]) {
         held[entry.state_range.v.clone()].copy_from_slice(&generalized[entry.state_range.v.clone()]);
     }
     core.held_wrenches.resize(core.derived.part_states.len(), Wrench::default());
-    for (constraint, force) in work.contact_constraints.iter().zip(impulses(work, &work.lambda)) {
+    let links = |core: &Core, part: u32| on_links(&core.objects().at(core.owners[part as usize].place as usize));
+    for patch in &work.moments {
+        let constraint = &work.contact_constraints[patch.contact];
+        for (part, moment) in [(constraint.a, patch.moment), (constraint.b, -patch.moment)] {
+            if links(core, part) {
+                core.held_wrenches[part as usize].torque += moment;
+            }
+        }
+    }
+    for (constraint, force) in work.contact_constraints.iter().zip(impulses(work, &work.lambda, 1.0)) {
         for (part_state, force) in [(constraint.a, force), (constraint.b, -force)] {
-            if on_links(&core.objects().at(core.owners[part_state as usize].place as usize)) {
+            if links(core, part_state) {
                 let state = &core.derived.part_states[part_state as usize];
                 let arm = constraint.point_on(part_state, state) - state.position();
                 let wrench = &mut core.held_wrenches[part_state as usize];

@@ -48,6 +48,8 @@ pub(crate) struct Part {
     pub member: bool,
     /// Separation speed after the pass, m/s, at least.
     pub rebound: f64,
+    /// Ratio of the sliding velocity after the pass to the reverse of that before.
+    pub reversal: f64,
     /// Energy that the contact took from the bodies before, J. A pass may give it back.
     pub energy: f64,
 }
@@ -110,6 +112,7 @@ pub(crate) fn resolve(
             Part {
                 member: if last { candidates[i].takes_part } else { approach(i) },
                 rebound: restitution * approach_speed,
+                reversal: if restitution > 0.0 { work.contact_constraints[i].reversal() } else { 0.0 },
                 energy: 0.0,
             }
         };
@@ -178,6 +181,9 @@ fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], parts: &[Part], (el
     work.c.copy_from_slice(c);
     for (block, part) in work.rows.blocks.iter().zip(parts) {
         work.c[block.row as usize] -= part.rebound;
+        if part.reversal > 0.0 {
+            block.range().skip(1).for_each(|row| work.c[row] *= 1.0 + part.reversal);
+        }
     }
     work.lambda.fill(0.0);
     zero(&mut work.du, core.dof);

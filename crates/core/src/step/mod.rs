@@ -1,5 +1,6 @@
 //! One frame of simulated time, by either of two steppers.
 
+mod adhesion;
 mod backtracking;
 mod budget;
 mod contact_rows;
@@ -11,6 +12,7 @@ mod held_forces;
 mod impact;
 mod islands;
 mod moment;
+mod patch;
 mod solves;
 mod time_stepping;
 mod unreachable_joints;

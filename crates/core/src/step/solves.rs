@@ -6,7 +6,7 @@ use crate::solver::{Islands, LargestResidual, LcpPyramid, LcpSliding, RowSolver,
 use crate::world::view::{ObjectId, Objects};
 
 /// A solve counts as converged below this number of tolerances, the change that ends the sweeps.
-const SOLVED: f64 = 10.0;
+pub(super) const SOLVED: f64 = 10.0;
 /// Least tolerance, m/s: that of impacts is relative to their speed, and may be near rounding.
 const LEAST_TOLERANCE: f64 = 1e-9;
 

@@ -37,8 +37,10 @@ mod impacts;
 mod moving;
 mod passing;
 
-use super::contacts::{build_rows, detect, displace, impulses, push, row_velocities, shift, solve, whiten};
+use super::adhesion::adhere;
+use super::contacts::{build_rows, detect, displace, impulses, push, row_velocities, shift, whiten};
 use super::impact::{self, Candidate, Part};
+use super::patch::solve_patches;
 use super::warm_start::{row_starts, warm_start};
 use super::{Moment, StepContext, Stepper, Workspace};
 use crate::constraint::rows::RowSet;
@@ -134,10 +136,11 @@ impl TimeStepping {
         let mut u = std::mem::take(&mut self.work.u);
         let mut du_force = std::mem::take(&mut self.work.du_force);
         whiten(middle.coordinates(core), &self.work.dp, h, &mut u, &mut du_force);
+        adhere(&mut self.work, core.settings.drift_tolerance, h, &mut du_force);
         let mut after = std::mem::take(&mut self.buffers.after);
         self.impacts(core, middle, h, &mut u, &mut du_force, &mut after)?;
         self.look_again(core, middle, h, &u, &after);
-        self.contacts(core, middle, h, &u, &mut after, &du_force);
+        self.contacts(core, middle, h, &u, &mut after, &du_force)?;
         self.rebound(core, &after);
         self.commit(core, middle, h, &u, &after, &du_force)?;
         (self.work.u, self.work.du_force, self.buffers.after) = (u, du_force, after);
@@ -164,7 +167,15 @@ impl TimeStepping {
 
     /// Adds the forces and solves all contacts and constraints of the step: `u` becomes the
     /// velocity at its end.
-    fn contacts(&mut self, core: &mut Core, middle: &mut Moment, h: f64, u0: &[f64], u: &mut [f64], du_force: &[f64]) {
+    fn contacts(
+        &mut self,
+        core: &mut Core,
+        middle: &mut Moment,
+        h: f64,
+        u0: &[f64],
+        u: &mut [f64],
+        du_force: &[f64],
+    ) -> Result<(), StepError> {
         let work = &mut self.work;
         let Buffers { before, gain: first, parts, keep, .. } = &mut self.buffers;
         let moves = work.contact_constraints.iter().any(|t| t.moved.changes());
@@ -214,9 +225,10 @@ impl TimeStepping {
         warm_start(core, work, h);
         let settings =
             SolverSettings { budget: core.meter.for_solve(work.rows.blocks.len()), ..core.settings.solver_settings };
-        solve(core, work, settings, 1.0, |b| keep[b]);
+        solve_patches(core, Some(middle), work, (settings, 1.0), keep, u)?;
         keep.iter().zip(&work.rows.blocks).filter(|(k, _)| !**k).for_each(|(_, b)| work.lambda[b.range()].fill(0.0));
         u.iter_mut().zip(&work.du).for_each(|(u, du)| *u += du);
+        Ok(())
     }
 
     /// Writes the state at the end of the step.
@@ -270,8 +282,8 @@ impl TimeStepping {
         }
         core.publish(
             &self.work.contact_constraints,
-            impulses(&self.work, total),
-            impulses(&self.work, &self.work.lambda).map(|i| i / h),
+            impulses(&self.work, total, h),
+            impulses(&self.work, &self.work.lambda, h).map(|i| i / h),
             row_starts(&self.work, &self.work.lambda, 1.0 / h),
         );
         core.check_finite(dp, Some(&mut *middle))

@@ -2,6 +2,7 @@
 
 use super::Workspace;
 use crate::contact::detect::ContactConstraint;
+use crate::contact::laws::ContactLaws;
 use crate::contact::warm_starts::RowStart;
 use crate::contact::wrench::Wrench;
 use crate::world::Core;
@@ -32,9 +33,11 @@ pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
         }
         for ((constraint, block), force) in contacts.iter().zip(blocks).zip(&forces) {
             for (row, axis) in block.range().zip(&constraint.frame.axes) {
-                work.lambda[row] = scale * axis.dot(force);
+                let size = if constraint.laws.is_some() { axis.norm_squared() } else { 1.0 };
+                work.lambda[row] = scale * axis.dot(force) / size;
             }
-            work.lambda[block.row as usize] = work.lambda[block.row as usize].max(0.0);
+            let pull = scale * ContactLaws::pull(&constraint.laws);
+            work.lambda[block.row as usize] = (work.lambda[block.row as usize] + pull).max(0.0);
         }
     }
     let contacts = work.contact_constraints.len();

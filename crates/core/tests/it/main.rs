@@ -23,6 +23,7 @@ mod budget;
 mod chains;
 mod common;
 mod compound;
+mod contact_laws;
 mod correction;
 mod crowds;
 mod drives;

@@ -18,6 +18,7 @@ use crate::contact::time_of_impact::time_to_close;
 use crate::integrators::context::free_motion;
 use crate::object::Level;
 use crate::step::Moment;
+use crate::step::adhesion::adhere;
 use crate::step::budget::{IMPACTS, REBOUND};
 use crate::step::contacts::{build_rows, detect, push, row_velocities, whiten, zero};
 use crate::step::impact::{self, Candidate};
@@ -111,6 +112,7 @@ impl TimeStepping {
         moving::move_to_impacts(core, work, (&self.impact_fraction, &rates), h);
         build_rows(core, Some(&mut *middle), work, Level::Velocity { h }, 0.5 * h)?;
         whiten(middle.coordinates(core), &work.dp, h, u, du_force);
+        adhere(work, core.settings.drift_tolerance, h, du_force);
         let at_impact: Vec<f64> = (0..u.len()).map(|i| u[i] + self.impact_fraction[i].max(0.0) * du_force[i]).collect();
         after.clone_from(&at_impact);
         let budget = core.meter.left(IMPACTS);

@@ -1,0 +1,280 @@
+//! Contact patches: rolling and torsional friction, and friction that depends on the sliding speed.
+//!
+//! Contacts of a pair with one normal are a *patch*. The patch has angular rows, which exist during one
+//! solve: one along the normal, two along the tangents. Their bounds, and the friction coefficients of
+//! sliding contacts, depend on the solution, so the rows are solved again until they no longer change.
+//!
+//! ```text
+//! rolling      |τ_t| ≤ ρ·N                  τ_t = −ρ·N·ω_t/|ω_t| where the pair rolls
+//! sliding and  |(f/μ, τ_n/σ)| ≤ λ_n         of greatest dissipation: (f/μ, τ_n/σ) = −λ_n·(μ·w, σ·ω_n)/|(μ·w, σ·ω_n)|
+//! spinning     per contact, which has the share λ_n/N of τ_n
+//! a round      p = f/μ − r·μ·w,  q = τ_n/σ·λ_n/N − r·σ·ω_n,  m = |(p, q)|,  r = 1/(μ²·K_t + σ²·K_n)
+//!              m > λ_n:  |f| ≤ μ·λ_n·|p|/m,                |τ_n| ≤ Σ σ·λ_n·|q|/m
+//!              else:     |f| ≤ μ·√(λ_n² − q²),             |τ_n| ≤ Σ σ·√(λ_n² − |p|²)
+//! ```
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `λ_n`, `f` | normal and friction force of a contact, N (or impulse, N·s) |
+//! | `N` | `Σ λ_n` of the patch |
+//! | `τ_n`, `τ_t` | moment of the patch about its normal and across it, N·m |
+//! | `w`, `ω_n`, `ω_t` | sliding velocity of a contact, relative angular velocity along the normal and across it |
+//! | `μ`, `σ`, `ρ` | coefficients of friction (1), torsional friction (m), rolling friction (m) |
+//! | `K_t`, `K_n` | diagonal entries of the contact's matrix along a tangent and of the angular row |
+//!
+//! The law of sliding and spinning is the ellipse that Contensou's law of a disc comes close to (Leine
+//! and Glocker, *A set-valued force law for spatial Coulomb–Contensou friction*, 2003). It is that of
+//! `condim` 4 and 6 in MuJoCo; there rolling shares the same ellipse.
+
+use super::contacts::{Workspace, solve};
+use super::{Moment, contacts};
+use crate::constraint::builder::RowBuilder;
+use crate::constraint::rows::{Block, RowSet, Rows};
+use crate::contact::detect::ContactConstraint;
+use crate::contact::laws::ContactLaws;
+use crate::object::RowTarget;
+use crate::object::collidable::ContactFrame;
+use crate::solver::SolverSettings;
+use crate::world::view::ObjectId;
+use crate::world::{Core, StepError};
+use std::ops::Range;
+use tumble_collide::Vec3;
+
+/// Maximum number of rounds.
+const ROUNDS: usize = 40;
+/// After this number of rounds a round goes half the way: bounds that alternate converge.
+const HALF: usize = 8;
+/// Least factor by which spinning reduces the friction against sliding: no cone has no friction.
+const LEAST: f64 = 1e-9;
+
+/// Angular rows of the contacts of a pair with one normal.
+struct Patch {
+    contacts: Range<usize>,
+    /// Normal and tangents, unit.
+    axes: [Vec3; 3],
+    /// Blocks of the two rows across the normal.
+    rolling: Option<[usize; 2]>,
+    /// Block of the row along the normal.
+    torsional: Option<usize>,
+}
+
+/// Moment of a patch on part A of its contacts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PatchMoment {
+    pub contact: usize,
+    /// N·m at the acceleration level, else N·m·s, world axes.
+    pub moment: Vec3,
+}
+
+/// Solves all blocks that `keep` selects, as [`solve`] does, for contacts with laws of their own. `u` is
+/// the whitened velocity at the end without the multipliers; rows respond at the moment `acting`. The
+/// moments of patches go to `work.moments`.
+pub(super) fn solve_patches(
+    core: &mut Core,
+    acting: Option<&mut Moment>,
+    work: &mut Workspace,
+    (settings, unit): (SolverSettings, f64),
+    keep: &[bool],
+    u: &[f64],
+) -> Result<bool, StepError> {
+    work.moments.clear();
+    let laws = |c: &ContactConstraint| c.laws.as_ref().is_some_and(|laws| laws.depends_on_solution(c.friction));
+    if !work.contact_constraints.iter().any(laws) {
+        return Ok(solve(core, work, settings, unit, |b| keep[b]));
+    }
+    let (blocks, len, y) = (work.rows.blocks.len(), work.rows.len, work.rows.y.len());
+    let patches = lay_patches(core, acting, work, keep)?;
+    work.lambda.resize(work.rows.len, 0.0);
+    for row in len..work.rows.len {
+        work.c.push(work.bias[row] / unit);
+    }
+    for block in &work.rows.blocks[blocks..] {
+        work.c[block.row as usize] += work.rows.row_velocity(block, 0, u) / unit;
+    }
+    contacts::zero(&mut work.du, core.dof);
+    for block in &work.rows.blocks {
+        work.rows.apply_block(block, &work.lambda, &mut work.du);
+    }
+    let tolerance = super::solves::SOLVED * settings.tolerance;
+    let mut ray = false;
+    for round in 0..=ROUNDS {
+        let mut change: f64 = 0.0;
+        for patch in &patches {
+            let relax = if round > HALF { 0.5 } else { 1.0 };
+            change = change.max(update(work, patch, unit, relax));
+        }
+        if round > 0 && change <= tolerance {
+            break;
+        }
+        if round == ROUNDS {
+            core.report.missed(unit * change);
+            break;
+        }
+        ray = solve(core, work, settings, unit, |b| keep.get(b).copied().unwrap_or(true));
+    }
+    for patch in &patches {
+        let rows = patch.torsional.map(|b| (b, 0)).into_iter();
+        let rows = rows.chain(patch.rolling.into_iter().flatten().zip(1..));
+        let moment = rows.map(|(b, k)| patch.axes[k] * work.lambda[work.rows.blocks[b].row as usize]).sum();
+        work.moments.push(PatchMoment { contact: patch.contacts.start, moment });
+    }
+    work.rows.blocks.truncate(blocks);
+    work.rows.y.truncate(y);
+    work.rows.len = len;
+    [&mut work.bias, &mut work.c, &mut work.lambda].into_iter().for_each(|numbers| numbers.truncate(len));
+    Ok(ray)
+}
+
+/// Adds the angular rows of all patches, with bounds 0.
+fn lay_patches(
+    core: &mut Core,
+    acting: Option<&mut Moment>,
+    work: &mut Workspace,
+    keep: &[bool],
+) -> Result<Vec<Patch>, StepError> {
+    let mut patches: Vec<Patch> = Vec::new();
+    let mut first = 0;
+    let same =
+        |a: &ContactConstraint, b: &ContactConstraint| a.key.pair == b.key.pair && a.frame.axes[0] == b.frame.axes[0];
+    for contacts in work.contact_constraints.chunk_by(same) {
+        let range = first..first + contacts.len();
+        first = range.end;
+        let laws = contacts[0].laws.as_ref().filter(|laws| laws.depends_on_solution(contacts[0].friction));
+        if laws.is_some() && range.clone().any(|i| keep[i]) {
+            let axes = ContactFrame::new(contacts[0].frame.point, contacts[0].frame.axes[0]).axes;
+            patches.push(Patch { contacts: range, axes, rolling: None, torsional: None });
+        }
+    }
+    let time = core.state.time;
+    let owners = core.owners.clone();
+    let basis = core.basis(acting, time, None);
+    let (mut targets, mut kinds, mut problem) = (Vec::new(), Vec::new(), None);
+    let mut builder = RowBuilder {
+        rows: &mut work.rows,
+        bias: &mut work.bias,
+        targets: &mut targets,
+        kinds: &mut kinds,
+        objects: basis.view.objects,
+        x: basis.found.0,
+        caches: basis.caches,
+        part_states: basis.view.part_states,
+        problem: &mut problem,
+        owner: ObjectId::default(),
+    };
+    for patch in &mut patches {
+        let constraint = &work.contact_constraints[patch.contacts.start];
+        let Some(laws) = &constraint.laws else { continue };
+        let [normal, t, b] = patch.axes;
+        let [side_a, side_b] = [constraint.a, constraint.b].map(|part| owners[part as usize]);
+        let mut row = |axis: Vec3| {
+            let block = builder.rows.blocks.len();
+            builder
+                .row(RowTarget::new(RowSet::Interval { lo: 0.0, hi: 0.0 }, 0.0))
+                .on_rotation(side_a.id, side_a.part as usize, &axis, 1.0)
+                .on_rotation(side_b.id, side_b.part as usize, &axis, -1.0);
+            block
+        };
+        patch.rolling = (laws.rolling > 0.0).then(|| [row(t), row(b)]);
+        patch.torsional = (laws.torsional > 0.0).then(|| row(normal));
+    }
+    match problem {
+        Some(why) => Err(StepError::Row { object: "a contact".into(), why }),
+        None => Ok(patches),
+    }
+}
+
+/// The present solution of one row: its multiplier, its velocity, and its diagonal entry.
+struct RowState {
+    lambda: f64,
+    w: f64,
+    own: f64,
+}
+
+fn row_state(work: &Workspace, block: &Block, k: usize) -> RowState {
+    let row = block.row as usize + k;
+    let w = work.c[row] + work.rows.row_velocity(block, k, &work.du);
+    RowState { lambda: work.lambda[row], w, own: work.rows.own(block, k, k) }
+}
+
+/// Sets the bounds of a patch and the friction of its contacts from the present solution. Returns the
+/// largest change in terms of a row velocity.
+fn update(work: &mut Workspace, patch: &Patch, unit: f64, relax: f64) -> f64 {
+    let ContactConstraint { laws, friction, .. } = &work.contact_constraints[patch.contacts.start];
+    let (Some(laws), friction) = (laws.clone(), *friction) else { return 0.0 };
+    let load_of = |work: &Workspace, i: usize| work.lambda[work.rows.blocks[i].row as usize].max(0.0);
+    let total: f64 = patch.contacts.clone().map(|i| load_of(work, i)).sum();
+    let mut change: f64 = 0.0;
+    let spin = patch.torsional.map(|b| (b, row_state(work, &work.rows.blocks[b], 0)));
+    let mut torsion = 0.0;
+    for i in patch.contacts.clone() {
+        let load = load_of(work, i);
+        let block = work.rows.blocks[i];
+        let RowSet::Cone { mu: before } = block.set else {
+            torsion += laws.torsional * load;
+            continue;
+        };
+        let tangents = [1, 2].map(|k| row_state(work, &block, k));
+        let share = if total > 0.0 { load / total } else { 1.0 / patch.contacts.len() as f64 };
+        let axes = &work.contact_constraints[i].frame.axes;
+        let speed = unit * (tangents[0].w / axes[1].norm()).hypot(tangents[1].w / axes[2].norm());
+        let mu = laws.friction_at(speed, friction);
+        let (factor, moment) =
+            spin.as_ref().map_or((1.0, 0.0), |(_, spin)| divide(&laws, mu.max(LEAST), &tangents, (spin, share), load));
+        torsion += moment;
+        let mu = before + relax * (mu * factor.max(LEAST) - before);
+        change = change.max((mu - before).abs() * load * tangents[0].own.max(tangents[1].own));
+        work.rows.blocks[i].set = RowSet::Cone { mu };
+    }
+    if let Some((b, spin)) = spin {
+        change = change.max(bound(&mut work.rows, b, torsion, relax) * spin.own);
+    }
+    if let Some(rows) = patch.rolling {
+        let rolls = rows.map(|b| row_state(work, &work.rows.blocks[b], 0));
+        let most = laws.rolling * total;
+        let r = 1.0 / rolls[0].own.max(rolls[1].own).max(f64::MIN_POSITIVE);
+        let wanted = [0, 1].map(|k| rolls[k].lambda - r * rolls[k].w);
+        let size = wanted[0].hypot(wanted[1]);
+        for k in 0..2 {
+            let allowed = if size > most {
+                most * wanted[k].abs() / size
+            } else {
+                (most * most - wanted[1 - k] * wanted[1 - k]).max(0.0).sqrt()
+            };
+            change = change.max(bound(&mut work.rows, rows[k], allowed, relax) * rolls[k].own);
+        }
+    }
+    change
+}
+
+/// Divides the friction of a contact between sliding and spinning. Returns the factor of its
+/// coefficient, and the largest moment.
+fn divide(
+    laws: &ContactLaws,
+    mu: f64,
+    tangents: &[RowState; 2],
+    (spin, share): (&RowState, f64),
+    load: f64,
+) -> (f64, f64) {
+    let sigma = laws.torsional;
+    let own = mu * mu * tangents[0].own.max(tangents[1].own) + sigma * sigma * spin.own;
+    let r = if own > 0.0 { 1.0 / own } else { 0.0 };
+    let p = tangents[0].lambda / mu - r * mu * tangents[0].w;
+    let p = p.hypot(tangents[1].lambda / mu - r * mu * tangents[1].w);
+    let q = (share * spin.lambda / sigma - r * sigma * spin.w).abs();
+    let size = p.hypot(q);
+    if size > load {
+        (p / size, sigma * load * q / size)
+    } else if load > 0.0 {
+        (((load * load - q * q).max(0.0)).sqrt() / load, sigma * (load * load - p * p).max(0.0).sqrt())
+    } else {
+        (1.0, 0.0)
+    }
+}
+
+/// Sets the bounds of a row to ± `most`, `relax` of the way. Returns the change.
+fn bound(rows: &mut Rows, block: usize, most: f64, relax: f64) -> f64 {
+    let RowSet::Interval { hi: before, .. } = rows.blocks[block].set else { return 0.0 };
+    let hi = before + relax * (most - before);
+    rows.blocks[block].set = RowSet::Interval { lo: -hi, hi };
+    (hi - before).abs()
+}
