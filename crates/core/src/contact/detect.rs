@@ -50,7 +50,7 @@ pub(crate) struct ContactConstraint {
     pub restitution: f64,
     /// Velocity of A's surface over A, less that of B's, m/s, world axes.
     pub surface_velocity: Vec3,
-    /// What the pair has beside Coulomb's law, if anything.
+    /// Laws of the pair beside Coulomb's, if any.
     pub laws: Option<Box<ContactLaws>>,
     pub key: ContactKey,
 }

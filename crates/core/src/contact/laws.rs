@@ -1,4 +1,4 @@
-//! What a pair of surfaces has beside Coulomb's law and restitution.
+//! Laws of a pair of surfaces beside those of Coulomb and of restitution.
 //!
 //! Friction that depends on the direction: with the factors `s_k` of `μ` along two orthogonal tangents
 //! `t_k`, rows along `s_k·t_k` turn the ellipse of admissible friction forces into the circle of the

@@ -307,6 +307,50 @@ class RigidBody:
     @surface_velocity.setter
     def surface_velocity(self, value: ArrayLike) -> None: ...
     @property
+    def static_friction(self) -> float:
+        """Coefficient of friction of surfaces at rest on each other, if larger than ``friction``; 0 for none."""
+    @static_friction.setter
+    def static_friction(self, value: float) -> None: ...
+    @property
+    def stribeck_speed(self) -> float:
+        """Sliding speed, m/s, at which friction has fallen from ``static_friction`` towards ``friction`` by
+        63 %: the coefficient at speed v is ``friction + (static_friction - friction) * exp(-(v / stribeck_speed)**2)``.
+        """
+    @stribeck_speed.setter
+    def stribeck_speed(self, value: float) -> None: ...
+    @property
+    def friction_scale(self) -> _Floats:
+        """Factors of ``friction`` along the axes of the shape's frame, shape (3,), 1e-3 to 1e3: a surface with
+        a grain. All 1 by default.
+        """
+    @friction_scale.setter
+    def friction_scale(self, value: ArrayLike) -> None: ...
+    @property
+    def rolling_friction(self) -> float:
+        """Moment of rolling friction per normal force, m, at least 0. The larger of a pair counts."""
+    @rolling_friction.setter
+    def rolling_friction(self, value: float) -> None: ...
+    @property
+    def torsional_friction(self) -> float:
+        """Moment of torsional friction per normal force, m, at least 0, about the normal of a contact that
+        does not slide: two thirds of friction times the radius of a patch under uniform pressure. The
+        larger of a pair counts.
+        """
+    @torsional_friction.setter
+    def torsional_friction(self, value: float) -> None: ...
+    @property
+    def tangential_restitution(self) -> float:
+        """Tangential velocity of the contact point after an impact as a fraction of the reverse of that
+        before, 0 to 1, as far as friction permits: 1 for a superball. The larger of a pair counts.
+        """
+    @tangential_restitution.setter
+    def tangential_restitution(self, value: float) -> None: ...
+    @property
+    def adhesion(self) -> float:
+        """Force with which surfaces in contact attract each other, N, at least 0. The larger of a pair counts."""
+    @adhesion.setter
+    def adhesion(self, value: float) -> None: ...
+    @property
     def color(self) -> _Floats:
         """Color, sRGB, shape (3,), each 0 to 1. Setting it removes a pattern."""
     @color.setter

@@ -332,6 +332,89 @@ impl RigidBody {
         self.change(py, |body| body.material.surface_velocity = velocity.into())
     }
 
+    /// Coefficient of friction of surfaces at rest on each other, if larger than ``friction``; 0 for none.
+    #[getter]
+    fn static_friction(&self) -> Result<f64> {
+        self.constant(|body| body.material.static_friction)
+    }
+
+    #[setter]
+    fn set_static_friction(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |body| body.material.static_friction = value)
+    }
+
+    /// Sliding speed, m/s, at which friction has fallen from ``static_friction`` towards ``friction`` by
+    /// 63 %: the coefficient at speed v is ``friction + (static_friction - friction) * exp(-(v / stribeck_speed)**2)``.
+    #[getter]
+    fn stribeck_speed(&self) -> Result<f64> {
+        self.constant(|body| body.material.stribeck_speed)
+    }
+
+    #[setter]
+    fn set_stribeck_speed(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |body| body.material.stribeck_speed = value)
+    }
+
+    /// Factors of ``friction`` along the axes of the shape's frame, shape (3,), 1e-3 to 1e3: a surface with
+    /// a grain. All 1 by default.
+    #[getter]
+    fn friction_scale<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(array(py, self.constant(|body| body.material.friction_scale)?.as_slice()))
+    }
+
+    #[setter]
+    fn set_friction_scale(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        let scale = some::<3>(value, "friction_scale")?;
+        self.change(py, |body| body.material.friction_scale = scale.into())
+    }
+
+    /// Moment of rolling friction per normal force, m, at least 0. The larger of a pair counts.
+    #[getter]
+    fn rolling_friction(&self) -> Result<f64> {
+        self.constant(|body| body.material.rolling_friction)
+    }
+
+    #[setter]
+    fn set_rolling_friction(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |body| body.material.rolling_friction = value)
+    }
+
+    /// Moment of torsional friction per normal force, m, at least 0, about the normal of a contact that
+    /// does not slide: two thirds of friction times the radius of a patch under uniform pressure. The
+    /// larger of a pair counts.
+    #[getter]
+    fn torsional_friction(&self) -> Result<f64> {
+        self.constant(|body| body.material.torsional_friction)
+    }
+
+    #[setter]
+    fn set_torsional_friction(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |body| body.material.torsional_friction = value)
+    }
+
+    /// Tangential velocity of the contact point after an impact as a fraction of the reverse of that
+    /// before, 0 to 1, as far as friction permits: 1 for a superball. The larger of a pair counts.
+    #[getter]
+    fn tangential_restitution(&self) -> Result<f64> {
+        self.constant(|body| body.material.tangential_restitution)
+    }
+
+    #[setter]
+    fn set_tangential_restitution(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |body| body.material.tangential_restitution = value)
+    }
+
+    /// Force with which surfaces in contact attract each other, N, at least 0. The larger of a pair counts.
+    #[getter]
+    fn adhesion(&self) -> Result<f64> {
+        self.constant(|body| body.material.adhesion)
+    }
+
+    #[setter]
+    fn set_adhesion(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |body| body.material.adhesion = value)
+    }
+
     /// Color, sRGB, shape (3,), each 0 to 1. Setting it removes a pattern.
     #[getter]
     fn color<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {

@@ -119,9 +119,7 @@ fn position(link: &LinkSpec, base: &Pose) -> Vec<f64> {
 fn attach(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Result<(), ArticulatedError> {
     let surface = &placed.spec.surface;
     if let Some(shape) = placed.solid().filter(|_| placed.spec.collides) {
-        let id = material_id(surface.material);
-        let material =
-            Material { restitution: surface.restitution, friction: surface.friction, id, ..Material::default() };
+        let material = Material { id: material_id(surface.material), ..surface.contact };
         body.add_collider(
             link,
             Collider {

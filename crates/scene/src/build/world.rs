@@ -164,12 +164,7 @@ impl SceneFile {
         let [x, y, z, w] = spec.orientation_xyzw;
         let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
         let pose = Pose::from_parts(Translation3::from(Vec3::from(spec.position_m)), rotation);
-        let material = Material {
-            restitution: spec.restitution,
-            friction: spec.friction,
-            surface_velocity: Vec3::from(spec.surface_velocity_m_per_s),
-            id: material_id(spec.material),
-        };
+        let material = Material { id: material_id(spec.material), ..spec.contact };
         let mut body = body
             .with_name(&spec.name)
             .with_pose(pose)

@@ -17,8 +17,8 @@ use crate::xml::Element;
 
 /// Density of a geom without its own, kg/m³.
 const DENSITY: f64 = 1000.0;
-/// Sliding friction of a geom without its own.
-const FRICTION: f64 = 1.0;
+/// Sliding, torsional (m) and rolling friction (m) of a geom without its own.
+const FRICTION: [f64; 3] = [1.0, 0.005, 0.0001];
 /// Geoms of this group and above are not drawn, as in MuJoCo's viewer.
 const HIDDEN_GROUP: i64 = 3;
 
@@ -47,8 +47,10 @@ pub(super) struct Geom<'a> {
     pub(super) group: i64,
     /// `contype` and `conaffinity`.
     pub(super) bits: [u32; 2],
-    pub(super) friction: f64,
-    pub(super) frictionless: bool,
+    /// Sliding, torsional (m) and rolling friction (m).
+    pub(super) friction: [f64; 3],
+    /// `condim`: of the contact forces that it has.
+    pub(super) dimensions: f64,
     pub(super) appearance: AppearanceSpec,
     pub(super) visible: bool,
 }
@@ -108,10 +110,8 @@ impl<'a> Geom<'a> {
         });
         let look = read_look(&item, reader);
         let group = count("group", 0.0) as i64;
-        let condim = count("condim", 3.0);
-        if condim > 3.0 {
-            reader.notes.add(&element, "torsional and rolling friction (condim above 3) are left out");
-        }
+        let given = item.list("friction", 3).unwrap_or_default();
+        let friction = |k: usize| given.get(k).copied().unwrap_or(FRICTION[k]).clamp(0.0, 100.0);
         let plane = form == Form::Plane;
         Some(Geom {
             name: item.name(),
@@ -122,8 +122,8 @@ impl<'a> Geom<'a> {
             density: item.number("density", Bound::NOT_NEGATIVE, DENSITY),
             group,
             bits: if reader.contacts { bits } else { [0; 2] },
-            friction: item.list("friction", 3).map_or(FRICTION, |f| f[0]).clamp(0.0, 100.0),
-            frictionless: condim <= 1.0,
+            friction: [0, 1, 2].map(friction),
+            dimensions: count("condim", 3.0),
             appearance: appearance(&look, plane),
             visible: group < HIDDEN_GROUP && look.rgba[3] > 0.0,
         })

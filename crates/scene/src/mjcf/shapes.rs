@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use tumble_core::CollisionGroup;
 use tumble_core::collide::{Pose, TriMesh, Vec3};
+use tumble_core::{CollisionGroup, Material};
 
 use super::Reader;
 use super::asset::MeshFrom;
@@ -66,8 +66,14 @@ impl Groups {
     /// Returns the surface of a geom.
     pub(super) fn surface(&self, geom: &Geom<'_>) -> Surface {
         let (group, mask) = self.group(geom);
-        let friction = if geom.frictionless { 0.0 } else { geom.friction };
-        Surface { friction, group, mask, appearance: geom.appearance.clone(), ..Surface::default() }
+        let [sliding, torsional, rolling] = geom.friction;
+        let contact = Material {
+            friction: if geom.dimensions > 1.0 { sliding } else { 0.0 },
+            torsional_friction: if geom.dimensions > 3.0 { torsional } else { 0.0 },
+            rolling_friction: if geom.dimensions > 4.0 { rolling } else { 0.0 },
+            ..Material::default()
+        };
+        Surface { contact, group, mask, appearance: geom.appearance.clone(), ..Surface::default() }
     }
 }
 

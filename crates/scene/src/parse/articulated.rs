@@ -13,6 +13,7 @@ use crate::parse::body::{Library, read_name};
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names, Value, number_of};
 use crate::parse::link::{Inherited, LinkRow, LinkSpec, Surface};
+use crate::parse::material::overlay_contact;
 use crate::parse::place::Place;
 use crate::parse::rotation;
 use crate::urdf::{CollisionMeshes, MissingMeshes, UrdfOptions};
@@ -211,16 +212,18 @@ impl ArticulatedSpec {
             }
         };
         (self.links, self.exclude_collisions, self.notes) = (read.links, read.exclude_collisions, notes);
-        let [named, friction, restitution, color] =
-            ["material", "friction", "restitution", "color"].map(|key| f.value(key).is_some());
+        let [named, color] = ["material", "color"].map(|key| f.value(key).is_some());
         for shape in self.links.iter_mut().flat_map(|link| &mut link.shapes) {
             shape.collides &= from.collides;
             shape.visible &= from.visible;
             let (own, new) = (&mut shape.surface, from.surface);
             own.material = new.material;
             own.contacts = new.contacts;
-            own.friction = if named || friction { new.friction } else { own.friction };
-            own.restitution = if named || restitution { new.restitution } else { own.restitution };
+            if named {
+                own.contact = new.contact;
+            } else {
+                overlay_contact(f, &mut own.contact, &new.contact);
+            }
             if named || color {
                 own.appearance = new.appearance.clone();
             }

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use tumble_core::collide::ContactMode;
 use tumble_core::collide::Mat3;
-use tumble_core::{CollisionGroup, LockedAxes, Mode};
+use tumble_core::{CollisionGroup, LockedAxes, Material, Mode};
 
 use crate::parse::appearance::AppearanceSpec;
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names};
 use crate::parse::link::read_inertia;
-use crate::parse::material::{DEFAULT_FRICTION, DEFAULT_RESTITUTION, FRICTION, MaterialSpec, RESTITUTION};
+use crate::parse::material::{MaterialSpec, read_contact};
 use crate::parse::mount::Mounts;
 use crate::parse::rotation;
 use crate::parse::shape::ShapeSpec;
@@ -53,12 +53,8 @@ pub struct BodySpec {
     /// Index into [`SceneFile::materials`](crate::SceneFile::materials), if the body names a
     /// material.
     pub material: Option<usize>,
-    /// The body's own, else its material's, else 0.5.
-    pub friction: f64,
-    /// The body's own, else its material's, else 0.
-    pub restitution: f64,
-    /// Velocity of its surface over it, frame of the shape, m/s: a conveyor belt. Default `[0, 0, 0]`.
-    pub surface_velocity_m_per_s: [f64; 3],
+    /// Contact constants: the body's own, else its material's, else the default ones.
+    pub contact: Material,
     /// Contact mode of a mesh or cylinder. Default: that of the world.
     pub contacts: ContactMode,
     /// Center of mass in the shape's frame, m. Default: that of the uniform shape.
@@ -110,8 +106,7 @@ impl BodySpec {
         let mass = read_mass(f, mode, shape.as_ref().is_some_and(ShapeSpec::has_density));
         let material = read_material(f, library);
         let base = material.map(|index| &library.materials[index]);
-        let (friction, restitution) =
-            base.map_or((DEFAULT_FRICTION, DEFAULT_RESTITUTION), |m| (m.friction, m.restitution));
+        let of_material = base.map_or_else(Material::default, |m| m.contact);
         let appearance = base.map_or_else(AppearanceSpec::default, |m| m.appearance.clone());
         let [linear, angular] = read_velocities(f, mode);
         let body = BodySpec {
@@ -124,9 +119,7 @@ impl BodySpec {
             velocity_m_per_s: linear,
             angular_velocity_rad_per_s: angular,
             material,
-            friction: f.number_or("friction", FRICTION, friction),
-            restitution: f.number_or("restitution", RESTITUTION, restitution),
-            surface_velocity_m_per_s: f.vector_or("surface_velocity_m_per_s", Bound::ANY, [0.0; 3]),
+            contact: read_contact(f, &of_material),
             contacts: f.choice_or("contacts", CONTACTS, library.contacts),
             center_m: f.optional_vector("center_m", Bound::ANY),
             inertia_kg_m2: read_inertia(f),

@@ -6,14 +6,14 @@ use std::sync::Arc;
 use toml::de::DeValue;
 use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{ContactMode, Mat3, Pose, TriMesh, Vec3};
-use tumble_core::{CollisionGroup, Joint};
+use tumble_core::{CollisionGroup, Joint, Material};
 
 use crate::parse::appearance::{AppearanceSpec, Color, as_color};
 use crate::parse::body::{Library, MassSpec, read_material, read_name};
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Value};
 use crate::parse::joint::JointSpec;
-use crate::parse::material::{DEFAULT_FRICTION, DEFAULT_RESTITUTION, FRICTION, RESTITUTION};
+use crate::parse::material::read_contact;
 use crate::parse::mount::Mounts;
 use crate::parse::rotation;
 use crate::parse::shape::ShapeSpec;
@@ -120,10 +120,8 @@ pub enum Geometry {
 pub struct Surface {
     /// Index into [`SceneFile::materials`](crate::SceneFile::materials), if a material is named.
     pub material: Option<usize>,
-    /// Coulomb's coefficient of friction.
-    pub friction: f64,
-    /// Newton's coefficient of restitution.
-    pub restitution: f64,
+    /// Contact constants.
+    pub contact: Material,
     /// Contact mode of meshes and cylinders.
     pub contacts: ContactMode,
     /// Collision group.
@@ -138,8 +136,7 @@ impl Default for Surface {
     fn default() -> Surface {
         Surface {
             material: None,
-            friction: DEFAULT_FRICTION,
-            restitution: DEFAULT_RESTITUTION,
+            contact: Material::default(),
             contacts: ContactMode::default(),
             group: CollisionGroup::default(),
             mask: u64::MAX,
@@ -153,14 +150,10 @@ impl Surface {
     pub(crate) fn read(f: &mut Fields<'_>, library: &Library<'_>, base: &Surface) -> Surface {
         let material = read_material(f, library);
         let named = material.map(|index| &library.materials[index]);
-        let (friction, restitution, appearance) = named
-            .map_or((base.friction, base.restitution, &base.appearance), |m| {
-                (m.friction, m.restitution, &m.appearance)
-            });
+        let (contact, appearance) = named.map_or((&base.contact, &base.appearance), |m| (&m.contact, &m.appearance));
         Surface {
             material: material.or(base.material),
-            friction: f.number_or("friction", FRICTION, friction),
-            restitution: f.number_or("restitution", RESTITUTION, restitution),
+            contact: read_contact(f, contact),
             contacts: f.choice_or("contacts", CONTACTS, base.contacts),
             group: base.group,
             mask: base.mask,

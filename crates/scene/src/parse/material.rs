@@ -3,28 +3,65 @@
 use crate::parse::appearance::AppearanceSpec;
 use crate::parse::bound::Bound;
 use crate::parse::fields::Fields;
-
-/// Friction of a body without its own.
-pub(crate) const DEFAULT_FRICTION: f64 = 0.5;
-/// Restitution of a body without its own.
-pub(crate) const DEFAULT_RESTITUTION: f64 = 0.0;
+use tumble_core::Material;
+use tumble_core::collide::Vec3;
 
 /// Range of coefficients of friction.
 pub(crate) const FRICTION: Bound = Bound::new(0.0, 100.0, "a friction coefficient from 0 to 100");
 /// Range of coefficients of restitution.
 pub(crate) const RESTITUTION: Bound = Bound::new(0.0, 1.0, "a restitution from 0 (no bounce) to 1 (no loss)");
 
+/// Range of factors of friction.
+const SCALE: Bound = Bound::new(1e-3, 1e3, "a factor of friction from 1e-3 to 1e3");
+
+/// The keys of contact constants, and how each passes from one material to another.
+type Pass = fn(&mut Material, &Material);
+const CONTACT_KEYS: [(&str, Pass); 10] = [
+    ("friction", |to, from| to.friction = from.friction),
+    ("restitution", |to, from| to.restitution = from.restitution),
+    ("static_friction", |to, from| to.static_friction = from.static_friction),
+    ("stribeck_speed_m_per_s", |to, from| to.stribeck_speed = from.stribeck_speed),
+    ("friction_scale", |to, from| to.friction_scale = from.friction_scale),
+    ("rolling_friction_m", |to, from| to.rolling_friction = from.rolling_friction),
+    ("torsional_friction_m", |to, from| to.torsional_friction = from.torsional_friction),
+    ("tangential_restitution", |to, from| to.tangential_restitution = from.tangential_restitution),
+    ("adhesion_n", |to, from| to.adhesion = from.adhesion),
+    ("surface_velocity_m_per_s", |to, from| to.surface_velocity = from.surface_velocity),
+];
+
+/// Reads the contact constants; absent keys are those of `base`.
+pub(crate) fn read_contact(f: &mut Fields<'_>, base: &Material) -> Material {
+    Material {
+        friction: f.number_or("friction", FRICTION, base.friction),
+        restitution: f.number_or("restitution", RESTITUTION, base.restitution),
+        static_friction: f.number_or("static_friction", FRICTION, base.static_friction),
+        stribeck_speed: f.number_or("stribeck_speed_m_per_s", Bound::POSITIVE, base.stribeck_speed),
+        friction_scale: Vec3::from(f.vector_or("friction_scale", SCALE, base.friction_scale.into())),
+        rolling_friction: f.number_or("rolling_friction_m", Bound::NOT_NEGATIVE, base.rolling_friction),
+        torsional_friction: f.number_or("torsional_friction_m", Bound::NOT_NEGATIVE, base.torsional_friction),
+        tangential_restitution: f.number_or("tangential_restitution", Bound::UNIT, base.tangential_restitution),
+        adhesion: f.number_or("adhesion_n", Bound::NOT_NEGATIVE, base.adhesion),
+        surface_velocity: Vec3::from(f.vector_or("surface_velocity_m_per_s", Bound::ANY, base.surface_velocity.into())),
+        id: base.id,
+    }
+}
+
+/// Copies the contact constants that the table gives, which have been read to `new`.
+pub(crate) fn overlay_contact(f: &mut Fields<'_>, own: &mut Material, new: &Material) {
+    for (key, pass) in CONTACT_KEYS {
+        if f.value(key).is_some() {
+            pass(own, new);
+        }
+    }
+}
+
 /// A named material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialSpec {
     /// The NAME of `[materials.NAME]`.
     pub name: String,
-    /// Coulomb's coefficient of friction, at least 0; combined with that of the other body. Default
-    /// 0.5.
-    pub friction: f64,
-    /// Newton's coefficient of restitution, 0 to 1; combined with that of the other body. Default
-    /// 0.
-    pub restitution: f64,
+    /// Contact constants; combined with those of the other body.
+    pub contact: Material,
     /// Appearance of bodies of this material.
     pub appearance: AppearanceSpec,
 }
@@ -33,8 +70,7 @@ impl MaterialSpec {
     pub(crate) fn read(name: &str, mut f: Fields<'_>) -> Self {
         let material = MaterialSpec {
             name: name.to_owned(),
-            friction: f.number_or("friction", FRICTION, DEFAULT_FRICTION),
-            restitution: f.number_or("restitution", RESTITUTION, DEFAULT_RESTITUTION),
+            contact: read_contact(&mut f, &Material::default()),
             appearance: AppearanceSpec::read(&mut f, &AppearanceSpec::default()),
         };
         f.finish();

@@ -42,7 +42,7 @@ fn the_example_of_every_key_means_what_it_says() {
     assert_eq!((stiffness, damping, velocity, limit), (4000.0, 800.0, 0.0, 900.0));
     assert!((target - std::f64::consts::FRAC_PI_4).abs() < 1e-15);
     assert_eq!(jib.shapes.len(), 2);
-    assert_eq!(jib.shapes[0].surface.friction, 0.4, "the material of the body");
+    assert_eq!(jib.shapes[0].surface.contact.friction, 0.4, "the material of the body");
 
     let trolley = link("trolley");
     assert_eq!((trolley.joint.position[0], trolley.joint.velocity[0]), (1.0, 0.1));

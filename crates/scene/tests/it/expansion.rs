@@ -1,5 +1,6 @@
 //! The result of a valid file: defaults, materials, orientations and grids.
 
+use tumble_core::collide::Vec3;
 use tumble_scene::{
     BodySpec, Combine, Integrator, LightKind, MassSpec, MeshSource, Mode, Pattern, SceneFile, ShapeSpec, Solver,
     Stepper,
@@ -137,10 +138,10 @@ fn a_body_takes_what_its_material_says_unless_it_says_otherwise() {
         read(&(text.clone() + &body)).bodies.remove(0)
     };
     let plain = one("");
-    assert_eq!((plain.friction, plain.restitution, plain.material), (0.9, 0.4, Some(0)));
+    assert_eq!((plain.contact.friction, plain.contact.restitution, plain.material), (0.9, 0.4, Some(0)));
     assert_eq!((plain.appearance.color, plain.appearance.roughness), ([1.0, 0.0, 0.0], 0.1));
     let other = one("friction = 0.2\ncolor = [0, 0.5, 1]\npattern = \"wood\"");
-    assert_eq!((other.friction, other.restitution), (0.2, 0.4));
+    assert_eq!((other.contact.friction, other.contact.restitution), (0.2, 0.4));
     assert_eq!(
         (other.appearance.color, other.appearance.roughness, other.appearance.pattern),
         ([0.0, 0.5, 1.0], 0.1, Pattern::Wood)
@@ -152,7 +153,20 @@ fn a_body_takes_what_its_material_says_unless_it_says_otherwise() {
         (bare.appearance.pattern, bare.appearance.pattern_scale_m, bare.appearance.pattern_offset_m),
         (Pattern::Plain, 0.1, 0.0)
     );
-    assert_eq!((bare.friction, bare.restitution, bare.material), (0.5, 0.0, None));
+    assert_eq!((bare.contact.friction, bare.contact.restitution, bare.material), (0.5, 0.0, None));
+}
+
+#[test]
+fn contact_constants_come_from_the_material_and_the_body() {
+    let text = "[materials.m]\nrolling_friction_m = 0.01\nstatic_friction = 0.8\nadhesion_n = 3\n\
+                [[body]]\nname = \"b\"\nshape = { type = \"sphere\", radius_m = 1 }\nmass_kg = 1\nmaterial = \"m\"\n\
+                torsional_friction_m = 0.02\nstribeck_speed_m_per_s = 0.1\nfriction_scale = [1, 0.5, 2]\n\
+                tangential_restitution = 0.3\nadhesion_n = 4\n";
+    let contact = read(text).bodies[0].contact;
+    assert_eq!((contact.rolling_friction, contact.torsional_friction), (0.01, 0.02));
+    assert_eq!((contact.friction, contact.static_friction, contact.stribeck_speed), (0.5, 0.8, 0.1));
+    assert_eq!((contact.friction_scale, contact.tangential_restitution), (Vec3::new(1.0, 0.5, 2.0), 0.3));
+    assert_eq!(contact.adhesion, 4.0);
 }
 
 #[test]

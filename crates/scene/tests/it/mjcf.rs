@@ -350,7 +350,7 @@ fn scenes_and_single_bodies_are_read_from_the_same_files() {
     let spec = &scene.articulated[0];
     assert_eq!((spec.name.as_str(), spec.base), ("c", Pose::translation(0.0, 0.0, 1.0)));
     assert_eq!((spec.links[1].joint.dof.damping, spec.links[1].joint.position[0]), (0.5, 0.3));
-    assert!(spec.links.iter().flat_map(|l| &l.shapes).all(|s| s.surface.friction == 0.1));
+    assert!(spec.links.iter().flat_map(|l| &l.shapes).all(|s| s.surface.contact.friction == 0.1));
     let wrong = SceneFile::parse("[[articulated]]\nname = \"c\"\nmjcf = \"none.xml\"\nfloating = true\n", "s.toml");
     let wrong = wrong.unwrap_err().to_string();
     assert!(wrong.contains("s.toml:3:8: `mjcf` of articulated \"c\": none.xml: cannot read the MJCF file"), "{wrong}");

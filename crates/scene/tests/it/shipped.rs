@@ -123,9 +123,9 @@ fn incline_lies_flat_on_the_ramp_and_stops_on_it() {
     let v = block.velocity_m_per_s;
     assert!((distance(v, [0.0; 3]) - 2.0).abs() < 1e-12);
     assert!((0..3).map(|k| v[k] * up[k]).sum::<f64>().abs() < 1e-12 && v[0] > 0.0);
-    let mu = scene.world.combine_friction.of(ramp.friction, block.friction);
+    let mu = scene.world.combine_friction.of(ramp.contact.friction, block.contact.friction);
     assert!(mu > angle.tan());
-    assert!(scene.world.combine_restitution.of(ramp.restitution, block.restitution) > 0.0);
+    assert!(scene.world.combine_restitution.of(ramp.contact.restitution, block.contact.restitution) > 0.0);
     // The block starts 1 m above the middle and needs v^2 / 2a = 0.9192 m.
     let stop = 4.0 / (2.0 * 9.81 * (mu * angle.cos() - angle.sin()));
     assert!((stop - 0.9192).abs() < 1e-4);
@@ -161,10 +161,10 @@ fn billiards_is_regulation() {
     let (friction, restitution) = (scene.world.combine_friction, scene.world.combine_restitution);
     let (bed, cushion) = (body(&scene, "bed"), body(&scene, "cushion_long_1"));
     assert_eq!(bed.shape, ShapeSpec::Box { size_m: [2.54, 1.27, 0.04] });
-    assert!((pair(friction, cue.friction, bed.friction) - 0.2).abs() < 1e-12);
-    assert!((pair(friction, cue.friction, cushion.friction) - 0.14).abs() < 1e-12);
-    assert_eq!(pair(restitution, cue.restitution, cushion.restitution), 0.8);
-    assert_eq!(pair(restitution, cue.restitution, first.restitution), 0.95);
+    assert!((pair(friction, cue.contact.friction, bed.contact.friction) - 0.2).abs() < 1e-12);
+    assert!((pair(friction, cue.contact.friction, cushion.contact.friction) - 0.14).abs() < 1e-12);
+    assert_eq!(pair(restitution, cue.contact.restitution, cushion.contact.restitution), 0.8);
+    assert_eq!(pair(restitution, cue.contact.restitution, first.contact.restitution), 0.95);
     check_cushions(&scene);
 }
 
@@ -217,7 +217,7 @@ fn bowling_is_regulation() {
 /// is a parabola; then it rolls straight on. It must reach pin 1 from the right, in the pocket.
 fn check_hook(scene: &SceneFile) {
     let (ball, lane) = (body(scene, "ball"), body(scene, "lane"));
-    let (mu, g, r) = (scene.world.combine_friction.of(ball.friction, lane.friction), 9.81, 0.1085);
+    let (mu, g, r) = (scene.world.combine_friction.of(ball.contact.friction, lane.contact.friction), 9.81, 0.1085);
     assert!((mu - 0.08).abs() < 1e-12);
     let ([vx, vy, _], [wx, wy, _]) = (ball.velocity_m_per_s, ball.angular_velocity_rad_per_s);
     let slip = [vx - r * wy, vy + r * wx];

@@ -67,7 +67,8 @@ fn billiards_the_cue_ball_arrives_as_its_page_says() {
 fn billiards_the_break_keeps_momentum_and_energy_before_the_first_cushion() {
     let mut scene = load("billiards");
     for body in scene.bodies.iter_mut().filter(|b| b.mode == Mode::Dynamic) {
-        (body.restitution, body.friction, body.linear_damping_per_s, body.angular_damping_per_s) = (1.0, 0.0, 0.0, 0.0);
+        (body.contact.restitution, body.contact.friction, body.linear_damping_per_s, body.angular_damping_per_s) =
+            (1.0, 0.0, 0.0, 0.0);
     }
     let mut world = build(&scene);
     let ids = movers(&scene, &world);
