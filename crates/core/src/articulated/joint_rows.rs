@@ -53,13 +53,13 @@ impl ArticulatedBody {
 impl Constraint for ArticulatedBody {
     fn rows(&self, me: &StateRange, view: &WorldView, level: Level, out: &mut RowBuilder) {
         let x = &view.x[me.x.clone()];
-        let mut maker = RowMaker { unit: vec![0.0; self.model.dof()], out };
+        let dof = self.model.dof();
+        let mut maker = RowMaker { unit: vec![0.0; dof], known: vec![None; dof], out };
         for (index, sign, error) in self.limit_errors(x) {
-            maker.row(RowTarget::new(RowSet::HalfLine, error), &[(index, sign)]);
+            maker.row_of(RowTarget::new(RowSet::HalfLine, error), index, sign);
         }
         for (index, dof_state) in self.dof_states(x) {
-            dof_state.resistance(level, |target| maker.row(target, &[(index, 1.0)]));
-            dof_state.drive(level, view.time).into_iter().for_each(|target| maker.row(target, &[(index, 1.0)]));
+            dof_state.forces(level, view.time, |target| maker.row_of(target, index, 1.0));
         }
         for c in &self.couplings {
             let position = |dof| self.position_of(dof).map_or(0.0, |q| x[q]);
@@ -80,10 +80,29 @@ impl Constraint for ArticulatedBody {
 /// Makes rows on the generalized coordinates of the owner.
 struct RowMaker<'a, 'b> {
     unit: Vec<f64>,
+    /// The first row along each degree of freedom, with its sign.
+    known: Vec<Option<(usize, f64)>>,
     out: &'a mut RowBuilder<'b>,
 }
 
 impl RowMaker<'_, '_> {
+    /// Makes a row along one degree of freedom.
+    fn row_of(&mut self, target: RowTarget, index: usize, sign: f64) {
+        if let Some((row, of_row)) = self.known[index] {
+            self.out.row(target);
+            if self.out.like(row, sign * of_row) {
+                return;
+            }
+            let owner = self.out.owner();
+            self.unit[index] = sign;
+            self.out.on_coordinates(owner, &self.unit);
+            self.unit[index] = 0.0;
+            return;
+        }
+        self.row(target, &[(index, sign)]);
+        self.known[index] = Some((self.out.last(), sign));
+    }
+
     fn row(&mut self, target: RowTarget, entries: &[(usize, f64)]) {
         let owner = self.out.owner();
         entries.iter().for_each(|&(i, value)| self.unit[i] = value);

@@ -150,6 +150,28 @@ impl RowBuilder<'_> {
         self
     }
 
+    /// Returns the index of the row that was started last, for [`like`](Self::like).
+    pub(crate) fn last(&self) -> usize {
+        self.rows.blocks.len().saturating_sub(1)
+    }
+
+    /// Gives the row the responses of an earlier row on coordinates of one object, times `factor`. Returns
+    /// false, and does nothing, if that row has none.
+    pub(crate) fn like(&mut self, earlier: usize, factor: f64) -> bool {
+        let Some(&[side]) = self.rows.blocks.get(earlier).map(|block| block.sides()) else { return false };
+        if self.problem.is_some() || self.targets.is_empty() {
+            return false;
+        }
+        self.is_of(RowKind::Coordinate);
+        let (from, dof) = (side.y as usize, side.dof as usize);
+        if self.rows.side(side.u as usize, dof).is_some() {
+            let to = self.rows.y.len() - dof;
+            let (before, added) = self.rows.y.split_at_mut(to);
+            added.iter_mut().zip(&before[from..from + dof]).for_each(|(to, from)| *to = factor * from);
+        }
+        true
+    }
+
     /// Returns whether a row is open and the given numbers are finite; refuses the row otherwise.
     fn open<'n>(&mut self, mut numbers: impl Iterator<Item = &'n f64>) -> bool {
         let finite = numbers.all(|x| x.is_finite());

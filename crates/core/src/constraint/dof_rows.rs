@@ -51,6 +51,22 @@ impl DofState<'_> {
         }
     }
 
+    /// Calls `row` with the targets of the rows of dry friction, damping and drive. Damping and a position
+    /// drive without a limit are one row: two springs in parallel.
+    pub fn forces(&self, level: Level, time: f64, mut row: impl FnMut(RowTarget)) {
+        let drive = self.drive(level, time);
+        let soft = drive.filter(|d| d.set == RowSet::Equality && d.compliance > 0.0 && self.settings.damping > 0.0);
+        let (Some(drive), Some(h)) = (soft, level.soft_step()) else {
+            self.resistance(level, &mut row);
+            return drive.into_iter().for_each(row);
+        };
+        if self.settings.friction > 0.0 {
+            row(RowTarget::new(level.bounded(self.settings.friction), 0.0));
+        }
+        let (own, both) = (1.0 / drive.compliance, 1.0 / drive.compliance + h * self.settings.damping);
+        row(RowTarget { compliance: 1.0 / both, velocity: drive.velocity * own / both, ..drive });
+    }
+
     /// Clamps the target velocity of a drive so that it does not point beyond the joint's limits,
     /// which hold for any strength of the drive. At the end of a step the joint is then exactly at
     /// the limit.

@@ -90,6 +90,8 @@ struct Buffers {
     total: Vec<f64>,
     /// Whether each block is solved.
     keep: Vec<bool>,
+    /// Limits that are left out of the solve until they would be passed.
+    far: Vec<usize>,
     /// Parts of the contacts in the rebound.
     parts: Vec<Part>,
     /// Change of velocity by the rebound.
@@ -166,7 +168,8 @@ impl TimeStepping {
     }
 
     /// Adds the forces and solves all contacts and constraints of the step: `u` becomes the
-    /// velocity at its end.
+    /// velocity at its end. Limits that free motion does not bring half way to their stops are left out,
+    /// unless the solution would pass one.
     fn contacts(
         &mut self,
         core: &mut Core,
@@ -177,7 +180,7 @@ impl TimeStepping {
         du_force: &[f64],
     ) -> Result<(), StepError> {
         let work = &mut self.work;
-        let Buffers { before, gain: first, parts, keep, .. } = &mut self.buffers;
+        let Buffers { before, gain: first, parts, keep, far, .. } = &mut self.buffers;
         let moves = work.contact_constraints.iter().any(|t| t.moved.changes());
         let free =
             if work.targets.is_empty() && !moves { FreeTerms::default() } else { FreeTerms::new(middle, core, h) };
@@ -214,10 +217,15 @@ impl TimeStepping {
                 moving::add_motion(work, i, &free, h);
             }
         }
-        for (block, target) in work.rows.blocks[work.contact_constraints.len()..].iter().zip(&work.targets) {
+        far.clear();
+        let constraints = (work.contact_constraints.len()..).zip(&work.targets);
+        for ((b, target), block) in constraints.zip(&work.rows.blocks[work.contact_constraints.len()..]) {
             let (change, turning) = free.of_row(&work.rows, block, 0);
             work.c[block.row as usize] += change - 0.5 * h * turning;
             let reach = if target.set == RowSet::HalfLine { target.error.max(0.0) / h } else { 0.0 };
+            if reach > 0.0 && work.c[block.row as usize] > -0.5 * reach && target.compliance == 0.0 {
+                far.push(b);
+            }
             // rows are those of the middle of the step, and go on turning for the other half
             let turning = if target.set == RowSet::Equality { 0.5 * h * target.bias_acceleration } else { 0.0 };
             work.c[block.row as usize] += reach + turning - target.velocity;
@@ -225,7 +233,17 @@ impl TimeStepping {
         warm_start(core, work, h);
         let settings =
             SolverSettings { budget: core.meter.for_solve(work.rows.blocks.len()), ..core.settings.solver_settings };
-        solve_patches(core, Some(middle), work, (settings, 1.0), keep, u)?;
+        far.retain(|&b| work.lambda[work.rows.blocks[b].row as usize] == 0.0);
+        far.iter().for_each(|&b| keep[b] = false);
+        solve_patches(core, Some(&mut *middle), work, (settings, 1.0), keep, u)?;
+        far.iter().for_each(|&b| keep[b] = true);
+        let passed = |&b: &usize| {
+            let block = &work.rows.blocks[b];
+            work.c[block.row as usize] + work.rows.row_velocity(block, 0, &work.du) < 0.0
+        };
+        if far.iter().any(passed) {
+            solve_patches(core, Some(middle), work, (settings, 1.0), keep, u)?;
+        }
         keep.iter().zip(&work.rows.blocks).filter(|(k, _)| !**k).for_each(|(_, b)| work.lambda[b.range()].fill(0.0));
         u.iter_mut().zip(&work.du).for_each(|(u, du)| *u += du);
         Ok(())
@@ -255,7 +273,11 @@ impl TimeStepping {
             let numbers = Numbers { caches, x, ..Numbers::default() };
             each_object(threads, objects, numbers, |entry, own| free_motion(entry, own.cache, own.x, h * share(entry)));
         };
-        move_freely(core.coordinates(Some(&mut *middle)), &before);
+        for entry in core.table.with(&core.state.objects).iter().filter(|e| in_the_middle(e)) {
+            core.state.x[entry.state_range.x.clone()].copy_from_slice(&middle.x[entry.state_range.x.clone()]);
+        }
+        let to_impact = |entry: &Entry| if in_the_middle(entry) { 0.0 } else { before(entry) };
+        move_freely(core.coordinates(Some(&mut *middle)), &to_impact);
         write(rest, &|i| change[i] + late[i]);
         let end: Vec<f64> = u0.iter().zip(&*rest).map(|(u, du)| u + du).collect();
         push(core.coordinates(Some(&mut *middle)), rest, dp);

@@ -241,6 +241,18 @@ impl<T: Scalar> Sweep<T> {
     #[inline(always)]
     pub fn run(&mut self, compiled: &Compiled, gravity: &Vec3, state: &impl Input<T>, out: impl FnMut(usize, T)) {
         self.place::<false>(compiled, state);
+        self.run_as_placed(compiled, gravity, state, out);
+    }
+
+    /// The rest of [`run`](Self::run), after the links are placed.
+    #[inline(always)]
+    pub fn run_as_placed(
+        &mut self,
+        compiled: &Compiled,
+        gravity: &Vec3,
+        state: &impl Input<T>,
+        out: impl FnMut(usize, T),
+    ) {
         for (i, body) in compiled.bodies.iter().enumerate().rev() {
             self.fold_link(i + 1, body);
             self.push_link(i + 1, body, state);

@@ -41,6 +41,8 @@ pub struct Dynamics {
     /// `√D` and `1/√D` (or 0) of each revolute or prismatic joint, by slot.
     pub(in crate::articulated) roots: Vec<[f64; 2]>,
     singular: Option<usize>,
+    /// Zeros, one per degree of freedom.
+    no_force: Vec<f64>,
 }
 
 /// Buffers of one call, for the maps that take `&self`. Made by [`Dynamics::scratch`]; no data is
@@ -60,6 +62,7 @@ impl Dynamics {
         Dynamics {
             roots: vec![[0.0; 2]; compiled.bodies.len() + 1],
             joint_sin_cos: JointSinCos::new(&compiled),
+            no_force: vec![0.0; compiled.dof],
             compiled,
             sweep,
             singular: None,
@@ -120,6 +123,38 @@ impl Dynamics {
                 self.singular = Some(i);
             }
         }
+    }
+
+    /// Returns the kinetic energy at a state, J. Afterwards the maps need a [`refresh`](Self::refresh).
+    pub(in crate::articulated) fn kinetic_energy(&mut self, q: &[f64], v: &[f64]) -> f64 {
+        let turns = self.joint_sin_cos.take(q);
+        self.sweep.place::<true>(&self.compiled, &SingleState { turns, q, v, tau: &[] });
+        self.kinetic_energy_as_placed(v)
+    }
+
+    /// Writes `q̈` without any force to `qdd`, and returns the kinetic energy, J. Afterwards the maps need a
+    /// [`refresh`](Self::refresh).
+    pub(in crate::articulated) fn free_acceleration(&mut self, q: &[f64], v: &[f64], qdd: &mut [f64]) -> f64 {
+        let kinetic = self.kinetic_energy(q, v);
+        qdd.fill(0.0);
+        let Dynamics { compiled, sweep, joint_sin_cos, .. } = self;
+        let tau = std::mem::take(&mut self.no_force);
+        let turns = joint_sin_cos.turns();
+        sweep.run_as_placed(compiled, &Vec3::zeros(), &SingleState { turns, q, v, tau: &tau }, |k, x| qdd[k] = x);
+        self.no_force = tau;
+        kinetic
+    }
+
+    /// Returns the kinetic energy of the links as they are placed, before inertias are swept inward.
+    fn kinetic_energy_as_placed(&self, v: &[f64]) -> f64 {
+        let of_link = |(body, slot): (&CompiledLink, &Slot<f64>)| {
+            let (omega, velocity) = (slot.angular, slot.linear);
+            let h = slot.rotation.of_constant(&body.moment);
+            let spin = 0.5 * omega.dot(slot.inertia.rotational * omega);
+            let rotor = if body.armature > 0.0 { 0.5 * body.armature * v[body.v] * v[body.v] } else { 0.0 };
+            spin + 0.5 * body.mass * velocity.dot(velocity) + velocity.dot(omega.cross(h)) + rotor
+        };
+        self.compiled.bodies.iter().zip(&self.sweep.slots[1..]).map(of_link).sum()
     }
 
     /// Returns the first link whose joint meets no inertia at the refreshed state, as in gimbal

@@ -60,10 +60,10 @@ impl FreeMotion {
         self.stage.copy_from_slice(x);
         let mut energy = 0.0;
         for s in 0..4 {
-            self.accelerate_at_stage(n, s);
-            if s == 0 {
-                energy = self.energy(&x[n..]);
-            }
+            let (q, v) = self.stage.split_at(n);
+            let kinetic = self.dynamics.free_acceleration(q, v, &mut self.a[s]);
+            self.v[s].copy_from_slice(v);
+            energy = if s == 0 { kinetic } else { energy };
             match s {
                 0 | 1 => {
                     self.stage.copy_from_slice(&self.start);
@@ -110,8 +110,7 @@ impl FreeMotion {
             integrate(model, &mut x[..n], d, h);
             return;
         }
-        self.dynamics.refresh(&x[..n], &x[n..]);
-        let energy = self.energy(&x[n..]);
+        let energy = self.dynamics.kinetic_energy(&x[..n], &x[n..]);
         self.stage.copy_from_slice(x);
         for end in [0.5 * h, h] {
             self.transport_rate(model, d, stretch);
@@ -144,27 +143,12 @@ impl FreeMotion {
         }
     }
 
-    /// Writes velocity and acceleration of stage `s`.
-    fn accelerate_at_stage(&mut self, n: usize, s: usize) {
-        let (q, v) = self.stage.split_at(n);
-        self.dynamics.refresh(q, v);
-        self.v[s].copy_from_slice(v);
-        self.dynamics.accelerate(&mut self.scratch, &self.zeros, &[], &mut self.a[s]);
-    }
-
     /// Scales the velocities of `x` to a kinetic energy, if that is finite.
     fn scale_to(&mut self, energy: f64, n: usize, x: &mut [f64]) {
-        self.dynamics.refresh(&x[..n], &x[n..]);
-        let scale = (energy / self.energy(&x[n..])).sqrt();
+        let scale = (energy / self.dynamics.kinetic_energy(&x[..n], &x[n..])).sqrt();
         if scale.is_finite() {
             x[n..].iter_mut().for_each(|v| *v *= scale);
         }
-    }
-
-    /// Returns `½|L·v|²` at the refreshed positions.
-    fn energy(&mut self, v: &[f64]) -> f64 {
-        self.dynamics.mul_l(&mut self.scratch, v, &mut self.sum);
-        0.5 * self.sum.iter().map(|u| u * u).sum::<f64>()
     }
 }
 
