@@ -65,6 +65,9 @@ pub enum Error {
     /// A step failed in one of many forks.
     #[error("fork {fork}, frame {frame}: {source}")]
     Fork { fork: usize, frame: usize, source: Box<Error> },
+    /// A step failed in worlds of a batch; the first of them.
+    #[error("world {world}: {source}{}", others(*.failed, *.count))]
+    Member { world: usize, failed: usize, count: usize, source: Box<Error> },
     /// A file that the binding reads itself.
     #[error("{file}: {source}")]
     File { file: String, source: std::io::Error },
@@ -134,7 +137,7 @@ impl Error {
             Error::Scene(_) | Error::Build(_) | Error::Urdf(_) | Error::Mjcf(_) => "SceneError",
             Error::Snapshot(_) | Error::Archive(_) => "SnapshotError",
             Error::Step(_) => "StepError",
-            Error::Fork { source, .. } => source.class(),
+            Error::Fork { source, .. } | Error::Member { source, .. } => source.class(),
             Error::Name(_) => "UnknownNameError",
             Error::Busy | Error::Within => "BusyError",
             Error::Internal(_) | Error::Broken | Error::Stopped => "InternalError",
@@ -152,7 +155,10 @@ impl From<Error> for PyErr {
         let error = match error {
             Error::Python(error) => return error,
             Error::Fork { fork, frame, source } if matches!(*source, Error::Python(_)) => {
-                return noted(PyErr::from(*source), fork, frame);
+                return noted(PyErr::from(*source), format!("in fork {fork}, frame {frame}"));
+            }
+            Error::Member { world, source, .. } if matches!(*source, Error::Python(_)) => {
+                return noted(PyErr::from(*source), format!("in world {world} of the batch"));
             }
             error => error,
         };
@@ -163,10 +169,15 @@ impl From<Error> for PyErr {
     }
 }
 
-/// Adds a note about the fork to an exception (Python 3.11 and later).
-fn noted(error: PyErr, fork: usize, frame: usize) -> PyErr {
-    Python::attach(|py| _ = error.value(py).call_method1("add_note", (format!("in fork {fork}, frame {frame}"),)));
+/// Adds a note about the place to an exception (Python 3.11 and later).
+fn noted(error: PyErr, place: String) -> PyErr {
+    Python::attach(|py| _ = error.value(py).call_method1("add_note", (place,)));
     error
+}
+
+/// Returns what is said about the other worlds that failed.
+fn others(failed: usize, count: usize) -> String {
+    if failed > 1 { format!(" ({failed} of {count} worlds failed)") } else { String::new() }
 }
 
 /// Returns a class of `tumble._errors`, imported once.

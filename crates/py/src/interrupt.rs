@@ -3,6 +3,7 @@
 
 use crate::errors::{Error, Result, caught};
 use pyo3::prelude::*;
+use rayon::ThreadPool;
 use std::cell::RefCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -66,6 +67,28 @@ pub fn interruptible<T: Send>(py: Python<'_>, work: impl FnOnce(&Stop) -> Result
         let outcome = py.detach(|| joined(worker.join()));
         signal.and(outcome)
     })
+}
+
+/// As [`interruptible`], on a thread of the pool: no thread is started.
+pub fn pooled<T: Send>(py: Python<'_>, pool: &ThreadPool, work: impl FnOnce(&Stop) -> Result<T> + Send) -> Result<T> {
+    if let Some(stop) = around() {
+        return py.detach(|| caught(|| work(&stop)));
+    }
+    let (stop, done, caller) = (Stop::default(), AtomicBool::new(false), thread::current());
+    let mut outcome = None;
+    let signal = pool.in_place_scope(|scope| {
+        let (stop, done, caller, outcome) = (&stop, &done, &caller, &mut outcome);
+        scope.spawn(move |_| *outcome = Some(finish(caught(|| work(stop)), done, caller)));
+        watch(py, done).inspect_err(|_| {
+            stop.stop();
+            py.detach(|| {
+                while !done.load(Ordering::Acquire) {
+                    thread::park_timeout(TURN)
+                }
+            });
+        })
+    });
+    signal.and(outcome.unwrap_or_else(|| Err(Error::Internal("a thread ended by a panic".into()))))
 }
 
 /// As [`interruptible`], for work that owns its data. The exception is returned at once, and the

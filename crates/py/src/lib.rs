@@ -1,6 +1,7 @@
 //! The Python module `tumble._native`: conversion between Python and the crates, and no physics.
 
 mod arrays;
+mod batch;
 mod choices;
 mod errors;
 mod extension;
@@ -18,6 +19,8 @@ use pyo3::prelude::*;
 mod _native {
     use super::*;
 
+    #[pymodule_export]
+    use super::batch::class::Batch;
     #[pymodule_export]
     use super::choices::_choices;
     #[pymodule_export]

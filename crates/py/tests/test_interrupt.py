@@ -80,6 +80,29 @@ def test_a_rollout_of_hours_ends(force, threads):
     assert after < 10.0  # a fiftieth of that on a machine that does nothing else
 
 
+@pytest.mark.parametrize("threads", ["None", "1", "3"])
+def test_the_steps_of_a_batch_end(threads):
+    lines, after = run(f"""
+        batch = tumble.Batch(tumble.World.load("stack"), 4, threads={threads})
+        start = batch.state.copy()
+        batch.step(substeps=3)
+        once, count = batch.state.copy(), threads()
+        soon()
+        try:
+            batch.step(substeps=10_000_000)
+        except KeyboardInterrupt:
+            took = waited()
+            print("interrupted")
+        print(threads() <= count, (batch.state != once).any())
+        batch.reset()
+        print((batch.state == start).all())
+        batch.step(substeps=3)
+        print((batch.state == once).all())
+        print(took)
+    """)
+    assert lines == ["interrupted", "True True", "True", "True"] and after < 10.0
+
+
 def test_a_rollout_within_a_force_ends():
     lines, after = run("""
         class Plans(tumble.Force):

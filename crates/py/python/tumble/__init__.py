@@ -22,6 +22,7 @@ from tumble._extension import Behavior, Force
 from tumble._native import (
     Articulation,
     ArticulationBuilder,
+    Batch,
     Bodies,
     Box,
     Capsule,
@@ -52,6 +53,7 @@ Plane = HalfSpace
 __all__ = [
     "Articulation",
     "ArticulationBuilder",
+    "Batch",
     "Behavior",
     "Bodies",
     "Box",

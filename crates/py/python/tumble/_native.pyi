@@ -1,6 +1,6 @@
 """The compiled part of the package: what it takes and gives. The words about each are in its docstring."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, TypeAlias, final, overload
@@ -23,6 +23,7 @@ __version__: str
 __all__ = [
     "Articulation",
     "ArticulationBuilder",
+    "Batch",
     "Bodies",
     "Box",
     "Capsule",
@@ -1052,6 +1053,141 @@ def show_contacts(world: World, names: list[str], contacts: bytes) -> None:
 
 def read_recording(path: _Path) -> dict[str, Any]:
     """Returns all of a recording, as the arguments of `Recording`."""
+
+@final
+class Batch:
+    """``n`` worlds of one model that are stepped together on all cores, each under controls of its own.
+
+    world: the model; the batch has forks of it and leaves it alone. threads: largest number of
+    threads, by default one for each core; no number changes a bit of any world, and each moves as it
+    would alone. articulations: the articulated bodies that ``controls``, ``q`` and ``v`` are about,
+    by default all, one after the other in the order of ``world.bodies``. configure: called as
+    ``configure(world, i)`` for each world, to change masses, frictions, drives, poses or states; it
+    may not add or remove bodies. What it leaves is what ``reset`` goes back to.
+
+    Arrays have one row for each world. The same array is returned at each access, is read-only, and
+    follows ``step`` and ``reset``; copy what is to be kept. An array costs nothing before its first
+    access.
+    """
+    def __new__(
+        cls,
+        world: World,
+        n: int,
+        *,
+        threads: int | None = None,
+        articulations: Sequence[Articulation | str] | None = None,
+        configure: Callable[[World, int], Any] | None = None,
+    ) -> Batch: ...
+    def step(
+        self,
+        controls: ArrayLike | None = None,
+        substeps: int = 1,
+        *,
+        targets: ArrayLike | None = None,
+        mask: ArrayLike | None = None,
+    ) -> None:
+        """Advances each world by ``substeps`` steps of its ``dt``, with the interpreter released; Ctrl-C
+        stops all of them between two steps.
+
+        controls: generalized forces on the degrees of freedom of the articulations, N·m and N, shape
+        (n, dof), or (dof,) for all worlds; they act in every step until they are set again. None
+        leaves them. targets: of the position drives, rad or m, of the same shapes; numbers for
+        degrees of freedom without such a drive have no effect. mask: which worlds step, booleans of
+        shape (n,); None: all.
+
+        A world that fails raises ``StepError`` with its number, after all others have stepped:
+        ``failed`` says which. It stays as before the step that failed, and ``reset`` serves it as any
+        other.
+        """
+    def reset(
+        self,
+        mask: ArrayLike | None = None,
+        state: ArrayLike | None = None,
+        *,
+        q: ArrayLike | None = None,
+        v: ArrayLike | None = None,
+    ) -> None:
+        """Takes worlds back to the state in which the batch was made, contacts and the forces of the last
+        step excepted.
+
+        mask: which worlds, booleans of shape (n,); None: all. state: states instead, as ``state``; q,
+        v: positions and velocities of the articulations instead, as ``q`` and ``v``; each of them one row
+        or a row for each world, of which those of other worlds are not used. Masses, drives and other
+        constants stay as they are.
+
+        A row that is no state raises ``InvalidValueError`` with the number of its world, which is at its
+        start then.
+        """
+    def set_drives(
+        self,
+        *,
+        target: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        stiffness: ArrayLike | None = None,
+        damping: ArrayLike | None = None,
+        max_force: ArrayLike | None = None,
+    ) -> None:
+        """Sets the drives of all degrees of freedom of the articulations in all worlds; those of which all
+        numbers are 0 or None have none then.
+
+        Arguments as in ``Articulation.set_drive``: one number for all, shape (dof,) or (n, dof). Drives
+        are no part of the state, so ``reset`` leaves them.
+        """
+    @property
+    def worlds(self) -> list[World]:
+        """The worlds: a new list. They are the batch's own, and what is changed in them counts from the
+        next step on. From the first access on, each access to an array reads all worlds.
+        """
+    def world(self, index: int) -> World:
+        """Returns the world of a number; negative ones count from the end."""
+    def __len__(self) -> int: ...
+    @property
+    def dof(self) -> int:
+        """Number of columns of ``controls`` and ``v``."""
+    @property
+    def threads(self) -> int:
+        """Number of threads that step the worlds."""
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Which worlds failed in the last ``step`` or ``reset``: a new array of booleans, shape (n,)."""
+    @property
+    def time(self) -> _Floats:
+        """Simulated times, s, shape (n,)."""
+    @property
+    def state(self) -> _Floats:
+        """The states, as ``World.state``, shape (n, len(state))."""
+    @property
+    def q(self) -> _Floats:
+        """Positions of the articulations, as ``Articulation.q``, one after the other: shape (n, nq)."""
+    @property
+    def v(self) -> _Floats:
+        """Velocities of the articulations, as ``Articulation.qd``, one after the other: shape (n, dof)."""
+    @property
+    def positions(self) -> _Floats:
+        """Positions of all bodies, as ``World.positions``: shape (n, bodies, 3), m."""
+    @property
+    def orientations(self) -> _Floats:
+        """Orientations of all bodies, quaternions (x, y, z, w): shape (n, bodies, 4)."""
+    @property
+    def velocities(self) -> _Floats:
+        """Velocities of all bodies, as ``World.velocities``: shape (n, bodies, 3), m/s."""
+    @property
+    def angular_velocities(self) -> _Floats:
+        """Angular velocities of all bodies, world axes: shape (n, bodies, 3), rad/s."""
+    @property
+    def contact_forces(self) -> _Floats:
+        """Sum of the contact forces on each body, ``force`` of ``World.contacts``: shape (n, bodies, 3),
+        N, world axes.
+        """
+    @property
+    def link_contact_forces(self) -> _Floats:
+        """Sum of the contact forces on each link of the articulations, in the order of their
+        ``link_names``: torque about the world's origin, N·m, then force, N; shape (n, links, 6), world
+        axes.
+        """
+    @property
+    def contact_counts(self) -> _Floats:
+        """Number of contacts of the last step: shape (n,), of whole numbers as floats."""
 
 @final
 class World:

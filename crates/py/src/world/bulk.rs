@@ -10,7 +10,7 @@ use tumble::collide::{Pose, Vec3};
 use tumble::dynamics::{BodyView, ObjectId, RigidBody as Rigid};
 
 /// A quantity of all bodies.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Bulk {
     Positions,
     Orientations,
@@ -28,7 +28,8 @@ impl Bulk {
         }
     }
 
-    fn width(self) -> usize {
+    /// Returns how many numbers a body has.
+    pub fn width(self) -> usize {
         if self == Bulk::Orientations { 4 } else { 3 }
     }
 

@@ -1,6 +1,7 @@
 //! The class `World`.
 
 use crate::arrays::convert::{Numbers, numbers, path, pose, vec3, vec3_or, vector, whole_number};
+use crate::batch::crew;
 use crate::choices::meaning;
 use crate::errors::{Error, Result};
 use crate::extension::callbacks::{Extensions, Reduced};
@@ -686,9 +687,7 @@ impl World {
         #[pyo3(from_py_with = whole_number)] every: usize,
         #[pyo3(from_py_with = whole_number)] threads: Option<usize>,
     ) -> Result<Bound<'py, PyArray3<f64>>> {
-        if threads == Some(0) || threads.is_some_and(|n| n > 1024) {
-            return Err(Error::value(format!("threads is {}; it must be 1 to 1024", threads.unwrap_or(0))));
-        }
+        let threads = crew::checked(threads)?;
         let asked = articulations
             .map(|all| all.iter().map(|one| Ok(own_place(&self.shared, one)?.id)).collect::<Result<Vec<_>>>())
             .transpose()?;

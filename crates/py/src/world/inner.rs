@@ -73,6 +73,17 @@ impl Inner {
         self.extension.is_empty() && self.shown.alive(py)
     }
 
+    /// Sets the generalized forces on articulated bodies: `row` has those of one after the other.
+    pub fn set_efforts(&mut self, driven: impl IntoIterator<Item = (ObjectId, usize)>, mut row: &[f64]) {
+        for (id, dof) in driven {
+            let (own, rest) = row.split_at(dof);
+            let efforts = self.efforts.entry(id).or_default();
+            efforts.clear();
+            efforts.extend_from_slice(own);
+            row = rest;
+        }
+    }
+
     /// Steps by one frame. On an error the world is as it was before, and has none of the frame's forces.
     pub fn step(&mut self) -> Result<()> {
         self.take_raised()?; // by a `fork`

@@ -1,13 +1,13 @@
 //! Rollouts: many forks of one world, each with its own controls, on all cores.
 
 use crate::arrays::convert::{Numbers, room, shown};
-use crate::errors::{Error, Result, caught};
+use crate::batch::crew::each;
+use crate::errors::{Error, Result};
 use crate::interrupt::Stop;
 use crate::objects::place::body_ids;
 use crate::pool;
 use crate::world::inner::Inner;
 use pyo3::exceptions::PyRecursionError;
-use rayon::prelude::*;
 use std::cell::Cell;
 use std::sync::Mutex;
 use tumble::dynamics::ObjectId;
@@ -135,14 +135,12 @@ impl Plan {
         match world.extension.is_empty() {
             true => {
                 let template = Mutex::new(world);
-                let each = |(fork, out): (usize, &mut [f64])| {
-                    stop.check()?;
+                let mut chunks: Vec<&mut [f64]> = out.chunks_mut(kept).collect();
+                let outcomes = each(&pool, stop, &mut chunks, |fork, out| {
                     let own = template.lock().map_err(|_| Error::Broken)?.fork();
-                    caught(|| self.fork(own, fork, out, stop))
-                };
-                pool.install(|| out.par_chunks_mut(kept).enumerate().map(each).collect::<Vec<Result<()>>>())
-                    .into_iter()
-                    .collect::<Result<()>>()?;
+                    self.fork(own, fork, out, stop)
+                });
+                outcomes.into_iter().collect::<Result<()>>()?;
             }
             // A fork runs Python code, which may wait for threads of the pool, so no thread of the
             // pool may wait for it.
@@ -150,15 +148,13 @@ impl Plan {
                 let few = 4 * pool.current_num_threads();
                 for (first, out) in out.chunks_mut(few * kept).enumerate().map(|(k, out)| (k * few, out)) {
                     stop.check()?;
-                    let own: Vec<Mutex<Option<Inner>>> =
-                        (0..out.len() / kept).map(|_| Mutex::new(Some(world.fork()))).collect();
-                    let each = |(k, out): (usize, &mut [f64])| {
-                        let own = own[k].lock().map_err(|_| Error::Broken)?.take().ok_or(Error::Broken)?;
-                        caught(|| self.fork(own, first + k, out, stop))
-                    };
-                    pool.install(|| out.par_chunks_mut(kept).enumerate().map(each).collect::<Vec<Result<()>>>())
-                        .into_iter()
-                        .collect::<Result<()>>()?;
+                    let fork = |out| (Some(world.fork()), out);
+                    let mut forks: Vec<(Option<Inner>, &mut [f64])> = out.chunks_mut(kept).map(fork).collect();
+                    let outcomes = each(&pool, stop, &mut forks, |k, (own, out)| {
+                        let own = own.take().ok_or(Error::Broken)?;
+                        self.fork(own, first + k, out, stop)
+                    });
+                    outcomes.into_iter().collect::<Result<()>>()?;
                 }
             }
         }
@@ -168,7 +164,7 @@ impl Plan {
     fn fork(&self, own: Inner, fork: usize, out: &mut [f64], stop: &Stop) -> Result<()> {
         // A waiting thread may do another fork's work meanwhile.
         let before = DEPTH.replace(self.depth);
-        let outcome = stop.within(|| self.go(own, fork, out, stop));
+        let outcome = self.go(own, fork, out, stop);
         DEPTH.set(before);
         outcome
     }
@@ -181,12 +177,7 @@ impl Plan {
         let controls = &self.controls[fork * self.frames * width..(fork + 1) * self.frames * width];
         for frame in 0..self.frames {
             stop.check()?;
-            let mut row = &controls[frame * width..(frame + 1) * width];
-            for &(id, dof) in &self.driven {
-                let (own_row, rest) = row.split_at(dof);
-                own.efforts.insert(id, own_row.to_vec());
-                row = rest;
-            }
+            own.set_efforts(self.driven.iter().copied(), &controls[frame * width..(frame + 1) * width]);
             own.step().map_err(|source| Error::Fork { fork, frame, source: Box::new(source) })?;
             if (frame + 1) % self.every == 0 {
                 let at = ((frame + 1) / self.every - 1) * size;

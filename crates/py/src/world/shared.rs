@@ -73,6 +73,21 @@ impl Shared {
         apart(py, &mut held, |py, inner| leave(py, inner, call))
     }
 
+    /// Changes the world on any thread, without the interpreter. Arrays over the world's memory show
+    /// the state before until [`show`](Self::show).
+    pub fn unseen<T>(&self, call: impl FnOnce(&mut Inner) -> Result<T>) -> Result<T> {
+        let mut held = self.hold()?;
+        held.world.state_memory().freeze();
+        guarded(&mut held, call)
+    }
+
+    /// Lets arrays over the world's memory show its state again, if no other call works on it.
+    pub fn show(&self, _py: Python<'_>) {
+        if let Ok(mut held) = self.hold() {
+            held.world.state_memory().thaw();
+        }
+    }
+
     /// As `work`, in parts of the given length until one returns true. The world stays locked
     /// throughout, and Ctrl-C is checked between two parts.
     pub fn work_in_parts(

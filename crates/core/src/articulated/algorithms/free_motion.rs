@@ -158,9 +158,10 @@ fn step(model: &Model, x: &mut [f64], v: &[f64], rate: &[f64], h: f64) {
     x[n..].iter_mut().zip(rate).for_each(|(v, a)| *v += h * a);
 }
 
-/// Writes `Σ weight·k`.
+/// Writes `Σ weight·k`. A stage of weight 0 is not read: it may be one of an earlier step, which
+/// failed with numbers that are not finite.
 fn combine(k: &[Vec<f64>; 4], weight: [f64; 4], sum: &mut [f64]) {
     for (i, sum) in sum.iter_mut().enumerate() {
-        *sum = k.iter().zip(weight).map(|(k, w)| w * k[i]).sum();
+        *sum = k.iter().zip(weight).filter(|(_, w)| *w != 0.0).map(|(k, w)| w * k[i]).sum();
     }
 }
