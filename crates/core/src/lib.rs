@@ -72,5 +72,5 @@ pub use world::view::{Mode, ObjectId, Status, WorldView};
 pub use world::{
     BodyDistance, BodyView, ContactPoint, Event, EventKind, Overlap, PickForce, PointDepth, QueryFilter, Ray,
     RayCastHit, Replica, ReplicaError, ShapeCastHit, ShapeOverlap, SnapshotError, StateMemory, StateMemoryHold,
-    StepError, World, WorldError, WorldState,
+    StepError, WorkingMemory, World, WorldError, WorldState,
 };

@@ -216,7 +216,7 @@ def test_wrong_arguments_are_refused(arm_world, call, words):
         ({"n": 2, "threads": 0}, "threads is 0"),
         ({"n": 2, "articulations": ["ball"]}, "expected articulations"),
         ({"n": 2, "articulations": ["leg"]}, "no body named 'leg'"),
-        ({"n": 2, "configure": lambda world, k: world.remove("ball")}, "bodies were added .* or removed"),
+        ({"n": 2, "configure": lambda world, k: world.remove("ball")}, "bodies or joints were added .* or removed"),
     ],
 )
 def test_wrong_batches_are_refused(arm_world, arguments, words):
@@ -238,7 +238,7 @@ def test_a_changed_world_counts_at_once(arm_world):
     batch.step()
     assert (view == batch.state[1]).all()
     world.remove("ball")
-    with pytest.raises(tumble.InvalidValueError, match="world 1: bodies were added"):
+    with pytest.raises(tumble.InvalidValueError, match="world 1: bodies or joints were added"):
         batch.step()
 
 

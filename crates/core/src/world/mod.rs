@@ -18,6 +18,7 @@ mod snapshot;
 mod state;
 mod state_memory;
 pub(crate) mod view;
+mod working_memory;
 
 pub(crate) use self::core::Coordinates;
 pub use self::core::{ContactPoint, Core, StepError};
@@ -31,6 +32,7 @@ pub use snapshot::SnapshotError;
 pub(crate) use state::ObjectState;
 pub use state::WorldState;
 pub use state_memory::{StateMemory, StateMemoryHold};
+pub use working_memory::WorkingMemory;
 
 use crate::contact::detect::Owner;
 use crate::object::part_state::{PartState, StateRange, StateSizes};

@@ -17,6 +17,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyList;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
+use tumble::dynamics::WorkingMemory;
 
 /// Largest number of worlds.
 const MOST_WORLDS: usize = 1 << 20;
@@ -46,6 +47,8 @@ pub struct Batch {
     starts: Vec<Start>,
     /// Whether Python was given a world, and may change it by itself.
     given: AtomicBool,
+    /// As many as worlds are stepped at once.
+    memory: Mutex<Vec<WorkingMemory>>,
     now: Mutex<Now>,
 }
 
@@ -102,7 +105,7 @@ impl Batch {
     fn run<'t>(&self, py: Python<'_>, selected: &[bool], task: impl Fn(usize) -> Task<'t>) -> Result<()> {
         let mut now = self.now()?;
         let (now, count) = (&mut *now, self.shared.len());
-        let (fields, record) = (now.fields(), now.record());
+        let (fields, record, memory) = (now.fields(), now.record(), &self.memory);
         now.records.resize(count * record, 0.0);
         let mut records = &mut now.records[..];
         let mut members = Vec::with_capacity(count);
@@ -110,7 +113,7 @@ impl Batch {
             let (own, rest) = std::mem::take(&mut records).split_at_mut(record);
             records = rest;
             if selected[number] {
-                members.push(Member { number, shared, task: task(number), record: own, outcome: Ok(()) });
+                members.push(Member { number, shared, task: task(number), memory, record: own, outcome: Ok(()) });
             }
         }
         let ran = self.crew.run(py, &mut members, |_, member, pause| Ok(member.advance(&self.layout, &fields, pause)));
@@ -210,7 +213,7 @@ impl Batch {
             shared[..different].iter().map(|one| one.read(|inner| Ok(Start::of(inner)))).collect::<Result<Vec<_>>>()?;
         let now = Now { tables: Vec::new(), records: Vec::new(), failed: vec![false; n], stale: false };
         let given = AtomicBool::new(configure.is_some());
-        Ok(Batch { worlds, shared, layout, crew, starts, given, now: Mutex::new(now) })
+        Ok(Batch { worlds, shared, layout, crew, starts, given, memory: Mutex::default(), now: Mutex::new(now) })
     }
 
     /// Advances each world by ``substeps`` steps of its ``dt``, with the interpreter released; Ctrl-C

@@ -29,6 +29,8 @@ pub struct Driven {
 pub struct Layout {
     /// Length of the state.
     pub state: usize,
+    /// All objects except for forces written in Python.
+    objects: Vec<ObjectId>,
     /// All bodies.
     pub bodies: Vec<ObjectId>,
     /// The articulated bodies of `q`, `v` and controls.
@@ -48,7 +50,8 @@ impl Layout {
             Ok(Driven { id, x, positions: robot.positions(), dof: robot.dof(), links: robot.model.frames().len() })
         });
         let driven = driven.collect::<Result<Vec<_>>>()?;
-        Ok(Layout { state: inner.world.state().len(), bodies, driven })
+        let objects = inner.world.ids().iter().copied().filter(|id| !inner.forces().contains(id)).collect();
+        Ok(Layout { state: inner.world.state().len(), objects, bodies, driven })
     }
 
     /// Returns the degrees of freedom of all driven bodies.
@@ -63,9 +66,11 @@ impl Layout {
 
     /// Checks that a world still has the bodies that the batch was made with.
     pub fn check(&self, inner: &Inner) -> Result<()> {
-        match inner.world.state().len() == self.state && self.driven.iter().all(|d| inner.robots.contains_key(&d.id)) {
+        let own = inner.world.ids();
+        let own = own.iter().filter(|id| !inner.forces().contains(id));
+        match own.eq(&self.objects) {
             true => Ok(()),
-            false => Err(Error::value("bodies were added to this world of a batch, or removed from it")),
+            false => Err(Error::value("bodies or joints were added to this world of a batch, or removed from it")),
         }
     }
 }

@@ -7,7 +7,8 @@ use crate::objects::robot::settled;
 use crate::world::inner::Inner;
 use crate::world::shared::Shared;
 use std::collections::BTreeMap;
-use tumble::dynamics::{ArticulatedBody, DofSettings, Drive, ObjectId, WorldState};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use tumble::dynamics::{ArticulatedBody, DofSettings, Drive, ObjectId, WorkingMemory, WorldState};
 
 /// What a reset goes back to: the state, and the generalized forces that act in every step.
 pub struct Start {
@@ -38,6 +39,8 @@ pub struct Member<'a> {
     pub number: usize,
     pub shared: &'a Shared,
     pub task: Task<'a>,
+    /// Working memory that no world uses at the moment.
+    pub memory: &'a Mutex<Vec<WorkingMemory>>,
     /// Where its fields are written once it is done.
     pub record: &'a mut [f64],
     pub outcome: Result<()>,
@@ -46,10 +49,14 @@ pub struct Member<'a> {
 impl Member<'_> {
     /// Works until it is done, which returns true, or until the pause. An error is its outcome.
     pub fn advance(&mut self, layout: &Layout, fields: &[Field], pause: &Pause<'_>) -> bool {
-        let Member { shared, task, record, .. } = self;
+        let Member { shared, task, record, memory, .. } = self;
         let worked = shared.unseen(|inner| {
             layout.check(inner)?;
+            let mut lent = locked(memory).pop().unwrap_or_default();
+            inner.world.swap_working_memory(&mut lent);
             let outcome = task.run(layout, inner, pause);
+            inner.world.swap_working_memory(&mut lent);
+            locked(memory).push(lent);
             if !matches!(outcome, Ok(false)) {
                 write(fields, layout, inner, record)?;
             }
@@ -63,6 +70,10 @@ impl Member<'_> {
             }
         }
     }
+}
+
+fn locked(memory: &Mutex<Vec<WorkingMemory>>) -> MutexGuard<'_, Vec<WorkingMemory>> {
+    memory.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Writes the fields of a world into its record.
@@ -96,7 +107,7 @@ impl Task<'_> {
             }
             Task::Reset { start, state, q, v } => {
                 if !inner.world.roll_back(&start.state) {
-                    return Err(Error::value("bodies were added to this world of a batch, or removed from it"));
+                    return Err(Error::value("forces were added to this world of a batch, or removed from it"));
                 }
                 inner.efforts.clone_from(&start.efforts);
                 if let Some(state) = state {
