@@ -1,0 +1,144 @@
+"""What an environment is, and the worlds that it runs in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, TypeAlias
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+import tumble
+
+Floats: TypeAlias = NDArray[np.float64]
+Flags: TypeAlias = NDArray[np.bool_]
+Infos: TypeAlias = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class State:
+    """Positions ``q`` and velocities ``v`` of all worlds at one time, one row each, and the batch that they are of."""
+
+    q: Floats
+    v: Floats
+    batch: tumble.Batch
+
+    @staticmethod
+    def of(batch: tumble.Batch) -> State:
+        """Returns the present."""
+        return State(batch.q.copy(), batch.v.copy(), batch)
+
+
+class Task:
+    """An environment: a model, and observation, reward and end of an episode as functions of arrays with one row for each world.
+
+    A subclass is a dataclass whose fields are its parameters, and sets the class variables. Motors are ``(joint, gear)``: an action in
+    ``-reach`` to ``reach`` for each, the torque is gear times action.
+    """
+
+    MODEL: ClassVar[str]
+    """File of the model: in the folder ``models``, or anything that ``World.load`` opens."""
+    KEYFRAME: ClassVar[str | None] = None
+    """Keyframe of the model in which it starts."""
+    MOTORS: ClassVar[Sequence[tuple[str, float]]] = ()
+    REACH: ClassVar[float] = 1.0
+    FRAME_SKIP: ClassVar[int] = 1
+    """Steps of the world for each step of the environment."""
+    OBSERVATION: ClassVar[int]
+    """Length of an observation."""
+
+    def world(self) -> tumble.World:
+        """Returns the world of the model."""
+        shipped = Path(__file__).parent / "models" / self.MODEL
+        return tumble.World.load(shipped if shipped.is_file() else self.MODEL, keyframe=self.KEYFRAME)
+
+    def action_space(self) -> spaces.Space[Any]:
+        """Returns the space of one world's actions."""
+        return spaces.Box(-self.REACH, self.REACH, (len(self.MOTORS),), np.float32)
+
+    def observation_space(self) -> spaces.Box:
+        """Returns the space of one world's observations."""
+        return spaces.Box(-np.inf, np.inf, (self.OBSERVATION,), np.float64)
+
+    def controls(self, actions: NDArray[Any], columns: NDArray[np.int64], dof: int) -> Floats:
+        """Returns the generalized forces of actions. columns: the degrees of freedom of the motors."""
+        if actions.shape[1:] != (len(self.MOTORS),):
+            raise tumble.InvalidValueError(f"action: expected shape ({len(self.MOTORS)},), got {actions.shape[1:]}")
+        controls = np.zeros((len(actions), dof))
+        controls[:, columns] = np.clip(actions, -self.REACH, self.REACH) * [gear for _, gear in self.MOTORS]
+        return controls
+
+    def start(self, rng: np.random.Generator, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Returns positions and velocities at the start of an episode in one world. q, v: those of the model."""
+        raise NotImplementedError
+
+    def observe(self, state: State) -> Floats:
+        """Returns the observations, shape (n, OBSERVATION)."""
+        raise NotImplementedError
+
+    def reward(self, before: State, state: State, actions: NDArray[Any], dt: float) -> tuple[Floats, Infos]:
+        """Returns the rewards of a step, shape (n,), and what the info says of it. dt: length of a step of the environment, s."""
+        raise NotImplementedError
+
+    def terminated(self, state: State) -> Flags:
+        """Returns whether the episodes are over, shape (n,)."""
+        return np.zeros(len(state.q), np.bool_)
+
+    def reset_info(self, state: State) -> Infos:
+        """Returns what the info says of a start."""
+        return {}
+
+    def camera(self, q: Floats) -> tumble.Camera | None:
+        """Returns the camera of a picture of one world; None for that of the model."""
+        return None
+
+
+class Runs:
+    """The worlds of a task, and what is common to ``Env`` and ``VectorEnv``."""
+
+    def __init__(self, task: Task, count: int, threads: int | None) -> None:
+        self.task = task
+        world = task.world()
+        self.batch = tumble.Batch(world, count, threads=threads)
+        self.dt = world.dt * task.FRAME_SKIP
+        self.q, self.v = self.batch.q[0].copy(), self.batch.v[0].copy()
+        names = [name for body in world.bodies if isinstance(body, tumble.Articulation) for name in _columns(body)]
+        self.columns = np.array([names.index(joint) for joint, _ in task.MOTORS], np.int64)
+
+    def reset(self, mask: Flags, rngs: Sequence[np.random.Generator]) -> Infos:
+        """Starts new episodes in the worlds of a mask. Returns the infos of all worlds."""
+        q, v = (np.tile(row, (len(mask), 1)) for row in (self.q, self.v))
+        for k in np.flatnonzero(mask):
+            q[k], v[k] = self.task.start(rngs[k], self.q.copy(), self.v.copy())
+        self.batch.reset(mask, q=q, v=v)
+        return self.task.reset_info(State.of(self.batch))
+
+    def step(self, actions: NDArray[Any], mask: Flags) -> tuple[Floats, Flags, Infos]:
+        """Steps the worlds of a mask. Returns rewards, ends and infos, which count for those worlds. A step that fails ends the episode,
+        and ``failed`` in the info says so."""
+        before, failed = State.of(self.batch), np.zeros(len(mask), np.bool_)
+        controls = self.task.controls(actions, self.columns, self.batch.dof)
+        try:
+            self.batch.step(controls, self.task.FRAME_SKIP, mask=mask)
+        except tumble.StepError:
+            failed = self.batch.failed
+        state = State.of(self.batch)
+        reward, info = self.task.reward(before, state, actions.astype(np.float64), self.dt)
+        if failed.any():
+            info["failed"] = failed
+        return reward, self.task.terminated(state) | failed, info
+
+    def observe(self) -> Floats:
+        """Returns the observations of all worlds."""
+        return self.task.observe(State.of(self.batch))
+
+
+def _columns(body: tumble.Articulation) -> list[str]:
+    """The joint of each degree of freedom."""
+    spare = body.dof - len(body.joint_names)  # a floating root has six, of one joint
+    if spare == 5:
+        return [body.joint_names[0]] * 6 + body.joint_names[1:]
+    return body.joint_names
