@@ -36,7 +36,7 @@ goldens:
 
 references:
 	python3 -m venv target/python
-	target/python/bin/pip install --quiet pin example-robot-data mujoco numpy scipy trimesh rtree
+	target/python/bin/pip install --quiet pin example-robot-data mujoco imageio numpy scipy trimesh rtree
 
 lint:
 	@scripts/lint.sh

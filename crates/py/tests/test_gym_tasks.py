@@ -134,7 +134,8 @@ def test_ant():
 @pytest.mark.parametrize("name", NAMES)
 def test_beside_gymnasium_s_own_environment(name):
     """Masses, and observation, reward and end at the same state, which gymnasium's environment is put into."""
-    pytest.importorskip("mujoco", reason="SKIPPED: mujoco is not installed; `make references` installs it")
+    for package in ("mujoco", "imageio"):  # gymnasium's environments need both
+        pytest.importorskip(package, reason=f"SKIPPED: {package} is not installed; `make references` installs it")
     own = tumble_gym.Env(name)
     theirs = gymnasium.make(f"{name}-v5").unwrapped
     body = next(b for b in own.world.bodies if isinstance(b, tumble.Articulation))
