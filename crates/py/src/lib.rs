@@ -53,6 +53,8 @@ mod _native {
     use super::world::pickling::{_unpickle_shape, _unpickle_world};
     #[pymodule_export]
     use super::world::report::StepReport;
+    #[pymodule_export]
+    use super::world::simulate::simulate;
 
     /// Adds everything that is not a class or a function.
     #[pymodule_init]

@@ -43,6 +43,7 @@ from tumble._native import (
     View,
     World,
     __version__,
+    simulate,
 )
 from tumble._pictures import Camera, save_png
 from tumble._recordings import Recording, read, replay
@@ -99,4 +100,5 @@ __all__ = [
     "read",
     "replay",
     "save_png",
+    "simulate",
 ]

@@ -46,6 +46,7 @@ __all__ = [
     "__version__",
     "read_recording",
     "show_contacts",
+    "simulate",
     "_panic",
     "_unpickle_articulation",
     "_unpickle_built_articulation",
@@ -1535,6 +1536,11 @@ class World:
 
         Forces and behaviors are copied by their own ``fork``.
         """
+    def model(self) -> bytes:
+        """Returns the world as bytes for ``simulate``: shapes, masses, settings, drives and its present
+        state. Forces and behaviors in Python are no part of them: such a world raises
+        ``InvalidValueError`` and is pickled instead.
+        """
     def __copy__(self) -> World: ...
     def __deepcopy__(self, _memo: Any) -> World: ...
     def rollout(
@@ -1748,6 +1754,22 @@ class World:
 
         Otherwise as ``plot_energy``.
         """
+
+def simulate(
+    model: bytes, snapshot: bytes | None, controls: ArrayLike, every: int = 1
+) -> dict[str, NDArray[Any]]:
+    """Simulates a world that is given as bytes: a pure function of its arguments, for any engine that
+    has a ``map``. Nothing is kept between two calls, and arguments and results pickle.
+
+    model: ``World.model()``. snapshot: where it starts, ``World.save()`` of a world of that model;
+    None: the model's own state. controls: shape (steps, dof), as those of one fork in
+    ``World.rollout``. every: interval in steps at which the results are kept.
+
+    Returns a dict of arrays with one row for each kept step: ``time``, ``state``, ``q``, ``v``,
+    ``positions``, ``orientations``, ``velocities``, ``angular_velocities``, ``contact_counts``, each
+    as in ``Batch``, and ``snapshot``, the bytes of ``World.save()`` at the end, uint8, with which
+    the next call goes on.
+    """
 
 def _panic(world: World, while_: str) -> None:
     """Panics within a call on a world that is ``"read"``, ``"changed"`` or ``"stepped"``."""

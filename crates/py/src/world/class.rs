@@ -638,6 +638,13 @@ impl World {
         self.shared.write(py, |inner| snapshot::read(inner, &snapshot))
     }
 
+    /// Returns the world as bytes for ``simulate``: shapes, masses, settings, drives and its present
+    /// state. Forces and behaviors in Python are no part of them: such a world raises
+    /// ``InvalidValueError`` and is pickled instead.
+    fn model<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(py, &self.shared.read(pickling::model)?))
+    }
+
     /// Returns an independent copy with the same state and the same future.
     ///
     /// Forces and behaviors are copied by their own ``fork``.

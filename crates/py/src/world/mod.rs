@@ -14,4 +14,5 @@ pub mod query;
 pub mod report;
 pub mod rollout;
 pub mod shared;
+pub mod simulate;
 pub mod snapshot;

@@ -75,6 +75,14 @@ pub fn write(inner: &Inner) -> Result<Vec<u8>> {
     Ok(seal(WORLD, &record)?)
 }
 
+/// The bytes of a world that has no forces and behaviors.
+pub fn model(inner: &Inner) -> Result<Vec<u8>> {
+    match inner.extension.is_empty() {
+        true => write(inner),
+        false => Err(Error::value("forces and behaviors in Python are no part of a model; pickle the world instead")),
+    }
+}
+
 /// The world of such bytes; its forces have no Python object yet.
 pub fn read(bytes: &[u8]) -> Result<Inner> {
     let record: Record = open(WORLD, bytes)?;
