@@ -12,12 +12,13 @@ import pytest
 ROOT = Path(__file__).resolve().parents[3]
 SHORT = {script for script in (ROOT / "examples").glob("*.py") if len(script.read_text().splitlines()) < 25}  # test_programs.py runs those
 EXAMPLES = sorted({*(ROOT / "examples").glob("*.py")} - SHORT)
-NEEDS = {"cart_pole": "gymnasium"}
+NEEDS = {"cart_pole": "gymnasium", "gym_training": "gymnasium"}
 WORDS = {  # what must stand in the output, beside what each script asserts itself
     "arm_dynamics": "a batch of accelerations: (1000, 6)",
     "bouncing_ball": "off the closed form",
     "boids": "10 s: order 1.0",
     "cart_pole": "episode 2: 500 steps upright",
+    "gym_training": "returns of 500 to 500 in new episodes",
     "pendulum_energy": "period by theory            2.152875 s",
     "rollout_control": "touched: False",
     "sphere_tree": "level 2: 64 balls",
@@ -49,6 +50,13 @@ def test_an_example_runs(script, tmp_path):
             pytest.skip("SKIPPED: no graphics adapter")
     said = run([script], tmp_path)
     assert WORDS.get(script.stem, "") in said and said
+
+
+def test_a_hopper_learns_to_stay_up(tmp_path):
+    pytest.importorskip("gymnasium", reason="SKIPPED: gymnasium is not installed")
+    first, *_, last = run([ROOT / "examples" / "gym_training.py", "Hopper", "6", "200"], tmp_path).splitlines()
+    untrained, least = float(first.split()[-1]), float(last.split("returns of ")[1].split()[0])
+    assert untrained < 70 and least > 2 * untrained
 
 
 def test_the_notebook_runs(tmp_path):

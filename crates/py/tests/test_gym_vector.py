@@ -98,6 +98,8 @@ def test_wrong_arguments_are_refused():
         env.step(np.full((2, 3), np.nan))
     with pytest.raises(ValueError, match="rgb_array"):
         tumble_gym.VectorEnv("Hopper", 2, render_mode="human")
+    with pytest.raises(KeyError, match="no task named 'Dragon'"):
+        tumble_gym.Env("Dragon")
 
 
 @dataclass

@@ -9,7 +9,7 @@ import pytest
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 PROGRAMS = (
-    "falling_stack double_pendulum four_bar arm_pd quadruped random_search domain_randomization record_and_replay gym_training save_restore "
+    "falling_stack double_pendulum four_bar arm_pd quadruped random_search domain_randomization record_and_replay save_restore "
     "heavy_on_light linked_rings"
 ).split()
 G = 9.81
@@ -105,13 +105,6 @@ def test_a_throw_is_recorded_and_gone_on_with(run):
     assert names["error"] < 1e-12 and names["same"]
     ball, turning = 0.5 * (3**2 + 5**2), 0.5 * 0.4 * 0.1**2 * 9**2
     assert names["energies"] == pytest.approx([ball + turning] * 61, rel=1e-12)
-
-
-def test_training_balances_the_pole(run):
-    pytest.importorskip("gymnasium", reason="SKIPPED: gymnasium is not installed")
-    names = run("gym_training")
-    assert names["history"][0] < 50 and names["history"][-1] == 500
-    assert np.mean([names["episode"](names["best"], seed) for seed in range(200, 210)]) > 450
 
 
 def test_a_snapshot_has_one_future(run, capsys):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,7 +20,10 @@ from tumble.gym.task import Flags, Floats, Infos, Runs, Task
 def _made(task: Task | type[Task] | str, parameters: dict[str, Any]) -> Task:
     """The task itself, or of a name or a class with parameters."""
     if isinstance(task, str):
-        task = getattr(tumble.gym, f"{task}Task")
+        found: type[Task] = getattr(importlib.import_module("tumble.gym"), f"{task}Task", Task)
+        if found is Task:
+            raise tumble.UnknownNameError(f"tumble.gym has no task named {task!r}")
+        task = found
     return task if isinstance(task, Task) else task(**parameters)
 
 
@@ -70,12 +74,13 @@ class Env(gymnasium.Env[NDArray[Any], Any]):
         reward, terminated, info = self.runs.step(np.asarray(action)[None], np.ones(1, np.bool_))
         return self._observation(), float(reward[0]), bool(terminated[0]), False, _row(info)
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """Returns an image, shape (400, 600, 3), if ``render_mode`` is ``"rgb_array"``."""
         return None if self.render_mode is None else _picture(self.task, self.world, self.runs.batch.q[0])
 
     def _observation(self) -> NDArray[Any]:
-        return self.runs.observe()[0].astype(self.observation_space.dtype)
+        observation: NDArray[Any] = self.runs.observe()[0].astype(self.observation_space.dtype)
+        return observation
 
 
 def _row(infos: Infos) -> dict[str, Any]:
@@ -141,7 +146,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[A
         actions = np.asarray(actions)
         if len(actions) != self.num_envs:
             raise tumble.InvalidValueError(f"actions: expected {self.num_envs} rows, got {len(actions)}")
-        stepped, infos = ~self._over, {}
+        infos: dict[str, Any] = {}
+        stepped = ~self._over
         if not stepped.all():
             if self.autoreset_mode == AutoresetMode.DISABLED:
                 raise tumble.InvalidValueError("episodes are over; start new ones by reset(options={'reset_mask': mask})")
@@ -160,7 +166,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[A
             _add(infos, info, stepped)
         return self._observations(), reward, terminated, truncated, infos
 
-    def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # type: ignore[override]
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """Returns an image of each world, shape (400, 600, 3), if ``render_mode`` is ``"rgb_array"``."""
         if self.render_mode is None:
             return None

@@ -111,7 +111,7 @@ class Runs:
     def reset(self, mask: Flags, rngs: Sequence[np.random.Generator]) -> Infos:
         """Starts new episodes in the worlds of a mask. Returns the infos of all worlds."""
         q, v = (np.tile(row, (len(mask), 1)) for row in (self.q, self.v))
-        for k in np.flatnonzero(mask):
+        for k in np.flatnonzero(mask).tolist():
             q[k], v[k] = self.task.start(rngs[k], self.q.copy(), self.v.copy())
         self.batch.reset(mask, q=q, v=v)
         return self.task.reset_info(State.of(self.batch))
