@@ -1,6 +1,6 @@
 # Short names for the scripts; each can be run by itself where there is no make.
 
-.PHONY: help demo test test-slow wheel cave-trial goldens references lint bench clean
+.PHONY: help demo test test-slow wheel cave-trial goldens references lint bench bench-robots clean
 
 help:
 	@echo "make demo       install what is missing, run the billiards scene, leave a recording and a picture in out/, run an example in Python"
@@ -12,6 +12,7 @@ help:
 	@echo "make references installs Pinocchio, MuJoCo and real robots into target/python; tests that compare with them then run"
 	@echo "make lint       format, clippy, rustdoc, ruff and mypy; warnings are errors"
 	@echo "make bench      step times beside Rapier, and articulated bodies; five minutes (benches/peers, a workspace of its own: it has more)"
+	@echo "make bench-robots robots beside MuJoCo, one world and batches, in Python; minutes"
 	@echo "make clean      remove everything built"
 
 demo:
@@ -44,6 +45,11 @@ lint:
 bench:
 	@scripts/setup.sh
 	cargo bench --locked --manifest-path benches/peers/Cargo.toml --bench piles --bench articulated
+
+bench-robots:
+	@[ -x target/python/bin/python ] || $(MAKE) references
+	@scripts/test_python.sh crates/py/tests/test_package.py
+	target/py-tests/bin/python benches/python/robots.py
 
 clean:
 	cargo clean

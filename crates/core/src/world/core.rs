@@ -112,6 +112,8 @@ pub struct Core {
     pub(crate) state: WorldState,
     pub(crate) dof: usize,
     pub(crate) derived: Derived,
+    /// Whether the caches of `derived` are absent, or those of another state.
+    pub(super) stale: bool,
     pub(crate) owners: Vec<Owner>,
     /// See [`WorldView::implicit`](crate::WorldView::implicit).
     pub(crate) implicit: bool,
@@ -166,6 +168,7 @@ impl Core {
             state,
             dof,
             derived: Derived { part_states: vec![PartState::default(); parts], caches },
+            stale: false,
             owners,
             implicit: false,
             by_impulses: false,
@@ -207,6 +210,9 @@ impl Core {
 
     /// Returns the present state, and the caches of `acting`, or else of the present.
     pub(crate) fn coordinates<'a>(&'a mut self, acting: Option<&'a mut Moment>) -> Coordinates<'a> {
+        if acting.is_none() {
+            self.own_caches();
+        }
         let objects = self.table.with(&self.state.objects);
         let derived = acting.map_or(&mut self.derived, |moment| &mut moment.derived);
         Coordinates { objects, x: &mut self.state.x, caches: &mut derived.caches, threads: &self.threads }
@@ -238,13 +244,31 @@ impl Core {
         self.state.clone_from(state);
         self.clear_contact_forces();
         self.state.write_accelerations(&mut self.derived.part_states);
-        self.integration().refresh();
+        self.refresh();
     }
 
     /// Clears all contact and joint forces.
     pub(crate) fn clear_contact_forces(&mut self) {
         self.held.fill(0.0);
         self.held_wrenches.clear();
+    }
+
+    /// Computes part states and caches from the state.
+    pub(crate) fn refresh(&mut self) {
+        if self.derived.caches.len() != self.table.placed.len() {
+            self.derived.caches = self.table.new_caches();
+        }
+        self.stale = false;
+        self.integration().refresh();
+    }
+
+    /// Makes the caches those of the present state. Part states stay as they are.
+    pub(super) fn own_caches(&mut self) {
+        if self.stale {
+            let shown = self.derived.part_states.clone();
+            self.refresh();
+            self.derived.part_states = shown;
+        }
     }
 
     /// Lends the present state to the integrators.
@@ -254,6 +278,9 @@ impl Core {
 
     /// Lends the state of `moment`, or else the present one, to the integrators.
     pub(crate) fn integration_of<'a>(&'a mut self, moment: Option<&'a mut Moment>) -> IntegrationContext<'a> {
+        if moment.is_none() {
+            self.own_caches();
+        }
         let (x, derived) = match moment {
             Some(moment) => (&mut moment.x[..], &mut moment.derived),
             None => (&mut self.state.x[..], &mut self.derived),

@@ -141,7 +141,7 @@ impl World {
         let report_before = std::mem::take(&mut core.report);
         core.needs_wake.clear();
         core.meter.reset();
-        core.integration().refresh(); // constants and switches may have changed
+        core.refresh(); // constants and switches may have changed
         core.wake_disturbed();
         loop {
             let requests = core.needs_wake.len();
@@ -367,6 +367,7 @@ impl World {
             return Err(WorldError::NotFinite(name));
         }
         core.moments.clear();
+        core.own_caches();
         core.derived.caches.push(object.new_cache());
         let name = Arc::<str>::from(name);
         let id = core.table.push(name.clone(), object, state_range.clone());
@@ -389,6 +390,7 @@ impl World {
     pub fn remove(&mut self, id: ObjectId) -> Result<Box<dyn Object>, WorldError> {
         self.core.wake(id);
         let core = &mut self.core;
+        core.own_caches();
         let (place, gone) = core.table.remove(id).ok_or(WorldError::Stale)?;
         self.names.remove(&gone.name);
         core.state.remove(place, &gone.state_range);

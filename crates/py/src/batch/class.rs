@@ -193,12 +193,15 @@ impl Batch {
             .transpose()?;
         let (layout, crew) = (model.read(|inner| Layout::new(inner, asked))?, Crew::new(checked(threads)?)?);
         let (mut worlds, mut shared) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        let mut memory = WorkingMemory::default();
         for k in 0..n {
             let mut fork = model.read(|inner| Ok(inner.fork()))?;
             fork.take_raised()?;
             let mut settings = *fork.world.settings();
             settings.threads = 1; // they are many already
             fork.world.set_settings(settings)?;
+            fork.world.lend_working_memory(&mut memory);
+            fork.world.return_working_memory(&mut memory); // what it has of its own is dropped
             let fork = Py::new(py, World::of(py, fork)?)?;
             if let Some(configure) = configure {
                 configure.call1((&fork, k))?;
@@ -213,7 +216,16 @@ impl Batch {
             shared[..different].iter().map(|one| one.read(|inner| Ok(Start::of(inner)))).collect::<Result<Vec<_>>>()?;
         let now = Now { tables: Vec::new(), records: Vec::new(), failed: vec![false; n], stale: false };
         let given = AtomicBool::new(configure.is_some());
-        Ok(Batch { worlds, shared, layout, crew, starts, given, memory: Mutex::default(), now: Mutex::new(now) })
+        Ok(Batch {
+            worlds,
+            shared,
+            layout,
+            crew,
+            starts,
+            given,
+            memory: Mutex::new(vec![memory]),
+            now: Mutex::new(now),
+        })
     }
 
     /// Advances each world by ``substeps`` steps of its ``dt``, with the interpreter released; Ctrl-C

@@ -53,9 +53,9 @@ impl Member<'_> {
         let worked = shared.unseen(|inner| {
             layout.check(inner)?;
             let mut lent = locked(memory).pop().unwrap_or_default();
-            inner.world.swap_working_memory(&mut lent);
+            inner.world.lend_working_memory(&mut lent);
             let outcome = task.run(layout, inner, pause);
-            inner.world.swap_working_memory(&mut lent);
+            inner.world.return_working_memory(&mut lent);
             locked(memory).push(lent);
             if !matches!(outcome, Ok(false)) {
                 write(fields, layout, inner, record)?;
