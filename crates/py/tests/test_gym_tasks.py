@@ -68,14 +68,14 @@ def test_reacher():
 
 
 @pytest.mark.parametrize(
-    ("name", "dt", "cost", "alive", "limit"), [("Hopper", 0.008, 1e-3, 1.0, 10.0), ("Walker2d", 0.008, 1e-3, 1.0, 10.0), ("HalfCheetah", 0.05, 0.1, 0.0, np.inf)]
+    ("name", "dt", "cost", "bonus", "limit"), [("Hopper", 0.008, 1e-3, 1.0, 10.0), ("Walker2d", 0.008, 1e-3, 1.0, 10.0), ("HalfCheetah", 0.05, 0.1, 0.0, np.inf)]
 )
-def test_those_in_a_plane(name, dt, cost, alive, limit):
+def test_those_in_a_plane(name, dt, cost, bonus, limit):
     env, (before, _), (q, v), action, (seen, reward, over, _, info) = after(name, 8)
     assert env.runs.dt == pytest.approx(dt)
     assert seen.tolist() == [*q[1:], *np.clip(v, -limit, limit)]
     speed = (q[0] - before[0]) / dt
-    assert reward == pytest.approx(speed - cost * (action**2).sum() + alive * (not over))
+    assert reward == pytest.approx(speed - cost * (action**2).sum() + bonus * (not over))
     assert info["x_velocity"] == pytest.approx(speed) and info["x_position"] == q[0]
     assert info["reward_ctrl"] == pytest.approx(-cost * (action**2).sum())
     whole = tumble_gym.Env(name, exclude_current_positions_from_observation=False)

@@ -43,7 +43,7 @@ pub struct Batch {
     shared: Vec<Arc<Shared>>,
     layout: Layout,
     crew: Crew,
-    /// What each world is reset to, or the one of all.
+    /// The start of each world, or the one of all.
     starts: Vec<Start>,
     /// Whether Python was given a world, and may change it by itself.
     given: AtomicBool,
@@ -52,7 +52,7 @@ pub struct Batch {
     now: Mutex<Now>,
 }
 
-/// What a call changes.
+/// The data that a call changes.
 struct Now {
     tables: Vec<Table>,
     /// The fields of the tables of each world, one world after the other.

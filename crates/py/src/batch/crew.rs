@@ -22,7 +22,7 @@ pub struct Crew {
     own: Option<Arc<rayon::ThreadPool>>,
 }
 
-/// Tells work when to return, to be continued later or never.
+/// The reason for which work returns before its end.
 pub enum Pause<'a> {
     /// When the whole is stopped.
     Stopped(&'a Stop),

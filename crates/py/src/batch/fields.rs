@@ -25,7 +25,7 @@ pub struct Driven {
     pub links: usize,
 }
 
-/// What all worlds of a batch have in common.
+/// The objects and sizes that all worlds of a batch have in common.
 pub struct Layout {
     /// Length of the state.
     pub state: usize,

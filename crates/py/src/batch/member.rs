@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tumble::dynamics::{ArticulatedBody, DofSettings, Drive, ObjectId, WorkingMemory, WorldState};
 
-/// What a reset goes back to: the state, and the generalized forces that act in every step.
+/// The target of a reset: the state, and the generalized forces that act in every step.
 pub struct Start {
     state: WorldState,
     efforts: BTreeMap<ObjectId, Vec<f64>>,
@@ -25,7 +25,7 @@ impl Start {
     }
 }
 
-/// What is asked of one world.
+/// The work of one world in one call.
 pub enum Task<'a> {
     /// Generalized forces and drive targets from now on, if given, and the number of steps.
     Step { efforts: Option<&'a [f64]>, targets: Option<&'a [f64]>, left: usize },
@@ -41,7 +41,7 @@ pub struct Member<'a> {
     pub task: Task<'a>,
     /// Working memory that no world uses at the moment.
     pub memory: &'a Mutex<Vec<WorkingMemory>>,
-    /// Where its fields are written once it is done.
+    /// Memory for its fields, which are written once it is done.
     pub record: &'a mut [f64],
     pub outcome: Result<()>,
 }

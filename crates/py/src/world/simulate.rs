@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyDict;
 
-/// What is returned after every `every` steps.
+/// The fields that are returned after every `every` steps.
 const FIELDS: [(&str, Field); 9] = [
     ("time", Field::Time),
     ("state", Field::State),
