@@ -63,4 +63,5 @@ mod state;
 mod still;
 mod threads;
 mod unreachable_joints;
+mod working_memory;
 mod worst_solve;

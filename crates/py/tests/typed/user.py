@@ -32,3 +32,12 @@ def why(path: str) -> str | None:
     except tumble.SceneError as error:
         return str(error)
     return None
+
+
+def together(model: str) -> NDArray[np.float64]:
+    """The positions of 16 worlds after a second."""
+    batch = tumble.Batch(tumble.World.load(model), 16, configure=lambda world, k: world.set_pair_material("a", "b", friction=k / 16))
+    for _ in range(240):
+        batch.step(-batch.v, targets=np.zeros(batch.dof), mask=~batch.failed)
+    found = tumble.simulate(batch.world(0).model(), None, np.zeros((4, batch.dof)))
+    return np.concatenate([batch.q, found["q"]])

@@ -119,8 +119,3 @@ class CartPole(Env):
 
     def __init__(self, render_mode: str | None = None) -> None:
         super().__init__(CartPoleTask(), render_mode)
-
-    @property
-    def body(self) -> tumble.Articulation:
-        """The cart with its pole."""
-        return self.world.articulation("cart_pole")

@@ -63,6 +63,11 @@ class Env(gymnasium.Env[NDArray[Any], Any]):
         """The world."""
         return self.runs.batch.world(0)
 
+    @property
+    def body(self) -> tumble.Articulation:
+        """The first articulated body of the world."""
+        return next(body for body in self.world.bodies if isinstance(body, tumble.Articulation))
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[NDArray[Any], dict[str, Any]]:
         """Starts a new episode."""
         super().reset(seed=seed)
