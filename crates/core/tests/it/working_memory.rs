@@ -64,7 +64,7 @@ fn a_world_without_memory_can_do_everything() {
         ("pose", &|w| w.set_pose(ball, Pose::translation(0.5, 0.0, 0.3)).unwrap()),
         ("mass", &|w| w.set_mass(ball, 2.0).unwrap()),
         ("snapshot", &|w| w.restore(&w.save()).unwrap()),
-        ("another body", &|w| drop(w.add(RigidBody::new(Shape::sphere(0.1).unwrap())).unwrap())),
+        ("another body", &|w| _ = w.add(RigidBody::new(Shape::sphere(0.1).unwrap())).unwrap()),
         ("one less", &|w| drop(w.remove(ball).unwrap())),
     ];
     for (name, call) in calls {
