@@ -1,16 +1,19 @@
 //! Contact patches: rolling and torsional friction, and friction that depends on the sliding speed.
 //!
 //! Contacts of a pair with one normal are a *patch*. The patch has angular rows, which exist during one
-//! solve: one along the normal, two along the tangents. Their bounds, and the friction coefficients of
-//! sliding contacts, depend on the solution, so the rows are solved again until they no longer change.
+//! solve: one along the normal, two along the tangents. Their bounds are multiples of the normal forces of
+//! the solution, so the rows are solved again until they no longer change. How friction is divided, between
+//! sliding and spinning and among the directions of rolling, is found from the velocities with the
+//! multipliers of the last step, then once more from those of the first solve.
 //!
 //! ```text
 //! rolling      |τ_t| ≤ ρ·N                  τ_t = −ρ·N·ω_t/|ω_t| where the pair rolls
 //! sliding and  |(f/μ, τ_n/σ)| ≤ λ_n         of greatest dissipation: (f/μ, τ_n/σ) = −λ_n·(μ·w, σ·ω_n)/|(μ·w, σ·ω_n)|
 //! spinning     per contact, which has the share λ_n/N of τ_n
-//! a round      p = f/μ − r·μ·w,  q = τ_n/σ·λ_n/N − r·σ·ω_n,  m = |(p, q)|,  r = 1/(μ²·K_t + σ²·K_n)
+//! division     p = f/μ − r·μ·w,  q = τ_n/σ·λ_n/N − r·σ·ω_n,  m = |(p, q)|,  r = 1/(μ²·K_t + σ²·K_n)
 //!              m > λ_n:  |f| ≤ μ·λ_n·|p|/m,                |τ_n| ≤ Σ σ·λ_n·|q|/m
 //!              else:     |f| ≤ μ·√(λ_n² − q²),             |τ_n| ≤ Σ σ·√(λ_n² − |p|²)
+//! a round      λ_n of the solution, the same factors of it
 //! ```
 //!
 //! | symbol | meaning |
@@ -41,11 +44,11 @@ use std::ops::Range;
 use tumble_collide::Vec3;
 
 /// Maximum number of rounds.
-const ROUNDS: usize = 40;
+const ROUNDS: usize = 20;
 /// After this number of rounds a round goes half the way: bounds that alternate converge.
 const HALF: usize = 8;
 /// Least factor by which spinning reduces the friction against sliding: no cone has no friction.
-const LEAST: f64 = 1e-9;
+const LEAST: f64 = 1e-3;
 
 /// Angular rows of the contacts of a pair with one normal.
 struct Patch {
@@ -56,6 +59,10 @@ struct Patch {
     rolling: Option<[usize; 2]>,
     /// Block of the row along the normal.
     torsional: Option<usize>,
+    /// Of each contact: the factor of its friction, and the moment about the normal per normal force, m.
+    divisions: Vec<(f64, f64)>,
+    /// Share of rolling friction along each tangent.
+    directions: [f64; 2],
 }
 
 /// Moment of a patch on part A of its contacts.
@@ -83,7 +90,7 @@ pub(super) fn solve_patches(
         return Ok(solve(core, work, settings, unit, |b| keep[b]));
     }
     let (blocks, len, y) = (work.rows.blocks.len(), work.rows.len, work.rows.y.len());
-    let patches = lay_patches(core, acting, work, keep)?;
+    let mut patches = lay_patches(core, acting, work, keep)?;
     work.lambda.resize(work.rows.len, 0.0);
     for row in len..work.rows.len {
         work.c.push(work.bias[row] / unit);
@@ -99,6 +106,9 @@ pub(super) fn solve_patches(
     let mut ray = false;
     for round in 0..=ROUNDS {
         let mut change: f64 = 0.0;
+        if round < 2 {
+            patches.iter_mut().for_each(|patch| divide_friction(work, patch));
+        }
         for patch in &patches {
             let relax = if round > HALF { 0.5 } else { 1.0 };
             change = change.max(update(work, patch, unit, relax));
@@ -142,7 +152,8 @@ fn lay_patches(
         let laws = contacts[0].laws.as_ref().filter(|laws| laws.depends_on_solution(contacts[0].friction));
         if laws.is_some() && range.clone().any(|i| keep[i]) {
             let axes = ContactFrame::new(contacts[0].frame.point, contacts[0].frame.axes[0]).axes;
-            patches.push(Patch { contacts: range, axes, rolling: None, torsional: None });
+            let (divisions, directions) = (Vec::new(), [1.0; 2]);
+            patches.push(Patch { contacts: range, axes, rolling: None, torsional: None, divisions, directions });
         }
     }
     let time = core.state.time;
@@ -196,37 +207,25 @@ fn row_state(work: &Workspace, block: &Block, k: usize) -> RowState {
     RowState { lambda: work.lambda[row], w, own: work.rows.own(block, k, k) }
 }
 
-/// Sets the bounds of a patch and the friction of its contacts from the present solution. Returns the
-/// largest change in terms of a row velocity.
-fn update(work: &mut Workspace, patch: &Patch, unit: f64, relax: f64) -> f64 {
+/// Finds how the friction of a patch is divided, from the present solution.
+fn divide_friction(work: &Workspace, patch: &mut Patch) {
     let ContactConstraint { laws, friction, .. } = &work.contact_constraints[patch.contacts.start];
-    let (Some(laws), friction) = (laws.clone(), *friction) else { return 0.0 };
-    let load_of = |work: &Workspace, i: usize| work.lambda[work.rows.blocks[i].row as usize].max(0.0);
-    let total: f64 = patch.contacts.clone().map(|i| load_of(work, i)).sum();
-    let mut change: f64 = 0.0;
-    let spin = patch.torsional.map(|b| (b, row_state(work, &work.rows.blocks[b], 0)));
-    let mut torsion = 0.0;
+    let Some(laws) = laws else { return };
+    let load_of = |i: usize| work.lambda[work.rows.blocks[i].row as usize].max(0.0);
+    let total: f64 = patch.contacts.clone().map(load_of).sum();
+    let spin = patch.torsional.map(|b| row_state(work, &work.rows.blocks[b], 0));
+    patch.divisions.clear();
     for i in patch.contacts.clone() {
-        let load = load_of(work, i);
-        let block = work.rows.blocks[i];
-        let RowSet::Cone { mu: before } = block.set else {
-            torsion += laws.torsional * load;
-            continue;
+        let (load, block) = (load_of(i), &work.rows.blocks[i]);
+        let division = match (&spin, block.set) {
+            (Some(spin), RowSet::Cone { .. }) => {
+                let tangents = [1, 2].map(|k| row_state(work, block, k));
+                let share = if total > 0.0 { load / total } else { 1.0 / patch.contacts.len() as f64 };
+                divide(laws, friction.max(LEAST), &tangents, (spin, share), load)
+            }
+            _ => (1.0, laws.torsional),
         };
-        let tangents = [1, 2].map(|k| row_state(work, &block, k));
-        let share = if total > 0.0 { load / total } else { 1.0 / patch.contacts.len() as f64 };
-        let axes = &work.contact_constraints[i].frame.axes;
-        let speed = unit * (tangents[0].w / axes[1].norm()).hypot(tangents[1].w / axes[2].norm());
-        let mu = laws.friction_at(speed, friction);
-        let (factor, moment) =
-            spin.as_ref().map_or((1.0, 0.0), |(_, spin)| divide(&laws, mu.max(LEAST), &tangents, (spin, share), load));
-        torsion += moment;
-        let mu = before + relax * (mu * factor.max(LEAST) - before);
-        change = change.max((mu - before).abs() * load * tangents[0].own.max(tangents[1].own));
-        work.rows.blocks[i].set = RowSet::Cone { mu };
-    }
-    if let Some((b, spin)) = spin {
-        change = change.max(bound(&mut work.rows, b, torsion, relax) * spin.own);
+        patch.divisions.push(division);
     }
     if let Some(rows) = patch.rolling {
         let rolls = rows.map(|b| row_state(work, &work.rows.blocks[b], 0));
@@ -234,20 +233,43 @@ fn update(work: &mut Workspace, patch: &Patch, unit: f64, relax: f64) -> f64 {
         let r = 1.0 / rolls[0].own.max(rolls[1].own).max(f64::MIN_POSITIVE);
         let wanted = [0, 1].map(|k| rolls[k].lambda - r * rolls[k].w);
         let size = wanted[0].hypot(wanted[1]);
-        for k in 0..2 {
-            let allowed = if size > most {
-                most * wanted[k].abs() / size
-            } else {
-                (most * most - wanted[1 - k] * wanted[1 - k]).max(0.0).sqrt()
-            };
-            change = change.max(bound(&mut work.rows, rows[k], allowed, relax) * rolls[k].own);
-        }
+        patch.directions = [0, 1].map(|k| {
+            let other = wanted[1 - k] / most.max(f64::MIN_POSITIVE);
+            if size > most { wanted[k].abs() / size } else { (1.0 - other * other).max(0.0).sqrt() }
+        });
+    }
+}
+
+/// Sets the bounds of a patch and the friction of its contacts from the normal forces of the present
+/// solution. Returns the largest change in terms of a row velocity.
+fn update(work: &mut Workspace, patch: &Patch, unit: f64, relax: f64) -> f64 {
+    let ContactConstraint { laws, friction, .. } = &work.contact_constraints[patch.contacts.start];
+    let (Some(laws), friction) = (laws.clone(), *friction) else { return 0.0 };
+    let (mut change, mut total, mut torsion) = (0.0f64, 0.0, 0.0);
+    for (i, (factor, moment)) in patch.contacts.clone().zip(&patch.divisions) {
+        let block = work.rows.blocks[i];
+        let load = work.lambda[block.row as usize].max(0.0);
+        total += load;
+        torsion += moment * load;
+        let RowSet::Cone { mu: before } = block.set else { continue };
+        let tangents = [1, 2].map(|k| row_state(work, &block, k));
+        let axes = &work.contact_constraints[i].frame.axes;
+        let speed = unit * (tangents[0].w / axes[1].norm()).hypot(tangents[1].w / axes[2].norm());
+        let mu = laws.friction_at(speed, friction) * factor.max(LEAST);
+        let mu = before + relax * (mu - before);
+        change = change.max((mu - before).abs() * load * tangents[0].own.max(tangents[1].own));
+        work.rows.blocks[i].set = RowSet::Cone { mu };
+    }
+    let rolling = patch.rolling.into_iter().flatten().zip(patch.directions.map(|share| share * laws.rolling * total));
+    for (b, most) in rolling.chain(patch.torsional.map(|b| (b, torsion))) {
+        let own = work.rows.own(&work.rows.blocks[b], 0, 0);
+        change = change.max(bound(&mut work.rows, b, most, relax) * own);
     }
     change
 }
 
 /// Divides the friction of a contact between sliding and spinning. Returns the factor of its
-/// coefficient, and the largest moment.
+/// coefficient, and the moment about the normal per normal force, m.
 fn divide(
     laws: &ContactLaws,
     mu: f64,
@@ -263,11 +285,12 @@ fn divide(
     let q = (share * spin.lambda / sigma - r * sigma * spin.w).abs();
     let size = p.hypot(q);
     if size > load {
-        (p / size, sigma * load * q / size)
+        (p / size, sigma * q / size)
     } else if load > 0.0 {
-        (((load * load - q * q).max(0.0)).sqrt() / load, sigma * (load * load - p * p).max(0.0).sqrt())
+        let rest = |x: f64| (1.0 - (x / load).powi(2)).max(0.0).sqrt();
+        (rest(q), sigma * rest(p))
     } else {
-        (1.0, 0.0)
+        (1.0, sigma)
     }
 }
 
