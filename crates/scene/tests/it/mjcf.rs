@@ -376,3 +376,27 @@ fn deep_and_large_files_are_refused() {
     let many = "<mujoco><worldbody><replicate count=\"9999\"><replicate count=\"9999\"><geom size=\"1\"/></replicate></replicate></worldbody></mujoco>";
     assert!(errors(many)[0].contains("is one too many; expected at most"));
 }
+
+/// Feet with rolling and torsional friction (`condim` 6) that random torques make stick, roll and spin: the
+/// solves of all laws converge but for a few, and no step fails.
+#[test]
+fn a_quadruped_on_feet_of_all_laws_of_friction_steps() {
+    let scene = SceneFile::load(models().join("quadruped.xml")).unwrap();
+    let start = scene.build().unwrap().0;
+    let (mut seed, mut unconverged) = (1u64, 0);
+    let mut random = || {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    };
+    for _ in 0..10 {
+        let mut world = start.fork();
+        let trunk = world.find("trunk").unwrap();
+        for _ in 0..100 {
+            let mut torque = [0.0; 18];
+            torque[6..].iter_mut().for_each(|torque| *torque = 2.0 * random());
+            world.apply_generalized(trunk, &torque).unwrap();
+            unconverged += world.step().unwrap().unconverged;
+        }
+    }
+    assert!(unconverged <= 30, "{unconverged} of 1000 steps");
+}
