@@ -151,8 +151,9 @@ fn run_duplicates(carrier: &str, joins: std::ops::Range<u64>) {
     let logged: std::collections::BTreeSet<u64> =
         ["out", "second", "third"].iter().flat_map(|folder| numbers(&place.log(folder, "l"))).collect();
     let shown = frames - facet["not_shown"].as_u64().unwrap();
+    // the killed process may have logged a frame whose receipt it did not send
     assert!(
-        shown >= logged.len() as u64 && shown <= facet["presented"].as_u64().unwrap() && said.contains("not shown"),
+        shown + 1 >= logged.len() as u64 && shown <= facet["presented"].as_u64().unwrap() && said.contains("not shown"),
         "{shown}, {logged:?}: {said}"
     );
     assert_eq!(
