@@ -59,7 +59,7 @@ struct Patch {
     rolling: Option<[usize; 2]>,
     /// Block of the row along the normal.
     torsional: Option<usize>,
-    /// Of each contact: the factor of its friction, and the moment about the normal per normal force, m.
+    /// Factor of the friction of each contact, and its moment about the normal per normal force, m.
     divisions: Vec<(f64, f64)>,
     /// Share of rolling friction along each tangent.
     directions: [f64; 2],

@@ -377,8 +377,8 @@ fn deep_and_large_files_are_refused() {
     assert!(errors(many)[0].contains("is one too many; expected at most"));
 }
 
-/// Feet with rolling and torsional friction (`condim` 6) that random torques make stick, roll and spin: the
-/// solves of all laws converge but for a few, and no step fails.
+/// Feet with rolling and torsional friction (`condim` 6) that random torques make stick, roll and spin: nearly
+/// all solves of all laws converge, and no step fails.
 #[test]
 fn a_quadruped_on_feet_of_all_laws_of_friction_steps() {
     let scene = SceneFile::load(models().join("quadruped.xml")).unwrap();
