@@ -55,7 +55,8 @@ fn a_world_without_memory_can_do_everything() {
     world.step().unwrap();
     let mut bare = world.fork();
     let mut memory = WorkingMemory::default();
-    let calls: [(&str, &dyn Fn(&mut World)); 7] = [
+    type Call<'a> = (&'a str, &'a dyn Fn(&mut World));
+    let calls: [Call; 7] = [
         ("impulse on the chain", &|w| w.apply_impulse(chain, 1, Vec3::x(), &Vec3::zeros()).unwrap()),
         ("state", &|w| {
             let x: Vec<f64> = w.state_of(chain).unwrap().iter().map(|x| x * 1.0).collect();
