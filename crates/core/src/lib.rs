@@ -56,7 +56,7 @@ pub use contact::pair_material::{PairMaterial, PairSide};
 pub use derived::Cache;
 pub use object::collidable::{CollisionGroup, ContactFrame};
 pub use object::mounts::{CameraMount, Detail, LightMount, Spread};
-pub use object::part_state::{ForceSlice, Forces, PartPoint, PartState, StateRange, StateSizes, Wrench};
+pub use object::part_state::{ForceSlice, Forces, PartPoint, PartState, PointLoad, StateRange, StateSizes, Wrench};
 pub use object::visual::{Drawn, Visual, VisualGeometry, VisualMesh};
 pub use object::{
     Appearance, CameraCarrier, Collidable, Combine, Constraint, Energy, ForceGenerator, Fork, Integratable, Level,

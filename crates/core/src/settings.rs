@@ -70,6 +70,10 @@ pub struct Settings {
     pub drift_tolerance: f64,
     /// Maximum speed at which existing penetration is corrected, m/s.
     pub recovery_speed: f64,
+    /// Largest angle by which the forces of joints may turn a part back and forth in a sub-step, rad, 0.01
+    /// to 1e6; 1 by default. A frame in which a part turns further is taken again in sub-steps that
+    /// are short enough: chains of light links with a heavy end need it (`step/turning.rs`).
+    pub max_turn: f64,
     /// When islands fall asleep; `None`: never.
     pub sleep: Option<Sleep>,
     /// Combination of the friction coefficients of two bodies. The default is the geometric mean,
@@ -110,6 +114,7 @@ impl Default for Settings {
             contact_tolerance: 1e-7,
             drift_tolerance: 1e-4,
             recovery_speed: 3.0,
+            max_turn: 1.0,
             sleep: None,
             combine_friction: Combine::GeometricMean,
             combine_restitution: Combine::Max,
@@ -159,6 +164,7 @@ setters! {
     with_contact_tolerance contact_tolerance: f64,
     with_drift_tolerance drift_tolerance: f64,
     with_recovery_speed recovery_speed: f64,
+    with_max_turn max_turn: f64,
     with_sleep sleep: Option<Sleep>,
     with_combine_friction combine_friction: Combine,
     with_combine_restitution combine_restitution: Combine,
@@ -197,6 +203,7 @@ impl Settings {
             check("budget", budget.into(), budget > 0, "above 0 relaxations")?;
         }
         check("solver tolerance", self.solver_settings.tolerance, self.solver_settings.tolerance >= 0.0, "at least 0")?;
+        check("max turn", self.max_turn, (0.01..=1e6).contains(&self.max_turn), "0.01 to 1e6 rad")?;
         check("contact tolerance", self.contact_tolerance, self.contact_tolerance > 0.0, "above 0 m")?;
         check(
             "drift tolerance",

@@ -8,6 +8,7 @@ mod model;
 mod object;
 mod parts;
 mod simd;
+mod turning;
 
 pub use algorithms::crba::MassMatrix;
 pub use algorithms::dynamics::{Dynamics, Scratch, forward_dynamics};

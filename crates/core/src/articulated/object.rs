@@ -12,7 +12,7 @@ use crate::object::Material;
 use crate::object::collidable::{Collidable, CollisionGroup};
 use crate::object::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
 use crate::object::net_sync;
-use crate::object::part_state::{ForceSlice, Forces, PartPoint, PartState, StateRange, StateSizes, Wrench};
+use crate::object::part_state::{ForceSlice, Forces, PartPoint, PartState, PointLoad, StateRange, StateSizes, Wrench};
 use crate::object::visual::Visual;
 use crate::object::{Constraint, Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError};
 use crate::rigid::rotation;
@@ -166,6 +166,16 @@ impl Integratable for ArticulatedBody {
                 Vec3::zeros()
             };
         }
+    }
+
+    fn turning_rate(
+        &self,
+        cache: &mut Cache,
+        part_states: &[PartState],
+        gravity: &Vec3,
+        loads: &mut dyn Iterator<Item = PointLoad>,
+    ) -> (usize, f64) {
+        self.fastest_turn(&cache.get::<BodyCache>().dynamics, part_states, gravity, loads)
     }
 
     fn free_motion_rate(&self, cache: &mut Cache, _x: &[f64], out: &mut [f64]) {

@@ -68,6 +68,11 @@ impl WarmStarts {
         &self.rows[start..start + count]
     }
 
+    /// Returns the forces of each object's constraint.
+    pub fn rows_by_owner(&self) -> impl Iterator<Item = &[RowStart]> {
+        self.rows.chunk_by(|a, b| a.owner == b.owner)
+    }
+
     /// Replaces the forces of contacts; they may come in any order.
     pub fn replace(&mut self, entries: impl Iterator<Item = WarmStart>) {
         self.entries.clear();

@@ -1,6 +1,6 @@
 //! The trait of objects with a state.
 
-use super::part_state::{ForceSlice, Forces, PartPoint, PartState, StateRange, StateSizes};
+use super::part_state::{ForceSlice, Forces, PartPoint, PartState, PointLoad, StateRange, StateSizes};
 use super::{Energy, Momentum, Object, by_jacobian};
 use crate::derived::Cache;
 use crate::world::view::WorldView;
@@ -153,6 +153,20 @@ pub trait Integratable: Object {
     fn test_impulse_shared(&self, cache: &Cache, at: &PartPoint, sign: f64, y: &mut [f64]) -> bool {
         let _ = (cache, at, sign, y);
         false
+    }
+    /// Returns the part that forces turn back and forth fastest, with the angular frequency, rad/s:
+    /// those of the object's own joints, and `loads`, the forces of loop joints in the last sub-step.
+    /// Parts have the accelerations of the sub-step. The steps of the world are divided so that
+    /// [`Settings::max_turn`](crate::Settings::max_turn) is not exceeded. 0 by default.
+    fn turning_rate(
+        &self,
+        cache: &mut Cache,
+        part_states: &[PartState],
+        gravity: &Vec3,
+        loads: &mut dyn Iterator<Item = PointLoad>,
+    ) -> (usize, f64) {
+        let _ = (cache, part_states, gravity, loads);
+        (0, 0.0)
     }
     /// Returns the reason why the state of the last refresh has no motion (a singular mass matrix).
     /// The step then ends with this as its error.

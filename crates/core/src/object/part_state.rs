@@ -154,3 +154,14 @@ pub struct ForceSlice<'a> {
     /// Generalized force per degree of freedom of the object.
     pub generalized: &'a [f64],
 }
+
+/// A force that acts at a point of a part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointLoad {
+    /// Part of the object.
+    pub part: usize,
+    /// The point, world axes, m.
+    pub point: Vec3,
+    /// The force, world axes, N.
+    pub force: Vec3,
+}

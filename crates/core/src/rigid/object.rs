@@ -7,12 +7,13 @@ use crate::derived::Cache;
 use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraMount, LightMount};
 use crate::object::net_sync;
-use crate::object::part_state::{ForceSlice, Forces, PartPoint, PartState, StateRange, StateSizes, Wrench};
+use crate::object::part_state::{ForceSlice, Forces, PartPoint, PartState, PointLoad, StateRange, StateSizes, Wrench};
 use crate::object::visual::Visual;
 use crate::object::{
     CameraCarrier, Collidable, Energy, Integratable, LightCarrier, Material, Momentum, MomentumKind, NetSync, Object,
     Renderable, SyncError,
 };
+use crate::step::{add_stiffness, rate_squared};
 use crate::world::view::WorldView;
 use nalgebra::{ComplexField, Translation3, Unit};
 use tumble_collide::{ContactMode, Mat3, Pose, Quat, Shape, Vec3};
@@ -197,6 +198,25 @@ impl Integratable for RigidBody {
 
     fn momentum_kind(&self) -> MomentumKind {
         MomentumKind::Conjugate
+    }
+
+    fn turning_rate(
+        &self,
+        _cache: &mut Cache,
+        part_states: &[PartState],
+        _gravity: &Vec3,
+        loads: &mut dyn Iterator<Item = PointLoad>,
+    ) -> (usize, f64) {
+        let Some(first) = loads.next() else { return (0, 0.0) };
+        let pose = &part_states[0].pose;
+        let center = self.center_pose_of(pose);
+        let mut stiffness = Mat3::zeros();
+        for load in std::iter::once(first).chain(loads) {
+            add_stiffness(&mut stiffness, &(load.point - center.translation.vector), &load.force);
+        }
+        let turned = |k: usize| self.omega(&center.rotation, &stiffness.column(k).into_owned());
+        let a = Mat3::from_columns(&[turned(0), turned(1), turned(2)]);
+        (0, rate_squared(&a).sqrt())
     }
 
     fn accepts(&self, x: &[f64]) -> bool {

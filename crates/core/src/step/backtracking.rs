@@ -88,10 +88,29 @@ impl Stepper for Backtracking {
 
     fn step(&mut self, frame: StepContext) -> Result<(), StepError> {
         let core = frame.core;
-        let dt = core.settings.dt;
-        let (mut left, end) = (dt, core.state.time + dt);
+        let (start, pieces) = (core.state.time, core.division);
+        (1..=pieces).try_for_each(|piece| {
+            let share = f64::from(piece) / f64::from(pieces);
+            self.piece(core, start + share * core.settings.dt)
+        })
+    }
+
+    fn divides(&self) -> bool {
+        true
+    }
+
+    fn fork(&self) -> Box<dyn Stepper> {
+        Box::<Backtracking>::default()
+    }
+}
+
+impl Backtracking {
+    /// Advances to the time `end`, s, by a piece of the frame.
+    fn piece(&mut self, core: &mut Core, end: f64) -> Result<(), StepError> {
+        let (dt, most) = (core.settings.dt, TRIES * core.division);
+        let mut left = if core.division == 1 { dt } else { end - core.state.time };
         while left > 1e-12 * dt {
-            if core.report.tries >= TRIES || !core.meter.start_try(core.settings.solver_settings.budget) {
+            if core.report.tries >= most || !core.meter.start_try(core.settings.solver_settings.budget) {
                 core.report.floor_hits += 1;
                 self.fallback.substep(core, left)?;
                 break;
@@ -110,12 +129,6 @@ impl Stepper for Backtracking {
         Ok(())
     }
 
-    fn fork(&self) -> Box<dyn Stepper> {
-        Box::<Backtracking>::default()
-    }
-}
-
-impl Backtracking {
     /// Corrects overlap beyond the contact tolerance, then computes contacts, rows and smooth
     /// accelerations at the present state.
     fn gather(&mut self, core: &mut Core, left: f64) -> Result<(), StepError> {
@@ -377,7 +390,7 @@ impl Backtracking {
             let f = self.margin(core, h)?;
             let landed = f >= -tolerance && (f <= tolerance || !bracket.crossed());
             let floored = f < -tolerance && h <= floor;
-            let stuck = core.report.tries >= TRIES;
+            let stuck = core.report.tries >= TRIES * core.division;
             if landed || floored || (stuck && f >= -tolerance) {
                 core.report.floor_hits += floored as u32;
                 if self.adaptive.path.extends_beyond(h) {

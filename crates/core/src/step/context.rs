@@ -35,6 +35,12 @@ use crate::world::{StepError, WorldState};
 /// # Ok::<(), StepError>(())
 /// ```
 impl StepContext<'_> {
+    /// Returns the number of equal parts of each sub-step that [`Settings::max_turn`](crate::Settings::max_turn)
+    /// asks for in this frame.
+    pub fn division(&self) -> u32 {
+        self.core.division
+    }
+
     /// Returns the settings. A stepper advances the world by [`Settings::dt`].
     pub fn settings(&self) -> &Settings {
         &self.core.settings

@@ -15,6 +15,7 @@ mod moment;
 mod patch;
 mod solves;
 mod time_stepping;
+mod turning;
 mod unreachable_joints;
 mod warm_start;
 
@@ -23,6 +24,7 @@ pub(crate) use budget::WorkMeter;
 pub(crate) use contacts::Workspace;
 pub(crate) use moment::Moment;
 pub use time_stepping::TimeStepping;
+pub(crate) use turning::{HeldDivision, LargestTurn, add_stiffness, rate_squared};
 
 use crate::world::{Core, StepError};
 
@@ -33,6 +35,11 @@ pub trait Stepper: Send + Sync {
     fn name(&self) -> &'static str;
     /// Advances by one frame: [`Settings::dt`](crate::Settings::dt) seconds. After an error the world restores state and time.
     fn step(&mut self, frame: StepContext) -> Result<(), StepError>;
+    /// Returns whether it divides its sub-steps by [`StepContext::division`]. Otherwise
+    /// [`Settings::max_turn`](crate::Settings::max_turn) is only reported.
+    fn divides(&self) -> bool {
+        false
+    }
     /// Returns an independent copy.
     fn fork(&self) -> Box<dyn Stepper>;
 }

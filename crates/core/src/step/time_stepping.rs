@@ -105,8 +105,13 @@ impl Stepper for TimeStepping {
 
     fn step(&mut self, frame: StepContext) -> Result<(), StepError> {
         let core = frame.core;
-        let h = core.settings.dt / core.settings.substeps as f64;
-        (0..core.settings.substeps).try_for_each(|_| self.substep(core, h))
+        let substeps = core.settings.substeps * core.division;
+        let h = core.settings.dt / substeps as f64;
+        (0..substeps).try_for_each(|_| self.substep(core, h))
+    }
+
+    fn divides(&self) -> bool {
+        true
     }
 
     fn fork(&self) -> Box<dyn Stepper> {

@@ -11,7 +11,7 @@ use crate::object::part_state::{Forces, PartState, Wrench};
 use crate::report::StepReport;
 use crate::settings::Settings;
 use crate::solver::RowSolver;
-use crate::step::{Moment, WorkMeter};
+use crate::step::{LargestTurn, Moment, WorkMeter};
 use crate::threads::Threads;
 use crate::world::view::{Entry, ObjectId, Objects, Table, WorldView};
 use tumble_collide::{BroadPhase, SweepAndPrune, Vec3};
@@ -66,6 +66,22 @@ pub enum StepError {
         advanced: f64,
         /// `Settings::dt`.
         dt: f64,
+    },
+    /// The forces of joints turn a part too far even in the shortest sub-steps.
+    #[error(
+        "'{object}' at t = {time} s: the forces of its joints turn part {part} by {turn} rad in a sub-step, though it is divided as far as admissible; at most {most} is: shorten dt, give its lightest parts more inertia, or raise max_turn"
+    )]
+    Turn {
+        /// Object.
+        object: String,
+        /// Part of the object: a link of an articulated body, 0 of a rigid body.
+        part: usize,
+        /// Turn, rad.
+        turn: f64,
+        /// `Settings::max_turn`.
+        most: f64,
+        /// Simulated time, s.
+        time: f64,
     },
     /// A constraint made an invalid row.
     #[error("constraint '{object}': {why}")]
@@ -141,6 +157,12 @@ pub struct Core {
     pub(crate) meter: WorkMeter,
     /// Serial numbers of sleeping objects that the frame disturbs.
     pub(crate) needs_wake: Vec<u32>,
+    /// Number of parts that each sub-step of the settings is divided into in this frame.
+    pub(crate) division: u32,
+    /// Turn in an undivided sub-step from which the division was found, rad; 0 without a division.
+    pub(crate) undivided_turn: f64,
+    /// Largest turn of the frame.
+    pub(crate) largest_turn: LargestTurn,
 }
 
 /// The state of the objects, and the caches for the maps that change it.
@@ -186,6 +208,9 @@ impl Core {
             report: StepReport::default(),
             meter: WorkMeter::default(),
             needs_wake: Vec::new(),
+            division: 1,
+            undivided_turn: 0.0,
+            largest_turn: LargestTurn::default(),
         }
     }
 
@@ -351,8 +376,11 @@ impl Core {
             self.state.x[e.state_range.x.clone()].iter().all(|x| x.is_finite())
                 && self.derived.part_states[e.state_range.parts.clone()].iter().all(moves)
         };
-        let bad = self.objects().iter().find(|e| !fine(e));
-        bad.map_or(Ok(()), |e| Err(self.not_finite(e.name, "its state")))
+        if let Some(bad) = self.objects().iter().find(|e| !fine(e)) {
+            return Err(self.not_finite(bad.name, "its state"));
+        }
+        self.measure_turns(h);
+        Ok(())
     }
 
     /// Checks that all forces and accelerations are finite, and that no mass matrix is singular, at

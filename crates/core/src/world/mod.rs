@@ -42,7 +42,7 @@ use crate::report::StepReport;
 use crate::rigid::RigidBody;
 use crate::settings::Settings;
 use crate::solver::{GaussSeidel, RowSolver};
-use crate::step::{StepContext, Stepper, TimeStepping};
+use crate::step::{LargestTurn, StepContext, Stepper, TimeStepping};
 use crate::world::view::{Mode, ObjectId, Placed, Status, Table, WorldView};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -143,6 +143,7 @@ impl World {
         core.meter.reset();
         core.refresh(); // constants and switches may have changed
         core.wake_disturbed();
+        core.divide_ahead(self.stepper.as_ref());
         loop {
             let requests = core.needs_wake.len();
             core.clear_contact_forces();
@@ -150,15 +151,20 @@ impl World {
             core.touches.clear();
             core.broken.clear();
             core.meter.start_frame(core.settings.solver_settings.budget, self.before.time + core.settings.dt);
+            core.largest_turn = LargestTurn::default();
             let done = self.stepper.step(StepContext { core });
-            if let Err(error) = done.and_then(|()| check_duration(self.stepper.name(), core, self.before.time)) {
-                core.set_state(&self.before);
-                std::mem::swap(&mut self.contacts_before, &mut core.contacts);
-                core.report = report_before;
-                return Err(error);
-            }
+            let done = done.and_then(|()| check_duration(self.stepper.name(), core, self.before.time));
+            let again = match done.and_then(|()| core.divide_again(self.stepper.as_ref(), self.before.time)) {
+                Ok(again) => again,
+                Err(error) => {
+                    core.set_state(&self.before);
+                    std::mem::swap(&mut self.contacts_before, &mut core.contacts);
+                    core.report = report_before;
+                    return Err(error);
+                }
+            };
             core.request_wake_by_load();
-            if core.needs_wake.len() == requests {
+            if core.needs_wake.len() == requests && !again {
                 break;
             }
             core.set_state(&self.before);

@@ -127,7 +127,7 @@ impl SleepGroup {
 
 impl Core {
     /// Returns the index of the object with a serial number.
-    pub(super) fn by_serial(&self, serial: u32) -> Option<usize> {
+    pub(crate) fn by_serial(&self, serial: u32) -> Option<usize> {
         self.state.objects.binary_search_by_key(&serial, |o| o.serial).ok()
     }
 

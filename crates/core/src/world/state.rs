@@ -4,6 +4,7 @@ use super::state_memory::StateVector;
 use crate::clone_by_field::clone_by_field;
 use crate::contact::warm_starts::WarmStarts;
 use crate::object::part_state::{PartState, StateRange, Wrench};
+use crate::step::HeldDivision;
 use crate::world::events::Touching;
 use crate::world::sleep::{RestTimer, SleepGroup};
 use crate::world::view::Status;
@@ -39,6 +40,8 @@ pub struct WorldState {
     pub(crate) warm: WarmStarts,
     /// Inner step with which the adaptive integrator continues, s; 0 before the first.
     pub(crate) inner_step: f64,
+    /// The division of sub-steps that joints needed last.
+    pub(crate) held_division: HeldDivision,
     /// The sleeping islands.
     pub(crate) groups: Vec<SleepGroup>,
     /// Pairs of parts that touch, and of sensors with parts that overlap them; sorted.
@@ -56,6 +59,7 @@ clone_by_field!(WorldState {
     applied_generalized,
     warm,
     inner_step,
+    held_division,
     groups,
     touching,
 });
@@ -128,7 +132,10 @@ impl WorldState {
         let vectors =
             self.accelerations.iter().flatten().chain(self.applied.iter().flat_map(|w| [&w.torque, &w.force]));
         let mut numbers = self.x.iter().chain(&self.applied_generalized).chain(vectors.flat_map(|v| v.iter()));
-        let steps = self.time.is_finite() && self.inner_step.is_finite() && self.inner_step >= 0.0;
+        let steps = self.time.is_finite()
+            && self.held_division.is_sound()
+            && self.inner_step.is_finite()
+            && self.inner_step >= 0.0;
         steps && numbers.all(|x| x.is_finite()) && self.warm.finite()
     }
 

@@ -243,13 +243,13 @@ fn a_kinematic_wheel_drives_the_piston() {
 
 #[test]
 fn steps_that_are_too_long_leave_the_linkage_closed() {
-    // the crank turns by up to 0.25 rad per frame: energy fluctuates, and nothing diverges
+    // the crank turns by up to 0.25 rad per frame: the division of frames holds the energy
     for stepper in STEPPERS {
         let worst = run(&mut FourBar::new(stepper, 1.0 / 60.0), 60.0);
         println!("{stepper}, 60 s at 60 Hz: {worst:?}");
         assert!(worst.gap < 3e-9 && worst.off < 1e-6, "{stepper}: {worst:?}");
         assert!(
-            worst.energy < 0.5 * worst.kinetic,
+            worst.energy < 0.03 * worst.kinetic,
             "{stepper}: energy is off by {} J of {} J",
             worst.energy,
             worst.kinetic

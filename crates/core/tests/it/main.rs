@@ -62,6 +62,7 @@ mod stacks;
 mod state;
 mod still;
 mod threads;
+mod turning;
 mod unreachable_joints;
 mod working_memory;
 mod worst_solve;

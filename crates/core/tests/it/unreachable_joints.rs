@@ -56,15 +56,15 @@ impl ReachMechanism {
         self.world.state_of(self.chain).unwrap()[self.links..].iter().fold(0.0, |a: f64, v| a.max(v.abs()))
     }
 
-    /// Moves the hand for the given time. Returns the highest joint speed and the largest position
-    /// error.
+    /// Moves the hand for the given time. Returns the highest joint speed, over the root of the number of
+    /// sub-steps of its frame, and the largest position error.
     fn lead(&mut self, velocity: Vec3, seconds: f64) -> (f64, f64) {
         let (mut fastest, mut position_error): (f64, f64) = (0.0, 0.0);
         for _ in 0..(seconds * 240.0).round() as usize {
             self.world.set_velocity(self.hand, velocity, Vec3::zeros()).unwrap();
             let report = *self.world.step().unwrap();
             self.reported = report.unreachable_joint.or(self.reported);
-            fastest = fastest.max(self.fastest());
+            fastest = fastest.max(self.fastest() / f64::from(report.substeps).sqrt());
             position_error = position_error.max(self.position_error());
         }
         (fastest, position_error)

@@ -854,6 +854,9 @@ class StepReport:
     def max_penetration(self) -> float:
         """Deepest penetration found, meters."""
     @property
+    def max_turn(self) -> float:
+        """"""
+    @property
     def unreachable_joint(self) -> str | None:
         """Name of the loop joint with the largest gap among those that cannot be closed; None if all
         can be.
@@ -1230,6 +1233,7 @@ class World:
         threads: int = 1,
         budget: int | None = None,
         event_impulse: float = 0.0,
+        max_turn: float = 1.0,
     ) -> World: ...
     @staticmethod
     def load(
@@ -1415,6 +1419,11 @@ class World:
         """
     @event_impulse.setter
     def event_impulse(self, value: float) -> None: ...
+    @property
+    def max_turn(self) -> float:
+        """"""
+    @max_turn.setter
+    def max_turn(self, value: float) -> None: ...
     def cast_rays(
         self,
         origins: ArrayLike,

@@ -54,8 +54,9 @@ use tumble::scene::{FileKind, LoadOptions, SceneFile, resolve_scene};
 /// combine_restitution, combine_friction: rule for the coefficients of a pair, ``"min"``,
 /// ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``. threads: threads of a step, 0 for
 /// as many as cores; no number changes the result. budget: largest work of a step in block
-/// relaxations, None for no bound. event_impulse: N·s, see ``events``. Names and defaults are those
-/// of scene files.
+/// relaxations, None for no bound. event_impulse: N·s, see ``events``. max_turn: largest angle, rad, by
+/// which forces of joints may turn a part back and forth in a sub-step; frames are divided so that they do not.
+/// Names and defaults are those of scene files.
 ///
 /// One thread at a time: while one thread steps a world, calls on it from another raise
 /// ``BusyError``. The interpreter is released while a world steps.
@@ -103,10 +104,10 @@ impl World {
     #[pyo3(
         text_signature = "(gravity=(0.0, 0.0, -9.81), dt=0.004166666666666667, stepper='time_stepping', integrator='verlet', \
         solver='gauss_seidel', *, substeps=1, iterations=200, contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, \
-        combine_restitution='max', combine_friction='geometric_mean', threads=1, budget=None, event_impulse=0.0)"
+        combine_restitution='max', combine_friction='geometric_mean', threads=1, budget=None, event_impulse=0.0, max_turn=1.0)"
     )]
     #[pyo3(signature = (gravity=None, dt=0.004166666666666667, stepper="time_stepping", integrator="verlet", solver="gauss_seidel", *, substeps=1, iterations=200,
-        contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, combine_restitution="max", combine_friction="geometric_mean", threads=1, budget=None, event_impulse=0.0))]
+        contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, combine_restitution="max", combine_friction="geometric_mean", threads=1, budget=None, event_impulse=0.0, max_turn=1.0))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
         py: Python<'_>,
@@ -126,6 +127,7 @@ impl World {
         #[pyo3(from_py_with = whole_number)] threads: u32,
         budget: Option<u32>,
         event_impulse: f64,
+        max_turn: f64,
     ) -> Result<World> {
         let mut scene = SceneFile::parse("", "World")?;
         let world = &mut scene.world;
@@ -135,7 +137,7 @@ impl World {
         (world.substeps, world.iterations) = (substeps, iterations);
         (world.contact_tolerance_m, world.integrator_tolerance) = (contact_tolerance, integrator_tolerance);
         (world.sleep_after_s, world.sleep_within_m) = (sleep_after, sleep_within);
-        world.event_impulse_n_s = event_impulse;
+        (world.event_impulse_n_s, world.max_turn_rad) = (event_impulse, max_turn);
         world.combine_restitution = combine(combine_restitution, "combine_restitution")?;
         world.combine_friction = combine(combine_friction, "combine_friction")?;
         World::of(py, build(scene)?)
@@ -470,6 +472,19 @@ impl World {
     #[setter]
     fn set_event_impulse(&self, py: Python<'_>, value: f64) -> Result<()> {
         self.set(py, |s| s.event_impulse = value)
+    }
+
+    /// Largest angle, rad, 0.01 to 1e6, by which forces of joints may turn a part back and forth in a
+    /// sub-step. A frame in which a part turns further is taken in sub-steps that are short enough;
+    /// chains of light links with a heavy end need it. 1 by default.
+    #[getter]
+    fn max_turn(&self) -> Result<f64> {
+        self.settings(|s| s.max_turn)
+    }
+
+    #[setter]
+    fn set_max_turn(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.set(py, |s| s.max_turn = value)
     }
 
     /// Returns where rays enter bodies: a structured array with one row per ray.

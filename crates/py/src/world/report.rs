@@ -43,6 +43,9 @@ pub struct StepReport {
     asleep: u32,
     /// Deepest penetration found, meters.
     max_penetration: f64,
+    /// Largest angle by which the forces of joints turn a part back and forth in a sub-step, rad
+    /// (``World.max_turn``).
+    max_turn: f64,
     /// Name of the loop joint with the largest gap among those that cannot be closed; None if all
     /// can be.
     unreachable_joint: Option<String>,
@@ -67,6 +70,7 @@ impl StepReport {
             iterations,
             relaxations,
             max_penetration,
+            max_turn,
             unreachable_joint: out_of_reach,
             asleep,
             ..
@@ -91,6 +95,7 @@ impl StepReport {
             iterations,
             relaxations,
             max_penetration,
+            max_turn,
             asleep,
             unreachable_joint: name,
             unreachable_distance: out_of_reach.map_or(0.0, |o| o.distance),

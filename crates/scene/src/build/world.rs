@@ -148,6 +148,7 @@ impl SceneFile {
             .with_combine_friction(w.combine_friction)
             .with_combine_restitution(w.combine_restitution)
             .with_event_impulse(w.event_impulse_n_s)
+            .with_max_turn(w.max_turn_rad)
             .with_threads(w.threads)
     }
 

@@ -201,6 +201,8 @@ pub struct WorldSettings {
     pub combine_friction: Combine,
     /// Smallest impulse in a step with which a pair counts as in contact, N·s. Default 0.
     pub event_impulse_n_s: f64,
+    /// Largest angle by which forces of joints may turn a part back and forth in a sub-step, rad. Default 1.
+    pub max_turn_rad: f64,
     /// Contact mode of meshes and cylinders without their own. Default `surface`.
     pub contacts: ContactMode,
     /// Threads of a step, 0 for as many as cores; no number changes the result. Default 1.
@@ -226,6 +228,7 @@ impl Default for WorldSettings {
             combine_restitution: Combine::Max,
             combine_friction: Combine::GeometricMean,
             event_impulse_n_s: 0.0,
+            max_turn_rad: 1.0,
             contacts: ContactMode::Surface,
             threads: 1,
         }
@@ -236,6 +239,7 @@ const DT: Bound = Bound::new(1e-6, 1.0, "a time from 1e-6 to 1 s");
 const TOLERANCE: Bound = Bound::new(1e-9, 1.0, "a length from 1e-9 to 1 m");
 const ACCURACY: Bound = Bound::new(1e-14, 0.1, "a tolerance from 1e-14 to 0.1");
 const AFTER: Bound = Bound::new(1e-3, 1e6, "a time from 0.001 to 1e6 s");
+const TURN: Bound = Bound::new(0.01, 1e6, "an angle from 0.01 to 1e6 rad");
 const SECONDS: Bound = Bound::new(0.0, 1e6, "a time from 0 to 1e6 s");
 
 impl WorldSettings {
@@ -258,6 +262,7 @@ impl WorldSettings {
             combine_restitution: f.choice_or("combine_restitution", Combine::NAMES, default.combine_restitution),
             combine_friction: f.choice_or("combine_friction", Combine::NAMES, default.combine_friction),
             event_impulse_n_s: f.number_or("event_impulse_n_s", Bound::NOT_NEGATIVE, default.event_impulse_n_s),
+            max_turn_rad: f.number_or("max_turn_rad", TURN, default.max_turn_rad),
             contacts: f.choice_or("contacts", CONTACTS, default.contacts),
             threads: f.integer_or("threads", 0..=256, default.threads),
         };

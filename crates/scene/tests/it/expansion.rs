@@ -43,11 +43,12 @@ fn the_empty_scene_has_the_defaults_of_the_documentation() {
 fn every_word_of_the_world() {
     let scene = read(
         "[world]\nstepper = \"backtracking\"\nintegrator = \"dormand_prince\"\nintegrator_tolerance = 1e-9\nsolver = \"lcp_sliding\"\nsubsteps = 4\niterations = 7\n\
-         duration_s = 2\ncontact_tolerance_m = 1e-5\ncombine_restitution = \"average\"\ncombine_friction = \"product\"\ngravity_m_per_s2 = [1, 2, 3]\nsleep_after_s = 0.25\nsleep_within_m = 1e-6\nthreads = 3\nbudget = 5000\nevent_impulse_n_s = 0.5\n",
+         duration_s = 2\ncontact_tolerance_m = 1e-5\ncombine_restitution = \"average\"\ncombine_friction = \"product\"\ngravity_m_per_s2 = [1, 2, 3]\nsleep_after_s = 0.25\nsleep_within_m = 1e-6\nthreads = 3\nbudget = 5000\nevent_impulse_n_s = 0.5\nmax_turn_rad = 0.25\n",
     );
     assert_eq!(scene.build().unwrap().0.settings().threads, 3);
     assert_eq!(scene.build().unwrap().0.settings().solver_settings.budget, Some(5000));
     assert_eq!(scene.build().unwrap().0.settings().event_impulse, 0.5);
+    assert_eq!(scene.build().unwrap().0.settings().max_turn, 0.25);
     let world = scene.world;
     assert_eq!(
         (world.stepper, world.integrator, world.solver),

@@ -8,6 +8,7 @@ use crate::articulated::model::compiled::{Compiled, CompiledLink, JointKind};
 use crate::articulated::simd::joint_sin_cos::JointSinCos;
 use crate::object::part_state::Wrench;
 use crate::spatial::{Force, Motion, Vector};
+use crate::step::rate_squared;
 use nalgebra::{Rotation3, UnitQuaternion};
 use tumble_collide::{Mat3, Pose, Vec3};
 
@@ -221,6 +222,26 @@ impl Dynamics {
         for ((angular, linear), slot) in out.iter_mut().zip(&slots[1..]) {
             *angular += Vec3::from(slot.bias_acceleration.angular);
             *linear += Vec3::from(slot.bias_acceleration.linear);
+        }
+    }
+
+    /// Returns the square of the angular frequency, rad²/s², with which a link turns about its joint, all
+    /// links before it held, if a rotation vector `δθ` (world axes) gives a restoring torque `stiffness·δθ`,
+    /// N·m/rad; 0 for joints without rotation.
+    pub(in crate::articulated) fn joint_rate(&self, link: usize, stiffness: &Mat3) -> f64 {
+        let slot = &self.sweep.slots[link + 1];
+        match self.compiled.bodies[link].kind {
+            JointKind::Revolute => {
+                let axis = Vec3::from(slot.rotation.z);
+                slot.inverse * axis.dot(&(stiffness * axis)).abs()
+            }
+            JointKind::Spherical(block) => {
+                let factor = &self.sweep.blocks[block].first;
+                let torque = |k: usize| stiffness.column(k).into_owned().into();
+                let solved = |k: usize| Vec3::from(factor.upper_solve(factor.lower_solve(torque(k))));
+                rate_squared(&Mat3::from_columns(&[solved(0), solved(1), solved(2)]))
+            }
+            JointKind::Prismatic | JointKind::Floating(_) => 0.0,
         }
     }
 

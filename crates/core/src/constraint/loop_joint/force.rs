@@ -4,7 +4,8 @@ use super::LoopJoint;
 use super::pair::{Motion, Term, Terms};
 use crate::contact::warm_starts::RowStart;
 use crate::object::Level;
-use crate::world::view::WorldView;
+use crate::object::part_state::PointLoad;
+use crate::world::view::{ObjectId, WorldView};
 use tumble_collide::Vec3;
 
 /// The force and torque that a loop joint transmits, with those of its limits, spring, friction,
@@ -46,6 +47,17 @@ impl LoopJoint {
             sum.drive += force - spring + self.dof.damping * coordinate.rate;
         }
         sum
+    }
+
+    /// Returns the forces on its sides for the forces of its rows, each at the joint's point of the side;
+    /// `None` for the world, and for both if there are none.
+    pub(crate) fn loads(&self, view: &WorldView, forces: &[RowStart]) -> [Option<(ObjectId, PointLoad)>; 2] {
+        let force = self.transmitted(view, forces).force;
+        let Some(pair) = self.pair(view).filter(|_| force != Vec3::zeros()) else { return [None; 2] };
+        [(&pair.a, force), (&pair.b, -force)].map(|(end, force)| {
+            let (id, part) = end.part?;
+            Some((id, PointLoad { part, point: end.p(), force }))
+        })
     }
 
     pub(crate) fn breaks(&self, force: &JointForce) -> bool {
