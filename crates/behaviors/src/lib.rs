@@ -19,13 +19,17 @@
 
 mod boid;
 mod error;
+mod fields;
 mod flock;
 mod grid;
 mod non_spinning;
 mod steering;
 
 pub use boid::Boid;
-pub use error::FlockError;
+pub use error::BehaviorError;
+pub use fields::{
+    Attractor, Buoyancy, DragLaw, Explosion, Panel, Panels, Submerged, Targets, Wind, silhouette, submerged,
+};
 pub use flock::Flock;
 pub use non_spinning::non_spinning;
 pub use steering::{Flyer, Search, Steering};

@@ -1,6 +1,8 @@
 //! The behaviors against closed forms, hand computations and brute force.
 
 mod boids;
+mod buoyancy;
+mod fields;
 mod flights;
 mod laws;
 mod neighbors;
