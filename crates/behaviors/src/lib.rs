@@ -23,6 +23,7 @@ mod fields;
 mod flock;
 mod grid;
 mod non_spinning;
+mod particles;
 mod steering;
 
 pub use boid::Boid;
@@ -32,4 +33,5 @@ pub use fields::{
 };
 pub use flock::Flock;
 pub use non_spinning::non_spinning;
+pub use particles::{Emitter, Particle, ParticleSettings, ParticleSystem};
 pub use steering::{Flyer, Search, Steering};

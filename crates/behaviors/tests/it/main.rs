@@ -7,6 +7,7 @@ mod flights;
 mod laws;
 mod neighbors;
 mod non_spinning;
+mod particles;
 mod steering;
 
 use tumble_behaviors::Boid;
