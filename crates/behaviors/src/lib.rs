@@ -24,6 +24,7 @@ mod flock;
 mod grid;
 mod non_spinning;
 mod particles;
+mod springs;
 mod steering;
 
 pub use boid::Boid;
@@ -34,4 +35,5 @@ pub use fields::{
 pub use flock::Flock;
 pub use non_spinning::non_spinning;
 pub use particles::{Emitter, Particle, ParticleSettings, ParticleSystem};
+pub use springs::{Cloth, Jelly, MeshSpring, SpringMesh};
 pub use steering::{Flyer, Search, Steering};

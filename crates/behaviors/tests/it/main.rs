@@ -8,6 +8,7 @@ mod laws;
 mod neighbors;
 mod non_spinning;
 mod particles;
+mod springs;
 mod steering;
 
 use tumble_behaviors::Boid;
