@@ -37,3 +37,8 @@ pub use non_spinning::non_spinning;
 pub use particles::{Emitter, Particle, ParticleSettings, ParticleSystem};
 pub use springs::{Cloth, Jelly, MeshSpring, SpringMesh};
 pub use steering::{Flyer, Search, Steering};
+
+/// The tutorial, whose programs run as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/new_behavior.md")]
+struct Tutorial;

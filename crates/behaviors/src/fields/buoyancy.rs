@@ -26,6 +26,16 @@ use tumble_collide::Vec3;
 use tumble_core::{ForceGenerator, Forces, Object, StateRange, WorldView};
 
 /// A fluid below a horizontal surface, without walls or ground.
+///
+/// ```
+/// # use tumble_core::prelude::*;
+/// use tumble_behaviors::{Buoyancy, DragLaw, Wind};
+/// let mut world = World::default();
+/// let ball = world.add(RigidBody::new(Shape::sphere(0.2)?).with_mass(16.755))?; // half of what it displaces
+/// world.add(Buoyancy::new("water", Vec3::zeros(), 1000.0)?.with_drag(2.0, Vec3::zeros())?)?;
+/// world.add(Wind::new("wind", Vec3::new(3.0, 0.0, 0.0), DragLaw::Quadratic { density: 1.2, coefficient: 0.47 })?)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Buoyancy {
     name: String,

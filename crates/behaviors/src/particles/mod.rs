@@ -95,6 +95,18 @@ impl Default for ParticleSettings {
 }
 
 /// A system of particles.
+///
+/// ```
+/// # use tumble_core::prelude::*;
+/// # let mut world = World::default();
+/// use tumble_behaviors::{Emitter, ParticleSettings, ParticleSystem};
+/// let sparks = ParticleSettings { linear_drag: 0.5, two_way: true, ..ParticleSettings::default() };
+/// let sparks = ParticleSystem::new("sparks", sparks)?.with_emitter(Emitter::burst(Vec3::new(0.0, 0.0, 1.0), 500, 0.0))?;
+/// let sparks = world.add(sparks)?;
+/// world.step()?;
+/// assert_eq!(ParticleSystem::particles(&world, sparks).unwrap().count(), 500);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct ParticleSystem {
     name: String,

@@ -1,4 +1,4 @@
-//! What particles collide with: all parts of a world, as they moved during a frame.
+//! Obstacles of particles: all parts of a world, as they moved during a frame.
 //!
 //! ```text
 //! gap(t) = distance(shape at X(t), x(t)) − r,  |gap(t₂) − gap(t₁)| ≤ s·|t₂ − t₁|

@@ -60,6 +60,18 @@ pub struct MeshSpring {
 
 /// Point masses joined by springs. Its state is the positions of all nodes (m), then their velocities (m/s). Each
 /// node is a part.
+///
+/// ```
+/// # use tumble_core::prelude::*;
+/// # let mut world = World::default();
+/// use tumble_behaviors::{Cloth, SpringMesh};
+/// let cloth = Cloth { stiffness: [1e6, 1e6, 1e4], ..Cloth::default() }; // N/m: structure, shear, bending
+/// let cloth = cloth.mesh()?.with_radius(0.03)?.with_pins(|x| x.y > 0.499);
+/// let cloth = SpringMesh::add(&mut world, cloth)?;
+/// world.step()?;
+/// assert_eq!(SpringMesh::positions(&world, cloth).unwrap().len(), 400);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct SpringMesh {
     name: String,
@@ -72,7 +84,7 @@ pub struct SpringMesh {
     material: Material,
     /// Length of a sub-step, s.
     step: f64,
-    /// Where in a step the forces of springs act, ½ to 1.
+    /// Time in a step at which the forces of springs act, ½ to 1.
     implicitness: f64,
     pattern: Arc<Pattern>,
 }

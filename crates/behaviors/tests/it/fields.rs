@@ -83,8 +83,8 @@ fn silhouettes_against_shadows_of_many_points() {
 
 /// Returns the position after one orbit of an eccentric ellipse with `count` steps per orbit.
 fn orbit(count: usize) -> (f64, f64) {
-    let (strength, axis, eccentricity) = (4.0, 1.0, 0.3);
-    let period = 2.0 * PI * (axis * axis * axis / strength as f64).sqrt();
+    let (strength, axis, eccentricity) = (4.0, 1.0f64, 0.3);
+    let period = 2.0 * PI * (axis * axis * axis / strength).sqrt();
     let mut world = world(period / count as f64, 0.0);
     let start = Vec3::new(axis * (1.0 - eccentricity), 0.0, 0.0);
     let speed = (strength / axis * (1.0 + eccentricity) / (1.0 - eccentricity)).sqrt();

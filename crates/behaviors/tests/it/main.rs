@@ -4,6 +4,7 @@ mod boids;
 mod buoyancy;
 mod fields;
 mod flights;
+mod frame_states;
 mod laws;
 mod neighbors;
 mod non_spinning;

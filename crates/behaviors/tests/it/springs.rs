@@ -160,7 +160,7 @@ fn a_ball_falls_on_a_sheet_and_stays_on_it() {
         let body = world.body(ball).unwrap();
         println!("ball at {:.4} m, at most {rest:.4} m/s, lifted by {lift:.4} N", body.position().z);
         assert!(rest < 0.1 && body.position().xy().norm() < 0.25 && body.position().z > -0.5, "{}", body.position());
-        // in the mean of two seconds the contacts carry its weight, but for the change of its velocity
+        // in the mean of two seconds the contacts carry its weight, less the change of its velocity
         assert!((lift - G).abs() < 0.01 * G, "{lift} N");
         let depth = world.contacts().iter().map(|c| c.depth).fold(0.0, f64::max);
         assert!(depth < 1e-3 && SpringMesh::positions(&world, id).unwrap().iter().all(|x| x.z < 0.1), "{depth}");

@@ -8,7 +8,7 @@ use crate::world::view::{ObjectId, WorldView};
 use tumble_collide::Vec3;
 
 /// A state that follows the world: it is advanced once per frame, after everything else has moved.
-/// Particles have one, and so has a controller that remembers what it saw.
+/// Particles have one; a controller that remembers what it saw has one too.
 ///
 /// The state is a part of `X`, so it is saved, forked and rolled back with the world. It has no degrees
 /// of freedom: no integrator, solver or contact knows it. An object that is
