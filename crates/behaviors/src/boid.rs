@@ -31,7 +31,7 @@
 //! For contacts the boid is a point mass: it has no angular velocity, and nothing but its own turn
 //! changes its orientation.
 
-use crate::error::{FlockError, check};
+use crate::error::{BehaviorError, check};
 use std::f64::consts::FRAC_PI_2;
 use tumble_collide::{Pose, Quat, Shape, Vec3};
 use tumble_core::{
@@ -61,8 +61,8 @@ impl Boid {
     /// Makes a boid of a mass, kg, above 0, at rest at the origin.
     ///
     /// # Errors
-    /// [`FlockError::Range`] names the mass.
-    pub fn new(shape: Shape, mass: f64) -> Result<Boid, FlockError> {
+    /// [`BehaviorError::Range`] names the mass.
+    pub fn new(shape: Shape, mass: f64) -> Result<Boid, BehaviorError> {
         check("the mass of a boid", mass, mass > 0.0, "above 0")?;
         let (name, material, visuals) = (String::new(), Material::default(), Vec::new());
         Ok(Boid { name, shape, mass, material, visuals, start: [0.0; 8], bank_time: 1.0, roll_time: 0.2 })
@@ -94,8 +94,8 @@ impl Boid {
     /// 0.2 s by default.
     ///
     /// # Errors
-    /// [`FlockError::Range`] names the time that is out of its range.
-    pub fn with_bank(self, bank_time: f64, roll_time: f64) -> Result<Boid, FlockError> {
+    /// [`BehaviorError::Range`] names the time that is out of its range.
+    pub fn with_bank(self, bank_time: f64, roll_time: f64) -> Result<Boid, BehaviorError> {
         check("bank_time", bank_time, bank_time >= 0.0, "at least 0")?;
         check("roll_time", roll_time, roll_time > 0.0, "above 0")?;
         Ok(Boid { bank_time, roll_time, ..self })

@@ -6,7 +6,7 @@ use tumble_core::WorldError;
 /// An error of a boid or a flock.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum FlockError {
+pub enum BehaviorError {
     /// A constant is out of its range.
     Range {
         /// The constant.
@@ -24,33 +24,33 @@ pub enum FlockError {
     World(WorldError),
 }
 
-impl fmt::Display for FlockError {
+impl fmt::Display for BehaviorError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            FlockError::Range { what, value, range } => write!(f, "{what} is {value}, but must be {range}"),
-            FlockError::NoFlock => write!(f, "no such flock: it was removed, or the id is of another object"),
-            FlockError::NoBoid => write!(f, "the object is not a boid of this flock"),
-            FlockError::World(why) => why.fmt(f),
+            BehaviorError::Range { what, value, range } => write!(f, "{what} is {value}, but must be {range}"),
+            BehaviorError::NoFlock => write!(f, "no such flock: it was removed, or the id is of another object"),
+            BehaviorError::NoBoid => write!(f, "the object is not a boid of this flock"),
+            BehaviorError::World(why) => why.fmt(f),
         }
     }
 }
 
-impl std::error::Error for FlockError {
+impl std::error::Error for BehaviorError {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
-            FlockError::World(why) => Some(why),
+            BehaviorError::World(why) => Some(why),
             _ => None,
         }
     }
 }
 
-impl From<WorldError> for FlockError {
-    fn from(why: WorldError) -> FlockError {
-        FlockError::World(why)
+impl From<WorldError> for BehaviorError {
+    fn from(why: WorldError) -> BehaviorError {
+        BehaviorError::World(why)
     }
 }
 
 /// Returns an error if a constant is not finite or not within its range.
-pub(crate) fn check(what: &'static str, value: f64, fits: bool, range: &'static str) -> Result<(), FlockError> {
-    if value.is_finite() && fits { Ok(()) } else { Err(FlockError::Range { what, value, range }) }
+pub(crate) fn check(what: &'static str, value: f64, fits: bool, range: &'static str) -> Result<(), BehaviorError> {
+    if value.is_finite() && fits { Ok(()) } else { Err(BehaviorError::Range { what, value, range }) }
 }

@@ -5,7 +5,7 @@
 //! removed between steps; ids of boids that were removed from the world are ignored.
 
 use crate::boid::Boid;
-use crate::error::FlockError;
+use crate::error::BehaviorError;
 use crate::steering::{Flyer, Search, Steering};
 use tumble_collide::Vec3;
 use tumble_core::{ForceGenerator, Forces, Object, ObjectId, StateRange, World, WorldView};
@@ -24,7 +24,7 @@ impl Flock {
     ///
     /// # Errors
     /// As [`Steering::validate`].
-    pub fn new(name: impl Into<String>, steering: Steering) -> Result<Flock, FlockError> {
+    pub fn new(name: impl Into<String>, steering: Steering) -> Result<Flock, BehaviorError> {
         steering.validate()?;
         Ok(Flock { name: name.into(), steering, search: Search::Grid, boids: Vec::new() })
     }
@@ -40,7 +40,7 @@ impl Flock {
     ///
     /// # Errors
     /// As [`Steering::validate`]. The constants then stay as they are.
-    pub fn set_steering(&mut self, steering: Steering) -> Result<(), FlockError> {
+    pub fn set_steering(&mut self, steering: Steering) -> Result<(), BehaviorError> {
         steering.validate()?;
         self.steering = steering;
         Ok(())
@@ -54,24 +54,24 @@ impl Flock {
     /// Adds a boid to the world and to a flock of it, and returns its id.
     ///
     /// # Errors
-    /// [`FlockError::NoFlock`], or [`FlockError::World`] as of [`World::add`]. Nothing is added then.
-    pub fn add(world: &mut World, flock: ObjectId, boid: Boid) -> Result<ObjectId, FlockError> {
-        world.get::<Flock>(flock).ok_or(FlockError::NoFlock)?;
+    /// [`BehaviorError::NoFlock`], or [`BehaviorError::World`] as of [`World::add`]. Nothing is added then.
+    pub fn add(world: &mut World, flock: ObjectId, boid: Boid) -> Result<ObjectId, BehaviorError> {
+        world.get::<Flock>(flock).ok_or(BehaviorError::NoFlock)?;
         let id = world.add(boid)?;
-        world.get_mut::<Flock>(flock).ok_or(FlockError::NoFlock)?.boids.push(id);
+        world.get_mut::<Flock>(flock).ok_or(BehaviorError::NoFlock)?.boids.push(id);
         Ok(id)
     }
 
     /// Removes a boid from a flock and from the world.
     ///
     /// # Errors
-    /// [`FlockError::NoFlock`]; [`FlockError::NoBoid`] if the object is not in the flock or was
+    /// [`BehaviorError::NoFlock`]; [`BehaviorError::NoBoid`] if the object is not in the flock or was
     /// removed from the world before.
-    pub fn remove(world: &mut World, flock: ObjectId, boid: ObjectId) -> Result<(), FlockError> {
-        let boids = &mut world.get_mut::<Flock>(flock).ok_or(FlockError::NoFlock)?.boids;
-        let place = boids.iter().position(|id| *id == boid).ok_or(FlockError::NoBoid)?;
+    pub fn remove(world: &mut World, flock: ObjectId, boid: ObjectId) -> Result<(), BehaviorError> {
+        let boids = &mut world.get_mut::<Flock>(flock).ok_or(BehaviorError::NoFlock)?.boids;
+        let place = boids.iter().position(|id| *id == boid).ok_or(BehaviorError::NoBoid)?;
         boids.remove(place);
-        world.remove(boid).map(drop).map_err(|_| FlockError::NoBoid)
+        world.remove(boid).map(drop).map_err(|_| BehaviorError::NoBoid)
     }
 }
 

@@ -19,13 +19,26 @@
 
 mod boid;
 mod error;
+mod fields;
 mod flock;
 mod grid;
 mod non_spinning;
+mod particles;
+mod springs;
 mod steering;
 
 pub use boid::Boid;
-pub use error::FlockError;
+pub use error::BehaviorError;
+pub use fields::{
+    Attractor, Buoyancy, DragLaw, Explosion, Panel, Panels, Submerged, Targets, Wind, silhouette, submerged,
+};
 pub use flock::Flock;
 pub use non_spinning::non_spinning;
+pub use particles::{Emitter, Particle, ParticleSettings, ParticleSystem};
+pub use springs::{Cloth, Jelly, MeshSpring, SpringMesh};
 pub use steering::{Flyer, Search, Steering};
+
+/// The tutorial, whose programs run as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/new_behavior.md")]
+struct Tutorial;

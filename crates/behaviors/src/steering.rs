@@ -35,7 +35,7 @@
 //! - Constants belong to the flock and not to each boid. Center, radius and stiffness of the
 //!   boundary are constants; in the appendix they are 0, 300 and 1.
 
-use crate::error::{FlockError, check};
+use crate::error::{BehaviorError, check};
 use crate::grid::Grid;
 use std::f64::consts::PI;
 use tumble_collide::Vec3;
@@ -124,8 +124,8 @@ impl Steering {
     /// Checks the ranges of all constants.
     ///
     /// # Errors
-    /// [`FlockError::Range`] names a constant that is out of its range.
-    pub fn validate(&self) -> Result<(), FlockError> {
+    /// [`BehaviorError::Range`] names a constant that is out of its range.
+    pub fn validate(&self) -> Result<(), BehaviorError> {
         for (what, value) in [
             ("avoidance", self.avoidance),
             ("matching", self.matching),

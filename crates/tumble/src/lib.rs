@@ -1,7 +1,7 @@
 //! Real-time dynamics for interactive and immersive environments.
 //!
-//! Reexports the crates: geometry ([`collide`]), dynamics ([`dynamics`]), scene files ([`scene`]),
-//! networking and recordings (`net`) and pictures (`render`). The `tumble` command is built on this
+//! Reexports the crates: geometry ([`collide`]), dynamics ([`dynamics`]), flocks, particles, cloth and
+//! force fields ([`behaviors`]), scene files ([`scene`]), networking and recordings (`net`) and pictures (`render`). The `tumble` command is built on this
 //! library. `docs/conventions.md` compares units, sizes, frames and signs with those of Python and
 //! of scene files.
 //!
@@ -11,7 +11,7 @@
 //! | `net` | the module `net`: recordings (MCAP), facets of a cave over shared memory and UDP | yes |
 //! | `command` | the dependencies of the `tumble` command; implies `render` and `net` | yes |
 //!
-//! With `default-features = false` the library holds `collide`, `dynamics` and `scene` only.
+//! With `default-features = false` the library holds `collide`, `dynamics`, `behaviors` and `scene` only.
 //!
 //! ```
 //! let scene = tumble::scene::resolve_scene("stack", &[])?.load()?;
@@ -21,6 +21,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub use tumble_behaviors as behaviors;
 pub use tumble_collide as collide;
 pub use tumble_core as dynamics;
 #[cfg(feature = "net")]

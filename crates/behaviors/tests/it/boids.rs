@@ -2,7 +2,7 @@
 
 use crate::{Numbers, boid, steps, world};
 use std::f64::consts::FRAC_PI_2;
-use tumble_behaviors::{Boid, FlockError};
+use tumble_behaviors::{BehaviorError, Boid};
 use tumble_core::prelude::*;
 
 #[test]
@@ -100,7 +100,7 @@ fn boids_collide_as_points_of_their_mass() {
 fn constants_out_of_range_are_refused() {
     let sphere = || Shape::sphere(0.1).unwrap();
     for mass in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        assert!(matches!(Boid::new(sphere(), mass), Err(FlockError::Range { .. })));
+        assert!(matches!(Boid::new(sphere(), mass), Err(BehaviorError::Range { .. })));
     }
     let fine = || Boid::new(sphere(), 1.0).unwrap();
     assert!(fine().with_bank(-1.0, 1.0).is_err() && fine().with_bank(1.0, 0.0).is_err());

@@ -1,7 +1,7 @@
 //! Flocks in worlds.
 
 use crate::{Numbers, boid, steps, world};
-use tumble_behaviors::{Flock, FlockError, Search, Steering};
+use tumble_behaviors::{BehaviorError, Flock, Search, Steering};
 use tumble_core::prelude::*;
 
 fn flock(world: &mut World, steering: Steering, search: Search, count: usize, size: f64) -> ObjectId {
@@ -140,8 +140,8 @@ fn boids_come_and_go_in_flight() {
     world.set_enabled(boids[7], false).unwrap();
     steps(&mut world, 30);
     assert!(world.part_state(boids[3], 0).is_none());
-    assert_eq!(Flock::remove(&mut world, id, boids[3]), Err(FlockError::NoBoid));
-    assert_eq!(Flock::remove(&mut world, boids[5], boids[6]), Err(FlockError::NoFlock));
+    assert_eq!(Flock::remove(&mut world, id, boids[3]), Err(BehaviorError::NoBoid));
+    assert_eq!(Flock::remove(&mut world, boids[5], boids[6]), Err(BehaviorError::NoFlock));
     let late = Flock::add(&mut world, id, boid(Vec3::new(1.0, 2.0, 3.0), Vec3::y())).unwrap();
     steps(&mut world, 30);
     assert!(world.part_state(late, 0).unwrap().velocity.norm() > 1.0);

@@ -1,10 +1,15 @@
 //! The behaviors against closed forms, hand computations and brute force.
 
 mod boids;
+mod buoyancy;
+mod fields;
 mod flights;
+mod frame_states;
 mod laws;
 mod neighbors;
 mod non_spinning;
+mod particles;
+mod springs;
 mod steering;
 
 use tumble_behaviors::Boid;

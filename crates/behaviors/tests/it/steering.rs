@@ -1,7 +1,7 @@
 //! The forces of the appendix by hand.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
-use tumble_behaviors::{Flock, FlockError, Flyer, Search, Steering};
+use tumble_behaviors::{BehaviorError, Flock, Flyer, Search, Steering};
 use tumble_core::prelude::*;
 
 /// A flock without forces, that sees 10 m in front; each test turns on its own.
@@ -134,7 +134,7 @@ fn constants_out_of_range_are_refused_by_name() {
     for (steering, name) in bad.iter().zip(["max_force", "visibility_distance", "visibility_angle", "boundary_center"])
     {
         let error = Flock::new("flock", *steering).unwrap_err();
-        assert!(matches!(error, FlockError::Range { what, .. } if what == name), "{error}");
+        assert!(matches!(error, BehaviorError::Range { what, .. } if what == name), "{error}");
         assert!(error.to_string().starts_with(name));
     }
 }

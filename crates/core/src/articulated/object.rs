@@ -120,6 +120,14 @@ impl Integratable for ArticulatedBody {
         x.copy_from_slice(&self.start);
     }
 
+    fn part_mass(&self, part: usize) -> f64 {
+        self.model.links().get(part).map_or(0.0, |link| link.mass.mass)
+    }
+
+    fn part_center(&self, part: usize) -> Vec3 {
+        self.model.links().get(part).map_or_else(Vec3::zeros, |link| link.mass.center)
+    }
+
     fn accepts(&self, x: &[f64]) -> bool {
         self.is_state(x)
     }

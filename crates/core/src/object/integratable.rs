@@ -41,6 +41,12 @@ pub trait Integratable: Object {
         let _ = part;
         0.0
     }
+    /// Returns the center of mass of a part in the frame of the part, m, for forces that act on
+    /// masses. The origin by default; the provided methods do not use it.
+    fn part_center(&self, part: usize) -> Vec3 {
+        let _ = part;
+        Vec3::zeros()
+    }
     /// Returns which quantity of motion the state holds. [`MomentumKind::Velocity`] by default.
     fn momentum_kind(&self) -> MomentumKind {
         MomentumKind::Velocity

@@ -11,6 +11,7 @@ pub(crate) mod collidable;
 mod conserved;
 mod constraint;
 mod force;
+pub(crate) mod frame_state;
 mod integratable;
 mod material;
 pub(crate) mod mounts;
@@ -23,6 +24,7 @@ pub use collidable::Collidable;
 pub use conserved::{Energy, Momentum};
 pub use constraint::{Constraint, Level, RowTarget};
 pub use force::ForceGenerator;
+pub use frame_state::FrameState;
 pub use integratable::{Integratable, MomentumKind};
 pub use material::{Combine, Material};
 pub use mounts::{CameraCarrier, LightCarrier};
@@ -33,7 +35,7 @@ use crate::derived::Cache;
 use part_state::PartState;
 use std::any::Any;
 
-/// Anything in a world. Eight accessors return its other traits; all are `None` by default (the
+/// Anything in a world. Nine accessors return its other traits; all are `None` by default (the
 /// thesis's `ImplementsInterface`, §IV.B.1).
 pub trait Object: Fork + Any + Send + Sync {
     /// Returns the name that the object is to have in a world, of any length. By default it is
@@ -68,6 +70,10 @@ pub trait Object: Fork + Any + Send + Sync {
     /// Returns the interface of an object that applies forces to others; it need not have a state
     /// (thesis §IV.B.2: "live").
     fn force(&self) -> Option<&dyn ForceGenerator> {
+        None
+    }
+    /// Returns the interface of an object with a state that the world advances once per frame.
+    fn frame_state(&self) -> Option<&dyn FrameState> {
         None
     }
     /// Returns the interface of an object that can be drawn.

@@ -196,6 +196,14 @@ impl Integratable for RigidBody {
         x[10..13].copy_from_slice(l.as_slice());
     }
 
+    fn part_mass(&self, _part: usize) -> f64 {
+        self.mass
+    }
+
+    fn part_center(&self, _part: usize) -> Vec3 {
+        self.offset
+    }
+
     fn momentum_kind(&self) -> MomentumKind {
         MomentumKind::Conjugate
     }

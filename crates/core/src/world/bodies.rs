@@ -1,6 +1,6 @@
 //! Access to the objects of a world between steps.
 
-use super::{Coordinates, World, WorldError};
+use super::{World, WorldError};
 use crate::object::part_state::{PartPoint, PartState};
 use crate::object::{Integratable, Object};
 use crate::rigid::{RigidBody, orientation, vec3};
@@ -107,8 +107,12 @@ impl World {
     pub fn write_state_of(&mut self, id: ObjectId, x: &[f64]) -> Result<(), WorldError> {
         self.core.wake(id);
         let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
-        let accepted = |body: &dyn Integratable| x.len() == entry.state_range.x.len() && body.accepts(x);
-        if !entry.object.integratable().is_some_and(accepted) {
+        let (object, fits) = (&entry.object, x.len() == entry.state_range.x.len());
+        let accepted = match (object.integratable(), object.frame_state()) {
+            (None, None) => false,
+            (body, follower) => body.is_none_or(|b| b.accepts(x)) && follower.is_none_or(|f| f.accepts(x)),
+        };
+        if !(fits && accepted) {
             return Err(WorldError::BadState(entry.name.to_string()));
         }
         self.core.state.x[entry.state_range.x.clone()].copy_from_slice(x);
@@ -293,18 +297,8 @@ impl World {
         let index = self.part(id, part, &[impulse, *point])?;
         self.core.wake(id);
         let part_state = self.core.derived.part_states[index];
-        let Coordinates { objects, x, caches, .. } = self.core.coordinates(None);
-        let entry = objects.get(id).ok_or(WorldError::Stale)?;
-        let Some(body) = entry.object.integratable().filter(|_| entry.moves()) else { return Ok(()) };
-        let dof = entry.state_range.v.len();
-        let (mut y, mut dp) = (vec![0.0; 3 * dof], vec![0.0; dof]);
-        let cache = &mut caches[entry.place];
         let axes = [Vec3::x(), Vec3::y(), Vec3::z()];
-        body.test_impulse(cache, &PartPoint { part, part_state: &part_state, point: *point, axes: &axes }, 1.0, &mut y);
-        let du: Vec<f64> = (0..dof).map(|k| (0..3).map(|r| impulse[r] * y[r * dof + k]).sum()).collect();
-        body.unwhiten_change(cache, &du, &mut dp);
-        body.kick(&mut x[entry.state_range.x.clone()], &dp, 1.0);
-        self.core.integration().refresh_one(id);
+        self.core.kick_at(id, &PartPoint { part, part_state: &part_state, point: *point, axes: &axes }, &impulse);
         Ok(())
     }
 

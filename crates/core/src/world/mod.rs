@@ -7,6 +7,7 @@ mod contacts_of;
 mod core;
 mod error;
 pub(crate) mod events;
+mod frame_states;
 mod islands;
 mod joints;
 mod pair_materials;
@@ -37,7 +38,7 @@ pub use working_memory::WorkingMemory;
 use crate::contact::detect::Owner;
 use crate::object::part_state::{PartState, StateRange, StateSizes};
 use crate::object::visual::Visual;
-use crate::object::{Energy, Momentum, Object};
+use crate::object::{Energy, FrameState, Momentum, Object};
 use crate::report::StepReport;
 use crate::rigid::RigidBody;
 use crate::settings::Settings;
@@ -56,6 +57,8 @@ pub struct World {
     before: WorldState,
     /// Contacts of the frame before, for a frame that fails.
     contacts_before: Vec<ContactPoint>,
+    /// Part states before the frame, for objects with a frame state; empty if there are none.
+    parts_before: Vec<PartState>,
     names: BTreeMap<Arc<str>, ObjectId>,
 }
 
@@ -82,7 +85,14 @@ impl World {
     }
 
     fn of(core: Core, stepper: Box<dyn Stepper>, names: BTreeMap<Arc<str>, ObjectId>) -> World {
-        World { core, stepper, before: WorldState::default(), contacts_before: Vec::new(), names }
+        World {
+            core,
+            stepper,
+            before: WorldState::default(),
+            contacts_before: Vec::new(),
+            parts_before: Vec::new(),
+            names,
+        }
     }
 
     /// Replaces the stepper. A world is archived only with one of [`STEPPERS`](crate::STEPPERS).
@@ -144,6 +154,7 @@ impl World {
         core.refresh(); // constants and switches may have changed
         core.wake_disturbed();
         core.divide_ahead(self.stepper.as_ref());
+        core.keep_part_states(&mut self.parts_before);
         loop {
             let requests = core.needs_wake.len();
             core.clear_contact_forces();
@@ -154,7 +165,12 @@ impl World {
             core.largest_turn = LargestTurn::default();
             let done = self.stepper.step(StepContext { core });
             let done = done.and_then(|()| check_duration(self.stepper.name(), core, self.before.time));
-            let again = match done.and_then(|()| core.divide_again(self.stepper.as_ref(), self.before.time)) {
+            let done = done.and_then(|()| core.divide_again(self.stepper.as_ref(), self.before.time));
+            let followed = |again: bool| match again {
+                true => Ok(true),
+                false => core.advance_frame_states(&self.parts_before).map(|()| false),
+            };
+            let again = match done.and_then(followed) {
                 Ok(again) => again,
                 Err(error) => {
                     core.set_state(&self.before);
@@ -332,6 +348,8 @@ impl World {
             "joint"
         } else if object.force().is_some() {
             "force"
+        } else if object.frame_state().is_some() {
+            "state"
         } else {
             "object"
         };
@@ -355,7 +373,8 @@ impl World {
         }
         let core = &mut self.core;
         let parts = object.collidable().map_or(0, |c| c.parts());
-        let state_sizes = object.integratable().map_or(StateSizes { x: 0, dof: 0, parts }, |i| i.state_sizes());
+        let x = frame_states::alone(object.as_ref()).map_or(0, FrameState::len);
+        let state_sizes = object.integratable().map_or(StateSizes { x, dof: 0, parts }, |i| i.state_sizes());
         if object.collidable().is_some() && state_sizes.parts != parts {
             return Err(WorldError::Parts { name, parts, part_states: state_sizes.parts });
         }
@@ -367,6 +386,8 @@ impl World {
         core.state.x.resize(state_range.x.end);
         if let Some(body) = object.integratable() {
             body.write_initial(&mut core.state.x[state_range.x.clone()]);
+        } else if let Some(follower) = object.frame_state() {
+            follower.write_initial(&mut core.state.x[state_range.x.clone()]);
         }
         if core.state.x[state_range.x.clone()].iter().any(|x| !x.is_finite()) {
             core.state.x.resize(state_range.x.start);

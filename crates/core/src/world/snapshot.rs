@@ -113,7 +113,9 @@ impl World {
             return format("its tables have the wrong lengths");
         }
         let accepts = |e: crate::world::view::Entry| {
-            e.object.integratable().is_none_or(|body| body.accepts(&state.x[e.state_range.x.clone()]))
+            let x = &state.x[e.state_range.x.clone()];
+            e.object.integratable().is_none_or(|body| body.accepts(x))
+                && e.object.frame_state().is_none_or(|follower| follower.accepts(x))
         };
         if !(state.is_finite() && self.core.objects().iter().all(accepts)) {
             return Err(SnapshotError::NotFinite);

@@ -1,0 +1,144 @@
+//! The traits of objects for the spring mesh.
+
+use super::SpringMesh;
+use super::factor::{Factor, Pattern};
+use tumble_collide::{Pose, Shape, Vec3};
+use tumble_core::{
+    Cache, Collidable, Energy, ForceSlice, Integratable, Material, Object, PartPoint, PartState, StateSizes,
+};
+
+/// The factor of the last refreshed state, made when it is first asked for.
+#[derive(Default)]
+pub(super) struct MeshCache {
+    pub x: Vec<f64>,
+    pub factor: Option<Factor>,
+    /// Memory of a factor that is out of date.
+    pub spare: Factor,
+    /// Vectors in the order of elimination.
+    work: Vec<Vec3>,
+}
+
+impl SpringMesh {
+    /// Does `work` with the pattern, the factor and a vector in the order of elimination, made of `from` and
+    /// written to `to`.
+    fn map(&self, cache: &mut Cache, from: &[f64], to: &mut [f64], work: impl Fn(&Pattern, &Factor, &mut [Vec3])) {
+        let MeshCache { x, factor, spare, work: vector } = cache.get();
+        let factor = factor.get_or_insert_with(|| {
+            let mut factor = std::mem::take(spare);
+            self.write_factor(x, x, &mut factor);
+            factor
+        });
+        vector.resize(self.nodes.len(), Vec3::zeros());
+        for (place, from) in self.pattern.place.iter().zip(from.chunks_exact(3)) {
+            vector[*place] = Vec3::from_column_slice(from);
+        }
+        work(&self.pattern, factor, vector);
+        for (place, to) in self.pattern.place.iter().zip(to.chunks_exact_mut(3)) {
+            to.copy_from_slice(vector[*place].as_slice());
+        }
+    }
+}
+
+impl Object for SpringMesh {
+    fn name(&self) -> &str {
+        &self.name
+    }
+    fn new_cache(&self) -> Cache {
+        Cache::new(MeshCache::default())
+    }
+    fn refresh(&self, x: &[f64], cache: &mut Cache, part_states: &mut [PartState]) {
+        let cache: &mut MeshCache = cache.get();
+        if cache.x != x {
+            x.clone_into(&mut cache.x);
+            if let Some(factor) = cache.factor.take() {
+                cache.spare = factor;
+            }
+        }
+        let (positions, velocities) = x.split_at(3 * self.nodes.len());
+        for ((part, x), v) in part_states.iter_mut().zip(positions.chunks_exact(3)).zip(velocities.chunks_exact(3)) {
+            part.pose = Pose::translation(x[0], x[1], x[2]);
+            part.velocity = Vec3::from_column_slice(v);
+        }
+    }
+    fn integratable(&self) -> Option<&dyn Integratable> {
+        Some(self)
+    }
+    fn collidable(&self) -> Option<&dyn Collidable> {
+        Some(self)
+    }
+}
+
+impl Integratable for SpringMesh {
+    fn state_sizes(&self) -> StateSizes {
+        let count = self.nodes.len();
+        StateSizes { x: 6 * count, dof: 3 * count, parts: count }
+    }
+    fn write_initial(&self, x: &mut [f64]) {
+        let (positions, velocities) = x.split_at_mut(3 * self.nodes.len());
+        positions.iter_mut().zip(self.nodes.iter().flat_map(|node| node.iter())).for_each(|(x, node)| *x = *node);
+        for (v, pinned) in velocities.chunks_exact_mut(3).zip(&self.pinned) {
+            v.copy_from_slice(if *pinned { &[0.0; 3] } else { self.velocity.as_slice() });
+        }
+    }
+    fn part_mass(&self, part: usize) -> f64 {
+        self.masses.get(part).copied().unwrap_or(0.0)
+    }
+    fn jacobian(&self, _cache: &mut Cache, at: &PartPoint, j: &mut [f64]) {
+        if self.pinned[at.part] {
+            return;
+        }
+        for (axis, j) in at.axes.iter().zip(j.chunks_exact_mut(3 * self.nodes.len())) {
+            j[3 * at.part..3 * at.part + 3].iter_mut().zip(axis.iter()).for_each(|(j, axis)| *j += axis);
+        }
+    }
+    fn mul_l(&self, cache: &mut Cache, v: &[f64], u: &mut [f64]) {
+        self.map(cache, v, u, |pattern, factor, b| pattern.mul_transposed(factor, b));
+    }
+    fn solve_l(&self, cache: &mut Cache, u: &[f64], v: &mut [f64]) {
+        self.map(cache, u, v, |pattern, factor, b| pattern.solve_transposed(factor, b));
+    }
+    fn solve_lt(&self, cache: &mut Cache, j: &[f64], y: &mut [f64]) {
+        self.map(cache, j, y, |pattern, factor, b| pattern.solve(factor, b));
+    }
+    fn mul_lt(&self, cache: &mut Cache, u: &[f64], j: &mut [f64]) {
+        self.map(cache, u, j, |pattern, factor, b| pattern.mul(factor, b));
+    }
+    fn derivative(&self, cache: &mut Cache, x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
+        let mut forces: Vec<Vec3> = f.wrenches.iter().map(|wrench| wrench.force).collect();
+        forces.iter_mut().zip(f.generalized.chunks_exact(3)).for_each(|(f, g)| *f += Vec3::from_column_slice(g));
+        let change = self.solve_step(cache.get(), x, &forces);
+        for (dp, change) in dp.chunks_exact_mut(3).zip(change) {
+            dp.copy_from_slice((change / self.step).as_slice());
+        }
+    }
+    fn accelerations(&self, _cache: &mut Cache, _x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
+        for (part, dp) in part_states.iter_mut().zip(dp.chunks_exact(3)) {
+            part.acceleration = Vec3::from_column_slice(dp);
+        }
+    }
+    fn energy(&self, x: &[f64], gravity: &Vec3) -> Energy {
+        let (positions, velocities) = x.split_at(3 * self.nodes.len());
+        let of = |numbers: &[f64], of: &dyn Fn(f64, Vec3) -> f64| {
+            let nodes = self.masses.iter().zip(numbers.chunks_exact(3));
+            nodes.map(|(mass, x)| of(*mass, Vec3::from_column_slice(x))).sum::<f64>()
+        };
+        let weight = of(positions, &|mass, x| -mass * gravity.dot(&x));
+        let kinetic = of(velocities, &|mass, v| 0.5 * mass * v.norm_squared());
+        Energy { kinetic, potential: weight + self.spring_energy(x) }
+    }
+}
+
+impl Collidable for SpringMesh {
+    fn parts(&self) -> usize {
+        self.nodes.len()
+    }
+    fn shape(&self, _part: usize) -> Option<&Shape> {
+        self.shape.as_ref()
+    }
+    fn material(&self, _part: usize) -> Material {
+        self.material
+    }
+    fn part_moves(&self, part: usize) -> bool {
+        !self.pinned[part]
+    }
+}
