@@ -10,9 +10,10 @@ try:
 except ImportError as _missing:
     raise ImportError("tumble.gym needs the package gymnasium: pip install gymnasium", name="gymnasium") from _missing
 
-from tumble.gym.arms import InvertedPendulumTask, ReacherTask
+from tumble.gym.arms import InvertedDoublePendulumTask, InvertedPendulumTask, PusherTask, ReacherTask
 from tumble.gym.cart_pole import CartPole, CartPoleTask
 from tumble.gym.env import Env, VectorEnv
+from tumble.gym.humanoids import HumanoidStandupTask, HumanoidTask
 from tumble.gym.runners import AntTask, HalfCheetahTask, HopperTask, Walker2dTask
 from tumble.gym.task import State, Task
 
@@ -23,7 +24,11 @@ __all__ = [
     "Env",
     "HalfCheetahTask",
     "HopperTask",
+    "HumanoidStandupTask",
+    "HumanoidTask",
+    "InvertedDoublePendulumTask",
     "InvertedPendulumTask",
+    "PusherTask",
     "ReacherTask",
     "State",
     "Task",
@@ -34,11 +39,15 @@ __all__ = [
 for _task, _steps in (
     ("CartPole", 500),
     ("InvertedPendulum", 1000),
+    ("InvertedDoublePendulum", 1000),
     ("Reacher", 50),
+    ("Pusher", 100),
     ("Hopper", 1000),
     ("Walker2d", 1000),
     ("HalfCheetah", 1000),
     ("Ant", 1000),
+    ("Humanoid", 1000),
+    ("HumanoidStandup", 1000),
 ):
     if f"tumble/{_task}-v0" not in gymnasium.registry:
         gymnasium.register(
