@@ -2,7 +2,7 @@
 ``gymnasium.make_vec("tumble/Hopper-v0", num_envs=64)`` find them after ``import tumble.gym``.
 
 An environment is a ``Task``: a model, and observation, reward and end of an episode as functions of arrays. ``Env`` runs one world of it,
-``VectorEnv`` many in one ``tumble.Batch``; both give the same numbers.
+``VectorEnv`` many in one ``tumble.Batch``; both give the same numbers. A ``Team`` is several robots in one world, for PettingZoo.
 """
 
 try:
@@ -14,6 +14,7 @@ from tumble.gym.arms import InvertedDoublePendulumTask, InvertedPendulumTask, Pu
 from tumble.gym.cart_pole import CartPole, CartPoleTask
 from tumble.gym.env import Env, VectorEnv
 from tumble.gym.humanoids import HumanoidStandupTask, HumanoidTask
+from tumble.gym.parallel import ParallelEnv, Team
 from tumble.gym.runners import AntTask, HalfCheetahTask, HopperTask, Walker2dTask
 from tumble.gym.task import State, Task
 
@@ -28,10 +29,12 @@ __all__ = [
     "HumanoidTask",
     "InvertedDoublePendulumTask",
     "InvertedPendulumTask",
+    "ParallelEnv",
     "PusherTask",
     "ReacherTask",
     "State",
     "Task",
+    "Team",
     "VectorEnv",
     "Walker2dTask",
 ]

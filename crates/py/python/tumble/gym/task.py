@@ -122,7 +122,7 @@ class Runs:
         self.batch = tumble.Batch(world, count, threads=threads)
         self.dt = world.dt * task.FRAME_SKIP
         self.q, self.v = self.batch.q[0].copy(), self.batch.v[0].copy()
-        names = [name for body in world.bodies if isinstance(body, tumble.Articulation) for name in _columns(body)]
+        names = [name for body in world.bodies if isinstance(body, tumble.Articulation) for name in columns(body)]
         self.controls, self.limit_forces = np.zeros((count, self.batch.dof)), np.zeros(count)
         self.columns = np.array([names.index(joint) for joint, _ in task.MOTORS], np.int64)
 
@@ -161,8 +161,8 @@ class Runs:
         return self.task.observe(self.state())
 
 
-def _columns(body: tumble.Articulation) -> list[str]:
-    """The joint of each degree of freedom."""
+def columns(body: tumble.Articulation) -> list[str]:
+    """Returns the joint of each degree of freedom."""
     spare = body.dof - len(body.joint_names)  # a floating root has six, of one joint
     if spare == 5:
         return [body.joint_names[0]] * 6 + body.joint_names[1:]
