@@ -11,7 +11,7 @@ import tumble
 gymnasium = pytest.importorskip("gymnasium", reason="SKIPPED: gymnasium is not installed")
 tumble_gym = pytest.importorskip("tumble.gym")
 
-NAMES = ["InvertedPendulum", "InvertedDoublePendulum", "Reacher", "Pusher", "Hopper", "Walker2d", "HalfCheetah", "Ant", "Humanoid", "HumanoidStandup"]
+NAMES = ["InvertedPendulum", "InvertedDoublePendulum", "Reacher", "Pusher", "Swimmer", "Hopper", "Walker2d", "HalfCheetah", "Ant", "Humanoid", "HumanoidStandup"]
 FREE = ("Ant", "Humanoid", "HumanoidStandup")  # those with a floating root
 
 
@@ -175,6 +175,62 @@ def test_the_gripper_pushes_the_cylinder():
     for _ in range(20):
         env.step(np.array([2.0, 0, 0, 0, 0, 0, 0]))
     assert env.runs.batch.q[0, 7] > -0.55
+
+
+def test_swimmer():
+    env, (before, _), (q, v), action, (seen, reward, over, _, info) = after("Swimmer", 20)
+    assert env.runs.dt == pytest.approx(0.04) and seen.tolist() == [*q[2:], *v] and not over
+    speed = (q[:2] - before[:2]) / 0.04
+    assert reward == pytest.approx(speed[0] - 1e-4 * (action**2).sum()) and info["y_velocity"] == pytest.approx(speed[1])
+    assert info["distance_from_origin"] == pytest.approx(np.hypot(*q[:2]))
+
+
+def test_the_fluid_slows_a_swimmer():
+    """Straight along its axis: m dv/dt = -(6 b π s + 2 d r_y r_z v) v for each of the three links, and the armature moves with them."""
+
+    class Fine(tumble_gym.SwimmerTask):  # a force that depends on velocities is integrated to first order
+        FRAME_SKIP = 160
+
+        def world(self):
+            world = super().world()
+            world.dt = 0.04 / self.FRAME_SKIP
+            return world
+
+    env = tumble_gym.Env(Fine())
+    env.reset(seed=0)
+    env.runs.batch.reset(q=np.zeros(5), v=[2.0, 0, 0, 0, 0])
+    from tumble.gym.swimmer import half_sizes
+
+    x, y, z = half_sizes()
+    linear, square = 3 * 6 * 0.1 * np.pi * (x + y + z) / 3, 3 * 2 * 4000 * y * z
+    mass = env.world.articulation("front").mass + 0.1
+    for k in range(1, 6):
+        env.step(np.zeros(2))
+        decay = np.exp(-linear / mass * 0.04 * k)
+        assert env.runs.batch.v[0, 0] == pytest.approx(2 * decay / (1 + 2 * square / linear * (1 - decay)), rel=1e-3)
+    assert abs(env.runs.batch.v[0, 1:]).max() < 1e-9
+
+
+def test_the_drag_is_mujoco_s():
+    for package in ("mujoco", "imageio"):
+        pytest.importorskip(package, reason=f"SKIPPED: {package} is not installed; `make references` installs it")
+    from tumble.gym.swimmer import LINKS, drag
+
+    theirs, body, rng = gymnasium.make("Swimmer-v5").unwrapped, tumble_gym.Env("Swimmer").world.articulation("front"), np.random.default_rng(5)
+    theirs.reset(seed=0)
+    for _ in range(10):
+        q, v = rng.uniform(-1, 1, 5), rng.normal(0, 2, 5)
+        theirs.set_state(q, v)
+        found = np.zeros(5)
+        for link, middle in zip(LINKS, (1.0, -0.5, -0.5)):
+            pose, jacobian = body.link_pose(link, q), body.jacobian(link, q)
+            angle = 2 * np.arctan2(pose[5], pose[6])
+            away = middle * np.array([np.cos(angle), np.sin(angle), 0])
+            jacobian[3:] += np.cross(jacobian[:3].T, away).T  # at the center of mass
+            twist = jacobian @ v
+            force, torque = drag(pose[None, 3:], twist[None, 3:], twist[None, :3])
+            found += jacobian[3:].T @ force[0] + jacobian[:3].T @ torque[0]
+        assert abs(found).max() > 1 and found == pytest.approx(theirs.data.qfrc_passive, rel=1e-9, abs=1e-9)
 
 
 def test_humanoid():

@@ -16,6 +16,7 @@ from tumble.gym.env import Env, VectorEnv
 from tumble.gym.humanoids import HumanoidStandupTask, HumanoidTask
 from tumble.gym.parallel import ParallelEnv, Team
 from tumble.gym.runners import AntTask, HalfCheetahTask, HopperTask, Walker2dTask
+from tumble.gym.swimmer import SwimmerTask
 from tumble.gym.task import State, Task
 
 __all__ = [
@@ -33,6 +34,7 @@ __all__ = [
     "PusherTask",
     "ReacherTask",
     "State",
+    "SwimmerTask",
     "Task",
     "Team",
     "VectorEnv",
@@ -45,6 +47,7 @@ for _task, _steps in (
     ("InvertedDoublePendulum", 1000),
     ("Reacher", 50),
     ("Pusher", 100),
+    ("Swimmer", 1000),
     ("Hopper", 1000),
     ("Walker2d", 1000),
     ("HalfCheetah", 1000),
