@@ -9,7 +9,7 @@ help:
 	@echo "make wheel      a wheel to hand on, in target/wheels/manylinux: tagged with the oldest glibc that it runs on, and checked"
 	@echo "make cave-trial a cave of five processes: frames, kills, freezes, a recording shown again and cut; minutes (scripts/cave_trial.py --long: all of it)"
 	@echo "make goldens    draws the kept pictures of crates/render/tests/goldens anew; look at them before committing"
-	@echo "make references installs Pinocchio, MuJoCo and real robots into target/python; tests that compare with them then run"
+	@echo "make references installs Pinocchio, MuJoCo, real robots and Ray into target/python; tests that compare with them or use them then run"
 	@echo "make lint       format, clippy, rustdoc, ruff and mypy; warnings are errors"
 	@echo "make bench      step times beside Rapier, and articulated bodies; five minutes (benches/peers, a workspace of its own: it has more)"
 	@echo "make bench-robots robots beside MuJoCo, one world and batches, in Python; minutes"
@@ -37,7 +37,7 @@ goldens:
 
 references:
 	python3 -m venv target/python
-	target/python/bin/pip install --quiet pin example-robot-data mujoco imageio numpy scipy trimesh rtree
+	target/python/bin/pip install --quiet pin example-robot-data mujoco imageio numpy scipy trimesh rtree ray
 
 lint:
 	@scripts/lint.sh

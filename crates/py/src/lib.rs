@@ -22,6 +22,8 @@ mod _native {
     #[pymodule_export]
     use super::batch::class::Batch;
     #[pymodule_export]
+    use super::batch::pickling::_unpickle_batch;
+    #[pymodule_export]
     use super::choices::_choices;
     #[pymodule_export]
     use super::extension::view::View;

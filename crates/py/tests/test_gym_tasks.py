@@ -11,7 +11,8 @@ import tumble
 gymnasium = pytest.importorskip("gymnasium", reason="SKIPPED: gymnasium is not installed")
 tumble_gym = pytest.importorskip("tumble.gym")
 
-NAMES = ["InvertedPendulum", "Reacher", "Hopper", "Walker2d", "HalfCheetah", "Ant"]
+NAMES = ["InvertedPendulum", "InvertedDoublePendulum", "Reacher", "Pusher", "Swimmer", "Hopper", "Walker2d", "HalfCheetah", "Ant", "Humanoid", "HumanoidStandup"]
+FREE = ("Ant", "Humanoid", "HumanoidStandup")  # those with a floating root
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +132,149 @@ def test_ant():
     assert short.reset(seed=0)[0].shape == (27,) == short.observation_space.shape
 
 
+def test_inverted_double_pendulum():
+    env, (before, _), (q, v), action, (seen, reward, over, _, info) = after("InvertedDoublePendulum", 4)
+    assert env.runs.dt == pytest.approx(0.05)
+    assert seen == pytest.approx([q[0], *np.sin(q[1:]), *np.cos(q[1:]), *np.clip(v, -10, 10), 0])
+    pose = env.body.link_pose("upper")
+    assert pose[0] == pytest.approx(q[0] + 0.6 * np.sin(q[1]))
+    x, z = q[0] + 0.6 * (np.sin(q[1]) + np.sin(q[1] + q[2])), 0.6 * (np.cos(q[1]) + np.cos(q[1] + q[2]))
+    assert over == (z <= 1) and info["reward_survive"] == 10 * (not over)
+    assert reward == pytest.approx(10 * (not over) - 0.01 * x**2 - (z - 2) ** 2 - 1e-3 * v[1] ** 2 - 5e-3 * v[2] ** 2)
+
+
+def test_the_end_of_the_rail_pushes_back():
+    """A cart that is pressed against the end, its poles hanging at rest: the force is that of the motor."""
+    env = tumble_gym.Env("InvertedDoublePendulum")
+    env.reset(seed=0)
+    env.runs.batch.reset(q=[1.0, np.pi, 0.0], v=np.zeros(3))
+    for _ in range(3):
+        seen, *_ = env.step(np.array([0.01]))  # 5 N
+    assert seen[8] == pytest.approx(-5.0, abs=1e-3) and seen[0] == pytest.approx(1.0, abs=1e-6)
+    assert env.step(np.array([1.0]))[0][8] == -10
+    assert env.reset(seed=1)[0][8] == 0
+
+
+def test_pusher():
+    env, _, (q, v), action, (seen, reward, over, _, info) = after("Pusher", 5)
+    gripper = env.world.articulation("shoulder").link_pose("gripper")[:3]
+    disk, goal = (env.world.articulation(name).link_poses()[-1, :3] for name in ("object", "goal"))
+    assert seen == pytest.approx([*q[:7], *v[:7], *gripper, *disk, *goal], abs=1e-12)
+    near, far = np.linalg.norm(disk - gripper), np.linalg.norm(disk - goal)
+    assert np.linalg.norm(q[7:9]) > 0.17 and (q[9:] == 0).all() and not over
+    assert [info[key] for key in ("reward_near", "reward_dist", "reward_ctrl")] == pytest.approx([-near / 2, -far, -0.1 * (action**2).sum()])
+    assert reward == pytest.approx(-near / 2 - far - 0.1 * (action**2).sum())
+
+
+def test_the_gripper_pushes_the_cylinder():
+    env = tumble_gym.Env("Pusher")
+    env.reset(seed=0)
+    q = np.zeros(11)
+    q[1], q[7], q[8] = 0.45, -0.6, 0.36  # the arm is lowered, the cylinder lies beside the gripper
+    env.runs.batch.reset(q=q, v=np.zeros(11))
+    for _ in range(20):
+        env.step(np.array([2.0, 0, 0, 0, 0, 0, 0]))
+    assert env.runs.batch.q[0, 7] > -0.55
+
+
+def test_swimmer():
+    env, (before, _), (q, v), action, (seen, reward, over, _, info) = after("Swimmer", 20)
+    assert env.runs.dt == pytest.approx(0.04) and seen.tolist() == [*q[2:], *v] and not over
+    speed = (q[:2] - before[:2]) / 0.04
+    assert reward == pytest.approx(speed[0] - 1e-4 * (action**2).sum()) and info["y_velocity"] == pytest.approx(speed[1])
+    assert info["distance_from_origin"] == pytest.approx(np.hypot(*q[:2]))
+
+
+def test_the_fluid_slows_a_swimmer():
+    """Straight along its axis: m dv/dt = -(6 b π s + 2 d r_y r_z v) v for each of the three links, and the armature moves with them."""
+
+    class Fine(tumble_gym.SwimmerTask):  # a force that depends on velocities is integrated to first order
+        FRAME_SKIP = 160
+
+        def world(self):
+            world = super().world()
+            world.dt = 0.04 / self.FRAME_SKIP
+            return world
+
+    env = tumble_gym.Env(Fine())
+    env.reset(seed=0)
+    env.runs.batch.reset(q=np.zeros(5), v=[2.0, 0, 0, 0, 0])
+    from tumble.gym.swimmer import half_sizes
+
+    x, y, z = half_sizes()
+    linear, square = 3 * 6 * 0.1 * np.pi * (x + y + z) / 3, 3 * 2 * 4000 * y * z
+    mass = env.world.articulation("front").mass + 0.1
+    for k in range(1, 6):
+        env.step(np.zeros(2))
+        decay = np.exp(-linear / mass * 0.04 * k)
+        assert env.runs.batch.v[0, 0] == pytest.approx(2 * decay / (1 + 2 * square / linear * (1 - decay)), rel=1e-3)
+    assert abs(env.runs.batch.v[0, 1:]).max() < 1e-9
+
+
+def test_the_drag_is_mujoco_s():
+    for package in ("mujoco", "imageio"):
+        pytest.importorskip(package, reason=f"SKIPPED: {package} is not installed; `make references` installs it")
+    from tumble.gym.swimmer import LINKS, drag
+
+    theirs, body, rng = gymnasium.make("Swimmer-v5").unwrapped, tumble_gym.Env("Swimmer").world.articulation("front"), np.random.default_rng(5)
+    theirs.reset(seed=0)
+    for _ in range(10):
+        q, v = rng.uniform(-1, 1, 5), rng.normal(0, 2, 5)
+        theirs.set_state(q, v)
+        found = np.zeros(5)
+        for link, middle in zip(LINKS, (1.0, -0.5, -0.5)):
+            pose, jacobian = body.link_pose(link, q), body.jacobian(link, q)
+            angle = 2 * np.arctan2(pose[5], pose[6])
+            away = middle * np.array([np.cos(angle), np.sin(angle), 0])
+            jacobian[3:] += np.cross(jacobian[:3].T, away).T  # at the center of mass
+            twist = jacobian @ v
+            force, torque = drag(pose[None, 3:], twist[None, 3:], twist[None, :3])
+            found += jacobian[3:].T @ force[0] + jacobian[:3].T @ torque[0]
+        assert abs(found).max() > 1 and found == pytest.approx(theirs.data.qfrc_passive, rel=1e-9, abs=1e-9)
+
+
+def test_humanoid():
+    env, (before, _), (q, v), action, (seen, reward, over, _, info) = after("Humanoid", 12)
+    body = env.world.articulation("torso")
+    jacobians = {name: body.jacobian(name) for name in env.task.names}
+    # the masses give the total, the first moments the center of mass, the velocities the momentum of the whole
+    inertias = seen[45:175].reshape(13, 10)
+    assert inertias[:, 9].sum() == pytest.approx(body.mass) and inertias[:, 6:9].sum(axis=0) == pytest.approx(np.zeros(3), abs=1e-9)
+    velocities = seen[175:253].reshape(13, 6)
+    assert velocities[:, :3] == pytest.approx(np.array([jacobian[:3] @ v for jacobian in jacobians.values()]))
+    momentum = (inertias[:, 9:] * velocities[:, 3:] + np.cross(velocities[:, :3], inertias[:, 6:9])).sum(axis=0)
+    step = 1e-6
+    moved = q.copy()
+    moved[:3] += step * v[3:6]
+    moved[7:] += step * v[6:]
+    turned = np.concatenate([step / 2 * v[:3], [1.0]])  # a small turn before the orientation
+    (ax, ay, az, aw), (bx, by, bz, bw) = turned, q[3:7]
+    moved[3:7] = [aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx, aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz]
+    moved[3:7] /= np.linalg.norm(moved[3:7])
+    assert momentum == pytest.approx(body.mass * (body.center_of_mass(moved) - body.center_of_mass(q)) / step, abs=2e-3)
+    torques = np.zeros(23)
+    names = [*body.joint_names]
+    for (joint, gear), a in zip(env.task.MOTORS, action):
+        torques[names.index(joint) + 5] = gear * a
+    assert seen[253:270] == pytest.approx(torques[6:])
+    speed = (body.center_of_mass(q) - body.center_of_mass(before))[0] / 0.015
+    contact = min(5e-7 * (seen[270:] ** 2).sum(), 10)
+    assert reward == pytest.approx(1.25 * speed + 5 * (not over) - 0.1 * (action**2).sum() - contact)
+    assert over == (not 1 < q[2] < 2) and info["x_velocity"] == pytest.approx(speed)
+    short = tumble_gym.Env("Humanoid", include_cinert_in_observation=False, include_cvel_in_observation=False, include_qfrc_actuator_in_observation=False,
+                           include_cfrc_ext_in_observation=False, exclude_current_positions_from_observation=False)  # fmt: skip
+    assert short.reset(seed=0)[0].shape == (47,) == short.observation_space.shape
+
+
+def test_humanoid_standup():
+    env, _, (q, v), action, (seen, reward, over, _, info) = after("HumanoidStandup", 20)
+    forces = seen[270:].reshape(13, 6)
+    weight = 9.81 * env.world.articulation("torso").mass
+    assert forces[:, 5].sum() > 0.2 * weight  # it lies on the floor
+    assert reward == pytest.approx(q[2] / 0.003 - 0.1 * (action**2).sum() - min(0.5e-6 * (forces**2).sum(), 10) + 1) and not over
+    assert info["z_distance_from_origin"] == pytest.approx(q[2] - 0.105)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_beside_gymnasium_s_own_environment(name):
     """Masses, and observation, reward and end at the same state, which gymnasium's environment is put into."""
@@ -145,11 +289,12 @@ def test_beside_gymnasium_s_own_environment(name):
     for _ in range(10):
         q, v = own.runs.batch.q[0] + rng.uniform(-0.1, 0.1, len(own.runs.q)), rng.normal(0, 1, len(own.runs.v))
         qpos, qvel = q.copy(), v.copy()
-        if name == "Ant":
+        if name in FREE:
             q[3:7] /= np.linalg.norm(q[3:7])
             qpos[3:7], qvel[:3] = q[[6, 3, 4, 5]], v[3:6]
             own.runs.batch.reset(q=q, v=v)
-            qvel[3:6] = own.task.observe(tumble_gym.State.of(own.runs.batch))[0, 16:19]
+            first = 16 if name == "Ant" else 25
+            qvel[3:6] = own.task.observe(tumble_gym.State.of(own.runs.batch))[0, first : first + 3]
         own.runs.batch.reset(q=q, v=v)
         theirs.set_state(qpos, qvel)
         state = tumble_gym.State.of(own.runs.batch)
@@ -163,5 +308,6 @@ def test_beside_gymnasium_s_own_environment(name):
 
             inertia = np.zeros((theirs.model.nv, theirs.model.nv))
             mujoco.mj_fullM(theirs.model, data, inertia)
-            rows = slice(6, None) if name == "Ant" else slice(None)
-            assert body.mass_matrix(q)[rows, rows] == pytest.approx(inertia[rows, rows], rel=1e-6, abs=1e-6)
+            rows = slice(6, None) if name in FREE else slice(body.dof)
+            inertia = inertia[: body.dof, : body.dof]
+            assert body.mass_matrix(q[: body.nq])[rows, rows] == pytest.approx(inertia[rows, rows], rel=1e-6, abs=1e-6)

@@ -12,7 +12,7 @@ tumble_gym = pytest.importorskip("tumble.gym")
 
 from gymnasium.vector import AutoresetMode, SyncVectorEnv  # noqa: E402
 
-NAMES = ["CartPole", "InvertedPendulum", "Reacher", "Hopper", "Walker2d", "HalfCheetah", "Ant"]
+NAMES = ["CartPole", "InvertedPendulum", "InvertedDoublePendulum", "Reacher", "Pusher", "Swimmer", "Hopper", "Walker2d", "HalfCheetah", "Ant", "Humanoid", "HumanoidStandup"]
 
 
 def same(one, other, path="info"):

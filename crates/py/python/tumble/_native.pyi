@@ -49,6 +49,7 @@ __all__ = [
     "simulate",
     "_panic",
     "_unpickle_articulation",
+    "_unpickle_batch",
     "_unpickle_built_articulation",
     "_unpickle_shape",
     "_unpickle_tree",
@@ -1790,6 +1791,10 @@ def _unpickle_articulation(
     file: Path, floating: bool, packages: Mapping[str, Path], words: Sequence[str], numbers: Sequence[Sequence[float]]
 ) -> Articulation:
     """Unpickles a description. Its file is read again."""
+def _unpickle_batch(
+    worlds: Sequence[World], starts: Sequence[World], driven: Sequence[int], threads: int | None, given: bool, failed: Sequence[bool]
+) -> Batch:
+    """Returns the batch of a pickle."""
 def _unpickle_built_articulation(data: bytes, numbers: Sequence[Sequence[float]]) -> Articulation:
     """Unpickles a description of a body made by a program."""
 def _unpickle_shape(data: bytes) -> Shape:

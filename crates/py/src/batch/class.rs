@@ -5,6 +5,7 @@ use crate::batch::crew::{Crew, checked};
 use crate::batch::drives::{Drives, Setting};
 use crate::batch::fields::{Field, Layout, Rows, Table};
 use crate::batch::member::{Member, Start, Task, write};
+use crate::batch::pickling::{self, Reduced};
 use crate::errors::{Error, Result};
 use crate::world::add::own_place;
 use crate::world::bulk::Bulk;
@@ -39,25 +40,26 @@ const MOST_STEPS: usize = 1 << 40;
 /// access.
 #[pyclass(frozen, weakref, module = "tumble")]
 pub struct Batch {
-    worlds: Vec<Py<World>>,
-    shared: Vec<Arc<Shared>>,
-    layout: Layout,
-    crew: Crew,
+    pub(super) worlds: Vec<Py<World>>,
+    pub(super) shared: Vec<Arc<Shared>>,
+    pub(super) layout: Layout,
+    pub(super) crew: Crew,
     /// The start of each world, or the one of all.
-    starts: Vec<Start>,
+    pub(super) starts: Vec<Start>,
     /// Whether Python was given a world, and may change it by itself.
-    given: AtomicBool,
+    pub(super) given: AtomicBool,
     /// As many as worlds are stepped at once.
-    memory: Mutex<Vec<WorkingMemory>>,
-    now: Mutex<Now>,
+    pub(super) memory: Mutex<Vec<WorkingMemory>>,
+    pub(super) now: Mutex<Now>,
 }
 
 /// The data that a call changes.
-struct Now {
+#[derive(Default)]
+pub(super) struct Now {
     tables: Vec<Table>,
     /// The fields of the tables of each world, one world after the other.
     records: Vec<f64>,
-    failed: Vec<bool>,
+    pub(super) failed: Vec<bool>,
     /// Whether a call that was interrupted left the tables behind.
     stale: bool,
 }
@@ -79,7 +81,7 @@ impl Now {
 }
 
 impl Batch {
-    fn now(&self) -> Result<MutexGuard<'_, Now>> {
+    pub(super) fn now(&self) -> Result<MutexGuard<'_, Now>> {
         match self.now.try_lock() {
             Ok(now) => Ok(now),
             Err(TryLockError::Poisoned(now)) => Ok(now.into_inner()),
@@ -192,7 +194,7 @@ impl Batch {
             .map(|all| all.iter().map(|one| Ok(own_place(model, one)?.id)).collect::<Result<Vec<_>>>())
             .transpose()?;
         let (layout, crew) = (model.read(|inner| Layout::new(inner, asked))?, Crew::new(checked(threads)?)?);
-        let (mut worlds, mut shared) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        let mut worlds = Vec::with_capacity(n);
         let mut memory = WorkingMemory::default();
         for k in 0..n {
             let mut fork = model.read(|inner| Ok(inner.fork()))?;
@@ -207,25 +209,13 @@ impl Batch {
                 configure.call1((&fork, k))?;
             }
             fork.get().shared.read(|inner| layout.check(inner))?;
-            shared.push(fork.get().shared.clone());
             worlds.push(fork);
             py.check_signals()?;
         }
         let different = if configure.is_some() { n } else { 1 };
-        let starts =
-            shared[..different].iter().map(|one| one.read(|inner| Ok(Start::of(inner)))).collect::<Result<Vec<_>>>()?;
-        let now = Now { tables: Vec::new(), records: Vec::new(), failed: vec![false; n], stale: false };
-        let given = AtomicBool::new(configure.is_some());
-        Ok(Batch {
-            worlds,
-            shared,
-            layout,
-            crew,
-            starts,
-            given,
-            memory: Mutex::new(vec![memory]),
-            now: Mutex::new(now),
-        })
+        let start = |world: &Py<World>| world.get().shared.read(|inner| Ok(Start::of(inner)));
+        let starts = worlds[..different].iter().map(start).collect::<Result<Vec<_>>>()?;
+        Ok(Batch::of(worlds, layout, crew, starts, configure.is_some(), vec![false; n], memory))
     }
 
     /// Advances each world by ``substeps`` steps of its ``dt``, with the interpreter released; Ctrl-C
@@ -435,6 +425,10 @@ impl Batch {
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
         self.worlds.iter().try_for_each(|world| visit.call(world))
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Result<Reduced<'py>> {
+        pickling::reduce(self, py)
     }
 
     fn __repr__(&self) -> String {

@@ -72,6 +72,11 @@ impl Crew {
         Ok(Crew { threads, own })
     }
 
+    /// Returns the number of threads that was asked for.
+    pub fn asked(&self) -> Option<usize> {
+        self.threads
+    }
+
     /// Returns the number of threads.
     pub fn threads(&self) -> Result<usize> {
         Ok(self.threads.unwrap_or(pool::shared()?.current_num_threads()))

@@ -64,6 +64,12 @@ impl Layout {
         self.driven.iter().map(|one| one.positions).sum()
     }
 
+    /// Returns the places of the driven bodies among all objects.
+    pub fn driven_places(&self) -> Vec<usize> {
+        let place = |one: &Driven| self.objects.iter().position(|id| *id == one.id);
+        self.driven.iter().filter_map(place).collect()
+    }
+
     /// Checks that a world still has the bodies that the batch was made with.
     pub fn check(&self, inner: &Inner) -> Result<()> {
         let own = inner.world.ids();

@@ -23,6 +23,15 @@ impl Start {
         inner.world.checkpoint(&mut state);
         Start { state, efforts: inner.efforts.clone() }
     }
+
+    /// Takes a world back to it.
+    pub fn restore(&self, inner: &mut Inner) -> Result<()> {
+        if !inner.world.roll_back(&self.state) {
+            return Err(Error::value("forces were added to this world of a batch, or removed from it"));
+        }
+        inner.efforts.clone_from(&self.efforts);
+        Ok(())
+    }
 }
 
 /// The work of one world in one call.
@@ -106,10 +115,7 @@ impl Task<'_> {
                 }
             }
             Task::Reset { start, state, q, v } => {
-                if !inner.world.roll_back(&start.state) {
-                    return Err(Error::value("forces were added to this world of a batch, or removed from it"));
-                }
-                inner.efforts.clone_from(&start.efforts);
+                start.restore(inner)?;
                 if let Some(state) = state {
                     inner.write_state(&[state.len()], state)?;
                 }

@@ -6,3 +6,4 @@ pub mod crew;
 pub mod drives;
 pub mod fields;
 pub mod member;
+pub mod pickling;

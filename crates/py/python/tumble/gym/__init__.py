@@ -2,7 +2,7 @@
 ``gymnasium.make_vec("tumble/Hopper-v0", num_envs=64)`` find them after ``import tumble.gym``.
 
 An environment is a ``Task``: a model, and observation, reward and end of an episode as functions of arrays. ``Env`` runs one world of it,
-``VectorEnv`` many in one ``tumble.Batch``; both give the same numbers.
+``VectorEnv`` many in one ``tumble.Batch``; both give the same numbers. A ``Team`` is several robots in one world, for PettingZoo.
 """
 
 try:
@@ -10,10 +10,13 @@ try:
 except ImportError as _missing:
     raise ImportError("tumble.gym needs the package gymnasium: pip install gymnasium", name="gymnasium") from _missing
 
-from tumble.gym.arms import InvertedPendulumTask, ReacherTask
+from tumble.gym.arms import InvertedDoublePendulumTask, InvertedPendulumTask, PusherTask, ReacherTask
 from tumble.gym.cart_pole import CartPole, CartPoleTask
 from tumble.gym.env import Env, VectorEnv
+from tumble.gym.humanoids import HumanoidStandupTask, HumanoidTask
+from tumble.gym.parallel import ParallelEnv, Team
 from tumble.gym.runners import AntTask, HalfCheetahTask, HopperTask, Walker2dTask
+from tumble.gym.swimmer import SwimmerTask
 from tumble.gym.task import State, Task
 
 __all__ = [
@@ -23,10 +26,17 @@ __all__ = [
     "Env",
     "HalfCheetahTask",
     "HopperTask",
+    "HumanoidStandupTask",
+    "HumanoidTask",
+    "InvertedDoublePendulumTask",
     "InvertedPendulumTask",
+    "ParallelEnv",
+    "PusherTask",
     "ReacherTask",
     "State",
+    "SwimmerTask",
     "Task",
+    "Team",
     "VectorEnv",
     "Walker2dTask",
 ]
@@ -34,11 +44,16 @@ __all__ = [
 for _task, _steps in (
     ("CartPole", 500),
     ("InvertedPendulum", 1000),
+    ("InvertedDoublePendulum", 1000),
     ("Reacher", 50),
+    ("Pusher", 100),
+    ("Swimmer", 1000),
     ("Hopper", 1000),
     ("Walker2d", 1000),
     ("HalfCheetah", 1000),
     ("Ant", 1000),
+    ("Humanoid", 1000),
+    ("HumanoidStandup", 1000),
 ):
     if f"tumble/{_task}-v0" not in gymnasium.registry:
         gymnasium.register(

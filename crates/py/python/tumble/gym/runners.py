@@ -181,10 +181,7 @@ class AntTask(_Runner):
 
     def contact_forces(self, state: State) -> Floats:
         """Returns torques about the center of mass and forces on each body, clipped, shape (n, 13, 6)."""
-        wrenches = state.batch.link_contact_forces.copy()
-        center = np.atleast_2d(self.body.center_of_mass(state.q))
-        wrenches[..., :3] -= np.cross(center[:, None], wrenches[..., 3:])
-        return np.clip(wrenches[:, self.order], -1, 1)
+        return np.clip(contact_wrenches(state, self.body)[:, self.order], -1, 1)
 
     def world(self) -> tumble.World:
         world = super().world()
@@ -196,7 +193,7 @@ class AntTask(_Runner):
         first = self.PLACES if self.exclude_current_positions_from_observation else 0
         quaternion = state.q[:, [6, 3, 4, 5]]
         position = np.concatenate([state.q[:, :3], quaternion, state.q[:, 7:]], axis=1)[:, first:]
-        velocity = np.concatenate([state.v[:, 3:6], _into(quaternion, state.v[:, :3]), state.v[:, 6:]], axis=1)
+        velocity = np.concatenate([state.v[:, 3:6], into(quaternion, state.v[:, :3]), state.v[:, 6:]], axis=1)
         contact = [self.contact_forces(state).reshape(len(state.q), -1)] if self.include_cfrc_ext_in_observation else []
         return np.concatenate([position, velocity, *contact], axis=1)
 
@@ -213,7 +210,15 @@ class AntTask(_Runner):
         return tumble.Camera((q[0], q[1] - 4.0, 2.5), (q[0], q[1], 0.3))
 
 
-def _into(quaternion: Floats, vector: Floats) -> Floats:
+def contact_wrenches(state: State, body: tumble.Articulation) -> Floats:
+    """Torques about the body's center of mass and forces of contacts on each link, world axes, shape (n, links, 6)."""
+    wrenches = state.batch.link_contact_forces.copy()
+    center = np.atleast_2d(body.center_of_mass(state.q))
+    wrenches[..., :3] -= np.cross(center[:, None], wrenches[..., 3:])
+    return wrenches
+
+
+def into(quaternion: Floats, vector: Floats) -> Floats:
     """Vectors of world axes in the axes of orientations (w, x, y, z)."""
     w, axis = quaternion[:, :1], -quaternion[:, 1:]
     turned = 2 * np.cross(axis, vector)

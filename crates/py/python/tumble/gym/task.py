@@ -20,16 +20,29 @@ Infos: TypeAlias = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class State:
-    """Positions ``q`` and velocities ``v`` of all worlds at one time, one row each, and the batch that they are of."""
+    """Positions ``q`` and velocities ``v`` of all worlds at one time, one row each, and the batch that they are of.
+
+    controls: the generalized forces of the last step, shape (n, dof), 0 after a start. limit_forces: mean forces of constraints on the first degree of
+    freedom in that step, shape (n,), of tasks that ask for them.
+    """
 
     q: Floats
     v: Floats
     batch: tumble.Batch
+    controls: Floats
+    limit_forces: Floats
 
     @staticmethod
-    def of(batch: tumble.Batch) -> State:
+    def of(batch: tumble.Batch, controls: Floats | None = None, limit_forces: Floats | None = None) -> State:
         """Returns the present."""
-        return State(batch.q.copy(), batch.v.copy(), batch)
+        none = np.zeros(len(batch))
+        return State(
+            batch.q.copy(),
+            batch.v.copy(),
+            batch,
+            np.zeros((len(batch), batch.dof)) if controls is None else controls.copy(),
+            none if limit_forces is None else limit_forces.copy(),
+        )
 
 
 class Task:
@@ -83,6 +96,10 @@ class Task:
         """Returns the rewards of a step, shape (n,), and what the info says of it. dt: length of a step of the environment, s."""
         raise NotImplementedError
 
+    def limit_forces(self, before: State, state: State, dt: float) -> Floats:
+        """Returns ``State.limit_forces`` of a step, shape (n,)."""
+        return np.zeros(len(state.q))
+
     def terminated(self, state: State) -> Flags:
         """Returns whether the episodes are over, shape (n,)."""
         return np.zeros(len(state.q), np.bool_)
@@ -105,7 +122,8 @@ class Runs:
         self.batch = tumble.Batch(world, count, threads=threads)
         self.dt = world.dt * task.FRAME_SKIP
         self.q, self.v = self.batch.q[0].copy(), self.batch.v[0].copy()
-        names = [name for body in world.bodies if isinstance(body, tumble.Articulation) for name in _columns(body)]
+        names = [name for body in world.bodies if isinstance(body, tumble.Articulation) for name in columns(body)]
+        self.controls, self.limit_forces = np.zeros((count, self.batch.dof)), np.zeros(count)
         self.columns = np.array([names.index(joint) for joint, _ in task.MOTORS], np.int64)
 
     def reset(self, mask: Flags, rngs: Sequence[np.random.Generator]) -> Infos:
@@ -114,18 +132,25 @@ class Runs:
         for k in np.flatnonzero(mask).tolist():
             q[k], v[k] = self.task.start(rngs[k], self.q.copy(), self.v.copy())
         self.batch.reset(mask, q=q, v=v)
-        return self.task.reset_info(State.of(self.batch))
+        self.controls[mask], self.limit_forces[mask] = 0, 0
+        return self.task.reset_info(self.state())
+
+    def state(self) -> State:
+        """Returns the present."""
+        return State.of(self.batch, self.controls, self.limit_forces)
 
     def step(self, actions: NDArray[Any], mask: Flags) -> tuple[Floats, Flags, Infos]:
         """Steps the worlds of a mask. Returns rewards, ends and infos, which count for those worlds. A step that fails ends the episode,
         and ``failed`` in the info says so."""
-        before, failed = State.of(self.batch), np.zeros(len(mask), np.bool_)
+        before, failed = self.state(), np.zeros(len(mask), np.bool_)
         controls = self.task.controls(actions, self.columns, self.batch.dof)
         try:
             self.batch.step(controls, self.task.FRAME_SKIP, mask=mask)
         except tumble.StepError:
             failed = self.batch.failed
-        state = State.of(self.batch)
+        self.controls[mask] = controls[mask]
+        self.limit_forces[mask] = self.task.limit_forces(before, self.state(), self.dt)[mask]
+        state = self.state()
         reward, info = self.task.reward(before, state, actions.astype(np.float64), self.dt)
         if failed.any():
             info["failed"] = failed
@@ -133,11 +158,11 @@ class Runs:
 
     def observe(self) -> Floats:
         """Returns the observations of all worlds."""
-        return self.task.observe(State.of(self.batch))
+        return self.task.observe(self.state())
 
 
-def _columns(body: tumble.Articulation) -> list[str]:
-    """The joint of each degree of freedom."""
+def columns(body: tumble.Articulation) -> list[str]:
+    """Returns the joint of each degree of freedom."""
     spare = body.dof - len(body.joint_names)  # a floating root has six, of one joint
     if spare == 5:
         return [body.joint_names[0]] * 6 + body.joint_names[1:]
