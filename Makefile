@@ -1,6 +1,6 @@
 # Short names for the scripts; each can be run by itself where there is no make.
 
-.PHONY: help demo test test-slow wheel cave-trial goldens references lint bench bench-robots clean
+.PHONY: help demo test test-slow wheel cave-trial goldens gallery references lint bench bench-robots clean
 
 help:
 	@echo "make demo       install what is missing, run the billiards scene, leave a recording and a picture in out/, run an example in Python"
@@ -9,6 +9,7 @@ help:
 	@echo "make wheel      a wheel to hand on, in target/wheels/manylinux: tagged with the oldest glibc that it runs on, and checked"
 	@echo "make cave-trial a cave of five processes: frames, kills, freezes, a recording shown again and cut; minutes (scripts/cave_trial.py --long: all of it)"
 	@echo "make goldens    draws the kept pictures of crates/render/tests/goldens anew; look at them before committing"
+	@echo "make gallery    draws the moving pictures of docs/gallery.md anew; minutes (scripts/gallery.py SCENE: one of them)"
 	@echo "make references installs Pinocchio, MuJoCo, real robots and Ray into target/python; tests that compare with them or use them then run"
 	@echo "make lint       format, clippy, rustdoc, ruff and mypy; warnings are errors"
 	@echo "make bench      step times beside Rapier, and articulated bodies; five minutes (benches/peers, a workspace of its own: it has more)"
@@ -34,6 +35,13 @@ cave-trial:
 
 goldens:
 	TUMBLE_KEEP_PICTURES=1 cargo test --release --locked -p tumble-render --test it goldens
+
+gallery:
+	@scripts/setup.sh
+	cargo build --release --locked -p tumble
+	[ -x target/gallery/bin/python ] || python3 -m venv target/gallery
+	target/gallery/bin/pip install --quiet pillow
+	target/gallery/bin/python scripts/gallery.py
 
 references:
 	python3 -m venv target/python

@@ -42,7 +42,15 @@ const SHIPPED: &[Shipped] = shipped_scenes![
     "chain",
     "piston",
     "skeleton",
-    "robot"["arm.urdf"]
+    "robot"["arm.urdf"],
+    "dominoes",
+    "newtons_cradle",
+    "arch",
+    "card_house",
+    "wrecking_ball",
+    "marble_run",
+    "steam_engine",
+    "walker",
 ];
 
 /// Returns the scenes that come with tumble.

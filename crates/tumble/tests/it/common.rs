@@ -5,8 +5,26 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// The shipped scenes.
-pub const SCENES: [&str; 10] =
-    ["billiards", "bowling", "chain", "falling", "incline", "pendulum", "piston", "robot", "skeleton", "stack"];
+pub const SCENES: [&str; 18] = [
+    "arch",
+    "billiards",
+    "bowling",
+    "card_house",
+    "chain",
+    "dominoes",
+    "falling",
+    "incline",
+    "marble_run",
+    "newtons_cradle",
+    "pendulum",
+    "piston",
+    "robot",
+    "skeleton",
+    "stack",
+    "steam_engine",
+    "walker",
+    "wrecking_ball",
+];
 pub const STEPPERS: [&str; 2] = ["time_stepping", "backtracking"];
 
 /// A folder that is removed at the end.

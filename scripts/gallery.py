@@ -1,0 +1,91 @@
+#!/usr/bin/env python3
+"""Draws the moving pictures of docs/gallery.md: one animated WebP for each shipped scene, in docs/images/gallery. `make gallery` runs it.
+
+    scripts/gallery.py [SCENE...]     all scenes, or the named ones
+
+It needs target/release/tumble, a Vulkan or OpenGL driver, and Pillow. A run ends after five minutes; a picture above 300 kB is written again with
+a lower quality.
+"""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from PIL import Image
+
+ROOT = Path(__file__).resolve().parents[1]
+TUMBLE = ROOT / "target" / "release" / "tumble"
+OUT = ROOT / "docs" / "images" / "gallery"
+SIZE = "384x216"
+FPS = 12
+LIMIT = 300_000  # bytes of a picture
+TIME_OUT = 300  # seconds of a run
+
+# Scene: the time at which its picture begins and how long it shows, in seconds of the scene.
+SCENES = {
+    "falling": (0, 3.0),
+    "stack": (0, 0.5),
+    "billiards": (0, 3.0),
+    "bowling": (2.2, 2.0),
+    "incline": (0, 1.5),
+    "pendulum": (0, 4.0),
+    "chain": (0, 3.0),
+    "piston": (0, 0.5),
+    "skeleton": (0, 3.5),
+    "robot": (0, 4.5),
+    "dominoes": (0, 3.5),
+    "newtons_cradle": (0, 0.9),
+    "arch": (1.5, 2.5),
+    "card_house": (0, 0.5),
+    "wrecking_ball": (0, 3.0),
+    "marble_run": (0, 5.0),
+    "steam_engine": (5, 1.0),
+    "walker": (0, 5.5),
+}
+
+
+def tumble(*words):
+    """Runs the command quietly; an error ends this script."""
+    subprocess.run([str(TUMBLE), "run", *map(str, words), "--quiet"], check=True, timeout=TIME_OUT, stdin=subprocess.DEVNULL)
+
+
+def frames(scene, begin, length, fps, folder):
+    """Returns the pictures of a scene between `begin` and `begin + length`, s."""
+    file = ROOT / "scenes" / scene
+    words = [file, "--duration", length, "--fps", fps, "--size", SIZE, "--frames-dir", folder]
+    if begin > 0:
+        state = Path(folder) / "state"
+        tumble(file, "--duration", begin, "--save", state)
+        words += ["--restore", state]
+    tumble(*words)
+    return [Image.open(path).convert("RGB") for path in sorted(Path(folder).glob("frame_*.png"))]
+
+
+def write(pictures, path, milliseconds):
+    """Writes an animated WebP that repeats, of at most `LIMIT` bytes if a quality of 30 allows it."""
+    for quality in (80, 70, 60, 50, 40, 30):
+        pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=milliseconds, loop=0, quality=quality, method=6)
+        if path.stat().st_size <= LIMIT:
+            return
+
+
+def main():
+    shipped = {path.parent.name for path in ROOT.glob("scenes/*/scene.toml")}
+    if shipped != set(SCENES):
+        sys.exit(f"error: not in both scenes/ and this script: {', '.join(sorted(shipped ^ set(SCENES)))}")
+    wanted = sys.argv[1:] or list(SCENES)
+    if unknown := [name for name in wanted if name not in SCENES]:
+        sys.exit(f"error: no scene {', '.join(unknown)}")
+    OUT.mkdir(parents=True, exist_ok=True)
+    for name in wanted:
+        begin, length = SCENES[name]
+        fps = FPS if length > 1 else 2 * FPS
+        with tempfile.TemporaryDirectory() as folder:
+            pictures = frames(name, begin, length, fps, folder)
+            write(pictures, OUT / f"{name}.webp", 1000 // fps)
+        print(f"{name}: {len(pictures)} pictures, {(OUT / f'{name}.webp').stat().st_size / 1000:.0f} kB", flush=True)
+
+
+if __name__ == "__main__":
+    main()
