@@ -38,10 +38,10 @@ pub struct WorldState {
     /// Force that users apply to every degree of freedom during the next frame.
     pub(crate) applied_generalized: Vec<f64>,
     pub(crate) warm: WarmStarts,
-    /// Inner step with which the adaptive integrator continues, s; 0 before the first.
-    pub(crate) inner_step: f64,
     /// The division of sub-steps that joints needed last.
     pub(crate) held_division: HeldDivision,
+    /// Inner step with which the adaptive integrator continues, s; 0 before the first.
+    pub(crate) inner_step: f64,
     /// The sleeping islands.
     pub(crate) groups: Vec<SleepGroup>,
     /// Pairs of parts that touch, and of sensors with parts that overlap them; sorted.
@@ -58,8 +58,8 @@ clone_by_field!(WorldState {
     applied,
     applied_generalized,
     warm,
-    inner_step,
     held_division,
+    inner_step,
     groups,
     touching,
 });
