@@ -26,6 +26,7 @@ mod locked;
 mod object;
 pub(crate) mod rotation;
 mod state;
+mod turning;
 
 pub use body::RigidBody;
 pub use error::BodyError;

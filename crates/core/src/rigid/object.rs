@@ -13,7 +13,6 @@ use crate::object::{
     CameraCarrier, Collidable, Energy, Integratable, LightCarrier, Material, Momentum, MomentumKind, NetSync, Object,
     Renderable, SyncError,
 };
-use crate::step::{add_stiffness, rate_squared};
 use crate::world::view::WorldView;
 use nalgebra::{ComplexField, Translation3, Unit};
 use tumble_collide::{ContactMode, Mat3, Pose, Quat, Shape, Vec3};
@@ -38,7 +37,7 @@ impl RigidBody {
     }
 
     /// Returns the angular velocity for an orientation and an angular momentum, world axes.
-    fn omega(&self, q: &Quat, l: &Vec3) -> Vec3 {
+    pub(super) fn omega(&self, q: &Quat, l: &Vec3) -> Vec3 {
         if !self.locked.rotates_freely() {
             return self.locked.inverse(&self.world_inertia(q)) * l;
         }
@@ -73,7 +72,7 @@ impl RigidBody {
     }
 
     /// Returns the vector from the center of mass to the origin of the part, world axes.
-    fn part_arm(&self, q: &Quat) -> Vec3 {
+    pub(super) fn part_arm(&self, q: &Quat) -> Vec3 {
         -(q * self.offset)
     }
 
@@ -215,16 +214,7 @@ impl Integratable for RigidBody {
         _gravity: &Vec3,
         loads: &mut dyn Iterator<Item = PointLoad>,
     ) -> (usize, f64) {
-        let Some(first) = loads.next() else { return (0, 0.0) };
-        let pose = &part_states[0].pose;
-        let center = self.center_pose_of(pose);
-        let mut stiffness = Mat3::zeros();
-        for load in std::iter::once(first).chain(loads) {
-            add_stiffness(&mut stiffness, &(load.point - center.translation.vector), &load.force);
-        }
-        let turned = |k: usize| self.omega(&center.rotation, &stiffness.column(k).into_owned());
-        let a = Mat3::from_columns(&[turned(0), turned(1), turned(2)]);
-        (0, rate_squared(&a).sqrt())
+        (0, self.fastest_turn(&part_states[0].pose, loads))
     }
 
     fn accepts(&self, x: &[f64]) -> bool {

@@ -42,7 +42,7 @@ use crate::contact::motion;
 use crate::contact::pair::PredictionMode;
 use crate::integrators::Adaptive;
 use crate::object::{Level, RowTarget};
-use crate::settings::Integrator;
+use crate::settings::{Integrator, Settings};
 use crate::solver::SolverSettings;
 use crate::world::{Core, StepError};
 use tumble_collide::NormalFrom;
@@ -95,8 +95,8 @@ impl Stepper for Backtracking {
         })
     }
 
-    fn divides(&self) -> bool {
-        true
+    fn undivided_step(&self, settings: &Settings) -> Option<f64> {
+        Some(settings.dt)
     }
 
     fn fork(&self) -> Box<dyn Stepper> {

@@ -24,8 +24,9 @@ pub(crate) use budget::WorkMeter;
 pub(crate) use contacts::Workspace;
 pub(crate) use moment::Moment;
 pub use time_stepping::TimeStepping;
-pub(crate) use turning::{HeldDivision, LargestTurn, add_stiffness, rate_squared};
+pub(crate) use turning::{Attempt, HeldDivision, LargestTurn, add_stiffness, rate_squared};
 
+use crate::settings::Settings;
 use crate::world::{Core, StepError};
 
 /// A method that advances a world by one frame.
@@ -35,10 +36,11 @@ pub trait Stepper: Send + Sync {
     fn name(&self) -> &'static str;
     /// Advances by one frame: [`Settings::dt`](crate::Settings::dt) seconds. After an error the world restores state and time.
     fn step(&mut self, frame: StepContext) -> Result<(), StepError>;
-    /// Returns whether it divides its sub-steps by [`StepContext::division`]. Otherwise
-    /// [`Settings::max_turn`](crate::Settings::max_turn) is only reported.
-    fn divides(&self) -> bool {
-        false
+    /// Returns the length of its longest sub-step, s, if it divides it by [`StepContext::division`]. By default it
+    /// does not, and [`Settings::max_turn`](crate::Settings::max_turn) is only reported.
+    fn undivided_step(&self, settings: &Settings) -> Option<f64> {
+        let _ = settings;
+        None
     }
     /// Returns an independent copy.
     fn fork(&self) -> Box<dyn Stepper>;

@@ -50,6 +50,7 @@ use crate::contact::time_of_impact::time_contacts;
 use crate::each_object::{Numbers, each_object};
 use crate::integrators::context::free_motion;
 use crate::object::Level;
+use crate::settings::Settings;
 use crate::solver::SolverSettings;
 use crate::world::view::Entry;
 use crate::world::{Coordinates, Core, StepError};
@@ -110,8 +111,8 @@ impl Stepper for TimeStepping {
         (0..substeps).try_for_each(|_| self.substep(core, h))
     }
 
-    fn divides(&self) -> bool {
-        true
+    fn undivided_step(&self, settings: &Settings) -> Option<f64> {
+        Some(settings.dt / f64::from(settings.substeps))
     }
 
     fn fork(&self) -> Box<dyn Stepper> {

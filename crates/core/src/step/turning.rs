@@ -6,7 +6,7 @@
 //! apart, though every solve is exact.
 //!
 //! ```text
-//! τ(δθ) = (δθ × r) × F                K = Σ (r·F)·1 − sym(r Fᵀ)                  restoring torque −K·δθ
+//! τ(δθ) = (δθ × r) × F                K = Σ (r·F)·1 − r Fᵀ                        restoring torque −K·δθ
 //! rigid body        ω² = √tr((I⁻¹K)²)     about the center of mass, F of loop joints
 //! joint of a link   ω² = (4 + 2√3)·|sᵀK s|/D    about the joint's origin, F of the weight, the inertia and the links beyond it
 //! turn = ω·h                              above `Settings::max_turn` the frame is taken again in more sub-steps
@@ -15,14 +15,17 @@
 //! The factor of links: a long chain of equal rods of mass `m` and length `l` under a tension `T` has
 //! `D = (1/3 + 1/√12)·ml²` with the links before the joint held, and `K = T·l`; neighbors that turn against
 //! each other oscillate with `ω² = 12·T/(ml)`. Explicit motion is stable up to a turn of
-//! 2; with the default of 1 a swinging chain keeps its energy to 1e-3. A body that a motor spins
-//! about its center carries no such force and is not divided, however fast it is. A body on an
-//! eccentric pin is: its centripetal force gives `ω` about the speed of its rotation.
+//! 2. A body that a motor spins about its center carries no such force and is not divided, however fast it
+//! is. A rigid body on an eccentric pin is: its centripetal force gives `ω` about the speed of its rotation.
+//! The forces that a link's own rotation needs are left out of its `K`: they turn with it.
+//!
+//! `K` is not symmetric while the forces have a moment about the point. The symmetric part alone would give
+//! an axis of little inertia, as the length of a bar, a stiffness that it does not have.
 //!
 //! | symbol | meaning |
 //! |---|---|
 //! | `I`, `D` | inertia of the body; inertia along the joint with all links beyond it (`abm.rs`) |
-//! | `s` | axis of the joint; for spherical joints all three, and the norm of the matrix |
+//! | `s` | axis of the joint; for spherical joints all three, with `√tr((D⁻¹K)²)` |
 //! | `F` | a force of the last sub-step without impacts; N, world axes |
 
 use super::Stepper;
@@ -49,6 +52,18 @@ pub(crate) struct LargestTurn {
     turn: f64,
     place: usize,
     part: usize,
+}
+
+/// How often a frame was taken, with the turn in an undivided sub-step before, rad.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) enum Attempt {
+    /// Once.
+    #[default]
+    First,
+    /// Again in shorter sub-steps.
+    Finer(f64),
+    /// Again without a division, after the finest one.
+    Undivided(f64),
 }
 
 /// Adds the stiffness of a force `f` at an arm `r` to `k`.
@@ -101,9 +116,9 @@ impl Core {
     /// Divides the sub-steps of a frame that begins, by the forces of the last sub-step and the division that
     /// is held.
     pub(crate) fn divide_ahead(&mut self, stepper: &dyn Stepper) {
-        (self.division, self.undivided_turn, self.largest_turn) = (1, 0.0, LargestTurn::default());
-        if stepper.divides() {
-            self.measure_turns(self.settings.dt / f64::from(self.settings.substeps));
+        (self.division, self.attempt, self.largest_turn) = (1, Attempt::First, LargestTurn::default());
+        if let Some(h) = stepper.undivided_step(&self.settings) {
+            self.measure_turns(h);
             self.divide_to(self.largest_turn.turn);
             self.division = self.division.max(self.state.held_division.at(self.state.time));
         }
@@ -114,23 +129,38 @@ impl Core {
     /// those of a jerk, as of a chain that gets taut: no division bounds their turn, and none is needed.
     ///
     /// # Errors
-    /// [`StepError::Turn`] if no admissible division is fine enough.
+    /// [`StepError::Turn`] if no admissible division is fine enough, unless a joint is out of reach, which the
+    /// report says.
     pub(crate) fn divide_again(&mut self, stepper: &dyn Stepper, time: f64) -> Result<bool, StepError> {
         let (LargestTurn { turn, place, part }, most) = (self.largest_turn, self.settings.max_turn);
         let undivided = f64::from(self.division) * turn;
-        let known = self.undivided_turn > 0.0 && self.undivided_turn <= most * f64::from(MAX_DIVISION);
-        if !stepper.divides() || known && undivided > JERK * self.undivided_turn {
+        let admissible = most * f64::from(MAX_DIVISION);
+        let jerk = match self.attempt {
+            Attempt::First => false,
+            Attempt::Finer(coarse) => coarse <= admissible && undivided > JERK * coarse,
+            Attempt::Undivided(fine) => undivided <= admissible && fine > JERK * undivided,
+        };
+        if stepper.undivided_step(&self.settings).is_none() || jerk {
             return Ok(false);
         }
         if turn <= if self.division > 1 { MARGIN * most } else { most } {
             self.state.held_division.hold((undivided / most).ceil() as u32, time);
             return Ok(false);
         }
-        if self.division >= MAX_DIVISION {
-            let name = self.objects().at(place).name.to_string();
-            return Err(StepError::Turn { object: name, part, turn, most, time });
+        match self.attempt {
+            Attempt::First if self.division == MAX_DIVISION => {
+                (self.division, self.attempt) = (1, Attempt::Undivided(undivided));
+            }
+            Attempt::First | Attempt::Finer(_) if self.division < MAX_DIVISION => {
+                self.divide_to(undivided);
+                self.attempt = Attempt::Finer(undivided);
+            }
+            _ if self.report.unreachable_joint.is_some() => return Ok(false),
+            _ => {
+                let object = self.objects().at(place).name.to_string();
+                return Err(StepError::Turn { object, part, turn, most, time });
+            }
         }
-        self.divide_to(undivided);
         Ok(true)
     }
 
@@ -138,7 +168,6 @@ impl Core {
     fn divide_to(&mut self, undivided: f64) {
         let parts = (undivided / self.settings.max_turn).ceil();
         self.division = parts.clamp(1.0, f64::from(MAX_DIVISION)) as u32;
-        self.undivided_turn = if self.division > 1 { undivided } else { 0.0 };
     }
 }
 

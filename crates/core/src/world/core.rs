@@ -11,7 +11,7 @@ use crate::object::part_state::{Forces, PartState, Wrench};
 use crate::report::StepReport;
 use crate::settings::Settings;
 use crate::solver::RowSolver;
-use crate::step::{LargestTurn, Moment, WorkMeter};
+use crate::step::{Attempt, LargestTurn, Moment, WorkMeter};
 use crate::threads::Threads;
 use crate::world::view::{Entry, ObjectId, Objects, Table, WorldView};
 use tumble_collide::{BroadPhase, SweepAndPrune, Vec3};
@@ -159,8 +159,7 @@ pub struct Core {
     pub(crate) needs_wake: Vec<u32>,
     /// Number of parts that each sub-step of the settings is divided into in this frame.
     pub(crate) division: u32,
-    /// Turn in an undivided sub-step from which the division was found, rad; 0 without a division.
-    pub(crate) undivided_turn: f64,
+    pub(crate) attempt: Attempt,
     /// Largest turn of the frame.
     pub(crate) largest_turn: LargestTurn,
 }
@@ -209,7 +208,7 @@ impl Core {
             meter: WorkMeter::default(),
             needs_wake: Vec::new(),
             division: 1,
-            undivided_turn: 0.0,
+            attempt: Attempt::First,
             largest_turn: LargestTurn::default(),
         }
     }

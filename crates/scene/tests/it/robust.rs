@@ -17,7 +17,7 @@ fn read(text: &str) {
 
 /// The longest scenes, which are lists of numbers, are cut at every seventh byte unless `TUMBLE_SLOW=1`.
 #[test]
-fn every_scene_cut_at_every_byte() {
+fn every_scene_cut_at_every_byte_full_length() {
     let slow = std::env::var_os("TUMBLE_SLOW").is_some_and(|v| v == "1");
     for scene in shipped() {
         let stride = if slow || scene.text.len() < 23_000 { 1 } else { 7 };

@@ -143,7 +143,7 @@ fn elliptic(k: f64) -> f64 {
 }
 
 #[test]
-fn the_last_ball_of_the_cradle_leaves_as_the_first_one_came() {
+fn the_last_ball_of_the_cradle_leaves_as_the_first_one_came_full_length() {
     let mut world = build(&load("newtons_cradle"));
     let rate = |world: &World, k: usize| coordinate(world, &format!("ball_{k}"), "ball").1;
     let angle = |world: &World, k: usize| coordinate(world, &format!("ball_{k}"), "ball").0;
@@ -185,7 +185,7 @@ fn displaced(world: &World, ids: &[ObjectId], start: &[Vec3]) -> f64 {
 }
 
 #[test]
-fn the_arch_stands_by_its_shape() {
+fn the_arch_stands_by_its_shape_full_length() {
     let mut scene = load("arch");
     scene.world.sleep_after_s = None;
     scene.bodies.retain(|body| body.name != "ball");
@@ -271,7 +271,7 @@ fn marbles_roll_in_a_groove_as_they_should_and_all_end_in_the_tray() {
 }
 
 #[test]
-fn the_steam_engine_keeps_to_its_closed_form_and_its_governor_rises() {
+fn the_steam_engine_keeps_to_its_closed_form_and_its_governor_rises_full_length() {
     let mut world = build(&load("steam_engine"));
     let slider = |r: f64, l: f64, angle: f64| r * angle.cos() + (l * l - (r * angle.sin()).powi(2)).sqrt();
     let mut farthest = 0f64;
