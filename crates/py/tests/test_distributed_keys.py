@@ -118,6 +118,21 @@ def test_classes_of_the_standard_kinds_have_hashes():
     assert key(function, Slots(Point(2.0))) == key(function, Slots(Point(2.0)))
 
 
+def test_an_attribute_is_no_global_of_its_name():
+    text = "import threading\nlock = threading.Lock()\nA = 1\ndef f(x):\n    return x.lock, x.A\n"
+    assert key(of(text), 1) == key(of(text.replace("A = 1", "A = 2")), 1)
+    with pytest.raises(ValueError, match="a lock has no content"):
+        key(of(text.replace("x.lock", "lock")), 1)
+    within = "A = 1\ndef f(x):\n    class C:\n        B = A\n    return [lambda: C.B]\n"
+    assert key(of(within), 1) != key(of(within.replace("A = 1", "A = 2")), 1)
+
+
+def test_a_function_of_a_module_that_cannot_be_imported_counts_with_its_code():
+    text = "A = 1\ndef f(x):\n    return x + A\n"
+    keys = [key(of(each, __name__="made.up"), 1) for each in (text, text, text.replace("A = 1", "A = 2"))]
+    assert keys[0] == keys[1] != keys[2]
+
+
 def test_a_closure_counts():
     def make(a):
         return lambda x: a * x

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import dis
 import functools
 import hashlib
 import importlib
 import os
 import tempfile
+import time
 import types
 from collections.abc import Callable
 from operator import itemgetter
@@ -20,17 +23,23 @@ from tumble._errors import InvalidValueError
 
 MAGIC = b"tumble result 1\n"
 DEEPEST = 100  # levels of values within values
+STALE_S = 86400.0  # age of a file that nobody finishes any more
+LOADS = ("LOAD_GLOBAL", "LOAD_NAME", "LOAD_FROM_DICT_OR_GLOBALS")  # instructions that may read a global
 
 
 class Store:
     """Results in a folder, each in a file of its own that is complete or absent. A file that was damaged counts as absent.
 
-    folder: made where it is missing. Its files are pickles: use no folder that others can write to.
+    folder: made where it is missing. Files that a run left unfinished are removed here after a day. Its files are pickles: use no folder that others can write to.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         self.folder = Path(folder)
         self.folder.mkdir(parents=True, exist_ok=True)
+        for left in self.folder.glob("unfinished-*"):
+            with contextlib.suppress(OSError):  # another program removed it
+                if time.time() - left.stat().st_mtime > STALE_S:
+                    left.unlink()
 
     def path(self, key: str) -> Path:
         """Returns the file of a key."""
@@ -50,7 +59,7 @@ class Store:
         """Keeps the pickled result of a key."""
         path = self.path(key)
         path.parent.mkdir(exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix="unfinished-")
+        handle, name = tempfile.mkstemp(dir=self.folder, prefix="unfinished-")
         try:
             with os.fdopen(handle, "wb") as file:
                 file.write(MAGIC + hashlib.sha256(payload).digest() + payload)
@@ -60,7 +69,7 @@ class Store:
             raise
 
     def __len__(self) -> int:
-        return sum(not path.name.startswith("unfinished-") for path in self.folder.glob("??/*"))
+        return sum(1 for _ in self.folder.glob("??/*"))
 
 
 def key(function: Callable[[Any], Any], job: object, version: str = "") -> str:
@@ -170,10 +179,11 @@ class _Feed:
         self.many(f"object {type(value).__module__}.{type(value).__qualname__}", parts, depth)
 
 
-def _names(code: types.CodeType) -> set[str]:
-    """The names of globals in a function and the functions within it."""
-    inner = [const for const in code.co_consts if isinstance(const, types.CodeType)]
-    return set(code.co_names).union(*(_names(each) for each in inner))
+@functools.lru_cache(maxsize=4096)
+def _names(code: types.CodeType) -> frozenset[str]:
+    """The names of globals in a function and the functions and classes within it."""
+    own = (each.argval for each in dis.get_instructions(code) if each.opname in LOADS)
+    return frozenset(own).union(*(_names(const) for const in code.co_consts if isinstance(const, types.CodeType)))
 
 
 def _content(cell: Any) -> Any:
@@ -204,6 +214,7 @@ def _inner(entry: Any) -> tuple[Any, ...]:
     return (entry,)
 
 
+@functools.lru_cache(maxsize=4096)
 def _installed(module: str) -> bool:
     """Whether a module is installed, and not a program's own. One that cannot be imported, such as that of a named tuple's methods, is not."""
     if module == "__main__":
