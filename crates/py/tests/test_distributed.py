@@ -20,6 +20,7 @@ import pytest
 import tumble
 import tumble.distributed
 from tumble.distributed import JobError, Progress, Store
+from tumble.distributed.calls import Outcome, call
 
 WAIT = {"timeout_s": 120}
 
@@ -118,6 +119,69 @@ def test_a_job_that_kills_every_worker_fails_alone(cluster):
     assert results[:2] + results[3:] == [0, 1, 3, 4, 5]
 
 
+def always_dies(folder):
+    (folder / f"{time.monotonic_ns()}-{os.getpid()}").touch()
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+@pytest.mark.parametrize("retries", [0, 1, 2])
+def test_a_killer_is_called_once_and_retries_times_again(cluster, tmp_path, retries):
+    results = tumble.distributed.map(always_dies, [tmp_path], engine=cluster, retries=retries, errors="return", **WAIT)
+    assert isinstance(results[0], JobError) and len(list(tmp_path.iterdir())) == 1 + retries
+    assert tumble.distributed.map(divide, [2], engine=cluster, retries=0, **WAIT) == [6]
+
+
+class Losing(tumble.distributed.Engine):
+    """An engine of four slots that loses each job a number of times."""
+
+    def __init__(self, losses, retries_itself=False):
+        self.losses, self.retries_itself, self.tries, self.closed = losses, retries_itself, {}, False
+
+    def session(self, function, retries):
+        return LosingSession(self, function, retries)
+
+    def close(self):
+        self.closed = True
+
+
+class LosingSession(tumble.distributed.Session):
+    slots = 4
+
+    def __init__(self, engine, function, retries):
+        self.engine, self.function, self.running = engine, function, []
+        self.retries_itself, self.tries = engine.retries_itself, 1 + retries * engine.retries_itself
+
+    def submit(self, number, job):
+        self.running.append((number, job))
+
+    def finished(self, timeout_s):
+        number, job = self.running.pop(0)
+        for _ in range(self.tries):
+            self.engine.tries[number] = self.engine.tries.get(number, 0) + 1
+            if self.engine.tries[number] > self.engine.losses:
+                return [(number, call(self.function, job))]
+        return [(number, Outcome(False, None, "lost"))]
+
+
+@pytest.mark.parametrize("retries_itself", [False, True])
+@pytest.mark.parametrize(("retries", "losses"), [(0, 1), (1, 1), (1, 2), (3, 3), (3, 9)])
+def test_a_lost_job_is_tried_as_often_as_promised(retries_itself, retries, losses):
+    engine = Losing(losses, retries_itself)
+    results = tumble.distributed.map(divide, [1, 2, 3], engine=engine, retries=retries, errors="return")
+    assert engine.tries == dict.fromkeys(range(3), 1 + min(retries, losses))
+    assert results == [12, 6, 4] if retries >= losses else all(isinstance(each, JobError) for each in results)
+
+
+@pytest.mark.parametrize("retries_itself", [False, True])
+def test_lost_jobs_among_endless_ones_are_tried_again(retries_itself):
+    def endless():
+        yield from range(100)
+        pytest.fail("no lost job was tried again")
+
+    found = tumble.distributed.as_completed(lambda n: 2 * n, endless(), engine=Losing(1, retries_itself), retries=1)
+    assert dict(next(found) for _ in range(12)) == {number: 2 * number for number in range(12)}
+
+
 def divide(number):
     return 12 // number
 
@@ -164,6 +228,16 @@ def test_a_damaged_result_is_computed_again(tmp_path):
         assert store.get(name) is None and tumble.distributed.map(divide, [2], store=store) == [6]
         assert store.path(name).read_bytes() == whole
     assert len(store) == 2
+
+
+def test_what_was_left_unfinished_is_removed_after_a_day(tmp_path):
+    Store(tmp_path).put("ab" * 32, b"result")
+    fresh, stale = tmp_path / "unfinished-1", tmp_path / "unfinished-2"
+    for file in (fresh, stale):
+        file.write_bytes(b"part")
+    os.utime(stale, (time.time() - 90000,) * 2)
+    store = Store(tmp_path)
+    assert fresh.exists() and not stale.exists() and len(store) == 1 and store.get("ab" * 32) == b"result"
 
 
 SCRIPT = """
