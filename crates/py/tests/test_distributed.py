@@ -11,7 +11,7 @@ import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -299,6 +299,122 @@ def test_an_executor_of_the_program_that_breaks_is_not_replaced():
     with ProcessPoolExecutor(1) as executor:
         results = tumble.distributed.map(dies, range(6), engine=executor, errors="return", **WAIT)
     assert isinstance(results[2], JobError) and "give a function that makes executors" in str(results[2])
+
+
+def test_late_news_of_a_broken_pool_leaves_the_new_one_alone():
+    made = []
+
+    class Pool(Executor):
+        def __init__(self):
+            made.append(self)
+            self.futures, self.stopped = [], False
+
+        def submit(self, *_):
+            self.futures.append(Future())
+            return self.futures[-1]
+
+        def shutdown(self, wait=True, *, cancel_futures=False):
+            self.stopped = True
+
+    with tumble.distributed.connect(Pool) as engine:
+        session = engine.session(divide, 0)
+        session.submit(0, 1)
+        session.submit(1, 1)
+        old = made[0].futures
+        old[0].set_exception(BrokenExecutor("gone"))
+        assert [number for number, _ in session.finished(5)] == [0] and made[0].stopped
+        session.submit(2, 1)
+        old[1].set_exception(BrokenExecutor("gone"))
+        assert [number for number, _ in session.finished(5)] == [1]
+        session.submit(3, 1)
+        assert len(made) == 2 and not made[1].stopped and len(made[1].futures) == 2
+    assert made[1].stopped
+
+
+def stubborn(_):
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    time.sleep(600)
+
+
+def test_processes_that_do_not_end_are_killed(monkeypatch):
+    monkeypatch.setattr("tumble.distributed.executors.STOP_S", 0.5)
+    made = []
+
+    def make():
+        made.append(pool())
+        return made[-1]
+
+    with pytest.raises(TimeoutError):
+        engine = tumble.distributed.connect(make)
+        try:
+            tumble.distributed.map(stubborn, range(2), engine=engine, timeout_s=4)
+        finally:
+            processes = list(made[0]._processes.values())
+            engine.close()
+    assert len(processes) == 2 and not any(process.is_alive() for process in processes)
+
+
+class Stuck(Losing):
+    """An engine whose jobs never finish and cannot be taken back."""
+
+    def session(self, function, retries):
+        session = super().session(function, retries)
+        session.finished, session.cancel = lambda timeout_s: [], lambda: 1 // 0
+        return session
+
+
+def test_an_engine_that_cannot_take_jobs_back_is_closed_and_hides_no_error(monkeypatch):
+    engine = Stuck(0)
+    monkeypatch.setattr("tumble.distributed.jobs.connect", lambda *_, **__: engine)
+    with pytest.raises(TimeoutError, match="no job finished within 3 s"):
+        tumble.distributed.map(divide, [1], engine="stuck", timeout_s=3)
+    assert engine.closed
+
+
+def test_a_cluster_without_a_client_is_closed(monkeypatch):
+    distributed = pytest.importorskip("distributed", reason="SKIPPED: distributed is not installed")
+    closed = []
+
+    class Cluster:
+        def __init__(self, **_):
+            pass
+
+        def close(self, timeout):
+            closed.append(timeout)
+
+    def refuse(*_, **__):
+        raise OSError("no connection")
+
+    monkeypatch.delenv("DASK_SCHEDULER_ADDRESS", raising=False)
+    monkeypatch.setattr(distributed, "LocalCluster", Cluster)
+    monkeypatch.setattr(distributed, "Client", refuse)
+    monkeypatch.setattr(distributed, "default_client", lambda: (_ for _ in ()).throw(ValueError))
+    with pytest.raises(OSError, match="no connection"):
+        tumble.distributed.connect("dask")
+    assert len(closed) == 1
+
+
+def test_jobs_that_are_canceled_elsewhere_are_not_taken_for_slow_ones():
+    distributed = pytest.importorskip("distributed", reason="SKIPPED: distributed is not installed")
+    with tumble.distributed.connect("dask", workers=1) as engine:
+        session = engine.session(divide, 0)
+        wait, calls = session.distributed.wait, []
+
+        def canceled(*words, **more):
+            calls.append(more["timeout"])
+            if len(calls) < 3:
+                raise distributed.CancelledError
+            return wait(*words, **more)
+
+        class Distributed:
+            wait, TimeoutError, CancelledError = staticmethod(canceled), distributed.TimeoutError, distributed.CancelledError
+
+        session.distributed = Distributed
+        future = engine.client.submit(time.sleep, 0.3, pure=False)  # the one worker is busy: nothing is done at first
+        session.submit(0, 2)
+        outcomes = session.finished(60)
+        assert len(calls) == 3 and [(number, pickle.loads(outcome.payload)) for number, outcome in outcomes] == [(0, 6)]
+        future.release()
 
 
 def test_results_as_they_finish():

@@ -37,7 +37,7 @@ def map(
     ``functools.partial(tumble.simulate, model, snapshot)`` is one. engine, workers: as in ``connect``; what is not an ``Engine`` yet and is started here is
     stopped at the end. store: a folder of results by content hash: a job whose result is there is not run again, and results are there as soon as they
     arrive, so a run that was interrupted goes on where it was. version: counts in the hash, see ``key``. retries: how often at most a job is tried again after its
-    worker died; a Dask cluster that was not started here counts by its own ``allowed-failures``; exceptions of the function are not tried again. timeout_s: longest time without any job that finishes, s. progress: ``True`` for a bar on a
+    worker died; a Dask cluster that was not started here counts by its own ``allowed-failures``; exceptions of the function are not tried again. timeout_s: longest time without any job that finishes, s; without effect in this process, ``engine=None``. progress: ``True`` for a bar on a
     terminal, or a function that is called with a ``Progress`` after each job.
 
     A job without result raises ``JobError`` after all others are finished, or stands as one in the results with ``errors="return"``. Raises
@@ -197,13 +197,15 @@ class _Run:
         return pickle.loads(outcome.payload)
 
     def close(self) -> None:
-        if self.session is not None and self.running:
-            with contextlib.suppress(Exception):  # interrupted: what is there is kept, and the first error is the one to see
-                for number, outcome in self.session.finished(0):
-                    self.keep(number, outcome)
-            self.session.cancel()
-        if self.engine is not None and self.engine is not self.given:
-            self.engine.close()
+        try:
+            if self.session is not None and self.running:  # interrupted: what is there is kept
+                with contextlib.suppress(Exception):
+                    for number, outcome in self.session.finished(0):
+                        self.keep(number, outcome)
+                self.session.cancel()
+        finally:
+            if self.engine is not None and self.engine is not self.given:
+                self.engine.close()
 
 
 def grid(**values: Sequence[Any]) -> list[dict[str, Any]]:
