@@ -38,7 +38,10 @@ class Engine:
     """Where jobs run: what ``connect`` returns, or a class of a program for another engine. A ``with`` block closes it."""
 
     def session(self, function: Callable[[Any], Any], retries: int) -> Session:
-        """Prepares for the jobs of a function. retries: how often the engine tries a job again whose worker was lost, if it does."""
+        """Prepares for the jobs of a function. retries: how often the engine tries a job again whose worker was lost, if it does.
+
+        Where it does, another session with ``retries`` 0 follows for the jobs that were lost nevertheless, one at a time; the one before is empty then.
+        """
         raise NotImplementedError
 
     def close(self) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ThreadPoolExecutor, wait
 from typing import Any
 
 from tumble.distributed.calls import Outcome, call, call_packed, pack
-from tumble.distributed.engines import Engine, Results, Session
+from tumble.distributed.engines import STOP_S, Engine, Results, Session
 
 
 class Executors(Engine):
@@ -29,20 +30,29 @@ class Executors(Engine):
             self.executor = self.make()
         return self.executor
 
-    def drop(self) -> bool:
-        """Gives a broken executor up. Returns whether there will be another."""
-        if self.make is None:
-            return False
-        self.close()
-        return True
+    def drop(self, broken: Executor) -> bool:
+        """Gives a broken executor up, if that is still the present one. Returns whether there will be another."""
+        if self.make is not None and broken is self.executor:
+            self.close()
+        return self.make is not None
 
     def close(self) -> None:
-        if self.make is not None and self.executor is not None:
-            if self.abandoned:
-                for process in list((getattr(self.executor, "_processes", None) or {}).values()):
-                    process.terminate()
-            self.executor.shutdown(wait=True, cancel_futures=True)
-            self.executor, self.abandoned = None, False
+        """Stops the executor if it was made here, within twice ``STOP_S``."""
+        if self.make is None or self.executor is None:
+            return
+        executor, abandoned = self.executor, self.abandoned
+        self.executor, self.abandoned = None, False
+        processes = list((getattr(executor, "_processes", None) or {}).values())
+        if abandoned:
+            for process in processes:
+                process.terminate()
+        stopping = threading.Thread(target=executor.shutdown, kwargs={"wait": True, "cancel_futures": True}, daemon=True)
+        stopping.start()
+        stopping.join(STOP_S)
+        if stopping.is_alive():
+            for process in processes:
+                process.kill()
+            stopping.join(STOP_S)
 
 
 class _Session(Session):
@@ -55,34 +65,39 @@ class _Session(Session):
         self.slots = 4 * int(getattr(engine.present(), "_max_workers", None) or os.cpu_count() or 1)
         self.threads = isinstance(engine.present(), ThreadPoolExecutor)
         self.function: Any = function if self.threads else pack(function)
-        self.running: dict[Future[Any], int] = {}
+        self.running: dict[Future[Any], tuple[int, Executor]] = {}  # and the executor that it was given to
 
     def submit(self, number: int, job: Any) -> None:
+        executor = self.engine.present()
         try:
-            future = self._submit(job)
+            future = self._submit(executor, job)
         except BrokenExecutor as error:
-            if self.engine.drop():  # it broke just now; the jobs in it learn of it by themselves
-                future = self._submit(job)
+            if self.engine.drop(executor):  # it broke just now; the jobs in it learn of it by themselves
+                executor = self.engine.present()
+                future = self._submit(executor, job)
             else:
                 future = Future()
                 future.set_exception(error)
-        self.running[future] = number
+        self.running[future] = number, executor
 
     def finished(self, timeout_s: float) -> Results:
         done, _ = wait(self.running, max(timeout_s, 0), FIRST_COMPLETED)
-        outcomes = [(self.running.pop(future), self._outcome(future)) for future in done]
-        if any(_broke(future) for future in done):
-            self.engine.drop()
+        outcomes = []
+        for future in done:
+            number, executor = self.running.pop(future)
+            outcomes.append((number, self._outcome(future)))
+            if _broke(future):
+                self.engine.drop(executor)
         return outcomes
 
     def cancel(self) -> None:
         self.engine.abandoned |= not all(future.cancel() or future.done() for future in list(self.running))
         self.running.clear()
 
-    def _submit(self, job: Any) -> Future[Any]:
+    def _submit(self, executor: Executor, job: Any) -> Future[Any]:
         if self.threads:
-            return self.engine.present().submit(call, self.function, job)
-        return self.engine.present().submit(call_packed, self.function, pack(job))
+            return executor.submit(call, self.function, job)
+        return executor.submit(call_packed, self.function, pack(job))
 
     def _outcome(self, future: Future[Any]) -> Outcome:
         try:

@@ -36,8 +36,8 @@ def map(
     function: pure, of one argument: the same job gives the same result in any process, where ``tumble`` and what it imports are installed.
     ``functools.partial(tumble.simulate, model, snapshot)`` is one. engine, workers: as in ``connect``; what is not an ``Engine`` yet and is started here is
     stopped at the end. store: a folder of results by content hash: a job whose result is there is not run again, and results are there as soon as they
-    arrive, so a run that was interrupted goes on where it was. version: counts in the hash, see ``key``. retries: how often a job is tried again after its
-    worker died; exceptions of the function are not tried again. timeout_s: longest time without any job that finishes, s. progress: ``True`` for a bar on a
+    arrive, so a run that was interrupted goes on where it was. version: counts in the hash, see ``key``. retries: how often at most a job is tried again after its
+    worker died; a Dask cluster that was not started here counts by its own ``allowed-failures``; exceptions of the function are not tried again. timeout_s: longest time without any job that finishes, s; without effect in this process, ``engine=None``. progress: ``True`` for a bar on a
     terminal, or a function that is called with a ``Progress`` after each job.
 
     A job without result raises ``JobError`` after all others are finished, or stands as one in the results with ``errors="return"``. Raises
@@ -91,14 +91,14 @@ def as_completed(
             run.submit(number, job)
             while run.full():
                 yield from run.arrived()
-        while run.running:
-            yield from run.arrived()
-        while run.lost:
-            number, job = run.lost.popleft()
-            run.submit(number, job)
-            yield from run.arrived(alone=True)
-    finally:
-        run.close()
+            if run.many_lost():
+                yield from run.rest()
+        yield from run.rest()
+    except BaseException:
+        with contextlib.suppress(Exception):  # the first error is the one to see
+            run.close()
+        raise
+    run.close()
 
 
 class _Run:
@@ -116,8 +116,9 @@ class _Run:
         self.running: dict[int, Any] = {}
         self.keys: dict[int, str] = {}
         self.lost: deque[tuple[int, Any]] = deque()
-        """Jobs whose workers died: they may have died of another job, so in the end each of them is tried alone."""
+        """Jobs whose workers died: they may have died of another job, so each of them is tried alone."""
         self.deaths: dict[int, int] = {}
+        """How often each of them was lost alone."""
 
     def look_up(self, number: int, job: Any) -> bytes | None:
         """Returns the result of a job from the store."""
@@ -134,12 +135,34 @@ class _Run:
     def submit(self, number: int, job: Any) -> None:
         if self.session is None:  # nothing is started for jobs that are all known
             self.engine = connect(self.given, workers=self.workers)
-            self.session = self.engine.session(self.function, self.retries)
+            self.begin(max(self.retries - 1, 0))  # the last try is alone
+        assert self.session is not None
         self.running[number] = job
         self.session.submit(number, job)
 
+    def begin(self, retries: int) -> None:
+        """Goes on with another session, of an engine that tries lost jobs again by itself."""
+        assert self.engine is not None and not self.running
+        if self.session is None or self.session.retries_itself:
+            self.session = self.engine.session(self.function, retries)
+
     def full(self) -> bool:
         return self.session is not None and len(self.running) >= self.session.slots
+
+    def many_lost(self) -> bool:
+        return self.session is not None and len(self.lost) > self.session.slots
+
+    def rest(self) -> Iterator[tuple[int, Any]]:
+        """Waits for all jobs at the engine, then tries the lost ones alone."""
+        while self.running:
+            yield from self.arrived()
+        if not self.lost:
+            return
+        self.begin(0)
+        while self.lost:
+            self.submit(*self.lost.popleft())
+            yield from self.arrived(alone=True)
+        self.begin(max(self.retries - 1, 0))
 
     def arrived(self, alone: bool = False) -> Iterator[tuple[int, Any]]:
         """Waits, and yields the results that arrive."""
@@ -159,10 +182,10 @@ class _Run:
             yield number, result
 
     def again(self, number: int, alone: bool) -> bool:
-        """Whether a job whose worker died is tried again."""
+        """Whether a job whose worker died is tried again. The first loss is among others, and is one of several where the engine tries again by itself."""
         assert self.session is not None
         self.deaths[number] = self.deaths.get(number, 0) + alone
-        return self.deaths[number] < (1 if self.session.retries_itself else max(self.retries, 1))
+        return self.deaths[number] < (min(self.retries, 1) if self.session.retries_itself else self.retries)
 
     def keep(self, number: int, outcome: Outcome) -> Any:
         """Returns the result of a job, which is put into the store, or its error."""
@@ -174,13 +197,15 @@ class _Run:
         return pickle.loads(outcome.payload)
 
     def close(self) -> None:
-        if self.session is not None and self.running:
-            with contextlib.suppress(Exception):  # interrupted: what is there is kept, and the first error is the one to see
-                for number, outcome in self.session.finished(0):
-                    self.keep(number, outcome)
-            self.session.cancel()
-        if self.engine is not None and self.engine is not self.given:
-            self.engine.close()
+        try:
+            if self.session is not None and self.running:  # interrupted: what is there is kept
+                with contextlib.suppress(Exception):
+                    for number, outcome in self.session.finished(0):
+                        self.keep(number, outcome)
+                self.session.cancel()
+        finally:
+            if self.engine is not None and self.engine is not self.given:
+                self.engine.close()
 
 
 def grid(**values: Sequence[Any]) -> list[dict[str, Any]]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import importlib
 import itertools
 import logging
+import time
 import uuid
 from collections.abc import Callable
 from typing import Any
@@ -12,6 +14,7 @@ from typing import Any
 from tumble.distributed.calls import Outcome, call_packed, pack
 from tumble.distributed.engines import STOP_S, Engine, Results, Session
 
+FETCH_S = 60.0  # the longest wait for results that are finished
 LARGE = 1 << 18  # bytes of a function that is not sent with each job: jobs that share a value are not spread as evenly
 
 
@@ -29,7 +32,11 @@ def open_dask(address: str | None, workers: int) -> Dask:
     if address is not None:
         return Dask(distributed.Client(address, set_as_default=False, timeout=60), started=True)
     cluster = distributed.LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL)
-    return Dask(distributed.Client(cluster, set_as_default=False, timeout=60), cluster, started=True)
+    try:
+        return Dask(distributed.Client(cluster, set_as_default=False, timeout=60), cluster, started=True)
+    except BaseException:
+        cluster.close(timeout=STOP_S)
+        raise
 
 
 class Dask(Engine):
@@ -48,10 +55,12 @@ class Dask(Engine):
 
     def close(self) -> None:
         if self.started:
-            self.client.close(timeout=STOP_S)
-            if self.cluster is not None:
-                self.cluster.close(timeout=STOP_S)
             self.started = False
+            try:
+                self.client.close(timeout=STOP_S)
+            finally:
+                if self.cluster is not None:
+                    self.cluster.close(timeout=STOP_S)
 
 
 class _Session(Session):
@@ -72,13 +81,12 @@ class _Session(Session):
     def finished(self, timeout_s: float) -> Results:
         if not self.running:
             return []
-        try:
-            with self.client.as_current():
-                done = self.distributed.wait(list(self.running), timeout=max(timeout_s, 0.01), return_when="FIRST_COMPLETED").done
-        except TimeoutError:
-            return []
-        except self.distributed.CancelledError:
-            done = [future for future in self.running if future.done()]
+        end = time.monotonic() + timeout_s
+        done = self._done(timeout_s)
+        while done is None and time.monotonic() < end:
+            time.sleep(0.02)
+            done = self._done(end - time.monotonic())
+        done = done or []
         whole = [future for future in done if future.status == "finished"]
         fetched = dict(zip(whole, self._fetched(whole), strict=True))
         return [(self.running.pop(future), fetched.get(future) or self._outcome(future)) for future in done]
@@ -87,15 +95,29 @@ class _Session(Session):
         self.client.cancel(list(self.running), force=True)
         self.running.clear()
 
+    def _done(self, timeout_s: float) -> list[Any] | None:
+        """Waits for futures; None if one was canceled elsewhere and none is known to be done yet."""
+        try:
+            with self.client.as_current():
+                return list(self.distributed.wait(list(self.running), timeout=max(timeout_s, 0.01), return_when="FIRST_COMPLETED").done)
+        except (TimeoutError, self.distributed.TimeoutError):
+            return []
+        except self.distributed.CancelledError:
+            return [future for future in self.running if future.done()] or None
+
     def _fetched(self, futures: list[Any]) -> list[Outcome | None]:
         """The results of many in one message; none where a worker was lost meanwhile."""
+
+        async def gather() -> Any:
+            return await asyncio.wait_for(self.client.gather(futures, asynchronous=True), FETCH_S)
+
         try:
-            return [Outcome(*each) for each in self.client.gather(futures)]
-        except Exception:
+            return [Outcome(*each) for each in self.client.sync(gather)]
+        except (Exception, self.distributed.CancelledError):
             return [None] * len(futures)
 
     def _outcome(self, future: Any) -> Outcome:
         try:
-            return Outcome(*future.result(timeout=60))
+            return Outcome(*future.result(timeout=FETCH_S))
         except (Exception, self.distributed.CancelledError) as error:
             return Outcome(False, None, f"{type(error).__name__}: {error}")

@@ -48,7 +48,7 @@ class Ray(Engine):
 
 class _Session(Session):
     def __init__(self, ray: Any, function: Callable[[Any], Any], retries: int) -> None:
-        self.ray, self.retries = ray, retries
+        self.ray = ray
         self.slots = max(64, 4 * int(ray.cluster_resources().get("CPU", 1)))
         self.function = ray.put(pack(function))  # once for all jobs
         self.task = ray.remote(call_packed).options(max_retries=retries, retry_exceptions=False, num_cpus=1)
@@ -74,4 +74,4 @@ class _Session(Session):
         try:
             return Outcome(*self.ray.get(reference, timeout=60))
         except self.ray.exceptions.RayError as error:
-            return Outcome(False, None, f"its worker was lost, {self.retries + 1} times: {type(error).__name__}: {error}")
+            return Outcome(False, None, f"its worker was lost: {type(error).__name__}: {error}")

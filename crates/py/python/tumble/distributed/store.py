@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import dis
+import functools
 import hashlib
 import importlib
 import os
 import tempfile
+import time
 import types
 from collections.abc import Callable
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -18,17 +23,23 @@ from tumble._errors import InvalidValueError
 
 MAGIC = b"tumble result 1\n"
 DEEPEST = 100  # levels of values within values
+STALE_S = 86400.0  # age of a file that nobody finishes any more
+LOADS = ("LOAD_GLOBAL", "LOAD_NAME", "LOAD_FROM_DICT_OR_GLOBALS")  # instructions that may read a global
 
 
 class Store:
     """Results in a folder, each in a file of its own that is complete or absent. A file that was damaged counts as absent.
 
-    folder: made where it is missing. Its files are pickles: use no folder that others can write to.
+    folder: made where it is missing. Files that a run left unfinished are removed here after a day. Its files are pickles: use no folder that others can write to.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         self.folder = Path(folder)
         self.folder.mkdir(parents=True, exist_ok=True)
+        for left in self.folder.glob("unfinished-*"):
+            with contextlib.suppress(OSError):  # another program removed it
+                if time.time() - left.stat().st_mtime > STALE_S:
+                    left.unlink()
 
     def path(self, key: str) -> Path:
         """Returns the file of a key."""
@@ -48,7 +59,7 @@ class Store:
         """Keeps the pickled result of a key."""
         path = self.path(key)
         path.parent.mkdir(exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix="unfinished-")
+        handle, name = tempfile.mkstemp(dir=self.folder, prefix="unfinished-")
         try:
             with os.fdopen(handle, "wb") as file:
                 file.write(MAGIC + hashlib.sha256(payload).digest() + payload)
@@ -58,7 +69,7 @@ class Store:
             raise
 
     def __len__(self) -> int:
-        return sum(not path.name.startswith("unfinished-") for path in self.folder.glob("??/*"))
+        return sum(1 for _ in self.folder.glob("??/*"))
 
 
 def key(function: Callable[[Any], Any], job: object, version: str = "") -> str:
@@ -86,9 +97,9 @@ def _library() -> str:
 class _Feed:
     """Writes values as bytes that depend on nothing but the values."""
 
-    def __init__(self, write: Callable[[bytes], object]) -> None:
+    def __init__(self, write: Callable[[bytes], object], known: dict[int, int] | None = None) -> None:
         self.write = write
-        self.known: dict[int, int] = {}  # functions and classes, which may refer to each other
+        self.known = dict(known or {})  # functions and classes, which may refer to each other
 
     def part(self, tag: str, data: bytes) -> None:
         self.write(f"{tag} {len(data)} ".encode() + data)
@@ -106,7 +117,7 @@ class _Feed:
         elif type(value) in (list, tuple):
             self.many(type(value).__name__, value, depth)
         elif isinstance(value, (set, frozenset)):
-            self.many(type(value).__name__, sorted(_digest(each, depth) for each in value), depth)
+            self.many(type(value).__name__, sorted(self.digest(each, depth) for each in value), depth)
         elif type(value) is dict:
             self.many("dict", [part for pair in value.items() for part in pair], depth)
         elif isinstance(value, types.CodeType):
@@ -124,6 +135,11 @@ class _Feed:
         for each in values:
             self.value(each, depth + 1)
 
+    def digest(self, value: Any, depth: int) -> bytes:
+        digest = hashlib.sha256()
+        _Feed(digest.update, self.known).value(value, depth + 1)
+        return digest.digest()
+
     def named(self, value: Any, depth: int) -> None:
         """A function or class: its name, and what it is made of if it is that of a program."""
         self.part("name", f"{value.__module__}.{value.__qualname__}".encode())
@@ -137,8 +153,7 @@ class _Feed:
             if not _installed(value.__module__):
                 self.globals(value.__code__, value.__globals__, value.__module__, depth)
         elif not _installed(value.__module__):
-            own = {name: part for name, part in vars(value).items() if isinstance(_inner(part), types.FunctionType)}
-            self.many("class", [value.__bases__, *(part for name in sorted(own) for part in (name, _inner(own[name])))], depth)
+            self.many("class", [value.__bases__, *(part for name, entry in _entries(value) for part in (name, *_inner(entry)))], depth)
 
     def globals(self, code: types.CodeType, names: dict[str, Any], module: str, depth: int) -> None:
         """What a function names in its module; modules, and what was imported from others, by name."""
@@ -158,21 +173,17 @@ class _Feed:
             raise InvalidValueError(f"a {type(value).__name__} has no content that can be hashed: {error}") from error
         if isinstance(made, str):
             self.part("name", f"{value.__module__}.{made}".encode())
+            self.value(getattr(value, "__wrapped__", None), depth + 1)  # the function of functools.cache
             return
         parts = [list(part) if number > 2 and part is not None else part for number, part in enumerate(made)]
         self.many(f"object {type(value).__module__}.{type(value).__qualname__}", parts, depth)
 
 
-def _digest(value: Any, depth: int) -> bytes:
-    digest = hashlib.sha256()
-    _Feed(digest.update).value(value, depth + 1)
-    return digest.digest()
-
-
-def _names(code: types.CodeType) -> set[str]:
-    """The names of globals in a function and the functions within it."""
-    inner = [const for const in code.co_consts if isinstance(const, types.CodeType)]
-    return set(code.co_names).union(*(_names(each) for each in inner))
+@functools.lru_cache(maxsize=4096)
+def _names(code: types.CodeType) -> frozenset[str]:
+    """The names of globals in a function and the functions and classes within it."""
+    own = (each.argval for each in dis.get_instructions(code) if each.opname in LOADS)
+    return frozenset(own).union(*(_names(const) for const in code.co_consts if isinstance(const, types.CodeType)))
 
 
 def _content(cell: Any) -> Any:
@@ -182,15 +193,35 @@ def _content(cell: Any) -> Any:
         return None
 
 
-def _inner(part: Any) -> Any:
-    """The function of a method, a class method, a static method or a property."""
-    return getattr(part, "__func__", getattr(part, "fget", part))
+def _entries(owner: type) -> list[tuple[str, Any]]:
+    """What a class defines itself, by name: attributes and methods, without what Python adds to every class."""
+    entries = [(name, entry) for name, entry in vars(owner).items() if name != "_abc_impl"]
+    return sorted((each for each in entries if not _is_dunder(each[0]) or isinstance(_inner(each[1])[-1], types.FunctionType)), key=itemgetter(0))
 
 
+def _is_dunder(name: str) -> bool:
+    return name.startswith("__") and name.endswith("__")
+
+
+def _inner(entry: Any) -> tuple[Any, ...]:
+    """What an entry of a class is made of: its kind and functions if it is a method of a kind or a property, otherwise itself."""
+    if isinstance(entry, (classmethod, staticmethod)):
+        return type(entry).__name__, entry.__func__
+    if isinstance(entry, property):
+        return "property", entry.fset, entry.fdel, entry.fget
+    if isinstance(entry, functools.cached_property):
+        return "cached_property", entry.func
+    return (entry,)
+
+
+@functools.lru_cache(maxsize=4096)
 def _installed(module: str) -> bool:
-    """Whether a module is installed, and not a program's own."""
+    """Whether a module is installed, and not a program's own. One that cannot be imported, such as that of a named tuple's methods, is not."""
     if module == "__main__":
         return False
-    file = getattr(importlib.import_module(module), "__file__", None) if module else None
+    try:
+        file = getattr(importlib.import_module(module), "__file__", None) if module else None
+    except Exception:
+        return False
     parts = Path(file).parts if file else ()
     return not file or "site-packages" in parts or "dist-packages" in parts or Path(os.__file__).parent in Path(file).parents
