@@ -83,7 +83,7 @@ table! {
     steam_engine_backtracking: "steam_engine", Backtracking, "466f4da8adf2589f", "f65c1d0393337846";
     arch_time_stepping: "arch", TimeStepping, "b1067ee5cac37610", "7162c57df380fe8b";
     walker_time_stepping: "walker", TimeStepping, "1354183924844efe", "becbf6edc5e078a5";
-    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "c3d5f4df6fadd5f4", "6000a2939c8d5a1d";
+    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "c7b940edc3ea2b9a", "a97663656893ebca";
     dominoes_time_stepping: "dominoes", TimeStepping, "2b5433839ac3b3d2", "97388a630470b482";
 }
 
@@ -92,5 +92,5 @@ table! {
     arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "15c2a2986571f20d";
     dominoes_backtracking: "dominoes", Backtracking, "9c7b110aee952a4c", "4c3f82114ea67b3e";
     walker_backtracking: "walker", Backtracking, "ca535adb9b9b96d3", "093bfa105a94cd32";
-    wrecking_ball_backtracking: "wrecking_ball", Backtracking, "cf5218eacd10dfbd", "9248ecfe03f40d9d";
+    wrecking_ball_backtracking: "wrecking_ball", Backtracking, "6c2945a4c1ce9c8e", "3d6cb77528bdd2e7";
 }
