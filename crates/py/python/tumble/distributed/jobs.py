@@ -36,9 +36,10 @@ def map(
     function: pure, of one argument: the same job gives the same result in any process, where ``tumble`` and what it imports are installed.
     ``functools.partial(tumble.simulate, model, snapshot)`` is one. engine, workers: as in ``connect``; what is not an ``Engine`` yet and is started here is
     stopped at the end. store: a folder of results by content hash: a job whose result is there is not run again, and results are there as soon as they
-    arrive, so a run that was interrupted goes on where it was. version: counts in the hash, see ``key``. retries: how often at most a job is tried again after its
-    worker died; a Dask cluster that was not started here counts by its own ``allowed-failures``; exceptions of the function are not tried again. timeout_s: longest time without any job that finishes, s; without effect in this process, ``engine=None``. progress: ``True`` for a bar on a
-    terminal, or a function that is called with a ``Progress`` after each job.
+    arrive, so a run that was interrupted goes on where it was. version: counts in the hash, see ``key``. retries: how often at most a job is tried again
+    after its worker died; a Dask cluster that was not started here counts by its own ``allowed-failures``; exceptions of the function are not tried again.
+    timeout_s: longest time without any job that finishes, s; without effect in this process, ``engine=None``. progress: ``True`` for a bar on a terminal, or
+    a function that is called with a ``Progress`` after each job.
 
     A job without result raises ``JobError`` after all others are finished, or stands as one in the results with ``errors="return"``. Raises
     ``TimeoutError`` after ``timeout_s``.

@@ -30,7 +30,8 @@ LOADS = ("LOAD_GLOBAL", "LOAD_NAME", "LOAD_FROM_DICT_OR_GLOBALS")  # instruction
 class Store:
     """Results in a folder, each in a file of its own that is complete or absent. A file that was damaged counts as absent.
 
-    folder: made where it is missing. Files that a run left unfinished are removed here after a day. Its files are pickles: use no folder that others can write to.
+    folder: made where it is missing. Files that a run left unfinished are removed here after a day. Its files are pickles: use no folder that others can write
+    to.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
@@ -75,9 +76,9 @@ class Store:
 def key(function: Callable[[Any], Any], job: object, version: str = "") -> str:
     """Returns the content hash of a job, as 64 hexadecimal digits: of the function, the job, ``version``, and this build of the library.
 
-    Of a function written in Python the code counts, its defaults and what it closes over, and with it all functions, classes and values of its module
-    that it names. What lies in other modules counts by name only: change ``version`` when it changes. Raises ``InvalidValueError`` for what does not
-    pickle.
+    Of a function written in Python the code counts, its defaults and what it closes over, and with it all functions, classes and values of its module that it
+    names; of a class its methods and attributes. What lies in other modules counts by name only: change ``version`` when it changes. Raises
+    ``InvalidValueError`` for what does not pickle.
     """
     digest = hashlib.sha256()
     _Feed(digest.update).value((_library(), version, function, job), 0)
