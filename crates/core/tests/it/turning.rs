@@ -52,7 +52,7 @@ impl Chain {
         for i in 0..=count {
             let (width, length, mass) = if i == count { (LOAD, LOAD, load) } else { (0.04, LENGTH, 1.0) };
             let shape = Shape::cuboid(Vec3::new(width, width, length)).unwrap();
-            let link = LinkBuilder::new(format!("link {i}"), joint.clone());
+            let link = LinkBuilder::new(format!("link {i}"), joint);
             let link = link.with_shape(shape, Pose::translation(0.0, 0.0, -0.5 * length)).with_mass(mass);
             builder = builder.link(match i {
                 0 => link,
