@@ -108,8 +108,7 @@ impl Emitter {
     /// Returns a particle that leaves in a frame: the record without its serial number, the time within the frame,
     /// s, and its velocity over the mount, m/s. `None` without a mount that it should have.
     pub(super) fn birth(&self, number: u64, random: Random, twin: Random, frame: &Frame) -> Option<Birth> {
-        let begin = frame.view.time - frame.dt;
-        let after = (self.time(number) - begin).clamp(0.0, frame.dt);
+        let after = (self.time(number) - frame.start).clamp(0.0, frame.dt);
         let (pose, carrier) = self.carrier(frame, after / frame.dt)?;
         let paired = self.half_angle >= PI && number < u64::from(self.burst & !1);
         let (draw, sign) = if paired && number % 2 == 1 { (twin, -1.0) } else { (random, 1.0) };

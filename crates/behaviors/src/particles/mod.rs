@@ -204,7 +204,7 @@ impl ParticleSystem {
 
     /// Lets the particles fly that leave their sources in this frame. Particles without a place are lost.
     fn bear(&self, flight: &Flight, header: &mut [f64], records: &mut [f64], memory: &mut Memory) {
-        let (frame, begin) = (flight.frame, flight.frame.view.time - flight.frame.dt);
+        let (frame, begin) = (flight.frame, flight.frame.start);
         let mut free = records.chunks_exact_mut(RECORD).filter(|record| record[6] <= 0.0);
         for emitter in &self.emitters {
             // what leaves at the very start of the first frame is not left out

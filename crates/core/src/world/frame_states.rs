@@ -17,8 +17,9 @@ impl Core {
         }
     }
 
-    /// Advances all frame states by the frame that was just stepped, then applies their impulses.
-    pub(super) fn advance_frame_states(&mut self, before: &[PartState]) -> Result<(), StepError> {
+    /// Advances all frame states by the frame that was just stepped, from the time `start` (s) and the part states
+    /// `before`; then applies their impulses.
+    pub(super) fn advance_frame_states(&mut self, start: f64, before: &[PartState]) -> Result<(), StepError> {
         let (mut impulses, mut x) = (Vec::new(), Vec::new());
         for place in 0..self.table.placed.len() {
             let entry = self.objects().at(place);
@@ -26,8 +27,8 @@ impl Core {
             let range = entry.state_range.x.clone();
             x.clear();
             x.extend_from_slice(&self.state.x[range.clone()]);
-            let view = self.view(self.state.time);
-            let frame = Frame { dt: self.settings.dt, settings: &self.settings, view, before, threads: &self.threads };
+            let (settings, view, threads) = (&self.settings, self.view(self.state.time), &self.threads);
+            let frame = Frame { dt: settings.dt, start, settings, view, before, threads };
             follower.advance(entry.state_range, &frame, &mut x, &mut impulses);
             let fine = impulses.iter().all(|i| i.impulse.iter().chain(i.point.iter()).all(|x| x.is_finite()));
             let bad = if !fine { Some("an impulse of it") } else { (!follower.accepts(&x)).then_some("its state") };
