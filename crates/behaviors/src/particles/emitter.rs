@@ -66,6 +66,8 @@ impl Emitter {
 
     pub(super) fn validate(&self) -> Result<(), BehaviorError> {
         check_vector("the place of an emitter", &self.pose.translation.vector)?;
+        let rotation = self.pose.rotation.coords;
+        rotation.iter().try_for_each(|q| check("the axis of an emitter", *q, true, "finite"))?;
         check("the half angle of an emitter", self.half_angle, (0.0..=PI).contains(&self.half_angle), "0 to π")?;
         check("the radius of an emitter", self.radius, self.radius >= 0.0, "at least 0")?;
         check("the rate of an emitter", self.rate, (0.0..=1e9).contains(&self.rate), "0 to 1e9")?;

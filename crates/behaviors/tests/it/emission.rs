@@ -3,6 +3,7 @@
 use crate::steps;
 use std::collections::BTreeSet;
 use tumble_behaviors::{Emitter, ParticleSettings, ParticleSystem};
+use tumble_core::WorldError;
 use tumble_core::prelude::*;
 
 fn world(dt: f64) -> World {
@@ -102,4 +103,19 @@ fn a_stream_in_step_with_the_frames_leaves_each_particle_once() {
             }
         }
     }
+}
+
+#[test]
+fn lifetimes_and_axes_are_checked() {
+    let mut world = world(0.01);
+    let id = world.add(ParticleSystem::new("sparks", settings()).unwrap()).unwrap();
+    for life in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let refused = ParticleSystem::spawn(&mut world, id, Vec3::zeros(), Vec3::zeros(), life);
+        assert_eq!(refused, Err(WorldError::BadState("sparks".into())), "{life}");
+    }
+    assert_eq!(ParticleSystem::spawn(&mut world, id, Vec3::zeros(), Vec3::zeros(), 1.0), Ok(Some(0)));
+    let rotation = Quat::new_unchecked(nalgebra::Quaternion::new(f64::NAN, 0.0, 0.0, 0.0));
+    let emitter = Emitter { pose: Pose::from_parts(Vec3::zeros().into(), rotation), ..Emitter::default() };
+    let error = ParticleSystem::new("", settings()).unwrap().with_emitter(emitter).unwrap_err().to_string();
+    assert!(error.starts_with("the axis of an emitter"), "{error}");
 }
