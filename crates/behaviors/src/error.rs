@@ -1,9 +1,9 @@
-//! Errors of boids and flocks.
+//! Errors of behaviors: bodies that do not spin, flocks, force fields, particles and spring meshes.
 
 use std::fmt;
 use tumble_core::WorldError;
 
-/// An error of a boid or a flock.
+/// Reason why a behavior was not made, changed or added.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum BehaviorError {
@@ -20,7 +20,7 @@ pub enum BehaviorError {
     NoFlock,
     /// The object is not a boid of this flock.
     NoBoid,
-    /// The world refuses the boid.
+    /// The world refuses the object.
     World(WorldError),
 }
 

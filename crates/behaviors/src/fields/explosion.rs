@@ -1,7 +1,7 @@
 //! An explosion: a spherical wave that hits all bodies at one time and decays.
 //!
 //! ```text
-//! s = min(1, A/(4π·r²))          J = I·s·r/|r|          F(t) = J/τ·exp(−(t − t₀)/τ)  for t ≥ t₀
+//! s = min(1, A/(4π·r²))          J = I·s·r/|r|          F(t) = J/τ·exp(−(t − t₀)/τ)  for t₀ ≤ t ≤ t₀ + 40·τ
 //! ```
 //!
 //! | symbol | meaning |
@@ -26,6 +26,10 @@ use nalgebra::ComplexField;
 use std::f64::consts::PI;
 use tumble_collide::Vec3;
 use tumble_core::{ForceGenerator, Forces, Object, StateRange, World, WorldError, WorldView};
+
+/// Age, in time constants, from which there is no force: what is left, 4e-18 of the momentum, is below rounding, and
+/// would keep islands awake.
+const LASTS: f64 = 40.0;
 
 /// An explosion at a time.
 #[derive(Clone, Debug)]
@@ -101,7 +105,7 @@ impl Object for Explosion {
 impl ForceGenerator for Explosion {
     fn apply(&self, _me: &StateRange, view: &WorldView, out: &mut Forces) {
         let age = (view.time - self.time) / self.decay;
-        if age < 0.0 {
+        if !(0.0..=LASTS).contains(&age) {
             return;
         }
         let strength = ComplexField::exp(-age) / self.decay;

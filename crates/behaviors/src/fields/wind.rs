@@ -38,7 +38,7 @@ pub enum DragLaw {
     },
 }
 
-/// A uniform wind. Parts without a shape, and half-spaces, feel none.
+/// A uniform wind. Parts without a shape feel none; half-spaces, which have no silhouette, only the linear law.
 #[derive(Clone, Debug)]
 pub struct Wind {
     name: String,

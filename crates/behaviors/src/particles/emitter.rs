@@ -66,6 +66,8 @@ impl Emitter {
 
     pub(super) fn validate(&self) -> Result<(), BehaviorError> {
         check_vector("the place of an emitter", &self.pose.translation.vector)?;
+        let rotation = self.pose.rotation.coords;
+        rotation.iter().try_for_each(|q| check("the axis of an emitter", *q, true, "finite"))?;
         check("the half angle of an emitter", self.half_angle, (0.0..=PI).contains(&self.half_angle), "0 to π")?;
         check("the radius of an emitter", self.radius, self.radius >= 0.0, "at least 0")?;
         check("the rate of an emitter", self.rate, (0.0..=1e9).contains(&self.rate), "0 to 1e9")?;
@@ -108,8 +110,7 @@ impl Emitter {
     /// Returns a particle that leaves in a frame: the record without its serial number, the time within the frame,
     /// s, and its velocity over the mount, m/s. `None` without a mount that it should have.
     pub(super) fn birth(&self, number: u64, random: Random, twin: Random, frame: &Frame) -> Option<Birth> {
-        let begin = frame.view.time - frame.dt;
-        let after = (self.time(number) - begin).clamp(0.0, frame.dt);
+        let after = (self.time(number) - frame.start).clamp(0.0, frame.dt);
         let (pose, carrier) = self.carrier(frame, after / frame.dt)?;
         let paired = self.half_angle >= PI && number < u64::from(self.burst & !1);
         let (draw, sign) = if paired && number % 2 == 1 { (twin, -1.0) } else { (random, 1.0) };

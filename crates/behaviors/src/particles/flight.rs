@@ -47,6 +47,9 @@ impl Flight<'_> {
     pub fn fly(&self, x: &mut Vec3, v: &mut Vec3, start: f64, memory: &mut Memory) {
         let (dt, mut time) = (self.frame.dt, start);
         for _ in 0..IMPACTS {
+            if time >= dt {
+                return; // born at the end of the frame, or an impact or a slide ends there
+            }
             let left = dt - time;
             let path = self.air.path(*x, *v, left);
             let end = path.at(left);
@@ -59,11 +62,8 @@ impl Flight<'_> {
             let obstacle = self.obstacles.get(hit.obstacle);
             let normal = self.part(obstacle, x, time);
             let bounced = self.impact(obstacle, &normal, x, v, &path.pull, memory);
-            if !bounced {
+            if !bounced && time < dt {
                 time += self.slide(hit.obstacle, &normal, x, v, (time, &path.pull), memory);
-            }
-            if time >= dt {
-                return;
             }
         }
     }
@@ -113,8 +113,8 @@ impl Flight<'_> {
         e > 0.0
     }
 
-    /// Slides a particle along an obstacle up to the end of the frame, or to the next contact. Returns the time
-    /// that this takes, s.
+    /// Slides a particle along an obstacle up to the end of the frame, or to the next contact, from a time before
+    /// that end. Returns the time that this takes, s.
     fn slide(
         &self,
         index: usize,

@@ -183,7 +183,8 @@ impl ParticleSystem {
     /// number; `None` if all places are taken.
     ///
     /// # Errors
-    /// [`WorldError::Stale`] if the id is of no system; [`WorldError::BadState`] if a number is not finite.
+    /// [`WorldError::Stale`] if the id is of no system; [`WorldError::BadState`] if a number is not finite, or the lifetime
+    /// is not above 0.
     pub fn spawn(
         world: &mut World,
         system: ObjectId,
@@ -195,6 +196,9 @@ impl ParticleSystem {
         let mut x = world.state_of(system).ok_or(WorldError::Stale)?.to_vec();
         let (header, records) = x.split_at_mut(HEADER);
         let Some(record) = records.chunks_exact_mut(RECORD).find(|record| record[6] <= 0.0) else { return Ok(None) };
+        if !(life > 0.0 && life.is_finite()) {
+            return Err(WorldError::BadState(world.name(system).unwrap_or_default().to_string()));
+        }
         let serial = header[0];
         write(record, &position, &velocity, life, serial);
         header[0] += 1.0;
@@ -204,7 +208,7 @@ impl ParticleSystem {
 
     /// Lets the particles fly that leave their sources in this frame. Particles without a place are lost.
     fn bear(&self, flight: &Flight, header: &mut [f64], records: &mut [f64], memory: &mut Memory) {
-        let (frame, begin) = (flight.frame, flight.frame.view.time - flight.frame.dt);
+        let (frame, begin) = (flight.frame, flight.frame.start);
         let mut free = records.chunks_exact_mut(RECORD).filter(|record| record[6] <= 0.0);
         for emitter in &self.emitters {
             // what leaves at the very start of the first frame is not left out

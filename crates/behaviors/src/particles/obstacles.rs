@@ -210,7 +210,9 @@ impl Obstacle<'_> {
         }
         let (mut ends, mut last) = ((low.1, high.1), 0);
         for _ in 0..STEPS {
-            let t = (low.0 * ends.1 - high.0 * ends.0) / (ends.1 - ends.0);
+            let chord = (low.0 * ends.1 - high.0 * ends.0) / (ends.1 - ends.0);
+            // rounding puts a root close to the later end there: halves then find how close
+            let t = if chord < high.0 { chord } else { 0.5 * (low.0 + high.0) };
             if !(t > low.0 && t < high.0) {
                 break;
             }

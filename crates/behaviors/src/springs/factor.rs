@@ -10,11 +10,15 @@
 //! | `P` | order of elimination: nested dissection (George, 1973) by the places of the nodes |
 //! | `G` | lower triangular, by columns of blocks; its pattern is found once |
 
+use crate::error::{BehaviorError, check};
 use nalgebra::Cholesky;
 use tumble_collide::{Mat3, Vec3};
 
 /// Number of nodes that are not divided further.
 const LEAF: usize = 6;
+
+/// Most pairs of blocks that change others: 200 MB.
+const MOST_PAIRS: usize = 50_000_000;
 
 /// The pattern of a factor: what depends on the springs alone.
 #[derive(Clone, Debug)]
@@ -37,22 +41,33 @@ pub(super) struct Factor {
 
 impl Pattern {
     /// Finds the pattern for nodes at places, m, and the pairs that springs join.
-    pub fn new(nodes: &[Vec3], pairs: impl Iterator<Item = [usize; 2]>) -> Pattern {
+    ///
+    /// # Errors
+    /// [`BehaviorError::Range`] if it would need more memory than is sensible.
+    pub fn new(nodes: &[Vec3], pairs: impl Iterator<Item = [usize; 2]>) -> Result<Pattern, BehaviorError> {
         let mut joined = vec![Vec::new(); nodes.len()];
         for [a, b] in pairs {
             joined[a].push(b);
             joined[b].push(a);
         }
         let mut order = Vec::with_capacity(nodes.len());
-        dissect(nodes, &joined, (0..nodes.len()).collect(), &mut order);
+        dissect(nodes, &joined, (0..nodes.len()).collect(), &mut vec![false; nodes.len()], &mut order);
         let mut place = vec![0; nodes.len()];
         order.iter().enumerate().for_each(|(k, node)| place[*node] = k);
         let mut columns: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
+        let mut updated = 0;
         for (k, node) in order.iter().enumerate() {
             let mut rows = std::mem::take(&mut columns[k]);
             rows.extend(joined[*node].iter().map(|other| place[*other]).filter(|row| *row > k));
             rows.sort_unstable();
             rows.dedup();
+            updated += rows.len() * (rows.len() + 1) / 2;
+            check(
+                "the number of pairs of blocks in the factor of the springs, as far as counted,",
+                updated as f64,
+                updated <= MOST_PAIRS,
+                "at most 50 million: take fewer nodes, or let springs join nearer ones",
+            )?;
             if let Some(&parent) = rows.first() {
                 columns[parent].extend(rows.iter().skip(1)); // fill
             }
@@ -69,7 +84,7 @@ impl Pattern {
             rows.iter().enumerate().flat_map(|(b, column)| rows[b..].iter().map(|row| (*row, *column)))
         });
         pattern.update = updates.map(|(row, column)| pattern.find(row, column) as u32).collect();
-        pattern
+        Ok(pattern)
     }
 
     /// Returns the block in a row of a column, which has one.
@@ -157,8 +172,8 @@ impl Pattern {
 }
 
 /// Appends the nodes in the order of elimination: two halves, then the nodes of the first that a spring joins to the
-/// second.
-fn dissect(nodes: &[Vec3], joined: &[Vec<usize>], mut own: Vec<usize>, order: &mut Vec<usize>) {
+/// second. `beyond` marks nodes; it is false before and after.
+fn dissect(nodes: &[Vec3], joined: &[Vec<usize>], mut own: Vec<usize>, beyond: &mut [bool], order: &mut Vec<usize>) {
     if own.len() <= LEAF {
         return order.append(&mut own);
     }
@@ -167,15 +182,15 @@ fn dissect(nodes: &[Vec3], joined: &[Vec<usize>], mut own: Vec<usize>, order: &m
     let axis = (high - low).imax();
     own.sort_by(|a, b| nodes[*a][axis].total_cmp(&nodes[*b][axis]).then(a.cmp(b)));
     let second = own.split_off(own.len() / 2);
-    let mut beyond = vec![false; nodes.len()];
     second.iter().for_each(|n| beyond[*n] = true);
     let (between, first): (Vec<usize>, Vec<usize>) =
         own.into_iter().partition(|n| joined[*n].iter().any(|other| beyond[*other]));
+    second.iter().for_each(|n| beyond[*n] = false);
     if first.is_empty() {
         order.extend(second);
     } else {
-        dissect(nodes, joined, first, order);
-        dissect(nodes, joined, second, order);
+        dissect(nodes, joined, first, beyond, order);
+        dissect(nodes, joined, second, beyond, order);
     }
     order.extend(between);
 }
@@ -206,7 +221,7 @@ mod tests {
         let beside = |k: usize| [(k % side + 1 < side).then_some(k + 1), (k + side < side * side).then_some(k + side)];
         let pairs: Vec<[usize; 2]> =
             (0..side * side).flat_map(|k| beside(k).into_iter().flatten().map(move |other| [k, other])).collect();
-        let pattern = Pattern::new(&nodes, pairs.iter().copied());
+        let pattern = Pattern::new(&nodes, pairs.iter().copied()).unwrap();
         let mut factor = Factor::default();
         pattern.clear(&mut factor);
         let n = nodes.len();

@@ -63,7 +63,7 @@ impl SpringMesh {
                 break;
             }
         }
-        cache.factor = Some(factor);
+        (cache.factor, cache.made_for) = (Some(factor), [self.step, self.implicitness]);
         change
     }
 

@@ -93,7 +93,8 @@ impl SpringMesh {
     /// Makes a mesh at rest of nodes (m), their masses (kg, above 0) and springs.
     ///
     /// # Errors
-    /// [`BehaviorError::Range`] names what is out of its range.
+    /// [`BehaviorError::Range`] names what is out of its range. A mesh whose factor has more than 50 million pairs of
+    /// blocks is refused: blocks of many nodes along each edge, or springs between far nodes.
     pub fn new(nodes: Vec<Vec3>, masses: Vec<f64>, springs: Vec<MeshSpring>) -> Result<SpringMesh, BehaviorError> {
         let count = nodes.len();
         check("the number of nodes", count as f64, (1..=MOST).contains(&count), "1 to 100,000")?;
@@ -107,7 +108,7 @@ impl SpringMesh {
             check("the stiffness of a spring", spring.stiffness, spring.stiffness >= 0.0, "at least 0")?;
             check("the damping of a spring", spring.damping, spring.damping >= 0.0, "at least 0")?;
         }
-        let pattern = Arc::new(Pattern::new(&nodes, springs.iter().map(|spring| spring.nodes)));
+        let pattern = Arc::new(Pattern::new(&nodes, springs.iter().map(|spring| spring.nodes))?);
         Ok(SpringMesh {
             name: String::new(),
             pinned: vec![false; count],

@@ -12,6 +12,8 @@ use tumble_core::{
 pub(super) struct MeshCache {
     pub x: Vec<f64>,
     pub factor: Option<Factor>,
+    /// Step and implicitness that the factor was made for.
+    pub made_for: [f64; 2],
     /// Memory of a factor that is out of date.
     pub spare: Factor,
     /// Vectors in the order of elimination.
@@ -22,7 +24,11 @@ impl SpringMesh {
     /// Does `work` with the pattern, the factor and a vector in the order of elimination, made of `from` and
     /// written to `to`.
     fn map(&self, cache: &mut Cache, from: &[f64], to: &mut [f64], work: impl Fn(&Pattern, &Factor, &mut [Vec3])) {
-        let MeshCache { x, factor, spare, work: vector } = cache.get();
+        let MeshCache { x, factor, made_for, spare, work: vector } = cache.get();
+        let now = [self.step, self.implicitness];
+        if std::mem::replace(made_for, now) != now {
+            *spare = factor.take().unwrap_or_else(|| std::mem::take(spare));
+        }
         let factor = factor.get_or_insert_with(|| {
             let mut factor = std::mem::take(spare);
             self.write_factor(x, x, &mut factor);

@@ -3,6 +3,7 @@
 use crate::{Numbers, steps};
 use std::f64::consts::PI;
 use tumble_behaviors::{Attractor, BehaviorError, DragLaw, Explosion, Panel, Panels, Targets, Wind, silhouette};
+use tumble_core::Sleep;
 use tumble_core::prelude::*;
 
 const G: f64 = 9.81;
@@ -233,4 +234,16 @@ fn constants_of_fields_are_refused_by_name() {
     named(Attractor::new("", Vec3::zeros(), 1.0, -1.0).map(drop), "the softening");
     named(Explosion::new("", Vec3::zeros(), 1.0, 0.0, 0.0).map(drop), "the decay");
     named(Explosion::new("", nan, 1.0, 0.0, 1.0).map(drop), "the center");
+}
+
+#[test]
+fn bodies_sleep_after_an_explosion_has_decayed() {
+    let mut world = World::new(Settings::default().with_dt(1.0 / 60.0).with_sleep(Some(Sleep::default()))).unwrap();
+    world.add(RigidBody::fixed(Shape::half_space())).unwrap();
+    let block = RigidBody::new(Shape::cuboid(Vec3::new(0.4, 0.4, 0.2)).unwrap()).with_mass(5.0);
+    let block = world.add(block.with_pose(Pose::translation(1.0, 0.0, 0.1))).unwrap();
+    let bang = Explosion::new("bang", Vec3::new(0.0, 0.0, 0.2), 0.1, 0.0, 0.02).unwrap();
+    world.add(bang).unwrap();
+    steps(&mut world, 180); // 150 times the time constant
+    assert!(world.asleep(block));
 }

@@ -2,6 +2,7 @@
 
 mod boids;
 mod buoyancy;
+mod emission;
 mod fields;
 mod flights;
 mod frame_states;

@@ -280,3 +280,31 @@ fn constants_of_meshes_are_refused_by_name() {
     named(Cloth { nodes: [1, 5], ..Cloth::default() }.mesh().map(drop), "the nodes of a cloth");
     named(Jelly { nodes: [1000; 3], ..Jelly::default() }.mesh().map(drop), "the number of nodes");
 }
+
+#[test]
+fn a_mesh_whose_factor_needs_too_much_memory_is_refused() {
+    // each of 700 nodes with each other: 57 million pairs of blocks
+    let nodes: Vec<Vec3> = (0..700).map(|k| Vec3::new(f64::from(k), f64::from(k % 7), f64::from(k % 13))).collect();
+    let spring = |nodes| MeshSpring { nodes, length: 1.0, stiffness: 1.0, damping: 0.0 };
+    let springs = (0..700).flat_map(|a| (0..a).map(move |b| spring([a, b]))).collect();
+    let error = SpringMesh::new(nodes, vec![1.0; 700], springs).err().unwrap().to_string();
+    assert!(error.contains("fewer nodes"), "{error}");
+    // a block of 46 nodes along each edge: 12 thousand million
+    let block = Jelly { nodes: [46; 3], ..Jelly::default() };
+    assert!(block.mesh().err().is_some_and(|error| error.to_string().contains("fewer nodes")));
+}
+
+#[test]
+fn a_changed_step_changes_the_response_at_once() {
+    let response = |before: bool| {
+        let mut world = World::new(Settings::default().with_gravity(Vec3::zeros())).unwrap();
+        let id = SpringMesh::add(&mut world, Cloth::default().mesh().unwrap()).unwrap();
+        if before {
+            world.apply_impulse(id, 3, Vec3::zeros(), &Vec3::zeros()).unwrap();
+        }
+        world.get_mut::<SpringMesh>(id).unwrap().set_step(0.05).unwrap();
+        world.apply_impulse(id, 3, Vec3::new(1e-3, 2e-3, 3e-3), &Vec3::zeros()).unwrap();
+        world.state_of(id).unwrap().to_vec()
+    };
+    assert!(response(true) == response(false), "the factor of the old step is out of date");
+}

@@ -38,8 +38,10 @@ pub trait FrameState: Object {
 
 /// A frame that the world has just stepped.
 pub struct Frame<'a> {
-    /// Length of the frame, s.
+    /// Length of the frame, s: that of the settings, which `view.time - start` is up to rounding.
     pub dt: f64,
+    /// Time at its start, s: to the bit that at the end of the frame before.
+    pub start: f64,
     /// The settings of the world.
     pub settings: &'a Settings,
     /// The world at its end. The object's own range of `view.x` is that at its start.

@@ -292,14 +292,19 @@ impl World {
     /// Applies an impulse (N·s) at a world point of one part, at once.
     ///
     /// # Errors
-    /// [`WorldError`]: the object was removed, has no such part, or a number is not finite.
+    /// [`WorldError`]: the object was removed, has no such part, or a number is not finite, one of the state after it
+    /// included; the state then stays.
     pub fn apply_impulse(&mut self, id: ObjectId, part: usize, impulse: Vec3, point: &Vec3) -> Result<(), WorldError> {
         let index = self.part(id, part, &[impulse, *point])?;
+        let place = self.core.table.place(id).ok_or(WorldError::Stale)?;
         self.core.wake(id);
         let part_state = self.core.derived.part_states[index];
         let axes = [Vec3::x(), Vec3::y(), Vec3::z()];
-        self.core.kick_at(id, &PartPoint { part, part_state: &part_state, point: *point, axes: &axes }, &impulse);
-        Ok(())
+        let at = PartPoint { part, part_state: &part_state, point: *point, axes: &axes };
+        match self.core.kick_by(id, std::iter::once((at, impulse))) {
+            true => Ok(()),
+            false => Err(WorldError::NotFinite(self.core.table.placed[place].name.to_string())),
+        }
     }
 
     pub(super) fn part(&self, id: ObjectId, part: usize, numbers: &[Vec3]) -> Result<usize, WorldError> {

@@ -2,8 +2,9 @@
 
 use super::{Core, StepError};
 use crate::object::FrameState;
-use crate::object::frame_state::Frame;
+use crate::object::frame_state::{Frame, FrameImpulse};
 use crate::object::part_state::{PartPoint, PartState};
+use crate::world::view::ObjectId;
 use tumble_collide::Vec3;
 
 const AXES: [Vec3; 3] = [Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)];
@@ -17,54 +18,85 @@ impl Core {
         }
     }
 
-    /// Advances all frame states by the frame that was just stepped, then applies their impulses.
-    pub(super) fn advance_frame_states(&mut self, before: &[PartState]) -> Result<(), StepError> {
+    /// Advances all frame states by the frame that was just stepped, from the time `start` (s) and the part states
+    /// `before`; then applies their impulses.
+    pub(super) fn advance_frame_states(&mut self, start: f64, before: &[PartState]) -> Result<(), StepError> {
         let (mut impulses, mut x) = (Vec::new(), Vec::new());
         for place in 0..self.table.placed.len() {
             let entry = self.objects().at(place);
             let Some(follower) = entry.object.frame_state().filter(|_| entry.status.enabled) else { continue };
-            let range = entry.state_range.x.clone();
+            let (range, id, body) = (entry.state_range.x.clone(), self.table.order[place], entry.object.integratable());
             x.clear();
             x.extend_from_slice(&self.state.x[range.clone()]);
-            let view = self.view(self.state.time);
-            let frame = Frame { dt: self.settings.dt, settings: &self.settings, view, before, threads: &self.threads };
+            let (settings, view, threads) = (&self.settings, self.view(self.state.time), &self.threads);
+            let frame = Frame { dt: settings.dt, start, settings, view, before, threads };
             follower.advance(entry.state_range, &frame, &mut x, &mut impulses);
             let fine = impulses.iter().all(|i| i.impulse.iter().chain(i.point.iter()).all(|x| x.is_finite()));
-            let bad = if !fine { Some("an impulse of it") } else { (!follower.accepts(&x)).then_some("its state") };
+            let accepted = follower.accepts(&x) && body.is_none_or(|body| body.accepts(&x));
+            let bad = if !fine { Some("an impulse of it") } else { (!accepted).then_some("its state") };
             if let Some(what) = bad {
                 return Err(StepError::NotFinite { object: entry.name.to_string(), what, time: self.state.time });
             }
+            let moved = body.is_some() && self.state.x[range.clone()] != x;
             self.state.x[range].copy_from_slice(&x);
+            if moved {
+                self.integration().refresh_one(id);
+            }
         }
-        for impulse in impulses {
-            let Some(entry) = self.objects().get(impulse.id) else { continue };
+        self.apply_frame_impulses(&impulses)
+    }
+
+    /// Applies the impulses of a frame, those on one object together. Sleepers are asked to wake.
+    fn apply_frame_impulses(&mut self, impulses: &[FrameImpulse]) -> Result<(), StepError> {
+        let place = |impulse: &FrameImpulse| Some((self.objects().get(impulse.id)?.place, *impulse));
+        let mut placed: Vec<(usize, FrameImpulse)> = impulses.iter().filter_map(place).collect();
+        placed.sort_by_key(|(place, _)| *place); // stable: sums have the order of the impulses
+        for group in placed.chunk_by(|a, b| a.0 == b.0) {
+            let entry = self.objects().at(group[0].0);
             if entry.asleep {
-                self.needs_wake.push(entry.serial); // the frame will be repeated with it awake
+                let serial = entry.serial;
+                self.needs_wake.push(serial); // the frame will be repeated with it awake
                 continue;
             }
-            let row = entry.state_range.parts.start + impulse.part;
-            if impulse.part < entry.state_range.parts.len() {
-                let part_state = self.derived.part_states[row];
-                let at = PartPoint { part: impulse.part, part_state: &part_state, point: impulse.point, axes: &AXES };
-                self.kick_at(impulse.id, &at, &impulse.impulse);
+            let part_states = self.derived.part_states[entry.state_range.parts.clone()].to_vec();
+            let kicks = group.iter().filter_map(|(_, impulse)| {
+                let FrameImpulse { part, point, impulse, .. } = *impulse;
+                Some((PartPoint { part, part_state: part_states.get(part)?, point, axes: &AXES }, impulse))
+            });
+            if !self.kick_by(group[0].1.id, kicks) {
+                let object = self.objects().at(group[0].0).name.to_string();
+                return Err(StepError::NotFinite { object, what: "its state after impulses", time: self.state.time });
             }
         }
         Ok(())
     }
 
-    /// Applies an impulse at a point of a part to the state, if impulses move the object.
-    pub(super) fn kick_at(&mut self, id: crate::world::view::ObjectId, at: &PartPoint, impulse: &Vec3) {
+    /// Applies impulses at points of parts to the state, if impulses move the object. Returns false, and leaves the
+    /// state, if it would not be finite.
+    pub(super) fn kick_by<'a>(&mut self, id: ObjectId, impulses: impl Iterator<Item = (PartPoint<'a>, Vec3)>) -> bool {
         let super::Coordinates { objects, x, caches, .. } = self.coordinates(None);
-        let Some(entry) = objects.get(id).filter(|entry| entry.moves()) else { return };
-        let Some(body) = entry.object.integratable() else { return };
+        let Some(entry) = objects.get(id).filter(|entry| entry.moves()) else { return true };
+        let Some(body) = entry.object.integratable() else { return true };
         let dof = entry.state_range.v.len();
-        let (mut y, mut dp) = (vec![0.0; 3 * dof], vec![0.0; dof]);
+        let (mut y, mut du, mut dp) = (vec![0.0; 3 * dof], vec![0.0; dof], vec![0.0; dof]);
         let cache = &mut caches[entry.place];
-        body.test_impulse(cache, at, 1.0, &mut y);
-        let du: Vec<f64> = (0..dof).map(|k| (0..3).map(|r| impulse[r] * y[r * dof + k]).sum()).collect();
+        for (at, impulse) in impulses {
+            y.fill(0.0);
+            body.test_impulse(cache, &at, 1.0, &mut y);
+            for (k, du) in du.iter_mut().enumerate() {
+                *du += (0..3).map(|r| impulse[r] * y[r * dof + k]).sum::<f64>();
+            }
+        }
         body.unwhiten_change(cache, &du, &mut dp);
-        body.kick(&mut x[entry.state_range.x.clone()], &dp, 1.0);
+        let own = &mut x[entry.state_range.x.clone()];
+        let mut kicked = own.to_vec();
+        body.kick(&mut kicked, &dp, 1.0);
+        if !kicked.iter().all(|x| x.is_finite()) {
+            return false;
+        }
+        own.copy_from_slice(&kicked);
         self.integration().refresh_one(id);
+        true
     }
 }
 

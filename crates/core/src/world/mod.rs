@@ -168,7 +168,7 @@ impl World {
             let done = done.and_then(|()| core.divide_again(self.stepper.as_ref(), self.before.time));
             let followed = |again: bool| match again {
                 true => Ok(true),
-                false => core.advance_frame_states(&self.parts_before).map(|()| false),
+                false => core.advance_frame_states(self.before.time, &self.parts_before).map(|()| false),
             };
             let again = match done.and_then(followed) {
                 Ok(again) => again,
