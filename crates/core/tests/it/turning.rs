@@ -144,7 +144,7 @@ fn the_turn_of_a_hanging_bar_is_that_of_its_weight() {
     assert_relative(turn, h * (2.0f64.sqrt() * cube.1 / cube.0).sqrt());
     let about = cube.0 + 0.25 * LOAD * LOAD;
     let revolute = Joint::revolute(Vec3::y());
-    let turn = free(Chain::of_links(Chain::start("time_stepping", h, 1.0), revolute.clone(), 0, 1.0, 0.0), 1);
+    let turn = free(Chain::of_links(Chain::start("time_stepping", h, 1.0), revolute, 0, 1.0, 0.0), 1);
     assert_relative(turn, h * (hinge * cube.1 / about).sqrt());
     // with a bar above a load without weight to speak of, the bar is as if alone
     let turn = free(Chain::of_links(Chain::start("time_stepping", h, 10.0), revolute, 1, 1e-9, 0.0), 2);

@@ -856,7 +856,9 @@ class StepReport:
         """Deepest penetration found, meters."""
     @property
     def max_turn(self) -> float:
-        """"""
+        """Largest angle by which the forces of joints turn a part back and forth in a sub-step, rad
+        (``World.max_turn``).
+        """
     @property
     def unreachable_joint(self) -> str | None:
         """Name of the loop joint with the largest gap among those that cannot be closed; None if all
@@ -1209,8 +1211,9 @@ class World:
     combine_restitution, combine_friction: rule for the coefficients of a pair, ``"min"``,
     ``"max"``, ``"average"``, ``"product"`` or ``"geometric_mean"``. threads: threads of a step, 0 for
     as many as cores; no number changes the result. budget: largest work of a step in block
-    relaxations, None for no bound. event_impulse: N·s, see ``events``. Names and defaults are those
-    of scene files.
+    relaxations, None for no bound. event_impulse: N·s, see ``events``. max_turn: largest angle, rad, by
+    which forces of joints may turn a part back and forth in a sub-step; frames are divided so that they do not.
+    Names and defaults are those of scene files.
 
     One thread at a time: while one thread steps a world, calls on it from another raise
     ``BusyError``. The interpreter is released while a world steps.
@@ -1422,7 +1425,10 @@ class World:
     def event_impulse(self, value: float) -> None: ...
     @property
     def max_turn(self) -> float:
-        """"""
+        """Largest angle, rad, 0.01 to 1e6, by which forces of joints may turn a part back and forth in a
+        sub-step. A frame in which a part turns further is taken in sub-steps that are short enough;
+        chains of light links with a heavy end need it. 1 by default.
+        """
     @max_turn.setter
     def max_turn(self, value: float) -> None: ...
     def cast_rays(
