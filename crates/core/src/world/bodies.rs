@@ -109,10 +109,11 @@ impl World {
         let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
         let (object, fits) = (&entry.object, x.len() == entry.state_range.x.len());
         let accepted = match (object.integratable(), object.frame_state()) {
+            _ if !fits => false,
             (None, None) => false,
             (body, follower) => body.is_none_or(|b| b.accepts(x)) && follower.is_none_or(|f| f.accepts(x)),
         };
-        if !(fits && accepted) {
+        if !accepted {
             return Err(WorldError::BadState(entry.name.to_string()));
         }
         self.core.state.x[entry.state_range.x.clone()].copy_from_slice(x);
