@@ -8,6 +8,10 @@ use crate::object::{Constraint, Integratable, RowTarget};
 use crate::world::view::{Entry, Mode, ObjectId, Objects};
 use tumble_collide::Vec3;
 
+/// The fraction of the squared responses of two parts of one object below which their difference counts as none:
+/// two points that are 0.1 mm apart in a meter, as for dependent rows in `solver/linkage.rs`.
+const SAME: f64 = 1e-8;
+
 /// The quantity that a row constrains. Rows of one kind in one constraint share a unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RowKind {
@@ -112,12 +116,21 @@ impl RowBuilder<'_> {
     /// part, or is the third one.
     fn on_part(&mut self, entry: Option<Entry>, part: usize, add: impl FnOnce(&mut Self, &Entry) -> bool) {
         let Some(entry) = entry else { return self.refuse("a row names an object that is not in the world".into()) };
+        let before = self.last_side(&entry).map(|y| y.to_vec());
         if part >= entry.state_range.parts.len() || !add(self, &entry) {
             self.refuse(format!(
                 "'{}' has no part {part} that answers impulses, or the row names a third object",
                 entry.name
             ));
+        } else if let (Some(before), Some(y)) = (before, self.last_side(&entry)) {
+            drop_common_motion(&before, y);
         }
+    }
+
+    /// Returns the responses of the last row on an object; `None` if the row has no such side.
+    fn last_side(&mut self, entry: &Entry) -> Option<&mut [f64]> {
+        let side = *self.rows.blocks.last()?.sides().iter().find(|s| s.u as usize == entry.state_range.v.start)?;
+        Some(&mut self.rows.y[side.y as usize..(side.y + side.dof) as usize])
     }
 
     /// Adds `Σ j_k · v_k` over the generalized velocities of one object.
@@ -212,6 +225,27 @@ impl RowBuilder<'_> {
 
     fn refuse(&mut self, why: String) {
         self.problem.get_or_insert(why);
+    }
+}
+
+/// Sets the response of a row between two parts of one object to 0 if both parts respond alike: `before` is the
+/// response of the first part, `y` that of both.
+///
+/// ```text
+/// y = y₁ + y₂ = 0    if |y|² ≤ SAME·(|y₁|² + |y₂|²)
+/// ```
+///
+/// What is left of such a row is rounding and the gap of the joint. A solver that held it would stop the motion
+/// that both parts share: the bead of a governor that is pinned to its spindle's plane would stop the spindle.
+fn drop_common_motion(before: &[f64], y: &mut [f64]) {
+    let (mut first, mut second, mut both) = (0.0, 0.0, 0.0);
+    for (a, y) in before.iter().zip(y.iter()) {
+        first += a * a;
+        second += (y - a) * (y - a);
+        both += y * y;
+    }
+    if both <= SAME * (first + second) {
+        y.fill(0.0);
     }
 }
 

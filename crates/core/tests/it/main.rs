@@ -37,6 +37,7 @@ mod internal_edges;
 mod limits;
 mod loop_joints;
 mod loop_joints_articulated;
+mod loop_joints_governor;
 mod loop_joints_joints;
 mod loop_joints_kinds;
 mod loop_joints_spatial;

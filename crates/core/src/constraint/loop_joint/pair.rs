@@ -170,8 +170,12 @@ impl EndPair {
         }
     }
 
-    /// Adds the rows that keep the origins together.
+    /// Adds the rows that keep the origins together. Between parts of one object they are measured in the frame of B
+    /// and at one point: a motion that both parts share is then in no row, also while the origins are apart.
     fn coincident_origins(&self, row: &mut dyn FnMut(JointRow)) {
+        if self.a.part.zip(self.b.part).is_some_and(|((a, _), (b, _))| a == b) {
+            return self.origin_along([0, 1, 2], row);
+        }
         let (pa, pb) = (self.a.p(), self.b.p());
         let (error, bias) = (pa - pb, self.a.bias_acceleration_at(&pa) - self.b.bias_acceleration_at(&pb));
         for (k, e) in WORLD_AXES.iter().enumerate() {

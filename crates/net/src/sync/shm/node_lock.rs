@@ -4,7 +4,9 @@
 //! All nodes of a folder draw their numbers from one counter in it (`….global_mgmt`, 16 bytes).
 //! iceoryx2 0.10 never removes the counter, because a node that still runs would then draw numbers
 //! twice. A process with a node holds a shared lock on a file in the folder. A process that gets
-//! the lock exclusively knows that there is no node.
+//! the lock exclusively knows that there is no node. What the folder of nodes then holds was left by
+//! processes that were killed while they started, or while they cleaned up after others; iceoryx2
+//! does not find such nodes any more.
 
 use super::wakeup;
 use crate::sync::transport::LinkError;
@@ -14,6 +16,8 @@ use std::path::{Path, PathBuf};
 
 const LOCK: &str = "nodes.lock";
 const COUNTER: &str = ".global_mgmt";
+/// The folder in which iceoryx2 keeps a few files for each node.
+const NODES: &str = "nodes";
 
 /// Held by a process while it has a node, and dropped after the node.
 pub struct NodeLock {
@@ -57,8 +61,9 @@ impl Drop for NodeLock {
     fn drop(&mut self) {
         wakeup::clean_up(self.user);
         if self.file.unlock().is_ok() && self.file.try_lock().is_ok() {
-            let folder = self.path.parent().and_then(|folder| std::fs::read_dir(folder).ok());
-            for file in folder
+            let folder = self.path.parent().unwrap_or(Path::new(""));
+            let _ = std::fs::remove_dir_all(folder.join(NODES));
+            for file in std::fs::read_dir(folder)
                 .into_iter()
                 .flatten()
                 .flatten()
@@ -68,5 +73,29 @@ impl Drop for NodeLock {
             }
             let _ = std::fs::remove_file(&self.path);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A user that does not exist: the locks clean up its wakeups.
+    const NOBODY: u32 = 4_000_000_002;
+
+    #[test]
+    fn the_last_lock_removes_what_killed_nodes_left() {
+        let folder = std::env::temp_dir().join(format!("tumble-node-lock-{}", std::process::id()));
+        let node = folder.join(NODES).join("77");
+        std::fs::create_dir_all(&node).unwrap();
+        let left = [node.join("a.port_tag"), folder.join(NODES).join("a.node_monitor"), folder.join("a.global_mgmt")];
+        left.iter().for_each(|file| std::fs::write(file, b"").unwrap());
+        let first = NodeLock::new(&folder, NOBODY).unwrap();
+        let second = NodeLock::new(&folder, NOBODY).unwrap();
+        drop(first);
+        assert!(left.iter().all(|file| file.exists()), "another process may have a node");
+        drop(second);
+        assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 0);
+        std::fs::remove_dir(&folder).unwrap();
     }
 }

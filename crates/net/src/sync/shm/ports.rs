@@ -26,6 +26,8 @@ use std::sync::Arc;
 pub const DOWN_BYTES: usize = 128 << 10;
 /// Maximum size of a sample from a facet, bytes.
 pub const UP_BYTES: usize = 16 << 10;
+/// Timeout for the clean-up of one node that another process cleans up.
+const CLEAN_UP_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(2);
 /// Number of samples in the buffer of a slow reader.
 const BUFFER_SAMPLES: usize = 8;
 
@@ -222,7 +224,7 @@ fn node(name: &str) -> Result<(Node<Private>, NodeLock), LinkError> {
 /// Removes leftovers of killed processes.
 pub fn clean_up() -> Result<(), LinkError> {
     let (node, node_lock) = node("tumble clean-up")?;
-    node.try_cleanup_dead_nodes();
+    node.blocking_cleanup_dead_nodes(CLEAN_UP_TIMEOUT); // waits where another process cleans the same node up
     drop(node);
     drop(node_lock);
     Ok(())
