@@ -24,6 +24,7 @@ mod flock;
 mod grid;
 mod non_spinning;
 mod particles;
+mod sight;
 mod springs;
 mod steering;
 

@@ -260,6 +260,7 @@ impl Core {
             x: &self.state.x,
             part_states: &self.derived.part_states,
             objects: self.objects(),
+            threads: &self.threads,
         }
     }
 
