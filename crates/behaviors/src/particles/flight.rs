@@ -52,7 +52,7 @@ impl Flight<'_> {
             }
             let left = dt - time;
             let path = self.air.path(*x, *v, left);
-            let end = path.at(left);
+            let end = path.end();
             self.obstacles.near(x, &end.0, &mut memory.near);
             let Some(hit) = self.first(&memory.near, &path, time, left, None) else {
                 return (*x, *v) = end;
