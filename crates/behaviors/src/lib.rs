@@ -22,6 +22,7 @@ mod error;
 mod fields;
 mod flock;
 mod grid;
+mod helm;
 mod non_spinning;
 mod particles;
 mod sight;
@@ -34,6 +35,7 @@ pub use fields::{
     Attractor, Buoyancy, DragLaw, Explosion, Panel, Panels, Submerged, Targets, Wind, silhouette, submerged,
 };
 pub use flock::Flock;
+pub use helm::{BodyFlock, Helm};
 pub use non_spinning::non_spinning;
 pub use particles::{Emitter, Particle, ParticleSettings, ParticleSystem};
 pub use springs::{Cloth, Jelly, MeshSpring, SpringMesh};
