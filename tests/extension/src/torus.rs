@@ -68,10 +68,13 @@ impl Torus {
     fn meets_plane(&self, pose: &Pose, plane: &Pose, margin: f64, out: &mut Vec<Contact>) {
         let normal = plane.rotation * Vec3::z();
         let down = pose.rotation.inverse() * -normal;
+        // a torus that stands rolls about its axis, where its core then is; one that lies tilts about its tube
+        let standing = down.xy().norm();
+        let core_a = self.minor + if standing > 0.5 { self.major / standing } else { 0.0 };
         self.each_point(pose, &down, |feature, point, _| {
             let gap = normal.dot(&(point - plane.translation.vector)) - self.minor;
             if gap <= margin {
-                let (core_a, core_b, normal_from) = (self.minor, 0.0, NormalFrom::FaceOfB);
+                let (core_b, normal_from) = (0.0, NormalFrom::FaceOfB);
                 let point = point - (self.minor + 0.5 * gap) * normal;
                 out.push(Contact { point, normal, gap, feature, core_a, core_b, normal_from });
             }
