@@ -14,7 +14,7 @@
 //! Times of impact are those of the exact path, so an elastic bounce keeps its height. An impact slower than the
 //! acceleration gives in a frame does not bounce: the particle slides for the rest of the frame.
 
-use super::obstacles::{Hit, Obstacle, Obstacles, Stretch};
+use super::obstacles::{Hit, Obstacle, Obstacles, Stretch, TOUCHING};
 use super::path::{Air, Path};
 use tumble_collide::Vec3;
 use tumble_core::{Frame, FrameImpulse, Material};
@@ -99,7 +99,10 @@ impl Flight<'_> {
         let u = *v - obstacle.velocity(x);
         let along = u.dot(n);
         if along > 0.0 {
-            return true;
+            // rounding gives a particle at rest a speed that does not lift it off
+            let lifts = along * along > -2.0 * a.dot(n) * TOUCHING;
+            *v -= if lifts { 0.0 } else { along } * n;
+            return lifts;
         }
         let settings = self.frame.settings;
         let e = settings.combine_restitution.of(self.material.restitution, obstacle.material.restitution);

@@ -22,7 +22,7 @@ use tumble_core::{CollisionGroup, Frame, Material, ObjectId, PartState};
 /// Most steps along a path.
 const STEPS: usize = 48;
 /// Gap of a particle that lies on a surface, m.
-const TOUCHING: f64 = 1e-10;
+pub(super) const TOUCHING: f64 = 1e-10;
 /// Number of obstacles from which a tree finds those near a path.
 const MANY: usize = 48;
 
@@ -195,6 +195,14 @@ impl Obstacle<'_> {
         self.state.velocity_at(point) + self.state.pose.rotation * self.material.surface_velocity
     }
 
+    /// Returns the time at which a stretch that leaves the surface turns back to it, s, at most half of it.
+    fn apex(&self, stretch: &Stretch) -> Option<f64> {
+        let (path, half) = (stretch.path, 0.5 * stretch.length);
+        let normal = self.gap(&path.x, stretch.start / stretch.dt, stretch.radius).1;
+        let (rate, pull) = ((path.v - self.velocity(&path.x)).dot(&normal), path.pull.dot(&normal));
+        (rate > 0.0).then(|| if pull < 0.0 { half.min(-rate / pull) } else { half })
+    }
+
     /// Returns the time along a stretch at which it meets the surface, s; 0 if it begins there. The gap is
     /// not negative then, unless it was at the start.
     pub fn meets(&self, stretch: &Stretch) -> Option<f64> {
@@ -210,7 +218,11 @@ impl Obstacle<'_> {
         }
         let mut high = (stretch.length, at(stretch.length, stretch.end));
         if low.1 <= TOUCHING && high.1 < 0.0 {
-            return Some(0.0);
+            // a bounce that begins here may end within the stretch
+            match self.apex(stretch).map(|t| (t, gap(t))).filter(|apex| apex.1 > TOUCHING) {
+                Some(apex) => low = apex,
+                None => return Some(0.0),
+            }
         }
         if high.1 >= 0.0 {
             let mut steps = 0;
