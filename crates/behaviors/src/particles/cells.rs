@@ -100,7 +100,12 @@ impl Cells {
         });
         if lists > 1 && out.len() > start + 1 {
             out[start..].sort_unstable();
-            out.dedup();
+            let mut kept = start + 1;
+            for k in kept..out.len() {
+                out[kept] = out[k];
+                kept += usize::from(out[kept] != out[kept - 1]);
+            }
+            out.truncate(kept);
         }
         true
     }
@@ -133,8 +138,9 @@ mod tests {
             let mut met = 0;
             for k in 0..2000 {
                 let way = one([0.01, 0.5, 3.0, 20.0][k % 4]);
-                let mut near = Vec::new();
+                let mut near = vec![7, 0]; // what is there stays
                 if cells.near(&way, &mut near) {
+                    let near = near.strip_prefix(&[7, 0]).unwrap();
                     assert!(near.is_sorted_by(|a, b| a < b));
                     let meets = (0..count).filter(|index| boxes[*index].overlaps(&way));
                     met += meets.inspect(|index| assert!(near.contains(index), "{index}")).count();

@@ -137,6 +137,7 @@ impl Flight<'_> {
         let stopped = end == Vec3::zeros() && ease.norm() * left < 1e-9 * u.norm();
         let way = if stopped { u * (0.5 * u.norm() / grip / left) } else { 0.5 * (u + end) };
         let path = Path::straight(*x, carrier + way);
+        self.obstacles.near(x, &path.at(left).0, &mut memory.near); // a slide goes elsewhere than free flight
         let hit = self.first(&memory.near, &path, time, left, Some(index)).filter(|hit| hit.time > 0.0);
         let took = hit.map_or(left, |hit| hit.time);
         let share = took / left;

@@ -299,7 +299,38 @@ fn a_low_bounce_on_a_slope_does_not_stop_the_particle() {
         let (along, expected) = (plane.rotation * Vec3::x(), 9.81 * slope.sin() * 5.0);
         for particle in ParticleSystem::particles(&world, system).unwrap() {
             let v = particle.velocity.dot(&along);
-            assert!((v - expected).abs() < 1e-6 * expected, "{restitution}, {}: {v} is not {expected}", particle.serial);
+            assert!(
+                (v - expected).abs() < 1e-6 * expected,
+                "{restitution}, {}: {v} is not {expected}",
+                particle.serial
+            );
         }
     }
+}
+
+/// A ground without a finite box does not hide what is beside it.
+#[test]
+fn nothing_enters_a_ball_on_a_tilted_ground() {
+    let mut world = world(1.0 / 60.0);
+    let tilted = Pose::from_parts(Vec3::zeros().into(), Quat::from_axis_angle(&Vec3::x_axis(), 0.05));
+    world.add(RigidBody::fixed(Shape::half_space()).with_pose(tilted)).unwrap();
+    let center = Vec3::new(0.0, 0.0, 0.7);
+    world
+        .add(RigidBody::fixed(Shape::sphere(0.8).unwrap()).with_pose(Pose::from_parts(center.into(), Quat::identity())))
+        .unwrap();
+    let rain = Emitter {
+        radius: 1.0,
+        speed: [0.0, 1.0],
+        lifetime: [9.0; 2],
+        ..Emitter::burst(Vec3::new(0.0, 0.0, 4.0), 1000, 0.0)
+    };
+    let system = ParticleSystem::new("rain", settings()).unwrap().with_emitter(rain).unwrap();
+    let id = world.add(system).unwrap();
+    let mut nearest = f64::INFINITY;
+    for _ in 0..240 {
+        world.step().unwrap();
+        let gaps = all(&world, id).into_iter().map(|particle| (particle.position - center).norm() - 0.81);
+        nearest = gaps.fold(nearest, f64::min);
+    }
+    assert!(nearest > -1e-9 && nearest < 1e-6, "{nearest}");
 }
