@@ -60,16 +60,15 @@ impl Default for Helm {
 /// A flock of rigid bodies in one world. It is a force: it has no state, and bodies of any shape can join it.
 ///
 /// ```
-/// use tumble_behaviors::{BodyFlock, Helm, Steering};
-/// use tumble_core::prelude::*;
-/// let mut world = World::new(Settings::default().with_gravity(Vec3::zeros()))?;
-/// let mut flock = BodyFlock::new("fish", Steering::default(), Helm::default())?;
-/// for k in 0..20 {
-///     let fish = RigidBody::new(Shape::cuboid(Vec3::new(0.4, 0.1, 0.2))?).with_mass(1.0);
-///     flock.push(world.add(fish.with_pose(Pose::translation(2.0 * k as f64, 0.0, 0.0)))?);
-/// }
-/// world.add(flock)?;
-/// world.step()?;
+/// # use tumble_core::prelude::*;
+/// # use tumble_behaviors::Steering;
+/// # let mut world = World::default();
+/// use tumble_behaviors::{BodyFlock, Helm};
+/// let mut school = BodyFlock::new("school", Steering::default(), Helm::default())?;
+/// let fish = RigidBody::new(Shape::cuboid(Vec3::new(0.4, 0.1, 0.2))?).with_gravity_scale(0.0);
+/// school.push(world.add(fish.with_velocity(Vec3::x()))?);
+/// world.add(school)?;
+/// # world.step()?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]

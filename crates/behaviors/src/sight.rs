@@ -1,4 +1,4 @@
-//! What a boid sees: the weights of its neighbors, several at once.
+//! Sight of a boid: the weights of its neighbors, several at once.
 //!
 //! ```text
 //! w = clamp((D − d)·p)·clamp((A − θ)·q)          p = 1/(D − D₀), q = 1/(A − A₀); clamp to 0 … 1
@@ -30,9 +30,9 @@ const MARGIN: f64 = 1e-9;
 pub(crate) struct Eye {
     /// Square of a distance from which nothing is seen, m².
     pub unseen: f64,
-    /// Where the weight by distance is 0, m, and its slope, 1/m.
+    /// Distance at which the weight is 0, m, and its slope, 1/m.
     distance: [f64; 2],
-    /// Where the weight by angle is 0, rad, and its slope, 1/rad.
+    /// Angle at which the weight is 0, rad, and its slope, 1/rad.
     angle: [f64; 2],
 }
 

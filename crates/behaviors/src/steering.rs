@@ -172,7 +172,7 @@ impl Steering {
             };
             match search {
                 Search::Grid => grid.each_cell(places, work),
-                Search::BruteForce => work(places, &[0..flyers.len()]),
+                Search::BruteForce => work(places, std::slice::from_ref(&(0..flyers.len()))),
             }
         });
         let mut forces = vec![Vec3::zeros(); flyers.len()];

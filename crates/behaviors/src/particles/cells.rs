@@ -101,7 +101,7 @@ impl Cells {
         if lists > 1 && out.len() > start + 1 {
             out[start..].sort_unstable();
             let mut kept = start + 1;
-            for k in kept..out.len() {
+            for k in start + 1..out.len() {
                 out[kept] = out[k];
                 kept += usize::from(out[kept] != out[kept - 1]);
             }

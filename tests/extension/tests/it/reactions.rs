@@ -1,4 +1,4 @@
-//! What a program does with a contact after a step: push, explode, remove.
+//! Reactions of a program to contacts, after a step: push and remove.
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Vec3};
