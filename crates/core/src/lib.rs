@@ -56,12 +56,14 @@ pub use contact::pair_material::{PairMaterial, PairSide};
 pub use derived::Cache;
 pub use object::collidable::{CollisionGroup, ContactFrame};
 pub use object::frame_state::{Frame, FrameImpulse};
+pub use object::intersect::IntersectPart;
 pub use object::mounts::{CameraMount, Detail, LightMount, Spread};
 pub use object::part_state::{ForceSlice, Forces, PartPoint, PartState, PointLoad, StateRange, StateSizes, Wrench};
 pub use object::visual::{Drawn, Visual, VisualGeometry, VisualMesh};
 pub use object::{
     Appearance, CameraCarrier, Collidable, Combine, Constraint, Energy, ForceGenerator, Fork, FrameState, Integratable,
-    Level, LightCarrier, Material, Momentum, MomentumKind, NetSync, Object, Renderable, RowTarget, SyncError,
+    Intersect, Level, LightCarrier, Material, Momentum, MomentumKind, NetSync, Object, Renderable, RowTarget,
+    SyncError,
 };
 pub use report::{StepReport, UnreachableJoint, WorstSolve};
 pub use rigid::{BodyError, LockedAxes, RigidBody};

@@ -162,6 +162,8 @@ pub struct Core {
     pub(crate) attempt: Attempt,
     /// Largest turn of the frame.
     pub(crate) largest_turn: LargestTurn,
+    /// Working memory of frame states.
+    pub(super) frame_numbers: Vec<f64>,
 }
 
 /// The state of the objects, and the caches for the maps that change it.
@@ -210,6 +212,7 @@ impl Core {
             division: 1,
             attempt: Attempt::First,
             largest_turn: LargestTurn::default(),
+            frame_numbers: Vec::new(),
         }
     }
 
@@ -260,6 +263,7 @@ impl Core {
             x: &self.state.x,
             part_states: &self.derived.part_states,
             objects: self.objects(),
+            threads: &self.threads,
         }
     }
 

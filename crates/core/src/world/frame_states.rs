@@ -21,7 +21,7 @@ impl Core {
     /// Advances all frame states by the frame that was just stepped, from the time `start` (s) and the part states
     /// `before`; then applies their impulses.
     pub(super) fn advance_frame_states(&mut self, start: f64, before: &[PartState]) -> Result<(), StepError> {
-        let (mut impulses, mut x) = (Vec::new(), Vec::new());
+        let (mut impulses, mut x) = (Vec::new(), std::mem::take(&mut self.frame_numbers));
         for place in 0..self.table.placed.len() {
             let entry = self.objects().at(place);
             let Some(follower) = entry.object.frame_state().filter(|_| entry.status.enabled) else { continue };
@@ -43,6 +43,7 @@ impl Core {
                 self.integration().refresh_one(id);
             }
         }
+        self.frame_numbers = x;
         self.apply_frame_impulses(&impulses)
     }
 
