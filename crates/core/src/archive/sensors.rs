@@ -12,7 +12,7 @@ use tumble_collide::Pose;
 /// Index of the object of a site, if that still exists, and part, `None` for the world; the frame.
 type Site = (Option<(Option<u32>, usize)>, Pose);
 
-/// What a sensor is fixed to; objects by index.
+/// The thing that a sensor is fixed to; objects by index.
 #[derive(Serialize, Deserialize)]
 enum Place {
     Site(Site),

@@ -24,11 +24,11 @@ pub(crate) struct FrameLoads {
     pub parts: Vec<Wrench>,
     /// Impulses along the normals of contacts.
     pub touches: Vec<TouchLoad>,
-    /// What loop joints did to their side A, by serial number.
+    /// Impulses of loop joints on their side A, by serial number.
     pub joints: BTreeMap<u32, JointLoad>,
     /// Impulses of the drives and of applied generalized forces on each degree of freedom, N·m·s or N·s.
     pub drives: Vec<f64>,
-    /// Of the present sub-step.
+    /// Numbers of the present sub-step.
     pending: Pending,
 }
 
@@ -92,7 +92,7 @@ pub(crate) struct SubstepForces<'a> {
     pub moments: &'a [PatchMoment],
     /// Factor of the moments that makes them torques.
     pub scale: f64,
-    /// Of the rows of constraints.
+    /// Forces of the rows of constraints.
     pub rows: Vec<RowStart>,
 }
 

@@ -1,4 +1,4 @@
-//! What sensors read in a world: the equations of [`SensorKind`].
+//! Readings of sensors: the equations of [`SensorKind`].
 
 use super::{Sensor, SensorKind, SensorPlace};
 use crate::articulated::ArticulatedBody;

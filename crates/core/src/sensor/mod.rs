@@ -65,7 +65,7 @@ pub enum SensorError {
     },
 }
 
-/// What a sensor is fixed to.
+/// The thing that a sensor is fixed to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SensorPlace {
     /// A frame fixed to a part or to the world.
@@ -226,7 +226,7 @@ impl Sensor {
         self.kind
     }
 
-    /// Returns what it is fixed to.
+    /// Returns the thing that it is fixed to.
     pub fn place(&self) -> &SensorPlace {
         &self.place
     }
