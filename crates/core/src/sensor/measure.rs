@@ -110,7 +110,7 @@ impl Sensor {
     /// Returns the distance along z to the next part that does not move with the site, m; −1 for none.
     fn range(&self, core: &Core, site: &Anchor, pose: &Pose) -> f64 {
         let direction = pose.rotation * Vec3::z();
-        let ray = Ray { origin: pose.translation.vector, direction, max_distance: self.cutoff() };
+        let ray = Ray { origin: pose.translation.vector, direction, max_distance: f64::INFINITY };
         let own =
             |id, part| site.part.is_some_and(|(on, at)| on == id && core.carrier(on, at) == core.carrier(id, part));
         core.distance_along(&ray, own).unwrap_or(-1.0)

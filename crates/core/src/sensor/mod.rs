@@ -185,8 +185,7 @@ impl Sensor {
         Ok(self)
     }
 
-    /// Sets the largest absolute value of every number of a reading, in its unit; infinite for none. A range finder sees no
-    /// further.
+    /// Sets the largest absolute value of every number of a reading, in its unit; infinite for none.
     ///
     /// # Errors
     /// [`SensorError::Range`] for a number that is not above 0, [`SensorError::Kind`] for orientations.

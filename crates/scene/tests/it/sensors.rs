@@ -135,7 +135,7 @@ fn faults_of_sensors_are_reported_with_their_place() {
         said
     };
     for (sensor, expected) in [
-        ("type = \"gyroskope\"\non = \"box\"", "`gyroskope`"),
+        ("type = \"gyroskope\"\non = \"box\"", "\"gyroskope\"; did you mean `gyroscope`?"),
         ("type = \"gyroscope\"\non = \"bocks\"", "bocks"),
         ("type = \"touch\"", "has no `on`"),
         ("type = \"gyroscope\"\non = \"box\"\ndeviation = -1", "deviation"),
