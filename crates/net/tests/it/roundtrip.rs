@@ -146,7 +146,8 @@ fn readings_and_events_come_back_with_their_frames() {
     let scratch = Scratch::new("report");
     let path = scratch.file("a.mcap");
     let mut recorder = Recorder::create(&path, WORLD, &entities(), options(Compression::Lz4, 2)).unwrap();
-    let readings = |k: u64| Readings::from([("imu".into(), vec![0.1 * k as f64, -1e-300, 9.81]), ("ß".into(), vec![1.0])]);
+    let readings =
+        |k: u64| Readings::from([("imu".into(), vec![0.1 * k as f64, -1e-300, 9.81]), ("ß".into(), vec![1.0])]);
     let hit = |k: u64| RecordedEvent {
         kind: "contact_begin".into(),
         a: "ball".into(),
