@@ -185,7 +185,7 @@ fn sensors_of_a_model_read_what_those_of_mujoco_read() {
         let ours: Vec<f64> = fine.iter().zip(coarse).map(|(fine, coarse)| 2.0 * fine - coarse).collect();
         let size = expected.iter().map(|x| x.abs()).fold(1.0, f64::max);
         worst = ours.iter().zip(&expected).map(|(a, b)| (a - b).abs() / size).fold(worst, f64::max);
-        close(&ours, &expected, 2e-5 * size, name);
+        close(&ours, &expected, 2e-6 * size, name);
         count += 1;
     }
     println!("{count} sensors; largest difference {worst:e} of the largest number");
