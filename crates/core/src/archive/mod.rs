@@ -2,7 +2,7 @@
 //!
 //! | part | bytes |
 //! |---|---|
-//! | `tumbleAD`; the last is the number of the format | 8 |
+//! | `tumbleAE`; the last is the number of the format | 8 |
 //! | XXH3 of the rest, little-endian | 8 |
 //! | settings, stepper, solver, shapes, visual meshes, objects, pairs, state, contacts, report in postcard | any |
 //!
@@ -13,6 +13,7 @@
 
 mod bodies;
 mod records;
+mod sensors;
 
 use crate::report::StepReport;
 use crate::settings::Settings;
@@ -20,12 +21,13 @@ use crate::solver::{self, RowSolver};
 use crate::step::{STEPPERS, Stepper, stepper_by_name};
 use crate::world::view::{Mode, ObjectId};
 use crate::world::{ContactPoint, Event, EventKind, World, WorldState};
-use crate::{ArticulatedBody, LoopJoint, Object, RigidBody, UnreachableJoint, WorstSolve};
+use crate::{ArticulatedBody, LoopJoint, Object, RigidBody, Sensor, UnreachableJoint, WorstSolve};
 use bodies::{ArticulatedRecord, RigidRecord};
 use records::{
     ContactRecord, EventRecord, LoadedTables, LoopJointRecord, MeshRecord, ObjectIndices, PairRecord, ReportRecord,
     Tables, meshes,
 };
+use sensors::SensorRecord;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use tumble_collide::Shape;
@@ -33,7 +35,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 /// First bytes of an archive of a world. The last is the number of the format, which rises with
 /// every change of the content.
-const HEAD: &[u8; 8] = b"tumbleAD";
+const HEAD: &[u8; 8] = b"tumbleAE";
 
 /// Why an archive cannot be written or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -110,6 +112,7 @@ enum Record {
     Rigid(Box<RigidRecord>),
     Articulated(Box<ArticulatedRecord>),
     LoopJoint(Box<LoopJointRecord>),
+    Sensor(Box<SensorRecord>),
     Foreign,
 }
 
@@ -181,6 +184,7 @@ impl World {
                 Record::Rigid(rigid) => Box::new(rigid.body(&tables)?),
                 Record::Articulated(articulated) => Box::new(articulated.body(&tables)?),
                 Record::LoopJoint(loop_joint) => Box::new(loop_joint.loop_joint(&ids)?),
+                Record::Sensor(sensor) => Box::new(sensor.sensor(&tables, &ids)?),
                 Record::Foreign => foreign(&name).ok_or_else(|| ArchiveError::Foreign(name.clone()))?,
             };
             ids.push(world.add_named(name, object, Mode::Dynamic).map_err(damaged)?);
@@ -244,6 +248,8 @@ fn record(object: &dyn Object, tables: &mut Tables, indices: &ObjectIndices) -> 
         Record::Articulated(Box::new(ArticulatedRecord::of(body, tables)))
     } else if let Some(loop_joint) = any.downcast_ref::<LoopJoint>() {
         Record::LoopJoint(Box::new(LoopJointRecord::of(loop_joint, indices)))
+    } else if let Some(sensor) = any.downcast_ref::<Sensor>() {
+        Record::Sensor(Box::new(SensorRecord::of(sensor, tables, indices)))
     } else {
         Record::Foreign
     }

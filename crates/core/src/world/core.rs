@@ -9,6 +9,7 @@ use crate::derived::{Cache, Derived};
 use crate::integrators::context::IntegrationContext;
 use crate::object::part_state::{Forces, PartState, Wrench};
 use crate::report::StepReport;
+use crate::sensor::loads::FrameLoads;
 use crate::settings::Settings;
 use crate::solver::RowSolver;
 use crate::step::{Attempt, LargestTurn, Moment, WorkMeter};
@@ -148,6 +149,8 @@ pub struct Core {
     pub(crate) contacts: Vec<ContactPoint>,
     /// Touches of the present frame.
     pub(crate) touches: Touches,
+    /// Impulses of the present frame, for sensors.
+    pub(crate) loads: FrameLoads,
     /// Serials of the loop joints that break in the present frame.
     pub(crate) broken: Vec<u32>,
     /// Events of the last frame.
@@ -204,6 +207,7 @@ impl Core {
             detect_scratch: DetectorBuffers::default(),
             contacts: Vec::new(),
             touches: Touches::default(),
+            loads: FrameLoads::default(),
             broken: Vec::new(),
             events: Vec::new(),
             report: StepReport::default(),
@@ -374,6 +378,7 @@ impl Core {
         self.report.substeps += 1;
         self.keep_touches(h);
         self.integration().refresh();
+        self.keep_loads(h);
         let moves = |s: &PartState| s.velocity.iter().chain(s.angular_velocity.iter()).all(|x| x.is_finite());
         let fine = |e: &Entry| {
             self.state.x[e.state_range.x.clone()].iter().all(|x| x.is_finite())

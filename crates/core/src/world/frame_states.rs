@@ -64,6 +64,8 @@ impl Core {
                 let FrameImpulse { part, point, impulse, .. } = *impulse;
                 Some((PartPoint { part, part_state: part_states.get(part)?, point, axes: &AXES }, impulse))
             });
+            let from = entry.state_range.parts.start;
+            group.iter().for_each(|(_, i)| self.loads.add(from + i.part, &i.impulse, &i.point));
             if !self.kick_by(group[0].1.id, kicks) {
                 let object = self.objects().at(group[0].0).name.to_string();
                 return Err(StepError::NotFinite { object, what: "its state after impulses", time: self.state.time });

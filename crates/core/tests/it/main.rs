@@ -56,6 +56,8 @@ mod random_scenes;
 mod regressions;
 mod regressions_articulated;
 mod regressions_rows;
+mod sensor_noise;
+mod sensors;
 mod sleep;
 mod soft_rows;
 mod solvers;

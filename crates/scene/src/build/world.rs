@@ -63,6 +63,9 @@ impl SceneFile {
         for spec in &self.loop_joints {
             self.add_loop_joint(spec, &mut built)?;
         }
+        for spec in &self.sensors {
+            self.add_sensor(spec, &mut built)?;
+        }
         for spec in &self.pairs {
             self.add_pair(spec, &mut built).map_err(world)?;
         }
