@@ -42,6 +42,11 @@ pub(super) struct Step<'a> {
     pub keep: &'a [bool],
 }
 
+/// Iterates over the coordinates of both sides of a block.
+fn coordinates(block: &Block) -> impl Iterator<Item = usize> + '_ {
+    block.sides().iter().flat_map(|side| side.u as usize..(side.u + side.dof) as usize)
+}
+
 /// Takes the potential energy of lifts from the kinetic energy of the groups.
 pub(super) fn pay_for_lift(at: Coordinates, work: &mut Workspace, step: &Step) {
     if step.moved.iter().all(|du| *du == 0.0) {
@@ -49,15 +54,12 @@ pub(super) fn pay_for_lift(at: Coordinates, work: &mut Workspace, step: &Step) {
     }
     let contacts = work.contact_constraints.len();
     let Workspace { rows, islands, bias, targets, .. } = work;
-    let coordinates = |block: &Block| {
-        block.sides().iter().flat_map(|side| side.u as usize..(side.u + side.dof) as usize).collect::<Vec<_>>()
-    };
     let acts = |b: usize| {
         let block = &rows.blocks[b];
         b >= contacts
             || !step.keep[b]
             || block.range().any(|row| step.lambda[row] != 0.0)
-            || coordinates(block).iter().any(|&i| step.moved[i] != 0.0)
+            || coordinates(block).any(|i| step.moved[i] != 0.0)
     };
     islands.build(rows, acts);
     let mut du = vec![0.0; step.moved.len()];
