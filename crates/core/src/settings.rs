@@ -107,7 +107,7 @@ impl Default for Settings {
             dt: 1.0 / 240.0,
             substeps: 1,
             integrator: Integrator::default(),
-            integrator_tolerance: 1e-6,
+            integrator_tolerance: 1e-10,
             solver_settings: SolverSettings { max_sweeps: 200, max_relaxations: 20_000, tolerance: 1e-9, budget: None },
             projection_sweeps: 15,
             stabilize_positions: true,

@@ -34,6 +34,7 @@
 //! overlap is corrected at its end, and they strike at the start of the next.
 
 mod impacts;
+mod lift;
 mod moving;
 mod passing;
 
@@ -150,7 +151,7 @@ impl TimeStepping {
         self.impacts(core, middle, h, &mut u, &mut du_force, &mut after)?;
         self.look_again(core, middle, h, &u, &after);
         self.contacts(core, middle, h, &u, &mut after, &du_force)?;
-        self.rebound(core, &after);
+        self.rebound(core, &after, &du_force);
         self.commit(core, middle, h, &u, &after, &du_force)?;
         (self.work.u, self.work.du_force, self.buffers.after) = (u, du_force, after);
         Ok(())
@@ -203,7 +204,8 @@ impl TimeStepping {
             let block = &work.rows.blocks[i];
             let (row, struck) = (block.row as usize, self.impact[block.row as usize] > 0.0);
             let s = block.sides().iter().map(|side| self.impact_fraction[side.u as usize]).fold(0.0, f64::max);
-            let closed = h * s * 0.5 * (first[row] + moving::gap_rate(work, i, &free, (first[row], h)).0);
+            let rate = moving::gap_rate(work, i, &free, (first[row], h)).0;
+            let closed = h * s * 0.5 * (first[row] + rate);
             let (gap, left) = (constraint.gap_of_row() + closed, h * (1.0 - s).max(1e-9));
             let candidate = self.candidates.get(i);
             let rest_speed = candidate.map_or(f64::INFINITY, |candidate| candidate.rest_speed);
@@ -216,7 +218,11 @@ impl TimeStepping {
             // nothing presses an elastic contact, so it has no force but that of its impact
             let unpressed = constraint.restitution > impact::ELASTIC && rest_speed <= impact::SLOWEST_BOUNCE;
             keep[i] &= struck || !unpressed;
-            work.c[row] += if struck { 0.0 } else { gap.max(0.0) / left };
+            // without an impact the impulse acts in the middle of the step: what forces bring back in it gets to
+            // the surface with the mean of both velocities
+            let pressed = first[row] - before[row];
+            let by_mean = if s > 0.0 { 0.0 } else { (2.0 * gap / h + rate).min(pressed) };
+            work.c[row] += if struck { 0.0 } else { (gap / left).max(by_mean).max(0.0) };
         }
         for i in 0..work.contact_constraints.len() {
             let constraint = &work.contact_constraints[i];
@@ -300,12 +306,14 @@ impl TimeStepping {
         }
         shift(core.coordinates(Some(&mut *middle)), rest, h);
         write(mean, &|i| impact_fraction(i) * u0[i] + (1.0 - impact_fraction(i)) * u1[i] + parabola[i]);
+        rest.clone_from(mean);
         self.work.frictionless.du.clear();
         self.correct(core, middle, h)?;
-        let Buffers { dp, total, keep, moved, .. } = &mut self.buffers;
-        pay_for_lift(core.coordinates(Some(&mut *middle)), (&self.work, keep, moved), &end, du_force);
+        let Buffers { dp, total, keep, moved, rest: mean, .. } = &mut self.buffers;
         total.clear();
         total.extend(self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b));
+        let step = lift::Step { u: [u0, &end], du_force, mean, moved, lambda: total, keep };
+        lift::pay_for_lift(core.coordinates(Some(&mut *middle)), &mut self.work, &step);
         if core.has_breakable_joints() {
             core.break_joints(&row_starts(&self.work, total, 1.0 / h));
         }
@@ -326,26 +334,6 @@ impl TimeStepping {
         );
         core.check_finite(dp, Some(&mut *middle))
     }
-}
-
-/// Takes the potential energy by which the correction has lifted bodies out of contacts that are not
-/// kept, elastic ones that closed late in the step, from their kinetic energy. `u` is the whitened
-/// velocity at the end, `moved` the displacement by the correction, per second.
-fn pay_for_lift(at: Coordinates, (work, keep, moved): (&Workspace, &[bool], &[f64]), u: &[f64], du_force: &[f64]) {
-    if keep.iter().all(|keep| *keep) || moved.iter().all(|du| *du == 0.0) {
-        return;
-    }
-    let mut du = vec![0.0; u.len()];
-    for (block, _) in work.rows.blocks.iter().zip(keep).filter(|(_, keep)| !**keep) {
-        let coordinates = || block.sides().iter().flat_map(|side| side.u as usize..(side.u + side.dof) as usize);
-        let lift: f64 = -coordinates().map(|i| du_force[i] * moved[i]).sum::<f64>();
-        let kinetic: f64 = coordinates().map(|i| 0.5 * u[i] * u[i]).sum();
-        if lift > 0.0 && lift < kinetic {
-            let scale = (1.0 - lift / kinetic).sqrt() - 1.0;
-            coordinates().for_each(|i| du[i] = scale * u[i]);
-        }
-    }
-    push(at, &du, &mut Vec::new());
 }
 
 /// Returns whether all impulses on an object act in the middle of the step, impacts too: links,

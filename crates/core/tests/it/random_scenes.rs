@@ -57,11 +57,11 @@ impl RowSolver for Judged {
 }
 
 /// SplitMix64.
-struct Random(u64);
+pub struct Random(pub u64);
 
 impl Random {
     /// Returns a number from `from` to `to`.
-    fn next(&mut self, from: f64, to: f64) -> f64 {
+    pub fn next(&mut self, from: f64, to: f64) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -69,13 +69,13 @@ impl Random {
         from + (to - from) * ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    fn vector(&mut self, most: f64) -> Vec3 {
+    pub fn vector(&mut self, most: f64) -> Vec3 {
         Vec3::new(self.next(-most, most), self.next(-most, most), self.next(-most, most))
     }
 }
 
 /// A vase, which is not convex, a round stone and a wedge.
-static MESHES: LazyLock<[Shape; 3]> = LazyLock::new(|| {
+pub static MESHES: LazyLock<[Shape; 3]> = LazyLock::new(|| {
     let vase = TriMesh::lathe(&[(0.0, -0.2), (0.15, -0.15), (0.06, 0.05), (0.12, 0.2), (0.0, 0.2)], 12).unwrap();
     [vase, TriMesh::icosphere(0.15, 1), TriMesh::cuboid(Vec3::new(0.3, 0.2, 0.1))]
         .map(|mesh| Shape::mesh(mesh, &TreeSettings::default()).unwrap())

@@ -1270,7 +1270,7 @@ class World:
         substeps: int = 1,
         iterations: int = 200,
         contact_tolerance: float = 1e-7,
-        integrator_tolerance: float = 1e-6,
+        integrator_tolerance: float = 1e-10,
         sleep_after: float | None = None,
         sleep_within: float = 1e-5,
         combine_restitution: Combine = "max",

@@ -104,11 +104,11 @@ impl World {
     #[new]
     #[pyo3(
         text_signature = "(gravity=(0.0, 0.0, -9.81), dt=0.004166666666666667, stepper='time_stepping', integrator='verlet', \
-        solver='gauss_seidel', *, substeps=1, iterations=200, contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, \
+        solver='gauss_seidel', *, substeps=1, iterations=200, contact_tolerance=1e-7, integrator_tolerance=1e-10, sleep_after=None, sleep_within=1e-5, \
         combine_restitution='max', combine_friction='geometric_mean', threads=1, budget=None, event_impulse=0.0, max_turn=1.0)"
     )]
     #[pyo3(signature = (gravity=None, dt=0.004166666666666667, stepper="time_stepping", integrator="verlet", solver="gauss_seidel", *, substeps=1, iterations=200,
-        contact_tolerance=1e-7, integrator_tolerance=1e-6, sleep_after=None, sleep_within=1e-5, combine_restitution="max", combine_friction="geometric_mean", threads=1, budget=None, event_impulse=0.0, max_turn=1.0))]
+        contact_tolerance=1e-7, integrator_tolerance=1e-10, sleep_after=None, sleep_within=1e-5, combine_restitution="max", combine_friction="geometric_mean", threads=1, budget=None, event_impulse=0.0, max_turn=1.0))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
         py: Python<'_>,

@@ -218,7 +218,7 @@ impl Default for WorldSettings {
             duration_s: 5.0,
             stepper: Stepper::TimeStepping,
             integrator: Integrator::Verlet,
-            integrator_tolerance: 1e-6,
+            integrator_tolerance: 1e-10,
             solver: Solver::GaussSeidel,
             iterations: 200,
             budget: None,

@@ -48,43 +48,43 @@ macro_rules! table {
 
 table! {
     [1.0, 10.0];
-    billiards_time_stepping: "billiards", TimeStepping, "41c9d6a80a4215d2", "a62d36da0e7f5ce2";
+    billiards_time_stepping: "billiards", TimeStepping, "36b9d75c4ae9875c", "0297c6beb51197ed";
     billiards_backtracking: "billiards", Backtracking, "b5a27eda6855859e", "bf300238bd656f9e";
-    bowling_time_stepping: "bowling", TimeStepping, "f6721937cb4d54f4", "8c68902f614f0847";
-    bowling_backtracking: "bowling", Backtracking, "e677eac272ba7de7", "098bcebdb2ce128e";
-    chain_time_stepping: "chain", TimeStepping, "22fbcd4bcbb18743", "531efe443cc14759";
+    bowling_time_stepping: "bowling", TimeStepping, "94968c1b4058a725", "d4b9173ab658f913";
+    bowling_backtracking: "bowling", Backtracking, "e677eac272ba7de7", "f80aac7b0618b2a5";
+    chain_time_stepping: "chain", TimeStepping, "22fbcd4bcbb18743", "7e68bdb4b444ccf6";
     chain_backtracking: "chain", Backtracking, "63d0cbaca36ef0a9", "3198250057940e22";
-    falling_time_stepping: "falling", TimeStepping, "b502e3d757eeef41", "8787b18645b7223e";
+    falling_time_stepping: "falling", TimeStepping, "c360ce783144cf4b", "2536cc6ee6f266bc";
     falling_backtracking: "falling", Backtracking, "cbb914d607445f21", "253502563aa8576c";
-    incline_time_stepping: "incline", TimeStepping, "e279621724363969", "85a12d59b2107f19";
+    incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "dba991e4803cfe34", "95407557393acae5";
     pendulum_time_stepping: "pendulum", TimeStepping, "a6f0f0b542061dc2", "63acd1d2fe930652";
     pendulum_backtracking: "pendulum", Backtracking, "69fe4156518a0013", "692b5de118331942";
     piston_time_stepping: "piston", TimeStepping, "03971f4c855a8149", "498658197dce906c";
     piston_backtracking: "piston", Backtracking, "49b38596ba941018", "3623d35cde9a52a8";
-    robot_time_stepping: "robot", TimeStepping, "6b21cb8a1f188192", "8bea891d086ec9c1";
+    robot_time_stepping: "robot", TimeStepping, "68db682e31ad9267", "6ab4de6c331237ef";
     robot_backtracking: "robot", Backtracking, "34a6c003f76116a6", "1b8364d88cd17538";
-    skeleton_time_stepping: "skeleton", TimeStepping, "fd7ab16715dfff87", "2b63db53102edef9";
+    skeleton_time_stepping: "skeleton", TimeStepping, "e4b2d7099e2ce12c", "c987b4835830af30";
     skeleton_backtracking: "skeleton", Backtracking, "fd6d29b9de01f60c", "2dda572634ab3e36";
-    stack_time_stepping: "stack", TimeStepping, "20ad0965d34e48bf", "ecd253fcdb6efb2e";
+    stack_time_stepping: "stack", TimeStepping, "c9eeea26137d2a5f", "99d9eaf45acdf7b8";
     stack_backtracking: "stack", Backtracking, "8bf0d645b39a693b", "3d204eae8525be65";
 }
 
 // Structures and machines whose steps cost more, or that are known after less.
 table! {
     [0.5, 2.0];
-    card_house_time_stepping: "card_house", TimeStepping, "29b46a855d5f640b", "465b1df79b20786e";
+    card_house_time_stepping: "card_house", TimeStepping, "091b9380060ee20c", "8003317c097996db";
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
-    marble_run_time_stepping: "marble_run", TimeStepping, "a72b1fd3a5363896", "7de43f3b42f90427";
+    marble_run_time_stepping: "marble_run", TimeStepping, "54c3e3322b6781af", "27e58360ffb0f6a7";
     marble_run_backtracking: "marble_run", Backtracking, "67834b3a7fb5547d", "59907c8a56f4eda7";
-    newtons_cradle_time_stepping: "newtons_cradle", TimeStepping, "241aa3d8432a474e", "a8caedb1d85dab02";
+    newtons_cradle_time_stepping: "newtons_cradle", TimeStepping, "241aa3d8432a474e", "c34c93b030ba61fc";
     newtons_cradle_backtracking: "newtons_cradle", Backtracking, "878a964993b52e1f", "0579d119408e16b9";
     steam_engine_time_stepping: "steam_engine", TimeStepping, "3a2ab60873834ca6", "4a72b3cc1d1779dd";
     steam_engine_backtracking: "steam_engine", Backtracking, "466f4da8adf2589f", "f65c1d0393337846";
-    arch_time_stepping: "arch", TimeStepping, "b1067ee5cac37610", "7162c57df380fe8b";
-    walker_time_stepping: "walker", TimeStepping, "1354183924844efe", "becbf6edc5e078a5";
-    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "c7b940edc3ea2b9a", "a97663656893ebca";
-    dominoes_time_stepping: "dominoes", TimeStepping, "2b5433839ac3b3d2", "97388a630470b482";
+    arch_time_stepping: "arch", TimeStepping, "e7090b6cbe5ad156", "7149f35988a11a9d";
+    walker_time_stepping: "walker", TimeStepping, "4f3cf3f418140f88", "671d7eee0c71360b";
+    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "b8885a64a8d5fa18", "f5ab66a6456e0662";
+    dominoes_time_stepping: "dominoes", TimeStepping, "3dbbb8d56ce5506d", "87e9ec807e1f2df6";
 }
 
 table! {

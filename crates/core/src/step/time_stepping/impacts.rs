@@ -210,18 +210,40 @@ impl TimeStepping {
     /// Resolves the rebound of contacts that were not among the first of their bodies: the solve of
     /// all contacts has stopped them at the surface. `late` becomes the change of whitened velocity
     /// at the end of the step.
-    pub(super) fn rebound(&mut self, core: &mut Core, u: &[f64]) {
-        let (work, Buffers { before, gain, parts, late, .. }) = (&mut self.work, &mut self.buffers);
+    pub(super) fn rebound(&mut self, core: &mut Core, u: &[f64], du_force: &[f64]) {
+        let (work, Buffers { before, gain, parts, late, change, .. }) = (&mut self.work, &mut self.buffers);
         zero(late, core.dof);
         if parts.iter().all(|part| part.rebound <= 0.0) {
             return;
         }
         row_velocities(&core.threads, &work.rows, &work.bias, u, gain);
-        for (part, block) in parts.iter_mut().zip(&work.rows.blocks) {
-            part.member = part.rebound > 0.0 && work.lambda[block.row as usize] > 0.0;
+        // impulses act at the time of impact or in the middle of the step: forces follow, for the rest of it
+        let rest = |(i, du): (usize, &f64)| {
+            let impact_fraction = self.impact_fraction[i];
+            du * (1.0 - if impact_fraction < 0.0 { 0.5 } else { impact_fraction })
+        };
+        let follows: Vec<f64> = du_force.iter().enumerate().map(rest).collect();
+        zero(change, work.rows.len);
+        work.rows.add_velocity(&follows, change);
+        let contacts = parts.len();
+        let taken = |b: usize| -> f64 {
+            let rows = work.rows.blocks[b].range();
+            rows.map(|row| work.lambda[row] * (change[row] - 0.5 * (before[row] + gain[row]))).sum()
+        };
+        for (b, part) in parts.iter_mut().enumerate() {
+            part.member = part.rebound > 0.0 && work.lambda[work.rows.blocks[b].row as usize] > 0.0;
             part.rebound = if part.member { part.rebound } else { 0.0 };
-            let taken = |row: usize| -0.5 * work.lambda[row] * (before[row] + gain[row]);
-            part.energy = block.range().map(taken).sum::<f64>().max(0.0);
+            part.energy = if part.member { taken(b).max(0.0) } else { 0.0 };
+        }
+        // a light body between others has contacts that give some of the energy back which others take
+        let acts = |b: usize| work.rows.blocks[b].range().any(|row| work.lambda[row] != 0.0);
+        work.islands.build(&work.rows, acts);
+        for blocks in work.islands.iter() {
+            let of_contacts = || blocks.iter().map(|&b| b as usize).filter(|&b| b < contacts);
+            let all: f64 = of_contacts().map(taken).sum();
+            let members: f64 = of_contacts().map(|b| parts[b].energy).sum();
+            let share = (all / members).clamp(0.0, 1.0);
+            of_contacts().filter(|_| members > all).for_each(|b| parts[b].energy *= share);
         }
         if parts.iter().any(|part| part.member) {
             let forces = work.lambda.clone();

@@ -105,7 +105,8 @@ pub(super) fn move_to_impacts(core: &Core, work: &mut Workspace, (fraction, rate
             if let Some(contact) = found.iter().find(|contact| contact.feature == constraint.key.feature) {
                 constraint.find_again(contact, pair.part_states, s * h, true);
             }
-        } else if move_in_step(core, constraint, s * h) {
+        } else {
+            move_in_step(core, constraint, s * h);
             let Moved { time, way, .. } = constraint.moved;
             let turned = if time == s * h { -0.5 * time * time * rate } else { 0.0 };
             constraint.moved = Moved { time, way, turned, ..Moved::default() };
