@@ -6,6 +6,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
+use tumble::behaviors::BehaviorError;
 use tumble::collide::{MeshError, ShapeError};
 use tumble::dynamics::{
     ArchiveError, ArticulatedError, ArticulationError, BodyError, LoopJointError, ModelError, SettingsError,
@@ -37,6 +38,8 @@ pub enum Error {
     Articulation(#[from] ArticulationError),
     #[error(transparent)]
     Joint(#[from] LoopJointError),
+    #[error(transparent)]
+    Behavior(#[from] BehaviorError),
     #[error(transparent)]
     Model(#[from] ModelError),
     #[error(transparent)]
@@ -115,6 +118,7 @@ impl Error {
     fn class(&self) -> &'static str {
         match self {
             Error::World(WorldError::Stale) | Error::Removed(_) => "RemovedError",
+            Error::Behavior(BehaviorError::NoFlock | BehaviorError::World(WorldError::Stale)) => "RemovedError",
             Error::Scene(SceneError::Unknown { .. }) => "MissingFileError",
             Error::Scene(SceneError::Read { source, .. }) => of_file(source),
             Error::Scene(SceneError::Mjcf(error)) => match error.as_ref() {

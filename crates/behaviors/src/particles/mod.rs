@@ -14,12 +14,14 @@
 //! | life | time that is left, s; 0 or less of a free place |
 //! | serial | serial number of the particle |
 
+mod drawn;
 mod emitter;
 mod flight;
 pub(crate) mod obstacles;
 mod path;
 mod random;
 
+pub use drawn::ParticleLook;
 pub use emitter::Emitter;
 
 use crate::error::{BehaviorError, check};
@@ -30,7 +32,8 @@ use path::Air;
 use random::Random;
 use tumble_collide::Vec3;
 use tumble_core::{
-    CollisionGroup, Frame, FrameImpulse, FrameState, Material, Object, ObjectId, StateRange, World, WorldError,
+    CollisionGroup, Frame, FrameImpulse, FrameState, Material, NetSync, Object, ObjectId, Renderable, StateRange,
+    World, WorldError,
 };
 
 /// Length of the header and of a record.
@@ -112,6 +115,7 @@ pub struct ParticleSystem {
     name: String,
     settings: ParticleSettings,
     emitters: Vec<Emitter>,
+    look: ParticleLook,
 }
 
 /// A particle that lives.
@@ -148,7 +152,7 @@ impl ParticleSystem {
         check("the restitution", s.material.restitution, (0.0..=1.0).contains(&s.material.restitution), "0 to 1")?;
         check("the gravity scale", s.gravity_scale, true, "finite")?;
         check_vector("the velocity of the air", &s.wind)?;
-        Ok(ParticleSystem { name: name.into(), settings, emitters: Vec::new() })
+        Ok(ParticleSystem { name: name.into(), settings, emitters: Vec::new(), look: ParticleLook::default() })
     }
 
     /// Adds a source.
@@ -244,6 +248,12 @@ impl Object for ParticleSystem {
         &self.name
     }
     fn frame_state(&self) -> Option<&dyn FrameState> {
+        Some(self)
+    }
+    fn renderable(&self) -> Option<&dyn Renderable> {
+        Some(self)
+    }
+    fn net_sync(&self) -> Option<&dyn NetSync> {
         Some(self)
     }
 }

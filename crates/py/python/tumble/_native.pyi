@@ -25,20 +25,27 @@ __all__ = [
     "ArticulationBuilder",
     "Batch",
     "Bodies",
+    "Boid",
     "Box",
     "Capsule",
     "Compound",
     "ConvexHull",
     "Cylinder",
+    "Emitter",
+    "Field",
+    "Flock",
     "HalfSpace",
     "HeightField",
     "Joint",
     "Mesh",
+    "Panel",
+    "ParticleSystem",
     "Recorder",
     "RigidBody",
     "Shape",
     "Sphere",
     "SphereTree",
+    "SpringMesh",
     "StepReport",
     "Terrain",
     "View",
@@ -403,6 +410,134 @@ class RigidBody:
         """
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
+
+@final
+class SpringMesh:
+    @property
+    def name(self) -> str: ...
+    @property
+    def exists(self) -> bool: ...
+    @property
+    def positions(self) -> _Floats: ...
+    @property
+    def velocities(self) -> _Floats: ...
+    @property
+    def masses(self) -> _Floats: ...
+    @property
+    def pinned(self) -> NDArray[np.bool_]: ...
+    @property
+    def triangles(self) -> NDArray[np.uint32]: ...
+
+@final
+class Emitter:
+    def __new__(
+        cls,
+        position: ArrayLike | None = None,
+        *,
+        orientation: ArrayLike | None = None,
+        body: _Body | None = None,
+        part: int = 0,
+        radius: float = 0.0,
+        speed: float | ArrayLike | None = None,
+        half_angle: float = 3.141592653589793,
+        lifetime: float | ArrayLike | None = None,
+        burst: int = 0,
+        rate: float = 0.0,
+        start: float = 0.0,
+        end: float | None = None,
+    ) -> Emitter: ...
+
+@final
+class ParticleSystem:
+    @property
+    def name(self) -> str: ...
+    @property
+    def exists(self) -> bool: ...
+    @property
+    def capacity(self) -> int: ...
+    @property
+    def positions(self) -> _Floats: ...
+    @property
+    def velocities(self) -> _Floats: ...
+    @property
+    def lives(self) -> _Floats: ...
+    @property
+    def serials(self) -> NDArray[np.uint64]: ...
+    def spawn(self, position: ArrayLike, velocity: ArrayLike | None = None, life: float = 1.0) -> int | None: ...
+    def __len__(self) -> int: ...
+
+@final
+class Flock:
+    @property
+    def name(self) -> str: ...
+    @property
+    def exists(self) -> bool: ...
+    @property
+    def boids(self) -> list[Boid]: ...
+    @property
+    def steering(self) -> dict[str, Any]: ...
+    @steering.setter
+    def steering(self, value: dict[str, Any]) -> None: ...
+    def add(
+        self,
+        name: str = "",
+        position: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        *,
+        mass: float = 1.0,
+        radius: float = 0.2,
+        bank_time: float = 1.0,
+        roll_time: float = 0.2,
+        color: ArrayLike | None = None,
+    ) -> Boid: ...
+    def remove(self, boid: Boid | str) -> None: ...
+    def __len__(self) -> int: ...
+
+@final
+class Boid:
+    @property
+    def name(self) -> str: ...
+    @property
+    def exists(self) -> bool: ...
+    @property
+    def mass(self) -> float: ...
+    @property
+    def position(self) -> _Floats: ...
+    @property
+    def orientation(self) -> _Floats: ...
+    @property
+    def velocity(self) -> _Floats: ...
+    @property
+    def bank(self) -> float: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class Panel:
+    def __new__(
+        cls,
+        body: _Body,
+        area: float,
+        *,
+        part: int = 0,
+        point: ArrayLike | None = None,
+        normal: ArrayLike | None = None,
+        lift_slope: float = 6.283185307179586,
+        drag: float = 0.02,
+    ) -> Panel: ...
+
+@final
+class Field:
+    @staticmethod
+    def wind(velocity: ArrayLike, *, drag: float | None = None, density: float = 1.2, drag_coefficient: float = 0.47) -> Field: ...
+    @staticmethod
+    def attractor(position: ArrayLike, strength: float, *, softening: float = 0.0) -> Field: ...
+    @staticmethod
+    def explosion(position: ArrayLike, impulse: float, *, start: float = 0.0, decay: float = 0.02) -> Field: ...
+    @staticmethod
+    def buoyancy(surface: ArrayLike | None = None, density: float = 1000.0, *, drag: float = 0.0, current: ArrayLike | None = None) -> Field: ...
+    @staticmethod
+    def panels(panels: Sequence[Panel], *, density: float = 1.2, wind: ArrayLike | None = None) -> Field: ...
 
 @final
 class Joint:
@@ -1617,6 +1752,7 @@ class World:
         center_of_mass: ArrayLike | None = None,
         gravity_scale: float = 1.0,
         locked: Sequence[LockedAxis] | None = None,
+        non_spinning: bool = False,
     ) -> RigidBody:
         """Adds a body that moves.
 
@@ -1716,10 +1852,75 @@ class World:
         bodies still collide with each other: ``set_pair_material(a, b, collides=False)``. Points and axes
         are in the world.
         """
-    def remove(self, body: RigidBody | Articulation | Joint | str) -> None:
+    def remove(self, body: RigidBody | Articulation | Joint | SpringMesh | ParticleSystem | Flock | Boid | str) -> None:
         """Removes a body or a joint, given as a handle or by name, or a force or behavior by name. Handles
         of a removed object raise ``RemovedError``. Joints of a removed body stay, without effect.
         """
+    def add_cloth(
+        self,
+        name: str = "",
+        *,
+        nodes: Sequence[int] | None = None,
+        size: ArrayLike | None = None,
+        mass: float = 0.2,
+        stiffness: ArrayLike | None = None,
+        damping: float = 0.01,
+        position: ArrayLike | None = None,
+        orientation: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        node_radius: float | None = None,
+        pins: Iterable[str | int] | None = None,
+        implicitness: float = 1.0,
+        friction: float = 0.5,
+        restitution: float = 0.0,
+        color: ArrayLike | None = None,
+    ) -> SpringMesh: ...
+    def add_jelly(
+        self,
+        name: str = "",
+        *,
+        nodes: Sequence[int] | None = None,
+        size: ArrayLike | None = None,
+        mass: float = 2.0,
+        stiffness: ArrayLike | None = None,
+        damping: float = 0.01,
+        position: ArrayLike | None = None,
+        orientation: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        node_radius: float | None = None,
+        pins: Iterable[str | int] | None = None,
+        implicitness: float = 1.0,
+        friction: float = 0.5,
+        restitution: float = 0.0,
+        color: ArrayLike | None = None,
+    ) -> SpringMesh: ...
+    def add_particles(
+        self,
+        name: str = "",
+        emitters: Sequence[Emitter] = (),
+        *,
+        capacity: int = 10000,
+        seed: int = 0,
+        mass: float = 0.001,
+        radius: float = 0.01,
+        friction: float = 0.5,
+        restitution: float = 0.0,
+        gravity_scale: float = 1.0,
+        linear_drag: float = 0.0,
+        quadratic_drag: float = 0.0,
+        wind: ArrayLike | None = None,
+        collides: bool = True,
+        group: int = 0,
+        mask: int | Sequence[int] | None = None,
+        two_way: bool = False,
+        color: ArrayLike | None = None,
+        drawn_radius: float | None = None,
+        fade: float = 0.0,
+    ) -> ParticleSystem: ...
+    def add_flock(self, name: str = "", **steering: Any) -> Flock: ...
+    def add_field(
+        self, name: str, field: Field, *, targets: Sequence[_Body | SpringMesh | Boid] | None = None
+    ) -> None: ...
     def add_force(self, name: str, force: Force) -> None:
         """Adds a custom force: an object of a subclass of ``tumble.Force``. Its name must be unique
         among bodies, forces and behaviors.

@@ -16,7 +16,7 @@ use tumble::dynamics::ObjectId;
 use tumble::net::record::{
     Contact, Ending, Pose, Recorder as Writer, RecorderOptions, decode_contacts, encode_contacts, read,
 };
-use tumble::net::world::{self as net_world, contacts, entities, names as entity_names, poses};
+use tumble::net::world::{self as net_world, contacts, deforming, entities, names as entity_names, poses};
 
 /// Largest count of numbers, and of bytes of states, of a recording that is read at once.
 const MAX_NUMBERS: usize = 1 << 29;
@@ -60,6 +60,7 @@ impl Open {
             self.writer.set_entities(core.time(), &entities(core))?;
             (self.world, self.objects) = (world.clone(), core.ids().to_vec());
         }
+        self.writer.deforming(core.time(), &deforming(core))?;
         Ok(self.writer.frame(core.time(), core.frame(), &poses(core), &contacts(core), &core.save())?)
     }
 }
