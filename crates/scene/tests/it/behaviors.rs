@@ -44,12 +44,14 @@ fn the_banner_hangs_along_the_sum_of_wind_and_weight() {
     let mut scene = shipped().iter().find(|scene| scene.name == "cloth").unwrap().read().unwrap();
     scene.behaviors.soft.retain(|soft| soft.name == "banner"); // the sheet takes most of the time
     let (mut world, rod) = (scene.build().unwrap().0, 1.25 + 0.6);
-    run(&mut world, 8.0);
+    run(&mut world, 12.0);
     let hanging = nodes(&world, "banner");
-    // every free node bears the same force, so all of them are in the plane of that force and of the rod
-    let slope = 0.002 * 4.0 / (0.001 * G);
+    // the rod bears no moment about itself, and every free node bears the same force: the moments cancel
+    let (slope, middle) = (0.002 * 4.0 / (0.001 * G), center(&hanging));
+    assert!((middle.x - slope * (rod - middle.z)).abs() < 1e-5, "{middle:?} is off the plane of slope {slope}");
+    // it wrinkles a little: its springs across are pressed together
     for node in &hanging {
-        assert!((node.x - slope * (rod - node.z)).abs() < 2e-3, "{node:?} is off the plane of slope {slope}");
+        assert!((node.x - slope * (rod - node.z)).abs() < 5e-3, "{node:?} is off the plane of slope {slope}");
     }
     let lowest = hanging.iter().map(|node| node.z).fold(f64::INFINITY, f64::min);
     assert!((rod - lowest) > 1.2 * (1.0 / (1.0 + slope * slope)).sqrt(), "the springs give, they do not shrink");

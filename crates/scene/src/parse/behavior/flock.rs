@@ -106,15 +106,15 @@ impl BoidGroupSpec {
         if self.count == 1 { self.name.clone() } else { format!("{}_{k}", self.name) }
     }
 
-    /// Returns the start of boid `k`, m: on a spiral through shells of equal volume.
+    /// Returns the start of boid `k`, m: on shells of equal volume, in directions of the R₂ sequence (Roberts, 2018), whose
+    /// steps are the powers of 1/ρ with ρ³ = ρ + 1.
     pub(crate) fn start(&self, k: usize) -> Vec3 {
-        const GOLDEN: f64 = 2.399_963_229_728_653; // π·(3 − √5)
-        let share = (k as f64 + 0.5) / self.count as f64;
-        // the height runs through all values on each shell: multiples of the golden ratio, modulo 1
-        let height = 1.0 - 2.0 * (0.618_033_988_749_894_9 * (k as f64 + 0.5)).fract();
+        const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
+        let [turn, height] = STEPS.map(|step| (0.5 + step * k as f64).fract());
+        let height = 1.0 - 2.0 * height;
         let around = (1.0 - height * height).max(0.0).sqrt();
-        let (sin, cos) = libm::sincos(GOLDEN * k as f64);
-        let radius = self.spread_m * libm::cbrt(share);
+        let (sin, cos) = libm::sincos(std::f64::consts::TAU * turn);
+        let radius = self.spread_m * libm::cbrt((k as f64 + 0.5) / self.count as f64);
         Vec3::from(self.position_m) + radius * Vec3::new(around * cos, around * sin, height)
     }
 }
