@@ -54,6 +54,8 @@ table! {
     bowling_backtracking: "bowling", Backtracking, "e677eac272ba7de7", "098bcebdb2ce128e";
     chain_time_stepping: "chain", TimeStepping, "22fbcd4bcbb18743", "531efe443cc14759";
     chain_backtracking: "chain", Backtracking, "63d0cbaca36ef0a9", "3198250057940e22";
+    flock_time_stepping: "flock", TimeStepping, "f6d6cd2c936b534a", "91cf95719438324b";
+    flock_backtracking: "flock", Backtracking, "cb91b06026531961", "15eb1ab38440d07f";
     falling_time_stepping: "falling", TimeStepping, "b502e3d757eeef41", "8787b18645b7223e";
     falling_backtracking: "falling", Backtracking, "cbb914d607445f21", "253502563aa8576c";
     incline_time_stepping: "incline", TimeStepping, "e279621724363969", "85a12d59b2107f19";
@@ -73,6 +75,8 @@ table! {
 // Structures and machines whose steps cost more, or that are known after less.
 table! {
     [0.5, 2.0];
+    sparks_time_stepping: "sparks", TimeStepping, "515a77d2df6b5217", "9badcde17809dddb";
+    sparks_backtracking: "sparks", Backtracking, "805c8cba100469d4", "6052e84af86ee0f9";
     card_house_time_stepping: "card_house", TimeStepping, "29b46a855d5f640b", "465b1df79b20786e";
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
     marble_run_time_stepping: "marble_run", TimeStepping, "a72b1fd3a5363896", "7de43f3b42f90427";
@@ -89,6 +93,9 @@ table! {
 
 table! {
     [0.1, 0.3];
+    cloth_time_stepping: "cloth", TimeStepping, "8f0123d54572e57a", "be138723987bf8f8";
+    cloth_backtracking: "cloth", Backtracking, "4d27c99388f5fd44", "e15311030cdc3060";
+    jelly_time_stepping: "jelly", TimeStepping, "672df96a105718eb", "e1b7eae6919a2c5d";
     arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "15c2a2986571f20d";
     dominoes_backtracking: "dominoes", Backtracking, "9c7b110aee952a4c", "4c3f82114ea67b3e";
     walker_backtracking: "walker", Backtracking, "ca535adb9b9b96d3", "093bfa105a94cd32";

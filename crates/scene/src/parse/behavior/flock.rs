@@ -25,7 +25,7 @@ pub struct FlockSpec {
     pub groups: Vec<BoidGroupSpec>,
 }
 
-/// Equal boids of a flock, spread evenly within a sphere.
+/// Equal boids of a flock, spread along a helix within a sphere.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoidGroupSpec {
     /// Beginning of their names, before `_0`, `_1` and so on; the name of a single one.
@@ -106,15 +106,15 @@ impl BoidGroupSpec {
         if self.count == 1 { self.name.clone() } else { format!("{}_{k}", self.name) }
     }
 
-    /// Returns the start of boid `k`, m: on shells of equal volume, in directions of the R₂ sequence (Roberts, 2018), whose
-    /// steps are the powers of 1/ρ with ρ³ = ρ + 1.
+    /// Returns the start of boid `k`, m: on a helix that winds through shells of equal volume.
     pub(crate) fn start(&self, k: usize) -> Vec3 {
-        const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
-        let [turn, height] = STEPS.map(|step| (0.5 + step * k as f64).fract());
-        let height = 1.0 - 2.0 * height;
+        const GOLDEN: f64 = 2.399_963_229_728_653; // π·(3 − √5)
+        let share = (k as f64 + 0.5) / self.count as f64;
+        // multiples of the golden ratio, modulo 1
+        let height = 1.0 - 2.0 * (0.618_033_988_749_894_9 * (k as f64 + 0.5)).fract();
         let around = (1.0 - height * height).max(0.0).sqrt();
-        let (sin, cos) = libm::sincos(std::f64::consts::TAU * turn);
-        let radius = self.spread_m * libm::cbrt((k as f64 + 0.5) / self.count as f64);
+        let (sin, cos) = libm::sincos(GOLDEN * k as f64);
+        let radius = self.spread_m * libm::cbrt(share);
         Vec3::from(self.position_m) + radius * Vec3::new(around * cos, around * sin, height)
     }
 }
