@@ -96,7 +96,9 @@ fn saved_particles_and_cloth_look_as_before() {
     for name in ["cloth", "sparks"] {
         let scene = load(name);
         let (mut world, mut copy) = (scene.build().unwrap().0, scene.build().unwrap().0);
-        (0..30).for_each(|_| drop(world.step().unwrap()));
+        (0..30).for_each(|_| {
+            world.step().unwrap();
+        });
         copy.restore(&world.save()).unwrap();
         assert_eq!(points(&list(&scene, &world)), points(&list(&scene, &copy)), "{name}");
     }
