@@ -23,7 +23,7 @@ fn edges(triangles: &[[usize; 3]]) -> BTreeMap<[usize; 2], usize> {
 fn a_jelly_has_the_closed_surface_of_its_block() {
     let jelly = Jelly { nodes: [3, 4, 2], size: [0.2, 0.3, 0.5], ..Jelly::default() }.mesh().unwrap();
     let (triangles, nodes) = (triangles(&jelly), jelly.nodes());
-    assert_eq!(triangles.len(), 2 * 2 * (2 * 3 + 3 * 1 + 1 * 2), "two for each cell of six faces");
+    assert_eq!(triangles.len(), 2 * 2 * (6 + 3 + 2), "two for each cell of six faces");
     let edges = edges(&triangles);
     assert!(edges.iter().all(|([a, b], n)| *n == 1 && edges.contains_key(&[*b, *a])), "closed, and turned one way");
     let volume: f64 = triangles.iter().map(|[a, b, c]| nodes[*a].dot(&nodes[*b].cross(&nodes[*c])) / 6.0).sum();
@@ -119,7 +119,7 @@ fn bad_messages_are_refused_and_change_nothing() {
     let (mut world, id) = burst(10, ParticleLook::default());
     let (good, before) = (message(&world, id), world.state().to_vec());
     let system = world.get::<ParticleSystem>(id).unwrap().clone();
-    let mut read = |data: &[u8]| {
+    let read = |data: &[u8]| {
         let mut x = before.clone();
         let outcome = system.read_data(data, &mut x);
         assert!(outcome.is_ok() || x == before, "unchanged on an error");

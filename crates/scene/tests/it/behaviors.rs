@@ -187,7 +187,7 @@ fn defaults_are_those_of_the_crate() {
     assert_eq!(specs.soft[0].grid, Grid::Cloth(Cloth::default()));
     assert_eq!(specs.soft[1].grid, Grid::Jelly(Jelly::default()));
     assert_eq!(specs.particle_systems[0].settings, ParticleSettings::default());
-    assert_eq!(specs.particle_systems[0].emitters[0].emitter, Emitter { end: 1.0 / 0.0, ..Emitter::default() });
+    assert_eq!(specs.particle_systems[0].emitters[0].emitter, Emitter::default());
     assert_eq!(specs.flocks[0].steering, Steering::default());
     let (world, _) = scene.build().unwrap();
     assert!(["c", "j", "p", "f", "f_boid"].iter().all(|name| world.find(name).is_some()));
