@@ -42,6 +42,10 @@ SCENES = {
     "marble_run": (0, 5.0),
     "steam_engine": (5, 1.0),
     "walker": (0, 5.5),
+    "flock": (1.5, 3.0),
+    "sparks": (0, 2.5),
+    "cloth": (0, 3.0),
+    "jelly": (0, 1.5),
 }
 
 

@@ -18,6 +18,7 @@
 //! ```
 
 mod boid;
+mod dart;
 mod error;
 mod fields;
 mod flock;
@@ -37,7 +38,7 @@ pub use fields::{
 pub use flock::Flock;
 pub use helm::{BodyFlock, Helm};
 pub use non_spinning::non_spinning;
-pub use particles::{Emitter, Particle, ParticleSettings, ParticleSystem};
+pub use particles::{Emitter, Particle, ParticleLook, ParticleSettings, ParticleSystem};
 pub use springs::{Cloth, Jelly, MeshSpring, SpringMesh};
 pub use steering::{Flyer, Search, Steering};
 

@@ -1,7 +1,8 @@
 //! Conversion of a world to the entities and poses of a recording.
 
 use crate::record::{
-    Contact, Entity, MAX_CONTACTS, MAX_EVENTS, MAX_NAME_BYTES, Pose, Readings, RecordedEvent, Shape, VisualPart,
+    Contact, Deforming, Entity, MAX_CONTACTS, MAX_EVENTS, MAX_NAME_BYTES, Point, Pose, Readings, RecordedEvent, Shape,
+    Surface, VisualPart,
 };
 use nalgebra::Translation3;
 use std::collections::BTreeMap;
@@ -12,8 +13,31 @@ use xxhash_rust::xxh3::xxh3_64;
 /// Side of the square that represents a half-space, m.
 const PLANE_M: f64 = 40.0;
 
+/// Returns the surfaces and particles of a world. Objects that are not enabled are left out.
+pub fn deforming(world: &World) -> Deforming {
+    let mut shown = Deforming::default();
+    for &id in world.ids().iter().filter(|id| world.status(**id).is_some_and(|status| status.enabled)) {
+        let Some(drawn) = world.object(id).and_then(|object| object.renderable()) else { continue };
+        if let (Some(surface), Some(range)) = (drawn.surface(), world.view().state_range(id)) {
+            let [r, g, b] = surface.appearance.color;
+            shown.surfaces.push(Surface {
+                name: shortened(world.name(id).unwrap_or_default().to_owned()),
+                vertices: world.part_states()[range.parts.clone()].iter().map(|part| part.position().into()).collect(),
+                triangles: surface.triangles.to_vec(),
+                color: [r, g, b, 1.0],
+            });
+        }
+        if let Some(cloud) = world.state_of(id).and_then(|x| drawn.cloud(x)) {
+            let [red, green, blue] = cloud.appearance.color.map(|share| (255.0 * share.clamp(0.0, 1.0)).round() as u8);
+            let color = [red, green, blue, 255];
+            shown.points.extend(cloud.spheres.map(|(center, _)| Point { position: center.cast().into(), color }));
+        }
+    }
+    shown
+}
+
 /// Returns every drawable part as one entity. It has the name of its object, followed by `/part` if
-/// the object has several parts. A name of more than [`MAX_NAME_BYTES`] is replaced by its
+/// the object has several parts. The nodes of a surface are no entities ([`deforming`] has the surface). A name of more than [`MAX_NAME_BYTES`] is replaced by its
 /// beginning and a hash of the whole.
 pub fn entities(world: &World) -> Vec<Entity> {
     sites(world).map(|(id, part)| entity(world, id, part)).collect()
@@ -111,7 +135,10 @@ fn shortened(name: String) -> String {
 }
 
 fn sites(world: &World) -> impl Iterator<Item = (ObjectId, usize)> + '_ {
-    let parts = |id: ObjectId| world.view().state_range(id).map_or(0, |span| span.parts.len());
+    let whole = |id: ObjectId| world.object(id).and_then(|o| o.renderable()).is_some_and(|r| r.surface().is_some());
+    let parts = move |id: ObjectId| {
+        if whole(id) { 0 } else { world.view().state_range(id).map_or(0, |span| span.parts.len()) }
+    };
     world.ids().iter().flat_map(move |&id| (0..parts(id)).map(move |part| (id, part)))
 }
 

@@ -6,6 +6,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
+use tumble::behaviors::BehaviorError;
 use tumble::collide::{MeshError, ShapeError};
 use tumble::dynamics::{
     ArchiveError, ArticulatedError, ArticulationError, BodyError, LoopJointError, ModelError, SensorError,
@@ -39,6 +40,8 @@ pub enum Error {
     Joint(#[from] LoopJointError),
     #[error(transparent)]
     Sensor(#[from] SensorError),
+    #[error(transparent)]
+    Behavior(#[from] BehaviorError),
     #[error(transparent)]
     Model(#[from] ModelError),
     #[error(transparent)]
@@ -117,6 +120,7 @@ impl Error {
     fn class(&self) -> &'static str {
         match self {
             Error::World(WorldError::Stale) | Error::Removed(_) => "RemovedError",
+            Error::Behavior(BehaviorError::NoFlock | BehaviorError::World(WorldError::Stale)) => "RemovedError",
             Error::Scene(SceneError::Unknown { .. }) => "MissingFileError",
             Error::Scene(SceneError::Read { source, .. }) => of_file(source),
             Error::Scene(SceneError::Mjcf(error)) => match error.as_ref() {

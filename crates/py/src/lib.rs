@@ -2,6 +2,7 @@
 
 mod arrays;
 mod batch;
+mod behaviors;
 mod choices;
 mod errors;
 mod extension;
@@ -23,6 +24,14 @@ mod _native {
     use super::batch::class::Batch;
     #[pymodule_export]
     use super::batch::pickling::_unpickle_batch;
+    #[pymodule_export]
+    use super::behaviors::field::{Field, Panel};
+    #[pymodule_export]
+    use super::behaviors::flock::{PyBoid, PyFlock};
+    #[pymodule_export]
+    use super::behaviors::particles::{Emitter, Particles};
+    #[pymodule_export]
+    use super::behaviors::soft::Soft;
     #[pymodule_export]
     use super::choices::_choices;
     #[pymodule_export]

@@ -41,6 +41,8 @@
 //!
 //! `[[articulated]]` is [`ArticulatedSpec`], a tree of links written out or read from a URDF
 //! ([`urdf`]), and `[[loop_joint]]` is [`LoopJointSpec`], which joins parts of any objects.
+//! `[[cloth]]` and `[[jelly]]` are [`SoftSpec`], `[[particle_system]]` is [`ParticleSystemSpec`], `[[flock]]` is
+//! [`FlockSpec`] and `[[field]]` is [`FieldSpec`].
 //! `[meshes.NAME]` is [`MeshSpec`]; `[[grid]]` repeats a body, see [`BodySpec`] for its keys;
 //! `[[light]]`, `[sky]` and `[ground]` are [`LightSpec`], [`SkySpec`] and [`GroundSpec`]; `[cave]`
 //! is [`CavePlace`], and caves have files of their own ([`cave`]). `scenes/README.md` has a table
@@ -77,6 +79,11 @@ pub use open::plain::{open_file, read_file};
 pub use open::shipped::{SceneSource, Shipped, resolve_scene, shipped};
 pub use parse::appearance::{AppearanceSpec, Color, Pattern};
 pub use parse::articulated::ArticulatedSpec;
+pub use parse::behavior::BehaviorSpecs;
+pub use parse::behavior::field::{FieldKind, FieldSpec, PanelSpec};
+pub use parse::behavior::flock::{BoidGroupSpec, FlockSpec};
+pub use parse::behavior::particles::{EmitterSpec, ParticleSystemSpec};
+pub use parse::behavior::soft::{Grid, SoftSpec};
 pub use parse::body::{BodySpec, MassSpec};
 pub use parse::file::{MAX_BYTES, SceneFile};
 pub use parse::joint::{JointSpec, MimicSpec};

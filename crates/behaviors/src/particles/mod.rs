@@ -15,12 +15,14 @@
 //! | serial | serial number of the particle |
 
 mod cells;
+mod drawn;
 mod emitter;
 mod flight;
 pub(crate) mod obstacles;
 mod path;
 mod random;
 
+pub use drawn::ParticleLook;
 pub use emitter::Emitter;
 
 use crate::error::{BehaviorError, check};
@@ -31,7 +33,8 @@ use path::Air;
 use random::Random;
 use tumble_collide::Vec3;
 use tumble_core::{
-    CollisionGroup, Frame, FrameImpulse, FrameState, Material, Object, ObjectId, StateRange, World, WorldError,
+    CollisionGroup, Frame, FrameImpulse, FrameState, Material, NetSync, Object, ObjectId, Renderable, StateRange,
+    World, WorldError,
 };
 
 /// Length of the header and of a record.
@@ -113,6 +116,7 @@ pub struct ParticleSystem {
     name: String,
     settings: ParticleSettings,
     emitters: Vec<Emitter>,
+    look: ParticleLook,
 }
 
 /// A particle that lives.
@@ -149,7 +153,7 @@ impl ParticleSystem {
         check("the restitution", s.material.restitution, (0.0..=1.0).contains(&s.material.restitution), "0 to 1")?;
         check("the gravity scale", s.gravity_scale, true, "finite")?;
         check_vector("the velocity of the air", &s.wind)?;
-        Ok(ParticleSystem { name: name.into(), settings, emitters: Vec::new() })
+        Ok(ParticleSystem { name: name.into(), settings, emitters: Vec::new(), look: ParticleLook::default() })
     }
 
     /// Adds a source.
@@ -245,6 +249,12 @@ impl Object for ParticleSystem {
         &self.name
     }
     fn frame_state(&self) -> Option<&dyn FrameState> {
+        Some(self)
+    }
+    fn renderable(&self) -> Option<&dyn Renderable> {
+        Some(self)
+    }
+    fn net_sync(&self) -> Option<&dyn NetSync> {
         Some(self)
     }
 }

@@ -111,7 +111,7 @@ fn grid(
             }
         }
     }
-    SpringMesh::new(places, vec![mass / count as f64; count], springs)
+    Ok(SpringMesh::new(places, vec![mass / count as f64; count], springs)?.drawn_as_grid(nodes))
 }
 
 /// Returns the ways to the other ends of springs, each pair once, and the kinds: 0 structure, 1 shear, 2 bending.

@@ -33,6 +33,7 @@ mod factor;
 mod implicit;
 mod make;
 mod object;
+mod surface;
 
 pub use make::{Cloth, Jelly};
 
@@ -41,7 +42,7 @@ use crate::fields::check_vector;
 use factor::Pattern;
 use std::sync::Arc;
 use tumble_collide::{Pose, Shape, Vec3};
-use tumble_core::{Material, ObjectId, World};
+use tumble_core::{Material, ObjectId, PartSurface, World};
 
 /// Most nodes of a mesh.
 const MOST: usize = 100_000;
@@ -88,6 +89,8 @@ pub struct SpringMesh {
     /// Time in a step at which the forces of springs act, ½ to 1.
     implicitness: f64,
     pattern: Arc<Pattern>,
+    /// Triangles that are drawn.
+    surface: Option<PartSurface>,
 }
 
 impl SpringMesh {
@@ -122,6 +125,7 @@ impl SpringMesh {
             step: 1.0 / 240.0,
             implicitness: 1.0,
             pattern,
+            surface: None,
         })
     }
     /// Sets the name.

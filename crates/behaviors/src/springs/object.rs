@@ -4,7 +4,7 @@ use super::SpringMesh;
 use super::factor::{Factor, Pattern};
 use tumble_collide::{Pose, Shape, Vec3};
 use tumble_core::{
-    Cache, Collidable, Energy, ForceSlice, Integratable, Material, Object, PartPoint, PartState, StateSizes,
+    Cache, Collidable, Energy, ForceSlice, Integratable, Material, Object, PartPoint, PartState, Renderable, StateSizes,
 };
 
 /// The factor of the last refreshed state, made when it is first asked for.
@@ -70,6 +70,9 @@ impl Object for SpringMesh {
         Some(self)
     }
     fn collidable(&self) -> Option<&dyn Collidable> {
+        Some(self)
+    }
+    fn renderable(&self) -> Option<&dyn Renderable> {
         Some(self)
     }
 }

@@ -2,6 +2,7 @@
 
 mod boids;
 mod buoyancy;
+mod drawn;
 mod emission;
 mod fields;
 mod flights;

@@ -4,7 +4,7 @@
 //! It is never checked for being closed. A mesh that cannot be read is not drawn, and
 //! [`VisualMesh::fault`] then returns the reason.
 
-use super::Appearance;
+use super::{Appearance, Cloud, PartSurface};
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 use tumble_collide::{MeshError, Pose, Shape, TriMesh, Vec3};
@@ -14,6 +14,15 @@ use tumble_collide::{MeshError, Pose, Shape, TriMesh, Vec3};
 pub trait Renderable {
     /// Returns its visuals.
     fn visuals(&self) -> &[Visual];
+    /// Returns a surface through its parts, if it has one.
+    fn surface(&self) -> Option<&PartSurface> {
+        None
+    }
+    /// Returns spheres that are read from the object's range `x` of a state, if it has them.
+    fn cloud<'a>(&'a self, x: &'a [f64]) -> Option<Cloud<'a>> {
+        let _ = x;
+        None
+    }
 }
 
 /// One visual, fixed to a part.

@@ -19,7 +19,7 @@ pub(crate) fn nanoseconds(time_s: f64) -> u64 {
 
 /// Converts a log time to Foxglove's time stamp. Below `MAX_TIME_S` the seconds fit 32 bits;
 /// beyond, they saturate.
-fn stamp(log_time: u64) -> Timestamp {
+pub(crate) fn stamp(log_time: u64) -> Timestamp {
     let seconds = u32::try_from(log_time / NANOS_PER_SECOND).unwrap_or(u32::MAX);
     Timestamp::new(seconds, (log_time % NANOS_PER_SECOND) as u32)
 }
@@ -34,7 +34,7 @@ pub(crate) fn scene_update(log_time: u64, entities: &[Entity], before: &[String]
     }
 }
 
-fn deletion(log_time: u64, name: &str) -> SceneEntityDeletion {
+pub(crate) fn deletion(log_time: u64, name: &str) -> SceneEntityDeletion {
     SceneEntityDeletion {
         timestamp: Some(stamp(log_time)),
         r#type: scene_entity_deletion::Type::MatchingId as i32,
@@ -93,7 +93,7 @@ fn tube(pose: &Pose, color: [f32; 4], radius: f64, length: f64) -> CylinderPrimi
     }
 }
 
-fn triangle_list(
+pub(crate) fn triangle_list(
     pose: Option<FoxPose>,
     color: Option<Color>,
     vertices: &[[f64; 3]],
@@ -127,7 +127,7 @@ fn fox_pose(pose: &Pose) -> FoxPose {
     FoxPose { position: Some(vector(pose.position)), orientation: Some(quaternion(pose.rotation)) }
 }
 
-fn fox_color(c: [f32; 4]) -> Color {
+pub(crate) fn fox_color(c: [f32; 4]) -> Color {
     Color { r: c[0].into(), g: c[1].into(), b: c[2].into(), a: c[3].into() }
 }
 

@@ -29,12 +29,14 @@
 //! | [`TOPIC_SCENE`] | `foxglove.SceneUpdate` | at the start and at every change of the list of entities; always the whole list |
 //! | [`TOPIC_TRANSFORMS`] | `foxglove.FrameTransforms` | every frame: [`ROOT_FRAME`] → each entity's frame, named as the entity |
 //! | [`TOPIC_STATE`] | `tumble.State` | every frame: frame number, exact time and the caller's state bytes and contacts |
+//! | [`TOPIC_SURFACES`] | `foxglove.SceneUpdate` | every frame of a world with cloth or jelly: its surfaces |
+//! | [`TOPIC_PARTICLES`] | `foxglove.PointCloud` | every frame of a world with particles: at most [`MAX_POINTS`] of them |
 //!
-//! All three are protobuf, with their schemas in the file. The metadata of the state channel also
+//! All are protobuf, with their schemas in the file. The metadata of the state channel also
 //! contains the text of `tumble.State`, under `proto`. A metadata record named `tumble` contains
 //! the version and the world's name.
 //!
-//! **Viewers.** Foxglove draws the entities and moves them. Rerun (0.41) reads all three topics and
+//! **Viewers.** Foxglove draws the entities and moves them. Rerun (0.41) reads the first three topics and
 //! moves the frames, but does not draw `foxglove.SceneUpdate`; it lists the message's fields.
 //!
 //! **Time.** Every time stamp is *simulated* time in nanoseconds from 0, rounded to the nearest. No
@@ -59,6 +61,7 @@ mod budget;
 mod bytes;
 mod chunk;
 mod container;
+mod deforming;
 mod error;
 #[cfg(feature = "live")]
 pub mod live;
@@ -71,12 +74,15 @@ mod schemas;
 mod writer;
 
 pub use container::Ending;
+pub use deforming::{Deforming, MAX_POINTS, Point, Surface};
 pub use error::RecordError;
 pub use reader::{Frame, Reader, is_recording, read};
 pub use recover::{RecoverReport, recover};
 pub use report::{MAX_EVENTS, Readings, RecordedEvent, TOPIC_EVENTS, TOPIC_SENSORS};
 pub use scene::{Contact, Entity, Pose, Shape, VisualPart, decode_contacts, encode_contacts};
-pub use schemas::{ROOT_FRAME, STATE_PROTO, TOPIC_SCENE, TOPIC_STATE, TOPIC_TRANSFORMS};
+pub use schemas::{
+    ROOT_FRAME, STATE_PROTO, TOPIC_PARTICLES, TOPIC_SCENE, TOPIC_STATE, TOPIC_SURFACES, TOPIC_TRANSFORMS,
+};
 pub use writer::{Compression, FlushEvery, Recorder, RecorderOptions, Summary};
 
 /// Maximum number of bytes in one record of a file (a stored chunk, a metadata record).

@@ -5,7 +5,7 @@ use super::chunk::{Channel, Inner, Schema, next_inner, parse_inner};
 use super::error::{RecordError, Result};
 use super::writer::append_options;
 use foxglove::Encode;
-use foxglove::messages::{FrameTransforms, SceneUpdate};
+use foxglove::messages::{FrameTransforms, PointCloud, SceneUpdate};
 use mcap::Writer;
 use mcap::write::NoSeek;
 use prost::Message;
@@ -21,12 +21,17 @@ pub const TOPIC_SCENE: &str = "/scene";
 pub const TOPIC_TRANSFORMS: &str = "/tf";
 /// Topic of the state.
 pub const TOPIC_STATE: &str = "/tumble/state";
+/// Topic of surfaces that change their shape.
+pub const TOPIC_SURFACES: &str = "/surfaces";
+/// Topic of particles.
+pub const TOPIC_PARTICLES: &str = "/particles";
 /// Name of the parent frame of all entities: meters, z up, right-handed.
 pub const ROOT_FRAME: &str = "world";
 
 pub(crate) const STATE_SCHEMA: &str = "tumble.State";
 pub(crate) const SCENE_SCHEMA: &str = "foxglove.SceneUpdate";
 pub(crate) const TRANSFORMS_SCHEMA: &str = "foxglove.FrameTransforms";
+const PARTICLES_SCHEMA: &str = "foxglove.PointCloud";
 pub(crate) const PROTOBUF: &str = "protobuf";
 /// Name of the metadata record that marks a recording of tumble.
 pub(crate) const METADATA_NAME: &str = "tumble";
@@ -102,19 +107,24 @@ pub(crate) struct Channels {
     pub scene: u16,
     pub transforms: u16,
     pub state: u16,
+    pub surfaces: u16,
+    pub particles: u16,
 }
 
-/// Writes the three schemas, then the three channels.
+/// Writes the schemas, then the channels.
 pub(crate) fn add_channels<W: Write + Seek>(writer: &mut Writer<W>, path: &Path) -> Result<Channels> {
     let mut all = || {
         let scene = writer.add_schema(SCENE_SCHEMA, PROTOBUF, &published::<SceneUpdate>())?;
         let transforms = writer.add_schema(TRANSFORMS_SCHEMA, PROTOBUF, &published::<FrameTransforms>())?;
         let state = writer.add_schema(STATE_SCHEMA, PROTOBUF, &state_descriptor())?;
+        let particles = writer.add_schema(PARTICLES_SCHEMA, PROTOBUF, &published::<PointCloud>())?;
         let (none, proto) = (BTreeMap::new(), BTreeMap::from([("proto".to_owned(), STATE_PROTO.to_owned())]));
         Ok(Channels {
             scene: writer.add_channel(scene, TOPIC_SCENE, PROTOBUF, &none)?,
             transforms: writer.add_channel(transforms, TOPIC_TRANSFORMS, PROTOBUF, &none)?,
             state: writer.add_channel(state, TOPIC_STATE, PROTOBUF, &proto)?,
+            surfaces: writer.add_channel(scene, TOPIC_SURFACES, PROTOBUF, &none)?,
+            particles: writer.add_channel(particles, TOPIC_PARTICLES, PROTOBUF, &none)?,
         })
     };
     all().map_err(RecordError::write(path))

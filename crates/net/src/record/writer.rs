@@ -1,6 +1,7 @@
 //! The recorder: writes frames to an MCAP file.
 
 use super::budget;
+use super::deforming::Deforming;
 use super::error::{RecordError, Result};
 use super::messages::{nanoseconds, scene_update, set_transforms, transforms_for};
 use super::report::{Readings, RecordedEvent, ReportChannels, encode_events, encode_readings};
@@ -120,6 +121,8 @@ pub struct Recorder {
     writer: AppendWriter,
     channels: Channels,
     names: Vec<String>,
+    /// Names of the surfaces of the last frame, and whether it had points.
+    shown: (Vec<String>, bool),
     transforms: FrameTransforms,
     /// Bytes of messages in the open chunk.
     pending_bytes: u64,
@@ -167,6 +170,7 @@ impl Recorder {
             writer,
             channels,
             names: Vec::new(),
+            shown: (Vec::new(), false),
             transforms: FrameTransforms::default(),
             pending_bytes: 0,
             pending_frames: 0,
@@ -239,6 +243,27 @@ impl Recorder {
         self.pending_frames += 1;
         self.last = Some((time_s, frame));
         if self.flush_is_due(time_s) { self.flush() } else { Ok(()) }
+    }
+
+    /// Records surfaces and points of a frame for viewers, before the [`frame`](Self::frame) itself.
+    ///
+    /// # Errors
+    /// [`RecordError`]: a value is out of range, in which case nothing is written, or writing fails.
+    pub fn deforming(&mut self, time_s: f64, shown: &Deforming) -> Result<()> {
+        self.check_time(time_s)?;
+        let log_time = nanoseconds(time_s);
+        let (surfaces, points) = (!shown.surfaces.is_empty(), !shown.points.is_empty());
+        if surfaces || !self.shown.0.is_empty() {
+            let message = shown.surfaces_message(log_time, &self.shown.0)?.encode_to_vec();
+            self.write(self.channels.surfaces, 0, log_time, &message)?;
+            self.shown.0 = shown.surfaces.iter().map(|surface| surface.name.clone()).collect();
+        }
+        if points || self.shown.1 {
+            let message = shown.points_message(log_time).encode_to_vec();
+            self.write(self.channels.particles, 0, log_time, &message)?;
+            self.shown.1 = points;
+        }
+        Ok(())
     }
 
     /// Writes all frames so far to the file; they survive if the run is killed.

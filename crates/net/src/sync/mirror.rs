@@ -135,9 +135,9 @@ impl Mirror {
             (false, Some(id)) => id,
             (false, None) => return Err(unfit("is not in this scene")),
             (true, old) => {
-                let visuals = get_visuals(looks, parts as usize, &self.base)?;
+                let (visuals, surface) = get_visuals(looks, parts as usize, &self.base)?;
                 let _ = old.map(|id| world.remove(id));
-                let render_proxy = RenderProxy { name: entry.name.to_owned(), parts: parts as usize, visuals };
+                let render_proxy = RenderProxy { name: entry.name.to_owned(), parts: parts as usize, visuals, surface };
                 world.add_boxed(Box::new(render_proxy), Mode::Static).map_err(|why| unfit(&why.to_string()))?
             }
         };

@@ -7,7 +7,7 @@ use super::quantize::{get_pose, put_pose};
 use super::table::{Entry, EntryKind, MAX_OBJECTS, put_record, put_snapshot_head, put_state_head};
 use super::transport::MAX_MESSAGE_BYTES;
 use super::viewer::{VIEWER_NAME, Viewer};
-use super::visuals::put_visuals;
+use super::visuals::{put_surface, put_visuals};
 use super::wire::{HEADER_BYTES, Hash};
 use crate::world::strongest;
 use std::collections::BTreeMap;
@@ -213,6 +213,7 @@ impl Publisher {
             }
             if described {
                 put_visuals(&mut body, object.renderable().map_or(&[], |r| r.visuals()), &self.base);
+                put_surface(&mut body, object.renderable().and_then(|r| r.surface()));
             }
             let entry = Entry {
                 name,

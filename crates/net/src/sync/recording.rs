@@ -19,9 +19,9 @@ use super::server::ServerEvent;
 use super::transport::{FacetNumber, MAX_MESSAGE_BYTES};
 use super::wire::{ByteReader, HEADER_BYTES, Hash, MessageError, MessageHeader, MessageKind, message, open};
 use crate::record::{
-    Contact, Ending, MAX_STATE_BYTES, Pose, Reader, RecordError, Recorder, RecorderOptions, Summary, read,
+    Contact, Deforming, Ending, MAX_STATE_BYTES, Pose, Reader, RecordError, Recorder, RecorderOptions, Summary, read,
 };
-use crate::world::{contacts, entities, names, poses};
+use crate::world::{contacts, deforming, entities, names, poses};
 use std::path::Path;
 use std::sync::Arc;
 use tumble_core::World;
@@ -47,6 +47,7 @@ struct WaitingFrame {
     time_s: f64,
     poses: Vec<Pose>,
     contacts: Vec<Contact>,
+    deforming: Deforming,
     /// Messages so far.
     messages: Vec<u8>,
 }
@@ -128,8 +129,8 @@ impl SessionRecorder {
         let done = FrameAck { hash: recorded.hash, ..FrameAck::default() };
         out.extend(message(&head(MessageKind::Ready), |out| done.write(out)));
         let (frame, time_s) = (recorded.frame, recorded.time_s);
-        let (poses, contacts) = (poses(world), contacts(world));
-        self.waiting = Some(WaitingFrame { frame, time_s, poses, contacts, messages: out });
+        let (poses, contacts, deforming) = (poses(world), contacts(world), deforming(world));
+        self.waiting = Some(WaitingFrame { frame, time_s, poses, contacts, deforming, messages: out });
         Ok(())
     }
 
@@ -170,7 +171,8 @@ impl SessionRecorder {
     fn write_waiting(&mut self) -> Result<(), RecordError> {
         let Some(mut waiting) = self.waiting.take() else { return Ok(()) };
         waiting.messages.append(&mut self.notes);
-        let WaitingFrame { frame, time_s, poses, contacts, messages } = waiting;
+        let WaitingFrame { frame, time_s, poses, contacts, deforming, messages } = waiting;
+        self.recorder.deforming(time_s, &deforming)?;
         self.recorder.frame(time_s, frame, &poses, &contacts, &messages)
     }
 }

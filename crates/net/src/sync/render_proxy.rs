@@ -2,7 +2,7 @@
 //! have.
 
 use tumble_collide::Shape;
-use tumble_core::{Collidable, Object, Renderable, Visual};
+use tumble_core::{Collidable, Object, PartSurface, Renderable, Visual};
 
 /// Parts with visuals, at the poses that were set for display.
 #[derive(Clone)]
@@ -10,6 +10,7 @@ pub(crate) struct RenderProxy {
     pub name: String,
     pub parts: usize,
     pub visuals: Vec<Visual>,
+    pub surface: Option<PartSurface>,
 }
 
 impl Object for RenderProxy {
@@ -39,5 +40,9 @@ impl Collidable for RenderProxy {
 impl Renderable for RenderProxy {
     fn visuals(&self) -> &[Visual] {
         &self.visuals
+    }
+
+    fn surface(&self) -> Option<&PartSurface> {
+        self.surface.as_ref()
     }
 }

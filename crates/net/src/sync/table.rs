@@ -4,7 +4,7 @@
 //! ```text
 //! SNAPSHOT  revision u32 | exact u8 | 0 u8 | 0 u16 | count u32 | count times: name, size u64, body
 //!           name: length u32, UTF-8
-//!           body: kind u8 | flags u8 | parts u16 | 20 bytes per part if it is stationary | visuals if it is described
+//!           body: kind u8 | flags u8 | parts u16 | 20 bytes per part if it is stationary | visuals and surface if it is described
 //! STATE     revision u32 | count u32 | count times: index u32, size u32, body | contacts
 //!           body: 20 bytes per part | the object's own message | the viewer; nothing if it is not enabled
 //! ```

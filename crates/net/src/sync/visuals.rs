@@ -8,7 +8,7 @@ use super::viewer::{exact_pose, put_exact_pose};
 use super::wire::{ByteReader, MessageError, put_f64, put_name};
 use std::sync::Arc;
 use tumble_collide::{Shape, TriMesh, Vec3};
-use tumble_core::{Appearance, Drawn, Visual, VisualGeometry, VisualMesh, World};
+use tumble_core::{Appearance, Drawn, PartSurface, Visual, VisualGeometry, VisualMesh, World};
 
 /// Maximum number of visuals of one object.
 pub const MAX_VISUALS: usize = 4096;
@@ -73,6 +73,33 @@ fn put_geometry(out: &mut Vec<u8>, drawn: Drawn<'_>, base: &World) {
     }
 }
 
+/// Appends a surface through parts: 1, its triangles, crease and appearance; 0 if there is none.
+pub(crate) fn put_surface(out: &mut Vec<u8>, surface: Option<&PartSurface>) {
+    out.push(surface.is_some() as u8);
+    let Some(surface) = surface else { return };
+    out.extend((surface.triangles.len() as u32).to_le_bytes());
+    out.extend(surface.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()));
+    put_f64(out, &[surface.crease]);
+    put_appearance(out, &surface.appearance);
+}
+
+fn get_surface(rest: &mut ByteReader<'_>, parts: usize) -> Result<Option<PartSurface>, MessageError> {
+    match rest.u8()? {
+        0 => return Ok(None),
+        1 => {}
+        _ => return Err(MessageError::Malformed("an unknown kind of surface")),
+    }
+    let count = rest.u32()? as u64;
+    let mut indices = ByteReader(rest.take(12 * count)?); // checked against what is there before anything is kept
+    let triangle = |_| Ok([indices.u32()?, indices.u32()?, indices.u32()?]);
+    let triangles: Vec<[u32; 3]> = (0..count).map(triangle).collect::<Result<_, MessageError>>()?;
+    if triangles.iter().flatten().any(|&i| i as usize >= parts) {
+        return Err(MessageError::Malformed("a surface through an unknown part"));
+    }
+    let crease = rest.f64()?;
+    Ok(Some(PartSurface { triangles: triangles.into(), crease, appearance: get_appearance(rest)? }))
+}
+
 /// Finds the same geometry in the scene of the file. Returns the object's name and the index of the
 /// visual.
 fn place_of(base: &World, same: impl Fn(&VisualGeometry) -> bool) -> Option<(&str, usize)> {
@@ -123,8 +150,12 @@ fn put_text(out: &mut Vec<u8>, text: &str) {
     out.extend(&text.as_bytes()[..end]);
 }
 
-/// Reads the visuals of an object with `parts` parts; `base` as in [`put_visuals`].
-pub(crate) fn get_visuals(bytes: &[u8], parts: usize, base: &World) -> Result<Vec<Visual>, MessageError> {
+/// Reads the visuals and the surface of an object with `parts` parts; `base` as in [`put_visuals`].
+pub(crate) fn get_visuals(
+    bytes: &[u8],
+    parts: usize,
+    base: &World,
+) -> Result<(Vec<Visual>, Option<PartSurface>), MessageError> {
     let mut rest = ByteReader(bytes);
     let count = rest.u32()? as usize;
     if count > MAX_VISUALS {
@@ -146,8 +177,9 @@ pub(crate) fn get_visuals(bytes: &[u8], parts: usize, base: &World) -> Result<Ve
             stands_in_for: Vec::new(),
         });
     }
+    let surface = get_surface(&mut rest, parts)?;
     rest.end()?;
-    Ok(visuals)
+    Ok((visuals, surface))
 }
 
 fn get_geometry(rest: &mut ByteReader<'_>, base: &World) -> Result<VisualGeometry, MessageError> {

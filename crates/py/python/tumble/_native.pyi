@@ -25,20 +25,27 @@ __all__ = [
     "ArticulationBuilder",
     "Batch",
     "Bodies",
+    "Boid",
     "Box",
     "Capsule",
     "Compound",
     "ConvexHull",
     "Cylinder",
+    "Emitter",
+    "Field",
+    "Flock",
     "HalfSpace",
     "HeightField",
     "Joint",
     "Mesh",
+    "Panel",
+    "ParticleSystem",
     "Recorder",
     "RigidBody",
     "Shape",
     "Sphere",
     "SphereTree",
+    "SpringMesh",
     "StepReport",
     "Terrain",
     "View",
@@ -442,6 +449,217 @@ class Sensors:
         """The handle of a sensor, for its kind and its seed."""
     def record(self) -> np.void:
         """All readings as one value of a structured dtype, with a field of each sensor's name: ``record["imu"]``."""
+
+@final
+class SpringMesh:
+    """A cloth or a jelly of a world: point masses, the nodes, joined by springs. Node ``i + nx·(j + ny·k)`` is
+    number ``i`` along x, ``j`` along y and ``k`` along z.
+
+    A handle without data of its own, made by ``World.add_cloth`` and ``World.add_jelly``.
+    """
+    @property
+    def name(self) -> str:
+        """Name, unique in its world."""
+    @property
+    def exists(self) -> bool:
+        """Whether its world still has it."""
+    @property
+    def positions(self) -> _Floats:
+        """Positions of the nodes, shape (n, 3), m."""
+    @property
+    def velocities(self) -> _Floats:
+        """Velocities of the nodes, shape (n, 3), m/s."""
+    @property
+    def masses(self) -> _Floats:
+        """Masses of the nodes, shape (n,), kg."""
+    @property
+    def pinned(self) -> NDArray[np.bool_]:
+        """Which nodes are pinned, shape (n,)."""
+    @property
+    def triangles(self) -> NDArray[np.uint32]:
+        """Triangles of its surface, shape (m, 3): numbers of nodes."""
+
+@final
+class Emitter:
+    """A source of particles: a burst at its start, and a stream from then on.
+
+    position: shape (3,), m. orientation: unit quaternion (x, y, z, w) that turns z to the axis of its cone. body: the
+    handle or name of the body that carries it, whose frame position and orientation are in; None for the world. part:
+    of that body. radius: of a sphere around the position in which particles begin, m. speed, m/s, and lifetime, s: one
+    number, or the least and the greatest. half_angle: half the angle of the cone, rad, π for all directions. burst:
+    particles at the start. rate: particles per second. start, end: of the stream, s; end None for never.
+    """
+    def __new__(
+        cls,
+        position: ArrayLike | None = None,
+        *,
+        orientation: ArrayLike | None = None,
+        body: _Body | None = None,
+        part: int = 0,
+        radius: float = 0.0,
+        speed: float | ArrayLike | None = None,
+        half_angle: float = 3.141592653589793,
+        lifetime: float | ArrayLike | None = None,
+        burst: int = 0,
+        rate: float = 0.0,
+        start: float = 0.0,
+        end: float | None = None,
+    ) -> Emitter: ...
+
+@final
+class ParticleSystem:
+    """A system of particles of a world: points that fly, collide with bodies one way or two ways, and end.
+
+    A handle without data of its own, made by ``World.add_particles``. The arrays have one row for each particle that
+    lives, in the order of their places.
+    """
+    @property
+    def name(self) -> str:
+        """Name, unique in its world."""
+    @property
+    def exists(self) -> bool:
+        """Whether its world still has it."""
+    @property
+    def capacity(self) -> int:
+        """Most particles that live at once."""
+    @property
+    def positions(self) -> _Floats:
+        """Positions, shape (n, 3), m."""
+    @property
+    def velocities(self) -> _Floats:
+        """Velocities, shape (n, 3), m/s."""
+    @property
+    def lives(self) -> _Floats:
+        """Times that are left, shape (n,), s."""
+    @property
+    def serials(self) -> NDArray[np.uint64]:
+        """Numbers in the order of birth, shape (n,)."""
+    def spawn(self, position: ArrayLike, velocity: ArrayLike | None = None, life: float = 1.0) -> int | None:
+        """Adds a particle between two steps. position: m, velocity: m/s, shape (3,); life: s, above 0. Returns its number;
+        None if all places are taken.
+        """
+    def __len__(self) -> int: ...
+
+@final
+class Flock:
+    """A flock of a world: boids that keep together, and the forces on them.
+
+    A handle without data of its own, made by ``World.add_flock``.
+    """
+    @property
+    def name(self) -> str:
+        """Name, unique in its world."""
+    @property
+    def exists(self) -> bool:
+        """Whether its world still has it."""
+    @property
+    def boids(self) -> list[Boid]:
+        """Its boids, in the order in which they were added: a list of ``Boid``."""
+    @property
+    def steering(self) -> dict[str, Any]:
+        """The constants of its forces by name, as in ``World.add_flock``. Setting it changes those that are given, from the
+        next step on.
+        """
+    @steering.setter
+    def steering(self, value: dict[str, Any]) -> None: ...
+    def add(
+        self,
+        name: str = "",
+        position: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        *,
+        mass: float = 1.0,
+        radius: float = 0.2,
+        bank_time: float = 1.0,
+        roll_time: float = 0.2,
+        color: ArrayLike | None = None,
+    ) -> Boid:
+        """Adds a boid, also in flight, and returns its handle. name: unique; by default the world makes one. position: m,
+        velocity: m/s, shape (3,). mass: kg. radius: of the sphere with which it collides, m. bank_time: seconds of its
+        rate of turn that are a quarter turn of bank; roll_time: time constant of the roll, s. color: sRGB, each 0 to 1.
+        """
+    def remove(self, boid: Boid | str) -> None:
+        """Removes a boid, given as a handle or by name, from the flock and from the world."""
+    def __len__(self) -> int: ...
+
+@final
+class Boid:
+    """A boid of a flock: a point mass whose nose points along its velocity, and that banks into turns.
+
+    A handle without data of its own, made by ``Flock.add``. After the boid was removed every use raises
+    ``RemovedError``.
+    """
+    @property
+    def name(self) -> str:
+        """Name, unique in its world."""
+    @property
+    def exists(self) -> bool:
+        """Whether its world still has it."""
+    @property
+    def mass(self) -> float:
+        """Mass, kg."""
+    @property
+    def position(self) -> _Floats:
+        """Position, shape (3,), m."""
+    @property
+    def orientation(self) -> _Floats:
+        """Unit quaternion (x, y, z, w): x forward, y to the left, z up."""
+    @property
+    def velocity(self) -> _Floats:
+        """Velocity, shape (3,), m/s."""
+    @property
+    def bank(self) -> float:
+        """Bank about the nose, rad; negative in turns to the left."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class Panel:
+    """A flat surface on a body with lift and drag, for ``Field.panels``.
+
+    body: handle or name; part: of an articulation, the index of a link. point: its middle, and normal, of any length:
+    shape (3,), in the frame of the part, m. area: m². lift_slope: of the lift over the angle of attack, 1/rad, 2π of a
+    thin airfoil. drag: coefficient along the panel.
+    """
+    def __new__(
+        cls,
+        body: _Body,
+        area: float,
+        *,
+        part: int = 0,
+        point: ArrayLike | None = None,
+        normal: ArrayLike | None = None,
+        lift_slope: float = 6.283185307179586,
+        drag: float = 0.02,
+    ) -> Panel: ...
+
+@final
+class Field:
+    """A law of force on bodies, given to ``World.add_field``; made by one of its static methods."""
+    @staticmethod
+    def wind(velocity: ArrayLike, *, drag: float | None = None, density: float = 1.2, drag_coefficient: float = 0.47) -> Field:
+        """Moving air. velocity: shape (3,), m/s. drag: force per speed, N·s/m, the same for every body; None for a force in
+        proportion to the square of the speed and to the silhouette, with the density of the air, kg/m³, and a
+        drag coefficient.
+        """
+    @staticmethod
+    def attractor(position: ArrayLike, strength: float, *, softening: float = 0.0) -> Field:
+        """A point that attracts masses as a planet does. position: shape (3,), m. strength: m³/s², negative to repel.
+        softening: length, m, below which the force does not grow.
+        """
+    @staticmethod
+    def explosion(position: ArrayLike, impulse: float, *, start: float = 0.0, decay: float = 0.02) -> Field:
+        """An explosion. position: shape (3,), m. impulse: momentum in all directions together, N·s; a body gets the
+        share that its silhouette covers. start: s. decay: time constant, s.
+        """
+    @staticmethod
+    def buoyancy(surface: ArrayLike | None = None, density: float = 1000.0, *, drag: float = 0.0, current: ArrayLike | None = None) -> Field:
+        """A fluid below a horizontal surface. surface: a point of it, shape (3,), m. density: kg/m³. drag: per mass of
+        displaced fluid, 1/s. current: velocity of the fluid, shape (3,), m/s.
+        """
+    @staticmethod
+    def panels(panels: Sequence[Panel], *, density: float = 1.2, wind: ArrayLike | None = None) -> Field:
+        """Lift and drag on panels: wings, sails, fins. density: of the air, kg/m³. wind: its velocity, shape (3,), m/s."""
 
 @final
 class Joint:
@@ -1658,6 +1876,7 @@ class World:
         center_of_mass: ArrayLike | None = None,
         gravity_scale: float = 1.0,
         locked: Sequence[LockedAxis] | None = None,
+        non_spinning: bool = False,
     ) -> RigidBody:
         """Adds a body that moves.
 
@@ -1672,7 +1891,8 @@ class World:
         sequence, None for all; two bodies collide if the group of each is in the mask of the other.
         sensor: no contacts; ``events`` reports the bodies that overlap it. inertia: about the center of
         mass, shape (3, 3) or (3,), kg·m², by default that of a uniform body; center_of_mass: in the
-        frame of the shape, shape (3,), m; gravity_scale, locked: as the properties of a body.
+        frame of the shape, shape (3,), m; gravity_scale, locked: as the properties of a body. non_spinning: locks all
+        rotations, so that forces and impulses act on the center of mass alone.
         """
     def add_static(
         self,
@@ -1793,9 +2013,111 @@ class World:
     @property
     def sensors(self) -> Sensors:
         """The readings of all measuring sensors by name, after the last step."""
-    def remove(self, body: RigidBody | Articulation | Joint | Sensor | str) -> None:
-        """Removes a body, a joint or a sensor, given as a handle or by name, or a force or behavior by name. Handles
+    def remove(self, body: RigidBody | Articulation | Joint | Sensor | SpringMesh | ParticleSystem | Flock | Boid | str) -> None:
+        """Removes an object, given as a handle or by name, or a force, a field or a behavior by name. Handles
         of a removed object raise ``RemovedError``. Joints of a removed body stay, without effect.
+        """
+    def add_cloth(
+        self,
+        name: str = "",
+        *,
+        nodes: Sequence[int] | None = None,
+        size: ArrayLike | None = None,
+        mass: float = 0.2,
+        stiffness: ArrayLike | None = None,
+        damping: float = 0.01,
+        position: ArrayLike | None = None,
+        orientation: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        node_radius: float | None = None,
+        pins: Iterable[str | int] | None = None,
+        implicitness: float = 1.0,
+        friction: float = 0.5,
+        restitution: float = 0.0,
+        color: ArrayLike | None = None,
+    ) -> SpringMesh:
+        """Adds a rectangular cloth in the xy-plane of its frame: point masses, the nodes, joined by springs. Returns its
+        handle.
+
+        nodes: along x and y, at least 2 each. size: along x and y, m. mass: of the whole, kg. stiffness: of the springs
+        of structure, of shear and of bending, N/m. damping: of each spring over its stiffness, s. position: of the
+        middle, m; orientation: unit quaternion (x, y, z, w). velocity: m/s. node_radius: with which the nodes collide,
+        m, None for no collisions. pins: nodes that never move: names of sides (``"x_min"``, ``"x_max"``, ``"y_min"``,
+        ``"y_max"``), ``"corners"``, and numbers. implicitness: time in a step at which the springs act, 0.5 to 1; 1
+        damps what a step does not resolve. friction, restitution: of the nodes. color: sRGB, each 0 to 1.
+        """
+    def add_jelly(
+        self,
+        name: str = "",
+        *,
+        nodes: Sequence[int] | None = None,
+        size: ArrayLike | None = None,
+        mass: float = 2.0,
+        stiffness: ArrayLike | None = None,
+        damping: float = 0.01,
+        position: ArrayLike | None = None,
+        orientation: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        node_radius: float | None = None,
+        pins: Iterable[str | int] | None = None,
+        implicitness: float = 1.0,
+        friction: float = 0.5,
+        restitution: float = 0.0,
+        color: ArrayLike | None = None,
+    ) -> SpringMesh:
+        """Adds a block of jelly: point masses, the nodes, joined by springs. Returns its handle.
+
+        nodes, size: along x, y and z. pins: names of sides, ``"x_min"`` to ``"z_max"``, ``"corners"``, and numbers of
+        nodes. The other arguments are those of ``add_cloth``.
+        """
+    def add_particles(
+        self,
+        name: str = "",
+        emitters: Sequence[Emitter] = (),
+        *,
+        capacity: int = 10000,
+        seed: int = 0,
+        mass: float = 0.001,
+        radius: float = 0.01,
+        friction: float = 0.5,
+        restitution: float = 0.0,
+        gravity_scale: float = 1.0,
+        linear_drag: float = 0.0,
+        quadratic_drag: float = 0.0,
+        wind: ArrayLike | None = None,
+        collides: bool = True,
+        group: int = 0,
+        mask: int | Sequence[int] | None = None,
+        two_way: bool = False,
+        color: ArrayLike | None = None,
+        drawn_radius: float | None = None,
+        fade: float = 0.0,
+    ) -> ParticleSystem:
+        """Adds a system of particles: sparks, smoke, drops. Returns its handle.
+
+        emitters: its sources, a list of ``Emitter``. capacity: most particles that live at once. seed: of its random
+        numbers. mass, kg, and radius, m, of a particle. friction, restitution: at bodies. gravity_scale: factor of
+        gravity, negative for smoke. linear_drag: 1/s, quadratic_drag: 1/m, both per mass. wind: velocity of the air,
+        shape (3,), m/s. collides: with bodies. group, mask: as in ``add_rigid``. two_way: whether bodies get the
+        momentum that particles lose. color: sRGB, each 0 to 1. drawn_radius: in pictures, m, by default the radius.
+        fade: seconds before its end in which a particle shrinks.
+        """
+    def add_flock(self, name: str = "", **steering: Any) -> Flock:
+        """Adds a flock without boids and returns its handle; ``Flock.add`` adds boids.
+
+        Keywords are the constants of its forces: ``avoidance`` (m²/s²), ``matching`` (1/s), ``clustering`` (1/s²),
+        ``max_force`` of these three together (N); ``visibility_distance``, ``inner_visibility_distance`` (m),
+        ``visibility_angle``, ``inner_visibility_angle`` (rad): within the inner ones a neighbor is seen fully;
+        ``desired_speed`` (m/s), ``speed_rate`` (1/s); ``boundary_center`` (m), ``boundary_radius`` (m),
+        ``boundary_stiffness`` (N/m) of a soft sphere around the flock.
+        """
+    def add_field(
+        self, name: str, field: Field, *, targets: Sequence[_Body | SpringMesh | Boid] | None = None
+    ) -> None:
+        """Adds a force field under a unique name; ``remove`` takes the name.
+
+        targets: the bodies, cloths, jellies and boids that it acts on, as handles or names; None for all that move,
+        also those that are added later.
         """
     def add_force(self, name: str, force: Force) -> None:
         """Adds a custom force: an object of a subclass of ``tumble.Force``. Its name must be unique

@@ -16,7 +16,9 @@ use tumble::dynamics::ObjectId;
 use tumble::net::record::{
     Contact, Ending, Pose, RecordedEvent, Recorder as Writer, RecorderOptions, decode_contacts, encode_contacts, read,
 };
-use tumble::net::world::{self as net_world, contacts, entities, events, names as entity_names, poses, readings};
+use tumble::net::world::{
+    self as net_world, contacts, deforming, entities, events, names as entity_names, poses, readings,
+};
 
 /// Largest count of numbers, and of bytes of states, of a recording that is read at once.
 const MAX_NUMBERS: usize = 1 << 29;
@@ -61,6 +63,7 @@ impl Open {
             (self.world, self.objects) = (world.clone(), core.ids().to_vec());
         }
         self.writer.report(&readings(core), &events(core))?;
+        self.writer.deforming(core.time(), &deforming(core))?;
         Ok(self.writer.frame(core.time(), core.frame(), &poses(core), &contacts(core), &core.save())?)
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::arrays::convert::{Numbers, numbers, path, pose, vec3, vec3_or, vector, whole_number};
 use crate::batch::crew;
+use crate::behaviors;
 use crate::choices::meaning;
 use crate::errors::{Error, Result};
 use crate::extension::callbacks::{Extensions, Reduced};
@@ -381,8 +382,12 @@ impl World {
         Joint::new(py, joints::place_by_name(&self.shared, name)?)
     }
 
-    /// ``world[name]``: the body of that name, a ``RigidBody`` or an ``Articulation``.
+    /// ``world[name]``: the body of that name, a ``RigidBody``, an ``Articulation``, a ``SpringMesh`` or a ``Boid``, the
+    /// ``ParticleSystem`` or the ``Flock``; of a field its name.
     fn __getitem__(&self, py: Python<'_>, name: &str) -> Result<Py<PyAny>> {
+        if let Some(handle) = behaviors::handle(py, &self.shared, name)? {
+            return Ok(handle);
+        }
         handle(py, &self.shared, self.shared.read(|inner| by_name(inner, name))?)
     }
 
@@ -757,9 +762,10 @@ impl World {
     /// sequence, None for all; two bodies collide if the group of each is in the mask of the other.
     /// sensor: no contacts; ``events`` reports the bodies that overlap it. inertia: about the center of
     /// mass, shape (3, 3) or (3,), kg·m², by default that of a uniform body; center_of_mass: in the
-    /// frame of the shape, shape (3,), m; gravity_scale, locked: as the properties of a body.
+    /// frame of the shape, shape (3,), m; gravity_scale, locked: as the properties of a body. non_spinning: locks all
+    /// rotations, so that forces and impulses act on the center of mass alone.
     #[pyo3(signature = (name=None, shape=None, mass=None, density=None, position=None, orientation=None, velocity=None, angular_velocity=None, restitution=0.0,
-        friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface", group=0, mask=None, sensor=false, inertia=None, center_of_mass=None, gravity_scale=1.0, locked=None))]
+        friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface", group=0, mask=None, sensor=false, inertia=None, center_of_mass=None, gravity_scale=1.0, locked=None, non_spinning=false))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_rigid(
         &self,
@@ -786,6 +792,7 @@ impl World {
         center_of_mass: Option<&Bound<'_, PyAny>>,
         gravity_scale: f64,
         locked: Option<Vec<String>>,
+        non_spinning: bool,
     ) -> Result<RigidBody> {
         let (name, shape) = named_shape(name, shape)?;
         let mode = if kinematic { Mode::Kinematic } else { Mode::Dynamic };
@@ -803,6 +810,9 @@ impl World {
             .with_sensor(sensor)
             .with_gravity_scale(gravity_scale)
             .with_locked(body::locked(&locked.unwrap_or_default())?);
+        if non_spinning {
+            body = tumble::behaviors::non_spinning(body);
+        }
         if let Some(inertia) = inertia {
             if body.is_fixed() {
                 return Err(Error::value("inertia: expected a mass or a density with it"));
@@ -989,7 +999,7 @@ impl World {
         Sensors::new(py, &self.shared)
     }
 
-    /// Removes a body, a joint or a sensor, given as a handle or by name, or a force or behavior by name. Handles
+    /// Removes an object, given as a handle or by name, or a force, a field or a behavior by name. Handles
     /// of a removed object raise ``RemovedError``. Joints of a removed body stay, without effect.
     fn remove(&self, py: Python<'_>, body: &Bound<'_, PyAny>) -> Result<()> {
         if let Ok(name) = body.extract::<String>()
@@ -1000,7 +1010,10 @@ impl World {
         let found = joints::place_of(&self.shared, body)?;
         let place = match found.map_or_else(|| sensors::place_of(&self.shared, body), |place| Ok(Some(place)))? {
             Some(place) => place,
-            None => own_place(&self.shared, body)?,
+            None => match behaviors::own_place(&self.shared, body)? {
+                Some(place) => place,
+                None => own_place(&self.shared, body)?,
+            },
         };
         place.write(py, |inner| {
             inner.world.remove(place.id)?;

@@ -1,5 +1,6 @@
 //! From a world and its scene to a draw list. The world is only read.
 
+mod deforming;
 mod detail;
 mod overlay;
 mod surface;
@@ -131,6 +132,14 @@ impl Drawing {
             for visual in object.renderable().map_or(&[][..], |r| r.visuals()) {
                 let Some(part_state) = world.part_state(id, visual.part) else { continue };
                 self.place(&mut list, &mut placed, name, visual, &(part_state.pose * visual.pose), tint)?;
+            }
+            let Some(drawn) = object.renderable() else { continue };
+            if let (Some(surface), Some(range)) = (drawn.surface(), world.view().state_range(id)) {
+                let parts = &world.part_states()[range.parts.clone()];
+                self.place_surface(&mut list, name, surface, parts, tint)?;
+            }
+            if let Some(cloud) = world.state_of(id).and_then(|x| drawn.cloud(x)) {
+                deforming::place_cloud(&mut list, name, cloud, tint);
             }
         }
         self.spheres = list.spheres.len();

@@ -68,6 +68,16 @@ pub enum BuildError {
         /// From the sensor; names it.
         why: String,
     },
+    /// A soft body, a particle system, a flock or a field is invalid.
+    #[error("{scene}: \"{name}\": {why}")]
+    Behavior {
+        /// The scene.
+        scene: String,
+        /// Its name.
+        name: String,
+        /// From the behavior; names the constant.
+        why: String,
+    },
     /// The world refused a setting.
     #[error("{scene}: {source}")]
     World {

@@ -2,6 +2,7 @@
 
 pub(crate) mod appearance;
 pub(crate) mod articulated;
+pub(crate) mod behaviors;
 pub(crate) mod collada;
 pub(crate) mod error;
 pub(crate) mod heights;

@@ -69,6 +69,7 @@ impl SceneFile {
         for spec in &self.pairs {
             self.add_pair(spec, &mut built).map_err(world)?;
         }
+        self.add_behaviors(&mut built)?;
         Ok((built, notes))
     }
 
@@ -124,7 +125,7 @@ impl SceneFile {
     }
 
     /// Returns the object and part number of a part in the world.
-    fn part(&self, world: &World, part: &PartSpec) -> Option<(ObjectId, usize)> {
+    pub(crate) fn part(&self, world: &World, part: &PartSpec) -> Option<(ObjectId, usize)> {
         match *part {
             PartSpec::Body(body) => Some((world.find(&self.bodies[body].name)?, 0)),
             PartSpec::Link(spec, link) => {

@@ -51,6 +51,10 @@ const SHIPPED: &[Shipped] = shipped_scenes![
     "marble_run",
     "steam_engine",
     "walker",
+    "cloth",
+    "jelly",
+    "sparks",
+    "flock",
 ];
 
 /// Returns the scenes that come with tumble.

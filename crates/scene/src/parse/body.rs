@@ -19,7 +19,7 @@ use crate::parse::world::CONTACTS;
 const MODES: Names<Mode> = &[("dynamic", Mode::Dynamic), ("static", Mode::Static), ("kinematic", Mode::Kinematic)];
 
 /// Numbers of collision groups.
-const GROUPS: std::ops::RangeInclusive<u32> = 0..=63;
+pub(crate) const GROUPS: std::ops::RangeInclusive<u32> = 0..=63;
 
 /// The mass of a body or shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,7 +124,7 @@ impl BodySpec {
             center_m: f.optional_vector("center_m", Bound::ANY),
             inertia_kg_m2: read_inertia(f),
             gravity_scale: f.number_or("gravity_scale", Bound::ANY, 1.0),
-            locked: read_locked(f),
+            locked: read_all_locked(f),
             linear_damping_per_s: f.number_or("linear_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
             angular_damping_per_s: f.number_or("angular_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
             collides: f.flag_or("collides", true),
@@ -162,7 +162,7 @@ pub(crate) fn read_name(f: &mut Fields<'_>) -> Option<String> {
 }
 
 /// Reads the groups of a mask as one bit each; all without the key.
-fn read_mask(f: &mut Fields<'_>) -> u64 {
+pub(crate) fn read_mask(f: &mut Fields<'_>) -> u64 {
     let Some(value) = f.value("mask") else { return u64::MAX };
     let Some(groups) = value.get_ref().as_array() else {
         f.wrong("mask", value, "a list of collision groups, such as [0, 3]");
@@ -183,6 +183,12 @@ fn read_locked(f: &mut Fields<'_>) -> LockedAxes {
         None => f.wrong("locked", value, expected),
     }
     LockedAxes::default()
+}
+
+/// Reads the locked axes: those of `locked`, and all rotations of a body that is `non_spinning`.
+fn read_all_locked(f: &mut Fields<'_>) -> LockedAxes {
+    let locked = read_locked(f);
+    if f.flag_or("non_spinning", false) { LockedAxes { rotation: [true; 3], ..locked } } else { locked }
 }
 
 /// Reads the mode. A wrong value counts as kinematic, the mode that requires no other key.

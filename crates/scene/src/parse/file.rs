@@ -9,6 +9,7 @@ use toml::de::{DeTable, DeValue};
 use crate::error::SceneError;
 use crate::mjcf::ActuatorSpec;
 use crate::parse::articulated::ArticulatedSpec;
+use crate::parse::behavior::BehaviorSpecs;
 use crate::parse::body::{BodySpec, Library};
 use crate::parse::fields::Fields;
 use crate::parse::grid::{self, MAX_BODIES};
@@ -66,6 +67,8 @@ pub struct SceneFile {
     pub actuators: Vec<ActuatorSpec>,
     /// `[[pair]]` in the order of the file.
     pub pairs: Vec<PairSpec>,
+    /// Soft bodies, particles, flocks and fields.
+    pub behaviors: BehaviorSpecs,
     /// `[camera]`; `None` leaves the view to the renderer.
     pub camera: Option<CameraSpec>,
     /// `[cave]`; `None` derives the pose of a cave from the camera.
@@ -122,6 +125,9 @@ impl SceneFile {
         let loop_joints = read_loop_joints(&mut f, &objects, &mut names);
         let sensors = read_sensors(&mut f, &objects, &loop_joints, &mut names);
         let pairs = read_pairs(&mut f, &library, &objects);
+        let behaviors = BehaviorSpecs::read(&mut f, &library, &objects, |table, name| {
+            note_unique(table.log, "object", &mut names, name, &table.span);
+        });
         let camera = read_table(&mut f, "camera", CameraSpec::read);
         let cave = read_table(&mut f, "cave", CavePlace::read);
         let mut lights: Vec<LightSpec> =
@@ -144,6 +150,7 @@ impl SceneFile {
             sensors,
             actuators: Vec::new(),
             pairs,
+            behaviors,
             camera,
             cave,
             lights,

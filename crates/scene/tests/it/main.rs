@@ -3,6 +3,7 @@
 mod articulated;
 mod articulated_world;
 mod bad_input;
+mod behaviors;
 mod cave_devices;
 mod caves;
 mod contacts;

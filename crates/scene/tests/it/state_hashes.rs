@@ -55,6 +55,8 @@ table! {
     chain_time_stepping: "chain", TimeStepping, "22fbcd4bcbb18743", "7e68bdb4b444ccf6";
     chain_backtracking: "chain", Backtracking, "63d0cbaca36ef0a9", "3198250057940e22";
     falling_time_stepping: "falling", TimeStepping, "c360ce783144cf4b", "2536cc6ee6f266bc";
+    flock_time_stepping: "flock", TimeStepping, "f6d6cd2c936b534a", "91cf95719438324b";
+    flock_backtracking: "flock", Backtracking, "cb91b06026531961", "15eb1ab38440d07f";
     falling_backtracking: "falling", Backtracking, "cbb914d607445f21", "253502563aa8576c";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "dba991e4803cfe34", "95407557393acae5";
@@ -74,6 +76,8 @@ table! {
 table! {
     [0.5, 2.0];
     card_house_time_stepping: "card_house", TimeStepping, "091b9380060ee20c", "8003317c097996db";
+    sparks_time_stepping: "sparks", TimeStepping, "515a77d2df6b5217", "9badcde17809dddb";
+    sparks_backtracking: "sparks", Backtracking, "805c8cba100469d4", "6052e84af86ee0f9";
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
     marble_run_time_stepping: "marble_run", TimeStepping, "54c3e3322b6781af", "27e58360ffb0f6a7";
     marble_run_backtracking: "marble_run", Backtracking, "67834b3a7fb5547d", "59907c8a56f4eda7";
@@ -89,6 +93,9 @@ table! {
 
 table! {
     [0.1, 0.3];
+    cloth_time_stepping: "cloth", TimeStepping, "8f0123d54572e57a", "be138723987bf8f8";
+    cloth_backtracking: "cloth", Backtracking, "4d27c99388f5fd44", "e15311030cdc3060";
+    jelly_time_stepping: "jelly", TimeStepping, "672df96a105718eb", "e1b7eae6919a2c5d";
     arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "15c2a2986571f20d";
     dominoes_backtracking: "dominoes", Backtracking, "9c7b110aee952a4c", "4c3f82114ea67b3e";
     walker_backtracking: "walker", Backtracking, "ca535adb9b9b96d3", "093bfa105a94cd32";

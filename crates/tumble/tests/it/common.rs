@@ -5,21 +5,25 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// The shipped scenes.
-pub const SCENES: [&str; 18] = [
+pub const SCENES: [&str; 22] = [
     "arch",
     "billiards",
     "bowling",
     "card_house",
     "chain",
+    "cloth",
     "dominoes",
     "falling",
+    "flock",
     "incline",
+    "jelly",
     "marble_run",
     "newtons_cradle",
     "pendulum",
     "piston",
     "robot",
     "skeleton",
+    "sparks",
     "stack",
     "steam_engine",
     "walker",

@@ -20,6 +20,7 @@ mod cave_windows;
 mod caves;
 mod command_line;
 mod common;
+mod deforming;
 mod desktop;
 mod determinism;
 mod machines;
