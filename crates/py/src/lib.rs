@@ -44,7 +44,7 @@ mod _native {
     #[pymodule_export]
     use super::objects::joint::Joint;
     #[pymodule_export]
-    use super::objects::shapes::{Block, Capsule, Compound, Cylinder, HalfSpace, Mesh, Shape, Sphere};
+    use super::objects::shapes::{Block, Capsule, Compound, Cone, Cylinder, Ellipsoid, HalfSpace, Mesh, Shape, Sphere};
     #[pymodule_export]
     use super::objects::spheretree::{_unpickle_tree, SphereTree};
     #[pymodule_export]

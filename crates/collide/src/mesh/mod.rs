@@ -31,6 +31,7 @@ pub(crate) use crossing::crossing_shells;
 pub(crate) use distance::{BestFirstSearch, box_distance_squared, face_normals, pseudonormals};
 pub use distance::{ClosestPoint, MeshDistance};
 pub(crate) use edges::{EdgeGroups, edge_groups};
+pub(crate) use generate::revolve;
 pub(crate) use morton::morton_codes;
 pub use polygon::PolygonTriangulator;
 pub use repair::{RepairReport, RepairSettings};

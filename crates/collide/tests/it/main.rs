@@ -23,6 +23,7 @@ mod rays;
 mod rng;
 mod shape_cache;
 mod shared_meshes;
+mod smooth_shapes;
 mod surface;
 mod surface_parry;
 mod terrain;

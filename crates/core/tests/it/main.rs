@@ -57,6 +57,7 @@ mod regressions;
 mod regressions_articulated;
 mod regressions_rows;
 mod sleep;
+mod smooth_shapes;
 mod soft_rows;
 mod solvers;
 mod stacks;
