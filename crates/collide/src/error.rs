@@ -262,6 +262,12 @@ pub enum MeshError {
         /// The face at fault, from 1.
         face: Option<usize>,
     },
+    /// Distances on a grid that enclose no solid, or a grid out of its range.
+    #[error("isosurface: {what}")]
+    Isosurface {
+        /// The fault.
+        what: String,
+    },
     /// A lathe profile that does not make a solid.
     #[error("the profile {what}")]
     Profile {

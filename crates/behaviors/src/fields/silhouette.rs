@@ -13,6 +13,7 @@
 //! the core of a capsule or of a cylinder, `e` half the axes of an ellipsoid, `h` the height of a cone, `ρ` a rounding, `A_t` the area vector of a triangle. The area of a mesh
 //! is exact if it is convex; else, as for a compound, hidden surfaces count too.
 
+use nalgebra::ComplexField;
 use std::f64::consts::PI;
 use tumble_collide::{Shape, Vec3};
 
@@ -42,7 +43,7 @@ pub fn silhouette(shape: &Shape, direction: &Vec3) -> f64 {
             if tip <= low {
                 return PI * radius * low;
             }
-            radius * (tip * tip - low * low).sqrt() + radius * low * (PI - libm::acos(low / tip))
+            radius * (tip * tip - low * low).sqrt() + radius * low * (PI - ComplexField::acos(low / tip))
         }
         Shape::RoundedBox { half_extents, rounding: r } => {
             let a = half_extents.add_scalar(-r);

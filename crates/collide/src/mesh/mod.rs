@@ -10,6 +10,7 @@ mod generate;
 mod holes;
 mod hull;
 mod integrals;
+mod isosurface;
 mod morton;
 mod obj;
 mod pairing;

@@ -230,6 +230,16 @@ impl Shape {
         Shape::mesh(surface.terrain(thickness)?, &TreeSettings::octree())
     }
 
+    /// Returns the solid in which a signed distance is negative, as a mesh of its surface
+    /// ([`TriMesh::isosurface`]): within the box from `low` to `high` (m), `cells` along the longest side.
+    /// Mass properties are those of the mesh.
+    ///
+    /// # Errors
+    /// [`ShapeError::Mesh`]: a surface that is not inside the box, or a grid out of its range.
+    pub fn sdf(distance: impl Fn(&Vec3) -> f64, low: Vec3, high: Vec3, cells: usize) -> Result<Shape, ShapeError> {
+        Shape::mesh(TriMesh::isosurface(distance, low, high, cells)?, &TreeSettings::octree())
+    }
+
     /// Returns [`Shape::mesh`] from the cache if it was built before from the same vertices,
     /// triangles and settings; otherwise builds and stores it. The bits are the same. Also returns
     /// a warning about the cache, if any.

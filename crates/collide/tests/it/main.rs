@@ -11,6 +11,7 @@ mod deep_overlaps;
 mod distances;
 mod hull;
 mod hull_contacts;
+mod isosurface;
 mod medial;
 mod mesh_contacts;
 mod mesh_files;
