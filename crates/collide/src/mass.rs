@@ -87,7 +87,7 @@ pub(crate) fn cone(radius: f64, height: f64, density: f64) -> MassProperties {
 }
 
 /// A box of half extents `a` and all points within `r` of it: the box, slabs on its faces, quarter
-/// cylinders along its edges, octants of a ball at its corners.
+/// cylinders along its edges, octants of a sphere at its corners.
 ///
 /// ```text
 /// ∫ x² dV = 8/3·a_x³·a_y·a_z                                            box

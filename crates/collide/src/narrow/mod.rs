@@ -59,7 +59,7 @@ pub fn contacts_in_mode(
     contacts_in_order(mode, (a, pose_a), (b, pose_b), margin, true, out);
 }
 
-/// Appends the contacts of two shapes, neither compound nor rounded; by the formula of the pair only if
+/// Appends the contacts of two shapes, both without parts and rounding; by the formula of the pair only if
 /// `formulas`.
 fn contacts_in_order(
     mode: ContactMode,
