@@ -1,5 +1,6 @@
 //! Distances: from a point to a shape, and between two shapes.
 
+use crate::shape::{Cone, ellipsoid};
 use crate::{Contact, Pose, Shape, Vec3, contacts};
 
 /// Maximum number of alternating projections.
@@ -97,6 +98,20 @@ impl Shape {
                     }
                 }
                 least
+            }
+            Shape::Ellipsoid { half_axes } => {
+                let found = ellipsoid::closest(half_axes, p);
+                (found.point, found.distance, found.normal)
+            }
+            Shape::Cone { radius, height } => {
+                let (_, distance, normal) = Cone { radius: *radius, height: *height }.closest(p);
+                (p - normal * distance, distance, normal)
+            }
+            Shape::RoundedBox { .. } | Shape::RoundedCylinder { .. } => {
+                let (core, rounding) = self.core();
+                let (q, distance, normal) = core.closest_local(p);
+                // inside the core the direction of the nearest face, across which the rounding adds
+                (q + normal * rounding, distance - rounding, normal)
             }
         }
     }

@@ -14,6 +14,24 @@ pub enum ShapeError {
         /// The given value, meters.
         value: f64,
     },
+    /// A rounding that is negative, or that leaves nothing of its shape.
+    #[error("rounding is {rounding}, but must be at least 0 and less than {limit} m, half the smallest size")]
+    Rounding {
+        /// The given value, meters.
+        rounding: f64,
+        /// Half the smallest size of the shape, meters.
+        limit: f64,
+    },
+    /// Sizes of an ellipsoid or cone whose ratio is too large.
+    #[error("{what} has sizes of {smallest} m and {largest} m, but they may differ by at most 100,000 times")]
+    Aspect {
+        /// The name of the shape.
+        what: &'static str,
+        /// The smallest size, meters.
+        smallest: f64,
+        /// The largest size, meters.
+        largest: f64,
+    },
     /// A density that is zero, negative or not finite.
     #[error("density is {0}, but must be finite and above 0 kg/m³")]
     Density(f64),
@@ -243,6 +261,12 @@ pub enum MeshError {
         what: String,
         /// The face at fault, from 1.
         face: Option<usize>,
+    },
+    /// Distances on a grid that enclose no solid, or a grid out of its range.
+    #[error("isosurface: {what}")]
+    Isosurface {
+        /// The fault.
+        what: String,
     },
     /// A lathe profile that does not make a solid.
     #[error("the profile {what}")]

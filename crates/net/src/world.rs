@@ -10,6 +10,9 @@ use tumble_collide::{Shape as Solid, TriMesh, Vec3};
 use tumble_core::{ContactPoint, Drawn, Event, EventKind, ObjectId, RigidBody, World};
 use xxhash_rust::xxh3::xxh3_64;
 
+/// Sides of a rounded cylinder.
+const SIDES: usize = 48;
+
 /// Side of the square that represents a half-space, m.
 const PLANE_M: f64 = 40.0;
 
@@ -172,6 +175,9 @@ fn drawn(drawn: Drawn<'_>) -> Shape {
         Solid::Cylinder(c) => Shape::Cylinder { radius: c.radius(), length: 2.0 * c.half_length() },
         Solid::Mesh(mesh) => triangles(mesh.mesh()),
         Solid::Compound(compound) => triangles(&compound.mesh()),
+        Solid::Ellipsoid { half_axes } => Shape::Ellipsoid { size: (2.0 * half_axes).into() },
+        Solid::Cone { radius, height } => Shape::Cone { radius: *radius, height: *height },
+        Solid::RoundedBox { .. } | Solid::RoundedCylinder { .. } => triangles(&shape.surface_mesh(SIDES)),
     }
 }
 

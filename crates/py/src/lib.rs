@@ -55,7 +55,7 @@ mod _native {
     #[pymodule_export]
     use super::objects::sensor::{Sensor, Sensors};
     #[pymodule_export]
-    use super::objects::shapes::{Block, Capsule, Compound, Cylinder, HalfSpace, Mesh, Shape, Sphere};
+    use super::objects::shapes::{Block, Capsule, Compound, Cone, Cylinder, Ellipsoid, HalfSpace, Mesh, Shape, Sphere};
     #[pymodule_export]
     use super::objects::spheretree::{_unpickle_tree, SphereTree};
     #[pymodule_export]

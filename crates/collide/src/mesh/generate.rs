@@ -106,6 +106,12 @@ impl TriMesh {
         Ok(mesh)
     }
 
+    /// Returns a cone along z about its center of mass, tip up; meters.
+    pub fn cone(radius: f64, height: f64, segments: usize) -> TriMesh {
+        let base = -0.25 * height;
+        revolve(&[(0.0, base), (radius, base), (0.0, 0.75 * height)], segments)
+    }
+
     pub(super) fn push_quad(&mut self, [a, b, c, d]: [u32; 4]) {
         self.triangles.extend([[a, b, c], [a, c, d]]);
     }
@@ -152,7 +158,7 @@ fn on_arc(radius: f64, z: f64, angle: f64) -> (f64, f64) {
 
 /// Revolves an ascending profile from axis to axis around z: a pole at each end, a ring per point
 /// between.
-fn revolve(profile: &[(f64, f64)], segments: usize) -> TriMesh {
+pub(crate) fn revolve(profile: &[(f64, f64)], segments: usize) -> TriMesh {
     let segments = segments.clamp(3, MAX_SEGMENTS);
     let rings = profile.len() - 2;
     let mut mesh =

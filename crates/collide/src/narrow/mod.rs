@@ -6,17 +6,21 @@ mod box_pair;
 mod capsule;
 mod clip;
 mod compound;
+mod curved;
 mod cylinder;
 mod half_space;
 mod parts;
 mod reduce;
+mod rounded;
 mod sdf_contact;
 mod segment;
 mod sphere;
 mod tree;
 
 use crate::sdf::DistanceField;
+use crate::sdf::curved::{ConeField, EllipsoidField};
 use crate::sdf::primitive::{BoxField, CylinderField, HalfSpaceField, RoundField};
+use crate::shape::Cone;
 use crate::{Contact, ContactMode, Pose, Shape, SurfacePoint, Vec3};
 use sdf_contact::{Body, BodyElements};
 
@@ -29,8 +33,9 @@ pub fn contacts(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64,
 /// ≥ 0`).
 ///
 /// **Normals point from B towards A.** Exact among half-space, sphere, box and capsule, and for a
-/// cylinder on a half-space. For meshes and other pairs with cylinders the mode applies: see
-/// [`ContactMode`]. Manifolds are reduced to the few points that matter. Allocates only for the
+/// cylinder, an ellipsoid and a cone on a half-space. For meshes and other pairs with cylinders the
+/// mode applies: see [`ContactMode`]. All other pairs collide by their surfaces, and rounded shapes by
+/// their cores. Manifolds are reduced to the few points that matter. Allocates only for the
 /// growth of `out`. A pose that is not finite has no contacts.
 #[allow(clippy::too_many_arguments)]
 pub fn contacts_in_mode(
@@ -48,11 +53,27 @@ pub fn contacts_in_mode(
     if let Some(side) = compound::Side::of(a, b) {
         return compound::contacts_of_compound(side, mode, (a, pose_a), (b, pose_b), margin, out);
     }
+    if a.is_rounded() || b.is_rounded() {
+        return rounded::contacts_of_rounded(mode, (a, pose_a), (b, pose_b), margin, out);
+    }
+    contacts_in_order(mode, (a, pose_a), (b, pose_b), margin, true, out);
+}
+
+/// Appends the contacts of two shapes, both without parts and rounding; by the formula of the pair only if
+/// `formulas`.
+fn contacts_in_order(
+    mode: ContactMode,
+    (a, pose_a): (&Shape, &Pose),
+    (b, pose_b): (&Shape, &Pose),
+    margin: f64,
+    formulas: bool,
+    out: &mut Vec<Contact>,
+) {
     let start = out.len();
     let ordered = rank(a) <= rank(b);
     let [(first, pose_first), (second, pose_second)] =
         if ordered { [(a, pose_a), (b, pose_b)] } else { [(b, pose_b), (a, pose_a)] };
-    if !exact(first, pose_first, second, pose_second, margin, out) {
+    if !(formulas && exact(first, pose_first, second, pose_second, margin, out)) {
         general(mode, first, pose_first, second, pose_second, margin, out);
     }
     if !ordered {
@@ -68,6 +89,12 @@ pub fn closest_point_within(shape: &Shape, pose: &Pose, point: &Vec3, limit: f64
     if let Shape::Compound(compound) = shape {
         let parts = compound.placed().filter_map(|(part, own)| closest_point_within(part, &(pose * own), point, limit));
         return parts.min_by(|x, y| x.distance.total_cmp(&y.distance));
+    }
+    if shape.is_rounded() {
+        let (core, radius) = shape.core();
+        let found = closest_point_within(&core, pose, point, limit + radius)?;
+        let distance = found.distance - radius;
+        return Some(SurfacePoint { point: point - found.normal * distance, distance, normal: found.normal });
     }
     let local = pose.inverse_transform_point(&(*point).into()).coords;
     let mut least: Option<(f64, Vec3)> = None;
@@ -102,9 +129,11 @@ fn rank(shape: &Shape) -> u8 {
         Shape::Sphere { .. } => 1,
         Shape::Capsule { .. } => 2,
         Shape::Box { .. } => 3,
-        Shape::HalfSpace => 4,
-        // its parts are ordered
-        Shape::Compound(_) => 5,
+        Shape::Ellipsoid { .. } => 4,
+        Shape::Cone { .. } => 5,
+        Shape::HalfSpace => 6,
+        // by their parts and cores
+        Shape::Compound(_) | Shape::RoundedBox { .. } | Shape::RoundedCylinder { .. } => 7,
     }
 }
 
@@ -133,6 +162,13 @@ fn exact(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, out: &
         (Box { half_extents: ha }, Box { half_extents: hb }) => box_box::box_box(ha, pose_a, hb, pose_b, margin, out),
         (Box { half_extents }, HalfSpace) => half_space::cuboid(half_extents, pose_a, pose_b, margin, out),
         (HalfSpace, HalfSpace) => {}
+        (Shape::Ellipsoid { half_axes }, HalfSpace) => {
+            curved::ellipsoid_half_space(half_axes, pose_a, pose_b, margin, out)
+        }
+        (Shape::Cone { radius, height }, HalfSpace) => {
+            let cone = Cone { radius: *radius, height: *height };
+            curved::cone_half_space(&cone, pose_a, pose_b, margin, out)
+        }
         (Cylinder(c), HalfSpace) => cylinder::half_space((c.radius(), c.half_length()), pose_a, pose_b, margin, out),
         _ => return false,
     }
@@ -162,11 +198,11 @@ fn by_surfaces(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64, 
 }
 
 /// Returns the number of surfaces of a shape: several for a mesh of overlapping shells, none for
-/// other meshes that cross themselves, and for compounds.
+/// other meshes that cross themselves, for compounds and rounded shapes.
 fn part_count(shape: &Shape) -> usize {
     match shape {
         Shape::Mesh(mesh) => mesh.surfaces().len(),
-        Shape::Compound(_) => 0,
+        Shape::Compound(_) | Shape::RoundedBox { .. } | Shape::RoundedCylinder { .. } => 0,
         _ => 1,
     }
 }
@@ -196,8 +232,15 @@ fn with_body(shape: &Shape, part: usize, visit: &mut dyn FnMut(&Body)) {
             let elements = BodyElements::Mesh(&surface.elements);
             visit(&Body { elements, field: &surface.field, mesh: Some(&surface.field), radius })
         }
-        // by its parts
-        Shape::Compound(_) => {}
+        Shape::Ellipsoid { half_axes } => {
+            call(BodyElements::Ellipsoid(*half_axes), &EllipsoidField { half: *half_axes })
+        }
+        Shape::Cone { radius, height } => {
+            let cone = Cone { radius: *radius, height: *height };
+            call(BodyElements::Cone(cone), &ConeField { cone })
+        }
+        // by their parts and cores
+        Shape::Compound(_) | Shape::RoundedBox { .. } | Shape::RoundedCylinder { .. } => {}
     }
 }
 

@@ -9,6 +9,8 @@
 use super::reduce::Collector;
 use super::segment::closest_on_segment;
 use super::sphere::point_box;
+use crate::shape::cone::{Cone, ConePart};
+use crate::shape::ellipsoid;
 use crate::{Contact, NormalFrom, Pose, Shape, SphereTree, Vec3};
 use nalgebra::Point3;
 
@@ -67,7 +69,7 @@ struct PrimitiveSample {
     face: bool,
 }
 
-/// Appends the contacts of a tree (A) and a half-space, sphere, box or capsule (B).
+/// Appends the contacts of a tree (A) and a half-space, sphere, box, capsule, ellipsoid or cone (B).
 pub(super) fn tree_primitive(
     a: &SphereTree,
     pose_a: &Pose,
@@ -121,7 +123,20 @@ fn sample_primitive(primitive: &Shape, p: &Vec3) -> Option<PrimitiveSample> {
             core: 0.0,
             face: f.face,
         }),
-        Shape::Cylinder(_) | Shape::Mesh(_) | Shape::Compound(_) => None,
+        Shape::Ellipsoid { half_axes } => {
+            let found = ellipsoid::closest(half_axes, p);
+            let core = ellipsoid::mean_radius(half_axes, &found.normal);
+            Some(PrimitiveSample { distance: found.distance, normal: found.normal, core, face: false })
+        }
+        Shape::Cone { radius, height } => {
+            let (part, distance, normal) = Cone { radius: *radius, height: *height }.closest(p);
+            Some(PrimitiveSample { distance, normal, core: 0.0, face: part == ConePart::Base })
+        }
+        Shape::Cylinder(_)
+        | Shape::Mesh(_)
+        | Shape::Compound(_)
+        | Shape::RoundedBox { .. }
+        | Shape::RoundedCylinder { .. } => None,
     }
 }
 

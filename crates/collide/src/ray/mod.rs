@@ -3,11 +3,14 @@
 //! In the frame of the shape the ray is `o + t·d`, `|d| = 1`. Sphere: `t² + 2 t o·d + o² − r² = 0`.
 //! A slab `|x| ≤ h` is entered and left at `(∓h − o)/d`; a point is inside a box if it is inside
 //! all slabs (Kay and Kajiya, 1986). The side of a cylinder is a sphere in the two dimensions
-//! across its axis. Meshes search a tree of boxes ([`triangles`]).
+//! across its axis. An ellipsoid is a sphere in scaled axes. Cones and rounded shapes are entered by
+//! tangents ([`convex`]). Meshes search a tree of boxes ([`triangles`]).
 
 mod box_tree;
+mod convex;
 mod triangles;
 
+use crate::shape::cone::{Cone, ConePart};
 use crate::{CompoundShape, Pose, Shape, TriMesh, Vec3};
 pub use box_tree::BoxTree;
 pub(crate) use triangles::RayMesh;
@@ -21,8 +24,9 @@ pub struct RayHit {
     /// Outward unit normal of the surface there, world axes.
     pub normal: Vec3,
     /// The face: the index of a mesh's triangle; 0 to 5 for −x, +x, −y, +y, −z and +z of a box; 0,
-    /// 1 and 2 for the side, the −z end and the +z end of a cylinder; the index of a compound's part;
-    /// 0 for all others.
+    /// 1 and 2 for the side, the −z end and the +z end of a cylinder; 0 and 1 for the side and the base
+    /// of a cone; on a rounded edge the face whose normal is nearest; the index of a compound's part; 0
+    /// for all others.
     pub face: u32,
 }
 
@@ -87,6 +91,41 @@ impl Shape {
                 Some((hit.distance, normal, hit.triangle))
             }
             Shape::Compound(compound) => compound_entry(compound, o, d, max),
+            Shape::Ellipsoid { half_axes } => {
+                let scaled = d.component_div(half_axes);
+                let length = scaled.norm();
+                let t = sphere(&o.component_div(half_axes), &(scaled / length), 1.0)? / length;
+                let normal = (o + d * t).component_div(half_axes).component_div(half_axes);
+                Some((t, normal.normalize(), 0))
+            }
+            Shape::Cone { radius, height } => {
+                let cone = Cone { radius: *radius, height: *height };
+                let distance = |p: &Vec3| {
+                    let (part, distance, normal) = cone.closest(p);
+                    (distance, normal, u32::from(part == ConePart::Base))
+                };
+                convex::entry(o, d, self.bounding_radius(), max, distance)
+            }
+            Shape::RoundedBox { .. } | Shape::RoundedCylinder { .. } => {
+                let (core, rounding) = self.core();
+                let distance = |p: &Vec3| {
+                    let at = core.closest_point(&Pose::identity(), p);
+                    (at.distance - rounding, at.normal, self.face_of(&at.normal))
+                };
+                convex::entry(o, d, self.bounding_radius(), max, distance)
+            }
+        }
+    }
+}
+
+impl Shape {
+    /// Returns the face of a rounded shape that a normal belongs to: the one that it is closest to.
+    fn face_of(&self, normal: &Vec3) -> u32 {
+        let of_axis = |k: usize| 2 * k as u32 + u32::from(normal[k] > 0.0);
+        match self {
+            Shape::RoundedCylinder { .. } if normal.z.abs() <= normal.xy().norm() => 0,
+            Shape::RoundedCylinder { .. } => 1 + u32::from(normal.z > 0.0),
+            _ => of_axis(normal.iamax()),
         }
     }
 }

@@ -14,6 +14,7 @@
 //! `d_B` along it (`narrow/sdf_contact/line.rs`). On a finely triangulated smooth surface only
 //! vertices are tested: see [`elements::Elements`] for the error.
 
+pub(crate) mod curved;
 pub(crate) mod elements;
 pub(crate) mod field;
 pub(crate) mod primitive;
@@ -153,6 +154,11 @@ pub(crate) trait DistanceField {
     /// capsule answer false although they are curved: their core point and axis are elements, and
     /// find the edges of the mesh.
     fn is_curved(&self) -> bool {
+        false
+    }
+    /// Returns whether searches end where the slope vanishes, and not already at a distance: on a surface
+    /// that curves gently, places far apart have nearly the same distance.
+    fn is_smooth(&self) -> bool {
         false
     }
     /// Returns whether the signed distance is a linear function of the point: a half-space. Then

@@ -248,6 +248,9 @@ fn surface(shape: &Shape) -> TriMesh {
         Shape::Capsule { radius, half_length } => TriMesh::capsule(*radius, 2.0 * half_length, SIDES, SIDES / 4),
         Shape::Cylinder(c) => TriMesh::cylinder(c.radius(), 2.0 * c.half_length(), SIDES),
         Shape::Mesh(mesh) => mesh.mesh().clone(),
+        Shape::Ellipsoid { .. } | Shape::Cone { .. } | Shape::RoundedBox { .. } | Shape::RoundedCylinder { .. } => {
+            shape.surface_mesh(SIDES)
+        }
         Shape::HalfSpace | Shape::Compound(_) => TriMesh { vertices: Vec::new(), triangles: Vec::new() },
     }
 }
@@ -296,6 +299,10 @@ enum StoredShape {
     Capsule(f64, f64),
     Cylinder(#[serde(with = "crate::archive::shared")] Arc<CylinderShape>),
     Mesh(#[serde(with = "crate::archive::shared")] Arc<MeshShape>),
+    Ellipsoid(Vec3),
+    Cone(f64, f64),
+    RoundedBox(Vec3, f64),
+    RoundedCylinder(#[serde(with = "crate::archive::shared")] Arc<CylinderShape>, f64),
 }
 
 impl Serialize for CompoundShape {
@@ -307,6 +314,10 @@ impl Serialize for CompoundShape {
                 Shape::Capsule { radius, half_length } => StoredShape::Capsule(*radius, *half_length),
                 Shape::Cylinder(cylinder) => StoredShape::Cylinder(cylinder.clone()),
                 Shape::Mesh(mesh) => StoredShape::Mesh(mesh.clone()),
+                Shape::Ellipsoid { half_axes } => StoredShape::Ellipsoid(*half_axes),
+                Shape::Cone { radius, height } => StoredShape::Cone(*radius, *height),
+                Shape::RoundedBox { half_extents, rounding } => StoredShape::RoundedBox(*half_extents, *rounding),
+                Shape::RoundedCylinder { core, rounding } => StoredShape::RoundedCylinder(core.clone(), *rounding),
                 // neither is a part
                 Shape::HalfSpace | Shape::Compound(_) => StoredShape::Sphere(0.0),
             };
@@ -326,6 +337,10 @@ impl<'de> Deserialize<'de> for CompoundShape {
                 StoredShape::Capsule(radius, half_length) => Shape::Capsule { radius, half_length },
                 StoredShape::Cylinder(cylinder) => Shape::Cylinder(cylinder),
                 StoredShape::Mesh(mesh) => Shape::Mesh(mesh),
+                StoredShape::Ellipsoid(half_axes) => Shape::Ellipsoid { half_axes },
+                StoredShape::Cone(radius, height) => Shape::Cone { radius, height },
+                StoredShape::RoundedBox(half_extents, rounding) => Shape::RoundedBox { half_extents, rounding },
+                StoredShape::RoundedCylinder(core, rounding) => Shape::RoundedCylinder { core, rounding },
             };
             CompoundPart { shape, pose, density }
         };

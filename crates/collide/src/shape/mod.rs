@@ -1,12 +1,17 @@
 //! The shapes that a part of a body can have.
 
 mod compound;
+pub(crate) mod cone;
 mod cylinder;
+pub(crate) mod ellipsoid;
 mod mesh;
+pub(crate) mod rounded;
 mod stored;
+mod surface;
 
 use crate::{Aabb, MassProperties, Pose, ShapeError, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3, mass};
 pub use compound::{CompoundPart, CompoundShape};
+pub(crate) use cone::Cone;
 pub use cylinder::CylinderShape;
 pub use mesh::MeshShape;
 use std::sync::Arc;
@@ -39,6 +44,35 @@ pub enum Shape {
     Mesh(#[serde(with = "crate::archive::shared")] Arc<MeshShape>),
     /// Several shapes of one body about their common center of mass; shared.
     Compound(#[serde(with = "crate::archive::shared")] Arc<CompoundShape>),
+    /// An ellipsoid with its axes along the local axes.
+    Ellipsoid {
+        /// Distances from the center to the surface along x, y and z, meters.
+        half_axes: Vec3,
+    },
+    /// A cone along the local z axis, tip up, about its center of mass: the base is a quarter of the
+    /// height below the origin.
+    Cone {
+        /// Radius of the base, meters.
+        radius: f64,
+        /// From base to tip, meters.
+        height: f64,
+    },
+    /// A box with rounded edges and corners: all points within `rounding` of a smaller box.
+    RoundedBox {
+        /// Distances from the center to the faces, meters.
+        half_extents: Vec3,
+        /// Radius of edges and corners, meters; below each half extent.
+        rounding: f64,
+    },
+    /// A cylinder along the local z axis with rounded rims: all points within `rounding` of a smaller
+    /// one.
+    RoundedCylinder {
+        /// The cylinder without the rounding.
+        #[serde(with = "crate::archive::shared")]
+        core: Arc<CylinderShape>,
+        /// Radius of the rims, meters.
+        rounding: f64,
+    },
 }
 
 impl Shape {
@@ -89,6 +123,35 @@ impl Shape {
         positive("radius of a cylinder", radius)?;
         half("length of a cylinder", length)?;
         Ok(Shape::Cylinder(Arc::new(CylinderShape::new(radius, length)?)))
+    }
+
+    /// Returns an ellipsoid with full axes of `size` along x, y and z, meters.
+    ///
+    /// # Errors
+    /// [`ShapeError::Length`] if an axis is not finite and above 0, [`ShapeError::Aspect`] if two axes
+    /// differ by more than 100,000 times.
+    pub fn ellipsoid(size: Vec3) -> Result<Shape, ShapeError> {
+        let [x, y, z] = size.into();
+        let half_axes = Vec3::new(
+            half("size x of an ellipsoid", x)?,
+            half("size y of an ellipsoid", y)?,
+            half("size z of an ellipsoid", z)?,
+        );
+        similar("an ellipsoid", size.min(), size.max())?;
+        Ok(Shape::Ellipsoid { half_axes })
+    }
+
+    /// Returns a cone along z with its tip up, about its center of mass; `radius` of the base and
+    /// `height` in meters.
+    ///
+    /// # Errors
+    /// [`ShapeError::Length`] if a size is not finite and above 0, [`ShapeError::Aspect`] if they
+    /// differ by more than 100,000 times.
+    pub fn cone(radius: f64, height: f64) -> Result<Shape, ShapeError> {
+        positive("radius of a cone", radius)?;
+        half("height of a cone", height)?;
+        similar("a cone", radius.min(height), radius.max(height))?;
+        Ok(Shape::Cone { radius, height })
     }
 
     /// Returns a compound of several shapes, moved so that its center of mass is the origin;
@@ -167,6 +230,16 @@ impl Shape {
         Shape::mesh(surface.terrain(thickness)?, &TreeSettings::octree())
     }
 
+    /// Returns the solid in which a signed distance is negative, as a mesh of its surface
+    /// ([`TriMesh::isosurface`]): within the box from `low` to `high` (m), `cells` along the longest side.
+    /// Mass properties are those of the mesh.
+    ///
+    /// # Errors
+    /// [`ShapeError::Mesh`]: a surface that is not inside the box, or a grid out of its range.
+    pub fn sdf(distance: impl Fn(&Vec3) -> f64, low: Vec3, high: Vec3, cells: usize) -> Result<Shape, ShapeError> {
+        Shape::mesh(TriMesh::isosurface(distance, low, high, cells)?, &TreeSettings::octree())
+    }
+
     /// Returns [`Shape::mesh`] from the cache if it was built before from the same vertices,
     /// triangles and settings; otherwise builds and stores it. The bits are the same. Also returns
     /// a warning about the cache, if any.
@@ -237,6 +310,26 @@ impl Shape {
             Shape::Cylinder(cylinder) => return cylinder.aabb(pose),
             Shape::Mesh(mesh) => return mesh.aabb(pose),
             Shape::Compound(compound) => return compound.aabb(pose),
+            Shape::Ellipsoid { half_axes } => {
+                // the support function along the world axes
+                let turn = pose.rotation.to_rotation_matrix();
+                let reach = |k: usize| turn.matrix().row(k).transpose().component_mul(half_axes).norm();
+                Vec3::from_fn(|k, _| reach(k)) * (1.0 + 1e-12)
+            }
+            Shape::Cone { radius, height } => {
+                let cone = Cone { radius: *radius, height: *height };
+                let support = |n: Vec3| cone.support(&pose.rotation.inverse_transform_vector(&n));
+                let rounding = Vec3::repeat(1e-12 * (radius + height));
+                let low = Vec3::from_fn(|k, _| -support(Vec3::ith(k, -1.0))) - rounding;
+                let high = Vec3::from_fn(|k, _| support(Vec3::ith(k, 1.0))) + rounding;
+                return Aabb { min: center + low, max: center + high };
+            }
+            Shape::RoundedBox { .. } | Shape::RoundedCylinder { .. } => {
+                let (core, rounding) = self.core();
+                let own = core.aabb(pose);
+                // of a half extent less the rounding and back: room for rounding
+                return own.grown(rounding * (1.0 + 1e-12) + 1e-15 * center.amax());
+            }
         };
         Aabb { min: center - half, max: center + half }
     }
@@ -256,6 +349,10 @@ impl Shape {
                 (pose.transform_point(&(0.5 * (bounds.min + bounds.max)).into()).coords, half)
             }
             Shape::Compound(compound) => return compound.tight_aabb(pose),
+            Shape::RoundedBox { .. } | Shape::RoundedCylinder { .. } => {
+                let (core, rounding) = self.core();
+                return core.tight_aabb(pose).grown(rounding * (1.0 + 1e-12));
+            }
             _ => return self.aabb(pose),
         };
         // room for rounding
@@ -281,6 +378,14 @@ impl Shape {
             Shape::Cylinder(c) => Ok(mass::cylinder(c.radius(), c.half_length(), density)),
             Shape::Mesh(mesh) => Ok(mesh.mass_properties(density)),
             Shape::Compound(compound) => Ok(compound.mass_properties(density)),
+            Shape::Ellipsoid { half_axes } => Ok(mass::ellipsoid(half_axes, density)),
+            Shape::Cone { radius, height } => Ok(mass::cone(*radius, *height, density)),
+            Shape::RoundedBox { half_extents, rounding: r } => {
+                Ok(mass::rounded_cuboid(&half_extents.add_scalar(-r), *r, density))
+            }
+            Shape::RoundedCylinder { core, rounding } => {
+                Ok(mass::rounded_cylinder(core.radius(), core.half_length(), *rounding, density))
+            }
         }
     }
 
@@ -307,6 +412,14 @@ impl Shape {
             Shape::Cylinder(c) => mass::cylinder_volume(c.radius(), c.half_length()),
             Shape::Mesh(mesh) => mesh.volume(),
             Shape::Compound(compound) => compound.volume(),
+            Shape::Ellipsoid { half_axes } => mass::ellipsoid_volume(half_axes),
+            Shape::Cone { radius, height } => mass::cone_volume(*radius, *height),
+            Shape::RoundedBox { half_extents, rounding: r } => {
+                mass::rounded_cuboid_volume(&half_extents.add_scalar(-r), *r)
+            }
+            Shape::RoundedCylinder { core, rounding } => {
+                mass::rounded_cylinder_volume(core.radius(), core.half_length(), *rounding)
+            }
         }
     }
 
@@ -321,8 +434,21 @@ impl Shape {
             Shape::Cylinder(c) => (c.radius().powi(2) + c.half_length().powi(2)).sqrt(),
             Shape::Mesh(mesh) => mesh.bounding_radius(),
             Shape::Compound(compound) => compound.bounding_radius(),
+            Shape::Ellipsoid { half_axes } => half_axes.max(),
+            Shape::Cone { radius, height } => (radius.powi(2) + (0.25 * height).powi(2)).sqrt().max(0.75 * height),
+            Shape::RoundedBox { .. } | Shape::RoundedCylinder { .. } => {
+                let (core, rounding) = self.core();
+                core.bounding_radius() + rounding
+            }
         }
     }
+}
+
+/// Largest ratio of two sizes of an ellipsoid or cone: radii of curvature are up to its square.
+const MAX_ASPECT: f64 = 1e5;
+
+fn similar(what: &'static str, smallest: f64, largest: f64) -> Result<(), ShapeError> {
+    if largest > MAX_ASPECT * smallest { Err(ShapeError::Aspect { what, smallest, largest }) } else { Ok(()) }
 }
 
 fn positive(what: &'static str, value: f64) -> Result<(), ShapeError> {

@@ -28,6 +28,7 @@ impl ShapeTable {
             Shape::Mesh(mesh) => Some(Arc::as_ptr(mesh).addr()),
             Shape::Cylinder(cylinder) => Some(Arc::as_ptr(cylinder).addr()),
             Shape::Compound(compound) => Some(Arc::as_ptr(compound).addr()),
+            Shape::RoundedCylinder { .. } => None, // its core may be that of another rounding
             _ => None,
         };
         let index = address.map_or(next, |address| *self.tables.entry(address).or_insert(next));

@@ -61,6 +61,7 @@ mod regressions_rows;
 mod sensor_noise;
 mod sensors;
 mod sleep;
+mod smooth_shapes;
 mod soft_rows;
 mod solvers;
 mod stacks;

@@ -70,6 +70,11 @@ fn push_part(out: &mut SceneEntity, part: &VisualPart) {
                 out.spheres.push(ball(&cap, part.color, *radius));
             }
         }
+        Shape::Ellipsoid { size } => out.spheres.push(SpherePrimitive { pose, size: Some(vector(*size)), color }),
+        Shape::Cone { radius, height } => {
+            let middle = Pose { position: along_z(&part.pose, 0.25 * height), ..part.pose };
+            out.cylinders.push(CylinderPrimitive { top_scale: 0.0, ..tube(&middle, part.color, *radius, *height) });
+        }
         Shape::Mesh { vertices, triangles } => out.triangles.push(triangle_list(pose, color, vertices, triangles)),
         Shape::Plane { size } => {
             let s = 0.5 * size;
@@ -173,14 +178,25 @@ fn read_entity(entity: SceneEntity) -> Entity {
     let numbers = |size: Option<Vector3>| size.map_or([0.0; 3], |v| [v.x, v.y, v.z]);
     let mut parts = Vec::new();
     for p in entity.spheres {
-        parts.push(read_part(Shape::Sphere { radius: numbers(p.size)[0] / 2.0 }, p.pose, p.color));
+        let size = numbers(p.size);
+        let shape = match size.iter().all(|x| *x == size[0]) {
+            true => Shape::Sphere { radius: size[0] / 2.0 },
+            false => Shape::Ellipsoid { size },
+        };
+        parts.push(read_part(shape, p.pose, p.color));
     }
     for p in entity.cubes {
         parts.push(read_part(Shape::Box { size: numbers(p.size) }, p.pose, p.color));
     }
     for p in entity.cylinders {
         let [diameter, _, length] = numbers(p.size);
-        parts.push(read_part(Shape::Cylinder { radius: diameter / 2.0, length }, p.pose, p.color));
+        if p.top_scale == 0.0 && p.bottom_scale == 1.0 {
+            let mut part = read_part(Shape::Cone { radius: diameter / 2.0, height: length }, p.pose, p.color);
+            part.pose.position = along_z(&part.pose, -0.25 * length);
+            parts.push(part);
+        } else {
+            parts.push(read_part(Shape::Cylinder { radius: diameter / 2.0, length }, p.pose, p.color));
+        }
     }
     for p in entity.triangles {
         let vertices = p.points.iter().map(|v| [v.x, v.y, v.z]).collect();

@@ -68,6 +68,19 @@ pub enum Shape {
         /// Length of the cylinder without the caps.
         length: f64,
     },
+    /// An ellipsoid, axes along x, y, z.
+    Ellipsoid {
+        /// Full axes.
+        size: [f64; 3],
+    },
+    /// A cone along z, tip up, with its base a quarter of the height below the origin. Stored as a
+    /// cylinder whose top has no radius, with the pose of its middle.
+    Cone {
+        /// Radius of the base.
+        radius: f64,
+        /// From base to tip.
+        height: f64,
+    },
     /// Triangles.
     Mesh {
         /// The vertices.
@@ -217,7 +230,8 @@ fn part_fault(part: &VisualPart) -> Option<String> {
 fn shape_fault(shape: &Shape) -> Option<String> {
     let lengths: &[f64] = match shape {
         Shape::Sphere { radius } => &[*radius],
-        Shape::Box { size } => size,
+        Shape::Box { size } | Shape::Ellipsoid { size } => size,
+        Shape::Cone { radius, height } => &[*radius, *height],
         Shape::Cylinder { radius, length } | Shape::Capsule { radius, length } => &[*radius, *length],
         Shape::Plane { size } => &[*size],
         Shape::Mesh { vertices, triangles } => return mesh_fault(vertices, triangles),

@@ -33,6 +33,9 @@ pub fn scene_hash(text: &str, world: &World) -> [u8; 32] {
                 Drawn::Shape(Shape::Mesh(mesh)) => put_mesh(&mut out, mesh.mesh()),
                 Drawn::Shape(Shape::Compound(compound)) => put_mesh(&mut out, &compound.mesh()),
                 Drawn::Shape(Shape::Cylinder(c)) => put_f64(&mut out, &[4.0, c.radius(), c.half_length()]),
+                Drawn::Shape(Shape::RoundedCylinder { core, rounding }) => {
+                    put_f64(&mut out, &[10.0, core.radius(), core.half_length(), *rounding]);
+                }
                 Drawn::Shape(other) => out.extend(format!("{other:?}").bytes()), // plain numbers, written so that they read back the same
             }
             // by file name only: the folder differs between machines

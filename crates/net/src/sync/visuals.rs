@@ -54,6 +54,12 @@ fn put_geometry(out: &mut Vec<u8>, drawn: Drawn<'_>, base: &World) {
         Shape::Box { half_extents: h } => tagged(2, &[h.x, h.y, h.z]),
         Shape::Capsule { radius, half_length } => tagged(3, &[*radius, *half_length]),
         Shape::Cylinder(c) => tagged(4, &[c.radius(), c.half_length()]),
+        Shape::Ellipsoid { half_axes: e } => tagged(7, &[e.x, e.y, e.z]),
+        Shape::Cone { radius, height } => tagged(8, &[*radius, *height]),
+        Shape::RoundedBox { half_extents: h, rounding } => tagged(9, &[h.x, h.y, h.z, *rounding]),
+        Shape::RoundedCylinder { core, rounding } => {
+            tagged(10, &[core.radius() + rounding, core.half_length() + rounding, *rounding])
+        }
         Shape::Mesh(mesh) => put_triangles(
             out,
             mesh.mesh(),
@@ -198,9 +204,13 @@ fn get_geometry(rest: &mut ByteReader<'_>, base: &World) -> Result<VisualGeometr
             })?;
             return Ok(VisualGeometry::Mesh(Arc::new(mesh)));
         }
+        7 => Shape::ellipsoid(2.0 * Vec3::from(rest.f64s::<3>()?)),
+        8 => rest.f64s().map(|[radius, height]| Shape::cone(radius, height))?,
+        9 => rest.f64s().map(|[x, y, z, rounding]| Shape::rounded_cuboid(2.0 * Vec3::new(x, y, z), rounding))?,
+        10 => rest.f64s().map(|[radius, half, rounding]| Shape::rounded_cylinder(radius, 2.0 * half, rounding))?,
         _ => return Err(MessageError::Malformed("an unknown shape")),
     };
-    shape.map(VisualGeometry::Shape).map_err(|_| MessageError::Malformed("a shape with a size that is not above 0"))
+    shape.map(VisualGeometry::Shape).map_err(|_| MessageError::Malformed("a shape with a wrong size"))
 }
 
 fn mesh_of(base: &World, name: &str, index: usize) -> Result<VisualGeometry, MessageError> {

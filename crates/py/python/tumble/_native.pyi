@@ -29,8 +29,10 @@ __all__ = [
     "Box",
     "Capsule",
     "Compound",
+    "Cone",
     "ConvexHull",
     "Cylinder",
+    "Ellipsoid",
     "Emitter",
     "Field",
     "Flock",
@@ -66,8 +68,9 @@ __all__ = [
 
 @disjoint_base
 class Shape:
-    """A collision shape. The classes ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``HalfSpace``,
-    ``Mesh``, ``ConvexHull``, ``HeightField``, ``Terrain`` and ``Compound`` make one.
+    """A collision shape. The classes ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``Ellipsoid``,
+    ``Cone``, ``HalfSpace``, ``Mesh``, ``ConvexHull``, ``HeightField``, ``Terrain`` and ``Compound``
+    make one.
     """
     @property
     def volume(self) -> float:
@@ -85,8 +88,10 @@ class Sphere(Shape):
 
 @final
 class Box(Shape):
-    """A box about its center. size: full edge lengths along x, y and z, meters; one number is a cube."""
-    def __new__(cls, size: ArrayLike) -> Box: ...
+    """A box about its center. size: full edge lengths along x, y and z, meters; one number is a cube.
+    rounding: radius of edges and corners, meters, below half the shortest edge; the faces stay.
+    """
+    def __new__(cls, size: ArrayLike, *, rounding: float = 0.0) -> Box: ...
 
 @final
 class Capsule(Shape):
@@ -112,8 +117,22 @@ class Compound(Shape):
 
 @final
 class Cylinder(Shape):
-    """A cylinder along z about its center. radius, length: meters."""
-    def __new__(cls, radius: float, length: float) -> Cylinder: ...
+    """A cylinder along z about its center. radius, length: meters; rounding: radius of the rims, meters,
+    below the radius and half the length.
+    """
+    def __new__(cls, radius: float, length: float, *, rounding: float = 0.0) -> Cylinder: ...
+
+@final
+class Ellipsoid(Shape):
+    """An ellipsoid about its center. size: full axes along x, y and z, meters."""
+    def __new__(cls, size: ArrayLike) -> Ellipsoid: ...
+
+@final
+class Cone(Shape):
+    """A cone along z with its tip up, about its center of mass, a quarter of the height above the base.
+    radius: of the base, meters; height: meters.
+    """
+    def __new__(cls, radius: float, height: float) -> Cone: ...
 
 @final
 class HalfSpace(Shape):

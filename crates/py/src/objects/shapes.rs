@@ -14,8 +14,9 @@ use pyo3::types::PyBytes;
 use tumble::collide::{CompoundPart, Pose, Quat, Shape as Solid, TreeCache, TreeSettings, TriMesh, Vec3};
 use tumble::scene::{building_surface, read_solid};
 
-/// A collision shape. The classes ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``HalfSpace``,
-/// ``Mesh``, ``ConvexHull``, ``HeightField``, ``Terrain`` and ``Compound`` make one.
+/// A collision shape. The classes ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``Ellipsoid``,
+/// ``Cone``, ``HalfSpace``, ``Mesh``, ``ConvexHull``, ``HeightField``, ``Terrain`` and ``Compound``
+/// make one.
 #[pyclass(frozen, subclass, module = "tumble")]
 pub struct Shape {
     /// In its own frame.
@@ -37,9 +38,11 @@ impl Shape {
         let shape = Shape { solid, placement, words };
         Ok(match &shape.solid {
             Solid::Sphere { .. } => Py::new(py, shape.into_a(Sphere))?.into_any(),
-            Solid::Box { .. } => Py::new(py, shape.into_a(Block))?.into_any(),
+            Solid::Box { .. } | Solid::RoundedBox { .. } => Py::new(py, shape.into_a(Block))?.into_any(),
             Solid::Capsule { .. } => Py::new(py, shape.into_a(Capsule))?.into_any(),
-            Solid::Cylinder(_) => Py::new(py, shape.into_a(Cylinder))?.into_any(),
+            Solid::Cylinder(_) | Solid::RoundedCylinder { .. } => Py::new(py, shape.into_a(Cylinder))?.into_any(),
+            Solid::Ellipsoid { .. } => Py::new(py, shape.into_a(Ellipsoid))?.into_any(),
+            Solid::Cone { .. } => Py::new(py, shape.into_a(Cone))?.into_any(),
             Solid::HalfSpace => Py::new(py, shape.into_a(HalfSpace))?.into_any(),
             Solid::Mesh(_) => mesh_of_record(py, shape)?,
             Solid::Compound(_) => Py::new(py, shape.into_a(Compound))?.into_any(),
@@ -93,13 +96,15 @@ impl Sphere {
 }
 
 /// A box about its center. size: full edge lengths along x, y and z, meters; one number is a cube.
+/// rounding: radius of edges and corners, meters, below half the shortest edge; the faces stay.
 #[pyclass(frozen, extends = Shape, name = "Box", module = "tumble")]
 pub struct Block;
 
 #[pymethods]
 impl Block {
     #[new]
-    fn new(size: &Bound<'_, PyAny>) -> Result<PyClassInitializer<Block>> {
+    #[pyo3(signature = (size, *, rounding=0.0))]
+    fn new(size: &Bound<'_, PyAny>, rounding: f64) -> Result<PyClassInitializer<Block>> {
         let size = match size.extract::<f64>() {
             Ok(edge) => [number(edge, "size")?; 3],
             Err(_) => some::<3>(size, "size")?,
@@ -108,7 +113,8 @@ impl Block {
         if let Some(edge) = size.iter().find(|edge| **edge <= 0.0) {
             return Err(Error::value(format!("size: an edge of {edge} m; edges must be above 0 m")));
         }
-        Ok(Shape::new(Solid::cuboid(Vec3::from(size))?, format!("Box(size=({x}, {y}, {z}))")).into_a(Block))
+        let solid = Solid::rounded_cuboid(Vec3::from(size), rounding)?;
+        Ok(Shape::new(solid, format!("Box(size=({x}, {y}, {z}){})", rounded(rounding))).into_a(Block))
     }
 }
 
@@ -126,17 +132,54 @@ impl Capsule {
     }
 }
 
-/// A cylinder along z about its center. radius, length: meters.
+/// A cylinder along z about its center. radius, length: meters; rounding: radius of the rims, meters,
+/// below the radius and half the length.
 #[pyclass(frozen, extends = Shape, module = "tumble")]
 pub struct Cylinder;
 
 #[pymethods]
 impl Cylinder {
     #[new]
-    fn new(radius: f64, length: f64) -> Result<PyClassInitializer<Cylinder>> {
+    #[pyo3(signature = (radius, length, *, rounding=0.0))]
+    fn new(radius: f64, length: f64, rounding: f64) -> Result<PyClassInitializer<Cylinder>> {
         let length = checked_length(length)?;
-        let solid = caught(|| Ok(Solid::cylinder(radius, length)?))?;
-        Ok(Shape::new(solid, format!("Cylinder(radius={radius}, length={length})")).into_a(Cylinder))
+        let solid = caught(|| Ok(Solid::rounded_cylinder(radius, length, rounding)?))?;
+        let words = format!("Cylinder(radius={radius}, length={length}{})", rounded(rounding));
+        Ok(Shape::new(solid, words).into_a(Cylinder))
+    }
+}
+
+/// Returns the last argument of a rounded shape's Python expression.
+fn rounded(rounding: f64) -> String {
+    if rounding == 0.0 { String::new() } else { format!(", rounding={rounding}") }
+}
+
+/// An ellipsoid about its center. size: full axes along x, y and z, meters.
+#[pyclass(frozen, extends = Shape, module = "tumble")]
+pub struct Ellipsoid;
+
+#[pymethods]
+impl Ellipsoid {
+    #[new]
+    fn new(size: &Bound<'_, PyAny>) -> Result<PyClassInitializer<Ellipsoid>> {
+        let size = some::<3>(size, "size")?;
+        let [x, y, z] = size;
+        let solid = Solid::ellipsoid(Vec3::from(size))?;
+        Ok(Shape::new(solid, format!("Ellipsoid(size=({x}, {y}, {z}))")).into_a(Ellipsoid))
+    }
+}
+
+/// A cone along z with its tip up, about its center of mass, a quarter of the height above the base.
+/// radius: of the base, meters; height: meters.
+#[pyclass(frozen, extends = Shape, module = "tumble")]
+pub struct Cone;
+
+#[pymethods]
+impl Cone {
+    #[new]
+    fn new(radius: f64, height: f64) -> Result<PyClassInitializer<Cone>> {
+        let solid = Solid::cone(radius, height)?;
+        Ok(Shape::new(solid, format!("Cone(radius={radius}, height={height})")).into_a(Cone))
     }
 }
 

@@ -25,6 +25,9 @@ use tumble_core::{Appearance, Detail, Drawn, Visual, VisualGeometry, World};
 use tumble_scene::{LightKind, LightSpec, MeshSource, SceneFile};
 use unwrap::Unwrapped;
 
+/// Sides of ellipsoids, cones and rounded cylinders.
+const SIDES: usize = 64;
+
 /// Half the side of the square that represents a half-space, m.
 const PLANE_M: f32 = 60.0;
 /// Edges sharper than this stay sharp, rad.
@@ -294,6 +297,9 @@ fn key(drawn: Drawn<'_>) -> String {
         Drawn::Shape(Shape::Mesh(mesh)) => format!("mesh {:p}", Arc::as_ptr(mesh)),
         Drawn::Shape(Shape::Compound(compound)) => format!("compound {:p}", Arc::as_ptr(compound)),
         Drawn::Shape(Shape::Cylinder(c)) => format!("cylinder {} {}", c.radius(), c.half_length()),
+        Drawn::Shape(Shape::RoundedCylinder { core, rounding }) => {
+            format!("rounded cylinder {} {} {rounding}", core.radius(), core.half_length())
+        }
         Drawn::Shape(other) => format!("{other:?}"),
     }
 }
@@ -320,6 +326,9 @@ fn mesh_of(drawn: Drawn<'_>) -> Result<MeshData, RenderError> {
         Shape::Cylinder(c) => MeshData::cylinder(c.radius() as f32, 2.0 * c.half_length() as f32, 48),
         Shape::Mesh(mesh) => triangles(mesh.mesh())?,
         Shape::Compound(compound) => triangles(&compound.mesh())?,
+        Shape::Ellipsoid { .. } | Shape::Cone { .. } | Shape::RoundedBox { .. } | Shape::RoundedCylinder { .. } => {
+            triangles(&shape.surface_mesh(SIDES))?
+        }
     })
 }
 

@@ -103,8 +103,14 @@ pub(crate) fn make(spec: &ShapeSpec, meshes: &[Shape]) -> Result<Shape, ShapeErr
         ShapeSpec::HalfSpace => Ok(Shape::half_space()),
         ShapeSpec::Sphere { radius_m } => Shape::sphere(radius_m),
         ShapeSpec::Box { size_m } => Shape::cuboid(Vec3::from(size_m)),
+        ShapeSpec::RoundedBox { size_m, rounding_m } => Shape::rounded_cuboid(Vec3::from(size_m), rounding_m),
+        ShapeSpec::Ellipsoid { size_m } => Shape::ellipsoid(Vec3::from(size_m)),
+        ShapeSpec::Cone { radius_m, height_m } => Shape::cone(radius_m, height_m),
         ShapeSpec::Capsule { radius_m, length_m } => Shape::capsule(radius_m, length_m),
         ShapeSpec::Cylinder { radius_m, length_m } => Shape::cylinder(radius_m, length_m),
+        ShapeSpec::RoundedCylinder { radius_m, length_m, rounding_m } => {
+            Shape::rounded_cylinder(radius_m, length_m, rounding_m)
+        }
     }
 }
 

@@ -10,14 +10,11 @@ use super::Reader;
 use super::asset::MeshFrom;
 use super::geom::{Form, Geom};
 use super::tree::Body;
-use crate::build::mesh_files::stretched;
 use crate::parse::link::{Geometry, LinkShape, Surface};
 use crate::parse::mesh::{MeshSource, MeshSpec};
 use crate::parse::shape::ShapeSpec;
 use crate::urdf::MissingMeshes;
 
-/// Subdivisions of the sphere that an ellipsoid is made of: 1280 triangles.
-const ELLIPSOID: u32 = 3;
 /// Number of collision groups.
 const GROUPS: usize = 64;
 
@@ -103,11 +100,7 @@ pub(super) fn make(geom: &Geom<'_>, reader: &Reader<'_>) -> Option<Made> {
             Made::Primitive(ShapeSpec::Cylinder { radius_m: *radius_m, length_m: 2.0 * half })
         }
         Form::Box(half) => Made::Primitive(ShapeSpec::Box { size_m: half.map(|x| 2.0 * x) }),
-        Form::Ellipsoid(radii) => {
-            let [a, b, c] = radii;
-            let mesh = stretched(TriMesh::icosphere(1.0, ELLIPSOID), *radii);
-            Made::Solid(format!("ellipsoid {a} {b} {c}"), Arc::new(mesh))
-        }
+        Form::Ellipsoid(radii) => Made::Primitive(ShapeSpec::Ellipsoid { size_m: radii.map(|x| 2.0 * x) }),
         Form::Field(name) => Made::Solid(format!("hfield {name}"), reader.assets.fields.get(name)?.clone()),
         Form::Mesh(name) => match reader.solid(name) {
             Ok(mesh) => Made::Solid(name.clone(), mesh),

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use tumble_core::collide::Pose;
+use tumble_core::collide::{Pose, Shape, ShapeError};
 
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names};
@@ -38,6 +38,34 @@ pub enum ShapeSpec {
         /// Full length, meters.
         length_m: f64,
     },
+    /// A box with rounded edges and corners about the origin.
+    RoundedBox {
+        /// Full edge lengths along x, y and z, meters.
+        size_m: [f64; 3],
+        /// Radius of edges and corners, meters.
+        rounding_m: f64,
+    },
+    /// A cylinder with rounded rims along z about the origin.
+    RoundedCylinder {
+        /// Meters.
+        radius_m: f64,
+        /// Full length, meters.
+        length_m: f64,
+        /// Radius of the rims, meters.
+        rounding_m: f64,
+    },
+    /// An ellipsoid about the origin.
+    Ellipsoid {
+        /// Full axes along x, y and z, meters.
+        size_m: [f64; 3],
+    },
+    /// A cone along z with its tip up, about its center of mass.
+    Cone {
+        /// Radius of the base, meters.
+        radius_m: f64,
+        /// From base to tip, meters.
+        height_m: f64,
+    },
     /// All points at and below z = 0; `plane` is another name of it.
     HalfSpace,
     /// A mesh with the vertices of its source.
@@ -69,6 +97,8 @@ enum Kind {
     Box,
     Capsule,
     Cylinder,
+    Ellipsoid,
+    Cone,
     HalfSpace,
     Mesh,
     Compound,
@@ -79,6 +109,8 @@ const KINDS: Names<Kind> = &[
     ("box", Kind::Box),
     ("capsule", Kind::Capsule),
     ("cylinder", Kind::Cylinder),
+    ("ellipsoid", Kind::Ellipsoid),
+    ("cone", Kind::Cone),
     ("half_space", Kind::HalfSpace),
     ("plane", Kind::HalfSpace),
     ("mesh", Kind::Mesh),
@@ -109,15 +141,38 @@ impl ShapeSpec {
     fn of_kind(f: &mut Fields<'_>, kind: Kind, meshes: &BTreeMap<&str, Option<usize>>) -> Option<ShapeSpec> {
         match kind {
             Kind::Sphere => Some(ShapeSpec::Sphere { radius_m: f.number("radius_m", Bound::POSITIVE) }),
-            Kind::Box => Some(ShapeSpec::Box { size_m: f.vector("size_m", Bound::POSITIVE) }),
+            Kind::Box => {
+                let size_m: [f64; 3] = f.vector("size_m", Bound::POSITIVE);
+                let rounding = read_rounding(f, |rounding| Shape::rounded_cuboid(size_m.into(), rounding));
+                Some(
+                    rounding
+                        .map_or(ShapeSpec::Box { size_m }, |rounding_m| ShapeSpec::RoundedBox { size_m, rounding_m }),
+                )
+            }
+            Kind::Ellipsoid => {
+                let size_m: [f64; 3] = f.vector("size_m", Bound::POSITIVE);
+                check(f, "size_m", Shape::ellipsoid(size_m.into()));
+                Some(ShapeSpec::Ellipsoid { size_m })
+            }
+            Kind::Cone => {
+                let (radius_m, height_m) =
+                    (f.number("radius_m", Bound::POSITIVE), f.number("height_m", Bound::POSITIVE));
+                check(f, "height_m", Shape::cone(radius_m, height_m));
+                Some(ShapeSpec::Cone { radius_m, height_m })
+            }
             Kind::Capsule => Some(ShapeSpec::Capsule {
                 radius_m: f.number("radius_m", Bound::POSITIVE),
                 length_m: f.number("length_m", Bound::POSITIVE),
             }),
-            Kind::Cylinder => Some(ShapeSpec::Cylinder {
-                radius_m: f.number("radius_m", Bound::POSITIVE),
-                length_m: f.number("length_m", Bound::POSITIVE),
-            }),
+            Kind::Cylinder => {
+                let (radius_m, length_m) =
+                    (f.number("radius_m", Bound::POSITIVE), f.number("length_m", Bound::POSITIVE));
+                let rounding = read_rounding(f, |rounding| Shape::rounded_cylinder(radius_m, length_m, rounding));
+                Some(match rounding {
+                    Some(rounding_m) => ShapeSpec::RoundedCylinder { radius_m, length_m, rounding_m },
+                    None => ShapeSpec::Cylinder { radius_m, length_m },
+                })
+            }
             Kind::HalfSpace => Some(ShapeSpec::HalfSpace),
             Kind::Mesh => read_mesh(f, meshes),
             Kind::Compound => read_compound(f, meshes),
@@ -137,6 +192,23 @@ impl ShapeSpec {
             ShapeSpec::Compound { parts } => parts.iter_mut().for_each(|part| part.shape.shift_meshes(by)),
             _ => {}
         }
+    }
+}
+
+/// Returns the key `rounding_m` of a shape that `make` makes, if it is there and not 0.
+fn read_rounding(f: &mut Fields<'_>, make: impl Fn(f64) -> Result<Shape, ShapeError>) -> Option<f64> {
+    let rounding = f.optional_number("rounding_m", Bound::NOT_NEGATIVE).filter(|rounding| *rounding != 0.0)?;
+    check(f, "rounding_m", make(rounding));
+    Some(rounding)
+}
+
+/// Reports a value that cannot be a shape; numbers that are wrong themselves have been reported.
+fn check(f: &mut Fields<'_>, key: &'static str, made: Result<Shape, ShapeError>) {
+    if let Err(why @ (ShapeError::Rounding { rounding: x, .. } | ShapeError::Aspect { smallest: x, .. })) = made
+        && x.is_finite()
+        && let Some(value) = f.value(key)
+    {
+        f.wrong(key, value, format!("other sizes: {why}"));
     }
 }
 

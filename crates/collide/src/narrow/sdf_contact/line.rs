@@ -248,7 +248,8 @@ impl Query<'_> {
         mut on_face: bool,
         found: &mut Collector,
     ) -> Option<[Sample; 2]> {
-        let tolerance = 1e-9 * self.size;
+        // without kinks the search ends where the slope vanishes
+        let tolerance = if self.field.is_smooth() { 1e-15 } else { 1e-9 } * self.size;
         let limit = found.limit() + line.radius;
         for n in 0..MAX_SAMPLES {
             let (s, level) = tangent_intersection(&low, &high);

@@ -27,6 +27,7 @@ use super::tolerances::DEEP_OVERLAP;
 use super::{Body, BodyElements, elements, faces};
 use crate::sdf::TOUCHING;
 use crate::sdf::field::MeshField;
+use crate::shape::ellipsoid;
 use crate::{Contact, Mat3, NormalFrom, Pose, Vec3};
 use arrayvec::ArrayVec;
 use nalgebra::Point3;
@@ -88,7 +89,8 @@ pub(super) fn separate(a: &Body, b: &Body, a_in_b: &Pose, size: f64, sampled: &S
         return;
     }
     let pair = BodyPair { a, b, pose: a_in_b, rotation: *a_in_b.rotation.to_rotation_matrix().matrix(), size };
-    if !(missing || contact_depth.max(sampled_depth) > MIN_DEPTH * size || pair.is_crossed(found)) {
+    let overlaps = missing || contact_depth.max(sampled_depth) > MIN_DEPTH * size;
+    if !(overlaps || pair.is_crossed(found) || pair.is_pierced(found)) {
         return;
     }
     pair.limit_depths(found);
@@ -157,6 +159,20 @@ impl BodyPair<'_> {
         convex(self.a)
             && convex(self.b)
             && found.deepest().is_some_and(|c| self.overlap_along(&c.normal) > MIN_DEPTH * self.size)
+    }
+
+    /// Returns whether an ellipsoid or a cone overlaps another primitive although no contact shows it: each
+    /// passes through the other between its elements. A contact at a gap proves the opposite, as does
+    /// a direction that separates the two.
+    fn is_pierced(&self, found: &Collector) -> bool {
+        let bodies = [self.a, self.b];
+        let curved = |body: &&Body| matches!(body.elements, BodyElements::Ellipsoid(_) | BodyElements::Cone(_));
+        if !bodies.iter().any(curved) || bodies.iter().any(|body| body.mesh.is_some()) {
+            return false;
+        }
+        let proof = |c: &Contact| c.gap <= 0.0 || self.overlap_along(&c.normal) <= 0.0;
+        let Some(n) = self.pose.translation.vector.try_normalize(1e-9 * self.size) else { return true };
+        !found.contains_like(proof) && self.refine((n, self.overlap_along(&n))).1 > MIN_DEPTH * self.size
     }
 
     /// Limits the depth of the deepest contacts to the translation along their normals that separates
@@ -373,7 +389,7 @@ impl Body<'_> {
         match (&self.elements, self.mesh) {
             (BodyElements::Mesh(_), Some(mesh)) => mesh_normals(mesh, visit),
             (BodyElements::Box(_), _) => (0..3).for_each(|k| visit(Vec3::ith(k, 1.0))),
-            (BodyElements::Cylinder { .. }, _) => visit(Vec3::z()),
+            (BodyElements::Cylinder { .. } | BodyElements::Cone(_), _) => visit(Vec3::z()),
             _ => {}
         }
     }
@@ -394,7 +410,7 @@ impl Body<'_> {
             BodyElements::Box(_) => edge_directions.extend((0..3).map(|k| Vec3::ith(k, 1.0))),
             BodyElements::Round { half_length, .. } if *half_length == 0.0 => {}
             BodyElements::Round { .. } | BodyElements::Cylinder { .. } => edge_directions.push(Vec3::z()),
-            BodyElements::Empty => {}
+            BodyElements::Ellipsoid(_) | BodyElements::Cone(_) | BodyElements::Empty => {}
         }
         edge_directions
     }
@@ -414,18 +430,20 @@ fn mesh_normals(mesh: &MeshField, visit: &mut dyn FnMut(Vec3)) {
 
 impl BodyElements<'_> {
     /// Returns the support function: the maximum of `n·x` over the body.
-    fn support(&self, n: &Vec3) -> f64 {
+    pub(super) fn support(&self, n: &Vec3) -> f64 {
         match self {
             BodyElements::Mesh(elements) => elements.support(n).dot(n),
             BodyElements::Box(half) => half.dot(&n.abs()),
             BodyElements::Round { radius, half_length } => radius * n.norm() + half_length * n.z.abs(),
             BodyElements::Cylinder { radius, half_length } => radius * n.xy().norm() + half_length * n.z.abs(),
+            BodyElements::Ellipsoid(half) => half.component_mul(n).norm(),
+            BodyElements::Cone(cone) => cone.support(n),
             BodyElements::Empty => f64::INFINITY,
         }
     }
 
     /// Returns a point of the body that attains it.
-    fn support_point(&self, n: &Vec3) -> Vec3 {
+    pub(super) fn support_point(&self, n: &Vec3) -> Vec3 {
         let sign = |x: f64| if x.abs() < 1e-9 { 0.0 } else { x.signum() };
         match self {
             BodyElements::Mesh(elements) => elements.support(n),
@@ -435,6 +453,8 @@ impl BodyElements<'_> {
                 Vec3::new(n.x, n.y, 0.0).try_normalize(1e-9).unwrap_or_default() * *radius
                     + Vec3::z() * (sign(n.z) * half_length)
             }
+            BodyElements::Ellipsoid(half) => ellipsoid::support_point(half, n),
+            BodyElements::Cone(cone) => cone.support_point(n),
             BodyElements::Empty => Vec3::zeros(),
         }
     }

@@ -10,6 +10,8 @@
 //! distance field collision* (2020). Departure: faces are searched only in deep overlaps
 //! ([`mesh_convex_depth`], [`mesh_mesh_depth`]), since edges and vertices of both bodies are exact.
 
+mod cone;
+mod ellipsoid;
 mod hyperbola;
 mod line;
 mod mesh_convex_depth;
@@ -24,6 +26,7 @@ use super::reduce::Collector;
 use crate::sdf::DistanceField;
 use crate::sdf::elements::Elements;
 use crate::sdf::field::MeshField;
+use crate::shape::Cone;
 use crate::{Contact, Pose, Vec3};
 use min_translation::SampledDistance;
 use query::{NearestCache, Query};
@@ -39,6 +42,10 @@ pub(in crate::narrow) enum BodyElements<'a> {
     Round { radius: f64, half_length: f64 },
     /// Rims and axis.
     Cylinder { radius: f64, half_length: f64 },
+    /// The whole surface; half axes.
+    Ellipsoid(Vec3),
+    /// Tip, rim and side.
+    Cone(Cone),
     /// A half-space has no elements.
     Empty,
 }

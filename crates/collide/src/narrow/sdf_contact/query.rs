@@ -36,6 +36,8 @@ pub(super) struct Query<'a> {
     pub(super) rotation: Mat3,
     pub(super) field: &'a dyn DistanceField,
     pub(super) mesh: Option<&'a MeshField>,
+    /// Elements of the body with the field.
+    pub(super) other: &'a BodyElements<'a>,
     pub(super) size: f64,
     /// In the second query, whose field is A's: the pose of A in B.
     pub(super) second: Option<&'a Pose>,
@@ -69,7 +71,7 @@ const CACHE_SLOTS: usize = 1024;
 impl<'a> Query<'a> {
     /// Prepares the query of one body, at `pose` in the frame of the other.
     pub(super) fn new(
-        [one, other]: [&Body<'a>; 2],
+        [one, other]: [&'a Body<'a>; 2],
         pose: &'a Pose,
         size: f64,
         second: Option<&'a Pose>,
@@ -82,6 +84,7 @@ impl<'a> Query<'a> {
             rotation,
             field: other.field,
             mesh: other.mesh,
+            other: &other.elements,
             size,
             second,
             cache,
@@ -96,6 +99,8 @@ impl<'a> Query<'a> {
             BodyElements::Box(half) => self.query_box(half, found),
             BodyElements::Round { radius, half_length } => self.query_round(*radius, *half_length, found),
             BodyElements::Cylinder { radius, half_length } => self.cylinder(*radius, *half_length, found),
+            BodyElements::Ellipsoid(half) => self.query_ellipsoid(half, found),
+            BodyElements::Cone(cone) => self.query_cone(cone, found),
             BodyElements::Empty => {}
         }
     }

@@ -26,14 +26,16 @@ use crate::Vec3;
 use crate::sdf::{Feature, Hit, OVERHANG, facing};
 
 /// A circle at the end of a cylinder, in the frame of the field.
-struct Rim {
-    middle: Vec3,
+pub(super) struct Rim {
+    pub middle: Vec3,
     /// Away from the body.
-    up: Vec3,
+    pub up: Vec3,
     /// Axis of rotation of the directions, the same for both rims.
-    axis: Vec3,
-    radius: f64,
-    side: u64,
+    pub axis: Vec3,
+    pub radius: f64,
+    pub side: u64,
+    /// Components of the normal of the side across the axis and against `up`: 1 and 0 for a cylinder.
+    pub slope: (f64, f64),
 }
 
 /// The distance and slope at a place on a rim.
@@ -88,21 +90,22 @@ impl Query<'_> {
         for side in 0..2 {
             let axis = self.rotation.column(2).into_owned();
             let up = if side == 0 { -axis } else { axis };
-            let rim = Rim { middle: self.to_field(&ends[side as usize]), up, axis, radius, side };
+            let rim = Rim { middle: self.to_field(&ends[side as usize]), up, axis, radius, side, slope: (1.0, 0.0) };
             if self.field.bound(&rim.middle) - rim.radius <= found.limit() {
                 self.rim(&rim, found);
             }
         }
     }
 
-    fn rim(&self, rim: &Rim, found: &mut Collector) {
+    pub(super) fn rim(&self, rim: &Rim, found: &mut Collector) {
         let (x, y) = (self.rotation.column(0).into_owned(), self.rotation.column(1).into_owned());
         let directions: [Vec3; RIM_DIRECTIONS] = std::array::from_fn(|n| x * RIM_POINTS[n].0 + y * RIM_POINTS[n].1);
         for n in (0..RIM_DIRECTIONS).step_by(3) {
             let at = rim.at(&directions[n]);
             if self.field.bound(&at) <= found.limit() {
-                let hit = self.field.hit(&at, &[directions[n], rim.up], OVERHANG);
-                if hit.facing && across(&hit.normal, &rim.up).norm() < STEEP_TILT {
+                let hit = self.field.hit(&at, &rim.normals(&directions[n]), OVERHANG);
+                let below = rim.slope.1 == 0.0 || hit.normal.dot(&rim.up) < 0.0;
+                if hit.facing && below && across(&hit.normal, &rim.up).norm() < STEEP_TILT {
                     self.push(&at, 0.0, &hit, point_normal(&hit), rim.feature(n as u64), found);
                 }
             }
@@ -139,7 +142,7 @@ impl Query<'_> {
 
     fn sample_rim(&self, rim: &Rim, direction: &Vec3) -> RimSample {
         let at = rim.at(direction);
-        let hit = self.field.hit(&at, &[*direction, rim.up], OVERHANG);
+        let hit = self.field.hit(&at, &rim.normals(direction), OVERHANG);
         self.record(&hit, 0.0);
         RimSample { direction: *direction, slope: hit.normal.dot(&rim.axis.cross(direction)), hit }
     }
@@ -207,7 +210,7 @@ impl Query<'_> {
         part: &mut u64,
         found: &mut Collector,
     ) -> Option<RimSample> {
-        let tolerance = 1e-10 * self.size;
+        let tolerance = if self.field.is_smooth() { 1e-15 } else { 1e-10 } * self.size;
         let mut kink = None;
         for n in 0..MAX_SAMPLES {
             let (mut direction, level) = tangent_intersection(rim, &low, &high);
@@ -246,7 +249,7 @@ impl Query<'_> {
             && let Some(normal) = ridge(&low, &high)
         {
             // two faces at depth `level` meet in an edge further up
-            let faces = facing(&[at, rim.up], &normal.0);
+            let faces = facing(&rim.normals(&at), &normal.0);
             let edge = Hit { distance: level * normal.1, normal: normal.0, facing: faces, ..hit };
             if self.is_surface(&rim.at(&at), &edge) {
                 (direction, hit) = (at, edge);
@@ -256,8 +259,8 @@ impl Query<'_> {
         if !hit.facing || tilt < MIN_TILT {
             return Some(best);
         }
-        // the core of a cylinder on its side is its axis
-        let core = if tilt > SIDE_TILT { rim.radius } else { 0.0 };
+        // the core of a cylinder on its side, or of a cone, is its axis
+        let core = if rim.lies_on_side(&hit.normal, &direction, tilt) { rim.radius / rim.slope.0 } else { 0.0 };
         let hit = Hit { distance: hit.distance + core, ..hit };
         self.push(&(rim.at(&direction) + hit.normal * core), core, &hit, point_normal(&hit), rim.feature(*part), found);
         *part += 1;
@@ -275,6 +278,23 @@ impl RimSample {
 impl Rim {
     fn at(&self, direction: &Vec3) -> Vec3 {
         self.middle + direction * self.radius
+    }
+
+    /// Returns the normals of the two surfaces that meet in the rim.
+    fn normals(&self, direction: &Vec3) -> [Vec3; 2] {
+        let (across, along) = self.slope;
+        match along == 0.0 {
+            true => [*direction, self.up],
+            false => [direction * across - self.up * along, self.up],
+        }
+    }
+
+    /// Returns whether the side lies on a surface with this normal, across the axis by `tilt`.
+    fn lies_on_side(&self, normal: &Vec3, direction: &Vec3, tilt: f64) -> bool {
+        match self.slope.1 == 0.0 {
+            true => tilt > SIDE_TILT,
+            false => -normal.dot(&self.normals(direction)[0]) > SIDE_TILT,
+        }
     }
 
     fn feature(&self, part: u64) -> u64 {

@@ -27,6 +27,11 @@ impl MeshField {
         (p - closest_on_triangle(p, &self.triangles.corners[t]).0).norm()
     }
 
+    /// Calls `each` for the triangles within `radius` of `p`.
+    pub fn faces_within(&self, p: &Vec3, radius: f64, each: &mut dyn FnMut(usize)) {
+        self.boxes().within(p, radius, &mut |face, _, _| each(face));
+    }
+
     /// Searches the tree of boxes around the triangles.
     pub fn search_faces(&self, to: &mut impl BestFirstSearch) {
         self.boxes().descend(to);

@@ -1,0 +1,54 @@
+//! The entry of a ray into a convex solid, by its signed distance.
+//!
+//! ```text
+//! f(t) = d(o + t·v)      convex in t,   f' = n·v,   n the gradient of the distance
+//! t  ←  t − f/f'         Newton's method from outside: it never passes the first root
+//! ```
+//!
+//! Where `f' ≥ 0` the ray has passed its nearest point and misses. The steps are those of a polyhedron
+//! of tangent planes; at a grazing entry they halve the way.
+
+use super::LocalHit;
+use crate::Vec3;
+
+/// Maximum number of steps; about six are taken.
+const MAX_STEPS: usize = 100;
+/// Distance at which the surface is reached, as a fraction of the radius of the solid.
+const REACHED: f64 = 1e-14;
+
+/// Returns where a ray from `o` along the unit direction `v` enters a solid within `radius` of the
+/// origin. `distance` returns the signed distance of a point, the outward normal and the face.
+pub(super) fn entry(
+    o: &Vec3,
+    v: &Vec3,
+    radius: f64,
+    max: f64,
+    distance: impl Fn(&Vec3) -> (f64, Vec3, u32),
+) -> Option<LocalHit> {
+    // from the bounding sphere on, so that distant rays keep their digits
+    let along = -o.dot(v);
+    let nearest = o + v * along;
+    if nearest.norm_squared() > radius * radius {
+        return None;
+    }
+    let half = (radius * radius - nearest.norm_squared()).sqrt();
+    let start = (along - half).max(0.0);
+    let place = |t: f64| nearest + v * (t - along);
+    if distance(&place(start)).0 < 0.0 {
+        return None;
+    }
+    let mut t = start;
+    for _ in 0..MAX_STEPS {
+        let (f, normal, face) = distance(&place(t));
+        let slope = normal.dot(v);
+        if f <= REACHED * radius {
+            return (slope < 0.0).then_some((t, normal, face));
+        }
+        if slope >= 0.0 || t > max.min(along + half) {
+            return None;
+        }
+        t -= f / slope;
+    }
+    // a grazing ray
+    None
+}
