@@ -5,9 +5,11 @@
 
 use super::records::{ObjectIndices, PairRecord, Tables};
 use super::{NamedRecord, record};
+use crate::object::Object;
 use crate::settings::Settings;
 use crate::world::World;
 use crate::world::view::Status;
+use crate::{ArticulatedBody, LoopJoint, RigidBody};
 use serde::{Serialize, Serializer};
 use tumble_collide::{Shape, Vec3};
 
@@ -33,7 +35,8 @@ struct Outline {
 }
 
 impl World {
-    /// Writes settings, objects and pairs without the state. The names of the fields are no part of
+    /// Writes settings, objects and pairs without the state: first the rigid bodies, then the
+    /// articulated ones, then the loop joints, each in the order of the world. The names of the fields are no part of
     /// the interface, except that `initial_pose`, `initial_velocity` and `start` are of time 0, that
     /// `visuals`, `cameras` and `lights` have no effect on motion, and that `colliders` may be in
     /// another order.
@@ -41,9 +44,11 @@ impl World {
     /// # Errors
     /// Those of the serializer.
     pub fn serialize_constants<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let (mut tables, indices) = (Tables::default(), ObjectIndices::of(self.ids()));
+        let mut ids = self.ids().to_vec();
+        ids.sort_by_key(|&id| self.object(id).map_or(u8::MAX, rank));
+        let (mut tables, indices) = (Tables::default(), ObjectIndices::of(&ids));
         (tables.shapes.repeated, tables.meshes.skipped) = (true, true);
-        let objects = self.ids().iter().filter_map(|&id| Some((self.name(id)?, self.object(id)?)));
+        let objects = ids.iter().filter_map(|&id| Some((self.name(id)?, self.object(id)?)));
         let objects = objects
             .map(|(name, object)| NamedRecord { name: name.into(), record: record(object, &mut tables, &indices) });
         let objects = objects.collect();
@@ -55,11 +60,22 @@ impl World {
             stepper: self.stepper_name(),
             solver: self.solver_name(),
             objects,
-            status: self.ids().iter().filter_map(|&id| self.status(id)).collect(),
+            status: ids.iter().filter_map(|&id| self.status(id)).collect(),
             shapes: tables.shapes.list.iter().map(outline).collect(),
             pairs,
         };
         constants.serialize(serializer)
+    }
+}
+
+/// Returns the place of an object's kind in the order of kinds.
+fn rank(object: &dyn Object) -> u8 {
+    let any: &dyn std::any::Any = object;
+    match () {
+        _ if any.is::<RigidBody>() => 0,
+        _ if any.is::<ArticulatedBody>() => 1,
+        _ if any.is::<LoopJoint>() => 2,
+        _ => 3,
     }
 }
 

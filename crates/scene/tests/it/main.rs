@@ -17,6 +17,7 @@ mod pinocchio;
 mod repair;
 mod robots;
 mod robust;
+mod saving;
 mod scenes_in_motion;
 mod shipped;
 mod spheres;
