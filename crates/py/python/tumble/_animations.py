@@ -225,7 +225,7 @@ class Animation:
     def html(self) -> str:
         """A page of HTML with all images in it: play, pause, and a slider."""
         width, height = self.size
-        data = [[p.x, p.y, base64.b64encode(png(p.pixels)).decode()] for p in self._parts]
+        data: list[tuple[int, int, str]] = [(p.x, p.y, base64.b64encode(png(p.pixels)).decode()) for p in self._parts]
         values = {
             "@TITLE@": html.escape(self.title),
             "@WIDTH@": str(width),

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tumble._errors import BusyError, InvalidValueError, PictureError
@@ -33,7 +35,9 @@ class Window:
         opening = self._feed.opening(world, title, (width, height))
         # the window's own session: Ctrl-C in the terminal is for the program
         command = [sys.executable, "-c", "from tumble._window import main; main()"]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
+        paths = [str(Path(__file__).resolve().parents[1]), os.environ.get("PYTHONPATH", "")]
+        own = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True, env=own)
         self._messages = b""
         self._ending = threading.Event()
         self._error: Exception | None = None

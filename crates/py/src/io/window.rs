@@ -79,7 +79,9 @@ impl _WindowFeed {
         let mut kept = self.publisher.lock().unwrap_or_else(PoisonError::into_inner);
         let (publisher, last, count) = &mut *kept;
         let bytes = world.get().shared.read(|inner| {
-            let frame = publisher.publish(&inner.world, &Viewer::default(), *count + 1).map_err(Error::value)?;
+            let frame = publisher
+                .publish(&inner.world, &Viewer::default(), *count + 1)
+                .map_err(|e| Error::value(e.to_string()))?;
             if !frame.fresh && frame.state == *last {
                 return Ok(Vec::new());
             }

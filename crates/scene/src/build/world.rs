@@ -87,9 +87,9 @@ impl SceneFile {
     }
 
     fn add_loop_joint(&self, spec: &LoopJointSpec, world: &mut World) -> Result<(), BuildError> {
-        let (a, b) = (self.part(world, &spec.a), spec.b.and_then(|b| self.part(world, &b)));
+        let (a, b) = (spec.a.and_then(|a| self.part(world, &a)), spec.b.and_then(|b| self.part(world, &b)));
         if let Some(anchors) = spec.anchors {
-            let [a, b] = [(a, Some(spec.a)), (b, spec.b)].map(|(part, named)| Anchor {
+            let [a, b] = [(a, spec.a), (b, spec.b)].map(|(part, named)| Anchor {
                 part,
                 frame: named.map_or_else(Pose::identity, |named| self.frame_in_part(world, &named)),
             });

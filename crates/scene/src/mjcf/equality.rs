@@ -80,7 +80,7 @@ fn join(item: &Item<'_>, starts: &[Vec<Pose>], assembly: &mut Assembly<'_, '_>) 
     assembly.scene.loop_joints.push(LoopJointSpec {
         name,
         kind,
-        a,
+        a: Some(a),
         b,
         anchors: None,
         references: [Pose::identity(); 2],

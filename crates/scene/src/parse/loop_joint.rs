@@ -26,8 +26,8 @@ pub struct LoopJointSpec {
     pub name: String,
     /// Which motion it leaves free.
     pub kind: LoopJointKind,
-    /// One side.
-    pub a: PartSpec,
+    /// One side; `None`, only with `anchors`, is the world.
+    pub a: Option<PartSpec>,
     /// The other side; `None` is the world.
     pub b: Option<PartSpec>,
     /// Frames of the joint in the frames of its two bodies or links, or in the world; instead of
@@ -111,11 +111,14 @@ impl LoopJointSpec {
             f.give_up();
             return None;
         };
-        let a = f.text("a", "the name of a body, or \"OBJECT/LINK\"");
-        let b = f.optional_text("b");
         let (anchors, references) = (read_frames(&mut f, ["anchor_a", "anchor_b"]), ["reference_a", "reference_b"]);
         let references = anchors.and_then(|_| read_frames(&mut f, references)).unwrap_or([Pose::identity(); 2]);
         let placed = anchors.is_none();
+        let b = f.optional_text("b");
+        let a = match f.optional_text("a") {
+            None if placed || b.is_none() => f.text("a", "the name of a body, or \"OBJECT/LINK\""),
+            a => a,
+        };
         let position_m = if placed { f.vector("position_m", Bound::ANY) } else { [0.0; 3] };
         let second_position_m = (placed && kind.has_length()).then(|| f.vector("second_position_m", Bound::ANY));
         let axis = if placed && kind.has_axis() { f.direction("axis") } else { [0.0, 0.0, 1.0] };
@@ -147,7 +150,7 @@ impl LoopJointSpec {
         Some(LoopJointSpec {
             name,
             kind,
-            a: sides[0]?,
+            a: if a.is_some() { Some(sides[0]?) } else { None },
             b: sides[1],
             anchors,
             references,

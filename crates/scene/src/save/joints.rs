@@ -18,12 +18,8 @@ impl Writer<'_> {
         let mut t = Table::of("name", name);
         t.put("type", kind.name());
         let [a, b] = joint.sides();
-        // the scene has no `a` that is the world: sides are exchanged only where that changes nothing
-        let (Some(part_a), frame_a) = self.anchor(&a) else {
-            return self.fault(format!("loop joint \"{name}\": its first side is the world"));
-        };
-        let (part_b, frame_b) = self.anchor(&b);
-        t.put("a", part_a);
+        let ((part_a, frame_a), (part_b, frame_b)) = (self.anchor(&a), self.anchor(&b));
+        part_a.iter().for_each(|a| t.put("a", a));
         part_b.iter().for_each(|b| t.put("b", b));
         t.put("anchor_a", pose(&frame_a));
         t.put("anchor_b", pose(&frame_b));

@@ -258,7 +258,10 @@ fn write_checked(
         move |source| SaveError::Write { file, source }
     };
     let folder = unfinished.join(format!("{stem}_files"));
-    std::fs::create_dir_all(&folder).map_err(failed(&folder))?;
+    // of a process of this number that was killed
+    let _ = std::fs::remove_dir_all(unfinished);
+    std::fs::create_dir(unfinished).map_err(failed(unfinished))?;
+    std::fs::create_dir(&folder).map_err(failed(&folder))?;
     for (name, bytes) in files {
         let file = folder.join(name);
         std::fs::write(&file, bytes).map_err(failed(&file))?;

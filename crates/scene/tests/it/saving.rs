@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use tumble_core::articulated::{DofSettings, Drive, LinkMass, ModelBuilder, Playback, Spring};
 use tumble_core::collide::{CompoundPart, Mat3, Pose, Shape, TreeSettings, TriMesh, Vec3};
 use tumble_core::{
-    ArticulatedBody, Collider, CollisionGroup, Coupling, ForceGenerator, Forces, Joint, JointPlace, LockedAxes,
+    Anchor, ArticulatedBody, Collider, CollisionGroup, Coupling, ForceGenerator, Forces, Joint, JointPlace, LockedAxes,
     LoopJoint, LoopJointKind, Material, Mode, Object, PairMaterial, PairSide, RigidBody, Settings, StateRange, Visual,
     VisualMesh, World, WorldView,
 };
@@ -295,6 +295,11 @@ fn add_joints(world: &mut World) {
         JointPlace::between(Vec3::z(), Vec3::x()),
     );
     world.add(spring.unwrap()).unwrap();
+    // the world may be the first side
+    let at = Pose::new(Vec3::new(0.1, 0.2, 0.3), Vec3::new(0.3, -0.2, 0.5));
+    let here = world.pose(body, 0).unwrap() * at;
+    let hung = LoopJoint::new("hung", LoopJointKind::Spherical, Anchor::world(here), Anchor::on(body, 0, at));
+    world.add(hung.unwrap()).unwrap();
 }
 
 #[test]
