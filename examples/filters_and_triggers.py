@@ -12,12 +12,12 @@ ghost = world.add_rigid("ghost", tumble.Sphere(0.1), mass=1, position=(0, 0, 5),
 world.set_pair_material("ghost", "crate", collides=False)
 shade = world.add_rigid("shade", tumble.Sphere(0.1), mass=1, position=(2, 0, 6), group=DEBRIS, mask=[DEBRIS])  # through all but debris
 
-passed, landed = {}, {}
+passed, blows = {}, []
 for _ in range(2000):
     world.step()
     for event in world.events:
         if event.kind == "sensor_begin":
             passed[event.b.name] = world.time
-        elif event.kind == "contact_begin" and "ball" in (event.a.name, event.b.name):
-            landed.setdefault("ball", (world.time, -event.impulse[2] if event.b is None or event.b.name == "ball" else event.impulse[2]))
-print({name: round(time, 3) for name, time in passed.items()}, landed)
+        elif event.kind.startswith("contact") and {event.a.name, event.b.name} == {"ball", "crate"}:
+            blows.append((world.time, abs(event.impulse[2])))
+print({name: round(time, 3) for name, time in passed.items()}, f"the ball lands at {blows[0][0]:.3f} s")

@@ -18,7 +18,6 @@ WORDS = {  # what must stand in the output, beside what each script asserts itse
     "bouncing_ball": "off the closed form",
     "boids": "10 s: order 1.0",
     "cart_pole": "episode 2: 500 steps upright",
-    "fork_for_mpc": "m from the goal",
     "gym_training": "returns of 500 to 500 in new episodes",
     "pendulum_energy": "period by theory            2.152875 s",
     "rollout_control": "touched: False",
