@@ -158,15 +158,12 @@ impl<'w> SceneWriter<'w> {
         // the tables of meshes stand before the objects that name them
         let at = out.find("\n[[").unwrap_or(out.len());
         out.insert_str(at, &meshes.tables);
-        Ok((
-            format!(
-                "# A world at {} s, written by tumble. The file `saved_world` has its exact state while this text is unchanged.\n{}{out}",
-                self.world.time(),
-                top.lines()
-            ),
-            meshes,
-            notes,
-        ))
+        let head = format!(
+            "# A world at {} s, written by tumble. \
+             The file `saved_world` has its exact state while this text is unchanged.\n",
+            self.world.time()
+        );
+        Ok((head + &top.lines() + &out, meshes, notes))
     }
 }
 
