@@ -182,7 +182,21 @@ pub(crate) struct Writer<'w> {
 }
 
 impl Writer<'_> {
+    /// Names the tables of the scene that are not written. Without `..`: a new table of scenes is an
+    /// error here until it is written, or noted.
+    fn note_tables(&mut self) {
+        #[rustfmt::skip]
+        let SceneFile {
+            file: _, description: _, world: _, materials: _, meshes: _, bodies: _, articulated: _, loop_joints: _,
+            actuators, pairs: _, camera: _, cave: _, lights: _, sky: _, ground: _, notes: _, saved: _,
+        } = self.like;
+        if !actuators.is_empty() {
+            self.notes.push("the actuators of its model of MuJoCo are not written: scene files have none".into());
+        }
+    }
+
     fn objects(&mut self) {
+        self.note_tables();
         self.world_table();
         self.material_tables();
         let world = self.world;
