@@ -41,6 +41,8 @@ mod _native {
     #[pymodule_export]
     use super::io::recording::{Recorder, read_recording, show_contacts};
     #[pymodule_export]
+    use super::io::window::{_WindowFeed, _show_window};
+    #[pymodule_export]
     use super::objects::articulation::Articulation;
     #[pymodule_export]
     use super::objects::bodies::Bodies;

@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import tumble
+
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 PROGRAMS = (
     "falling_stack double_pendulum four_bar arm_pd quadruped random_search domain_randomization record_and_replay save_restore "
-    "heavy_on_light linked_rings"
+    "heavy_on_light linked_rings lidar dumbbell filters_and_triggers terrain custom_force vector_environment notebook_animation"
 ).split()
 G = 9.81
 
@@ -137,3 +139,69 @@ def test_a_ring_hangs_in_a_ring(run):
     facets = 2 * (0.06 * (1 - np.cos(np.pi / 48)) + 0.01 * (1 - np.cos(np.pi / 24)))
     assert -names["lower"].position[2] == pytest.approx(0.08, abs=facets)
     assert names["held"] == pytest.approx(names["lower"].mass * G, rel=1e-3)
+
+
+def test_every_beam_of_a_lidar_meets_what_is_there(run):
+    names = run("lidar")
+    assert names["error"] < 1e-9 and names["hits"] == (names["column"] < names["wall"]).sum() > 50
+
+
+def test_a_dumbbell_precesses_as_euler_says(run):
+    names = run("dumbbell")
+    assert names["rate"] == pytest.approx((0.02 - 0.36) / 0.36 * 8.0) and len(names["errors"]) == 480
+    assert max(names["errors"]) < 1e-6
+    # its axis keeps its angle to the angular momentum
+    assert names["world"].energy().total == pytest.approx(0.5 * (0.36 * 0.5**2 + 0.02 * 8**2), rel=1e-8)
+
+
+def test_groups_pairs_and_gates_do_what_they_say(run):
+    names = run("filters_and_triggers")
+    fall = {"ball": 4 - 2.11, "ghost": 5 - 2.11}  # to the upper face of the gate, by the lower side of the sphere
+    assert names["passed"] == pytest.approx({name: np.sqrt(2 * height / G) for name, height in fall.items()}, abs=2e-3), "the shade passes unseen"
+    times, impulses = np.transpose(names["blows"])
+    assert times[0] == pytest.approx(np.sqrt(2 * 3.4 / G), abs=2e-3)  # onto the crate of 0.5 m
+    # 1 kg without rebound; the impact may end in the step after the one in which it begins
+    assert impulses[:2].sum() == pytest.approx(np.sqrt(2 * G * 3.4), rel=5e-3)
+    assert impulses[-1] == pytest.approx(G * 1e-3, rel=1e-5)  # then its weight, over each step
+    assert names["ghost"].position[2] == pytest.approx(0.1, abs=1e-4)  # through the crate, onto the floor
+    assert names["shade"].position[2] < -5
+
+
+def test_a_block_slides_down_a_hill(run):
+    names = run("terrain")
+    assert names["slid"][-1] == pytest.approx(names["expected"][-1], rel=2e-3)
+    assert np.abs(names["above"]).max() < 1e-4
+
+
+def test_a_force_in_python_makes_damped_oscillations(run):
+    names = run("custom_force")
+    assert len(names["bodies"]) == 3 and names["error"] < 1e-3
+
+
+def test_a_thousand_pendulums_stand_up(run):
+    names = run("vector_environment")
+    assert names["upright"].all() and names["batch"].q.shape == (1000, 1)
+    # a world of the batch moves as it would alone
+    world, batch = names["world"].fork(), names["batch"]
+    batch.reset()
+    for _ in range(50):
+        batch.step(np.full((1000, 1), 0.7))
+    pendulum = world.articulation("pendulum")
+    pendulum.tau = [0.7]
+    world.step(50)
+    assert (batch.q[::333] == pendulum.q).all()
+
+
+def test_an_animation_is_a_page_and_a_picture(run):
+    try:
+        tumble.World().render(8, 8)
+    except tumble.PictureError as error:
+        pytest.skip(f"SKIPPED: {error}")
+    names = run("notebook_animation")
+    assert names["animation"].size == (240, 180) and len(names["animation"].times) == 31
+    heights = names["recording"].position("ball")[:, 2]
+    fall = np.arange(0, 1.0, 0.1)
+    falling = fall < np.sqrt(2 / G)
+    times = names["recording"].times
+    assert np.interp(fall[falling], times, heights) == pytest.approx(1.1 - G * fall[falling] ** 2 / 2, abs=2e-3)
+    assert Path("bounce.html").read_text().startswith("<!DOCTYPE html>") and Path("bounce.png").stat().st_size > 5000

@@ -64,6 +64,7 @@ pub mod mjcf;
 mod notes;
 mod open;
 mod parse;
+mod save;
 pub mod urdf;
 mod xml;
 
@@ -99,5 +100,6 @@ pub use parse::shape::{CompoundPartSpec, ShapeSpec};
 pub use parse::terrain::{Heights, HullPoints};
 pub use parse::view::{CameraSpec, CavePlace, GroundSpec, LightKind, LightSpec, SkySpec};
 pub use parse::world::{Integrator, Solver, Stepper, UnknownName, WorldSettings, combine_by_name};
+pub use save::{SaveError, SavedWorld, SceneWriter};
 pub use tumble_core::LoopJointKind;
 pub use tumble_core::{Combine, Mode};

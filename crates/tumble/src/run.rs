@@ -13,14 +13,14 @@ use std::time::Instant;
 use tumble::dynamics::World;
 use tumble::net::record::{Recorder, RecorderOptions};
 use tumble::net::world::{contacts, deforming, entities, events, poses, readings};
-use tumble::scene::{SceneFile, open_file, visual_notes};
+use tumble::scene::{SceneFile, SceneWriter, open_file, visual_notes};
 
 /// Largest saved state that is read: a thousand times the size of one of ten thousand bodies.
 const MAX_STATE_BYTES: u64 = 1 << 30;
 
 /// Runs a scene.
 pub fn run(options: &RunOptions) -> Result<(), Failure> {
-    let outputs = [&options.summary, &options.screenshot, &options.save, &options.video];
+    let outputs = [&options.summary, &options.screenshot, &options.save, &options.save_scene, &options.video];
     outputs
         .into_iter()
         .flatten()
@@ -40,6 +40,7 @@ pub fn run(options: &RunOptions) -> Result<(), Failure> {
     if let Some(path) = &options.save {
         write_file(path, &world.save())?;
     }
+    save_scene(&world, &scene, options)?;
     let summary = simulated.tally.summary(&scene.file, &world, start, simulated.time_s, simulated.wall_s);
     if !options.quiet {
         print!("{}", summary.lines());
@@ -125,6 +126,14 @@ fn finish_recording(recorder: Option<Recorder>, options: &RunOptions) -> Result<
     let (Some(recorder), Some(path)) = (recorder, &options.record) else { return Ok(()) };
     recorder.finish().map_err(|e| Failure::run("recording", e))?;
     say(options, "recording", path);
+    Ok(())
+}
+
+fn save_scene(world: &World, scene: &SceneFile, options: &RunOptions) -> Result<(), Failure> {
+    let Some(path) = &options.save_scene else { return Ok(()) };
+    let notes = SceneWriter::new(world).like(scene).save(path).map_err(|e| Failure::run("the scene", e))?;
+    notes.iter().filter(|_| !options.quiet).for_each(|note| println!("{note}"));
+    say(options, "scene", path);
     Ok(())
 }
 

@@ -12,6 +12,7 @@
 //! kept, ids are not: they are new.
 
 mod bodies;
+mod constants;
 mod records;
 mod sensors;
 

@@ -18,6 +18,8 @@ use tumble_collide::{Pose, Shape, TriMesh, Vec3};
 pub(super) struct ShapeTable {
     pub list: Vec<Shape>,
     tables: BTreeMap<usize, u32>,
+    /// Whether shared shapes are written once for each use.
+    pub repeated: bool,
 }
 
 impl ShapeTable {
@@ -25,6 +27,7 @@ impl ShapeTable {
     pub fn index(&mut self, shape: &Shape) -> u32 {
         let next = self.list.len() as u32;
         let address = match shape {
+            _ if self.repeated => None,
             Shape::Mesh(mesh) => Some(Arc::as_ptr(mesh).addr()),
             Shape::Cylinder(cylinder) => Some(Arc::as_ptr(cylinder).addr()),
             Shape::Compound(compound) => Some(Arc::as_ptr(compound).addr()),
@@ -50,6 +53,8 @@ pub(super) fn shape(shapes: &[Shape], index: u32) -> Result<Shape, ArchiveError>
 pub(super) struct MeshTable {
     pub list: Vec<MeshRecord>,
     tables: BTreeMap<usize, u32>,
+    /// Whether no mesh is read.
+    pub skipped: bool,
 }
 
 /// Source of a visual mesh, with its triangles or the reason why they cannot be read.
@@ -57,6 +62,9 @@ pub(super) type MeshRecord = (String, Result<TriMesh, String>);
 
 impl MeshTable {
     fn index(&mut self, mesh: &Arc<VisualMesh>) -> u32 {
+        if self.skipped {
+            return 0;
+        }
         *self.tables.entry(Arc::as_ptr(mesh).addr()).or_insert_with(|| {
             let triangles = mesh.triangles().map(|mesh| TriMesh::clone(mesh)).map_err(str::to_owned);
             self.list.push((mesh.name().to_owned(), triangles));

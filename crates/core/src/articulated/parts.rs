@@ -20,6 +20,23 @@ pub(crate) struct ArticulatedParts {
 }
 
 impl ArticulatedBody {
+    /// Returns the colliders in the order of their parts, each with the moving link that carries it;
+    /// `None` for the base. Poses are in the frame of that link or of the base, about the center of
+    /// the shape.
+    pub fn colliders(&self) -> impl Iterator<Item = (Option<usize>, &Collider)> {
+        self.colliders.iter().map(|part| (part.link, &part.collider))
+    }
+
+    /// Returns the couplings of its degrees of freedom.
+    pub fn couplings(&self) -> &[Coupling] {
+        &self.couplings
+    }
+
+    /// Returns the pairs of moving links that do not collide, sorted; `None` is the base.
+    pub fn excluded_pairs(&self) -> &[[Option<usize>; 2]] {
+        &self.excluded_pairs
+    }
+
     pub(crate) fn to_parts(&self) -> ArticulatedParts {
         ArticulatedParts {
             colliders: self.colliders.iter().map(|part| (part.link, part.collider.clone())).collect(),

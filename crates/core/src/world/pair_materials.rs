@@ -31,7 +31,7 @@ impl World {
     }
 
     /// Returns all pairs that were set, in the order of their sides.
-    pub(crate) fn pair_materials(&self) -> impl Iterator<Item = (&[PairSide; 2], &PairMaterial)> {
+    pub fn pair_materials(&self) -> impl Iterator<Item = (&[PairSide; 2], &PairMaterial)> {
         self.core.pair_materials.iter()
     }
 

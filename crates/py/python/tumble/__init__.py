@@ -3,6 +3,7 @@
 SI units, radians, z up, right-handed axes; quaternions are (x, y, z, w); numpy arrays of float64 in and out.
 """
 
+from tumble._animations import Animation
 from tumble._errors import (
     BusyError,
     InternalError,
@@ -59,10 +60,12 @@ from tumble._native import (
 from tumble._pictures import Camera, save_png
 from tumble._recordings import Recording, read, replay
 from tumble._values import Energy, Event, Momentum, SphereLevel
+from tumble._window import Window
 
 Plane = HalfSpace
 
 __all__ = [
+    "Animation",
     "Articulation",
     "ArticulationBuilder",
     "Batch",
@@ -117,6 +120,7 @@ __all__ = [
     "UnknownNameError",
     "UnreadableFileError",
     "View",
+    "Window",
     "World",
     "__version__",
     "read",

@@ -11,6 +11,7 @@ from typing_extensions import disjoint_base
 
 from tumble._extension import Behavior, Force
 from tumble._values import Energy, Event, Momentum, SphereLevel
+from tumble._window import Window
 from tumble.typing import Axis, CollisionMeshes, Combine, Contacts, Integrator, JointKind, JointType, LockedAxis, MissingMeshes, Mode, SensorKind, Solver, Stepper, TreeMethod
 
 _Floats: TypeAlias = NDArray[np.float64]
@@ -56,7 +57,9 @@ __all__ = [
     "read_recording",
     "show_contacts",
     "simulate",
+    "_WindowFeed",
     "_panic",
+    "_show_window",
     "_unpickle_articulation",
     "_unpickle_batch",
     "_unpickle_built_articulation",
@@ -1817,6 +1820,15 @@ class World:
     @property
     def report(self) -> StepReport:
         """Statistics of the last step."""
+    def save_scene(self, path: _Path) -> list[str]:
+        """Writes the world as it stands to a scene file (``.toml``), with a folder ``NAME_files`` beside it for
+        meshes and the exact state: ``World.load`` of the file goes on with the same bits. Once its text is
+        edited, the text counts.
+
+        Returns notes about things that are not in it, such as generalized forces and visuals that scenes do
+        not have. Forces and behaviors written in Python, and all else that a scene cannot say, raise
+        ``ValueError`` with their names, and nothing is written.
+        """
     def save(self) -> bytes:
         """Returns everything that the next step reads as bytes, for ``restore`` in a world of the same
         bodies. Shapes, masses, settings and drives are not included.
@@ -2172,6 +2184,15 @@ class World:
         run --debug-draw``, such as ``"contacts,forces"``. Without a graphics adapter it raises
         ``PictureError``.
         """
+    def view(self, *, block: bool = False, title: str | None = None, width: int = 1280, height: int = 720) -> Window:
+        """Opens a window on the world and returns it: ``tumble.Window``. A process of its own draws the world as
+        it stands, 60 times a second, while the program steps and changes it. The window closes with the
+        program.
+
+        block: step the world in real time until the window is closed. title, width, height (pixels): of the
+        window. Without a desktop or a graphics adapter, ``block=True`` and later calls of ``is_open`` raise
+        ``PictureError``.
+        """
     def _repr_png_(self) -> bytes | None:
         """Returns a PNG for notebooks, or None without a graphics adapter."""
     def plot_energy(self, duration: float = 5.0, *, ax: Any = None) -> Any:
@@ -2223,6 +2244,18 @@ def _unpickle_built_articulation(data: bytes, numbers: Sequence[Sequence[float]]
     """Unpickles a description of a body made by a program."""
 def _unpickle_shape(data: bytes) -> Shape:
     """Returns the object of its class that a pickled shape becomes."""
+@final
+class _WindowFeed:
+    """Makes the messages of a window."""
+
+    def __new__(cls) -> _WindowFeed: ...
+    def opening(self, world: World, title: str, size: tuple[int, int]) -> bytes:
+        """Returns the first message."""
+    def frame(self, world: World) -> bytes:
+        """Returns the messages of the present state; empty if nothing changed."""
+
+def _show_window() -> None:
+    """Shows the messages of stdin in a window until it is closed or they end."""
 def _unpickle_tree(data: bytes) -> SphereTree:
     """Unpickles a sphere tree."""
 def _unpickle_world(data: bytes) -> World:

@@ -11,8 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tumble._animations import Animation, Shot, instants, write_video
 from tumble._errors import InvalidValueError, UnknownNameError
 from tumble._native import World, read_recording, show_contacts
+from tumble._pictures import Camera
 
 _CONTACT = np.dtype([("bodies", "<u4", (2,)), ("point", "<f8", (3,)), ("normal", "<f8", (3,)), ("depth", "<f8"), ("force", "<f8", (3,))])
 
@@ -77,6 +79,48 @@ class Recording:
         """Returns the orientations of a body, (x, y, z, w), shape (n, 4)."""
         return self.orientations[:, self.index(name)]
 
+    def video(
+        self,
+        path: str | PathLike[str],
+        world: World | None = None,
+        *,
+        width: int = 1280,
+        height: int = 720,
+        fps: float = 30.0,
+        speed: float = 1.0,
+        camera: Camera | None = None,
+    ) -> None:
+        """Writes the recording as a video (``.mp4`` and all that ffmpeg knows), or without ffmpeg as an animated PNG (``.png``, ``.apng``).
+
+        world: a world with the same bodies, for a recording of a world made by a program; it stays as it is. width, height: pixels. fps: images per second. speed: times
+        real time. camera: by default that of the scene. Without ffmpeg or a graphics adapter: ``PictureError``.
+        """
+        if Path(path).suffix.lower() in (".png", ".apng"):
+            self.animation(world, width=width, height=height, fps=fps, speed=speed, camera=camera).save(path)
+        else:
+            write_video(path, self._shots(world, (width, height), fps, speed, camera), fps)
+
+    def animation(
+        self,
+        world: World | None = None,
+        *,
+        width: int = 480,
+        height: int = 320,
+        fps: float = 15.0,
+        speed: float = 1.0,
+        camera: Camera | None = None,
+    ) -> Animation:
+        """Returns an animation for notebooks, which plays without a kernel and without a network; arguments as for ``video``."""
+        return Animation(self._shots(world, (width, height), fps, speed, camera), fps, self.world)
+
+    def _shots(self, world: World | None, size: tuple[int, int], fps: float, speed: float, camera: Camera | None) -> Iterator[Shot]:
+        chosen = instants(self.times, fps, speed)
+        shown = world.fork() if world is not None else _world_of(self, None)
+        for k in chosen:
+            shown.restore(self.states[k])
+            show_contacts(shown, self.names, self.contacts[k].tobytes())
+            yield Shot(float(self.times[k]), shown.render(*size, camera=camera))
+
     def __repr__(self) -> str:
         until = f"{self.times[-1]:g} s" if len(self) else "0 s"
         return f"<tumble.Recording of {self.world}: {len(self)} frames, {len(self.names)} bodies, until {until}>"
@@ -102,11 +146,16 @@ def replay(path: str | PathLike[str], world: World | None = None) -> Iterator[Wo
     rendered, and stepped from any frame. Different bodies raise ``SnapshotError``.
     """
     recording = read(path)
-    if world is None:
-        if recording.world == "World":
-            raise InvalidValueError(f"{path}: the world was made by a program and not from a scene; pass a world with the same bodies as `world`")
-        world = World.load(_scene_of(recording))
-    return _frames(world, recording)
+    return _frames(_world_of(recording, world), recording)
+
+
+def _world_of(recording: Recording, world: World | None) -> World:
+    """Returns the given world, or else that of the scene which the recording names."""
+    if world is not None:
+        return world
+    if recording.world == "World":
+        raise InvalidValueError("the recorded world was made by a program and not from a scene; pass a world with the same bodies as `world`")
+    return World.load(_scene_of(recording))
 
 
 def _scene_of(recording: Recording) -> str:

@@ -1,5 +1,7 @@
 //! Images, recordings and warnings about slow loading.
 
+pub mod orbit;
 pub mod picture;
 pub mod recording;
 pub mod slow;
+pub mod window;

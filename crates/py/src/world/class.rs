@@ -29,7 +29,7 @@ use crate::world::query::{self, Selection};
 use crate::world::report::StepReport;
 use crate::world::rollout::Plan;
 use crate::world::shared::Shared;
-use crate::world::{contacts, pickling, sensors, snapshot};
+use crate::world::{contacts, pickling, save_scene, sensors, snapshot};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
@@ -646,6 +646,18 @@ impl World {
         self.shared.read(|inner| Ok(StepReport::of(&inner.world)))
     }
 
+    /// Writes the world as it stands to a scene file (``.toml``), with a folder ``NAME_files`` beside it for
+    /// meshes and the exact state: ``World.load`` of the file goes on with the same bits. Once its text is
+    /// edited, the text counts.
+    ///
+    /// Returns notes about things that are not in it, such as generalized forces and visuals that scenes do
+    /// not have. Forces and behaviors written in Python, and all else that a scene cannot say, raise
+    /// ``ValueError`` with their names, and nothing is written.
+    fn save_scene(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> Result<Vec<String>> {
+        let path = self::path(path)?;
+        self.shared.work(py, |inner| save_scene::write(inner, &path))
+    }
+
     /// Returns everything that the next step reads as bytes, for ``restore`` in a world of the same
     /// bodies. Shapes, masses, settings and drives are not included.
     fn save<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
@@ -1083,6 +1095,29 @@ impl World {
         overlays: Option<&str>,
     ) -> Result<Bound<'py, PyArray3<u8>>> {
         Shot::new([width, height], camera, facet, cave, overlays)?.take(py, &self.shared)
+    }
+
+    /// Opens a window on the world and returns it: ``tumble.Window``. A process of its own draws the world as
+    /// it stands, 60 times a second, while the program steps and changes it. The window closes with the
+    /// program.
+    ///
+    /// block: step the world in real time until the window is closed. title, width, height (pixels): of the
+    /// window. Without a desktop or a graphics adapter, ``block=True`` and later calls of ``is_open`` raise
+    /// ``PictureError``.
+    #[pyo3(signature = (*, block=false, title=None, width=1280, height=720))]
+    fn view(
+        slf: &Bound<'_, Self>,
+        block: bool,
+        title: Option<&str>,
+        #[pyo3(from_py_with = whole_number)] width: u32,
+        #[pyo3(from_py_with = whole_number)] height: u32,
+    ) -> Result<Py<PyAny>> {
+        let options = PyDict::new(slf.py());
+        options.set_item("block", block)?;
+        options.set_item("title", title)?;
+        options.set_item("width", width)?;
+        options.set_item("height", height)?;
+        Ok(slf.py().import("tumble._window")?.call_method("view", (slf,), Some(&options))?.unbind())
     }
 
     /// Returns a PNG for notebooks, or None without a graphics adapter.

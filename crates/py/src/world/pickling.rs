@@ -33,7 +33,7 @@ struct Record {
 
 /// The stored part of a scene: its name, and the settings of pictures.
 #[derive(Serialize, Deserialize)]
-struct SceneRecord {
+pub struct SceneRecord {
     file: String,
     description: String,
     integrator: String,
@@ -45,12 +45,12 @@ struct SceneRecord {
 }
 
 impl SceneRecord {
-    fn of(scene: &SceneFile) -> SceneRecord {
+    pub fn of(scene: &SceneFile) -> SceneRecord {
         let SceneFile { file, description, camera, cave, lights, sky, ground, world, .. } = scene.clone();
         SceneRecord { file, description, integrator: world.integrator.to_string(), camera, cave, lights, sky, ground }
     }
 
-    fn scene(self) -> Result<SceneFile> {
+    pub fn scene(self) -> Result<SceneFile> {
         let SceneRecord { file, description, integrator, camera, cave, lights, sky, ground } = self;
         let mut scene = SceneFile::parse("", &file)?;
         scene.world.integrator = integrator.parse()?;

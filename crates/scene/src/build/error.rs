@@ -78,6 +78,16 @@ pub enum BuildError {
         /// From the behavior; names the constant.
         why: String,
     },
+    /// The exact state of a saved scene is damaged or of another version.
+    #[error("{scene}: the state in {} cannot be used: {why}; without the line `saved_world` the text counts", file.display())]
+    Saved {
+        /// The scene.
+        scene: String,
+        /// Its file.
+        file: PathBuf,
+        /// From the archive.
+        why: String,
+    },
     /// The world refused a setting.
     #[error("{scene}: {source}")]
     World {

@@ -4,8 +4,8 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::solver::SolverSettings;
 use tumble_core::{
-    ArticulatedBody, Drive, JointPlace, LoopJoint, LoopJointError, LoopJointKind, Material, ObjectId, PairMaterial,
-    PairSide, RigidBody, Settings, Sleep, Visual, World, WorldError,
+    Anchor, ArticulatedBody, Drive, JointPlace, LoopJoint, LoopJointError, LoopJointKind, Material, ObjectId,
+    PairMaterial, PairSide, RigidBody, Settings, Sleep, Visual, World, WorldError,
 };
 
 use crate::build::appearance::{appearance, material_id};
@@ -42,6 +42,11 @@ impl SceneFile {
 
     fn build_for(&self, purpose: Purpose) -> Result<(World, Notes), BuildError> {
         let mut notes = self.notes.clone();
+        if purpose == Purpose::Stepped
+            && let Some(world) = self.saved_world(&mut notes).map_err(|why| self.saved_error(why))?
+        {
+            return Ok((world, notes));
+        }
         let world = |source| BuildError::World { scene: self.file.clone(), source };
         let meshes =
             self.meshes.iter().map(|mesh| self.solid(mesh, purpose, &mut notes)).collect::<Result<Vec<_>, _>>()?;
@@ -86,8 +91,18 @@ impl SceneFile {
     }
 
     fn add_loop_joint(&self, spec: &LoopJointSpec, world: &mut World) -> Result<(), BuildError> {
-        let wrong = |why: String| BuildError::LoopJoint { scene: self.file.clone(), why };
-        let (a, b) = (self.part(world, &spec.a), spec.b.and_then(|b| self.part(world, &b)));
+        let (a, b) = (spec.a.and_then(|a| self.part(world, &a)), spec.b.and_then(|b| self.part(world, &b)));
+        if let Some(anchors) = spec.anchors {
+            let [a, b] = [(a, spec.a), (b, spec.b)].map(|(part, named)| Anchor {
+                part,
+                frame: named.map_or_else(Pose::identity, |named| self.frame_in_part(world, &named)),
+            });
+            let [a, b] = [(a, anchors[0]), (b, anchors[1])].map(|(a, frame)| Anchor { frame: a.frame * frame, ..a });
+            let made = LoopJoint::new(spec.name.as_str(), spec.kind, a, b);
+            let ground = spec.ground_m.map(Vec3::from);
+            let made = made.and_then(|j| j.with_transmission(|t| (t.ground, t.references) = (ground, spec.references)));
+            return self.add_joint(spec, made, world);
+        }
         let place = JointPlace {
             point: Vec3::from(spec.position_m),
             second_point: spec.second_position_m.map(Vec3::from),
@@ -96,8 +111,39 @@ impl SceneFile {
             ground: spec.ground_m.map(Vec3::from),
         };
         let made = LoopJoint::joining(spec.name.as_str(), spec.kind, world, a, b, place);
+        self.add_joint(spec, made, world)
+    }
+
+    fn add_joint(
+        &self,
+        spec: &LoopJointSpec,
+        made: Result<LoopJoint, LoopJointError>,
+        world: &mut World,
+    ) -> Result<(), BuildError> {
+        let wrong = |why: String| BuildError::LoopJoint { scene: self.file.clone(), why };
         let joint = made.and_then(|joint| with_settings(joint, spec)).map_err(|e| wrong(e.to_string()))?;
-        world.add(joint).map(drop).map_err(|e| wrong(e.to_string()))
+        let id = world.add(joint).map_err(|e| wrong(e.to_string()))?;
+        world.set_enabled(id, spec.enabled).map_err(|e| wrong(e.to_string()))
+    }
+
+    /// Returns the pose of the frame of a body or link in that of its part.
+    fn frame_in_part(&self, world: &World, part: &PartSpec) -> Pose {
+        let in_part = match *part {
+            PartSpec::Body(body) => world.find(&self.bodies[body].name).and_then(|id| {
+                let center = world.get::<RigidBody>(id)?.shape().center_of_mass();
+                Some(Pose::from_parts((-center).into(), nalgebra::one()))
+            }),
+            PartSpec::Link(spec, link) => world.find(&self.articulated[spec].name).and_then(|id| {
+                let model = world.get::<ArticulatedBody>(id)?.model();
+                Some(model.frame(&self.articulated[spec].links[link].name)?.pose)
+            }),
+        };
+        in_part.unwrap_or_else(Pose::identity)
+    }
+
+    fn saved_error(&self, why: String) -> BuildError {
+        let file = self.saved.as_ref().map(|saved| saved.path.clone()).unwrap_or_default();
+        BuildError::Saved { scene: self.file.clone(), file, why }
     }
 
     fn add_pair(&self, spec: &PairSpec, world: &mut World) -> Result<(), WorldError> {
@@ -138,7 +184,8 @@ impl SceneFile {
         }
     }
 
-    fn settings(&self) -> Settings {
+    /// Returns the settings of the world.
+    pub(crate) fn settings(&self) -> Settings {
         let (w, base) = (&self.world, Settings::default());
         base.with_gravity(Vec3::from(w.gravity_m_per_s2))
             .with_dt(w.dt_s)

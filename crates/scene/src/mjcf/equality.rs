@@ -80,8 +80,11 @@ fn join(item: &Item<'_>, starts: &[Vec<Pose>], assembly: &mut Assembly<'_, '_>) 
     assembly.scene.loop_joints.push(LoopJointSpec {
         name,
         kind,
-        a,
+        a: Some(a),
         b,
+        anchors: None,
+        references: [Pose::identity(); 2],
+        enabled: true,
         position_m: point.translation.vector.into(),
         second_position_m: None,
         axis: Vec3::z().into(),

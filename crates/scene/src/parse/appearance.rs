@@ -32,7 +32,7 @@ pub enum Pattern {
 }
 
 impl Pattern {
-    const NAMES: Names<Self> = &[
+    pub(crate) const NAMES: Names<Self> = &[
         ("plain", Pattern::Plain),
         ("checker", Pattern::Checker),
         ("grid", Pattern::Grid),

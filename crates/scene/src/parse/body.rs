@@ -128,8 +128,8 @@ impl BodySpec {
             linear_damping_per_s: f.number_or("linear_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
             angular_damping_per_s: f.number_or("angular_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
             collides: f.flag_or("collides", true),
-            group: CollisionGroup::new(f.integer_or("group", GROUPS, 0) as u8).unwrap_or_default(),
-            mask: read_mask(f),
+            group: read_group(f, CollisionGroup::default()),
+            mask: read_mask(f, u64::MAX),
             sensor: f.flag_or("sensor", false),
             enabled: f.flag_or("enabled", true),
             visible: f.flag_or("visible", true),
@@ -161,9 +161,15 @@ pub(crate) fn read_name(f: &mut Fields<'_>) -> Option<String> {
     Some(name.to_owned())
 }
 
-/// Reads the groups of a mask as one bit each; all without the key.
-pub(crate) fn read_mask(f: &mut Fields<'_>) -> u64 {
-    let Some(value) = f.value("mask") else { return u64::MAX };
+/// Reads a collision group.
+pub(crate) fn read_group(f: &mut Fields<'_>, default: CollisionGroup) -> CollisionGroup {
+    let default = default.bit().trailing_zeros();
+    CollisionGroup::new(f.integer_or("group", GROUPS, default) as u8).unwrap_or_default()
+}
+
+/// Reads the groups of a mask as one bit each.
+pub(crate) fn read_mask(f: &mut Fields<'_>, default: u64) -> u64 {
+    let Some(value) = f.value("mask") else { return default };
     let Some(groups) = value.get_ref().as_array() else {
         f.wrong("mask", value, "a list of collision groups, such as [0, 3]");
         return u64::MAX;

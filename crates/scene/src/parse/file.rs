@@ -23,6 +23,7 @@ use crate::parse::problem::Invalid;
 use crate::parse::sensor::SensorSpec;
 use crate::parse::view::{CameraSpec, CavePlace, GroundSpec, LightSpec, SkySpec};
 use crate::parse::world::WorldSettings;
+use crate::save::SavedWorld;
 use tumble_core::collide::ContactMode;
 
 /// Largest scene file in bytes: 16 MiB.
@@ -81,6 +82,8 @@ pub struct SceneFile {
     pub ground: Option<GroundSpec>,
     /// Notes about the file.
     pub notes: Vec<String>,
+    /// The exact state that belongs to the text of a scene that was saved.
+    pub saved: Option<SavedWorld>,
 }
 
 impl SceneFile {
@@ -103,7 +106,10 @@ impl SceneFile {
         // After a syntax error the tree is guesswork, so only syntax errors are reported.
         let scene = parse_toml(&log, text).map(|root| SceneFile::read(&log, &root, file_name, files));
         match scene {
-            Some(scene) if log.count() == 0 => Ok(scene),
+            Some(mut scene) if log.count() == 0 => {
+                scene.saved = scene.saved.take().map(|saved| saved.belonging_to(&scene));
+                Ok(scene)
+            }
             _ => Err(invalid(log, text, file_name)),
         }
     }
@@ -113,6 +119,7 @@ impl SceneFile {
         let place = Place { folder, files };
         let mut f = Fields::of_table(log, root, 0..0, "the scene");
         let description = f.optional_text("description").map_or("", |(text, _)| text).to_owned();
+        let saved = SavedWorld::read(&mut f, folder);
         let world = read_table(&mut f, "world", WorldSettings::read).unwrap_or_default();
         let materials = read_named(&mut f, "materials", |name, table| Some(MaterialSpec::read(name, table)));
         let meshes = read_named(&mut f, "meshes", |name, table| MeshSpec::read(name, table, folder));
@@ -157,6 +164,7 @@ impl SceneFile {
             sky,
             ground,
             notes: Vec::new(),
+            saved,
         }
     }
 }

@@ -17,7 +17,7 @@ const MAX_SAMPLES: usize = 100_000;
 /// A joint at time 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointSpec {
-    /// The name: in a scene that of the link it moves, in a URDF its own.
+    /// The name: its own, in a scene without one that of the link it moves.
     pub name: String,
     /// The type of joint; its axis has unit length.
     pub kind: Joint,
@@ -170,7 +170,8 @@ impl JointSpec {
             Kind::Prismatic => Joint::Prismatic { axis: axis(f) },
             Kind::Spherical => Joint::Spherical,
         };
-        let mut joint = JointSpec::new(name, kind);
+        let own = f.optional_text("joint_name").map(|(own, _)| own);
+        let mut joint = JointSpec::new(own.unwrap_or(name), kind);
         joint.read_effects(f);
         Some(joint)
     }

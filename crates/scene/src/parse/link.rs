@@ -9,11 +9,12 @@ use tumble_core::collide::{ContactMode, Mat3, Pose, TriMesh, Vec3};
 use tumble_core::{CollisionGroup, Joint, Material};
 
 use crate::parse::appearance::{AppearanceSpec, Color, as_color};
-use crate::parse::body::{Library, MassSpec, read_material, read_name};
+use crate::parse::body::{Library, MassSpec, read_group, read_mask, read_material, read_name};
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Value};
 use crate::parse::joint::JointSpec;
 use crate::parse::material::read_contact;
+use crate::parse::mesh::read_path;
 use crate::parse::mount::Mounts;
 use crate::parse::rotation;
 use crate::parse::shape::ShapeSpec;
@@ -155,8 +156,8 @@ impl Surface {
             material: material.or(base.material),
             contact: read_contact(f, contact),
             contacts: f.choice_or("contacts", CONTACTS, base.contacts),
-            group: base.group,
-            mask: base.mask,
+            group: read_group(f, base.group),
+            mask: read_mask(f, base.mask),
             appearance: AppearanceSpec::read(f, appearance),
         }
     }
@@ -274,6 +275,9 @@ fn read_shapes(f: &mut Fields<'_>, from: &Inherited<'_, '_>) -> Vec<LinkShape> {
 
 impl LinkShape {
     fn read(mut f: Fields<'_>, from: &Inherited<'_, '_>) -> Option<LinkShape> {
+        if f.value("type").and_then(|value| value.get_ref().as_str()) == Some("visual_mesh") {
+            return LinkShape::read_visual(f, from);
+        }
         let Some(shape) = ShapeSpec::read_part(&mut f, &from.library.meshes) else {
             f.give_up();
             return None;
@@ -305,12 +309,28 @@ impl LinkShape {
     }
 }
 
+impl LinkShape {
+    /// Reads a mesh that is only drawn, from its file.
+    fn read_visual(mut f: Fields<'_>, from: &Inherited<'_, '_>) -> Option<LinkShape> {
+        let folder = f.log.folder().to_path_buf();
+        let scale = f.number_or("scale", Bound::POSITIVE, 1.0);
+        let path = read_path(&mut f, &folder);
+        let (pose, surface) = (rotation::read_pose(&mut f), Surface::read(&mut f, from.library, from.surface));
+        let visible = f.flag_or("visible", from.visible);
+        let place = f.what.clone();
+        f.finish();
+        let geometry = Geometry::File { path: path?, scale: [scale; 3], place, hull: false, required: true };
+        Some(LinkShape { pose, geometry, mass: None, surface, collides: false, visible })
+    }
+}
+
 fn read_mass(f: &mut Fields<'_>, shapes: &[LinkShape], fixed: bool) -> LinkMassSpec {
     let mass = f.optional_number("mass_kg", Bound::POSITIVE);
     let density = f.optional_number("density_kg_per_m3", Bound::POSITIVE);
     let center = f.optional_vector::<3>("center_m", Bound::ANY);
     let inertia = read_inertia(f);
-    let own = shapes.iter().filter(|s| s.mass.is_some()).count();
+    let solid = |shape: &&LinkShape| matches!(shape.geometry, Geometry::Shape(_));
+    let (own, solids) = (shapes.iter().filter(|s| s.mass.is_some()).count(), shapes.iter().filter(solid).count());
     let given = mass.is_some() || density.is_some() || center.is_some() || inertia.is_some();
     let contradiction =
         |message: &str, expected: &str| f.log.report(f.span.clone(), format!("{} {message}", f.what), expected);
@@ -320,26 +340,26 @@ fn read_mass(f: &mut Fields<'_>, shapes: &[LinkShape], fixed: bool) -> LinkMassS
         contradiction("has both `mass_kg` and `density_kg_per_m3`", "expected one of them");
     } else if (center.is_some() || inertia.is_some()) && mass.is_none() {
         contradiction("has `center_m` or `inertia_kg_m2` but no `mass_kg`", "expected `mass_kg` with them");
-    } else if inertia.is_none() && center.is_some() && !shapes.is_empty() {
+    } else if inertia.is_none() && center.is_some() && solids > 0 {
         contradiction(
             "has `center_m` but no `inertia_kg_m2`",
             "expected both, or neither: the mass is then distributed over the shapes",
         );
-    } else if own > 0 && own < shapes.len() {
+    } else if own > 0 && own < solids {
         contradiction(
             "has shapes with a mass and shapes without",
             "expected a mass for each shape, or one for the link",
         );
-    } else if !given && own == 0 && !shapes.is_empty() && !fixed {
+    } else if !given && own == 0 && solids > 0 && !fixed {
         f.missing("mass_kg", "`mass_kg` or `density_kg_per_m3` for the link, or for each of its shapes");
-    } else if density.is_some() && shapes.is_empty() {
+    } else if density.is_some() && solids == 0 {
         contradiction(
             "has a density but no shape",
             "expected a shape, or `mass_kg` with `center_m` and `inertia_kg_m2`",
         );
     }
     match (mass, density) {
-        (Some(mass), _) if inertia.is_some() || shapes.is_empty() => {
+        (Some(mass), _) if inertia.is_some() || solids == 0 => {
             let center = Vec3::from(center.unwrap_or_default());
             LinkMassSpec::Given(LinkMass { mass, center, inertia: inertia.unwrap_or_default() })
         }

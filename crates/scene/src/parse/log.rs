@@ -40,6 +40,11 @@ impl<'a> Log<'a> {
         &self.file
     }
 
+    /// Returns the whole text.
+    pub(crate) fn text(&self) -> &'a str {
+        self.text
+    }
+
     /// Returns the folder that file names in the text are relative to.
     pub(crate) fn folder(&self) -> &std::path::Path {
         &self.folder

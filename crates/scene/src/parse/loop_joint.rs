@@ -1,13 +1,14 @@
 //! `[[loop_joint]]`: a joint between two parts of any objects. It may close a loop.
 
 use tumble_core::articulated::{DofSettings, Spring};
-use tumble_core::collide::Vec3;
+use tumble_core::collide::{Pose, Vec3};
 use tumble_core::{Joint, LoopJointKind};
 
 use crate::parse::body::read_name;
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Value};
 use crate::parse::joint::JointSpec;
+use crate::parse::rotation;
 
 /// A part of an object in the description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,10 +26,17 @@ pub struct LoopJointSpec {
     pub name: String,
     /// Which motion it leaves free.
     pub kind: LoopJointKind,
-    /// One side.
-    pub a: PartSpec,
+    /// One side; `None`, only with `anchors`, is the world.
+    pub a: Option<PartSpec>,
     /// The other side; `None` is the world.
     pub b: Option<PartSpec>,
+    /// Frames of the joint in the frames of its two bodies or links, or in the world; instead of
+    /// positions and axes.
+    pub anchors: Option<[Pose; 2]>,
+    /// Frames in the world at which gears and racks have position 0, with `anchors`.
+    pub references: [Pose; 2],
+    /// Takes part in the simulation; a broken joint does not. Default true.
+    pub enabled: bool,
     /// Position of the joint, world axes at time 0, m; for kinds with a length its end on `a`.
     pub position_m: [f64; 3],
     /// Its end on `b` for kinds with a length, world axes at time 0, m.
@@ -103,12 +111,19 @@ impl LoopJointSpec {
             f.give_up();
             return None;
         };
-        let a = f.text("a", "the name of a body, or \"OBJECT/LINK\"");
+        let (anchors, references) = (read_frames(&mut f, ["anchor_a", "anchor_b"]), ["reference_a", "reference_b"]);
+        let references = anchors.and_then(|_| read_frames(&mut f, references)).unwrap_or([Pose::identity(); 2]);
+        let placed = anchors.is_none();
         let b = f.optional_text("b");
-        let position_m = f.vector("position_m", Bound::ANY);
-        let second_position_m = kind.has_length().then(|| f.vector("second_position_m", Bound::ANY));
-        let axis = if kind.has_axis() { f.direction("axis") } else { [0.0, 0.0, 1.0] };
+        let a = match f.optional_text("a") {
+            None if placed || b.is_none() => f.text("a", "the name of a body, or \"OBJECT/LINK\""),
+            a => a,
+        };
+        let position_m = if placed { f.vector("position_m", Bound::ANY) } else { [0.0; 3] };
+        let second_position_m = (placed && kind.has_length()).then(|| f.vector("second_position_m", Bound::ANY));
+        let axis = if placed && kind.has_axis() { f.direction("axis") } else { [0.0, 0.0, 1.0] };
         let second_axis = match kind {
+            _ if !placed => None,
             LoopJointKind::Universal | LoopJointKind::Rack => Some(f.direction("second_axis")),
             LoopJointKind::Gear => Some(f.direction_or("second_axis", axis)),
             _ => None,
@@ -120,18 +135,26 @@ impl LoopJointSpec {
         let teeth = if kind == LoopJointKind::Gear { read_teeth(&mut f) } else { [1; 2] };
         let radius_m = if kind == LoopJointKind::Rack { read_not_zero(&mut f, "radius_m") } else { 1.0 };
         let pitch_m = if kind == LoopJointKind::Screw { read_not_zero(&mut f, "pitch_m") } else { 1.0 };
-        let length_m = if kind.has_length() { f.optional_number("length_m", Bound::NOT_NEGATIVE) } else { None };
+        let length_m = match kind.has_length() {
+            true if placed => f.optional_number("length_m", Bound::NOT_NEGATIVE),
+            true => Some(f.number("length_m", Bound::NOT_NEGATIVE)),
+            false => None,
+        };
         let settings = read_settings(&mut f, kind, Vec3::from(axis));
         let breaking_force_n = f.number_or("breaking_force_n", Bound::POSITIVE, f64::INFINITY);
         let breaking_torque_n_m = f.number_or("breaking_torque_n_m", Bound::POSITIVE, f64::INFINITY);
+        let enabled = f.flag_or("enabled", true);
         let expected = "a part other than `a`; or no `b`, which is the world";
         let sides = parts.sides(&f, [a, b], |name| parts.part(name), expected);
         f.finish();
         Some(LoopJointSpec {
             name,
             kind,
-            a: sides[0]?,
+            a: if a.is_some() { Some(sides[0]?) } else { None },
             b: sides[1],
+            anchors,
+            references,
+            enabled,
             position_m,
             second_position_m,
             axis,
@@ -148,6 +171,17 @@ impl LoopJointSpec {
             breaking_torque_n_m,
         })
     }
+}
+
+/// Reads two poses, if either key is present; an absent one is the identity.
+fn read_frames(f: &mut Fields<'_>, keys: [&'static str; 2]) -> Option<[Pose; 2]> {
+    let frames = keys.map(|key| {
+        let mut table = f.table(key, "{ position_m = [0, 0, 1] }")?;
+        let pose = rotation::read_pose(&mut table);
+        table.finish();
+        Some(pose)
+    });
+    frames.iter().any(Option::is_some).then(|| frames.map(|frame| frame.unwrap_or_else(Pose::identity)))
 }
 
 /// Reads the settings of the position of a joint, if it has one.

@@ -232,7 +232,7 @@ fn read_torus(f: &mut Fields<'_>) -> MeshSource {
 }
 
 /// Reads the path of a mesh file: an existing OBJ, STL, PLY or COLLADA file.
-pub(super) fn read_path(f: &mut Fields<'_>, folder: &Path) -> Option<PathBuf> {
+pub(crate) fn read_path(f: &mut Fields<'_>, folder: &Path) -> Option<PathBuf> {
     read_file(f, folder, &["obj", "stl", "ply", "dae"], "the path of an .obj, .stl, .ply or .dae file")
 }
 

@@ -85,7 +85,7 @@ fn the_example_of_every_key_means_what_it_says() {
     let sling = &scene.loop_joints[0];
     assert_eq!(
         (sling.kind, sling.a, sling.b),
-        (LoopJointKind::Spherical, PartSpec::Link(0, crane.link("hook").unwrap()), Some(PartSpec::Body(0)))
+        (LoopJointKind::Spherical, Some(PartSpec::Link(0, crane.link("hook").unwrap())), Some(PartSpec::Body(0)))
     );
 }
 

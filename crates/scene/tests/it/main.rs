@@ -18,6 +18,7 @@ mod pinocchio;
 mod repair;
 mod robots;
 mod robust;
+mod saving;
 mod scenes_in_motion;
 mod sensors;
 mod shipped;

@@ -208,6 +208,10 @@ pub struct RunOptions {
     /// Simulated time of the run, s (default: from the scene).
     #[arg(long, help_heading = "Stepping", value_name = "S", value_parser = seconds)]
     pub duration: Option<f64>,
+    /// Write the world at the end as a scene, with its files beside it; running that goes on with the same
+    /// bits.
+    #[arg(long, help_heading = "Results", value_name = "FILE.toml")]
+    pub save_scene: Option<PathBuf>,
     /// Write a recording (MCAP; opens in Foxglove).
     #[arg(long, help_heading = "Results", value_name = "FILE")]
     pub record: Option<PathBuf>,

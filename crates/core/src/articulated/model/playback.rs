@@ -67,6 +67,21 @@ impl Playback {
         Ok(playback)
     }
 
+    /// Returns the times of the samples, s.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// Returns the positions of the samples, rad or m.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Returns whether the motion repeats without end.
+    pub fn repeats(&self) -> bool {
+        self.repeats
+    }
+
     /// Makes a motion that repeats without end; its last value must equal its first.
     ///
     /// # Errors

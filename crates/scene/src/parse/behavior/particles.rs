@@ -62,7 +62,7 @@ impl ParticleSystemSpec {
             wind: Vec3::from(f.vector_or("wind_m_per_s", Bound::ANY, [0.0; 3])),
             collides: f.flag_or("collides", usual.collides),
             group: CollisionGroup::new(f.integer_or("group", GROUPS, 0) as u8).unwrap_or_default(),
-            mask: read_mask(f),
+            mask: read_mask(f, u64::MAX),
             two_way: f.flag_or("two_way", usual.two_way),
         };
         let emitters = f.tables("emitter", MOST_EMITTERS);

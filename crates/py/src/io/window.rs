@@ -1,0 +1,273 @@
+//! A window on a world of a program: the program publishes frames, and a process of its own draws
+//! them, because a window needs the main thread of its process.
+//!
+//! | message | bytes |
+//! |---|---|
+//! | kind: 0 opening, 1 object table, 2 frame | 1 |
+//! | number of the frame, simulated time (s), length of the rest, little-endian | 8, 8, 4 |
+//! | title, size and views in postcard; a NetSync snapshot; a NetSync state | any |
+
+use crate::errors::{Error, Result};
+use crate::io::orbit::Orbit;
+use crate::world::class::World;
+use crate::world::pickling::SceneRecord;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use serde::{Deserialize, Serialize};
+use std::io::{ErrorKind, Read};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+use tumble::dynamics::World as Core;
+use tumble::dynamics::archive::{open, seal};
+use tumble::net::sync::{MAX_CONTACTS, Mirror, Publisher, Viewer};
+use tumble::render::winit::event::{ElementState, WindowEvent};
+use tumble::render::winit::keyboard::{Key, NamedKey};
+use tumble::render::{
+    Camera, DebugDraw, DrawList, Drawing, Next, Quality, Screen, WindowApp, WindowOptions, run_window,
+};
+
+const HEAD: &[u8; 8] = b"tumbleW1";
+const HEADER_BYTES: usize = 21;
+/// Largest message.
+const MAX_BYTES: usize = 1 << 30;
+/// Time between two pictures.
+const INTERVAL: Duration = Duration::from_millis(16);
+
+/// The first message.
+#[derive(Serialize, Deserialize)]
+struct Opening {
+    title: String,
+    size: [u32; 2],
+    scene: SceneRecord,
+}
+
+fn message(kind: u8, frame: u64, time: f64, body: &[u8]) -> Result<Vec<u8>> {
+    let length = u32::try_from(body.len()).ok().filter(|n| *n as usize <= MAX_BYTES);
+    let length = length.ok_or_else(|| Error::value("the world is too large for a window"))?;
+    Ok([&[kind][..], &frame.to_le_bytes(), &time.to_le_bytes(), &length.to_le_bytes(), body].concat())
+}
+
+/// Makes the messages of a window.
+#[pyclass(frozen, module = "tumble._native")]
+pub struct _WindowFeed {
+    publisher: Mutex<(Publisher, Vec<u8>, u64)>,
+}
+
+#[pymethods]
+impl _WindowFeed {
+    #[new]
+    fn new() -> Result<_WindowFeed> {
+        let publisher = Publisher::new(&Core::default(), false, 0).with_contacts(MAX_CONTACTS);
+        Ok(_WindowFeed { publisher: Mutex::new((publisher, Vec::new(), 0)) })
+    }
+
+    /// Returns the first message.
+    fn opening<'py>(
+        &self,
+        py: Python<'py>,
+        world: &Bound<'_, World>,
+        title: String,
+        size: [u32; 2],
+    ) -> Result<Bound<'py, PyBytes>> {
+        let scene = world.get().shared.read(|inner| Ok(SceneRecord::of(&inner.scene)))?;
+        Ok(PyBytes::new(py, &message(0, 0, 0.0, &seal(HEAD, &Opening { title, size, scene })?)?))
+    }
+
+    /// Returns the messages of the present state; empty if nothing changed.
+    fn frame<'py>(&self, py: Python<'py>, world: &Bound<'_, World>) -> Result<Bound<'py, PyBytes>> {
+        let mut kept = self.publisher.lock().unwrap_or_else(PoisonError::into_inner);
+        let (publisher, last, count) = &mut *kept;
+        let bytes = world.get().shared.read(|inner| {
+            let frame = publisher
+                .publish(&inner.world, &Viewer::default(), *count + 1)
+                .map_err(|e| Error::value(e.to_string()))?;
+            if !frame.fresh && frame.state == *last {
+                return Ok(Vec::new());
+            }
+            *count += 1;
+            let time = inner.world.time();
+            let table = match frame.fresh {
+                true => message(1, *count, time, &publisher.snapshot())?,
+                false => Vec::new(),
+            };
+            let state = message(2, *count, time, &frame.state)?;
+            *last = frame.state;
+            Ok([table, state].concat())
+        })?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+}
+
+/// Shows the messages of stdin in a window until it is closed or they end.
+#[pyfunction]
+pub fn _show_window(py: Python<'_>) -> Result<()> {
+    py.detach(|| {
+        let mut input = std::io::stdin().lock();
+        let Some((0, _, _, opening)) = read(&mut input)? else {
+            return Err(Error::value("the messages of a window do not begin with its opening"));
+        };
+        let opening: Opening = open(HEAD, &opening).map_err(Error::Archive)?;
+        drop(input);
+        let shown = Arc::new(Shown::default());
+        let feed = shown.clone();
+        std::thread::spawn(move || feed.follow());
+        let mut app = App::new(&opening.title, opening.scene.scene()?, shown);
+        run_window(&WindowOptions::new(opening.title, opening.size), &mut app)
+    })
+}
+
+/// Reads a message; `None` at the end.
+fn read(input: &mut impl Read) -> Result<Option<(u8, u64, f64, Vec<u8>)>> {
+    let failed = |source| Error::File { file: "the messages of a window".into(), source };
+    let mut head = [0; HEADER_BYTES];
+    match input.read_exact(&mut head) {
+        Err(e) if e.kind() == ErrorKind::UnexpectedEof => return Ok(None),
+        outcome => outcome.map_err(failed)?,
+    }
+    let eight = |at: usize| head[at..at + 8].try_into().unwrap_or_default();
+    let length = u32::from_le_bytes(head[17..21].try_into().unwrap_or_default()) as usize;
+    if length > MAX_BYTES {
+        return Err(Error::value(format!("a message of {length} bytes")));
+    }
+    let mut body = Vec::new();
+    input.take(length as u64).read_to_end(&mut body).map_err(failed)?;
+    if body.len() < length {
+        return Ok(None);
+    }
+    Ok(Some((head[0], u64::from_le_bytes(eight(1)), f64::from_le_bytes(eight(9)), body)))
+}
+
+/// The world of the window, which a thread keeps up to date.
+struct Shown {
+    mirror: Mutex<Mirror>,
+    /// Whether the mirror has changed since it was drawn.
+    fresh: AtomicBool,
+    ended: AtomicBool,
+}
+
+impl Default for Shown {
+    fn default() -> Shown {
+        let mirror = Mutex::new(Mirror::new(Core::default()));
+        Shown { mirror, fresh: AtomicBool::new(false), ended: AtomicBool::new(false) }
+    }
+}
+
+impl Shown {
+    fn mirror(&self) -> MutexGuard<'_, Mirror> {
+        self.mirror.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Applies messages until they end.
+    fn follow(&self) {
+        let mut input = std::io::stdin().lock();
+        loop {
+            let applied = match read(&mut input) {
+                Ok(Some((1, _, _, table))) => self.mirror().apply_snapshot(&table),
+                Ok(Some((2, frame, time, state))) => self.mirror().apply_state(frame, time, &state),
+                Ok(_) => break,
+                Err(error) => {
+                    eprintln!("window: {error}");
+                    break;
+                }
+            };
+            if let Err(error) = applied {
+                eprintln!("window: {error}");
+                break;
+            }
+            self.fresh.store(true, Ordering::Release);
+        }
+        self.ended.store(true, Ordering::Release);
+    }
+}
+
+struct App {
+    name: String,
+    shown: Arc<Shown>,
+    drawing: Drawing,
+    overlays: DebugDraw,
+    list: Option<DrawList>,
+    /// The camera of the first list.
+    home: Option<Camera>,
+    orbit: Orbit,
+    quality: Quality,
+    stale: bool,
+    ended: bool,
+}
+
+impl App {
+    fn new(name: &str, scene: tumble::scene::SceneFile, shown: Arc<Shown>) -> App {
+        App {
+            name: name.into(),
+            shown,
+            drawing: Drawing::new(&scene),
+            overlays: DebugDraw::default(),
+            list: None,
+            home: None,
+            orbit: Orbit::default(),
+            quality: Quality::default(),
+            stale: true,
+            ended: false,
+        }
+    }
+
+    /// Makes the draw list of the newest state.
+    fn update(&mut self, screen: &Screen) -> Result<()> {
+        let mirror = self.shown.mirror();
+        let mut list = self.drawing.list(mirror.world(), &self.overlays)?;
+        screen.window().set_title(&format!("{}  {:.2} s", self.name, mirror.world().time()));
+        drop(mirror);
+        self.quality.apply(&mut list.settings);
+        self.list = Some(list);
+        Ok(())
+    }
+
+    fn key(&mut self, key: &Key) {
+        match key {
+            Key::Named(NamedKey::Home) => self.orbit = Orbit::default(),
+            Key::Named(NamedKey::Escape) => self.ended = true,
+            Key::Character(c) if c == "q" => self.ended = true,
+            Key::Character(c) if c == "c" => self.overlays.contacts = !self.overlays.contacts,
+            _ => return,
+        }
+        self.shown.fresh.store(true, Ordering::Release);
+    }
+}
+
+impl WindowApp for App {
+    type Error = Error;
+
+    fn opened(&mut self, screen: &mut Screen) -> Result<()> {
+        self.quality = if screen.is_software() { Quality::fast() } else { Quality::default() };
+        Ok(())
+    }
+
+    fn event(&mut self, screen: &mut Screen, event: &WindowEvent) -> Result<()> {
+        match event {
+            WindowEvent::KeyboardInput { event, .. } if event.state == ElementState::Pressed => {
+                self.key(&event.logical_key);
+            }
+            event => self.stale |= self.orbit.handle(event, screen.size_px()),
+        }
+        Ok(())
+    }
+
+    fn turn(&mut self, screen: &mut Screen) -> Result<Next> {
+        if self.ended || self.shown.ended.load(Ordering::Acquire) {
+            return Ok(Next::End);
+        }
+        let begin = Instant::now();
+        if self.shown.fresh.swap(false, Ordering::AcqRel) {
+            self.update(screen)?;
+            self.stale = true;
+        }
+        if let Some(list) = self.list.as_ref().filter(|_| self.stale) {
+            let camera = self.orbit.camera(self.home.get_or_insert(list.camera));
+            let [width, height] = screen.size_px();
+            screen.renderer().draw(&camera, list, width, height)?;
+            screen.show()?;
+            self.stale = false;
+        }
+        Ok(Next::At(begin + INTERVAL))
+    }
+}

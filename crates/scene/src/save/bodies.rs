@@ -1,0 +1,124 @@
+//! `[[body]]` of a rigid body as it stands.
+
+use tumble_core::collide::{ContactMode, Mat3, Pose, Vec3};
+use tumble_core::{Material, Mode, Object, ObjectId, RigidBody, Visual, VisualGeometry};
+
+use super::Writer;
+use super::shapes::is_same;
+use super::surface;
+use super::text::Table;
+use crate::parse::appearance::AppearanceSpec;
+
+impl Writer<'_> {
+    /// Writes a rigid body.
+    pub(super) fn body(&mut self, id: ObjectId, name: &str, body: &RigidBody) {
+        let (Some(status), Some(part), Some(center)) =
+            (self.world.status(id), self.world.part_state(id, 0), self.world.center_state(id))
+        else {
+            return;
+        };
+        let mut t = Table::of("name", name);
+        t.put_unless(
+            "dynamic",
+            "mode",
+            match status.mode {
+                Mode::Dynamic => "dynamic",
+                Mode::Static => "static",
+                Mode::Kinematic => "kinematic",
+            },
+        );
+        t.put("shape", self.meshes.shape(body.shape()));
+        if !body.is_fixed() {
+            t.extend(mass(body));
+        }
+        t.put_pose(&body.frame_of(&part.pose));
+        if status.mode != Mode::Static {
+            t.put_unless(Vec3::zeros(), "velocity_m_per_s", center.velocity);
+            t.put_unless(Vec3::zeros(), "angular_velocity_rad_per_s", center.angular_velocity);
+        }
+        let (contact, look) = self.surface_of(&body.material, &mut t);
+        t.extend(surface::contact(&body.material, &contact));
+        t.put_unless(ContactMode::Surface, "contacts", body.contact_mode);
+        t.put_unless(1.0, "gravity_scale", body.gravity_scale);
+        let locked: Vec<&str> = body.locked.names().collect();
+        t.put_unless(Vec::new(), "locked", locked);
+        t.put_unless(0.0, "linear_damping_per_s", body.linear_damping);
+        t.put_unless(0.0, "angular_damping_per_s", body.angular_damping);
+        t.put_unless(true, "collides", status.collidable);
+        t.extend(surface::groups(body.group, body.mask));
+        t.put_unless(false, "sensor", body.sensor);
+        t.put_unless(true, "enabled", status.enabled);
+        t.extend(self.look(name, body, &look));
+        self.out += &t.under("[[body]]");
+    }
+
+    /// Returns contact constants and appearance of the material that a part names, and writes its
+    /// name; without one the default ones.
+    pub(super) fn surface_of(&self, material: &Material, t: &mut Table) -> (Material, AppearanceSpec) {
+        match self.materials.iter().find(|(id, _)| *id == material.id) {
+            Some((_, spec)) => {
+                t.put("material", &spec.name);
+                (spec.contact, spec.appearance.clone())
+            }
+            None => (Material::default(), AppearanceSpec::default()),
+        }
+    }
+
+    /// Returns the keys of a body's appearance, camera and light.
+    fn look(&mut self, name: &str, body: &RigidBody, base: &AppearanceSpec) -> Table {
+        let center = body.shape().center_of_mass();
+        let mut t = Table::default();
+        let visuals = body.renderable().map_or(&[][..], |r| r.visuals());
+        match visuals.first() {
+            None => t.put("visible", false),
+            Some(visual) => {
+                t.extend(surface::appearance(&visual.appearance, &center, base));
+                self.note_shader(name, visual);
+                if visuals.len() > 1 || !is_own_shape(visual, body) {
+                    self.notes
+                        .push(format!("body \"{name}\": it is drawn as its shape; its own visuals are not written"));
+                }
+            }
+        }
+        let cameras = body.camera().map_or(&[][..], |c| c.cameras());
+        let lights = body.light().map_or(&[][..], |l| l.lights());
+        cameras.iter().take(1).for_each(|camera| t.put("camera", surface::camera(camera, &center)));
+        lights.iter().take(1).for_each(|light| t.put("light", surface::light(light, &center)));
+        if cameras.len().max(lights.len()) > 1 {
+            self.notes.push(format!("body \"{name}\": only its first camera and its first light are written"));
+        }
+        t
+    }
+
+    /// Notes a shader that is no pattern of scene files.
+    pub(super) fn note_shader(&mut self, name: &str, visual: &Visual) {
+        let shader = &visual.appearance.shader;
+        if !surface::is_pattern(shader) {
+            self.fault(format!("\"{name}\": its shader '{shader}' is no pattern of scene files"));
+        }
+    }
+}
+
+fn is_own_shape(visual: &Visual, body: &RigidBody) -> bool {
+    let own = matches!(&visual.geometry, VisualGeometry::Shape(shape) if is_same(shape, body.shape()));
+    own && visual.pose == Pose::identity() && visual.stands_in_for.is_empty()
+}
+
+/// Returns mass, center of mass and inertia; the last two only if they are not those of the uniform
+/// shape.
+fn mass(body: &RigidBody) -> Table {
+    let mut t = Table::of("mass_kg", body.mass());
+    if body.center_in_part() != Vec3::zeros() {
+        t.put("center_m", body.center_of_mass());
+    }
+    let uniform = RigidBody::fixed(body.shape().clone()).with_mass(body.mass());
+    if uniform.validate().is_err() || uniform.inertia() != body.inertia() {
+        t.put("inertia_kg_m2", inertia(body.inertia()));
+    }
+    t
+}
+
+/// Returns a symmetric matrix as `[xx, yy, zz, xy, xz, yz]`.
+pub(super) fn inertia(m: &Mat3) -> [f64; 6] {
+    [m.m11, m.m22, m.m33, m.m12, m.m13, m.m23]
+}

@@ -1,0 +1,158 @@
+//! `[[loop_joint]]` and `[[pair]]`.
+
+use std::collections::BTreeSet;
+
+use tumble_core::collide::Pose;
+use tumble_core::{
+    Anchor, ArticulatedBody, DofSettings, LoopJoint, LoopJointKind, ObjectId, PairMaterial, PairSide, Transmission,
+};
+
+use super::Writer;
+use super::articulated::dof_settings;
+use super::text::Table;
+
+impl Writer<'_> {
+    /// Writes a loop joint by the frames of its two sides.
+    pub(super) fn loop_joint(&mut self, id: ObjectId, name: &str, joint: &LoopJoint) {
+        let kind = joint.kind();
+        let mut t = Table::of("name", name);
+        t.put("type", kind.name());
+        let [a, b] = joint.sides();
+        let ((part_a, frame_a), (part_b, frame_b)) = (self.anchor(&a), self.anchor(&b));
+        part_a.iter().for_each(|a| t.put("a", a));
+        part_b.iter().for_each(|b| t.put("b", b));
+        t.put("anchor_a", pose(&frame_a));
+        t.put("anchor_b", pose(&frame_b));
+        let Transmission { teeth, radius, pitch, ratio, ground, references } = joint.transmission();
+        match kind {
+            LoopJointKind::Gear => t.put("teeth", *teeth),
+            LoopJointKind::Rack => t.put("radius_m", *radius),
+            LoopJointKind::Screw => t.put("pitch_m", *pitch),
+            LoopJointKind::Pulley => {
+                t.put("ground_position_m", ground[0]);
+                t.put("second_ground_position_m", ground[1]);
+                t.put_unless(1.0, "ratio", *ratio);
+            }
+            _ => {}
+        }
+        if matches!(kind, LoopJointKind::Gear | LoopJointKind::Rack) {
+            t.put("reference_a", pose(&references[0]));
+            t.put("reference_b", pose(&references[1]));
+        }
+        if kind.has_length() {
+            t.put("length_m", joint.length());
+        }
+        if kind.has_position() {
+            let mut dof = joint.dof().clone();
+            if kind == LoopJointKind::Spring {
+                t.put("stiffness_n_per_m", dof.spring.map_or(0.0, |spring| spring.stiffness));
+                dof.spring = None;
+            }
+            t.extend(dof_settings(&dof, kind == LoopJointKind::Revolute));
+        } else if *joint.dof() != DofSettings::default() {
+            self.fault(format!("loop joint \"{name}\": settings of a position that it does not have"));
+        }
+        let [force, torque] = joint.breaking();
+        t.put_unless(f64::INFINITY, "breaking_force_n", force);
+        t.put_unless(f64::INFINITY, "breaking_torque_n_m", torque);
+        t.put_unless(true, "enabled", self.world.status(id).is_none_or(|status| status.enabled));
+        self.out += &t.under("[[loop_joint]]");
+    }
+
+    /// Returns the name of the part of a side, and its frame in the frame of the body or link;
+    /// no name for the world.
+    fn anchor(&mut self, side: &Anchor) -> (Option<String>, Pose) {
+        let Anchor { part, frame } = side;
+        let Some((id, part)) = *part else { return (None, *frame) };
+        let Some(name) = self.world.name(id).map(str::to_owned) else {
+            self.fault("a loop joint of an object that was removed".into());
+            return (None, *frame);
+        };
+        let Some(body) = self.world.get::<ArticulatedBody>(id) else {
+            let center = self.world.get::<tumble_core::RigidBody>(id).map(|body| body.shape().center_of_mass());
+            let moved = nalgebra::Translation3::from(center.unwrap_or_default()) * frame;
+            return (Some(name), moved);
+        };
+        let links = body.model().links().len();
+        let on_link = match part.checked_sub(links + 1) {
+            Some(collider) => body.colliders().nth(collider).map_or(*frame, |(_, c)| c.pose * frame),
+            None => *frame,
+        };
+        match link_name(body, part) {
+            Some((link, pose)) => (Some(format!("{name}/{link}")), pose.inverse() * on_link),
+            None => {
+                self.fault(format!("a joint on the base of \"{name}\", which has no link that is fixed to its base"));
+                (None, *frame)
+            }
+        }
+    }
+
+    /// Writes the pairs with surface constants of their own.
+    pub(super) fn pairs(&mut self) {
+        let world = self.world;
+        let mut written = BTreeSet::new();
+        for ([a, b], material) in world.pair_materials() {
+            let PairMaterial { restitution, friction, collides } = *material;
+            let mut t = Table::default();
+            match (self.material_name(a), self.material_name(b)) {
+                (Some(a), Some(b)) => t.put("materials", [a, b]),
+                (None, None) => match (self.side(a), self.side(b)) {
+                    (Some(a), Some(b)) => {
+                        t.put("a", a);
+                        t.put("b", b);
+                    }
+                    _ => continue,
+                },
+                _ => {
+                    self.fault("a pair of a body and a material".into());
+                    continue;
+                }
+            }
+            restitution.iter().for_each(|x| t.put("restitution", *x));
+            friction.iter().for_each(|x| t.put("friction", *x));
+            collides.iter().for_each(|x| t.put("collides", *x));
+            let text = t.under("[[pair]]");
+            // links with several shapes have a pair for each
+            if written.insert(text.clone()) {
+                self.out += &text;
+            }
+        }
+    }
+
+    fn material_name(&self, side: &PairSide) -> Option<String> {
+        let PairSide::Material(id) = side else { return None };
+        self.materials.iter().find(|(known, _)| known == id).map(|(_, spec)| spec.name.clone())
+    }
+
+    /// Returns the name of a side that is an object or a part of one.
+    fn side(&mut self, side: &PairSide) -> Option<String> {
+        let (id, part) = match *side {
+            PairSide::Object(id) => (id, None),
+            PairSide::Part(id, part) => (id, Some(part)),
+            PairSide::Material(id) => {
+                self.fault(format!("a pair of the material {id}, which no part has"));
+                return None;
+            }
+        };
+        let name = self.world.name(id)?.to_owned();
+        match (part, self.world.get::<ArticulatedBody>(id)) {
+            (Some(part), Some(body)) => link_name(body, part).map(|(link, _)| format!("{name}/{link}")),
+            _ => Some(name),
+        }
+    }
+}
+
+/// Returns the name of the link that carries a part, and the pose of its frame in that of the moving
+/// link or the base.
+fn link_name(body: &ArticulatedBody, part: usize) -> Option<(&str, Pose)> {
+    match body.link_of(part) {
+        Some(link) => Some((body.model().links()[link].name.as_str(), Pose::identity())),
+        None => body.model().frames().iter().find(|f| f.link.is_none()).map(|f| (f.name.as_str(), f.pose)),
+    }
+}
+
+fn pose(pose: &Pose) -> Table {
+    let mut t = Table::default();
+    t.put_pose(pose);
+    t
+}
