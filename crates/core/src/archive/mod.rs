@@ -2,7 +2,7 @@
 //!
 //! | part | bytes |
 //! |---|---|
-//! | `tumbleAD`; the last is the number of the format | 8 |
+//! | `tumbleAE`; the last is the number of the format | 8 |
 //! | XXH3 of the rest, little-endian | 8 |
 //! | settings, stepper, solver, shapes, visual meshes, objects, pairs, state, contacts, report in postcard | any |
 //!
@@ -13,6 +13,7 @@
 
 mod bodies;
 mod records;
+mod script;
 
 use crate::report::StepReport;
 use crate::settings::Settings;
@@ -20,12 +21,15 @@ use crate::solver::{self, RowSolver};
 use crate::step::{STEPPERS, Stepper, stepper_by_name};
 use crate::world::view::{Mode, ObjectId};
 use crate::world::{ContactPoint, Event, EventKind, World, WorldState};
-use crate::{ArticulatedBody, LoopJoint, Object, RigidBody, UnreachableJoint, WorstSolve};
+use crate::{
+    ArticulatedBody, EventError, LoopJoint, Object, RigidBody, ScriptedEvent, Template, UnreachableJoint, WorstSolve,
+};
 use bodies::{ArticulatedRecord, RigidRecord};
 use records::{
     ContactRecord, EventRecord, LoadedTables, LoopJointRecord, MeshRecord, ObjectIndices, PairRecord, ReportRecord,
     Tables, meshes,
 };
+use script::{EventScript, TemplateRecord};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use tumble_collide::Shape;
@@ -33,7 +37,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 /// First bytes of an archive of a world. The last is the number of the format, which rises with
 /// every change of the content.
-const HEAD: &[u8; 8] = b"tumbleAD";
+const HEAD: &[u8; 8] = b"tumbleAE";
 
 /// Why an archive cannot be written or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -111,6 +115,8 @@ enum Record {
     Articulated(Box<ArticulatedRecord>),
     LoopJoint(Box<LoopJointRecord>),
     Foreign,
+    Event(Box<EventScript>),
+    Template(TemplateRecord),
 }
 
 impl World {
@@ -181,12 +187,20 @@ impl World {
                 Record::Rigid(rigid) => Box::new(rigid.body(&tables)?),
                 Record::Articulated(articulated) => Box::new(articulated.body(&tables)?),
                 Record::LoopJoint(loop_joint) => Box::new(loop_joint.loop_joint(&ids)?),
+                Record::Event(event) => Box::new(event.event(&ids)),
+                Record::Template(template) => Box::new(template.template(&ids)),
                 Record::Foreign => foreign(&name).ok_or_else(|| ArchiveError::Foreign(name.clone()))?,
             };
             ids.push(world.add_named(name, object, Mode::Dynamic).map_err(damaged)?);
         }
         archive.pairs.into_iter().try_for_each(|pair| pair.put(&mut world, &ids)).map_err(damaged)?;
         world.restore_state(&archive.state).map_err(damaged)?;
+        for event in ids.iter().filter_map(|id| world.get::<ScriptedEvent>(*id)) {
+            match event.clone().prepare(&world) {
+                Ok(()) | Err(EventError::Gone(_)) => {} // it may name a removed object
+                Err(why) => return Err(damaged(why)),
+            }
+        }
         let contacts = archive.contacts.into_iter().map(|c| c.contact(&ids)).collect();
         let events = archive.events.into_iter().map(|event| event.event(&ids)).collect();
         world.publish(contacts, events, archive.report.report(&ids));
@@ -244,6 +258,10 @@ fn record(object: &dyn Object, tables: &mut Tables, indices: &ObjectIndices) -> 
         Record::Articulated(Box::new(ArticulatedRecord::of(body, tables)))
     } else if let Some(loop_joint) = any.downcast_ref::<LoopJoint>() {
         Record::LoopJoint(Box::new(LoopJointRecord::of(loop_joint, indices)))
+    } else if let Some(event) = any.downcast_ref::<ScriptedEvent>() {
+        Record::Event(Box::new(EventScript::of(event, indices)))
+    } else if let Some(template) = any.downcast_ref::<Template>() {
+        Record::Template(TemplateRecord::of(template, indices))
     } else {
         Record::Foreign
     }

@@ -82,13 +82,13 @@ impl ObjectIndices {
     }
 
     /// Returns `None` for a removed object.
-    fn of_id(&self, id: ObjectId) -> Option<u32> {
+    pub fn of_id(&self, id: ObjectId) -> Option<u32> {
         self.0.get(&id).copied()
     }
 }
 
 /// Returns the id at an index, or an id of no object.
-fn id(ids: &[ObjectId], index: Option<u32>) -> ObjectId {
+pub(super) fn id(ids: &[ObjectId], index: Option<u32>) -> ObjectId {
     index.and_then(|index| ids.get(index as usize)).copied().unwrap_or_default()
 }
 

@@ -56,6 +56,8 @@ mod random_scenes;
 mod regressions;
 mod regressions_articulated;
 mod regressions_rows;
+mod scripted_events;
+mod scripted_splines;
 mod sleep;
 mod soft_rows;
 mod solvers;
