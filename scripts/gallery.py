@@ -42,6 +42,7 @@ SCENES = {
     "marble_run": (0, 5.0),
     "steam_engine": (5, 1.0),
     "walker": (0, 5.5),
+    "ball_machine": (0.5, 6.0),
 }
 
 

@@ -70,7 +70,7 @@ pub use step::{Backtracking, STEPPERS, StepContext, Stepper, TimeStepping, stepp
 pub use tumble_collide as collide;
 pub use world::script::{
     Action, CameraChange, Ends, EventError, Keyframe, LightChange, Looks, MAX_KEY_BYTES, MAX_SPAWNED, ScriptedEvent,
-    Smoothness, Spline, SplineError, SplinePoint, Template, Trigger, Who,
+    Smoothness, Spline, SplineError, SplinePoint, Subject, Template, Trigger,
 };
 pub use world::sleep::Sleep;
 pub use world::view::{Mode, ObjectId, Status, WorldView};

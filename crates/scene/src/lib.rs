@@ -78,6 +78,7 @@ pub use open::shipped::{SceneSource, Shipped, resolve_scene, shipped};
 pub use parse::appearance::{AppearanceSpec, Color, Pattern};
 pub use parse::articulated::ArticulatedSpec;
 pub use parse::body::{BodySpec, MassSpec};
+pub use parse::event::{EventSpec, TemplateSpec};
 pub use parse::file::{MAX_BYTES, SceneFile};
 pub use parse::joint::{JointSpec, MimicSpec};
 pub use parse::link::{Geometry, LinkMassSpec, LinkShape, LinkSpec, Surface};

@@ -55,7 +55,7 @@ fn an_impulse_off_the_center_turns_the_body() {
     let mut world = no_gravity(world("time_stepping", 0.01));
     let cube = world.add(RigidBody::new(cube(0.6)).with_mass(5.0)).unwrap();
     let (impulse, point) = (Vec3::new(0.0, 2.0, 0.0), Vec3::new(0.3, 0.0, 0.0));
-    let push = Action::Push { body: Who::Part(cube, 0), impulse, point: Some(point) };
+    let push = Action::Push { body: Subject::Part(cube, 0), impulse, point: Some(point) };
     world.add(at(0.05).with_action(push)).unwrap();
     run_to(&mut world, 0.05);
     let spin = world.part_state(cube, 0).unwrap().angular_velocity;
@@ -69,7 +69,7 @@ fn a_force_for_some_time_gives_force_times_duration() {
         let mut world = no_gravity(world("time_stepping", dt));
         let ball = world.add(ball("ball", [0.0; 3])).unwrap();
         let force = Action::Force {
-            body: Who::Part(ball, 0),
+            body: Subject::Part(ball, 0),
             force: Vec3::new(3.0, 0.0, 0.0),
             torque: Vec3::new(0.0, 0.0, 0.2),
             duration: 0.3333,
@@ -156,7 +156,7 @@ fn a_contact_fires_from_its_threshold_on() {
         let ball = world.add(ball("ball", [0.0, 0.0, 1.1])).unwrap();
         let trigger = Trigger::Contact { a: vec![floor], b: vec![ball], impulse: threshold };
         let event = ScriptedEvent::new("event", trigger);
-        let away = Action::Remove(Who::Other);
+        let away = Action::Remove(Subject::Other);
         world.add(event.with_action(away)).unwrap();
         run_to(&mut world, 1.0);
         assert_eq!(fired(&world), expected, "{threshold}");
@@ -281,7 +281,7 @@ fn a_joint_holds_two_bodies_where_they_are() {
         let a = world.add(ball("a", [0.0; 3]).with_angular_velocity(Vec3::new(0.0, 0.0, 1.0))).unwrap();
         let b = world.add(ball("b", [0.7, 0.0, 0.0]).with_velocity(Vec3::new(0.3, 0.2, 0.0))).unwrap();
         let sides = [a, b].map(|id| Anchor::on(id, 0, Pose::identity()));
-        let joint = world.add(LoopJoint::new("weld", LoopJointKind::Fixed, sides[0], sides[1]).unwrap()).unwrap();
+        let joint = world.add(LoopJoint::new("bond", LoopJointKind::Fixed, sides[0], sides[1]).unwrap()).unwrap();
         world.set_enabled(joint, false).unwrap();
         let attach = Action::Attach { joint, here: true };
         world.add(at(0.5).with_action(attach)).unwrap();
@@ -319,7 +319,7 @@ fn colors_lights_and_cameras_follow_the_latest_event() {
     let spawn = Action::spawn(template, Pose::identity(), Vec3::x());
     let every = ScriptedEvent::new("spawn", Trigger::Every { period: 1.0, first: 0.1 });
     world.add(every.with_action(spawn)).unwrap();
-    let red = Action::Recolor { body: Who::Other, color: [1.0, 0.0, 0.0] };
+    let red = Action::Recolor { body: Subject::Other, color: [1.0, 0.0, 0.0] };
     let enters = Trigger::Enters { sensor: gate, bodies: vec![shot] };
     world.add(ScriptedEvent::new("red", enters).with_action(red)).unwrap();
     let dark = LightChange { light: 0, intensity: Some(0.1), color: None };
@@ -347,7 +347,7 @@ fn busy(threads: u32) -> World {
     let template = Template::add(&mut world, "shot", &ball("", [0.0; 3]), 6, true).unwrap();
     let shots = world.get::<Template>(template).unwrap().bodies().to_vec();
     let sides = [Anchor::on(shots[0], 0, Pose::identity()), Anchor::on(shots[1], 0, Pose::identity())];
-    let joint = world.add(LoopJoint::new("weld", LoopJointKind::Fixed, sides[0], sides[1]).unwrap()).unwrap();
+    let joint = world.add(LoopJoint::new("bond", LoopJointKind::Fixed, sides[0], sides[1]).unwrap()).unwrap();
     world.set_enabled(joint, false).unwrap();
     let keys = [(0.0, 0.25), (0.7, 0.9), (1.5, 0.25)];
     let keys = keys.map(|(time, z)| Keyframe { time, pose: Pose::translation(0.0, 0.0, z) });
@@ -358,8 +358,8 @@ fn busy(threads: u32) -> World {
     let spawns = add(&mut world, event("spawns", Trigger::Every { period: 0.21, first: 0.1 }).with_action(spawn));
     add(&mut world, event("lifts", Trigger::Time { at: 0.3 }).with_action(Action::Move { body: lift, path }));
     let hits = Trigger::Contact { a: vec![floor], b: shots.clone(), impulse: 0.5 };
-    let kick = Action::Push { body: Who::Other, impulse: Vec3::new(0.0, 0.3, 2.0), point: None };
-    let red = Action::Recolor { body: Who::Other, color: [1.0, 0.2, 0.1] };
+    let kick = Action::Push { body: Subject::Other, impulse: Vec3::new(0.0, 0.3, 2.0), point: None };
+    let red = Action::Recolor { body: Subject::Other, color: [1.0, 0.2, 0.1] };
     add(&mut world, event("hits", hits).with_action(kick).with_action(red));
     let after = event("after", Trigger::Fired { event: spawns }).with_delay(0.33).with_times(4);
     add(&mut world, after.with_action(Action::Attach { joint, here: true }));
@@ -377,7 +377,9 @@ fn events_are_part_of_the_state_to_the_bit_on_any_number_of_threads() {
             let mut copies = vec![one.fork(), World::from_archive(&bytes, &mut |_| None).unwrap()];
             assert_eq!(copies[1].archive(&[]).unwrap(), bytes);
             let mut end = one.fork();
-            (0..60).for_each(|_| drop(end.step().unwrap()));
+            (0..60).for_each(|_| {
+                end.step().unwrap();
+            });
             let mut looks = vec![end.looks()];
             end.restore(&start).unwrap(); // back, over spawns and attachments
             copies.push(end);
@@ -386,7 +388,9 @@ fn events_are_part_of_the_state_to_the_bit_on_any_number_of_threads() {
             let saved: Vec<Vec<u8>> = copies
                 .iter_mut()
                 .map(|copy| {
-                    (0..60).for_each(|_| drop(copy.step().unwrap()));
+                    (0..60).for_each(|_| {
+                        copy.step().unwrap();
+                    });
                     copy.save()
                 })
                 .collect();
@@ -399,7 +403,9 @@ fn events_are_part_of_the_state_to_the_bit_on_any_number_of_threads() {
     assert!(fired("spawns") == 12 && fired("hits") > 3 && fired("after") == 4 && fired("off") == 1);
     for threads in [2, 3] {
         let mut many = busy(threads);
-        (0..300).for_each(|_| drop(many.step().unwrap()));
+        (0..300).for_each(|_| {
+            many.step().unwrap();
+        });
         assert_eq!(many.save(), one.save(), "{threads} threads");
     }
 }
@@ -450,7 +456,7 @@ fn wrong_events_are_refused_with_the_reason() {
             at(1.0).with_action(Action::push(ball, nan)),
             "an impulse has a number that is not finite or out of its range",
         ),
-        (at(1.0).with_action(Action::Remove(Who::Other)), "the other body of a trigger that has none"),
+        (at(1.0).with_action(Action::Remove(Subject::Other)), "the other body of a trigger that has none"),
         (at(1.0).with_action(Action::Move { body: ball, path }), "'ball' is not kinematic"),
         (at(1.0).with_action(Action::drive(ball, 0, 1.0)), "'ball' is not a body or joint with a drive"),
         (at(1.0).with_action(Action::spawn(ball, Pose::identity(), Vec3::x())), "'ball' is not a template"),
@@ -461,7 +467,7 @@ fn wrong_events_are_refused_with_the_reason() {
         (ScriptedEvent::new("event", Trigger::Fired { event: ball }), "'ball' is not an event"),
         (
             ScriptedEvent::new("event", Trigger::Contact { a: vec![ball], b: vec![], impulse: 0.0 })
-                .with_action(Action::Recolor { body: Who::Other, color: [0.0; 3] }),
+                .with_action(Action::Recolor { body: Subject::Other, color: [0.0; 3] }),
             "only a trigger with a list of bodies can recolor the other one",
         ),
     ];

@@ -1,6 +1,7 @@
 //! From a world and its scene to a draw list. The world is only read.
 
 mod detail;
+mod looks;
 mod overlay;
 mod surface;
 mod tree;
@@ -110,7 +111,8 @@ impl Drawing {
     /// # Errors
     /// [`RenderError`] if a mesh has more vertices than can be drawn.
     pub fn list(&mut self, world: &World, overlays: &DebugDraw) -> Result<DrawList, RenderError> {
-        let mut list = self.base.clone();
+        let (mut list, looks) = (self.base.clone(), world.looks());
+        looks::change_lights(&mut list, &looks);
         list.spheres.reserve(self.spheres);
         let mut placed = Placed::default();
         let tints =
@@ -130,11 +132,14 @@ impl Drawing {
             let tint = tints.as_ref().and_then(|tints| tints.get(&id)).copied();
             for visual in object.renderable().map_or(&[][..], |r| r.visuals()) {
                 let Some(part_state) = world.part_state(id, visual.part) else { continue };
+                let recolored = looks::recolored(visual, looks.colors.get(&id));
+                let visual = recolored.as_ref().unwrap_or(visual);
                 self.place(&mut list, &mut placed, name, visual, &(part_state.pose * visual.pose), tint)?;
             }
         }
         self.spheres = list.spheres.len();
         list.camera = self.camera.unwrap_or_else(|| list.framing_camera(Vector3::new(-0.5, 1.0, -0.5)));
+        looks::change_camera(&mut list, &looks, world)?;
         overlays.draw(world, &mut list);
         Ok(list)
     }

@@ -5,7 +5,7 @@ use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::solver::SolverSettings;
 use tumble_core::{
     ArticulatedBody, Drive, JointPlace, LoopJoint, LoopJointError, LoopJointKind, Material, ObjectId, PairMaterial,
-    PairSide, RigidBody, Settings, Sleep, Visual, World, WorldError,
+    PairSide, RigidBody, Settings, Sleep, Template, Visual, World, WorldError,
 };
 
 use crate::build::appearance::{appearance, material_id};
@@ -63,6 +63,14 @@ impl SceneFile {
         for spec in &self.loop_joints {
             self.add_loop_joint(spec, &mut built)?;
         }
+        for spec in &self.templates {
+            let body = self.body(&spec.body, &meshes)?;
+            let added = Template::add(&mut built, &spec.body.name, &body, spec.count, spec.reuse);
+            added.map_err(|e| self.body_error(&spec.body, e))?;
+        }
+        for spec in &self.events {
+            spec.add(&mut built).map_err(world)?;
+        }
         for spec in &self.pairs {
             self.add_pair(spec, &mut built).map_err(world)?;
         }
@@ -93,7 +101,8 @@ impl SceneFile {
         };
         let made = LoopJoint::joining(spec.name.as_str(), spec.kind, world, a, b, place);
         let joint = made.and_then(|joint| with_settings(joint, spec)).map_err(|e| wrong(e.to_string()))?;
-        world.add(joint).map(drop).map_err(|e| wrong(e.to_string()))
+        let id = world.add(joint).map_err(|e| wrong(e.to_string()))?;
+        world.set_enabled(id, spec.enabled).map_err(|e| wrong(e.to_string()))
     }
 
     fn add_pair(&self, spec: &PairSpec, world: &mut World) -> Result<(), WorldError> {

@@ -96,6 +96,7 @@ fn join(item: &Item<'_>, starts: &[Vec<Pose>], assembly: &mut Assembly<'_, '_>) 
         holds_start: false,
         breaking_force_n: f64::INFINITY,
         breaking_torque_n_m: f64::INFINITY,
+        enabled: true,
     });
 }
 

@@ -51,6 +51,7 @@ const SHIPPED: &[Shipped] = shipped_scenes![
     "marble_run",
     "steam_engine",
     "walker",
+    "ball_machine",
 ];
 
 /// Returns the scenes that come with tumble.

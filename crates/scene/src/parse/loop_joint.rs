@@ -58,6 +58,8 @@ pub struct LoopJointSpec {
     pub breaking_force_n: f64,
     /// Torque above which it breaks, N·m. Default infinite.
     pub breaking_torque_n_m: f64,
+    /// Whether it holds at the start. Default true.
+    pub enabled: bool,
 }
 
 /// Looks up the parts that a loop joint or a pair names.
@@ -124,6 +126,7 @@ impl LoopJointSpec {
         let settings = read_settings(&mut f, kind, Vec3::from(axis));
         let breaking_force_n = f.number_or("breaking_force_n", Bound::POSITIVE, f64::INFINITY);
         let breaking_torque_n_m = f.number_or("breaking_torque_n_m", Bound::POSITIVE, f64::INFINITY);
+        let enabled = f.flag_or("enabled", true);
         let expected = "a part other than `a`; or no `b`, which is the world";
         let sides = parts.sides(&f, [a, b], |name| parts.part(name), expected);
         f.finish();
@@ -146,6 +149,7 @@ impl LoopJointSpec {
             dof: settings.dof,
             breaking_force_n,
             breaking_torque_n_m,
+            enabled,
         })
     }
 }

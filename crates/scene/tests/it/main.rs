@@ -6,6 +6,7 @@ mod bad_input;
 mod cave_devices;
 mod caves;
 mod contacts;
+mod events;
 mod expansion;
 mod finding;
 mod mjcf;

@@ -1,4 +1,4 @@
-//! What a scripted event does.
+//! Actions of a scripted event.
 
 use super::spline::Spline;
 use crate::world::view::ObjectId;
@@ -8,14 +8,14 @@ use tumble_collide::{Pose, Vec3};
 
 /// The body that an action is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Who<B = ObjectId> {
+pub enum Subject<B = ObjectId> {
     /// A part of an object.
     Part(B, usize),
     /// The body that made the event fire: the one that entered, or the second side of a contact.
     Other,
 }
 
-/// What a [`ScriptedEvent`](super::ScriptedEvent) does when it fires. World axes and SI units unless it
+/// A deed of a [`ScriptedEvent`](super::ScriptedEvent) that fires. World axes and SI units unless it
 /// says otherwise. An action on an object that was removed from the world does nothing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Action<B = ObjectId> {
@@ -37,7 +37,7 @@ pub enum Action<B = ObjectId> {
     /// An impulse at once.
     Push {
         /// The body.
-        body: Who<B>,
+        body: Subject<B>,
         /// N·s.
         impulse: Vec3,
         /// Point of the part's frame that it acts at, m; `None` for the center of mass.
@@ -46,7 +46,7 @@ pub enum Action<B = ObjectId> {
     /// A constant force at the center of mass, and a torque, for some time. A new firing begins anew.
     Force {
         /// The body.
-        body: Who<B>,
+        body: Subject<B>,
         /// N.
         force: Vec3,
         /// N·m.
@@ -57,14 +57,14 @@ pub enum Action<B = ObjectId> {
     /// Sets the velocity of a rigid body, dynamic or kinematic.
     Velocity {
         /// The body.
-        body: Who<B>,
+        body: Subject<B>,
         /// Velocity of the center of mass, m/s.
         velocity: Vec3,
         /// rad/s.
         angular_velocity: Vec3,
     },
     /// Disables a body. A body of a template can be spawned again.
-    Remove(Who<B>),
+    Remove(Subject<B>),
     /// Enables an object of any kind: a body, a joint, a force, an event.
     Enable(B),
     /// Disables an object of any kind.
@@ -79,8 +79,8 @@ pub enum Action<B = ObjectId> {
     },
     /// Gives all visuals of a body another color.
     Recolor {
-        /// The body. [`Who::Other`] requires a trigger with a list of bodies.
-        body: Who<B>,
+        /// The body. [`Subject::Other`] requires a trigger with a list of bodies.
+        body: Subject<B>,
         /// sRGB, each 0 to 1.
         color: [f32; 3],
     },
@@ -138,42 +138,44 @@ pub struct LightChange {
     pub color: Option<[f64; 3]>,
 }
 
-impl<B: Copy> Who<B> {
-    fn map<C>(self, f: &mut dyn FnMut(&B) -> C) -> Who<C> {
+impl<B> Subject<B> {
+    fn map<C>(&self, f: &mut dyn FnMut(&B) -> C) -> Subject<C> {
         match self {
-            Who::Part(body, part) => Who::Part(f(&body), part),
-            Who::Other => Who::Other,
+            Subject::Part(body, part) => Subject::Part(f(body), *part),
+            Subject::Other => Subject::Other,
         }
     }
 }
 
-impl<B: Copy> Action<B> {
+impl<B> Action<B> {
     /// Returns the same action with other names of objects.
-    pub(crate) fn map<C>(&self, f: &mut dyn FnMut(&B) -> C) -> Action<C> {
-        match *self {
-            Action::Spawn { template, pose, velocity, angular_velocity, from } => Action::Spawn {
-                template: f(&template),
+    pub fn map<C>(&self, f: &mut dyn FnMut(&B) -> C) -> Action<C> {
+        match self {
+            &Action::Spawn { ref template, pose, velocity, angular_velocity, ref from } => Action::Spawn {
+                template: f(template),
                 pose,
                 velocity,
                 angular_velocity,
                 from: from.as_ref().map(&mut *f),
             },
-            Action::Push { body, impulse, point } => Action::Push { body: body.map(f), impulse, point },
-            Action::Force { body, force, torque, duration } => {
+            &Action::Push { ref body, impulse, point } => Action::Push { body: body.map(f), impulse, point },
+            &Action::Force { ref body, force, torque, duration } => {
                 Action::Force { body: body.map(f), force, torque, duration }
             }
-            Action::Velocity { body, velocity, angular_velocity } => {
+            &Action::Velocity { ref body, velocity, angular_velocity } => {
                 Action::Velocity { body: body.map(f), velocity, angular_velocity }
             }
             Action::Remove(body) => Action::Remove(body.map(f)),
-            Action::Enable(object) => Action::Enable(f(&object)),
-            Action::Disable(object) => Action::Disable(f(&object)),
-            Action::Attach { joint, here } => Action::Attach { joint: f(&joint), here },
-            Action::Recolor { body, color } => Action::Recolor { body: body.map(f), color },
-            Action::Move { body, ref path } => Action::Move { body: f(&body), path: path.clone() },
-            Action::Drive { body, dof, target, original } => Action::Drive { body: f(&body), dof, target, original },
-            Action::Camera(ref change) => Action::Camera(change.clone()),
-            Action::Light(change) => Action::Light(change),
+            Action::Enable(object) => Action::Enable(f(object)),
+            Action::Disable(object) => Action::Disable(f(object)),
+            Action::Attach { joint, here } => Action::Attach { joint: f(joint), here: *here },
+            Action::Recolor { body, color } => Action::Recolor { body: body.map(f), color: *color },
+            Action::Move { body, path } => Action::Move { body: f(body), path: path.clone() },
+            &Action::Drive { ref body, dof, target, original } => {
+                Action::Drive { body: f(body), dof, target, original }
+            }
+            Action::Camera(change) => Action::Camera(change.clone()),
+            Action::Light(change) => Action::Light(*change),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Checks of an event when it is added to a world.
 
-use super::action::{Action, CameraChange, Who};
+use super::action::{Action, CameraChange, Subject};
 use super::guide::{drive, target_of};
 use super::template::MAX_SPAWNED;
 use super::trigger::{MAX_KEY_BYTES, Trigger};
@@ -35,7 +35,7 @@ pub enum EventError {
     Kind {
         /// Name of the object.
         name: String,
-        /// What it must be.
+        /// The kind that it must be of.
         expected: &'static str,
     },
     /// A template has too many or no bodies.
@@ -74,7 +74,7 @@ impl ScriptedEvent {
     }
 
     fn check(&self, action: &Action, world: &World) -> Result<(), EventError> {
-        let moving = |body: &Who| self.check_body(body, world);
+        let moving = |body: &Subject| self.check_body(body, world);
         match action {
             Action::Spawn { template, pose, velocity, angular_velocity, from } => {
                 of_kind::<Template>(world, *template, "a template")?;
@@ -95,8 +95,8 @@ impl ScriptedEvent {
                 finite("a velocity", velocity.iter().chain(angular_velocity))?;
                 moving(body)?;
                 match body {
-                    Who::Part(id, _) => of_kind::<RigidBody>(world, *id, "a rigid body"),
-                    Who::Other => Ok(()),
+                    Subject::Part(id, _) => of_kind::<RigidBody>(world, *id, "a rigid body"),
+                    Subject::Other => Ok(()),
                 }
             }
             Action::Remove(body) => moving(body),
@@ -108,7 +108,7 @@ impl ScriptedEvent {
                 if !color.iter().all(|c| (0.0..=1.0).contains(c)) {
                     return Err(EventError::Numbers("a color"));
                 }
-                if *body == Who::Other && self.trigger().others().is_empty() {
+                if *body == Subject::Other && self.trigger().others().is_empty() {
                     return Err(EventError::Other(
                         "only a trigger with a list of bodies can recolor the other one; expected the bodies by name",
                     ));
@@ -148,11 +148,11 @@ impl ScriptedEvent {
         }
     }
 
-    fn check_body(&self, who: &Who, world: &World) -> Result<(), EventError> {
+    fn check_body(&self, who: &Subject, world: &World) -> Result<(), EventError> {
         match who {
-            Who::Part(id, part) => body(world, *id, *part),
-            Who::Other if self.trigger().has_other() => Ok(()),
-            Who::Other => Err(EventError::Other(FOR_OTHER)),
+            Subject::Part(id, part) => body(world, *id, *part),
+            Subject::Other if self.trigger().has_other() => Ok(()),
+            Subject::Other => Err(EventError::Other(FOR_OTHER)),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The object of a scripted event: its constants and its numbers of the state.
 
-use super::action::{Action, Who};
+use super::action::{Action, Subject};
 use super::trigger::Trigger;
 use crate::object::net_sync::{read_state, write_state};
 use crate::object::part_state::StateRange;
@@ -29,7 +29,7 @@ pub(super) const TICKS: usize = 6;
 pub(super) const HEADER: usize = 7;
 
 /// A [`Trigger`] and what is done when it is met. Add it to a world like any object; the objects that it names are
-/// there already. Disabled, it neither fires nor has an effect.
+/// there already. A disabled one does not fire and has no effect.
 ///
 /// ```
 /// use tumble_core::{Action, ScriptedEvent, Trigger, prelude::*};
@@ -112,10 +112,10 @@ impl ScriptedEvent {
     }
 
     /// Returns the bodies whose color an action can change.
-    pub(super) fn colored<'a>(&'a self, body: &'a Who) -> &'a [ObjectId] {
+    pub(super) fn colored<'a>(&'a self, body: &'a Subject) -> &'a [ObjectId] {
         match body {
-            Who::Part(id, _) => std::slice::from_ref(id),
-            Who::Other => self.trigger.others(),
+            Subject::Part(id, _) => std::slice::from_ref(id),
+            Subject::Other => self.trigger.others(),
         }
     }
 
@@ -186,12 +186,12 @@ impl Action {
 
     /// Pushes a rigid body at its center of mass, N·s.
     pub fn push(body: ObjectId, impulse: Vec3) -> Action {
-        Action::Push { body: Who::Part(body, 0), impulse, point: None }
+        Action::Push { body: Subject::Part(body, 0), impulse, point: None }
     }
 
     /// Recolors a body, sRGB.
     pub fn recolor(body: ObjectId, color: [f32; 3]) -> Action {
-        Action::Recolor { body: Who::Part(body, 0), color }
+        Action::Recolor { body: Subject::Part(body, 0), color }
     }
 
     /// Sets the target of a drive.
@@ -207,7 +207,7 @@ impl Object for ScriptedEvent {
     fn frame_state(&self) -> Option<&dyn FrameState> {
         Some(self)
     }
-    /// Events that change what is drawn are sent to those who draw it.
+    /// Events that change a picture besides poses are sent to the facets that draw it.
     fn net_sync(&self) -> Option<&dyn NetSync> {
         self.actions.iter().any(Action::is_look).then_some(self as &dyn NetSync)
     }

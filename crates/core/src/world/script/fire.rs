@@ -11,7 +11,7 @@ use tumble_collide::Vec3;
 type Firing = (ObjectId, u32);
 
 impl World {
-    /// Tells the events that wait for this key that it was pressed. They fire at the end of the next frame. Returns
+    /// Notes that a user pressed a key for the events that wait for it. They fire at the end of the next frame. Returns
     /// whether there are any.
     pub fn press(&mut self, key: &str) -> bool {
         let core = &mut self.core;

@@ -1,4 +1,4 @@
-//! What events do over time: it follows from the state alone, at the start of each frame.
+//! Effects of events over time: they follow from the state alone, at the start of each frame.
 //!
 //! **Paths.** At the end of a frame a body on a path `p` has the pose `p(t)` and the velocity `ṗ(t)`. Within a frame a
 //! kinematic body moves uniformly. What rests on it takes its velocity in the middle of a sub-step `h`, and keeps it to
@@ -12,7 +12,7 @@
 //! A load then lags by `O(h²)` of its acceleration at any time; with `v = (p(t + dt) − p(t))/dt` it would lag by `h·v/2`.
 
 use super::ScriptedEvent;
-use super::action::{Action, Who};
+use super::action::{Action, Subject};
 use super::event::{FIRED, OTHER, STAMP, TIME};
 use super::spline::Spline;
 use crate::articulated::Drive;
@@ -159,8 +159,8 @@ impl Core {
                 // the share of the frame in which it still acts; times are sums of steps
                 let share = ((x[TIME] + duration - now) / dt).clamp(0.0, 1.0);
                 let body = match body {
-                    Who::Part(id, part) => Some((*id, *part)),
-                    Who::Other => self.other(x[OTHER] as u32).map(|id| (id, 0)),
+                    Subject::Part(id, part) => Some((*id, *part)),
+                    Subject::Other => self.other(x[OTHER] as u32).map(|id| (id, 0)),
                 };
                 acting.extend(body.filter(|_| share > 1e-6).map(|body| (body, share * force, share * torque)));
             }

@@ -1,4 +1,4 @@
-//! What events have changed of the picture.
+//! Changes of the picture by events.
 
 use super::action::{Action, CameraChange, LightChange};
 use super::event::STAMP;

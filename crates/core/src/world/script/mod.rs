@@ -23,7 +23,7 @@ mod spline;
 mod template;
 mod trigger;
 
-pub use action::{Action, CameraChange, LightChange, Who};
+pub use action::{Action, CameraChange, LightChange, Subject};
 pub use check::EventError;
 pub use event::ScriptedEvent;
 pub use looks::Looks;

@@ -1,6 +1,6 @@
 //! Actions at the moment at which an event fires.
 
-use super::action::{Action, Who};
+use super::action::{Action, Subject};
 use super::template::HEADER;
 use super::{ScriptedEvent, Template};
 use crate::constraint::loop_joint::LoopJoint;
@@ -31,9 +31,9 @@ impl World {
         memory: usize,
         other: Option<ObjectId>,
     ) -> Result<(), WorldError> {
-        let who = |body: &Who| match body {
-            Who::Part(id, part) => Ok((*id, *part)),
-            Who::Other => other.map(|id| (id, 0)).ok_or(WorldError::Stale),
+        let who = |body: &Subject| match body {
+            Subject::Part(id, part) => Ok((*id, *part)),
+            Subject::Other => other.map(|id| (id, 0)).ok_or(WorldError::Stale),
         };
         match action {
             Action::Spawn { template, pose, velocity, angular_velocity, from } => {

@@ -1,4 +1,4 @@
-//! What makes a scripted event fire.
+//! Triggers of a scripted event.
 
 use crate::world::view::ObjectId;
 use crate::world::{Event, EventKind};
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Longest name of a key, bytes.
 pub const MAX_KEY_BYTES: usize = 32;
 
-/// What makes a [`ScriptedEvent`](super::ScriptedEvent) fire. `B` names an object: an id, or its index in
+/// The cause that makes a [`ScriptedEvent`](super::ScriptedEvent) fire. `B` names an object: an id, or its index in
 /// an archive. An empty list of bodies means every body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Trigger<B = ObjectId> {
@@ -73,7 +73,7 @@ pub enum Trigger<B = ObjectId> {
 
 impl<B> Trigger<B> {
     /// Returns the same trigger with other names of objects.
-    pub(crate) fn map<C>(&self, f: &mut dyn FnMut(&B) -> C) -> Trigger<C> {
+    pub fn map<C>(&self, f: &mut dyn FnMut(&B) -> C) -> Trigger<C> {
         let mut all = |list: &[B]| list.iter().map(&mut *f).collect::<Vec<C>>();
         match self {
             Trigger::Time { at } => Trigger::Time { at: *at },
@@ -89,7 +89,7 @@ impl<B> Trigger<B> {
     }
 
     /// Returns the bodies that can be the *other* one; empty for every body, or none.
-    pub(crate) fn others(&self) -> &[B] {
+    pub fn others(&self) -> &[B] {
         match self {
             Trigger::Contact { b, .. } | Trigger::Parting { b, .. } => b,
             Trigger::Enters { bodies, .. } | Trigger::Leaves { bodies, .. } => bodies,
@@ -98,7 +98,7 @@ impl<B> Trigger<B> {
     }
 
     /// Returns whether a firing has an *other* body.
-    pub(crate) fn has_other(&self) -> bool {
+    pub fn has_other(&self) -> bool {
         matches!(
             self,
             Trigger::Contact { .. } | Trigger::Parting { .. } | Trigger::Enters { .. } | Trigger::Leaves { .. }
