@@ -60,8 +60,8 @@ table! {
     incline_backtracking: "incline", Backtracking, "dba991e4803cfe34", "95407557393acae5";
     pendulum_time_stepping: "pendulum", TimeStepping, "a6f0f0b542061dc2", "63acd1d2fe930652";
     pendulum_backtracking: "pendulum", Backtracking, "69fe4156518a0013", "692b5de118331942";
-    piston_time_stepping: "piston", TimeStepping, "ae876d8e7e8e345e", "bc01df0546e1951d";
-    piston_backtracking: "piston", Backtracking, "cebbc368133e0eb4", "ac9f392a7dadcd1e";
+    piston_time_stepping: "piston", TimeStepping, "03971f4c855a8149", "498658197dce906c";
+    piston_backtracking: "piston", Backtracking, "49b38596ba941018", "3623d35cde9a52a8";
     robot_time_stepping: "robot", TimeStepping, "6b21cb8a1f188192", "8bea891d086ec9c1";
     robot_backtracking: "robot", Backtracking, "34a6c003f76116a6", "1b8364d88cd17538";
     skeleton_time_stepping: "skeleton", TimeStepping, "fd7ab16715dfff87", "2b63db53102edef9";
