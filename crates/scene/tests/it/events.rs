@@ -154,7 +154,7 @@ fn the_example_of_the_page_does_what_it_says() {
     }
     assert_eq!(fired(&world, "drop"), 3);
     assert_eq!(Template::counts(&world, world.find("ball").unwrap()), Some([3, 0]));
-    // it falls 0.9 m with 1 kg: 4.2 N·s
+    // it falls 0.9 m with 1 kg and bounces with half: 6.3 N·s
     assert_eq!(fired(&world, "bounce"), 2);
     assert_eq!(world.looks().colors.len(), 2);
 }

@@ -24,7 +24,7 @@ pub struct Listener {
 }
 
 impl Listener {
-    /// Returns a listener at `eye` who looks at `target`, with `up` up. Straight up or down, the right is x.
+    /// Returns a listener at `eye` that looks at `target`, with `up` up. Straight up or down, the right is x.
     pub fn looking(eye: [f64; 3], target: [f64; 3], up: [f64; 3]) -> Listener {
         let [f, u] = [[0, 1, 2].map(|k| target[k] - eye[k]), up];
         let right = [f[1] * u[2] - f[2] * u[1], f[2] * u[0] - f[0] * u[2], f[0] * u[1] - f[1] * u[0]];

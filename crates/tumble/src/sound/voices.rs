@@ -1,4 +1,4 @@
-//! What is heard of an impact and of sliding, as a signal at the body.
+//! The signals of an impact and of sliding, at the body.
 //!
 //! ```text
 //! strike     F(t) = (π·J/2τ)·sin(π·t/τ)                        a half sine of the duration τ with the impulse J
