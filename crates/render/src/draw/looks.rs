@@ -1,4 +1,4 @@
-//! What scripted events have changed of a picture: colors, lights and the camera.
+//! Changes of a picture by scripted events: colors, lights and the camera.
 
 use super::{LIGHT, small};
 use crate::{Camera, DrawList, Light, RenderError};

@@ -66,7 +66,7 @@ pub struct EventSpec {
     pub actions: Vec<Action<String>>,
 }
 
-/// What a name of an object stands for.
+/// The kind of object that a name stands for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum ObjectKind {
     /// A rigid body.
@@ -77,7 +77,7 @@ pub(crate) enum ObjectKind {
     Link,
     /// A loop joint.
     Joint,
-    /// A template with so many bodies.
+    /// A template, and the number of its bodies.
     Template(usize),
     /// An event.
     Event,

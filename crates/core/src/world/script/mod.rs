@@ -11,6 +11,24 @@
 //! in which the events were added. What an event does over time (paths, forces, targets of drives, joints
 //! that hold bodies where they met) follows from the state alone, at the start of each frame
 //! (`guide.rs`).
+//!
+//! ```
+//! # fn run() -> Result<(), Box<dyn std::error::Error>> {
+//! use tumble_core::prelude::*;
+//! use tumble_core::{Action, ScriptedEvent, Template, Trigger};
+//! let mut world = World::default();
+//! let ball = RigidBody::new(Shape::sphere(0.1)?).with_mass(1.0);
+//! let balls = Template::add(&mut world, "ball", &ball, 5, false)?;
+//! let drop = ScriptedEvent::new("drop", Trigger::Every { period: 0.5, first: 0.5 });
+//! world.add(drop.with_action(Action::spawn(balls, Pose::translation(0.0, 0.0, 1.0), Vec3::zeros())))?;
+//! while world.time() < 1.1 {
+//!     world.step()?;
+//! }
+//! assert_eq!(Template::counts(&world, balls), Some([2, 0]));
+//! # Ok(())
+//! # }
+//! # run().unwrap();
+//! ```
 
 mod action;
 mod check;
