@@ -1,8 +1,8 @@
 //! Time of a step of flocks of boids.
 //!
 //! `cargo run --release -p tumble-behaviors --example flock -- [COUNT…]` prints the mean over a
-//! second of simulated time after one of warm-up, on one thread: 1,000 and 10,000 boids unless counts
-//! are given. Brute force runs up to 2,000 boids.
+//! second of simulated time after one of warm-up, on one and two threads: 1,000 and 10,000 boids unless counts
+//! are given; and the time of the forces alone, on one thread. Brute force runs up to 2,000 boids.
 
 use std::time::Instant;
 use tumble_behaviors::{Boid, Flock, Search, Steering};
@@ -13,20 +13,23 @@ const FRAMES: u32 = 60;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let counts: Result<Vec<usize>, _> = std::env::args().skip(1).map(|count| count.parse()).collect();
     let counts = Some(counts?).filter(|counts| !counts.is_empty()).unwrap_or_else(|| vec![1000, 10_000]);
-    println!("| boids | search | step, ms | of it the forces, ms | neighbors in reach |");
-    println!("|---|---|---|---|---|");
+    println!("| boids | search | threads | step, ms | the forces on one thread, ms | neighbors in reach |");
+    println!("|---|---|---|---|---|---|");
     for count in counts {
-        measure(count, Search::Grid)?;
+        for threads in [1, 2] {
+            measure(count, Search::Grid, threads)?;
+        }
         if count <= 2000 {
-            measure(count, Search::BruteForce)?;
+            measure(count, Search::BruteForce, 1)?;
         }
     }
     Ok(())
 }
 
-fn measure(count: usize, search: Search) -> Result<(), Box<dyn std::error::Error>> {
+fn measure(count: usize, search: Search, threads: u32) -> Result<(), Box<dyn std::error::Error>> {
     let steering = Steering::default();
-    let mut world = World::new(Settings::default().with_dt(1.0 / 60.0).with_gravity(Vec3::zeros()))?;
+    let settings = Settings::default().with_dt(1.0 / 60.0).with_gravity(Vec3::zeros()).with_threads(threads);
+    let mut world = World::new(settings)?;
     let flock = world.add(Flock::new("flock", steering)?.with_search(search))?;
     for k in 0..count {
         let boid = Boid::new(Shape::sphere(0.1)?, 1.0)?;
@@ -38,7 +41,7 @@ fn measure(count: usize, search: Search) -> Result<(), Box<dyn std::error::Error
     (0..FRAMES).try_for_each(|_| world.step().map(drop))?;
     let step = start.elapsed().as_secs_f64() / f64::from(FRAMES);
     let (forces, near) = forces(&world, &steering, search);
-    println!("| {count} | {search:?} | {:.2} | {:.2} | {near:.1} |", 1e3 * step, 1e3 * forces);
+    println!("| {count} | {search:?} | {threads} | {:.2} | {:.2} | {near:.1} |", 1e3 * step, 1e3 * forces);
     Ok(())
 }
 

@@ -10,6 +10,9 @@ use crate::steering::{Flyer, Search, Steering};
 use tumble_collide::Vec3;
 use tumble_core::{ForceGenerator, Forces, Object, ObjectId, StateRange, World, WorldView};
 
+/// Least number of boids on a thread.
+const PIECE: usize = 64;
+
 /// A flock of [`Boid`]s in one world.
 #[derive(Clone, Debug)]
 pub struct Flock {
@@ -98,7 +101,10 @@ impl ForceGenerator for Flock {
                 mass: boid.mass(),
             });
         }
-        for (row, force) in rows.iter().zip(self.steering.forces(self.search, &flyers)) {
+        let forces = self.steering.forces_by(self.search, &flyers, |forces, work| {
+            view.each_piece(forces, PIECE, work);
+        });
+        for (row, force) in rows.iter().zip(forces) {
             out.wrenches[*row].force += force;
         }
     }

@@ -22,8 +22,10 @@ mod error;
 mod fields;
 mod flock;
 mod grid;
+mod helm;
 mod non_spinning;
 mod particles;
+mod sight;
 mod springs;
 mod steering;
 
@@ -33,6 +35,7 @@ pub use fields::{
     Attractor, Buoyancy, DragLaw, Explosion, Panel, Panels, Submerged, Targets, Wind, silhouette, submerged,
 };
 pub use flock::Flock;
+pub use helm::{BodyFlock, Helm};
 pub use non_spinning::non_spinning;
 pub use particles::{Emitter, Particle, ParticleSettings, ParticleSystem};
 pub use springs::{Cloth, Jelly, MeshSpring, SpringMesh};

@@ -37,13 +37,9 @@
 
 use crate::error::{BehaviorError, check};
 use crate::grid::Grid;
-use std::f64::consts::PI;
+use crate::sight::{CLOSEST, Eye, LANES, Lanes, Sight};
+use std::ops::Range;
 use tumble_collide::Vec3;
-
-/// Smallest distance in the avoidance, m.
-const CLOSEST: f64 = 1e-6;
-/// Margin within which a cosine or a square does not decide what is seen.
-const MARGIN: f64 = 1e-9;
 
 /// Constants of a flock, SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -148,44 +144,62 @@ impl Steering {
         self.boundary_center.iter().try_for_each(|x| check("boundary_center", *x, true, "finite"))
     }
 
-    /// Returns the force on each boid, N, in the same order. The sums over neighbors are in the order
-    /// of the list, so both searches give the same bits.
+    /// Returns the force on each boid, N, in the same order. Both searches give the same bits.
     pub fn forces(&self, search: Search, flyers: &[Flyer]) -> Vec<Vec3> {
-        let mut forces = vec![Vec3::zeros(); flyers.len()];
+        self.forces_by(search, flyers, |forces, work| work(0, forces))
+    }
+
+    /// Returns the force on each boid, N. `run` is given the forces in the order of the cells; it calls the work with the
+    /// number of the first and the forces of each piece of them, in any order.
+    pub(crate) fn forces_by(
+        &self,
+        search: Search,
+        flyers: &[Flyer],
+        run: impl FnOnce(&mut [Vec3], &(dyn Fn(usize, &mut [Vec3]) + Sync)),
+    ) -> Vec<Vec3> {
+        let grid = Grid::new(flyers.iter().map(|flyer| flyer.position), self.visibility_distance);
+        let crowd = Crowd::new(flyers, grid.order().collect());
         let eye = Eye::new(self);
-        match search {
-            Search::BruteForce => {
-                let all = || flyers.iter().map(|flyer| flyer.position).enumerate();
-                (0..flyers.len()).for_each(|me| forces[me] = self.force(&eye, flyers, me, all()));
+        let mut sorted = vec![Vec3::zeros(); flyers.len()];
+        run(&mut sorted, &|first, forces: &mut [Vec3]| {
+            let mut seen = vec![0; flyers.len()];
+            let places = first..first + forces.len();
+            let mut work = |own: Range<usize>, runs: &[Range<usize>]| {
+                for place in own {
+                    let near = crowd.within(place, eye.unseen, runs, &mut seen);
+                    forces[place - first] = self.force(&eye, &crowd, place, &near);
+                }
+            };
+            match search {
+                Search::Grid => grid.each_cell(places, work),
+                Search::BruteForce => work(places, std::slice::from_ref(&(0..flyers.len()))),
             }
-            Search::Grid => {
-                let mut around: Vec<(usize, Vec3)> = Vec::new();
-                let grid = Grid::new(flyers.iter().map(|flyer| flyer.position), self.visibility_distance);
-                grid.each_cell(|own, near| {
-                    around.clear(); // one piece of memory for all boids of the cell
-                    around.extend(near.iter().map(|&other| (other as usize, flyers[other as usize].position)));
-                    for &(_, me) in own {
-                        forces[me as usize] = self.force(&eye, flyers, me as usize, around.iter().copied());
-                    }
-                });
-            }
-        }
+        });
+        let mut forces = vec![Vec3::zeros(); flyers.len()];
+        crowd.order.iter().zip(sorted).for_each(|(index, force)| forces[*index] = force);
         forces
     }
 
-    /// Returns the force on one boid, N. `near` has indices and positions, ascending by index.
-    fn force(&self, eye: &Eye, flyers: &[Flyer], me: usize, near: impl Iterator<Item = (usize, Vec3)>) -> Vec3 {
-        let own = &flyers[me];
-        let [mut avoidance, mut matching, mut clustering] = [Vec3::zeros(); 3];
-        for (other, position) in near {
-            let arm = position - own.position;
-            if arm.norm_squared() > eye.unseen || other == me {
-                continue;
+    /// Returns the force on the boid at a place.
+    fn force(&self, eye: &Eye, crowd: &Crowd, place: usize, near: &Near) -> Vec3 {
+        let own = &crowd.flyers[crowd.order[place]];
+        let mut sums = Sums::default();
+        for near in near.places.chunks(LANES) {
+            let (mut arm, mut faster) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+            for (lane, other) in near.iter().enumerate() {
+                for axis in 0..3 {
+                    arm[axis][lane] = crowd.positions[axis][*other as usize] - own.position[axis];
+                    faster[axis][lane] = crowd.velocities[axis][*other as usize] - own.velocity[axis];
+                }
             }
-            let Some(seen) = eye.sight(&arm, &own.forward, other > me) else { continue };
-            avoidance -= (seen.weight / seen.distance.max(CLOSEST)) * seen.direction;
-            matching += seen.weight * (flyers[other].velocity - own.velocity);
-            clustering += (seen.weight * seen.distance) * seen.direction;
+            sums.add(&eye.sight(&arm, &own.forward), &arm, &faster);
+        }
+        let [mut avoidance, mut matching, clustering] = sums.total();
+        let here = if near.here > 1 { near.places } else { &[] };
+        for other in here.iter().map(|other| *other as usize).filter(|other| crowd.is_at(*other, place)) {
+            let direction = if crowd.order[other] > crowd.order[place] { Vec3::x() } else { -Vec3::x() };
+            avoidance -= eye.at_the_same_place() / CLOSEST * direction;
+            matching += eye.at_the_same_place() * (crowd.flyers[crowd.order[other]].velocity - own.velocity);
         }
         let ranked = self.by_priority(
             &(own.mass * self.avoidance * avoidance),
@@ -225,65 +239,79 @@ impl Steering {
     }
 }
 
-/// The limits of what boids see. Squares and cosines decide where they are clear, which costs no root
-/// and no `acos`.
-struct Eye<'a> {
-    steering: &'a Steering,
-    /// Square of a distance from which nothing is seen, m².
-    unseen: f64,
-    /// Cosine above which the angle weighs 1, and below which nothing is seen.
-    cosines: [f64; 2],
+/// The boids in the order of the cells. Coordinates are apart, as the search reads them.
+struct Crowd<'a> {
+    flyers: &'a [Flyer],
+    /// Index of each boid.
+    order: Vec<usize>,
+    positions: [Vec<f64>; 3],
+    velocities: [Vec<f64>; 3],
 }
 
-impl Eye<'_> {
-    fn new(steering: &Steering) -> Eye<'_> {
-        let cosine = |angle: f64, margin: f64| if angle <= PI { angle.cos() + margin } else { -2.0 };
-        let cosines = [
-            cosine(steering.inner_visibility_angle.min(steering.visibility_angle), MARGIN),
-            cosine(steering.visibility_angle, -MARGIN),
-        ];
-        Eye { steering, unseen: steering.visibility_distance.powi(2) * (1.0 + MARGIN), cosines }
+impl<'a> Crowd<'a> {
+    fn new(flyers: &'a [Flyer], order: Vec<usize>) -> Crowd<'a> {
+        let sorted = |of: &dyn Fn(&Flyer) -> f64| order.iter().map(|index| of(&flyers[*index])).collect::<Vec<_>>();
+        let positions = [0, 1, 2].map(|axis| sorted(&|flyer| flyer.position[axis]));
+        let velocities = [0, 1, 2].map(|axis| sorted(&|flyer| flyer.velocity[axis]));
+        Crowd { flyers, positions, velocities, order }
     }
 
-    /// Returns how a boid sees another one, `arm` away; `None` if it does not. `later` states whether
-    /// the other one is behind it in the list.
-    fn sight(&self, arm: &Vec3, forward: &Vec3, later: bool) -> Option<Sight> {
-        let steering = self.steering;
-        let distance = arm.norm();
-        let by_distance = fade(distance, steering.inner_visibility_distance, steering.visibility_distance)?;
-        if distance == 0.0 {
-            let direction = if later { Vec3::x() } else { -Vec3::x() };
-            return Some(Sight { weight: by_distance, distance, direction });
+    /// Returns whether another boid is at the same place as one, to rounding of the square of their distance.
+    fn is_at(&self, other: usize, place: usize) -> bool {
+        let arm = Vec3::from(self.positions.each_ref().map(|x| x[other] - x[place]));
+        other != place && arm.x * arm.x + arm.y * arm.y + arm.z * arm.z == 0.0
+    }
+
+    /// Finds the boids of `runs` within a squared distance (m²) of one, itself included. Their places are written to the
+    /// front of `seen`, which is as long as the crowd.
+    fn within<'s>(&self, place: usize, squared: f64, runs: &[Range<usize>], seen: &'s mut [u32]) -> Near<'s> {
+        let [x, y, z] = &self.positions;
+        let (own_x, own_y, own_z) = (x[place], y[place], z[place]);
+        let (mut count, mut here) = (0, 0);
+        for run in runs {
+            let points = x[run.clone()].iter().zip(&y[run.clone()]).zip(&z[run.clone()]);
+            for (((x, y), z), other) in points.zip(run.start as u32..) {
+                let (dx, dy, dz) = (x - own_x, y - own_y, z - own_z);
+                let distance = dx * dx + dy * dy + dz * dz;
+                // each is written, and kept by the count: no branch to predict
+                seen[count] = other;
+                count += usize::from(distance <= squared);
+                here += usize::from(distance == 0.0);
+            }
         }
-        let direction = arm / distance;
-        let weight = by_distance * self.by_angle(&direction, forward)?;
-        Some(Sight { weight, distance, direction })
+        Near { places: &seen[..count], here }
     }
+}
 
-    /// Returns the weight of a direction; `None` if it is not seen.
-    fn by_angle(&self, direction: &Vec3, forward: &Vec3) -> Option<f64> {
-        let cosine = direction.dot(forward);
-        if cosine > self.cosines[0] {
-            Some(1.0)
-        } else if cosine < self.cosines[1] {
-            None
-        } else {
-            let angle = direction.angle(forward);
-            fade(angle, self.steering.inner_visibility_angle, self.steering.visibility_angle)
+/// The boids that one may see.
+struct Near<'a> {
+    /// Their places, ascending, with its own.
+    places: &'a [u32],
+    /// Number of those at its own place, itself included.
+    here: usize,
+}
+
+/// Sums over neighbors, one for each lane: `−Σ w·u/d`, `Σ w·(v_j − v_i)` and `Σ w·d·u`.
+#[derive(Default)]
+struct Sums([[Lanes; 3]; 3]);
+
+impl Sums {
+    #[inline(always)]
+    fn add(&mut self, sight: &Sight, arm: &[Lanes; 3], faster: &[Lanes; 3]) {
+        let [avoidance, matching, clustering] = &mut self.0;
+        for axis in 0..3 {
+            for k in 0..LANES {
+                avoidance[axis][k] -= sight.weight[k] * sight.nearness[k] * arm[axis][k];
+                matching[axis][k] += sight.weight[k] * faster[axis][k];
+                clustering[axis][k] += sight.weight[k] * arm[axis][k];
+            }
         }
     }
-}
 
-/// A neighbor as a boid sees it.
-struct Sight {
-    weight: f64,
-    distance: f64,
-    direction: Vec3,
-}
-
-/// Returns 1 below `inner`, then a line to 0 at `outer`; `None` from there on.
-fn fade(s: f64, inner: f64, outer: f64) -> Option<f64> {
-    (s < outer).then(|| if s < inner { 1.0 } else { (outer - s) / (outer - inner) })
+    /// Returns the sums of all lanes.
+    fn total(&self) -> [Vec3; 3] {
+        self.0.map(|sum| sum.map(|lanes| lanes.iter().sum()).into())
+    }
 }
 
 /// Returns a vector of at most that length.

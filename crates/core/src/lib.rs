@@ -35,6 +35,7 @@ mod object;
 pub mod prelude;
 mod report;
 mod rigid;
+mod sensor;
 mod settings;
 pub mod solver;
 pub mod spatial;
@@ -56,15 +57,18 @@ pub use contact::pair_material::{PairMaterial, PairSide};
 pub use derived::Cache;
 pub use object::collidable::{CollisionGroup, ContactFrame};
 pub use object::frame_state::{Frame, FrameImpulse};
+pub use object::intersect::IntersectPart;
 pub use object::mounts::{CameraMount, Detail, LightMount, Spread};
 pub use object::part_state::{ForceSlice, Forces, PartPoint, PartState, PointLoad, StateRange, StateSizes, Wrench};
 pub use object::visual::{Drawn, Visual, VisualGeometry, VisualMesh};
 pub use object::{
     Appearance, CameraCarrier, Collidable, Combine, Constraint, Energy, ForceGenerator, Fork, FrameState, Integratable,
-    Level, LightCarrier, Material, Momentum, MomentumKind, NetSync, Object, Renderable, RowTarget, SyncError,
+    Intersect, Level, LightCarrier, Material, Momentum, MomentumKind, NetSync, Object, Renderable, RowTarget,
+    SyncError,
 };
 pub use report::{StepReport, UnreachableJoint, WorstSolve};
 pub use rigid::{BodyError, LockedAxes, RigidBody};
+pub use sensor::{MAX_DELAY, Sensor, SensorError, SensorKind, SensorNoise, SensorPlace};
 pub use settings::{Integrator, Settings, SettingsError};
 pub use step::{Backtracking, STEPPERS, StepContext, Stepper, TimeStepping, stepper_by_name};
 pub use tumble_collide as collide;

@@ -78,6 +78,28 @@ impl Threads {
         (0..pieces).map(|i| i * len / pieces..(i + 1) * len / pieces).collect()
     }
 
+    /// Cuts an array of records of `record` numbers each into pieces of at least `least` records, and calls `work`
+    /// with the number of the first record and the records of each piece. Returns the results in the order of the
+    /// pieces.
+    pub fn each_piece<T: Send, R: Send>(
+        &self,
+        items: &mut [T],
+        record: usize,
+        least: usize,
+        work: impl Fn(usize, &mut [T]) -> R + Sync,
+    ) -> Vec<R> {
+        let pieces = self.pieces(items.len() / record.max(1), least);
+        let mut results: Vec<Option<R>> = pieces.iter().map(|_| None).collect();
+        let (mut parts, mut rest) = (Vec::new(), items);
+        for (piece, result) in pieces.into_iter().zip(&mut results) {
+            let (own, behind) = std::mem::take(&mut rest).split_at_mut(piece.len() * record);
+            parts.push((piece.start, own, result));
+            rest = behind;
+        }
+        self.each(parts, |(first, own, result)| *result = Some(work(first, own)));
+        results.into_iter().flatten().collect()
+    }
+
     /// Does the work on every item, on several threads at once. Items are taken in order.
     pub fn each<T: Send>(
         &self,

@@ -1,10 +1,12 @@
 //! Conversion of a world to the entities and poses of a recording.
 
-use crate::record::{Contact, Entity, MAX_CONTACTS, MAX_NAME_BYTES, Pose, Shape, VisualPart};
+use crate::record::{
+    Contact, Entity, MAX_CONTACTS, MAX_EVENTS, MAX_NAME_BYTES, Pose, Readings, RecordedEvent, Shape, VisualPart,
+};
 use nalgebra::Translation3;
 use std::collections::BTreeMap;
 use tumble_collide::{Shape as Solid, TriMesh, Vec3};
-use tumble_core::{ContactPoint, Drawn, ObjectId, RigidBody, World};
+use tumble_core::{ContactPoint, Drawn, Event, EventKind, ObjectId, RigidBody, World};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Side of the square that represents a half-space, m.
@@ -37,6 +39,26 @@ pub fn contacts(world: &World) -> Vec<Contact> {
         })
     };
     strongest(world, MAX_CONTACTS).into_iter().filter_map(contact).collect()
+}
+
+/// Returns the readings of all measuring sensors by name; long names as those of [`entities`].
+pub fn readings(world: &World) -> Readings {
+    let one = |id| Some((shortened(world.name(id)?.to_owned()), world.reading(id)?.to_vec()));
+    world.sensors().filter_map(one).collect()
+}
+
+/// Returns the events of the last step, at most [`MAX_EVENTS`], the first ones, with the names of [`entities`].
+pub fn events(world: &World) -> Vec<RecordedEvent> {
+    let kind =
+        |event: &Event| EventKind::NAMES.iter().find(|(_, kind)| *kind == event.kind).map_or("", |(name, _)| name);
+    let one = |event: &Event| RecordedEvent {
+        kind: kind(event).to_owned(),
+        a: name(world, event.a, event.part_a),
+        b: event.b.map(|b| name(world, b, event.part_b)),
+        impulse: event.impulse.into(),
+        point: event.point.into(),
+    };
+    world.events().iter().take(MAX_EVENTS).map(one).collect()
 }
 
 /// Shows recorded contacts in a world that has the same entities, as those of its last step.

@@ -5,7 +5,7 @@ use crate::errors::{Error, Result};
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use tumble::collide::{Builder, ContactMode};
-use tumble::dynamics::{Combine, EventKind, LockedAxes, LoopJointKind, Mode};
+use tumble::dynamics::{Combine, EventKind, LockedAxes, LoopJointKind, Mode, SensorKind};
 use tumble::scene::urdf::{CollisionMeshes, MissingMeshes};
 use tumble::scene::{Integrator, Solver, Stepper};
 
@@ -73,6 +73,7 @@ pub fn _choices() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("EventKind", names(EventKind::NAMES)),
         ("LockedAxis", LockedAxes::NAMES.to_vec()),
         ("JointKind", names(LoopJointKind::NAMES)),
+        ("SensorKind", SensorKind::NAMES.to_vec()),
         ("JointType", names(JOINT_TYPES)),
         ("MissingMeshes", names(MISSING_MESHES)),
         ("CollisionMeshes", names(COLLISION_MESHES)),

@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use tumble::collide::{MeshError, ShapeError};
 use tumble::dynamics::{
-    ArchiveError, ArticulatedError, ArticulationError, BodyError, LoopJointError, ModelError, SettingsError,
-    SnapshotError, StepError, WorldError,
+    ArchiveError, ArticulatedError, ArticulationError, BodyError, LoopJointError, ModelError, SensorError,
+    SettingsError, SnapshotError, StepError, WorldError,
 };
 use tumble::net::record::RecordError;
 use tumble::render::RenderError;
@@ -37,6 +37,8 @@ pub enum Error {
     Articulation(#[from] ArticulationError),
     #[error(transparent)]
     Joint(#[from] LoopJointError),
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
     #[error(transparent)]
     Model(#[from] ModelError),
     #[error(transparent)]

@@ -44,6 +44,8 @@ mod _native {
     #[pymodule_export]
     use super::objects::joint::Joint;
     #[pymodule_export]
+    use super::objects::sensor::{Sensor, Sensors};
+    #[pymodule_export]
     use super::objects::shapes::{Block, Capsule, Compound, Cylinder, HalfSpace, Mesh, Shape, Sphere};
     #[pymodule_export]
     use super::objects::spheretree::{_unpickle_tree, SphereTree};

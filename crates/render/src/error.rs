@@ -45,6 +45,16 @@ pub enum RenderError {
         /// Largest product of the sides that is accepted.
         max_pixels: u64,
     },
+    /// A constant or a number of free particles is out of its range.
+    #[error("{what} is {value}, but must be {range}")]
+    Particles {
+        /// The constant.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// Its range.
+        range: &'static str,
+    },
     /// An image cannot be encoded as PNG: it has no pixels, or not four bytes for each.
     #[error("the picture cannot be written as PNG: {0}")]
     Png(String),

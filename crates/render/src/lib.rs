@@ -42,7 +42,10 @@ pub use caption::caption;
 pub use draw::{DebugDraw, Drawing, NamedView, UnknownOverlay, UnknownView, UpAxis, tree_over_mesh};
 pub use error::RenderError;
 pub use facet::{Blend, CalibrationPattern, CaveView, FacetView, RIM_PX, Tile, Warp, calibration_picture, unfold};
-pub use gpu::{Renderer, Screen, Shown, Stage};
+pub use gpu::{
+    FreeParticle, FreeParticles, GpuParticles, MAX_OBSTACLES, MAX_PARTICLES, Obstacle, ObstacleShape, Renderer, Screen,
+    Shown, Stage,
+};
 pub use image::Image;
 pub use list::{
     Capsule, DebugLine, DebugPoint, DebugSphere, DebugStyle, DrawList, Ground, Instance, Light, MAX_ITEMS, MAX_LIGHTS,

@@ -88,6 +88,7 @@ pub use parse::mesh::{MeshSource, MeshSpec};
 pub use parse::mount::Mounts;
 pub use parse::pair::{PairSideSpec, PairSpec};
 pub use parse::problem::{Invalid, Problem};
+pub use parse::sensor::{SensorPlaceSpec, SensorSpec};
 pub use parse::shape::{CompoundPartSpec, ShapeSpec};
 pub use parse::terrain::{Heights, HullPoints};
 pub use parse::view::{CameraSpec, CavePlace, GroundSpec, LightKind, LightSpec, SkySpec};

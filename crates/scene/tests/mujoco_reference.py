@@ -3,6 +3,7 @@
     mujoco_reference.py MODEL COUNT     prints the model and COUNT random states of it (exit 77 where the package is missing, 78 where MuJoCo
                                         itself refuses the model)
     mujoco_reference.py models          prints the paths of all models in installed packages
+    mujoco_reference.py sensors MODEL   prints a line `sensor name numbers` for each sensor at the first keyframe
 
 The output is lines `word name numbers`: `joint`, `body`, `site`, `actuator` name the elements in MuJoCo's order; then for each state `qpos`, `qvel`,
 `ctrl`, `mass` (the whole matrix), `bias`, `passive`, `actuation`, `xpos` and `xquat` of the bodies, `sites` and `forces` of the actuators. Numbers
@@ -69,7 +70,19 @@ def state(model, data, random):
         say(word, part)
 
 
+def sensors(model):
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    for s in range(model.nsensor):
+        first = model.sensor_adr[s]
+        say(f"sensor {name(model, mujoco.mjtObj.mjOBJ_SENSOR, s)}", data.sensordata[first : first + model.sensor_dim[s]])
+
+
 if __name__ == "__main__":
+    if sys.argv[1] == "sensors":
+        sensors(mujoco.MjModel.from_xml_path(sys.argv[2]))
+        sys.exit(0)
     if sys.argv[1] == "models":
         models()
         sys.exit(0)

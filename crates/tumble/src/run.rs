@@ -13,7 +13,7 @@ use std::path::Path;
 use std::time::Instant;
 use tumble::dynamics::World;
 use tumble::net::record::{Recorder, RecorderOptions};
-use tumble::net::world::{contacts, entities, poses};
+use tumble::net::world::{contacts, entities, events, poses, readings};
 use tumble::scene::{SceneFile, open_file, visual_notes};
 
 /// Largest saved state that is read: a thousand times the size of one of ten thousand bodies.
@@ -106,7 +106,8 @@ fn simulate(
     let mut progress = Progress::new(frames, options.quiet);
     let mut record = |world: &World| match &mut recorder {
         Some(r) => r
-            .frame(world.time(), world.frame(), &poses(world), &contacts(world), &world.save())
+            .report(&readings(world), &events(world))
+            .and_then(|()| r.frame(world.time(), world.frame(), &poses(world), &contacts(world), &world.save()))
             .map_err(|e| Failure::run("recording", e)),
         None => Ok(()),
     };

@@ -7,6 +7,7 @@
 //! | [`Bead`] | 1 degree of freedom on a cycloid, state `[φ, p]`, inertia depends on the angle | a sphere | itself: a stop on the wire | |
 //! | [`Rod`] | | | two objects, or one and a point: fixed distance, or a rope | |
 //! | [`Lookout`] | as a particle | | | carries a camera and a lamp |
+//! | [`Torus`] | as a rigid body | by an intersection test of its own | | |
 //! | [`Wind`] | | | | drag on the listed objects |
 //!
 //! [`Graded`] is a stepper.
@@ -16,6 +17,7 @@ mod graded;
 mod lookout;
 mod particle;
 mod rod;
+mod torus;
 mod wind;
 
 pub use bead::Bead;
@@ -23,4 +25,5 @@ pub use graded::Graded;
 pub use lookout::Lookout;
 pub use particle::Particle;
 pub use rod::{End, Rod};
+pub use torus::Torus;
 pub use wind::Wind;

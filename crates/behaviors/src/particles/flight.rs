@@ -14,7 +14,7 @@
 //! Times of impact are those of the exact path, so an elastic bounce keeps its height. An impact slower than the
 //! acceleration gives in a frame does not bounce: the particle slides for the rest of the frame.
 
-use super::obstacles::{Hit, Obstacle, Obstacles, Stretch};
+use super::obstacles::{Hit, Obstacle, Obstacles, Stretch, TOUCHING};
 use super::path::{Air, Path};
 use tumble_collide::Vec3;
 use tumble_core::{Frame, FrameImpulse, Material};
@@ -52,7 +52,7 @@ impl Flight<'_> {
             }
             let left = dt - time;
             let path = self.air.path(*x, *v, left);
-            let end = path.at(left);
+            let end = path.end();
             self.obstacles.near(x, &end.0, &mut memory.near);
             let Some(hit) = self.first(&memory.near, &path, time, left, None) else {
                 return (*x, *v) = end;
@@ -99,7 +99,10 @@ impl Flight<'_> {
         let u = *v - obstacle.velocity(x);
         let along = u.dot(n);
         if along > 0.0 {
-            return true;
+            // rounding gives a particle at rest a speed that does not lift it off
+            let lifts = along * along > -2.0 * a.dot(n) * TOUCHING;
+            *v -= if lifts { 0.0 } else { along } * n;
+            return lifts;
         }
         let settings = self.frame.settings;
         let e = settings.combine_restitution.of(self.material.restitution, obstacle.material.restitution);
@@ -134,6 +137,7 @@ impl Flight<'_> {
         let stopped = end == Vec3::zeros() && ease.norm() * left < 1e-9 * u.norm();
         let way = if stopped { u * (0.5 * u.norm() / grip / left) } else { 0.5 * (u + end) };
         let path = Path::straight(*x, carrier + way);
+        self.obstacles.near(x, &path.at(left).0, &mut memory.near); // a slide goes elsewhere than free flight
         let hit = self.first(&memory.near, &path, time, left, Some(index)).filter(|hit| hit.time > 0.0);
         let took = hit.map_or(left, |hit| hit.time);
         let share = took / left;

@@ -14,6 +14,7 @@
 //! | life | time that is left, s; 0 or less of a free place |
 //! | serial | serial number of the particle |
 
+mod cells;
 mod emitter;
 mod flight;
 pub(crate) mod obstacles;
@@ -258,7 +259,7 @@ impl FrameState for ParticleSystem {
         let mask = if s.collides { s.mask } else { 0 };
         let obstacles = Obstacles::new(frame, s.radius, s.group, mask);
         let gravity = s.gravity_scale * frame.view.gravity;
-        let air = Air { gravity, wind: s.wind, linear: s.linear_drag, quadratic: s.quadratic_drag };
+        let air = Air::new(gravity, s.wind, [s.linear_drag, s.quadratic_drag], frame.dt);
         let (radius, mass, material, two_way) = (s.radius, s.mass, s.material, s.two_way);
         let flight = Flight { frame, obstacles: &obstacles, air, radius, mass, material, two_way };
         let (header, records) = x.split_at_mut(HEADER);

@@ -14,6 +14,7 @@
 //! (conservative advancement). If the gap is negative at the end, regula falsi (Illinois) finds the root instead; it is exact
 //! to rounding, and may be a later one of three.
 
+use super::cells::Cells;
 use super::path::Path;
 use tumble_collide::{Aabb, BoxTree, Pose, Shape, Vec3};
 use tumble_core::{CollisionGroup, Frame, Material, ObjectId, PartState};
@@ -21,7 +22,7 @@ use tumble_core::{CollisionGroup, Frame, Material, ObjectId, PartState};
 /// Most steps along a path.
 const STEPS: usize = 48;
 /// Gap of a particle that lies on a surface, m.
-const TOUCHING: f64 = 1e-10;
+pub(super) const TOUCHING: f64 = 1e-10;
 /// Number of obstacles from which a tree finds those near a path.
 const MANY: usize = 48;
 
@@ -51,7 +52,9 @@ pub(super) struct Obstacles<'a> {
     unbounded: usize,
     /// A box around the others.
     bounds: Aabb,
-    /// A tree of the others, if they are many.
+    /// Cells of the others, for short ways.
+    cells: Cells,
+    /// A tree of the others, if they are many, for long ways.
     tree: Option<BoxTree>,
 }
 
@@ -104,10 +107,12 @@ impl<'a> Obstacles<'a> {
         let finite = |o: &Obstacle| o.bounds.min.iter().chain(o.bounds.max.iter()).all(|x| x.is_finite());
         let (mut all, bounded): (Vec<_>, Vec<_>) = all.into_iter().partition(|o| !finite(o));
         let unbounded = all.len();
-        let tree = (bounded.len() > MANY).then(|| BoxTree::new(&bounded.iter().map(|o| o.bounds).collect::<Vec<_>>()));
-        let bounds = Aabb::around(bounded.iter().flat_map(|o| [o.bounds.min, o.bounds.max]));
+        let boxes: Vec<Aabb> = bounded.iter().map(|o| o.bounds).collect();
+        let tree = (bounded.len() > MANY).then(|| BoxTree::new(&boxes));
+        let bounds = Aabb::around(boxes.iter().flat_map(|b| [b.min, b.max]));
+        let cells = Cells::new(&bounds, &boxes);
         all.extend(bounded);
-        Obstacles { all, unbounded, bounds, tree }
+        Obstacles { all, unbounded, bounds, cells, tree }
     }
 
     /// Returns an obstacle.
@@ -119,10 +124,21 @@ impl<'a> Obstacles<'a> {
     pub fn near(&self, from: &Vec3, to: &Vec3, out: &mut Vec<usize>) {
         out.clear();
         let way = Aabb { min: from.inf(to), max: from.sup(to) };
-        let meets = |index: &usize| self.all[*index].bounds.overlaps(&way);
+        let meets = |index: &usize| overlap(&self.all[*index].bounds, &way);
         out.extend((0..self.unbounded).filter(meets));
+        if !overlap(&self.bounds, &way) {
+            return;
+        }
+        let start = out.len();
+        if self.cells.near(&way, out) {
+            let mut kept = start;
+            for k in start..out.len() {
+                out[kept] = self.unbounded + out[k];
+                kept += usize::from(meets(&out[kept]));
+            }
+            return out.truncate(kept);
+        }
         match &self.tree {
-            _ if !self.bounds.overlaps(&way) => {}
             None => out.extend((self.unbounded..self.all.len()).filter(meets)),
             Some(tree) => {
                 let length = (to - from).norm();
@@ -135,6 +151,12 @@ impl<'a> Obstacles<'a> {
             }
         }
     }
+}
+
+/// Returns whether two boxes share a point.
+#[inline(always)]
+fn overlap(a: &Aabb, b: &Aabb) -> bool {
+    (0..3).all(|k| a.min[k] <= b.max[k] && b.min[k] <= a.max[k])
 }
 
 /// A stretch of a path within a frame.
@@ -173,6 +195,14 @@ impl Obstacle<'_> {
         self.state.velocity_at(point) + self.state.pose.rotation * self.material.surface_velocity
     }
 
+    /// Returns the time at which a stretch that leaves the surface turns back to it, s, at most half of it.
+    fn apex(&self, stretch: &Stretch) -> Option<f64> {
+        let (path, half) = (stretch.path, 0.5 * stretch.length);
+        let normal = self.gap(&path.x, stretch.start / stretch.dt, stretch.radius).1;
+        let (rate, pull) = ((path.v - self.velocity(&path.x)).dot(&normal), path.pull.dot(&normal));
+        (rate > 0.0).then(|| if pull < 0.0 { half.min(-rate / pull) } else { half })
+    }
+
     /// Returns the time along a stretch at which it meets the surface, s; 0 if it begins there. The gap is
     /// not negative then, unless it was at the start.
     pub fn meets(&self, stretch: &Stretch) -> Option<f64> {
@@ -188,7 +218,11 @@ impl Obstacle<'_> {
         }
         let mut high = (stretch.length, at(stretch.length, stretch.end));
         if low.1 <= TOUCHING && high.1 < 0.0 {
-            return Some(0.0);
+            // a bounce that begins here may end within the stretch
+            match self.apex(stretch).map(|t| (t, gap(t))).filter(|apex| apex.1 > TOUCHING) {
+                Some(apex) => low = apex,
+                None => return Some(0.0),
+            }
         }
         if high.1 >= 0.0 {
             let mut steps = 0;

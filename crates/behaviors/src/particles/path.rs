@@ -29,6 +29,9 @@ pub(super) struct Air {
     pub linear: f64,
     /// Quadratic drag per mass, 1/m.
     pub quadratic: f64,
+    /// Length of a frame, s, and `φ₁` and `φ₂` there with linear drag alone: most paths are of a whole frame.
+    frame: f64,
+    phi: (f64, f64),
 }
 
 /// A path from a point in time.
@@ -39,30 +42,57 @@ pub(super) struct Path {
     /// Acceleration at its start, m/s².
     pub pull: Vec3,
     gamma: f64,
+    /// Length that the path is made for, s, and `φ₁` and `φ₂` there.
+    length: f64,
+    phi: (f64, f64),
 }
 
 impl Air {
+    /// Makes the air of frames of `frame` seconds, with linear and quadratic drag.
+    pub fn new(gravity: Vec3, wind: Vec3, [linear, quadratic]: [f64; 2], frame: f64) -> Air {
+        Air { gravity, wind, linear, quadratic, frame, phi: phi(linear * frame) }
+    }
+
     /// Returns the path of a particle for a step of `h` seconds.
     pub fn path(&self, x: Vec3, v: Vec3, h: f64) -> Path {
         let rate = |v: &Vec3| match self.quadratic {
             0.0 => self.linear,
             quadratic => self.linear + quadratic * (self.wind - v).norm(),
         };
-        let path = |gamma: f64| Path { x, v, pull: self.gravity + gamma * (self.wind - v), gamma };
-        let first = path(rate(&v));
-        if self.quadratic == 0.0 { first } else { path(rate(&first.at(0.5 * h).1)) }
+        let path = |gamma: f64, length: f64, phi: (f64, f64)| Path {
+            x,
+            v,
+            pull: self.gravity + gamma * (self.wind - v),
+            gamma,
+            length,
+            phi,
+        };
+        if self.quadratic == 0.0 {
+            return path(self.linear, h, if h == self.frame { self.phi } else { phi(self.linear * h) });
+        }
+        let (first, middle) = (rate(&v), 0.5 * h);
+        let gamma = rate(&path(first, middle, phi(first * middle)).end().1);
+        path(gamma, h, phi(gamma * h))
     }
 }
 
 impl Path {
     /// Returns a straight path at a velocity.
     pub fn straight(x: Vec3, v: Vec3) -> Path {
-        Path { x, v, pull: Vec3::zeros(), gamma: 0.0 }
+        Path { x, v, pull: Vec3::zeros(), gamma: 0.0, length: 0.0, phi: (1.0, 0.5) }
     }
 
     /// Returns position and velocity after `t` seconds.
     pub fn at(&self, t: f64) -> (Vec3, Vec3) {
-        let (one, two) = phi(self.gamma * t);
+        self.with(t, phi(self.gamma * t))
+    }
+
+    /// Returns position and velocity at its end.
+    pub fn end(&self) -> (Vec3, Vec3) {
+        self.with(self.length, self.phi)
+    }
+
+    fn with(&self, t: f64, (one, two): (f64, f64)) -> (Vec3, Vec3) {
         (self.x + t * (self.v + t * two * self.pull), self.v + t * one * self.pull)
     }
 
@@ -72,8 +102,11 @@ impl Path {
     }
 }
 
-/// Below this, 8 terms of the series are exact to rounding.
+/// Below this, the terms of the series of `φ₂` are exact to rounding.
 const SMALL: f64 = 0.03;
+/// `1/k!`, from `k = 2` on.
+const TERMS: [f64; 8] =
+    [1.0 / 2.0, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 120.0, 1.0 / 720.0, 1.0 / 5040.0, 1.0 / 40320.0, 1.0 / 362_880.0];
 
 /// Returns `φ₁` and `φ₂`.
 fn phi(z: f64) -> (f64, f64) {
@@ -81,8 +114,7 @@ fn phi(z: f64) -> (f64, f64) {
         (1.0, 0.5)
     } else if z < SMALL {
         // φ₂ = Σ (−z)^k/(k + 2)!, φ₁ = 1 − z·φ₂
-        let two = (3..=9).rev().fold(0.1, |sum, k| (1.0 - z * sum) / f64::from(k));
-        let two = 0.5 * (1.0 - z * two);
+        let two = TERMS.iter().rev().fold(0.0, |sum, term| term - z * sum);
         (1.0 - z * two, two)
     } else {
         let decay = -ComplexField::exp_m1(-z);

@@ -31,6 +31,8 @@ pub(super) struct Pattern {
     row: Vec<usize>,
     /// For each column, the block that each pair of its blocks below the diagonal changes.
     update: Vec<u32>,
+    /// The block of each pair that a spring joins.
+    joined: Vec<u32>,
 }
 
 /// The numbers of a factor.
@@ -44,9 +46,9 @@ impl Pattern {
     ///
     /// # Errors
     /// [`BehaviorError::Range`] if it would need more memory than is sensible.
-    pub fn new(nodes: &[Vec3], pairs: impl Iterator<Item = [usize; 2]>) -> Result<Pattern, BehaviorError> {
+    pub fn new(nodes: &[Vec3], pairs: impl Iterator<Item = [usize; 2]> + Clone) -> Result<Pattern, BehaviorError> {
         let mut joined = vec![Vec::new(); nodes.len()];
-        for [a, b] in pairs {
+        for [a, b] in pairs.clone() {
             joined[a].push(b);
             joined[b].push(a);
         }
@@ -79,11 +81,13 @@ impl Pattern {
             row.extend(rows);
             first.push(row.len());
         }
-        let mut pattern = Pattern { place, first, row, update: Vec::new() };
+        let mut pattern = Pattern { place, first, row, update: Vec::new(), joined: Vec::new() };
         let updates = columns.iter().flat_map(|rows| {
             rows.iter().enumerate().flat_map(|(b, column)| rows[b..].iter().map(|row| (*row, *column)))
         });
         pattern.update = updates.map(|(row, column)| pattern.find(row, column) as u32).collect();
+        let places = pairs.map(|pair| pair.map(|node| pattern.place[node]));
+        pattern.joined = places.map(|[i, j]| pattern.find(i.max(j), i.min(j)) as u32).collect();
         Ok(pattern)
     }
 
@@ -99,10 +103,14 @@ impl Pattern {
         factor.blocks.resize(self.row.len(), Mat3::zeros());
     }
 
-    /// Adds a symmetric block for two nodes and its transpose, or one on the diagonal.
-    pub fn add(&self, factor: &mut Factor, a: usize, b: usize, block: &Mat3) {
-        let (i, j) = (self.place[a], self.place[b]);
-        factor.blocks[self.find(i.max(j), i.min(j))] += block;
+    /// Adds a symmetric block for the nodes of a pair and its transpose.
+    pub fn add_joined(&self, factor: &mut Factor, pair: usize, block: &Mat3) {
+        factor.blocks[self.joined[pair] as usize] += block;
+    }
+
+    /// Adds a symmetric block for a node.
+    pub fn add(&self, factor: &mut Factor, node: usize, block: &Mat3) {
+        factor.blocks[self.first[self.place[node]]] += block;
     }
 
     /// Factors the matrix in place. Pivots that are not positive, which rounding alone makes, count as 1.
@@ -226,8 +234,11 @@ mod tests {
         pattern.clear(&mut factor);
         let n = nodes.len();
         let mut dense = nalgebra::DMatrix::<f64>::zeros(3 * n, 3 * n);
-        let mut put = |a: usize, b: usize, block: &Mat3, factor: &mut Factor| {
-            pattern.add(factor, a, b, block);
+        let mut put = |a: usize, b: usize, block: &Mat3, pair: Option<usize>, factor: &mut Factor| {
+            match pair {
+                Some(pair) => pattern.add_joined(factor, pair, block),
+                None => pattern.add(factor, a, block),
+            }
             let (i, j) = (3 * pattern.place[a], 3 * pattern.place[b]);
             for (i, j) in if a == b { vec![(i, j)] } else { vec![(i, j), (j, i)] } {
                 let mut view = dense.fixed_view_mut::<3, 3>(i, j);
@@ -237,10 +248,10 @@ mod tests {
         for (k, [a, b]) in pairs.iter().enumerate() {
             let u = Vec3::new(1.0, 0.3 * k as f64 % 1.7, 0.2 * k as f64 % 0.9).normalize();
             let block = u * u.transpose() * (2.0 + k as f64 % 5.0);
-            put(*a, *b, &-block, &mut factor);
-            [a, b].into_iter().for_each(|node| put(*node, *node, &block, &mut factor));
+            put(*a, *b, &-block, Some(k), &mut factor);
+            [a, b].into_iter().for_each(|node| put(*node, *node, &block, None, &mut factor));
         }
-        (0..n).for_each(|k| put(k, k, &Mat3::identity(), &mut factor));
+        (0..n).for_each(|k| put(k, k, &Mat3::identity(), None, &mut factor));
         pattern.factor(&mut factor);
         let b: Vec<Vec3> = (0..n).map(|k| Vec3::new(k as f64, 1.0 - k as f64, 3.0)).collect();
         let flat = nalgebra::DVector::from_iterator(3 * n, b.iter().flat_map(|b| b.iter().copied()));

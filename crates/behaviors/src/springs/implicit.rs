@@ -9,11 +9,15 @@
 use super::SpringMesh;
 use super::factor::Factor;
 use super::object::MeshCache;
+use std::collections::VecDeque;
 use tumble_collide::{Mat3, Vec3};
 
-/// Most iterations, and most halvings of one.
-const ITERATIONS: usize = 12;
+/// Most iterations, number of those with one factor, and most halvings of one.
+const ITERATIONS: usize = 48;
+const WITH_ONE_FACTOR: usize = 12;
 const HALVINGS: usize = 8;
+/// Number of iterations that a quasi-Newton step remembers.
+const REMEMBERED: usize = 6;
 /// Change of velocity at which the iteration ends, m/s.
 const CONVERGED: f64 = 1e-10;
 
@@ -45,11 +49,18 @@ impl SpringMesh {
         let equation = Equation { mesh: self, ahead, directions, velocity, external };
         let mut change = vec![Vec3::zeros(); self.nodes.len()];
         let mut factor = cache.factor.take().unwrap_or_else(|| std::mem::take(&mut cache.spare));
-        let mut value = equation.value(&change);
+        let (mut value, mut gradient) = (equation.value(&change), equation.gradient(&change));
+        let (mut past, mut left) = (Past::default(), 0);
+
         for _ in 0..ITERATIONS {
-            let flat: Vec<f64> = equation.places(&change).iter().flat_map(|q| q.iter().copied()).collect();
-            self.write_factor(&flat, positions, &mut factor);
-            let step = self.newton_step(&factor, &equation.gradient(&change));
+            let fresh = left == 0;
+            if fresh {
+                let flat: Vec<f64> = equation.places(&change).iter().flat_map(|q| q.iter().copied()).collect();
+                self.write_factor(&flat, positions, &mut factor);
+                past.0.clear();
+                left = WITH_ONE_FACTOR;
+            }
+            let step = past.step(&gradient, |gradient| self.newton_step(&factor, gradient));
             let size = step.iter().map(Vec3::amax).fold(0.0, f64::max);
             let tried = |share: f64| change.iter().zip(&step).map(|(v, s)| v - share * s).collect::<Vec<_>>();
             let shares = (0..HALVINGS).map(|k| 0.5f64.powi(k as i32));
@@ -57,11 +68,20 @@ impl SpringMesh {
                 let next_value = equation.value(&next);
                 (next_value <= value || size * share < CONVERGED).then_some((next, next_value))
             });
-            let Some((next, next_value)) = better else { break };
-            (change, value) = (next, next_value);
+            let Some((next, next_value)) = better else {
+                if fresh {
+                    break;
+                }
+                left = 0;
+                continue;
+            };
+            let next_gradient = equation.gradient(&next);
+            past.remember(difference(&next, &change), difference(&next_gradient, &gradient));
+            (change, value, gradient) = (next, next_value, next_gradient);
             if size < CONVERGED {
                 break;
             }
+            left -= 1;
         }
         (cache.factor, cache.made_for) = (Some(factor), [self.step, self.implicitness]);
         change
@@ -81,28 +101,72 @@ impl SpringMesh {
         let h = self.step;
         self.pattern.clear(factor);
         for (node, mass) in self.masses.iter().enumerate() {
-            self.pattern.add(factor, node, node, &(Mat3::identity() * *mass));
+            self.pattern.add(factor, node, &(Mat3::identity() * *mass));
         }
-        let mut add = |[a, b]: [usize; 2], block: &Mat3| {
+        let mut add = |spring: usize, block: &Mat3| {
+            let [a, b] = self.springs[spring].nodes;
             for node in [a, b].into_iter().filter(|node| !self.pinned[*node]) {
-                self.pattern.add(factor, node, node, block);
+                self.pattern.add(factor, node, block);
             }
             if !(self.pinned[a] || self.pinned[b]) {
-                self.pattern.add(factor, a, b, &-block);
+                self.pattern.add_joined(factor, spring, &-block);
             }
         };
-        self.each_spring(q, |spring, u, length| {
+        self.each_spring(q, |index, spring, u, length| {
             let weight = 0.5 * h * h * self.implicitness * spring.stiffness;
             let across = weight * (1.0 - spring.length / length).max(0.0);
-            add(spring.nodes, &(u * u.transpose() * (weight - across) + Mat3::identity() * across));
+            add(index, &(u * u.transpose() * (weight - across) + Mat3::identity() * across));
         });
-        self.each_spring(x, |spring, u, _| {
+        self.each_spring(x, |index, spring, u, _| {
             if spring.damping > 0.0 {
-                add(spring.nodes, &(u * u.transpose() * (0.5 * h * spring.damping)));
+                add(index, &(u * u.transpose() * (0.5 * h * spring.damping)));
             }
         });
         self.pattern.factor(factor);
     }
+}
+
+/// Changes of velocity and of the gradient in the last iterations, and the inverse of their product.
+#[derive(Default)]
+struct Past(VecDeque<(Vec<Vec3>, Vec<Vec3>, f64)>);
+
+impl Past {
+    /// Returns the quasi-Newton step for a gradient: `inverse` multiplies by the inverse of the factored matrix, and the
+    /// iterations since correct it (the two loops of L-BFGS).
+    fn step(&self, gradient: &[Vec3], inverse: impl Fn(&[Vec3]) -> Vec<Vec3>) -> Vec<Vec3> {
+        let mut rest = gradient.to_vec();
+        let mut shares = Vec::with_capacity(self.0.len());
+        for (moved, turned, scale) in self.0.iter().rev() {
+            let share = scale * product(moved, &rest);
+            rest.iter_mut().zip(turned).for_each(|(rest, turned)| *rest -= share * turned);
+            shares.push(share);
+        }
+        let mut step = inverse(&rest);
+        for ((moved, turned, scale), share) in self.0.iter().zip(shares.iter().rev()) {
+            let share = share - scale * product(turned, &step);
+            step.iter_mut().zip(moved).for_each(|(step, moved)| *step += share * moved);
+        }
+        step
+    }
+
+    /// Remembers an iteration, unless the potential has no curvature along it.
+    fn remember(&mut self, moved: Vec<Vec3>, turned: Vec<Vec3>) {
+        let curvature = product(&moved, &turned);
+        if curvature > 1e-12 * product(&moved, &moved).sqrt() * product(&turned, &turned).sqrt() {
+            if self.0.len() == REMEMBERED {
+                self.0.pop_front();
+            }
+            self.0.push_back((moved, turned, 1.0 / curvature));
+        }
+    }
+}
+
+fn product(a: &[Vec3], b: &[Vec3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
+}
+
+fn difference(a: &[Vec3], b: &[Vec3]) -> Vec<Vec3> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
 impl Equation<'_> {

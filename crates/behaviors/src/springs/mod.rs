@@ -17,10 +17,11 @@
 //! | `θ` | 1: forces at the end of the step (backward Euler, which damps stiff modes); ½: in its middle (midpoint rule) |
 //! | `Jᵀ·λ` | impulses of contacts and joints |
 //!
-//! The equation without `λ` is solved by Newton's method: each iteration is a minimum along `−A⁻¹·∇Φ` of the
-//! incremental potential `Φ(Δv)`, whose gradient is the difference of the two sides. So it never makes worse
+//! The equation without `λ` is solved by a quasi-Newton method: each iteration goes down the incremental potential `Φ(Δv)`,
+//! whose gradient is the difference of the two sides, along `−H·∇Φ`. `H` is `A⁻¹` at every twelfth iteration, corrected by
+//! the iterations since (L-BFGS; Liu, Bouaziz and Kavan, 2017). So it never makes worse
 //! what it begins with, however stiff the springs. The stepper knows nothing of it: to the solver the object has
-//! the mass matrix `A = LᵀL` of the last iteration, with a sparse factor ([`factor`]), so contacts are solved
+//! the mass matrix `A = LᵀL` of the last factor, with a sparse factor ([`factor`]), so contacts are solved
 //! together with the springs. Implicit cloth: Baraff and Witkin (1998).
 //!
 //! A spring without damping swings at `ω' = (2/h)·atan(½·ω·h)` with `θ = ½`: of second order in `h`.
@@ -197,14 +198,14 @@ impl SpringMesh {
         Some(world.state_of(id)?[..3 * count].chunks_exact(3).map(Vec3::from_column_slice).collect())
     }
 
-    /// Calls `work` with each spring, its direction and its length, m. A spring of no length has no direction and is
+    /// Calls `work` with the number of each spring, the spring, its direction and its length, m. A spring of no length has no direction and is
     /// left out.
-    fn each_spring(&self, x: &[f64], mut work: impl FnMut(&MeshSpring, &Vec3, f64)) {
-        for spring in &self.springs {
+    fn each_spring(&self, x: &[f64], mut work: impl FnMut(usize, &MeshSpring, &Vec3, f64)) {
+        for (index, spring) in self.springs.iter().enumerate() {
             let [a, b] = spring.nodes.map(|node| Vec3::from_column_slice(&x[3 * node..3 * node + 3]));
             let length = (b - a).norm();
             if length > 0.0 {
-                work(spring, &((b - a) / length), length);
+                work(index, spring, &((b - a) / length), length);
             }
         }
     }
@@ -212,7 +213,7 @@ impl SpringMesh {
     /// Returns the energy of the springs, J.
     fn spring_energy(&self, x: &[f64]) -> f64 {
         let mut sum = 0.0;
-        self.each_spring(x, |spring, _, length| sum += 0.5 * spring.stiffness * (length - spring.length).powi(2));
+        self.each_spring(x, |_, spring, _, length| sum += 0.5 * spring.stiffness * (length - spring.length).powi(2));
         sum
     }
 }

@@ -6,6 +6,7 @@ mod emission;
 mod fields;
 mod flights;
 mod frame_states;
+mod helm;
 mod laws;
 mod neighbors;
 mod non_spinning;

@@ -65,3 +65,35 @@ fn boids_very_far_out_have_the_same_bits() {
     }
     assert!(steering.forces(Search::Grid, &[]).is_empty());
 }
+
+/// The sums of the head of `steering.rs`, term by term.
+fn plain(steering: &Steering, flyers: &[Flyer], me: usize) -> Vec3 {
+    let own = &flyers[me];
+    let fade = |s: f64, inner: f64, outer: f64| ((outer - s) / (outer - inner)).clamp(0.0, 1.0);
+    let others = flyers.iter().enumerate().filter(|(other, _)| *other != me).map(|(_, other)| other);
+    let [mut a, mut v, mut c] = [Vec3::zeros(); 3];
+    for other in others {
+        let (d, u) = ((other.position - own.position).norm(), (other.position - own.position).normalize());
+        let angle = u.dot(&own.forward).clamp(-1.0, 1.0).acos();
+        let w = fade(d, steering.inner_visibility_distance, steering.visibility_distance)
+            * fade(angle, steering.inner_visibility_angle, steering.visibility_angle);
+        a -= w * u / d;
+        v += w * (other.velocity - own.velocity);
+        c += w * d * u;
+    }
+    own.mass * (steering.avoidance * a + steering.matching * v + steering.clustering * c)
+}
+
+#[test]
+fn the_forces_are_the_sums_of_the_appendix() {
+    let mut numbers = Numbers(11);
+    let free = Steering { max_force: 1e9, speed_rate: 0.0, boundary_stiffness: 0.0, ..Steering::default() };
+    let wide = Steering { visibility_angle: 4.0, inner_visibility_angle: 3.5, ..free };
+    for (steering, count) in [(free, 400), (wide, 57), (free, 1), (free, 9)] {
+        let flyers = crowd(&mut numbers, count, 12.0);
+        for (me, force) in steering.forces(Search::Grid, &flyers).iter().enumerate() {
+            let expected = plain(&steering, &flyers, me);
+            assert!((force - expected).norm() < 1e-11 * (1.0 + expected.norm()), "{force} is not {expected}");
+        }
+    }
+}

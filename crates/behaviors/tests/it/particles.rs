@@ -278,3 +278,59 @@ fn constants_of_particles_are_refused_by_name() {
     let emitter = Emitter { lifetime: [2.0, 1.0], ..Emitter::default() };
     assert!(ParticleSystem::new("", settings()).unwrap().with_emitter(emitter).is_err());
 }
+
+/// A bounce that ends within a frame: the particle does not stay where it left the ground.
+#[test]
+fn a_low_bounce_on_a_slope_does_not_stop_the_particle() {
+    let slope = 0.5f64;
+    for restitution in [0.2, 0.3, 0.4, 0.5, 0.6, 0.8] {
+        let mut world = World::new(Settings::default().with_dt(1.0 / 60.0)).unwrap();
+        let material = Material { restitution, friction: 0.0, ..Material::default() };
+        let plane = Pose::from_parts(Vec3::zeros().into(), Quat::from_axis_angle(&Vec3::y_axis(), slope));
+        world.add(RigidBody::fixed(Shape::half_space()).with_pose(plane).with_material(material)).unwrap();
+        let settings = ParticleSettings { material, ..ParticleSettings::default() };
+        let system = world.add(ParticleSystem::new("drops", settings).unwrap()).unwrap();
+        for k in 0..100 {
+            let at = Vec3::new(0.0, 0.0, 0.05 + 0.01 * f64::from(k));
+            ParticleSystem::spawn(&mut world, system, at, Vec3::zeros(), 100.0).unwrap();
+        }
+        steps(&mut world, 300);
+        // no force along the slope but gravity: v = g·sin α·t, whatever the bounces
+        let (along, expected) = (plane.rotation * Vec3::x(), 9.81 * slope.sin() * 5.0);
+        for particle in ParticleSystem::particles(&world, system).unwrap() {
+            let v = particle.velocity.dot(&along);
+            assert!(
+                (v - expected).abs() < 1e-6 * expected,
+                "{restitution}, {}: {v} is not {expected}",
+                particle.serial
+            );
+        }
+    }
+}
+
+/// A ground without a finite box does not hide what is beside it.
+#[test]
+fn nothing_enters_a_ball_on_a_tilted_ground() {
+    let mut world = world(1.0 / 60.0);
+    let tilted = Pose::from_parts(Vec3::zeros().into(), Quat::from_axis_angle(&Vec3::x_axis(), 0.05));
+    world.add(RigidBody::fixed(Shape::half_space()).with_pose(tilted)).unwrap();
+    let center = Vec3::new(0.0, 0.0, 0.7);
+    world
+        .add(RigidBody::fixed(Shape::sphere(0.8).unwrap()).with_pose(Pose::from_parts(center.into(), Quat::identity())))
+        .unwrap();
+    let rain = Emitter {
+        radius: 1.0,
+        speed: [0.0, 1.0],
+        lifetime: [9.0; 2],
+        ..Emitter::burst(Vec3::new(0.0, 0.0, 4.0), 1000, 0.0)
+    };
+    let system = ParticleSystem::new("rain", settings()).unwrap().with_emitter(rain).unwrap();
+    let id = world.add(system).unwrap();
+    let mut nearest = f64::INFINITY;
+    for _ in 0..240 {
+        world.step().unwrap();
+        let gaps = all(&world, id).into_iter().map(|particle| (particle.position - center).norm() - 0.81);
+        nearest = gaps.fold(nearest, f64::min);
+    }
+    assert!(nearest > -1e-9 && nearest < 1e-6, "{nearest}");
+}

@@ -14,6 +14,7 @@
 mod bodies;
 mod records;
 mod script;
+mod sensors;
 
 use crate::report::StepReport;
 use crate::settings::Settings;
@@ -22,7 +23,8 @@ use crate::step::{STEPPERS, Stepper, stepper_by_name};
 use crate::world::view::{Mode, ObjectId};
 use crate::world::{ContactPoint, Event, EventKind, World, WorldState};
 use crate::{
-    ArticulatedBody, EventError, LoopJoint, Object, RigidBody, ScriptedEvent, Template, UnreachableJoint, WorstSolve,
+    ArticulatedBody, EventError, LoopJoint, Object, RigidBody, ScriptedEvent, Sensor, Template, UnreachableJoint,
+    WorstSolve,
 };
 use bodies::{ArticulatedRecord, RigidRecord};
 use records::{
@@ -30,6 +32,7 @@ use records::{
     Tables, meshes,
 };
 use script::{EventScript, TemplateRecord};
+use sensors::SensorRecord;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use tumble_collide::Shape;
@@ -114,6 +117,7 @@ enum Record {
     Rigid(Box<RigidRecord>),
     Articulated(Box<ArticulatedRecord>),
     LoopJoint(Box<LoopJointRecord>),
+    Sensor(Box<SensorRecord>),
     Foreign,
     Event(Box<EventScript>),
     Template(TemplateRecord),
@@ -189,6 +193,7 @@ impl World {
                 Record::LoopJoint(loop_joint) => Box::new(loop_joint.loop_joint(&ids)?),
                 Record::Event(event) => Box::new(event.event(&ids)),
                 Record::Template(template) => Box::new(template.template(&ids)),
+                Record::Sensor(sensor) => Box::new(sensor.sensor(&tables, &ids)?),
                 Record::Foreign => foreign(&name).ok_or_else(|| ArchiveError::Foreign(name.clone()))?,
             };
             ids.push(world.add_named(name, object, Mode::Dynamic).map_err(damaged)?);
@@ -262,6 +267,8 @@ fn record(object: &dyn Object, tables: &mut Tables, indices: &ObjectIndices) -> 
         Record::Event(Box::new(EventScript::of(event, indices)))
     } else if let Some(template) = any.downcast_ref::<Template>() {
         Record::Template(TemplateRecord::of(template, indices))
+    } else if let Some(sensor) = any.downcast_ref::<Sensor>() {
+        Record::Sensor(Box::new(SensorRecord::of(sensor, tables, indices)))
     } else {
         Record::Foreign
     }

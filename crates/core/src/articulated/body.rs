@@ -20,6 +20,7 @@ use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraMount, LightMount};
 use crate::object::part_state::Wrench;
 use crate::object::visual::Visual;
+use crate::{Anchor, ObjectId};
 use nalgebra::{Quaternion, Translation3};
 use tumble_collide::{ContactMode, Pose, Quat, Shape, Vec3};
 
@@ -303,6 +304,14 @@ impl ArticulatedBody {
     fn part_of(&self, link: &str, pose: &Pose) -> Result<(usize, Pose), ArticulatedError> {
         let Some(frame) = self.model.frame(link) else { return Err(self.no_link(link)) };
         Ok((frame.link.unwrap_or(self.model.links().len()), frame.pose * pose))
+    }
+
+    /// Returns a frame fixed to a link, which may be a fixed one, for a sensor or a loop joint; `id` is this body in a world.
+    ///
+    /// # Errors
+    /// [`ArticulatedError::NoLink`].
+    pub fn anchor(&self, id: ObjectId, link: &str, pose: &Pose) -> Result<Anchor, ArticulatedError> {
+        self.part_of(link, pose).map(|(part, frame)| Anchor::on(id, part, frame))
     }
 
     /// Disables collisions between two links. A fixed link stands for the link or base into which

@@ -5,6 +5,7 @@ use crate::articulated::model::dof::{DofSettings, Drive};
 use crate::constraint::builder::RowBuilder;
 use crate::constraint::dof_rows::DofState;
 use crate::constraint::rows::RowSet;
+use crate::contact::warm_starts::RowStart;
 use crate::object::part_state::StateRange;
 use crate::object::{Constraint, Level, RowTarget};
 use crate::world::view::WorldView;
@@ -34,6 +35,39 @@ impl ArticulatedBody {
     pub(super) fn joint_forces(&self, x: &[f64], implicit: bool, out: &mut [f64]) {
         for (index, DofState { q, v, settings }) in self.dof_states(x) {
             out[index] += settings.spring_force(q) + if implicit { 0.0 } else { settings.explicit_force(q, v) };
+        }
+    }
+
+    /// Adds the impulses of drives to `out`, one number per degree of freedom, for the forces `rows` of its rows over a
+    /// sub-step of `h` seconds that ended at the state `x`.
+    ///
+    /// A drive and a damping that share a row divide its force by the velocity at the end: `f_drive = f + d·v`.
+    pub(crate) fn add_drives(&self, x: &[f64], time: f64, rows: &[RowStart], h: f64, out: &mut [f64]) {
+        let limits = self.limit_errors(x).count();
+        let targets = |level: Level| -> Vec<usize> {
+            let count = |(_, dof): (usize, DofState)| {
+                let mut count = 0;
+                dof.forces(level, time, |_| count += 1);
+                count
+            };
+            self.dof_states(x).map(count).collect()
+        };
+        let levels = [Level::Velocity { h }, Level::Acceleration { h, soft: None }];
+        let of = |level: &Level| limits + targets(*level).iter().sum::<usize>() + self.couplings.len() == rows.len();
+        let Some(level) = levels.into_iter().find(of) else { return };
+        let mut end = limits;
+        for ((index, dof), count) in self.dof_states(x).zip(targets(level)) {
+            end += count;
+            let damping = dof.settings.damping * dof.v;
+            let resisting = usize::from(dof.settings.friction > 0.0) + usize::from(dof.settings.damping > 0.0);
+            out[index] += h * match (dof.drive(level, time), level.soft_step()) {
+                (Some(_), soft) if count > 0 => {
+                    let shared = soft.is_some() && count == resisting;
+                    rows[end - 1].force + if shared { damping } else { 0.0 }
+                }
+                (None, None) => dof.settings.explicit_force(dof.q, dof.v) + damping,
+                _ => 0.0,
+            };
         }
     }
 

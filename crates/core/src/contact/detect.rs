@@ -3,6 +3,7 @@
 use crate::contact::internal_edges::{InternalEdges, Surroundings};
 use crate::contact::laws::ContactLaws;
 use crate::contact::motion::Moved;
+use crate::contact::own_tests::OwnTests;
 use crate::contact::pair::{CachedContacts, KnownContacts, MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
 use crate::contact::pair_material::{PairMaterials, Surface};
 use crate::contact::time_of_impact::MovingPair;
@@ -257,7 +258,12 @@ impl NarrowPhase<'_> {
         let mode = body_a.contact_mode(part_a).of_pair(body_b.contact_mode(part_b));
         let near = 2.0 * self.settings.drift_tolerance;
         let pair = PairQuery {
-            parts: MovingPair { mode, shapes: [shape_a, shape_b], part_states: [state_a, state_b] },
+            parts: MovingPair {
+                mode,
+                shapes: [shape_a, shape_b],
+                tests: OwnTests::of([(entry_a.object, part_a), (entry_b.object, part_b)]),
+                part_states: [state_a, state_b],
+            },
             motion_bounds: [self.motion_bounds[i], self.motion_bounds[j]],
             near,
             prediction: self.prediction,

@@ -5,6 +5,7 @@ pub(crate) mod detect;
 mod internal_edges;
 pub(crate) mod laws;
 pub(crate) mod motion;
+pub(crate) mod own_tests;
 pub(crate) mod pair;
 pub(crate) mod pair_material;
 mod rim;

@@ -23,6 +23,7 @@
 //! no advance overshoots. Another part of a mesh may come first, so meshes advance by the bound.
 
 use super::detect::{ContactConstraint, Owner};
+use super::own_tests::OwnTests;
 use crate::object::collidable::Collidable;
 use crate::object::part_state::PartState;
 use crate::rigid::rotation::turn;
@@ -66,6 +67,7 @@ pub(crate) fn pose_after_free_motion(part_state: &PartState, t: f64) -> Pose {
 pub(crate) struct MovingPair<'a> {
     pub mode: ContactMode,
     pub shapes: [&'a Shape; 2],
+    pub tests: OwnTests<'a>,
     pub part_states: [&'a PartState; 2],
 }
 
@@ -99,9 +101,8 @@ impl MovingPair<'_> {
 
     /// Finds the contacts at two poses, ordered by feature.
     pub fn contacts_at(&self, poses: &[Pose; 2], margin: f64, found: &mut Vec<Contact>) {
-        let [a, b] = self.shapes;
         found.clear();
-        tumble_collide::contacts_in_mode(self.mode, a, &poses[0], b, &poses[1], margin, found);
+        self.tests.contacts(self.mode, self.shapes, poses.each_ref(), margin, found);
         found.sort_by_key(|contact| contact.feature);
     }
 
@@ -212,12 +213,18 @@ pub(crate) fn moving_pair<'a>(
 ) -> Option<MovingPair<'a>> {
     let part = |index: u32| {
         let owner = owners[index as usize];
-        let body: &dyn Collidable = objects.at(owner.place as usize).object.collidable()?;
-        Some((body.shape(owner.part as usize)?, body.contact_mode(owner.part as usize)))
+        let (object, part) = (objects.at(owner.place as usize).object, owner.part as usize);
+        let body: &dyn Collidable = object.collidable()?;
+        Some((body.shape(part)?, body.contact_mode(part), (object, part)))
     };
-    let ((a, mode_a), (b, mode_b)) = part(contact.a).zip(part(contact.b))?;
+    let ((a, mode_a, side_a), (b, mode_b, side_b)) = part(contact.a).zip(part(contact.b))?;
     let part_states = [contact.a, contact.b].map(|index| &part_states[index as usize]);
-    Some(MovingPair { mode: mode_a.of_pair(mode_b), shapes: [a, b], part_states })
+    Some(MovingPair {
+        mode: mode_a.of_pair(mode_b),
+        shapes: [a, b],
+        tests: OwnTests::of([side_a, side_b]),
+        part_states,
+    })
 }
 
 /// Replaces the contacts of fast convex parts that close within `h` by those at the time at which
@@ -237,8 +244,8 @@ pub(crate) fn time_contacts(
         let motion = h * (states[0].velocity - states[1].velocity).norm();
         let pair = moving_pair(objects, owners, part_states, contact)?;
         let short = SHORT_MOTION * pair.size();
-        // contacts of a mesh begin and end with its features
-        let timed = motion >= short && !pair.shapes.iter().any(|shape| shape.has_tree());
+        // contacts of a mesh begin and end with its features; a surface of an own test need not be convex
+        let timed = motion >= short && !pair.shapes.iter().any(|shape| shape.has_tree()) && !pair.tests.any();
         timed.then_some((pair, (motion / short).min(MAX_SAMPLES).ceil()))
     };
     let same_pair = |x: &ContactConstraint, y: &ContactConstraint| x.key.pair == y.key.pair;

@@ -80,6 +80,7 @@ impl IntegrationContext<'_> {
             x: self.x,
             part_states: &self.derived.part_states,
             objects: self.table.with(self.states),
+            threads: self.threads,
         };
         for entry in self.table.with(self.states).iter().filter(|e| e.status.enabled) {
             if let Some(body) = entry.object.integratable().filter(|_| entry.moves()) {

@@ -1,6 +1,6 @@
 //! The trait of objects with parts that collide: shapes, materials and filters (thesis §IV.A.3).
 
-use super::Material;
+use super::{Intersect, Material};
 use tumble_collide::{ContactMode, Shape, Vec3};
 
 /// Collision group of a part, 0 to 63 (thesis `CollisionObjectType`). Pairs are filtered by group.
@@ -47,6 +47,10 @@ pub trait Collidable {
     /// Returns the shape of a part, in the part's frame; `None` for a part that never collides: one
     /// for forces, joints or visuals.
     fn shape(&self, part: usize) -> Option<&Shape>;
+    /// Returns the object's own intersection test; `None` for contacts of its shapes.
+    fn intersect(&self) -> Option<&dyn Intersect> {
+        None
+    }
     /// Returns the surface constants of a part.
     fn material(&self, part: usize) -> Material {
         let _ = part;

@@ -76,15 +76,6 @@ impl Frame<'_> {
         least: usize,
         work: impl Fn(usize, &mut [f64]) -> R + Sync,
     ) -> Vec<R> {
-        let pieces = self.threads.pieces(x.len() / record.max(1), least);
-        let mut results: Vec<Option<R>> = pieces.iter().map(|_| None).collect();
-        let (mut items, mut rest) = (Vec::new(), x);
-        for (piece, result) in pieces.into_iter().zip(&mut results) {
-            let (own, behind) = std::mem::take(&mut rest).split_at_mut(piece.len() * record);
-            items.push((piece.start, own, result));
-            rest = behind;
-        }
-        self.threads.each(items, |(first, own, result)| *result = Some(work(first, own)));
-        results.into_iter().flatten().collect()
+        self.threads.each_piece(x, record, least, work)
     }
 }

@@ -42,6 +42,7 @@ use crate::contact::motion;
 use crate::contact::pair::PredictionMode;
 use crate::integrators::Adaptive;
 use crate::object::{Level, RowTarget};
+use crate::sensor::loads::SubstepForces;
 use crate::settings::{Integrator, Settings};
 use crate::solver::SolverSettings;
 use crate::world::{Core, StepError};
@@ -228,6 +229,16 @@ impl Backtracking {
             if core.has_breakable_joints() {
                 core.break_joints(&row_starts(work, &total, 1.0 / core.settings.dt));
             }
+            if core.collects_loads() {
+                let (forces, rows) = (impulses(work, &total, 0.0).collect(), row_starts(work, &total, 1.0));
+                core.load_impact(&SubstepForces {
+                    constraints: &work.contact_constraints,
+                    forces,
+                    moments: &[],
+                    scale: 1.0,
+                    rows,
+                });
+            }
             push_to(core, &u, &before);
         }
         struck
@@ -327,6 +338,11 @@ impl Backtracking {
         }
         if core.has_breakable_joints() {
             core.break_joints(&row_starts(work, &work.lambda, 1.0));
+        }
+        if core.collects_loads() {
+            let (forces, rows) = (impulses(work, &work.lambda, 1.0).collect(), row_starts(work, &work.lambda, 1.0));
+            let (constraints, moments) = (&work.contact_constraints[..], &work.moments[..]);
+            core.load_substep(&SubstepForces { constraints, forces, moments, scale: 1.0, rows });
         }
         core.publish(
             &work.contact_constraints,

@@ -159,16 +159,16 @@ impl Core {
         time: f64,
         seen: Option<&'a Moment>,
     ) -> Basis<'a> {
-        let Core { table, state, derived: Derived { part_states, caches }, .. } = self;
+        let Core { table, state, derived: Derived { part_states, caches }, owners, threads, .. } = self;
         let (gravity, implicit) = (self.settings.gravity, self.implicit);
         let found = (&state.x[..], &part_states[..]);
         let (x, part_states) = seen.map_or(found, |moment| (&moment.x, &moment.derived.part_states));
-        let view = WorldView { time, gravity, implicit, x, part_states, objects: table.with(&state.objects) };
+        let view = WorldView { time, gravity, implicit, x, part_states, objects: table.with(&state.objects), threads };
         let (acting, caches) = match acting {
             Some(Moment { derived: Derived { part_states, caches }, .. }) => (Some(&part_states[..]), caches),
             None => (None, caches),
         };
-        Basis { owners: &self.owners, found, acting, caches, threads: &self.threads, view }
+        Basis { owners, found, acting, caches, threads, view }
     }
 }
 

@@ -23,6 +23,7 @@ pub use backtracking::Backtracking;
 pub(crate) use budget::WorkMeter;
 pub(crate) use contacts::Workspace;
 pub(crate) use moment::Moment;
+pub(crate) use patch::PatchMoment;
 pub use time_stepping::TimeStepping;
 pub(crate) use turning::{Attempt, HeldDivision, LargestTurn, add_stiffness, rate_squared};
 

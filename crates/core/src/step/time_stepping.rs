@@ -50,6 +50,7 @@ use crate::contact::time_of_impact::time_contacts;
 use crate::each_object::{Numbers, each_object};
 use crate::integrators::context::free_motion;
 use crate::object::Level;
+use crate::sensor::loads::SubstepForces;
 use crate::settings::Settings;
 use crate::solver::SolverSettings;
 use crate::world::view::Entry;
@@ -307,6 +308,15 @@ impl TimeStepping {
         total.extend(self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b));
         if core.has_breakable_joints() {
             core.break_joints(&row_starts(&self.work, total, 1.0 / h));
+        }
+        if core.collects_loads() {
+            core.load_substep(&SubstepForces {
+                constraints: &self.work.contact_constraints,
+                forces: impulses(&self.work, total, h).map(|i| i / h).collect(),
+                moments: &self.work.moments,
+                scale: 1.0 / h,
+                rows: row_starts(&self.work, total, 1.0 / h),
+            });
         }
         core.publish(
             &self.work.contact_constraints,

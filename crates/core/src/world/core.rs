@@ -9,6 +9,7 @@ use crate::derived::{Cache, Derived};
 use crate::integrators::context::IntegrationContext;
 use crate::object::part_state::{Forces, PartState, Wrench};
 use crate::report::StepReport;
+use crate::sensor::loads::FrameLoads;
 use crate::settings::Settings;
 use crate::solver::RowSolver;
 use crate::step::{Attempt, LargestTurn, Moment, WorkMeter};
@@ -156,6 +157,8 @@ pub struct Core {
     pub(crate) contacts: Vec<ContactPoint>,
     /// Touches of the present frame.
     pub(crate) touches: Touches,
+    /// Impulses of the present frame, for sensors.
+    pub(crate) loads: FrameLoads,
     /// Serials of the loop joints that break in the present frame.
     pub(crate) broken: Vec<u32>,
     /// Events of the last frame.
@@ -170,6 +173,8 @@ pub struct Core {
     pub(crate) attempt: Attempt,
     /// Largest turn of the frame.
     pub(crate) largest_turn: LargestTurn,
+    /// Working memory of frame states.
+    pub(super) frame_numbers: Vec<f64>,
 }
 
 /// The state of the objects, and the caches for the maps that change it.
@@ -210,6 +215,7 @@ impl Core {
             detect_scratch: DetectorBuffers::default(),
             contacts: Vec::new(),
             touches: Touches::default(),
+            loads: FrameLoads::default(),
             broken: Vec::new(),
             events: Vec::new(),
             report: StepReport::default(),
@@ -218,6 +224,7 @@ impl Core {
             division: 1,
             attempt: Attempt::First,
             largest_turn: LargestTurn::default(),
+            frame_numbers: Vec::new(),
         }
     }
 
@@ -268,6 +275,7 @@ impl Core {
             x: &self.state.x,
             part_states: &self.derived.part_states,
             objects: self.objects(),
+            threads: &self.threads,
         }
     }
 
@@ -378,6 +386,7 @@ impl Core {
         self.report.substeps += 1;
         self.keep_touches(h);
         self.integration().refresh();
+        self.keep_loads(h);
         let moves = |s: &PartState| s.velocity.iter().chain(s.angular_velocity.iter()).all(|x| x.is_finite());
         let fine = |e: &Entry| {
             self.state.x[e.state_range.x.clone()].iter().all(|x| x.is_finite())

@@ -39,6 +39,14 @@ pub enum WorldError {
     /// The call needs a loop joint.
     #[error("'{0}' is not a loop joint")]
     NotJoint(String),
+    /// A sensor cannot read what it names, or the object is no sensor.
+    #[error("sensor '{name}': {why}")]
+    Sensor {
+        /// Name of the sensor.
+        name: String,
+        /// The fault.
+        why: String,
+    },
     /// The object has more or fewer collidable parts than part states.
     #[error("'{name}' has {parts} collidable parts and {part_states} part states; the numbers must be equal")]
     Parts {

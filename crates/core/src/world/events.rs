@@ -10,9 +10,10 @@
 
 use super::{ContactPoint, Core, World, WorldState};
 use crate::contact::detect::ContactConstraint;
+use crate::contact::own_tests::OwnTests;
 use crate::world::view::{Entry, Mode, ObjectId};
 use serde::{Deserialize, Serialize};
-use tumble_collide::{Aabb, Contact, Pose, Shape, Vec3, contacts_in_mode};
+use tumble_collide::{Aabb, Contact, Pose, Shape, Vec3};
 
 /// Kind of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -395,7 +396,8 @@ impl Core {
         }
         contacts.clear();
         let mode = a.contact_mode(part_a).of_pair(b.contact_mode(part_b));
-        contacts_in_mode(mode, sensor.shape, &sensor.pose, other.shape, &other.pose, 0.0, contacts);
+        let tests = OwnTests::of([(sensor.entry.object, part_a), (other.entry.object, part_b)]);
+        tests.contacts(mode, [sensor.shape, other.shape], [&sensor.pose, &other.pose], 0.0, contacts);
         !contacts.is_empty()
     }
 }

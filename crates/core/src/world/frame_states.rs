@@ -21,7 +21,7 @@ impl Core {
     /// Advances all frame states by the frame that was just stepped, from the time `start` (s) and the part states
     /// `before`; then applies their impulses.
     pub(super) fn advance_frame_states(&mut self, start: f64, before: &[PartState]) -> Result<(), StepError> {
-        let (mut impulses, mut x) = (Vec::new(), Vec::new());
+        let (mut impulses, mut x) = (Vec::new(), std::mem::take(&mut self.frame_numbers));
         for place in 0..self.table.placed.len() {
             let entry = self.objects().at(place);
             let Some(follower) = entry.object.frame_state().filter(|_| entry.status.enabled) else { continue };
@@ -43,6 +43,7 @@ impl Core {
                 self.integration().refresh_one(id);
             }
         }
+        self.frame_numbers = x;
         self.apply_frame_impulses(&impulses)
     }
 
@@ -63,6 +64,8 @@ impl Core {
                 let FrameImpulse { part, point, impulse, .. } = *impulse;
                 Some((PartPoint { part, part_state: part_states.get(part)?, point, axes: &AXES }, impulse))
             });
+            let from = entry.state_range.parts.start;
+            group.iter().for_each(|(_, i)| self.loads.add(from + i.part, &i.impulse, &i.point));
             if !self.kick_by(group[0].1.id, kicks) {
                 let object = self.objects().at(group[0].0).name.to_string();
                 return Err(StepError::NotFinite { object, what: "its state after impulses", time: self.state.time });

@@ -15,6 +15,7 @@ mod pick;
 mod query;
 mod replica;
 pub(crate) mod script;
+mod sensors;
 pub(crate) mod sleep;
 mod snapshot;
 mod state;
@@ -42,6 +43,7 @@ use crate::object::visual::Visual;
 use crate::object::{Energy, FrameState, Momentum, Object};
 use crate::report::StepReport;
 use crate::rigid::RigidBody;
+use crate::sensor::Sensor;
 use crate::settings::Settings;
 use crate::solver::{GaussSeidel, RowSolver};
 use crate::step::{LargestTurn, StepContext, Stepper, TimeStepping};
@@ -162,6 +164,7 @@ impl World {
             core.clear_contact_forces();
             core.detect_scratch.forget();
             core.touches.clear();
+            core.start_loads();
             core.broken.clear();
             core.meter.start_frame(core.settings.solver_settings.budget, self.before.time + core.settings.dt);
             core.largest_turn = LargestTurn::default();
@@ -170,7 +173,10 @@ impl World {
             let done = done.and_then(|()| core.divide_again(self.stepper.as_ref(), self.before.time));
             let followed = |again: bool| match again {
                 true => Ok(true),
-                false => core.advance_frame_states(self.before.time, &self.parts_before).map(|()| false),
+                false => core
+                    .advance_frame_states(self.before.time, &self.parts_before)
+                    .and_then(|()| core.read_sensors(&self.parts_before))
+                    .map(|()| false),
             };
             let again = match done.and_then(followed) {
                 Ok(again) => again,
@@ -319,7 +325,7 @@ impl World {
     /// [`set_mode`](Self::set_mode) changes that.
     ///
     /// Names are unique and of any length. An object without a name gets one: `body`, `joint`,
-    /// `force` or `object` and the count of objects added before, `body 3`, or the next number if
+    /// `force`, `sensor`, `state` or `object` and the count of objects added before, `body 3`, or the next number if
     /// another object has that name. [`name`](Self::name) returns it.
     ///
     /// # Errors
@@ -353,11 +359,17 @@ impl World {
             "" => self.new_name(object.as_ref()),
             name => name.to_string(),
         };
-        self.add_named(name, object, mode)
+        let any: &dyn std::any::Any = object.as_ref();
+        let Some(sensor) = any.downcast_ref::<Sensor>() else { return self.add_named(name, object, mode) };
+        self.check_sensor(sensor)?;
+        let id = self.add_named(name, object, mode)?;
+        self.start_sensor(id);
+        Ok(id)
     }
 
     /// Returns a name that no object has. It depends only on the objects added so far.
     fn new_name(&self, object: &dyn Object) -> String {
+        let any: &dyn std::any::Any = object;
         let kind = if object.integratable().is_some() || object.collidable().is_some() {
             "body"
         } else if object.constraint().is_some() {
@@ -365,7 +377,7 @@ impl World {
         } else if object.force().is_some() {
             "force"
         } else if object.frame_state().is_some() {
-            "state"
+            if any.is::<Sensor>() { "sensor" } else { "state" }
         } else {
             "object"
         };

@@ -3,6 +3,7 @@
 use crate::derived::Cache;
 use crate::object::Object;
 use crate::object::part_state::{PartState, StateRange};
+use crate::threads::Threads;
 use crate::world::ObjectState;
 use slotmap::{SlotMap, new_key_type};
 use std::sync::Arc;
@@ -202,9 +203,22 @@ pub struct WorldView<'a> {
     /// The part states at this stage.
     pub part_states: &'a [PartState],
     pub(crate) objects: Objects<'a>,
+    pub(crate) threads: &'a Threads,
 }
 
 impl WorldView<'_> {
+    /// Cuts an array into pieces of at least `least` items, and calls `work` with the number of the first item and the
+    /// items of each piece, on several threads if the step has them. Returns the results in the order of the pieces.
+    /// Their number depends on that of the threads, so results that are joined must not.
+    pub fn each_piece<T: Send, R: Send>(
+        &self,
+        items: &mut [T],
+        least: usize,
+        work: impl Fn(usize, &mut [T]) -> R + Sync,
+    ) -> Vec<R> {
+        self.threads.each_piece(items, 1, least, work)
+    }
+
     /// Returns an object by id.
     pub fn object(&self, id: ObjectId) -> Option<&dyn Object> {
         self.objects.get(id).map(|e| e.object)

@@ -6,6 +6,10 @@ use super::chunk::{Channel, Inner, Schema, define, next_inner, open_chunk, parse
 use super::container::{Container, Ending, Next, RawRecord};
 use super::error::{RecordError, Result};
 use super::messages::{entities_of, nanoseconds, poses_of};
+use super::report::{
+    EVENTS_SCHEMA, JSON, Readings, RecordedEvent, SENSORS_SCHEMA, TOPIC_EVENTS, TOPIC_SENSORS, decode_events,
+    decode_readings,
+};
 use super::scene::{Contact, Entity, Pose, decode_contacts, name_fault};
 use super::schemas::{
     METADATA_NAME, PROTOBUF, SCENE_SCHEMA, STATE_SCHEMA, State, TOPIC_SCENE, TOPIC_STATE, TOPIC_TRANSFORMS,
@@ -31,6 +35,10 @@ pub struct Frame {
     pub contacts: Vec<Contact>,
     /// The recorded state bytes.
     pub state: Vec<u8>,
+    /// Readings of measuring sensors by their names.
+    pub sensors: Readings,
+    /// Events of the frame.
+    pub events: Vec<RecordedEvent>,
 }
 
 /// Opens a recording, complete or cut, and reads up to its first scene.
@@ -52,6 +60,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Reader> {
         position: 0,
         chunk_offset: 0,
         poses: None,
+        report: None,
         ahead: None,
         last_frame: None,
         ending: None,
@@ -105,6 +114,8 @@ pub struct Reader {
     chunk_offset: u64,
     /// Poses of the frame whose state comes next, with their log time.
     poses: Option<(u64, Vec<Pose>)>,
+    /// Readings and events of the frame whose state comes next, with their log time.
+    report: Option<(u64, Readings, Vec<RecordedEvent>)>,
     /// A frame that was read before the first scene.
     ahead: Option<Frame>,
     last_frame: Option<u64>,
@@ -241,20 +252,37 @@ impl Reader {
             TOPIC_SCENE => SCENE_SCHEMA,
             TOPIC_TRANSFORMS => TRANSFORMS_SCHEMA,
             TOPIC_STATE => STATE_SCHEMA,
+            TOPIC_SENSORS => SENSORS_SCHEMA,
+            TOPIC_EVENTS => EVENTS_SCHEMA,
             _ => return Ok(None),
         };
         let schema = self.schemas.get(&info.schema).map_or("", |schema| schema.name.as_str());
-        if schema != wanted || info.encoding != PROTOBUF {
+        let encoding = if matches!(wanted, SENSORS_SCHEMA | EVENTS_SCHEMA) { JSON } else { PROTOBUF };
+        if schema != wanted || info.encoding != encoding {
             return Err(format!(
-                "topic {} has schema \"{schema}\" in \"{}\", not {wanted} in {PROTOBUF}",
+                "topic {} has schema \"{schema}\" in \"{}\", not {wanted} in {encoding}",
                 info.topic, info.encoding
             ));
         }
         match wanted {
             SCENE_SCHEMA => self.scene(data).map(|()| Some(Event::Scene)),
             TRANSFORMS_SCHEMA => self.transforms(log_time, data).map(|()| None),
+            SENSORS_SCHEMA => decode_readings(data).map(|sensors| {
+                self.report_at(log_time).1 = sensors;
+                None
+            }),
+            EVENTS_SCHEMA => decode_events(data).map(|events| {
+                self.report_at(log_time).2 = events;
+                None
+            }),
             _ => self.state(log_time, data).map(|frame| Some(Event::Frame(frame))),
         }
+    }
+
+    /// Returns the readings and events of the frame at a log time.
+    fn report_at(&mut self, log_time: u64) -> &mut (u64, Readings, Vec<RecordedEvent>) {
+        self.report = self.report.take().filter(|(at, ..)| *at == log_time);
+        self.report.get_or_insert_with(|| (log_time, Readings::new(), Vec::new()))
     }
 
     fn scene(&mut self, data: &[u8]) -> std::result::Result<(), String> {
@@ -317,7 +345,9 @@ impl Reader {
             return Err(format!("frame {frame}: {why}"));
         }
         self.last_frame = Some(frame);
-        Ok(Frame { time_s, frame, poses, contacts, state: payload })
+        let report = self.report.take().filter(|(at, ..)| *at == log_time);
+        let (sensors, events) = report.map(|(_, sensors, events)| (sensors, events)).unwrap_or_default();
+        Ok(Frame { time_s, frame, poses, contacts, state: payload, sensors, events })
     }
 }
 

@@ -3,6 +3,7 @@
 use super::budget;
 use super::error::{RecordError, Result};
 use super::messages::{nanoseconds, scene_update, set_transforms, transforms_for};
+use super::report::{Readings, RecordedEvent, ReportChannels, encode_events, encode_readings};
 use super::scene::{Contact, Entity, Pose, check_entities, encode_contacts};
 use super::schemas::{Channels, METADATA_NAME, State, VERSION, add_channels};
 use super::{MAX_CONTACTS, MAX_NAME_BYTES, MAX_SCENE_BYTES, MAX_STATE_BYTES, MAX_TIME_S};
@@ -127,6 +128,9 @@ pub struct Recorder {
     flushed_frames: u64,
     flushed_time_s: f64,
     last: Option<(f64, u64)>,
+    report_channels: ReportChannels,
+    /// Messages of sensors and events that the next frame writes.
+    report: [Option<Vec<u8>>; 2],
 }
 
 impl Recorder {
@@ -169,6 +173,8 @@ impl Recorder {
             flushed_frames: 0,
             flushed_time_s: 0.0,
             last: None,
+            report_channels: ReportChannels::default(),
+            report: [None, None],
         };
         recorder.write_scene(0.0, entities)?;
         Ok(recorder)
@@ -184,6 +190,18 @@ impl Recorder {
         self.check_time(time_s)?;
         self.flush()?;
         self.write_scene(time_s, entities)
+    }
+
+    /// Gives the next frame readings of sensors and events. Without any it has no message of them.
+    ///
+    /// # Errors
+    /// [`RecordError`] for numbers that are not finite, long names, and more than [`MAX_EVENTS`](super::MAX_EVENTS) events.
+    pub fn report(&mut self, sensors: &Readings, events: &[RecordedEvent]) -> Result<()> {
+        let refuse = |why: String| RecordError::input("a frame", why);
+        let sensors = (!sensors.is_empty()).then(|| encode_readings(sensors)).transpose().map_err(refuse)?;
+        let events = (!events.is_empty()).then(|| encode_events(events)).transpose().map_err(refuse)?;
+        self.report = [sensors, events];
+        Ok(())
     }
 
     /// Records one frame.
@@ -206,6 +224,15 @@ impl Recorder {
         set_transforms(&mut self.transforms, log_time, poses);
         let transforms = self.transforms.encode_to_vec();
         self.write(self.channels.transforms, sequence, log_time, &transforms)?;
+        let [sensors, events] = std::mem::take(&mut self.report);
+        if let Some(message) = sensors {
+            let channel = self.report_channels.sensors(&mut self.writer, &self.path)?;
+            self.write(channel, sequence, log_time, &message)?;
+        }
+        if let Some(message) = events {
+            let channel = self.report_channels.events(&mut self.writer, &self.path)?;
+            self.write(channel, sequence, log_time, &message)?;
+        }
         let state =
             State { version: VERSION, frame, time_s, payload: state.to_vec(), contacts: encode_contacts(contacts) };
         self.write(self.channels.state, sequence, log_time, &state.encode_to_vec())?;

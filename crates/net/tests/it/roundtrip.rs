@@ -139,3 +139,43 @@ fn flushes_follow_simulated_time_and_size() {
     recorder.frame(0.0, 0, &poses(0), &[], &[]).unwrap();
     assert_eq!(recorder.flushed_frames(), 1);
 }
+
+/// Readings and events come back with their frames; another reader finds JSON in their channels.
+#[test]
+fn readings_and_events_come_back_with_their_frames() {
+    let scratch = Scratch::new("report");
+    let path = scratch.file("a.mcap");
+    let mut recorder = Recorder::create(&path, WORLD, &entities(), options(Compression::Lz4, 2)).unwrap();
+    let readings =
+        |k: u64| Readings::from([("imu".into(), vec![0.1 * k as f64, -1e-300, 9.81]), ("ß".into(), vec![1.0])]);
+    let hit = |k: u64| RecordedEvent {
+        kind: "contact_begin".into(),
+        a: "ball".into(),
+        b: (k == 3).then(|| "ground".into()),
+        impulse: [0.0, 0.0, k as f64],
+        point: [1.0 / 3.0, 0.0, 0.0],
+    };
+    for k in 0..6 {
+        let events = if k >= 3 { vec![hit(k), hit(k)] } else { Vec::new() };
+        let sensors = if k == 5 { Readings::new() } else { readings(k) };
+        recorder.report(&sensors, &events).unwrap();
+        let nan = Readings::from([("imu".into(), vec![f64::NAN])]);
+        assert!(recorder.report(&nan, &[]).unwrap_err().to_string().contains("the reading of \"imu\" is not finite"));
+        recorder.frame(time(k), k, &poses(k), &[], &state(k)).unwrap();
+    }
+    assert!(recorder.report(&Readings::new(), &vec![hit(0); MAX_EVENTS + 1]).is_err());
+    recorder.finish().unwrap();
+    let (frames, _) = read_all(&path);
+    assert_frames(&frames);
+    for (k, frame) in (0..).zip(&frames) {
+        assert_eq!(frame.sensors, if k == 5 { Readings::new() } else { readings(k) });
+        assert_eq!(frame.events, if k >= 3 { vec![hit(k), hit(k)] } else { Vec::new() });
+    }
+    let bytes = std::fs::read(&path).unwrap();
+    let messages: Vec<mcap::Message> = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).collect();
+    let json = |topic: &str| messages.iter().filter(|m| m.channel.topic == topic).count();
+    assert_eq!((json(TOPIC_SENSORS), json(TOPIC_EVENTS)), (5, 3));
+    let first = messages.iter().find(|m| m.channel.topic == TOPIC_SENSORS).unwrap();
+    assert_eq!(first.channel.message_encoding, "json");
+    assert_eq!(String::from_utf8_lossy(&first.data), r#"{"imu":[0.0,-1e-300,9.81],"ß":[1.0]}"#);
+}

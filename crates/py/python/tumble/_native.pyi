@@ -11,7 +11,7 @@ from typing_extensions import disjoint_base
 
 from tumble._extension import Behavior, Force
 from tumble._values import Energy, Event, Momentum, SphereLevel
-from tumble.typing import Axis, CollisionMeshes, Combine, Contacts, Integrator, JointKind, JointType, LockedAxis, MissingMeshes, Mode, Solver, Stepper, TreeMethod
+from tumble.typing import Axis, CollisionMeshes, Combine, Contacts, Integrator, JointKind, JointType, LockedAxis, MissingMeshes, Mode, SensorKind, Solver, Stepper, TreeMethod
 
 _Floats: TypeAlias = NDArray[np.float64]
 _Path: TypeAlias = str | PathLike[str]
@@ -403,6 +403,45 @@ class RigidBody:
         """
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
+
+@final
+class Sensor:
+    """A measuring sensor, made by ``World.add_sensor`` or ``[[sensor]]``."""
+    @property
+    def name(self) -> str:
+        """Name, unique in its world."""
+    @property
+    def exists(self) -> bool:
+        """Whether its world still has it."""
+    @property
+    def kind(self) -> SensorKind:
+        """Quantity that it reads."""
+    @property
+    def value(self) -> NDArray[np.float64]:
+        """Reading at the end of the last step, with its errors: 3 numbers, or 1 or 4 for some kinds. Raises ``RemovedError`` if
+        the sensor or its body was removed.
+        """
+    def seed(self, seed: int) -> None:
+        """Starts its noise anew from a seed, a whole number of at most 64 bits. The reading and the bias stay."""
+    def __hash__(self) -> int: ...
+
+@final
+class Sensors:
+    """The readings of all measuring sensors of a world by name, in the order of their addition: a mapping to arrays."""
+    def __getitem__(self, name: str) -> NDArray[np.float64]: ...
+    def __contains__(self, name: object) -> bool: ...
+    def __len__(self) -> int: ...
+    def __iter__(self) -> Iterator[str]: ...
+    def keys(self) -> list[str]:
+        """Names of all sensors."""
+    def values(self) -> list[NDArray[np.float64]]:
+        """Readings of all sensors."""
+    def items(self) -> list[tuple[str, NDArray[np.float64]]]:
+        """Names and readings of all sensors."""
+    def handle(self, name: str) -> Sensor:
+        """The handle of a sensor, for its kind and its seed."""
+    def record(self) -> np.void:
+        """All readings as one value of a structured dtype, with a field of each sensor's name: ``record["imu"]``."""
 
 @final
 class Joint:
@@ -1163,6 +1202,8 @@ class Batch:
     @property
     def state(self) -> _Floats:
         """The states, as ``World.state``, shape (n, len(state))."""
+    def sensor(self, name: str) -> _Floats:
+        """Readings of the measuring sensor of that name, shape (n, k): a view of ``state``."""
     @property
     def q(self) -> _Floats:
         """Positions of the articulations, as ``Articulation.q``, one after the other: shape (n, nq)."""
@@ -1716,8 +1757,44 @@ class World:
         bodies still collide with each other: ``set_pair_material(a, b, collides=False)``. Points and axes
         are in the world.
         """
-    def remove(self, body: RigidBody | Articulation | Joint | str) -> None:
-        """Removes a body or a joint, given as a handle or by name, or a force or behavior by name. Handles
+    def add_sensor(
+        self,
+        kind: SensorKind,
+        on: _Side | Joint = None,
+        *,
+        name: str = "",
+        position: ArrayLike | None = None,
+        orientation: ArrayLike | None = None,
+        relative_to: _Side = None,
+        volume: Shape | None = None,
+        cutoff: float | None = None,
+        deviation: float = 0.0,
+        bias_walk: float = 0.0,
+        quantization: float = 0.0,
+        delay: int = 0,
+        seed: int = 0,
+    ) -> Sensor:
+        """Adds a measuring sensor, read after every step: ``world.sensors[name]``.
+
+        kind: ``"accelerometer"``, ``"gyroscope"``, ``"velocimeter"`` (in the axes of the site), ``"force"`` and ``"torque"`` (of the joint
+        that moves the link, on the link; of a loop joint, on its side a), ``"touch"`` (normal force on the link or body), ``"range_finder"``
+        (along z of the site; -1 if nothing is there), ``"position"``, ``"orientation"``, ``"linear_velocity"``, ``"angular_velocity"``,
+        ``"linear_acceleration"``, ``"angular_acceleration"``, ``"joint_position"``, ``"joint_velocity"`` or ``"drive_force"``. Accelerations
+        and forces are means over the step.
+
+        on: a body, a link (``"ARTICULATION/LINK"`` or ``(articulation, "LINK")``) or a joint, as handle or name; None is the world.
+        position: shape (3,), m, and orientation, (x, y, z, w): the site in the frame of the body or link. relative_to: a body or link
+        against whose frame positions, orientations and velocities are read. volume: a shape at the site; touch outside does not
+        count. cutoff: largest absolute value of a reading.
+
+        deviation: standard deviation of white noise. bias_walk: that of the change of a bias in a second. quantization: distance
+        of the values that a reading can have. delay: steps by which it is late. seed: start of the noise.
+        """
+    @property
+    def sensors(self) -> Sensors:
+        """The readings of all measuring sensors by name, after the last step."""
+    def remove(self, body: RigidBody | Articulation | Joint | Sensor | str) -> None:
+        """Removes a body, a joint or a sensor, given as a handle or by name, or a force or behavior by name. Handles
         of a removed object raise ``RemovedError``. Joints of a removed body stay, without effect.
         """
     def add_force(self, name: str, force: Force) -> None:

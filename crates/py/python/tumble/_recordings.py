@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path, PurePath
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,21 @@ from tumble._errors import InvalidValueError, UnknownNameError
 from tumble._native import World, read_recording, show_contacts
 
 _CONTACT = np.dtype([("bodies", "<u4", (2,)), ("point", "<f8", (3,)), ("normal", "<f8", (3,)), ("depth", "<f8"), ("force", "<f8", (3,))])
+
+
+class RecordedEvent(NamedTuple):
+    """An event of a recorded frame; ``World.events`` has the kinds."""
+
+    kind: str
+    """Kind of the event."""
+    a: str
+    """Name of the body, as in ``Recording.names``, or of the joint."""
+    b: str | None
+    """Name of the other body; None for sleep and joints."""
+    impulse: tuple[float, float, float]
+    """Impulse on ``a`` over the step, N·s."""
+    point: tuple[float, float, float]
+    """Point with the largest impulse, m."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -37,6 +53,10 @@ class Recording:
     contacts: list[NDArray[np.void]]
     """Contacts of each frame whose surfaces touch, at most 4096, those with the largest forces: a structured array with ``bodies`` (2,),
     indices in ``names``; ``point`` (3,), m; ``normal`` (3,), from the second body to the first; ``depth``, m; ``force`` (3,) on the first, N."""
+    sensors: dict[str, NDArray[np.float64]]
+    """Readings of each measuring sensor by its name, shape (n, k); NaN while it did not exist."""
+    events: list[list[RecordedEvent]]
+    """Events of the step before each frame, at most 4096."""
     note: str | None
     """Where the file was cut; None for a complete one."""
 
@@ -69,6 +89,9 @@ def read(path: str | PathLike[str]) -> Recording:
     """
     arrays = read_recording(path)
     arrays["contacts"] = [np.frombuffer(contacts, _CONTACT) for contacts in arrays["contacts"]]
+    arrays["events"] = [
+        [RecordedEvent(kind, a, b, tuple(impulse), tuple(point)) for kind, a, b, impulse, point in events] for events in arrays["events"]
+    ]
     return Recording(**arrays)
 
 

@@ -46,6 +46,26 @@ JointKind: TypeAlias = Literal[
 ]
 """``World.add_joint(kind=…)``: the motion that a joint between two bodies leaves free."""
 
+SensorKind: TypeAlias = Literal[
+    "accelerometer",
+    "gyroscope",
+    "velocimeter",
+    "force",
+    "torque",
+    "touch",
+    "range_finder",
+    "position",
+    "orientation",
+    "linear_velocity",
+    "angular_velocity",
+    "linear_acceleration",
+    "angular_acceleration",
+    "joint_position",
+    "joint_velocity",
+    "drive_force",
+]
+"""``World.add_sensor(kind=…)``: what a measuring sensor reads."""
+
 JointType: TypeAlias = Literal["revolute", "prismatic", "spherical", "fixed", "floating"]
 """``ArticulationBuilder.add_link(joint=…)``: the joint of a link."""
 

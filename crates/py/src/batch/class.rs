@@ -10,12 +10,13 @@ use crate::errors::{Error, Result};
 use crate::world::add::own_place;
 use crate::world::bulk::Bulk;
 use crate::world::class::World;
+use crate::world::sensors;
 use crate::world::shared::Shared;
 use numpy::{PyArray1, PyArrayLike1, PyUntypedArrayMethods};
 use pyo3::exceptions::PyIndexError;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
-use pyo3::types::PyList;
+use pyo3::types::{PyList, PySlice};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 use tumble::dynamics::WorkingMemory;
@@ -364,6 +365,13 @@ impl Batch {
     #[getter]
     fn state<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         self.field(py, Field::State)
+    }
+
+    /// Readings of the measuring sensor of that name, shape (n, k): a view of ``state``.
+    fn sensor<'py>(&self, py: Python<'py>, name: &str) -> Result<Bound<'py, PyAny>> {
+        let columns = sensors::columns(&self.shared[0], name)?;
+        let columns = PySlice::new(py, columns.start as isize, columns.end as isize, 1);
+        Ok(self.field(py, Field::State)?.get_item((PySlice::full(py), columns))?)
     }
 
     /// Positions of the articulations, as ``Articulation.q``, one after the other: shape (n, nq).

@@ -14,9 +14,9 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use tumble::dynamics::ObjectId;
 use tumble::net::record::{
-    Contact, Ending, Pose, Recorder as Writer, RecorderOptions, decode_contacts, encode_contacts, read,
+    Contact, Ending, Pose, RecordedEvent, Recorder as Writer, RecorderOptions, decode_contacts, encode_contacts, read,
 };
-use tumble::net::world::{self as net_world, contacts, entities, names as entity_names, poses};
+use tumble::net::world::{self as net_world, contacts, entities, events, names as entity_names, poses, readings};
 
 /// Largest count of numbers, and of bytes of states, of a recording that is read at once.
 const MAX_NUMBERS: usize = 1 << 29;
@@ -60,6 +60,7 @@ impl Open {
             self.writer.set_entities(core.time(), &entities(core))?;
             (self.world, self.objects) = (world.clone(), core.ids().to_vec());
         }
+        self.writer.report(&readings(core), &events(core))?;
         Ok(self.writer.frame(core.time(), core.frame(), &poses(core), &contacts(core), &core.save())?)
     }
 }
@@ -183,6 +184,10 @@ struct Frames {
     poses: Vec<(Arc<Vec<usize>>, Vec<Pose>)>,
     states: Vec<Vec<u8>>,
     contacts: Vec<Vec<u8>>,
+    sensors: BTreeMap<String, Vec<(usize, Vec<f64>)>>,
+    events: Vec<Vec<RecordedEvent>>,
+    /// Numbers of all sensors in a frame.
+    width: usize,
     bytes: usize,
 }
 
@@ -195,6 +200,17 @@ impl Frames {
             })
         };
         Arc::new(names.iter().map(&mut column).collect())
+    }
+
+    /// Returns the readings of a sensor, with NaN for a frame without one, and the numbers per frame. Readings of
+    /// another length than the first are left out.
+    fn column(&self, readings: &[(usize, Vec<f64>)]) -> (Vec<f64>, usize) {
+        let length = readings.first().map_or(0, |(_, reading)| reading.len());
+        let mut column = vec![f64::NAN; length * self.times.len()];
+        for (row, reading) in readings.iter().filter(|(_, reading)| reading.len() == length) {
+            column[row * length..(row + 1) * length].copy_from_slice(reading);
+        }
+        (column, length)
     }
 
     /// Returns both arrays, with NaN for a name without a pose.
@@ -220,6 +236,15 @@ pub fn read_recording<'py>(py: Python<'py>, path: &Bound<'py, PyAny>) -> Result<
     let (positions, rotations) = all.arrays();
     let (frames, names) = (all.times.len(), all.names.len());
     let dict = PyDict::new(py);
+    let sensors = PyDict::new(py);
+    for (name, readings) in &all.sensors {
+        let (column, length) = all.column(readings);
+        sensors.set_item(name, PyArray1::from_vec(py, column).reshape([frames, length])?)?;
+    }
+    dict.set_item("sensors", sensors)?;
+    let event = |e: &RecordedEvent| (e.kind.clone(), e.a.clone(), e.b.clone(), e.impulse, e.point);
+    let events: Vec<Vec<_>> = all.events.iter().map(|events| events.iter().map(event).collect()).collect();
+    dict.set_item("events", events)?;
     dict.set_item("world", world)?;
     dict.set_item("times", PyArray1::from_vec(py, all.times))?;
     dict.set_item("frames", PyArray1::from_iter(py, all.frames.iter().map(|&frame| frame as i64)))?;
@@ -250,12 +275,21 @@ fn whole(file: &PathBuf) -> Result<(String, Frames, Option<String>)> {
         }
         let contacts = named_contacts(&frame.contacts, &columns);
         all.bytes += frame.state.len() + contacts.len();
-        if (all.times.len() + 1) * all.names.len() * 7 > MAX_NUMBERS || all.bytes > MAX_NUMBERS {
+        all.bytes += frame.sensors.values().map(|reading| 8 * reading.len()).sum::<usize>();
+        all.bytes += frame.events.iter().map(|event| size_of_val(event) + event.a.len()).sum::<usize>();
+        let new = frame.sensors.iter().filter(|(name, _)| !all.sensors.contains_key(*name));
+        all.width += new.map(|(_, reading)| reading.len()).sum::<usize>();
+        let columns_of = all.names.len() * 7 + all.width;
+        if (all.times.len() + 1).saturating_mul(columns_of) > MAX_NUMBERS || all.bytes > MAX_NUMBERS {
             return Err(Error::value(format!(
                 "{}: too many frames to read at once ({MAX_NUMBERS} numbers or bytes)",
                 file.display()
             )));
         }
+        for (name, reading) in frame.sensors {
+            all.sensors.entry(name).or_default().push((all.times.len(), reading));
+        }
+        all.events.push(frame.events);
         all.times.push(frame.time_s);
         all.frames.push(frame.frame);
         all.poses.push((columns.clone(), frame.poses));

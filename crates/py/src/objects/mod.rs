@@ -11,6 +11,7 @@ pub mod joint;
 pub mod joints;
 pub mod place;
 pub mod robot;
+pub mod sensor;
 pub mod shapes;
 pub mod spheretree;
 pub mod terrain;

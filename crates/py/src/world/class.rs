@@ -14,6 +14,7 @@ use crate::objects::bodies::{Bodies, handle, place_of};
 use crate::objects::body::{self, RigidBody};
 use crate::objects::joint::Joint;
 use crate::objects::place::{body_ids, by_name};
+use crate::objects::sensor::{Sensor, Sensors};
 use crate::objects::shapes::Shape;
 use crate::pool;
 use crate::world::add::{add, articulated, named_shape, own_place, rigid};
@@ -27,7 +28,7 @@ use crate::world::query::{self, Selection};
 use crate::world::report::StepReport;
 use crate::world::rollout::Plan;
 use crate::world::shared::Shared;
-use crate::world::{contacts, pickling, snapshot};
+use crate::world::{contacts, pickling, sensors, snapshot};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
@@ -37,7 +38,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 use tumble::collide::{ContactMode, Vec3};
-use tumble::dynamics::{Material, Mode, PairMaterial, RigidBody as Rigid, Settings};
+use tumble::dynamics::{Material, Mode, PairMaterial, RigidBody as Rigid, SensorNoise, Settings};
 use tumble::scene::mjcf::MjcfOptions;
 use tumble::scene::{FileKind, LoadOptions, SceneFile, resolve_scene};
 
@@ -942,7 +943,53 @@ impl World {
         joints::add(&self.shared, py, &given)
     }
 
-    /// Removes a body or a joint, given as a handle or by name, or a force or behavior by name. Handles
+    /// Adds a measuring sensor, read after every step: ``world.sensors[name]``.
+    ///
+    /// kind: ``"accelerometer"``, ``"gyroscope"``, ``"velocimeter"`` (in the axes of the site), ``"force"`` and ``"torque"`` (of the joint
+    /// that moves the link, on the link; of a loop joint, on its side a), ``"touch"`` (normal force on the link or body), ``"range_finder"``
+    /// (along z of the site; -1 if nothing is there), ``"position"``, ``"orientation"``, ``"linear_velocity"``, ``"angular_velocity"``,
+    /// ``"linear_acceleration"``, ``"angular_acceleration"``, ``"joint_position"``, ``"joint_velocity"`` or ``"drive_force"``. Accelerations
+    /// and forces are means over the step.
+    ///
+    /// on: a body, a link (``"ARTICULATION/LINK"`` or ``(articulation, "LINK")``) or a joint, as handle or name; None is the world.
+    /// position: shape (3,), m, and orientation, (x, y, z, w): the site in the frame of the body or link. relative_to: a body or link
+    /// against whose frame positions, orientations and velocities are read. volume: a shape at the site; touch outside does not
+    /// count. cutoff: largest absolute value of a reading.
+    ///
+    /// deviation: standard deviation of white noise. bias_walk: that of the change of a bias in a second. quantization: distance
+    /// of the values that a reading can have. delay: steps by which it is late. seed: start of the noise.
+    #[pyo3(signature = (kind, on=None, *, name="", position=None, orientation=None, relative_to=None, volume=None, cutoff=None, deviation=0.0,
+        bias_walk=0.0, quantization=0.0, delay=0, seed=0))]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn add_sensor(
+        &self,
+        py: Python<'_>,
+        kind: &str,
+        on: Option<&Bound<'_, PyAny>>,
+        name: &str,
+        position: Option<&Bound<'_, PyAny>>,
+        orientation: Option<&Bound<'_, PyAny>>,
+        relative_to: Option<&Bound<'_, PyAny>>,
+        volume: Option<&Bound<'_, Shape>>,
+        cutoff: Option<f64>,
+        deviation: f64,
+        bias_walk: f64,
+        quantization: f64,
+        delay: u32,
+        seed: u64,
+    ) -> Result<Sensor> {
+        let noise = SensorNoise { deviation, bias_walk, quantization, delay, seed };
+        let given = sensors::Arguments { kind, on, name, position, orientation, relative_to, volume, cutoff, noise };
+        sensors::add(&self.shared, py, &given)
+    }
+
+    /// The readings of all measuring sensors by name, after the last step.
+    #[getter]
+    fn sensors(&self, py: Python<'_>) -> Result<Sensors> {
+        Sensors::new(py, &self.shared)
+    }
+
+    /// Removes a body, a joint or a sensor, given as a handle or by name, or a force or behavior by name. Handles
     /// of a removed object raise ``RemovedError``. Joints of a removed body stay, without effect.
     fn remove(&self, py: Python<'_>, body: &Bound<'_, PyAny>) -> Result<()> {
         if let Ok(name) = body.extract::<String>()
@@ -950,7 +997,8 @@ impl World {
         {
             return Ok(());
         }
-        let place = match joints::place_of(&self.shared, body)? {
+        let found = joints::place_of(&self.shared, body)?;
+        let place = match found.map_or_else(|| sensors::place_of(&self.shared, body), |place| Ok(Some(place)))? {
             Some(place) => place,
             None => own_place(&self.shared, body)?,
         };

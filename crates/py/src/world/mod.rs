@@ -13,6 +13,7 @@ pub mod pickling;
 pub mod query;
 pub mod report;
 pub mod rollout;
+pub mod sensors;
 pub mod shared;
 pub mod simulate;
 pub mod snapshot;

@@ -7,6 +7,7 @@ mod facets;
 mod goldens;
 mod lists;
 mod meshes;
+mod particles;
 mod pictures;
 mod projectors;
 mod shading;

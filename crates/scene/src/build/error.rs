@@ -60,6 +60,14 @@ pub enum BuildError {
         /// From the joint; names the joint.
         why: String,
     },
+    /// A sensor is invalid.
+    #[error("{scene}: {why}")]
+    Sensor {
+        /// The scene.
+        scene: String,
+        /// From the sensor; names it.
+        why: String,
+    },
     /// The world refused a setting.
     #[error("{scene}: {source}")]
     World {

@@ -8,6 +8,7 @@ pub(crate) mod event;
 pub(crate) mod heights;
 pub(crate) mod mesh_files;
 pub(crate) mod meshes;
+mod sensor;
 pub(crate) mod shapes;
 pub(crate) mod slow;
 pub(crate) mod visual_mesh;

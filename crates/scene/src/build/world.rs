@@ -71,6 +71,9 @@ impl SceneFile {
         for spec in &self.events {
             spec.add(&mut built).map_err(world)?;
         }
+        for spec in &self.sensors {
+            self.add_sensor(spec, &mut built)?;
+        }
         for spec in &self.pairs {
             self.add_pair(spec, &mut built).map_err(world)?;
         }

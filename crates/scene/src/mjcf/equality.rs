@@ -157,7 +157,7 @@ pub(super) fn single(
     let (body, k) = find(element, attribute, &assembly.names.joints, optional)?;
     let joint = &assembly.bodies[body].joints[k];
     if !joint.is_single() {
-        assembly.reader.notes.add(element, "couplings and actuators of ball and free joints are left out");
+        assembly.reader.notes.add(element, "couplings, actuators and sensors of ball and free joints are left out");
         return None;
     }
     let (tree, link) = *assembly.joints[body].get(k)?;

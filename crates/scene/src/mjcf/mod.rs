@@ -47,6 +47,7 @@ mod options;
 mod pairs;
 mod scene;
 mod schema;
+mod sensor;
 mod shapes;
 mod source;
 mod tree;

@@ -10,7 +10,7 @@ use super::names::{Names, Taken};
 use super::shapes::{Groups, Meshes};
 use super::source::XmlNode;
 use super::tree::{self, Body};
-use super::{Reader, actuator, equality, inertia, keyframe, mass, pairs, schema, views};
+use super::{Reader, actuator, equality, inertia, keyframe, mass, pairs, schema, sensor, views};
 use crate::parse::bound::Bound;
 use crate::parse::file::SceneFile;
 use crate::parse::log::Log;
@@ -88,6 +88,7 @@ pub(super) fn read<'a>(root: &XmlNode<'a>, path: &Path, reader: &Reader<'a>, log
     let controls = keyframe::apply(root, &mut assembly);
     equality::read(root, &mut assembly);
     actuator::read(root, controls.as_deref(), &mut assembly);
+    sensor::read(root, &mut assembly);
     pairs::read(root, &mut assembly);
     views::read(&mut assembly);
     let mut scene = assembly.scene;
@@ -127,7 +128,7 @@ fn read_option(root: &XmlNode<'_>, reader: &Reader<'_>, scene: &mut SceneFile) {
 
 /// Notes the sections that are left out as a whole.
 fn note_sections(root: &XmlNode<'_>, reader: &Reader<'_>) {
-    const READ: [&str; 10] = [
+    const READ: [&str; 11] = [
         "compiler",
         "option",
         "default",
@@ -138,16 +139,12 @@ fn note_sections(root: &XmlNode<'_>, reader: &Reader<'_>) {
         "actuator",
         "keyframe",
         "tendon",
+        "sensor",
     ];
     for section in &root.children {
         let (tag, element) = (section.tag(), &section.element);
         match tag {
             _ if READ.contains(&tag) => {}
-            "sensor" => {
-                for sensor in &section.children {
-                    reader.notes.add(&sensor.element, "sensors are left out");
-                }
-            }
             "visual" | "statistic" | "size" | "custom" | "extension" | "deformable" => {
                 reader.notes.add(element, format!("<{tag}> is left out"));
             }

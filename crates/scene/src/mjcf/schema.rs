@@ -61,7 +61,7 @@ pub(super) const OPTION: Attributes = Attributes {
     used: &["gravity", "timestep"],
     dropped: &[
         (&["density", "viscosity", "wind"], FLUID),
-        (&["magnetic"], "sensors are left out"),
+        (&["magnetic"], "magnetometers are left out"),
         (&["o_margin", "o_solref", "o_solimp", "o_friction"], SOFT),
         (
             &[
@@ -206,11 +206,8 @@ pub(super) const GEOM: Attributes = Attributes {
 };
 
 pub(super) const SITE: Attributes = Attributes {
-    used: &["axisangle", "class", "euler", "fromto", "name", "pos", "quat", "xyaxes", "zaxis"],
-    dropped: &[
-        (&["group", "material", "mesh", "rgba", "size", "type"], "sites are frames and are not drawn"),
-        (&["user"], DATA),
-    ],
+    used: &["axisangle", "class", "euler", "fromto", "name", "pos", "quat", "size", "type", "xyaxes", "zaxis"],
+    dropped: &[(&["group", "material", "mesh", "rgba"], "sites are frames and are not drawn"), (&["user"], DATA)],
 };
 
 pub(super) const CAMERA: Attributes = Attributes {
@@ -327,6 +324,16 @@ pub(super) const EQUALITY: Attributes = Attributes {
         "site2",
     ],
     dropped: &[(&["solimp", "solref", "torquescale"], SOFT)],
+};
+
+pub(super) const SENSOR: Attributes = Attributes {
+    used: &["cutoff", "joint", "name", "objname", "objtype", "refname", "reftype", "site"],
+    dropped: &[
+        (&["noise"], "`noise` of sensors is left out, as MuJoCo itself adds none"),
+        (&["delay", "interp", "interval", "nsample", "history"], "delays of sensors are left out"),
+        (&["data", "num"], "data of sensors other than the distance are left out"),
+        (&["user"], DATA),
+    ],
 };
 
 pub(super) const PAIR: Attributes = Attributes {

@@ -42,6 +42,8 @@ pub(super) struct Frame<'a> {
     pub(super) name: Option<String>,
     pub(super) element: Element<'a, 'a>,
     pub(super) pose: Pose,
+    /// Volume of a site, for touch sensors.
+    pub(super) volume: Option<crate::parse::shape::ShapeSpec>,
 }
 
 /// A camera on a body: it looks along its −z axis, and y is up in the image.
@@ -138,7 +140,9 @@ impl<'a> Tree<'_, 'a> {
                     schema::SITE.check(&element, &reader.notes);
                     let item = reader.classes.item(element, class);
                     let pose = around.frame * placed(&item, reader).0;
-                    let site = Frame { name: item.name(), element, pose };
+                    let size = item.list("size", 3).unwrap_or_default();
+                    let volume = super::sensor::volume(item.text("type").unwrap_or("sphere"), &size);
+                    let site = Frame { name: item.name(), element, pose, volume };
                     self.bodies[to].sites.push(named(site, around.suffix, |site| &mut site.name));
                 }
                 "camera" => self.camera(element, around),
@@ -241,7 +245,8 @@ impl<'a> Tree<'_, 'a> {
             reader.notes.add(&element, "cameras and lights that follow something are fixed to their bodies");
         }
         let pose = around.frame * reader.compiler.pose(&item);
-        let frame = named(Frame { name: item.name(), element, pose }, around.suffix, |frame| &mut frame.name);
+        let frame =
+            named(Frame { name: item.name(), element, pose, volume: None }, around.suffix, |frame| &mut frame.name);
         let fovy = item.number("fovy", Bound::new(0.1, 179.0, "an angle from 0.1 to 179 degrees"), 45.0);
         self.bodies[around.body].cameras.push(Camera { frame, fovy: fovy.clamp(1.0, 170.0) });
     }

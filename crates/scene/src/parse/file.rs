@@ -20,6 +20,7 @@ use crate::parse::mesh::MeshSpec;
 use crate::parse::pair::PairSpec;
 use crate::parse::place::Place;
 use crate::parse::problem::Invalid;
+use crate::parse::sensor::SensorSpec;
 use crate::parse::view::{CameraSpec, CavePlace, GroundSpec, LightSpec, SkySpec};
 use crate::parse::world::WorldSettings;
 use tumble_core::collide::ContactMode;
@@ -35,6 +36,7 @@ const MAX_SYNTAX_ERRORS: usize = 5;
 const MAX_ARTICULATED: usize = 10_000;
 /// Largest number of loop joints of a scene.
 const MAX_LOOP_JOINTS: usize = 100_000;
+const MAX_SENSORS: usize = 100_000;
 /// Largest number of tables `[[pair]]` of a scene.
 const MAX_PAIRS: usize = 1_000;
 /// Largest number of tables `[[template]]` of a scene.
@@ -67,6 +69,8 @@ pub struct SceneFile {
     pub templates: Vec<TemplateSpec>,
     /// `[[event]]` in the order of the file.
     pub events: Vec<EventSpec>,
+    /// `[[sensor]]` in the order of the file.
+    pub sensors: Vec<SensorSpec>,
     /// Actuators of a model of MuJoCo; scene files have none.
     pub actuators: Vec<ActuatorSpec>,
     /// `[[pair]]` in the order of the file.
@@ -125,6 +129,7 @@ impl SceneFile {
         let articulated = read_articulated(&mut f, &library, &place, &mut names);
         let objects = Objects { bodies: &bodies, articulated: &articulated };
         let loop_joints = read_loop_joints(&mut f, &objects, &mut names);
+        let sensors = read_sensors(&mut f, &objects, &loop_joints, &mut names);
         let pairs = read_pairs(&mut f, &library, &objects);
         let templates = read_templates(&mut f, &library, bodies.len(), &mut names);
         let camera = read_table(&mut f, "camera", CameraSpec::read);
@@ -150,6 +155,7 @@ impl SceneFile {
             loop_joints,
             templates,
             events,
+            sensors,
             actuators: Vec::new(),
             pairs,
             camera,
@@ -336,6 +342,23 @@ fn read_events(f: &mut Fields<'_>, mut named: ObjectNames, lights: usize, names:
         events.push(event);
     }
     events
+}
+
+fn read_sensors(
+    f: &mut Fields<'_>,
+    objects: &Objects<'_>,
+    joints: &[LoopJointSpec],
+    names: &mut Taken,
+) -> Vec<SensorSpec> {
+    let one = |mut table: Fields<'_>| {
+        let (log, place) = (table.log, name_span(&mut table));
+        let spec = SensorSpec::read(table, objects, joints)?;
+        if !spec.name.is_empty() {
+            note_unique(log, "object", names, &spec.name, &place);
+        }
+        Some(spec)
+    };
+    f.tables("sensor", MAX_SENSORS).into_iter().filter_map(one).collect()
 }
 
 fn read_pairs(f: &mut Fields<'_>, library: &Library<'_>, objects: &Objects<'_>) -> Vec<PairSpec> {

@@ -23,6 +23,7 @@ pub(crate) mod problem;
 pub(crate) mod profile;
 pub(crate) mod renamed;
 pub(crate) mod rotation;
+pub(crate) mod sensor;
 pub(crate) mod shape;
 pub(crate) mod suggest;
 pub(crate) mod terrain;

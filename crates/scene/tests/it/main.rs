@@ -19,6 +19,7 @@ mod repair;
 mod robots;
 mod robust;
 mod scenes_in_motion;
+mod sensors;
 mod shipped;
 mod spheres;
 mod state_hashes;

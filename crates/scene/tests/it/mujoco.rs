@@ -386,7 +386,7 @@ fn rotation(wxyz: &[f64]) -> Quat {
 
 /// Returns the output of the script; the inner error is MuJoCo's for a model that it refuses. `None`,
 /// with a note, if it cannot run.
-fn python(arguments: &[&str]) -> Option<Result<String, String>> {
+pub(crate) fn python(arguments: &[&str]) -> Option<Result<String, String>> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mujoco_reference.py");
     let python = std::env::var("TUMBLE_PYTHON").unwrap_or_else(|_| "python3".into());
     let output =

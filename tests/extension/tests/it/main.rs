@@ -5,6 +5,8 @@ mod collisions;
 mod common;
 mod laws;
 mod lookout;
+mod reactions;
 mod rods;
 mod stepper;
+mod torus;
 mod wind;

@@ -1,10 +1,10 @@
 //! Forces of loop joints: what they carry, and when they break.
 
 use super::LoopJoint;
-use super::pair::{Motion, Term, Terms};
+use super::pair::{EndPair, JointRow, Motion, Term, Terms};
 use crate::contact::warm_starts::RowStart;
 use crate::object::Level;
-use crate::object::part_state::PointLoad;
+use crate::object::part_state::{PointLoad, Wrench};
 use crate::world::view::{ObjectId, WorldView};
 use tumble_collide::Vec3;
 
@@ -26,27 +26,57 @@ impl LoopJoint {
     pub(crate) fn transmitted(&self, view: &WorldView, forces: &[RowStart]) -> JointForce {
         let mut sum = JointForce::default();
         let Some(pair) = self.pair(view) else { return sum };
-        // the rows of the last step, in which soft forces were rows or not
-        let levels = [Level::Velocity { h: 1.0 }, Level::Acceleration { h: 1.0, soft: None }];
-        let rows = levels.map(|level| {
-            let mut rows = Vec::new();
-            self.lay(&pair, level, view.time, &mut |row| rows.push(row));
-            rows
-        });
-        let Some(level) = rows.iter().position(|rows| rows.len() == forces.len()) else { return sum };
-        for (row, start) in rows[level].iter().zip(forces) {
+        let Some((rows, explicit)) = self.rows_with(&pair, view.time, forces.len()) else { return sum };
+        for (row, start) in rows.iter().zip(forces) {
             add(&mut sum, &row.terms, start.force);
             if row.drives {
                 sum.drive += start.force;
             }
         }
-        let explicit = level == 1 && rows[0].len() != rows[1].len();
         if let Some(coordinate) = self.coordinate(&pair).filter(|_| explicit) {
             let (force, spring) = (self.explicit_force(&coordinate), self.dof.spring_force(coordinate.position));
             add(&mut sum, &coordinate.terms, force);
             sum.drive += force - spring + self.dof.damping * coordinate.rate;
         }
         sum
+    }
+
+    /// Returns the rows of the last step if they are of this number, and whether soft forces were no rows in it.
+    fn rows_with(&self, pair: &EndPair, time: f64, count: usize) -> Option<(Vec<JointRow>, bool)> {
+        let levels = [Level::Velocity { h: 1.0 }, Level::Acceleration { h: 1.0, soft: None }];
+        let [implicit, explicit] = levels.map(|level| {
+            let mut rows = Vec::new();
+            self.lay(pair, level, time, &mut |row| rows.push(row));
+            rows
+        });
+        match count {
+            _ if count == implicit.len() => Some((implicit, false)),
+            _ if count == explicit.len() => Some((explicit, true)),
+            _ => None,
+        }
+    }
+
+    /// Adds the wrenches of its rows on its two parts to the table by part, each about the part's origin.
+    pub(crate) fn add_wrenches(&self, view: &WorldView, forces: &[RowStart], out: &mut [Wrench]) {
+        let Some(pair) = self.pair(view) else { return };
+        let Some((rows, _)) = self.rows_with(&pair, view.time, forces.len()) else { return };
+        for (row, start) in rows.iter().zip(forces) {
+            for Term { side, motion, axis, factor } in row.terms.into_iter().flatten() {
+                let end = [&pair.a, &pair.b][side];
+                let Some(range) = end.part.and_then(|(id, _)| view.state_range(id)) else { continue };
+                let Some(wrench) = end.part.and_then(|(_, part)| out.get_mut(range.parts.start + part)) else {
+                    continue;
+                };
+                let force = factor * start.force * axis;
+                match motion {
+                    Motion::Point(p) => {
+                        wrench.force += force;
+                        wrench.torque += (p - end.part_state.position()).cross(&force);
+                    }
+                    Motion::Rotation => wrench.torque += force,
+                }
+            }
+        }
     }
 
     /// Returns the forces on its sides for the forces of its rows, each at the joint's point of the side;

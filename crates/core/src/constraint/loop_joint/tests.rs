@@ -101,6 +101,7 @@ impl Pairing {
             x: &self.x,
             part_states: &self.part_states,
             objects: self.table.with(&self.states),
+            threads: &crate::threads::Threads::NONE,
         };
         let mut out = RowBuilder {
             rows: &mut rows,

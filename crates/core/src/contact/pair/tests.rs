@@ -1,6 +1,7 @@
 //! Skipped queries must not matter: separated pairs, followed along their motion.
 
 use super::{CachedContacts, MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
+use crate::contact::own_tests::OwnTests;
 use crate::contact::time_of_impact::{MovingPair, pose_after_free_motion};
 use crate::object::part_state::PartState;
 use tumble_collide::{ContactMode, Pose, Shape, Vec3, contacts};
@@ -68,6 +69,7 @@ fn separated_pairs_do_not_touch_during_the_step() {
             let queries = PairQuery {
                 parts: MovingPair {
                     mode: ContactMode::Surface,
+                    tests: OwnTests::NONE,
                     shapes: pair,
                     part_states: [&part_states[0], &part_states[1]],
                 },
@@ -93,6 +95,7 @@ fn contacts_of_pairs_that_did_not_move_are_cached() {
     let pair = |near: f64| PairQuery {
         parts: MovingPair {
             mode: ContactMode::Surface,
+            tests: OwnTests::NONE,
             shapes: [&cylinder, &block],
             part_states: [&part_states[0], &part_states[1]],
         },

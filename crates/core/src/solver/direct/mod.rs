@@ -7,10 +7,11 @@
 //! 1. from multipliers that are near, a few steps of semismooth Newton (`proximal.rs`);
 //! 2. else the interior point method from the beginning (`interior_point.rs`);
 //! 3. and semismooth Newton for the digits that it leaves;
-//! 4. of a small island that is still not solved, semismooth Newton from the forces with which all
+//! 4. if that is not enough, the method of multipliers with a lagged shift (`lagged.rs`);
+//! 5. of a small island that is still not solved, semismooth Newton from the forces with which all
 //!    contacts stick.
 //!
-//! Both factor matrices `1 + Σ Y·G·Yᵀ` with a 3×3 matrix `G` per contact (`lu.rs`), with one block
+//! All of them factor matrices `1 + Σ Y·G·Yᵀ` with a 3×3 matrix `G` per contact (`lu.rs`), with one block
 //! row per object (`structure.rs`): linear cost in a chain or a tower, more where contacts form
 //! loops. Islands whose factorization costs more than [`MAX_WORK`] or [`MAX_COST`] are left to the
 //! sweeps, and so are islands of more than [`SMALL`] degrees of freedom in motion.
@@ -18,6 +19,7 @@
 mod cone;
 mod interior_point;
 mod island;
+mod lagged;
 mod lu;
 mod proximal;
 mod structure;
@@ -46,6 +48,8 @@ const NEAR: (f64, f64) = (1e-2, 1e-5);
 /// Maximum number of factorizations from multipliers that are near, and of the last phase for a
 /// small and a large island.
 const FACTORS: (u32, u32, u32) = (8, 30, 8);
+/// Maximum number of factorizations with a lagged shift, for a small and a large island.
+const LAGGED: (u32, u32) = (150, 20);
 /// Penalties of the forces with which all contacts stick, in the order in which they are tried.
 const STICKING: [f64; 3] = [1e9, 1e6, 1e4];
 /// Degrees of freedom of a small island, on which no effort is spared.
@@ -151,6 +155,11 @@ impl<'a> Plan<'a> {
         if error > tolerance.goal && error.is_finite() && (cheap || error <= NEAR.0 * fastest) {
             let (reached, factors) =
                 proximal::solve(system, &mut own, error, tolerance, (last.min(most - taken), cheap));
+            (error, taken) = (reached, taken + factors);
+        }
+        if error > tolerance.solved && error.is_finite() && cheap {
+            let limit = if small { LAGGED.0 } else { LAGGED.1 };
+            let (reached, factors) = lagged::solve(system, &mut own, error, tolerance, limit.min(most - taken));
             (error, taken) = (reached, taken + factors);
         }
         for penalty in STICKING.into_iter().filter(|_| small) {

@@ -28,8 +28,8 @@ const PENALTY: (f64, f64, f64) = (1e3, 10.0, 1e9);
 const STEPS: (u32, u32) = (30, 25);
 /// An inner iteration ends at this fraction of the last error.
 const INNER: f64 = 0.002;
-/// Number of halvings of a step.
-const HALVINGS: u32 = 8;
+/// Number of halvings of a step that looks for a smaller `F`, and for a smaller potential.
+const HALVINGS: (u32, u32) = (8, 20);
 /// Number of inner steps that may fail to make `F` smaller.
 const FAILURES: u32 = 3;
 /// An expensive step must reduce `F`, and an outer step the error, to this fraction.
@@ -59,9 +59,7 @@ pub(super) fn solve(
             break;
         }
         taken += p.inner(INNER * last, factors - taken, cheap);
-        std::mem::swap(&mut p.center, &mut p.projected);
-        p.system.island.apply(&p.center, &mut p.u);
-        let reached = p.system.island.error(&p.u, &p.center);
+        let reached = p.accept();
         let slow = reached.is_nan() || reached > 0.1 * error;
         if reached < error {
             error = reached;
@@ -71,8 +69,7 @@ pub(super) fn solve(
             if diverged > DIVERGENCES {
                 break;
             }
-            p.center.copy_from_slice(lambda);
-            p.system.island.apply(&p.center, &mut p.u);
+            p.restart(lambda);
             p.penalty = (p.penalty / PENALTY.1).max(PENALTY.0);
             continue;
         }
@@ -80,7 +77,7 @@ pub(super) fn solve(
             break;
         }
         if reached.is_nan() || reached > 0.1 * last {
-            p.penalty = (p.penalty * PENALTY.1).min(PENALTY.2);
+            p.raise_penalty();
         }
         last = reached;
     }
@@ -131,16 +128,20 @@ pub(super) fn sticking(system: &mut System, own: &[f64], penalty: f64) -> Option
     Some(lambda)
 }
 
-struct Proximal<'s, 'a> {
-    system: &'s mut System<'a>,
-    penalty: f64,
+pub(super) struct Proximal<'s, 'a> {
+    pub system: &'s mut System<'a>,
+    pub penalty: f64,
+    /// The shifts of all blocks, if they are held.
+    pub held_shift: Option<Vec<f64>>,
     u: Vec<f64>,
     /// The proximal center `λ`.
-    center: Vec<f64>,
+    pub center: Vec<f64>,
     /// `Π(…)` at the last `u` that was tried.
     projected: Vec<f64>,
     /// `F` there.
     f: Vec<f64>,
+    /// With a held shift the convex function of `u` whose gradient is `F`; else NaN.
+    potential: f64,
     /// `ρ·Π'·(1 + s')` of each block.
     gains: Vec<M3>,
     /// Square root of the largest diagonal of `K`.
@@ -148,18 +149,59 @@ struct Proximal<'s, 'a> {
 }
 
 impl<'s, 'a> Proximal<'s, 'a> {
-    fn new(system: &'s mut System<'a>, lambda: &[f64]) -> Proximal<'s, 'a> {
+    pub fn new(system: &'s mut System<'a>, lambda: &[f64]) -> Proximal<'s, 'a> {
         let island = &system.island;
         let largest = island.blocks.iter().fold(0.0, |d: f64, b| d.max(b.diagonal)).sqrt();
         let mut u = Vec::new();
         island.apply(lambda, &mut u);
         let (center, projected) = (lambda.to_vec(), lambda.to_vec());
-        Proximal { system, penalty: PENALTY.0, u, center, projected, f: Vec::new(), gains: Vec::new(), largest }
+        Proximal {
+            system,
+            penalty: PENALTY.0,
+            held_shift: None,
+            u,
+            center,
+            projected,
+            f: Vec::new(),
+            potential: f64::NAN,
+            gains: Vec::new(),
+            largest,
+        }
+    }
+
+    /// Makes the projection the center. Returns its error.
+    pub fn accept(&mut self) -> f64 {
+        std::mem::swap(&mut self.center, &mut self.projected);
+        self.system.island.apply(&self.center, &mut self.u);
+        self.system.island.error(&self.u, &self.center)
+    }
+
+    /// Makes `lambda` the center.
+    pub fn restart(&mut self, lambda: &[f64]) {
+        self.center.copy_from_slice(lambda);
+        self.system.island.apply(&self.center, &mut self.u);
+    }
+
+    pub fn raise_penalty(&mut self) {
+        self.penalty = (self.penalty * PENALTY.1).min(PENALTY.2);
+    }
+
+    /// Holds the shifts that the center has.
+    pub fn hold_shift(&mut self) {
+        let island = &self.system.island;
+        let shift = |b: &LocalBlock| match b.kind {
+            Kind::Cone { mu } => {
+                let w = free(island, b, &self.u);
+                mu * length(w[1], w[2])
+            }
+            _ => 0.0,
+        };
+        self.held_shift = Some(island.blocks.iter().map(shift).collect());
     }
 
     /// Solves `F(u) = 0` to row velocities of about `tolerance`. Returns the number of
     /// factorizations.
-    fn inner(&mut self, tolerance: f64, factors: u32, cheap: bool) -> u32 {
+    pub fn inner(&mut self, tolerance: f64, factors: u32, cheap: bool) -> u32 {
         let (mut taken, mut failures, mut tried, mut work) = (0, 0, Vec::new(), Vec::new());
         let mut size = self.evaluate(true);
         while taken < factors.min(STEPS.1) && size * self.largest > tolerance {
@@ -171,10 +213,16 @@ impl<'s, 'a> Proximal<'s, 'a> {
             let mut step = self.f.clone();
             factor.solve(structure, island, &mut step, &mut work);
             tried.clone_from(&self.u);
-            let shorter = (0..HALVINGS).map(|k| 0.5_f64.powi(k as i32)).find(|&t| {
+            let potential = self.potential;
+            let lengths = |count: u32| (0..count).map(|k| 0.5_f64.powi(k as i32));
+            let mut size_at = |t: f64| {
                 self.u.iter_mut().zip(tried.iter().zip(&step)).for_each(|(u, (from, s))| *u = from - t * s);
-                self.evaluate(false) < (1.0 - 1e-4 * t) * size
-            });
+                (self.evaluate(false), self.potential)
+            };
+            let mut shorter = lengths(HALVINGS.0).find(|&t| size_at(t).0 < (1.0 - 1e-4 * t) * size);
+            if shorter.is_none() && potential.is_finite() {
+                shorter = lengths(HALVINGS.1).find(|&t| size_at(t).1 < potential);
+            }
             if shorter.is_none() {
                 self.u.iter_mut().zip(tried.iter().zip(&step)).for_each(|(u, (from, s))| *u = from - s);
                 failures += 1;
@@ -187,21 +235,43 @@ impl<'s, 'a> Proximal<'s, 'a> {
         taken
     }
 
-    /// Writes `Π(…)`, `F` and, if asked for, the gains at `u`; returns the size of `F`.
+    /// Writes `Π(…)`, `F`, the potential and, if asked for, the gains at `u`; returns the size of `F`.
     fn evaluate(&mut self, with_gains: bool) -> f64 {
         let island = &self.system.island;
         let still = STILL * island.fastest;
         self.gains.clear();
         self.f.clone_from(&self.u);
-        for b in &island.blocks {
-            let (next, gain) = trial(b, &self.center[b.range()], self.penalty, free(island, b, &self.u), still);
+        let mut potential = if self.held_shift.is_some() { 0.5 * square(&self.u) } else { f64::NAN };
+        for (i, b) in island.blocks.iter().enumerate() {
+            let held = self.held_shift.as_ref().map(|shift| shift[i]);
+            let w = free(island, b, &self.u);
+            let (next, gain) = trial(b, &self.center[b.range()], self.penalty, (w, held), still);
             self.projected[b.range()].copy_from_slice(&next[..b.rows]);
             island.push(b, &next.map(|x| -x)[..b.rows], &mut self.f);
             if with_gains {
                 self.gains.push(gain);
             }
+            if held.is_some() {
+                potential += potential_of(b, &self.center[b.range()], self.penalty, w, next);
+            }
         }
-        self.f.iter().map(|f| f * f).sum::<f64>().sqrt()
+        self.potential = potential;
+        square(&self.f).sqrt()
+    }
+}
+
+fn square(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum()
+}
+
+/// Returns the share of a block in the potential, `max over y of −yᵀ(w + s) − |y − λ|²/2ρ − ½R·y²`, at
+/// which `y` is `next`. That of a cone is without `|λ|²/2ρ`.
+fn potential_of(b: &LocalBlock, lambda: &[f64], penalty: f64, w: V3, next: V3) -> f64 {
+    let rho = penalty / b.diagonal;
+    match b.kind {
+        Kind::Held => -lambda[0] * w[0],
+        Kind::Cone { .. } => square(&next) / (2.0 * rho),
+        _ => -next[0] * w[0] - (next[0] - lambda[0]).powi(2) / (2.0 * rho) - 0.5 * b.compliance * next[0] * next[0],
     }
 }
 
@@ -214,9 +284,9 @@ fn free(island: &Island, b: &LocalBlock, u: &[f64]) -> V3 {
 }
 
 /// Returns `Π(λ − ρ·(w + s))` of one block and `ρ·Π'·(1 + s')`, with `w` without compliance: a soft
-/// row divides by `1 + ρ·R`.
+/// row divides by `1 + ρ·R`. A shift that is held has no derivative.
 #[inline(always)]
-fn trial(b: &LocalBlock, lambda: &[f64], penalty: f64, w: V3, still: f64) -> (V3, M3) {
+fn trial(b: &LocalBlock, lambda: &[f64], penalty: f64, (w, held): (V3, Option<f64>), still: f64) -> (V3, M3) {
     let rho = penalty / b.diagonal;
     let mut gain = [[0.0; 3]; 3];
     let mut scalar = |lo: f64, hi: f64| {
@@ -234,9 +304,10 @@ fn trial(b: &LocalBlock, lambda: &[f64], penalty: f64, w: V3, still: f64) -> (V3
         Kind::Interval { lo, hi } => scalar(lo, hi),
         Kind::Cone { mu } => {
             let speed = length(w[1], w[2]);
-            let moved = [lambda[0] - rho * (w[0] + mu * speed), lambda[1] - rho * w[1], lambda[2] - rho * w[2]];
+            let shift = held.unwrap_or(mu * speed);
+            let moved = [lambda[0] - rho * (w[0] + shift), lambda[1] - rho * w[1], lambda[2] - rho * w[2]];
             let (onto, derivative) = project(moved, mu);
-            let turn = mu / length(speed, still).max(f64::MIN_POSITIVE);
+            let turn = if held.is_some() { 0.0 } else { mu / length(speed, still).max(f64::MIN_POSITIVE) };
             for (gain, d) in gain.iter_mut().zip(&derivative) {
                 *gain = [d[0], d[1] + d[0] * turn * w[1], d[2] + d[0] * turn * w[2]].map(|x| rho * x);
             }

@@ -69,5 +69,5 @@ fn recorded_problems_are_solved() {
         );
         count += 1;
     }
-    assert_eq!(count, 5);
+    assert_eq!(count, 10);
 }

@@ -9,7 +9,7 @@ pub use pairs::Overlap;
 pub use rays::{Ray, RayCastHit};
 pub use shapes::{BodyDistance, PointDepth, ShapeCastHit, ShapeOverlap};
 
-use super::World;
+use super::{Core, World};
 use crate::object::collidable::CollisionGroup;
 use crate::world::view::{Entry, ObjectId};
 use tumble_collide::{ContactMode, Pose, Shape};
@@ -65,17 +65,24 @@ struct Part<'w> {
     pose: Pose,
 }
 
-impl World {
+impl Core {
     /// Returns the parts that collide, in the order of the part table.
     fn parts(&self) -> impl Iterator<Item = Part<'_>> {
-        let entries = self.core.objects().iter().filter(|e| e.status.enabled && e.status.collidable);
+        let entries = self.objects().iter().filter(|e| e.status.enabled && e.status.collidable);
         entries.filter_map(|entry| Some((entry, entry.object.collidable()?))).flat_map(move |(entry, body)| {
-            let id = self.core.table.order[entry.place];
+            let id = self.table.order[entry.place];
             entry.state_range.parts.clone().enumerate().filter_map(move |(part, part_state)| {
-                let pose = self.core.derived.part_states[part_state].pose;
+                let pose = self.derived.part_states[part_state].pose;
                 Some(Part { entry, id, part, shape: body.shape(part)?, mode: body.contact_mode(part), pose })
             })
         })
+    }
+}
+
+impl World {
+    /// Returns the parts that collide, in the order of the part table.
+    fn parts(&self) -> impl Iterator<Item = Part<'_>> {
+        self.core.parts()
     }
 
     /// Returns the parts that a filter selects, in the order of the part table.

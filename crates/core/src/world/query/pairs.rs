@@ -2,10 +2,11 @@
 
 use super::Part;
 use crate::contact::detect::may_collide;
+use crate::contact::own_tests::OwnTests;
 use crate::world::World;
 use crate::world::view::{Mode, ObjectId};
 use std::collections::BTreeMap;
-use tumble_collide::{Aabb, BroadPhase, Contact, SweepAndPrune, contacts_in_mode};
+use tumble_collide::{Aabb, BroadPhase, Contact, SweepAndPrune};
 
 /// Two objects that overlap, in the order in which they were added; the same object twice if its
 /// own parts overlap.
@@ -54,7 +55,8 @@ impl World {
         }
         let mode = a.mode.of_pair(b.mode);
         let mut found: Vec<Contact> = Vec::new();
-        contacts_in_mode(mode, a.shape, &a.pose, b.shape, &b.pose, 0.0, &mut found);
+        let tests = OwnTests::of([(a.entry.object, a.part), (b.entry.object, b.part)]);
+        tests.contacts(mode, [a.shape, b.shape], [&a.pose, &b.pose], 0.0, &mut found);
         found.iter().map(|contact| -contact.gap).max_by(f64::total_cmp)
     }
 }

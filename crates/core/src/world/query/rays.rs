@@ -6,8 +6,8 @@
 //! a tree. Of several parts at one distance, the first one added is hit.
 
 use super::{Part, QueryFilter};
-use crate::world::World;
 use crate::world::view::ObjectId;
+use crate::world::{Core, World};
 use tumble_collide::{Aabb, BoxTree, RayHit, Shape, Vec3};
 
 /// Maximum number of rays that are searched for without a tree.
@@ -76,6 +76,17 @@ impl World {
             hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = targets.first(ray));
         });
         hits
+    }
+}
+
+impl Core {
+    /// Returns the distance to the first part that a ray enters, without those that `skip` selects.
+    pub(crate) fn distance_along(&self, ray: &Ray, skip: impl Fn(ObjectId, usize) -> bool) -> Option<f64> {
+        let seen = |part: &Part<'_>| {
+            part.entry.object.collidable().is_some_and(|body| !body.is_sensor(part.part)) && !skip(part.id, part.part)
+        };
+        let targets = Targets { unbounded: self.parts().filter(seen).collect(), bounded: Vec::new(), tree: None };
+        targets.first(ray).map(|hit| hit.distance)
     }
 }
 

@@ -1,0 +1,191 @@
+//! A flock of rigid bodies, steered by forces and torques: bodies fly nose first, bank into turns, and are turned by
+//! collisions like any other body.
+//!
+//! ```text
+//! f* = v/|v|      ω* = v × F/(m·|v|²)      φ* = −½π·clamp(B·(ω*·u), −1, 1)
+//! R* = Rot(f*, φ*)·[f*, u × f*, u],  u = up − (up·f*)·f*, normalized
+//! e = log(R*·Rᵀ)                τ = I·α + ω × I·ω,  α = cap(k²·e + 2·k·(ω* − ω))
+//! ```
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `F` | force of the flock on the body's center of mass ([`super::steering`]) |
+//! | `v`, `ω`, `R`, `m`, `I` | velocity, angular velocity, orientation, mass, and inertia in world axes |
+//! | `f*`, `R*` | wanted nose and orientation; x forward, y to the left, z up |
+//! | `ω*` | turn rate that `F` commands |
+//! | `φ*`, `B` | bank about the nose, negative in turns to the left; time that turns a rate into a share of a quarter turn |
+//! | `e` | rotation vector from the orientation to the wanted one, at most π |
+//! | `k`, `α` | agility; angular acceleration, at most `max_angular_acceleration` |
+//!
+//! The error of the orientation is critically damped with the rate `k`. `ω*` is added in advance, so in a steady turn
+//! the nose has no lag, and the body turns at the commanded rate. The torque has no part along the momentum of the center of mass: in a
+//! collision the bodies of a flock keep it, whatever they do with their noses. It depends on velocities, so it is constant
+//! over a step `h`: keep `k·h` below ¼. Without speed there is no course; the torque then only stops the spin.
+//!
+//! This is the steering by torques that appendix A of the thesis leaves open.
+
+use crate::error::{BehaviorError, check};
+use crate::fields::check_vector;
+use crate::steering::{Flyer, Search, Steering};
+use nalgebra::Unit;
+use std::f64::consts::FRAC_PI_2;
+use tumble_collide::{Mat3, Quat, Vec3};
+use tumble_core::{ForceGenerator, Forces, Object, ObjectId, PartState, RigidBody, StateRange, WorldView};
+
+/// Speed below which a body has no course, m/s.
+const SLOWEST: f64 = 1e-3;
+/// Least number of bodies on a thread.
+const PIECE: usize = 64;
+
+/// How a body turns to its course.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Helm {
+    /// Rate at which the orientation approaches the wanted one, 1/s, at least 0.
+    pub agility: f64,
+    /// Largest angular acceleration, rad/s², at least 0.
+    pub max_angular_acceleration: f64,
+    /// Time that turns a rate of turn (rad/s) into a share of a quarter turn of bank, s, at least 0.
+    pub bank_time: f64,
+    /// The direction that is up for a body without bank; any length above 0.
+    pub up: Vec3,
+}
+
+impl Default for Helm {
+    /// A quarter of a second to turn, up along z.
+    fn default() -> Helm {
+        Helm { agility: 8.0, max_angular_acceleration: 100.0, bank_time: 1.0, up: Vec3::z() }
+    }
+}
+
+/// A flock of rigid bodies in one world. It is a force: it has no state, and bodies of any shape can join it.
+///
+/// ```
+/// # use tumble_core::prelude::*;
+/// # use tumble_behaviors::Steering;
+/// # let mut world = World::default();
+/// use tumble_behaviors::{BodyFlock, Helm};
+/// let mut school = BodyFlock::new("school", Steering::default(), Helm::default())?;
+/// let fish = RigidBody::new(Shape::cuboid(Vec3::new(0.4, 0.1, 0.2))?).with_gravity_scale(0.0);
+/// school.push(world.add(fish.with_velocity(Vec3::x()))?);
+/// world.add(school)?;
+/// # world.step()?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct BodyFlock {
+    name: String,
+    steering: Steering,
+    helm: Helm,
+    search: Search,
+    bodies: Vec<ObjectId>,
+}
+
+impl BodyFlock {
+    /// Makes a flock without bodies.
+    ///
+    /// # Errors
+    /// As [`Steering::validate`]; [`BehaviorError::Range`] names a constant of the helm that is out of its range.
+    pub fn new(name: impl Into<String>, steering: Steering, helm: Helm) -> Result<BodyFlock, BehaviorError> {
+        steering.validate()?;
+        check("agility", helm.agility, helm.agility >= 0.0, "at least 0")?;
+        let most = helm.max_angular_acceleration;
+        check("max_angular_acceleration", most, most >= 0.0, "at least 0")?;
+        check("bank_time", helm.bank_time, helm.bank_time >= 0.0, "at least 0")?;
+        check_vector("up", &helm.up)?;
+        check("the length of up", helm.up.norm(), helm.up.norm() > 0.0, "above 0")?;
+        Ok(BodyFlock { name: name.into(), steering, helm, search: Search::Grid, bodies: Vec::new() })
+    }
+    /// Sets how neighbors are found; the forces have the same bits.
+    pub fn with_search(self, search: Search) -> BodyFlock {
+        BodyFlock { search, ..self }
+    }
+    /// Adds a rigid body of the flock's world. Its gravity acts beside the flock: set
+    /// [`RigidBody::with_gravity_scale`] to 0 for wings that carry it.
+    pub fn push(&mut self, body: ObjectId) {
+        self.bodies.push(body);
+    }
+    /// Removes a body from the flock; it stays in the world. Returns whether it was in it.
+    pub fn release(&mut self, body: ObjectId) -> bool {
+        let before = self.bodies.len();
+        self.bodies.retain(|id| *id != body);
+        self.bodies.len() < before
+    }
+    /// Returns the ids of the bodies, in the order in which they were added. Those that are no enabled rigid bodies of the
+    /// world are ignored.
+    pub fn bodies(&self) -> &[ObjectId] {
+        &self.bodies
+    }
+}
+
+impl Helm {
+    /// Returns the angular acceleration that a force calls for which accelerates the center of mass by `a`, m/s², at the velocity
+    /// `v`, m/s; rad/s².
+    pub fn angular_acceleration(&self, state: &PartState, v: &Vec3, a: &Vec3) -> Vec3 {
+        let spin = state.angular_velocity;
+        let wanted = match self.course(v, &(v.cross(a) / v.norm_squared())) {
+            Some((orientation, turn)) => {
+                let off = (orientation * state.pose.rotation.inverse()).scaled_axis();
+                self.agility * self.agility * off + 2.0 * self.agility * (turn - spin)
+            }
+            None => -2.0 * self.agility * spin,
+        };
+        let size = wanted.norm();
+        if size > self.max_angular_acceleration { wanted * (self.max_angular_acceleration / size) } else { wanted }
+    }
+
+    /// Returns the wanted orientation at a velocity and a turn rate, and that rate; `None` without speed.
+    fn course(&self, velocity: &Vec3, turn: &Vec3) -> Option<(Quat, Vec3)> {
+        let nose = velocity.try_normalize(SLOWEST)?;
+        let up = self.up.normalize();
+        // straight up or down any direction across is level
+        let level = (up - up.dot(&nose) * nose).try_normalize(1e-6).unwrap_or_else(|| across(&nose));
+        let axes = Mat3::from_columns(&[nose, level.cross(&nose), level]);
+        let bank = -FRAC_PI_2 * (self.bank_time * turn.dot(&level)).clamp(-1.0, 1.0);
+        let orientation = nalgebra::Rotation3::from_matrix_unchecked(axes);
+        Some((
+            Quat::from_axis_angle(&Unit::new_unchecked(nose), bank) * Quat::from_rotation_matrix(&orientation),
+            *turn,
+        ))
+    }
+}
+
+/// Returns a unit vector across another one.
+fn across(axis: &Vec3) -> Vec3 {
+    axis.cross(&Vec3::ith(axis.iamin(), 1.0)).normalize()
+}
+
+impl Object for BodyFlock {
+    fn name(&self) -> &str {
+        &self.name
+    }
+    fn force(&self) -> Option<&dyn ForceGenerator> {
+        Some(self)
+    }
+}
+
+impl ForceGenerator for BodyFlock {
+    fn apply(&self, _me: &StateRange, view: &WorldView, out: &mut Forces) {
+        let (mut bodies, mut flyers) = (Vec::new(), Vec::new());
+        for &id in self.bodies.iter().filter(|id| view.status(**id).is_some_and(|status| status.enabled)) {
+            let (Some(body), Some(range)) = (view.get::<RigidBody>(id), view.state_range(id)) else { continue };
+            let (row, mass) = (range.parts.start, body.mass());
+            let state = &view.part_states[row];
+            let position = state.pose.transform_point(&body.center_in_part().into()).coords;
+            let (velocity, forward) = (state.velocity_at(&position), state.pose.rotation * Vec3::x());
+            bodies.push((row, body));
+            flyers.push(Flyer { position, velocity, forward, mass });
+        }
+        let forces = self.steering.forces_by(self.search, &flyers, |forces, work| {
+            view.each_piece(forces, PIECE, work);
+        });
+        for (((row, body), flyer), force) in bodies.iter().zip(&flyers).zip(forces) {
+            let state = &view.part_states[*row];
+            let axes = state.pose.rotation.to_rotation_matrix();
+            let inertia = axes.matrix() * body.inertia() * axes.matrix().transpose();
+            let spin = state.angular_velocity;
+            let acceleration = self.helm.angular_acceleration(state, &flyer.velocity, &(force / flyer.mass));
+            out.add_at(*row, state, force, &flyer.position);
+            out.wrenches[*row].torque += inertia * acceleration + spin.cross(&(inertia * spin));
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Records of measuring sensors.
+
+use super::records::{LoadedTables, ObjectIndices, Tables, id, shape};
+use super::{ArchiveError, damaged};
+use crate::Anchor;
+use crate::object::Object;
+use crate::sensor::{Sensor, SensorKind, SensorNoise, SensorPlace};
+use crate::world::view::ObjectId;
+use serde::{Deserialize, Serialize};
+use tumble_collide::Pose;
+
+/// Index of the object of a site, if that still exists, and part, `None` for the world; the frame.
+type Site = (Option<(Option<u32>, usize)>, Pose);
+
+/// The thing that a sensor is fixed to; objects by index.
+#[derive(Serialize, Deserialize)]
+enum Place {
+    Site(Site),
+    LoopJoint(Option<u32>),
+    Dof(Option<u32>, usize),
+}
+
+/// A sensor.
+#[derive(Serialize, Deserialize)]
+pub(super) struct SensorRecord {
+    name: String,
+    kind: SensorKind,
+    place: Place,
+    reference: Option<Site>,
+    volume: Option<u32>,
+    cutoff: f64,
+    noise: SensorNoise,
+}
+
+fn site(anchor: &Anchor, indices: &ObjectIndices) -> Site {
+    (anchor.part.map(|(id, part)| (indices.of_id(id), part)), anchor.frame)
+}
+
+fn anchor((part, frame): Site, ids: &[ObjectId]) -> Anchor {
+    Anchor { part: part.map(|(index, part)| (id(ids, index), part)), frame }
+}
+
+impl SensorRecord {
+    pub fn of(sensor: &Sensor, tables: &mut Tables, indices: &ObjectIndices) -> SensorRecord {
+        let place = match sensor.place() {
+            SensorPlace::Site(anchor) => Place::Site(site(anchor, indices)),
+            SensorPlace::LoopJoint(joint) => Place::LoopJoint(indices.of_id(*joint)),
+            SensorPlace::Dof(body, dof) => Place::Dof(indices.of_id(*body), *dof),
+        };
+        SensorRecord {
+            name: sensor.name().into(),
+            kind: sensor.kind(),
+            place,
+            reference: sensor.reference().map(|anchor| site(anchor, indices)),
+            volume: sensor.volume().map(|volume| tables.shapes.index(volume)),
+            cutoff: sensor.cutoff(),
+            noise: *sensor.noise(),
+        }
+    }
+
+    pub fn sensor(self, tables: &LoadedTables, ids: &[ObjectId]) -> Result<Sensor, ArchiveError> {
+        let place = match self.place {
+            Place::Site(site) => SensorPlace::Site(anchor(site, ids)),
+            Place::LoopJoint(index) => SensorPlace::LoopJoint(id(ids, index)),
+            Place::Dof(index, dof) => SensorPlace::Dof(id(ids, index), dof),
+        };
+        let mut sensor = Sensor::at(self.name, self.kind, place).map_err(damaged)?;
+        if let Some(site) = self.reference {
+            sensor = sensor.relative_to(anchor(site, ids)).map_err(damaged)?;
+        }
+        if let Some(index) = self.volume {
+            sensor = sensor.with_volume(shape(&tables.shapes, index)?).map_err(damaged)?;
+        }
+        sensor.with_cutoff(self.cutoff).and_then(|sensor| sensor.with_noise(self.noise)).map_err(damaged)
+    }
+}

@@ -1,0 +1,178 @@
+//! Measuring sensors of a world: how they are added, and what they read.
+
+use crate::arrays::convert::{number, pose};
+use crate::choices::meaning;
+use crate::errors::{Error, Result};
+use crate::objects::place::{Place, by_name};
+use crate::objects::sensor::Sensor;
+use crate::objects::shapes::Shape;
+use crate::world::add::own_place;
+use crate::world::inner::Inner;
+use crate::world::joints;
+use crate::world::shared::Shared;
+use pyo3::prelude::*;
+use std::sync::Arc;
+use tumble::collide::Pose;
+use tumble::dynamics::{Anchor, ArticulatedBody, ObjectId, Sensor as Core, SensorKind, SensorNoise, SensorPlace};
+
+/// The arguments of ``add_sensor``.
+pub struct Arguments<'a, 'py> {
+    pub kind: &'a str,
+    pub on: Option<&'a Bound<'py, PyAny>>,
+    pub name: &'a str,
+    pub position: Option<&'a Bound<'py, PyAny>>,
+    pub orientation: Option<&'a Bound<'py, PyAny>>,
+    pub relative_to: Option<&'a Bound<'py, PyAny>>,
+    pub volume: Option<&'a Bound<'py, Shape>>,
+    pub cutoff: Option<f64>,
+    pub noise: SensorNoise,
+}
+
+/// A body, and the name of a link of it.
+struct Target {
+    id: ObjectId,
+    link: Option<String>,
+}
+
+/// Adds a sensor and returns its handle.
+pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> Result<Sensor> {
+    let kinds: Vec<(&str, SensorKind)> = SensorKind::NAMES.into_iter().zip(SensorKind::ALL).collect();
+    let kind = meaning("kind", given.kind, &kinds)?;
+    let site = pose(given.position, given.orientation)?;
+    let joint = given.on.map_or(Ok(None), |on| joints::place_of(shared, on))?;
+    let target = match given.on.filter(|_| joint.is_none()) {
+        Some(on) => Some(target(shared, on)?),
+        None => None,
+    };
+    let reference = given.relative_to.map(|value| self::target(shared, value)).transpose()?;
+    let volume = match given.volume.map(|volume| volume.get()) {
+        Some(volume) if volume.placement != Pose::identity() => {
+            return Err(Error::value("volume: expected a sphere, a box, a capsule or a cylinder"));
+        }
+        volume => volume.map(|volume| volume.solid.clone()),
+    };
+    let cutoff = given.cutoff.map_or(Ok(f64::INFINITY), |cutoff| number(cutoff, "cutoff"))?;
+    let place = shared.write(py, |inner| {
+        let place = match (&joint, &target) {
+            (Some(joint), _) => SensorPlace::LoopJoint(joint.id),
+            (_, Some(target)) if kind.reads_dof() => {
+                let (id, dof) = dof_of(inner, target)?;
+                SensorPlace::Dof(id, dof)
+            }
+            (_, Some(target)) => SensorPlace::Site(anchor(inner, target, &site)?),
+            (_, None) => SensorPlace::Site(Anchor::world(site)),
+        };
+        let mut sensor = Core::at(given.name.into(), kind, place)?;
+        if let Some(reference) = &reference {
+            sensor = sensor.relative_to(anchor(inner, reference, &Pose::identity())?)?;
+        }
+        if let Some(volume) = volume {
+            sensor = sensor.with_volume(volume)?;
+        }
+        let id = inner.world.add(sensor.with_cutoff(cutoff)?.with_noise(given.noise)?)?;
+        let name = inner.world.name(id).unwrap_or_default().into();
+        Ok(Place { shared: shared.clone(), id, name })
+    })?;
+    Sensor::new(py, place)
+}
+
+/// Converts a handle, a name, ``"ARTICULATION/LINK"``, or a tuple of an articulation and the name of a link.
+fn target(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<Target> {
+    if let Ok((body, link)) = value.extract::<(Bound<'_, PyAny>, String)>() {
+        return Ok(Target { id: own_place(shared, &body)?.id, link: Some(link) });
+    }
+    if let Ok(name) = value.extract::<String>()
+        && let Some((object, link)) = name.split_once('/')
+        && shared.read(|inner| Ok(inner.world.find(&name).is_none()))?
+    {
+        let found = shared.read(|inner| by_name(inner, object))?;
+        return Ok(Target { id: found.id, link: Some(link.into()) });
+    }
+    Ok(Target { id: own_place(shared, value)?.id, link: None })
+}
+
+/// Returns the articulated body and the link that a target names.
+fn link<'a>(inner: &'a Inner, target: &'a Target) -> Result<Option<(&'a ArticulatedBody, &'a str)>> {
+    let name = inner.world.name(target.id).unwrap_or_default();
+    match (inner.world.get::<ArticulatedBody>(target.id), &target.link) {
+        (Some(body), Some(link)) => Ok(Some((body, link.as_str()))),
+        (None, None) => Ok(None),
+        (Some(_), None) => Err(Error::value(format!(
+            "'{name}' is an articulation; name a link of it: \"{name}/LINK\", or (articulation, \"LINK\")"
+        ))),
+        (None, Some(link)) => Err(Error::Name(format!("'{name}' has no link named '{link}'"))),
+    }
+}
+
+fn anchor(inner: &Inner, target: &Target, site: &Pose) -> Result<Anchor> {
+    match link(inner, target)? {
+        Some((body, link)) => body.anchor(target.id, link, site).map_err(|e| Error::Name(e.to_string())),
+        None => Ok(Anchor::on(target.id, 0, *site)),
+    }
+}
+
+/// Returns the degree of freedom of the joint that moves a link.
+fn dof_of(inner: &Inner, target: &Target) -> Result<(ObjectId, usize)> {
+    let none = || Error::value("on: expected a link that a revolute or prismatic joint moves, or a loop joint");
+    let (body, link) = link(inner, target)?.ok_or_else(none)?;
+    let missing =
+        || Error::Name(format!("'{}' has no link named '{link}'", inner.world.name(target.id).unwrap_or_default()));
+    let frame = body.model().frame(link).ok_or_else(missing)?;
+    let moving = frame.link.map(|k| &body.model().links()[k]).filter(|link| link.joint.dof() == 1).ok_or_else(none)?;
+    Ok((target.id, moving.v))
+}
+
+/// Returns the place of the sensor of that name.
+pub fn place_by_name(shared: &Arc<Shared>, name: &str) -> Result<Place> {
+    shared.read(|inner| {
+        let id = inner.world.find(name).filter(|id| inner.world.get::<Core>(*id).is_some());
+        let unknown = || {
+            let names: Vec<&str> = inner.world.sensors().filter_map(|id| inner.world.name(id)).take(8).collect();
+            Error::Name(format!("the world has no measuring sensor named '{name}'; it has [{}]", names.join(", ")))
+        };
+        Ok(Place { shared: shared.clone(), id: id.ok_or_else(unknown)?, name: name.into() })
+    })
+}
+
+/// Returns the place of a sensor of this world, given as a handle or by name; `None` for anything else.
+pub fn place_of(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<Option<Place>> {
+    if let Ok(sensor) = value.cast::<Sensor>() {
+        let place = sensor.get().place.clone();
+        return match Arc::ptr_eq(&place.shared, shared) {
+            true => place.status().map(|_| Some(place)),
+            false => Err(Error::value(format!("'{}' belongs to another world", place.name))),
+        };
+    }
+    Ok(value.extract::<String>().ok().and_then(|name| place_by_name(shared, &name).ok()))
+}
+
+/// Returns the reading of a sensor.
+pub fn value<'py>(py: Python<'py>, place: &Place) -> Result<Bound<'py, numpy::PyArray1<f64>>> {
+    let numbers = place.read(|inner| inner.world.reading(place.id).map(<[f64]>::to_vec))?;
+    Ok(numpy::PyArray1::from_vec(py, numbers))
+}
+
+/// Returns the places of a sensor's reading in the state.
+pub fn columns(shared: &Arc<Shared>, name: &str) -> Result<std::ops::Range<usize>> {
+    let place = place_by_name(shared, name)?;
+    place.read(|inner| {
+        let numbers = inner.world.get::<Core>(place.id)?.kind().numbers();
+        let start = inner.world.view().state_range(place.id)?.x.start;
+        Some(start..start + numbers)
+    })
+}
+
+/// Returns the names of all sensors with the lengths of their readings and the numbers one after the other, in the order of
+/// their addition. Those of removed bodies are left out.
+pub fn all(shared: &Arc<Shared>) -> Result<(Vec<(String, usize)>, Vec<f64>)> {
+    shared.read(|inner| {
+        let (mut names, mut numbers) = (Vec::new(), Vec::new());
+        for id in inner.world.sensors() {
+            if let (Some(name), Some(reading)) = (inner.world.name(id), inner.world.reading(id)) {
+                names.push((name.to_owned(), reading.len()));
+                numbers.extend_from_slice(reading);
+            }
+        }
+        Ok((names, numbers))
+    })
+}
