@@ -46,6 +46,7 @@ SCENES = {
     "sparks": (0, 2.5),
     "cloth": (0, 3.0),
     "jelly": (0, 1.5),
+    "ball_machine": (0.5, 6.0),
 }
 
 

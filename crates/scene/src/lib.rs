@@ -86,6 +86,7 @@ pub use parse::behavior::flock::{BoidGroupSpec, FlockSpec};
 pub use parse::behavior::particles::{EmitterSpec, ParticleSystemSpec};
 pub use parse::behavior::soft::{Grid, SoftSpec};
 pub use parse::body::{BodySpec, MassSpec};
+pub use parse::event::{EventSpec, TemplateSpec};
 pub use parse::file::{MAX_BYTES, SceneFile};
 pub use parse::joint::{JointSpec, MimicSpec};
 pub use parse::link::{Geometry, LinkMassSpec, LinkShape, LinkSpec, Surface};

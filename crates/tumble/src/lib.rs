@@ -9,6 +9,7 @@
 //! |---|---|---|
 //! | `render` | the module `render`: draw lists, the wgpu renderer, windows | yes |
 //! | `net` | the module `net`: recordings (MCAP), facets of a cave over shared memory and UDP | yes |
+//! | `sound` | the module `sound`: the sound of a run as a WAV file | yes |
 //! | `command` | the dependencies of the `tumble` command; implies `render` and `net` | yes |
 //!
 //! With `default-features = false` the library holds `collide`, `dynamics`, `behaviors` and `scene` only.
@@ -20,6 +21,9 @@
 //! assert_eq!(world.frame(), 1);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+
+#[cfg(feature = "sound")]
+pub mod sound;
 
 pub use tumble_behaviors as behaviors;
 pub use tumble_collide as collide;

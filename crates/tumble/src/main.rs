@@ -5,6 +5,7 @@
 
 mod args;
 mod atomic_file;
+mod audio;
 mod capture;
 mod cave;
 mod caves;

@@ -2,6 +2,7 @@
 
 use crate::args::RunOptions;
 use crate::atomic_file::{check_writable, write_file};
+use crate::audio::Audio;
 use crate::capture::{Capture, write_png};
 use crate::divergence;
 use crate::failure::Failure;
@@ -20,7 +21,8 @@ const MAX_STATE_BYTES: u64 = 1 << 30;
 
 /// Runs a scene.
 pub fn run(options: &RunOptions) -> Result<(), Failure> {
-    let outputs = [&options.summary, &options.screenshot, &options.save, &options.save_scene, &options.video];
+    let outputs =
+        [&options.summary, &options.screenshot, &options.save, &options.save_scene, &options.video, &options.audio];
     outputs
         .into_iter()
         .flatten()
@@ -35,7 +37,9 @@ pub fn run(options: &RunOptions) -> Result<(), Failure> {
     // the capture and the recorder have read the visual meshes by now
     visual_notes(world.visuals()).iter().filter(|_| !options.quiet).for_each(|note| println!("{note}"));
     let start = State::of(&world);
-    let simulated = simulate(&mut world, recorder.as_mut(), capture.as_mut(), &scene, options)?;
+    let mut audio = options.audio.is_some().then(|| Audio::new(&scene)).transpose()?;
+    let outputs = Outputs { recorder: recorder.as_mut(), capture: capture.as_mut(), audio: audio.as_mut() };
+    let simulated = simulate(&mut world, outputs, &scene, options)?;
     finish_recording(recorder, options)?;
     if let Some(path) = &options.save {
         write_file(path, &world.save())?;
@@ -46,9 +50,20 @@ pub fn run(options: &RunOptions) -> Result<(), Failure> {
         print!("{}", summary.lines());
     }
     write_summary(&summary, options)?;
+    if let (Some(audio), Some(path)) = (audio, &options.audio) {
+        let what = audio.write(path, simulated.time_s)?;
+        say(options, &what, path);
+    }
     pictures(&world, capture, options)?;
     // what was computed is written all the same
     simulated.outcome
+}
+
+/// The outputs that look at each frame.
+struct Outputs<'a> {
+    recorder: Option<&'a mut Recorder>,
+    capture: Option<&'a mut Capture>,
+    audio: Option<&'a mut Audio>,
 }
 
 /// A run without its outputs.
@@ -84,8 +99,7 @@ fn recorder(world: &World, scene: &SceneFile, options: &RunOptions) -> Result<Op
 /// Steps to the end, or until the simulation diverges.
 fn simulate(
     world: &mut World,
-    mut recorder: Option<&mut Recorder>,
-    mut capture: Option<&mut Capture>,
+    Outputs { mut recorder, mut capture, mut audio }: Outputs<'_>,
     scene: &SceneFile,
     options: &RunOptions,
 ) -> Result<Simulated, Failure> {
@@ -112,6 +126,7 @@ fn simulate(
         wall += taken;
         record(world)?;
         shoot(world)?;
+        audio.iter_mut().for_each(|audio| audio.frame(world));
         progress.at(frame, world.time());
         outcome = divergence::check(world);
         if outcome.is_err() {

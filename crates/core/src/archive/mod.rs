@@ -14,6 +14,7 @@
 mod bodies;
 mod constants;
 mod records;
+mod script;
 mod sensors;
 
 use crate::report::StepReport;
@@ -22,12 +23,16 @@ use crate::solver::{self, RowSolver};
 use crate::step::{STEPPERS, Stepper, stepper_by_name};
 use crate::world::view::{Mode, ObjectId};
 use crate::world::{ContactPoint, Event, EventKind, World, WorldState};
-use crate::{ArticulatedBody, LoopJoint, Object, RigidBody, Sensor, UnreachableJoint, WorstSolve};
+use crate::{
+    ArticulatedBody, EventError, LoopJoint, Object, RigidBody, ScriptedEvent, Sensor, Template, UnreachableJoint,
+    WorstSolve,
+};
 use bodies::{ArticulatedRecord, RigidRecord};
 use records::{
     ContactRecord, EventRecord, LoadedTables, LoopJointRecord, MeshRecord, ObjectIndices, PairRecord, ReportRecord,
     Tables, meshes,
 };
+use script::{EventScript, TemplateRecord};
 use sensors::SensorRecord;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -115,6 +120,8 @@ enum Record {
     LoopJoint(Box<LoopJointRecord>),
     Sensor(Box<SensorRecord>),
     Foreign,
+    Event(Box<EventScript>),
+    Template(TemplateRecord),
 }
 
 impl World {
@@ -185,6 +192,8 @@ impl World {
                 Record::Rigid(rigid) => Box::new(rigid.body(&tables)?),
                 Record::Articulated(articulated) => Box::new(articulated.body(&tables)?),
                 Record::LoopJoint(loop_joint) => Box::new(loop_joint.loop_joint(&ids)?),
+                Record::Event(event) => Box::new(event.event(&ids)),
+                Record::Template(template) => Box::new(template.template(&ids)),
                 Record::Sensor(sensor) => Box::new(sensor.sensor(&tables, &ids)?),
                 Record::Foreign => foreign(&name).ok_or_else(|| ArchiveError::Foreign(name.clone()))?,
             };
@@ -192,6 +201,12 @@ impl World {
         }
         archive.pairs.into_iter().try_for_each(|pair| pair.put(&mut world, &ids)).map_err(damaged)?;
         world.restore_state(&archive.state).map_err(damaged)?;
+        for event in ids.iter().filter_map(|id| world.get::<ScriptedEvent>(*id)) {
+            match event.clone().prepare(&world) {
+                Ok(()) | Err(EventError::Gone(_)) => {} // it may name a removed object
+                Err(why) => return Err(damaged(why)),
+            }
+        }
         let contacts = archive.contacts.into_iter().map(|c| c.contact(&ids)).collect();
         let events = archive.events.into_iter().map(|event| event.event(&ids)).collect();
         world.publish(contacts, events, archive.report.report(&ids));
@@ -249,6 +264,10 @@ fn record(object: &dyn Object, tables: &mut Tables, indices: &ObjectIndices) -> 
         Record::Articulated(Box::new(ArticulatedRecord::of(body, tables)))
     } else if let Some(loop_joint) = any.downcast_ref::<LoopJoint>() {
         Record::LoopJoint(Box::new(LoopJointRecord::of(loop_joint, indices)))
+    } else if let Some(event) = any.downcast_ref::<ScriptedEvent>() {
+        Record::Event(Box::new(EventScript::of(event, indices)))
+    } else if let Some(template) = any.downcast_ref::<Template>() {
+        Record::Template(TemplateRecord::of(template, indices))
     } else if let Some(sensor) = any.downcast_ref::<Sensor>() {
         Record::Sensor(Box::new(SensorRecord::of(sensor, tables, indices)))
     } else {

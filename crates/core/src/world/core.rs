@@ -84,6 +84,14 @@ pub enum StepError {
         /// Simulated time, s.
         time: f64,
     },
+    /// An action of a scripted event failed.
+    #[error("event '{event}': {why}")]
+    Event {
+        /// Name of the event.
+        event: String,
+        /// The fault.
+        why: super::WorldError,
+    },
     /// A constraint made an invalid row.
     #[error("constraint '{object}': {why}")]
     Row {

@@ -1,5 +1,6 @@
 //! Errors of calls to a world.
 
+use super::script::EventError;
 use crate::rigid::BodyError;
 use crate::settings::SettingsError;
 
@@ -17,6 +18,14 @@ pub enum WorldError {
         name: String,
         /// The constant and its range.
         why: BodyError,
+    },
+    /// A scripted event, or its template, cannot be added.
+    #[error("event '{name}': {why}")]
+    Event {
+        /// Name of the event or template.
+        name: String,
+        /// The fault.
+        why: EventError,
     },
     /// A setting is out of its range.
     #[error(transparent)]

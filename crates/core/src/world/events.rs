@@ -34,6 +34,8 @@ pub enum EventKind {
     Awake,
     /// A loop joint broke.
     JointBroken,
+    /// A scripted event fired: `a` is the event, `b` the body that made it fire.
+    Fired,
 }
 
 impl EventKind {
@@ -47,6 +49,7 @@ impl EventKind {
         ("asleep", EventKind::Asleep),
         ("awake", EventKind::Awake),
         ("joint_broken", EventKind::JointBroken),
+        ("fired", EventKind::Fired),
     ];
 }
 

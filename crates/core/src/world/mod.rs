@@ -14,6 +14,7 @@ mod pair_materials;
 mod pick;
 mod query;
 mod replica;
+pub(crate) mod script;
 mod sensors;
 pub(crate) mod sleep;
 mod snapshot;
@@ -154,6 +155,7 @@ impl World {
         core.needs_wake.clear();
         core.meter.reset();
         core.refresh(); // constants and switches may have changed
+        core.guide();
         core.wake_disturbed();
         core.divide_ahead(self.stepper.as_ref());
         core.keep_part_states(&mut self.parts_before);
@@ -191,6 +193,7 @@ impl World {
             }
             core.set_state(&self.before);
             core.report = StepReport::default();
+            core.guide();
             core.wake_disturbed();
             core.wake_requested();
         }
@@ -202,7 +205,15 @@ impl World {
         core.state.clear_applied();
         core.state.keep_accelerations(&core.derived.part_states);
         core.state.frame += 1;
-        Ok(&core.report)
+        if let Err(error) = self.fire_events() {
+            let core = &mut self.core;
+            core.set_state(&self.before);
+            core.events.clear();
+            std::mem::swap(&mut self.contacts_before, &mut core.contacts);
+            core.report = report_before;
+            return Err(error);
+        }
+        Ok(&self.core.report)
     }
 
     /// Writes the present state to `at`, whose memory is used again.
@@ -338,7 +349,12 @@ impl World {
     ///
     /// # Errors
     /// [`WorldError`], as [`add`](Self::add).
-    pub fn add_boxed(&mut self, object: Box<dyn Object>, mode: Mode) -> Result<ObjectId, WorldError> {
+    pub fn add_boxed(&mut self, mut object: Box<dyn Object>, mode: Mode) -> Result<ObjectId, WorldError> {
+        let any: &mut dyn std::any::Any = object.as_mut();
+        if let Some(event) = any.downcast_mut::<script::ScriptedEvent>() {
+            let prepared = event.prepare(self);
+            prepared.map_err(|why| WorldError::Event { name: object.name().into(), why })?;
+        }
         let name = match object.name() {
             "" => self.new_name(object.as_ref()),
             name => name.to_string(),

@@ -58,6 +58,8 @@ mod random_scenes;
 mod regressions;
 mod regressions_articulated;
 mod regressions_rows;
+mod scripted_events;
+mod scripted_splines;
 mod sensor_noise;
 mod sensors;
 mod sleep;

@@ -21,7 +21,7 @@ Mode: TypeAlias = Literal["dynamic", "kinematic", "static"]
 """``RigidBody.mode``."""
 
 EventKind: TypeAlias = Literal[
-    "contact_begin", "contact_persist", "contact_end", "sensor_begin", "sensor_end", "asleep", "awake", "joint_broken"
+    "contact_begin", "contact_persist", "contact_end", "sensor_begin", "sensor_end", "asleep", "awake", "joint_broken", "fired"
 ]
 """``Event.kind``."""
 

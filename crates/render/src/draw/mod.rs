@@ -2,6 +2,7 @@
 
 mod deforming;
 mod detail;
+mod looks;
 mod overlay;
 mod surface;
 mod tree;
@@ -114,7 +115,8 @@ impl Drawing {
     /// # Errors
     /// [`RenderError`] if a mesh has more vertices than can be drawn.
     pub fn list(&mut self, world: &World, overlays: &DebugDraw) -> Result<DrawList, RenderError> {
-        let mut list = self.base.clone();
+        let (mut list, looks) = (self.base.clone(), world.looks());
+        looks::change_lights(&mut list, &looks);
         list.spheres.reserve(self.spheres);
         let mut placed = Placed::default();
         let tints =
@@ -134,6 +136,8 @@ impl Drawing {
             let tint = tints.as_ref().and_then(|tints| tints.get(&id)).copied();
             for visual in object.renderable().map_or(&[][..], |r| r.visuals()) {
                 let Some(part_state) = world.part_state(id, visual.part) else { continue };
+                let recolored = looks::recolored(visual, looks.colors.get(&id));
+                let visual = recolored.as_ref().unwrap_or(visual);
                 self.place(&mut list, &mut placed, name, visual, &(part_state.pose * visual.pose), tint)?;
             }
             let Some(drawn) = object.renderable() else { continue };
@@ -147,6 +151,7 @@ impl Drawing {
         }
         self.spheres = list.spheres.len();
         list.camera = self.camera.unwrap_or_else(|| list.framing_camera(Vector3::new(-0.5, 1.0, -0.5)));
+        looks::change_camera(&mut list, &looks, world)?;
         overlays.draw(world, &mut list);
         Ok(list)
     }

@@ -5,7 +5,7 @@ use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::solver::SolverSettings;
 use tumble_core::{
     Anchor, ArticulatedBody, Drive, JointPlace, LoopJoint, LoopJointError, LoopJointKind, Material, ObjectId,
-    PairMaterial, PairSide, RigidBody, Settings, Sleep, Visual, World, WorldError,
+    PairMaterial, PairSide, RigidBody, Settings, Sleep, Template, Visual, World, WorldError,
 };
 
 use crate::build::appearance::{appearance, material_id};
@@ -67,6 +67,14 @@ impl SceneFile {
         }
         for spec in &self.loop_joints {
             self.add_loop_joint(spec, &mut built)?;
+        }
+        for spec in &self.templates {
+            let body = self.body(&spec.body, &meshes)?;
+            let added = Template::add(&mut built, &spec.body.name, &body, spec.count, spec.reuse);
+            added.map_err(|e| self.body_error(&spec.body, e))?;
+        }
+        for spec in &self.events {
+            spec.add(&mut built).map_err(world)?;
         }
         for spec in &self.sensors {
             self.add_sensor(spec, &mut built)?;

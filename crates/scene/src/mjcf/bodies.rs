@@ -156,6 +156,7 @@ impl Assembly<'_, '_> {
             sensor: false,
             enabled: true,
             visible: true,
+            sound: None,
             appearance: surface.appearance,
             mounts: Mounts::default(),
         }

@@ -84,7 +84,6 @@ fn join(item: &Item<'_>, starts: &[Vec<Pose>], assembly: &mut Assembly<'_, '_>) 
         b,
         anchors: None,
         references: [Pose::identity(); 2],
-        enabled: true,
         position_m: point.translation.vector.into(),
         second_position_m: None,
         axis: Vec3::z().into(),
@@ -99,6 +98,7 @@ fn join(item: &Item<'_>, starts: &[Vec<Pose>], assembly: &mut Assembly<'_, '_>) 
         holds_start: false,
         breaking_force_n: f64::INFINITY,
         breaking_torque_n_m: f64::INFINITY,
+        enabled: true,
     });
 }
 

@@ -89,6 +89,7 @@ pub(crate) fn mesh(path: &Path, repair: bool) -> Result<SceneFile, SceneError> {
         shape: ShapeSpec::Mesh { mesh: 0 },
         mass: Some(MassSpec::Density(DENSITY)),
         visible: true,
+        sound: None,
         appearance: AppearanceSpec { color: COLOR, ..AppearanceSpec::default() },
         ..scene.bodies[0].clone()
     };

@@ -55,6 +55,7 @@ const SHIPPED: &[Shipped] = shipped_scenes![
     "jelly",
     "sparks",
     "flock",
+    "ball_machine",
 ];
 
 /// Returns the scenes that come with tumble.

@@ -10,7 +10,7 @@ use crate::parse::appearance::AppearanceSpec;
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names};
 use crate::parse::link::read_inertia;
-use crate::parse::material::{MaterialSpec, read_contact};
+use crate::parse::material::{MaterialSpec, read_contact, read_sound};
 use crate::parse::mount::Mounts;
 use crate::parse::rotation;
 use crate::parse::shape::ShapeSpec;
@@ -82,6 +82,8 @@ pub struct BodySpec {
     pub enabled: bool,
     /// Is drawn. Default true.
     pub visible: bool,
+    /// How it sounds: the name of a material of `tumble::sound`, its own, else that of its material. Default by density.
+    pub sound: Option<String>,
     /// Appearance of the body: that of its material with the body's own keys on top.
     pub appearance: AppearanceSpec,
     /// The camera and the light attached to the body, in axes of the shape.
@@ -133,6 +135,7 @@ impl BodySpec {
             sensor: f.flag_or("sensor", false),
             enabled: f.flag_or("enabled", true),
             visible: f.flag_or("visible", true),
+            sound: read_sound(f),
             appearance: AppearanceSpec::read(f, &appearance),
             mounts: Mounts::read(f),
         };

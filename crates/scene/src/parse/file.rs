@@ -11,6 +11,7 @@ use crate::mjcf::ActuatorSpec;
 use crate::parse::articulated::ArticulatedSpec;
 use crate::parse::behavior::BehaviorSpecs;
 use crate::parse::body::{BodySpec, Library};
+use crate::parse::event::{EventSpec, ObjectKind, ObjectNames, TemplateSpec};
 use crate::parse::fields::Fields;
 use crate::parse::grid::{self, MAX_BODIES};
 use crate::parse::log::Log;
@@ -40,6 +41,10 @@ const MAX_LOOP_JOINTS: usize = 100_000;
 const MAX_SENSORS: usize = 100_000;
 /// Largest number of tables `[[pair]]` of a scene.
 const MAX_PAIRS: usize = 1_000;
+/// Largest number of tables `[[template]]` of a scene.
+const MAX_TEMPLATES: usize = 1_000;
+/// Largest number of tables `[[event]]` of a scene.
+const MAX_EVENTS: usize = 10_000;
 /// Largest number of lights of a scene.
 const MAX_LIGHTS: usize = 64;
 
@@ -62,6 +67,10 @@ pub struct SceneFile {
     pub articulated: Vec<ArticulatedSpec>,
     /// `[[loop_joint]]` in the order of the file.
     pub loop_joints: Vec<LoopJointSpec>,
+    /// `[[template]]` in the order of the file.
+    pub templates: Vec<TemplateSpec>,
+    /// `[[event]]` in the order of the file.
+    pub events: Vec<EventSpec>,
     /// `[[sensor]]` in the order of the file.
     pub sensors: Vec<SensorSpec>,
     /// Actuators of a model of MuJoCo; scene files have none.
@@ -135,6 +144,7 @@ impl SceneFile {
         let behaviors = BehaviorSpecs::read(&mut f, &library, &objects, |table, name| {
             note_unique(table.log, "object", &mut names, name, &table.span);
         });
+        let templates = read_templates(&mut f, &library, bodies.len(), &mut names);
         let camera = read_table(&mut f, "camera", CameraSpec::read);
         let cave = read_table(&mut f, "cave", CavePlace::read);
         let mut lights: Vec<LightSpec> =
@@ -142,6 +152,8 @@ impl SceneFile {
         if lights.is_empty() {
             lights.push(LightSpec::sun());
         }
+        let named = object_names(&bodies, &articulated, &loop_joints, &templates);
+        let events = read_events(&mut f, named, lights.len(), &mut names);
         let sky = read_table(&mut f, "sky", SkySpec::read).unwrap_or_default();
         let ground = read_table(&mut f, "ground", GroundSpec::read);
         f.finish();
@@ -154,6 +166,8 @@ impl SceneFile {
             bodies,
             articulated,
             loop_joints,
+            templates,
+            events,
             sensors,
             actuators: Vec::new(),
             pairs,
@@ -298,6 +312,51 @@ fn read_loop_joints(f: &mut Fields<'_>, objects: &Objects<'_>, names: &mut Taken
         Some(spec)
     };
     f.tables("loop_joint", MAX_LOOP_JOINTS).into_iter().filter_map(one).collect()
+}
+
+/// Reads all templates; `bodies` is the number of bodies of the scene without them.
+fn read_templates(f: &mut Fields<'_>, library: &Library<'_>, bodies: usize, names: &mut Taken) -> Vec<TemplateSpec> {
+    let (mut templates, mut room) = (Vec::new(), MAX_BODIES.saturating_sub(bodies));
+    for mut table in f.tables("template", MAX_TEMPLATES) {
+        let (log, place) = (table.log, name_span(&mut table));
+        let Some(template) = TemplateSpec::read(table, library, &mut room) else { continue };
+        let unique = note_unique(log, "template", names, &template.body.name, &place);
+        if unique && !template.body.name.is_empty() {
+            template.names().take_while(|name| note_unique(log, "body", names, name, &place)).for_each(drop);
+        }
+        templates.push(template);
+    }
+    templates
+}
+
+/// Returns what events can name.
+fn object_names(
+    bodies: &[BodySpec],
+    articulated: &[ArticulatedSpec],
+    loop_joints: &[LoopJointSpec],
+    templates: &[TemplateSpec],
+) -> ObjectNames {
+    let mut names = ObjectNames::default();
+    bodies.iter().for_each(|body| names.add(&body.name, ObjectKind::Body { mode: body.mode, sensor: body.sensor }));
+    for spec in articulated {
+        names.add(&spec.name, ObjectKind::Articulated);
+        spec.links.iter().for_each(|link| names.add(&format!("{}/{}", spec.name, link.name), ObjectKind::Link));
+    }
+    loop_joints.iter().for_each(|joint| names.add(&joint.name, ObjectKind::Joint));
+    templates.iter().for_each(|template| names.add_template(&template.body.name, template.count));
+    names
+}
+
+fn read_events(f: &mut Fields<'_>, mut named: ObjectNames, lights: usize, names: &mut Taken) -> Vec<EventSpec> {
+    let mut events = Vec::new();
+    for mut table in f.tables("event", MAX_EVENTS) {
+        let (log, place) = (table.log, name_span(&mut table));
+        let Some(event) = EventSpec::read(table, &named, lights) else { continue };
+        note_unique(log, "object", names, &event.name, &place);
+        named.add(&event.name, ObjectKind::Event);
+        events.push(event);
+    }
+    events
 }
 
 fn read_sensors(

@@ -35,8 +35,6 @@ pub struct LoopJointSpec {
     pub anchors: Option<[Pose; 2]>,
     /// Frames in the world at which gears and racks have position 0, with `anchors`.
     pub references: [Pose; 2],
-    /// Takes part in the simulation; a broken joint does not. Default true.
-    pub enabled: bool,
     /// Position of the joint, world axes at time 0, m; for kinds with a length its end on `a`.
     pub position_m: [f64; 3],
     /// Its end on `b` for kinds with a length, world axes at time 0, m.
@@ -66,6 +64,8 @@ pub struct LoopJointSpec {
     pub breaking_force_n: f64,
     /// Torque above which it breaks, N·m. Default infinite.
     pub breaking_torque_n_m: f64,
+    /// Takes part in the simulation; a broken joint does not. Default true.
+    pub enabled: bool,
 }
 
 /// Looks up the parts that a loop joint or a pair names.
@@ -154,7 +154,6 @@ impl LoopJointSpec {
             b: sides[1],
             anchors,
             references,
-            enabled,
             position_m,
             second_position_m,
             axis,
@@ -169,6 +168,7 @@ impl LoopJointSpec {
             dof: settings.dof,
             breaking_force_n,
             breaking_torque_n_m,
+            enabled,
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::parse::appearance::AppearanceSpec;
 use crate::parse::bound::Bound;
-use crate::parse::fields::Fields;
+use crate::parse::fields::{Fields, Names};
 use tumble_core::Material;
 use tumble_core::collide::Vec3;
 
@@ -62,6 +62,8 @@ pub struct MaterialSpec {
     pub name: String,
     /// Contact constants; combined with those of the other body.
     pub contact: Material,
+    /// How bodies of this material sound.
+    pub sound: Option<String>,
     /// Appearance of bodies of this material.
     pub appearance: AppearanceSpec,
 }
@@ -71,9 +73,25 @@ impl MaterialSpec {
         let material = MaterialSpec {
             name: name.to_owned(),
             contact: read_contact(&mut f, &Material::default()),
+            sound: read_sound(&mut f),
             appearance: AppearanceSpec::read(&mut f, &AppearanceSpec::default()),
         };
         f.finish();
         material
     }
+}
+
+/// Names of materials that sound.
+const SOUNDS: Names<&str> = &[
+    ("wood", "wood"),
+    ("rubber", "rubber"),
+    ("plastic", "plastic"),
+    ("glass", "glass"),
+    ("stone", "stone"),
+    ("steel", "steel"),
+];
+
+/// Reads `sound`.
+pub(crate) fn read_sound(f: &mut Fields<'_>) -> Option<String> {
+    f.optional_choice("sound", SOUNDS).map(str::to_owned)
 }

@@ -5,6 +5,8 @@ pub(crate) mod articulated;
 pub(crate) mod behavior;
 pub(crate) mod body;
 pub(crate) mod bound;
+pub(crate) mod event;
+pub(crate) mod event_actions;
 pub(crate) mod fields;
 pub(crate) mod file;
 pub(crate) mod grid;

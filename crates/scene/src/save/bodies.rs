@@ -48,6 +48,8 @@ impl Writer<'_> {
         t.extend(surface::groups(body.group, body.mask));
         t.put_unless(false, "sensor", body.sensor);
         t.put_unless(true, "enabled", status.enabled);
+        let known = self.like.bodies.iter().find(|spec| spec.name == name);
+        known.and_then(|spec| spec.sound.as_ref()).iter().for_each(|sound| t.put("sound", *sound));
         t.extend(self.look(name, body, &look));
         self.out += &t.under("[[body]]");
     }

@@ -189,7 +189,7 @@ impl Writer<'_> {
         let SceneFile {
             file: _, description: _, world: _, materials: _, meshes: _, bodies: _, articulated: _, loop_joints: _,
             actuators, pairs: _, camera: _, cave: _, lights: _, sky: _, ground: _, notes: _, saved: _,
-            sensors: _, behaviors: _, // their objects are refused below
+            sensors: _, behaviors: _, templates: _, events: _, // their objects are refused below
         } = self.like;
         if !actuators.is_empty() {
             self.notes.push("the actuators of its model of MuJoCo are not written: scene files have none".into());
@@ -250,7 +250,9 @@ fn materials(world: &World, like: &SceneFile) -> Result<Vec<(u32, MaterialSpec)>
         let spec = match like.materials.get(id as usize - 1) {
             Some(known) if sorted => known.clone(),
             Some(known) => MaterialSpec { name, ..known.clone() },
-            None => MaterialSpec { name, contact: Material::default(), appearance: AppearanceSpec::default() },
+            None => {
+                MaterialSpec { name, contact: Material::default(), appearance: AppearanceSpec::default(), sound: None }
+            }
         };
         (id, spec)
     };

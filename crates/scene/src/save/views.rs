@@ -52,6 +52,7 @@ impl Writer<'_> {
         for (_, spec) in &self.materials {
             let mut t = contact(&spec.contact, &Default::default());
             t.extend(appearance_spec(&spec.appearance, &AppearanceSpec::default()));
+            spec.sound.iter().for_each(|sound| t.put("sound", sound));
             self.out += &t.under(&format!("[materials.{}]", serde_json::Value::from(spec.name.as_str())));
         }
     }

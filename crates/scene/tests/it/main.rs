@@ -7,6 +7,7 @@ mod behaviors;
 mod cave_devices;
 mod caves;
 mod contacts;
+mod events;
 mod expansion;
 mod finding;
 mod mjcf;

@@ -239,6 +239,9 @@ pub struct RunOptions {
     /// such as .mp4.
     #[arg(long, help_heading = "Pictures", value_name = "FILE")]
     pub video: Option<PathBuf>,
+    /// Write the sound of the run, heard from the scene's camera, as a WAV file.
+    #[arg(long, help_heading = "Pictures", value_name = "FILE")]
+    pub audio: Option<PathBuf>,
     /// Frames of the video, and pictures in the folder, per simulated second.
     #[arg(long, help_heading = "Pictures", value_name = "N", default_value = "30", value_parser = rate)]
     pub fps: f64,

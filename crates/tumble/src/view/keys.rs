@@ -102,6 +102,15 @@ pub fn command(key: &Key) -> Option<Command> {
     })
 }
 
+/// Returns the name of a key for scripted events: its letter, in lower case, or its digit, or `enter`.
+pub fn name(key: &Key) -> Option<String> {
+    match key {
+        Key::Named(NamedKey::Enter) => Some("enter".into()),
+        Key::Character(text) => Some(text.to_lowercase()),
+        _ => None,
+    }
+}
+
 /// Returns how a key moves the user. Keys are identified by their place on the keyboard, whatever
 /// is printed on them.
 pub fn movement(code: KeyCode) -> Option<Movement> {

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// The shipped scenes.
-pub const SCENES: [&str; 22] = [
+pub const SCENES: [&str; 23] = [
     "arch",
+    "ball_machine",
     "billiards",
     "bowling",
     "card_house",

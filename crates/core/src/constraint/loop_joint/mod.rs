@@ -294,6 +294,11 @@ impl LoopJoint {
         [self.a, self.b]
     }
 
+    /// Joins another frame of the second side, which is finite.
+    pub(crate) fn set_second_side(&mut self, b: Anchor) {
+        self.b = b;
+    }
+
     /// Returns the settings of its position.
     pub fn dof(&self) -> &DofSettings {
         &self.dof

@@ -245,7 +245,7 @@ impl WindowApp for Window<'_> {
     }
 }
 
-/// Returns the USB HID usage (page 7) of a key that moves a user.
+/// Returns the USB HID usage (page 7) of a key that moves a user or makes an event fire.
 fn usage(code: KeyCode) -> Option<u16> {
     Some(match code {
         KeyCode::KeyA => 0x04,
@@ -260,6 +260,39 @@ fn usage(code: KeyCode) -> Option<u16> {
         KeyCode::ArrowLeft => 0x50,
         KeyCode::ArrowDown => 0x51,
         KeyCode::ArrowUp => 0x52,
-        _ => return None,
+        KeyCode::Enter => 0x28,
+        other => FREE_KEYS.iter().find(|(code, _)| *code == other)?.1,
     })
 }
+
+/// Keys that do not move a user, with their usages.
+const FREE_KEYS: [(KeyCode, u16); 28] = [
+    (KeyCode::KeyC, 0x06),
+    (KeyCode::KeyF, 0x09),
+    (KeyCode::KeyG, 0x0A),
+    (KeyCode::KeyH, 0x0B),
+    (KeyCode::KeyI, 0x0C),
+    (KeyCode::KeyJ, 0x0D),
+    (KeyCode::KeyK, 0x0E),
+    (KeyCode::KeyL, 0x0F),
+    (KeyCode::KeyM, 0x10),
+    (KeyCode::KeyN, 0x11),
+    (KeyCode::KeyO, 0x12),
+    (KeyCode::KeyP, 0x13),
+    (KeyCode::KeyR, 0x15),
+    (KeyCode::KeyT, 0x17),
+    (KeyCode::KeyU, 0x18),
+    (KeyCode::KeyX, 0x1B),
+    (KeyCode::KeyY, 0x1C),
+    (KeyCode::KeyZ, 0x1D),
+    (KeyCode::Digit1, 0x1E),
+    (KeyCode::Digit2, 0x1F),
+    (KeyCode::Digit3, 0x20),
+    (KeyCode::Digit4, 0x21),
+    (KeyCode::Digit5, 0x22),
+    (KeyCode::Digit6, 0x23),
+    (KeyCode::Digit7, 0x24),
+    (KeyCode::Digit8, 0x25),
+    (KeyCode::Digit9, 0x26),
+    (KeyCode::Digit0, 0x27),
+];

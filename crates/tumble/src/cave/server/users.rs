@@ -60,6 +60,8 @@ pub struct Users {
     /// The newest input of each device, and its arrival.
     inputs: BTreeMap<Device, (Input, f64)>,
     held: BTreeMap<Device, Grabbed>,
+    /// Keys held in the last step.
+    pressed: Vec<u16>,
     colliders: UserColliders,
     /// Time by which users walk, s per simulated s. Users live in wall time: where the simulation is
     /// slower, they walk more in each step.
@@ -87,6 +89,7 @@ impl Users {
             screens,
             inputs: BTreeMap::new(),
             held: BTreeMap::new(),
+            pressed: Vec::new(),
             colliders,
             pace: 1.0,
         })
@@ -125,6 +128,12 @@ impl Users {
         let failed = |e: WorldError| Failure::run("what a user does", e);
         self.inputs.retain(|_, (_, since)| world.time() - *since < INPUT_TIMEOUT_S);
         let keys: Vec<u16> = self.inputs.values().flat_map(|(input, _)| input.keys.iter().copied()).collect();
+        for key in keys.iter().filter(|key| !self.pressed.contains(key)) {
+            if let Some(name) = name_of(*key) {
+                world.press(&name);
+            }
+        }
+        self.pressed.clone_from(&keys);
         self.walk(&keys, dt * self.pace);
         self.held.retain(|device, _| self.inputs.get(device).is_some_and(|(input, _)| input.buttons & 1 == 1));
         for (&device, (input, _)) in &self.inputs {
@@ -218,4 +227,16 @@ fn grab(world: &World, colliders: &UserColliders, origin: &Vec3, direction: &Vec
     let target = origin + direction * distance;
     let point = part_state.pose.rotation.inverse() * (target - part_state.position());
     Some(Grabbed { pull: PickForce { id, part, point, target, frequency: PULL_RAD_PER_S }, distance })
+}
+
+/// Returns the name of a key for scripted events from its USB HID usage: a letter, a digit or `enter`.
+fn name_of(usage: u16) -> Option<String> {
+    let shifted = |first: char, by: u16| char::from_u32(u32::from(first) + u32::from(by)).map(String::from);
+    match usage {
+        0x04..=0x1D => shifted('a', usage - 0x04),
+        0x1E..=0x26 => shifted('1', usage - 0x1E),
+        0x27 => Some("0".into()),
+        0x28 => Some("enter".into()),
+        _ => None,
+    }
 }

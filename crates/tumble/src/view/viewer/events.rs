@@ -22,6 +22,12 @@ impl Viewer {
                     if down { self.user.press(movement) } else { self.user.release(movement) }
                 }
                 if down
+                    && !event.repeat
+                    && let Some(name) = keys::name(&event.logical_key)
+                {
+                    self.simulation_thread.lock().world.press(&name);
+                }
+                if down
                     && let Some(command) = keys::command(&event.logical_key)
                     && (!event.repeat || command.repeats())
                 {

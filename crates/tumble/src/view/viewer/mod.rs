@@ -21,7 +21,7 @@ use crate::failure::Failure;
 use panel::Panel;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use tumble::dynamics::{World, WorldError};
+use tumble::dynamics::{CameraChange, World, WorldError};
 use tumble::render::winit::event::WindowEvent;
 use tumble::render::{DebugDraw, DrawList, Drawing, Image, Next, Quality, Screen, Shown, WindowApp, caption};
 use tumble::scene::{FileKind, SceneFile, visual_notes};
@@ -58,6 +58,8 @@ pub struct Viewer {
     screenshot_dir: PathBuf,
     picture_wanted: bool,
     last_picture: Option<Image>,
+    /// The camera that scripted events chose last.
+    scripted_camera: Option<CameraChange>,
     /// Whether the shown picture is out of date.
     stale: bool,
     /// [`Simulation::changes`] of the present list.
@@ -144,6 +146,7 @@ impl Viewer {
             screenshot_dir: options.screenshot_dir.clone(),
             picture_wanted: options.screenshot.is_some(),
             last_picture: None,
+            scripted_camera: None,
             stale: true,
             drawn: 0,
             ended: false,
@@ -173,7 +176,11 @@ impl Viewer {
         let world = &simulation.world;
         self.list = self.drawing.list(world, &self.overlays.draw).map_err(|e| Failure::run("the picture", e))?;
         self.drawn = simulation.changes;
-        if let Some(camera) = self.presets.followed(world, &self.list) {
+        let scripted = world.looks().camera;
+        if scripted != self.scripted_camera {
+            self.user.look_from(&self.list.camera); // an event chose another one; the user is free to leave it
+            self.scripted_camera = scripted;
+        } else if let Some(camera) = self.presets.followed(world, &self.list) {
             self.user.look_from(&camera);
         }
         if let Some(quality) = &self.quality {

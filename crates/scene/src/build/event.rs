@@ -1,0 +1,59 @@
+//! Adds a scripted event to a world: names to objects.
+
+use tumble_core::{Action, ArticulatedBody, ObjectId, ScriptedEvent, Subject, World, WorldError};
+
+use crate::parse::event::EventSpec;
+
+impl EventSpec {
+    /// Adds the event to a world that has the objects that it names.
+    ///
+    /// # Errors
+    /// [`WorldError`]: the name is taken, or an object is absent or of another kind.
+    pub fn add(&self, world: &mut World) -> Result<ObjectId, WorldError> {
+        let find = |name: &String| place(world, name).map_or_else(ObjectId::default, |(id, _)| id);
+        let event = ScriptedEvent::new(&self.name, self.when.map(&mut |name| find(name)));
+        let event = self.actions.iter().fold(event.with_delay(self.delay_s).with_times(self.times), |event, spec| {
+            let mut action = spec.map(&mut |name| find(name));
+            set_part(world, spec, &mut action);
+            event.with_action(action)
+        });
+        world.add(event)
+    }
+}
+
+/// Sets the part of a link, or its degree of freedom.
+fn set_part(world: &World, spec: &Action<String>, action: &mut Action) {
+    let part = |name: &str| place(world, name).map_or(0, |(_, part)| part);
+    match (spec, action) {
+        (Action::Push { body: Subject::Part(name, _), .. }, Action::Push { body: Subject::Part(_, to), .. })
+        | (Action::Force { body: Subject::Part(name, _), .. }, Action::Force { body: Subject::Part(_, to), .. })
+        | (
+            Action::Velocity { body: Subject::Part(name, _), .. },
+            Action::Velocity { body: Subject::Part(_, to), .. },
+        )
+        | (Action::Remove(Subject::Part(name, _)), Action::Remove(Subject::Part(_, to)))
+        | (Action::Recolor { body: Subject::Part(name, _), .. }, Action::Recolor { body: Subject::Part(_, to), .. }) => {
+            *to = part(name);
+        }
+        (Action::Drive { body: name, .. }, Action::Drive { body, dof, .. }) => {
+            let link = name.rsplit_once('/').map(|(_, link)| link);
+            let found = world.get::<ArticulatedBody>(*body).and_then(|body| body.dof_of(link?));
+            *dof = found.unwrap_or(0);
+        }
+        _ => {}
+    }
+}
+
+/// Returns the object of a name, or the object and part of `OBJECT/LINK`.
+fn place(world: &World, name: &str) -> Option<(ObjectId, usize)> {
+    if let Some(id) = world.find(name) {
+        return Some((id, 0));
+    }
+    let cuts = name.match_indices('/').map(|(at, _)| at);
+    cuts.into_iter().find_map(|at| {
+        let id = world.find(&name[..at])?;
+        let model = world.get::<ArticulatedBody>(id)?.model();
+        let carrier = model.frame(&name[at + 1..])?.link;
+        Some((id, carrier.unwrap_or(model.links().len())))
+    })
+}
