@@ -50,8 +50,8 @@ impl TriMesh {
         if !(size.min() > 0.0 && (low.norm() + high.norm()).is_finite()) {
             return fault(format!("the box from {low:?} to {high:?} is empty"));
         }
-        if cells < 2 || cells > MAX_POINTS {
-            return fault(format!("{cells} cells along the longest side; it must be 2 or more"));
+        if !(2..=MAX_POINTS).contains(&cells) {
+            return fault(format!("{cells} cells along the longest side; it must be 2 to {MAX_POINTS}"));
         }
         let step = size.max() / cells as f64;
         let counts: [usize; 3] = std::array::from_fn(|k| ((size[k] / step) - 1e-9).ceil().max(1.0) as usize + 1);

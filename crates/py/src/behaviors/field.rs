@@ -1,5 +1,7 @@
 //! Force fields.
 
+#![allow(clippy::approx_constant, reason = "defaults that Python shows as numbers")]
+
 use crate::arrays::convert::{vec3, vec3_or, whole_number};
 use crate::behaviors;
 use crate::errors::{Error, Result};

@@ -1,5 +1,7 @@
 //! Systems of particles and their sources.
 
+#![allow(clippy::approx_constant, reason = "defaults that Python shows as numbers")]
+
 use crate::arrays::convert::{pose, vec3, vec3_or, whole_number};
 use crate::behaviors::{appearance, material, placed, rows};
 use crate::errors::{Error, Result};

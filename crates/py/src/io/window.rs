@@ -117,8 +117,11 @@ pub fn _show_window(py: Python<'_>) -> Result<()> {
     })
 }
 
+/// Kind, frame, time and payload of a message.
+type Message = (u8, u64, f64, Vec<u8>);
+
 /// Reads a message; `None` at the end.
-fn read(input: &mut impl Read) -> Result<Option<(u8, u64, f64, Vec<u8>)>> {
+fn read(input: &mut impl Read) -> Result<Option<Message>> {
     let failed = |source| Error::File { file: "the messages of a window".into(), source };
     let mut head = [0; HEADER_BYTES];
     match input.read_exact(&mut head) {

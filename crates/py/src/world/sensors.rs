@@ -162,9 +162,12 @@ pub fn columns(shared: &Arc<Shared>, name: &str) -> Result<std::ops::Range<usize
     })
 }
 
+/// Names of sensors with the lengths of their readings.
+type Lengths = Vec<(String, usize)>;
+
 /// Returns the names of all sensors with the lengths of their readings and the numbers one after the other, in the order of
 /// their addition. Those of removed bodies are left out.
-pub fn all(shared: &Arc<Shared>) -> Result<(Vec<(String, usize)>, Vec<f64>)> {
+pub fn all(shared: &Arc<Shared>) -> Result<(Lengths, Vec<f64>)> {
     shared.read(|inner| {
         let (mut names, mut numbers) = (Vec::new(), Vec::new());
         for id in inner.world.sensors() {

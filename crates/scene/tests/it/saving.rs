@@ -88,6 +88,22 @@ fn check(name: &str, scene: &SceneFile) {
     assert!(gap < 1e-9, "{name}: the text places a part {gap:e} m or rad off");
 }
 
+/// Scenes with objects of kinds that are not written.
+const REFUSED: [&str; 5] = ["cloth", "jelly", "sparks", "flock", "ball_machine"];
+
+/// Nothing is lost in silence: what cannot be written is named, and no file is left.
+#[test]
+fn scenes_with_other_objects_are_refused() {
+    for name in REFUSED {
+        let scene = shipped().iter().find(|s| s.name == name).unwrap().read().unwrap();
+        let (world, _) = scene.build().unwrap();
+        let folder = Folder::new(name);
+        let error = SceneWriter::new(&world).like(&scene).save(folder.scene()).unwrap_err();
+        assert!(error.to_string().contains("an object of a type of its own"), "{name}: {error}");
+        assert!(!folder.scene().exists(), "{name}");
+    }
+}
+
 macro_rules! shipped_scenes {
     ($($name:ident),*) => {
         $(#[test]
@@ -99,7 +115,7 @@ macro_rules! shipped_scenes {
 
         #[test]
         fn every_shipped_scene_is_saved() {
-            let names: Vec<&str> = shipped().iter().map(|s| s.name).collect();
+            let names: Vec<&str> = shipped().iter().map(|s| s.name).filter(|name| !REFUSED.contains(name)).collect();
             let mut tested = vec![$(stringify!($name)),*];
             tested.sort_unstable_by_key(|name| names.iter().position(|n| n == name));
             assert_eq!(tested, names);
@@ -157,6 +173,10 @@ fn made_in_code() -> World {
         mesh.clone(),
         Shape::compound(parts).unwrap(),
         mesh.clone(),
+        Shape::ellipsoid(Vec3::new(0.3, 0.4, 0.6)).unwrap(),
+        Shape::cone(0.2, 0.5).unwrap(),
+        Shape::rounded_cuboid(Vec3::new(0.3, 0.4, 0.5), 0.05).unwrap(),
+        Shape::rounded_cylinder(0.2, 0.5, 0.04).unwrap(),
     ];
     world
         .add_static(RigidBody::fixed(Shape::half_space()).with_name("floor").with_pose(tilted(0.0).inverse()))

@@ -86,7 +86,11 @@ fn reach(scene: &SceneFile, body: &BodySpec) -> f64 {
         ShapeSpec::Capsule { radius_m, length_m } => radius_m + 0.5 * length_m,
         ShapeSpec::Cylinder { radius_m, length_m } => radius_m.hypot(0.5 * length_m),
         ShapeSpec::HalfSpace => f64::INFINITY,
-        ShapeSpec::Compound { .. } => panic!("{} is a compound", body.name),
+        ShapeSpec::Compound { .. }
+        | ShapeSpec::RoundedBox { .. }
+        | ShapeSpec::RoundedCylinder { .. }
+        | ShapeSpec::Ellipsoid { .. }
+        | ShapeSpec::Cone { .. } => panic!("{} has another shape than these scenes", body.name),
         ShapeSpec::Mesh { mesh } => match &scene.meshes[*mesh].source {
             MeshSource::Lathe { profile_m, .. } => profile_m.iter().map(|[r, z]| r.hypot(*z)).fold(0.0, f64::max),
             MeshSource::Torus { radius_m, tube_radius_m, .. } => radius_m + tube_radius_m,

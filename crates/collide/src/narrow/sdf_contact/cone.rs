@@ -119,7 +119,7 @@ impl Query<'_> {
                 let hit =
                     Hit { distance: gap, nearest: gap, normal: -n, core: 0.0, feature: Feature::Point, facing: true };
                 self.record(&hit, 0.0);
-                self.push(&a, 0.0, &hit, NormalFrom::Edges, 1 << 58 | 1 + part as u64, found);
+                self.push(&a, 0.0, &hit, NormalFrom::Edges, (1 << 58) | (1 + part as u64), found);
             }
         }
     }
@@ -140,7 +140,7 @@ impl Query<'_> {
         let step = TAU / SAMPLES as f64;
         let samples: [f64; SAMPLES] = std::array::from_fn(|k| gap(step * k as f64));
         let best = (1..SAMPLES).fold(0, |best, k| if samples[k] > samples[best] { k } else { best }) as f64;
-        let angle = greatest(&gap, step * (best - 1.0), step * (best + 1.0));
+        let angle = greatest(gap, step * (best - 1.0), step * (best + 1.0));
         let (w, height) = (own(angle), gap(angle));
         let n = normal(&w);
         let on_b = self.other.support_point(&-n);
