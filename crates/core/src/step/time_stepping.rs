@@ -312,7 +312,7 @@ impl TimeStepping {
         let Buffers { dp, total, keep, moved, rest: mean, .. } = &mut self.buffers;
         total.clear();
         total.extend(self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b));
-        let step = lift::Step { u: [u0, &end], du_force, mean, moved, lambda: total, keep };
+        let step = lift::Step { u: [u0, &end], du_force, mean, moved, lambda: total, impact: &self.impact, keep };
         lift::pay_for_lift(core.coordinates(Some(&mut *middle)), &mut self.work, &step);
         if core.has_breakable_joints() {
             core.break_joints(&row_starts(&self.work, total, 1.0 / h));

@@ -42,7 +42,7 @@ fn the_container_is_valid_for_another_reader() {
     let bytes = std::fs::read(&path).unwrap();
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
     let stats = summary.stats.unwrap();
-    assert_eq!((stats.schema_count, stats.channel_count, stats.message_count), (3, 3, 1 + 2 * 20));
+    assert_eq!((stats.schema_count, stats.channel_count, stats.message_count), (4, 5, 1 + 2 * 20));
     assert_eq!(stats.chunk_count, 1 + 4, "the scene's, and 20 frames by 6");
     assert_eq!((stats.message_start_time, stats.message_end_time), (0, 79_166_667), "19/240 s in ns, to the nearest");
     let topics: Vec<String> =

@@ -204,7 +204,7 @@ fn missing_keys() {
     assert_errors(
         &shape("{ radius_m = 1 }"),
         &[
-            "s.toml:2:9: the shape of body \"b\" has no `type`; expected `sphere`, `box`, `capsule`, `cylinder`, `half_space`, `plane`, `mesh` or `compound`",
+            "s.toml:2:9: the shape of body \"b\" has no `type`; expected `sphere`, `box`, `capsule`, `cylinder`, `ellipsoid`, `cone`, `half_space`, `plane`, `mesh` or `compound`",
         ],
     );
     assert_errors(

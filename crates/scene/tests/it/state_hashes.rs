@@ -50,24 +50,24 @@ table! {
     [1.0, 10.0];
     billiards_time_stepping: "billiards", TimeStepping, "36b9d75c4ae9875c", "0297c6beb51197ed";
     billiards_backtracking: "billiards", Backtracking, "b5a27eda6855859e", "bf300238bd656f9e";
-    bowling_time_stepping: "bowling", TimeStepping, "94968c1b4058a725", "d4b9173ab658f913";
-    bowling_backtracking: "bowling", Backtracking, "e677eac272ba7de7", "f80aac7b0618b2a5";
+    bowling_time_stepping: "bowling", TimeStepping, "94968c1b4058a725", "70d187bf489b9fef";
+    bowling_backtracking: "bowling", Backtracking, "e677eac272ba7de7", "e18c2e4b1775af2c";
     chain_time_stepping: "chain", TimeStepping, "22fbcd4bcbb18743", "7e68bdb4b444ccf6";
     chain_backtracking: "chain", Backtracking, "63d0cbaca36ef0a9", "3198250057940e22";
-    falling_time_stepping: "falling", TimeStepping, "c360ce783144cf4b", "2536cc6ee6f266bc";
-    flock_time_stepping: "flock", TimeStepping, "f6d6cd2c936b534a", "91cf95719438324b";
-    flock_backtracking: "flock", Backtracking, "cb91b06026531961", "15eb1ab38440d07f";
-    falling_backtracking: "falling", Backtracking, "cbb914d607445f21", "253502563aa8576c";
+    falling_time_stepping: "falling", TimeStepping, "b7e8d4a13db443ed", "b1ca29edd7c2e534";
+    flock_time_stepping: "flock", TimeStepping, "62dc48ae297f84ac", "1f735e6ea46bfed5";
+    flock_backtracking: "flock", Backtracking, "5e122f1064026626", "f28e4fa647471731";
+    falling_backtracking: "falling", Backtracking, "f1462869e100d4f1", "04dc94aa1ba65435";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "dba991e4803cfe34", "95407557393acae5";
     pendulum_time_stepping: "pendulum", TimeStepping, "a6f0f0b542061dc2", "63acd1d2fe930652";
     pendulum_backtracking: "pendulum", Backtracking, "69fe4156518a0013", "692b5de118331942";
     piston_time_stepping: "piston", TimeStepping, "03971f4c855a8149", "498658197dce906c";
     piston_backtracking: "piston", Backtracking, "49b38596ba941018", "3623d35cde9a52a8";
-    robot_time_stepping: "robot", TimeStepping, "68db682e31ad9267", "6ab4de6c331237ef";
-    robot_backtracking: "robot", Backtracking, "34a6c003f76116a6", "1b8364d88cd17538";
-    skeleton_time_stepping: "skeleton", TimeStepping, "e4b2d7099e2ce12c", "c987b4835830af30";
-    skeleton_backtracking: "skeleton", Backtracking, "fd6d29b9de01f60c", "2dda572634ab3e36";
+    robot_time_stepping: "robot", TimeStepping, "68db682e31ad9267", "9a0673bfe03781ee";
+    robot_backtracking: "robot", Backtracking, "34a6c003f76116a6", "608ca54c62cd056b";
+    skeleton_time_stepping: "skeleton", TimeStepping, "e4b2d7099e2ce12c", "c33ec71934ce9b14";
+    skeleton_backtracking: "skeleton", Backtracking, "fd6d29b9de01f60c", "a128ff5c335e2548";
     stack_time_stepping: "stack", TimeStepping, "c9eeea26137d2a5f", "99d9eaf45acdf7b8";
     stack_backtracking: "stack", Backtracking, "8bf0d645b39a693b", "3d204eae8525be65";
 }
@@ -79,25 +79,25 @@ table! {
     sparks_time_stepping: "sparks", TimeStepping, "515a77d2df6b5217", "9badcde17809dddb";
     sparks_backtracking: "sparks", Backtracking, "805c8cba100469d4", "6052e84af86ee0f9";
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
-    marble_run_time_stepping: "marble_run", TimeStepping, "54c3e3322b6781af", "27e58360ffb0f6a7";
+    marble_run_time_stepping: "marble_run", TimeStepping, "54c3e3322b6781af", "85e7f83fec6b1f6f";
     marble_run_backtracking: "marble_run", Backtracking, "67834b3a7fb5547d", "59907c8a56f4eda7";
     newtons_cradle_time_stepping: "newtons_cradle", TimeStepping, "241aa3d8432a474e", "c34c93b030ba61fc";
     newtons_cradle_backtracking: "newtons_cradle", Backtracking, "878a964993b52e1f", "0579d119408e16b9";
     steam_engine_time_stepping: "steam_engine", TimeStepping, "3a2ab60873834ca6", "4a72b3cc1d1779dd";
     steam_engine_backtracking: "steam_engine", Backtracking, "466f4da8adf2589f", "f65c1d0393337846";
     arch_time_stepping: "arch", TimeStepping, "e7090b6cbe5ad156", "7149f35988a11a9d";
-    walker_time_stepping: "walker", TimeStepping, "4f3cf3f418140f88", "671d7eee0c71360b";
-    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "b8885a64a8d5fa18", "f5ab66a6456e0662";
-    dominoes_time_stepping: "dominoes", TimeStepping, "3dbbb8d56ce5506d", "87e9ec807e1f2df6";
+    walker_time_stepping: "walker", TimeStepping, "4f3cf3f418140f88", "5a0751b9b50b1fd7";
+    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "b8885a64a8d5fa18", "ef3c637cbb294c26";
+    dominoes_time_stepping: "dominoes", TimeStepping, "e494f088d2363d0e", "631db3c70aca49e4";
 }
 
 table! {
     [0.1, 0.3];
-    cloth_time_stepping: "cloth", TimeStepping, "8f0123d54572e57a", "be138723987bf8f8";
-    cloth_backtracking: "cloth", Backtracking, "4d27c99388f5fd44", "e15311030cdc3060";
-    jelly_time_stepping: "jelly", TimeStepping, "672df96a105718eb", "e1b7eae6919a2c5d";
-    arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "15c2a2986571f20d";
-    dominoes_backtracking: "dominoes", Backtracking, "9c7b110aee952a4c", "4c3f82114ea67b3e";
+    cloth_time_stepping: "cloth", TimeStepping, "6b8af320d69ac658", "1c8b3c94c431c444";
+    cloth_backtracking: "cloth", Backtracking, "645053291a4cb2e0", "e8bc49562045d081";
+    jelly_time_stepping: "jelly", TimeStepping, "9a60cdddb1e6cb89", "5782a120f1e26d9b";
+    arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "43819e958609f0f5";
+    dominoes_backtracking: "dominoes", Backtracking, "9c7b110aee952a4c", "09a9c0d733328405";
     walker_backtracking: "walker", Backtracking, "ca535adb9b9b96d3", "093bfa105a94cd32";
     wrecking_ball_backtracking: "wrecking_ball", Backtracking, "6c2945a4c1ce9c8e", "3d6cb77528bdd2e7";
 }

@@ -28,6 +28,7 @@ fn seconds(scene: &str) -> f64 {
         "stack" => 0.5,
         "chain" => 1.0, // the ball meets it after 0.29 s
         "walker" | "cloth" | "jelly" => 0.5,
+        "ball_machine" => 4.0, // balls lie in the tray after 2 s
         _ => 2.0,
     }
 }

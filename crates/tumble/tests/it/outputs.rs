@@ -44,6 +44,9 @@ fn number(value: &Value, pointer: &str) -> f64 {
     value.pointer(&format!("/{pointer}")).and_then(Value::as_f64).unwrap_or_else(|| panic!("no number at {pointer}"))
 }
 
+/// Cloth and jelly of the shipped scenes: their surfaces are recorded, but they are no entities.
+const SOFT: [&str; 5] = ["banner", "sheet", "lower", "upper", "cushion"];
+
 #[test]
 fn every_shipped_scene_runs_and_leaves_a_whole_summary_and_a_recording_that_ends_where_it_ended() {
     let folder = Folder::new("outputs");
@@ -100,7 +103,8 @@ fn check_recording(name: &str, path: &str, frames: usize, saved: &[u8], summary:
     let last = all.last().unwrap();
     assert!(last.state == saved, "{name}: the recording ends in another state than --save");
     assert!((last.time_s - number(summary, "simulated_s")).abs() < 1e-12);
-    let bodies = summary["bodies"].as_array().unwrap();
+    let is_soft = |body: &&Value| SOFT.iter().any(|soft| body["name"] == *soft);
+    let bodies: Vec<_> = summary["bodies"].as_array().unwrap().iter().filter(|body| !is_soft(body)).collect();
     assert!(reader.entities().len() >= bodies.len(), "{name}");
     for body in bodies {
         let found = reader.entities().iter().zip(&last.poses).find(|(entity, _)| body["name"] == entity.name.as_str());

@@ -15,6 +15,9 @@
 //! | `v̄` | mean velocity of the step |
 //! | `w` | velocities of rows |
 //!
+//! Only groups that something strikes, or in which a contact is not kept, pay. Elsewhere the energy of a step
+//! differs from that of the motion by its order, either way: to take each surplus would damp what rolls.
+//!
 //! All velocities of a group get one factor, so those of its rows that are zero stay so. A group that
 //! kinematic bodies, moving surfaces or motors may drive gives nothing: they add energy.
 
@@ -36,8 +39,10 @@ pub(super) struct Step<'a> {
     pub mean: &'a [f64],
     /// Displacement by the correction, per second.
     pub moved: &'a [f64],
-    /// Multipliers of impacts and of the solve, and of the impacts alone.
+    /// Multipliers of impacts and of the solve.
     pub lambda: &'a [f64],
+    /// Multipliers of the impacts alone.
+    pub impact: &'a [f64],
     /// Whether each block was solved.
     pub keep: &'a [bool],
 }
@@ -69,7 +74,9 @@ pub(super) fn pay_for_lift(at: Coordinates, work: &mut Workspace, step: &Step) {
         places.dedup();
         let sum = |of: &dyn Fn(usize) -> f64| places.iter().map(|&i| of(i)).sum::<f64>();
         let lift = -sum(&|i| step.du_force[i] * step.moved[i]);
-        if lift <= 0.0 {
+        let strikes =
+            |&b: &u32| !step.keep[b as usize] || rows.blocks[b as usize].range().any(|row| step.impact[row] != 0.0);
+        if lift <= 0.0 || !blocks.iter().any(strikes) {
             continue;
         }
         let driven = |&b: &u32| {
