@@ -34,7 +34,8 @@ pub(super) fn entry(
     let half = (radius * radius - nearest.norm_squared()).sqrt();
     let start = (along - half).max(0.0);
     let place = |t: f64| nearest + v * (t - along);
-    if distance(&place(start)).0 < 0.0 {
+    // a solid may touch its bounding sphere where the ray enters it, as the tip of a cone does
+    if distance(&place(start)).0 < -REACHED * radius {
         return None;
     }
     let mut t = start;

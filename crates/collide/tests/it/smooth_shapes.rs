@@ -402,3 +402,17 @@ fn wrong_sizes_are_errors() {
     assert!(matches!(Shape::rounded_cuboid(Vec3::repeat(1.0), 0.0), Ok(Shape::Box { .. })));
     assert!(matches!(Shape::rounded_cylinder(0.2, 1.0, 0.0), Ok(Shape::Cylinder(_))));
 }
+
+/// The tip of a slender cone lies on its bounding sphere, where rays begin.
+#[test]
+fn a_ray_along_its_axis_meets_the_tip_of_a_cone() {
+    for height in [0.3, 0.37, 0.51, 0.9] {
+        let cone = Shape::cone(0.1, height).unwrap();
+        for drop in [0.1, 1.0 / 3.0, 2.0, 100.0] {
+            let top = 0.75 * height;
+            let hit = cone.cast_ray(&Pose::identity(), &Vec3::new(0.0, 0.0, top + drop), &-Vec3::z(), 1e3);
+            let distance = hit.expect("it is on its way").distance;
+            assert!((distance - drop).abs() < 1e-12 * (1.0 + drop), "{height}: {distance} for {drop}");
+        }
+    }
+}
