@@ -15,6 +15,8 @@ use crate::Vec3;
 const MAX_STEPS: usize = 100;
 /// Distance at which the surface is reached, as a fraction of the radius of the solid.
 const REACHED: f64 = 1e-14;
+/// Distance from the bounding sphere at which a ray begins, as a fraction of its radius.
+const OUTSIDE: f64 = 1e-9;
 
 /// Returns where a ray from `o` along the unit direction `v` enters a solid within `radius` of the
 /// origin. `distance` returns the signed distance of a point, the outward normal and the face.
@@ -25,7 +27,9 @@ pub(super) fn entry(
     max: f64,
     distance: impl Fn(&Vec3) -> (f64, Vec3, u32),
 ) -> Option<LocalHit> {
-    // from the bounding sphere on, so that distant rays keep their digits
+    // from a little outside of the bounding sphere on, so that distant rays keep their digits: a solid may touch
+    // the sphere where the ray enters it, as the tip of a cone does
+    let radius = radius * (1.0 + OUTSIDE);
     let along = -o.dot(v);
     let nearest = o + v * along;
     if nearest.norm_squared() > radius * radius {
@@ -34,8 +38,7 @@ pub(super) fn entry(
     let half = (radius * radius - nearest.norm_squared()).sqrt();
     let start = (along - half).max(0.0);
     let place = |t: f64| nearest + v * (t - along);
-    // a solid may touch its bounding sphere where the ray enters it, as the tip of a cone does
-    if distance(&place(start)).0 < -REACHED * radius {
+    if distance(&place(start)).0 < 0.0 {
         return None;
     }
     let mut t = start;
