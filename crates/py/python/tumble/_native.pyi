@@ -67,6 +67,8 @@ __all__ = [
     "_unpickle_tree",
     "_unpickle_world",
     "_choices",
+    "Sensor",
+    "Sensors",
 ]
 
 @disjoint_base
@@ -457,8 +459,8 @@ class Sensor:
 @final
 class Sensors:
     """The readings of all measuring sensors of a world by name, in the order of their addition: a mapping to arrays."""
-    def __getitem__(self, name: str) -> NDArray[np.float64]: ...
-    def __contains__(self, name: object) -> bool: ...
+    def __getitem__(self, key: str, /) -> NDArray[np.float64]: ...
+    def __contains__(self, key: object, /) -> bool: ...
     def __len__(self) -> int: ...
     def __iter__(self) -> Iterator[str]: ...
     def keys(self) -> list[str]:
