@@ -36,22 +36,23 @@ pub(super) fn entry(
         return None;
     }
     let half = (radius * radius - nearest.norm_squared()).sqrt();
-    let start = (along - half).max(0.0);
-    let place = |t: f64| nearest + v * (t - along);
+    // counted from the nearest point to the origin
+    let start = (-half).max(-along);
+    let place = |s: f64| nearest + v * s;
     if distance(&place(start)).0 < 0.0 {
         return None;
     }
-    let mut t = start;
+    let mut s = start;
     for _ in 0..MAX_STEPS {
-        let (f, normal, face) = distance(&place(t));
+        let (f, normal, face) = distance(&place(s));
         let slope = normal.dot(v);
         if f <= REACHED * radius {
-            return (slope < 0.0).then_some((t, normal, face));
+            return (slope < 0.0).then_some((along + s, normal, face));
         }
-        if slope >= 0.0 || t > max.min(along + half) {
+        if slope >= 0.0 || s > half.min(max - along) {
             return None;
         }
-        t -= f / slope;
+        s -= f / slope;
     }
     // a grazing ray
     None
