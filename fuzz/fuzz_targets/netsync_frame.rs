@@ -3,6 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
+use tumble_net::sync::compute::{ObjectHashes, SavedWorld, Step};
 use tumble_net::sync::messages::{FrameAck, FacetCounts, Join, Refusal};
 use tumble_net::sync::table::Snapshot;
 use tumble_net::sync::wire::{message, open};
@@ -24,5 +25,8 @@ fuzz_target!(|bytes: &[u8]| {
     Join::read(bytes).into_iter().for_each(|x| assert_eq!(written(|out| x.write(out)), bytes));
     FrameAck::read(bytes).into_iter().for_each(|x| assert_eq!(written(|out| x.write(out)), bytes));
     FacetCounts::read(bytes).into_iter().for_each(|x| assert_eq!(written(|out| x.write(out)), bytes));
+    Step::read(bytes).into_iter().for_each(|x| assert_eq!(written(|out| x.write(out)), bytes));
+    SavedWorld::read(bytes).into_iter().for_each(|x| assert_eq!(written(|out| x.write(out)), bytes));
+    ObjectHashes::read(bytes).into_iter().for_each(|x| assert_eq!(written(|out| x.write(out)), bytes));
     Input::read(bytes).into_iter().for_each(|x| assert_eq!(written(|out| x.write(out)), bytes));
 });

@@ -1,6 +1,7 @@
 //! Runs sessions over links in real time. `tumble serve` and `tumble facet` use [`Server`] and
 //! [`Facet`].
 
+use super::compute::{FrameInputs, Simulation};
 use super::facet::{FacetOptions, FacetSession, Task};
 use super::input::Input;
 use super::messages::FacetCounts;
@@ -83,6 +84,27 @@ impl<L: ServerLink> Server<L> {
     pub fn begin(&mut self, world: &World, viewer: &Viewer) -> Result<u64, SessionError> {
         self.poll(Duration::ZERO)?;
         let frame = self.session.publish(self.now(), world, viewer)?;
+        self.flush()?;
+        Ok(frame)
+    }
+
+    /// Sends everything that acts on the world in the next frame to the facets that step by
+    /// themselves. [`begin_simulation`](Self::begin_simulation) of that frame follows.
+    ///
+    /// # Errors
+    /// Errors of the link.
+    pub fn send_inputs(&mut self, inputs: FrameInputs) -> Result<(), SessionError> {
+        self.session.send_inputs(self.now(), inputs);
+        self.flush()
+    }
+
+    /// Publishes the world of a simulation as the next frame without waiting, like
+    /// [`begin`](Self::begin).
+    ///
+    /// # Errors
+    /// Errors of the link, and [`PublishError`].
+    pub fn begin_simulation(&mut self, simulation: &dyn Simulation) -> Result<u64, SessionError> {
+        let frame = self.session.publish_simulation(self.now(), simulation)?;
         self.flush()?;
         Ok(frame)
     }
@@ -233,6 +255,12 @@ impl<L: FacetLink> Facet<L> {
     /// Creates the session. `base` is the world as the scene file makes it.
     pub fn new(link: L, options: FacetOptions, base: World) -> Facet<L> {
         Facet { link, session: FacetSession::new(options, base), start: Instant::now() }
+    }
+
+    /// Creates the session of a facet that steps the world by itself; see
+    /// [`FacetSession::computing`].
+    pub fn computing(link: L, options: FacetOptions, simulation: Box<dyn Simulation>) -> Facet<L> {
+        Facet { link, session: FacetSession::computing(options, simulation), start: Instant::now() }
     }
 
     /// Waits at most `timeout` for the next task and returns it. On [`Task::Draw`] call

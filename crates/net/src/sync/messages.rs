@@ -6,23 +6,41 @@ use super::wire::{ByteReader, Hash, MessageError, put_name};
 /// Maximum length of a refusal's text, bytes.
 const MAX_TEXT: usize = 1024;
 
+/// Content of the frames that a facet receives.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Content {
+    /// Poses, in the precision of a picture.
+    #[default]
+    Poses,
+    /// Exact messages of the objects that have them: for a replica.
+    Exact,
+    /// Inputs: the facet steps the world by itself.
+    Inputs,
+}
+
+impl Content {
+    /// Every content, in the order of their codes.
+    pub const ALL: [Content; 3] = [Content::Poses, Content::Exact, Content::Inputs];
+}
+
 /// Request of a facet to join.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Join {
-    /// BLAKE3 hash of the scene file and the files that it names. Equal hashes mean equal scenes.
+    /// BLAKE3 hash of the scene file and the files that it names. Equal hashes mean equal scenes. With
+    /// [`Content::Inputs`] the hash covers constants and settings of the world too.
     pub scene: [u8; 32],
     /// The facet's name in the cave file.
     pub name: String,
-    /// Whether the facet wants exact messages (a replica) instead of poses.
-    pub exact: bool,
+    /// Content of its frames.
+    pub content: Content,
 }
 
 impl Join {
-    /// Appends the payload: hash, name, flag.
+    /// Appends the payload: hash, name, content.
     pub fn write(&self, out: &mut Vec<u8>) {
         out.extend(self.scene);
         put_name(out, &self.name);
-        out.push(self.exact as u8);
+        out.push(self.content as u8);
     }
 
     /// Reads the payload.
@@ -32,12 +50,9 @@ impl Join {
     pub fn read(payload: &[u8]) -> Result<Join, MessageError> {
         let mut rest = ByteReader(payload);
         let (scene, name) = (rest.array()?, rest.name()?.to_owned());
-        let exact = match rest.u8()? {
-            exact @ (0 | 1) => exact == 1,
-            _ => return Err(MessageError::Malformed("an unknown flag")),
-        };
+        let content = *Content::ALL.get(rest.u8()? as usize).ok_or(MessageError::Malformed("an unknown content"))?;
         rest.end()?;
-        Ok(Join { scene, name, exact })
+        Ok(Join { scene, name, content })
     }
 }
 

@@ -55,6 +55,10 @@
 //! and `input.rs` the small messages, `quantize.rs` the poses with the bound on their error.
 //! `docs/netsync.md` describes the protocol.
 
+#[cfg(feature = "fuzzing")]
+pub mod compute;
+#[cfg(not(feature = "fuzzing"))]
+mod compute;
 mod contacts;
 pub mod cpu_latency;
 mod driver;
@@ -94,12 +98,13 @@ pub mod wire;
 #[cfg(not(feature = "fuzzing"))]
 mod wire;
 
+pub use compute::{FrameInputs, Simulation, StateHashes};
 pub use contacts::MAX_CONTACTS;
 pub use driver::{Facet, Server, SessionError};
 pub use facet::{EndReason, FacetOptions, FacetSession, Task, WaitReason};
 pub use input::{Input, MAX_KEYS};
 pub use local::{LocalFacet, LocalServer, LocalTransport};
-pub use messages::{FacetCounts, FrameAck};
+pub use messages::{Content, FacetCounts, FrameAck};
 pub use mirror::Mirror;
 pub use publisher::{PublishError, Published, Publisher};
 #[cfg(feature = "fuzzing")]

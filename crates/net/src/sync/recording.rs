@@ -14,7 +14,7 @@
 //! | PRESENTED | facet | acknowledgements since then, each with its frame in the header |
 
 use super::input::Input;
-use super::messages::{FrameAck, Join};
+use super::messages::{Content, FrameAck, Join};
 use super::server::ServerEvent;
 use super::transport::{FacetNumber, MAX_MESSAGE_BYTES};
 use super::wire::{ByteReader, HEADER_BYTES, Hash, MessageError, MessageHeader, MessageKind, message, open};
@@ -119,7 +119,7 @@ impl SessionRecorder {
         let head = |kind| MessageHeader { kind, run: 0, join: 0, frame: recorded.frame, time_s: recorded.time_s };
         let mut out = Vec::new();
         if first {
-            let join = Join { scene: self.scene, name: "server".into(), exact: false };
+            let join = Join { scene: self.scene, name: "server".into(), content: Content::Poses };
             out.extend(message(&head(MessageKind::Join), |out| join.write(out)));
         }
         if let Some(list) = self.list.take() {

@@ -23,7 +23,7 @@ use super::transport::MAX_MESSAGE_BYTES;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_128_with_seed};
 
 /// Version of all messages. Later versions keep the header up to this field.
-pub const VERSION: u16 = 4;
+pub const VERSION: u16 = 5;
 /// Length of the header, bytes.
 pub const HEADER_BYTES: usize = 128;
 /// Length of the name in the header, bytes, the last one zero (thesis §IV.A.6).
@@ -69,11 +69,17 @@ pub enum MessageKind {
     Leave = 12,
     /// Facet: input of a user.
     Input = 13,
+    /// Server: a whole world with its users, for a facet that steps by itself.
+    World = 14,
+    /// Server: everything that acts on the world in a frame, for the same.
+    Step = 15,
+    /// Facet: hashes of its objects after a frame whose hash differs from the server's.
+    Differs = 16,
 }
 
 impl MessageKind {
     /// Every kind, in the order of their codes.
-    pub const ALL: [MessageKind; 13] = [
+    pub const ALL: [MessageKind; 16] = [
         MessageKind::Join,
         MessageKind::Refused,
         MessageKind::Snapshot,
@@ -87,6 +93,9 @@ impl MessageKind {
         MessageKind::End,
         MessageKind::Leave,
         MessageKind::Input,
+        MessageKind::World,
+        MessageKind::Step,
+        MessageKind::Differs,
     ];
 }
 

@@ -3,6 +3,7 @@
 
 use crate::udp::frames as count;
 use std::path::Path;
+use tumble_net::sync::compute::{ObjectHashes, Step};
 use tumble_net::sync::messages::{FacetCounts, FrameAck, Join};
 use tumble_net::sync::parse_frame;
 use tumble_net::sync::shm::wire::SampleHeader;
@@ -46,6 +47,9 @@ fn seeds_are_of_the_current_versions() {
     assert!(wire::open(&seed("netsync_frame/message")).is_ok());
     assert!(
         Snapshot::parse(&seed("netsync_frame/snapshot")).is_ok() && Viewer::read(&seed("netsync_frame/viewer")).is_ok()
+    );
+    assert!(
+        Step::read(&seed("netsync_frame/step")).is_ok() && ObjectHashes::read(&seed("netsync_frame/differs")).is_ok()
     );
     assert!(Join::read(&seed("netsync_frame/join")).is_ok() && Input::read(&seed("netsync_frame/input")).is_ok());
     assert!(

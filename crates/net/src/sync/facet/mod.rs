@@ -11,6 +11,7 @@
 //! The state of a later frame implies the PRESENT of the drawn one: the server would not have sent
 //! it before.
 
+mod computing;
 mod receiving;
 
 use super::input::Input;
@@ -20,6 +21,7 @@ use super::server::SyncMode;
 use super::transport::{Delivery, LinkEvent, Message};
 use super::viewer::Viewer;
 use super::wire::{HEADER_BYTES, Hash, MessageHeader, MessageKind, is_later, message};
+use computing::Shown;
 use std::collections::VecDeque;
 use std::time::Duration;
 use tumble_core::World;
@@ -121,7 +123,9 @@ struct PendingState {
 /// A facet's session.
 pub struct FacetSession {
     options: FacetOptions,
-    mirror: Mirror,
+    content: Shown,
+    /// Number of frames whose hash differed from the server's.
+    differences: u64,
     phase: Phase,
     lost: bool,
     run: u64,
@@ -160,10 +164,15 @@ pub struct FacetSession {
 impl FacetSession {
     /// Creates the session. `base` is the world as the scene file makes it.
     pub fn new(options: FacetOptions, base: World) -> FacetSession {
+        FacetSession::with(options, Shown::Mirrored(Mirror::new(base)))
+    }
+
+    fn with(options: FacetOptions, content: Shown) -> FacetSession {
         let mut session = FacetSession {
             process: splitmix64(options.seed) & PROCESS_MASK,
             options,
-            mirror: Mirror::new(base),
+            content,
+            differences: 0,
             phase: Phase::Joining,
             lost: false,
             run: 0,
@@ -193,12 +202,17 @@ impl FacetSession {
 
     /// Returns the world to draw after [`begin`](Self::begin).
     pub fn world(&self) -> &World {
-        self.mirror.world()
+        self.content.world()
     }
 
     /// Returns the users' heads and the cave's place in the scene.
     pub fn viewer(&self) -> &Viewer {
-        self.mirror.viewer()
+        self.content.viewer()
+    }
+
+    /// Returns the number of frames of a facet that steps by itself whose hash was not the server's.
+    pub fn differences(&self) -> u64 {
+        self.differences
     }
 
     /// Returns the counts.
@@ -223,21 +237,27 @@ impl FacetSession {
 
     /// Returns the next task.
     pub fn task(&self) -> Task {
-        match (&self.phase, &self.drawn_frame, &self.pending) {
+        match (&self.phase, &self.drawn_frame, self.has_frame()) {
             (Phase::Ended(why), ..) => Task::Ended(why.clone()),
             (_, Some((frame, ..)), _) if self.show => Task::Present(*frame),
             (Phase::Joining, ..) => Task::Wait(if self.lost { WaitReason::Lost } else { WaitReason::Server }),
             (_, Some((frame, ..)), _) => Task::Wait(WaitReason::Others(*frame)),
-            (_, None, Some(_)) => Task::Draw,
-            (_, None, None) => Task::Wait(WaitReason::Frame),
+            (_, None, true) => Task::Draw,
+            (_, None, false) => Task::Wait(WaitReason::Frame),
         }
+    }
+
+    /// Returns whether a frame waits to be drawn.
+    fn has_frame(&self) -> bool {
+        self.pending.is_some() || self.content.has_frames()
     }
 
     /// Applies the pending frame and returns its number. Returns `None` if there is none, or if it
     /// did not fit and was refused.
     pub fn begin(&mut self) -> Option<u64> {
+        let Shown::Mirrored(mirror) = &mut self.content else { return self.make_frames() };
         let PendingState { header, message, arrived } = self.pending.take()?;
-        let applied = self.mirror.apply_state(header.frame, header.time_s, message.get(HEADER_BYTES..).unwrap_or(&[]));
+        let applied = mirror.apply_state(header.frame, header.time_s, message.get(HEADER_BYTES..).unwrap_or(&[]));
         if applied.is_err() {
             increment(&mut self.counts.refused);
             self.newest = None; // so that it is taken when it comes again
@@ -253,8 +273,9 @@ impl FacetSession {
     pub fn drawn(&mut self, now: Duration, image: Hash) {
         let Some((frame, arrived)) = self.drawing.take() else { return };
         let took_us = short_micros(now.saturating_sub(arrived));
+        let hash = self.content.hash();
         let done = FrameAck {
-            hash: self.mirror.hash(),
+            hash,
             image,
             took_us,
             input_us: None,
@@ -262,7 +283,7 @@ impl FacetSession {
             completed_us: micros(now),
         };
         self.drawn_frame = Some((frame, done, now));
-        self.show = self.options.mode == SyncMode::Latest || self.pending.is_some();
+        self.show = self.options.mode == SyncMode::Latest || self.has_frame();
         self.present_received = (self.options.mode == SyncMode::Latest).then_some(arrived);
         if self.options.mode == SyncMode::Lockstep {
             self.answer(MessageKind::Ready, frame, &done);
@@ -296,7 +317,7 @@ impl FacetSession {
     /// Returns when the newest of this facet's inputs in the picture was sent, if the picture is
     /// the first to show it. Forgets all inputs up to it.
     fn take_shown_input(&mut self) -> Option<Duration> {
-        let users = &self.mirror.viewer().users;
+        let users = &self.content.viewer().users;
         let shows = |user: u16| users.get(user as usize).map(|u| u.input);
         let newest = self
             .inputs
@@ -351,8 +372,8 @@ impl FacetSession {
             Phase::Joining => {
                 if self.asked.is_none_or(|asked| now >= asked.saturating_add(self.options.join_interval)) {
                     self.asked = Some(now);
-                    let join =
-                        Join { scene: self.options.scene, name: self.options.name.clone(), exact: self.options.exact };
+                    let content = self.content.wanted(self.options.exact);
+                    let join = Join { scene: self.options.scene, name: self.options.name.clone(), content };
                     self.send(MessageKind::Join, 0, |out| join.write(out));
                 }
             }
@@ -383,6 +404,7 @@ impl FacetSession {
         (self.pending, self.early, self.list, self.drawing, self.drawn_frame, self.show, self.shown) =
             (None, None, None, None, None, false, None);
         (self.present_received, self.inputs) = (None, VecDeque::new());
+        self.content.restart();
     }
 
     fn answer(&mut self, kind: MessageKind, frame: u64, done: &FrameAck) {

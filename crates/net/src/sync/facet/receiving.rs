@@ -6,8 +6,11 @@ use super::super::server::SyncMode;
 use super::super::table::Snapshot;
 use super::super::transport::Message;
 use super::super::wire::{HEADER_BYTES, MessageError, MessageHeader, MessageKind, VERSION, is_later, open};
+use super::computing::Shown;
 use super::{EndReason, FacetSession, PendingState, Phase};
 use std::time::Duration;
+
+const NO_MIRROR: MessageError = MessageError::Malformed("poses for a facet that steps by itself");
 
 impl FacetSession {
     pub(super) fn on_message(&mut self, now: Duration, message: Message) {
@@ -42,6 +45,10 @@ impl FacetSession {
                     self.on_snapshot(now, &header, payload)?;
                 }
             }
+            MessageKind::World if about_us && (live || self.phase == Phase::Joining) => {
+                return self.on_world(now, header, message);
+            }
+            MessageKind::Step if live => return self.on_step(now, header, message),
             MessageKind::Refused if about_us => {
                 self.phase = Phase::Ended(EndReason::Refused(Refusal::read(payload)?.0))
             }
@@ -61,6 +68,8 @@ impl FacetSession {
             | MessageKind::Rejoin
             | MessageKind::End
             | MessageKind::State
+            | MessageKind::World
+            | MessageKind::Step
             | MessageKind::Present
             | MessageKind::Heartbeat => {
                 increment(&mut self.counts.stale);
@@ -83,26 +92,28 @@ impl FacetSession {
             increment(if listed == header.frame { &mut self.counts.duplicate } else { &mut self.counts.stale });
             return Ok(());
         }
-        if self.phase == Phase::Live && Some(Snapshot::revision_of(payload)?) == self.mirror.revision() {
+        let Shown::Mirrored(mirror) = &mut self.content else { return Err(NO_MIRROR) };
+        if self.phase == Phase::Live && Some(Snapshot::revision_of(payload)?) == mirror.revision() {
             increment(&mut self.counts.duplicate);
             return Ok(());
         }
-        self.mirror.apply_snapshot(payload)?;
+        mirror.apply_snapshot(payload)?;
+        let revision = mirror.revision();
         (self.phase, self.run, self.listed, self.lost, self.resynced) =
             (Phase::Live, header.run, Some(header.frame), false, None);
         if self.pending.take().is_some() {
             increment(&mut self.counts.missing); // it belonged to the old list
         }
         let early = self.early.take().filter(|early| early.header.run == self.run);
-        let fits =
-            early.filter(|early| Mirror::revision_of(&early.message[HEADER_BYTES..]).ok() == self.mirror.revision());
+        let fits = early.filter(|early| Mirror::revision_of(&early.message[HEADER_BYTES..]).ok() == revision);
         fits.into_iter().for_each(|early| self.take_state(early));
         Ok(())
     }
 
     fn on_state(&mut self, now: Duration, header: MessageHeader, message: Message) -> Result<(), MessageError> {
         self.last_received = now;
-        if Some(Mirror::revision_of(&message[HEADER_BYTES..])?) == self.mirror.revision() {
+        let Shown::Mirrored(mirror) = &self.content else { return Err(NO_MIRROR) };
+        if Some(Mirror::revision_of(&message[HEADER_BYTES..])?) == mirror.revision() {
             self.take_state(PendingState { header, message, arrived: now });
             return Ok(());
         }
@@ -166,7 +177,7 @@ impl FacetSession {
     }
 
     /// Repeats an acknowledgement that was lost: the server has asked again.
-    fn repeat_answer(&mut self, frame: u64) {
+    pub(super) fn repeat_answer(&mut self, frame: u64) {
         if let Some((drawn_frame, done, _)) = self.drawn_frame.filter(|(drawn_frame, ..)| *drawn_frame == frame) {
             self.answer(MessageKind::Ready, drawn_frame, &done);
         } else if let Some((shown, done)) = self.shown.filter(|(shown, _)| *shown == frame) {

@@ -1,6 +1,6 @@
 //! Stages of a frame: published, ready, presented.
 
-use super::super::messages::increment;
+use super::super::messages::{Content, increment};
 use super::super::publisher::PublishError;
 use super::super::recording::FrameRecord;
 use super::super::transport::FacetNumber;
@@ -22,7 +22,7 @@ impl ServerSession {
     pub fn publish(&mut self, now: Duration, world: &World, viewer: &Viewer) -> Result<u64, PublishError> {
         self.abandon_frame();
         let frame = self.next;
-        let replicas = self.joined().any(|(_, p)| p.exact);
+        let replicas = self.joined().any(|(_, p)| p.content == Content::Exact);
         for exact in [false, true] {
             let stream = &mut self.streams[exact as usize];
             stream.state = Arc::default();
@@ -88,10 +88,10 @@ impl ServerSession {
         {
             facet_state.membership = Membership::InStep;
         }
-        for exact in [false, true] {
-            let of_stream = |(k, p): (FacetNumber, &FacetState)| (p.exact == exact).then_some((k, p.membership));
+        for (content, stream) in [(Content::Poses, 0), (Content::Exact, 1)] {
+            let of_stream = |(k, p): (FacetNumber, &FacetState)| (p.content == content).then_some((k, p.membership));
             let to: Vec<(FacetNumber, Membership)> = self.joined().filter_map(of_stream).collect();
-            let stream = &self.streams[exact as usize];
+            let stream = &self.streams[stream];
             let (fresh, state) = (stream.listed == Some(frame), stream.state.clone());
             if fresh {
                 to.iter().for_each(|&(k, _)| self.send_snapshot(k));
@@ -104,7 +104,9 @@ impl ServerSession {
                 }
             }
         }
-        for facet_state in self.facets.iter_mut().filter(|p| p.membership != Membership::Absent) {
+        self.send_worlds(now);
+        let present = |p: &&mut FacetState| p.membership != Membership::Absent && p.content != Content::Inputs;
+        for facet_state in self.facets.iter_mut().filter(present) {
             facet_state.sent = now;
             note_request(&mut facet_state.state_requested, frame, now);
         }

@@ -14,6 +14,7 @@
 //! the others once, for `ready_timeout`. A facet that joined before the first frame is awaited from
 //! that frame on, for `first_frame_timeout`.
 
+mod computing;
 mod duplicate_facets;
 mod frame_times;
 mod frames;
@@ -23,10 +24,11 @@ mod sending;
 pub use frame_times::FrameTimes;
 
 use super::input::Input;
-use super::messages::{FacetCounts, FrameAck};
+use super::messages::{Content, FacetCounts, FrameAck};
 use super::publisher::Publisher;
 use super::transport::{Closed, Delivery, FacetNumber, LinkEvent, MAX_FACETS};
 use super::wire::{Hash, MessageKind};
+use computing::InputStream;
 use duplicate_facets::DuplicateFacets;
 pub(crate) use duplicate_facets::process_of;
 use frame_times::{ClockOffset, FrameTimer, RequestTime};
@@ -79,6 +81,9 @@ pub struct ServerOptions {
     /// Largest number of contacts that are sent with a frame ([`Publisher::with_contacts`]); 0 by
     /// default.
     pub contacts: usize,
+    /// BLAKE3 hash of the scene with all constants and settings, for facets that step the world by
+    /// themselves ([`Content::Inputs`]). `None` by default: such facets are refused.
+    pub compute: Option<[u8; 32]>,
 }
 
 impl ServerOptions {
@@ -97,6 +102,7 @@ impl ServerOptions {
             resend_interval: None,
             first_frame: 0,
             contacts: 0,
+            compute: None,
         }
     }
 }
@@ -160,6 +166,9 @@ pub enum ServerEvent {
     Finished(u64),
     /// Input of a user.
     Input(FacetNumber, Input),
+    /// A facet that steps by itself had another state after a frame. The text names the first object
+    /// that differs.
+    Differs(FacetNumber, u64, String),
 }
 
 /// A message to send.
@@ -184,7 +193,9 @@ struct FacetState {
     join: u64,
     former_joins: VecDeque<u64>,
     duplicate_facets: DuplicateFacets,
-    exact: bool,
+    content: Content,
+    /// For a facet that steps by itself: whether it needs a whole world.
+    needs_world: bool,
     last_received: Duration,
     sent: Duration,
     /// Whether the facet has answered the snapshot with a frame.
@@ -227,6 +238,7 @@ pub struct ServerSession {
     facets: Vec<FacetState>,
     /// Poses, then exact messages.
     streams: [Stream; 2],
+    inputs: InputStream,
     /// The last published frame.
     frame: Option<u64>,
     next: u64,
@@ -252,7 +264,8 @@ impl ServerSession {
             join: 0,
             former_joins: VecDeque::new(),
             duplicate_facets: DuplicateFacets::default(),
-            exact: false,
+            content: Content::Poses,
+            needs_world: false,
             last_received: Duration::ZERO,
             sent: Duration::ZERO,
             synced: false,
@@ -281,6 +294,7 @@ impl ServerSession {
             options,
             facets,
             streams: [stream(false), stream(true)],
+            inputs: InputStream::default(),
             frame: None,
             next,
             time_s: 0.0,

@@ -1,7 +1,8 @@
 //! Handling of the facets' messages in a server.
 
+use super::super::compute::ObjectHashes;
 use super::super::input::Input;
-use super::super::messages::{FacetCounts, FrameAck, Join, Refusal, increment};
+use super::super::messages::{Content, FacetCounts, FrameAck, Join, Refusal, increment};
 use super::super::transport::FacetNumber;
 use super::super::wire::{Hash, MessageError, MessageHeader, MessageKind, VERSION, is_later, open};
 use super::frame_times::ClockOffset;
@@ -63,6 +64,7 @@ impl ServerSession {
             MessageKind::Heartbeat => facet_state.reported = FacetCounts::read(payload)?,
             MessageKind::Leave => self.mark_absent(facet, true),
             MessageKind::Input => self.on_input(now, facet, Input::read(payload)?),
+            MessageKind::Differs => self.on_differs(facet, header.frame, &ObjectHashes::read(payload)?),
             _ => return Err(MessageError::Malformed("a kind that only servers send")),
         }
         Ok(())
@@ -102,8 +104,9 @@ impl ServerSession {
             self.mark_absent(facet, false);
         }
         let facet_state = &mut self.facets[facet as usize];
-        (facet_state.membership, facet_state.join, facet_state.exact, facet_state.last_received, facet_state.sent) =
-            (Membership::Following, join, wanted.exact, now, now);
+        (facet_state.membership, facet_state.join, facet_state.last_received, facet_state.sent) =
+            (Membership::Following, join, now, now);
+        (facet_state.content, facet_state.needs_world) = (wanted.content, true);
         (facet_state.synced, facet_state.ready, facet_state.presented, facet_state.reported) =
             (false, None, None, FacetCounts::default());
         (facet_state.answered, facet_state.caught_up) = (None, false);
@@ -124,7 +127,17 @@ impl ServerSession {
                 slot.name, wanted.name
             ));
         }
-        let (ours, theirs) = (hex(&self.options.scene), hex(&wanted.scene));
+        let ours = match (wanted.content, self.options.compute) {
+            (Content::Inputs, None) => {
+                return Some(format!(
+                    "facet '{}' computes by itself, and the server sends no inputs: start it with --compute everywhere",
+                    slot.name
+                ));
+            }
+            (Content::Inputs, Some(hash)) => hex(&hash),
+            _ => hex(&self.options.scene),
+        };
+        let theirs = hex(&wanted.scene);
         (ours != theirs).then(|| {
             format!(
                 "the server's scene has the hash {ours}, that of facet '{}' has {theirs}: use the same files on both",
@@ -141,8 +154,14 @@ impl ServerSession {
     }
 
     /// Returns whether a frame's hash is right, if the frame is remembered.
-    pub(super) fn check(&self, exact: bool, frame: u64, hash: &Hash) -> Option<bool> {
-        self.streams[exact as usize].hashes.iter().find(|(f, _)| *f == frame).map(|(_, ours)| ours == hash)
+    pub(super) fn check(&self, content: Content, frame: u64, hash: &Hash) -> Option<bool> {
+        let of_stream = |k: usize| self.streams[k].hashes.iter().find(|(f, _)| *f == frame).map(|(_, ours)| ours);
+        let ours = match content {
+            Content::Poses => of_stream(0),
+            Content::Exact => of_stream(1),
+            Content::Inputs => self.inputs.hash(frame),
+        };
+        ours.map(|ours| ours == hash)
     }
 
     /// Detects that a following facet is fast enough again. It draws one frame after the other,
@@ -165,7 +184,7 @@ impl ServerSession {
     pub(super) fn on_ready(&mut self, now: Duration, facet: FacetNumber, frame: u64, done: FrameAck) {
         self.track_catch_up(now, facet, frame);
         let facet_state = &self.facets[facet as usize];
-        let right = self.check(facet_state.exact, frame, &done.hash);
+        let right = self.check(facet_state.content, frame, &done.hash);
         let facet_state = &mut self.facets[facet as usize];
         let Some(right) = right else { return increment(&mut facet_state.counts.stale) };
         let again = facet_state.ready.is_some_and(|f| !is_later(frame, f));
@@ -182,7 +201,7 @@ impl ServerSession {
                     (Membership::InStep, None, false);
             }
             if !right {
-                increment(&mut facet_state.counts.mismatched);
+                self.replace_wrong_world(facet);
             }
             self.time_ready(now, facet as usize, frame, &done);
             self.report(ServerEvent::Ready(facet, frame, done, right));
@@ -197,7 +216,7 @@ impl ServerSession {
 
     pub(super) fn on_presented(&mut self, now: Duration, facet: FacetNumber, frame: u64, done: FrameAck) {
         let facet_state = &self.facets[facet as usize];
-        let right = self.check(facet_state.exact, frame, &done.hash);
+        let right = self.check(facet_state.content, frame, &done.hash);
         let latest = self.options.mode == SyncMode::Latest;
         let facet_state = &mut self.facets[facet as usize];
         let Some(right) = right else { return increment(&mut facet_state.counts.stale) };
@@ -211,7 +230,7 @@ impl ServerSession {
             facet_state.membership = Membership::InStep;
         }
         if !right && latest {
-            increment(&mut facet_state.counts.mismatched);
+            self.replace_wrong_world(facet);
         }
         self.time_presented(now, facet as usize, frame, &done);
         self.report(ServerEvent::Presented(facet, frame, done, right));

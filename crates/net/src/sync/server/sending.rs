@@ -1,9 +1,10 @@
 //! Sending, and the work that is due by time.
 
+use super::super::messages::Content;
 use super::super::transport::{Delivery, FacetNumber};
 use super::super::wire::{MessageHeader, MessageKind, message};
 use super::frame_times::note_request;
-use super::{FacetState, FrameStage, Membership, ServerSession, SyncMode, ToFacets};
+use super::{FacetState, FrameStage, Membership, ServerSession, Stream, SyncMode, ToFacets};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -82,15 +83,19 @@ impl ServerSession {
 
     /// Sends the snapshot and the last frame, with which a facet begins.
     pub(super) fn send_snapshot_and_state(&mut self, now: Duration, facet: FacetNumber) {
-        if self.frame.is_some() {
-            self.send_snapshot(facet);
-            self.send_state(now, facet);
+        match (self.frame, self.facets[facet as usize].content) {
+            (None, _) => {}
+            (Some(_), Content::Inputs) => self.send_world(now, facet),
+            (Some(_), _) => {
+                self.send_snapshot(facet);
+                self.send_state(now, facet);
+            }
         }
     }
 
     pub(super) fn send_snapshot(&mut self, facet: FacetNumber) {
         let facet_state = &self.facets[facet as usize];
-        let (snapshot, join) = (self.streams[facet_state.exact as usize].snapshot.clone(), facet_state.join);
+        let (snapshot, join) = (self.stream(facet_state.content).snapshot.clone(), facet_state.join);
         if !snapshot.is_empty() {
             self.send_to(facet, MessageKind::Snapshot, join, self.frame.unwrap_or(self.next), |out| {
                 out.extend(snapshot.iter())
@@ -99,11 +104,20 @@ impl ServerSession {
     }
 
     pub(super) fn send_state(&mut self, now: Duration, facet: FacetNumber) {
-        let state = self.streams[self.facets[facet as usize].exact as usize].state.clone();
+        let content = self.facets[facet as usize].content;
+        if content == Content::Inputs {
+            return self.repeat_inputs(now, facet);
+        }
+        let state = self.stream(content).state.clone();
         if !state.is_empty() {
             note_request(&mut self.facets[facet as usize].state_requested, self.frame.unwrap_or(0), now);
             self.send(vec![facet], self.state_delivery(Membership::InStep), state);
         }
+    }
+
+    /// Returns the frames of poses, or those of exact messages.
+    fn stream(&self, content: Content) -> &Stream {
+        &self.streams[usize::from(content == Content::Exact)]
     }
 
     pub(super) fn send_present(&mut self, now: Duration, to: Vec<FacetNumber>, frame: u64) {

@@ -7,7 +7,9 @@ use tumble_net::sync::simulated_network::NetworkConditions;
 use tumble_net::sync::table::Snapshot;
 use tumble_net::sync::transport::LinkEvent;
 use tumble_net::sync::wire::{HEADER_BYTES, MessageError, MessageHeader, MessageKind, message, open};
-use tumble_net::sync::{FacetOptions, FacetSession, Input, Mirror, Publisher, ServerSession, SyncMode, Viewer};
+use tumble_net::sync::{
+    Content, FacetOptions, FacetSession, Input, Mirror, Publisher, ServerSession, SyncMode, Viewer,
+};
 
 fn header(kind: MessageKind) -> MessageHeader {
     MessageHeader { kind, run: 1, join: 2, frame: 3, time_s: 0.5 }
@@ -40,7 +42,7 @@ fn payloads() -> Vec<Vec<u8>> {
     };
     let done =
         FrameAck { hash: [1; 16], image: [2; 16], took_us: 3, input_us: Some(4), received_us: None, completed_us: 5 };
-    let join = Join { scene: SCENE, name: "front".into(), exact: true };
+    let join = Join { scene: SCENE, name: "front".into(), content: Content::Exact };
     vec![
         publisher.snapshot().to_vec(),
         published.state,

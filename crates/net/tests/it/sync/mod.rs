@@ -1,5 +1,6 @@
 //! NetSync from outside.
 
+mod compute;
 mod faults;
 mod hostile;
 mod links;
