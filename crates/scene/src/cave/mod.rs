@@ -29,7 +29,7 @@ pub use checks::{Gap, MAX_PIXELS, MAX_SIDE_PX, RIM_PX, SQUARE_TOLERANCE, gaps};
 pub use error::CaveError;
 pub use facet::{Facet, Flip, Output, Stereo};
 pub use parts::{LAUNCH_PLACEHOLDERS, Node, Screen, User};
-pub use settings::{Mode, Recording, Security, Sync, Transport};
+pub use settings::{Compute, Mode, Recording, Security, Sync, Transport};
 pub use shipped::{CaveSource, ShippedCave, resolve_cave, shipped_caves};
 pub use tracker::{Axes, TRACKER_PORT, Tracker};
 

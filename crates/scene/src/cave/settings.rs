@@ -25,6 +25,21 @@ pub enum Mode {
     Latest,
 }
 
+/// Where the world is stepped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Compute {
+    /// On the server, which sends poses.
+    #[default]
+    Server,
+    /// On the server and on every facet: inputs are sent, and the hashes of all states are compared.
+    Everywhere,
+}
+
+impl Compute {
+    /// All choices with their names in cave files and on the command line.
+    pub const NAMES: &[(&str, Self)] = &[("server", Compute::Server), ("everywhere", Compute::Everywhere)];
+}
+
 const TRANSPORTS: Names<Transport> = &[("shared_memory", Transport::SharedMemory), ("udp", Transport::Udp)];
 const MODES: Names<Mode> = &[("lockstep", Mode::Lockstep), ("latest", Mode::Latest)];
 
@@ -38,6 +53,8 @@ pub struct Sync {
     pub port: u16,
     /// Default `lockstep`.
     pub mode: Mode,
+    /// Default `server`.
+    pub compute: Compute,
     /// Time that the start waits for facets, ms, 1 to 600 000. Default 10 000.
     pub connect_timeout_ms: u32,
     /// Time that a frame waits for a facet, ms, 1 to 60 000. Default 100.
@@ -55,6 +72,7 @@ impl Default for Sync {
             transport: Transport::SharedMemory,
             port: 47_100,
             mode: Mode::Lockstep,
+            compute: Compute::Server,
             connect_timeout_ms: 10_000,
             ready_timeout_ms: 100,
             drop_timeout_ms: 2000,
@@ -70,6 +88,7 @@ impl Sync {
             transport: f.choice_or("transport", TRANSPORTS, default.transport),
             port: f.integer_or("port", 1..=65_535, default.port.into()) as u16,
             mode: f.choice_or("mode", MODES, default.mode),
+            compute: f.choice_or("compute", Compute::NAMES, default.compute),
             connect_timeout_ms: f.integer_or("connect_timeout_ms", 1..=600_000, default.connect_timeout_ms),
             ready_timeout_ms: f.integer_or("ready_timeout_ms", 1..=60_000, default.ready_timeout_ms),
             drop_timeout_ms: f.integer_or("drop_timeout_ms", 100..=600_000, default.drop_timeout_ms),

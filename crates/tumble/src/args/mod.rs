@@ -99,6 +99,19 @@ impl SceneOptions {
         w.budget = self.budget.or(w.budget);
         Ok(scene)
     }
+
+    /// Returns the options of stepping as arguments.
+    pub fn stepping_args(&self) -> Vec<String> {
+        let given = [
+            ("--dt", self.dt.map(|dt| dt.to_string())),
+            ("--stepper", self.stepper.map(|stepper| stepper.to_string())),
+            ("--solver", self.solver.map(|solver| solver.to_string())),
+            ("--integrator", self.integrator.map(|integrator| integrator.to_string())),
+            ("--threads", self.threads.map(|threads| threads.to_string())),
+            ("--budget", self.budget.map(|budget| budget.to_string())),
+        ];
+        given.into_iter().filter_map(|(name, value)| Some([name.to_owned(), value?])).flatten().collect()
+    }
 }
 
 /// Opening a robot or a mesh file.

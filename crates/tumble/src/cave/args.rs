@@ -1,11 +1,12 @@
 //! Options of `tumble cave`, `tumble serve`, `tumble facet`, `tumble replay` and `tumble recover`.
 
-use crate::args::{OpeningOptions, Overlays, SceneOptions};
+use crate::args::{Overlays, SceneOptions};
 use crate::cave::tracker::sealed::MAX_RELAYS;
 use clap::{Args, ValueEnum};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use tumble::render::{DebugDraw, Quality, UnknownOverlay};
+use tumble::scene::cave::Compute;
 
 /// The cave and the environment of the scene. Server and facets must get the same.
 #[derive(Args, Clone)]
@@ -27,6 +28,24 @@ pub enum TransportKind {
     SharedMemory,
     /// UDP datagrams.
     Udp,
+}
+
+/// Where the world is stepped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ComputeKind {
+    /// On the server, which sends poses.
+    Server,
+    /// On every node: inputs are sent, and the hashes of all states are compared.
+    Everywhere,
+}
+
+impl From<Compute> for ComputeKind {
+    fn from(compute: Compute) -> ComputeKind {
+        match compute {
+            Compute::Server => ComputeKind::Server,
+            Compute::Everywhere => ComputeKind::Everywhere,
+        }
+    }
 }
 
 /// Options of a server.
@@ -95,6 +114,10 @@ pub struct ServeOptions {
     /// facets.
     #[arg(long)]
     pub contacts: bool,
+    /// Where the world is stepped (default: as the cave says). With everywhere, each facet steps it
+    /// by itself from the users' inputs, and its states are compared with the server's.
+    #[arg(long, value_name = "WHERE")]
+    pub compute: Option<ComputeKind>,
     /// Print errors only.
     #[arg(long, short)]
     pub quiet: bool,
@@ -230,12 +253,20 @@ pub struct RelayOptions {
 #[derive(Args, Clone)]
 pub struct FacetOptions {
     /// The scene, as the server got it.
-    #[arg(value_name = "SCENE")]
-    pub scene: String,
     #[command(flatten)]
-    pub opening: OpeningOptions,
+    pub scene: SceneOptions,
     #[command(flatten)]
     pub surroundings: CaveSceneOptions,
+    /// Where the world is stepped (default: as the cave says). With everywhere, this facet steps it by
+    /// itself; the options of stepping and --user-colliders must then be the server's.
+    #[arg(long, value_name = "WHERE")]
+    pub compute: Option<ComputeKind>,
+    /// With --compute everywhere: the server has --user-colliders.
+    #[arg(long)]
+    pub user_colliders: bool,
+    /// For tests of the comparison: after this frame of the world one bit of its state is wrong.
+    #[arg(long, hide = true, value_name = "N")]
+    pub disturb_after: Option<u64>,
     /// Name of the facet in the cave.
     #[arg(long, value_name = "NAME", required_unless_present = "preview")]
     pub facet: Option<String>,

@@ -37,6 +37,7 @@ mod replay;
 mod run_setup;
 mod server;
 mod signals;
+mod simulation;
 mod tracker;
 
 use crate::failure::Failure;
@@ -65,9 +66,10 @@ pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
     let scene = &serve.scene;
     let method = scene.stepper.is_some() || scene.solver.is_some() || scene.integrator.is_some();
     let stepping = scene.dt.is_some() || scene.threads.is_some() || scene.budget.is_some() || method;
-    if serve.record.is_some() || users || stepping || serve.contacts {
+    let everywhere = serve.compute == Some(args::ComputeKind::Everywhere);
+    if serve.record.is_some() || users || stepping || serve.contacts || everywhere {
         return Err(Failure::input(
-            "a replay shows what was recorded; --record, --user-colliders, --tracker, --replay-input, --contacts, --dt, --stepper, --solver, --integrator, --threads and --budget go with tumble cave",
+            "a replay shows what was recorded; --record, --user-colliders, --tracker, --replay-input, --contacts, --dt, --stepper, --solver, --integrator, --threads, --budget and --compute everywhere go with tumble cave",
         ));
     }
     server::run(serve, Some(&options.cave), Some(&options.file))

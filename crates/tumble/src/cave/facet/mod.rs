@@ -11,12 +11,13 @@ mod runner;
 mod window;
 
 use super::address::{RunServer, ServerAddress};
-use super::args::FacetOptions;
+use super::args::{ComputeKind, FacetOptions};
 use super::endpoints::FacetEndpoint;
 use super::facet_report::Reporter;
 use super::lock;
 use super::run_setup::{Role, RunSetup};
 use super::signals::Signals;
+use super::simulation::CaveSimulation;
 use crate::failure::Failure;
 use control::{FacetControl, POLL_INTERVAL, watch_parent};
 use desktop::{Desktop, Probe, desktop};
@@ -26,7 +27,7 @@ use runner::FacetRunner;
 use std::time::{Duration, Instant};
 use tumble::net::sync::{Facet, FacetOptions as SessionOptions, SyncMode};
 use tumble::net::sync::{transport::FacetNumber, udp::Entropy};
-use tumble::scene::cave::{Mode, Output};
+use tumble::scene::cave::{Mode, Output, resolve_cave};
 use window::WindowSetup;
 
 /// Runs a facet until the end of the run.
@@ -34,8 +35,9 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     let signals = Signals::watch()?;
     let parent_gone = options.parent_watch.then(watch_parent).transpose()?;
     let reporter = Reporter::start(options.parent_watch)?;
-    let scene = options.opening.read(&options.scene)?;
-    let setup = RunSetup::load(scene, &options.surroundings, Role::Facet)?;
+    let compute = compute(options)?;
+    let role = if compute == ComputeKind::Everywhere { Role::Server } else { Role::Facet };
+    let setup = RunSetup::load(options.scene.load()?, &options.surroundings, role)?;
     let description = options.facet.as_deref().map(|name| setup.cave.facet(name).cloned()).transpose()?;
     let number = description
         .as_ref()
@@ -71,7 +73,15 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     let link = FacetEndpoint::open(&server, number, &setup, again)?;
     let session_options = session_options(&setup, &name)?;
     let log = frame_log(options, &name, &reporter)?;
-    let facet = Facet::new(link, session_options, setup.world);
+    let facet = match compute {
+        ComputeKind::Server => Facet::new(link, session_options, setup.world),
+        ComputeKind::Everywhere => {
+            let simulation = CaveSimulation::new(&setup, setup.world.fork(), options.user_colliders)?
+                .disturbed(options.disturb_after);
+            let hash = simulation.hash(&setup)?;
+            Facet::computing(link, SessionOptions { scene: hash, ..session_options }, Box::new(simulation))
+        }
+    };
     let mut runner = FacetRunner::new(facet, render_thread, log, draw.burn_in, control, reporter.clone());
     let outcome = match window_setup {
         Some(window_setup) => window_setup.show(&mut runner, draw.burn_in, desktop.take()),
@@ -83,6 +93,12 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     let written = runner.log.as_mut().map_or(Ok(()), FrameLog::finish);
     reporter.flush();
     written.and(outcome)
+}
+
+/// Returns where the world is stepped: by the command line, else by the cave file.
+fn compute(options: &FacetOptions) -> Result<ComputeKind, Failure> {
+    let of_cave = || Ok(resolve_cave(&options.surroundings.cave)?.load()?.sync.compute.into());
+    options.compute.map_or_else(of_cave, Ok)
 }
 
 /// Opens the facet's folder for frames, if there is one.

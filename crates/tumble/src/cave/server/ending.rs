@@ -36,7 +36,7 @@ impl RunLoop<'_> {
             // explains why no facet joined
             None => eprint!("{}", unknown_peers_line(&refused(&self.server.unknown_peers()))),
         }
-        session.and(recorded).and(summed).and(ended).and(self.input_devices.check())
+        session.and(recorded).and(summed).and(ended).and(self.input_devices.check()).and(self.metrics.check_states())
     }
 
     /// Returns whether the facets of this launcher write frames.
@@ -75,7 +75,7 @@ impl RunLoop<'_> {
             replay: self.replay.as_ref().map(|replay| replay.counts),
             replay_input: self.input_devices.replayed_counts(),
             tracker: self.input_devices.tracker_counts(),
-            heads_rejected: self.users.heads_rejected,
+            heads_rejected: self.simulation.users.heads_rejected,
             unknown_peers: refused(&self.server.unknown_peers()),
             facets: self.metrics.facets(&self.server, &self.slots, self.frames, written),
         })

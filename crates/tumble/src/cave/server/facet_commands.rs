@@ -1,7 +1,7 @@
 //! Commands that start facets: arguments, launch commands of nodes, addresses.
 
 use crate::cave::address::{ServerAddress, address_towards};
-use crate::cave::args::{CaveOptions, ServeOptions, TransportKind};
+use crate::cave::args::{CaveOptions, ComputeKind, ServeOptions, TransportKind};
 use crate::cave::run_setup::PREVIEW;
 use tumble::net::sync::FacetSlot;
 use tumble::scene::cave::{Cave, Node};
@@ -87,6 +87,15 @@ pub fn scene_args(serve: &ServeOptions) -> Vec<String> {
     args.extend(serve.scene.opening.to_args());
     args.extend(["--cave".into(), surroundings.cave.clone()]);
     args.extend(surroundings.environment.iter().flat_map(|e| ["--environment".into(), e.clone()]));
+    match serve.compute {
+        None => {}
+        Some(ComputeKind::Server) => args.extend(["--compute".into(), "server".into()]),
+        Some(ComputeKind::Everywhere) => {
+            args.extend(["--compute".into(), "everywhere".into()]);
+            args.extend(serve.scene.stepping_args());
+            args.extend(serve.user_colliders.then(|| "--user-colliders".to_owned()));
+        }
+    }
     args
 }
 

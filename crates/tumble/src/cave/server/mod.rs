@@ -11,7 +11,5 @@ mod outputs;
 mod recording;
 mod serve;
 mod summary;
-mod user_colliders;
-mod users;
 
 pub use serve::run;

@@ -8,25 +8,26 @@ use super::live_viewers::LiveViewers;
 use super::outputs;
 use super::recording::{RunRecorder, Target};
 use super::summary::{Metrics, Status};
-use super::users::{PACE_SOURCE, Users};
 use crate::cave::address::{RunKey, ServerAddress};
-use crate::cave::args::{CaveOptions, ServeOptions, TransportKind};
+use crate::cave::args::{CaveOptions, ComputeKind, ServeOptions, TransportKind};
 use crate::cave::endpoints::{ServerEndpoint, idle_timeout, key, timing};
 use crate::cave::lock::{RunInfo, RunLock};
 use crate::cave::replay::frames::Replay;
 use crate::cave::run_setup::{Role, RunSetup};
 use crate::cave::signals::Signals;
+use crate::cave::simulation::{CaveSimulation, PACE_SOURCE};
 use crate::divergence;
 use crate::failure::Failure;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::Path;
 use std::time::{Duration, Instant};
-use tumble::dynamics::World;
 use tumble::net::sync::cpu_latency::CpuLatencyRequest;
 use tumble::net::sync::shm::{ShmServer, clean_up};
 use tumble::net::sync::transport::FacetNumber;
 use tumble::net::sync::udp::{Entropy, UdpServer};
-use tumble::net::sync::{FacetSlot, Input, MAX_CONTACTS, Server, ServerEvent, ServerOptions, SessionError, SyncMode};
+use tumble::net::sync::{
+    FacetSlot, FrameInputs, Input, MAX_CONTACTS, Server, ServerEvent, ServerOptions, SessionError, SyncMode,
+};
 use tumble::scene::cave::{Cave, Mode};
 
 /// Interval at which signals and processes are polled.
@@ -42,6 +43,10 @@ const SLOW_START: Duration = Duration::from_secs(5);
 pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Option<&Path>) -> Result<(), Failure> {
     let signals = Signals::watch()?;
     let setup = RunSetup::load(options.scene.load()?, &options.surroundings, Role::Server)?;
+    let compute = compute(options, &setup.cave, recording.is_some());
+    let options = &ServeOptions { compute, ..options.clone() };
+    let launcher = launcher.map(|launcher| CaveOptions { serve: options.clone(), ..launcher.clone() });
+    let launcher = launcher.as_ref();
     let say = |what: &str| (!options.quiet).then(|| eprintln!("{what}"));
     setup.notes.iter().for_each(|note| _ = say(note));
     outputs::check(options, launcher, &setup.cave, recording.is_some())?;
@@ -80,12 +85,17 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
     run.address = Some(address.clone());
     lock.write(&run)?;
     let shared_memory = matches!(end, ServerEndpoint::Shm(_));
-    let server = Server::new(end, session_options(options, &setup, number, &slots), &setup.world);
+    let simulation = CaveSimulation::new(&setup, setup.world.fork(), options.user_colliders)?;
+    let everywhere = compute == Some(ComputeKind::Everywhere);
+    let hash = everywhere.then(|| simulation.hash(&setup)).transpose()?;
+    let session_options = ServerOptions { compute: hash, ..session_options(options, &setup, number, &slots) };
+    let server = Server::new(end, session_options, &setup.world);
     let mut processes = FacetProcesses::start(options, &setup.cave, launcher, &address, &signals)?;
     let _awake = options
         .stay_awake
         .then(|| CpuLatencyRequest::ask().inspect_err(|why| _ = say(&format!("the cores may fall asleep: {why}"))));
-    let outcome = RunLoop::new(options, launcher, setup, server, slots, &signals, replay).and_then(|mut run_loop| {
+    let begin = RunLoop::new(options, launcher, setup, simulation, server, slots, &signals, replay);
+    let outcome = begin.and_then(|mut run_loop| {
         let outcome = run_loop.run_frames(&mut processes);
         let ended = run_loop.end(&mut processes);
         outcome.and(ended)
@@ -97,6 +107,15 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
     }
     drop(lock);
     outcome
+}
+
+/// Returns where the world is stepped, if the facets need to know: a replay steps nothing.
+fn compute(options: &ServeOptions, cave: &Cave, replaying: bool) -> Option<ComputeKind> {
+    let of_cave = ComputeKind::from(cave.sync.compute);
+    match options.compute.unwrap_or(of_cave) {
+        ComputeKind::Everywhere if !replaying => Some(ComputeKind::Everywhere),
+        _ => (of_cave == ComputeKind::Everywhere).then_some(ComputeKind::Server),
+    }
 }
 
 fn listen(options: &ServeOptions, cave: &Cave) -> SocketAddr {
@@ -132,8 +151,9 @@ pub(super) struct RunLoop<'a> {
     pub launcher: Option<&'a CaveOptions>,
     signals: &'a Signals,
     pub server: Server<ServerEndpoint>,
-    world: World,
-    pub users: Users,
+    pub simulation: CaveSimulation,
+    /// Inputs since the last frame.
+    inputs: Vec<(FacetNumber, Input)>,
     pub input_devices: InputDevices,
     live_viewers: LiveViewers,
     pub recorder: RunRecorder,
@@ -154,36 +174,36 @@ pub(super) struct RunLoop<'a> {
 }
 
 impl<'a> RunLoop<'a> {
+    #[allow(clippy::too_many_arguments)] // the parts of a run
     fn new(
         options: &'a ServeOptions,
         launcher: Option<&'a CaveOptions>,
         setup: RunSetup,
+        simulation: CaveSimulation,
         server: Server<ServerEndpoint>,
         slots: Vec<FacetSlot>,
         signals: &'a Signals,
         replay: Option<Replay>,
     ) -> Result<RunLoop<'a>, Failure> {
-        let viewer = setup.viewer()?;
-        let RunSetup { scene, cave, mut world, hash, .. } = setup;
-        let users = Users::new(viewer, &cave, &mut world, options.user_colliders)?;
+        let RunSetup { scene, cave, hash, .. } = setup;
         let input_devices = InputDevices::open(options, &cave, hash, replay.is_none())?;
         let live_viewers = LiveViewers::open(options)?;
         let target = Target::of(options, cave.recording.as_ref(), replay.is_some());
-        let recorder = RunRecorder::open(target.as_ref(), &scene.file, hash, &world, signals)?;
+        let recorder = RunRecorder::open(target.as_ref(), &scene.file, hash, &simulation.world, signals)?;
         Ok(RunLoop {
             options,
             launcher,
             signals,
             server,
-            world,
-            users,
+            simulation,
+            inputs: Vec::new(),
             input_devices,
             live_viewers,
             recorder,
             cave,
             scene: scene.file,
             duration: options.duration,
-            metrics: Metrics::new(slots.len()),
+            metrics: Metrics::new(&slots),
             slots,
             status: Status::new(options.quiet),
             replay,
@@ -201,7 +221,7 @@ impl<'a> RunLoop<'a> {
             return Ok(());
         }
         self.recorder.begin()?;
-        let step_s = self.world.settings().dt;
+        let step_s = self.simulation.world.settings().dt;
         let steps = ((1.0 / (self.options.fps * step_s) + 1e-9).floor() as u32).max(1);
         let dt = self.frame_length(step_s * f64::from(steps));
         let last = self.duration.map(|s| (s / dt).round() as u64);
@@ -248,7 +268,7 @@ impl<'a> RunLoop<'a> {
                 return Err(Failure::run("the start", format!("{missing}; --wait SECONDS gives them more time")));
             }
             self.server.idle_until(now + POLL_INTERVAL).map_err(failed)?;
-            self.take_events(0.0);
+            self.take_events()?;
             processes.watch(true)?;
         }
         Ok(true)
@@ -259,18 +279,19 @@ impl<'a> RunLoop<'a> {
     fn pace(&mut self, steps: u32) -> Option<Input> {
         let wall_s = self.frame_began.replace(Instant::now())?.elapsed().as_secs_f64();
         let live = !self.options.no_realtime && self.input_devices.live();
-        self.users.pace(wall_s, f64::from(steps) * self.world.settings().dt).filter(|_| live)
+        let frame_s = f64::from(steps) * self.simulation.world.settings().dt;
+        self.simulation.users.pace(wall_s, frame_s).filter(|_| live)
     }
 
-    /// Simulates the steps of one frame.
+    /// Simulates the steps of one frame. Nodes that compute by themselves do so at the same time.
     fn simulate(&mut self, frame: u64, steps: u32) -> Result<(), Failure> {
-        let (clock, dt) = (Instant::now(), self.world.settings().dt);
-        for _ in 0..steps {
-            self.users.act(&mut self.world, dt)?;
-            self.world.step().map_err(|e| Failure::run("the simulation stopped", e))?;
-        }
-        self.metrics.step.add(clock.elapsed().as_secs_f64(), frame, self.world.time());
-        divergence::check(&self.world)
+        let clock = Instant::now();
+        let inputs = std::mem::take(&mut self.inputs);
+        self.server.send_inputs(FrameInputs { steps, inputs }).map_err(failed)?;
+        self.simulation.step(steps)?;
+        let world = &self.simulation.world;
+        self.metrics.step.add(clock.elapsed().as_secs_f64(), frame, world.time());
+        divergence::check(world)
     }
 
     /// Returns the frame length, s: of a recording, or the simulated one.
@@ -305,10 +326,11 @@ impl<'a> RunLoop<'a> {
         let recorded = self.replay.as_mut().map(Replay::next).transpose()?;
         if recorded.is_none() && frame > 0 {
             // inputs since the last frame take effect in this one
-            self.take_events(self.time_s);
-            self.input_devices.tracker_inputs().into_iter().for_each(|(from, input)| self.take_input(from, input));
+            self.take_events()?;
+            let tracked = self.input_devices.tracker_inputs();
+            tracked.into_iter().try_for_each(|(from, input)| self.take_input(from, input))?;
             if let Some(pace) = self.pace(steps) {
-                self.take_input(PACE_SOURCE, pace);
+                self.take_input(PACE_SOURCE, pace)?;
             }
             self.simulate(frame, steps)?;
         }
@@ -321,19 +343,20 @@ impl<'a> RunLoop<'a> {
                 self.time_s = recorded.time_s;
             }
             None => {
-                self.server.begin(&self.world, &self.users.viewer).map_err(failed)?;
+                self.server.begin_simulation(&self.simulation).map_err(failed)?;
+                self.inputs.clear();
                 self.wait(processes)?;
-                self.time_s = self.world.time();
-                self.live_viewers.frame(&self.world);
+                self.time_s = self.simulation.world.time();
+                self.live_viewers.frame(&self.simulation.world);
             }
         }
         self.metrics.barrier.add(clock.elapsed().as_secs_f64(), frame, self.time_s);
         self.frames += 1;
-        self.recorder.frame(&self.world, self.server.session());
+        self.recorder.frame(&self.simulation.world, self.server.session());
         let session = self.server.session();
         let replayed_input = self.input_devices.after(|| session.recorded(false))?;
-        replayed_input.into_iter().for_each(|(from, input)| self.take_input(from, input));
-        self.take_events(self.time_s);
+        replayed_input.into_iter().try_for_each(|(from, input)| self.take_input(from, input))?;
+        self.take_events()?;
         self.status.at(&self.server, &self.slots, &self.metrics, frame, self.time_s);
         Ok(true)
     }
@@ -353,12 +376,12 @@ impl<'a> RunLoop<'a> {
         Ok(next)
     }
 
-    fn take_events(&mut self, time_s: f64) {
+    fn take_events(&mut self) -> Result<(), Failure> {
         let mut events = self.server.events();
         events.retain(|event| self.input_devices.live() || !matches!(event, ServerEvent::Input(..)));
         self.recorder.events(&events);
         for event in events {
-            self.metrics.take(&event, time_s);
+            self.metrics.take(&event, self.time_s);
             self.replay.iter_mut().for_each(|replay| replay.take(&event));
             let slot = |k: &u16| self.slots.get(*k as usize).map_or("", |s| s.name.as_str());
             let said = match &event {
@@ -367,6 +390,10 @@ impl<'a> RunLoop<'a> {
                 ServerEvent::Gone(k, true) => Some(format!("facet {} left", slot(k))),
                 ServerEvent::Gone(k, false) => Some(format!("facet {} was dropped; the others continue", slot(k))),
                 ServerEvent::Late(k, frame) => Some(format!("facet {} is late with frame {frame}", slot(k))),
+                ServerEvent::Differs(k, frame, object) => Some(format!(
+                    "facet {} computed another state: {object} differs first, in frame {frame}; it gets the server's world",
+                    slot(k)
+                )),
                 ServerEvent::Presented(k, frame, _, false) => {
                     Some(format!("facet {} drew frame {frame} with another state than was sent", slot(k)))
                 }
@@ -377,21 +404,25 @@ impl<'a> RunLoop<'a> {
                 self.status.interrupted();
             }
             if let ServerEvent::Input(from, input) = event {
-                self.users.take(from, input, time_s);
+                self.act(from, input)?;
             }
         }
+        Ok(())
     }
 
     /// Takes an input of a device other than a facet's window.
-    fn take_input(&mut self, from: FacetNumber, input: Input) {
+    fn take_input(&mut self, from: FacetNumber, input: Input) -> Result<(), Failure> {
         if from != PACE_SOURCE {
             self.server.note_input(input.user, input.sequence);
         }
-        let event = ServerEvent::Input(from, input);
-        self.recorder.events(std::slice::from_ref(&event));
-        if let ServerEvent::Input(from, input) = event {
-            self.users.take(from, input, self.time_s);
-        }
+        self.recorder.events(&[ServerEvent::Input(from, input.clone())]);
+        self.act(from, input)
+    }
+
+    /// Applies an input, and keeps it for the nodes that compute by themselves.
+    fn act(&mut self, from: FacetNumber, input: Input) -> Result<(), Failure> {
+        self.inputs.push((from, input.clone()));
+        self.simulation.take(from, input)
     }
 }
 

@@ -6,6 +6,7 @@ use crate::cave::endpoints::ServerEndpoint;
 use crate::cave::replay::frames::Counts;
 use crate::cave::replay::replayed_input;
 use crate::cave::tracker::osc;
+use crate::failure::Failure;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
@@ -35,6 +36,18 @@ pub struct Metrics {
     /// By slot: the last frame shown, and the number of different ones. A facet that joins again
     /// shows the last frame again.
     shown: Vec<(Option<u64>, u64)>,
+    /// By slot: the first frame in which a facet that steps by itself had another state.
+    differences: Vec<Option<Difference>>,
+    /// Names of the slots.
+    names: Vec<String>,
+}
+
+/// The first difference between a facet that steps the world by itself and the server.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Difference {
+    pub frame: u64,
+    /// The first object whose state differs, in the order of the world.
+    pub object: String,
 }
 
 /// Refused packets of a link, by reason.
@@ -91,6 +104,8 @@ pub struct FacetSummary {
     pub written: Option<u64>,
     /// Shown frames that are not written.
     pub not_written: Option<u64>,
+    /// With `--compute everywhere`: the first frame in which its state was another one.
+    pub first_difference: Option<Difference>,
     pub draw: Quantiles,
     pub bytes_out: u64,
     pub bytes_in: u64,
@@ -100,9 +115,12 @@ pub struct FacetSummary {
 }
 
 impl Metrics {
-    /// Creates the timings for this number of slots.
-    pub fn new(slots: usize) -> Metrics {
+    /// Creates the timings for these slots.
+    pub fn new(names: &[FacetSlot]) -> Metrics {
+        let slots = names.len();
         Metrics {
+            differences: vec![None; slots],
+            names: names.iter().map(|slot| slot.name.clone()).collect(),
             draw: (0..slots).map(|_| Histogram::default()).collect(),
             last: vec![(0, 0.0); slots],
             shown: vec![(None, 0); slots],
@@ -118,6 +136,11 @@ impl Metrics {
             }
             shown.input.iter().for_each(|input| self.input.add(input.as_secs_f64(), shown.frame, time_s));
         }
+        if let ServerEvent::Differs(facet, frame, object) = event
+            && let Some(difference) = self.differences.get_mut(*facet as usize)
+        {
+            difference.get_or_insert_with(|| Difference { frame: *frame, object: object.clone() });
+        }
         let (ServerEvent::Ready(facet, frame, done, _) | ServerEvent::Presented(facet, frame, done, _)) = event else {
             return;
         };
@@ -132,6 +155,16 @@ impl Metrics {
         if let (ServerEvent::Presented(..), Some((last, different))) = (event, self.shown.get_mut(k)) {
             *different += u64::from(last.replace(*frame) != Some(*frame));
         }
+    }
+
+    /// Checks that all facets that step the world by themselves had the server's states.
+    pub fn check_states(&self) -> Result<(), Failure> {
+        let first = |(name, difference): (&String, &Option<Difference>)| {
+            let Difference { frame, object } = difference.as_ref()?;
+            Some(format!("facet {name} computed another state: {object} differs first, in frame {frame}"))
+        };
+        let different: Vec<String> = self.names.iter().zip(&self.differences).filter_map(first).collect();
+        if different.is_empty() { Ok(()) } else { Err(Failure::run("the run", different.join("; "))) }
     }
 
     /// Returns the summaries of all facets after this number of frames; `written` by slot.
@@ -151,6 +184,7 @@ impl Metrics {
                 written,
                 not_written: written.map(|written| self.shown[k].1.saturating_sub(written)),
                 counts,
+                first_difference: self.differences[k].clone(),
                 draw: self.draw[k].quantiles(),
                 bytes_out: link.bytes_out,
                 bytes_in: link.bytes_in,
@@ -206,10 +240,15 @@ impl Summary {
         if self.heads_rejected > 0 {
             text += &format!("{} head poses rejected: an eye would be behind a screen\n", self.heads_rejected);
         }
-        for FacetSummary { name, counts: c, not_shown, not_written, refused_packets, .. } in &self.facets {
+        for FacetSummary { name, counts: c, not_shown, not_written, refused_packets, first_difference, .. } in
+            &self.facets
+        {
+            let differs = first_difference
+                .as_ref()
+                .map_or(String::new(), |d| format!(", DIFFERS from frame {} in {}", d.frame, d.object));
             let lost = not_written.filter(|n| *n > 0).map_or(String::new(), |n| format!(", {n} NOT WRITTEN"));
             text += &format!(
-                "facet {name}: {} shown, {not_shown} not shown{lost}, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times{}\n",
+                "facet {name}: {} shown, {not_shown} not shown{lost}{differs}, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times{}\n",
                 c.presented,
                 c.late,
                 c.missing,
@@ -310,8 +349,10 @@ impl Status {
                 Membership::InStep => "in step",
             };
             let (last, took_ms) = metrics.last[k];
+            let differs =
+                metrics.differences[k].as_ref().map_or(String::new(), |d| format!(", DIFFERS from frame {}", d.frame));
             text += &format!(
-                "\x1b[K  {:<12} {membership:<8} frame {last}, {:.1} frames/s, {} late, dropped {} times, drawn in {took_ms:.2} ms\n",
+                "\x1b[K  {:<12} {membership:<8} frame {last}, {:.1} frames/s, {} late, dropped {} times, drawn in {took_ms:.2} ms{differs}\n",
                 slot.name,
                 per_s(counts.presented, self.shown[k]),
                 counts.late + counts.missing,

@@ -17,7 +17,7 @@ use tumble::scene::cave::{Cave, Screen};
 const WALK_M_PER_S: f64 = 1.5;
 const TURN_RAD_PER_S: f64 = 1.0;
 /// Frequency of the wand's spring, rad/s.
-const PULL_RAD_PER_S: f64 = 10.0;
+pub(super) const PULL_RAD_PER_S: f64 = 10.0;
 /// Source of the pace of walking; no facet and no other device has the number.
 pub const PACE_SOURCE: FacetNumber = FacetNumber::MAX - 1;
 /// Fastest pace, s of wall time per simulated s.
@@ -47,7 +47,7 @@ mod key {
 const HAND_KEYS: [u16; 2] = [key::V, key::B];
 
 /// Source of an input, and its user.
-type Device = (FacetNumber, u16);
+pub(super) type Device = (FacetNumber, u16);
 
 /// All users of a run.
 pub struct Users {
@@ -58,21 +58,21 @@ pub struct Users {
     /// Screens that are drawn for each user.
     screens: Vec<Vec<Screen>>,
     /// The newest input of each device, and its arrival.
-    inputs: BTreeMap<Device, (Input, f64)>,
-    held: BTreeMap<Device, Grabbed>,
+    pub(super) inputs: BTreeMap<Device, (Input, f64)>,
+    pub(super) held: BTreeMap<Device, Grabbed>,
     /// Keys held in the last step.
-    pressed: Vec<u16>,
+    pub(super) pressed: Vec<u16>,
     colliders: UserColliders,
     /// Time by which users walk, s per simulated s. Users live in wall time: where the simulation is
     /// slower, they walk more in each step.
-    pace: f64,
+    pub(super) pace: f64,
 }
 
 /// A body grabbed by a wand.
-struct Grabbed {
-    pull: PickForce,
+pub(super) struct Grabbed {
+    pub pull: PickForce,
     /// Distance from the wand's origin along its ray, m.
-    distance: f64,
+    pub distance: f64,
 }
 
 impl Users {
@@ -121,6 +121,13 @@ impl Users {
         }
         user.input = input.sequence;
         self.inputs.insert((from, input.user), (input, time_s));
+    }
+
+    /// Forgets all inputs: nothing is held or pressed. The users stay where they are.
+    pub fn release(&mut self) {
+        self.inputs.clear();
+        self.held.clear();
+        self.pressed.clear();
     }
 
     /// Applies the users' input for the next step of `dt` seconds.
