@@ -4,6 +4,7 @@
 use crate::args::RunOptions;
 use crate::atomic_file::write_file;
 use crate::failure::Failure;
+use crate::frames_folder::begin_without_list;
 use crate::video::Video;
 use std::path::Path;
 use tumble::dynamics::World;
@@ -154,6 +155,7 @@ fn frames(source: &Source, options: &RunOptions) -> Result<Option<FrameSeries>, 
         return Ok(None);
     }
     if let Some(folder) = &options.frames_dir {
+        begin_without_list(folder, options.overwrite)?;
         std::fs::create_dir_all(folder)
             .map_err(|e| Failure::input(format!("{}: cannot be created: {e}", folder.display())))?;
     }

@@ -7,6 +7,7 @@ use crate::capture::{Capture, write_png};
 use crate::divergence;
 use crate::failure::Failure;
 use crate::progress::Progress;
+use crate::recording_file::{self, NamedBy};
 use crate::summary::{State, Summary, Tally};
 use std::io::Read;
 use std::path::Path;
@@ -27,6 +28,7 @@ pub fn run(options: &RunOptions) -> Result<(), Failure> {
         .into_iter()
         .flatten()
         .try_for_each(|path| check_writable(path).map_err(|why| Failure::run("the results", why)))?;
+    options.record.as_deref().map_or(Ok(false), |file| recording_file::check(file, NamedBy::User))?;
     let mut scene = options.scene.load()?;
     scene.world.duration_s = options.duration.unwrap_or(scene.world.duration_s);
     let (mut world, notes) = scene.build().map_err(Failure::input)?;

@@ -99,6 +99,9 @@ pub struct ServeOptions {
     /// file.
     #[arg(long, value_name = "IP,…", value_delimiter = ',')]
     pub tracker_from: Vec<std::net::IpAddr>,
+    /// Send contacts to a sound engine at this address: impacts, slides and listeners as OSC over UDP.
+    #[arg(long, value_name = "ADDR:PORT")]
+    pub sound: Option<SocketAddr>,
     /// Stream the run to Foxglove (WebSocket); every machine that reaches the address can watch.
     #[cfg(feature = "foxglove")]
     #[arg(long, value_name = "ADDR:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]

@@ -31,7 +31,6 @@ pub mod args;
 mod endpoints;
 mod facet;
 mod facet_report;
-mod frames_folder;
 mod lock;
 mod replay;
 mod run_setup;
@@ -67,9 +66,9 @@ pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
     let method = scene.stepper.is_some() || scene.solver.is_some() || scene.integrator.is_some();
     let stepping = scene.dt.is_some() || scene.threads.is_some() || scene.budget.is_some() || method;
     let everywhere = serve.compute == Some(args::ComputeKind::Everywhere);
-    if serve.record.is_some() || users || stepping || serve.contacts || everywhere {
+    if serve.record.is_some() || users || stepping || serve.contacts || everywhere || serve.sound.is_some() {
         return Err(Failure::input(
-            "a replay shows what was recorded; --record, --user-colliders, --tracker, --replay-input, --contacts, --dt, --stepper, --solver, --integrator, --threads, --budget and --compute everywhere go with tumble cave",
+            "a replay shows what was recorded; --record, --user-colliders, --tracker, --sound, --replay-input, --contacts, --dt, --stepper, --solver, --integrator, --threads, --budget and --compute everywhere go with tumble cave",
         ));
     }
     server::run(serve, Some(&options.cave), Some(&options.file))

@@ -17,6 +17,6 @@ mod tests;
 pub use body::{MODES, SoundBody};
 pub use materials::{SOUND_MATERIALS, SoundMaterial};
 pub use mix::{Listener, RATE_HZ, SPEED_OF_SOUND};
-pub use observe::Soundtrack;
+pub use observe::{Impact, Impacts, Slide, Soundtrack, slides};
 pub use voices::{Rub, Strike};
 pub use wav::{MAX_SECONDS, Mixed, SoundError};

@@ -16,12 +16,74 @@ const QUIET_RUB: f64 = 1e-4;
 
 type Pair = (ObjectId, ObjectId);
 
+/// A blow between two bodies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Impact {
+    /// The bodies.
+    pub bodies: [ObjectId; 2],
+    /// Where they meet, world frame, m.
+    pub point: Vec3,
+    /// Rise of the impulse between them from the step before, N·s, above 0.
+    pub impulse: f64,
+}
+
+/// Finds impacts from step to step.
+#[derive(Clone, Debug, Default)]
+pub struct Impacts {
+    /// Impulse of each pair in the step before, N·s.
+    before: BTreeMap<Pair, f64>,
+}
+
+impl Impacts {
+    /// Returns the impacts of the last step of a world; called after each step.
+    pub fn after_step(&mut self, world: &World) -> Vec<Impact> {
+        let (mut now, mut impacts) = (BTreeMap::new(), Vec::new());
+        for event in world.events() {
+            let (EventKind::ContactBegin | EventKind::ContactPersist, Some(b)) = (event.kind, event.b) else {
+                continue;
+            };
+            let impulse = event.impulse.norm();
+            *now.entry((event.a, b)).or_insert(0.0) += impulse;
+            // what a lasting contact carries is not struck; a rise of it is
+            let struck = impulse - self.before.get(&(event.a, b)).copied().unwrap_or(0.0);
+            if struck > QUIET && struck > 0.2 * impulse {
+                impacts.push(Impact { bodies: [event.a, b], point: event.point, impulse: struck });
+            }
+        }
+        self.before = now;
+        impacts
+    }
+}
+
+/// A contact that slides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slide {
+    /// The bodies.
+    pub bodies: [ObjectId; 2],
+    /// Its place, world frame, m.
+    pub point: Vec3,
+    /// Normal force, N.
+    pub force: f64,
+    /// Speed of sliding, m/s.
+    pub speed: f64,
+}
+
+/// Returns the contacts of the last step that slide with at least 0.1 mW.
+pub fn slides(world: &World) -> impl Iterator<Item = Slide> + '_ {
+    let touching = world.contacts().iter().filter(|contact| contact.is_touching());
+    let slide = |contact: &tumble_core::ContactPoint| {
+        let slip = contact.velocity - contact.normal * contact.velocity.dot(&contact.normal);
+        let (force, speed) = (contact.force.dot(&contact.normal).abs(), slip.norm());
+        Slide { bodies: [contact.a, contact.b], point: contact.point, force, speed }
+    };
+    touching.map(slide).filter(|slide| slide.force * slide.speed > QUIET_RUB)
+}
+
 /// The sounds of a run.
 #[derive(Default)]
 pub struct Soundtrack {
     materials: BTreeMap<String, SoundMaterial>,
-    /// Impulse of each pair in the frame before, N·s.
-    before: BTreeMap<Pair, f64>,
+    impacts: Impacts,
     strikes: Vec<Strike>,
     rubs: Vec<(u64, Rub)>,
     /// Number of each pair that rubs: its noise.
@@ -56,31 +118,16 @@ impl Soundtrack {
         let dt = world.settings().dt;
         let begin = *self.begin.get_or_insert(world.time() - dt);
         let time = world.time() - dt - begin;
-        let mut now = BTreeMap::new();
-        for event in world.events() {
-            let (EventKind::ContactBegin | EventKind::ContactPersist, Some(b)) = (event.kind, event.b) else {
-                continue;
-            };
-            let impulse = event.impulse.norm();
-            *now.entry((event.a, b)).or_insert(0.0) += impulse;
-            // what a lasting contact carries is not struck; a rise of it is
-            let struck = impulse - self.before.get(&(event.a, b)).copied().unwrap_or(0.0);
-            if struck > QUIET && struck > 0.2 * impulse {
-                self.strike(world, [event.a, b], time, event.point, struck);
-            }
+        for Impact { bodies, point, impulse } in self.impacts.after_step(world) {
+            self.strike(world, bodies, time, point, impulse);
         }
-        self.before = now;
-        for contact in world.contacts().iter().filter(|c| c.is_touching()) {
-            let force = contact.force.dot(&contact.normal).abs();
-            let slip = contact.velocity - contact.normal * contact.velocity.dot(&contact.normal);
-            let rub = Rub { time, duration: dt, point: contact.point.into(), force, speed: slip.norm() };
-            if rub.force * rub.speed > QUIET_RUB {
-                let next = self.numbers.len() as u64;
-                let number = *self.numbers.entry((contact.a, contact.b)).or_insert(next);
-                match self.rubs.len() < MAX_VOICES {
-                    true => self.rubs.push((number, rub)),
-                    false => self.left_out += 1,
-                }
+        for Slide { bodies: [a, b], point, force, speed } in slides(world) {
+            let rub = Rub { time, duration: dt, point: point.into(), force, speed };
+            let next = self.numbers.len() as u64;
+            let number = *self.numbers.entry((a, b)).or_insert(next);
+            match self.rubs.len() < MAX_VOICES {
+                true => self.rubs.push((number, rub)),
+                false => self.left_out += 1,
             }
         }
     }

@@ -193,3 +193,44 @@ fn a_run_says_what_it_wrote() {
     let said = succeed(&["run", "incline", "--duration", "0.1", "--summary", &path]);
     assert!(said.contains(&path) && said.contains("times real time"), "{said}");
 }
+
+/// `--record` replaces a recording and an empty file, and nothing else.
+#[test]
+fn a_file_that_is_no_recording_is_not_overwritten() {
+    let folder = Folder::new("run-record");
+    let (mine, empty) = (folder.write("thesis.tex", "mine"), folder.write("run.mcap", ""));
+    let run = |file: &str| ["run", "falling", "--quiet", "--duration", "0.02", "--record", file].map(str::to_owned);
+    let said = fail(&run(&mine).each_ref().map(String::as_str), 2);
+    assert!(said.contains("thesis.tex: is no recording of tumble and is not overwritten"), "{said}");
+    assert_eq!(std::fs::read(&mine).unwrap(), b"mine");
+    let said = fail(&run(&text(&folder.path("."))).each_ref().map(String::as_str), 2);
+    assert!(said.contains("it is a folder"), "{said}");
+    for _ in 0..2 {
+        succeed(&run(&empty).each_ref().map(String::as_str));
+        assert!(read(&empty).unwrap().next_frame().unwrap().is_some());
+    }
+}
+
+/// Pictures of two runs are not mixed: a folder with pictures is refused, or they are removed.
+#[test]
+fn a_folder_with_pictures_of_an_earlier_run_is_refused() {
+    let folder = Folder::new("run-mixed");
+    let frames = folder.path("frames");
+    std::fs::create_dir_all(&frames).unwrap();
+    let [old, other, list] = ["frame_000090.png", "notes.txt", "frames.jsonl"].map(|name| frames.join(name));
+    [&old, &other, &list].into_iter().for_each(|path| std::fs::write(path, "old").unwrap());
+    let args = ["run", "falling", "--quiet", "--duration", "0.1", "--fps", "20", "--size", "32x24", "--frames-dir"];
+    let args = [&args[..], &[frames.to_str().unwrap()]].concat();
+    let out = tumble(&args);
+    let said = String::from_utf8(out.stderr).unwrap();
+    if said.contains("no picture:") {
+        return; // no graphics adapter
+    }
+    assert!(out.status.code() == Some(2) && said.contains("is of an earlier run"), "{said}");
+    assert!(old.exists());
+    succeed(&[&args[..], &["--overwrite"]].concat());
+    let mut names: Vec<String> =
+        std::fs::read_dir(&frames).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    assert_eq!(names, ["frame_000000.png", "frame_000001.png", "frame_000002.png", "notes.txt"]);
+}

@@ -1,8 +1,8 @@
 //! `frames.jsonl`: one line per shown frame of a facet.
 
 use crate::cave::facet_report::Reporter;
-use crate::cave::frames_folder::{LIST, begin, facet_folder, picture_paths};
 use crate::failure::Failure;
+use crate::frames_folder::{LIST, begin, facet_folder, picture_paths};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Write};

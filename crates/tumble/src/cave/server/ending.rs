@@ -75,6 +75,7 @@ impl RunLoop<'_> {
             replay: self.replay.as_ref().map(|replay| replay.counts),
             replay_input: self.input_devices.replayed_counts(),
             tracker: self.input_devices.tracker_counts(),
+            sound: self.sound.as_ref().map(|sound| sound.counts),
             heads_rejected: self.simulation.users.heads_rejected,
             unknown_peers: refused(&self.server.unknown_peers()),
             facets: self.metrics.facets(&self.server, &self.slots, self.frames, written),

@@ -1,6 +1,7 @@
 //! The server's process of a run: it simulates the scene, publishes frames, starts the facets'
 //! processes and writes the recording and the summary.
 
+mod contact_sound;
 mod ending;
 mod facet_commands;
 mod facet_processes;

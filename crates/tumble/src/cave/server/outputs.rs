@@ -4,8 +4,8 @@
 use super::facet_commands::transport_kind;
 use super::recording::Target;
 use crate::cave::args::{CaveOptions, ServeOptions, TransportKind};
-use crate::cave::frames_folder::begin_all;
 use crate::failure::Failure;
+use crate::frames_folder::begin_all;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
 use std::os::unix::fs::MetadataExt;

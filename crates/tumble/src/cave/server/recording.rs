@@ -3,11 +3,12 @@
 use crate::cave::args::ServeOptions;
 use crate::cave::signals::Signals;
 use crate::failure::Failure;
+use crate::recording_file::{self, NamedBy, replaceable};
 use std::fs::{File, OpenOptions};
-use std::os::unix::fs::{FileTypeExt, MetadataExt};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use tumble::dynamics::World;
-use tumble::net::record::{RecorderOptions, is_recording};
+use tumble::net::record::RecorderOptions;
 use tumble::net::sync::{ServerEvent, ServerSession, SessionRecorder};
 use tumble::scene::cave;
 
@@ -82,15 +83,6 @@ impl RunRecorder {
     }
 }
 
-/// Origin of a recording's path.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NamedBy {
-    /// The command line.
-    User,
-    /// The cave file.
-    CaveFile,
-}
-
 /// File of a recording.
 #[derive(Clone, Debug)]
 pub struct Target {
@@ -112,21 +104,9 @@ impl Target {
         given.or_else(|| cave_file.map(of_cave)).filter(|_| !replaying)
     }
 
-    /// Refuses a target that would be damaged: a file that is no recording, a folder, a disk. Returns
-    /// whether it is written directly: pipes and character devices that the user names. A cave
-    /// file, which may come from elsewhere, cannot name them.
+    /// Checks the target as [`recording_file::check`] does.
     pub fn check(&self) -> Result<bool, Failure> {
-        let refuse = |why: &str| Err(Failure::input(format!("{}: cannot record into it: {why}", self.file.display())));
-        match std::fs::metadata(&self.file).ok().map(|about| about.file_type()) {
-            None => Ok(false),
-            Some(kind) if kind.is_dir() => refuse("it is a folder"),
-            Some(kind) if kind.is_file() => replaceable(&self.file).map(|()| false),
-            Some(kind) if kind.is_block_device() => refuse("it is a disk"),
-            Some(_) if self.named_by == NamedBy::CaveFile => {
-                refuse("it is no regular file, and a cave file can name no other; use --record")
-            }
-            Some(_) => Ok(true),
-        }
+        recording_file::check(&self.file, self.named_by)
     }
 }
 
@@ -196,17 +176,6 @@ impl Recording {
     /// Returns the target.
     pub fn file(&self) -> &Path {
         &self.file
-    }
-}
-
-/// Refuses to replace a file that is no recording. An empty file may be replaced.
-fn replaceable(file: &Path) -> Result<(), Failure> {
-    match std::fs::metadata(file) {
-        Ok(about) if about.len() > 0 && !is_recording(file) => Err(Failure::input(format!(
-            "{}: is no recording of tumble and is not overwritten; choose another file",
-            file.display()
-        ))),
-        _ => Ok(()),
     }
 }
 

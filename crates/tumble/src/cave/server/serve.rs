@@ -1,6 +1,7 @@
 //! The server's process: simulates, publishes, keeps real time, and serves facets, recording and
 //! users.
 
+use super::contact_sound::ContactSound;
 use super::facet_commands::{slots, transport_kind};
 use super::facet_processes::{FacetProcesses, ProcessStatus};
 use super::input_devices::InputDevices;
@@ -156,6 +157,7 @@ pub(super) struct RunLoop<'a> {
     inputs: Vec<(FacetNumber, Input)>,
     pub input_devices: InputDevices,
     live_viewers: LiveViewers,
+    pub sound: Option<ContactSound>,
     pub recorder: RunRecorder,
     pub cave: Cave,
     pub scene: String,
@@ -188,6 +190,8 @@ impl<'a> RunLoop<'a> {
         let RunSetup { scene, cave, hash, .. } = setup;
         let input_devices = InputDevices::open(options, &cave, hash, replay.is_none())?;
         let live_viewers = LiveViewers::open(options)?;
+        let users = cave.users.iter().map(|user| user.name.clone()).collect();
+        let sound = options.sound.map(|engine| ContactSound::open(engine, users)).transpose()?;
         let target = Target::of(options, cave.recording.as_ref(), replay.is_some());
         let recorder = RunRecorder::open(target.as_ref(), &scene.file, hash, &simulation.world, signals)?;
         Ok(RunLoop {
@@ -199,6 +203,7 @@ impl<'a> RunLoop<'a> {
             inputs: Vec::new(),
             input_devices,
             live_viewers,
+            sound,
             recorder,
             cave,
             scene: scene.file,
@@ -288,8 +293,10 @@ impl<'a> RunLoop<'a> {
         let clock = Instant::now();
         let inputs = std::mem::take(&mut self.inputs);
         self.server.send_inputs(FrameInputs { steps, inputs }).map_err(failed)?;
-        self.simulation.step(steps)?;
+        let sound = &mut self.sound;
+        self.simulation.step(steps, |world| sound.iter_mut().for_each(|sound| sound.step(world)))?;
         let world = &self.simulation.world;
+        self.sound.iter_mut().for_each(|sound| sound.frame(frame, world, &self.simulation.users.viewer));
         self.metrics.step.add(clock.elapsed().as_secs_f64(), frame, world.time());
         divergence::check(world)
     }

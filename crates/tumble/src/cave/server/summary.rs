@@ -1,6 +1,7 @@
 //! Counts and timings of a run: status lines while it runs, a few lines at its end, and everything
 //! as JSON.
 
+use super::contact_sound;
 use super::histogram::{Histogram, Quantiles};
 use crate::cave::endpoints::ServerEndpoint;
 use crate::cave::replay::frames::Counts;
@@ -84,6 +85,8 @@ pub struct Summary {
     pub replay_input: Option<replayed_input::Counts>,
     /// Messages of a tracker.
     pub tracker: Option<osc::Counts>,
+    /// Datagrams to a sound engine.
+    pub sound: Option<contact_sound::Counts>,
     /// Head poses not applied, because an eye would be behind a screen or in it.
     pub heads_rejected: u64,
     /// Refused packets that belong to no facet, by reason; zero counts are omitted.

@@ -97,12 +97,13 @@ impl CaveSimulation {
         Ok(())
     }
 
-    /// Steps; while time stands, nothing moves.
-    pub fn step(&mut self, steps: u32) -> Result<(), Failure> {
+    /// Steps; while time stands, nothing moves. `after_step` looks at the world after each step.
+    pub fn step(&mut self, steps: u32, mut after_step: impl FnMut(&World)) -> Result<(), Failure> {
         let dt = self.world.settings().dt;
         for _ in 0..if self.paused { 0 } else { steps } {
             self.users.act(&mut self.world, dt)?;
             self.world.step().map_err(|e| Failure::run("the simulation stopped", e))?;
+            after_step(&self.world);
         }
         if self.disturb_after.take_if(|frame| self.world.frame() >= *frame).is_some() {
             self.disturb();
@@ -134,7 +135,7 @@ impl Simulation for CaveSimulation {
         for (from, input) in &frame.inputs {
             self.take(*from, input.clone()).map_err(|e| e.report().to_owned())?;
         }
-        self.step(frame.steps).map_err(|e| e.report().to_owned())
+        self.step(frame.steps, |_| {}).map_err(|e| e.report().to_owned())
     }
 
     fn save(&self) -> Vec<u8> {

@@ -77,10 +77,10 @@ fn time_stands_while_paused() {
     let mut simulation = simulation(false);
     simulation.take(OPERATOR_SOURCE, Request::Pause.input(1)).ok().unwrap();
     let before = simulation.world.save();
-    simulation.step(10).ok().unwrap();
+    simulation.step(10, |_| {}).ok().unwrap();
     assert!(simulation.is_paused() && simulation.world.save() == before);
     simulation.take(OPERATOR_SOURCE, Request::Resume.input(2)).ok().unwrap();
-    simulation.step(10).ok().unwrap();
+    simulation.step(10, |_| {}).ok().unwrap();
     assert!((simulation.world.time() - 10.0 * simulation.world.settings().dt).abs() < 1e-12);
     simulation.take(OPERATOR_SOURCE, Request::Reset.input(3)).ok().unwrap();
     assert!(simulation.world.save() == before);

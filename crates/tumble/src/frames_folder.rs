@@ -1,5 +1,5 @@
-//! Folders of `--frames-dir` and `--log-dir`: a folder per facet, with the facet's pictures and
-//! `frames.jsonl`. A run begins with an empty place or refuses, so that no file of an earlier run
+//! Folders of `--frames-dir` and `--log-dir`: that of `tumble run`, or one per facet of a cave with
+//! the facet's pictures and `frames.jsonl`. A run begins with an empty place or refuses, so that no file of an earlier run
 //! is taken for one of this run.
 
 use crate::failure::Failure;
@@ -21,7 +21,7 @@ pub fn picture_paths(folder: &Path, frame: u64) -> [PathBuf; 2] {
     [folder.join(&name), folder.join(format!(".{name}{UNFINISHED}"))]
 }
 
-/// Returns whether a file's name is one that a facet gives: the list, a picture, or an unfinished
+/// Returns whether a file's name is one that a facet or a run gives: the list, a picture, or an unfinished
 /// picture.
 fn is_facets(name: &str) -> bool {
     let whole = name.strip_suffix(UNFINISHED).and_then(|name| name.strip_prefix('.')).unwrap_or(name);
@@ -67,16 +67,21 @@ pub fn begin_all(folder: &Path, overwrite: bool) -> Result<(), Failure> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let mut folders: Vec<PathBuf> = entries.map(|e| e.path()).filter(|path| path.is_dir()).collect();
     folders.sort();
-    folders.iter().try_for_each(|folder| {
-        begin(folder, overwrite)?;
-        // an earlier list stays only where this run writes another one
-        let list = folder.join(LIST);
-        if overwrite && list.symlink_metadata().is_ok_and(|about| about.is_file()) {
-            std::fs::remove_file(&list)
-                .map_err(|e| Failure::input(format!("{}: cannot be removed: {e}", list.display())))?;
-        }
-        Ok(())
-    })
+    folders.iter().try_for_each(|folder| begin_without_list(folder, overwrite))
+}
+
+/// Makes a folder ready for a run that writes no list there, as [`begin`] does.
+///
+/// # Errors
+/// Those of [`begin`].
+pub fn begin_without_list(folder: &Path, overwrite: bool) -> Result<(), Failure> {
+    begin(folder, overwrite)?;
+    let list = folder.join(LIST);
+    if overwrite && list.symlink_metadata().is_ok_and(|about| about.is_file()) {
+        std::fs::remove_file(&list)
+            .map_err(|e| Failure::input(format!("{}: cannot be removed: {e}", list.display())))?;
+    }
+    Ok(())
 }
 
 #[cfg(test)]
