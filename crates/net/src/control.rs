@@ -214,7 +214,9 @@ mod tests {
             assert_eq!(ask(method, &path, &bearer), Ok(Some(action.clone())));
             let other = if method == "GET" { "POST" } else { "GET" };
             assert_eq!(ask(other, &path, &bearer), Err(Refusal::Method));
-            for wrong in ["", "Authorization: Bearer\r\n", "Authorization: Bearer 0123456789abcdef\r\n", "Cookie: x\r\n"] {
+            for wrong in
+                ["", "Authorization: Bearer\r\n", "Authorization: Bearer 0123456789abcdef\r\n", "Cookie: x\r\n"]
+            {
                 assert_eq!(ask(method, &path, wrong), Err(Refusal::Token));
             }
             let whole = format!("{method} {path} HTTP/1.1\r\n{bearer}\r\n");
@@ -223,7 +225,10 @@ mod tests {
             }
         }
         assert_eq!(ask("GET", "/", ""), Ok(Some(Action::Page)));
-        assert_eq!(read_request(b"GET /api/status HTTP/1.1\r\nAuthorization: Bearer \r\n\r\n", ""), Err(Refusal::Token));
+        assert_eq!(
+            read_request(b"GET /api/status HTTP/1.1\r\nAuthorization: Bearer \r\n\r\n", ""),
+            Err(Refusal::Token)
+        );
     }
 
     #[test]

@@ -43,6 +43,7 @@ fn main() -> ExitCode {
         Command::Cave(options) => cave::cave(&options),
         Command::Serve(options) => cave::serve(&options),
         Command::Facet(options) => cave::facet(&options),
+        Command::Console(options) => cave::console(&options),
         Command::Relay(options) => cave::relay(&options),
         Command::Replay(options) => cave::replay(&options),
         Command::Recover(options) => cave::recover(&options),

@@ -6,7 +6,9 @@ mod values;
 pub use scene::{OpeningOptions, SceneOptions, kind};
 pub use values::{rate, seconds};
 
-use crate::cave::args::{CaveOptions, FacetOptions, RecoverOptions, RelayOptions, ReplayOptions, ServeOptions};
+use crate::cave::args::{
+    CaveOptions, ConsoleOptions, FacetOptions, RecoverOptions, RelayOptions, ReplayOptions, ServeOptions,
+};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use tumble::collide::Builder;
@@ -34,6 +36,8 @@ pub enum Command {
     Serve(Box<ServeOptions>),
     /// Draw one facet of a cave, from a server that runs or will run
     Facet(Box<FacetOptions>),
+    /// Watch and direct a run in a cave by its console: status, pause, reset, record and others
+    Console(ConsoleOptions),
     /// Forward the datagrams of a tracker to the server of a cave, sealed
     Relay(RelayOptions),
     /// Show a recording in a cave, and compare its pictures with those recorded

@@ -2,7 +2,7 @@
 
 use crate::args::{Overlays, SceneOptions};
 use crate::cave::tracker::sealed::MAX_RELAYS;
-use clap::{Args, ValueEnum};
+use clap::{Args, Subcommand, ValueEnum};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use tumble::render::{DebugDraw, Quality, UnknownOverlay};
@@ -121,9 +121,63 @@ pub struct ServeOptions {
     /// by itself from the users' inputs, and its states are compared with the server's.
     #[arg(long, value_name = "WHERE")]
     pub compute: Option<ComputeKind>,
+    /// Serve an operator's console (page and `tumble console`) at this address. Clients need the token
+    /// of the run, which this user finds by itself, or that of --console-token.
+    #[arg(long, value_name = "ADDR:PORT", num_args = 0..=1, default_missing_value = crate::cave::console::DEFAULT_ADDRESS)]
+    pub console: Option<SocketAddr>,
+    /// File with the console's token, at least 16 characters; required if other machines reach the
+    /// address of --console.
+    #[arg(long, value_name = "FILE", requires = "console")]
+    pub console_token: Option<PathBuf>,
+    /// Another scene, which begins when the one before ends or at the console's `next`; may be given
+    /// several times.
+    #[arg(long, value_name = "SCENE")]
+    pub then: Vec<String>,
     /// Print errors only.
     #[arg(long, short)]
     pub quiet: bool,
+}
+
+/// Options of `tumble console`.
+#[derive(Args, Clone)]
+pub struct ConsoleOptions {
+    /// Address of the console (`--console` of the run).
+    #[arg(value_name = "ADDR:PORT")]
+    pub address: SocketAddr,
+    /// File with the token (default: that of a run of this user on this machine).
+    #[arg(long, value_name = "FILE", global = true)]
+    pub token_file: Option<PathBuf>,
+    /// Print the answer as JSON.
+    #[arg(long, global = true)]
+    pub json: bool,
+    #[command(subcommand)]
+    pub command: ConsoleCommand,
+}
+
+/// What a console is asked for.
+#[derive(Subcommand, Clone)]
+pub enum ConsoleCommand {
+    /// Print the state of the run; exit code 1 if there are alarms
+    Status,
+    /// Print the last lines of all processes
+    Log,
+    /// Let simulated time stand
+    Pause,
+    /// Let simulated time go on
+    Resume,
+    /// Set the world back to its first state
+    Reset,
+    /// End this scene and begin the next one of --then
+    Next,
+    /// Record into a file, written where the run was started
+    Record {
+        /// Name without folders that ends with .mcap.
+        file: String,
+    },
+    /// End the recording
+    Unrecord,
+    /// End the run
+    Stop,
 }
 
 /// Overlays of a facet, which knows poses and contacts; no words mean none.
@@ -191,6 +245,9 @@ pub struct DrawOptions {
     /// Draw into memory even if there is a display.
     #[arg(long)]
     pub offscreen: bool,
+    /// Look at the own pictures for the operator's console. A launcher with --console sets it.
+    #[arg(long, hide = true)]
+    pub watch_pictures: bool,
     /// Draw nothing: states are applied and acknowledged.
     #[arg(long, conflicts_with_all = ["frames_dir", "burn_in"])]
     pub no_pictures: bool,

@@ -2,7 +2,9 @@
 //! and which launch commands such as `ssh` pass on.
 //!
 //! ```text
-//! tumble-facet {"number":7,"preparing":false,"written":41,"waiting":2,"progress":5210}
+//! tumble-facet {"number":7,"preparing":false,"written":41,"waiting":2,"progress":5210,…}
+//! tumble-facet-line draws into memory, because …
+//! tumble-facet-picture 89504e47…
 //! ```
 //!
 //! So the launcher waits for a facet that works and does not wait for one that hangs. Other lines
@@ -10,6 +12,7 @@
 
 use crate::failure::Failure;
 use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -17,8 +20,13 @@ use std::time::{Duration, Instant};
 
 /// Beginning of a report's line.
 const MARK: &str = "tumble-facet ";
+/// Beginnings of lines with a message for the operator, and with a small picture (PNG, hexadecimal).
+const LINE_MARK: &str = "tumble-facet-line ";
+const PICTURE_MARK: &str = "tumble-facet-picture ";
 /// Maximum length of a line, bytes; longer lines are ignored.
-const MAX_LINE_BYTES: usize = 1024;
+const MAX_LINE_BYTES: usize = 1 << 17;
+/// Maximum number of messages that wait.
+const MAX_MESSAGES: usize = 100;
 /// Interval at which changes are reported.
 const INTERVAL: Duration = Duration::from_millis(100);
 /// Number of intervals after which a facet that prepares reports even without a change.
@@ -37,12 +45,43 @@ pub struct FacetReport {
     pub waiting: u64,
     /// Work done on files, in arbitrary units; it grows as long as writing proceeds.
     pub progress: u64,
+    /// Number of pictures that were looked at, of black ones, and of black ones since the last other.
+    #[serde(default)]
+    pub pictures: u64,
+    #[serde(default)]
+    pub black: u64,
+    #[serde(default)]
+    pub black_now: u64,
+    /// First 16 bytes of the BLAKE3 hash of the last picture, hexadecimal.
+    #[serde(default)]
+    pub image: String,
+}
+
+/// Messages and a picture that wait for the launcher.
+#[derive(Default)]
+struct Outbox {
+    lines: VecDeque<String>,
+    picture: Option<Vec<u8>>,
+}
+
+impl Outbox {
+    /// Returns what waits as lines.
+    fn take(&mut self) -> String {
+        let one_line = |text: &String| text.replace(['\n', '\r'], " ");
+        let mut text: String = self.lines.iter().map(|line| format!("{LINE_MARK}{}\n", one_line(line))).collect();
+        self.lines.clear();
+        if let Some(png) = self.picture.take() {
+            text += &format!("{PICTURE_MARK}{}\n", png.iter().map(|b| format!("{b:02x}")).collect::<String>());
+        }
+        text
+    }
 }
 
 /// A facet's side.
 #[derive(Clone, Default)]
 pub struct Reporter {
     report: Arc<Mutex<FacetReport>>,
+    outbox: Arc<Mutex<Outbox>>,
     /// Whether there is a launcher to report to.
     speaks: bool,
 }
@@ -51,7 +90,7 @@ impl Reporter {
     /// Starts to report to a launcher, if there is one.
     pub fn start(to_launcher: bool) -> Result<Reporter, Failure> {
         let report = FacetReport { preparing: true, ..FacetReport::default() };
-        let reporter = Reporter { report: Arc::new(Mutex::new(report)), speaks: to_launcher };
+        let reporter = Reporter { report: Arc::new(Mutex::new(report)), outbox: Arc::default(), speaks: to_launcher };
         if to_launcher {
             let ours = reporter.clone();
             std::thread::Builder::new()
@@ -67,9 +106,25 @@ impl Reporter {
         change(&mut lock(&self.report));
     }
 
+    /// Sends a message to the operator's console.
+    pub fn line(&self, text: &str) {
+        let mut outbox = lock(&self.outbox);
+        if outbox.lines.len() < MAX_MESSAGES {
+            outbox.lines.push_back(text.chars().take(1000).collect());
+        }
+    }
+
+    /// Sends a small picture (PNG) to the operator's console; a later one replaces it while it waits.
+    pub fn picture(&self, png: Vec<u8>) {
+        if png.len() < MAX_LINE_BYTES / 2 - PICTURE_MARK.len() {
+            lock(&self.outbox).picture = Some(png);
+        }
+    }
+
     /// Reports the present state at once.
     pub fn flush(&self) {
         if self.speaks {
+            let _ = write_text(&lock(&self.outbox).take());
             let report = self.next();
             // a launcher that is gone reads nothing
             let _ = write_line(&report);
@@ -86,6 +141,11 @@ impl Reporter {
         let (mut last, mut silent) = (FacetReport::default(), 0);
         loop {
             let now = lock(&self.report).clone();
+            let text = lock(&self.outbox).take();
+            // the lock is free while this waits for the pipe
+            if !text.is_empty() && write_text(&text).is_err() {
+                return;
+            }
             silent += 1;
             if now != last || now.preparing && silent >= HEARTBEAT_INTERVALS {
                 // the lock is free while this waits for the pipe
@@ -101,9 +161,12 @@ impl Reporter {
 }
 
 fn write_line(report: &FacetReport) -> std::io::Result<()> {
-    let line = format!("{MARK}{}\n", serde_json::to_string(report)?);
+    write_text(&format!("{MARK}{}\n", serde_json::to_string(report)?))
+}
+
+fn write_text(text: &str) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
-    out.write_all(line.as_bytes())?;
+    out.write_all(text.as_bytes())?;
     out.flush()
 }
 
@@ -115,6 +178,9 @@ pub struct Received {
     pub heard: Option<Instant>,
     /// Arrival of the newest report that shows a progress of writing.
     pub proceeded: Option<Instant>,
+    /// Messages and a picture since they were last taken.
+    pub lines: VecDeque<String>,
+    pub picture: Option<Vec<u8>>,
 }
 
 impl Received {
@@ -153,6 +219,12 @@ impl ReportReader {
         lock(&self.received).clone()
     }
 
+    /// Takes the messages and the picture that have arrived.
+    pub fn take_messages(&self) -> (VecDeque<String>, Option<Vec<u8>>) {
+        let mut received = lock(&self.received);
+        (std::mem::take(&mut received.lines), received.picture.take())
+    }
+
     /// Waits at most `most` for the end of the pipe, so that a process that has ended is known by
     /// its last report.
     pub fn wait_for_end(&self, most: Duration) {
@@ -170,9 +242,7 @@ fn read_lines(mut pipe: impl Read, received: &Mutex<Received>) {
             match byte {
                 b'\n' => {
                     let text = std::str::from_utf8(&line).ok().filter(|_| !too_long);
-                    if let Some(report) = text.and_then(parse) {
-                        lock(received).take(report);
-                    }
+                    text.into_iter().for_each(|line| take_line(line, received));
                     line.clear();
                     too_long = false;
                 }
@@ -183,8 +253,25 @@ fn read_lines(mut pipe: impl Read, received: &Mutex<Received>) {
     }
 }
 
-fn parse(line: &str) -> Option<FacetReport> {
-    serde_json::from_str(line.strip_prefix(MARK)?).ok()
+fn take_line(line: &str, received: &Mutex<Received>) {
+    if let Some(report) = line.strip_prefix(MARK).and_then(|json| serde_json::from_str(json).ok()) {
+        lock(received).take(report);
+    } else if let Some(text) = line.strip_prefix(LINE_MARK) {
+        let lines = &mut lock(received).lines;
+        if lines.len() < MAX_MESSAGES {
+            lines.push_back(text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect());
+        }
+    } else if let Some(png) = line.strip_prefix(PICTURE_MARK).and_then(bytes_of) {
+        lock(received).picture = Some(png);
+    }
+}
+
+/// Reads hexadecimal digits.
+fn bytes_of(hex: &str) -> Option<Vec<u8>> {
+    let (pairs, rest) = hex.as_bytes().as_chunks::<2>();
+    let digit = |b: u8| char::from(b).to_digit(16);
+    let byte = |[a, b]: &[u8; 2]| Some((16 * digit(*a)? + digit(*b)?) as u8);
+    rest.is_empty().then(|| pairs.iter().map(byte).collect()).flatten()
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -204,14 +291,19 @@ mod tests {
             "Welcome to this machine\n".to_owned(),
             line(&report(1, 3)),
             format!("{MARK}{{\"number\":9}}\n"),
-            format!("{MARK}{}\n", "x".repeat(100_000)),
+            format!("{MARK}{}\n", "x".repeat(200_000)),
             line(&report(3, 5)),
             line(&report(2, 4)),
+            format!("{LINE_MARK}no\twindow\n{PICTURE_MARK}00ff1\n{PICTURE_MARK}00fF\n"),
             line(&report(4, 6)).trim_end().to_owned(),
         ]
         .concat();
         let received = Mutex::new(Received::default());
         read_lines(text.as_bytes(), &received);
         assert_eq!(lock(&received).report, report(3, 5));
+        assert_eq!(
+            (lock(&received).lines.clone(), lock(&received).picture.clone()),
+            (VecDeque::from(["no window".to_owned()]), Some(vec![0, 255]))
+        );
     }
 }

@@ -9,6 +9,7 @@ use crate::failure::Failure;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
+use std::net::SocketAddr;
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -34,6 +35,22 @@ pub struct RunInfo {
     /// Key of the run over UDP without a key file.
     #[serde(default)]
     pub key: Option<RunKey>,
+    /// The operator's console.
+    #[serde(default)]
+    pub console: Option<ConsoleLink>,
+}
+
+/// Address and token of a console. The file can be read by its user alone.
+#[derive(Clone, PartialEq, Serialize, Deserialize)]
+pub struct ConsoleLink {
+    pub address: SocketAddr,
+    pub token: String,
+}
+
+impl std::fmt::Debug for ConsoleLink {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "ConsoleLink({}, secret)", self.address)
+    }
 }
 
 impl RunInfo {
@@ -49,6 +66,7 @@ impl RunInfo {
             start_ticks: start_ticks(pid).unwrap_or(0),
             address: None,
             key: None,
+            console: None,
         }
     }
 
@@ -138,6 +156,15 @@ impl Drop for RunLock {
 pub fn find_run(place: &str) -> Result<Option<RunServer>, Failure> {
     let run = read(&path(place)?).filter(RunInfo::is_running);
     Ok(run.and_then(|run| Some(RunServer { address: run.address?, key: run.key })))
+}
+
+/// Returns the token of the console at this address, if a run of this user on this machine has it.
+pub fn find_console(at: SocketAddr) -> Result<Option<String>, Failure> {
+    let (folder, _) = folder().map_err(|e| Failure::run("the cave's lock", e))?;
+    let files = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let locks = files.filter(|path| path.extension().is_some_and(|extension| extension == "lock"));
+    let consoles = locks.filter_map(|path| read(&path)).filter(RunInfo::is_running).filter_map(|run| run.console);
+    Ok(consoles.into_iter().find(|console| console.address == at).map(|console| console.token))
 }
 
 /// Returns when a process started, ticks since boot. Returns `None` if there is no such process, or

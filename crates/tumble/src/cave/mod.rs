@@ -28,6 +28,7 @@ macro_rules! eprint {
 
 mod address;
 pub mod args;
+pub mod console;
 mod endpoints;
 mod facet;
 mod facet_report;
@@ -40,7 +41,7 @@ mod simulation;
 mod tracker;
 
 use crate::failure::Failure;
-use args::{CaveOptions, FacetOptions, RecoverOptions, RelayOptions, ReplayOptions, ServeOptions};
+use args::{CaveOptions, ConsoleOptions, FacetOptions, RecoverOptions, RelayOptions, ReplayOptions, ServeOptions};
 
 /// Runs the server and the facets of this machine.
 pub fn cave(options: &CaveOptions) -> Result<(), Failure> {
@@ -72,6 +73,11 @@ pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
         ));
     }
     server::run(serve, Some(&options.cave), Some(&options.file))
+}
+
+/// Asks the console of a run.
+pub fn console(options: &ConsoleOptions) -> Result<(), Failure> {
+    console::console(options)
 }
 
 /// Forwards the datagrams of a tracker to a server, sealed.

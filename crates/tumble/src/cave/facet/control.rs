@@ -1,5 +1,6 @@
 //! Conditions that end a facet: a signal, the end of its parent, no server for too long.
 
+use crate::cave::facet_report::Reporter;
 use crate::cave::signals::Signals;
 use crate::failure::Failure;
 use std::io::Read;
@@ -17,6 +18,7 @@ const REPORT_DELAY: Duration = Duration::from_secs(1);
 pub struct FacetControl {
     pub name: String,
     pub signals: Signals,
+    pub reporter: Reporter,
     pub parent_gone: Option<Arc<AtomicBool>>,
     pub connect_timeout: Duration,
     /// Whether packets are authenticated. A server with another key file then does not answer.
@@ -30,6 +32,7 @@ impl FacetControl {
 
     pub fn say(&self, what: &str) {
         eprintln!("facet {}: {what}", self.name);
+        self.reporter.line(what);
     }
 
     pub fn is_orphaned(&self) -> bool {

@@ -5,6 +5,7 @@ mod burn_in;
 mod control;
 mod desktop;
 mod frame_log;
+mod picture_watch;
 mod priority;
 mod render_thread;
 mod runner;
@@ -22,6 +23,7 @@ use crate::failure::Failure;
 use control::{FacetControl, POLL_INTERVAL, watch_parent};
 use desktop::{Desktop, Probe, desktop};
 use frame_log::{Earlier, FrameLog};
+use picture_watch::PictureWatch;
 use render_thread::{RenderThread, slot_name};
 use runner::FacetRunner;
 use std::time::{Duration, Instant};
@@ -32,9 +34,18 @@ use window::WindowSetup;
 
 /// Runs a facet until the end of the run.
 pub fn run(options: &FacetOptions) -> Result<(), Failure> {
+    let reporter = Reporter::start(options.parent_watch)?;
+    let outcome = show(options, &reporter);
+    if let Err(failure) = &outcome {
+        reporter.line(failure.report());
+    }
+    reporter.flush();
+    outcome
+}
+
+fn show(options: &FacetOptions, reporter: &Reporter) -> Result<(), Failure> {
     let signals = Signals::watch()?;
     let parent_gone = options.parent_watch.then(watch_parent).transpose()?;
-    let reporter = Reporter::start(options.parent_watch)?;
     let compute = compute(options)?;
     let role = if compute == ComputeKind::Everywhere { Role::Server } else { Role::Facet };
     let setup = RunSetup::load(options.scene.load()?, &options.surroundings, role)?;
@@ -63,6 +74,7 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     let mut control = FacetControl {
         name: name.clone(),
         signals,
+        reporter: reporter.clone(),
         parent_gone,
         connect_timeout: Duration::from_secs_f64(options.connect_timeout),
         sealed: false,
@@ -72,7 +84,7 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     let again = options.server.is_none() && options.run.is_none();
     let link = FacetEndpoint::open(&server, number, &setup, again)?;
     let session_options = session_options(&setup, &name)?;
-    let log = frame_log(options, &name, &reporter)?;
+    let log = frame_log(options, &name, reporter)?;
     let facet = match compute {
         ComputeKind::Server => Facet::new(link, session_options, setup.world),
         ComputeKind::Everywhere => {
@@ -82,7 +94,8 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
             Facet::computing(link, SessionOptions { scene: hash, ..session_options }, Box::new(simulation))
         }
     };
-    let mut runner = FacetRunner::new(facet, render_thread, log, draw.burn_in, control, reporter.clone());
+    let watch = draw.watch_pictures.then(|| PictureWatch::new(reporter.clone()));
+    let mut runner = FacetRunner::new(facet, render_thread, log, draw.burn_in, control, reporter.clone(), watch);
     let outcome = match window_setup {
         Some(window_setup) => window_setup.show(&mut runner, draw.burn_in, desktop.take()),
         None => runner.run_offscreen(),
@@ -91,7 +104,6 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     let _ = runner.facet.leave();
     // a write error is the cause of other errors
     let written = runner.log.as_mut().map_or(Ok(()), FrameLog::finish);
-    reporter.flush();
     written.and(outcome)
 }
 

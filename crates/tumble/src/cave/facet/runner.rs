@@ -2,6 +2,7 @@
 
 use super::control::{FacetControl, POLL_INTERVAL, ServerWait};
 use super::frame_log::FrameLog;
+use super::picture_watch::PictureWatch;
 use super::priority;
 use super::render_thread::{RenderThread, image_hash};
 use crate::cave::endpoints::FacetEndpoint;
@@ -22,6 +23,7 @@ pub struct FacetRunner {
     burn_in: bool,
     control: FacetControl,
     reporter: Reporter,
+    watch: Option<PictureWatch>,
     server_wait: ServerWait,
     /// The frame being drawn, and its simulated time.
     drawing: Option<(u64, f64)>,
@@ -50,9 +52,21 @@ impl FacetRunner {
         burn_in: bool,
         control: FacetControl,
         reporter: Reporter,
+        watch: Option<PictureWatch>,
     ) -> FacetRunner {
         let server_wait = ServerWait::default();
-        FacetRunner { facet, render_thread, log, burn_in, control, reporter, server_wait, drawing: None, picture: None }
+        FacetRunner {
+            facet,
+            render_thread,
+            log,
+            burn_in,
+            control,
+            reporter,
+            watch,
+            server_wait,
+            drawing: None,
+            picture: None,
+        }
     }
 
     /// Reports that the facet is ready to join. With a software driver it has begun to draw by now,
@@ -88,6 +102,11 @@ impl FacetRunner {
     /// Returns whether the frame log has room for another frame.
     pub fn has_room(&self) -> bool {
         self.log.as_ref().is_none_or(FrameLog::has_room)
+    }
+
+    /// Returns whether a window must read its next picture back.
+    pub fn wants_picture(&self) -> bool {
+        self.log.is_some() || self.watch.as_ref().is_some_and(PictureWatch::is_due)
     }
 
     /// Returns the number of whole seconds without a server.
@@ -139,6 +158,9 @@ impl FacetRunner {
     pub fn drawn(&mut self, frame: u64, time_s: f64, image: Option<Image>) -> Result<(), Failure> {
         self.drawing = None;
         let hash = image.as_ref().map_or([0; 16], image_hash);
+        if let (Some(watch), Some(image)) = (&mut self.watch, &image) {
+            watch.look(image, &hash);
+        }
         self.picture = Some(DrawnFrame { frame, time_s, hash, image });
         self.facet.drawn(hash).map_err(failed)
     }

@@ -115,8 +115,9 @@ impl Window<'_> {
         };
         apply_viewer(view, viewer);
         self.window_setup.view_mode.draw(screen, &self.list)?;
-        // a frame is drawn when the device has finished; it is read back only for the log
-        let image = match self.runner.log.is_some() {
+        // a frame is drawn when the device has finished; it is read back only for the log, and for
+        // the console once a second
+        let image = match self.runner.wants_picture() {
             true => Some(screen.renderer().read()?),
             false => screen.renderer().wait().map(|()| None)?,
         };

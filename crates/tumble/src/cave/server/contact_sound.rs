@@ -183,7 +183,8 @@ mod tests {
         let mut world = World::new(Settings::default().with_dt(1e-3)).unwrap();
         world.add_static(RigidBody::fixed(Shape::half_space()).with_name("ground")).unwrap();
         let material = Material { restitution: 0.5, ..Material::default() };
-        let sphere = RigidBody::new(Shape::sphere(0.1).unwrap()).with_name("sphere").with_mass(2.0).with_material(material);
+        let sphere =
+            RigidBody::new(Shape::sphere(0.1).unwrap()).with_name("sphere").with_mass(2.0).with_material(material);
         world.add(sphere.with_pose(tumble::collide::Pose::translation(0.3, -0.2, 0.6))).unwrap();
         let viewer = Viewer {
             users: vec![tumble::net::sync::User {

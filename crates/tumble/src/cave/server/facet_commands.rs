@@ -72,6 +72,7 @@ pub fn facet_args(launcher: &CaveOptions, name: &str, address: &ServerAddress, a
         ("--burn-in", draw.burn_in),
         ("--offscreen", draw.offscreen),
         ("--no-pictures", draw.no_pictures),
+        ("--watch-pictures", launcher.serve.console.is_some() && !draw.no_pictures),
     ];
     args.extend(switches.iter().filter(|(_, on)| *on).map(|(name, _)| (*name).to_owned()));
     // the launcher times out before its facets

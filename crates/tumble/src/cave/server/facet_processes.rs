@@ -4,7 +4,7 @@
 use super::facet_commands::{address_for, facet_args, launch, scene_args, shell_quoted, slots};
 use crate::cave::address::ServerAddress;
 use crate::cave::args::{CaveOptions, ServeOptions};
-use crate::cave::facet_report::{Received, ReportReader};
+use crate::cave::facet_report::{FacetReport, Received, ReportReader};
 use crate::cave::signals::Signals;
 use crate::failure::Failure;
 use std::collections::VecDeque;
@@ -277,6 +277,21 @@ impl FacetProcesses {
             }
             std::thread::sleep(Duration::from_millis(10));
         }
+    }
+
+    /// Returns the messages and the small pictures of the facets since the last call.
+    pub fn messages(&self) -> Vec<(FacetNumber, VecDeque<String>, Option<Vec<u8>>)> {
+        let of = |process: &FacetProcess| {
+            let (lines, picture) = process.reports.as_ref()?.take_messages();
+            (!lines.is_empty() || picture.is_some()).then_some((process.slot, lines, picture))
+        };
+        self.processes.iter().filter_map(of).collect()
+    }
+
+    /// Returns the last report of the facet in a slot; an empty one if this process did not start it.
+    pub fn report_of(&self, slot: FacetNumber) -> FacetReport {
+        let process = self.processes.iter().find(|process| process.slot == slot);
+        process.map_or_else(FacetReport::default, |process| process.received().report)
     }
 
     /// Returns by slot how many frames have been written; `None` for a facet that this process did

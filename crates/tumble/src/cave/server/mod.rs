@@ -8,9 +8,13 @@ mod facet_processes;
 mod histogram;
 mod input_devices;
 mod live_viewers;
+mod operator;
 mod outputs;
 mod recording;
 mod serve;
+mod start;
 mod summary;
 
-pub use serve::run;
+pub use outputs::say;
+pub use start::run;
+pub use summary::Difference;

@@ -42,6 +42,18 @@ pub fn check(
     folder.map_or(Ok(()), |folder| begin_all(folder, draw.is_some_and(|draw| draw.overwrite)))
 }
 
+/// Refuses outputs of which the next scene would replace those of the one before.
+pub fn check_scenes(options: &ServeOptions, launcher: Option<&CaveOptions>, replaying: bool) -> Result<(), Failure> {
+    let frames = launcher.is_some_and(|l| l.draw.frames_dir.is_some() || l.draw.log_dir.is_some());
+    let files = options.record.is_some() || options.summary.is_some() || options.replay_input.is_some();
+    if !options.then.is_empty() && (frames || files || replaying) {
+        return Err(Failure::input(
+            "--then: further scenes go without --frames-dir, --log-dir, --record, --summary, --replay-input and replays",
+        ));
+    }
+    Ok(())
+}
+
 /// Returns whether two paths name the same file.
 pub fn same(a: &Path, b: &Path) -> bool {
     let number = |path: &Path| std::fs::metadata(path).map(|about| (about.dev(), about.ino())).ok();

@@ -44,6 +44,33 @@ impl RunRecorder {
         Ok(RunRecorder { current: Some((recorder, recording)), recorded: false, failure: None })
     }
 
+    /// Starts a recording within a run.
+    ///
+    /// # Errors
+    /// A recording is in progress, or the file cannot be opened.
+    pub fn start(
+        &mut self,
+        target: &Target,
+        scene: &str,
+        hash: [u8; 32],
+        world: &World,
+        signals: &Signals,
+    ) -> Result<(), Failure> {
+        if let Some(file) = self.file() {
+            return Err(Failure::run("recording", format!("{} is being recorded", file.display())));
+        }
+        let mut started = RunRecorder::open(Some(target), scene, hash, world, signals)?;
+        started.begin()?;
+        started.failure = self.failure.take();
+        *self = started;
+        Ok(())
+    }
+
+    /// Returns the file of the recording in progress.
+    pub fn file(&self) -> Option<&Path> {
+        self.current.as_ref().map(|(_, recording)| recording.file())
+    }
+
     /// Moves the recording to its target: the run begins.
     pub fn begin(&mut self) -> Result<(), Failure> {
         self.current.as_mut().map_or(Ok(()), |(_, recording)| recording.begin())

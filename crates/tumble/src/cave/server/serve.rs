@@ -1,35 +1,25 @@
-//! The server's process: simulates, publishes, keeps real time, and serves facets, recording and
-//! users.
+//! The frames of a run: simulates, publishes, keeps real time, and serves facets, recording and users.
 
 use super::contact_sound::ContactSound;
-use super::facet_commands::{slots, transport_kind};
 use super::facet_processes::{FacetProcesses, ProcessStatus};
 use super::input_devices::InputDevices;
 use super::live_viewers::LiveViewers;
-use super::outputs;
+use super::operator::{Operator, Wish};
 use super::recording::{RunRecorder, Target};
+use super::start::connect_timeout;
 use super::summary::{Metrics, Status};
-use crate::cave::address::{RunKey, ServerAddress};
-use crate::cave::args::{CaveOptions, ComputeKind, ServeOptions, TransportKind};
-use crate::cave::endpoints::{ServerEndpoint, idle_timeout, key, timing};
-use crate::cave::lock::{RunInfo, RunLock};
+use crate::cave::args::{CaveOptions, ServeOptions};
+use crate::cave::endpoints::ServerEndpoint;
 use crate::cave::replay::frames::Replay;
-use crate::cave::run_setup::{Role, RunSetup};
+use crate::cave::run_setup::RunSetup;
 use crate::cave::signals::Signals;
-use crate::cave::simulation::{CaveSimulation, PACE_SOURCE};
+use crate::cave::simulation::{CaveSimulation, OPERATOR_SOURCE, PACE_SOURCE};
 use crate::divergence;
 use crate::failure::Failure;
-use std::net::{Ipv4Addr, SocketAddr};
-use std::path::Path;
 use std::time::{Duration, Instant};
-use tumble::net::sync::cpu_latency::CpuLatencyRequest;
-use tumble::net::sync::shm::{ShmServer, clean_up};
 use tumble::net::sync::transport::FacetNumber;
-use tumble::net::sync::udp::{Entropy, UdpServer};
-use tumble::net::sync::{
-    FacetSlot, FrameInputs, Input, MAX_CONTACTS, Server, ServerEvent, ServerOptions, SessionError, SyncMode,
-};
-use tumble::scene::cave::{Cave, Mode};
+use tumble::net::sync::{FacetSlot, FrameInputs, Input, Server, ServerEvent, SessionError};
+use tumble::scene::cave::Cave;
 
 /// Interval at which signals and processes are polled.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
@@ -39,110 +29,12 @@ const PREPARATION_TIMEOUT: Duration = Duration::from_secs(300);
 /// Time after which a start is reported as slow.
 const SLOW_START: Duration = Duration::from_secs(5);
 
-/// Runs a scene in a cave, or replays a recording of one. With a launcher's options it also runs
-/// the facets of this machine.
-pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Option<&Path>) -> Result<(), Failure> {
-    let signals = Signals::watch()?;
-    let setup = RunSetup::load(options.scene.load()?, &options.surroundings, Role::Server)?;
-    let compute = compute(options, &setup.cave, recording.is_some());
-    let options = &ServeOptions { compute, ..options.clone() };
-    let launcher = launcher.map(|launcher| CaveOptions { serve: options.clone(), ..launcher.clone() });
-    let launcher = launcher.as_ref();
-    let say = |what: &str| (!options.quiet).then(|| eprintln!("{what}"));
-    setup.notes.iter().for_each(|note| _ = say(note));
-    outputs::check(options, launcher, &setup.cave, recording.is_some())?;
-    let replay = recording.map(|path| Replay::open(path, setup.hash)).transpose()?;
-    let key = key(&setup.cave)?;
-    let mut entropy = Entropy::system().map_err(|e| Failure::run("the run", e))?;
-    let number = entropy.next_u64();
-    let name = format!("{number:016x}");
-    if signals.stop_requested() {
-        return Ok(());
-    }
-    let mut run = RunInfo::here(&setup.scene.file, &setup.cave.file);
-    let mut lock = RunLock::take(&setup, &run, options.replace)?;
-    signals.remove_at_the_end(lock.path().to_owned());
-    let slots = slots(&setup.cave, launcher.is_some_and(|l| l.preview));
-    let count = slots.len() as u16;
-    let failed = |e| Failure::run("the server", e);
-    let (end, address) = match transport_kind(options, &setup.cave) {
-        TransportKind::SharedMemory => {
-            let server = ShmServer::new(&name, count).map_err(failed)?.with_idle_timeout(idle_timeout(&setup.cave));
-            (ServerEndpoint::Shm(Box::new(server)), ServerAddress::Memory(name))
-        }
-        TransportKind::Udp => {
-            let at = listen(options, &setup.cave);
-            // without a key file the run has a key of its own, by which this user's processes join
-            run.key = (key.is_none() && at.ip().is_loopback()).then(|| RunKey::new(entropy.next_bytes()));
-            let by = if run.key.is_some() { "a key of this run, for this user alone" } else { "the key file" };
-            let key = key.or(run.key.as_ref().map(RunKey::shared));
-            let server = UdpServer::bind(at, count, key, timing(&setup.cave)).map_err(failed)?;
-            let address = ServerAddress::Udp(server.address().map_err(failed)?);
-            say(&format!("server: {} by {by}", server.describe()));
-            (ServerEndpoint::Udp(Box::new(server)), address)
-        }
-    };
-    // from here on facets can join
-    run.address = Some(address.clone());
-    lock.write(&run)?;
-    let shared_memory = matches!(end, ServerEndpoint::Shm(_));
-    let simulation = CaveSimulation::new(&setup, setup.world.fork(), options.user_colliders)?;
-    let everywhere = compute == Some(ComputeKind::Everywhere);
-    let hash = everywhere.then(|| simulation.hash(&setup)).transpose()?;
-    let session_options = ServerOptions { compute: hash, ..session_options(options, &setup, number, &slots) };
-    let server = Server::new(end, session_options, &setup.world);
-    let mut processes = FacetProcesses::start(options, &setup.cave, launcher, &address, &signals)?;
-    let _awake = options
-        .stay_awake
-        .then(|| CpuLatencyRequest::ask().inspect_err(|why| _ = say(&format!("the cores may fall asleep: {why}"))));
-    let begin = RunLoop::new(options, launcher, setup, simulation, server, slots, &signals, replay);
-    let outcome = begin.and_then(|mut run_loop| {
-        let outcome = run_loop.run_frames(&mut processes);
-        let ended = run_loop.end(&mut processes);
-        outcome.and(ended)
-    });
-    drop(processes);
-    if shared_memory {
-        // leftovers of killed facets
-        clean_up().map_err(|e| Failure::run("cleaning up", e))?;
-    }
-    drop(lock);
-    outcome
-}
-
-/// Returns where the world is stepped, if the facets need to know: a replay steps nothing.
-fn compute(options: &ServeOptions, cave: &Cave, replaying: bool) -> Option<ComputeKind> {
-    let of_cave = ComputeKind::from(cave.sync.compute);
-    match options.compute.unwrap_or(of_cave) {
-        ComputeKind::Everywhere if !replaying => Some(ComputeKind::Everywhere),
-        _ => (of_cave == ComputeKind::Everywhere).then_some(ComputeKind::Server),
-    }
-}
-
-fn listen(options: &ServeOptions, cave: &Cave) -> SocketAddr {
-    let remote = cave.nodes.iter().any(|n| !n.is_local());
-    let default = if remote { (Ipv4Addr::UNSPECIFIED, cave.sync.port) } else { (Ipv4Addr::LOCALHOST, 0) };
-    options.listen.unwrap_or(default.into())
-}
-
-/// Returns the timeout for facets to join.
-fn connect_timeout(options: &ServeOptions, cave: &Cave) -> Duration {
-    options.connect_timeout.map_or(Duration::from_millis(cave.sync.connect_timeout_ms.into()), Duration::from_secs_f64)
-}
-
-/// Returns the session's options from the cave file.
-fn session_options(options: &ServeOptions, setup: &RunSetup, run: u64, slots: &[FacetSlot]) -> ServerOptions {
-    let (sync, wait) = (&setup.cave.sync, connect_timeout(options, &setup.cave));
-    let ms = |ms: u32| Duration::from_millis(ms.into());
-    ServerOptions {
-        mode: if sync.mode == Mode::Lockstep { SyncMode::Lockstep } else { SyncMode::Latest },
-        ready_timeout: if options.no_realtime { wait } else { ms(sync.ready_timeout_ms) },
-        first_frame_timeout: wait,
-        drop_timeout: ms(sync.drop_timeout_ms),
-        history: sync.history_frames as usize,
-        contacts: if options.contacts { MAX_CONTACTS } else { 0 },
-        ..ServerOptions::new(run, setup.join_hash, slots.to_vec())
-    }
+/// How much is over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Over {
+    /// A scene: another one may follow.
+    Scene,
+    Run,
 }
 
 /// A run in progress. [`ending`](super::ending) has its end.
@@ -150,7 +42,8 @@ pub(super) struct RunLoop<'a> {
     pub options: &'a ServeOptions,
     /// Options of the launcher, if this process starts the facets.
     pub launcher: Option<&'a CaveOptions>,
-    signals: &'a Signals,
+    pub signals: &'a Signals,
+    pub operator: Operator<'a>,
     pub server: Server<ServerEndpoint>,
     pub simulation: CaveSimulation,
     /// Inputs since the last frame.
@@ -161,6 +54,8 @@ pub(super) struct RunLoop<'a> {
     pub recorder: RunRecorder,
     pub cave: Cave,
     pub scene: String,
+    /// Hash of the scene.
+    pub hash: [u8; 32],
     duration: Option<f64>,
     pub slots: Vec<FacetSlot>,
     pub metrics: Metrics,
@@ -173,11 +68,13 @@ pub(super) struct RunLoop<'a> {
     frame_began: Option<Instant>,
     pub behind_s: f64,
     pub frames: u64,
+    /// Frames in which simulated time went on.
+    moving_frames: u64,
 }
 
 impl<'a> RunLoop<'a> {
     #[allow(clippy::too_many_arguments)] // the parts of a run
-    fn new(
+    pub fn new(
         options: &'a ServeOptions,
         launcher: Option<&'a CaveOptions>,
         setup: RunSetup,
@@ -186,6 +83,7 @@ impl<'a> RunLoop<'a> {
         slots: Vec<FacetSlot>,
         signals: &'a Signals,
         replay: Option<Replay>,
+        operator: Operator<'a>,
     ) -> Result<RunLoop<'a>, Failure> {
         let RunSetup { scene, cave, hash, .. } = setup;
         let input_devices = InputDevices::open(options, &cave, hash, replay.is_none())?;
@@ -198,6 +96,8 @@ impl<'a> RunLoop<'a> {
             options,
             launcher,
             signals,
+            operator,
+            hash,
             server,
             simulation,
             inputs: Vec::new(),
@@ -217,13 +117,14 @@ impl<'a> RunLoop<'a> {
             frame_began: None,
             behind_s: 0.0,
             frames: 0,
+            moving_frames: 0,
         })
     }
 
     /// Runs from the first join to the last frame.
-    fn run_frames(&mut self, processes: &mut FacetProcesses) -> Result<(), Failure> {
+    pub fn run_frames(&mut self, processes: &mut FacetProcesses) -> Result<Over, Failure> {
         if !self.wait_for_facets(processes)? {
-            return Ok(());
+            return Ok(Over::Run);
         }
         self.recorder.begin()?;
         let step_s = self.simulation.world.settings().dt;
@@ -235,20 +136,23 @@ impl<'a> RunLoop<'a> {
         for frame in 0.. {
             let begin = Instant::now();
             if !self.publish(frame, steps, processes)? {
-                return Ok(());
+                return Ok(Over::Scene);
             }
-            if last.map_or(self.input_devices.over(), |last| last == frame)
-                || self.signals.stop_requested()
-                || !self.check_processes(processes)?
-            {
-                return Ok(());
+            // the duration is one of simulated time, which stands while the run is paused
+            self.moving_frames += u64::from(frame > 0 && !self.simulation.is_paused());
+            let over = last.map_or(self.input_devices.over(), |last| last == self.moving_frames);
+            if over || self.operator.wish == Wish::NextScene {
+                return Ok(Over::Scene);
+            }
+            if self.operator.wish == Wish::Stop || self.signals.stop_requested() || !self.check_processes(processes)? {
+                return Ok(Over::Run);
             }
             if !self.options.no_realtime {
                 due = self.wait_for_next_frame(due, dt)?;
             }
             self.metrics.frame.add(begin.elapsed().as_secs_f64(), frame, self.time_s);
         }
-        Ok(())
+        Ok(Over::Run)
     }
 
     /// Waits for the critical facets. Returns `false` if the end was requested meanwhile.
@@ -275,6 +179,10 @@ impl<'a> RunLoop<'a> {
             self.server.idle_until(now + POLL_INTERVAL).map_err(failed)?;
             self.take_events()?;
             processes.watch(true)?;
+            self.operate(processes)?;
+            if self.operator.wish == Wish::Stop {
+                return Ok(false);
+            }
         }
         Ok(true)
     }
@@ -330,6 +238,7 @@ impl<'a> RunLoop<'a> {
     /// Publishes the next frame and waits until it is shown. Returns `false` at the end of a
     /// recording.
     fn publish(&mut self, frame: u64, steps: u32, processes: &mut FacetProcesses) -> Result<bool, Failure> {
+        self.operate(processes)?;
         let recorded = self.replay.as_mut().map(Replay::next).transpose()?;
         if recorded.is_none() && frame > 0 {
             // inputs since the last frame take effect in this one
@@ -406,9 +315,12 @@ impl<'a> RunLoop<'a> {
                 }
                 _ => None,
             };
-            if let (Some(said), false) = (said, self.options.quiet) {
-                eprintln!("{said}");
-                self.status.interrupted();
+            if let Some(said) = said {
+                self.operator.log(&said);
+                if !self.options.quiet {
+                    eprintln!("{said}");
+                    self.status.interrupted();
+                }
             }
             if let ServerEvent::Input(from, input) = event {
                 self.act(from, input)?;
@@ -418,8 +330,8 @@ impl<'a> RunLoop<'a> {
     }
 
     /// Takes an input of a device other than a facet's window.
-    fn take_input(&mut self, from: FacetNumber, input: Input) -> Result<(), Failure> {
-        if from != PACE_SOURCE {
+    pub fn take_input(&mut self, from: FacetNumber, input: Input) -> Result<(), Failure> {
+        if from != PACE_SOURCE && from != OPERATOR_SOURCE {
             self.server.note_input(input.user, input.sequence);
         }
         self.recorder.events(&[ServerEvent::Input(from, input.clone())]);

@@ -33,6 +33,7 @@ pub struct Metrics {
     pub input: Histogram,
     /// By slot: from the arrival of a frame at the facet to the end of drawing.
     draw: Vec<Histogram>,
+    /// By slot: the last frame drawn or shown, and the time of drawing, ms.
     last: Vec<(u64, f64)>,
     /// By slot: the last frame shown, and the number of different ones. A facet that joins again
     /// shows the last frame again.
@@ -158,6 +159,16 @@ impl Metrics {
         if let (ServerEvent::Presented(..), Some((last, different))) = (event, self.shown.get_mut(k)) {
             *different += u64::from(last.replace(*frame) != Some(*frame));
         }
+    }
+
+    /// Returns the last frame of a slot, and its time of drawing, ms.
+    pub fn last(&self, slot: usize) -> (u64, f64) {
+        self.last.get(slot).copied().unwrap_or_default()
+    }
+
+    /// Returns the first difference of a slot's states.
+    pub fn difference(&self, slot: usize) -> Option<Difference> {
+        self.differences.get(slot).cloned().flatten()
     }
 
     /// Checks that all facets that step the world by themselves had the server's states.

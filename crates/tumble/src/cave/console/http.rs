@@ -1,0 +1,182 @@
+//! The console's connections: one request each, with a time-out, in a thread of its own.
+
+use super::{Asked, Shown, lock};
+use std::io::{ErrorKind, Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use tumble::net::control::{Action, MAX_REQUEST_BYTES, Refusal, read_request};
+
+/// Time for a request to arrive, and again for its answer to be taken.
+const REQUEST_TIMEOUT: Duration = Duration::from_secs(3);
+/// Time for the run to do what is asked.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
+/// Maximum number of connections at a time; further ones are closed at once.
+const MAX_CONNECTIONS: usize = 16;
+/// Fields that keep browsers from guessing types, framing the page or loading anything else.
+const SAFE: &str = "X-Content-Type-Options: nosniff\r\nX-Frame-Options: DENY\r\nReferrer-Policy: no-referrer\r\nCache-Control: no-store\r\nContent-Security-Policy: default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src blob:; connect-src 'self'\r\n";
+
+/// What all connections of a console share.
+struct Context {
+    token: String,
+    shown: Arc<Mutex<Shown>>,
+    ask: SyncSender<Asked>,
+    connections: AtomicUsize,
+    over: AtomicBool,
+}
+
+/// A thread that accepts connections until this value is dropped.
+pub struct Listener {
+    address: SocketAddr,
+    context: Arc<Context>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Listener {
+    pub fn start(
+        at: SocketAddr,
+        token: String,
+        shown: Arc<Mutex<Shown>>,
+        ask: SyncSender<Asked>,
+    ) -> std::io::Result<Listener> {
+        let socket = TcpListener::bind(at)?;
+        let address = socket.local_addr()?;
+        let (connections, over) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let context = Arc::new(Context { token, shown, ask, connections, over });
+        let ours = context.clone();
+        let thread = std::thread::Builder::new().name("console".into()).spawn(move || accept(&socket, &ours))?;
+        Ok(Listener { address, context, thread: Some(thread) })
+    }
+
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+}
+
+impl Drop for Listener {
+    fn drop(&mut self) {
+        self.context.over.store(true, Ordering::Relaxed);
+        let mut here = self.address;
+        if here.ip().is_unspecified() {
+            here.set_ip(if here.is_ipv4() { [127, 0, 0, 1].into() } else { std::net::Ipv6Addr::LOCALHOST.into() });
+        }
+        // wakes the thread; without that it ends with the process
+        if TcpStream::connect_timeout(&here, Duration::from_millis(200)).is_ok()
+            && let Some(thread) = self.thread.take()
+        {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn accept(socket: &TcpListener, context: &Arc<Context>) {
+    while !context.over.load(Ordering::Relaxed) {
+        let Ok((stream, _)) = socket.accept() else {
+            // a client that has gone, or no free descriptor: both pass
+            std::thread::sleep(Duration::from_millis(50));
+            continue;
+        };
+        if context.connections.fetch_add(1, Ordering::Relaxed) >= MAX_CONNECTIONS {
+            context.connections.fetch_sub(1, Ordering::Relaxed);
+            continue;
+        }
+        let theirs = context.clone();
+        let serve = move || {
+            let _ = serve(stream, &theirs); // a client that goes away needs no answer
+            theirs.connections.fetch_sub(1, Ordering::Relaxed);
+        };
+        if std::thread::Builder::new().name("console client".into()).spawn(serve).is_err() {
+            context.connections.fetch_sub(1, Ordering::Relaxed);
+        }
+    }
+}
+
+fn serve(mut stream: TcpStream, context: &Context) -> std::io::Result<()> {
+    stream.set_write_timeout(Some(REQUEST_TIMEOUT))?;
+    let action = match receive(&mut stream, &context.token)? {
+        Ok(action) => action,
+        Err(refusal) => return send(&mut stream, refusal.status(), "application/json", &error(&refusal.to_string())),
+    };
+    let shown = || lock(&context.shown);
+    match action {
+        Action::Page => send(&mut stream, 200, "text/html; charset=utf-8", include_bytes!("page.html")),
+        Action::Status => {
+            let status = shown().status.clone();
+            send(&mut stream, 200, "application/json", status.as_bytes())
+        }
+        Action::Log => {
+            let lines: String = shown().lines.iter().flat_map(|line| [line.as_str(), "\n"]).collect();
+            send(&mut stream, 200, "text/plain; charset=utf-8", lines.as_bytes())
+        }
+        Action::Picture(facet) => {
+            let picture = shown().pictures.get(&facet).cloned();
+            match picture {
+                Some(png) => send(&mut stream, 200, "image/png", &png),
+                None => send(&mut stream, 404, "application/json", &error("no picture of this facet yet")),
+            }
+        }
+        action => {
+            let (code, text) = perform(action, context);
+            send(&mut stream, code, "application/json", &text)
+        }
+    }
+}
+
+/// Passes an action to the run and waits for the answer.
+fn perform(action: Action, context: &Context) -> (u16, Vec<u8>) {
+    let (answer, answered) = sync_channel(1);
+    if context.ask.try_send(Asked { action, answer }).is_err() {
+        return (503, error("too many actions wait for the run"));
+    }
+    match answered.recv_timeout(ANSWER_TIMEOUT) {
+        Ok(Ok(done)) => (200, serde_json::json!({ "done": done }).to_string().into_bytes()),
+        Ok(Err(why)) => (409, error(&why)),
+        Err(_) => (504, error("the run does not answer")),
+    }
+}
+
+fn error(why: &str) -> Vec<u8> {
+    serde_json::json!({ "error": why }).to_string().into_bytes()
+}
+
+/// Reads a request, for at most the time-out.
+fn receive(stream: &mut TcpStream, token: &str) -> std::io::Result<Result<Action, Refusal>> {
+    let until = Instant::now() + REQUEST_TIMEOUT;
+    let (mut request, mut bytes) = (Vec::new(), [0; 1024]);
+    loop {
+        match read_request(&request, token) {
+            Ok(Some(action)) => return Ok(Ok(action)),
+            Err(refusal) => return Ok(Err(refusal)),
+            Ok(None) if request.len() > MAX_REQUEST_BYTES => return Ok(Err(Refusal::TooLong)),
+            Ok(None) => {}
+        }
+        let left = until.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Err(ErrorKind::TimedOut.into());
+        }
+        stream.set_read_timeout(Some(left))?;
+        match stream.read(&mut bytes)? {
+            0 => return Err(ErrorKind::UnexpectedEof.into()),
+            length => request.extend(&bytes[..length]),
+        }
+    }
+}
+
+fn send(stream: &mut TcpStream, code: u16, kind: &str, body: &[u8]) -> std::io::Result<()> {
+    let reason = match code {
+        200 => "OK",
+        401 => "Unauthorized",
+        404 => "Not Found",
+        _ => "Refused",
+    };
+    let length = body.len();
+    let head = format!(
+        "HTTP/1.1 {code} {reason}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\nConnection: close\r\n{SAFE}\r\n"
+    );
+    stream.write_all(head.as_bytes())?;
+    stream.write_all(body)?;
+    stream.flush()
+}
