@@ -3,6 +3,7 @@
 mod articulated_scenes;
 mod bad_input;
 mod cave_compute;
+mod cave_console;
 mod cave_faults;
 mod cave_figures;
 mod cave_frames;
