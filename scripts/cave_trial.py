@@ -2,24 +2,28 @@
 """Trials of `tumble cave`: the same frames on all facets, kills and freezes at random times, a long run, a recording shown again and cut, nodes with a
 launch command in a network namespace.
 
-usage: scripts/cave_trial.py [--long] [--seed 1] [--quality default] [--frames N] [--kills N] [--soak N] [--minute N] [TRIAL ...]
+usage: scripts/cave_trial.py [--long] [--seed 1] [--quality default] [--frames N] [--kills N] [--soak N] [--everywhere N] [--bodies N] [--minute N] [TRIAL ...]
 
-Without names the short ones run that need no root and no other build: frames, kills, freezes, launchers, servers, minute, cuts. --long has the full numbers,
+Without names the short ones run that need no root and no other build: frames, kills, freezes, launchers, servers, everywhere, minute, cuts. --long has the full numbers,
 and all but `namespace` (root) and `viewers` (a build with --features foxglove).
 Ends with 1 if a trial does not show what it must. Nothing is left behind but out/cave_trial.
 """
 
 import argparse
 import json
+import math
 import os
 import random
 import re
 import secrets
+import selectors
 import shutil
 import signal
+import socket
 import struct
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -343,6 +347,102 @@ def soak(options):
     return whole and same and faults == 0 and max(grown) < 2.0
 
 
+class Lossy:
+    """A relay of datagrams that loses some, each way. Every client has a socket of its own towards the server."""
+
+    def __init__(self, server, loss, seed):
+        self.server, self.loss, self.random = server, loss, random.Random(seed)
+        self.front = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.front.bind(("127.0.0.1", 0))
+        self.port = self.front.getsockname()[1]
+        self.clients, self.counts = {}, {"taken": 0, "lost": 0}
+        self.over = False
+        self.thread = threading.Thread(target=self.run, daemon=True)
+        self.thread.start()
+
+    def run(self):
+        watch = selectors.DefaultSelector()
+        watch.register(self.front, selectors.EVENT_READ, None)
+        while not self.over:
+            for key, _ in watch.select(0.1):
+                data, source = key.fileobj.recvfrom(2048)
+                self.counts["taken"] += 1
+                if self.random.random() < self.loss:
+                    self.counts["lost"] += 1
+                elif key.data is not None:
+                    self.front.sendto(data, key.data)
+                else:
+                    if source not in self.clients:
+                        self.clients[source] = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+                        watch.register(self.clients[source], selectors.EVENT_READ, source)
+                    self.clients[source].sendto(data, self.server)
+
+    def end(self):
+        self.over = True
+        self.thread.join()
+
+
+def everywhere(options):
+    """`--compute everywhere`: 8 nodes step the world by themselves over datagrams of which 5 % are lost each way, while a tracked user walks through
+    the bodies. All states are the same, and a frame takes less than 2 kB per node."""
+    nodes, folder, port = 8, OUT / "everywhere", 47951
+    side = math.ceil(options.bodies ** (1 / 3))
+    scene = OUT / "bodies.toml"
+    scene.write_text(f"""[world]
+dt_s = {1 / 60}
+sleep_after_s = 0.5
+sleep_within_m = 1e-4
+[[body]]
+name = "floor"
+mode = "static"
+shape = {{ type = "half_space" }}
+[[grid]]
+name = "box"
+shape = {{ type = "box", size_m = [0.2, 0.2, 0.2] }}
+density_kg_per_m3 = 200
+position_m = [0, 3, {0.12 + 0.105 * (side - 1)}]
+count = [{side}, {side}, {side}]
+spacing_m = [0.24, 0.24, 0.21]
+""")
+    key = OUT / "key"
+    key.write_text(secrets.token_hex(32))
+    key.chmod(0o600)
+    screens = "".join(f'[[screen]]\nname = "s{k}"\nlower_left_m = [{k}, 2, 0]\nlower_right_m = [{k + 1}, 2, 0]\nupper_left_m = [{k}, 2, 1]\n'
+                      f'[[facet]]\nname = "f{k}"\nscreen = "s{k}"\nsize_px = [64, 64]\n' for k in range(nodes))
+    cave = OUT / "everywhere.toml"
+    cave.write_text(f'[[user]]\nname = "u"\neye_m = [0, 0, 1.7]\n{screens}[sync]\ntransport = "udp"\ncompute = "everywhere"\nready_timeout_ms = 60000\n'
+                    f'drop_timeout_ms = 60000\nconnect_timeout_ms = 120000\n[security]\nkey_file = "{key}"\n')
+    began = time.time()
+    relay = Lossy(("127.0.0.1", port), 0.05, options.seed)
+    server = start("serve", scene, "--cave", cave, "--listen", f"127.0.0.1:{port}", "--no-realtime", "--user-colliders", "--tracker", "127.0.0.1:47952",
+                   "--duration", options.everywhere / 60, "--summary", OUT / "everywhere.json", "--quiet")
+    facets = [start("facet", scene, "--cave", cave, "--facet", f"f{k}", "--server", f"127.0.0.1:{relay.port}", "--user-colliders", "--no-pictures", "--log-dir", folder,
+                    "--connect-timeout", 120) for k in range(nodes)]
+    tracker, count = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), 0
+    pad = lambda text: text.encode().ljust(len(text) // 4 * 4 + 4, b"\0")
+    while server.poll() is None:
+        x, y = 0.9 * math.sin(count / 60), 0.9 * math.sin(count / 83)
+        for address in ["head", "hand/left"]:
+            tracker.sendto(pad(f"/tumble/user/u/{address}") + pad(",fffffff") + struct.pack(">7f", x, y, 1.7, 0, 0, 0, 1), ("127.0.0.1", 47952))
+        tracker.sendto(pad("/tumble/user/u/keys") + pad(",i") + struct.pack(">i", [0x1A, 0x16][count // 300 % 2]), ("127.0.0.1", 47952))
+        count += 1
+        time.sleep(1 / 60)
+    [process.wait(timeout=120) for process in facets]
+    relay.end()
+    summary = json.loads((OUT / "everywhere.json").read_text())
+    logs = [[(line["frame"], line["state"]) for line in log(folder, f"f{k}")] for k in range(nodes)]
+    same = all(lines == logs[0] for lines in logs)
+    whole = [frame for frame, _ in logs[0]] == list(range(options.everywhere + 1))
+    moving = len({state for _, state in logs[0]})
+    faults = sum(facet[key] for facet in summary["facets"] for key in ["late", "missing", "torn", "mismatched", "dropped"])
+    # the world that each node gets at its join counts too
+    sent = max(facet["bytes_out"] for facet in summary["facets"]) / (options.everywhere + 1)
+    print(f"everywhere: {nodes} nodes, {side ** 3} bodies, {options.everywhere} frames ({summary['simulated_s']:.0f} s) in {time.time() - began:.0f} s, {relay.counts['lost']} of "
+          f"{relay.counts['taken']} datagrams lost: {'all' if whole else 'NOT ALL'} frames on each node, states {'the same' if same else 'DIFFERENT'} ({moving} different ones), "
+          f"{faults} faults; {sent:.0f} bytes a frame to each node, the world at the join included; simulation of a frame {summary['simulation']['p50_ms']:.1f} ms", flush=True)
+    return same and whole and faults == 0 and server.returncode == 0
+
+
 def minute(options):
     """A recording of a minute, shown twice: the same states and the same pictures, bit by bit."""
     cave, file = small_cave("minute", sync="ready_timeout_ms = 10000\ndrop_timeout_ms = 10000\nconnect_timeout_ms = 60000"), OUT / "minute.mcap"
@@ -494,8 +594,8 @@ def viewers(options):
     return code == 0 and counts.get("/scene", 0) >= 1 and counts.get("/tf", 0) > 30
 
 
-TRIALS = [frames, rates, bowling, kills, drawn_kills, freezes, launchers, servers, soak, minute, cuts, namespace, viewers]
-SHORT = [frames, kills, freezes, launchers, servers, minute, cuts]
+TRIALS = [frames, rates, bowling, kills, drawn_kills, freezes, launchers, servers, soak, everywhere, minute, cuts, namespace, viewers]
+SHORT = [frames, kills, freezes, launchers, servers, everywhere, minute, cuts]
 
 
 def main():
@@ -505,6 +605,8 @@ def main():
     parser.add_argument("--rates", type=int, help="frames of each run of `rates` (20; long 60)")
     parser.add_argument("--kills", type=int, help="kills and freezes of each kind (2; long 20)")
     parser.add_argument("--soak", type=int, help="frames of `soak` (6,000; long 108,000)")
+    parser.add_argument("--everywhere", type=int, help="frames of `everywhere` (300; long 108,000)")
+    parser.add_argument("--bodies", type=int, help="bodies of `everywhere`, rounded up to a cube (125; long 10,000)")
     parser.add_argument("--minute", type=int, help="frames of `minute` (120; long 3,600)")
     parser.add_argument("--cuts", type=int, help="cuts, at most (100; long all)")
     parser.add_argument("--scene", default="pendulum", help="scene of `soak`")
@@ -512,7 +614,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("trials", nargs="*", help=", ".join(trial.__name__ for trial in TRIALS))
     options = parser.parse_args()
-    usual = {"frames": (30, 600), "rates": (20, 60), "kills": (2, 20), "soak": (6000, 108000), "minute": (120, 3600), "cuts": (100, 1 << 30)}
+    usual = {"frames": (30, 600), "rates": (20, 60), "kills": (2, 20), "soak": (6000, 108000), "everywhere": (300, 108000), "bodies": (125, 10000), "minute": (120, 3600), "cuts": (100, 1 << 30)}
     for name, numbers in usual.items():
         if getattr(options, name) is None:
             setattr(options, name, numbers[options.long])

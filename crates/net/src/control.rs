@@ -19,7 +19,7 @@ pub const MIN_TOKEN_BYTES: usize = 16;
 /// Maximum length of a name in a path, bytes.
 const MAX_NAME_BYTES: usize = 128;
 
-/// What a console asks for.
+/// Request of a console.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Action {
     /// The page.

@@ -65,6 +65,10 @@ pub struct SessionRecorder {
     list: Option<Arc<Vec<u8>>>,
     names: Vec<String>,
     scene: [u8; 32],
+    /// Time of the last frame in the file, and how much later it is than simulated time, s: a world that
+    /// is set back does not set back the file.
+    last_s: f64,
+    shift_s: f64,
 }
 
 impl SessionRecorder {
@@ -94,6 +98,8 @@ impl SessionRecorder {
             list: None,
             names,
             scene,
+            last_s: 0.0,
+            shift_s: 0.0,
         })
     }
 
@@ -111,9 +117,12 @@ impl SessionRecorder {
             return Ok(());
         }
         self.write_waiting()?;
+        self.shift_s = self.shift_s.max(self.last_s - recorded.time_s);
+        let file_time_s = (recorded.time_s + self.shift_s).max(self.last_s);
+        self.last_s = file_time_s;
         let names = names(world);
         if names != self.names {
-            self.recorder.set_entities(recorded.time_s, &entities(world))?;
+            self.recorder.set_entities(file_time_s, &entities(world))?;
             self.names = names;
         }
         let head = |kind| MessageHeader { kind, run: 0, join: 0, frame: recorded.frame, time_s: recorded.time_s };
@@ -128,7 +137,7 @@ impl SessionRecorder {
         out.extend(message(&head(MessageKind::State), |out| out.extend(&recorded.state)));
         let done = FrameAck { hash: recorded.hash, ..FrameAck::default() };
         out.extend(message(&head(MessageKind::Ready), |out| done.write(out)));
-        let (frame, time_s) = (recorded.frame, recorded.time_s);
+        let (frame, time_s) = (recorded.frame, file_time_s);
         let (poses, contacts, deforming) = (poses(world), contacts(world), deforming(world));
         self.waiting = Some(WaitingFrame { frame, time_s, poses, contacts, deforming, messages: out });
         Ok(())

@@ -25,7 +25,7 @@ pub enum Mode {
     Latest,
 }
 
-/// Where the world is stepped.
+/// Place where the world is stepped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Compute {
     /// On the server, which sends poses.

@@ -30,7 +30,7 @@ pub enum TransportKind {
     Udp,
 }
 
-/// Where the world is stepped.
+/// Place where the world is stepped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ComputeKind {
     /// On the server, which sends poses.
@@ -117,7 +117,7 @@ pub struct ServeOptions {
     /// facets.
     #[arg(long)]
     pub contacts: bool,
-    /// Where the world is stepped (default: as the cave says). With everywhere, each facet steps it
+    /// Place where the world is stepped (default: as the cave says). With everywhere, each facet steps it
     /// by itself from the users' inputs, and its states are compared with the server's.
     #[arg(long, value_name = "WHERE")]
     pub compute: Option<ComputeKind>,
@@ -154,7 +154,7 @@ pub struct ConsoleOptions {
     pub command: ConsoleCommand,
 }
 
-/// What a console is asked for.
+/// Request of a console.
 #[derive(Subcommand, Clone)]
 pub enum ConsoleCommand {
     /// Print the state of the run; exit code 1 if there are alarms
@@ -317,7 +317,7 @@ pub struct FacetOptions {
     pub scene: SceneOptions,
     #[command(flatten)]
     pub surroundings: CaveSceneOptions,
-    /// Where the world is stepped (default: as the cave says). With everywhere, this facet steps it by
+    /// Place where the world is stepped (default: as the cave says). With everywhere, this facet steps it by
     /// itself; the options of stepping and --user-colliders must then be the server's.
     #[arg(long, value_name = "WHERE")]
     pub compute: Option<ComputeKind>,

@@ -21,7 +21,7 @@ type Pair = (ObjectId, ObjectId);
 pub struct Impact {
     /// The bodies.
     pub bodies: [ObjectId; 2],
-    /// Where they meet, world frame, m.
+    /// The place where they meet, world frame, m.
     pub point: Vec3,
     /// Rise of the impulse between them from the step before, N·s, above 0.
     pub impulse: f64,

@@ -147,10 +147,10 @@ fn a_console_records_and_goes_to_the_next_scene() {
     place.assert_clean();
 }
 
-/// Garbage, half requests, wrong tokens and a full house cost the run nothing, and no request without
+/// Garbage, half requests, wrong tokens and too many clients cost the run nothing, and no request without
 /// the token has an effect.
 #[test]
-fn a_console_under_fire_neither_obeys_nor_delays() {
+fn a_console_under_fire_does_not_obey_and_delays_no_frame() {
     let place = Place::new("console-fire", &wall());
     let (summary, out) = (place.path("summary.json"), place.path("out"));
     let run = place.start("cave", &[&RUN[..], &[&summary, "--log-dir", &out]].concat());

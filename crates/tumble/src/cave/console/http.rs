@@ -19,7 +19,7 @@ const MAX_CONNECTIONS: usize = 16;
 /// Fields that keep browsers from guessing types, framing the page or loading anything else.
 const SAFE: &str = "X-Content-Type-Options: nosniff\r\nX-Frame-Options: DENY\r\nReferrer-Policy: no-referrer\r\nCache-Control: no-store\r\nContent-Security-Policy: default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src blob:; connect-src 'self'\r\n";
 
-/// What all connections of a console share.
+/// Data that all connections of a console share.
 struct Context {
     token: String,
     shown: Arc<Mutex<Shown>>,
