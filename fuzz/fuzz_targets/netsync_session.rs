@@ -1,5 +1,6 @@
 //! Valid messages with random content, to a server and a facet in the middle of a run. The bytes
-//! are a sequence of: kind, flags (run, join, receiver), frame, length, payload.
+//! are a sequence of: kind, flags (run, join, receiver; of the first: whether the facet steps by itself),
+//! frame, length, payload.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -8,7 +9,9 @@ use tumble_core::collide::{Pose, Shape};
 use tumble_core::{RigidBody, Settings, World};
 use tumble_net::sync::transport::LinkEvent;
 use tumble_net::sync::wire::{MessageHeader, MessageKind, message, open};
-use tumble_net::sync::{FacetOptions, FacetSession, FacetSlot, ServerOptions, ServerSession, Task, Viewer};
+use tumble_net::sync::{
+    FacetOptions, FacetSession, FacetSlot, FrameInputs, ServerOptions, ServerSession, Simulation, Task, Viewer,
+};
 
 fn world() -> World {
     let mut world = World::new(Settings::default()).expect("the default settings are sound");
@@ -17,10 +20,41 @@ fn world() -> World {
     world
 }
 
+/// A world without users.
+struct Alone(World, Viewer);
+
+impl Simulation for Alone {
+    fn world(&self) -> &World {
+        &self.0
+    }
+
+    fn viewer(&self) -> &Viewer {
+        &self.1
+    }
+
+    fn advance(&mut self, frame: &FrameInputs) -> Result<(), String> {
+        (0..frame.steps.min(2)).try_for_each(|_| self.0.step().map(|_| ()).map_err(|e| e.to_string()))
+    }
+
+    fn save(&self) -> Vec<u8> {
+        self.0.save()
+    }
+
+    fn restore(&mut self, bytes: &[u8]) -> Result<(), String> {
+        self.0.restore(bytes).map_err(|e| e.to_string())
+    }
+}
+
 fuzz_target!(|bytes: &[u8]| {
     let slots = vec![FacetSlot { name: "f".into(), critical: true }];
-    let mut server = ServerSession::new(ServerOptions::new(1, [0; 32], slots), &world());
-    let mut facet = FacetSession::new(FacetOptions::new("f", [0; 32], 1), world());
+    let options = ServerOptions { compute: Some([0; 32]), ..ServerOptions::new(1, [0; 32], slots) };
+    let mut server = ServerSession::new(options, &world());
+    let options = FacetOptions::new("f", [0; 32], 1);
+    let mut facet = match bytes.get(1).is_some_and(|flags| flags & 8 != 0) {
+        true => FacetSession::computing(options, Box::new(Alone(world(), Viewer::default()))),
+        false => FacetSession::new(options, world()),
+    };
+    let simulation = Alone(world(), Viewer::default());
     let (mut rest, mut now, mut join) = (bytes, Duration::ZERO, 0);
     while let [kind, flags, frame, length, tail @ ..] = rest {
         let payload;
@@ -38,7 +72,10 @@ fuzz_target!(|bytes: &[u8]| {
             server.on_event(now, 0, LinkEvent::Message, &bytes);
         }
         if server.is_idle() && server.all_critical_joined() {
-            server.publish(now, &world(), &Viewer::default()).expect("a sound world");
+            if server.frame().is_some() {
+                server.send_inputs(now, FrameInputs::default());
+            }
+            server.publish_simulation(now, &simulation).expect("a sound world");
         }
         server.outgoing().iter().for_each(|out| facet.on_event(now, LinkEvent::Message, out.message.to_vec().into()));
         let header = MessageHeader {

@@ -300,10 +300,8 @@ mod tests {
         .concat();
         let received = Mutex::new(Received::default());
         read_lines(text.as_bytes(), &received);
-        assert_eq!(lock(&received).report, report(3, 5));
-        assert_eq!(
-            (lock(&received).lines.clone(), lock(&received).picture.clone()),
-            (VecDeque::from(["no window".to_owned()]), Some(vec![0, 255]))
-        );
+        let received = received.into_inner().unwrap();
+        assert_eq!(received.report, report(3, 5));
+        assert_eq!((received.lines, received.picture), (["no window".to_owned()].into(), Some(vec![0, 255])));
     }
 }

@@ -237,7 +237,7 @@ fn pictures_of_all_facets_are_shown_and_a_black_screen_is_an_alarm() {
     assert_eq!(ask(at, &token, "GET", "/api/picture/none").0, 404);
     signal(run.pid(), Signal::TERM);
     assert_eq!(run.end().0, Some(0));
-    // neither sun nor sky
+    // no sun and no sky
     let black = "color = \"#000000\"\nintensity = 0\n[sky]\nintensity = 0\nzenith_color = \"#000000\"\nhorizon_color = \"#000000\"\nnadir_color = \"#000000\"\n";
     place.folder.write("scene.toml", format!("{SCENE}{black}"));
     let Some((run, at, token)) = drawing(&place) else { return };
