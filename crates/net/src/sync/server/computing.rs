@@ -89,14 +89,26 @@ impl ServerSession {
             if self.computing().any(|(_, p)| p.needs_world) {
                 let mut payload = Vec::new();
                 SavedWorld { before, hash, bytes: &simulation.save() }.write(&mut payload);
-                let (count, max) = (payload.len() + HEADER_BYTES, MAX_MESSAGE_BYTES);
-                if count > max {
-                    return Err(PublishError::LimitExceeded { what: "bytes of a world".into(), count, max });
+                match payload.len() + HEADER_BYTES {
+                    count if count > MAX_MESSAGE_BYTES => self.refuse_worlds(count),
+                    _ => self.inputs.world = Some((frame, Arc::new(payload))),
                 }
-                self.inputs.world = Some((frame, Arc::new(payload)));
             }
         }
         self.publish(now, world, viewer)
+    }
+
+    /// Refuses the facets that need a world of too many bytes; the others go on.
+    fn refuse_worlds(&mut self, count: usize) {
+        let needing: Vec<(FacetNumber, u64)> =
+            self.computing().filter(|(_, p)| p.needs_world).map(|(k, p)| (k, p.join)).collect();
+        for (facet, join) in needing {
+            let why = format!(
+                "the world has {count} bytes, at most {MAX_MESSAGE_BYTES} can be sent: start the facet with --compute server"
+            );
+            self.reject_join(facet, join, why);
+            self.mark_absent(facet, false);
+        }
     }
 
     /// Sends the world of the frame to the facets that need it.

@@ -18,6 +18,8 @@ struct Pushed {
     viewer: Viewer,
     /// Frame of the world's counter after which an object is moved by a bit: a wrong node.
     wrong_after: Option<(u64, &'static str)>,
+    /// Bytes that follow a saved world.
+    ballast: usize,
 }
 
 impl Pushed {
@@ -26,7 +28,7 @@ impl Pushed {
             users: vec![User { head: Pose::identity(), interpupillary_m: 0.064, input: 0 }],
             ..Viewer::default()
         };
-        Pushed { world: scene(), viewer, wrong_after: None }
+        Pushed { world: scene(), viewer, wrong_after: None, ballast: 0 }
     }
 }
 
@@ -63,7 +65,7 @@ impl Simulation for Pushed {
         let mut bytes = Vec::new();
         self.viewer.write(&mut bytes);
         let size = bytes.len() as u32;
-        [&size.to_le_bytes()[..], &bytes, &self.world.save()].concat()
+        [&size.to_le_bytes()[..], &bytes, &self.world.save(), &vec![0; self.ballast]].concat()
     }
 
     fn restore(&mut self, bytes: &[u8]) -> Result<(), String> {
@@ -189,11 +191,7 @@ impl Run {
         let Some(session) = node.session.as_mut().filter(|_| self.now >= node.frozen_until) else { return };
         session.advance(self.now);
         match session.task() {
-            Task::Draw => {
-                if session.begin().is_some() {
-                    session.drawn(self.now, [k as u8; 16]);
-                }
-            }
+            Task::Draw if session.begin().is_some() => session.drawn(self.now, [k as u8; 16]),
             Task::Present(_) => {
                 session.presented(self.now);
                 node.shown.extend(session.shown());
@@ -340,4 +338,21 @@ fn a_node_with_other_constants_is_refused_with_both_hashes() {
     let why = why.unwrap();
     assert!(why.contains(&"09".repeat(32)) && why.contains(&"07".repeat(32)), "{why}");
     assert!(matches!(run.nodes[1].session.as_ref().unwrap().task(), Task::Ended(EndReason::Refused(_))));
+}
+
+/// A world that is too large to be sent refuses the facet that needs it, and ends no show.
+#[test]
+fn a_world_of_too_many_bytes_ends_no_show() {
+    let mut run = Run::new(19, NetworkConditions::PERFECT, 2, &[]);
+    assert!(run.until(Duration::from_secs(5), |run| run.server.frame() >= Some(20)));
+    run.nodes[1].session = None;
+    run.run(Duration::from_secs(3));
+    run.simulation.ballast = 17 << 20;
+    run.start(1, None);
+    run.run(Duration::from_secs(1));
+    assert!(matches!(run.nodes[1].session.as_ref().unwrap().task(), Task::Ended(EndReason::Refused(_))));
+    let at = run.server.frame().unwrap();
+    assert!(run.until(Duration::from_secs(2), |run| run.server.frame() >= Some(at + 60)));
+    run.assert_same(0);
+    assert!(run.is_in_step(0));
 }
