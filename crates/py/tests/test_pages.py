@@ -40,6 +40,7 @@ NOT_RUN = {
     "tumble cave billiards --cave cube4": "opens windows: crates/tumble/tests/it/cave_windows.rs",
     "tumble relay --cave my.toml --to 10.0.0.1:47200": "another machine: crates/tumble/tests/it/cave_relay.rs",
     "tumble relay --cave my.toml --to 10.0.0.1:47200 --listen 10.0.1.2:47200 --from 10.0.1.7": "other machines: crates/tumble/tests/it/cave_relay.rs",
+    "tumble console 127.0.0.1:47300 …": "a run beside it: crates/tumble/tests/it/cave_console.rs",
     "sudo scripts/netns.sh --frames 6000": "root, 100 s",
     "cargo build --release --locked -p tumble --features foxglove": "another build of everything",
 }
