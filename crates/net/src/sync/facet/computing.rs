@@ -18,8 +18,9 @@ use std::collections::VecDeque;
 use std::time::Duration;
 use tumble_core::World;
 
-/// Maximum number of frames that wait; a facet that is farther behind asks for a world.
-const MAX_WAITING_FRAMES: usize = 120;
+/// Maximum number of frames that wait; a facet that is farther behind asks for a world. Frames wait
+/// while a large world is on its way, so this is longer than that takes.
+const MAX_WAITING_FRAMES: usize = 600;
 /// Maximum number of frames that a facet advances before it draws.
 const FRAMES_PER_PICTURE: usize = 8;
 

@@ -5,7 +5,7 @@ use super::super::compute::{MAX_FRAME_INPUTS, ObjectHashes, SavedWorld, Simulati
 use super::super::messages::{Content, increment};
 use super::super::publisher::PublishError;
 use super::super::transport::{Delivery, FacetNumber, MAX_MESSAGE_BYTES};
-use super::super::wire::{HEADER_BYTES, Hash, MessageKind, message};
+use super::super::wire::{HEADER_BYTES, Hash, MessageKind, is_later, message};
 use super::frame_times::note_request;
 use super::{FacetState, ServerEvent, ServerSession};
 use crate::sync::compute::FrameInputs;
@@ -35,6 +35,14 @@ impl InputStream {
     /// Returns the hash of a frame, if it is remembered.
     pub fn hash(&self, frame: u64) -> Option<&Hash> {
         self.hashes(frame).map(|hashes| &hashes.hash)
+    }
+}
+
+impl FacetState {
+    /// Notes that the facet has drawn or shown a frame: a world of that frame or an earlier one has
+    /// arrived.
+    pub(super) fn answer_world(&mut self, frame: u64) {
+        self.world_under_way = self.world_under_way.filter(|world| is_later(*world, frame));
     }
 }
 
@@ -118,13 +126,18 @@ impl ServerSession {
     }
 
     /// Sends the world of the present frame if it is there; else the facet gets that of the next one.
+    /// Over a reliable link one world at a time is under way.
     pub(super) fn send_world(&mut self, now: Duration, facet: FacetNumber) {
         let world = self.inputs.world.as_ref().filter(|(of, _)| Some(*of) == self.frame).cloned();
         let facet_state = &mut self.facets[facet as usize];
+        if self.options.resend_interval.is_none() && facet_state.world_under_way.is_some() {
+            facet_state.needs_world = false;
+            return;
+        }
         facet_state.needs_world = world.is_none();
         let Some((frame, payload)) = world else { return };
         note_request(&mut facet_state.state_requested, frame, now);
-        facet_state.sent = now;
+        (facet_state.sent, facet_state.world_under_way) = (now, Some(frame));
         let join = facet_state.join;
         self.send_to(facet, MessageKind::World, join, frame, |out| out.extend(payload.iter()));
     }

@@ -196,6 +196,8 @@ struct FacetState {
     content: Content,
     /// For a facet that steps by itself: whether it needs a whole world.
     needs_world: bool,
+    /// Frame of a world that was sent to it and not answered yet.
+    world_under_way: Option<u64>,
     last_received: Duration,
     sent: Duration,
     /// Whether the facet has answered the snapshot with a frame.
@@ -266,6 +268,7 @@ impl ServerSession {
             duplicate_facets: DuplicateFacets::default(),
             content: Content::Poses,
             needs_world: false,
+            world_under_way: None,
             last_received: Duration::ZERO,
             sent: Duration::ZERO,
             synced: false,

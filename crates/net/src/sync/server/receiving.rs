@@ -106,7 +106,7 @@ impl ServerSession {
         let facet_state = &mut self.facets[facet as usize];
         (facet_state.membership, facet_state.join, facet_state.last_received, facet_state.sent) =
             (Membership::Following, join, now, now);
-        (facet_state.content, facet_state.needs_world) = (wanted.content, true);
+        (facet_state.content, facet_state.needs_world, facet_state.world_under_way) = (wanted.content, true, None);
         (facet_state.synced, facet_state.ready, facet_state.presented, facet_state.reported) =
             (false, None, None, FacetCounts::default());
         (facet_state.answered, facet_state.caught_up) = (None, false);
@@ -189,6 +189,7 @@ impl ServerSession {
         let Some(right) = right else { return increment(&mut facet_state.counts.stale) };
         let again = facet_state.ready.is_some_and(|f| !is_later(frame, f));
         facet_state.synced = true;
+        facet_state.answer_world(frame);
         if again {
             increment(&mut facet_state.counts.duplicate);
         } else {
@@ -225,6 +226,7 @@ impl ServerSession {
         }
         facet_state.presented = Some(frame);
         facet_state.synced = true;
+        facet_state.answer_world(frame);
         increment(&mut facet_state.counts.presented);
         if latest {
             facet_state.membership = Membership::InStep;
