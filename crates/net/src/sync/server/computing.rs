@@ -166,15 +166,22 @@ impl ServerSession {
                 None => "the number of objects".to_owned(),
             },
         };
-        self.facets[facet as usize].needs_world = true;
+        self.require_world(facet);
         self.report(ServerEvent::Differs(facet, frame, what));
     }
 
     /// Marks a facet whose hash of a frame is wrong.
     pub(super) fn replace_wrong_world(&mut self, facet: FacetNumber) {
+        increment(&mut self.facets[facet as usize].counts.mismatched);
+        self.require_world(facet);
+    }
+
+    /// Lets a facet that steps by itself get the world with the next frame, unless one is on its way.
+    fn require_world(&mut self, facet: FacetNumber) {
+        let lossy = self.options.resend_interval.is_some();
         let facet_state = &mut self.facets[facet as usize];
-        increment(&mut facet_state.counts.mismatched);
-        facet_state.needs_world |= facet_state.content == Content::Inputs;
+        let open = lossy || facet_state.world_under_way.is_none();
+        facet_state.needs_world |= open && facet_state.content == Content::Inputs;
     }
 
     fn hash_before(&self, frame: u64) -> Hash {
