@@ -50,6 +50,24 @@ impl Blend {
         Ok(Blend { shares: values.chunks_exact(samples).map(pixel).collect() })
     }
 
+    /// Returns fractions of red, green and blue, rows from the top, as the bytes of a PNG of 16 bits.
+    ///
+    /// # Errors
+    /// [`RenderError::Png`] for as many fractions as the size does not have.
+    pub fn png(shares: &[[f32; 3]], [width, height]: [u32; 2]) -> Result<Vec<u8>, RenderError> {
+        let failed = |e: png::EncodingError| RenderError::Png(e.to_string());
+        let mut out = Vec::new();
+        let mut encoder = png::Encoder::new(&mut out, width, height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Sixteen);
+        let mut writer = encoder.write_header().map_err(failed)?;
+        let word = |share: &f32| ((65535.0 * share.clamp(0.0, 1.0)).round() as u16).to_be_bytes();
+        let bytes: Vec<u8> = shares.iter().flatten().flat_map(word).collect();
+        writer.write_image_data(&bytes).map_err(failed)?;
+        writer.finish().map_err(failed)?;
+        Ok(out)
+    }
+
     /// The fractions of red, green and blue by pixel, rows from the top.
     pub fn shares(&self) -> &[[f32; 3]] {
         &self.shares

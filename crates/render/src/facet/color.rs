@@ -6,8 +6,8 @@
 //! (1 − b) t_i = s_i (1 − B) g L + m_i (B − b)                    Σ s_i = 1,  Σ m_i (B − b) = B − n b
 //! ```
 //!
-//! Where `n` projectors overlap, `Σ P_i = n b + (1 − B) g L + B − n b = W`: neither the picture nor
-//! black shows the seam.
+//! Where `n` projectors overlap, `Σ P_i = n b + (1 − B) g L + B − n b = W`: the picture shows no seam, and
+//! black does not either.
 //!
 //! | symbol | meaning |
 //! |---|---|

@@ -49,9 +49,8 @@ impl Cube {
     /// distance from the next one to the right and below, and one in fifty may be denser.
     pub fn fitting(shown: &[[f32; 4]], [width, height]: [u32; 2], eye: &Point3<f64>) -> Cube {
         let (w, h) = (width as usize, height as usize);
-        let unit = |x: usize, y: usize| {
-            direction(shown[y * w + x], eye).and_then(|d| Vector3::from(d).try_normalize(1e-12))
-        };
+        let unit =
+            |x: usize, y: usize| direction(shown[y * w + x], eye).and_then(|d| Vector3::from(d).try_normalize(1e-12));
         let (dx, dy) = ((w / 64).max(1), (h / 64).max(1));
         let mut steps = Vec::new();
         for (x, y) in (0..h - 1).step_by(dy).flat_map(|y| (0..w - 1).step_by(dx).map(move |x| (x, y))) {

@@ -11,7 +11,7 @@ use nalgebra::{Point3, Vector3};
 use std::sync::Arc;
 use tumble_scene::CavePlace;
 
-/// What the pixels of a picture show, and the resolution of the faces.
+/// The content of each pixel of a picture, and the resolution of the faces.
 pub(super) struct Curved {
     finish: Arc<Finish>,
     cube: Cube,
@@ -88,9 +88,20 @@ impl Curved {
         super::surface::direction(pixel, eye).map(Vector3::from)
     }
 
+    /// Returns the point that each pixel shows; `None` if one shows a direction.
+    pub fn points(&self) -> Option<Vec<Option<[f64; 3]>>> {
+        let point = |[x, y, z, w]: &[f32; 4]| match *w {
+            0.0 => None,
+            w => Some((w > 0.0).then(|| [*x, *y, *z].map(f64::from))),
+        };
+        shown(&self.finish).iter().map(point).collect()
+    }
+
     fn faces(&self, from: &EyeInCave) -> Vec<usize> {
         let seen = self.cube.seen(shown(&self.finish), self.finish.size[0], &from.eye);
-        (0..6).filter(|&face| seen[face]).collect()
+        let faces: Vec<usize> = (0..6).filter(|&face| seen[face]).collect();
+        // a picture that shows nothing is made of a face too
+        if faces.is_empty() { vec![0] } else { faces }
     }
 
     fn view(&self, face: usize, from: &EyeInCave) -> Result<FacetView, RenderError> {
@@ -102,7 +113,7 @@ impl Curved {
     }
 }
 
-/// What each pixel shows.
+/// Returns what each pixel shows.
 fn shown(finish: &Finish) -> &[[f32; 4]] {
     match &finish.bend {
         Bend::Surface(shown) => shown,

@@ -43,7 +43,8 @@ impl ColorTable {
     /// # Errors
     /// The fault with its line.
     pub fn parse(bytes: &[u8]) -> Result<ColorTable, String> {
-        let text = std::str::from_utf8(bytes).map_err(|e| format!("the color table is no text (byte {})", e.valid_up_to()))?;
+        let text =
+            std::str::from_utf8(bytes).map_err(|e| format!("the color table is no text (byte {})", e.valid_up_to()))?;
         let (mut size, mut colors) = (None, Vec::new());
         for (number, line) in text.lines().enumerate() {
             let at = |what: &str| format!("line {}: {what}", number + 1);
@@ -52,16 +53,21 @@ impl ColorTable {
             match first {
                 "TITLE" => {}
                 "LUT_3D_SIZE" => {
-                    let n = words.next().and_then(|word| word.parse::<u32>().ok()).filter(|n| (2..=MAX_SIZE).contains(n));
+                    let n =
+                        words.next().and_then(|word| word.parse::<u32>().ok()).filter(|n| (2..=MAX_SIZE).contains(n));
                     size = Some(n.ok_or_else(|| at(&format!("expected `LUT_3D_SIZE n` with n from 2 to {MAX_SIZE}")))?);
                 }
                 "LUT_1D_SIZE" => {
-                    return Err(at("a one-dimensional table; expected LUT_3D_SIZE, or `gamma` and `white` in the cave file"));
+                    return Err(at(
+                        "a one-dimensional table; expected LUT_3D_SIZE, or `gamma` and `white` in the cave file",
+                    ));
                 }
                 "DOMAIN_MIN" | "DOMAIN_MAX" => {
                     let wanted = if first == "DOMAIN_MIN" { 0.0 } else { 1.0 };
                     if three(words) != Some([wanted; 3]) {
-                        return Err(at(&format!("expected `{first} {wanted} {wanted} {wanted}`: codes go from 0 to 1")));
+                        return Err(at(&format!(
+                            "expected `{first} {wanted} {wanted} {wanted}`: codes go from 0 to 1"
+                        )));
                     }
                 }
                 _ => {

@@ -9,6 +9,7 @@ mod blend;
 mod calibration;
 mod canvas;
 mod color;
+mod color_patterns;
 mod compose;
 mod cube;
 mod curved;
@@ -24,7 +25,7 @@ mod warp;
 
 pub use blend::Blend;
 pub(crate) use blend::encoded;
-pub use calibration::{CalibrationPattern, calibration_picture};
+pub use calibration::{CalibrationPattern, calibration_picture, finished_calibration_picture};
 pub(crate) use canvas::fill_rect;
 pub use color::ProjectorColor;
 pub(crate) use compose::blank;

@@ -60,7 +60,8 @@ impl ScreenMesh {
                         .ok_or_else(|| at("expected `v x y z` with three numbers, m".into()))?,
                 ),
                 Some("vt") => places.push(numbers::<2>(words, -0.5..=1.5).ok_or_else(|| {
-                    at("expected `vt u v` with numbers from 0 to 1 (fractions of the picture; at most -0.5 to 1.5)".into())
+                    at("expected `vt u v` with numbers from 0 to 1 (fractions of the picture; at most -0.5 to 1.5)"
+                        .into())
                 })?),
                 Some("f") => {
                     let corner = |word: &str| -> Result<Corner<3>, String> {
@@ -124,10 +125,9 @@ pub(crate) fn shown(
             };
             Some(match warp {
                 Some(warp) => warp.sources(size).into_iter().map(|from| from.map_or(NOTHING, at)).collect(),
-                None => (0..size[1])
-                    .flat_map(|y| (0..size[0]).map(move |x| [f64::from(x), f64::from(y)]))
-                    .map(at)
-                    .collect(),
+                None => {
+                    (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| [f64::from(x), f64::from(y)])).map(at).collect()
+                }
             })
         }
     }

@@ -60,7 +60,8 @@ impl CaveView {
             _ => Ok(None),
         };
         let meshes = cave.screens.iter().map(mesh).collect::<Result<_, _>>()?;
-        let mask = |path: &Option<PathBuf>, f: &Facet| path.as_deref().map(|path| Blend::load(path, f.size_px)).transpose();
+        let mask =
+            |path: &Option<PathBuf>, f: &Facet| path.as_deref().map(|path| Blend::load(path, f.size_px)).transpose();
         let masks = |f: &Facet| -> Result<_, RenderError> {
             Ok(blend::masks(mask(&f.blend_file, f)?.as_ref(), mask(&f.black_file, f)?.as_ref()))
         };
@@ -124,6 +125,31 @@ impl CaveView {
         };
         let origin = scene(eye);
         Some((origin, (scene(towards) - origin).try_normalize(1e-12)?))
+    }
+
+    /// Returns the point of the cave that each pixel of one eye's picture shows, m, cave axes, by rows
+    /// from the top, after the warp and before mirroring. `None` for a pixel that shows nothing, and for
+    /// a facet whose pixels show directions.
+    pub fn points(&self, facet: &Facet) -> Option<Vec<Option<[f64; 3]>>> {
+        let (index, screen) = (self.index(facet)?, &self.cave.screens[facet.screen]);
+        if let Some(curved) = &self.curved[index] {
+            return curved.points();
+        }
+        let [w, h] = facet.size_px;
+        let at = |[x, y]: [f64; 2]| {
+            let (u, v) = ((x + 0.5) / f64::from(w), (y + 0.5) / f64::from(h));
+            (screen.upper_left_m + screen.across() * u - screen.upward() * v).coords.into()
+        };
+        Some(match &self.warps[index] {
+            Some(warp) => warp.sources([w, h]).into_iter().map(|from| from.map(at)).collect(),
+            None => (0..h).flat_map(|y| (0..w).map(move |x| [x.into(), y.into()])).map(|p| Some(at(p))).collect(),
+        })
+    }
+
+    /// The shares of red, green and blue light that each pixel of a facet keeps, and of the lift of
+    /// black; `None` without masks.
+    pub fn masks(&self, facet: &Facet) -> Option<&[[f32; 4]]> {
+        self.masks[self.index(facet)?].as_deref()
     }
 
     /// The size of a facet's finished picture, or of all facets unfolded into at most `most`
@@ -197,20 +223,34 @@ impl CaveView {
         let index = self.index(facet);
         let [w, h] = facet.size_px;
         let curved = index.and_then(|i| self.curved[i].as_ref());
-        let one = |side: &f64| -> Result<Image, RenderError> {
+        let mut one = |side: &f64| -> Result<Image, RenderError> {
             match curved {
                 Some(curved) => curved.draw_in_memory(renderer, list, &self.around(facet, *side)),
                 None => renderer.render_from(&self.eye(facet, *side)?.part(w, h, RIM_PX), list, w, h),
             }
         };
-        let mut eyes = facet.stereo.sides().iter().map(one).collect::<Result<Vec<_>, _>>()?;
-        if let Some(warp) = index.and_then(|i| self.warps[i].as_ref()).filter(|_| curved.is_none()) {
-            eyes = eyes.iter().map(|eye| warp.apply(eye)).collect();
+        let finished = |eye: Image| match curved {
+            // put together through the warp already
+            Some(_) => self.colored(eye, index),
+            None => self.finished(eye, facet),
+        };
+        let eyes = facet.stereo.sides().iter().map(|side| Ok(flipped(finished(one(side)?), facet.flip)));
+        Ok(combined(eyes.collect::<Result<_, RenderError>>()?, facet.stereo))
+    }
+
+    /// Warps, blends and colors a picture of one eye of a facet, in memory.
+    pub(super) fn finished(&self, image: Image, facet: &Facet) -> Image {
+        let index = self.index(facet);
+        let warped = index.and_then(|i| self.warps[i].as_ref()).map(|warp| warp.apply(&image));
+        self.colored(warped.unwrap_or(image), index)
+    }
+
+    fn colored(&self, mut image: Image, index: Option<usize>) -> Image {
+        let finish = index.map(|i| (self.masks[i].as_deref(), self.colors[i].as_ref()));
+        if let Some((masks, color)) = finish.filter(|(masks, color)| masks.is_some() || color.is_some()) {
+            color::apply(&mut image, masks, color);
         }
-        if let Some((masks, colors)) = index.map(|i| (self.masks[i].as_deref(), self.colors[i].as_ref())) {
-            eyes.iter_mut().for_each(|eye| color::apply(eye, masks, colors));
-        }
-        Ok(combined(eyes.into_iter().map(|eye| flipped(eye, facet.flip)).collect(), facet.stereo))
+        image
     }
 
     /// Draws all facets unfolded into one picture of at most `most` pixels, seen from between the
@@ -257,7 +297,9 @@ impl CaveView {
     /// Returns the curved screen of a tile, from those kept; `None` for a flat one.
     fn unfolded(&self, tile: Tile) -> Option<Arc<Curved>> {
         let mut kept = self.unfolded.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, curved)) = kept.iter().find(|(known, _)| (known.facet, known.size_px) == (tile.facet, tile.size_px)) {
+        if let Some((_, curved)) =
+            kept.iter().find(|(known, _)| (known.facet, known.size_px) == (tile.facet, tile.size_px))
+        {
             return Some(curved.clone());
         }
         let facet = &self.cave.facets[tile.facet];
@@ -295,10 +337,7 @@ impl CaveView {
         let (screen, mesh) = (&self.cave.screens[facet.screen], self.meshes[facet.screen].as_ref());
         let bend = Bend::Surface(shown(screen, mesh, self.warps[index].as_ref(), facet.size_px)?);
         let (shares, color) = (self.masks[index].clone(), self.colors[index].clone());
-        Some(Curved::new(
-            Finish { size: facet.size_px, bend, shares, color },
-            &self.cave.users[facet.user].eye_m,
-        ))
+        Some(Curved::new(Finish { size: facet.size_px, bend, shares, color }, &self.cave.users[facet.user].eye_m))
     }
 }
 

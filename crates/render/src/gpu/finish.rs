@@ -200,10 +200,8 @@ impl Finisher {
         around: Option<Around>,
     ) -> Result<(), RenderError> {
         let target = whole.create_view(&TextureViewDescriptor::default());
-        let plain = around.is_none()
-            && placed.finish.is_none()
-            && placed.flip == Flip::None
-            && placed.channels == [true; 3];
+        let plain =
+            around.is_none() && placed.finish.is_none() && placed.flip == Flip::None && placed.channels == [true; 3];
         let load = placed.begin.map_or(wgpu::LoadOp::Load, |color| wgpu::LoadOp::Clear(linear_color(color)));
         let uniform = uniform_buffer(gpu, &place_floats(rim, size, placed, around), "place")?;
         let views = self.views(gpu, placed.finish.as_ref());

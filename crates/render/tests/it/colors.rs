@@ -29,7 +29,8 @@ fn light(code: f64, gamma: Option<f64>, black: f64) -> f64 {
 }
 
 /// A row across two projectors: alone, overlapping with a ramp, alone; the wall's light is the same
-/// everywhere, for each level of the picture, with and without black.
+/// everywhere, for each level of the picture, with and without black. In bytes each projector rounds by
+/// half a code, which is 1.1 of 255 levels of light at the bright end.
 #[test]
 fn overlapping_light_is_flat() {
     for (black, gamma) in [(0.0, None), (0.004, None), (0.02, Some(2.2)), (0.01, Some(1.8))] {
@@ -56,9 +57,14 @@ fn overlapping_light_is_flat() {
                 bytes[bright] = bytes[bright].max((rounded - wanted).abs());
             }
         }
-        println!("black {black}, gamma {gamma:?}: exact {:.5}, in bytes {:.3} and {:.3} of 255 levels of light (up to half, above)", 255.0 * exact, 255.0 * bytes[0], 255.0 * bytes[1]);
+        println!(
+            "black {black}, gamma {gamma:?}: exact {:.5}, in bytes {:.3} and {:.3} of 255 levels of light (up to half, above)",
+            255.0 * exact,
+            255.0 * bytes[0],
+            255.0 * bytes[1]
+        );
         assert!(255.0 * exact < 0.01, "{exact}");
-        assert!(255.0 * bytes[0] < 1.5 && 255.0 * bytes[1] < 2.4, "{bytes:?}");
+        assert!(255.0 * bytes[0] < 1.0 && 255.0 * bytes[1] < 1.6, "{bytes:?}");
     }
 }
 

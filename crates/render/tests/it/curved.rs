@@ -28,11 +28,11 @@ fn points(eye: Point3<f64>, count: usize) -> Vec<Point3<f64>> {
         .collect()
 }
 
-/// Center of the light within 12 pixels of a place; `None` if there is none.
+/// Center of the light within 20 pixels of a place; `None` if there is none.
 fn center(image: &Image, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
     let (mut sum, mut at) = (0.0, [0.0; 2]);
-    for row in (y - 12.0).max(0.0) as u32..((y + 12.0) as u32).min(image.height) {
-        for column in (x - 12.0).max(0.0) as u32..((x + 12.0) as u32).min(image.width) {
+    for row in (y - 20.0).max(0.0) as u32..((y + 20.0) as u32).min(image.height) {
+        for column in (x - 20.0).max(0.0) as u32..((x + 20.0) as u32).min(image.width) {
             let light = crate::support::linear(image, column, row, 0);
             sum += light;
             at = [at[0] + light * (f64::from(column) + 0.5), at[1] + light * (f64::from(row) + 0.5)];
@@ -55,10 +55,10 @@ fn worst(
     let mut list = bare(Camera::default());
     let mut seen: Vec<[f64; 2]> = Vec::new();
     for point in points(eye, 160) {
-        let Some(at) = place(eye, point) else { continue };
-        let inside = (0..2).all(|k| at[k] > 13.0 && at[k] < f64::from(size[k]) - 13.0);
-        if inside && seen.iter().all(|other| (other[0] - at[0]).hypot(other[1] - at[1]) > 40.0) {
-            let radius = 0.008 * (point - eye).norm();
+        let radius = 0.02 * (point - eye).norm();
+        let Some(at) = outline(eye, point, radius, &place) else { continue };
+        let inside = (0..2).all(|k| at[k] > 21.0 && at[k] < f64::from(size[k]) - 21.0);
+        if inside && seen.iter().all(|other| (other[0] - at[0]).hypot(other[1] - at[1]) > 45.0) {
             list.add_sphere(point.cast(), radius as f32, UnitQuaternion::identity(), Material::unlit([1.0; 3]));
             seen.push(at);
         }
@@ -69,6 +69,38 @@ fn worst(
         (x - at[0]).hypot(y - at[1])
     };
     Some((seen.iter().map(off).fold(0.0, f64::max), seen.len()))
+}
+
+/// Center of the area that the outline of a sphere encloses in the picture: a closed polygon of 90
+/// tangent rays.
+fn outline(
+    eye: Point3<f64>,
+    point: Point3<f64>,
+    radius: f64,
+    place: &impl Fn(Point3<f64>, Point3<f64>) -> Option<[f64; 2]>,
+) -> Option<[f64; 2]> {
+    let d = point - eye;
+    let sin = radius / d.norm();
+    let u = d.cross(&if d.z.abs() < 0.9 * d.norm() { Vector3::z() } else { Vector3::x() }).normalize();
+    let v = u.cross(&d.normalize());
+    let tangent = |i: usize| {
+        let a = 2.0 * PI * i as f64 / 90.0;
+        eye + d * (1.0 - sin * sin).sqrt() + (u * a.cos() + v * a.sin()) * (sin * d.norm())
+    };
+    let corners: Vec<[f64; 2]> = (0..90).map(|i| place(eye, tangent(i))).collect::<Option<_>>()?;
+    // across the edge of a picture, or larger than the window of `center`
+    let wide = (0..2).any(|k| corners.iter().any(|p| (p[k] - corners[0][k]).abs() > 36.0));
+    if wide {
+        return None;
+    }
+    let (mut area, mut sum) = (0.0, [0.0; 2]);
+    for (i, p) in corners.iter().enumerate() {
+        let q = corners[(i + 1) % corners.len()];
+        let cross = p[0] * q[1] - q[0] * p[1];
+        area += cross;
+        sum = [sum[0] + cross * (p[0] + q[0]), sum[1] + cross * (p[1] + q[1])];
+    }
+    Some(sum.map(|x| x / (3.0 * area)))
 }
 
 /// The point where the ray from the eye through `p` leaves a sphere, or a cylinder along z, around
@@ -114,8 +146,7 @@ fn points_of_a_panorama_are_at_their_longitude_and_latitude() {
         let d = (p - eye).normalize();
         let elevation = d.z.asin();
         // close to the poles the picture stretches a sphere to a line
-        (elevation.abs() < 1.2)
-            .then(|| [(d.x.atan2(d.y) / (2.0 * PI) + 0.5) * 1600.0, (0.5 - elevation / PI) * 800.0])
+        (elevation.abs() < 1.1).then(|| [(d.x.atan2(d.y) / (2.0 * PI) + 0.5) * 1600.0, (0.5 - elevation / PI) * 800.0])
     };
     let Some((off, count)) = worst([0.3, -0.2, 1.5], "shape = \"equirectangular\"", [1600, 800], place) else { return };
     println!("panorama: {off:.4} px of {count} points");
@@ -137,7 +168,7 @@ fn points_of_a_cube_map_are_on_the_square_of_their_largest_coordinate() {
             _ => (1.0, 2.0, d.x, -d.y),
         };
         // spheres across the edge of a square are cut
-        let inner = a.abs().max(b.abs()) < 0.9 * most;
+        let inner = a.abs().max(b.abs()) < 0.95 * most;
         inner.then(|| [(column + 0.5 + 0.5 * a / most) * 300.0, (row + 0.5 + 0.5 * b / most) * 300.0])
     };
     let Some((off, count)) = worst([0.3, -0.2, 1.5], "shape = \"cube_map\"", [1200, 900], place) else { return };
@@ -153,7 +184,7 @@ fn a_flat_mesh_shows_the_picture_of_a_flat_screen() {
         let d = p - eye;
         let t = (2.0 - eye.y) / d.y;
         let x = eye + d * t;
-        (t > 0.0).then(|| [(0.5 + 0.5 * x.x) * 900.0, (1.0 - 0.5 * x.z) * 900.0])
+        (t > 0.0).then(|| [(0.5 + 0.5 * x.x) * 500.0, (1.0 - 0.5 * x.z) * 500.0])
     };
     let folder = std::env::temp_dir().join(format!("tumble-mesh-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
@@ -161,9 +192,9 @@ fn a_flat_mesh_shows_the_picture_of_a_flat_screen() {
     std::fs::write(folder.join("wall.obj"), obj).unwrap();
     let mesh = format!("shape = \"mesh\"\nmesh_file = \"{}\"", folder.join("wall.obj").display());
     for screen in [flat, &mesh] {
-        let Some((off, count)) = worst([0.4, 0.1, 1.3], screen, [900, 900], place) else { return };
+        let Some((off, count)) = worst([0.4, 0.1, 1.3], screen, [500, 500], place) else { return };
         println!("{off:.4} px of {count} points");
-        assert!(count > 8 && off < 0.1, "{off} px of {count} points on {screen}");
+        assert!(count > 4 && off < 0.1, "{off} px of {count} points on {screen}");
     }
     std::fs::remove_dir_all(&folder).unwrap();
 }
@@ -199,7 +230,8 @@ fn seams_of_the_cube_cannot_be_seen() {
     // seams are at 45, 135, 225 and 315 degrees from the left edge of one picture, and at 0, 90, 180 and
     // 270 of the other
     let far = (0..1024).map(|x| column(x).abs()).sum::<f64>() / 1024.0;
-    let seams: Vec<f64> = [128, 384, 640, 896, 256, 512, 768].iter().flat_map(|&x| [column(x - 1), column(x)]).collect();
+    let seams: Vec<f64> =
+        [128, 384, 640, 896, 256, 512, 768].iter().flat_map(|&x| [column(x - 1), column(x)]).collect();
     let most = seams.iter().fold(0.0, |most: f64, c| most.max(c.abs()));
     let differ = straight.rgba.iter().zip(&turned.rgba).filter(|(a, b)| a.abs_diff(**b) > 12).count() as f64
         / straight.rgba.len() as f64;
@@ -261,7 +293,10 @@ fn bad_meshes_say_what_is_wrong_and_where() {
     let obj = |text: &str| ScreenMesh::from_obj(text.as_bytes()).unwrap_err();
     assert!(obj("v 0 0\n").starts_with("line 1: expected `v x y z`"));
     assert!(obj("v 0 0 0\nvt 2 0\n").starts_with("line 2: expected `vt u v`"));
-    assert!(obj("v 0 0 0\nvt 0 0\nf 1 1 4\n").contains("line 3: the corner `4` names no `v` above it, of which there are 1"));
+    assert!(
+        obj("v 0 0 0\nvt 0 0\nf 1 1 4\n")
+            .contains("line 3: the corner `4` names no `v` above it, of which there are 1")
+    );
     assert!(obj("v 0 0 0\n").contains("no faces"));
     assert!(ScreenMesh::from_pfm(b"PF\n2 2 -1.0\n").unwrap_err().contains("0 bytes of floats, expected 48"));
     let nan = [b"PF\n2 2\n-1.0\n".to_vec(), f32::NAN.to_le_bytes().repeat(12)].concat();

@@ -107,11 +107,16 @@ pub(crate) fn facet(facet: &Facet, screen: &Screen, user: &User, f: &mut Fields<
         };
         let place = f.value("screen").map_or(f.span.clone(), |value| value.span());
         let (how, expected) = match screen.is_flat() {
-            true => ("behind", "expected the eye in front of the screen; corners are named as seen from the front, so left and right may be swapped"),
+            true => (
+                "behind",
+                "expected the eye in front of the screen; corners are named as seen from the front, so left and right may be swapped",
+            ),
             false => ("outside", "expected the eye inside the cylinder or sphere"),
         };
-        let message =
-            format!("{}: {eye} of user \"{}\" is {:.3} m {how} screen \"{}\"", f.what, user.name, -distance, screen.name);
+        let message = format!(
+            "{}: {eye} of user \"{}\" is {:.3} m {how} screen \"{}\"",
+            f.what, user.name, -distance, screen.name
+        );
         f.log.report(place, message, expected);
     }
     if let (Surface::Mesh { .. }, Some(_)) = (&screen.surface, &facet.warp_file) {

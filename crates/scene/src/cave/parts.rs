@@ -81,7 +81,12 @@ impl Screen {
     pub(crate) fn read(mut f: Fields<'_>, folder: &Path) -> Option<Screen> {
         let name = read_name(&mut f)?;
         let problems = f.log.count();
-        let surface = Surface::read(&mut f, folder);
+        let Some(surface) = Surface::read(&mut f, folder) else {
+            // the other keys depend on the shape; the name is known to facets
+            f.give_up();
+            let [lower_left_m, lower_right_m, upper_left_m] = [Point3::origin(); 3];
+            return Some(Screen { name, surface: Surface::Flat, lower_left_m, lower_right_m, upper_left_m });
+        };
         let [lower_left_m, lower_right_m, upper_left_m] = match &surface {
             Surface::Flat => {
                 ["lower_left_m", "lower_right_m", "upper_left_m"].map(|key| Point3::from(f.vector(key, Bound::ANY)))

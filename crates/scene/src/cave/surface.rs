@@ -121,10 +121,14 @@ const LENGTH: Bound = Bound::new(1e-3, 1e6, "a length from 0.001 to 1e6 m");
 const ELEVATION: Bound = Bound::new(-90.0, 90.0, "an angle from -90 to 90 degrees");
 
 impl Surface {
-    /// Reads `shape` and the keys of that shape.
-    pub(crate) fn read(f: &mut Fields<'_>, folder: &Path) -> Surface {
+    /// Reads `shape` and the keys of that shape; `None`, with the problem recorded, for an unknown one.
+    pub(crate) fn read(f: &mut Fields<'_>, folder: &Path) -> Option<Surface> {
         let radians = |degrees: f64| degrees.to_radians();
-        match f.choice_or("shape", SHAPES, Shape::Flat) {
+        let shape = match f.value("shape") {
+            Some(value) => f.as_choice("shape", value, SHAPES)?,
+            None => Shape::Flat,
+        };
+        Some(match shape {
             Shape::Flat => Surface::Flat,
             Shape::Cylinder => Surface::Cylinder {
                 frame: SurfaceFrame::read(f, [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]),
@@ -151,12 +155,10 @@ impl Surface {
             },
             Shape::CubeMap => Surface::CubeMap { frame: SurfaceFrame::read(f, [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]) },
             Shape::Mesh => {
-                if f.required("mesh_file", "a file that ends in .obj or .pfm").is_none() {
-                    return Surface::Mesh { file: PathBuf::new() };
-                }
+                f.required("mesh_file", "a file that ends in .obj or .pfm");
                 Surface::Mesh { file: file(f, "mesh_file", folder, &["obj", "pfm"]).unwrap_or_default() }
             }
-        }
+        })
     }
 
     /// Returns what the place `(u, v)` of the picture shows, 0 to 1 from its lower left corner;
