@@ -13,6 +13,7 @@ mod check;
 mod divergence;
 mod failure;
 mod help;
+mod mpcdi;
 mod progress;
 mod run;
 mod spheretree;
@@ -48,6 +49,7 @@ fn main() -> ExitCode {
         Command::SphereTree(options) => spheretree::spheretree(&options),
         Command::Scenes => scenes(),
         Command::Caves(options) => caves::caves(&options),
+        Command::Mpcdi(options) => mpcdi::mpcdi(&options),
         Command::Completions(options) => completions(options.shell),
     };
     match outcome {

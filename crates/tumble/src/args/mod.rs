@@ -1,7 +1,9 @@
 //! The command line: commands and their options.
 
+mod caves;
 mod values;
 
+pub use caves::{CavesOptions, MpcdiOptions};
 pub use values::{rate, seconds};
 
 use crate::cave::args::{CaveOptions, FacetOptions, RecoverOptions, RelayOptions, ReplayOptions, ServeOptions};
@@ -9,7 +11,7 @@ use crate::failure::Failure;
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use tumble::collide::Builder;
-use tumble::render::{CalibrationPattern, DebugDraw, Quality};
+use tumble::render::{DebugDraw, Quality};
 use tumble::scene::mjcf::MjcfOptions;
 use tumble::scene::urdf::{MissingMeshes, UrdfOptions};
 use tumble::scene::{FileKind, Integrator, LoadOptions, SceneFile, Solver, Stepper, resolve_scene};
@@ -50,6 +52,8 @@ pub enum Command {
     Scenes,
     /// List the shipped caves, or draw a calibration pattern for a facet
     Caves(CavesOptions),
+    /// Make a cave of an MPCDI archive or a configuration of SGCT, or an archive of a cave
+    Mpcdi(MpcdiOptions),
     /// Print a script that completes commands and options in a shell
     Completions(CompletionOptions),
 }
@@ -416,22 +420,6 @@ pub struct SphereTreeOptions {
 pub struct CompletionOptions {
     /// The shell.
     pub shell: clap_complete::Shell,
-}
-
-#[derive(Args)]
-pub struct CavesOptions {
-    /// Draw a calibration pattern: grid, corners, colors or name.
-    #[arg(long, value_name = "WHAT", requires_all = ["cave", "facet", "screenshot"])]
-    pub pattern: Option<CalibrationPattern>,
-    /// A cave file or the name of a shipped cave.
-    #[arg(long, value_name = "CAVE", requires = "pattern")]
-    pub cave: Option<String>,
-    /// The facet that shows the pattern.
-    #[arg(long, value_name = "NAME", requires = "pattern")]
-    pub facet: Option<String>,
-    /// Write the pattern here (PNG).
-    #[arg(long, value_name = "FILE", requires = "pattern", value_parser = png)]
-    pub screenshot: Option<PathBuf>,
 }
 
 /// Overlays of `--debug-draw`; an empty word means none.

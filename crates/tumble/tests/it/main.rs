@@ -4,6 +4,7 @@ mod articulated_scenes;
 mod bad_input;
 mod cave_faults;
 mod cave_figures;
+mod cave_formats;
 mod cave_frames;
 mod cave_keys;
 mod cave_outputs;
