@@ -19,7 +19,7 @@ mod window;
 use crate::list::bounds::Bounds;
 use crate::{DrawList, Image, Lens, MAX_PIXELS, MAX_SIDE, Part, RenderError, Viewpoint};
 use finish::Finisher;
-pub(crate) use finish::{Finish, Placed};
+pub(crate) use finish::{Around, Bend, Finish, Placed};
 use frame::Frame;
 use meshes::MeshCache;
 use nalgebra::Matrix4;
@@ -281,6 +281,30 @@ impl Renderer {
         let rim = self.draw_with_rim(stage, lens, width, height)?;
         let targets = &self.targets[self.targets.len() - 1]; // put there by drawing
         self.picture = Some(self.finisher.place(&self.gpu, targets, rim, [width, height], placed)?);
+        self.gpu.complaint()
+    }
+
+    /// Draws the view of a face of the cube of pictures into its tile, `side` pixels wide, at a place
+    /// of the picture of all tiles.
+    pub(crate) fn draw_face(
+        &mut self,
+        stage: &Stage,
+        from: &dyn Viewpoint,
+        side: u32,
+        [whole_px, at_px]: [[u32; 2]; 2],
+    ) -> Result<(), RenderError> {
+        self.check_size(whole_px[0], whole_px[1])?;
+        let rim = self.draw_with_rim(stage, from.lens(1.0)?, side, side)?;
+        let targets = &self.targets[self.targets.len() - 1]; // put there by drawing
+        self.finisher.place_face(&self.gpu, targets, rim, side, [whole_px, at_px]);
+        self.gpu.complaint()
+    }
+
+    /// Finishes a picture on a curved screen from the faces drawn before, and places it in the whole
+    /// picture.
+    pub(crate) fn place_surface(&mut self, around: Around, size: [u32; 2], placed: &Placed) -> Result<(), RenderError> {
+        self.check_size(placed.whole_px[0], placed.whole_px[1])?;
+        self.picture = Some(self.finisher.place_surface(&self.gpu, around, size, placed)?);
         self.gpu.complaint()
     }
 

@@ -41,7 +41,10 @@ pub use camera::Camera;
 pub use caption::caption;
 pub use draw::{DebugDraw, Drawing, NamedView, UnknownOverlay, UnknownView, UpAxis, tree_over_mesh};
 pub use error::RenderError;
-pub use facet::{Blend, CalibrationPattern, CaveView, FacetView, RIM_PX, Tile, Warp, calibration_picture, unfold};
+pub use facet::{
+    Blend, CalibrationPattern, CaveView, ColorTable, FacetView, Pfm, ProjectorColor, RIM_PX, ScreenMesh, Tile, Warp,
+    calibration_picture, finished_calibration_picture, unfold,
+};
 pub use gpu::{
     FreeParticle, FreeParticles, GpuParticles, MAX_OBSTACLES, MAX_PARTICLES, Obstacle, ObstacleShape, Renderer, Screen,
     Shown, Stage,

@@ -3,7 +3,8 @@
 use crate::args::CavesOptions;
 use crate::capture::write_png;
 use crate::failure::Failure;
-use tumble::render::calibration_picture;
+use tumble::render::{CaveView, calibration_picture, finished_calibration_picture};
+use tumble::scene::SceneFile;
 use tumble::scene::cave::{resolve_cave, shipped_caves};
 
 /// Lists the shipped caves, or draws a calibration pattern.
@@ -20,7 +21,16 @@ pub fn caves(options: &CavesOptions) -> Result<(), Failure> {
     };
     let cave = resolve_cave(name)?.load()?;
     let facet = cave.facet(facet)?;
-    write_png(&calibration_picture(&cave, facet, pattern), path)?;
+    let picture = match options.finish {
+        true => {
+            // the place in a scene changes no pattern
+            let scene = SceneFile::parse("[cave]\norigin_m = [0, 0, 0]\n", "the origin")?;
+            let view = CaveView::new(cave.clone(), &scene).map_err(Failure::input)?;
+            finished_calibration_picture(&view, facet, pattern)
+        }
+        false => calibration_picture(&cave, facet, pattern),
+    };
+    write_png(&picture, path)?;
     println!("picture: {}", path.display());
     Ok(())
 }

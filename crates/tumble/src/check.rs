@@ -6,8 +6,8 @@ use std::path::Path;
 use tumble::collide::{RepairSettings, Shape, TreeSettings};
 use tumble::dynamics::{ArticulatedBody, World};
 use tumble::net::sync::udp::SharedKey;
-use tumble::render::{Blend, DebugDraw, Drawing, RenderError, Warp};
-use tumble::scene::cave::{Cave, MAX_BYTES, is_cave, resolve_cave, shipped_caves};
+use tumble::render::{Blend, DebugDraw, Drawing, ProjectorColor, RenderError, ScreenMesh, Warp};
+use tumble::scene::cave::{Cave, MAX_BYTES, Surface, is_cave, resolve_cave, shipped_caves};
 use tumble::scene::{
     FileKind, SceneError, building_surface, overlap_notes, read_mesh_bytes, read_solid, resolve_scene, shipped,
     visual_notes,
@@ -96,12 +96,18 @@ fn cave(name: &str) -> Result<String, Failure> {
     Ok(cave.summary())
 }
 
-/// Reads the files that a cave names (warps, blends, the key), as its facets and its server do.
+/// Reads the files that a cave names (meshes, warps, blends, colors, the key), as its facets and its server do.
 fn check_files(cave: &Cave) -> Result<(), Failure> {
     for facet in &cave.facets {
         let named = |e: RenderError| Failure::input(format!("facet \"{}\" of {}: {e}", facet.name, cave.file));
         facet.warp_file.as_deref().map(Warp::load).transpose().map_err(named)?;
-        facet.blend_file.as_deref().map(|path| Blend::load(path, facet.size_px)).transpose().map_err(named)?;
+        for mask in [&facet.blend_file, &facet.black_file].into_iter().flatten() {
+            Blend::load(mask, facet.size_px).map_err(named)?;
+        }
+        ProjectorColor::load(facet).map_err(named)?;
+        if let Surface::Mesh { file } = &cave.screens[facet.screen].surface {
+            ScreenMesh::load(file).map_err(named)?;
+        }
     }
     let key = cave.security.as_ref().map(|security| SharedKey::read(&security.key_file)).transpose();
     key.map(drop).map_err(|e| Failure::input(format!("[security] of {}: {e}", cave.file)))

@@ -14,6 +14,7 @@ mod divergence;
 mod failure;
 mod frames_folder;
 mod help;
+mod mpcdi;
 mod progress;
 mod recording_file;
 mod run;
@@ -51,6 +52,7 @@ fn main() -> ExitCode {
         Command::SphereTree(options) => spheretree::spheretree(&options),
         Command::Scenes => scenes(),
         Command::Caves(options) => caves::caves(&options),
+        Command::Mpcdi(options) => mpcdi::mpcdi(&options),
         Command::Completions(options) => completions(options.shell),
     };
     match outcome {

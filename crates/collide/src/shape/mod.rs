@@ -9,6 +9,7 @@ pub(crate) mod rounded;
 mod stored;
 mod surface;
 
+use crate::sdf::DistanceField;
 use crate::{Aabb, MassProperties, Pose, ShapeError, SphereTree, TreeCache, TreeSettings, TriMesh, Vec3, mass};
 pub use compound::{CompoundPart, CompoundShape};
 pub(crate) use cone::Cone;
@@ -280,6 +281,16 @@ impl Shape {
             Shape::Cylinder(_) | Shape::Mesh(_) => true,
             Shape::Compound(compound) => compound.parts().iter().any(|part| part.shape.has_tree()),
             _ => false,
+        }
+    }
+
+    /// Returns whether the shape is convex or a union of convex parts: all but meshes with concave edges.
+    /// Builds the surface of a mesh on first use.
+    pub fn has_convex_parts(&self) -> bool {
+        match self {
+            Shape::Mesh(mesh) => mesh.surfaces().iter().all(|surface| surface.field.is_convex()),
+            Shape::Compound(compound) => compound.parts().iter().all(|part| part.shape.has_convex_parts()),
+            _ => true,
         }
     }
 

@@ -263,6 +263,7 @@ impl NarrowPhase<'_> {
                 shapes: [shape_a, shape_b],
                 tests: OwnTests::of([(entry_a.object, part_a), (entry_b.object, part_b)]),
                 part_states: [state_a, state_b],
+                skipped: &[],
             },
             motion_bounds: [self.motion_bounds[i], self.motion_bounds[j]],
             near,

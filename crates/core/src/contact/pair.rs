@@ -158,7 +158,7 @@ impl PairQuery<'_> {
             max_advances: 2 * MAX_SAMPLES as u32,
         };
         let start = Approach::Bounded { gap: margin, speed: closing / horizon };
-        let Some((time, nearest)) = self.parts.time_of_impact(start, &search, found) else {
+        let Some((time, nearest)) = self.parts.time_of_impact(start, 0.0, &search, found) else {
             found.clear();
             return 0.0;
         };

@@ -36,6 +36,8 @@ use tumble_collide::{Contact, ContactMode, NormalFrom, Pose, Shape, Vec3};
 /// A relative displacement in the step below this fraction of the smaller bounding radius needs no
 /// search: the normal of the start is accurate enough.
 const SHORT_MOTION: f64 = 0.1;
+/// Gap at which a part has met an edge, in gaps that count as near elsewhere.
+const CLOSE: f64 = 1e-3;
 /// Maximum number of queries between the impact and the end of the step.
 const MAX_SAMPLES: f64 = 32.0;
 /// Minimum number of contacts of a piece on one thread.
@@ -69,6 +71,8 @@ pub(crate) struct MovingPair<'a> {
     pub shapes: [&'a Shape; 2],
     pub tests: OwnTests<'a>,
     pub part_states: [&'a PartState; 2],
+    /// Features of contacts that are not found.
+    pub skipped: &'a [u64],
 }
 
 /// Distance between two parts at some time of a search.
@@ -103,18 +107,20 @@ impl MovingPair<'_> {
     pub fn contacts_at(&self, poses: &[Pose; 2], margin: f64, found: &mut Vec<Contact>) {
         found.clear();
         self.tests.contacts(self.mode, self.shapes, poses.each_ref(), margin, found);
+        found.retain(|contact| !self.skipped.contains(&contact.feature));
         found.sort_by_key(|contact| contact.feature);
     }
 
-    /// Returns the time at which the parts meet, s, and the contact there; `None` if they do not
-    /// meet within the horizon. `found` receives all contacts of that time.
+    /// Returns the time from `start` on at which the parts meet, s, and the contact there; `None` if they
+    /// do not meet within the horizon. `found` receives all contacts of that time.
     pub fn time_of_impact(
         &self,
         mut approach: Approach,
+        start: f64,
         search: &Search,
         found: &mut Vec<Contact>,
     ) -> Option<(f64, Contact)> {
-        let mut time = 0.0;
+        let mut time = start;
         for advances in 1.. {
             time += self.advance(&approach, time, 0.5 * search.near)?;
             if time.is_nan() || time > search.horizon {
@@ -195,13 +201,21 @@ impl MovingPair<'_> {
         let (time, met) = if contact.gap <= near {
             (0.0, contact)
         } else {
-            self.time_of_impact(Approach::Convex(contact), &search, found)?
+            self.time_of_impact(Approach::Convex(contact), 0.0, &search, found)?
         };
-        let rounded =
-            matches!(met.normal_from, NormalFrom::CorePoints | NormalFrom::LineOfA(_) | NormalFrom::LineOfB(_));
+        let rounded = is_at_edge(&met) || matches!(met.normal_from, NormalFrom::CorePoints);
         let end = if rounded { self.contact_after_glance(time, samples, &search, found) } else { None };
+        if end.is_none() && is_at_edge(&met) {
+            // a face beside the edge may come first
+            let close = Search { near: CLOSE * near, ..search };
+            return Some(self.time_of_impact(Approach::Convex(met), time, &close, found).unwrap_or((time, met)));
+        }
         Some(end.map_or((time, met), |end| (horizon, end)))
     }
+}
+
+fn is_at_edge(contact: &Contact) -> bool {
+    matches!(contact.normal_from, NormalFrom::LineOfA(_) | NormalFrom::LineOfB(_))
 }
 
 /// Returns the parts of a contact; `None` if one has no shape.
@@ -224,6 +238,7 @@ pub(crate) fn moving_pair<'a>(
         shapes: [a, b],
         tests: OwnTests::of([side_a, side_b]),
         part_states,
+        skipped: &[],
     })
 }
 
@@ -245,7 +260,7 @@ pub(crate) fn time_contacts(
         let pair = moving_pair(objects, owners, part_states, contact)?;
         let short = SHORT_MOTION * pair.size();
         // contacts of a mesh begin and end with its features; a surface of an own test need not be convex
-        let timed = motion >= short && !pair.shapes.iter().any(|shape| shape.has_tree()) && !pair.tests.any();
+        let timed = motion >= short && pair.is_convex() && !pair.tests.any();
         timed.then_some((pair, (motion / short).min(MAX_SAMPLES).ceil()))
     };
     let same_pair = |x: &ContactConstraint, y: &ContactConstraint| x.key.pair == y.key.pair;
@@ -291,10 +306,31 @@ fn pieces_of_pairs<'a>(threads: &Threads, contacts: &'a [ContactConstraint]) -> 
 }
 
 impl MovingPair<'_> {
-    /// Writes the contacts of the pair to `out`, for those that are predicted at the start of a step.
+    /// Writes the contacts of the pair to `out`, for those that are predicted at the start of a step. The
+    /// open contacts of a compound are followed beside those that touch: a ball that rolls over one part
+    /// towards the next meets the face of that part, and not the edge between both.
     fn time_contacts(
         &self,
         predicted: &[ContactConstraint],
+        limits: (f64, f64, f64),
+        found: &mut Vec<Contact>,
+        out: &mut Vec<ContactConstraint>,
+    ) {
+        let begin = out.len();
+        let compound = self.shapes.iter().any(|shape| matches!(shape, Shape::Compound(_)));
+        let near = |c: &Contact| if is_at_edge(c) { CLOSE * limits.1 } else { limits.1 };
+        let (touching, open): (Vec<_>, Vec<_>) =
+            predicted.iter().partition(|c| compound && c.contact.gap <= near(&c.contact));
+        let skipped: Vec<u64> = touching.iter().map(|c| c.key.feature).collect();
+        MovingPair { skipped: &skipped, ..*self }.follow_open(&open, limits, found, out);
+        out.extend(touching.into_iter().cloned());
+        out[begin..].sort_by_key(|constraint| constraint.key.feature);
+    }
+
+    /// Appends the contacts of the pair, for those that are predicted and followed.
+    fn follow_open(
+        &self,
+        predicted: &[&ContactConstraint],
         limits: (f64, f64, f64),
         found: &mut Vec<Contact>,
         out: &mut Vec<ContactConstraint>,
@@ -303,12 +339,11 @@ impl MovingPair<'_> {
         let closes =
             |c: &ContactConstraint| self.time_to_close(&c.contact, c.contact.gap, 0.0).filter(|t| *t <= horizon);
         let mut order: Vec<(f64, &ContactConstraint)> =
-            predicted.iter().filter_map(|c| Some((closes(c)?, c))).collect();
+            predicted.iter().filter_map(|c| Some((closes(c)?, *c))).collect();
         order.sort_by(|(s, _), (t, _)| s.total_cmp(t));
         let met = order.iter().find_map(|(_, c)| self.follow(c.contact, limits, found));
         match met {
             Some((time, first)) if time > 0.0 => {
-                let begin = out.len();
                 self.contacts_after(time, self.reach(&first.point, (horizon - time).max(0.5 * horizon)), found);
                 if !found.iter().any(|contact| contact.feature == first.feature) {
                     found.push(first);
@@ -316,7 +351,7 @@ impl MovingPair<'_> {
                 let least = predicted.iter().map(|c| c.contact.gap).fold(f64::INFINITY, f64::min);
                 out.extend(found.iter().map(|contact| {
                     let known = predicted.iter().find(|c| c.key.feature == contact.feature);
-                    let mut constraint = known.unwrap_or(&predicted[0]).clone();
+                    let mut constraint = (*known.unwrap_or(&predicted[0])).clone();
                     constraint.find_again(contact, self.part_states, time, known.is_some());
                     // contacts that were not predicted are further away
                     let nearer = (least - constraint.contact.gap).max(0.0);
@@ -324,10 +359,9 @@ impl MovingPair<'_> {
                     constraint.moved.turned -= nearer;
                     constraint
                 }));
-                out[begin..].sort_by_key(|constraint| constraint.key.feature);
             }
-            Some(_) => out.extend_from_slice(predicted),
-            None => out.extend(predicted.iter().filter(|c| closes(c).is_none()).cloned()),
+            Some(_) => out.extend(predicted.iter().copied().cloned()),
+            None => out.extend(predicted.iter().filter(|c| closes(c).is_none()).copied().cloned()),
         }
     }
 
@@ -337,6 +371,12 @@ impl MovingPair<'_> {
         let [a, b] = self.part_states;
         let spin = a.angular_velocity.norm() + b.angular_velocity.norm();
         t * ((a.velocity_at(point) - b.velocity_at(point)).norm() + spin * 2.0 * self.size())
+    }
+
+    /// Returns whether the parts collide as convex shapes, or as unions of convex shapes.
+    fn is_convex(&self) -> bool {
+        let exact = self.mode == ContactMode::Surface || !self.shapes.iter().any(|shape| shape.has_tree());
+        exact && self.shapes.iter().all(|shape| shape.has_convex_parts())
     }
 
     /// Returns the smaller bounding radius, m.

@@ -23,7 +23,8 @@ pub(crate) struct LargestResidual {
 
 impl LargestResidual {
     fn or(self, other: LargestResidual) -> LargestResidual {
-        if other.residual > self.residual { other } else { self }
+        // what is not a number is the largest
+        if other.residual > self.residual || other.residual.is_nan() { other } else { self }
     }
 }
 

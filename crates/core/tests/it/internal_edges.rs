@@ -5,7 +5,7 @@
 //! a lost speed of a body that meets an edge inside the floor is a difference.
 
 use crate::common::*;
-use tumble_core::collide::{Pose, Quat, Shape, TreeSettings, TriMesh, Vec3};
+use tumble_core::collide::{CompoundPart, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3};
 use tumble_core::*;
 
 /// Size of the floor in meters; it begins at `FLOOR_START` on x and is centered on y.
@@ -339,6 +339,48 @@ fn a_wall_on_a_floor_is_struck() {
             });
             let x = position(&world, id).x;
             assert!((x - 0.9).abs() < 1e-3, "{stepper} {mover:?} at a wall of {height} m: {x}");
+        }
+    }
+}
+
+/// A track of two plates that meet at the line x = z = 0; the second one rises by `angle`.
+fn creased(angle: f64, hulls: bool) -> Shape {
+    let size = Vec3::new(2.0, 1.0, 0.2);
+    let plate = if hulls {
+        Shape::convex_hull(&TriMesh::cuboid(size).vertices).unwrap()
+    } else {
+        Shape::Box { half_extents: 0.5 * size }
+    };
+    let turn = Quat::from_axis_angle(&Vec3::y_axis(), -angle);
+    let poses = [Pose::translation(-1.0, 0.0, -0.1), Pose::from_parts((turn * Vec3::new(1.0, 0.0, -0.1)).into(), turn)];
+    Shape::compound(poses.map(|pose| CompoundPart::new(plate.clone(), pose)).to_vec()).unwrap()
+}
+
+/// A ball that slides over the inner edge of a track meets the face behind it, and not the edge: it loses
+/// the velocity along that face's normal and goes on with `v·cos(angle)`, whatever the step and the
+/// place where it begins.
+#[test]
+fn a_ball_meets_the_face_behind_an_inner_edge_of_a_compound() {
+    let (speed, radius) = (0.75, 0.012);
+    for case in 0..8 {
+        let (angle, hulls) = ([0.0f64, 2.0, 7.5, 20.0][case / 2].to_radians(), case % 2 == 1);
+        for rate in [60.0, 120.0, 240.0, 480.0, 960.0, 4000.0] {
+            for phase in 0..10 {
+                let mut world = no_gravity(world("time_stepping", 1.0 / rate));
+                let smooth = Material { friction: 0.0, restitution: 0.0, ..Material::default() };
+                world.add_static(RigidBody::fixed(creased(angle, hulls)).with_material(smooth)).unwrap();
+                let start = -0.05 - speed / rate * f64::from(phase) / 10.0;
+                let ball = RigidBody::new(sphere(radius)).with_material(smooth);
+                let ball = ball.with_pose(Pose::translation(start, 0.0, radius));
+                let ball = world.add(ball.with_velocity(Vec3::x() * speed)).unwrap();
+                while world.time() < 0.2 {
+                    world.step().unwrap();
+                }
+                let v = velocity(&world, ball);
+                let along = Vec3::new(angle.cos(), 0.0, angle.sin()) * (speed * angle.cos());
+                let error = (v - along).norm() / speed;
+                assert!(error < 1e-12, "hulls: {hulls}, {angle} rad, {rate} Hz, place {phase}: {error} off");
+            }
         }
     }
 }

@@ -2,9 +2,10 @@
 //! the screen, so that a tape measure checks them.
 
 use super::canvas::{fill_rect, put};
+use super::color_patterns;
 use super::compose::{blank, combined, flipped};
 use super::font::{text_width, write};
-use crate::Image;
+use crate::{CaveView, Image};
 use std::fmt;
 use std::str::FromStr;
 use tumble_scene::cave::{Cave, Facet, Screen};
@@ -20,15 +21,27 @@ pub enum CalibrationPattern {
     Corners,
     /// Bars and ramps: check that projectors agree in color and brightness.
     Colors,
+    /// Ramps of gray and of each color, and the darkest and brightest 32 codes in steps: check black
+    /// level, transfer curve and clipping.
+    Ramps,
+    /// Bands of 0, 10, 25, 50 and 100 % of light: flat across projectors with blends and colors that
+    /// fit.
+    Blend,
+    /// Lines one pixel wide in white, red, green and blue: check focus and that the three colors of a
+    /// projector meet.
+    Convergence,
     /// The facet's name, large, with its node, user and size: checks that the right picture is on
     /// the right screen, upright.
     Name,
 }
 
-const NAMES: [(&str, CalibrationPattern); 4] = [
+const NAMES: [(&str, CalibrationPattern); 7] = [
     ("grid", CalibrationPattern::Grid),
     ("corners", CalibrationPattern::Corners),
     ("colors", CalibrationPattern::Colors),
+    ("ramps", CalibrationPattern::Ramps),
+    ("blend", CalibrationPattern::Blend),
+    ("convergence", CalibrationPattern::Convergence),
     ("name", CalibrationPattern::Name),
 ];
 
@@ -40,7 +53,7 @@ impl FromStr for CalibrationPattern {
             .iter()
             .find(|(name, _)| *name == word)
             .map(|(_, pattern)| *pattern)
-            .ok_or_else(|| "expected grid, corners, colors or name".into())
+            .ok_or_else(|| "expected grid, corners, colors, ramps, blend, convergence or name".into())
     }
 }
 
@@ -62,13 +75,18 @@ const YELLOW: [u8; 4] = [255, 220, 64, 255];
 /// Draws the pattern of a facet: in stereo one per eye, labeled, mirrored as the facet is, not
 /// warped and not blended.
 pub fn calibration_picture(cave: &Cave, facet: &Facet, pattern: CalibrationPattern) -> Image {
+    drawn(cave, facet, pattern, &|eye| eye)
+}
+
+/// Draws the pattern of a facet as its projector gets pictures: warped, blended and colored too.
+pub fn finished_calibration_picture(view: &CaveView, facet: &Facet, pattern: CalibrationPattern) -> Image {
+    drawn(view.cave(), facet, pattern, &|eye| view.finished(eye, facet))
+}
+
+fn drawn(cave: &Cave, facet: &Facet, pattern: CalibrationPattern, finish: &dyn Fn(Image) -> Image) -> Image {
     let screen = &cave.screens[facet.screen];
-    let eyes = facet
-        .stereo
-        .sides()
-        .iter()
-        .map(|side| flipped(one_eye(cave, facet, screen, pattern, *side), facet.flip))
-        .collect();
+    let sides = facet.stereo.sides().iter();
+    let eyes = sides.map(|side| flipped(finish(one_eye(cave, facet, screen, pattern, *side)), facet.flip)).collect();
     combined(eyes, facet.stereo)
 }
 
@@ -79,6 +97,9 @@ fn one_eye(cave: &Cave, facet: &Facet, screen: &Screen, pattern: CalibrationPatt
         CalibrationPattern::Grid => grid(&mut image, screen),
         CalibrationPattern::Corners => corners(&mut image, screen),
         CalibrationPattern::Colors => colors(&mut image),
+        CalibrationPattern::Ramps => color_patterns::ramps(&mut image),
+        CalibrationPattern::Blend => color_patterns::bands(&mut image),
+        CalibrationPattern::Convergence => color_patterns::convergence(&mut image),
         CalibrationPattern::Name => {}
     }
     caption(&mut image, cave, facet, screen, pattern, side);
@@ -138,9 +159,10 @@ fn corners(image: &mut Image, screen: &Screen) {
     for (name, place, right, low, color) in named {
         fill_rect(image, if right { w - arm } else { 0 }, if low { h - thick } else { 0 }, arm, thick, color);
         fill_rect(image, if right { w - thick } else { 0 }, if low { h - arm } else { 0 }, thick, arm, color);
-        for (line, text) in
-            [name.to_owned(), format!("{:.3} {:.3} {:.3} M", place.x, place.y, place.z)].iter().enumerate()
-        {
+        // the corners of a curved screen are those of its stand-in
+        let measures =
+            if screen.is_flat() { format!("{:.3} {:.3} {:.3} M", place.x, place.y, place.z) } else { String::new() };
+        for (line, text) in [name.to_owned(), measures].iter().enumerate() {
             let inset = 4 * thick;
             let x = if right { w - inset - text_width(text, scale) } else { inset };
             let down = inset + 10 * scale * line as i64;

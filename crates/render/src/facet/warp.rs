@@ -18,27 +18,24 @@
 //! in linear light. Outside the grid the result is black.
 
 use super::blend::encoded;
+use super::pfm::Pfm;
+use super::raster::{MAX_TRIANGLES, Patches};
 use crate::material::linear;
 use crate::{Image, RenderError};
 use std::path::Path;
 
 /// Largest warp file, bytes.
 const MAX_BYTES: u64 = 64 << 20;
-/// Largest number of triangles of a grid.
-const MAX_TRIANGLES: usize = 1 << 21;
 
 /// Range of places; the picture itself is 0 to 1.
 const PLACES: std::ops::RangeInclusive<f64> = -0.5..=1.5;
-/// Largest sum of the areas of the triangles' upright boxes, in targets.
-const MAX_COVERS: f64 = 100.0;
-
 /// A corner: place in the target, place in the drawn picture; both 0 to 1, y up.
-type Corner = ([f64; 2], [f64; 2]);
+type Corner = super::raster::Corner<2>;
 
 /// A grid that warps pictures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Warp {
-    triangles: Vec<[Corner; 3]>,
+    patches: Patches<2>,
 }
 
 impl Warp {
@@ -90,7 +87,7 @@ impl Warp {
         if triangles.is_empty() {
             return Err("the warp grid has no faces; expected lines `v x y`, `vt u v` and `f v/vt v/vt v/vt`".into());
         }
-        Warp::of(triangles)
+        Ok(Warp { patches: Patches::triangles(triangles)? })
     }
 
     /// Parses the bytes of a PFM file.
@@ -98,47 +95,12 @@ impl Warp {
     /// # Errors
     /// The fault.
     pub fn from_pfm(bytes: &[u8]) -> Result<Warp, String> {
-        let (header, data) = pfm_header(bytes)?;
-        let ([w, h], little) = header;
-        let float = |at: usize| {
-            let four: [u8; 4] = std::array::from_fn(|k| data[at + k]);
-            f64::from(if little { f32::from_le_bytes(four) } else { f32::from_be_bytes(four) })
-        };
-        let node = |x: usize, y: usize| -> Option<Corner> {
-            let at = 12 * (y * w + x);
-            let source = [float(at), float(at + 4)];
-            let place = [x as f64 / (w - 1) as f64, y as f64 / (h - 1) as f64];
-            source.iter().all(|s| PLACES.contains(s)).then_some((place, source))
-        };
-        let mut triangles = Vec::new();
-        for y in 0..h - 1 {
-            for x in 0..w - 1 {
-                if let (Some(a), Some(b), Some(c), Some(d)) =
-                    (node(x, y), node(x + 1, y), node(x + 1, y + 1), node(x, y + 1))
-                {
-                    triangles.extend([[a, b, c], [a, c, d]]);
-                }
-            }
-        }
-        if triangles.is_empty() {
-            return Err("no cell of the warp grid has all its places from 0 to 1 (at most -0.5 to 1.5)".into());
-        }
-        Warp::of(triangles)
-    }
-
-    /// Builds a warp from triangles that are adjacent, at least approximately.
-    fn of(triangles: Vec<[Corner; 3]>) -> Result<Warp, String> {
-        let side = |t: &[Corner; 3], k: usize| {
-            let along = t.map(|(place, _)| place[k].clamp(0.0, 1.0));
-            along.iter().copied().fold(0.0, f64::max) - along.iter().copied().fold(1.0, f64::min)
-        };
-        let covers: f64 = triangles.iter().map(|t| side(t, 0) * side(t, 1)).sum();
-        if covers > MAX_COVERS {
-            return Err(format!(
-                "the triangles of the warp grid cover the picture {covers:.0} times; expected adjacent triangles, and at most {MAX_COVERS} times"
-            ));
-        }
-        Ok(Warp { triangles })
+        let pfm = Pfm::parse(bytes)?;
+        let inside = |uv: &[f32; 2]| uv.iter().all(|s| PLACES.contains(&f64::from(*s)));
+        let nodes = pfm.values.iter().map(|[u, v, _]| Some([*u, *v]).filter(inside)).collect();
+        let patches = Patches::grid(pfm.size, nodes)
+            .ok_or("no cell of the warp grid has all its places from 0 to 1 (at most -0.5 to 1.5)")?;
+        Ok(Warp { patches })
     }
 
     /// Returns the warped picture, of the same size.
@@ -155,52 +117,15 @@ impl Warp {
     /// For each pixel of a picture of this size, by rows from the top, the place that appears
     /// there, in pixels; centers are at whole numbers.
     pub(crate) fn sources(&self, [width, height]: [u32; 2]) -> Vec<Option<[f64; 2]>> {
-        let (w, h) = (width as usize, height as usize);
-        let mut out = vec![None; w * h];
-        for triangle in &self.triangles {
-            // corners in pixels of the target, y down
-            let p = triangle.map(|(place, _)| [place[0] * w as f64, (1.0 - place[1]) * h as f64]);
-            let area = cross(p[0], p[1], p[2]);
-            if area.abs() < 1e-12 {
-                continue;
-            }
-            let span = |k: usize, most: usize| {
-                let (low, high) =
-                    (p.iter().map(|c| c[k]).fold(f64::MAX, f64::min), p.iter().map(|c| c[k]).fold(f64::MIN, f64::max));
-                (
-                    (low - 0.5).ceil().clamp(0.0, most as f64) as usize,
-                    ((high - 0.5).floor() + 1.0).clamp(0.0, most as f64) as usize,
-                )
-            };
-            let ((x0, x1), (y0, y1)) = (span(0, w), span(1, h));
-            for y in y0..y1 {
-                for x in x0..x1 {
-                    let middle = [x as f64 + 0.5, y as f64 + 0.5];
-                    let share = [
-                        cross(middle, p[1], p[2]) / area,
-                        cross(p[0], middle, p[2]) / area,
-                        cross(p[0], p[1], middle) / area,
-                    ];
-                    if share.iter().all(|s| *s >= -1e-9) {
-                        let source: [f64; 2] =
-                            std::array::from_fn(|k| (0..3).map(|i| share[i] * triangle[i].1[k]).sum());
-                        out[y * w + x] = Some([source[0] * w as f64 - 0.5, (1.0 - source[1]) * h as f64 - 0.5]);
-                    }
-                }
-            }
-        }
-        out
+        let (w, h) = (f64::from(width), f64::from(height));
+        let place = |[u, v]: [f64; 2]| [u * w - 0.5, (1.0 - v) * h - 0.5];
+        self.patches.rasterized([width, height]).into_iter().map(|source| source.map(place)).collect()
     }
-}
-
-/// Twice the signed area of a triangle.
-fn cross(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
-    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
 /// Samples the picture bilinearly; pixel centers are at whole numbers, and the edge is repeated
 /// outside.
-fn sample(image: &Image, x: f64, y: f64) -> [u8; 4] {
+pub(super) fn sample(image: &Image, x: f64, y: f64) -> [u8; 4] {
     let (fx, fy) = ((x - x.round()).abs(), (y - y.round()).abs());
     let clamped = |v: f64, most: u32| v.clamp(0.0, f64::from(most - 1)) as usize;
     let at = |x: f64, y: f64| 4 * (clamped(y, image.height) * image.width as usize + clamped(x, image.width));
@@ -232,64 +157,23 @@ fn pair<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<[f64; 2]> {
 
 /// Parses `v/vt`, `v/vt/vn` or `v`; indices start at 1, negative ones count from the end.
 fn corner(word: &str, places: &[[f64; 2]], sources: &[[f64; 2]]) -> Result<Corner, String> {
+    let (place, source) = index(word, places.len(), sources.len())?;
+    Ok((places[place], sources[source]))
+}
+
+/// Parses a corner of a face as the indices, from 0, of its `v` and its `vt`, of which there are as
+/// many; a bare `v` has the `vt` of its number.
+pub(super) fn index(word: &str, v: usize, vt: usize) -> Result<(usize, usize), String> {
     let mut parts = word.split('/');
     let place = parts.next().unwrap_or("");
     let source = parts.next().filter(|s| !s.is_empty()).unwrap_or(place);
-    let pick = |digits: &str, of: &[[f64; 2]], what: &str| {
-        let index = digits
+    let pick = |digits: &str, count: usize, what: &str| {
+        digits
             .parse::<i64>()
             .ok()
-            .and_then(|i| usize::try_from(if i < 0 { of.len() as i64 + i } else { i - 1 }).ok());
-        index
-            .and_then(|i| of.get(i).copied())
-            .ok_or_else(|| format!("the corner `{word}` names no `{what}` above it, of which there are {}", of.len()))
+            .and_then(|i| usize::try_from(if i < 0 { count as i64 + i } else { i - 1 }).ok())
+            .filter(|i| *i < count)
+            .ok_or_else(|| format!("the corner `{word}` names no `{what}` above it, of which there are {count}"))
     };
-    Ok((pick(place, places, "v")?, pick(source, sources, "vt")?))
-}
-
-/// Size, and whether the floats are little-endian.
-type PfmHeader = ([usize; 2], bool);
-
-/// Returns the header and the floats.
-fn pfm_header(bytes: &[u8]) -> Result<(PfmHeader, &[u8]), String> {
-    let mut words = Vec::new();
-    let mut at = 0;
-    while words.len() < 4 {
-        let start = at
-            + bytes[at..]
-                .iter()
-                .take(64)
-                .position(|b| !b.is_ascii_whitespace())
-                .ok_or("the header of the PFM file is cut off")?;
-        let length = bytes[start..]
-            .iter()
-            .take(64)
-            .position(u8::is_ascii_whitespace)
-            .ok_or("the header of the PFM file is cut off")?;
-        words.push(
-            std::str::from_utf8(&bytes[start..start + length]).map_err(|_| "the header of the PFM file is no text")?,
-        );
-        at = start + length;
-    }
-    if words[0] != "PF" {
-        return Err(format!("the PFM file is of kind {}, expected PF (three floats)", words[0]));
-    }
-    let side = |word: &str| {
-        word.parse::<usize>()
-            .ok()
-            .filter(|n| (2..=1024).contains(n))
-            .ok_or_else(|| format!("the PFM grid has the side {word}, expected 2 to 1024"))
-    };
-    let size = [side(words[1])?, side(words[2])?];
-    let scale: f64 = words[3]
-        .parse()
-        .ok()
-        .filter(|s: &f64| s.is_finite() && *s != 0.0)
-        .ok_or_else(|| format!("the PFM scale is {}, expected a number", words[3]))?;
-    let data = &bytes[at + 1..];
-    let wanted = 12 * size[0] * size[1];
-    if data.len() < wanted {
-        return Err(format!("the PFM grid has {} bytes of floats, expected {wanted}", data.len()));
-    }
-    Ok(((size, scale < 0.0), data))
+    Ok((pick(place, v, "v")?, pick(source, vt, "vt")?))
 }

@@ -2,8 +2,9 @@
 //! darkens and mirrors for projectors.
 //!
 //! If a picture only changes its place, its bytes are copied. Otherwise one pass per eye gives the
-//! result of [`crate::Warp::apply`] and [`crate::Blend::apply`] to within one level: these round to
-//! bytes in between, the pass does not.
+//! result of [`crate::Warp::apply`], [`crate::Blend::apply`] and [`crate::ProjectorColor::apply`] to
+//! within one level: these round to bytes in between, the pass does not. Pictures on curved screens are
+//! taken from the faces of a cube of pictures in the same pass.
 
 use super::Gpu;
 use super::frame::bind;
@@ -11,6 +12,7 @@ use super::meshes::uniform_buffer;
 use super::pipelines::COLOR;
 use super::targets::{Targets, finished_texture};
 use crate::RenderError;
+use crate::facet::ProjectorColor;
 use std::sync::Arc;
 use tumble_scene::cave::Flip;
 use wgpu::util::{DeviceExt, TextureDataOrder};
@@ -24,16 +26,40 @@ const FINISH_WGSL: &str = include_str!("../shaders/finish.wgsl");
 const MAX_KEPT: usize = 64;
 /// Marks a pixel without a source in the texture of a warp.
 const NOWHERE: f32 = -1e9;
+/// Number of textures of a finish: warp or surface, shares, table of colors.
+const TEXTURES: usize = 3;
 
-/// Warp and blend of every picture of one size, as numbers.
+/// Warp, blend and color of every picture of one size, as numbers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Finish {
     pub size: [u32; 2],
-    /// For each pixel the place of the picture that appears there, in pixels, centers at whole
-    /// numbers; `None` stays black.
-    pub warp: Option<Vec<Option<[f32; 2]>>>,
-    /// For each pixel the fraction of light that it keeps, per color, 255 for all of it.
-    pub shares: Option<Vec<[u8; 3]>>,
+    pub bend: Bend,
+    /// For each pixel the fraction of light that it keeps, per color, and that of the lift; 0 to 1.
+    pub shares: Option<Vec<[f32; 4]>>,
+    pub color: Option<ProjectorColor>,
+}
+
+/// The content of each pixel.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) enum Bend {
+    /// The same pixel of the picture.
+    #[default]
+    None,
+    /// The place of the picture that appears there, in pixels, centers at whole numbers; `None` stays
+    /// black.
+    Warp(Vec<Option<[f32; 2]>>),
+    /// A point (`x y z 1`) or a direction (`x y z 0`) in the cave; `w = -1` stays black.
+    Surface(Vec<[f32; 4]>),
+}
+
+/// A cube of pictures around an eye, the source of pictures on curved screens.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Around {
+    /// The eye, cave axes, m.
+    pub eye: [f32; 3],
+    /// Pixels of 90 degrees, and beyond each edge of a face.
+    pub side_px: u32,
+    pub border_px: u32,
 }
 
 /// How an eye's picture is placed in the whole.
@@ -55,9 +81,13 @@ pub(crate) struct Finisher {
     layout: BindGroupLayout,
     /// All colors; red; green and blue.
     pipelines: [RenderPipeline; 3],
-    nothing: [TextureView; 2],
-    known: Vec<(Arc<Finish>, [TextureView; 2])>,
+    /// The same from a cube of pictures.
+    surfaces: [RenderPipeline; 3],
+    nothing: [TextureView; TEXTURES],
+    known: Vec<(Arc<Finish>, [TextureView; TEXTURES])>,
     whole: Option<Texture>,
+    /// The faces of a cube of pictures.
+    faces: Option<Texture>,
 }
 
 const CHANNELS: [[bool; 3]; 3] = [[true; 3], [true, false, false], [false, true, true]];
@@ -81,20 +111,22 @@ impl Finisher {
             has_dynamic_offset: false,
             min_binding_size: None,
         };
-        let entries = [entry(0, place), entry(1, numbers), entry(2, numbers), entry(3, numbers)];
+        let entries = [entry(0, place), entry(1, numbers), entry(2, numbers), entry(3, numbers), entry(4, numbers)];
         let layout = device
             .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("finish"), entries: &entries });
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("finish"),
             source: wgpu::ShaderSource::Wgsl(FINISH_WGSL.into()),
         });
-        let pipelines = CHANNELS.map(|channels| pipeline(device, &layout, &module, channels));
-        // no warp, and a mask that keeps all light
+        let pipelines = CHANNELS.map(|channels| pipeline(device, &layout, &module, "fs_place", channels));
+        let surfaces = CHANNELS.map(|channels| pipeline(device, &layout, &module, "fs_surface", channels));
+        // no warp, a mask that keeps all light, no table
         let nothing = [
             upload(gpu, [1, 1], TextureFormat::Rg32Float, &[0; 8]),
             upload(gpu, [1, 1], TextureFormat::Rgba8Unorm, &[255; 4]),
+            upload(gpu, [1, 1], TextureFormat::Rgba8Unorm, &[0; 4]),
         ];
-        Finisher { layout, pipelines, nothing, known: Vec::new(), whole: None }
+        Finisher { layout, pipelines, surfaces, nothing, known: Vec::new(), whole: None, faces: None }
     }
 
     /// Copies the middle of a picture, without `rim` pixels on each side.
@@ -117,44 +149,89 @@ impl Finisher {
         placed: &Placed,
     ) -> Result<Texture, RenderError> {
         let whole = self.whole(gpu, placed.whole_px);
-        let target = whole.create_view(&TextureViewDescriptor::default());
-        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("finish") });
         let plain = placed.finish.is_none() && placed.flip == Flip::None && placed.channels == [true; 3];
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("finish") });
         if placed.begin.is_some() || !plain {
-            let load = placed.begin.map_or(wgpu::LoadOp::Load, |color| wgpu::LoadOp::Clear(linear_color(color)));
-            let uniform = uniform_buffer(gpu, &place_floats(rim, size, placed), "place")?;
-            let views = self.views(gpu, placed.finish.as_ref());
-            let entries = [
-                uniform.as_entire_binding(),
-                BindingResource::TextureView(&from.picture),
-                BindingResource::TextureView(&views[0]),
-                BindingResource::TextureView(&views[1]),
-            ];
-            let inputs = bind(gpu, &self.layout, &entries);
-            let attachment = wgpu::RenderPassColorAttachment {
-                view: &target,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
-            };
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("finish"),
-                color_attachments: &[Some(attachment)],
-                ..Default::default()
-            });
-            if !plain {
-                let which = CHANNELS.iter().position(|c| *c == placed.channels).unwrap_or(0);
-                pass.set_pipeline(&self.pipelines[which]);
-                pass.set_bind_group(0, &inputs, &[]);
-                pass.set_scissor_rect(placed.at_px[0], placed.at_px[1], size[0], size[1]);
-                pass.draw(0..3, 0..1);
-            }
+            self.pass(gpu, &mut encoder, (&from.picture, &whole), (rim, size, placed), None)?;
         }
         if plain {
             copy(&mut encoder, &from.resolved, rim, size, &whole, placed.at_px);
         }
         gpu.queue.submit([encoder.finish()]);
         Ok(whole)
+    }
+
+    /// Copies the picture of the targets, without its rim, to a face of the cube of pictures, which
+    /// has this size.
+    pub fn place_face(&mut self, gpu: &Gpu, from: &Targets, rim: u32, side: u32, [whole, at]: [[u32; 2]; 2]) {
+        let faces = match &self.faces {
+            Some(faces) if [faces.width(), faces.height()] == whole => faces,
+            _ => self.faces.insert(finished_texture(&gpu.device, "faces", whole[0], whole[1])),
+        };
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("face") });
+        copy(&mut encoder, &from.resolved, rim, [side; 2], faces, at);
+        gpu.queue.submit([encoder.finish()]);
+    }
+
+    /// Places a picture on a curved screen, taken from the faces, and returns the whole.
+    pub fn place_surface(
+        &mut self,
+        gpu: &Gpu,
+        around: Around,
+        size: [u32; 2],
+        placed: &Placed,
+    ) -> Result<Texture, RenderError> {
+        let whole = self.whole(gpu, placed.whole_px);
+        let faces = self.faces.as_ref().ok_or_else(|| gpu.failed("no face was drawn yet".into()))?;
+        let faces = faces.create_view(&TextureViewDescriptor::default());
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("finish") });
+        self.pass(gpu, &mut encoder, (&faces, &whole), (0, size, placed), Some(around))?;
+        gpu.queue.submit([encoder.finish()]);
+        Ok(whole)
+    }
+
+    /// Records the pass that clears the whole if asked for, and draws unless the picture is copied.
+    fn pass(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        (from, whole): (&TextureView, &Texture),
+        (rim, size, placed): (u32, [u32; 2], &Placed),
+        around: Option<Around>,
+    ) -> Result<(), RenderError> {
+        let target = whole.create_view(&TextureViewDescriptor::default());
+        let plain =
+            around.is_none() && placed.finish.is_none() && placed.flip == Flip::None && placed.channels == [true; 3];
+        let load = placed.begin.map_or(wgpu::LoadOp::Load, |color| wgpu::LoadOp::Clear(linear_color(color)));
+        let uniform = uniform_buffer(gpu, &place_floats(rim, size, placed, around), "place")?;
+        let views = self.views(gpu, placed.finish.as_ref());
+        let entries = [
+            uniform.as_entire_binding(),
+            BindingResource::TextureView(from),
+            BindingResource::TextureView(&views[0]),
+            BindingResource::TextureView(&views[1]),
+            BindingResource::TextureView(&views[2]),
+        ];
+        let inputs = bind(gpu, &self.layout, &entries);
+        let attachment = wgpu::RenderPassColorAttachment {
+            view: &target,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
+        };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("finish"),
+            color_attachments: &[Some(attachment)],
+            ..Default::default()
+        });
+        if !plain {
+            let which = CHANNELS.iter().position(|c| *c == placed.channels).unwrap_or(0);
+            pass.set_pipeline(if around.is_some() { &self.surfaces[which] } else { &self.pipelines[which] });
+            pass.set_bind_group(0, &inputs, &[]);
+            pass.set_scissor_rect(placed.at_px[0], placed.at_px[1], size[0], size[1]);
+            pass.draw(0..3, 0..1);
+        }
+        Ok(())
     }
 
     /// The texture of finished pictures of this size; its content persists between calls.
@@ -165,21 +242,30 @@ impl Finisher {
         }
     }
 
-    fn views(&mut self, gpu: &Gpu, finish: Option<&Arc<Finish>>) -> [TextureView; 2] {
+    fn views(&mut self, gpu: &Gpu, finish: Option<&Arc<Finish>>) -> [TextureView; TEXTURES] {
         let Some(finish) = finish else { return self.nothing.clone() };
         if let Some((_, views)) = self.known.iter().find(|(known, _)| Arc::ptr_eq(known, finish)) {
             return views.clone();
         }
-        let warp = finish.warp.as_ref().map(|warp| {
-            let floats: Vec<f32> = warp.iter().flat_map(|from| from.unwrap_or([NOWHERE; 2])).collect();
-            upload(gpu, finish.size, TextureFormat::Rg32Float, bytemuck::cast_slice(&floats))
-        });
-        let shares = finish.shares.as_ref().map(|shares| {
-            let bytes: Vec<u8> = shares.iter().flat_map(|[r, g, b]| [*r, *g, *b, 255]).collect();
-            upload(gpu, finish.size, TextureFormat::Rgba8Unorm, &bytes)
-        });
-        let views =
-            [warp.unwrap_or_else(|| self.nothing[0].clone()), shares.unwrap_or_else(|| self.nothing[1].clone())];
+        let mut views = self.nothing.clone();
+        match &finish.bend {
+            Bend::None => {}
+            Bend::Warp(warp) => {
+                let floats: Vec<f32> = warp.iter().flat_map(|from| from.unwrap_or([NOWHERE; 2])).collect();
+                views[0] = upload(gpu, finish.size, TextureFormat::Rg32Float, bytemuck::cast_slice(&floats));
+            }
+            Bend::Surface(shown) => {
+                views[0] = upload(gpu, finish.size, TextureFormat::Rgba32Float, bytemuck::cast_slice(shown));
+            }
+        }
+        if let Some(shares) = &finish.shares {
+            let halves: Vec<u16> = shares.iter().flatten().map(|share| half(*share)).collect();
+            views[1] = upload(gpu, finish.size, TextureFormat::Rgba16Float, bytemuck::cast_slice(&halves));
+        }
+        if let Some((n, colors)) = finish.color.as_ref().and_then(|c| c.table.as_ref()).map(|table| table.nodes()) {
+            let floats: Vec<f32> = colors.iter().flat_map(|[r, g, b]| [*r, *g, *b, 1.0]).collect();
+            views[2] = upload(gpu, [n, n * n], TextureFormat::Rgba32Float, bytemuck::cast_slice(&floats));
+        }
         if self.known.len() >= MAX_KEPT {
             self.known.remove(0);
         }
@@ -188,12 +274,39 @@ impl Finisher {
     }
 }
 
-fn place_floats(rim: u32, [w, h]: [u32; 2], placed: &Placed) -> [f32; 8] {
+/// Returns a number from 0 to 1 as a float of 16 bits.
+fn half(x: f32) -> u16 {
+    let x = x.clamp(0.0, 1.0);
+    if x < 6.103_515_6e-5 {
+        // no leading one, in units of 2^-24
+        return (x * 16_777_216.0).round() as u16;
+    }
+    // exponents are biased by 127 and by 15; 13 bits of the mantissa are rounded off
+    (((x.to_bits() + 0x1000) >> 13) - (112 << 10)) as u16
+}
+
+/// The uniform of the shader.
+fn place_floats(rim: u32, [w, h]: [u32; 2], placed: &Placed, around: Option<Around>) -> [f32; 24] {
     let flag = |on: bool| f32::from(u8::from(on));
     let across = flag(matches!(placed.flip, Flip::Horizontal | Flip::Both));
     let upward = flag(matches!(placed.flip, Flip::Vertical | Flip::Both));
-    let warped = flag(placed.finish.as_ref().is_some_and(|f| f.warp.is_some()));
-    [placed.at_px[0] as f32, placed.at_px[1] as f32, across, upward, w as f32, h as f32, rim as f32, warped]
+    let finish = placed.finish.as_deref();
+    let warped = flag(finish.is_some_and(|f| matches!(f.bend, Bend::Warp(_))));
+    let ([x, y, z], side, border) = around.map_or(([0.0; 3], 0, 0), |a| (a.eye, a.side_px, a.border_px));
+    let color = finish.and_then(|f| f.color.as_ref());
+    let ([r, g, b], [lr, lg, lb]) = color.map_or(([1.0; 3], [0.0; 3]), |c| (c.gain, c.lift));
+    let inverse_gamma = color.map_or(0.0, |c| c.inverse_gamma);
+    let nodes = color.and_then(|c| c.table.as_ref()).map_or(0, |table| table.nodes().0);
+    #[rustfmt::skip]
+    let floats = [
+        placed.at_px[0] as f32, placed.at_px[1] as f32, across, upward,
+        w as f32, h as f32, rim as f32, warped,
+        x, y, z, side as f32,
+        border as f32, 0.0, 0.0, 0.0,
+        r, g, b, inverse_gamma,
+        lr, lg, lb, nodes as f32,
+    ];
+    floats
 }
 
 /// Converts a color of bytes for clearing an sRGB texture.
@@ -242,6 +355,7 @@ fn pipeline(
     device: &wgpu::Device,
     layout: &BindGroupLayout,
     module: &wgpu::ShaderModule,
+    entry_point: &str,
     [red, green, blue]: [bool; 3],
 ) -> RenderPipeline {
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -268,7 +382,7 @@ fn pipeline(
         multisample: Default::default(),
         fragment: Some(wgpu::FragmentState {
             module,
-            entry_point: Some("fs_place"),
+            entry_point: Some(entry_point),
             compilation_options: Default::default(),
             targets: &[Some(wgpu::ColorTargetState { format: COLOR, blend: None, write_mask })],
         }),

@@ -3,6 +3,8 @@
 
 mod cameras;
 mod cast;
+mod colors;
+mod curved;
 mod facets;
 mod goldens;
 mod lists;

@@ -104,7 +104,7 @@ fn bad_warps_say_what_is_wrong_and_where() {
     assert!(pfm(b"PF\n3").contains("cut off"));
     assert!(pfm(b"PF\n1 9 -1.0\n").contains("the side 1"));
     assert!(pfm(b"PF\n4 4 -1.0\nxx").contains("2 bytes of floats, expected 192"));
-    assert!(pfm(b"PF\n9999999 4 -1.0\n").contains("expected 2 to 1024"));
+    assert!(pfm(b"PF\n9999999 4 -1.0\n").contains("expected 2 to 4096"));
     let error = Warp::load(std::path::Path::new("/nowhere/a.obj")).unwrap_err().to_string();
     assert!(error.starts_with("/nowhere/a.obj: the warp grid cannot be read"), "{error}");
 }

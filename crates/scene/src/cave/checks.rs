@@ -18,6 +18,7 @@ use nalgebra::{Point3, Vector3};
 use super::Cave;
 use super::facet::{Facet, Stereo};
 use super::parts::{Screen, User};
+use super::surface::Surface;
 use crate::parse::fields::Fields;
 
 /// Largest cosine between the edges of a screen's corner: 1 mm in a meter.
@@ -105,11 +106,22 @@ pub(crate) fn facet(facet: &Facet, screen: &Screen, user: &User, f: &mut Fields<
             _ => "the eye",
         };
         let place = f.value("screen").map_or(f.span.clone(), |value| value.span());
+        let (how, expected) = match screen.is_flat() {
+            true => (
+                "behind",
+                "expected the eye in front of the screen; corners are named as seen from the front, so left and right may be swapped",
+            ),
+            false => ("outside", "expected the eye inside the cylinder or sphere"),
+        };
         let message = format!(
-            "{}: {eye} of user \"{}\" is {:.3} m behind screen \"{}\"",
+            "{}: {eye} of user \"{}\" is {:.3} m {how} screen \"{}\"",
             f.what, user.name, -distance, screen.name
         );
-        f.log.report(place, message, "expected the eye in front of the screen; corners are named as seen from the front, so left and right may be swapped");
+        f.log.report(place, message, expected);
+    }
+    if let (Surface::Mesh { .. }, Some(_)) = (&screen.surface, &facet.warp_file) {
+        let message = format!("{} has a `warp_file`, and its screen \"{}\" is a mesh", f.what, screen.name);
+        f.log.report(f.span.clone(), message, "expected one of them: the mesh has the place of each pixel already");
     }
 }
 
@@ -120,7 +132,7 @@ pub(crate) fn notes(cave: &Cave) -> Vec<String> {
         let screen = &cave.screens[facet.screen];
         let ([w, h], [wide, high]) = (facet.size_px, screen.size_m());
         let ratio = f64::from(w) / f64::from(h) / (wide / high);
-        if (ratio - 1.0).abs() > ASPECT_TOLERANCE {
+        if (ratio - 1.0).abs() > ASPECT_TOLERANCE && !matches!(screen.surface, Surface::Mesh { .. }) {
             let fit = (f64::from(w) * high / wide).round();
             notes.push(format!(
                 "facet \"{}\": {w} x {h} pixels on {wide:.3} m x {high:.3} m are {ratio:.3} times denser horizontally than vertically; {w} x {fit} would be square (harmless if the display stretches the image)",
@@ -223,7 +235,7 @@ fn misaligned(screens: &[Screen], found: &[Gap]) -> Vec<Misaligned> {
     out
 }
 
-/// Returns all pairs of edges of different screens, each once, in the order of the file.
+/// Returns all pairs of edges of different flat screens, each once, in the order of the file.
 fn pairs(screens: &[Screen]) -> Vec<(Place, Place, Edge, Edge)> {
     let all: Vec<(Place, Edge)> = screens
         .iter()
@@ -231,7 +243,8 @@ fn pairs(screens: &[Screen]) -> Vec<(Place, Place, Edge, Edge)> {
         .flat_map(|(i, s)| edges(s).into_iter().enumerate().map(move |(k, edge)| ((i, k), edge)))
         .collect();
     let mut out = Vec::new();
-    for (i, j) in (0..screens.len()).flat_map(|i| (i + 1..screens.len()).map(move |j| (i, j))) {
+    let flat: Vec<usize> = (0..screens.len()).filter(|&i| screens[i].is_flat()).collect();
+    for (i, j) in flat.iter().enumerate().flat_map(|(k, &i)| flat[k + 1..].iter().map(move |&j| (i, j))) {
         for (first, a) in &all[4 * i..4 * i + 4] {
             out.extend(all[4 * j..4 * j + 4].iter().map(|(second, b)| (*first, *second, *a, *b)));
         }

@@ -114,7 +114,46 @@ pub struct Facet {
     pub warp_file: Option<PathBuf>,
     /// An image that darkens the final one where projectors overlap: PNG.
     pub blend_file: Option<PathBuf>,
+    /// An image of shares of the lift of black, 1 without it: PNG.
+    pub black_file: Option<PathBuf>,
+    /// The projector's color.
+    pub color: Option<FacetColor>,
 }
+
+/// The color of a projector; numbers are by red, green, blue.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FacetColor {
+    /// Exponent of the transfer curve, light = code^gamma, 1 to 4; `None` for sRGB.
+    pub gamma: Option<f64>,
+    /// Gain of light, 0 to 1. Default 1.
+    pub white: [f64; 3],
+    /// Light at code 0, as a share of full light, 0 to 0.5. Default 0.
+    pub black: [f64; 3],
+    /// Darkest light of the wall that black is lifted to, as a share of full light, at least
+    /// `black`. Default `black`.
+    pub floor: [f64; 3],
+    /// A table of colors: `.cube`.
+    pub lut_file: Option<PathBuf>,
+}
+
+impl FacetColor {
+    fn read(mut f: Fields<'_>, folder: &Path) -> FacetColor {
+        let problems = f.log.count();
+        let gamma = f.optional_number("gamma", Bound::new(1.0, 4.0, "a number from 1 to 4"));
+        let white = f.vector_or("white", Bound::UNIT, [1.0; 3]);
+        let black = f.vector_or("black", LEAK, [0.0; 3]);
+        let floor = f.vector_or("floor", LEAK, black);
+        let lut_file = file(&mut f, "lut_file", folder, &["cube"]);
+        if f.log.count() == problems && (0..3).any(|k| floor[k] < black[k]) {
+            let message = format!("`floor` of {} is {floor:?}, and `black` {black:?}", f.what);
+            f.log.report(f.span.clone(), message, "expected a floor of at least the projector's own black");
+        }
+        f.finish();
+        FacetColor { gamma, white, black, floor, lut_file }
+    }
+}
+
+const LEAK: Bound = Bound::new(0.0, 0.5, "a share of full light from 0 to 0.5");
 
 impl Facet {
     pub(crate) fn read(
@@ -160,6 +199,8 @@ impl Facet {
             critical: f.flag_or("critical", true),
             warp_file: file(&mut f, "warp_file", folder, &["obj", "pfm"]),
             blend_file: file(&mut f, "blend_file", folder, &["png"]),
+            black_file: file(&mut f, "black_file", folder, &["png"]),
+            color: color(&mut f, folder),
         };
         let parts = (screens.get(facet.screen), users.get(facet.user));
         if let (true, (Some(screen), Some(user))) = (f.log.count() == problems, parts) {
@@ -198,6 +239,13 @@ fn reference(
     found
 }
 
+/// Reads the table `color`.
+fn color(f: &mut Fields<'_>, folder: &Path) -> Option<FacetColor> {
+    let value = f.value("color")?;
+    let table = Fields::of(f.log, value, format!("`color` of {}", f.what), "{ gamma = 2.2 }")?;
+    Some(FacetColor::read(table, folder))
+}
+
 /// Reads `size_px`: two integers.
 fn size(f: &mut Fields<'_>) -> [u32; 2] {
     let Some(value) = f.required("size_px", "width and height in pixels, such as [1920, 1080]") else { return [1, 1] };
@@ -226,7 +274,7 @@ fn position(f: &mut Fields<'_>) -> [i32; 2] {
 
 /// Reads the path of a file beside the cave and checks its extension. Its content is read when it
 /// is used.
-fn file(f: &mut Fields<'_>, key: &'static str, folder: &Path, endings: &[&'static str]) -> Option<PathBuf> {
+pub(crate) fn file(f: &mut Fields<'_>, key: &'static str, folder: &Path, endings: &[&'static str]) -> Option<PathBuf> {
     let (text, value) = f.optional_text(key)?;
     let ending = Path::new(text).extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     if !endings.contains(&ending.as_str()) {

@@ -23,14 +23,16 @@ mod facet;
 mod parts;
 mod settings;
 mod shipped;
+mod surface;
 mod tracker;
 
 pub use checks::{Gap, MAX_PIXELS, MAX_SIDE_PX, RIM_PX, SQUARE_TOLERANCE, gaps};
 pub use error::CaveError;
-pub use facet::{Facet, Flip, Output, Stereo};
+pub use facet::{Facet, FacetColor, Flip, Output, Stereo};
 pub use parts::{LAUNCH_PLACEHOLDERS, Node, Screen, User};
 pub use settings::{Compute, Mode, Recording, Security, Sync, Transport};
 pub use shipped::{CaveSource, ShippedCave, resolve_cave, shipped_caves};
+pub use surface::{Place, Surface, SurfaceFrame};
 pub use tracker::{Axes, TRACKER_PORT, Tracker};
 
 use std::collections::BTreeMap;
@@ -130,7 +132,7 @@ impl Cave {
         let mut f = Fields::of_table(log, root, 0..0, "the cave");
         let description = f.optional_text("description").map_or("", |(text, _)| text).to_owned();
         let users = named(&mut f, "user", User::read, |user| &user.name);
-        let screens = named(&mut f, "screen", Screen::read, |screen| &screen.name);
+        let screens = named(&mut f, "screen", |table| Screen::read(table, folder), |screen| &screen.name);
         let nodes = named(&mut f, "node", Node::read, |node| &node.name);
         let facets =
             named(&mut f, "facet", |table| Facet::read(table, &users, &screens, &nodes, folder), |facet| &facet.name);

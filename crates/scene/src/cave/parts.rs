@@ -1,10 +1,12 @@
 //! `[[user]]`, `[[screen]]`, `[[node]]`: the viewers, the screens, and the machines that draw.
 
 use std::net::IpAddr;
+use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 
 use super::checks;
+use super::surface::Surface;
 use crate::parse::bound::Bound;
 use crate::parse::fields::Fields;
 
@@ -57,11 +59,16 @@ impl User {
     }
 }
 
-/// A flat rectangle with a front.
+/// A screen: a flat rectangle with a front, or a curved one.
+///
+/// Curved screens have the corners of a stand-in: the rectangle of the picture's width and height
+/// that touches the screen in the middle of the picture. Only its size has a meaning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Screen {
     /// Unique among screens.
     pub name: String,
+    /// The shape.
+    pub surface: Surface,
     /// Lower left corner as seen from the front, m, cave axes.
     pub lower_left_m: Point3<f64>,
     /// Lower right corner as seen from the front, m, cave axes.
@@ -71,20 +78,32 @@ pub struct Screen {
 }
 
 impl Screen {
-    pub(crate) fn read(mut f: Fields<'_>) -> Option<Screen> {
+    pub(crate) fn read(mut f: Fields<'_>, folder: &Path) -> Option<Screen> {
         let name = read_name(&mut f)?;
         let problems = f.log.count();
-        let screen = Screen {
-            name,
-            lower_left_m: Point3::from(f.vector("lower_left_m", Bound::ANY)),
-            lower_right_m: Point3::from(f.vector("lower_right_m", Bound::ANY)),
-            upper_left_m: Point3::from(f.vector("upper_left_m", Bound::ANY)),
+        let Some(surface) = Surface::read(&mut f, folder) else {
+            // the other keys depend on the shape; the name is known to facets
+            f.give_up();
+            let [lower_left_m, lower_right_m, upper_left_m] = [Point3::origin(); 3];
+            return Some(Screen { name, surface: Surface::Flat, lower_left_m, lower_right_m, upper_left_m });
         };
-        if f.log.count() == problems {
+        let [lower_left_m, lower_right_m, upper_left_m] = match &surface {
+            Surface::Flat => {
+                ["lower_left_m", "lower_right_m", "upper_left_m"].map(|key| Point3::from(f.vector(key, Bound::ANY)))
+            }
+            curved => stand_in(curved),
+        };
+        let screen = Screen { name, surface, lower_left_m, lower_right_m, upper_left_m };
+        if f.log.count() == problems && screen.is_flat() {
             checks::screen(&screen, &f);
         }
         f.finish();
         Some(screen)
+    }
+
+    /// Returns whether it is a flat rectangle.
+    pub fn is_flat(&self) -> bool {
+        self.surface == Surface::Flat
     }
 
     /// Returns the lower edge from left to right, m.
@@ -112,10 +131,25 @@ impl Screen {
         [self.across().norm(), self.upward().norm()]
     }
 
-    /// Returns the distance of a point in front of the screen's plane, m; negative behind it.
+    /// Returns the distance of a point in front of the screen's plane, m, negative behind it; of
+    /// curved screens the distance inside their cylinder or sphere, infinity without one.
     pub fn distance_m(&self, point: &Point3<f64>) -> f64 {
-        (point - self.lower_left_m).dot(&self.normal())
+        match &self.surface {
+            Surface::Flat => (point - self.lower_left_m).dot(&self.normal()),
+            curved => curved.distance_m(point),
+        }
     }
+}
+
+/// Returns the corners of the rectangle that stands for a curved screen: lower left, lower right,
+/// upper left. A mesh, whose file is not read here, gets a square of 1 m.
+fn stand_in(curved: &Surface) -> [Point3<f64>; 3] {
+    let [wide, high] = curved.size_m().unwrap_or([1.0; 2]);
+    let (middle, right, up) = match curved.frame() {
+        Some(frame) => (frame.center_m + frame.forward * curved.radius_m(), frame.right, frame.up),
+        None => (Point3::new(0.0, 1.0, 0.0), Vector3::x(), Vector3::z()),
+    };
+    [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5)].map(|(a, b)| middle + right * (a * wide) + up * (b * high))
 }
 
 /// A machine that draws facets.

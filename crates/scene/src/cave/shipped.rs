@@ -21,7 +21,8 @@ macro_rules! shipped_caves {
     };
 }
 
-const SHIPPED: &[ShippedCave] = shipped_caves!["wall3", "cube4", "cube6", "cylinder5", "sphere5"];
+const SHIPPED: &[ShippedCave] =
+    shipped_caves!["wall3", "cube4", "cube6", "cylinder5", "sphere5", "curve", "dome", "panorama", "cube_map"];
 
 /// Returns the caves that come with tumble.
 pub fn shipped_caves() -> &'static [ShippedCave] {

@@ -54,7 +54,7 @@ table! {
     bowling_backtracking: "bowling", Backtracking, "e677eac272ba7de7", "e18c2e4b1775af2c";
     chain_time_stepping: "chain", TimeStepping, "22fbcd4bcbb18743", "7e68bdb4b444ccf6";
     chain_backtracking: "chain", Backtracking, "63d0cbaca36ef0a9", "3198250057940e22";
-    falling_time_stepping: "falling", TimeStepping, "b7e8d4a13db443ed", "b1ca29edd7c2e534";
+    falling_time_stepping: "falling", TimeStepping, "fd3ad61b4e564f55", "6997c90a0eb55308";
     flock_time_stepping: "flock", TimeStepping, "62dc48ae297f84ac", "1f735e6ea46bfed5";
     flock_backtracking: "flock", Backtracking, "5e122f1064026626", "f28e4fa647471731";
     falling_backtracking: "falling", Backtracking, "f1462869e100d4f1", "04dc94aa1ba65435";
@@ -79,13 +79,13 @@ table! {
     sparks_time_stepping: "sparks", TimeStepping, "515a77d2df6b5217", "9badcde17809dddb";
     sparks_backtracking: "sparks", Backtracking, "805c8cba100469d4", "6052e84af86ee0f9";
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
-    marble_run_time_stepping: "marble_run", TimeStepping, "54c3e3322b6781af", "85e7f83fec6b1f6f";
-    marble_run_backtracking: "marble_run", Backtracking, "67834b3a7fb5547d", "59907c8a56f4eda7";
+    marble_run_time_stepping: "marble_run", TimeStepping, "54c3e3322b6781af", "5406447c388d03c0";
+    marble_run_backtracking: "marble_run", Backtracking, "67834b3a7fb5547d", "ff57ee16e3696b0a";
     newtons_cradle_time_stepping: "newtons_cradle", TimeStepping, "241aa3d8432a474e", "c34c93b030ba61fc";
     newtons_cradle_backtracking: "newtons_cradle", Backtracking, "878a964993b52e1f", "0579d119408e16b9";
     steam_engine_time_stepping: "steam_engine", TimeStepping, "3a2ab60873834ca6", "4a72b3cc1d1779dd";
     steam_engine_backtracking: "steam_engine", Backtracking, "466f4da8adf2589f", "f65c1d0393337846";
-    arch_time_stepping: "arch", TimeStepping, "e7090b6cbe5ad156", "7149f35988a11a9d";
+    arch_time_stepping: "arch", TimeStepping, "e7090b6cbe5ad156", "4c2e00f4dc0a531c";
     walker_time_stepping: "walker", TimeStepping, "4f3cf3f418140f88", "5a0751b9b50b1fd7";
     wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "b8885a64a8d5fa18", "ef3c637cbb294c26";
     dominoes_time_stepping: "dominoes", TimeStepping, "e494f088d2363d0e", "631db3c70aca49e4";

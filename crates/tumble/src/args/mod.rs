@@ -1,8 +1,10 @@
 //! The command line: commands and their options.
 
+mod caves;
 mod scene;
 mod values;
 
+pub use caves::{CavesOptions, MpcdiOptions};
 pub use scene::{OpeningOptions, SceneOptions, kind};
 pub use values::{rate, seconds};
 
@@ -12,7 +14,7 @@ use crate::cave::args::{
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use tumble::collide::Builder;
-use tumble::render::{CalibrationPattern, DebugDraw, Quality};
+use tumble::render::{DebugDraw, Quality};
 use tumble::scene::urdf::MissingMeshes;
 use values::{folder, fraction, method, missing, package, planner, png, size};
 
@@ -53,6 +55,8 @@ pub enum Command {
     Scenes,
     /// List the shipped caves, or draw a calibration pattern for a facet
     Caves(CavesOptions),
+    /// Make a cave of an MPCDI archive or a configuration of SGCT, or an archive of a cave
+    Mpcdi(MpcdiOptions),
     /// Print a script that completes commands and options in a shell
     Completions(CompletionOptions),
 }
@@ -276,22 +280,6 @@ pub struct SphereTreeOptions {
 pub struct CompletionOptions {
     /// The shell.
     pub shell: clap_complete::Shell,
-}
-
-#[derive(Args)]
-pub struct CavesOptions {
-    /// Draw a calibration pattern: grid, corners, colors or name.
-    #[arg(long, value_name = "WHAT", requires_all = ["cave", "facet", "screenshot"])]
-    pub pattern: Option<CalibrationPattern>,
-    /// A cave file or the name of a shipped cave.
-    #[arg(long, value_name = "CAVE", requires = "pattern")]
-    pub cave: Option<String>,
-    /// The facet that shows the pattern.
-    #[arg(long, value_name = "NAME", requires = "pattern")]
-    pub facet: Option<String>,
-    /// Write the pattern here (PNG).
-    #[arg(long, value_name = "FILE", requires = "pattern", value_parser = png)]
-    pub screenshot: Option<PathBuf>,
 }
 
 /// Overlays of `--debug-draw`; an empty word means none.

@@ -93,3 +93,10 @@ pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
         .filter(fits)
         .ok_or_else(|| format!("expected WIDTHxHEIGHT in pixels, each 1 to {MAX_SIDE}, together at most {MAX_PIXELS}"))
 }
+
+/// Reads three numbers with commas between them.
+pub fn point(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|word| word.trim().parse().ok().filter(|x: &f64| x.abs() <= 1e6)).collect();
+    numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| "expected three numbers, such as 0,0,1.7".into())
+}

@@ -8,7 +8,7 @@ use tumble::dynamics::{Mode, World};
 use tumble::net::sync::transport::MAX_FACETS;
 use tumble::net::sync::{User, Viewer, scene_hash};
 use tumble::render::CaveView;
-use tumble::scene::cave::{Cave, CaveSource, resolve_cave};
+use tumble::scene::cave::{Cave, CaveSource, Surface, resolve_cave};
 use tumble::scene::{CavePlace, SceneFile, resolve_scene, visual_notes};
 
 /// Name of the slot of the process that draws a preview.
@@ -100,14 +100,25 @@ fn hash_for_joining(scene: &[u8; 32], cave: &Cave, world: &World) -> [u8; 32] {
     // an unreadable file is reported where it is used
     let content = |path: &Path| std::fs::read(path).map_or([0; 32], |bytes| *blake3::hash(&bytes).as_bytes());
     put(scene);
-    put(format!("{:?} {:?} {:?}", cave.sync.mode, cave.screens, cave.users).as_bytes());
+    put(format!("{:?} {:?}", cave.sync.mode, cave.users).as_bytes());
+    // files count by their content: folders differ between machines
+    for mut screen in cave.screens.iter().cloned() {
+        if let Surface::Mesh { file } = &mut screen.surface {
+            put(&content(&std::mem::take(file)));
+        }
+        put(format!("{screen:?}").as_bytes());
+    }
     for f in &cave.facets {
+        let mut color = f.color.clone();
+        let table = color.as_mut().and_then(|color| color.lut_file.take());
         put(format!(
-            "{:?} {} {} {:?} {} {} {:?} {:?}",
+            "{:?} {} {} {:?} {} {} {:?} {:?} {color:?}",
             f.name, f.screen, f.user, f.size_px, f.near_m, f.far_m, f.stereo, f.flip
         )
         .as_bytes());
-        [&f.warp_file, &f.blend_file].into_iter().for_each(|file| put(&file.as_deref().map_or([0; 32], content)));
+        [&f.warp_file, &f.blend_file, &f.black_file, &table]
+            .into_iter()
+            .for_each(|file| put(&file.as_deref().map_or([0; 32], content)));
     }
     let textures: std::collections::BTreeSet<_> =
         world.visuals().filter_map(|visual| visual.appearance.texture.clone()).collect();

@@ -30,11 +30,18 @@ pub struct Ray {
 }
 
 /// A view in a rectangle of the window.
-struct Tile {
-    from: Box<dyn Viewpoint>,
+struct Tile<'a> {
+    from: From<'a>,
     position_px: [u32; 2],
     size_px: [u32; 2],
     flip: [bool; 2],
+}
+
+/// The eye of a tile: through a flat rectangle, or the one on a side of a facet's user, whose screen
+/// is curved.
+enum From<'a> {
+    Flat(Box<dyn Viewpoint>),
+    Curved(&'a CaveView, &'a Facet, f64),
 }
 
 impl ViewMode {
@@ -99,7 +106,15 @@ impl ViewMode {
         let share: [f64; 2] =
             std::array::from_fn(|k| (at_px[k] - f64::from(tile.position_px[k])) / f64::from(tile.size_px[k]));
         let share: [f64; 2] = std::array::from_fn(|k| if tile.flip[k] { 1.0 - share[k] } else { share[k] });
-        let lens = tile.from.lens(tile.size_px[0] as f32 / tile.size_px[1] as f32).ok()?;
+        let from = match &tile.from {
+            From::Flat(from) => from,
+            From::Curved(view, facet, side) => {
+                let (origin, direction) = view.sight(facet, *side, share)?;
+                let (_, axis) = view.sight(facet, *side, [0.5; 2])?;
+                return Some(Ray { origin: origin.coords, direction, axis });
+            }
+        };
+        let lens = from.lens(tile.size_px[0] as f32 / tile.size_px[1] as f32).ok()?;
         let back = (lens.projection * lens.view).try_inverse()?;
         let at = |depth: f64| {
             back.transform_point(&nalgebra::Point3::new(2.0 * share[0] - 1.0, 1.0 - 2.0 * share[1], depth)).coords
@@ -110,17 +125,17 @@ impl ViewMode {
         Some(Ray { origin, direction: (far - near).try_normalize(1e-12)?, axis: -rotation.column(2).into_owned() })
     }
 
-    fn tiles(&self, list: &DrawList, size_px: [u32; 2]) -> Result<Vec<Tile>, RenderError> {
-        let tile =
-            |from: Box<dyn Viewpoint>, position_px, size_px| Tile { from, position_px, size_px, flip: [false; 2] };
+    fn tiles<'a>(&'a self, list: &DrawList, size_px: [u32; 2]) -> Result<Vec<Tile<'a>>, RenderError> {
         Ok(match self {
-            ViewMode::Camera => vec![tile(Box::new(list.camera), [0; 2], size_px)],
+            ViewMode::Camera => {
+                let from = From::Flat(Box::new(list.camera));
+                vec![Tile { from, position_px: [0; 2], size_px, flip: [false; 2] }]
+            }
             ViewMode::Facet(view, facet) => eyes(view, facet)?,
             ViewMode::Unfolded(view) => {
-                let facets = &view.cave().facets;
-                let tile = |t: tumble::render::Tile| -> Result<Tile, RenderError> {
-                    let [w, h] = t.size_px;
-                    Ok(tile(Box::new(view.eye(&facets[t.facet], 0.0)?.part(w, h, RIM_PX)), t.position_px, t.size_px))
+                let tile = |t: tumble::render::Tile| -> Result<Tile<'a>, RenderError> {
+                    let from = from(view, &view.cave().facets[t.facet], 0.0, t.size_px)?;
+                    Ok(Tile { from, position_px: t.position_px, size_px: t.size_px, flip: [false; 2] })
                 };
                 unfold(view.cave(), size_px).1.into_iter().map(tile).collect::<Result<_, _>>()?
             }
@@ -129,17 +144,25 @@ impl ViewMode {
 }
 
 /// Returns the views of a facet in their rectangles: one per eye, or one from between the eyes.
-fn eyes(view: &CaveView, facet: &Facet) -> Result<Vec<Tile>, RenderError> {
+fn eyes<'a>(view: &'a CaveView, facet: &'a Facet) -> Result<Vec<Tile<'a>>, RenderError> {
     let [w, h] = facet.size_px;
     let flip = [matches!(facet.flip, Flip::Horizontal | Flip::Both), matches!(facet.flip, Flip::Vertical | Flip::Both)];
-    let eye = |side: &f64| -> Result<Tile, RenderError> {
+    let eye = |side: &f64| -> Result<Tile<'a>, RenderError> {
         let right = *side > 0.0;
         let position_px = match facet.stereo {
             Stereo::SideBySide if right => [w, 0],
             Stereo::TopBottom if right => [0, h],
             _ => [0, 0],
         };
-        Ok(Tile { from: Box::new(view.eye(facet, *side)?.part(w, h, RIM_PX)), position_px, size_px: [w, h], flip })
+        Ok(Tile { from: from(view, facet, *side, [w, h])?, position_px, size_px: [w, h], flip })
     };
     facet.stereo.sides().iter().map(eye).collect()
+}
+
+/// Returns the eye on a side of a facet's user, for a picture of this size.
+fn from<'a>(view: &'a CaveView, facet: &'a Facet, side: f64, [w, h]: [u32; 2]) -> Result<From<'a>, RenderError> {
+    if !view.cave().screens[facet.screen].is_flat() {
+        return Ok(From::Curved(view, facet, side));
+    }
+    Ok(From::Flat(Box::new(view.eye(facet, side)?.part(w, h, RIM_PX))))
 }

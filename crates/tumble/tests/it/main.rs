@@ -6,6 +6,7 @@ mod cave_compute;
 mod cave_console;
 mod cave_faults;
 mod cave_figures;
+mod cave_formats;
 mod cave_frames;
 mod cave_keys;
 mod cave_outputs;

@@ -206,7 +206,10 @@ impl<'a> Island<'a> {
     pub fn error(&self, u: &[f64], lambda: &[f64]) -> f64 {
         let error = |b: &LocalBlock| self.block_error(b, self.row_velocity(b, u, lambda), &lambda[b.range()]);
         // `max` would drop NaN
-        self.blocks.iter().map(error).fold(0.0, |max, error| if error <= max { max } else { error })
+        self.blocks
+            .iter()
+            .map(error)
+            .fold(0.0, |max: f64, error| if max.is_nan() || error <= max { max } else { error })
     }
 
     /// The same for multipliers alone.
@@ -250,5 +253,25 @@ impl<'a> Island<'a> {
     /// Writes the multipliers of the island.
     pub fn write(&self, own: &[f64], lambda: &mut [f64]) {
         self.blocks.iter().for_each(|b| lambda[b.block.range()].copy_from_slice(&own[b.range()]));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Island, RowSet, Rows};
+
+    /// A multiplier that is not a number makes the error of its island no number, also if blocks with a
+    /// finite error follow: such a result must never pass for a better one.
+    #[test]
+    fn what_is_not_a_number_is_no_small_error() {
+        let mut rows = Rows::default();
+        rows.clear(3);
+        for k in 0..3 {
+            rows.push_block(RowSet::HalfLine);
+            rows.side(k, 1).expect("first side")[0] = 1.0;
+        }
+        let island = Island::new(&rows, &[0, 1, 2], &[-1.0; 3]);
+        assert!(island.error_of(&[1.0, f64::NAN, 0.5]).is_nan());
+        assert!((island.error_of(&[1.0, 1.0, 0.5]) - 0.5).abs() < 1e-12);
     }
 }

@@ -81,3 +81,17 @@ fn contacts_are_judged_by_coulombs_law() {
         assert!(cone(mu, c, lambda) > 0.1, "{mu} {c:?} {lambda:?}: {}", cone(mu, c, lambda));
     }
 }
+
+/// A multiplier that is not a number makes the residual no number, also if blocks with a finite one follow.
+#[test]
+fn what_is_not_a_number_is_no_small_error() {
+    let mut rows = Rows::default();
+    rows.clear(3);
+    for k in 0..3 {
+        rows.push_block(RowSet::HalfLine);
+        rows.side(k, 1).expect("first side")[0] = 1.0;
+    }
+    let (c, lambda) = ([-1.0; 3], [1.0, f64::NAN, 0.5]);
+    assert!(residual(&rows, &[0, 1, 2], &c, &lambda, &lambda).is_nan());
+    assert!((residual(&rows, &[0, 2], &c, &lambda, &lambda) - 0.5).abs() < 1e-15);
+}

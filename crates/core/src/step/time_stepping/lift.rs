@@ -54,7 +54,8 @@ fn coordinates(block: &Block) -> impl Iterator<Item = usize> + '_ {
 
 /// Takes the potential energy of lifts from the kinetic energy of the groups.
 pub(super) fn pay_for_lift(at: Coordinates, work: &mut Workspace, step: &Step) {
-    if step.moved.iter().all(|du| *du == 0.0) {
+    let strikes = step.impact.iter().any(|impulse| *impulse != 0.0) || step.keep.iter().any(|keep| !keep);
+    if !strikes || step.moved.iter().all(|du| *du == 0.0) {
         return;
     }
     let contacts = work.contact_constraints.len();
