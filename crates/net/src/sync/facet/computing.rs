@@ -147,7 +147,6 @@ impl FacetSession {
     }
 
     fn report_difference(&mut self, now: Duration, hashes: &StateHashes) {
-        self.differences = self.differences.wrapping_add(1);
         let objects: &ObjectHashes = &hashes.objects;
         self.send(MessageKind::Differs, hashes.frame, |out| objects.write(out));
         self.resync(now);

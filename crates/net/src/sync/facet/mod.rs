@@ -124,8 +124,6 @@ struct PendingState {
 pub struct FacetSession {
     options: FacetOptions,
     content: Shown,
-    /// Number of frames whose hash differed from the server's.
-    differences: u64,
     phase: Phase,
     lost: bool,
     run: u64,
@@ -172,7 +170,6 @@ impl FacetSession {
             process: splitmix64(options.seed) & PROCESS_MASK,
             options,
             content,
-            differences: 0,
             phase: Phase::Joining,
             lost: false,
             run: 0,
@@ -208,11 +205,6 @@ impl FacetSession {
     /// Returns the users' heads and the cave's place in the scene.
     pub fn viewer(&self) -> &Viewer {
         self.content.viewer()
-    }
-
-    /// Returns the number of frames of a facet that steps by itself whose hash was not the server's.
-    pub fn differences(&self) -> u64 {
-        self.differences
     }
 
     /// Returns the counts.
