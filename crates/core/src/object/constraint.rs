@@ -79,6 +79,12 @@ pub trait Constraint {
     fn on_itself(&self) -> bool {
         false
     }
+    /// Returns whether its rows or gaps depend on the part states of the view. If those of no constraint do,
+    /// the views of a step have the part states of another time, and nothing but `x` and the time are those of
+    /// the view.
+    fn reads_part_states(&self) -> bool {
+        true
+    }
 }
 
 /// Admissible multipliers, error and targets of one row of a [`Constraint`].
