@@ -162,6 +162,9 @@ impl Rows {
 
     /// Adds `(Yᵀu)_i` to `c_i` for every row, on several threads.
     pub(crate) fn add_velocity_on(&self, threads: &Threads, u: &[f64], c: &mut [f64]) {
+        if threads.count() == 1 || self.blocks.len() < 2 * BLOCKS {
+            return self.add_velocity(u, c);
+        }
         let mut rest = c;
         let pieces = threads.pieces(self.blocks.len(), BLOCKS).into_iter().map(|piece| {
             let blocks = &self.blocks[piece];
