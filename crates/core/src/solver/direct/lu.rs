@@ -157,7 +157,7 @@ impl Factor {
     }
 }
 
-/// A call of [`Factor::factor`] that is compiled for the instruction set of its caller. A closure would not be:
+/// A call of [`Factor::factor`] that is compiled for the instruction set of its caller. A Rust closure would not be:
 /// its call is a function of its own.
 struct Factorization<'f, 's> {
     factor: &'f mut Factor,
