@@ -219,13 +219,10 @@ impl Rows {
     /// Returns `K + R`, with `K = YᵀY`, of the given blocks: dense, row-major, in the order of
     /// their rows. For the pivoting solvers and tests.
     pub fn dense(&self, blocks: &[u32]) -> Vec<f64> {
-        let rows: Vec<(&Block, usize)> = blocks
-            .iter()
-            .flat_map(|&b| {
-                let block = &self.blocks[b as usize];
-                (0..block.set.rows()).map(move |k| (block, k))
-            })
-            .collect();
+        let mut rows: Vec<(&Block, usize)> = Vec::with_capacity(blocks.len());
+        for block in blocks.iter().map(|&b| &self.blocks[b as usize]) {
+            rows.extend((0..block.set.rows()).map(|k| (block, k)));
+        }
         let n = rows.len();
         let mut dense = vec![0.0; n * n];
         for (i, (a, ka)) in rows.iter().enumerate() {

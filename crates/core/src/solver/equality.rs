@@ -43,7 +43,7 @@ impl Equalities {
         let whole: Vec<f64> = (0..e).map(|i| k[i * e + i]).collect();
         // Remaining fraction of each diagonal; negative once it was the pivot.
         let mut left: Vec<f64> = whole.iter().map(|d| if *d > 0.0 { 1.0 } else { 0.0 }).collect();
-        let mut factor = Equalities { size: e, order: Vec::new(), columns: Vec::new() };
+        let mut factor = Equalities { size: e, order: Vec::with_capacity(e), columns: Vec::with_capacity(e * e) };
         for _ in 0..e {
             let next = (0..e).fold(0, |best, i| if left[i] > left[best] { i } else { best });
             if left[next].is_nan() || left[next] <= rank {
@@ -61,7 +61,7 @@ impl Equalities {
     /// earlier columns) / √rest`.
     fn eliminate(&mut self, k: &[f64], next: usize, rest: f64) {
         let e = self.size;
-        let mut column = k[next * e..(next + 1) * e].to_vec();
+        let mut column = Numbers::from_slice(&k[next * e..(next + 1) * e]);
         for earlier in self.columns.chunks_exact(e).filter(|c| c[next] != 0.0) {
             add_multiple(earlier, -earlier[next], &mut column);
         }
@@ -69,7 +69,7 @@ impl Equalities {
         column.iter_mut().for_each(|x| *x /= root);
         self.order.iter().for_each(|&i| column[i] = 0.0);
         column[next] = root;
-        self.columns.extend(column);
+        self.columns.extend_from_slice(&column);
         self.order.push(next);
     }
 

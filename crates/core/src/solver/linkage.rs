@@ -84,7 +84,8 @@ impl SideRange {
 impl Linkages {
     /// Finds the linkages among `blocks` and factors their rows.
     pub fn new(rows: &Rows, blocks: &[u32]) -> Linkages {
-        let joints: Vec<u32> = blocks.iter().copied().filter(|&b| is_joint(rows, &rows.blocks[b as usize])).collect();
+        let mut joints: Vec<u32> = Vec::with_capacity(blocks.len());
+        joints.extend(blocks.iter().copied().filter(|&b| is_joint(rows, &rows.blocks[b as usize])));
         let mut all = Linkages::default();
         for joined in groups(rows, &joints) {
             let objects = objects_of(rows, &joined);
@@ -277,8 +278,13 @@ fn island<'a>(rows: &'a Rows, blocks: &'a [u32]) -> impl Iterator<Item = &'a Blo
 
 /// Returns the objects of the blocks, sorted: start of `u`, degrees of freedom.
 fn objects_of(rows: &Rows, blocks: &[u32]) -> Vec<(u32, u32)> {
-    let mut objects: Vec<(u32, u32)> =
-        island(rows, blocks).flat_map(|b| b.sides().iter().map(|s| (s.u, s.dof))).collect();
+    let mut objects: Vec<(u32, u32)> = Vec::new();
+    for object in island(rows, blocks).flat_map(|b| b.sides().iter().map(|s| (s.u, s.dof))) {
+        // the rows of one robot are consecutive
+        if objects.last() != Some(&object) {
+            objects.push(object);
+        }
+    }
     objects.sort_unstable();
     objects.dedup();
     objects
@@ -287,6 +293,9 @@ fn objects_of(rows: &Rows, blocks: &[u32]) -> Vec<(u32, u32)> {
 /// Returns the joints grouped by connected objects, in the order of each group's first joint.
 fn groups(rows: &Rows, joints: &[u32]) -> Vec<Vec<u32>> {
     let objects = objects_of(rows, joints);
+    if objects.len() == 1 {
+        return vec![joints.to_vec()];
+    }
     let place = |s: &Side| objects.binary_search(&(s.u, s.dof)).unwrap_or(0) as u32;
     let mut sets = UnionFind::new(objects.len());
     for joint in island(rows, joints) {
