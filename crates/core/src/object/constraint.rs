@@ -79,9 +79,9 @@ pub trait Constraint {
     fn on_itself(&self) -> bool {
         false
     }
-    /// Returns whether its rows or gaps depend on the part states of the view. If those of no constraint do,
-    /// the views of a step have the part states of another time, and nothing but `x` and the time are those of
-    /// the view.
+    /// Returns whether its rows or gaps depend on the part states of the view, as those of loop joints do. If
+    /// those of no constraint of the world do, part states are not computed for it, and the view has those of
+    /// another time of the step.
     fn reads_part_states(&self) -> bool {
         true
     }
