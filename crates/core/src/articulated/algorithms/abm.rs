@@ -155,7 +155,7 @@ impl<T: Scalar> Sweep<T> {
             let rotation = match body.kind {
                 JointKind::Revolute => {
                     turn = turned.z * state.v(body.v);
-                    turn_about_z(&turned, state.joint_angle_sin_cos(i, body.q))
+                    turned.times_turn_about_z(state.joint_angle_sin_cos(i, body.q))
                 }
                 JointKind::Prismatic => {
                     arm += turned.z * state.q(body.q);
@@ -163,7 +163,7 @@ impl<T: Scalar> Sweep<T> {
                     turned
                 }
                 JointKind::Spherical(_) => {
-                    let rotation = turned * quaternion_matrix(four(state, body.q));
+                    let rotation = turned * Matrix::of_quaternion(four(state, body.q));
                     turn = rotation * three(|k| state.v(k), body.v);
                     rotation
                 }
@@ -171,7 +171,7 @@ impl<T: Scalar> Sweep<T> {
                     arm = three(|k| state.q(k), body.q);
                     turn = three(|k| state.v(k), body.v);
                     slide = three(|k| state.v(k), body.v + 3);
-                    quaternion_matrix(four(state, body.q + 3))
+                    Matrix::of_quaternion(four(state, body.q + 3))
                 }
             };
             let angular = outer + turn;
@@ -419,29 +419,6 @@ fn floating_factor<T: Scalar>(inertia: &ArticulatedInertia<T>, block: &mut Joint
     block.w = block.first.forward_rows(columns);
     let rest = block.first.complement(&inertia.rotational, &block.w);
     block.second = Factor::new(&rest, inertia.rotational.trace() * SINGULAR);
-}
-
-/// Returns `A·Rz` for the sine and cosine of an angle.
-#[inline(always)]
-fn turn_about_z<T: Scalar>(a: &Matrix<T>, (sin, cos): (T, T)) -> Matrix<T> {
-    Matrix { x: a.x * cos + a.y * sin, y: a.y * cos - a.x * sin, z: a.z }
-}
-
-/// Returns the rotation of a quaternion `x, y, z, w` of any length above 0: `1 + s (…)` with `s =
-/// 2/|q|²`.
-#[inline(always)]
-fn quaternion_matrix<T: Scalar>([x, y, z, w]: [T; 4]) -> Matrix<T> {
-    let (zero, one) = (x.constant(0.0), x.constant(1.0));
-    let s = (x * x + y * y + z * z + w * w).reciprocal_above(zero) * 2.0;
-    let (sx, sy, sz) = (x * s, y * s, z * s);
-    let (xx, yy, zz) = (x * sx, y * sy, z * sz);
-    let (xy, xz, yz) = (x * sy, x * sz, y * sz);
-    let (wx, wy, wz) = (w * sx, w * sy, w * sz);
-    Matrix {
-        x: Vector::new(one - (yy + zz), xy + wz, xz - wy),
-        y: Vector::new(xy - wz, one - (xx + zz), yz + wx),
-        z: Vector::new(xz + wy, yz - wx, one - (xx + yy)),
-    }
 }
 
 /// Returns four position numbers from `k` on.
