@@ -1,4 +1,4 @@
-"""A pole balanced on a cart, by a regulator worked out from central differences of forward dynamics. Needs gymnasium (``pip install ".[gym]"`` in a clone).
+"""A pole balanced on a cart, by a regulator worked out from the derivatives of forward dynamics. Needs gymnasium (``pip install ".[gym]"`` in a clone).
 
     python examples/cart_pole.py
 """
@@ -13,16 +13,10 @@ body = env.unwrapped.body
 
 
 def linear_model() -> tuple[np.ndarray, np.ndarray]:
-    """z' = A z + B u about upright rest, z = (x, θ, x', θ'), by central differences of forward dynamics."""
-    h = 1e-5
-    steps = h * np.eye(5)
-    rows = np.concatenate([steps, -steps])
-    tau = np.zeros((10, 2))
-    tau[:, 0] = rows[:, 4]
-    qdd = body.forward_dynamics(rows[:, :2], rows[:, 2:4], tau)
-    slopes = ((qdd[:5] - qdd[5:]) / (2 * h)).T
-    A = np.block([[np.zeros((2, 2)), np.eye(2)], [slopes[:, :4]]])
-    return A, np.concatenate([np.zeros(2), slopes[:, 4]])
+    """z' = A z + B u about upright rest, z = (x, θ, x', θ')."""
+    by_q, by_qd, by_tau = body.forward_dynamics_derivatives(np.zeros(2), np.zeros(2), np.zeros(2))
+    A = np.block([[np.zeros((2, 2)), np.eye(2)], [by_q, by_qd]])
+    return A, np.concatenate([np.zeros(2), by_tau[:, 0]])
 
 
 def regulator(A: np.ndarray, B: np.ndarray, dt: float = 0.02) -> np.ndarray:

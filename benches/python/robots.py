@@ -24,14 +24,18 @@ except ImportError:
 
 ROOT = Path(__file__).resolve().parents[2]
 OWN, TESTS = ROOT / "crates/py/python/tumble/gym/models", ROOT / "crates/scene/tests/mjcf"
+# file, and number of degrees of freedom of the root, which are not driven
 MODELS = {
-    "cart-pole": TESTS / "cartpole.xml",
-    "hopper": OWN / "hopper.xml",
-    "walker": OWN / "walker2d.xml",
-    "cheetah": OWN / "half_cheetah.xml",
-    "ant": OWN / "ant.xml",
-    "quadruped": TESTS / "quadruped.xml",
-    "humanoid": TESTS / "humanoid.xml",
+    "cart-pole": (TESTS / "cartpole.xml", 0),
+    "two poles": (OWN / "inverted_double_pendulum.xml", 0),
+    "swimmer": (OWN / "swimmer.xml", 3),
+    "hopper": (OWN / "hopper.xml", 3),
+    "walker": (OWN / "walker2d.xml", 3),
+    "cheetah": (OWN / "half_cheetah.xml", 3),
+    "ant": (OWN / "ant.xml", 6),
+    "quadruped": (TESTS / "quadruped.xml", 6),
+    "gym humanoid": (OWN / "humanoid.xml", 6),
+    "humanoid": (TESTS / "humanoid.xml", 6),
 }
 TURNS, STEPS = 5, 100
 WORLDS = int(sys.argv[2]) if len(sys.argv) > 2 else 256
@@ -120,14 +124,14 @@ def main():
     asked = [sys.argv[1]] if len(sys.argv) > 1 else list(MODELS)
     if mujoco is None:
         print("SKIPPED: the columns of MuJoCo, which is not installed; `make references` installs it")
-    print(f"{'':12}{'':>4}{'one world, 1000 steps/s of a core':>40}{f'{WORLDS} worlds':>34}{'deepest overlap, mm':>24}")
-    print(f"{'':12}{'dof':>4}{'tumble':>16}{'MuJoCo':>12}{'ratio':>12}{'tumble':>12}{'MuJoCo':>12}{'ratio':>10}{'tumble':>14}{'MuJoCo':>10}")
+    print(f"{'':14}{'':>4}{'one world, 1000 steps/s of a core':>40}{f'{WORLDS} worlds':>34}{'deepest overlap, mm':>24}")
+    print(f"{'':14}{'dof':>4}{'tumble':>16}{'MuJoCo':>12}{'ratio':>12}{'tumble':>12}{'MuJoCo':>12}{'ratio':>10}{'tumble':>14}{'MuJoCo':>10}")
     for name in asked:
-        world = tumble.World.load(MODELS[name])
+        path, root = MODELS[name]
+        world = tumble.World.load(path)
         robot = next(body for body in world.bodies if isinstance(body, tumble.Articulation))
-        driven = robot.dof - 6 if robot.dof - len(robot.joint_names) == 5 else max(1, robot.dof - 3) if name != "cart-pole" else robot.dof
-        torques = np.random.default_rng(0).normal(0, 0.05 * robot.mass, (STEPS, WORLDS, driven))
-        ours, theirs = Tumble(MODELS[name], torques), Mujoco(MODELS[name], torques) if mujoco else None
+        torques = np.random.default_rng(0).normal(0, 0.05 * robot.mass, (STEPS, WORLDS, robot.dof - root))
+        ours, theirs = Tumble(path, torques), Mujoco(path, torques) if mujoco else None
         engines = [engine for engine in (ours, theirs) if engine]
         with mujoco.rollout.Rollout(nthread=2) if mujoco else open("/dev/null") as pool:
             if theirs:
@@ -138,7 +142,7 @@ def main():
                     count = STEPS * (WORLDS if way == "step_many" else 1)
                     rates[engine, way].append(rate(getattr(engine, way), count)[0])
         found = {key: median(values) / 1e3 for key, values in rates.items()}
-        cells = [f"{name:12}{robot.dof:4}"]
+        cells = [f"{name:14}{robot.dof:4}"]
         for way, widths in (("step_one", (16, 12, 12)), ("step_many", (12, 12, 10))):
             own, other = found[ours, way], found.get((theirs, way))
             ratios = [f"{a / b:.2f}" for a, b in zip(rates[ours, way], rates[theirs, way])] if other else []

@@ -41,10 +41,11 @@ pub(crate) fn each_object(threads: &Threads, objects: Objects, numbers: Numbers,
         w: Slice { start: 0, numbers: w },
         part_states: Slice { start: 0, numbers: part_states },
     };
-    let places = threads.pieces(objects.table.placed.len(), OBJECTS);
-    if places.len() == 1 {
-        return places.into_iter().for_each(|places| rest.walk(objects, places, &work));
+    let count = objects.table.placed.len();
+    if threads.count() == 1 || count < 2 * OBJECTS {
+        return rest.walk(objects, 0..count, &work);
     }
+    let places = threads.pieces(count, OBJECTS);
     let pieces: Vec<(Range<usize>, Slices)> = places
         .into_iter()
         .map(|places| {

@@ -73,6 +73,32 @@ def test_the_mass_matrix_is_the_slope_of_inverse_dynamics(arm):
     assert arm.mass_matrix(q[0]) == pytest.approx(np.array(columns).T, abs=1e-10)
 
 
+def test_derivatives_are_slopes(arm):
+    q, qd, tau = (row[0] for row in random_states(arm, 1, seed=3))
+    h, unit = 1e-5, np.eye(arm.dof)
+
+    def slopes(of):
+        return np.array([(of(h * e) - of(-h * e)) / (2 * h) for e in unit]).T
+
+    by_q, by_qd, by_tau = arm.forward_dynamics_derivatives(q, qd, tau)
+    assert by_q == pytest.approx(slopes(lambda d: arm.forward_dynamics(q + d, qd, tau)), rel=1e-6, abs=1e-5)
+    assert by_qd == pytest.approx(slopes(lambda d: arm.forward_dynamics(q, qd + d, tau)), rel=1e-6, abs=1e-5)
+    assert by_tau @ arm.mass_matrix(q) == pytest.approx(unit, abs=1e-9)
+    qdd = arm.forward_dynamics(q, qd, tau)
+    by_q, by_qd, mass = arm.inverse_dynamics_derivatives(q, qd, qdd)
+    assert by_q == pytest.approx(slopes(lambda d: arm.inverse_dynamics(q + d, qd, qdd)), rel=1e-6, abs=1e-6)
+    assert by_qd == pytest.approx(slopes(lambda d: arm.inverse_dynamics(q, qd + d, qdd)), rel=1e-6, abs=1e-6)
+    assert mass == pytest.approx(arm.mass_matrix(q), abs=1e-12)
+
+
+def test_derivatives_of_a_batch_have_the_bits_of_its_rows(arm):
+    q, qd, tau = random_states(arm, 60)
+    whole = arm.forward_dynamics_derivatives(q, qd, tau)
+    assert whole.shape == (60, 3, arm.dof, arm.dof)
+    assert (whole[7] == arm.forward_dynamics_derivatives(q[7], qd[7], tau[7])).all()
+    assert (arm.inverse_dynamics_derivatives(q, qd[0])[9] == arm.inverse_dynamics_derivatives(q[9], qd[0])).all()
+
+
 def test_jacobians_are_differences_of_poses(arm):
     q, qd, _ = random_states(arm, 1)
     h = 1e-6

@@ -109,6 +109,10 @@ impl Constraint for ArticulatedBody {
     fn on_itself(&self) -> bool {
         true
     }
+
+    fn reads_part_states(&self) -> bool {
+        false
+    }
 }
 
 /// Makes rows on the generalized coordinates of the owner.

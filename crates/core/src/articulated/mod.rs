@@ -11,6 +11,9 @@ mod simd;
 mod turning;
 
 pub use algorithms::crba::MassMatrix;
+pub use algorithms::derivatives::{
+    ForwardDynamicsDerivatives, InverseDynamicsDerivatives, forward_dynamics_derivatives, inverse_dynamics_derivatives,
+};
 pub use algorithms::dynamics::{Dynamics, Scratch, forward_dynamics};
 pub use algorithms::energy::{center_of_mass, energy, momentum};
 pub use algorithms::jacobian::{link_jacobian, point_jacobian};

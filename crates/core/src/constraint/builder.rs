@@ -6,6 +6,7 @@ use crate::object::collidable::ContactFrame;
 use crate::object::part_state::{PartPoint, PartState};
 use crate::object::{Constraint, Integratable, RowTarget};
 use crate::world::view::{Entry, Mode, ObjectId, Objects};
+use smallvec::SmallVec;
 use tumble_collide::Vec3;
 
 /// The fraction of the squared responses of two parts of one object below which their difference counts as none:
@@ -148,7 +149,7 @@ impl RowBuilder<'_> {
             if !entry.moves() {
                 return self.kinematic_coordinates(&entry, i, jacobian);
             }
-            let mut y = vec![0.0; jacobian.len()];
+            let mut y = SmallVec::<[f64; 32]>::from_elem(0.0, jacobian.len());
             i.solve_lt(&mut self.caches[entry.place], jacobian, &mut y);
             let side = self.rows.side(entry.state_range.v.start, y.len());
             side.map(|side| side.iter_mut().zip(&y).for_each(|(s, y)| *s += y)).is_some()

@@ -162,6 +162,9 @@ impl Rows {
 
     /// Adds `(Yᵀu)_i` to `c_i` for every row, on several threads.
     pub(crate) fn add_velocity_on(&self, threads: &Threads, u: &[f64], c: &mut [f64]) {
+        if threads.count() == 1 || self.blocks.len() < 2 * BLOCKS {
+            return self.add_velocity(u, c);
+        }
         let mut rest = c;
         let pieces = threads.pieces(self.blocks.len(), BLOCKS).into_iter().map(|piece| {
             let blocks = &self.blocks[piece];
@@ -216,13 +219,10 @@ impl Rows {
     /// Returns `K + R`, with `K = YᵀY`, of the given blocks: dense, row-major, in the order of
     /// their rows. For the pivoting solvers and tests.
     pub fn dense(&self, blocks: &[u32]) -> Vec<f64> {
-        let rows: Vec<(&Block, usize)> = blocks
-            .iter()
-            .flat_map(|&b| {
-                let block = &self.blocks[b as usize];
-                (0..block.set.rows()).map(move |k| (block, k))
-            })
-            .collect();
+        let mut rows: Vec<(&Block, usize)> = Vec::with_capacity(blocks.len());
+        for block in blocks.iter().map(|&b| &self.blocks[b as usize]) {
+            rows.extend((0..block.set.rows()).map(|k| (block, k)));
+        }
         let n = rows.len();
         let mut dense = vec![0.0; n * n];
         for (i, (a, ka)) in rows.iter().enumerate() {

@@ -79,6 +79,12 @@ pub trait Constraint {
     fn on_itself(&self) -> bool {
         false
     }
+    /// Returns whether its rows or gaps depend on the part states of the view, as those of loop joints do. If
+    /// those of no constraint of the world do, part states are not computed for it, and the view has those of
+    /// another time of the step.
+    fn reads_part_states(&self) -> bool {
+        true
+    }
 }
 
 /// Admissible multipliers, error and targets of one row of a [`Constraint`].

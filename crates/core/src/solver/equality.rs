@@ -15,12 +15,16 @@
 //! first.
 
 use crate::constraint::rows::dot;
+use smallvec::SmallVec;
 
 /// A row depends on others if its pivot is below this fraction of its own diagonal. Rounding is
 /// relative to the diagonal, however large other rows are.
 pub(super) const RANK: f64 = 1e-11;
 /// A row vanishes if elimination leaves less than this fraction of its diagonal.
 pub(super) const VANISHED: f64 = 1e-12;
+
+/// One number for each equality row; on the stack for the joints of one robot.
+pub(super) type Numbers = SmallVec<[f64; 32]>;
 
 /// A pivoted Cholesky factor of `K_EE`.
 pub(super) struct Equalities {
@@ -39,7 +43,7 @@ impl Equalities {
         let whole: Vec<f64> = (0..e).map(|i| k[i * e + i]).collect();
         // Remaining fraction of each diagonal; negative once it was the pivot.
         let mut left: Vec<f64> = whole.iter().map(|d| if *d > 0.0 { 1.0 } else { 0.0 }).collect();
-        let mut factor = Equalities { size: e, order: Vec::new(), columns: Vec::new() };
+        let mut factor = Equalities { size: e, order: Vec::with_capacity(e), columns: Vec::with_capacity(e * e) };
         for _ in 0..e {
             let next = (0..e).fold(0, |best, i| if left[i] > left[best] { i } else { best });
             if left[next].is_nan() || left[next] <= rank {
@@ -57,7 +61,7 @@ impl Equalities {
     /// earlier columns) / √rest`.
     fn eliminate(&mut self, k: &[f64], next: usize, rest: f64) {
         let e = self.size;
-        let mut column = k[next * e..(next + 1) * e].to_vec();
+        let mut column = Numbers::from_slice(&k[next * e..(next + 1) * e]);
         for earlier in self.columns.chunks_exact(e).filter(|c| c[next] != 0.0) {
             add_multiple(earlier, -earlier[next], &mut column);
         }
@@ -65,7 +69,7 @@ impl Equalities {
         column.iter_mut().for_each(|x| *x /= root);
         self.order.iter().for_each(|&i| column[i] = 0.0);
         column[next] = root;
-        self.columns.extend(column);
+        self.columns.extend_from_slice(&column);
         self.order.push(next);
     }
 
@@ -79,9 +83,9 @@ impl Equalities {
     }
 
     /// Returns `R⁻¹` of the independent entries of `x`, in pivot order.
-    fn forward(&self, x: &[f64]) -> Vec<f64> {
-        let mut left = x.to_vec();
-        let mut t = Vec::with_capacity(self.rank());
+    fn forward(&self, x: &[f64]) -> Numbers {
+        let mut left = Numbers::from_slice(x);
+        let mut t = Numbers::with_capacity(self.rank());
         for (p, &i) in self.order.iter().enumerate() {
             let next = if left[i] == 0.0 { 0.0 } else { left[i] / self.column(p)[i] };
             if next != 0.0 {
@@ -93,9 +97,9 @@ impl Equalities {
     }
 
     /// Returns `K_EE⁻¹·x` on the independent rows, 0 elsewhere; as long as `x`.
-    pub(super) fn solve(&self, x: &[f64]) -> Vec<f64> {
+    pub(super) fn solve(&self, x: &[f64]) -> Numbers {
         let t = self.forward(x);
-        let mut out = vec![0.0; x.len()];
+        let mut out = Numbers::from_elem(0.0, x.len());
         for (p, &i) in self.order.iter().enumerate().rev() {
             let column = self.column(p);
             out[i] = (t[p] - dot(column, &out)) / column[i];
@@ -107,7 +111,7 @@ impl Equalities {
     /// n` within rows of `stride`.
     pub(super) fn reduce(&self, coupling: &[Vec<f64>], free: &[f64], k: &mut [f64], stride: usize, c: &mut [f64]) {
         let t = self.forward(free);
-        let columns: Vec<Vec<f64>> = coupling.iter().map(|x| self.forward(x)).collect();
+        let columns: Vec<Numbers> = coupling.iter().map(|x| self.forward(x)).collect();
         let whole: Vec<f64> = (0..c.len()).map(|i| k[i * stride + i]).collect();
         for (i, a) in columns.iter().enumerate() {
             c[i] -= dot(a, &t);
@@ -131,6 +135,15 @@ pub(crate) fn smallest_pivot(k: &[f64], e: usize) -> Option<f64> {
     (0..factor.rank()).map(|p| factor.column(p)[factor.order[p]].powi(2)).reduce(f64::min)
 }
 
-fn add_multiple(x: &[f64], scale: f64, to: &mut [f64]) {
-    to.iter_mut().zip(x).for_each(|(to, x)| *to += scale * x);
+/// `to += scale·x`.
+pub(super) fn add_multiple(x: &[f64], scale: f64, to: &mut [f64]) {
+    let ((to, to_rest), (x, x_rest)) = (to.as_chunks_mut::<4>(), x.as_chunks::<4>());
+    for (to, x) in to.iter_mut().zip(x) {
+        let mut sum = *to; // a value, so the compiler knows that it does not overlap `x`
+        for k in 0..4 {
+            sum[k] += scale * x[k];
+        }
+        *to = sum;
+    }
+    to_rest.iter_mut().zip(x_rest).for_each(|(to, x)| *to += scale * x);
 }

@@ -84,7 +84,11 @@ impl RowSolver for GaussSeidel {
         with_memory(|locals| {
             let mut linkages = Linkages::new(rows, blocks);
             add_blocks(rows, blocks, (c, lambda), &mut linkages, locals);
-            apply(locals, &linkages, rows, c, lambda, du);
+            let left = apply(locals, &linkages, rows, c, lambda, du);
+            if locals.is_empty() {
+                let converged = left <= settings.tolerance;
+                return SolveReport { iterations: 1, converged, ray: false, relaxations: 0 };
+            }
             let extrapolation = Extrapolation::new(locals, &linkages, rows, du);
             Solve { rows, blocks, c, lambda, du, settings, locals, linkages, extrapolation }.run()
         })

@@ -31,7 +31,7 @@
 //! E inside its limits and leave E at them. That would be an active set: bordering the factor by
 //! one row (`e²`) when one joins, the inverse operation when one leaves, and a sweep in between.
 
-use super::equality::{Equalities, VANISHED};
+use super::equality::{Equalities, Numbers, VANISHED, add_multiple};
 use super::one_contact::Symmetric3;
 use crate::constraint::rows::{Block, RowSet, Rows, Side, dot};
 use tumble_collide::UnionFind;
@@ -84,7 +84,8 @@ impl SideRange {
 impl Linkages {
     /// Finds the linkages among `blocks` and factors their rows.
     pub fn new(rows: &Rows, blocks: &[u32]) -> Linkages {
-        let joints: Vec<u32> = blocks.iter().copied().filter(|&b| is_joint(rows, &rows.blocks[b as usize])).collect();
+        let mut joints: Vec<u32> = Vec::with_capacity(blocks.len());
+        joints.extend(blocks.iter().copied().filter(|&b| is_joint(rows, &rows.blocks[b as usize])));
         let mut all = Linkages::default();
         for joined in groups(rows, &joints) {
             let objects = objects_of(rows, &joined);
@@ -95,6 +96,8 @@ impl Linkages {
                 island(rows, blocks).filter(couples).map(|b| b.set.rows()).sum()
             };
             if joined.len() <= MAX_DIRECT_ROWS && joined.len().pow(2) * met <= MAX_WORK {
+                let dof: usize = objects.iter().map(|(_, dof)| *dof as usize).sum();
+                all.y.reserve(met * dof);
                 all.objects.extend(objects.iter().map(|(u, _)| (*u, all.linkages.len())));
                 all.linkages.push(Linkage::new(rows, joined, objects));
             }
@@ -141,7 +144,8 @@ impl Linkages {
             }
         }
         for side in block.sides() {
-            (0..count).for_each(|k| self.add(first, side, k, 1.0, rows.response(side, k)));
+            let Linkages { sides, y, .. } = self;
+            (0..count).for_each(|k| add(&sides[first..], y, (side, k), 1.0, rows.response(side, k)));
         }
         let side_range = SideRange { first: first as u32, end: self.sides.len() as u32 };
         for k in 0..count {
@@ -154,17 +158,12 @@ impl Linkages {
 
     /// Subtracts `Y_E·A⁻¹·K_Ei` of one linkage from `Ỹ`, for every row of a block.
     fn subtract_joint_responses(&mut self, rows: &Rows, block: &Block, linkage: usize, first: usize) {
+        let Linkages { linkages, sides, y, .. } = self;
+        let Linkage { rows: joints, factor, .. } = &linkages[linkage];
         for k in 0..block.set.rows() {
-            let linkage = &self.linkages[linkage];
-            let coupling: Vec<f64> =
-                island(rows, &linkage.rows).map(|joint| rows.coupling(joint, 0, block, k)).collect();
-            let held = linkage.factor.solve(&coupling);
-            let joints: Vec<(u32, f64)> = linkage.rows.iter().copied().zip(held).filter(|(_, h)| *h != 0.0).collect();
-            for (joint, held) in joints {
-                rows.blocks[joint as usize]
-                    .sides()
-                    .iter()
-                    .for_each(|s| self.add(first, s, k, -held, rows.response(s, 0)));
+            let coupling: Numbers = island(rows, joints).map(|joint| rows.coupling(joint, 0, block, k)).collect();
+            for (joint, held) in island(rows, joints).zip(factor.solve(&coupling)).filter(|(_, held)| *held != 0.0) {
+                joint.sides().iter().for_each(|s| add(&sides[first..], y, (s, k), -held, rows.response(s, 0)));
             }
         }
     }
@@ -177,14 +176,6 @@ impl Linkages {
     fn push_side(&mut self, u: u32, dof: u32, count: usize) {
         self.sides.push(Side { u, dof, y: self.y.len() as u32 });
         self.y.resize(self.y.len() + count * dof as usize, 0.0);
-    }
-
-    /// Adds `scale·y` to `Ỹ_k` on the object of `side`, in the range that starts at `first`.
-    fn add(&mut self, first: usize, side: &Side, k: usize, scale: f64, y: &[f64]) {
-        if let Some(to) = self.sides[first..].iter().find(|s| s.u == side.u) {
-            let start = to.y as usize + k * y.len();
-            self.y[start..start + y.len()].iter_mut().zip(y).for_each(|(to, y)| *to += scale * y);
-        }
     }
 
     fn clear(&mut self, side_range: SideRange, k: usize) {
@@ -239,7 +230,7 @@ impl Linkage {
 
     fn solve_equalities(&self, rows: &Rows, c: &[f64], lambda: &mut [f64], du: &mut [f64]) -> f64 {
         island(rows, &self.rows).for_each(|joint| lambda[joint.row as usize] = 0.0);
-        let velocities = |lambda: &[f64], du: &[f64]| -> Vec<f64> {
+        let velocities = |lambda: &[f64], du: &[f64]| -> Numbers {
             let w = |joint: &Block| {
                 c[joint.row as usize] + rows.row_velocity(joint, 0, du) + joint.compliance * lambda[joint.row as usize]
             };
@@ -253,14 +244,21 @@ impl Linkage {
             for (joint, change) in island(rows, &self.rows).zip(self.factor.solve(&w)) {
                 lambda[joint.row as usize] -= change;
                 for s in joint.sides() {
-                    let du = &mut du[s.u as usize..(s.u + s.dof) as usize];
-                    du.iter_mut().zip(rows.response(s, 0)).for_each(|(du, y)| *du -= y * change);
+                    add_multiple(rows.response(s, 0), -change, &mut du[s.u as usize..(s.u + s.dof) as usize]);
                 }
             }
             w = velocities(lambda, du);
         }
         let left = largest(&w);
         if left <= SOLVED * before { 0.0 } else { left }
+    }
+}
+
+/// Adds `scale·y` to `Ỹ_k`, in `all`, on the object of `side` among `sides`.
+fn add(sides: &[Side], all: &mut [f64], (side, k): (&Side, usize), scale: f64, y: &[f64]) {
+    if let Some(to) = sides.iter().find(|s| s.u == side.u) {
+        let start = to.y as usize + k * y.len();
+        add_multiple(y, scale, &mut all[start..start + y.len()]);
     }
 }
 
@@ -280,8 +278,13 @@ fn island<'a>(rows: &'a Rows, blocks: &'a [u32]) -> impl Iterator<Item = &'a Blo
 
 /// Returns the objects of the blocks, sorted: start of `u`, degrees of freedom.
 fn objects_of(rows: &Rows, blocks: &[u32]) -> Vec<(u32, u32)> {
-    let mut objects: Vec<(u32, u32)> =
-        island(rows, blocks).flat_map(|b| b.sides().iter().map(|s| (s.u, s.dof))).collect();
+    let mut objects: Vec<(u32, u32)> = Vec::new();
+    for object in island(rows, blocks).flat_map(|b| b.sides().iter().map(|s| (s.u, s.dof))) {
+        // the rows of one robot are consecutive
+        if objects.last() != Some(&object) {
+            objects.push(object);
+        }
+    }
     objects.sort_unstable();
     objects.dedup();
     objects
@@ -290,6 +293,9 @@ fn objects_of(rows: &Rows, blocks: &[u32]) -> Vec<(u32, u32)> {
 /// Returns the joints grouped by connected objects, in the order of each group's first joint.
 fn groups(rows: &Rows, joints: &[u32]) -> Vec<Vec<u32>> {
     let objects = objects_of(rows, joints);
+    if objects.len() == 1 {
+        return vec![joints.to_vec()];
+    }
     let place = |s: &Side| objects.binary_search(&(s.u, s.dof)).unwrap_or(0) as u32;
     let mut sets = UnionFind::new(objects.len());
     for joint in island(rows, joints) {

@@ -50,6 +50,9 @@ pub(crate) fn largest_residual_on(
     blocks: &[u32],
     (c, lambda, du): (&[f64], &[f64], &[f64]),
 ) -> LargestResidual {
+    if threads.count() == 1 || blocks.len() < 2 * BLOCKS {
+        return largest_residual(rows, blocks, c, lambda, du);
+    }
     let none = LargestResidual::default();
     let pieces = threads.pieces(blocks.len(), BLOCKS).into_iter();
     let mut largest: Vec<(&[u32], LargestResidual)> = pieces.map(|piece| (&blocks[piece], none)).collect();

@@ -23,6 +23,29 @@ impl<T: Scalar> Matrix<T> {
         Matrix { x, y, z }
     }
 
+    /// Returns the rotation of a quaternion `x, y, z, w` of any length above 0: `1 + s (…)` with `s =
+    /// 2/|q|²`.
+    #[inline(always)]
+    pub fn of_quaternion([x, y, z, w]: [T; 4]) -> Matrix<T> {
+        let (zero, one) = (x.constant(0.0), x.constant(1.0));
+        let s = (x * x + y * y + z * z + w * w).reciprocal_above(zero) * 2.0;
+        let (sx, sy, sz) = (x * s, y * s, z * s);
+        let (xx, yy, zz) = (x * sx, y * sy, z * sz);
+        let (xy, xz, yz) = (x * sy, x * sz, y * sz);
+        let (wx, wy, wz) = (w * sx, w * sy, w * sz);
+        Matrix {
+            x: Vector::new(one - (yy + zz), xy + wz, xz - wy),
+            y: Vector::new(xy - wz, one - (xx + zz), yz + wx),
+            z: Vector::new(xz + wy, yz - wx, one - (xx + yy)),
+        }
+    }
+
+    /// Returns `A·Rz` for the sine and cosine of an angle.
+    #[inline(always)]
+    pub fn times_turn_about_z(&self, (sin, cos): (T, T)) -> Matrix<T> {
+        Matrix { x: self.x * cos + self.y * sin, y: self.y * cos - self.x * sin, z: self.z }
+    }
+
     /// Returns `Aᵀ v`.
     #[inline(always)]
     pub fn transposed_times(&self, v: Vector<T>) -> Vector<T> {

@@ -117,7 +117,7 @@ pub(crate) fn detect(
 }
 
 /// Returns the state in `ahead` seconds if no momentum changes (or no velocity, of objects whose
-/// state holds velocities).
+/// state holds velocities), as constraints see it.
 fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
     let mut moment = core.moment();
     let Coordinates { objects, x, caches, .. } = moment.coordinates(core);
@@ -132,7 +132,7 @@ fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
             None => free_motion(&entry, &mut caches[entry.place], x, ahead),
         }
     }
-    moment.refresh(core);
+    moment.refresh_for_constraints(core);
     moment
 }
 

@@ -139,7 +139,7 @@ fn measure_gaps(core: &mut Core, work: &Workspace, options: &Options, time: f64)
     let mut gaps = Vec::new();
     if !work.limits.is_empty() && matches!(options.limits, Limits::Violated) {
         let mut end = core.moment();
-        end.refresh(core);
+        end.refresh_for_constraints(core);
         limits(&end.view(core, time), &mut gaps)?;
         core.moments.push(end);
     }

@@ -1,6 +1,7 @@
 //! A second state of the objects within a step, with the values derived from it.
 
 use super::contacts::Basis;
+use crate::constraint::builder::constraints;
 use crate::derived::{Cache, Derived};
 use crate::integrators::context::refresh_all;
 use crate::world::view::{Table, WorldView};
@@ -22,6 +23,13 @@ impl Moment {
     /// Writes part states and caches from the state.
     pub fn refresh(&mut self, core: &Core) {
         refresh_all(&core.threads, core.objects(), &self.x, &mut self.derived);
+    }
+
+    /// Writes part states and caches from the state if any constraint reads part states.
+    pub fn refresh_for_constraints(&mut self, core: &Core) {
+        if constraints(core.objects()).any(|(_, _, constraint)| constraint.reads_part_states()) {
+            self.refresh(core);
+        }
     }
 
     /// Returns the view of it that objects are given, at a time, s.

@@ -11,6 +11,7 @@ mod armature;
 mod articulated_agree;
 mod articulated_closed;
 mod articulated_contacts;
+mod articulated_derivatives;
 mod articulated_joints;
 mod articulated_laws;
 mod articulated_limits;

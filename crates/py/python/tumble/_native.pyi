@@ -1013,6 +1013,25 @@ class Articulation:
         q: (nq,), qd, qdd: (dof,), each optionally batched. Without ``qdd`` the accelerations are
         zero.
         """
+    def inverse_dynamics_derivatives(
+        self, q: ArrayLike | None = None, qd: ArrayLike | None = None, qdd: ArrayLike | None = None
+    ) -> _Floats:
+        """Returns the derivatives of ``inverse_dynamics``: by ``q``, by ``qd`` and by ``qdd``, which is the
+        mass matrix; shape (3, dof, dof) or (batch, 3, dof, dof).
+
+        Arguments as in ``inverse_dynamics``. Row ``i``, column ``k`` is that of force ``i`` by number
+        ``k``. Positions change along velocities: column ``k`` by ``q`` is the slope along unit velocity
+        ``k``, also of spherical joints and floating roots.
+        """
+    def forward_dynamics_derivatives(
+        self, q: ArrayLike | None = None, qd: ArrayLike | None = None, tau: ArrayLike | None = None
+    ) -> _Floats:
+        """Returns the derivatives of ``forward_dynamics``: by ``q``, by ``qd`` and by ``tau``, which is the
+        inverse of the mass matrix; shape (3, dof, dof) or (batch, 3, dof, dof).
+
+        Arguments as in ``forward_dynamics``, rows and columns as in ``inverse_dynamics_derivatives``. A
+        singular mass matrix raises ``InvalidValueError``.
+        """
     def mass_matrix(self, q: ArrayLike | None = None) -> _Floats:
         """Returns the mass matrix, symmetric, shape (dof, dof) or (batch, dof, dof)."""
     def jacobian(self, link: str, q: ArrayLike | None = None) -> _Floats:

@@ -84,8 +84,8 @@ impl Articulation {
     }
 }
 
-type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
-type Given<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
+pub(super) type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
+pub(super) type Given<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
 
 #[pymethods]
 impl Articulation {

@@ -6,6 +6,7 @@ pub mod binding;
 pub mod bodies;
 pub mod body;
 pub mod builder;
+pub mod derivatives;
 pub mod description;
 pub mod joint;
 pub mod joints;

@@ -7,11 +7,13 @@
 use crate::arrays::convert::{Numbers, room, shown};
 use crate::errors::{Error, Result, caught};
 use crate::pool;
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 use tumble::collide::{Pose, Vec3};
 use tumble::dynamics::articulated::{
     BatchDynamics, Dynamics, InverseDynamics, Kinematics, Lanes, LinkFrame, MassMatrix, Model, center_of_mass,
-    forward_dynamics, inverse_dynamics, link_jacobian, normalize,
+    forward_dynamics, forward_dynamics_derivatives, inverse_dynamics, inverse_dynamics_derivatives, link_jacobian,
+    normalize,
 };
 
 /// States that one call of the batched algorithm processes.
@@ -139,6 +141,14 @@ impl Rows {
     }
 }
 
+/// Writes matrices by rows, one after the other.
+fn by_rows(matrices: [&DMatrix<f64>; 3], out: &mut [f64]) {
+    let numbers = matrices
+        .into_iter()
+        .flat_map(|matrix| matrix.row_iter().flat_map(|row| row.iter().copied().collect::<Vec<_>>()));
+    out.iter_mut().zip(numbers).for_each(|(out, x)| *out = x);
+}
+
 /// Returns one row of positions with normalized quaternions.
 pub fn settled(robot: &Robot, q: Vec<f64>) -> Result<Vec<f64>> {
     let width = q.len();
@@ -213,6 +223,46 @@ impl Robot {
                 inverse_dynamics(model, (kin, work), gravity, rows.row(0, k), rows.row(1, k), rows.row(2, k), &[], tau);
             })
         })
+    }
+
+    /// Returns `∂τ/∂q`, `∂τ/∂v` and `M` at `q`, `qd`, `qdd`: three matrices by rows.
+    pub fn inverse_dynamics_derivatives(&self, gravity: &Vec3, rows: &mut Rows) -> Result<Vec<f64>> {
+        rows.settle(&self.model)?;
+        let (rows, model) = (&*rows, &self.model);
+        caught(|| {
+            rows.each(
+                3 * self.dof() * self.dof(),
+                || Kinematics::new(model),
+                |kin, k, out| {
+                    let [q, v, qdd] = [0, 1, 2].map(|argument| rows.row(argument, k));
+                    let d = inverse_dynamics_derivatives(model, kin, gravity, q, v, qdd);
+                    by_rows([&d.by_q, &d.by_v, &d.by_qdd], out);
+                },
+            )
+        })
+    }
+
+    /// Returns `∂q̈/∂q`, `∂q̈/∂v` and `M⁻¹` at `q`, `qd`, `tau`: three matrices by rows.
+    pub fn forward_dynamics_derivatives(&self, gravity: &Vec3, rows: &mut Rows) -> Result<Vec<f64>> {
+        rows.settle(&self.model)?;
+        let (rows, model, width) = (&*rows, &self.model, 3 * self.dof() * self.dof());
+        let out = caught(|| {
+            rows.each(
+                width,
+                || Kinematics::new(model),
+                |kin, k, out| {
+                    let [q, v, tau] = [0, 1, 2].map(|argument| rows.row(argument, k));
+                    match forward_dynamics_derivatives(model, kin, gravity, q, v, tau) {
+                        Some(d) => by_rows([&d.by_q, &d.by_v, &d.by_tau], out),
+                        None => out.fill(f64::NAN),
+                    }
+                },
+            )
+        })?;
+        match out.chunks(width.max(1)).position(|row| row[0].is_nan()) {
+            Some(row) => Err(Error::value(format!("the mass matrix at the positions of row {row} is singular"))),
+            None => Ok(out),
+        }
     }
 
     /// Returns `M` of `q`, by rows.

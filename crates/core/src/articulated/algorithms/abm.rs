@@ -132,6 +132,17 @@ impl<T: Scalar> Sweep<T> {
     /// velocities of the origins.
     #[inline(always)]
     pub fn place<const WHOLE: bool>(&mut self, compiled: &Compiled, state: &impl Input<T>) {
+        self.place_links::<WHOLE, true>(compiled, state);
+    }
+
+    /// Places every link for its kinetic energy alone: without biases, and of the inertia only `J`.
+    #[inline(always)]
+    pub fn place_for_energy(&mut self, compiled: &Compiled, state: &impl Input<T>) {
+        self.place_links::<true, false>(compiled, state);
+    }
+
+    #[inline(always)]
+    fn place_links<const WHOLE: bool, const BIASED: bool>(&mut self, compiled: &Compiled, state: &impl Input<T>) {
         for (i, body) in compiled.bodies.iter().enumerate() {
             let parent = &self.slots[body.parent];
             let turned = parent.rotation.times_constant(&body.turned);
@@ -144,7 +155,7 @@ impl<T: Scalar> Sweep<T> {
             let rotation = match body.kind {
                 JointKind::Revolute => {
                     turn = turned.z * state.v(body.v);
-                    turn_about_z(&turned, state.joint_angle_sin_cos(i, body.q))
+                    turned.times_turn_about_z(state.joint_angle_sin_cos(i, body.q))
                 }
                 JointKind::Prismatic => {
                     arm += turned.z * state.q(body.q);
@@ -152,7 +163,7 @@ impl<T: Scalar> Sweep<T> {
                     turned
                 }
                 JointKind::Spherical(_) => {
-                    let rotation = turned * quaternion_matrix(four(state, body.q));
+                    let rotation = turned * Matrix::of_quaternion(four(state, body.q));
                     turn = rotation * three(|k| state.v(k), body.v);
                     rotation
                 }
@@ -160,25 +171,28 @@ impl<T: Scalar> Sweep<T> {
                     arm = three(|k| state.q(k), body.q);
                     turn = three(|k| state.v(k), body.v);
                     slide = three(|k| state.v(k), body.v + 3);
-                    quaternion_matrix(four(state, body.q + 3))
+                    Matrix::of_quaternion(four(state, body.q + 3))
                 }
             };
             let angular = outer + turn;
             let sweeping = outer.cross(arm);
-            let bias_acceleration = Motion {
-                angular: outer_bias_acceleration.angular + outer.cross(turn),
-                linear: outer_bias_acceleration.linear
-                    + outer_bias_acceleration.angular.cross(arm)
-                    + outer.cross(sweeping + (slide + slide)),
-            };
             let slot = &mut self.slots[i + 1];
-            (slot.rotation, slot.arm, slot.angular, slot.bias_acceleration) =
-                (rotation, arm, angular, bias_acceleration);
+            (slot.rotation, slot.arm, slot.angular) = (rotation, arm, angular);
             if WHOLE {
                 slot.position = parent_position + arm;
                 slot.linear = parent_linear + sweeping + slide;
             }
-            load(body, slot);
+            if BIASED {
+                slot.bias_acceleration = Motion {
+                    angular: outer_bias_acceleration.angular + outer.cross(turn),
+                    linear: outer_bias_acceleration.linear
+                        + outer_bias_acceleration.angular.cross(arm)
+                        + outer.cross(sweeping + (slide + slide)),
+                };
+                load(body, slot);
+            } else {
+                slot.inertia.rotational = inertia_about_origin(body, &slot.rotation).0;
+            }
         }
     }
 
@@ -367,19 +381,25 @@ fn with_armature<T: Scalar>(pivot: T, armature: f64) -> T {
 /// Sets the rigid inertia and the bias `p` of a placed link.
 #[inline(always)]
 fn load<T: Scalar>(body: &CompiledLink, slot: &mut Slot<T>) {
-    let like = slot.angular.x;
-    let (n, m) = (slot.rotation.of_constant(&body.pair[0]), slot.rotation.of_constant(&body.pair[1]));
+    let (rotational, [n, m]) = inertia_about_origin(body, &slot.rotation);
     let h = slot.rotation.of_constant(&body.moment);
     let (omega, bias_acceleration) = (slot.angular, slot.bias_acceleration);
-    let paired = Symmetric::of_pair(n, m);
-    let sphere = like.constant(body.sphere);
-    let mass = like.constant(body.mass);
-    let rotational = Symmetric { xx: paired.xx + sphere, yy: paired.yy + sphere, zz: paired.zz + sphere, ..paired };
+    let mass = slot.angular.x.constant(body.mass);
     slot.inertia = ArticulatedInertia::rigid(&Inertia { rotational, moment: h, mass });
     let spin = n * m.dot(omega) + m * n.dot(omega);
     let torque = rotational * bias_acceleration.angular + omega.cross(spin) + h.cross(bias_acceleration.linear);
     let force = bias_acceleration.linear * mass + bias_acceleration.angular.cross(h) + omega.cross(omega.cross(h));
     slot.bias = Force { torque, force };
+}
+
+/// Returns `J` of a link with these axes, and the pair of vectors that it is made of (`compiled.rs`).
+#[inline(always)]
+fn inertia_about_origin<T: Scalar>(body: &CompiledLink, rotation: &Matrix<T>) -> (Symmetric<T>, [Vector<T>; 2]) {
+    let (n, m) = (rotation.of_constant(&body.pair[0]), rotation.of_constant(&body.pair[1]));
+    let paired = Symmetric::of_pair(n, m);
+    let sphere = n.x.constant(body.sphere);
+    let inertia = Symmetric { xx: paired.xx + sphere, yy: paired.yy + sphere, zz: paired.zz + sphere, ..paired };
+    (inertia, [n, m])
 }
 
 #[inline(always)]
@@ -399,29 +419,6 @@ fn floating_factor<T: Scalar>(inertia: &ArticulatedInertia<T>, block: &mut Joint
     block.w = block.first.forward_rows(columns);
     let rest = block.first.complement(&inertia.rotational, &block.w);
     block.second = Factor::new(&rest, inertia.rotational.trace() * SINGULAR);
-}
-
-/// Returns `A·Rz` for the sine and cosine of an angle.
-#[inline(always)]
-fn turn_about_z<T: Scalar>(a: &Matrix<T>, (sin, cos): (T, T)) -> Matrix<T> {
-    Matrix { x: a.x * cos + a.y * sin, y: a.y * cos - a.x * sin, z: a.z }
-}
-
-/// Returns the rotation of a quaternion `x, y, z, w` of any length above 0: `1 + s (…)` with `s =
-/// 2/|q|²`.
-#[inline(always)]
-fn quaternion_matrix<T: Scalar>([x, y, z, w]: [T; 4]) -> Matrix<T> {
-    let (zero, one) = (x.constant(0.0), x.constant(1.0));
-    let s = (x * x + y * y + z * z + w * w).reciprocal_above(zero) * 2.0;
-    let (sx, sy, sz) = (x * s, y * s, z * s);
-    let (xx, yy, zz) = (x * sx, y * sy, z * sz);
-    let (xy, xz, yz) = (x * sy, x * sz, y * sz);
-    let (wx, wy, wz) = (w * sx, w * sy, w * sz);
-    Matrix {
-        x: Vector::new(one - (yy + zz), xy + wz, xz - wy),
-        y: Vector::new(xy - wz, one - (xx + zz), yz + wx),
-        z: Vector::new(xz + wy, yz - wx, one - (xx + yy)),
-    }
 }
 
 /// Returns four position numbers from `k` on.

@@ -129,33 +129,30 @@ impl Dynamics {
     /// Returns the kinetic energy at a state, J. Afterwards the maps need a [`refresh`](Self::refresh).
     pub(in crate::articulated) fn kinetic_energy(&mut self, q: &[f64], v: &[f64]) -> f64 {
         let turns = self.joint_sin_cos.take(q);
-        self.sweep.place::<true>(&self.compiled, &SingleState { turns, q, v, tau: &[] });
-        self.kinetic_energy_as_placed(v)
+        self.sweep.place_for_energy(&self.compiled, &SingleState { turns, q, v, tau: &[] });
+        kinetic_energy_as_placed(&self.compiled, &self.sweep, v)
     }
 
-    /// Writes `q̈` without any force to `qdd`, and returns the kinetic energy, J. Afterwards the maps need a
-    /// [`refresh`](Self::refresh).
-    pub(in crate::articulated) fn free_acceleration(&mut self, q: &[f64], v: &[f64], qdd: &mut [f64]) -> f64 {
-        let kinetic = self.kinetic_energy(q, v);
-        qdd.fill(0.0);
-        let Dynamics { compiled, sweep, joint_sin_cos, .. } = self;
-        let tau = std::mem::take(&mut self.no_force);
-        let turns = joint_sin_cos.turns();
-        sweep.run_as_placed(compiled, &Vec3::zeros(), &SingleState { turns, q, v, tau: &tau }, |k, x| qdd[k] = x);
-        self.no_force = tau;
+    /// Writes `q̈` without any force to `qdd`. Afterwards the maps need a [`refresh`](Self::refresh).
+    pub(in crate::articulated) fn free_acceleration(&mut self, q: &[f64], v: &[f64], qdd: &mut [f64]) {
+        let Dynamics { compiled, sweep, joint_sin_cos, no_force, .. } = self;
+        let turns = joint_sin_cos.take(q);
+        sweep.run(compiled, &Vec3::zeros(), &SingleState { turns, q, v, tau: no_force }, |k, x| qdd[k] = x);
+    }
+
+    /// [`free_acceleration`](Self::free_acceleration), and returns the kinetic energy, J.
+    pub(in crate::articulated) fn free_acceleration_and_energy(
+        &mut self,
+        q: &[f64],
+        v: &[f64],
+        qdd: &mut [f64],
+    ) -> f64 {
+        let Dynamics { compiled, sweep, joint_sin_cos, no_force, .. } = self;
+        let state = SingleState { turns: joint_sin_cos.take(q), q, v, tau: no_force };
+        sweep.place::<true>(compiled, &state);
+        let kinetic = kinetic_energy_as_placed(compiled, sweep, v);
+        sweep.run_as_placed(compiled, &Vec3::zeros(), &state, |k, x| qdd[k] = x);
         kinetic
-    }
-
-    /// Returns the kinetic energy of the links as they are placed, before inertias are swept inward.
-    fn kinetic_energy_as_placed(&self, v: &[f64]) -> f64 {
-        let of_link = |(body, slot): (&CompiledLink, &Slot<f64>)| {
-            let (omega, velocity) = (slot.angular, slot.linear);
-            let h = slot.rotation.of_constant(&body.moment);
-            let spin = 0.5 * omega.dot(slot.inertia.rotational * omega);
-            let rotor = if body.armature > 0.0 { 0.5 * body.armature * v[body.v] * v[body.v] } else { 0.0 };
-            spin + 0.5 * body.mass * velocity.dot(velocity) + velocity.dot(omega.cross(h)) + rotor
-        };
-        self.compiled.bodies.iter().zip(&self.sweep.slots[1..]).map(of_link).sum()
     }
 
     /// Returns the first link whose joint meets no inertia at the refreshed state, as in gimbal
@@ -252,6 +249,18 @@ impl Dynamics {
             s.motions[i + 1] = carried(body, &self.sweep.slots[i + 1], s.motions[body.parent], v);
         }
     }
+}
+
+/// Returns the kinetic energy of the links as they are placed, before inertias are swept inward.
+fn kinetic_energy_as_placed(compiled: &Compiled, sweep: &Sweep<f64>, v: &[f64]) -> f64 {
+    let of_link = |(body, slot): (&CompiledLink, &Slot<f64>)| {
+        let (omega, velocity) = (slot.angular, slot.linear);
+        let h = slot.rotation.of_constant(&body.moment);
+        let spin = 0.5 * omega.dot(slot.inertia.rotational * omega);
+        let rotor = if body.armature > 0.0 { 0.5 * body.armature * v[body.v] * v[body.v] } else { 0.0 };
+        spin + 0.5 * body.mass * velocity.dot(velocity) + velocity.dot(omega.cross(h)) + rotor
+    };
+    compiled.bodies.iter().zip(&sweep.slots[1..]).map(of_link).sum()
 }
 
 /// Returns `V = X Vₚ + S v` of a link.

@@ -61,9 +61,12 @@ impl FreeMotion {
         let mut energy = 0.0;
         for s in 0..4 {
             let (q, v) = self.stage.split_at(n);
-            let kinetic = self.dynamics.free_acceleration(q, v, &mut self.a[s]);
+            if s == 0 {
+                energy = self.dynamics.free_acceleration_and_energy(q, v, &mut self.a[s]);
+            } else {
+                self.dynamics.free_acceleration(q, v, &mut self.a[s]);
+            }
             self.v[s].copy_from_slice(v);
-            energy = if s == 0 { kinetic } else { energy };
             match s {
                 0 | 1 => {
                     self.stage.copy_from_slice(&self.start);

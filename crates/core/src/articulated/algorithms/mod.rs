@@ -1,8 +1,9 @@
 //! Dynamics of a tree of links, one algorithm per file: kinematics, the articulated-body method and
-//! what its factors give, the mass matrix and inverse dynamics.
+//! what its factors give, the mass matrix, inverse dynamics and derivatives.
 
 pub(in crate::articulated) mod abm;
 pub(in crate::articulated) mod crba;
+pub(in crate::articulated) mod derivatives;
 pub(in crate::articulated) mod dynamics;
 pub(in crate::articulated) mod energy;
 pub(in crate::articulated) mod factor;

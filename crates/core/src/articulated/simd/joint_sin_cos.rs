@@ -22,11 +22,6 @@ impl JointSinCos {
         JointSinCos { revolute_joints: revolute_joints.collect(), turns: vec![(0.0, 1.0); compiled.bodies.len()] }
     }
 
-    /// Returns those of the last [`take`](Self::take).
-    pub fn turns(&self) -> &[(f64, f64)] {
-        &self.turns
-    }
-
     /// Computes and returns all sines and cosines for the positions `q`.
     #[inline(always)]
     pub fn take(&mut self, q: &[f64]) -> &[(f64, f64)] {

@@ -42,13 +42,7 @@ impl Factor {
     /// whether all diagonal blocks are regular.
     pub fn factor(&mut self, s: &Structure, island: &Island, gains: &[M3]) -> bool {
         // with the widest registers of the processor and without fused operations: the same bits on all
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                self.assemble(s, island, gains);
-                (0..s.order.len()).all(|j| self.eliminate(s, j))
-            },
-        )
+        pulp::Arch::new().dispatch(Factorization { factor: self, structure: s, island, gains })
     }
 
     #[inline(always)]
@@ -163,14 +157,60 @@ impl Factor {
     }
 }
 
+/// A call of [`Factor::factor`] that is compiled for the instruction set of its caller. A Rust closure would not be:
+/// its call is a function of its own.
+struct Factorization<'f, 's> {
+    factor: &'f mut Factor,
+    structure: &'s Structure,
+    island: &'s Island<'s>,
+    gains: &'s [M3],
+}
+
+impl pulp::NullaryFnOnce for Factorization<'_, '_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn call(self) -> bool {
+        let Factorization { factor, structure, island, gains } = self;
+        factor.assemble(structure, island, gains);
+        for j in 0..structure.order.len() {
+            if !factor.eliminate(structure, j) {
+                return false;
+            }
+        }
+        true
+    }
+}
+
 fn copy(to: &mut Vec<f64>, from: &[f64]) {
     to.clear();
     to.extend_from_slice(from);
 }
 
+/// `to += scale·from`, eight numbers at a time, then four: a loop over the numbers would use wide registers for
+/// long arrays only.
 #[inline(always)]
 fn add(to: &mut [f64], scale: f64, from: &[f64]) {
-    to.iter_mut().zip(from).for_each(|(to, from)| *to += scale * from);
+    let ((to, to_rest), (from, from_rest)) = (to.as_chunks_mut::<8>(), from.as_chunks::<8>());
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = sum_of(*to, scale, *from);
+    }
+    let ((to, to_rest), (from, from_rest)) = (to_rest.as_chunks_mut::<4>(), from_rest.as_chunks::<4>());
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = sum_of(*to, scale, *from);
+    }
+    for (to, from) in to_rest.iter_mut().zip(from_rest) {
+        *to += scale * from;
+    }
+}
+
+/// Returns `to + scale·from`. The arguments are values, so the compiler knows that they do not overlap.
+#[inline(always)]
+fn sum_of<const N: usize>(mut to: [f64; N], scale: f64, from: [f64; N]) -> [f64; N] {
+    for k in 0..N {
+        to[k] += scale * from[k];
+    }
+    to
 }
 
 #[inline(always)]
@@ -178,10 +218,10 @@ fn sum(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// `matrix += y·rightᵀ`.
+/// `matrix += y·rightᵀ`. A row of a link has no response to the links of other branches.
 #[inline(always)]
 fn outer(matrix: &mut [f64], y: &[f64], right: &[f64]) {
-    for (row, y) in matrix.chunks_exact_mut(right.len()).zip(y) {
+    for (row, y) in matrix.chunks_exact_mut(right.len()).zip(y).filter(|(_, y)| **y != 0.0) {
         add(row, *y, right);
     }
 }
@@ -209,21 +249,29 @@ fn subtract(c: &mut [f64], a: &[f64], b: &[f64], [rows, inner, columns]: [usize;
         for i in 0..6 {
             let mut sum = [0.0; 6];
             for k in 0..6 {
-                (0..6).for_each(|j| sum[j] += a[6 * i + k] * b[6 * k + j]);
+                for j in 0..6 {
+                    sum[j] += a[6 * i + k] * b[6 * k + j];
+                }
             }
-            (0..6).for_each(|j| c[6 * i + j] -= sum[j]);
+            for j in 0..6 {
+                c[6 * i + j] -= sum[j];
+            }
         }
         return;
     }
     for (c, a) in c.chunks_exact_mut(columns).zip(a.chunks_exact(inner)) {
-        a.iter().zip(b.chunks_exact(columns)).for_each(|(a, b)| add(c, -a, b));
+        for (a, b) in a.iter().zip(b.chunks_exact(columns)) {
+            add(c, -a, b);
+        }
     }
 }
 
 /// Inverts a matrix of size `n` in place by Gauss–Jordan elimination with row exchanges. Returns
 /// whether it is regular.
+#[inline(always)]
 fn invert(m: &mut [f64], n: usize, scratch: &mut Vec<f64>) -> bool {
     let width = 2 * n;
+    let mut exchanged = false;
     scratch.clear();
     scratch.resize(n * width, 0.0);
     for (i, row) in scratch.chunks_exact_mut(width).enumerate() {
@@ -238,9 +286,12 @@ fn invert(m: &mut [f64], n: usize, scratch: &mut Vec<f64>) -> bool {
             return false;
         }
         if pivot != column {
+            exchanged = true;
             (0..width).for_each(|k| scratch.swap(pivot * width + k, column * width + k));
         }
-        scratch[column * width..(column + 1) * width].iter_mut().for_each(|x| *x /= value);
+        // columns before this one are done; without exchanges the inverse is still the identity after it
+        let open = column..if exchanged { width } else { n + column + 1 };
+        scratch[column * width..(column + 1) * width][open.clone()].iter_mut().for_each(|x| *x /= value);
         for row in (0..n).filter(|row| *row != column) {
             let factor = scratch[row * width + column];
             let (from, to) = if row < column {
@@ -250,7 +301,7 @@ fn invert(m: &mut [f64], n: usize, scratch: &mut Vec<f64>) -> bool {
                 let (head, tail) = scratch.split_at_mut(row * width);
                 (&head[column * width..(column + 1) * width], &mut tail[..width])
             };
-            add(to, -factor, from);
+            add(&mut to[open.clone()], -factor, &from[open.clone()]);
         }
     }
     for (i, row) in scratch.chunks_exact(width).enumerate() {

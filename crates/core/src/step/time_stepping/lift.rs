@@ -60,6 +60,12 @@ pub(super) fn pay_for_lift(at: Coordinates, work: &mut Workspace, step: &Step) {
     }
     let contacts = work.contact_constraints.len();
     let Workspace { rows, islands, bias, targets, .. } = work;
+    let mut du = vec![0.0; step.moved.len()];
+    let strikes =
+        |&b: &u32| !step.keep[b as usize] || rows.blocks[b as usize].range().any(|row| step.impact[row] != 0.0);
+    if !(0..rows.blocks.len() as u32).any(|b| strikes(&b)) {
+        return push(at, &du, &mut Vec::new());
+    }
     let acts = |b: usize| {
         let block = &rows.blocks[b];
         b >= contacts
@@ -68,15 +74,12 @@ pub(super) fn pay_for_lift(at: Coordinates, work: &mut Workspace, step: &Step) {
             || coordinates(block).any(|i| step.moved[i] != 0.0)
     };
     islands.build(rows, acts);
-    let mut du = vec![0.0; step.moved.len()];
     for blocks in islands.iter() {
         let mut places: Vec<usize> = blocks.iter().flat_map(|&b| coordinates(&rows.blocks[b as usize])).collect();
         places.sort_unstable();
         places.dedup();
         let sum = |of: &dyn Fn(usize) -> f64| places.iter().map(|&i| of(i)).sum::<f64>();
         let lift = -sum(&|i| step.du_force[i] * step.moved[i]);
-        let strikes =
-            |&b: &u32| !step.keep[b as usize] || rows.blocks[b as usize].range().any(|row| step.impact[row] != 0.0);
         if lift <= 0.0 || !blocks.iter().any(strikes) {
             continue;
         }
