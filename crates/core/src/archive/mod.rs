@@ -64,8 +64,9 @@ pub enum ArchiveError {
     /// A value cannot be written, such as a path that is not UTF-8.
     #[error("the world cannot be written: {0}")]
     Unwritable(String),
-    /// An object of a user-defined type that the caller does not write, or does not make.
-    #[error("'{0}' is an object of a user-defined type, and the caller gave nothing to write or to make it")]
+    /// An object of a user-defined type, or with an intersection test of one, that the caller does not write, or does not
+    /// make.
+    #[error("'{0}' is, or has a test of, a user-defined type, and the caller gave nothing to write or to make it")]
     Foreign(String),
     /// A stepper of a user-defined type, or of another version of tumble: its name.
     #[error(
@@ -127,7 +128,8 @@ enum Record {
 impl World {
     /// Returns the whole world as bytes: objects with their shapes, settings, stepper, solver and
     /// state. `foreign` are the objects of user-defined types that the caller of
-    /// [`from_archive`](World::from_archive) makes itself.
+    /// [`from_archive`](World::from_archive) makes itself, and the rigid bodies with an intersection test of their own,
+    /// which it sets again.
     ///
     /// # Errors
     /// [`ArchiveError::Foreign`] for an object of a user-defined type that is not among `foreign`;
@@ -146,6 +148,9 @@ impl World {
             .collect::<Vec<NamedRecord>>();
         let unknown = self.ids().iter().zip(&objects).find_map(|(id, object)| match object.record {
             Record::Foreign if !foreign.contains(id) => Some(object.name.clone()),
+            Record::Rigid(_) if !foreign.contains(id) && has_test(self.get::<RigidBody>(*id)) => {
+                Some(object.name.clone())
+            }
             _ => None,
         });
         if let Some(name) = unknown {
@@ -254,6 +259,10 @@ fn stepper(name: &str) -> Result<Box<dyn Stepper>, ArchiveError> {
 
 fn solver(name: &str) -> Result<Box<dyn RowSolver>, ArchiveError> {
     solver::by_name(name).ok_or_else(|| ArchiveError::Solver(name.into()))
+}
+
+fn has_test(body: Option<&RigidBody>) -> bool {
+    body.is_some_and(|body| body.intersect().is_some())
 }
 
 fn record(object: &dyn Object, tables: &mut Tables, indices: &ObjectIndices) -> Record {

@@ -1,4 +1,4 @@
-//! Forces and behaviors written in Python (the thesis's extensibility, §IV.A.2).
+//! Forces, behaviors and callables written in Python (the thesis's extensibility, §IV.A.2).
 //!
 //! A force is an object of the world, like one written in Rust: it is evaluated in every stage of
 //! every integrator. A behavior is called once before each frame, and its forces act during that
@@ -8,6 +8,7 @@
 
 use crate::errors::{Error, Result};
 use crate::extension::columns::Arrays;
+use crate::extension::intersect::PythonTest;
 use crate::extension::layout::Layout;
 use crate::extension::view::View;
 use crate::world::gc::Callable;
@@ -15,10 +16,10 @@ use crate::world::inner::Inner;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::{Arc, Mutex, MutexGuard};
-use tumble::dynamics::{ForceGenerator, Forces, Mode, Object, ObjectId, StateRange, WorldView, Wrench};
+use tumble::dynamics::{ForceGenerator, Forces, Mode, Object, ObjectId, StateRange, World, WorldView, Wrench};
 
 /// A Python object that is called, the layout of its rows, and its pending exception.
-struct Code {
+pub struct Code {
     name: String,
     object: Callable,
     layout: Mutex<Option<Arc<Layout>>>,
@@ -38,6 +39,12 @@ impl Code {
 
     fn of(name: &str, object: Callable) -> Code {
         Code { name: name.into(), object, layout: Mutex::default(), arrays: Mutex::default(), raised: Mutex::default() }
+    }
+
+    /// Returns the copy of a callable for a fork of the world: of the object's own `fork` if it has one.
+    fn fork_callable(&self) -> Code {
+        let has_fork = Python::attach(|py| self.object.bind(py).hasattr("fork").unwrap_or(false));
+        if has_fork { self.fork("__call__") } else { Code::of(&self.name, self.object.clone()) }
     }
 
     /// Returns the copy for a fork of the world, from the object's own `fork`. An exception there
@@ -67,6 +74,11 @@ impl Code {
         }
     }
 
+    /// Returns the Python object.
+    pub fn object<'py>(&self, py: Python<'py>) -> &Bound<'py, PyAny> {
+        self.object.bind(py)
+    }
+
     /// Calls a method with a view. `each` receives the added forces by part.
     fn call(
         &self,
@@ -75,6 +87,33 @@ impl Code {
         rows: Option<&[i64]>,
         mut each: impl FnMut(usize, Wrench),
     ) -> Result<()> {
+        let called = |py: Python<'_>, view: &Bound<'_, View>| {
+            let object = self.object.bind(py);
+            let returned = match rows {
+                Some(rows) => object.call_method1(method, (view, numpy::PyArray1::from_slice(py, rows))),
+                None => object.call_method1(method, (view,)),
+            };
+            match returned?.is_none() {
+                true => Ok(()),
+                false => Err(Error::value(format!(
+                    "'{}': `{method}` must return None; add what it does to view.force and view.torque",
+                    self.name
+                ))),
+            }
+        };
+        self.viewed(world, called, |part_index, wrench| {
+            each(part_index, wrench);
+            Ok(())
+        })
+    }
+
+    /// Makes a call with a view. `each` receives the added forces by part.
+    pub fn viewed<T>(
+        &self,
+        world: &WorldView,
+        call: impl FnOnce(Python<'_>, &Bound<'_, View>) -> Result<T>,
+        mut each: impl FnMut(usize, Wrench) -> Result<()>,
+    ) -> Result<T> {
         let layout = self.layout(world);
         Python::attach(|py| {
             let arrays = match lock(&self.arrays).take().filter(|arrays| arrays.free(py, layout.len())) {
@@ -83,25 +122,18 @@ impl Code {
             };
             arrays.fill(py, &layout.shown(world.part_states))?;
             let view = Bound::new(py, View::new(world, &layout, &arrays))?;
-            let object = self.object.bind(py);
-            let outcome = match rows {
-                Some(rows) => object.call_method1(method, (&view, numpy::PyArray1::from_slice(py, rows))),
-                None => object.call_method1(method, (&view,)),
-            };
+            let outcome = call(py, &view);
             view.get().end();
             drop(view);
-            if !outcome?.is_none() {
-                return Err(Error::value(format!(
-                    "'{}': `{method}` must return None; add what it does to view.force and view.torque",
-                    self.name
-                )));
-            }
+            let outcome = outcome?;
+            let mut wrong = Ok(());
             arrays.take(py, &layout, &self.name, |row, wrench| {
                 let (part_index, wrench) = layout.at_part(row, world.part_states, wrench);
-                each(part_index, wrench);
+                wrong = std::mem::replace(&mut wrong, Ok(())).and_then(|()| each(part_index, wrench));
             })?;
+            wrong?;
             *lock(&self.arrays) = Some(arrays);
-            Ok(())
+            Ok(outcome)
         })
     }
 }
@@ -150,8 +182,11 @@ pub fn empty_force(name: &str) -> Box<dyn Object> {
     Box::new(PythonForce { code: Code::of(name, nobody) })
 }
 
-/// Names and objects of forces; names, objects and bodies of behaviors.
-pub type Extensions = (Vec<(String, Py<PyAny>)>, Vec<(String, Py<PyAny>, Vec<String>)>);
+/// Python objects by the name of the object of the world that calls them.
+type Named = Vec<(String, Py<PyAny>)>;
+
+/// Names and objects of forces; names, objects and bodies of behaviors; callables of events; intersection tests of bodies.
+pub type Extensions = (Named, Vec<(String, Py<PyAny>, Vec<String>)>, Named, Named);
 
 /// The result of `__reduce__`: the function that makes the world, its arguments, and the state for
 /// `__setstate__`.
@@ -163,23 +198,59 @@ struct Attached {
     bodies: Vec<ObjectId>,
 }
 
-/// The forces and behaviors of one world.
+/// A callable of an event.
+struct Called {
+    event: ObjectId,
+    code: Code,
+}
+
+/// The intersection test of a body.
+struct Tested {
+    body: ObjectId,
+    test: Arc<PythonTest>,
+}
+
+/// The callbacks of Python in one world: its forces and behaviors, the callables of events, and the intersection tests of bodies.
 #[derive(Default)]
 pub struct Extension {
     forces: Vec<ObjectId>,
     behaviors: Vec<Attached>,
+    calls: Vec<Called>,
+    tests: Vec<Tested>,
 }
 
 impl Extension {
     /// Returns whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.forces.is_empty() && self.behaviors.is_empty()
+        self.forces.is_empty() && self.behaviors.is_empty() && self.calls.is_empty() && self.tests.is_empty()
     }
 
-    /// Returns the copy for a fork of the world.
-    pub fn fork(&self) -> Extension {
+    /// Returns the copy for a fork of the world, whose bodies get tests of their own.
+    pub fn fork(&self, world: &mut World) -> Extension {
         let attached = |a: &Attached| Attached { code: a.code.fork("act"), bodies: a.bodies.clone() };
-        Extension { forces: self.forces.clone(), behaviors: self.behaviors.iter().map(attached).collect() }
+        let called = |c: &Called| Called { event: c.event, code: c.code.fork_callable() };
+        let mut fork = Extension {
+            forces: self.forces.clone(),
+            behaviors: self.behaviors.iter().map(attached).collect(),
+            calls: self.calls.iter().map(called).collect(),
+            tests: Vec::new(),
+        };
+        self.tests.iter().for_each(|tested| fork.set_test(world, tested.body, tested.test.object.clone()));
+        fork
+    }
+
+    /// Gives a body of a world an intersection test.
+    fn set_test(&mut self, world: &mut World, body: ObjectId, object: Callable) {
+        let test = Arc::new(PythonTest::new(object));
+        if world.set_intersect(body, Some(test.clone())).is_ok() {
+            self.tests.push(Tested { body, test });
+        }
+    }
+
+    /// Drops what belongs to a removed object.
+    pub fn forget(&mut self, id: ObjectId) {
+        self.calls.retain(|called| called.event != id);
+        self.tests.retain(|tested| tested.body != id);
     }
 }
 
@@ -189,15 +260,42 @@ impl Inner {
         let forces =
             self.extension.forces.iter().filter_map(|&id| self.world.get::<PythonForce>(id)).map(|force| &force.code);
         let codes = forces.chain(self.extension.behaviors.iter().map(|b| &b.code));
-        let mut raised: Vec<PyErr> = codes.filter_map(|code| lock(&code.raised).take()).collect();
+        let codes = codes.chain(self.extension.calls.iter().map(|called| &called.code));
+        let tests = self.extension.tests.iter().filter_map(|tested| tested.test.take_raised());
+        let mut raised: Vec<PyErr> = codes.filter_map(|code| lock(&code.raised).take()).chain(tests).collect();
         if raised.is_empty() { Ok(()) } else { Err(raised.swap_remove(0).into()) }
     }
 
-    /// Runs one frame with behaviors before it and forces in it.
+    /// Runs one frame with behaviors before it, forces and tests in it, and callables of events after it.
     pub fn extended_frame(&mut self) -> Result<()> {
         self.behave()?;
         let outcome = self.frame();
-        self.take_raised().and(outcome)
+        self.take_raised().and(outcome)?;
+        self.call_back()?;
+        self.take_raised()
+    }
+
+    /// Adds callables of an event.
+    pub fn add_calls(&mut self, event: ObjectId, callables: &[Bound<'_, PyAny>]) {
+        let name = self.world.name(event).unwrap_or_default().to_string();
+        let called = callables.iter().map(|object| Called { event, code: Code::new(&name, object) });
+        self.extension.calls.extend(called);
+    }
+
+    /// Returns the numbers of the callables of an event.
+    pub fn calls_of(&self, event: ObjectId) -> Vec<usize> {
+        let calls = self.extension.calls.iter().enumerate();
+        calls.filter(|(_, called)| called.event == event).map(|(k, _)| k).collect()
+    }
+
+    /// Returns a callable by its number.
+    pub fn call(&self, number: usize) -> &Code {
+        &self.extension.calls[number].code
+    }
+
+    /// Gives a body an intersection test; it must have `contacts`.
+    pub fn add_test(&mut self, body: ObjectId, object: &Bound<'_, PyAny>) {
+        self.extension.set_test(&mut self.world, body, Arc::new(object.clone().unbind()));
     }
 
     fn behave(&mut self) -> Result<()> {
@@ -268,7 +366,15 @@ impl Inner {
     pub fn callables(&self) -> Vec<Callable> {
         let forces =
             self.extension.forces.iter().filter_map(|&id| self.world.get::<PythonForce>(id)).map(|force| &force.code);
-        forces.chain(self.extension.behaviors.iter().map(|b| &b.code)).map(|code| code.object.clone()).collect()
+        let codes = forces.chain(self.extension.behaviors.iter().map(|b| &b.code));
+        let codes = codes.chain(self.extension.calls.iter().map(|called| &called.code));
+        let tests = self.extension.tests.iter().map(|tested| tested.test.object.clone());
+        codes.map(|code| code.object.clone()).chain(tests).collect()
+    }
+
+    /// Returns the objects that an archive writes without what Python adds to them.
+    pub fn foreign(&self) -> Vec<ObjectId> {
+        self.extension.forces.iter().copied().chain(self.extension.tests.iter().map(|tested| tested.body)).collect()
     }
 
     /// Returns the objects of the world that are forces written in Python.
@@ -289,11 +395,26 @@ impl Inner {
             (b.code.name.clone(), b.code.object.clone_ref(py), b.bodies.iter().filter_map(name).collect())
         };
         let behaviors = self.extension.behaviors.iter().map(of).collect();
-        (!self.extension.is_empty()).then_some((forces, behaviors))
+        let calls = self.extension.calls.iter().map(|c| (c.code.name.clone(), c.code.object.clone_ref(py))).collect();
+        let tests = self.extension.tests.iter();
+        let tests = tests.filter_map(|t| Some((name(&t.body)?, t.test.object.clone_ref(py)))).collect();
+        (!self.extension.is_empty()).then_some((forces, behaviors, calls, tests))
     }
 
     /// Sets the objects of restored forces and adds behaviors.
-    pub fn unpickle_extensions(&mut self, py: Python<'_>, (forces, behaviors): Extensions) -> Result<()> {
+    pub fn unpickle_extensions(&mut self, py: Python<'_>, extensions: Extensions) -> Result<()> {
+        let (forces, behaviors, calls, tests) = extensions;
+        let find = |world: &World, name: &str| {
+            world.find(name).ok_or_else(|| Error::value(format!("the pickled world has no object '{name}'")))
+        };
+        for (name, object) in calls {
+            let event = find(&self.world, &name)?;
+            self.add_calls(event, &[object.into_bound(py)]);
+        }
+        for (name, object) in tests {
+            let body = find(&self.world, &name)?;
+            self.add_test(body, object.bind(py));
+        }
         for (name, object) in forces {
             let id = self.world.find(&name).filter(|id| self.extension.forces.contains(id));
             let force = id.and_then(|id| self.world.get_mut::<PythonForce>(id));
@@ -310,9 +431,12 @@ impl Inner {
 
     /// Removes all forces and behaviors and returns them for the caller to drop.
     pub fn take_extension(&mut self) -> impl Send + use<> {
-        let Extension { forces, behaviors } = std::mem::take(&mut self.extension);
+        let Extension { forces, behaviors, calls, tests } = std::mem::take(&mut self.extension);
+        for tested in &tests {
+            let _ = self.world.set_intersect(tested.body, None); // an error is a body that was removed
+        }
         let forces: Vec<Option<Box<dyn Object>>> = forces.into_iter().map(|id| self.world.remove(id).ok()).collect();
-        (forces, behaviors)
+        (forces, behaviors, calls, tests)
     }
 
     /// Returns names and objects of the forces, then of the behaviors, in the order of addition.
