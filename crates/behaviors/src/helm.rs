@@ -26,10 +26,12 @@
 
 use crate::error::{BehaviorError, check};
 use crate::fields::check_vector;
+use crate::record;
 use crate::steering::{Flyer, Search, Steering};
 use nalgebra::Unit;
 use std::f64::consts::FRAC_PI_2;
 use tumble_collide::{Mat3, Quat, Vec3};
+use tumble_core::archive::{ObjectIndices, ObjectRecord};
 use tumble_core::{ForceGenerator, Forces, Object, ObjectId, PartState, RigidBody, StateRange, WorldView};
 
 /// Speed below which a body has no course, m/s.
@@ -38,7 +40,7 @@ const SLOWEST: f64 = 1e-3;
 const PIECE: usize = 64;
 
 /// How a body turns to its course.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Helm {
     /// Rate at which the orientation approaches the wanted one, 1/s, at least 0.
     pub agility: f64,
@@ -76,7 +78,7 @@ pub struct BodyFlock {
     name: String,
     steering: Steering,
     helm: Helm,
-    search: Search,
+    pub(crate) search: Search,
     bodies: Vec<ObjectId>,
 }
 
@@ -181,6 +183,9 @@ fn across(axis: &Vec3) -> Vec3 {
 }
 
 impl Object for BodyFlock {
+    fn record(&self, indices: &ObjectIndices) -> Option<ObjectRecord> {
+        record::body_flock(self, indices)
+    }
     fn name(&self) -> &str {
         &self.name
     }

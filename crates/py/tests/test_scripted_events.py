@@ -234,3 +234,30 @@ def test_wrong_arguments():
         Action.camera("scene", eye=(0, 0, 1))
     ball.velocity = (1, 0, 0)
     world.step()
+
+
+def test_a_recording_with_spawned_bodies_is_replayed(tmp_path):
+    def made():
+        world = tumble.World(dt=STEP)
+        world.add_static("floor", tumble.HalfSpace())
+        ball = world.add_template("ball", tumble.Sphere(0.1), 4, mass=1, reuse=True)
+        world.add_event("drop", Trigger.every(0.1, first=0.05), [Action.spawn(ball, (0, 0, 0.3), velocity=(1, 0, 0))])
+        world.add_event("hit", Trigger.contact("floor", ball), [Action.recolor("other", (1, 0, 0))])
+        return world
+
+    world, path = made(), tmp_path / "run.mcap"
+    states = []
+    with tumble.Recorder(path) as recorder:
+        for _ in range(120):
+            world.step()
+            recorder.frame(world)
+            states.append(world.state.copy())
+    replayed = 0
+    for shown, state in zip(tumble.replay(path, made()), states):
+        assert (shown.state == state).all()
+        if shown.frame == 60:
+            fork = shown.fork()
+            fork.step(60)
+            assert (fork.state == world.state).all()
+        replayed += 1
+    assert replayed == 120 and world["ball"].spawned == 5 and world["hit"].fired >= 2

@@ -68,6 +68,13 @@ impl World {
         Ok(())
     }
 
+    /// Replaces an object by one with the same state, by its place in the order of objects.
+    pub(crate) fn replace_object(&mut self, order: usize, object: Box<dyn Object>) {
+        if let Some(place) = self.ids().get(order).and_then(|id| self.core.table.place(*id)) {
+            self.core.table.placed[place].object = object;
+        }
+    }
+
     /// Sets or removes the intersection test of a rigid body's own, without waking it.
     ///
     /// # Errors

@@ -2,12 +2,13 @@
 
 use crate::arrays::convert::{array, quaternion, some, vector};
 use crate::errors::{Error, Result};
+use crate::extension::code::lock;
 use crate::objects::shapes::Shape;
 use crate::world::gc::Callable;
 use crate::world::pickling::ShapeRecord;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use std::sync::{Mutex, MutexGuard};
+use std::sync::Mutex;
 use tumble::collide::{Contact, NormalFrom, Pose, Vec3};
 use tumble::dynamics::{Intersect, IntersectPart, Object};
 
@@ -15,10 +16,6 @@ use tumble::dynamics::{Intersect, IntersectPart, Object};
 pub struct PythonTest {
     pub object: Callable,
     raised: Mutex<Option<PyErr>>,
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
 impl PythonTest {

@@ -89,9 +89,13 @@ pub fn model(inner: &Inner) -> Result<Vec<u8>> {
 pub fn read(bytes: &[u8]) -> Result<Inner> {
     let record: Record = open(WORLD, bytes)?;
     let mut forces = Vec::new();
-    let world = Core::from_archive(&record.archive, &mut |name| {
-        forces.push(name.to_string());
-        Some(crate::extension::callbacks::empty_force(name))
+    let world = Core::from_archive(&record.archive, &mut |object| {
+        tumble::behaviors::read_object(object).or_else(|| {
+            object.record.is_none().then(|| {
+                forces.push(object.name.to_string());
+                crate::extension::callbacks::empty_force(object.name)
+            })
+        })
     })?;
     let ids: Vec<ObjectId> = world.ids().to_vec();
     let mut inner = Inner::new(world, Arc::new(record.scene.scene()?));
