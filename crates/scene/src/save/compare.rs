@@ -107,7 +107,7 @@ impl Comparison<'_> {
                         let indices = indices.as_array().into_iter().flatten().filter_map(Value::as_u64);
                         indices.map(|index| list[index as usize].clone()).collect()
                     };
-                    self.compare(&path, &list(&self.shapes[0], ours), &list(&self.shapes[1], read));
+                    self.compare(&path, &list(self.shapes[0], ours), &list(self.shapes[1], read));
                 }
                 "colliders" => self.compare(&path, &sorted(ours, "link"), &sorted(read, "link")),
                 "couplings" => self.compare(&path, &sorted(ours, "dof"), &sorted(read, "dof")),

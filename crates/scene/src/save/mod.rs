@@ -241,9 +241,11 @@ impl Writer<'_> {
             self.event(name, event);
         } else if let Some(sensor) = any.downcast_ref::<Sensor>() {
             self.sensor(name, sensor);
-        } else if any.is::<RigidBody>() || any.is::<ArticulatedBody>() || any.is::<LoopJoint>() {
-            return;
-        } else if self.behavior(id, name) {
+        } else if any.is::<RigidBody>()
+            || any.is::<ArticulatedBody>()
+            || any.is::<LoopJoint>()
+            || self.behavior(id, name)
+        {
             return;
         } else {
             return self.fault(format!("\"{name}\", an object of a type of its own"));
