@@ -95,7 +95,10 @@ impl PyBodyFlock {
         }
         self.change(py, |flock| match flock.bodies().contains(&place.id) {
             true => Err(Error::value(format!("'{}' is in the flock", place.name))),
-            false => Ok(flock.push(place.id)),
+            false => {
+                flock.push(place.id);
+                Ok(())
+            }
         })
     }
 
