@@ -1,5 +1,6 @@
 //! NetSync from outside.
 
+mod events;
 mod faults;
 mod hostile;
 mod links;
