@@ -47,6 +47,7 @@ SCENES = {
     "cloth": (0, 3.0),
     "jelly": (0, 1.5),
     "ball_machine": (0.5, 6.0),
+    "bird": (3.0, 1.0),
 }
 
 

@@ -32,8 +32,10 @@
 //! changes its orientation.
 
 use crate::error::{BehaviorError, check};
+use crate::record;
 use std::f64::consts::FRAC_PI_2;
 use tumble_collide::{Pose, Quat, Shape, Vec3};
+use tumble_core::archive::{ObjectIndices, ObjectRecord};
 use tumble_core::{
     Cache, Collidable, Energy, ForceSlice, Forces, Integratable, Material, Object, PartPoint, PartState, Renderable,
     StateRange, StateSizes, Visual, WorldView,
@@ -48,16 +50,25 @@ const GYRATION: f64 = 0.1;
 #[derive(Clone, Debug)]
 pub struct Boid {
     name: String,
-    shape: Shape,
-    mass: f64,
-    material: Material,
-    visuals: Vec<Visual>,
-    start: [f64; 8],
-    bank_time: f64,
-    roll_time: f64,
+    pub(crate) shape: Shape,
+    pub(crate) mass: f64,
+    pub(crate) material: Material,
+    pub(crate) visuals: Vec<Visual>,
+    pub(crate) start: [f64; 8],
+    pub(crate) bank_time: f64,
+    pub(crate) roll_time: f64,
 }
 
 impl Boid {
+    /// Returns position, m, and velocity, m/s, at time 0.
+    pub fn start(&self) -> (Vec3, Vec3) {
+        (Vec3::from_column_slice(&self.start[..3]), Vec3::from_column_slice(&self.start[4..7]))
+    }
+    /// Returns `bank_time` and `roll_time`, s.
+    pub fn bank(&self) -> [f64; 2] {
+        [self.bank_time, self.roll_time]
+    }
+
     /// Makes a boid of a mass, kg, above 0, at rest at the origin.
     ///
     /// # Errors
@@ -138,6 +149,9 @@ impl Boid {
 }
 
 impl Object for Boid {
+    fn record(&self, _: &ObjectIndices) -> Option<ObjectRecord> {
+        record::boid(self)
+    }
     fn name(&self) -> &str {
         &self.name
     }

@@ -6,8 +6,10 @@
 
 use crate::boid::Boid;
 use crate::error::BehaviorError;
+use crate::record;
 use crate::steering::{Flyer, Search, Steering};
 use tumble_collide::Vec3;
+use tumble_core::archive::{ObjectIndices, ObjectRecord};
 use tumble_core::{ForceGenerator, Forces, Object, ObjectId, StateRange, World, WorldView};
 
 /// Least number of boids on a thread.
@@ -18,8 +20,8 @@ const PIECE: usize = 64;
 pub struct Flock {
     name: String,
     steering: Steering,
-    search: Search,
-    boids: Vec<ObjectId>,
+    pub(crate) search: Search,
+    pub(crate) boids: Vec<ObjectId>,
 }
 
 impl Flock {
@@ -79,6 +81,9 @@ impl Flock {
 }
 
 impl Object for Flock {
+    fn record(&self, indices: &ObjectIndices) -> Option<ObjectRecord> {
+        record::flock(self, indices)
+    }
     fn name(&self) -> &str {
         &self.name
     }

@@ -26,10 +26,12 @@
 
 use crate::error::{BehaviorError, check};
 use crate::fields::check_vector;
+use crate::record;
 use crate::steering::{Flyer, Search, Steering};
 use nalgebra::Unit;
 use std::f64::consts::FRAC_PI_2;
 use tumble_collide::{Mat3, Quat, Vec3};
+use tumble_core::archive::{ObjectIndices, ObjectRecord};
 use tumble_core::{ForceGenerator, Forces, Object, ObjectId, PartState, RigidBody, StateRange, WorldView};
 
 /// Speed below which a body has no course, m/s.
@@ -38,7 +40,7 @@ const SLOWEST: f64 = 1e-3;
 const PIECE: usize = 64;
 
 /// How a body turns to its course.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Helm {
     /// Rate at which the orientation approaches the wanted one, 1/s, at least 0.
     pub agility: f64,
@@ -76,7 +78,7 @@ pub struct BodyFlock {
     name: String,
     steering: Steering,
     helm: Helm,
-    search: Search,
+    pub(crate) search: Search,
     bodies: Vec<ObjectId>,
 }
 
@@ -87,12 +89,7 @@ impl BodyFlock {
     /// As [`Steering::validate`]; [`BehaviorError::Range`] names a constant of the helm that is out of its range.
     pub fn new(name: impl Into<String>, steering: Steering, helm: Helm) -> Result<BodyFlock, BehaviorError> {
         steering.validate()?;
-        check("agility", helm.agility, helm.agility >= 0.0, "at least 0")?;
-        let most = helm.max_angular_acceleration;
-        check("max_angular_acceleration", most, most >= 0.0, "at least 0")?;
-        check("bank_time", helm.bank_time, helm.bank_time >= 0.0, "at least 0")?;
-        check_vector("up", &helm.up)?;
-        check("the length of up", helm.up.norm(), helm.up.norm() > 0.0, "above 0")?;
+        helm.validate()?;
         Ok(BodyFlock { name: name.into(), steering, helm, search: Search::Grid, bodies: Vec::new() })
     }
     /// Sets how neighbors are found; the forces have the same bits.
@@ -110,6 +107,24 @@ impl BodyFlock {
         self.bodies.retain(|id| *id != body);
         self.bodies.len() < before
     }
+    /// Returns the constants of the forces.
+    pub fn steering(&self) -> &Steering {
+        &self.steering
+    }
+    /// Returns how bodies turn to their course.
+    pub fn helm(&self) -> &Helm {
+        &self.helm
+    }
+    /// Changes the constants from the next step on.
+    ///
+    /// # Errors
+    /// As [`new`](BodyFlock::new). The constants then stay as they are.
+    pub fn set_constants(&mut self, steering: Steering, helm: Helm) -> Result<(), BehaviorError> {
+        steering.validate()?;
+        helm.validate()?;
+        (self.steering, self.helm) = (steering, helm);
+        Ok(())
+    }
     /// Returns the ids of the bodies, in the order in which they were added. Those that are no enabled rigid bodies of the
     /// world are ignored.
     pub fn bodies(&self) -> &[ObjectId] {
@@ -118,6 +133,19 @@ impl BodyFlock {
 }
 
 impl Helm {
+    /// Checks all constants.
+    ///
+    /// # Errors
+    /// [`BehaviorError::Range`] names one that is out of its range.
+    pub fn validate(&self) -> Result<(), BehaviorError> {
+        check("agility", self.agility, self.agility >= 0.0, "at least 0")?;
+        let most = self.max_angular_acceleration;
+        check("max_angular_acceleration", most, most >= 0.0, "at least 0")?;
+        check("bank_time", self.bank_time, self.bank_time >= 0.0, "at least 0")?;
+        check_vector("up", &self.up)?;
+        check("the length of up", self.up.norm(), self.up.norm() > 0.0, "above 0")
+    }
+
     /// Returns the angular acceleration that a force calls for which accelerates the center of mass by `a`, m/s², at the velocity
     /// `v`, m/s; rad/s².
     pub fn angular_acceleration(&self, state: &PartState, v: &Vec3, a: &Vec3) -> Vec3 {
@@ -155,6 +183,9 @@ fn across(axis: &Vec3) -> Vec3 {
 }
 
 impl Object for BodyFlock {
+    fn record(&self, indices: &ObjectIndices) -> Option<ObjectRecord> {
+        record::body_flock(self, indices)
+    }
     fn name(&self) -> &str {
         &self.name
     }

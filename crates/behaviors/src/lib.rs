@@ -26,6 +26,7 @@ mod grid;
 mod helm;
 mod non_spinning;
 mod particles;
+mod record;
 mod sight;
 mod springs;
 mod steering;
@@ -39,7 +40,8 @@ pub use flock::Flock;
 pub use helm::{BodyFlock, Helm};
 pub use non_spinning::non_spinning;
 pub use particles::{Emitter, Particle, ParticleLook, ParticleSettings, ParticleSystem};
-pub use springs::{Cloth, Jelly, MeshSpring, SpringMesh};
+pub use record::{read_object, serialize_record};
+pub use springs::{Cloth, Grid, Jelly, MeshSpring, Origin, SpringMesh};
 pub use steering::{Flyer, Search, Steering};
 
 /// The tutorial, whose programs run as tests.

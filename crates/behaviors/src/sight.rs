@@ -54,6 +54,7 @@ impl Eye {
     }
 
     /// Returns how a boid sees others, `arm` away, m. Those at its own place have no direction and the weight 0.
+    #[inline(always)]
     pub fn sight(&self, arm: &[Lanes; 3], forward: &Vec3) -> Sight {
         let mut sight = Sight { weight: [0.0; LANES], nearness: [0.0; LANES] };
         for k in 0..LANES {

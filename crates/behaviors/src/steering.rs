@@ -42,7 +42,7 @@ use std::ops::Range;
 use tumble_collide::Vec3;
 
 /// Constants of a flock, SI units.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Steering {
     /// Coefficient of avoidance `Ka`, m²/s², at least 0.
     pub avoidance: f64,
@@ -107,7 +107,7 @@ pub struct Flyer {
 }
 
 /// A method of finding neighbors. Both give the same bits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Search {
     /// Boids of the same and of adjacent cells.
     #[default]
@@ -159,16 +159,22 @@ impl Steering {
     ) -> Vec<Vec3> {
         let grid = Grid::new(flyers.iter().map(|flyer| flyer.position), self.visibility_distance);
         let crowd = Crowd::new(flyers, grid.order().collect());
-        let eye = Eye::new(self);
+        let (eye, arch) = (Eye::new(self), pulp::Arch::new());
         let mut sorted = vec![Vec3::zeros(); flyers.len()];
         run(&mut sorted, &|first, forces: &mut [Vec3]| {
             let mut seen = vec![0; flyers.len()];
             let places = first..first + forces.len();
             let mut work = |own: Range<usize>, runs: &[Range<usize>]| {
-                for place in own {
-                    let near = crowd.within(place, eye.unseen, runs, &mut seen);
-                    forces[place - first] = self.force(&eye, &crowd, place, &near);
-                }
+                // the widest registers that there are: the same products and sums, so the same bits
+                arch.dispatch(
+                    #[inline(always)]
+                    || {
+                        for place in own {
+                            let near = crowd.within(place, eye.unseen, runs, &mut seen);
+                            forces[place - first] = self.force(&eye, &crowd, place, &near);
+                        }
+                    },
+                );
             };
             match search {
                 Search::Grid => grid.each_cell(places, work),
@@ -181,6 +187,7 @@ impl Steering {
     }
 
     /// Returns the force on the boid at a place.
+    #[inline(always)]
     fn force(&self, eye: &Eye, crowd: &Crowd, place: usize, near: &Near) -> Vec3 {
         let own = &crowd.flyers[crowd.order[place]];
         let mut sums = Sums::default();
@@ -264,6 +271,7 @@ impl<'a> Crowd<'a> {
 
     /// Finds the boids of `runs` within a squared distance (m²) of one, itself included. Their places are written to the
     /// front of `seen`, which is as long as the crowd.
+    #[inline(always)]
     fn within<'s>(&self, place: usize, squared: f64, runs: &[Range<usize>], seen: &'s mut [u32]) -> Near<'s> {
         let [x, y, z] = &self.positions;
         let (own_x, own_y, own_z) = (x[place], y[place], z[place]);

@@ -11,6 +11,7 @@ mod interrupt;
 mod io;
 mod objects;
 mod pool;
+mod script;
 mod world;
 
 use pyo3::prelude::*;
@@ -24,6 +25,8 @@ mod _native {
     use super::batch::class::Batch;
     #[pymodule_export]
     use super::batch::pickling::_unpickle_batch;
+    #[pymodule_export]
+    use super::behaviors::body_flock::PyBodyFlock;
     #[pymodule_export]
     use super::behaviors::field::{Field, Panel};
     #[pymodule_export]
@@ -40,6 +43,8 @@ mod _native {
     use super::faults::_panic;
     #[pymodule_export]
     use super::io::recording::{Recorder, read_recording, show_contacts};
+    #[pymodule_export]
+    use super::io::sound::Soundtrack;
     #[pymodule_export]
     use super::io::window::{_WindowFeed, _show_window};
     #[pymodule_export]
@@ -62,6 +67,12 @@ mod _native {
     use super::objects::spheretree::{_unpickle_tree, SphereTree};
     #[pymodule_export]
     use super::objects::terrain::{ConvexHull, HeightField, Terrain};
+    #[pymodule_export]
+    use super::script::action::Action;
+    #[pymodule_export]
+    use super::script::handles::{ScriptedEvent, Template};
+    #[pymodule_export]
+    use super::script::trigger::Trigger;
     #[pymodule_export]
     use super::world::class::World;
     #[pymodule_export]

@@ -1,5 +1,8 @@
 """Worlds written as scene files, and read back to the same bits."""
 
+import copy
+import pickle
+
 import pytest
 
 import tumble
@@ -86,3 +89,59 @@ def test_what_a_scene_cannot_say_is_named(tmp_path):
         world.save_scene(tmp_path / "now.txt")
     with pytest.raises(FileNotFoundError):
         world.save_scene(tmp_path / "no folder" / "now.toml")
+
+
+def everything(world):
+    """Adds each behavior to a world."""
+    world.add_static("floor", tumble.HalfSpace())
+    flag = world.add_cloth("flag", nodes=(6, 4), size=(0.6, 0.4), pins=["x_min"], position=(0, 0, 2), node_radius=0.02)
+    world.add_jelly("jelly", nodes=(3, 3, 3), size=(0.3, 0.3, 0.3), position=(3, 0, 0.5), node_radius=0.04)
+    ball = world.add_rigid("ball", tumble.Sphere(0.1), mass=1, position=(1, 0, 1))
+    world.add_field("breeze", tumble.Field.wind((3, 1, 0), drag=0.002), targets=[flag])
+    world.add_field("sea", tumble.Field.buoyancy((0, 0, 0.05), drag=1.0))
+    world.add_particles("sparks", [tumble.Emitter((0, 0, 1), speed=(1, 3), lifetime=2, burst=50, rate=100)], capacity=300, seed=4)
+    flock = world.add_flock("flock", desired_speed=6, visibility_angle=2.0)
+    for k in range(4):
+        flock.add(position=(k, 0, 5), velocity=(1, 0, 0), color=(0.1 * k, 0.5, 0.5))
+    shard = world.add_template("shard", tumble.Sphere(0.05), 3, mass=0.1, reuse=True)
+    world.add_event("drop", tumble.Trigger.every(0.2), [tumble.Action.spawn(shard, (2, 2, 1), velocity=(0, 1, 0))])
+    world.add_event("hit", tumble.Trigger.contact("floor", [ball, shard]), [tumble.Action.push("other", (0, 0, 0.1))], times=3)
+    world.add_sensor("accelerometer", ball, name="imu", deviation=0.1)
+    return world
+
+
+def test_a_world_with_every_behavior_is_pickled_copied_and_written(tmp_path):
+    world = everything(tumble.World())
+    world.step(100)
+    path = tmp_path / "now.toml"
+    assert world.save_scene(path) == []
+    copies = {"pickle": pickle.loads(pickle.dumps(world)), "copy": copy.copy(world), "scene": tumble.World.load(path)}
+    world.step(140)
+    for name, other in copies.items():
+        assert other.frame == 100, name
+        other.step(140)
+        assert (other.state == world.state).all(), name
+        assert len(other["flock"]) == 4 and other["flag"].positions.shape == (24, 3), name
+        assert other["drop"].fired == world["drop"].fired > 4, name
+        assert (other.sensors["imu"] == world.sensors["imu"]).all(), name
+    flock = copies["pickle"]["flock"]
+    flock.remove(flock.boids[0])
+    copies["pickle"].step()
+    assert len(flock) == 3
+
+
+def test_callables_and_flocks_of_bodies_have_no_words_in_scenes(tmp_path):
+    world = tumble.World()
+    world.add_rigid("ball", tumble.Sphere(0.1), mass=1)
+    world.add_event("now", tumble.Trigger.time(1), [len])
+    with pytest.raises(tumble.InvalidValueError, match="'now'"):
+        world.save_scene(tmp_path / "now.toml")
+    world = tumble.World()
+    world.add_rigid("ball", tumble.Sphere(0.1), mass=1, intersect=tumble.Intersect())
+    with pytest.raises(tumble.TumbleError, match="ball"):
+        world.save_scene(tmp_path / "now.toml")
+    world = tumble.World()
+    world.add_body_flock("school")
+    with pytest.raises(tumble.TumbleError, match="school"):
+        world.save_scene(tmp_path / "now.toml")
+    assert list(tmp_path.iterdir()) == []

@@ -2,11 +2,10 @@
 
 use crate::atomic_file::write_file;
 use crate::failure::Failure;
-use std::collections::BTreeMap;
 use std::path::Path;
 use tumble::dynamics::World;
 use tumble::scene::SceneFile;
-use tumble::sound::{Listener, MAX_SECONDS, SoundMaterial, Soundtrack};
+use tumble::sound::{Listener, MAX_SECONDS, Soundtrack};
 
 /// The sound of one run.
 pub struct Audio {
@@ -23,20 +22,7 @@ impl Audio {
                 scene.world.duration_s
             )));
         }
-        let listener = match &scene.camera {
-            Some(camera) => Listener::looking(camera.eye_m, camera.target_m, camera.up),
-            None => Listener::looking([0.0, -3.0, 1.7], [0.0; 3], [0.0, 0.0, 1.0]),
-        };
-        let mut materials = BTreeMap::new();
-        let mut add = |name: String, material: Option<usize>, own: Option<&str>| {
-            let of_material = material.and_then(|k| scene.materials[k].sound.as_deref());
-            materials.extend(own.or(of_material).and_then(SoundMaterial::of_name).map(|sound| (name, sound)));
-        };
-        scene.bodies.iter().for_each(|body| add(body.name.clone(), body.material, body.sound.as_deref()));
-        for template in &scene.templates {
-            template.names().for_each(|name| add(name, template.body.material, template.body.sound.as_deref()));
-        }
-        Ok(Audio { soundtrack: Soundtrack::new(materials), listener })
+        Ok(Audio { soundtrack: Soundtrack::of_scene(scene), listener: Listener::of_scene(scene) })
     }
 
     /// Listens to a frame.

@@ -12,20 +12,39 @@
 
 use super::{Targets, check_vector};
 use crate::error::{BehaviorError, check};
+use crate::record;
 use tumble_collide::Vec3;
+use tumble_core::archive::{ObjectIndices, ObjectRecord};
 use tumble_core::{ForceGenerator, Forces, Object, StateRange, WorldView};
 
 /// A point attractor. Each mass is pulled as a point at its center of mass.
 #[derive(Clone, Debug)]
 pub struct Attractor {
     name: String,
-    center: Vec3,
-    strength: f64,
-    softening: f64,
-    targets: Targets,
+    pub(crate) center: Vec3,
+    pub(crate) strength: f64,
+    pub(crate) softening: f64,
+    pub(crate) targets: Targets,
 }
 
 impl Attractor {
+    /// Returns the point, m.
+    pub fn center(&self) -> Vec3 {
+        self.center
+    }
+    /// Returns the strength, m³/s².
+    pub fn strength(&self) -> f64 {
+        self.strength
+    }
+    /// Returns the softening length, m.
+    pub fn softening(&self) -> f64 {
+        self.softening
+    }
+    /// Returns the bodies that it acts on.
+    pub fn targets(&self) -> &Targets {
+        &self.targets
+    }
+
     /// Makes an attractor at a point, m, of a strength `μ`, m³/s²; a negative one repels.
     /// `softening` is a length, m, at least 0. With 0 the force at the point itself is 0, and close to
     /// it without bound.
@@ -54,6 +73,9 @@ impl Attractor {
 }
 
 impl Object for Attractor {
+    fn record(&self, indices: &ObjectIndices) -> Option<ObjectRecord> {
+        record::attractor(self, indices)
+    }
     fn name(&self) -> &str {
         &self.name
     }

@@ -20,9 +20,11 @@
 
 use super::{Targets, check_vector, submerged};
 use crate::error::{BehaviorError, check};
+use crate::record;
 use nalgebra::ComplexField;
 use std::f64::consts::PI;
 use tumble_collide::Vec3;
+use tumble_core::archive::{ObjectIndices, ObjectRecord};
 use tumble_core::{ForceGenerator, Forces, Object, StateRange, WorldView};
 
 /// A fluid below a horizontal surface, without walls or ground.
@@ -39,14 +41,35 @@ use tumble_core::{ForceGenerator, Forces, Object, StateRange, WorldView};
 #[derive(Clone, Debug)]
 pub struct Buoyancy {
     name: String,
-    surface: Vec3,
-    density: f64,
-    drag: f64,
-    current: Vec3,
-    targets: Targets,
+    pub(crate) surface: Vec3,
+    pub(crate) density: f64,
+    pub(crate) drag: f64,
+    pub(crate) current: Vec3,
+    pub(crate) targets: Targets,
 }
 
 impl Buoyancy {
+    /// Returns a point of the surface, m.
+    pub fn surface(&self) -> Vec3 {
+        self.surface
+    }
+    /// Returns the density, kg/m³.
+    pub fn density(&self) -> f64 {
+        self.density
+    }
+    /// Returns the drag per mass of displaced fluid, 1/s.
+    pub fn drag(&self) -> f64 {
+        self.drag
+    }
+    /// Returns the velocity of the fluid, m/s.
+    pub fn current(&self) -> Vec3 {
+        self.current
+    }
+    /// Returns the bodies that it acts on.
+    pub fn targets(&self) -> &Targets {
+        &self.targets
+    }
+
     /// Makes a fluid at rest: a point of its surface, m, and its density, kg/m³, at least 0; 1000 of
     /// water.
     ///
@@ -75,6 +98,9 @@ impl Buoyancy {
 }
 
 impl Object for Buoyancy {
+    fn record(&self, indices: &ObjectIndices) -> Option<ObjectRecord> {
+        record::buoyancy(self, indices)
+    }
     fn name(&self) -> &str {
         &self.name
     }

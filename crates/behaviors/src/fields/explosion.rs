@@ -22,9 +22,11 @@
 
 use super::{Target, Targets, check_vector, silhouette};
 use crate::error::{BehaviorError, check};
+use crate::record;
 use nalgebra::ComplexField;
 use std::f64::consts::PI;
 use tumble_collide::Vec3;
+use tumble_core::archive::{ObjectIndices, ObjectRecord};
 use tumble_core::{ForceGenerator, Forces, Object, StateRange, World, WorldError, WorldView};
 
 /// Age, in time constants, from which there is no force: what is left, 4e-18 of the momentum, is below rounding, and
@@ -35,14 +37,35 @@ const LASTS: f64 = 40.0;
 #[derive(Clone, Debug)]
 pub struct Explosion {
     name: String,
-    center: Vec3,
-    impulse: f64,
-    time: f64,
-    decay: f64,
-    targets: Targets,
+    pub(crate) center: Vec3,
+    pub(crate) impulse: f64,
+    pub(crate) time: f64,
+    pub(crate) decay: f64,
+    pub(crate) targets: Targets,
 }
 
 impl Explosion {
+    /// Returns the point, m.
+    pub fn center(&self) -> Vec3 {
+        self.center
+    }
+    /// Returns the momentum in all directions together, N·s.
+    pub fn impulse(&self) -> f64 {
+        self.impulse
+    }
+    /// Returns the time of its start, s.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+    /// Returns the time constant of its pulse, s.
+    pub fn decay(&self) -> f64 {
+        self.decay
+    }
+    /// Returns the bodies that it acts on.
+    pub fn targets(&self) -> &Targets {
+        &self.targets
+    }
+
     /// Makes an explosion at a point, m, of a total momentum, N·s, at least 0. It begins at `time`,
     /// s, and decays with the time constant `decay`, s, above 0.
     ///
@@ -94,6 +117,9 @@ impl Explosion {
 }
 
 impl Object for Explosion {
+    fn record(&self, indices: &ObjectIndices) -> Option<ObjectRecord> {
+        record::explosion(self, indices)
+    }
     fn name(&self) -> &str {
         &self.name
     }

@@ -21,7 +21,9 @@
 
 use super::check_vector;
 use crate::error::{BehaviorError, check};
+use crate::record;
 use tumble_collide::Vec3;
+use tumble_core::archive::{ObjectIndices, ObjectRecord};
 use tumble_core::{ForceGenerator, Forces, Object, ObjectId, StateRange, WorldView};
 
 /// A flat surface on a part of a body.
@@ -47,12 +49,25 @@ pub struct Panel {
 #[derive(Clone, Debug)]
 pub struct Panels {
     name: String,
-    density: f64,
-    wind: Vec3,
-    panels: Vec<Panel>,
+    pub(crate) density: f64,
+    pub(crate) wind: Vec3,
+    pub(crate) panels: Vec<Panel>,
 }
 
 impl Panels {
+    /// Returns the density of the air, kg/m³.
+    pub fn density(&self) -> f64 {
+        self.density
+    }
+    /// Returns the velocity of the air, m/s.
+    pub fn wind(&self) -> Vec3 {
+        self.wind
+    }
+    /// Returns the panels.
+    pub fn panels(&self) -> &[Panel] {
+        &self.panels
+    }
+
     /// Makes panels in air of a density, kg/m³, at least 0, and a velocity, m/s.
     ///
     /// # Errors
@@ -91,6 +106,9 @@ impl Panel {
 }
 
 impl Object for Panels {
+    fn record(&self, indices: &ObjectIndices) -> Option<ObjectRecord> {
+        record::panels(self, indices)
+    }
     fn name(&self) -> &str {
         &self.name
     }

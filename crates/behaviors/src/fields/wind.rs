@@ -18,11 +18,13 @@
 
 use super::{Targets, check_vector, silhouette};
 use crate::error::{BehaviorError, check};
+use crate::record;
 use tumble_collide::Vec3;
+use tumble_core::archive::{ObjectIndices, ObjectRecord};
 use tumble_core::{ForceGenerator, Forces, Object, StateRange, WorldView};
 
 /// How drag depends on speed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum DragLaw {
     /// In proportion to the speed: slow motion in a viscous fluid. The same for every body.
     Linear {
@@ -42,12 +44,25 @@ pub enum DragLaw {
 #[derive(Clone, Debug)]
 pub struct Wind {
     name: String,
-    velocity: Vec3,
-    law: DragLaw,
-    targets: Targets,
+    pub(crate) velocity: Vec3,
+    pub(crate) law: DragLaw,
+    pub(crate) targets: Targets,
 }
 
 impl Wind {
+    /// Returns the velocity of the air, m/s.
+    pub fn velocity(&self) -> Vec3 {
+        self.velocity
+    }
+    /// Returns the law of the drag.
+    pub fn law(&self) -> DragLaw {
+        self.law
+    }
+    /// Returns the bodies that it acts on.
+    pub fn targets(&self) -> &Targets {
+        &self.targets
+    }
+
     /// Makes a wind of a velocity, m/s, world axes; zero for air at rest.
     ///
     /// # Errors
@@ -78,6 +93,9 @@ impl Wind {
 }
 
 impl Object for Wind {
+    fn record(&self, indices: &ObjectIndices) -> Option<ObjectRecord> {
+        record::wind(self, indices)
+    }
     fn name(&self) -> &str {
         &self.name
     }

@@ -21,7 +21,7 @@ pub(super) const MOST_SENT: usize = 32_768;
 const SENT: usize = 16;
 
 /// How particles are drawn: as small spheres.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ParticleLook {
     /// Appearance of all particles of the system; textures have no effect.
     pub appearance: Appearance,

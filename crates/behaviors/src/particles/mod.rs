@@ -27,11 +27,13 @@ pub use emitter::Emitter;
 
 use crate::error::{BehaviorError, check};
 use crate::fields::check_vector;
+use crate::record;
 use flight::{Flight, Memory};
 use obstacles::Obstacles;
 use path::Air;
 use random::Random;
 use tumble_collide::Vec3;
+use tumble_core::archive::{ObjectIndices, ObjectRecord};
 use tumble_core::{
     CollisionGroup, Frame, FrameImpulse, FrameState, Material, NetSync, Object, ObjectId, Renderable, StateRange,
     World, WorldError,
@@ -46,7 +48,7 @@ const MOST: usize = 10_000_000;
 const PIECE: usize = 1024;
 
 /// Constants of the particles of a system, SI units.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ParticleSettings {
     /// Most particles that live at once, 1 to 10 million; more are not born.
     pub capacity: usize,
@@ -245,6 +247,9 @@ fn write(record: &mut [f64], x: &Vec3, v: &Vec3, life: f64, serial: f64) {
 }
 
 impl Object for ParticleSystem {
+    fn record(&self, indices: &ObjectIndices) -> Option<ObjectRecord> {
+        record::particles(self, indices)
+    }
     fn name(&self) -> &str {
         &self.name
     }

@@ -6,12 +6,12 @@
 //! | shear | neighbors across the cells, in all diagonals |
 //! | bending | nodes two apart along the lines |
 
-use super::{MeshSpring, SpringMesh};
+use super::{Grid, MeshSpring, Origin, SpringMesh};
 use crate::error::{BehaviorError, check};
-use tumble_collide::Vec3;
+use tumble_collide::{Pose, Vec3};
 
 /// A rectangular sheet in the xy-plane about the origin.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Cloth {
     /// Nodes along x and y, at least 2 each.
     pub nodes: [usize; 2],
@@ -33,7 +33,7 @@ impl Default for Cloth {
 }
 
 /// A block about the origin.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Jelly {
     /// Nodes along x, y and z, at least 2 each.
     pub nodes: [usize; 3],
@@ -62,7 +62,8 @@ impl Cloth {
     pub fn mesh(&self) -> Result<SpringMesh, BehaviorError> {
         let ([nx, ny], [x, y]) = (self.nodes, self.size);
         check("the nodes of a cloth", nx.min(ny) as f64, nx.min(ny) >= 2, "at least 2")?;
-        grid([nx, ny, 1], [x, y, 1.0], self.mass, self.stiffness, self.damping)
+        let mesh = grid([nx, ny, 1], [x, y, 1.0], self.mass, self.stiffness, self.damping)?;
+        Ok(of(mesh, Grid::Cloth(*self)))
     }
 }
 
@@ -74,8 +75,13 @@ impl Jelly {
     pub fn mesh(&self) -> Result<SpringMesh, BehaviorError> {
         let least = self.nodes.into_iter().min().unwrap_or(0);
         check("the nodes of a jelly", least as f64, least >= 2, "at least 2")?;
-        grid(self.nodes, self.size, self.mass, self.stiffness, self.damping)
+        let mesh = grid(self.nodes, self.size, self.mass, self.stiffness, self.damping)?;
+        Ok(of(mesh, Grid::Jelly(*self)))
     }
+}
+
+fn of(mesh: SpringMesh, grid: Grid) -> SpringMesh {
+    SpringMesh { origin: Some(Origin { grid, pose: Pose::identity() }), ..mesh }
 }
 
 fn grid(

@@ -48,7 +48,7 @@ use tumble_core::{Material, ObjectId, PartSurface, World};
 const MOST: usize = 100_000;
 
 /// A spring between two nodes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct MeshSpring {
     /// Its nodes, two different ones.
     pub nodes: [usize; 2],
@@ -58,6 +58,24 @@ pub struct MeshSpring {
     pub stiffness: f64,
     /// Damping, N·s/m, at least 0.
     pub damping: f64,
+}
+
+/// The grid that a mesh was made as, and its pose at time 0.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Origin {
+    /// The grid.
+    pub grid: Grid,
+    /// Pose of the frame of the grid.
+    pub pose: Pose,
+}
+
+/// A grid of nodes.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub enum Grid {
+    /// A sheet.
+    Cloth(Cloth),
+    /// A block.
+    Jelly(Jelly),
 }
 
 /// Point masses joined by springs. Its state is the positions of all nodes (m), then their velocities (m/s). Each
@@ -77,23 +95,40 @@ pub struct MeshSpring {
 #[derive(Clone, Debug)]
 pub struct SpringMesh {
     name: String,
-    nodes: Vec<Vec3>,
-    masses: Vec<f64>,
-    pinned: Vec<bool>,
-    springs: Vec<MeshSpring>,
-    velocity: Vec3,
-    shape: Option<Shape>,
-    material: Material,
+    pub(crate) nodes: Vec<Vec3>,
+    /// The nodes as they were given, from which the order of elimination follows.
+    pub(crate) given: Arc<[Vec3]>,
+    pub(crate) masses: Vec<f64>,
+    pub(crate) pinned: Vec<bool>,
+    pub(crate) springs: Vec<MeshSpring>,
+    pub(crate) velocity: Vec3,
+    pub(crate) shape: Option<Shape>,
+    pub(crate) material: Material,
     /// Length of a sub-step, s.
-    step: f64,
+    pub(crate) step: f64,
     /// Time in a step at which the forces of springs act, ½ to 1.
-    implicitness: f64,
+    pub(crate) implicitness: f64,
     pattern: Arc<Pattern>,
     /// Triangles that are drawn.
-    surface: Option<PartSurface>,
+    pub(crate) surface: Option<PartSurface>,
+    /// How its nodes and springs were made.
+    pub(crate) origin: Option<Origin>,
 }
 
 impl SpringMesh {
+    /// Returns the shape with which each node collides.
+    pub fn node_shape(&self) -> Option<&Shape> {
+        self.shape.as_ref()
+    }
+    /// Returns the surface constants.
+    pub fn material(&self) -> &Material {
+        &self.material
+    }
+    /// Returns the surface that is drawn.
+    pub fn surface(&self) -> Option<&PartSurface> {
+        self.surface.as_ref()
+    }
+
     /// Makes a mesh at rest of nodes (m), their masses (kg, above 0) and springs.
     ///
     /// # Errors
@@ -116,6 +151,7 @@ impl SpringMesh {
         Ok(SpringMesh {
             name: String::new(),
             pinned: vec![false; count],
+            given: nodes.clone().into(),
             nodes,
             masses,
             springs,
@@ -126,6 +162,7 @@ impl SpringMesh {
             implicitness: 1.0,
             pattern,
             surface: None,
+            origin: None,
         })
     }
     /// Sets the name.
@@ -135,6 +172,7 @@ impl SpringMesh {
     /// Moves the nodes of time 0 by a pose.
     pub fn with_pose(mut self, pose: Pose) -> SpringMesh {
         self.nodes.iter_mut().for_each(|node| *node = pose.transform_point(&(*node).into()).coords);
+        self.origin = self.origin.map(|origin| Origin { pose: pose * origin.pose, ..origin });
         self
     }
     /// Sets the velocity of all nodes at time 0, m/s.
@@ -191,6 +229,22 @@ impl SpringMesh {
     /// Returns the nodes of time 0, m.
     pub fn nodes(&self) -> &[Vec3] {
         &self.nodes
+    }
+    /// Returns the grid that it was made as; `None` for other nodes and springs.
+    pub fn origin(&self) -> Option<&Origin> {
+        self.origin.as_ref()
+    }
+    /// Returns the numbers of the pinned nodes.
+    pub fn pinned_nodes(&self) -> impl Iterator<Item = usize> {
+        self.pinned.iter().enumerate().filter(|(_, pinned)| **pinned).map(|(node, _)| node)
+    }
+    /// Returns the velocity of all nodes at time 0, m/s.
+    pub fn velocity(&self) -> Vec3 {
+        self.velocity
+    }
+    /// Returns where in a step the forces of springs act.
+    pub fn implicitness(&self) -> f64 {
+        self.implicitness
     }
     /// Returns the springs.
     pub fn springs(&self) -> &[MeshSpring] {

@@ -2,7 +2,9 @@
 
 use super::SpringMesh;
 use super::factor::{Factor, Pattern};
+use crate::record;
 use tumble_collide::{Pose, Shape, Vec3};
+use tumble_core::archive::{ObjectIndices, ObjectRecord};
 use tumble_core::{
     Cache, Collidable, Energy, ForceSlice, Integratable, Material, Object, PartPoint, PartState, Renderable, StateSizes,
 };
@@ -46,6 +48,9 @@ impl SpringMesh {
 }
 
 impl Object for SpringMesh {
+    fn record(&self, _: &ObjectIndices) -> Option<ObjectRecord> {
+        record::mesh(self)
+    }
     fn name(&self) -> &str {
         &self.name
     }

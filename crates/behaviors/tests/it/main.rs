@@ -1,5 +1,6 @@
 //! The behaviors against closed forms, hand computations and brute force.
 
+mod archives;
 mod boids;
 mod buoyancy;
 mod drawn;

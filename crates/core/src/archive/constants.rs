@@ -8,9 +8,11 @@ use super::{NamedRecord, record};
 use crate::object::Object;
 use crate::settings::Settings;
 use crate::world::World;
+use crate::world::view::ObjectId;
 use crate::world::view::Status;
-use crate::{ArticulatedBody, LoopJoint, RigidBody};
+use crate::{ArticulatedBody, LoopJoint, RigidBody, Template};
 use serde::{Serialize, Serializer};
+use std::collections::BTreeSet;
 use tumble_collide::{Shape, Vec3};
 
 /// Everything that is constant during a step, except meshes that are only drawn.
@@ -36,7 +38,8 @@ struct Outline {
 
 impl World {
     /// Writes settings, objects and pairs without the state: first the rigid bodies, then the
-    /// articulated ones, then the loop joints, each in the order of the world. The names of the fields are no part of
+    /// articulated ones, then the loop joints, each in the order of the world; then bodies of templates and all other objects by
+    /// their names. The names of the fields are no part of
     /// the interface, except that `initial_pose`, `initial_velocity` and `start` are of time 0, that
     /// `visuals`, `cameras` and `lights` have no effect on motion, and that `colliders` may be in
     /// another order.
@@ -45,7 +48,12 @@ impl World {
     /// Those of the serializer.
     pub fn serialize_constants<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut ids = self.ids().to_vec();
-        ids.sort_by_key(|&id| self.object(id).map_or(u8::MAX, rank));
+        let templates = ids.iter().filter_map(|&id| self.get::<Template>(id));
+        let spawned: BTreeSet<ObjectId> = templates.flat_map(Template::bodies).copied().collect();
+        ids.sort_by_cached_key(|&id| match self.object(id).map_or(OTHER, rank) {
+            rank if rank < OTHER && !spawned.contains(&id) => (rank, String::new()),
+            _ => (OTHER, self.name(id).unwrap_or_default().to_owned()),
+        });
         let (mut tables, indices) = (Tables::default(), ObjectIndices::of(&ids));
         (tables.shapes.repeated, tables.meshes.skipped) = (true, true);
         let objects = ids.iter().filter_map(|&id| Some((self.name(id)?, self.object(id)?)));
@@ -68,6 +76,9 @@ impl World {
     }
 }
 
+/// Place of all other kinds.
+const OTHER: u8 = 3;
+
 /// Returns the place of an object's kind in the order of kinds.
 fn rank(object: &dyn Object) -> u8 {
     let any: &dyn std::any::Any = object;
@@ -75,7 +86,7 @@ fn rank(object: &dyn Object) -> u8 {
         _ if any.is::<RigidBody>() => 0,
         _ if any.is::<ArticulatedBody>() => 1,
         _ if any.is::<LoopJoint>() => 2,
-        _ => 3,
+        _ => OTHER,
     }
 }
 

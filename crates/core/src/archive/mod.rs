@@ -2,17 +2,18 @@
 //!
 //! | part | bytes |
 //! |---|---|
-//! | `tumbleAE`; the last is the number of the format | 8 |
+//! | `tumbleAF`; the last is the number of the format | 8 |
 //! | XXH3 of the rest, little-endian | 8 |
 //! | settings, stepper, solver, shapes, visual meshes, objects, pairs, state, contacts, report in postcard | any |
 //!
-//! The same world gives the same bytes. Objects of user-defined types are written by name alone;
-//! the caller makes them. Shapes that objects share are written once and are shared again; meshes
+//! The same world gives the same bytes. Objects of other crates write themselves ([`Object::record`]), or are written
+//! by name alone; the caller makes both. Shapes that objects share are written once and are shared again; meshes
 //! that are only drawn are read for it, so that no file is needed later. The order of objects is
 //! kept, ids are not: they are new.
 
 mod bodies;
 mod constants;
+mod other;
 mod records;
 mod script;
 mod sensors;
@@ -28,9 +29,11 @@ use crate::{
     WorstSolve,
 };
 use bodies::{ArticulatedRecord, RigidRecord};
+use other::OtherRecord;
+pub use other::{MakeObject, ObjectRecord, ReadObject};
+pub use records::ObjectIndices;
 use records::{
-    ContactRecord, EventRecord, LoadedTables, LoopJointRecord, MeshRecord, ObjectIndices, PairRecord, ReportRecord,
-    Tables, meshes,
+    ContactRecord, EventRecord, LoadedTables, LoopJointRecord, MeshRecord, PairRecord, ReportRecord, Tables, meshes,
 };
 use script::{EventScript, TemplateRecord};
 use sensors::SensorRecord;
@@ -41,7 +44,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 /// First bytes of an archive of a world. The last is the number of the format, which rises with
 /// every change of the content.
-const HEAD: &[u8; 8] = b"tumbleAE";
+const HEAD: &[u8; 8] = b"tumbleAF";
 
 /// Why an archive cannot be written or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -64,8 +67,9 @@ pub enum ArchiveError {
     /// A value cannot be written, such as a path that is not UTF-8.
     #[error("the world cannot be written: {0}")]
     Unwritable(String),
-    /// An object of a user-defined type that the caller does not write, or does not make.
-    #[error("'{0}' is an object of a user-defined type, and the caller gave nothing to write or to make it")]
+    /// An object of a user-defined type, or with an intersection test of one, that the caller does not write, or does not
+    /// make.
+    #[error("'{0}' is, or has a test of, a user-defined type, and the caller gave nothing to write or to make it")]
     Foreign(String),
     /// A stepper of a user-defined type, or of another version of tumble: its name.
     #[error(
@@ -122,12 +126,14 @@ enum Record {
     Foreign,
     Event(Box<EventScript>),
     Template(TemplateRecord),
+    Other(Box<OtherRecord>),
 }
 
 impl World {
     /// Returns the whole world as bytes: objects with their shapes, settings, stepper, solver and
     /// state. `foreign` are the objects of user-defined types that the caller of
-    /// [`from_archive`](World::from_archive) makes itself.
+    /// [`from_archive`](World::from_archive) makes itself, and the rigid bodies with an intersection test of their own,
+    /// which it sets again.
     ///
     /// # Errors
     /// [`ArchiveError::Foreign`] for an object of a user-defined type that is not among `foreign`;
@@ -146,6 +152,9 @@ impl World {
             .collect::<Vec<NamedRecord>>();
         let unknown = self.ids().iter().zip(&objects).find_map(|(id, object)| match object.record {
             Record::Foreign if !foreign.contains(id) => Some(object.name.clone()),
+            Record::Rigid(_) if !foreign.contains(id) && has_test(self.get::<RigidBody>(*id)) => {
+                Some(object.name.clone())
+            }
             _ => None,
         });
         if let Some(name) = unknown {
@@ -171,22 +180,21 @@ impl World {
     }
 
     /// Returns the world of an archive, which continues with the same bits. `foreign` makes an
-    /// object of a user-defined type from its name.
+    /// object of another crate from its name and its record. It is called once more, when all ids are known, for one that names an
+    /// object after it.
     ///
     /// # Errors
     /// [`ArchiveError`] for bytes that are no archive, of another format or damaged, for an object
     /// that `foreign` does not make, and for a stepper or solver without a name in [`STEPPERS`] or
     /// [`solver::NAMES`].
-    pub fn from_archive(
-        bytes: &[u8],
-        foreign: &mut dyn FnMut(&str) -> Option<Box<dyn Object>>,
-    ) -> Result<World, ArchiveError> {
+    pub fn from_archive(bytes: &[u8], foreign: &mut MakeObject) -> Result<World, ArchiveError> {
         let archive: Archive = open(HEAD, bytes)?;
         let mut world = World::new(archive.settings).map_err(damaged)?;
         world.set_stepper(stepper(&archive.stepper)?);
         world.set_solver(solver(&archive.solver)?);
         let tables = LoadedTables { shapes: archive.shapes, meshes: meshes(archive.meshes) };
         let mut ids = Vec::with_capacity(archive.objects.len());
+        let mut ahead: Vec<(usize, String, ObjectRecord)> = Vec::new();
         for NamedRecord { name, record } in archive.objects {
             let object: Box<dyn Object> = match record {
                 Record::Rigid(rigid) => Box::new(rigid.body(&tables)?),
@@ -195,9 +203,20 @@ impl World {
                 Record::Event(event) => Box::new(event.event(&ids)),
                 Record::Template(template) => Box::new(template.template(&ids)),
                 Record::Sensor(sensor) => Box::new(sensor.sensor(&tables, &ids)?),
-                Record::Foreign => foreign(&name).ok_or_else(|| ArchiveError::Foreign(name.clone()))?,
+                Record::Foreign => other::made(&name, None, &ids, foreign)?.0,
+                Record::Other(other) => {
+                    let record = other.record(&tables)?;
+                    let (object, names_later) = other::made(&name, Some(&record), &ids, foreign)?;
+                    if names_later {
+                        ahead.push((ids.len(), name.clone(), record));
+                    }
+                    object
+                }
             };
             ids.push(world.add_named(name, object, Mode::Dynamic).map_err(damaged)?);
+        }
+        for (place, name, record) in ahead {
+            world.replace_object(place, other::made(&name, Some(&record), &ids, foreign)?.0);
         }
         archive.pairs.into_iter().try_for_each(|pair| pair.put(&mut world, &ids)).map_err(damaged)?;
         world.restore_state(&archive.state).map_err(damaged)?;
@@ -256,6 +275,10 @@ fn solver(name: &str) -> Result<Box<dyn RowSolver>, ArchiveError> {
     solver::by_name(name).ok_or_else(|| ArchiveError::Solver(name.into()))
 }
 
+fn has_test(body: Option<&RigidBody>) -> bool {
+    body.is_some_and(|body| body.intersect().is_some())
+}
+
 fn record(object: &dyn Object, tables: &mut Tables, indices: &ObjectIndices) -> Record {
     let any: &dyn std::any::Any = object;
     if let Some(body) = any.downcast_ref::<RigidBody>() {
@@ -271,7 +294,7 @@ fn record(object: &dyn Object, tables: &mut Tables, indices: &ObjectIndices) -> 
     } else if let Some(sensor) = any.downcast_ref::<Sensor>() {
         Record::Sensor(Box::new(SensorRecord::of(sensor, tables, indices)))
     } else {
-        Record::Foreign
+        OtherRecord::of(object, tables, indices).map_or(Record::Foreign, |other| Record::Other(Box::new(other)))
     }
 }
 

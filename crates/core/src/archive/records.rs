@@ -83,14 +83,14 @@ pub(super) fn meshes(list: Vec<MeshRecord>) -> Vec<Arc<VisualMesh>> {
 }
 
 /// Indices of objects in the order of insertion.
-pub(super) struct ObjectIndices(BTreeMap<ObjectId, u32>);
+pub struct ObjectIndices(BTreeMap<ObjectId, u32>);
 
 impl ObjectIndices {
-    pub fn of(ids: &[ObjectId]) -> ObjectIndices {
+    pub(super) fn of(ids: &[ObjectId]) -> ObjectIndices {
         ObjectIndices(ids.iter().zip(0..).map(|(id, index)| (*id, index)).collect())
     }
 
-    /// Returns `None` for a removed object.
+    /// Returns the index of an object; `None` for a removed one.
     pub fn of_id(&self, id: ObjectId) -> Option<u32> {
         self.0.get(&id).copied()
     }

@@ -21,7 +21,7 @@ pub struct IntersectPart<'a> {
 /// [`Collidable::shape`](super::Collidable::shape) then is a solid around the true surface. The broad phase,
 /// sphere casts, rays, distances, particles and pictures see that shape; contacts, sensors and overlaps of bodies are
 /// those of the test.
-pub trait Intersect: Sync {
+pub trait Intersect: Send + Sync {
     /// Appends all contacts between its part `own` and a part of any object, whose gap is at most `margin`, m.
     /// `own` is side A of them: normals point from `other` towards `own`. Features that stay in contact
     /// keep their [`Contact::feature`], which differs between the contacts of a pair. Depends on the arguments alone.

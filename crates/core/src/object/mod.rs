@@ -35,6 +35,7 @@ pub use mounts::{CameraCarrier, LightCarrier};
 pub use net_sync::{NetSync, SyncError};
 pub use visual::Renderable;
 
+use crate::archive::{ObjectIndices, ObjectRecord};
 use crate::derived::Cache;
 use part_state::PartState;
 use std::any::Any;
@@ -90,6 +91,12 @@ pub trait Object: Fork + Any + Send + Sync {
     }
     /// Returns the interface of an object that carries lights.
     fn light(&self) -> Option<&dyn LightCarrier> {
+        None
+    }
+    /// Returns its constants for an archive, with other objects by index; `None`, the default, for an object that the caller
+    /// of [`World::archive`](crate::World::archive) writes itself.
+    fn record(&self, indices: &ObjectIndices) -> Option<ObjectRecord> {
+        let _ = indices;
         None
     }
     /// Returns the interface of an object that is synchronized with copies of itself in other

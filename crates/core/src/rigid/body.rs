@@ -2,11 +2,12 @@
 
 use super::inertia::{Inertia, symmetric};
 use super::{BodyError, LockedAxes};
-use crate::object::Material;
 use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraMount, LightMount};
 use crate::object::visual::Visual;
+use crate::object::{Intersect, Material};
 use nalgebra::Translation3;
+use std::sync::Arc;
 use tumble_collide::{ContactMode, Mat3, Pose, Shape, Vec3};
 
 /// A rigid body. Its mode in the world (static, kinematic or dynamic) is not part of it.
@@ -55,6 +56,7 @@ pub struct RigidBody {
     pub(super) visuals: Vec<Visual>,
     pub(super) cameras: Vec<CameraMount>,
     pub(super) lights: Vec<LightMount>,
+    pub(super) intersect: Option<Arc<dyn Intersect>>,
 }
 
 impl RigidBody {
@@ -112,7 +114,26 @@ impl RigidBody {
             fixed: true,
             cameras: Vec::new(),
             lights: Vec::new(),
+            intersect: None,
         }
+    }
+
+    /// Sets an intersection test of its own, which [`Collidable::intersect`](crate::Collidable::intersect) returns. An archive
+    /// does not have it.
+    #[must_use]
+    pub fn with_intersect(mut self, test: Arc<dyn Intersect>) -> Self {
+        self.set_intersect(Some(test));
+        self
+    }
+
+    /// Sets or removes the intersection test of its own.
+    pub fn set_intersect(&mut self, test: Option<Arc<dyn Intersect>>) {
+        self.intersect = test;
+    }
+
+    /// Returns the intersection test of its own.
+    pub fn intersect(&self) -> Option<&Arc<dyn Intersect>> {
+        self.intersect.as_ref()
     }
 
     /// Sets the name, unique in its world and of any length. Without one, the world makes a name.

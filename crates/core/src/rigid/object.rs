@@ -10,8 +10,8 @@ use crate::object::net_sync;
 use crate::object::part_state::{ForceSlice, Forces, PartPoint, PartState, PointLoad, StateRange, StateSizes, Wrench};
 use crate::object::visual::Visual;
 use crate::object::{
-    CameraCarrier, Collidable, Energy, Integratable, LightCarrier, Material, Momentum, MomentumKind, NetSync, Object,
-    Renderable, SyncError,
+    CameraCarrier, Collidable, Energy, Integratable, Intersect, LightCarrier, Material, Momentum, MomentumKind,
+    NetSync, Object, Renderable, SyncError,
 };
 use crate::world::view::WorldView;
 use nalgebra::{ComplexField, Translation3, Unit};
@@ -437,6 +437,10 @@ impl Collidable for RigidBody {
 
     fn collides_with(&self, _part: usize, other: CollisionGroup) -> bool {
         self.mask & other.bit() != 0
+    }
+
+    fn intersect(&self) -> Option<&dyn Intersect> {
+        self.intersect.as_deref()
     }
 }
 

@@ -2,9 +2,10 @@
 
 use super::{World, WorldError};
 use crate::object::part_state::{PartPoint, PartState};
-use crate::object::{Integratable, Object};
+use crate::object::{Integratable, Intersect, Object};
 use crate::rigid::{RigidBody, orientation, vec3};
 use crate::world::view::{Mode, ObjectId, Status};
+use std::sync::Arc;
 use tumble_collide::{Mat3, Pose, Vec3};
 
 impl World {
@@ -64,6 +65,24 @@ impl World {
     /// [`WorldError::Stale`] if the object was removed.
     pub fn set_collidable(&mut self, id: ObjectId, collidable: bool) -> Result<(), WorldError> {
         self.status_mut(id)?.collidable = collidable;
+        Ok(())
+    }
+
+    /// Replaces an object by one with the same state, by its place in the order of objects.
+    pub(crate) fn replace_object(&mut self, order: usize, object: Box<dyn Object>) {
+        if let Some(place) = self.ids().get(order).and_then(|id| self.core.table.place(*id)) {
+            self.core.table.placed[place].object = object;
+        }
+    }
+
+    /// Sets or removes the intersection test of a rigid body's own, without waking it.
+    ///
+    /// # Errors
+    /// [`WorldError::Stale`] if the object was removed or is no rigid body.
+    pub fn set_intersect(&mut self, id: ObjectId, test: Option<Arc<dyn Intersect>>) -> Result<(), WorldError> {
+        let place = self.core.table.place(id).ok_or(WorldError::Stale)?;
+        let object: &mut dyn std::any::Any = self.core.table.placed[place].object.as_mut();
+        object.downcast_mut::<RigidBody>().ok_or(WorldError::Stale)?.set_intersect(test);
         Ok(())
     }
 

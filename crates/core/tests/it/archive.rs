@@ -150,7 +150,8 @@ fn objects_of_other_kinds_are_made_by_the_caller() {
     let bytes = world.archive(&[lift]).unwrap();
     let refused = World::from_archive(&bytes, &mut |_| None).map(|_| ());
     assert_eq!(refused, Err(ArchiveError::Foreign("lift".into())));
-    let mut other = World::from_archive(&bytes, &mut |name| (name == "lift").then(|| Box::new(Lift) as _)).unwrap();
+    let mut other =
+        World::from_archive(&bytes, &mut |read| (read.name == "lift").then(|| Box::new(Lift) as _)).unwrap();
     for _ in 0..50 {
         world.step().unwrap();
         other.step().unwrap();

@@ -19,12 +19,14 @@ from tumble._errors import (
     UnknownNameError,
     UnreadableFileError,
 )
-from tumble._extension import Behavior, Force
+from tumble._extension import Behavior, Force, Intersect
 from tumble._native import (
+    Action,
     Articulation,
     ArticulationBuilder,
     Batch,
     Bodies,
+    BodyFlock,
     Boid,
     Box,
     Capsule,
@@ -44,14 +46,18 @@ from tumble._native import (
     ParticleSystem,
     Recorder,
     RigidBody,
+    ScriptedEvent,
     Sensor,
     Sensors,
     Shape,
+    Soundtrack,
     Sphere,
     SphereTree,
     SpringMesh,
     StepReport,
+    Template,
     Terrain,
+    Trigger,
     View,
     World,
     __version__,
@@ -59,18 +65,20 @@ from tumble._native import (
 )
 from tumble._pictures import Camera, save_png
 from tumble._recordings import Recording, read, replay
-from tumble._values import Energy, Event, Momentum, SphereLevel
+from tumble._values import Energy, Event, Firing, IntersectPart, Momentum, SphereLevel
 from tumble._window import Window
 
 Plane = HalfSpace
 
 __all__ = [
+    "Action",
     "Animation",
     "Articulation",
     "ArticulationBuilder",
     "Batch",
     "Behavior",
     "Bodies",
+    "BodyFlock",
     "Boid",
     "Box",
     "BusyError",
@@ -85,11 +93,14 @@ __all__ = [
     "Energy",
     "Event",
     "Field",
+    "Firing",
     "Flock",
     "Force",
     "HalfSpace",
     "HeightField",
     "InternalError",
+    "Intersect",
+    "IntersectPart",
     "InvalidValueError",
     "Joint",
     "Mesh",
@@ -105,17 +116,21 @@ __all__ = [
     "RemovedError",
     "RigidBody",
     "SceneError",
+    "ScriptedEvent",
     "Sensor",
     "Sensors",
     "Shape",
     "SnapshotError",
+    "Soundtrack",
     "Sphere",
     "SphereLevel",
     "SphereTree",
     "SpringMesh",
     "StepError",
     "StepReport",
+    "Template",
     "Terrain",
+    "Trigger",
     "TumbleError",
     "UnknownNameError",
     "UnreadableFileError",

@@ -1,8 +1,9 @@
-"""Forces and behaviors written in Python."""
+"""Forces, behaviors and intersection tests written in Python."""
 
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
     from tumble._native import View
+    from tumble._values import IntersectPart
 
 
 class Force:
@@ -49,6 +51,24 @@ class Behavior:
         return copy.deepcopy(self)
 
 
+class Intersect:
+    """Base class of intersection tests of a body's own: define ``contacts`` and pass an object as ``intersect`` of ``World.add_rigid``.
+
+    It is the narrow phase of all pairs with that body. The shape of the body surrounds the true surface: the broad phase, rays, distances,
+    particles and pictures see the shape. The object is called on any thread, by forks too, and must not change.
+    """
+
+    def contacts(self, own: IntersectPart, other: IntersectPart, margin: float) -> Iterable[Sequence[object]] | None:
+        """Returns all contacts between the body and another part whose gap is at most ``margin``, m; None leaves the pair to the shapes.
+
+        A contact is ``(point, normal, gap)``: midway between the surfaces, shape (3,), m; unit vector from the other part towards the own one;
+        distance, m, negative for overlap. Behind them may stand ``feature``, a whole number that the same features keep while they touch (by
+        default the number in the list), and ``core_own``, ``core_other``: radii of curvature there, m, 0 (the default) for a flat side, whose
+        normal turns with its body. An exception ends the step and is raised there; the world then has its state before that step.
+        """
+        raise NotImplementedError(f"{type(self).__name__} must define contacts(self, own, other, margin)")
+
+
 def check_force(value: object) -> None:
     """Raises ``TypeError`` for anything but a force."""
     _check(Force, value)
@@ -59,7 +79,12 @@ def check_behavior(value: object) -> None:
     _check(Behavior, value)
 
 
-def _check(kind: type[Force] | type[Behavior], value: object) -> None:
+def check_intersect(value: object) -> None:
+    """Raises ``TypeError`` for anything but an intersection test."""
+    _check(Intersect, value)
+
+
+def _check(kind: type[Force] | type[Behavior] | type[Intersect], value: object) -> None:
     if not isinstance(value, kind):
         given = f"the class {value.__name__} itself" if isinstance(value, type) else type(value).__name__
         raise TypeError(f"expected an object of a subclass of tumble.{kind.__name__}, not {given}")

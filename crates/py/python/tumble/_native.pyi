@@ -3,29 +3,35 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any, TypeAlias, final, overload
+from typing import Any, Literal, TypeAlias, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import disjoint_base
 
-from tumble._extension import Behavior, Force
-from tumble._values import Energy, Event, Momentum, SphereLevel
+from tumble._extension import Behavior, Force, Intersect
+from tumble._values import Energy, Event, Firing, Momentum, SphereLevel
 from tumble._window import Window
 from tumble.typing import Axis, CollisionMeshes, Combine, Contacts, Integrator, JointKind, JointType, LockedAxis, MissingMeshes, Mode, SensorKind, Solver, Stepper, TreeMethod
 
 _Floats: TypeAlias = NDArray[np.float64]
 _Path: TypeAlias = str | PathLike[str]
 _Body: TypeAlias = RigidBody | Articulation | str
+_Object: TypeAlias = (
+    RigidBody | Articulation | Joint | SpringMesh | ParticleSystem | Flock | BodyFlock | Boid | ScriptedEvent | Template | str | tuple[Articulation | str, str]
+)
+_Several: TypeAlias = _Object | list[_Object]
 _Side: TypeAlias = _Body | tuple[Articulation | str, str] | None
 
 __version__: str
 
 __all__ = [
+    "Action",
     "Articulation",
     "ArticulationBuilder",
     "Batch",
     "Bodies",
+    "BodyFlock",
     "Boid",
     "Box",
     "Capsule",
@@ -45,19 +51,23 @@ __all__ = [
     "ParticleSystem",
     "Recorder",
     "RigidBody",
+    "ScriptedEvent",
+    "Sensor",
+    "Sensors",
     "Shape",
+    "Soundtrack",
     "Sphere",
     "SphereTree",
     "SpringMesh",
     "StepReport",
+    "Template",
     "Terrain",
+    "Trigger",
     "View",
     "World",
-    "__version__",
-    "read_recording",
-    "show_contacts",
-    "simulate",
     "_WindowFeed",
+    "__version__",
+    "_choices",
     "_panic",
     "_show_window",
     "_unpickle_articulation",
@@ -66,9 +76,9 @@ __all__ = [
     "_unpickle_shape",
     "_unpickle_tree",
     "_unpickle_world",
-    "_choices",
-    "Sensor",
-    "Sensors",
+    "read_recording",
+    "show_contacts",
+    "simulate",
 ]
 
 @disjoint_base
@@ -605,6 +615,199 @@ class Flock:
     def remove(self, boid: Boid | str) -> None:
         """Removes a boid, given as a handle or by name, from the flock and from the world."""
     def __len__(self) -> int: ...
+
+@final
+class BodyFlock:
+    """A flock of rigid bodies of a world: the forces of a flock on their centers of mass, and torques that turn the nose (x) of each along
+    its velocity and bank it into turns.
+
+    A handle without data of its own, made by ``World.add_body_flock``.
+    """
+    def __len__(self) -> int: ...
+    def add(self, body: _Body) -> None:
+        """Adds a rigid body of the world, given as a handle or by name. Gravity acts beside the flock: a body that its wings carry has
+        ``gravity_scale=0``.
+        """
+    def remove(self, body: _Body) -> None:
+        """Removes a body, given as a handle or by name, from the flock. It stays in the world."""
+    @property
+    def exists(self) -> bool:
+        """Whether its world still has it."""
+    @property
+    def steering(self) -> dict[str, Any]:
+        """The constants of its forces and of its helm by name, as in ``World.add_body_flock``. Setting it changes those that are given, from
+        the next step on.
+        """
+    @steering.setter
+    def steering(self, value: dict[str, Any]) -> None: ...
+    @property
+    def name(self) -> str:
+        """Name, unique in its world."""
+    @property
+    def bodies(self) -> list[RigidBody]:
+        """Its bodies, in the order in which they were added."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class Trigger:
+    """The cause that makes an event of ``World.add_event`` fire; made by one of its static methods.
+
+    Bodies are handles or names; a template stands for all its bodies. Where several are accepted, a list of them is.
+    """
+    @staticmethod
+    def time(at: float) -> Trigger:
+        """Once, at the end of the first frame that reaches a time. at: s."""
+    @staticmethod
+    def every(period: float, *, first: float | None = None) -> Trigger:
+        """Again and again. period: s. first: time of the first firing, s, by default the period."""
+    @staticmethod
+    def contact(a: _Several, b: _Several | None = None, *, impulse: float = 0.0) -> Trigger:
+        """A body of a and one of b come into contact; without b any body counts. With an impulse, N·s, above 0: whenever the impulse between
+        two parts in a frame reaches it, in a lasting contact too. The body of b is the *other* one of the event.
+        """
+    @staticmethod
+    def parting(a: _Several, b: _Several | None = None) -> Trigger:
+        """A body of a and one of b part."""
+    @staticmethod
+    def enters(sensor: _Object, bodies: _Several | None = None) -> Trigger:
+        """A body enters a sensor (``sensor=True`` of ``add_rigid`` and ``add_static``); without bodies any one counts. It is the *other* body of the event."""
+    @staticmethod
+    def leaves(sensor: _Object, bodies: _Several | None = None) -> Trigger:
+        """A body leaves a sensor."""
+    @staticmethod
+    def broken(joint: _Object) -> Trigger:
+        """A joint of ``World.add_joint`` breaks."""
+    @staticmethod
+    def key(key: str) -> Trigger:
+        """A user presses a key in a window or in a cave, or a program calls ``World.press``."""
+    @staticmethod
+    def after(event: _Object) -> Trigger:
+        """An event that was added before fires. The *other* body is that of it."""
+
+@final
+class Action:
+    """A deed of an event of ``World.add_event``; made by one of its static methods.
+
+    Objects are handles or names; a link is ``"ARTICULATION/LINK"``. Instead of a body, ``"other"`` is the body that made the event fire: the
+    visitor of a sensor, or the second side of a contact. SI units and world axes. An action on an object that was removed does nothing.
+    """
+    @staticmethod
+    def spawn(template: _Object, position: ArrayLike | None = None, orientation: ArrayLike | None = None, velocity: ArrayLike | None = None, angular_velocity: ArrayLike | None = None, *, source: _Object | None = None) -> Action:
+        """Spawns a body of a template at a pose with a velocity of its center of mass, m/s, and an angular velocity, rad/s. source: a body that
+        throws it: all of them are relative to it and to its motion.
+        """
+    @staticmethod
+    def push(body: _Object, impulse: ArrayLike, *, point: ArrayLike | None = None) -> Action:
+        """An impulse at once, N·s, shape (3,). point: of the frame of the body, m, by default its center of mass."""
+    @staticmethod
+    def force(body: _Object, force: ArrayLike | None = None, torque: ArrayLike | None = None, *, duration: float) -> Action:
+        """A constant force at the center of mass, N, and a torque, N·m, for a duration, s."""
+    @staticmethod
+    def set_velocity(body: _Object, velocity: ArrayLike | None = None, angular_velocity: ArrayLike | None = None) -> Action:
+        """Sets the velocity of a rigid body, m/s, and its angular velocity, rad/s."""
+    @staticmethod
+    def remove(body: _Object) -> Action:
+        """Disables a body. A body of a template can be spawned again."""
+    @staticmethod
+    def enable(object: _Object) -> Action:
+        """Enables a body, a joint or an event."""
+    @staticmethod
+    def disable(object: _Object) -> Action:
+        """Disables a body, a joint or an event."""
+    @staticmethod
+    def attach(joint: _Object, *, here: bool = False) -> Action:
+        """Enables a joint of ``World.add_joint``. here: joins its sides where they are at that moment."""
+    @staticmethod
+    def detach(joint: _Object) -> Action:
+        """Disables a joint."""
+    @staticmethod
+    def recolor(body: _Object, color: ArrayLike) -> Action:
+        """Gives a body another color, sRGB, each 0 to 1."""
+    @staticmethod
+    def move_along(body: _Object, times: ArrayLike, positions: ArrayLike, orientations: ArrayLike | None = None, *, smoothness: Literal["c1", "c2"] = "c2", ends: Literal["rest", "free", "loop"] = "rest") -> Action:
+        """Moves a kinematic rigid body along a path through n keyframes. times: since the firing, shape (n,), s, rising. positions: shape (n, 3), m.
+        orientations: shape (n, 4), by default none. smoothness: ``"c1"`` or ``"c2"``; ends: ``"rest"``, ``"free"`` or ``"loop"``.
+        """
+    @staticmethod
+    def drive(joint: _Object, target: float) -> Action:
+        """Sets the target of a drive, rad, m, rad/s or m/s as the drive has it. joint: a joint of ``World.add_joint``, or
+        ``"ARTICULATION/LINK"`` for the joint that moves the link.
+        """
+    @staticmethod
+    def camera(name: str | None = None, *, eye: ArrayLike | None = None, target: ArrayLike | None = None, vertical_fov: float = 0.6981317007977318) -> Action:
+        """Looks from a camera by its name, or from an eye at a target, m; vertical_fov: rad."""
+    @staticmethod
+    def light(number: int, *, intensity: float | None = None, color: ArrayLike | None = None) -> Action:
+        """Changes a light of the scene. number: from 1. intensity: at least 0. color: sRGB, each 0 to 1."""
+
+@final
+class ScriptedEvent:
+    """An event of a world, made by ``World.add_event`` or ``[[event]]``."""
+    @property
+    def fired(self) -> int:
+        """How often it has fired."""
+    @property
+    def name(self) -> str:
+        """Name, unique in its world."""
+    @property
+    def exists(self) -> bool:
+        """Whether its world still has it."""
+    @property
+    def enabled(self) -> bool:
+        """Whether it can fire, and has effects."""
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class Template:
+    """Equal bodies that events spawn, made by ``World.add_template`` or ``[[template]]``.
+
+    They are in the world from the start, disabled, under the names ``"NAME 1"``, ``"NAME 2"`` and so on.
+    """
+    @property
+    def name(self) -> str:
+        """Name, unique in its world."""
+    @property
+    def exists(self) -> bool:
+        """Whether its world still has it."""
+    @property
+    def spawned(self) -> int:
+        """How often it has spawned a body."""
+    @property
+    def bodies(self) -> list[RigidBody]:
+        """Its bodies, disabled ones too."""
+    @property
+    def refused(self) -> int:
+        """How often it could not spawn one, because all were in use."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class Soundtrack:
+    """Collects the sound of a world, frame by frame: ``sound = tumble.Soundtrack(world); sound.run(480); sound.save("run.wav")``.
+
+    It is what ``tumble run --audio`` writes: two channels of 48 kHz. The same run gives the same samples.
+    """
+    def __new__(cls, world: World, *, eye: ArrayLike | None = None, target: ArrayLike | None = None, materials: Mapping[str, str] | None = None) -> Soundtrack: ...
+    def frame(self) -> None:
+        """Listens to the last frame of the world. Every frame must be heard, each once."""
+    def run(self, n: int) -> None:
+        """Steps the world n times and listens to each frame."""
+    def samples(self) -> _Floats:
+        """Returns the samples of both ears, shape (n, 2), 48,000 for each second; 1 is full scale, and louder ones are not cut."""
+    def save(self, path: _Path) -> float:
+        """Writes a WAV file of 16 bits. If the peak exceeds 0.98 of full scale, the whole is made quieter by one factor, which it returns;
+        otherwise 1.
+        """
+    @property
+    def impacts(self) -> int:
+        """Number of impacts so far."""
+    @property
+    def left_out(self) -> int:
+        """Number of sounds that were left out because there were too many."""
 
 @final
 class Boid:
@@ -1929,6 +2132,7 @@ class World:
         gravity_scale: float = 1.0,
         locked: Sequence[LockedAxis] | None = None,
         non_spinning: bool = False,
+        intersect: Intersect | None = None,
     ) -> RigidBody:
         """Adds a body that moves.
 
@@ -1944,7 +2148,8 @@ class World:
         sensor: no contacts; ``events`` reports the bodies that overlap it. inertia: about the center of
         mass, shape (3, 3) or (3,), kg·m², by default that of a uniform body; center_of_mass: in the
         frame of the shape, shape (3,), m; gravity_scale, locked: as the properties of a body. non_spinning: locks all
-        rotations, so that forces and impulses act on the center of mass alone.
+        rotations, so that forces and impulses act on the center of mass alone. intersect: an object of a subclass of
+        ``tumble.Intersect``, the body's own intersection test; the shape then surrounds the true surface.
         """
     def add_static(
         self,
@@ -1960,9 +2165,10 @@ class World:
         group: int = 0,
         mask: int | Sequence[int] | None = None,
         sensor: bool = False,
+        intersect: Intersect | None = None,
     ) -> RigidBody:
         """Adds geometry that never moves. name, position, orientation, restitution, friction, contacts,
-        group, mask, sensor: as in ``add_rigid``.
+        group, mask, sensor, intersect: as in ``add_rigid``.
         """
     def add_articulation(
         self, articulation: Articulation | ArticulationBuilder | _Path, base: ArrayLike | None = None, *, name: str | None = None
@@ -2065,7 +2271,7 @@ class World:
     @property
     def sensors(self) -> Sensors:
         """The readings of all measuring sensors by name, after the last step."""
-    def remove(self, body: RigidBody | Articulation | Joint | Sensor | SpringMesh | ParticleSystem | Flock | Boid | str) -> None:
+    def remove(self, body: _Object | Sensor) -> None:
         """Removes an object, given as a handle or by name, or a force, a field or a behavior by name. Handles
         of a removed object raise ``RemovedError``. Joints of a removed body stay, without effect.
         """
@@ -2163,6 +2369,49 @@ class World:
         ``desired_speed`` (m/s), ``speed_rate`` (1/s); ``boundary_center`` (m), ``boundary_radius`` (m),
         ``boundary_stiffness`` (N/m) of a soft sphere around the flock.
         """
+    def add_body_flock(self, name: str = "", **steering: Any) -> BodyFlock:
+        """Adds a flock of rigid bodies without bodies and returns its handle; ``BodyFlock.add`` adds bodies of the world.
+
+        Keywords are the constants of the forces, as in ``add_flock``, and of the helm: ``agility``, rate at which the orientation
+        approaches the wanted one (1/s); ``max_angular_acceleration`` (rad/s²); ``bank_time``, seconds of the rate of turn that are a
+        quarter turn of bank; ``up``, the direction that is up for a body without bank.
+        """
+    def add_event(
+        self,
+        name: str,
+        when: Trigger,
+        do: list[Action | Callable[[View, Firing], Iterable[Action] | None]] | Action | Callable[[View, Firing], Iterable[Action] | None],
+        *,
+        delay: float = 0.0,
+        times: int | None = None,
+    ) -> ScriptedEvent:
+        """Adds a scripted event and returns its handle.
+
+        when: a ``Trigger``. do: a list of ``Action`` and callables, done in this order, callables last. A callable is called after the
+        frame, as ``f(view, firing)`` with a ``View`` and a ``Firing``, and returns None or a list of actions that are done at once.
+        delay: from the trigger to the actions, s. times: how often it fires at most, None for any number. Objects that it names must be
+        in the world.
+        """
+    def add_template(
+        self,
+        name: str,
+        shape: Shape,
+        max: int,
+        *,
+        mass: float | None = None,
+        density: float | None = None,
+        restitution: float = 0.0,
+        friction: float = 0.5,
+        reuse: bool = False,
+        color: ArrayLike | None = None,
+    ) -> Template:
+        """Adds equal rigid bodies for events to spawn, and returns their template.
+
+        max: the largest number that is there at a time, 1 to 10,000. reuse: whether the oldest one is spawned again when all are there.
+        mass, density, restitution, friction: as in ``add_rigid``. color: sRGB, each 0 to 1.
+        """
+    def press(self, key: str) -> bool:
+        """Presses a key for the events that wait for it; they fire at the end of the next step. Returns whether there are any."""
     def add_field(
         self, name: str, field: Field, *, targets: Sequence[_Body | SpringMesh | Boid] | None = None
     ) -> None:

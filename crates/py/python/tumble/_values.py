@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from tumble._native import Articulation, Joint, RigidBody
+    from tumble._native import Articulation, Joint, RigidBody, ScriptedEvent, Shape
     from tumble.typing import EventKind
 
 
@@ -49,8 +49,8 @@ class Event(NamedTuple):
 
     kind: EventKind
     """What happened."""
-    a: RigidBody | Articulation | Joint
-    """The body that was added first, the sensor, the body that fell asleep or woke, or the joint that broke."""
+    a: RigidBody | Articulation | Joint | ScriptedEvent
+    """The body that was added first, the sensor, the body that fell asleep or woke, the joint that broke, or the scripted event that fired."""
     b: RigidBody | Articulation | None
     """The other body; None for sleep and joints."""
     parts: tuple[int, int]
@@ -59,6 +59,38 @@ class Event(NamedTuple):
     """Impulse on ``a`` over the step, world axes, shape (3,), N·s; zero for all but contacts that begin or persist."""
     point: NDArray[np.float64]
     """The contact point with the largest impulse, world, shape (3,), m; zero like the impulse."""
+
+
+class Firing(NamedTuple):
+    """What made an event fire, for a callable of ``World.add_event``."""
+
+    event: str
+    """Name of the event."""
+    other: str | None
+    """Name of the body that made it fire: the visitor of a sensor, or the second side of a contact."""
+    time: float
+    """Simulated time, s."""
+    impulse: NDArray[np.float64]
+    """Impulse of the contact on the other body over the step, world axes, shape (3,), N·s; zero without a contact."""
+    point: NDArray[np.float64]
+    """The contact point with the largest impulse, world, shape (3,), m; zero without a contact."""
+
+
+class IntersectPart(NamedTuple):
+    """A part that takes part in an intersection test of Python: see ``Intersect``."""
+
+    name: str
+    """Name of its object, empty if the world made it."""
+    part: int
+    """Its number in the object."""
+    position: NDArray[np.float64]
+    """Origin of its frame in the world, shape (3,), m: for a rigid body the center of mass of its uniform shape."""
+    orientation: NDArray[np.float64]
+    """Part to world, unit quaternion (x, y, z, w)."""
+    rotation: NDArray[np.float64]
+    """The same as a matrix, shape (3, 3)."""
+    shape: Shape
+    """Its shape in its frame."""
 
 
 class SphereLevel(NamedTuple):

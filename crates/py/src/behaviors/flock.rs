@@ -49,6 +49,16 @@ pub fn steering(mut of: Steering, given: Option<&Bound<'_, PyDict>>) -> Result<S
     Ok(of)
 }
 
+/// Returns the constants by name.
+pub fn steering_dict(py: Python<'_>, mut of: Steering) -> Result<Bound<'_, PyDict>> {
+    let dict = PyDict::new(py);
+    for (name, constant) in CONSTANTS {
+        dict.set_item(name, *constant(&mut of))?;
+    }
+    dict.set_item("boundary_center", vector(py, &of.boundary_center))?;
+    Ok(dict)
+}
+
 /// A flock of a world: boids that keep together, and the forces on them.
 ///
 /// A handle without data of its own, made by ``World.add_flock``.
@@ -107,13 +117,8 @@ impl PyFlock {
     /// next step on.
     #[getter]
     fn steering<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
-        let mut of = self.place.read(|inner| inner.world.get::<Flock>(self.place.id).map(|flock| *flock.steering()))?;
-        let dict = PyDict::new(py);
-        for (name, constant) in CONSTANTS {
-            dict.set_item(name, *constant(&mut of))?;
-        }
-        dict.set_item("boundary_center", vector(py, &of.boundary_center))?;
-        Ok(dict)
+        let of = self.place.read(|inner| inner.world.get::<Flock>(self.place.id).map(|flock| *flock.steering()))?;
+        steering_dict(py, of)
     }
 
     #[setter]

@@ -1,5 +1,6 @@
-//! Soft bodies, particles, flocks and force fields in Python.
+//! Soft bodies, particles, flocks and force fields in Python, and the handles of all objects that are no bodies, joints or sensors.
 
+pub mod body_flock;
 pub mod field;
 pub mod flock;
 pub mod particles;
@@ -9,15 +10,20 @@ pub mod world;
 use crate::errors::{Error, Result};
 use crate::objects::appearance::palette;
 use crate::objects::place::Place;
+use crate::script::handles::{ScriptedEvent, Template};
 use crate::world::inner::Inner;
 use crate::world::shared::Shared;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 use std::sync::Arc;
-use tumble::behaviors::{Attractor, Boid, Buoyancy, Explosion, Flock, Panels, ParticleSystem, SpringMesh, Wind};
+use tumble::behaviors::{
+    Attractor, BodyFlock, Boid, Buoyancy, Explosion, Flock, Panels, ParticleSystem, SpringMesh, Wind,
+};
 use tumble::collide::Vec3;
-use tumble::dynamics::{Appearance, Material, ObjectId, World as Core};
+use tumble::dynamics::{
+    Appearance, Material, ObjectId, ScriptedEvent as EventObject, Template as TemplateObject, World as Core,
+};
 
 /// The kinds of objects that have handles here.
 #[derive(Clone, Copy)]
@@ -26,7 +32,10 @@ enum Kind {
     Particles,
     Flock,
     Boid,
+    BodyFlock,
     Field,
+    Event,
+    Template,
 }
 
 fn kind(world: &Core, id: ObjectId) -> Option<Kind> {
@@ -35,6 +44,9 @@ fn kind(world: &Core, id: ObjectId) -> Option<Kind> {
         .or_else(|| has(world.get::<ParticleSystem>(id).is_some(), Kind::Particles))
         .or_else(|| has(world.get::<Flock>(id).is_some(), Kind::Flock))
         .or_else(|| has(world.get::<Boid>(id).is_some(), Kind::Boid))
+        .or_else(|| has(world.get::<BodyFlock>(id).is_some(), Kind::BodyFlock))
+        .or_else(|| has(world.get::<EventObject>(id).is_some(), Kind::Event))
+        .or_else(|| has(world.get::<TemplateObject>(id).is_some(), Kind::Template))
         .or_else(|| {
             let field = world.get::<Wind>(id).is_some()
                 || world.get::<Attractor>(id).is_some()
@@ -58,6 +70,9 @@ pub fn handle(py: Python<'_>, shared: &Arc<Shared>, name: &str) -> Result<Option
         Kind::Particles => Py::new(py, particles::Particles::new(py, place)?)?.into_any(),
         Kind::Flock => Py::new(py, flock::PyFlock::new(py, place)?)?.into_any(),
         Kind::Boid => Py::new(py, flock::PyBoid::new(py, place)?)?.into_any(),
+        Kind::BodyFlock => Py::new(py, body_flock::PyBodyFlock::new(py, place)?)?.into_any(),
+        Kind::Event => Py::new(py, ScriptedEvent::new(py, place)?)?.into_any(),
+        Kind::Template => Py::new(py, Template::new(py, place)?)?.into_any(),
         Kind::Field => name.into_pyobject(py).map_err(PyErr::from)?.into_any().unbind(),
     }))
 }
@@ -71,17 +86,25 @@ pub fn own_place(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<Optio
             Ok(id.map(|id| Place { shared: shared.clone(), id, name: name.as_str().into() }))
         });
     }
+    let Some(place) = handle_place(value) else { return Ok(None) };
+    match Arc::ptr_eq(&place.shared, shared) {
+        true => place.status().map(|_| Some(place)),
+        false => Err(Error::value(format!("'{}' belongs to another world", place.name))),
+    }
+}
+
+/// Returns the place of a handle of a behavior, of any world; `None` if it is something else.
+pub fn handle_place(value: &Bound<'_, PyAny>) -> Option<Place> {
     let place = value
         .cast::<soft::Soft>()
         .map(|handle| handle.get().place.clone())
         .or_else(|_| value.cast::<particles::Particles>().map(|handle| handle.get().place.clone()))
         .or_else(|_| value.cast::<flock::PyFlock>().map(|handle| handle.get().place.clone()))
-        .or_else(|_| value.cast::<flock::PyBoid>().map(|handle| handle.get().place.clone()));
-    let Ok(place) = place else { return Ok(None) };
-    match Arc::ptr_eq(&place.shared, shared) {
-        true => place.status().map(|_| Some(place)),
-        false => Err(Error::value(format!("'{}' belongs to another world", place.name))),
-    }
+        .or_else(|_| value.cast::<flock::PyBoid>().map(|handle| handle.get().place.clone()))
+        .or_else(|_| value.cast::<body_flock::PyBodyFlock>().map(|handle| handle.get().place.clone()))
+        .or_else(|_| value.cast::<ScriptedEvent>().map(|handle| handle.get().place.clone()))
+        .or_else(|_| value.cast::<Template>().map(|handle| handle.get().place.clone()));
+    place.ok()
 }
 
 /// Returns the place of an object that was just added.

@@ -12,7 +12,6 @@ use pyo3::types::PyString;
 use std::sync::Arc;
 use tumble::behaviors::{Cloth, Jelly, SpringMesh};
 use tumble::collide::{Pose, Vec3};
-use tumble::dynamics::Renderable;
 
 /// A cloth or a jelly of a world: point masses, the nodes, joined by springs. Node ``i + nx·(j + ny·k)`` is
 /// number ``i`` along x, ``j`` along y and ``k`` along z.

@@ -1,110 +1,20 @@
-//! Forces and behaviors written in Python (the thesis's extensibility, §IV.A.2).
+//! Forces, behaviors and callables written in Python (the thesis's extensibility, §IV.A.2).
 //!
 //! A force is an object of the world, like one written in Rust: it is evaluated in every stage of
 //! every integrator. A behavior is called once before each frame, and its forces act during that
-//! frame. Both get a [`View`]. An exception from Python is kept and raised by the step with its
+//! frame. Both get a [`View`](crate::extension::view::View). An exception from Python is kept and raised by the step with its
 //! traceback. The frame runs to its end without that force, and then the world returns to its state
 //! before the frame.
 
 use crate::errors::{Error, Result};
-use crate::extension::columns::Arrays;
-use crate::extension::layout::Layout;
-use crate::extension::view::View;
+use crate::extension::code::{Code, lock};
+use crate::extension::intersect::PythonTest;
 use crate::world::gc::Callable;
 use crate::world::inner::Inner;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use std::sync::{Arc, Mutex, MutexGuard};
-use tumble::dynamics::{ForceGenerator, Forces, Mode, Object, ObjectId, StateRange, WorldView, Wrench};
-
-/// A Python object that is called, the layout of its rows, and its pending exception.
-struct Code {
-    name: String,
-    object: Callable,
-    layout: Mutex<Option<Arc<Layout>>>,
-    /// From the previous call.
-    arrays: Mutex<Option<Arc<Arrays>>>,
-    raised: Mutex<Option<PyErr>>,
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
-}
-
-impl Code {
-    fn new(name: &str, object: &Bound<'_, PyAny>) -> Code {
-        Code::of(name, Arc::new(object.clone().unbind()))
-    }
-
-    fn of(name: &str, object: Callable) -> Code {
-        Code { name: name.into(), object, layout: Mutex::default(), arrays: Mutex::default(), raised: Mutex::default() }
-    }
-
-    /// Returns the copy for a fork of the world, from the object's own `fork`. An exception there
-    /// is kept like that of a call.
-    fn fork(&self, method: &str) -> Code {
-        let fork = |py: Python<'_>| {
-            let object = self.object.call_method0(py, "fork")?;
-            match object.getattr(py, method).is_ok() && object.getattr(py, "fork").is_ok() {
-                true => Ok(object),
-                false => Err(PyErr::from(Error::value(format!(
-                    "'{}': `fork` must return an object with `{method}` and `fork`",
-                    self.name
-                )))),
-            }
-        };
-        Python::attach(|py| match fork(py) {
-            Ok(object) => Code::of(&self.name, Arc::new(object)),
-            Err(error) => Code { raised: Mutex::new(Some(error)), ..Code::of(&self.name, self.object.clone()) },
-        })
-    }
-
-    fn layout(&self, world: &WorldView) -> Arc<Layout> {
-        let mut kept = lock(&self.layout);
-        match &*kept {
-            Some(layout) if layout.fits(world) => layout.clone(),
-            _ => kept.insert(Arc::new(Layout::of(world))).clone(),
-        }
-    }
-
-    /// Calls a method with a view. `each` receives the added forces by part.
-    fn call(
-        &self,
-        world: &WorldView,
-        method: &str,
-        rows: Option<&[i64]>,
-        mut each: impl FnMut(usize, Wrench),
-    ) -> Result<()> {
-        let layout = self.layout(world);
-        Python::attach(|py| {
-            let arrays = match lock(&self.arrays).take().filter(|arrays| arrays.free(py, layout.len())) {
-                Some(arrays) => arrays,
-                None => Arc::new(Arrays::new(py, layout.len())?),
-            };
-            arrays.fill(py, &layout.shown(world.part_states))?;
-            let view = Bound::new(py, View::new(world, &layout, &arrays))?;
-            let object = self.object.bind(py);
-            let outcome = match rows {
-                Some(rows) => object.call_method1(method, (&view, numpy::PyArray1::from_slice(py, rows))),
-                None => object.call_method1(method, (&view,)),
-            };
-            view.get().end();
-            drop(view);
-            if !outcome?.is_none() {
-                return Err(Error::value(format!(
-                    "'{}': `{method}` must return None; add what it does to view.force and view.torque",
-                    self.name
-                )));
-            }
-            arrays.take(py, &layout, &self.name, |row, wrench| {
-                let (part_index, wrench) = layout.at_part(row, world.part_states, wrench);
-                each(part_index, wrench);
-            })?;
-            *lock(&self.arrays) = Some(arrays);
-            Ok(())
-        })
-    }
-}
+use std::sync::Arc;
+use tumble::dynamics::{ForceGenerator, Forces, Mode, Object, ObjectId, StateRange, World, WorldView, Wrench};
 
 /// A force written in Python as an object of the world.
 struct PythonForce {
@@ -150,8 +60,11 @@ pub fn empty_force(name: &str) -> Box<dyn Object> {
     Box::new(PythonForce { code: Code::of(name, nobody) })
 }
 
-/// Names and objects of forces; names, objects and bodies of behaviors.
-pub type Extensions = (Vec<(String, Py<PyAny>)>, Vec<(String, Py<PyAny>, Vec<String>)>);
+/// Python objects by the name of the object of the world that calls them.
+type Named = Vec<(String, Py<PyAny>)>;
+
+/// Names and objects of forces; names, objects and bodies of behaviors; callables of events; intersection tests of bodies.
+pub type Extensions = (Named, Vec<(String, Py<PyAny>, Vec<String>)>, Named, Named);
 
 /// The result of `__reduce__`: the function that makes the world, its arguments, and the state for
 /// `__setstate__`.
@@ -163,23 +76,59 @@ struct Attached {
     bodies: Vec<ObjectId>,
 }
 
-/// The forces and behaviors of one world.
+/// A callable of an event.
+struct Called {
+    event: ObjectId,
+    code: Code,
+}
+
+/// The intersection test of a body.
+struct Tested {
+    body: ObjectId,
+    test: Arc<PythonTest>,
+}
+
+/// The callbacks of Python in one world: its forces and behaviors, the callables of events, and the intersection tests of bodies.
 #[derive(Default)]
 pub struct Extension {
     forces: Vec<ObjectId>,
     behaviors: Vec<Attached>,
+    calls: Vec<Called>,
+    tests: Vec<Tested>,
 }
 
 impl Extension {
     /// Returns whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.forces.is_empty() && self.behaviors.is_empty()
+        self.forces.is_empty() && self.behaviors.is_empty() && self.calls.is_empty() && self.tests.is_empty()
     }
 
-    /// Returns the copy for a fork of the world.
-    pub fn fork(&self) -> Extension {
+    /// Returns the copy for a fork of the world, whose bodies get tests of their own.
+    pub fn fork(&self, world: &mut World) -> Extension {
         let attached = |a: &Attached| Attached { code: a.code.fork("act"), bodies: a.bodies.clone() };
-        Extension { forces: self.forces.clone(), behaviors: self.behaviors.iter().map(attached).collect() }
+        let called = |c: &Called| Called { event: c.event, code: c.code.fork_callable() };
+        let mut fork = Extension {
+            forces: self.forces.clone(),
+            behaviors: self.behaviors.iter().map(attached).collect(),
+            calls: self.calls.iter().map(called).collect(),
+            tests: Vec::new(),
+        };
+        self.tests.iter().for_each(|tested| fork.set_test(world, tested.body, tested.test.object.clone()));
+        fork
+    }
+
+    /// Gives a body of a world an intersection test.
+    fn set_test(&mut self, world: &mut World, body: ObjectId, object: Callable) {
+        let test = Arc::new(PythonTest::new(object));
+        if world.set_intersect(body, Some(test.clone())).is_ok() {
+            self.tests.push(Tested { body, test });
+        }
+    }
+
+    /// Drops what belongs to a removed object.
+    pub fn forget(&mut self, id: ObjectId) {
+        self.calls.retain(|called| called.event != id);
+        self.tests.retain(|tested| tested.body != id);
     }
 }
 
@@ -189,15 +138,47 @@ impl Inner {
         let forces =
             self.extension.forces.iter().filter_map(|&id| self.world.get::<PythonForce>(id)).map(|force| &force.code);
         let codes = forces.chain(self.extension.behaviors.iter().map(|b| &b.code));
-        let mut raised: Vec<PyErr> = codes.filter_map(|code| lock(&code.raised).take()).collect();
+        let codes = codes.chain(self.extension.calls.iter().map(|called| &called.code));
+        let tests = self.extension.tests.iter().filter_map(|tested| tested.test.take_raised());
+        let mut raised: Vec<PyErr> = codes.filter_map(|code| lock(&code.raised).take()).chain(tests).collect();
         if raised.is_empty() { Ok(()) } else { Err(raised.swap_remove(0).into()) }
     }
 
-    /// Runs one frame with behaviors before it and forces in it.
+    /// Runs one frame with behaviors before it, forces and tests in it, and callables of events after it.
     pub fn extended_frame(&mut self) -> Result<()> {
         self.behave()?;
         let outcome = self.frame();
-        self.take_raised().and(outcome)
+        self.take_raised().and(outcome)?;
+        self.call_back()?;
+        self.take_raised()
+    }
+
+    /// Adds callables of an event.
+    pub fn add_calls(&mut self, event: ObjectId, callables: &[Bound<'_, PyAny>]) {
+        let name = self.world.name(event).unwrap_or_default().to_string();
+        let called = callables.iter().map(|object| Called { event, code: Code::new(&name, object) });
+        self.extension.calls.extend(called);
+    }
+
+    /// Returns the name of the first event with a callable.
+    pub fn called_event(&self) -> Option<&str> {
+        self.world.name(self.extension.calls.first()?.event)
+    }
+
+    /// Returns the numbers of the callables of an event.
+    pub fn calls_of(&self, event: ObjectId) -> Vec<usize> {
+        let calls = self.extension.calls.iter().enumerate();
+        calls.filter(|(_, called)| called.event == event).map(|(k, _)| k).collect()
+    }
+
+    /// Returns a callable by its number.
+    pub fn call(&self, number: usize) -> &Code {
+        &self.extension.calls[number].code
+    }
+
+    /// Gives a body an intersection test; it must have `contacts`.
+    pub fn add_test(&mut self, body: ObjectId, object: &Bound<'_, PyAny>) {
+        self.extension.set_test(&mut self.world, body, Arc::new(object.clone().unbind()));
     }
 
     fn behave(&mut self) -> Result<()> {
@@ -268,7 +249,15 @@ impl Inner {
     pub fn callables(&self) -> Vec<Callable> {
         let forces =
             self.extension.forces.iter().filter_map(|&id| self.world.get::<PythonForce>(id)).map(|force| &force.code);
-        forces.chain(self.extension.behaviors.iter().map(|b| &b.code)).map(|code| code.object.clone()).collect()
+        let codes = forces.chain(self.extension.behaviors.iter().map(|b| &b.code));
+        let codes = codes.chain(self.extension.calls.iter().map(|called| &called.code));
+        let tests = self.extension.tests.iter().map(|tested| tested.test.object.clone());
+        codes.map(|code| code.object.clone()).chain(tests).collect()
+    }
+
+    /// Returns the objects that an archive writes without what Python adds to them.
+    pub fn foreign(&self) -> Vec<ObjectId> {
+        self.extension.forces.iter().copied().chain(self.extension.tests.iter().map(|tested| tested.body)).collect()
     }
 
     /// Returns the objects of the world that are forces written in Python.
@@ -289,11 +278,26 @@ impl Inner {
             (b.code.name.clone(), b.code.object.clone_ref(py), b.bodies.iter().filter_map(name).collect())
         };
         let behaviors = self.extension.behaviors.iter().map(of).collect();
-        (!self.extension.is_empty()).then_some((forces, behaviors))
+        let calls = self.extension.calls.iter().map(|c| (c.code.name.clone(), c.code.object.clone_ref(py))).collect();
+        let tests = self.extension.tests.iter();
+        let tests = tests.filter_map(|t| Some((name(&t.body)?, t.test.object.clone_ref(py)))).collect();
+        (!self.extension.is_empty()).then_some((forces, behaviors, calls, tests))
     }
 
     /// Sets the objects of restored forces and adds behaviors.
-    pub fn unpickle_extensions(&mut self, py: Python<'_>, (forces, behaviors): Extensions) -> Result<()> {
+    pub fn unpickle_extensions(&mut self, py: Python<'_>, extensions: Extensions) -> Result<()> {
+        let (forces, behaviors, calls, tests) = extensions;
+        let find = |world: &World, name: &str| {
+            world.find(name).ok_or_else(|| Error::value(format!("the pickled world has no object '{name}'")))
+        };
+        for (name, object) in calls {
+            let event = find(&self.world, &name)?;
+            self.add_calls(event, &[object.into_bound(py)]);
+        }
+        for (name, object) in tests {
+            let body = find(&self.world, &name)?;
+            self.add_test(body, object.bind(py));
+        }
         for (name, object) in forces {
             let id = self.world.find(&name).filter(|id| self.extension.forces.contains(id));
             let force = id.and_then(|id| self.world.get_mut::<PythonForce>(id));
@@ -310,9 +314,12 @@ impl Inner {
 
     /// Removes all forces and behaviors and returns them for the caller to drop.
     pub fn take_extension(&mut self) -> impl Send + use<> {
-        let Extension { forces, behaviors } = std::mem::take(&mut self.extension);
+        let Extension { forces, behaviors, calls, tests } = std::mem::take(&mut self.extension);
+        for tested in &tests {
+            let _ = self.world.set_intersect(tested.body, None); // an error is a body that was removed
+        }
         let forces: Vec<Option<Box<dyn Object>>> = forces.into_iter().map(|id| self.world.remove(id).ok()).collect();
-        (forces, behaviors)
+        (forces, behaviors, calls, tests)
     }
 
     /// Returns names and objects of the forces, then of the behaviors, in the order of addition.

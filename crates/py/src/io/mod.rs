@@ -4,4 +4,5 @@ pub mod orbit;
 pub mod picture;
 pub mod recording;
 pub mod slow;
+pub mod sound;
 pub mod window;

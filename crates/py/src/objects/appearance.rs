@@ -44,7 +44,8 @@ pub fn colored(body: Rigid, color: [f64; 3]) -> Rigid {
     looking(body, Appearance { color: color.map(|c| c as f32), ..Appearance::default() })
 }
 
-fn looking(body: Rigid, appearance: Appearance) -> Rigid {
+/// Returns the body with an appearance.
+pub fn looking(body: Rigid, appearance: Appearance) -> Rigid {
     let visuals = body
         .visuals()
         .iter()

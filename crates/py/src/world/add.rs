@@ -63,8 +63,18 @@ pub fn rigid(name: &str, shape: &Shape, mass: Option<f64>, density: Option<f64>,
     }
 }
 
-/// Adds a body and returns its handle.
-pub fn add(shared: &Arc<Shared>, py: Python<'_>, body: Rigid, mode: Mode, collidable: bool) -> Result<RigidBody> {
+/// Adds a body, with its intersection test if it has one, and returns its handle.
+pub fn add(
+    shared: &Arc<Shared>,
+    py: Python<'_>,
+    body: Rigid,
+    mode: Mode,
+    collidable: bool,
+    intersect: Option<&Bound<'_, PyAny>>,
+) -> Result<RigidBody> {
+    if let Some(test) = intersect {
+        py.import("tumble._extension")?.call_method1("check_intersect", (test,))?;
+    }
     let place = shared.write(py, |inner| {
         let body = appearance::usual(body, inner.world.ids().len());
         let id = inner.world.add_boxed(Box::new(body), mode)?;
@@ -72,6 +82,12 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, body: Rigid, mode: Mode, collid
         let name = inner.world.name(id).unwrap_or_default().into();
         Ok(Place { shared: shared.clone(), id, name })
     })?;
+    if let Some(test) = intersect {
+        shared.extend(py, |inner| {
+            inner.add_test(place.id, test);
+            Ok(())
+        })?;
+    }
     RigidBody::new(py, place)
 }
 

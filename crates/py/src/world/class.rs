@@ -775,9 +775,10 @@ impl World {
     /// sensor: no contacts; ``events`` reports the bodies that overlap it. inertia: about the center of
     /// mass, shape (3, 3) or (3,), kg·m², by default that of a uniform body; center_of_mass: in the
     /// frame of the shape, shape (3,), m; gravity_scale, locked: as the properties of a body. non_spinning: locks all
-    /// rotations, so that forces and impulses act on the center of mass alone.
+    /// rotations, so that forces and impulses act on the center of mass alone. intersect: an object of a subclass of
+    /// ``tumble.Intersect``, the body's own intersection test; the shape then surrounds the true surface.
     #[pyo3(signature = (name=None, shape=None, mass=None, density=None, position=None, orientation=None, velocity=None, angular_velocity=None, restitution=0.0,
-        friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface", group=0, mask=None, sensor=false, inertia=None, center_of_mass=None, gravity_scale=1.0, locked=None, non_spinning=false))]
+        friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface", group=0, mask=None, sensor=false, inertia=None, center_of_mass=None, gravity_scale=1.0, locked=None, non_spinning=false, intersect=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_rigid(
         &self,
@@ -805,6 +806,7 @@ impl World {
         gravity_scale: f64,
         locked: Option<Vec<String>>,
         non_spinning: bool,
+        intersect: Option<&Bound<'_, PyAny>>,
     ) -> Result<RigidBody> {
         let (name, shape) = named_shape(name, shape)?;
         let mode = if kinematic { Mode::Kinematic } else { Mode::Dynamic };
@@ -834,12 +836,13 @@ impl World {
         if let Some(center) = center_of_mass {
             body = body.with_center_of_mass(vec3(center, "center_of_mass")?);
         }
-        add(&self.shared, py, body.with_velocity(motion[0]).with_angular_velocity(motion[1]), mode, collidable)
+        let body = body.with_velocity(motion[0]).with_angular_velocity(motion[1]);
+        add(&self.shared, py, body, mode, collidable, intersect)
     }
 
     /// Adds geometry that never moves. name, position, orientation, restitution, friction, contacts,
-    /// group, mask, sensor: as in ``add_rigid``.
-    #[pyo3(signature = (name=None, shape=None, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true, contacts="surface", group=0, mask=None, sensor=false))]
+    /// group, mask, sensor, intersect: as in ``add_rigid``.
+    #[pyo3(signature = (name=None, shape=None, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true, contacts="surface", group=0, mask=None, sensor=false, intersect=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_static(
         &self,
@@ -855,6 +858,7 @@ impl World {
         #[pyo3(from_py_with = whole_number)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
         sensor: bool,
+        intersect: Option<&Bound<'_, PyAny>>,
     ) -> Result<RigidBody> {
         let (name, shape) = named_shape(name, shape)?;
         let pose = pose(position, orientation)? * shape.placement;
@@ -865,7 +869,7 @@ impl World {
             .with_contact_mode(meaning("contacts", contacts, ContactMode::NAMES)?)
             .with_groups(query::group(group)?, query::mask(mask)?)
             .with_sensor(sensor);
-        add(&self.shared, py, body, Mode::Static, collidable)
+        add(&self.shared, py, body, Mode::Static, collidable, intersect)
     }
 
     /// Adds an articulated body and returns its handle.
@@ -1027,7 +1031,8 @@ impl World {
                 None => own_place(&self.shared, body)?,
             },
         };
-        place.write(py, |inner| {
+        place.status()?;
+        self.shared.extend(py, |inner| {
             inner.world.remove(place.id)?;
             inner.forget(place.id);
             Ok(())

@@ -1,10 +1,11 @@
 //! The contacts of the last step as one structured numpy array.
 
 use crate::arrays::convert::vector;
+use crate::behaviors;
 use crate::choices::word;
 use crate::errors::Result;
 use crate::objects::bodies::handle;
-use crate::objects::place::{body_ids, found};
+use crate::objects::place::{Found, body_ids, found};
 use crate::world::inner::Inner;
 use crate::world::shared::Shared;
 use numpy::PyArray1;
@@ -85,12 +86,20 @@ pub fn events(shared: &Arc<Shared>, py: Python<'_>) -> Result<Vec<Py<PyAny>>> {
     })?;
     let class = py.import("tumble._values")?.getattr("Event")?;
     let tuple = |(event, a, b, parts): (Event, _, Option<_>, (i64, i64))| {
-        let a = handle(py, shared, a)?;
+        let a = event_side(py, shared, a)?;
         let b = b.map(|b| handle(py, shared, b)).transpose()?;
         let kind = word(event.kind, EventKind::NAMES);
         Ok(class.call1((kind, a, b, parts, vector(py, &event.impulse), vector(py, &event.point)))?.unbind())
     };
     all.into_iter().map(tuple).collect()
+}
+
+/// Returns the handle of the first side of an event: a body, a joint, or a scripted event.
+fn event_side(py: Python<'_>, shared: &Arc<Shared>, found: Found) -> Result<Py<PyAny>> {
+    match behaviors::handle(py, shared, &found.name)? {
+        Some(other) => Ok(other),
+        None => handle(py, shared, found),
+    }
 }
 
 /// Returns the handles of the bodies in contact with a body, or in a sensor.

@@ -21,7 +21,7 @@ pub struct Inner {
     pub robots: BTreeMap<ObjectId, Arc<Robot>>,
     /// Generalized forces that act on articulated bodies in every frame.
     pub efforts: BTreeMap<ObjectId, Vec<f64>>,
-    /// Forces and behaviors written in Python.
+    /// The callbacks of Python in the world: forces, behaviors, callables and intersection tests.
     pub extension: Extension,
     /// The array through which Python sees the state.
     pub shown: Shown,
@@ -54,12 +54,14 @@ impl Inner {
 
     /// Returns an independent copy without arrays.
     pub fn fork(&self) -> Inner {
+        let mut world = self.world.fork();
+        let extension = self.extension.fork(&mut world);
         Inner {
-            world: self.world.fork(),
+            world,
             scene: self.scene.clone(),
             robots: self.robots.clone(),
             efforts: self.efforts.clone(),
-            extension: self.extension.fork(),
+            extension,
             shown: Shown::default(),
             notes: self.notes.clone(),
             overlaps: self.overlaps.clone(),
@@ -122,6 +124,7 @@ impl Inner {
     pub fn forget(&mut self, id: ObjectId) {
         self.robots.remove(&id);
         self.efforts.remove(&id);
+        self.extension.forget(id);
     }
 
     /// Writes the whole state, or nothing on an error.

@@ -17,7 +17,7 @@ use tumble::dynamics::{ArchiveError, ArticulatedBody, ObjectId, World as Core};
 use tumble::scene::{CameraSpec, CavePlace, GroundSpec, LightSpec, SceneFile, SkySpec};
 
 /// The first bytes of a pickled world and a pickled shape. The number is raised with every change of their content.
-const WORLD: &[u8; 8] = b"tumbleW2";
+const WORLD: &[u8; 8] = b"tumbleW3";
 const SHAPE: &[u8; 8] = b"tumbleG2";
 
 /// A world.
@@ -66,7 +66,7 @@ pub fn write(inner: &Inner) -> Result<Vec<u8>> {
         Some((place, robot.joints.clone(), inner.efforts.get(id).cloned()))
     });
     let record = Record {
-        archive: inner.world.archive(inner.forces())?,
+        archive: inner.world.archive(&inner.foreign())?,
         scene: SceneRecord::of(&inner.scene),
         robots: robots.collect(),
         notes: inner.notes.clone(),
@@ -79,7 +79,9 @@ pub fn write(inner: &Inner) -> Result<Vec<u8>> {
 pub fn model(inner: &Inner) -> Result<Vec<u8>> {
     match inner.extension.is_empty() {
         true => write(inner),
-        false => Err(Error::value("forces and behaviors in Python are no part of a model; pickle the world instead")),
+        false => Err(Error::value(
+            "forces, behaviors, callables and intersection tests in Python are no part of a model; pickle the world instead",
+        )),
     }
 }
 
@@ -87,9 +89,13 @@ pub fn model(inner: &Inner) -> Result<Vec<u8>> {
 pub fn read(bytes: &[u8]) -> Result<Inner> {
     let record: Record = open(WORLD, bytes)?;
     let mut forces = Vec::new();
-    let world = Core::from_archive(&record.archive, &mut |name| {
-        forces.push(name.to_string());
-        Some(crate::extension::callbacks::empty_force(name))
+    let world = Core::from_archive(&record.archive, &mut |object| {
+        tumble::behaviors::read_object(object).or_else(|| {
+            object.record.is_none().then(|| {
+                forces.push(object.name.to_string());
+                crate::extension::callbacks::empty_force(object.name)
+            })
+        })
     })?;
     let ids: Vec<ObjectId> = world.ids().to_vec();
     let mut inner = Inner::new(world, Arc::new(record.scene.scene()?));

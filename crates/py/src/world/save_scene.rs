@@ -8,6 +8,11 @@ use tumble::scene::{SaveError, SceneWriter};
 /// Writes a world as a scene and returns notes about things that are not in it.
 pub fn write(inner: &Inner, path: &Path) -> Result<Vec<String>> {
     let name = |id| inner.world.name(id).unwrap_or_default();
+    if let Some(event) = inner.called_event() {
+        return Err(Error::value(format!(
+            "the world cannot be written as a scene, which has no words for callables: '{event}'"
+        )));
+    }
     let mut writer = SceneWriter::new(&inner.world).like(&inner.scene);
     for (&id, robot) in &inner.robots {
         writer = writer.with_joint_names(name(id), robot.joints.clone());

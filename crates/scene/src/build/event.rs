@@ -24,28 +24,18 @@ impl EventSpec {
 /// Sets the part of a link, or its degree of freedom.
 fn set_part(world: &World, spec: &Action<String>, action: &mut Action) {
     let part = |name: &str| place(world, name).map_or(0, |(_, part)| part);
-    match (spec, action) {
-        (Action::Push { body: Subject::Part(name, _), .. }, Action::Push { body: Subject::Part(_, to), .. })
-        | (Action::Force { body: Subject::Part(name, _), .. }, Action::Force { body: Subject::Part(_, to), .. })
-        | (
-            Action::Velocity { body: Subject::Part(name, _), .. },
-            Action::Velocity { body: Subject::Part(_, to), .. },
-        )
-        | (Action::Remove(Subject::Part(name, _)), Action::Remove(Subject::Part(_, to)))
-        | (Action::Recolor { body: Subject::Part(name, _), .. }, Action::Recolor { body: Subject::Part(_, to), .. }) => {
-            *to = part(name);
-        }
-        (Action::Drive { body: name, .. }, Action::Drive { body, dof, .. }) => {
-            let link = name.rsplit_once('/').map(|(_, link)| link);
-            let found = world.get::<ArticulatedBody>(*body).and_then(|body| body.dof_of(link?));
-            *dof = found.unwrap_or(0);
-        }
-        _ => {}
+    if let (Some(Subject::Part(name, _)), Some(Subject::Part(_, to))) = (spec.subject(), action.subject_mut()) {
+        *to = part(name);
+    }
+    if let (Action::Drive { body: name, .. }, Action::Drive { body, dof, .. }) = (spec, action) {
+        let link = name.rsplit_once('/').map(|(_, link)| link);
+        let found = world.get::<ArticulatedBody>(*body).and_then(|body| body.dof_of(link?));
+        *dof = found.unwrap_or(0);
     }
 }
 
-/// Returns the object of a name, or the object and part of `OBJECT/LINK`.
-fn place(world: &World, name: &str) -> Option<(ObjectId, usize)> {
+/// Returns the object of a name and its part 0, or the object and part of `OBJECT/LINK`.
+pub fn place(world: &World, name: &str) -> Option<(ObjectId, usize)> {
     if let Some(id) = world.find(name) {
         return Some((id, 0));
     }

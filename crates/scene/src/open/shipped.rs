@@ -56,6 +56,7 @@ const SHIPPED: &[Shipped] = shipped_scenes![
     "sparks",
     "flock",
     "ball_machine",
+    "bird",
 ];
 
 /// Returns the scenes that come with tumble.

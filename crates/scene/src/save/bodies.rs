@@ -27,14 +27,22 @@ impl Writer<'_> {
                 Mode::Kinematic => "kinematic",
             },
         );
-        t.put("shape", self.meshes.shape(body.shape()));
-        if !body.is_fixed() {
-            t.extend(mass(body));
-        }
         t.put_pose(&body.frame_of(&part.pose));
         if status.mode != Mode::Static {
             t.put_unless(Vec3::zeros(), "velocity_m_per_s", center.velocity);
             t.put_unless(Vec3::zeros(), "angular_velocity_rad_per_s", center.angular_velocity);
+        }
+        t.put_unless(true, "collides", status.collidable);
+        t.put_unless(true, "enabled", status.enabled);
+        t.extend(self.constants(name, body));
+        self.out += &t.under("[[body]]");
+    }
+
+    /// Returns the keys that a body and a template have in common: shape, mass, surface, laws and looks.
+    pub(super) fn constants(&mut self, name: &str, body: &RigidBody) -> Table {
+        let mut t = Table::of("shape", self.meshes.shape(body.shape()));
+        if !body.is_fixed() {
+            t.extend(mass(body));
         }
         let (contact, look) = self.surface_of(&body.material, &mut t);
         t.extend(surface::contact(&body.material, &contact));
@@ -44,14 +52,13 @@ impl Writer<'_> {
         t.put_unless(Vec::new(), "locked", locked);
         t.put_unless(0.0, "linear_damping_per_s", body.linear_damping);
         t.put_unless(0.0, "angular_damping_per_s", body.angular_damping);
-        t.put_unless(true, "collides", status.collidable);
         t.extend(surface::groups(body.group, body.mask));
         t.put_unless(false, "sensor", body.sensor);
-        t.put_unless(true, "enabled", status.enabled);
-        let known = self.like.bodies.iter().find(|spec| spec.name == name);
+        let templates = self.like.templates.iter().map(|template| &template.body);
+        let known = self.like.bodies.iter().chain(templates).find(|spec| spec.name == name);
         known.and_then(|spec| spec.sound.as_ref()).iter().for_each(|sound| t.put("sound", *sound));
         t.extend(self.look(name, body, &look));
-        self.out += &t.under("[[body]]");
+        t
     }
 
     /// Returns contact constants and appearance of the material that a part names, and writes its

@@ -61,7 +61,7 @@ impl Writer<'_> {
 
     /// Returns the name of the part of a side, and its frame in the frame of the body or link;
     /// no name for the world.
-    fn anchor(&mut self, side: &Anchor) -> (Option<String>, Pose) {
+    pub(super) fn anchor(&mut self, side: &Anchor) -> (Option<String>, Pose) {
         let Anchor { part, frame } = side;
         let Some((id, part)) = *part else { return (None, *frame) };
         let Some(name) = self.world.name(id).map(str::to_owned) else {
@@ -144,7 +144,7 @@ impl Writer<'_> {
 
 /// Returns the name of the link that carries a part, and the pose of its frame in that of the moving
 /// link or the base.
-fn link_name(body: &ArticulatedBody, part: usize) -> Option<(&str, Pose)> {
+pub(super) fn link_name(body: &ArticulatedBody, part: usize) -> Option<(&str, Pose)> {
     match body.link_of(part) {
         Some(link) => Some((body.model().links()[link].name.as_str(), Pose::identity())),
         None => body.model().frames().iter().find(|f| f.link.is_none()).map(|f| (f.name.as_str(), f.pose)),

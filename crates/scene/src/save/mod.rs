@@ -14,8 +14,10 @@
 //! compared field by field. A constant that a scene file cannot say is an error that names it.
 
 mod articulated;
+mod behaviors;
 mod bodies;
 mod compare;
+mod events;
 mod joints;
 mod saved;
 mod shapes;
@@ -25,11 +27,14 @@ mod views;
 
 pub use saved::SavedWorld;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use tumble_core::{ArchiveError, ArticulatedBody, LoopJoint, Material, Object, RigidBody, World};
+use tumble_core::{
+    ArchiveError, ArticulatedBody, LoopJoint, Material, Object, ObjectId, RigidBody, ScriptedEvent, Sensor, Template,
+    World,
+};
 
 use crate::notes::Notes;
 use crate::parse::appearance::AppearanceSpec;
@@ -189,7 +194,7 @@ impl Writer<'_> {
         let SceneFile {
             file: _, description: _, world: _, materials: _, meshes: _, bodies: _, articulated: _, loop_joints: _,
             actuators, pairs: _, camera: _, cave: _, lights: _, sky: _, ground: _, notes: _, saved: _,
-            sensors: _, behaviors: _, templates: _, events: _, // their objects are refused below
+            sensors: _, behaviors: _, templates: _, events: _,
         } = self.like;
         if !actuators.is_empty() {
             self.notes.push("the actuators of its model of MuJoCo are not written: scene files have none".into());
@@ -202,14 +207,9 @@ impl Writer<'_> {
         self.material_tables();
         let world = self.world;
         let objects = || world.ids().iter().filter_map(|&id| Some((id, world.name(id)?, world.object(id)?)));
-        let foreign = |object: &dyn Object| {
-            let any: &dyn std::any::Any = object;
-            !(any.is::<RigidBody>() || any.is::<ArticulatedBody>() || any.is::<LoopJoint>())
-        };
-        for (_, name, _) in objects().filter(|(_, _, object)| foreign(*object)) {
-            self.fault(format!("\"{name}\", an object of a type of its own"));
-        }
-        for (id, name, _) in objects() {
+        let templates = || world.ids().iter().filter_map(|&id| world.get::<Template>(id));
+        let spawned: BTreeSet<ObjectId> = templates().flat_map(Template::bodies).copied().collect();
+        for (id, name, _) in objects().filter(|(id, ..)| !spawned.contains(id)) {
             if let Some(body) = world.get::<RigidBody>(id) {
                 self.body(id, name, body);
             }
@@ -224,8 +224,35 @@ impl Writer<'_> {
                 self.loop_joint(id, name, joint);
             }
         }
+        for (id, name, object) in objects() {
+            self.other(id, name, object);
+        }
         self.pairs();
         self.views();
+    }
+
+    /// Writes an object that is no body and no joint.
+    fn other(&mut self, id: ObjectId, name: &str, object: &dyn Object) {
+        let any: &dyn std::any::Any = object;
+        let enabled = self.world.status(id).is_none_or(|status| status.enabled);
+        if let Some(template) = any.downcast_ref::<Template>() {
+            self.template(name, template);
+        } else if let Some(event) = any.downcast_ref::<ScriptedEvent>() {
+            self.event(name, event);
+        } else if let Some(sensor) = any.downcast_ref::<Sensor>() {
+            self.sensor(name, sensor);
+        } else if any.is::<RigidBody>()
+            || any.is::<ArticulatedBody>()
+            || any.is::<LoopJoint>()
+            || self.behavior(id, name)
+        {
+            return;
+        } else {
+            return self.fault(format!("\"{name}\", an object of a type of its own"));
+        }
+        if !enabled {
+            self.fault(format!("\"{name}\", which is disabled"));
+        }
     }
 
     fn fault(&mut self, fault: String) {

@@ -82,7 +82,8 @@ impl SceneFile {
             notes.push(format!("{}: its objects were changed, so it starts from its text", self.file));
             return Ok(None);
         }
-        let mut world = World::from_archive(archive, &mut |_| None).map_err(|e: ArchiveError| e.to_string())?;
+        let mut world = World::from_archive(archive, &mut tumble_behaviors::read_object)
+            .map_err(|e: ArchiveError| e.to_string())?;
         let (ours, read) = (&self.world, &as_read.world);
         if *world.settings() != self.settings() {
             world.set_settings(self.settings()).map_err(|e: WorldError| e.to_string())?;

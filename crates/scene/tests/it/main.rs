@@ -4,6 +4,7 @@ mod articulated;
 mod articulated_world;
 mod bad_input;
 mod behaviors;
+mod bird;
 mod cave_devices;
 mod cave_schema;
 mod caves;

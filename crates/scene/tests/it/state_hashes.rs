@@ -75,6 +75,10 @@ table! {
 // Structures and machines whose steps cost more, or that are known after less.
 table! {
     [0.5, 2.0];
+    ball_machine_time_stepping: "ball_machine", TimeStepping, "5ecf66676422b39a", "405845acd18db798";
+    ball_machine_backtracking: "ball_machine", Backtracking, "36e0fde2a34f7dfa", "602f95bd076b0fe7";
+    bird_time_stepping: "bird", TimeStepping, "9912fa3537bd36e5", "fc79a9efd1447313";
+    bird_backtracking: "bird", Backtracking, "40c04f81ed4da802", "98febadc544f874a";
     card_house_time_stepping: "card_house", TimeStepping, "091b9380060ee20c", "8003317c097996db";
     sparks_time_stepping: "sparks", TimeStepping, "515a77d2df6b5217", "9badcde17809dddb";
     sparks_backtracking: "sparks", Backtracking, "805c8cba100469d4", "6052e84af86ee0f9";

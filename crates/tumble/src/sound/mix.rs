@@ -7,6 +7,8 @@
 //! `s` is the sine of the angle from the middle: −1 at the left, 1 at the right. The sum of the squares of both ears does
 //! not depend on it. Sources are where the contact was; the Doppler effect is left out.
 
+use tumble_scene::SceneFile;
+
 /// Samples per second.
 pub const RATE_HZ: u32 = 48_000;
 /// Speed of sound, m/s.
@@ -24,6 +26,14 @@ pub struct Listener {
 }
 
 impl Listener {
+    /// Hears from the camera of a scene; without one from 3 m before the origin, 1.7 m up.
+    pub fn of_scene(scene: &SceneFile) -> Listener {
+        match &scene.camera {
+            Some(camera) => Listener::looking(camera.eye_m, camera.target_m, camera.up),
+            None => Listener::looking([0.0, -3.0, 1.7], [0.0; 3], [0.0, 0.0, 1.0]),
+        }
+    }
+
     /// Returns a listener at `eye` that looks at `target`, with `up` up. Straight up or down, the right is x.
     pub fn looking(eye: [f64; 3], target: [f64; 3], up: [f64; 3]) -> Listener {
         let [f, u] = [[0, 1, 2].map(|k| target[k] - eye[k]), up];

@@ -6,6 +6,7 @@ use super::{Listener, MAX_SECONDS, Mixed, RATE_HZ, Rub, SoundBody, SoundError, S
 use std::collections::BTreeMap;
 use tumble_core::collide::{Shape, Vec3};
 use tumble_core::{EventKind, ObjectId, RigidBody, World};
+use tumble_scene::SceneFile;
 
 /// Largest number of strikes and of rubs; later ones are not heard.
 const MAX_VOICES: usize = 2_000_000;
@@ -96,6 +97,25 @@ impl Soundtrack {
     /// Begins a soundtrack. `materials` names the material of bodies; the others have that of their density.
     pub fn new(materials: BTreeMap<String, SoundMaterial>) -> Soundtrack {
         Soundtrack { materials, ..Soundtrack::default() }
+    }
+
+    /// Begins a soundtrack with the `sound` of the bodies, templates and materials of a scene.
+    pub fn of_scene(scene: &SceneFile) -> Soundtrack {
+        let mut materials = BTreeMap::new();
+        let mut add = |name: String, material: Option<usize>, own: Option<&str>| {
+            let of_material = material.and_then(|k| scene.materials[k].sound.as_deref());
+            materials.extend(own.or(of_material).and_then(SoundMaterial::of_name).map(|sound| (name, sound)));
+        };
+        scene.bodies.iter().for_each(|body| add(body.name.clone(), body.material, body.sound.as_deref()));
+        for template in &scene.templates {
+            template.names().for_each(|name| add(name, template.body.material, template.body.sound.as_deref()));
+        }
+        Soundtrack::new(materials)
+    }
+
+    /// Sets the material of a body by its name.
+    pub fn set_material(&mut self, body: impl Into<String>, material: SoundMaterial) {
+        self.materials.insert(body.into(), material);
     }
 
     /// Makes a soundtrack of strikes alone.

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// The shipped scenes.
-pub const SCENES: [&str; 23] = [
+pub const SCENES: [&str; 24] = [
     "arch",
     "ball_machine",
     "billiards",
+    "bird",
     "bowling",
     "card_house",
     "chain",

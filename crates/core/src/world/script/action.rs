@@ -179,6 +179,36 @@ impl<B> Action<B> {
         }
     }
 
+    /// Returns whether it follows from the state of its event after the firing.
+    pub(super) fn goes_on(&self) -> bool {
+        let lasting = matches!(self, Action::Force { .. } | Action::Move { .. } | Action::Drive { .. });
+        lasting || self.is_look() || matches!(self, Action::Attach { here: true, .. })
+    }
+
+    /// Returns the body that it is about, if it may be a part of an object or the *other* one.
+    pub fn subject(&self) -> Option<&Subject<B>> {
+        match self {
+            Action::Push { body, .. }
+            | Action::Force { body, .. }
+            | Action::Velocity { body, .. }
+            | Action::Remove(body)
+            | Action::Recolor { body, .. } => Some(body),
+            _ => None,
+        }
+    }
+
+    /// Returns the same for a change.
+    pub fn subject_mut(&mut self) -> Option<&mut Subject<B>> {
+        match self {
+            Action::Push { body, .. }
+            | Action::Force { body, .. }
+            | Action::Velocity { body, .. }
+            | Action::Remove(body)
+            | Action::Recolor { body, .. } => Some(body),
+            _ => None,
+        }
+    }
+
     /// Returns whether it changes what is drawn besides poses.
     pub(super) fn is_look(&self) -> bool {
         matches!(self, Action::Recolor { .. } | Action::Camera(_) | Action::Light(_))

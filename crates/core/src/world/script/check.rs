@@ -44,6 +44,9 @@ pub enum EventError {
     /// The other body of a trigger that has none, or of any.
     #[error("{0}")]
     Other(&'static str),
+    /// An action that is done now goes on after its firing.
+    #[error("this action goes on after its firing, or is drawn; expected it among the actions of an event")]
+    GoesOn,
     /// The name of a key.
     #[error("the name of a key is {0} bytes long; expected 1 to {max}", max = MAX_KEY_BYTES)]
     Key(usize),
@@ -73,7 +76,7 @@ impl ScriptedEvent {
         Ok(())
     }
 
-    fn check(&self, action: &Action, world: &World) -> Result<(), EventError> {
+    pub(super) fn check(&self, action: &Action, world: &World) -> Result<(), EventError> {
         let moving = |body: &Subject| self.check_body(body, world);
         match action {
             Action::Spawn { template, pose, velocity, angular_velocity, from } => {

@@ -2,14 +2,31 @@
 
 use super::action::{Action, Subject};
 use super::template::HEADER;
-use super::{ScriptedEvent, Template};
+use super::{EventError, ScriptedEvent, Template, Trigger};
 use crate::constraint::loop_joint::LoopJoint;
+use crate::object::Object;
 use crate::world::sleep::RestTimer;
 use crate::world::view::ObjectId;
 use crate::world::{StepError, World, WorldError};
 use tumble_collide::{Pose, Vec3};
 
 impl World {
+    /// Does an action now, between two steps, as an event that fires does it.
+    ///
+    /// # Errors
+    /// [`WorldError::Event`] for an action that goes on after its firing or is drawn (a force for some time, a path, a
+    /// drive, a color, a camera, a light, a joint that is attached `here`), and for an action that names a wrong object or
+    /// number; the errors of the changes themselves.
+    pub fn perform_action(&mut self, action: &Action) -> Result<(), WorldError> {
+        let event = ScriptedEvent::new("an action", Trigger::Time { at: 1.0 });
+        let wrong = |why| WorldError::Event { name: event.name().into(), why };
+        if action.goes_on() {
+            return Err(wrong(EventError::GoesOn));
+        }
+        event.check(action, self).map_err(wrong)?;
+        self.act(&event, ObjectId::default(), action, 0, None)
+    }
+
     /// Runs the actions of an event, in their order.
     pub(super) fn perform(&mut self, id: ObjectId, other: u32) -> Result<(), StepError> {
         let Some(event) = self.get::<ScriptedEvent>(id).cloned() else { return Ok(()) };

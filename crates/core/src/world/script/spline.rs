@@ -199,6 +199,16 @@ impl Spline {
         self.record.ends == Ends::Loop
     }
 
+    /// Returns how smooth it is at its keyframes.
+    pub fn smoothness(&self) -> Smoothness {
+        self.record.smoothness
+    }
+
+    /// Returns how it begins and ends.
+    pub fn ends(&self) -> Ends {
+        self.record.ends
+    }
+
     /// Returns the keyframes.
     pub fn keyframes(&self) -> &[Keyframe] {
         &self.record.keyframes

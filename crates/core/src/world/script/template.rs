@@ -79,6 +79,11 @@ impl Template {
         &self.bodies
     }
 
+    /// Returns whether the oldest body is spawned again when all are in use.
+    pub fn reuses(&self) -> bool {
+        self.reuse
+    }
+
     /// Returns how often a template has spawned a body, and how often it could not because all were in use.
     /// `None` if the id is of another object.
     pub fn counts(world: &World, template: ObjectId) -> Option<[u64; 2]> {

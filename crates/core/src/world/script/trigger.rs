@@ -107,8 +107,9 @@ impl<B> Trigger<B> {
 }
 
 impl Trigger {
-    /// Returns the other body, if what happened in the frame fires the event.
-    pub(super) fn met(&self, happened: &Event) -> Option<Option<ObjectId>> {
+    /// Returns the other body, `None` in it without one, if what happened in the frame meets the trigger. Times, keys
+    /// and other events are never met by what happened.
+    pub fn met(&self, happened: &Event) -> Option<Option<ObjectId>> {
         let in_list = |list: &[ObjectId], id: ObjectId| list.is_empty() || list.contains(&id);
         let pair = |a: &[ObjectId], b: &[ObjectId]| {
             let (first, second) = (happened.a, happened.b?);

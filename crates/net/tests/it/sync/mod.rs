@@ -1,6 +1,7 @@
 //! NetSync from outside.
 
 mod compute;
+mod events;
 mod faults;
 mod hostile;
 mod links;
