@@ -39,7 +39,7 @@ SCENES = {
     "arch": (1.5, 2.5),
     "card_house": (0, 0.5),
     "wrecking_ball": (0, 3.0),
-    "marble_run": (0, 5.0),
+    "marble_run": (5.0, 5.0),
     "steam_engine": (5, 1.0),
     "walker": (0, 5.5),
     "flock": (1.5, 3.0),
