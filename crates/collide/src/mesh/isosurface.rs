@@ -89,6 +89,18 @@ impl TriMesh {
     }
 }
 
+impl TriMesh {
+    /// Returns [`isosurface_of_grid`](TriMesh::isosurface_of_grid) of a grid whose first point is `low` and whose last
+    /// one is `high` (m).
+    ///
+    /// # Errors
+    /// As [`isosurface_of_grid`](TriMesh::isosurface_of_grid).
+    pub fn isosurface_within(values: &[f64], counts: [usize; 3], low: Vec3, high: Vec3) -> Result<TriMesh, MeshError> {
+        let step = Vec3::from_fn(|k, _| (high[k] - low[k]) / counts[k].saturating_sub(1).max(1) as f64);
+        TriMesh::isosurface_of_grid(values, counts, low, step)
+    }
+}
+
 fn fault<T>(what: String) -> Result<T, MeshError> {
     Err(MeshError::Isosurface { what })
 }

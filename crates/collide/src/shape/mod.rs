@@ -241,6 +241,15 @@ impl Shape {
         Shape::mesh(TriMesh::isosurface(distance, low, high, cells)?, &TreeSettings::octree())
     }
 
+    /// Returns the solid in which signed distances on a grid are negative, as a mesh ([`TriMesh::isosurface_within`]):
+    /// `counts` points along x, y and z, x fastest, the first at `low` and the last at `high` (m).
+    ///
+    /// # Errors
+    /// As [`Shape::sdf`].
+    pub fn sdf_of_grid(values: &[f64], counts: [usize; 3], low: Vec3, high: Vec3) -> Result<Shape, ShapeError> {
+        Shape::mesh(TriMesh::isosurface_within(values, counts, low, high)?, &TreeSettings::octree())
+    }
+
     /// Returns [`Shape::mesh`] from the cache if it was built before from the same vertices,
     /// triangles and settings; otherwise builds and stores it. The bits are the same. Also returns
     /// a warning about the cache, if any.

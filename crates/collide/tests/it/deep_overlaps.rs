@@ -6,7 +6,7 @@ use crate::against_parry::to_parry;
 use crate::rng::Rng;
 use parry3d_f64::query;
 use parry3d_f64::shape::{Capsule, Cuboid, Cylinder, Shape as ParryShape};
-use tumble_collide::{Contact, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts};
+use tumble_collide::{CompoundPart, Contact, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts};
 
 fn slow() -> bool {
     std::env::var_os("TUMBLE_SLOW").is_some()
@@ -32,6 +32,20 @@ fn angle() -> TriMesh {
     TriMesh { vertices, triangles }
 }
 
+/// Points of a stone.
+fn stone() -> Vec<Vec3> {
+    let mut rng = Rng::new(3);
+    (0..30).map(|_| rng.direction().component_mul(&Vec3::new(0.5, 0.4, 0.3))).collect()
+}
+
+/// A bar between a ball and a box.
+fn dumbbell() -> Shape {
+    let part = |shape, z| CompoundPart::new(shape, Pose::translation(0.0, 0.0, z));
+    let (bar, ball) = (Shape::cylinder(0.1, 0.8).unwrap(), Shape::sphere(0.25).unwrap());
+    let block = Shape::cuboid(Vec3::new(0.5, 0.4, 0.3)).unwrap();
+    Shape::compound(vec![part(bar, 0.0), part(ball, 0.4), part(block, -0.4)]).unwrap()
+}
+
 fn shapes() -> Vec<(&'static str, Shape)> {
     let spool = [(0.0, -0.5), (0.5, -0.5), (0.2, -0.1), (0.2, 0.1), (0.5, 0.5), (0.0, 0.5)];
     vec![
@@ -49,6 +63,14 @@ fn shapes() -> Vec<(&'static str, Shape)> {
         ("torus mesh", mesh(&TriMesh::torus(0.4, 0.15, 24, 12))),
         ("angle mesh", mesh(&angle())),
         ("spool mesh", mesh(&TriMesh::lathe(&spool, 16).unwrap())),
+        ("ellipsoid", Shape::ellipsoid(Vec3::new(0.5, 0.8, 1.1)).unwrap()),
+        ("lens", Shape::ellipsoid(Vec3::new(1.2, 1.0, 0.2)).unwrap()),
+        ("cone", Shape::cone(0.5, 0.8).unwrap()),
+        ("needle", Shape::cone(0.1, 1.2).unwrap()),
+        ("rounded box", Shape::rounded_cuboid(Vec3::new(0.6, 0.8, 1.1), 0.1).unwrap()),
+        ("rounded cylinder", Shape::rounded_cylinder(0.4, 0.9, 0.1).unwrap()),
+        ("hull", mesh(&TriMesh::hull_of(&stone()).unwrap())),
+        ("compound", dumbbell()),
     ]
 }
 
@@ -60,6 +82,19 @@ fn height(shape: &Shape, pose: &Pose, n: &Vec3) -> f64 {
         Shape::Capsule { radius, half_length } => radius + half_length * local.z.abs(),
         Shape::Box { half_extents } => half_extents.dot(&local.abs()),
         Shape::Cylinder(c) => c.radius() * local.xy().norm() + c.half_length() * local.z.abs(),
+        Shape::Ellipsoid { half_axes } => half_axes.component_mul(&local).norm(),
+        Shape::Cone { radius, height } => {
+            (0.75 * height * local.z).max(radius * local.xy().norm() - 0.25 * height * local.z)
+        }
+        Shape::RoundedBox { half_extents, rounding } => {
+            (half_extents - Vec3::repeat(*rounding)).dot(&local.abs()) + rounding
+        }
+        Shape::RoundedCylinder { core, rounding } => {
+            core.radius() * local.xy().norm() + core.half_length() * local.z.abs() + rounding
+        }
+        Shape::Compound(parts) => {
+            return parts.placed().map(|(part, at)| height(part, &(pose * at), n)).fold(f64::NEG_INFINITY, f64::max);
+        }
         Shape::Mesh(mesh) => mesh.mesh().vertices.iter().map(|v| v.dot(&local)).fold(f64::NEG_INFINITY, f64::max),
         Shape::HalfSpace if local.z > 1.0 - 1e-9 => 0.0,
         _ => f64::INFINITY,

@@ -336,3 +336,26 @@ fn convex_meshes_through_each_other_have_the_depth_of_the_least_translation() {
         assert!(spread(&found).x > 1.9 && spread(&found).y > 1.3, "{found:?}");
     }
 }
+
+/// A prism of 200 sides beside the edge of a plate: the plate's edge is closest to the round side. Edges of the round side
+/// that lie further on above the plate's face, at an inclination, are no contacts: rows of theirs would stop a gear's tooth
+/// that passes. Their ends, at the rim of the prism, neither.
+#[test]
+fn edges_of_a_round_side_are_no_contacts_above_a_face_that_is_inclined_to_them() {
+    let mesh = |mesh: TriMesh| Shape::mesh(mesh, &TreeSettings::octree()).unwrap();
+    let prism = mesh(TriMesh::cylinder(1.0, 0.5, 200));
+    for thickness in [0.4, 0.5, 0.6] {
+        // its face looks towards the prism at x = 1.02, from y = 0.3 on
+        let plate = mesh_box(0.2, 1.0, thickness);
+        let at = Pose::translation(1.12, 0.8, 0.0);
+        let found = find_contacts(&prism, &Pose::identity(), &plate, &at, 0.2);
+        let least = found.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
+        assert!((least - (1.02_f64.hypot(0.3) - 1.0)).abs() < 2e-4, "{least}");
+        for c in &found {
+            // out of the prism, at the foot on its side
+            let outward = Vec3::new(c.point.x, c.point.y, 0.0).normalize();
+            let inclined = outward.cross(&c.normal).norm();
+            assert!(inclined < 5.0 * std::f64::consts::TAU / 200.0, "{thickness}: {inclined} {c:?}");
+        }
+    }
+}

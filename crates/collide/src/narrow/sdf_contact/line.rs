@@ -25,9 +25,10 @@ use super::super::reduce::Collector;
 use super::hyperbola::Hyperbola;
 use super::query::{Normals, Query};
 use super::tolerances::{FLAT_SLOPE, LEVEL_SLOPE, MAX_PIECE, SLOPE_ROUNDING};
-use crate::sdf::elements::Edge;
+use crate::sdf::elements::{Edge, max_slope};
 use crate::sdf::{Feature, Hit, TOUCHING, facing};
 use crate::{NormalFrom, Vec3};
+use nalgebra::RealField;
 
 /// Maximum length of a piece if both faces of the edge belong to a smooth surface, in the same
 /// unit; its ends suffice.
@@ -53,6 +54,9 @@ struct Line<'a> {
     index: u32,
     /// The edge, if the element is an edge of a mesh.
     edge: Option<&'a Edge>,
+    /// Whether it is the axis of a cylinder, whose surface is its radius away only across the axis; that of a
+    /// capsule is everywhere.
+    is_axis: bool,
 }
 
 /// The distance and slope at a place on a line.
@@ -100,7 +104,9 @@ impl Query<'_> {
             return;
         }
         let normals: Normals = normals.iter().map(|n| self.rotation * n).collect();
-        let line = Line { start, along: (end - start) / length, length, radius, normals: &normals, index, edge };
+        let is_axis = self.is_cylinder && radius > 0.0;
+        let line =
+            Line { start, along: (end - start) / length, length, radius, normals: &normals, index, edge, is_axis };
         if self.field.is_convex() {
             let start = self.sample(&line, 0.0);
             if start.slope < FLAT_SLOPE {
@@ -325,6 +331,9 @@ impl Query<'_> {
     }
 
     fn bottom(&self, line: &Line, s: f64, hit: Hit, found: &mut Collector) {
+        if line.is_axis && hit.normal.dot(&line.along).abs() > SLOPE_ROUNDING {
+            return;
+        }
         let fits = facing(line.normals, &hit.normal) && line.is_closest(&hit.normal);
         if self.second.is_some()
             && matches!(hit.feature, Feature::Edge(_))
@@ -398,7 +407,8 @@ impl Query<'_> {
             return; // the surface of a cylinder is its radius away across the axis alone
         }
         if hit.facing && (hit.feature == Feature::Face || line.is_closest(&hit.normal)) {
-            self.push(&line.at(s), line.radius, &hit, line_normal(line, &hit), line.feature(part), found);
+            let fits = line.may_roll_onto(&hit.normal);
+            self.push_if(fits, &line.at(s), line.radius, &hit, line_normal(line, &hit), line.feature(part), found);
         }
     }
 }
@@ -414,6 +424,16 @@ impl Line<'_> {
         let cos = n1.dot(n2);
         // into the first face is −(n₂ − n₁ cos)
         [n2 - n1 * cos, n1 - n2 * cos].iter().all(|out| normal.dot(out) <= SLOPE_ROUNDING)
+    }
+
+    /// Returns whether a face with this normal is inclined so little to the faces of the edge that the body may roll
+    /// onto it. At a larger inclination a neighboring edge of the smooth part meets it first.
+    fn may_roll_onto(&self, normal: &Vec3) -> bool {
+        let [n1, n2] = self.normals else { return true };
+        let (cos, sin) = (n1.dot(n2), n1.cross(n2).norm());
+        let most = f64::from(max_slope(RealField::atan2(sin, cos)));
+        // into the first face is −(n₂ − n₁ cos)/sin
+        [n2 - n1 * cos, n1 - n2 * cos].iter().all(|out| normal.dot(out) <= most * sin + SLOPE_ROUNDING)
     }
 
     fn feature(&self, part: u64) -> u64 {

@@ -39,6 +39,8 @@ pub(super) struct Query<'a> {
     /// Elements of the body with the field.
     pub(super) other: &'a BodyElements<'a>,
     pub(super) size: f64,
+    /// Whether the body with the elements is a cylinder.
+    pub(super) is_cylinder: bool,
     /// In the second query, whose field is A's: the pose of A in B.
     pub(super) second: Option<&'a Pose>,
     cache: &'a NearestCache,
@@ -86,6 +88,7 @@ impl<'a> Query<'a> {
             mesh: other.mesh,
             other: &other.elements,
             size,
+            is_cylinder: matches!(one.elements, BodyElements::Cylinder { .. }),
             second,
             cache,
             frame_map,
@@ -295,7 +298,10 @@ impl<'a> Query<'a> {
             _ => point.max_slope,
         })
         .max(SLOPE_ROUNDING);
-        let first = max_slope.is_infinite() || elements.ring_of(point).all(|edge| down.dot(&edge) >= -max_slope);
+        let first = match max_slope.is_infinite() {
+            true => hit.feature != Feature::Face || !elements.smooth_edge_leads(point, &down),
+            false => elements.ring_of(point).all(|edge| down.dot(&edge) >= -max_slope),
+        };
         let edges = if first { elements.edge_directions_of(point) } else { &[] };
         let hit = Hit { facing: hit.facing && first, ..hit };
         self.push_point(at, 0.0, hit, edges, point.index, found);

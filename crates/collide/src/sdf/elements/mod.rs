@@ -40,6 +40,8 @@ const SMOOTH_ANGLE: f64 = 0.5;
 const SMOOTH_LENGTH: f64 = 0.03;
 /// Turn of an edge, radians, from which the vertices at its ends make contacts above any face.
 const SHARP_TURN: f64 = 0.25;
+/// Its cosine, rounded down.
+const SHARP_COSINE: f64 = 0.9689;
 /// At smaller turns a vertex makes a contact above a face that is inclined to its own normals by at
 /// most this many turns, and by at least the sine below: the body may rock onto it.
 const TURNS_BEYOND: f64 = 4.0;
@@ -265,6 +267,21 @@ impl Elements {
         ring.iter().map(|direction| Vec3::from(direction.map(f64::from)))
     }
 
+    /// Returns whether an edge at a vertex leads closer to a face with the normal `up`, steeper than the body may roll,
+    /// and goes on almost straight on the other side of the vertex: the rim of a prism. Its next vertex then meets the
+    /// face first.
+    pub fn smooth_edge_leads(&self, point: &Point, up: &Vec3) -> bool {
+        self.edge_directions_of(point).iter().enumerate().any(|(k, edge)| {
+            let slope = -up.dot(edge);
+            if slope <= MIN_FLAT_SLOPE {
+                return false;
+            }
+            let others = self.edge_directions_of(point).iter().enumerate().filter(|(other, _)| *other != k);
+            let straight = others.map(|(_, other)| -edge.dot(other)).fold(-1.0, f64::max);
+            straight > SHARP_COSINE && slope > f64::from(max_slope(ComplexField::acos(straight.min(1.0))))
+        })
+    }
+
     /// Collects the vertices of the convex edges.
     fn gather_points(&mut self, mesh: &TriMesh, face: &[Vec3], searched: &[[bool; 3]], edges: &[Edge]) {
         let mut edge_directions: Vec<Vec<Vec3>> = vec![Vec::new(); mesh.vertices.len()];
@@ -335,7 +352,7 @@ impl Edge {
 }
 
 /// Returns [`Point::max_slope`] for the largest turn of the convex edges at a vertex, radians.
-fn max_slope(turn: f64) -> f32 {
+pub(crate) fn max_slope(turn: f64) -> f32 {
     if turn < SHARP_TURN { (TURNS_BEYOND * turn).max(MIN_FLAT_SLOPE) as f32 } else { f32::INFINITY }
 }
 
