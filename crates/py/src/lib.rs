@@ -66,7 +66,7 @@ mod _native {
     #[pymodule_export]
     use super::objects::spheretree::{_unpickle_tree, SphereTree};
     #[pymodule_export]
-    use super::objects::terrain::{ConvexHull, HeightField, Terrain};
+    use super::objects::terrain::{ConvexHull, HeightField, Sdf, Terrain};
     #[pymodule_export]
     use super::script::action::Action;
     #[pymodule_export]

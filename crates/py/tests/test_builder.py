@@ -158,6 +158,6 @@ def test_what_is_wrong_is_named():
         builder.build()
     with pytest.raises(tumble.UnknownNameError, match="there are none yet"):
         tumble.ArticulationBuilder().add_shape("x", tumble.Sphere(1))
-    with pytest.raises(tumble.InvalidValueError, match="no moving link"):
+    with pytest.raises(tumble.InvalidValueError, match="no link"):
         tumble.World().add_articulation(tumble.ArticulationBuilder())
     assert repr(double_pendulum()) == """<tumble.ArticulationBuilder ["upper", "lower"]>"""

@@ -228,16 +228,16 @@ def test_what_is_wrong_is_named():
         with pytest.raises(tumble.TumbleError, match=wrong):
             world.add_joint(**words)
         assert world.joints == []
-    joint = world.add_joint("spherical", ball)
-    with pytest.raises(tumble.InvalidValueError, match="a spherical joint, which has no position"):
+    joint = world.add_joint("planar", ball)
+    with pytest.raises(tumble.InvalidValueError, match="a planar joint, which has no position"):
         _ = joint.position
-    with pytest.raises(tumble.InvalidValueError, match="a spherical joint has no limits"):
+    with pytest.raises(tumble.InvalidValueError, match="a planar joint has no limits"):
         joint.damping = 1
-    with pytest.raises(tumble.InvalidValueError, match="a spherical joint has no length"):
+    with pytest.raises(tumble.InvalidValueError, match="a planar joint has no length"):
         joint.length = 1
     with pytest.raises(tumble.UnknownNameError, match="no joint named 'ball'"):
         world.joint("ball")
-    assert repr(joint) == f"<tumble.Joint '{joint.name}', spherical>"
+    assert repr(joint) == f"<tumble.Joint '{joint.name}', planar>"
 
 
 TRANSMISSIONS = """

@@ -70,6 +70,7 @@ mod xml;
 
 pub use build::error::BuildError;
 pub use build::event::place as part_by_name;
+pub use build::grid::{ValueGrid, read_grid};
 pub use build::heights::{HeightGrid, read_heights};
 pub use build::mesh_files::{read_mesh_bytes, read_solid, read_triangles};
 pub use build::slow::{building_surface, set_slow_load_listener};

@@ -4,7 +4,7 @@ use super::records::{LoadedTables, ObjectIndices, Tables, id, shape};
 use super::{ArchiveError, damaged};
 use crate::Anchor;
 use crate::object::Object;
-use crate::sensor::{Sensor, SensorKind, SensorNoise, SensorPlace};
+use crate::sensor::{Optics, Sensor, SensorKind, SensorNoise, SensorPlace};
 use crate::world::view::ObjectId;
 use serde::{Deserialize, Serialize};
 use tumble_collide::Pose;
@@ -30,6 +30,8 @@ pub(super) struct SensorRecord {
     volume: Option<u32>,
     cutoff: f64,
     noise: SensorNoise,
+    /// Optics of a camera.
+    optics: Option<Optics>,
 }
 
 fn site(anchor: &Anchor, indices: &ObjectIndices) -> Site {
@@ -55,6 +57,7 @@ impl SensorRecord {
             volume: sensor.volume().map(|volume| tables.shapes.index(volume)),
             cutoff: sensor.cutoff(),
             noise: *sensor.noise(),
+            optics: sensor.kind().is_camera().then(|| *sensor.optics()),
         }
     }
 
@@ -70,6 +73,9 @@ impl SensorRecord {
         }
         if let Some(index) = self.volume {
             sensor = sensor.with_volume(shape(&tables.shapes, index)?).map_err(damaged)?;
+        }
+        if let Some(optics) = self.optics {
+            sensor = sensor.with_optics(optics).map_err(damaged)?;
         }
         sensor.with_cutoff(self.cutoff).and_then(|sensor| sensor.with_noise(self.noise)).map_err(damaged)
     }

@@ -182,6 +182,18 @@ impl LinkBuilder {
         self
     }
 
+    /// Sets the largest speed of its joint, rad/s or m/s; infinite for none.
+    pub fn with_max_velocity(mut self, max_velocity: f64) -> Self {
+        self.dof.max_velocity = max_velocity;
+        self
+    }
+
+    /// Sets the force of its motor, N·m or N, the limit of drives that name none; infinite if it is not known.
+    pub fn with_effort(mut self, effort: f64) -> Self {
+        self.dof.effort = effort;
+        self
+    }
+
     /// Sets the inertia of the rotor that drives its revolute or prismatic joint, as the joint meets it, kg·m² or kg:
     /// [`Link::armature`](crate::articulated::Link::armature).
     pub fn with_armature(mut self, armature: f64) -> Self {

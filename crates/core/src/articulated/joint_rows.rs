@@ -1,4 +1,4 @@
-//! Rows of joints: limits, dry friction, drives, couplings (equations in `dof.rs`).
+//! Rows of joints: limits, velocity limits, dry friction, drives, couplings (equations in `dof.rs`).
 
 use super::body::ArticulatedBody;
 use crate::articulated::model::dof::{DofSettings, Drive};
@@ -13,8 +13,10 @@ use crate::world::view::WorldView;
 impl ArticulatedBody {
     /// Returns whether any setting or coupling makes a row.
     pub(super) fn has_rows(&self) -> bool {
-        let rows =
-            |f: &DofSettings| f.limits.is_some() || f.friction > 0.0 || f.damping > 0.0 || f.drive != Drive::None;
+        let rows = |f: &DofSettings| {
+            let resists = f.friction > 0.0 || f.damping > 0.0 || f.max_velocity.is_finite();
+            resists || f.limits.is_some() || f.drive != Drive::None
+        };
         !self.couplings.is_empty() || self.dofs().iter().any(rows)
     }
 
@@ -43,7 +45,7 @@ impl ArticulatedBody {
     ///
     /// A drive and a damping that share a row divide its force by the velocity at the end: `f_drive = f + d·v`.
     pub(crate) fn add_drives(&self, x: &[f64], time: f64, rows: &[RowStart], h: f64, out: &mut [f64]) {
-        let limits = self.limit_errors(x).count();
+        let limits = self.limit_errors(x).count() + self.velocity_limits(x).count();
         let targets = |level: Level| -> Vec<usize> {
             let count = |(_, dof): (usize, DofState)| {
                 let mut count = 0;
@@ -82,6 +84,11 @@ impl ArticulatedBody {
     fn limit_errors<'a>(&'a self, x: &'a [f64]) -> impl Iterator<Item = (usize, f64, f64)> {
         self.dof_states(x).flat_map(|(index, p)| p.limits().map(move |(sign, error)| (index, sign, error)))
     }
+
+    /// Returns the rows of the velocity limits: index of the degree of freedom, sign and target.
+    fn velocity_limits<'a>(&'a self, x: &'a [f64]) -> impl Iterator<Item = (usize, f64, RowTarget)> {
+        self.dof_states(x).flat_map(|(index, p)| p.velocity_limits().map(move |(sign, target)| (index, sign, target)))
+    }
 }
 
 impl Constraint for ArticulatedBody {
@@ -91,6 +98,9 @@ impl Constraint for ArticulatedBody {
         let mut maker = RowMaker { unit: vec![0.0; dof], known: vec![None; dof], out };
         for (index, sign, error) in self.limit_errors(x) {
             maker.row_of(RowTarget::new(RowSet::HalfLine, error), index, sign);
+        }
+        for (index, sign, target) in self.velocity_limits(x) {
+            maker.row_of(target, index, sign);
         }
         for (index, dof_state) in self.dof_states(x) {
             dof_state.forces(level, view.time, |target| maker.row_of(target, index, 1.0));

@@ -40,6 +40,15 @@ impl DofState<'_> {
         gaps.into_iter().flatten().filter(|(_, gap)| gap.is_finite())
     }
 
+    /// Returns the rows of the velocity limit: sign of the row's velocity, and target. They hold no position, so
+    /// they are intervals and no half-lines.
+    pub fn velocity_limits(&self) -> impl Iterator<Item = (f64, RowTarget)> + use<> {
+        let most = self.settings.max_velocity;
+        let set = RowSet::Interval { lo: 0.0, hi: f64::INFINITY };
+        let target = RowTarget { velocity: -most, ..RowTarget::new(set, 0.0) };
+        [1.0, -1.0].into_iter().filter(move |_| most.is_finite()).map(move |sign| (sign, target))
+    }
+
     /// Calls `row` with the targets of the rows of dry friction and damping.
     pub fn resistance(&self, level: Level, mut row: impl FnMut(RowTarget)) {
         if self.settings.friction > 0.0 {

@@ -39,13 +39,17 @@ pub enum SensorKind {
     JointVelocity,
     /// 1 number: force of the drive of a joint, N·m or N, the mean over the frame, with what `apply_generalized` adds.
     DriveForce,
+    /// An image of distances along the z axis of the site, m; −1 where nothing is: [`World::depth_image`](crate::World::depth_image).
+    Depth,
+    /// An image of the parts that a camera sees: [`World::segmentation_image`](crate::World::segmentation_image).
+    Segmentation,
 }
 
 use SensorKind::*;
 
 impl SensorKind {
     /// All kinds.
-    pub const ALL: [SensorKind; 16] = [
+    pub const ALL: [SensorKind; 18] = [
         Accelerometer,
         Gyroscope,
         Velocimeter,
@@ -62,9 +66,11 @@ impl SensorKind {
         JointPosition,
         JointVelocity,
         DriveForce,
+        Depth,
+        Segmentation,
     ];
     /// Their names in Python and in scene files, in the same order.
-    pub const NAMES: [&'static str; 16] = [
+    pub const NAMES: [&'static str; 18] = [
         "accelerometer",
         "gyroscope",
         "velocimeter",
@@ -81,6 +87,8 @@ impl SensorKind {
         "joint_position",
         "joint_velocity",
         "drive_force",
+        "depth",
+        "segmentation",
     ];
 
     /// Returns its name in Python and in scene files.
@@ -93,11 +101,12 @@ impl SensorKind {
         SensorKind::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
-    /// Returns how many numbers a reading has.
+    /// Returns how many numbers of the state a reading has: none of an image, which is made when it is read.
     pub fn numbers(self) -> usize {
         match self {
             Touch | RangeFinder | JointPosition | JointVelocity | DriveForce => 1,
             Orientation => 4,
+            Depth | Segmentation => 0,
             _ => 3,
         }
     }
@@ -110,6 +119,11 @@ impl SensorKind {
     /// Returns whether it reads the force or torque of a joint.
     pub fn reads_joint(self) -> bool {
         matches!(self, Force | Torque)
+    }
+
+    /// Returns whether it reads an image.
+    pub fn is_camera(self) -> bool {
+        matches!(self, Depth | Segmentation)
     }
 
     /// Returns whether it may have a reference.

@@ -42,6 +42,9 @@ impl Sensor {
     /// Returns the reading at the present; `None` if what it reads was removed, or cannot be read. Without a past all
     /// means over a frame are zero.
     pub(crate) fn measure(&self, core: &Core, past: Option<Past>) -> Option<Reading> {
+        if self.kind().is_camera() {
+            return None;
+        }
         match (self.place(), past) {
             (SensorPlace::Site(site), past) => self.at_site(core, site, past),
             (SensorPlace::LoopJoint(id), past) => self.of_loop_joint(core, *id, past),
@@ -111,9 +114,7 @@ impl Sensor {
     fn range(&self, core: &Core, site: &Anchor, pose: &Pose) -> f64 {
         let direction = pose.rotation * Vec3::z();
         let ray = Ray { origin: pose.translation.vector, direction, max_distance: f64::INFINITY };
-        let own =
-            |id, part| site.part.is_some_and(|(on, at)| on == id && core.carrier(on, at) == core.carrier(id, part));
-        core.distance_along(&ray, own).unwrap_or(-1.0)
+        core.distance_along(&ray, |id, part| core.carries(site, id, part)).unwrap_or(-1.0)
     }
 
     /// Returns the impulse along the normals of the contacts of the site's link or body, within the volume if there is one, N·s.
@@ -186,6 +187,11 @@ impl Core {
         let pose = state.pose * anchor.frame;
         let velocity = state.velocity_at(&pose.translation.vector);
         Some(SiteState { pose, velocity, angular_velocity: state.angular_velocity })
+    }
+
+    /// Returns the present pose of a site; `None` if its part was removed.
+    pub(crate) fn site_pose(&self, anchor: &Anchor) -> Option<Pose> {
+        Some(self.site(anchor, &self.derived.part_states)?.pose)
     }
 
     /// Returns the link that carries a part of an articulated body: `None` for its base, and for all parts of other objects.

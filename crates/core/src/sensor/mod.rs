@@ -19,11 +19,13 @@
 //! | reference | The frame against which positions and velocities are read; the world by default |
 
 pub(crate) mod balance;
+mod camera;
 mod kind;
 pub(crate) mod loads;
 pub(crate) mod measure;
 mod noise;
 
+pub use camera::{Optics, SensorImage};
 pub use kind::SensorKind;
 pub use noise::SensorNoise;
 
@@ -109,6 +111,7 @@ pub struct Sensor {
     volume: Option<Shape>,
     cutoff: f64,
     noise: SensorNoise,
+    optics: Optics,
 }
 
 impl Sensor {
@@ -158,7 +161,16 @@ impl Sensor {
             return Err(SensorError::Kind { name, kind: kind.name(), why });
         }
         let noise = SensorNoise::default();
-        Ok(Sensor { name, kind, place, reference: None, volume: None, cutoff: f64::INFINITY, noise })
+        Ok(Sensor {
+            name,
+            kind,
+            place,
+            reference: None,
+            volume: None,
+            cutoff: f64::INFINITY,
+            noise,
+            optics: Optics::default(),
+        })
     }
 
     /// Sets the frame against which a position, an orientation or a velocity is read.
@@ -212,7 +224,30 @@ impl Sensor {
         if self.kind == SensorKind::Orientation && noise.quantization > 0.0 {
             return Err(self.wrong("an orientation has no quantization"));
         }
+        if self.kind.is_camera() && (noise.bias_walk > 0.0 || noise.delay > 0) {
+            return Err(self.wrong("an image has no walk of a bias and no delay"));
+        }
+        if self.kind == SensorKind::Segmentation
+            && noise != (SensorNoise { seed: noise.seed, ..SensorNoise::default() })
+        {
+            return Err(self.wrong("a segmentation has no noise"));
+        }
         self.noise = noise;
+        Ok(self)
+    }
+
+    /// Sets resolution and angle of view of a camera.
+    ///
+    /// # Errors
+    /// [`SensorError::Range`] for a constant out of its range, [`SensorError::Kind`] for another kind.
+    pub fn with_optics(mut self, optics: Optics) -> Result<Sensor, SensorError> {
+        if !self.kind.is_camera() {
+            return Err(self.wrong("only cameras have a resolution and an angle of view"));
+        }
+        if let Some((what, value, expected)) = optics.range_error() {
+            return Err(SensorError::Range { name: self.name, what, value, expected });
+        }
+        self.optics = optics;
         Ok(self)
     }
 
@@ -243,6 +278,11 @@ impl Sensor {
     /// Returns the largest absolute value of a reading; infinite for none.
     pub fn cutoff(&self) -> f64 {
         self.cutoff
+    }
+
+    /// Returns resolution and angle of view of a camera.
+    pub fn optics(&self) -> &Optics {
+        &self.optics
     }
 
     /// Returns the errors of the sensor.

@@ -66,6 +66,15 @@ impl SensorNoise {
         }
     }
 
+    /// Returns the generator of a frame's image. The words in `x` do not change, so an image can be read any number
+    /// of times.
+    pub(crate) fn of_image(&self, kind: SensorKind, x: &[f64], frame: u64) -> Option<SplitMix64> {
+        let layout = self.layout(kind);
+        let words = x.get(layout.generator).filter(|words| words.len() == 2)?;
+        let mut stream = SplitMix64(frame);
+        Some(SplitMix64(SplitMix64::read(words).0 ^ stream.next()))
+    }
+
     /// Writes a reading with its errors to the numbers `x` of the sensor, after a frame of `dt` seconds, or at its
     /// addition for `None`. `present` becomes what the sensor sees now, without the delay.
     pub(crate) fn write(&self, kind: SensorKind, dt: Option<f64>, cutoff: f64, present: &mut [f64], x: &mut [f64]) {
@@ -143,7 +152,8 @@ impl Layout {
     }
 }
 
-struct SplitMix64(u64);
+/// A generator of 64 bits.
+pub(crate) struct SplitMix64(u64);
 
 impl SplitMix64 {
     fn read(words: &[f64]) -> SplitMix64 {
@@ -167,7 +177,7 @@ impl SplitMix64 {
         ((self.next() >> 11) as f64 + 1.0) / (1_u64 << 53) as f64
     }
 
-    fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         let (radius, angle) = (self.unit(), std::f64::consts::TAU * self.unit());
         (-2.0 * <f64 as ComplexField>::ln(radius)).sqrt() * <f64 as ComplexField>::cos(angle)
     }

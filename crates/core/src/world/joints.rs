@@ -7,12 +7,15 @@ use crate::world::view::{ObjectId, WorldView};
 
 impl World {
     /// Returns the force that a loop joint carried in the last sub-step: the mean over it. Zero before
-    /// the first step, for a joint that is broken or disabled, and while its bodies sleep; `None` if it
-    /// was removed or is no loop joint.
+    /// the first step and for a joint that is broken or disabled. While its bodies sleep it is what holds
+    /// them: the force with which they fell asleep. `None` if it was removed or is no loop joint.
     pub fn joint_force(&self, id: ObjectId) -> Option<JointForce> {
         let joint = self.get::<LoopJoint>(id)?;
         let serial = self.core.objects().get(id)?.serial;
-        Some(joint.transmitted(&self.view(), self.core.state.warm.of_owner(serial)))
+        if !self.status(id)?.enabled {
+            return Some(JointForce::default());
+        }
+        Some(joint.transmitted(&self.view(), self.core.row_forces(serial)))
     }
 
     /// Changes a loop joint between steps, and wakes the objects that it joins.

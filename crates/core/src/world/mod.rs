@@ -8,6 +8,7 @@ mod core;
 mod error;
 pub(crate) mod events;
 mod frame_states;
+mod images;
 mod islands;
 mod joints;
 mod pair_materials;

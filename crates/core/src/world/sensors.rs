@@ -13,9 +13,10 @@ impl World {
     /// addition, whose means over a frame are zero. [`SensorKind`](crate::SensorKind) has units and axes. `None` if the sensor or
     /// what it is on was removed, or the object is no sensor.
     ///
-    /// The reading of forces and of touch stays as it was while the bodies sleep: it is what holds them.
+    /// The reading of forces and of touch stays as it was while the bodies sleep: it is what holds them. A camera has an
+    /// image instead.
     pub fn reading(&self, id: ObjectId) -> Option<&[f64]> {
-        let sensor = self.get::<Sensor>(id)?;
+        let sensor = self.get::<Sensor>(id).filter(|sensor| !sensor.kind().is_camera())?;
         let reference = sensor.reference().and_then(|anchor| Some(anchor.part?.0));
         if sensor.place().object().into_iter().chain(reference).any(|id| self.object(id).is_none()) {
             return None;
@@ -93,6 +94,9 @@ impl World {
         let Some(sensor) = any.downcast_ref::<Sensor>() else { return };
         let (noise, kind, cutoff) = (*sensor.noise(), sensor.kind(), sensor.cutoff());
         let (serial, range) = (entry.serial, entry.state_range.x.clone());
+        if kind.is_camera() {
+            return noise.start(kind, serial, &mut self.core.state.x[range]);
+        }
         let Some(mut reading) = sensor.measure(&self.core, None) else { return };
         let x = &mut self.core.state.x[range];
         noise.start(kind, serial, x);

@@ -23,7 +23,7 @@
 //! ([`Constraint::partners`](crate::Constraint::partners)).
 
 use crate::clone_by_field::clone_by_field;
-use crate::contact::warm_starts::WarmStart;
+use crate::contact::warm_starts::{RowStart, WarmStart};
 use crate::object::part_state::{PartState, Wrench};
 use crate::world::Core;
 use crate::world::view::{Entry, Mode, ObjectId};
@@ -73,9 +73,11 @@ pub(crate) struct SleepGroup {
     pub load: Option<Vec<f64>>,
     /// Contact forces with which they fell asleep.
     pub warm: Vec<WarmStart>,
+    /// Forces of the constraints between them with which they fell asleep, by owner.
+    pub rows: Vec<RowStart>,
 }
 
-clone_by_field!(SleepGroup { members, supports, load, warm });
+clone_by_field!(SleepGroup { members, supports, load, warm, rows });
 
 /// An object at rest on which members of a group lie or hang: its serial number, and the poses of
 /// its parts as in [`RestTimer`].
@@ -120,6 +122,8 @@ impl SleepGroup {
         let finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
         let fine = self.load.iter().all(|load| finite(load))
             && self.warm.iter().all(WarmStart::is_finite)
+            && self.rows.iter().all(|row| row.force.is_finite())
+            && self.rows.is_sorted_by_key(|row| row.owner)
             && self.supports.iter().flat_map(|s| &s.poses).all(|p| finite(p));
         fine && !self.members.is_empty() && self.members.is_sorted_by(|a, b| a < b)
     }
@@ -319,7 +323,34 @@ impl Core {
         group.supports = supports.into_iter().map(support).collect();
         let ours = |serial: &u32| group.members.binary_search(serial).is_ok();
         group.warm = self.state.warm.take(|key| ours(&key.pair[0]) || ours(&key.pair[2]));
+        group.rows = self.rows_between(members);
         self.state.groups.push(group);
+    }
+
+    /// Returns the forces of the constraints on any of these objects, in the last sub-step.
+    fn rows_between(&self, members: &[usize]) -> Vec<RowStart> {
+        let ours = |owner: u32| {
+            let Some(place) = self.by_serial(owner) else { return false };
+            let mut partners = Vec::new();
+            let constraint = self.objects().at(place).object.constraint();
+            constraint.into_iter().for_each(|constraint| _ = constraint.partners(&mut partners));
+            let joined = partners.iter().filter_map(|id| self.table.place(*id));
+            joined.chain([place]).any(|place| members.contains(&place))
+        };
+        self.state.warm.rows_by_owner().filter(|rows| ours(rows[0].owner)).flatten().copied().collect()
+    }
+
+    /// Returns the forces of the rows of an object's constraint: those of the last sub-step, or those with which
+    /// its partners fell asleep.
+    pub(crate) fn row_forces(&self, owner: u32) -> &[RowStart] {
+        let last = self.state.warm.of_owner(owner);
+        let asleep = || {
+            self.state
+                .groups
+                .iter()
+                .find_map(|g| g.rows.chunk_by(|a, b| a.owner == b.owner).find(|rows| rows[0].owner == owner))
+        };
+        if last.is_empty() { asleep().unwrap_or(last) } else { last }
     }
 }
 

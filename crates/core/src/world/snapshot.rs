@@ -30,7 +30,7 @@ pub enum SnapshotError {
     NotFinite,
 }
 
-const MAGIC: [u8; 8] = *b"tumbleS8";
+const MAGIC: [u8; 8] = *b"tumbleS9";
 
 /// The objects of the world, before the state.
 #[derive(Serialize, Deserialize)]
@@ -68,7 +68,7 @@ impl World {
         let format = |e: postcard::Error| SnapshotError::Format(e.to_string());
         let (header, rest) = postcard::take_from_bytes::<Header>(bytes).map_err(format)?;
         if header.magic != MAGIC {
-            return Err(SnapshotError::Format("the first eight bytes are not 'tumbleS8'".into()));
+            return Err(SnapshotError::Format("the first eight bytes are not 'tumbleS9'".into()));
         }
         self.check_labels(&header.objects)?;
         let (state, rest) = postcard::take_from_bytes::<WorldState>(rest).map_err(format)?;

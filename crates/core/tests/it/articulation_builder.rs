@@ -128,3 +128,35 @@ fn a_mesh_off_its_center_stands_where_its_file_says() {
     };
     assert!((world.part_states()[2].position() - place).norm() < 1e-12);
 }
+
+/// A table as a URDF has it: links that are all fixed to the base. It is ground for others and never moves.
+#[test]
+fn a_body_of_fixed_links_is_static() {
+    for stepper in STEPPERS {
+        let mut world = World::new(Settings::default().with_sleep(Some(Sleep::default()))).unwrap();
+        world.set_stepper(stepper_by_name(stepper).unwrap());
+        let top = LinkBuilder::new("top", Joint::Fixed)
+            .with_shape(Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap(), Pose::translation(0.0, 0.0, 0.7));
+        let leg = LinkBuilder::new("leg", Joint::Fixed)
+            .with_parent("top")
+            .with_shape(Shape::cylinder(0.05, 0.65).unwrap(), Pose::translation(0.0, 0.0, 0.325));
+        let table = ArticulationBuilder::new("table").link(top).link(leg).build().unwrap();
+        let table = world.add(table.with_pose(Pose::translation(0.0, 0.0, 0.2))).unwrap();
+        let ball = RigidBody::new(Shape::sphere(0.1).unwrap()).with_mass(1.0);
+        let ball = world.add(ball.with_pose(Pose::translation(0.1, 0.2, 1.2))).unwrap();
+        // nothing supports a table on the floor: it stands in the air
+        for _ in 0..480 {
+            world.step().unwrap();
+        }
+        let at = world.part_state(ball, 0).unwrap().position();
+        assert!((at - Vec3::new(0.1, 0.2, 1.05)).norm() < 1e-6, "{stepper}: {at:?}");
+        assert_eq!(world.state_of(table).unwrap().len(), 0);
+        let (mut again, mut fork) =
+            (World::from_archive(&world.archive(&[]).unwrap(), &mut |_| None).unwrap(), world.fork());
+        fork.restore(&world.save()).unwrap();
+        for world in [&mut world, &mut again, &mut fork] {
+            world.step().unwrap();
+        }
+        assert!(again.save() == world.save() && fork.save() == world.save());
+    }
+}

@@ -453,7 +453,7 @@ fn wrong_settings_are_named() {
     let joint = |kind| join(&world, kind, id, None, JointPlace::between(Vec3::zeros(), Vec3::x()));
     let of = |result: Result<LoopJoint, LoopJointError>| result.unwrap_err().to_string();
     for (message, words) in [
-        (of(joint(LoopJointKind::Spherical).with_limits([0.0, 1.0])), "a spherical joint has no limits"),
+        (of(joint(LoopJointKind::Planar).with_limits([0.0, 1.0])), "a planar joint has no limits"),
         (of(joint(LoopJointKind::Revolute).with_length(1.0)), "a revolute joint has no length"),
         (of(joint(LoopJointKind::Rope).with_length(-1.0)), "the length is -1; it must be finite and at least 0"),
         (of(joint(LoopJointKind::Revolute).with_limits([1.0, 0.0])), "the lower limit is 1"),

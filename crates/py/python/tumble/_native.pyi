@@ -52,6 +52,7 @@ __all__ = [
     "Recorder",
     "RigidBody",
     "ScriptedEvent",
+    "Sdf",
     "Sensor",
     "Sensors",
     "Shape",
@@ -222,6 +223,15 @@ class Terrain(Mesh):
         *,
         scale: float = 1.0,
     ) -> Terrain: ...
+
+@final
+class Sdf(Mesh):
+    """The solid in which signed distances on a grid are negative, a ``Mesh`` of the surface by marching tetrahedra.
+    values: shape (nx, ny, nz), ``values[i, j, k]`` at x, y and z, as ``numpy.meshgrid(indexing="ij")`` makes them;
+    or the path of a NumPy file (.npy). low, high: the first and the last grid point, shape (3,), meters, in the
+    frame of the body. The grid must surround the solid.
+    """
+    def __new__(cls, values: ArrayLike | _Path, low: ArrayLike, high: ArrayLike) -> Sdf: ...
 
 @final
 class RigidBody:
@@ -458,8 +468,8 @@ class Sensor:
     def kind(self) -> SensorKind:
         """Quantity that it reads."""
     @property
-    def value(self) -> NDArray[np.float64]:
-        """Reading at the end of the last step, with its errors: 3 numbers, or 1 or 4 for some kinds. Raises ``RemovedError`` if
+    def value(self) -> NDArray[Any]:
+        """Reading at the end of the last step, with its errors: 3 numbers, or 1 or 4 for some kinds, or the present image of a camera. Raises ``RemovedError`` if
         the sensor or its body was removed.
         """
     def seed(self, seed: int) -> None:
@@ -469,20 +479,20 @@ class Sensor:
 @final
 class Sensors:
     """The readings of all measuring sensors of a world by name, in the order of their addition: a mapping to arrays."""
-    def __getitem__(self, key: str, /) -> NDArray[np.float64]: ...
+    def __getitem__(self, key: str, /) -> NDArray[Any]: ...
     def __contains__(self, key: object, /) -> bool: ...
     def __len__(self) -> int: ...
     def __iter__(self) -> Iterator[str]: ...
     def keys(self) -> list[str]:
         """Names of all sensors."""
-    def values(self) -> list[NDArray[np.float64]]:
+    def values(self) -> list[NDArray[Any]]:
         """Readings of all sensors."""
-    def items(self) -> list[tuple[str, NDArray[np.float64]]]:
+    def items(self) -> list[tuple[str, NDArray[Any]]]:
         """Names and readings of all sensors."""
     def handle(self, name: str) -> Sensor:
         """The handle of a sensor, for its kind and its seed."""
     def record(self) -> np.void:
-        """All readings as one value of a structured dtype, with a field of each sensor's name: ``record["imu"]``."""
+        """All readings but images as one value of a structured dtype, with a field of each sensor's name: ``record["imu"]``."""
 
 @final
 class SpringMesh:
@@ -892,8 +902,8 @@ class Field:
 class Joint:
     """A joint between two bodies, or a body and the world, made by ``World.add_joint``.
 
-    Its position is an angle (rad), a displacement (m) or a length (m); ``"spherical"``, ``"fixed"``,
-    ``"universal"`` and ``"planar"`` joints have none. Everything can change between steps. All vectors
+    Its position is an angle (rad), a displacement (m) or a length (m); ``"fixed"``, ``"universal"`` and
+    ``"planar"`` joints have none. Everything can change between steps. All vectors
     are in world axes.
     """
     @property
@@ -918,8 +928,8 @@ class Joint:
     def enabled(self, value: bool) -> None: ...
     @property
     def position(self) -> float:
-        """Position, rad or m: the angle of ``a`` about the axis, its displacement along the axis, or the
-        length. Zero where the joint was made, except for a length. An angle is in (-π, π], or within π
+        """Position, rad or m: the angle of ``a`` about the axis, its displacement along the axis, the length, or
+        the angle between both axes of a ``"spherical"`` joint. Zero where the joint was made, except for a length. An angle is in (-π, π], or within π
         of the middle of its limits.
         """
     @property
@@ -931,13 +941,27 @@ class Joint:
     @limits.setter
     def limits(self, value: ArrayLike | None) -> None: ...
     @property
+    def cone(self) -> float | None:
+        """Largest swing of a ``"spherical"`` joint, rad, or None: its axis on ``a`` stays in this cone about that on ``b``."""
+    @cone.setter
+    def cone(self, value: float | None) -> None: ...
+    @property
+    def max_velocity(self) -> float:
+        """Largest speed of the position, of a ``"spherical"`` joint that about each axis, rad/s or m/s; infinite
+        for none.
+        """
+    @max_velocity.setter
+    def max_velocity(self, value: float) -> None: ...
+    @property
     def damping(self) -> float:
-        """Viscous damping along the position, N·m·s/rad or N·s/m."""
+        """Viscous damping along the position, of a ``"spherical"`` joint about each axis, N·m·s/rad or N·s/m."""
     @damping.setter
     def damping(self, value: float) -> None: ...
     @property
     def friction(self) -> float:
-        """Dry friction along the position: largest torque or force, N·m or N."""
+        """Dry friction along the position: largest torque or force, N·m or N. Of a ``"spherical"`` joint about each
+        axis.
+        """
     @friction.setter
     def friction(self, value: float) -> None: ...
     @property
@@ -1002,8 +1026,8 @@ class Joint:
     @property
     def force(self) -> _Floats:
         """Force on ``a`` in the last sub-step, shape (3,), N; the opposite acts on ``b``. It includes those
-        of limits, spring, damping, friction and drive. Zero while the joint is not enabled, and while
-        its bodies sleep.
+        of limits, spring, damping, friction and drive. Zero while the joint is not enabled; while its
+        bodies sleep it is that with which they fell asleep.
         """
     @property
     def torque(self) -> _Floats:
@@ -1050,6 +1074,8 @@ class ArticulationBuilder:
         stiffness: float = 0.0,
         rest: float = 0.0,
         drive: Mapping[str, float] | None = None,
+        max_velocity: float | None = None,
+        effort: float | None = None,
         q: float | None = None,
         qd: float | None = None,
         friction: float = 0.5,
@@ -1073,7 +1099,8 @@ class ArticulationBuilder:
 
         limits: (lower, upper), rad or m. joint_damping: N·m·s/rad or N·s/m. joint_friction: N·m or N.
         armature: inertia of the rotor of a revolute or prismatic joint, as the joint meets it, kg·m² or kg.
-        stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
+        max_velocity: largest speed of the joint, rad/s or m/s. effort: the force of its motor, N·m or N, which limits drives that name no
+        ``max_force``. stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
         ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the
         start. friction, restitution, collides: of the shapes. color: sRGB, shape (3,).
         """
@@ -1122,13 +1149,15 @@ class Articulation:
         packages: Mapping[str, _Path] | None = None,
         missing_meshes: MissingMeshes = "error",
         collision_meshes: CollisionMeshes = "exact",
+        velocity_limits: bool = False,
     ) -> Articulation:
         """Reads a URDF. The tree is read at once, collision shapes when it is added to a world, and
         visual meshes when they are first drawn.
 
         floating: whether the root floats; otherwise it is fixed to the base. packages: folders by
         name, for ``package://NAME/…``. missing_meshes: ``"error"`` or ``"skip"``, for missing
-        collision meshes. collision_meshes: ``"exact"`` or ``"hull"``.
+        collision meshes. collision_meshes: ``"exact"`` or ``"hull"``. velocity_limits: whether the largest
+        velocities of joints are enforced.
         """
     @staticmethod
     def from_mjcf(
@@ -1198,6 +1227,20 @@ class Articulation:
         """Lower and upper position limit of each degree of freedom, shape (dof, 2), rad or m; infinite
         without a limit.
         """
+    @property
+    def max_velocity(self) -> _Floats:
+        """Largest speed of each degree of freedom, shape (dof,), rad/s or m/s; infinite for none. Settable for a
+        body in a world.
+        """
+    @max_velocity.setter
+    def max_velocity(self, value: ArrayLike) -> None: ...
+    @property
+    def effort(self) -> _Floats:
+        """Force of the motor of each degree of freedom, shape (dof,), N·m or N, the limit of drives that name none;
+        infinite if it is not known. A URDF states it. Settable for a body in a world.
+        """
+    @effort.setter
+    def effort(self, value: ArrayLike) -> None: ...
     def forward_dynamics(
         self, q: ArrayLike | None = None, qd: ArrayLike | None = None, tau: ArrayLike | None = None
     ) -> _Floats:
@@ -1265,7 +1308,7 @@ class Articulation:
 
         With ``stiffness`` or ``damping`` it drives to position ``target`` (rad or m) and
         ``velocity``. With neither it holds ``velocity``. Without arguments the drive is removed.
-        max_force: largest torque or force, N·m or N; None: unlimited. The drive is a property of
+        max_force: largest torque or force, N·m or N; None: the ``effort`` of the joint. The drive is a property of
         the body and not part of the state, so ``save`` does not include it.
         """
     def apply_force(self, link: str, force: ArrayLike, point: ArrayLike | None = None) -> None:
@@ -2210,6 +2253,8 @@ class World:
         pitch: float | None = None,
         ratio: float = 1.0,
         ground: ArrayLike | None = None,
+        cone: float | None = None,
+        max_velocity: float | None = None,
     ) -> Joint:
         """Joins two bodies, or a body and the world, in their present poses, and returns the joint.
 
@@ -2230,7 +2275,8 @@ class World:
 
         limits: (lower, upper) of the position, rad or m. drive: a dict with the arguments of
         ``Joint.set_drive``. stiffness, rest: a spring along the position, N·m/rad or N/m, and rad or m.
-        damping: N·m·s/rad or N·s/m. friction: N·m or N. breaking_force, N, and breaking_torque about the
+        cone: largest angle of a spherical joint between its axis on a and that on b, rad. max_velocity: largest speed
+        of the position, rad/s or m/s. damping: N·m·s/rad or N·s/m. friction: N·m or N. breaking_force, N, and breaking_torque about the
         point, N·m: above one of them the joint breaks; ``events`` has a ``"joint_broken"`` then. The
         bodies still collide with each other: ``set_pair_material(a, b, collides=False)``. Points and axes
         are in the world.
@@ -2251,6 +2297,8 @@ class World:
         quantization: float = 0.0,
         delay: int = 0,
         seed: int = 0,
+        resolution: tuple[int, int] | None = None,
+        vertical_fov: float | None = None,
     ) -> Sensor:
         """Adds a measuring sensor, read after every step: ``world.sensors[name]``.
 
@@ -2267,6 +2315,11 @@ class World:
 
         deviation: standard deviation of white noise. bias_walk: that of the change of a bias in a second. quantization: distance
         of the values that a reading can have. delay: steps by which it is late. seed: start of the noise.
+
+        ``"depth"`` and ``"segmentation"`` are cameras that look along z of the site, with x to the right and y down in the image.
+        resolution: pixels in a row and rows, by default (64, 48). vertical_fov: rad, by default π/4. Their readings are made when
+        they are read: distances along z, m, shape (rows, columns), -1 where nothing is; and what a pixel shows, shape (rows,
+        columns, 2): the index in ``world.bodies`` and that of the link in its ``link_names``, -1 for nothing and other objects.
         """
     @property
     def sensors(self) -> Sensors:
@@ -2503,7 +2556,7 @@ def _choices() -> dict[str, list[str]]:
     order.
     """
 def _unpickle_articulation(
-    file: Path, floating: bool, packages: Mapping[str, Path], words: Sequence[str], numbers: Sequence[Sequence[float]]
+    file: Path, floating: bool, packages: Mapping[str, Path], words: Sequence[str], velocity_limits: bool, numbers: Sequence[Sequence[float]]
 ) -> Articulation:
     """Unpickles a description. Its file is read again."""
 def _unpickle_batch(

@@ -63,6 +63,8 @@ SensorKind: TypeAlias = Literal[
     "joint_position",
     "joint_velocity",
     "drive_force",
+    "depth",
+    "segmentation",
 ]
 """``World.add_sensor(kind=…)``: what a measuring sensor reads."""
 

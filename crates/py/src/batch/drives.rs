@@ -46,7 +46,7 @@ impl Drives {
             let driven = stiffness != 0.0 || damping != 0.0;
             let target = of(&self.target).filter(|_| driven);
             let velocity = of(&self.velocity).filter(|v| driven || *v != 0.0);
-            let limit = of(&self.max_force).unwrap_or(f64::INFINITY);
+            let limit = of(&self.max_force).unwrap_or(settings.effort);
             settings.drive = drive(target, velocity, stiffness, damping, limit)?;
             dof += 1;
             Ok(())

@@ -94,9 +94,10 @@ impl Articulation {
     ///
     /// floating: whether the root floats; otherwise it is fixed to the base. packages: folders by
     /// name, for ``package://NAME/…``. missing_meshes: ``"error"`` or ``"skip"``, for missing
-    /// collision meshes. collision_meshes: ``"exact"`` or ``"hull"``.
+    /// collision meshes. collision_meshes: ``"exact"`` or ``"hull"``. velocity_limits: whether the largest
+    /// velocities of joints are enforced.
     #[staticmethod]
-    #[pyo3(signature = (path, *, floating=false, packages=None, missing_meshes="error", collision_meshes="exact"))]
+    #[pyo3(signature = (path, *, floating=false, packages=None, missing_meshes="error", collision_meshes="exact", velocity_limits=false))]
     pub fn from_urdf(
         py: Python<'_>,
         path: &Bound<'_, PyAny>,
@@ -104,9 +105,11 @@ impl Articulation {
         packages: Option<BTreeMap<String, PathBuf>>,
         missing_meshes: &str,
         collision_meshes: &str,
+        velocity_limits: bool,
     ) -> Result<Articulation> {
         let file = crate::arrays::convert::path(path)?;
         let options = UrdfOptions {
+            velocity_limits,
             floating,
             packages: packages.unwrap_or_default(),
             missing_meshes: meaning("missing_meshes", missing_meshes, MISSING_MESHES)?,
@@ -252,6 +255,30 @@ impl Articulation {
         Ok(PyArray1::from_vec(py, flat).reshape([dofs.len(), 2])?)
     }
 
+    /// Largest speed of each degree of freedom, shape (dof,), rad/s or m/s; infinite for none. Settable for a
+    /// body in a world.
+    #[getter]
+    fn max_velocity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(PyArray1::from_vec(py, self.spot.dofs()?.iter().map(|dof| dof.max_velocity).collect()))
+    }
+
+    #[setter]
+    fn set_max_velocity(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.change_dofs(py, ("max_velocity", value), |dof, max_velocity| DofSettings { max_velocity, ..dof })
+    }
+
+    /// Force of the motor of each degree of freedom, shape (dof,), N·m or N, the limit of drives that name none;
+    /// infinite if it is not known. A URDF states it. Settable for a body in a world.
+    #[getter]
+    fn effort<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(PyArray1::from_vec(py, self.spot.dofs()?.iter().map(|dof| dof.effort).collect()))
+    }
+
+    #[setter]
+    fn set_effort(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.change_dofs(py, ("effort", value), |dof, effort| DofSettings { effort, ..dof })
+    }
+
     /// Returns the accelerations ``qdd`` that generalized forces ``tau`` cause, shape (dof,) or
     /// (batch, dof).
     ///
@@ -345,7 +372,7 @@ impl Articulation {
     ///
     /// With ``stiffness`` or ``damping`` it drives to position ``target`` (rad or m) and
     /// ``velocity``. With neither it holds ``velocity``. Without arguments the drive is removed.
-    /// max_force: largest torque or force, N·m or N; None: unlimited. The drive is a property of
+    /// max_force: largest torque or force, N·m or N; None: the ``effort`` of the joint. The drive is a property of
     /// the body and not part of the state, so ``save`` does not include it.
     #[pyo3(signature = (joint, *, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
@@ -359,12 +386,12 @@ impl Articulation {
         damping: f64,
         max_force: Option<f64>,
     ) -> Result<()> {
-        let max_force = max_force.unwrap_or(f64::INFINITY);
         let (place, index) = (self.in_world()?, self.dof_of(joint)?);
-        let drive = drive(target, velocity, stiffness, damping, max_force)?;
         place.write(py, |inner| {
             let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
-            let settings = DofSettings { drive, ..body.dofs()[index].clone() };
+            let before = body.dofs()[index].clone();
+            let drive = drive(target, velocity, stiffness, damping, max_force.unwrap_or(before.effort))?;
+            let settings = DofSettings { drive, ..before };
             Ok(body.set_dof(index, settings)?)
         })
     }
@@ -430,9 +457,10 @@ impl Articulation {
         Ok(match source {
             Source::File { file, options, .. } => {
                 let file = std::path::absolute(file).unwrap_or_else(|_| file.clone());
-                let UrdfOptions { floating, packages, missing_meshes, collision_meshes, .. } = options.clone();
+                let UrdfOptions { floating, packages, missing_meshes, collision_meshes, velocity_limits, .. } =
+                    options.clone();
                 let words = [word(missing_meshes, MISSING_MESHES), word(collision_meshes, COLLISION_MESHES)];
-                let arguments = (file, floating, packages, words, numbers).into_pyobject(py)?;
+                let arguments = (file, floating, packages, words, velocity_limits, numbers).into_pyobject(py)?;
                 (native.getattr("_unpickle_articulation")?, arguments.into_any())
             }
             Source::Built(body) => {

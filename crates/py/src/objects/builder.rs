@@ -77,16 +77,17 @@ impl ArticulationBuilder {
     ///
     /// limits: (lower, upper), rad or m. joint_damping: N·m·s/rad or N·s/m. joint_friction: N·m or N.
     /// armature: inertia of the rotor of a revolute or prismatic joint, as the joint meets it, kg·m² or kg.
-    /// stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
+    /// max_velocity: largest speed of the joint, rad/s or m/s. effort: the force of its motor, N·m or N, which limits drives that name no
+    /// ``max_force``. stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
     /// ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the
     /// start. friction, restitution, collides: of the shapes. color: sRGB, shape (3,).
     #[pyo3(signature = (name, parent=None, *, joint="revolute", axis=None, position=None, orientation=None, shape=None, shape_position=None,
         shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, joint_friction=0.0,
-        armature=0.0, stiffness=0.0, rest=0.0, drive=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=true, color=None))]
+        armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=true, color=None))]
     #[pyo3(
         text_signature = "($self, name, parent=None, *, joint='revolute', axis=(0.0, 0.0, 1.0), position=None, orientation=None, shape=None, \
         shape_position=None, shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, \
-        joint_friction=0.0, armature=0.0, stiffness=0.0, rest=0.0, drive=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=True, color=None)"
+        joint_friction=0.0, armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=True, color=None)"
     )]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_link(
@@ -111,6 +112,8 @@ impl ArticulationBuilder {
         stiffness: f64,
         rest: f64,
         drive: Option<&Bound<'_, PyDict>>,
+        max_velocity: Option<f64>,
+        effort: Option<f64>,
         q: Option<f64>,
         qd: Option<f64>,
         friction: f64,
@@ -146,8 +149,10 @@ impl ArticulationBuilder {
             link = link.with_limits(pair(limits)?);
         }
         if let Some(drive) = drive {
-            link = link.with_drive(drive_of(drive)?);
+            link = link.with_drive(drive_of(drive, effort.unwrap_or(f64::INFINITY))?);
         }
+        link = max_velocity.into_iter().fold(link, LinkBuilder::with_max_velocity);
+        link = effort.into_iter().fold(link, LinkBuilder::with_effort);
         link = q.into_iter().fold(link, LinkBuilder::with_position);
         link = qd.into_iter().fold(link, LinkBuilder::with_velocity);
         let color = match color {

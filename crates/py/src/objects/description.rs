@@ -58,11 +58,13 @@ pub fn _unpickle_articulation(
     floating: bool,
     packages: BTreeMap<String, PathBuf>,
     words: [String; 2],
+    velocity_limits: bool,
     numbers: [Vec<f64>; 4],
 ) -> Result<Articulation> {
     let file = file.into_pyobject(py)?.into_any();
     let [missing, collision] = words;
-    let description = Articulation::from_urdf(py, &file, floating, Some(packages), &missing, &collision)?;
+    let description =
+        Articulation::from_urdf(py, &file, floating, Some(packages), &missing, &collision, velocity_limits)?;
     with_numbers(py, description, numbers)
 }
 
@@ -104,5 +106,5 @@ pub fn described<'py>(value: &Bound<'py, PyAny>) -> Result<Bound<'py, Articulati
     if matches!(FileKind::of(&path(value)?), Ok(FileKind::Mjcf)) {
         return Ok(Bound::new(value.py(), Articulation::from_mjcf(value.py(), value, None, "error", "hull")?)?);
     }
-    Ok(Bound::new(value.py(), Articulation::from_urdf(value.py(), value, false, None, "error", "exact")?)?)
+    Ok(Bound::new(value.py(), Articulation::from_urdf(value.py(), value, false, None, "error", "exact", false)?)?)
 }

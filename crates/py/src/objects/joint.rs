@@ -14,8 +14,8 @@ use tumble::dynamics::{DofSettings, JointForce, LoopJoint, LoopJointKind, Spring
 
 /// A joint between two bodies, or a body and the world, made by ``World.add_joint``.
 ///
-/// Its position is an angle (rad), a displacement (m) or a length (m); ``"spherical"``, ``"fixed"``,
-/// ``"universal"`` and ``"planar"`` joints have none. Everything can change between steps. All vectors
+/// Its position is an angle (rad), a displacement (m) or a length (m); ``"fixed"``, ``"universal"`` and
+/// ``"planar"`` joints have none. Everything can change between steps. All vectors
 /// are in world axes.
 #[pyclass(frozen, module = "tumble")]
 pub struct Joint {
@@ -138,8 +138,8 @@ impl Joint {
         self.place.write(py, |inner| Ok(inner.world.set_enabled(self.place.id, value)?))
     }
 
-    /// Position, rad or m: the angle of ``a`` about the axis, its displacement along the axis, or the
-    /// length. Zero where the joint was made, except for a length. An angle is in (-π, π], or within π
+    /// Position, rad or m: the angle of ``a`` about the axis, its displacement along the axis, the length, or
+    /// the angle between both axes of a ``"spherical"`` joint. Zero where the joint was made, except for a length. An angle is in (-π, π], or within π
     /// of the middle of its limits.
     #[getter]
     fn position(&self) -> Result<f64> {
@@ -164,7 +164,34 @@ impl Joint {
         self.change_dof(py, |dof| dof.limits = limits)
     }
 
-    /// Viscous damping along the position, N·m·s/rad or N·s/m.
+    /// Largest swing of a ``"spherical"`` joint, rad, or None: its axis on ``a`` stays in this cone about that on ``b``.
+    #[getter]
+    fn cone(&self) -> Result<Option<f64>> {
+        self.constant(LoopJoint::cone)
+    }
+
+    #[setter]
+    fn set_cone(&self, py: Python<'_>, value: Option<f64>) -> Result<()> {
+        self.change(py, |joint| {
+            is_of(joint, LoopJointKind::Spherical)?;
+            let dof = DofSettings { limits: value.map(|cone| [0.0, cone]), ..joint.dof().clone() };
+            Ok(joint.set_dof(dof)?)
+        })
+    }
+
+    /// Largest speed of the position, of a ``"spherical"`` joint that about each axis, rad/s or m/s; infinite
+    /// for none.
+    #[getter]
+    fn max_velocity(&self) -> Result<f64> {
+        self.constant(|joint| joint.dof().max_velocity)
+    }
+
+    #[setter]
+    fn set_max_velocity(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change_dof(py, |dof| dof.max_velocity = value)
+    }
+
+    /// Viscous damping along the position, of a ``"spherical"`` joint about each axis, N·m·s/rad or N·s/m.
     #[getter]
     fn damping(&self) -> Result<f64> {
         self.constant(|joint| joint.dof().damping)
@@ -175,7 +202,8 @@ impl Joint {
         self.change_dof(py, |dof| dof.damping = value)
     }
 
-    /// Dry friction along the position: largest torque or force, N·m or N.
+    /// Dry friction along the position: largest torque or force, N·m or N. Of a ``"spherical"`` joint about each
+    /// axis.
     #[getter]
     fn friction(&self) -> Result<f64> {
         self.constant(|joint| joint.dof().friction)
@@ -309,13 +337,17 @@ impl Joint {
         damping: f64,
         max_force: Option<f64>,
     ) -> Result<()> {
-        let drive = drive(target, velocity, stiffness, damping, max_force.unwrap_or(f64::INFINITY))?;
-        self.change_dof(py, |dof| dof.drive = drive)
+        self.change(py, |joint| {
+            let max_force = max_force.unwrap_or(joint.dof().effort);
+            let drive = drive(target, velocity, stiffness, damping, max_force)?;
+            let dof = DofSettings { drive, ..joint.dof().clone() };
+            Ok(joint.set_dof(dof)?)
+        })
     }
 
     /// Force on ``a`` in the last sub-step, shape (3,), N; the opposite acts on ``b``. It includes those
-    /// of limits, spring, damping, friction and drive. Zero while the joint is not enabled, and while
-    /// its bodies sleep.
+    /// of limits, spring, damping, friction and drive. Zero while the joint is not enabled; while its
+    /// bodies sleep it is that with which they fell asleep.
     #[getter]
     fn force<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
         Ok(vector(py, &self.carried()?.force))

@@ -1,7 +1,7 @@
 //! Shared parts of the methods of articulations: lookup of joints and links by name, arguments and
 //! results of the algorithms.
 
-use crate::arrays::convert::{Numbers, numbers, vec3};
+use crate::arrays::convert::{Numbers, numbers, shown, vec3};
 use crate::errors::{Error, Result};
 use crate::objects::articulation::Articulation;
 use crate::objects::binding::Which;
@@ -12,7 +12,7 @@ use numpy::{IxDyn, PyArray1, PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tumble::collide::Vec3;
-use tumble::dynamics::Drive;
+use tumble::dynamics::{ArticulatedBody, DofSettings, Drive};
 
 impl Articulation {
     /// Returns the arguments of an algorithm. Omitted ones have their current values.
@@ -51,6 +51,38 @@ impl Articulation {
             )));
         }
         Ok(link.v)
+    }
+
+    /// Sets one setting of all degrees of freedom of a body in a world: a number for all, or shape (dof,). An
+    /// invalid value changes nothing.
+    pub fn change_dofs(
+        &self,
+        py: Python<'_>,
+        (name, value): (&str, &Bound<'_, PyAny>),
+        with: impl Fn(DofSettings, f64) -> DofSettings,
+    ) -> Result<()> {
+        let (place, dof) = (self.in_world()?, self.robot.dof());
+        let Numbers { shape, data } = numbers(value, name)?;
+        let each = match shape.as_slice() {
+            [] => vec![data[0]; dof],
+            [n] if *n == dof => data,
+            _ => {
+                return Err(Error::value(format!(
+                    "{name}: expected a number or shape ({dof},), got {}",
+                    shown(&shape)
+                )));
+            }
+        };
+        place.write(py, |inner| {
+            let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
+            let mut changed = body.clone();
+            for (index, value) in each.into_iter().enumerate() {
+                let settings = with(changed.dofs()[index].clone(), value);
+                changed.set_dof(index, settings)?;
+            }
+            *body = changed;
+            Ok(())
+        })
     }
 
     /// Returns the part that carries a frame.
@@ -108,8 +140,8 @@ pub fn drive(target: Option<f64>, velocity: Option<f64>, stiffness: f64, damping
     })
 }
 
-/// Returns the drive of a dict with the arguments of ``set_drive``.
-pub fn drive_of(given: &Bound<'_, PyDict>) -> Result<Drive> {
+/// Returns the drive of a dict with the arguments of ``set_drive``; `effort` is the default of its limit.
+pub fn drive_of(given: &Bound<'_, PyDict>, effort: f64) -> Result<Drive> {
     const KEYS: [&str; 5] = ["target", "velocity", "stiffness", "damping", "max_force"];
     let mut values = [None; 5];
     for (key, value) in given {
@@ -120,5 +152,5 @@ pub fn drive_of(given: &Bound<'_, PyDict>) -> Result<Drive> {
         values[index] = value.extract()?;
     }
     let [target, velocity, stiffness, damping, max_force] = values;
-    drive(target, velocity, stiffness.unwrap_or(0.0), damping.unwrap_or(0.0), max_force.unwrap_or(f64::INFINITY))
+    drive(target, velocity, stiffness.unwrap_or(0.0), damping.unwrap_or(0.0), max_force.unwrap_or(effort))
 }

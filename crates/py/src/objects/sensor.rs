@@ -5,7 +5,6 @@ use crate::objects::place::{Place, hash};
 use crate::world::gc::{Anchor, anchor};
 use crate::world::sensors;
 use crate::world::shared::Shared;
-use numpy::PyArray1;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -46,10 +45,10 @@ impl Sensor {
         self.place.read(|inner| inner.world.get::<Core>(self.place.id).map(|sensor| sensor.kind().name()))
     }
 
-    /// Reading at the end of the last step, with its errors: 3 numbers, or 1 or 4 for some kinds. Raises ``RemovedError`` if
+    /// Reading at the end of the last step, with its errors: 3 numbers, or 1 or 4 for some kinds, or the present image of a camera. Raises ``RemovedError`` if
     /// the sensor or its body was removed.
     #[getter]
-    fn value<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+    fn value<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         sensors::value(py, &self.place)
     }
 
@@ -92,14 +91,14 @@ impl Sensors {
     }
 
     fn names(&self) -> Result<Vec<String>> {
-        Ok(sensors::all(&self.shared)?.0.into_iter().map(|(name, _)| name).collect())
+        sensors::names(&self.shared)
     }
 }
 
 #[pymethods]
 impl Sensors {
     /// Reading of a sensor, as ``Sensor.value``. An unknown name raises ``UnknownNameError``.
-    fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> Result<Bound<'py, PyArray1<f64>>> {
+    fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> Result<Bound<'py, PyAny>> {
         sensors::value(py, &sensors::place_by_name(&self.shared, name)?)
     }
 
@@ -122,12 +121,12 @@ impl Sensors {
     }
 
     /// Readings of all sensors.
-    fn values<'py>(&self, py: Python<'py>) -> Result<Vec<Bound<'py, PyArray1<f64>>>> {
+    fn values<'py>(&self, py: Python<'py>) -> Result<Vec<Bound<'py, PyAny>>> {
         self.names()?.iter().map(|name| self.__getitem__(py, name)).collect()
     }
 
     /// Names and readings of all sensors.
-    fn items<'py>(&self, py: Python<'py>) -> Result<Vec<(String, Bound<'py, PyArray1<f64>>)>> {
+    fn items<'py>(&self, py: Python<'py>) -> Result<Vec<(String, Bound<'py, PyAny>)>> {
         self.names()?.into_iter().map(|name| Ok((name.clone(), self.__getitem__(py, &name)?))).collect()
     }
 
@@ -136,7 +135,7 @@ impl Sensors {
         Sensor::new(py, sensors::place_by_name(&self.shared, name)?)
     }
 
-    /// All readings as one value of a structured dtype, with a field of each sensor's name: ``record["imu"]``.
+    /// All readings but images as one value of a structured dtype, with a field of each sensor's name: ``record["imu"]``.
     fn record<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         let (names, numbers) = sensors::all(&self.shared)?;
         if names.is_empty() {

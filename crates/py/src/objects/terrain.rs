@@ -1,4 +1,4 @@
-//! Shapes that are meshes made from something else: convex hulls, height fields, terrain.
+//! Shapes that are meshes made from something else: convex hulls, height fields, terrain, signed distances.
 
 use crate::arrays::convert::{number, numbers, path, shown, some};
 use crate::errors::{Error, Result, caught};
@@ -8,7 +8,7 @@ use pyo3::PyClass;
 use pyo3::prelude::*;
 use std::path::Path;
 use tumble::collide::{TriMesh, Vec3};
-use tumble::scene::{read_heights, read_mesh_bytes, read_triangles};
+use tumble::scene::{ValueGrid, read_grid, read_heights, read_mesh_bytes, read_triangles};
 
 impl Shape {
     /// Returns the shape as an object of a subclass of `Mesh`.
@@ -24,6 +24,7 @@ pub(super) fn mesh_of_record(py: Python<'_>, shape: Shape) -> Result<Py<PyAny>> 
         "ConvexHull" => Py::new(py, shape.into_mesh(ConvexHull))?.into_any(),
         "HeightField" => Py::new(py, shape.into_mesh(HeightField))?.into_any(),
         "Terrain" => Py::new(py, shape.into_mesh(Terrain))?.into_any(),
+        "Sdf" => Py::new(py, shape.into_mesh(Sdf))?.into_any(),
         _ => Py::new(py, shape.into_a(Mesh))?.into_any(),
     })
 }
@@ -156,5 +157,51 @@ impl Terrain {
         let count = mesh.triangles.len();
         let solid = mesh.scaled(scale).terrain(thickness).map_err(|e| Error::value(format!("{place}{e}")))?;
         Ok(Shape::new(built(py, "Terrain", solid)?, format!("Terrain({count} triangles)")).into_mesh(Terrain))
+    }
+}
+
+/// The solid in which signed distances on a grid are negative, a ``Mesh`` of the surface by marching tetrahedra.
+/// values: shape (nx, ny, nz), ``values[i, j, k]`` at x, y and z, as ``numpy.meshgrid(indexing="ij")`` makes them;
+/// or the path of a NumPy file (.npy). low, high: the first and the last grid point, shape (3,), meters, in the
+/// frame of the body. The grid must surround the solid.
+#[pyclass(frozen, extends = Mesh, module = "tumble")]
+pub struct Sdf;
+
+#[pymethods]
+impl Sdf {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        values: &Bound<'_, PyAny>,
+        low: &Bound<'_, PyAny>,
+        high: &Bound<'_, PyAny>,
+    ) -> Result<PyClassInitializer<Sdf>> {
+        let corners = [some::<3>(low, "low")?, some::<3>(high, "high")?].map(Vec3::from);
+        let (grid, place) = match values.extract::<std::path::PathBuf>() {
+            Ok(file) => {
+                let named = |why| Error::value(format!("{}: {why}", file.display()));
+                let read = || read_mesh_bytes(&file).and_then(|bytes| read_grid(&bytes)).map_err(named);
+                (py.detach(read)?, format!("{}: ", file.display()))
+            }
+            Err(_) => {
+                let array = numbers(values, "values")?;
+                let Ok(counts) = <[usize; 3]>::try_from(array.shape.as_slice()) else {
+                    let expected = "values: expected shape (nx, ny, nz)";
+                    return Err(Error::value(format!("{expected}, got {}", shown(&array.shape))));
+                };
+                (ValueGrid::of_c_order(&array.data, counts).map_err(Error::value)?, String::new())
+            }
+        };
+        let [low, high] = corners;
+        let mesh = py
+            .detach(|| {
+                caught(|| {
+                    TriMesh::isosurface_within(&grid.values, grid.counts, low, high)
+                        .map_err(|e| Error::value(e.to_string()))
+                })
+            })
+            .map_err(|e| if place.is_empty() { e } else { Error::value(format!("{place}{e}")) })?;
+        let [nx, ny, nz] = grid.counts;
+        Ok(Shape::new(built(py, "Sdf", mesh)?, format!("Sdf({nx} x {ny} x {nz} values)")).into_mesh(Sdf))
     }
 }

@@ -908,16 +908,18 @@ impl World {
     ///
     /// limits: (lower, upper) of the position, rad or m. drive: a dict with the arguments of
     /// ``Joint.set_drive``. stiffness, rest: a spring along the position, N·m/rad or N/m, and rad or m.
-    /// damping: N·m·s/rad or N·s/m. friction: N·m or N. breaking_force, N, and breaking_torque about the
+    /// cone: largest angle of a spherical joint between its axis on a and that on b, rad. max_velocity: largest speed
+    /// of the position, rad/s or m/s. damping: N·m·s/rad or N·s/m. friction: N·m or N. breaking_force, N, and breaking_torque about the
     /// point, N·m: above one of them the joint breaks; ``events`` has a ``"joint_broken"`` then. The
     /// bodies still collide with each other: ``set_pair_material(a, b, collides=False)``. Points and axes
     /// are in the world.
     #[pyo3(signature = (kind, a, b=None, point=None, axis=None, limits=None, drive=None, breaking_force=None, *, name="", second_point=None,
-        second_axis=None, length=None, stiffness=0.0, rest=None, damping=0.0, friction=0.0, breaking_torque=None, teeth=None, radius=None, pitch=None, ratio=1.0, ground=None))]
+        second_axis=None, length=None, stiffness=0.0, rest=None, damping=0.0, friction=0.0, breaking_torque=None, teeth=None, radius=None, pitch=None, ratio=1.0, ground=None,
+        cone=None, max_velocity=None))]
     #[pyo3(
         text_signature = "($self, kind, a, b=None, point=None, axis=(0.0, 0.0, 1.0), limits=None, drive=None, breaking_force=None, *, name='', \
         second_point=None, second_axis=None, length=None, stiffness=0.0, rest=None, damping=0.0, friction=0.0, breaking_torque=None, teeth=None, radius=None, \
-        pitch=None, ratio=1.0, ground=None)"
+        pitch=None, ratio=1.0, ground=None, cone=None, max_velocity=None)"
     )]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_joint(
@@ -945,6 +947,8 @@ impl World {
         pitch: Option<f64>,
         ratio: f64,
         ground: Option<&Bound<'_, PyAny>>,
+        cone: Option<f64>,
+        max_velocity: Option<f64>,
     ) -> Result<Joint> {
         let given = joints::Arguments {
             kind,
@@ -965,6 +969,8 @@ impl World {
             pitch,
             ratio,
             ground,
+            cone,
+            max_velocity,
         };
         joints::add(&self.shared, py, &given)
     }
@@ -984,8 +990,13 @@ impl World {
     ///
     /// deviation: standard deviation of white noise. bias_walk: that of the change of a bias in a second. quantization: distance
     /// of the values that a reading can have. delay: steps by which it is late. seed: start of the noise.
+    ///
+    /// ``"depth"`` and ``"segmentation"`` are cameras that look along z of the site, with x to the right and y down in the image.
+    /// resolution: pixels in a row and rows, by default (64, 48). vertical_fov: rad, by default π/4. Their readings are made when
+    /// they are read: distances along z, m, shape (rows, columns), -1 where nothing is; and what a pixel shows, shape (rows,
+    /// columns, 2): the index in ``world.bodies`` and that of the link in its ``link_names``, -1 for nothing and other objects.
     #[pyo3(signature = (kind, on=None, *, name="", position=None, orientation=None, relative_to=None, volume=None, cutoff=None, deviation=0.0,
-        bias_walk=0.0, quantization=0.0, delay=0, seed=0))]
+        bias_walk=0.0, quantization=0.0, delay=0, seed=0, resolution=None, vertical_fov=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_sensor(
         &self,
@@ -1003,9 +1014,23 @@ impl World {
         quantization: f64,
         delay: u32,
         seed: u64,
+        resolution: Option<[u32; 2]>,
+        vertical_fov: Option<f64>,
     ) -> Result<Sensor> {
         let noise = SensorNoise { deviation, bias_walk, quantization, delay, seed };
-        let given = sensors::Arguments { kind, on, name, position, orientation, relative_to, volume, cutoff, noise };
+        let given = sensors::Arguments {
+            kind,
+            on,
+            name,
+            position,
+            orientation,
+            relative_to,
+            volume,
+            cutoff,
+            noise,
+            resolution,
+            vertical_fov,
+        };
         sensors::add(&self.shared, py, &given)
     }
 

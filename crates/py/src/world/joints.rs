@@ -36,6 +36,8 @@ pub struct Arguments<'a, 'py> {
     pub pitch: Option<f64>,
     pub ratio: f64,
     pub ground: Option<&'a Bound<'py, PyAny>>,
+    pub cone: Option<f64>,
+    pub max_velocity: Option<f64>,
 }
 
 /// Adds a joint and returns its handle.
@@ -43,8 +45,8 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
     let kind = meaning("kind", given.kind, LoopJointKind::NAMES)?;
     let [a, b] = given.sides.map(|value| value.map(|value| side(shared, value)).transpose());
     let (a, b) = (a?, b?);
-    let drive = given.drive.map_or(Ok(Drive::None), drive_of)?;
-    let limits = given.limits.map(pair).transpose()?;
+    let drive = given.drive.map_or(Ok(Drive::None), |drive| drive_of(drive, f64::INFINITY))?;
+    let limits = given.limits.map(pair).transpose()?.or(given.cone.map(|cone| [0.0, cone]));
     let points = [("point", given.points[0], a), ("second_point", given.points[1], b)].map(|(name, point, side)| {
         if let Some(point) = point {
             return vec3(point, name).map(Some);
@@ -62,6 +64,12 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
     }
     let missing = |what: &str| Err(Error::value(format!("{what}: a {} needs it", kind.name())));
     match kind {
+        LoopJointKind::Spherical if given.limits.is_some() => {
+            return Err(Error::value("limits: a spherical joint has a cone"));
+        }
+        _ if kind != LoopJointKind::Spherical && given.cone.is_some() => {
+            return Err(Error::value(format!("cone: a {} joint has none", kind.name())));
+        }
         LoopJointKind::Gear if given.teeth.is_none() => return missing("teeth"),
         LoopJointKind::Rack if given.radius.is_none() => return missing("radius"),
         LoopJointKind::Rack if given.axes[1].is_none() => return missing("second_axis"),
@@ -90,7 +98,17 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
         let rest = given.rest.unwrap_or(if kind.has_length() { joint.length() } else { 0.0 });
         let springs = given.stiffness != 0.0 || kind == LoopJointKind::Spring;
         let spring = springs.then_some(Spring { stiffness: given.stiffness, rest });
-        joint.set_dof(DofSettings { limits, damping: given.damping, friction: given.friction, spring, drive })?;
+        let (damping, friction) = (given.damping, given.friction);
+        let max_velocity = given.max_velocity.unwrap_or(f64::INFINITY);
+        joint.set_dof(DofSettings {
+            limits,
+            damping,
+            friction,
+            spring,
+            drive,
+            max_velocity,
+            ..DofSettings::default()
+        })?;
         let [force, torque] = given.breaking.map(|most| most.unwrap_or(f64::INFINITY));
         joint.set_breaking(force, torque)?;
         let id = inner.world.add(joint)?;

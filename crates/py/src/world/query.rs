@@ -67,15 +67,15 @@ impl Rows {
 }
 
 /// The numbers of the bodies in `world.bodies`.
-struct Numbering(BTreeMap<ObjectId, i64>);
+pub struct Numbering(BTreeMap<ObjectId, i64>);
 
 impl Numbering {
-    fn of(inner: &Inner) -> Numbering {
+    pub fn of(inner: &Inner) -> Numbering {
         Numbering((0..).zip(body_ids(&inner.world)).map(|(number, id)| (id, number)).collect())
     }
 
     /// Returns the number of a body, and the index of its link.
-    fn sides(&self, inner: &Inner, id: ObjectId, part: usize) -> [i64; 2] {
+    pub fn sides(&self, inner: &Inner, id: ObjectId, part: usize) -> [i64; 2] {
         [self.0.get(&id).copied().unwrap_or(-1), link(inner, id, part)]
     }
 }

@@ -9,11 +9,15 @@ use crate::objects::shapes::Shape;
 use crate::world::add::own_place;
 use crate::world::inner::Inner;
 use crate::world::joints;
+use crate::world::query::Numbering;
 use crate::world::shared::Shared;
+use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use std::sync::Arc;
 use tumble::collide::Pose;
-use tumble::dynamics::{Anchor, ArticulatedBody, ObjectId, Sensor as Core, SensorKind, SensorNoise, SensorPlace};
+use tumble::dynamics::{
+    Anchor, ArticulatedBody, ObjectId, Optics, Sensor as Core, SensorImage, SensorKind, SensorNoise, SensorPlace,
+};
 
 /// The arguments of ``add_sensor``.
 pub struct Arguments<'a, 'py> {
@@ -26,6 +30,8 @@ pub struct Arguments<'a, 'py> {
     pub volume: Option<&'a Bound<'py, Shape>>,
     pub cutoff: Option<f64>,
     pub noise: SensorNoise,
+    pub resolution: Option<[u32; 2]>,
+    pub vertical_fov: Option<f64>,
 }
 
 /// A body, and the name of a link of it.
@@ -68,6 +74,12 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
         }
         if let Some(volume) = volume {
             sensor = sensor.with_volume(volume)?;
+        }
+        if given.resolution.is_some() || given.vertical_fov.is_some() {
+            let usual = Optics::default();
+            let resolution = given.resolution.unwrap_or(usual.resolution);
+            let vertical_fov = given.vertical_fov.unwrap_or(usual.vertical_fov);
+            sensor = sensor.with_optics(Optics { resolution, vertical_fov })?;
         }
         let id = inner.world.add(sensor.with_cutoff(cutoff)?.with_noise(given.noise)?)?;
         let name = inner.world.name(id).unwrap_or_default().into();
@@ -146,26 +158,64 @@ pub fn place_of(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<Option
     Ok(value.extract::<String>().ok().and_then(|name| place_by_name(shared, &name).ok()))
 }
 
-/// Returns the reading of a sensor.
-pub fn value<'py>(py: Python<'py>, place: &Place) -> Result<Bound<'py, numpy::PyArray1<f64>>> {
-    let numbers = place.read(|inner| inner.world.reading(place.id).map(<[f64]>::to_vec))?;
-    Ok(numpy::PyArray1::from_vec(py, numbers))
+/// Returns the reading of a sensor: an array of float64, of a segmentation of int32.
+pub fn value<'py>(py: Python<'py>, place: &Place) -> Result<Bound<'py, PyAny>> {
+    match place.read(|inner| Some(inner.world.get::<Core>(place.id)?.kind()))? {
+        SensorKind::Depth => {
+            let SensorImage { width, height, pixels } = place.read(|inner| inner.world.depth_image(place.id))?;
+            Ok(PyArray1::from_vec(py, pixels).reshape([height, width])?.into_any())
+        }
+        SensorKind::Segmentation => {
+            let SensorImage { width, height, pixels } = place.read(|inner| parts_in_image(inner, place.id))?;
+            let numbers = pixels.into_iter().flatten().collect();
+            Ok(PyArray1::from_vec(py, numbers).reshape([height, width, 2])?.into_any())
+        }
+        _ => {
+            let numbers = place.read(|inner| inner.world.reading(place.id).map(<[f64]>::to_vec))?;
+            Ok(PyArray1::from_vec(py, numbers).into_any())
+        }
+    }
+}
+
+/// Returns the index of the body in ``world.bodies`` and that of the link in its ``link_names`` behind each pixel.
+fn parts_in_image(inner: &Inner, id: ObjectId) -> Option<SensorImage<[i32; 2]>> {
+    let SensorImage { width, height, pixels } = inner.world.segmentation_image(id)?;
+    let numbers = Numbering::of(inner);
+    let of = |(id, part)| numbers.sides(inner, id, part).map(|number| i32::try_from(number).unwrap_or(-1));
+    let pixels = pixels.into_iter().map(|part| part.map_or([-1; 2], of)).collect();
+    Some(SensorImage { width, height, pixels })
 }
 
 /// Returns the places of a sensor's reading in the state.
 pub fn columns(shared: &Arc<Shared>, name: &str) -> Result<std::ops::Range<usize>> {
     let place = place_by_name(shared, name)?;
     place.read(|inner| {
-        let numbers = inner.world.get::<Core>(place.id)?.kind().numbers();
+        let kind = inner.world.get::<Core>(place.id)?.kind();
+        if kind.is_camera() {
+            return Some(Err(Error::value(format!("'{name}' is a camera: read it in each world"))));
+        }
         let start = inner.world.view().state_range(place.id)?.x.start;
-        Some(start..start + numbers)
-    })
+        Some(Ok(start..start + kind.numbers()))
+    })?
 }
 
 /// Names of sensors with the lengths of their readings.
 type Lengths = Vec<(String, usize)>;
 
-/// Returns the names of all sensors with the lengths of their readings and the numbers one after the other, in the order of
+/// Returns the names of all sensors, cameras included, in the order of their addition. Those of removed bodies are left out.
+pub fn names(shared: &Arc<Shared>) -> Result<Vec<String>> {
+    shared.read(|inner| {
+        let world = &inner.world;
+        let camera = |id: ObjectId| {
+            let sensor = world.get::<Core>(id).filter(|sensor| sensor.kind().is_camera());
+            sensor.is_some_and(|sensor| sensor.place().object().is_none_or(|on| world.status(on).is_some()))
+        };
+        let present = world.sensors().filter(|id| camera(*id) || world.reading(*id).is_some());
+        Ok(present.filter_map(|id| world.name(id).map(str::to_owned)).collect())
+    })
+}
+
+/// Returns the names of all sensors but cameras with the lengths of their readings and the numbers one after the other, in the order of
 /// their addition. Those of removed bodies are left out.
 pub fn all(shared: &Arc<Shared>) -> Result<(Lengths, Vec<f64>)> {
     shared.read(|inner| {

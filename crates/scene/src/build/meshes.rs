@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use tumble_core::collide::{RepairSettings, Shape, ShapeError, TreeCache, TreeSettings, TriMesh, Vec3};
 
 use crate::build::error::BuildError;
+use crate::build::grid::read_grid;
 use crate::build::heights::{HeightGrid, read_heights};
 use crate::build::mesh_files::{MAX_MESH_BYTES, make_solid, read_with_lines};
 use crate::build::shapes::Purpose;
@@ -92,6 +93,12 @@ impl SceneFile {
             MeshSource::Terrain { path, scale, thickness_m } => {
                 let (mesh, lines) = self.read_mesh(spec, path, wrong)?;
                 mesh.scaled(*scale).terrain(*thickness_m).map_err(|e| wrong(e.at_line(&lines).to_string()))?
+            }
+            MeshSource::Sdf { path, low_m, high_m } => {
+                let grid = read_grid(&self.read_bytes(spec, path, wrong)?);
+                let grid = grid.map_err(|why| wrong(format!("{}: {why}", path.display())))?;
+                TriMesh::isosurface_within(&grid.values, grid.counts, Vec3::from(*low_m), Vec3::from(*high_m))
+                    .map_err(|e| wrong(e.to_string()))?
             }
         };
         Ok((made, Vec::new()))

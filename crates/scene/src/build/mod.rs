@@ -6,6 +6,7 @@ pub(crate) mod behaviors;
 pub(crate) mod collada;
 pub(crate) mod error;
 pub(crate) mod event;
+pub(crate) mod grid;
 pub(crate) mod heights;
 pub(crate) mod mesh_files;
 pub(crate) mod meshes;

@@ -36,6 +36,9 @@ impl SceneFile {
             if let Some(volume) = &spec.volume {
                 sensor = sensor.with_volume(shapes::make(volume, &[]).map_err(|e| e.to_string())?).map_err(text)?;
             }
+            if let Some(optics) = spec.optics {
+                sensor = sensor.with_optics(optics).map_err(text)?;
+            }
             sensor.with_cutoff(spec.cutoff).and_then(|sensor| sensor.with_noise(spec.noise)).map_err(text)
         };
         let sensor = make().map_err(wrong)?;

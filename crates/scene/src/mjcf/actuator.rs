@@ -310,7 +310,7 @@ fn drive(tree: usize, link: usize, group: &[usize], elements: &[Element<'_, '_>]
         damping,
         target: if stiffness > 0.0 { force / stiffness } else { 0.0 },
         velocity: if stiffness > 0.0 { 0.0 } else { force / damping },
-        limit: most.min(joint.effort.unwrap_or(f64::INFINITY)),
+        limit: most.min(joint.dof.effort),
     };
     group.iter().for_each(|&index| assembly.scene.actuators[index].driven = true);
 }

@@ -246,7 +246,8 @@ impl Assembly<'_, '_> {
         } else if joint.kind == Kind::Ball && joint.armature > 0.0 {
             self.reader.notes.add(&joint.element, "armatures of ball joints are left out");
         }
-        spec.effort = joint.actuator_range.map(|[low, high]| high.max(-low)).filter(|most| *most > 0.0);
+        let effort = joint.actuator_range.map(|[low, high]| high.max(-low)).filter(|most| *most > 0.0);
+        spec.dof.effort = effort.filter(|_| joint.is_single()).unwrap_or(f64::INFINITY);
         spec
     }
 }

@@ -163,6 +163,7 @@ impl ArticulatedSpec {
             collision_meshes: f.choice_or("collision_meshes", COLLISION, CollisionMeshes::Exact),
             surface: from.surface.clone(),
             recolor: f.value("color").is_some() || f.value("material").is_some(),
+            velocity_limits: f.flag_or("velocity_limits", false),
         };
         let file = place.folder.join(path);
         let robot = match place.files.iter().find(|(name, _)| *name == path) {

@@ -29,12 +29,9 @@ pub struct JointSpec {
     pub position: Vec<f64>,
     /// Velocity numbers at time 0.
     pub velocity: Vec<f64>,
-    /// Largest torque or force of its motor, N·m or N, if a URDF has one. It is the default force
-    /// limit of drives.
-    pub effort: Option<f64>,
     /// Inertia of its rotor, kg·m² or kg, at least 0; 0 unless it has one degree of freedom.
     pub armature: f64,
-    /// Largest speed that the file allows, rad/s or m/s. Stored, not enforced.
+    /// Largest speed that a URDF states, rad/s or m/s. It is the velocity limit if its options ask for that.
     pub speed: Option<f64>,
     /// Whether a position drive without a target holds the initial position.
     pub(crate) holds_start: bool,
@@ -86,6 +83,8 @@ struct JointKeys {
     limits: Key,
     damping: &'static str,
     friction: &'static str,
+    max_velocity: &'static str,
+    effort: &'static str,
     armature: &'static str,
     stiffness: &'static str,
     rest: Key,
@@ -102,6 +101,8 @@ const REVOLUTE_KEYS: JointKeys = JointKeys {
     limits: ("limits_rad", Some("limits_deg")),
     damping: "damping_n_m_s_per_rad",
     friction: "friction_n_m",
+    max_velocity: "max_velocity_rad_per_s",
+    effort: "effort_n_m",
     armature: "armature_kg_m2",
     stiffness: "stiffness_n_m_per_rad",
     rest: ("rest_rad", Some("rest_deg")),
@@ -118,6 +119,8 @@ const PRISMATIC_KEYS: JointKeys = JointKeys {
     limits: ("limits_m", None),
     damping: "damping_n_s_per_m",
     friction: "friction_n",
+    max_velocity: "max_velocity_m_per_s",
+    effort: "effort_n",
     armature: "armature_kg",
     stiffness: "stiffness_n_per_m",
     rest: ("rest_m", None),
@@ -144,7 +147,6 @@ impl JointSpec {
             mimic: None,
             position,
             velocity,
-            effort: None,
             armature: 0.0,
             speed: None,
             holds_start: false,
@@ -200,6 +202,16 @@ impl JointSpec {
     fn read_resistance(&mut self, f: &mut Fields<'_>, keys: &'static JointKeys) {
         self.dof.damping = f.number_or(keys.damping, Bound::NOT_NEGATIVE, self.dof.damping);
         self.dof.friction = f.number_or(keys.friction, Bound::NOT_NEGATIVE, self.dof.friction);
+        self.dof.max_velocity = f.number_or(keys.max_velocity, Bound::POSITIVE, self.dof.max_velocity);
+    }
+
+    /// Reads the settings of a spherical loop joint: the half angle of its cone, damping, friction and velocity
+    /// limit.
+    pub(crate) fn read_cone(&mut self, f: &mut Fields<'_>) {
+        self.read_resistance(f, self.keys());
+        if let Some(cone) = number(f, ("cone_rad", Some("cone_deg"))) {
+            self.dof.limits = Some([0.0, cone]);
+        }
     }
 
     fn read_spherical_start(&mut self, f: &mut Fields<'_>) {
@@ -219,6 +231,7 @@ impl JointSpec {
         if let Some(limits) = read_limits(f, keys.limits) {
             self.dof.limits = limits;
         }
+        self.dof.effort = f.number_or(keys.effort, Bound::POSITIVE, self.dof.effort);
         let example = format!("{{ {} = 10 }}", keys.stiffness);
         if let Some(mut spring) = springs.then(|| f.table("spring", &example)).flatten() {
             let stiffness = spring.number(keys.stiffness, Bound::NOT_NEGATIVE);
@@ -233,7 +246,7 @@ impl JointSpec {
 
     fn read_drive(&mut self, mut f: Fields<'_>, keys: &'static JointKeys) {
         let Some(motor) = f.choice("type", DRIVE_KINDS) else { return f.give_up() };
-        let most = self.effort.unwrap_or(f64::INFINITY);
+        let most = self.dof.effort;
         self.holds_start = false;
         let drive = match motor {
             DriveKind::Position => {
@@ -255,15 +268,15 @@ impl JointSpec {
                     damping,
                     target: target.unwrap_or(0.0),
                     velocity,
-                    limit: f.number_or(keys.limit, Bound::NOT_NEGATIVE, most),
+                    limit: read_most(&mut f, keys.limit, most),
                 })
             }
             DriveKind::Velocity => {
                 let target = f.number(keys.target_rate, Bound::ANY);
-                Some(Drive::Velocity { target, limit: f.number_or(keys.limit, Bound::NOT_NEGATIVE, most) })
+                Some(Drive::Velocity { target, limit: read_most(&mut f, keys.limit, most) })
             }
             DriveKind::Playback => {
-                let limit = f.number_or(keys.limit, Bound::NOT_NEGATIVE, most);
+                let limit = read_most(&mut f, keys.limit, most);
                 read_playback(&mut f, keys.values).map(|motion| Drive::Playback { motion: Arc::new(motion), limit })
             }
         };
@@ -301,6 +314,15 @@ fn number(f: &mut Fields<'_>, (si, degrees): Key) -> Option<f64> {
     let given = f.optional_number(si, Bound::ANY);
     let turned = degrees.and_then(|key| f.optional_number(key, Bound::ANY)).map(f64::to_radians);
     one_of(f, (si, degrees), given, turned)
+}
+
+/// Reads the largest force of a drive; `false` is none.
+fn read_most(f: &mut Fields<'_>, key: &'static str, default: f64) -> f64 {
+    match f.value(key) {
+        Some(value) if value.get_ref().as_bool() == Some(false) => f64::INFINITY,
+        Some(value) => f.as_number(key, value, Bound::NOT_NEGATIVE),
+        None => default,
+    }
 }
 
 /// Returns the value of the one of two alternative keys that is present. Both at once are a

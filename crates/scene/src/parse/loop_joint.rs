@@ -121,7 +121,11 @@ impl LoopJointSpec {
         };
         let position_m = if placed { f.vector("position_m", Bound::ANY) } else { [0.0; 3] };
         let second_position_m = (placed && kind.has_length()).then(|| f.vector("second_position_m", Bound::ANY));
-        let axis = if placed && kind.has_axis() { f.direction("axis") } else { [0.0, 0.0, 1.0] };
+        let axis = match kind {
+            LoopJointKind::Spherical if placed => f.direction_or("axis", [0.0, 0.0, 1.0]),
+            _ if placed && kind.has_axis() => f.direction("axis"),
+            _ => [0.0, 0.0, 1.0],
+        };
         let second_axis = match kind {
             _ if !placed => None,
             LoopJointKind::Universal | LoopJointKind::Rack => Some(f.direction("second_axis")),
@@ -186,14 +190,15 @@ fn read_frames(f: &mut Fields<'_>, keys: [&'static str; 2]) -> Option<[Pose; 2]>
 
 /// Reads the settings of the position of a joint, if it has one.
 fn read_settings(f: &mut Fields<'_>, kind: LoopJointKind, axis: Vec3) -> JointSpec {
-    let turns = kind == LoopJointKind::Revolute;
-    let mut joint = JointSpec::new("", if turns { Joint::Revolute { axis } } else { Joint::Prismatic { axis } });
+    let mut joint = JointSpec::new("", if kind.turns() { Joint::Revolute { axis } } else { Joint::Prismatic { axis } });
     if kind == LoopJointKind::Spring {
         let stiffness = f.number("stiffness_n_per_m", Bound::NOT_NEGATIVE);
         joint.dof.spring = Some(Spring { stiffness, rest: 0.0 });
     }
-    if kind.has_position() {
-        joint.read_settings(f, kind != LoopJointKind::Spring);
+    match kind {
+        LoopJointKind::Spherical => joint.read_cone(f),
+        _ if kind.has_position() => joint.read_settings(f, kind != LoopJointKind::Spring),
+        _ => {}
     }
     joint
 }

@@ -115,6 +115,15 @@ pub enum MeshSource {
         /// side.
         thickness_m: Option<f64>,
     },
+    /// The solid in which signed distances on a grid are negative, in the frame of the grid.
+    Sdf {
+        /// A NumPy file of three axes, prefixed with the folder of the scene.
+        path: PathBuf,
+        /// The first grid point, meters.
+        low_m: [f64; 3],
+        /// The last grid point, meters.
+        high_m: [f64; 3],
+    },
 }
 
 const TREE_ERROR: Bound = Bound::new(1e-4, 1.0, "a fraction of the mesh's diagonal, from 1e-4 to 1");
@@ -131,6 +140,7 @@ enum Kind {
     ConvexHull,
     HeightField,
     Terrain,
+    Sdf,
 }
 
 const KINDS: Names<Kind> = &[
@@ -144,6 +154,7 @@ const KINDS: Names<Kind> = &[
     ("convex_hull", Kind::ConvexHull),
     ("height_field", Kind::HeightField),
     ("terrain", Kind::Terrain),
+    ("sdf", Kind::Sdf),
 ];
 
 impl MeshSpec {
@@ -176,6 +187,7 @@ impl MeshSource {
         match self {
             MeshSource::File { path, .. }
             | MeshSource::Terrain { path, .. }
+            | MeshSource::Sdf { path, .. }
             | MeshSource::ConvexHull(HullPoints::File { path, .. })
             | MeshSource::HeightField { heights: Heights::File { path, .. }, .. } => Some(path),
             _ => None,
@@ -211,6 +223,11 @@ impl MeshSource {
             Kind::ConvexHull => terrain::read_hull(f, folder)?,
             Kind::HeightField => terrain::read_height_field(f, folder)?,
             Kind::Terrain => terrain::read_terrain(f, folder)?,
+            Kind::Sdf => {
+                let [low_m, high_m] = ["low_m", "high_m"].map(|key| f.vector(key, Bound::ANY));
+                let path = read_file(f, folder, &["npy"], "the path of an .npy file")?;
+                MeshSource::Sdf { path, low_m, high_m }
+            }
         })
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use tumble_core::collide::Pose;
-use tumble_core::{MAX_DELAY, SensorKind, SensorNoise};
+use tumble_core::{MAX_DELAY, Optics, SensorKind, SensorNoise};
 
 use crate::parse::body::read_name;
 use crate::parse::bound::Bound;
@@ -42,6 +42,8 @@ pub struct SensorSpec {
     pub cutoff: f64,
     /// Errors of the sensor. Default none.
     pub noise: SensorNoise,
+    /// Resolution and angle of view of a camera.
+    pub optics: Option<Optics>,
 }
 
 const KINDS: Names<SensorKind> = &{
@@ -67,12 +69,16 @@ impl SensorSpec {
         let volume = if kind == SensorKind::Touch { read_volume(&mut f) } else { None };
         let oriented = kind == SensorKind::Orientation;
         let cutoff = if oriented { f64::INFINITY } else { f.number_or("cutoff", Bound::POSITIVE, f64::INFINITY) };
+        let optics = kind.is_camera().then(|| read_optics(&mut f));
+        let (noisy, scaled) = (kind != SensorKind::Segmentation, !oriented && kind != SensorKind::Segmentation);
+        let number =
+            |f: &mut Fields<'_>, key, read: bool| if read { f.number_or(key, Bound::NOT_NEGATIVE, 0.0) } else { 0.0 };
         let noise = SensorNoise {
-            deviation: f.number_or("deviation", Bound::NOT_NEGATIVE, 0.0),
-            bias_walk: f.number_or("bias_walk", Bound::NOT_NEGATIVE, 0.0),
-            quantization: if oriented { 0.0 } else { f.number_or("quantization", Bound::NOT_NEGATIVE, 0.0) },
-            delay: f.integer_or("delay", 0..=MAX_DELAY, 0),
-            seed: u64::from(f.integer_or("seed", 0..=u32::MAX, 0)),
+            deviation: number(&mut f, "deviation", noisy),
+            bias_walk: number(&mut f, "bias_walk", optics.is_none()),
+            quantization: number(&mut f, "quantization", scaled),
+            delay: if optics.is_none() { f.integer_or("delay", 0..=MAX_DELAY, 0) } else { 0 },
+            seed: if noisy { u64::from(f.integer_or("seed", 0..=u32::MAX, 0)) } else { 0 },
         };
         let place = match on {
             None if kind.reads_dof() || kind.reads_joint() || kind == SensorKind::Touch => {
@@ -99,8 +105,30 @@ impl SensorSpec {
             found
         });
         f.finish();
-        Some(SensorSpec { name, kind, on: place?, site, relative_to: reference, volume, cutoff, noise })
+        Some(SensorSpec { name, kind, on: place?, site, relative_to: reference, volume, cutoff, noise, optics })
     }
+}
+
+/// Reads `resolution` and `vertical_fov_deg` of a camera.
+fn read_optics(f: &mut Fields<'_>) -> Optics {
+    const EXPECTED: &str = "the pixels in a row and the rows, whole numbers above 0 with a product of at most 16777216";
+    let usual = Optics::default();
+    let mut resolution = usual.resolution;
+    if let Some(value) = f.value("resolution") {
+        let problems = f.log.count();
+        let given: [f64; 2] = f.as_vector("resolution", value, Bound::ANY);
+        let whole = given.iter().all(|n| n.fract() == 0.0 && *n >= 1.0) && given[0] * given[1] <= 16_777_216.0;
+        match whole {
+            true => resolution = given.map(|n| n as u32),
+            false if f.log.count() == problems => f.wrong("resolution", value, EXPECTED),
+            false => {}
+        }
+    }
+    const DEGREES: Bound = Bound::new(1e-3, 179.9, "an angle from 0.001 to 179.9 degrees");
+    const RADIANS: Bound = Bound::new(1e-5, 3.14, "an angle from 0.00001 to 3.14 radians");
+    let degrees = f.optional_number("vertical_fov_deg", DEGREES).map(f64::to_radians);
+    let vertical_fov = f.optional_number("vertical_fov_rad", RADIANS).or(degrees).unwrap_or(usual.vertical_fov);
+    Optics { resolution, vertical_fov }
 }
 
 /// Reads `volume`, a shape without a mesh.

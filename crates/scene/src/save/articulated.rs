@@ -235,15 +235,20 @@ fn resistance(dof: &DofSettings) -> Table {
     let mut t = Table::default();
     t.put_unless(0.0, "damping_n_m_s_per_rad", dof.damping);
     t.put_unless(0.0, "friction_n_m", dof.friction);
+    t.put_unless(f64::INFINITY, "max_velocity_rad_per_s", dof.max_velocity);
     t
 }
 
 /// Returns the settings of a degree of freedom with a position; `turns` for an angle.
 pub(super) fn dof_settings(dof: &DofSettings, turns: bool) -> Table {
-    let DofSettings { limits, damping, friction, spring, drive } = dof;
+    let DofSettings { limits, damping, friction, spring, drive, max_velocity, effort } = dof;
     let [at_limits, resists, dry, stiff, at_rest] = match turns {
         true => ["limits_rad", "damping_n_m_s_per_rad", "friction_n_m", "stiffness_n_m_per_rad", "rest_rad"],
         false => ["limits_m", "damping_n_s_per_m", "friction_n", "stiffness_n_per_m", "rest_m"],
+    };
+    let [fastest, strongest] = match turns {
+        true => ["max_velocity_rad_per_s", "effort_n_m"],
+        false => ["max_velocity_m_per_s", "effort_n"],
     };
     let [target, rate, most, values] = match turns {
         true => ["target_rad", "target_rad_per_s", "max_torque_n_m", "values_rad"],
@@ -253,6 +258,8 @@ pub(super) fn dof_settings(dof: &DofSettings, turns: bool) -> Table {
     limits.iter().for_each(|limits| t.put(at_limits, *limits));
     t.put_unless(0.0, resists, *damping);
     t.put_unless(0.0, dry, *friction);
+    t.put_unless(f64::INFINITY, fastest, *max_velocity);
+    t.put_unless(f64::INFINITY, strongest, *effort);
     if let Some(spring) = spring {
         let mut s = Table::of(stiff, spring.stiffness);
         s.put(at_rest, spring.rest);
@@ -281,7 +288,11 @@ pub(super) fn dof_settings(dof: &DofSettings, turns: bool) -> Table {
             (d, limit)
         }
     };
-    d.put_unless(f64::INFINITY, most, *limit);
+    // without a limit of its own a drive has the effort
+    match limit.is_infinite() && effort.is_finite() {
+        true => d.put(most, false),
+        false => d.put_unless(*effort, most, *limit),
+    }
     t.put("drive", d);
     t
 }

@@ -204,6 +204,10 @@ impl Writer<'_> {
             None => {}
         }
         t.put_unless(f64::INFINITY, "cutoff", sensor.cutoff());
+        if sensor.kind().is_camera() {
+            t.put("resolution", sensor.optics().resolution);
+            t.put("vertical_fov_rad", sensor.optics().vertical_fov);
+        }
         let noise = sensor.noise();
         t.put_unless(0.0, "deviation", noise.deviation);
         t.put_unless(0.0, "bias_walk", noise.bias_walk);

@@ -48,7 +48,9 @@ impl Writer<'_> {
                 t.put("stiffness_n_per_m", dof.spring.map_or(0.0, |spring| spring.stiffness));
                 dof.spring = None;
             }
-            t.extend(dof_settings(&dof, kind == LoopJointKind::Revolute));
+            joint.cone().iter().for_each(|cone| t.put("cone_rad", *cone));
+            dof.limits = dof.limits.filter(|_| joint.cone().is_none());
+            t.extend(dof_settings(&dof, kind.turns()));
         } else if *joint.dof() != DofSettings::default() {
             self.fault(format!("loop joint \"{name}\": settings of a position that it does not have"));
         }

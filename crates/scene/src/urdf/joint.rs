@@ -46,7 +46,6 @@ pub(crate) struct JointElement {
     /// Unit axis; the normal of a planar joint.
     pub(crate) axis: Vec3,
     pub(crate) dof: DofSettings,
-    pub(crate) effort: Option<f64>,
     pub(crate) speed: Option<f64>,
     pub(crate) mimic: Option<Mimic>,
 }
@@ -65,7 +64,7 @@ impl JointElement {
         let kind = read_kind(joint);
         let [parent, child] = ["parent", "child"].map(|end| read_end(joint, end, links));
         let axis = read_axis(joint);
-        let (dof, effort, speed) = read_limits(joint, kind?);
+        let (dof, speed) = read_limits(joint, kind?);
         let mimic = joint.child("mimic").and_then(|mimic| {
             Some(Mimic {
                 joint: mimic.required_text("joint", "the name of the joint that it follows")?.to_owned(),
@@ -85,7 +84,6 @@ impl JointElement {
             placement,
             axis,
             dof,
-            effort,
             speed,
             mimic,
         })
@@ -108,7 +106,7 @@ impl JointElement {
     /// Returns the joint with the limits, damping, friction, effort and speed of this element.
     pub(crate) fn with_effects(&self, joint: JointSpec) -> JointSpec {
         let dof = if joint.kind == Joint::Fixed { DofSettings::default() } else { self.dof.clone() };
-        JointSpec { dof, effort: self.effort, speed: self.speed, ..joint }
+        JointSpec { dof, speed: self.speed, ..joint }
     }
 }
 
@@ -157,7 +155,7 @@ fn read_axis(joint: &Element<'_, '_>) -> Vec3 {
 }
 
 /// Reads `<limit>` and `<dynamics>`: limits, damping, friction, effort, speed.
-fn read_limits(joint: &Element<'_, '_>, kind: Kind) -> (DofSettings, Option<f64>, Option<f64>) {
+fn read_limits(joint: &Element<'_, '_>, kind: Kind) -> (DofSettings, Option<f64>) {
     let bounded = matches!(kind, Kind::Revolute | Kind::Prismatic);
     let limit = match bounded {
         true => joint.required(
@@ -179,9 +177,7 @@ fn read_limits(joint: &Element<'_, '_>, kind: Kind) -> (DofSettings, Option<f64>
     let constant = |name: &str| dynamics.and_then(|d| d.number(name, Bound::NOT_NEGATIVE)).unwrap_or(0.0);
     let open = lower == f64::NEG_INFINITY && upper == f64::INFINITY;
     let limits = (bounded && limit.is_some() && !open).then_some([lower, upper]);
-    (
-        DofSettings { limits, damping: constant("damping"), friction: constant("friction"), ..DofSettings::default() },
-        most("effort"),
-        most("velocity"),
-    )
+    let [damping, friction] = ["damping", "friction"].map(constant);
+    let effort = most("effort").unwrap_or(f64::INFINITY);
+    (DofSettings { limits, damping, friction, effort, ..DofSettings::default() }, most("velocity"))
 }

@@ -15,7 +15,7 @@
 //! | `<joint>` revolute, continuous, prismatic, fixed | the joint of that type; fixed links are merged into their parents |
 //! | `<joint>` planar | two massless prismatic joints `NAME/x`, `NAME/y` in the plane, then a revolute joint `NAME` about its normal |
 //! | `<joint>` floating | a floating root if its parent is fixed to the base; else prismatic joints `NAME/x`, `/y`, `/z` and a spherical joint |
-//! | `<limit>` | position limits; effort is the default force limit of drives; velocity is stored and not enforced |
+//! | `<limit>` | position limits; effort is the default force limit of drives; velocity is enforced with [`UrdfOptions::velocity_limits`] |
 //! | `<dynamics>` | viscous damping and dry friction |
 //! | `<mimic>` | a coupling of the two joints |
 //! | `<collision>` | box, cylinder, sphere, capsule; meshes in STL, OBJ, PLY and COLLADA |

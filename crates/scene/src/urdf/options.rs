@@ -42,4 +42,6 @@ pub struct UrdfOptions {
     pub surface: Surface,
     /// Whether the appearance of `surface` replaces the file's colors.
     pub recolor: bool,
+    /// Whether the velocities in `<limit>` are [enforced](tumble_core::DofSettings::max_velocity).
+    pub velocity_limits: bool,
 }

@@ -113,7 +113,10 @@ fn read_robot(robot: &Element<'_, '_>, mut context: Context<'_>) -> Option<Robot
     }
     let root = tree::find_root(robot.log, &elements, &joints)?;
     let name = robot.text("name").unwrap_or("robot").to_owned();
-    let links = TreeBuilder::new(robot.log, elements, &joints).build(root, &mut context);
+    let mut links = TreeBuilder::new(robot.log, elements, &joints).build(root, &mut context);
+    for joint in links.iter_mut().map(|link| &mut link.joint).filter(|_| context.options.velocity_limits) {
+        joint.dof.max_velocity = joint.speed.filter(|_| joint.is_single()).unwrap_or(f64::INFINITY);
+    }
     Some(Robot { name, links, notes: context.notes.take() })
 }
 

@@ -270,7 +270,8 @@ fn add_crane(world: &mut World, mesh: Shape) {
     ];
     for (dof, drive) in drives.into_iter().enumerate() {
         let spring = Some(Spring { stiffness: 3.0, rest: 0.1 });
-        let settings = DofSettings { limits: Some([-1.0, 2.0]), damping: 0.2, friction: 0.1, spring, drive };
+        let (limits, max_velocity, effort) = (Some([-1.0, 2.0]), 7.5, 40.0);
+        let settings = DofSettings { limits, damping: 0.2, friction: 0.1, spring, drive, max_velocity, effort };
         crane.set_dof(dof, settings).unwrap();
     }
     for dof in 2..5 {
@@ -311,7 +312,10 @@ fn add_joints(world: &mut World) {
         let constants = joint.with_transmission(|t| (t.teeth, t.radius, t.pitch, t.ratio) = ([3, -7], 0.2, 0.05, 2.0));
         let mut joint = constants.unwrap().with_breaking_force(5e3).unwrap();
         if kind.has_position() {
-            let mut dof = DofSettings { damping: 0.3, friction: 0.02, ..joint.dof().clone() };
+            let mut dof = DofSettings { damping: 0.3, friction: 0.02, max_velocity: 9.0, ..joint.dof().clone() };
+            if *kind == LoopJointKind::Spherical {
+                dof.limits = Some([0.0, 2.5]);
+            }
             if *kind == LoopJointKind::Spring {
                 dof.spring = Some(Spring { stiffness: 20.0, rest: 0.4 });
             }

@@ -50,14 +50,14 @@ table! {
     [1.0, 10.0];
     billiards_time_stepping: "billiards", TimeStepping, "36b9d75c4ae9875c", "0297c6beb51197ed";
     billiards_backtracking: "billiards", Backtracking, "b5a27eda6855859e", "bf300238bd656f9e";
-    bowling_time_stepping: "bowling", TimeStepping, "94968c1b4058a725", "70d187bf489b9fef";
+    bowling_time_stepping: "bowling", TimeStepping, "94968c1b4058a725", "3929761e92ed79fc";
     bowling_backtracking: "bowling", Backtracking, "e677eac272ba7de7", "e18c2e4b1775af2c";
     chain_time_stepping: "chain", TimeStepping, "22fbcd4bcbb18743", "7e68bdb4b444ccf6";
     chain_backtracking: "chain", Backtracking, "63d0cbaca36ef0a9", "3198250057940e22";
-    falling_time_stepping: "falling", TimeStepping, "fd3ad61b4e564f55", "6997c90a0eb55308";
+    falling_time_stepping: "falling", TimeStepping, "975e49a4706a1c69", "e6ab76fd3ebd1444";
     flock_time_stepping: "flock", TimeStepping, "62dc48ae297f84ac", "1f735e6ea46bfed5";
     flock_backtracking: "flock", Backtracking, "5e122f1064026626", "f28e4fa647471731";
-    falling_backtracking: "falling", Backtracking, "f1462869e100d4f1", "04dc94aa1ba65435";
+    falling_backtracking: "falling", Backtracking, "b064bee7ee0b458a", "d126928e23c90248";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "dba991e4803cfe34", "95407557393acae5";
     pendulum_time_stepping: "pendulum", TimeStepping, "a6f0f0b542061dc2", "63acd1d2fe930652";

@@ -98,8 +98,14 @@ fn an_arm_is_a_body_with_what_acts_on_it() {
     let [shoulder, slide, wheel] = body.dofs() else { panic!() };
     assert_eq!(
         *shoulder,
-        DofSettings { limits: Some([-1.5, 2.0]), damping: 0.25, friction: 0.5, ..DofSettings::default() }
+        DofSettings { limits: Some([-1.5, 2.0]), damping: 0.25, friction: 0.5, effort: 40.0, ..DofSettings::default() }
     );
+    // the velocities in the file are enforced if asked
+    let asked = UrdfOptions { velocity_limits: true, ..UrdfOptions::default() };
+    let (limited, _) = load(folder.write("arm.urdf", ARM), &asked).unwrap();
+    let velocities: Vec<f64> = limited.dofs().iter().map(|dof| dof.max_velocity).collect();
+    assert_eq!(velocities, [3.0, 1.0, f64::INFINITY]);
+    assert!(body.dofs().iter().all(|dof| dof.max_velocity.is_infinite()));
     assert_eq!(slide.limits, Some([0.0, 0.2]));
     assert_eq!(*wheel, DofSettings::default());
     let visuals = body.renderable().unwrap().visuals();

@@ -71,7 +71,7 @@ impl Joints {
                     position,
                     range: joint.dof.limits.unwrap_or([-most, most]),
                     unit: if slides { "m" } else { "rad" },
-                    effort: joint.effort.unwrap_or(f64::INFINITY),
+                    effort: joint.dof.effort,
                     own: joint.dof.drive.clone(),
                     followers: spec.links.iter().enumerate().filter_map(follower).collect(),
                 });

@@ -9,6 +9,7 @@
 //! damping           τ = −c·q̇⁺                               row  q̇⁺ + R·λ = 0,                               R = 1/(h·c)
 //! velocity drive    any τ with |τ| ≤ τ_max                   row  q̇⁺ = q̇*,                                    |λ| ≤ h·τ_max
 //! dry friction      against the motion, |τ| ≤ τ_f            row  q̇⁺ = 0,                                     |λ| ≤ h·τ_f
+//! velocity limit    −q̇_max ≤ q̇⁺ ≤ q̇_max                      rows ±q̇⁺ + q̇_max ≥ 0 ⟂ λ ≥ 0
 //! ```
 //!
 //! so no gain is too stiff for the step. `backtracking` does the same, with forces that hold over
@@ -22,13 +23,14 @@
 //! | `q, q̇` | position (rad or m) and velocity of the degree of freedom; `⁺` at the end of the step |
 //! | `k, c` | stiffness, N·m/rad or N/m, and damping, N·m·s/rad or N·s/m |
 //! | `λ = h·τ` | impulse of the row |
+//! | `q̇_max` | [`DofSettings::max_velocity`]: a stop that takes whatever force it needs, like a limit |
 
 use crate::articulated::model::playback::Playback;
 use std::sync::Arc;
 
-/// Settings of one degree of freedom. Spherical and floating joints support only damping and dry
-/// friction: their degrees of freedom have no single position.
-#[derive(Clone, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+/// Settings of one degree of freedom. Spherical and floating joints support only damping, dry friction
+/// and velocity limits: their degrees of freedom have no single position.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DofSettings {
     /// Lower and upper limit of the position, rad or m.
     pub limits: Option<[f64; 2]>,
@@ -40,6 +42,26 @@ pub struct DofSettings {
     pub spring: Option<Spring>,
     /// Motor.
     pub drive: Drive,
+    /// Largest speed, rad/s or m/s, above 0; infinite for none. An impact may exceed it until the forces of
+    /// the same step act.
+    pub max_velocity: f64,
+    /// Force of the motor that is built in, N·m or N, above 0: the limit of drives that name none. Infinite
+    /// if it is not known.
+    pub effort: f64,
+}
+
+impl Default for DofSettings {
+    fn default() -> DofSettings {
+        DofSettings {
+            limits: None,
+            damping: 0.0,
+            friction: 0.0,
+            spring: None,
+            drive: Drive::None,
+            max_velocity: f64::INFINITY,
+            effort: f64::INFINITY,
+        }
+    }
 }
 
 /// A linear spring on a joint. It is an explicit force: keep `stiffness·dt²` below the inertia that
@@ -125,7 +147,10 @@ impl DofSettings {
             return Some(("the lower limit", lo, "a number that is not above the upper limit"));
         }
         let spring = self.spring.unwrap_or(Spring { stiffness: 0.0, rest: 0.0 });
+        let most =
+            |what, value: f64| (value.is_nan() || value <= 0.0).then_some((what, value, "above 0; infinite for none"));
         let own = least("damping", self.damping).or(least("friction", self.friction));
+        let own = own.or(most("the velocity limit", self.max_velocity)).or(most("the effort", self.effort));
         let own = own
             .or(least("the spring's stiffness", spring.stiffness))
             .or(finite("the spring's rest position", spring.rest));

@@ -22,8 +22,8 @@ pub const MAX_LINKS: usize = 10_000;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModelError {
-    /// There is no moving link.
-    #[error("the model has no moving link")]
+    /// There is no link. A model whose links are all fixed, such as a table, never moves.
+    #[error("the model has no link")]
     Empty,
     /// More links than [`MAX_LINKS`].
     #[error("the model has more than {MAX_LINKS} links")]
@@ -317,7 +317,7 @@ impl ModelBuilder {
             }
             model.add(number, added)?;
         }
-        if model.links.is_empty() {
+        if model.frames.is_empty() {
             return Err(ModelError::Empty);
         }
         model.check_masses()?;

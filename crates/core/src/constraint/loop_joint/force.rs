@@ -33,10 +33,12 @@ impl LoopJoint {
                 sum.drive += start.force;
             }
         }
-        if let Some(coordinate) = self.coordinate(&pair).filter(|_| explicit) {
-            let (force, spring) = (self.explicit_force(&coordinate), self.dof.spring_force(coordinate.position));
-            add(&mut sum, &coordinate.terms, force);
-            sum.drive += force - spring + self.dof.damping * coordinate.rate;
+        if explicit {
+            self.explicit_forces(&pair, |coordinate, force| {
+                let spring = self.dof.spring_force(coordinate.position);
+                add(&mut sum, &coordinate.terms, force);
+                sum.drive += force - spring + self.dof.damping * coordinate.rate;
+            });
         }
         sum
     }

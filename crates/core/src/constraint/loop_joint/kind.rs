@@ -3,7 +3,8 @@
 /// The motion that a loop joint leaves free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum LoopJointKind {
-    /// The origins coincide; all rotations are free. Three rows.
+    /// The origins coincide; all rotations are free. Three rows. Its position is the swing: the angle between the
+    /// z axes, in [0, π].
     Spherical,
     /// The origins and the z axes coincide; one rotation is free. Five rows.
     Revolute,
@@ -62,10 +63,15 @@ impl LoopJointKind {
         Self::NAMES.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
     }
 
-    /// Returns whether it has one position: an angle, a displacement or a length.
+    /// Returns whether it has one position: an angle, a displacement, a length, or the swing of a spherical joint.
     pub fn has_position(self) -> bool {
         use LoopJointKind::*;
-        matches!(self, Revolute | Prismatic | Cylindrical | Screw) || self.has_length()
+        matches!(self, Revolute | Prismatic | Spherical | Cylindrical | Screw) || self.has_length()
+    }
+
+    /// Returns whether its position is an angle, rad, and no distance, m.
+    pub fn turns(self) -> bool {
+        matches!(self, LoopJointKind::Revolute | LoopJointKind::Spherical)
     }
 
     /// Returns whether its position is a length: the distance of its origins, or that of a pulley.

@@ -16,6 +16,7 @@
 //! gear        z_A, z_B        θ_A + θ_B·n_B/n_A           z_A·ω_A + z_B·ω_B·n_B/n_A
 //! rack        z_A, z_B        radius·θ_A − s_B            radius·z_A·ω_A − z_B·ṗ_B
 //! screw       t = z_B         t·d − pitch·θ/2π            t·s(p_A) − t·ω·pitch/2π
+//! swing       n = z_B × z_A/|…|  θ                        n·ω                n·(α_A − α_B) + dn/dt·ω
 //!
 //! spherical = origins    revolute = origins + axis    fixed = origins + rotation    prismatic = line + rotation
 //! cylindrical = line + axis    planar = plane + axis    universal = origins + across
@@ -37,8 +38,9 @@
 //! reaches it in Newton steps.
 //!
 //! **Position.** Some kinds have one: the angle of A about `z_B` from `x_B`, the displacement
-//! `z_B·d`, or the length `|d|`. It has the settings of a degree of freedom ([`DofSettings`]), whose
-//! rows are those of a joint of an articulated body. Only the spring differs: with implicit rows it
+//! `z_B·d`, the length `|d|`, or the swing `θ` of a spherical joint, whose limit is a cone. It has the settings of a degree of freedom ([`DofSettings`]), whose
+//! rows are those of a joint of an articulated body. A spherical joint has dry friction, damping and velocity
+//! limits about each axis of B's frame instead, and no spring or drive. Only the spring differs: with implicit rows it
 //! is the implicit midpoint rule, which is stable at any stiffness and keeps energy,
 //!
 //! ```text
@@ -61,7 +63,7 @@ pub use force::JointForce;
 pub use kind::LoopJointKind;
 pub use transmission::Transmission;
 
-use crate::articulated::DofSettings;
+use crate::articulated::{DofSettings, Drive};
 use crate::constraint::builder::RowBuilder;
 use crate::constraint::dof_rows::DofState;
 use crate::constraint::rows::RowSet;
@@ -182,7 +184,7 @@ impl LoopJoint {
 
     /// Sets the settings of its position: limits, damping, friction, spring and drive. Those of a
     /// revolute joint are about an angle in (−π, π] without limits, and within π of the middle of its
-    /// limits with them.
+    /// limits with them. The limits of a spherical joint are 0 and the half angle of a cone.
     ///
     /// # Errors
     /// [`LoopJointError::Range`] for a setting out of its range, [`LoopJointError::Kind`] for a joint
@@ -190,6 +192,13 @@ impl LoopJoint {
     pub fn set_dof(&mut self, dof: DofSettings) -> Result<(), LoopJointError> {
         if dof != DofSettings::default() && !self.kind.has_position() {
             return Err(self.wrong_kind("limits, damping, friction, springs and drives"));
+        }
+        if self.kind == LoopJointKind::Spherical {
+            if dof.spring.is_some() || dof.drive != Drive::None {
+                return Err(self.wrong_kind("springs and drives"));
+            }
+            let lower = dof.limits.map_or(0.0, |[lo, _]| lo);
+            self.check("the lower limit of its swing", lower, lower == 0.0, "0: a cone has no lower limit")?;
         }
         if let Some((what, value, expected)) = dof.range_error(true) {
             return Err(LoopJointError::Range { name: self.name.clone(), what, value, expected });
@@ -257,6 +266,27 @@ impl LoopJoint {
         self.with_dof(dof)
     }
 
+    /// Sets the largest swing of a spherical joint, rad: the half angle of a cone about the z axis of B's frame in
+    /// which the z axis of A's stays.
+    ///
+    /// # Errors
+    /// [`LoopJointError::Range`] for an angle below 0, [`LoopJointError::Kind`] for another kind.
+    pub fn with_cone(self, angle: f64) -> Result<Self, LoopJointError> {
+        match self.kind {
+            LoopJointKind::Spherical => self.with_limits([0.0, angle]),
+            _ => Err(self.wrong_kind("cone")),
+        }
+    }
+
+    /// Sets the largest speed of its position, of a spherical joint that about each axis, rad/s or m/s.
+    ///
+    /// # Errors
+    /// As [`set_dof`](Self::set_dof).
+    pub fn with_max_velocity(self, max_velocity: f64) -> Result<Self, LoopJointError> {
+        let dof = DofSettings { max_velocity, ..self.dof.clone() };
+        self.with_dof(dof)
+    }
+
     /// Sets the length of a distance, a rope or a spring, m.
     ///
     /// # Errors
@@ -302,6 +332,11 @@ impl LoopJoint {
     /// Returns the settings of its position.
     pub fn dof(&self) -> &DofSettings {
         &self.dof
+    }
+
+    /// Returns the largest swing of a spherical joint, rad; `None` without one.
+    pub fn cone(&self) -> Option<f64> {
+        self.dof.limits.filter(|_| self.kind == LoopJointKind::Spherical).map(|[_, cone]| cone)
     }
 
     /// Returns the length of a distance, a rope or a spring, m.
@@ -354,7 +389,6 @@ impl LoopJoint {
 
     /// Returns the angle that the drive turns about: without limits it goes the shorter way.
     fn driven(&self, position: f64) -> f64 {
-        use crate::articulated::Drive;
         match (&self.dof.drive, self.dof.limits, self.kind) {
             (Drive::Position { target, .. }, None, LoopJointKind::Revolute) => near(position, *target),
             _ => position,
@@ -367,36 +401,45 @@ impl LoopJoint {
                 let [lo, hi] = limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
                 Some([lo, hi.min(self.length)])
             }
+            (LoopJointKind::Spherical, Some([_, cone])) => Some([f64::NEG_INFINITY, cone]),
             (_, limits) => limits,
         }
     }
 
-    /// Calls `row` with all rows, in their order: held, limits, friction, damping, spring, drive.
+    /// Calls `row` with all rows, in their order: held, limits, velocity limits, friction, damping, spring, drive.
     fn lay(&self, pair: &EndPair, level: Level, time: f64, row: &mut dyn FnMut(JointRow)) {
         pair.held(self.kind, self.length, &self.transmission, row);
         let Some(coordinate) = self.coordinate(pair) else { return };
-        let Coordinate { position, rate, terms, bias } = coordinate;
-        let mut along = |sign: f64, target: RowTarget| {
-            let target = RowTarget { bias_acceleration: sign * bias, ..target };
-            let terms = terms.map(|term| term.map(|term| Term { factor: sign * term.factor, ..term }));
-            row(JointRow { terms, target, drives: false });
-        };
-        for (sign, gap) in self.gaps_of(position) {
-            along(sign, RowTarget::new(RowSet::HalfLine, gap));
+        for (sign, gap) in self.gaps_of(coordinate.position) {
+            row(coordinate.row(sign, RowTarget::new(RowSet::HalfLine, gap)));
         }
-        let state = DofState { q: self.driven(position), v: rate, settings: &self.dof };
-        state.resistance(level, |target| along(1.0, target));
+        if self.kind == LoopJointKind::Spherical {
+            return pair.rotations().iter().for_each(|about| self.lay_resistance(about, level, row));
+        }
+        self.lay_resistance(&coordinate, level, row);
+        let Coordinate { position, rate, .. } = coordinate;
         if let (Some(spring), Some(soft)) = (self.dof.spring.filter(|s| s.stiffness > 0.0), level.soft_step()) {
             let h = level.h();
             let velocity = rate - 4.0 * (position - spring.rest) * soft / (h * h);
             let compliance = 4.0 / (spring.stiffness * h * h);
             let share = level.share();
-            along(1.0, RowTarget { velocity, compliance, share, ..RowTarget::new(RowSet::Equality, 0.0) });
+            let target = RowTarget { velocity, compliance, share, ..RowTarget::new(RowSet::Equality, 0.0) };
+            row(coordinate.row(1.0, target));
         }
-        if let Some(target) = state.drive(level, time) {
-            let target = RowTarget { bias_acceleration: bias, ..target };
-            row(JointRow { terms, target, drives: true });
+        if let Some(target) = self.state(&coordinate).drive(level, time) {
+            row(JointRow { drives: true, ..coordinate.row(1.0, target) });
         }
+    }
+
+    /// Calls `row` with the rows of the velocity limit, friction and damping of a coordinate.
+    fn lay_resistance(&self, coordinate: &Coordinate, level: Level, row: &mut dyn FnMut(JointRow)) {
+        let state = self.state(coordinate);
+        state.velocity_limits().for_each(|(sign, target)| row(coordinate.row(sign, target)));
+        state.resistance(level, |target| row(coordinate.row(1.0, target)));
+    }
+
+    fn state(&self, coordinate: &Coordinate) -> DofState<'_> {
+        DofState { q: self.driven(coordinate.position), v: coordinate.rate, settings: &self.dof }
     }
 
     fn gaps_of(&self, position: f64) -> impl Iterator<Item = (f64, f64)> + use<> {
@@ -404,10 +447,16 @@ impl LoopJoint {
         gaps.into_iter().flatten().filter(|(_, gap)| gap.is_finite())
     }
 
-    /// Returns the force along the position of springs, damping and drives that are no rows.
-    fn explicit_force(&self, coordinate: &Coordinate) -> f64 {
-        self.dof.spring_force(coordinate.position)
-            + self.dof.explicit_force(self.driven(coordinate.position), coordinate.rate)
+    /// Calls `act` with the coordinates along which springs, damping and drives are forces and no rows, and with
+    /// these forces.
+    fn explicit_forces(&self, pair: &EndPair, mut act: impl FnMut(&Coordinate, f64)) {
+        if self.kind == LoopJointKind::Spherical {
+            return pair.rotations().iter().for_each(|about| act(about, -self.dof.damping * about.rate));
+        }
+        let Some(coordinate) = self.coordinate(pair) else { return };
+        let driven = self.driven(coordinate.position);
+        let force = self.dof.spring_force(coordinate.position) + self.dof.explicit_force(driven, coordinate.rate);
+        act(&coordinate, force);
     }
 
     fn wrong_kind(&self, what: &'static str) -> LoopJointError {
@@ -465,17 +514,17 @@ impl ForceGenerator for LoopJoint {
             return;
         }
         let Some(pair) = self.pair(view) else { return };
-        let Some(coordinate) = self.coordinate(&pair) else { return };
-        let force = self.explicit_force(&coordinate);
-        for Term { side, motion, axis, factor } in coordinate.terms.into_iter().flatten() {
-            let end = [&pair.a, &pair.b][side];
-            let Some((id, part)) = end.part else { continue };
-            let Some(index) = view.state_range(id).map(|range| range.parts.start + part) else { continue };
-            match motion {
-                Motion::Point(p) => out.add_at(index, &end.part_state, factor * force * axis, &p),
-                Motion::Rotation => out.wrenches[index].torque += factor * force * axis,
+        self.explicit_forces(&pair, |coordinate, force| {
+            for Term { side, motion, axis, factor } in coordinate.terms.into_iter().flatten() {
+                let end = [&pair.a, &pair.b][side];
+                let Some((id, part)) = end.part else { continue };
+                let Some(index) = view.state_range(id).map(|range| range.parts.start + part) else { continue };
+                match motion {
+                    Motion::Point(p) => out.add_at(index, &end.part_state, factor * force * axis, &p),
+                    Motion::Rotation => out.wrenches[index].torque += factor * force * axis,
+                }
             }
-        }
+        });
     }
 
     fn potential(&self, view: &WorldView) -> f64 {

@@ -54,6 +54,15 @@ pub(super) struct Coordinate {
     pub bias: f64,
 }
 
+impl Coordinate {
+    /// Returns a row along its rate times a sign.
+    pub fn row(&self, sign: f64, target: RowTarget) -> JointRow {
+        let target = RowTarget { bias_acceleration: sign * self.bias, ..target };
+        let terms = self.terms.map(|term| term.map(|term| Term { factor: sign * term.factor, ..term }));
+        JointRow { terms, target, drives: false }
+    }
+}
+
 /// One side in a view of the world.
 pub(super) struct JointEnd {
     pub part: PartRef,
@@ -276,7 +285,8 @@ impl EndPair {
             Prismatic | Cylindrical | Screw => Some(self.displacement()),
             Distance | Rope | Spring => Some(self.length()),
             Pulley => Some(self.lengths(by)),
-            Spherical | Fixed | Planar | Universal | Gear | Rack => None,
+            Spherical => Some(self.swing()),
+            Fixed | Planar | Universal | Gear | Rack => None,
         }
     }
 
@@ -290,6 +300,39 @@ impl EndPair {
             terms: between([Motion::Rotation; 2], &axis),
             bias: axis.dot(&alpha) + self.b.part_state.angular_velocity.cross(&axis).dot(&omega),
         }
+    }
+
+    /// Returns the angle between `z_A` and `z_B`, in [0, π].
+    fn swing(&self) -> Coordinate {
+        let (u, w, omega) = (self.a.axis(2), self.b.axis(2), self.omega());
+        let (omega_a, omega_b) = (self.a.part_state.angular_velocity, self.b.part_state.angular_velocity);
+        let c = w.cross(&u);
+        let angle = RealField::atan2(c.norm(), w.dot(&u));
+        // while they are parallel the swing grows about the axis of the rotation across them
+        let across = (omega - w * w.dot(&omega)).try_normalize(0.0).unwrap_or_else(|| self.b.axis(0));
+        let (axis, turning) = match c.try_normalize(1e-9) {
+            None => (across, Vec3::zeros()),
+            Some(n) => {
+                let rate = omega_b.cross(&w).cross(&u) + w.cross(&omega_a.cross(&u));
+                (n, (rate - n * n.dot(&rate)) / c.norm())
+            }
+        };
+        Coordinate {
+            position: angle,
+            rate: axis.dot(&omega),
+            terms: between([Motion::Rotation; 2], &axis),
+            bias: axis.dot(&self.alpha()) + turning.dot(&omega),
+        }
+    }
+
+    /// Returns the rotations of A about the axes of B's frame, as rates without positions.
+    pub fn rotations(&self) -> [Coordinate; 3] {
+        let (omega, alpha) = (self.omega(), self.alpha());
+        [0, 1, 2].map(|k| {
+            let axis = self.b.axis(k);
+            let bias = axis.dot(&alpha) + self.b.part_state.angular_velocity.cross(&axis).dot(&omega);
+            Coordinate { position: 0.0, rate: axis.dot(&omega), terms: between([Motion::Rotation; 2], &axis), bias }
+        })
     }
 
     /// Returns the displacement of A's origin along `z_B`.

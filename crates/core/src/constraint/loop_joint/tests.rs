@@ -2,6 +2,7 @@
 //! kinematic and static bodies.
 
 use super::*;
+use crate::articulated::DofSettings;
 use crate::constraint::rows::Rows;
 use crate::object::part_state::{PartState, StateSizes};
 use crate::rigid::RigidBody;
@@ -277,5 +278,27 @@ fn errors_of_rotations_are_the_rotation_that_is_left() {
         let tilt = frame.rotation * Vec3::new(hinge.errors[3], hinge.errors[4], 0.0);
         let reached = Quat::from_scaled_axis(tilt) * (frame.rotation * Vec3::z());
         assert!((reached - turned.rotation * Vec3::z()).norm() < 1e-12);
+    }
+}
+
+#[test]
+fn the_swing_of_a_spherical_joint_has_the_rate_and_bias_of_its_row() {
+    let t = 1e-5;
+    for modes in MODES {
+        let (pairing, [mut a, b]) = pairing(modes, Vec3::zeros());
+        a.frame.rotation *= Quat::from_scaled_axis(Vec3::new(0.4, -0.5, 0.3));
+        let dof = DofSettings { limits: Some([0.0, 1.5]), friction: 2.0, ..DofSettings::default() };
+        let joint = LoopJoint::new("joint", LoopJointKind::Spherical, a, b).unwrap().with_dof(dof).unwrap();
+        let [before, now, after] = [-t, 0.0, t].map(|t| pairing.after(t).record_loop_joint(&joint));
+        // three of the origin, the cone, friction about three axes
+        assert_eq!(now.errors.len(), 7);
+        let turn = Quat::from_scaled_axis(Vec3::new(0.4, -0.5, 0.3)) * Vec3::z();
+        assert!((1.5 - now.errors[3] - turn.z.acos()).abs() < 1e-12);
+        let rate = (after.errors[3] - before.errors[3]) / (2.0 * t);
+        assert!((rate - now.velocities[3]).abs() < 1e-8, "{modes:?}: {} {rate}", now.velocities[3]);
+        for row in 3..7 {
+            let rate = (after.velocities[row] - before.velocities[row]) / (2.0 * t);
+            assert!((rate - now.biases[row]).abs() < 1e-7, "{modes:?} row {row}: {} {rate}", now.biases[row]);
+        }
     }
 }

@@ -55,17 +55,27 @@ impl World {
     /// has no direction. A ray that starts inside a convex shape does not meet that shape. A mesh
     /// is hit on its outside only.
     pub fn cast_ray(&self, ray: &Ray, filter: &QueryFilter) -> Option<RayCastHit> {
-        Targets::new(self, filter, false).first(ray)
+        Targets::new(self.parts_by(filter), false).first(ray)
     }
 
     /// Returns the hits of [`cast_ray`](Self::cast_ray) for many rays, on
     /// [`Settings::threads`](crate::Settings::threads) threads. The number of threads changes no
     /// bit.
     pub fn cast_rays(&self, rays: &[Ray], filter: &QueryFilter) -> Vec<Option<RayCastHit>> {
-        let targets = Targets::new(self, filter, rays.len() > FEW);
+        self.core.cast(&Targets::new(self.parts_by(filter), rays.len() > FEW), rays)
+    }
+}
+
+impl Core {
+    /// Returns the first parts that rays enter, without those that `skip` selects.
+    pub(crate) fn parts_along(&self, rays: &[Ray], skip: impl Fn(ObjectId, usize) -> bool) -> Vec<Option<RayCastHit>> {
+        self.cast(&Targets::new(self.parts().filter(solid_unless(skip)), rays.len() > FEW), rays)
+    }
+
+    fn cast(&self, targets: &Targets<'_>, rays: &[Ray]) -> Vec<Option<RayCastHit>> {
         let mut hits = vec![None; rays.len()];
-        let mut threads = self.core.threads.clone();
-        threads.set(self.core.settings.threads);
+        let mut threads = self.threads.clone();
+        threads.set(self.settings.threads);
         let (mut work, mut left) = (Vec::new(), &mut hits[..]);
         for piece in threads.pieces(rays.len(), RAYS) {
             let (first, rest) = std::mem::take(&mut left).split_at_mut(piece.len());
@@ -77,23 +87,25 @@ impl World {
         });
         hits
     }
-}
 
-impl Core {
     /// Returns the distance to the first part that a ray enters, without those that `skip` selects.
     pub(crate) fn distance_along(&self, ray: &Ray, skip: impl Fn(ObjectId, usize) -> bool) -> Option<f64> {
-        let seen = |part: &Part<'_>| {
-            part.entry.object.collidable().is_some_and(|body| !body.is_sensor(part.part)) && !skip(part.id, part.part)
-        };
-        let targets = Targets { unbounded: self.parts().filter(seen).collect(), bounded: Vec::new(), tree: None };
+        let seen = self.parts().filter(solid_unless(skip));
+        let targets = Targets { unbounded: seen.collect(), bounded: Vec::new(), tree: None };
         targets.first(ray).map(|hit| hit.distance)
     }
 }
 
+/// Returns whether a part stops rays of sensors: no trigger, and not one that `skip` selects.
+fn solid_unless(skip: impl Fn(ObjectId, usize) -> bool) -> impl Fn(&Part<'_>) -> bool {
+    move |part| {
+        part.entry.object.collidable().is_some_and(|body| !body.is_sensor(part.part)) && !skip(part.id, part.part)
+    }
+}
+
 impl<'w> Targets<'w> {
-    fn new(world: &'w World, filter: &QueryFilter, with_tree: bool) -> Targets<'w> {
-        let (unbounded, mut bounded): (Vec<_>, Vec<_>) =
-            world.parts_by(filter).partition(|part| matches!(part.shape, Shape::HalfSpace));
+    fn new(parts: impl Iterator<Item = Part<'w>>, with_tree: bool) -> Targets<'w> {
+        let (unbounded, mut bounded): (Vec<_>, Vec<_>) = parts.partition(|part| matches!(part.shape, Shape::HalfSpace));
         let tree = with_tree.then(|| {
             let boxes: Vec<Aabb> = bounded.iter().map(|part| part.shape.tight_aabb(&part.pose)).collect();
             let tree = BoxTree::new(&boxes);
