@@ -76,6 +76,8 @@ mod _native {
     #[pymodule_export]
     use super::world::class::World;
     #[pymodule_export]
+    use super::world::linearize::LinearizedStep;
+    #[pymodule_export]
     use super::world::pickling::{_unpickle_shape, _unpickle_world};
     #[pymodule_export]
     use super::world::report::StepReport;

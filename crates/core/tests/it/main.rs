@@ -36,6 +36,7 @@ mod hulls;
 mod impacts;
 mod internal_edges;
 mod limits;
+mod linearize;
 mod loop_joints;
 mod loop_joints_articulated;
 mod loop_joints_governor;

@@ -59,6 +59,7 @@ __all__ = [
     "Sphere",
     "SphereTree",
     "SpringMesh",
+    "LinearizedStep",
     "StepReport",
     "Template",
     "Terrain",
@@ -1299,6 +1300,41 @@ class Bodies:
         """Returns the names of all bodies, in order."""
 
 @final
+class LinearizedStep:
+    """The derivative of a step, see ``World.linearize``. ``A, B = world.linearize()`` unpacks it."""
+
+    @property
+    def A(self) -> _Floats:  # noqa: N802
+        """The derivative by the state, shape (2n, 2n) for n degrees of freedom."""
+    @property
+    def B(self) -> _Floats:  # noqa: N802
+        """The derivative by generalized forces that are constant over the step, shape (2n, n)."""
+    @property
+    def objects(self) -> list[tuple[str, int, int]]:
+        """Names of the objects that move, and the range (first, end) of each in the n degrees of freedom."""
+    @property
+    def switches(self) -> list[tuple[str, tuple[str, str] | None]]:
+        """Kinks of the step next to its state, at which the derivative is that of one side: ``"gap"`` (a contact or a limit
+        closes or is open), ``"overlap"`` (is corrected or within the tolerance), ``"force"`` (presses or
+        separates), ``"friction"`` (sticks or slides, or a motor reaches its bound), each with the names of the two
+        objects in contact, or None.
+        """
+    @property
+    def one_sided(self) -> list[int]:
+        """Columns of ``[A B]`` that are one-sided, since the number of contacts or impacts is another on the other side."""
+    @property
+    def across(self) -> list[int]:
+        """Columns of ``[A B]`` differenced across a jump, since the number of contacts or impacts is another on both sides."""
+    @property
+    def residual(self) -> float:
+        """Largest error of the contact solutions that are differentiated, m/s."""
+    @property
+    def indeterminate(self) -> bool:
+        """Whether rigid contact leaves velocities open: redundant contacts, as four corners of a box that slides and turns, may share
+        forces in other ways with other friction. The derivative is that of the nearest solution.
+        """
+    def __iter__(self) -> Iterator[_Floats]: ...
+
 class StepReport:
     """Statistics of one step; see ``World.report``."""
     @property
@@ -2073,6 +2109,20 @@ class World:
         """
     def __copy__(self) -> World: ...
     def __deepcopy__(self, _memo: Any) -> World: ...
+    def linearize(self) -> LinearizedStep:
+        """Returns the derivative of the next step by the state and by generalized forces: ``A, B = world.linearize()``,
+        ``dx' = A @ dx + B @ dtau``. The world stays as it is.
+
+        Coordinates, for n degrees of freedom of the objects that move: n of positions, then n of velocities, object by
+        object in the order of addition (``objects``). Positions are displacements along generalized velocities: the
+        angle of a joint; for a rigid body or a floating root a turn in world axes, rad, then a displacement, m; for
+        a spherical joint a turn in the link's axes. Velocities are ``qd``; of a rigid body ω, then v of its center of mass.
+
+        Contacts are differentiated at their active set (which presses, sticks, slides), exactly; free motion and
+        forces by differences with an error of about 1e-9 of the largest entry. At a kink the result is the derivative of one side, and ``switches``
+        names the contact. The stepper must be ``"time_stepping"`` and the solver ``"gauss_seidel"``, and the world
+        must have no callables of Python in its steps.
+        """
     def rollout(
         self,
         controls: ArrayLike,
