@@ -26,6 +26,8 @@ mod _native {
     #[pymodule_export]
     use super::batch::pickling::_unpickle_batch;
     #[pymodule_export]
+    use super::batch::policy::Policy;
+    #[pymodule_export]
     use super::behaviors::body_flock::PyBodyFlock;
     #[pymodule_export]
     use super::behaviors::field::{Field, Panel};

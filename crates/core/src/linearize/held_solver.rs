@@ -209,7 +209,7 @@ impl<'a> Problem<'a> {
                 RowSet::Cone { mu } if presses(k) && mu > 0.0 => {
                     let [moved, speed] = [1.0, 0.0].map(|share| {
                         let along = |k: usize| share * d * lambda[k] - w[k];
-                        along(k + 1).hypot(along(k + 2))
+                        hypot(along(k + 1), along(k + 2))
                     });
                     let sticks = speed <= STILL || moved <= mu * d * lambda[k];
                     if sticks { Active::Sticks } else { Active::Slides }
@@ -256,7 +256,7 @@ impl<'a> Problem<'a> {
                 (Active::AtLow, RowSet::Interval { lo, .. }) => f[k] = d * (lambda[k] - lo),
                 (Active::AtHigh, RowSet::Interval { hi, .. }) => f[k] = d * (lambda[k] - hi),
                 (Active::Slides, _) => {
-                    let (speed, load) = (f[k + 1].hypot(f[k + 2]), d * mu * lambda[k]);
+                    let (speed, load) = (hypot(f[k + 1], f[k + 2]), d * mu * lambda[k]);
                     let scale = 1.0 / (speed + load).max(STILL);
                     (k + 1..k + 3).for_each(|k| f[k] = scale * (speed * d * lambda[k] + load * f[k]));
                 }
@@ -286,7 +286,7 @@ impl<'a> Problem<'a> {
                     }
                 }
                 Active::Slides => {
-                    let (speed, load) = (w[k + 1].hypot(w[k + 2]), d * mu * lambda[k]);
+                    let (speed, load) = (hypot(w[k + 1], w[k + 2]), d * mu * lambda[k]);
                     let scale = 1.0 / (speed + load).max(STILL);
                     let along = |j: usize| if speed > 0.0 { w[j] / speed } else { 0.0 };
                     for j in k + 1..k + 3 {
@@ -342,7 +342,7 @@ impl<'a> Problem<'a> {
                 (Active::AtLow, _) if below(w[k]) => Some(Switch::Friction),
                 (Active::AtHigh, _) if below(-w[k]) => Some(Switch::Friction),
                 (Active::Sticks, RowSet::Cone { mu })
-                    if below(d * (mu * lambda[k] - lambda[k + 1].hypot(lambda[k + 2]))) =>
+                    if below(d * (mu * lambda[k] - hypot(lambda[k + 1], lambda[k + 2]))) =>
                 {
                     Some(Switch::Friction)
                 }
@@ -364,4 +364,9 @@ impl<'a> Problem<'a> {
         self.places.iter().zip(own).for_each(|(&row, &value)| lambda[row] = value);
         blocks().for_each(|block| self.rows.apply_block(block, lambda, du));
     }
+}
+
+/// Returns `√(a² + b²)`, with the same bits on every platform.
+fn hypot(a: f64, b: f64) -> f64 {
+    nalgebra::ComplexField::hypot(a, b)
 }

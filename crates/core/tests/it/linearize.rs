@@ -297,6 +297,29 @@ fn a_ball_that_rolls_or_slides_has_the_closed_form() {
 }
 
 #[test]
+fn a_bounce_has_the_closed_form() {
+    // t = (v + √(v² + 2·g·d))/g to the ground at distance d, speed w = √(v² + 2·g·d) there, then −e·w upwards
+    let (r, e, g, dt, d, v) = (0.05, 0.6, 9.81, 1.0 / 120.0, 0.02, -4.0);
+    let mut world = exact_world(dt);
+    ground(&mut world, e, 0.0);
+    let ball = RigidBody::new(sphere(r)).with_mass(0.3).with_pose(Pose::translation(0.0, 0.0, r + d));
+    let material = Material { restitution: e, friction: 0.0, ..Material::default() };
+    world.add(ball.with_material(material).with_velocity(Vec3::new(0.0, 0.0, v))).unwrap();
+    let step = world.linearize().unwrap();
+    let w = (v * v + 2.0 * g * d).sqrt();
+    let t = (v + w) / g;
+    // ∂t/∂d = 1/w, ∂t/∂v = t/w, ∂w/∂d = g/w, ∂w/∂v = v/w;   v' = e·w − g·(dt − t),  z' = e·w·(dt − t) − ½·g·(dt − t)²
+    let left = dt - t;
+    let of = |dt_: f64, dw: f64| (e * dw * left - e * w * dt_ + g * left * dt_, e * dw + g * dt_);
+    let (by_d, by_v) = (of(1.0 / w, g / w), of(t / w, v / w));
+    let (z, vz) = (5, 11);
+    let found = [step.a[(z, z)], step.a[(vz, z)], step.a[(z, vz)], step.a[(vz, vz)]];
+    for (found, expected) in found.into_iter().zip([by_d.0, by_d.1, by_v.0, by_v.1]) {
+        assert!((found - expected).abs() < 1e-7 * expected.abs().max(1.0), "{found:.9} {expected:.9}");
+    }
+}
+
+#[test]
 fn a_body_at_rest_is_at_a_kink_and_says_so() {
     let mut world = exact_world(1.0 / 240.0);
     let floor = ground(&mut world, 0.0, 0.5);

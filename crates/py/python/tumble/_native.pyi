@@ -46,9 +46,11 @@ __all__ = [
     "HalfSpace",
     "HeightField",
     "Joint",
+    "LinearizedStep",
     "Mesh",
     "Panel",
     "ParticleSystem",
+    "Policy",
     "Recorder",
     "RigidBody",
     "ScriptedEvent",
@@ -59,7 +61,6 @@ __all__ = [
     "Sphere",
     "SphereTree",
     "SpringMesh",
-    "LinearizedStep",
     "StepReport",
     "Template",
     "Terrain",
@@ -1300,6 +1301,20 @@ class Bodies:
         """Returns the names of all bodies, in order."""
 
 @final
+class Policy:
+    """A linear policy or a perceptron, evaluated within the steps of a ``Batch``.
+
+    layers: pairs (W, b) of weights, shape (outputs, inputs), and offsets, shape (outputs,), or None for
+    zeros; one pair is a linear policy. With shapes (n, outputs, inputs) and (n, outputs) world i has a policy of its own, the i-th. activation:
+    ``"tanh"`` or ``"relu"`` between layers. ``policy(observation, i=0)`` evaluates the i-th alone, with the same bits.
+    """
+
+    def __new__(
+        cls, layers: Sequence[tuple[ArrayLike, ArrayLike | None]], *, activation: Literal["tanh", "relu"] = "tanh"
+    ) -> Policy: ...
+    def __call__(self, observation: ArrayLike, i: int = 0) -> _Floats:
+        """Returns the outputs for an observation, shape (inputs,), by the i-th policy."""
+
 class LinearizedStep:
     """The derivative of a step, see ``World.linearize``. ``A, B = world.linearize()`` unpacks it."""
 
@@ -1630,6 +1645,7 @@ class Batch:
         substeps: int = 1,
         *,
         targets: ArrayLike | None = None,
+        policy: Policy | None = None,
         mask: ArrayLike | None = None,
     ) -> None:
         """Advances each world by ``substeps`` steps of its ``dt``, with the interpreter released; Ctrl-C
@@ -1637,7 +1653,8 @@ class Batch:
 
         controls: generalized forces on the degrees of freedom of the articulations, N·m and N, shape
         (n, dof), or (dof,) for all worlds; they act in every step until they are set again. None
-        leaves them. targets: of the position drives, rad or m, of the same shapes; numbers for
+        leaves them. policy: a ``Policy`` instead, evaluated before each step: its inputs are ``q``, then ``v`` of the world, its
+        outputs the forces, of which the last ones go on acting. targets: of the position drives, rad or m, of the same shapes; numbers for
         degrees of freedom without such a drive have no effect. mask: which worlds step, booleans of
         shape (n,); None: all.
 
@@ -1678,6 +1695,20 @@ class Batch:
 
         Arguments as in ``Articulation.set_drive``: one number for all, shape (dof,) or (n, dof). Drives
         are no part of the state, so ``reset`` leaves them.
+        """
+    def set_body(
+        self,
+        name: str,
+        *,
+        mass: ArrayLike | None = None,
+        friction: ArrayLike | None = None,
+        restitution: ArrayLike | None = None,
+    ) -> None:
+        """Sets constants of the rigid body of that name, each one number for all worlds or one for each, shape (n,); None leaves
+        them. mass: kg, with the inertia in proportion. friction, restitution: its coefficients. Velocities stay. They are no part
+        of the state, so ``reset`` leaves them.
+
+        A number out of range raises ``InvalidValueError`` with the number of the world; worlds before it have their new ones.
         """
     @property
     def worlds(self) -> list[World]:
