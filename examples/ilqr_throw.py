@@ -22,16 +22,16 @@ def fly(law):
     """States, forces and derivatives of a throw; ``law(k, x)`` is the force of the hand in step k."""
     world, ball = start()
     xs, us, slopes, bounces = [], [], [], 0
-    for k in range(STEPS + 1):
+    for k in range(STEPS):
         xs.append(np.concatenate([ball.position, ball.angular_velocity, ball.velocity]))
-        if k == STEPS:
-            return np.array(xs), np.array(us), slopes, bounces
         us.append(law(k, xs[-1]) if k < HELD else np.zeros(3))
         ball.apply_force(us[-1], ball.position)
         A, B = world.linearize()
         slopes.append((A[np.ix_(USED, USED)], B[USED, 3:] if k < HELD else np.zeros((9, 3))))
         world.step()
         bounces += world.report.impact_passes > 0
+    xs.append(np.concatenate([ball.position, ball.angular_velocity, ball.velocity]))
+    return np.array(xs), np.array(us), slopes, bounces
 
 
 def cost(xs, us):

@@ -1312,9 +1312,9 @@ class Policy:
     def __new__(
         cls, layers: Sequence[tuple[ArrayLike, ArrayLike | None]], *, activation: Literal["tanh", "relu"] = "tanh"
     ) -> Policy: ...
-    def __call__(self, observation: ArrayLike, i: int = 0) -> _Floats:
-        """Returns the outputs for an observation, shape (inputs,), by the i-th policy."""
+    def __call__(self, observation: ArrayLike, i: int = 0) -> _Floats: ...
 
+@final
 class LinearizedStep:
     """The derivative of a step, see ``World.linearize``. ``A, B = world.linearize()`` unpacks it."""
 
@@ -1350,6 +1350,7 @@ class LinearizedStep:
         """
     def __iter__(self) -> Iterator[_Floats]: ...
 
+@final
 class StepReport:
     """Statistics of one step; see ``World.report``."""
     @property
