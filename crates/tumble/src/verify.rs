@@ -3,7 +3,7 @@
 use crate::args::VerifyOptions;
 use crate::failure::Failure;
 use tumble::dynamics::World;
-use tumble::net::record::{Frame, read};
+use tumble::net::record::{Ending, Frame, read};
 
 /// Verifies a recording.
 pub fn verify(options: &VerifyOptions) -> Result<(), Failure> {
@@ -31,8 +31,14 @@ pub fn verify(options: &VerifyOptions) -> Result<(), Failure> {
         }
         frames += 1;
     }
+    if frames == 0 {
+        return Err(Failure::input(format!("{file}: it has no complete frame, so there is nothing to verify")));
+    }
+    if let Some(Ending::Cut { offset, .. }) = reader.ending() {
+        println!("{file}: it is cut at byte {offset}; the frames before are verified");
+    }
     let hash: String =
-        reader.chain().map_or(String::new(), |chain| chain[..8].iter().map(|b| format!("{b:02x}")).collect());
+        reader.last_hash().map_or(String::new(), |chain| chain[..8].iter().map(|b| format!("{b:02x}")).collect());
     println!("{file}: {frames} frames computed again, the same bits in all; chain {hash}");
     Ok(())
 }
@@ -44,7 +50,8 @@ fn restore(world: &mut World, frame: &Frame) -> Result<(), String> {
 /// Steps to a frame number.
 fn advance(world: &mut World, frame: u64) -> Result<(), Failure> {
     while world.frame() < frame {
-        world.step().map_err(|e| Failure::run(&format!("frame {} cannot be computed", world.frame() + 1), e))?;
+        let next = world.frame() + 1;
+        world.step().map_err(|e| Failure::run(&format!("frame {next} cannot be computed"), e))?;
     }
     Ok(())
 }

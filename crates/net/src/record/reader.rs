@@ -154,7 +154,7 @@ impl Reader {
     }
 
     /// Returns the hash of the frames so far, as the last one has it ([`chain_hash`]).
-    pub fn chain(&self) -> Option<&ChainHash> {
+    pub fn last_hash(&self) -> Option<&ChainHash> {
         self.chain.as_ref()
     }
 

@@ -6,13 +6,15 @@ use tumble::net::record::{Recorder, RecorderOptions, read};
 #[test]
 fn a_recording_is_computed_again_with_the_same_bits() {
     let folder = Folder::new("verify");
-    for (scene, extra) in [("falling", &["--stepper", "backtracking"][..]), ("newtons_cradle", &[]), ("sparks", &[])] {
+    for (scene, extra) in
+        [("falling", &["--stepper", "backtracking"][..]), ("newtons_cradle", &[][..]), ("sparks", &[][..])]
+    {
         let recording = text(&folder.path(&format!("{scene}.mcap")));
         let with = |words: &[&str]| succeed(&[words, extra].concat());
         with(&["run", scene, "--duration", "0.5", "--quiet", "--record", &recording]);
         let mut reader = read(&recording).unwrap();
         while reader.next_frame().unwrap().is_some() {}
-        let hash: String = reader.chain().unwrap()[..8].iter().map(|byte| format!("{byte:02x}")).collect();
+        let hash: String = reader.last_hash().unwrap()[..8].iter().map(|byte| format!("{byte:02x}")).collect();
         let said = with(&["verify", &recording, scene]);
         assert!(said.contains("the same bits in all") && said.contains(&hash), "{said}");
     }
@@ -37,6 +39,17 @@ fn the_first_frame_that_differs_is_named() {
     writer.finish().unwrap();
     let said = fail(&["verify", &copy, "falling"], 1);
     assert!(said.contains("frame 7 ("), "{said}");
+}
+
+#[test]
+fn a_recording_without_a_frame_is_not_verified() {
+    let folder = Folder::new("verify_cut");
+    let recording = text(&folder.path("falling.mcap"));
+    succeed(&["run", "falling", "--duration", "0.5", "--quiet", "--record", &recording]);
+    let bytes = std::fs::read(&recording).unwrap();
+    let cut = folder.write("cut.mcap", &bytes[..20_000]);
+    let said = fail(&["verify", &cut, "falling"], 2);
+    assert!(said.contains("no complete frame"), "{said}");
 }
 
 #[test]
