@@ -23,6 +23,8 @@
 //! # Ok::<(), tumble_collide::ShapeError>(())
 //! ```
 
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
+
 mod archive;
 mod broad;
 mod bytes;

@@ -22,6 +22,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
+
 pub mod archive;
 pub mod articulated;
 mod clone_by_field;
@@ -31,6 +33,7 @@ mod derived;
 mod each_object;
 mod force;
 mod integrators;
+pub mod linearize;
 mod object;
 pub mod prelude;
 mod report;
@@ -55,6 +58,7 @@ pub use constraint::loop_joint::{
 pub use constraint::rows;
 pub use contact::pair_material::{PairMaterial, PairSide};
 pub use derived::Cache;
+pub use linearize::{LinearizeError, LinearizedStep, Switch, Switching};
 pub use object::collidable::{CollisionGroup, ContactFrame};
 pub use object::frame_state::{Frame, FrameImpulse};
 pub use object::intersect::IntersectPart;

@@ -9,8 +9,8 @@ use std::io::ErrorKind;
 use tumble::behaviors::BehaviorError;
 use tumble::collide::{MeshError, ShapeError};
 use tumble::dynamics::{
-    ArchiveError, ArticulatedError, ArticulationError, BodyError, LoopJointError, ModelError, SensorError,
-    SettingsError, SnapshotError, StepError, WorldError,
+    ArchiveError, ArticulatedError, ArticulationError, BodyError, LinearizeError, LoopJointError, ModelError,
+    SensorError, SettingsError, SnapshotError, StepError, WorldError,
 };
 use tumble::net::record::RecordError;
 use tumble::render::RenderError;
@@ -65,6 +65,8 @@ pub enum Error {
     /// The bytes are not a pickled world or shape.
     #[error(transparent)]
     Archive(ArchiveError),
+    #[error(transparent)]
+    Linearize(#[from] LinearizeError),
     #[error(transparent)]
     Step(#[from] StepError),
     /// A step failed in one of many forks.
@@ -142,7 +144,7 @@ impl Error {
             Error::Build(BuildError::World { .. }) => "InvalidValueError",
             Error::Scene(_) | Error::Build(_) | Error::Urdf(_) | Error::Mjcf(_) => "SceneError",
             Error::Snapshot(_) | Error::Archive(_) => "SnapshotError",
-            Error::Step(_) => "StepError",
+            Error::Step(_) | Error::Linearize(LinearizeError::Step(_)) => "StepError",
             Error::Fork { source, .. } | Error::Member { source, .. } => source.class(),
             Error::Name(_) => "UnknownNameError",
             Error::Busy | Error::Within => "BusyError",

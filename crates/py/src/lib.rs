@@ -26,6 +26,8 @@ mod _native {
     #[pymodule_export]
     use super::batch::pickling::_unpickle_batch;
     #[pymodule_export]
+    use super::batch::policy::Policy;
+    #[pymodule_export]
     use super::behaviors::body_flock::PyBodyFlock;
     #[pymodule_export]
     use super::behaviors::field::{Field, Panel};
@@ -75,6 +77,8 @@ mod _native {
     use super::script::trigger::Trigger;
     #[pymodule_export]
     use super::world::class::World;
+    #[pymodule_export]
+    use super::world::linearize::LinearizedStep;
     #[pymodule_export]
     use super::world::pickling::{_unpickle_shape, _unpickle_world};
     #[pymodule_export]

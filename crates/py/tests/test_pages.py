@@ -249,7 +249,7 @@ def test_tests_and_programs_that_pages_name_are_there():
 
 
 FOREIGN = set(  # of other programs, and of other engines
-    "manylinux_2_35 compinit zfunc zshrc GLIBC_TUNABLES glibc malloc hugetlb timehist strace rustfmt mj_forward "
+    "openusd openusd_schemas UsdPhysics manylinux_2_35 compinit zfunc zshrc GLIBC_TUNABLES glibc malloc hugetlb timehist strace rustfmt mj_forward "
     "PhysicsSystem PxCombineMode SetCombineFriction SetCombineRestitution b2MixFriction b2MixRestitution btManifoldResult calculateCombinedRestitution BoxShape round_cuboid "
     "UDisplayClusterPlayerInput cluster_display cluster_operation Documentation troubleshooting unity distortionMap".split()
 )

@@ -7,7 +7,7 @@ use clap::{Command, CommandFactory};
 const GROUPS: [(&str, &[&str]); 5] = [
     ("Simulate", &["run", "view"]),
     ("Caves", &["cave", "serve", "facet", "console", "relay", "caves", "mpcdi"]),
-    ("Recordings", &["replay", "recover"]),
+    ("Recordings", &["replay", "verify", "recover"]),
     ("Files", &["check", "spheretree", "scenes"]),
     ("Shell", &["completions", "help"]),
 ];

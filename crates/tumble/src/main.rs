@@ -20,6 +20,7 @@ mod recording_file;
 mod run;
 mod spheretree;
 mod summary;
+mod verify;
 mod video;
 mod view;
 
@@ -48,6 +49,7 @@ fn main() -> ExitCode {
         Command::Relay(options) => cave::relay(&options),
         Command::Replay(options) => cave::replay(&options),
         Command::Recover(options) => cave::recover(&options),
+        Command::Verify(options) => verify::verify(&options),
         Command::Check(options) => check::check(&options),
         Command::SphereTree(options) => spheretree::spheretree(&options),
         Command::Scenes => scenes(),

@@ -124,7 +124,7 @@ impl TriMesh {
         };
         for (t, slope) in slopes.iter().enumerate() {
             if let Some(slope) = slope.filter(|slope| slope * first.signum() < STEEPEST) {
-                let angle = slope.clamp(-1.0, 1.0).acos().to_degrees();
+                let angle = nalgebra::ComplexField::acos(slope.clamp(-1.0, 1.0)).to_degrees();
                 let what = format!(
                     "face {} is turned by {angle:.1}° from the direction of extrusion; all faces must look to one side \
                      of it, none along it",

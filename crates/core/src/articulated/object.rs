@@ -5,7 +5,7 @@ use super::body::{ArticulatedBody, BodyCache, LinkCollider};
 use crate::articulated::algorithms::dynamics::Dynamics;
 use crate::articulated::algorithms::energy::{energy, momentum};
 use crate::articulated::algorithms::kinematics::Kinematics;
-use crate::articulated::model::coordinates::integrate;
+use crate::articulated::model::coordinates::{difference, integrate};
 use crate::articulated::model::joint::Joint;
 use crate::derived::Cache;
 use crate::object::Material;
@@ -197,6 +197,10 @@ impl Integratable for ArticulatedBody {
 
     fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64) {
         integrate(&self.model, &mut x[..self.model.positions()], v, h);
+    }
+
+    fn difference(&self, from: &[f64], to: &[f64], v: &mut [f64]) {
+        difference(&self.model, from, to, v);
     }
 
     fn displace(&self, cache: &mut Cache, x: &mut [f64], v: &[f64], h: f64) {

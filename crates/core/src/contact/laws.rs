@@ -71,10 +71,10 @@ impl ContactLaws {
         let Some(scale) = laws.and_then(|laws| laws.friction_scale) else { return frame };
         let [_, t, b] = frame.axes;
         let (tt, tb, bb) = (t.dot(&(scale * t)), t.dot(&(scale * b)), b.dot(&(scale * b)));
-        let angle = 0.5 * (2.0 * tb).atan2(tt - bb);
-        let (sin, cos) = angle.sin_cos();
+        let angle = 0.5 * nalgebra::RealField::atan2(2.0 * tb, tt - bb);
+        let (sin, cos) = nalgebra::ComplexField::sin_cos(angle);
         let mean = 0.5 * (tt + bb);
-        let half = (0.5 * (tt - bb)).hypot(tb);
+        let half = nalgebra::ComplexField::hypot(0.5 * (tt - bb), tb);
         let factor = |s: f64| s.max(LEAST_SCALE);
         frame.axes[1] = factor(mean + half) * (cos * t + sin * b);
         frame.axes[2] = factor(mean - half) * (cos * b - sin * t);

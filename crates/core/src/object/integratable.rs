@@ -86,6 +86,12 @@ pub trait Integratable: Object {
     fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64) {
         x.iter_mut().zip(v).for_each(|(x, v)| *x += h * v);
     }
+    /// Writes the generalized velocity `v` that takes the positions of `from` to those of `to` in one second: the
+    /// inverse of [`integrate_positions`](Self::integrate_positions), along the shorter way. The default subtracts the
+    /// first numbers of the states, one per degree of freedom.
+    fn difference(&self, from: &[f64], to: &[f64], v: &mut [f64]) {
+        v.iter_mut().zip(from.iter().zip(to)).for_each(|(v, (from, to))| *v = to - from);
+    }
     /// Advances the state by `h` seconds without forces: exact, or symmetric and of second order at
     /// least. The default moves the positions with the velocity of the state.
     fn free_motion(&self, cache: &mut Cache, x: &mut [f64], h: f64) {

@@ -310,6 +310,11 @@ impl Integratable for RigidBody {
         write_orientation(x, &turned);
     }
 
+    fn difference(&self, from: &[f64], to: &[f64], v: &mut [f64]) {
+        let turned = orientation(to) * orientation(from).inverse();
+        write6(v, &turned.scaled_axis(), &(vec3(to) - vec3(from)));
+    }
+
     fn displace(&self, _cache: &mut Cache, x: &mut [f64], v: &[f64], h: f64) {
         let before = self.spinning(x);
         self.integrate_positions(x, v, h);

@@ -295,7 +295,7 @@ impl Problem {
             [false, true] => Some(([0.0, if self.c[row + 2] > 0.0 { -1.0 } else { 1.0 }], None)),
             [true, true] => {
                 let (x, y) = (self.c[row + 1], self.c[row + 2]);
-                let speed = x.hypot(y);
+                let speed = nalgebra::ComplexField::hypot(x, y);
                 let along = if speed > SLIDING_TOLERANCE * self.scale { [-x / speed, -y / speed] } else { [1.0, 0.0] };
                 Some((along, Some([-along[1], along[0]])))
             }

@@ -232,7 +232,7 @@ fn divide_friction(work: &Workspace, patch: &mut Patch) {
         let most = laws.rolling * total;
         let r = 1.0 / rolls[0].own.max(rolls[1].own).max(f64::MIN_POSITIVE);
         let wanted = [0, 1].map(|k| rolls[k].lambda - r * rolls[k].w);
-        let size = wanted[0].hypot(wanted[1]);
+        let size = hypot(wanted[0], wanted[1]);
         patch.directions = [0, 1].map(|k| {
             let other = wanted[1 - k] / most.max(f64::MIN_POSITIVE);
             if size > most { wanted[k].abs() / size } else { (1.0 - other * other).max(0.0).sqrt() }
@@ -254,7 +254,7 @@ fn update(work: &mut Workspace, patch: &Patch, unit: f64, relax: f64) -> f64 {
         let RowSet::Cone { mu: before } = block.set else { continue };
         let tangents = [1, 2].map(|k| row_state(work, &block, k));
         let axes = &work.contact_constraints[i].frame.axes;
-        let speed = unit * (tangents[0].w / axes[1].norm()).hypot(tangents[1].w / axes[2].norm());
+        let speed = unit * hypot(tangents[0].w / axes[1].norm(), tangents[1].w / axes[2].norm());
         let mu = laws.friction_at(speed, friction) * factor.max(LEAST);
         let mu = before + relax * (mu - before);
         change = change.max((mu - before).abs() * load * tangents[0].own.max(tangents[1].own));
@@ -281,9 +281,9 @@ fn divide(
     let own = mu * mu * tangents[0].own.max(tangents[1].own) + sigma * sigma * spin.own;
     let r = if own > 0.0 { 1.0 / own } else { 0.0 };
     let p = tangents[0].lambda / mu - r * mu * tangents[0].w;
-    let p = p.hypot(tangents[1].lambda / mu - r * mu * tangents[1].w);
+    let p = hypot(p, tangents[1].lambda / mu - r * mu * tangents[1].w);
     let q = (share * spin.lambda / sigma - r * sigma * spin.w).abs();
-    let size = p.hypot(q);
+    let size = hypot(p, q);
     if size > load {
         (p / size, sigma * q / size)
     } else if load > 0.0 {
@@ -300,4 +300,9 @@ fn bound(rows: &mut Rows, block: usize, most: f64, relax: f64) -> f64 {
     let hi = before + relax * (most - before);
     rows.blocks[block].set = RowSet::Interval { lo: -hi, hi };
     (hi - before).abs()
+}
+
+/// Returns `√(a² + b²)`, with the same bits on every platform.
+fn hypot(a: f64, b: f64) -> f64 {
+    nalgebra::ComplexField::hypot(a, b)
 }

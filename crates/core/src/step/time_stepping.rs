@@ -50,6 +50,7 @@ use crate::contact::pair::PredictionMode;
 use crate::contact::time_of_impact::time_contacts;
 use crate::each_object::{Numbers, each_object};
 use crate::integrators::context::free_motion;
+use crate::linearize::Switch;
 use crate::object::Level;
 use crate::sensor::loads::SubstepForces;
 use crate::settings::Settings;
@@ -221,8 +222,13 @@ impl TimeStepping {
             // without an impact the impulse acts in the middle of the step: what forces bring back in it gets to
             // the surface with the mean of both velocities
             let pressed = first[row] - before[row];
-            let by_mean = if s > 0.0 { 0.0 } else { (2.0 * gap / h + rate).min(pressed) };
-            work.c[row] += if struck { 0.0 } else { (gap / left).max(by_mean).max(0.0) };
+            let mean = 2.0 * gap / h + rate;
+            let all = core.branches.take(Switch::Gap, Some(i), mean > pressed);
+            let by_mean = if s > 0.0 { 0.0 } else { [mean, pressed][usize::from(all)] };
+            let later = core.branches.take(Switch::Gap, Some(i), by_mean > gap / left);
+            let reach = if later { by_mean } else { gap / left };
+            let open = core.branches.take(Switch::Gap, Some(i), !struck && reach > 0.0);
+            work.c[row] += if open { reach } else { 0.0 };
         }
         for i in 0..work.contact_constraints.len() {
             let constraint = &work.contact_constraints[i];
@@ -235,7 +241,8 @@ impl TimeStepping {
         for ((b, target), block) in constraints.zip(&work.rows.blocks[work.contact_constraints.len()..]) {
             let (change, turning) = free.of_row(&work.rows, block, 0);
             work.c[block.row as usize] += change - 0.5 * h * turning;
-            let reach = if target.set == RowSet::HalfLine { target.error.max(0.0) / h } else { 0.0 };
+            let open = target.set == RowSet::HalfLine && core.branches.take(Switch::Gap, None, target.error > 0.0);
+            let reach = if open { target.error / h } else { 0.0 };
             if reach > 0.0 && work.c[block.row as usize] > -0.5 * reach && target.compliance == 0.0 {
                 far.push(b);
             }

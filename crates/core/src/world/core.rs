@@ -7,6 +7,7 @@ use crate::contact::pair_material::PairMaterials;
 use crate::contact::warm_starts::{RowStart, WarmStart};
 use crate::derived::{Cache, Derived};
 use crate::integrators::context::IntegrationContext;
+use crate::linearize::Branches;
 use crate::object::part_state::{Forces, PartState, Wrench};
 use crate::report::StepReport;
 use crate::sensor::loads::FrameLoads;
@@ -175,6 +176,8 @@ pub struct Core {
     pub(crate) largest_turn: LargestTurn,
     /// Working memory of frame states.
     pub(super) frame_numbers: Vec<f64>,
+    /// Branches of the step that [`linearize`](crate::linearize) holds.
+    pub(crate) branches: Branches,
 }
 
 /// The state of the objects, and the caches for the maps that change it.
@@ -225,6 +228,7 @@ impl Core {
             attempt: Attempt::First,
             largest_turn: LargestTurn::default(),
             frame_numbers: Vec::new(),
+            branches: Branches::default(),
         }
     }
 

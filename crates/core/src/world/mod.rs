@@ -54,7 +54,7 @@ use std::sync::Arc;
 
 /// A world of objects that moves in frames of `settings.dt` seconds.
 pub struct World {
-    core: Core,
+    pub(crate) core: Core,
     stepper: Box<dyn Stepper>,
     /// The state before the frame: a frame that fails, or that wakes a sleeper, is rolled back to
     /// it.

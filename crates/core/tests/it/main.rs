@@ -1,5 +1,7 @@
 //! Physics proved: closed forms, conservation laws, determinism.
 
+#![allow(clippy::disallowed_methods)] // expected numbers may come from the platform
+
 mod abm;
 mod abm_lanes;
 mod abm_reference;
@@ -38,6 +40,7 @@ mod hulls;
 mod impacts;
 mod internal_edges;
 mod limits;
+mod linearize;
 mod loop_joints;
 mod loop_joints_articulated;
 mod loop_joints_governor;

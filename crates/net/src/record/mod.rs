@@ -59,6 +59,7 @@
 
 mod budget;
 mod bytes;
+mod chain;
 mod chunk;
 mod container;
 mod deforming;
@@ -73,6 +74,7 @@ mod scene;
 mod schemas;
 mod writer;
 
+pub use chain::{ChainHash, chain_hash};
 pub use container::Ending;
 pub use deforming::{Deforming, MAX_POINTS, Point, Surface};
 pub use error::RecordError;

@@ -2,6 +2,7 @@
 
 use super::budget;
 use super::bytes::Fields;
+use super::chain::{ChainHash, chain_hash};
 use super::chunk::{Channel, Inner, Schema, define, next_inner, open_chunk, parse_inner};
 use super::container::{Container, Ending, Next, RawRecord};
 use super::error::{RecordError, Result};
@@ -63,6 +64,8 @@ pub fn read(path: impl AsRef<Path>) -> Result<Reader> {
         report: None,
         ahead: None,
         last_frame: None,
+        chain: None,
+        broken_at: None,
         ending: None,
         failed: false,
     };
@@ -119,6 +122,9 @@ pub struct Reader {
     /// A frame that was read before the first scene.
     ahead: Option<Frame>,
     last_frame: Option<u64>,
+    /// Hash of the last frame, and the first frame whose hash does not follow from the frames before.
+    chain: Option<ChainHash>,
+    broken_at: Option<u64>,
     ending: Option<Ending>,
     failed: bool,
 }
@@ -145,6 +151,17 @@ impl Reader {
     /// Returns how the file ends; `None` until all frames are read.
     pub fn ending(&self) -> Option<&Ending> {
         self.ending.as_ref()
+    }
+
+    /// Returns the hash of the frames so far, as the last one has it ([`chain_hash`]).
+    pub fn last_hash(&self) -> Option<&ChainHash> {
+        self.chain.as_ref()
+    }
+
+    /// Returns the first frame so far whose hash does not follow from the frames before: one of them was changed or
+    /// removed, as in a recovered file. `None` if the chain is whole.
+    pub fn broken_at(&self) -> Option<u64> {
+        self.broken_at
     }
 
     /// Returns the next frame; `None` at the end. Each returned frame has passed its chunk's
@@ -323,7 +340,7 @@ impl Reader {
     }
 
     fn state(&mut self, log_time: u64, data: &[u8]) -> std::result::Result<Frame, String> {
-        let State { version, frame, time_s, payload, contacts } =
+        let State { version, frame, time_s, payload, contacts, chain } =
             State::decode(data).map_err(|e| format!("state: {e}"))?;
         if version != VERSION {
             return Err(format!("state of version {version}; expected {VERSION}"));
@@ -345,6 +362,10 @@ impl Reader {
             return Err(format!("frame {frame}: {why}"));
         }
         self.last_frame = Some(frame);
+        if chain != chain_hash(self.chain.as_ref(), frame, time_s, &payload) {
+            self.broken_at = self.broken_at.or(Some(frame));
+        }
+        self.chain = chain.try_into().ok();
         let report = self.report.take().filter(|(at, ..)| *at == log_time);
         let (sensors, events) = report.map(|(_, sensors, events)| (sensors, events)).unwrap_or_default();
         Ok(Frame { time_s, frame, poses, contacts, state: payload, sensors, events })

@@ -36,7 +36,7 @@ pub(crate) const PROTOBUF: &str = "protobuf";
 /// Name of the metadata record that marks a recording of tumble.
 pub(crate) const METADATA_NAME: &str = "tumble";
 /// Version of the recording's layout.
-pub(crate) const VERSION: u32 = 2;
+pub(crate) const VERSION: u32 = 3;
 
 /// The state message, as text. Every file contains it twice: compiled, as the channel's schema, and
 /// as this text.
@@ -49,11 +49,12 @@ package tumble;
 
 // One frame of a simulation. The schema's name takes the place of a magic number.
 message State {
-  fixed32 version = 1;  // layout of this message: 2
+  fixed32 version = 1;  // layout of this message: 3
   fixed64 frame = 2;    // frame number, strictly increasing within a file
   double time_s = 3;    // simulated time in seconds from 0, not rounded; the log time is this in whole nanoseconds
   bytes payload = 4;    // the state, opaque here; little-endian
   bytes contacts = 5;   // 88 bytes each, little-endian: indices of entities a and b in /tf (2 u32); point, normal from b to a, depth, force on a (10 f64)
+  bytes chain = 6;      // BLAKE3 of the chain of the frame before (none for the first), frame, time_s and payload: 32 bytes
 }
 "#;
 
@@ -70,6 +71,8 @@ pub(crate) struct State {
     pub payload: Vec<u8>,
     #[prost(bytes = "vec", tag = "5")]
     pub contacts: Vec<u8>,
+    #[prost(bytes = "vec", tag = "6")]
+    pub chain: Vec<u8>,
 }
 
 /// Returns the compiled form of [`STATE_PROTO`], as `protoc --descriptor_set_out` writes it.
@@ -88,6 +91,7 @@ fn state_descriptor() -> Vec<u8> {
         (3, "time_s", Type::Double),
         (4, "payload", Type::Bytes),
         (5, "contacts", Type::Bytes),
+        (6, "chain", Type::Bytes),
     ];
     let message =
         DescriptorProto { name: Some("State".into()), field: fields.map(field).to_vec(), ..Default::default() };
@@ -197,13 +201,15 @@ mod tests {
     /// little-endian values.
     #[test]
     fn state_bytes_are_as_documented() {
-        let state = State { version: 2, frame: 0x0102, time_s: 0.5, payload: vec![7, 8], contacts: vec![9] };
+        let state =
+            State { version: 3, frame: 0x0102, time_s: 0.5, payload: vec![7, 8], contacts: vec![9], chain: vec![5] };
         let wire = [
-            &[0x0d, 2, 0, 0, 0][..],
+            &[0x0d, 3, 0, 0, 0][..],
             &[0x11, 2, 1, 0, 0, 0, 0, 0, 0],
             &[0x19, 0, 0, 0, 0, 0, 0, 0xe0, 0x3f],
             &[0x22, 2, 7, 8],
             &[0x2a, 1, 9],
+            &[0x32, 1, 5],
         ];
         assert_eq!(state.encode_to_vec(), wire.concat());
     }

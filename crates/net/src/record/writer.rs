@@ -1,6 +1,7 @@
 //! The recorder: writes frames to an MCAP file.
 
 use super::budget;
+use super::chain::{ChainHash, chain_hash};
 use super::deforming::Deforming;
 use super::error::{RecordError, Result};
 use super::messages::{nanoseconds, scene_update, set_transforms, transforms_for};
@@ -132,6 +133,8 @@ pub struct Recorder {
     flushed_time_s: f64,
     last: Option<(f64, u64)>,
     report_channels: ReportChannels,
+    /// Hash of the last frame and of all before.
+    chain: Option<ChainHash>,
     /// Messages of sensors and events that the next frame writes.
     report: [Option<Vec<u8>>; 2],
 }
@@ -177,6 +180,7 @@ impl Recorder {
             flushed_frames: 0,
             flushed_time_s: 0.0,
             last: None,
+            chain: None,
             report_channels: ReportChannels::default(),
             report: [None, None],
         };
@@ -237,8 +241,16 @@ impl Recorder {
             let channel = self.report_channels.events(&mut self.writer, &self.path)?;
             self.write(channel, sequence, log_time, &message)?;
         }
-        let state =
-            State { version: VERSION, frame, time_s, payload: state.to_vec(), contacts: encode_contacts(contacts) };
+        let chain = chain_hash(self.chain.as_ref(), frame, time_s, state);
+        self.chain = Some(chain);
+        let state = State {
+            version: VERSION,
+            frame,
+            time_s,
+            payload: state.to_vec(),
+            contacts: encode_contacts(contacts),
+            chain: chain.to_vec(),
+        };
         self.write(self.channels.state, sequence, log_time, &state.encode_to_vec())?;
         self.pending_frames += 1;
         self.last = Some((time_s, frame));

@@ -46,9 +46,11 @@ __all__ = [
     "HalfSpace",
     "HeightField",
     "Joint",
+    "LinearizedStep",
     "Mesh",
     "Panel",
     "ParticleSystem",
+    "Policy",
     "Recorder",
     "RigidBody",
     "ScriptedEvent",
@@ -1342,6 +1344,56 @@ class Bodies:
         """Returns the names of all bodies, in order."""
 
 @final
+class Policy:
+    """A linear policy or a perceptron, evaluated within the steps of a ``Batch``.
+
+    layers: pairs (W, b) of weights, shape (outputs, inputs), and offsets, shape (outputs,), or None for
+    zeros; one pair is a linear policy. With shapes (n, outputs, inputs) and (n, outputs) world i has a policy of its own, the i-th. activation:
+    ``"tanh"`` or ``"relu"`` between layers. ``policy(observation, i=0)`` evaluates the i-th alone, with the same bits.
+    """
+
+    def __new__(
+        cls, layers: Sequence[tuple[ArrayLike, ArrayLike | None]], *, activation: Literal["tanh", "relu"] = "tanh"
+    ) -> Policy: ...
+    def __call__(self, observation: ArrayLike, i: int = 0) -> _Floats: ...
+
+@final
+class LinearizedStep:
+    """The derivative of a step, see ``World.linearize``. ``A, B = world.linearize()`` unpacks it."""
+
+    @property
+    def A(self) -> _Floats:  # noqa: N802
+        """The derivative by the state, shape (2n, 2n) for n degrees of freedom."""
+    @property
+    def B(self) -> _Floats:  # noqa: N802
+        """The derivative by generalized forces that are constant over the step, shape (2n, n)."""
+    @property
+    def objects(self) -> list[tuple[str, int, int]]:
+        """Names of the objects that move, and the range (first, end) of each in the n degrees of freedom."""
+    @property
+    def switches(self) -> list[tuple[str, tuple[str, str] | None]]:
+        """Kinks of the step next to its state, at which the derivative is that of one side: ``"gap"`` (a contact or a limit
+        closes or is open), ``"overlap"`` (is corrected or within the tolerance), ``"force"`` (presses or
+        separates), ``"friction"`` (sticks or slides, or a motor reaches its bound), each with the names of the two
+        objects in contact, or None.
+        """
+    @property
+    def one_sided(self) -> list[int]:
+        """Columns of ``[A B]`` that are one-sided, since the number of contacts or impacts is another on the other side."""
+    @property
+    def across(self) -> list[int]:
+        """Columns of ``[A B]`` differenced across a jump, since the number of contacts or impacts is another on both sides."""
+    @property
+    def residual(self) -> float:
+        """Largest error of the contact solutions that are differentiated, m/s."""
+    @property
+    def indeterminate(self) -> bool:
+        """Whether rigid contact leaves velocities open: redundant contacts, as four corners of a box that slides and turns, may share
+        forces in other ways with other friction. The derivative is that of the nearest solution.
+        """
+    def __iter__(self) -> Iterator[_Floats]: ...
+
+@final
 class StepReport:
     """Statistics of one step; see ``World.report``."""
     @property
@@ -1637,6 +1689,7 @@ class Batch:
         substeps: int = 1,
         *,
         targets: ArrayLike | None = None,
+        policy: Policy | None = None,
         mask: ArrayLike | None = None,
     ) -> None:
         """Advances each world by ``substeps`` steps of its ``dt``, with the interpreter released; Ctrl-C
@@ -1644,7 +1697,8 @@ class Batch:
 
         controls: generalized forces on the degrees of freedom of the articulations, N·m and N, shape
         (n, dof), or (dof,) for all worlds; they act in every step until they are set again. None
-        leaves them. targets: of the position drives, rad or m, of the same shapes; numbers for
+        leaves them. policy: a ``Policy`` instead, evaluated before each step: its inputs are ``q``, then ``v`` of the world, its
+        outputs the forces, of which the last ones go on acting. targets: of the position drives, rad or m, of the same shapes; numbers for
         degrees of freedom without such a drive have no effect. mask: which worlds step, booleans of
         shape (n,); None: all.
 
@@ -1685,6 +1739,20 @@ class Batch:
 
         Arguments as in ``Articulation.set_drive``: one number for all, shape (dof,) or (n, dof). Drives
         are no part of the state, so ``reset`` leaves them.
+        """
+    def set_body(
+        self,
+        name: str,
+        *,
+        mass: ArrayLike | None = None,
+        friction: ArrayLike | None = None,
+        restitution: ArrayLike | None = None,
+    ) -> None:
+        """Sets constants of the rigid body of that name, each one number for all worlds or one for each, shape (n,); None leaves
+        them. mass: kg, with the inertia in proportion. friction, restitution: its coefficients. Velocities stay. They are no part
+        of the state, so ``reset`` leaves them.
+
+        A number out of range raises ``InvalidValueError`` with the number of the world; worlds before it have their new ones.
         """
     @property
     def worlds(self) -> list[World]:
@@ -2116,6 +2184,20 @@ class World:
         """
     def __copy__(self) -> World: ...
     def __deepcopy__(self, _memo: Any) -> World: ...
+    def linearize(self) -> LinearizedStep:
+        """Returns the derivative of the next step by the state and by generalized forces: ``A, B = world.linearize()``,
+        ``dx' = A @ dx + B @ dtau``. The world stays as it is.
+
+        Coordinates, for n degrees of freedom of the objects that move: n of positions, then n of velocities, object by
+        object in the order of addition (``objects``). Positions are displacements along generalized velocities: the
+        angle of a joint; for a rigid body or a floating root a turn in world axes, rad, then a displacement, m; for
+        a spherical joint a turn in the link's axes. Velocities are ``qd``; of a rigid body ω, then v of its center of mass.
+
+        Contacts are differentiated at their active set (which presses, sticks, slides), exactly; free motion and
+        forces by differences with an error of about 1e-9 of the largest entry. At a kink the result is the derivative of one side, and ``switches``
+        names the contact. The stepper must be ``"time_stepping"`` and the solver ``"gauss_seidel"``, and the world
+        must have no callables of Python in its steps.
+        """
     def rollout(
         self,
         controls: ArrayLike,

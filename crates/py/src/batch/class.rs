@@ -1,11 +1,13 @@
 //! The class `Batch`.
 
 use crate::arrays::convert::{numbers, whole_number};
+use crate::batch::bodies::Constants;
 use crate::batch::crew::{Crew, checked};
 use crate::batch::drives::{Drives, Setting};
 use crate::batch::fields::{Field, Layout, Rows, Table};
 use crate::batch::member::{Member, Start, Task, write};
 use crate::batch::pickling::{self, Reduced};
+use crate::batch::policy::Policy;
 use crate::errors::{Error, Result};
 use crate::world::add::own_place;
 use crate::world::bulk::Bulk;
@@ -224,22 +226,31 @@ impl Batch {
     ///
     /// controls: generalized forces on the degrees of freedom of the articulations, N·m and N, shape
     /// (n, dof), or (dof,) for all worlds; they act in every step until they are set again. None
-    /// leaves them. targets: of the position drives, rad or m, of the same shapes; numbers for
+    /// leaves them. policy: a ``Policy`` instead, evaluated before each step: its inputs are ``q``, then ``v`` of the world, its
+    /// outputs the forces, of which the last ones go on acting. targets: of the position drives, rad or m, of the same shapes; numbers for
     /// degrees of freedom without such a drive have no effect. mask: which worlds step, booleans of
     /// shape (n,); None: all.
     ///
     /// A world that fails raises ``StepError`` with its number, after all others have stepped:
     /// ``failed`` says which. It stays as before the step that failed, and ``reset`` serves it as any
     /// other.
-    #[pyo3(signature = (controls=None, substeps=1, *, targets=None, mask=None))]
+    #[pyo3(signature = (controls=None, substeps=1, *, targets=None, policy=None, mask=None))]
     fn step(
         &self,
         py: Python<'_>,
         controls: Option<&Bound<'_, PyAny>>,
         #[pyo3(from_py_with = whole_number)] substeps: usize,
         targets: Option<&Bound<'_, PyAny>>,
+        policy: Option<&Bound<'_, Policy>>,
         mask: Option<&Bound<'_, PyAny>>,
     ) -> Result<()> {
+        let policy = policy.map(Bound::get);
+        if controls.is_some() && policy.is_some() {
+            return Err(Error::value("controls and policy: give one of them"));
+        }
+        policy.map_or(Ok(()), |p| {
+            p.check(self.shared.len(), self.layout.positions() + self.layout.dof(), self.layout.dof())
+        })?;
         if substeps > MOST_STEPS {
             return Err(Error::value(format!("substeps is {substeps}; it must be at most {MOST_STEPS}")));
         }
@@ -248,7 +259,7 @@ impl Batch {
         let selected = self.selected(mask)?;
         self.run(py, &selected, |k| {
             let [efforts, targets] = [&controls, &targets].map(|rows| rows.as_ref().map(|rows| rows.of(k)));
-            Task::Step { efforts, targets, left: substeps }
+            Task::Step { efforts, targets, policy: policy.map(|policy| (policy, k)), left: substeps }
         })
     }
 
@@ -310,6 +321,28 @@ impl Batch {
             })
         };
         self.shared.iter().enumerate().try_for_each(each)
+    }
+
+    /// Sets constants of the rigid body of that name, each one number for all worlds or one for each, shape (n,); None leaves
+    /// them. mass: kg, with the inertia in proportion. friction, restitution: its coefficients. Velocities stay. They are no part
+    /// of the state, so ``reset`` leaves them.
+    ///
+    /// A number out of range raises ``InvalidValueError`` with the number of the world; worlds before it have their new ones.
+    #[pyo3(signature = (name, *, mass=None, friction=None, restitution=None))]
+    fn set_body(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        mass: Option<&Bound<'_, PyAny>>,
+        friction: Option<&Bound<'_, PyAny>>,
+        restitution: Option<&Bound<'_, PyAny>>,
+    ) -> Result<()> {
+        let count = self.shared.len();
+        let constants = Constants::new(count, mass, friction, restitution)?;
+        self.shared
+            .iter()
+            .enumerate()
+            .try_for_each(|(k, shared)| shared.write(py, |inner| constants.set(inner, name, k)))
     }
 
     /// The worlds: a new list. They are the batch's own, and what is changed in them counts from the

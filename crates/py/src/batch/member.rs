@@ -2,6 +2,7 @@
 
 use crate::batch::crew::Pause;
 use crate::batch::fields::{Field, Layout};
+use crate::batch::policy::Policy;
 use crate::errors::{Error, Result};
 use crate::objects::robot::settled;
 use crate::world::inner::Inner;
@@ -37,7 +38,8 @@ impl Start {
 /// The work of one world in one call.
 pub enum Task<'a> {
     /// Generalized forces and drive targets from now on, if given, and the number of steps.
-    Step { efforts: Option<&'a [f64]>, targets: Option<&'a [f64]>, left: usize },
+    /// With a policy the forces are its outputs before each step; it is that of the world's number.
+    Step { efforts: Option<&'a [f64]>, targets: Option<&'a [f64]>, policy: Option<(&'a Policy, usize)>, left: usize },
     /// Back to the start; then the whole state, or positions and velocities, if given.
     Reset { start: &'a Start, state: Option<&'a [f64]>, q: Option<&'a [f64]>, v: Option<&'a [f64]> },
 }
@@ -99,14 +101,20 @@ pub fn write(fields: &[Field], layout: &Layout, inner: &Inner, record: &mut [f64
 impl Task<'_> {
     fn run(&mut self, layout: &Layout, inner: &mut Inner, pause: &Pause<'_>) -> Result<bool> {
         match self {
-            Task::Step { efforts, targets, left } => {
+            Task::Step { efforts, targets, policy, left } => {
                 if let Some(row) = efforts.take() {
                     inner.set_efforts(layout.driven.iter().map(|body| (body.id, body.dof)), row);
                 }
                 if let Some(row) = targets.take() {
                     aim(layout, inner, row)?;
                 }
+                let (mut observation, mut work) = (vec![0.0; layout.positions() + layout.dof()], Vec::new());
                 while *left > 0 {
+                    if let Some((policy, world)) = policy {
+                        write(&[Field::Q, Field::V], layout, inner, &mut observation)?;
+                        let forces = policy.act(*world, &observation, &mut work);
+                        inner.set_efforts(layout.driven.iter().map(|body| (body.id, body.dof)), &forces);
+                    }
                     inner.step()?;
                     *left -= 1;
                     if *left > 0 && pause.now() {

@@ -7,6 +7,7 @@ pub mod contacts;
 pub mod gc;
 pub mod inner;
 pub mod joints;
+pub mod linearize;
 pub mod load;
 pub mod pairs;
 pub mod pickling;

@@ -44,6 +44,8 @@ pub enum Command {
     Relay(RelayOptions),
     /// Show a recording in a cave, and compare its pictures with those recorded
     Replay(Box<ReplayOptions>),
+    /// Compute a recording again from its scene, and name the first frame that differs
+    Verify(VerifyOptions),
     /// Save the intact part of a recording that was cut or damaged
     Recover(RecoverOptions),
     /// Check scenes, caves, URDF robots and meshes without running them
@@ -59,6 +61,15 @@ pub enum Command {
     Mpcdi(MpcdiOptions),
     /// Print a script that completes commands and options in a shell
     Completions(CompletionOptions),
+}
+
+/// Options of `tumble verify`.
+#[derive(Args)]
+pub struct VerifyOptions {
+    /// Recording (MCAP) of a run.
+    pub recording: PathBuf,
+    #[command(flatten)]
+    pub scene: SceneOptions,
 }
 
 #[derive(Args)]

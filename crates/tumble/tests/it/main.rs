@@ -34,6 +34,7 @@ mod repair;
 mod scenes;
 mod spheretree;
 mod unusual_inputs;
+mod verify;
 mod view;
 mod view_drivers;
 mod view_sliders;

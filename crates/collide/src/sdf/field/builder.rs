@@ -41,7 +41,11 @@ impl Triangles {
             (0.5 * (bounds.min + bounds.max), 0.5 * (bounds.max - bounds.min).max() + MARGIN * self.diagonal);
         let lengths: f64 = self.corners.iter().map(|[a, b, _]| (b - a).norm()).sum();
         let mean = lengths / self.corners.len() as f64;
-        (center, half, (3.0_f64.sqrt() * half / (MIN_CELL * mean)).log2().ceil().clamp(1.0, MAX_DEPTH) as u32)
+        (
+            center,
+            half,
+            nalgebra::ComplexField::log2(3.0_f64.sqrt() * half / (MIN_CELL * mean)).ceil().clamp(1.0, MAX_DEPTH) as u32,
+        )
     }
 }
 

@@ -24,6 +24,7 @@ use super::super::contacts::{Limit, Workspace, displace};
 use super::super::islands::each_island;
 use super::{Contacts, Options, is_joint};
 use crate::constraint::rows::{RowSet, Rows};
+use crate::linearize::Switch;
 use crate::object::RowTarget;
 use crate::solver::SolverSettings;
 use crate::world::Core;
@@ -60,7 +61,7 @@ pub(super) fn separate(
         }
     };
     let worst = (0..work.rows.blocks.len()).map(|b| violation(b, &work.c)).fold(0.0, f64::max);
-    if worst <= least {
+    if core.branches.take(Switch::Overlap, None, worst <= least) {
         return false;
     }
     let mut p = std::mem::take(&mut work.frictionless);
@@ -73,8 +74,10 @@ pub(super) fn separate(
     let later = |&b: &u32| !in_place && (b as usize) >= contacts && waits(&targets[b as usize - contacts]);
     let mut moved = false;
     let Frictionless { rows, c, lambda, du } = &mut p;
-    let left_alone =
-        |blocks: &[u32]| blocks.iter().all(later) || blocks.iter().all(|&b| violation(b as usize, &work.c) <= least);
+    let left_alone = |blocks: &[u32]| {
+        let within = || blocks.iter().all(|&b| violation(b as usize, &work.c) <= least);
+        blocks.iter().all(later) || core.branches.take(Switch::Overlap, None, within())
+    };
     let budget = core.meter.left(if in_place { IN_PLACE } else { 1.0 });
     let all = budget.map_or(0, |_| work.islands.iter().filter(|blocks| !left_alone(blocks)).map(<[u32]>::len).sum());
     let solve = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {

@@ -1,0 +1,372 @@
+//! The solution of the contact problem near a known one, by the implicit function theorem on the
+//! whitened rows.
+//!
+//! The problem `λ ∈ set, w = c + (K + R)·λ` of [`RowSet`] has equations on its *active set*:
+//!
+//! ```text
+//! open, without response               λ = 0
+//! presses without friction             w_n = 0,  λ_t = 0
+//! equality; presses; inside bounds     w = 0
+//! at a bound                           λ = bound
+//! sticks                               w_n = 0,  w_t = 0
+//! slides                               w_n = 0,  |w_t|·λ_t + μ·λ_n·w_t = 0
+//! ```
+//!
+//! With `F(λ; rows) = 0` at the known solution `λ₀`, rows that differ by `δ` have the solution
+//!
+//! ```text
+//! λ = λ₀ − (∂F/∂λ)⁻¹·F(λ₀; rows + δ)          exact to first order in δ
+//! ```
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `K`, `R`, `c`, `w` | as in [`rows`](crate::constraint::rows) |
+//! | `∂F/∂λ` | at the known solution; singular where contacts are redundant (four corners of a box), where the solution nearest to `λ₀` is taken: velocities are the same for all |
+//!
+//! Where a row presses with no force, or slides with no velocity, the derivative is that of one side: the one on which
+//! the row holds.
+
+use super::branches::Switch;
+use crate::constraint::rows::{RowSet, Rows};
+use crate::solver::{RowSolver, SolveReport, SolverSettings};
+use nalgebra::{DMatrix, DVector};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Newton rounds that make the known solution exact.
+const ROUNDS: usize = 8;
+/// Rounds with the derivative at the known solution, for displaced rows: the first one makes the derivative right, the others
+/// the truncation of differences small.
+const CHORDS: usize = 3;
+/// Singular values below this fraction of the largest belong to redundant rows.
+const RANK: f64 = 1e-10;
+/// Redundant multipliers that change no row velocity by more than this, in units of their own, leave velocities determined.
+const DETERMINED: f64 = 1e-6;
+/// Row velocities below this are zero, m/s: ten times the tolerance with which solutions are found.
+const STILL: f64 = 1e-9;
+
+/// State of a block in the solution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Active {
+    Open,
+    Holds,
+    AtLow,
+    AtHigh,
+    Sticks,
+    Slides,
+    /// Presses without friction.
+    Smooth,
+}
+
+/// One solved island.
+#[derive(Debug)]
+struct Known {
+    blocks: Vec<u32>,
+    active: Vec<Active>,
+    /// Multipliers of the rows of the blocks, in their order.
+    lambda: Vec<f64>,
+    /// The inverse of `∂F/∂λ`.
+    inverse: DMatrix<f64>,
+}
+
+/// The solves of a step in their order.
+#[derive(Debug, Default)]
+pub(super) struct Tape {
+    known: Vec<Known>,
+    repeats: bool,
+    next: usize,
+    /// Whether a solve of this run had other blocks than the recorded one.
+    torn: bool,
+    /// Blocks of this run that leave their active set.
+    switched: Vec<(Switch, usize)>,
+    /// Largest error of the recorded solutions, m/s.
+    pub residual: f64,
+    /// Largest number of rows of a solve.
+    pub largest: usize,
+    /// Whether multipliers that are not determined change velocities.
+    pub indeterminate: bool,
+}
+
+impl Tape {
+    /// Starts to repeat.
+    pub fn repeat(&mut self) {
+        (self.repeats, self.next, self.torn) = (true, 0, false);
+        self.switched.clear();
+    }
+
+    /// Returns the blocks that left their active sets in this run; `None` if it had other solves.
+    pub fn switched(&self) -> Option<&[(Switch, usize)]> {
+        (!self.torn && self.next == self.known.len()).then_some(&self.switched[..])
+    }
+}
+
+/// Solves by another solver and records the active sets, or repeats them.
+pub(super) struct HeldSolver {
+    pub inner: Box<dyn RowSolver>,
+    pub tape: Arc<Mutex<Tape>>,
+}
+
+impl RowSolver for HeldSolver {
+    fn name(&self) -> &'static str {
+        self.inner.name()
+    }
+
+    fn solve(
+        &self,
+        rows: &Rows,
+        blocks: &[u32],
+        c: &[f64],
+        lambda: &mut [f64],
+        du: &mut [f64],
+        settings: SolverSettings,
+    ) -> SolveReport {
+        // equalities have no active set, and are solved directly
+        if blocks.iter().all(|&b| rows.blocks[b as usize].set == RowSet::Equality) {
+            return self.inner.solve(rows, blocks, c, lambda, du, settings);
+        }
+        let mut tape = self.tape.lock().unwrap_or_else(PoisonError::into_inner);
+        let problem = Problem::new(rows, blocks, c);
+        if !tape.repeats {
+            let outcome = self.inner.solve(rows, blocks, c, lambda, du, settings);
+            let known = problem.know(lambda, &mut tape);
+            tape.largest = tape.largest.max(problem.places.len());
+            problem.write(&known.lambda, lambda, du);
+            tape.known.push(known);
+            return SolveReport { converged: true, ..outcome };
+        }
+        tape.next += 1;
+        let fits = !tape.torn && tape.known.get(tape.next - 1).is_some_and(|known| known.blocks == blocks);
+        if !fits {
+            tape.torn = true;
+            return self.inner.solve(rows, blocks, c, lambda, du, settings);
+        }
+        let Tape { known, next, switched, .. } = &mut *tape;
+        let known = &known[*next - 1];
+        let mut next = known.lambda.clone();
+        (0..CHORDS).for_each(|_| next = problem.step(&known.active, &next, &known.inverse));
+        problem.check(&known.active, &next, switched);
+        problem.write(&next, lambda, du);
+        SolveReport { iterations: 1, converged: true, ray: false, relaxations: 0 }
+    }
+
+    fn fork(&self) -> Box<dyn RowSolver> {
+        self.inner.fork()
+    }
+}
+
+/// The contact problem of one island.
+struct Problem<'a> {
+    rows: &'a Rows,
+    blocks: &'a [u32],
+    c: &'a [f64],
+    /// Row of `rows` of each unknown.
+    places: Vec<usize>,
+}
+
+impl<'a> Problem<'a> {
+    fn new(rows: &'a Rows, blocks: &'a [u32], c: &'a [f64]) -> Problem<'a> {
+        let places = blocks.iter().flat_map(|&b| rows.blocks[b as usize].range()).collect();
+        Problem { rows, blocks, c, places }
+    }
+
+    /// Returns `w` of all rows.
+    fn velocities(&self, lambda: &[f64]) -> Vec<f64> {
+        let (mut all, mut du) = (vec![0.0; self.rows.len], vec![0.0; self.rows.dof]);
+        self.places.iter().zip(lambda).for_each(|(&row, &value)| all[row] = value);
+        let blocks = || self.blocks.iter().map(|&b| &self.rows.blocks[b as usize]);
+        blocks().for_each(|block| self.rows.apply_block(block, &all, &mut du));
+        blocks()
+            .flat_map(|block| block.range().enumerate().map(move |(k, row)| (block, k, row)))
+            .map(|(block, k, row)| self.c[row] + self.rows.row_velocity(block, k, &du) + block.compliance * all[row])
+            .collect()
+    }
+
+    /// Calls `each` with each block, its mean entry on the diagonal of `K`, and its first unknown.
+    fn each_block(&self, mut each: impl FnMut(usize, RowSet, f64, usize)) {
+        let mut first = 0;
+        for (i, block) in self.blocks.iter().map(|&b| &self.rows.blocks[b as usize]).enumerate() {
+            let n = block.set.rows();
+            let diagonal = (0..n).map(|k| self.rows.own(block, k, k)).sum::<f64>() / n as f64 + block.compliance;
+            each(i, block.set, diagonal, first);
+            first += n;
+        }
+    }
+
+    /// Returns the active set of a solution.
+    fn active(&self, lambda: &[f64]) -> Vec<Active> {
+        let w = self.velocities(lambda);
+        let mut active = vec![Active::Open; self.blocks.len()];
+        self.each_block(|i, set, d, k| {
+            if d <= f64::MIN_POSITIVE {
+                return;
+            }
+            let presses = |k: usize| d * lambda[k] - w[k] >= -STILL && w[k] <= STILL;
+            active[i] = match set {
+                RowSet::Equality => Active::Holds,
+                RowSet::HalfLine if presses(k) => Active::Holds,
+                RowSet::Interval { lo, .. } if d * (lambda[k] - lo) < w[k] - STILL => Active::AtLow,
+                RowSet::Interval { hi, .. } if d * (lambda[k] - hi) > w[k] + STILL => Active::AtHigh,
+                RowSet::Interval { .. } => Active::Holds,
+                RowSet::Cone { mu } if presses(k) && mu > 0.0 => {
+                    let [moved, speed] = [1.0, 0.0].map(|share| {
+                        let along = |k: usize| share * d * lambda[k] - w[k];
+                        hypot(along(k + 1), along(k + 2))
+                    });
+                    let sticks = speed <= STILL || moved <= mu * d * lambda[k];
+                    if sticks { Active::Sticks } else { Active::Slides }
+                }
+                RowSet::Cone { .. } if presses(k) => Active::Smooth,
+                RowSet::HalfLine | RowSet::Cone { .. } => Active::Open,
+            };
+        });
+        active
+    }
+
+    /// Returns the solution near `lambda` exactly, with its active set and the inverse of the derivative.
+    fn know(&self, all: &[f64], tape: &mut Tape) -> Known {
+        let mut lambda: Vec<f64> = self.places.iter().map(|&row| all[row]).collect();
+        let active = self.active(&lambda);
+        let (mut inverse, mut determined) = self.inverse(&active, &lambda);
+        for _ in 0..ROUNDS {
+            let next = self.step(&active, &lambda, &inverse);
+            let (before, after) = (self.error(&active, &lambda), self.error(&active, &next));
+            if after.is_nan() || after >= before {
+                break;
+            }
+            lambda = next;
+            (inverse, determined) = self.inverse(&active, &lambda);
+        }
+        tape.residual = tape.residual.max(self.error(&active, &lambda));
+        tape.indeterminate |= !determined;
+        Known { blocks: self.blocks.to_vec(), active, lambda, inverse }
+    }
+
+    fn error(&self, active: &[Active], lambda: &[f64]) -> f64 {
+        self.equations(active, lambda).iter().fold(0.0, |most: f64, f| most.max(f.abs()))
+    }
+
+    /// Returns `F(λ)`, in m/s.
+    fn equations(&self, active: &[Active], lambda: &[f64]) -> Vec<f64> {
+        let mut f = self.velocities(lambda);
+        self.each_block(|i, set, d, k| {
+            let mu = if let RowSet::Cone { mu } = set { mu } else { 0.0 };
+            let d = if d > f64::MIN_POSITIVE { d } else { 1.0 };
+            match (active[i], set) {
+                (Active::Open, _) => (k..k + set.rows()).for_each(|k| f[k] = d * lambda[k]),
+                (Active::Smooth, _) => (k + 1..k + 3).for_each(|k| f[k] = d * lambda[k]),
+                (Active::AtLow, RowSet::Interval { lo, .. }) => f[k] = d * (lambda[k] - lo),
+                (Active::AtHigh, RowSet::Interval { hi, .. }) => f[k] = d * (lambda[k] - hi),
+                (Active::Slides, _) => {
+                    let (speed, load) = (hypot(f[k + 1], f[k + 2]), d * mu * lambda[k]);
+                    let scale = 1.0 / (speed + load).max(STILL);
+                    (k + 1..k + 3).for_each(|k| f[k] = scale * (speed * d * lambda[k] + load * f[k]));
+                }
+                _ => {}
+            }
+        });
+        f
+    }
+
+    /// Returns the inverse of `∂F/∂λ`, or the pseudo-inverse of a singular one, and whether it determines all
+    /// velocities: four corners that slide and turn may share the load in many ways, with other moments of friction.
+    fn inverse(&self, active: &[Active], lambda: &[f64]) -> (DMatrix<f64>, bool) {
+        let n = self.places.len();
+        let k_matrix = DMatrix::from_row_slice(n, n, &self.rows.dense(self.blocks));
+        let (mut jacobian, w) = (k_matrix.clone(), self.velocities(lambda));
+        let mut unit = vec![1.0; n];
+        self.each_block(|i, set, d, k| {
+            let d = if d > f64::MIN_POSITIVE { d } else { 1.0 };
+            let mu = if let RowSet::Cone { mu } = set { mu } else { 0.0 };
+            unit[k..k + set.rows()].fill(1.0 / d.sqrt());
+            match active[i] {
+                Active::Open | Active::AtLow | Active::AtHigh | Active::Smooth => {
+                    let first = k + usize::from(active[i] == Active::Smooth);
+                    for k in first..k + set.rows() {
+                        jacobian.row_mut(k).fill(0.0);
+                        jacobian[(k, k)] = d;
+                    }
+                }
+                Active::Slides => {
+                    let (speed, load) = (hypot(w[k + 1], w[k + 2]), d * mu * lambda[k]);
+                    let scale = 1.0 / (speed + load).max(STILL);
+                    let along = |j: usize| if speed > 0.0 { w[j] / speed } else { 0.0 };
+                    for j in k + 1..k + 3 {
+                        let mut row = load * k_matrix.row(j);
+                        for t in k + 1..k + 3 {
+                            row += d * lambda[j] * along(t) * k_matrix.row(t);
+                        }
+                        row[j] += speed * d;
+                        row[k] += d * mu * w[j];
+                        jacobian.set_row(j, &(scale * row));
+                    }
+                }
+                Active::Holds | Active::Sticks => {}
+            }
+        });
+        // in units in which every row has a mass of about 1, small singular values are those of redundant rows
+        let scale = DMatrix::from_diagonal(&DVector::from_vec(unit));
+        let scaled = &scale * jacobian * &scale;
+        let svd = scaled.svd(true, true);
+        let least = RANK * svd.singular_values.max();
+        let coupled = &scale * &k_matrix * &scale;
+        let free =
+            |(i, _): (usize, &f64)| svd.v_t.as_ref().map_or(0.0, |v_t| (&coupled * v_t.row(i).transpose()).amax());
+        let undetermined = svd.singular_values.iter().enumerate().filter(|(_, s)| **s <= least);
+        let determined = undetermined.map(free).fold(0.0, f64::max) <= DETERMINED;
+        let inverse = svd.pseudo_inverse(least).unwrap_or_else(|_| DMatrix::zeros(n, n));
+        (&scale * inverse * &scale, determined)
+    }
+
+    /// Returns `λ − (∂F/∂λ)⁻¹·F(λ)`.
+    fn step(&self, active: &[Active], lambda: &[f64], inverse: &DMatrix<f64>) -> Vec<f64> {
+        let change = inverse * DVector::from_vec(self.equations(active, lambda));
+        lambda.iter().zip(change.iter()).map(|(lambda, change)| lambda - change).collect()
+    }
+
+    /// Adds the blocks whose multipliers or velocities leave the active set.
+    fn check(&self, active: &[Active], lambda: &[f64], switched: &mut Vec<(Switch, usize)>) {
+        let w = self.velocities(lambda);
+        self.each_block(|i, set, d, k| {
+            let below = |value: f64| value < -STILL;
+            let switch = match (active[i], set) {
+                (Active::Open, _) if d > 0.0 && below(w[k]) => Some(Switch::Force),
+                (Active::Holds, RowSet::HalfLine) | (Active::Sticks | Active::Slides | Active::Smooth, _)
+                    if below(d * lambda[k]) =>
+                {
+                    Some(Switch::Force)
+                }
+                (Active::Holds, RowSet::Interval { lo, hi })
+                    if below(d * (lambda[k] - lo)) || below(d * (hi - lambda[k])) =>
+                {
+                    Some(Switch::Friction)
+                }
+                (Active::AtLow, _) if below(w[k]) => Some(Switch::Friction),
+                (Active::AtHigh, _) if below(-w[k]) => Some(Switch::Friction),
+                (Active::Sticks, RowSet::Cone { mu })
+                    if below(d * (mu * lambda[k] - hypot(lambda[k + 1], lambda[k + 2]))) =>
+                {
+                    Some(Switch::Friction)
+                }
+                (Active::Slides, _) if w[k + 1] * lambda[k + 1] + w[k + 2] * lambda[k + 2] > 0.0 => {
+                    Some(Switch::Friction)
+                }
+                _ => None,
+            };
+            switched.extend(switch.map(|switch| (switch, self.blocks[i] as usize)));
+        });
+    }
+
+    /// Writes the multipliers, and adds their effect to `du`, where that of these blocks is removed before.
+    fn write(&self, own: &[f64], lambda: &mut [f64], du: &mut [f64]) {
+        let blocks = || self.blocks.iter().map(|&b| &self.rows.blocks[b as usize]);
+        for side in blocks().flat_map(|block| block.sides()) {
+            du[side.u as usize..(side.u + side.dof) as usize].fill(0.0);
+        }
+        self.places.iter().zip(own).for_each(|(&row, &value)| lambda[row] = value);
+        blocks().for_each(|block| self.rows.apply_block(block, lambda, du));
+    }
+}
+
+/// Returns `√(a² + b²)`, with the same bits on every platform.
+fn hypot(a: f64, b: f64) -> f64 {
+    nalgebra::ComplexField::hypot(a, b)
+}
