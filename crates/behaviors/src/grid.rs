@@ -52,6 +52,7 @@ impl Grid {
 
     /// Calls `work` for each cell of the points at `places` in the order of the cells, with the places of its points there
     /// and with runs of places, ascending, that contain all points within the distance of one of them.
+    #[inline(always)]
     pub fn each_cell(&self, places: Range<usize>, mut work: impl FnMut(Range<usize>, &[Range<usize>])) {
         let mut columns: [Range<usize>; COLUMNS] = std::array::from_fn(|_| 0..0);
         let mut own = places.start..places.start;

@@ -18,6 +18,7 @@
 //! ```
 
 mod boid;
+mod crowd;
 mod dart;
 mod error;
 mod fields;
@@ -27,6 +28,7 @@ mod helm;
 mod non_spinning;
 mod particles;
 mod record;
+mod registers;
 mod sight;
 mod springs;
 mod steering;
