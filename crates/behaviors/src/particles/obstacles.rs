@@ -11,8 +11,7 @@
 //! | `s` | bound on the relative speed: that of the particle and of the fastest point of the shape |
 //!
 //! The bound finds the first contact along a path by steps of `gap/s`, which pass no surface however thin
-//! (conservative advancement). They converge to a surface and do not reach it; the secant of the last two is extended beyond it
-//! until the gap there is negative. If the gap is negative there, or at the end, regula falsi (Illinois) finds the root instead; it is exact
+//! (conservative advancement). If the gap is negative at the end, regula falsi (Illinois) finds the root instead; it is exact
 //! to rounding, and may be a later one of three.
 
 use super::cells::Cells;
@@ -22,8 +21,6 @@ use tumble_core::{CollisionGroup, Frame, Material, ObjectId, PartState};
 
 /// Most steps along a path.
 const STEPS: usize = 48;
-/// Share of a secant up to the surface by which it is extended.
-const BEYOND: f64 = 1.02;
 /// Gap of a particle that lies on a surface, m.
 pub(super) const TOUCHING: f64 = 1e-10;
 /// Number of obstacles from which a tree finds those near a path.
@@ -239,16 +236,7 @@ impl Obstacle<'_> {
                     high = next;
                     break;
                 }
-                // such steps only approach a surface that is met at a slant: a point just beyond where they lead to is behind it
-                let ahead = next.0 + BEYOND * next.1 * (next.0 - low.0) / (low.1 - next.1);
                 (low, steps) = (next, steps + 1);
-                if ahead > low.0 && ahead < high.0 {
-                    let beyond = (ahead, gap(ahead));
-                    if beyond.1 < 0.0 {
-                        high = beyond;
-                        break;
-                    }
-                }
             }
             if high.1 >= 0.0 {
                 return None;

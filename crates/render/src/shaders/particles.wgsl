@@ -74,7 +74,6 @@ struct Hit {
 const UNIT: f32 = 0.0625;
 const IMPACTS: i32 = 8;
 const STEPS: i32 = 48;
-const BEYOND: f32 = 1.02;
 // gap of a particle that lies on a surface, m
 const TOUCHING: f32 = 4e-7;
 const NEVER: f32 = -1.0;
@@ -206,20 +205,7 @@ fn meets(o: i32, start: vec3<f32>, path: Path, length_s: f32) -> f32 {
                 high = next;
                 break;
             }
-            // such steps only approach a surface that is met at a slant: a point just beyond where they lead to is behind it
-            let fall = low.y - next.y;
-            let last_step = next.x - low.x;
             low = next;
-            if fall > 0.0 {
-                let ahead = next.x + BEYOND * next.y * last_step / fall;
-                if ahead > low.x && ahead < high.x {
-                    let behind = gap_at(o, start + way(path, ahead)).gap;
-                    if behind < 0.0 {
-                        high = vec2<f32>(ahead, behind);
-                        break;
-                    }
-                }
-            }
         }
         if high.y >= 0.0 {
             return NEVER;

@@ -80,8 +80,8 @@ table! {
     bird_time_stepping: "bird", TimeStepping, "edfbc51d27e3b795", "fec93c56055a3e4d";
     bird_backtracking: "bird", Backtracking, "fb21b06f6d3e5830", "5ee9b90abac4068b";
     card_house_time_stepping: "card_house", TimeStepping, "091b9380060ee20c", "8003317c097996db";
-    sparks_time_stepping: "sparks", TimeStepping, "515a77d2df6b5217", "ac8e7e72e10c8f2a";
-    sparks_backtracking: "sparks", Backtracking, "805c8cba100469d4", "6249d77bf5fe9edc";
+    sparks_time_stepping: "sparks", TimeStepping, "515a77d2df6b5217", "9badcde17809dddb";
+    sparks_backtracking: "sparks", Backtracking, "805c8cba100469d4", "6052e84af86ee0f9";
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
     marble_run_time_stepping: "marble_run", TimeStepping, "54c3e3322b6781af", "5406447c388d03c0";
     marble_run_backtracking: "marble_run", Backtracking, "67834b3a7fb5547d", "ff57ee16e3696b0a";
