@@ -158,11 +158,20 @@ fn particles_and_a_flock_that_the_scene_does_not_have_are_shown_too() {
             }
             alive.push(ours.len() - before);
         }
-        // 700 particles, and the bodies of five boids; they die one by one, and none is seen while the system is off
-        assert!(alive[0] >= 700 && alive[18] < 100 && alive[17] > 100 && alive[38] < 100, "{alive:?}");
+        // they die one by one, and none is seen in the two frames in which the system is off
+        let (before_off, off, after_off) = (alive[17], &alive[18..20], alive[20]);
+        assert!(alive[0] == 700 && before_off > 600 && off == [0, 0] && after_off > 600, "{alive:?}");
+        assert!(alive[38] < 600, "{alive:?}");
         world.remove(system).unwrap();
         let (ours, theirs, fresh) = send(&world, 41);
         assert!(fresh && ours.len() == theirs.len());
+        for k in 0..5 {
+            let place = |world: &World| {
+                let id = world.find(&format!("boid {k}")).unwrap();
+                world.part_state(id, 0).unwrap().position()
+            };
+            assert!((place(&world) - place(mirror.world())).norm() < 1e-4, "boid {k}");
+        }
     }
 }
 
