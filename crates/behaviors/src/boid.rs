@@ -211,6 +211,17 @@ impl Integratable for Boid {
     fn mul_lt(&self, cache: &mut Cache, u: &[f64], j: &mut [f64]) {
         self.mul_l(cache, u, j);
     }
+    // as the provided methods, which take memory for a general Jacobian: a flock has thousands of boids
+    fn whitened_velocity(&self, cache: &mut Cache, x: &[f64], u: &mut [f64]) {
+        self.mul_l(cache, &x[4..], u);
+    }
+    fn free_motion(&self, _cache: &mut Cache, x: &mut [f64], h: f64) {
+        (0..4).for_each(|k| x[k] += h * x[4 + k]);
+    }
+    fn accelerations(&self, _cache: &mut Cache, _x: &[f64], dp: &[f64], part_states: &mut [PartState]) {
+        part_states[0].acceleration = Vec3::from_column_slice(&dp[..3]);
+        part_states[0].angular_acceleration = Vec3::zeros();
+    }
     fn energy(&self, x: &[f64], _gravity: &Vec3) -> Energy {
         let kinetic = (0..4).map(|k| 0.5 * (self.root(k) * x[4 + k]).powi(2)).sum();
         Energy { kinetic, potential: 0.0 }

@@ -12,7 +12,8 @@
 //!
 //! The excess of `s` covers the rounding of `x/s` up to 1e9 cells from the origin. Points beyond share the outermost
 //! cells, so none is missed. Points are sorted by cell and then by index, so five cells along z are one run of the
-//! list. No hash, no allocation by extent: the memory is that of the points.
+//! list. Runs are found among the cells that have points, in the order of which both of their ends only go forward. No hash, no
+//! allocation by extent: the memory is that of the points.
 
 use std::ops::Range;
 use tumble_collide::Vec3;
@@ -28,8 +29,12 @@ const OFFSET: i64 = 1 << 30;
 
 /// The points sorted by cell.
 pub(crate) struct Grid {
-    /// Cell and index of each point, ascending: 31 bits per axis, 32 bits of the index.
-    keys: Vec<u128>,
+    /// Index of each point.
+    order: Vec<u32>,
+    /// Each cell with points, ascending: 31 bits per axis; and none behind.
+    cells: Vec<u128>,
+    /// Place of the first point of each cell, and the number of points.
+    firsts: Vec<u32>,
 }
 
 impl Grid {
@@ -39,57 +44,77 @@ impl Grid {
         let cell = |x: f64| (x / side).floor().clamp(-FARTHEST, FARTHEST) as i64;
         let mut keys: Vec<u128> = positions
             .zip(0u32..)
-            .map(|(p, index)| first_of([cell(p.x), cell(p.y), cell(p.z)]) | u128::from(index))
+            .map(|(p, index)| key_of([cell(p.x), cell(p.y), cell(p.z)]) << 32 | u128::from(index))
             .collect();
         keys.sort_unstable();
-        Grid { keys }
+        let (mut cells, mut firsts) = (Vec::new(), Vec::new());
+        for (key, place) in keys.iter().zip(0..) {
+            if cells.last() != Some(&(key >> 32)) {
+                cells.push(key >> 32);
+                firsts.push(place);
+            }
+        }
+        cells.push(u128::MAX);
+        firsts.push(keys.len() as u32);
+        Grid { order: keys.into_iter().map(|key| key as u32).collect(), cells, firsts }
     }
 
     /// Returns the index of each point, in the order of the cells.
     pub fn order(&self) -> impl Iterator<Item = usize> + '_ {
-        self.keys.iter().map(|key| *key as u32 as usize)
+        self.order.iter().map(|index| *index as usize)
     }
 
     /// Calls `work` for each cell of the points at `places` in the order of the cells, with the places of its points there
     /// and with runs of places, ascending, that contain all points within the distance of one of them.
+    #[inline(always)]
     pub fn each_cell(&self, places: Range<usize>, mut work: impl FnMut(Range<usize>, &[Range<usize>])) {
         let mut columns: [Range<usize>; COLUMNS] = std::array::from_fn(|_| 0..0);
-        let mut own = places.start..places.start;
-        while own.start < places.end {
-            let cell = cell_of(self.keys[own.start]);
-            let [x, y, z] = cell;
-            let next = first_of([x, y, z + 1]);
-            while own.end < places.end && self.keys[own.end] < next {
-                own.end += 1;
+        let mut runs: [Range<usize>; COLUMNS] = std::array::from_fn(|_| 0..0);
+        let first = self.firsts.partition_point(|first| (*first as usize) <= places.start) - 1;
+        for own in first..self.cells.len() - 1 {
+            let points = self.places(own..own + 1);
+            if points.start >= places.end {
+                break;
             }
+            let [x, y, z] = cell_of(self.cells[own]);
             let beside = (-AROUND..=AROUND).flat_map(|dx| (-AROUND..=AROUND).map(move |dy| (x + dx, y + dy)));
-            for ((x, y), run) in beside.zip(&mut columns) {
-                // cells ascend, and the runs with them: each end moves forward only
-                run.start = self.advance(run.start, first_of([x, y, z - AROUND]));
-                run.end = self.advance(run.end.max(run.start), first_of([x, y, z + AROUND + 1]));
+            for (((x, y), column), run) in beside.zip(&mut columns).zip(&mut runs) {
+                // cells ascend, and the columns with them: each end moves forward only
+                column.start = self.advance(column.start, key_of([x, y, z - AROUND]));
+                column.end = self.advance(column.end.max(column.start), key_of([x, y, z + AROUND + 1]));
+                *run = self.places(column.clone());
             }
-            work(own.clone(), &columns);
-            own.start = own.end;
+            work(points.start.max(places.start)..points.end.min(places.end), &runs);
         }
     }
 
-    /// Returns the first place from `place` on whose key is at least `key`, by exponential search.
+    /// Returns the places of the points of some cells.
+    fn places(&self, cells: Range<usize>) -> Range<usize> {
+        self.firsts[cells.start] as usize..self.firsts[cells.end] as usize
+    }
+
+    /// Returns the first cell from a place of the list on whose key is at least `key`, by exponential search.
+    #[inline(always)]
     fn advance(&self, place: usize, key: u128) -> usize {
-        let (mut low, mut step) = (place, 1);
-        while low + step <= self.keys.len() && self.keys[low + step - 1] < key {
+        // most often it is this one or the next one
+        if self.cells[place] >= key {
+            return place;
+        }
+        let (mut low, mut step) = (place + 1, 1);
+        while low + step <= self.cells.len() && self.cells[low + step - 1] < key {
             low += step;
             step *= 2;
         }
-        let high = (low + step - 1).min(self.keys.len());
-        low + self.keys[low..high].partition_point(|k| *k < key)
+        let high = (low + step - 1).min(self.cells.len());
+        low + self.cells[low..high].partition_point(|k| *k < key)
     }
 }
 
-/// Returns the key of a cell with the index 0.
-fn first_of(cell: [i64; 3]) -> u128 {
-    cell.iter().fold(0, |key, c| key << 31 | (c + OFFSET) as u128) << 32
+/// Returns the key of a cell.
+fn key_of(cell: [i64; 3]) -> u128 {
+    cell.iter().fold(0, |key, c| key << 31 | (c + OFFSET) as u128)
 }
 
 fn cell_of(key: u128) -> [i64; 3] {
-    [94, 63, 32].map(|shift| (key >> shift & 0x7fff_ffff) as i64 - OFFSET)
+    [62, 31, 0].map(|shift| (key >> shift & 0x7fff_ffff) as i64 - OFFSET)
 }

@@ -1,4 +1,4 @@
-//! A flock of rigid bodies, steered by forces and torques: bodies fly nose first, bank into turns, and are turned by
+//! A flock of rigid and articulated bodies, steered by forces and torques: bodies fly nose first, bank into turns, and are turned by
 //! collisions like any other body.
 //!
 //! ```text
@@ -10,7 +10,7 @@
 //! | symbol | meaning |
 //! |---|---|
 //! | `F` | force of the flock on the body's center of mass ([`super::steering`]) |
-//! | `v`, `ω`, `R`, `m`, `I` | velocity, angular velocity, orientation, mass, and inertia in world axes |
+//! | `v`, `ω`, `R`, `m`, `I` | velocity in the air, angular velocity, orientation, mass, and inertia in world axes |
 //! | `f*`, `R*` | wanted nose and orientation; x forward, y to the left, z up |
 //! | `ω*` | turn rate that `F` commands |
 //! | `φ*`, `B` | bank about the nose, negative in turns to the left; time that turns a rate into a share of a quarter turn |
@@ -22,6 +22,10 @@
 //! collision the bodies of a flock keep it, whatever they do with their noses. It depends on velocities, so it is constant
 //! over a step `h`: keep `k·h` below ¼. Without speed there is no course; the torque then only stops the spin.
 //!
+//! An articulated body is steered by its floating root, such as the torso of a bird: `F` acts on the root at the center of mass of the
+//! whole, `R` and `ω` are those of the root, and `m` and `I` those of all links in their present poses. How its joints move is its own
+//! affair.
+//!
 //! This is the steering by torques that appendix A of the thesis leaves open.
 
 use crate::error::{BehaviorError, check};
@@ -32,7 +36,10 @@ use nalgebra::Unit;
 use std::f64::consts::FRAC_PI_2;
 use tumble_collide::{Mat3, Quat, Vec3};
 use tumble_core::archive::{ObjectIndices, ObjectRecord};
-use tumble_core::{ForceGenerator, Forces, Object, ObjectId, PartState, RigidBody, StateRange, WorldView};
+use tumble_core::articulated::Joint;
+use tumble_core::{
+    ArticulatedBody, ForceGenerator, Forces, Object, ObjectId, PartState, RigidBody, StateRange, WorldView,
+};
 
 /// Speed below which a body has no course, m/s.
 const SLOWEST: f64 = 1e-3;
@@ -50,16 +57,19 @@ pub struct Helm {
     pub bank_time: f64,
     /// The direction that is up for a body without bank; any length above 0.
     pub up: Vec3,
+    /// Velocity of the air, m/s. Speeds and courses of the flock are those in the air; the boundary stands still.
+    pub wind: Vec3,
 }
 
 impl Default for Helm {
-    /// A quarter of a second to turn, up along z.
+    /// A quarter of a second to turn, up along z, in still air.
     fn default() -> Helm {
-        Helm { agility: 8.0, max_angular_acceleration: 100.0, bank_time: 1.0, up: Vec3::z() }
+        Helm { agility: 8.0, max_angular_acceleration: 100.0, bank_time: 1.0, up: Vec3::z(), wind: Vec3::zeros() }
     }
 }
 
-/// A flock of rigid bodies in one world. It is a force: it has no state, and bodies of any shape can join it.
+/// A flock of rigid bodies, and of articulated ones with a floating root, in one world. It is a force: it has no state, and bodies of
+/// any shape can join it.
 ///
 /// ```
 /// # use tumble_core::prelude::*;
@@ -96,8 +106,8 @@ impl BodyFlock {
     pub fn with_search(self, search: Search) -> BodyFlock {
         BodyFlock { search, ..self }
     }
-    /// Adds a rigid body of the flock's world. Its gravity acts beside the flock: set
-    /// [`RigidBody::with_gravity_scale`] to 0 for wings that carry it.
+    /// Adds a rigid body, or an articulated one whose root floats, of the flock's world. Its gravity acts beside the flock: set
+    /// [`RigidBody::with_gravity_scale`] to 0 for a body without wings that carry it.
     pub fn push(&mut self, body: ObjectId) {
         self.bodies.push(body);
     }
@@ -125,8 +135,13 @@ impl BodyFlock {
         (self.steering, self.helm) = (steering, helm);
         Ok(())
     }
-    /// Returns the ids of the bodies, in the order in which they were added. Those that are no enabled rigid bodies of the
-    /// world are ignored.
+    /// Returns whether an object can be steered: a rigid body, or an articulated body whose first link floats.
+    pub fn steers(object: &dyn Object) -> bool {
+        let object: &dyn std::any::Any = object;
+        object.is::<RigidBody>() || object.downcast_ref().is_some_and(floats)
+    }
+    /// Returns the ids of the bodies, in the order in which they were added. Those that are not enabled, or that
+    /// [`steers`](BodyFlock::steers) refuses, are ignored.
     pub fn bodies(&self) -> &[ObjectId] {
         &self.bodies
     }
@@ -142,6 +157,7 @@ impl Helm {
         let most = self.max_angular_acceleration;
         check("max_angular_acceleration", most, most >= 0.0, "at least 0")?;
         check("bank_time", self.bank_time, self.bank_time >= 0.0, "at least 0")?;
+        check_vector("wind", &self.wind)?;
         check_vector("up", &self.up)?;
         check("the length of up", self.up.norm(), self.up.norm() > 0.0, "above 0")
     }
@@ -196,27 +212,80 @@ impl Object for BodyFlock {
 
 impl ForceGenerator for BodyFlock {
     fn apply(&self, _me: &StateRange, view: &WorldView, out: &mut Forces) {
-        let (mut bodies, mut flyers) = (Vec::new(), Vec::new());
+        let (mut members, mut flyers) = (Vec::new(), Vec::new());
         for &id in self.bodies.iter().filter(|id| view.status(**id).is_some_and(|status| status.enabled)) {
-            let (Some(body), Some(range)) = (view.get::<RigidBody>(id), view.state_range(id)) else { continue };
-            let (row, mass) = (range.parts.start, body.mass());
-            let state = &view.part_states[row];
-            let position = state.pose.transform_point(&body.center_in_part().into()).coords;
-            let (velocity, forward) = (state.velocity_at(&position), state.pose.rotation * Vec3::x());
-            bodies.push((row, body));
+            let Some(range) = view.state_range(id) else { continue };
+            let states = &view.part_states[range.parts.clone()];
+            let member = match (view.get::<RigidBody>(id), view.get::<ArticulatedBody>(id)) {
+                (Some(body), _) => Member::rigid(body, &states[0]),
+                (None, Some(body)) if floats(body) => Member::articulated(body, states),
+                _ => continue,
+            };
+            let Member { position, mass, .. } = member;
+            let velocity = member.velocity - self.helm.wind;
+            let forward = states[0].pose.rotation * Vec3::x();
+            members.push((range.parts.start, member));
             flyers.push(Flyer { position, velocity, forward, mass });
         }
         let forces = self.steering.forces_by(self.search, &flyers, |forces, work| {
             view.each_piece(forces, PIECE, work);
         });
-        for (((row, body), flyer), force) in bodies.iter().zip(&flyers).zip(forces) {
-            let state = &view.part_states[*row];
-            let axes = state.pose.rotation.to_rotation_matrix();
-            let inertia = axes.matrix() * body.inertia() * axes.matrix().transpose();
+        for (((row, member), flyer), force) in members.iter().zip(&flyers).zip(forces) {
+            let (state, inertia) = (&view.part_states[*row], &member.inertia);
             let spin = state.angular_velocity;
-            let acceleration = self.helm.angular_acceleration(state, &flyer.velocity, &(force / flyer.mass));
-            out.add_at(*row, state, force, &flyer.position);
+            let acceleration = self.helm.angular_acceleration(state, &flyer.velocity, &(force / member.mass));
+            out.add_at(*row, state, force, &member.position);
             out.wrenches[*row].torque += inertia * acceleration + spin.cross(&(inertia * spin));
         }
     }
+}
+
+/// A body of a flock as a whole.
+struct Member {
+    /// Center of mass, m, and its velocity, m/s.
+    position: Vec3,
+    velocity: Vec3,
+    /// Mass, kg.
+    mass: f64,
+    /// Inertia about the center of mass, world axes, kg·m².
+    inertia: Mat3,
+}
+
+impl Member {
+    fn rigid(body: &RigidBody, state: &PartState) -> Member {
+        let position = state.pose.transform_point(&body.center_in_part().into()).coords;
+        let (velocity, inertia) = (state.velocity_at(&position), turned(body.inertia(), state));
+        Member { position, velocity, mass: body.mass(), inertia }
+    }
+
+    /// `I = Σ Iᵢ + mᵢ·(|dᵢ|²·1 − dᵢ·dᵢᵀ)` over the links, `dᵢ` from the center of mass of the whole to theirs.
+    fn articulated(body: &ArticulatedBody, states: &[PartState]) -> Member {
+        let links = || body.model().links().iter().map(|link| &link.mass).zip(states);
+        let (mut mass, mut moment, mut momentum) = (0.0, Vec3::zeros(), Vec3::zeros());
+        for (link, state) in links() {
+            let center = state.pose.transform_point(&link.center.into()).coords;
+            mass += link.mass;
+            moment += link.mass * center;
+            momentum += link.mass * state.velocity_at(&center);
+        }
+        let (position, velocity) = (moment / mass, momentum / mass);
+        let mut inertia = Mat3::zeros();
+        for (link, state) in links() {
+            let arm = state.pose.transform_point(&link.center.into()).coords - position;
+            let steiner = Mat3::from_diagonal_element(arm.norm_squared()) - arm * arm.transpose();
+            inertia += turned(&link.inertia, state) + link.mass * steiner;
+        }
+        Member { position, velocity, mass, inertia }
+    }
+}
+
+/// Returns an inertia of a part in world axes.
+fn turned(inertia: &Mat3, state: &PartState) -> Mat3 {
+    let axes = state.pose.rotation.to_rotation_matrix();
+    axes.matrix() * inertia * axes.matrix().transpose()
+}
+
+/// Returns whether the first link of a body floats, and has a mass.
+fn floats(body: &ArticulatedBody) -> bool {
+    body.model().links().first().is_some_and(|root| matches!(root.joint, Joint::Floating) && root.mass.mass > 0.0)
 }

@@ -20,6 +20,7 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 mod boid;
+mod crowd;
 mod dart;
 mod error;
 mod fields;
@@ -29,6 +30,7 @@ mod helm;
 mod non_spinning;
 mod particles;
 mod record;
+mod registers;
 mod sight;
 mod springs;
 mod steering;

@@ -10,14 +10,10 @@
 //! `0 ≤ z ≤ ¼` with 13 coefficients, of an error below 2e-17. All lanes do the same work without a branch, so the compiler
 //! makes vector instructions of it; each lane has the bits that it would have alone.
 
+use crate::registers::{LANES, Lanes};
 use crate::steering::Steering;
 use std::f64::consts::{FRAC_PI_2, PI};
 use tumble_collide::Vec3;
-
-/// Number of neighbors that are weighed at once.
-pub(crate) const LANES: usize = 8;
-/// A number for each neighbor.
-pub(crate) type Lanes = [f64; LANES];
 
 /// Slope of an edge without width: 1 just before it.
 const SHARP: f64 = 1e300;
@@ -41,6 +37,8 @@ pub(crate) struct Sight {
     pub weight: Lanes,
     /// `1/d²`, 1/m²; 1/(1 µm·d) below 1 µm.
     pub nearness: Lanes,
+    /// `d`, m.
+    pub distance: Lanes,
 }
 
 impl Eye {
@@ -56,7 +54,7 @@ impl Eye {
     /// Returns how a boid sees others, `arm` away, m. Those at its own place have no direction and the weight 0.
     #[inline(always)]
     pub fn sight(&self, arm: &[Lanes; 3], forward: &Vec3) -> Sight {
-        let mut sight = Sight { weight: [0.0; LANES], nearness: [0.0; LANES] };
+        let mut sight = Sight { weight: [0.0; LANES], nearness: [0.0; LANES], distance: [0.0; LANES] };
         for k in 0..LANES {
             let [x, y, z] = [arm[0][k], arm[1][k], arm[2][k]];
             let distance = (x * x + y * y + z * z).sqrt();
@@ -65,6 +63,7 @@ impl Eye {
             let angle = acos(closeness * (x * forward.x + y * forward.y + z * forward.z));
             let weight = fade(self.distance, distance) * fade(self.angle, angle);
             sight.weight[k] = if apart { weight } else { 0.0 };
+            sight.distance[k] = distance;
             sight.nearness[k] = closeness * least(closeness, 1.0 / CLOSEST);
         }
         sight
@@ -89,6 +88,23 @@ fn least(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
+/// Coefficients of `P`, from that of 1 on.
+const ARC_SINE: [f64; 13] = [
+    1.0,
+    0.166_666_666_666_649_42,
+    0.075_000_000_003_852_01,
+    0.044_642_856_805_998_936,
+    0.030_381_959_697_685_14,
+    0.022_371_749_733_164_054,
+    0.017_359_779_641_349_98,
+    0.013_884_842_826_402_08,
+    0.012_170_138_592_391_726,
+    0.006_529_302_004_736_569_5,
+    0.019_513_468_251_252_167,
+    -0.016_187_392_271_599_134,
+    0.031_879_621_400_812_84,
+];
+
 /// Returns the arc cosine to 1e-15, two units of its last place; that of ±1 beyond.
 #[inline(always)]
 fn acos(c: f64) -> f64 {
@@ -96,23 +112,12 @@ fn acos(c: f64) -> f64 {
     let wide = size > 0.5;
     let z = if wide { 0.5 * (1.0 - size) } else { size * size };
     let s = if wide { z.sqrt() } else { size };
-    let mut p = 0.031_879_621_400_812_84;
-    for coefficient in [
-        -0.016_187_392_271_599_134,
-        0.019_513_468_251_252_167,
-        0.006_529_302_004_736_569_5,
-        0.012_170_138_592_391_726,
-        0.013_884_842_826_402_08,
-        0.017_359_779_641_349_98,
-        0.022_371_749_733_164_054,
-        0.030_381_959_697_685_14,
-        0.044_642_856_805_998_936,
-        0.075_000_000_003_852_01,
-        0.166_666_666_666_649_42,
-        1.0,
-    ] {
-        p = p * z + coefficient;
-    }
+    // pairs of terms, pairs of those and so on, which do not wait for each other (Estrin)
+    let p = {
+        let (z2, pair) = (z * z, |k: usize| ARC_SINE[k] + z * ARC_SINE[k + 1]);
+        let (z4, four) = (z2 * z2, |k: usize| pair(k) + z2 * pair(k + 2));
+        four(0) + z4 * (four(4) + z4 * (four(8) + z4 * ARC_SINE[12]))
+    };
     let asin = s * p;
     let angle = if wide { 2.0 * asin } else { FRAC_PI_2 - asin };
     if c < 0.0 { PI - angle } else { angle }

@@ -35,9 +35,11 @@
 //! - Constants belong to the flock and not to each boid. Center, radius and stiffness of the
 //!   boundary are constants; in the appendix they are 0, 300 and 1.
 
+use crate::crowd::{Crowd, Nearby, Seen};
 use crate::error::{BehaviorError, check};
 use crate::grid::Grid;
-use crate::sight::{CLOSEST, Eye, LANES, Lanes, Sight};
+use crate::registers::{LANES, Lanes, Portable, Registers};
+use crate::sight::{CLOSEST, Eye, Sight};
 use std::ops::Range;
 use tumble_collide::Vec3;
 
@@ -159,55 +161,18 @@ impl Steering {
     ) -> Vec<Vec3> {
         let grid = Grid::new(flyers.iter().map(|flyer| flyer.position), self.visibility_distance);
         let crowd = Crowd::new(flyers, grid.order().collect());
-        let (eye, arch) = (Eye::new(self), pulp::Arch::new());
+        let eye = Eye::new(self);
         let mut sorted = vec![Vec3::zeros(); flyers.len()];
         run(&mut sorted, &|first, forces: &mut [Vec3]| {
-            let mut seen = vec![0; flyers.len()];
-            let places = first..first + forces.len();
-            let mut work = |own: Range<usize>, runs: &[Range<usize>]| {
-                // the widest registers that there are: the same products and sums, so the same bits
-                arch.dispatch(
-                    #[inline(always)]
-                    || {
-                        for place in own {
-                            let near = crowd.within(place, eye.unseen, runs, &mut seen);
-                            forces[place - first] = self.force(&eye, &crowd, place, &near);
-                        }
-                    },
-                );
-            };
-            match search {
-                Search::Grid => grid.each_cell(places, work),
-                Search::BruteForce => work(places, std::slice::from_ref(&(0..flyers.len()))),
-            }
+            Piece { steering: self, eye: &eye, grid: &grid, crowd: &crowd, search, first, forces, sums: Vec::new() }
+                .vectorized();
         });
-        let mut forces = vec![Vec3::zeros(); flyers.len()];
-        crowd.order.iter().zip(sorted).for_each(|(index, force)| forces[*index] = force);
-        forces
+        crowd.unsorted(&sorted)
     }
 
-    /// Returns the force on the boid at a place.
+    /// Returns the force on a boid with these sums over its neighbors.
     #[inline(always)]
-    fn force(&self, eye: &Eye, crowd: &Crowd, place: usize, near: &Near) -> Vec3 {
-        let own = &crowd.flyers[crowd.order[place]];
-        let mut sums = Sums::default();
-        for near in near.places.chunks(LANES) {
-            let (mut arm, mut faster) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
-            for (lane, other) in near.iter().enumerate() {
-                for axis in 0..3 {
-                    arm[axis][lane] = crowd.positions[axis][*other as usize] - own.position[axis];
-                    faster[axis][lane] = crowd.velocities[axis][*other as usize] - own.velocity[axis];
-                }
-            }
-            sums.add(&eye.sight(&arm, &own.forward), &arm, &faster);
-        }
-        let [mut avoidance, mut matching, clustering] = sums.total();
-        let here = if near.here > 1 { near.places } else { &[] };
-        for other in here.iter().map(|other| *other as usize).filter(|other| crowd.is_at(*other, place)) {
-            let direction = if crowd.order[other] > crowd.order[place] { Vec3::x() } else { -Vec3::x() };
-            avoidance -= eye.at_the_same_place() / CLOSEST * direction;
-            matching += eye.at_the_same_place() * (crowd.flyers[crowd.order[other]].velocity - own.velocity);
-        }
+    fn force(&self, own: &Flyer, [avoidance, matching, clustering]: &[Vec3; 3]) -> Vec3 {
         let ranked = self.by_priority(
             &(own.mass * self.avoidance * avoidance),
             &(own.mass * self.matching * matching),
@@ -216,28 +181,27 @@ impl Steering {
         ranked + self.cruise(own) + self.boundary(own)
     }
 
-    /// Adds the three forces by priority under the limit.
+    /// Adds the three forces by priority under the limit. What is not taken is computed too: no branch to predict.
+    #[inline(always)]
     fn by_priority(&self, avoidance: &Vec3, matching: &Vec3, clustering: &Vec3) -> Vec3 {
         let limit = self.max_force;
         let two = avoidance + matching;
-        if avoidance.norm() > limit {
-            cap(avoidance, limit)
-        } else if two.norm() >= limit {
-            cap(&two, limit)
-        } else {
-            cap(&(two + clustering), limit)
-        }
+        let (one, two, all) = (cap(avoidance, limit), cap(&two, limit), cap(&(two + clustering), limit));
+        let rest = choose(two.size >= limit, &two.capped, &all.capped);
+        choose(one.size > limit, &one.capped, &rest)
     }
 
     /// Returns the force that seeks the desired speed.
+    #[inline(always)]
     fn cruise(&self, own: &Flyer) -> Vec3 {
-        own.mass * self.speed_rate * (self.desired_speed - own.velocity.norm()) * own.forward
+        own.mass * self.speed_rate * (self.desired_speed - length(&own.velocity)) * own.forward
     }
 
     /// Returns the force of the soft boundary.
+    #[inline(always)]
     fn boundary(&self, own: &Flyer) -> Vec3 {
         let arm = own.position - self.boundary_center;
-        let distance = arm.norm();
+        let distance = length(&arm);
         if distance > self.boundary_radius {
             -self.boundary_stiffness * (distance - self.boundary_radius) * (arm / distance)
         } else {
@@ -246,60 +210,114 @@ impl Steering {
     }
 }
 
-/// The boids in the order of the cells. Coordinates are apart, as the search reads them.
-struct Crowd<'a> {
-    flyers: &'a [Flyer],
-    /// Index of each boid.
-    order: Vec<usize>,
-    positions: [Vec<f64>; 3],
-    velocities: [Vec<f64>; 3],
+/// The forces on a piece of the crowd, from place `first` on.
+struct Piece<'a> {
+    steering: &'a Steering,
+    eye: &'a Eye,
+    grid: &'a Grid,
+    crowd: &'a Crowd,
+    search: Search,
+    first: usize,
+    forces: &'a mut [Vec3],
+    /// Sums over the neighbors of each boid.
+    sums: Vec<[Vec3; 3]>,
 }
 
-impl<'a> Crowd<'a> {
-    fn new(flyers: &'a [Flyer], order: Vec<usize>) -> Crowd<'a> {
-        let sorted = |of: &dyn Fn(&Flyer) -> f64| order.iter().map(|index| of(&flyers[*index])).collect::<Vec<_>>();
-        let positions = [0, 1, 2].map(|axis| sorted(&|flyer| flyer.position[axis]));
-        let velocities = [0, 1, 2].map(|axis| sorted(&|flyer| flyer.velocity[axis]));
-        Crowd { flyers, positions, velocities, order }
+impl Piece<'_> {
+    /// Computes them in the widest registers that there are: the same products and sums, so the same bits.
+    fn vectorized(self) {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(token) = pulp::x86::V4::try_new() {
+            return token.vectorize(Vectorized(self, token));
+        }
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || self.compute(Portable),
+        );
     }
 
-    /// Returns whether another boid is at the same place as one, to rounding of the square of their distance.
-    fn is_at(&self, other: usize, place: usize) -> bool {
-        let arm = Vec3::from(self.positions.each_ref().map(|x| x[other] - x[place]));
-        other != place && arm.x * arm.x + arm.y * arm.y + arm.z * arm.z == 0.0
-    }
-
-    /// Finds the boids of `runs` within a squared distance (m²) of one, itself included. Their places are written to the
-    /// front of `seen`, which is as long as the crowd.
     #[inline(always)]
-    fn within<'s>(&self, place: usize, squared: f64, runs: &[Range<usize>], seen: &'s mut [u32]) -> Near<'s> {
-        let [x, y, z] = &self.positions;
-        let (own_x, own_y, own_z) = (x[place], y[place], z[place]);
-        let (mut count, mut here) = (0, 0);
-        for run in runs {
-            let points = x[run.clone()].iter().zip(&y[run.clone()]).zip(&z[run.clone()]);
-            for (((x, y), z), other) in points.zip(run.start as u32..) {
-                let (dx, dy, dz) = (x - own_x, y - own_y, z - own_z);
-                let distance = dx * dx + dy * dy + dz * dz;
-                // each is written, and kept by the count: no branch to predict
-                seen[count] = other;
-                count += usize::from(distance <= squared);
-                here += usize::from(distance == 0.0);
+    fn compute<R: Registers>(mut self, registers: R) {
+        let (places, mut near) = (self.first..self.first + self.forces.len(), Nearby::default());
+        self.sums.resize(self.forces.len(), Default::default());
+        match self.search {
+            Search::Grid => self.grid.each_cell(
+                places,
+                #[inline(always)]
+                |own, runs| self.cell(registers, own, runs, &mut near),
+            ),
+            Search::BruteForce => {
+                let all = 0..self.crowd.len();
+                for place in places {
+                    self.cell(registers, place..place + 1, std::slice::from_ref(&all), &mut near);
+                }
             }
         }
-        Near { places: &seen[..count], here }
+        // all sums first: a force waits long for its roots, and those of several boids are found at once
+        for ((force, sums), own) in self.forces.iter_mut().zip(&self.sums).zip(self.crowd.flyers(self.first)) {
+            *force = self.steering.force(own, sums);
+        }
+    }
+
+    /// Sums over the neighbors of some boids, which are in `runs`.
+    #[inline(always)]
+    fn cell<R: Registers>(&mut self, registers: R, own: Range<usize>, runs: &[Range<usize>], near: &mut Nearby) {
+        self.crowd.candidates(registers, self.eye, own.clone(), runs, near);
+        for place in own {
+            let seen = self.crowd.seen(registers, self.eye, place, near);
+            self.sums[place - self.first] = self.sums(registers, place, &seen);
+        }
+    }
+
+    /// Returns the sums over the neighbors of a boid: `−Σ w·u/d`, `Σ w·(v_j − v_i)` and `Σ w·d·u`.
+    #[inline(always)]
+    fn sums<R: Registers>(&self, registers: R, place: usize, seen: &Seen) -> [Vec3; 3] {
+        let (crowd, eye) = (self.crowd, self.eye);
+        let own = crowd.flyer(place);
+        let (mut sums, mut here) = (Sums::default(), 0);
+        for near in seen.places {
+            let [x, y, z, u, v, w] = crowd.columns(registers, near);
+            let arm = less([x, y, z], &own.position);
+            let sight = eye.sight(&arm, &own.forward);
+            here += registers.at_most(&sight.distance, 0.0).count_ones() as usize;
+            sums.add(&sight, &arm, &less([u, v, w], &own.velocity));
+        }
+        let [mut avoidance, mut matching, clustering] = sums.total();
+        if here > seen.fill + 1 {
+            for other in crowd.beside(place, seen) {
+                let direction = if crowd.index(other) > crowd.index(place) { Vec3::x() } else { -Vec3::x() };
+                avoidance -= eye.at_the_same_place() / CLOSEST * direction;
+                matching += eye.at_the_same_place() * (crowd.flyer(other).velocity - own.velocity);
+            }
+        }
+        [avoidance, matching, clustering]
     }
 }
 
-/// The boids that one may see.
-struct Near<'a> {
-    /// Their places, ascending, with its own.
-    places: &'a [u32],
-    /// Number of those at its own place, itself included.
-    here: usize,
+/// A piece that is compiled for the registers of its token.
+#[cfg(target_arch = "x86_64")]
+struct Vectorized<'a>(Piece<'a>, pulp::x86::V4);
+
+#[cfg(target_arch = "x86_64")]
+impl pulp::NullaryFnOnce for Vectorized<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        self.0.compute(self.1);
+    }
 }
 
-/// Sums over neighbors, one for each lane: `−Σ w·u/d`, `Σ w·(v_j − v_i)` and `Σ w·d·u`.
+/// Subtracts a vector in each lane.
+#[inline(always)]
+fn less(x: [Lanes; 3], own: &Vec3) -> [Lanes; 3] {
+    let mut out = x;
+    for axis in 0..3 {
+        (0..LANES).for_each(|k| out[axis][k] -= own[axis]);
+    }
+    out
+}
+
+/// Sums over neighbors, one for each lane.
 #[derive(Default)]
 struct Sums([[Lanes; 3]; 3]);
 
@@ -318,12 +336,33 @@ impl Sums {
 
     /// Returns the sums of all lanes.
     fn total(&self) -> [Vec3; 3] {
-        self.0.map(|sum| sum.map(|lanes| lanes.iter().sum()).into())
+        self.0.map(|sum| sum.map(|[a, b, c, d, e, f, g, h]| ((a + e) + (c + g)) + ((b + f) + (d + h))).into())
     }
 }
 
-/// Returns a vector of at most that length.
-fn cap(force: &Vec3, limit: f64) -> Vec3 {
-    let size = force.norm();
-    if size > limit { force * (limit / size) } else { *force }
+/// A vector of at most some length, and its length before.
+struct Capped {
+    capped: Vec3,
+    size: f64,
+}
+
+#[inline(always)]
+fn cap(force: &Vec3, limit: f64) -> Capped {
+    let size = length(force);
+    let share = limit / size;
+    // no number for 0/0: all of it then
+    Capped { capped: force * if share < 1.0 { share } else { 1.0 }, size }
+}
+
+/// Returns the length of a vector. The root is an instruction of the registers in use; that of nalgebra's `norm` is one of the older
+/// kind, which waits for all lanes of the wide ones.
+#[inline(always)]
+fn length(v: &Vec3) -> f64 {
+    (v.x * v.x + v.y * v.y + v.z * v.z).sqrt()
+}
+
+#[inline(always)]
+fn choose(first: bool, a: &Vec3, b: &Vec3) -> Vec3 {
+    let of = |a: f64, b: f64| if first { a } else { b };
+    Vec3::new(of(a.x, b.x), of(a.y, b.y), of(a.z, b.z))
 }

@@ -61,9 +61,10 @@ fn main() -> Result<(), Failure> {
     };
     let qualities: Vec<Quality> = words.iter().map(|words| words.parse()).collect::<Result<_, _>>()?;
     let mut summary = Vec::new();
-    let mut subjects = [billiards()?, bodies("1,000 bodies", [25, 20, 2])?, bodies("10,000 bodies", [50, 50, 4])?];
-    for subject in &mut subjects {
-        for count in [1, 4, 6] {
+    let (few, many) = (bodies("1,000 bodies", [25, 20, 2])?, bodies("10,000 bodies", [50, 50, 4])?);
+    let mut subjects = [billiards()?, few, many, boids()?, particles()?];
+    for (index, subject) in subjects.iter_mut().enumerate() {
+        for count in if index < 3 { vec![1, 4, 6] } else { vec![1] } {
             let facets = facets(&subject.scene, count, [1024, 768], Stereo::Mono)?;
             let mut cells = Vec::new();
             for quality in &qualities {
@@ -138,6 +139,25 @@ fn bodies(name: &'static str, [nx, ny, nz]: [usize; 3]) -> Result<Subject, Failu
         "balls.toml",
     )?;
     subject(name, scene)
+}
+
+/// A flock that fills the picture.
+fn boids() -> Result<Subject, Failure> {
+    let text = "[[flock]]\nname = \"flock\"\n[[flock.group]]\ncount = 10000\nspread_m = 30\nvelocity_m_per_s = [10, 0, 0]\n\
+                [camera]\neye_m = [0, -90, 0]\ntarget_m = [0, 0, 0]\nvertical_fov_deg = 40\n";
+    subject("10,000 boids", SceneFile::parse(text, "boids.toml")?)
+}
+
+/// Sparks in a ball above the ground.
+fn particles() -> Result<Subject, Failure> {
+    let text = "[ground]\n[[particle_system]]\nname = \"sparks\"\ncapacity = 100000\n[[particle_system.emitter]]\nburst = 100000\n\
+                position_m = [0, 0, 3]\nspeed_m_per_s = [0.5, 4]\nhalf_angle_deg = 180\nlifetime_s = 10\n\
+                [camera]\neye_m = [0, -8, 2.5]\ntarget_m = [0, 0, 2.5]\nvertical_fov_deg = 40\n";
+    let mut subject = subject("100,000 particles", SceneFile::parse(text, "sparks.toml")?)?;
+    for _ in 0..120 {
+        subject.world.step()?;
+    }
+    Ok(subject)
 }
 
 /// One cell: frames per second, or none if it was not requested.

@@ -84,7 +84,7 @@ pub use parse::appearance::{AppearanceSpec, Color, Pattern};
 pub use parse::articulated::ArticulatedSpec;
 pub use parse::behavior::BehaviorSpecs;
 pub use parse::behavior::field::{FieldKind, FieldSpec, PanelSpec};
-pub use parse::behavior::flock::{BoidGroupSpec, FlockSpec};
+pub use parse::behavior::flock::{BodyFlockSpec, BoidGroupSpec, FlockSpec};
 pub use parse::behavior::particles::{EmitterSpec, ParticleSystemSpec};
 pub use parse::behavior::soft::{Grid, SoftSpec};
 pub use parse::body::{BodySpec, MassSpec};

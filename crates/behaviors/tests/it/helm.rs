@@ -3,6 +3,7 @@
 use crate::{Numbers, steps};
 use std::f64::consts::FRAC_PI_2;
 use tumble_behaviors::{BehaviorError, BodyFlock, Helm, Search, Steering};
+use tumble_core::articulated::{ArticulationBuilder, LinkBuilder};
 use tumble_core::prelude::*;
 
 /// No force at all.
@@ -164,5 +165,93 @@ fn a_body_without_speed_stops_its_spin_and_bad_constants_are_refused() {
     ];
     for helm in bad {
         assert!(matches!(BodyFlock::new("fish", none(), helm), Err(BehaviorError::Range { .. })));
+    }
+}
+
+/// Two halves of a fish, side by side, on a slide along the nose that a spring (N/m) holds. The root is the left half.
+fn halves(world: &mut World, stiffness: f64, pose: Pose, velocity: Vec3) -> ObjectId {
+    let half = |name: &str, joint: Joint, y: f64| {
+        let shape = Shape::cuboid(Vec3::new(0.4, 0.05, 0.2)).unwrap();
+        LinkBuilder::new(name, joint).with_shape(shape, Pose::translation(0.0, y, 0.0)).with_mass(1.0)
+    };
+    let slide = half("right", Joint::Prismatic { axis: Vec3::x() }, -0.025).with_spring(stiffness, 0.0);
+    let body = ArticulationBuilder::new("halves").with_self_collision(false).link(half("left", Joint::Floating, 0.025));
+    let body = body.link(slide.with_joint_damping(0.02 * stiffness).with_parent("left")).build().unwrap();
+    let mut v = vec![0.0; body.model().dof()];
+    v[3..6].copy_from_slice(velocity.as_slice());
+    world.add(body.with_pose(pose).with_velocities(&v).unwrap()).unwrap()
+}
+
+/// The halves together are the fish of one piece: the same mass, center and inertia. So they go the same way and turn alike, the
+/// closer the stiffer the spring and the shorter the step.
+#[test]
+fn an_articulated_body_is_steered_as_the_rigid_one_of_its_links() {
+    let steering =
+        Steering { boundary_radius: 2.0, boundary_stiffness: 2.0, desired_speed: 3.0, speed_rate: 1.0, ..none() };
+    let start = Pose::from_parts(Vec3::new(1.5, 0.0, 0.0).into(), Quat::from_axis_angle(&Vec3::z_axis(), 0.9));
+    let velocity = Vec3::new(1.0, 2.5, 0.2);
+    let end = |rate: f64, stiffness: Option<f64>| {
+        let mut world = world(1.0 / rate);
+        let mut flock = BodyFlock::new("fish", steering, Helm::default()).unwrap();
+        let id = match stiffness {
+            None => world.add(fish(Vec3::zeros(), velocity).with_pose(start)).unwrap(),
+            Some(stiffness) => halves(&mut world, stiffness, start, velocity),
+        };
+        assert!(BodyFlock::steers(world.object(id).unwrap()));
+        flock.push(id);
+        world.add(flock).unwrap();
+        steps(&mut world, (2.0 * rate) as usize);
+        let state = *world.part_state(id, 0).unwrap();
+        (state.position(), state.pose.rotation)
+    };
+    // two kinds of objects integrate rotations each in its way, so the steps get shorter too
+    let gaps = [(240.0, 1e3), (480.0, 1e4), (960.0, 1e5)].map(|(rate, stiffness)| {
+        let (rigid, articulated) = (end(rate, None), end(rate, Some(stiffness)));
+        assert!((rigid.0 - start.translation.vector).norm() > 1.0, "it flies");
+        ((rigid.0 - articulated.0).norm(), rigid.1.angle_to(&articulated.1))
+    });
+    println!("gaps {gaps:?}");
+    for (soft, stiff) in gaps.iter().zip(&gaps[1..]) {
+        assert!(stiff.0 < 0.5 * soft.0 && stiff.1 < 0.5 * soft.1, "{gaps:?}");
+    }
+    assert!(gaps[2].0 < 1e-4 && gaps[2].1 < 1e-4, "{gaps:?}");
+}
+
+#[test]
+fn a_body_that_does_not_float_is_not_steered() {
+    let mut world = world(1.0 / 60.0);
+    let shape = Shape::cuboid(Vec3::new(0.4, 0.1, 0.2)).unwrap();
+    let link = LinkBuilder::new("arm", Joint::Revolute { axis: Vec3::z() }).with_shape(shape, Pose::identity());
+    let arm = world.add(ArticulationBuilder::new("arm").link(link.with_mass(1.0)).build().unwrap()).unwrap();
+    assert!(!BodyFlock::steers(world.object(arm).unwrap()));
+    let mut flock = BodyFlock::new("fish", Steering::default(), Helm::default()).unwrap();
+    flock.push(arm);
+    let before = world.state_of(arm).unwrap().to_vec();
+    world.add(flock).unwrap();
+    steps(&mut world, 60);
+    assert_eq!(world.state_of(arm).unwrap(), before);
+}
+
+/// A flock in moving air is the same flock in still air, seen by somebody who moves.
+#[test]
+fn a_flock_in_wind_drifts_with_it() {
+    let wind = Vec3::new(-7.0, 2.0, 0.5);
+    let paths = [Vec3::zeros(), wind].map(|wind| {
+        let mut world = world(1.0 / 120.0);
+        let steering = Steering { boundary_stiffness: 0.0, desired_speed: 4.0, ..Steering::default() };
+        let mut numbers = Numbers(3);
+        let bodies = (0..12).map(|_| fish(numbers.vector(4.0), numbers.vector(3.0) + wind)).collect();
+        let ids = flock(&mut world, steering, Helm { wind, ..Helm::default() }, bodies);
+        steps(&mut world, 360);
+        ids.iter()
+            .map(|id| {
+                let state = *world.part_state(*id, 0).unwrap();
+                (state.position() - 3.0 * wind, state.velocity - wind, state.pose.rotation)
+            })
+            .collect::<Vec<_>>()
+    });
+    for (still, moving) in paths[0].iter().zip(&paths[1]) {
+        let gaps = [(still.0 - moving.0).norm(), (still.1 - moving.1).norm(), still.2.angle_to(&moving.2)];
+        assert!(gaps.iter().all(|gap| *gap < 1e-7), "{gaps:?}");
     }
 }

@@ -1,6 +1,7 @@
 //! A facet's copy of the world: built from the scene file, updated by messages, drawn and never
 //! stepped.
 
+use super::cloud::{get_cloud, put_cloud};
 use super::contacts::{get_contacts, put_contacts};
 use super::frame_hash::FrameHasher;
 use super::publisher::put_message;
@@ -8,7 +9,7 @@ use super::quantize::get_pose;
 use super::render_proxy::RenderProxy;
 use super::table::{Entry, EntryKind, Snapshot, parse_state, poses_bytes};
 use super::viewer::{VIEWER_NAME, Viewer};
-use super::visuals::get_visuals;
+use super::visuals::get_looks;
 use super::wire::{Hash, MessageError};
 use std::collections::BTreeSet;
 use tumble_collide::Pose;
@@ -135,9 +136,9 @@ impl Mirror {
             (false, Some(id)) => id,
             (false, None) => return Err(unfit("is not in this scene")),
             (true, old) => {
-                let (visuals, surface) = get_visuals(looks, parts as usize, &self.base)?;
+                let looks = get_looks(looks, parts as usize, entry.kind == EntryKind::Cloud, &self.base)?;
                 let _ = old.map(|id| world.remove(id));
-                let render_proxy = RenderProxy { name: entry.name.to_owned(), parts: parts as usize, visuals, surface };
+                let render_proxy = RenderProxy::new(entry.name, parts as usize, looks);
                 world.add_boxed(Box::new(render_proxy), Mode::Static).map_err(|why| unfit(&why.to_string()))?
             }
         };
@@ -180,7 +181,7 @@ impl Mirror {
         if count as usize != self.moving {
             return Err(MessageError::Malformed("a wrong number of objects"));
         }
-        let (mut viewer, mut messages) = (None, Vec::new());
+        let (mut viewer, mut messages, mut clouds) = (None, Vec::new(), Vec::new());
         let (mut poses, mut shown) = (std::mem::take(&mut self.poses), Vec::with_capacity(self.moving));
         poses.clear();
         for (wanted, slot) in self.slots.iter().enumerate().filter(|(_, slot)| !slot.stationary) {
@@ -190,6 +191,7 @@ impl Mirror {
                 (None, _) => viewer = Some(Viewer::read(body)?),
                 (Some(id), _) if body.is_empty() => shown.push((id, 0..0)),
                 (Some(id), EntryKind::Exact) => messages.push((id, body)),
+                (Some(id), EntryKind::Cloud) => clouds.push((id, get_cloud(body)?)),
                 (Some(id), _) => {
                     let start = poses.len();
                     read_poses(body, slot.parts, &mut poses)?;
@@ -200,6 +202,12 @@ impl Mirror {
         let contacts = get_contacts(records.rest(), &self.ids, &self.world)?;
         let viewer = viewer.ok_or(MessageError::Malformed("no viewer"))?;
         self.apply_messages(&messages)?;
+        for (id, spheres) in clouds {
+            let _ = self.world.set_enabled(id, true); // as below
+            if let Some(proxy) = self.world.get_mut::<RenderProxy>(id) {
+                proxy.spheres = spheres;
+            }
+        }
         for (id, range) in shown {
             let enabled = !range.is_empty();
             if self.world.status(id).is_some_and(|s| s.enabled != enabled) {
@@ -258,9 +266,10 @@ impl Mirror {
     }
 
     fn hash_object(&self, id: ObjectId, slot: &MirroredObject, hasher: &mut FrameHasher) {
-        if slot.kind == EntryKind::Exact {
-            hasher.bytes(|out| put_message(&self.world, id, out));
-            return;
+        match slot.kind {
+            EntryKind::Exact => return hasher.bytes(|out| put_message(&self.world, id, out)),
+            EntryKind::Cloud => return hasher.bytes(|out| put_cloud(&self.world, id, out)),
+            _ => {}
         }
         let part_states = self
             .world

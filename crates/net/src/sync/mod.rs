@@ -55,6 +55,7 @@
 //! and `input.rs` the small messages, `quantize.rs` the poses with the bound on their error.
 //! `docs/netsync.md` describes the protocol.
 
+mod cloud;
 #[cfg(feature = "fuzzing")]
 pub mod compute;
 #[cfg(not(feature = "fuzzing"))]

@@ -1,13 +1,14 @@
 //! The server's side of a frame: turns a world into payloads, and computes the hash that a facet
 //! must acknowledge.
 
+use super::cloud::{cloud_of, put_cloud};
 use super::contacts::{MAX_CONTACTS, put_contacts};
 use super::frame_hash::FrameHasher;
 use super::quantize::{get_pose, put_pose};
 use super::table::{Entry, EntryKind, MAX_OBJECTS, put_record, put_snapshot_head, put_state_head};
 use super::transport::MAX_MESSAGE_BYTES;
 use super::viewer::{VIEWER_NAME, Viewer};
-use super::visuals::{put_surface, put_visuals};
+use super::visuals::{put_appearance, put_surface, put_visuals};
 use super::wire::{HEADER_BYTES, Hash};
 use crate::world::strongest;
 use std::collections::BTreeMap;
@@ -176,6 +177,9 @@ impl Publisher {
         let exact = known && object.net_sync().is_some() && (self.exact || parts == 0);
         match (exact, parts) {
             (true, _) => Some((EntryKind::Exact, false, status.enabled, parts)),
+            (false, 0) if !known && cloud_of(world, id).is_some() => {
+                Some((EntryKind::Cloud, false, status.enabled, parts))
+            }
             (false, 0) => None,
             _ => Some((EntryKind::Poses, status.mode == Mode::Static, status.enabled, parts)),
         }
@@ -214,6 +218,9 @@ impl Publisher {
             if described {
                 put_visuals(&mut body, object.renderable().map_or(&[], |r| r.visuals()), &self.base);
                 put_surface(&mut body, object.renderable().and_then(|r| r.surface()));
+                if let (EntryKind::Cloud, Some(cloud)) = (row.kind, cloud_of(world, row.id)) {
+                    put_appearance(&mut body, cloud.appearance);
+                }
             }
             let entry = Entry {
                 name,
@@ -252,8 +259,9 @@ fn put_row(
     saturated: &mut u32,
 ) -> Result<(), PublishError> {
     let start = out.len();
-    if row.kind == EntryKind::Exact {
-        put_message(world, row.id, out);
+    if matches!(row.kind, EntryKind::Exact | EntryKind::Cloud) {
+        let put = if row.kind == EntryKind::Exact { put_message } else { put_cloud };
+        put(world, row.id, out);
         hasher.bytes(|seen| seen.extend(&out[start..]));
         return Ok(());
     }

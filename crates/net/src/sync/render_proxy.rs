@@ -1,16 +1,28 @@
 //! An object that is only drawn. It represents an object of the server that the scene file does not
 //! have.
 
+use super::cloud::Sphere;
+use super::visuals::Looks;
 use tumble_collide::Shape;
-use tumble_core::{Collidable, Object, PartSurface, Renderable, Visual};
+use tumble_core::{Appearance, Cloud, Collidable, Object, PartSurface, Renderable, Visual};
 
 /// Parts with visuals, at the poses that were set for display.
 #[derive(Clone)]
 pub(crate) struct RenderProxy {
-    pub name: String,
-    pub parts: usize,
-    pub visuals: Vec<Visual>,
-    pub surface: Option<PartSurface>,
+    name: String,
+    parts: usize,
+    visuals: Vec<Visual>,
+    surface: Option<PartSurface>,
+    cloud: Option<Appearance>,
+    /// The spheres of its cloud.
+    pub spheres: Vec<Sphere>,
+}
+
+impl RenderProxy {
+    pub fn new(name: &str, parts: usize, looks: Looks) -> RenderProxy {
+        let Looks { visuals, surface, cloud } = looks;
+        RenderProxy { name: name.to_owned(), parts, visuals, surface, cloud, spheres: Vec::new() }
+    }
 }
 
 impl Object for RenderProxy {
@@ -44,5 +56,10 @@ impl Renderable for RenderProxy {
 
     fn surface(&self) -> Option<&PartSurface> {
         self.surface.as_ref()
+    }
+
+    fn cloud<'a>(&'a self, _: &'a [f64]) -> Option<Cloud<'a>> {
+        let appearance = self.cloud.as_ref()?;
+        Some(Cloud { appearance, spheres: Box::new(self.spheres.iter().copied()) })
     }
 }

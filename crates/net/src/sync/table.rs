@@ -4,9 +4,10 @@
 //! ```text
 //! SNAPSHOT  revision u32 | exact u8 | 0 u8 | 0 u16 | count u32 | count times: name, size u64, body
 //!           name: length u32, UTF-8
-//!           body: kind u8 | flags u8 | parts u16 | 20 bytes per part if it is stationary | visuals and surface if it is described
+//!           body: kind u8 | flags u8 | parts u16 | 20 bytes per part if it is stationary | visuals and surface if it is described, and the
+//!                 appearance of a cloud
 //! STATE     revision u32 | count u32 | count times: index u32, size u32, body | contacts
-//!           body: 20 bytes per part | the object's own message | the viewer; nothing if it is not enabled
+//!           body: 20 bytes per part | the object's own message | the viewer | spheres; nothing if it is not enabled
 //! ```
 //!
 //! A state holds every object of the snapshot that is not stationary, in order; a partial state is
@@ -28,9 +29,11 @@ pub enum EntryKind {
     Exact,
     /// The viewer.
     Viewer,
+    /// Spheres of an object without parts that the scene file does not have.
+    Cloud,
 }
 
-const KINDS: [EntryKind; 3] = [EntryKind::Poses, EntryKind::Exact, EntryKind::Viewer];
+const KINDS: [EntryKind; 4] = [EntryKind::Poses, EntryKind::Exact, EntryKind::Viewer, EntryKind::Cloud];
 const ALIVE: u8 = 1;
 const STATIONARY: u8 = 2;
 const DESCRIBED: u8 = 4;
@@ -127,6 +130,9 @@ fn entry<'a>(rest: &mut ByteReader<'a>) -> Result<Entry<'a>, MessageError> {
     let [enabled, stationary, described] = [ALIVE, STATIONARY, DESCRIBED].map(|bit| flags & bit != 0);
     if (stationary || described) && kind == EntryKind::Viewer {
         return Err(MessageError::Malformed("a viewer that is stationary or described"));
+    }
+    if kind == EntryKind::Cloud && (stationary || !described || parts > 0) {
+        return Err(MessageError::Malformed("a cloud that is stationary, not described or has parts"));
     }
     Ok(Entry { name, kind, enabled, stationary, described, parts, body: body.0 })
 }

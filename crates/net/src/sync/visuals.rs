@@ -138,7 +138,7 @@ fn put_mesh(out: &mut Vec<u8>, mesh: &TriMesh) {
     out.extend(mesh.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()));
 }
 
-fn put_appearance(out: &mut Vec<u8>, appearance: &Appearance) {
+pub(crate) fn put_appearance(out: &mut Vec<u8>, appearance: &Appearance) {
     let [r, g, b] = appearance.color;
     out.extend([r, g, b, appearance.roughness, appearance.metallic].iter().flat_map(|x| x.to_le_bytes()));
     put_text(out, &appearance.shader);
@@ -156,12 +156,16 @@ fn put_text(out: &mut Vec<u8>, text: &str) {
     out.extend(&text.as_bytes()[..end]);
 }
 
-/// Reads the visuals and the surface of an object with `parts` parts; `base` as in [`put_visuals`].
-pub(crate) fn get_visuals(
-    bytes: &[u8],
-    parts: usize,
-    base: &World,
-) -> Result<(Vec<Visual>, Option<PartSurface>), MessageError> {
+/// What a described object shows.
+pub(crate) struct Looks {
+    pub visuals: Vec<Visual>,
+    pub surface: Option<PartSurface>,
+    /// Appearance of its cloud.
+    pub cloud: Option<Appearance>,
+}
+
+/// Reads what an object with `parts` parts shows, and the appearance of its cloud if it has one; `base` as in [`put_visuals`].
+pub(crate) fn get_looks(bytes: &[u8], parts: usize, cloud: bool, base: &World) -> Result<Looks, MessageError> {
     let mut rest = ByteReader(bytes);
     let count = rest.u32()? as usize;
     if count > MAX_VISUALS {
@@ -184,8 +188,9 @@ pub(crate) fn get_visuals(
         });
     }
     let surface = get_surface(&mut rest, parts)?;
+    let cloud = cloud.then(|| get_appearance(&mut rest)).transpose()?;
     rest.end()?;
-    Ok((visuals, surface))
+    Ok(Looks { visuals, surface, cloud })
 }
 
 fn get_geometry(rest: &mut ByteReader<'_>, base: &World) -> Result<VisualGeometry, MessageError> {

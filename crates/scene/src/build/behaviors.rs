@@ -1,8 +1,8 @@
 //! Adds the behaviors of a scene to its world: soft bodies, particles, flocks and fields.
 
 use tumble_behaviors::{
-    Attractor, BehaviorError, Boid, Buoyancy, DragLaw, Emitter, Explosion, Flock, Panel, Panels, ParticleLook,
-    ParticleSystem, SpringMesh, Targets, Wind,
+    Attractor, BehaviorError, BodyFlock, Boid, Buoyancy, DragLaw, Emitter, Explosion, Flock, Panel, Panels,
+    ParticleLook, ParticleSystem, SpringMesh, Targets, Wind,
 };
 use tumble_core::collide::{Shape, Vec3};
 use tumble_core::{Material, ObjectId, World};
@@ -10,7 +10,7 @@ use tumble_core::{Material, ObjectId, World};
 use crate::build::appearance::{appearance, material_id};
 use crate::build::error::BuildError;
 use crate::parse::behavior::field::{FieldKind, FieldSpec, PanelSpec};
-use crate::parse::behavior::flock::{BoidGroupSpec, FlockSpec};
+use crate::parse::behavior::flock::{BodyFlockSpec, BoidGroupSpec, FlockSpec};
 use crate::parse::behavior::particles::{EmitterSpec, ParticleSystemSpec};
 use crate::parse::behavior::soft::{Grid, SoftSpec};
 use crate::parse::file::SceneFile;
@@ -32,6 +32,9 @@ impl SceneFile {
         }
         for spec in &specs.flocks {
             add_flock(spec, world).map_err(|why| wrong(&spec.name, why))?;
+        }
+        for spec in &specs.body_flocks {
+            add_body_flock(spec, world).map_err(|why| wrong(&spec.name, why))?;
         }
         for spec in &specs.fields {
             self.add_field(spec, world).map_err(|why| wrong(&spec.name, why))?;
@@ -124,6 +127,13 @@ fn add_flock(spec: &FlockSpec, world: &mut World) -> Result<(), BehaviorError> {
             Flock::add(world, flock, boid.with_visuals(visuals.clone()))?;
         }
     }
+    Ok(())
+}
+
+fn add_body_flock(spec: &BodyFlockSpec, world: &mut World) -> Result<(), BehaviorError> {
+    let mut flock = BodyFlock::new(spec.name.as_str(), spec.steering, spec.helm)?;
+    spec.bodies.iter().filter_map(|name| world.find(name)).for_each(|id| flock.push(id));
+    world.add(flock)?;
     Ok(())
 }
 

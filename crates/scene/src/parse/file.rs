@@ -25,6 +25,7 @@ use crate::parse::sensor::SensorSpec;
 use crate::parse::view::{CameraSpec, CavePlace, GroundSpec, LightSpec, SkySpec};
 use crate::parse::world::WorldSettings;
 use crate::save::SavedWorld;
+use tumble_core::Joint;
 use tumble_core::collide::ContactMode;
 
 /// Largest scene file in bytes: 16 MiB.
@@ -397,6 +398,10 @@ impl Parts for Objects<'_> {
             let link = name.strip_prefix(spec.name.as_str())?.strip_prefix('/')?;
             spec.link(link).map(|link| PartSpec::Link(k, link))
         })
+    }
+
+    fn floats(&self, articulated: usize) -> bool {
+        self.articulated[articulated].links.first().is_some_and(|root| root.joint.kind == Joint::Floating)
     }
 
     fn articulated(&self, name: &str) -> Option<usize> {

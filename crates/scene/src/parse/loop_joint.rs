@@ -74,6 +74,8 @@ pub(crate) trait Parts {
     fn part(&self, name: &str) -> Option<PartSpec>;
     /// Returns the index of the articulated body of that name.
     fn articulated(&self, name: &str) -> Option<usize>;
+    /// Returns whether the root of an articulated body floats.
+    fn floats(&self, articulated: usize) -> bool;
     /// Returns all names, for messages.
     fn names(&self) -> Vec<String>;
 

@@ -1,4 +1,4 @@
-//! `[[cloth]]`, `[[jelly]]`, `[[particle_system]]`, `[[flock]]` and `[[field]]`.
+//! `[[cloth]]`, `[[jelly]]`, `[[particle_system]]`, `[[flock]]`, `[[body_flock]]` and `[[field]]`.
 //!
 //! Their tables say how they began: no key of a scene says where a node or a particle is now. The archive has that.
 
@@ -63,8 +63,8 @@ impl Writer<'_> {
             self.field(t, fluid.targets());
         } else if let Some(panels) = world.get::<Panels>(id) {
             self.panels(name, panels);
-        } else if world.get::<BodyFlock>(id).is_some() {
-            self.fault(format!("\"{name}\", a flock of rigid bodies"));
+        } else if let Some(flock) = world.get::<BodyFlock>(id) {
+            self.body_flock(name, flock);
         } else {
             return false;
         }
@@ -179,26 +179,23 @@ impl Writer<'_> {
     }
 
     fn flock(&mut self, name: &str, flock: &Flock) {
-        let s: &Steering = flock.steering();
-        let mut t = Table::of("name", name);
-        t.put("avoidance_m2_per_s2", s.avoidance);
-        t.put("matching_per_s", s.matching);
-        t.put("clustering_per_s2", s.clustering);
-        t.put("max_force_n", s.max_force);
-        t.put("visibility_distance_m", s.visibility_distance);
-        t.put("inner_visibility_distance_m", s.inner_visibility_distance);
-        t.put("visibility_angle_deg", s.visibility_angle.to_degrees());
-        t.put("inner_visibility_angle_deg", s.inner_visibility_angle.to_degrees());
-        t.put("desired_speed_m_per_s", s.desired_speed);
-        t.put("speed_rate_per_s", s.speed_rate);
-        t.put("boundary_center_m", s.boundary_center);
-        t.put("boundary_radius_m", s.boundary_radius);
-        t.put("boundary_stiffness_n_per_m", s.boundary_stiffness);
-        self.out += &t.under("[[flock]]");
+        self.out += &steering(name, flock.steering()).under("[[flock]]");
         for &id in flock.boids() {
             let (Some(boid), Some(name)) = (self.world.get::<Boid>(id), self.world.name(id)) else { continue };
             self.boid(name, boid);
         }
+    }
+
+    fn body_flock(&mut self, name: &str, flock: &BodyFlock) {
+        let (mut t, helm) = (steering(name, flock.steering()), flock.helm());
+        t.put("agility_per_s", helm.agility);
+        t.put("max_angular_acceleration_rad_per_s2", helm.max_angular_acceleration);
+        t.put("bank_time_s", helm.bank_time);
+        t.put("up", helm.up);
+        t.put_unless(Vec3::zeros(), "wind_m_per_s", helm.wind);
+        let names = flock.bodies().iter().filter_map(|id| self.world.name(*id).map(str::to_owned));
+        t.put("bodies", names.collect::<Vec<String>>());
+        self.out += &t.under("[[body_flock]]");
     }
 
     fn boid(&mut self, name: &str, boid: &Boid) {
@@ -253,5 +250,24 @@ impl Writer<'_> {
 fn field(name: &str, kind: &str) -> Table {
     let mut t = Table::of("name", name);
     t.put("type", kind);
+    t
+}
+
+/// Returns a table with the constants of the forces of a flock.
+fn steering(name: &str, s: &Steering) -> Table {
+    let mut t = Table::of("name", name);
+    t.put("avoidance_m2_per_s2", s.avoidance);
+    t.put("matching_per_s", s.matching);
+    t.put("clustering_per_s2", s.clustering);
+    t.put("max_force_n", s.max_force);
+    t.put("visibility_distance_m", s.visibility_distance);
+    t.put("inner_visibility_distance_m", s.inner_visibility_distance);
+    t.put("visibility_angle_deg", s.visibility_angle.to_degrees());
+    t.put("inner_visibility_angle_deg", s.inner_visibility_angle.to_degrees());
+    t.put("desired_speed_m_per_s", s.desired_speed);
+    t.put("speed_rate_per_s", s.speed_rate);
+    t.put("boundary_center_m", s.boundary_center);
+    t.put("boundary_radius_m", s.boundary_radius);
+    t.put("boundary_stiffness_n_per_m", s.boundary_stiffness);
     t
 }

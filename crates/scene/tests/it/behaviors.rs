@@ -2,7 +2,7 @@
 //! the defaults, and bad input.
 
 use crate::bad_input::assert_errors;
-use tumble_behaviors::{Cloth, Emitter, Flock, Jelly, ParticleSettings, ParticleSystem, SpringMesh, Steering};
+use tumble_behaviors::{Cloth, Emitter, Flock, Helm, Jelly, ParticleSettings, ParticleSystem, SpringMesh, Steering};
 use tumble_core::collide::Vec3;
 use tumble_core::{ObjectId, RigidBody, World};
 use tumble_scene::{Grid, SceneFile, shipped};
@@ -181,7 +181,7 @@ fn the_scout_approaches_its_speed_and_the_swarm_stays_within_its_bound() {
 #[test]
 fn defaults_are_those_of_the_crate() {
     let text = "[[cloth]]\nname = \"c\"\n[[jelly]]\nname = \"j\"\n[[particle_system]]\nname = \"p\"\n\
-        [[particle_system.emitter]]\n[[flock]]\nname = \"f\"\n[[flock.group]]\n";
+        [[particle_system.emitter]]\n[[flock]]\nname = \"f\"\n[[flock.group]]\n[[body_flock]]\nname = \"b\"\n";
     let scene = SceneFile::parse(text, "s.toml").unwrap();
     let specs = &scene.behaviors;
     assert_eq!(specs.soft[0].grid, Grid::Cloth(Cloth::default()));
@@ -189,6 +189,7 @@ fn defaults_are_those_of_the_crate() {
     assert_eq!(specs.particle_systems[0].settings, ParticleSettings::default());
     assert_eq!(specs.particle_systems[0].emitters[0].emitter, Emitter::default());
     assert_eq!(specs.flocks[0].steering, Steering::default());
+    assert_eq!((specs.body_flocks[0].steering, specs.body_flocks[0].helm), (Steering::default(), Helm::default()));
     let (world, _) = scene.build().unwrap();
     assert!(["c", "j", "p", "f", "f_boid"].iter().all(|name| world.find(name).is_some()));
 }
@@ -266,6 +267,24 @@ fn errors_name_what_is_wrong() {
         &[
             "s.toml:3:1: group 1 has no `spread_m`; expected `spread_m` above 0, so that the boids of the group do not start in one place",
         ],
+    );
+    let floor = "[[body]]\nname = \"floor\"\nmode = \"static\"\nshape = { type = \"half_space\" }\n";
+    assert_errors(
+        &format!("[[body_flock]]\nname = \"f\"\nup = [0, 0, 0]\nbodies = [\"flor\"]\n{floor}"),
+        &[
+            "s.toml:3:6: `up` of body_flock \"f\" is [0, 0, 0]; expected a direction",
+            "s.toml:4:11: `bodies` of body_flock \"f\" is \"flor\"; did you mean `floor`?",
+        ],
+    );
+    assert_errors(
+        &format!("{floor}[[body_flock]]\nname = \"f\"\nbodies = [\"floor\", \"floor\"]\n"),
+        &["s.toml:7:20: `bodies` of body_flock \"f\" is \"floor\"; expected each body once"],
+    );
+    let arm = "[[articulated]]\nname = \"arm\"\n[[articulated.link]]\nname = \"base\"\nmass_kg = 1\n\
+        shapes = [{ type = \"sphere\", radius_m = 0.1 }]\njoint = \"revolute\"\naxis = [0, 0, 1]\n";
+    assert_errors(
+        &format!("{arm}[[body_flock]]\nname = \"f\"\nbodies = [\"arm\"]\n"),
+        &["s.toml:11:11: `bodies` of body_flock \"f\" is \"arm\"; expected an articulated body with `floating = true`"],
     );
     assert_errors(
         "[[field]]\nname = \"w\"\ntype = \"wind\"\ndrag_n_s_per_m = 1\ndrag_coefficient = 1\n",

@@ -11,7 +11,15 @@ const G: f64 = 9.81;
 /// The parts of the panels in the order of the file.
 const PARTS: [&str; 6] = ["left_wing", "left_wing", "right_wing", "right_wing", "torso", "torso"];
 
+/// The scene without the flock and its swifts: nothing steers the bird.
 fn bird() -> SceneFile {
+    let mut scene = flock();
+    scene.behaviors.body_flocks.clear();
+    scene.bodies.retain(|body| !body.name.starts_with("swift"));
+    scene
+}
+
+fn flock() -> SceneFile {
     shipped().iter().find(|scene| scene.name == "bird").unwrap().read().unwrap()
 }
 
@@ -121,4 +129,64 @@ fn wings_that_are_held_let_it_sink_by_the_work_of_the_air() {
         })
         .collect();
     assert!(errors[0] < 1.0 && errors[1] < 0.6 * errors[0], "{errors:?}");
+}
+
+/// In the flock the gull is a boid: it keeps its speed and its place, turns back what disturbs it, and its wings still carry it.
+#[test]
+fn the_flock_steers_the_torso_of_the_bird() {
+    let scene = flock();
+    let (mut world, _) = scene.build().unwrap();
+    let id = world.find("bird").unwrap();
+    let swifts: Vec<ObjectId> = (1..=4).map(|k| world.find(&format!("swift_{k}")).unwrap()).collect();
+    let (panels, wind) = (panels(&scene), Vec3::new(-10.0, 0.0, 0.0));
+    let nose = |world: &World| world.part_state(id, 0).unwrap().pose.rotation * Vec3::x();
+    let run = |world: &mut World, seconds: f64| {
+        let steps = (seconds * 240.0).round() as usize;
+        let (mut lift, mut farthest, mut course) = (0.0, 0f64, 1f64);
+        for _ in 0..steps {
+            world.step().unwrap();
+            lift += air(world, &panels).0.z / steps as f64;
+            let state = world.part_state(id, 0).unwrap();
+            let v = state.velocity - wind;
+            farthest = farthest.max((state.position() - Vec3::new(0.0, 0.0, 2.2)).norm());
+            course = course.min(nose(world).dot(&v.normalize()));
+            assert!((7.0..13.0).contains(&v.norm()), "{} m/s at {} s", v.norm(), world.time());
+        }
+        (lift, farthest, course)
+    };
+    run(&mut world, 4.0);
+    let (lift, farthest, course) = run(&mut world, 4.0);
+    println!("lift {lift} N, within {farthest} m, nose within {} rad", course.acos());
+    assert!((lift / (0.792 * G) - 1.0).abs() < 0.25, "{lift} N");
+    assert!(farthest < 2.5 && course > 0.9, "{farthest} m, {course}");
+    for (k, a) in swifts.iter().enumerate() {
+        let x = world.part_state(*a, 0).unwrap().position();
+        assert!((x - Vec3::new(0.0, 0.0, 2.2)).norm() < 2.5, "{x}");
+        for b in swifts[k + 1..].iter().chain([&id]) {
+            assert!((x - world.part_state(*b, 0).unwrap().position()).norm() > 0.2);
+        }
+    }
+}
+
+/// A push against the tail turns the bird. Free, it flies off on a slow curve, as gliders do; in the flock its nose comes back.
+#[test]
+fn a_push_against_the_tail_is_steered_back() {
+    let off = |scene: SceneFile| {
+        let (mut world, _) = scene.build().unwrap();
+        let id = world.find("bird").unwrap();
+        let steps = |world: &mut World, seconds: f64| {
+            (0..(seconds * 240.0) as usize).for_each(|_| {
+                world.step().unwrap();
+            });
+        };
+        steps(&mut world, 4.0);
+        let tail = world.part_state(id, 0).unwrap().pose.transform_point(&Vec3::new(-0.3, 0.0, 0.0).into()).coords;
+        world.apply_impulse(id, 0, Vec3::new(0.0, 0.4, 0.0), &tail).unwrap();
+        steps(&mut world, 3.0);
+        let nose = world.part_state(id, 0).unwrap().pose.rotation * Vec3::x();
+        nose.y.atan2(nose.x).abs()
+    };
+    let (free, steered) = (off(bird()), off(flock()));
+    println!("off the wind by {free} rad free, {steered} rad in the flock");
+    assert!(steered < 0.15 && free > 2.0 * steered, "{free} rad free, {steered} rad in the flock");
 }

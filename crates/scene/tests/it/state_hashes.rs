@@ -55,8 +55,8 @@ table! {
     chain_time_stepping: "chain", TimeStepping, "22fbcd4bcbb18743", "7e68bdb4b444ccf6";
     chain_backtracking: "chain", Backtracking, "63d0cbaca36ef0a9", "3198250057940e22";
     falling_time_stepping: "falling", TimeStepping, "975e49a4706a1c69", "e6ab76fd3ebd1444";
-    flock_time_stepping: "flock", TimeStepping, "62dc48ae297f84ac", "1f735e6ea46bfed5";
-    flock_backtracking: "flock", Backtracking, "5e122f1064026626", "f28e4fa647471731";
+    flock_time_stepping: "flock", TimeStepping, "89758af10faedc50", "3a693791277610b4";
+    flock_backtracking: "flock", Backtracking, "d183d81677f6cfab", "3cc3efa393ca88df";
     falling_backtracking: "falling", Backtracking, "b064bee7ee0b458a", "d126928e23c90248";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "dba991e4803cfe34", "95407557393acae5";
@@ -77,8 +77,8 @@ table! {
     [0.5, 2.0];
     ball_machine_time_stepping: "ball_machine", TimeStepping, "5ecf66676422b39a", "405845acd18db798";
     ball_machine_backtracking: "ball_machine", Backtracking, "36e0fde2a34f7dfa", "602f95bd076b0fe7";
-    bird_time_stepping: "bird", TimeStepping, "9912fa3537bd36e5", "fc79a9efd1447313";
-    bird_backtracking: "bird", Backtracking, "40c04f81ed4da802", "98febadc544f874a";
+    bird_time_stepping: "bird", TimeStepping, "edfbc51d27e3b795", "fec93c56055a3e4d";
+    bird_backtracking: "bird", Backtracking, "fb21b06f6d3e5830", "5ee9b90abac4068b";
     card_house_time_stepping: "card_house", TimeStepping, "091b9380060ee20c", "8003317c097996db";
     sparks_time_stepping: "sparks", TimeStepping, "515a77d2df6b5217", "9badcde17809dddb";
     sparks_backtracking: "sparks", Backtracking, "805c8cba100469d4", "6052e84af86ee0f9";

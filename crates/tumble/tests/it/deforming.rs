@@ -1,6 +1,6 @@
 //! Cloth, jelly, particles and boids look the same on a server and on a facet that gets its messages.
 
-use tumble::behaviors::{Cloth, SpringMesh};
+use tumble::behaviors::{Boid, Cloth, Emitter, Flock, ParticleSettings, ParticleSystem, SpringMesh, Steering};
 use tumble::collide::{Pose, Vec3};
 use tumble::dynamics::World;
 use tumble::net::sync::{Mirror, Publisher, Viewer};
@@ -102,4 +102,87 @@ fn saved_particles_and_cloth_look_as_before() {
         copy.restore(&world.save()).unwrap();
         assert_eq!(points(&list(&scene, &world)), points(&list(&scene, &copy)), "{name}");
     }
+}
+
+/// Spheres that are drawn of a world.
+fn spheres(scene: &SceneFile, world: &World) -> Vec<[f32; 4]> {
+    let mut spheres: Vec<[f32; 4]> = list(scene, world)
+        .spheres
+        .iter()
+        .map(|sphere| [sphere.center.x, sphere.center.y, sphere.center.z, sphere.radius])
+        .collect();
+    spheres.sort_by(|a, b| a.partial_cmp(b).unwrap());
+    spheres
+}
+
+#[test]
+fn particles_and_a_flock_that_the_scene_does_not_have_are_shown_too() {
+    let scene = load("falling");
+    for exact in [false, true] {
+        let (mut world, base) = (scene.build().unwrap().0, scene.build_drawn().unwrap().0);
+        let (mut publisher, mut mirror) = (Publisher::new(&world, exact, 0), Mirror::new(base));
+        let before = spheres(&scene, &world).len();
+        let mut send = |world: &World, frame: u64| {
+            let published = publisher.publish(world, &Viewer::default(), frame).unwrap();
+            if published.fresh {
+                mirror.apply_snapshot(&publisher.snapshot()).unwrap();
+            }
+            mirror.apply_state(frame, world.time(), &published.state).unwrap();
+            assert_eq!(mirror.hash(), published.hash, "frame {frame}");
+            (spheres(&scene, world), spheres(&scene, mirror.world()), published.fresh)
+        };
+        send(&world, 1);
+        let burst = Emitter { lifetime: [0.05, 0.4], ..Emitter::burst(Vec3::new(0.0, 0.0, 3.0), 700, 0.0) };
+        let system = ParticleSystem::new("late", ParticleSettings::default()).unwrap().with_emitter(burst).unwrap();
+        let system = world.add(system).unwrap();
+        let flock = world.add(Flock::new("flock", Steering::default()).unwrap()).unwrap();
+        for k in 0..5 {
+            let boid = Boid::new(tumble::collide::Shape::sphere(0.2).unwrap(), 1.0).unwrap();
+            let boid = boid.with_name(format!("boid {k}")).with_position(Vec3::new(f64::from(k), 0.0, 8.0));
+            Flock::add(&mut world, flock, boid).unwrap();
+        }
+        let mut alive = Vec::new();
+        for frame in 2..=40 {
+            world.step().unwrap();
+            if frame == 20 {
+                world.set_enabled(system, false).unwrap();
+            }
+            if frame == 22 {
+                world.set_enabled(system, true).unwrap();
+            }
+            let (ours, theirs, fresh) = send(&world, frame);
+            assert_eq!(fresh, frame == 2, "a table for each new particle");
+            assert_eq!(ours.len(), theirs.len(), "frame {frame}");
+            for (a, b) in ours.iter().zip(&theirs) {
+                assert!((0..4).all(|k| (a[k] - b[k]).abs() < 3e-4), "{a:?} and {b:?}");
+            }
+            alive.push(ours.len() - before);
+        }
+        // they die one by one, and none is seen in the two frames in which the system is off
+        let (before_off, off, after_off) = (alive[17], &alive[18..20], alive[20]);
+        assert!(alive[0] == 700 && before_off > 600 && off == [0, 0] && after_off > 600, "{alive:?}");
+        assert!(alive[38] < 600, "{alive:?}");
+        world.remove(system).unwrap();
+        let (ours, theirs, fresh) = send(&world, 41);
+        assert!(fresh && ours.len() == theirs.len());
+        for k in 0..5 {
+            let place = |world: &World| {
+                let id = world.find(&format!("boid {k}")).unwrap();
+                world.part_state(id, 0).unwrap().position()
+            };
+            assert!((place(&world) - place(mirror.world())).norm() < 1e-4, "boid {k}");
+        }
+    }
+}
+
+#[test]
+fn a_recording_has_particles_that_were_added_late() {
+    let scene = load("falling");
+    let mut world = scene.build().unwrap().0;
+    assert!(tumble::net::world::deforming(&world).points.is_empty());
+    let burst = Emitter::burst(Vec3::new(0.0, 0.0, 3.0), 300, 0.0);
+    let system = ParticleSystem::new("late", ParticleSettings::default()).unwrap().with_emitter(burst).unwrap();
+    world.add(system).unwrap();
+    world.step().unwrap();
+    assert_eq!(tumble::net::world::deforming(&world).points.len(), 300);
 }

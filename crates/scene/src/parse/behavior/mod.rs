@@ -1,4 +1,4 @@
-//! The tables of behaviors: `[[cloth]]`, `[[jelly]]`, `[[particle_system]]`, `[[flock]]` and `[[field]]`.
+//! The tables of behaviors: `[[cloth]]`, `[[jelly]]`, `[[particle_system]]`, `[[flock]]`, `[[body_flock]]` and `[[field]]`.
 
 pub(crate) mod field;
 pub(crate) mod flock;
@@ -9,7 +9,7 @@ use crate::parse::body::Library;
 use crate::parse::fields::{Fields, Value};
 use crate::parse::loop_joint::{PartSpec, Parts};
 use field::FieldSpec;
-use flock::FlockSpec;
+use flock::{BodyFlockSpec, FlockSpec};
 use particles::ParticleSystemSpec;
 use soft::SoftSpec;
 
@@ -25,6 +25,8 @@ pub struct BehaviorSpecs {
     pub particle_systems: Vec<ParticleSystemSpec>,
     /// `[[flock]]`.
     pub flocks: Vec<FlockSpec>,
+    /// `[[body_flock]]`.
+    pub body_flocks: Vec<BodyFlockSpec>,
     /// `[[field]]`.
     pub fields: Vec<FieldSpec>,
 }
@@ -54,6 +56,10 @@ impl BehaviorSpecs {
                 (0..group.count).for_each(|k| take(&table, &group.name_of(k)));
             }
             end(table, specs.flocks.last().map(|flock| flock.name.as_str()), &mut take);
+        }
+        for mut table in f.tables("body_flock", MOST) {
+            specs.body_flocks.push(BodyFlockSpec::read(&mut table, parts));
+            end(table, specs.body_flocks.last().map(|flock| flock.name.as_str()), &mut take);
         }
         for mut table in f.tables("field", MOST) {
             match FieldSpec::read(&mut table, parts, &specs.soft) {
