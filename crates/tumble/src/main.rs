@@ -6,6 +6,7 @@
 mod args;
 mod atomic_file;
 mod audio;
+mod calibrate;
 mod capture;
 mod cave;
 mod caves;
@@ -52,6 +53,7 @@ fn main() -> ExitCode {
         Command::SphereTree(options) => spheretree::spheretree(&options),
         Command::Scenes => scenes(),
         Command::Caves(options) => caves::caves(&options),
+        Command::Calibrate(options) => calibrate::calibrate(&options),
         Command::Mpcdi(options) => mpcdi::mpcdi(&options),
         Command::Completions(options) => completions(options.shell),
     };
