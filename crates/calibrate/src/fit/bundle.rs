@@ -322,8 +322,11 @@ fn pairs(views: &[View], walls: &[Wall], layout: Layout, x: &[f64], strip: f64) 
             let width = decoded.size_px[0] as usize;
             // every n-th pixel of every n-th row
             let n = ((decoded.count() as f64 / MAX_PAIRS as f64).sqrt().ceil() as usize).max(1);
-            for (i, place) in
-                decoded.places.iter().enumerate().filter(|(i, _)| i % width % n == 0 && i / width % n == 0)
+            for (i, place) in decoded
+                .places
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| (i % width).is_multiple_of(n) && (i / width).is_multiple_of(n))
             {
                 let Some(place) = place.map(|p| p.map(f64::from)) else { continue };
                 let Some(coarse) = decoded.density(i, REACH).filter(|c| *c <= COARSEST) else { continue };
