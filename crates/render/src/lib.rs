@@ -43,7 +43,7 @@ pub use draw::{DebugDraw, Drawing, NamedView, UnknownOverlay, UnknownView, UpAxi
 pub use error::RenderError;
 pub use facet::{
     Blend, CalibrationPattern, CaveView, ColorTable, FacetView, Pfm, ProjectorColor, RIM_PX, ScreenMesh, Tile, Warp,
-    calibration_picture, finished_calibration_picture, unfold,
+    as_projected, calibration_picture, finished_calibration_picture, unfold,
 };
 pub use gpu::{
     FreeParticle, FreeParticles, GpuParticles, MAX_OBSTACLES, MAX_PARTICLES, Obstacle, ObstacleShape, Renderer, Screen,

@@ -6,7 +6,7 @@ use clap::{Command, CommandFactory};
 /// The commands, grouped by purpose; clap would print one list.
 const GROUPS: [(&str, &[&str]); 5] = [
     ("Simulate", &["run", "view"]),
-    ("Caves", &["cave", "serve", "facet", "console", "relay", "caves", "mpcdi"]),
+    ("Caves", &["cave", "serve", "facet", "console", "relay", "caves", "calibrate", "mpcdi"]),
     ("Recordings", &["replay", "verify", "recover"]),
     ("Files", &["check", "spheretree", "scenes"]),
     ("Shell", &["completions", "help"]),

@@ -6,6 +6,7 @@
 mod args;
 mod atomic_file;
 mod audio;
+mod calibrate;
 mod capture;
 mod cave;
 mod caves;
@@ -54,6 +55,7 @@ fn main() -> ExitCode {
         Command::SphereTree(options) => spheretree::spheretree(&options),
         Command::Scenes => scenes(),
         Command::Caves(options) => caves::caves(&options),
+        Command::Calibrate(options) => calibrate::calibrate(&options),
         Command::Mpcdi(options) => mpcdi::mpcdi(&options),
         Command::Completions(options) => completions(options.shell),
     };

@@ -8,7 +8,7 @@ use tumble_scene::SceneFile;
 use tumble_scene::cave::Cave;
 
 /// Writes a cave and its files, and returns its view at the origin.
-fn view(files: &CaveFiles, name: &str) -> CaveView {
+pub fn view(files: &CaveFiles, name: &str) -> CaveView {
     let folder = std::env::temp_dir().join(format!("tumble-mpcdi-{name}-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     files.files.iter().for_each(|(file, bytes)| std::fs::write(folder.join(file), bytes).unwrap());

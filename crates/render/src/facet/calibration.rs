@@ -83,6 +83,13 @@ pub fn finished_calibration_picture(view: &CaveView, facet: &Facet, pattern: Cal
     drawn(view.cave(), facet, pattern, &|eye| view.finished(eye, facet))
 }
 
+/// Returns a picture as the facet's projector gets it: in stereo for both eyes, mirrored as the facet is, not
+/// warped and not blended.
+pub fn as_projected(eye: &Image, facet: &Facet) -> Image {
+    let eyes = facet.stereo.sides().iter().map(|_| flipped(eye.clone(), facet.flip)).collect();
+    combined(eyes, facet.stereo)
+}
+
 fn drawn(cave: &Cave, facet: &Facet, pattern: CalibrationPattern, finish: &dyn Fn(Image) -> Image) -> Image {
     let screen = &cave.screens[facet.screen];
     let sides = facet.stereo.sides().iter();

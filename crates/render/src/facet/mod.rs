@@ -25,7 +25,7 @@ mod warp;
 
 pub use blend::Blend;
 pub(crate) use blend::encoded;
-pub use calibration::{CalibrationPattern, calibration_picture, finished_calibration_picture};
+pub use calibration::{CalibrationPattern, as_projected, calibration_picture, finished_calibration_picture};
 pub(crate) use canvas::fill_rect;
 pub use color::ProjectorColor;
 pub(crate) use compose::blank;

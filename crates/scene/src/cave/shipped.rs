@@ -64,6 +64,22 @@ impl CaveSource {
             CaveSource::Shipped(cave) => cave.read(),
         }
     }
+
+    /// Returns the text of a cave that [`CaveSource::load`] reads.
+    ///
+    /// # Errors
+    /// As [`Cave::load`], for a file that cannot be read.
+    pub fn text(&self) -> Result<String, CaveError> {
+        match self {
+            CaveSource::Path(path) => {
+                let unread = |source| CaveError::Read { file: path.clone(), source };
+                let bytes = crate::open::plain::read_file(path).map_err(unread)?;
+                String::from_utf8(bytes)
+                    .map_err(|e| CaveError::NotUtf8 { file: path.clone(), byte: e.utf8_error().valid_up_to() })
+            }
+            CaveSource::Shipped(cave) => Ok(cave.text.to_owned()),
+        }
+    }
 }
 
 /// Finds a cave: the path of a file, or the name of a shipped one. `caves/NAME.toml` of a shipped

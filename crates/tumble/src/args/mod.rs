@@ -4,9 +4,9 @@ mod caves;
 mod scene;
 mod values;
 
-pub use caves::{CavesOptions, MpcdiOptions};
+pub use caves::{CalibrateAction, CalibrateOptions, CavesOptions, MpcdiOptions, SolveOptions};
 pub use scene::{OpeningOptions, SceneOptions, kind};
-pub use values::{rate, seconds};
+pub use values::{cutoff, lead, rate, seconds};
 
 use crate::cave::args::{
     CaveOptions, ConsoleOptions, FacetOptions, RecoverOptions, RelayOptions, ReplayOptions, ServeOptions,
@@ -57,6 +57,8 @@ pub enum Command {
     Scenes,
     /// List the shipped caves, or draw a calibration pattern for a facet
     Caves(CavesOptions),
+    /// Measure a cave with a camera: patterns for projectors, warps of photographs
+    Calibrate(CalibrateOptions),
     /// Make a cave of an MPCDI archive or a configuration of SGCT, or an archive of a cave
     Mpcdi(MpcdiOptions),
     /// Print a script that completes commands and options in a shell

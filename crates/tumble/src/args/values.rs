@@ -25,6 +25,18 @@ pub fn rate(text: &str) -> Result<f64, String> {
     number(text, 0.01, 1000.0)
 }
 
+pub fn cutoff(text: &str) -> Result<f64, String> {
+    number(text, 0.01, 100.0)
+}
+
+pub fn lead(text: &str) -> Result<f64, String> {
+    number(text, 0.0, 200.0)
+}
+
+pub(super) fn millimeters(text: &str) -> Result<f64, String> {
+    number(text, 0.0, 1000.0)
+}
+
 pub fn solver(text: &str) -> Result<Solver, String> {
     let name = if text == "lcp" { "lcp_pyramid" } else { text };
     name.parse().map_err(|e: tumble::scene::UnknownName| e.to_string())

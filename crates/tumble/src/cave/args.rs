@@ -1,7 +1,9 @@
 //! Options of `tumble cave`, `tumble serve`, `tumble facet`, `tumble replay` and `tumble recover`.
 
 use crate::args::{Overlays, SceneOptions};
+use crate::cave::tracker::one_euro::Smoothing;
 use crate::cave::tracker::sealed::MAX_RELAYS;
+use crate::cave::tracker::vrpn_client::DeviceMap;
 use clap::{Args, Subcommand, ValueEnum};
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -99,6 +101,21 @@ pub struct ServeOptions {
     /// file.
     #[arg(long, value_name = "IP,…", value_delimiter = ',')]
     pub tracker_from: Vec<std::net::IpAddr>,
+    /// Take the users' positions from a VRPN server (TCP, usually port 3883) instead of OSC. Axes and origin
+    /// are those of [tracker] in the cave file.
+    #[arg(long, value_name = "HOST:PORT", conflicts_with = "tracker", requires = "vrpn_map")]
+    pub vrpn: Option<String>,
+    /// What a device of the VRPN server moves: DEVICE=USER/PART or DEVICE:SENSOR=USER/PART, separated by
+    /// commas. A part is head, wand, hand/left, hand/right or buttons.
+    #[arg(long, value_name = "MAP,…", value_delimiter = ',', requires = "vrpn")]
+    pub vrpn_map: Vec<DeviceMap>,
+    /// Smooth tracked heads by a 1 € filter with this cutoff at rest, Hz; less is smoother, 1 to 2 is usual.
+    #[arg(long, value_name = "HZ", value_parser = crate::args::cutoff)]
+    pub tracker_smooth: Option<f64>,
+    /// Draw tracked heads where they will be after this time, ms: from the measurement to the light of the
+    /// picture.
+    #[arg(long, value_name = "MS", value_parser = crate::args::lead)]
+    pub tracker_lead: Option<f64>,
     /// Send contacts to a sound engine at this address: impacts, slides and listeners as OSC over UDP.
     #[arg(long, value_name = "ADDR:PORT")]
     pub sound: Option<SocketAddr>,
@@ -352,4 +369,13 @@ pub struct FacetOptions {
     /// facet again.
     #[arg(long, hide = true, conflicts_with = "overwrite")]
     pub continue_frames: bool,
+}
+
+impl ServeOptions {
+    /// Returns how tracked heads are smoothed and predicted; `None` for as they are.
+    pub fn smoothing(&self) -> Option<Smoothing> {
+        let wanted = self.tracker_smooth.is_some() || self.tracker_lead.is_some();
+        let lead_s = 1e-3 * self.tracker_lead.unwrap_or(0.0);
+        wanted.then_some(Smoothing { rest_hz: self.tracker_smooth, beta: Smoothing::BETA, lead_s })
+    }
 }

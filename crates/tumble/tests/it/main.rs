@@ -2,6 +2,7 @@
 
 mod articulated_scenes;
 mod bad_input;
+mod calibrate;
 mod cave_compute;
 mod cave_console;
 mod cave_faults;

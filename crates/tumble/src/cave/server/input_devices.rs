@@ -6,10 +6,11 @@ use crate::cave::endpoints::key;
 use crate::cave::replay::replayed_input::{self, ReplayedInput};
 use crate::cave::tracker::osc;
 use crate::cave::tracker::socket::{TrackerSocket, configured};
+use crate::cave::tracker::vrpn_client::VrpnClient;
 use crate::failure::Failure;
 use tumble::net::sync::transport::FacetNumber;
 use tumble::net::sync::{FrameRecord, Input};
-use tumble::scene::cave::Cave;
+use tumble::scene::cave::{Cave, Tracker};
 
 /// Source number of the tracker; no facet has it.
 pub const TRACKER_SOURCE: FacetNumber = FacetNumber::MAX;
@@ -17,6 +18,7 @@ pub const TRACKER_SOURCE: FacetNumber = FacetNumber::MAX;
 /// All input devices of a run.
 pub struct InputDevices {
     tracker: Option<TrackerSocket>,
+    vrpn: Option<VrpnClient>,
     replayed_input: Option<ReplayedInput>,
 }
 
@@ -30,16 +32,23 @@ impl InputDevices {
     ) -> Result<InputDevices, Failure> {
         let key = key(cave)?;
         let replayed_input = options.replay_input.as_ref().map(|path| ReplayedInput::open(path, scene)).transpose()?;
-        let wanted = configured(cave, options.tracker, &options.tracker_from)?
-            .filter(|_| replayed_input.is_none() && simulating);
-        let tracker = wanted.as_ref().map(|tracker| TrackerSocket::open(tracker, key.as_ref())).transpose()?;
+        let live = replayed_input.is_none() && simulating;
+        let wanted =
+            configured(cave, options.tracker, &options.tracker_from)?.filter(|_| live && options.vrpn.is_none());
+        let open = |tracker| TrackerSocket::open(tracker, key.as_ref(), options.smoothing());
+        let tracker = wanted.as_ref().map(open).transpose()?;
+        let vrpn = |server: &String| {
+            let about = cave.tracker.clone().unwrap_or_else(|| Tracker::of(&cave.users));
+            VrpnClient::open(server, &options.vrpn_map, &about, options.smoothing(), options.quiet)
+        };
+        let vrpn = options.vrpn.as_ref().filter(|_| live).map(vrpn).transpose()?;
         if let (Some(socket), Some(tracker), false) = (&tracker, &wanted, options.quiet) {
             eprintln!("{}", socket.describe(tracker));
         }
         if let (Some(path), false) = (&options.replay_input, options.quiet) {
             eprintln!("input: replayed from {}; live input of windows and trackers is ignored", path.display());
         }
-        Ok(InputDevices { tracker, replayed_input })
+        Ok(InputDevices { tracker, vrpn, replayed_input })
     }
 
     /// Returns whether input of facets is used.
@@ -55,7 +64,7 @@ impl InputDevices {
     /// Returns the tracker's inputs since the last frame.
     pub fn tracker_inputs(&self) -> Vec<(FacetNumber, Input)> {
         let inputs = self.tracker.iter().flat_map(TrackerSocket::inputs);
-        inputs.map(|input| (TRACKER_SOURCE, input)).collect()
+        inputs.chain(self.vrpn.iter().flat_map(VrpnClient::inputs)).map(|input| (TRACKER_SOURCE, input)).collect()
     }
 
     /// Returns the recorded inputs from this frame to the next. `simulated` is called only if there
@@ -72,7 +81,7 @@ impl InputDevices {
 
     /// Returns the tracker's counts.
     pub fn tracker_counts(&self) -> Option<osc::Counts> {
-        self.tracker.as_ref().map(TrackerSocket::counts)
+        self.tracker.as_ref().map(TrackerSocket::counts).or_else(|| self.vrpn.as_ref().map(VrpnClient::counts))
     }
 
     /// Checks that replayed inputs gave the recorded states.

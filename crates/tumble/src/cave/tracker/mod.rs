@@ -1,7 +1,11 @@
-//! Input of a tracker: OSC messages over UDP.
+//! Input of a tracker: OSC messages over UDP, or the stream of a VRPN server.
 
 pub mod budget;
+pub mod one_euro;
 pub mod osc;
 pub mod relay;
 pub mod sealed;
+mod smoothed;
 pub mod socket;
+mod vrpn;
+pub mod vrpn_client;

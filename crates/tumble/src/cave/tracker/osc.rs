@@ -158,12 +158,17 @@ impl OscDecoder {
                 OscPacket::Message(_) if count == MAX_MESSAGES => return self.drop(Dropped::TooMany),
                 OscPacket::Message(message) => {
                     count += 1;
-                    match self.apply(&message) {
-                        Ok(()) => self.counts.taken = self.counts.taken.wrapping_add(1),
-                        Err(why) => self.drop(why),
-                    }
+                    self.apply_one(&message);
                 }
             }
+        }
+    }
+
+    /// Applies a message, or counts why not.
+    pub(super) fn apply_one(&mut self, message: &OscMessage) {
+        match self.apply(message) {
+            Ok(()) => self.counts.taken = self.counts.taken.wrapping_add(1),
+            Err(why) => self.drop(why),
         }
     }
 

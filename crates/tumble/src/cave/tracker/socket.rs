@@ -2,8 +2,10 @@
 //! simulation, and the newest input is there when a frame begins.
 
 use super::budget::{SenderBudgets, WINDOW};
+use super::one_euro::Smoothing;
 use super::osc::{Counts, Dropped, MAX_DATAGRAM_BYTES, OscDecoder};
 use super::sealed;
+use super::smoothed::SmoothedHeads;
 use crate::failure::Failure;
 use std::io::ErrorKind;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
@@ -25,6 +27,7 @@ pub(super) const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// A tracker's socket and its thread.
 pub struct TrackerSocket {
     decoder: Arc<Mutex<OscDecoder>>,
+    heads: Mutex<SmoothedHeads>,
     end: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
     at: SocketAddr,
@@ -63,7 +66,11 @@ pub fn configured(cave: &Cave, address: Option<SocketAddr>, senders: &[IpAddr]) 
 
 impl TrackerSocket {
     /// Opens the socket and starts the thread. `key` is that of the cave, for sealed datagrams.
-    pub fn open(tracker: &Tracker, key: Option<&SharedKey>) -> Result<TrackerSocket, Failure> {
+    pub fn open(
+        tracker: &Tracker,
+        key: Option<&SharedKey>,
+        smoothing: Option<Smoothing>,
+    ) -> Result<TrackerSocket, Failure> {
         let title = format!("the tracker's address {}", tracker.socket());
         let failed = |e: std::io::Error| Failure::run(&title, e);
         let (decoder, end) = (Arc::new(Mutex::new(OscDecoder::new(tracker))), Arc::new(AtomicBool::new(false)));
@@ -80,7 +87,8 @@ impl TrackerSocket {
             let at = socket.local_addr().map_err(failed)?;
             (builder.spawn(move || listen(&socket, &theirs, &ended)), at)
         };
-        Ok(TrackerSocket { decoder, end, thread: Some(thread.map_err(failed)?), at })
+        let heads = Mutex::new(SmoothedHeads::new(smoothing));
+        Ok(TrackerSocket { decoder, heads, end, thread: Some(thread.map_err(failed)?), at })
     }
 
     /// Returns a line for the user: address, senders, users.
@@ -95,7 +103,8 @@ impl TrackerSocket {
 
     /// Returns the users' input that changed since the last call.
     pub fn inputs(&self) -> Vec<Input> {
-        lock(&self.decoder).inputs()
+        let inputs = lock(&self.decoder).inputs();
+        self.heads.lock().unwrap_or_else(PoisonError::into_inner).applied(inputs)
     }
 
     /// Returns the counts.

@@ -1,0 +1,281 @@
+//! Client of a VRPN server, on a thread of its own: reports of devices become the messages that trackers send as
+//! OSC, and go through the same decoder.
+//!
+//! The client connects by TCP, and again a second after a connection was lost. It writes nothing but its greeting.
+
+use super::one_euro::Smoothing;
+use super::osc::{Counts, OscDecoder};
+use super::smoothed::SmoothedHeads;
+use super::socket::{POLL_INTERVAL, lock};
+use super::vrpn::{GREETING, Report, VrpnStream};
+use crate::failure::Failure;
+use rosc::{OscMessage, OscType};
+use std::io::{ErrorKind, Read, Write};
+use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
+use std::str::FromStr;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use tumble::net::sync::Input;
+use tumble::scene::cave::Tracker;
+
+/// Time to connect and to be greeted.
+const GREETING_TIMEOUT: Duration = Duration::from_secs(3);
+/// Time between two attempts.
+const RETRY_INTERVAL: Duration = Duration::from_secs(1);
+/// Largest number of buttons of a user.
+const MAX_BUTTONS: i32 = 32;
+const PARTS: [&str; 5] = ["head", "wand", "hand/left", "hand/right", "buttons"];
+
+/// What a device of the server moves: `DEVICE:SENSOR=USER/PART`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DeviceMap {
+    /// Name of the device.
+    pub device: String,
+    /// Number of the sensor; of buttons not used.
+    pub sensor: i32,
+    /// User of the cave.
+    pub user: String,
+    /// `head`, `wand`, `hand/left`, `hand/right` or `buttons`.
+    pub part: String,
+}
+
+impl FromStr for DeviceMap {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<DeviceMap, String> {
+        let expected =
+            || format!("expected DEVICE=USER/PART or DEVICE:SENSOR=USER/PART with a PART of {}", PARTS.join(", "));
+        let (from, to) = text.split_once('=').ok_or_else(expected)?;
+        let (user, part) = to.split_once('/').ok_or_else(expected)?;
+        let (device, sensor) = match from.rsplit_once(':') {
+            Some((device, sensor)) => (device, sensor.parse().map_err(|_| expected())?),
+            None => (from, 0),
+        };
+        match !device.is_empty() && !user.is_empty() && PARTS.contains(&part) {
+            true => Ok(DeviceMap { device: device.into(), sensor, user: user.into(), part: part.into() }),
+            false => Err(expected()),
+        }
+    }
+}
+
+/// A connection to a server and its thread.
+pub struct VrpnClient {
+    decoder: Arc<Mutex<OscDecoder>>,
+    heads: Mutex<SmoothedHeads>,
+    end: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl VrpnClient {
+    /// Starts the thread. The axes and the users are those of the tracker.
+    ///
+    /// # Errors
+    /// An address that has no meaning, and maps of users that the tracker does not have.
+    pub fn open(
+        server: &str,
+        maps: &[DeviceMap],
+        tracker: &Tracker,
+        smoothing: Option<Smoothing>,
+        quiet: bool,
+    ) -> Result<VrpnClient, Failure> {
+        if maps.is_empty() {
+            return Err(Failure::input("--vrpn: no device moves a user; name them with --vrpn-map DEVICE=USER/PART"));
+        }
+        if let Some(stray) = maps.iter().find(|map| !tracker.users.contains(&map.user)) {
+            let users = tracker.users.join(", ");
+            return Err(Failure::input(format!("--vrpn-map: there is no user \"{}\"; there are {users}", stray.user)));
+        }
+        let unknown =
+            |why: String| Failure::input(format!("--vrpn {server}: {why}; expected HOST:PORT, such as 10.0.0.7:3883"));
+        let address = server.to_socket_addrs().map_err(|e| unknown(e.to_string()))?.next();
+        let address = address.ok_or_else(|| unknown("has no address".into()))?;
+        let (decoder, end) = (Arc::new(Mutex::new(OscDecoder::new(tracker))), Arc::new(AtomicBool::new(false)));
+        let session = Session { address, maps: maps.to_vec(), decoder: decoder.clone(), end: end.clone(), quiet };
+        let builder = std::thread::Builder::new().name("vrpn".into());
+        let thread = builder.spawn(move || session.run()).map_err(|e| Failure::run("the VRPN client", e))?;
+        Ok(VrpnClient { decoder, heads: Mutex::new(SmoothedHeads::new(smoothing)), end, thread: Some(thread) })
+    }
+
+    /// Returns the users' input that changed since the last call.
+    pub fn inputs(&self) -> Vec<Input> {
+        let inputs = lock(&self.decoder).inputs();
+        self.heads.lock().unwrap_or_else(std::sync::PoisonError::into_inner).applied(inputs)
+    }
+
+    /// Returns the counts.
+    pub fn counts(&self) -> Counts {
+        lock(&self.decoder).counts.clone()
+    }
+}
+
+impl Drop for VrpnClient {
+    fn drop(&mut self) {
+        self.end.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The part of a client on its thread.
+struct Session {
+    address: SocketAddr,
+    maps: Vec<DeviceMap>,
+    decoder: Arc<Mutex<OscDecoder>>,
+    end: Arc<AtomicBool>,
+    quiet: bool,
+}
+
+impl Session {
+    fn run(&self) {
+        let mut said = String::new();
+        while !self.ended() {
+            let why = self.connect().unwrap_or_else(|why| why);
+            if why != said && !self.ended() && !self.quiet {
+                eprintln!("VRPN {}: {why}; tries again", self.address);
+                said = why;
+            }
+            let wait = Instant::now();
+            while wait.elapsed() < RETRY_INTERVAL && !self.ended() {
+                std::thread::sleep(POLL_INTERVAL);
+            }
+        }
+    }
+
+    fn ended(&self) -> bool {
+        self.end.load(Ordering::Relaxed)
+    }
+
+    /// Reads until the end or a fault, which it returns.
+    fn connect(&self) -> Result<String, String> {
+        let failed = |e: std::io::Error| e.to_string();
+        let mut socket = TcpStream::connect_timeout(&self.address, GREETING_TIMEOUT).map_err(failed)?;
+        socket.set_read_timeout(Some(POLL_INTERVAL)).map_err(failed)?;
+        socket.set_write_timeout(Some(GREETING_TIMEOUT)).map_err(failed)?;
+        socket.write_all(&GREETING).map_err(failed)?;
+        let (mut stream, mut buttons) = (VrpnStream::default(), vec![0u32; self.maps.len()]);
+        let (start, mut heard, mut bytes) = (Instant::now(), false, [0; 4096]);
+        while !self.ended() {
+            match socket.read(&mut bytes) {
+                Ok(0) => return Err("the server closed the connection".into()),
+                Ok(length) => {
+                    if !heard && !self.quiet {
+                        eprintln!("VRPN {}: is connected", self.address);
+                    }
+                    heard = true;
+                    stream.take(&bytes[..length], |report| self.apply(&report, &mut buttons))?;
+                }
+                Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted) => {
+                    if !heard && start.elapsed() > GREETING_TIMEOUT {
+                        return Err(format!("the server says nothing for {} s", GREETING_TIMEOUT.as_secs()));
+                    }
+                }
+                Err(e) => return Err(e.to_string()),
+            }
+        }
+        Ok(String::new())
+    }
+
+    /// Gives a report to the decoder as the message of an OSC tracker.
+    fn apply(&self, report: &Report, buttons: &mut [u32]) {
+        for (map, held) in self.maps.iter().zip(buttons) {
+            let args = match report {
+                Report::Pose { device, sensor, numbers }
+                    if *device == map.device && *sensor == map.sensor && map.part != "buttons" =>
+                {
+                    numbers.iter().map(|x| OscType::Double(*x)).collect()
+                }
+                Report::Button { device, button, held: pressed }
+                    if *device == map.device && map.part == "buttons" && (0..MAX_BUTTONS - 1).contains(button) =>
+                {
+                    *held = (*held & !(1 << button)) | (u32::from(*pressed) << button);
+                    vec![OscType::Long(i64::from(*held))]
+                }
+                _ => continue,
+            };
+            lock(&self.decoder)
+                .apply_one(&OscMessage { addr: format!("/tumble/user/{}/{}", map.user, map.part), args });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::vrpn::tests::{message, named, pose};
+    use super::*;
+    use std::net::TcpListener;
+
+    fn tracker() -> Tracker {
+        Tracker { users: vec!["viewer".into()], origin_m: [0.0, 0.0, 0.5], ..Tracker::of(&[]) }
+    }
+
+    /// Waits for inputs, at most 10 s.
+    fn awaited(client: &VrpnClient, wanted: impl Fn(&Input) -> bool) -> Input {
+        let start = Instant::now();
+        loop {
+            if let Some(input) = client.inputs().into_iter().find(|input| wanted(input)) {
+                return input;
+            }
+            assert!(start.elapsed() < Duration::from_secs(10), "no such input");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// A server that speaks the protocol: greets, names, reports; drops the connection, and is found again with
+    /// other numbers for the same names.
+    #[test]
+    fn poses_and_buttons_arrive_and_a_lost_server_is_found_again() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let at = listener.local_addr().unwrap().to_string();
+        let maps = ["Glasses:1=viewer/head", "Wand=viewer/hand/right", "Wand=viewer/buttons"];
+        let maps: Vec<DeviceMap> = maps.iter().map(|map| map.parse().unwrap()).collect();
+        let client = VrpnClient::open(&at, &maps, &tracker(), None, true).unwrap_or_else(|e| panic!("{}", e.report()));
+        for (round, x) in [(0, 0.25), (1, 0.75)] {
+            let (mut socket, _) = listener.accept().unwrap();
+            let mut greeting = [0; 24];
+            socket.read_exact(&mut greeting).unwrap();
+            assert!(greeting.starts_with(b"vrpn: ver. 07.35  0"));
+            let (glasses, wand, poses, pressed) = (3 + round, 8 - round, 1 + round, 6 + round);
+            let unit = [0.0, 0.0, 0.0, 1.0];
+            let at = |x: f64| [x, 0.5, 1.25, unit[0], unit[1], unit[2], unit[3]];
+            let bytes = [
+                GREETING.to_vec(),
+                named(glasses, -1, "Glasses"),
+                named(wand, -1, "Wand"),
+                named(poses, -2, "vrpn_Tracker Pos_Quat"),
+                named(pressed, -2, "vrpn_Button Change"),
+                // sensor 0 of the glasses moves nothing, and a quaternion of length 2 is dropped
+                pose(glasses, poses, 0, at(9.0)),
+                pose(wand, poses, 0, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.0]),
+                pose(wand, poses, 0, at(-x)),
+                message(wand, pressed, &[2i32.to_be_bytes(), 1i32.to_be_bytes()].concat()),
+                pose(glasses, poses, 1, at(x)),
+            ]
+            .concat();
+            bytes.chunks(17).for_each(|part| socket.write_all(part).unwrap());
+            let input = awaited(&client, |input| input.head.is_some_and(|head| head.translation.x == x));
+            let head = input.head.unwrap().translation;
+            assert_eq!([head.x, head.y, head.z], [x, 0.5, 1.75]);
+            assert_eq!((input.hands[1].unwrap().translation.x, input.buttons), (-x, 4));
+        }
+        assert_eq!(client.counts().dropped["invalid_rotation"], 2);
+    }
+
+    #[test]
+    fn a_map_names_device_sensor_user_and_part() {
+        let map: DeviceMap = "Glasses 1:2=viewer/hand/left".parse().unwrap();
+        assert_eq!(
+            (map.device.as_str(), map.sensor, map.user.as_str(), map.part.as_str()),
+            ("Glasses 1", 2, "viewer", "hand/left")
+        );
+        for wrong in ["Glasses", "Glasses=viewer", "Glasses=viewer/foot", "=viewer/head", "G:x=viewer/head", "G=/head"]
+        {
+            assert!(wrong.parse::<DeviceMap>().unwrap_err().starts_with("expected DEVICE"), "{wrong}");
+        }
+        let stray = ["G=other/head".parse().unwrap()];
+        let said = VrpnClient::open("127.0.0.1:1", &stray, &tracker(), None, true).err().unwrap();
+        assert!(said.report().contains("there is no user \"other\"; there are viewer"), "{}", said.report());
+    }
+}
