@@ -83,7 +83,9 @@ impl ContactLaws {
 
     /// Returns the coefficient of friction at a sliding speed, m/s, for that of fast sliding.
     pub fn friction_at(&self, speed: f64, sliding: f64) -> f64 {
-        sliding + (self.static_friction - sliding).max(0.0) * (-(speed / self.stribeck_speed).powi(2)).exp()
+        sliding
+            + (self.static_friction - sliding).max(0.0)
+                * nalgebra::ComplexField::exp(-(speed / self.stribeck_speed).powi(2))
     }
 
     /// Returns the adhesion at a contact, N.

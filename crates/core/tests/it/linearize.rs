@@ -107,18 +107,18 @@ fn random_contact(seed: u64) -> World {
     let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
     let mut between = |low: f64, high: f64| random.real(low, high);
     let mut world = exact_world(1.0 / 240.0);
-    let friction = if seed % 5 == 0 { 0.0 } else { between(0.2, 1.0) };
+    let friction = if seed.is_multiple_of(5) { 0.0 } else { between(0.2, 1.0) };
     ground(&mut world, 0.0, friction);
     // overlap, or a gap that the step closes or not
     let gap = [-1.0, 1.0][(seed / 4 % 2) as usize] * between(5e-5, 8e-4);
     let speed = [0.0, 0.02, 1.5][(seed / 8 % 3) as usize];
     let mut v = Vec3::new(between(-speed, speed), between(-speed, speed), between(-0.25, 0.1));
     let w = Vec3::new(between(-speed, speed), between(-speed, speed), between(-speed, speed));
-    if seed / 24 % 4 == 0 {
+    if (seed / 24).is_multiple_of(4) {
         v.z = between(0.05, 0.5); // opens
     }
     let material = Material { friction, ..Material::default() };
-    let turn = if seed / 96 % 2 == 0 { 0.0 } else { 0.3 };
+    let turn = if (seed / 96).is_multiple_of(2) { 0.0 } else { 0.3 };
     let tilt = Vec3::new(between(-turn, turn), between(-turn, turn), between(-3.0, 3.0));
     let rotation = Quat::from_scaled_axis(tilt);
     if seed % 4 == 3 {

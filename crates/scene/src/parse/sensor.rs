@@ -124,8 +124,8 @@ fn read_optics(f: &mut Fields<'_>) -> Optics {
             false => {}
         }
     }
-    const DEGREES: Bound = Bound::new(1e-3, 179.9, "an angle from 0.001 to 179.9 degrees");
-    const RADIANS: Bound = Bound::new(1e-5, 3.14, "an angle from 0.00001 to 3.14 radians");
+    const DEGREES: Bound = Bound::new(1e-3, 179.3, "an angle from 0.001 to 179.3 degrees");
+    const RADIANS: Bound = Bound::new(1e-5, 3.13, "an angle from 0.00001 to 3.13 radians");
     let degrees = f.optional_number("vertical_fov_deg", DEGREES).map(f64::to_radians);
     let vertical_fov = f.optional_number("vertical_fov_rad", RADIANS).or(degrees).unwrap_or(usual.vertical_fov);
     Optics { resolution, vertical_fov }
