@@ -53,6 +53,8 @@ const FACTORIZATIONS: f64 = 3.0;
 /// one of at most [`TINY`] blocks, whose sweeps cost less than a factorization.
 const NEWTON: [u32; 2] = [2, 12];
 const TINY: usize = 4;
+/// Degrees of freedom of a rigid body.
+const RIGID: u32 = 6;
 
 /// A few sweeps follow a direct solution that is not finished, in islands of at most this number of
 /// blocks.
@@ -102,7 +104,7 @@ impl RowSolver for GaussSeidel {
                 return SolveReport { iterations: 1, converged, ray: false, relaxations: 0 };
             }
             let extrapolation = Extrapolation::new(locals, &linkages, rows, du);
-            Solve { rows, blocks, c, lambda, du, settings, locals, linkages, extrapolation }.run()
+            Solve { rows, blocks, c, lambda, du, settings, locals, linkages, extrapolation, is_reduced: false }.run()
         })
     }
 
@@ -137,6 +139,7 @@ fn solve_reduced(
             locals,
             linkages: none,
             extrapolation,
+            is_reduced: true,
         }
         .run()
     });
@@ -160,6 +163,8 @@ struct Solve<'a> {
     locals: &'a mut Vec<Local>,
     linkages: Linkages,
     extrapolation: Extrapolation,
+    /// Whether it is the smaller problem of an island with equality rows.
+    is_reduced: bool,
 }
 
 impl Solve<'_> {
@@ -234,9 +239,15 @@ impl Solve<'_> {
         outcome
     }
 
-    /// Returns whether an island may be small enough for Newton's method.
+    /// Returns whether Newton's method may be tried: on small islands with a robot, whose contacts are seldom
+    /// redundant. Of redundant multipliers it finds the nearest, and the interior point method those that share the
+    /// load evenly.
     fn may_try_newton(&self) -> bool {
-        self.locals.len() <= FEW && self.settings.budget.is_none() && self.linkages.is_empty()
+        let of_robot = |local: &Local| local.block(self.rows).sides().iter().any(|side| side.dof > RIGID);
+        self.locals.len() <= FEW
+            && self.settings.budget.is_none()
+            && self.linkages.is_empty()
+            && (self.is_reduced || self.locals.iter().any(of_robot))
     }
 
     /// Tries Newton's method on a small island.

@@ -6,8 +6,8 @@
 //! ```
 //!
 //! The matrix is symmetric in structure but not in value: sliding friction makes `G` unsymmetric.
-//! Pivots are chosen within diagonal blocks only; the identity in the matrix keeps those regular. The last
-//! diagonal block, often the only one, is not inverted: it has triangular factors of its own.
+//! Pivots are chosen within diagonal blocks only; the identity in the matrix keeps those regular. The matrix of a
+//! single object is not inverted: it has triangular factors.
 
 use super::cone::M3;
 use super::island::Island;
@@ -16,9 +16,9 @@ use crate::constraint::rows::dot;
 
 /// Factors of a system matrix, in the places of a [`Structure`].
 pub(super) struct Factor {
-    /// Inverses of the diagonal blocks but the last, and `L` (row-major).
+    /// Inverses of the diagonal blocks, or the triangular factors of the only one, and `L` (row-major).
     lower: Vec<f64>,
-    /// Row exchanges of the last diagonal block.
+    /// Row exchanges of the only diagonal block.
     exchanges: Vec<usize>,
     /// `U` above the diagonal: the block of row `j` and column `r`, row-major.
     upper: Vec<f64>,
@@ -111,7 +111,7 @@ impl Factor {
             }
         }
         let diagonal = &mut lower[s.diagonal[j]..][..dof * dof];
-        if j + 1 == s.order.len() {
+        if s.order.len() == 1 {
             return triangulate(diagonal, dof, exchanges);
         }
         if !invert(diagonal, dof, left) {
@@ -157,7 +157,7 @@ impl Factor {
             }
             let place = island.objects[s.order[j]].first;
             let diagonal = &self.lower[s.diagonal[j]..][..own.len() * own.len()];
-            if j + 1 == s.order.len() {
+            if s.order.len() == 1 {
                 solve_triangular(diagonal, &self.exchanges, own);
                 x[place..place + own.len()].copy_from_slice(own);
                 continue;
