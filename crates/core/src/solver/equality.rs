@@ -78,7 +78,8 @@ impl Equalities {
         self.order.len()
     }
 
-    fn column(&self, p: usize) -> &[f64] {
+    /// Returns column `p` of `R`, with one number per row.
+    pub(super) fn column(&self, p: usize) -> &[f64] {
         &self.columns[p * self.size..(p + 1) * self.size]
     }
 

@@ -35,6 +35,7 @@ use super::extrapolation::Extrapolation;
 use super::joint_row::parallel_rows;
 use super::linkage::Linkages;
 use super::local::{Local, Progress, apply, with_memory, write_back};
+use super::reduced::Reduced;
 use super::relaxation::Relaxation;
 use super::{RowSolver, SolveReport, SolverSettings, residual};
 use crate::constraint::rows::{RowSet, Rows, dot};
@@ -47,6 +48,13 @@ const ACCELERATED: u32 = 200;
 const FIRST_SWEEPS: u32 = 25;
 /// Sweeps go on until they have cost as much as this number of factorizations.
 const FACTORIZATIONS: f64 = 3.0;
+
+/// Numbers of sweeps after which Newton's method is tried on a small island. The first attempt is left out on
+/// one of at most [`TINY`] blocks, whose sweeps cost less than a factorization.
+const NEWTON: [u32; 2] = [2, 12];
+const TINY: usize = 4;
+/// Degrees of freedom of a rigid body.
+const RIGID: u32 = 6;
 
 /// A few sweeps follow a direct solution that is not finished, in islands of at most this number of
 /// blocks.
@@ -81,8 +89,14 @@ impl RowSolver for GaussSeidel {
         du: &mut [f64],
         settings: SolverSettings,
     ) -> SolveReport {
+        let mut linkages = Linkages::new(rows, blocks);
+        let reduced = Reduced::new(rows, blocks, (c, lambda), &linkages);
+        if let Some(outcome) =
+            reduced.and_then(|r| solve_reduced(r, (rows, blocks, c), &linkages, (lambda, du), settings))
+        {
+            return outcome;
+        }
         with_memory(|locals| {
-            let mut linkages = Linkages::new(rows, blocks);
             add_blocks(rows, blocks, (c, lambda), &mut linkages, locals);
             let left = apply(locals, &linkages, rows, c, lambda, du);
             if locals.is_empty() {
@@ -90,13 +104,52 @@ impl RowSolver for GaussSeidel {
                 return SolveReport { iterations: 1, converged, ray: false, relaxations: 0 };
             }
             let extrapolation = Extrapolation::new(locals, &linkages, rows, du);
-            Solve { rows, blocks, c, lambda, du, settings, locals, linkages, extrapolation }.run()
+            Solve { rows, blocks, c, lambda, du, settings, locals, linkages, extrapolation, is_reduced: false }.run()
         })
     }
 
     fn fork(&self) -> Box<dyn RowSolver> {
         Box::new(*self)
     }
+}
+
+/// Solves an island that has become smaller. Returns `None` if what is solved there is not solved here, because of
+/// rounding; `lambda` is then a start.
+fn solve_reduced(
+    mut reduced: Reduced,
+    (rows, blocks, c): (&Rows, &[u32], &[f64]),
+    linkages: &Linkages,
+    (lambda, du): (&mut [f64], &mut [f64]),
+    settings: SolverSettings,
+) -> Option<SolveReport> {
+    let mut own = vec![0.0; reduced.rows.dof];
+    let Reduced { rows: few, blocks: all, c: free, lambda: start, .. } = &mut reduced;
+    let outcome = with_memory(|locals| {
+        let mut none = Linkages::default();
+        add_blocks(few, all, (free, start), &mut none, locals);
+        apply(locals, &none, few, free, start, &mut own);
+        let extrapolation = Extrapolation::new(locals, &none, few, &own);
+        Solve {
+            rows: few,
+            blocks: all,
+            c: free,
+            lambda: start,
+            du: &mut own,
+            settings,
+            locals,
+            linkages: none,
+            extrapolation,
+            is_reduced: true,
+        }
+        .run()
+    });
+    reduced.write(rows, c, linkages, lambda, du);
+    let solved = !outcome.converged || residual(rows, blocks, c, lambda, du) <= SOLVED * settings.tolerance;
+    if !solved {
+        let sides = blocks.iter().flat_map(|&b| rows.blocks[b as usize].sides());
+        sides.for_each(|side| du[side.u as usize..(side.u + side.dof) as usize].fill(0.0));
+    }
+    solved.then_some(outcome)
 }
 
 /// An island while it is solved.
@@ -110,6 +163,8 @@ struct Solve<'a> {
     locals: &'a mut Vec<Local>,
     linkages: Linkages,
     extrapolation: Extrapolation,
+    /// Whether it is the smaller problem of an island with equality rows.
+    is_reduced: bool,
 }
 
 impl Solve<'_> {
@@ -128,8 +183,21 @@ impl Solve<'_> {
                 break;
             }
             relaxation.record(sweep, progress.change);
+            if NEWTON[usize::from(count <= TINY)..].contains(&sweep) && self.may_try_newton() {
+                plan = plan.or_else(|| Plan::new(self.rows, self.blocks, self.c, false).filter(Plan::is_small));
+                if let Some(plan) = &mut plan {
+                    outcome = self.newton(plan);
+                    direct = outcome.converged;
+                }
+                if direct {
+                    outcome.iterations += sweep;
+                    outcome.relaxations += sweep * count as u32;
+                    break;
+                }
+                outcome.iterations = sweeps;
+            }
             if first {
-                plan = Plan::new(self.rows, self.blocks, self.c, sweeps < FIRST_SWEEPS);
+                plan = plan.or_else(|| Plan::new(self.rows, self.blocks, self.c, sweeps < FIRST_SWEEPS));
                 due = plan.as_ref().map_or(u32::MAX, |plan| (FACTORIZATIONS * plan.cost()) as u32).max(sweep);
                 if let Some(affordable) = affordable {
                     let spare = |plan: &Plan| affordable - AFFORDABLE * plan.cost();
@@ -169,6 +237,26 @@ impl Solve<'_> {
             outcome.converged &= direct || left <= self.settings.tolerance;
         }
         outcome
+    }
+
+    /// Returns whether Newton's method may be tried: on small islands with a robot, whose contacts are seldom
+    /// redundant. Of redundant multipliers it finds the nearest, and the interior point method those that share the
+    /// load evenly.
+    fn may_try_newton(&self) -> bool {
+        let of_robot = |local: &Local| local.block(self.rows).sides().iter().any(|side| side.dof > RIGID);
+        self.locals.len() <= FEW
+            && self.settings.budget.is_none()
+            && self.linkages.is_empty()
+            && (self.is_reduced || self.locals.iter().any(of_robot))
+    }
+
+    /// Tries Newton's method on a small island.
+    fn newton(&mut self, plan: &mut Plan) -> SolveReport {
+        self.rebuild();
+        let solved = plan.newton(self.lambda, self.settings.tolerance);
+        self.read();
+        let relaxations = (f64::from(solved.factorizations) * plan.cost() * self.locals.len() as f64) as u32;
+        SolveReport { iterations: solved.factorizations, converged: solved.converged, ray: false, relaxations }
     }
 
     /// Relaxes every block once.

@@ -116,6 +116,11 @@ impl Linkages {
         !self.is_empty() && is_joint(rows, block) && block.sides().iter().any(|s| self.linkage_of(s).is_some())
     }
 
+    /// Returns the equality rows of each linkage, with their factor.
+    pub fn each(&self) -> impl Iterator<Item = (&[u32], &Equalities)> {
+        self.linkages.iter().map(|l| (&l.rows[..], &l.factor))
+    }
+
     /// Returns start and end of every range of `du` that the linkages move.
     pub fn stretches(&self) -> impl Iterator<Item = (u32, u32)> {
         self.linkages.iter().flat_map(|l| l.objects.iter().map(|(u, dof)| (*u, u + dof)))

@@ -15,6 +15,7 @@ mod lemke;
 mod linkage;
 mod local;
 mod one_contact;
+mod reduced;
 mod relaxation;
 mod residual;
 #[cfg(test)]

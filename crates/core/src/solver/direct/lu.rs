@@ -6,16 +6,20 @@
 //! ```
 //!
 //! The matrix is symmetric in structure but not in value: sliding friction makes `G` unsymmetric.
-//! Pivots are chosen within diagonal blocks only; the identity in the matrix keeps those regular.
+//! Pivots are chosen within diagonal blocks only; the identity in the matrix keeps those regular. The matrix of a
+//! single object is not inverted: it has triangular factors.
 
 use super::cone::M3;
 use super::island::Island;
 use super::structure::Structure;
+use crate::constraint::rows::dot;
 
 /// Factors of a system matrix, in the places of a [`Structure`].
 pub(super) struct Factor {
-    /// Inverses of the diagonal blocks, and `L` (row-major).
+    /// Inverses of the diagonal blocks, or the triangular factors of the only one, and `L` (row-major).
     lower: Vec<f64>,
+    /// Row exchanges of the only diagonal block.
+    exchanges: Vec<usize>,
     /// `U` above the diagonal: the block of row `j` and column `r`, row-major.
     upper: Vec<f64>,
     right: Vec<f64>,
@@ -35,7 +39,7 @@ impl Factor {
     /// Returns a factor without numbers.
     pub fn new(s: &Structure) -> Factor {
         let scratch = Scratch { at: vec![0; s.order.len()], ..Scratch::default() };
-        Factor { lower: vec![0.0; s.len], upper: vec![0.0; s.len], right: Vec::new(), scratch }
+        Factor { lower: vec![0.0; s.len], exchanges: Vec::new(), upper: vec![0.0; s.len], right: Vec::new(), scratch }
     }
 
     /// Factors `1 + Σ Y·G·Yᵀ` with `G` of each block; only the part for its rows is read. Returns
@@ -88,7 +92,7 @@ impl Factor {
 
     #[inline(always)]
     fn eliminate(&mut self, s: &Structure, j: usize) -> bool {
-        let Factor { lower, upper, scratch: Scratch { left, top, at }, .. } = self;
+        let Factor { lower, upper, exchanges, scratch: Scratch { left, top, at }, .. } = self;
         let dof = s.dof[j];
         s.columns[j].iter().for_each(|(r, start)| at[*r] = *start);
         for &(k, index) in &s.rows[j] {
@@ -107,6 +111,9 @@ impl Factor {
             }
         }
         let diagonal = &mut lower[s.diagonal[j]..][..dof * dof];
+        if s.order.len() == 1 {
+            return triangulate(diagonal, dof, exchanges);
+        }
         if !invert(diagonal, dof, left) {
             return false;
         }
@@ -149,7 +156,13 @@ impl Factor {
                 }
             }
             let place = island.objects[s.order[j]].first;
-            for (i, inverse) in self.lower[s.diagonal[j]..].chunks_exact(own.len()).take(own.len()).enumerate() {
+            let diagonal = &self.lower[s.diagonal[j]..][..own.len() * own.len()];
+            if s.order.len() == 1 {
+                solve_triangular(diagonal, &self.exchanges, own);
+                x[place..place + own.len()].copy_from_slice(own);
+                continue;
+            }
+            for (i, inverse) in diagonal.chunks_exact(own.len()).enumerate() {
                 x[place + i] = sum(inverse, own);
             }
             own.copy_from_slice(&x[place..place + own.len()]);
@@ -263,6 +276,47 @@ fn subtract(c: &mut [f64], a: &[f64], b: &[f64], [rows, inner, columns]: [usize;
         for (a, b) in a.iter().zip(b.chunks_exact(columns)) {
             add(c, -a, b);
         }
+    }
+}
+
+/// Replaces a matrix of size `n` by its triangular factors, with row exchanges. Returns whether it is regular.
+#[inline(always)]
+fn triangulate(m: &mut [f64], n: usize, exchanges: &mut Vec<usize>) -> bool {
+    exchanges.clear();
+    for column in 0..n {
+        let size = |row: usize| m[row * n + column].abs();
+        let pivot = (column..n).fold(column, |best, row| if size(row) > size(best) { row } else { best });
+        let value = m[pivot * n + column];
+        if value == 0.0 || !value.is_finite() {
+            return false;
+        }
+        exchanges.push(pivot);
+        if pivot != column {
+            let (head, tail) = m.split_at_mut(pivot * n);
+            head[column * n..(column + 1) * n].swap_with_slice(&mut tail[..n]);
+        }
+        let (head, tail) = m.split_at_mut((column + 1) * n);
+        let from = &head[column * n + column + 1..];
+        for row in tail.chunks_exact_mut(n) {
+            let factor = row[column] / value;
+            row[column] = factor;
+            if factor != 0.0 {
+                add(&mut row[column + 1..], -factor, from);
+            }
+        }
+    }
+    true
+}
+
+/// Replaces a right-hand side by the solution, with the factors of [`triangulate`].
+fn solve_triangular(m: &[f64], exchanges: &[usize], x: &mut [f64]) {
+    let n = x.len();
+    exchanges.iter().enumerate().for_each(|(row, pivot)| x.swap(row, *pivot));
+    for (row, m) in m.chunks_exact(n).enumerate() {
+        x[row] -= dot(&m[..row], &x[..row]);
+    }
+    for (row, m) in m.chunks_exact(n).enumerate().rev() {
+        x[row] = (x[row] - dot(&m[row + 1..], &x[row + 1..])) / m[row];
     }
 }
 

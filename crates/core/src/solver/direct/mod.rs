@@ -4,7 +4,9 @@
 //! of them. Here all rows of an island are solved at once, and the number of factorizations does not
 //! grow with the island:
 //!
-//! 1. from multipliers that are near, a few steps of semismooth Newton (`proximal.rs`);
+//! 0. a small island first by Newton's method on the function of Alart and Curnier (`newton.rs`), in the midst
+//!    of its sweeps;
+//! 1. from multipliers that are near, a few steps of semismooth Newton with a proximal term (`proximal.rs`);
 //! 2. else the interior point method from the beginning (`interior_point.rs`);
 //! 3. and semismooth Newton for the digits that it leaves;
 //! 4. if that is not enough, the method of multipliers with a lagged shift (`lagged.rs`);
@@ -21,6 +23,7 @@ mod interior_point;
 mod island;
 mod lagged;
 mod lu;
+mod newton;
 mod proximal;
 mod structure;
 
@@ -115,6 +118,31 @@ impl<'a> Plan<'a> {
         Some(Plan { system: System { island, structure, factor }, at_rest })
     }
 
+    /// Returns whether the island is so small that no effort is spared.
+    pub fn is_small(&self) -> bool {
+        self.system.island.dof <= SMALL
+    }
+
+    /// Solves a small island from multipliers in `lambda` that need not be near, and replaces them if it finds
+    /// better ones.
+    pub fn newton(&mut self, lambda: &mut [f64], tolerance: f64) -> Direct {
+        let tolerance = self.tolerance(tolerance);
+        let system = &mut self.system;
+        let mut own = system.island.read(lambda);
+        let start = system.island.error_of(&own);
+        let (error, factorizations) = newton::solve(system, &mut own, start, tolerance);
+        if error < start {
+            system.island.write(&own, lambda);
+        }
+        Direct { factorizations, converged: error <= tolerance.solved }
+    }
+
+    /// Returns the errors to reach for the tolerance of a sweep.
+    fn tolerance(&self, tolerance: f64) -> Tolerance {
+        let fastest = self.system.island.fastest;
+        Tolerance { goal: tolerance.max(ROUNDING.0 * fastest), solved: (10.0 * tolerance).max(ROUNDING.1 * fastest) }
+    }
+
     /// Returns the cost of a factorization in sweeps.
     pub fn cost(&self) -> f64 {
         let (assembly, sweep) = work_of_blocks(&self.system.island);
@@ -127,13 +155,10 @@ impl<'a> Plan<'a> {
         let fastest = self.system.island.fastest;
         let cheap = self.system.island.dof <= SMALL || self.cost() < CHEAP;
         let near = if self.at_rest { NEAR.0 } else { NEAR.1 };
+        let tolerance = self.tolerance(tolerance);
         let system = &mut self.system;
         let small = system.island.dof <= SMALL;
         let (enough, last) = if small { (0.0, FACTORS.1) } else { (ENOUGH * fastest, FACTORS.2) };
-        let tolerance = Tolerance {
-            goal: tolerance.max(ROUNDING.0 * fastest),
-            solved: (10.0 * tolerance).max(ROUNDING.1 * fastest),
-        };
         let mut own = system.island.read(lambda);
         let start = system.island.error_of(&own);
         if start <= tolerance.solved && !cheap {
