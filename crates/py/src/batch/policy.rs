@@ -9,7 +9,7 @@
 
 use crate::arrays::convert::{Numbers, array, numbers, shown};
 use crate::errors::{Error, Result};
-use numpy::{PyArray1};
+use numpy::PyArray1;
 use pyo3::prelude::*;
 
 /// Largest number of layers.
