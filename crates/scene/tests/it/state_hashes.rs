@@ -48,26 +48,26 @@ macro_rules! table {
 
 table! {
     [1.0, 10.0];
-    billiards_time_stepping: "billiards", TimeStepping, "36b9d75c4ae9875c", "0297c6beb51197ed";
-    billiards_backtracking: "billiards", Backtracking, "b5a27eda6855859e", "bf300238bd656f9e";
-    bowling_time_stepping: "bowling", TimeStepping, "94968c1b4058a725", "3929761e92ed79fc";
-    bowling_backtracking: "bowling", Backtracking, "e677eac272ba7de7", "e18c2e4b1775af2c";
-    chain_time_stepping: "chain", TimeStepping, "22fbcd4bcbb18743", "7e68bdb4b444ccf6";
-    chain_backtracking: "chain", Backtracking, "63d0cbaca36ef0a9", "3198250057940e22";
-    falling_time_stepping: "falling", TimeStepping, "975e49a4706a1c69", "e6ab76fd3ebd1444";
-    flock_time_stepping: "flock", TimeStepping, "89758af10faedc50", "3a693791277610b4";
-    flock_backtracking: "flock", Backtracking, "d183d81677f6cfab", "3cc3efa393ca88df";
-    falling_backtracking: "falling", Backtracking, "b064bee7ee0b458a", "d126928e23c90248";
+    billiards_time_stepping: "billiards", TimeStepping, "902d9b2039798813", "04e97dda57f29f5b";
+    billiards_backtracking: "billiards", Backtracking, "5c3d2c760e7c52da", "c2964b8dad76bdf4";
+    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "fdbc7b7a997170a2";
+    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "42a00e4870244b44";
+    chain_time_stepping: "chain", TimeStepping, "51a78b5bdac7bf65", "9a9233a467758672";
+    chain_backtracking: "chain", Backtracking, "37b8cf357ed51095", "23bbf9cb7921e71d";
+    falling_time_stepping: "falling", TimeStepping, "e4671c0ee21ed722", "cef07154cf638c3f";
+    flock_time_stepping: "flock", TimeStepping, "e41e23ddcc483acc", "1855f9c020bc971a";
+    flock_backtracking: "flock", Backtracking, "af789340dc0ef11e", "6faef2e76a3efc30";
+    falling_backtracking: "falling", Backtracking, "d1513aca63296e42", "97eedc6cc174ae0c";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "dba991e4803cfe34", "95407557393acae5";
     pendulum_time_stepping: "pendulum", TimeStepping, "a6f0f0b542061dc2", "63acd1d2fe930652";
     pendulum_backtracking: "pendulum", Backtracking, "69fe4156518a0013", "692b5de118331942";
     piston_time_stepping: "piston", TimeStepping, "03971f4c855a8149", "498658197dce906c";
     piston_backtracking: "piston", Backtracking, "49b38596ba941018", "3623d35cde9a52a8";
-    robot_time_stepping: "robot", TimeStepping, "68db682e31ad9267", "9a0673bfe03781ee";
-    robot_backtracking: "robot", Backtracking, "34a6c003f76116a6", "608ca54c62cd056b";
-    skeleton_time_stepping: "skeleton", TimeStepping, "e4b2d7099e2ce12c", "c33ec71934ce9b14";
-    skeleton_backtracking: "skeleton", Backtracking, "fd6d29b9de01f60c", "a128ff5c335e2548";
+    robot_time_stepping: "robot", TimeStepping, "617584311da206c8", "e3daef76eb545345";
+    robot_backtracking: "robot", Backtracking, "1af0172412c09af6", "347f7c177c9b2e4f";
+    skeleton_time_stepping: "skeleton", TimeStepping, "6f7c6a0daa3c23f3", "cead67e6baa4a820";
+    skeleton_backtracking: "skeleton", Backtracking, "c7a9b3de921103d6", "015df888682c8fa8";
     stack_time_stepping: "stack", TimeStepping, "c9eeea26137d2a5f", "99d9eaf45acdf7b8";
     stack_backtracking: "stack", Backtracking, "8bf0d645b39a693b", "3d204eae8525be65";
 }
@@ -75,24 +75,24 @@ table! {
 // Structures and machines whose steps cost more, or that are known after less.
 table! {
     [0.5, 2.0];
-    ball_machine_time_stepping: "ball_machine", TimeStepping, "5ecf66676422b39a", "405845acd18db798";
-    ball_machine_backtracking: "ball_machine", Backtracking, "36e0fde2a34f7dfa", "602f95bd076b0fe7";
+    ball_machine_time_stepping: "ball_machine", TimeStepping, "5ecf66676422b39a", "cc169b8f7f9a0d18";
+    ball_machine_backtracking: "ball_machine", Backtracking, "36e0fde2a34f7dfa", "50a39ed5ff84a6aa";
     bird_time_stepping: "bird", TimeStepping, "edfbc51d27e3b795", "fec93c56055a3e4d";
     bird_backtracking: "bird", Backtracking, "fb21b06f6d3e5830", "5ee9b90abac4068b";
     card_house_time_stepping: "card_house", TimeStepping, "091b9380060ee20c", "8003317c097996db";
     sparks_time_stepping: "sparks", TimeStepping, "515a77d2df6b5217", "9badcde17809dddb";
     sparks_backtracking: "sparks", Backtracking, "805c8cba100469d4", "6052e84af86ee0f9";
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
-    marble_run_time_stepping: "marble_run", TimeStepping, "54c3e3322b6781af", "5406447c388d03c0";
-    marble_run_backtracking: "marble_run", Backtracking, "67834b3a7fb5547d", "ff57ee16e3696b0a";
-    newtons_cradle_time_stepping: "newtons_cradle", TimeStepping, "241aa3d8432a474e", "c34c93b030ba61fc";
-    newtons_cradle_backtracking: "newtons_cradle", Backtracking, "878a964993b52e1f", "0579d119408e16b9";
-    steam_engine_time_stepping: "steam_engine", TimeStepping, "3a2ab60873834ca6", "4a72b3cc1d1779dd";
+    marble_run_time_stepping: "marble_run", TimeStepping, "a6aa80e60f400a7a", "80f2216852c0c445";
+    marble_run_backtracking: "marble_run", Backtracking, "d233e2869b9ec085", "85be23266f25baed";
+    newtons_cradle_time_stepping: "newtons_cradle", TimeStepping, "241aa3d8432a474e", "8a992d40dc67236d";
+    newtons_cradle_backtracking: "newtons_cradle", Backtracking, "1a0128aa197a01fb", "ecc9f19bdcb9f483";
+    steam_engine_time_stepping: "steam_engine", TimeStepping, "0d1a9f294d535f1d", "4a72b3cc1d1779dd";
     steam_engine_backtracking: "steam_engine", Backtracking, "466f4da8adf2589f", "f65c1d0393337846";
     arch_time_stepping: "arch", TimeStepping, "e7090b6cbe5ad156", "4c2e00f4dc0a531c";
-    walker_time_stepping: "walker", TimeStepping, "4f3cf3f418140f88", "5a0751b9b50b1fd7";
-    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "b8885a64a8d5fa18", "ef3c637cbb294c26";
-    dominoes_time_stepping: "dominoes", TimeStepping, "e494f088d2363d0e", "631db3c70aca49e4";
+    walker_time_stepping: "walker", TimeStepping, "4f3cf3f418140f88", "22300531661b6dd7";
+    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "a088038d428e36c3", "382e062bb5aef3af";
+    dominoes_time_stepping: "dominoes", TimeStepping, "fe44a6680e801f5a", "c798dcaf8ca85ed0";
 }
 
 table! {
@@ -101,7 +101,7 @@ table! {
     cloth_backtracking: "cloth", Backtracking, "645053291a4cb2e0", "e8bc49562045d081";
     jelly_time_stepping: "jelly", TimeStepping, "9a60cdddb1e6cb89", "5782a120f1e26d9b";
     arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "43819e958609f0f5";
-    dominoes_backtracking: "dominoes", Backtracking, "9c7b110aee952a4c", "09a9c0d733328405";
+    dominoes_backtracking: "dominoes", Backtracking, "94511c9695cd65a8", "8ea2dcd0224d1f61";
     walker_backtracking: "walker", Backtracking, "ca535adb9b9b96d3", "093bfa105a94cd32";
-    wrecking_ball_backtracking: "wrecking_ball", Backtracking, "6c2945a4c1ce9c8e", "3d6cb77528bdd2e7";
+    wrecking_ball_backtracking: "wrecking_ball", Backtracking, "edd1de7daad227d6", "dec185d53d1e009f";
 }
