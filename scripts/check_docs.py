@@ -297,7 +297,7 @@ def check_commands(name, lines, scenes, targets, subcommands, faults):
             faults.append(f"{name}:{number}: tumble has no command {words[0]}")
         elif words[0] in ("run", "check"):
             scene = words[1] if len(words) > 1 else ""
-            shown = scene.startswith("my/") or scene.isupper()  # a stand-in for the reader's own
+            shown = scene.startswith(("my/", "measured/")) or scene.isupper()  # a stand-in for the reader's own
             if not (scene in scenes or shown or (ROOT / scene).exists() and scene):
                 faults.append(f"{name}:{number}: there is no scene '{scene}'")
 

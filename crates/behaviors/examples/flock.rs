@@ -58,7 +58,7 @@ fn measure(count: usize, search: Search) -> Result<(), Box<dyn std::error::Error
     Ok(())
 }
 
-/// Returns the processor time of this thread; Linux alone tells it, elsewhere it is that of the clock.
+/// Returns the processor time of this thread; only Linux reports it, elsewhere it is that of the clock.
 fn processor_time() -> Duration {
     let spent = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let spent = spent.and_then(|text| text.split_whitespace().next()?.parse().ok());

@@ -1,4 +1,4 @@
-//! What compilers make no vector instructions of: the choice of lanes, and the columns of a few rows.
+//! Operations that compilers make no vector instructions of: the choice of lanes, and the columns of a few rows.
 //!
 //! Both implementations give the same numbers: nothing is computed here but a comparison.
 

@@ -43,7 +43,7 @@ def test_the_effort_of_a_urdf_limits_drives_that_name_no_force(urdf):
     batch = tumble.Batch(world, 2)
     batch.set_drives(velocity=100.0)
     start = batch.v.copy()
-    batch.step(12)
+    batch.step(substeps=12)
     assert (batch.v - start).ravel() == pytest.approx([1 / 0.1 * 12 / 240] * 2, rel=1e-9)
 
 
@@ -53,7 +53,7 @@ def test_velocity_limits_of_a_urdf_hold_if_asked(urdf, tmp_path):
     made = tumble.World(gravity=(0, 0, 0))
     description = tumble.Articulation.from_urdf(urdf, velocity_limits=True)
     made.add_articulation(pickle.loads(pickle.dumps(description)), name="arm")
-    for world in (made, tumble.World.load(scene)):
+    for number, world in enumerate((made, tumble.World.load(scene))):
         arm = world["arm"]
         assert arm.max_velocity == pytest.approx([3])
         for _ in range(24):
@@ -61,8 +61,9 @@ def test_velocity_limits_of_a_urdf_hold_if_asked(urdf, tmp_path):
             world.step()
             assert arm.qd[0] == pytest.approx(min(2 / 0.1 * world.time, 3), abs=1e-9)
         copied = copy.deepcopy(world)
-        copied.save_scene(tmp_path / "saved.toml", overwrite=True)
-        for other in (copied, pickle.loads(pickle.dumps(world)), world.fork(), tumble.World.load(tmp_path / "saved.toml")):
+        saved = tmp_path / f"saved_{number}.toml"
+        copied.save_scene(saved)
+        for other in (copied, pickle.loads(pickle.dumps(world)), world.fork(), tumble.World.load(saved)):
             assert (other["arm"].max_velocity == [3]).all() and (other["arm"].effort == [0.5]).all()
         arm.max_velocity = np.inf
         arm.tau = [2.0]

@@ -243,7 +243,7 @@ def test_tests_and_programs_that_pages_name_are_there():
         for crate, _, wanted in RUST_TEST.findall(text):
             sources = (folders[crate] if crate else ROOT / "crates").rglob("*.rs")
             name = (wanted or "").split("::")[-1]
-            assert any(name in found for path in sources for found in [path.stem, *re.findall(r"fn (\w+)", path.read_text())]), f"{page}: no test {wanted} in {crate}"
+            assert any(name in found for path in sources for found in [path.stem, path.parent.name, *re.findall(r"fn (\w+)", path.read_text())]), f"{page}: no test {wanted} in {crate}"
         for crate, name in RUST_EXAMPLE.findall(text):
             examples = folders[crate or "tumble"] / "examples"
             assert (examples / f"{name}.rs").is_file() or (examples / name).is_dir(), f"{page}: no example {name}"

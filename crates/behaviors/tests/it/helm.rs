@@ -232,7 +232,7 @@ fn a_body_that_does_not_float_is_not_steered() {
     assert_eq!(world.state_of(arm).unwrap(), before);
 }
 
-/// A flock in moving air is the same flock in still air, seen by somebody who moves.
+/// A flock in moving air is the same flock in still air, seen from a frame that moves.
 #[test]
 fn a_flock_in_wind_drifts_with_it() {
     let wind = Vec3::new(-7.0, 2.0, 0.5);

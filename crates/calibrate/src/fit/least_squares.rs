@@ -29,7 +29,7 @@ pub(crate) trait Term {
     fn residual(&self, local: &[f64]) -> Option<[f64; 2]>;
 }
 
-/// What is known about an unknown before.
+/// Knowledge of an unknown before the fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Prior {
     /// Nothing.

@@ -321,7 +321,7 @@ fn a_dome_is_below_a_third_of_a_pixel() {
 /// The corner was built otherwise than its file says: the photographs move and tilt its walls.
 #[test]
 fn screens_that_were_measured_wrongly_are_found() {
-    // walls and marks are told apart by exact marks
+    // exact marks separate walls from marks
     let mut case = corner(&Faults { marks: 0.1, ..FAULTS });
     // the file says 9 mm more to the left, and a floor that rises by 8 mm to the front
     let wrong = case

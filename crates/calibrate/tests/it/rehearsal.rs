@@ -170,7 +170,7 @@ impl Room {
         seen.then(|| (place, -normal.dot(&d.normalize()) / d.norm_squared()))
     }
 
-    /// What the camera sees: four samples for each pixel, point and normal.
+    /// The view of the camera: four samples for each pixel, point and normal.
     pub fn look(&self, eye: &Stand) -> Vec<Option<(Point3<f64>, Vector3<f64>)>> {
         let [w, h] = self.camera.size;
         let quarters = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)];
@@ -224,7 +224,7 @@ impl Room {
     }
 }
 
-/// What the camera sees of one projector.
+/// The view of one projector by the camera.
 struct Seen {
     size: [u32; 2],
     projector: [u32; 2],

@@ -163,7 +163,7 @@ struct Moving {
     range: Range<usize>,
 }
 
-/// What a column displaces.
+/// The displacement of a column.
 #[derive(Clone, Copy)]
 enum Coordinate {
     Position(usize),

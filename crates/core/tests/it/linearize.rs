@@ -64,7 +64,7 @@ fn body(world: &World, id: ObjectId) -> &dyn Integratable {
     match (world.get::<RigidBody>(id), world.get::<ArticulatedBody>(id)) {
         (Some(body), _) => body.integratable().unwrap(),
         (_, Some(body)) => body.integratable().unwrap(),
-        _ => panic!("neither a rigid nor an articulated body"),
+        _ => panic!("not a rigid and not an articulated body"),
     }
 }
 

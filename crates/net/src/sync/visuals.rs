@@ -156,7 +156,7 @@ fn put_text(out: &mut Vec<u8>, text: &str) {
     out.extend(&text.as_bytes()[..end]);
 }
 
-/// What a described object shows.
+/// The visuals of a described object.
 pub(crate) struct Looks {
     pub visuals: Vec<Visual>,
     pub surface: Option<PartSurface>,

@@ -105,11 +105,11 @@ pub struct ServeOptions {
     /// are those of [tracker] in the cave file.
     #[arg(long, value_name = "HOST:PORT", conflicts_with = "tracker", requires = "vrpn_map")]
     pub vrpn: Option<String>,
-    /// What a device of the VRPN server moves: DEVICE=USER/PART or DEVICE:SENSOR=USER/PART, separated by
+    /// The part that a device of the VRPN server moves: DEVICE=USER/PART or DEVICE:SENSOR=USER/PART, separated by
     /// commas. A part is head, wand, hand/left, hand/right or buttons.
     #[arg(long, value_name = "MAP,…", value_delimiter = ',', requires = "vrpn")]
     pub vrpn_map: Vec<DeviceMap>,
-    /// Smooth tracked heads by a 1 € filter with this cutoff at rest, Hz; less is smoother, 1 to 2 is usual.
+    /// Smooth tracked heads by a 1 € filter with this cutoff at rest, Hz; less is smoother, 1 to 2 suits heads.
     #[arg(long, value_name = "HZ", value_parser = crate::args::cutoff)]
     pub tracker_smooth: Option<f64>,
     /// Draw tracked heads where they will be after this time, ms: from the measurement to the light of the

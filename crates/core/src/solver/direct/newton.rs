@@ -18,7 +18,7 @@
 //! | `A`, `B` | derivatives of `f` of a block by its own `λ` and its own `w` |
 //! | `ε` | keeps redundant contacts regular; grows after a step along which `|f|` does not fall |
 //!
-//! With the right choice of open, sticking and sliding contacts a step is exact but for the curve of sliding
+//! With the right choice of open, sticking and sliding contacts a step is exact except for the curve of sliding
 //! friction. From the multipliers of the last step, nine tenths of the islands of robots that stand and fall take
 //! five steps or so, if a second attempt follows ten sweeps; the others go in circles, and other methods solve
 //! them. Source: Alart and Curnier,

@@ -28,7 +28,7 @@ const RETRY_INTERVAL: Duration = Duration::from_secs(1);
 const MAX_BUTTONS: i32 = 32;
 const PARTS: [&str; 5] = ["head", "wand", "hand/left", "hand/right", "buttons"];
 
-/// What a device of the server moves: `DEVICE:SENSOR=USER/PART`.
+/// The part that a device of the server moves: `DEVICE:SENSOR=USER/PART`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DeviceMap {
     /// Name of the device.
