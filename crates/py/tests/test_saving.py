@@ -147,4 +147,4 @@ def test_flocks_of_bodies_are_saved(tmp_path):
     world = tumble.World()
     world.add_body_flock("school")
     world.save_scene(tmp_path / "now.toml")
-    assert "school" in tumble.World.load(tmp_path / "now.toml")
+    assert tumble.World.load(tmp_path / "now.toml")["school"].name == "school"

@@ -206,10 +206,13 @@ fn a_thousand_random_contacts_agree_with_differences() {
         }
         // differences that do not agree with themselves have met a kink, or the solver's rounding
         let expected = by_differences(&world, &linear, 1.0);
-        if error_of(&linear, &expected, &by_differences(&world, &linear, 0.7)) > 5e-8 {
+        let again = by_differences(&world, &linear, 0.7);
+        if error_of(&linear, &expected, &again) > 5e-8 {
             unsure += 1;
             continue;
         }
+        // the mean has less of the rounding of the solves, which is 1e-13 m/s over displacements of 1e-6
+        let expected = 0.5 * (expected + again);
         checked += 1;
         let off = error_of(&linear, &joined(&linear), &expected);
         if off > worst.0 {

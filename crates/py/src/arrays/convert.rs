@@ -26,8 +26,25 @@ pub struct Numbers {
     pub data: Vec<f64>,
 }
 
-/// Converts anything that numpy can make an array of. `what` names the argument in errors.
+/// Converts anything that numpy can make an array of, if all its numbers are finite. `what` names the argument in errors.
 pub fn numbers(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
+    let all = array(value, what)?;
+    match all.data.iter().position(|x| !x.is_finite()) {
+        Some(k) => Err(Error::value(format!("{what}: number {k} is {}; all must be finite", all.data[k]))),
+        None => Ok(all),
+    }
+}
+
+/// Converts anything that numpy can make an array of, such as bounds that may be infinite.
+pub fn bounds(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
+    let all = array(value, what)?;
+    match all.data.iter().any(|x| x.is_nan()) {
+        true => Err(Error::value(format!("{what}: NaN is no bound"))),
+        false => Ok(all),
+    }
+}
+
+fn array(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
     // numpy would drop imaginary parts and convert dates to days.
     if value.cast::<PyUntypedArray>().is_ok_and(|array| b"cmMSUV".contains(&array.dtype().kind())) {
         return Err(not_numbers(value, what));
@@ -40,10 +57,7 @@ pub fn numbers(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
         Ok(slice) if array.is_c_contiguous() => data.extend_from_slice(slice),
         _ => data.extend(array.as_array().iter()),
     }
-    match data.iter().position(|x| !x.is_finite()) {
-        Some(k) => Err(Error::value(format!("{what}: number {k} is {}; all must be finite", data[k]))),
-        None => Ok(Numbers { shape, data }),
-    }
+    Ok(Numbers { shape, data })
 }
 
 /// Returns an empty vector with room for `len` numbers, if there is enough memory.

@@ -1,7 +1,7 @@
 //! Shared parts of the methods of articulations: lookup of joints and links by name, arguments and
 //! results of the algorithms.
 
-use crate::arrays::convert::{Numbers, numbers, shown, vec3};
+use crate::arrays::convert::{Numbers, bounds, numbers, shown, vec3};
 use crate::errors::{Error, Result};
 use crate::objects::articulation::Articulation;
 use crate::objects::binding::Which;
@@ -62,7 +62,8 @@ impl Articulation {
         with: impl Fn(DofSettings, f64) -> DofSettings,
     ) -> Result<()> {
         let (place, dof) = (self.in_world()?, self.robot.dof());
-        let Numbers { shape, data } = numbers(value, name)?;
+        let may_be_infinite = ["effort", "max_velocity"].contains(&name);
+        let Numbers { shape, data } = if may_be_infinite { bounds(value, name) } else { numbers(value, name) }?;
         let each = match shape.as_slice() {
             [] => vec![data[0]; dof],
             [n] if *n == dof => data,
