@@ -28,7 +28,7 @@ pub struct Numbers {
 
 /// Converts anything that numpy can make an array of, if all its numbers are finite. `what` names the argument in errors.
 pub fn numbers(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
-    let all = array(value, what)?;
+    let all = any_numbers(value, what)?;
     match all.data.iter().position(|x| !x.is_finite()) {
         Some(k) => Err(Error::value(format!("{what}: number {k} is {}; all must be finite", all.data[k]))),
         None => Ok(all),
@@ -37,14 +37,14 @@ pub fn numbers(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
 
 /// Converts anything that numpy can make an array of, such as bounds that may be infinite.
 pub fn bounds(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
-    let all = array(value, what)?;
+    let all = any_numbers(value, what)?;
     match all.data.iter().any(|x| x.is_nan()) {
         true => Err(Error::value(format!("{what}: NaN is no bound"))),
         false => Ok(all),
     }
 }
 
-fn array(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
+fn any_numbers(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
     // numpy would drop imaginary parts and convert dates to days.
     if value.cast::<PyUntypedArray>().is_ok_and(|array| b"cmMSUV".contains(&array.dtype().kind())) {
         return Err(not_numbers(value, what));
