@@ -56,7 +56,7 @@ def test_velocity_limits_of_a_urdf_hold_if_asked(urdf, tmp_path):
     for number, world in enumerate((made, tumble.World.load(scene))):
         arm = world["arm"]
         assert arm.max_velocity == pytest.approx([3])
-        for _ in range(24):
+        for _ in range(48):
             arm.tau = [2.0]
             world.step()
             assert arm.qd[0] == pytest.approx(min(2 / 0.1 * world.time, 3), abs=1e-9)
