@@ -7,9 +7,9 @@
 //! K̃   = Ŷᵀ·Ŷ,         Ŷ: r numbers per row                             pivoted Cholesky, r its rank
 //! ```
 //!
-//! A humanoid with joint damping and two feet on the ground has 27 degrees of freedom, 21 equality rows and a
-//! dozen others. Reduced, it is one object with twelve degrees of freedom or less: each sweep and each
-//! factorization of it takes a tenth of the time or less.
+//! A humanoid with joint damping and two feet on the ground has 27 degrees of freedom, 21 equality rows and one or
+//! two dozen others. Reduced, it is one object with no more degrees of freedom than it has other rows, so that sweeps
+//! and factorizations cost less.
 
 use super::equality::Equalities;
 use super::joint_row::parallel_rows;

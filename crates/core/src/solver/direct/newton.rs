@@ -19,10 +19,8 @@
 //! | `ε` | keeps redundant contacts regular; grows after a step along which `|f|` does not fall |
 //!
 //! With the right choice of open, sticking and sliding contacts a step is exact except for the curve of sliding
-//! friction. From the multipliers of the last step, nine tenths of the islands of robots that stand and fall take
-//! five steps or so, if a second attempt follows ten sweeps; the others go in circles, and other methods solve
-//! them. Source: Alart and Curnier,
-//! *A mixed formulation for frictional contact problems prone to Newton like solution methods*, 1991.
+//! friction. Where the choices go in circles, a second attempt after ten sweeps often succeeds; other methods solve
+//! the rest. Source: Alart and Curnier, *A mixed formulation for frictional contact problems prone to Newton like solution methods*, 1991.
 
 use super::cone::{M3, V3, length, times};
 use super::island::{Island, Kind, LocalBlock};
