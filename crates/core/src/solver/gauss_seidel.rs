@@ -89,28 +89,39 @@ impl RowSolver for GaussSeidel {
         du: &mut [f64],
         settings: SolverSettings,
     ) -> SolveReport {
-        let mut linkages = Linkages::new(rows, blocks);
+        let linkages = Linkages::new(rows, blocks);
         let reduced = Reduced::new(rows, blocks, (c, lambda), &linkages);
         if let Some(outcome) =
             reduced.and_then(|r| solve_reduced(r, (rows, blocks, c), &linkages, (lambda, du), settings))
         {
             return outcome;
         }
-        with_memory(|locals| {
-            add_blocks(rows, blocks, (c, lambda), &mut linkages, locals);
-            let left = apply(locals, &linkages, rows, c, lambda, du);
-            if locals.is_empty() {
-                let converged = left <= settings.tolerance;
-                return SolveReport { iterations: 1, converged, ray: false, relaxations: 0 };
-            }
-            let extrapolation = Extrapolation::new(locals, &linkages, rows, du);
-            Solve { rows, blocks, c, lambda, du, settings, locals, linkages, extrapolation, is_reduced: false }.run()
-        })
+        solve_rows((rows, blocks, c), (lambda, du), linkages, settings, false)
     }
 
     fn fork(&self) -> Box<dyn RowSolver> {
         Box::new(*self)
     }
+}
+
+/// Solves an island as it is.
+fn solve_rows(
+    (rows, blocks, c): (&Rows, &[u32], &[f64]),
+    (lambda, du): (&mut [f64], &mut [f64]),
+    mut linkages: Linkages,
+    settings: SolverSettings,
+    is_reduced: bool,
+) -> SolveReport {
+    with_memory(|locals| {
+        add_blocks(rows, blocks, (c, lambda), &mut linkages, locals);
+        let left = apply(locals, &linkages, rows, c, lambda, du);
+        if locals.is_empty() {
+            let converged = left <= settings.tolerance;
+            return SolveReport { iterations: 1, converged, ray: false, relaxations: 0 };
+        }
+        let extrapolation = Extrapolation::new(locals, &linkages, rows, du);
+        Solve { rows, blocks, c, lambda, du, settings, locals, linkages, extrapolation, is_reduced }.run()
+    })
 }
 
 /// Solves an island that has become smaller. Returns `None` if what is solved there is not solved here, because of
@@ -124,25 +135,7 @@ fn solve_reduced(
 ) -> Option<SolveReport> {
     let mut own = vec![0.0; reduced.rows.dof];
     let Reduced { rows: few, blocks: all, c: free, lambda: start, .. } = &mut reduced;
-    let outcome = with_memory(|locals| {
-        let mut none = Linkages::default();
-        add_blocks(few, all, (free, start), &mut none, locals);
-        apply(locals, &none, few, free, start, &mut own);
-        let extrapolation = Extrapolation::new(locals, &none, few, &own);
-        Solve {
-            rows: few,
-            blocks: all,
-            c: free,
-            lambda: start,
-            du: &mut own,
-            settings,
-            locals,
-            linkages: none,
-            extrapolation,
-            is_reduced: true,
-        }
-        .run()
-    });
+    let outcome = solve_rows((few, all, free), (start, &mut own), Linkages::default(), settings, true);
     reduced.write(rows, c, linkages, lambda, du);
     let solved = !outcome.converged || residual(rows, blocks, c, lambda, du) <= SOLVED * settings.tolerance;
     if !solved {

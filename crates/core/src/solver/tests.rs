@@ -6,6 +6,7 @@ mod islands;
 mod joint_rows;
 mod linkages;
 mod pivoting;
+mod reduced;
 mod redundant;
 mod residuals;
 mod scalar;
