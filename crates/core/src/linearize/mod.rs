@@ -10,9 +10,9 @@
 //! | `τ` | generalized forces, constant over the frame, in addition to those that are applied already |
 //!
 //! **Contacts and joints.** A step contains several contact problems: impacts, the solve of all rows, rebounds,
-//! overlap. Each is differentiated at its active set by the implicit function theorem ([`held_solver`]): no
+//! overlap. Each is differentiated at its active set by the implicit function theorem (`held_solver`): no
 //! solver runs, and its tolerance is not in the result. The branches at which the map of a step has a kink (a gap
-//! that opens, overlap above the tolerance) are held as well ([`branches`]). So the result is the derivative of the
+//! that opens, overlap above the tolerance) are held as well (`branches`). So the result is the derivative of the
 //! one smooth map that holds on one side of a kink, also exactly at it.
 //!
 //! **The rest** of a step (free motion, forces, kinematics, the motion of contacts) is differenced: columns are
