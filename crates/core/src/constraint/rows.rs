@@ -219,19 +219,26 @@ impl Rows {
     /// Returns `K + R`, with `K = YᵀY`, of the given blocks: dense, row-major, in the order of
     /// their rows. For the pivoting solvers and tests.
     pub fn dense(&self, blocks: &[u32]) -> Vec<f64> {
-        let mut rows: Vec<(&Block, usize)> = Vec::with_capacity(blocks.len());
-        for block in blocks.iter().map(|&b| &self.blocks[b as usize]) {
-            rows.extend((0..block.set.rows()).map(|k| (block, k)));
-        }
-        let n = rows.len();
+        let n: usize = blocks.iter().map(|&b| self.blocks[b as usize].set.rows()).sum();
         let mut dense = vec![0.0; n * n];
-        for (i, (a, ka)) in rows.iter().enumerate() {
-            for (j, (b, kb)) in rows.iter().enumerate().take(i + 1) {
-                let value = self.coupling(a, *ka, b, *kb);
-                dense[i * n + j] = value;
-                dense[j * n + i] = value;
+        let mut responses: Vec<(u32, usize, &[f64])> = Vec::with_capacity(2 * n);
+        let mut row = 0;
+        for block in blocks.iter().map(|&b| &self.blocks[b as usize]) {
+            for k in 0..block.set.rows() {
+                responses.extend(block.sides().iter().map(|side| (side.u, row, self.response(side, k))));
+                dense[row * n + row] += block.compliance;
+                row += 1;
             }
-            dense[i * n + i] += a.compliance;
+        }
+        responses.sort_unstable_by_key(|&(u, row, _)| (u, row));
+        for of_object in responses.chunk_by(|a, b| a.0 == b.0) {
+            for (end, &(_, i, a)) in of_object.iter().enumerate() {
+                let row = &mut dense[i * n..][..i + 1];
+                of_object[..=end].iter().for_each(|&(_, j, b)| row[j] += dot(a, b));
+            }
+        }
+        for i in 0..n {
+            (0..i).for_each(|j| dense[j * n + i] = dense[i * n + j]);
         }
         dense
     }

@@ -30,8 +30,9 @@
 //! so are large islands in motion. A solve that ends unfinished is scaled so that it adds no energy
 //! ([`optimal_scale`]).
 
-use super::direct::Plan;
+use super::direct::{Plan, SmallIsland};
 use super::extrapolation::Extrapolation;
+use super::folded::Folded;
 use super::joint_row::parallel_rows;
 use super::linkage::Linkages;
 use super::local::{Local, Progress, apply, with_memory, write_back};
@@ -89,19 +90,46 @@ impl RowSolver for GaussSeidel {
         du: &mut [f64],
         settings: SolverSettings,
     ) -> SolveReport {
-        let linkages = Linkages::new(rows, blocks);
-        let reduced = Reduced::new(rows, blocks, (c, lambda), &linkages);
-        if let Some(outcome) =
-            reduced.and_then(|r| solve_reduced(r, (rows, blocks, c), &linkages, (lambda, du), settings))
-        {
-            return outcome;
+        match Folded::new(rows, blocks, (c, lambda)) {
+            Some(folded) => solve_folded(folded, (rows, c), (lambda, du), settings),
+            None => solve_island((rows, blocks, c), (lambda, du), settings),
         }
-        solve_rows((rows, blocks, c), (lambda, du), linkages, settings, false)
     }
 
     fn fork(&self) -> Box<dyn RowSolver> {
         Box::new(*self)
     }
+}
+
+/// Solves an island without the soft rows of its objects, then these.
+fn solve_folded(
+    mut folded: Folded,
+    (rows, c): (&Rows, &[f64]),
+    (lambda, du): (&mut [f64], &mut [f64]),
+    settings: SolverSettings,
+) -> SolveReport {
+    let mut own = vec![0.0; folded.dof()];
+    let Folded { rows: rest, blocks, c: free, lambda: start, .. } = &mut folded;
+    let outcome = if blocks.is_empty() {
+        SolveReport { iterations: 1, converged: true, ray: false, relaxations: 0 }
+    } else {
+        solve_island((rest, blocks, free), (start, &mut own), settings)
+    };
+    folded.write(rows, c, &mut own, lambda, du);
+    outcome
+}
+
+/// Solves an island, in fewer numbers if it can be reduced.
+fn solve_island(
+    (rows, blocks, c): (&Rows, &[u32], &[f64]),
+    (lambda, du): (&mut [f64], &mut [f64]),
+    settings: SolverSettings,
+) -> SolveReport {
+    let linkages = Linkages::new(rows, blocks);
+    let reduced = Reduced::new(rows, blocks, (c, lambda), &linkages);
+    reduced
+        .and_then(|reduced| solve_reduced(reduced, (rows, blocks, c), &linkages, (lambda, du), settings))
+        .unwrap_or_else(|| solve_rows((rows, blocks, c), (lambda, du), linkages, settings, false))
 }
 
 /// Solves an island as it is.
@@ -167,7 +195,9 @@ impl Solve<'_> {
         let mut outcome = SolveReport { iterations: sweeps, converged: false, ray: false, relaxations: 0 };
         let affordable = self.settings.budget.map(|budget| f64::from(budget) / count.max(1) as f64);
         let mut relaxation = Relaxation::new(ACCELERATED);
-        let (mut plan, mut due, mut direct) = (None, 0, false);
+        let (mut small, mut plan, mut due, mut direct) = (None, None, 0, false);
+        // of Newton's method, in relaxations
+        let mut work = 0;
         for sweep in 1..=sweeps {
             let progress = self.sweep(relaxation.factor);
             let first = sweep == FIRST_SWEEPS.min(sweeps);
@@ -177,20 +207,20 @@ impl Solve<'_> {
             }
             relaxation.record(sweep, progress.change);
             if NEWTON[usize::from(count <= TINY)..].contains(&sweep) && self.may_try_newton() {
-                plan = plan.or_else(|| Plan::new(self.rows, self.blocks, self.c, false).filter(Plan::is_small));
-                if let Some(plan) = &mut plan {
-                    outcome = self.newton(plan);
-                    direct = outcome.converged;
+                small = small.or_else(|| SmallIsland::new(self.rows, self.blocks, self.c));
+                if let Some(island) = &mut small {
+                    let tried = self.newton(island, sweep == NEWTON[1]);
+                    work += tried.relaxations;
+                    if tried.converged {
+                        outcome = SolveReport { iterations: sweep + tried.iterations, ..tried };
+                        outcome.relaxations = sweep * count as u32;
+                        direct = true;
+                        break;
+                    }
                 }
-                if direct {
-                    outcome.iterations += sweep;
-                    outcome.relaxations += sweep * count as u32;
-                    break;
-                }
-                outcome.iterations = sweeps;
             }
             if first {
-                plan = plan.or_else(|| Plan::new(self.rows, self.blocks, self.c, sweeps < FIRST_SWEEPS));
+                plan = Plan::new(self.rows, self.blocks, self.c, sweeps < FIRST_SWEEPS);
                 due = plan.as_ref().map_or(u32::MAX, |plan| (FACTORIZATIONS * plan.cost()) as u32).max(sweep);
                 if let Some(affordable) = affordable {
                     let spare = |plan: &Plan| affordable - AFFORDABLE * plan.cost();
@@ -220,6 +250,7 @@ impl Solve<'_> {
         if !direct {
             outcome.relaxations = outcome.iterations * count as u32;
         }
+        outcome.relaxations += work;
         write_back(self.locals, self.lambda);
         if !outcome.converged && !direct && self.linkages.is_empty() {
             self.limit_energy();
@@ -244,11 +275,11 @@ impl Solve<'_> {
     }
 
     /// Tries Newton's method on a small island.
-    fn newton(&mut self, plan: &mut Plan) -> SolveReport {
+    fn newton(&mut self, island: &mut SmallIsland, thorough: bool) -> SolveReport {
         self.rebuild();
-        let solved = plan.newton(self.lambda, self.settings.tolerance);
+        let solved = island.solve(self.lambda, self.settings.tolerance, thorough);
         self.read();
-        let relaxations = (f64::from(solved.factorizations) * plan.cost() * self.locals.len() as f64) as u32;
+        let relaxations = (f64::from(solved.factorizations) * island.cost() * self.locals.len() as f64) as u32;
         SolveReport { iterations: solved.factorizations, converged: solved.converged, ray: false, relaxations }
     }
 

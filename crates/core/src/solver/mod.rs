@@ -7,6 +7,7 @@ mod direct;
 mod dof6;
 mod equality;
 mod extrapolation;
+mod folded;
 mod gauss_seidel;
 mod island;
 mod joint_row;

@@ -18,7 +18,7 @@ use crate::constraint::rows::{Block, Rows, dot};
 
 /// Maximum numbers of rows that are left, and of degrees of freedom before. There must be no more rows than degrees of
 /// freedom: with more, to reduce the island costs more than it saves.
-const MAX: (usize, usize) = (32, 256);
+const MAX: (usize, usize) = (64, 256);
 /// A row depends on others below this fraction of its diagonal of `K̃`.
 const RANK: f64 = 1e-13;
 
@@ -43,7 +43,7 @@ impl Reduced {
         }
         let objects = objects_of(rows, blocks);
         let dof = objects.last().map_or(0, |o| o.first + o.dof);
-        if dof > MAX.1 || count > dof || linkages.is_empty() && 2 * count > dof {
+        if dof > MAX.1 || linkages.is_empty() && 2 * count > dof {
             return None;
         }
         let members: Vec<u32> = members().collect();

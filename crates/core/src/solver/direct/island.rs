@@ -1,7 +1,11 @@
 //! One island in compact form: its objects numbered from 0, its multipliers and velocities in a row.
 
+use super::Tolerance;
 use super::cone::{length, project};
 use crate::constraint::rows::{Block, RowSet, Rows, dot};
+
+/// Errors relative to the fastest row: what rounding leaves at best, and what counts as solved.
+const ROUNDING: [f64; 2] = [1e-13, 1e-10];
 
 /// An object of the island.
 pub(super) struct Object {
@@ -73,6 +77,23 @@ pub(super) fn fastest_row(block: &Block, c: &[f64]) -> f64 {
     let one_sided = matches!(block.set, RowSet::Cone { .. } | RowSet::HalfLine);
     let first = if one_sided { c[0].min(0.0) } else { c[0] };
     c[1..].iter().fold(first.abs(), |f, c| f.max(c.abs()))
+}
+
+impl Kind {
+    /// Returns the bounds of the multiplier of a scalar row that has any.
+    #[inline(always)]
+    pub fn bounds(self) -> Option<(f64, f64)> {
+        match self {
+            Kind::HalfLine => Some((0.0, f64::INFINITY)),
+            Kind::Interval { lo, hi } => Some((lo, hi)),
+            Kind::Held | Kind::Equality | Kind::Cone { .. } => None,
+        }
+    }
+}
+
+/// Returns the largest of errors; one that is not a number is the largest, and `max` would drop it.
+pub(super) fn largest(errors: impl Iterator<Item = f64>) -> f64 {
+    errors.fold(0.0, |max: f64, error| if max.is_nan() || error <= max { max } else { error })
 }
 
 /// The rows of an island.
@@ -205,11 +226,13 @@ impl<'a> Island<'a> {
     /// (w + μ·|w_t|·n)/d` onto its set, times `d`. `u` is `Y·λ`.
     pub fn error(&self, u: &[f64], lambda: &[f64]) -> f64 {
         let error = |b: &LocalBlock| self.block_error(b, self.row_velocity(b, u, lambda), &lambda[b.range()]);
-        // `max` would drop NaN
-        self.blocks
-            .iter()
-            .map(error)
-            .fold(0.0, |max: f64, error| if max.is_nan() || error <= max { max } else { error })
+        largest(self.blocks.iter().map(error))
+    }
+
+    /// Returns the errors to reach for the tolerance of a sweep.
+    pub fn tolerance(&self, tolerance: f64) -> Tolerance {
+        let [rounding, solved] = ROUNDING.map(|share| share * self.fastest);
+        Tolerance { goal: tolerance.max(rounding), solved: (10.0 * tolerance).max(solved) }
     }
 
     /// The same for multipliers alone.
@@ -219,7 +242,8 @@ impl<'a> Island<'a> {
         self.error(&u, lambda)
     }
 
-    fn block_error(&self, block: &LocalBlock, w: [f64; 3], lambda: &[f64]) -> f64 {
+    /// Returns the error of one block with the row velocities `w`.
+    pub fn block_error(&self, block: &LocalBlock, w: [f64; 3], lambda: &[f64]) -> f64 {
         let d = block.diagonal;
         let scalar = |lo: f64, hi: f64| (lambda[0] - (lambda[0] - w[0] / d).max(lo).min(hi)).abs() * d;
         match block.kind {

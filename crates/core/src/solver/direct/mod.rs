@@ -18,7 +18,9 @@
 //! loops. Islands whose factorization costs more than [`MAX_WORK`] or [`MAX_COST`] are left to the
 //! sweeps, and so are islands of more than [`SMALL`] degrees of freedom in motion.
 
+mod choice;
 mod cone;
+mod dense;
 mod interior_point;
 mod island;
 mod lagged;
@@ -30,6 +32,7 @@ mod structure;
 use crate::constraint::rows::{RowSet, Rows};
 use island::{Island, fastest_row};
 use lu::Factor;
+pub(super) use newton::SmallIsland;
 use structure::Structure;
 
 /// Maximum number of multiplications of one factorization, and if nothing slides: a wall at rest is
@@ -52,15 +55,13 @@ const NEAR: (f64, f64) = (1e-2, 1e-5);
 /// small and a large island.
 const FACTORS: (u32, u32, u32) = (8, 30, 8);
 /// Maximum number of factorizations with a lagged shift, for a small and a large island.
-const LAGGED: (u32, u32) = (150, 20);
+const LAGGED: (u32, u32) = (60, 20);
 /// Penalties of the forces with which all contacts stick, in the order in which they are tried.
 const STICKING: [f64; 3] = [1e9, 1e6, 1e4];
 /// Degrees of freedom of a small island, on which no effort is spared.
 const SMALL: usize = 120;
 /// Error, relative to the fastest row, that ends the interior point method of a large island early.
 const ENOUGH: f64 = 1e-5;
-/// Errors relative to the fastest row: what rounding leaves at best, and what counts as solved.
-const ROUNDING: (f64, f64) = (1e-13, 1e-10);
 
 /// The errors to reach, m/s.
 #[derive(Clone, Copy)]
@@ -118,31 +119,6 @@ impl<'a> Plan<'a> {
         Some(Plan { system: System { island, structure, factor }, at_rest })
     }
 
-    /// Returns whether the island is so small that no effort is spared.
-    pub fn is_small(&self) -> bool {
-        self.system.island.dof <= SMALL
-    }
-
-    /// Solves a small island from multipliers in `lambda` that need not be near, and replaces them if it finds
-    /// better ones.
-    pub fn newton(&mut self, lambda: &mut [f64], tolerance: f64) -> Direct {
-        let tolerance = self.tolerance(tolerance);
-        let system = &mut self.system;
-        let mut own = system.island.read(lambda);
-        let start = system.island.error_of(&own);
-        let (error, factorizations) = newton::solve(system, &mut own, start, tolerance);
-        if error < start {
-            system.island.write(&own, lambda);
-        }
-        Direct { factorizations, converged: error <= tolerance.solved }
-    }
-
-    /// Returns the errors to reach for the tolerance of a sweep.
-    fn tolerance(&self, tolerance: f64) -> Tolerance {
-        let fastest = self.system.island.fastest;
-        Tolerance { goal: tolerance.max(ROUNDING.0 * fastest), solved: (10.0 * tolerance).max(ROUNDING.1 * fastest) }
-    }
-
     /// Returns the cost of a factorization in sweeps.
     pub fn cost(&self) -> f64 {
         let (assembly, sweep) = work_of_blocks(&self.system.island);
@@ -155,7 +131,7 @@ impl<'a> Plan<'a> {
         let fastest = self.system.island.fastest;
         let cheap = self.system.island.dof <= SMALL || self.cost() < CHEAP;
         let near = if self.at_rest { NEAR.0 } else { NEAR.1 };
-        let tolerance = self.tolerance(tolerance);
+        let tolerance = self.system.island.tolerance(tolerance);
         let system = &mut self.system;
         let small = system.island.dof <= SMALL;
         let (enough, last) = if small { (0.0, FACTORS.1) } else { (ENOUGH * fastest, FACTORS.2) };

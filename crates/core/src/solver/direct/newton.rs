@@ -1,267 +1,311 @@
-//! Newton's method on the function of Alart and Curnier: small islands, from multipliers that need not be
-//! near.
+//! Newton's method on the function of Alart and Curnier (`choice.rs`), with the matrix of the rows: small islands,
+//! from multipliers that need not be near.
 //!
 //! ```text
-//! normal      f_n = w_n                     if n = λ_n − ρ·w_n > 0,      else f = λ/ρ (open)
-//! tangents    f_t = w_t                     if |x| ≤ μ·n,  x = λ_t − ρ·w_t        (stick)
-//!             f_t = (λ_t − μ·n·x/|x|)/ρ     else                                  (slide)
-//! scalar      f   = (λ − clamp(λ − ρ·w, lo, hi))/ρ
-//!
-//! f(λ) = 0,   w = c + Yᵀu + R·λ,   u = Y·λ                  f' = A + B·(K + R)
-//! C = A + B·R + ε·d,   G = C⁻¹·B
-//! (1 + Σ Y·G·Yᵀ)·δu = −Σ Y·C⁻¹·f,       δλ = −C⁻¹·(f + B·Yᵀδu)
+//! f(λ, w) = 0,    w = c + (K + R)·λ
+//! open, low, high:     (1 + ε)·d·δλ = −f
+//! free, slide:         (∂f/∂λ + ε·d + ∂f/∂w·(K + R))·δλ = −f
 //! ```
 //!
 //! | symbol | meaning |
 //! |---|---|
-//! | `ρ` | `1/d`, with `d` the mean diagonal of the block of `K` |
-//! | `A`, `B` | derivatives of `f` of a block by its own `λ` and its own `w` |
+//! | `d` | mean diagonal of a block of `K` |
 //! | `ε` | keeps redundant contacts regular; grows after a step along which `|f|` does not fall |
 //!
-//! With the right choice of open, sticking and sliding contacts a step is exact except for the curve of sliding
-//! friction. Where the choices go in circles, a second attempt after ten sweeps often succeeds; other methods solve
-//! the rest. Source: Alart and Curnier, *A mixed formulation for frictional contact problems prone to Newton like solution methods*, 1991.
+//! With the right choices a step is exact except for the curve of sliding friction. The choices follow the iterate,
+//! and a line search along `|f|` accepts some steps uphill. Where they go in circles, a second attempt after ten sweeps
+//! often succeeds. If it fails too, the choices are *held*: those of the multipliers that are there, then each with one
+//! block changed, in the order of how near the block is to that change. Four feet of a robot with friction press each
+//! other through its joints, and then `|f|` has minima that are no solutions; nine of ten times the right choices
+//! differ by at most one block. Other methods solve the rest.
 
-use super::cone::{M3, V3, length, times};
-use super::island::{Island, Kind, LocalBlock};
-use super::{System, Tolerance};
+use super::choice::{Choice, Derivative, Point};
+use super::dense;
+use super::island::{Island, LocalBlock, largest};
+use super::{Direct, Tolerance, work_of_blocks};
+use crate::constraint::rows::{Rows, dot};
 
-/// Maximum number of factorizations.
-const STEPS: u32 = 12;
+/// Maximum number of rows of an island.
+const MAX_ROWS: usize = 128;
+/// Maximum number of steps, and of those with the choices held.
+const STEPS: (u32, u32) = (12, 6);
+/// Number of single changes that are tried.
+const CHANGES: usize = 10;
 /// `ε`: least, first after a step that failed, growth and bound.
-const REGULAR: [f64; 4] = [1e-10, 1e-6, 100.0, 0.1];
-/// A step is accepted if `|f|` falls below the largest of this number of last iterates: the way to the right choice
-/// of open, sticking and sliding contacts leads uphill now and then (Grippo, Lampariello and Lucidi, *A nonmonotone
-/// line search technique for Newton's method*, 1986).
+const REGULAR: [f64; 4] = [1e-13, 1e-6, 100.0, 0.1];
+/// A step is accepted if `|f|` falls below the largest of this number of last iterates: the way to the right choices
+/// leads uphill now and then (Grippo, Lampariello and Lucidi, *A nonmonotone line search technique for Newton's
+/// method*, 1986).
 const MEMORY: usize = 6;
 /// Number of lengths of a step that are tried, each half of the last.
 const LENGTHS: u32 = 6;
 
-/// A block at an iterate.
-#[derive(Clone, Copy, Default)]
-struct Point {
-    lambda: V3,
-    w: V3,
+/// A small island with the matrix of its rows.
+pub(in crate::solver) struct SmallIsland<'a> {
+    island: Island<'a>,
+    /// `K + R`, row-major.
+    k: Vec<f64>,
+    memory: Memory,
 }
 
-impl Point {
-    /// Returns `λ − ρ·w`.
+/// Equations of the coupled rows.
+#[derive(Default)]
+struct Memory {
+    coupled: Vec<usize>,
+    matrix: Vec<f64>,
+    right: Vec<f64>,
+}
+
+/// Multipliers and row velocities of the island.
+#[derive(Clone)]
+struct Iterate {
+    lambda: Vec<f64>,
+    w: Vec<f64>,
+}
+
+impl Iterate {
     #[inline(always)]
-    fn moved(&self, block: &LocalBlock) -> V3 {
-        [0, 1, 2].map(|k| self.lambda[k] - self.w[k] / block.diagonal)
+    fn point(&self, block: &LocalBlock) -> Point {
+        let mut point = Point::default();
+        point.lambda[..block.rows].copy_from_slice(&self.lambda[block.range()]);
+        point.w[..block.rows].copy_from_slice(&self.w[block.range()]);
+        point
+    }
+
+    /// Returns a block after `t` of a change.
+    #[inline(always)]
+    fn point_along(&self, change: &Iterate, t: f64, block: &LocalBlock) -> Point {
+        let (at, change) = (self.point(block), change.point(block));
+        let add = |x: [f64; 3], d: [f64; 3]| [0, 1, 2].map(|k| x[k] + t * d[k]);
+        Point { lambda: add(at.lambda, change.lambda), w: add(at.w, change.w) }
+    }
+
+    fn advance(&mut self, change: &Iterate, t: f64) {
+        self.lambda.iter_mut().zip(&change.lambda).for_each(|(x, d)| *x += t * d);
+        self.w.iter_mut().zip(&change.w).for_each(|(x, d)| *x += t * d);
     }
 }
 
-/// The function of a block and its derivatives, `f' = A + B·(K + R)`.
-struct Linear {
-    f: V3,
-    a: M3,
-    b: M3,
+/// The best multipliers so far.
+struct Best {
+    lambda: Vec<f64>,
+    error: f64,
+    /// Number of equations solved.
+    taken: u32,
+    tolerance: Tolerance,
 }
 
-/// Improves `lambda`, whose error is `error`. Returns the error of the best multipliers found, which it leaves
-/// in `lambda`, and the number of factorizations.
-pub(super) fn solve(system: &mut System, lambda: &mut [f64], mut error: f64, tolerance: Tolerance) -> (f64, u32) {
-    let System { island, structure, factor } = system;
-    let (mut u, mut work, mut next) = (Vec::new(), Vec::new(), lambda.to_vec());
-    let mut points = Vec::with_capacity(island.blocks.len());
-    let (mut gains, mut halves) = (vec![[[0.0; 3]; 3]; island.blocks.len()], Vec::new());
-    let (mut epsilon, mut taken) = (REGULAR[0], 0);
-    island.apply(lambda, &mut u);
-    read_points(island, lambda, &u, &mut points);
-    let mut sizes = vec![size_of(island, &points)];
-    while taken < STEPS && error > tolerance.goal && sizes.iter().all(|size| size.is_finite()) {
-        let mut step = vec![0.0; island.dof];
-        halves.clear();
-        for (block, (point, gain)) in island.blocks.iter().zip(points.iter().zip(&mut gains)) {
-            let (inverse, linear) = Linear::new(block, point).condensed(block, epsilon);
-            *gain = product(&inverse, &linear.b);
-            let force = times(&inverse, linear.f).map(|x| -x);
-            island.push(block, &force[..block.rows], &mut step);
-            halves.push(force);
+impl Best {
+    fn is_solved(&self) -> bool {
+        self.error <= self.tolerance.solved
+    }
+}
+
+impl<'a> SmallIsland<'a> {
+    /// Returns `None` if the island has too many rows.
+    pub fn new(rows: &'a Rows, blocks: &[u32], c: &[f64]) -> Option<SmallIsland<'a>> {
+        let count: usize = blocks.iter().map(|&b| rows.blocks[b as usize].set.rows()).sum();
+        let island = || Island::new(rows, blocks, c);
+        (count <= MAX_ROWS).then(|| SmallIsland { island: island(), k: rows.dense(blocks), memory: Memory::default() })
+    }
+
+    /// Returns the cost of a step in sweeps, at most.
+    pub fn cost(&self) -> f64 {
+        (self.island.c.len() as f64).powi(3) / 3.0 / work_of_blocks(&self.island).1
+    }
+
+    /// Solves from the multipliers in `lambda`, and replaces them if it finds better ones. If `thorough`, choices
+    /// are held where those that follow the iterate fail.
+    pub fn solve(&mut self, lambda: &mut [f64], tolerance: f64, thorough: bool) -> Direct {
+        let tolerance = self.island.tolerance(tolerance);
+        let own = self.island.read(lambda);
+        let start = self.at(own.clone());
+        let error = self.error(&start);
+        let mut best = Best { lambda: own, error, taken: 0, tolerance };
+        self.follow(start, &mut best);
+        if thorough && !best.is_solved() && best.error.is_finite() {
+            self.hold(&mut best);
         }
-        if !factor.factor(structure, island, &gains) {
-            break;
+        if best.error < error {
+            self.island.write(&best.lambda, lambda);
         }
-        taken += 1;
-        factor.solve(structure, island, &mut step, &mut work);
-        let change = |(i, block): (usize, &LocalBlock)| {
-            let v = island.velocity(block, &step);
-            let reaction = times(&gains[i], v);
-            let lambda = [0, 1, 2].map(|k| halves[i][k] - reaction[k]);
-            Point { lambda, w: [v[0] + block.compliance * lambda[0], v[1], v[2]] }
-        };
-        let changes: Vec<Point> = island.blocks.iter().enumerate().map(change).collect();
-        let largest = sizes.iter().rev().take(MEMORY).fold(0.0, |a: f64, size| a.max(*size));
-        let shorter = (0..LENGTHS)
-            .map(|k| 0.5_f64.powi(k as i32))
-            .find(|&t| size_along(island, &points, &changes, t) < (1.0 - 1e-4 * t) * largest);
-        let length = match shorter {
-            Some(length) => {
-                if length == 1.0 {
-                    epsilon = (0.1 * epsilon).max(REGULAR[0]);
+        Direct { factorizations: best.taken, converged: best.is_solved() }
+    }
+
+    /// Takes steps with the choices that each iterate asks for.
+    fn follow(&mut self, mut at: Iterate, best: &mut Best) {
+        let mut epsilon = REGULAR[0];
+        let mut choices = self.choices(&at);
+        let mut sizes = vec![self.size(|block| at.point(block), None)];
+        for _ in 0..STEPS.0 {
+            if best.error <= best.tolerance.goal || !sizes.iter().all(|size| size.is_finite()) {
+                return;
+            }
+            let Some(change) = self.change(&at, &choices, epsilon) else { return };
+            best.taken += 1;
+            let largest = sizes.iter().rev().take(MEMORY).fold(0.0, |a: f64, size| a.max(*size));
+            let falls = |t: &f64| {
+                let size = self.size(|block| at.point_along(&change, *t, block), None);
+                size < (1.0 - 1e-4 * t) * largest
+            };
+            let length = match (0..LENGTHS).map(|k| 0.5_f64.powi(k as i32)).find(falls) {
+                Some(length) => {
+                    if length == 1.0 {
+                        epsilon = (0.1 * epsilon).max(REGULAR[0]);
+                    }
+                    length
                 }
-                length
+                None if epsilon < REGULAR[3] => {
+                    epsilon = (REGULAR[2] * epsilon).max(REGULAR[1]);
+                    continue;
+                }
+                None => {
+                    epsilon = REGULAR[0];
+                    1.0
+                }
+            };
+            at.advance(&change, length);
+            choices = self.choices(&at);
+            self.consider(&at, &choices, best);
+            sizes.push(self.size(|block| at.point(block), None));
+        }
+    }
+
+    /// Tries the choices of the best multipliers, and those with one block changed.
+    fn hold(&mut self, best: &mut Best) {
+        let start = self.at(best.lambda.clone());
+        let mut choices = self.choices(&start);
+        let mut changes = Vec::new();
+        for (i, block) in self.island.blocks.iter().enumerate() {
+            start.point(block).others(block, |distance, choice| changes.push((distance, i, choice)));
+        }
+        changes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        self.follow_held(start.clone(), &choices, best);
+        for (_, i, choice) in changes.into_iter().take(CHANGES) {
+            if best.is_solved() {
+                return;
             }
-            None if epsilon < REGULAR[3] => {
-                epsilon = (REGULAR[2] * epsilon).max(REGULAR[1]);
-                continue;
+            let before = std::mem::replace(&mut choices[i], choice);
+            self.follow_held(start.clone(), &choices, best);
+            choices[i] = before;
+        }
+    }
+
+    /// Takes steps with the choices held.
+    fn follow_held(&mut self, mut at: Iterate, choices: &[Choice], best: &mut Best) {
+        let mut last = f64::INFINITY;
+        let mut rises = 0;
+        for _ in 0..STEPS.1 {
+            let size = self.size(|block| at.point(block), Some(choices));
+            rises += u32::from(size >= last);
+            if !size.is_finite() || rises > 2 {
+                return;
             }
-            None => {
-                epsilon = REGULAR[0];
-                1.0
+            last = size;
+            let Some(change) = self.change(&at, choices, REGULAR[0]) else { return };
+            best.taken += 1;
+            at.advance(&change, 1.0);
+            self.consider(&at, choices, best);
+            if best.is_solved() {
+                return;
             }
+        }
+    }
+
+    /// Takes the multipliers that the choices ask for if they are the best.
+    fn consider(&self, at: &Iterate, choices: &[Choice], best: &mut Best) {
+        let mut lambda = vec![0.0; self.island.c.len()];
+        for (block, choice) in self.island.blocks.iter().zip(choices) {
+            lambda[block.range()].copy_from_slice(&at.point(block).target(block, *choice)[..block.rows]);
+        }
+        let reached = self.at(lambda);
+        let error = self.error(&reached);
+        if error < best.error {
+            (best.error, best.lambda) = (error, reached.lambda);
+        }
+    }
+
+    fn at(&self, lambda: Vec<f64>) -> Iterate {
+        let mut w = self.times(&lambda);
+        w.iter_mut().zip(&self.island.c).for_each(|(w, c)| *w += c);
+        Iterate { lambda, w }
+    }
+
+    /// Returns `(K + R)·λ`.
+    fn times(&self, lambda: &[f64]) -> Vec<f64> {
+        self.k.chunks_exact(lambda.len().max(1)).map(|row| dot(row, lambda)).collect()
+    }
+
+    fn error(&self, at: &Iterate) -> f64 {
+        let error = |block: &LocalBlock| {
+            let point = at.point(block);
+            self.island.block_error(block, point.w, &point.lambda)
         };
-        for (block, (point, change)) in island.blocks.iter().zip(points.iter().zip(&changes)) {
-            let moved = along(point, change, length);
-            let onto = target(block, &moved);
-            next[block.range()].copy_from_slice(&onto[..block.rows]);
-        }
-        island.apply(&next, &mut u);
-        let reached = island.error(&u, &next);
-        if reached < error {
-            error = reached;
-            lambda.copy_from_slice(&next);
-        }
-        points.iter_mut().zip(&changes).for_each(|(point, change)| *point = along(point, change, length));
-        sizes.push(size_of(island, &points));
+        largest(self.island.blocks.iter().map(error))
     }
-    (error, taken)
-}
 
-fn read_points(island: &Island, lambda: &[f64], u: &[f64], points: &mut Vec<Point>) {
-    points.clear();
-    points.extend(island.blocks.iter().map(|block| {
-        let mut own = [0.0; 3];
-        own[..block.rows].copy_from_slice(&lambda[block.range()]);
-        Point { lambda: own, w: island.row_velocity(block, u, lambda) }
-    }));
-}
-
-fn along(point: &Point, change: &Point, t: f64) -> Point {
-    let add = |x: V3, d: V3| [0, 1, 2].map(|k| x[k] + t * d[k]);
-    Point { lambda: add(point.lambda, change.lambda), w: add(point.w, change.w) }
-}
-
-fn size_of(island: &Island, points: &[Point]) -> f64 {
-    let square = |(block, point): (&LocalBlock, &Point)| square(function(block, point));
-    island.blocks.iter().zip(points).map(square).sum::<f64>().sqrt()
-}
-
-fn size_along(island: &Island, points: &[Point], changes: &[Point], t: f64) -> f64 {
-    let pairs = points.iter().zip(changes);
-    let square = |(block, (point, change)): (&LocalBlock, _)| square(function(block, &along(point, change, t)));
-    island.blocks.iter().zip(pairs).map(square).sum::<f64>().sqrt()
-}
-
-fn square(x: V3) -> f64 {
-    x[0] * x[0] + x[1] * x[1] + x[2] * x[2]
-}
-
-/// Returns the multipliers that the choice of open, sticking and sliding at a point asks for: in the set of
-/// the block.
-#[inline(always)]
-fn target(block: &LocalBlock, point: &Point) -> V3 {
-    let moved = point.moved(block);
-    match block.kind {
-        Kind::Held => point.lambda,
-        Kind::Equality => [point.lambda[0], 0.0, 0.0],
-        Kind::HalfLine => [moved[0].max(0.0), 0.0, 0.0],
-        Kind::Interval { lo, hi } => [moved[0].max(lo).min(hi), 0.0, 0.0],
-        Kind::Cone { .. } if moved[0] <= 0.0 => [0.0; 3],
-        Kind::Cone { mu } => {
-            let (size, radius) = (length(moved[1], moved[2]), mu * moved[0]);
-            let share = if size <= radius { 1.0 } else { radius / size };
-            [moved[0], share * moved[1], share * moved[2]]
-        }
+    fn choices(&self, at: &Iterate) -> Vec<Choice> {
+        self.island.blocks.iter().map(|block| at.point(block).choice(block)).collect()
     }
-}
 
-/// Returns `f` of a block.
-#[inline(always)]
-fn function(block: &LocalBlock, point: &Point) -> V3 {
-    let Point { lambda, w } = point;
-    let d = block.diagonal;
-    match block.kind {
-        Kind::Held => [0.0; 3],
-        Kind::Equality => [w[0], 0.0, 0.0],
-        Kind::HalfLine | Kind::Interval { .. } => {
-            let onto = target(block, point)[0];
-            [if onto == point.moved(block)[0] { w[0] } else { d * (lambda[0] - onto) }, 0.0, 0.0]
-        }
-        Kind::Cone { mu } => {
-            let moved = point.moved(block);
-            let size = length(moved[1], moved[2]);
-            if moved[0] <= 0.0 {
-                lambda.map(|x| d * x)
-            } else if size <= mu * moved[0] {
-                *w
-            } else {
-                let share = mu * moved[0] / size;
-                [w[0], d * (lambda[1] - share * moved[1]), d * (lambda[2] - share * moved[2])]
-            }
-        }
-    }
-}
-
-impl Linear {
+    /// Returns `|f|` with the choices that the points ask for, or with those that are held.
     #[inline(always)]
-    fn new(block: &LocalBlock, point: &Point) -> Linear {
-        let d = block.diagonal;
-        let mut linear = Linear { f: function(block, point), a: [[0.0; 3]; 3], b: [[0.0; 3]; 3] };
-        match block.kind {
-            Kind::Held => linear.a[0][0] = 1.0,
-            Kind::Equality => linear.b[0][0] = 1.0,
-            Kind::HalfLine | Kind::Interval { .. } => {
-                let free = target(block, point)[0] == point.moved(block)[0];
-                (linear.a[0][0], linear.b[0][0]) = if free { (0.0, 1.0) } else { (d, 0.0) };
+    fn size(&self, point: impl Fn(&LocalBlock) -> Point, held: Option<&[Choice]>) -> f64 {
+        let square = |(i, block): (usize, &LocalBlock)| {
+            let point = point(block);
+            let choice = held.map_or_else(|| point.choice(block), |choices| choices[i]);
+            let f = point.function(block, choice);
+            f[0] * f[0] + f[1] * f[1] + f[2] * f[2]
+        };
+        self.island.blocks.iter().enumerate().map(square).sum::<f64>().sqrt()
+    }
+
+    /// Returns the change that makes the linearized function 0, `None` if there is none.
+    fn change(&mut self, at: &Iterate, choices: &[Choice], epsilon: f64) -> Option<Iterate> {
+        let Memory { coupled, matrix, right } = &mut self.memory;
+        let (island, k, count) = (&self.island, &self.k, self.island.c.len());
+        let mut lambda = vec![0.0; count];
+        coupled.clear();
+        for (block, choice) in island.blocks.iter().zip(choices) {
+            if choice.is_coupled() {
+                coupled.extend(block.range());
+            } else {
+                let f = at.point(block).function(block, *choice);
+                let scale = -1.0 / ((1.0 + epsilon) * block.diagonal.max(f64::MIN_POSITIVE));
+                lambda[block.range()].iter_mut().zip(f).for_each(|(x, f)| *x = scale * f);
             }
-            Kind::Cone { mu } => {
-                let moved = point.moved(block);
-                let size = length(moved[1], moved[2]);
-                if moved[0] <= 0.0 {
-                    (0..3).for_each(|k| linear.a[k][k] = d);
-                } else if size <= mu * moved[0] {
-                    (0..3).for_each(|k| linear.b[k][k] = 1.0);
-                } else {
-                    let (t, share) = ([moved[1] / size, moved[2] / size], mu * moved[0] / size);
-                    linear.b[0][0] = 1.0;
-                    for i in 0..2 {
-                        linear.a[1 + i][0] = -d * mu * t[i];
-                        linear.b[1 + i][0] = mu * t[i];
-                        for j in 0..2 {
-                            let same = f64::from(u8::from(i == j));
-                            let turn = share * (same - t[i] * t[j]);
-                            linear.a[1 + i][1 + j] = d * (same - turn);
-                            linear.b[1 + i][1 + j] = turn;
-                        }
+        }
+        let n = coupled.len();
+        matrix.clear();
+        matrix.resize(n * n, 0.0);
+        right.clear();
+        let known = lambda.iter().any(|x| *x != 0.0);
+        let pulled = |row: usize| if known { dot(&k[row * count..][..count], &lambda) } else { 0.0 };
+        let mut first = 0;
+        for (block, choice) in island.blocks.iter().zip(choices).filter(|(_, choice)| choice.is_coupled()) {
+            let point = at.point(block);
+            let f = point.function(block, *choice);
+            let Derivative { by_lambda, by_w } = Derivative::new(block, &point, *choice);
+            let pulls = [0, 1, 2].map(|i| if i < block.rows { pulled(block.row + i) } else { 0.0 });
+            for i in 0..block.rows {
+                let row = &mut matrix[(first + i) * n..][..n];
+                for (j, weight) in by_w[i].iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
+                    if j < block.rows {
+                        let from = &k[(block.row + j) * count..][..count];
+                        row.iter_mut().zip(&*coupled).for_each(|(x, &at)| *x += weight * from[at]);
                     }
                 }
+                (0..block.rows).for_each(|j| row[first + j] += by_lambda[i][j]);
+                row[first + i] += (epsilon * block.diagonal).max(f64::MIN_POSITIVE);
+                right.push(-f[i] - (0..block.rows).map(|j| by_w[i][j] * pulls[j]).sum::<f64>());
             }
+            first += block.rows;
         }
-        linear
-    }
-
-    /// Returns `C⁻¹` with the function.
-    #[inline(always)]
-    fn condensed(self, block: &LocalBlock, epsilon: f64) -> (M3, Linear) {
-        let mut c = self.a;
-        let regular = (epsilon * block.diagonal).max(f64::MIN_POSITIVE);
-        (0..3).for_each(|k| c[k][k] += regular);
-        c[0][0] += self.b[0][0] * block.compliance;
-        if !matches!(block.kind, Kind::Cone { .. }) {
-            return ([[1.0 / c[0][0], 0.0, 0.0], [0.0; 3], [0.0; 3]], self);
+        if !dense::solve(matrix, right) {
+            return None;
         }
-        // the normal row has no tangents in it
-        let normal = 1.0 / c[0][0];
-        let tangents = 1.0 / (c[1][1] * c[2][2] - c[1][2] * c[2][1]);
-        let [xx, xy, yx, yy] = [c[2][2], -c[1][2], -c[2][1], c[1][1]].map(|entry| entry * tangents);
-        let column = [-normal * (xx * c[1][0] + xy * c[2][0]), -normal * (yx * c[1][0] + yy * c[2][0])];
-        ([[normal, 0.0, 0.0], [column[0], xx, xy], [column[1], yx, yy]], self)
+        coupled.iter().zip(&*right).for_each(|(&at, x)| lambda[at] = *x);
+        let w = self.times(&lambda);
+        Some(Iterate { lambda, w })
     }
-}
-
-#[inline(always)]
-fn product(a: &M3, b: &M3) -> M3 {
-    [0, 1, 2].map(|i| [0, 1, 2].map(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j]))
 }

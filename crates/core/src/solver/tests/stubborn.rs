@@ -33,7 +33,19 @@ fn of_two_feet_that_conflict_the_one_that_carries_less_slides() {
 /// code.
 #[test]
 fn recorded_problems_are_solved() {
-    let text = include_str!("stubborn.txt");
+    assert_eq!(solve_all(include_str!("stubborn.txt"), u32::MAX), 10);
+}
+
+/// Four feet with friction that press each other through the joints of a robot: sweeps get no nearer than 1e-7 m/s,
+/// and `|f|` has minima that are no solutions. Newton's method with held choices solves them, before the sweep after
+/// which other methods follow would have cost their first factorizations.
+#[test]
+fn feet_that_are_braced_against_each_other_are_solved() {
+    assert_eq!(solve_all(include_str!("braced.txt"), 100), 4);
+}
+
+/// Solves recorded problems, each in at most a number of iterations, and returns their number.
+fn solve_all(text: &str, most: u32) -> usize {
     let mut count = 0;
     for problem in text.split("problem ").skip(1) {
         let numbers = |line: &str| -> Vec<f64> { line.split(' ').skip(1).map(|x| x.parse().unwrap()).collect() };
@@ -47,6 +59,10 @@ fn recorded_problems_are_solved() {
                 rows.push_block(RowSet::Cone { mu: x[0] });
                 c.extend(&x[1..4]);
                 lambda.extend(&x[4..7]);
+            } else if line.starts_with("half") {
+                rows.push_block(RowSet::HalfLine);
+                c.push(x[0]);
+                lambda.push(x[1]);
             } else {
                 rows.side(x[0] as usize, x[1] as usize).unwrap().copy_from_slice(&x[2..]);
             }
@@ -62,12 +78,12 @@ fn recorded_problems_are_solved() {
         let outcome = GaussSeidel.solve(&rows, &blocks, &c, &mut lambda, &mut du, settings);
         let left = residual(&rows, &blocks, &c, &lambda, &du);
         assert!(
-            outcome.converged && left < 20.0 * settings.tolerance,
+            outcome.converged && left < 20.0 * settings.tolerance && outcome.iterations <= most,
             "{} contacts: {outcome:?}, {left} of {}",
             blocks.len(),
             settings.tolerance
         );
         count += 1;
     }
-    assert_eq!(count, 10);
+    count
 }

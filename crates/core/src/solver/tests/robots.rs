@@ -2,8 +2,7 @@
 
 use super::{FAR, Random, all, distance, solve};
 use crate::constraint::rows::{RowSet, Rows};
-use crate::solver::linkage::Linkages;
-use crate::solver::reduced::Reduced;
+use crate::solver::folded::Folded;
 use crate::solver::{GaussSeidel, LcpPyramid, SolverSettings, residual};
 
 const SETTINGS: SolverSettings =
@@ -39,9 +38,6 @@ fn robot(seed: u64, dof: usize, contacts: usize, mu: f64) -> (Rows, Vec<f64>) {
 fn limits_of_a_damped_robot_are_those_of_pivoting() {
     for seed in 0..200 {
         let (rows, c) = robot(seed, 18, 8, 0.0);
-        assert!(
-            Reduced::new(&rows, &all(&rows), (&c, &vec![0.0; rows.len]), &Linkages::new(&rows, &all(&rows))).is_some()
-        );
         let (ours, pivoted) = (solve(&GaussSeidel, &rows, &c, SETTINGS), solve(&LcpPyramid, &rows, &c, FAR));
         assert!(ours.outcome.converged && pivoted.outcome.converged, "{seed}");
         assert!(distance(&ours.du, &pivoted.du) < 1e-7, "{seed}: {:.1e}", distance(&ours.du, &pivoted.du));
@@ -62,4 +58,30 @@ fn contacts_of_a_damped_robot_are_solved() {
     }
     // most end by Newton's method, before the sweep after which other methods follow
     assert!(few > 200, "{few}");
+}
+
+/// Damping is folded into the responses of the robot, and stiff drives are not: their rows hold either way, and the
+/// velocity is that of pivoting, which solves all rows together.
+#[test]
+fn soft_rows_hold_whether_they_are_folded_or_not() {
+    let mut random = Random(7);
+    for stiffness in [1e-3, 1.0, 1e3, 1e5, 1e8] {
+        let (mut rows, mut c) = robot(3, 12, 3, 0.0);
+        for block in 0..6 {
+            rows.push_soft(RowSet::Equality, 1.0 / stiffness);
+            rows.side(0, 12).expect("one side")[block] = 1.0;
+            c.push(random.real(-1.0, 1.0));
+        }
+        let folded = Folded::new(&rows, &all(&rows), (&c, &vec![0.0; rows.len])).expect("damping is folded");
+        let soft = rows.blocks.iter().filter(|b| b.set == RowSet::Equality).count();
+        let left = folded.rows.blocks.iter().filter(|b| b.set == RowSet::Equality).count();
+        assert_eq!(left, if stiffness > 1e4 { 6 } else { 0 }, "of {soft}");
+        let (ours, pivoted) = (solve(&GaussSeidel, &rows, &c, SETTINGS), solve(&LcpPyramid, &rows, &c, FAR));
+        assert!(distance(&ours.du, &pivoted.du) < 1e-8, "{stiffness}: {:.1e}", distance(&ours.du, &pivoted.du));
+        for block in rows.blocks.iter().filter(|b| b.set == RowSet::Equality) {
+            let row = block.row as usize;
+            let w = c[row] + rows.row_velocity(block, 0, &ours.du) + block.compliance * ours.lambda[row];
+            assert!(w.abs() < 1e-9, "{stiffness}: {w}");
+        }
+    }
 }

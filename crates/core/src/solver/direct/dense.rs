@@ -1,0 +1,93 @@
+//! Dense linear equations, by elimination with row exchanges, in the widest registers of the processor and without
+//! fused operations: the same bits on all.
+
+/// Solves `A·x = b` for the row-major `a`, which it destroys; `b` becomes `x`. Returns whether `A` is regular.
+pub(super) fn solve(a: &mut [f64], b: &mut [f64]) -> bool {
+    pulp::Arch::new().dispatch(Elimination { a, b })
+}
+
+struct Elimination<'a> {
+    a: &'a mut [f64],
+    b: &'a mut [f64],
+}
+
+impl pulp::NullaryFnOnce for Elimination<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn call(self) -> bool {
+        let Elimination { a, b } = self;
+        let n = b.len();
+        for j in 0..n {
+            let mut pivot = j;
+            for i in j + 1..n {
+                if a[i * n + j].abs() > a[pivot * n + j].abs() {
+                    pivot = i;
+                }
+            }
+            let largest = a[pivot * n + j];
+            if !(largest.abs() > f64::MIN_POSITIVE && largest.is_finite()) {
+                return false;
+            }
+            let (above, below) = a.split_at_mut((j + 1) * n);
+            let own = &mut above[j * n..];
+            if pivot != j {
+                own[j..].swap_with_slice(&mut below[(pivot - j - 1) * n + j..][..n - j]);
+                b.swap(j, pivot);
+            }
+            let inverse = 1.0 / own[j];
+            for (i, row) in below.chunks_exact_mut(n).enumerate() {
+                let factor = row[j] * inverse;
+                if factor != 0.0 {
+                    subtract(&mut row[j + 1..], factor, &own[j + 1..]);
+                    b[j + 1 + i] -= factor * b[j];
+                }
+            }
+        }
+        for j in (0..n).rev() {
+            let known: f64 = a[j * n + j + 1..][..n - j - 1].iter().zip(&b[j + 1..]).map(|(a, x)| a * x).sum();
+            b[j] = (b[j] - known) / a[j * n + j];
+        }
+        true
+    }
+}
+
+/// `to −= factor·from`, four numbers at a time.
+#[inline(always)]
+fn subtract(to: &mut [f64], factor: f64, from: &[f64]) {
+    let ((to, to_rest), (from, from_rest)) = (to.as_chunks_mut::<4>(), from.as_chunks::<4>());
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = [0, 1, 2, 3].map(|k| to[k] - factor * from[k]);
+    }
+    for (to, from) in to_rest.iter_mut().zip(from_rest) {
+        *to -= factor * from;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::solve;
+
+    #[test]
+    fn the_solution_solves() {
+        let mut seed = 7u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        for n in 1..20 {
+            let (a, x): (Vec<f64>, Vec<f64>) =
+                ((0..n * n).map(|_| random()).collect(), (0..n).map(|_| random()).collect());
+            let mut b: Vec<f64> = a.chunks_exact(n).map(|row| row.iter().zip(&x).map(|(a, x)| a * x).sum()).collect();
+            assert!(solve(&mut a.clone(), &mut b));
+            let error = b.iter().zip(&x).map(|(b, x)| (b - x).abs()).fold(0.0, f64::max);
+            assert!(error < 1e-10, "{n}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_singular_matrix_is_told() {
+        assert!(!solve(&mut [1.0, 2.0, 2.0, 4.0], &mut [1.0, 1.0]));
+        assert!(!solve(&mut [f64::NAN], &mut [1.0]));
+    }
+}
