@@ -55,7 +55,7 @@ const NEAR: (f64, f64) = (1e-2, 1e-5);
 /// small and a large island.
 const FACTORS: (u32, u32, u32) = (8, 30, 8);
 /// Maximum number of factorizations with a lagged shift, for a small and a large island.
-const LAGGED: (u32, u32) = (60, 20);
+const LAGGED: (u32, u32) = (150, 20);
 /// Penalties of the forces with which all contacts stick, in the order in which they are tried.
 const STICKING: [f64; 3] = [1e9, 1e6, 1e4];
 /// Degrees of freedom of a small island, on which no effort is spared.
