@@ -37,8 +37,8 @@ fn recorded_problems_are_solved() {
 }
 
 /// Four feet with friction that press each other through the joints of a robot: sweeps get no nearer than 1e-7 m/s,
-/// and `|f|` has minima that are no solutions. Newton's method with held choices solves them, before the sweep after
-/// which other methods follow would have cost their first factorizations.
+/// and `|f|` has minima that are no solutions. Newton's method with held choices solves them; without it, all other
+/// methods together end at 1e-8 to 1e-5 m/s after 350 factorizations.
 #[test]
 fn feet_that_are_braced_against_each_other_are_solved() {
     assert_eq!(solve_all(include_str!("braced.txt"), 100), 4);
