@@ -14,7 +14,8 @@
 //! Times of impact are those of the exact path, so an elastic bounce keeps its height. An impact slower than the
 //! acceleration gives in a frame does not bounce: the particle slides for the rest of the frame.
 
-use super::obstacles::{Hit, Obstacle, Obstacles, Stretch, TOUCHING};
+use super::first_contact::{Stretch, TOUCHING};
+use super::obstacles::{Hit, Obstacle, Obstacles};
 use super::path::{Air, Path};
 use tumble_collide::Vec3;
 use tumble_core::{Frame, FrameImpulse, Material};

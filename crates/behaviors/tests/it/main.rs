@@ -15,6 +15,7 @@ mod laws;
 mod neighbors;
 mod non_spinning;
 mod particles;
+mod slanting;
 mod springs;
 mod steering;
 
