@@ -83,11 +83,6 @@ impl Instant {
         let root = (self.rate * self.rate + 2.0 * self.fall * self.gap).sqrt();
         if self.rate < 0.0 { 2.0 * self.gap / (root - self.rate) } else { (self.rate + root) / self.fall }
     }
-
-    /// Returns whether a particle that lies on the surface leaves it before it comes back.
-    fn lifts(self) -> bool {
-        self.rate > 0.0 && self.rate * self.rate > 2.0 * self.fall * TOUCHING
-    }
 }
 
 impl Obstacle<'_> {
@@ -102,10 +97,24 @@ impl Obstacle<'_> {
         if first.gap > speed * stretch.length {
             return None;
         }
-        if first.gap <= TOUCHING && !first.lifts() && self.end_gap(stretch) < 0.0 {
+        if first.gap <= TOUCHING && self.presses(stretch) {
             return Some(0.0);
         }
         if self.convex { self.by_planes(stretch, first) } else { self.by_balls(stretch, first, speed) }
+    }
+
+    /// Returns whether a particle that lies on the surface stays there: a slide finds out how long.
+    fn presses(&self, stretch: &Stretch) -> bool {
+        let path = stretch.path;
+        let n = self.gap(&path.x, stretch.start / stretch.dt, stretch.radius).1;
+        let (rate, pull) = ((path.v - self.velocity(&path.x)).dot(&n), path.pull.dot(&n));
+        !lifts(rate, pull) && (rate < 0.0 || pull < 0.0)
+    }
+
+    /// Returns the time along a stretch on the surface at which the gap has become `wide`, m, which it is at the end.
+    pub fn leaves(&self, stretch: &Stretch, wide: f64) -> f64 {
+        let (start, end) = (self.instant(stretch, 0.0).gap, self.end_gap(stretch));
+        self.sign_change(stretch, wide, (0.0, start), (stretch.length, end))
     }
 
     /// Advances by planes.
@@ -177,14 +186,14 @@ impl Obstacle<'_> {
         if high.gap >= -high.reached {
             high.t
         } else {
-            self.between_signs(stretch, (low.t, low.gap), (high.t, high.gap))
+            self.sign_change(stretch, 0.0, (low.t, low.gap), (high.t, high.gap))
         }
     }
 
     /// Returns the time of a contact after more steps than there should be: a path that grazes the surface, or goes into it.
     fn last_resort(&self, stretch: &Stretch, low: Instant) -> Option<f64> {
         let end = self.end_gap(stretch);
-        (end < 0.0).then(|| self.between_signs(stretch, (low.t, low.gap), (stretch.length, end)))
+        (end < 0.0).then(|| self.sign_change(stretch, 0.0, (low.t, low.gap), (stretch.length, end)))
     }
 
     fn end_gap(&self, stretch: &Stretch) -> f64 {
@@ -203,9 +212,13 @@ impl Obstacle<'_> {
         Instant { t, gap, rate, fall: fall.max(0.0), reached: REACHED * (1.0 + x.amax()) }
     }
 
-    /// Returns the time of a surface between two times, s, of which the gaps have opposite signs; regula falsi (Illinois).
-    fn between_signs(&self, stretch: &Stretch, mut low: (f64, f64), mut high: (f64, f64)) -> f64 {
-        let gap = |t: f64| self.gap(&stretch.path.at(t).0, (stretch.start + t) / stretch.dt, stretch.radius).0;
+    /// Returns the last time known before the gap minus `level`, m, changes its sign between two times, s, given with the gaps there;
+    /// regula falsi (Illinois).
+    fn sign_change(&self, stretch: &Stretch, level: f64, low: (f64, f64), high: (f64, f64)) -> f64 {
+        let above =
+            |t: f64| self.gap(&stretch.path.at(t).0, (stretch.start + t) / stretch.dt, stretch.radius).0 - level;
+        let sign = if low.1 >= level { 1.0 } else { -1.0 };
+        let (mut low, mut high) = ((low.0, sign * (low.1 - level)), (high.0, sign * (high.1 - level)));
         let (mut ends, mut last) = ((low.1, high.1), 0);
         for _ in 0..STEPS {
             let chord = (low.0 * ends.1 - high.0 * ends.0) / (ends.1 - ends.0);
@@ -214,7 +227,7 @@ impl Obstacle<'_> {
             if !(t > low.0 && t < high.0) {
                 break;
             }
-            let value = gap(t);
+            let value = sign * above(t);
             let side = if value >= 0.0 { 1 } else { -1 };
             // an end that stays twice counts half
             let half = if side == last { 0.5 } else { 1.0 };
@@ -230,6 +243,12 @@ impl Obstacle<'_> {
         }
         low.0
     }
+}
+
+/// Returns whether a particle on a surface leaves it, with a rate of the gap, m/s, and an acceleration along the normal, m/s²: it gets
+/// farther than rounding before it comes back.
+pub(super) fn lifts(rate: f64, pull: f64) -> bool {
+    rate > 0.0 && rate * rate > -2.0 * pull * TOUCHING
 }
 
 impl Rates {

@@ -123,3 +123,30 @@ fn moving_and_turning_shapes_are_hit_at_a_slant_on_curved_paths() {
         Case { name: "moving capsule", shape: capsule, velocity, spin, gravity: Vec3::zeros() }.check(60, 4);
     }
 }
+
+/// Without friction a point slides off a table at its speed, and its fall begins at the edge, wherever in a frame it gets there.
+#[test]
+fn a_fall_begins_at_the_edge_of_a_table() {
+    for rate in [30.0, 60.0, 240.0] {
+        for speed in [0.31, 1.7, 6.3] {
+            let settings = Settings::default().with_dt(1.0 / rate).with_gravity(Vec3::new(0.0, 0.0, -9.81));
+            let mut world = World::new(settings).unwrap();
+            let smooth = Material { friction: 0.0, ..Material::default() };
+            let table = RigidBody::fixed(Shape::cuboid(Vec3::new(1.0, 1.0, 0.1)).unwrap()).with_material(smooth);
+            world.add(table.with_pose(Pose::translation(-0.5, 0.0, -0.05))).unwrap();
+            let drops = ParticleSettings { radius: 0.0, material: smooth, ..ParticleSettings::default() };
+            let system = world.add(ParticleSystem::new("drops", drops).unwrap()).unwrap();
+            let (start, velocity) = (Vec3::new(-0.1, 0.0, 0.0), Vec3::new(speed, 0.0, 0.0));
+            ParticleSystem::spawn(&mut world, system, start, velocity, 10.0).unwrap();
+            let frames = (rate * (0.1 / speed + 0.3)).ceil();
+            crate::steps(&mut world, frames as usize);
+            let particle = ParticleSystem::particles(&world, system).unwrap().next().unwrap();
+            // it has left 0.01 mm beyond the edge
+            let fallen = (frames / rate - (0.1 + 1e-5) / speed).max(0.0);
+            let (depth, fall) = (-0.5 * 9.81 * fallen * fallen, -9.81 * fallen);
+            let off = (particle.position.z - depth).abs() + (particle.velocity.z - fall).abs();
+            assert!(off < 1e-6, "{rate} Hz, {speed} m/s: {particle:?}, {depth} m and {fall} m/s expected");
+            assert!((particle.position.x - (speed * frames / rate - 0.1)).abs() < 1e-9);
+        }
+    }
+}

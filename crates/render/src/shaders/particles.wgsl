@@ -76,6 +76,8 @@ const IMPACTS: i32 = 8;
 const STEPS: i32 = 48;
 // gap of a particle that lies on a surface, m
 const TOUCHING: f32 = 4e-7;
+// gap at which a particle has left a surface that it slid on, m
+const LEFT: f32 = 1e-5;
 // gap at which a surface is reached, m
 const REACHED: f32 = 1e-8;
 const NEVER: f32 = -1.0;
@@ -200,17 +202,12 @@ fn meets(o: i32, start: vec3<f32>, path: Path, length_s: f32) -> f32 {
     if low.gap > bound * length_s {
         return NEVER;
     }
-    if low.gap <= TOUCHING {
-        let end = gap_at(o, start + way(path, length_s)).gap;
-        let lifts = low.rate > 0.0 && low.rate * low.rate > 2.0 * low.fall * TOUCHING;
-        if !lifts {
-            return select(NEVER, 0.0, end < 0.0 || (low.gap < -TOUCHING && low.rate < 0.0));
-        }
-        if end >= 0.0 {
-            return NEVER;
-        }
-    }
     var t = 0.0;
+    let lifts = low.rate > 0.0 && low.rate * low.rate > 2.0 * low.fall * TOUCHING;
+    let presses = !lifts && (low.rate < 0.0 || low.fall > 0.0);
+    if low.gap < -TOUCHING || (low.gap <= TOUCHING && presses) {
+        return 0.0;
+    }
     for (var k = 0; k < STEPS; k++) {
         let next_t = t + to_plane(low, length_s);
         if next_t >= length_s {
@@ -226,6 +223,21 @@ fn meets(o: i32, start: vec3<f32>, path: Path, length_s: f32) -> f32 {
         }
     }
     return t;
+}
+
+// the time at which a slide has left the surface, s, which it has at `late`: by halves
+fn leaving(o: i32, start: vec3<f32>, v: vec3<f32>, late: f32) -> f32 {
+    var low = 0.0;
+    var high = late;
+    for (var k = 0; k < 24; k++) {
+        let t = 0.5 * (low + high);
+        if gap_at(o, start + t * v).gap < LEFT {
+            low = t;
+        } else {
+            high = t;
+        }
+    }
+    return low;
 }
 
 fn first_hit(x: Fixed, path: Path, length_s: f32, except: i32) -> Hit {
@@ -306,11 +318,19 @@ fn fly(x_in: Fixed, v_in: Fixed, out_v: ptr<function, Fixed>) -> Fixed {
             }
             let slide = first_hit(x, Path(mean, vec3<f32>(0.0), 0.0), rest, o);
             let stops = slide.obstacle >= 0 && slide.time > 0.0;
-            let took = select(rest, slide.time, stops);
+            var took = select(rest, slide.time, stops);
+            let wide = gap_at(o, beyond(x, o) + took * mean).gap;
+            var leaves = false;
+            if wide > LEFT {
+                let early = leaving(o, beyond(x, o), mean, took);
+                let fall = took - early;
+                leaves = wide > 0.5 * press * fall * fall;
+                took = select(took, early, leaves);
+            }
             x = plus(x, took * mean);
             v = plus(v, took / rest * (end - moving));
             time += took;
-            if !stops {
+            if !stops && !leaves {
                 let over = gap_at(o, beyond(x, o));
                 if over.gap < 0.0 {
                     x = plus(x, -over.gap * over.normal);
