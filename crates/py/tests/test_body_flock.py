@@ -66,8 +66,9 @@ def test_a_flock_steers_articulations_that_float():
     assert all(isinstance(body, tumble.RigidBody) for body in flock.bodies)
     flock.add("bird")
     assert flock.bodies[-1] == bird and repr(flock) == "<tumble.BodyFlock 'flock': 5 bodies>"
-    chain = tumble.ArticulationBuilder("crane").link("jib", joint="revolute", shapes=[tumble.Box((1, 0.1, 0.1))], mass=1)
-    world.add_articulation(chain)
+    crane = tumble.ArticulationBuilder("crane")
+    crane.add_link("jib", shape=tumble.Box((1, 0.1, 0.1)), mass=1)
+    world.add_articulation(crane.build())
     with pytest.raises(tumble.InvalidValueError, match="whose first link floats"):
         flock.add("crane")
     world.step()

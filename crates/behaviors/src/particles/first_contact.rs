@@ -78,10 +78,14 @@ struct Instant {
 }
 
 impl Instant {
-    /// Returns the time to where the bound of the plane is 0, s.
+    /// Returns the time to where the bound of the plane is 0, s; infinite if it never is.
     fn to_plane(self) -> f64 {
         let root = (self.rate * self.rate + 2.0 * self.fall * self.gap).sqrt();
-        if self.rate < 0.0 { 2.0 * self.gap / (root - self.rate) } else { (self.rate + root) / self.fall }
+        match self.rate < 0.0 {
+            true => 2.0 * self.gap / (root - self.rate),
+            false if self.fall > 0.0 => (self.rate + root) / self.fall,
+            false => f64::INFINITY,
+        }
     }
 }
 
@@ -122,8 +126,7 @@ impl Obstacle<'_> {
         let mut low = first;
         for _ in 0..STEPS {
             let t = low.t + low.to_plane();
-            // also where the plane is never met
-            if !(t < stretch.length) {
+            if t >= stretch.length {
                 return None;
             }
             if t == low.t {
@@ -166,7 +169,7 @@ impl Obstacle<'_> {
         let mut low = first;
         for _ in 0..TRIALS {
             let t = low.t + low.to_plane();
-            if !(t < stretch.length) {
+            if t >= stretch.length {
                 return None;
             }
             let next = self.instant(stretch, t);

@@ -4,8 +4,8 @@ use crate::arrays::convert::{some, vector};
 use crate::behaviors::flock::{steering, steering_dict};
 use crate::behaviors::placed;
 use crate::errors::{Error, Result};
-use crate::objects::handle::handle;
 use crate::objects::bodies::handle as handle_of;
+use crate::objects::handle::handle;
 use crate::objects::place::{Found, Place, found};
 use crate::world::add::own_place;
 use crate::world::class::World;
@@ -72,9 +72,13 @@ impl PyBodyFlock {
     /// the flock: a rigid body that no wings carry has ``gravity_scale=0``.
     fn add(&self, py: Python<'_>, body: &Bound<'_, PyAny>) -> Result<()> {
         let place = own_place(&self.place.shared, body)?;
-        let steered = self.place.shared.read(|inner| Ok(inner.world.object(place.id).is_some_and(BodyFlock::steers)))?;
+        let steered =
+            self.place.shared.read(|inner| Ok(inner.world.object(place.id).is_some_and(BodyFlock::steers)))?;
         if !steered {
-            return Err(Error::value(format!("'{}': expected a rigid body, or an articulation whose first link floats", place.name)));
+            return Err(Error::value(format!(
+                "'{}': expected a rigid body, or an articulation whose first link floats",
+                place.name
+            )));
         }
         self.change(py, |flock| match flock.bodies().contains(&place.id) {
             true => Err(Error::value(format!("'{}' is in the flock", place.name))),

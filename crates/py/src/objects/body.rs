@@ -5,9 +5,9 @@ use crate::arrays::convert::{
 };
 use crate::choices::{MODES, meaning, word};
 use crate::errors::{Error, Result};
-use crate::objects::handle::handle;
 use crate::objects::appearance;
 use crate::objects::description::alone;
+use crate::objects::handle::handle;
 use crate::objects::place::Place;
 use crate::world::gc::Anchor;
 use crate::world::{contacts, query};

@@ -40,10 +40,7 @@ macro_rules! handle {
                 crate::objects::place::hash(&self.place)
             }
 
-            fn __traverse__(
-                &self,
-                visit: pyo3::gc::PyVisit<'_>,
-            ) -> std::result::Result<(), pyo3::gc::PyTraverseError> {
+            fn __traverse__(&self, visit: pyo3::gc::PyVisit<'_>) -> std::result::Result<(), pyo3::gc::PyTraverseError> {
                 visit.call(&self.anchor)
             }
         }

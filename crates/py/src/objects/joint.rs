@@ -2,9 +2,9 @@
 
 use crate::arrays::convert::vector;
 use crate::errors::{Error, Result};
-use crate::objects::handle::handle;
 use crate::objects::bodies::handle;
 use crate::objects::builder::pair;
+use crate::objects::handle::handle;
 use crate::objects::joints::drive;
 use crate::objects::place::{Place, found};
 use crate::world::gc::Anchor;

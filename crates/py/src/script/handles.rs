@@ -1,8 +1,8 @@
 //! Handles of events and templates.
 
 use crate::errors::Result;
-use crate::objects::handle::handle;
 use crate::objects::body::RigidBody;
+use crate::objects::handle::handle;
 use crate::objects::place::Place;
 use crate::world::gc::Anchor;
 use pyo3::prelude::*;
@@ -46,7 +46,10 @@ pub struct Template {
     anchor: Py<Anchor>,
 }
 
-handle!(Template, "Template", |template| template.counts().ok().map(|[spawned, _]| format!(": spawned {spawned} times")));
+handle!(Template, "Template", |template| template
+    .counts()
+    .ok()
+    .map(|[spawned, _]| format!(": spawned {spawned} times")));
 
 impl Template {
     fn counts(&self) -> Result<[u64; 2]> {

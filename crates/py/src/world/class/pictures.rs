@@ -1,48 +1,12 @@
 //! Pictures, windows and plots of a world.
 
-use crate::arrays::convert::{Numbers, numbers, path, pose, vec3, vec3_or, vector, whole_number};
-use crate::batch::crew;
-use crate::behaviors;
-use crate::choices::meaning;
-use crate::errors::{Error, Result};
-use crate::extension::callbacks::{Extensions, Reduced};
-use crate::interrupt::interruptible;
+use crate::arrays::convert::whole_number;
+use crate::errors::Result;
 use crate::io::picture::Shot;
-use crate::io::slow;
-use crate::objects::articulation::Articulation;
-use crate::objects::bodies;
-use crate::objects::bodies::{Bodies, handle, place_of};
-use crate::objects::body::{self, RigidBody};
-use crate::objects::joint::Joint;
-use crate::objects::place::{body_ids, by_name};
-use crate::objects::sensor::{Sensor, Sensors};
-use crate::objects::shapes::Shape;
-use crate::pool;
-use crate::world::add::{add, articulated, named_shape, own_place, rigid};
 use crate::world::class::World;
-use crate::world::bulk::{self, Bulk};
-use crate::world::gc::{Anchor, anchor};
-use crate::world::inner::Inner;
-use crate::world::joints;
-use crate::world::load::{Choices, build};
-use crate::world::pairs::{self, combine};
-use crate::world::query::{self, Selection};
-use crate::world::report::StepReport;
-use crate::world::rollout::Plan;
-use crate::world::shared::Shared;
-use crate::world::{contacts, pickling, save_scene, sensors, snapshot};
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
-use pyo3::gc::{PyTraverseError, PyVisit};
+use numpy::PyArray3;
 use pyo3::prelude::*;
-use pyo3::pybacked::PyBackedBytes;
-use pyo3::types::{PyBytes, PyDict};
-use std::collections::BTreeMap;
-use std::sync::Arc;
-use std::time::Instant;
-use tumble::collide::{ContactMode, Vec3};
-use tumble::dynamics::{Material, Mode, PairMaterial, RigidBody as Rigid, SensorNoise, Settings};
-use tumble::scene::mjcf::MjcfOptions;
-use tumble::scene::{FileKind, LoadOptions, SceneFile, resolve_scene};
+use pyo3::types::PyDict;
 
 #[pymethods]
 impl World {
