@@ -53,7 +53,7 @@ SCENES = {
 }
 
 # Scenes in which nothing should move: the camera goes around its target, and comes back, by that many degrees to each side.
-STILL = {"stack": 20, "card_house": 25}
+STILL = {"stack": 20, "card_house": 14}
 
 
 def tumble(*words):
