@@ -62,6 +62,9 @@ def test_a_flock_steers_articulations_that_float():
     flock = world["flock"]
     bird = flock.bodies[0]
     assert isinstance(bird, tumble.Articulation) and bird == world["bird"] and len(flock) == 5
+    assert flock.steering["wind"].tolist() == [-10, 0, 0]
+    flock.steering = {"wind": (-9, 1, 0)}
+    assert flock.steering["wind"].tolist() == [-9, 1, 0]
     flock.remove(bird)
     assert all(isinstance(body, tumble.RigidBody) for body in flock.bodies)
     flock.add("bird")

@@ -7,6 +7,7 @@ mod boids;
 mod buoyancy;
 mod drawn;
 mod emission;
+mod extremes;
 mod fields;
 mod flights;
 mod frame_states;

@@ -2515,7 +2515,8 @@ class World:
 
         Keywords are the constants of the forces, as in ``add_flock``, and of the helm: ``agility``, rate at which the orientation
         approaches the wanted one (1/s); ``max_angular_acceleration`` (rad/s²); ``bank_time``, seconds of the rate of turn that are a
-        quarter turn of bank; ``up``, the direction that is up for a body without bank.
+        quarter turn of bank; ``up``, the direction that is up for a body without bank; ``wind``, velocity of the air in which bodies
+        fly (m/s).
         """
     def add_event(
         self,

@@ -40,9 +40,11 @@ fn helm(mut of: Helm, given: &Bound<'_, PyDict>) -> Result<Helm> {
             given.del_item(name)?;
         }
     }
-    if let Some(up) = given.get_item("up")? {
-        of.up = Vec3::from(some::<3>(&up, "up")?);
-        given.del_item("up")?;
+    for (name, vector) in [("up", &mut of.up), ("wind", &mut of.wind)] {
+        if let Some(value) = given.get_item(name)? {
+            *vector = Vec3::from(some::<3>(&value, name)?);
+            given.del_item(name)?;
+        }
     }
     of.validate()?;
     Ok(of)
@@ -110,6 +112,7 @@ impl PyBodyFlock {
         dict.set_item("max_angular_acceleration", helm.max_angular_acceleration)?;
         dict.set_item("bank_time", helm.bank_time)?;
         dict.set_item("up", vector(py, &helm.up))?;
+        dict.set_item("wind", vector(py, &helm.wind))?;
         Ok(dict)
     }
 
@@ -137,7 +140,8 @@ impl World {
     ///
     /// Keywords are the constants of the forces, as in ``add_flock``, and of the helm: ``agility``, rate at which the orientation
     /// approaches the wanted one (1/s); ``max_angular_acceleration`` (rad/s²); ``bank_time``, seconds of the rate of turn that are a
-    /// quarter turn of bank; ``up``, the direction that is up for a body without bank.
+    /// quarter turn of bank; ``up``, the direction that is up for a body without bank; ``wind``, velocity of the air in which bodies
+    /// fly (m/s).
     #[pyo3(signature = (name="", **steering))]
     fn add_body_flock(&self, py: Python<'_>, name: &str, steering: Option<&Bound<'_, PyDict>>) -> Result<PyBodyFlock> {
         let given = steering.map_or_else(|| Ok(PyDict::new(py)), |given| given.copy())?;
