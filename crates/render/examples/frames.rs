@@ -9,7 +9,7 @@
 //! contain the words), `--quality WORDS` (instead of the five shown), `--readback` (with the copy
 //! to memory), `--stages` (the time of each row by stage), `--pictures FOLDER` (the last picture of
 //! each row), `--size WxH` (pixels of a facet, 1024x768 by default), `--step THREADS` (each frame also
-//! steps the world by 1/60 s on so many threads before its list is made).
+//! steps the world by 1/60 s on that number of threads before its list is made).
 
 use nalgebra::Vector3;
 use std::time::{Duration, Instant};

@@ -1,4 +1,4 @@
-//! What every handle of an object of a world has: name, existence, equality, hash, text, and its part in garbage collection.
+//! The common part of the handles of objects: name, existence, equality, hash, text, and garbage collection.
 
 /// Gives a class with the fields `place: Place` and `anchor: Py<Anchor>` what handles have, and a constructor. `$shown` returns what its text
 /// says behind the name, `None` if the object was removed.

@@ -1,4 +1,4 @@
-//! What a world tells of its present: contacts, events, rays, overlaps, distances, energy, the report of a step.
+//! Queries of the present of a world: contacts, events, rays, overlaps, distances, energy, the report of a step.
 
 use crate::arrays::convert::{vector, whole_number};
 use crate::errors::Result;
