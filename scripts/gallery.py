@@ -7,6 +7,8 @@ It needs target/release/tumble, a Vulkan or OpenGL driver, and Pillow. A run end
 a lower quality.
 """
 
+import math
+import re
 import subprocess
 import sys
 import tempfile
@@ -25,7 +27,7 @@ TIME_OUT = 300  # seconds of a run
 # Scene: the time at which its picture begins and how long it shows, in seconds of the scene.
 SCENES = {
     "falling": (0, 3.0),
-    "stack": (0, 0.5),
+    "stack": (0, 3.0),
     "billiards": (0, 3.0),
     "bowling": (2.2, 2.0),
     "incline": (0, 1.5),
@@ -37,7 +39,7 @@ SCENES = {
     "dominoes": (0, 3.5),
     "newtons_cradle": (0, 0.9),
     "arch": (1.5, 2.5),
-    "card_house": (0, 0.5),
+    "card_house": (0, 3.0),
     "wrecking_ball": (0, 3.0),
     "marble_run": (5.0, 5.0),
     "steam_engine": (5, 1.0),
@@ -49,6 +51,9 @@ SCENES = {
     "ball_machine": (0.5, 6.0),
     "bird": (3.0, 1.0),
 }
+
+# Scenes in which nothing should move: the camera goes around its target, and comes back, by that many degrees to each side.
+STILL = {"stack": 20, "card_house": 14}
 
 
 def tumble(*words):
@@ -66,6 +71,28 @@ def frames(scene, begin, length, fps, folder):
         words += ["--restore", state]
     tumble(*words)
     return [Image.open(path).convert("RGB") for path in sorted(Path(folder).glob("frame_*.png"))]
+
+
+def around(scene, begin, length, fps, folder):
+    """Returns pictures of a still scene from a camera that swings about the vertical through its target; each is of its time of the scene."""
+    text = (ROOT / "scenes" / scene / "scene.toml").read_text(encoding="utf-8")
+    x, y, z = numbers(text, "eye_m")
+    a, b, _ = numbers(text, "target_m")
+    pictures = []
+    for k in range(round(length * fps)):
+        turn = math.radians(STILL[scene]) * math.sin(2 * math.pi * k / round(length * fps))
+        east, north = x - a, y - b
+        eye = [a + east * math.cos(turn) - north * math.sin(turn), b + east * math.sin(turn) + north * math.cos(turn), z]
+        file, picture = Path(folder) / "scene.toml", Path(folder) / f"{k}.png"
+        file.write_text(re.sub(r"eye_m = \[.*\]", f"eye_m = {eye}", text), encoding="utf-8")
+        tumble(file, "--duration", begin + k / fps, "--size", SIZE, "--screenshot", picture)
+        pictures.append(Image.open(picture).convert("RGB"))
+    return pictures
+
+
+def numbers(text, key):
+    """Returns the numbers of a key of a scene's camera."""
+    return [float(number) for number in re.search(rf"{key} = \[(.*)\]", text).group(1).split(",")]
 
 
 def write(pictures, path, milliseconds):
@@ -88,7 +115,7 @@ def main():
         begin, length = SCENES[name]
         fps = FPS if length > 1 else 2 * FPS
         with tempfile.TemporaryDirectory() as folder:
-            pictures = frames(name, begin, length, fps, folder)
+            pictures = (around if name in STILL else frames)(name, begin, length, fps, folder)
             write(pictures, OUT / f"{name}.webp", 1000 // fps)
         print(f"{name}: {len(pictures)} pictures, {(OUT / f'{name}.webp').stat().st_size / 1000:.0f} kB", flush=True)
 

@@ -1,8 +1,8 @@
 //! Time of a step of flocks of boids.
 //!
 //! `cargo run --release -p tumble-behaviors --example flock -- [COUNT…]` prints, for 1,000 and 10,000 boids unless counts are given,
-//! the processor time of a step at 60 Hz on one thread, that of the forces alone, and the clock time of a step on two threads. Each is
-//! the median over two seconds of simulated time after one of warm-up, with the least in brackets: programs that share the
+//! the processor time of a step at 60 Hz on one thread, that of the forces alone, the clock time of a step on two threads, and the processor
+//! time of the calling one of them, which the clock time is on a machine that does nothing else. Each is the median over two seconds of simulated time after one of warm-up, with the least in brackets: programs that share the
 //! processor make a step longer, and none makes it shorter. Brute force runs up to 2,000 boids.
 
 #![allow(clippy::disallowed_methods)] // what is measured need not have the same bits on every platform
@@ -17,9 +17,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let counts: Result<Vec<usize>, _> = std::env::args().skip(1).map(|count| count.parse()).collect();
     let counts = Some(counts?).filter(|counts| !counts.is_empty()).unwrap_or_else(|| vec![1000, 10_000]);
     println!(
-        "| boids | search | step, processor ms | forces alone, processor ms | step on two threads, ms | neighbors in reach |"
+        "| boids | search | step, processor ms | forces alone, processor ms | step on two threads, ms | its calling thread, processor ms | neighbors in reach |"
     );
-    println!("|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|");
     for count in counts {
         measure(count, Search::Grid)?;
         if count <= 2000 {
@@ -33,14 +33,15 @@ fn measure(count: usize, search: Search) -> Result<(), Box<dyn std::error::Error
     let steering = Steering::default();
     let mut world = flock(count, search, &steering, 1)?;
     let mut parallel = flock(count, search, &steering, 2)?;
-    let (mut steps, mut forces, mut both) = (Vec::new(), Vec::new(), Vec::new());
+    let [mut steps, mut forces, mut both, mut caller] = [const { Vec::new() }; 4];
     for frame in 0..FRAMES + FRAMES / 2 {
         let start = processor_time();
         world.step()?;
         let step = processor_time() - start;
-        let (start, flyers) = (Instant::now(), flyers(&world));
+        let flyers = flyers(&world);
+        let (start, spent) = (Instant::now(), processor_time());
         parallel.step()?;
-        let parallel = start.elapsed();
+        let (parallel, calling) = (start.elapsed(), processor_time() - spent);
         let start = processor_time();
         let sum: Vec3 = steering.forces(search, &flyers).into_iter().sum();
         let force = processor_time() - start;
@@ -49,12 +50,13 @@ fn measure(count: usize, search: Search) -> Result<(), Box<dyn std::error::Error
             steps.push(step);
             forces.push(force);
             both.push(parallel);
+            caller.push(calling);
         }
     }
     assert_eq!(world.state(), parallel.state());
     let near = neighbors(&flyers(&world), steering.visibility_distance);
-    let [steps, forces, both] = [steps, forces, both].map(shown);
-    println!("| {count} | {search:?} | {steps} | {forces} | {both} | {near:.1} |");
+    let [steps, forces, both, caller] = [steps, forces, both, caller].map(shown);
+    println!("| {count} | {search:?} | {steps} | {forces} | {both} | {caller} | {near:.1} |");
     Ok(())
 }
 

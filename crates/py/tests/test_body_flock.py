@@ -57,6 +57,41 @@ def test_a_copy_of_a_school_swims_on():
         assert (copy.state == world.state).all()
 
 
+def test_a_flock_steers_articulations_that_float():
+    world = tumble.World.load("bird")
+    flock = world["flock"]
+    bird = flock.bodies[0]
+    assert isinstance(bird, tumble.Articulation) and bird == world["bird"] and len(flock) == 5
+    assert flock.steering["wind"].tolist() == [-10, 0, 0]
+    flock.steering = {"wind": (-9, 1, 0)}
+    assert flock.steering["wind"].tolist() == [-9, 1, 0]
+    flock.remove(bird)
+    assert all(isinstance(body, tumble.RigidBody) for body in flock.bodies)
+    flock.add("bird")
+    assert flock.bodies[-1] == bird and repr(flock) == "<tumble.BodyFlock 'flock': 5 bodies>"
+    crane = tumble.ArticulationBuilder("crane")
+    crane.add_link("jib", shape=tumble.Box((1, 0.1, 0.1)), mass=1)
+    world.add_articulation(crane.build())
+    with pytest.raises(tumble.InvalidValueError, match="whose first link floats"):
+        flock.add("crane")
+    world.step()
+
+
+def test_handles_of_one_object_are_equal():
+    world = tumble.World()
+    flock = world.add_flock("flock")
+    boid = flock.add("boid")
+    cloth = world.add_cloth("cloth")
+    sparks = world.add_particles("sparks")
+    for handle in (flock, boid, cloth, sparks):
+        other = world[handle.name]
+        assert other == handle and hash(other) == hash(handle) and other is not handle and handle != world["flock" if handle is not flock else "cloth"]
+        assert repr(handle).startswith(f"<tumble.{type(handle).__name__} '{handle.name}'")
+    world.remove(cloth)
+    assert not cloth.exists and repr(cloth) == "<tumble.SpringMesh 'cloth', removed>"
+    assert repr(flock) == "<tumble.Flock 'flock': 1 boids>"
+
+
 def dropped():
     world = tumble.World(dt=1 / 240)
     world.add_static("floor", tumble.HalfSpace())

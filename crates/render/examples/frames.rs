@@ -8,7 +8,8 @@
 //! and three frames, but starts none after six seconds. Other options: `--only WORDS` (rows that
 //! contain the words), `--quality WORDS` (instead of the five shown), `--readback` (with the copy
 //! to memory), `--stages` (the time of each row by stage), `--pictures FOLDER` (the last picture of
-//! each row).
+//! each row), `--size WxH` (pixels of a facet, 1024x768 by default), `--step THREADS` (each frame also
+//! steps the world by 1/60 s on that number of threads before its list is made).
 
 use nalgebra::Vector3;
 use std::time::{Duration, Instant};
@@ -30,6 +31,8 @@ struct Options {
     readback: bool,
     stages: bool,
     pictures: Option<std::path::PathBuf>,
+    size: [u32; 2],
+    step: Option<u32>,
 }
 
 /// The content of a row.
@@ -65,7 +68,7 @@ fn main() -> Result<(), Failure> {
     let mut subjects = [billiards()?, few, many, boids()?, particles()?];
     for (index, subject) in subjects.iter_mut().enumerate() {
         for count in if index < 3 { vec![1, 4, 6] } else { vec![1] } {
-            let facets = facets(&subject.scene, count, [1024, 768], Stereo::Mono)?;
+            let facets = facets(&subject.scene, count, options.size, Stereo::Mono)?;
             let mut cells = Vec::new();
             for quality in &qualities {
                 cells.push(row(&options, &mut renderer, subject, &facets, quality)?);
@@ -93,8 +96,16 @@ fn main() -> Result<(), Failure> {
 }
 
 fn options() -> Result<Options, Failure> {
-    let mut options =
-        Options { seconds: 1.5, only: String::new(), quality: None, readback: false, stages: false, pictures: None };
+    let mut options = Options {
+        seconds: 1.5,
+        only: String::new(),
+        quality: None,
+        readback: false,
+        stages: false,
+        pictures: None,
+        size: [1024, 768],
+        step: None,
+    };
     let mut words = std::env::args().skip(1);
     while let Some(word) = words.next() {
         let mut value = || words.next().ok_or(format!("{word} wants a value"));
@@ -105,7 +116,13 @@ fn options() -> Result<Options, Failure> {
             "--readback" => options.readback = true,
             "--pictures" => options.pictures = Some(value()?.into()),
             "--stages" => options.stages = true,
-            _ => return Err(format!("no option {word}; expected --duration S, --only WORDS, --quality WORDS, --readback, --stages or --pictures FOLDER").into()),
+            "--step" => options.step = Some(value()?.parse()?),
+            "--size" => {
+                let size = value()?;
+                let (width, height) = size.split_once('x').ok_or("--size wants WxH")?;
+                options.size = [width.parse()?, height.parse()?];
+            }
+            _ => return Err(format!("no option {word}; expected --duration S, --only WORDS, --quality WORDS, --readback, --stages, --size WxH, --step THREADS or --pictures FOLDER").into()),
         }
     }
     Ok(options)
@@ -172,8 +189,17 @@ fn row(
     if !label.contains(&options.only) {
         return Ok(None);
     }
-    let mut stages = [Duration::ZERO; 2];
-    let mut frame = |renderer: &mut Renderer| -> Result<(), RenderError> {
+    if let Some(threads) = options.step {
+        let settings = subject.world.settings().with_dt(1.0 / 60.0).with_threads(threads);
+        subject.world.set_settings(settings)?;
+    }
+    let mut stages = [Duration::ZERO; 3];
+    let mut frame = |renderer: &mut Renderer| -> Result<(), Failure> {
+        let begin = Instant::now();
+        if options.step.is_some() {
+            subject.world.step()?;
+        }
+        stages[2] += begin.elapsed();
         let begin = Instant::now();
         let mut list = subject.drawing.list(&subject.world, &DebugDraw::default())?;
         quality.apply(&mut list.settings);
@@ -203,7 +229,7 @@ fn row(
     println!("| {label} | {:.1} | {:.1} | {processor:.0} |", 1.0 / each, 1e3 * each);
     if options.stages {
         let ms = |d: Duration| 1e3 * d.as_secs_f64() / f64::from(frames + 1);
-        println!("  list {:.2} ms, picture {:.2} ms", ms(stages[0]), ms(stages[1]));
+        println!("  step {:.2} ms, list {:.2} ms, picture {:.2} ms", ms(stages[2]), ms(stages[0]), ms(stages[1]));
     }
     Ok(Some(1.0 / each))
 }

@@ -12,15 +12,19 @@
 //! | `a`, `p` | acceleration without contact; that by which the surface presses |
 //!
 //! Times of impact are those of the exact path, so an elastic bounce keeps its height. An impact slower than the
-//! acceleration gives in a frame does not bounce: the particle slides for the rest of the frame.
+//! acceleration gives in a frame does not bounce: the particle slides for the rest of the frame, along the tangent. If the surface recedes by more than
+//! `½·p·t²` in the time `t` after the gap opened, beyond an edge or in a curve that is taken too fast, free flight begins there.
 
-use super::obstacles::{Hit, Obstacle, Obstacles, Stretch, TOUCHING};
+use super::first_contact::{Stretch, lifts};
+use super::obstacles::{Hit, Obstacle, Obstacles};
 use super::path::{Air, Path};
 use tumble_collide::Vec3;
 use tumble_core::{Frame, FrameImpulse, Material};
 
 /// Most impacts of a particle in a frame.
 const IMPACTS: usize = 8;
+/// Gap at which a particle has left a surface that it slid on, m.
+const LEFT: f64 = 1e-5;
 /// Gap at which an overlap ends, m, per meter from the origin.
 const APART: f64 = 1e-12;
 
@@ -100,7 +104,7 @@ impl Flight<'_> {
         let along = u.dot(n);
         if along > 0.0 {
             // rounding gives a particle at rest a speed that does not lift it off
-            let lifts = along * along > -2.0 * a.dot(n) * TOUCHING;
+            let lifts = lifts(along, a.dot(n));
             *v -= if lifts { 0.0 } else { along } * n;
             return lifts;
         }
@@ -139,13 +143,23 @@ impl Flight<'_> {
         let path = Path::straight(*x, carrier + way);
         self.obstacles.near(x, &path.at(left).0, &mut memory.near); // a slide goes elsewhere than free flight
         let hit = self.first(&memory.near, &path, time, left, Some(index)).filter(|hit| hit.time > 0.0);
-        let took = hit.map_or(left, |hit| hit.time);
+        let mut took = hit.map_or(left, |hit| hit.time);
+        let end_of = path.at(took).0;
+        let gap = obstacle.gap(&end_of, (time + took) / self.frame.dt, self.radius).0;
+        let mut leaves = false;
+        if gap > LEFT {
+            let (dt, radius) = (self.frame.dt, self.radius);
+            let stretch = Stretch { path: &path, end: &end_of, start: time, length: took, dt, radius };
+            let fall = obstacle.leaves(&stretch, LEFT);
+            leaves = gap > 0.5 * press * (took - fall).powi(2);
+            took = if leaves { fall } else { took };
+        }
         let share = took / left;
         *x = path.at(took).0;
         let change = share * (end - u);
         *v += change;
         self.push(obstacle, x, &(change - took * a), memory);
-        if hit.is_none() {
+        if hit.is_none() && !leaves {
             self.part(obstacle, x, self.frame.dt);
         }
         took

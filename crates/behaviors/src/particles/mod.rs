@@ -17,6 +17,7 @@
 mod cells;
 mod drawn;
 mod emitter;
+mod first_contact;
 mod flight;
 pub(crate) mod obstacles;
 mod path;

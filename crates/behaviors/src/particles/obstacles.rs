@@ -1,28 +1,11 @@
-//! Obstacles of particles: all parts of a world, as they moved during a frame.
-//!
-//! ```text
-//! gap(t) = distance(shape at X(t), x(t)) − r,  |gap(t₂) − gap(t₁)| ≤ s·|t₂ − t₁|
-//! ```
-//!
-//! | symbol | meaning |
-//! |---|---|
-//! | `x(t)`, `r` | path of a particle; its radius |
-//! | `X(t)` | pose of the shape between those at the start and the end of the frame |
-//! | `s` | bound on the relative speed: that of the particle and of the fastest point of the shape |
-//!
-//! The bound finds the first contact along a path by steps of `gap/s`, which pass no surface however thin
-//! (conservative advancement). If the gap is negative at the end, regula falsi (Illinois) finds the root instead; it is exact
-//! to rounding, and may be a later one of three.
+//! Obstacles of particles: all parts of a world, as they moved during a frame. When a path meets one is in
+//! [`first_contact`](super::first_contact).
 
 use super::cells::Cells;
-use super::path::Path;
+use super::first_contact::Rates;
 use tumble_collide::{Aabb, BoxTree, Pose, Shape, Vec3};
 use tumble_core::{CollisionGroup, Frame, Material, ObjectId, PartState};
 
-/// Most steps along a path.
-const STEPS: usize = 48;
-/// Gap of a particle that lies on a surface, m.
-pub(super) const TOUCHING: f64 = 1e-10;
 /// Number of obstacles from which a tree finds those near a path.
 const MANY: usize = 48;
 
@@ -33,14 +16,20 @@ pub(super) struct Obstacle<'a> {
     pub state: &'a PartState,
     pub material: Material,
     shape: &'a Shape,
+    /// Pose of the shape in the part, unless it is that of the part.
+    placed: Option<&'a Pose>,
     before: Pose,
     moves: bool,
+    /// Whether the shape is convex for certain.
+    pub(super) convex: bool,
+    /// Its velocities over the frame, unless it does not move.
+    pub(super) rates: Option<Rates>,
     /// Whether impulses move it.
     pub dynamic: bool,
     /// Normal and offset of a half-space that does not move.
     plane: Option<(Vec3, f64)>,
     /// Bound on the speed of its points over the frame, m/s.
-    speed: f64,
+    pub(super) speed: f64,
     /// Box around its motion, grown by the radius of a particle.
     bounds: Aabb,
 }
@@ -91,17 +80,42 @@ impl<'a> Obstacles<'a> {
                 }
                 let (before, state) = (frame.before[row].pose, &view.part_states[row]);
                 let moves = before != state.pose;
-                let turn = (state.pose.rotation * before.rotation.inverse()).angle();
-                let (path, reach) = ((state.position() - before.translation.vector).norm(), shape.bounding_radius());
-                let sweep = if turn > 0.0 { turn * reach } else { 0.0 };
-                let speed = if moves { (path + sweep) / frame.dt } else { 0.0 };
-                let [a, b] = [&before, &state.pose].map(|pose| shape.tight_aabb(pose));
-                let bounds = Aabb { min: a.min.inf(&b.min), max: a.max.sup(&b.max) }.grown(radius + sweep);
+                let turn = (state.pose.rotation * before.rotation.inverse()).scaled_axis();
+                let path = state.position() - before.translation.vector;
+                // a half-space has no bounding radius
+                let sweep = if turn == Vec3::zeros() { 0.0 } else { turn.norm() * shape.bounding_radius() };
+                let speed = if moves { (path.norm() + sweep) / frame.dt } else { 0.0 };
+                let rates = moves.then(|| Rates {
+                    start: before.translation.vector,
+                    velocity: path / frame.dt,
+                    angular: turn / frame.dt,
+                });
                 let (material, dynamic) = (body.material(part), dynamic && body.part_moves(part));
-                let normal = state.pose.rotation * Vec3::z();
-                let plane =
-                    (!moves && matches!(shape, Shape::HalfSpace)).then(|| (normal, normal.dot(&state.position())));
-                all.push(Obstacle { id, part, state, material, shape, before, moves, dynamic, plane, speed, bounds });
+                for (shape, placed) in pieces(shape) {
+                    let at = |pose: &Pose| shape.tight_aabb(&placed.map_or(*pose, |placed| pose * placed));
+                    let [a, b] = [at(&before), at(&state.pose)];
+                    let bounds = Aabb { min: a.min.inf(&b.min), max: a.max.sup(&b.max) }.grown(radius + sweep);
+                    let normal = state.pose.rotation * Vec3::z();
+                    let plane =
+                        (!moves && matches!(shape, Shape::HalfSpace)).then(|| (normal, normal.dot(&state.position())));
+                    let convex = !matches!(shape, Shape::Mesh(_));
+                    all.push(Obstacle {
+                        id,
+                        part,
+                        state,
+                        material,
+                        shape,
+                        placed,
+                        before,
+                        moves,
+                        convex,
+                        rates,
+                        dynamic,
+                        plane,
+                        speed,
+                        bounds,
+                    });
+                }
             }
         }
         let finite = |o: &Obstacle| o.bounds.min.iter().chain(o.bounds.max.iter()).all(|x| x.is_finite());
@@ -159,18 +173,12 @@ fn overlap(a: &Aabb, b: &Aabb) -> bool {
     (0..3).all(|k| a.min[k] <= b.max[k] && b.min[k] <= a.max[k])
 }
 
-/// A stretch of a path within a frame.
-pub(super) struct Stretch<'a> {
-    pub path: &'a Path,
-    /// Position at its end, m.
-    pub end: &'a Vec3,
-    /// Start and length, s; the start is counted from that of the frame.
-    pub start: f64,
-    pub length: f64,
-    /// Length of the frame, s.
-    pub dt: f64,
-    /// Radius of the particle, m.
-    pub radius: f64,
+/// Returns a shape, or those that a compound is made of with their poses.
+fn pieces(shape: &Shape) -> Vec<(&Shape, Option<&Pose>)> {
+    match shape {
+        Shape::Compound(compound) => compound.placed().map(|(shape, pose)| (shape, Some(pose))).collect(),
+        _ => vec![(shape, None)],
+    }
 }
 
 impl Obstacle<'_> {
@@ -180,10 +188,13 @@ impl Obstacle<'_> {
             return (normal.dot(point) - offset - radius, normal);
         }
         let pose = match self.moves {
-            true => &between(&self.before, &self.state.pose, share),
-            false => &self.state.pose,
+            true => between(&self.before, &self.state.pose, share),
+            false => self.state.pose,
         };
-        let closest = self.shape.closest_point(pose, point);
+        let closest = match self.placed {
+            Some(placed) => self.shape.closest_point(&(pose * placed), point),
+            None => self.shape.closest_point(&pose, point),
+        };
         (closest.distance - radius, closest.normal)
     }
 
@@ -193,77 +204,5 @@ impl Obstacle<'_> {
             return Vec3::zeros();
         }
         self.state.velocity_at(point) + self.state.pose.rotation * self.material.surface_velocity
-    }
-
-    /// Returns the time at which a stretch that leaves the surface turns back to it, s, at most half of it.
-    fn apex(&self, stretch: &Stretch) -> Option<f64> {
-        let (path, half) = (stretch.path, 0.5 * stretch.length);
-        let normal = self.gap(&path.x, stretch.start / stretch.dt, stretch.radius).1;
-        let (rate, pull) = ((path.v - self.velocity(&path.x)).dot(&normal), path.pull.dot(&normal));
-        (rate > 0.0).then(|| if pull < 0.0 { half.min(-rate / pull) } else { half })
-    }
-
-    /// Returns the time along a stretch at which it meets the surface, s; 0 if it begins there. The gap is
-    /// not negative then, unless it was at the start.
-    pub fn meets(&self, stretch: &Stretch) -> Option<f64> {
-        let bound = stretch.path.top_speed(stretch.length) + self.speed;
-        let at = |t: f64, x: &Vec3| self.gap(x, (stretch.start + t) / stretch.dt, stretch.radius).0;
-        let gap = |t: f64| at(t, &stretch.path.at(t).0);
-        let mut low = (0.0, at(0.0, &stretch.path.x));
-        if low.1 <= 0.0 {
-            return Some(0.0);
-        }
-        if low.1 > bound * stretch.length {
-            return None;
-        }
-        let mut high = (stretch.length, at(stretch.length, stretch.end));
-        if low.1 <= TOUCHING && high.1 < 0.0 {
-            // a bounce that begins here may end within the stretch
-            match self.apex(stretch).map(|t| (t, gap(t))).filter(|apex| apex.1 > TOUCHING) {
-                Some(apex) => low = apex,
-                None => return Some(0.0),
-            }
-        }
-        if high.1 >= 0.0 {
-            let mut steps = 0;
-            while low.1 > 0.0 && low.1 + high.1 < bound * (high.0 - low.0) && steps < STEPS {
-                let t = low.0 + (low.1 / bound).max(1e-6 * stretch.length);
-                if t >= high.0 {
-                    return None;
-                }
-                let next = (t, gap(t));
-                if next.1 < 0.0 {
-                    high = next;
-                    break;
-                }
-                (low, steps) = (next, steps + 1);
-            }
-            if high.1 >= 0.0 {
-                return None;
-            }
-        }
-        let (mut ends, mut last) = ((low.1, high.1), 0);
-        for _ in 0..STEPS {
-            let chord = (low.0 * ends.1 - high.0 * ends.0) / (ends.1 - ends.0);
-            // rounding puts a root close to the later end there: halves then find how close
-            let t = if chord < high.0 { chord } else { 0.5 * (low.0 + high.0) };
-            if !(t > low.0 && t < high.0) {
-                break;
-            }
-            let value = gap(t);
-            let side = if value >= 0.0 { 1 } else { -1 };
-            // an end that stays twice counts half
-            let half = if side == last { 0.5 } else { 1.0 };
-            if side > 0 {
-                (low, ends) = ((t, value), (value, half * ends.1));
-            } else {
-                (high, ends) = ((t, value), (half * ends.0, value));
-            }
-            last = side;
-            if low.1 < 1e-14 {
-                break;
-            }
-        }
-        Some(low.0)
     }
 }

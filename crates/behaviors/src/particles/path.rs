@@ -96,6 +96,11 @@ impl Path {
         (self.x + t * (self.v + t * two * self.pull), self.v + t * one * self.pull)
     }
 
+    /// Returns the acceleration where the velocity is `v`, m/s²: it decays along the path and does not turn.
+    pub fn acceleration(&self, v: &Vec3) -> Vec3 {
+        self.pull - self.gamma * (v - self.v)
+    }
+
     /// Returns a bound on the speed up to `t` seconds, m/s.
     pub fn top_speed(&self, t: f64) -> f64 {
         self.v.norm() + t * self.pull.norm()

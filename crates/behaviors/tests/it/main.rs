@@ -7,6 +7,7 @@ mod boids;
 mod buoyancy;
 mod drawn;
 mod emission;
+mod extremes;
 mod fields;
 mod flights;
 mod frame_states;
@@ -15,6 +16,7 @@ mod laws;
 mod neighbors;
 mod non_spinning;
 mod particles;
+mod slanting;
 mod springs;
 mod steering;
 

@@ -524,6 +524,8 @@ class SpringMesh:
     @property
     def triangles(self) -> NDArray[np.uint32]:
         """Triangles of its surface, shape (m, 3): numbers of nodes."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
 
 @final
 class Emitter:
@@ -585,6 +587,8 @@ class ParticleSystem:
         None if all places are taken.
         """
     def __len__(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
 
 @final
 class Flock:
@@ -627,18 +631,20 @@ class Flock:
     def remove(self, boid: Boid | str) -> None:
         """Removes a boid, given as a handle or by name, from the flock and from the world."""
     def __len__(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
 
 @final
 class BodyFlock:
-    """A flock of rigid bodies of a world: the forces of a flock on their centers of mass, and torques that turn the nose (x) of each along
-    its velocity and bank it into turns.
+    """A flock of rigid and articulated bodies of a world: the forces of a flock on their centers of mass, and torques that turn the nose (x)
+    of each, or of its first link, along its velocity and bank it into turns.
 
     A handle without data of its own, made by ``World.add_body_flock``.
     """
     def __len__(self) -> int: ...
     def add(self, body: _Body) -> None:
-        """Adds a rigid body of the world, given as a handle or by name. Gravity acts beside the flock: a body that its wings carry has
-        ``gravity_scale=0``.
+        """Adds a rigid body of the world, or an articulation whose first link floats, given as a handle or by name. Gravity acts beside
+        the flock: a rigid body that no wings carry has ``gravity_scale=0``.
         """
     def remove(self, body: _Body) -> None:
         """Removes a body, given as a handle or by name, from the flock. It stays in the world."""
@@ -656,7 +662,7 @@ class BodyFlock:
     def name(self) -> str:
         """Name, unique in its world."""
     @property
-    def bodies(self) -> list[RigidBody]:
+    def bodies(self) -> list[RigidBody | Articulation]:
         """Its bodies, in the order in which they were added."""
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
@@ -2505,11 +2511,12 @@ class World:
         ``boundary_stiffness`` (N/m) of a soft sphere around the flock.
         """
     def add_body_flock(self, name: str = "", **steering: Any) -> BodyFlock:
-        """Adds a flock of rigid bodies without bodies and returns its handle; ``BodyFlock.add`` adds bodies of the world.
+        """Adds a flock of rigid and articulated bodies, empty, and returns its handle; ``BodyFlock.add`` adds bodies of the world.
 
         Keywords are the constants of the forces, as in ``add_flock``, and of the helm: ``agility``, rate at which the orientation
         approaches the wanted one (1/s); ``max_angular_acceleration`` (rad/s²); ``bank_time``, seconds of the rate of turn that are a
-        quarter turn of bank; ``up``, the direction that is up for a body without bank.
+        quarter turn of bank; ``up``, the direction that is up for a body without bank; ``wind``, velocity of the air in which bodies
+        fly (m/s).
         """
     def add_event(
         self,

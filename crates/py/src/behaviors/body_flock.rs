@@ -1,22 +1,22 @@
-//! Flocks of rigid bodies.
+//! Flocks of rigid and articulated bodies.
 
 use crate::arrays::convert::{some, vector};
 use crate::behaviors::flock::{steering, steering_dict};
 use crate::behaviors::placed;
 use crate::errors::{Error, Result};
-use crate::objects::body::RigidBody;
-use crate::objects::place::{Place, hash};
+use crate::objects::bodies::handle as handle_of;
+use crate::objects::handle::handle;
+use crate::objects::place::{Found, Place, found};
 use crate::world::add::own_place;
 use crate::world::class::World;
-use crate::world::gc::{Anchor, anchor};
-use pyo3::gc::{PyTraverseError, PyVisit};
+use crate::world::gc::Anchor;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tumble::behaviors::{BodyFlock, Helm, Steering};
 use tumble::collide::Vec3;
 
-/// A flock of rigid bodies of a world: the forces of a flock on their centers of mass, and torques that turn the nose (x) of each along
-/// its velocity and bank it into turns.
+/// A flock of rigid and articulated bodies of a world: the forces of a flock on their centers of mass, and torques that turn the nose (x)
+/// of each, or of its first link, along its velocity and bank it into turns.
 ///
 /// A handle without data of its own, made by ``World.add_body_flock``.
 #[pyclass(frozen, module = "tumble", name = "BodyFlock")]
@@ -24,6 +24,8 @@ pub struct PyBodyFlock {
     pub place: Place,
     anchor: Py<Anchor>,
 }
+
+handle!(PyBodyFlock, "BodyFlock", |flock| flock.__len__().ok().map(|count| format!(": {count} bodies")));
 
 /// Returns the constants of a helm with those that are given by name, which are taken out of `given`.
 fn helm(mut of: Helm, given: &Bound<'_, PyDict>) -> Result<Helm> {
@@ -38,20 +40,17 @@ fn helm(mut of: Helm, given: &Bound<'_, PyDict>) -> Result<Helm> {
             given.del_item(name)?;
         }
     }
-    if let Some(up) = given.get_item("up")? {
-        of.up = Vec3::from(some::<3>(&up, "up")?);
-        given.del_item("up")?;
+    for (name, vector) in [("up", &mut of.up), ("wind", &mut of.wind)] {
+        if let Some(value) = given.get_item(name)? {
+            *vector = Vec3::from(some::<3>(&value, name)?);
+            given.del_item(name)?;
+        }
     }
     of.validate()?;
     Ok(of)
 }
 
 impl PyBodyFlock {
-    /// Returns a handle.
-    pub fn new(py: Python<'_>, place: Place) -> Result<PyBodyFlock> {
-        Ok(PyBodyFlock { anchor: anchor(py, &place.shared)?, place })
-    }
-
     fn change<T>(&self, py: Python<'_>, change: impl FnOnce(&mut BodyFlock) -> Result<T>) -> Result<T> {
         self.place.write(py, |inner| {
             change(inner.world.get_mut::<BodyFlock>(self.place.id).ok_or_else(|| self.place.removed())?)
@@ -61,37 +60,27 @@ impl PyBodyFlock {
 
 #[pymethods]
 impl PyBodyFlock {
-    /// Name, unique in its world.
-    #[getter]
-    fn name(&self) -> &str {
-        &self.place.name
-    }
-
-    /// Whether its world still has it.
-    #[getter]
-    fn exists(&self) -> Result<bool> {
-        self.place.shared.read(|inner| Ok(inner.world.status(self.place.id).is_some()))
-    }
-
     /// Its bodies, in the order in which they were added.
     #[getter]
-    fn bodies(&self, py: Python<'_>) -> Result<Vec<RigidBody>> {
-        let places: Vec<Place> = self.place.read(|inner| {
+    fn bodies(&self, py: Python<'_>) -> Result<Vec<Py<PyAny>>> {
+        let present: Vec<Found> = self.place.read(|inner| {
             let bodies = inner.world.get::<BodyFlock>(self.place.id)?.bodies().iter();
-            let present = bodies.filter(|id| inner.world.status(**id).is_some());
-            Some(present.map(|id| placed(&self.place.shared, inner, *id)).collect())
+            Some(bodies.filter_map(|id| found(inner, *id)).collect())
         })?;
-        places.into_iter().map(|place| RigidBody::new(py, place)).collect()
+        present.into_iter().map(|body| handle_of(py, &self.place.shared, body)).collect()
     }
 
-    /// Adds a rigid body of the world, given as a handle or by name. Gravity acts beside the flock: a body that its wings carry has
-    /// ``gravity_scale=0``.
+    /// Adds a rigid body of the world, or an articulation whose first link floats, given as a handle or by name. Gravity acts beside
+    /// the flock: a rigid body that no wings carry has ``gravity_scale=0``.
     fn add(&self, py: Python<'_>, body: &Bound<'_, PyAny>) -> Result<()> {
         let place = own_place(&self.place.shared, body)?;
-        let rigid =
-            self.place.shared.read(|inner| Ok(inner.world.get::<tumble::dynamics::RigidBody>(place.id).is_some()))?;
-        if !rigid {
-            return Err(Error::value(format!("'{}' is not a rigid body", place.name)));
+        let steered =
+            self.place.shared.read(|inner| Ok(inner.world.object(place.id).is_some_and(BodyFlock::steers)))?;
+        if !steered {
+            return Err(Error::value(format!(
+                "'{}': expected a rigid body, or an articulation whose first link floats",
+                place.name
+            )));
         }
         self.change(py, |flock| match flock.bodies().contains(&place.id) {
             true => Err(Error::value(format!("'{}' is in the flock", place.name))),
@@ -123,6 +112,7 @@ impl PyBodyFlock {
         dict.set_item("max_angular_acceleration", helm.max_angular_acceleration)?;
         dict.set_item("bank_time", helm.bank_time)?;
         dict.set_item("up", vector(py, &helm.up))?;
+        dict.set_item("wind", vector(py, &helm.wind))?;
         Ok(dict)
     }
 
@@ -142,34 +132,16 @@ impl PyBodyFlock {
             Some(bodies.iter().filter(|id| inner.world.status(**id).is_some()).count())
         })
     }
-
-    fn __repr__(&self) -> String {
-        match self.__len__() {
-            Ok(count) => format!("<BodyFlock '{}': {count} bodies>", self.place.name),
-            Err(_) => format!("<BodyFlock '{}', removed>", self.place.name),
-        }
-    }
-
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<PyBodyFlock>().is_ok_and(|other| self.place.same(&other.get().place))
-    }
-
-    fn __hash__(&self) -> u64 {
-        hash(&self.place)
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> std::result::Result<(), PyTraverseError> {
-        visit.call(&self.anchor)
-    }
 }
 
 #[pymethods]
 impl World {
-    /// Adds a flock of rigid bodies without bodies and returns its handle; ``BodyFlock.add`` adds bodies of the world.
+    /// Adds a flock of rigid and articulated bodies, empty, and returns its handle; ``BodyFlock.add`` adds bodies of the world.
     ///
     /// Keywords are the constants of the forces, as in ``add_flock``, and of the helm: ``agility``, rate at which the orientation
     /// approaches the wanted one (1/s); ``max_angular_acceleration`` (rad/s²); ``bank_time``, seconds of the rate of turn that are a
-    /// quarter turn of bank; ``up``, the direction that is up for a body without bank.
+    /// quarter turn of bank; ``up``, the direction that is up for a body without bank; ``wind``, velocity of the air in which bodies
+    /// fly (m/s).
     #[pyo3(signature = (name="", **steering))]
     fn add_body_flock(&self, py: Python<'_>, name: &str, steering: Option<&Bound<'_, PyDict>>) -> Result<PyBodyFlock> {
         let given = steering.map_or_else(|| Ok(PyDict::new(py)), |given| given.copy())?;

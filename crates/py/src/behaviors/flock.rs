@@ -3,10 +3,10 @@
 use crate::arrays::convert::{quaternion, some, vec3_or, vector};
 use crate::behaviors::{appearance, placed};
 use crate::errors::{Error, Result};
-use crate::objects::place::{Place, hash};
-use crate::world::gc::{Anchor, anchor};
+use crate::objects::handle::handle;
+use crate::objects::place::Place;
+use crate::world::gc::Anchor;
 use numpy::PyArray1;
-use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use std::sync::Arc;
@@ -68,12 +68,9 @@ pub struct PyFlock {
     anchor: Py<Anchor>,
 }
 
-impl PyFlock {
-    /// Returns a handle.
-    pub fn new(py: Python<'_>, place: Place) -> Result<PyFlock> {
-        Ok(PyFlock { anchor: anchor(py, &place.shared)?, place })
-    }
+handle!(PyFlock, "Flock", |flock| flock.__len__().ok().map(|count| format!(": {count} boids")));
 
+impl PyFlock {
     fn boid(&self, value: &Bound<'_, PyAny>) -> Result<ObjectId> {
         if value.is_instance_of::<PyString>() {
             let name: String = value.extract()?;
@@ -90,18 +87,6 @@ impl PyFlock {
 
 #[pymethods]
 impl PyFlock {
-    /// Name, unique in its world.
-    #[getter]
-    fn name(&self) -> &str {
-        &self.place.name
-    }
-
-    /// Whether its world still has it.
-    #[getter]
-    fn exists(&self) -> Result<bool> {
-        self.place.shared.read(|inner| Ok(inner.world.status(self.place.id).is_some()))
-    }
-
     /// Its boids, in the order in which they were added: a list of ``Boid``.
     #[getter]
     fn boids(&self, py: Python<'_>) -> Result<Vec<PyBoid>> {
@@ -174,14 +159,6 @@ impl PyFlock {
             Some(flock.boids().iter().filter(|id| inner.world.status(**id).is_some()).count())
         })
     }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        visit.call(&self.anchor)
-    }
-
-    fn __repr__(&self) -> String {
-        format!("<tumble.Flock '{}'>", self.place.name)
-    }
 }
 
 /// A boid of a flock: a point mass whose nose points along its velocity, and that banks into turns.
@@ -194,27 +171,10 @@ pub struct PyBoid {
     anchor: Py<Anchor>,
 }
 
-impl PyBoid {
-    /// Returns a handle.
-    pub fn new(py: Python<'_>, place: Place) -> Result<PyBoid> {
-        Ok(PyBoid { anchor: anchor(py, &place.shared)?, place })
-    }
-}
+handle!(PyBoid, "Boid", |_| Some(String::new()));
 
 #[pymethods]
 impl PyBoid {
-    /// Name, unique in its world.
-    #[getter]
-    fn name(&self) -> &str {
-        &self.place.name
-    }
-
-    /// Whether its world still has it.
-    #[getter]
-    fn exists(&self) -> Result<bool> {
-        self.place.shared.read(|inner| Ok(inner.world.status(self.place.id).is_some()))
-    }
-
     /// Mass, kg.
     #[getter]
     fn mass(&self) -> Result<f64> {
@@ -243,21 +203,5 @@ impl PyBoid {
     #[getter]
     fn bank(&self) -> Result<f64> {
         self.place.read(|inner| inner.world.state_of(self.place.id)?.get(3).copied())
-    }
-
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<PyBoid>().is_ok_and(|other| other.get().place.same(&self.place))
-    }
-
-    fn __hash__(&self) -> u64 {
-        hash(&self.place)
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        visit.call(&self.anchor)
-    }
-
-    fn __repr__(&self) -> String {
-        format!("<tumble.Boid '{}'>", self.place.name)
     }
 }

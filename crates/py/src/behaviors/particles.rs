@@ -5,13 +5,13 @@
 use crate::arrays::convert::{pose, vec3, vec3_or, whole_number};
 use crate::behaviors::{appearance, material, placed, rows};
 use crate::errors::{Error, Result};
+use crate::objects::handle::handle;
 use crate::objects::place::Place;
 use crate::world::add::own_place;
-use crate::world::gc::{Anchor, anchor};
+use crate::world::gc::Anchor;
 use crate::world::query;
 use crate::world::shared::Shared;
 use numpy::{PyArray1, PyArray2};
-use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use std::sync::Arc;
 use tumble::behaviors::{Emitter as Source, Particle, ParticleLook, ParticleSettings, ParticleSystem};
@@ -135,12 +135,9 @@ pub struct Particles {
     anchor: Py<Anchor>,
 }
 
-impl Particles {
-    /// Returns a handle.
-    pub fn new(py: Python<'_>, place: Place) -> Result<Particles> {
-        Ok(Particles { anchor: anchor(py, &place.shared)?, place })
-    }
+handle!(Particles, "ParticleSystem", |_| Some(String::new()));
 
+impl Particles {
     fn each<T>(&self, get: impl Fn(Particle) -> T) -> Result<Vec<T>> {
         self.place.read(|inner| Some(ParticleSystem::particles(&inner.world, self.place.id)?.map(get).collect()))
     }
@@ -148,18 +145,6 @@ impl Particles {
 
 #[pymethods]
 impl Particles {
-    /// Name, unique in its world.
-    #[getter]
-    fn name(&self) -> &str {
-        &self.place.name
-    }
-
-    /// Whether its world still has it.
-    #[getter]
-    fn exists(&self) -> Result<bool> {
-        self.place.shared.read(|inner| Ok(inner.world.status(self.place.id).is_some()))
-    }
-
     /// Most particles that live at once.
     #[getter]
     fn capacity(&self) -> Result<usize> {
@@ -211,13 +196,5 @@ impl Particles {
 
     fn __len__(&self) -> Result<usize> {
         Ok(self.each(|_| ())?.len())
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        visit.call(&self.anchor)
-    }
-
-    fn __repr__(&self) -> String {
-        format!("<tumble.ParticleSystem '{}'>", self.place.name)
     }
 }

@@ -2,11 +2,11 @@
 
 use crate::behaviors::{appearance, material, placed, rows};
 use crate::errors::{Error, Result};
+use crate::objects::handle::handle;
 use crate::objects::place::Place;
-use crate::world::gc::{Anchor, anchor};
+use crate::world::gc::Anchor;
 use crate::world::shared::Shared;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 use std::sync::Arc;
@@ -22,6 +22,8 @@ pub struct Soft {
     pub place: Place,
     anchor: Py<Anchor>,
 }
+
+handle!(Soft, "SpringMesh", |_| Some(String::new()));
 
 /// The grid of a new mesh.
 pub enum Grid {
@@ -97,11 +99,6 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, grid: &Grid, given: &Common<'_,
 }
 
 impl Soft {
-    /// Returns a handle.
-    pub fn new(py: Python<'_>, place: Place) -> Result<Soft> {
-        Ok(Soft { anchor: anchor(py, &place.shared)?, place })
-    }
-
     fn constant<T>(&self, get: impl FnOnce(&SpringMesh) -> T) -> Result<T> {
         self.place.read(|inner| inner.world.get::<SpringMesh>(self.place.id).map(get))
     }
@@ -118,18 +115,6 @@ impl Soft {
 
 #[pymethods]
 impl Soft {
-    /// Name, unique in its world.
-    #[getter]
-    fn name(&self) -> &str {
-        &self.place.name
-    }
-
-    /// Whether its world still has it.
-    #[getter]
-    fn exists(&self) -> Result<bool> {
-        self.place.shared.read(|inner| Ok(inner.world.status(self.place.id).is_some()))
-    }
-
     /// Positions of the nodes, shape (n, 3), m.
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
@@ -162,13 +147,5 @@ impl Soft {
         })?;
         let shape = [triangles.len() / 3, 3];
         Ok(PyArray1::from_vec(py, triangles).reshape(shape)?)
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        visit.call(&self.anchor)
-    }
-
-    fn __repr__(&self) -> String {
-        format!("<tumble.SpringMesh '{}'>", self.place.name)
     }
 }

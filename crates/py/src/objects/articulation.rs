@@ -161,7 +161,7 @@ impl Articulation {
     /// Whether its world still has it; True for a description.
     #[getter]
     fn exists(&self) -> Result<bool> {
-        self.place().map_or(Ok(true), |place| place.shared.read(|inner| Ok(inner.world.status(place.id).is_some())))
+        self.place().map_or(Ok(true), Place::exists)
     }
 
     /// Names of all joints that are not fixed, in the order of the coordinates.

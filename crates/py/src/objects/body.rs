@@ -7,11 +7,11 @@ use crate::choices::{MODES, meaning, word};
 use crate::errors::{Error, Result};
 use crate::objects::appearance;
 use crate::objects::description::alone;
-use crate::objects::place::{Place, hash};
-use crate::world::gc::{Anchor, anchor};
+use crate::objects::handle::handle;
+use crate::objects::place::Place;
+use crate::world::gc::Anchor;
 use crate::world::{contacts, query};
 use numpy::{PyArray1, PyArray2};
-use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use tumble::collide::{Mat3, Pose, Vec3};
@@ -27,12 +27,9 @@ pub struct RigidBody {
     anchor: Py<Anchor>,
 }
 
-impl RigidBody {
-    /// Returns a handle.
-    pub fn new(py: Python<'_>, place: Place) -> Result<RigidBody> {
-        Ok(RigidBody { anchor: anchor(py, &place.shared)?, place })
-    }
+handle!(RigidBody, "RigidBody", |_| Some(String::new()));
 
+impl RigidBody {
     fn constant<T>(&self, get: impl FnOnce(&Rigid) -> T) -> Result<T> {
         self.place.read(|inner| inner.world.get::<Rigid>(self.place.id).map(get))
     }
@@ -90,18 +87,6 @@ pub fn locked(names: &[String]) -> Result<LockedAxes> {
 
 #[pymethods]
 impl RigidBody {
-    /// Name, unique in its world.
-    #[getter]
-    fn name(&self) -> &str {
-        &self.place.name
-    }
-
-    /// Whether its world still has it.
-    #[getter]
-    fn exists(&self) -> Result<bool> {
-        self.place.shared.read(|inner| Ok(inner.world.status(self.place.id).is_some()))
-    }
-
     /// Mass, kg, above 0. Meaningless for static geometry. Setting it keeps the velocity and changes
     /// the inertia by the same factor.
     #[getter]
@@ -540,25 +525,8 @@ impl RigidBody {
         Ok(vector(py, &self.place.pose()?.transform_point(&point.into()).coords))
     }
 
-    fn __repr__(&self) -> String {
-        let gone = !self.exists().unwrap_or(true);
-        format!("<tumble.RigidBody '{}'{}>", self.place.name, if gone { ", removed" } else { "" })
-    }
-
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<RigidBody>().is_ok_and(|other| self.place.same(&other.get().place))
-    }
-
-    fn __hash__(&self) -> u64 {
-        hash(&self.place)
-    }
-
     /// Refuses to pickle a handle by itself.
     fn __reduce__(&self) -> Result<()> {
         Err(alone(&self.place.name))
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        visit.call(&self.anchor)
     }
 }

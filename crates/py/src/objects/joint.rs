@@ -4,11 +4,11 @@ use crate::arrays::convert::vector;
 use crate::errors::{Error, Result};
 use crate::objects::bodies::handle;
 use crate::objects::builder::pair;
+use crate::objects::handle::handle;
 use crate::objects::joints::drive;
-use crate::objects::place::{Place, found, hash};
-use crate::world::gc::{Anchor, anchor};
+use crate::objects::place::{Place, found};
+use crate::world::gc::Anchor;
 use numpy::PyArray1;
-use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use tumble::dynamics::{DofSettings, JointForce, LoopJoint, LoopJointKind, Spring, Transmission};
 
@@ -23,12 +23,9 @@ pub struct Joint {
     anchor: Py<Anchor>,
 }
 
-impl Joint {
-    /// Returns a handle.
-    pub fn new(py: Python<'_>, place: Place) -> Result<Joint> {
-        Ok(Joint { anchor: anchor(py, &place.shared)?, place })
-    }
+handle!(Joint, "Joint", |joint| joint.kind().ok().map(|kind| format!(", {kind}")));
 
+impl Joint {
     fn constant<T>(&self, get: impl FnOnce(&LoopJoint) -> T) -> Result<T> {
         self.place.read(|inner| inner.world.get::<LoopJoint>(self.place.id).map(get))
     }
@@ -97,18 +94,6 @@ impl Joint {
 
 #[pymethods]
 impl Joint {
-    /// Name, unique in its world.
-    #[getter]
-    fn name(&self) -> &str {
-        &self.place.name
-    }
-
-    /// Whether its world still has it.
-    #[getter]
-    fn exists(&self) -> Result<bool> {
-        self.place.shared.read(|inner| Ok(inner.world.status(self.place.id).is_some()))
-    }
-
     /// Kind of the joint.
     #[getter]
     fn kind(&self) -> Result<&'static str> {
@@ -373,25 +358,6 @@ impl Joint {
             let error = joint.position_error(&inner.world.view()).unwrap_or_default();
             Some((error.distance, error.angle))
         })
-    }
-
-    fn __repr__(&self) -> String {
-        match self.kind() {
-            Ok(kind) => format!("<tumble.Joint '{}', {kind}>", self.place.name),
-            Err(_) => format!("<tumble.Joint '{}', removed>", self.place.name),
-        }
-    }
-
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Joint>().is_ok_and(|other| self.place.same(&other.get().place))
-    }
-
-    fn __hash__(&self) -> u64 {
-        hash(&self.place)
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        visit.call(&self.anchor)
     }
 }
 

@@ -8,6 +8,7 @@ pub mod body;
 pub mod builder;
 pub mod derivatives;
 pub mod description;
+pub mod handle;
 pub mod joint;
 pub mod joints;
 pub mod place;

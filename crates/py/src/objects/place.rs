@@ -39,6 +39,11 @@ impl Place {
         })
     }
 
+    /// Returns whether its world still has the object.
+    pub fn exists(&self) -> Result<bool> {
+        self.shared.read(|inner| Ok(inner.world.status(self.id).is_some()))
+    }
+
     /// Returns mode and flags of the object.
     pub fn status(&self) -> Result<Status> {
         self.read(|inner| inner.world.status(self.id))

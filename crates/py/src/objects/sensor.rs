@@ -1,7 +1,8 @@
 //! Measuring sensors of a world, and the mapping of their readings.
 
 use crate::errors::{Error, Result};
-use crate::objects::place::{Place, hash};
+use crate::objects::handle::handle;
+use crate::objects::place::Place;
 use crate::world::gc::{Anchor, anchor};
 use crate::world::sensors;
 use crate::world::shared::Shared;
@@ -18,27 +19,10 @@ pub struct Sensor {
     anchor: Py<Anchor>,
 }
 
-impl Sensor {
-    /// Returns a handle.
-    pub fn new(py: Python<'_>, place: Place) -> Result<Sensor> {
-        Ok(Sensor { anchor: anchor(py, &place.shared)?, place })
-    }
-}
+handle!(Sensor, "Sensor", |sensor| sensor.kind().ok().map(|kind| format!(": {kind}")));
 
 #[pymethods]
 impl Sensor {
-    /// Name, unique in its world.
-    #[getter]
-    fn name(&self) -> &str {
-        &self.place.name
-    }
-
-    /// Whether its world still has it.
-    #[getter]
-    fn exists(&self) -> Result<bool> {
-        self.place.shared.read(|inner| Ok(inner.world.status(self.place.id).is_some()))
-    }
-
     /// Quantity that it reads.
     #[getter]
     fn kind(&self) -> Result<&'static str> {
@@ -55,25 +39,6 @@ impl Sensor {
     /// Starts its noise anew from a seed, a whole number of at most 64 bits. The reading and the bias stay.
     fn seed(&self, py: Python<'_>, seed: u64) -> Result<()> {
         self.place.write(py, |inner| Ok(inner.world.seed_sensor(self.place.id, seed)?))
-    }
-
-    fn __repr__(&self) -> String {
-        match self.kind() {
-            Ok(kind) => format!("<Sensor '{}': {kind}>", self.place.name),
-            Err(_) => format!("<Sensor '{}', removed>", self.place.name),
-        }
-    }
-
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Sensor>().is_ok_and(|other| self.place.same(&other.get().place))
-    }
-
-    fn __hash__(&self) -> u64 {
-        hash(&self.place)
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        visit.call(&self.anchor)
     }
 }
 

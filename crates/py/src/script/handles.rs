@@ -2,9 +2,9 @@
 
 use crate::errors::Result;
 use crate::objects::body::RigidBody;
-use crate::objects::place::{Place, hash};
-use crate::world::gc::{Anchor, anchor};
-use pyo3::gc::{PyTraverseError, PyVisit};
+use crate::objects::handle::handle;
+use crate::objects::place::Place;
+use crate::world::gc::Anchor;
 use pyo3::prelude::*;
 use tumble::dynamics::{ScriptedEvent as Core, Template as Store};
 
@@ -15,27 +15,10 @@ pub struct ScriptedEvent {
     anchor: Py<Anchor>,
 }
 
-impl ScriptedEvent {
-    /// Returns a handle.
-    pub fn new(py: Python<'_>, place: Place) -> Result<ScriptedEvent> {
-        Ok(ScriptedEvent { anchor: anchor(py, &place.shared)?, place })
-    }
-}
+handle!(ScriptedEvent, "ScriptedEvent", |event| event.fired().ok().map(|fired| format!(": fired {fired} times")));
 
 #[pymethods]
 impl ScriptedEvent {
-    /// Name, unique in its world.
-    #[getter]
-    fn name(&self) -> &str {
-        &self.place.name
-    }
-
-    /// Whether its world still has it.
-    #[getter]
-    fn exists(&self) -> Result<bool> {
-        self.place.shared.read(|inner| Ok(inner.world.status(self.place.id).is_some()))
-    }
-
     /// How often it has fired.
     #[getter]
     fn fired(&self) -> Result<u64> {
@@ -52,25 +35,6 @@ impl ScriptedEvent {
     fn set_enabled(&self, py: Python<'_>, value: bool) -> Result<()> {
         self.place.write(py, |inner| Ok(inner.world.set_enabled(self.place.id, value)?))
     }
-
-    fn __repr__(&self) -> String {
-        match self.fired() {
-            Ok(fired) => format!("<ScriptedEvent '{}': fired {fired} times>", self.place.name),
-            Err(_) => format!("<ScriptedEvent '{}', removed>", self.place.name),
-        }
-    }
-
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<ScriptedEvent>().is_ok_and(|other| self.place.same(&other.get().place))
-    }
-
-    fn __hash__(&self) -> u64 {
-        hash(&self.place)
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> std::result::Result<(), PyTraverseError> {
-        visit.call(&self.anchor)
-    }
 }
 
 /// Equal bodies that events spawn, made by ``World.add_template`` or ``[[template]]``.
@@ -82,12 +46,12 @@ pub struct Template {
     anchor: Py<Anchor>,
 }
 
-impl Template {
-    /// Returns a handle.
-    pub fn new(py: Python<'_>, place: Place) -> Result<Template> {
-        Ok(Template { anchor: anchor(py, &place.shared)?, place })
-    }
+handle!(Template, "Template", |template| template
+    .counts()
+    .ok()
+    .map(|[spawned, _]| format!(": spawned {spawned} times")));
 
+impl Template {
     fn counts(&self) -> Result<[u64; 2]> {
         self.place.read(|inner| Store::counts(&inner.world, self.place.id))
     }
@@ -95,18 +59,6 @@ impl Template {
 
 #[pymethods]
 impl Template {
-    /// Name, unique in its world.
-    #[getter]
-    fn name(&self) -> &str {
-        &self.place.name
-    }
-
-    /// Whether its world still has it.
-    #[getter]
-    fn exists(&self) -> Result<bool> {
-        self.place.shared.read(|inner| Ok(inner.world.status(self.place.id).is_some()))
-    }
-
     /// How often it has spawned a body.
     #[getter]
     fn spawned(&self) -> Result<u64> {
@@ -128,24 +80,5 @@ impl Template {
             Some(ids.iter().map(|&id| Place { shared: self.place.shared.clone(), id, name: name(id) }).collect())
         })?;
         places.into_iter().map(|place| RigidBody::new(py, place)).collect()
-    }
-
-    fn __repr__(&self) -> String {
-        match self.counts() {
-            Ok([spawned, _]) => format!("<Template '{}': spawned {spawned} times>", self.place.name),
-            Err(_) => format!("<Template '{}', removed>", self.place.name),
-        }
-    }
-
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Template>().is_ok_and(|other| self.place.same(&other.get().place))
-    }
-
-    fn __hash__(&self) -> u64 {
-        hash(&self.place)
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> std::result::Result<(), PyTraverseError> {
-        visit.call(&self.anchor)
     }
 }

@@ -76,6 +76,10 @@ const IMPACTS: i32 = 8;
 const STEPS: i32 = 48;
 // gap of a particle that lies on a surface, m
 const TOUCHING: f32 = 4e-7;
+// gap at which a particle has left a surface that it slid on, m
+const LEFT: f32 = 1e-5;
+// gap at which a surface is reached, m
+const REACHED: f32 = 1e-8;
 const NEVER: f32 = -1.0;
 
 fn plus(a: Fixed, d: vec3<f32>) -> Fixed {
@@ -163,80 +167,77 @@ fn gap_at(o: i32, p: vec3<f32>) -> Gap {
     return Gap(q.z - radius, sides.z * z);
 }
 
-// the time at which a path meets an obstacle, s; NEVER if it does not within `length`
+// a time of a path: gap, m, its rate, m/s, and the most that this falls, m/s^2
+struct Instant {
+    gap: f32,
+    rate: f32,
+    fall: f32,
+}
+
+fn instant(o: i32, start: vec3<f32>, path: Path, t: f32) -> Instant {
+    let at = gap_at(o, start + way(path, t));
+    let gained = gain(path, t);
+    let pull = path.pull - path.gamma * gained;
+    return Instant(at.gap, dot(path.v + gained, at.normal), max(0.0, -dot(pull, at.normal)));
+}
+
+// the time to where a particle meets the plane of the closest point, s, or later than `length`
+fn to_plane(at: Instant, length_s: f32) -> f32 {
+    let gap = max(at.gap, 0.0);
+    let root = sqrt(at.rate * at.rate + 2.0 * at.fall * gap);
+    if at.rate < 0.0 {
+        return 2.0 * gap / (root - at.rate);
+    }
+    if at.rate + root >= at.fall * length_s {
+        return 2.0 * length_s;
+    }
+    return (at.rate + root) / at.fall;
+}
+
+// the time at which a path meets an obstacle first, s; NEVER if it does not within `length`. All obstacles are convex: each is behind the
+// plane of its closest point, so no step to that plane passes it
 fn meets(o: i32, start: vec3<f32>, path: Path, length_s: f32) -> f32 {
-    let begin = gap_at(o, start);
-    var low = vec2<f32>(0.0, begin.gap);
+    var low = instant(o, start, path, 0.0);
     let bound = length(path.v) + length_s * length(path.pull);
-    if low.y > bound * length_s {
+    if low.gap > bound * length_s {
         return NEVER;
     }
-    var high = vec2<f32>(length_s, gap_at(o, start + way(path, length_s)).gap);
-    if low.y <= TOUCHING {
-        let rate = dot(path.v, begin.normal);
-        if high.y >= 0.0 {
-            return select(NEVER, 0.0, low.y < -TOUCHING && rate < 0.0);
-        }
-        if rate <= 0.0 {
-            return 0.0;
-        }
-        // a bounce that begins here may end within the stretch
-        let pull = dot(path.pull, begin.normal);
-        var apex = 0.5 * length_s;
-        if pull < 0.0 {
-            apex = min(apex, -rate / pull);
-        }
-        low = vec2<f32>(apex, gap_at(o, start + way(path, apex)).gap);
-        if low.y <= TOUCHING {
-            return 0.0;
-        }
+    var t = 0.0;
+    let lifts = low.rate > 0.0 && low.rate * low.rate > 2.0 * low.fall * TOUCHING;
+    let presses = !lifts && (low.rate < 0.0 || low.fall > 0.0);
+    if low.gap < -TOUCHING || (low.gap <= TOUCHING && presses) {
+        return 0.0;
     }
-    if high.y >= 0.0 {
-        for (var k = 0; k < STEPS; k++) {
-            if low.y <= 0.0 || low.y + high.y >= bound * (high.x - low.x) {
-                return NEVER;
-            }
-            let t = low.x + max(low.y / bound, 1e-5 * length_s);
-            if t >= high.x {
-                return NEVER;
-            }
-            let next = vec2<f32>(t, gap_at(o, start + way(path, t)).gap);
-            if next.y < 0.0 {
-                high = next;
-                break;
-            }
-            low = next;
-        }
-        if high.y >= 0.0 {
+    for (var k = 0; k < STEPS; k++) {
+        let next_t = t + to_plane(low, length_s);
+        if next_t >= length_s {
             return NEVER;
         }
-    }
-    var ends = vec2<f32>(low.y, high.y);
-    var last = 0;
-    for (var k = 0; k < STEPS; k++) {
-        var t = (low.x * ends.y - high.x * ends.x) / (ends.y - ends.x);
-        if !(t < high.x) {
-            t = 0.5 * (low.x + high.x);
-        }
-        if !(t > low.x && t < high.x) {
+        if next_t == t {
             break;
         }
-        let value = gap_at(o, start + way(path, t)).gap;
-        let side = select(-1, 1, value >= 0.0);
-        let share = select(1.0, 0.5, side == last);
-        if side > 0 {
-            low = vec2<f32>(t, value);
-            ends = vec2<f32>(value, share * ends.y);
+        t = next_t;
+        low = instant(o, start, path, t);
+        if low.gap <= REACHED {
+            break;
+        }
+    }
+    return t;
+}
+
+// the time at which a slide has left the surface, s, which it has at `late`: by halves
+fn leaving(o: i32, start: vec3<f32>, v: vec3<f32>, late: f32) -> f32 {
+    var low = 0.0;
+    var high = late;
+    for (var k = 0; k < 24; k++) {
+        let t = 0.5 * (low + high);
+        if gap_at(o, start + t * v).gap < LEFT {
+            low = t;
         } else {
-            high = vec2<f32>(t, value);
-            ends = vec2<f32>(share * ends.x, value);
-        }
-        last = side;
-        if low.y < 1e-8 {
-            break;
+            high = t;
         }
     }
-    return low.x;
+    return low;
 }
 
 fn first_hit(x: Fixed, path: Path, length_s: f32, except: i32) -> Hit {
@@ -317,11 +318,19 @@ fn fly(x_in: Fixed, v_in: Fixed, out_v: ptr<function, Fixed>) -> Fixed {
             }
             let slide = first_hit(x, Path(mean, vec3<f32>(0.0), 0.0), rest, o);
             let stops = slide.obstacle >= 0 && slide.time > 0.0;
-            let took = select(rest, slide.time, stops);
+            var took = select(rest, slide.time, stops);
+            let wide = gap_at(o, beyond(x, o) + took * mean).gap;
+            var leaves = false;
+            if wide > LEFT {
+                let early = leaving(o, beyond(x, o), mean, took);
+                let fall = took - early;
+                leaves = wide > 0.5 * press * fall * fall;
+                took = select(took, early, leaves);
+            }
             x = plus(x, took * mean);
             v = plus(v, took / rest * (end - moving));
             time += took;
-            if !stops {
+            if !stops && !leaves {
                 let over = gap_at(o, beyond(x, o));
                 if over.gap < 0.0 {
                     x = plus(x, -over.gap * over.normal);

@@ -77,11 +77,11 @@ table! {
     [0.5, 2.0];
     ball_machine_time_stepping: "ball_machine", TimeStepping, "5ecf66676422b39a", "cc169b8f7f9a0d18";
     ball_machine_backtracking: "ball_machine", Backtracking, "36e0fde2a34f7dfa", "50a39ed5ff84a6aa";
-    bird_time_stepping: "bird", TimeStepping, "edfbc51d27e3b795", "fec93c56055a3e4d";
-    bird_backtracking: "bird", Backtracking, "fb21b06f6d3e5830", "5ee9b90abac4068b";
+    bird_time_stepping: "bird", TimeStepping, "10d4a92a5cc33df9", "4e6c5af8d4117d23";
+    bird_backtracking: "bird", Backtracking, "b5e07c8878b5ccea", "7681d45b1374835e";
     card_house_time_stepping: "card_house", TimeStepping, "091b9380060ee20c", "8003317c097996db";
-    sparks_time_stepping: "sparks", TimeStepping, "515a77d2df6b5217", "9badcde17809dddb";
-    sparks_backtracking: "sparks", Backtracking, "805c8cba100469d4", "6052e84af86ee0f9";
+    sparks_time_stepping: "sparks", TimeStepping, "4d51d6429d4ba2cf", "63c5aa8f37bac88c";
+    sparks_backtracking: "sparks", Backtracking, "dfa02104906b2991", "847a159107ba4a95";
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
     marble_run_time_stepping: "marble_run", TimeStepping, "a6aa80e60f400a7a", "80f2216852c0c445";
     marble_run_backtracking: "marble_run", Backtracking, "d233e2869b9ec085", "85be23266f25baed";

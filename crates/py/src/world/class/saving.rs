@@ -1,0 +1,111 @@
+//! Saved, copied and forked worlds, and rollouts.
+
+use crate::arrays::convert::{numbers, path, whole_number};
+use crate::batch::crew;
+use crate::errors::Result;
+use crate::extension::callbacks::{Extensions, Reduced};
+use crate::interrupt::interruptible;
+use crate::world::add::own_place;
+use crate::world::class::World;
+use crate::world::rollout::Plan;
+use crate::world::{pickling, save_scene, snapshot};
+use numpy::{PyArray1, PyArray3, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
+use pyo3::types::PyBytes;
+
+#[pymethods]
+impl World {
+    /// Writes the world as it stands to a scene file (``.toml``), with a folder ``NAME_files`` beside it for
+    /// meshes and the exact state: ``World.load`` of the file goes on with the same bits. Once its text is
+    /// edited, the text counts.
+    ///
+    /// Returns notes about things that are not in it, such as generalized forces and visuals that scenes do
+    /// not have. Forces and behaviors written in Python, and all else that a scene cannot say, raise
+    /// ``ValueError`` with their names, and nothing is written.
+    fn save_scene(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> Result<Vec<String>> {
+        let path = self::path(path)?;
+        self.shared.work(py, |inner| save_scene::write(inner, &path))
+    }
+
+    /// Returns everything that the next step reads as bytes, for ``restore`` in a world of the same
+    /// bodies. Shapes, masses, settings and drives are not included.
+    fn save<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
+        let bytes = self.shared.read(|inner| Ok(snapshot::write(inner)))?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Restores the bytes of ``save``. Invalid bytes, or those of another world, raise
+    /// ``SnapshotError`` and change nothing.
+    fn restore(&self, py: Python<'_>, snapshot: PyBackedBytes) -> Result<()> {
+        self.shared.write(py, |inner| snapshot::read(inner, &snapshot))
+    }
+
+    /// Returns the world as bytes for ``simulate``: shapes, masses, settings, drives and its present
+    /// state. Forces and behaviors in Python are no part of them: such a world raises
+    /// ``InvalidValueError`` and is pickled instead.
+    fn model<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(py, &self.shared.read(pickling::model)?))
+    }
+
+    /// Returns an independent copy with the same state and the same future.
+    ///
+    /// Forces and behaviors are copied by their own ``fork``.
+    fn fork(&self, py: Python<'_>) -> Result<World> {
+        let inner = self.shared.read(|inner| Ok(inner.fork()))?;
+        inner.take_raised()?;
+        World::of(py, inner)
+    }
+
+    fn __copy__(&self, py: Python<'_>) -> Result<World> {
+        self.fork(py)
+    }
+
+    fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> Result<World> {
+        self.fork(py)
+    }
+
+    /// Pickles the whole world, with its forces and behaviors.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Result<Reduced<'py>> {
+        let (bytes, state) = self.shared.read(|inner| Ok((pickling::write(inner)?, inner.pickled_extensions(py))))?;
+        let unpickle = py.import("tumble._native")?.getattr("_unpickle_world")?;
+        Ok((unpickle, (PyBytes::new(py, &bytes),), state))
+    }
+
+    /// Sets the forces and behaviors of an unpickled world.
+    fn __setstate__(&self, py: Python<'_>, state: Extensions) -> Result<()> {
+        self.shared.extend(py, |inner| inner.unpickle_extensions(py, state))
+    }
+
+    /// Runs many forks, each with its own controls, on all cores with the interpreter released.
+    /// This world does not change.
+    ///
+    /// controls: shape (forks, steps, n): generalized forces of each step, N·m and N, for all
+    /// ``articulations`` one after the other (by default all of the world, in order; without any, n
+    /// is 0). states: initial states of the forks, shape (len(state),) or (forks, len(state)), by
+    /// default the state of the world. every: interval in steps at which the state is kept.
+    /// threads: largest number of threads (default: all cores). Returns the states, shape (forks,
+    /// steps // every, len(state)): the same bits on any number of threads. A fork that fails
+    /// raises ``StepError`` with its number; Ctrl-C stops all of them between two steps.
+    #[pyo3(signature = (controls, *, articulations=None, states=None, every=1, threads=None))]
+    fn rollout<'py>(
+        &self,
+        py: Python<'py>,
+        controls: &Bound<'py, PyAny>,
+        articulations: Option<Vec<Bound<'py, PyAny>>>,
+        states: Option<&Bound<'py, PyAny>>,
+        #[pyo3(from_py_with = whole_number)] every: usize,
+        #[pyo3(from_py_with = whole_number)] threads: Option<usize>,
+    ) -> Result<Bound<'py, PyArray3<f64>>> {
+        let threads = crew::checked(threads)?;
+        let asked = articulations
+            .map(|all| all.iter().map(|one| Ok(own_place(&self.shared, one)?.id)).collect::<Result<Vec<_>>>())
+            .transpose()?;
+        let (controls, states) = (numbers(controls, "controls")?, states.map(|s| numbers(s, "states")).transpose()?);
+        let (plan, fork) =
+            self.shared.read(|inner| Ok((Plan::new(inner, asked, controls, states, every)?, inner.fork())))?;
+        let shape = [plan.count, plan.frames / plan.every, fork.world.state().len()];
+        let out = interruptible(py, |stop| plan.run(fork, threads, stop))?;
+        Ok(PyArray1::from_vec(py, out).reshape(shape)?)
+    }
+}
