@@ -270,6 +270,23 @@ pub struct DrawOptions {
     pub no_pictures: bool,
 }
 
+/// Options of facets on the screens of web browsers.
+#[derive(Args, Clone)]
+#[command(next_help_heading = "Web browsers")]
+pub struct WebOptions {
+    /// Show facets in web browsers: each facet of this machine serves a page at this address, the next one at
+    /// the next port. The link of each is printed.
+    #[arg(long, value_name = "ADDR:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:47400")]
+    #[arg(conflicts_with_all = ["preview", "no_pictures", "burn_in"])]
+    pub web: Option<SocketAddr>,
+    /// File with the key of the links, at least 16 letters, digits and -_.~ (default: a new one for each run).
+    #[arg(long, value_name = "FILE", requires = "web")]
+    pub web_key: Option<PathBuf>,
+    /// Time for a browser to draw a frame, ms. One that takes longer is no longer awaited until it is faster.
+    #[arg(long, value_name = "MS", requires = "web", default_value = "100", value_parser = crate::args::web_timeout)]
+    pub web_timeout: f64,
+}
+
 /// Options of `tumble cave`.
 #[derive(Args, Clone)]
 pub struct CaveOptions {
@@ -277,6 +294,11 @@ pub struct CaveOptions {
     pub serve: ServeOptions,
     #[command(flatten)]
     pub draw: DrawOptions,
+    #[command(flatten)]
+    pub web: WebOptions,
+    /// Facets of --web (default: all of this machine).
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "web", help_heading = "Web browsers")]
+    pub web_facets: Vec<String>,
     /// Start one process that draws all facets, unfolded into one picture, instead of one process
     /// per facet.
     #[arg(long)]
@@ -362,6 +384,8 @@ pub struct FacetOptions {
     pub connect_timeout: f64,
     #[command(flatten)]
     pub draw: DrawOptions,
+    #[command(flatten)]
+    pub web: WebOptions,
     /// End when stdin ends. A launcher sets it, so that a facet ends with its launcher in any case.
     #[arg(long, hide = true)]
     pub parent_watch: bool,

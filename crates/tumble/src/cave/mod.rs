@@ -32,6 +32,7 @@ pub mod console;
 mod endpoints;
 mod facet;
 mod facet_report;
+mod listener;
 mod lock;
 mod replay;
 mod run_setup;
@@ -39,6 +40,7 @@ mod server;
 mod signals;
 mod simulation;
 mod tracker;
+mod web;
 
 use crate::failure::Failure;
 use args::{CaveOptions, ConsoleOptions, FacetOptions, RecoverOptions, RelayOptions, ReplayOptions, ServeOptions};

@@ -1,13 +1,14 @@
 //! The processes of a run's facets. Those of this machine, and of nodes with a launch command, are
 //! started, monitored and ended. For all others the command line is printed.
 
-use super::facet_commands::{address_for, facet_args, launch, scene_args, shell_quoted, slots};
+use super::facet_commands::{address_for, facet_args, launch, scene_args, shell_quoted, slots, web_addresses};
 use crate::cave::address::ServerAddress;
 use crate::cave::args::{CaveOptions, ServeOptions};
 use crate::cave::facet_report::{FacetReport, Received, ReportReader};
 use crate::cave::signals::Signals;
+use crate::cave::web::{KEY_VARIABLE, new_key};
 use crate::failure::Failure;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -43,6 +44,8 @@ pub struct FacetProcesses {
     restart: bool,
     quiet: bool,
     signals: Signals,
+    /// Key of the links of browsers, if there are any.
+    web_key: Option<String>,
 }
 
 struct FacetProcess {
@@ -100,11 +103,13 @@ impl FacetProcesses {
         address: &ServerAddress,
         signals: &Signals,
     ) -> Result<FacetProcesses, Failure> {
+        let web = launcher.map_or(Ok(BTreeMap::new()), |launcher| web_addresses(launcher, cave))?;
         let mut processes = FacetProcesses {
             processes: Vec::new(),
             restart: launcher.is_some_and(|l| l.restart),
             quiet: serve.quiet,
             signals: signals.clone(),
+            web_key: if web.is_empty() { None } else { Some(new_key()?) },
         };
         for (k, slot) in slots(cave, launcher.is_some_and(|l| l.preview)).into_iter().enumerate() {
             let remote = cave.facets.get(k).and_then(|f| f.node).map(|n| &cave.nodes[n]).filter(|n| !n.is_local());
@@ -120,14 +125,17 @@ impl FacetProcesses {
                 (Some(launcher), None) => {
                     let program = std::env::current_exe().map_err(|e| Failure::run("starting a facet", e))?;
                     let command = |again| {
-                        let words = facet_args(launcher, &slot.name, address, again).into_iter().map(OsString::from);
+                        let words = facet_args(launcher, &slot.name, address, web.get(&slot.name), again)
+                            .into_iter()
+                            .map(OsString::from);
                         std::iter::once(program.clone().into_os_string()).chain(words).collect()
                     };
                     processes.processes.push(FacetProcess::new(k, &slot.name, command));
                 }
                 (Some(launcher), Some(node)) if !node.launch.is_empty() => {
                     let server = server_address.as_ref().unwrap_or(address);
-                    let words = |again| launch(node, &slot.name, &facet_args(launcher, &slot.name, server, again));
+                    let words =
+                        |again| launch(node, &slot.name, &facet_args(launcher, &slot.name, server, None, again));
                     processes.report(&format!(
                         "facet {}: starting it on {}: {}",
                         slot.name,
@@ -313,6 +321,7 @@ impl FacetProcesses {
         let mut command = Command::new(&words[0]);
         // a group of its own, because Ctrl-C is for the launcher, which ends the run in order
         command.args(&words[1..]).stdin(Stdio::piped()).stdout(Stdio::piped()).process_group(0);
+        command.envs(self.web_key.iter().map(|key| (KEY_VARIABLE, key)));
         let failed = |e: std::io::Error| Failure::run(&format!("starting facet {}", process.name), e);
         let mut child = command.spawn().map_err(failed)?;
         self.signals.started(child.id());

@@ -154,6 +154,7 @@ impl RunLoop<'_> {
                 black: report.black,
                 black_now: report.black_now,
                 image: report.image,
+                browsers: report.browsers,
                 first_difference: self.metrics.difference(k),
             }
         };

@@ -273,7 +273,8 @@ impl<'a> RunLoop<'a> {
         let replayed_input = self.input_devices.after(|| session.recorded(false))?;
         replayed_input.into_iter().try_for_each(|(from, input)| self.take_input(from, input))?;
         self.take_events()?;
-        self.status.at(&self.server, &self.slots, &self.metrics, frame, self.time_s);
+        let browsers = |facet| processes.report_of(facet).browsers;
+        self.status.at(&self.server, &self.slots, &self.metrics, frame, self.time_s, browsers);
         Ok(true)
     }
 
