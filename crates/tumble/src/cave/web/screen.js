@@ -113,7 +113,7 @@ function fail(error) {
 }
 
 async function open() {
-  const wanted = new URLSearchParams(location.search).get("draw");
+  const wanted = new URLSearchParams(location.hash.slice(1)).get("draw");
   try {
     backend ??= await makeBackend(wanted);
   } catch (error) {
