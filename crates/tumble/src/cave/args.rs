@@ -193,6 +193,17 @@ pub enum ConsoleCommand {
     },
     /// End the recording
     Unrecord,
+    /// Replay a recording of this scene, then begin the scene again
+    Replay {
+        /// Name without folders that ends with .mcap, where the run was started.
+        file: String,
+    },
+    /// Show a calibration pattern on all facets: grid, corners, colors, ramps, blend, convergence, name;
+    /// off shows the scene again
+    Pattern {
+        /// The pattern, or off.
+        name: String,
+    },
     /// End the run
     Stop,
 }
@@ -285,6 +296,9 @@ pub struct WebOptions {
     /// Time for a browser to draw a frame, ms. One that takes longer is no longer awaited until it is faster.
     #[arg(long, value_name = "MS", requires = "web", default_value = "100", value_parser = crate::args::web_timeout)]
     pub web_timeout: f64,
+    /// Key of the links for all scenes of this launcher, which draws it.
+    #[arg(skip)]
+    pub drawn_key: Option<String>,
 }
 
 /// Options of `tumble cave`.

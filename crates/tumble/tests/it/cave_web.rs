@@ -169,14 +169,28 @@ fn a_browser_takes_part_in_the_barrier_and_never_stalls_it() {
 }
 
 /// A browser shows what the renderer draws of the same frame and facet, and frames within one of the
-/// other facet's.
+/// other facet's. Both are software drivers here, so rounding differs: by a level or two within
+/// surfaces, and by pixels at edges of bodies and of shadows.
 #[test]
-fn chromium_shows_what_the_renderer_draws() {
-    compare("webgl2", "fast", &["--use-angle=swiftshader"]);
+fn chromium_shows_by_webgl_what_the_renderer_draws() {
+    compare("webgl2", "billiards", "fast", &["--use-angle=swiftshader"]);
 }
 
-fn compare(backend: &str, quality: &str, more: &[&str]) {
-    let place = Place::new(&format!("web-{backend}"), &twins("[480, 360]"));
+/// Soft shadows, and four samples: the renderer smooths edges of spheres too, a browser whole pixels.
+#[test]
+fn chromium_shows_soft_shadows_by_webgl() {
+    compare("webgl2", "robot", "default,occlusion=off", &["--use-angle=swiftshader"]);
+}
+
+/// The picture is read back: Chromium without a display and a GPU has WebGPU, but no canvas for it.
+#[test]
+fn chromium_shows_by_webgpu_what_the_renderer_draws() {
+    compare("webgpu-read", "billiards", "fast", &["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"]);
+}
+
+fn compare(backend: &str, scene: &str, quality: &str, more: &[&str]) {
+    let mut place = Place::new(&format!("web-{backend}-{scene}"), &twins("[480, 360]"));
+    place.scene = scene.into();
     let Some(mut page) = Chromium::start(backend, [480, 360], more) else { return };
     let (out, console) = (place.path("out"), free_address().to_string());
     let (run, at) = start(
@@ -184,11 +198,12 @@ fn compare(backend: &str, quality: &str, more: &[&str]) {
         &["--frames-dir", &out, "--quality", quality, "--console", &console, "--web-timeout", "2000", "--fps", "10"],
     );
     page.open(&format!("http://{at}/{KEY}/#draw={backend}"));
-    page.wait_for("tumble.frames > 20 || tumble.error");
+    page.wait_for("tumble.frames > 20 || tumble.error !== ''");
     if page.run("tumble.error").as_str() == Some("there is no WebGPU") {
         return skip("a page that draws by WebGPU: this Chromium has no adapter");
     }
-    assert_eq!((page.run("tumble.error"), page.run("tumble.backend")), ("".into(), backend.into()));
+    let name = backend.trim_end_matches("-read");
+    assert_eq!((page.run("tumble.error"), page.run("tumble.backend")), ("".into(), name.into()));
     // frames within one: asked for between two questions to the other facet's log
     let last = |facet: &str| place.log("out", facet).last().map_or(0, |line| line["frame"].as_u64().unwrap());
     let mut apart = Vec::new();
@@ -207,17 +222,17 @@ fn compare(backend: &str, quality: &str, more: &[&str]) {
     let shown = page.run("tumble.shown").as_u64().unwrap();
     page.wait_for(&format!("tumble.shown > {}", shown + 5));
     page.run("document.getElementById('full').style.display = 'none'");
-    let seen = page.screenshot(&format!("web_{backend}_{quality}"));
+    let seen = page.screenshot(&format!("web_{backend}_{scene}"));
     let frame = page.run("tumble.shown").as_u64().unwrap();
     place.wait_for("out", "l", frame);
     let file = place.folder.path("out").join("l").join(format!("frame_{frame:06}.png"));
     let drawn = Image::read_png(&file).unwrap();
-    keep(&file, &format!("web_{backend}_{quality}_native"));
+    keep(&file, &format!("web_{backend}_{scene}_native"));
     assert_eq!(page.errors, Vec::<String>::new());
     signal(run.pid(), rustix::process::Signal::INT);
     assert_eq!(run.end().0, Some(0));
     let difference = Difference::of(&seen, &drawn);
-    eprintln!("{backend} {quality}: {difference:?}");
+    println!("{backend} {scene} {quality}: {difference:?}");
     assert!(difference.within(), "{difference:?}");
 }
 
@@ -228,7 +243,7 @@ struct Difference {
     mean: f64,
     /// Share of the pixels with a color more than 2 levels off.
     off: f64,
-    /// Largest.
+    /// Largest: whole pixels at edges.
     max: u8,
 }
 
@@ -245,7 +260,8 @@ impl Difference {
         }
     }
 
+    /// A light or a shadow that is missing would be several levels in the mean.
     fn within(&self) -> bool {
-        self.mean < 0.1 && self.off < 0.005 && self.max < 255
+        self.mean < 0.25 && self.off < 0.01 && self.max < 255
     }
 }

@@ -26,6 +26,7 @@ mod caves;
 mod chromium;
 mod command_line;
 mod common;
+mod console_page;
 mod deforming;
 mod desktop;
 mod determinism;

@@ -22,6 +22,10 @@ pub struct ConsoleStatus {
     /// Median time from an input to the last facet that shows it.
     pub input_to_picture_ms: Option<f64>,
     pub paused: bool,
+    /// Whether recorded frames are shown.
+    pub replaying: bool,
+    /// The calibration pattern that facets show instead of the scene.
+    pub pattern: Option<String>,
     /// File of the recording in progress.
     pub recording: Option<String>,
     pub facets: Vec<FacetStatus>,

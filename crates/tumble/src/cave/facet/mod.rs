@@ -22,7 +22,8 @@ use super::signals::Signals;
 use super::simulation::CaveSimulation;
 use super::web::WebScreen;
 use crate::failure::Failure;
-use control::{FacetControl, POLL_INTERVAL, watch_parent};
+pub use control::PATTERN_MARK;
+use control::{FacetControl, POLL_INTERVAL, Parent};
 use desktop::{Desktop, Probe, desktop};
 use frame_log::{Earlier, FrameLog};
 use painter::Painter;
@@ -49,7 +50,7 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
 
 fn show(options: &FacetOptions, reporter: &Reporter) -> Result<(), Failure> {
     let signals = Signals::watch()?;
-    let parent_gone = options.parent_watch.then(watch_parent).transpose()?;
+    let parent = options.parent_watch.then(Parent::watch).transpose()?;
     let compute = compute(options)?;
     let role = if compute == ComputeKind::Everywhere { Role::Server } else { Role::Facet };
     let setup = RunSetup::load(options.scene.load()?, &options.surroundings, role)?;
@@ -87,7 +88,7 @@ fn show(options: &FacetOptions, reporter: &Reporter) -> Result<(), Failure> {
         name: name.clone(),
         signals,
         reporter: reporter.clone(),
-        parent_gone,
+        parent,
         connect_timeout: Duration::from_secs_f64(options.connect_timeout),
         sealed: false,
     };

@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use std::time::Duration;
 use tumble::dynamics::World;
 use tumble::net::sync::Viewer;
-use tumble::render::Image;
+use tumble::render::{CalibrationPattern, Image};
 
 /// What draws a facet that has no window.
 pub enum Painter {
@@ -25,10 +25,18 @@ impl Painter {
         }
     }
 
-    /// Starts a picture of the world, with the frame number in it for `burn_in`.
-    pub fn begin(&mut self, world: &World, viewer: &Viewer, frame: u64, burn_in: bool) -> Result<(), Failure> {
+    /// Starts a picture of the world, or of a calibration pattern, with the frame number in it for
+    /// `burn_in`. Browsers go on with the scene: patterns are for projectors.
+    pub fn begin(
+        &mut self,
+        world: &World,
+        viewer: &Viewer,
+        frame: u64,
+        burn_in: bool,
+        pattern: Option<CalibrationPattern>,
+    ) -> Result<(), Failure> {
         match self {
-            Painter::Memory(thread) => thread.begin(world, viewer, burn_in.then_some(frame)),
+            Painter::Memory(thread) => thread.begin(world, viewer, burn_in.then_some(frame), pattern),
             Painter::Browsers(screen) => screen.begin(world, viewer, frame),
         }
     }

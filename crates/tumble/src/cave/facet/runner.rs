@@ -11,7 +11,7 @@ use crate::cave::facet_report::Reporter;
 use crate::failure::Failure;
 use std::time::Duration;
 use tumble::net::sync::{EndReason, Facet, SessionError, Task};
-use tumble::render::Image;
+use tumble::render::{CalibrationPattern, Image};
 
 /// Pause while the frame log has no room for another frame.
 const LOG_FULL_PAUSE: Duration = Duration::from_millis(5);
@@ -110,6 +110,11 @@ impl FacetRunner {
         self.log.is_some() || self.watch.as_ref().is_some_and(PictureWatch::is_due)
     }
 
+    /// Returns the calibration pattern to show instead of the scene.
+    pub fn pattern(&self) -> Option<CalibrationPattern> {
+        self.control.pattern()
+    }
+
     /// Returns the number of whole seconds without a server.
     pub fn server_wait_s(&self) -> u64 {
         self.server_wait.elapsed().as_secs()
@@ -137,7 +142,8 @@ impl FacetRunner {
         let time_s = self.facet.world().time();
         match &mut self.painter {
             Some(painter) => {
-                painter.begin(self.facet.world(), self.facet.viewer(), frame, self.burn_in)?;
+                let pattern = self.control.pattern();
+                painter.begin(self.facet.world(), self.facet.viewer(), frame, self.burn_in, pattern)?;
                 self.drawing = Some((frame, time_s));
                 Ok(())
             }

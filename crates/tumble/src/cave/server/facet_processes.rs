@@ -4,12 +4,15 @@
 use super::facet_commands::{address_for, facet_args, launch, scene_args, shell_quoted, slots, web_addresses};
 use crate::cave::address::ServerAddress;
 use crate::cave::args::{CaveOptions, ServeOptions};
+use crate::cave::facet::PATTERN_MARK;
 use crate::cave::facet_report::{FacetReport, Received, ReportReader};
 use crate::cave::signals::Signals;
-use crate::cave::web::{KEY_VARIABLE, new_key};
+use crate::cave::web::KEY_VARIABLE;
 use crate::failure::Failure;
+use rustix::io::ioctl_fionbio;
 use std::collections::{BTreeMap, VecDeque};
 use std::ffi::OsString;
+use std::io::Write;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
@@ -46,6 +49,8 @@ pub struct FacetProcesses {
     signals: Signals,
     /// Key of the links of browsers, if there are any.
     web_key: Option<String>,
+    /// The calibration pattern that the facets show.
+    pattern: Option<String>,
 }
 
 struct FacetProcess {
@@ -109,7 +114,8 @@ impl FacetProcesses {
             restart: launcher.is_some_and(|l| l.restart),
             quiet: serve.quiet,
             signals: signals.clone(),
-            web_key: if web.is_empty() { None } else { Some(new_key()?) },
+            web_key: launcher.and_then(|launcher| launcher.web.drawn_key.clone()),
+            pattern: None,
         };
         for (k, slot) in slots(cave, launcher.is_some_and(|l| l.preview)).into_iter().enumerate() {
             let remote = cave.facets.get(k).and_then(|f| f.node).map(|n| &cave.nodes[n]).filter(|n| !n.is_local());
@@ -296,6 +302,23 @@ impl FacetProcesses {
         self.processes.iter().filter_map(of).collect()
     }
 
+    /// Has all facets show a calibration pattern, or `off` for the scene. A facet that is started again
+    /// shows it too.
+    pub fn show_pattern(&mut self, name: &str) {
+        self.pattern = Some(name.to_owned()).filter(|name| name != "off");
+        self.processes.iter_mut().for_each(|process| process.tell_pattern(name));
+    }
+
+    /// Returns the calibration pattern that the facets show.
+    pub fn pattern(&self) -> Option<&str> {
+        self.pattern.as_deref()
+    }
+
+    /// Returns whether this process has started a facet.
+    pub fn any(&self) -> bool {
+        !self.processes.is_empty()
+    }
+
     /// Returns the last report of the facet in a slot; an empty one if this process did not start it.
     pub fn report_of(&self, slot: FacetNumber) -> FacetReport {
         let process = self.processes.iter().find(|process| process.slot == slot);
@@ -325,10 +348,13 @@ impl FacetProcesses {
         let failed = |e: std::io::Error| Failure::run(&format!("starting facet {}", process.name), e);
         let mut child = command.spawn().map_err(failed)?;
         self.signals.started(child.id());
+        // a facet that does not read must not stop the run
+        child.stdin.iter().try_for_each(|pipe| ioctl_fionbio(pipe, true)).map_err(|e| failed(e.into()))?;
         let reports = child.stdout.take().map(ReportReader::start).transpose();
         process.written_before = process.written();
         (process.child, process.began, process.ended, process.fault) = (Some(child), Some(Instant::now()), None, None);
         process.reports = reports.map_err(|e| Failure::run(&format!("starting facet {}", process.name), e))?;
+        self.pattern.iter().for_each(|name| process.tell_pattern(name));
         Ok(())
     }
 
@@ -369,6 +395,13 @@ impl FacetProcess {
             fault: None,
             restarts: VecDeque::new(),
         }
+    }
+
+    /// Writes a line into the pipe to the facet. A full pipe takes none.
+    fn tell_pattern(&mut self, name: &str) {
+        let pipe = self.child.as_mut().and_then(|child| child.stdin.as_mut());
+        // a facet that has ended shows nothing
+        pipe.into_iter().for_each(|pipe| _ = pipe.write_all(format!("{PATTERN_MARK}{name}\n").as_bytes()));
     }
 
     fn received(&self) -> Received {

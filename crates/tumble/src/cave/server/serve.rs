@@ -16,6 +16,7 @@ use crate::cave::signals::Signals;
 use crate::cave::simulation::{CaveSimulation, OPERATOR_SOURCE, PACE_SOURCE};
 use crate::divergence;
 use crate::failure::Failure;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tumble::net::sync::transport::FacetNumber;
 use tumble::net::sync::{FacetSlot, FrameInputs, Input, Server, ServerEvent, SessionError};
@@ -30,10 +31,12 @@ const PREPARATION_TIMEOUT: Duration = Duration::from_secs(300);
 const SLOW_START: Duration = Duration::from_secs(5);
 
 /// How much is over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Over {
     /// A scene: another one may follow.
     Scene,
+    /// A scene, for a replay of this recording.
+    Replay(PathBuf),
     Run,
 }
 
@@ -143,6 +146,9 @@ impl<'a> RunLoop<'a> {
             let over = last.map_or(self.input_devices.over(), |last| last == self.moving_frames);
             if over || self.operator.wish == Wish::NextScene {
                 return Ok(Over::Scene);
+            }
+            if let Wish::Replay(file) = &self.operator.wish {
+                return Ok(Over::Replay(file.clone()));
             }
             if self.operator.wish == Wish::Stop || self.signals.stop_requested() || !self.check_processes(processes)? {
                 return Ok(Over::Run);

@@ -140,13 +140,14 @@ async function open() {
   };
 }
 
+// `#draw=webgl2` or `#draw=webgpu` in the link chooses; `webgpu-read` puts pictures on a plain canvas.
 async function makeBackend(wanted) {
   if (wanted !== "webgl2" && navigator.gpu) {
     const adapter = await navigator.gpu.requestAdapter().catch(() => null);
     // a software adapter draws no better than WebGL
-    if (adapter && (wanted === "webgpu" || !(adapter.info && adapter.info.isFallbackAdapter))) return makeWebgpu(canvas, adapter);
+    if (adapter && (wanted || !(adapter.info && adapter.info.isFallbackAdapter))) return makeWebgpu(canvas, adapter, wanted === "webgpu-read");
   }
-  if (wanted === "webgpu") throw new Error("there is no WebGPU");
+  if (wanted && wanted !== "webgl2") throw new Error("there is no WebGPU");
   return makeWebgl(canvas);
 }
 

@@ -1,4 +1,7 @@
 // Drawing by WebGPU, from the shaders as they are.
+//
+// With `reads`, pictures are read back and put on a plain canvas, for browsers whose WebGPU has no canvas
+// (Chromium without a display and a GPU, as tests use it).
 "use strict";
 
 const COPY_WGSL = `
@@ -11,11 +14,11 @@ const COPY_WGSL = `
   return vec4f(select(1.055 * pow(c, vec3f(1.0 / 2.4)) - 0.055, 12.92 * c, c <= vec3f(0.0031308)), 1.0);
 }`;
 
-async function makeWebgpu(canvas, adapter) {
+async function makeWebgpu(canvas, adapter, reads) {
   const device = await adapter.requestDevice();
-  const context = canvas.getContext("webgpu");
+  const context = canvas.getContext(reads ? "2d" : "webgpu");
   const format = navigator.gpu.getPreferredCanvasFormat();
-  context.configure({ device, format, alphaMode: "opaque", usage: GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC });
+  if (!reads) context.configure({ device, format, alphaMode: "opaque" });
   device.addEventListener("uncapturederror", (event) => fail(event.error));
   device.lost.then((info) => { if (info.reason !== "destroyed") fail(new Error("the device was lost: " + info.message)); });
   const programs = new Map(), meshes = new Map(), textures = new Map(), arrays = new Map();
@@ -119,6 +122,20 @@ async function makeWebgpu(canvas, adapter) {
     }
   }
 
+  // Returns the picture in memory, drawn before. Rows in buffers have multiples of 256 bytes.
+  async function readBack({ width, height }) {
+    const bytesPerRow = 256 * Math.ceil(width / 64);
+    const into = device.createBuffer({ size: bytesPerRow * height, usage: GPUBufferUsage.COPY_DST | GPUBufferUsage.MAP_READ });
+    const encoder = device.createCommandEncoder();
+    encoder.copyTextureToBuffer({ texture: targets.picture }, { buffer: into, bytesPerRow }, [width, height]);
+    device.queue.submit([encoder.finish()]);
+    await into.mapAsync(GPUMapMode.READ);
+    const [bytes, pixels] = [new Uint8Array(into.getMappedRange()), new ImageData(width, height)];
+    for (let y = 0; y < height; y++) pixels.data.set(bytes.subarray(y * bytesPerRow, y * bytesPerRow + 4 * width), 4 * y * width);
+    into.destroy();
+    return pixels;
+  }
+
   const cleared = (view) => ({ view, depthClearValue: 0, depthLoadOp: "clear", depthStoreOp: "store" });
 
   return {
@@ -127,10 +144,11 @@ async function makeWebgpu(canvas, adapter) {
     resize({ width, height, samples, mapSize, layers }) {
       freeTargets();
       const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.TEXTURE_BINDING;
-      const make = (imageFormat, sampleCount, size = [width, height]) => device.createTexture({ size, format: imageFormat, sampleCount, usage });
+      const read = GPUTextureUsage.COPY_SRC;
+      const make = (imageFormat, sampleCount, size = [width, height], more = 0) => device.createTexture({ size, format: imageFormat, sampleCount, usage: usage | more });
       const side = layers ? mapSize : 1;
       targets = {
-        picture: make("rgba8unorm-srgb", 1),
+        picture: make("rgba8unorm-srgb", 1, [width, height], read),
         depth: make("depth32float", samples),
         multiple: samples > 1 ? make("rgba8unorm-srgb", samples) : null,
         maps: make("depth32float", 1, [side, side, Math.max(layers, 1)]),
@@ -177,8 +195,10 @@ async function makeWebgpu(canvas, adapter) {
       pass.end();
       device.queue.submit([encoder.finish()]);
       await device.queue.onSubmittedWorkDone();
+      if (reads) targets.pixels = await readBack(size);
     },
     show() {
+      if (reads) return context.putImageData(targets.pixels, 0, 0);
       const encoder = device.createCommandEncoder();
       const pass = encoder.beginRenderPass({ colorAttachments: [{ view: context.getCurrentTexture().createView(), loadOp: "clear", storeOp: "store" }] });
       pass.setPipeline(copy);
