@@ -3,12 +3,11 @@
 use crate::args::{Overlays, SceneOptions};
 use crate::cave::tracker::one_euro::Smoothing;
 use crate::cave::tracker::sealed::MAX_RELAYS;
-use crate::cave::tracker::vrpn_client::DeviceMap;
 use clap::{Args, Subcommand, ValueEnum};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use tumble::render::{DebugDraw, Quality, UnknownOverlay};
-use tumble::scene::cave::Compute;
+use tumble::scene::cave::{Compute, DeviceMap};
 
 /// The cave and the environment of the scene. Server and facets must get the same.
 #[derive(Args, Clone)]

@@ -33,15 +33,20 @@ impl InputDevices {
         let key = key(cave)?;
         let replayed_input = options.replay_input.as_ref().map(|path| ReplayedInput::open(path, scene)).transpose()?;
         let live = replayed_input.is_none() && simulating;
-        let wanted =
-            configured(cave, options.tracker, &options.tracker_from)?.filter(|_| live && options.vrpn.is_none());
+        let about = cave.tracker.clone().unwrap_or_else(|| Tracker::of(&cave.users));
+        // the command line's tracker takes the place of the cave file's
+        let vrpn = match (&options.vrpn, &about.vrpn) {
+            (Some(server), _) => Some((server, &options.vrpn_map)),
+            (None, Some(server)) if options.tracker.is_none() => Some((server, &about.vrpn_map)),
+            _ => None,
+        };
+        let wanted = configured(cave, options.tracker, &options.tracker_from)?.filter(|_| live && vrpn.is_none());
         let open = |tracker| TrackerSocket::open(tracker, key.as_ref(), options.smoothing());
         let tracker = wanted.as_ref().map(open).transpose()?;
-        let vrpn = |server: &String| {
-            let about = cave.tracker.clone().unwrap_or_else(|| Tracker::of(&cave.users));
-            VrpnClient::open(server, &options.vrpn_map, &about, options.smoothing(), options.quiet)
+        let connect = |(server, maps): (&String, &Vec<_>)| {
+            VrpnClient::open(server, maps, &about, options.smoothing(), options.quiet)
         };
-        let vrpn = options.vrpn.as_ref().filter(|_| live).map(vrpn).transpose()?;
+        let vrpn = vrpn.filter(|_| live).map(connect).transpose()?;
         if let (Some(socket), Some(tracker), false) = (&tracker, &wanted, options.quiet) {
             eprintln!("{}", socket.describe(tracker));
         }
