@@ -2,6 +2,7 @@
 //! Control 1.0). Also replays of recorded user input.
 
 use crate::cave_place::in_place;
+use crate::cave_place::{Place, signal, wait, wall};
 use crate::cave_users::{SCENE, Server, one_screen, place};
 use crate::common::{json, text};
 use serde_json::{Value, json as value};

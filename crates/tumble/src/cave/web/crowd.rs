@@ -7,7 +7,8 @@
 //!
 //! A browser is awaited at the barrier once it has drawn a few frames in time. One that is late is shown
 //! what it draws, gets no frame before it has drawn the last, and is not awaited until it is in time
-//! again: a slow browser costs the run one time-out, and never stalls it.
+//! again, for twice as many frames each time: a slow browser costs the run a time-out now and then, ever
+//! more rarely, and never stalls it.
 
 use super::encode::{Encoder, show};
 use crate::cave::facet_report::BrowserReport;
@@ -18,8 +19,10 @@ use tumble::net::browser::{Backend, BrowserMessage};
 
 /// Maximum number of browsers of a facet.
 pub const MAX_BROWSERS: usize = 8;
-/// Number of frames in time after which a browser is awaited.
+/// Number of frames in time after which a browser is awaited for the first time.
 const STEADY: u32 = 5;
+/// Largest number of frames in time after which a browser is awaited again.
+const MOST_STEADY: u32 = 10_000;
 /// Time without an answer after which a browser is removed.
 const GONE: Duration = Duration::from_secs(30);
 
@@ -43,11 +46,13 @@ struct Browser {
     drawn: Option<u64>,
     /// Frames in succession that it has drawn in time.
     in_time: u32,
+    /// The number of them after which it is awaited.
+    steady: u32,
 }
 
 impl Browser {
     fn is_awaited(&self) -> bool {
-        self.in_time >= STEADY
+        self.in_time >= self.steady
     }
 }
 
@@ -65,7 +70,7 @@ impl Crowd {
         }
         self.next += 1;
         let (id, encoder) = (self.next, Encoder::new(backend));
-        self.browsers.push(Browser { id, encoder, outbox, drawing: None, drawn: None, in_time: 0 });
+        self.browsers.push(Browser { id, encoder, outbox, drawing: None, drawn: None, in_time: 0, steady: STEADY });
         Some(id)
     }
 
@@ -118,6 +123,7 @@ impl Crowd {
             let Some((_, since)) = browser.drawing else { continue };
             if now.duration_since(since) > self.timeout {
                 browser.in_time = 0;
+                browser.steady = (2 * browser.steady).min(MOST_STEADY);
                 self.counts.late += 1;
             } else {
                 all = false;
@@ -266,6 +272,25 @@ mod tests {
         assert_eq!(trial.crowd.counts().late, 1);
         assert!(stalled_ms <= 110, "{stalled_ms}");
         assert!(shown.len() > 20 && shown.is_sorted(), "{shown:?}");
+    }
+
+    /// One that is late whenever it is awaited delays 5,000 frames by nine time-outs: 5 · 2ⁿ frames in
+    /// time come before the one after n others (5 · (2⁹ − 1) = 2555, 5 · (2¹⁰ − 1) = 5115).
+    #[test]
+    fn a_browser_that_is_late_on_purpose_is_trusted_less_each_time() {
+        let mut trial = trial();
+        let (id, inbox) = trial.join();
+        for frame in 0..5000 {
+            trial.begin(frame);
+            if !trial.crowd.is_drawn(trial.now) && trial.crowd.counts().awaited > 0 {
+                trial.later(101);
+                assert!(trial.crowd.is_drawn(trial.now));
+            }
+            trial.crowd.present(frame);
+            trial.take(id, BrowserMessage::Drawn(frame));
+            inbox.try_iter().for_each(drop);
+        }
+        assert_eq!(trial.crowd.counts().late, 9);
     }
 
     #[test]

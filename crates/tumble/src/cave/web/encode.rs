@@ -306,7 +306,8 @@ mod tests {
             list.meshes[0] = mesh.clone();
             let camera = list.camera.clone();
             let picture = PortablePicture::new(&list, &camera, [64, 48]).unwrap();
-            let records = read(&encoder.frame(frame as u64, &picture, &glsl).unwrap());
+            let message = encoder.frame(frame as u64, &picture, &glsl).unwrap_or_else(|e| panic!("{}", e.report()));
+            let records = read(&message);
             let kinds: Vec<u32> = records.iter().map(|(kind, _)| *kind).collect();
             match frame {
                 0 => assert!([SIZE, PROGRAM, MESH, ARRAY, DRAWS, FRAME].iter().all(|kind| kinds.contains(kind))),
