@@ -47,7 +47,7 @@ pub struct Tracker {
     pub origin_m: [f64; 3],
     /// VRPN server (TCP), `HOST:PORT`, instead of datagrams. Default: none.
     pub vrpn: Option<String>,
-    /// What the devices of that server move; at least one.
+    /// Devices of that server with the parts that they move; at least one.
     pub vrpn_map: Vec<DeviceMap>,
 }
 

@@ -108,6 +108,9 @@ pub struct ServeOptions {
     /// commas. A part is head, wand, hand/left, hand/right or buttons.
     #[arg(long, value_name = "MAP,…", value_delimiter = ',', requires = "vrpn")]
     pub vrpn_map: Vec<DeviceMap>,
+    /// Take the first gamepad of this machine for this user: sticks walk and turn, buttons are digits.
+    #[arg(long, value_name = "USER")]
+    pub gamepad: Option<String>,
     /// Smooth tracked heads by a 1 € filter with this cutoff at rest, Hz; less is smoother, 1 to 2 suits heads.
     #[arg(long, value_name = "HZ", value_parser = crate::args::cutoff)]
     pub tracker_smooth: Option<f64>,

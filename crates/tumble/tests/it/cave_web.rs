@@ -217,8 +217,8 @@ fn compare(backend: &str, scene: &str, quality: &str, more: &[&str]) {
         std::thread::sleep(Duration::from_millis(37));
     }
     // time stands, so that the newest frames are the same picture
-    let told = in_place(&place.folder, &["console", &console, "pause"]).output().unwrap();
-    assert!(told.status.success(), "{told:?}");
+    let paused = in_place(&place.folder, &["console", &console, "pause"]).output().unwrap();
+    assert!(paused.status.success(), "{paused:?}");
     let shown = page.run("tumble.shown").as_u64().unwrap();
     page.wait_for(&format!("tumble.shown > {}", shown + 5));
     page.run("document.getElementById('full').style.display = 'none'");

@@ -1,4 +1,4 @@
-//! What draws a facet that has no window: a thread of this process, or web browsers.
+//! The painter of a facet without a window: a thread of this process, or web browsers.
 
 use super::render_thread::RenderThread;
 use crate::cave::web::WebScreen;
@@ -8,7 +8,7 @@ use tumble::dynamics::World;
 use tumble::net::sync::Viewer;
 use tumble::render::{CalibrationPattern, Image};
 
-/// What draws a facet that has no window.
+/// The painter of a facet without a window.
 pub enum Painter {
     /// Into memory.
     Memory(Box<RenderThread>),

@@ -249,8 +249,8 @@ impl<'a> RunLoop<'a> {
         if recorded.is_none() && frame > 0 {
             // inputs since the last frame take effect in this one
             self.take_events()?;
-            let tracked = self.input_devices.tracker_inputs();
-            tracked.into_iter().try_for_each(|(from, input)| self.take_input(from, input))?;
+            let held = self.input_devices.inputs();
+            held.into_iter().try_for_each(|(from, input)| self.take_input(from, input))?;
             if let Some(pace) = self.pace(steps) {
                 self.take_input(PACE_SOURCE, pace)?;
             }

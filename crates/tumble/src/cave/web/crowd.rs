@@ -42,7 +42,7 @@ struct Browser {
     outbox: SyncSender<Vec<u8>>,
     /// The frame that it draws, and since when.
     drawing: Option<(u64, Instant)>,
-    /// The frame that it has drawn and not been told to show.
+    /// The frame that it has drawn and must not show yet.
     drawn: Option<u64>,
     /// Frames in succession that it has drawn in time.
     in_time: u32,
@@ -97,7 +97,7 @@ impl Crowd {
         now: Instant,
         mut encode: impl FnMut(&mut Encoder) -> Result<Vec<u8>, Failure>,
     ) -> Option<Failure> {
-        // who has not answered for long is gone
+        // a browser that has not answered for long is gone
         self.browsers.retain(|b| b.drawing.is_none_or(|(_, since)| now.duration_since(since) < GONE));
         let mut failure = None;
         self.browsers.retain_mut(|browser| {

@@ -22,8 +22,8 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(10);
 const POLL_INTERVAL: Duration = Duration::from_millis(500);
 /// Messages that wait for a browser: a frame, its `show`, and one more of each.
 const MAX_WAITING: usize = 4;
-/// Fields that keep browsers from guessing types, framing the page, loading anything else, and telling
-/// the link to others.
+/// Fields that keep browsers from guessing types, framing the page, loading anything else, and passing
+/// the link on.
 const SAFE: &str = "X-Content-Type-Options: nosniff\r\nX-Frame-Options: DENY\r\nReferrer-Policy: no-referrer\r\nCache-Control: no-store\r\nContent-Security-Policy: default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'\r\n";
 
 const PAGE: &str = concat!(
