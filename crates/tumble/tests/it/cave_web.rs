@@ -188,6 +188,30 @@ fn chromium_shows_by_webgpu_what_the_renderer_draws() {
     compare("webgpu-read", "billiards", "fast", &["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"]);
 }
 
+/// The page finds the next scene by the same link, without a click; a device that is lost comes back.
+#[test]
+fn a_page_follows_the_run_to_the_next_scene() {
+    let place = Place::new("web-next", &twins("[480, 360]"));
+    let Some(mut page) = Chromium::start("next", [390, 844], &["--use-angle=swiftshader"]) else { return };
+    let console = free_address().to_string();
+    let (run, at) = start(&place, &["--quality", "fastest", "--console", &console, "--then", "billiards"]);
+    page.open(&format!("http://{at}/{KEY}/"));
+    page.wait_for("tumble.frames > 3");
+    page.screenshot("web_phone");
+    assert_eq!((page.run("tumble.backend"), page.errors.clone()), ("webgl2".into(), Vec::new()));
+    let next = in_place(&place.folder, &["console", &console, "next"]).output().unwrap();
+    assert!(next.status.success(), "{next:?}");
+    page.wait_for("document.body.innerText.includes('trying again')");
+    let before = page.run("tumble.frames").as_u64().unwrap();
+    page.wait_for(&format!("tumble.frames > {before} + 3"));
+    page.screenshot("web_phone_next");
+    page.run("document.getElementById('screen').getContext('webgl2').getExtension('WEBGL_lose_context').loseContext()");
+    page.wait_for("tumble.error.includes('the device was lost')");
+    page.wait_for("window.tumble && tumble.error === '' && tumble.frames > 3");
+    signal(run.pid(), rustix::process::Signal::INT);
+    assert_eq!(run.end().0, Some(0));
+}
+
 fn compare(backend: &str, scene: &str, quality: &str, more: &[&str]) {
     let mut place = Place::new(&format!("web-{backend}-{scene}"), &twins("[480, 360]"));
     place.scene = scene.into();

@@ -112,6 +112,12 @@ function fail(error) {
   }
 }
 
+// A device that is lost, as when a phone sleeps, comes back with the page.
+function lost() {
+  fail(new Error("the device was lost; the page is loaded again"));
+  setTimeout(() => location.reload(), 5000);
+}
+
 async function open() {
   const wanted = new URLSearchParams(location.hash.slice(1)).get("draw");
   try {

@@ -21,6 +21,7 @@ const COPY = [
 function makeWebgl(canvas) {
   const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: true });
   if (!gl) throw new Error("there is no WebGL 2");
+  canvas.addEventListener("webglcontextlost", lost);
   const unit = { shadow_maps: 0, shadow_depths: 1, occlusion: 2, albedo: 3 };
   const programs = new Map(), meshes = new Map(), textures = new Map(), arrays = new Map();
   let targets = null, copy = null;

@@ -20,7 +20,7 @@ async function makeWebgpu(canvas, adapter, reads) {
   const format = navigator.gpu.getPreferredCanvasFormat();
   if (!reads) context.configure({ device, format, alphaMode: "opaque" });
   device.addEventListener("uncapturederror", (event) => fail(event.error));
-  device.lost.then((info) => { if (info.reason !== "destroyed") fail(new Error("the device was lost: " + info.message)); });
+  device.lost.then(lost);
   const programs = new Map(), meshes = new Map(), textures = new Map(), arrays = new Map();
   let targets = null, shaders = null;
 
