@@ -12,7 +12,7 @@ use tumble::render::Image;
 use tungstenite::{Message, WebSocket};
 
 /// Maximum time that a test waits for a browser.
-const PATIENCE: Duration = Duration::from_secs(90);
+const PATIENCE: Duration = Duration::from_secs(240);
 
 /// A browser with one page.
 pub struct Chromium {
