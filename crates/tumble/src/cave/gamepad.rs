@@ -181,7 +181,7 @@ impl Pad {
                 let bit = 1 << number;
                 self.buttons = if value != 0 { self.buttons | bit } else { self.buttons & !bit };
             }
-            2 => self.axes.iter_mut().nth(number.into()).into_iter().for_each(|axis| *axis = value),
+            2 => self.axes.get_mut(usize::from(number)).into_iter().for_each(|axis| *axis = value),
             _ => {}
         }
     }

@@ -29,7 +29,7 @@ fn says(page: &mut Chromium, text: &str) {
 fn an_operator_directs_a_run_by_its_page() {
     let place = Place::new("console-page", &cube());
     let Some(mut page) = Chromium::start("console", SIZE, &[]) else { return };
-    let second = place.folder.write("second.toml", &SCENE.replace("Things that fall", "The second scene"));
+    let second = place.folder.write("second.toml", SCENE.replace("Things that fall", "The second scene"));
     let run = place.start("cave", &["--offscreen", "--console", "127.0.0.1:0", "--then", &second]);
     wait("the console", || run_info(&place.folder)["console"].is_object());
     let link = run_info(&place.folder)["console"].clone();

@@ -304,8 +304,7 @@ mod tests {
         for (frame, height) in [1.0, 2.0, 2.0].into_iter().enumerate() {
             let mut list = list(height);
             list.meshes[0] = mesh.clone();
-            let camera = list.camera.clone();
-            let picture = PortablePicture::new(&list, &camera, [64, 48]).unwrap();
+            let picture = PortablePicture::new(&list, &list.camera, [64, 48]).unwrap();
             let message = encoder.frame(frame as u64, &picture, &glsl).unwrap_or_else(|e| panic!("{}", e.report()));
             let records = read(&message);
             let kinds: Vec<u32> = records.iter().map(|(kind, _)| *kind).collect();
