@@ -4,6 +4,7 @@
 //! GET  /                       the page, without a token
 //! GET  /api/status             GET /api/log             GET /api/picture/FACET
 //! POST /api/pause, resume, reset, next, stop            POST /api/record/FILE.mcap, /api/unrecord
+//! POST /api/replay/FILE.mcap                            POST /api/pattern/NAME (off: the scene)
 //! ```
 //!
 //! Everything under `/api` needs `Authorization: Bearer TOKEN`. Requests have no body and are limited
@@ -44,6 +45,10 @@ pub enum Action {
     Record(String),
     /// The end of the recording.
     Unrecord,
+    /// A replay of this recording, a name as of a new one; then the scene again.
+    Replay(String),
+    /// A calibration pattern on all facets by its name, or the scene again (`off`).
+    Pattern(String),
 }
 
 impl Action {
@@ -62,7 +67,15 @@ impl Action {
             Action::Stop => post("stop"),
             Action::Record(file) => post(&format!("record/{}", encoded(file))),
             Action::Unrecord => post("unrecord"),
+            Action::Replay(file) => post(&format!("replay/{}", encoded(file))),
+            Action::Pattern(name) => post(&format!("pattern/{}", encoded(name))),
         }
+    }
+
+    /// Returns its word, as `tumble console` has it.
+    pub fn word(&self) -> String {
+        let path = self.request().1;
+        path.trim_start_matches("/api").trim_start_matches('/').split('/').next().unwrap_or_default().to_owned()
     }
 
     fn of(method: &str, path: &str) -> Result<Action, Refusal> {
@@ -82,6 +95,10 @@ impl Action {
             Action::Picture(facet.ok_or(Refusal::NotFound)?)
         } else if let Some(file) = named("/api/record/") {
             Action::Record(file.filter(|file| is_recording_name(file)).ok_or(Refusal::FileName)?)
+        } else if let Some(file) = named("/api/replay/") {
+            Action::Replay(file.filter(|file| is_recording_name(file)).ok_or(Refusal::FileName)?)
+        } else if let Some(name) = named("/api/pattern/") {
+            Action::Pattern(name.filter(|name| is_word(name)).ok_or(Refusal::NotFound)?)
         } else {
             known.into_iter().find(|action| action.request().1 == path).ok_or(Refusal::NotFound)?
         };
@@ -167,6 +184,11 @@ pub fn is_recording_name(name: &str) -> bool {
     name.len() <= MAX_NAME_BYTES && name.chars().all(plain) && !name.starts_with('.') && name.ends_with(".mcap")
 }
 
+/// Returns whether a name is a word of small letters.
+fn is_word(name: &str) -> bool {
+    name.len() <= MAX_NAME_BYTES && name.bytes().all(|b| b.is_ascii_lowercase())
+}
+
 /// Encodes a name for a path.
 fn encoded(name: &str) -> String {
     let one = |b: u8| if b.is_ascii_alphanumeric() { char::from(b).to_string() } else { format!("%{b:02X}") };
@@ -208,6 +230,8 @@ mod tests {
             Action::Stop,
             Action::Record("a show.mcap".into()),
             Action::Unrecord,
+            Action::Replay("a show.mcap".into()),
+            Action::Pattern("grid".into()),
         ];
         for action in actions {
             let (method, path) = action.request();
@@ -245,6 +269,10 @@ mod tests {
         assert_eq!(read_request(&[b"GET /".to_vec(), vec![b'a'; 5000]].concat(), TOKEN), Err(Refusal::TooLong));
         for file in ["..%2Fa.mcap", "%2Fetc%2Fpasswd", "a.txt", ".hidden.mcap", "%00.mcap", "", "a%2"] {
             assert_eq!(ask("POST", &format!("/api/record/{file}"), &bearer), Err(Refusal::FileName), "{file}");
+            assert_eq!(ask("POST", &format!("/api/replay/{file}"), &bearer), Err(Refusal::FileName), "{file}");
+        }
+        for name in ["", "a%0Ab", "Grid", "a%20b"] {
+            assert_eq!(ask("POST", &format!("/api/pattern/{name}"), &bearer), Err(Refusal::NotFound), "{name}");
         }
     }
 }

@@ -42,6 +42,7 @@ NOT_RUN = {
     "tumble relay --cave my.toml --to 10.0.0.1:47200 --listen 10.0.1.2:47200 --from 10.0.1.7": "other machines: crates/tumble/tests/it/cave_relay.rs",
     "tumble calibrate …": "a camera: crates/tumble/tests/it/calibrate.rs",
     "tumble check measured/cave.toml": "a camera: crates/tumble/tests/it/calibrate.rs",
+    "tumble cave billiards --cave wall3 --web …": "browsers: crates/tumble/tests/it/cave_web.rs",
     "tumble cave billiards --cave cube4 --vrpn …": "a tracker: crates/tumble/src/cave/tracker/vrpn_client.rs",
     "tumble console 127.0.0.1:47300 …": "a run beside it: crates/tumble/tests/it/cave_console.rs",
     "sudo scripts/netns.sh --frames 6000": "root, 100 s",

@@ -22,6 +22,12 @@ pub enum RenderError {
         /// The message of the graphics library.
         reason: String,
     },
+    /// The shaders have no translation for another renderer.
+    #[error("the shaders cannot be translated: {reason}")]
+    Translation {
+        /// The message of the translator.
+        reason: String,
+    },
     /// There is no desktop to open a window on, or the desktop refuses to.
     #[error(
         "no window can be opened ({reason}). A window needs a desktop: X11, named by DISPLAY, or Wayland, named by WAYLAND_DISPLAY; \

@@ -46,8 +46,9 @@ pub use facet::{
     as_projected, calibration_picture, finished_calibration_picture, unfold,
 };
 pub use gpu::{
-    FreeParticle, FreeParticles, GpuParticles, MAX_OBSTACLES, MAX_PARTICLES, Obstacle, ObstacleShape, Renderer, Screen,
-    Shown, Stage,
+    FreeParticle, FreeParticles, GlslProgram, GlslTranslator, GpuParticles, MAX_OBSTACLES, MAX_PARTICLES, Obstacle,
+    ObstacleShape, PortableDraw, PortableItems, PortableKey, PortablePicture, Recipe, Renderer, Screen, Shown, Stage,
+    portable_wgsl,
 };
 pub use image::Image;
 pub use list::{

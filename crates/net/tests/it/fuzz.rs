@@ -34,6 +34,7 @@ targets! {
     netsync_mirror "../../../../fuzz/fuzz_targets/netsync_mirror.rs"
     netsync_session "../../../../fuzz/fuzz_targets/netsync_session.rs"
     netsync_recording "../../../../fuzz/fuzz_targets/netsync_recording.rs"
+    browser "../../../../fuzz/fuzz_targets/browser.rs"
     console "../../../../fuzz/fuzz_targets/console.rs"
     udp_packet "../../../../fuzz/fuzz_targets/udp_packet.rs"
     udp_session "../../../../fuzz/fuzz_targets/udp_session.rs"

@@ -202,6 +202,14 @@ pub fn sphere(s: &Sphere, out: &mut Vec<u32>) {
     out.extend([q.x, q.y, q.z, q.w, m.clearcoat, 0.0, size[0], size[1]].map(f32::to_bits));
 }
 
+/// A sphere as numbers: center and radius, orientation, material.
+pub fn sphere_floats(s: &Sphere, out: &mut Vec<f32>) {
+    let (c, q) = (s.center, s.orientation.coords);
+    out.extend([c.x, c.y, c.z, s.radius, q.x, q.y, q.z, q.w]);
+    // the texture goes once around a sphere
+    material(&s.material, 0.0, out);
+}
+
 /// A capsule: center and radius, orientation, material, half length. Its texture is projected by
 /// position.
 pub fn capsule(c: &Capsule, out: &mut Vec<f32>) {

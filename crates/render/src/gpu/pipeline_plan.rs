@@ -9,9 +9,9 @@ use wgpu::{
 /// Depth test and write; nearer is greater.
 #[derive(Clone, Copy)]
 pub(super) struct DepthUse {
-    compare: CompareFunction,
-    write: bool,
-    bias: i32,
+    pub compare: CompareFunction,
+    pub write: bool,
+    pub bias: i32,
 }
 pub(super) const WRITE: DepthUse = DepthUse { compare: CompareFunction::GreaterEqual, write: true, bias: 0 };
 /// Slightly farther, so that objects in the plane of the floor are visible.
@@ -144,7 +144,7 @@ const RANGE: [wgpu::VertexAttribute; 1] =
     [wgpu::VertexAttribute { format: VertexFormat::Uint32x2, offset: 0, shader_location: 0 }];
 
 impl Input {
-    fn floats(self) -> u64 {
+    pub(super) fn floats(self) -> u64 {
         match self {
             Input::None | Input::Range | Input::SphereBounds => 0,
             Input::Mesh => INSTANCE_FLOATS,

@@ -23,7 +23,7 @@ pub const ID: TextureFormat = TextureFormat::R32Uint;
 const NUMBERS: wgpu::TextureSampleType = wgpu::TextureSampleType::Float { filterable: false };
 
 /// Everything except the edges of spheres.
-const PICTURE_WGSL: &str = concat!(
+pub(super) const PICTURE_WGSL: &str = concat!(
     include_str!("../shaders/variant.wgsl"),
     include_str!("../shaders/view.wgsl"),
     include_str!("../shaders/noise.wgsl"),
@@ -36,8 +36,8 @@ const PICTURE_WGSL: &str = concat!(
     include_str!("../shaders/line.wgsl"),
     include_str!("../shaders/sky.wgsl"),
 );
-const EDGE_SAMPLES_WGSL: &str = include_str!("../shaders/edge_samples.wgsl");
-const EDGE_PIXELS_WGSL: &str = include_str!("../shaders/edge_pixels.wgsl");
+pub(super) const EDGE_SAMPLES_WGSL: &str = include_str!("../shaders/edge_samples.wgsl");
+pub(super) const EDGE_PIXELS_WGSL: &str = include_str!("../shaders/edge_pixels.wgsl");
 const OCCLUSION_WGSL: &str = concat!(include_str!("../shaders/view.wgsl"), include_str!("../shaders/occlusion.wgsl"));
 
 /// The kind of item that a pipeline draws.
@@ -77,6 +77,11 @@ impl Variant {
             reflections,
             one_sun,
         }
+    }
+
+    /// The same with this many samples per pixel.
+    pub fn with_samples(self, samples: u32) -> Self {
+        Variant { samples, ..self }
     }
 
     /// With one sample per pixel, the nearest depth is drawn first, and only the nearest surface is
@@ -243,53 +248,55 @@ impl Pipelines {
     }
 
     fn make(&self, device: &Device, (pass, surface, variant): Key) -> RenderPipeline {
-        let over = Some(BlendState::PREMULTIPLIED_ALPHA_BLENDING);
         let first = variant.depth_first();
-        let (solid, behind, seen) = match (first, variant.spheres_first()) {
-            (_, true) => (TEST, WRITE_BEHIND, WHERE_ANY),
-            (true, _) => (TEST, TEST_BEHIND, ALWAYS),
-            _ => (WRITE, WRITE_BEHIND, WRITE),
-        };
-        let (vs, fs, input, depth, blend) = match pass {
-            // at the far plane: only pixels without an item
-            Pass::Sky => ("vs_sky", "fs_sky", Input::None, TEST, None),
-            Pass::Ground => ("vs_ground", "fs_ground", Input::Mesh, behind, None),
-            Pass::Mesh => ("vs_mesh", "fs_mesh", Input::Mesh, solid, None),
-            Pass::Sphere if first => ("vs_seen", "fs_sphere_seen", Input::Range, seen, None),
-            Pass::Sphere => ("vs_sphere", "fs_sphere", Input::SphereBounds, seen, None),
-            Pass::Capsule if variant.spheres_first() => ("vs_capsule", "fs_capsule", Input::Capsule, WRITE, None),
-            Pass::Capsule => ("vs_capsule", "fs_capsule", Input::Capsule, solid, None),
-            Pass::Shell => ("vs_shell", "fs_shell", Input::Sphere, TEST, over),
-            Pass::Line => ("vs_line", "fs_line", Input::Stroke, TEST, over),
-            Pass::LineOnTop => ("vs_line", "fs_line", Input::Stroke, ALWAYS, over),
-        };
-        let flag = |on: bool| f64::from(u8::from(on));
-        let constants = [
-            ("SURFACE", f64::from(surface % 1000)),
-            ("COAT", flag(surface / 1000 % 10 == 1)),
-            ("TEXTURED", flag(surface >= 10_000)),
-            ("SHADOWS", f64::from(variant.shadows)),
-            ("OCCLUSION", flag(variant.occlusion)),
-            ("SOFTBOX", flag(variant.softbox)),
-            ("REFLECTIONS", flag(variant.reflections)),
-            ("ONE_SUN", flag(variant.one_sun)),
-        ];
-        let plan = Plan {
-            vs,
-            fs: Some(fs),
-            input,
-            color: Some(COLOR),
-            depth: Some(depth),
-            blend,
-            samples: variant.samples,
-            constants: &constants,
-        };
+        let constants = constants(surface, variant);
+        let plan = plan(pass, variant, &constants);
         plan.build(
             device,
             &self.modules[usize::from(first)],
             &[Some(&self.view_layout), Some(&self.scene_layout), Some(&self.texture_layout)],
         )
     }
+}
+
+/// Returns the plan of a pipeline that draws items in color.
+pub(super) fn plan<'a>(pass: Pass, variant: Variant, constants: &'a [(&'a str, f64)]) -> Plan<'a> {
+    let over = Some(BlendState::PREMULTIPLIED_ALPHA_BLENDING);
+    let first = variant.depth_first();
+    let (solid, behind, seen) = match (first, variant.spheres_first()) {
+        (_, true) => (TEST, WRITE_BEHIND, WHERE_ANY),
+        (true, _) => (TEST, TEST_BEHIND, ALWAYS),
+        _ => (WRITE, WRITE_BEHIND, WRITE),
+    };
+    let (vs, fs, input, depth, blend) = match pass {
+        // at the far plane: only pixels without an item
+        Pass::Sky => ("vs_sky", "fs_sky", Input::None, TEST, None),
+        Pass::Ground => ("vs_ground", "fs_ground", Input::Mesh, behind, None),
+        Pass::Mesh => ("vs_mesh", "fs_mesh", Input::Mesh, solid, None),
+        Pass::Sphere if first => ("vs_seen", "fs_sphere_seen", Input::Range, seen, None),
+        Pass::Sphere => ("vs_sphere", "fs_sphere", Input::SphereBounds, seen, None),
+        Pass::Capsule if variant.spheres_first() => ("vs_capsule", "fs_capsule", Input::Capsule, WRITE, None),
+        Pass::Capsule => ("vs_capsule", "fs_capsule", Input::Capsule, solid, None),
+        Pass::Shell => ("vs_shell", "fs_shell", Input::Sphere, TEST, over),
+        Pass::Line => ("vs_line", "fs_line", Input::Stroke, TEST, over),
+        Pass::LineOnTop => ("vs_line", "fs_line", Input::Stroke, ALWAYS, over),
+    };
+    Plan { vs, fs: Some(fs), input, color: Some(COLOR), depth: Some(depth), blend, samples: variant.samples, constants }
+}
+
+/// Returns the constants of the shaders for a surface.
+pub(super) fn constants(surface: u32, variant: Variant) -> [(&'static str, f64); 8] {
+    let flag = |on: bool| f64::from(u8::from(on));
+    [
+        ("SURFACE", f64::from(surface % 1000)),
+        ("COAT", flag(surface / 1000 % 10 == 1)),
+        ("TEXTURED", flag(surface >= 10_000)),
+        ("SHADOWS", f64::from(variant.shadows)),
+        ("OCCLUSION", flag(variant.occlusion)),
+        ("SOFTBOX", flag(variant.softbox)),
+        ("REFLECTIONS", flag(variant.reflections)),
+        ("ONE_SUN", flag(variant.one_sun)),
+    ]
 }
 
 fn shader(device: &Device, label: &str, source: &str) -> ShaderModule {

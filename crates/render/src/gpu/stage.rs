@@ -48,8 +48,8 @@ impl Textures {
 
 /// Items with one surface, contiguous in a buffer, shadow casters first.
 pub(super) struct Same {
-    surface: u32,
-    texture: Option<usize>,
+    pub surface: u32,
+    pub texture: Option<usize>,
     pub all: Range<u32>,
     pub casters: Range<u32>,
 }
@@ -282,6 +282,13 @@ fn draw_mesh(pass: &mut RenderPass, mesh: &MeshBuffers, instances: &Buffer, rang
 }
 
 fn group_instances(gpu: &Gpu, list: &DrawList, meshes: &[MeshBuffers]) -> Result<(Vec<Group>, Buffer), RenderError> {
+    let (groups, floats) = placed_meshes(list);
+    let groups = groups.into_iter().map(|(mesh, same)| Group { mesh: meshes[mesh.0].clone(), same }).collect();
+    Ok((groups, vertex_buffer(gpu, &floats, "instances")?))
+}
+
+/// Groups placed meshes by mesh and surface; returns the groups and the numbers of all instances.
+pub(super) fn placed_meshes(list: &DrawList) -> (Vec<(MeshId, Same)>, Vec<f32>) {
     let items = &list.instances;
     let mut order: Vec<usize> = (0..items.len()).collect();
     let kind = |i: usize| (items[i].mesh, items[i].material.surface(), items[i].material.texture.map(|t| t.id));
@@ -290,14 +297,10 @@ fn group_instances(gpu: &Gpu, list: &DrawList, meshes: &[MeshBuffers]) -> Result
     order
         .iter()
         .for_each(|&i| data::instance(&items[i], !list.meshes[items[i].mesh.0].unwrapped.is_empty(), &mut floats));
-    let mut groups = Vec::new();
-    for (same, first) in runs(&order, kind, |i| items[i].casts_shadow) {
-        groups.push(Group {
-            mesh: meshes[items[first].mesh.0].clone(),
-            same: Same { surface: kind(first).1, texture: kind(first).2, ..same },
-        });
-    }
-    Ok((groups, vertex_buffer(gpu, &floats, "instances")?))
+    let groups = runs(&order, kind, |i| items[i].casts_shadow)
+        .map(|(same, first)| (items[first].mesh, Same { surface: kind(first).1, texture: kind(first).2, ..same }))
+        .collect();
+    (groups, floats)
 }
 
 /// Groups spheres or capsules by surface; returns the groups and the order.

@@ -11,6 +11,7 @@ mod lists;
 mod meshes;
 mod particles;
 mod pictures;
+mod portable;
 mod projectors;
 mod shading;
 mod support;

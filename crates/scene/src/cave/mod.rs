@@ -18,6 +18,7 @@
 //! ```
 
 mod checks;
+mod devices;
 mod error;
 mod facet;
 mod parts;
@@ -27,6 +28,7 @@ mod surface;
 mod tracker;
 
 pub use checks::{Gap, MAX_PIXELS, MAX_SIDE_PX, RIM_PX, SQUARE_TOLERANCE, gaps};
+pub use devices::DeviceMap;
 pub use error::CaveError;
 pub use facet::{Facet, FacetColor, Flip, Output, Stereo};
 pub use parts::{LAUNCH_PLACEHOLDERS, Node, Screen, User};

@@ -4,13 +4,15 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
 use toml::de::DeValue;
 
-use super::User;
+use super::{DeviceMap, User};
 use crate::parse::fields::{Fields, Names};
 
 /// Default UDP port for datagrams of a tracker.
 pub const TRACKER_PORT: u16 = 47_200;
 /// Largest number of senders.
 const MAX_SENDERS: usize = 64;
+/// Largest number of devices.
+const MAX_DEVICES: usize = 64;
 
 /// Axes of the tracker's frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +45,10 @@ pub struct Tracker {
     pub axes: Axes,
     /// Origin of the tracker's frame in the cave, m. Default 0, 0, 0.
     pub origin_m: [f64; 3],
+    /// VRPN server (TCP), `HOST:PORT`, instead of datagrams. Default: none.
+    pub vrpn: Option<String>,
+    /// Devices of that server with the parts that they move; at least one.
+    pub vrpn_map: Vec<DeviceMap>,
 }
 
 impl Tracker {
@@ -56,6 +62,8 @@ impl Tracker {
             sealed: false,
             axes: Axes::ZUp,
             origin_m: [0.0; 3],
+            vrpn: None,
+            vrpn_map: Vec::new(),
         }
     }
 
@@ -73,10 +81,15 @@ impl Tracker {
             .and_then(|(text, value)| address_of(&f, "address", text, value))
             .unwrap_or(default.address);
         let port = u32::from(default.port);
+        let users = read_users(&mut f, users).unwrap_or(default.users);
+        let vrpn = read_vrpn(&mut f);
+        let vrpn_map = read_vrpn_map(&mut f, &users, vrpn.is_some());
         let tracker = Tracker {
+            vrpn,
+            vrpn_map,
             address,
             port: f.integer_or("port", 1..=65535, port) as u16,
-            users: read_users(&mut f, users).unwrap_or(default.users),
+            users,
             senders: read_senders(&mut f),
             sealed: f.flag_or("sealed", default.sealed),
             axes: f.choice_or("axes", AXES, default.axes),
@@ -118,6 +131,44 @@ fn read_senders(f: &mut Fields<'_>) -> Vec<IpAddr> {
         .into_iter()
         .filter_map(|value| f.as_text("senders", value).and_then(|text| address_of(f, "senders", text, value)))
         .collect()
+}
+
+fn read_vrpn(f: &mut Fields<'_>) -> Option<String> {
+    let (server, value) = f.optional_text("vrpn")?;
+    let well = server.rsplit_once(':').is_some_and(|(host, port)| {
+        !host.is_empty() && !host.contains(char::is_whitespace) && port.parse::<u16>().is_ok_and(|port| port > 0)
+    });
+    if !well {
+        f.wrong("vrpn", value, "HOST:PORT, such as \"10.0.0.7:3883\"");
+    }
+    Some(server.to_owned())
+}
+
+fn read_vrpn_map(f: &mut Fields<'_>, users: &[String], has_server: bool) -> Vec<DeviceMap> {
+    let items = f.list("vrpn_map", MAX_DEVICES, "a list of devices, such as \"Glasses=user/head\"");
+    let mut maps = Vec::new();
+    for value in &items {
+        let Some(text) = f.as_text("vrpn_map", value) else { continue };
+        match text.parse::<DeviceMap>() {
+            Ok(map) if users.contains(&map.user) => maps.push(map),
+            Ok(_) => f.wrong("vrpn_map", value, format!("a user of this tracker: {}", users.join(", "))),
+            Err(expected) => f.wrong("vrpn_map", value, expected.trim_start_matches("expected ")),
+        }
+    }
+    let missing = match (has_server, items.is_empty()) {
+        (true, true) => Some((
+            "`vrpn` without `vrpn_map`: no device moves a user",
+            "expected a list of devices, such as vrpn_map = [\"Glasses=user/head\"]",
+        )),
+        (false, false) => {
+            Some(("`vrpn_map` without `vrpn`", "expected the server of the devices, such as vrpn = \"10.0.0.7:3883\""))
+        }
+        _ => None,
+    };
+    if let Some((what, expected)) = missing {
+        f.log.report(f.span.clone(), format!("{} has {what}", f.what), expected);
+    }
+    maps
 }
 
 fn address_of(f: &Fields<'_>, key: &str, text: &str, value: &crate::parse::fields::Value<'_>) -> Option<IpAddr> {

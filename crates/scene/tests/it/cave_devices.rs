@@ -2,7 +2,7 @@
 
 use crate::caves::SMALL;
 use std::net::{IpAddr, Ipv4Addr};
-use tumble_scene::cave::{Axes, Cave};
+use tumble_scene::cave::{Axes, Cave, DeviceMap};
 
 fn error_of(text: &str) -> String {
     Cave::parse(&format!("{SMALL}{text}"), "my.toml").expect_err("it is wrong").to_string()
@@ -26,11 +26,19 @@ fn a_tracker_is_heard_on_this_machine_and_elsewhere_by_name() {
         (far.senders, far.axes, far.users),
         (vec![IpAddr::from(Ipv4Addr::new(10, 0, 0, 7))], Axes::YUp, vec!["glasses 1".to_owned()])
     );
+    let vrpn = of("[tracker]\nusers = [\"eva\"]\nvrpn = \"wall:3883\"\nvrpn_map = [\"Glasses 1:2=eva/hand/left\"]\n");
+    let map = DeviceMap { device: "Glasses 1".into(), sensor: 2, user: "eva".into(), part: "hand/left".into() };
+    assert_eq!((vrpn.vrpn.as_deref(), vrpn.vrpn_map), (Some("wall:3883"), vec![map]));
     let cases = [
         ("[tracker]\naddress = \"0.0.0.0\"\n", "without `senders`"),
         ("[tracker]\naddress = \"here\"\n", "expected an IP address"),
         ("[tracker]\nsealed = true\n", "expected a [security] with a key_file"),
         ("[tracker]\nport = 0\n", "an integer from 1 to 65535"),
+        ("[tracker]\nvrpn = \"here\"\nvrpn_map = [\"G=u/head\"]\n", "HOST:PORT, such as"),
+        ("[tracker]\nvrpn = \"here:3883\"\n", "no device moves a user"),
+        ("[tracker]\nvrpn_map = [\"G=u/head\"]\n", "`vrpn_map` without `vrpn`"),
+        ("[tracker]\nvrpn = \"here:3883\"\nvrpn_map = [\"G=u/foot\"]\n", "a PART of head, wand"),
+        ("[tracker]\nvrpn = \"here:3883\"\nvrpn_map = [\"G=other/head\"]\n", "a user of this tracker: u"),
         ("[tracker]\nusers = [\"a\", \"b\"]\n", "one unique name without / for each of the cave's 1 users"),
         ("[tracker]\nusers = [\"a/b\"]\n", "without /"),
         ("[tracker]\nsenders = [7]\n", "`senders`"),

@@ -6,7 +6,7 @@ mod values;
 
 pub use caves::{CalibrateAction, CalibrateOptions, CavesOptions, MpcdiOptions, SolveOptions};
 pub use scene::{OpeningOptions, SceneOptions, kind};
-pub use values::{cutoff, lead, rate, seconds};
+pub use values::{cutoff, lead, rate, seconds, web_timeout};
 
 use crate::cave::args::{
     CaveOptions, ConsoleOptions, FacetOptions, RecoverOptions, RelayOptions, ReplayOptions, ServeOptions,

@@ -25,6 +25,10 @@ pub fn rate(text: &str) -> Result<f64, String> {
     number(text, 0.01, 1000.0)
 }
 
+pub fn web_timeout(text: &str) -> Result<f64, String> {
+    number(text, 1.0, 60_000.0)
+}
+
 pub fn cutoff(text: &str) -> Result<f64, String> {
     number(text, 0.01, 100.0)
 }

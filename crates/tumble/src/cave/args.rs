@@ -3,12 +3,11 @@
 use crate::args::{Overlays, SceneOptions};
 use crate::cave::tracker::one_euro::Smoothing;
 use crate::cave::tracker::sealed::MAX_RELAYS;
-use crate::cave::tracker::vrpn_client::DeviceMap;
 use clap::{Args, Subcommand, ValueEnum};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use tumble::render::{DebugDraw, Quality, UnknownOverlay};
-use tumble::scene::cave::Compute;
+use tumble::scene::cave::{Compute, DeviceMap};
 
 /// The cave and the environment of the scene. Server and facets must get the same.
 #[derive(Args, Clone)]
@@ -109,6 +108,9 @@ pub struct ServeOptions {
     /// commas. A part is head, wand, hand/left, hand/right or buttons.
     #[arg(long, value_name = "MAP,…", value_delimiter = ',', requires = "vrpn")]
     pub vrpn_map: Vec<DeviceMap>,
+    /// Take the first gamepad of this machine for this user: sticks walk and turn, buttons are digits.
+    #[arg(long, value_name = "USER")]
+    pub gamepad: Option<String>,
     /// Smooth tracked heads by a 1 € filter with this cutoff at rest, Hz; less is smoother, 1 to 2 suits heads.
     #[arg(long, value_name = "HZ", value_parser = crate::args::cutoff)]
     pub tracker_smooth: Option<f64>,
@@ -193,6 +195,17 @@ pub enum ConsoleCommand {
     },
     /// End the recording
     Unrecord,
+    /// Replay a recording of this scene, then begin the scene again
+    Replay {
+        /// Name without folders that ends with .mcap, where the run was started.
+        file: String,
+    },
+    /// Show a calibration pattern on all facets: grid, corners, colors, ramps, blend, convergence, name;
+    /// off shows the scene again
+    Pattern {
+        /// The pattern, or off.
+        name: String,
+    },
     /// End the run
     Stop,
 }
@@ -270,6 +283,26 @@ pub struct DrawOptions {
     pub no_pictures: bool,
 }
 
+/// Options of facets on the screens of web browsers.
+#[derive(Args, Clone)]
+#[command(next_help_heading = "Web browsers")]
+pub struct WebOptions {
+    /// Show facets in web browsers: each facet of this machine serves a page at this address, the next one at
+    /// the next port. The link of each is printed.
+    #[arg(long, value_name = "ADDR:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:47400")]
+    #[arg(conflicts_with_all = ["preview", "no_pictures", "burn_in"])]
+    pub web: Option<SocketAddr>,
+    /// File with the key of the links, at least 16 letters, digits and -_.~ (default: a new one for each run).
+    #[arg(long, value_name = "FILE", requires = "web")]
+    pub web_key: Option<PathBuf>,
+    /// Time for a browser to draw a frame, ms. One that takes longer is no longer awaited until it is faster.
+    #[arg(long, value_name = "MS", requires = "web", default_value = "100", value_parser = crate::args::web_timeout)]
+    pub web_timeout: f64,
+    /// Key of the links for all scenes of this launcher, which draws it.
+    #[arg(skip)]
+    pub drawn_key: Option<String>,
+}
+
 /// Options of `tumble cave`.
 #[derive(Args, Clone)]
 pub struct CaveOptions {
@@ -277,6 +310,11 @@ pub struct CaveOptions {
     pub serve: ServeOptions,
     #[command(flatten)]
     pub draw: DrawOptions,
+    #[command(flatten)]
+    pub web: WebOptions,
+    /// Facets of --web (default: all of this machine).
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "web", help_heading = "Web browsers")]
+    pub web_facets: Vec<String>,
     /// Start one process that draws all facets, unfolded into one picture, instead of one process
     /// per facet.
     #[arg(long)]
@@ -362,6 +400,8 @@ pub struct FacetOptions {
     pub connect_timeout: f64,
     #[command(flatten)]
     pub draw: DrawOptions,
+    #[command(flatten)]
+    pub web: WebOptions,
     /// End when stdin ends. A launcher sets it, so that a facet ends with its launcher in any case.
     #[arg(long, hide = true)]
     pub parent_watch: bool,

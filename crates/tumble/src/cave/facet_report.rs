@@ -55,6 +55,34 @@ pub struct FacetReport {
     /// First 16 bytes of the BLAKE3 hash of the last picture, hexadecimal.
     #[serde(default)]
     pub image: String,
+    /// Web browsers that show the facet.
+    #[serde(default)]
+    pub browsers: Option<BrowserReport>,
+}
+
+/// Web browsers that show a facet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BrowserReport {
+    /// Number of browsers now.
+    pub browsers: u32,
+    /// Number of browsers that are awaited at the swap barrier.
+    pub awaited: u32,
+    /// Number of times that an awaited browser was late.
+    pub late: u64,
+    /// Frames that browsers have shown.
+    pub shown: u64,
+    /// Largest number of frames by which an awaited browser was behind when it had shown one.
+    pub behind_max: u64,
+}
+
+impl std::fmt::Display for BrowserReport {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let BrowserReport { browsers, awaited, late, shown, behind_max } = self;
+        write!(
+            f,
+            "{browsers} browsers ({awaited} awaited), {shown} frames in them, {late} times late, at most {behind_max} behind"
+        )
+    }
 }
 
 /// Messages and a picture that wait for the launcher.

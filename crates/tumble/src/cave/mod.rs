@@ -32,6 +32,8 @@ pub mod console;
 mod endpoints;
 mod facet;
 mod facet_report;
+mod gamepad;
+mod listener;
 mod lock;
 mod replay;
 mod run_setup;
@@ -39,6 +41,7 @@ mod server;
 mod signals;
 mod simulation;
 mod tracker;
+mod web;
 
 use crate::failure::Failure;
 use args::{CaveOptions, ConsoleOptions, FacetOptions, RecoverOptions, RelayOptions, ReplayOptions, ServeOptions};
@@ -62,14 +65,15 @@ pub fn facet(options: &FacetOptions) -> Result<(), Failure> {
 /// Shows a recorded run on the facets of a cave.
 pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
     let serve = &options.cave.serve;
-    let users = serve.user_colliders || serve.tracker.is_some() || serve.replay_input.is_some();
+    let devices = serve.tracker.is_some() || serve.vrpn.is_some() || serve.gamepad.is_some();
+    let users = serve.user_colliders || devices || serve.replay_input.is_some();
     let scene = &serve.scene;
     let method = scene.stepper.is_some() || scene.solver.is_some() || scene.integrator.is_some();
     let stepping = scene.dt.is_some() || scene.threads.is_some() || scene.budget.is_some() || method;
     let everywhere = serve.compute == Some(args::ComputeKind::Everywhere);
     if serve.record.is_some() || users || stepping || serve.contacts || everywhere || serve.sound.is_some() {
         return Err(Failure::input(
-            "a replay shows what was recorded; --record, --user-colliders, --tracker, --sound, --replay-input, --contacts, --dt, --stepper, --solver, --integrator, --threads, --budget and --compute everywhere go with tumble cave",
+            "a replay shows what was recorded; --record, --user-colliders, --tracker, --vrpn, --gamepad, --sound, --replay-input, --contacts, --dt, --stepper, --solver, --integrator, --threads, --budget and --compute everywhere go with tumble cave",
         ));
     }
     server::run(serve, Some(&options.cave), Some(&options.file))

@@ -83,7 +83,12 @@ fn a_run_is_watched_and_directed_by_the_command() {
     let (code, said, _) = console(&place, at, &["next", "--json"]);
     assert!(code == Some(1) && serde_json::from_str::<Value>(&said).unwrap()["error"].is_string(), "{said}");
     let (code, said, _) = console(&place, at, &["log"]);
-    assert!(code == Some(0) && said.contains("facet r joined") && said.contains("/api/reset"), "{said}");
+    assert!(
+        code == Some(0)
+            && said.contains("facet r joined")
+            && said.contains("console: reset: the world is as before the first step"),
+        "{said}"
+    );
     assert_eq!(console(&place, at, &["stop"]).0, Some(0));
     let (code, _, wrong) = run.end();
     assert_eq!(code, Some(0), "{wrong}");

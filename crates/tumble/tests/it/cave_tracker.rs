@@ -2,6 +2,7 @@
 //! Control 1.0). Also replays of recorded user input.
 
 use crate::cave_place::in_place;
+use crate::cave_place::{Place, signal, wait, wall};
 use crate::cave_users::{SCENE, Server, one_screen, place};
 use crate::common::{json, text};
 use serde_json::{Value, json as value};
@@ -308,4 +309,27 @@ fn what_users_did_is_done_again_bit_by_bit() {
     let wrong = String::from_utf8_lossy(&out.stderr);
     assert!(out.status.code() == Some(2) && wrong.contains("--dt and --fps must be those of the recording"), "{wrong}");
     assert!(SCENE.contains("dt_s = 0.01"));
+}
+
+/// The server of `[tracker]` is called instead of listening for datagrams.
+#[test]
+fn a_cave_file_names_a_vrpn_server() {
+    let server = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    server.set_nonblocking(true).unwrap();
+    let at = server.local_addr().unwrap();
+    let tracker = format!("[tracker]\nvrpn = \"{at}\"\nvrpn_map = [\"Glasses=u/head\"]\n");
+    let place = Place::new("tracker-vrpn", &(wall() + &tracker));
+    let run = place.start("cave", &["--no-pictures"]);
+    let mut client = None;
+    wait("the client", || {
+        client = server.accept().ok();
+        client.is_some()
+    });
+    let (mut socket, _) = client.unwrap();
+    socket.set_nonblocking(false).unwrap();
+    let mut greeting = [0; 24];
+    std::io::Read::read_exact(&mut socket, &mut greeting).unwrap();
+    assert!(greeting.starts_with(b"vrpn: ver. 07."), "{greeting:?}");
+    signal(run.pid(), rustix::process::Signal::INT);
+    assert_eq!(run.end().0, Some(0));
 }

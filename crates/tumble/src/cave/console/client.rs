@@ -7,8 +7,10 @@ use crate::failure::Failure;
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
+use std::str::FromStr;
 use std::time::Duration;
 use tumble::net::control::{Action, is_recording_name};
+use tumble::render::CalibrationPattern;
 
 /// Time to connect, and to wait for an answer: longer than the run may take for it.
 const TIMEOUT: Duration = Duration::from_secs(12);
@@ -37,10 +39,14 @@ pub fn console(options: &ConsoleOptions) -> Result<(), Failure> {
         ConsoleCommand::Next => Action::Next,
         ConsoleCommand::Stop => Action::Stop,
         ConsoleCommand::Unrecord => Action::Unrecord,
-        ConsoleCommand::Record { file } if is_recording_name(file) => Action::Record(file.clone()),
-        ConsoleCommand::Record { file } => {
-            let why = "expected the name of a recording without folders that ends with .mcap";
-            return Err(Failure::input(format!("{file}: {why}; it is written where the run was started")));
+        ConsoleCommand::Record { file } => Action::Record(recording_name(file)?),
+        ConsoleCommand::Replay { file } => Action::Replay(recording_name(file)?),
+        ConsoleCommand::Pattern { name } => {
+            let pattern = CalibrationPattern::from_str(name).map(|_| ());
+            pattern
+                .or_else(|why| if name == "off" { Ok(()) } else { Err(why) })
+                .map_err(|why| Failure::input(format!("{name}: {why}, or off")))?;
+            Action::Pattern(name.clone())
         }
     };
     let (code, body) = ask(options.address, &token, &action).map_err(|e| failed(&e))?;
@@ -66,6 +72,14 @@ pub fn console(options: &ConsoleOptions) -> Result<(), Failure> {
 }
 
 /// Sends a request; returns the status code and the body of the answer.
+fn recording_name(file: &str) -> Result<String, Failure> {
+    if is_recording_name(file) {
+        return Ok(file.to_owned());
+    }
+    let why = "expected the name of a recording without folders that ends with .mcap";
+    Err(Failure::input(format!("{file}: {why}; it lies where the run was started")))
+}
+
 fn ask(at: SocketAddr, token: &str, action: &Action) -> Result<(u16, Vec<u8>), String> {
     let text = |e: std::io::Error| e.to_string();
     let mut stream = TcpStream::connect_timeout(&at, TIMEOUT).map_err(text)?;

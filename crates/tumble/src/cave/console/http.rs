@@ -1,12 +1,11 @@
 //! The console's connections: one request each, with a time-out, in a thread of its own.
 
 use super::{Asked, Shown, lock};
+use crate::cave::listener::Listener;
 use std::io::{ErrorKind, Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::net::{SocketAddr, TcpStream};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tumble::net::control::{Action, MAX_REQUEST_BYTES, Refusal, read_request};
 
@@ -24,74 +23,19 @@ struct Context {
     token: String,
     shown: Arc<Mutex<Shown>>,
     ask: SyncSender<Asked>,
-    connections: AtomicUsize,
-    over: AtomicBool,
 }
 
-/// A thread that accepts connections until this value is dropped.
-pub struct Listener {
-    address: SocketAddr,
-    context: Arc<Context>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Listener {
-    pub fn start(
-        at: SocketAddr,
-        token: String,
-        shown: Arc<Mutex<Shown>>,
-        ask: SyncSender<Asked>,
-    ) -> std::io::Result<Listener> {
-        let socket = TcpListener::bind(at)?;
-        let address = socket.local_addr()?;
-        let (connections, over) = (AtomicUsize::new(0), AtomicBool::new(false));
-        let context = Arc::new(Context { token, shown, ask, connections, over });
-        let ours = context.clone();
-        let thread = std::thread::Builder::new().name("console".into()).spawn(move || accept(&socket, &ours))?;
-        Ok(Listener { address, context, thread: Some(thread) })
-    }
-
-    pub fn address(&self) -> SocketAddr {
-        self.address
-    }
-}
-
-impl Drop for Listener {
-    fn drop(&mut self) {
-        self.context.over.store(true, Ordering::Relaxed);
-        let mut here = self.address;
-        if here.ip().is_unspecified() {
-            here.set_ip(if here.is_ipv4() { [127, 0, 0, 1].into() } else { std::net::Ipv6Addr::LOCALHOST.into() });
-        }
-        // wakes the thread; without that it ends with the process
-        if TcpStream::connect_timeout(&here, Duration::from_millis(200)).is_ok()
-            && let Some(thread) = self.thread.take()
-        {
-            let _ = thread.join();
-        }
-    }
-}
-
-fn accept(socket: &TcpListener, context: &Arc<Context>) {
-    while !context.over.load(Ordering::Relaxed) {
-        let Ok((stream, _)) = socket.accept() else {
-            // a client that has gone, or no free descriptor: both pass
-            std::thread::sleep(Duration::from_millis(50));
-            continue;
-        };
-        if context.connections.fetch_add(1, Ordering::Relaxed) >= MAX_CONNECTIONS {
-            context.connections.fetch_sub(1, Ordering::Relaxed);
-            continue;
-        }
-        let theirs = context.clone();
-        let serve = move || {
-            let _ = serve(stream, &theirs); // a client that goes away needs no answer
-            theirs.connections.fetch_sub(1, Ordering::Relaxed);
-        };
-        if std::thread::Builder::new().name("console client".into()).spawn(serve).is_err() {
-            context.connections.fetch_sub(1, Ordering::Relaxed);
-        }
-    }
+/// Starts to serve consoles at an address.
+pub fn start(
+    at: SocketAddr,
+    token: String,
+    shown: Arc<Mutex<Shown>>,
+    ask: SyncSender<Asked>,
+) -> std::io::Result<Listener> {
+    let context = Context { token, shown, ask };
+    Listener::start(at, "console", MAX_CONNECTIONS, move |stream| {
+        let _ = serve(stream, &context); // a client that goes away needs no answer
+    })
 }
 
 fn serve(mut stream: TcpStream, context: &Context) -> std::io::Result<()> {

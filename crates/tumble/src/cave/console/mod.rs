@@ -17,8 +17,8 @@ mod status;
 pub use client::console;
 pub use status::{ConsoleStatus, FacetStatus};
 
+use crate::cave::listener::Listener;
 use crate::failure::Failure;
-use http::Listener;
 use std::collections::{BTreeMap, VecDeque};
 use std::io::Read;
 use std::net::SocketAddr;
@@ -77,7 +77,7 @@ impl Console {
         let shown = Arc::new(Mutex::new(Shown { status: "{}".into(), ..Shown::default() }));
         let (ask, asked) = sync_channel(MAX_WAITING);
         let listener =
-            Listener::start(at, token, shown.clone(), ask).map_err(|e| Failure::run(&format!("--console {at}"), e))?;
+            http::start(at, token, shown.clone(), ask).map_err(|e| Failure::run(&format!("--console {at}"), e))?;
         Ok(Console { listener, shown, asked })
     }
 

@@ -1,5 +1,6 @@
 //! The state of a run as consoles show it. Names end with units.
 
+use crate::cave::facet_report::BrowserReport;
 use crate::cave::server::Difference;
 use serde::Serialize;
 
@@ -21,6 +22,10 @@ pub struct ConsoleStatus {
     /// Median time from an input to the last facet that shows it.
     pub input_to_picture_ms: Option<f64>,
     pub paused: bool,
+    /// Whether recorded frames are shown.
+    pub replaying: bool,
+    /// The calibration pattern that facets show instead of the scene.
+    pub pattern: Option<String>,
     /// File of the recording in progress.
     pub recording: Option<String>,
     pub facets: Vec<FacetStatus>,
@@ -54,6 +59,8 @@ pub struct FacetStatus {
     pub black_now: u64,
     /// First 16 bytes of the BLAKE3 hash of its last picture, hexadecimal; empty before the first.
     pub image: String,
+    /// The web browsers that show it, if it is served to browsers.
+    pub browsers: Option<BrowserReport>,
     /// The first frame in which a facet that steps the world by itself had another state.
     pub first_difference: Option<Difference>,
 }

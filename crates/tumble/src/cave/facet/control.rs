@@ -3,23 +3,29 @@
 use crate::cave::facet_report::Reporter;
 use crate::cave::signals::Signals;
 use crate::failure::Failure;
-use std::io::Read;
-use std::sync::Arc;
+use std::io::{BufRead, Read};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tumble::net::sync::{Task, WaitReason};
+use tumble::render::CalibrationPattern;
 
 /// Interval at which signals, parent and picture are polled.
 pub const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Time without a server after which the facet reports it.
 const REPORT_DELAY: Duration = Duration::from_secs(1);
 
+/// Maximum length of a line of the launcher, bytes; the rest of a longer one counts as another line.
+const MAX_LINE_BYTES: u64 = 64;
+/// Beginning of a line that asks for a calibration pattern.
+pub const PATTERN_MARK: &str = "pattern ";
+
 /// Conditions that end a facet, and its timeout.
 pub struct FacetControl {
     pub name: String,
     pub signals: Signals,
     pub reporter: Reporter,
-    pub parent_gone: Option<Arc<AtomicBool>>,
+    pub parent: Option<Parent>,
     pub connect_timeout: Duration,
     /// Whether packets are authenticated. A server with another key file then does not answer.
     pub sealed: bool,
@@ -36,7 +42,12 @@ impl FacetControl {
     }
 
     pub fn is_orphaned(&self) -> bool {
-        self.parent_gone.as_ref().is_some_and(|gone| gone.load(Ordering::Relaxed))
+        self.parent.as_ref().is_some_and(|parent| parent.gone.load(Ordering::Relaxed))
+    }
+
+    /// Returns the calibration pattern to show instead of the scene.
+    pub fn pattern(&self) -> Option<CalibrationPattern> {
+        self.parent.as_ref().and_then(Parent::pattern)
     }
 
     pub fn should_stop(&self) -> bool {
@@ -44,17 +55,51 @@ impl FacetControl {
     }
 }
 
-/// Returns a flag that is set when stdin ends, which happens when the launcher ends in any way.
-pub fn watch_parent() -> Result<Arc<AtomicBool>, Failure> {
-    let gone = Arc::new(AtomicBool::new(false));
-    let raise = gone.clone();
-    let wait = move || {
-        let mut bytes = [0; 64];
-        while matches!(std::io::stdin().read(&mut bytes), Ok(n) if n > 0) {}
-        raise.store(true, Ordering::Relaxed);
-    };
-    std::thread::Builder::new().name("parent".into()).spawn(wait).map_err(|e| Failure::run("the facet", e))?;
-    Ok(gone)
+/// The launcher's pipe: it ends when the launcher ends in any way, and its lines are requests.
+///
+/// ```text
+/// pattern grid
+/// pattern off
+/// ```
+#[derive(Clone, Default)]
+pub struct Parent {
+    gone: Arc<AtomicBool>,
+    pattern: Arc<Mutex<Option<CalibrationPattern>>>,
+}
+
+impl Parent {
+    /// Starts to read stdin.
+    pub fn watch() -> Result<Parent, Failure> {
+        let parent = Parent::default();
+        let ours = parent.clone();
+        let wait = move || {
+            ours.read(std::io::stdin().lock());
+            ours.gone.store(true, Ordering::Relaxed);
+        };
+        std::thread::Builder::new().name("parent".into()).spawn(wait).map_err(|e| Failure::run("the facet", e))?;
+        Ok(parent)
+    }
+
+    /// Reads requests until the end; other lines are ignored.
+    fn read(&self, mut pipe: impl BufRead) {
+        loop {
+            let mut line = Vec::new();
+            match pipe.by_ref().take(MAX_LINE_BYTES).read_until(b'\n', &mut line) {
+                Ok(1..) => {
+                    let text = String::from_utf8_lossy(&line);
+                    if let Some(name) = text.trim().strip_prefix(PATTERN_MARK) {
+                        *self.pattern.lock().unwrap_or_else(PoisonError::into_inner) = name.parse().ok();
+                    }
+                }
+                Ok(0) | Err(_) => return,
+            }
+        }
+    }
+
+    /// Returns the calibration pattern to show instead of the scene.
+    pub fn pattern(&self) -> Option<CalibrationPattern> {
+        *self.pattern.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// Time without a server, and whether it was reported.
@@ -101,5 +146,24 @@ impl ServerWait {
             self.said = true;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_pattern_counts_and_other_lines_do_not() {
+        let parent = Parent::default();
+        for (lines, pattern) in [
+            ("pattern grid\n".to_owned(), Some(CalibrationPattern::Grid)),
+            (format!("garbage\n{}\n", "x".repeat(1000)), Some(CalibrationPattern::Grid)),
+            ("pattern grid\npattern name\n".into(), Some(CalibrationPattern::Name)),
+            ("pattern off\n".into(), None),
+        ] {
+            parent.read(lines.as_bytes());
+            assert_eq!(parent.pattern(), pattern, "{lines}");
+        }
     }
 }

@@ -5,6 +5,7 @@ mod burn_in;
 mod control;
 mod desktop;
 mod frame_log;
+mod painter;
 mod picture_watch;
 mod priority;
 mod render_thread;
@@ -19,17 +20,21 @@ use super::lock;
 use super::run_setup::{Role, RunSetup};
 use super::signals::Signals;
 use super::simulation::CaveSimulation;
+use super::web::WebScreen;
 use crate::failure::Failure;
-use control::{FacetControl, POLL_INTERVAL, watch_parent};
+pub use control::PATTERN_MARK;
+use control::{FacetControl, POLL_INTERVAL, Parent};
 use desktop::{Desktop, Probe, desktop};
 use frame_log::{Earlier, FrameLog};
+use painter::Painter;
 use picture_watch::PictureWatch;
+pub use render_thread::draw_list;
 use render_thread::{RenderThread, slot_name};
 use runner::FacetRunner;
 use std::time::{Duration, Instant};
 use tumble::net::sync::{Facet, FacetOptions as SessionOptions, SyncMode};
 use tumble::net::sync::{transport::FacetNumber, udp::Entropy};
-use tumble::scene::cave::{Mode, Output, resolve_cave};
+use tumble::scene::cave::{Facet as CaveFacet, Mode, Output, resolve_cave};
 use window::WindowSetup;
 
 /// Runs a facet until the end of the run.
@@ -45,7 +50,7 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
 
 fn show(options: &FacetOptions, reporter: &Reporter) -> Result<(), Failure> {
     let signals = Signals::watch()?;
-    let parent_gone = options.parent_watch.then(watch_parent).transpose()?;
+    let parent = options.parent_watch.then(Parent::watch).transpose()?;
     let compute = compute(options)?;
     let role = if compute == ComputeKind::Everywhere { Role::Server } else { Role::Facet };
     let setup = RunSetup::load(options.scene.load()?, &options.surroundings, role)?;
@@ -56,16 +61,24 @@ fn show(options: &FacetOptions, reporter: &Reporter) -> Result<(), Failure> {
         as FacetNumber;
     let name = slot_name(description.as_ref()).to_owned();
     let draw = &options.draw;
-    let in_memory =
-        draw.no_pictures || draw.offscreen || description.as_ref().is_some_and(|f| f.output == Output::Offscreen);
+    let in_memory = draw.no_pictures
+        || draw.offscreen
+        || options.web.web.is_some()
+        || description.as_ref().is_some_and(|f| f.output == Output::Offscreen);
     let window_required = description.as_ref().is_some_and(|f| f.window_required);
     let mut desktop = if in_memory { None } else { reach_desktop(&name, window_required)? };
     let offscreen = desktop.is_none();
-    let (mut render_thread, mut window_setup) = (None, None);
+    let (mut painter, mut window_setup) = (None, None);
     match (draw.no_pictures, offscreen) {
         (true, _) => {}
         (false, true) => {
-            render_thread = Some(RenderThread::new(&setup, description.as_ref(), draw.quality, draw.debug_draw.draw)?)
+            painter = Some(match web_screen(options, &setup, description.as_ref(), reporter)? {
+                Some(screen) => Painter::Browsers(Box::new(screen)),
+                None => {
+                    let (facet, overlays) = (description.as_ref(), draw.debug_draw.draw);
+                    Painter::Memory(Box::new(RenderThread::new(&setup, facet, draw.quality, overlays)?))
+                }
+            })
         }
         (false, false) => {
             window_setup = Some(WindowSetup::new(&setup, description.as_ref(), draw.quality, draw.debug_draw.draw)?)
@@ -75,7 +88,7 @@ fn show(options: &FacetOptions, reporter: &Reporter) -> Result<(), Failure> {
         name: name.clone(),
         signals,
         reporter: reporter.clone(),
-        parent_gone,
+        parent,
         connect_timeout: Duration::from_secs_f64(options.connect_timeout),
         sealed: false,
     };
@@ -95,7 +108,7 @@ fn show(options: &FacetOptions, reporter: &Reporter) -> Result<(), Failure> {
         }
     };
     let watch = draw.watch_pictures.then(|| PictureWatch::new(reporter.clone()));
-    let mut runner = FacetRunner::new(facet, render_thread, log, draw.burn_in, control, reporter.clone(), watch);
+    let mut runner = FacetRunner::new(facet, painter, log, draw.burn_in, control, reporter.clone(), watch);
     let outcome = match window_setup {
         Some(window_setup) => window_setup.show(&mut runner, draw.burn_in, desktop.take()),
         None => runner.run_offscreen(),
@@ -105,6 +118,22 @@ fn show(options: &FacetOptions, reporter: &Reporter) -> Result<(), Failure> {
     // a write error is the cause of other errors
     let written = runner.log.as_mut().map_or(Ok(()), FrameLog::finish);
     written.and(outcome)
+}
+
+/// Serves the facet to browsers if the options say so.
+fn web_screen(
+    options: &FacetOptions,
+    setup: &RunSetup,
+    facet: Option<&CaveFacet>,
+    reporter: &Reporter,
+) -> Result<Option<WebScreen>, Failure> {
+    let (web, draw) = (&options.web, &options.draw);
+    let (Some(at), Some(facet)) = (web.web, facet) else { return Ok(None) };
+    if draw.frames_dir.is_some() {
+        let why = "browsers keep their pictures, so there is none to write; --log-dir writes frames.jsonl";
+        return Err(Failure::input(format!("--web with --frames-dir: {why}")));
+    }
+    WebScreen::open(setup, facet, at, web, draw.quality, draw.debug_draw.draw, reporter).map(Some)
 }
 
 /// Returns where the world is stepped: by the command line, else by the cave file.

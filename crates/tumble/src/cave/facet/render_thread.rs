@@ -8,7 +8,10 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 use tumble::dynamics::World;
 use tumble::net::sync::Viewer;
-use tumble::render::{CaveView, DebugDraw, DrawList, Drawing, Image, Quality, RenderError, Renderer};
+use tumble::render::{
+    CalibrationPattern, CaveView, DebugDraw, DrawList, Drawing, Image, Quality, RenderError, Renderer,
+    finished_calibration_picture,
+};
 use tumble::scene::cave::Facet;
 
 /// Size of shadow maps in caves instead of the default, texels; as for all pictures of caves.
@@ -21,6 +24,7 @@ struct RenderRequest {
     list: DrawList,
     viewer: Viewer,
     burn_in: Option<u64>,
+    pattern: Option<CalibrationPattern>,
 }
 
 /// Makes draw lists in the calling thread and pictures in its own.
@@ -66,7 +70,7 @@ impl RenderThread {
         let mut render_thread =
             RenderThread { drawing: Drawing::new(&setup.scene), quality, overlays, requests, pictures, software };
         // the first picture takes seconds to compile pipelines, and nothing waits for it yet
-        render_thread.begin(&setup.world, &setup.viewer()?, None)?;
+        render_thread.begin(&setup.world, &setup.viewer()?, None, None)?;
         while render_thread.finished(Duration::from_secs(1))?.is_none() {}
         Ok(render_thread)
     }
@@ -76,11 +80,18 @@ impl RenderThread {
         self.software
     }
 
-    /// Starts a picture of the world, with the frame number in it if `burn_in` is given.
-    pub fn begin(&mut self, world: &World, viewer: &Viewer, burn_in: Option<u64>) -> Result<(), Failure> {
+    /// Starts a picture of the world, or of a calibration pattern, with the frame number in it if
+    /// `burn_in` is given.
+    pub fn begin(
+        &mut self,
+        world: &World,
+        viewer: &Viewer,
+        burn_in: Option<u64>,
+        pattern: Option<CalibrationPattern>,
+    ) -> Result<(), Failure> {
         let list = draw_list(&mut self.drawing, world, self.quality.as_ref(), &self.overlays)?;
         self.requests
-            .send(RenderRequest { list, viewer: viewer.clone(), burn_in })
+            .send(RenderRequest { list, viewer: viewer.clone(), burn_in, pattern })
             .map_err(|_| Failure::run("drawing", "the render thread has ended"))
     }
 
@@ -120,9 +131,10 @@ fn render_all(
 ) {
     while let Ok(request) = incoming.recv() {
         apply_viewer(&mut view, &request.viewer);
-        let mut image = match &facet {
-            Some(facet) => view.draw(renderer, &request.list, facet),
-            None => view.draw_unfolded(renderer, &request.list, PREVIEW_PX),
+        let mut image = match (&facet, request.pattern) {
+            (Some(facet), Some(pattern)) => Ok(finished_calibration_picture(&view, facet, pattern)),
+            (Some(facet), None) => view.draw(renderer, &request.list, facet),
+            (None, _) => view.draw_unfolded(renderer, &request.list, PREVIEW_PX),
         };
         if let (Ok(image), Some(frame)) = (&mut image, request.burn_in) {
             burn_in(image, frame);

@@ -2,15 +2,16 @@
 
 use super::control::{FacetControl, POLL_INTERVAL, ServerWait};
 use super::frame_log::FrameLog;
+use super::painter::Painter;
 use super::picture_watch::PictureWatch;
 use super::priority;
-use super::render_thread::{RenderThread, image_hash};
+use super::render_thread::image_hash;
 use crate::cave::endpoints::FacetEndpoint;
 use crate::cave::facet_report::Reporter;
 use crate::failure::Failure;
 use std::time::Duration;
 use tumble::net::sync::{EndReason, Facet, SessionError, Task};
-use tumble::render::Image;
+use tumble::render::{CalibrationPattern, Image};
 
 /// Pause while the frame log has no room for another frame.
 const LOG_FULL_PAUSE: Duration = Duration::from_millis(5);
@@ -18,7 +19,7 @@ const LOG_FULL_PAUSE: Duration = Duration::from_millis(5);
 /// A facet that is connected or looks for its server.
 pub struct FacetRunner {
     pub facet: Facet<FacetEndpoint>,
-    render_thread: Option<RenderThread>,
+    painter: Option<Painter>,
     pub log: Option<FrameLog>,
     burn_in: bool,
     control: FacetControl,
@@ -47,7 +48,7 @@ impl FacetRunner {
     /// Creates a facet that has drawn nothing.
     pub fn new(
         facet: Facet<FacetEndpoint>,
-        render_thread: Option<RenderThread>,
+        painter: Option<Painter>,
         log: Option<FrameLog>,
         burn_in: bool,
         control: FacetControl,
@@ -57,7 +58,7 @@ impl FacetRunner {
         let server_wait = ServerWait::default();
         FacetRunner {
             facet,
-            render_thread,
+            painter,
             log,
             burn_in,
             control,
@@ -109,6 +110,11 @@ impl FacetRunner {
         self.log.is_some() || self.watch.as_ref().is_some_and(PictureWatch::is_due)
     }
 
+    /// Returns the calibration pattern to show instead of the scene.
+    pub fn pattern(&self) -> Option<CalibrationPattern> {
+        self.control.pattern()
+    }
+
     /// Returns the number of whole seconds without a server.
     pub fn server_wait_s(&self) -> u64 {
         self.server_wait.elapsed().as_secs()
@@ -116,7 +122,7 @@ impl FacetRunner {
 
     /// Draws into memory, or nothing, until the end.
     pub fn run_offscreen(&mut self) -> Result<(), Failure> {
-        self.prepared(self.render_thread.as_ref().is_some_and(RenderThread::is_software));
+        self.prepared(self.painter.as_ref().is_some_and(Painter::is_software));
         while let Some(task) = self.next(if self.drawing.is_some() { Duration::ZERO } else { POLL_INTERVAL })? {
             match task {
                 // a started picture is finished first, even if no frame waits for it any more
@@ -134,9 +140,10 @@ impl FacetRunner {
     fn draw(&mut self) -> Result<(), Failure> {
         let Some(frame) = self.facet.begin() else { return Ok(()) };
         let time_s = self.facet.world().time();
-        match &mut self.render_thread {
-            Some(render_thread) => {
-                render_thread.begin(self.facet.world(), self.facet.viewer(), self.burn_in.then_some(frame))?;
+        match &mut self.painter {
+            Some(painter) => {
+                let pattern = self.control.pattern();
+                painter.begin(self.facet.world(), self.facet.viewer(), frame, self.burn_in, pattern)?;
                 self.drawing = Some((frame, time_s));
                 Ok(())
             }
@@ -145,11 +152,11 @@ impl FacetRunner {
     }
 
     fn poll_picture(&mut self) -> Result<(), Failure> {
-        let (Some(render_thread), Some((frame, time_s))) = (&mut self.render_thread, self.drawing) else {
+        let (Some(painter), Some((frame, time_s))) = (&mut self.painter, self.drawing) else {
             return Ok(());
         };
-        match render_thread.finished(POLL_INTERVAL)? {
-            Some(image) => self.drawn(frame, time_s, Some(image)),
+        match painter.finished(POLL_INTERVAL)? {
+            Some(image) => self.drawn(frame, time_s, image),
             None => Ok(()),
         }
     }
@@ -167,6 +174,7 @@ impl FacetRunner {
 
     /// Reports and logs a shown frame.
     pub fn present(&mut self, frame: u64) -> Result<(), Failure> {
+        self.painter.iter_mut().for_each(|painter| painter.present(frame));
         self.facet.presented().map_err(failed)?;
         let shown = self.facet.session().shown();
         let Some(drawn) = self.picture.take().filter(|d| d.frame == frame) else { return Ok(()) };

@@ -17,7 +17,8 @@ use tumble::net::sync::{Input, Task, WaitReason};
 use tumble::render::winit::event::{ElementState, MouseButton, WindowEvent};
 use tumble::render::winit::keyboard::{KeyCode, PhysicalKey};
 use tumble::render::{
-    DebugDraw, DrawList, Drawing, Next, Quality, Screen, WindowApp, WindowOptions, caption, run_window,
+    DebugDraw, DrawList, Drawing, Image, Next, Quality, Screen, WindowApp, WindowOptions, caption,
+    finished_calibration_picture, run_window,
 };
 use tumble::scene::cave::{Facet, Output};
 
@@ -77,6 +78,7 @@ impl WindowSetup {
             sequence: 0,
             warned: None,
             ended: false,
+            pattern: None,
             probe,
         };
         run_window(&options, &mut window)
@@ -99,6 +101,8 @@ struct Window<'a> {
     /// Number of seconds without a server in the last warning.
     warned: Option<u64>,
     ended: bool,
+    /// The calibration pattern of the next picture.
+    pattern: Option<Image>,
     /// Keeps the desktop from resetting until the window is open.
     probe: Option<Probe>,
 }
@@ -115,9 +119,14 @@ impl Window<'_> {
         };
         apply_viewer(view, viewer);
         self.window_setup.view_mode.draw(screen, &self.list)?;
+        self.pattern = match (&self.window_setup.view_mode, self.runner.pattern()) {
+            (ViewMode::Facet(view, facet), Some(pattern)) => Some(finished_calibration_picture(view, facet, pattern)),
+            _ => None,
+        };
         // a frame is drawn when the device has finished; it is read back only for the log, and for
         // the console once a second
         let image = match self.runner.wants_picture() {
+            true if self.pattern.is_some() => self.pattern.clone(),
             true => Some(screen.renderer().read()?),
             false => screen.renderer().wait().map(|()| None)?,
         };
@@ -125,7 +134,9 @@ impl Window<'_> {
     }
 
     fn present(&mut self, screen: &mut Screen, frame: u64) -> Result<(), Failure> {
-        screen.set_caption(self.burn_in.then(|| burn_in::strip(screen.size_px()[0], frame)));
+        // a pattern covers the picture
+        let number = self.burn_in.then(|| burn_in::strip(screen.size_px()[0], frame));
+        screen.set_caption(self.pattern.take().or(number));
         self.warned = None;
         // a hidden window shows nothing and must not delay the others
         screen.show()?;

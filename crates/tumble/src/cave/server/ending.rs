@@ -18,12 +18,12 @@ impl RunLoop<'_> {
         let wall_s = self.began.elapsed().as_secs_f64();
         let session = self.server.end().map_err(failed);
         let recorded = self.recorder.finish(self.options.quiet);
-        let first = self.summary(wall_s, &self.written(processes));
+        let first = self.summary(wall_s, processes);
         let mut summed = first.as_ref().map_or(Ok(()), |summary| self.write_summary(summary));
         let ended = processes.end(self.frames > 0);
-        match self.summary(wall_s, &self.written(processes)) {
+        match self.summary(wall_s, processes) {
             Some(last) => {
-                if self.writes_frames() && summed.is_ok() {
+                if (self.writes_frames() || self.serves_browsers()) && summed.is_ok() {
                     summed = self.write_summary(&last);
                 }
                 if summed.is_err() {
@@ -44,6 +44,11 @@ impl RunLoop<'_> {
         self.launcher.is_some_and(|launcher| launcher.draw.frames_dir.is_some() || launcher.draw.log_dir.is_some())
     }
 
+    /// Returns whether facets of this launcher are served to browsers.
+    fn serves_browsers(&self) -> bool {
+        self.launcher.is_some_and(|launcher| launcher.web.web.is_some())
+    }
+
     /// Returns by slot how many frames have been written; `None` where that is unknown.
     fn written(&self, processes: &FacetProcesses) -> Vec<Option<u64>> {
         match self.writes_frames() {
@@ -53,7 +58,9 @@ impl RunLoop<'_> {
     }
 
     /// Returns the summary, if there was a frame.
-    fn summary(&self, wall_s: f64, written: &[Option<u64>]) -> Option<Summary> {
+    fn summary(&self, wall_s: f64, processes: &FacetProcesses) -> Option<Summary> {
+        let mut facets = self.metrics.facets(&self.server, &self.slots, self.frames, &self.written(processes));
+        (0..).zip(&mut facets).for_each(|(k, facet)| facet.browsers = processes.report_of(k).browsers);
         (self.frames > 0).then(|| Summary {
             scene: self.scene.clone(),
             cave: self.cave.file.clone(),
@@ -78,7 +85,7 @@ impl RunLoop<'_> {
             sound: self.sound.as_ref().map(|sound| sound.counts),
             heads_rejected: self.simulation.users.heads_rejected,
             unknown_peers: refused(&self.server.unknown_peers()),
-            facets: self.metrics.facets(&self.server, &self.slots, self.frames, written),
+            facets,
         })
     }
 

@@ -3,8 +3,11 @@
 use crate::cave::address::{ServerAddress, address_towards};
 use crate::cave::args::{CaveOptions, ComputeKind, ServeOptions, TransportKind};
 use crate::cave::run_setup::PREVIEW;
+use crate::failure::Failure;
+use std::collections::BTreeMap;
+use std::net::SocketAddr;
 use tumble::net::sync::FacetSlot;
-use tumble::scene::cave::{Cave, Node};
+use tumble::scene::cave::{Cave, Facet, Node};
 
 /// Returns the facet slots of a run: all facets, or the preview alone.
 pub fn slots(cave: &Cave, preview: bool) -> Vec<FacetSlot> {
@@ -40,8 +43,37 @@ pub fn launch(node: &Node, facet: &str, arguments: &[String]) -> Vec<String> {
     node.launch.iter().flat_map(fill).collect()
 }
 
-/// Returns the arguments of a facet's process; `again` for one that is started again.
-pub fn facet_args(launcher: &CaveOptions, name: &str, address: &ServerAddress, again: bool) -> Vec<String> {
+/// Returns the addresses at which facets of this machine serve browsers, by name.
+///
+/// # Errors
+/// A facet of --web-facets that is none of this machine, or a port beyond the last.
+pub fn web_addresses(launcher: &CaveOptions, cave: &Cave) -> Result<BTreeMap<String, SocketAddr>, Failure> {
+    let Some(first) = launcher.web.web else { return Ok(BTreeMap::new()) };
+    let local = |facet: &&Facet| facet.node.is_none_or(|node| cave.nodes[node].is_local());
+    let all: Vec<&str> = cave.facets.iter().filter(local).map(|facet| facet.name.as_str()).collect();
+    let wrong = |what: String| Failure::input(format!("--web {first}: {what}"));
+    if let Some(name) = launcher.web_facets.iter().find(|name| !all.contains(&name.as_str())) {
+        return Err(wrong(format!("no facet of this machine is named {name}; there are {}", all.join(", "))));
+    }
+    let chosen = |name: &&str| launcher.web_facets.is_empty() || launcher.web_facets.iter().any(|one| one == name);
+    let one = |(k, name): (u16, &str)| {
+        // a free port for each
+        let port = if first.port() == 0 { Some(0) } else { first.port().checked_add(k) };
+        let port = port.ok_or_else(|| wrong(format!("no port is left for the facet {name}")))?;
+        Ok((name.to_owned(), SocketAddr::new(first.ip(), port)))
+    };
+    (0..).zip(all.into_iter().filter(chosen)).map(one).collect()
+}
+
+/// Returns the arguments of a facet's process; `web` is the address at which it serves browsers, and
+/// `again` says that it is started again.
+pub fn facet_args(
+    launcher: &CaveOptions,
+    name: &str,
+    address: &ServerAddress,
+    web: Option<&SocketAddr>,
+    again: bool,
+) -> Vec<String> {
     let mut args = vec!["facet".to_owned()];
     args.extend(scene_args(&launcher.serve));
     if name == PREVIEW && launcher.preview {
@@ -57,8 +89,13 @@ pub fn facet_args(launcher: &CaveOptions, name: &str, address: &ServerAddress, a
     let folder = |option: &str, path: &Option<std::path::PathBuf>| {
         path.iter().flat_map(|p| [option.to_owned(), p.display().to_string()]).collect::<Vec<_>>()
     };
-    args.extend(folder("--frames-dir", &draw.frames_dir));
+    // browsers keep their pictures
+    args.extend(folder(if web.is_some() { "--log-dir" } else { "--frames-dir" }, &draw.frames_dir));
     args.extend(folder("--log-dir", &draw.log_dir));
+    if let Some(at) = web {
+        args.extend(["--web".into(), at.to_string(), "--web-timeout".into(), launcher.web.web_timeout.to_string()]);
+        args.extend(folder("--web-key", &launcher.web.web_key));
+    }
     args.extend(draw.quality.iter().flat_map(|q| ["--quality".to_owned(), q.to_string()]));
     args.extend(
         Some(draw.debug_draw.to_string())

@@ -1,14 +1,18 @@
 //! The processes of a run's facets. Those of this machine, and of nodes with a launch command, are
 //! started, monitored and ended. For all others the command line is printed.
 
-use super::facet_commands::{address_for, facet_args, launch, scene_args, shell_quoted, slots};
+use super::facet_commands::{address_for, facet_args, launch, scene_args, shell_quoted, slots, web_addresses};
 use crate::cave::address::ServerAddress;
 use crate::cave::args::{CaveOptions, ServeOptions};
+use crate::cave::facet::PATTERN_MARK;
 use crate::cave::facet_report::{FacetReport, Received, ReportReader};
 use crate::cave::signals::Signals;
+use crate::cave::web::KEY_VARIABLE;
 use crate::failure::Failure;
-use std::collections::VecDeque;
+use rustix::io::ioctl_fionbio;
+use std::collections::{BTreeMap, VecDeque};
 use std::ffi::OsString;
+use std::io::Write;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
@@ -43,6 +47,10 @@ pub struct FacetProcesses {
     restart: bool,
     quiet: bool,
     signals: Signals,
+    /// Key of the links of browsers, if there are any.
+    web_key: Option<String>,
+    /// The calibration pattern that the facets show.
+    pattern: Option<String>,
 }
 
 struct FacetProcess {
@@ -100,11 +108,14 @@ impl FacetProcesses {
         address: &ServerAddress,
         signals: &Signals,
     ) -> Result<FacetProcesses, Failure> {
+        let web = launcher.map_or(Ok(BTreeMap::new()), |launcher| web_addresses(launcher, cave))?;
         let mut processes = FacetProcesses {
             processes: Vec::new(),
             restart: launcher.is_some_and(|l| l.restart),
             quiet: serve.quiet,
             signals: signals.clone(),
+            web_key: launcher.and_then(|launcher| launcher.web.drawn_key.clone()),
+            pattern: None,
         };
         for (k, slot) in slots(cave, launcher.is_some_and(|l| l.preview)).into_iter().enumerate() {
             let remote = cave.facets.get(k).and_then(|f| f.node).map(|n| &cave.nodes[n]).filter(|n| !n.is_local());
@@ -120,14 +131,17 @@ impl FacetProcesses {
                 (Some(launcher), None) => {
                     let program = std::env::current_exe().map_err(|e| Failure::run("starting a facet", e))?;
                     let command = |again| {
-                        let words = facet_args(launcher, &slot.name, address, again).into_iter().map(OsString::from);
+                        let words = facet_args(launcher, &slot.name, address, web.get(&slot.name), again)
+                            .into_iter()
+                            .map(OsString::from);
                         std::iter::once(program.clone().into_os_string()).chain(words).collect()
                     };
                     processes.processes.push(FacetProcess::new(k, &slot.name, command));
                 }
                 (Some(launcher), Some(node)) if !node.launch.is_empty() => {
                     let server = server_address.as_ref().unwrap_or(address);
-                    let words = |again| launch(node, &slot.name, &facet_args(launcher, &slot.name, server, again));
+                    let words =
+                        |again| launch(node, &slot.name, &facet_args(launcher, &slot.name, server, None, again));
                     processes.report(&format!(
                         "facet {}: starting it on {}: {}",
                         slot.name,
@@ -288,6 +302,23 @@ impl FacetProcesses {
         self.processes.iter().filter_map(of).collect()
     }
 
+    /// Has all facets show a calibration pattern, or `off` for the scene. A facet that is started again
+    /// shows it too.
+    pub fn show_pattern(&mut self, name: &str) {
+        self.pattern = Some(name.to_owned()).filter(|name| name != "off");
+        self.processes.iter_mut().for_each(|process| process.tell_pattern(name));
+    }
+
+    /// Returns the calibration pattern that the facets show.
+    pub fn pattern(&self) -> Option<&str> {
+        self.pattern.as_deref()
+    }
+
+    /// Returns whether this process has started a facet.
+    pub fn any(&self) -> bool {
+        !self.processes.is_empty()
+    }
+
     /// Returns the last report of the facet in a slot; an empty one if this process did not start it.
     pub fn report_of(&self, slot: FacetNumber) -> FacetReport {
         let process = self.processes.iter().find(|process| process.slot == slot);
@@ -313,13 +344,17 @@ impl FacetProcesses {
         let mut command = Command::new(&words[0]);
         // a group of its own, because Ctrl-C is for the launcher, which ends the run in order
         command.args(&words[1..]).stdin(Stdio::piped()).stdout(Stdio::piped()).process_group(0);
+        command.envs(self.web_key.iter().map(|key| (KEY_VARIABLE, key)));
         let failed = |e: std::io::Error| Failure::run(&format!("starting facet {}", process.name), e);
         let mut child = command.spawn().map_err(failed)?;
         self.signals.started(child.id());
+        // a facet that does not read must not stop the run
+        child.stdin.iter().try_for_each(|pipe| ioctl_fionbio(pipe, true)).map_err(|e| failed(e.into()))?;
         let reports = child.stdout.take().map(ReportReader::start).transpose();
         process.written_before = process.written();
         (process.child, process.began, process.ended, process.fault) = (Some(child), Some(Instant::now()), None, None);
         process.reports = reports.map_err(|e| Failure::run(&format!("starting facet {}", process.name), e))?;
+        self.pattern.iter().for_each(|name| process.tell_pattern(name));
         Ok(())
     }
 
@@ -360,6 +395,13 @@ impl FacetProcess {
             fault: None,
             restarts: VecDeque::new(),
         }
+    }
+
+    /// Writes a line into the pipe to the facet. A full pipe takes none.
+    fn tell_pattern(&mut self, name: &str) {
+        let pipe = self.child.as_mut().and_then(|child| child.stdin.as_mut());
+        // a facet that has ended shows nothing
+        pipe.into_iter().for_each(|pipe| _ = pipe.write_all(format!("{PATTERN_MARK}{name}\n").as_bytes()));
     }
 
     fn received(&self) -> Received {

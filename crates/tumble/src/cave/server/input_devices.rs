@@ -3,22 +3,27 @@
 
 use crate::cave::args::ServeOptions;
 use crate::cave::endpoints::key;
+use crate::cave::gamepad::{Gamepad, user_of};
 use crate::cave::replay::replayed_input::{self, ReplayedInput};
 use crate::cave::tracker::osc;
 use crate::cave::tracker::socket::{TrackerSocket, configured};
 use crate::cave::tracker::vrpn_client::VrpnClient;
 use crate::failure::Failure;
+use std::time::Instant;
 use tumble::net::sync::transport::FacetNumber;
 use tumble::net::sync::{FrameRecord, Input};
 use tumble::scene::cave::{Cave, Tracker};
 
 /// Source number of the tracker; no facet has it.
 pub const TRACKER_SOURCE: FacetNumber = FacetNumber::MAX;
+/// Source number of the gamepad.
+const GAMEPAD_SOURCE: FacetNumber = FacetNumber::MAX - 3;
 
 /// All input devices of a run.
 pub struct InputDevices {
     tracker: Option<TrackerSocket>,
     vrpn: Option<VrpnClient>,
+    gamepad: Option<Gamepad>,
     replayed_input: Option<ReplayedInput>,
 }
 
@@ -33,22 +38,29 @@ impl InputDevices {
         let key = key(cave)?;
         let replayed_input = options.replay_input.as_ref().map(|path| ReplayedInput::open(path, scene)).transpose()?;
         let live = replayed_input.is_none() && simulating;
-        let wanted =
-            configured(cave, options.tracker, &options.tracker_from)?.filter(|_| live && options.vrpn.is_none());
+        let about = cave.tracker.clone().unwrap_or_else(|| Tracker::of(&cave.users));
+        // the command line's tracker takes the place of the cave file's
+        let vrpn = match (&options.vrpn, &about.vrpn) {
+            (Some(server), _) => Some((server, &options.vrpn_map)),
+            (None, Some(server)) if options.tracker.is_none() => Some((server, &about.vrpn_map)),
+            _ => None,
+        };
+        let gamepad = options.gamepad.as_ref().map(|name| user_of(name, &cave.users)).transpose()?;
+        let gamepad = gamepad.filter(|_| live).map(|user| Gamepad::new(user, options.quiet));
+        let wanted = configured(cave, options.tracker, &options.tracker_from)?.filter(|_| live && vrpn.is_none());
         let open = |tracker| TrackerSocket::open(tracker, key.as_ref(), options.smoothing());
         let tracker = wanted.as_ref().map(open).transpose()?;
-        let vrpn = |server: &String| {
-            let about = cave.tracker.clone().unwrap_or_else(|| Tracker::of(&cave.users));
-            VrpnClient::open(server, &options.vrpn_map, &about, options.smoothing(), options.quiet)
+        let connect = |(server, maps): (&String, &Vec<_>)| {
+            VrpnClient::open(server, maps, &about, options.smoothing(), options.quiet)
         };
-        let vrpn = options.vrpn.as_ref().filter(|_| live).map(vrpn).transpose()?;
+        let vrpn = vrpn.filter(|_| live).map(connect).transpose()?;
         if let (Some(socket), Some(tracker), false) = (&tracker, &wanted, options.quiet) {
             eprintln!("{}", socket.describe(tracker));
         }
         if let (Some(path), false) = (&options.replay_input, options.quiet) {
             eprintln!("input: replayed from {}; live input of windows and trackers is ignored", path.display());
         }
-        Ok(InputDevices { tracker, vrpn, replayed_input })
+        Ok(InputDevices { tracker, vrpn, gamepad, replayed_input })
     }
 
     /// Returns whether input of facets is used.
@@ -61,10 +73,13 @@ impl InputDevices {
         self.replayed_input.as_ref().is_some_and(ReplayedInput::is_over)
     }
 
-    /// Returns the tracker's inputs since the last frame.
-    pub fn tracker_inputs(&self) -> Vec<(FacetNumber, Input)> {
-        let inputs = self.tracker.iter().flat_map(TrackerSocket::inputs);
-        inputs.chain(self.vrpn.iter().flat_map(VrpnClient::inputs)).map(|input| (TRACKER_SOURCE, input)).collect()
+    /// Returns the inputs of tracker and gamepad since the last frame.
+    pub fn inputs(&mut self) -> Vec<(FacetNumber, Input)> {
+        let tracked = self.tracker.iter().flat_map(TrackerSocket::inputs);
+        let tracked = tracked.chain(self.vrpn.iter().flat_map(VrpnClient::inputs)).map(|input| (TRACKER_SOURCE, input));
+        let now = Instant::now();
+        let held = self.gamepad.iter_mut().filter_map(|gamepad| gamepad.input(now));
+        tracked.chain(held.map(|input| (GAMEPAD_SOURCE, input))).collect()
     }
 
     /// Returns the recorded inputs from this frame to the next. `simulated` is called only if there

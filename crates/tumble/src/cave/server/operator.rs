@@ -5,26 +5,30 @@ use super::facet_processes::FacetProcesses;
 use super::recording::Target;
 use super::serve::RunLoop;
 use crate::cave::console::{Asked, Console, ConsoleStatus, FacetStatus};
+use crate::cave::replay::frames::Replay;
 use crate::cave::simulation::{OPERATOR_SOURCE, Request};
 use crate::failure::Failure;
 use crate::recording_file::NamedBy;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tumble::net::control::Action;
 use tumble::net::sync::Membership;
 use tumble::net::sync::transport::FacetNumber;
+use tumble::render::CalibrationPattern;
 
 /// Interval at which consoles see a new state.
 const INTERVAL: Duration = Duration::from_millis(200);
 
 /// How far the operator's wish ends a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Wish {
     /// Not at all.
     #[default]
     GoOn,
     /// This scene.
     NextScene,
+    /// This scene, for a replay of this recording.
+    Replay(PathBuf),
     /// All scenes.
     Stop,
 }
@@ -54,7 +58,7 @@ impl<'a> Operator<'a> {
 
 impl RunLoop<'_> {
     /// Does what the console asks, and shows the state of the run.
-    pub fn operate(&mut self, processes: &FacetProcesses) -> Result<(), Failure> {
+    pub fn operate(&mut self, processes: &mut FacetProcesses) -> Result<(), Failure> {
         let Some(console) = self.operator.console else { return Ok(()) };
         for (slot, lines, picture) in processes.messages() {
             let name = self.slots.get(slot as usize).map_or("", |slot| slot.name.as_str());
@@ -62,7 +66,7 @@ impl RunLoop<'_> {
             picture.into_iter().for_each(|png| console.set_picture(name, png));
         }
         while let Some(asked) = console.next() {
-            self.perform(console, asked)?;
+            self.perform(console, asked, processes)?;
         }
         if self.operator.shown.0.elapsed() >= INTERVAL {
             let status = self.console_status(processes);
@@ -71,7 +75,7 @@ impl RunLoop<'_> {
         Ok(())
     }
 
-    fn perform(&mut self, console: &Console, asked: Asked) -> Result<(), Failure> {
+    fn perform(&mut self, console: &Console, asked: Asked, processes: &mut FacetProcesses) -> Result<(), Failure> {
         let done = match &asked.action {
             Action::Pause => self.request(Request::Pause, "paused")?,
             Action::Resume => self.request(Request::Resume, "time goes on")?,
@@ -87,10 +91,12 @@ impl RunLoop<'_> {
             }
             Action::Record(file) => self.start_recording(file),
             Action::Unrecord => self.end_recording(),
+            Action::Replay(file) => self.replay(Path::new(file)),
+            Action::Pattern(name) => show_pattern(name, processes),
             Action::Page | Action::Status | Action::Log | Action::Picture(_) => Err("is read without the run".into()),
         };
         let (Ok(said) | Err(said)) = &done;
-        console.log(&format!("console: {}: {said}", asked.action.request().1));
+        console.log(&format!("console: {}: {said}", asked.action.word()));
         asked.answer(done);
         Ok(())
     }
@@ -116,6 +122,20 @@ impl RunLoop<'_> {
         let text = |failure: Failure| failure.report().trim().to_owned();
         self.recorder.start(&target, &self.scene, self.hash, &self.simulation.world, self.signals).map_err(text)?;
         Ok(format!("recording {file}"))
+    }
+
+    /// Ends the scene for a replay of a recording, if it is one of this scene.
+    fn replay(&mut self, file: &Path) -> Result<String, String> {
+        if self.recorder.file().is_some() {
+            return Err("a recording is in progress; end it first".into());
+        }
+        let writes = self.launcher.is_some_and(|l| l.draw.frames_dir.is_some() || l.draw.log_dir.is_some());
+        if writes || self.options.summary.is_some() || self.options.replay_input.is_some() {
+            return Err("a run with --frames-dir, --log-dir, --summary or --replay-input replays nothing else".into());
+        }
+        Replay::open(file, self.hash).map_err(|failure| failure.report().trim().to_owned())?;
+        self.operator.wish = Wish::Replay(file.to_owned());
+        Ok(format!("replaying {}; then the scene begins again", file.display()))
     }
 
     fn end_recording(&mut self) -> Result<String, String> {
@@ -154,6 +174,7 @@ impl RunLoop<'_> {
                 black: report.black,
                 black_now: report.black_now,
                 image: report.image,
+                browsers: report.browsers,
                 first_difference: self.metrics.difference(k),
             }
         };
@@ -170,6 +191,8 @@ impl RunLoop<'_> {
             skew_ms: median(&self.metrics.skew),
             input_to_picture_ms: median(&self.metrics.input),
             paused: self.simulation.is_paused(),
+            pattern: processes.pattern().map(str::to_owned),
+            replaying: self.replay.is_some(),
             recording: self.recorder.file().map(|file| file.display().to_string()),
             alarms: facets.iter().flat_map(FacetStatus::alarms).collect(),
             facets,
@@ -178,4 +201,16 @@ impl RunLoop<'_> {
         self.operator.shown = (Instant::now(), frame, shown);
         status
     }
+}
+
+/// Has the facets of this launcher show a calibration pattern, or the scene again.
+fn show_pattern(name: &str, processes: &mut FacetProcesses) -> Result<String, String> {
+    if name != "off" {
+        name.parse::<CalibrationPattern>().map_err(|why| format!("no pattern is named {name}: {why}, or off"))?;
+    }
+    if !processes.any() {
+        return Err("this process started no facets (tumble serve); tumble cave shows patterns".into());
+    }
+    processes.show_pattern(name);
+    Ok(if name == "off" { "the facets show the scene".into() } else { format!("the facets show the pattern {name}") })
 }

@@ -16,6 +16,7 @@ use crate::cave::signals::Signals;
 use crate::cave::simulation::{CaveSimulation, OPERATOR_SOURCE, PACE_SOURCE};
 use crate::divergence;
 use crate::failure::Failure;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tumble::net::sync::transport::FacetNumber;
 use tumble::net::sync::{FacetSlot, FrameInputs, Input, Server, ServerEvent, SessionError};
@@ -30,10 +31,12 @@ const PREPARATION_TIMEOUT: Duration = Duration::from_secs(300);
 const SLOW_START: Duration = Duration::from_secs(5);
 
 /// How much is over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Over {
     /// A scene: another one may follow.
     Scene,
+    /// A scene, for a replay of this recording.
+    Replay(PathBuf),
     Run,
 }
 
@@ -144,6 +147,9 @@ impl<'a> RunLoop<'a> {
             if over || self.operator.wish == Wish::NextScene {
                 return Ok(Over::Scene);
             }
+            if let Wish::Replay(file) = &self.operator.wish {
+                return Ok(Over::Replay(file.clone()));
+            }
             if self.operator.wish == Wish::Stop || self.signals.stop_requested() || !self.check_processes(processes)? {
                 return Ok(Over::Run);
             }
@@ -243,8 +249,8 @@ impl<'a> RunLoop<'a> {
         if recorded.is_none() && frame > 0 {
             // inputs since the last frame take effect in this one
             self.take_events()?;
-            let tracked = self.input_devices.tracker_inputs();
-            tracked.into_iter().try_for_each(|(from, input)| self.take_input(from, input))?;
+            let held = self.input_devices.inputs();
+            held.into_iter().try_for_each(|(from, input)| self.take_input(from, input))?;
             if let Some(pace) = self.pace(steps) {
                 self.take_input(PACE_SOURCE, pace)?;
             }
@@ -273,7 +279,8 @@ impl<'a> RunLoop<'a> {
         let replayed_input = self.input_devices.after(|| session.recorded(false))?;
         replayed_input.into_iter().try_for_each(|(from, input)| self.take_input(from, input))?;
         self.take_events()?;
-        self.status.at(&self.server, &self.slots, &self.metrics, frame, self.time_s);
+        let browsers = |facet| processes.report_of(facet).browsers;
+        self.status.at(&self.server, &self.slots, &self.metrics, frame, self.time_s, browsers);
         Ok(true)
     }
 

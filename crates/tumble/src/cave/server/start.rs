@@ -7,7 +7,7 @@ use super::outputs;
 use super::serve::{Over, RunLoop};
 use crate::args::SceneOptions;
 use crate::cave::address::{RunKey, ServerAddress};
-use crate::cave::args::{CaveOptions, ComputeKind, ServeOptions, TransportKind};
+use crate::cave::args::{CaveOptions, ComputeKind, ServeOptions, TransportKind, WebOptions};
 use crate::cave::console::{Console, read_token};
 use crate::cave::endpoints::{ServerEndpoint, idle_timeout, key, timing};
 use crate::cave::lock::{ConsoleLink, RunInfo, RunLock};
@@ -15,6 +15,7 @@ use crate::cave::replay::frames::Replay;
 use crate::cave::run_setup::{Role, RunSetup};
 use crate::cave::signals::Signals;
 use crate::cave::simulation::CaveSimulation;
+use crate::cave::web::new_key;
 use crate::failure::Failure;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::Path;
@@ -30,6 +31,8 @@ use tumble::scene::cave::{Cave, Mode};
 pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Option<&Path>) -> Result<(), Failure> {
     let signals = Signals::watch()?;
     outputs::check_scenes(options, launcher, recording.is_some())?;
+    let launcher = launcher.map(with_key).transpose()?;
+    let launcher = launcher.as_ref();
     let link = console_link(options)?;
     let console = link.clone().map(|link| Console::open(link.address, link.token)).transpose()?;
     let link = link.zip(console.as_ref()).map(|(link, console)| ConsoleLink { address: console.address(), ..link });
@@ -41,12 +44,29 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
         let name = k.checked_sub(1).map_or(&options.scene.name, |k| &options.then[k]).clone();
         let scene = SceneOptions { name, ..options.scene.clone() };
         let options = ServeOptions { scene, ..options.clone() };
-        let operator = Operator::new(console.as_ref(), k < options.then.len());
-        if run_scene(&options, launcher, recording, &signals, operator, link.clone())? == Over::Run {
+        let show = |recording: Option<&Path>| {
+            let operator = Operator::new(console.as_ref(), k < options.then.len());
+            run_scene(&options, launcher, recording, &signals, operator, link.clone())
+        };
+        let mut over = show(recording)?;
+        // the operator's replays; after each the scene begins again
+        while let Over::Replay(file) = over {
+            over = match show(Some(&file))? {
+                Over::Scene => show(recording)?,
+                other => other,
+            };
+        }
+        if over == Over::Run {
             break;
         }
     }
     Ok(())
+}
+
+/// Draws the key of the links of browsers, if there are any.
+fn with_key(launcher: &CaveOptions) -> Result<CaveOptions, Failure> {
+    let drawn_key = launcher.web.web.map(|_| new_key()).transpose()?;
+    Ok(CaveOptions { web: WebOptions { drawn_key, ..launcher.web.clone() }, ..launcher.clone() })
 }
 
 /// Returns address and token of the console, if the run has one.

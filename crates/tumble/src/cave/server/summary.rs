@@ -4,6 +4,7 @@
 use super::contact_sound;
 use super::histogram::{Histogram, Quantiles};
 use crate::cave::endpoints::ServerEndpoint;
+use crate::cave::facet_report::BrowserReport;
 use crate::cave::replay::frames::Counts;
 use crate::cave::replay::replayed_input;
 use crate::cave::tracker::osc;
@@ -110,6 +111,8 @@ pub struct FacetSummary {
     pub not_written: Option<u64>,
     /// With `--compute everywhere`: the first frame in which its state was another one.
     pub first_difference: Option<Difference>,
+    /// The web browsers that showed it, if it was served to browsers.
+    pub browsers: Option<BrowserReport>,
     pub draw: Quantiles,
     pub bytes_out: u64,
     pub bytes_in: u64,
@@ -199,6 +202,7 @@ impl Metrics {
                 not_written: written.map(|written| self.shown[k].1.saturating_sub(written)),
                 counts,
                 first_difference: self.differences[k].clone(),
+                browsers: None,
                 draw: self.draw[k].quantiles(),
                 bytes_out: link.bytes_out,
                 bytes_in: link.bytes_in,
@@ -254,15 +258,15 @@ impl Summary {
         if self.heads_rejected > 0 {
             text += &format!("{} head poses rejected: an eye would be behind a screen\n", self.heads_rejected);
         }
-        for FacetSummary { name, counts: c, not_shown, not_written, refused_packets, first_difference, .. } in
-            &self.facets
-        {
+        for facet in &self.facets {
+            let FacetSummary { name, counts: c, not_shown, not_written, refused_packets, first_difference, .. } = facet;
+            let browsers = facet.browsers.map_or(String::new(), |b| format!("; {b}"));
             let differs = first_difference
                 .as_ref()
                 .map_or(String::new(), |d| format!(", DIFFERS from frame {} in {}", d.frame, d.object));
             let lost = not_written.filter(|n| *n > 0).map_or(String::new(), |n| format!(", {n} NOT WRITTEN"));
             text += &format!(
-                "facet {name}: {} shown, {not_shown} not shown{lost}{differs}, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times{}\n",
+                "facet {name}: {} shown, {not_shown} not shown{lost}{differs}, {} late, {} missing, {} duplicate, {} stale, {} torn, {} mismatched, dropped {} times{}{browsers}\n",
                 c.presented,
                 c.late,
                 c.missing,
@@ -337,6 +341,7 @@ impl Status {
         metrics: &Metrics,
         frame: u64,
         time_s: f64,
+        browsers: impl Fn(FacetNumber) -> Option<BrowserReport>,
     ) {
         let passed = self.since.elapsed();
         let every = if self.terminal { EVERY / 5 } else { EVERY };
@@ -366,11 +371,12 @@ impl Status {
             let differs =
                 metrics.differences[k].as_ref().map_or(String::new(), |d| format!(", DIFFERS from frame {}", d.frame));
             text += &format!(
-                "\x1b[K  {:<12} {membership:<8} frame {last}, {:.1} frames/s, {} late, dropped {} times, drawn in {took_ms:.2} ms{differs}\n",
+                "\x1b[K  {:<12} {membership:<8} frame {last}, {:.1} frames/s, {} late, dropped {} times, drawn in {took_ms:.2} ms{differs}{}\n",
                 slot.name,
                 per_s(counts.presented, self.shown[k]),
                 counts.late + counts.missing,
-                counts.dropped
+                counts.dropped,
+                browsers(k as FacetNumber).map_or(String::new(), |b| format!("; {b}"))
             );
             self.shown[k] = counts.presented;
         }

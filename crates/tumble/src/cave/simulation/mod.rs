@@ -8,7 +8,7 @@ mod users;
 
 use super::run_setup::RunSetup;
 use crate::failure::Failure;
-pub use users::{PACE_SOURCE, Users};
+pub use users::{PACE_SOURCE, Users, key};
 
 use tumble::dynamics::World;
 use tumble::net::sync::transport::FacetNumber;

@@ -28,7 +28,7 @@ const INPUT_TIMEOUT_S: f64 = 1.0;
 const MIN_EYE_DISTANCE_M: f64 = 0.02;
 
 /// Keys by USB HID usage.
-mod key {
+pub mod key {
     pub const A: u16 = 0x04;
     pub const B: u16 = 0x05;
     pub const D: u16 = 0x07;

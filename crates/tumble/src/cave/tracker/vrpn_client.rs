@@ -12,13 +12,12 @@ use crate::failure::Failure;
 use rosc::{OscMessage, OscType};
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
-use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tumble::net::sync::Input;
-use tumble::scene::cave::Tracker;
+use tumble::scene::cave::{DeviceMap, Tracker};
 
 /// Time to connect and to be greeted.
 const GREETING_TIMEOUT: Duration = Duration::from_secs(3);
@@ -26,39 +25,6 @@ const GREETING_TIMEOUT: Duration = Duration::from_secs(3);
 const RETRY_INTERVAL: Duration = Duration::from_secs(1);
 /// Largest number of buttons of a user.
 const MAX_BUTTONS: i32 = 32;
-const PARTS: [&str; 5] = ["head", "wand", "hand/left", "hand/right", "buttons"];
-
-/// The part that a device of the server moves: `DEVICE:SENSOR=USER/PART`.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct DeviceMap {
-    /// Name of the device.
-    pub device: String,
-    /// Number of the sensor; of buttons not used.
-    pub sensor: i32,
-    /// User of the cave.
-    pub user: String,
-    /// `head`, `wand`, `hand/left`, `hand/right` or `buttons`.
-    pub part: String,
-}
-
-impl FromStr for DeviceMap {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<DeviceMap, String> {
-        let expected =
-            || format!("expected DEVICE=USER/PART or DEVICE:SENSOR=USER/PART with a PART of {}", PARTS.join(", "));
-        let (from, to) = text.split_once('=').ok_or_else(expected)?;
-        let (user, part) = to.split_once('/').ok_or_else(expected)?;
-        let (device, sensor) = match from.rsplit_once(':') {
-            Some((device, sensor)) => (device, sensor.parse().map_err(|_| expected())?),
-            None => (from, 0),
-        };
-        match !device.is_empty() && !user.is_empty() && PARTS.contains(&part) {
-            true => Ok(DeviceMap { device: device.into(), sensor, user: user.into(), part: part.into() }),
-            false => Err(expected()),
-        }
-    }
-}
 
 /// A connection to a server and its thread.
 pub struct VrpnClient {

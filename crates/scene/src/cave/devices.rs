@@ -1,0 +1,37 @@
+//! Devices of a VRPN server and what they move: words of `[tracker]` and of `--vrpn-map`.
+
+use std::str::FromStr;
+
+const PARTS: [&str; 5] = ["head", "wand", "hand/left", "hand/right", "buttons"];
+
+/// The part that a device of the server moves: `DEVICE:SENSOR=USER/PART`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DeviceMap {
+    /// Name of the device.
+    pub device: String,
+    /// Number of the sensor; of buttons not used.
+    pub sensor: i32,
+    /// User, by its name at the tracker.
+    pub user: String,
+    /// `head`, `wand`, `hand/left`, `hand/right` or `buttons`.
+    pub part: String,
+}
+
+impl FromStr for DeviceMap {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<DeviceMap, String> {
+        let expected =
+            || format!("expected DEVICE=USER/PART or DEVICE:SENSOR=USER/PART with a PART of {}", PARTS.join(", "));
+        let (from, to) = text.split_once('=').ok_or_else(expected)?;
+        let (user, part) = to.split_once('/').ok_or_else(expected)?;
+        let (device, sensor) = match from.rsplit_once(':') {
+            Some((device, sensor)) => (device, sensor.parse().map_err(|_| expected())?),
+            None => (from, 0),
+        };
+        match !device.is_empty() && !user.is_empty() && PARTS.contains(&part) {
+            true => Ok(DeviceMap { device: device.into(), sensor, user: user.into(), part: part.into() }),
+            false => Err(expected()),
+        }
+    }
+}

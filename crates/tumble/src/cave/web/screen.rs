@@ -1,0 +1,194 @@
+//! The picture of a facet as browsers draw it: the counterpart of the render thread.
+
+use super::crowd::Crowd;
+use super::link::{Shared, serve};
+use crate::cave::address::address_towards;
+use crate::cave::args::WebOptions;
+use crate::cave::console::read_token;
+use crate::cave::facet::draw_list;
+use crate::cave::facet_report::{BrowserReport, Reporter};
+use crate::cave::listener::Listener;
+use crate::cave::run_setup::{RunSetup, apply_viewer};
+use crate::failure::Failure;
+use std::net::SocketAddr;
+use std::path::Path;
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use tumble::dynamics::World;
+use tumble::net::browser::MIN_KEY_BYTES;
+use tumble::net::sync::Viewer;
+use tumble::net::sync::udp::Entropy;
+use tumble::render::{CaveView, DebugDraw, Drawing, GlslTranslator, PortablePicture, Quality};
+use tumble::scene::cave::{Facet, Flip, Stereo};
+
+/// Environment variable with the key of a run, by which a launcher keeps links when it starts a facet
+/// again. Other users of the machine cannot read it, as they can arguments.
+pub const KEY_VARIABLE: &str = "TUMBLE_WEB_KEY";
+/// Maximum number of connections of a facet at a time.
+const MAX_CONNECTIONS: usize = 24;
+/// Address of documentation (RFC 5737) towards which the route goes that other machines take too.
+const ELSEWHERE: &str = "192.0.2.1";
+
+/// The picture of a facet on browsers.
+pub struct WebScreen {
+    drawing: Drawing,
+    quality: Quality,
+    overlays: DebugDraw,
+    view: CaveView,
+    facet: Facet,
+    glsl: GlslTranslator,
+    shared: Arc<Shared>,
+    _listener: Listener,
+    reported: BrowserReport,
+}
+
+impl WebScreen {
+    /// Serves a facet at an address, and says by which link browsers join.
+    ///
+    /// # Errors
+    /// A facet that a browser cannot show, an address that cannot be used, a key file that cannot be
+    /// read.
+    pub fn open(
+        setup: &RunSetup,
+        facet: &Facet,
+        at: SocketAddr,
+        options: &WebOptions,
+        quality: Option<Quality>,
+        overlays: DebugDraw,
+        reporter: &Reporter,
+    ) -> Result<WebScreen, Failure> {
+        check(setup, facet)?;
+        let key = key(options.web_key.as_deref())?;
+        let timeout = Duration::from_secs_f64(1e-3 * options.web_timeout);
+        let title = format!("facet {}", facet.name);
+        let shared = Arc::new(Shared {
+            key: key.clone(),
+            crowd: Mutex::new(Crowd::new(timeout)),
+            changed: Condvar::new(),
+            reporter: reporter.clone(),
+            title: title.clone(),
+        });
+        let theirs = shared.clone();
+        let listener = Listener::start(at, "web", MAX_CONNECTIONS, move |stream| serve(stream, &theirs))
+            .map_err(|e| Failure::run(&title, format!("--web {at}: {e}")))?;
+        let key = if options.web_key.is_some() { "KEY" } else { &key };
+        let link = format!("http://{}/{key}/", reachable(listener.address()));
+        eprintln!("{title}: open {link} in a browser");
+        reporter.line(&format!("serves browsers at {}", listener.address()));
+        reporter.update(|report| report.browsers = Some(BrowserReport::default()));
+        Ok(WebScreen {
+            drawing: Drawing::new(&setup.scene),
+            // unknown devices: hard shadows, smooth edges
+            quality: quality.unwrap_or(Quality { samples: 4, ..Quality::fast() }),
+            overlays,
+            view: setup.view()?,
+            facet: facet.clone(),
+            glsl: GlslTranslator::new().map_err(|e| Failure::run(&title, e))?,
+            shared,
+            _listener: listener,
+            reported: BrowserReport::default(),
+        })
+    }
+
+    /// Sends a frame to the browsers that have drawn their last.
+    pub fn begin(&mut self, world: &World, viewer: &Viewer, frame: u64) -> Result<(), Failure> {
+        if !self.shared.crowd().is_idle() {
+            return Ok(());
+        }
+        apply_viewer(&mut self.view, viewer);
+        let list = draw_list(&mut self.drawing, world, Some(&self.quality), &self.overlays)?;
+        let failed = |e| Failure::run("drawing", e);
+        let [width, height] = self.facet.size_px;
+        let from = self.view.eye(&self.facet, 0.0).map_err(failed)?.part(width, height, 0);
+        let picture = PortablePicture::new(&list, &from, [width, height]).map_err(failed)?;
+        let glsl = &self.glsl;
+        let refused = self.shared.crowd().begin(frame, Instant::now(), |encoder| encoder.frame(frame, &picture, glsl));
+        if let Some(why) = refused {
+            self.shared.say(why.report().trim());
+        }
+        Ok(())
+    }
+
+    /// Waits at most `timeout` until no browser is awaited for the frame. Returns whether that is so.
+    pub fn is_finished(&mut self, timeout: Duration) -> bool {
+        let until = Instant::now() + timeout;
+        let mut crowd = self.shared.crowd();
+        loop {
+            let now = Instant::now();
+            if crowd.is_drawn(now) {
+                return true;
+            }
+            let left = until.saturating_duration_since(now);
+            if left.is_zero() {
+                return false;
+            }
+            // browsers that say nothing are late by the clock
+            let wait = left.min(Duration::from_millis(10));
+            crowd = self.shared.changed.wait_timeout(crowd, wait).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// Has the browsers show the frame.
+    pub fn present(&mut self, frame: u64) {
+        let mut crowd = self.shared.crowd();
+        crowd.present(frame);
+        let counts = crowd.counts();
+        drop(crowd);
+        if counts != self.reported {
+            self.shared.reporter.update(|report| report.browsers = Some(counts));
+            self.reported = counts;
+        }
+    }
+}
+
+/// Checks that a browser can show a facet: one flat picture as it is.
+fn check(setup: &RunSetup, facet: &Facet) -> Result<(), Failure> {
+    let has = [
+        (!setup.cave.screens[facet.screen].is_flat(), "a curved screen"),
+        (facet.stereo != Stereo::Mono, "stereo"),
+        (facet.flip != Flip::None, "flip"),
+        (facet.warp_file.is_some(), "a warp"),
+        (facet.blend_file.is_some() || facet.black_file.is_some(), "a blend"),
+        (facet.color.is_some(), "a color correction"),
+    ];
+    match has.iter().find(|(has, _)| *has) {
+        None => Ok(()),
+        Some((_, what)) => {
+            let why = format!("has {what}, which browsers do not show; --web-facets names the facets that have none");
+            Err(Failure::input(format!("{}: facet {}: {why}", setup.cave.file, facet.name)))
+        }
+    }
+}
+
+/// Returns the key of the link: of a file, of the launcher, or a new one.
+fn key(file: Option<&Path>) -> Result<String, Failure> {
+    if let Some(file) = file {
+        let key = read_token(file)?;
+        return match key.bytes().all(|b| b.is_ascii_alphanumeric() || b"-_.~".contains(&b)) {
+            true => Ok(key),
+            false => Err(Failure::input(format!(
+                "key file {}: expected letters, digits and -_.~ alone, because the key is part of a link",
+                file.display()
+            ))),
+        };
+    }
+    match std::env::var(KEY_VARIABLE) {
+        Ok(key) if key.len() >= MIN_KEY_BYTES && key.bytes().all(|b| b.is_ascii_alphanumeric()) => Ok(key),
+        _ => new_key(),
+    }
+}
+
+/// Draws a key.
+pub fn new_key() -> Result<String, Failure> {
+    let mut entropy = Entropy::system().map_err(|e| Failure::run("the key of --web", e))?;
+    let bytes: [u8; 32] = entropy.next_bytes();
+    Ok(bytes[..16].iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// Returns the address as another machine reaches it, if it is one of all interfaces.
+fn reachable(at: SocketAddr) -> SocketAddr {
+    match address_towards(ELSEWHERE, at.port()) {
+        Some(ip) if at.ip().is_unspecified() => (ip, at.port()).into(),
+        _ => at,
+    }
+}
