@@ -146,15 +146,12 @@ async function open() {
   };
 }
 
-// `#draw=webgl2` or `#draw=webgpu` in the link chooses; `webgpu-read` puts pictures on a plain canvas.
+// `#draw=webgpu` in the link chooses WebGPU; `webgpu-read` puts its pictures on a plain canvas.
 async function makeBackend(wanted) {
-  if (wanted !== "webgl2" && navigator.gpu) {
-    const adapter = await navigator.gpu.requestAdapter().catch(() => null);
-    // a software adapter draws no better than WebGL
-    if (adapter && (wanted || !(adapter.info && adapter.info.isFallbackAdapter))) return makeWebgpu(canvas, adapter, wanted === "webgpu-read");
-  }
-  if (wanted && wanted !== "webgl2") throw new Error("there is no WebGPU");
-  return makeWebgl(canvas);
+  if (!wanted || !wanted.startsWith("webgpu")) return makeWebgl(canvas);
+  const adapter = navigator.gpu && await navigator.gpu.requestAdapter().catch(() => null);
+  if (!adapter) throw new Error("there is no WebGPU");
+  return makeWebgpu(canvas, adapter, wanted === "webgpu-read");
 }
 
 at("full").onclick = () => document.documentElement.requestFullscreen().catch(() => {});

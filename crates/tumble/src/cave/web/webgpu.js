@@ -46,7 +46,7 @@ async function makeWebgpu(canvas, adapter, reads) {
   const copyModule = device.createShaderModule({ code: COPY_WGSL });
   const copy = await device.createRenderPipelineAsync({ layout: "auto", vertex: { module: copyModule }, fragment: { module: copyModule, targets: [{ format }] } });
 
-  // A texture with mipmaps, each averaged from the one before by the canvas of the browser.
+  // A texture with mipmaps, each averaged from the one before, about in linear light.
   function image(width, height, rgba) {
     const mipLevelCount = 1 + Math.floor(Math.log2(Math.max(width, height)));
     const usage = GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.COPY_DST;
