@@ -18,7 +18,7 @@
 use super::cone::{M3, V3, length};
 use super::island::{Kind, LocalBlock};
 
-/// What a block does.
+/// State of a block: open or closed, at a bound, sticking or sliding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Choice {
     /// A contact without a force.
