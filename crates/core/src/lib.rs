@@ -55,6 +55,7 @@ pub use constraint::builder::RowBuilder;
 pub use constraint::loop_joint::{
     Anchor, JointForce, JointPlace, LoopJoint, LoopJointError, LoopJointKind, PositionError, Transmission,
 };
+pub use constraint::mimic::{JointRef, Mimic, MimicError};
 pub use constraint::rows;
 pub use contact::pair_material::{PairMaterial, PairSide};
 pub use derived::Cache;

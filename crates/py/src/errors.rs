@@ -9,8 +9,8 @@ use std::io::ErrorKind;
 use tumble::behaviors::BehaviorError;
 use tumble::collide::{MeshError, ShapeError};
 use tumble::dynamics::{
-    ArchiveError, ArticulatedError, ArticulationError, BodyError, LinearizeError, LoopJointError, ModelError,
-    SensorError, SettingsError, SnapshotError, StepError, WorldError,
+    ArchiveError, ArticulatedError, ArticulationError, BodyError, LinearizeError, LoopJointError, MimicError,
+    ModelError, SensorError, SettingsError, SnapshotError, StepError, WorldError,
 };
 use tumble::net::record::RecordError;
 use tumble::render::RenderError;
@@ -38,6 +38,8 @@ pub enum Error {
     Articulation(#[from] ArticulationError),
     #[error(transparent)]
     Joint(#[from] LoopJointError),
+    #[error(transparent)]
+    Mimic(#[from] MimicError),
     #[error(transparent)]
     Sensor(#[from] SensorError),
     #[error(transparent)]

@@ -62,6 +62,8 @@ mod _native {
     #[pymodule_export]
     use super::objects::joint::Joint;
     #[pymodule_export]
+    use super::objects::mimic::Mimic;
+    #[pymodule_export]
     use super::objects::sensor::{Sensor, Sensors};
     #[pymodule_export]
     use super::objects::shapes::{Block, Capsule, Compound, Cone, Cylinder, Ellipsoid, HalfSpace, Mesh, Shape, Sphere};

@@ -95,6 +95,7 @@ pub use parse::link::{Geometry, LinkMassSpec, LinkShape, LinkSpec, Surface};
 pub use parse::loop_joint::{LoopJointSpec, PartSpec};
 pub use parse::material::MaterialSpec;
 pub use parse::mesh::{MeshSource, MeshSpec};
+pub use parse::mimic::{JointMimicSpec, JointSideSpec};
 pub use parse::mount::Mounts;
 pub use parse::pair::{PairSideSpec, PairSpec};
 pub use parse::problem::{Invalid, Problem};

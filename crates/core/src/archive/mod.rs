@@ -13,6 +13,7 @@
 
 mod bodies;
 mod constants;
+mod mimic;
 mod other;
 mod records;
 mod script;
@@ -25,10 +26,11 @@ use crate::step::{STEPPERS, Stepper, stepper_by_name};
 use crate::world::view::{Mode, ObjectId};
 use crate::world::{ContactPoint, Event, EventKind, World, WorldState};
 use crate::{
-    ArticulatedBody, EventError, LoopJoint, Object, RigidBody, ScriptedEvent, Sensor, Template, UnreachableJoint,
-    WorstSolve,
+    ArticulatedBody, EventError, LoopJoint, Mimic, Object, RigidBody, ScriptedEvent, Sensor, Template,
+    UnreachableJoint, WorstSolve,
 };
 use bodies::{ArticulatedRecord, RigidRecord};
+use mimic::MimicRecord;
 use other::OtherRecord;
 pub use other::{MakeObject, ObjectRecord, ReadObject};
 pub use records::ObjectIndices;
@@ -127,6 +129,7 @@ enum Record {
     Event(Box<EventScript>),
     Template(TemplateRecord),
     Other(Box<OtherRecord>),
+    Mimic(MimicRecord),
 }
 
 impl World {
@@ -200,6 +203,7 @@ impl World {
                 Record::Rigid(rigid) => Box::new(rigid.body(&tables)?),
                 Record::Articulated(articulated) => Box::new(articulated.body(&tables)?),
                 Record::LoopJoint(loop_joint) => Box::new(loop_joint.loop_joint(&ids)?),
+                Record::Mimic(mimic) => Box::new(mimic.mimic(&ids)?),
                 Record::Event(event) => Box::new(event.event(&ids)),
                 Record::Template(template) => Box::new(template.template(&ids)),
                 Record::Sensor(sensor) => Box::new(sensor.sensor(&tables, &ids)?),
@@ -287,6 +291,8 @@ fn record(object: &dyn Object, tables: &mut Tables, indices: &ObjectIndices) -> 
         Record::Articulated(Box::new(ArticulatedRecord::of(body, tables)))
     } else if let Some(loop_joint) = any.downcast_ref::<LoopJoint>() {
         Record::LoopJoint(Box::new(LoopJointRecord::of(loop_joint, indices)))
+    } else if let Some(mimic) = any.downcast_ref::<Mimic>() {
+        Record::Mimic(MimicRecord::of(mimic, indices))
     } else if let Some(event) = any.downcast_ref::<ScriptedEvent>() {
         Record::Event(Box::new(EventScript::of(event, indices)))
     } else if let Some(template) = any.downcast_ref::<Template>() {

@@ -338,7 +338,11 @@ impl ArticulatedBody {
         let Some(link) = self.model.links().iter().find(|l| (l.v..l.v + l.joint.dof()).contains(&index)) else {
             return Err(self.no_link(&format!("of degree of freedom {index}")));
         };
-        if let Some((what, value, expected)) = dof.range_error(link.joint.dof() == 1) {
+        let fault = match link.joint {
+            super::Joint::Spherical => dof.spherical_range_error(),
+            joint => dof.range_error(joint.dof() == 1),
+        };
+        if let Some((what, value, expected)) = fault {
             return Err(ArticulatedError::Range {
                 body: self.name.clone(),
                 link: link.name.clone(),

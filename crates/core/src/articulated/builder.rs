@@ -96,6 +96,7 @@ pub struct LinkBuilder {
     mass: Mass,
     dof: DofSettings,
     armature: f64,
+    cone: Option<(usize, f64)>,
     appearance: Appearance,
     material: Material,
     position: Option<f64>,
@@ -114,6 +115,7 @@ impl LinkBuilder {
             mass: Mass::Density(RigidBody::DEFAULT_DENSITY),
             dof: DofSettings::default(),
             armature: 0.0,
+            cone: None,
             appearance: Appearance::default(),
             material: Material::default(),
             position: None,
@@ -179,6 +181,13 @@ impl LinkBuilder {
     /// Sets the dry friction of its joint, N·m or N.
     pub fn with_joint_friction(mut self, friction: f64) -> Self {
         self.dof.friction = friction;
+        self
+    }
+
+    /// Sets the largest swing of its spherical joint, rad: the half angle of a cone about axis 0, 1 or 2 (x, y or z) of the
+    /// joint's frame, in which the same axis of the link stays.
+    pub fn with_cone(mut self, axis: usize, angle: f64) -> Self {
+        self.cone = Some((axis, angle));
         self
     }
 
@@ -400,13 +409,25 @@ impl ArticulationBuilder {
             let Some((q, v)) =
                 body.model().link(&link.name).map(|k| (body.model().links()[k].q, body.model().links()[k].v))
             else {
-                match link.dof == DofSettings::default() && link.position.is_none() && link.velocity.is_none() {
+                match link.dof == DofSettings::default()
+                    && link.cone.is_none()
+                    && link.position.is_none()
+                    && link.velocity.is_none()
+                {
                     true => continue,
                     false => return Err(self.wrong_joint(link, "it has settings of a joint")),
                 }
             };
-            for index in v..v + link.joint.dof() {
-                body.set_dof(index, link.dof.clone())?;
+            let spherical = link.joint == Joint::Spherical;
+            if link.cone.is_some() && !spherical {
+                return Err(self.wrong_joint(link, "it has a cone, which only spherical joints have"));
+            }
+            if link.cone.is_some_and(|(axis, _)| axis > 2) {
+                return Err(self.wrong_joint(link, "the axis of its cone is not 0, 1 or 2"));
+            }
+            for (k, index) in (v..v + link.joint.dof()).enumerate() {
+                let cone = link.cone.filter(|(axis, _)| *axis == k).map(|(_, cone)| [0.0, cone]);
+                body.set_dof(index, DofSettings { limits: link.dof.limits.or(cone), ..link.dof.clone() })?;
             }
             for (value, index) in [(link.position, q), (link.velocity, velocities + v)] {
                 let Some(value) = value else { continue };

@@ -2,6 +2,7 @@
 
 use super::body::ArticulatedBody;
 use crate::articulated::model::dof::{DofSettings, Drive};
+use crate::articulated::swing::Swing;
 use crate::constraint::builder::RowBuilder;
 use crate::constraint::dof_rows::DofState;
 use crate::constraint::rows::RowSet;
@@ -9,6 +10,7 @@ use crate::contact::warm_starts::RowStart;
 use crate::object::part_state::StateRange;
 use crate::object::{Constraint, Level, RowTarget};
 use crate::world::view::WorldView;
+use tumble_collide::Vec3;
 
 impl ArticulatedBody {
     /// Returns whether any setting or coupling makes a row.
@@ -45,7 +47,7 @@ impl ArticulatedBody {
     ///
     /// A drive and a damping that share a row divide its force by the velocity at the end: `f_drive = f + d·v`.
     pub(crate) fn add_drives(&self, x: &[f64], time: f64, rows: &[RowStart], h: f64, out: &mut [f64]) {
-        let limits = self.limit_errors(x).count() + self.velocity_limits(x).count();
+        let limits = self.limits(x).count() + self.velocity_limits(x).count();
         let targets = |level: Level| -> Vec<usize> {
             let count = |(_, dof): (usize, DofState)| {
                 let mut count = 0;
@@ -79,10 +81,22 @@ impl ArticulatedBody {
         self.dof_states(x).map(|(_, p)| energy(p)).sum()
     }
 
-    /// Returns the errors of the limits in the order of their rows: for each degree of freedom the
-    /// lower, then the upper.
-    fn limit_errors<'a>(&'a self, x: &'a [f64]) -> impl Iterator<Item = (usize, f64, f64)> {
-        self.dof_states(x).flat_map(|(index, p)| p.limits().map(move |(sign, error)| (index, sign, error)))
+    /// Returns the limits in the order of their rows: for each degree of freedom the lower, then the upper.
+    fn limits<'a>(&'a self, x: &'a [f64]) -> impl Iterator<Item = Limit> {
+        let n = self.model.positions();
+        self.model.links().iter().filter(|link| matches!(link.joint.dof(), 1 | 3)).flat_map(move |link| {
+            let single = link.joint.dof() == 1;
+            (0..link.joint.dof()).flat_map(move |k| {
+                let (index, settings) = (link.v + k, &self.dofs()[link.v + k]);
+                let state = DofState { q: x[link.q], v: x[n + index], settings };
+                let sides = state.limits().filter(move |_| single);
+                let sides = sides.map(move |(sign, gap)| Limit { gap, along: Along::Dof { index, sign } });
+                let cone = settings.limits.filter(|[_, cone]| !single && cone.is_finite());
+                let cone =
+                    cone.map(|[_, cone]| Limit::of_cone(cone, link.v, Swing::of(k, &x[link.q..], &x[n + link.v..])));
+                sides.chain(cone)
+            })
+        })
     }
 
     /// Returns the rows of the velocity limits: index of the degree of freedom, sign and target.
@@ -96,8 +110,15 @@ impl Constraint for ArticulatedBody {
         let x = &view.x[me.x.clone()];
         let dof = self.model.dof();
         let mut maker = RowMaker { unit: vec![0.0; dof], known: vec![None; dof], out };
-        for (index, sign, error) in self.limit_errors(x) {
-            maker.row_of(RowTarget::new(RowSet::HalfLine, error), index, sign);
+        for Limit { gap, along } in self.limits(x) {
+            let target = RowTarget::new(RowSet::HalfLine, gap);
+            match along {
+                Along::Dof { index, sign } => maker.row_of(target, index, sign),
+                Along::Swing { first, jacobian, bias_acceleration } => {
+                    let entries = [0, 1, 2].map(|k| (first + k, jacobian[k]));
+                    maker.row(RowTarget { bias_acceleration, ..target }, &entries);
+                }
+            }
         }
         for (index, sign, target) in self.velocity_limits(x) {
             maker.row_of(target, index, sign);
@@ -113,7 +134,7 @@ impl Constraint for ArticulatedBody {
     }
 
     fn gaps(&self, me: &StateRange, view: &WorldView, out: &mut Vec<f64>) {
-        out.extend(self.limit_errors(&view.x[me.x.clone()]).map(|(_, _, error)| error));
+        out.extend(self.limits(&view.x[me.x.clone()]).map(|limit| limit.gap));
     }
 
     fn on_itself(&self) -> bool {
@@ -122,6 +143,27 @@ impl Constraint for ArticulatedBody {
 
     fn reads_part_states(&self) -> bool {
         false
+    }
+}
+
+/// A limit of a joint.
+struct Limit {
+    /// rad or m.
+    gap: f64,
+    along: Along,
+}
+
+/// The velocity at which a gap opens.
+enum Along {
+    /// `sign` times that of a degree of freedom.
+    Dof { index: usize, sign: f64 },
+    /// A combination of the three of a spherical joint.
+    Swing { first: usize, jacobian: Vec3, bias_acceleration: f64 },
+}
+
+impl Limit {
+    fn of_cone(cone: f64, first: usize, Swing { angle, jacobian, bias }: Swing) -> Limit {
+        Limit { gap: cone - angle, along: Along::Swing { first, jacobian: -jacobian, bias_acceleration: -bias } }
     }
 }
 

@@ -8,6 +8,7 @@ mod model;
 mod object;
 mod parts;
 mod simd;
+mod swing;
 mod turning;
 
 pub use algorithms::crba::MassMatrix;

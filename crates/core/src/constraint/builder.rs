@@ -224,7 +224,7 @@ impl RowBuilder<'_> {
         true
     }
 
-    fn refuse(&mut self, why: String) {
+    pub(crate) fn refuse(&mut self, why: String) {
         self.problem.get_or_insert(why);
     }
 }

@@ -3,4 +3,5 @@
 pub(crate) mod builder;
 pub(crate) mod dof_rows;
 pub(crate) mod loop_joint;
+pub(crate) mod mimic;
 pub mod rows;

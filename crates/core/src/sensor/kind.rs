@@ -43,13 +43,15 @@ pub enum SensorKind {
     Depth,
     /// An image of the parts that a camera sees: [`World::segmentation_image`](crate::World::segmentation_image).
     Segmentation,
+    /// An image of the colors that a camera sees: [`World::color_image`](crate::World::color_image).
+    Color,
 }
 
 use SensorKind::*;
 
 impl SensorKind {
     /// All kinds.
-    pub const ALL: [SensorKind; 18] = [
+    pub const ALL: [SensorKind; 19] = [
         Accelerometer,
         Gyroscope,
         Velocimeter,
@@ -68,9 +70,10 @@ impl SensorKind {
         DriveForce,
         Depth,
         Segmentation,
+        Color,
     ];
     /// Their names in Python and in scene files, in the same order.
-    pub const NAMES: [&'static str; 18] = [
+    pub const NAMES: [&'static str; 19] = [
         "accelerometer",
         "gyroscope",
         "velocimeter",
@@ -89,6 +92,7 @@ impl SensorKind {
         "drive_force",
         "depth",
         "segmentation",
+        "color",
     ];
 
     /// Returns its name in Python and in scene files.
@@ -106,7 +110,7 @@ impl SensorKind {
         match self {
             Touch | RangeFinder | JointPosition | JointVelocity | DriveForce => 1,
             Orientation => 4,
-            Depth | Segmentation => 0,
+            Depth | Segmentation | Color => 0,
             _ => 3,
         }
     }
@@ -123,7 +127,12 @@ impl SensorKind {
 
     /// Returns whether it reads an image.
     pub fn is_camera(self) -> bool {
-        matches!(self, Depth | Segmentation)
+        matches!(self, Depth | Segmentation | Color)
+    }
+
+    /// Returns whether it reads distances, to which noise can be added, or numbers: an image of parts or colors has none.
+    pub fn has_noise(self) -> bool {
+        !matches!(self, Segmentation | Color)
     }
 
     /// Returns whether it may have a reference.

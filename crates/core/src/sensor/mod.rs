@@ -227,10 +227,11 @@ impl Sensor {
         if self.kind.is_camera() && (noise.bias_walk > 0.0 || noise.delay > 0) {
             return Err(self.wrong("an image has no walk of a bias and no delay"));
         }
-        if self.kind == SensorKind::Segmentation
-            && noise != (SensorNoise { seed: noise.seed, ..SensorNoise::default() })
-        {
-            return Err(self.wrong("a segmentation has no noise"));
+        if !self.kind.has_noise() && noise != (SensorNoise { seed: noise.seed, ..SensorNoise::default() }) {
+            return Err(self.wrong(match self.kind {
+                SensorKind::Segmentation => "a segmentation has no noise",
+                _ => "an image of colors has no noise",
+            }));
         }
         self.noise = noise;
         Ok(self)

@@ -1,6 +1,7 @@
 //! Errors of calls to a world.
 
 use super::script::EventError;
+use crate::constraint::mimic::MimicError;
 use crate::rigid::BodyError;
 use crate::settings::SettingsError;
 
@@ -36,6 +37,9 @@ pub enum WorldError {
     /// The call needs a rigid body.
     #[error("'{0}' is not a rigid body")]
     NotRigid(String),
+    /// Two joints cannot be coupled like that.
+    #[error(transparent)]
+    Mimic(#[from] MimicError),
     /// The call needs a loop joint.
     #[error("'{0}' is not a loop joint")]
     NotJoint(String),

@@ -2,6 +2,7 @@
 
 use super::{Core, World, WorldError};
 use crate::constraint::loop_joint::{JointForce, LoopJoint};
+use crate::constraint::mimic::Mimic;
 use crate::contact::warm_starts::RowStart;
 use crate::world::view::{ObjectId, WorldView};
 
@@ -33,6 +34,31 @@ impl World {
         let mut changed = joint.clone();
         change(&mut changed)?;
         *joint = changed;
+        Ok(())
+    }
+}
+
+impl World {
+    /// Returns the force of a [`Mimic`] along the position of the joint that follows, N·m or N: the mean over the last
+    /// sub-step. Zero while it makes no row. `None` if it was removed or is no mimic.
+    pub fn mimic_force(&self, id: ObjectId) -> Option<f64> {
+        self.get::<Mimic>(id)?;
+        let serial = self.core.objects().get(id)?.serial;
+        let acts = self.status(id)?.enabled;
+        Some(self.core.row_forces(serial).iter().filter(|_| acts).map(|row| row.force).sum())
+    }
+
+    /// Changes the multiplier and the offset (rad or m) of a [`Mimic`] between steps, and wakes the objects that it
+    /// couples.
+    ///
+    /// # Errors
+    /// [`WorldError::Stale`] if it was removed, [`WorldError::NotJoint`] for another object, [`WorldError::Mimic`] for a
+    /// number out of its range. Nothing changes then.
+    pub fn set_mimic_ratio(&mut self, id: ObjectId, multiplier: f64, offset: f64) -> Result<(), WorldError> {
+        let name = self.name(id).ok_or(WorldError::Stale)?.to_string();
+        let mimic = self.get::<Mimic>(id).ok_or(WorldError::NotJoint(name.clone()))?;
+        let changed = mimic.changed(multiplier, offset, &self.view())?;
+        *self.get_mut::<Mimic>(id).ok_or(WorldError::NotJoint(name))? = changed;
         Ok(())
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::common::*;
 use std::f64::consts::{FRAC_PI_2, PI};
+use tumble_core::articulated::{Joint, LinkMass, ModelBuilder};
 use tumble_core::collide::{Pose, Shape, TreeSettings, TriMesh, Vec3};
 use tumble_core::*;
 
@@ -92,6 +93,68 @@ fn a_camera_sees_what_single_rays_meet_on_any_number_of_threads_and_not_its_own_
     let archived = World::from_archive(&world.archive(&[]).unwrap(), &mut |_| None).unwrap();
     let again = archived.find("depth").unwrap();
     assert_eq!(archived.depth_image(again).unwrap(), image);
+}
+
+/// The color of a pixel is that of the surface, dimmed in linear light by the angle between its normal and the ray.
+#[test]
+fn a_color_camera_sees_the_colors_of_bodies_by_its_own_light() {
+    let mut world = no_gravity(world("time_stepping", 0.01));
+    let painted = |color: [f32; 3]| Appearance { color, ..Appearance::default() };
+    let red = RigidBody::fixed(sphere(0.5))
+        .with_visuals(vec![Visual::shape(0, Pose::identity(), sphere(0.5), painted([0.8, 0.2, 0.1]))])
+        .with_pose(Pose::translation(0.0, 0.0, 1.0));
+    world.add_static(red).unwrap();
+    // one link with two shapes of different colors, the left one blue and the right one green
+    let link = |color, x| {
+        let look = painted(color);
+        (
+            Visual::shape(0, Pose::translation(x, 0.0, 0.0), cube(0.4), look),
+            Collider::new(cube(0.4), Pose::translation(x, 0.0, 0.0)),
+        )
+    };
+    let mut builder = ModelBuilder::new();
+    let mass = LinkMass { mass: 1.0, center: Vec3::zeros(), inertia: tumble_core::collide::Mat3::identity() };
+    builder.link("carriage", None, Joint::prismatic(Vec3::y()), Pose::translation(0.0, 2.0, 1.0), mass);
+    let mut body = ArticulatedBody::new("cart", builder.build().unwrap());
+    for (color, x) in [([0.0, 0.0, 1.0], -0.3), ([0.0, 1.0, 0.0], 0.3)] {
+        let (visual, collider) = link(color, x);
+        body.add_visual("carriage", visual).unwrap();
+        body.add_collider("carriage", collider).unwrap();
+    }
+    world.add(body).unwrap();
+    let optics = Optics { resolution: [81, 61], vertical_fov: 1.2 };
+    let site = |x: f64, y: f64| Anchor::world(Pose::new(Vec3::new(x, y, 3.0), Vec3::x() * PI));
+    let ball = camera(&mut world, SensorKind::Color, site(0.0, 0.0), optics);
+    let image = world.color_image(ball).unwrap();
+    let curve = |light: f64| if light <= 0.0031308 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
+    let linear = |c: f64| if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
+    let focal = 30.5 / 0.6_f64.tan();
+    let mut seen = 0;
+    for (k, pixel) in image.pixels.iter().enumerate() {
+        let d = Vec3::new(((k % 81) as f64 - 40.0) / focal, -((k / 81) as f64 - 30.0) / focal, -1.0).normalize();
+        let to = Vec3::new(0.0, 0.0, -2.0);
+        let root = d.dot(&to).powi(2) - to.norm_squared() + 0.25;
+        if root < 0.0 {
+            assert_eq!(*pixel, [0; 3], "pixel {k} shows nothing");
+            continue;
+        }
+        let normal = (d * (d.dot(&to) - root.sqrt()) - to) / 0.5;
+        let light = 0.25 + 0.75 * -normal.dot(&d);
+        let expected = [0.8, 0.2, 0.1].map(|c: f32| 255.0 * curve(light * linear(f64::from(c))));
+        assert!(
+            pixel.iter().zip(expected).all(|(c, e)| (f64::from(*c) - e).abs() < 0.5001),
+            "{k}: {pixel:?}, {expected:?}"
+        );
+        seen += 1;
+    }
+    assert!(seen > 300, "{seen}");
+    let above = Sensor::new("above", SensorKind::Color, site(0.0, 2.0)).unwrap().with_optics(optics).unwrap();
+    let cart = world.add(above).unwrap();
+    let image = world.color_image(cart).unwrap();
+    let at = |column: usize| image.pixels[30 * 81 + column];
+    assert!(at(30)[2] > 240 && at(30)[1] == 0 && at(50)[1] > 240 && at(50)[2] == 0, "{:?} {:?}", at(30), at(50));
+    assert_eq!(at(40), [0; 3], "between the shapes");
+    assert!(world.depth_image(cart).is_none() && world.color_image(ball).is_some());
 }
 
 #[test]

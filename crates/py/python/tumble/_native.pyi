@@ -48,6 +48,7 @@ __all__ = [
     "Joint",
     "LinearizedStep",
     "Mesh",
+    "Mimic",
     "Panel",
     "ParticleSystem",
     "Policy",
@@ -455,6 +456,48 @@ class RigidBody:
         frame, meters (default: its origin).
         """
     def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class Mimic:
+    """A coupling of two joints, made by ``World.add_mimic`` or ``[[mimic]]``: the position of one is ``multiplier`` times that
+    of the other, plus ``offset``.
+    """
+    @property
+    def name(self) -> str:
+        """Name, unique in its world."""
+    @property
+    def exists(self) -> bool:
+        """Whether its world still has it."""
+    @property
+    def joint(self) -> Joint | tuple[Articulation, str] | None:
+        """The joint that follows: a ``Joint``, or (articulation, link); None if it was removed."""
+    @property
+    def of(self) -> Joint | tuple[Articulation, str] | None:
+        """The joint that it follows: a ``Joint``, or (articulation, link); None if it was removed."""
+    @property
+    def enabled(self) -> bool:
+        """Whether it acts."""
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
+    @property
+    def multiplier(self) -> float:
+        """Ratio of the positions, not 0."""
+    @multiplier.setter
+    def multiplier(self, value: float) -> None: ...
+    @property
+    def offset(self) -> float:
+        """Position of the joint that follows while the other is at 0, rad or m."""
+    @offset.setter
+    def offset(self, value: float) -> None: ...
+    @property
+    def force(self) -> float:
+        """Force of the coupling along the position of the joint that follows in the last sub-step, N·m or N; on the other
+        joint acts ``-multiplier`` times as much.
+        """
+    @property
+    def error(self) -> float:
+        """Position of the joint that follows less that which it should have, rad or m; NaN while it does not act."""
     def __hash__(self) -> int: ...
 
 @final
@@ -1090,6 +1133,7 @@ class ArticulationBuilder:
         restitution: float = 0.0,
         collides: bool = True,
         color: ArrayLike | None = None,
+        cone: float | None = None,
     ) -> None:
         """Adds a link. Its joint has the same name.
 
@@ -1110,7 +1154,8 @@ class ArticulationBuilder:
         max_velocity: largest speed of the joint, rad/s or m/s. effort: the force of its motor, N·m or N, which limits drives that name no
         ``max_force``. stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
         ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the
-        start. friction, restitution, collides: of the shapes. color: sRGB, shape (3,).
+        start. friction, restitution, collides: of the shapes. color: sRGB, shape (3,). cone: largest angle of a spherical joint
+        between its axis, x, y or z, on the link and on the parent, rad.
         """
     def add_shape(
         self,
@@ -1316,8 +1361,7 @@ class Articulation:
 
         With ``stiffness`` or ``damping`` it drives to position ``target`` (rad or m) and
         ``velocity``. With neither it holds ``velocity``. Without arguments the drive is removed.
-        max_force: largest torque or force, N·m or N; None: the ``effort`` of the joint. The drive is a property of
-        the body and not part of the state, so ``save`` does not include it.
+        max_force: largest torque or force, N·m or N; None: the ``effort`` of the joint. ``save`` includes it.
         """
     def apply_force(self, link: str, force: ArrayLike, point: ArrayLike | None = None) -> None:
         """Applies a force to a link of a body in a world during the next step only. force: shape (3,),
@@ -2172,7 +2216,7 @@ class World:
         """
     def save(self) -> bytes:
         """Returns everything that the next step reads as bytes, for ``restore`` in a world of the same
-        bodies. Shapes, masses, settings and drives are not included.
+        bodies, with the drives that were set since they were added. Shapes, masses and settings are not included.
         """
     def restore(self, snapshot: bytes | bytearray) -> None:
         """Restores the bytes of ``save``. Invalid bytes, or those of another world, raise
@@ -2314,6 +2358,9 @@ class World:
     @property
     def joints(self) -> list[Joint]:
         """All joints made by ``add_joint`` or ``[[loop_joint]]``, in the order in which they were added."""
+    @property
+    def mimics(self) -> list[Mimic]:
+        """All couplings of joints made by ``add_mimic`` or ``[[mimic]]``, in the order in which they were added."""
     def joint(self, name: str) -> Joint:
         """Returns the joint of that name, made by ``add_joint`` or ``[[loop_joint]]``."""
     def add_joint(
@@ -2369,6 +2416,14 @@ class World:
         bodies still collide with each other: ``set_pair_material(a, b, collides=False)``. Points and axes
         are in the world.
         """
+    def add_mimic(self, joint: _Side | Joint, of: _Side | Joint, multiplier: float = 1.0, offset: float = 0.0, *, name: str = "") -> Mimic:
+        """Couples two joints, and returns the coupling: the position of ``joint`` is ``multiplier`` times that of ``of``, plus ``offset``.
+
+        joint, of: joints made by ``add_joint``, by handle or name, of a kind with a position other than ``"spherical"``; or
+        links that a revolute or prismatic joint moves, ``"ARTICULATION/LINK"`` or ``(articulation, "LINK")``. Together they
+        join two bodies that move at most. multiplier: not 0; between two angles of joints without limits a ratio of whole
+        numbers up to 1000. offset: rad or m, as the position of ``joint``.
+        """
     def add_sensor(
         self,
         kind: SensorKind,
@@ -2404,7 +2459,7 @@ class World:
         deviation: standard deviation of white noise. bias_walk: that of the change of a bias in a second. quantization: distance
         of the values that a reading can have. delay: steps by which it is late. seed: start of the noise.
 
-        ``"depth"`` and ``"segmentation"`` are cameras that look along z of the site, with x to the right and y down in the image.
+        ``"depth"``, ``"segmentation"`` and ``"color"`` are cameras that look along z of the site, with x to the right and y down in the image.
         resolution: pixels in a row and rows, by default (64, 48). vertical_fov: rad, by default π/4. Their readings are made when
         they are read: distances along z, m, shape (rows, columns), -1 where nothing is; and what a pixel shows, shape (rows,
         columns, 2): the index in ``world.bodies`` and that of the link in its ``link_names``, -1 for nothing and other objects.

@@ -65,6 +65,7 @@ SensorKind: TypeAlias = Literal[
     "drive_force",
     "depth",
     "segmentation",
+    "color",
 ]
 """``World.add_sensor(kind=…)``: what a measuring sensor reads."""
 

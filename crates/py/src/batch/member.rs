@@ -173,12 +173,14 @@ fn aim(layout: &Layout, inner: &mut Inner, mut row: &[f64]) -> Result<()> {
 pub fn change(layout: &Layout, inner: &mut Inner, mut each: impl FnMut(&mut DofSettings) -> Result<()>) -> Result<()> {
     for body in &layout.driven {
         let gone = || Error::value("an articulation was removed from this world of a batch");
-        let own = inner.world.get_mut::<ArticulatedBody>(body.id).ok_or_else(gone)?;
         for index in 0..body.dof {
+            let own = inner.world.get::<ArticulatedBody>(body.id).ok_or_else(gone)?;
             let before = &own.dofs()[index];
             let mut settings = before.clone();
             each(&mut settings)?;
             if settings.drive != before.drive {
+                inner.note_drives(body.id);
+                let own = inner.world.get_mut::<ArticulatedBody>(body.id).ok_or_else(gone)?;
                 own.set_dof(index, settings)?;
             }
         }

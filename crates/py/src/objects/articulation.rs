@@ -372,8 +372,7 @@ impl Articulation {
     ///
     /// With ``stiffness`` or ``damping`` it drives to position ``target`` (rad or m) and
     /// ``velocity``. With neither it holds ``velocity``. Without arguments the drive is removed.
-    /// max_force: largest torque or force, N·m or N; None: the ``effort`` of the joint. The drive is a property of
-    /// the body and not part of the state, so ``save`` does not include it.
+    /// max_force: largest torque or force, N·m or N; None: the ``effort`` of the joint. ``save`` includes it.
     #[pyo3(signature = (joint, *, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn set_drive(
@@ -388,11 +387,14 @@ impl Articulation {
     ) -> Result<()> {
         let (place, index) = (self.in_world()?, self.dof_of(joint)?);
         place.write(py, |inner| {
-            let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
+            let body = inner.world.get::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
             let before = body.dofs()[index].clone();
             let drive = drive(target, velocity, stiffness, damping, max_force.unwrap_or(before.effort))?;
-            let settings = DofSettings { drive, ..before };
-            Ok(body.set_dof(index, settings)?)
+            let mut body = body.clone();
+            body.set_dof(index, DofSettings { drive, ..before })?;
+            inner.note_drives(place.id);
+            *inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())? = body;
+            Ok(())
         })
     }
 

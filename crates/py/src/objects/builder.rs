@@ -80,14 +80,15 @@ impl ArticulationBuilder {
     /// max_velocity: largest speed of the joint, rad/s or m/s. effort: the force of its motor, N·m or N, which limits drives that name no
     /// ``max_force``. stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
     /// ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the
-    /// start. friction, restitution, collides: of the shapes. color: sRGB, shape (3,).
+    /// start. friction, restitution, collides: of the shapes. color: sRGB, shape (3,). cone: largest angle of a spherical joint
+    /// between its axis, x, y or z, on the link and on the parent, rad.
     #[pyo3(signature = (name, parent=None, *, joint="revolute", axis=None, position=None, orientation=None, shape=None, shape_position=None,
         shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, joint_friction=0.0,
-        armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=true, color=None))]
+        armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=true, color=None, cone=None))]
     #[pyo3(
         text_signature = "($self, name, parent=None, *, joint='revolute', axis=(0.0, 0.0, 1.0), position=None, orientation=None, shape=None, \
         shape_position=None, shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, \
-        joint_friction=0.0, armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=True, color=None)"
+        joint_friction=0.0, armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=True, color=None, cone=None)"
     )]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_link(
@@ -120,6 +121,7 @@ impl ArticulationBuilder {
         restitution: f64,
         collides: bool,
         color: Option<&Bound<'_, PyAny>>,
+        cone: Option<f64>,
     ) -> Result<()> {
         if self.builder().links().iter().any(|known| known.name() == name) {
             return Err(Error::value(format!("there is a link named '{name}' already")));
@@ -147,6 +149,13 @@ impl ArticulationBuilder {
         }
         if let Some(limits) = limits {
             link = link.with_limits(pair(limits)?);
+        }
+        if let Some(cone) = cone {
+            let along: Vec<usize> = (0..3).filter(|k| axis[*k] != 0.0).collect();
+            let [k] = along[..] else {
+                return Err(Error::value("axis: expected that of the cone, an axis x, y or z of the joint's frame"));
+            };
+            link = link.with_cone(k, cone);
         }
         if let Some(drive) = drive {
             link = link.with_drive(drive_of(drive, effort.unwrap_or(f64::INFINITY))?);

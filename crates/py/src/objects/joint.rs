@@ -322,6 +322,10 @@ impl Joint {
         damping: f64,
         max_force: Option<f64>,
     ) -> Result<()> {
+        self.place.write(py, |inner| {
+            inner.note_drives(self.place.id);
+            Ok(())
+        })?;
         self.change(py, |joint| {
             let max_force = max_force.unwrap_or(joint.dof().effort);
             let drive = drive(target, velocity, stiffness, damping, max_force)?;

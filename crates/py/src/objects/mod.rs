@@ -11,6 +11,7 @@ pub mod description;
 pub mod handle;
 pub mod joint;
 pub mod joints;
+pub mod mimic;
 pub mod place;
 pub mod robot;
 pub mod sensor;

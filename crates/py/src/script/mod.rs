@@ -9,6 +9,7 @@ pub mod world;
 use crate::errors::{Error, Result};
 use crate::objects::bodies::place_of;
 use crate::objects::joint::Joint;
+use crate::objects::mimic::Mimic;
 use crate::objects::place::Place;
 use crate::world::shared::Shared;
 use pyo3::prelude::*;
@@ -62,6 +63,9 @@ pub fn part_of(world: &Core, shared: Option<&Arc<Shared>>, value: &Bound<'_, PyA
 fn place(value: &Bound<'_, PyAny>) -> Result<Place> {
     if let Ok(joint) = value.cast::<Joint>() {
         return Ok(joint.get().place.clone());
+    }
+    if let Ok(mimic) = value.cast::<Mimic>() {
+        return Ok(mimic.get().place.clone());
     }
     crate::behaviors::handle_place(value).map_or_else(|| place_of(value), Ok)
 }

@@ -35,9 +35,9 @@ pub struct Arguments<'a, 'py> {
 }
 
 /// A body, and the name of a link of it.
-struct Target {
-    id: ObjectId,
-    link: Option<String>,
+pub struct Target {
+    pub id: ObjectId,
+    pub link: Option<String>,
 }
 
 /// Adds a sensor and returns its handle.
@@ -62,7 +62,7 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
         let place = match (&joint, &target) {
             (Some(joint), _) => SensorPlace::LoopJoint(joint.id),
             (_, Some(target)) if kind.reads_dof() => {
-                let (id, dof) = dof_of(inner, target)?;
+                let (id, dof) = dof_of(inner, target, "on")?;
                 SensorPlace::Dof(id, dof)
             }
             (_, Some(target)) => SensorPlace::Site(anchor(inner, target, &site)?),
@@ -89,7 +89,7 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
 }
 
 /// Converts a handle, a name, ``"ARTICULATION/LINK"``, or a tuple of an articulation and the name of a link.
-fn target(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<Target> {
+pub fn target(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<Target> {
     if let Ok((body, link)) = value.extract::<(Bound<'_, PyAny>, String)>() {
         return Ok(Target { id: own_place(shared, &body)?.id, link: Some(link) });
     }
@@ -124,8 +124,10 @@ fn anchor(inner: &Inner, target: &Target, site: &Pose) -> Result<Anchor> {
 }
 
 /// Returns the degree of freedom of the joint that moves a link.
-fn dof_of(inner: &Inner, target: &Target) -> Result<(ObjectId, usize)> {
-    let none = || Error::value("on: expected a link that a revolute or prismatic joint moves, or a loop joint");
+pub fn dof_of(inner: &Inner, target: &Target, argument: &str) -> Result<(ObjectId, usize)> {
+    let none = || {
+        Error::value(format!("{argument}: expected a link that a revolute or prismatic joint moves, or a loop joint"))
+    };
     let (body, link) = link(inner, target)?.ok_or_else(none)?;
     let missing =
         || Error::Name(format!("'{}' has no link named '{link}'", inner.world.name(target.id).unwrap_or_default()));
@@ -158,12 +160,17 @@ pub fn place_of(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<Option
     Ok(value.extract::<String>().ok().and_then(|name| place_by_name(shared, &name).ok()))
 }
 
-/// Returns the reading of a sensor: an array of float64, of a segmentation of int32.
+/// Returns the reading of a sensor: an array of float64, of a segmentation of int32, of colors of uint8.
 pub fn value<'py>(py: Python<'py>, place: &Place) -> Result<Bound<'py, PyAny>> {
     match place.read(|inner| Some(inner.world.get::<Core>(place.id)?.kind()))? {
         SensorKind::Depth => {
             let SensorImage { width, height, pixels } = place.read(|inner| inner.world.depth_image(place.id))?;
             Ok(PyArray1::from_vec(py, pixels).reshape([height, width])?.into_any())
+        }
+        SensorKind::Color => {
+            let SensorImage { width, height, pixels } = place.read(|inner| inner.world.color_image(place.id))?;
+            let colors = pixels.into_iter().flatten().collect();
+            Ok(PyArray1::from_vec(py, colors).reshape([height, width, 3])?.into_any())
         }
         SensorKind::Segmentation => {
             let SensorImage { width, height, pixels } = place.read(|inner| parts_in_image(inner, place.id))?;

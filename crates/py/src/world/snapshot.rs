@@ -1,5 +1,5 @@
 //! Format of `World.save`: the library's snapshot, followed by the generalized forces on
-//! articulated bodies.
+//! articulated bodies and by the drives that the program changed (`drives.rs`).
 //!
 //! | part | bytes |
 //! |---|---|
@@ -12,6 +12,7 @@
 //! the command.
 
 use crate::errors::Result;
+use crate::world::drives;
 use crate::world::inner::Inner;
 use tumble::dynamics::{ObjectId, SnapshotError};
 
@@ -34,15 +35,17 @@ pub fn write(inner: &Inner) -> Vec<u8> {
         bytes.extend(len.to_le_bytes());
         bytes.extend(MAGIC);
     }
+    drives::write(inner, &mut bytes);
     bytes
 }
 
 /// Restores a world from its bytes. On an error it keeps its state.
 pub fn read(inner: &mut Inner, bytes: &[u8]) -> Result<()> {
+    let (bytes, drives) = drives::split(bytes)?;
     let (snapshot, forces) = split(bytes)?;
     let before = inner.world.save();
     inner.world.restore(snapshot)?;
-    match efforts(inner, forces) {
+    match efforts(inner, forces).and_then(|all| drives::read(inner, drives).map(|()| all)) {
         Ok(all) => inner.efforts = all.into_iter().collect(),
         Err(error) => {
             inner.world.restore(&before)?;

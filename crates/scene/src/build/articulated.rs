@@ -33,8 +33,7 @@ pub(crate) fn moving_joints(links: &[LinkSpec]) -> Vec<String> {
 
 /// Returns the settings of each degree of freedom, in the order of the velocities.
 pub(crate) fn dofs(links: &[LinkSpec]) -> Vec<DofSettings> {
-    let of = |link: &LinkSpec| vec![link.joint.dof.clone(); link.joint.kind.dof()];
-    links.iter().filter(|link| moves(link)).flat_map(of).collect()
+    links.iter().filter(|link| moves(link)).flat_map(|link| link.joint.dofs()).collect()
 }
 
 fn moves(link: &LinkSpec) -> bool {
@@ -84,8 +83,8 @@ fn assembled(
     }
     for (number, link) in moving.iter().enumerate() {
         let first = body.model().links()[number].v;
-        for index in first..first + link.joint.kind.dof() {
-            body.set_dof(index, link.joint.dof.clone())?;
+        for (k, dof) in link.joint.dofs().into_iter().enumerate() {
+            body.set_dof(first + k, dof)?;
         }
         if let Some(mimic) = link.joint.mimic
             && let Some(of) = body.dof_of(&spec.links[mimic.link].name)

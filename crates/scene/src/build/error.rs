@@ -60,6 +60,14 @@ pub enum BuildError {
         /// From the joint; names the joint.
         why: String,
     },
+    /// A coupling of two joints is invalid.
+    #[error("{scene}: {why}")]
+    Mimic {
+        /// The scene.
+        scene: String,
+        /// From the coupling; names it.
+        why: String,
+    },
     /// A sensor is invalid.
     #[error("{scene}: {why}")]
     Sensor {

@@ -10,6 +10,7 @@ pub(crate) mod grid;
 pub(crate) mod heights;
 pub(crate) mod mesh_files;
 pub(crate) mod meshes;
+mod mimic;
 mod sensor;
 pub(crate) mod shapes;
 pub(crate) mod slow;

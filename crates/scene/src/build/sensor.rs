@@ -58,7 +58,7 @@ impl SceneFile {
     }
 
     /// Returns the degree of freedom that moves a link.
-    fn joint_of(&self, world: &World, part: &PartSpec) -> Option<(ObjectId, usize)> {
+    pub(super) fn joint_of(&self, world: &World, part: &PartSpec) -> Option<(ObjectId, usize)> {
         let PartSpec::Link(spec, link) = *part else { return None };
         let spec = &self.articulated[spec];
         let id = world.find(&spec.name)?;

@@ -68,6 +68,9 @@ impl SceneFile {
         for spec in &self.loop_joints {
             self.add_loop_joint(spec, &mut built)?;
         }
+        for spec in &self.mimics {
+            self.add_mimic(spec, &mut built)?;
+        }
         for spec in &self.templates {
             let body = self.body(&spec.body, &meshes)?;
             let added = Template::add(&mut built, &spec.body.name, &body, spec.count, spec.reuse);

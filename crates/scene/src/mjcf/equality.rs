@@ -11,6 +11,7 @@ use super::schema;
 use super::source::XmlNode;
 use crate::parse::joint::MimicSpec;
 use crate::parse::loop_joint::{LoopJointSpec, PartSpec};
+use crate::parse::mimic::{JointMimicSpec, JointSideSpec};
 use crate::xml::Element;
 
 /// Reads all equality constraints.
@@ -129,11 +130,20 @@ fn couple(item: &Item<'_>, assembly: &mut Assembly<'_, '_>) {
     if (2..5).any(|k| coefficient(k) != 0.0) {
         return reader.notes.add(element, "couplings of joints that are not linear are left out");
     }
-    if first.tree != second.tree || first.link == second.link {
-        return reader.notes.add(element, "couplings of joints of different articulated bodies are left out");
-    }
     let multiplier = coefficient(1);
     let offset = first.reference + coefficient(0) - multiplier * second.reference;
+    if (first.tree, first.link) == (second.tree, second.link) {
+        return reader.notes.add(element, "a coupling of a joint to itself is left out");
+    }
+    if first.tree != second.tree {
+        if multiplier == 0.0 {
+            return reader.notes.add(element, "a coupling of two articulated bodies with the ratio 0 is left out");
+        }
+        let [joint, of] = [first, second].map(|joint| JointSideSpec::Link(joint.tree, joint.link));
+        let number = assembly.scene.mimics.len();
+        let name = assembly.taken.unique(item.name().unwrap_or_else(|| format!("mimic{number}")));
+        return assembly.scene.mimics.push(JointMimicSpec { name, joint, of, multiplier, offset, enabled: true });
+    }
     let joint = &mut assembly.scene.articulated[first.tree].links[first.link].joint;
     if joint.mimic.is_some() {
         return reader.notes.add(element, "a second coupling of one joint is left out");

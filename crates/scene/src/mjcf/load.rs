@@ -83,6 +83,7 @@ pub(crate) fn one_body(path: &Path, options: &MjcfOptions) -> Result<(Articulate
     let others = [
         (scene.bodies.len(), "static and rigid bodies"),
         (scene.loop_joints.len(), "loop joints"),
+        (scene.mimics.len(), "couplings of joints"),
         (scene.pairs.len(), "pairs"),
     ];
     for (count, what) in others.into_iter().filter(|(count, _)| *count > 0) {

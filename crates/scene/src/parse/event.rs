@@ -77,6 +77,8 @@ pub(crate) enum ObjectKind {
     Link,
     /// A loop joint.
     Joint,
+    /// A coupling of two joints.
+    Mimic,
     /// A template, and the number of its bodies.
     Template(usize),
     /// An event.

@@ -18,6 +18,7 @@ use crate::parse::log::Log;
 use crate::parse::loop_joint::{LoopJointSpec, PartSpec, Parts};
 use crate::parse::material::MaterialSpec;
 use crate::parse::mesh::MeshSpec;
+use crate::parse::mimic::{JointMimicSpec, Joints};
 use crate::parse::pair::PairSpec;
 use crate::parse::place::Place;
 use crate::parse::problem::Invalid;
@@ -39,6 +40,7 @@ const MAX_SYNTAX_ERRORS: usize = 5;
 const MAX_ARTICULATED: usize = 10_000;
 /// Largest number of loop joints of a scene.
 const MAX_LOOP_JOINTS: usize = 100_000;
+const MAX_MIMICS: usize = 100_000;
 const MAX_SENSORS: usize = 100_000;
 /// Largest number of tables `[[pair]]` of a scene.
 const MAX_PAIRS: usize = 1_000;
@@ -68,6 +70,8 @@ pub struct SceneFile {
     pub articulated: Vec<ArticulatedSpec>,
     /// `[[loop_joint]]` in the order of the file.
     pub loop_joints: Vec<LoopJointSpec>,
+    /// `[[mimic]]` in the order of the file.
+    pub mimics: Vec<JointMimicSpec>,
     /// `[[template]]` in the order of the file.
     pub templates: Vec<TemplateSpec>,
     /// `[[event]]` in the order of the file.
@@ -140,6 +144,8 @@ impl SceneFile {
         let articulated = read_articulated(&mut f, &library, &place, &mut names);
         let objects = Objects { bodies: &bodies, articulated: &articulated };
         let loop_joints = read_loop_joints(&mut f, &objects, &mut names);
+        let joints = Joints { articulated: &articulated, loop_joints: &loop_joints };
+        let mimics = read_mimics(&mut f, &joints, &mut names);
         let sensors = read_sensors(&mut f, &objects, &loop_joints, &mut names);
         let pairs = read_pairs(&mut f, &library, &objects);
         let behaviors = BehaviorSpecs::read(&mut f, &library, &objects, |table, name| {
@@ -153,7 +159,7 @@ impl SceneFile {
         if lights.is_empty() {
             lights.push(LightSpec::sun());
         }
-        let named = object_names(&bodies, &articulated, &loop_joints, &templates);
+        let named = object_names(&bodies, &articulated, &loop_joints, &mimics, &templates);
         let events = read_events(&mut f, named, lights.len(), &mut names);
         let sky = read_table(&mut f, "sky", SkySpec::read).unwrap_or_default();
         let ground = read_table(&mut f, "ground", GroundSpec::read);
@@ -167,6 +173,7 @@ impl SceneFile {
             bodies,
             articulated,
             loop_joints,
+            mimics,
             templates,
             events,
             sensors,
@@ -335,6 +342,7 @@ fn object_names(
     bodies: &[BodySpec],
     articulated: &[ArticulatedSpec],
     loop_joints: &[LoopJointSpec],
+    mimics: &[JointMimicSpec],
     templates: &[TemplateSpec],
 ) -> ObjectNames {
     let mut names = ObjectNames::default();
@@ -344,6 +352,7 @@ fn object_names(
         spec.links.iter().for_each(|link| names.add(&format!("{}/{}", spec.name, link.name), ObjectKind::Link));
     }
     loop_joints.iter().for_each(|joint| names.add(&joint.name, ObjectKind::Joint));
+    mimics.iter().for_each(|mimic| names.add(&mimic.name, ObjectKind::Mimic));
     templates.iter().for_each(|template| names.add_template(&template.body.name, template.count));
     names
 }
@@ -358,6 +367,18 @@ fn read_events(f: &mut Fields<'_>, mut named: ObjectNames, lights: usize, names:
         events.push(event);
     }
     events
+}
+
+fn read_mimics(f: &mut Fields<'_>, joints: &Joints<'_>, names: &mut Taken) -> Vec<JointMimicSpec> {
+    let one = |mut table: Fields<'_>| {
+        let (log, place) = (table.log, name_span(&mut table));
+        let spec = JointMimicSpec::read(table, joints)?;
+        if !spec.name.is_empty() {
+            note_unique(log, "object", names, &spec.name, &place);
+        }
+        Some(spec)
+    };
+    f.tables("mimic", MAX_MIMICS).into_iter().filter_map(one).collect()
 }
 
 fn read_sensors(

@@ -29,6 +29,8 @@ pub struct JointSpec {
     pub position: Vec<f64>,
     /// Velocity numbers at time 0.
     pub velocity: Vec<f64>,
+    /// Cone of a spherical joint: 0, 1 or 2 for axis x, y or z of its frame, and half angle, rad.
+    pub cone: Option<(usize, f64)>,
     /// Inertia of its rotor, kg·m² or kg, at least 0; 0 unless it has one degree of freedom.
     pub armature: f64,
     /// Largest speed that a URDF states, rad/s or m/s. It is the velocity limit if its options ask for that.
@@ -147,6 +149,7 @@ impl JointSpec {
             mimic: None,
             position,
             velocity,
+            cone: None,
             armature: 0.0,
             speed: None,
             holds_start: false,
@@ -184,6 +187,7 @@ impl JointSpec {
         match self.kind {
             Joint::Spherical => {
                 self.read_resistance(f, keys);
+                self.read_own_cone(f);
                 self.read_spherical_start(f);
             }
             _ if self.is_single() => {
@@ -212,6 +216,33 @@ impl JointSpec {
         if let Some(cone) = number(f, ("cone_rad", Some("cone_deg"))) {
             self.dof.limits = Some([0.0, cone]);
         }
+    }
+
+    /// Reads the cone of a spherical joint of a link, and its axis.
+    fn read_own_cone(&mut self, f: &mut Fields<'_>) {
+        const EXPECTED: &str = "an axis of the joint's frame: [1, 0, 0], [0, 1, 0] or [0, 0, 1]";
+        let Some(cone) = number(f, ("cone_rad", Some("cone_deg"))) else { return };
+        let mut axis = 2;
+        if let Some(value) = f.value("axis") {
+            let problems = f.log.count();
+            let given: [f64; 3] = f.as_vector("axis", value, Bound::ANY);
+            let along: Vec<usize> = (0..3).filter(|k| given[*k] != 0.0).collect();
+            match along[..] {
+                [k] => axis = k,
+                _ if f.log.count() == problems => f.wrong("axis", value, EXPECTED),
+                _ => {}
+            }
+        }
+        self.cone = Some((axis, cone));
+    }
+
+    /// Returns the settings of each of its degrees of freedom.
+    pub(crate) fn dofs(&self) -> Vec<DofSettings> {
+        let of = |k: usize| {
+            let cone = self.cone.filter(|(axis, _)| *axis == k).map(|(_, cone)| [0.0, cone]);
+            DofSettings { limits: self.dof.limits.or(cone), ..self.dof.clone() }
+        };
+        (0..self.kind.dof()).map(of).collect()
     }
 
     fn read_spherical_start(&mut self, f: &mut Fields<'_>) {
@@ -293,10 +324,15 @@ impl JointSpec {
         let mut mimic = f.table("mimic", "{ joint = \"NAME\", multiplier = 1 }")?;
         let of = mimic.text("joint", "the name of the link whose joint it follows");
         let multiplier = mimic.number_or("multiplier", Bound::ANY, 1.0);
-        let offset = number(&mut mimic, self.keys().offset).unwrap_or(0.0);
+        let offset = self.read_offset(&mut mimic);
         mimic.finish();
         self.mimic = Some(MimicSpec { link: usize::MAX, multiplier, offset });
         of
+    }
+
+    /// Reads the offset of a coupling, rad or m; 0 without one.
+    pub(crate) fn read_offset(&self, f: &mut Fields<'_>) -> f64 {
+        number(f, self.keys().offset).unwrap_or(0.0)
     }
 
     /// Sets the target of a position drive without a target to the position at time 0.

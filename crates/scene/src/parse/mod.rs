@@ -17,6 +17,7 @@ pub(crate) mod log;
 pub(crate) mod loop_joint;
 pub(crate) mod material;
 pub(crate) mod mesh;
+pub(crate) mod mimic;
 pub(crate) mod mount;
 pub(crate) mod pair;
 pub(crate) mod place;

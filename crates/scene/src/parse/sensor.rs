@@ -70,7 +70,7 @@ impl SensorSpec {
         let oriented = kind == SensorKind::Orientation;
         let cutoff = if oriented { f64::INFINITY } else { f.number_or("cutoff", Bound::POSITIVE, f64::INFINITY) };
         let optics = kind.is_camera().then(|| read_optics(&mut f));
-        let (noisy, scaled) = (kind != SensorKind::Segmentation, !oriented && kind != SensorKind::Segmentation);
+        let (noisy, scaled) = (kind.has_noise(), !oriented && kind.has_noise());
         let number =
             |f: &mut Fields<'_>, key, read: bool| if read { f.number_or(key, Bound::NOT_NEGATIVE, 0.0) } else { 0.0 };
         let noise = SensorNoise {

@@ -79,8 +79,18 @@ impl Writer<'_> {
         joint.filter(|joint| *joint != name).into_iter().for_each(|joint| t.put("joint_name", joint));
         let rates = &state[model.positions() + v..model.positions() + v + kind.dof()];
         let dof = &body.dofs()[*v];
-        if body.dofs()[*v..v + kind.dof()].iter().any(|other| other != dof) {
+        let own = &body.dofs()[*v..v + kind.dof()];
+        let cones: Vec<(usize, f64)> = match kind {
+            Joint::Spherical => (0..3).filter_map(|k| own[k].limits.map(|[_, cone]| (k, cone))).collect(),
+            _ => Vec::new(),
+        };
+        let without_cone =
+            |dof: &DofSettings| DofSettings { limits: dof.limits.filter(|_| cones.is_empty()), ..dof.clone() };
+        if own.iter().any(|other| without_cone(other) != without_cone(dof)) {
             self.fault(format!("link \"{name}\": different damping or friction of one joint's degrees of freedom"));
+        }
+        if cones.len() > 1 {
+            self.fault(format!("link \"{name}\": cones about several axes of one joint"));
         }
         match kind {
             Joint::Fixed | Joint::Floating => {}
@@ -110,6 +120,10 @@ impl Writer<'_> {
                 t.put("joint", "spherical");
                 t.extend(rotation(&state[*q..q + 4]));
                 t.put("angular_velocity_rad_per_s", rates);
+                for (axis, cone) in cones {
+                    t.put("axis", [0, 1, 2].map(|k| if k == axis { 1.0 } else { 0.0 }));
+                    t.put("cone_rad", cone);
+                }
                 t.extend(resistance(dof));
             }
         }

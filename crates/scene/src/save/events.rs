@@ -170,7 +170,7 @@ impl Writer<'_> {
     }
 
     /// Returns `OBJECT/LINK` of the link that a degree of freedom moves.
-    fn dof_name(&self, id: ObjectId, dof: usize) -> Option<String> {
+    pub(super) fn dof_name(&self, id: ObjectId, dof: usize) -> Option<String> {
         let body = self.world.get::<ArticulatedBody>(id)?;
         let link = body.model().links().iter().find(|link| link.v == dof)?;
         Some(format!("{}/{}", self.world.name(id)?, link.name))

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use tumble_core::collide::Pose;
 use tumble_core::{
-    Anchor, ArticulatedBody, DofSettings, LoopJoint, LoopJointKind, ObjectId, PairMaterial, PairSide, Transmission,
+    Anchor, ArticulatedBody, DofSettings, Joint, JointRef, LoopJoint, LoopJointKind, Mimic, ObjectId, PairMaterial,
+    PairSide, Transmission,
 };
 
 use super::Writer;
@@ -59,6 +60,38 @@ impl Writer<'_> {
         t.put_unless(f64::INFINITY, "breaking_torque_n_m", torque);
         t.put_unless(true, "enabled", self.world.status(id).is_none_or(|status| status.enabled));
         self.out += &t.under("[[loop_joint]]");
+    }
+
+    /// Writes a coupling of two joints.
+    pub(super) fn mimic(&mut self, id: ObjectId, name: &str, mimic: &Mimic) {
+        let mut t = Table::of("name", name);
+        let mut turns = false;
+        for (key, joint) in ["joint", "of"].into_iter().zip(mimic.joints()) {
+            let (text, angle) = match joint {
+                JointRef::LoopJoint(joint) => (
+                    self.world.name(joint).map(str::to_owned),
+                    self.world.get::<LoopJoint>(joint).is_some_and(|joint| joint.kind().turns()),
+                ),
+                JointRef::Dof(body, dof) => (self.dof_name(body, dof), self.turns(body, dof)),
+            };
+            match text {
+                Some(text) => t.put(key, text),
+                None => self.fault(format!("\"{name}\", a coupling of a joint that was removed")),
+            }
+            turns |= angle && key == "joint";
+        }
+        let [multiplier, offset] = mimic.ratio();
+        t.put_unless(1.0, "multiplier", multiplier);
+        t.put_unless(0.0, if turns { "offset_rad" } else { "offset_m" }, offset);
+        t.put_unless(true, "enabled", self.world.status(id).is_none_or(|status| status.enabled));
+        self.out += &t.under("[[mimic]]");
+    }
+
+    /// Returns whether a degree of freedom of an articulated body is an angle.
+    fn turns(&self, body: ObjectId, dof: usize) -> bool {
+        let body = self.world.get::<ArticulatedBody>(body);
+        let link = body.and_then(|body| body.model().links().iter().find(|link| link.v == dof));
+        link.is_some_and(|link| matches!(link.joint, Joint::Revolute { .. }))
     }
 
     /// Returns the name of the part of a side, and its frame in the frame of the body or link;

@@ -32,8 +32,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use tumble_core::{
-    ArchiveError, ArticulatedBody, LoopJoint, Material, Object, ObjectId, RigidBody, ScriptedEvent, Sensor, Template,
-    World,
+    ArchiveError, ArticulatedBody, LoopJoint, Material, Mimic, Object, ObjectId, RigidBody, ScriptedEvent, Sensor,
+    Template, World,
 };
 
 use crate::notes::Notes;
@@ -194,7 +194,7 @@ impl Writer<'_> {
         let SceneFile {
             file: _, description: _, world: _, materials: _, meshes: _, bodies: _, articulated: _, loop_joints: _,
             actuators, pairs: _, camera: _, cave: _, lights: _, sky: _, ground: _, notes: _, saved: _,
-            sensors: _, behaviors: _, templates: _, events: _,
+            mimics: _, sensors: _, behaviors: _, templates: _, events: _,
         } = self.like;
         if !actuators.is_empty() {
             self.notes.push("the actuators of its model of MuJoCo are not written: scene files have none".into());
@@ -224,6 +224,11 @@ impl Writer<'_> {
                 self.loop_joint(id, name, joint);
             }
         }
+        for (id, name, _) in objects() {
+            if let Some(mimic) = world.get::<Mimic>(id) {
+                self.mimic(id, name, mimic);
+            }
+        }
         for (id, name, object) in objects() {
             self.other(id, name, object);
         }
@@ -244,6 +249,7 @@ impl Writer<'_> {
         } else if any.is::<RigidBody>()
             || any.is::<ArticulatedBody>()
             || any.is::<LoopJoint>()
+            || any.is::<Mimic>()
             || self.behavior(id, name)
         {
             return;

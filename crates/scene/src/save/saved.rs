@@ -100,6 +100,7 @@ impl SceneFile {
     fn has_objects_of(&self, other: &SceneFile) -> bool {
         (&self.meshes, &self.bodies, &self.articulated) == (&other.meshes, &other.bodies, &other.articulated)
             && (&self.loop_joints, &self.pairs, &self.materials) == (&other.loop_joints, &other.pairs, &other.materials)
+            && self.mimics == other.mimics
     }
 }
 

@@ -13,6 +13,7 @@ mod curved_screens;
 mod events;
 mod expansion;
 mod finding;
+mod mimics;
 mod mjcf;
 mod mjcf_damaged;
 mod mujoco;

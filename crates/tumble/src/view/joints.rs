@@ -48,7 +48,7 @@ impl Joints {
     pub fn new(scene: &SceneFile, world: &World) -> Joints {
         let mut joints = Vec::new();
         let several = scene.articulated.len() > 1;
-        for spec in scene.articulated.iter().filter(|_| scene.loop_joints.is_empty()) {
+        for spec in scene.articulated.iter().filter(|_| scene.loop_joints.is_empty() && scene.mimics.is_empty()) {
             let Some(id) = world.find(&spec.name) else { continue };
             let Some(body) = world.get::<ArticulatedBody>(id) else { continue };
             let place = |link: usize| {

@@ -29,10 +29,11 @@ use crate::articulated::model::playback::Playback;
 use std::sync::Arc;
 
 /// Settings of one degree of freedom. Spherical and floating joints support only damping, dry friction
-/// and velocity limits: their degrees of freedom have no single position.
+/// and velocity limits, and spherical ones cones: their degrees of freedom have no single position.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DofSettings {
-    /// Lower and upper limit of the position, rad or m.
+    /// Lower and upper limit of the position, rad or m. Those of degree of freedom `k` of a spherical joint are 0 and the
+    /// half angle of a cone about axis `k` of the joint's frame, x, y or z, in which the same axis of the link stays.
     pub limits: Option<[f64; 2]>,
     /// Viscous damping, N·m·s/rad or N·s/m, at least 0.
     pub damping: f64,
@@ -127,6 +128,15 @@ pub struct Coupling {
 }
 
 impl DofSettings {
+    /// Returns the first setting out of its range for a degree of freedom of a spherical joint.
+    pub(crate) fn spherical_range_error(&self) -> Option<(&'static str, f64, &'static str)> {
+        let below = self.limits.and_then(|[lo, cone]| {
+            let lower = (lo != 0.0).then_some(("the lower limit of the cone", lo, "0: a cone has no lower limit"));
+            lower.or((cone.is_nan() || cone < 0.0).then_some(("the cone", cone, "at least 0 rad")))
+        });
+        below.or(DofSettings { limits: None, ..self.clone() }.range_error(false))
+    }
+
     /// Returns the first setting out of its range: name, value, admissible range.
     pub(crate) fn range_error(&self, positional: bool) -> Option<(&'static str, f64, &'static str)> {
         let least =
@@ -139,7 +149,7 @@ impl DofSettings {
             return Some((
                 "the number of degrees of freedom of its joint with limits, springs or drives",
                 1.0,
-                "0: only revolute and prismatic joints have them",
+                "0: only revolute and prismatic joints have them, and spherical ones a cone",
             ));
         }
         let [lo, hi] = self.limits.unwrap_or([-1.0, 1.0]);

@@ -51,6 +51,7 @@
 //! are forces.
 
 mod at;
+mod coordinate;
 mod error;
 mod force;
 mod kind;
@@ -58,6 +59,7 @@ mod pair;
 mod transmission;
 
 pub use at::{Anchor, JointPlace};
+pub(crate) use coordinate::JointCoordinate;
 pub use error::LoopJointError;
 pub use force::JointForce;
 pub use kind::LoopJointKind;

@@ -386,12 +386,17 @@ impl EndPair {
 
     /// Adds a row.
     pub fn add(&self, row: &JointRow, out: &mut RowBuilder) {
-        let started = out.row(row.target);
-        for Term { side, motion, axis, factor } in row.terms.into_iter().flatten() {
-            let Some((id, part)) = [&self.a, &self.b][side].part else { continue };
+        out.row(row.target);
+        self.add_terms(&row.terms, 1.0, out);
+    }
+
+    /// Adds `scale` times a velocity to the open row.
+    pub fn add_terms(&self, terms: &Terms, scale: f64, out: &mut RowBuilder) {
+        for Term { side, motion, axis, factor } in terms.iter().flatten() {
+            let Some((id, part)) = [&self.a, &self.b][*side].part else { continue };
             match motion {
-                Motion::Point(p) => started.on_point(id, part, &p, &axis, factor),
-                Motion::Rotation => started.on_rotation(id, part, &axis, factor),
+                Motion::Point(p) => out.on_point(id, part, p, axis, scale * factor),
+                Motion::Rotation => out.on_rotation(id, part, axis, scale * factor),
             };
         }
     }

@@ -53,7 +53,7 @@ impl Gear {
     }
 
     /// Returns radius and angle of the points of the outline, counter-clockwise.
-    fn outline(&self) -> Vec<(f64, f64)> {
+    pub fn outline(&self) -> Vec<(f64, f64)> {
         (0..self.teeth)
             .flat_map(|tooth| {
                 let at = TAU * tooth as f64 / self.teeth as f64;

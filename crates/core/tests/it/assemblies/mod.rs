@@ -1,7 +1,9 @@
 //! Assemblies from raw meshes: the contacts alone guide the parts, as they do real ones.
 
+mod bearing;
 mod gear;
 mod thread;
+mod worm;
 
 use crate::common::*;
 use gear::Gear;

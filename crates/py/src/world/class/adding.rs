@@ -6,11 +6,13 @@ use crate::errors::{Error, Result};
 use crate::objects::articulation::Articulation;
 use crate::objects::body::{self, RigidBody};
 use crate::objects::joint::Joint;
+use crate::objects::mimic::Mimic;
 use crate::objects::sensor::Sensor;
 use crate::objects::shapes::Shape;
 use crate::world::add::{add, articulated, named_shape, rigid};
 use crate::world::class::World;
 use crate::world::joints;
+use crate::world::mimics;
 use crate::world::query::{self};
 use crate::world::sensors;
 use pyo3::prelude::*;
@@ -234,6 +236,25 @@ impl World {
         joints::add(&self.shared, py, &given)
     }
 
+    /// Couples two joints, and returns the coupling: the position of ``joint`` is ``multiplier`` times that of ``of``, plus ``offset``.
+    ///
+    /// joint, of: joints made by ``add_joint``, by handle or name, of a kind with a position other than ``"spherical"``; or
+    /// links that a revolute or prismatic joint moves, ``"ARTICULATION/LINK"`` or ``(articulation, "LINK")``. Together they
+    /// join two bodies that move at most. multiplier: not 0; between two angles of joints without limits a ratio of whole
+    /// numbers up to 1000. offset: rad or m, as the position of ``joint``.
+    #[pyo3(signature = (joint, of, multiplier=1.0, offset=0.0, *, name=""))]
+    fn add_mimic(
+        &self,
+        py: Python<'_>,
+        joint: &Bound<'_, PyAny>,
+        of: &Bound<'_, PyAny>,
+        multiplier: f64,
+        offset: f64,
+        name: &str,
+    ) -> Result<Mimic> {
+        mimics::add(&self.shared, py, [joint, of], [multiplier, offset], name)
+    }
+
     /// Adds a measuring sensor, read after every step: ``world.sensors[name]``.
     ///
     /// kind: ``"accelerometer"``, ``"gyroscope"``, ``"velocimeter"`` (in the axes of the site), ``"force"`` and ``"torque"`` (of the joint
@@ -250,7 +271,7 @@ impl World {
     /// deviation: standard deviation of white noise. bias_walk: that of the change of a bias in a second. quantization: distance
     /// of the values that a reading can have. delay: steps by which it is late. seed: start of the noise.
     ///
-    /// ``"depth"`` and ``"segmentation"`` are cameras that look along z of the site, with x to the right and y down in the image.
+    /// ``"depth"``, ``"segmentation"`` and ``"color"`` are cameras that look along z of the site, with x to the right and y down in the image.
     /// resolution: pixels in a row and rows, by default (64, 48). vertical_fov: rad, by default π/4. Their readings are made when
     /// they are read: distances along z, m, shape (rows, columns), -1 where nothing is; and what a pixel shows, shape (rows,
     /// columns, 2): the index in ``world.bodies`` and that of the link in its ``link_names``, -1 for nothing and other objects.

@@ -7,11 +7,13 @@ use crate::objects::bodies;
 use crate::objects::bodies::{Bodies, handle, place_of};
 use crate::objects::body::RigidBody;
 use crate::objects::joint::Joint;
+use crate::objects::mimic::Mimic;
 use crate::objects::place::by_name;
 use crate::objects::sensor::Sensors;
 use crate::world::add::own_place;
 use crate::world::class::World;
 use crate::world::joints;
+use crate::world::mimics;
 use crate::world::pairs::{self};
 use crate::world::sensors;
 use pyo3::prelude::*;
@@ -72,6 +74,12 @@ impl World {
         joints::all(&self.shared, py)
     }
 
+    /// All couplings of joints made by ``add_mimic`` or ``[[mimic]]``, in the order in which they were added.
+    #[getter]
+    fn mimics(&self, py: Python<'_>) -> Result<Vec<Mimic>> {
+        mimics::all(&self.shared, py)
+    }
+
     /// Returns the joint of that name, made by ``add_joint`` or ``[[loop_joint]]``.
     fn joint(&self, py: Python<'_>, name: &str) -> Result<Joint> {
         Joint::new(py, joints::place_by_name(&self.shared, name)?)
@@ -101,6 +109,7 @@ impl World {
             return Ok(());
         }
         let found = joints::place_of(&self.shared, body)?;
+        let found = found.map_or_else(|| mimics::place_of(&self.shared, body), |place| Ok(Some(place)))?;
         let place = match found.map_or_else(|| sensors::place_of(&self.shared, body), |place| Ok(Some(place)))? {
             Some(place) => place,
             None => match behaviors::own_place(&self.shared, body)? {

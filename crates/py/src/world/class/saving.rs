@@ -29,7 +29,7 @@ impl World {
     }
 
     /// Returns everything that the next step reads as bytes, for ``restore`` in a world of the same
-    /// bodies. Shapes, masses, settings and drives are not included.
+    /// bodies, with the drives that were set since they were added. Shapes, masses and settings are not included.
     fn save<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyBytes>> {
         let bytes = self.shared.read(|inner| Ok(snapshot::write(inner)))?;
         Ok(PyBytes::new(py, &bytes))
