@@ -48,10 +48,11 @@ def wheel(width, sections=5):
 
 world = tumble.World(dt=1 / 240, gravity=(0, 0, 0))
 steel = {"density": 7800, "friction": 0.05}
-screw = world.add_rigid("worm", worm(5 * PITCH), color=(0.75, 0.55, 0.25), **steel)
+screw = world.add_rigid("worm", worm(5 * PITCH), **steel)
 half = 0.5**0.5
 # a gap of the thread faces the tooth on the x axis of the wheel, which points to the worm; its own axis is y
-gear = world.add_rigid("wheel", wheel(0.012), position=(R1 + R2, 0, 0), orientation=(0, half, half, 0), color=(0.55, 0.6, 0.65), **steel)
+gear = world.add_rigid("wheel", wheel(0.012), position=(R1 + R2, 0, 0), orientation=(0, half, half, 0), **steel)
+screw.color, gear.color = (0.75, 0.55, 0.25), (0.55, 0.6, 0.65)
 axles = [world.add_joint("revolute", screw), world.add_joint("revolute", gear, axis=(0, 1, 0), damping=0.01)]
 axles[0].set_drive(velocity=4 * np.pi)
 

@@ -99,7 +99,7 @@ def test_a_lamp_of_an_articulation_stays_in_its_cone():
 
 def test_a_color_camera_sees_its_own_light():
     world = tumble.World()
-    world.add_static("ball", tumble.Sphere(0.5), color=(0.2, 0.4, 0.8))
+    world.add_static("ball", tumble.Sphere(0.5)).color = (0.2, 0.4, 0.8)
     camera = world.add_sensor("color", name="eye", position=(0, 0, 2), orientation=(1, 0, 0, 0), resolution=(41, 31), vertical_fov=0.8)
     image = camera.value
     assert image.shape == (31, 41, 3) and image.dtype == np.uint8 and (image == world.sensors["eye"]).all()

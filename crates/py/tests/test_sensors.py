@@ -153,7 +153,7 @@ def test_what_cannot_be_read_is_an_error():
 def test_the_kinds_are_those_of_the_types():
     world = tumble.World()
     ball = world.add_rigid("ball", tumble.Sphere(0.1), mass=1)
-    assert len(SensorKind.__args__) == 18
+    assert len(SensorKind.__args__) == 19
     for kind in SensorKind.__args__:
         if kind not in ("force", "torque", "joint_position", "joint_velocity", "drive_force"):
             sensor = world.add_sensor(kind, ball, name=kind)

@@ -27,7 +27,7 @@ use crate::articulated::ArticulatedBody;
 use crate::constraint::builder::RowBuilder;
 use crate::constraint::loop_joint::{JointCoordinate, LoopJoint, LoopJointKind};
 use crate::constraint::rows::RowSet;
-use crate::object::part_state::StateRange;
+use crate::object::part_state::{StateRange, Wrench};
 use crate::object::{Constraint, Level, Object, RowTarget};
 use crate::world::World;
 use crate::world::view::{ObjectId, WorldView};
@@ -223,6 +223,16 @@ impl Mimic {
         changed.set_ratio(multiplier, offset)?;
         changed.step(view).ok_or_else(|| changed.without_step())?;
         Ok(changed)
+    }
+
+    /// Adds the wrenches of its force on the parts that loop joints join, each about the part's origin. Forces along joints
+    /// of articulated bodies act between links, and are no loads.
+    pub(crate) fn add_wrenches(&self, view: &WorldView, force: f64, out: &mut [Wrench]) {
+        for (joint, factor) in self.joints.into_iter().zip([1.0, -self.multiplier]) {
+            if let Some(Position::Loop(joint)) = Position::of(joint, view) {
+                joint.add_wrenches(factor * force, view, out);
+            }
+        }
     }
 
     fn error_of(&self, follower: &Position, leader: &Position, step: f64) -> f64 {

@@ -5,6 +5,7 @@
 
 use crate::ArticulatedBody;
 use crate::constraint::loop_joint::LoopJoint;
+use crate::constraint::mimic::Mimic;
 use crate::contact::detect::ContactConstraint;
 use crate::contact::warm_starts::RowStart;
 use crate::object::part_state::Wrench;
@@ -177,6 +178,8 @@ impl Core {
                 let sum = joint.transmitted(&view, rows);
                 out.joints.push((entry.serial, JointLoad { force: sum.force, torque: sum.torque, drive: sum.drive }));
                 joint.add_wrenches(&view, rows, &mut out.wrenches);
+            } else if let Some(mimic) = any.downcast_ref::<Mimic>() {
+                rows.iter().for_each(|row| mimic.add_wrenches(&view, row.force, &mut out.wrenches));
             }
         }
     }

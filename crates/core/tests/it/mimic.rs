@@ -117,6 +117,34 @@ fn a_joint_of_a_robot_follows_a_loop_joint() {
     }
 }
 
+/// A balance beam of a robot carries a drum on a loop joint, whose coupling to a second drum holds it against a weight's
+/// torque: the sensor in the beam's joint reads the torque of the coupling.
+#[test]
+fn a_force_sensor_reads_what_a_coupling_does() {
+    let mut world = no_gravity(world("time_stepping", 0.002));
+    let mut builder = ModelBuilder::new();
+    let beam = LinkMass { mass: 1.0, center: Vec3::zeros(), inertia: Mat3::identity() * 0.1 };
+    builder.link("beam", None, Joint::revolute(Vec3::z()), Pose::identity(), beam);
+    let mut robot = ArticulatedBody::new("robot", builder.build().unwrap());
+    let drive = articulated::Drive::Velocity { target: 0.0, limit: f64::INFINITY };
+    robot.set_dof(0, DofSettings { drive, ..DofSettings::default() }).unwrap();
+    let robot = world.add(robot).unwrap();
+    // the joint between beam and drum carries no torque about z, so the beam feels the coupling alone
+    let drum = ball(&mut world, Vec3::x(), 1.0, 0.5);
+    let hinge = LoopJoint::revolute_at("", &world, Some((drum, 0)), Some((robot, 0)), Vec3::x(), Vec3::z()).unwrap();
+    let hinge = world.add(hinge).unwrap();
+    couple(&mut world, [JointRef::LoopJoint(hinge), JointRef::Dof(robot, 0)], 1.0, 0.0);
+    let sensor = Sensor::new("torque", SensorKind::Torque, Anchor::on(robot, 0, Pose::identity())).unwrap();
+    let sensor = world.add(sensor).unwrap();
+    for _ in 0..10 {
+        world.apply_torque(drum, 0, Vec3::z() * 3.0).unwrap();
+        world.step().unwrap();
+    }
+    // the drum stands still: the coupling holds it with −3 N·m, and the beam's joint holds +3 N·m of its reaction
+    let reading = world.reading(sensor).unwrap();
+    assert!((reading[2] + 3.0).abs() < 1e-9, "{reading:?}");
+}
+
 /// A fork, a snapshot and an archive go on with the same bits, and what the coupling cannot be is refused by name.
 #[test]
 fn couplings_are_kept_and_their_faults_named() {

@@ -3,6 +3,7 @@
 use super::LoopJoint;
 use super::pair::{Coordinate, EndPair};
 use crate::constraint::builder::RowBuilder;
+use crate::object::part_state::Wrench;
 use crate::world::view::WorldView;
 
 /// The position of a loop joint, with the sides on which a row along it acts.
@@ -25,6 +26,11 @@ impl JointCoordinate {
     /// Adds `factor` times its rate to the open row.
     pub fn add(&self, factor: f64, out: &mut RowBuilder) {
         self.pair.add_terms(&self.coordinate.terms, factor, out);
+    }
+
+    /// Adds the wrenches of a force along it on both parts, each about the part's origin.
+    pub fn add_wrenches(&self, force: f64, view: &WorldView, out: &mut [Wrench]) {
+        self.pair.add_wrenches(&self.coordinate.terms, force, view, out);
     }
 }
 

@@ -63,21 +63,7 @@ impl LoopJoint {
         let Some(pair) = self.pair(view) else { return };
         let Some((rows, _)) = self.rows_with(&pair, view.time, forces.len()) else { return };
         for (row, start) in rows.iter().zip(forces) {
-            for Term { side, motion, axis, factor } in row.terms.into_iter().flatten() {
-                let end = [&pair.a, &pair.b][side];
-                let Some(range) = end.part.and_then(|(id, _)| view.state_range(id)) else { continue };
-                let Some(wrench) = end.part.and_then(|(_, part)| out.get_mut(range.parts.start + part)) else {
-                    continue;
-                };
-                let force = factor * start.force * axis;
-                match motion {
-                    Motion::Point(p) => {
-                        wrench.force += force;
-                        wrench.torque += (p - end.part_state.position()).cross(&force);
-                    }
-                    Motion::Rotation => wrench.torque += force,
-                }
-            }
+            pair.add_wrenches(&row.terms, start.force, view, out);
         }
     }
 
@@ -99,6 +85,27 @@ impl LoopJoint {
 
     pub(crate) fn is_breakable(&self) -> bool {
         self.breaking().iter().any(|most| most.is_finite())
+    }
+}
+
+impl EndPair {
+    /// Adds the wrenches of a force along a velocity on the two parts, each about the part's origin.
+    pub(super) fn add_wrenches(&self, terms: &Terms, force: f64, view: &WorldView, out: &mut [Wrench]) {
+        for Term { side, motion, axis, factor } in terms.iter().flatten() {
+            let end = [&self.a, &self.b][*side];
+            let Some(range) = end.part.and_then(|(id, _)| view.state_range(id)) else { continue };
+            let Some(wrench) = end.part.and_then(|(_, part)| out.get_mut(range.parts.start + part)) else {
+                continue;
+            };
+            let force = *factor * force * axis;
+            match motion {
+                Motion::Point(p) => {
+                    wrench.force += force;
+                    wrench.torque += (p - end.part_state.position()).cross(&force);
+                }
+                Motion::Rotation => wrench.torque += force,
+            }
+        }
     }
 }
 

@@ -60,6 +60,10 @@ fn the_balls_of_a_bearing_go_around_at_their_kinematic_ratio() {
     assert!(triangles <= 20_000);
     world.add_static(steel("outer ring", shape(outer), 0.3)).unwrap();
     let shaft = world.add(steel("shaft", shape(inner), 0.3)).unwrap();
+    // another bearing at the end of the shaft: it holds the direction of the axis and the place along it
+    let place = JointPlace::on_line(Vec3::zeros(), Vec3::z());
+    let held = LoopJoint::joining("end", LoopJointKind::Planar, &world, Some((shaft, 0)), None, place).unwrap();
+    world.add(held).unwrap();
     let mut balls = Vec::new();
     for k in 0..COUNT {
         let (sin, cos) = (TAU * (k as f64 + 0.5) / COUNT as f64).sin_cos();
@@ -111,8 +115,8 @@ fn the_balls_of_a_bearing_go_around_at_their_kinematic_ratio() {
         turns.total / TAU
     );
     assert!((ratio - expected).abs() < 0.01 * expected, "{ratio}, {expected}");
-    // the shaft stays within the play and the facets of the grooves
-    assert!(low < 2.0 * PLAY && overlap < 1e-5, "{low} m, {overlap} m");
+    // the shaft stays within the play
+    assert!(low < PLAY && overlap < 1e-4, "{low} m, {overlap} m");
     let spread = gone.iter().fold(0.0f64, |spread, g| spread.max((g / gone[0] - 1.0).abs()));
     assert!(spread < 0.5, "no ball is left behind: {spread}");
 }
