@@ -1,6 +1,5 @@
 //! Assemblies from raw meshes: the contacts alone guide the parts, as they do real ones.
 
-mod bearing;
 mod gear;
 mod thread;
 mod worm;
