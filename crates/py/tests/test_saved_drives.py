@@ -42,11 +42,15 @@ def test_drives_that_the_program_set_are_saved_and_restored():
         other.restore(saved)
         other.step(100)
         assert (other.state == expected).all()
-    # a snapshot from before has the drives with which the bodies were added
+    # a snapshot from before has the drives with which the bodies were added, in a pickled copy too
+    other = pickle.loads(pickle.dumps(world))
+    assert other.save() == world.save()
+    other.restore(plain)
+    other.step(240)
     world.restore(plain)
     world.step(240)
     assert arm.qd[0] == pytest.approx(1, abs=1e-6) and axle.velocity == 0
-    assert world.save() != plain and axle.drive_force == 0
+    assert world.save() == other.save() and axle.drive_force == 0
 
 
 def test_damaged_drives_change_nothing():

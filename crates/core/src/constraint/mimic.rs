@@ -280,7 +280,7 @@ fn objects_of(world: &World, joint: &JointRef) -> Option<Vec<ObjectId>> {
 
 /// The position of a joint in a view of the world, with what its row acts on.
 enum Position {
-    Loop(JointCoordinate),
+    Loop(Box<JointCoordinate>),
     Dof { body: ObjectId, dof: usize, of: usize, position: f64 },
 }
 
@@ -289,7 +289,7 @@ impl Position {
         match joint {
             JointRef::LoopJoint(id) => {
                 view.status(id).filter(|status| status.enabled)?;
-                view.get::<LoopJoint>(id)?.joint_coordinate(view).map(Position::Loop)
+                view.get::<LoopJoint>(id)?.joint_coordinate(view).map(Box::new).map(Position::Loop)
             }
             JointRef::Dof(body, dof) => {
                 view.status(body).filter(|status| status.enabled)?;

@@ -21,7 +21,7 @@ const MAGIC: [u8; 8] = *b"tumbleD1";
 pub type Drives = BTreeMap<ObjectId, Vec<Drive>>;
 
 /// Returns the drives of an articulated body, or that of a loop joint; none of another object.
-fn of(world: &World, id: ObjectId) -> Vec<Drive> {
+pub fn of(world: &World, id: ObjectId) -> Vec<Drive> {
     if let Some(body) = world.get::<ArticulatedBody>(id) {
         return body.dofs().iter().map(|dof| dof.drive.clone()).collect();
     }
