@@ -22,6 +22,7 @@ WORDS = {  # what must stand in the output, beside what each script asserts itse
     "pendulum_energy": "period by theory            2.152875 s",
     "rollout_control": "touched: False",
     "sphere_tree": "level 2: 64 balls",
+    "worm_gear": "by theory -0.8378",
     "wind_force": "falling at 0.981 m/s",
 }
 
