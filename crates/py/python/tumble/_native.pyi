@@ -1181,6 +1181,20 @@ class Articulation:
         keyframe: name or number of the keyframe that it starts in. missing_meshes: ``"error"`` or
         ``"skip"``, for missing collision meshes. collision_meshes: ``"exact"`` or ``"hull"``.
         """
+    @staticmethod
+    def from_sdformat(
+        path: _Path,
+        *,
+        packages: Mapping[str, _Path] | None = None,
+        missing_meshes: MissingMeshes = "error",
+        collision_meshes: CollisionMeshes = "exact",
+    ) -> Articulation:
+        """Reads the only body of joined links of an SDF file (of Gazebo), at the place that it has there.
+        ``World.load`` reads a whole file: models, planes, lights, gravity and time step.
+
+        packages: folders by name, for ``model://NAME/…``. missing_meshes: ``"error"`` or ``"skip"``, for
+        missing collision meshes. collision_meshes: ``"exact"`` or ``"hull"``.
+        """
     @property
     def name(self) -> str:
         """Name of the robot in its file, or of the body in its world."""
@@ -2169,6 +2183,12 @@ class World:
         Returns notes about things that are not in it, such as generalized forces and visuals that scenes do
         not have. Forces and behaviors written in Python, and all else that a scene cannot say, raise
         ``ValueError`` with their names, and nothing is written.
+        """
+    def save_mjcf(self, path: _Path) -> list[str]:
+        """Writes the world as it stands to a model of MuJoCo (``.xml`` or ``.mjcf``), with a folder
+        ``NAME_files`` beside it for meshes. The keyframe ``now`` of the model is the present state.
+
+        Returns notes about everything that MJCF cannot say.
         """
     def save(self) -> bytes:
         """Returns everything that the next step reads as bytes, for ``restore`` in a world of the same
