@@ -27,7 +27,7 @@ use std::cell::RefCell;
 /// Largest input, bytes: that of scene files.
 const MAX_INPUT: usize = tumble_scene::MAX_BYTES as usize;
 
-/// What the page reads and writes.
+/// Input, text and scene of the page.
 #[derive(Default)]
 struct Page {
     input: Vec<u8>,

@@ -27,6 +27,7 @@ mod same_bits;
 mod saving;
 mod scenes_in_motion;
 mod sdformat;
+mod sdformat_damaged;
 mod sensors;
 mod shipped;
 mod spheres;
