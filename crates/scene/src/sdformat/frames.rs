@@ -7,7 +7,7 @@
 //!     a joint                                  its child link
 //! ```
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Quaternion, Unit};
 use tumble_core::collide::Pose;
@@ -63,6 +63,7 @@ impl<'a, 'd> Frames<'a, 'd> {
     pub(super) fn pose(&mut self, name: &str) -> Option<Pose> {
         // the frames from the named one to one whose pose is known
         let (mut chain, mut at): (Vec<(&'a str, Pose)>, &str) = (Vec::new(), name);
+        let mut seen = BTreeSet::new();
         let mut pose = loop {
             if at == MODEL {
                 break Pose::identity();
@@ -71,7 +72,7 @@ impl<'a, 'd> Frames<'a, 'd> {
             if let Some(pose) = named.pose {
                 break pose;
             }
-            if chain.iter().any(|(other, _)| other == own) {
+            if !seen.insert(*own) {
                 named.element.problem("has a pose relative to itself", "expected frames without loops");
                 return None;
             }

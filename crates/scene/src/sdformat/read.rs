@@ -132,7 +132,9 @@ impl Reading {
                 LightKind::Directional { direction: direction.try_normalize(1e-9).unwrap_or(-Vec3::z()).into() }
             }
             Some("point") => LightKind::Point { position_m: pose.translation.vector.into() },
-            _ => return note(light, "lights of other types than directional and point are left out", &mut context.notes),
+            _ => {
+                return note(light, "lights of other types than directional and point are left out", &mut context.notes);
+            }
         };
         let color = light.child("diffuse").and_then(|diffuse| numbers::<4>(&diffuse, Bound::ANY));
         let [r, g, b, _] = color.unwrap_or([1.0; 4]).map(|x| x.clamp(0.0, 1.0));

@@ -251,6 +251,38 @@ axis = [1, 0, 0]
     assert_eq!(error.to_string(), "model.txt: expected the name of a .xml or .mjcf file");
 }
 
+/// Limits of one side, and equal ones, which hold a joint.
+#[test]
+fn limits_come_back() {
+    let text = r#"
+[[articulated]]
+name = "arm"
+[[articulated.link]]
+name = "a"
+joint = "revolute"
+axis = [0, 1, 0]
+limits_rad = [-0.5, 1.25]
+mass_kg = 1
+center_m = [0, 0, -0.5]
+[[articulated.link]]
+name = "b"
+parent = "a"
+position_m = [0, 0, -1]
+joint = "prismatic"
+axis = [0, 0, 1]
+limits_m = [0.25, 0.25]
+displacement_m = 0.25
+mass_kg = 1
+"#;
+    let scene = SceneFile::parse(text, "limits.toml").unwrap_or_else(|error| panic!("{error}"));
+    let (world, _) = scene.build().unwrap();
+    let written = MjcfWriter::new(&world).like(&scene).text("files");
+    let read = tumble_scene::mjcf::parse(&written.text, "limits.xml", &MjcfOptions::default()).unwrap();
+    let links = moving(&read.articulated[0].links);
+    let limits: Vec<_> = links.iter().map(|link| link.joint.dof.limits).collect();
+    assert_eq!(limits, [Some([-0.5, 1.25]), Some([0.25; 2])], "{}", written.text);
+}
+
 /// Filters of groups, excluded pairs and welds come back.
 #[test]
 fn contacts_and_constraints_come_back() {

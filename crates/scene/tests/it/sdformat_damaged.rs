@@ -10,8 +10,28 @@ const FILES: [&str; 2] = [
 ];
 /// Words that replace others.
 const WORDS: [&str; 22] = [
-    "0", "-1", "1e300", "nan", "", "0 0 0 0 0 0", "true", "ball", "universal", "world", "__model__", "a", "b", "f", "j",
-    "k", "mesh", "plane", "link", "joint", "1e-12", "a::b",
+    "0",
+    "-1",
+    "1e300",
+    "nan",
+    "",
+    "0 0 0 0 0 0",
+    "true",
+    "ball",
+    "universal",
+    "world",
+    "__model__",
+    "a",
+    "b",
+    "f",
+    "j",
+    "k",
+    "mesh",
+    "plane",
+    "link",
+    "joint",
+    "1e-12",
+    "a::b",
 ];
 
 /// Reads a text and builds what is read.

@@ -26,6 +26,9 @@ use super::bodies::put_rotation;
 use super::geoms::visual_of;
 use super::xml::{Attributes, numbers, vector};
 
+/// Limit of a joint that is open at one end, rad or m.
+const FAR: f64 = 1e10;
+
 /// An articulated body that is being written.
 struct Tree<'b> {
     id: ObjectId,
@@ -171,7 +174,15 @@ impl MjcfWriter<'_> {
                 t.put("type", if turns { "hinge" } else { "slide" });
                 t.put_unless(Vec3::zeros(), "pos", at.translation.vector, vector(&at.translation.vector));
                 t.put("axis", vector(&(at.rotation * axis)));
-                dof.limits.iter().for_each(|limits| t.put("range", numbers(*limits)));
+                match dof.limits {
+                    // MuJoCo refuses a range without width
+                    Some([low, high]) if low == high => {
+                        let held = Attributes::of("joint1", &tree.joints[k]);
+                        self.equalities.push(("joint", held.with("polycoef", numbers([low, 0.0, 0.0, 0.0, 0.0]))));
+                    }
+                    Some(limits) => t.put("range", numbers(limits.map(|x| x.clamp(-FAR, FAR)))),
+                    None => {}
+                }
                 if let Some(spring) = &dof.spring {
                     t.put_number(0.0, "stiffness", spring.stiffness);
                     t.put_number(0.0, "springref", spring.rest);
