@@ -5,8 +5,8 @@ use tumble_scene::sdformat::parse;
 use tumble_scene::urdf::{MissingMeshes, UrdfOptions};
 
 const FILES: [&str; 2] = [
-    include_str!("../../../../fuzz/seeds/sdformat/arm.sdf"),
-    include_str!("../../../../fuzz/seeds/sdformat/world.sdf"),
+    include_str!("../sdformat/arm.sdf"),
+    include_str!("../sdformat/world.sdf"),
 ];
 /// Words that replace others.
 const WORDS: [&str; 22] = [
