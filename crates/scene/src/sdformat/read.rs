@@ -133,7 +133,11 @@ impl Reading {
             }
             Some("point") => LightKind::Point { position_m: pose.translation.vector.into() },
             _ => {
-                return note(light, "lights of other types than directional and point are left out", &mut context.notes);
+                return note(
+                    light,
+                    "lights of other types than directional and point are left out",
+                    &mut context.notes,
+                );
             }
         };
         let color = light.child("diffuse").and_then(|diffuse| numbers::<4>(&diffuse, Bound::ANY));

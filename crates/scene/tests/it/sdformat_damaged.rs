@@ -4,10 +4,7 @@ use proptest::prelude::*;
 use tumble_scene::sdformat::parse;
 use tumble_scene::urdf::{MissingMeshes, UrdfOptions};
 
-const FILES: [&str; 2] = [
-    include_str!("../sdformat/arm.sdf"),
-    include_str!("../sdformat/world.sdf"),
-];
+const FILES: [&str; 2] = [include_str!("../sdformat/arm.sdf"), include_str!("../sdformat/world.sdf")];
 /// Words that replace others.
 const WORDS: [&str; 22] = [
     "0",

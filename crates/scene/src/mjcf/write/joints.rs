@@ -44,6 +44,9 @@ impl MjcfWriter<'_> {
         }
         let body = self.world.get::<ArticulatedBody>(id)?;
         let name = self.names.get(&(id, body.link_of(part)))?.clone();
-        Some((name, body.part_pose(part) * side.frame))
+        let frame = body.part_pose(part) * side.frame;
+        // a base without a body of its own
+        let in_world = name == "world" && body.link_of(part).is_none();
+        Some((name, if in_world { body.base() * frame } else { frame }))
     }
 }

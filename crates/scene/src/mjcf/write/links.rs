@@ -40,6 +40,8 @@ struct Tree<'b> {
     children: Vec<Vec<usize>>,
     /// Names of its joints by link.
     joints: Vec<String>,
+    /// Whether it has a body for its base: the base carries something, or several roots.
+    based: bool,
 }
 
 impl MjcfWriter<'_> {
@@ -60,7 +62,12 @@ impl MjcfWriter<'_> {
             self.joints.unique(own.to_string())
         });
         let joints = joints.collect::<Vec<_>>();
-        let tree = Tree { id, name, body, state, collides: status.collidable, children, joints };
+        let fixed = links.iter().filter(|link| link.parent.is_none() && link.joint != Joint::Floating).count();
+        let based = fixed > 1
+            || body.colliders().any(|(link, _)| link.is_none())
+            || visuals(body, None).next().is_some()
+            || body.model().frames().iter().any(|frame| frame.link.is_none());
+        let tree = Tree { id, name, body, state, collides: status.collidable, children, joints, based };
         self.base(&tree);
         for root in roots(links, Joint::Floating) {
             self.link(&tree, root, &[]);
@@ -84,23 +91,21 @@ impl MjcfWriter<'_> {
     /// Writes the base with what is fixed to it, and the trees of links on it.
     fn base(&mut self, tree: &Tree<'_>) {
         let links = tree.body.model().links();
-        let label = self.bodies.unique(tree.name.to_string());
-        self.names.insert((tree.id, None), label.clone());
-        let fixed: Vec<usize> =
-            (0..links.len()).filter(|k| links[*k].parent.is_none() && links[*k].joint != Joint::Floating).collect();
-        let carries = tree.body.colliders().any(|(link, _)| link.is_none())
-            || visuals(tree.body, None).next().is_some()
-            || tree.body.model().frames().iter().any(|frame| frame.link.is_none());
-        if fixed.is_empty() && !carries {
+        let fixed = (0..links.len()).filter(|k| links[*k].parent.is_none() && links[*k].joint != Joint::Floating);
+        if !tree.based {
+            self.names.insert((tree.id, None), "world".into());
+            fixed.for_each(|root| self.link(tree, root, &[]));
             return;
         }
+        let taken = links.iter().any(|link| link.name == tree.name);
+        let label = if taken { format!("{}/base", tree.name) } else { tree.name.to_owned() };
+        let label = self.bodies.unique(label);
+        self.names.insert((tree.id, None), label.clone());
         let mut t = Attributes::of("name", label);
         t.put_pose(tree.body.base());
         self.xml.open("body", &t);
         self.content(tree, None);
-        for root in fixed {
-            self.link(tree, root, &[]);
-        }
+        fixed.for_each(|root| self.link(tree, root, &[]));
         self.xml.close();
     }
 
@@ -286,7 +291,7 @@ impl Tree<'_> {
     fn placement(&self, link: &Link) -> Pose {
         match (&link.joint, link.parent) {
             (Joint::Floating, _) => pose_of(&self.state[link.q..link.q + 7]),
-            (_, None) => self.body.base().inverse() * link.placement,
+            (_, None) if self.based => self.body.base().inverse() * link.placement,
             _ => link.placement,
         }
     }
