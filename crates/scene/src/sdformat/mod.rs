@@ -23,7 +23,7 @@
 //!
 //! Everything else is a note with the file, the line and the element. Nested models and `<include>` are errors, as are other
 //! types of joints and links with two joints. How meshes are found and what replaces the file's surfaces are
-//! [`UrdfOptions`](crate::urdf::UrdfOptions); the file says whether its roots float.
+//! [`UrdfOptions`]; the file says whether its roots float.
 
 mod error;
 mod frames;
