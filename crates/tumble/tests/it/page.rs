@@ -43,10 +43,16 @@ fn scenes_in_a_browser_have_the_bits_of_this_machine() {
     browser.open(&format!("file://{}#paused&scene=falling", file.display()));
     browser.wait_for("window.tumble.ready || window.tumble.error !== ''");
     assert_eq!(browser.run("tumble.error"), "");
-    for (scene, frames) in [("falling", 240), ("stack", 60), ("pendulum", 60), ("robot", 60), ("cloth", 5), ("sparks", 60)] {
+    for (scene, frames) in
+        [("falling", 240), ("stack", 60), ("pendulum", 60), ("robot", 60), ("cloth", 5), ("sparks", 60)]
+    {
         browser.run(&format!("tumble.open('{scene}')"));
         let before = browser.screenshot(&format!("page-{scene}-0"));
-        assert_eq!(browser.run(&format!("tumble.step({frames}) && (tumble.draw(), tumble.frame())")), frames, "{scene}");
+        assert_eq!(
+            browser.run(&format!("tumble.step({frames}) && (tumble.draw(), tumble.frame())")),
+            frames,
+            "{scene}"
+        );
         assert_eq!(browser.run("tumble.hash()"), native_hash(scene, frames).as_str(), "{scene} after {frames} frames");
         let after = browser.screenshot(&format!("page-{scene}-{frames}"));
         let pixels = changed(&before, &after);
@@ -57,7 +63,8 @@ fn scenes_in_a_browser_have_the_bits_of_this_machine() {
     browser.run("tumble.open('[world]\\ndt = 1\\n')");
     let said = browser.run("tumble.error").as_str().unwrap().to_owned();
     assert!(said.contains("scene.toml:2") && said.contains("dt_s"), "{said}");
-    browser.run("tumble.open('[[body]]\\nname = \"a\"\\nshape = { type = \"sphere\", radius_m = 1 }\\nmass_kg = 1\\n')");
+    browser
+        .run("tumble.open('[[body]]\\nname = \"a\"\\nshape = { type = \"sphere\", radius_m = 1 }\\nmass_kg = 1\\n')");
     assert_eq!(browser.run("tumble.error"), "");
     // by itself it runs in real time
     browser.run("tumble.open('falling'); tumble.playing = true");
