@@ -16,6 +16,7 @@ use tumble::net::record::RecordError;
 use tumble::render::RenderError;
 use tumble::scene::cave::CaveError;
 use tumble::scene::mjcf::MjcfError;
+use tumble::scene::sdformat::SdformatError;
 use tumble::scene::urdf::UrdfError;
 use tumble::scene::{BuildError, SceneError, UnknownName};
 
@@ -54,6 +55,8 @@ pub enum Error {
     Urdf(#[from] UrdfError),
     #[error(transparent)]
     Mjcf(#[from] MjcfError),
+    #[error(transparent)]
+    Sdformat(#[from] SdformatError),
     #[error(transparent)]
     Cave(#[from] CaveError),
     #[error(transparent)]
@@ -133,6 +136,8 @@ impl Error {
             },
             Error::Urdf(UrdfError::Read { source, .. }) => of_file(source),
             Error::Mjcf(MjcfError::Read { source, .. }) => of_file(source),
+            Error::Sdformat(SdformatError::Read { source, .. })
+            | Error::Scene(SceneError::Sdformat(SdformatError::Read { source, .. })) => of_file(source),
             Error::Build(BuildError::MeshFile { source, .. }) => of_file(source),
             Error::File { source, .. } => of_file(source),
             Error::Record(RecordError::Io { source, .. }) => of_file(source),
@@ -144,7 +149,7 @@ impl Error {
             Error::Record(RecordError::Input { .. }) => "InvalidValueError",
             Error::Record(_) => "RecordingError",
             Error::Build(BuildError::World { .. }) => "InvalidValueError",
-            Error::Scene(_) | Error::Build(_) | Error::Urdf(_) | Error::Mjcf(_) => "SceneError",
+            Error::Scene(_) | Error::Build(_) | Error::Urdf(_) | Error::Mjcf(_) | Error::Sdformat(_) => "SceneError",
             Error::Snapshot(_) | Error::Archive(_) => "SnapshotError",
             Error::Step(_) | Error::Linearize(LinearizeError::Step(_)) => "StepError",
             Error::Fork { source, .. } | Error::Member { source, .. } => source.class(),

@@ -6,6 +6,7 @@ use thiserror::Error;
 
 use crate::mjcf::MjcfError;
 use crate::parse::problem::{Invalid, Problem};
+use crate::sdformat::SdformatError;
 use crate::urdf::UrdfError;
 
 /// Why a scene could not be read.
@@ -51,6 +52,9 @@ pub enum SceneError {
     /// A model of MuJoCo is invalid.
     #[error(transparent)]
     Mjcf(Box<MjcfError>),
+    /// A file of Gazebo is invalid.
+    #[error(transparent)]
+    Sdformat(#[from] SdformatError),
     /// The name is not a path and not a shipped scene.
     #[error("no scene `{name}`: {hint}")]
     Unknown {
@@ -72,6 +76,7 @@ impl SceneError {
             SceneError::Invalid(invalid) => invalid.report(color),
             SceneError::Urdf(error) => error.report(color),
             SceneError::Mjcf(error) => error.report(color),
+            SceneError::Sdformat(error) => error.report(color),
             other => format!("error: {other}\n"),
         }
     }

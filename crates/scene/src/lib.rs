@@ -65,6 +65,7 @@ mod notes;
 mod open;
 mod parse;
 mod save;
+pub mod sdformat;
 pub mod urdf;
 mod xml;
 

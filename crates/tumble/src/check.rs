@@ -33,7 +33,7 @@ fn one(file: &str, opening: &OpeningOptions) -> Result<String, Failure> {
     match kind(file) {
         FileKind::Mesh => mesh(Path::new(file), opening.repair),
         FileKind::Urdf => robot(file, opening),
-        FileKind::Mjcf => model(file, opening),
+        FileKind::Mjcf | FileKind::Sdformat => model(file, opening),
         FileKind::Scene if looks_like_cave(file) => cave(file),
         FileKind::Scene => scene(file),
     }

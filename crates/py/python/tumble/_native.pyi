@@ -1226,6 +1226,20 @@ class Articulation:
         keyframe: name or number of the keyframe that it starts in. missing_meshes: ``"error"`` or
         ``"skip"``, for missing collision meshes. collision_meshes: ``"exact"`` or ``"hull"``.
         """
+    @staticmethod
+    def from_sdformat(
+        path: _Path,
+        *,
+        packages: Mapping[str, _Path] | None = None,
+        missing_meshes: MissingMeshes = "error",
+        collision_meshes: CollisionMeshes = "exact",
+    ) -> Articulation:
+        """Reads the only body of joined links of an SDF file (of Gazebo), at the place that it has there.
+        ``World.load`` reads a whole file: models, planes, lights, gravity and time step.
+
+        packages: folders by name, for ``model://NAME/…``. missing_meshes: ``"error"`` or ``"skip"``, for
+        missing collision meshes. collision_meshes: ``"exact"`` or ``"hull"``.
+        """
     @property
     def name(self) -> str:
         """Name of the robot in its file, or of the body in its world."""
@@ -2214,6 +2228,12 @@ class World:
         not have. Forces and behaviors written in Python, and all else that a scene cannot say, raise
         ``ValueError`` with their names, and nothing is written.
         """
+    def save_mjcf(self, path: _Path) -> list[str]:
+        """Writes the world as it stands to a model of MuJoCo (``.xml`` or ``.mjcf``), with a folder
+        ``NAME_files`` beside it for meshes. The keyframe ``now`` of the model is the present state.
+
+        Returns notes about everything that MJCF cannot say.
+        """
     def save(self) -> bytes:
         """Returns everything that the next step reads as bytes, for ``restore`` in a world of the same
         bodies, with the drives that were set since they were added. Shapes, masses and settings are not included.
@@ -2350,7 +2370,7 @@ class World:
     ) -> Articulation:
         """Adds an articulated body and returns its handle.
 
-        articulation: a description, a builder, or the path of a URDF or a model of MuJoCo. base: pose
+        articulation: a description, a builder, or the path of a URDF, a model of MuJoCo or an SDF file. base: pose
         of its base: a position (3,), or position and quaternion (7,), meters and (x, y, z, w). name: by default the
         description's. It starts with the ``q``, ``qd`` and ``tau`` of the description; the pose of
         a floating root is relative to the base.

@@ -73,10 +73,10 @@ JointType: TypeAlias = Literal["revolute", "prismatic", "spherical", "fixed", "f
 """``ArticulationBuilder.add_link(joint=…)``: the joint of a link."""
 
 MissingMeshes: TypeAlias = Literal["error", "skip"]
-"""``Articulation.from_urdf(missing_meshes=…)`` and ``from_mjcf``: treatment of missing collision meshes."""
+"""``Articulation.from_urdf(missing_meshes=…)``, ``from_mjcf`` and ``from_sdformat``: treatment of missing collision meshes."""
 
 CollisionMeshes: TypeAlias = Literal["exact", "hull"]
-"""``Articulation.from_urdf(collision_meshes=…)`` and ``from_mjcf``: the meshes themselves, or their convex hulls."""
+"""``Articulation.from_urdf(collision_meshes=…)``, ``from_mjcf`` and ``from_sdformat``: the meshes themselves, or their convex hulls."""
 
 TreeMethod: TypeAlias = Literal["medial", "hubbard", "grid", "octree"]
 """``SphereTree.build(method=…)``."""

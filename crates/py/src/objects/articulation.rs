@@ -22,6 +22,7 @@ use std::sync::{Arc, Mutex};
 use tumble::collide::{Pose, Vec3};
 use tumble::dynamics::{ArticulatedBody, DofSettings, Object};
 use tumble::scene::mjcf::{self, MjcfOptions};
+use tumble::scene::sdformat;
 use tumble::scene::urdf::{self, UrdfOptions};
 
 /// A tree of links: a robot, a chain, a skeleton.
@@ -143,6 +144,31 @@ impl Articulation {
             collision_meshes: meaning("collision_meshes", collision_meshes, COLLISION_MESHES)?,
         };
         let (body, joints, _) = py.detach(|| pool::run(|| Ok(mjcf::articulation(&file, &options)?)))?;
+        Ok(Articulation::of_source(Source::Built(Box::new(body.clone())), &body, joints))
+    }
+
+    /// Reads the only body of joined links of an SDF file (of Gazebo), at the place that it has there.
+    /// ``World.load`` reads a whole file: models, planes, lights, gravity and time step.
+    ///
+    /// packages: folders by name, for ``model://NAME/…``. missing_meshes: ``"error"`` or ``"skip"``, for
+    /// missing collision meshes. collision_meshes: ``"exact"`` or ``"hull"``.
+    #[staticmethod]
+    #[pyo3(signature = (path, *, packages=None, missing_meshes="error", collision_meshes="exact"))]
+    pub fn from_sdformat(
+        py: Python<'_>,
+        path: &Bound<'_, PyAny>,
+        packages: Option<BTreeMap<String, PathBuf>>,
+        missing_meshes: &str,
+        collision_meshes: &str,
+    ) -> Result<Articulation> {
+        let file = crate::arrays::convert::path(path)?;
+        let options = UrdfOptions {
+            packages: packages.unwrap_or_default(),
+            missing_meshes: meaning("missing_meshes", missing_meshes, MISSING_MESHES)?,
+            collision_meshes: meaning("collision_meshes", collision_meshes, COLLISION_MESHES)?,
+            ..UrdfOptions::default()
+        };
+        let (body, joints, _) = py.detach(|| pool::run(|| Ok(sdformat::articulation(&file, &options)?)))?;
         Ok(Articulation::of_source(Source::Built(Box::new(body.clone())), &body, joints))
     }
 

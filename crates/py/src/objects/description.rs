@@ -95,7 +95,7 @@ pub fn alone(name: &str) -> Error {
     .into()
 }
 
-/// Returns a description, also of a builder or of the path of a URDF or a model of MuJoCo.
+/// Returns a description, also of a builder or of the path of a URDF, a model of MuJoCo or an SDF file.
 pub fn described<'py>(value: &Bound<'py, PyAny>) -> Result<Bound<'py, Articulation>> {
     if let Ok(own) = value.cast::<Articulation>() {
         return Ok(own.clone());
@@ -103,8 +103,11 @@ pub fn described<'py>(value: &Bound<'py, PyAny>) -> Result<Bound<'py, Articulati
     if let Ok(builder) = value.cast::<ArticulationBuilder>() {
         return Ok(Bound::new(value.py(), builder.get().description()?)?);
     }
-    if matches!(FileKind::of(&path(value)?), Ok(FileKind::Mjcf)) {
-        return Ok(Bound::new(value.py(), Articulation::from_mjcf(value.py(), value, None, "error", "hull")?)?);
-    }
-    Ok(Bound::new(value.py(), Articulation::from_urdf(value.py(), value, false, None, "error", "exact", false)?)?)
+    let py = value.py();
+    let read = match FileKind::of(&path(value)?) {
+        Ok(FileKind::Mjcf) => Articulation::from_mjcf(py, value, None, "error", "hull")?,
+        Ok(FileKind::Sdformat) => Articulation::from_sdformat(py, value, None, "error", "exact")?,
+        _ => Articulation::from_urdf(py, value, false, None, "error", "exact", false)?,
+    };
+    Ok(Bound::new(py, read)?)
 }

@@ -16,6 +16,7 @@ pub mod pickling;
 pub mod query;
 pub mod report;
 pub mod rollout;
+mod save_mjcf;
 mod save_scene;
 pub mod sensors;
 pub mod shared;

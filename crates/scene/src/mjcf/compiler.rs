@@ -171,7 +171,7 @@ impl Compiler {
 
 /// Returns the smallest rotation that takes the z axis to a unit vector; half a turn about x for
 /// its opposite, as in MuJoCo.
-pub(super) fn turn_z_to(to: &Vec3) -> Quat {
+pub(crate) fn turn_z_to(to: &Vec3) -> Quat {
     let axis = Vec3::z().cross(to);
     let (sine, cosine) = (axis.norm(), to.z);
     match Unit::try_new(axis, 1e-10) {

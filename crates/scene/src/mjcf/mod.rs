@@ -26,6 +26,8 @@
 //! | `<site>`, `<camera>`, `<light>` | frames, cameras and lights on links |
 //!
 //! Everything else is a note with the file, the line and the element of its first occurrence.
+//!
+//! [`MjcfWriter`] writes a world as a model.
 
 mod actuator;
 mod asset;
@@ -52,6 +54,7 @@ mod shapes;
 mod source;
 mod tree;
 mod views;
+mod write;
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -62,10 +65,12 @@ use tumble_core::articulated::LinkMass;
 use tumble_core::collide::TriMesh;
 
 pub use actuator::ActuatorSpec;
+pub(crate) use compiler::turn_z_to;
 pub use error::MjcfError;
 pub(crate) use load::one_body;
 pub use load::{articulation, load, parse};
 pub use options::MjcfOptions;
+pub use write::{MjcfText, MjcfWriter, SaveMjcfError};
 
 use asset::{Assets, MeshAsset};
 use compiler::Compiler;

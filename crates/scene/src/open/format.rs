@@ -11,8 +11,6 @@ const OTHER_MESHES: [&str; 24] = [
 ];
 /// Extensions of models of MuJoCo.
 const MODELS: [&str; 2] = ["xml", "mjcf"];
-/// Extensions of robot formats that are not supported.
-const OTHER_ROBOTS: [&str; 1] = ["sdf"];
 
 /// Returns the extension of a path in lower case; empty if it has none.
 pub(crate) fn extension(path: &Path) -> String {
@@ -28,6 +26,8 @@ pub enum FileKind {
     Urdf,
     /// A model of MuJoCo.
     Mjcf,
+    /// A model or world of Gazebo.
+    Sdformat,
     /// A mesh of a supported format.
     Mesh,
 }
@@ -42,14 +42,12 @@ impl FileKind {
         let own = extension(path);
         match own.as_str() {
             "urdf" => Ok(FileKind::Urdf),
+            "sdf" => Ok(FileKind::Sdformat),
             e if MODELS.contains(&e) => Ok(FileKind::Mjcf),
             e if MESHES.contains(&e) => Ok(FileKind::Mesh),
             e if OTHER_MESHES.contains(&e) => Err(format!(
                 "the mesh format .{e} is not supported; convert the file to .obj, .stl, .ply or .dae, for example with Blender or MeshLab"
             )),
-            e if OTHER_ROBOTS.contains(&e) => {
-                Err(format!("the robot format .{e} is not supported; convert the file to URDF (.urdf) or MJCF (.xml)"))
-            }
             "xacro" => {
                 Err("macros of .xacro are not supported; expand them first: xacro NAME.xacro > NAME.urdf".into())
             }
@@ -61,11 +59,10 @@ impl FileKind {
 /// Returns whether a name has the extension of a scene, robot or mesh format, supported or not.
 pub(crate) fn is_file_name(path: &Path) -> bool {
     let own = extension(path);
-    ["toml", "urdf", "xacro"]
+    ["toml", "urdf", "sdf", "xacro"]
         .iter()
         .chain(&MODELS)
         .chain(&MESHES)
         .chain(&OTHER_MESHES)
-        .chain(&OTHER_ROBOTS)
         .any(|known| own == *known)
 }

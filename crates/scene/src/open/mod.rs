@@ -12,12 +12,13 @@ use crate::error::SceneError;
 use crate::mjcf::{self, MjcfOptions};
 use crate::open::format::FileKind;
 use crate::parse::file::{MAX_BYTES, SceneFile};
+use crate::sdformat;
 use crate::urdf::UrdfOptions;
 
 /// How a robot or a mesh file is opened as a scene. Scene files have keys for these options.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadOptions {
-    /// How a URDF is read.
+    /// How a URDF or a file of Gazebo is read.
     pub urdf: UrdfOptions,
     /// How a model of MuJoCo is read.
     pub mjcf: MjcfOptions,
@@ -28,7 +29,7 @@ pub struct LoadOptions {
 impl SceneFile {
     /// Reads the file at `path`, or `scene.toml` in the folder `path`. A URDF (`.urdf`) becomes a
     /// scene with the robot on a floor through its lowest point. A model of MuJoCo (`.xml`, `.mjcf`)
-    /// becomes a scene with all its bodies. A mesh (`.obj`, `.stl`, `.ply`,
+    /// or of Gazebo (`.sdf`) becomes a scene with all its bodies. A mesh (`.obj`, `.stl`, `.ply`,
     /// `.dae`) becomes a dynamic body of 1000 kg/m³ above a floor, in the frame of its file.
     ///
     /// # Errors
@@ -51,6 +52,7 @@ impl SceneFile {
             FileKind::Scene => {}
             FileKind::Urdf => return on_floor::robot(&path, &options.urdf),
             FileKind::Mjcf => return Ok(mjcf::load(&path, &options.mjcf)?),
+            FileKind::Sdformat => return Ok(sdformat::load(&path, &options.urdf)?),
             FileKind::Mesh => return on_floor::mesh(&path, options.repair),
         }
         let bytes = read_capped(&path)?;

@@ -34,6 +34,7 @@ pub(crate) fn no_regular_file() -> io::Error {
 }
 
 /// Maximum number of symbolic links that are followed.
+#[cfg(unix)]
 const MAX_LINKS: usize = 16;
 
 #[cfg(unix)]

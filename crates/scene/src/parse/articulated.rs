@@ -1,5 +1,5 @@
 //! `[[articulated]]`: a tree of links in reduced coordinates, written out in the scene or read from
-//! a URDF or a model of MuJoCo.
+//! a URDF, a model of MuJoCo or one of Gazebo.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -77,7 +77,7 @@ impl ArticulatedSpec {
         let floating = f.flag_or("floating", false);
         let mut spec = ArticulatedSpec {
             base,
-            exclude_overlapping: f.value("urdf").is_some(),
+            exclude_overlapping: f.value("urdf").or(f.value("sdformat")).is_some(),
             ..ArticulatedSpec::of(name, Vec::new())
         };
         (spec.self_collision, spec.enabled) = (f.flag_or("self_collision", true), f.flag_or("enabled", true));
@@ -89,10 +89,11 @@ impl ArticulatedSpec {
             collides: f.flag_or("collides", true),
             visible: f.flag_or("visible", true),
         };
-        match (f.value("urdf"), f.value("mjcf")) {
-            (Some(_), _) => spec.read_urdf(&mut f, &from, place)?,
-            (None, Some(_)) => spec.read_mjcf(&mut f, &from, place)?,
-            (None, None) => spec.read_links(&mut f, &from),
+        match (f.value("urdf"), f.value("mjcf"), f.value("sdformat")) {
+            (Some(_), _, _) => spec.read_urdf(&mut f, &from, place)?,
+            (None, Some(_), _) => spec.read_mjcf(&mut f, &from, place)?,
+            (None, None, Some(_)) => spec.read_sdformat(&mut f, &from, place)?,
+            (None, None, None) => spec.read_links(&mut f, &from),
         }
         spec.read_joints(&mut f);
         spec.read_start(&mut f);
@@ -106,7 +107,7 @@ impl ArticulatedSpec {
     fn read_links(&mut self, f: &mut Fields<'_>, from: &Inherited<'_, '_>) {
         let tables = f.tables("link", MAX_LINKS);
         if tables.is_empty() && f.value("link").is_none() {
-            f.missing("link", "links, each under a line [[articulated.link]], or `urdf` or `mjcf`");
+            f.missing("link", "links, each under a line [[articulated.link]], or `urdf`, `mjcf` or `sdformat`");
         }
         let mut mimics = Vec::new();
         let mut lines: BTreeMap<String, usize> = BTreeMap::new();
@@ -153,18 +154,43 @@ impl ArticulatedSpec {
         }
     }
 
+    /// Reads `sdformat` and the keys that belong to it. The pose of the table is that of the model.
+    fn read_sdformat(&mut self, f: &mut Fields<'_>, from: &Inherited<'_, '_>, place: &Place<'_>) -> Option<()> {
+        let (path, value) = f.optional_text("sdformat")?;
+        if let Some(floating) = f.value("floating").filter(|_| from.floating) {
+            f.wrong("floating", floating, "no `floating` with `sdformat`: the file says whether its root floats");
+        }
+        let options = read_options(f, from, place);
+        match crate::sdformat::one_body(&place.folder.join(path), &options) {
+            Ok((read, notes)) => {
+                (self.links, self.notes) = (read.links, notes);
+                if f.value("self_collision").is_none() {
+                    self.self_collision = read.self_collision;
+                }
+                for shape in self.links.iter_mut().flat_map(|link| &mut link.shapes) {
+                    shape.collides &= from.collides;
+                    shape.visible &= from.visible;
+                }
+                Some(())
+            }
+            Err(error) => {
+                for line in error.to_string().lines() {
+                    f.log.report(
+                        value.span(),
+                        format!("`sdformat` of {}: {line}", f.what),
+                        "expected a valid SDF file",
+                    );
+                }
+                None
+            }
+        }
+    }
+
     /// Reads `urdf` and the keys that belong to it.
     fn read_urdf(&mut self, f: &mut Fields<'_>, from: &Inherited<'_, '_>, place: &Place<'_>) -> Option<()> {
         let (path, value) = f.optional_text("urdf")?;
-        let options = UrdfOptions {
-            floating: from.floating,
-            packages: read_packages(f, place.folder),
-            missing_meshes: f.choice_or("missing_meshes", MISSING, MissingMeshes::Error),
-            collision_meshes: f.choice_or("collision_meshes", COLLISION, CollisionMeshes::Exact),
-            surface: from.surface.clone(),
-            recolor: f.value("color").is_some() || f.value("material").is_some(),
-            velocity_limits: f.flag_or("velocity_limits", false),
-        };
+        let options =
+            UrdfOptions { velocity_limits: f.flag_or("velocity_limits", false), ..read_options(f, from, place) };
         let file = place.folder.join(path);
         let robot = match place.files.iter().find(|(name, _)| *name == path) {
             Some((_, text)) => crate::urdf::read_text(text, &file, &options, crate::urdf::Content::Body),
@@ -325,6 +351,19 @@ impl ArticulatedSpec {
             );
         }
         found
+    }
+}
+
+/// Reads the keys of a robot's file.
+fn read_options(f: &mut Fields<'_>, from: &Inherited<'_, '_>, place: &Place<'_>) -> UrdfOptions {
+    UrdfOptions {
+        floating: from.floating,
+        packages: read_packages(f, place.folder),
+        missing_meshes: f.choice_or("missing_meshes", MISSING, MissingMeshes::Error),
+        collision_meshes: f.choice_or("collision_meshes", COLLISION, CollisionMeshes::Exact),
+        surface: from.surface.clone(),
+        recolor: f.value("color").is_some() || f.value("material").is_some(),
+        velocity_limits: false,
     }
 }
 

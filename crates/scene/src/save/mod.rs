@@ -20,7 +20,7 @@ mod compare;
 mod events;
 mod joints;
 mod saved;
-mod shapes;
+pub(crate) mod shapes;
 mod surface;
 mod text;
 mod views;

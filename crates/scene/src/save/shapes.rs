@@ -126,7 +126,7 @@ fn round(kind: &str, radius: f64, half_length: f64) -> Table {
 }
 
 /// Returns a mesh as OBJ; numbers read back to the same bits.
-fn obj(mesh: &TriMesh) -> Vec<u8> {
+pub(crate) fn obj(mesh: &TriMesh) -> Vec<u8> {
     let number = |x: &f64| x.toml();
     let vertex = |v: &Vec3| format!("v {} {} {}\n", number(&v.x), number(&v.y), number(&v.z));
     let face = |t: &[u32; 3]| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
@@ -135,7 +135,7 @@ fn obj(mesh: &TriMesh) -> Vec<u8> {
 }
 
 /// Returns whether two shapes are the same one: shared, or primitives of the same size.
-pub(super) fn is_same(a: &Shape, b: &Shape) -> bool {
+pub(crate) fn is_same(a: &Shape, b: &Shape) -> bool {
     match (a, b) {
         (Shape::Mesh(a), Shape::Mesh(b)) => Arc::ptr_eq(a, b),
         (Shape::Compound(a), Shape::Compound(b)) => Arc::ptr_eq(a, b),

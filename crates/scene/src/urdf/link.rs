@@ -87,7 +87,7 @@ fn read_inertial(inertial: &Element<'_, '_>, context: &mut Context<'_>) -> LinkM
 /// Returns a valid inertia. Negative principal moments, which real files have, are set to 0, with a
 /// note if they are more than rounding. A moment greater than the sum of the others only makes a
 /// note, since it does no harm in the equations of motion.
-fn mended(element: &Element<'_, '_>, inertia: Mat3, context: &mut Context<'_>) -> Mat3 {
+pub(crate) fn mended(element: &Element<'_, '_>, inertia: Mat3, context: &mut Context<'_>) -> Mat3 {
     let eigen = SymmetricEigen::new(inertia);
     let negative = eigen.eigenvalues.min() < 0.0;
     if let Some(fault) = inertia_fault(&inertia) {
@@ -172,6 +172,16 @@ fn read_mesh(mesh: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) 
         mesh.wrong("scale", "three numbers other than 0");
         return None;
     }
+    mesh_file(mesh, (uri, scale), collides, context)
+}
+
+/// Returns the geometry of a mesh file that an element names, scaled; `None` if it is left out, with a note or a problem.
+pub(crate) fn mesh_file(
+    mesh: &Element<'_, '_>,
+    (uri, scale): (&str, [f64; 3]),
+    collides: bool,
+    context: &mut Context<'_>,
+) -> Option<Geometry> {
     let place = format!("{}:{}", context.file, mesh.log.line(mesh.span().start));
     let hull = context.options.collision_meshes == CollisionMeshes::Hull;
     let required = context.options.missing_meshes == MissingMeshes::Error;

@@ -27,7 +27,7 @@
 mod error;
 mod files;
 mod joint;
-mod link;
+pub(crate) mod link;
 mod load;
 mod options;
 mod read;
@@ -38,5 +38,5 @@ mod tree;
 pub use error::UrdfError;
 pub use load::{UrdfModel, load, model, parse_model};
 pub use options::{CollisionMeshes, MissingMeshes, UrdfOptions};
-pub(crate) use read::{Content, read_file, read_text};
+pub(crate) use read::{Content, read_file, read_text, text_of};
 pub use spheres::{LinkSpheres, SphereOptions, SphereRobot, spherize};

@@ -45,7 +45,7 @@ pub(crate) fn read_file(path: &Path, options: &UrdfOptions, content: Content) ->
 }
 
 /// Reads the text of a file.
-pub(super) fn text_of(path: &Path) -> Result<String, UrdfError> {
+pub(crate) fn text_of(path: &Path) -> Result<String, UrdfError> {
     let unread = |source| UrdfError::Read { file: path.to_path_buf(), source };
     let mut bytes = Vec::new();
     crate::open_file(path).map_err(unread)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unread)?;

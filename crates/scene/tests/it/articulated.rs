@@ -103,7 +103,7 @@ fn wrong_links_are_reported() {
     assert_errors(
         "[[articulated]]\nname = \"a\"\n",
         &[
-            "s.toml:1:1: articulated \"a\" has no `link`; expected links, each under a line [[articulated.link]], or `urdf` or `mjcf`",
+            "s.toml:1:1: articulated \"a\" has no `link`; expected links, each under a line [[articulated.link]], or `urdf`, `mjcf` or `sdformat`",
         ],
     );
     assert_errors(

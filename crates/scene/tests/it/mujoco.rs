@@ -70,6 +70,15 @@ fn models_of_installed_packages_are_as_mujoco_reads_them() {
     assert!(failed.is_empty(), "{failed:#?}");
 }
 
+/// Compares a written model with MuJoCo. `None` without MuJoCo; the reason if MuJoCo refuses it.
+pub(crate) fn compared_or_refused(path: &Path, close: f64) -> Option<Result<(), String>> {
+    if let Err(refused) = python(&[&path.display().to_string(), "1"])? {
+        return Some(Err(refused));
+    }
+    assert!(compared(path, close), "{}: it is not compared", path.display());
+    Some(Ok(()))
+}
+
 /// Compares one model with MuJoCo. Returns whether MuJoCo is available and reads it.
 fn compared(path: &Path, close: f64) -> bool {
     let Some(said) = python(&[&path.display().to_string(), &STATES.to_string()]) else { return false };

@@ -12,7 +12,7 @@ use tumble::scene::{FileKind, Integrator, LoadOptions, SceneFile, Solver, Steppe
 #[derive(Args, Clone)]
 pub struct SceneOptions {
     /// A scene file, a folder with a scene.toml, the name of a shipped scene, a robot (.urdf), a model
-    /// of MuJoCo (.xml, .mjcf) or a mesh (.obj, .stl, .ply, .dae).
+    /// of MuJoCo (.xml, .mjcf) or Gazebo (.sdf), or a mesh (.obj, .stl, .ply, .dae).
     #[arg(value_name = "SCENE")]
     pub name: String,
     /// Length of a step, s (default: from the scene).
@@ -82,7 +82,7 @@ pub struct OpeningOptions {
     /// searched in the folders above the URDF.
     #[arg(long = "package", value_name = "NAME=DIR", value_parser = package)]
     pub packages: Vec<(String, PathBuf)>,
-    /// If a collision mesh of a URDF or a model of MuJoCo is missing: error, or skip it with a note.
+    /// If a collision mesh of a URDF or a model of MuJoCo or Gazebo is missing: error, or skip it with a note.
     #[arg(long, value_name = "error|skip", value_parser = missing)]
     pub missing_meshes: Option<MissingMeshes>,
     /// The keyframe that a model of MuJoCo starts in: its name, or its number from 0.
@@ -142,12 +142,18 @@ impl OpeningOptions {
         let urdf = self.floating || self.fixed_base || !self.packages.is_empty();
         let robot = urdf || self.missing_meshes.is_some();
         match kind {
-            FileKind::Urdf | FileKind::Mesh | FileKind::Scene if self.keyframe.is_some() => {
+            FileKind::Urdf | FileKind::Sdformat | FileKind::Mesh | FileKind::Scene if self.keyframe.is_some() => {
                 Err("--keyframe needs a model of MuJoCo (.xml)")
             }
             FileKind::Mjcf if urdf => Err("--floating, --fixed-base and --package need a .urdf file"),
             FileKind::Mjcf if self.repair => {
                 Err("--repair needs a mesh file; meshes of a model of MuJoCo collide by their convex hulls")
+            }
+            FileKind::Sdformat if self.floating || self.fixed_base => {
+                Err("--floating and --fixed-base need a .urdf file; an .sdf file says whether its roots float")
+            }
+            FileKind::Sdformat if self.repair => {
+                Err("--repair needs a mesh file; an open mesh of an .sdf file collides by its convex hull")
             }
             FileKind::Urdf if self.repair => {
                 Err("--repair needs a mesh file; an open mesh of a URDF collides by its convex hull")

@@ -33,6 +33,7 @@ mod determinism;
 mod machines;
 mod opening;
 mod outputs;
+mod page;
 mod picture;
 mod repair;
 mod scenes;

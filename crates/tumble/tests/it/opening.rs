@@ -125,7 +125,7 @@ fn files_that_are_no_scenes_give_one_message() {
         ("x.glb", vec![0x67, 0x6c, 0x54, 0x46, 2, 0, 0, 0], ".glb is not supported"),
         ("X.FBX", vec![0; 100], ".fbx is not supported"),
         ("x.xacro", b"<robot/>".to_vec(), "xacro NAME.xacro > NAME.urdf"),
-        ("x.sdf", b"<sdf/>".to_vec(), "convert the file to URDF"),
+        ("x.sdf", b"<sdf/>".to_vec(), "<sdf> has no <model>"),
         ("x.bin", vec![b'a', 0, b'b'], "byte 1 of the file is 0"),
         ("x.txt", many.into(), "more syntax errors follow"),
         ("off", off.into(), "more syntax errors follow"),

@@ -135,7 +135,7 @@ impl World {
 
     /// Adds an articulated body and returns its handle.
     ///
-    /// articulation: a description, a builder, or the path of a URDF or a model of MuJoCo. base: pose
+    /// articulation: a description, a builder, or the path of a URDF, a model of MuJoCo or an SDF file. base: pose
     /// of its base: a position (3,), or position and quaternion (7,), meters and (x, y, z, w). name: by default the
     /// description's. It starts with the ``q``, ``qd`` and ``tau`` of the description; the pose of
     /// a floating root is relative to the base.

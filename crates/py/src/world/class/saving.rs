@@ -8,7 +8,7 @@ use crate::interrupt::interruptible;
 use crate::world::add::own_place;
 use crate::world::class::World;
 use crate::world::rollout::Plan;
-use crate::world::{pickling, save_scene, snapshot};
+use crate::world::{pickling, save_mjcf, save_scene, snapshot};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -26,6 +26,15 @@ impl World {
     fn save_scene(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> Result<Vec<String>> {
         let path = self::path(path)?;
         self.shared.work(py, |inner| save_scene::write(inner, &path))
+    }
+
+    /// Writes the world as it stands to a model of MuJoCo (``.xml`` or ``.mjcf``), with a folder
+    /// ``NAME_files`` beside it for meshes. The keyframe ``now`` of the model is the present state.
+    ///
+    /// Returns notes about everything that MJCF cannot say.
+    fn save_mjcf(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> Result<Vec<String>> {
+        let path = self::path(path)?;
+        self.shared.work(py, |inner| save_mjcf::write(inner, &path))
     }
 
     /// Returns everything that the next step reads as bytes, for ``restore`` in a world of the same

@@ -1,0 +1,126 @@
+//! Rigid bodies: static ones as geoms of the world, kinematic ones as `mocap` bodies, dynamic ones with a free joint.
+
+use nalgebra::Translation3;
+use tumble_core::articulated::LinkMass;
+use tumble_core::collide::{Pose, Vec3};
+use tumble_core::{Collidable, Mode, Object, ObjectId, RigidBody};
+
+use super::MjcfWriter;
+use super::geoms::{about_frame, visual_of};
+use super::xml::{Attributes, numbers, vector, wxyz};
+
+impl MjcfWriter<'_> {
+    /// Writes a rigid body.
+    pub(super) fn rigid(&mut self, id: ObjectId, name: &str, body: &RigidBody) {
+        let (Some(status), Some(part), Some(center)) =
+            (self.world.status(id), self.world.part_state(id, 0), self.world.center_state(id))
+        else {
+            return;
+        };
+        let pose = body.frame_of(&part.pose);
+        let label = self.bodies.unique(name.to_string());
+        self.names.insert((id, None), label.clone());
+        if status.mode == Mode::Static {
+            self.rigid_geoms(name, body, &pose, status.collidable, Some(&label));
+            self.names.insert((id, None), "world".into());
+            return;
+        }
+        let mut t = Attributes::of("name", &label);
+        t.put_pose(&pose);
+        match status.mode {
+            Mode::Kinematic => {
+                t.put("mocap", "true");
+                if center.velocity != Vec3::zeros() || center.angular_velocity != Vec3::zeros() {
+                    self.note(name, "velocities of kinematic bodies are left out");
+                }
+            }
+            _ => t.put_number(0.0, "gravcomp", 1.0 - body.gravity_scale),
+        }
+        self.xml.open("body", &t);
+        if status.mode == Mode::Dynamic {
+            let joint = self.joints.unique(name.to_string());
+            self.xml.leaf("freejoint", &Attributes::of("name", joint));
+            self.inertial(
+                name,
+                &LinkMass { mass: body.mass(), center: body.center_of_mass(), inertia: *body.inertia() },
+            );
+            let (q, spin) = (pose.rotation, center.angular_velocity);
+            let velocity = center.velocity - spin.cross(&(q * body.center_of_mass()));
+            self.qpos.extend(pose.translation.vector.iter().chain(&[q.w, q.i, q.j, q.k]));
+            self.qvel.extend(velocity.iter().chain((q.inverse() * spin).iter()));
+            if body.linear_damping != 0.0 || body.angular_damping != 0.0 {
+                self.note(name, "linear_damping and angular_damping are left out");
+            }
+            if body.locked.names().next().is_some() {
+                self.note(name, "locked axes are left out");
+            }
+        }
+        self.rigid_geoms(name, body, &Pose::identity(), status.collidable, None);
+        self.xml.close();
+    }
+
+    /// Writes the shape of a body and its other visuals. `pose` is that of the body's frame.
+    fn rigid_geoms(&mut self, name: &str, body: &RigidBody, pose: &Pose, collides: bool, label: Option<&str>) {
+        let mut left: Vec<_> = body.renderable().map_or(&[][..], |r| r.visuals()).iter().collect();
+        let visual = visual_of(&mut left, body.shape(), &Pose::identity());
+        let Some(parts) = body.collidable() else { return };
+        let mut common = self.surface(name, parts, 0, collides, visual.map(|visual| &visual.appearance));
+        if let Some(label) = label.filter(|_| !matches!(body.shape(), tumble_core::collide::Shape::Compound(_))) {
+            common.put("name", label);
+        }
+        if parts.is_sensor(0) {
+            self.note(name, "bodies that only report overlaps do not collide in MuJoCo, and report nothing");
+        }
+        self.geoms(name, pose, body.shape(), &common);
+        let center = Pose::from_parts(Translation3::from(body.shape().center_of_mass()), nalgebra::one());
+        for visual in left.into_iter().filter(|visual| visual.drawn().is_some()) {
+            let mut visual = visual.clone();
+            visual.pose = pose * center * visual.pose;
+            self.visual_geom(name, &visual);
+        }
+        if !body.camera().map_or(&[][..], |c| c.cameras()).is_empty()
+            || !body.light().map_or(&[][..], |l| l.lights()).is_empty()
+        {
+            self.note(name, "cameras and lights are left out");
+        }
+    }
+
+    /// Writes `<inertial>`: `mass`, center of mass and inertia about it, in the axes of the body.
+    pub(super) fn inertial(&mut self, owner: &str, mass: &LinkMass) {
+        let LinkMass { mass, center, inertia: i } = mass;
+        if *mass <= 0.0 || i.amax() <= 0.0 {
+            self.note(owner, "a body that moves has no mass or no inertia, which MuJoCo refuses");
+        }
+        let mut t = Attributes::of("pos", vector(center)).with("mass", numbers([*mass]));
+        if [i.m12, i.m13, i.m23] == [0.0; 3] {
+            t.put("diaginertia", numbers([i.m11, i.m22, i.m33]));
+        } else {
+            t.put("fullinertia", numbers([i.m11, i.m22, i.m33, i.m12, i.m13, i.m23]));
+        }
+        self.xml.leaf("inertial", &t);
+    }
+
+    /// Writes a shape that a link carries, by the pose of its own frame.
+    pub(super) fn collider(
+        &mut self,
+        owner: &str,
+        parts: &dyn Collidable,
+        part: usize,
+        pose: &Pose,
+        common: &Attributes,
+    ) {
+        if let Some(shape) = parts.shape(part) {
+            self.geoms(owner, &(pose * about_frame(shape)), &shape.clone(), common);
+        }
+    }
+}
+
+/// Adds a joint's rotation, `x y z w`, as MuJoCo's `w x y z`.
+pub(super) fn put_rotation(xyzw: &[f64], out: &mut Vec<f64>) {
+    out.extend([xyzw[3], xyzw[0], xyzw[1], xyzw[2]]);
+}
+
+/// Returns `relpose` of a weld.
+pub(super) fn relpose(pose: &Pose) -> String {
+    format!("{} {}", vector(&pose.translation.vector), wxyz(&pose.rotation))
+}

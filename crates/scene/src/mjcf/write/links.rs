@@ -1,0 +1,343 @@
+//! Articulated bodies as trees of `<body>`.
+//!
+//! ```text
+//! tumble:   X_parent_link = P·J(q)                                one joint of a link, at its origin
+//! MJCF:     X_parent_body = B·J₁(q₁)·J₂(q₂)·…                     joints by anchor and axis in the axes of the body
+//! ```
+//!
+//! MuJoCo refuses bodies that move without mass. A chain of massless links with one child each and the
+//! link at its end therefore become one body with several joints: with placements `P₁ … Pₙ`, `B = P₁·…·Pₙ`, and joint `k`
+//! has the pose `(Pₖ₊₁·…·Pₙ)⁻¹` in the body.
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `P` | placement of a joint's frame in the frame of the parent |
+//! | `J` | motion of a joint |
+//! | `B` | pose of the body at joint positions 0 |
+
+use std::collections::BTreeSet;
+
+use tumble_core::articulated::{DofSettings, Drive, Link, LinkMass};
+use tumble_core::collide::{Pose, Vec3};
+use tumble_core::{ArticulatedBody, Joint, Mode, Object, ObjectId};
+
+use super::MjcfWriter;
+use super::bodies::put_rotation;
+use super::geoms::visual_of;
+use super::xml::{Attributes, numbers, vector};
+
+/// Limit of a joint that is open at one end, rad or m.
+const FAR: f64 = 1e10;
+
+/// An articulated body that is being written.
+struct Tree<'b> {
+    id: ObjectId,
+    name: &'b str,
+    body: &'b ArticulatedBody,
+    state: &'b [f64],
+    /// Whether the whole body collides.
+    collides: bool,
+    children: Vec<Vec<usize>>,
+    /// Names of its joints by link.
+    joints: Vec<String>,
+    /// Whether it has a body for its base: the base carries something, or several roots.
+    based: bool,
+}
+
+impl MjcfWriter<'_> {
+    /// Writes an articulated body.
+    pub(super) fn articulated(&mut self, id: ObjectId, name: &str, body: &ArticulatedBody) {
+        let (Some(status), Some(state)) = (self.world.status(id), self.world.state_of(id)) else { return };
+        if status.mode != Mode::Dynamic {
+            self.note(name, "an articulated body that is not dynamic is written as a dynamic one");
+        }
+        let links = body.model().links();
+        let mut children: Vec<Vec<usize>> = vec![Vec::new(); links.len()];
+        for (k, link) in links.iter().enumerate() {
+            link.parent.iter().for_each(|parent| children[*parent].push(k));
+        }
+        let known = self.joint_names.get(name).cloned().unwrap_or_default();
+        let joints = links.iter().enumerate().map(|(k, link)| {
+            let own = known.get(k).filter(|_| known.len() == links.len()).unwrap_or(&link.name);
+            self.joints.unique(own.to_string())
+        });
+        let joints = joints.collect::<Vec<_>>();
+        let fixed = links.iter().filter(|link| link.parent.is_none() && link.joint != Joint::Floating).count();
+        let based = fixed > 1
+            || body.colliders().any(|(link, _)| link.is_none())
+            || visuals(body, None).next().is_some()
+            || body.model().frames().iter().any(|frame| frame.link.is_none());
+        let tree = Tree { id, name, body, state, collides: status.collidable, children, joints, based };
+        self.base(&tree);
+        for root in roots(links, Joint::Floating) {
+            self.link(&tree, root, &[]);
+        }
+        self.excludes(&tree);
+        self.drives(&tree);
+        for coupling in body.couplings() {
+            let of = |v: usize| links.iter().position(|link| link.v == v).map(|k| tree.joints[k].clone());
+            let (Some(first), Some(second)) = (of(coupling.dof), of(coupling.of)) else { continue };
+            let polynomial = numbers([coupling.offset, coupling.multiplier, 0.0, 0.0, 0.0]);
+            let t = Attributes::of("joint1", first).with("joint2", second).with("polycoef", polynomial);
+            self.equalities.push(("joint", t));
+        }
+        if !body.camera().map_or(&[][..], |c| c.cameras()).is_empty()
+            || !body.light().map_or(&[][..], |l| l.lights()).is_empty()
+        {
+            self.note(name, "cameras and lights are left out");
+        }
+    }
+
+    /// Writes the base with what is fixed to it, and the trees of links on it.
+    fn base(&mut self, tree: &Tree<'_>) {
+        let links = tree.body.model().links();
+        let fixed = (0..links.len()).filter(|k| links[*k].parent.is_none() && links[*k].joint != Joint::Floating);
+        if !tree.based {
+            self.names.insert((tree.id, None), "world".into());
+            fixed.for_each(|root| self.link(tree, root, &[]));
+            return;
+        }
+        let taken = links.iter().any(|link| link.name == tree.name);
+        let label = if taken { format!("{}/base", tree.name) } else { tree.name.to_owned() };
+        let label = self.bodies.unique(label);
+        self.names.insert((tree.id, None), label.clone());
+        let mut t = Attributes::of("name", label);
+        t.put_pose(tree.body.base());
+        self.xml.open("body", &t);
+        self.content(tree, None);
+        fixed.for_each(|root| self.link(tree, root, &[]));
+        self.xml.close();
+    }
+
+    /// Writes a link and all below it. `chain` are massless links above it that become joints of its body.
+    fn link(&mut self, tree: &Tree<'_>, k: usize, chain: &[usize]) {
+        let chain = [chain, &[k]].concat();
+        if let ([child], true) = (&tree.children[k][..], tree.is_bare(k)) {
+            return self.link(tree, *child, &chain);
+        }
+        let links = tree.body.model().links();
+        let link = &links[k];
+        let label = self.bodies.unique(link.name.clone());
+        for link in &chain {
+            self.names.insert((tree.id, Some(*link)), label.clone());
+        }
+        let mut t = Attributes::of("name", label);
+        let placed = chain.iter().fold(Pose::identity(), |pose, k| pose * tree.placement(&links[*k]));
+        t.put_pose(&placed);
+        self.xml.open("body", &t);
+        for (n, joint) in chain.iter().enumerate() {
+            let below = chain[n + 1..].iter().fold(Pose::identity(), |pose, k| pose * tree.placement(&links[*k]));
+            self.joint(tree, *joint, &below.inverse());
+        }
+        self.inertial(&link.name, &link.mass);
+        self.content(tree, Some(k));
+        for child in &tree.children[k] {
+            self.link(tree, *child, &[]);
+        }
+        self.xml.close();
+    }
+
+    /// Writes the joint of a link, whose frame has this pose in the body.
+    fn joint(&mut self, tree: &Tree<'_>, k: usize, at: &Pose) {
+        let (model, link) = (tree.body.model(), &tree.body.model().links()[k]);
+        let q = &tree.state[link.q..link.q + link.joint.positions()];
+        let v = &tree.state[model.positions() + link.v..][..link.joint.dof()];
+        let dofs = &tree.body.dofs()[link.v..link.v + link.joint.dof()];
+        let Some(dof) = dofs.first() else { return };
+        if dofs.iter().any(|other| other != dof) {
+            self.note(
+                &link.name,
+                "different damping or friction of one joint's degrees of freedom: the first is written",
+            );
+        }
+        let mut t = Attributes::of("name", &tree.joints[k]);
+        match &link.joint {
+            Joint::Fixed => return,
+            Joint::Floating => {
+                put_free(q, v, (&mut self.qpos, &mut self.qvel));
+                if dof.damping == 0.0 && dof.friction == 0.0 {
+                    return self.xml.leaf("freejoint", &t);
+                }
+                t.put("type", "free");
+            }
+            Joint::Spherical => {
+                put_rotation(q, &mut self.qpos);
+                self.qvel.extend(v);
+                t.put("type", "ball");
+                t.put_unless(Vec3::zeros(), "pos", at.translation.vector, vector(&at.translation.vector));
+                if at.rotation != nalgebra::one() {
+                    self.note(
+                        &link.name,
+                        "a spherical joint in a chain of massless links has axes that MJCF cannot turn",
+                    );
+                }
+            }
+            Joint::Revolute { axis } | Joint::Prismatic { axis } => {
+                self.qpos.extend(q);
+                self.qvel.extend(v);
+                let turns = matches!(link.joint, Joint::Revolute { .. });
+                t.put("type", if turns { "hinge" } else { "slide" });
+                t.put_unless(Vec3::zeros(), "pos", at.translation.vector, vector(&at.translation.vector));
+                t.put("axis", vector(&(at.rotation * axis)));
+                match dof.limits {
+                    // MuJoCo refuses a range without width
+                    Some([low, high]) if low == high => {
+                        let held = Attributes::of("joint1", &tree.joints[k]);
+                        self.equalities.push(("joint", held.with("polycoef", numbers([low, 0.0, 0.0, 0.0, 0.0]))));
+                    }
+                    Some(limits) => t.put("range", numbers(limits.map(|x| x.clamp(-FAR, FAR)))),
+                    None => {}
+                }
+                if let Some(spring) = &dof.spring {
+                    t.put_number(0.0, "stiffness", spring.stiffness);
+                    t.put_number(0.0, "springref", spring.rest);
+                }
+                t.put_number(0.0, "armature", link.armature);
+                if dof.effort.is_finite() {
+                    t.put("actuatorfrcrange", numbers([-dof.effort, dof.effort]));
+                }
+            }
+        }
+        t.put_number(0.0, "damping", dof.damping);
+        t.put_number(0.0, "frictionloss", dof.friction);
+        if dof.max_velocity.is_finite() {
+            self.note(&tree.joints[k], "limits of velocities are left out");
+        }
+        self.xml.leaf("joint", &t);
+    }
+
+    /// Writes the shapes of a link or of the base, and frames that are fixed to it.
+    fn content(&mut self, tree: &Tree<'_>, link: Option<usize>) {
+        let (body, model) = (tree.body, tree.body.model());
+        let owner = link.map_or(tree.name, |k| &model.links()[k].name).to_owned();
+        let mut left: Vec<_> = visuals(body, link).collect();
+        let Some(parts) = body.collidable() else { return };
+        for part in body.colliders_of(link) {
+            let Some(shape) = parts.shape(part) else { continue };
+            let pose = body.part_pose(part);
+            let visual = visual_of(&mut left, shape, &pose);
+            let common = self.surface(&owner, parts, part, tree.collides, visual.map(|visual| &visual.appearance));
+            self.collider(&owner, parts, part, &pose, &common);
+        }
+        left.into_iter().for_each(|visual| self.visual_geom(&owner, visual));
+        for frame in model.frames().iter().filter(|f| f.link == link) {
+            if link.is_some_and(|k| model.links()[k].name == frame.name) {
+                continue;
+            }
+            let mut t = Attributes::of("name", self.sites.unique(frame.name.clone()));
+            t.put_pose(&frame.pose);
+            self.xml.leaf("site", &t);
+        }
+    }
+
+    /// Excludes pairs of links that collide in MuJoCo and not here.
+    fn excludes(&mut self, tree: &Tree<'_>) {
+        let (body, links) = (tree.body, tree.body.model().links());
+        let Some(parts) = body.collidable() else { return };
+        let carriers: BTreeSet<Option<usize>> = body.colliders().map(|(link, _)| link).collect();
+        let carriers: Vec<Option<usize>> = carriers.into_iter().collect();
+        for (n, a) in carriers.iter().enumerate() {
+            for b in &carriers[n + 1..] {
+                let (Some(first), Some(second)) = (body.colliders_of(*a).next(), body.colliders_of(*b).next()) else {
+                    continue;
+                };
+                let joined =
+                    |a: Option<usize>, b: Option<usize>| b.is_some() && a.is_some_and(|a| tree.parent(links, a) == b);
+                let (meets, neighbors) = (parts.parts_collide(first, second), joined(*a, *b) || joined(*b, *a));
+                let names = [a, b].map(|side| self.names.get(&(tree.id, *side)).cloned().unwrap_or_default());
+                if !meets && !neighbors && names[0] != names[1] {
+                    let [first, second] = names;
+                    self.contacts.push(("exclude", Attributes::of("body1", first).with("body2", second)));
+                } else if meets && neighbors {
+                    self.note(&names[0], "links of one joint that collide: MuJoCo leaves out such contacts");
+                }
+            }
+        }
+    }
+
+    /// Writes drives as actuators: `f = g·u + b₀ + b₁·q + b₂·q̇`.
+    fn drives(&mut self, tree: &Tree<'_>) {
+        for (k, link) in tree.body.model().links().iter().enumerate().filter(|(_, link)| link.joint.dof() == 1) {
+            let dof = &tree.body.dofs()[link.v];
+            let joint = &tree.joints[k];
+            let DofSettings { drive, .. } = dof;
+            match drive {
+                Drive::None => {}
+                Drive::Position { stiffness, damping, target, velocity, limit } => {
+                    let (gain, constant, control) = match *stiffness > 0.0 {
+                        true => (*stiffness, damping * velocity, *target),
+                        false => (*damping, 0.0, *velocity),
+                    };
+                    let mut t = Attributes::of("name", self.actuators.unique(joint.to_string())).with("joint", joint);
+                    t = t.with("gaintype", "fixed").with("gainprm", numbers([gain])).with("biastype", "affine");
+                    t.put("biasprm", numbers([constant, -stiffness, -damping]));
+                    if limit.is_finite() {
+                        t.put("forcerange", numbers([-limit, *limit]));
+                    }
+                    self.controls.push(control);
+                    self.drive_elements.push(("general", t));
+                }
+                Drive::Velocity { .. } => {
+                    self.note(joint, "velocity drives, which hold their velocity exactly, are left out")
+                }
+                Drive::Playback { .. } => self.note(joint, "playback drives are left out"),
+            }
+        }
+    }
+}
+
+impl Tree<'_> {
+    /// Returns the placement of a link in its parent, in the base, or in the world for a floating root.
+    fn placement(&self, link: &Link) -> Pose {
+        match (&link.joint, link.parent) {
+            (Joint::Floating, _) => pose_of(&self.state[link.q..link.q + 7]),
+            (_, None) if self.based => self.body.base().inverse() * link.placement,
+            _ => link.placement,
+        }
+    }
+
+    /// Returns whether a link is a joint alone: without mass, shapes and visuals.
+    fn is_bare(&self, k: usize) -> bool {
+        let link = &self.body.model().links()[k];
+        link.mass == LinkMass::none()
+            && link.joint != Joint::Floating
+            && self.body.colliders_of(Some(k)).next().is_none()
+            && visuals(self.body, Some(k)).next().is_none()
+            && self.body.model().frames().iter().filter(|frame| frame.link == Some(k)).count() == 1
+    }
+
+    /// Returns the parent of a link's body.
+    fn parent(&self, links: &[Link], mut k: usize) -> Option<usize> {
+        loop {
+            k = links[k].parent?;
+            if !(self.is_bare(k) && self.children[k].len() == 1) {
+                return Some(k);
+            }
+        }
+    }
+}
+
+/// Returns the roots with this joint.
+fn roots(links: &[Link], joint: Joint) -> Vec<usize> {
+    (0..links.len()).filter(|k| links[*k].parent.is_none() && links[*k].joint == joint).collect()
+}
+
+/// Returns the visuals of a link, or of the base, that are drawn.
+fn visuals(body: &ArticulatedBody, link: Option<usize>) -> impl Iterator<Item = &tumble_core::Visual> {
+    let part = link.unwrap_or(body.model().links().len());
+    let all = body.renderable().map_or(&[][..], |r| r.visuals());
+    all.iter().filter(move |visual| visual.part == part && visual.drawn().is_some())
+}
+
+/// Adds position and velocity of a floating root: MuJoCo's angular velocity is in the axes of the body.
+fn put_free(q: &[f64], v: &[f64], (qpos, qvel): (&mut Vec<f64>, &mut Vec<f64>)) {
+    qpos.extend(&q[..3]);
+    put_rotation(&q[3..7], qpos);
+    let spin = pose_of(q).rotation.inverse() * Vec3::new(v[0], v[1], v[2]);
+    qvel.extend(v[3..6].iter().chain(spin.iter()));
+}
+
+fn pose_of(q: &[f64]) -> Pose {
+    let rotation = nalgebra::Quaternion::new(q[6], q[3], q[4], q[5]);
+    Pose::from_parts(Vec3::new(q[0], q[1], q[2]).into(), nalgebra::UnitQuaternion::new_unchecked(rotation))
+}
