@@ -12,7 +12,7 @@ use tumble::sound::{Listener, MAX_SECONDS, Mixed, SoundError, Soundtrack};
 /// The sound of one run.
 pub struct Audio {
     soundtrack: Soundtrack,
-    /// Where it is heard while nothing else was chosen.
+    /// Listener while nothing else was chosen.
     scene: Listener,
     /// `--camera`.
     camera: Option<String>,
