@@ -110,8 +110,13 @@ def test_the_sound_of_a_run(tmp_path):
     assert first == pytest.approx(fall + travel, abs=1.5 / 240)
     left, right = (samples**2).sum(axis=0)
     assert right > 2 * left  # it falls at the right
-    limit = sound.save(tmp_path / "run.wav")
-    assert 0 < limit <= 1
+    gain = sound.save(tmp_path / "run.wav")
+    assert gain * np.abs(samples).max() == pytest.approx(np.sqrt(0.5))
+    assert sound.save(tmp_path / "quiet.wav", gain_db=-40) == pytest.approx(0.01)
+    with pytest.raises(tumble.InvalidValueError, match="a gain of 200 dB"):
+        sound.save(tmp_path / "loud.wav", gain_db=200)
+    with pytest.raises(tumble.InvalidValueError, match="ends in .wav"):
+        sound.save(tmp_path / "run.mp3")
     with wave.open(str(tmp_path / "run.wav")) as file:
         assert (file.getnchannels(), file.getframerate(), file.getnframes()) == (2, 48000, len(samples))
     again = tumble.Soundtrack(dropped(), eye=(0, -3, 1), target=(0, 0, 1), materials={"block": "wood"})

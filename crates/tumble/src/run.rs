@@ -39,7 +39,7 @@ pub fn run(options: &RunOptions) -> Result<(), Failure> {
     // the capture and the recorder have read the visual meshes by now
     visual_notes(world.visuals()).iter().filter(|_| !options.quiet).for_each(|note| println!("{note}"));
     let start = State::of(&world);
-    let mut audio = options.audio.is_some().then(|| Audio::new(&scene)).transpose()?;
+    let mut audio = options.audio.is_some().then(|| Audio::new(&scene, &world, options)).transpose()?;
     let outputs = Outputs { recorder: recorder.as_mut(), capture: capture.as_mut(), audio: audio.as_mut() };
     let simulated = simulate(&mut world, outputs, &scene, options)?;
     finish_recording(recorder, options)?;
@@ -128,7 +128,7 @@ fn simulate(
         wall += taken;
         record(world)?;
         shoot(world)?;
-        audio.iter_mut().for_each(|audio| audio.frame(world));
+        audio.as_mut().map_or(Ok(()), |audio| audio.frame(world))?;
         progress.at(frame, world.time());
         outcome = divergence::check(world);
         if outcome.is_err() {

@@ -859,9 +859,9 @@ class Soundtrack:
         """Steps the world n times and listens to each frame."""
     def samples(self) -> _Floats:
         """Returns the samples of both ears, shape (n, 2), 48,000 for each second; 1 is full scale, and louder ones are not cut."""
-    def save(self, path: _Path) -> float:
-        """Writes a WAV file of 16 bits. If the peak exceeds 0.98 of full scale, the whole is made quieter by one factor, which it returns;
-        otherwise 1.
+    def save(self, path: _Path, *, gain_db: float | None = None) -> float:
+        """Writes a WAV file of 16 bits, whose name ends in ``.wav``, and returns the factor of its samples. gain_db: gain, -120 to 120 dB; by
+        default the peak is brought to -3 dB of full scale. A peak above 0.98 of full scale is lowered to it by one factor for the whole.
         """
     @property
     def impacts(self) -> int:

@@ -112,8 +112,8 @@ impl Soundtrack {
 
     /// Number of impacts so far.
     #[getter]
-    fn impacts(&self) -> usize {
-        self.heard().track.strikes().len()
+    fn impacts(&self) -> u64 {
+        self.heard().track.impacts()
     }
 
     /// Number of sounds that were left out because there were too many.
@@ -129,13 +129,22 @@ impl Soundtrack {
         Ok(PyArray1::from_iter(py, samples.into_iter().flatten()).reshape(shape)?)
     }
 
-    /// Writes a WAV file of 16 bits. If the peak exceeds 0.98 of full scale, the whole is made quieter by one factor, which it returns;
-    /// otherwise 1.
-    fn save(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> Result<f64> {
-        let (path, mixed) = (crate::arrays::convert::path(path)?, self.mixed(py)?);
+    /// Writes a WAV file of 16 bits, whose name ends in ``.wav``, and returns the factor of its samples. gain_db: gain, -120 to 120 dB; by
+    /// default the peak is brought to -3 dB of full scale. A peak above 0.98 of full scale is lowered to it by one factor for the whole.
+    #[pyo3(signature = (path, *, gain_db=None))]
+    fn save(&self, py: Python<'_>, path: &Bound<'_, PyAny>, gain_db: Option<f64>) -> Result<f64> {
+        let path = crate::arrays::convert::path(path)?;
+        if path.extension().is_some_and(|ending| !ending.eq_ignore_ascii_case("wav")) {
+            let file = path.display();
+            return Err(Error::value(format!(
+                "path: '{file}'; sound is written as WAV; expected a file that ends in .wav"
+            )));
+        }
+        let mixed = self.mixed(py)?;
+        let gain = mixed.gain(gain_db).map_err(failed)?;
         py.detach(|| {
-            write(&path, &mixed.wav().map_err(failed)?)?;
-            Ok(mixed.limit())
+            write(&path, &mixed.wav(gain).map_err(failed)?)?;
+            Ok(gain)
         })
     }
 

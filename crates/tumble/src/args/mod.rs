@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use tumble::collide::Builder;
 use tumble::render::{DebugDraw, Quality};
 use tumble::scene::urdf::MissingMeshes;
-use values::{folder, fraction, method, missing, package, planner, png, size};
+use values::{folder, fraction, gain, method, missing, package, planner, png, size, wav};
 
 /// Real-time dynamics for interactive and immersive environments.
 #[derive(Parser)]
@@ -116,9 +116,19 @@ pub struct RunOptions {
     /// such as .mp4.
     #[arg(long, help_heading = "Pictures", value_name = "FILE")]
     pub video: Option<PathBuf>,
-    /// Write the sound of the run, heard from the scene's camera, as a WAV file.
-    #[arg(long, help_heading = "Pictures", value_name = "FILE")]
+    /// Write the sound of the run, heard from the camera, as a WAV file.
+    #[arg(long, help_heading = "Pictures", value_name = "FILE", value_parser = wav)]
     pub audio: Option<PathBuf>,
+    /// Gain of the sound, dB (default: the peak is brought to -3 dB). A peak above full scale is lowered to it.
+    #[arg(
+        long,
+        help_heading = "Pictures",
+        value_name = "DB",
+        requires = "audio",
+        allow_negative_numbers = true,
+        value_parser = gain
+    )]
+    pub audio_gain: Option<f64>,
     /// Frames of the video, and pictures in the folder, per simulated second.
     #[arg(long, help_heading = "Pictures", value_name = "N", default_value = "30", value_parser = rate)]
     pub fps: f64,

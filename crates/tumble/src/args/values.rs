@@ -17,6 +17,10 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     number(text, 0.0, 1e6)
 }
 
+pub(super) fn gain(text: &str) -> Result<f64, String> {
+    number(text, -tumble::sound::MAX_GAIN_DB, tumble::sound::MAX_GAIN_DB)
+}
+
 pub fn time_step(text: &str) -> Result<f64, String> {
     number(text, 1e-6, 1.0)
 }
@@ -85,6 +89,17 @@ pub(super) fn png(text: &str) -> Result<PathBuf, String> {
     match path.extension() {
         Some(ending) if !ending.eq_ignore_ascii_case("png") => {
             Err("pictures are written as PNG; expected a file that ends in .png".into())
+        }
+        _ => Ok(path),
+    }
+}
+
+/// Parses the name of a sound: its extension must be .wav, or missing.
+pub(super) fn wav(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match path.extension() {
+        Some(ending) if !ending.eq_ignore_ascii_case("wav") => {
+            Err("sound is written as WAV; expected a file that ends in .wav".into())
         }
         _ => Ok(path),
     }

@@ -8,6 +8,7 @@ mod body;
 mod materials;
 mod mix;
 mod observe;
+mod parts;
 mod voices;
 mod wav;
 
@@ -19,4 +20,4 @@ pub use materials::{SOUND_MATERIALS, SoundMaterial};
 pub use mix::{Listener, RATE_HZ, SPEED_OF_SOUND};
 pub use observe::{Impact, Impacts, Slide, Soundtrack, slides};
 pub use voices::{Rub, Strike};
-pub use wav::{MAX_SECONDS, Mixed, SoundError};
+pub use wav::{MAX_GAIN_DB, MAX_SECONDS, Mixed, SoundError};

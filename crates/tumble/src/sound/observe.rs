@@ -1,11 +1,12 @@
 //! Collects what sounds from a world, frame by frame.
 
 use super::mix::Canvas;
+use super::parts::Chosen;
 use super::voices::Noise;
 use super::{Listener, MAX_SECONDS, Mixed, RATE_HZ, Rub, SoundBody, SoundError, SoundMaterial, Strike};
 use std::collections::BTreeMap;
-use tumble_core::collide::{Shape, Vec3};
-use tumble_core::{EventKind, ObjectId, RigidBody, World};
+use tumble_core::collide::Vec3;
+use tumble_core::{EventKind, ObjectId, World};
 use tumble_scene::SceneFile;
 
 /// Largest number of strikes and of rubs; later ones are not heard.
@@ -15,13 +16,16 @@ const QUIET: f64 = 1e-6;
 /// Power of friction below which it is not heard, W.
 const QUIET_RUB: f64 = 1e-4;
 
-type Pair = (ObjectId, ObjectId);
+/// Two parts that touch.
+type Pair = ([ObjectId; 2], [usize; 2]);
 
 /// A blow between two bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Impact {
     /// The bodies.
     pub bodies: [ObjectId; 2],
+    /// Their parts that meet.
+    pub parts: [usize; 2],
     /// The place where they meet, world frame, m.
     pub point: Vec3,
     /// Rise of the impulse between them from the step before, N·s, above 0.
@@ -29,6 +33,9 @@ pub struct Impact {
 }
 
 /// Finds impacts from step to step.
+///
+/// What touches when a world begins or when listening begins was not struck. A pair that sleeps keeps the impulse that
+/// it had, so it does not sound when it wakes.
 #[derive(Clone, Debug, Default)]
 pub struct Impacts {
     /// Impulse of each pair in the step before, N·s.
@@ -43,15 +50,18 @@ impl Impacts {
             let (EventKind::ContactBegin | EventKind::ContactPersist, Some(b)) = (event.kind, event.b) else {
                 continue;
             };
-            let impulse = event.impulse.norm();
-            *now.entry((event.a, b)).or_insert(0.0) += impulse;
+            let (bodies, parts, impulse) = ([event.a, b], [event.part_a, event.part_b], event.impulse.norm());
+            now.insert((bodies, parts), impulse);
+            let known = self.before.get(&(bodies, parts)).copied();
+            let began = event.kind == EventKind::ContactBegin && world.frame() > 1;
             // what a lasting contact carries is not struck; a rise of it is
-            let struck = impulse - self.before.get(&(event.a, b)).copied().unwrap_or(0.0);
+            let struck = impulse - known.unwrap_or(if began { 0.0 } else { impulse });
             if struck > QUIET && struck > 0.2 * impulse {
-                impacts.push(Impact { bodies: [event.a, b], point: event.point, impulse: struck });
+                impacts.push(Impact { bodies, parts, point: event.point, impulse: struck });
             }
         }
-        self.before = now;
+        self.before.retain(|(bodies, _), _| bodies.iter().any(|id| world.asleep(*id)));
+        self.before.extend(now);
         impacts
     }
 }
@@ -83,39 +93,31 @@ pub fn slides(world: &World) -> impl Iterator<Item = Slide> + '_ {
 /// The sounds of a run.
 #[derive(Default)]
 pub struct Soundtrack {
-    materials: BTreeMap<String, SoundMaterial>,
+    chosen: Chosen,
     impacts: Impacts,
+    heard: u64,
     strikes: Vec<Strike>,
     rubs: Vec<(u64, Rub)>,
     /// Number of each pair that rubs: its noise.
-    numbers: BTreeMap<Pair, u64>,
+    numbers: BTreeMap<[ObjectId; 2], u64>,
     begin: Option<f64>,
     left_out: u64,
 }
 
 impl Soundtrack {
-    /// Begins a soundtrack. `materials` names the material of bodies; the others have that of their density.
+    /// Begins a soundtrack. `materials` names the material of objects; the others have that of their density.
     pub fn new(materials: BTreeMap<String, SoundMaterial>) -> Soundtrack {
-        Soundtrack { materials, ..Soundtrack::default() }
+        Soundtrack { chosen: Chosen { objects: materials, ..Chosen::default() }, ..Soundtrack::default() }
     }
 
     /// Begins a soundtrack with the `sound` of the bodies, templates and materials of a scene.
     pub fn of_scene(scene: &SceneFile) -> Soundtrack {
-        let mut materials = BTreeMap::new();
-        let mut add = |name: String, material: Option<usize>, own: Option<&str>| {
-            let of_material = material.and_then(|k| scene.materials[k].sound.as_deref());
-            materials.extend(own.or(of_material).and_then(SoundMaterial::of_name).map(|sound| (name, sound)));
-        };
-        scene.bodies.iter().for_each(|body| add(body.name.clone(), body.material, body.sound.as_deref()));
-        for template in &scene.templates {
-            template.names().for_each(|name| add(name, template.body.material, template.body.sound.as_deref()));
-        }
-        Soundtrack::new(materials)
+        Soundtrack { chosen: Chosen::of_scene(scene), ..Soundtrack::default() }
     }
 
-    /// Sets the material of a body by its name.
+    /// Sets the material of a body or of all links of an articulated body by its name.
     pub fn set_material(&mut self, body: impl Into<String>, material: SoundMaterial) {
-        self.materials.insert(body.into(), material);
+        self.chosen.objects.insert(body.into(), material);
     }
 
     /// Makes a soundtrack of strikes alone.
@@ -128,6 +130,11 @@ impl Soundtrack {
         &self.strikes
     }
 
+    /// Returns the number of impacts that are heard: of each, one or both bodies are among the strikes.
+    pub fn impacts(&self) -> u64 {
+        self.heard
+    }
+
     /// Returns how many sounds were left out because there were too many.
     pub fn left_out(&self) -> u64 {
         self.left_out
@@ -138,13 +145,13 @@ impl Soundtrack {
         let dt = world.settings().dt;
         let begin = *self.begin.get_or_insert(world.time() - dt);
         let time = world.time() - dt - begin;
-        for Impact { bodies, point, impulse } in self.impacts.after_step(world) {
-            self.strike(world, bodies, time, point, impulse);
+        for impact in self.impacts.after_step(world) {
+            self.strike(world, time, &impact);
         }
         for Slide { bodies: [a, b], point, force, speed } in slides(world) {
             let rub = Rub { time, duration: dt, point: point.into(), force, speed };
             let next = self.numbers.len() as u64;
-            let number = *self.numbers.entry((a, b)).or_insert(next);
+            let number = *self.numbers.entry([a, b]).or_insert(next);
             match self.rubs.len() < MAX_VOICES {
                 true => self.rubs.push((number, rub)),
                 false => self.left_out += 1,
@@ -152,9 +159,10 @@ impl Soundtrack {
         }
     }
 
-    fn strike(&mut self, world: &World, ids: [ObjectId; 2], time: f64, point: Vec3, impulse: f64) {
-        let bodies = ids.map(|id| self.body(world, id));
+    fn strike(&mut self, world: &World, time: f64, &Impact { bodies, parts, point, impulse }: &Impact) {
+        let bodies = [0, 1].map(|side| self.chosen.body(world, bodies[side], parts[side]));
         let contact = duration(&bodies, impulse);
+        self.heard += u64::from(bodies.iter().any(Option::is_some));
         for body in bodies.into_iter().flatten() {
             match self.strikes.len() < MAX_VOICES {
                 true => self.strikes.push(Strike { time, point: point.into(), impulse, body, contact }),
@@ -163,49 +171,42 @@ impl Soundtrack {
         }
     }
 
-    /// Returns how a body sounds; `None` for one without an end, such as the ground, and for links.
-    fn body(&self, world: &World, id: ObjectId) -> Option<SoundBody> {
-        let body = world.get::<RigidBody>(id)?;
-        let sides = sides(body.shape())?;
-        let volume = body.shape().mass_properties(1.0).ok()?.mass;
-        let named = self.materials.get(world.name(id)?).copied();
-        let material = match named {
-            Some(material) => material,
-            None if body.is_fixed() => return None, // a fixed body has no mass of its own
-            None => SoundMaterial::of_density(body.mass() / volume),
-        };
-        let mass = if body.is_fixed() { material.density * volume } else { body.mass() };
-        let (length, thickness) = (sides.max(), sides.min());
-        Some(SoundBody { material, length, thickness, mass })
-    }
-
-    /// Mixes everything for a listener. The sound ends a second after the last frame, at `end` s after the first.
+    /// Mixes everything for a listener that stays. The sound ends a second after the last frame, at `end` s after the
+    /// first.
     ///
     /// # Errors
     /// [`SoundError::Long`].
     pub fn mix(&self, listener: &Listener, end: f64) -> Result<Mixed, SoundError> {
+        self.mix_moving(&[(0.0, *listener)], end)
+    }
+
+    /// Mixes everything for a listener that moves. `ears` has the listener from a time on, s after the first frame's
+    /// start, in ascending order; the first is also heard before its time. Each sound is heard from where the listener
+    /// is when it begins.
+    ///
+    /// # Errors
+    /// [`SoundError::Long`]; [`SoundError::NoEars`] without a listener.
+    pub fn mix_moving(&self, ears: &[(f64, Listener)], end: f64) -> Result<Mixed, SoundError> {
         if end.is_nan() || end > MAX_SECONDS {
             return Err(SoundError::Long(end));
         }
+        let first = ears.first().ok_or(SoundError::NoEars)?;
+        let at = |time: f64| match ears.partition_point(|(from, _)| *from <= time + 1e-9) {
+            0 => first.1,
+            n => ears[n - 1].1,
+        };
         let mut canvas = Canvas::default();
         for strike in &self.strikes {
-            canvas.add(listener, strike.time, strike.point, &strike.samples());
+            canvas.add(&at(strike.time), strike.time, strike.point, &strike.samples());
         }
         let mut noises: BTreeMap<u64, Noise> = BTreeMap::new();
         for (number, rub) in &self.rubs {
             let noise = noises.entry(*number).or_insert_with(|| Noise::new(*number));
-            canvas.add(listener, rub.time, rub.point, &rub.samples(noise));
+            canvas.add(&at(rub.time), rub.time, rub.point, &rub.samples(noise));
         }
         canvas.0.resize(((end + 1.0) * f64::from(RATE_HZ)).ceil().max(0.0) as usize, [0.0; 2]);
         Ok(Mixed { samples: canvas.0 })
     }
-}
-
-/// Returns the sides of the box of a shape, m; `None` for a half-space.
-fn sides(shape: &Shape) -> Option<Vec3> {
-    let bounds = shape.aabb(&Default::default());
-    let sides = bounds.max - bounds.min;
-    (sides.iter().all(|x| x.is_finite()) && sides.max() < 1e4 && sides.min() > 1e-6).then_some(sides)
 }
 
 /// Returns the duration of a contact by Hertz' law, s, of the lighter body with its approach speed `J/m`.

@@ -1,6 +1,7 @@
 //! The `tumble` command as users run it: processes, files, exit codes.
 
 mod articulated_scenes;
+mod audio;
 mod bad_input;
 mod calibrate;
 mod cave_compute;

@@ -97,7 +97,7 @@ impl ContactSound {
             messages.push(message("/tumble/listener", [vec![name_of(name)], pose].concat()));
         }
         let names = |bodies: &[ObjectId; 2]| bodies.map(|id| name_of(world.name(id).unwrap_or_default())).to_vec();
-        for Impact { bodies, point, impulse } in &impacts {
+        for Impact { bodies, point, impulse, .. } in &impacts {
             let numbers = floats(&[point.x, point.y, point.z, *impulse]);
             messages.push(message("/tumble/impact", [names(bodies), numbers].concat()));
         }
@@ -218,6 +218,23 @@ mod tests {
         let expected = 2.0 * (2.0f64 * 9.81 * 0.5).sqrt() * 1.5;
         assert!((f64::from(numbers[3]) - expected).abs() < 0.02 * expected, "{numbers:?}, expected {expected}");
         assert_eq!(impacts.len(), 1, "the next is after 0.64 s");
+    }
+
+    #[test]
+    fn what_lies_on_the_ground_from_the_start_is_no_impact() {
+        let engine = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let mut sound = ContactSound::open(engine.local_addr().unwrap(), Vec::new()).ok().unwrap();
+        let mut world = World::new(Settings::default()).unwrap();
+        world.add_static(RigidBody::fixed(Shape::half_space())).unwrap();
+        let sphere = RigidBody::new(Shape::sphere(0.1).unwrap()).with_mass(2.0);
+        world.add(sphere.with_pose(tumble::collide::Pose::translation(0.0, 0.0, 0.1))).unwrap();
+        for frame in 0..20 {
+            world.step().unwrap();
+            assert!(!world.events().is_empty(), "it touches");
+            sound.step(&world);
+            sound.frame(frame, &world, &Viewer::default());
+        }
+        assert_eq!(sound.counts.impacts, 0);
     }
 
     #[test]
