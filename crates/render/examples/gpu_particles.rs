@@ -1,18 +1,14 @@
-//! Time of a frame of particles on the graphics device, and of the same particles on the processor.
+//! Time of a frame of particles on the graphics device. The example `particles` of `tumble-behaviors` has that of the processor.
 //!
 //! `cargo run --release -p tumble-render --example gpu_particles -- [COUNT…]` prints, for 100,000 and 1,000,000 particles unless counts
-//! are given (at most a million), ms of the clock per frame of 1/60 s: on the device with one submission a frame, on the device with all
-//! frames in a row, and by `ParticleSystem` on one thread. Ten seconds of particles that fall on a slope, a sphere and a box.
+//! are given (at most a million), ms of the clock per frame of 1/60 s: with one submission a frame, and with all frames in a row. Ten
+//! seconds of particles that fall on a slope, a sphere and a box.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use std::time::Instant;
-use tumble_behaviors::{ParticleSettings, ParticleSystem};
-use tumble_core::prelude::*;
+use std::time::{Duration, Instant};
 use tumble_render::{FreeParticle, FreeParticles, GpuParticles, Obstacle, ObstacleShape};
 
 const FRAMES: u32 = 600;
-/// Frames on the processor, of the first second: a frame takes longer there.
-const FEW: u32 = 60;
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -47,14 +43,8 @@ fn main() -> Result<(), Failure> {
         let begin = Instant::now();
         device.advance(FRAMES)?;
         let all = begin.elapsed();
-        let mut world = in_a_world(&constants, &obstacles, &start)?;
-        let begin = Instant::now();
-        for _ in 0..FEW {
-            world.step()?;
-        }
-        let processor = begin.elapsed();
-        let ms = |time: std::time::Duration, frames: u32| 1e3 * time.as_secs_f64() / f64::from(frames);
-        println!("| {count} | {:.3} | {:.3} | {:.1} |", ms(single, FRAMES), ms(all, FRAMES), ms(processor, FEW));
+        let ms = |time: Duration| 1e3 * time.as_secs_f64() / f64::from(FRAMES);
+        println!("| {count} | {:.3} | {:.3} |", ms(single), ms(all));
     }
     Ok(())
 }
@@ -62,10 +52,6 @@ fn main() -> Result<(), Failure> {
 fn obstacle(shape: ObstacleShape, position: Vector3<f64>, turn: Vector3<f64>) -> Obstacle {
     let pose = Isometry3::from_parts(position.into(), UnitQuaternion::from_scaled_axis(turn));
     Obstacle { shape, pose, restitution: 0.6, friction: 0.3 }
-}
-
-fn surface(obstacle: &Obstacle) -> Material {
-    Material { friction: obstacle.friction, restitution: obstacle.restitution, ..Material::default() }
 }
 
 /// A fixed cloud of particles above the obstacles.
@@ -79,28 +65,4 @@ fn fallen(count: usize) -> Vec<FreeParticle> {
         life: 1e6,
     };
     (0..count).map(particle).collect()
-}
-
-fn in_a_world(constants: &FreeParticles, obstacles: &[Obstacle], particles: &[FreeParticle]) -> Result<World, Failure> {
-    let mut world = World::new(Settings::default().with_dt(constants.dt).with_gravity(constants.gravity))?;
-    for obstacle in obstacles {
-        let shape = match obstacle.shape {
-            ObstacleShape::HalfSpace => Shape::half_space(),
-            ObstacleShape::Sphere(radius) => Shape::sphere(radius)?,
-            ObstacleShape::Box(size) => Shape::cuboid(size)?,
-        };
-        world.add(RigidBody::fixed(shape).with_pose(obstacle.pose).with_material(surface(obstacle)))?;
-    }
-    let settings = ParticleSettings {
-        capacity: particles.len(),
-        linear_drag: constants.linear_drag,
-        radius: constants.radius,
-        material: surface(&obstacles[0]),
-        ..ParticleSettings::default()
-    };
-    let system = world.add(ParticleSystem::new("particles", settings)?)?;
-    for particle in particles {
-        ParticleSystem::spawn(&mut world, system, particle.position, particle.velocity, particle.life)?;
-    }
-    Ok(world)
 }
