@@ -158,11 +158,17 @@ fn bodies(name: &'static str, [nx, ny, nz]: [usize; 3]) -> Result<Subject, Failu
     subject(name, scene)
 }
 
-/// A flock that fills the picture.
+/// A flock that fills the picture, after three seconds: as dense as that of the example `flock` of `tumble-behaviors`.
 fn boids() -> Result<Subject, Failure> {
-    let text = "[[flock]]\nname = \"flock\"\n[[flock.group]]\ncount = 10000\nspread_m = 30\nvelocity_m_per_s = [10, 0, 0]\n\
-                [camera]\neye_m = [0, -90, 0]\ntarget_m = [0, 0, 0]\nvertical_fov_deg = 40\n";
-    subject("10,000 boids", SceneFile::parse(text, "boids.toml")?)
+    let text = "[[flock]]\nname = \"flock\"\n[[flock.group]]\ncount = 10000\nspread_m = 40\nvelocity_m_per_s = [10, 0, 0]\n\
+                [camera]\neye_m = [5, -140, -5]\ntarget_m = [5, 0, -5]\nvertical_fov_deg = 40\n";
+    let mut subject = subject("10,000 boids", SceneFile::parse(text, "boids.toml")?)?;
+    let settings = subject.world.settings().with_dt(1.0 / 60.0);
+    subject.world.set_settings(settings)?;
+    for _ in 0..180 {
+        subject.world.step()?;
+    }
+    Ok(subject)
 }
 
 /// Sparks in a ball above the ground.

@@ -50,6 +50,29 @@ pub struct Sphere {
     pub casts_shadow: bool,
 }
 
+/// Spheres of one material that cast no shadow and do not turn, such as particles: drawn as [`Sphere`]s are, with less work for
+/// each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SphereCloud {
+    /// Centers in the world and radii, m, above 0.
+    pub spheres: Vec<(Point3<f32>, f32)>,
+    /// The material of all, which has no texture.
+    pub material: Material,
+}
+
+impl SphereCloud {
+    /// Returns them one by one.
+    pub(crate) fn each(&self) -> impl Iterator<Item = Sphere> + '_ {
+        self.spheres.iter().map(|(center, radius)| Sphere {
+            center: *center,
+            radius: *radius,
+            orientation: UnitQuaternion::identity(),
+            material: self.material,
+            casts_shadow: false,
+        })
+    }
+}
+
 /// A capsule, drawn by ray casting like a sphere: all points within a radius of a segment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Capsule {
@@ -265,6 +288,8 @@ pub struct DrawList {
     pub instances: Vec<Instance>,
     /// Spheres.
     pub spheres: Vec<Sphere>,
+    /// Many small spheres of one material each.
+    pub clouds: Vec<SphereCloud>,
     /// Capsules.
     pub capsules: Vec<Capsule>,
     /// Debug lines and arrows.
@@ -311,6 +336,11 @@ impl DrawList {
         self.spheres.push(Sphere { center, radius, orientation, material, casts_shadow: true });
         let last = self.spheres.len() - 1;
         &mut self.spheres[last]
+    }
+
+    /// Returns the number of spheres, those of clouds among them.
+    pub fn sphere_count(&self) -> usize {
+        self.spheres.len() + self.clouds.iter().map(|cloud| cloud.spheres.len()).sum::<usize>()
     }
 
     /// Adds a capsule of this radius (m) around a segment of this length (m). It casts a shadow.

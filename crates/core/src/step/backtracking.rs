@@ -5,7 +5,8 @@
 //! while the frame has time left:
 //!     correct        overlap beyond the contact tolerance
 //!     impacts        at the touching contacts that approach                       (reflections)
-//!     resting        forces f at the acceleration level:  a + v/h + K f ≥ 0 ⟂ f ≥ 0, friction; they hold over the sub-step
+//!     resting        forces f at the acceleration level:  a + v/h + K f ≥ 0 ⟂ f ≥ 0, friction; they hold over the sub-step,
+//!                    which is made shorter and solved again if a slide ends in it
 //!     try h          integrate; go back while a new contact is deeper than the contact tolerance; land when it just touches
 //!     correct        joints, and limits that had a force
 //! ```
@@ -34,6 +35,7 @@ use super::event_location::{Bracket, LimitRole, Role, SLOW, Watch};
 use super::held_forces::{hold_forces, push_to};
 use super::impact::{self, Candidate};
 use super::patch::solve_patches;
+use super::slide_end::SlideEnds;
 use super::warm_start::{row_starts, warm_start};
 use super::{StepContext, Stepper, TimeStepping, Workspace};
 use crate::constraint::rows::{Block, RowSet};
@@ -58,11 +60,20 @@ pub struct Backtracking {
     after: Vec<ContactConstraint>,
     limits_after: Vec<Limit>,
     watch: Watch,
+    slides: SlideEnds,
     /// Limits with a force in this sub-step, and the rows at its end.
     held: Vec<ActiveLimit>,
     probe: Workspace,
     adaptive: Adaptive,
     fallback: TimeStepping,
+}
+
+/// What a solve for contact forces found.
+enum Resolved {
+    /// The generalized contact forces that hold over the sub-step.
+    Forces(Vec<f64>),
+    /// A slide ends after this time, s.
+    SlideEnds(f64),
 }
 
 /// Number of tries in a frame after which the rest of it is one time-stepping sub-step.
@@ -110,6 +121,7 @@ impl Backtracking {
     fn piece(&mut self, core: &mut Core, end: f64) -> Result<(), StepError> {
         let (dt, most) = (core.settings.dt, TRIES * core.division);
         let mut left = if core.division == 1 { dt } else { end - core.state.time };
+        self.slides.solves = 0;
         while left > 1e-12 * dt {
             if core.report.tries >= most || !core.meter.start_try(core.settings.solver_settings.budget) {
                 core.report.floor_hits += 1;
@@ -123,11 +135,26 @@ impl Backtracking {
                 self.gather(core, left)?;
                 self.roles(core);
             }
-            let held = self.resolve_contacts(core, left)?;
-            left -= self.advance(core, &held, left)?;
+            left -= self.motion(core, left)?;
         }
         core.state.time = end; // whatever the sub-steps add up to
         Ok(())
+    }
+
+    /// Advances to the next event, at most for `left` seconds. Returns the length of the sub-step, s.
+    fn motion(&mut self, core: &mut Core, left: f64) -> Result<f64, StepError> {
+        let mut h = left;
+        self.slides.start();
+        loop {
+            match self.resolve_contacts(core, h)? {
+                Resolved::Forces(held) => return self.advance(core, &held, h),
+                Resolved::SlideEnds(end) => {
+                    h = end;
+                    self.gather(core, h)?;
+                    self.roles(core);
+                }
+            }
+        }
     }
 
     /// Corrects overlap beyond the contact tolerance, then computes contacts, rows and smooth
@@ -260,9 +287,8 @@ impl Backtracking {
         if moves { build_rows(core, None, &mut self.work, self.level, 0.5 * left) } else { Ok(()) }
     }
 
-    /// Resolves contacts (thesis `ResolveContacts`). Returns the generalized contact forces that
-    /// hold over the sub-step.
-    fn resolve_contacts(&mut self, core: &mut Core, left: f64) -> Result<Vec<f64>, StepError> {
+    /// Resolves contacts (thesis `ResolveContacts`) for a sub-step of `left` seconds.
+    fn resolve_contacts(&mut self, core: &mut Core, left: f64) -> Result<Resolved, StepError> {
         let mut dp = std::mem::take(&mut self.work.dp);
         let time = core.state.time;
         core.integration().evaluate(time, &mut dp);
@@ -325,6 +351,12 @@ impl Backtracking {
         let rate = |i: usize| acceleration[i] + adhesion[i];
         let free: Vec<f64> = (0..u.len()).map(|i| u[i] + left * rate(i)).collect();
         let ray = solve_patches(core, None, work, (solver_settings, left), &keep, &free)?;
+        let floor = core.settings.dt * FLOOR;
+        if let Some(end) = self.slides.before(core, work, &velocity, left)
+            && end > floor
+        {
+            return Ok(Resolved::SlideEnds(end));
+        }
         work.du.iter_mut().zip(&adhesion).for_each(|(du, pull)| *du += pull);
         self.held = correction::limits_with_force(work);
         let mut held = vec![0.0; core.dof];
@@ -350,7 +382,7 @@ impl Backtracking {
             impulses(work, &work.lambda, 1.0),
             row_starts(work, &work.lambda, 1.0),
         );
-        Ok(held)
+        Ok(Resolved::Forces(held))
     }
 
     /// Assigns the roles of limits: those with a reported gap are active from the time at which

@@ -13,6 +13,7 @@ mod impact;
 mod islands;
 mod moment;
 mod patch;
+mod slide_end;
 mod solves;
 mod time_stepping;
 mod turning;

@@ -71,6 +71,7 @@ mod scripted_splines;
 mod sensor_noise;
 mod sensors;
 mod sleep;
+mod slides;
 mod smooth_shapes;
 mod soft_rows;
 mod solvers;

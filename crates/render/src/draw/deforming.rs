@@ -1,8 +1,8 @@
 //! Surfaces and clouds that change with the state: their geometry is made anew for each list.
 
 use super::{Drawing, small, surface};
-use crate::{DebugStyle, DrawList, Material, MeshData, Pattern, RenderError};
-use nalgebra::{Isometry3, Point3, UnitQuaternion};
+use crate::{DebugStyle, DrawList, Material, MeshData, Pattern, RenderError, SphereCloud};
+use nalgebra::{Isometry3, Point3};
 use std::sync::Arc;
 use tumble_core::{Appearance, Cloud, Detail, PartState, PartSurface};
 
@@ -41,12 +41,13 @@ impl Drawing {
     }
 }
 
-/// Adds the spheres of a cloud, without shadows.
+/// Adds the spheres of a cloud.
 pub(super) fn place_cloud(list: &mut DrawList, name: &str, cloud: Cloud<'_>, tint: Option<[f32; 3]>) {
     let material = plain(cloud.appearance, name, tint);
-    for (center, radius) in cloud.spheres.filter(|(center, radius)| center.amax() < FAR_M && *radius as f32 > 0.0) {
-        let center = Point3::from(small(&center));
-        list.add_sphere(center, radius as f32, UnitQuaternion::identity(), material).casts_shadow = false;
+    let shown = cloud.spheres.filter(|(center, radius)| center.amax() < FAR_M && *radius as f32 > 0.0);
+    let spheres: Vec<_> = shown.map(|(center, radius)| (Point3::from(small(&center)), radius as f32)).collect();
+    if !spheres.is_empty() {
+        list.clouds.push(SphereCloud { spheres, material });
     }
 }
 

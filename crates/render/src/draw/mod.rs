@@ -2,6 +2,7 @@
 
 mod deforming;
 mod detail;
+mod key;
 mod looks;
 mod overlay;
 mod surface;
@@ -16,6 +17,7 @@ pub use views::{NamedView, UnknownView};
 use crate::{
     Camera, DebugStyle, DrawList, Ground, Image, Light, Material, MeshData, MeshId, Pattern, RenderError, Sky, Texture,
 };
+use key::{Form, MeshKey};
 use nalgebra::{Isometry3, Point3, Vector3};
 use overlay::{island_colors, sleep_colors};
 use std::collections::BTreeMap;
@@ -42,8 +44,8 @@ const ROUNDING: f32 = 0.06;
 
 /// Makes draw lists of one scene. Meshes are converted once and shared by all frames.
 pub struct Drawing {
-    meshes: BTreeMap<String, Arc<MeshData>>,
-    edges: BTreeMap<String, Vec<[[f32; 3]; 2]>>,
+    meshes: BTreeMap<MeshKey, Arc<MeshData>>,
+    edges: BTreeMap<MeshKey, Vec<[[f32; 3]; 2]>>,
     /// Keeps the geometry of the converted meshes in memory, because the keys contain addresses.
     sources: Vec<VisualGeometry>,
     textures: BTreeMap<Arc<Path>, Arc<Image>>,
@@ -61,7 +63,7 @@ pub struct Drawing {
 /// Meshes of one list by the key of their shape, and textures by their file.
 #[derive(Default)]
 struct Placed {
-    meshes: BTreeMap<String, MeshId>,
+    meshes: BTreeMap<MeshKey, MeshId>,
     textures: BTreeMap<Arc<Path>, usize>,
 }
 
@@ -201,11 +203,12 @@ impl Drawing {
             return Ok(());
         }
         let textured = material.texture.is_some();
-        let key = match (simple, textured) {
-            (true, _) => format!("simple {}", key(drawn)),
-            (_, true) => format!("textured {}", key(drawn)),
-            _ => key(drawn),
+        let form = match (simple, textured) {
+            (true, _) => Form::Simple,
+            (_, true) => Form::Textured,
+            _ => Form::Full,
         };
+        let key = MeshKey::new(drawn, form);
         let mesh = match placed.meshes.get(&key) {
             Some(mesh) => *mesh,
             None => {
@@ -218,7 +221,7 @@ impl Drawing {
                         };
                         let data = if simple { detail::simplified(&full) } else { full };
                         self.sources.push(visual.geometry.clone());
-                        self.meshes.entry(key.clone()).or_insert(Arc::new(data)).clone()
+                        self.meshes.entry(key).or_insert(Arc::new(data)).clone()
                     }
                 };
                 *placed.meshes.entry(key).or_insert(list.add_mesh(data))
@@ -245,7 +248,7 @@ impl Drawing {
             list.wire_sphere(pose.translation.vector.into(), *radius as f32, DebugStyle::new(color).width(1.5));
             return Ok(());
         }
-        let key = key(drawn);
+        let key = MeshKey::new(drawn, Form::Full);
         if !self.edges.contains_key(&key) {
             let mesh = match drawn {
                 // without rounded edges, which would double the lines
@@ -253,7 +256,7 @@ impl Drawing {
                 other => mesh_of(other)?,
             };
             self.sources.push(visual.geometry.clone());
-            self.edges.insert(key.clone(), detail::edges(&mesh));
+            self.edges.insert(key, detail::edges(&mesh));
         }
         detail::draw_edges(list, &self.edges[&key], &pose, color);
         Ok(())
@@ -292,20 +295,6 @@ impl Drawing {
             }
         };
         Ok(Some(Texture { id, repeat_m }))
-    }
-}
-
-/// The key by which visuals share a mesh: their dimensions, or the address of the shared mesh.
-fn key(drawn: Drawn<'_>) -> String {
-    match drawn {
-        Drawn::Mesh(mesh) => format!("triangles {:p}", Arc::as_ptr(mesh)),
-        Drawn::Shape(Shape::Mesh(mesh)) => format!("mesh {:p}", Arc::as_ptr(mesh)),
-        Drawn::Shape(Shape::Compound(compound)) => format!("compound {:p}", Arc::as_ptr(compound)),
-        Drawn::Shape(Shape::Cylinder(c)) => format!("cylinder {} {}", c.radius(), c.half_length()),
-        Drawn::Shape(Shape::RoundedCylinder { core, rounding }) => {
-            format!("rounded cylinder {} {} {rounding}", core.radius(), core.half_length())
-        }
-        Drawn::Shape(other) => format!("{other:?}"),
     }
 }
 

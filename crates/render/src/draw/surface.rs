@@ -1,13 +1,13 @@
 //! Materials from the appearance of objects and of scene files.
 
-use crate::{Material, Pattern};
+use crate::{Material, Pattern, Shader};
 use tumble_core::Appearance;
 
 /// The material of an object's appearance. A billiard ball's number is the one at the end of the
 /// body's name (`ball_12`); without a number the spots stay blank.
 pub(super) fn of_appearance(appearance: &Appearance, name: &str) -> Material {
     let mut numbers = Numbers { second: [1.0; 3], scale_m: 0.1, offset_m: 0.0, name };
-    let mut clearcoat = 0.0;
+    let (mut clearcoat, mut shader) = (0.0, Shader::Lit);
     // the first of equal names counts
     for (key, value) in appearance.properties.iter().rev() {
         let value = *value as f32;
@@ -18,6 +18,7 @@ pub(super) fn of_appearance(appearance: &Appearance, name: &str) -> Material {
             "scale_m" => numbers.scale_m = value,
             "offset_m" => numbers.offset_m = value,
             "clearcoat" => clearcoat = value,
+            "glow" if value != 0.0 => shader = Shader::Unlit,
             _ => {}
         }
     }
@@ -26,6 +27,7 @@ pub(super) fn of_appearance(appearance: &Appearance, name: &str) -> Material {
         roughness: appearance.roughness,
         metallic: appearance.metallic,
         clearcoat,
+        shader,
         pattern: pattern(&appearance.shader, &numbers),
         ..Material::default()
     }
@@ -44,6 +46,7 @@ pub(super) fn of_spec(appearance: &tumble_scene::AppearanceSpec) -> Material {
         roughness: appearance.roughness as f32,
         metallic: appearance.metallic as f32,
         clearcoat: appearance.clearcoat as f32,
+        shader: if appearance.glow { Shader::Unlit } else { Shader::Lit },
         pattern: pattern(appearance.pattern.name(), &numbers),
         ..Material::default()
     }

@@ -3,7 +3,7 @@
 
 use crate::list::debug::Stroke;
 use crate::material::linear3;
-use crate::{Capsule, Instance, Material, Part, Sphere};
+use crate::{Capsule, Instance, Material, Part, Sphere, SphereCloud};
 use nalgebra::{Matrix2, Matrix3, Matrix4, Point3, Vector2, Vector3, Vector4};
 
 /// Numbers per mesh instance, sphere, capsule and stroke.
@@ -200,6 +200,17 @@ pub fn sphere(s: &Sphere, out: &mut Vec<u32>) {
     out.extend([pair(r, g), pair(b, m.roughness), pair(or, og), pair(ob, m.metallic)]);
     // the texture goes once around a sphere
     out.extend([q.x, q.y, q.z, q.w, m.clearcoat, 0.0, size[0], size[1]].map(f32::to_bits));
+}
+
+/// The spheres of a cloud as [`sphere`]: their appearance is computed once.
+pub fn cloud(cloud: &SphereCloud, out: &mut Vec<u32>) {
+    let Some(first) = cloud.each().next() else { return };
+    let mut words = Vec::with_capacity(4 * SPHERE_TEXELS);
+    sphere(&first, &mut words);
+    for (center, radius) in &cloud.spheres {
+        words[..4].copy_from_slice(&[center.x, center.y, center.z, *radius].map(f32::to_bits));
+        out.extend_from_slice(&words);
+    }
 }
 
 /// A sphere as numbers: center and radius, orientation, material.

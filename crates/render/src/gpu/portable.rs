@@ -13,9 +13,11 @@ use super::data::{self, Eye};
 use super::pipeline_plan::{Input, Plan, WRITE};
 use super::pipelines::{self, Pass, Variant};
 use super::scene;
-use super::stage::{Same, group_items, placed_meshes};
+use super::stage::{Same, cloud_groups, group_items, placed_meshes};
 use crate::list::debug::strokes;
-use crate::{DrawList, Image, Instance, MeshData, MeshId, Part, RenderError, Shadows, SphereStyle, Viewpoint};
+use crate::{
+    DrawList, Image, Instance, MeshData, MeshId, Part, RenderError, Shadows, SphereCloud, SphereStyle, Viewpoint,
+};
 use std::sync::{Arc, OnceLock};
 
 /// A picture as plain numbers.
@@ -207,9 +209,11 @@ impl PortablePicture {
     }
 
     fn add_spheres(&mut self, list: &DrawList, variant: Variant, near_lamp: bool) {
-        let (groups, order) = group_items(&list.spheres, |s| (&s.material, s.casts_shadow));
+        let (mut groups, order) = group_items(&list.spheres, |s| (&s.material, s.casts_shadow));
+        groups.extend(cloud_groups(list));
         let floats = &mut self.items[PortableItems::Spheres as usize];
         order.iter().for_each(|&i| data::sphere_floats(&list.spheres[i], floats));
+        list.clouds.iter().flat_map(SphereCloud::each).for_each(|sphere| data::sphere_floats(&sphere, floats));
         for same in &groups {
             self.draw(Pass::Sphere, same.surface, variant, PortableItems::Spheres, None, same);
             self.cast(Kind::SphereDepth, PortableItems::Spheres, None, same);

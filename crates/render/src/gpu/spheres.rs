@@ -3,7 +3,7 @@
 use super::Gpu;
 use super::cull::{SphereBounds, visible};
 use super::data::{self, Eye};
-use super::stage::{Same, group_items};
+use super::stage::{Same, cloud_groups, group_items};
 use crate::{DrawList, RenderError};
 use std::ops::Range;
 use wgpu::{Buffer, BufferUsages, TextureView};
@@ -42,9 +42,11 @@ pub enum Which {
 
 impl Spheres {
     pub(super) fn new(gpu: &Gpu, list: &DrawList) -> Result<Self, RenderError> {
-        let (groups, order) = group_items(&list.spheres, |s| (&s.material, s.casts_shadow));
-        let spheres: Vec<SphereBounds> =
-            order.iter().map(|&i| (list.spheres[i].center, list.spheres[i].radius)).collect();
+        let (mut groups, order) = group_items(&list.spheres, |s| (&s.material, s.casts_shadow));
+        groups.extend(cloud_groups(list));
+        let mut spheres: Vec<SphereBounds> = Vec::with_capacity(list.sphere_count());
+        spheres.extend(order.iter().map(|&i| (list.spheres[i].center, list.spheres[i].radius)));
+        list.clouds.iter().for_each(|cloud| spheres.extend(&cloud.spheres));
         let ranges: Vec<u32> = groups.iter().flat_map(|g| [g.all.start, g.all.end]).collect();
         let whole = if gpu.choosy || spheres.is_empty() {
             None
@@ -96,13 +98,15 @@ fn sphere_buffer(
 
 fn appearances(gpu: &Gpu, list: &DrawList, order: &[usize]) -> Result<TextureView, RenderError> {
     let row = 256 * 4 * data::SPHERE_TEXELS;
-    let rows = order.len().div_ceil(256).max(1);
+    let count = list.sphere_count();
+    let rows = count.div_ceil(256).max(1);
     let most = gpu.device.limits().max_texture_dimension_2d as usize;
     if rows > most {
-        return Err(RenderError::TooMany { what: "spheres", count: order.len(), cap: 256 * most });
+        return Err(RenderError::TooMany { what: "spheres", count, cap: 256 * most });
     }
     let mut words = Vec::with_capacity(rows * row);
     order.iter().for_each(|&i| data::sphere(&list.spheres[i], &mut words));
+    list.clouds.iter().for_each(|cloud| data::cloud(cloud, &mut words));
     words.resize(rows * row, 0);
     Ok(super::finish::upload(
         gpu,

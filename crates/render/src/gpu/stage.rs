@@ -315,6 +315,16 @@ pub(super) fn group_items<T>(items: &[T], kind: impl Fn(&T) -> (&Material, bool)
     (groups, order)
 }
 
+/// The clouds of a list, whose spheres come after all others.
+pub(super) fn cloud_groups(list: &DrawList) -> impl Iterator<Item = Same> + '_ {
+    let mut end = list.spheres.len() as u32;
+    list.clouds.iter().map(move |cloud| {
+        let start = end;
+        end += cloud.spheres.len() as u32;
+        Same { surface: cloud.material.surface(), texture: None, all: start..end, casters: start..start }
+    })
+}
+
 /// Forms runs of one kind, with the first item of each; shadow casters come first in each run.
 fn runs<K: PartialEq>(
     order: &[usize],

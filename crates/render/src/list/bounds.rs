@@ -96,12 +96,17 @@ impl DrawList {
             let r = Vector3::repeat(s.radius);
             (Corners([s.center; 8], 1), (s.center - r, s.center + r), s.radius)
         });
+        let clouds =
+            self.clouds.iter().filter(move |_| !casters).flat_map(|cloud| &cloud.spheres).map(|(center, radius)| {
+                let r = Vector3::repeat(*radius);
+                (Corners([*center; 8], 1), (center - r, center + r), *radius)
+            });
         let capsules = self.capsules.iter().filter(move |c| c.casts_shadow || !casters).map(|c| {
             let [a, b] = [-1.0, 1.0].map(|end| c.pose * Point3::new(0.0, 0.0, end * 0.5 * c.length));
             let r = Vector3::repeat(c.radius);
             (Corners([a, b, a, a, a, a, a, a], 2), (a.inf(&b) - r, a.sup(&b) + r), c.radius)
         });
-        instances.chain(spheres).chain(capsules)
+        instances.chain(spheres).chain(clouds).chain(capsules)
     }
 }
 

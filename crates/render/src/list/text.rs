@@ -73,6 +73,12 @@ impl Display for DrawList {
                 shadow(s.casts_shadow)
             )?;
         }
+        for (i, cloud) in self.clouds.iter().enumerate() {
+            writeln!(f, "cloud {i}: {} spheres {}", cloud.spheres.len(), material(&cloud.material))?;
+            for (center, radius) in &cloud.spheres {
+                writeln!(f, "  at {} radius {}", v(center.coords.as_slice()), n(*radius))?;
+            }
+        }
         for (i, c) in self.capsules.iter().enumerate() {
             let (t, q) = (c.pose.translation.vector, c.pose.rotation.coords);
             write!(f, "capsule {i}: at {} turned {} length {}", v(t.as_slice()), v(q.as_slice()), n(c.length))?;

@@ -42,6 +42,15 @@ impl DrawList {
             at.material(&s.material)?;
             at.texture(&s.material, self.textures.len())?;
         }
+        for (i, cloud) in self.clouds.iter().enumerate() {
+            let at = Item("cloud", i);
+            for (center, radius) in &cloud.spheres {
+                at.finite("center", center.coords.as_slice())?;
+                at.check(*radius > 0.0 && radius.is_finite(), "radius", radius, "finite and above 0")?;
+            }
+            at.material(&cloud.material)?;
+            at.check(cloud.material.texture.is_none(), "texture", &cloud.material.texture, "none")?;
+        }
         for (i, c) in self.capsules.iter().enumerate() {
             let at = Item("capsule", i);
             at.finite("pose", c.pose.translation.vector.as_slice())?;
@@ -62,7 +71,7 @@ impl DrawList {
         let counts = [
             ("meshes", self.meshes.len(), MAX_ITEMS),
             ("instances", self.instances.len(), MAX_ITEMS),
-            ("spheres", self.spheres.len(), MAX_ITEMS),
+            ("spheres", self.sphere_count(), MAX_ITEMS),
             ("capsules", self.capsules.len(), MAX_ITEMS),
             ("lines", self.lines.len(), MAX_ITEMS),
             ("points", self.points.len(), MAX_ITEMS),

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use tumble_render::{
     DebugDraw, DebugStyle, DrawList, Drawing, Ground, Image, Light, MAX_LIGHTS, Material, MeshData, MeshId, Pattern,
-    Quality, RenderError, Sky, Texture,
+    Quality, RenderError, Sky, SphereCloud, Texture,
 };
 use tumble_scene::SceneFile;
 
@@ -13,6 +13,8 @@ fn sample() -> DrawList {
     list.add_instance(cube, Isometry3::translation(1.0, -0.00001, 0.5), Material::plastic([0.8, 0.3, 0.2]))
         .casts_shadow = false;
     list.add_sphere(Point3::new(0.0, 0.0, 0.25), 0.25, UnitQuaternion::identity(), Material::billiard_ball(11));
+    let dust = vec![(Point3::new(1.0, 2.0, 3.0), 0.01), (Point3::new(0.0, 0.0, 4.0), 0.02)];
+    list.clouds.push(SphereCloud { spheres: dust, material: Material::unlit([1.0, 0.5, 0.0]) });
     list.textures.push(std::sync::Arc::new(Image { width: 2, height: 1, rgba: vec![255; 8] }));
     let worn = Material { texture: Some(Texture { id: 0, repeat_m: 0.25 }), metallic: 1.0, ..Material::walnut() };
     list.add_capsule(Isometry3::translation(0.0, 2.0, 1.0), 0.125, 1.0, worn).casts_shadow = false;
@@ -56,6 +58,9 @@ texture 0: 2 x 1
 instance 0: mesh 0 at (1 0 0.5) turned (0 0 0 1) scale (1 1 1) color (0.8 0.3 0.2) rough 0.45 metal 0 coat 0 no shadow
 instance 1: mesh 1 at (0 0 0) turned (0 0 0 1) scale (1 1 2) color (1 1 1) rough 0.45 metal 0 coat 0 unlit texture 0 every 1
 sphere 0: at (0 0 0.25) radius 0.25 turned (0 0 0 1) color (0.82 0.08 0.07) rough 0.25 metal 0 coat 1 pattern billiard_ball (0 0 0) (11 1)
+cloud 0: 2 spheres color (1 0.5 0) rough 0.45 metal 0 coat 0 unlit
+  at (1 2 3) radius 0.01
+  at (0 0 4) radius 0.02
 capsule 0: at (0 2 1) turned (0 0 0 1) length 1 radius 0.125 color (0.42 0.25 0.14) rough 0.5 metal 1 coat 0.2 pattern wood (0.2 0.1 0.05) (0.012 0) texture 0 every 0.25 no shadow
 arrow 0: from (0 0 0) to (0 0 1) color (1 0 0) opacity 1 width 2 on top
 line 1: from (0 0 0) to (1 2 3) color (0 1 0) opacity 1 width 2
@@ -102,6 +107,12 @@ fn faults_are_named() {
         fault(&|l| l.spheres[0].material.roughness = 1.5).starts_with("sphere 0: roughness is 1.5, expected 0 to 1")
     );
     assert!(fault(&|l| l.spheres[0].material.color[1] = f32::INFINITY).starts_with("sphere 0: color"));
+    assert!(fault(&|l| l.clouds[0].spheres[1].0.y = f32::NAN).starts_with("cloud 0: center is [0.0, NaN"));
+    assert!(
+        fault(&|l| l.clouds[0].spheres[0].1 = 0.0).starts_with("cloud 0: radius is 0.0, expected finite and above 0")
+    );
+    let texture = Some(Texture { id: 0, repeat_m: 1.0 });
+    assert!(fault(&|l| l.clouds[0].material.texture = texture).starts_with("cloud 0: texture is "));
     assert!(fault(&|l| l.lines[1].end.z = f32::NAN).starts_with("line 1: end"));
     assert!(fault(&|l| l.lights[0] = Light::sun(Vector3::zeros(), 1.0)).starts_with("light 0: direction"));
     assert!(fault(&|l| l.settings.shadow_map_size = 1 << 20).starts_with("settings 0: shadow_map_size is 1048576"));

@@ -14,10 +14,20 @@ fn flown(
     particles: &[FreeParticle],
     frames: u32,
 ) -> Option<Vec<FreeParticle>> {
+    flown_by(constants, obstacles, particles, frames).map(|(particles, _)| particles)
+}
+
+/// The same with the name of the adapter.
+fn flown_by(
+    constants: &FreeParticles,
+    obstacles: &[Obstacle],
+    particles: &[FreeParticle],
+    frames: u32,
+) -> Option<(Vec<FreeParticle>, String)> {
     match GpuParticles::new(constants, obstacles, particles) {
         Ok(mut on_gpu) => {
             on_gpu.advance(frames).unwrap();
-            Some(on_gpu.read().unwrap())
+            Some((on_gpu.read().unwrap(), on_gpu.adapter().to_owned()))
         }
         Err(RenderError::NoAdapter { reason }) => {
             // past the harness, which keeps what passing tests print
@@ -154,13 +164,15 @@ fn ten_seconds_of_bounces_are_those_of_the_processor() {
     // A sphere and the edges of a box part neighbors, so that a difference of rounding grows.
     let things = [ground, ball, block];
     let compared = |start: &[FreeParticle]| {
-        let end = flown(&constants, &things, start, 600)?;
-        Some(deviations(&end, &in_a_world(&constants, &things, start, 600)))
+        let (end, adapter) = flown_by(&constants, &things, start, 600)?;
+        Some((deviations(&end, &in_a_world(&constants, &things, start, 600)), adapter))
     };
-    let Some(all) = compared(&start) else { return };
+    let Some((all, adapter)) = compared(&start) else { return };
     println!("all things: worst of {} is {:.1e}", all.len(), largest(&all));
-    assert!(largest(&all) < 1e-5, "{:e}", largest(&all));
-    let Some(all) = compared(&cloud(4000, Vector3::new(0.0, 0.0, 6.0), 3.0, 2.0)) else { return };
+    // graphics cards divide and take roots to a few units in the last place; processors round correctly
+    let bound = if adapter.contains("Cpu") { 1e-5 } else { 1e-4 };
+    assert!(largest(&all) < bound, "{:e} on {adapter}", largest(&all));
+    let Some((all, _)) = compared(&cloud(4000, Vector3::new(0.0, 0.0, 6.0), 3.0, 2.0)) else { return };
     let close = all.iter().filter(|own| **own < 1e-5).count();
     println!("{close} of {} within 1e-5, worst {:.1e}", all.len(), largest(&all));
     assert!(close >= 3980 && largest(&all) < 1e-3, "{close}, {:e}", largest(&all));

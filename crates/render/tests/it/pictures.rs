@@ -3,7 +3,7 @@
 use crate::support::{area, bare, exact_edges, from_above, linear, moments, picture, renderer};
 use nalgebra::{Isometry3, Matrix4, Point3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
-use tumble_render::{Camera, DebugStyle, DrawList, Image, Instance, Material, MeshData, RenderError};
+use tumble_render::{Camera, DebugStyle, DrawList, Image, Instance, Material, MeshData, RenderError, SphereCloud};
 
 const WHITE: [f32; 3] = [1.0; 3];
 
@@ -54,6 +54,34 @@ fn a_ball_at_the_side_is_the_predicted_ellipse() {
         "center {mx} {my}, expected {}",
         200.0 + center
     );
+}
+
+/// Among other spheres, before and behind them, with light and shadows.
+#[test]
+fn a_cloud_is_drawn_as_its_spheres_are() {
+    let mut list = bare(from_above(5.0));
+    list.add_sphere(Point3::origin(), 0.6, UnitQuaternion::identity(), Material::plastic([0.2, 0.4, 0.9]));
+    list.add_sphere(Point3::new(0.9, 0.2, 0.3), 0.2, UnitQuaternion::identity(), Material::walnut());
+    let place = |k: usize| {
+        let turn = 2.4 * k as f32;
+        (Point3::new(0.05 * turn.cos() * k as f32, 0.05 * turn.sin() * k as f32, 0.1 * (k % 9) as f32), 0.1)
+    };
+    let clouds = [Material::plastic([0.9, 0.5, 0.1]), Material::unlit([0.1, 0.9, 0.2])]
+        .map(|material| SphereCloud { spheres: Vec::new(), material });
+    list.clouds = clouds.to_vec();
+    (0..40).for_each(|k| list.clouds[k % 2].spheres.push(place(k)));
+    let mut single = list.clone();
+    for cloud in std::mem::take(&mut single.clouds) {
+        for (center, radius) in cloud.spheres {
+            single.add_sphere(center, radius, UnitQuaternion::identity(), cloud.material).casts_shadow = false;
+        }
+    }
+    let (Some(cloud), Some(spheres)) = (picture(&list, 160, 120), picture(&single, 160, 120)) else { return };
+    assert_eq!(cloud.rgba, spheres.rgba);
+    list.clouds.clear();
+    let without = picture(&list, 160, 120).expect("as before");
+    let changed = without.rgba.chunks(4).zip(cloud.rgba.chunks(4)).filter(|(a, b)| a != b).count();
+    assert!(changed > 300, "{changed} pixels show the cloud");
 }
 
 #[test]

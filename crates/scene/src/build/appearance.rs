@@ -20,13 +20,18 @@ pub(crate) fn appearance(appearance: &AppearanceSpec, center: &Vec3) -> Appearan
         ("scale_m", appearance.pattern_scale_m),
         ("offset_m", appearance.pattern_offset_m - center.z),
         ("clearcoat", appearance.clearcoat),
+        ("glow", f64::from(u8::from(appearance.glow))),
     ];
     Appearance {
         color: appearance.color.map(|c| c as f32),
         roughness: appearance.roughness as f32,
         metallic: appearance.metallic as f32,
         shader: appearance.pattern.name().into(),
-        properties: named.map(|(name, value)| (name.to_string(), value)).to_vec(),
+        properties: named
+            .into_iter()
+            .filter(|(name, _)| *name != "glow" || appearance.glow)
+            .map(|(name, value)| (name.to_string(), value))
+            .collect(),
         texture: appearance.texture.as_deref().map(Into::into),
         detail: appearance.detail,
     }

@@ -72,6 +72,8 @@ pub struct AppearanceSpec {
     pub metallic: f64,
     /// Strength of a clear coat, 0 to 1. Default 0.
     pub clearcoat: f64,
+    /// Whether the surface shows its colors as they are, without light and shadow: sparks, flames, lamps. Default false.
+    pub glow: bool,
     /// A PNG image over the main color, which then tints it. It repeats every `pattern_scale_m`,
     /// and covers a sphere once. In the file relative to the folder of the scene; here the path as
     /// it is opened.
@@ -91,6 +93,7 @@ impl Default for AppearanceSpec {
             roughness: 0.5,
             metallic: 0.0,
             clearcoat: 0.0,
+            glow: false,
             texture: None,
             detail: Detail::Full,
         }
@@ -109,6 +112,7 @@ impl AppearanceSpec {
             roughness: f.number_or("roughness", Bound::UNIT, base.roughness),
             metallic: f.number_or("metallic", Bound::UNIT, base.metallic),
             clearcoat: f.number_or("clearcoat", Bound::UNIT, base.clearcoat),
+            glow: f.flag_or("glow", base.glow),
             texture: read_texture(f).or_else(|| base.texture.clone()),
             detail: read_detail(f, base.detail),
         }

@@ -68,6 +68,7 @@ pub(super) fn appearance(given: &Appearance, center: &Vec3, base: &AppearanceSpe
     t.put_unless(base.roughness as f32, "roughness", *roughness);
     t.put_unless(base.metallic as f32, "metallic", *metallic);
     t.put_unless(base.clearcoat, "clearcoat", property("clearcoat").unwrap_or(plain.clearcoat));
+    t.put_unless(base.glow, "glow", property("glow").map_or(plain.glow, |glow| glow != 0.0));
     match texture {
         Some(texture) if base.texture.as_deref() != Some(texture) => t.put("texture", absolute(texture)),
         _ => {}
@@ -87,6 +88,7 @@ pub(super) fn appearance_spec(spec: &AppearanceSpec, base: &AppearanceSpec) -> T
         roughness,
         metallic,
         clearcoat,
+        glow,
         texture,
         detail,
     } = spec;
@@ -99,6 +101,7 @@ pub(super) fn appearance_spec(spec: &AppearanceSpec, base: &AppearanceSpec) -> T
     t.put_unless(base.roughness, "roughness", *roughness);
     t.put_unless(base.metallic, "metallic", *metallic);
     t.put_unless(base.clearcoat, "clearcoat", *clearcoat);
+    t.put_unless(base.glow, "glow", *glow);
     texture.iter().for_each(|texture| t.put("texture", absolute(texture)));
     t.put_unless(base.detail.words(), "detail", detail.words());
     t

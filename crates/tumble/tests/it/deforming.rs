@@ -21,7 +21,14 @@ fn points(list: &DrawList) -> Vec<[f32; 3]> {
         let mesh = &list.meshes[instance.mesh.0].positions;
         mesh.iter().map(|p| instance.pose.transform_point(&(*p).into()).coords.into())
     });
-    placed.chain(list.spheres.iter().map(|sphere| sphere.center.coords.into())).collect()
+    placed.chain(all_spheres(list).map(|[x, y, z, _]| [x, y, z])).collect()
+}
+
+/// Center and radius of all spheres, and then of those of all clouds.
+fn all_spheres(list: &DrawList) -> impl Iterator<Item = [f32; 4]> + '_ {
+    let clouds = list.clouds.iter().flat_map(|cloud| &cloud.spheres).copied();
+    let spheres = list.spheres.iter().map(|sphere| (sphere.center, sphere.radius)).chain(clouds);
+    spheres.map(|(center, radius)| [center.x, center.y, center.z, radius])
 }
 
 fn assert_alike(ours: &DrawList, theirs: &DrawList, what: &str) {
@@ -50,11 +57,11 @@ fn a_facet_shows_what_the_server_has() {
             mirror.apply_state(frame, world.time(), &published.state).unwrap();
             assert_eq!(mirror.hash(), published.hash, "{name}");
             let ours = list(&scene, &world);
-            assert!(ours.instances.len() + ours.spheres.len() > 1);
+            assert!(ours.instances.len() + ours.sphere_count() > 1);
             assert_alike(&ours, &list(&scene, mirror.world()), name);
         }
         if name == "sparks" {
-            let sparks = list(&scene, mirror.world()).spheres.len();
+            let sparks = list(&scene, mirror.world()).sphere_count();
             assert!(sparks > 1000 + 500, "{sparks} particles are drawn");
         }
     }
@@ -106,11 +113,7 @@ fn saved_particles_and_cloth_look_as_before() {
 
 /// Spheres that are drawn of a world.
 fn spheres(scene: &SceneFile, world: &World) -> Vec<[f32; 4]> {
-    let mut spheres: Vec<[f32; 4]> = list(scene, world)
-        .spheres
-        .iter()
-        .map(|sphere| [sphere.center.x, sphere.center.y, sphere.center.z, sphere.radius])
-        .collect();
+    let mut spheres: Vec<[f32; 4]> = all_spheres(&list(scene, world)).collect();
     spheres.sort_by(|a, b| a.partial_cmp(b).unwrap());
     spheres
 }
