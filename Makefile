@@ -1,6 +1,6 @@
 # Short names for the scripts; each can be run by itself where there is no make.
 
-.PHONY: help demo test test-slow wheel cave-trial goldens gallery references lint bench bench-robots work-precision clean
+.PHONY: help demo test test-slow wheel cave-trial goldens gallery references lint bench bench-robots bench-scenes work-precision clean
 
 help:
 	@echo "make demo       install what is missing, run the billiards scene, leave a recording and a picture in out/, run an example in Python"
@@ -14,6 +14,7 @@ help:
 	@echo "make lint       format, clippy, rustdoc, ruff and mypy; warnings are errors"
 	@echo "make bench      step times beside Rapier, and articulated bodies; five minutes (benches/peers, a workspace of its own: it has more)"
 	@echo "make bench-robots robots beside MuJoCo, one world and batches, in Python; minutes"
+	@echo "make bench-scenes times of all shipped scenes with both steppers; minutes"
 	@echo "make work-precision error over CPU time on six problems with known answers, beside MuJoCo and Rapier; minutes, more the first time"
 	@echo "make clean      remove everything built"
 
@@ -60,6 +61,11 @@ work-precision:
 	@scripts/test_python.sh crates/py/tests/test_package.py
 	cd benches/peers && cargo bench --quiet --locked --bench precision > ../../target/precision.txt
 	target/py-tests/bin/python benches/python/work_precision.py docs/images/work_precision.svg target/precision.txt
+
+bench-scenes:
+	@scripts/setup.sh
+	cargo build --release --locked -p tumble
+	scripts/bench_scenes.py
 
 bench-robots:
 	@[ -x target/python/bin/python ] || $(MAKE) references

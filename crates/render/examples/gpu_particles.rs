@@ -30,9 +30,7 @@ fn main() -> Result<(), Failure> {
         let mut device = GpuParticles::new(&constants, &obstacles, &start)?;
         if row == 0 {
             println!("adapter: {}\n", device.adapter());
-            println!(
-                "| particles | device, a frame at a time | device, frames in a row | processor, one thread |\n|---|---|---|---|"
-            );
+            println!("| particles | device, a frame at a time | device, frames in a row |\n|---|---|---|");
         }
         device.advance(10)?; // pipelines and memory are made at the first
         let begin = Instant::now();

@@ -68,7 +68,7 @@ pub struct Backtracking {
     fallback: TimeStepping,
 }
 
-/// What a solve for contact forces found.
+/// The outcome of a solve for contact forces.
 enum Resolved {
     /// The generalized contact forces that hold over the sub-step.
     Forces(Vec<f64>),

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! The slide ends at the `h` of `s = 1`. `s` is linear in `1/h`, so a second try is exact while nothing turns. A contact that slides
-//! back at the end has `s = −1` whatever `h` is: then half of it is tried. A try that ends before the slide tells its deceleration.
+//! back at the end has `s = −1` whatever `h` is: then half of it is tried. A try that ends before the slide has its deceleration.
 //!
 //! Contacts with kinematic bodies are left out, because their velocity jumps from frame to frame, and so are frames with a budget.
 //!
