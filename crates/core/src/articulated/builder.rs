@@ -422,6 +422,9 @@ impl ArticulationBuilder {
             if link.cone.is_some() && !spherical {
                 return Err(self.wrong_joint(link, "it has a cone, which only spherical joints have"));
             }
+            if spherical && link.dof.limits.is_some() {
+                return Err(self.wrong_joint(link, "it has limits of one angle; a spherical joint has a cone"));
+            }
             if link.cone.is_some_and(|(axis, _)| axis > 2) {
                 return Err(self.wrong_joint(link, "the axis of its cone is not 0, 1 or 2"));
             }

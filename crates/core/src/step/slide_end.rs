@@ -30,13 +30,13 @@ use std::ops::Range;
 const SLIDING: f64 = 1e-6;
 /// Fraction of the contact tolerance by which a frame may misplace a contact whose slide ends in it.
 const LOCATED: f64 = 1e-2;
-/// Most solves of a frame that locate ends; later ones of the frame end within a sub-step.
+/// Most solves of a frame, or of a piece of one that is divided, that locate ends; later ones end within a sub-step.
 const MOST: u32 = 24;
 
 /// The search for the next end of a slide.
 #[derive(Default)]
 pub(super) struct SlideEnds {
-    /// Solves of the frame that were spent on it.
+    /// Solves of the frame, or of the piece of it, that were spent on it.
     pub solves: u32,
     tried: Option<Tried>,
 }
@@ -77,8 +77,9 @@ impl SlideEnds {
                 let tried = Tried { pair: pair(&run[0]), h, share: slide.share };
                 (slide.speed * (1.0 - slide.share) > slowest).then(|| (tried.end(before), tried))
             } else {
-                let tried = before.filter(|_| slide.speed * slide.kept > slowest);
-                tried.map(|tried| ((h / (1.0 - slide.kept)).clamp(h, 0.999_999 * tried.h), tried))
+                let tried = before.filter(|_| slide.kept < 1.0 && slide.speed * slide.kept > slowest);
+                let end = |tried: Tried| ((h / (1.0 - slide.kept)).min(0.999_999 * tried.h), tried);
+                tried.map(end).filter(|(end, _)| *end > h)
             };
             first = [first, found].into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0));
         }

@@ -59,6 +59,7 @@ impl World {
         let SensorPlace::Site(site) = sensor.place() else { return None };
         let pose = self.core.site_pose(site)?;
         let SensorImage { width, height, pixels } = self.image(sensor)?;
+        let looks = self.looks();
         let mut palette: BTreeMap<(ObjectId, usize), Vec<&Visual>> = BTreeMap::new();
         let color = |(hit, direction): (Option<(RayCastHit, f64)>, Vec3)| {
             let Some((hit, per_meter)) = hit else { return [0; 3] };
@@ -66,7 +67,8 @@ impl World {
             let visuals = palette.entry((hit.id, hit.part)).or_insert_with(|| self.core.visuals_of(hit.id, hit.part));
             let seen = self.core.seen(visuals, &hit, &pose.translation.vector, &direction);
             let light = AMBIENT + (1.0 - AMBIENT) * (-hit.normal.dot(&direction)).max(0.0);
-            let base = seen.map_or(Appearance::default().color, |visual| visual.appearance.color);
+            let own = seen.map_or(Appearance::default().color, |visual| visual.appearance.color);
+            let base = looks.colors.get(&hit.id).copied().unwrap_or(own);
             base.map(|c| encoded(light * decoded(f64::from(c))))
         };
         let pixels = pixels.into_iter().zip(sensor.optics().directions()).map(color).collect();

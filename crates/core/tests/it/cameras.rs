@@ -97,6 +97,21 @@ fn a_camera_sees_what_single_rays_meet_on_any_number_of_threads_and_not_its_own_
 
 /// The color of a pixel is that of the surface, dimmed in linear light by the angle between its normal and the ray.
 #[test]
+fn a_color_camera_sees_the_color_that_an_event_gives() {
+    let mut world = no_gravity(world("time_stepping", 0.01));
+    let ball = world.add_static(RigidBody::fixed(sphere(0.5))).unwrap();
+    let painted = Action::Recolor { body: Subject::Part(ball, 0), color: [0.0, 1.0, 0.0] };
+    world.add(ScriptedEvent::new("event", Trigger::Time { at: 0.005 }).with_action(painted)).unwrap();
+    let site = Anchor::world(Pose::new(Vec3::new(0.0, 0.0, 3.0), Vec3::x() * PI));
+    let camera = camera(&mut world, SensorKind::Color, site, Optics { resolution: [3, 3], vertical_fov: 0.2 });
+    let middle = |world: &World| world.color_image(camera).unwrap().pixels[4];
+    let [red, green, blue] = middle(&world);
+    assert!(red > 150 && green > 150 && blue > 150);
+    world.step().unwrap();
+    assert_eq!(middle(&world), [0, 255, 0]);
+}
+
+#[test]
 fn a_color_camera_sees_the_colors_of_bodies_by_its_own_light() {
     let mut world = no_gravity(world("time_stepping", 0.01));
     let painted = |color: [f32; 3]| Appearance { color, ..Appearance::default() };

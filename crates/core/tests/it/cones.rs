@@ -121,4 +121,8 @@ fn invalid_cones_are_refused() {
         LinkBuilder::new("arm", Joint::revolute(Vec3::z())).with_mass(1.0).with_shape(sphere(0.1), Pose::identity());
     let why = ArticulationBuilder::new("robot").link(link.with_cone(2, 0.5)).build().map(drop).unwrap_err().to_string();
     assert!(why.contains("cone"), "{why}");
+    let link = LinkBuilder::new("arm", Joint::Spherical).with_mass(1.0).with_shape(sphere(0.1), Pose::identity());
+    let link = link.with_limits([0.0, 1.0]);
+    let why = ArticulationBuilder::new("robot").link(link).build().map(drop).unwrap_err().to_string();
+    assert!(why.contains("a spherical joint has a cone"), "{why}");
 }

@@ -32,7 +32,7 @@ fn check(what: &str, bound: f64, error: impl Fn(f64) -> f64) {
 
 #[test]
 fn boxes_slide_to_rest_where_friction_stops_them() {
-    check("boxes", 2e-8, |dt| {
+    check("boxes", 2e-11, |dt| {
         let mut world = world("backtracking", dt);
         ground(&mut world, 0.0, 0.5);
         // each stops at a time of its own
@@ -53,7 +53,7 @@ fn a_box_thrown_up_a_slope_turns_and_slides_back() {
     let (along, across) = (G * angle.sin(), friction * G * angle.cos());
     let up = speed / (along + across);
     let at = |time: f64| speed * up / 2.0 - 0.5 * (along - across) * (time - up).powi(2);
-    check("a slope", 1e-7, |dt| {
+    check("a slope", 2e-11, |dt| {
         let mut world = world("backtracking", dt);
         slope(&mut world, angle, friction);
         let turn = Pose::rotation(Vec3::new(0.0, angle, 0.0));
@@ -72,7 +72,7 @@ fn a_ball_slides_until_it_rolls() {
     let (friction, speed) = (0.2f64, 3.0);
     let rolls = 2.0 * speed / (7.0 * friction * G);
     let way = 12.0 * speed * speed / (49.0 * friction * G) + 5.0 / 7.0 * speed * (1.0 - rolls);
-    check("a ball", 1e-7, |dt| {
+    check("a ball", 2e-11, |dt| {
         let mut world = world("backtracking", dt);
         ground(&mut world, 0.0, friction);
         let body = RigidBody::new(sphere(0.1)).with_mass(0.7).with_pose(Pose::translation(0.0, 0.0, 0.1));
@@ -85,7 +85,7 @@ fn a_ball_slides_until_it_rolls() {
 fn a_box_on_a_belt_reaches_its_speed_at_the_time_of_friction() {
     let (friction, belt) = (0.3, 1.7);
     let way = belt - 0.5 * belt * belt / (friction * G);
-    check("a belt", 2e-8, |dt| {
+    check("a belt", 2e-11, |dt| {
         let mut world = world("backtracking", dt);
         let material = Material { surface_velocity: Vec3::new(belt, 0.0, 0.0), ..surface(friction) };
         world.add_static(RigidBody::fixed(Shape::half_space()).with_material(material)).unwrap();

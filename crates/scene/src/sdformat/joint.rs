@@ -146,7 +146,7 @@ fn read_settings(axis: &Element<'_, '_>, limited: bool, notes: &mut NoteList) ->
             dof.limits = Some([lower, upper]);
         }
         // -1 is the format's word for no limit
-        dof.effort = Some(open_number(&limit, "effort", f64::INFINITY)).filter(|x| *x > 0.0).unwrap_or(f64::INFINITY);
+        dof.effort = Some(open_number(&limit, "effort", f64::INFINITY)).filter(|x| *x >= 0.0).unwrap_or(f64::INFINITY);
         if let Some(velocity) = limit.child("velocity").filter(|_| open_number(&limit, "velocity", -1.0) > 0.0) {
             note(&velocity, "limits of velocities are left out", notes);
         }

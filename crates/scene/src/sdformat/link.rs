@@ -5,7 +5,7 @@ use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{Mat3, Pose, Vec3};
 
 use super::frames::Frames;
-use super::value::{child_text, length, note, note_others, number, numbers};
+use super::value::{length, note, note_others, number, numbers};
 use crate::parse::body::MassSpec;
 use crate::parse::bound::Bound;
 use crate::parse::link::{Geometry, LinkMassSpec, LinkShape, Surface};
@@ -182,7 +182,7 @@ fn read_surface(part: &Element<'_, '_>, context: &mut Context<'_>) -> Surface {
     if let Some(material) = part.child("material").filter(|_| !context.options.recolor) {
         note_others(&material, &["ambient", "diffuse", "specular", "emissive", "lighting"], &mut context.notes);
         let color = material.child("diffuse").or(material.child("ambient"));
-        if let Some(color) = color.filter(|_| child_text(&material, "diffuse").is_some_and(|text| !text.is_empty())) {
+        if let Some(color) = color.filter(|color| !super::value::text(color).is_empty()) {
             let count = super::value::text(&color).split_whitespace().count();
             let rgb = if count == 3 {
                 numbers::<3>(&color, Bound::ANY)

@@ -63,10 +63,11 @@ fn webassembly_has_the_hashes_of_the_table() {
     said.lines().for_each(|line| assert!(TABLE.lines().any(|known| known == line), "{line} is not in the table"));
 }
 
-/// Returns the time of the last change of the crates that the program is made of.
+/// Returns the time of the last change of the crates and scenes that the program is made of.
 fn newest(crates: &Path) -> std::time::SystemTime {
     let mut folders: Vec<_> =
         ["collide", "core", "behaviors", "scene"].map(|name| crates.join(name).join("src")).into();
+    folders.extend(["scene/examples", "../scenes"].map(|folder| crates.join(folder)));
     let mut newest = std::time::SystemTime::UNIX_EPOCH;
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {

@@ -144,7 +144,12 @@ impl MjcfWriter<'_> {
         let v = &tree.state[model.positions() + link.v..][..link.joint.dof()];
         let dofs = &tree.body.dofs()[link.v..link.v + link.joint.dof()];
         let Some(dof) = dofs.first() else { return };
-        if dofs.iter().any(|other| other != dof) {
+        let spherical = link.joint == Joint::Spherical;
+        if spherical && dofs.iter().any(|other| other.limits.is_some()) {
+            self.note(&link.name, "cones of spherical joints are left out");
+        }
+        let free = |dof: &DofSettings| DofSettings { limits: dof.limits.filter(|_| !spherical), ..dof.clone() };
+        if dofs.iter().any(|other| free(other) != free(dof)) {
             self.note(
                 &link.name,
                 "different damping or friction of one joint's degrees of freedom: the first is written",

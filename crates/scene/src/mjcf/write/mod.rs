@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use tumble_core::{ArticulatedBody, Combine, LoopJoint, ObjectId, PairMaterial, PairSide, RigidBody, World};
+use tumble_core::{ArticulatedBody, Combine, LoopJoint, Mimic, ObjectId, PairMaterial, PairSide, RigidBody, World};
 
 use super::names::Taken;
 use crate::notes::{NoteList, Notes};
@@ -202,6 +202,8 @@ impl<'w> MjcfWriter<'w> {
                 self.rigid(id, name, body);
             } else if let Some(body) = world.get::<ArticulatedBody>(id) {
                 self.articulated(id, name, body);
+            } else if world.get::<Mimic>(id).is_some() {
+                self.note(name, "couplings of joints of different objects are left out");
             } else if world.get::<LoopJoint>(id).is_none() {
                 self.note(name, "sensors, behaviors, events and objects of types of their own are left out");
             }
