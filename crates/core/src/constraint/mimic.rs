@@ -106,7 +106,7 @@ pub enum MimicError {
 /// let mut hinges = Vec::new();
 /// for x in [0.0, 1.0] {
 ///     let arm = world.add(RigidBody::new(arm.clone()).with_mass(1.0).with_pose(Pose::translation(x, 0.0, 0.0)))?;
-///     let hinge = LoopJoint::revolute_at("hinge", &world, Some((arm, 0)), None, Vec3::new(x, 0.0, 0.0), Vec3::y())?;
+///     let hinge = LoopJoint::revolute_at(format!("hinge {x}"), &world, Some((arm, 0)), None, Vec3::new(x, 0.0, 0.0), Vec3::y())?;
 ///     hinges.push(JointRef::LoopJoint(world.add(hinge)?));
 /// }
 /// world.add(Mimic::between("mimic", &world, [hinges[1], hinges[0]], -2.0, 0.0)?)?;

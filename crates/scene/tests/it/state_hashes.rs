@@ -51,13 +51,13 @@ table! {
     billiards_time_stepping: "billiards", TimeStepping, "a324bc50eab8fdec", "5ba2a1c2fde17086";
     billiards_backtracking: "billiards", Backtracking, "33f9123d30fcbc15", "84b5733c3c00771e";
     bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "fd8067441d6ed9d0";
-    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "ba5518ac8cf91029";
+    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "4abb236bd503532e";
     chain_time_stepping: "chain", TimeStepping, "f47e2b35690a2684", "ee8524465209ed50";
     chain_backtracking: "chain", Backtracking, "90d13d3b09555754", "51cdc3e8ded0b2fb";
     falling_time_stepping: "falling", TimeStepping, "396dc7652d7cbc24", "57b50c4d9056a51d";
     flock_time_stepping: "flock", TimeStepping, "e41e23ddcc483acc", "1855f9c020bc971a";
     flock_backtracking: "flock", Backtracking, "af789340dc0ef11e", "6faef2e76a3efc30";
-    falling_backtracking: "falling", Backtracking, "ad6040547e5223bf", "0f534e6b4412d0d0";
+    falling_backtracking: "falling", Backtracking, "ad6040547e5223bf", "cf8c47082dcef84c";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "f953d1e35a61b08a", "188ead72ee20f94b";
     pendulum_time_stepping: "pendulum", TimeStepping, "a6f0f0b542061dc2", "63acd1d2fe930652";
@@ -65,9 +65,9 @@ table! {
     piston_time_stepping: "piston", TimeStepping, "03971f4c855a8149", "498658197dce906c";
     piston_backtracking: "piston", Backtracking, "49b38596ba941018", "3623d35cde9a52a8";
     robot_time_stepping: "robot", TimeStepping, "4870548dea823eed", "32478defeba22eba";
-    robot_backtracking: "robot", Backtracking, "e22a5daebf15f621", "95aa12ebe4172a7e";
+    robot_backtracking: "robot", Backtracking, "e22a5daebf15f621", "a38fc690488cc0b0";
     skeleton_time_stepping: "skeleton", TimeStepping, "7c5c775c256c1284", "533cb39b249b8282";
-    skeleton_backtracking: "skeleton", Backtracking, "611dba4a2c85a4d3", "cc44c4fee73463ec";
+    skeleton_backtracking: "skeleton", Backtracking, "611dba4a2c85a4d3", "870cdb306e31ab83";
     stack_time_stepping: "stack", TimeStepping, "c9eeea26137d2a5f", "99d9eaf45acdf7b8";
     stack_backtracking: "stack", Backtracking, "8bf0d645b39a693b", "3d204eae8525be65";
 }
@@ -84,7 +84,7 @@ table! {
     sparks_backtracking: "sparks", Backtracking, "dfa02104906b2991", "847a159107ba4a95";
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
     marble_run_time_stepping: "marble_run", TimeStepping, "a6aa80e60f400a7a", "80f2216852c0c445";
-    marble_run_backtracking: "marble_run", Backtracking, "d233e2869b9ec085", "38648d1eba2c0716";
+    marble_run_backtracking: "marble_run", Backtracking, "d233e2869b9ec085", "34fcf1baf6fda38f";
     newtons_cradle_time_stepping: "newtons_cradle", TimeStepping, "241aa3d8432a474e", "8a992d40dc67236d";
     newtons_cradle_backtracking: "newtons_cradle", Backtracking, "1a0128aa197a01fb", "ecc9f19bdcb9f483";
     steam_engine_time_stepping: "steam_engine", TimeStepping, "3a2ab60873834ca6", "5c8c8e28cd5add5b";
@@ -101,7 +101,7 @@ table! {
     cloth_backtracking: "cloth", Backtracking, "645053291a4cb2e0", "b2a753c73c3521a7";
     jelly_time_stepping: "jelly", TimeStepping, "84a2aa1893724107", "2e9336d3e59795ae";
     arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "43819e958609f0f5";
-    dominoes_backtracking: "dominoes", Backtracking, "94511c9695cd65a8", "34a3232950280a2e";
+    dominoes_backtracking: "dominoes", Backtracking, "94511c9695cd65a8", "4e9f28f0d690f8d4";
     walker_backtracking: "walker", Backtracking, "ca535adb9b9b96d3", "093bfa105a94cd32";
     wrecking_ball_backtracking: "wrecking_ball", Backtracking, "1d7fafc6ac54b274", "9f5c6d9320b43b95";
 }
