@@ -36,8 +36,8 @@ fn two_hinges_turn_in_their_ratio() {
             for ratio in [-2.0, 0.75] {
                 let mut world = no_gravity(world(stepper, 1.0 / rate));
                 let wheels = [(0.0, 0.5), (1.0, 2.0)].map(|(x, moment)| ball(&mut world, Vec3::x() * x, 1.0, moment));
-                let [led, leader] = [Vec3::new(0.6, 0.0, 0.8), Vec3::z()];
-                let follower = joint(&mut world, wheels[0], LoopJointKind::Revolute, led);
+                let [tilted, leader] = [Vec3::new(0.6, 0.0, 0.8), Vec3::z()];
+                let follower = joint(&mut world, wheels[0], LoopJointKind::Revolute, tilted);
                 let hinge = joint(&mut world, wheels[1], LoopJointKind::Revolute, leader);
                 let pair = [JointRef::LoopJoint(follower), JointRef::LoopJoint(hinge)];
                 let mimic = couple(&mut world, pair, ratio, 0.0);
