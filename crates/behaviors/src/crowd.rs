@@ -13,10 +13,11 @@ use crate::steering::Flyer;
 use std::ops::Range;
 
 /// Boids in the order of the cells.
+#[derive(Default)]
 pub(crate) struct Crowd {
     flyers: Vec<Flyer>,
     /// Index of each boid.
-    order: Vec<usize>,
+    order: Vec<u32>,
     /// Coordinates, m, and a register of NaN behind them.
     positions: [Vec<f64>; 3],
     /// Position, m, and velocity, m/s, of each boid.
@@ -44,15 +45,20 @@ pub(crate) struct Seen<'a> {
 
 impl Crowd {
     /// Sorts boids by their indices in `order`.
-    pub fn new(unsorted: &[Flyer], order: Vec<usize>) -> Crowd {
-        let flyers: Vec<Flyer> = order.iter().map(|index| unsorted[*index]).collect();
-        let positions =
-            [0, 1, 2].map(|axis| flyers.iter().map(|flyer| flyer.position[axis]).chain([f64::NAN; LANES]).collect());
-        let row = |flyer: &Flyer| {
-            let (x, v) = (&flyer.position, &flyer.velocity);
-            [x.x, x.y, x.z, v.x, v.y, v.z, 0.0, 0.0]
-        };
-        Crowd { positions, rows: flyers.iter().map(row).collect(), flyers, order }
+    pub fn sort(&mut self, unsorted: &[Flyer], order: &[u32]) {
+        let Crowd { flyers, positions, rows, order: own } = self;
+        own.clear();
+        own.extend_from_slice(order);
+        flyers.clear();
+        flyers.extend(order.iter().map(|index| unsorted[*index as usize]));
+        for (axis, positions) in positions.iter_mut().enumerate() {
+            positions.clear();
+            positions.extend(flyers.iter().map(|flyer| flyer.position[axis]).chain([f64::NAN; LANES]));
+        }
+        rows.clear();
+        rows.extend(
+            flyers.iter().map(|Flyer { position: x, velocity: v, .. }| [x.x, x.y, x.z, v.x, v.y, v.z, 0.0, 0.0]),
+        );
     }
 
     /// Returns the number of boids.
@@ -61,7 +67,7 @@ impl Crowd {
     }
     /// Returns the index of the boid at a place.
     pub fn index(&self, place: usize) -> usize {
-        self.order[place]
+        self.order[place] as usize
     }
     /// Returns the boid at a place.
     pub fn flyer(&self, place: usize) -> &Flyer {
@@ -72,10 +78,9 @@ impl Crowd {
         &self.flyers[first..]
     }
     /// Writes the forces at the places to the indices of their boids.
-    pub fn unsorted<T: Copy + Default>(&self, sorted: &[T]) -> Vec<T> {
-        let mut out = vec![T::default(); sorted.len()];
-        self.order.iter().zip(sorted).for_each(|(index, value)| out[*index] = *value);
-        out
+    pub fn unsort<T: Copy + Default>(&self, sorted: &[T], out: &mut Vec<T>) {
+        out.resize(sorted.len(), T::default());
+        self.order.iter().zip(sorted).for_each(|(index, value)| out[*index as usize] = *value);
     }
 
     /// Returns position and velocity of eight boids, a coordinate in each register.

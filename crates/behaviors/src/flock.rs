@@ -6,8 +6,9 @@
 
 use crate::boid::Boid;
 use crate::error::BehaviorError;
+use crate::kept::Kept;
 use crate::record;
-use crate::steering::{Flyer, Search, Steering};
+use crate::steering::{Flyer, Search, Sorted, Steering};
 use tumble_collide::Vec3;
 use tumble_core::archive::{ObjectIndices, ObjectRecord};
 use tumble_core::{ForceGenerator, Forces, Object, ObjectId, StateRange, World, WorldView};
@@ -22,6 +23,16 @@ pub struct Flock {
     steering: Steering,
     pub(crate) search: Search,
     pub(crate) boids: Vec<ObjectId>,
+    memory: Kept<Memory>,
+}
+
+#[derive(Default)]
+struct Memory {
+    /// Row of the part table and state of each boid that takes part.
+    found: Vec<Option<(usize, Flyer)>>,
+    rows: Vec<usize>,
+    flyers: Vec<Flyer>,
+    sorted: Sorted,
 }
 
 impl Flock {
@@ -31,7 +42,7 @@ impl Flock {
     /// As [`Steering::validate`].
     pub fn new(name: impl Into<String>, steering: Steering) -> Result<Flock, BehaviorError> {
         steering.validate()?;
-        Ok(Flock { name: name.into(), steering, search: Search::Grid, boids: Vec::new() })
+        Ok(Flock { name: name.into(), steering, search: Search::Grid, boids: Vec::new(), memory: Kept::default() })
     }
     /// Sets how neighbors are found; the forces have the same bits.
     pub fn with_search(self, search: Search) -> Flock {
@@ -94,23 +105,30 @@ impl Object for Flock {
 
 impl ForceGenerator for Flock {
     fn apply(&self, _me: &StateRange, view: &WorldView, out: &mut Forces) {
-        let (mut rows, mut flyers) = (Vec::new(), Vec::new());
-        for &id in self.boids.iter().filter(|id| view.status(**id).is_some_and(|status| status.enabled)) {
-            let (Some(boid), Some(range)) = (view.get::<Boid>(id), view.state_range(id)) else { continue };
-            let state = &view.part_states[range.parts.start];
-            rows.push(range.parts.start);
-            flyers.push(Flyer {
-                position: state.position(),
-                velocity: state.velocity,
-                forward: state.pose.rotation * Vec3::x(),
-                mass: boid.mass(),
+        self.memory.lend(|Memory { found, rows, flyers, sorted }| {
+            found.resize(self.boids.len(), None);
+            view.each_piece(found, PIECE, |first, found| {
+                found.iter_mut().zip(&self.boids[first..]).for_each(|(found, id)| *found = flyer(view, *id));
             });
-        }
-        let forces = self.steering.forces_by(self.search, &flyers, |forces, work| {
-            view.each_piece(forces, PIECE, work);
+            rows.clear();
+            rows.extend(found.iter().flatten().map(|(row, _)| *row));
+            flyers.clear();
+            flyers.extend(found.iter().flatten().map(|(_, flyer)| *flyer));
+            self.steering.forces_by(self.search, flyers, sorted, |forces, work| {
+                view.each_piece(forces, PIECE, work);
+            });
+            for (row, force) in rows.iter().zip(&sorted.forces) {
+                out.wrenches[*row].force += force;
+            }
         });
-        for (row, force) in rows.iter().zip(forces) {
-            out.wrenches[*row].force += force;
-        }
     }
+}
+
+/// Returns the row of the part table and the state of a boid that is in the world and enabled.
+fn flyer(view: &WorldView, id: ObjectId) -> Option<(usize, Flyer)> {
+    view.status(id).filter(|status| status.enabled)?;
+    let (boid, row) = (view.get::<Boid>(id)?, view.state_range(id)?.parts.start);
+    let state = &view.part_states[row];
+    let (position, velocity) = (state.position(), state.velocity);
+    Some((row, Flyer { position, velocity, forward: state.pose.rotation * Vec3::x(), mass: boid.mass() }))
 }

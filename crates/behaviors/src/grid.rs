@@ -28,7 +28,10 @@ const COLUMNS: usize = 25;
 const OFFSET: i64 = 1 << 30;
 
 /// The points sorted by cell.
+#[derive(Default)]
 pub(crate) struct Grid {
+    /// Cell and index of each point, ascending.
+    keys: Vec<u128>,
     /// Index of each point.
     order: Vec<u32>,
     /// Each cell with points, ascending: 31 bits per axis; and none behind.
@@ -39,15 +42,16 @@ pub(crate) struct Grid {
 
 impl Grid {
     /// Sorts positions (m) into cells for a distance `reach`, m, above 0.
-    pub fn new(positions: impl Iterator<Item = Vec3>, reach: f64) -> Grid {
+    pub fn sort(&mut self, positions: impl Iterator<Item = Vec3>, reach: f64) {
+        let Grid { keys, order, cells, firsts } = self;
         let side = 0.5 * reach * (1.0 + 1e-6);
         let cell = |x: f64| (x / side).floor().clamp(-FARTHEST, FARTHEST) as i64;
-        let mut keys: Vec<u128> = positions
-            .zip(0u32..)
-            .map(|(p, index)| key_of([cell(p.x), cell(p.y), cell(p.z)]) << 32 | u128::from(index))
-            .collect();
+        let key = |p: Vec3, index: u32| key_of([cell(p.x), cell(p.y), cell(p.z)]) << 32 | u128::from(index);
+        keys.clear();
+        keys.extend(positions.zip(0..).map(|(p, index)| key(p, index)));
         keys.sort_unstable();
-        let (mut cells, mut firsts) = (Vec::new(), Vec::new());
+        cells.clear();
+        firsts.clear();
         for (key, place) in keys.iter().zip(0..) {
             if cells.last() != Some(&(key >> 32)) {
                 cells.push(key >> 32);
@@ -56,12 +60,13 @@ impl Grid {
         }
         cells.push(u128::MAX);
         firsts.push(keys.len() as u32);
-        Grid { order: keys.into_iter().map(|key| key as u32).collect(), cells, firsts }
+        order.clear();
+        order.extend(keys.iter().map(|key| *key as u32));
     }
 
     /// Returns the index of each point, in the order of the cells.
-    pub fn order(&self) -> impl Iterator<Item = usize> + '_ {
-        self.order.iter().map(|index| *index as usize)
+    pub fn order(&self) -> &[u32] {
+        &self.order
     }
 
     /// Calls `work` for each cell of the points at `places` in the order of the cells, with the places of its points there

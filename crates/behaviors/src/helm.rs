@@ -31,7 +31,7 @@
 use crate::error::{BehaviorError, check};
 use crate::fields::check_vector;
 use crate::record;
-use crate::steering::{Flyer, Search, Steering};
+use crate::steering::{Flyer, Search, Sorted, Steering};
 use nalgebra::Unit;
 use std::f64::consts::FRAC_PI_2;
 use tumble_collide::{Mat3, Quat, Vec3};
@@ -227,14 +227,15 @@ impl ForceGenerator for BodyFlock {
             members.push((range.parts.start, member));
             flyers.push(Flyer { position, velocity, forward, mass });
         }
-        let forces = self.steering.forces_by(self.search, &flyers, |forces, work| {
+        let mut sorted = Sorted::default();
+        self.steering.forces_by(self.search, &flyers, &mut sorted, |forces, work| {
             view.each_piece(forces, PIECE, work);
         });
-        for (((row, member), flyer), force) in members.iter().zip(&flyers).zip(forces) {
+        for (((row, member), flyer), force) in members.iter().zip(&flyers).zip(&sorted.forces) {
             let (state, inertia) = (&view.part_states[*row], &member.inertia);
             let spin = state.angular_velocity;
             let acceleration = self.helm.angular_acceleration(state, &flyer.velocity, &(force / member.mass));
-            out.add_at(*row, state, force, &member.position);
+            out.add_at(*row, state, *force, &member.position);
             out.wrenches[*row].torque += inertia * acceleration + spin.cross(&(inertia * spin));
         }
     }

@@ -27,6 +27,7 @@ mod fields;
 mod flock;
 mod grid;
 mod helm;
+mod kept;
 mod non_spinning;
 mod particles;
 mod record;

@@ -118,6 +118,17 @@ pub enum Search {
     BruteForce,
 }
 
+/// Boids sorted by cells, and the forces on them: memory that is used again.
+#[derive(Default)]
+pub(crate) struct Sorted {
+    grid: Grid,
+    crowd: Crowd,
+    /// Force on each boid in the order of the cells, N.
+    sorted: Vec<Vec3>,
+    /// Force on each boid in its own order, N.
+    pub forces: Vec<Vec3>,
+}
+
 impl Steering {
     /// Checks the ranges of all constants.
     ///
@@ -148,26 +159,29 @@ impl Steering {
 
     /// Returns the force on each boid, N, in the same order. Both searches give the same bits.
     pub fn forces(&self, search: Search, flyers: &[Flyer]) -> Vec<Vec3> {
-        self.forces_by(search, flyers, |forces, work| work(0, forces))
+        let mut memory = Sorted::default();
+        self.forces_by(search, flyers, &mut memory, |forces, work| work(0, forces));
+        memory.forces
     }
 
-    /// Returns the force on each boid, N. `run` is given the forces in the order of the cells; it calls the work with the
-    /// number of the first and the forces of each piece of them, in any order.
+    /// Writes the force on each boid, N, to `memory.forces`. `run` is given the forces in the order of the cells; it calls
+    /// the work with the number of the first and the forces of each piece of them, in any order.
     pub(crate) fn forces_by(
         &self,
         search: Search,
         flyers: &[Flyer],
+        memory: &mut Sorted,
         run: impl FnOnce(&mut [Vec3], &(dyn Fn(usize, &mut [Vec3]) + Sync)),
-    ) -> Vec<Vec3> {
-        let grid = Grid::new(flyers.iter().map(|flyer| flyer.position), self.visibility_distance);
-        let crowd = Crowd::new(flyers, grid.order().collect());
-        let eye = Eye::new(self);
-        let mut sorted = vec![Vec3::zeros(); flyers.len()];
-        run(&mut sorted, &|first, forces: &mut [Vec3]| {
-            Piece { steering: self, eye: &eye, grid: &grid, crowd: &crowd, search, first, forces, sums: Vec::new() }
-                .vectorized();
+    ) {
+        let Sorted { grid, crowd, sorted, forces } = memory;
+        grid.sort(flyers.iter().map(|flyer| flyer.position), self.visibility_distance);
+        crowd.sort(flyers, grid.order());
+        let (eye, grid, crowd) = (Eye::new(self), &*grid, &*crowd);
+        sorted.resize(flyers.len(), Vec3::zeros());
+        run(sorted, &|first, forces: &mut [Vec3]| {
+            Piece { steering: self, eye: &eye, grid, crowd, search, first, forces, sums: Vec::new() }.vectorized();
         });
-        crowd.unsorted(&sorted)
+        crowd.unsort(sorted, forces);
     }
 
     /// Returns the force on a boid with these sums over its neighbors.

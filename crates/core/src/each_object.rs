@@ -63,6 +63,20 @@ pub(crate) fn each_object(threads: &Threads, objects: Objects, numbers: Numbers,
     threads.each(pieces, |(places, mut slices)| slices.walk(objects, places, &work));
 }
 
+/// Returns the first object, in the order of adding, of which `is` is true.
+pub(crate) fn first_object<'a>(
+    threads: &Threads,
+    objects: Objects<'a>,
+    is: impl Fn(&Entry) -> bool + Sync,
+) -> Option<Entry<'a>> {
+    let mut found: Vec<(Range<usize>, Option<usize>)> =
+        threads.pieces(objects.table.placed.len(), OBJECTS).into_iter().map(|places| (places, None)).collect();
+    threads.each(&mut found[..], |(places, found)| {
+        *found = places.clone().find(|place| is(&objects.at(*place)));
+    });
+    found.into_iter().find_map(|(_, place)| place).map(|place| objects.at(place))
+}
+
 /// The numbers of consecutive objects.
 struct Slices<'a> {
     caches: Slice<'a, Cache>,

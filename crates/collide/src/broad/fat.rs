@@ -25,13 +25,9 @@ impl FatBox {
     pub const EMPTY: FatBox = FatBox([f32::NAN; 8]);
     pub const UNBOUNDED: FatBox = FatBox([f32::NEG_INFINITY; 8]);
 
-    /// Returns the box with a margin of `share` of its smallest extent in every direction. Part of
-    /// the margin is shifted to the side on which the box left its `old` fat box, since the motion
-    /// probably continues.
-    pub fn around(tight: &Aabb, share: f64, moving: bool, old: &FatBox) -> FatBox {
-        let extent = tight.max - tight.min;
-        let smallest = extent.x.min(extent.y).min(extent.z);
-        let margin = if smallest.is_finite() { share * smallest } else { 0.0 };
+    /// Returns the box with a margin, m, in every direction. Part of the margin is shifted to the side on which
+    /// the box left its `old` fat box, since the motion probably continues.
+    pub fn around(tight: &Aabb, margin: f64, moving: bool, old: &FatBox) -> FatBox {
         let side = |k: usize| {
             let displacement = 0.5 * (tight.min[k] + tight.max[k] - f64::from(old.min(k)) - f64::from(old.max(k)));
             // false if not a number

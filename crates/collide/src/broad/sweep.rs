@@ -21,8 +21,10 @@ use super::fat::{FatBox, Rounded, RoundedOverlap, pair};
 use super::{BroadPhase, EMPTY, sanitized};
 use crate::Aabb;
 
-/// Margin of a fat box in every direction, as a fraction of the box's smallest extent.
-const MARGIN: f64 = 0.1;
+/// Least and largest margin of a fat box in every direction, as fractions of the box's smallest extent.
+const MARGINS: [f64; 2] = [0.1, 1.0];
+/// Number of displacements, as that between the last two boxes, that a margin takes.
+const DISPLACEMENTS: f64 = 3.0;
 /// All boxes are processed again if more than one in this number left its fat box.
 const REBUILD_DIVISOR: usize = 4;
 
@@ -32,6 +34,8 @@ pub struct SweepAndPrune {
     tight: Vec<Aabb>,
     rounded: Vec<Rounded>,
     fat: Vec<FatBox>,
+    /// Largest displacement of the center along an axis in the last `set`, m.
+    displaced: Vec<f64>,
     state: Vec<State>,
     /// Boxes to store again.
     changed: Vec<u32>,
@@ -60,6 +64,7 @@ impl BroadPhase for SweepAndPrune {
             self.tight.push(EMPTY);
             self.rounded.push(Rounded::new(&EMPTY));
             self.fat.push(FatBox::EMPTY);
+            self.displaced.push(0.0);
             self.state.push(State::default());
             self.tight.len() as u32 - 1
         });
@@ -72,7 +77,8 @@ impl BroadPhase for SweepAndPrune {
     fn set(&mut self, handle: u32, bounds: &Aabb, moving: bool) {
         let i = handle as usize;
         let Some(state) = self.state.get_mut(i).filter(|s| s.in_use) else { return };
-        self.tight[i] = sanitized(bounds);
+        let before = std::mem::replace(&mut self.tight[i], sanitized(bounds));
+        self.displaced[i] = displacement(&before, &self.tight[i]);
         self.rounded[i] = Rounded::new(&self.tight[i]);
         if !state.changed && (state.moving != moving || !self.fat[i].contains(&self.tight[i])) {
             state.changed = true;
@@ -109,8 +115,9 @@ impl SweepAndPrune {
     fn rebuild(&mut self) {
         self.changed.clear();
         self.state.iter_mut().for_each(|s| s.changed = false);
-        for ((fat, tight), state) in self.fat.iter_mut().zip(&self.tight).zip(&self.state) {
-            *fat = FatBox::around(tight, MARGIN, state.moving, fat);
+        let boxes = self.fat.iter_mut().zip(&self.tight).zip(&self.displaced).zip(&self.state);
+        for (((fat, tight), displaced), state) in boxes {
+            *fat = FatBox::around(tight, margin(tight, *displaced), state.moving, fat);
         }
         let entries = self.fat.iter().enumerate().map(|(i, fat)| Entry { fat: *fat, handle: i as u32 });
         self.candidates.clear();
@@ -140,7 +147,7 @@ impl SweepAndPrune {
     /// Updates the candidates of the changed boxes only. A box is compared with those stored before
     /// it.
     fn update_changed(&mut self) {
-        let SweepAndPrune { tight, fat, state, changed, cells, candidates, new_pairs, .. } = self;
+        let SweepAndPrune { tight, fat, displaced, state, changed, cells, candidates, new_pairs, .. } = self;
         let mut count = 0;
         for n in 0..candidates.len() {
             let pair = candidates[n];
@@ -153,7 +160,7 @@ impl SweepAndPrune {
         for &handle in changed.iter() {
             let i = handle as usize;
             let old = fat[i];
-            fat[i] = FatBox::around(&tight[i], MARGIN, state[i].moving, &old);
+            fat[i] = FatBox::around(&tight[i], margin(&tight[i], displaced[i]), state[i].moving, &old);
             state[i].changed = false;
             cells.update(handle, &old, &fat[i], |other| {
                 if !state[other as usize].changed {
@@ -165,6 +172,22 @@ impl SweepAndPrune {
         new_pairs.sort_unstable();
         merge(candidates, new_pairs);
     }
+}
+
+/// Returns the margin of a box whose center moves by `displaced` from step to step, m: fast boxes stay in their fat
+/// boxes for some steps too.
+fn margin(tight: &Aabb, displaced: f64) -> f64 {
+    let extent = tight.max - tight.min;
+    let smallest = extent.x.min(extent.y).min(extent.z);
+    let [least, most] = MARGINS.map(|share| share * smallest);
+    if smallest.is_finite() { (DISPLACEMENTS * displaced).min(most).max(least) } else { 0.0 }
+}
+
+/// Returns the largest displacement of the center along an axis, m; 0 if there is none.
+fn displacement(before: &Aabb, now: &Aabb) -> f64 {
+    let twice = (before.min + before.max) - (now.min + now.max);
+    let largest = 0.5 * twice.amax();
+    if largest.is_finite() { largest } else { 0.0 }
 }
 
 /// Merges `new_pairs` into `list`; both are ascending.

@@ -12,7 +12,7 @@ use crate::object::part_state::PartState;
 use crate::settings::Settings;
 use crate::threads::Threads;
 use crate::world::view::{Entry, Mode, ObjectId, Objects};
-use tumble_collide::{BroadPhase, Contact, Vec3};
+use tumble_collide::{Aabb, BroadPhase, Contact, Vec3};
 
 /// The object of a row of the part table, and the part of it.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +25,8 @@ pub(crate) struct Owner {
 
 /// Minimum number of pairs of a piece of the narrow phase, about 10 µs.
 const PAIRS: usize = 32;
+/// Minimum number of parts of a piece of the bounds, about 10 µs.
+const PARTS: usize = 128;
 
 /// Identifies a contact across steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
@@ -59,6 +61,8 @@ pub(crate) struct ContactConstraint {
 /// The detector's working memory.
 #[derive(Default)]
 pub(crate) struct DetectorBuffers {
+    /// Bounds of each part that is collidable.
+    part_bounds: Vec<Option<PartBounds>>,
     proxies: Vec<u32>,
     motion_bounds: Vec<MotionBounds>,
     narrow_phase_cache: NarrowPhaseCache,
@@ -89,6 +93,17 @@ impl DetectorBuffers {
     pub fn forget(&mut self) {
         self.narrow_phase_cache.forget();
     }
+}
+
+/// Where a part is within the horizon.
+#[derive(Clone, Copy)]
+struct PartBounds {
+    /// Serial and part.
+    key: [u32; 2],
+    motion: MotionBounds,
+    /// Box around its motion, with the drift tolerance.
+    swept: Aabb,
+    moving: bool,
 }
 
 /// A part that has a box in the broad phase, under a handle.
@@ -165,39 +180,56 @@ impl Detector<'_> {
     /// Puts one box per collidable part, around its motion within the horizon, into the broad
     /// phase.
     fn gather(&mut self, horizon: f64) {
+        self.bound_parts(horizon);
         let s = &mut *self.scratch;
         s.proxies.clear();
         s.motion_bounds.clear();
         s.gathered.clear();
         let mut registered = s.registered.iter().peekable();
-        for entry in self.objects.iter().filter(|e| e.status.enabled && e.status.collidable) {
-            let Some(collidable) = entry.object.collidable() else { continue };
-            for (part, index) in entry.state_range.parts.clone().enumerate() {
-                let Some(shape) = collidable.shape(part) else { continue };
-                let part_state = &self.part_states[index];
-                let tight = shape.aabb(&part_state.pose);
-                let around = (tight.max - part_state.position()).sup(&(part_state.position() - tight.min));
-                let motion_bounds = MotionBounds::new(part_state, shape.bounding_radius(), around, horizon);
-                let bounds = motion_bounds.swept(&tight, self.settings.drift_tolerance);
-                let moving = entry.status.mode != Mode::Static && !entry.asleep;
-                let key = [entry.serial, part as u32];
-                while let Some(gone) = registered.next_if(|f| f.key < key) {
-                    self.broad.remove(gone.handle);
-                }
-                let handle = match registered.next_if(|f| f.key == key) {
-                    Some(known) => {
-                        self.broad.set(known.handle, &bounds, moving);
-                        known.handle
-                    }
-                    None => self.broad.insert(&bounds, moving),
-                };
-                s.proxies.push(index as u32);
-                s.motion_bounds.push(motion_bounds);
-                s.gathered.push(BroadPhaseProxy { key, handle });
+        for (index, bounds) in s.part_bounds.iter().enumerate() {
+            let Some(PartBounds { key, motion, swept, moving }) = *bounds else { continue };
+            while let Some(gone) = registered.next_if(|f| f.key < key) {
+                self.broad.remove(gone.handle);
             }
+            let handle = match registered.next_if(|f| f.key == key) {
+                Some(known) => {
+                    self.broad.set(known.handle, &swept, moving);
+                    known.handle
+                }
+                None => self.broad.insert(&swept, moving),
+            };
+            s.proxies.push(index as u32);
+            s.motion_bounds.push(motion);
+            s.gathered.push(BroadPhaseProxy { key, handle });
         }
         registered.for_each(|gone| self.broad.remove(gone.handle));
         std::mem::swap(&mut s.registered, &mut s.gathered);
+    }
+
+    /// Computes the bounds of all parts.
+    fn bound_parts(&mut self, horizon: f64) {
+        let Detector { objects, owners, part_states, settings, threads, .. } = *self;
+        let bounds_of = |index: usize| {
+            let Owner { place, part, .. } = owners[index];
+            let entry = objects.at(place as usize);
+            let collidable =
+                Some(entry.object).filter(|_| entry.status.enabled && entry.status.collidable)?.collidable()?;
+            let (shape, part_state) = (collidable.shape(part as usize)?, &part_states[index]);
+            let tight = shape.aabb(&part_state.pose);
+            let around = (tight.max - part_state.position()).sup(&(part_state.position() - tight.min));
+            let motion = MotionBounds::new(part_state, shape.bounding_radius(), around, horizon);
+            Some(PartBounds {
+                key: [entry.serial, part],
+                motion,
+                swept: motion.swept(&tight, settings.drift_tolerance),
+                moving: entry.status.mode != Mode::Static && !entry.asleep,
+            })
+        };
+        let bounds = &mut self.scratch.part_bounds;
+        bounds.resize(owners.len(), None);
+        threads.each_piece(bounds, 1, PARTS, |first, bounds| {
+            bounds.iter_mut().zip(first..).for_each(|(bounds, index)| *bounds = bounds_of(index));
+        });
     }
 
     /// Converts pairs of handles to pairs of places in `proxies`, ascending, so the result does not

@@ -16,6 +16,7 @@ use crate::settings::Integrator;
 use crate::threads::Threads;
 use crate::world::view::{Entry, Mode, ObjectId, Objects, Table, WorldView};
 use crate::world::{ObjectState, StepError};
+use smallvec::SmallVec;
 use tumble_collide::Vec3;
 
 /// The objects, state and buffers of an integration, borrowed from the world.
@@ -118,25 +119,30 @@ impl IntegrationContext<'_> {
         });
     }
 
-    /// Subtracts from the rates the part that the free motion of a splitting already applies.
-    pub fn subtract_free_motion(&mut self, dp: &mut [f64]) {
-        let mut rate = Vec::new();
-        for entry in self.table.with(self.states).iter().filter(|e| e.moves()) {
-            let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
-            rate.resize(entry.state_range.v.len(), 0.0);
-            let cache = &mut self.derived.caches[entry.place];
-            body.free_motion_rate(cache, &self.x[entry.state_range.x.clone()], &mut rate);
-            dp[entry.state_range.v.clone()].iter_mut().zip(&rate).for_each(|(dp, c)| *dp -= c);
-        }
+    /// Subtracts from the rates the part that the free motion of a splitting over `h` already applies, and replaces
+    /// them by their means over `h`.
+    pub fn split_rates(&mut self, dp: &mut [f64], h: f64) {
+        let (x, objects) = (&*self.x, self.table.with(self.states));
+        let numbers = Numbers { caches: &mut self.derived.caches, v: dp, ..Numbers::default() };
+        each_object(self.threads, objects, numbers, |entry, Own { cache, v: dp, .. }| {
+            let Some(body) = entry.object.integratable().filter(|_| entry.moves()) else { return };
+            if body.holds_velocity() {
+                let mut rate = SmallVec::<[f64; 64]>::from_elem(0.0, dp.len());
+                body.free_motion_rate(cache, &x[entry.state_range.x.clone()], &mut rate);
+                dp.iter_mut().zip(&rate).for_each(|(dp, c)| *dp -= c);
+            }
+            body.mean_rate(h, dp);
+        });
     }
 
     /// Replaces the rates of momentum by their means over `h`.
-    pub fn average(&mut self, dp: &mut [f64], h: f64) {
-        for entry in self.table.with(self.states).iter().filter(|e| e.moves()) {
-            if let Some(body) = entry.object.integratable() {
-                body.mean_rate(h, &mut dp[entry.state_range.v.clone()]);
+    fn average(&mut self, dp: &mut [f64], h: f64) {
+        let numbers = Numbers { caches: &mut self.derived.caches, v: dp, ..Numbers::default() };
+        each_object(self.threads, self.table.with(self.states), numbers, |entry, own| {
+            if let Some(body) = entry.object.integratable().filter(|_| entry.moves()) {
+                body.mean_rate(h, own.v);
             }
-        }
+        });
     }
 
     fn kick(&mut self, dp: &[f64], h: f64) {
@@ -190,8 +196,7 @@ impl IntegrationContext<'_> {
             Integrator::Verlet => {
                 self.free_motion(0.5 * h);
                 self.evaluate(t + 0.5 * h, dp);
-                self.subtract_free_motion(dp);
-                self.average(dp, h);
+                self.split_rates(dp, h);
                 self.kick(dp, h);
                 self.free_motion(0.5 * h);
             }

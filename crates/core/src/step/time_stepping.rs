@@ -88,6 +88,8 @@ struct Buffers {
     parabola: Vec<f64>,
     rest: Vec<f64>,
     mean: Vec<f64>,
+    /// Velocity at the end of the step.
+    end: Vec<f64>,
     /// Displacement by the correction of overlap, per second.
     moved: Vec<f64>,
     /// Multipliers of impacts and contacts.
@@ -167,8 +169,7 @@ impl TimeStepping {
         let mut motion = core.integration_of(Some(&mut *middle));
         motion.free_motion(0.5 * h);
         motion.evaluate(time + 0.5 * h, &mut self.work.dp);
-        motion.subtract_free_motion(&mut self.work.dp);
-        motion.average(&mut self.work.dp, h);
+        motion.split_rates(&mut self.work.dp, h);
         core.check_finite(&self.work.dp, Some(&mut *middle))?;
         for (now, middle) in core.derived.part_states.iter_mut().zip(&middle.derived.part_states) {
             (now.acceleration, now.angular_acceleration) = (middle.acceleration, middle.angular_acceleration);
@@ -280,12 +281,9 @@ impl TimeStepping {
         du_force: &[f64],
     ) -> Result<(), StepError> {
         let impact_fraction = |i: usize| if self.impact_fraction[i] < 0.0 { 0.5 } else { self.impact_fraction[i] };
-        let Buffers { change, dp, parabola, rest, mean, late, .. } = &mut self.buffers;
-        let write = |out: &mut Vec<f64>, of: &dyn Fn(usize) -> f64| {
-            out.clear();
-            out.extend((0..u0.len()).map(of));
-        };
-        write(change, &|i| u1[i] - u0[i]);
+        let Buffers { change, dp, parabola, rest, mean, late, end, .. } = &mut self.buffers;
+        let n = u0.len();
+        write(change, n, |i| u1[i] - u0[i]);
         let before =
             |e: &Entry| e.state_range.v.clone().next().filter(|_| !in_the_middle(e)).map_or(0.5, impact_fraction);
         let move_freely = |Coordinates { objects, x, caches, threads }: Coordinates,
@@ -298,28 +296,30 @@ impl TimeStepping {
         }
         let to_impact = |entry: &Entry| if in_the_middle(entry) { 0.0 } else { before(entry) };
         move_freely(core.coordinates(Some(&mut *middle)), &to_impact);
-        write(rest, &|i| change[i] + late[i]);
-        let end: Vec<f64> = u0.iter().zip(&*rest).map(|(u, du)| u + du).collect();
+        write(rest, n, |i| change[i] + late[i]);
+        write(end, n, |i| u0[i] + rest[i]);
         push(core.coordinates(Some(&mut *middle)), rest, dp);
         move_freely(core.coordinates(Some(&mut *middle)), &|entry| 1.0 - before(entry));
-        for entry in core.objects().iter() {
-            late[entry.state_range.v.clone()].iter_mut().for_each(|du| *du *= before(&entry) - 1.0);
-        }
+        let Coordinates { objects, caches, threads, .. } = core.coordinates(Some(&mut *middle));
+        let numbers = Numbers { caches, v: late, ..Numbers::default() };
+        each_object(threads, objects, numbers, |entry, own| {
+            own.v.iter_mut().for_each(|du| *du *= before(entry) - 1.0);
+        });
         displace(core.coordinates(Some(&mut *middle)), late, h);
-        write(parabola, &|i| (impact_fraction(i) - 0.5) * du_force[i]);
+        write(parabola, n, |i| (impact_fraction(i) - 0.5) * du_force[i]);
         rest.clone_from(parabola);
         for i in core.objects().iter().filter(|e| in_the_middle(e)).flat_map(|e| e.state_range.v.clone()) {
             rest[i] -= (impact_fraction(i) - 0.5) * change[i];
         }
         shift(core.coordinates(Some(&mut *middle)), rest, h);
-        write(mean, &|i| impact_fraction(i) * u0[i] + (1.0 - impact_fraction(i)) * u1[i] + parabola[i]);
+        write(mean, n, |i| impact_fraction(i) * u0[i] + (1.0 - impact_fraction(i)) * u1[i] + parabola[i]);
         rest.clone_from(mean);
         self.work.frictionless.du.clear();
         self.correct(core, middle, h)?;
-        let Buffers { dp, total, keep, moved, rest: mean, .. } = &mut self.buffers;
+        let Buffers { dp, total, keep, moved, rest: mean, end, .. } = &mut self.buffers;
         total.clear();
         total.extend(self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b));
-        let step = lift::Step { u: [u0, &end], du_force, mean, moved, lambda: total, impact: &self.impact, keep };
+        let step = lift::Step { u: [u0, end], du_force, mean, moved, lambda: total, impact: &self.impact, keep };
         lift::pay_for_lift(core.coordinates(Some(&mut *middle)), &mut self.work, &step);
         if core.has_breakable_joints() {
             core.break_joints(&row_starts(&self.work, total, 1.0 / h));
@@ -341,6 +341,12 @@ impl TimeStepping {
         );
         core.check_finite(dp, Some(&mut *middle))
     }
+}
+
+/// Writes `n` numbers to `out`.
+fn write(out: &mut Vec<f64>, n: usize, of: impl Fn(usize) -> f64) {
+    out.clear();
+    out.extend((0..n).map(of));
 }
 
 /// Returns whether all impulses on an object act in the middle of the step, impacts too: links,

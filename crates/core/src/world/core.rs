@@ -6,6 +6,7 @@ use crate::contact::detect::{ContactConstraint, DetectorBuffers, Owner};
 use crate::contact::pair_material::PairMaterials;
 use crate::contact::warm_starts::{RowStart, WarmStart};
 use crate::derived::{Cache, Derived};
+use crate::each_object::first_object;
 use crate::integrators::context::IntegrationContext;
 use crate::linearize::Branches;
 use crate::object::part_state::{Forces, PartState, Wrench};
@@ -396,7 +397,7 @@ impl Core {
             self.state.x[e.state_range.x.clone()].iter().all(|x| x.is_finite())
                 && self.derived.part_states[e.state_range.parts.clone()].iter().all(moves)
         };
-        if let Some(bad) = self.objects().iter().find(|e| !fine(e)) {
+        if let Some(bad) = first_object(&self.threads, self.objects(), |e| !fine(e)) {
             return Err(self.not_finite(bad.name, "its state"));
         }
         self.measure_turns(h);
@@ -420,7 +421,7 @@ impl Core {
             dp[e.state_range.v.clone()].iter().all(|x| x.is_finite())
                 && part_states[e.state_range.parts.clone()].iter().all(accelerates)
         };
-        let bad = objects.iter().find(|e| !fine(e));
+        let bad = first_object(&self.threads, objects, |e| !fine(e));
         bad.map_or(Ok(()), |e| Err(self.not_finite(e.name, "the force on it")))
     }
 

@@ -46,7 +46,8 @@ impl TimeStepping {
     /// Corrects the positions at the end of a step of `h` seconds, first for the contacts of the step,
     /// then also for pairs of which others have deflected one into the other.
     pub(super) fn correct(&mut self, core: &mut Core, middle: &mut Moment, h: f64) -> Result<(), StepError> {
-        let mut moved = Vec::new();
+        let mut moved = std::mem::take(&mut self.buffers.moved);
+        moved.clear();
         for round in 0..=ROUNDS {
             let spent = core.meter.left(1.0).is_some_and(|left| (left as usize) < self.work.rows.blocks.len());
             let deflected = if round > 0 && !spent { self.add_deflected(core, middle, h) } else { Vec::new() };
