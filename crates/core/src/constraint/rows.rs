@@ -13,10 +13,13 @@
 //! | `λ`  | multiplier of every row: impulse in N·s, or force in N at the acceleration level |
 //! | `R`  | compliance of a scalar row, at least 0: the row yields by `R·λ` |
 
+use super::gram::{Response, add_gram};
 use crate::threads::Threads;
 
 /// Minimum number of blocks of a piece on one thread.
 const BLOCKS: usize = 256;
+/// Degrees of freedom of an object whose responses have many zeros.
+const WIDE: usize = 128;
 
 /// The set of admissible multipliers of a block, and the condition on its row velocities `w = c +
 /// (K + R)·λ`.
@@ -221,20 +224,25 @@ impl Rows {
     pub fn dense(&self, blocks: &[u32]) -> Vec<f64> {
         let n: usize = blocks.iter().map(|&b| self.blocks[b as usize].set.rows()).sum();
         let mut dense = vec![0.0; n * n];
-        let mut responses: Vec<(u32, usize, &[f64])> = Vec::with_capacity(2 * n);
+        let mut responses: Vec<(u32, Response)> = Vec::with_capacity(2 * n);
         let mut row = 0;
         for block in blocks.iter().map(|&b| &self.blocks[b as usize]) {
             for k in 0..block.set.rows() {
-                responses.extend(block.sides().iter().map(|side| (side.u, row, self.response(side, k))));
+                responses.extend(block.sides().iter().map(|side| (side.u, (row, self.response(side, k)))));
                 dense[row * n + row] += block.compliance;
                 row += 1;
             }
         }
-        responses.sort_unstable_by_key(|&(u, row, _)| (u, row));
+        responses.sort_unstable_by_key(|&(u, (row, _))| (u, row));
         for of_object in responses.chunk_by(|a, b| a.0 == b.0) {
-            for (end, &(_, i, a)) in of_object.iter().enumerate() {
+            if of_object[0].1.1.len() >= WIDE {
+                let of_object: Vec<Response> = of_object.iter().map(|(_, response)| *response).collect();
+                add_gram(&mut dense, n, &of_object);
+                continue;
+            }
+            for (end, &(_, (i, a))) in of_object.iter().enumerate() {
                 let row = &mut dense[i * n..][..i + 1];
-                of_object[..=end].iter().for_each(|&(_, j, b)| row[j] += dot(a, b));
+                of_object[..=end].iter().for_each(|&(_, (j, b))| row[j] += dot(a, b));
             }
         }
         for i in 0..n {

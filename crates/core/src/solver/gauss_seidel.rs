@@ -30,7 +30,7 @@
 //! so are large islands in motion. A solve that ends unfinished is scaled so that it adds no energy
 //! ([`optimal_scale`]).
 
-use super::direct::{Plan, SmallIsland};
+use super::direct::{Plan, SmallIsland, is_wide};
 use super::extrapolation::Extrapolation;
 use super::folded::Folded;
 use super::joint_row::parallel_rows;
@@ -54,6 +54,8 @@ const FACTORIZATIONS: f64 = 3.0;
 /// one of at most [`TINY`] blocks, whose sweeps cost less than a factorization.
 const NEWTON: [u32; 2] = [2, 12];
 const TINY: usize = 4;
+/// The same for an island with a wide object.
+const NEWTON_OF_WIDE: [u32; 3] = [12, 30, 80];
 /// Degrees of freedom of a rigid body.
 const RIGID: u32 = 6;
 
@@ -198,6 +200,8 @@ impl Solve<'_> {
         let (mut small, mut plan, mut due, mut direct) = (None, None, 0, false);
         // of Newton's method, in relaxations
         let mut work = 0;
+        let wide = is_wide(self.rows, self.blocks);
+        let attempts = if wide { &NEWTON_OF_WIDE[..] } else { &NEWTON[usize::from(count <= TINY)..] };
         for sweep in 1..=sweeps {
             let progress = self.sweep(relaxation.factor);
             let first = sweep == FIRST_SWEEPS.min(sweeps);
@@ -206,10 +210,10 @@ impl Solve<'_> {
                 break;
             }
             relaxation.record(sweep, progress.change);
-            if NEWTON[usize::from(count <= TINY)..].contains(&sweep) && self.may_try_newton() {
+            if attempts.contains(&sweep) && self.may_try_newton(wide) {
                 small = small.or_else(|| SmallIsland::new(self.rows, self.blocks, self.c));
                 if let Some(island) = &mut small {
-                    let tried = self.newton(island, sweep == NEWTON[1]);
+                    let tried = self.newton(island, sweep == NEWTON[1] && !wide);
                     work += tried.relaxations;
                     if tried.converged {
                         outcome = SolveReport { iterations: sweep + tried.iterations, ..tried };
@@ -266,9 +270,9 @@ impl Solve<'_> {
     /// Returns whether Newton's method may be tried: on small islands with a robot, whose contacts are seldom
     /// redundant. Of redundant multipliers it finds the nearest, and the interior point method those that share the
     /// load evenly.
-    fn may_try_newton(&self) -> bool {
+    fn may_try_newton(&self, wide: bool) -> bool {
         let of_robot = |local: &Local| local.block(self.rows).sides().iter().any(|side| side.dof > RIGID);
-        self.locals.len() <= FEW
+        (wide || self.locals.len() <= FEW)
             && self.settings.budget.is_none()
             && self.linkages.is_empty()
             && (self.is_reduced || self.locals.iter().any(of_robot))

@@ -11,6 +11,9 @@ struct Elimination<'a> {
     b: &'a mut [f64],
 }
 
+/// Number of columns that are eliminated before the others follow, which then are read and written once for all of them.
+const PANEL: usize = 4;
+
 impl pulp::NullaryFnOnce for Elimination<'_> {
     type Output = bool;
 
@@ -18,29 +21,28 @@ impl pulp::NullaryFnOnce for Elimination<'_> {
     fn call(self) -> bool {
         let Elimination { a, b } = self;
         let n = b.len();
-        for j in 0..n {
-            let mut pivot = j;
-            for i in j + 1..n {
-                if a[i * n + j].abs() > a[pivot * n + j].abs() {
-                    pivot = i;
+        for first in (0..n).step_by(PANEL) {
+            let end = (first + PANEL).min(n);
+            for j in first..end {
+                if !eliminate(a, b, j, end) {
+                    return false;
                 }
             }
-            let largest = a[pivot * n + j];
-            if !(largest.abs() > f64::MIN_POSITIVE && largest.is_finite()) {
-                return false;
+            // the rows of the panel by those above them, then all rows below, in the order of the columns
+            let (panel, below) = a[first * n..].split_at_mut((end - first) * n);
+            for j in 1..end - first {
+                let (above, own) = panel.split_at_mut(j * n);
+                for (k, from) in above.chunks_exact(n).enumerate() {
+                    let factor = own[first + k];
+                    subtract(&mut own[end..n], factor, &from[end..]);
+                }
             }
-            let (above, below) = a.split_at_mut((j + 1) * n);
-            let own = &mut above[j * n..];
-            if pivot != j {
-                own[j..].swap_with_slice(&mut below[(pivot - j - 1) * n + j..][..n - j]);
-                b.swap(j, pivot);
-            }
-            let inverse = 1.0 / own[j];
-            for (i, row) in below.chunks_exact_mut(n).enumerate() {
-                let factor = row[j] * inverse;
-                if factor != 0.0 {
-                    subtract(&mut row[j + 1..], factor, &own[j + 1..]);
-                    b[j + 1 + i] -= factor * b[j];
+            // a panel of fewer columns is the last: nothing is right of it
+            if end - first == PANEL {
+                let from: [&[f64]; PANEL] = std::array::from_fn(|k| &panel[k * n + end..(k + 1) * n]);
+                for row in below.chunks_exact_mut(n) {
+                    let (factors, row) = row.split_at_mut(end);
+                    subtract_all(row, std::array::from_fn(|k| factors[first + k]), from);
                 }
             }
         }
@@ -50,6 +52,37 @@ impl pulp::NullaryFnOnce for Elimination<'_> {
         }
         true
     }
+}
+
+/// Brings the largest number of column `j` to the diagonal, writes the factors of the rows below in its place, and
+/// eliminates the column from the columns before `end` and from `b`. Returns `false` if there is no pivot.
+#[inline(always)]
+fn eliminate(a: &mut [f64], b: &mut [f64], j: usize, end: usize) -> bool {
+    let n = b.len();
+    let mut pivot = j;
+    for i in j + 1..n {
+        if a[i * n + j].abs() > a[pivot * n + j].abs() {
+            pivot = i;
+        }
+    }
+    let largest = a[pivot * n + j];
+    if !(largest.abs() > f64::MIN_POSITIVE && largest.is_finite()) {
+        return false;
+    }
+    let (above, below) = a.split_at_mut((j + 1) * n);
+    let own = &mut above[j * n..];
+    if pivot != j {
+        own.swap_with_slice(&mut below[(pivot - j - 1) * n..][..n]);
+        b.swap(j, pivot);
+    }
+    let inverse = 1.0 / own[j];
+    for (i, row) in below.chunks_exact_mut(n).enumerate() {
+        let factor = row[j] * inverse;
+        row[j] = factor;
+        (j + 1..end).for_each(|k| row[k] -= factor * own[k]);
+        b[j + 1 + i] -= factor * b[j];
+    }
+    true
 }
 
 /// `to −= factor·from`, four numbers at a time.
@@ -64,6 +97,27 @@ fn subtract(to: &mut [f64], factor: f64, from: &[f64]) {
     }
 }
 
+/// As [`subtract`], of one row after the other.
+#[inline(always)]
+fn subtract_all(to: &mut [f64], factors: [f64; PANEL], from: [&[f64]; PANEL]) {
+    const WIDTH: usize = 8;
+    let len = to.len();
+    let from = from.map(|from| &from[..len]);
+    let whole = len / WIDTH * WIDTH;
+    for start in (0..whole).step_by(WIDTH) {
+        let mut sum = [0.0; WIDTH];
+        sum.copy_from_slice(&to[start..start + WIDTH]);
+        for (factor, from) in factors.iter().zip(from) {
+            let from = &from[start..start + WIDTH];
+            (0..WIDTH).for_each(|k| sum[k] -= factor * from[k]);
+        }
+        to[start..start + WIDTH].copy_from_slice(&sum);
+    }
+    for k in whole..len {
+        to[k] = factors.iter().zip(from).fold(to[k], |to, (factor, from)| to - factor * from[k]);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::solve;
@@ -75,7 +129,7 @@ mod tests {
             seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
         };
-        for n in 1..20 {
+        for n in (1..20).chain([61, 128]) {
             let (a, x): (Vec<f64>, Vec<f64>) =
                 ((0..n * n).map(|_| random()).collect(), (0..n).map(|_| random()).collect());
             let mut b: Vec<f64> = a.chunks_exact(n).map(|row| row.iter().zip(&x).map(|(a, x)| a * x).sum()).collect();

@@ -32,7 +32,7 @@ mod structure;
 use crate::constraint::rows::{RowSet, Rows};
 use island::{Island, fastest_row};
 use lu::Factor;
-pub(super) use newton::SmallIsland;
+pub(super) use newton::{SmallIsland, is_wide};
 use structure::Structure;
 
 /// Maximum number of multiplications of one factorization, and if nothing slides: a wall at rest is

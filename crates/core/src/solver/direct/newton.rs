@@ -25,8 +25,11 @@ use super::island::{Island, LocalBlock, largest};
 use super::{Direct, Tolerance, work_of_blocks};
 use crate::constraint::rows::{Rows, dot};
 
-/// Maximum number of rows of an island.
-const MAX_ROWS: usize = 128;
+/// Maximum number of rows of an island, and of one with a wide object, of which a sweep costs nearly as much as a step
+/// of the elimination.
+const MAX_ROWS: (usize, usize) = (128, 768);
+/// Degrees of freedom of a wide object, such as a cloth.
+const WIDE: u32 = 256;
 /// Maximum number of steps, and of those with the choices held.
 const STEPS: (u32, u32) = (12, 6);
 /// Number of single changes that are tried.
@@ -106,7 +109,8 @@ impl<'a> SmallIsland<'a> {
     pub fn new(rows: &'a Rows, blocks: &[u32], c: &[f64]) -> Option<SmallIsland<'a>> {
         let count: usize = blocks.iter().map(|&b| rows.blocks[b as usize].set.rows()).sum();
         let island = || Island::new(rows, blocks, c);
-        (count <= MAX_ROWS).then(|| SmallIsland { island: island(), k: rows.dense(blocks), memory: Memory::default() })
+        let most = if is_wide(rows, blocks) { MAX_ROWS.1 } else { MAX_ROWS.0 };
+        (count <= most).then(|| SmallIsland { island: island(), k: rows.dense(blocks), memory: Memory::default() })
     }
 
     /// Returns the cost of a step in sweeps, at most.
@@ -308,4 +312,9 @@ impl<'a> SmallIsland<'a> {
         let w = self.times(&lambda);
         Some(Iterate { lambda, w })
     }
+}
+
+/// Returns whether an island has a wide object.
+pub(in crate::solver) fn is_wide(rows: &Rows, blocks: &[u32]) -> bool {
+    blocks.iter().flat_map(|&b| rows.blocks[b as usize].sides()).any(|side| side.dof >= WIDE)
 }
