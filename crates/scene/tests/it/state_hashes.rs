@@ -97,9 +97,9 @@ table! {
 
 table! {
     [0.1, 0.3];
-    cloth_time_stepping: "cloth", TimeStepping, "6b8af320d69ac658", "32e61be33dfb9e9d";
-    cloth_backtracking: "cloth", Backtracking, "645053291a4cb2e0", "b2a753c73c3521a7";
-    jelly_time_stepping: "jelly", TimeStepping, "84a2aa1893724107", "2e9336d3e59795ae";
+    cloth_time_stepping: "cloth", TimeStepping, "6b8af320d69ac658", "ab6b9d5a1a151cad";
+    cloth_backtracking: "cloth", Backtracking, "645053291a4cb2e0", "14f546925b6b5f95";
+    jelly_time_stepping: "jelly", TimeStepping, "1395fdace9fb6d7c", "0a30a4ebc5783f12";
     arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "43819e958609f0f5";
     dominoes_backtracking: "dominoes", Backtracking, "94511c9695cd65a8", "4e9f28f0d690f8d4";
     walker_backtracking: "walker", Backtracking, "ca535adb9b9b96d3", "093bfa105a94cd32";
