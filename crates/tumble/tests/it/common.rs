@@ -11,6 +11,7 @@ pub const SCENES: [&str; 24] = [
     "billiards",
     "bird",
     "bowling",
+    "campfire",
     "card_house",
     "chain",
     "cloth",
