@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// The shipped scenes.
-pub const SCENES: [&str; 24] = [
+pub const SCENES: [&str; 25] = [
     "arch",
     "ball_machine",
     "billiards",

@@ -73,7 +73,9 @@ fn smoke_and_cooling_sparks_that_the_scene_does_not_have_look_the_same() {
         let system = ParticleSystem::new(name, ParticleSettings::default()).unwrap().with_emitter(source).unwrap();
         world.add(system.with_look(look).unwrap()).unwrap();
     }
-    (0..30).for_each(|_| drop(world.step().unwrap()));
+    (0..30).for_each(|_| {
+        world.step().unwrap();
+    });
     let published = publisher.publish(&world, &Viewer::default(), 1).unwrap();
     mirror.apply_snapshot(&publisher.snapshot()).unwrap();
     mirror.apply_state(1, world.time(), &published.state).unwrap();
