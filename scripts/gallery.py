@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Draws the moving pictures of docs/gallery.md: one animated WebP for each shipped scene, in docs/images/gallery. `make gallery` runs it.
+"""Draws the pictures of docs/gallery.md, in docs/images/gallery: one animated WebP for each shipped scene, and the figures of the thesis that
+show a cave. `make gallery` runs it.
 
-    scripts/gallery.py [SCENE...]     all scenes, or the named ones
+    scripts/gallery.py [NAME...]     all pictures, or those of the named scenes; a picture of a cave is `cave_` and the scene
 
 It needs target/release/tumble, a Vulkan or OpenGL driver, and Pillow. A run ends after five minutes; a picture above 300 kB is written again with
 a lower quality.
@@ -47,11 +48,17 @@ SCENES = {
     "walker": (0, 5.5),
     "flock": (1.5, 3.0),
     "sparks": (0.25, 1.75),
+    "campfire": (4.0, 2.5),
     "cloth": (0, 1.8),
     "jelly": (0, 1.2),
     "ball_machine": (0.5, 6.0),
     "bird": (3.0, 1.0),
 }
+
+# Figures 27 to 31 of the thesis: scenes in the cave `cube4`, and the time that is shown, whole seconds of the scene.
+CAVE = {"flock": 5, "billiards": 1, "bowling": 3, "falling": 2, "chain": 1}
+CAVE_FPS = 10
+WALL = 256  # side of a wall in the picture, pixels
 
 # Scenes in which nothing should move: the camera goes around its target, and comes back, by that many degrees to each side.
 STILL = {"stack": 20, "card_house": 14}
@@ -91,6 +98,20 @@ def around(scene, begin, length, fps, folder):
     return pictures
 
 
+def cave(scene, time, folder):
+    """Returns what the four facets of a run in a cave show at a time: the walls in a row, the floor below the front wall."""
+    words = [ROOT / "scenes" / scene, "--cave", "cube4", "--no-realtime", "--offscreen", "--frames-dir", folder]
+    # facets take the server for dead that sends nothing for seconds, so frames are short; the frame after the shown one waits for it
+    words += ["--fps", CAVE_FPS, "--duration", time + 1 / CAVE_FPS]
+    subprocess.run([str(TUMBLE), "cave", *map(str, words)], check=True, timeout=TIME_OUT, stdin=subprocess.DEVNULL, capture_output=True)
+    shown = f"frame_{CAVE_FPS * time:06}.png"
+    unfolded = Image.new("RGB", (3 * WALL, 2 * WALL), "white")
+    for facet, place in (("left", (0, 0)), ("front", (1, 0)), ("right", (2, 0)), ("floor", (1, 1))):
+        wall = Image.open(Path(folder) / facet / shown).convert("RGB").resize((WALL, WALL), Image.Resampling.BOX)
+        unfolded.paste(wall, tuple(WALL * number for number in place))
+    return [unfolded]
+
+
 def numbers(text, key):
     """Returns the numbers of a key of a scene's camera."""
     return [float(number) for number in re.search(rf"{key} = \[(.*)\]", text).group(1).split(",")]
@@ -108,11 +129,16 @@ def main():
     shipped = {path.parent.name for path in ROOT.glob("scenes/*/scene.toml")}
     if shipped != set(SCENES):
         sys.exit(f"error: not in both scenes/ and this script: {', '.join(sorted(shipped ^ set(SCENES)))}")
-    wanted = sys.argv[1:] or list(SCENES)
-    if unknown := [name for name in wanted if name not in SCENES]:
+    caves = {f"cave_{scene}": (scene, time) for scene, time in CAVE.items()}
+    wanted = sys.argv[1:] or [*SCENES, *caves]
+    if unknown := [name for name in wanted if name not in SCENES and name not in caves]:
         sys.exit(f"error: no scene {', '.join(unknown)}")
     OUT.mkdir(parents=True, exist_ok=True)
     for name in wanted:
+        if name in caves:
+            with tempfile.TemporaryDirectory() as folder:
+                write(cave(*caves[name], folder), OUT / f"{name}.webp", 1000)
+            continue
         begin, length, *faster = SCENES[name]
         fps = FPS if length > 2 else 2 * FPS
         shown = fps // (faster or [1])[0]

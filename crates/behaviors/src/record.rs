@@ -11,7 +11,7 @@ use tumble_core::archive::{ObjectIndices, ObjectRecord, ReadObject, open};
 use tumble_core::{Appearance, Material, Object, ObjectId, PartSurface};
 
 /// First bytes of a record; the last is the number of the format.
-const HEAD: &[u8; 8] = b"tumbleB2";
+const HEAD: &[u8; 8] = b"tumbleB3";
 
 /// An object by its index; `None` for a removed one.
 type Index = Option<u32>;

@@ -67,9 +67,9 @@ pub use object::mounts::{CameraMount, Detail, LightMount, Spread};
 pub use object::part_state::{ForceSlice, Forces, PartPoint, PartState, PointLoad, StateRange, StateSizes, Wrench};
 pub use object::visual::{Drawn, Visual, VisualGeometry, VisualMesh};
 pub use object::{
-    Appearance, CameraCarrier, Cloud, Collidable, Combine, Constraint, Energy, ForceGenerator, Fork, FrameState,
-    Integratable, Intersect, Level, LightCarrier, Material, Momentum, MomentumKind, NetSync, Object, PartSurface,
-    Renderable, RowTarget, SyncError,
+    Appearance, CameraCarrier, Cloud, CloudSphere, Collidable, Combine, Constraint, Energy, ForceGenerator, Fork,
+    FrameState, Integratable, Intersect, Level, LightCarrier, Material, Momentum, MomentumKind, NetSync, Object,
+    PartSurface, Renderable, RowTarget, SyncError,
 };
 pub use report::{StepReport, UnreachableJoint, WorstSolve};
 pub use rigid::{BodyError, LockedAxes, RigidBody};

@@ -31,9 +31,12 @@ pub fn deforming(world: &World) -> Deforming {
             });
         }
         if let Some(cloud) = world.state_of(id).and_then(|x| drawn.cloud(x)) {
-            let [red, green, blue] = cloud.appearance.color.map(|share| (255.0 * share.clamp(0.0, 1.0)).round() as u8);
-            let color = [red, green, blue, 255];
-            shown.points.extend(cloud.spheres.map(|(center, _)| Point { position: center.cast().into(), color }));
+            let byte = |share: f32| (255.0 * share.clamp(0.0, 1.0)).round() as u8;
+            shown.points.extend(cloud.spheres.map(|sphere| {
+                let [red, green, blue] = sphere.color.unwrap_or(cloud.appearance.color).map(byte);
+                let opacity = if cloud.transparent { sphere.opacity as f32 } else { 1.0 };
+                Point { position: sphere.center.cast().into(), color: [red, green, blue, byte(opacity)] }
+            }));
         }
     }
     shown

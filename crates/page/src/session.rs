@@ -8,10 +8,12 @@ use tumble_collide::{Pose, Shape, TriMesh};
 use tumble_core::{Drawn, ObjectId, Visual, VisualGeometry, World};
 use tumble_scene::{LightKind, Pattern, SceneFile, shipped};
 
-/// Numbers of an instance: a matrix by columns, then color and 1.
+/// Numbers of an instance: a matrix by columns, then color and opacity.
 const INSTANCE: usize = 20;
 /// Largest coordinate of a sphere of a cloud that is drawn, m.
 const FAR_M: f64 = 1e5;
+/// Largest opacity of what is not solid: the page draws with a pattern what is below 1.
+const LESS_THAN_ONE: f32 = 0.999;
 
 /// An open scene.
 pub struct Session {
@@ -19,7 +21,7 @@ pub struct Session {
     pub world: World,
     /// Position and normal of each corner of the triangles of all meshes.
     pub geometry: Vec<f32>,
-    /// The placed meshes in the order of the description's `draws`, then the spheres of clouds: a matrix by columns, color and 1 each.
+    /// The placed meshes in the order of the description's `draws`, then the spheres of clouds: a matrix by columns, color and opacity each; 1 is solid.
     pub instances: Vec<f32>,
     /// Position, normal and color of each corner of surfaces that deform.
     pub surfaces: Vec<f32>,
@@ -116,12 +118,13 @@ impl Session {
                 continue;
             }
             if let Some(cloud) = world.state_of(id).and_then(|x| drawn.cloud(x)) {
-                let color = cloud.appearance.color;
-                for (center, radius) in cloud.spheres.filter(|(center, radius)| center.amax() < FAR_M && *radius > 0.0)
-                {
-                    let matrix = Pose::translation(center.x, center.y, center.z).to_homogeneous();
-                    let matrix = matrix * Matrix4::from_diagonal(&Vector3::repeat(radius).push(1.0));
-                    push(&mut self.instances, &matrix.cast(), color);
+                for sphere in cloud.spheres.filter(|sphere| sphere.center.amax() < FAR_M && sphere.radius > 0.0) {
+                    let matrix = Pose::translation(sphere.center.x, sphere.center.y, sphere.center.z).to_homogeneous();
+                    let matrix = matrix * Matrix4::from_diagonal(&Vector3::repeat(sphere.radius).push(1.0));
+                    push(&mut self.instances, &matrix.cast(), sphere.color.unwrap_or(cloud.appearance.color));
+                    if let (true, Some(opacity)) = (cloud.transparent, self.instances.last_mut()) {
+                        *opacity = (sphere.opacity as f32).min(LESS_THAN_ONE);
+                    }
                 }
             }
             if let (Some(surface), Some(range)) = (drawn.surface(), world.view().state_range(id)) {

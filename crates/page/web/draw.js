@@ -13,17 +13,20 @@ layout(location = 3) in mat4 model;
 uniform mat4 view, light;
 out vec3 place, up, tint;
 out vec4 in_light;
+flat out float opacity;
 void main() {
   vec4 world = model * vec4(position, 1.0);
   place = world.xyz;
   up = mat3(model) * normal;
   tint = color.rgb;
+  opacity = color.a;
   in_light = light * world;
   gl_Position = view * world;
 }`;
 const FRAGMENT = COMMON + `
 in vec3 place, up, tint;
 in vec4 in_light;
+flat in float opacity;
 uniform vec3 eye, zenith, floor_color, second;
 uniform vec4 lights[8];   // direction to a distant light and 0, or place and 1
 uniform vec3 powers[8];
@@ -32,7 +35,15 @@ uniform float ambient, scale;
 uniform sampler2DShadow shadow;
 out vec4 shown;
 vec3 linear(vec3 c) { return pow(c, vec3(2.2)); }
+// Soft spheres are drawn as a share of their pixels, by an ordered pattern of 4 x 4: their order does not matter.
+bool left_out(float cosine) {
+  if (opacity >= 1.0) return false;
+  ivec2 p = ivec2(gl_FragCoord.xy) & 3, q = p >> 1;
+  int a = ((p.x ^ p.y) & 1) * 8 + (p.y & 1) * 4 + ((q.x ^ q.y) & 1) * 2 + (q.y & 1);
+  return 1.0 - pow(1.0 - opacity, cosine * cosine * cosine) < (float(a) + 0.5) / 16.0;
+}
 void main() {
+  if (left_out(abs(dot(normalize(eye - place), normalize(up))))) discard;
   vec3 albedo = linear(tint);
   if (scale > 0.0) {
     vec2 cell = floor(place.xy / scale);
@@ -64,7 +75,7 @@ void main() {
   }
   shown = vec4(pow(sum / (1.0 + 0.25 * sum), vec3(1.0 / 2.2)), 1.0);
 }`;
-const DEPTH = COMMON + "void main() {}";
+const DEPTH = COMMON + "flat in float opacity; void main() { if (opacity < 1.0) discard; }";
 const SKY = [COMMON + `
 out vec2 at;
 void main() { at = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0); gl_Position = vec4(at, 1.0, 1.0); }`,

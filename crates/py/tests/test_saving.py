@@ -100,6 +100,7 @@ def everything(world):
     world.add_field("breeze", tumble.Field.wind((3, 1, 0), drag=0.002), targets=[flag])
     world.add_field("sea", tumble.Field.buoyancy((0, 0, 0.05), drag=1.0))
     world.add_particles("sparks", [tumble.Emitter((0, 0, 1), speed=(1, 3), lifetime=2, burst=50, rate=100)], capacity=300, seed=4)
+    world.add_particles("smoke", [tumble.Emitter(rate=50)], opacity=(0.5, 0.25), scale=3, end_color=(0, 0.5, 1), glow=True)
     flock = world.add_flock("flock", desired_speed=6, visibility_angle=2.0)
     for k in range(4):
         flock.add(position=(k, 0, 5), velocity=(1, 0, 0), color=(0.1 * k, 0.5, 0.5))
@@ -115,6 +116,8 @@ def test_a_world_with_every_behavior_is_pickled_copied_and_written(tmp_path):
     world.step(100)
     path = tmp_path / "now.toml"
     assert world.save_scene(path) == []
+    text = path.read_text()
+    assert all(line in text for line in ("opacity = [0.5, 0.25]", "scale = [3", "end_color = [0", "glow = true"))
     copies = {"pickle": pickle.loads(pickle.dumps(world)), "copy": copy.copy(world), "scene": tumble.World.load(path)}
     world.step(140)
     for name, other in copies.items():

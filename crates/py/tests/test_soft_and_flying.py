@@ -167,6 +167,10 @@ def test_non_spinning(world):
         (lambda w: w.add_jelly(node_radius=-1), "radius of a node is -1"),
         (lambda w: w.add_particles(capacity=0), "capacity is 0"),
         (lambda w: w.add_particles(fade=-1), "fade of a particle is -1"),
+        (lambda w: w.add_particles(opacity=1.5), "opacity of a particle is 1.5"),
+        (lambda w: w.add_particles(opacity=(0.5, -0.5)), "opacity of a particle is -0.5"),
+        (lambda w: w.add_particles(scale=(1, -2)), "scale of a particle is -2"),
+        (lambda w: w.add_particles(end_color=(1, 2, 0)), "end_color"),
         (lambda w: tumble.Emitter(speed=(2, 1)), "speed of an emitter is 1"),
         (lambda w: w.add_flock(speed=1), "no constant 'speed'"),
         (lambda w: w.add_flock(matching=-1), "matching"),
@@ -199,6 +203,21 @@ def test_they_are_drawn(world):
     system.spawn((0, 0, 1))
     changed = np.abs(picture() - empty).max(axis=2) > 20
     assert changed.sum() == pytest.approx(math.pi * (0.3 * 120 / 2.91) ** 2, rel=0.1)
+
+
+def test_a_transparent_particle_blends_with_what_is_behind(world):
+    def middle():
+        try:
+            share = world.render(161, 121, camera=((0, -4, 1), (0, 0, 1)))[60, 80, :3] / 255
+        except tumble.PictureError as why:
+            pytest.skip(f"no graphics adapter: {why}")
+        return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+
+    behind = middle()
+    smoke = world.add_particles("smoke", drawn_radius=0.3, collides=False, color=(1, 0, 0), glow=True, opacity=(0.8, 0.4), end_color=(0, 0, 1))
+    smoke.spawn((0, 0, 1), life=2)
+    np.testing.assert_array_equal(smoke.lifetimes, [2])
+    np.testing.assert_allclose(middle(), 0.8 * np.array([1, 0, 0]) + 0.2 * behind, atol=0.012)
 
 
 def test_recordings_have_surfaces_and_particles(world, tmp_path):

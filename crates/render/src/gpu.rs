@@ -12,6 +12,7 @@ mod portable;
 mod recipe;
 mod scene;
 mod shadow;
+mod soft;
 mod spheres;
 mod stage;
 mod targets;

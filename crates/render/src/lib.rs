@@ -53,7 +53,7 @@ pub use gpu::{
 pub use image::Image;
 pub use list::{
     Capsule, DebugLine, DebugPoint, DebugSphere, DebugStyle, DrawList, Ground, Instance, Light, MAX_ITEMS, MAX_LIGHTS,
-    MAX_SHADOWS, MAX_TEXTURES, MeshId, Quality, Settings, Shadows, Sky, Sphere, SphereCloud, SphereStyle,
+    MAX_SHADOWS, MAX_TEXTURES, MeshId, Quality, Settings, Shadows, Sky, SoftSphere, Sphere, SphereCloud, SphereStyle,
     UnknownQuality,
 };
 pub use material::{Material, Pattern, Shader, Texture};

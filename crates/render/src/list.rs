@@ -11,7 +11,7 @@ pub use validate::{MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS, MAX_TEXTURES};
 
 pub use debug::{DebugLine, DebugPoint, DebugSphere, DebugStyle, SphereStyle};
 
-use crate::{Camera, Image, Material, MeshData, Pattern};
+use crate::{Camera, Image, Material, MeshData, Pattern, Shader};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
@@ -56,6 +56,8 @@ pub struct Sphere {
 pub struct SphereCloud {
     /// Centers in the world and radii, m, above 0.
     pub spheres: Vec<(Point3<f32>, f32)>,
+    /// A base color of each, sRGB; empty for that of the material.
+    pub colors: Vec<[f32; 3]>,
     /// The material of all, which has no texture.
     pub material: Material,
 }
@@ -63,14 +65,32 @@ pub struct SphereCloud {
 impl SphereCloud {
     /// Returns them one by one.
     pub(crate) fn each(&self) -> impl Iterator<Item = Sphere> + '_ {
-        self.spheres.iter().map(|(center, radius)| Sphere {
+        self.spheres.iter().enumerate().map(|(i, (center, radius))| Sphere {
             center: *center,
             radius: *radius,
             orientation: UnitQuaternion::identity(),
-            material: self.material,
+            material: Material { color: self.colors.get(i).copied().unwrap_or(self.material.color), ..self.material },
             casts_shadow: false,
         })
     }
+}
+
+/// A transparent sphere whose matter thins out toward its rim: a puff of smoke, a flame, a drop of mist. Soft spheres are
+/// drawn after all opaque items, those farther from the eye first, so their order in a list does not matter. They
+/// cast and receive no shadows. An opaque surface cuts them at the plane through the center.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SoftSphere {
+    /// Center in the world.
+    pub center: Point3<f32>,
+    /// Radius, m, above 0.
+    pub radius: f32,
+    /// Color, sRGB.
+    pub color: [f32; 3],
+    /// Share of the light from behind that its middle blocks, 0 to 1; above 0.999999 it counts as that, so that every
+    /// one has a soft rim.
+    pub opacity: f32,
+    /// How light is applied: scattered by `Lit` ones, `Unlit` ones have the color itself.
+    pub shader: Shader,
 }
 
 /// A capsule, drawn by ray casting like a sphere: all points within a radius of a segment.
@@ -290,6 +310,8 @@ pub struct DrawList {
     pub spheres: Vec<Sphere>,
     /// Many small spheres of one material each.
     pub clouds: Vec<SphereCloud>,
+    /// Transparent spheres.
+    pub soft_spheres: Vec<SoftSphere>,
     /// Capsules.
     pub capsules: Vec<Capsule>,
     /// Debug lines and arrows.

@@ -5,22 +5,36 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | number of particles, `u32` |
-//! | 16 of each | position, m, and time that is left, s: four `f32` |
+//! | 20 of each | position, m, time that is left and lifetime, s: five `f32` |
 //!
-//! All numbers are little-endian. A message has at most [`MOST_SENT`] particles, 512 KiB. Of `n` more, those are
+//! All numbers are little-endian. A message has at most [`MOST_SENT`] particles, 640 KiB. Of `n` more, those are
 //! sent whose serial number is a multiple of `⌈n/MOST_SENT⌉`, so a particle stays sent as long as that number stays.
 
 use super::{HEADER, ParticleSystem, RECORD, write};
 use crate::error::{BehaviorError, check};
 use tumble_collide::Vec3;
-use tumble_core::{Appearance, Cloud, NetSync, Renderable, StateRange, SyncError, Visual, WorldView};
+use tumble_core::{Appearance, Cloud, CloudSphere, NetSync, Renderable, StateRange, SyncError, Visual, WorldView};
 
 /// Most particles of a message.
 pub(super) const MOST_SENT: usize = 32_768;
 /// Bytes of a particle in a message.
-const SENT: usize = 16;
+const SENT: usize = 20;
 
-/// How particles are drawn: as small spheres.
+/// How particles are drawn: as small spheres, solid or transparent. What changes over the life of a particle has a
+/// value at its birth and one at its end, and is linear between them.
+///
+/// ```
+/// # use tumble_behaviors::{ParticleSettings, ParticleSystem};
+/// # use tumble_core::prelude::*;
+/// # let mut world = World::default();
+/// use tumble_behaviors::ParticleLook;
+/// use tumble_core::Appearance;
+/// let appearance = Appearance { color: [0.35, 0.32, 0.3], ..Appearance::default() };
+/// let look = ParticleLook { appearance, radius: Some(0.09), scale: [1.0, 5.0], opacity: Some([0.2, 0.0]), ..ParticleLook::default() };
+/// let settings = ParticleSettings { gravity_scale: -0.11, linear_drag: 0.9, collides: false, ..ParticleSettings::default() };
+/// world.add(ParticleSystem::new("smoke", settings)?.with_look(look)?)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ParticleLook {
     /// Appearance of all particles of the system; textures have no effect.
@@ -29,12 +43,20 @@ pub struct ParticleLook {
     pub radius: Option<f64>,
     /// Time before its end in which a particle shrinks to nothing, s, at least 0.
     pub fade: f64,
+    /// Share of the light from behind that the middle of a particle blocks, at birth and at the end, each 0 to 1:
+    /// particles are soft spheres. `None` for solid ones.
+    pub opacity: Option<[f64; 2]>,
+    /// Factor of the drawn radius at birth and at the end, each at least 0.
+    pub scale: [f64; 2],
+    /// Color at the end, sRGB, each 0 to 1; `None` for the appearance's color at all times.
+    pub end_color: Option<[f32; 3]>,
 }
 
 impl Default for ParticleLook {
-    /// As large as they are, without a fade.
+    /// Solid, as large as they are, without a change over their life.
     fn default() -> ParticleLook {
-        ParticleLook { appearance: Appearance::default(), radius: None, fade: 0.0 }
+        let appearance = Appearance::default();
+        ParticleLook { appearance, radius: None, fade: 0.0, opacity: None, scale: [1.0; 2], end_color: None }
     }
 }
 
@@ -47,6 +69,15 @@ impl ParticleSystem {
         let radius = look.radius.unwrap_or(1.0);
         check("the drawn radius of a particle", radius, radius > 0.0, "above 0")?;
         check("the fade of a particle", look.fade, look.fade >= 0.0, "at least 0")?;
+        for opacity in look.opacity.into_iter().flatten() {
+            check("the opacity of a particle", opacity, (0.0..=1.0).contains(&opacity), "0 to 1")?;
+        }
+        for scale in look.scale {
+            check("the scale of a particle", scale, scale >= 0.0, "at least 0")?;
+        }
+        for part in look.end_color.into_iter().flatten().map(f64::from) {
+            check("the end color of a particle", part, (0.0..=1.0).contains(&part), "0 to 1")?;
+        }
         Ok(ParticleSystem { look, ..self })
     }
     /// Returns how particles are drawn.
@@ -56,6 +87,22 @@ impl ParticleSystem {
     /// Returns the sources.
     pub fn emitters(&self) -> &[super::Emitter] {
         &self.emitters
+    }
+}
+
+impl ParticleLook {
+    /// Returns a particle of this radius, m, as it is drawn when a time is left of its lifetime, s.
+    fn sphere(&self, center: Vec3, radius: f64, [life, lifetime]: [f64; 2]) -> CloudSphere {
+        let age = (1.0 - life / lifetime).clamp(0.0, 1.0);
+        let over_life = |[birth, end]: [f64; 2]| birth + age * (end - birth);
+        let shrunk = if self.fade > 0.0 { (life / self.fade).min(1.0) } else { 1.0 };
+        let between = |k: usize, end: f32| self.appearance.color[k] + age as f32 * (end - self.appearance.color[k]);
+        CloudSphere {
+            center,
+            radius: radius * shrunk * over_life(self.scale),
+            opacity: self.opacity.map_or(1.0, over_life),
+            color: self.end_color.map(|[r, g, b]| [between(0, r), between(1, g), between(2, b)]),
+        }
     }
 }
 
@@ -69,13 +116,11 @@ impl Renderable for ParticleSystem {
         &[]
     }
     fn cloud<'a>(&'a self, x: &'a [f64]) -> Option<Cloud<'a>> {
-        let (whole, fade) = (self.look.radius.unwrap_or(self.settings.radius), self.look.fade);
-        let sphere = move |record: &[f64]| {
-            let share = if fade > 0.0 { (record[6] / fade).min(1.0) } else { 1.0 };
-            (Vec3::from_column_slice(&record[..3]), whole * share)
-        };
-        let spheres = living(x).map(sphere).filter(|(_, radius)| *radius > 0.0);
-        Some(Cloud { appearance: &self.look.appearance, spheres: Box::new(spheres) })
+        let (look, radius) = (&self.look, self.look.radius.unwrap_or(self.settings.radius));
+        let sphere =
+            move |record: &[f64]| look.sphere(Vec3::from_column_slice(&record[..3]), radius, [record[6], record[8]]);
+        let spheres = living(x).map(sphere).filter(|sphere| sphere.radius > 0.0);
+        Some(Cloud { appearance: &look.appearance, transparent: look.opacity.is_some(), spheres: Box::new(spheres) })
     }
 }
 
@@ -86,9 +131,9 @@ impl NetSync for ParticleSystem {
         let sent = || living(x).filter(|record| (record[7] as u64).is_multiple_of(every)).take(MOST_SENT);
         out.extend((sent().count() as u32).to_le_bytes());
         for record in sent() {
-            let life = (record[6] as f32).clamp(f32::MIN_POSITIVE, f32::MAX);
+            let times = [6, 8].map(|k| (record[k] as f32).clamp(f32::MIN_POSITIVE, f32::MAX));
             let place = [0, 1, 2].map(|k| (record[k] as f32).clamp(f32::MIN, f32::MAX));
-            out.extend(place.into_iter().chain([life]).flat_map(f32::to_le_bytes));
+            out.extend(place.into_iter().chain(times).flat_map(f32::to_le_bytes));
         }
     }
 
@@ -101,15 +146,19 @@ impl NetSync for ParticleSystem {
         }
         let numbers: Vec<f64> =
             records.as_chunks::<4>().0.iter().map(|bytes| f64::from(f32::from_le_bytes(*bytes))).collect();
-        let (particles, _) = numbers.as_chunks::<4>();
-        if !particles.iter().all(|[a, b, c, life]| [a, b, c, life].iter().all(|x| x.is_finite()) && *life > 0.0) {
+        let (particles, _) = numbers.as_chunks::<5>();
+        let fine = |[a, b, c, life, lifetime]: &[f64; 5]| {
+            [a, b, c, life, lifetime].iter().all(|x| x.is_finite()) && *life > 0.0 && *lifetime > 0.0
+        };
+        if !particles.iter().all(fine) {
             return Err(SyncError::Value);
         }
         x.fill(0.0);
         let (header, records) = x.split_at_mut(HEADER);
         (header[0], header[1]) = (count as f64, 1.0);
-        for ((serial, [a, b, c, life]), record) in (0..).zip(particles).zip(records.chunks_exact_mut(RECORD)) {
-            write(record, &Vec3::new(*a, *b, *c), &Vec3::zeros(), *life, f64::from(serial));
+        for ((serial, [a, b, c, life, lifetime]), record) in (0..).zip(particles).zip(records.chunks_exact_mut(RECORD))
+        {
+            write(record, &Vec3::new(*a, *b, *c), &Vec3::zeros(), [*life, *lifetime], f64::from(serial));
         }
         Ok(())
     }

@@ -4,7 +4,7 @@
 //! whose state are all its particles, advanced once per frame after the bodies
 //! ([`FrameState`](tumble_core::FrameState)). It is saved, forked and rolled back with the world.
 //!
-//! The state has a header of two numbers, and eight of each particle:
+//! The state has a header of two numbers, and nine of each particle:
 //!
 //! | numbers | meaning |
 //! |---|---|
@@ -13,6 +13,7 @@
 //! | `x`, `v` | position, m; velocity, m/s |
 //! | life | time that is left, s; 0 or less of a free place |
 //! | serial | serial number of the particle |
+//! | lifetime | time from its birth to its end, s |
 
 mod cells;
 mod drawn;
@@ -42,7 +43,7 @@ use tumble_core::{
 
 /// Length of the header and of a record.
 const HEADER: usize = 2;
-const RECORD: usize = 8;
+const RECORD: usize = 9;
 /// Most particles of a system.
 const MOST: usize = 10_000_000;
 /// Least number of particles on a thread.
@@ -131,6 +132,8 @@ pub struct Particle {
     pub velocity: Vec3,
     /// Time that is left, s.
     pub life: f64,
+    /// Time from its birth to its end, s.
+    pub lifetime: f64,
     /// Its number, in the order of birth in its system.
     pub serial: u64,
 }
@@ -183,6 +186,7 @@ impl ParticleSystem {
             position: Vec3::from_column_slice(&record[..3]),
             velocity: Vec3::from_column_slice(&record[3..6]),
             life: record[6],
+            lifetime: record[8],
             serial: record[7] as u64,
         }))
     }
@@ -208,7 +212,7 @@ impl ParticleSystem {
             return Err(WorldError::BadState(world.name(system).unwrap_or_default().to_string()));
         }
         let serial = header[0];
-        write(record, &position, &velocity, life, serial);
+        write(record, &position, &velocity, [life; 2], serial);
         header[0] += 1.0;
         world.write_state_of(system, &x)?;
         Ok(Some(serial as u64))
@@ -231,7 +235,7 @@ impl ParticleSystem {
                 let Some(birth) = emitter.birth(number, random(serial), random(serial - 1.0), frame) else { break };
                 let (mut x, mut v) = (birth.position, birth.velocity);
                 flight.fly(&mut x, &mut v, birth.after, memory);
-                write(record, &x, &v, birth.life - (frame.dt - birth.after), serial);
+                write(record, &x, &v, [birth.life - (frame.dt - birth.after), birth.life], serial);
                 if let (true, Some((id, part))) = (self.settings.two_way, emitter.mount) {
                     let impulse = -self.settings.mass * birth.relative;
                     memory.impulses.push(FrameImpulse { id, part, impulse, point: birth.position });
@@ -241,10 +245,11 @@ impl ParticleSystem {
     }
 }
 
-fn write(record: &mut [f64], x: &Vec3, v: &Vec3, life: f64, serial: f64) {
+/// Writes the record of a particle, with the time that is left and its lifetime, s.
+fn write(record: &mut [f64], x: &Vec3, v: &Vec3, [life, lifetime]: [f64; 2], serial: f64) {
     record[..3].copy_from_slice(x.as_slice());
     record[3..6].copy_from_slice(v.as_slice());
-    (record[6], record[7]) = (life, serial);
+    (record[6], record[7], record[8]) = (life, serial, lifetime);
 }
 
 impl Object for ParticleSystem {

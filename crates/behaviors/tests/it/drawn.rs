@@ -4,7 +4,7 @@ use crate::steps;
 use std::collections::BTreeMap;
 use tumble_behaviors::{Cloth, Emitter, Jelly, ParticleLook, ParticleSettings, ParticleSystem, SpringMesh};
 use tumble_core::prelude::*;
-use tumble_core::{NetSync, Renderable, SyncError};
+use tumble_core::{Appearance, CloudSphere, NetSync, Renderable, SyncError};
 
 fn triangles(mesh: &SpringMesh) -> Vec<[usize; 3]> {
     mesh.surface().unwrap().triangles.iter().map(|corners| corners.map(|k| k as usize)).collect()
@@ -65,14 +65,78 @@ fn burst(count: u32, look: ParticleLook) -> (World, tumble_core::ObjectId) {
 fn a_cloud_has_the_living_particles_and_shrinks_them_at_their_end() {
     let (world, id) = burst(500, ParticleLook { radius: Some(0.05), fade: 1.5, ..ParticleLook::default() });
     let system = world.get::<ParticleSystem>(id).unwrap();
-    let spheres: Vec<(Vec3, f64)> = system.cloud(world.state_of(id).unwrap()).unwrap().spheres.collect();
+    let spheres: Vec<CloudSphere> = system.cloud(world.state_of(id).unwrap()).unwrap().spheres.collect();
     let particles: Vec<_> = ParticleSystem::particles(&world, id).unwrap().collect();
     assert_eq!(spheres.len(), 500);
-    for ((center, radius), particle) in spheres.iter().zip(&particles) {
-        assert_eq!(*center, particle.position);
-        assert!((radius - 0.05 * (particle.life / 1.5).min(1.0)).abs() < 1e-15);
+    for (sphere, particle) in spheres.iter().zip(&particles) {
+        assert_eq!((sphere.center, sphere.opacity, sphere.color), (particle.position, 1.0, None));
+        assert!((sphere.radius - 0.05 * (particle.life / 1.5).min(1.0)).abs() < 1e-15);
     }
     assert!(particles.iter().any(|particle| particle.life < 1.5) && particles.iter().any(|p| p.life > 1.5));
+}
+
+/// Look with all changes over life.
+fn smoke() -> ParticleLook {
+    let appearance = Appearance { color: [1.0, 0.5, 0.25], ..Appearance::default() };
+    let end_color = Some([0.0, 0.25, 0.5]);
+    ParticleLook { appearance, opacity: Some([0.8, 0.2]), scale: [0.5, 4.0], end_color, ..ParticleLook::default() }
+}
+
+#[test]
+fn opacity_size_and_color_change_linearly_from_birth_to_end() {
+    let (mut world, id) = burst(300, smoke());
+    let lifetimes: Vec<f64> = ParticleSystem::particles(&world, id).unwrap().map(|p| p.lifetime).collect();
+    assert!(lifetimes.iter().all(|life| (1.0..2.0).contains(life)));
+    assert!(lifetimes.iter().any(|life| *life < 1.1) && lifetimes.iter().any(|life| *life > 1.9));
+    steps(&mut world, 30);
+    let system = world.get::<ParticleSystem>(id).unwrap();
+    let cloud = system.cloud(world.state_of(id).unwrap()).unwrap();
+    assert!(cloud.transparent);
+    let (spheres, time) = (cloud.spheres.collect::<Vec<_>>(), world.time());
+    let particles: Vec<_> = ParticleSystem::particles(&world, id).unwrap().collect();
+    assert_eq!(spheres.len(), 300);
+    for ((sphere, particle), lifetime) in spheres.iter().zip(particles).zip(lifetimes) {
+        assert_eq!(particle.lifetime, lifetime, "it stays");
+        let age = time / lifetime; // all were born at time 0
+        assert!((particle.life - (lifetime - time)).abs() < 1e-12);
+        assert!((sphere.opacity - (0.8 - 0.6 * age)).abs() < 1e-12);
+        assert!((sphere.radius - 0.01 * (0.5 + 3.5 * age)).abs() < 1e-14);
+        let color = sphere.color.unwrap().map(f64::from);
+        for (have, want) in color.into_iter().zip([1.0 - age, 0.5 - 0.25 * age, 0.25 + 0.25 * age]) {
+            assert!((have - want).abs() < 1e-6, "{have} for {want}");
+        }
+    }
+}
+
+#[test]
+fn a_copy_made_of_a_message_looks_the_same() {
+    let (world, id) = burst(50, smoke());
+    let mut copy = world.fork();
+    copy.replica().read_data(id, &message(&world, id)).unwrap();
+    let spheres = |world: &World| -> Vec<CloudSphere> {
+        world.get::<ParticleSystem>(id).unwrap().cloud(world.state_of(id).unwrap()).unwrap().spheres.collect()
+    };
+    for (ours, theirs) in spheres(&world).iter().zip(spheres(&copy)) {
+        assert!((ours.opacity - theirs.opacity).abs() < 1e-6 && (ours.radius - theirs.radius).abs() < 1e-8);
+    }
+}
+
+#[test]
+fn looks_out_of_range_are_refused_by_name() {
+    let refused = |look: ParticleLook| {
+        let system = ParticleSystem::new("p", ParticleSettings::default()).unwrap();
+        system.with_look(look).unwrap_err().to_string()
+    };
+    let usual = ParticleLook::default;
+    for (look, words) in [
+        (ParticleLook { opacity: Some([0.5, 1.5]), ..usual() }, "the opacity of a particle is 1.5"),
+        (ParticleLook { opacity: Some([f64::NAN, 0.0]), ..usual() }, "the opacity of a particle is NaN"),
+        (ParticleLook { scale: [-1.0, 1.0], ..usual() }, "the scale of a particle is -1"),
+        (ParticleLook { end_color: Some([0.0, 2.0, 0.0]), ..usual() }, "the end color of a particle is 2"),
+    ] {
+        let message = refused(look);
+        assert!(message.contains(words), "{message}");
+    }
 }
 
 fn message(world: &World, id: tumble_core::ObjectId) -> Vec<u8> {
@@ -85,7 +149,7 @@ fn message(world: &World, id: tumble_core::ObjectId) -> Vec<u8> {
 fn a_message_has_all_particles_and_a_copy_repeats_it() {
     let (world, id) = burst(700, ParticleLook::default());
     let sent = message(&world, id);
-    assert_eq!(sent.len(), 4 + 16 * 700);
+    assert_eq!(sent.len(), 4 + 20 * 700);
     let mut copy = world.fork();
     copy.replica().read_data(id, &sent).unwrap();
     assert_eq!(message(&copy, id), sent, "the copy sends the same bytes");
@@ -95,6 +159,7 @@ fn a_message_has_all_particles_and_a_copy_repeats_it() {
     for (a, b) in ours.zip(theirs) {
         assert!((a.position - b.position).amax() < 4.0 * f64::from(f32::EPSILON), "single precision");
         assert!((a.life - b.life).abs() < 2.0 * f64::from(f32::EPSILON));
+        assert!((a.lifetime - b.lifetime).abs() < 2.0 * f64::from(f32::EPSILON));
         count += 1;
     }
     assert_eq!(count, 700);
@@ -105,7 +170,7 @@ fn a_message_of_many_particles_is_bounded_and_thinned_by_serial_number() {
     let (world, id) = burst(100_000, ParticleLook::default());
     let sent = message(&world, id);
     // of 100,000 each fourth: ⌈100,000/32,768⌉ = 4
-    assert_eq!(sent.len(), 4 + 16 * 25_000);
+    assert_eq!(sent.len(), 4 + 20 * 25_000);
     let mut copy = world.fork();
     copy.replica().read_data(id, &sent).unwrap();
     assert_eq!(message(&copy, id), sent);
@@ -138,5 +203,6 @@ fn bad_messages_are_refused_and_change_nothing() {
     assert!(matches!(read(&with(0, u32::MAX.to_le_bytes())), Err(SyncError::Length { .. })));
     assert_eq!(read(&with(4, f32::NAN.to_le_bytes())), Err(SyncError::Value));
     assert_eq!(read(&with(16, 0f32.to_le_bytes())), Err(SyncError::Value), "no time left");
+    assert_eq!(read(&with(20, (-1f32).to_le_bytes())), Err(SyncError::Value), "a lifetime below 0");
     world.step().unwrap();
 }

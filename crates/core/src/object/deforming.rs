@@ -22,6 +22,28 @@ pub struct PartSurface {
 pub struct Cloud<'a> {
     /// Appearance of all of them; without a texture.
     pub appearance: &'a Appearance,
-    /// Center, m, world axes, and radius, m, above 0, of each.
-    pub spheres: Box<dyn Iterator<Item = (Vec3, f64)> + 'a>,
+    /// Whether they are drawn as soft spheres with their opacity, like smoke. Otherwise they are solid.
+    pub transparent: bool,
+    /// The spheres.
+    pub spheres: Box<dyn Iterator<Item = CloudSphere> + 'a>,
+}
+
+/// A sphere of a [`Cloud`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CloudSphere {
+    /// Center, m, world axes.
+    pub center: Vec3,
+    /// Radius, m, above 0.
+    pub radius: f64,
+    /// Share of the light from behind that its middle blocks, 0 to 1; without effect if the cloud is not transparent.
+    pub opacity: f64,
+    /// Color of its own, sRGB, each 0 to 1; `None` for that of the appearance.
+    pub color: Option<[f32; 3]>,
+}
+
+impl CloudSphere {
+    /// Makes an opaque sphere of the cloud's color.
+    pub fn new(center: Vec3, radius: f64) -> CloudSphere {
+        CloudSphere { center, radius, opacity: 1.0, color: None }
+    }
 }

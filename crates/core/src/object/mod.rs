@@ -25,7 +25,7 @@ pub use appearance::Appearance;
 pub use collidable::Collidable;
 pub use conserved::{Energy, Momentum};
 pub use constraint::{Constraint, Level, RowTarget};
-pub use deforming::{Cloud, PartSurface};
+pub use deforming::{Cloud, CloudSphere, PartSurface};
 pub use force::ForceGenerator;
 pub use frame_state::FrameState;
 pub use integratable::{Integratable, MomentumKind};

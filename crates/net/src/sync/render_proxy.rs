@@ -1,7 +1,7 @@
 //! An object that is only drawn. It represents an object of the server that the scene file does not
 //! have.
 
-use super::cloud::Sphere;
+use super::cloud::Spheres;
 use super::visuals::Looks;
 use tumble_collide::Shape;
 use tumble_core::{Appearance, Cloud, Collidable, Object, PartSurface, Renderable, Visual};
@@ -15,13 +15,13 @@ pub(crate) struct RenderProxy {
     surface: Option<PartSurface>,
     cloud: Option<Appearance>,
     /// The spheres of its cloud.
-    pub spheres: Vec<Sphere>,
+    pub spheres: Spheres,
 }
 
 impl RenderProxy {
     pub fn new(name: &str, parts: usize, looks: Looks) -> RenderProxy {
         let Looks { visuals, surface, cloud } = looks;
-        RenderProxy { name: name.to_owned(), parts, visuals, surface, cloud, spheres: Vec::new() }
+        RenderProxy { name: name.to_owned(), parts, visuals, surface, cloud, spheres: Spheres::default() }
     }
 }
 
@@ -60,6 +60,7 @@ impl Renderable for RenderProxy {
 
     fn cloud<'a>(&'a self, _: &'a [f64]) -> Option<Cloud<'a>> {
         let appearance = self.cloud.as_ref()?;
-        Some(Cloud { appearance, spheres: Box::new(self.spheres.iter().copied()) })
+        let Spheres { transparent, spheres } = &self.spheres;
+        Some(Cloud { appearance, transparent: *transparent, spheres: Box::new(spheres.iter().copied()) })
     }
 }

@@ -623,6 +623,9 @@ class ParticleSystem:
     def lives(self) -> _Floats:
         """Times that are left, shape (n,), s."""
     @property
+    def lifetimes(self) -> _Floats:
+        """Times from birth to end, shape (n,), s."""
+    @property
     def serials(self) -> NDArray[np.uint64]:
         """Numbers in the order of birth, shape (n,)."""
     def spawn(self, position: ArrayLike, velocity: ArrayLike | None = None, life: float = 1.0) -> int | None:
@@ -2566,6 +2569,10 @@ class World:
         color: ArrayLike | None = None,
         drawn_radius: float | None = None,
         fade: float = 0.0,
+        opacity: float | ArrayLike | None = None,
+        scale: float | ArrayLike | None = None,
+        end_color: ArrayLike | None = None,
+        glow: bool = False,
     ) -> ParticleSystem:
         """Adds a system of particles: sparks, smoke, drops. Returns its handle.
 
@@ -2574,7 +2581,10 @@ class World:
         gravity, negative for smoke. linear_drag: 1/s, quadratic_drag: 1/m, both per mass. wind: velocity of the air,
         shape (3,), m/s. collides: with bodies. group, mask: as in ``add_rigid``. two_way: whether bodies get the
         momentum that particles lose. color: sRGB, each 0 to 1. drawn_radius: in pictures, m, by default the radius.
-        fade: seconds before its end in which a particle shrinks.
+        fade: seconds before its end in which a particle shrinks. opacity: share of the light from behind that the middle
+        of a particle blocks, 0 to 1, or two numbers, at birth and at the end; None for solid particles. scale: factor of
+        the drawn radius, one number or two likewise. end_color: sRGB at the end, where color is that at birth.
+        glow: colors as they are, without light, for sparks and flames.
         """
     def add_flock(self, name: str = "", **steering: Any) -> Flock:
         """Adds a flock without boids and returns its handle; ``Flock.add`` adds boids.

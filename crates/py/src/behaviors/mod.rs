@@ -115,16 +115,19 @@ pub fn placed(shared: &Arc<Shared>, inner: &Inner, id: ObjectId) -> Place {
 /// Returns an appearance of a color, sRGB, each 0 to 1; without one the color of the `count`th object.
 pub fn appearance(color: Option<&Bound<'_, PyAny>>, count: usize) -> Result<Appearance> {
     let color = match color {
-        Some(color) => {
-            let color = crate::arrays::convert::some::<3>(color, "color")?;
-            if !color.iter().all(|share| (0.0..=1.0).contains(share)) {
-                return Err(Error::value(format!("color: {color:?}; expected numbers from 0 to 1")));
-            }
-            color.map(|share| share as f32)
-        }
+        Some(color) => self::color(color, "color")?,
         None => palette(count),
     };
     Ok(Appearance { color, ..Appearance::default() })
+}
+
+/// Returns a color, sRGB, each 0 to 1, checked.
+pub fn color(value: &Bound<'_, PyAny>, what: &str) -> Result<[f32; 3]> {
+    let color = crate::arrays::convert::some::<3>(value, what)?;
+    if !color.iter().all(|share| (0.0..=1.0).contains(share)) {
+        return Err(Error::value(format!("{what}: {color:?}; expected numbers from 0 to 1")));
+    }
+    Ok(color.map(|share| share as f32))
 }
 
 /// Returns the surface constants, checked.

@@ -72,7 +72,7 @@ impl Emitter {
     }
 }
 
-/// Converts one number, or the least and the greatest; 1 for None.
+/// Converts one number, or two: the least and the greatest, or those at birth and at the end; 1 for None.
 fn range(value: Option<&Bound<'_, PyAny>>, what: &str) -> Result<[f64; 2]> {
     let Some(value) = value else { return Ok([1.0; 2]) };
     match value.extract::<f64>() {
@@ -93,6 +93,10 @@ pub struct Given<'a, 'py> {
     pub color: Option<&'a Bound<'py, PyAny>>,
     pub drawn_radius: Option<f64>,
     pub fade: f64,
+    pub opacity: Option<&'a Bound<'py, PyAny>>,
+    pub scale: Option<&'a Bound<'py, PyAny>>,
+    pub end_color: Option<&'a Bound<'py, PyAny>>,
+    pub glow: bool,
 }
 
 /// Adds a system and returns its handle.
@@ -114,10 +118,15 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: Given<'_, '_>) -> Result
         system = system.with_emitter(Source { mount, ..emitter.source.clone() })?;
     }
     let place = shared.write(py, |inner| {
+        let mut appearance = appearance(given.color, inner.world.ids().len())?;
+        appearance.properties.extend(given.glow.then(|| ("glow".to_owned(), 1.0)));
         let look = ParticleLook {
-            appearance: appearance(given.color, inner.world.ids().len())?,
+            appearance,
             radius: given.drawn_radius,
             fade: given.fade,
+            opacity: given.opacity.map(|opacity| range(Some(opacity), "opacity")).transpose()?,
+            scale: range(given.scale, "scale")?,
+            end_color: given.end_color.map(|color| crate::behaviors::color(color, "end_color")).transpose()?,
         };
         let id = inner.world.add(system.with_look(look)?)?;
         Ok(placed(shared, inner, id))
@@ -168,6 +177,12 @@ impl Particles {
     #[getter]
     fn lives<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
         Ok(PyArray1::from_vec(py, self.each(|particle| particle.life)?))
+    }
+
+    /// Times from birth to end, shape (n,), s.
+    #[getter]
+    fn lifetimes<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(PyArray1::from_vec(py, self.each(|particle| particle.lifetime)?))
     }
 
     /// Numbers in the order of birth, shape (n,).

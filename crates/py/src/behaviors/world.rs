@@ -105,11 +105,16 @@ impl World {
     /// gravity, negative for smoke. linear_drag: 1/s, quadratic_drag: 1/m, both per mass. wind: velocity of the air,
     /// shape (3,), m/s. collides: with bodies. group, mask: as in ``add_rigid``. two_way: whether bodies get the
     /// momentum that particles lose. color: sRGB, each 0 to 1. drawn_radius: in pictures, m, by default the radius.
-    /// fade: seconds before its end in which a particle shrinks.
+    /// fade: seconds before its end in which a particle shrinks. opacity: share of the light from behind that the middle
+    /// of a particle blocks, 0 to 1, or two numbers, at birth and at the end; None for solid particles. scale: factor of
+    /// the drawn radius, one number or two likewise. end_color: sRGB at the end, where color is that at birth.
+    /// glow: colors as they are, without light, for sparks and flames.
     #[pyo3(signature = (name="", emitters=vec![], *, capacity=10000, seed=0, mass=0.001, radius=0.01, friction=0.5, restitution=0.0, gravity_scale=1.0,
-        linear_drag=0.0, quadratic_drag=0.0, wind=None, collides=true, group=0, mask=None, two_way=false, color=None, drawn_radius=None, fade=0.0),
+        linear_drag=0.0, quadratic_drag=0.0, wind=None, collides=true, group=0, mask=None, two_way=false, color=None, drawn_radius=None, fade=0.0,
+        opacity=None, scale=None, end_color=None, glow=false),
         text_signature = "(self, name='', emitters=(), *, capacity=10000, seed=0, mass=0.001, radius=0.01, friction=0.5, restitution=0.0, gravity_scale=1.0, \
-        linear_drag=0.0, quadratic_drag=0.0, wind=None, collides=True, group=0, mask=None, two_way=False, color=None, drawn_radius=None, fade=0.0)")]
+        linear_drag=0.0, quadratic_drag=0.0, wind=None, collides=True, group=0, mask=None, two_way=False, color=None, drawn_radius=None, fade=0.0, \
+        opacity=None, scale=None, end_color=None, glow=False)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_particles<'py>(
         &self,
@@ -133,6 +138,10 @@ impl World {
         color: Option<&Bound<'py, PyAny>>,
         drawn_radius: Option<f64>,
         fade: f64,
+        opacity: Option<&Bound<'py, PyAny>>,
+        scale: Option<&Bound<'py, PyAny>>,
+        end_color: Option<&Bound<'py, PyAny>>,
+        glow: bool,
     ) -> Result<Particles> {
         let settings = ParticleSettings {
             capacity,
@@ -147,7 +156,22 @@ impl World {
             ..ParticleSettings::default()
         };
         let surface = [friction, restitution];
-        let given = Given { name, settings, surface, wind, group, mask, emitters, color, drawn_radius, fade };
+        let given = Given {
+            name,
+            settings,
+            surface,
+            wind,
+            group,
+            mask,
+            emitters,
+            color,
+            drawn_radius,
+            fade,
+            opacity,
+            scale,
+            end_color,
+            glow,
+        };
         particles::add(&self.shared, py, given)
     }
 

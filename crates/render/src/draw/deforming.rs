@@ -1,10 +1,10 @@
 //! Surfaces and clouds that change with the state: their geometry is made anew for each list.
 
 use super::{Drawing, small, surface};
-use crate::{DebugStyle, DrawList, Material, MeshData, Pattern, RenderError, SphereCloud};
+use crate::{DebugStyle, DrawList, Material, MeshData, Pattern, RenderError, SoftSphere, SphereCloud};
 use nalgebra::{Isometry3, Point3};
 use std::sync::Arc;
-use tumble_core::{Appearance, Cloud, Detail, PartState, PartSurface};
+use tumble_core::{Appearance, Cloud, CloudSphere, Detail, PartState, PartSurface};
 
 /// Largest coordinate of a sphere of a cloud that is drawn, m: what has flown away is left out.
 const FAR_M: f64 = 1e5;
@@ -44,10 +44,26 @@ impl Drawing {
 /// Adds the spheres of a cloud.
 pub(super) fn place_cloud(list: &mut DrawList, name: &str, cloud: Cloud<'_>, tint: Option<[f32; 3]>) {
     let material = plain(cloud.appearance, name, tint);
-    let shown = cloud.spheres.filter(|(center, radius)| center.amax() < FAR_M && *radius as f32 > 0.0);
-    let spheres: Vec<_> = shown.map(|(center, radius)| (Point3::from(small(&center)), radius as f32)).collect();
+    let shown = cloud.spheres.filter(|sphere| sphere.center.amax() < FAR_M && sphere.radius as f32 > 0.0);
+    let place = |sphere: &CloudSphere| (Point3::from(small(&sphere.center)), sphere.radius as f32);
+    let color = |sphere: &CloudSphere| if tint.is_some() { None } else { sphere.color };
+    if cloud.transparent {
+        list.soft_spheres.extend(shown.map(|sphere| {
+            let ((center, radius), color) = (place(&sphere), color(&sphere).unwrap_or(material.color));
+            SoftSphere { center, radius, color, opacity: sphere.opacity as f32, shader: material.shader }
+        }));
+        return;
+    }
+    let (mut spheres, mut colors) = (Vec::new(), Vec::new());
+    for sphere in shown {
+        spheres.push(place(&sphere));
+        colors.extend(color(&sphere));
+    }
+    if colors.len() != spheres.len() {
+        colors.clear(); // all have one, or none is used
+    }
     if !spheres.is_empty() {
-        list.clouds.push(SphereCloud { spheres, material });
+        list.clouds.push(SphereCloud { spheres, colors, material });
     }
 }
 

@@ -3,7 +3,7 @@
 
 use crate::list::debug::Stroke;
 use crate::material::linear3;
-use crate::{Capsule, Instance, Material, Part, Sphere, SphereCloud};
+use crate::{Capsule, Instance, Material, Part, Shader, SoftSphere, Sphere, SphereCloud};
 use nalgebra::{Matrix2, Matrix3, Matrix4, Point3, Vector2, Vector3, Vector4};
 
 /// Numbers per mesh instance, sphere, capsule and stroke.
@@ -117,6 +117,11 @@ impl Eye {
         (place - self.origin[0]).dot(&self.ahead)
     }
 
+    /// Distance of a place from the eye, m; in a parallel view its depth.
+    pub fn distance(&self, place: &Vector3<f64>) -> f64 {
+        if self.perspective { (place - self.origin[0]).norm() } else { self.view_depth(place) }
+    }
+
     /// Depth as it is drawn, 1 at the near plane and 0 at the far plane; `None` behind the eye.
     pub fn depth_at(&self, view_depth: f64) -> Option<f64> {
         let [x, y, z, w] = self.depth;
@@ -189,17 +194,16 @@ pub fn sphere(s: &Sphere, out: &mut Vec<u32>) {
     let (c, q, m) = (s.center, s.orientation.coords, &s.material);
     let (_, other, size) = m.pattern.packed();
     let ([r, g, b], [or, og, ob]) = (linear3(m.color), linear3(other));
-    let pair = |low: f32, high: f32| {
-        [low, high]
-            .map(|x| (x.clamp(0.0, 1.0) * 65_535.0).round() as u32)
-            .into_iter()
-            .rev()
-            .fold(0, |word, half| word << 16 | half)
-    };
     out.extend([c.x, c.y, c.z, s.radius].map(f32::to_bits));
     out.extend([pair(r, g), pair(b, m.roughness), pair(or, og), pair(ob, m.metallic)]);
     // the texture goes once around a sphere
     out.extend([q.x, q.y, q.z, q.w, m.clearcoat, 0.0, size[0], size[1]].map(f32::to_bits));
+}
+
+/// Two fractions in one word.
+fn pair(low: f32, high: f32) -> u32 {
+    let [low, high] = [low, high].map(|x| (x.clamp(0.0, 1.0) * 65_535.0).round() as u32);
+    high << 16 | low
 }
 
 /// The spheres of a cloud as [`sphere`]: their appearance is computed once.
@@ -207,8 +211,12 @@ pub fn cloud(cloud: &SphereCloud, out: &mut Vec<u32>) {
     let Some(first) = cloud.each().next() else { return };
     let mut words = Vec::with_capacity(4 * SPHERE_TEXELS);
     sphere(&first, &mut words);
-    for (center, radius) in &cloud.spheres {
+    for (i, (center, radius)) in cloud.spheres.iter().enumerate() {
         words[..4].copy_from_slice(&[center.x, center.y, center.z, *radius].map(f32::to_bits));
+        if let Some(color) = cloud.colors.get(i) {
+            let [r, g, b] = linear3(*color);
+            words[4..6].copy_from_slice(&[pair(r, g), pair(b, cloud.material.roughness)]);
+        }
         out.extend_from_slice(&words);
     }
 }
@@ -236,6 +244,14 @@ pub fn shell(s: &crate::DebugSphere, out: &mut Vec<f32>) {
     out.extend([s.center.x, s.center.y, s.center.z, s.radius, 0.0, 0.0, 0.0, 1.0]);
     out.extend([r, g, b, s.style.opacity]);
     out.extend([0.0; 8]);
+}
+
+/// A soft sphere; its opacity replaces the roughness, and the other color says whether it is lit.
+pub fn soft(s: &SoftSphere, out: &mut Vec<f32>) {
+    let [r, g, b] = linear3(s.color);
+    out.extend([s.center.x, s.center.y, s.center.z, s.radius, 0.0, 0.0, 0.0, 1.0]);
+    out.extend([r, g, b, s.opacity, f32::from(u8::from(s.shader == Shader::Lit))]);
+    out.extend([0.0; 7]);
 }
 
 /// A stroke: ends with widths, color, kind.

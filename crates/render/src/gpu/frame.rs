@@ -17,7 +17,8 @@ pub struct Frame<'a> {
     scene: BindGroup,
     occlusion_raw: BindGroup,
     occlusion_blur: BindGroup,
-    shells: Batch,
+    /// Soft spheres and shells, in the order of this view.
+    transparent: [Batch; 2],
     choice: Choice,
 }
 
@@ -55,7 +56,7 @@ impl<'a> Frame<'a> {
             scene: bind(gpu, &pipelines.scene_layout, &scene_entries),
             occlusion_raw: bind_occlusion(&targets.white),
             occlusion_blur: bind_occlusion(&targets.occlusion_raw),
-            shells: stage.shells_from(gpu, &lens.view.cast())?,
+            transparent: [stage.soft_from(gpu, &eye)?, stage.shells_from(gpu, &lens.view.cast())?],
             choice: stage.spheres.choose(gpu, &eye, Which::All)?,
             stage,
             targets,
@@ -94,7 +95,7 @@ impl<'a> Frame<'a> {
         let mut pass = self.picture_pass(encoder);
         pass.set_bind_group(0, &self.view, &[]);
         pass.set_bind_group(1, &self.scene, &[]);
-        self.stage.draw_picture(&mut pass, pipelines, &self.choice, &self.shells);
+        self.stage.draw_picture(&mut pass, pipelines, &self.choice, &self.transparent);
     }
 
     /// Occlusion from depth, and its blur.

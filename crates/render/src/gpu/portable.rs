@@ -64,11 +64,13 @@ pub enum PortableItems {
     Shells,
     /// Lines and points, 16 numbers each.
     Strokes,
+    /// Soft spheres, 20 numbers each.
+    Soft,
 }
 
 impl PortableItems {
     /// Number of kinds.
-    pub const COUNT: usize = 7;
+    pub const COUNT: usize = 8;
 }
 
 /// Instances that one program draws.
@@ -181,6 +183,7 @@ impl PortablePicture {
         picture.add_meshes(list, variant);
         picture.add_ground(list, scene::floor(list, seen.as_ref()), variant);
         picture.draw(Pass::Sky, 0, variant, PortableItems::Nothing, None, &one());
+        picture.add_soft(list, &eye, variant);
         picture.add_overlays(list, &lens.view.cast(), variant);
         Ok(picture)
     }
@@ -258,6 +261,16 @@ impl PortablePicture {
         let (surface, texture) = (ground.material.surface(), ground.material.texture.map(|t| t.id));
         let same = Same { texture, ..one() };
         self.draw(Pass::Ground, surface, variant, PortableItems::Ground, Some(placed.mesh.0), &same);
+    }
+
+    /// Adds soft spheres, the farthest first.
+    fn add_soft(&mut self, list: &DrawList, eye: &Eye, variant: Variant) {
+        let all = 0..list.soft_spheres.len() as u32;
+        self.items[PortableItems::Soft as usize] = super::soft::far_to_near(&list.soft_spheres, eye);
+        if !all.is_empty() {
+            let same = Same { surface: 0, texture: None, casters: 0..0, all };
+            self.draw(Pass::Soft, 0, variant, PortableItems::Soft, None, &same);
+        }
     }
 
     /// Adds lines, translucent spheres from back to front, and lines on top.

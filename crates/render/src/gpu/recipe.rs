@@ -101,7 +101,7 @@ impl PortableKey {
 }
 
 /// Entry points of programs.
-const ENTRIES: [&str; 20] = [
+const ENTRIES: [&str; 22] = [
     "vs_sky",
     "fs_sky",
     "vs_ground",
@@ -113,6 +113,8 @@ const ENTRIES: [&str; 20] = [
     "vs_capsule",
     "fs_capsule",
     "fs_shell",
+    "vs_soft",
+    "fs_soft",
     "vs_line",
     "fs_line",
     "vs_mesh_depth",

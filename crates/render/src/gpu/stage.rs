@@ -8,7 +8,9 @@ use super::targets::{MAX_LAYERS, ShadowMaps};
 use super::{Gpu, scene};
 use crate::list::bounds::Bounds;
 use crate::list::debug::strokes;
-use crate::{DebugSphere, DrawList, Instance, Material, MeshData, MeshId, RenderError, Shadows, SphereStyle};
+use crate::{
+    DebugSphere, DrawList, Instance, Material, MeshData, MeshId, RenderError, Shadows, SoftSphere, SphereStyle,
+};
 use std::ops::Range;
 use wgpu::{BindGroup, Buffer, CommandEncoder, RenderPass, RenderPipeline};
 
@@ -23,6 +25,7 @@ pub struct Stage {
     pub(super) shadow_views: Vec<(BindGroup, Choice)>,
     pub(super) scene: Buffer,
     shells: Vec<DebugSphere>,
+    soft_spheres: Vec<SoftSphere>,
     groups: Vec<Group>,
     instances: Buffer,
     /// With its surface and texture.
@@ -105,6 +108,7 @@ impl Stage {
                 .filter(|s| s.kind == SphereStyle::Shell && s.radius > 0.0)
                 .cloned()
                 .collect(),
+            soft_spheres: list.soft_spheres.clone(),
             groups,
             instances,
             ground: ground(gpu, list, seen)?,
@@ -120,7 +124,7 @@ impl Stage {
 
     /// The keys of all pipelines that a picture of it may need.
     fn keys(&self) -> impl Iterator<Item = Key> {
-        let fixed = [(Pass::Sky, 0), (Pass::Shell, 0), (Pass::Line, 0), (Pass::LineOnTop, 0)];
+        let fixed = [(Pass::Sky, 0), (Pass::Soft, 0), (Pass::Shell, 0), (Pass::Line, 0), (Pass::LineOnTop, 0)];
         let ground = self.ground.iter().map(|(_, _, (surface, _))| (Pass::Ground, *surface));
         let meshes = self.groups.iter().map(|g| (Pass::Mesh, g.same.surface));
         let spheres = self.spheres.groups.iter().map(|g| (Pass::Sphere, g.surface));
@@ -183,8 +187,14 @@ impl Stage {
         self.draw_sphere_depth(pass, by, choice);
     }
 
-    /// Draws everything in color, with the view's own shells.
-    pub(super) fn draw_picture(&self, pass: &mut RenderPass, pipelines: &Pipelines, choice: &Choice, shells: &Batch) {
+    /// Draws everything in color, with the view's own order of transparent items: soft spheres and shells.
+    pub(super) fn draw_picture(
+        &self,
+        pass: &mut RenderPass,
+        pipelines: &Pipelines,
+        choice: &Choice,
+        [soft, shells]: &[Batch; 2],
+    ) {
         let select = |pass: &mut RenderPass, which, surface| {
             pipelines.of((which, surface, self.variant)).map(|p| pass.set_pipeline(p)).is_some()
         };
@@ -217,9 +227,12 @@ impl Stage {
         if select(pass, Pass::Sky, 0) {
             pass.draw(0..3, 0..1);
         }
-        for (which, batch) in
-            [(Pass::Line, &self.strokes[0]), (Pass::Shell, shells), (Pass::LineOnTop, &self.strokes[1])]
-        {
+        for (which, batch) in [
+            (Pass::Soft, soft),
+            (Pass::Line, &self.strokes[0]),
+            (Pass::Shell, shells),
+            (Pass::LineOnTop, &self.strokes[1]),
+        ] {
             if batch.count > 0 && select(pass, which, 0) {
                 pass.set_vertex_buffer(0, batch.buffer.slice(..));
                 pass.draw(0..4, 0..batch.count);
@@ -247,6 +260,12 @@ impl Stage {
                 pass.draw(0..4, choice.ranges[i].clone());
             }
         }
+    }
+
+    /// Orders soft spheres for a viewpoint.
+    pub(super) fn soft_from(&self, gpu: &Gpu, eye: &Eye) -> Result<Batch, RenderError> {
+        let floats = super::soft::far_to_near(&self.soft_spheres, eye);
+        Batch::new(gpu, &floats, self.soft_spheres.len(), "soft spheres")
     }
 
     /// Sorts shells from back to front, so that they blend correctly.

@@ -101,12 +101,16 @@ impl DrawList {
                 let r = Vector3::repeat(*radius);
                 (Corners([*center; 8], 1), (center - r, center + r), *radius)
             });
+        let soft = self.soft_spheres.iter().filter(move |_| !casters).map(|s| {
+            let r = Vector3::repeat(s.radius);
+            (Corners([s.center; 8], 1), (s.center - r, s.center + r), s.radius)
+        });
         let capsules = self.capsules.iter().filter(move |c| c.casts_shadow || !casters).map(|c| {
             let [a, b] = [-1.0, 1.0].map(|end| c.pose * Point3::new(0.0, 0.0, end * 0.5 * c.length));
             let r = Vector3::repeat(c.radius);
             (Corners([a, b, a, a, a, a, a, a], 2), (a.inf(&b) - r, a.sup(&b) + r), c.radius)
         });
-        instances.chain(spheres).chain(clouds).chain(capsules)
+        instances.chain(spheres).chain(clouds).chain(soft).chain(capsules)
     }
 }
 

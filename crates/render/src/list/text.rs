@@ -78,6 +78,14 @@ impl Display for DrawList {
             for (center, radius) in &cloud.spheres {
                 writeln!(f, "  at {} radius {}", v(center.coords.as_slice()), n(*radius))?;
             }
+            for color in &cloud.colors {
+                writeln!(f, "  color {}", v(color))?;
+            }
+        }
+        for (i, s) in self.soft_spheres.iter().enumerate() {
+            let (at, color, lit) = (v(s.center.coords.as_slice()), v(&s.color), s.shader == Shader::Lit);
+            write!(f, "soft sphere {i}: at {at} radius {} color {color} opacity {}", n(s.radius), n(s.opacity))?;
+            writeln!(f, "{}", if lit { "" } else { " unlit" })?;
         }
         for (i, c) in self.capsules.iter().enumerate() {
             let (t, q) = (c.pose.translation.vector, c.pose.rotation.coords);

@@ -50,6 +50,16 @@ impl DrawList {
             }
             at.material(&cloud.material)?;
             at.check(cloud.material.texture.is_none(), "texture", &cloud.material.texture, "none")?;
+            let colors = cloud.colors.len();
+            at.check([0, cloud.spheres.len()].contains(&colors), "colors", &colors, "none, or one for each sphere")?;
+            cloud.colors.iter().try_for_each(|color| at.color("colors", *color))?;
+        }
+        for (i, s) in self.soft_spheres.iter().enumerate() {
+            let at = Item("soft sphere", i);
+            at.finite("center", s.center.coords.as_slice())?;
+            at.check(s.radius > 0.0 && s.radius.is_finite(), "radius", &s.radius, "finite and above 0")?;
+            at.color("color", s.color)?;
+            at.check(in_range(s.opacity, 0.0, 1.0), "opacity", &s.opacity, "0 to 1")?;
         }
         for (i, c) in self.capsules.iter().enumerate() {
             let at = Item("capsule", i);
@@ -72,6 +82,7 @@ impl DrawList {
             ("meshes", self.meshes.len(), MAX_ITEMS),
             ("instances", self.instances.len(), MAX_ITEMS),
             ("spheres", self.sphere_count(), MAX_ITEMS),
+            ("soft spheres", self.soft_spheres.len(), MAX_ITEMS),
             ("capsules", self.capsules.len(), MAX_ITEMS),
             ("lines", self.lines.len(), MAX_ITEMS),
             ("points", self.points.len(), MAX_ITEMS),

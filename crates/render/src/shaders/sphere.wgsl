@@ -31,6 +31,7 @@ struct Cover {
     plane: vec2f,    // place in the plane, m from the center
     numbers: vec3f,  // d², d² - r², h²
     near: bool,
+    depth: f32,      // of the plane
 };
 
 fn clip_row(i: u32) -> vec3f {
@@ -53,7 +54,7 @@ fn cover(sphere: vec4f, index: u32) -> Cover {
     let corner = corner_of(index);
     let middle = view.clip_from_world * vec4f(sphere.xyz, 1.0);
     let aside = beside(middle, sphere.w);
-    let whole = Cover(select(vec4f(corner, 0.5, 1.0), NOWHERE, aside), vec2f(0.0), vec3f(0.0), !aside);
+    let whole = Cover(select(vec4f(corner, 0.5, 1.0), NOWHERE, aside), vec2f(0.0), vec3f(0.0), !aside, select(1.0, NOWHERE.z, aside));
     var axis = view.dir_0.xyz;
     let r2 = sphere.w * sphere.w;
     var numbers = vec3f(1.0, 1.0, r2);
@@ -71,12 +72,12 @@ fn cover(sphere: vec4f, index: u32) -> Cover {
     let row = clip_row(3u);
     let least = middle.w - half * (abs(dot(row, side)) + abs(dot(row, up)));
     if (view.lens.x > 0.5 && least < 1e-3 * half) {
-        if (middle.w < -1.5 * half) { return Cover(NOWHERE, vec2f(0.0), numbers, false); }
+        if (middle.w < -1.5 * half) { return Cover(NOWHERE, vec2f(0.0), numbers, false, NOWHERE.z); }
         return whole;
     }
     let reach = half * 1.002 * corner;
     let clip = view.clip_from_world * vec4f(sphere.xyz + side * reach.x + up * reach.y, 1.0);
-    return Cover(vec4f(clip.xy, 0.5 * clip.w, clip.w), reach, numbers, false);
+    return Cover(vec4f(clip.xy, 0.5 * clip.w, clip.w), reach, numbers, false, clip.z / clip.w);
 }
 
 // Outside the picture.

@@ -14,7 +14,7 @@ fn sample() -> DrawList {
         .casts_shadow = false;
     list.add_sphere(Point3::new(0.0, 0.0, 0.25), 0.25, UnitQuaternion::identity(), Material::billiard_ball(11));
     let dust = vec![(Point3::new(1.0, 2.0, 3.0), 0.01), (Point3::new(0.0, 0.0, 4.0), 0.02)];
-    list.clouds.push(SphereCloud { spheres: dust, material: Material::unlit([1.0, 0.5, 0.0]) });
+    list.clouds.push(SphereCloud { spheres: dust, colors: Vec::new(), material: Material::unlit([1.0, 0.5, 0.0]) });
     list.textures.push(std::sync::Arc::new(Image { width: 2, height: 1, rgba: vec![255; 8] }));
     let worn = Material { texture: Some(Texture { id: 0, repeat_m: 0.25 }), metallic: 1.0, ..Material::walnut() };
     list.add_capsule(Isometry3::translation(0.0, 2.0, 1.0), 0.125, 1.0, worn).casts_shadow = false;

@@ -14,4 +14,5 @@ mod pictures;
 mod portable;
 mod projectors;
 mod shading;
+mod soft;
 mod support;

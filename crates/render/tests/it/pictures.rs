@@ -66,8 +66,11 @@ fn a_cloud_is_drawn_as_its_spheres_are() {
         let turn = 2.4 * k as f32;
         (Point3::new(0.05 * turn.cos() * k as f32, 0.05 * turn.sin() * k as f32, 0.1 * (k % 9) as f32), 0.1)
     };
-    let clouds = [Material::plastic([0.9, 0.5, 0.1]), Material::unlit([0.1, 0.9, 0.2])]
-        .map(|material| SphereCloud { spheres: Vec::new(), material });
+    let clouds = [Material::plastic([0.9, 0.5, 0.1]), Material::unlit([0.1, 0.9, 0.2])].map(|material| SphereCloud {
+        spheres: Vec::new(),
+        colors: Vec::new(),
+        material,
+    });
     list.clouds = clouds.to_vec();
     (0..40).for_each(|k| list.clouds[k % 2].spheres.push(place(k)));
     let mut single = list.clone();

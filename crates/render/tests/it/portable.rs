@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use std::collections::BTreeSet;
 use tumble_render::{
-    DrawList, GlslTranslator, Ground, Light, Material, MeshData, PortableItems, PortablePicture, Quality,
+    DrawList, GlslTranslator, Ground, Light, Material, MeshData, PortableItems, PortablePicture, Quality, SoftSphere,
 };
 
 /// A list with every kind of item in every surface that presets have.
@@ -16,6 +16,9 @@ fn list() -> DrawList {
         list.add_instance(cube, Isometry3::from_parts(at.into(), UnitQuaternion::identity()), material);
         list.add_sphere(Point3::new(k as f32, 2.0, 0.5), 0.4, UnitQuaternion::identity(), material);
         list.add_capsule(Isometry3::translation(k as f32, 4.0, 0.5), 0.2, 0.4, material);
+        let center = Point3::new(k as f32, 6.0, 0.5);
+        let (color, shader) = (material.color, material.shader);
+        list.soft_spheres.push(SoftSphere { center, radius: 0.4, color, opacity: 0.5, shader });
     }
     list.ground = Some(Ground::grid(0.0));
     list.lights.push(Light::sun(Vector3::new(0.4, 0.5, -1.0), 2.5));
@@ -60,6 +63,7 @@ fn all_items_of_a_list_are_drawn_once() {
         (PortableItems::Spheres, list.spheres.len(), 20),
         (PortableItems::Capsules, list.capsules.len(), 24),
         (PortableItems::Ground, 1, 24),
+        (PortableItems::Soft, list.soft_spheres.len(), 20),
     ] {
         assert_eq!((drawn(items), floats(items)), (count, count * each), "{items:?}");
     }

@@ -47,6 +47,9 @@ impl SceneFile {
             appearance: appearance(&spec.appearance, &Vec3::zeros()),
             radius: spec.drawn_radius_m,
             fade: spec.fade_s,
+            opacity: spec.opacity,
+            scale: spec.scale,
+            end_color: spec.end_color.map(|color| color.map(|c| c as f32)),
         };
         let mut system = ParticleSystem::new(spec.name.as_str(), spec.settings.clone())?.with_look(look)?;
         for EmitterSpec { emitter, mount } in &spec.emitters {

@@ -54,6 +54,7 @@ const SHIPPED: &[Shipped] = shipped_scenes![
     "cloth",
     "jelly",
     "sparks",
+    "campfire",
     "flock",
     "ball_machine",
     "bird",

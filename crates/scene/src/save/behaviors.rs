@@ -146,6 +146,9 @@ impl Writer<'_> {
         let look = system.look();
         look.radius.iter().for_each(|radius| t.put("drawn_radius_m", *radius));
         t.put_unless(0.0, "fade_s", look.fade);
+        look.opacity.iter().for_each(|opacity| t.put("opacity", *opacity));
+        t.put_unless([1.0; 2], "scale", look.scale);
+        look.end_color.iter().for_each(|color| t.put("end_color", *color));
         t.extend(surface::appearance(&look.appearance, &Vec3::zeros(), &base));
         self.out += &t.under("[[particle_system]]");
         for emitter in system.emitters() {

@@ -130,6 +130,50 @@ fn sparks_are_as_many_as_their_rate_and_their_life_give() {
 }
 
 #[test]
+fn smoke_takes_the_velocity_of_the_wind_and_of_its_lift() {
+    let mut world = load("campfire");
+    let wanted = Vec3::new(0.3, 0.0, 0.11 * G / 0.9);
+    run(&mut world, 5.0);
+    let smoke: Vec<_> = ParticleSystem::particles(&world, world.find("smoke").unwrap()).unwrap().collect();
+    assert!(smoke.len().abs_diff(280) <= 1, "{} puffs", smoke.len());
+    for puff in smoke {
+        let age = puff.lifetime - puff.life;
+        // it began within the cone, with w + (v − w)·e^(0.9·τ)
+        let born = wanted + (puff.velocity - wanted) * (0.9 * age).exp();
+        assert!((0.5 - 1e-9..0.9 + 1e-9).contains(&born.norm()), "{} m/s", born.norm());
+        assert!(born.z / born.norm() > 25f64.to_radians().cos() - 1e-9);
+    }
+}
+
+#[test]
+fn drops_of_the_fountain_rise_as_high_as_their_speed_gives() {
+    let mut world = load("campfire");
+    let mut highest = 0.0f64;
+    while world.time() < 2.0 - 1e-9 {
+        world.step().unwrap();
+        for drop in living(&world, "drops") {
+            highest = highest.max(drop.z);
+            assert!(drop.z > 0.006 - 1e-6, "{drop:?}");
+        }
+    }
+    assert!(living(&world, "drops").len().abs_diff(900) <= 1);
+    let most = 0.56 + 0.01 + 2.5 * 2.5 / (2.0 * G);
+    assert!(highest < most && highest > most - 0.02, "{highest} of {most} m");
+}
+
+#[test]
+fn looks_of_particles_are_read() {
+    let text = "[[particle_system]]\nname = \"p\"\nopacity = 0.4\nscale = [1, 3]\ncolor = \"#ff0000\"\nend_color = [0, 0, 1]\n\
+        [[particle_system]]\nname = \"q\"\nopacity = [0.5, 0]\nscale = 2\n[[particle_system]]\nname = \"r\"\n";
+    let world = parsed(text);
+    let look = |name: &str| world.get::<ParticleSystem>(world.find(name).unwrap()).unwrap().look().clone();
+    let [p, q, r] = ["p", "q", "r"].map(look);
+    assert_eq!((p.opacity, p.scale, p.end_color), (Some([0.4; 2]), [1.0, 3.0], Some([0.0, 0.0, 1.0])));
+    assert_eq!((q.opacity, q.scale, q.end_color), (Some([0.5, 0.0]), [2.0; 2], None));
+    assert_eq!((r.opacity, r.scale, r.end_color), (None, [1.0; 2], None));
+}
+
+#[test]
 fn the_middle_of_the_rocket_falls_with_drag() {
     let mut world = load("sparks");
     run(&mut world, 0.5 - 1e-6);
@@ -254,6 +298,14 @@ fn errors_name_what_is_wrong() {
     assert_errors(
         "[[particle_system]]\nname = \"p\"\n[[particle_system.emitter]]\nbody = \"b\"\n[[body]]\nname = \"bb\"\nmode = \"static\"\nshape = { type = \"half_space\" }\n",
         &["s.toml:4:8: `body` of emitter 1 is \"b\"; did you mean `bb`?"],
+    );
+    assert_errors(
+        "[[particle_system]]\nname = \"p\"\nopacity = [0.5, 1.5]\nscale = -1\nend_color = \"reddish\"\n",
+        &[
+            "s.toml:3:17: `opacity` of particle_system \"p\" is 1.5; expected a number from 0 to 1",
+            "s.toml:4:9: `scale` of particle_system \"p\" is -1; expected a number of at least 0",
+            "s.toml:5:13: `end_color` of particle_system \"p\" is \"reddish\"; expected a color: \"#rrggbb\", or [r, g, b] with numbers from 0 to 1",
+        ],
     );
     assert_errors(
         "[[cloth]]\nname = \"c\"\nnodes = [1, 20]\n[[jelly]]\nname = \"c\"\n",

@@ -94,7 +94,7 @@ fn check(name: &str, scene: &SceneFile) {
 }
 
 /// Scenes with behaviors or spawned bodies, whose text says how they began.
-const BEGINNINGS: [&str; 6] = ["cloth", "jelly", "sparks", "flock", "ball_machine", "bird"];
+const BEGINNINGS: [&str; 7] = ["cloth", "jelly", "sparks", "campfire", "flock", "ball_machine", "bird"];
 
 /// The text of a scene with behaviors builds the world of its beginning: two texts in a row are the same.
 #[test]

@@ -80,8 +80,10 @@ table! {
     bird_time_stepping: "bird", TimeStepping, "053882e764b94dcc", "e2df2c127e6dacd5";
     bird_backtracking: "bird", Backtracking, "b927264344ce2024", "146adb12bfd53669";
     card_house_time_stepping: "card_house", TimeStepping, "091b9380060ee20c", "8003317c097996db";
-    sparks_time_stepping: "sparks", TimeStepping, "4d51d6429d4ba2cf", "63c5aa8f37bac88c";
-    sparks_backtracking: "sparks", Backtracking, "dfa02104906b2991", "847a159107ba4a95";
+    sparks_time_stepping: "sparks", TimeStepping, "b8077dc41b083964", "400afd684ba4d9c5";
+    sparks_backtracking: "sparks", Backtracking, "e856d118294a5e88", "879fe126adcb8b24";
+    campfire_time_stepping: "campfire", TimeStepping, "b2b53ea54d16087f", "07e5ef35c0df9446";
+    campfire_backtracking: "campfire", Backtracking, "b2b53ea54d16087f", "07e5ef35c0df9446";
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
     marble_run_time_stepping: "marble_run", TimeStepping, "a6aa80e60f400a7a", "80f2216852c0c445";
     marble_run_backtracking: "marble_run", Backtracking, "d233e2869b9ec085", "34fcf1baf6fda38f";

@@ -121,6 +121,9 @@ pub struct ServeOptions {
     /// Send contacts to a sound engine at this address: impacts, slides and listeners as OSC over UDP.
     #[arg(long, value_name = "ADDR:PORT")]
     pub sound: Option<SocketAddr>,
+    /// Write the sound of the run at each user's head: DIR/USER.wav, one gain for all.
+    #[arg(long, value_name = "DIR", requires = "duration", conflicts_with_all = ["console", "then"])]
+    pub audio: Option<PathBuf>,
     /// Stream the run to Foxglove (WebSocket); every machine that reaches the address can watch.
     #[cfg(feature = "foxglove")]
     #[arg(long, value_name = "ADDR:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]

@@ -70,10 +70,11 @@ pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
     let scene = &serve.scene;
     let method = scene.stepper.is_some() || scene.solver.is_some() || scene.integrator.is_some();
     let stepping = scene.dt.is_some() || scene.threads.is_some() || scene.budget.is_some() || method;
+    let sound = serve.sound.is_some() || serve.audio.is_some();
     let everywhere = serve.compute == Some(args::ComputeKind::Everywhere);
-    if serve.record.is_some() || users || stepping || serve.contacts || everywhere || serve.sound.is_some() {
+    if serve.record.is_some() || users || stepping || serve.contacts || everywhere || sound {
         return Err(Failure::input(
-            "a replay shows what was recorded; --record, --user-colliders, --tracker, --vrpn, --gamepad, --sound, --replay-input, --contacts, --dt, --stepper, --solver, --integrator, --threads, --budget and --compute everywhere go with tumble cave",
+            "a replay shows what was recorded; --record, --user-colliders, --tracker, --vrpn, --gamepad, --sound, --audio, --replay-input, --contacts, --dt, --stepper, --solver, --integrator, --threads, --budget and --compute everywhere go with tumble cave",
         ));
     }
     server::run(serve, Some(&options.cave), Some(&options.file))

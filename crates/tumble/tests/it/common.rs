@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// The shipped scenes.
-pub const SCENES: [&str; 24] = [
+pub const SCENES: [&str; 25] = [
     "arch",
     "ball_machine",
     "billiards",
     "bird",
     "bowling",
+    "campfire",
     "card_house",
     "chain",
     "cloth",

@@ -1,6 +1,8 @@
 //! Cloth, jelly, particles and boids look the same on a server and on a facet that gets its messages.
 
-use tumble::behaviors::{Boid, Cloth, Emitter, Flock, ParticleSettings, ParticleSystem, SpringMesh, Steering};
+use tumble::behaviors::{
+    Boid, Cloth, Emitter, Flock, ParticleLook, ParticleSettings, ParticleSystem, SpringMesh, Steering,
+};
 use tumble::collide::{Pose, Vec3};
 use tumble::dynamics::World;
 use tumble::net::sync::{Mirror, Publisher, Viewer};
@@ -24,10 +26,11 @@ fn points(list: &DrawList) -> Vec<[f32; 3]> {
     placed.chain(all_spheres(list).map(|[x, y, z, _]| [x, y, z])).collect()
 }
 
-/// Center and radius of all spheres, and then of those of all clouds.
+/// Center and radius of all spheres, then of those of all clouds, then of the transparent ones.
 fn all_spheres(list: &DrawList) -> impl Iterator<Item = [f32; 4]> + '_ {
     let clouds = list.clouds.iter().flat_map(|cloud| &cloud.spheres).copied();
     let spheres = list.spheres.iter().map(|sphere| (sphere.center, sphere.radius)).chain(clouds);
+    let spheres = spheres.chain(list.soft_spheres.iter().map(|sphere| (sphere.center, sphere.radius)));
     spheres.map(|(center, radius)| [center.x, center.y, center.z, radius])
 }
 
@@ -40,9 +43,53 @@ fn assert_alike(ours: &DrawList, theirs: &DrawList, what: &str) {
     }
 }
 
+/// Compares opacities, colors and light of all transparent spheres, and colors of particles.
+fn assert_looks_alike(ours: &DrawList, theirs: &DrawList, most: f32) {
+    for (a, b) in ours.soft_spheres.iter().zip(&theirs.soft_spheres) {
+        assert!((a.opacity - b.opacity).abs() < most && a.shader == b.shader, "{a:?} and {b:?}");
+        assert!((0..3).all(|k| (a.color[k] - b.color[k]).abs() < most), "{a:?} and {b:?}");
+    }
+    for (a, b) in ours.clouds.iter().zip(&theirs.clouds) {
+        assert_eq!(a.colors.len(), b.colors.len());
+        let apart =
+            a.colors.iter().zip(&b.colors).map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f32::max));
+        assert!(apart.fold(0.0, f32::max) < most);
+    }
+}
+
+/// Without the scene's description colors and opacities have a byte each.
+#[test]
+fn smoke_and_cooling_sparks_that_the_scene_does_not_have_look_the_same() {
+    let scene = load("falling");
+    let (mut world, base) = (scene.build().unwrap().0, scene.build_drawn().unwrap().0);
+    let (mut publisher, mut mirror) = (Publisher::new(&world, false, 0), Mirror::new(base));
+    let usual = ParticleLook::default();
+    for (name, look) in [
+        ("smoke", ParticleLook { opacity: Some([0.7, 0.1]), scale: [1.0, 4.0], ..usual.clone() }),
+        ("flames", ParticleLook { opacity: Some([0.5, 0.0]), end_color: Some([0.8, 0.1, 0.0]), ..usual.clone() }),
+        ("sparks", ParticleLook { end_color: Some([0.3, 0.0, 0.0]), ..usual }),
+    ] {
+        let source = Emitter { lifetime: [1.0, 2.0], ..Emitter::burst(Vec3::new(0.0, 0.0, 9.0), 60, 0.0) };
+        let system = ParticleSystem::new(name, ParticleSettings::default()).unwrap().with_emitter(source).unwrap();
+        world.add(system.with_look(look).unwrap()).unwrap();
+    }
+    (0..30).for_each(|_| {
+        world.step().unwrap();
+    });
+    let published = publisher.publish(&world, &Viewer::default(), 1).unwrap();
+    mirror.apply_snapshot(&publisher.snapshot()).unwrap();
+    mirror.apply_state(1, world.time(), &published.state).unwrap();
+    assert_eq!(mirror.hash(), published.hash);
+    let (ours, theirs) = (list(&scene, &world), list(&scene, mirror.world()));
+    assert_eq!((ours.soft_spheres.len(), ours.clouds.len()), (120, 1));
+    assert_alike(&ours, &theirs, "late");
+    assert_looks_alike(&ours, &theirs, 0.51 / 255.0);
+    assert_eq!(ours.clouds[0].colors.len(), 60);
+}
+
 #[test]
 fn a_facet_shows_what_the_server_has() {
-    for name in ["cloth", "jelly", "sparks", "flock"] {
+    for name in ["cloth", "jelly", "sparks", "flock", "campfire"] {
         let scene = load(name);
         let (mut world, base) = (scene.build().unwrap().0, scene.build_drawn().unwrap().0);
         let (mut publisher, mut mirror) = (Publisher::new(&world, false, 0), Mirror::new(base));
@@ -58,7 +105,10 @@ fn a_facet_shows_what_the_server_has() {
             assert_eq!(mirror.hash(), published.hash, "{name}");
             let ours = list(&scene, &world);
             assert!(ours.instances.len() + ours.sphere_count() > 1);
-            assert_alike(&ours, &list(&scene, mirror.world()), name);
+            let theirs = list(&scene, mirror.world());
+            assert_alike(&ours, &theirs, name);
+            assert_looks_alike(&ours, &theirs, 1e-5);
+            assert_eq!(ours.soft_spheres.len() > 40, name == "campfire");
         }
         if name == "sparks" {
             let sparks = list(&scene, mirror.world()).sphere_count();
@@ -100,7 +150,7 @@ fn a_surface_is_lit_from_the_side_that_it_turns_to_the_light() {
 
 #[test]
 fn saved_particles_and_cloth_look_as_before() {
-    for name in ["cloth", "sparks"] {
+    for name in ["cloth", "sparks", "campfire"] {
         let scene = load(name);
         let (mut world, mut copy) = (scene.build().unwrap().0, scene.build().unwrap().0);
         (0..30).for_each(|_| {

@@ -58,7 +58,7 @@ fn a_state_saved_in_mid_contact_goes_on_in_another_process_as_if_nothing_had_hap
             let summary = text(&folder.path("half.json"));
             let first = [scene, "--duration", &half.to_string(), "--stepper", stepper, "--summary", &summary];
             let halfway = state(&folder, "half", &first);
-            let free = ["pendulum", "piston", "steam_engine", "flock", "sparks", "bird"].contains(&scene);
+            let free = ["pendulum", "piston", "steam_engine", "flock", "sparks", "campfire", "bird"].contains(&scene);
             assert!(
                 free || json(summary.as_ref())["contacts_max"].as_u64() > Some(0),
                 "{scene} in {stepper}: nothing touched before the save"

@@ -5,7 +5,7 @@ use tumble_core::collide::{Pose, Quat, Vec3};
 use tumble_core::{CollisionGroup, Material};
 
 use super::part;
-use crate::parse::appearance::AppearanceSpec;
+use crate::parse::appearance::{AppearanceSpec, as_color};
 use crate::parse::body::{GROUPS, Library, read_mask, read_material, read_name};
 use crate::parse::bound::Bound;
 use crate::parse::fields::Fields;
@@ -30,6 +30,12 @@ pub struct ParticleSystemSpec {
     pub drawn_radius_m: Option<f64>,
     /// Time before its end in which a particle shrinks to nothing, s. Default 0.
     pub fade_s: f64,
+    /// Opacity at birth and at the end, each 0 to 1. Default: solid.
+    pub opacity: Option<[f64; 2]>,
+    /// Factor of the drawn radius at birth and at the end. Default 1.
+    pub scale: [f64; 2],
+    /// Color at the end, sRGB, each 0 to 1. Default: the appearance's.
+    pub end_color: Option<[f64; 3]>,
     /// Appearance of the particles.
     pub appearance: AppearanceSpec,
 }
@@ -72,6 +78,9 @@ impl ParticleSystemSpec {
             emitters: emitters.into_iter().map(|table| EmitterSpec::read(table, parts)).collect(),
             drawn_radius_m: f.optional_number("drawn_radius_m", Bound::POSITIVE),
             fade_s: f.number_or("fade_s", Bound::NOT_NEGATIVE, 0.0),
+            opacity: over_life(f, "opacity", Bound::UNIT),
+            scale: over_life(f, "scale", Bound::NOT_NEGATIVE).unwrap_or([1.0; 2]),
+            end_color: f.value("end_color").map(|value| as_color(f, "end_color", value)),
             appearance: AppearanceSpec::read(f, &appearance),
         }
     }
@@ -107,6 +116,15 @@ fn turn_z_to(axis: &Vec3) -> Quat {
     let [x, y, w] = if w < 1e-12 { [1.0, 0.0, 0.0] } else { [-axis.y, axis.x, w] };
     turn.coords.copy_from_slice(&[x, y, 0.0, w]);
     Quat::new_normalize(turn)
+}
+
+/// Reads one number, or the one at the birth of a particle and the one at its end.
+fn over_life(f: &mut Fields<'_>, key: &'static str, bound: Bound) -> Option<[f64; 2]> {
+    let value = f.value(key)?;
+    Some(match value.get_ref().as_array() {
+        None => [f.as_number(key, value, bound); 2],
+        Some(_) => f.as_vector(key, value, bound),
+    })
 }
 
 /// Reads one number, or the least and the greatest of a range.

@@ -18,6 +18,7 @@ impl RunLoop<'_> {
         let wall_s = self.began.elapsed().as_secs_f64();
         let session = self.server.end().map_err(failed);
         let recorded = self.recorder.finish(self.options.quiet);
+        let heard = self.write_audio();
         let first = self.summary(wall_s, processes);
         let mut summed = first.as_ref().map_or(Ok(()), |summary| self.write_summary(summary));
         let ended = processes.end(self.frames > 0);
@@ -36,7 +37,20 @@ impl RunLoop<'_> {
             // explains why no facet joined
             None => eprint!("{}", unknown_peers_line(&refused(&self.server.unknown_peers()))),
         }
-        session.and(recorded).and(summed).and(ended).and(self.input_devices.check()).and(self.metrics.check_states())
+        session
+            .and(recorded)
+            .and(heard)
+            .and(summed)
+            .and(ended)
+            .and(self.input_devices.check())
+            .and(self.metrics.check_states())
+    }
+
+    /// Writes what the users heard, if that was asked for and there was a frame.
+    fn write_audio(&self) -> Result<(), Failure> {
+        let Some(audio) = self.audio.as_ref().filter(|_| self.frames > 0) else { return Ok(()) };
+        let said = audio.write()?;
+        if self.options.quiet { Ok(()) } else { outputs::say(&(said + "\n")) }
     }
 
     /// Returns whether the facets of this launcher write frames.

@@ -14,6 +14,7 @@ mod recording;
 mod serve;
 mod start;
 mod summary;
+mod user_audio;
 
 pub use outputs::say;
 pub use start::run;

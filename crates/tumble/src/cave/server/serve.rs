@@ -8,6 +8,7 @@ use super::operator::{Operator, Wish};
 use super::recording::{RunRecorder, Target};
 use super::start::connect_timeout;
 use super::summary::{Metrics, Status};
+use super::user_audio::UserAudio;
 use crate::cave::args::{CaveOptions, ServeOptions};
 use crate::cave::endpoints::ServerEndpoint;
 use crate::cave::replay::frames::Replay;
@@ -54,6 +55,7 @@ pub(super) struct RunLoop<'a> {
     pub input_devices: InputDevices,
     live_viewers: LiveViewers,
     pub sound: Option<ContactSound>,
+    pub audio: Option<UserAudio>,
     pub recorder: RunRecorder,
     pub cave: Cave,
     pub scene: String,
@@ -91,7 +93,11 @@ impl<'a> RunLoop<'a> {
         let RunSetup { scene, cave, hash, .. } = setup;
         let input_devices = InputDevices::open(options, &cave, hash, replay.is_none())?;
         let live_viewers = LiveViewers::open(options)?;
-        let users = cave.users.iter().map(|user| user.name.clone()).collect();
+        let users: Vec<String> = cave.users.iter().map(|user| user.name.clone()).collect();
+        let listened = options.audio.as_deref().zip(options.duration);
+        let audio = listened
+            .map(|(folder, duration)| UserAudio::new(folder, &scene, &users, &simulation.world, duration))
+            .transpose()?;
         let sound = options.sound.map(|engine| ContactSound::open(engine, users)).transpose()?;
         let target = Target::of(options, cave.recording.as_ref(), replay.is_some());
         let recorder = RunRecorder::open(target.as_ref(), &scene.file, hash, &simulation.world, signals)?;
@@ -107,6 +113,7 @@ impl<'a> RunLoop<'a> {
             input_devices,
             live_viewers,
             sound,
+            audio,
             recorder,
             cave,
             scene: scene.file,
@@ -207,10 +214,14 @@ impl<'a> RunLoop<'a> {
         let clock = Instant::now();
         let inputs = std::mem::take(&mut self.inputs);
         self.server.send_inputs(FrameInputs { steps, inputs }).map_err(failed)?;
-        let sound = &mut self.sound;
-        self.simulation.step(steps, |world| sound.iter_mut().for_each(|sound| sound.step(world)))?;
+        let (sound, audio) = (&mut self.sound, &mut self.audio);
+        self.simulation.step(steps, |world| {
+            sound.iter_mut().for_each(|sound| sound.step(world));
+            audio.iter_mut().for_each(|audio| audio.step(world));
+        })?;
         let world = &self.simulation.world;
         self.sound.iter_mut().for_each(|sound| sound.frame(frame, world, &self.simulation.users.viewer));
+        self.audio.iter_mut().for_each(|audio| audio.frame(&self.simulation.users.viewer));
         self.metrics.step.add(clock.elapsed().as_secs_f64(), frame, world.time());
         divergence::check(world)
     }

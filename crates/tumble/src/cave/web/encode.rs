@@ -30,9 +30,9 @@ const FRAME: u32 = 10;
 const SHOW: u32 = 11;
 
 /// Numbers of the arrays after those of the instances: uniform blocks.
-const VIEW: u32 = 7;
-const SCENE: u32 = 8;
-const SHADOW_VIEW: u32 = 9;
+const VIEW: u32 = 8;
+const SCENE: u32 = 9;
+const SHADOW_VIEW: u32 = 10;
 
 /// Data that a browser has, so that only changes are sent.
 pub struct Encoder {

@@ -6,7 +6,7 @@
 
 const KIND = { SIZE: 1, MODULE: 2, PROGRAM: 3, MESH: 4, TEXTURE: 5, ARRAY: 6, DRAWS: 7, FORGET_MESH: 8, FORGET_TEXTURE: 9, FRAME: 10, SHOW: 11 };
 // numbers of the arrays: instances by kind, then the uniform blocks
-const VIEW = 7, SCENE = 8, SHADOW_VIEW = 9;
+const VIEW = 8, SCENE = 9, SHADOW_VIEW = 10;
 const at = (id) => document.getElementById(id);
 const canvas = at("screen");
 const note = (text) => { at("note").textContent = text; };
