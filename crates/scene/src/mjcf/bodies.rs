@@ -105,7 +105,8 @@ impl Assembly<'_, '_> {
                 && self.groups.surface(geom) == self.groups.surface(&own.geoms[0])
                 && !matches!(geom.form, Form::Plane | Form::Field(_))
         };
-        let plain = own.sites.is_empty() && own.cameras.is_empty() && own.lights.is_empty();
+        let plain =
+            own.sites.iter().all(|site| self.is_joint_end(site)) && own.cameras.is_empty() && own.lights.is_empty();
         let damped = own.joints[0].dof.damping > 0.0 || own.joints[0].dof.friction > 0.0;
         let mass = self.masses[body];
         if own.geoms.is_empty() || !plain || damped || mass.mass <= 0.0 || !own.geoms.iter().all(alike) {
@@ -227,7 +228,7 @@ impl Assembly<'_, '_> {
             }
             links[carrier].shapes.extend(on_link(geom, &self.groups, self.reader));
         }
-        for (k, site) in own.sites.iter().enumerate() {
+        for (k, site) in own.sites.iter().enumerate().filter(|(_, site)| !self.is_joint_end(site)) {
             let label = site.name.clone().unwrap_or_else(|| format!("{}/site{k}", links[carrier].name));
             add_frame(links, taken, carrier, label, site.pose, Mounts::default());
         }

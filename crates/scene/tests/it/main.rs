@@ -15,6 +15,7 @@ mod expansion;
 mod finding;
 mod mimics;
 mod mjcf;
+mod mjcf_constraints;
 mod mjcf_damaged;
 mod mjcf_written;
 mod mujoco;

@@ -13,10 +13,10 @@ use tumble_scene::{LinkSpec, SceneFile, resolve_scene};
 const CLOSE: f64 = 1e-12;
 
 /// A new folder for one test, removed when it goes out of scope.
-struct Folder(PathBuf);
+pub(crate) struct Folder(pub(crate) PathBuf);
 
 impl Folder {
-    fn new(name: &str) -> Folder {
+    pub(crate) fn new(name: &str) -> Folder {
         let path = std::env::temp_dir().join(format!("tumble-written-{}-{name}", std::process::id()));
         std::fs::create_dir_all(&path).unwrap();
         Folder(path)

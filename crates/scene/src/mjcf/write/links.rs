@@ -120,6 +120,7 @@ impl MjcfWriter<'_> {
         let label = self.bodies.unique(link.name.clone());
         for link in &chain {
             self.names.insert((tree.id, Some(*link)), label.clone());
+            self.inner.extend((*link != k).then_some((tree.id, Some(*link))));
         }
         let mut t = Attributes::of("name", label);
         let placed = chain.iter().fold(Pose::identity(), |pose, k| pose * tree.placement(&links[*k]));
@@ -233,6 +234,7 @@ impl MjcfWriter<'_> {
             t.put_pose(&frame.pose);
             self.xml.leaf("site", &t);
         }
+        self.joint_sites_of((tree.id, link));
     }
 
     /// Excludes pairs of links that collide in MuJoCo and not here.

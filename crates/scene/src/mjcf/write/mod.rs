@@ -8,7 +8,7 @@
 //! | articulated bodies | trees of `<body>`; links that are folded into others become `<site>` |
 //! | limits, springs, damping, dry friction, armature, effort | attributes of `<joint>` |
 //! | position drives | `<general>` actuators |
-//! | couplings; spherical and fixed loop joints | `<joint>`, `<connect>`, `<weld>` of `<equality>` |
+//! | couplings; spherical and fixed loop joints | `<joint>`, `<connect>` by sites, `<weld>` of `<equality>` |
 //! | collision groups; pairs that do not collide | `contype`, `conaffinity`; `<exclude>` |
 //! | the present state | the keyframe `now` |
 //!
@@ -20,16 +20,18 @@ mod joints;
 mod links;
 mod xml;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
 
+use tumble_core::collide::Pose;
 use tumble_core::{ArticulatedBody, Combine, LoopJoint, Mimic, ObjectId, PairMaterial, PairSide, RigidBody, World};
 
 use super::names::Taken;
 use crate::notes::{NoteList, Notes};
 use crate::parse::file::SceneFile;
 use geoms::{Assets, Groups};
+use joints::Carrier;
 use xml::{Attributes, Xml, numbers, vector};
 
 /// Name of the keyframe with the state of the world.
@@ -86,7 +88,13 @@ pub struct MjcfWriter<'w> {
     sites: Taken,
     actuators: Taken,
     /// Name of the body of each object, or of each link of one.
-    names: BTreeMap<(ObjectId, Option<usize>), String>,
+    names: BTreeMap<Carrier, String>,
+    /// Massless links that are joints of another link's body.
+    inner: BTreeSet<Carrier>,
+    /// Names of the two sites of each spherical loop joint.
+    joint_sites: BTreeMap<ObjectId, [String; 2]>,
+    /// Sites of loop joints that are not written yet.
+    planned: BTreeMap<Carrier, Vec<(String, Pose)>>,
     contacts: Vec<(&'static str, Attributes)>,
     equalities: Vec<(&'static str, Attributes)>,
     drive_elements: Vec<(&'static str, Attributes)>,
@@ -112,6 +120,9 @@ impl<'w> MjcfWriter<'w> {
             sites: Taken::default(),
             actuators: Taken::default(),
             names: BTreeMap::new(),
+            inner: BTreeSet::new(),
+            joint_sites: BTreeMap::new(),
+            planned: BTreeMap::new(),
             contacts: Vec::new(),
             equalities: Vec::new(),
             drive_elements: Vec::new(),
@@ -195,6 +206,7 @@ impl<'w> MjcfWriter<'w> {
     fn objects(&mut self) {
         let world = self.world;
         let objects = || world.ids().iter().filter_map(|&id| Some((id, world.name(id)?)));
+        self.plan_sites();
         for (id, name) in objects() {
             if world.status(id).is_some_and(|status| !status.enabled) {
                 self.note(name, "objects that are disabled are left out");
@@ -210,7 +222,7 @@ impl<'w> MjcfWriter<'w> {
         }
         for (id, name) in objects().filter(|(id, _)| world.status(*id).is_some_and(|status| status.enabled)) {
             if let Some(joint) = world.get::<LoopJoint>(id) {
-                self.loop_joint(name, joint);
+                self.loop_joint(id, name, joint);
             }
         }
         self.pairs();
