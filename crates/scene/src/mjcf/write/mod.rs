@@ -30,6 +30,7 @@ use tumble_core::{ArticulatedBody, Combine, LoopJoint, Mimic, ObjectId, PairMate
 use super::names::Taken;
 use crate::notes::{NoteList, Notes};
 use crate::parse::file::SceneFile;
+use crate::save::place::{Fault, Unfinished};
 use geoms::{Assets, Groups};
 use joints::Carrier;
 use xml::{Attributes, Xml, numbers, vector};
@@ -52,6 +53,12 @@ pub enum SaveMjcfError {
         /// From the system.
         source: io::Error,
     },
+}
+
+impl From<Fault> for SaveMjcfError {
+    fn from(Fault { file, source }: Fault) -> Self {
+        SaveMjcfError::Write { file, source }
+    }
 }
 
 /// A world as MJCF.
@@ -151,7 +158,8 @@ impl<'w> MjcfWriter<'w> {
     }
 
     /// Writes the model to `path`, and its meshes to a folder `NAME_files` beside it. Returns notes about everything that
-    /// MJCF cannot say. The model is written last, and at once.
+    /// MJCF cannot say. Model and meshes are finished in a folder of their own and moved to their places at once; if that fails,
+    /// the earlier ones stay. An earlier folder of files is replaced.
     ///
     /// # Errors
     /// [`SaveMjcfError`]: the path has another extension, or a file cannot be written.
@@ -161,23 +169,9 @@ impl<'w> MjcfWriter<'w> {
         let Some(stem) = path.file_stem().filter(|_| known).map(|stem| stem.to_string_lossy().into_owned()) else {
             return Err(SaveMjcfError::Name(path.into()));
         };
-        let failed = |file: &Path| {
-            let file = file.to_path_buf();
-            move |source| SaveMjcfError::Write { file, source }
-        };
         self.model.clone_from(&stem);
         let MjcfText { text, files, notes } = self.text(&format!("{stem}_files"));
-        let folder = path.with_file_name(format!("{stem}_files"));
-        if !files.is_empty() {
-            std::fs::create_dir_all(&folder).map_err(failed(&folder))?;
-        }
-        for (name, bytes) in &files {
-            let file = folder.join(name);
-            std::fs::write(&file, bytes).map_err(failed(&file))?;
-        }
-        let unfinished = path.with_file_name(format!(".{stem}.{}.unfinished", std::process::id()));
-        std::fs::write(&unfinished, text).map_err(failed(&unfinished))?;
-        std::fs::rename(&unfinished, path).map_err(failed(path))?;
+        Unfinished::write(path, &text, &files)?.put_in_place(path)?;
         Ok(notes)
     }
 
