@@ -4,11 +4,13 @@
 //! not closed. A spherical joint is therefore written by two sites, which are its frames on both sides.
 
 use tumble_core::collide::Pose;
-use tumble_core::{Anchor, ArticulatedBody, DofSettings, LoopJoint, LoopJointKind, ObjectId, RigidBody};
+use tumble_core::{
+    Anchor, ArticulatedBody, DofSettings, JointRef, LoopJoint, LoopJointKind, Mimic, ObjectId, RigidBody,
+};
 
 use super::MjcfWriter;
 use super::bodies::relpose;
-use super::xml::Attributes;
+use super::xml::{Attributes, numbers};
 
 /// A rigid body, or an articulated body with one of its links or its base.
 pub(super) type Carrier = (ObjectId, Option<usize>);
@@ -71,6 +73,21 @@ impl MjcfWriter<'_> {
         self.equalities.push(("weld", t));
     }
 
+    /// Writes a coupling of joints of two articulated bodies; notes one of loop joints.
+    pub(super) fn coupling(&mut self, name: &str, mimic: &Mimic) {
+        let joints = mimic.joints().map(|joint| match joint {
+            JointRef::Dof(body, dof) => self.dofs.get(&(body, dof)).cloned(),
+            JointRef::LoopJoint(_) => None,
+        });
+        let [Some(first), Some(second)] = joints else {
+            return self.note(name, "a coupling of a loop joint, or of an object that is not written, is left out");
+        };
+        let [multiplier, offset] = mimic.ratio();
+        let mut t = Attributes::of("name", name);
+        t.extend(&coupled(first, second, offset, multiplier));
+        self.equalities.push(("joint", t));
+    }
+
     fn site(&mut self, name: &str, frame: &Pose) {
         let mut t = Attributes::of("name", name);
         t.put_pose(frame);
@@ -103,4 +120,10 @@ impl MjcfWriter<'_> {
         let body = self.world.get::<ArticulatedBody>(id)?;
         Some(((id, body.link_of(part)), body.part_pose(part) * side.frame))
     }
+}
+
+/// Returns the equality `q₁ = offset + multiplier·q₂` of two joints.
+pub(super) fn coupled(first: String, second: String, offset: f64, multiplier: f64) -> Attributes {
+    let polynomial = numbers([offset, multiplier, 0.0, 0.0, 0.0]);
+    Attributes::of("joint1", first).with("joint2", second).with("polycoef", polynomial)
 }

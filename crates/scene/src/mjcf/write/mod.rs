@@ -96,6 +96,8 @@ pub struct MjcfWriter<'w> {
     actuators: Taken,
     /// Name of the body of each object, or of each link of one.
     names: BTreeMap<Carrier, String>,
+    /// Name of the joint of each single degree of freedom of an articulated body.
+    dofs: BTreeMap<(ObjectId, usize), String>,
     /// Massless links that are joints of another link's body.
     inner: BTreeSet<Carrier>,
     /// Names of the two sites of each spherical loop joint.
@@ -127,6 +129,7 @@ impl<'w> MjcfWriter<'w> {
             sites: Taken::default(),
             actuators: Taken::default(),
             names: BTreeMap::new(),
+            dofs: BTreeMap::new(),
             inner: BTreeSet::new(),
             joint_sites: BTreeMap::new(),
             planned: BTreeMap::new(),
@@ -208,15 +211,15 @@ impl<'w> MjcfWriter<'w> {
                 self.rigid(id, name, body);
             } else if let Some(body) = world.get::<ArticulatedBody>(id) {
                 self.articulated(id, name, body);
-            } else if world.get::<Mimic>(id).is_some() {
-                self.note(name, "couplings of joints of different objects are left out");
-            } else if world.get::<LoopJoint>(id).is_none() {
+            } else if world.get::<LoopJoint>(id).is_none() && world.get::<Mimic>(id).is_none() {
                 self.note(name, "sensors, behaviors, events and objects of types of their own are left out");
             }
         }
         for (id, name) in objects().filter(|(id, _)| world.status(*id).is_some_and(|status| status.enabled)) {
             if let Some(joint) = world.get::<LoopJoint>(id) {
                 self.loop_joint(id, name, joint);
+            } else if let Some(mimic) = world.get::<Mimic>(id) {
+                self.coupling(name, mimic);
             }
         }
         self.pairs();
