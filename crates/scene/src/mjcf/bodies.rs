@@ -243,9 +243,9 @@ impl Assembly<'_, '_> {
         spec.dof = joint.dof.clone();
         if joint.is_single() {
             spec.position = vec![joint.reference];
+        }
+        if joint.is_single() || joint.kind == Kind::Ball {
             spec.armature = joint.armature;
-        } else if joint.kind == Kind::Ball && joint.armature > 0.0 {
-            self.reader.notes.add(&joint.element, "armatures of ball joints are left out");
         }
         let effort = joint.actuator_range.map(|[low, high]| high.max(-low)).filter(|most| *most > 0.0);
         spec.dof.effort = effort.filter(|_| joint.is_single()).unwrap_or(f64::INFINITY);

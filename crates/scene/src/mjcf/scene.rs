@@ -166,7 +166,7 @@ impl Assembly<'_, '_> {
     fn check_masses(&self) {
         let mut heavy: Vec<bool> = self.masses.iter().map(|m| m.mass > 0.0 || m.inertia.amax() > 0.0).collect();
         for (number, body) in self.bodies.iter().enumerate().skip(1).rev() {
-            let massless = |joint: &&super::joint::JointItem<'_>| joint.armature == 0.0 || !joint.is_single();
+            let massless = |joint: &&super::joint::JointItem<'_>| joint.armature == 0.0;
             if !heavy[number] && body.joints.iter().any(|joint| massless(&joint)) {
                 let message = "moves no mass: it and its descendants have none";
                 body.element.problem(message, "expected <inertial>, or a geom with a mass, in one of them");

@@ -173,6 +173,7 @@ impl MjcfWriter<'_> {
                 self.qvel.extend(v);
                 t.put("type", "ball");
                 t.put_unless(Vec3::zeros(), "pos", at.translation.vector, vector(&at.translation.vector));
+                t.put_number(0.0, "armature", link.armature);
                 if at.rotation != nalgebra::one() {
                     self.note(
                         &link.name,
