@@ -10,6 +10,7 @@ mod cave_schema;
 mod caves;
 mod contacts;
 mod curved_screens;
+mod damage;
 mod events;
 mod expansion;
 mod finding;
