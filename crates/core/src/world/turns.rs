@@ -6,8 +6,7 @@ use crate::object::FrameState;
 use crate::world::view::ObjectId;
 
 impl World {
-    /// Tells a loop joint that was added which object it is, and gives it its first angle: the one within π of the middle of its
-    /// limits.
+    /// Sets which object a loop joint is that was added, and its first angle: the one within π of the middle of its limits.
     pub(super) fn start_turns(&mut self, id: ObjectId) {
         let Some(place) = self.core.table.place(id) else { return };
         let object: &mut dyn std::any::Any = self.core.table.placed[place].object.as_mut();

@@ -29,7 +29,7 @@ impl LoopJoint {
         self.kind == LoopJointKind::Revolute && self.dof.limits.is_some_and(|[lo, hi]| hi - lo > WIDE)
     }
 
-    /// Tells it which object of a world it is.
+    /// Sets which object of a world it is.
     pub(crate) fn set_own(&mut self, id: ObjectId) {
         self.own = Some(id);
     }
