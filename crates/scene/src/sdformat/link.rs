@@ -191,10 +191,9 @@ fn read_surface(part: &Element<'_, '_>, context: &mut Context<'_>) -> Surface {
     if let Some(material) = part.child("material").filter(|_| !context.options.recolor) {
         note_others(&material, &["ambient", "diffuse", "specular", "emissive", "lighting"], &mut context.notes);
         let color = material.child("diffuse").or(material.child("ambient"));
-        if let Some(color) = color.filter(|color| !super::value::text(color).is_empty()) {
-            if let Some(rgb) = super::value::color(&color) {
-                surface.appearance.color = rgb;
-            }
+        let color = color.filter(|color| !super::value::text(color).is_empty());
+        if let Some(rgb) = color.and_then(|color| super::value::color(&color)) {
+            surface.appearance.color = rgb;
         }
     }
     surface
