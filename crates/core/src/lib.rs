@@ -63,6 +63,7 @@ pub use linearize::{LinearizeError, LinearizedStep, Switch, Switching};
 pub use object::collidable::{CollisionGroup, ContactFrame};
 pub use object::frame_state::{Frame, FrameImpulse};
 pub use object::intersect::IntersectPart;
+pub use object::mesh_key::MeshKey;
 pub use object::mounts::{CameraMount, Detail, LightMount, Spread};
 pub use object::part_state::{ForceSlice, Forces, PartPoint, PartState, PointLoad, StateRange, StateSizes, Wrench};
 pub use object::visual::{Drawn, Visual, VisualGeometry, VisualMesh};

@@ -7,6 +7,7 @@
 //! ```text
 //! input(length) ◄── bytes of a name or a scene
 //! open(length)  ──► Text: description as JSON, or the error      Geometry: triangles of all meshes
+//! scenes()      ──► Text: names of the shipped scenes as JSON
 //! step(frames)  ──► Text: the error of a step
 //! picture()     ──► Instances: placed meshes                     Surfaces: triangles that deform
 //! hash()        ──► Text: BLAKE3 of the state
@@ -84,6 +85,12 @@ pub extern "C" fn open(length: usize) -> bool {
         let outcome = page.open(length);
         page.succeed(outcome)
     })
+}
+
+/// Writes the names of the shipped scenes as the text, a list of JSON.
+#[unsafe(no_mangle)]
+pub extern "C" fn scenes() {
+    with(|page| page.text = session::scenes().to_string());
 }
 
 /// Advances the world by a number of frames; stops at the first error.

@@ -3,9 +3,9 @@
 use crate::triangles::{self, CORNER};
 use nalgebra::{Matrix4, Vector3};
 use serde_json::{Value, json};
-use std::sync::Arc;
+use std::collections::BTreeMap;
 use tumble_collide::{Pose, Shape, TriMesh};
-use tumble_core::{Drawn, ObjectId, Visual, VisualGeometry, World};
+use tumble_core::{Drawn, MeshKey, ObjectId, Visual, World};
 use tumble_scene::{LightKind, Pattern, SceneFile, shipped};
 
 /// Numbers of an instance: a matrix by columns, then color and opacity.
@@ -72,21 +72,18 @@ impl Session {
     /// the unit sphere of clouds.
     fn place(&mut self) -> Vec<[usize; 2]> {
         let mut meshes = Vec::new();
-        let mut known: Vec<(String, usize)> = Vec::new();
+        let mut known: BTreeMap<MeshKey, usize> = BTreeMap::new();
         let sphere = triangles::of_shape(&Shape::Sphere { radius: 1.0 });
         add(&sphere, &mut self.geometry, &mut meshes);
         for &object in self.world.ids() {
             for (visual, drawn) in visuals(&self.world, object).iter().enumerate() {
-                let Some(key) = key(drawn) else { continue };
-                let mesh = known.iter().find(|(other, _)| *other == key).map(|(_, mesh)| *mesh);
-                let mesh = mesh.unwrap_or_else(|| {
-                    let surface = match drawn.drawn() {
-                        Some(Drawn::Shape(shape)) => triangles::of_shape(shape),
-                        Some(Drawn::Mesh(mesh)) => TriMesh::clone(mesh),
-                        None => TriMesh::default(),
+                let Some(drawn) = drawn.drawn() else { continue };
+                let mesh = *known.entry(MeshKey::of(drawn)).or_insert_with(|| {
+                    let surface = match drawn {
+                        Drawn::Shape(shape) => triangles::of_shape(shape),
+                        Drawn::Mesh(mesh) => TriMesh::clone(mesh),
                     };
                     add(&surface, &mut self.geometry, &mut meshes);
-                    known.push((key, meshes.len() - 1));
                     meshes.len() - 1
                 });
                 self.placed.push(Placed { object, visual, mesh });
@@ -175,7 +172,6 @@ impl Session {
             "name": name,
             "description": file.description,
             "dt": self.world.settings().dt,
-            "scenes": shipped().iter().map(|scene| scene.name).collect::<Vec<_>>(),
             "notes": notes,
             "meshes": meshes,
             "draws": draws,
@@ -186,6 +182,11 @@ impl Session {
             "sky": { "zenith": sky.zenith_color, "horizon": sky.horizon_color, "ground": sky.nadir_color, "intensity": sky.intensity },
         })
     }
+}
+
+/// Returns the names of the shipped scenes.
+pub(crate) fn scenes() -> Value {
+    shipped().iter().map(|scene| scene.name).collect()
 }
 
 fn visuals(world: &World, object: ObjectId) -> &[Visual] {
@@ -201,15 +202,4 @@ fn add(mesh: &TriMesh, geometry: &mut Vec<f32>, meshes: &mut Vec<[usize; 2]>) {
 fn push(instances: &mut Vec<f32>, matrix: &Matrix4<f32>, color: [f32; 3]) {
     instances.extend(matrix.iter().chain(&color).chain(&[1.0]));
     debug_assert_eq!(instances.len() % INSTANCE, 0);
-}
-
-/// Returns the key of a visual's geometry: its numbers, or the address of a mesh. `None` if it is not drawn.
-fn key(visual: &Visual) -> Option<String> {
-    visual.drawn()?;
-    Some(match &visual.geometry {
-        VisualGeometry::Shape(Shape::Mesh(mesh)) => format!("{:p}", Arc::as_ptr(mesh)),
-        VisualGeometry::Shape(Shape::Compound(compound)) => format!("{:p}", Arc::as_ptr(compound)),
-        VisualGeometry::Shape(shape) => format!("{shape:?}"),
-        VisualGeometry::Mesh(mesh) => format!("{:p}", Arc::as_ptr(mesh)),
-    })
 }

@@ -19,16 +19,21 @@ function note(text) { at("note").textContent = text; }
 function fail(text) {
   state.error = text;
   state.playing = false;
+  at("play").textContent = "Play";
   note(text);
 }
+
+/** Message of an exception. */
+function message(error) { return String(error && error.message || error); }
 
 function bytes(kind) { return new Uint8Array(module.memory.buffer, module.buffer(kind), module.length(kind)); }
 function numbers(kind) { return new Float32Array(module.memory.buffer, module.buffer(kind), module.length(kind) / 4); }
 function text() { return new TextDecoder().decode(bytes(TEXT)); }
 
-/** Opens a shipped scene by its name, or the text of a scene. */
+/** Opens a shipped scene by its name, or the text of a scene; returns whether it is one. After an error no scene is open. */
 function open(source) {
   const given = new TextEncoder().encode(source), room = module.input(given.length);
+  state.scene = null;
   if (!room) return fail("The file is larger than 16 MiB.");
   new Uint8Array(module.memory.buffer, room, given.length).set(given);
   if (!module.open(given.length)) return fail(text());
@@ -40,6 +45,7 @@ function open(source) {
   view.load(state.scene, numbers(GEOMETRY));
   at("scene").value = state.scene.name;
   draw();
+  return true;
 }
 
 /** Steps a number of frames; returns whether it went well. */
@@ -63,6 +69,7 @@ function draw() {
 
 function tick(now) {
   requestAnimationFrame(tick);
+  if (!state.scene) return;
   const passed = Math.min((now - before) / 1000, LATE);
   before = now;
   if (state.playing) {
@@ -78,32 +85,41 @@ function tick(now) {
   }
 }
 
+/** Shows what the link asks for. */
+function follow() {
+  const wanted = new URLSearchParams(location.hash.slice(1)), steps = Number(wanted.get("steps") ?? 0);
+  if (!open(wanted.get("scene") ?? opened)) return;
+  if (!(Number.isInteger(steps) && steps >= 0 && steps < 1e6)) return fail("`steps` in the link is no number of frames");
+  if (steps && !step(steps)) return;
+  state.playing = !wanted.has("paused");
+  draw();
+}
+
 async function main() {
   const packed = Uint8Array.from(atob(at("module").textContent.trim()), (c) => c.charCodeAt(0));
   const unpacked = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   const { instance } = await WebAssembly.instantiate(await new Response(unpacked).arrayBuffer(), {});
   module = instance.exports;
   view = makeView(at("view"));
-  const wanted = new URLSearchParams(location.hash.slice(1));
-  open(wanted.get("scene") ?? opened);
-  if (!state.scene) return;
-  at("scene").replaceChildren(...state.scene.scenes.map((name) => new Option(name, name)));
-  at("scene").value = state.scene.name;
-  const steps = Number(wanted.get("steps") ?? 0);
-  if (!(Number.isInteger(steps) && steps >= 0 && steps < 1e6)) return fail("`steps` in the link is no number of frames");
-  if (steps && !step(steps)) return;
-  state.playing = !wanted.has("paused");
+  module.scenes();
+  at("scene").replaceChildren(...JSON.parse(text()).map((name) => new Option(name, name)));
+  follow();
   Object.assign(state, { open, step, hash, draw, frame: () => module.frame(), ready: true });
-  draw();
+  addEventListener("hashchange", follow);
   requestAnimationFrame(tick);
 }
 
+// errors after the start are shown too
+addEventListener("error", (event) => fail(message(event.error || event.message)));
+addEventListener("unhandledrejection", (event) => fail(message(event.reason)));
+
 at("scene").onchange = () => open(at("scene").value);
-at("play").onclick = () => { state.playing = !state.playing && !state.error; draw(); };
-at("one").onclick = () => { state.playing = false; if (step(1)) draw(); };
+at("play").onclick = () => { if (!state.scene) return; state.playing = !state.playing && !state.error; draw(); };
+at("one").onclick = () => { if (!state.scene) return; state.playing = false; if (step(1)) draw(); };
 at("again").onclick = () => open(opened);
 at("file").onchange = async () => {
   const [file] = at("file").files;
+  at("file").value = ""; // the same file can be opened again
   if (file) open(await file.text());
 };
-main().catch((error) => fail(String(error && error.message || error)));
+main().catch((error) => fail(message(error)));

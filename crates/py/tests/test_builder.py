@@ -98,11 +98,13 @@ def test_armature_is_on_the_diagonal_of_the_mass_matrix():
         builder = tumble.ArticulationBuilder("arm")
         builder.add_link("upper", axis=(0, 1, 0), shape=tumble.Sphere(0.1), shape_position=(0, 0, -1), mass=2, armature=armature[0])
         builder.add_link("lower", "upper", joint="prismatic", position=(0, 0, -1), shape=tumble.Sphere(0.1), mass=1, armature=armature[1])
+        builder.add_link("hand", "lower", joint="spherical", position=(0, 0, -1), shape=tumble.Sphere(0.1), mass=1, armature=armature[2])
         return builder.build().mass_matrix()
 
-    assert matrix((0.5, 3)) - matrix((0, 0)) == pytest.approx(np.diag([0.5, 3]), abs=1e-12)
-    with pytest.raises(tumble.TumbleError, match="armature"):
-        matrix((-1, 0))
+    assert matrix((0.5, 3, 0.2)) - matrix((0, 0, 0)) == pytest.approx(np.diag([0.5, 3, 0.2, 0.2, 0.2]), abs=1e-12)
+    for wrong in ((-1, 0, 0), (0, 0, -1)):
+        with pytest.raises(tumble.TumbleError, match="armature"):
+            matrix(wrong)
 
 
 def test_copies_of_a_description_and_of_its_world():

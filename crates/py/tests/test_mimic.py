@@ -97,6 +97,25 @@ def test_a_lamp_of_an_articulation_stays_in_its_cone():
         arm.build()
 
 
+def test_a_color_camera_of_a_copy_sees_what_events_have_colored():
+    world = tumble.World()
+    ball = world.add_static("ball", tumble.Sphere(0.5))
+    ball.color = (0.2, 0.4, 0.8)
+    world.add_event("paint", tumble.Trigger.time(0.01), [tumble.Action.recolor(ball, (1, 0, 0))])
+    camera = world.add_sensor("color", name="eye", position=(0, 0, 2), orientation=(1, 0, 0, 0), resolution=(41, 31), vertical_fov=0.8)
+    before, first = world.save(), camera.value.copy()
+    world.step(10)
+    image = camera.value.copy()
+    assert (image[15, 20] == [255, 0, 0]).all() and (first[15, 20] != image[15, 20]).any()
+    for other in (world.fork(), pickle.loads(pickle.dumps(world))):
+        assert (other.sensors["eye"] == image).all()
+    after = world.save()
+    world.restore(before)
+    assert (camera.value == first).all()
+    world.restore(after)
+    assert (camera.value == image).all()
+
+
 def test_a_color_camera_sees_its_own_light():
     world = tumble.World()
     world.add_static("ball", tumble.Sphere(0.5)).color = (0.2, 0.4, 0.8)

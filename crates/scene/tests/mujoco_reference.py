@@ -4,6 +4,7 @@
                                         itself refuses the model)
     mujoco_reference.py models          prints the paths of all models in installed packages
     mujoco_reference.py sensors MODEL   prints a line `sensor name numbers` for each sensor at the first keyframe
+    mujoco_reference.py residuals MODEL prints a line `residual name numbers` for each active equality constraint at the first keyframe
 
 The output is lines `word name numbers`: `joint`, `body`, `site`, `actuator` name the elements in MuJoCo's order; then for each state `qpos`, `qvel`,
 `ctrl`, `mass` (the whole matrix), `bias`, `passive`, `actuation`, `xpos` and `xquat` of the bodies, `sites` and `forces` of the actuators. Numbers
@@ -79,9 +80,21 @@ def sensors(model):
         say(f"sensor {name(model, mujoco.mjtObj.mjOBJ_SENSOR, s)}", data.sensordata[first : first + model.sensor_dim[s]])
 
 
+def residuals(model):
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    equality = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+    for e in range(model.neq):
+        say(f"residual {name(model, mujoco.mjtObj.mjOBJ_EQUALITY, e)}", data.efc_pos[equality & (data.efc_id == e)])
+
+
 if __name__ == "__main__":
     if sys.argv[1] == "sensors":
         sensors(mujoco.MjModel.from_xml_path(sys.argv[2]))
+        sys.exit(0)
+    if sys.argv[1] == "residuals":
+        residuals(mujoco.MjModel.from_xml_path(sys.argv[2]))
         sys.exit(0)
     if sys.argv[1] == "models":
         models()

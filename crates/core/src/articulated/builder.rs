@@ -203,7 +203,7 @@ impl LinkBuilder {
         self
     }
 
-    /// Sets the inertia of the rotor that drives its revolute or prismatic joint, as the joint meets it, kg·m² or kg:
+    /// Sets the inertia of the rotor that drives its revolute, prismatic or spherical joint, as the joint meets it, kg·m² or kg:
     /// [`Link::armature`](crate::articulated::Link::armature).
     pub fn with_armature(mut self, armature: f64) -> Self {
         self.armature = armature;

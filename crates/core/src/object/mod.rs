@@ -16,6 +16,7 @@ pub(crate) mod frame_state;
 mod integratable;
 pub(crate) mod intersect;
 mod material;
+pub(crate) mod mesh_key;
 pub(crate) mod mounts;
 pub(crate) mod net_sync;
 pub(crate) mod part_state;

@@ -55,7 +55,11 @@ impl World {
     /// # Errors
     /// [`WorldError::Stale`] if the object was removed.
     pub fn set_enabled(&mut self, id: ObjectId, enabled: bool) -> Result<(), WorldError> {
+        let mends = enabled && self.status(id).is_some_and(|status| !status.enabled);
         self.status_mut(id)?.enabled = enabled;
+        if mends {
+            self.find_turns(id); // it did not follow while it was broken
+        }
         Ok(())
     }
 

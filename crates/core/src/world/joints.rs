@@ -34,6 +34,7 @@ impl World {
         let mut changed = joint.clone();
         change(&mut changed)?;
         *joint = changed;
+        self.fit_turns(id);
         Ok(())
     }
 }

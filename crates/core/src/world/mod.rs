@@ -21,6 +21,7 @@ pub(crate) mod sleep;
 mod snapshot;
 mod state;
 mod state_memory;
+mod turns;
 pub(crate) mod view;
 mod working_memory;
 
@@ -435,6 +436,7 @@ impl World {
         core.state.add(Status { mode, ..Status::default() }, &state_range);
         core.integration().refresh_one(id);
         self.names.insert(name, id);
+        self.start_turns(id);
         Ok(id)
     }
 

@@ -107,8 +107,19 @@ fn a_color_camera_sees_the_color_that_an_event_gives() {
     let middle = |world: &World| world.color_image(camera).unwrap().pixels[4];
     let [red, green, blue] = middle(&world);
     assert!(red > 150 && green > 150 && blue > 150);
+    let (before, plain) = (world.save(), world.color_image(camera).unwrap());
     world.step().unwrap();
     assert_eq!(middle(&world), [0, 255, 0]);
+    // what follows the state follows the color: a fork, a snapshot, an archive
+    let (image, saved) = (world.color_image(camera).unwrap(), world.save());
+    let archived = World::from_archive(&world.archive(&[]).unwrap(), &mut |_| None).unwrap();
+    assert_eq!(archived.color_image(archived.find("color").unwrap()).unwrap(), image);
+    assert_eq!(world.fork().color_image(camera).unwrap(), image);
+    world.restore(&before).unwrap();
+    assert_eq!(world.color_image(camera).unwrap(), plain);
+    assert_ne!(plain, image);
+    world.restore(&saved).unwrap();
+    assert_eq!(world.color_image(camera).unwrap(), image);
 }
 
 #[test]

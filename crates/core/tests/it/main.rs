@@ -49,6 +49,7 @@ mod loop_joints_joints;
 mod loop_joints_kinds;
 mod loop_joints_spatial;
 mod loop_joints_transmissions;
+mod loop_joints_turns;
 mod mesh_boxes;
 mod mesh_chains;
 mod mesh_frame;

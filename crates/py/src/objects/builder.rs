@@ -76,7 +76,7 @@ impl ArticulationBuilder {
     /// a point mass without inertia.
     ///
     /// limits: (lower, upper), rad or m. joint_damping: N·m·s/rad or N·s/m. joint_friction: N·m or N.
-    /// armature: inertia of the rotor of a revolute or prismatic joint, as the joint meets it, kg·m² or kg.
+    /// armature: inertia of the rotor of a revolute, prismatic or spherical joint, as the joint meets it, kg·m² or kg.
     /// max_velocity: largest speed of the joint, rad/s or m/s. effort: the force of its motor, N·m or N, which limits drives that name no
     /// ``max_force``. stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
     /// ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the

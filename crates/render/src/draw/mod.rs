@@ -2,7 +2,6 @@
 
 mod deforming;
 mod detail;
-mod key;
 mod looks;
 mod overlay;
 mod surface;
@@ -17,14 +16,13 @@ pub use views::{NamedView, UnknownView};
 use crate::{
     Camera, DebugStyle, DrawList, Ground, Image, Light, Material, MeshData, MeshId, Pattern, RenderError, Sky, Texture,
 };
-use key::{Form, MeshKey};
 use nalgebra::{Isometry3, Point3, Vector3};
 use overlay::{island_colors, sleep_colors};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tumble_collide::{Pose, Shape, TriMesh, Vec3};
-use tumble_core::{Appearance, Detail, Drawn, Visual, VisualGeometry, World};
+use tumble_core::{Appearance, Detail, Drawn, MeshKey, Visual, VisualGeometry, World};
 use tumble_scene::{LightKind, LightSpec, MeshSource, SceneFile};
 use unwrap::Unwrapped;
 
@@ -42,9 +40,22 @@ const LIGHT: f32 = 1.7;
 /// Radius of rounded box edges, as a fraction of the shortest half side.
 const ROUNDING: f32 = 0.06;
 
+/// Which mesh of a geometry is drawn.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Form {
+    Full,
+    /// With the texture coordinates of its file.
+    Textured,
+    /// With less detail.
+    Simple,
+}
+
+/// A geometry and the form in which it is drawn.
+type FormKey = (MeshKey, Form);
+
 /// Makes draw lists of one scene. Meshes are converted once and shared by all frames.
 pub struct Drawing {
-    meshes: BTreeMap<MeshKey, Arc<MeshData>>,
+    meshes: BTreeMap<FormKey, Arc<MeshData>>,
     edges: BTreeMap<MeshKey, Vec<[[f32; 3]; 2]>>,
     /// Keeps the geometry of the converted meshes in memory, because the keys contain addresses.
     sources: Vec<VisualGeometry>,
@@ -63,7 +74,7 @@ pub struct Drawing {
 /// Meshes of one list by the key of their shape, and textures by their file.
 #[derive(Default)]
 struct Placed {
-    meshes: BTreeMap<MeshKey, MeshId>,
+    meshes: BTreeMap<FormKey, MeshId>,
     textures: BTreeMap<Arc<Path>, usize>,
 }
 
@@ -208,7 +219,7 @@ impl Drawing {
             (_, true) => Form::Textured,
             _ => Form::Full,
         };
-        let key = MeshKey::new(drawn, form);
+        let key = (MeshKey::of(drawn), form);
         let mesh = match placed.meshes.get(&key) {
             Some(mesh) => *mesh,
             None => {
@@ -248,7 +259,7 @@ impl Drawing {
             list.wire_sphere(pose.translation.vector.into(), *radius as f32, DebugStyle::new(color).width(1.5));
             return Ok(());
         }
-        let key = MeshKey::new(drawn, Form::Full);
+        let key = MeshKey::of(drawn);
         if !self.edges.contains_key(&key) {
             let mesh = match drawn {
                 // without rounded edges, which would double the lines

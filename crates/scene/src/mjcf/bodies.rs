@@ -105,7 +105,8 @@ impl Assembly<'_, '_> {
                 && self.groups.surface(geom) == self.groups.surface(&own.geoms[0])
                 && !matches!(geom.form, Form::Plane | Form::Field(_))
         };
-        let plain = own.sites.is_empty() && own.cameras.is_empty() && own.lights.is_empty();
+        let plain =
+            own.sites.iter().all(|site| self.is_joint_end(site)) && own.cameras.is_empty() && own.lights.is_empty();
         let damped = own.joints[0].dof.damping > 0.0 || own.joints[0].dof.friction > 0.0;
         let mass = self.masses[body];
         if own.geoms.is_empty() || !plain || damped || mass.mass <= 0.0 || !own.geoms.iter().all(alike) {
@@ -227,7 +228,7 @@ impl Assembly<'_, '_> {
             }
             links[carrier].shapes.extend(on_link(geom, &self.groups, self.reader));
         }
-        for (k, site) in own.sites.iter().enumerate() {
+        for (k, site) in own.sites.iter().enumerate().filter(|(_, site)| !self.is_joint_end(site)) {
             let label = site.name.clone().unwrap_or_else(|| format!("{}/site{k}", links[carrier].name));
             add_frame(links, taken, carrier, label, site.pose, Mounts::default());
         }
@@ -242,9 +243,9 @@ impl Assembly<'_, '_> {
         spec.dof = joint.dof.clone();
         if joint.is_single() {
             spec.position = vec![joint.reference];
+        }
+        if joint.is_single() || joint.kind == Kind::Ball {
             spec.armature = joint.armature;
-        } else if joint.kind == Kind::Ball && joint.armature > 0.0 {
-            self.reader.notes.add(&joint.element, "armatures of ball joints are left out");
         }
         let effort = joint.actuator_range.map(|[low, high]| high.max(-low)).filter(|most| *most > 0.0);
         spec.dof.effort = effort.filter(|_| joint.is_single()).unwrap_or(f64::INFINITY);

@@ -1,5 +1,6 @@
 //! `<equality>`: loop joints, and couplings of joints.
 
+use nalgebra::{Quaternion, Unit};
 use tumble_core::LoopJointKind;
 use tumble_core::articulated::DofSettings;
 use tumble_core::collide::{Pose, Vec3};
@@ -17,7 +18,6 @@ use crate::xml::Element;
 /// Reads all equality constraints.
 pub(super) fn read<'a>(root: &XmlNode<'a>, assembly: &mut Assembly<'_, 'a>) {
     let reader = assembly.reader;
-    let starts = assembly.starts();
     for XmlNode { element, .. } in root.all("equality").flat_map(|section| &section.children) {
         let item = reader.classes.item(*element, 0);
         if !matches!(element.tag(), "connect" | "weld" | "joint") {
@@ -33,45 +33,38 @@ pub(super) fn read<'a>(root: &XmlNode<'a>, assembly: &mut Assembly<'_, 'a>) {
         }
         match element.tag() {
             "joint" => couple(&item, assembly),
-            _ => join(&item, &starts, assembly),
+            _ => join(&item, assembly),
         }
     }
 }
 
-/// Adds a loop joint that holds two bodies as they are at time 0.
-fn join(item: &Item<'_>, starts: &[Vec<Pose>], assembly: &mut Assembly<'_, '_>) {
-    let (element, reader, names) = (item.own(), assembly.reader, assembly.names);
+/// Adds a loop joint of two bodies. Its frames come from sites, from `relpose`, or from the reference configuration,
+/// whatever the state at time 0 is, as in MuJoCo.
+fn join(item: &Item<'_>, assembly: &mut Assembly<'_, '_>) {
+    let (element, names) = (item.own(), assembly.names);
     let by_sites = element.text("site1").is_some() || element.text("site2").is_some();
-    let (bodies, point) = if by_sites {
+    let ends = if by_sites {
         let sites = ["site1", "site2"].map(|side| find(element, side, &names.sites, false));
         let [Some(a), Some(b)] = sites else { return };
-        ([a.0, b.0], assembly.start_pose(a.0, starts) * assembly.bodies[a.0].sites[a.1].pose)
+        [a, b].map(|(body, k)| (body, assembly.bodies[body].sites[k].pose))
     } else {
         let a = find(element, "body1", &names.bodies, false);
         let b = if element.text("body2").is_some() { find(element, "body2", &names.bodies, false) } else { Some(0) };
         let (Some(a), Some(b)) = (a, b) else { return };
-        let anchor = item.numbers("anchor");
-        if anchor.is_none() && element.tag() == "connect" {
-            return element.problem("has no `anchor`", "expected three numbers, a point in the frame of body1");
-        }
-        let local = Pose::translation(
-            anchor.map_or(0.0, |p: [f64; 3]| p[0]),
-            anchor.map_or(0.0, |p| p[1]),
-            anchor.map_or(0.0, |p| p[2]),
-        );
-        ([a, b], assembly.start_pose(a, starts) * local)
+        let Some([frame_a, frame_b]) = frames(item, assembly.poses[a].inverse() * assembly.poses[b]) else { return };
+        [(a, frame_a), (b, frame_b)]
     };
-    if item.text("relpose").is_some() {
-        reader.notes.add(element, "`relpose` is left out: the bodies are held as they are at the start");
-    }
-    let parts = bodies.map(|body| part(&assembly.places[body]));
-    let (a, b) = match parts {
-        [Some(a), b] if Some(a) != b => (a, b),
-        [None, Some(b)] => (b, None),
+    let ends = ends.map(|(body, frame)| match assembly.places[body] {
+        Place::World => (None, assembly.poses[body] * frame),
+        Place::Rigid(index) => (Some(PartSpec::Body(index)), frame),
+        Place::Link(tree, link) => (Some(PartSpec::Link(tree, link)), frame),
+    });
+    let ((a, frame_a), (b, frame_b)) = match ends {
+        [(Some(a), frame_a), b] if Some(a) != b.0 => ((a, frame_a), b),
+        [fixed @ (None, _), (Some(b), frame_b)] => ((b, frame_b), fixed),
         _ => {
-            return reader
-                .notes
-                .add(element, "equality constraints within one body, or between fixed bodies, are left out");
+            let why = "equality constraints within one body, or between fixed bodies, are left out";
+            return assembly.reader.notes.add(element, why);
         }
     };
     let number = assembly.scene.loop_joints.len();
@@ -83,9 +76,9 @@ fn join(item: &Item<'_>, starts: &[Vec<Pose>], assembly: &mut Assembly<'_, '_>) 
         kind,
         a: Some(a),
         b,
-        anchors: None,
+        anchors: Some([frame_a, frame_b]),
         references: [Pose::identity(); 2],
-        position_m: point.translation.vector.into(),
+        position_m: [0.0; 3],
         second_position_m: None,
         axis: Vec3::z().into(),
         second_axis: None,
@@ -103,12 +96,27 @@ fn join(item: &Item<'_>, starts: &[Vec<Pose>], assembly: &mut Assembly<'_, '_>) 
     });
 }
 
-fn part(place: &Place) -> Option<PartSpec> {
-    match *place {
-        Place::World => None,
-        Place::Rigid(index) => Some(PartSpec::Body(index)),
-        Place::Link(tree, link) => Some(PartSpec::Link(tree, link)),
+/// Returns the frames of a joint in both bodies. `reference` is the pose of the second in the first in the reference
+/// configuration. The `anchor` of a `<connect>` is a point of the first body, that of a `<weld>` a point of the second.
+fn frames(item: &Item<'_>, reference: Pose) -> Option<[Pose; 2]> {
+    let anchor: Option<[f64; 3]> = item.numbers("anchor");
+    let at = |p: [f64; 3]| Pose::translation(p[0], p[1], p[2]);
+    if item.own().tag() == "connect" {
+        if anchor.is_none() {
+            item.own().problem("has no `anchor`", "expected three numbers, a point in the frame of body1");
+        }
+        let frame = at(anchor?);
+        return Some([frame, reference.inverse() * frame]);
     }
+    let given: Option<[f64; 7]> = item.numbers("relpose");
+    // a quaternion of zeros stands for the reference configuration
+    let relative = given.and_then(|p| {
+        let turn = Unit::try_new(Quaternion::new(p[3], p[4], p[5], p[6]), 1e-10)?;
+        Some(Pose::from_parts(Vec3::new(p[0], p[1], p[2]).into(), turn))
+    });
+    let relative = relative.unwrap_or(reference);
+    let frame = at(anchor.unwrap_or_default());
+    Some([relative * frame, frame])
 }
 
 /// Couples a joint to another, `q₁ − ref₁ = a₀ + a₁(q₂ − ref₂)`, or holds it.

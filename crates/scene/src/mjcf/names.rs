@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::source::XmlNode;
 use super::tree::Body;
 use crate::parse::suggest::nearest;
 use crate::xml::Element;
@@ -40,6 +41,22 @@ impl Names {
         }
         names
     }
+}
+
+/// Returns the sites that `<equality>` names and nothing else. They are places of joints, and no frames of their own.
+pub(super) fn joint_ends(root: &XmlNode<'_>) -> BTreeSet<String> {
+    const NAMING: [&str; 7] = ["site", "refsite", "sidesite", "cranksite", "slidersite", "objname", "refname"];
+    let (mut ends, mut others) = (BTreeSet::new(), BTreeSet::new());
+    let mut open: Vec<(&XmlNode<'_>, bool)> = root.children.iter().map(|node| (node, false)).collect();
+    while let Some((node, joins)) = open.pop() {
+        let joins = joins || node.tag() == "equality";
+        let (names, keys) = if joins { (&mut ends, &["site1", "site2"][..]) } else { (&mut others, &NAMING[..]) };
+        names.extend(keys.iter().filter_map(|key| node.element.text(key)).map(str::to_owned));
+        if node.tag() != "worldbody" {
+            open.extend(node.children.iter().map(|child| (child, joins)));
+        }
+    }
+    &ends - &others
 }
 
 fn note<T>(names: &mut BTreeMap<String, T>, name: &str, at: T, element: &Element<'_, '_>) {

@@ -1,15 +1,16 @@
 //! Puts the bodies of a model together as a scene.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use tumble_core::articulated::LinkMass;
 use tumble_core::collide::Pose;
 
 use super::joint::Kind;
-use super::names::{Names, Taken};
+use super::names::{Names, Taken, joint_ends};
 use super::shapes::{Groups, Meshes};
 use super::source::XmlNode;
-use super::tree::{self, Body};
+use super::tree::{self, Body, Frame};
 use super::{Reader, actuator, equality, inertia, keyframe, mass, pairs, schema, sensor, views};
 use crate::parse::bound::Bound;
 use crate::parse::file::SceneFile;
@@ -32,6 +33,8 @@ pub(super) struct Assembly<'r, 'a> {
     pub(super) reader: &'r Reader<'a>,
     pub(super) bodies: &'r [Body<'a>],
     pub(super) names: &'r Names,
+    /// Sites that are places of joints alone.
+    pub(super) joint_ends: BTreeSet<String>,
     pub(super) masses: Vec<LinkMass>,
     /// Poses of the bodies in the world, in the reference configuration.
     pub(super) poses: Vec<Pose>,
@@ -67,6 +70,7 @@ pub(super) fn read<'a>(root: &XmlNode<'a>, path: &Path, reader: &Reader<'a>, log
         reader,
         bodies: &bodies,
         names: &names,
+        joint_ends: joint_ends(root),
         masses,
         poses,
         fixed,
@@ -162,7 +166,7 @@ impl Assembly<'_, '_> {
     fn check_masses(&self) {
         let mut heavy: Vec<bool> = self.masses.iter().map(|m| m.mass > 0.0 || m.inertia.amax() > 0.0).collect();
         for (number, body) in self.bodies.iter().enumerate().skip(1).rev() {
-            let massless = |joint: &&super::joint::JointItem<'_>| joint.armature == 0.0 || !joint.is_single();
+            let massless = |joint: &&super::joint::JointItem<'_>| joint.armature == 0.0;
             if !heavy[number] && body.joints.iter().any(|joint| massless(&joint)) {
                 let message = "moves no mass: it and its descendants have none";
                 body.element.problem(message, "expected <inertial>, or a geom with a mass, in one of them");
@@ -176,22 +180,9 @@ impl Assembly<'_, '_> {
         }
     }
 
-    /// Returns the pose of a body in the world at time 0.
-    pub(super) fn start_pose(&self, body: usize, starts: &[Vec<Pose>]) -> Pose {
-        match self.places[body] {
-            Place::World => self.poses[body],
-            Place::Rigid(index) => {
-                let spec = &self.scene.bodies[index];
-                crate::parse::rotation::pose(spec.position_m, spec.orientation_xyzw)
-            }
-            Place::Link(tree, link) => starts[tree].get(link).copied().unwrap_or(self.poses[body]),
-        }
-    }
-
-    /// Returns the poses of all links of all articulated bodies at time 0.
-    pub(super) fn starts(&self) -> Vec<Vec<Pose>> {
-        let start = crate::build::articulated::link_poses_at_start;
-        self.scene.articulated.iter().map(|spec| start(spec).unwrap_or_default()).collect()
+    /// Returns whether a site is the place of a joint of `<equality>`, and nothing else.
+    pub(super) fn is_joint_end(&self, site: &Frame<'_>) -> bool {
+        site.name.as_ref().is_some_and(|name| self.joint_ends.contains(name))
     }
 
     /// Returns whether a body is free and has nothing below it.

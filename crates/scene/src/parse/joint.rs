@@ -187,6 +187,7 @@ impl JointSpec {
         match self.kind {
             Joint::Spherical => {
                 self.read_resistance(f, keys);
+                self.armature = f.number_or(keys.armature, Bound::NOT_NEGATIVE, self.armature);
                 self.read_own_cone(f);
                 self.read_spherical_start(f);
             }

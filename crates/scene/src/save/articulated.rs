@@ -120,6 +120,7 @@ impl Writer<'_> {
                 t.put("joint", "spherical");
                 t.extend(rotation(&state[*q..q + 4]));
                 t.put("angular_velocity_rad_per_s", rates);
+                t.put_unless(0.0, "armature_kg_m2", *armature);
                 for (axis, cone) in cones {
                     t.put("axis", [0, 1, 2].map(|k| if k == axis { 1.0 } else { 0.0 }));
                     t.put("cone_rad", cone);

@@ -19,6 +19,7 @@ mod bodies;
 mod compare;
 mod events;
 mod joints;
+pub(crate) mod place;
 mod saved;
 pub(crate) mod shapes;
 mod surface;
@@ -40,6 +41,7 @@ use crate::notes::Notes;
 use crate::parse::appearance::AppearanceSpec;
 use crate::parse::file::SceneFile;
 use crate::parse::material::MaterialSpec;
+use place::Unfinished;
 use shapes::Meshes;
 use text::Table;
 
@@ -131,11 +133,10 @@ impl<'w> SceneWriter<'w> {
         let (text, meshes, notes) = self.text(&folder)?;
         let state = saved::file(&text, world.archive(&[])?)?;
         let files: Vec<(String, Vec<u8>)> = meshes.files.into_iter().chain([("state.world".into(), state)]).collect();
-        let unfinished = path.with_file_name(format!(".{stem}.{}.unfinished", std::process::id()));
-        let written = write_checked(world, &unfinished, &stem, &text, &files)
-            .and_then(|()| put_in_place(&unfinished, &stem, path));
-        let _ = std::fs::remove_dir_all(&unfinished); // nothing depends on it any more
-        written.map(|()| notes)
+        let unfinished = Unfinished::write(path, &text, &files)?;
+        check(world, &unfinished.file())?;
+        unfinished.put_in_place(path)?;
+        Ok(notes)
     }
 
     /// Returns the text, its meshes and notes.
@@ -292,30 +293,9 @@ fn materials(world: &World, like: &SceneFile) -> Result<Vec<(u32, MaterialSpec)>
     Ok((1..=count).map(one).collect())
 }
 
-/// Writes all files to a folder of their own, reads them back and compares the worlds.
-fn write_checked(
-    world: &World,
-    unfinished: &Path,
-    stem: &str,
-    text: &str,
-    files: &[(String, Vec<u8>)],
-) -> Result<(), SaveError> {
-    let failed = |file: &Path| {
-        let file = file.to_path_buf();
-        move |source| SaveError::Write { file, source }
-    };
-    let folder = unfinished.join(format!("{stem}_files"));
-    // of a process of this number that was killed
-    let _ = std::fs::remove_dir_all(unfinished);
-    std::fs::create_dir(unfinished).map_err(failed(unfinished))?;
-    std::fs::create_dir(&folder).map_err(failed(&folder))?;
-    for (name, bytes) in files {
-        let file = folder.join(name);
-        std::fs::write(&file, bytes).map_err(failed(&file))?;
-    }
-    let file = unfinished.join(format!("{stem}.toml"));
-    std::fs::write(&file, text).map_err(failed(&file))?;
-    let mut scene = SceneFile::load(&file).map_err(|e| SaveError::Unread(e.to_string()))?;
+/// Reads what was written and compares the worlds.
+fn check(world: &World, file: &Path) -> Result<(), SaveError> {
+    let mut scene = SceneFile::load(file).map_err(|e| SaveError::Unread(e.to_string()))?;
     scene.saved = None;
     let (read, _) = scene.build().map_err(|e| SaveError::Unread(e.to_string()))?;
     let mut lost = compare::differences(world, &read).map_err(SaveError::Unread)?;
@@ -324,21 +304,6 @@ fn write_checked(
     }
     shorten(&mut lost);
     Err(SaveError::Unsayable(lost))
-}
-
-/// Moves the finished files to their places.
-fn put_in_place(unfinished: &Path, stem: &str, path: &Path) -> Result<(), SaveError> {
-    let files = format!("{stem}_files");
-    let place = path.with_file_name(&files);
-    let failed = |file: &Path| {
-        let file = file.to_path_buf();
-        move |source| SaveError::Write { file, source }
-    };
-    if place.exists() {
-        std::fs::rename(&place, unfinished.join("earlier")).map_err(failed(&place))?;
-    }
-    std::fs::rename(unfinished.join(&files), &place).map_err(failed(&place))?;
-    std::fs::rename(unfinished.join(format!("{stem}.toml")), path).map_err(failed(path))
 }
 
 /// Keeps the first entries and counts the others.

@@ -23,12 +23,17 @@ pub(super) const MODEL: &str = "__model__";
 /// The named frames of a model.
 pub(super) struct Frames<'a, 'd> {
     known: BTreeMap<&'a str, Named<'a, 'd>>,
+    /// The link that a joint of the model itself moves.
+    canonical: Option<&'a str>,
+    /// Whether axes are in the frame of the model unless they say another, as before version 1.5.
+    pub(super) axes_in_model: bool,
 }
 
 struct Named<'a, 'd> {
     element: Element<'a, 'd>,
     /// The frame of its pose unless `relative_to` says another.
     base: &'a str,
+    is_link: bool,
     /// In the model, once it is known.
     pose: Option<Pose>,
 }
@@ -36,7 +41,13 @@ struct Named<'a, 'd> {
 impl<'a, 'd> Frames<'a, 'd> {
     /// Collects links, joints and frames. A name that is used twice is a problem.
     pub(super) fn of(model: &Element<'a, 'd>) -> Frames<'a, 'd> {
-        let mut frames = Frames { known: BTreeMap::new() };
+        let version = model.node().ancestors().find_map(|node| node.attribute("version"));
+        let canonical = model.text("canonical_link").filter(|name| !name.is_empty());
+        let mut frames = Frames {
+            known: BTreeMap::new(),
+            canonical: canonical.or_else(|| model.child("link").and_then(|link| link.text("name"))),
+            axes_in_model: version.and_then(|version| version.parse().ok()).is_some_and(|version: f64| version < 1.45),
+        };
         for tag in ["link", "joint", "frame"] {
             for element in model.children(tag) {
                 let Some(name) = element.required_text("name", "a unique name") else { continue };
@@ -51,7 +62,7 @@ impl<'a, 'd> Frames<'a, 'd> {
                     let message = format!("has the name of {} at {}", first.element.what(), first.element.place());
                     element.problem(message, "expected a unique name among links, joints and frames");
                 } else {
-                    frames.known.insert(name, Named { element, base, pose: None });
+                    frames.known.insert(name, Named { element, base, is_link: tag == "link", pose: None });
                 }
             }
         }
@@ -91,6 +102,22 @@ impl<'a, 'd> Frames<'a, 'd> {
             }
         }
         Some(pose)
+    }
+
+    /// Returns the link that a link, joint or frame belongs to, or that the model itself stands for. `None` if there is none.
+    pub(super) fn link_of(&self, name: &'a str) -> Option<&'a str> {
+        let mut at = name;
+        for _ in 0..=self.known.len() {
+            if at == MODEL {
+                return self.canonical;
+            }
+            let named = self.known.get(at)?;
+            if named.is_link {
+                return Some(at);
+            }
+            at = named.base;
+        }
+        None
     }
 
     /// Returns the pose of `<pose>` in an element, in the frame of `base`.

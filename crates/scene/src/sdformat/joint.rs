@@ -66,7 +66,12 @@ impl<'a, 'd> JointElement<'a, 'd> {
         note_others(&element, &["parent", "child", "pose", "axis", "axis2"], notes);
         let end = |tag| element.required(tag, &format!("<{tag}>NAME OF A LINK</{tag}>")).map(|_| ());
         let (_, _) = (end("parent")?, end("child")?);
-        let [parent, child] = ["parent", "child"].map(|tag| child_text(&element, tag).unwrap_or(""));
+        // frames stand for the links that carry them; a name that is neither is reported with the tree
+        let link = |tag| {
+            let name = child_text(&element, tag).unwrap_or("");
+            frames.link_of(name).unwrap_or(name)
+        };
+        let [parent, child] = ["parent", "child"].map(link);
         let typed = element.required_text("type", EXPECTED)?;
         let Some((_, kind)) = KINDS.iter().find(|(word, _)| *word == typed) else {
             element.wrong("type", EXPECTED.trim_start_matches("expected "));
@@ -82,7 +87,7 @@ impl<'a, 'd> JointElement<'a, 'd> {
         let limited = matches!(kind, Kind::Revolute | Kind::Prismatic | Kind::Universal);
         let axes = tags.iter().filter_map(|tag| {
             let axis = element.required(tag, &format!("<{tag}> with <xyz>"))?;
-            Some(Axis::read(&axis, (&name, child), limited, frames, notes))
+            Some(Axis::read(&axis, &name, limited, frames, notes))
         });
         let axes: Vec<Axis<'a, 'd>> = axes.collect();
         (axes.len() == tags.len()).then_some(JointElement { name, element, kind: *kind, parent, child, frame, axes })
@@ -100,10 +105,10 @@ impl<'a, 'd> JointElement<'a, 'd> {
 }
 
 impl<'a, 'd> Axis<'a, 'd> {
-    /// Reads `<axis>`; `joint` and `child` are the frames of the joint and of its child link.
+    /// Reads `<axis>`; `joint` is the name of the joint.
     fn read(
         axis: &Element<'a, 'd>,
-        (joint, child): (&str, &str),
+        joint: &str,
         limited: bool,
         frames: &mut Frames<'a, 'd>,
         notes: &mut NoteList,
@@ -119,8 +124,8 @@ impl<'a, 'd> Axis<'a, 'd> {
                 super::value::wrong(&xyz, "a direction: three numbers, not all 0");
                 Vec3::z()
             });
-            // a word of SDF before 1.7
-            let old = flag(axis, "use_parent_model_frame", false).then_some(super::frames::MODEL);
+            // a word of SDF before 1.7; axes of SDF before 1.5 are so without it
+            let old = flag(axis, "use_parent_model_frame", frames.axes_in_model).then_some(super::frames::MODEL);
             if let Some(frame) = xyz.text("expressed_in").filter(|frame| !frame.is_empty()).or(old) {
                 match (frames.pose(frame), frames.pose(joint)) {
                     (Some(frame), Some(joint)) => direction = joint.rotation.inverse() * frame.rotation * direction,
@@ -129,7 +134,6 @@ impl<'a, 'd> Axis<'a, 'd> {
                 }
             }
         }
-        let _ = child;
         Axis { direction, dof: read_settings(axis, limited, notes), mimic: read_mimic(axis, notes) }
     }
 }

@@ -92,6 +92,9 @@ fn read_inertial<'a, 'd>(
     };
     note_others(&inertial, &["pose", "mass", "inertia", "density"], &mut context.notes);
     if matches!(inertial.text("auto"), Some("true" | "1")) {
+        if inertial.child("mass").is_some() {
+            return LinkMassSpec::Spread(MassSpec::Mass(number(&inertial, "mass", Bound::POSITIVE, 1.0)));
+        }
         let density = number(&inertial, "density", Bound::POSITIVE, DENSITY);
         return LinkMassSpec::Spread(MassSpec::Density(density));
     }
@@ -109,7 +112,7 @@ fn read_inertial<'a, 'd>(
 
 /// Reads the shape of `<geometry>`, and its pose in the frame of the element. `None` if it is left out or wrong.
 fn read_geometry(geometry: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) -> Option<(Geometry, Pose)> {
-    let expected = "expected <box>, <sphere>, <cylinder>, <capsule>, <ellipsoid>, <plane> or <mesh>";
+    let expected = "expected <box>, <sphere>, <cylinder>, <capsule>, <cone>, <ellipsoid>, <plane> or <mesh>";
     let Some(form) = geometry.first() else {
         geometry.problem("is empty", expected);
         return None;
@@ -145,7 +148,13 @@ fn read_geometry(geometry: &Element<'_, '_>, collides: bool, context: &mut Conte
             let geometry = mesh_file(&form, (super::value::text(&uri), scale), collides, context)?;
             return Some((geometry, Pose::identity()));
         }
-        tag @ ("empty" | "heightmap" | "image" | "polyline" | "cone") => {
+        "cone" => {
+            let (radius_m, height_m) = (length(&form, "radius"), length(&form, "length"));
+            // its origin is halfway up, that of a shape its center of mass
+            let down = Isometry3::translation(0.0, 0.0, -0.25 * height_m);
+            return Some((Geometry::Shape(ShapeSpec::Cone { radius_m, height_m }), down));
+        }
+        tag @ ("empty" | "heightmap" | "image" | "polyline") => {
             note(&form, format!("<{tag}> shapes are left out"), &mut context.notes);
             return None;
         }
@@ -182,16 +191,9 @@ fn read_surface(part: &Element<'_, '_>, context: &mut Context<'_>) -> Surface {
     if let Some(material) = part.child("material").filter(|_| !context.options.recolor) {
         note_others(&material, &["ambient", "diffuse", "specular", "emissive", "lighting"], &mut context.notes);
         let color = material.child("diffuse").or(material.child("ambient"));
-        if let Some(color) = color.filter(|color| !super::value::text(color).is_empty()) {
-            let count = super::value::text(&color).split_whitespace().count();
-            let rgb = if count == 3 {
-                numbers::<3>(&color, Bound::ANY)
-            } else {
-                numbers::<4>(&color, Bound::ANY).map(|[r, g, b, _]| [r, g, b])
-            };
-            if let Some(rgb) = rgb {
-                surface.appearance.color = rgb.map(|x| x.clamp(0.0, 1.0));
-            }
+        let color = color.filter(|color| !super::value::text(color).is_empty());
+        if let Some(rgb) = color.and_then(|color| super::value::color(&color)) {
+            surface.appearance.color = rgb;
         }
     }
     surface

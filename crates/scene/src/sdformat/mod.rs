@@ -28,6 +28,7 @@
 mod error;
 mod frames;
 mod joint;
+mod lenient;
 mod link;
 mod model;
 mod read;

@@ -8,8 +8,9 @@ use tumble_core::collide::{Pose, Vec3};
 
 use super::error::SdformatError;
 use super::frames::pose_of;
+use super::lenient::as_xml;
 use super::model::{self, SdfModel};
-use super::value::{flag, note, note_others, number, numbers};
+use super::value::{color, flag, note, note_others, number, numbers};
 use crate::notes::NoteList;
 use crate::parse::appearance::AppearanceSpec;
 use crate::parse::articulated::ArticulatedSpec;
@@ -28,6 +29,8 @@ use crate::xml::{self, Element};
 const EXPECTED: &str = "an SDF file: an XML document with one element <sdf>";
 /// Largest number of models of a file.
 const MAX_MODELS: usize = 10_000;
+/// Gravity of a world that names none, m/s².
+const GRAVITY: [f64; 3] = [0.0, 0.0, -9.8];
 /// The body of which static planes are copies.
 const FLOOR: &str = "[[body]]\nname = \"floor\"\nmode = \"static\"\nshape = { type = \"half_space\" }\n";
 
@@ -35,7 +38,8 @@ const FLOOR: &str = "[[body]]\nname = \"floor\"\nmode = \"static\"\nshape = { ty
 pub(super) fn read(text: &str, path: &Path, options: &UrdfOptions) -> Result<SceneFile, SdformatError> {
     let file = path.display().to_string();
     let log = Log::new(text).named(&file);
-    let document = xml::parse(&log, text, EXPECTED);
+    let strict = as_xml(text);
+    let document = xml::parse(&log, &strict, EXPECTED);
     let scene = document.as_ref().and_then(|document| {
         let context = Context {
             folder: path.parent().unwrap_or(Path::new("")),
@@ -105,9 +109,8 @@ impl Reading {
         for include in world.children("include") {
             include.problem("is not read", "expected the model itself instead of <include>");
         }
-        if let Some(gravity) = world.child("gravity").and_then(|gravity| numbers::<3>(&gravity, Bound::ANY)) {
-            self.scene.world.gravity_m_per_s2 = gravity;
-        }
+        let gravity = world.child("gravity").map_or(Some(GRAVITY), |gravity| numbers(&gravity, Bound::ANY));
+        self.scene.world.gravity_m_per_s2 = gravity.unwrap_or(GRAVITY);
         self.scene.world.dt_s = 0.001;
         if let Some(physics) = world.child("physics") {
             note_others(&physics, &["max_step_size", "real_time_factor", "real_time_update_rate"], &mut context.notes);
@@ -124,7 +127,12 @@ impl Reading {
 
     fn light(&mut self, light: &Element<'_, '_>, context: &mut Context<'_>) {
         note_others(light, &["pose", "cast_shadows", "diffuse", "direction", "intensity"], &mut context.notes);
-        let pose = light.child("pose").map_or(Pose::identity(), |pose| pose_of(&pose));
+        let pose = light.child("pose").map_or(Pose::identity(), |pose| {
+            if pose.text("relative_to").is_some_and(|to| !to.is_empty() && to != "world") {
+                pose.wrong("relative_to", "no frame: the pose of a light is in the world");
+            }
+            pose_of(&pose)
+        });
         let kind = match light.text("type") {
             Some("directional") => {
                 let given = light.child("direction").and_then(|direction| numbers::<3>(&direction, Bound::ANY));
@@ -140,11 +148,10 @@ impl Reading {
                 );
             }
         };
-        let color = light.child("diffuse").and_then(|diffuse| numbers::<4>(&diffuse, Bound::ANY));
-        let [r, g, b, _] = color.unwrap_or([1.0; 4]).map(|x| x.clamp(0.0, 1.0));
+        let color = light.child("diffuse").and_then(|diffuse| color(&diffuse)).unwrap_or([1.0; 3]);
         let casts_shadow = flag(light, "cast_shadows", false);
         let intensity = number(light, "intensity", Bound::NOT_NEGATIVE, 1.0);
-        self.scene.lights.push(LightSpec { kind, color: [r, g, b], intensity, casts_shadow });
+        self.scene.lights.push(LightSpec { kind, color, intensity, casts_shadow });
     }
 
     /// Adds the trees and planes of a model.

@@ -31,6 +31,15 @@ pub(super) fn numbers<const N: usize>(element: &Element<'_, '_>, bound: Bound) -
     array
 }
 
+/// Returns red, green and blue from 0 to 1 of a color: three numbers, or four with the opacity.
+pub(super) fn color(element: &Element<'_, '_>) -> Option<[f64; 3]> {
+    let rgb = match text(element).split_whitespace().count() {
+        3 => numbers::<3>(element, Bound::ANY),
+        _ => numbers::<4>(element, Bound::ANY).map(|[r, g, b, _]| [r, g, b]),
+    };
+    rgb.map(|rgb| rgb.map(|x| x.clamp(0.0, 1.0)))
+}
+
 /// Returns the number of the first child with that tag, or the default of the format.
 pub(super) fn number(element: &Element<'_, '_>, tag: &'static str, bound: Bound, default: f64) -> f64 {
     element.child(tag).and_then(|child| numbers::<1>(&child, bound)).map_or(default, |[x]| x)

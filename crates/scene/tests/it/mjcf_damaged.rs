@@ -4,6 +4,8 @@
 use proptest::prelude::*;
 use tumble_scene::mjcf::{MjcfOptions, parse};
 
+use crate::damage::{beginnings, damaged, edits};
+
 const MODELS: [&str; 5] = [
     include_str!("../mjcf/cartpole.xml"),
     include_str!("../mjcf/double_pendulum.xml"),
@@ -32,31 +34,13 @@ proptest! {
     #[test]
     fn replaced_words_and_lost_pieces_never_panic(
         model in 0..MODELS.len(),
-        edits in prop::collection::vec((any::<prop::sample::Index>(), 0..WORDS.len(), 0..3usize), 1..5),
+        edits in edits(),
     ) {
-        let mut text = MODELS[model].to_owned();
-        for (at, word, kind) in edits {
-            let ends: Vec<usize> = text.match_indices(['"', ' ', '<', '>', '=']).map(|(k, _)| k).collect();
-            if ends.len() < 2 {
-                break;
-            }
-            let from = at.index(ends.len() - 1);
-            let range = ends[from] + 1..ends[from + 1];
-            match kind {
-                0 => text.replace_range(range, WORDS[word]),
-                1 => text.replace_range(range, ""),
-                _ => {
-                    let piece = text[range].to_owned();
-                    text.insert_str(ends[from] + 1, &piece);
-                }
-            }
-        }
-        survives(&text);
+        survives(&damaged(MODELS[model], edits, &WORDS));
     }
 }
 
 #[test]
 fn every_beginning_of_a_model_is_an_error_or_a_scene() {
-    let text = MODELS[3];
-    (0..text.len()).step_by(7).filter(|end| text.is_char_boundary(*end)).for_each(|end| survives(&text[..end]));
+    beginnings(MODELS[3], 7).for_each(survives);
 }

@@ -13,10 +13,10 @@ use tumble_scene::{LinkSpec, SceneFile, resolve_scene};
 const CLOSE: f64 = 1e-12;
 
 /// A new folder for one test, removed when it goes out of scope.
-struct Folder(PathBuf);
+pub(crate) struct Folder(pub(crate) PathBuf);
 
 impl Folder {
-    fn new(name: &str) -> Folder {
+    pub(crate) fn new(name: &str) -> Folder {
         let path = std::env::temp_dir().join(format!("tumble-written-{}-{name}", std::process::id()));
         std::fs::create_dir_all(&path).unwrap();
         Folder(path)
@@ -339,4 +339,36 @@ collides = false
     }
     assert_eq!(read.loop_joints.len(), 2);
     assert_eq!(read.pairs.len(), 1);
+}
+
+/// The name of the model is taken by a folder: the meshes of an earlier model stay as they are.
+#[test]
+fn a_failure_leaves_an_earlier_model_and_its_meshes() {
+    let text = |radius: f64| {
+        format!(
+            "[[body]]\nname = \"a\"\nmass_kg = 1\nshape = {{ type = \"cone\", radius_m = {radius}, height_m = 1 }}\n"
+        )
+    };
+    let world = |radius| SceneFile::parse(&text(radius), "cone.toml").unwrap().build().unwrap().0;
+    let folder = Folder::new("half");
+    let file = folder.0.join("now.xml");
+    MjcfWriter::new(&world(0.1)).save(&file).unwrap();
+    let files = || {
+        let mut files: Vec<_> =
+            std::fs::read_dir(folder.0.join("now_files")).unwrap().map(|f| f.unwrap().path()).collect();
+        files.sort();
+        files.iter().map(|file| (file.clone(), std::fs::read(file).unwrap())).collect::<Vec<_>>()
+    };
+    let earlier = files();
+    assert!(!earlier.is_empty());
+    std::fs::rename(&file, folder.0.join("kept.xml")).unwrap();
+    std::fs::create_dir_all(file.join("in the way")).unwrap();
+    let error = MjcfWriter::new(&world(0.2)).save(&file).unwrap_err().to_string();
+    assert!(error.starts_with(&format!("writing {}: ", file.display())), "{error}");
+    assert_eq!(files(), earlier);
+    let left: Vec<_> = std::fs::read_dir(&folder.0).unwrap().map(|f| f.unwrap().file_name()).collect();
+    assert_eq!(left.len(), 3, "{left:?}");
+    std::fs::remove_dir_all(&file).unwrap();
+    MjcfWriter::new(&world(0.2)).save(&file).unwrap();
+    assert_ne!(files(), earlier);
 }

@@ -108,7 +108,7 @@ fn compared(path: &Path, close: f64) -> bool {
     if noted(&["of tendons", "springs of ball joints", "stiffness and armature of free", "tendons are left out"]) {
         left_out.push("passive");
     }
-    if noted(&["armatures of ball", "armature of tendons", "stiffness and armature of free"]) {
+    if noted(&["armature of tendons", "stiffness and armature of free"]) {
         left_out.extend(["mass", "bias"]);
     }
     if noted(&["their forces follow the control at once"]) {

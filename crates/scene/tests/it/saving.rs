@@ -457,3 +457,35 @@ fn a_lost_or_damaged_state_is_an_error() {
     SceneWriter::new(&world).save(folder.scene()).unwrap();
     SceneFile::load(folder.scene()).unwrap().build().unwrap();
 }
+
+/// The name of the scene is taken by a folder: the files of an earlier scene stay.
+#[test]
+fn a_failure_leaves_the_files_of_an_earlier_scene() {
+    let world = made_in_code();
+    let folder = Folder::new("in_the_way");
+    let (scene, state) = (folder.scene(), folder.0.join("saved_files/state.world"));
+    SceneWriter::new(&world).save(&scene).unwrap();
+    let earlier = std::fs::read(&state).unwrap();
+    std::fs::remove_file(&scene).unwrap();
+    std::fs::create_dir_all(scene.join("in the way")).unwrap();
+    let mut later = world.fork();
+    later.step().unwrap();
+    let error = SceneWriter::new(&later).save(&scene).unwrap_err().to_string();
+    assert!(error.starts_with(&format!("writing {}: ", scene.display())), "{error}");
+    assert_eq!(std::fs::read(&state).unwrap(), earlier);
+}
+
+#[test]
+fn the_armature_of_a_spherical_joint_is_read_and_saved() {
+    let text = "[[articulated]]\nname = \"a\"\n[[articulated.link]]\nname = \"l\"\njoint = \"spherical\"\narmature_kg_m2 = 0.125\nmass_kg = 1\ninertia_kg_m2 = [1, 1, 1]\n";
+    let scene = SceneFile::parse(text, "s.toml").unwrap_or_else(|error| panic!("{error}"));
+    let (world, _) = scene.build().unwrap();
+    let folder = Folder::new("armature");
+    SceneWriter::new(&world).like(&scene).save(folder.scene()).unwrap();
+    edit(&folder.scene());
+    let (read, _) = load(&folder.scene());
+    for world in [&world, &read] {
+        let body: &ArticulatedBody = world.get(world.find("a").unwrap()).unwrap();
+        assert_eq!(body.model().links()[0].armature, 0.125);
+    }
+}

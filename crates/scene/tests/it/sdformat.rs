@@ -323,3 +323,114 @@ fn a_scene_names_a_file_as_one_body() {
     assert!(said.contains("no `floating` with `sdformat`"), "{said}");
     std::fs::remove_dir_all(&folder).unwrap();
 }
+
+/// A world with one sphere and this light; returns color and place of the light.
+fn light(content: &str) -> Result<SceneFile, SdformatError> {
+    let ball = "<model name=\"m\"><link name=\"a\"><collision name=\"c\"><geometry><sphere><radius>1</radius></sphere></geometry></collision></link></model>";
+    read(&format!("<sdf version=\"1.9\"><world name=\"w\">{ball}{content}</world></sdf>"))
+}
+
+#[test]
+fn colors_of_lights_have_three_or_four_numbers() {
+    for (diffuse, color) in [("1 0.5 0.25", [1.0, 0.5, 0.25]), ("0 0.5 2 0.1", [0.0, 0.5, 1.0])] {
+        let scene = light(&format!("<light type=\"point\" name=\"l\"><diffuse>{diffuse}</diffuse></light>")).unwrap();
+        assert_eq!(scene.lights[0].color, color);
+    }
+    let plain = light("<light type=\"point\" name=\"l\"></light>").unwrap();
+    assert_eq!(plain.lights[0].color, [1.0; 3]);
+    for (content, why) in [
+        ("<diffuse>1 1</diffuse>", "the diffuse of light \"l\" is \"1 1\""),
+        ("<pose relative_to=\"m\">0 0 1 0 0 0</pose>", "`relative_to` of the pose of light \"l\" is \"m\""),
+    ] {
+        let error = light(&format!("<light type=\"point\" name=\"l\">{content}</light>")).unwrap_err().to_string();
+        assert!(error.contains(why), "{error}");
+    }
+}
+
+/// Gravity of 9.8 m/s² is the default of the format, and not that of this engine.
+#[test]
+fn a_world_without_gravity_has_that_of_the_format() {
+    assert_eq!(light("").unwrap().world.gravity_m_per_s2, [0.0, 0.0, -9.8]);
+    assert_eq!(light("<gravity>0 0 -1.62</gravity>").unwrap().world.gravity_m_per_s2, [0.0, 0.0, -1.62]);
+}
+
+/// Joints may name frames, other joints and the model instead of links; poses are then in these frames.
+#[test]
+fn joints_join_the_links_that_carry_their_frames() {
+    let links = format!(
+        "<link name=\"a\">{0}</link><link name=\"b\"><pose>0 0 10 0 0 0</pose>{0}</link><frame name=\"f\" attached_to=\"b\"><pose>1 0 0 0 0 0</pose></frame><frame name=\"g\" attached_to=\"f\"><pose>0 0 0 0 0 1.5707963267948966</pose></frame>",
+        inertial(1.0, [0.1; 3])
+    );
+    let joint = |parent: &str, child: &str| {
+        format!(
+            "<joint name=\"j\" type=\"revolute\"><pose>0 2 0 0 0 0</pose><parent>{parent}</parent><child>{child}</child><axis><xyz>1 0 0</xyz></axis></joint>"
+        )
+    };
+    // the point of the hinge in the model, and its axis
+    for (child, point, axis) in [
+        ("b", [0.0, 2.0, 10.0], [1.0, 0.0, 0.0]),
+        ("f", [1.0, 2.0, 10.0], [1.0, 0.0, 0.0]),
+        ("g", [-1.0, 0.0, 10.0], [0.0, 1.0, 0.0]),
+    ] {
+        for parent in ["a", "__model__"] {
+            let scene = model(&format!("{links}{}", joint(parent, child)));
+            let (world, _) = scene.build().unwrap();
+            let body = body(&world, "m");
+            let number = body.model().links().iter().position(|link| link.joint.dof() == 1).unwrap();
+            let link = &body.model().links()[number];
+            let Joint::Revolute { axis: turns } = link.joint else { panic!("{:?}", link.joint) };
+            assert_eq!(link.parent, Some(0));
+            assert!(
+                (link.placement.translation.vector - Vec3::from(point)).norm() < 1e-12,
+                "{child}: {}",
+                link.placement
+            );
+            assert!((link.placement.rotation * turns - Vec3::from(axis)).norm() < 1e-12, "{child}");
+        }
+    }
+    let error = errors(&format!("{links}{}", joint("a", "nobody")));
+    assert!(error[0].contains("joint \"j\"") && error[0].contains("\"nobody\""), "{error:?}");
+}
+
+/// Axes of versions before 1.5 are in the frame of the model, those of later ones in that of the joint.
+#[test]
+fn axes_are_in_the_frame_of_their_version() {
+    for (version, axis) in [("1.4", Vec3::x()), ("1.5", Vec3::y()), ("1.9", Vec3::y())] {
+        let text = format!(
+            "<sdf version=\"{version}\"><model name=\"m\"><link name=\"a\"><pose>0 0 0 0 0 1.5707963267948966</pose>{}</link><joint name=\"j\" type=\"revolute\"><parent>world</parent><child>a</child><axis><xyz>1 0 0</xyz></axis></joint></model></sdf>",
+            inertial(1.0, [0.1; 3])
+        );
+        let (world, _) = read(&text).unwrap().build().unwrap();
+        let link = &body(&world, "m").model().links()[0];
+        let Joint::Revolute { axis: turns } = link.joint else { panic!("{:?}", link.joint) };
+        assert!((link.placement.rotation * turns - axis).norm() < 1e-12, "{version}: {turns}");
+    }
+}
+
+/// A cone of SDF has its origin halfway up; its center of mass is a quarter of its height above the base. A mass beside `auto` is
+/// the mass: `I_zz = 3/10·m·r²`.
+#[test]
+fn cones_stand_on_half_their_length() {
+    let scene = model(
+        "<link name=\"a\"><inertial auto=\"true\"><mass>5</mass></inertial><collision name=\"c\"><geometry><cone><radius>0.5</radius><length>2</length></cone></geometry></collision></link>",
+    );
+    let (world, _) = scene.build().unwrap();
+    let mass = body(&world, "m").model().links()[0].mass;
+    assert!((mass.mass - 5.0).abs() < 1e-12 && (mass.center - Vec3::new(0.0, 0.0, -0.5)).norm() < 1e-12, "{mass:?}");
+    assert!((mass.inertia.m33 - 0.3 * 5.0 * 0.25).abs() < 1e-12, "{mass:?}");
+}
+
+/// Hyphens in comments and prefixes without a declaration are no errors; messages name lines of the file.
+#[test]
+fn texts_that_strict_xml_refuses_are_read() {
+    let text = |link: &str| {
+        format!(
+            "<sdf version=\"1.9\">\n<!-- a -- b --- é -->\n<model name=\"m\" gz:x=\"1\">\n<gz:word>1</gz:word>\n<link name=\"a\">{link}</link>\n</model></sdf>"
+        )
+    };
+    let scene = read(&text(&inertial(1.0, [1.0; 3]))).unwrap();
+    let note = scene.notes.join("\n");
+    assert!(note.contains("model.sdf:4") && note.contains("gz.word"), "{note}");
+    let error = read(&text("<inertial><mass>-1</mass></inertial>")).unwrap_err().to_string();
+    assert!(error.contains("model.sdf:5:"), "{error}");
+}

@@ -4,6 +4,8 @@ use proptest::prelude::*;
 use tumble_scene::sdformat::parse;
 use tumble_scene::urdf::{MissingMeshes, UrdfOptions};
 
+use crate::damage::{beginnings, damaged, edits};
+
 const FILES: [&str; 2] = [include_str!("../sdformat/arm.sdf"), include_str!("../sdformat/world.sdf")];
 /// Words that replace others.
 const WORDS: [&str; 22] = [
@@ -55,31 +57,13 @@ proptest! {
     #[test]
     fn replaced_words_and_lost_pieces_never_panic(
         file in 0..FILES.len(),
-        edits in prop::collection::vec((any::<prop::sample::Index>(), 0..WORDS.len(), 0..3usize), 1..5),
+        edits in edits(),
     ) {
-        let mut text = FILES[file].to_owned();
-        for (at, word, kind) in edits {
-            let ends: Vec<usize> = text.match_indices(['"', ' ', '<', '>', '=']).map(|(k, _)| k).collect();
-            if ends.len() < 2 {
-                break;
-            }
-            let from = at.index(ends.len() - 1);
-            let range = ends[from] + 1..ends[from + 1];
-            match kind {
-                0 => text.replace_range(range, WORDS[word]),
-                1 => text.replace_range(range, ""),
-                _ => {
-                    let piece = text[range].to_owned();
-                    text.insert_str(ends[from] + 1, &piece);
-                }
-            }
-        }
-        survives(&text);
+        survives(&damaged(FILES[file], edits, &WORDS));
     }
 }
 
 #[test]
 fn every_beginning_of_a_file_is_an_error_or_a_scene() {
-    let text = FILES[0];
-    (0..text.len()).step_by(3).filter(|end| text.is_char_boundary(*end)).for_each(|end| survives(&text[..end]));
+    beginnings(FILES[0], 3).for_each(survives);
 }

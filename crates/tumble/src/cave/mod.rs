@@ -36,6 +36,7 @@ mod gamepad;
 mod listener;
 mod lock;
 mod replay;
+mod request;
 mod run_setup;
 mod server;
 mod signals;

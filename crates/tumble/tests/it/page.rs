@@ -71,3 +71,39 @@ fn scenes_in_a_browser_have_the_bits_of_this_machine() {
     browser.wait_for("tumble.frame() > 30");
     assert!(browser.errors.is_empty(), "{:?}", browser.errors);
 }
+
+/// A link to a scene that does not exist, and errors after the start, are shown in the page; it goes on with the next link.
+#[test]
+fn a_page_shows_errors_and_goes_on() {
+    let Some(file) = page() else { return };
+    let Some(mut browser) = Chromium::start("page-errors", [640, 400], &[]) else { return };
+    browser.open(&format!("file://{}#scene=no_such_scene", file.display()));
+    browser.wait_for("window.tumble.error !== ''");
+    let note = "document.getElementById('note').textContent";
+    let said = browser.run(note).as_str().unwrap().to_owned();
+    assert!(said.contains("no_such_scene"), "{said}");
+    browser.run("location.hash = '#scene=pendulum&paused&steps=3'");
+    browser.wait_for("tumble.scene !== null && tumble.scene.name === 'pendulum' && tumble.frame() === 3");
+    assert_eq!(browser.run(note), "");
+    assert_eq!(browser.run("document.getElementById('scene').value"), "pendulum");
+    assert_eq!(browser.run("tumble.hash()"), native_hash("pendulum", 3).as_str());
+    // a link that fails after one that works
+    browser.run("location.hash = '#scene=pendulum&steps=many'");
+    browser.wait_for("tumble.error !== ''");
+    assert!(browser.run(note).as_str().unwrap().contains("`steps`"));
+    browser.run("location.hash = '#scene=gone'");
+    browser.wait_for("tumble.error.includes('gone')");
+    browser.run("document.getElementById('play').click(), document.getElementById('one').click()");
+    assert!(browser.run(note).as_str().unwrap().contains("gone"));
+    browser.run("location.hash = '#scene=falling'");
+    browser.wait_for("tumble.playing && tumble.frame() > 5");
+    assert!(browser.errors.is_empty(), "{:?}", browser.errors);
+    // an exception and a rejected promise
+    for throw in ["setTimeout(() => { throw new Error('too late'); })", "Promise.reject(new Error('too late'))"] {
+        browser.run("tumble.open('falling')");
+        browser.run(&format!("{throw}, 0"));
+        browser.wait_for("tumble.error === 'too late'");
+        assert_eq!(browser.run(note), "too late");
+        assert_eq!(browser.run("tumble.playing"), false);
+    }
+}

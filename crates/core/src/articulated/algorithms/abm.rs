@@ -20,7 +20,7 @@
 //! | `α⁰`, `a⁰` | acceleration of the link with `q̈ = 0`: all centripetal and Coriolis terms |
 //! | `J`, `h`, `m` | rigid inertia about the origin, first moment, mass |
 //! | `IA`, `p` | articulated inertia, and the force that holds the subtree at `Â = 0`; external wrenches are subtracted from `p` |
-//! | `a` | armature of a revolute or prismatic joint: the inertia of its rotor, as the joint meets it |
+//! | `a` | armature of a revolute, prismatic or spherical joint: the inertia of its rotor, as the joint meets it; `a·1` of a spherical one |
 //! | `S` | `[s; 0]` of a revolute joint, `[0; s]` of a prismatic one, `[R; 0]` of a spherical one, `1` of a floating root |
 //! | `X` | `[1 0; −r× 1]`: motion of the parent at the child's origin |
 //! | `Â` | acceleration minus `[α⁰; a⁰]`. Uniform gravity `g` enters as `Â = [0; −g]` of the world |
@@ -28,6 +28,14 @@
 //! Because `p` contains `α⁰` and `a⁰`, the inward sweep has no velocity-product term `c`, unlike
 //! [RBDA Table 7.1]: it is not in the chain of dependent operations. The inward sweep sums over all
 //! children; the thesis's Algorithm 1 allows one.
+//!
+//! A spherical joint has `D = J + a·1 = l d lᵀ`. With `w = l⁻¹ H` and the rows `r = a l⁻¹`, which are 0 without armature:
+//!
+//! ```text
+//! Ia = [a − rᵀ d⁻¹ r    rᵀ d⁻¹ w;    ·    M − wᵀ d⁻¹ w]
+//! p' = [R τ − rᵀ d⁻¹ l⁻¹ e;    f + wᵀ d⁻¹ l⁻¹ e]              e = R τ − n of p = [n; f]
+//! α̂  = l⁻ᵀ d⁻¹ (l⁻¹ e + r α̂' − w â')                          q̈ = Rᵀ (α̂ − α̂')
+//! ```
 
 use crate::articulated::algorithms::factor::{Factor, rows_times, rows_transposed_times};
 use crate::articulated::model::compiled::{Compiled, CompiledLink, JointKind};
@@ -85,12 +93,13 @@ pub(in crate::articulated) struct Slot<T> {
 
 /// Factors of a joint with three or six degrees of freedom.
 ///
-/// Spherical joint: `first` factors `J`, rows `w = l⁻¹ H`. Floating root: `first` factors `M`, `w =
+/// Spherical joint: `first` factors `J + a·1`, rows `w = l⁻¹ H` and `rotor = a l⁻¹`. Floating root: `first` factors `M`, `w =
 /// l⁻¹ Hᵀ`, and `second` factors `J − H M⁻¹ Hᵀ`.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::articulated) struct JointFactor<T> {
     pub first: Factor<T>,
     pub w: [Vector<T>; 3],
+    pub rotor: [Vector<T>; 3],
     pub second: Factor<T>,
 }
 
@@ -124,7 +133,8 @@ impl<T: Scalar> Sweep<T> {
             position: none,
             linear: none,
         };
-        let block = JointFactor { first: Factor::zero(zero), w: [none; 3], second: Factor::zero(zero) };
+        let block =
+            JointFactor { first: Factor::zero(zero), w: [none; 3], rotor: [none; 3], second: Factor::zero(zero) };
         Sweep { slots: vec![world; compiled.bodies.len() + 1], blocks: vec![block; compiled.blocks] }
     }
 
@@ -228,7 +238,7 @@ impl<T: Scalar> Sweep<T> {
                 }
                 slot.inertia.minus_square(slot.column, slot.inverse)
             }
-            JointKind::Spherical(block) => spherical_factor(&slot.inertia, &mut self.blocks[block]),
+            JointKind::Spherical(block) => spherical_factor(&slot.inertia, body.armature, &mut self.blocks[block]),
             JointKind::Floating(block) => return floating_factor(&slot.inertia, &mut self.blocks[block]),
         };
         if body.parent != 0 {
@@ -312,11 +322,14 @@ pub(in crate::articulated) fn push<T: Scalar>(
             p + slot.column * rate
         }
         JointKind::Spherical(block) => {
-            let JointFactor { first, w, .. } = &blocks[block];
-            let wanted = slot.rotation * three(tau, body.v);
-            let e = first.forward(wanted - p.torque);
+            let JointFactor { first, w, rotor, .. } = &blocks[block];
+            let mut torque = slot.rotation * three(tau, body.v);
+            let e = first.forward(torque - p.torque);
             effort.torque = e;
-            Force::new(wanted, p.force + rows_transposed_times(w, first.divide(e)))
+            if body.armature > 0.0 {
+                torque -= rows_transposed_times(rotor, first.divide(e));
+            }
+            Force::new(torque, p.force + rows_transposed_times(w, first.divide(e)))
         }
         JointKind::Floating(_) => {
             *effort = Force::new(three(tau, body.v), three(tau, body.v + 3)) - p;
@@ -348,8 +361,12 @@ pub(in crate::articulated) fn spread<T: Scalar>(
             Motion { angular: carried.angular, linear: carried.linear + s * rate }
         }
         JointKind::Spherical(block) => {
-            let JointFactor { first, w, .. } = &blocks[block];
-            let angular = first.backward(first.divide(effort.torque - rows_times(w, carried.linear)));
+            let JointFactor { first, w, rotor, .. } = &blocks[block];
+            let mut rest = effort.torque - rows_times(w, carried.linear);
+            if body.armature > 0.0 {
+                rest += rows_times(rotor, carried.angular);
+            }
+            let angular = first.backward(first.divide(rest));
             write_three(body.v, slot.rotation.transposed_times(angular - carried.angular), out);
             Motion { angular, linear: carried.linear }
         }
@@ -365,7 +382,7 @@ pub(in crate::articulated) fn spread<T: Scalar>(
 /// Returns `Â = D⁻¹ e` of a floating root.
 #[inline(always)]
 pub(in crate::articulated) fn solve_floating<T: Scalar>(block: &JointFactor<T>, e: Force<T>) -> Motion<T> {
-    let JointFactor { first, w, second } = block;
+    let JointFactor { first, w, second, .. } = block;
     let f = first.forward(e.force);
     let n = e.torque - rows_transposed_times(w, first.divide(f));
     let angular = second.backward(second.divide(second.forward(n)));
@@ -403,12 +420,47 @@ fn inertia_about_origin<T: Scalar>(body: &CompiledLink, rotation: &Matrix<T>) ->
 }
 
 #[inline(always)]
-fn spherical_factor<T: Scalar>(inertia: &ArticulatedInertia<T>, block: &mut JointFactor<T>) -> ArticulatedInertia<T> {
+fn spherical_factor<T: Scalar>(
+    inertia: &ArticulatedInertia<T>,
+    armature: f64,
+    block: &mut JointFactor<T>,
+) -> ArticulatedInertia<T> {
+    let zero = inertia.mass.xx.constant(0.0);
+    if armature > 0.0 {
+        return spherical_factor_with(inertia, zero.constant(armature), block);
+    }
     block.first = Factor::new(&inertia.rotational, inertia.rotational.trace() * SINGULAR);
     block.w = block.first.forward_rows(inertia.coupling);
-    let zero = inertia.mass.xx.constant(0.0);
     let mass = block.first.complement(&inertia.mass, &block.w);
     ArticulatedInertia { rotational: Symmetric::scaled_identity(zero), coupling: [Vector::splat(zero); 3], mass }
+}
+
+/// As [`spherical_factor`], with an armature: the joint then passes on torques too.
+#[inline(always)]
+fn spherical_factor_with<T: Scalar>(
+    inertia: &ArticulatedInertia<T>,
+    armature: T,
+    block: &mut JointFactor<T>,
+) -> ArticulatedInertia<T> {
+    let zero = armature.constant(0.0);
+    let own = Symmetric::scaled_identity(armature);
+    let d = inertia.rotational + own;
+    block.first = Factor::new(&d, d.trace() * SINGULAR);
+    block.w = block.first.forward_rows(inertia.coupling);
+    block.rotor = block.first.forward_rows([
+        Vector::new(armature, zero, zero),
+        Vector::new(zero, armature, zero),
+        Vector::new(zero, zero, armature),
+    ]);
+    let scaled = block.first.divide_rows(block.w);
+    let row = |of: fn(&Vector<T>) -> T| {
+        scaled[0] * of(&block.rotor[0]) + scaled[1] * of(&block.rotor[1]) + scaled[2] * of(&block.rotor[2])
+    };
+    ArticulatedInertia {
+        rotational: block.first.complement(&own, &block.rotor),
+        coupling: [row(|r| r.x), row(|r| r.y), row(|r| r.z)],
+        mass: block.first.complement(&inertia.mass, &block.w),
+    }
 }
 
 #[inline(always)]

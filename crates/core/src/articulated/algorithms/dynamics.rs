@@ -257,7 +257,11 @@ fn kinetic_energy_as_placed(compiled: &Compiled, sweep: &Sweep<f64>, v: &[f64]) 
         let (omega, velocity) = (slot.angular, slot.linear);
         let h = slot.rotation.of_constant(&body.moment);
         let spin = 0.5 * omega.dot(slot.inertia.rotational * omega);
-        let rotor = if body.armature > 0.0 { 0.5 * body.armature * v[body.v] * v[body.v] } else { 0.0 };
+        let rates = &v[body.v..][..if matches!(body.kind, JointKind::Spherical(_)) { 3 } else { 1 }];
+        let rotor = match body.armature > 0.0 {
+            true => rates.iter().map(|rate| 0.5 * body.armature * rate * rate).sum(),
+            false => 0.0,
+        };
         spin + 0.5 * body.mass * velocity.dot(velocity) + velocity.dot(omega.cross(h)) + rotor
     };
     compiled.bodies.iter().zip(&sweep.slots[1..]).map(of_link).sum()

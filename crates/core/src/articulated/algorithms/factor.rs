@@ -67,6 +67,13 @@ impl<T: Scalar> Factor<T> {
         [x, y, z - x * self.l[1] - y * self.l[2]]
     }
 
+    /// `diag(d)⁻¹ B`, rows.
+    #[inline(always)]
+    pub fn divide_rows(&self, rows: [Vector<T>; 3]) -> [Vector<T>; 3] {
+        let [x, y, z] = rows;
+        [x * self.inverse.x, y * self.inverse.y, z * self.inverse.z]
+    }
+
     /// `A − Wᵀ diag(d)⁻¹ W` of rows `w` of `W`.
     #[inline(always)]
     pub fn complement(&self, a: &Symmetric<T>, w: &[Vector<T>; 3]) -> Symmetric<T> {

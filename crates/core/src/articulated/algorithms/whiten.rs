@@ -17,7 +17,7 @@
 //! | joint | `C` | `G` |
 //! |---|---|---|
 //! | revolute, prismatic | `√D` | `U/√D` |
-//! | spherical | `R` own axes to world; `C` of `J` there | `[C; Wᵀ]`, `W = C⁻¹ H` |
+//! | spherical | `R` own axes to world; `C` of `J + a·1` there | `[C − Vᵀ; Wᵀ]`, `W = C⁻¹ H`, `V = a C⁻¹` with the armature `a` |
 //! | floating root | block upper triangular: `C` of `M`, `W = C⁻¹ Hᵀ`, `C` of `J − Wᵀ W` | none: nothing precedes it |
 
 use crate::articulated::algorithms::abm::JointFactor;
@@ -42,15 +42,15 @@ impl Dynamics {
                     u[body.v] = self.roots[i + 1][1] * (motion.power(slot.column) + body.armature * v[body.v])
                 }
                 JointKind::Spherical(block) => {
-                    let JointFactor { first, w, .. } = &self.sweep.blocks[block];
-                    store_vector(
-                        u,
-                        body.v,
-                        first.upper_times(motion.angular) + first.divide_root(rows_times(w, motion.linear)),
-                    );
+                    let JointFactor { first, w, rotor, .. } = &self.sweep.blocks[block];
+                    let mut own = rows_times(w, motion.linear);
+                    if body.armature > 0.0 {
+                        own -= rows_times(rotor, s.motions[body.parent].angular);
+                    }
+                    store_vector(u, body.v, first.upper_times(motion.angular) + first.divide_root(own));
                 }
                 JointKind::Floating(block) => {
-                    let JointFactor { first, w, second } = &self.sweep.blocks[block];
+                    let JointFactor { first, w, second, .. } = &self.sweep.blocks[block];
                     store_vector(u, body.v, second.upper_times(motion.angular));
                     store_vector(
                         u,
@@ -76,14 +76,17 @@ impl Dynamics {
                     *part += slot.rotation.z * rate;
                 }
                 JointKind::Spherical(block) => {
-                    let JointFactor { first, w, .. } = &self.sweep.blocks[block];
-                    let angular =
-                        first.upper_solve(load_vector(u, body.v) - first.divide_root(rows_times(w, motion.linear)));
+                    let JointFactor { first, w, rotor, .. } = &self.sweep.blocks[block];
+                    let mut carried = rows_times(w, motion.linear);
+                    if body.armature > 0.0 {
+                        carried -= rows_times(rotor, motion.angular);
+                    }
+                    let angular = first.upper_solve(load_vector(u, body.v) - first.divide_root(carried));
                     store_vector(v, body.v, slot.rotation.transposed_times(angular - motion.angular));
                     motion.angular = angular;
                 }
                 JointKind::Floating(block) => {
-                    let JointFactor { first, w, second } = &self.sweep.blocks[block];
+                    let JointFactor { first, w, second, .. } = &self.sweep.blocks[block];
                     let angular = second.upper_solve(load_vector(u, body.v));
                     let linear =
                         first.upper_solve(load_vector(u, body.v + 3) - first.divide_root(rows_times(w, angular)));
@@ -121,13 +124,16 @@ impl Dynamics {
                     p += slot.column * (inverse_root * u[body.v]);
                 }
                 JointKind::Spherical(block) => {
-                    let JointFactor { first, w, .. } = &self.sweep.blocks[block];
+                    let JointFactor { first, w, rotor, .. } = &self.sweep.blocks[block];
                     let own = load_vector(u, body.v);
                     p += Force::new(first.lower_times(own), rows_transposed_times(w, first.divide_root(own)));
                     store_vector(j, body.v, slot.rotation.transposed_times(p.torque));
+                    if body.armature > 0.0 {
+                        p.torque -= rows_transposed_times(rotor, first.divide_root(own));
+                    }
                 }
                 JointKind::Floating(block) => {
-                    let JointFactor { first, w, second } = &self.sweep.blocks[block];
+                    let JointFactor { first, w, second, .. } = &self.sweep.blocks[block];
                     let (angular, linear) = (load_vector(u, body.v), load_vector(u, body.v + 3));
                     store_vector(
                         j,
@@ -194,15 +200,19 @@ impl Dynamics {
                 p -= slot.column * (inverse_root * y);
             }
             JointKind::Spherical(block) => {
-                let JointFactor { first, w, .. } = &self.sweep.blocks[block];
+                let JointFactor { first, w, rotor, .. } = &self.sweep.blocks[block];
                 let own = slot.rotation * Vector::new(j(body.v), j(body.v + 1), j(body.v + 2));
                 let y = first.lower_solve(own + p.torque);
                 (0..3).for_each(|k| out(body.v + k, [y.x, y.y, y.z][k]));
-                // P − G y = [P − C y; …] and C y = own + P.
-                p = Force::new(-own, p.force - rows_transposed_times(w, first.divide_root(y)));
+                // P − G y = [P − C y + Vᵀ y; …] and C y = own + P.
+                let scaled = first.divide_root(y);
+                p = Force::new(-own, p.force - rows_transposed_times(w, scaled));
+                if body.armature > 0.0 {
+                    p.torque += rows_transposed_times(rotor, scaled);
+                }
             }
             JointKind::Floating(block) => {
-                let JointFactor { first, w, second } = &self.sweep.blocks[block];
+                let JointFactor { first, w, second, .. } = &self.sweep.blocks[block];
                 let own = |k| Vector::new(j(k), j(k + 1), j(k + 2));
                 let linear = first.lower_solve(own(body.v + 3) + p.force);
                 let angular =

@@ -166,7 +166,8 @@ pub struct Link {
     /// Index of its first velocity number.
     pub v: usize,
     /// Inertia of the rotor that drives its joint, as the joint meets it: added to the diagonal of
-    /// the mass matrix. kg·m² of a revolute joint, kg of a prismatic one, 0 of all others.
+    /// the mass matrix, of a spherical joint to all three of its numbers. kg·m² of a revolute or spherical joint, kg of
+    /// a prismatic one, 0 of all others.
     pub armature: f64,
 }
 
@@ -292,7 +293,7 @@ impl ModelBuilder {
         self.added.len() - 1
     }
 
-    /// Sets the [`armature`](Link::armature) of the revolute or prismatic joint of a link that was
+    /// Sets the [`armature`](Link::armature) of the revolute, prismatic or spherical joint of a link that was
     /// added; a number of no link has no effect.
     pub fn set_armature(&mut self, link: usize, armature: f64) {
         if let Some(added) = self.added.get_mut(link) {
@@ -391,13 +392,13 @@ impl Model {
 }
 
 fn check_armature(link: &str, joint: &Joint, armature: f64) -> Result<(), ModelError> {
-    let single = joint.dof() == 1;
-    if armature.is_finite() && (armature == 0.0 || single && armature > 0.0) {
+    let has_one = joint.dof() == 1 || *joint == Joint::Spherical;
+    if armature.is_finite() && (armature == 0.0 || has_one && armature > 0.0) {
         return Ok(());
     }
-    let expected = match single {
+    let expected = match has_one {
         true => "finite and at least 0",
-        false => "0: only revolute and prismatic joints have one",
+        false => "0: only revolute, prismatic and spherical joints have one",
     };
     Err(ModelError::Inertia { link: link.to_string(), what: "the armature of its joint", value: armature, expected })
 }

@@ -21,7 +21,7 @@
 //! spherical = origins    revolute = origins + axis    fixed = origins + rotation    prismatic = line + rotation
 //! cylindrical = line + axis    planar = plane + axis    universal = origins + across
 //!
-//! Angles have no count of turns. The errors of gears, racks and screws need none: they are taken modulo a
+//! Angles have no count of turns, except those of revolute joints with wide limits (`turns.rs`). The errors of gears, racks and screws need none: they are taken modulo a
 //! tooth or a turn, so the ratio is exact over any number of turns.
 //! ```
 //!
@@ -57,6 +57,7 @@ mod force;
 mod kind;
 mod pair;
 mod transmission;
+mod turns;
 
 pub use at::{Anchor, JointPlace};
 pub(crate) use coordinate::JointCoordinate;
@@ -70,7 +71,7 @@ use crate::constraint::builder::RowBuilder;
 use crate::constraint::dof_rows::DofState;
 use crate::constraint::rows::RowSet;
 use crate::object::part_state::{Forces, StateRange};
-use crate::object::{Constraint, ForceGenerator, Level, Object, RowTarget};
+use crate::object::{Constraint, ForceGenerator, FrameState, Level, Object, RowTarget};
 use crate::world::view::{ObjectId, WorldView};
 use pair::{Coordinate, EndPair, JointRow, Motion, Term};
 use std::f64::consts::{PI, TAU};
@@ -111,6 +112,8 @@ pub struct LoopJoint {
     breaking_force: f64,
     breaking_torque: f64,
     transmission: Transmission,
+    /// Itself in the world that it was added to.
+    own: Option<ObjectId>,
 }
 
 type PartRef = Option<(ObjectId, usize)>;
@@ -152,6 +155,7 @@ impl LoopJoint {
             breaking_force: f64::INFINITY,
             breaking_torque: f64::INFINITY,
             transmission: Transmission::default(),
+            own: None,
         })
     }
 
@@ -186,7 +190,8 @@ impl LoopJoint {
 
     /// Sets the settings of its position: limits, damping, friction, spring and drive. Those of a
     /// revolute joint are about an angle in (−π, π] without limits, and within π of the middle of its
-    /// limits with them. The limits of a spherical joint are 0 and the half angle of a cone.
+    /// limits with them; with limits more than 3π/2 apart the angle is followed from frame to frame instead, so it does not
+    /// pass its stops. A joint of a world gets other limits by [`World::change_joint`](crate::World::change_joint). The limits of a spherical joint are 0 and the half angle of a cone.
     ///
     /// # Errors
     /// [`LoopJointError::Range`] for a setting out of its range, [`LoopJointError::Kind`] for a joint
@@ -376,15 +381,14 @@ impl LoopJoint {
     }
 
     fn pair(&self, view: &WorldView) -> Option<EndPair> {
-        EndPair::of([&self.a, &self.b], view)
+        EndPair::of([&self.a, &self.b], view, self.middle(view))
     }
 
     /// Returns its position with the angle of a revolute joint near its limits or its target.
     fn coordinate(&self, pair: &EndPair) -> Option<Coordinate> {
         let mut coordinate = pair.coordinate(self.kind, &self.transmission)?;
         if self.kind == LoopJointKind::Revolute {
-            let middle = self.dof.limits.map_or(0.0, |[lo, hi]| 0.5 * (lo + hi));
-            coordinate.position = near(coordinate.position, middle);
+            coordinate.position = near(coordinate.position, pair.middle);
         }
         Some(coordinate)
     }
@@ -486,6 +490,10 @@ impl Object for LoopJoint {
 
     fn constraint(&self) -> Option<&dyn Constraint> {
         Some(self)
+    }
+
+    fn frame_state(&self) -> Option<&dyn FrameState> {
+        self.counts_turns().then_some(self)
     }
 
     fn force(&self) -> Option<&dyn ForceGenerator> {

@@ -102,12 +102,14 @@ impl JointEnd {
 pub(super) struct EndPair {
     pub a: JointEnd,
     pub b: JointEnd,
+    /// Angle within π of which that of a revolute joint is.
+    pub middle: f64,
 }
 
 impl EndPair {
     /// Returns the sides; `None` if one is missing or not enabled.
-    pub fn of([a, b]: [&Anchor; 2], view: &WorldView) -> Option<EndPair> {
-        Some(EndPair { a: JointEnd::of(a, view)?, b: JointEnd::of(b, view)? })
+    pub fn of([a, b]: [&Anchor; 2], view: &WorldView, middle: f64) -> Option<EndPair> {
+        Some(EndPair { a: JointEnd::of(a, view)?, b: JointEnd::of(b, view)?, middle })
     }
 
     fn omega(&self) -> Vec3 {

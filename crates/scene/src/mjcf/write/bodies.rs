@@ -56,6 +56,7 @@ impl MjcfWriter<'_> {
             }
         }
         self.rigid_geoms(name, body, &Pose::identity(), status.collidable, None);
+        self.joint_sites_of((id, None));
         self.xml.close();
     }
 

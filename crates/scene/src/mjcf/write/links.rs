@@ -24,6 +24,7 @@ use tumble_core::{ArticulatedBody, Joint, Mode, Object, ObjectId};
 use super::MjcfWriter;
 use super::bodies::put_rotation;
 use super::geoms::visual_of;
+use super::joints::coupled;
 use super::xml::{Attributes, numbers, vector};
 
 /// Limit of a joint that is open at one end, rad or m.
@@ -62,6 +63,9 @@ impl MjcfWriter<'_> {
             self.joints.unique(own.to_string())
         });
         let joints = joints.collect::<Vec<_>>();
+        for (link, joint) in links.iter().zip(&joints).filter(|(link, _)| link.joint.dof() == 1) {
+            self.dofs.insert((id, link.v), joint.clone());
+        }
         let fixed = links.iter().filter(|link| link.parent.is_none() && link.joint != Joint::Floating).count();
         let based = fixed > 1
             || body.colliders().any(|(link, _)| link.is_none())
@@ -77,9 +81,7 @@ impl MjcfWriter<'_> {
         for coupling in body.couplings() {
             let of = |v: usize| links.iter().position(|link| link.v == v).map(|k| tree.joints[k].clone());
             let (Some(first), Some(second)) = (of(coupling.dof), of(coupling.of)) else { continue };
-            let polynomial = numbers([coupling.offset, coupling.multiplier, 0.0, 0.0, 0.0]);
-            let t = Attributes::of("joint1", first).with("joint2", second).with("polycoef", polynomial);
-            self.equalities.push(("joint", t));
+            self.equalities.push(("joint", coupled(first, second, coupling.offset, coupling.multiplier)));
         }
         if !body.camera().map_or(&[][..], |c| c.cameras()).is_empty()
             || !body.light().map_or(&[][..], |l| l.lights()).is_empty()
@@ -120,6 +122,7 @@ impl MjcfWriter<'_> {
         let label = self.bodies.unique(link.name.clone());
         for link in &chain {
             self.names.insert((tree.id, Some(*link)), label.clone());
+            self.inner.extend((*link != k).then_some((tree.id, Some(*link))));
         }
         let mut t = Attributes::of("name", label);
         let placed = chain.iter().fold(Pose::identity(), |pose, k| pose * tree.placement(&links[*k]));
@@ -170,6 +173,7 @@ impl MjcfWriter<'_> {
                 self.qvel.extend(v);
                 t.put("type", "ball");
                 t.put_unless(Vec3::zeros(), "pos", at.translation.vector, vector(&at.translation.vector));
+                t.put_number(0.0, "armature", link.armature);
                 if at.rotation != nalgebra::one() {
                     self.note(
                         &link.name,
@@ -233,6 +237,7 @@ impl MjcfWriter<'_> {
             t.put_pose(&frame.pose);
             self.xml.leaf("site", &t);
         }
+        self.joint_sites_of((tree.id, link));
     }
 
     /// Excludes pairs of links that collide in MuJoCo and not here.

@@ -8,7 +8,7 @@
 //! | articulated bodies | trees of `<body>`; links that are folded into others become `<site>` |
 //! | limits, springs, damping, dry friction, armature, effort | attributes of `<joint>` |
 //! | position drives | `<general>` actuators |
-//! | couplings; spherical and fixed loop joints | `<joint>`, `<connect>`, `<weld>` of `<equality>` |
+//! | couplings; spherical and fixed loop joints | `<joint>`, `<connect>` by sites, `<weld>` of `<equality>` |
 //! | collision groups; pairs that do not collide | `contype`, `conaffinity`; `<exclude>` |
 //! | the present state | the keyframe `now` |
 //!
@@ -20,16 +20,19 @@ mod joints;
 mod links;
 mod xml;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
 
+use tumble_core::collide::Pose;
 use tumble_core::{ArticulatedBody, Combine, LoopJoint, Mimic, ObjectId, PairMaterial, PairSide, RigidBody, World};
 
 use super::names::Taken;
 use crate::notes::{NoteList, Notes};
 use crate::parse::file::SceneFile;
+use crate::save::place::{Fault, Unfinished};
 use geoms::{Assets, Groups};
+use joints::Carrier;
 use xml::{Attributes, Xml, numbers, vector};
 
 /// Name of the keyframe with the state of the world.
@@ -50,6 +53,12 @@ pub enum SaveMjcfError {
         /// From the system.
         source: io::Error,
     },
+}
+
+impl From<Fault> for SaveMjcfError {
+    fn from(Fault { file, source }: Fault) -> Self {
+        SaveMjcfError::Write { file, source }
+    }
 }
 
 /// A world as MJCF.
@@ -86,7 +95,15 @@ pub struct MjcfWriter<'w> {
     sites: Taken,
     actuators: Taken,
     /// Name of the body of each object, or of each link of one.
-    names: BTreeMap<(ObjectId, Option<usize>), String>,
+    names: BTreeMap<Carrier, String>,
+    /// Name of the joint of each single degree of freedom of an articulated body.
+    dofs: BTreeMap<(ObjectId, usize), String>,
+    /// Massless links that are joints of another link's body.
+    inner: BTreeSet<Carrier>,
+    /// Names of the two sites of each spherical loop joint.
+    joint_sites: BTreeMap<ObjectId, [String; 2]>,
+    /// Sites of loop joints that are not written yet.
+    planned: BTreeMap<Carrier, Vec<(String, Pose)>>,
     contacts: Vec<(&'static str, Attributes)>,
     equalities: Vec<(&'static str, Attributes)>,
     drive_elements: Vec<(&'static str, Attributes)>,
@@ -112,6 +129,10 @@ impl<'w> MjcfWriter<'w> {
             sites: Taken::default(),
             actuators: Taken::default(),
             names: BTreeMap::new(),
+            dofs: BTreeMap::new(),
+            inner: BTreeSet::new(),
+            joint_sites: BTreeMap::new(),
+            planned: BTreeMap::new(),
             contacts: Vec::new(),
             equalities: Vec::new(),
             drive_elements: Vec::new(),
@@ -140,7 +161,8 @@ impl<'w> MjcfWriter<'w> {
     }
 
     /// Writes the model to `path`, and its meshes to a folder `NAME_files` beside it. Returns notes about everything that
-    /// MJCF cannot say. The model is written last, and at once.
+    /// MJCF cannot say. Model and meshes are finished in a folder of their own and moved to their places at once; if that fails,
+    /// the earlier ones stay. An earlier folder of files is replaced.
     ///
     /// # Errors
     /// [`SaveMjcfError`]: the path has another extension, or a file cannot be written.
@@ -150,23 +172,9 @@ impl<'w> MjcfWriter<'w> {
         let Some(stem) = path.file_stem().filter(|_| known).map(|stem| stem.to_string_lossy().into_owned()) else {
             return Err(SaveMjcfError::Name(path.into()));
         };
-        let failed = |file: &Path| {
-            let file = file.to_path_buf();
-            move |source| SaveMjcfError::Write { file, source }
-        };
         self.model.clone_from(&stem);
         let MjcfText { text, files, notes } = self.text(&format!("{stem}_files"));
-        let folder = path.with_file_name(format!("{stem}_files"));
-        if !files.is_empty() {
-            std::fs::create_dir_all(&folder).map_err(failed(&folder))?;
-        }
-        for (name, bytes) in &files {
-            let file = folder.join(name);
-            std::fs::write(&file, bytes).map_err(failed(&file))?;
-        }
-        let unfinished = path.with_file_name(format!(".{stem}.{}.unfinished", std::process::id()));
-        std::fs::write(&unfinished, text).map_err(failed(&unfinished))?;
-        std::fs::rename(&unfinished, path).map_err(failed(path))?;
+        Unfinished::write(path, &text, &files)?.put_in_place(path)?;
         Ok(notes)
     }
 
@@ -195,6 +203,7 @@ impl<'w> MjcfWriter<'w> {
     fn objects(&mut self) {
         let world = self.world;
         let objects = || world.ids().iter().filter_map(|&id| Some((id, world.name(id)?)));
+        self.plan_sites();
         for (id, name) in objects() {
             if world.status(id).is_some_and(|status| !status.enabled) {
                 self.note(name, "objects that are disabled are left out");
@@ -202,15 +211,15 @@ impl<'w> MjcfWriter<'w> {
                 self.rigid(id, name, body);
             } else if let Some(body) = world.get::<ArticulatedBody>(id) {
                 self.articulated(id, name, body);
-            } else if world.get::<Mimic>(id).is_some() {
-                self.note(name, "couplings of joints of different objects are left out");
-            } else if world.get::<LoopJoint>(id).is_none() {
+            } else if world.get::<LoopJoint>(id).is_none() && world.get::<Mimic>(id).is_none() {
                 self.note(name, "sensors, behaviors, events and objects of types of their own are left out");
             }
         }
         for (id, name) in objects().filter(|(id, _)| world.status(*id).is_some_and(|status| status.enabled)) {
             if let Some(joint) = world.get::<LoopJoint>(id) {
-                self.loop_joint(name, joint);
+                self.loop_joint(id, name, joint);
+            } else if let Some(mimic) = world.get::<Mimic>(id) {
+                self.coupling(name, mimic);
             }
         }
         self.pairs();

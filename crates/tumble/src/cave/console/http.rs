@@ -2,11 +2,12 @@
 
 use super::{Asked, Shown, lock};
 use crate::cave::listener::Listener;
-use std::io::{ErrorKind, Read, Write};
+use crate::cave::request::receive;
+use std::io::Write;
 use std::net::{SocketAddr, TcpStream};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use tumble::net::control::{Action, MAX_REQUEST_BYTES, Refusal, read_request};
 
 /// Time for a request to arrive, and again for its answer to be taken.
@@ -40,7 +41,9 @@ pub fn start(
 
 fn serve(mut stream: TcpStream, context: &Context) -> std::io::Result<()> {
     stream.set_write_timeout(Some(REQUEST_TIMEOUT))?;
-    let action = match receive(&mut stream, &context.token)? {
+    let limit = (MAX_REQUEST_BYTES, Refusal::TooLong);
+    let read = receive(&mut stream, REQUEST_TIMEOUT, limit, |request| read_request(request, &context.token))?;
+    let action = match read {
         Ok(action) => action,
         Err(refusal) => return send(&mut stream, refusal.status(), "application/json", &error(&refusal.to_string())),
     };
@@ -84,29 +87,6 @@ fn perform(action: Action, context: &Context) -> (u16, Vec<u8>) {
 
 fn error(why: &str) -> Vec<u8> {
     serde_json::json!({ "error": why }).to_string().into_bytes()
-}
-
-/// Reads a request, for at most the time-out.
-fn receive(stream: &mut TcpStream, token: &str) -> std::io::Result<Result<Action, Refusal>> {
-    let until = Instant::now() + REQUEST_TIMEOUT;
-    let (mut request, mut bytes) = (Vec::new(), [0; 1024]);
-    loop {
-        match read_request(&request, token) {
-            Ok(Some(action)) => return Ok(Ok(action)),
-            Err(refusal) => return Ok(Err(refusal)),
-            Ok(None) if request.len() > MAX_REQUEST_BYTES => return Ok(Err(Refusal::TooLong)),
-            Ok(None) => {}
-        }
-        let left = until.saturating_duration_since(Instant::now());
-        if left.is_zero() {
-            return Err(ErrorKind::TimedOut.into());
-        }
-        stream.set_read_timeout(Some(left))?;
-        match stream.read(&mut bytes)? {
-            0 => return Err(ErrorKind::UnexpectedEof.into()),
-            length => request.extend(&bytes[..length]),
-        }
-    }
 }
 
 fn send(stream: &mut TcpStream, code: u16, kind: &str, body: &[u8]) -> std::io::Result<()> {

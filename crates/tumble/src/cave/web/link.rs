@@ -3,7 +3,8 @@
 
 use super::crowd::Crowd;
 use crate::cave::facet_report::Reporter;
-use std::io::{ErrorKind, Read, Write};
+use crate::cave::request::receive;
+use std::io::{ErrorKind, Write};
 use std::net::{Shutdown, TcpStream};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -70,7 +71,8 @@ pub fn serve(mut stream: TcpStream, shared: &Shared) {
 fn answer(stream: &mut TcpStream, shared: &Shared) -> std::io::Result<()> {
     stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
     stream.set_nodelay(true)?;
-    match receive(stream, &shared.key)? {
+    let limit = (MAX_REQUEST_BYTES, Refusal::Malformed);
+    match receive(stream, REQUEST_TIMEOUT, limit, |request| read_request(request, &shared.key))? {
         Ok(Request::Page) => {
             let head = format!("Content-Type: text/html; charset=utf-8\r\nContent-Length: {}\r\n{SAFE}", PAGE.len());
             send(stream, "200 OK", &head, PAGE)
@@ -94,29 +96,6 @@ fn send(stream: &mut TcpStream, status: &str, fields: &str, body: &str) -> std::
     stream.write_all(format!("HTTP/1.1 {status}\r\nConnection: close\r\n{fields}\r\n").as_bytes())?;
     stream.write_all(body.as_bytes())?;
     stream.flush()
-}
-
-/// Reads a request, for at most the time-out.
-fn receive(stream: &mut TcpStream, key: &str) -> std::io::Result<Result<Request, Refusal>> {
-    let until = Instant::now() + REQUEST_TIMEOUT;
-    let (mut request, mut bytes) = (Vec::new(), [0; 1024]);
-    loop {
-        match read_request(&request, key) {
-            Ok(Some(action)) => return Ok(Ok(action)),
-            Err(refusal) => return Ok(Err(refusal)),
-            Ok(None) if request.len() > MAX_REQUEST_BYTES => return Ok(Err(Refusal::Malformed)),
-            Ok(None) => {}
-        }
-        let left = until.saturating_duration_since(Instant::now());
-        if left.is_zero() {
-            return Err(ErrorKind::TimedOut.into());
-        }
-        stream.set_read_timeout(Some(left))?;
-        match stream.read(&mut bytes)? {
-            0 => return Err(ErrorKind::UnexpectedEof.into()),
-            length => request.extend(&bytes[..length]),
-        }
-    }
 }
 
 /// Returns a WebSocket over a connection whose handshake is done.

@@ -1,31 +1,22 @@
-//! The key by which visuals share a mesh.
+//! The key by which visuals of equal geometry share a mesh.
 
+use super::visual::Drawn;
 use std::sync::Arc;
 use tumble_collide::Shape;
-use tumble_core::Drawn;
 
-/// Which mesh of a geometry is drawn.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Form {
-    Full,
-    /// With the texture coordinates of its file.
-    Textured,
-    /// With less detail.
-    Simple,
-}
-
-/// The dimensions of a shape, or the address of a shared mesh. Lists of thousands of visuals look up one each: no text.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct MeshKey {
+/// The dimensions of a shape, or the address of a shared mesh: equal for visuals that one mesh can draw, while the mesh
+/// lives. Lists of thousands of visuals look up one each: no text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct MeshKey {
     kind: u8,
-    form: Form,
     numbers: [u64; 4],
 }
 
 impl MeshKey {
-    pub fn new(drawn: Drawn<'_>, form: Form) -> MeshKey {
+    /// Returns the key of a geometry.
+    pub fn of(drawn: Drawn<'_>) -> MeshKey {
         let shape = match drawn {
-            Drawn::Mesh(mesh) => return MeshKey { kind: 0, form, numbers: at(Arc::as_ptr(mesh)) },
+            Drawn::Mesh(mesh) => return MeshKey { kind: 0, numbers: at(Arc::as_ptr(mesh)) },
             Drawn::Shape(shape) => shape,
         };
         let (kind, numbers) = match shape {
@@ -41,7 +32,7 @@ impl MeshKey {
             Shape::RoundedBox { half_extents: h, rounding } => (10, bits([h.x, h.y, h.z, *rounding])),
             Shape::RoundedCylinder { core: c, rounding } => (11, bits([c.radius(), c.half_length(), *rounding])),
         };
-        MeshKey { kind, form, numbers }
+        MeshKey { kind, numbers }
     }
 }
 

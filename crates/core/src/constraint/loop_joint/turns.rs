@@ -1,0 +1,73 @@
+//! The angle of a revolute joint with wide limits, followed from frame to frame.
+//!
+//! Frames that have turned by `θ` and by `θ − 2π` are equal. An angle within π of the middle of its limits is the right one
+//! while the joint passes a stop by less than half of what the limits leave of a turn. A free motion of half a step passes it by
+//! `½·h·θ̇`, so limits near ±π need a memory: the angle at the end of the last frame, which is a number of the state.
+//!
+//! ```text
+//! θ = θ_raw + 2π·k   with   |θ − θ_frame| ≤ π
+//! ```
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `θ_raw` | angle of the frames in (−π, π] |
+//! | `θ_frame` | angle at the start of the frame |
+
+use super::{LoopJoint, LoopJointKind, near};
+use crate::object::FrameState;
+use crate::object::frame_state::{Frame, FrameImpulse};
+use crate::object::part_state::StateRange;
+use crate::world::view::{ObjectId, WorldView};
+use std::f64::consts::TAU;
+
+/// Distance of two limits above which the angle is followed, rad.
+const WIDE: f64 = 0.75 * TAU;
+
+impl LoopJoint {
+    /// Returns whether its angle is a number of the state.
+    pub(crate) fn counts_turns(&self) -> bool {
+        self.kind == LoopJointKind::Revolute && self.dof.limits.is_some_and(|[lo, hi]| hi - lo > WIDE)
+    }
+
+    /// Sets which object of a world it is.
+    pub(crate) fn set_own(&mut self, id: ObjectId) {
+        self.own = Some(id);
+    }
+
+    /// Returns its angle within π of the middle of its limits, rad; the middle while it makes no rows.
+    pub(crate) fn first_angle(&self, view: &WorldView) -> f64 {
+        let middle = self.middle_of_limits();
+        self.position(view).map_or(middle, |[angle, _]| near(angle, middle))
+    }
+
+    fn middle_of_limits(&self) -> f64 {
+        self.dof.limits.map_or(0.0, |[lo, hi]| 0.5 * (lo + hi))
+    }
+
+    /// Returns the angle within π of which that of a revolute joint is.
+    pub(super) fn middle(&self, view: &WorldView) -> f64 {
+        let middle = self.middle_of_limits();
+        if !self.counts_turns() {
+            return middle;
+        }
+        let own = self.own.filter(|id| view.get::<LoopJoint>(*id).is_some_and(|known| std::ptr::eq(known, self)));
+        let range = own.and_then(|id| view.state_range(id));
+        range.and_then(|range| view.x.get(range.x.clone())?.first().copied()).unwrap_or(middle)
+    }
+}
+
+impl FrameState for LoopJoint {
+    fn len(&self) -> usize {
+        usize::from(self.counts_turns())
+    }
+
+    fn write_initial(&self, x: &mut [f64]) {
+        x.fill(self.middle_of_limits());
+    }
+
+    fn advance(&self, _me: &StateRange, frame: &Frame, x: &mut [f64], _out: &mut Vec<FrameImpulse>) {
+        if let (Some([angle, _]), Some(x)) = (self.position(&frame.view), x.first_mut()) {
+            *x = angle;
+        }
+    }
+}
