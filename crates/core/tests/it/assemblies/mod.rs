@@ -1,6 +1,7 @@
 //! Assemblies from raw meshes: the contacts alone guide the parts, as they do real ones.
 
 mod gear;
+mod lock;
 mod thread;
 mod worm;
 
