@@ -18,6 +18,7 @@
 //! The cost is `d³/6` for an object of `d` degrees of freedom, and `d²/2` for each other row. Rows far stiffer than
 //! the object ([`STIFF`]) would cost digits; they are left to the linkages (`linkage.rs`).
 
+use super::objects::{IslandObject, dof_of, objects_of, place_of};
 use crate::constraint::rows::{Block, RowSet, Rows, dot};
 
 /// A row is folded if `|y_e|²/R_e` is at most this: `B` then costs no more than four of sixteen digits.
@@ -35,22 +36,13 @@ pub(super) struct Folded {
     /// Blocks of the island that are left, in their order, and those that are folded.
     members: Vec<u32>,
     soft: Vec<u32>,
-    objects: Vec<Object>,
+    objects: Vec<IslandObject>,
+    /// First number of the `G` of each object, if it has soft rows.
+    factor: Vec<Option<usize>>,
     /// `G` of all objects with soft rows, row-major, with the reciprocals of its diagonal on its diagonal.
     factors: Vec<f64>,
     /// `b` of all objects.
     free: Vec<f64>,
-}
-
-/// An object of the island.
-struct Object {
-    /// First of its numbers in `u` of all objects.
-    start: u32,
-    dof: usize,
-    /// First of its numbers in the velocities of the island.
-    first: usize,
-    /// First number of its `G`, if it has soft rows.
-    factor: Option<usize>,
 }
 
 impl Folded {
@@ -61,6 +53,7 @@ impl Folded {
         }
         let (soft, members): (Vec<u32>, Vec<u32>) =
             blocks.iter().partition(|&&b| is_soft(rows, &rows.blocks[b as usize]));
+        let objects = objects_of(rows, blocks);
         let mut folded = Folded {
             rows: Rows::default(),
             blocks: (0..members.len() as u32).collect(),
@@ -68,7 +61,8 @@ impl Folded {
             lambda: Vec::new(),
             members,
             soft,
-            objects: objects_of(rows, blocks),
+            factor: vec![None; objects.len()],
+            objects,
             factors: Vec::new(),
             free: Vec::new(),
         };
@@ -84,19 +78,20 @@ impl Folded {
 
     /// Factors `B` of each object with soft rows, and writes `b`.
     fn factor(&mut self, rows: &Rows, c: &[f64]) {
-        self.rows.clear(self.objects.last().map_or(0, |o| o.first + o.dof));
+        self.rows.clear(dof_of(&self.objects));
         self.free.resize(self.rows.dof, 0.0);
         for &b in &self.soft {
             let block = &rows.blocks[b as usize];
             let side = &block.sides()[0];
-            let object = object_at(&mut self.objects, side.u);
-            let (dof, end) = (object.dof, self.factors.len());
-            let first = *object.factor.get_or_insert(end);
+            let place = place_of(&self.objects, side.u);
+            let IslandObject { first: start, dof, .. } = self.objects[place];
+            let end = self.factors.len();
+            let first = *self.factor[place].get_or_insert(end);
             if first == end {
                 self.factors.resize(end + dof * dof, 0.0);
                 (0..dof).for_each(|i| self.factors[end + i * dof + i] = 1.0);
             }
-            let (y, free) = (rows.response(side, 0), &mut self.free[object.first..][..dof]);
+            let (y, free) = (rows.response(side, 0), &mut self.free[start..][..dof]);
             let (weight, pull) = (1.0 / block.compliance, c[block.row as usize] / block.compliance);
             for (i, &own) in y.iter().enumerate().filter(|(_, y)| **y != 0.0) {
                 free[i] -= own * pull;
@@ -104,8 +99,8 @@ impl Folded {
                 row.iter_mut().zip(y).for_each(|(b, y)| *b += weight * own * y);
             }
         }
-        for object in &self.objects {
-            if let Some(first) = object.factor {
+        for (object, factor) in self.objects.iter().zip(&self.factor) {
+            if let Some(first) = *factor {
                 let factor = &mut self.factors[first..][..object.dof * object.dof];
                 cholesky(factor, object.dof);
                 forward(factor, &mut self.free[object.first..][..object.dof]);
@@ -128,11 +123,12 @@ impl Folded {
             self.c.extend_from_slice(&c[block.range()]);
             self.lambda.extend_from_slice(&lambda[block.range()]);
             for side in block.sides() {
-                let object = object_at(&mut self.objects, side.u);
+                let place = place_of(&self.objects, side.u);
+                let object = self.objects[place];
                 let (start, dof) = (side.y as usize, object.dof);
                 let Some(y) = self.rows.side(object.first, dof) else { continue };
                 y.copy_from_slice(&rows.y[start..start + y.len()]);
-                let Some(factor) = object.factor.map(|at| &self.factors[at..][..dof * dof]) else { continue };
+                let Some(factor) = self.factor[place].map(|at| &self.factors[at..][..dof * dof]) else { continue };
                 let free = &self.free[object.first..][..dof];
                 for (k, y) in y.chunks_exact_mut(dof).enumerate() {
                     forward(factor, y);
@@ -148,9 +144,9 @@ impl Folded {
         for (block, &member) in self.rows.blocks.iter().zip(&self.members) {
             lambda[rows.blocks[member as usize].range()].copy_from_slice(&self.lambda[block.range()]);
         }
-        for object in &self.objects {
+        for (object, factor) in self.objects.iter().zip(&self.factor) {
             let own = &mut du[object.first..][..object.dof];
-            if let Some(first) = object.factor {
+            if let Some(first) = *factor {
                 own.iter_mut().zip(&self.free[object.first..]).for_each(|(du, b)| *du += b);
                 backward(&self.factors[first..][..object.dof * object.dof], own);
             }
@@ -176,25 +172,6 @@ fn is_soft(rows: &Rows, block: &Block) -> bool {
         let own = rows.own(block, 0, 0);
         own > f64::MIN_POSITIVE && own <= STIFF * block.compliance
     }
-}
-
-fn objects_of(rows: &Rows, blocks: &[u32]) -> Vec<Object> {
-    let sides = blocks.iter().flat_map(|&b| rows.blocks[b as usize].sides());
-    let mut all: Vec<(u32, u32)> = sides.map(|side| (side.u, side.dof)).collect();
-    all.sort_unstable();
-    all.dedup();
-    let mut first = 0;
-    let place = |(start, dof): (u32, u32)| {
-        let dof = dof as usize;
-        first += dof;
-        Object { start, dof, first: first - dof, factor: None }
-    };
-    all.into_iter().map(place).collect()
-}
-
-fn object_at(objects: &mut [Object], start: u32) -> &mut Object {
-    let at = objects.partition_point(|o| o.start < start);
-    &mut objects[at]
 }
 
 /// Replaces the lower half of a matrix that is at least 1 by its Cholesky factor, with the reciprocals of the

@@ -15,6 +15,7 @@ mod lcp;
 mod lemke;
 mod linkage;
 mod local;
+mod objects;
 mod one_contact;
 mod reduced;
 mod relaxation;

@@ -14,6 +14,7 @@
 use super::equality::Equalities;
 use super::joint_row::parallel_rows;
 use super::linkage::Linkages;
+use super::objects::{IslandObject, dof_of, objects_of, place_of};
 use crate::constraint::rows::{Block, Rows, dot};
 
 /// Maximum numbers of rows that are left, and of degrees of freedom before. There must be no more rows than degrees of
@@ -42,7 +43,7 @@ impl Reduced {
             return None;
         }
         let objects = objects_of(rows, blocks);
-        let dof = objects.last().map_or(0, |o| o.first + o.dof);
+        let dof = dof_of(&objects);
         if dof > MAX.1 || linkages.is_empty() && 2 * count > dof {
             return None;
         }
@@ -63,7 +64,7 @@ impl Reduced {
     }
 
     /// Eliminates the equality rows and writes the blocks with their responses `Ŷ`.
-    fn respond(&mut self, rows: &Rows, c: &[f64], linkages: &Linkages, (objects, dof): (&[Object], usize)) {
+    fn respond(&mut self, rows: &Rows, c: &[f64], linkages: &Linkages, (objects, dof): (&[IslandObject], usize)) {
         let own = dense(rows, &self.members, (objects, dof));
         let count = self.c.len();
         let mut k = vec![0.0; count * count];
@@ -130,8 +131,8 @@ impl Reduced {
 }
 
 /// Returns the responses of blocks to all velocities of the island, a row of `dof` numbers each.
-fn dense(rows: &Rows, blocks: &[u32], (objects, dof): (&[Object], usize)) -> Vec<f64> {
-    let place = |u: u32| objects[objects.partition_point(|o| o.start < u as usize)].first;
+fn dense(rows: &Rows, blocks: &[u32], (objects, dof): (&[IslandObject], usize)) -> Vec<f64> {
+    let place = |u: u32| objects[place_of(objects, u)].first;
     let mut all = Vec::new();
     for block in blocks.iter().map(|&b| &rows.blocks[b as usize]) {
         for k in 0..block.set.rows() {
@@ -143,25 +144,4 @@ fn dense(rows: &Rows, blocks: &[u32], (objects, dof): (&[Object], usize)) -> Vec
         }
     }
     all
-}
-
-/// An object of the island.
-struct Object {
-    /// First of its numbers in `u` of all objects, and in the numbers of the island.
-    start: usize,
-    first: usize,
-    dof: usize,
-}
-
-fn objects_of(rows: &Rows, blocks: &[u32]) -> Vec<Object> {
-    let sides = blocks.iter().flat_map(|&b| rows.blocks[b as usize].sides());
-    let mut all: Vec<(u32, u32)> = sides.map(|side| (side.u, side.dof)).collect();
-    all.sort_unstable();
-    all.dedup();
-    let mut first = 0;
-    let place = |(start, dof): (u32, u32)| {
-        first += dof as usize;
-        Object { start: start as usize, first: first - dof as usize, dof: dof as usize }
-    };
-    all.into_iter().map(place).collect()
 }

@@ -3,19 +3,10 @@
 use super::Tolerance;
 use super::cone::{length, project};
 use crate::constraint::rows::{Block, RowSet, Rows, dot};
+use crate::solver::objects::{IslandObject, dof_of, objects_of, place_of};
 
 /// Errors relative to the fastest row: what rounding leaves at best, and what counts as solved.
 const ROUNDING: [f64; 2] = [1e-13, 1e-10];
-
-/// An object of the island.
-pub(super) struct Object {
-    /// First of its numbers in the velocities of the island.
-    pub first: usize,
-    /// Degrees of freedom.
-    pub dof: usize,
-    /// First of its numbers in `u` of all objects.
-    start: u32,
-}
 
 /// The contribution of one object to a block.
 #[derive(Clone, Copy, Default)]
@@ -98,7 +89,7 @@ pub(super) fn largest(errors: impl Iterator<Item = f64>) -> f64 {
 
 /// The rows of an island.
 pub(super) struct Island<'a> {
-    pub objects: Vec<Object>,
+    pub objects: Vec<IslandObject>,
     pub blocks: Vec<LocalBlock<'a>>,
     /// Free values of the rows.
     pub c: Vec<f64>,
@@ -111,17 +102,8 @@ pub(super) struct Island<'a> {
 
 impl<'a> Island<'a> {
     pub fn new(rows: &'a Rows, blocks: &[u32], c: &[f64]) -> Island<'a> {
-        let island = || blocks.iter().map(|&b| &rows.blocks[b as usize]);
-        let mut starts: Vec<(u32, u32)> = island().flat_map(|b| b.sides().iter().map(|s| (s.u, s.dof))).collect();
-        starts.sort_unstable();
-        starts.dedup();
-        let mut dof = 0;
-        let place = |&(start, size): &(u32, u32)| {
-            let first = dof;
-            dof += size as usize;
-            Object { first, dof: size as usize, start }
-        };
-        let objects: Vec<Object> = starts.iter().map(place).collect();
+        let objects = objects_of(rows, blocks);
+        let dof = dof_of(&objects);
         let mut island =
             Island { objects, blocks: Vec::with_capacity(blocks.len()), c: Vec::new(), dof, fastest: 0.0, y: &rows.y };
         for &b in blocks {
@@ -140,7 +122,7 @@ impl<'a> Island<'a> {
         let count = block.set.rows();
         let mut sides = [LocalSide::default(); 2];
         for (local, side) in sides.iter_mut().zip(block.sides()) {
-            let object = self.objects.partition_point(|o| o.start < side.u);
+            let object = place_of(&self.objects, side.u);
             let first = self.objects[object].first;
             *local = LocalSide { object, first, dof: side.dof as usize, y: side.y as usize };
         }
