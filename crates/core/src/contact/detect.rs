@@ -95,7 +95,7 @@ impl DetectorBuffers {
     }
 }
 
-/// Where a part is within the horizon.
+/// Bounds of a part within the horizon.
 #[derive(Clone, Copy)]
 struct PartBounds {
     /// Serial and part.

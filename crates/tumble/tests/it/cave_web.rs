@@ -215,7 +215,7 @@ fn a_page_follows_the_run_to_the_next_scene() {
 fn compare(backend: &str, scene: &str, quality: &str, more: &[&str]) {
     let mut place = Place::new(&format!("web-{backend}-{scene}"), &twins("[480, 360]"));
     place.scene = scene.into();
-    let Some(mut page) = Chromium::start(backend, [480, 360], more) else { return };
+    let Some(mut page) = Chromium::start(&format!("{backend}-{scene}"), [480, 360], more) else { return };
     let (out, console) = (place.path("out"), free_address().to_string());
     let (run, at) = start(
         &place,
