@@ -9,7 +9,7 @@
 //! contain the words), `--quality WORDS` (instead of the five shown), `--readback` (with the copy
 //! to memory), `--stages` (the time of each row by stage), `--pictures FOLDER` (the last picture of
 //! each row), `--size WxH` (pixels of a facet, 1024x768 by default), `--step THREADS` (each frame also
-//! steps the world by 1/60 s on that number of threads before its list is made).
+//! steps the world by 1/60 s on that number of threads while its list is drawn, as a window does).
 
 use nalgebra::Vector3;
 use std::time::{Duration, Instant};
@@ -202,18 +202,24 @@ fn row(
     let mut stages = [Duration::ZERO; 3];
     let mut frame = |renderer: &mut Renderer| -> Result<(), Failure> {
         let begin = Instant::now();
-        if options.step.is_some() {
-            subject.world.step()?;
-        }
-        stages[2] += begin.elapsed();
-        let begin = Instant::now();
         let mut list = subject.drawing.list(&subject.world, &DebugDraw::default())?;
         quality.apply(&mut list.settings);
-        let listed = Instant::now();
-        draw(renderer, &list, facets, options.readback)?;
-        stages[0] += listed - begin;
-        stages[1] += listed.elapsed();
-        Ok(())
+        stages[0] += begin.elapsed();
+        let (world, steps) = (&mut subject.world, options.step.is_some());
+        let (stepped, drawn) = std::thread::scope(|scope| {
+            let stepping = scope.spawn(move || {
+                let begin = Instant::now();
+                (if steps { world.step().map(|_| ()) } else { Ok(()) }, begin.elapsed())
+            });
+            let begin = Instant::now();
+            let drawn = draw(renderer, &list, facets, options.readback);
+            stages[1] += begin.elapsed();
+            (stepping.join(), drawn)
+        });
+        drawn?;
+        let (stepped, took) = stepped.map_err(|_| "the step panicked")?;
+        stages[2] += took;
+        Ok(stepped?)
     };
     // the first frame creates the pipelines
     frame(renderer)?;

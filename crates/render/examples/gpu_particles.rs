@@ -1,12 +1,12 @@
 //! Time of a frame of particles on the graphics device. The example `particles` of `tumble-behaviors` has that of the processor.
 //!
 //! `cargo run --release -p tumble-render --example gpu_particles -- [COUNT…]` prints, for 100,000 and 1,000,000 particles unless counts
-//! are given (at most a million), ms of the clock per frame of 1/60 s: with one submission a frame, and with all frames in a row. Ten
-//! seconds of particles that fall on a slope, a sphere and a box.
+//! are given (at most a million), ms of the clock per frame of 1/60 s in both precisions: with one submission a frame, and with all frames
+//! in a row. Ten seconds of particles that fall on a slope, a sphere and a box.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use std::time::{Duration, Instant};
-use tumble_render::{FreeParticle, FreeParticles, GpuParticles, Obstacle, ObstacleShape};
+use tumble_render::{FreeParticle, FreeParticles, GpuParticles, Obstacle, ObstacleShape, Precision, RenderError};
 
 const FRAMES: u32 = 600;
 
@@ -15,7 +15,6 @@ type Failure = Box<dyn std::error::Error>;
 fn main() -> Result<(), Failure> {
     let counts: Result<Vec<usize>, _> = std::env::args().skip(1).map(|count| count.parse()).collect();
     let counts = Some(counts?).filter(|counts| !counts.is_empty()).unwrap_or_else(|| vec![100_000, 1_000_000]);
-    let constants = FreeParticles { linear_drag: 0.1, ..FreeParticles::default() };
     let obstacles = [
         obstacle(ObstacleShape::HalfSpace, Vector3::zeros(), Vector3::new(0.05, 0.02, 0.0)),
         obstacle(ObstacleShape::Sphere(1.5), Vector3::new(2.0, 0.0, 0.5), Vector3::zeros()),
@@ -25,25 +24,35 @@ fn main() -> Result<(), Failure> {
             Vector3::new(0.3, -0.2, 0.1),
         ),
     ];
-    for (row, count) in counts.into_iter().enumerate() {
+    println!(
+        "| particles | precision | device, a frame at a time | device, frames in a row | adapter |\n|---|---|---|---|---|"
+    );
+    for count in counts {
         let start = fallen(count);
-        let mut device = GpuParticles::new(&constants, &obstacles, &start)?;
-        if row == 0 {
-            println!("adapter: {}\n", device.adapter());
-            println!("| particles | device, a frame at a time | device, frames in a row |\n|---|---|---|");
+        for precision in [Precision::Single, Precision::Double] {
+            let constants = FreeParticles { linear_drag: 0.1, precision, ..FreeParticles::default() };
+            match GpuParticles::new(&constants, &obstacles, &start) {
+                Ok(device) => row(count, precision, device)?,
+                Err(RenderError::Device { reason, .. }) if precision == Precision::Double => println!("{reason}"),
+                Err(other) => return Err(other.into()),
+            }
         }
-        device.advance(10)?; // pipelines and memory are made at the first
-        let begin = Instant::now();
-        for _ in 0..FRAMES {
-            device.advance(1)?;
-        }
-        let single = begin.elapsed();
-        let begin = Instant::now();
-        device.advance(FRAMES)?;
-        let all = begin.elapsed();
-        let ms = |time: Duration| 1e3 * time.as_secs_f64() / f64::from(FRAMES);
-        println!("| {count} | {:.3} | {:.3} |", ms(single), ms(all));
     }
+    Ok(())
+}
+
+fn row(count: usize, precision: Precision, mut device: GpuParticles) -> Result<(), Failure> {
+    device.advance(10)?; // pipelines and memory are made at the first
+    let begin = Instant::now();
+    for _ in 0..FRAMES {
+        device.advance(1)?;
+    }
+    let single = begin.elapsed();
+    let begin = Instant::now();
+    device.advance(FRAMES)?;
+    let all = begin.elapsed();
+    let ms = |time: Duration| 1e3 * time.as_secs_f64() / f64::from(FRAMES);
+    println!("| {count} | {precision:?} | {:.3} | {:.3} | {} |", ms(single), ms(all), device.adapter());
     Ok(())
 }
 

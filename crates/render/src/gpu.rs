@@ -26,7 +26,9 @@ pub(crate) use finish::{Around, Bend, Finish, Placed};
 use frame::Frame;
 use meshes::MeshCache;
 use nalgebra::Matrix4;
-pub use particles::{FreeParticle, FreeParticles, GpuParticles, MAX_OBSTACLES, MAX_PARTICLES, Obstacle, ObstacleShape};
+pub use particles::{
+    FreeParticle, FreeParticles, GpuParticles, MAX_OBSTACLES, MAX_PARTICLES, Obstacle, ObstacleShape, Precision,
+};
 use pipelines::Pipelines;
 pub use portable::{PortableDraw, PortableItems, PortableKey, PortablePicture};
 pub use recipe::{GlslProgram, GlslTranslator, Recipe, portable_wgsl};
@@ -347,14 +349,24 @@ impl Renderer {
 
 impl Gpu {
     async fn open(adapter: wgpu::Adapter) -> Result<Gpu, RenderError> {
+        Gpu::open_with(adapter, wgpu::Features::empty()).await
+    }
+
+    /// Opens an adapter with features beyond those that every device has.
+    async fn open_with(adapter: wgpu::Adapter, features: wgpu::Features) -> Result<Gpu, RenderError> {
         let info = adapter.get_info();
         let name = format!("{} ({:?}, {:?})", info.name, info.device_type, info.backend);
         let mut limits = wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits());
         limits.max_buffer_size = adapter.limits().max_buffer_size;
+        let lacking = features - adapter.features();
+        if !lacking.is_empty() {
+            return Err(RenderError::Device { adapter: name, reason: format!("it has no {lacking}") });
+        }
         let opengl = info.backend == wgpu::Backend::Gl;
         let asked = adapter
             .request_device(&wgpu::DeviceDescriptor {
                 label: Some("tumble"),
+                required_features: features,
                 required_limits: limits,
                 ..Default::default()
             })

@@ -47,8 +47,8 @@ pub use facet::{
 };
 pub use gpu::{
     FreeParticle, FreeParticles, GlslProgram, GlslTranslator, GpuParticles, MAX_OBSTACLES, MAX_PARTICLES, Obstacle,
-    ObstacleShape, PortableDraw, PortableItems, PortableKey, PortablePicture, Recipe, Renderer, Screen, Shown, Stage,
-    portable_wgsl,
+    ObstacleShape, PortableDraw, PortableItems, PortableKey, PortablePicture, Precision, Recipe, Renderer, Screen,
+    Shown, Stage, portable_wgsl,
 };
 pub use image::Image;
 pub use list::{

@@ -65,8 +65,9 @@ pub struct Drawing {
     unwrapped: Option<Vec<Unwrapped>>,
     base: DrawList,
     camera: Option<Camera>,
-    /// Number of spheres in the last list.
+    /// Numbers of spheres and of instances in the last list.
     spheres: usize,
+    instances: usize,
     /// Detail of all objects, if set; otherwise each object has its own.
     pub detail: Option<Detail>,
 }
@@ -119,6 +120,7 @@ impl Drawing {
             base,
             camera,
             spheres: 0,
+            instances: 0,
             detail: None,
         }
     }
@@ -131,6 +133,7 @@ impl Drawing {
         let (mut list, looks) = (self.base.clone(), world.looks());
         looks::change_lights(&mut list, &looks);
         list.spheres.reserve(self.spheres);
+        list.instances.reserve(self.instances);
         let mut placed = Placed::default();
         let tints =
             if overlays.sleep { Some(sleep_colors(world)) } else { overlays.islands.then(|| island_colors(world)) };
@@ -162,7 +165,7 @@ impl Drawing {
                 deforming::place_cloud(&mut list, name, cloud, tint);
             }
         }
-        self.spheres = list.spheres.len();
+        (self.spheres, self.instances) = (list.spheres.len(), list.instances.len());
         list.camera = self.camera.unwrap_or_else(|| list.framing_camera(Vector3::new(-0.5, 1.0, -0.5)));
         looks::change_camera(&mut list, &looks, world)?;
         overlays.draw(world, &mut list);

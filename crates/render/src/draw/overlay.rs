@@ -96,6 +96,9 @@ pub(super) const SHELL_COLORS: [[f32; 3]; 6] = [
 
 impl DebugDraw {
     pub(super) fn draw(&self, world: &World, list: &mut DrawList) {
+        if *self == DebugDraw::default() {
+            return;
+        }
         let size = ARROW * list.bounding_sphere(true).map_or(1.0, |(_, r)| r).clamp(0.05, 5.0);
         let largest = world.contacts().iter().map(|c| c.force.norm()).fold(0.0, f64::max);
         for contact in world.contacts().iter().filter(|c| c.depth >= -1e-3 || c.force.norm() > 0.0) {

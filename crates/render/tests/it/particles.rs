@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use tumble_behaviors::{ParticleSettings, ParticleSystem};
 use tumble_core::prelude::*;
-use tumble_render::{FreeParticle, FreeParticles, GpuParticles, Obstacle, ObstacleShape, RenderError};
+use tumble_render::{FreeParticle, FreeParticles, GpuParticles, Obstacle, ObstacleShape, Precision, RenderError};
 
 const DT: f64 = 1.0 / 60.0;
 
@@ -29,16 +29,19 @@ fn flown_by(
             on_gpu.advance(frames).unwrap();
             Some((on_gpu.read().unwrap(), on_gpu.adapter().to_owned()))
         }
-        Err(RenderError::NoAdapter { reason }) => {
-            // past the harness, which keeps what passing tests print
-            let _ = std::io::Write::write_fmt(
-                &mut std::io::stderr(),
-                format_args!("\nSKIPPED: no graphics adapter ({reason})\n"),
-            );
-            None
+        Err(RenderError::NoAdapter { reason }) => skipped(&format!("no graphics adapter ({reason})")),
+        Err(RenderError::Device { adapter, reason }) if constants.precision == Precision::Double => {
+            skipped(&format!("{adapter}: {reason}"))
         }
         Err(other) => panic!("an adapter exists and fails: {other}"),
     }
+}
+
+/// Prints why there is nothing to compare.
+fn skipped<T>(why: &str) -> Option<T> {
+    // past the harness, which keeps what passing tests print
+    let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: {why}\n"));
+    None
 }
 
 /// A fixed cloud of particles about a point.
@@ -111,40 +114,44 @@ fn ten_seconds_of_fall_with_linear_drag_are_those_of_the_closed_form() {
     for (drag, wind) in
         [(0.0, Vector3::zeros()), (0.01, Vector3::new(3.0, -1.0, 0.5)), (0.8, Vector3::new(0.0, 9.0, 0.0))]
     {
-        let constants = FreeParticles { linear_drag: drag, wind, ..FreeParticles::default() };
-        let start = cloud(1000, Vector3::new(0.0, 0.0, 20.0), 10.0, 30.0);
-        let Some(end) = flown(&constants, &[], &start, 600) else { return };
-        let mut worst = 0.0f64;
-        for (start, end) in start.iter().zip(&end) {
-            let (t, g) = (10.0, constants.gravity);
-            // x = x₀ + w_∞·t + (v₀ − w_∞)·(1 − e^{−d·t})/d,  w_∞ = w + g/d
-            let exact = if drag == 0.0 {
-                start.position + t * start.velocity + 0.5 * t * t * g
-            } else {
-                let last = wind + g / drag;
-                start.position + t * last + (start.velocity - last) * -(-drag * t).exp_m1() / drag
-            };
-            worst = worst.max((end.position - exact).norm() / exact.norm().max(1.0));
-            assert!((end.life - (1e6 - t)).abs() < 1e-6);
+        for (precision, bound) in [(Precision::Single, 2e-6), (Precision::Double, 1e-13)] {
+            let constants = FreeParticles { linear_drag: drag, wind, precision, ..FreeParticles::default() };
+            let start = cloud(1000, Vector3::new(0.0, 0.0, 20.0), 10.0, 30.0);
+            let Some(end) = flown(&constants, &[], &start, 600) else { return };
+            let mut worst = 0.0f64;
+            for (start, end) in start.iter().zip(&end) {
+                let (t, g) = (10.0, constants.gravity);
+                // x = x₀ + w_∞·t + (v₀ − w_∞)·(1 − e^{−d·t})/d,  w_∞ = w + g/d
+                let exact = if drag == 0.0 {
+                    start.position + t * start.velocity + 0.5 * t * t * g
+                } else {
+                    let last = wind + g / drag;
+                    start.position + t * last + (start.velocity - last) * -(-drag * t).exp_m1() / drag
+                };
+                worst = worst.max((end.position - exact).norm() / exact.norm().max(1.0));
+                assert!((end.life - (1e6 - t)).abs() < 1e-6);
+            }
+            println!("drag {drag}, {precision:?}: {worst:.1e} of the distance from the origin");
+            assert!(worst < bound, "{worst:e}");
         }
-        println!("drag {drag}: {worst:.1e} of the distance from the origin");
-        assert!(worst < 2e-6, "{worst:e}");
     }
 }
 
 #[test]
 fn quadratic_drag_is_that_of_the_processor() {
-    let constants =
-        FreeParticles { quadratic_drag: 0.05, wind: Vector3::new(4.0, 0.0, 1.0), ..FreeParticles::default() };
-    let start = cloud(500, Vector3::new(0.0, 0.0, 50.0), 5.0, 40.0);
-    let Some(end) = flown(&constants, &[], &start, 600) else { return };
-    let worst = largest(&deviations(&end, &in_a_world(&constants, &[], &start, 600)));
-    println!("{worst:.1e}");
-    assert!(worst < 1e-5, "{worst:e}");
+    for (precision, bound) in [(Precision::Single, 1e-5), (Precision::Double, 1e-12)] {
+        let wind = Vector3::new(4.0, 0.0, 1.0);
+        let constants = FreeParticles { quadratic_drag: 0.05, wind, precision, ..FreeParticles::default() };
+        let start = cloud(500, Vector3::new(0.0, 0.0, 50.0), 5.0, 40.0);
+        let Some(end) = flown(&constants, &[], &start, 600) else { return };
+        let worst = largest(&deviations(&end, &in_a_world(&constants, &[], &start, 600)));
+        println!("{precision:?}: {worst:.1e}");
+        assert!(worst < bound, "{worst:e}");
+    }
 }
 
-#[test]
-fn ten_seconds_of_bounces_are_those_of_the_processor() {
+/// Drag, wind, and a slope, a sphere and a box.
+fn bumpy(precision: Precision) -> (FreeParticles, [Obstacle; 3]) {
     let obstacle = |shape, x: f64, y: f64, z: f64, turn: Vector3<f64>| Obstacle {
         shape,
         pose: Isometry3::from_parts(Vector3::new(x, y, z).into(), UnitQuaternion::from_scaled_axis(turn)),
@@ -154,15 +161,33 @@ fn ten_seconds_of_bounces_are_those_of_the_processor() {
     let ground = obstacle(ObstacleShape::HalfSpace, 0.0, 0.0, 0.0, Vector3::new(0.05, 0.02, 0.0));
     let ball = obstacle(ObstacleShape::Sphere(1.5), 2.0, 0.0, 0.5, Vector3::zeros());
     let block = obstacle(ObstacleShape::Box(Vector3::new(3.0, 3.0, 1.0)), -2.0, 0.0, 0.6, Vector3::new(0.3, -0.2, 0.1));
-    let constants = FreeParticles { linear_drag: 0.1, wind: Vector3::new(0.3, 0.2, 0.0), ..FreeParticles::default() };
+    let wind = Vector3::new(0.3, 0.2, 0.0);
+    let constants = FreeParticles { linear_drag: 0.1, wind, precision, ..FreeParticles::default() };
+    (constants, [ground, ball, block])
+}
+
+#[test]
+fn ten_seconds_of_bounces_are_those_of_the_processor() {
+    let (constants, things) = bumpy(Precision::Double);
+    for (count, things) in [(400, &things[..1]), (400, &things), (4000, &things)] {
+        let start = cloud(count, Vector3::new(0.0, 0.0, 6.0), 3.0, 2.0);
+        let Some((end, adapter)) = flown_by(&constants, things, &start, 600) else { return };
+        let worst = largest(&deviations(&end, &in_a_world(&constants, things, &start, 600)));
+        println!("{} things, {count} particles on {adapter}: worst {worst:.1e}", things.len());
+        assert!(worst < 1e-8, "{worst:e}");
+    }
+}
+
+#[test]
+fn ten_seconds_of_bounces_in_single_precision() {
+    let (constants, things) = bumpy(Precision::Single);
     let start = cloud(400, Vector3::new(0.0, 0.0, 6.0), 3.0, 2.0);
-    let Some(on_ground) = flown(&constants, &[ground], &start, 600) else { return };
-    let worst = largest(&deviations(&on_ground, &in_a_world(&constants, &[ground], &start, 600)));
+    let Some(on_ground) = flown(&constants, &things[..1], &start, 600) else { return };
+    let worst = largest(&deviations(&on_ground, &in_a_world(&constants, &things[..1], &start, 600)));
     println!("on the ground: worst {worst:.1e}");
     assert!(worst < 1e-5, "{worst:e}");
 
     // A sphere and the edges of a box part neighbors, so that a difference of rounding grows.
-    let things = [ground, ball, block];
     let compared = |start: &[FreeParticle]| {
         let (end, adapter) = flown_by(&constants, &things, start, 600)?;
         Some((deviations(&end, &in_a_world(&constants, &things, start, 600)), adapter))
