@@ -96,7 +96,7 @@ pub(crate) struct Hit {
 
 /// Smallest cosine between the negative normal of an element and the normal of a surface that it
 /// can touch: about 1° from perpendicular.
-const FACING: f64 = 0.02;
+pub(crate) const FACING: f64 = 0.02;
 
 /// Returns whether an element with these outward normals can touch a surface with outward normal
 /// `normal`. Example: the corner of a box on another box of the same size touches its top, not its

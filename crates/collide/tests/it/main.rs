@@ -11,6 +11,7 @@ mod buried;
 mod compound;
 mod deep_overlaps;
 mod distances;
+mod head_on;
 mod hull;
 mod hull_contacts;
 mod isosurface;

@@ -34,6 +34,24 @@ pub enum StepError {
         /// Simulated time, s.
         time: f64,
     },
+    /// A part flies away, which is an instability: of an explicit force, or of the step.
+    #[error(
+        "'{object}' at t = {time} s: part {part} flies away: {what}, is {value:e}, at most {most:e} is admissible; shorten dt, or look at the forces given to it: one that a program computes from the velocity is stable for |dF/dv| below 2·mass/dt"
+    )]
+    Runaway {
+        /// Object.
+        object: String,
+        /// Part of the object: a link of an articulated body, 0 of a rigid body.
+        part: usize,
+        /// The quantity, with its unit: the speed of the part's surface or its distance from the origin.
+        what: &'static str,
+        /// Its value, m/s or m.
+        value: f64,
+        /// Largest admissible value, m/s or m.
+        most: f64,
+        /// Simulated time, s.
+        time: f64,
+    },
     /// An object's mass matrix is singular.
     #[error("'{object}' at t = {time} s: {why}")]
     Singular {

@@ -15,6 +15,7 @@ mod pair_materials;
 mod pick;
 mod query;
 mod replica;
+mod runaway;
 pub(crate) mod script;
 mod sensors;
 pub(crate) mod sleep;
@@ -176,7 +177,8 @@ impl World {
             let followed = |again: bool| match again {
                 true => Ok(true),
                 false => core
-                    .advance_frame_states(self.before.time, &self.parts_before)
+                    .check_runaway()
+                    .and_then(|()| core.advance_frame_states(self.before.time, &self.parts_before))
                     .and_then(|()| core.read_sensors(&self.parts_before))
                     .map(|()| false),
             };

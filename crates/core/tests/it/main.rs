@@ -67,6 +67,7 @@ mod random_scenes;
 mod regressions;
 mod regressions_articulated;
 mod regressions_rows;
+mod runaway;
 mod scripted_events;
 mod scripted_splines;
 mod sensor_noise;

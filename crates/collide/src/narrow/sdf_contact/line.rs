@@ -26,7 +26,7 @@ use super::hyperbola::Hyperbola;
 use super::query::{Normals, Query};
 use super::tolerances::{FLAT_SLOPE, LEVEL_SLOPE, MAX_PIECE, SLOPE_ROUNDING};
 use crate::sdf::elements::{Edge, max_slope};
-use crate::sdf::{Feature, Hit, TOUCHING, facing};
+use crate::sdf::{FACING, Feature, Hit, TOUCHING, facing};
 use crate::{NormalFrom, Vec3};
 use nalgebra::RealField;
 
@@ -41,6 +41,8 @@ const MAX_SAMPLES: usize = 90;
 const MAX_SPLITS: u32 = 5;
 /// Smallest distance of a foot from an existing sample, as a fraction of the remaining interval.
 const MIN_FOOT_OFFSET: f64 = 1e-6;
+/// Least depth below a face that is not the nearest one at which walls in front of an edge are looked for, in the same unit.
+const OTHER_FACE: f64 = 1e-6;
 /// Distance below a tangent that exceeds rounding, as a fraction of the smaller body's radius.
 const CONVEXITY_TOLERANCE: f64 = 1e-9;
 
@@ -168,10 +170,24 @@ impl Query<'_> {
         let name = end.and_then(|end: usize| line.edge.map(|edge| edge.points[end]));
         let at = line.at(s);
         let hit = self.hit_at(&at, name, line.normals, TOUCHING);
+        let hit = self.wall_in_front(line, s, &hit).unwrap_or(hit);
         let slope = hit.normal.dot(&line.along);
         // the surface of a round element is its radius away only perpendicular to the axis
         self.record(&hit, if slope.abs() <= SLOPE_ROUNDING { line.radius } else { 0.0 });
         Sample { s, slope, hit }
+    }
+
+    /// Returns the hit of the nearest wall at `s` if an end of the edge meets that wall head-on and is less deep in it than
+    /// in the face of `hit`, which lies further away: the wall stops the end, whose vertex makes the contact.
+    fn wall_in_front(&self, line: &Line, s: f64, hit: &Hit) -> Option<Hit> {
+        if hit.distance >= hit.nearest.min(-OTHER_FACE * self.size) || line.normals.is_empty() {
+            return None;
+        }
+        let wall = self.field.hit(&line.at(s), &[], TOUCHING);
+        let is_in_front = line.normals.iter().all(|n| n.dot(&wall.normal).abs() <= FACING);
+        let rise = wall.normal.dot(&line.along);
+        let lowest = wall.distance - (rise * s).max(rise * (s - line.length));
+        (is_in_front && lowest > hit.distance).then_some(Hit { facing: false, ..wall })
     }
 
     /// Searches between two samples: the minimum, if it is not at one of them, and the exit from a
