@@ -104,9 +104,14 @@ def cave(scene, time, folder):
     # facets take the server for dead that sends nothing for seconds, so frames are short; the frame after the shown one waits for it
     words += ["--fps", CAVE_FPS, "--duration", time + 1 / CAVE_FPS]
     subprocess.run([str(TUMBLE), "cave", *map(str, words)], check=True, timeout=TIME_OUT, stdin=subprocess.DEVNULL, capture_output=True)
-    shown = f"frame_{CAVE_FPS * time:06}.png"
+    facets = (("left", (0, 0)), ("front", (1, 0)), ("right", (2, 0)), ("floor", (1, 1)))
+    # a facet that is late on a loaded machine leaves frames out
+    whole = set.intersection(*({path.name for path in (Path(folder) / facet).glob("frame_*.png")} for facet, _ in facets))
+    shown = max((name for name in whole if name <= f"frame_{CAVE_FPS * time:06}.png"), default="")
+    if shown < f"frame_{CAVE_FPS * (time - 1):06}.png":
+        sys.exit(f"error: no frame of the last second of {scene} was shown by all facets; the machine is too slow or too busy")
     unfolded = Image.new("RGB", (3 * WALL, 2 * WALL), "white")
-    for facet, place in (("left", (0, 0)), ("front", (1, 0)), ("right", (2, 0)), ("floor", (1, 1))):
+    for facet, place in facets:
         wall = Image.open(Path(folder) / facet / shown).convert("RGB").resize((WALL, WALL), Image.Resampling.BOX)
         unfolded.paste(wall, tuple(WALL * number for number in place))
     return [unfolded]
