@@ -38,6 +38,11 @@ impl Branches {
         (self.active, self.log) = (true, Mutex::default());
     }
 
+    /// Whether branches are recorded or repeated: the step is that of a linearization.
+    pub fn are_recorded(&self) -> bool {
+        self.active
+    }
+
     /// Starts to repeat what was recorded, from its begin.
     pub fn repeat(&mut self) {
         let log = self.log.get_mut().unwrap_or_else(PoisonError::into_inner);

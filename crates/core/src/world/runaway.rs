@@ -34,6 +34,9 @@ impl Core {
     /// # Errors
     /// [`StepError::Runaway`] for the first one.
     pub(super) fn check_runaway(&self) -> Result<(), StepError> {
+        if self.branches.are_recorded() {
+            return Ok(()); // with its choices held, an undetermined problem has solutions of any size: the linearization says so
+        }
         let part_states = &self.derived.part_states;
         let found = |e: &Entry| {
             let shape = |part: usize| e.object.collidable().and_then(|body| body.shape(part));
