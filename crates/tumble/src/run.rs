@@ -122,7 +122,13 @@ fn simulate(
     let mut outcome = divergence::check(world);
     for frame in 1..=frames {
         let clock = Instant::now();
-        let report = *world.step().map_err(|e| Failure::run("the simulation stopped", e))?;
+        let report = match world.step() {
+            Ok(report) => *report,
+            Err(e) => {
+                outcome = Err(Failure::run("the simulation stopped", e));
+                break;
+            }
+        };
         let taken = clock.elapsed().as_secs_f64();
         tally.add(&report, taken);
         wall += taken;
