@@ -5,11 +5,12 @@
 //! y_k = b_k            height of the tip of the pin on the key
 //! ```
 
+use super::grid::Grid;
 use super::thread::Parts;
 use super::*;
 
 /// The trees of the parts group their vertices; those of octrees are built at once.
-fn shape(mesh: TriMesh) -> Shape {
+pub fn shape(mesh: TriMesh) -> Shape {
     Shape::mesh(mesh, &TreeSettings::octree()).unwrap()
 }
 
@@ -59,48 +60,13 @@ fn solid(radii: &[f64], filled: impl Fn(usize, usize, usize) -> bool) -> TriMesh
     let mut planes: Vec<f64> = (0..5).flat_map(|k| [hole(k) - WIDE, hole(k) + WIDE]).collect();
     planes.insert(0, -0.075);
     planes.push(0.075);
-    let (rows, layers) = (radii.len() - 1, planes.len() - 1);
-    let mut number = vec![u32::MAX; radii.len() * COLUMNS * planes.len()];
-    let mut out = Parts::default();
     let rings: Vec<_> = radii.iter().map(|r| ring(*r)).collect();
-    let mut corner = |out: &mut Parts, [i, j, k]: [usize; 3]| {
-        let (j, at) = (j % COLUMNS, (i * COLUMNS + j % COLUMNS) * planes.len() + k);
-        if number[at] == u32::MAX {
-            number[at] = out.vertices.len() as u32;
-            out.vertices.push(Vec3::new(rings[i][j][0], rings[i][j][1], planes[k]));
-        }
-        number[at]
-    };
-    // the outside of a cell on each side: its corners clockwise, since the grid is left-handed
-    const SIDES: [([isize; 3], [[usize; 3]; 4]); 6] = [
-        ([-1, 0, 0], [[0, 0, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1]]),
-        ([1, 0, 0], [[1, 0, 0], [1, 0, 1], [1, 1, 1], [1, 1, 0]]),
-        ([0, -1, 0], [[0, 0, 0], [0, 0, 1], [1, 0, 1], [1, 0, 0]]),
-        ([0, 1, 0], [[0, 1, 0], [1, 1, 0], [1, 1, 1], [0, 1, 1]]),
-        ([0, 0, -1], [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]),
-        ([0, 0, 1], [[0, 0, 1], [0, 1, 1], [1, 1, 1], [1, 0, 1]]),
-    ];
-    let is_filled = |i: isize, j: isize, k: isize| {
-        let within = i >= 0 && i < rows as isize && k >= 0 && k < layers as isize;
-        within && filled(i as usize, j.rem_euclid(COLUMNS as isize) as usize, k as usize)
-    };
-    for n in 0..rows * COLUMNS * layers {
-        let (i, j, k) = (n / layers / COLUMNS, n / layers % COLUMNS, n % layers);
-        if !filled(i, j, k) {
-            continue;
-        }
-        for (way, corners) in SIDES {
-            if !is_filled(i as isize + way[0], j as isize + way[1], k as isize + way[2]) {
-                let [a, b, c, d] = corners.map(|[x, y, z]| corner(&mut out, [i + x, j + y, k + z]));
-                out.quad(a, b, c, d);
-            }
-        }
-    }
-    out.mesh()
+    let grid = Grid { counts: [radii.len() - 1, COLUMNS, planes.len() - 1], wraps: true };
+    grid.mesh(|[i, j, k]| Vec3::new(rings[i][j][0], rings[i][j][1], planes[k]), filled)
 }
 
 /// Returns the mesh of rectangles of half width `half` along x, from `low` to `high` along y, at each z.
-fn loft(sections: &[(f64, f64, f64)], half: f64) -> TriMesh {
+pub fn loft(sections: &[(f64, f64, f64)], half: f64) -> TriMesh {
     let mut out = Parts::default();
     for &(z, low, high) in sections {
         out.vertices.extend([(-half, low), (half, low), (half, high), (-half, high)].map(|(x, y)| Vec3::new(x, y, z)));

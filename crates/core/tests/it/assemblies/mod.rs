@@ -1,9 +1,11 @@
 //! Assemblies from raw meshes: the contacts alone guide the parts, as they do real ones.
 
 mod gear;
+mod grid;
 mod lock;
 mod thread;
 mod worm;
+mod zipper;
 
 use crate::common::*;
 use gear::Gear;
