@@ -22,10 +22,10 @@ const PITCH: f64 = 0.020;
 const BASE: f64 = 0.0075;
 const NECK: f64 = 0.0033;
 const HALF: f64 = 0.005;
-/// Play of heads, of teeth between the walls of the slider, and between its plates, m.
+/// Play of heads, of teeth between the walls of the slider, and above its plate, m.
 const PLAY: f64 = 0.0002;
 const WALL: f64 = 0.0008;
-const LID: f64 = 0.0005;
+const LID: f64 = 0.001;
 /// Half the distance between closed tapes, radius of the bend of a tape in the slider, m, and its angle, rad.
 const APART: f64 = 0.0114;
 const BEND: f64 = 0.080;
@@ -95,7 +95,7 @@ fn line(s: f64) -> ([f64; 2], f64) {
     ([-APART - BEND * (1.0 - cos) - beyond * sin, BEND * sin + beyond * cos], angle)
 }
 
-/// Returns a slider for teeth: two plates, the walls that close the tapes and the wedge that opens them.
+/// Returns a slider for teeth: a plate, the walls that close the tapes and the wedge that opens them.
 fn slider(tooth: Tooth) -> TriMesh {
     const ROWS: usize = 24;
     const EDGE: f64 = 0.0015;
@@ -113,7 +113,7 @@ fn slider(tooth: Tooth) -> TriMesh {
     let wall = |i: usize| beside(stations[i], -BASE - WALL);
     let wedge = |i: usize| beside(stations[i], tooth.reach() + tooth.head + WALL);
     let side = wall(ROWS)[0] - 0.006;
-    let layers = [-HALF - LID - 0.003, -HALF - LID, HALF + LID, HALF + LID + 0.003];
+    let layers = [-HALF - LID - 0.004, -HALF - LID, HALF];
     let place = |[i, j, k]: [usize; 3]| {
         let (column, sign) = if j < 3 { (j, 1.0) } else { (5 - j, -1.0) };
         let [x, y] = match column {
@@ -123,7 +123,7 @@ fn slider(tooth: Tooth) -> TriMesh {
         };
         Vec3::new(sign * x, y, layers[k])
     };
-    Grid { counts: [ROWS, 5, 3], wraps: false }
+    Grid { counts: [ROWS, 5, 2], wraps: false }
         .mesh(place, |i, j, k| k != 1 || matches!(j, 0 | 4) || j == 2 && wedge(i)[0] < -EDGE)
 }
 
