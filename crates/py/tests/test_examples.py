@@ -24,6 +24,7 @@ WORDS = {  # what must stand in the output, beside what each script asserts itse
     "rollout_control": "touched: False",
     "sphere_tree": "level 2: 64 balls",
     "worm_gear": "by theory -0.8378",
+    "zipper": "closed: slider at 199 mm, tapes 1.0 mm apart, hooks of 5.0 mm\npulled: slider at 199 mm, tapes 1.0 mm apart",
     "wind_force": "falling at 0.981 m/s",
 }
 

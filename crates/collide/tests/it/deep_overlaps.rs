@@ -146,7 +146,7 @@ fn random_pair(rng: &mut Rng, a: &Shape, b: &Shape) -> [Pose; 2] {
 }
 
 #[test]
-fn contacts_of_deep_overlaps_lie_at_both_bodies() {
+fn contacts_of_deep_overlaps_lie_at_both_bodies_full_length() {
     let (shapes, margin) = (shapes(), 0.01);
     let pairs: Vec<_> = (0..shapes.len()).flat_map(|i| (i.max(1)..shapes.len()).map(move |j| (i, j))).collect();
     let each = if slow() { 1_000_000 / pairs.len() + 1 } else { 200 };
@@ -207,7 +207,7 @@ fn least_translation(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> f64 {
 /// radius: the deepest contact is as deep as the translation along its normal, which is least. Also
 /// no deeper than parry's, which is EPA.
 #[test]
-fn deep_curved_pairs_have_the_least_translation() {
+fn deep_curved_pairs_have_the_least_translation_full_length() {
     let shapes = shapes();
     let find = |name: &str| &shapes.iter().find(|s| s.0 == name).unwrap().1;
     let round = ["cylinder", "disc", "rod"];

@@ -69,7 +69,7 @@ fn run(world: &mut World, seconds: f64, mut each: impl FnMut(&mut World)) -> f64
 /// A nut of two turns on a bolt, under its own weight, turned up and down by a torque: it moves by the pitch in each turn.
 /// Within the play of 0.1 mm it may tilt and lift.
 #[test]
-fn a_nut_climbs_a_bolt_by_its_pitch() {
+fn a_nut_climbs_a_bolt_by_its_pitch_full_length() {
     let turns = if slow() { 10.0 } else { 1.0 };
     let thread = Thread { pitch: 0.004, root: 0.0084, crest: 0.010, facets: 64, turns: 14 };
     let (bolt, nut) = (thread.bolt(0.016), Thread { turns: 2, ..thread }.nut(0.0001, 0.017));
@@ -113,7 +113,7 @@ fn a_nut_climbs_a_bolt_by_its_pitch() {
 
 /// Two spur gears on hinges: the wheel follows the pinion within their play, over any number of turns.
 #[test]
-fn spur_gears_keep_their_ratio() {
+fn spur_gears_keep_their_ratio_full_length() {
     let turns = if slow() { 100.0 } else { 4.0 };
     let pinion = Gear { module: 0.004, teeth: 20, play: 0.0002, width: 0.02, points: 8 };
     let wheel = Gear { teeth: 30, width: 0.018, ..pinion };

@@ -82,7 +82,7 @@ fn angle(world: &World, axle: &str) -> f64 {
 
 /// The wheel follows the worm by a tooth in each turn, within the play.
 #[test]
-fn a_worm_turns_its_wheel_by_a_tooth_in_a_turn() {
+fn a_worm_turns_its_wheel_by_a_tooth_in_a_turn_full_length() {
     let seconds = if slow() { 30.0 } else { 2.0 };
     let drive = Drive::Velocity { target: 2.0 * TAU, limit: f64::INFINITY };
     let (mut world, [worm, _], triangles) = gearbox(0.05, drive, 0.01);

@@ -30,7 +30,7 @@ const LID: f64 = 0.001;
 const APART: f64 = 0.0114;
 const BEND: f64 = 0.080;
 const ANGLE: f64 = std::f64::consts::FRAC_PI_6;
-/// What pulls each tooth away from the other tape, as cloth does, N.
+/// Force on each tooth away from the other tape, as of cloth, N.
 const TENSION: f64 = 0.2;
 /// Lengths of the throat and of the straight part of the slider, m.
 const THROAT: f64 = 0.030;
