@@ -37,11 +37,11 @@ def slider():  # a closed mesh of the filled cells of a grid: a plate, the walls
 
 world, teeth, tapes, overlap, height = tumble.World(gravity=(0, 0, 0)), tooth(), [], 0.0, 0.03
 for side, foot, turned, color in ((-1, 0.0, (0, 0, 0, 1), (0.8, 0.6, 0.2)), (1, -PITCH / 2, (0, 1, 0, 0), (0.3, 0.5, 0.8))):
-    tape = tumble.ArticulationBuilder(f"tape {side}", self_collision=False)
+    chain = tumble.ArticulationBuilder(f"tape {side}", self_collision=False)
     for k, lean in enumerate(np.diff(-side * line(PITCH * (np.arange(TEETH) + 0.5) + foot - height)[1], prepend=0)):
         at = {"position": (0, PITCH, 0) if k else (side * APART, foot, 0), "shape_position": (0, PITCH / 2, 0), "shape_orientation": turned}
-        tape.add_link(f"tooth {k}", f"tooth {k - 1}" if k else None, **at, shape=teeth, density=7800, joint_damping=0.002, friction=0.1, q=lean, color=color)
-    tapes.append((side, world.add_articulation(tape)))
+        chain.add_link(f"tooth {k}", f"tooth {k - 1}" if k else None, **at, shape=teeth, density=7800, joint_damping=0.002, friction=0.1, q=lean, color=color)
+    tapes.append((side, world.add_articulation(chain)))
 pull = world.add_rigid("slider", slider(), position=(0, height, 0), density=7800, friction=0.1)
 world.add_joint("prismatic", pull, point=(0, 0, 0), axis=(0, 1, 0))
 for state, seconds, height, tension in (("closed", 1.25, 0.2, 0.2), ("pulled", 0.25, None, 5.0), ("opened", 0.75, 0.1, 0.2), ("pulled", 0.1, None, 5.0)):
