@@ -50,7 +50,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         times.push(begun.elapsed().as_secs_f64() / f64::from(steps) * 1e6);
     }
     times.sort_by(f64::total_cmp);
-    let bytes: u64 = world.state().iter().fold(0, |h: u64, x| h.rotate_left(7) ^ x.to_bits().wrapping_mul(0x9E37_79B9_7F4A_7C15));
-    println!("{path}: {dof} dof, {:.2} us per step (least {:.2}), state {bytes:016x}, {} contacts, {:?}", times[times.len() / 2], times[0], world.contacts().len(), world.report());
+    let bytes: u64 =
+        world.state().iter().fold(0, |h: u64, x| h.rotate_left(7) ^ x.to_bits().wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    println!(
+        "{path}: {dof} dof, {:.2} us per step (least {:.2}), state {bytes:016x}, {} contacts, {:?}",
+        times[times.len() / 2],
+        times[0],
+        world.contacts().len(),
+        world.report()
+    );
     Ok(())
 }
