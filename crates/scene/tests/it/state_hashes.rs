@@ -50,14 +50,14 @@ table! {
     [1.0, 10.0];
     billiards_time_stepping: "billiards", TimeStepping, "a324bc50eab8fdec", "5ba2a1c2fde17086";
     billiards_backtracking: "billiards", Backtracking, "33f9123d30fcbc15", "84b5733c3c00771e";
-    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "fd8067441d6ed9d0";
-    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "4abb236bd503532e";
+    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "682a692bbe809d5e";
+    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "5b3b4039f014f3be";
     chain_time_stepping: "chain", TimeStepping, "f47e2b35690a2684", "ee8524465209ed50";
     chain_backtracking: "chain", Backtracking, "90d13d3b09555754", "51cdc3e8ded0b2fb";
-    falling_time_stepping: "falling", TimeStepping, "396dc7652d7cbc24", "57b50c4d9056a51d";
+    falling_time_stepping: "falling", TimeStepping, "be3988048208f897", "f93c0dd439b1b701";
     flock_time_stepping: "flock", TimeStepping, "e41e23ddcc483acc", "1855f9c020bc971a";
     flock_backtracking: "flock", Backtracking, "af789340dc0ef11e", "6faef2e76a3efc30";
-    falling_backtracking: "falling", Backtracking, "ad6040547e5223bf", "cf8c47082dcef84c";
+    falling_backtracking: "falling", Backtracking, "2b00009a085184fe", "7bfc4560967d462c";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "f953d1e35a61b08a", "188ead72ee20f94b";
     pendulum_time_stepping: "pendulum", TimeStepping, "a6f0f0b542061dc2", "63acd1d2fe930652";
@@ -85,7 +85,7 @@ table! {
     campfire_time_stepping: "campfire", TimeStepping, "b2b53ea54d16087f", "07e5ef35c0df9446";
     campfire_backtracking: "campfire", Backtracking, "b2b53ea54d16087f", "07e5ef35c0df9446";
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
-    marble_run_time_stepping: "marble_run", TimeStepping, "a6aa80e60f400a7a", "80f2216852c0c445";
+    marble_run_time_stepping: "marble_run", TimeStepping, "a6aa80e60f400a7a", "e6aff00ba5a5b496";
     marble_run_backtracking: "marble_run", Backtracking, "d233e2869b9ec085", "34fcf1baf6fda38f";
     newtons_cradle_time_stepping: "newtons_cradle", TimeStepping, "241aa3d8432a474e", "8a992d40dc67236d";
     newtons_cradle_backtracking: "newtons_cradle", Backtracking, "1a0128aa197a01fb", "ecc9f19bdcb9f483";
