@@ -275,6 +275,9 @@ impl Detector<'_> {
         }
         walk.parts.iter().fold(false, |changed, range| {
             let first = range.start;
+            if range.len() < 2 * PARTS {
+                return write(first, &mut bounds[range]) | changed;
+            }
             let pieces = threads.each_piece(&mut bounds[range], 1, PARTS, |from, bounds| write(first + from, bounds));
             pieces.contains(&true) | changed
         })

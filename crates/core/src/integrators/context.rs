@@ -64,10 +64,11 @@ impl IntegrationContext<'_> {
     /// object to `dp`, and accelerations to the part states.
     pub fn evaluate(&mut self, t: f64, dp: &mut [f64]) {
         self.refresh();
-        let forces = self.objects().iter().any(|e| e.status.enabled && e.object.force().is_some());
-        match forces {
-            true => self.applied.clone_into(&mut self.forces.wrenches), // they may act on settled objects
-            false => self.table.walk.parts.copy(self.applied, &mut self.forces.wrenches),
+        let act = || self.objects().iter().any(|e| e.status.enabled && e.object.force().is_some());
+        if self.table.walk.is_whole() || act() {
+            self.applied.clone_into(&mut self.forces.wrenches); // forces may act on settled objects
+        } else {
+            self.table.walk.parts.copy(self.applied, &mut self.forces.wrenches);
         }
         for (wrench, held) in self.forces.wrenches.iter_mut().zip(self.held_wrenches) {
             wrench.force += held.force;

@@ -415,7 +415,7 @@ impl Core {
         if self.branches.are_recorded() {
             return;
         }
-        let forces = self.has_forces();
+        let forces = !self.state.groups.is_empty() && self.has_forces();
         let Core { table, state, .. } = self;
         let (placed, objects) = (&table.placed, &state.objects);
         table.walk.settle(|place| {

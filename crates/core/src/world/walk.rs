@@ -16,7 +16,7 @@
 
 use std::ops::Range;
 
-/// What a step knows of the rest of an object.
+/// State of rest of an object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Rest {
     #[default]
@@ -71,7 +71,7 @@ pub(crate) struct Walk {
     pub settlings: u64,
     /// Changes when an object is added or removed.
     pub layout: u64,
-    /// What the spans below are of.
+    /// Value of `changes` plus 1 at which the spans below were measured.
     spans_of: u64,
     /// Ranges of the walked objects in `X`, and in the part table.
     pub x: Spans,
@@ -154,8 +154,8 @@ impl Walk {
         }
     }
 
-    /// Ends a frame: walked objects that `rest` are resting, those that rested before too are
-    /// settled. They are settled in numbers only, since copies of the whole state follow.
+    /// Ends a frame: walked objects for which `rests` returns whether they sleep are resting, and those that were
+    /// resting before the frame are settled. Copies of the whole state follow, so few objects wait for more.
     pub fn settle(&mut self, rests: impl Fn(usize) -> Option<bool>) {
         let resting = |rest: &[Rest], place: u32| rest[place as usize] == Rest::Resting;
         let rested = self.places.iter().filter(|&&place| resting(&self.rest, place));
@@ -180,8 +180,8 @@ impl Walk {
     }
 }
 
-/// Objects settle when there is one in so many: the copies of the whole state then cost less than
-/// the walks that they save.
+/// Objects settle when they are at least one in this number: copies of the whole state then cost less
+/// than the walks that they save.
 const SHARE: usize = 256;
 
 #[cfg(test)]
