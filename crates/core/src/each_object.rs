@@ -31,7 +31,7 @@ pub(crate) struct Own<'a> {
     pub part_states: &'a mut [PartState],
 }
 
-/// Calls `work` for every object with its numbers. The objects may be on several threads at once.
+/// Calls `work` for every object that a step walks with its numbers. The objects may be on several threads at once.
 pub(crate) fn each_object(threads: &Threads, objects: Objects, numbers: Numbers, work: impl Fn(&Entry, Own) + Sync) {
     let Numbers { caches, x, v, w, part_states } = numbers;
     let mut rest = Slices {
@@ -41,43 +41,46 @@ pub(crate) fn each_object(threads: &Threads, objects: Objects, numbers: Numbers,
         w: Slice { start: 0, numbers: w },
         part_states: Slice { start: 0, numbers: part_states },
     };
-    let count = objects.table.placed.len();
+    let walked = &objects.table.walk.places;
+    let count = walked.len();
     if threads.count() == 1 || count < 2 * OBJECTS {
-        return rest.walk(objects, 0..count, &work);
+        return rest.walk(objects, walked, &work);
     }
     let places = threads.pieces(count, OBJECTS);
-    let pieces: Vec<(Range<usize>, Slices)> = places
+    let pieces: Vec<(&[u32], Slices)> = places
         .into_iter()
         .map(|places| {
-            let ends = &objects.table.placed[places.end - 1].state_range;
+            let last = walked[places.end - 1] as usize;
+            let ends = &objects.table.placed[last].state_range;
             let piece = Slices {
-                caches: rest.caches.take(places.end),
+                caches: rest.caches.take(last + 1),
                 x: rest.x.take(ends.x.end),
                 v: rest.v.take(ends.v.end),
                 w: rest.w.take(ends.v.end),
                 part_states: rest.part_states.take(ends.parts.end),
             };
-            (places, piece)
+            (&walked[places], piece)
         })
         .collect();
     threads.each(pieces, |(places, mut slices)| slices.walk(objects, places, &work));
 }
 
-/// Returns the first object, in the order of adding, of which `is` is true.
+/// Returns the first walked object, in the order of adding, of which `is` is true.
 pub(crate) fn first_object<'a>(
     threads: &Threads,
     objects: Objects<'a>,
     is: impl Fn(&Entry) -> bool + Sync,
 ) -> Option<Entry<'a>> {
+    let walked = &objects.table.walk.places;
     let mut found: Vec<(Range<usize>, Option<usize>)> =
-        threads.pieces(objects.table.placed.len(), OBJECTS).into_iter().map(|places| (places, None)).collect();
+        threads.pieces(walked.len(), OBJECTS).into_iter().map(|places| (places, None)).collect();
     threads.each(&mut found[..], |(places, found)| {
-        *found = places.clone().find(|place| is(&objects.at(*place)));
+        *found = walked[places.clone()].iter().map(|&place| place as usize).find(|place| is(&objects.at(*place)));
     });
     found.into_iter().find_map(|(_, place)| place).map(|place| objects.at(place))
 }
 
-/// The numbers of consecutive objects.
+/// The numbers of walked objects, ascending.
 struct Slices<'a> {
     caches: Slice<'a, Cache>,
     x: Slice<'a, f64>,
@@ -87,8 +90,8 @@ struct Slices<'a> {
 }
 
 impl Slices<'_> {
-    fn walk(&mut self, objects: Objects, places: Range<usize>, work: impl Fn(&Entry, Own)) {
-        for place in places {
+    fn walk(&mut self, objects: Objects, places: &[u32], work: impl Fn(&Entry, Own)) {
+        for place in places.iter().map(|&place| place as usize) {
             let entry = objects.at(place);
             let range = entry.state_range;
             let own = Own {

@@ -253,7 +253,7 @@ fn drop_common_motion(before: &[f64], y: &mut [f64]) {
 /// Returns the enabled constraints in the order of insertion. Constraints that act only on an
 /// object that impulses do not move are left out.
 pub(crate) fn constraints<'a>(objects: Objects<'a>) -> impl Iterator<Item = (ObjectId, Entry<'a>, &'a dyn Constraint)> {
-    let entries = objects.table.order.iter().copied().zip(objects.iter());
+    let entries = objects.iter().map(move |e| (objects.table.order[e.place], e));
     entries
         .filter(|(_, e)| e.status.enabled)
         .filter_map(|(id, e)| Some((id, e, e.object.constraint().filter(|c| e.moves() || !c.on_itself())?)))

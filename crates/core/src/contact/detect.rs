@@ -70,8 +70,11 @@ pub(crate) struct DetectorBuffers {
     /// part table.
     registered: Vec<BroadPhaseProxy>,
     gathered: Vec<BroadPhaseProxy>,
-    /// Place in `proxies` of every handle.
+    /// Place in `proxies` of every handle, and of every part that has a box.
     place: Vec<u32>,
+    place_of_part: Vec<u32>,
+    /// [`Walk::layout`](crate::world::walk::Walk::layout) that the bounds and boxes are of.
+    layout: Option<u64>,
     pairs: Vec<[u32; 2]>,
     /// Results of the pieces of the narrow phase.
     found: Vec<Found>,
@@ -92,6 +95,11 @@ impl DetectorBuffers {
     /// Drops the cached contacts: a frame does not depend on the one before.
     pub fn forget(&mut self) {
         self.narrow_phase_cache.forget();
+    }
+
+    /// Computes the bounds of all parts in the next detection: they may be those of another world.
+    pub fn forget_parts(&mut self) {
+        self.layout = None;
     }
 }
 
@@ -180,8 +188,12 @@ impl Detector<'_> {
     /// Puts one box per collidable part, around its motion within the horizon, into the broad
     /// phase.
     fn gather(&mut self, horizon: f64) {
-        self.bound_parts(horizon);
+        if !self.bound_parts(horizon) {
+            return self.move_boxes();
+        }
         let s = &mut *self.scratch;
+        s.place_of_part.clear();
+        s.place_of_part.resize(self.owners.len(), 0);
         s.proxies.clear();
         s.motion_bounds.clear();
         s.gathered.clear();
@@ -198,16 +210,34 @@ impl Detector<'_> {
                 }
                 None => self.broad.insert(&swept, moving),
             };
+            s.place_of_part[index] = s.proxies.len() as u32;
             s.proxies.push(index as u32);
             s.motion_bounds.push(motion);
             s.gathered.push(BroadPhaseProxy { key, handle });
         }
         registered.for_each(|gone| self.broad.remove(gone.handle));
         std::mem::swap(&mut s.registered, &mut s.gathered);
+        let handles = s.registered.iter().map(|f| f.handle as usize + 1).max().unwrap_or(0);
+        s.place.resize(handles.max(s.place.len()), 0);
+        for (place, registered) in s.registered.iter().enumerate() {
+            s.place[registered.handle as usize] = place as u32;
+        }
     }
 
-    /// Computes the bounds of all parts.
-    fn bound_parts(&mut self, horizon: f64) {
+    /// Moves the boxes of the walked parts; no part has gained or lost its box since the last detection.
+    fn move_boxes(&mut self) {
+        let s = &mut *self.scratch;
+        for index in self.objects.table.walk.parts.iter().flatten() {
+            let Some(PartBounds { motion, swept, moving, .. }) = s.part_bounds[index] else { continue };
+            let place = s.place_of_part[index] as usize;
+            self.broad.set(s.registered[place].handle, &swept, moving);
+            s.motion_bounds[place] = motion;
+        }
+    }
+
+    /// Computes the bounds of all walked parts: those of settled objects stay. Returns whether any part
+    /// has gained or lost its box.
+    fn bound_parts(&mut self, horizon: f64) -> bool {
         let Detector { objects, owners, part_states, settings, threads, .. } = *self;
         let bounds_of = |index: usize| {
             let Owner { place, part, .. } = owners[index];
@@ -226,21 +256,37 @@ impl Detector<'_> {
             })
         };
         let bounds = &mut self.scratch.part_bounds;
-        bounds.resize(owners.len(), None);
-        threads.each_piece(bounds, 1, PARTS, |first, bounds| {
-            bounds.iter_mut().zip(first..).for_each(|(bounds, index)| *bounds = bounds_of(index));
-        });
+        let walk = &objects.table.walk;
+        let all = self.scratch.layout.replace(walk.layout) != Some(walk.layout) || bounds.len() != owners.len();
+        let write = |first: usize, bounds: &mut [Option<PartBounds>]| {
+            let write = |(bounds, index): (&mut Option<PartBounds>, usize)| {
+                let now = bounds_of(index);
+                let changed = now.is_some() != bounds.is_some();
+                *bounds = now;
+                changed
+            };
+            bounds.iter_mut().zip(first..).fold(false, |changed, one| write(one) | changed)
+        };
+        if all {
+            bounds.clear();
+            bounds.resize(owners.len(), None);
+            threads.each_piece(bounds, 1, PARTS, write);
+            return true;
+        }
+        walk.parts.iter().fold(false, |changed, range| {
+            let first = range.start;
+            if range.len() < 2 * PARTS {
+                return write(first, &mut bounds[range]) | changed;
+            }
+            let pieces = threads.each_piece(&mut bounds[range], 1, PARTS, |from, bounds| write(first + from, bounds));
+            pieces.contains(&true) | changed
+        })
     }
 
     /// Converts pairs of handles to pairs of places in `proxies`, ascending, so the result does not
     /// depend on the cache of the broad phase.
     fn order_by_part(&mut self, pairs: &mut [[u32; 2]]) {
         let s = &mut *self.scratch;
-        let handles = s.registered.iter().map(|f| f.handle as usize + 1).max().unwrap_or(0);
-        s.place.resize(handles.max(s.place.len()), 0);
-        for (place, registered) in s.registered.iter().enumerate() {
-            s.place[registered.handle as usize] = place as u32;
-        }
         for pair in pairs.iter_mut() {
             let [i, j] = pair.map(|handle| s.place[handle as usize]);
             *pair = [i.min(j), i.max(j)];

@@ -140,6 +140,9 @@ impl Surroundings<'_> {
 impl InternalEdges {
     /// Removes the contacts at internal edges.
     pub fn remove(&mut self, around: &Surroundings, contacts: &mut Vec<ContactConstraint>) {
+        if contacts.len() < 2 {
+            return;
+        }
         self.collect(around, contacts);
         self.removed_by.clear();
         self.removed_by.resize(contacts.len(), None);

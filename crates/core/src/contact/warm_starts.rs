@@ -41,9 +41,21 @@ pub(crate) struct WarmStarts {
 clone_by_field!(WarmStarts { entries, rows });
 
 impl WarmStarts {
-    /// Removes and returns the entries of the keys that `which` selects.
-    pub fn take(&mut self, which: impl Fn(&ContactKey) -> bool) -> Vec<WarmStart> {
-        let (taken, kept) = std::mem::take(&mut self.entries).into_iter().partition(|e| which(&e.key));
+    /// Returns the keys of all contacts, ascending.
+    pub fn keys(&self) -> impl Iterator<Item = &ContactKey> {
+        self.entries.iter().map(|e| &e.key)
+    }
+
+    /// Removes and returns the entries that `of` gives to an island, in their order with its number. `of` is in
+    /// the order of the [`keys`](Self::keys).
+    pub fn take(&mut self, of: &[Option<usize>]) -> Vec<(usize, WarmStart)> {
+        let (mut taken, mut kept) = (Vec::new(), Vec::new());
+        for (entry, island) in std::mem::take(&mut self.entries).into_iter().zip(of) {
+            match island {
+                Some(island) => taken.push((*island, entry)),
+                None => kept.push(entry),
+            }
+        }
         self.entries = kept;
         taken
     }

@@ -64,8 +64,12 @@ impl IntegrationContext<'_> {
     /// object to `dp`, and accelerations to the part states.
     pub fn evaluate(&mut self, t: f64, dp: &mut [f64]) {
         self.refresh();
-        self.forces.wrenches.clear();
-        self.forces.wrenches.extend_from_slice(self.applied);
+        let act = || self.objects().iter().any(|e| e.status.enabled && e.object.force().is_some());
+        if self.table.walk.is_whole() || act() {
+            self.applied.clone_into(&mut self.forces.wrenches); // forces may act on settled objects
+        } else {
+            self.table.walk.parts.copy(self.applied, &mut self.forces.wrenches);
+        }
         for (wrench, held) in self.forces.wrenches.iter_mut().zip(self.held_wrenches) {
             wrench.force += held.force;
             wrench.torque += held.torque;

@@ -206,7 +206,8 @@ impl Adaptive {
         let w = &mut self.work;
         let n = w.kinematic.len();
         let mut worst = Worst { error: 0.0, object: 0 };
-        for (object, entry) in motion.objects().iter().enumerate().filter(|(_, e)| e.moves()) {
+        for entry in motion.objects().iter().filter(|e| e.moves()) {
+            let object = entry.place;
             let Some(body) = entry.object.integratable() else { continue };
             let (x, v) = (entry.state_range.x.clone(), entry.state_range.v.clone());
             // e_v = M⁻¹·e_Δp: the error as a velocity, at the end of the step

@@ -65,6 +65,7 @@ impl Bench {
         for (object, state_range) in objects.into_iter().zip(state_ranges) {
             table.push("".into(), object, state_range);
         }
+        table.gather();
         Bench {
             table,
             states: Default::default(),

@@ -185,7 +185,7 @@ impl Linearizer {
         world.core.solver = Box::new(HeldSolver { inner: Box::new(GaussSeidel), tape: tape.clone() });
         world.core.branches.record();
         let (mut moving, mut dof) = (Vec::new(), 0);
-        for entry in world.core.objects().iter().filter(Entry::dynamic) {
+        for entry in world.core.objects().all().filter(Entry::dynamic) {
             let id = world.core.table.order[entry.place];
             let range = dof..dof + entry.state_range.v.len();
             dof = range.end;
@@ -313,6 +313,7 @@ impl Linearizer {
         let (Coordinate::Position(i) | Coordinate::Velocity(i) | Coordinate::Force(i)) = coordinate;
         let Some(moving) = self.moving.iter().find(|m| m.range.contains(&i)) else { return };
         let core = &mut self.world.core;
+        core.table.walk.unsettle(moving.place);
         let placed = &core.table.placed[moving.place];
         let (ranges, local) = (placed.state_range.clone(), i - moving.range.start);
         if let Coordinate::Force(_) = coordinate {

@@ -167,7 +167,7 @@ impl Sensor {
             (SensorKind::JointPosition, _) => x[body.position_of(dof)?],
             (SensorKind::JointVelocity, _) => *x.get(body.model().positions() + dof)?,
             (_, Some(past)) => {
-                core.loads.drives.get(v).copied().unwrap_or(0.0) / past.dt + core.state.applied_generalized.get(v)?
+                core.loads.drives.get(v).copied().unwrap_or(0.0) / past.dt + core.applied_generalized().get(v)?
             }
             (_, None) => 0.0,
         };

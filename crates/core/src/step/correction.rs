@@ -121,7 +121,7 @@ pub(super) fn correct(
     let acting = match acting {
         None if joints => {
             let moment = at_start.insert(core.moment());
-            moment.x.copy_from_slice(options.start);
+            core.table.walk.x.iter().for_each(|x| moment.x[x.clone()].copy_from_slice(&options.start[x]));
             moment.refresh(core);
             Some(moment)
         }
@@ -129,7 +129,9 @@ pub(super) fn correct(
     };
     let mut end = core.moment();
     correct_at(core, &mut end, acting, work, probe, options)?;
-    core.state.x.copy_from_slice(&end.x);
+    for range in core.table.walk.x.iter() {
+        core.state.x[range.clone()].copy_from_slice(&end.x[range]);
+    }
     core.moments.extend([Some(end), at_start].into_iter().flatten());
     Ok(())
 }

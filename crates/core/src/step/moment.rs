@@ -12,12 +12,15 @@ use crate::world::{Coordinates, Core};
 pub(crate) struct Moment {
     pub x: Vec<f64>,
     pub derived: Derived,
+    /// [`Walk::settlings`](crate::world::walk::Walk::settlings) at which it got the numbers of all objects.
+    pub settlings: Option<u64>,
 }
 
 impl Moment {
     /// Returns a moment without numbers for these objects.
     pub fn new(table: &Table) -> Moment {
-        Moment { x: Vec::new(), derived: Derived { part_states: Vec::new(), caches: table.new_caches() } }
+        let derived = Derived { part_states: Vec::new(), caches: table.new_caches() };
+        Moment { x: Vec::new(), derived, settlings: None }
     }
 
     /// Writes part states and caches from the state.
@@ -54,7 +57,7 @@ impl Moment {
 
     /// Returns the basis of rows at it, at a time, s.
     pub fn basis<'a>(&'a mut self, core: &'a Core, time: f64) -> Basis<'a> {
-        let Moment { x, derived: Derived { part_states, caches } } = self;
+        let Moment { x, derived: Derived { part_states, caches }, .. } = self;
         let (x, part_states) = (&x[..], &part_states[..]);
         let view = WorldView { x, part_states, ..core.view(time) };
         Basis { owners: &core.owners, found: (x, part_states), acting: None, caches, threads: &core.threads, view }

@@ -53,9 +53,9 @@ impl<'a> Solves<'a> {
         let mut acted_on = vec![false; rows.dof];
         blocks().flat_map(|block| block.sides()).for_each(|side| acted_on[side.u as usize] = true);
         let object = |u: u32| -> Option<ObjectId> {
-            let placed = &objects.table.placed;
-            let place = placed.partition_point(|entry| entry.state_range.v.end <= u as usize);
-            (place < placed.len()).then(|| objects.table.order[place])
+            let (placed, walked) = (&objects.table.placed, &objects.table.walk.places);
+            let at = walked.partition_point(|place| placed[*place as usize].state_range.v.end <= u as usize);
+            walked.get(at).map(|place| objects.table.order[*place as usize])
         };
         let mut sides = rows.blocks[largest.block as usize].sides().iter().map(|side| object(side.u));
         let (first, other) = (sides.next().flatten(), sides.next().flatten());

@@ -163,7 +163,7 @@ impl TimeStepping {
     /// Writes the rate of momentum at the midpoint to `work.dp`, and the midpoint to `middle`. The
     /// present part states receive its accelerations.
     fn smooth_forces(&mut self, core: &mut Core, middle: &mut Moment, h: f64) -> Result<(), StepError> {
-        core.state.x[..].clone_into(&mut self.x0);
+        core.table.walk.x.copy(&core.state.x, &mut self.x0);
         self.work.dp.resize(core.dof, 0.0);
         let time = core.state.time;
         let mut motion = core.integration_of(Some(&mut *middle));
@@ -171,7 +171,8 @@ impl TimeStepping {
         motion.evaluate(time + 0.5 * h, &mut self.work.dp);
         motion.split_rates(&mut self.work.dp, h);
         core.check_finite(&self.work.dp, Some(&mut *middle))?;
-        for (now, middle) in core.derived.part_states.iter_mut().zip(&middle.derived.part_states) {
+        for part in core.table.walk.parts.iter().flatten() {
+            let (now, middle) = (&mut core.derived.part_states[part], &middle.derived.part_states[part]);
             (now.acceleration, now.angular_acceleration) = (middle.acceleration, middle.angular_acceleration);
         }
         Ok(())

@@ -84,6 +84,7 @@ impl Core {
         let (derived, largest) = (&mut self.derived, &mut self.largest_turn);
         let mut rest = &loads[..];
         for entry in table.with(states).iter() {
+            rest = &rest[rest.partition_point(|(place, _)| *place < entry.place)..];
             let count = rest.iter().take_while(|(place, _)| *place == entry.place).count();
             let (own, after) = rest.split_at(count);
             rest = after;

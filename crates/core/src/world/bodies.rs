@@ -75,6 +75,7 @@ impl World {
     /// Replaces an object by one with the same state, by its place in the order of objects.
     pub(crate) fn replace_object(&mut self, order: usize, object: Box<dyn Object>) {
         if let Some(place) = self.ids().get(order).and_then(|id| self.core.table.place(*id)) {
+            self.core.table.walk.unsettle(place);
             self.core.table.placed[place].object = object;
         }
     }
@@ -85,6 +86,7 @@ impl World {
     /// [`WorldError::Stale`] if the object was removed or is no rigid body.
     pub fn set_intersect(&mut self, id: ObjectId, test: Option<Arc<dyn Intersect>>) -> Result<(), WorldError> {
         let place = self.core.table.place(id).ok_or(WorldError::Stale)?;
+        self.core.table.walk.unsettle(place);
         let object: &mut dyn std::any::Any = self.core.table.placed[place].object.as_mut();
         object.downcast_mut::<RigidBody>().ok_or(WorldError::Stale)?.set_intersect(test);
         Ok(())
@@ -93,6 +95,7 @@ impl World {
     /// Wakes an object and returns its settings for a change.
     fn status_mut(&mut self, id: ObjectId) -> Result<&mut Status, WorldError> {
         self.core.wake(id);
+        self.core.forces.wrenches.clear(); // a force that is disabled leaves what it wrote for settled objects
         let place = self.core.table.place(id).ok_or(WorldError::Stale)?;
         Ok(&mut self.core.state.objects[place].status)
     }
@@ -272,6 +275,7 @@ impl World {
     /// [`WorldError`]: the object was removed, has no such part, or a number is not finite.
     pub fn apply_force(&mut self, id: ObjectId, part: usize, force: Vec3, point: &Vec3) -> Result<(), WorldError> {
         let index = self.part(id, part, &[force, *point])?;
+        self.unsettle(id);
         let arm = point - self.core.derived.part_states[index].position();
         self.core.state.applied[index].force += force;
         self.core.state.applied[index].torque += arm.cross(&force);
@@ -284,6 +288,7 @@ impl World {
     /// [`WorldError`]: the object was removed, has no such part, or a number is not finite.
     pub fn apply_torque(&mut self, id: ObjectId, part: usize, torque: Vec3) -> Result<(), WorldError> {
         let index = self.part(id, part, &[torque])?;
+        self.unsettle(id);
         self.core.state.applied[index].torque += torque;
         Ok(())
     }
@@ -295,6 +300,7 @@ impl World {
     /// [`WorldError`]: the object was removed, the count is not its degrees of freedom, or a number
     /// is not finite.
     pub fn apply_generalized(&mut self, id: ObjectId, forces: &[f64]) -> Result<(), WorldError> {
+        self.unsettle(id);
         let entry = self.core.table.get(id).ok_or(WorldError::Stale)?;
         let name = || entry.name.to_string();
         if forces.len() != entry.state_range.v.len() {
@@ -328,6 +334,12 @@ impl World {
         match self.core.kick_by(id, std::iter::once((at, impulse))) {
             true => Ok(()),
             false => Err(WorldError::NotFinite(self.core.table.placed[place].name.to_string())),
+        }
+    }
+
+    fn unsettle(&mut self, id: ObjectId) {
+        if let Some(place) = self.core.table.place(id) {
+            self.core.table.walk.unsettle(place);
         }
     }
 

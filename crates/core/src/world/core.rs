@@ -1,6 +1,6 @@
 //! The core of a world, on which the steppers work.
 
-use super::events::{Event, Touches};
+use super::events::{Event, Touches, Touching};
 use super::state::WorldState;
 use crate::contact::detect::{ContactConstraint, DetectorBuffers, Owner};
 use crate::contact::pair_material::PairMaterials;
@@ -9,14 +9,16 @@ use crate::derived::{Cache, Derived};
 use crate::each_object::first_object;
 use crate::integrators::context::IntegrationContext;
 use crate::linearize::Branches;
+use crate::object::Object;
 use crate::object::part_state::{Forces, PartState, Wrench};
 use crate::report::StepReport;
+use crate::rigid::RigidBody;
 use crate::sensor::loads::FrameLoads;
 use crate::settings::Settings;
 use crate::solver::RowSolver;
 use crate::step::{Attempt, LargestTurn, Moment, WorkMeter};
 use crate::threads::Threads;
-use crate::world::view::{Entry, ObjectId, Objects, Table, WorldView};
+use crate::world::view::{Entry, Mode, ObjectId, Objects, Table, WorldView};
 use tumble_collide::{BroadPhase, SweepAndPrune, Vec3};
 
 /// An error that stopped a step. [`World::step`](crate::World::step) restores state and time to
@@ -170,6 +172,18 @@ pub struct Core {
     pub(crate) held_wrenches: Vec<Wrench>,
     /// Unused moments, kept for their memory.
     pub(crate) moments: Vec<Moment>,
+    /// In a frame: generalized forces that users apply to the walked objects, as these are numbered in it.
+    pub(crate) applied_now: Vec<f64>,
+    /// Counts the changes of the sleeping groups.
+    pub(super) group_changes: u64,
+    /// Groups with a member or support that is not settled, or without a load; and the changes of groups and of
+    /// walked objects that they are of.
+    pub(super) open_groups: Vec<u32>,
+    pub(super) open_groups_of: Option<[u64; 2]>,
+    /// Pairs of `touching` that a frame may change: all but those of settled bodies; and the changes of walked
+    /// objects that they are of.
+    pub(super) open_touching: Vec<Touching>,
+    pub(super) open_touching_of: Option<u64>,
     pub(crate) forces: Forces,
     pub(crate) threads: Threads,
     pub(crate) broad: Box<dyn BroadPhase>,
@@ -211,6 +225,8 @@ impl Core {
     /// Returns a core without contacts, whose part states are not computed yet.
     pub(super) fn new(table: Table, settings: Settings, solver: Box<dyn RowSolver>, state: WorldState) -> Core {
         let (dof, parts) = (state.applied_generalized.len(), state.applied.len());
+        let mut table = table;
+        table.walk.unsettle_all(); // their numbers are not in the buffers of this core
         let caches = table.new_caches();
         let mut owners = Vec::with_capacity(parts);
         for (place, (placed, &id)) in (0..).zip(table.placed.iter().zip(&table.order)) {
@@ -231,6 +247,12 @@ impl Core {
             held: vec![0.0; dof],
             held_wrenches: Vec::new(),
             moments: Vec::new(),
+            applied_now: Vec::new(),
+            group_changes: 0,
+            open_groups: Vec::new(),
+            open_groups_of: None,
+            open_touching: Vec::new(),
+            open_touching_of: None,
             forces: Forces::default(),
             threads: Threads::NONE,
             broad: Box::<SweepAndPrune>::default(),
@@ -284,8 +306,15 @@ impl Core {
     /// `moments` after use.
     pub(crate) fn moment(&mut self) -> Moment {
         let mut moment = self.moments.pop().unwrap_or_else(|| Moment::new(&self.table));
-        self.state.x[..].clone_into(&mut moment.x);
-        moment.derived.part_states.clone_from(&self.derived.part_states);
+        self.table.gather();
+        let walk = &self.table.walk;
+        if moment.settlings != Some(walk.settlings) {
+            moment.x.clear();
+            moment.derived.part_states.clear();
+            moment.settlings = Some(walk.settlings);
+        }
+        walk.x.copy(&self.state.x, &mut moment.x);
+        walk.parts.copy(&self.derived.part_states, &mut moment.derived.part_states);
         moment
     }
 
@@ -304,20 +333,102 @@ impl Core {
 
     /// Copies a state of these objects over the present one, and derives part states and caches.
     pub(crate) fn set_state(&mut self, state: &WorldState) {
+        self.table.walk.unsettle_all();
+        self.group_changes += 1;
         self.state.clone_from(state);
         self.clear_contact_forces();
-        self.state.write_accelerations(&mut self.derived.part_states);
+        self.state.write_accelerations(0..state.accelerations.len(), &mut self.derived.part_states);
         self.refresh();
     }
 
     /// Clears all contact and joint forces.
     pub(crate) fn clear_contact_forces(&mut self) {
-        self.held.fill(0.0);
+        self.held.clear();
+        self.held.resize(self.dof, 0.0);
         self.held_wrenches.clear();
+    }
+
+    /// Before a frame: computes part states and caches of all objects that are not settled.
+    pub(super) fn refresh_walked(&mut self) {
+        if self.stale {
+            return self.refresh();
+        }
+        self.wake_for_forces();
+        self.table.gather();
+        self.integration().refresh();
+    }
+
+    /// Forces may act on sleeping objects, which must then be walked.
+    fn wake_for_forces(&mut self) {
+        if self.table.walk.asleep > 0 && self.has_forces() {
+            self.table.walk.unsettle_all();
+        }
+    }
+
+    /// Returns whether any object acts on others by forces.
+    pub(super) fn has_forces(&self) -> bool {
+        self.objects().iter().any(|e| e.status.enabled && e.object.force().is_some())
+    }
+
+    /// Starts a frame, or starts it again: numbers the degrees of freedom of what it walks.
+    pub(super) fn enter_frame(&mut self) {
+        self.dof = self.table.number_walked();
+        let applied = &self.state.applied_generalized;
+        self.applied_now.clear();
+        match self.table.walk.kept() {
+            None => self.applied_now.extend_from_slice(applied),
+            Some(starts) => {
+                for (place, start) in self.table.walk.places.iter().zip(starts) {
+                    let count = self.table.placed[*place as usize].state_range.v.len();
+                    self.applied_now.extend_from_slice(&applied[*start..*start + count]);
+                }
+            }
+        }
+    }
+
+    /// Ends a frame.
+    pub(super) fn leave_frame(&mut self) {
+        self.dof = self.table.number_all();
+        self.applied_now.clear();
+    }
+
+    /// Returns the generalized forces that users apply, as the degrees of freedom are numbered now.
+    pub(crate) fn applied_generalized(&self) -> &[f64] {
+        if self.table.walk.dof.is_some() { &self.applied_now } else { &self.state.applied_generalized }
+    }
+
+    /// Goes back to the state at the start of the frame. What the frame did not walk is as it was.
+    pub(super) fn restart_frame(&mut self, before: &WorldState) {
+        self.table.gather();
+        self.state.copy_walked(before, &self.table);
+        self.state.groups.clone_from(&before.groups);
+        self.group_changes += 1;
+        self.clear_contact_forces();
+        for range in self.table.walk.parts.iter() {
+            self.state.write_accelerations(range, &mut self.derived.part_states);
+        }
+        self.integration().refresh();
+    }
+
+    /// Ends a frame: objects that rest need not be walked in the next ones.
+    pub(super) fn settle(&mut self) {
+        if self.branches.are_recorded() {
+            return;
+        }
+        let forces = !self.state.groups.is_empty() && self.has_forces();
+        let Core { table, state, .. } = self;
+        let (placed, objects) = (&table.placed, &state.objects);
+        table.walk.settle(|place| {
+            let object = &objects[place];
+            let rests = object.status.mode == Mode::Static || !object.status.enabled || (object.asleep && !forces);
+            (rests && may_settle(placed[place].object.as_ref())).then_some(object.asleep)
+        });
     }
 
     /// Computes part states and caches from the state.
     pub(crate) fn refresh(&mut self) {
+        self.table.walk.unsettle_all();
+        self.table.gather();
         if self.derived.caches.len() != self.table.placed.len() {
             self.derived.caches = self.table.new_caches();
         }
@@ -344,6 +455,7 @@ impl Core {
         if moment.is_none() {
             self.own_caches();
         }
+        self.held.resize(self.dof, 0.0);
         let (x, derived) = match moment {
             Some(moment) => (&mut moment.x[..], &mut moment.derived),
             None => (&mut self.state.x[..], &mut self.derived),
@@ -358,7 +470,11 @@ impl Core {
             gravity: self.settings.gravity,
             implicit: self.implicit,
             applied: &self.state.applied,
-            applied_generalized: &self.state.applied_generalized,
+            applied_generalized: if self.table.walk.dof.is_some() {
+                &self.applied_now
+            } else {
+                &self.state.applied_generalized
+            },
             held: &self.held,
             held_wrenches: &self.held_wrenches,
         }
@@ -446,4 +562,16 @@ impl Core {
     fn not_finite(&self, object: &str, what: &'static str) -> StepError {
         StepError::NotFinite { object: object.to_string(), what, time: self.state.time }
     }
+}
+
+/// Returns whether a step may leave the object out while it rests: a rigid body that is no sensor and acts on
+/// nothing.
+fn may_settle(object: &dyn Object) -> bool {
+    let any: &dyn std::any::Any = object;
+    let sensor = || object.collidable().is_some_and(|c| (0..c.parts()).any(|part| c.is_sensor(part)));
+    any.is::<RigidBody>()
+        && object.constraint().is_none()
+        && object.force().is_none()
+        && object.frame_state().is_none()
+        && !sensor()
 }

@@ -225,7 +225,7 @@ impl Core {
     pub(crate) fn collect_events(&mut self, before: &WorldState) {
         self.events.clear();
         let pairs = self.touched_pairs();
-        let known = std::mem::take(&mut self.state.touching);
+        let known = self.open_touching();
         let contact = |pair: [u32; 4]| Touching { sensor: false, pair };
         let mut touching: Vec<Touching> = pairs.iter().map(|p| contact(p.pair)).collect();
         let mut later = pairs.iter().map(|p| p.pair).peekable();
@@ -266,11 +266,28 @@ impl Core {
         }
         touching.extend(sensed);
         touching.sort_unstable();
-        self.state.touching = touching;
+        if touching != known {
+            self.state.touching.retain(|t| known.binary_search(t).is_err());
+            self.state.touching.extend_from_slice(&touching);
+            self.state.touching.sort_unstable();
+        }
+        self.open_touching = touching;
         let broken = self.broken.iter().filter_map(|serial| self.by_serial(*serial));
         let broken: Vec<Event> = broken.map(|place| self.event_of_one(EventKind::JointBroken, place)).collect();
         self.events.extend(broken);
         self.add_sleep_events(before);
+    }
+
+    /// Returns the pairs known from the frame before that this frame may change: all but those of settled bodies.
+    fn open_touching(&mut self) -> Vec<Touching> {
+        let changes = Some(self.table.walk.changes);
+        if self.open_touching_of == changes {
+            return std::mem::take(&mut self.open_touching);
+        }
+        self.open_touching_of = changes;
+        let settled = |serial: u32| self.by_serial(serial).is_some_and(|place| self.table.walk.is_settled(place));
+        let closed = |t: &Touching| !t.sensor && settled(t.pair[0]) && settled(t.pair[2]) && self.sleeps(t);
+        self.state.touching.iter().filter(|t| !closed(t)).copied().collect()
     }
 
     /// Returns the pairs that touched in the frame, sorted, with their impulses.
@@ -330,7 +347,8 @@ impl Core {
     }
 
     fn add_sleep_events(&mut self, before: &WorldState) {
-        for (place, (was, is)) in before.objects.iter().zip(&self.state.objects).enumerate() {
+        for place in self.table.walk.places.iter().map(|&place| place as usize) {
+            let (was, is) = (&before.objects[place], &self.state.objects[place]);
             if was.asleep != is.asleep {
                 let kind = if is.asleep { EventKind::Asleep } else { EventKind::Awake };
                 let event = self.event_of_one(kind, place);
@@ -348,7 +366,9 @@ impl Core {
     /// Returns the pairs of a sensor and a part that overlaps it, sorted.
     fn sensed_pairs(&self) -> Vec<Touching> {
         let parts = |sensors: bool| {
-            let entries = self.objects().iter().filter(|e| e.status.enabled && e.status.collidable);
+            let walked = sensors.then(|| self.objects().iter()).into_iter().flatten(); // no sensor is settled
+            let all = (!sensors).then(|| self.objects().all()).into_iter().flatten();
+            let entries = walked.chain(all).filter(|e| e.status.enabled && e.status.collidable);
             entries.filter_map(|e| Some((e, e.object.collidable()?))).flat_map(move |(entry, body)| {
                 let parts = entry.state_range.parts.clone().enumerate();
                 parts.filter(move |(part, _)| body.is_sensor(*part) == sensors).filter_map(move |(part, row)| {

@@ -22,7 +22,8 @@ impl Core {
     /// `before`; then applies their impulses.
     pub(super) fn advance_frame_states(&mut self, start: f64, before: &[PartState]) -> Result<(), StepError> {
         let (mut impulses, mut x) = (Vec::new(), std::mem::take(&mut self.frame_numbers));
-        for place in 0..self.table.placed.len() {
+        for walked in 0..self.table.walk.places.len() {
+            let place = self.table.walk.places[walked] as usize;
             let entry = self.objects().at(place);
             let Some(follower) = entry.object.frame_state().filter(|_| entry.status.enabled) else { continue };
             let (range, id, body) = (entry.state_range.x.clone(), self.table.order[place], entry.object.integratable());

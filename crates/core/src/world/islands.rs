@@ -25,7 +25,7 @@ impl World {
         let connections = core.connections().0.into_iter().chain(asleep);
         let (island, count) = core.components(connections, |e| e.dynamic());
         let mut islands = vec![Vec::new(); count];
-        for entry in core.objects().iter().filter(|e| e.dynamic()) {
+        for entry in core.objects().all().filter(|e| e.dynamic()) {
             islands[island[entry.place] as usize].push(core.table.order[entry.place]);
         }
         islands.retain(|island| !island.is_empty());

@@ -92,6 +92,9 @@ impl Core {
     pub(crate) fn disable_broken(&mut self) {
         self.broken.sort_unstable();
         self.broken.dedup();
+        if !self.broken.is_empty() {
+            self.forces.wrenches.clear();
+        }
         for serial in &self.broken {
             if let Some(place) = self.by_serial(*serial) {
                 self.state.objects[place].status.enabled = false;

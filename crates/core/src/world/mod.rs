@@ -24,6 +24,7 @@ mod state;
 mod state_memory;
 mod turns;
 pub(crate) mod view;
+pub(crate) mod walk;
 mod working_memory;
 
 pub(crate) use self::core::Coordinates;
@@ -61,6 +62,8 @@ pub struct World {
     /// The state before the frame: a frame that fails, or that wakes a sleeper, is rolled back to
     /// it.
     before: WorldState,
+    /// Layout, settlings and sleeping groups that `before` is of.
+    before_of: Option<[u64; 3]>,
     /// Contacts of the frame before, for a frame that fails.
     contacts_before: Vec<ContactPoint>,
     /// Part states before the frame, for objects with a frame state; empty if there are none.
@@ -95,6 +98,7 @@ impl World {
             core,
             stepper,
             before: WorldState::default(),
+            before_of: None,
             contacts_before: Vec::new(),
             parts_before: Vec::new(),
             names,
@@ -136,6 +140,7 @@ impl World {
         settings.validate()?;
         let now = &self.core.settings;
         if settings.with_threads(now.threads).with_budget(now.solver_settings.budget) != *now {
+            self.core.table.walk.unsettle_all();
             self.core.wake_all();
         }
         self.core.settings = settings;
@@ -152,18 +157,24 @@ impl World {
     pub fn step(&mut self) -> Result<&StepReport, StepError> {
         let core = &mut self.core;
         core.threads.set(core.settings.threads);
-        self.before.clone_from(&core.state);
+        core.refresh_walked(); // constants and switches may have changed
+        let now = [core.table.walk.layout, core.table.walk.settlings, core.group_changes];
+        match self.before_of {
+            Some(of) if of == now => self.before.copy_walked(&core.state, &core.table),
+            _ => self.before.clone_from(&core.state),
+        }
+        self.before_of = Some(now);
         std::mem::swap(&mut self.contacts_before, &mut core.contacts);
         let report_before = std::mem::take(&mut core.report);
         core.needs_wake.clear();
         core.meter.reset();
-        core.refresh(); // constants and switches may have changed
         core.guide();
         core.wake_disturbed();
         core.divide_ahead(self.stepper.as_ref());
         core.keep_part_states(&mut self.parts_before);
         loop {
             let requests = core.needs_wake.len();
+            core.enter_frame();
             core.clear_contact_forces();
             core.detect_scratch.forget();
             core.touches.clear();
@@ -185,6 +196,7 @@ impl World {
             let again = match done.and_then(followed) {
                 Ok(again) => again,
                 Err(error) => {
+                    core.leave_frame();
                     core.set_state(&self.before);
                     std::mem::swap(&mut self.contacts_before, &mut core.contacts);
                     core.report = report_before;
@@ -195,7 +207,8 @@ impl World {
             if core.needs_wake.len() == requests && !again {
                 break;
             }
-            core.set_state(&self.before);
+            core.leave_frame();
+            core.restart_frame(&self.before);
             core.report = StepReport::default();
             core.guide();
             core.wake_disturbed();
@@ -203,12 +216,17 @@ impl World {
         }
         core.disable_broken();
         core.fall_asleep();
-        core.report.asleep = core.objects().iter().filter(|e| e.asleep).count() as u32;
+        let asleep = core.objects().iter().filter(|e| e.asleep).count();
+        core.report.asleep = (asleep + core.table.walk.asleep) as u32;
         core.report.relaxations = core.meter.done();
         core.collect_events(&self.before);
-        core.state.clear_applied();
-        core.state.keep_accelerations(&core.derived.part_states);
+        core.state.clear_walked(&core.table);
+        for range in core.table.walk.parts.iter() {
+            core.state.keep_accelerations(range, &core.derived.part_states);
+        }
         core.state.frame += 1;
+        core.leave_frame();
+        core.settle();
         if let Err(error) = self.fire_events() {
             let core = &mut self.core;
             core.set_state(&self.before);
@@ -296,7 +314,7 @@ impl World {
 
     /// Returns all visuals, object by object in the order of addition.
     pub fn visuals(&self) -> impl Iterator<Item = &Visual> {
-        self.core.objects().iter().filter_map(|e| e.object.renderable()).flat_map(|renderable| renderable.visuals())
+        self.core.objects().all().filter_map(|e| e.object.renderable()).flat_map(|renderable| renderable.visuals())
     }
 
     /// Returns the mechanical energy of all dynamic objects and of the springs between them, J.
@@ -306,7 +324,7 @@ impl World {
             let e = body.energy(x, &g);
             Energy { kinetic: sum.kinetic + e.kinetic, potential: sum.potential + e.potential }
         });
-        let (view, enabled) = (self.view(), self.core.objects().iter().filter(|e| e.status.enabled));
+        let (view, enabled) = (self.view(), self.core.objects().all().filter(|e| e.status.enabled));
         let springs: f64 = enabled.filter_map(|e| e.object.force()).map(|force| force.potential(&view)).sum();
         Energy { potential: bodies.potential + springs, ..bodies }
     }
@@ -321,7 +339,7 @@ impl World {
     }
 
     fn moving(&self) -> impl Iterator<Item = (&[f64], &dyn crate::object::Integratable)> {
-        let moving = self.core.objects().iter().filter(|e| e.dynamic());
+        let moving = self.core.objects().all().filter(|e| e.dynamic());
         moving.filter_map(|e| Some((&self.core.state.x[e.state_range.x.clone()], e.object.integratable()?)))
     }
 
@@ -457,6 +475,7 @@ impl World {
         core.derived.part_states.drain(gone.state_range.parts.clone());
         core.derived.caches.remove(place);
         core.moments.clear();
+        core.forces.wrenches.clear();
         core.owners.drain(gone.state_range.parts.clone());
         core.dof -= gone.state_range.v.len();
         core.held.truncate(core.dof);

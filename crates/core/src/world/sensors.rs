@@ -108,7 +108,8 @@ impl Core {
     /// Takes the readings of all sensors after a frame that began with the part states `before`.
     pub(super) fn read_sensors(&mut self, before: &[PartState]) -> Result<(), StepError> {
         let dt = self.settings.dt;
-        for place in 0..self.table.placed.len() {
+        for walked in 0..self.table.walk.places.len() {
+            let place = self.table.walk.places[walked] as usize;
             let entry = self.objects().at(place);
             let any: &dyn std::any::Any = entry.object;
             let Some(sensor) = any.downcast_ref::<Sensor>().filter(|_| entry.status.enabled) else { continue };

@@ -23,11 +23,13 @@
 //! ([`Constraint::partners`](crate::Constraint::partners)).
 
 use crate::clone_by_field::clone_by_field;
+use crate::contact::detect::ContactKey;
 use crate::contact::warm_starts::{RowStart, WarmStart};
 use crate::object::part_state::{PartState, Wrench};
 use crate::world::Core;
 use crate::world::view::{Entry, Mode, ObjectId};
 use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
 use tumble_collide::Pose;
 
 /// Conditions under which islands fall asleep.
@@ -138,6 +140,7 @@ impl Core {
     /// Wakes the object, and all objects that sleep with it or on it.
     pub(crate) fn wake(&mut self, id: ObjectId) {
         let Some(place) = self.table.place(id) else { return };
+        self.table.walk.unsettle(place);
         let mut ids = vec![id];
         if let Some(constraint) = self.table.placed[place].object.constraint() {
             constraint.partners(&mut ids);
@@ -163,8 +166,10 @@ impl Core {
                 continue;
             }
             let group = state.groups.remove(at);
+            self.group_changes += 1;
             for serial in &group.members {
                 let Ok(place) = state.objects.binary_search_by_key(serial, |o| o.serial) else { continue };
+                self.table.walk.unsettle(place);
                 let object = &mut state.objects[place];
                 object.asleep = false;
                 object.rest.since = state.time;
@@ -180,9 +185,31 @@ impl Core {
     /// Before a frame: wakes groups with applied forces, and groups whose support has moved, moves,
     /// or is gone.
     pub(crate) fn wake_disturbed(&mut self) {
-        let disturbed = self.state.groups.iter().filter(|g| self.disturbed(g));
-        let disturbed: Vec<u32> = disturbed.map(|g| g.members[0]).collect();
-        self.wake_groups(|g| disturbed.contains(&g.members[0]));
+        self.open_groups();
+        let groups = self.open_groups.iter().map(|&at| &self.state.groups[at as usize]);
+        let disturbed: Vec<u32> = groups.filter(|g| self.disturbed(g)).map(|g| g.members[0]).collect();
+        if !disturbed.is_empty() {
+            self.wake_groups(|g| disturbed.contains(&g.members[0]));
+        }
+    }
+
+    /// Lists the groups that a frame may disturb: all but those whose members and supports are settled.
+    fn open_groups(&mut self) {
+        let changes = [self.group_changes, self.table.walk.changes];
+        if self.open_groups_of == Some(changes) {
+            return;
+        }
+        self.open_groups_of = Some(changes);
+        let mut open = std::mem::take(&mut self.open_groups);
+        open.clear();
+        let settled = |serial: u32| self.by_serial(serial).is_some_and(|place| self.table.walk.is_settled(place));
+        let closed = |g: &SleepGroup| {
+            g.load.is_some()
+                && g.members.iter().all(|serial| settled(*serial))
+                && g.supports.iter().all(|support| settled(support.serial))
+        };
+        open.extend((0..).zip(&self.state.groups).filter(|(_, g)| !closed(g)).map(|(at, _): (u32, _)| at));
+        self.open_groups = open;
     }
 
     fn disturbed(&self, group: &SleepGroup) -> bool {
@@ -200,16 +227,18 @@ impl Core {
 
     /// Returns whether a force is applied to the object during this frame.
     fn pushed(&self, e: Entry) -> bool {
-        let generalized = self.state.applied_generalized[e.state_range.v.clone()].iter().any(|f| *f != 0.0);
+        let generalized = self.applied_generalized()[e.state_range.v.clone()].iter().any(|f| *f != 0.0);
         generalized || self.state.applied[e.state_range.parts.clone()].iter().any(|w| *w != Wrench::default())
     }
 
     /// After a frame: requests to wake the groups whose external forces have changed. Stores the
     /// forces on groups that sleep their first frame.
     pub(crate) fn request_wake_by_load(&mut self) {
-        for at in 0..self.state.groups.len() {
-            let load = self.load(&self.state.groups[at]);
-            let group = &mut self.state.groups[at];
+        self.open_groups();
+        for &at in &self.open_groups {
+            let load = self.load(&self.state.groups[at as usize]);
+            let group = &mut self.state.groups[at as usize];
+            self.group_changes += u64::from(group.load.is_none());
             if group.load.get_or_insert_with(|| load.clone()) != &load {
                 self.needs_wake.push(group.members[0]);
             }
@@ -220,6 +249,11 @@ impl Core {
         let mut load = Vec::new();
         for place in group.members.iter().filter_map(|&s| self.by_serial(s)) {
             let state_range = &self.table.placed[place].state_range;
+            if self.table.walk.is_settled(place) {
+                // no force acts on it, and its degrees of freedom have no number in this frame
+                load.resize(load.len() + state_range.v.len() + 6 * state_range.parts.len(), 0.0);
+                continue;
+            }
             load.extend(self.forces.generalized.get(state_range.v.clone()).unwrap_or_default());
             let wrenches = self.forces.wrenches.get(state_range.parts.clone()).unwrap_or_default();
             wrenches.iter().for_each(|w| load.extend(w.torque.iter().chain(w.force.iter())));
@@ -229,6 +263,9 @@ impl Core {
 
     /// Wakes the groups that `needs_wake` names; the state is that before the frame.
     pub(crate) fn wake_requested(&mut self) {
+        if self.needs_wake.is_empty() {
+            return;
+        }
         let requests = std::mem::take(&mut self.needs_wake);
         self.wake_groups(|g| requests.iter().any(|s| g.members.binary_search(s).is_ok()));
         self.needs_wake = requests;
@@ -237,15 +274,16 @@ impl Core {
     /// After a frame: puts islands to sleep that have been still for long enough.
     pub(crate) fn fall_asleep(&mut self) {
         let Some(sleep) = self.settings.sleep else { return };
-        let ready = self.at_rest_for(&sleep);
-        if !ready.contains(&true) {
+        let still = self.at_rest_for(&sleep);
+        if still.is_empty() {
             return;
         }
         let (pairs, all_named) = self.connections();
         if !all_named {
             return;
         }
-        let mut ready = ready;
+        let mut ready = vec![false; self.table.placed.len()];
+        still.into_iter().for_each(|place| ready[place] = true);
         let mut supports: Vec<[usize; 2]> = Vec::new();
         for &[a, b] in &pairs {
             let (Some(i), Some(j)) = (self.table.place(a), self.table.place(b)) else { continue };
@@ -262,23 +300,29 @@ impl Core {
         for entry in self.objects().iter().filter(|e| e.moves()) {
             members[island[entry.place] as usize].push(entry.place);
         }
-        for (number, members) in members.iter().enumerate() {
-            if !members.is_empty() && members.iter().all(|&place| ready[place]) {
-                let supports = supports.iter().filter(|[mover, _]| island[*mover] as usize == number);
-                self.put_to_sleep(members, supports.map(|[_, support]| *support).collect());
-            }
+        let number = |place: usize| island[place] as usize;
+        let sleeps: Vec<bool> =
+            members.iter().map(|members| !members.is_empty() && members.iter().all(|&place| ready[place])).collect();
+        supports.sort_by_key(|[mover, _]| number(*mover));
+        let mut warm = self.warm_of_islands(|place| Some(number(place)).filter(|island| sleeps[*island]));
+        for (island, members) in members.iter().enumerate().filter(|(island, _)| sleeps[*island]) {
+            let from = supports.partition_point(|[mover, _]| number(*mover) < island);
+            let supports = supports[from..].iter().take_while(|[mover, _]| number(*mover) == island);
+            let count = warm.partition_point(|(of, _)| *of == island);
+            let warm = warm.drain(..count).map(|(_, start)| start).collect();
+            self.put_to_sleep(members, supports.map(|[_, support]| *support).collect(), warm);
         }
         self.integration().refresh();
     }
 
-    /// Returns which objects, in their order, have been still for the time in `sleep`; restarts the
+    /// Returns the places of the objects that have been still for the time in `sleep`; restarts the
     /// timers of those that moved.
-    fn at_rest_for(&mut self, sleep: &Sleep) -> Vec<bool> {
-        let mut ready = Vec::with_capacity(self.table.placed.len());
-        for place in 0..self.table.placed.len() {
+    fn at_rest_for(&mut self, sleep: &Sleep) -> Vec<usize> {
+        let mut ready = Vec::new();
+        for walked in 0..self.table.walk.places.len() {
+            let place = self.table.walk.places[walked] as usize;
             let (entry, rest) = (self.objects().at(place), &self.state.objects[place].rest);
             if !entry.moves() || !entry.object.integratable().is_some_and(|b| b.may_sleep()) {
-                ready.push(false);
                 continue;
             }
             let part_states = &self.derived.part_states[entry.state_range.parts.clone()];
@@ -291,7 +335,9 @@ impl Core {
             let restless = rest.from.len() != part_states.len()
                 || self.pushed(entry)
                 || rest.from.iter().zip(poses(part_states)).enumerate().any(far);
-            ready.push(!restless && self.state.time - rest.since >= sleep.after);
+            if !restless && self.state.time - rest.since >= sleep.after {
+                ready.push(place);
+            }
             if restless {
                 let rest = &mut self.state.objects[place].rest;
                 rest.since = self.state.time;
@@ -301,7 +347,22 @@ impl Core {
         ready
     }
 
-    fn put_to_sleep(&mut self, members: &[usize], mut supports: Vec<usize>) {
+    /// Takes the warm starts of contacts on members of islands that fall asleep, by the number of the island.
+    fn warm_of_islands(&mut self, sleeping: impl Fn(usize) -> Option<usize>) -> VecDeque<(usize, WarmStart)> {
+        let island = |key: &ContactKey| {
+            let [a, b] = [key.pair[0], key.pair[2]].map(|serial| {
+                let mover = self.by_serial(serial).filter(|&place| self.objects().at(place).moves());
+                mover.and_then(&sleeping)
+            });
+            a.into_iter().chain(b).min()
+        };
+        let of: Vec<Option<usize>> = self.state.warm.keys().map(island).collect();
+        let mut taken = self.state.warm.take(&of);
+        taken.sort_by_key(|(island, _)| *island); // stable: their order stays
+        taken.into()
+    }
+
+    fn put_to_sleep(&mut self, members: &[usize], mut supports: Vec<usize>, warm: Vec<WarmStart>) {
         let mut group = SleepGroup::default();
         for &place in members {
             let (placed, object) = (&self.table.placed[place], &mut self.state.objects[place]);
@@ -321,10 +382,10 @@ impl Core {
             poses: poses(&self.derived.part_states[self.table.placed[place].state_range.parts.clone()]).collect(),
         };
         group.supports = supports.into_iter().map(support).collect();
-        let ours = |serial: &u32| group.members.binary_search(serial).is_ok();
-        group.warm = self.state.warm.take(|key| ours(&key.pair[0]) || ours(&key.pair[2]));
+        group.warm = warm;
         group.rows = self.rows_between(members);
         self.state.groups.push(group);
+        self.group_changes += 1;
     }
 
     /// Returns the forces of the constraints on any of these objects, in the last sub-step.

@@ -92,7 +92,7 @@ impl World {
             name: e.name.to_string(),
             sizes: [e.state_range.x.len() as u32, e.state_range.v.len() as u32, e.state_range.parts.len() as u32],
         };
-        self.core.objects().iter().map(label).collect()
+        self.core.objects().all().map(label).collect()
     }
 
     fn check_labels(&self, theirs: &[Label]) -> Result<(), SnapshotError> {
@@ -117,7 +117,7 @@ impl World {
             e.object.integratable().is_none_or(|body| body.accepts(x))
                 && e.object.frame_state().is_none_or(|follower| follower.accepts(x))
         };
-        if !(state.is_finite() && self.core.objects().iter().all(accepts)) {
+        if !(state.is_finite() && self.core.objects().all().all(accepts)) {
             return Err(SnapshotError::NotFinite);
         }
         if !state.sleepers_are_sound() {

@@ -7,8 +7,9 @@ use crate::object::part_state::{PartState, StateRange, Wrench};
 use crate::step::HeldDivision;
 use crate::world::events::Touching;
 use crate::world::sleep::{RestTimer, SleepGroup};
-use crate::world::view::Status;
+use crate::world::view::{Status, Table};
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 use tumble_collide::Vec3;
 
 /// Maximum number of objects ever added to a world; frames are limited by its square.
@@ -109,21 +110,50 @@ impl WorldState {
         self.sizes() == other.sizes() && self.objects.iter().map(|o| o.serial).eq(serials)
     }
 
+    /// Copies a state of the same objects, up to the sleeping groups: of the objects only the walked ones, as the
+    /// others are equal.
+    pub(crate) fn copy_walked(&mut self, from: &WorldState, table: &Table) {
+        let WorldState { time, frame, next_serial, warm, held_division, inner_step, touching, .. } = from;
+        (self.time, self.frame, self.next_serial, self.inner_step) = (*time, *frame, *next_serial, *inner_step);
+        self.held_division = held_division.clone();
+        self.warm.clone_from(warm);
+        self.touching.clone_from(touching);
+        let walk = &table.walk;
+        for &place in &walk.places {
+            self.objects[place as usize].clone_from(&from.objects[place as usize]);
+            let v = table.outside(place as usize);
+            self.applied_generalized[v.clone()].copy_from_slice(&from.applied_generalized[v]);
+        }
+        walk.x.iter().for_each(|range| self.x[range.clone()].copy_from_slice(&from.x[range]));
+        for range in walk.parts.iter() {
+            self.accelerations[range.clone()].copy_from_slice(&from.accelerations[range.clone()]);
+            self.applied[range.clone()].copy_from_slice(&from.applied[range]);
+        }
+    }
+
+    /// Removes the forces applied to the walked objects. Those applied to others are zero.
+    pub(crate) fn clear_walked(&mut self, table: &Table) {
+        table.walk.parts.iter().for_each(|range| self.applied[range].fill(Wrench::default()));
+        let walked = table.walk.places.iter();
+        walked.for_each(|place| self.applied_generalized[table.outside(*place as usize)].fill(0.0));
+    }
+
     /// Removes all applied forces.
     pub(crate) fn clear_applied(&mut self) {
         self.applied.fill(Wrench::default());
         self.applied_generalized.fill(0.0);
     }
 
-    /// Copies the accelerations of the part table.
-    pub(crate) fn keep_accelerations(&mut self, part_states: &[PartState]) {
-        self.accelerations.clear();
-        self.accelerations.extend(part_states.iter().map(|s| [s.angular_acceleration, s.acceleration]));
+    /// Copies the accelerations of a range of the part table.
+    pub(crate) fn keep_accelerations(&mut self, range: Range<usize>, part_states: &[PartState]) {
+        for (kept, s) in self.accelerations[range.clone()].iter_mut().zip(&part_states[range]) {
+            *kept = [s.angular_acceleration, s.acceleration];
+        }
     }
 
-    /// Writes the accelerations into the part table.
-    pub(crate) fn write_accelerations(&self, part_states: &mut [PartState]) {
-        for (part_state, [angular, linear]) in part_states.iter_mut().zip(&self.accelerations) {
+    /// Writes the accelerations into a range of the part table.
+    pub(crate) fn write_accelerations(&self, range: Range<usize>, part_states: &mut [PartState]) {
+        for (part_state, [angular, linear]) in part_states[range.clone()].iter_mut().zip(&self.accelerations[range]) {
             (part_state.angular_acceleration, part_state.acceleration) = (*angular, *linear);
         }
     }

@@ -5,7 +5,9 @@ use crate::object::Object;
 use crate::object::part_state::{PartState, StateRange};
 use crate::threads::Threads;
 use crate::world::ObjectState;
+use crate::world::walk::Walk;
 use slotmap::{SlotMap, new_key_type};
+use std::ops::Range;
 use std::sync::Arc;
 use tumble_collide::Vec3;
 
@@ -103,6 +105,7 @@ pub(crate) struct Table {
     /// Ids in the same order.
     pub order: Vec<ObjectId>,
     places: SlotMap<ObjectId, usize>,
+    pub walk: Walk,
 }
 
 impl Table {
@@ -118,7 +121,58 @@ impl Table {
 
     /// Returns the degrees of freedom of all objects.
     pub fn dof(&self) -> usize {
-        self.placed.last().map_or(0, |placed| placed.state_range.v.end)
+        self.walk.dof.unwrap_or_else(|| self.placed.last().map_or(0, |placed| placed.state_range.v.end))
+    }
+
+    /// Brings the list of the walked objects up to date.
+    pub fn gather(&mut self) {
+        let Table { placed, walk, .. } = self;
+        walk.gather();
+        walk.measure(|place| {
+            let range = &placed[place].state_range;
+            [range.x.clone(), range.parts.clone()]
+        });
+    }
+
+    /// Begins a frame: numbers the degrees of freedom among the walked objects. Returns their
+    /// number.
+    pub fn number_walked(&mut self) -> usize {
+        self.gather();
+        let Table { placed, walk, .. } = self;
+        if walk.is_whole() {
+            return self.dof();
+        }
+        let mut dof = 0;
+        walk.kept.clear();
+        for &place in &walk.places {
+            let v = &mut placed[place as usize].state_range.v;
+            walk.kept.push(v.start);
+            *v = dof..dof + v.len();
+            dof = v.end;
+        }
+        walk.dof = Some(dof);
+        dof
+    }
+
+    /// Returns the degrees of freedom of an object as they are numbered outside a frame.
+    pub fn outside(&self, place: usize) -> Range<usize> {
+        let v = &self.placed[place].state_range.v;
+        let walked = self.walk.kept().and_then(|kept| {
+            let at = self.walk.places.binary_search(&(place as u32)).ok()?;
+            Some(kept[at]..kept[at] + v.len())
+        });
+        walked.unwrap_or_else(|| v.clone())
+    }
+
+    /// Ends a frame: numbers the degrees of freedom among all objects. Returns their number.
+    pub fn number_all(&mut self) -> usize {
+        let Table { placed, walk, .. } = self;
+        for (&place, start) in walk.places.iter().zip(walk.kept.drain(..)) {
+            let v = &mut placed[place as usize].state_range.v;
+            *v = start..start + v.len();
+        }
+        walk.dof = None;
+        self.dof()
     }
 
     /// Makes a cache for every object.
@@ -130,6 +184,7 @@ impl Table {
     pub fn push(&mut self, name: Arc<str>, object: Box<dyn Object>, state_range: StateRange) -> ObjectId {
         let id = self.places.insert(self.placed.len());
         self.placed.push(Placed { name, object, state_range });
+        self.walk.push();
         self.order.push(id);
         id
     }
@@ -138,6 +193,7 @@ impl Table {
     pub fn remove(&mut self, id: ObjectId) -> Option<(usize, Placed)> {
         let gone = self.places.remove(id)?;
         self.order.remove(gone);
+        self.walk.remove(gone);
         for (place, other) in self.order.iter().enumerate().skip(gone) {
             self.places[*other] = place;
         }
@@ -158,8 +214,14 @@ pub(crate) struct Objects<'a> {
 }
 
 impl<'a> Objects<'a> {
-    /// Walks them in the order in which they were added.
+    /// Walks those that are not settled, in the order in which they were added: the objects that a
+    /// step works on.
     pub fn iter(self) -> impl Iterator<Item = Entry<'a>> + Clone {
+        self.table.walk.places.iter().map(move |&place| self.at(place as usize))
+    }
+
+    /// Walks all of them in the order in which they were added.
+    pub fn all(self) -> impl Iterator<Item = Entry<'a>> + Clone {
         let entries = self.table.placed.iter().zip(self.states).enumerate();
         entries.map(|(place, (placed, state))| entry(place, placed, state))
     }

@@ -84,5 +84,11 @@ impl World {
         swap(&mut core.broad, &mut lent.broad);
         swap(&mut core.detect_scratch, &mut lent.detect_scratch);
         swap(&mut core.derived.caches, &mut lent.caches);
+        core.table.walk.unsettle_all(); // their numbers are not in these buffers
+        core.table.walk.gather();
+        core.moments.iter_mut().for_each(|moment| moment.settlings = None);
+        core.detect_scratch.forget_parts();
+        core.forces.wrenches.clear();
+        self.before_of = None;
     }
 }

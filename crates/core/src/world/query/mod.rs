@@ -68,7 +68,7 @@ struct Part<'w> {
 impl Core {
     /// Returns the parts that collide, in the order of the part table.
     fn parts(&self) -> impl Iterator<Item = Part<'_>> {
-        let entries = self.objects().iter().filter(|e| e.status.enabled && e.status.collidable);
+        let entries = self.objects().all().filter(|e| e.status.enabled && e.status.collidable);
         entries.filter_map(|entry| Some((entry, entry.object.collidable()?))).flat_map(move |(entry, body)| {
             let id = self.table.order[entry.place];
             entry.state_range.parts.clone().enumerate().filter_map(move |(part, part_state)| {

@@ -124,6 +124,7 @@ impl World {
         let place = self.core.table.place(id).ok_or(WorldError::Stale)?;
         let (serial, part) =
             (self.core.state.objects[place].serial, self.core.table.placed[place].state_range.parts.start);
+        self.core.table.walk.unsettle(place);
         self.core.state.objects[place].rest = RestTimer::default();
         self.core.state.accelerations[part] = [Vec3::zeros(); 2];
         let shown = &mut self.core.derived.part_states[part];
