@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! cargo run --release -p tumble-core --example large_world                     1,000 to 100,000
-//! cargo run --release -p tumble-core --example large_world -- 1000000          one number, 2 GiB
+//! cargo run --release -p tumble-core --example large_world -- 1000000          one number
 //! ```
 //!
 //! | bodies | |

@@ -105,7 +105,7 @@ mod tests {
             prop_assert!(forces.iter().all(|f| f.norm() < 10.0), "{forces:?}");
         }
 
-        /// Points at one place but for rounding keep the force, and their forces are not larger than what they replace.
+        /// Points at one place, apart by rounding, keep the force, and their forces are not larger than what they replace.
         #[test]
         fn points_at_one_place_resist_no_torque(force in vector(), other in vector(), at in vector(), power in -18.0..-3.0_f64) {
             let mut gone = Wrench::default();

@@ -34,6 +34,7 @@ impl World {
         }
         core.own_caches();
         core.moments.clear();
+        core.table.walk.relayout();
         match wanted {
             0 => core.state.x.cut(range),
             _ => {

@@ -100,6 +100,12 @@ impl Walk {
         (self.changes, self.layout) = (self.changes + 1, self.layout + 1);
     }
 
+    /// Notes that an object has more or fewer numbers than before, and makes all objects active.
+    pub fn relayout(&mut self) {
+        self.unsettle_all();
+        self.layout += 1;
+    }
+
     /// Returns the starts of the ranges of degrees of freedom of the walked objects outside a frame, if they
     /// are numbered otherwise now.
     pub fn kept(&self) -> Option<&[usize]> {
