@@ -56,8 +56,6 @@ const NEWTON: [u32; 2] = [2, 12];
 const TINY: usize = 4;
 /// The same for an island with a wide object.
 const NEWTON_OF_WIDE: [u32; 3] = [12, 30, 80];
-/// Maximum number of factorizations of other methods where Newton's method stalls; most islands take 20 to 30.
-const AFTER_STALL: u32 = 40;
 /// Degrees of freedom of a rigid body.
 const RIGID: u32 = 6;
 
@@ -215,8 +213,7 @@ impl Solve<'_> {
             if attempts.contains(&sweep) && self.may_try_newton(wide) {
                 small = small.or_else(|| SmallIsland::new(self.rows, self.blocks, self.c));
                 if let Some(island) = &mut small {
-                    let thorough = sweep == NEWTON[1] && !wide;
-                    let tried = self.newton(island, thorough, wide);
+                    let tried = self.newton(island, sweep == NEWTON[1] && !wide);
                     work += tried.relaxations;
                     if tried.converged {
                         outcome = SolveReport { iterations: sweep + tried.iterations, ..tried };
@@ -281,25 +278,12 @@ impl Solve<'_> {
             && (self.is_reduced || self.locals.iter().any(of_robot))
     }
 
-    /// Tries Newton's method on a small island, and where it stalls a few factorizations of the other methods, which are
-    /// expensive for a wide object; if `thorough`, held choices too.
-    fn newton(&mut self, island: &mut SmallIsland, thorough: bool, wide: bool) -> SolveReport {
+    /// Tries Newton's method on a small island.
+    fn newton(&mut self, island: &mut SmallIsland, thorough: bool) -> SolveReport {
         self.rebuild();
-        let mut solved = island.solve(self.lambda, self.settings.tolerance, thorough);
-        let mut work = f64::from(solved.factorizations) * island.cost();
-        if solved.stalled && !wide {
-            if let Some(plan) = Plan::new(self.rows, self.blocks, self.c, false) {
-                let cost = plan.cost();
-                solved = plan.solve(self.lambda, self.settings.tolerance, AFTER_STALL);
-                work += f64::from(solved.factorizations) * cost;
-            }
-            if thorough && !solved.converged {
-                solved = island.solve_held(self.lambda, self.settings.tolerance);
-                work += f64::from(solved.factorizations) * island.cost();
-            }
-        }
+        let solved = island.solve(self.lambda, self.settings.tolerance, thorough);
         self.read();
-        let relaxations = (work * self.locals.len() as f64) as u32;
+        let relaxations = (f64::from(solved.factorizations) * island.cost() * self.locals.len() as f64) as u32;
         SolveReport { iterations: solved.factorizations, converged: solved.converged, ray: false, relaxations }
     }
 

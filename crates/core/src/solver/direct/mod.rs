@@ -86,8 +86,6 @@ pub(super) struct Direct {
     pub factorizations: u32,
     /// Whether the error is within ten times the tolerance.
     pub converged: bool,
-    /// Whether Newton's method came near and then no nearer.
-    pub stalled: bool,
 }
 
 /// A direct solve of an island that is not too large for it.
@@ -140,7 +138,7 @@ impl<'a> Plan<'a> {
         let mut own = system.island.read(lambda);
         let start = system.island.error_of(&own);
         if start <= tolerance.solved && !cheap {
-            return Direct { factorizations: 0, converged: true, stalled: false };
+            return Direct { factorizations: 0, converged: true };
         }
         let (mut error, mut taken) = (start, 0);
         if error > tolerance.goal && error.is_finite() && (self.at_rest && cheap || error <= near * fastest) {
@@ -184,7 +182,7 @@ impl<'a> Plan<'a> {
         if error < start || start.is_nan() {
             system.island.write(&own, lambda);
         }
-        Direct { factorizations: taken, converged: error <= tolerance.solved, stalled: false }
+        Direct { factorizations: taken, converged: error <= tolerance.solved }
     }
 }
 

@@ -18,10 +18,6 @@
 //! block changed, in the order of how near the block is to that change. Four feet of a robot with friction press each
 //! other through its joints, and then `|f|` has minima that are no solutions; nine of ten times the right choices
 //! differ by at most one block. Other methods solve the rest.
-//!
-//! An attempt can also *stall* near the solution, with choices that stay. Many contacts of one foot are redundant, and their
-//! equations are singular or nearly so: where all stick, no multipliers meet them within the tolerance. Then the interior
-//! point method is tried before choices are held, since it mostly takes less.
 
 use super::choice::{Choice, Derivative, Point};
 use super::dense;
@@ -46,9 +42,6 @@ const REGULAR: [f64; 4] = [1e-13, 1e-6, 100.0, 0.1];
 const MEMORY: usize = 6;
 /// Number of lengths of a step that are tried, each half of the last.
 const LENGTHS: u32 = 6;
-/// An attempt stalls after this number of steps in a row that keep the choices and do not halve `|f|`, if its error is
-/// below this number of tolerances.
-const STALLED: (u32, f64) = (3, 100.0);
 
 /// A small island with the matrix of its rows.
 pub(in crate::solver) struct SmallIsland<'a> {
@@ -126,34 +119,33 @@ impl<'a> SmallIsland<'a> {
     }
 
     /// Solves from the multipliers in `lambda`, and replaces them if it finds better ones. If `thorough`, choices
-    /// are held where those that follow the iterate fail and do not stall.
+    /// are held where those that follow the iterate fail.
     pub fn solve(&mut self, lambda: &mut [f64], tolerance: f64, thorough: bool) -> Direct {
         let tolerance = self.island.tolerance(tolerance);
         let own = self.island.read(lambda);
         let start = self.at(own.clone());
         let error = self.error(&start);
         let mut best = Best { lambda: own, error, taken: 0, tolerance };
-        let stalled = self.follow(start, &mut best);
-        if thorough && !stalled && !best.is_solved() && best.error.is_finite() {
+        self.follow(start, &mut best);
+        if thorough && !best.is_solved() && best.error.is_finite() {
             self.hold(&mut best);
         }
         if best.error < error {
             self.island.write(&best.lambda, lambda);
         }
-        Direct { factorizations: best.taken, converged: best.is_solved(), stalled }
+        Direct { factorizations: best.taken, converged: best.is_solved() }
     }
 
-    /// Takes steps with the choices that each iterate asks for. Returns whether they stall near the solution.
-    fn follow(&mut self, mut at: Iterate, best: &mut Best) -> bool {
+    /// Takes steps with the choices that each iterate asks for.
+    fn follow(&mut self, mut at: Iterate, best: &mut Best) {
         let mut epsilon = REGULAR[0];
         let mut choices = self.choices(&at);
-        let mut still = 0;
         let mut sizes = vec![self.size(|block| at.point(block), None)];
         for _ in 0..STEPS.0 {
             if best.error <= best.tolerance.goal || !sizes.iter().all(|size| size.is_finite()) {
-                return false;
+                return;
             }
-            let Some(change) = self.change(&at, &choices, epsilon) else { return false };
+            let Some(change) = self.change(&at, &choices, epsilon) else { return };
             best.taken += 1;
             let largest = sizes.iter().rev().take(MEMORY).fold(0.0, |a: f64, size| a.max(*size));
             let falls = |t: &f64| {
@@ -177,32 +169,10 @@ impl<'a> SmallIsland<'a> {
                 }
             };
             at.advance(&change, length);
-            let before = std::mem::replace(&mut choices, self.choices(&at));
+            choices = self.choices(&at);
             self.consider(&at, &choices, best);
-            let (last, size) = (sizes[sizes.len() - 1], self.size(|block| at.point(block), None));
-            sizes.push(size);
-            still = if choices == before && size > 0.5 * last { still + 1 } else { 0 };
-            let near = !best.is_solved() && best.error <= STALLED.1 * best.tolerance.solved;
-            if still >= STALLED.0 && near {
-                return true;
-            }
+            sizes.push(self.size(|block| at.point(block), None));
         }
-        false
-    }
-
-    /// Tries held choices from the multipliers in `lambda`, and replaces them if it finds better ones.
-    pub fn solve_held(&mut self, lambda: &mut [f64], tolerance: f64) -> Direct {
-        let tolerance = self.island.tolerance(tolerance);
-        let own = self.island.read(lambda);
-        let error = self.error(&self.at(own.clone()));
-        let mut best = Best { lambda: own, error, taken: 0, tolerance };
-        if error.is_finite() {
-            self.hold(&mut best);
-        }
-        if best.error < error {
-            self.island.write(&best.lambda, lambda);
-        }
-        Direct { factorizations: best.taken, converged: best.is_solved(), stalled: false }
     }
 
     /// Tries the choices of the best multipliers, and those with one block changed.
