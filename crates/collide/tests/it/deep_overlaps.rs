@@ -264,15 +264,16 @@ fn parry_depth((a, pa): (&Shape, &Pose), (b, pb): (&Shape, &Pose)) -> Option<f64
     Some(-contact.dist)
 }
 
+/// Returns a pose by its place and its quaternion, of which the real part is last.
+fn pose(at: [f64; 3], [x, y, z, w]: [f64; 4]) -> Pose {
+    Pose::from_parts(Vec3::from(at).into(), Quat::new_normalize(nalgebra::Quaternion::new(w, x, y, z)))
+}
+
 /// The side of a rod that crosses a box near its corner was overlooked: the only contact was one of
 /// a rim, 0.8 mm apart.
 #[test]
 fn a_rod_through_a_corner_of_a_box_overlaps_it() {
     let (rod, block) = (Shape::cylinder(0.1, 1.6).unwrap(), Shape::cuboid(Vec3::new(0.6, 0.8, 1.1)).unwrap());
-    let pose = |at: [f64; 3], [x, y, z, w]: [f64; 4]| {
-        let turn = Quat::new_normalize(nalgebra::Quaternion::new(w, x, y, z));
-        Pose::from_parts(Vec3::from(at).into(), turn)
-    };
     let at_rod = pose(
         [0.48360638916696863, 0.06129435611964429, 1.212575056808812],
         [0.3921172790988866, -0.04050266563297842, -0.9080525149033862, 0.14157755361053756],
@@ -285,4 +286,151 @@ fn a_rod_through_a_corner_of_a_box_overlaps_it() {
     contacts(&rod, &at_rod, &block, &at_block, 0.01, &mut found);
     let depth = -found.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
     assert!((depth - 0.2799).abs() < 1e-3, "{depth}");
+}
+
+/// Meshes with places and quaternions of two bodies.
+type Case = (&'static str, [[f64; 3]; 2], [[f64; 4]; 2]);
+
+/// Returns the contacts of a shape with a mesh, both by name, and the two with their poses.
+fn contacts_of(name: &str, (mesh, at, turns): Case) -> ([(Shape, Pose); 2], Vec<Contact>) {
+    let find = |name: &str| shapes().into_iter().find(|s| s.0 == name).unwrap().1;
+    let [a, b] = [0, 1].map(|k| (find([name, mesh][k]), pose(at[k], turns[k])));
+    let mut found = Vec::new();
+    contacts(&a.0, &a.1, &b.0, &b.1, 0.01, &mut found);
+    ([a, b], found)
+}
+
+/// A needle through the middle of faces of a mesh, where no edge and no corner shows that it still
+/// overlaps after it was moved: the contact was at its tip or base, as if the hull of the mesh touched
+/// it, up to half a meter outside one of the two. It is midway between the two surfaces.
+#[test]
+fn a_needle_through_a_mesh_touches_it_where_the_mesh_is() {
+    let cases: [Case; 17] = [
+        (
+            "torus mesh",
+            [[0.910602, 1.192968, -0.483977], [0.686697, 0.669171, 0.248261]],
+            [[0.264096, -0.066156, -0.900020, 0.340355], [0.264096, -0.066156, -0.900019, 0.340356]],
+        ),
+        (
+            "torus mesh",
+            [[-0.653337, 1.159785, -0.539290], [-0.894019, 0.901304, -0.071073]],
+            [[-0.033933, -0.129568, -0.027199, 0.990616], [0.239777, -0.207382, 0.144823, 0.937297]],
+        ),
+        (
+            "torus mesh",
+            [[0.032862, 0.885451, 1.229663], [0.204866, 0.134192, 0.928766]],
+            [[0.163330, 0.701744, -0.522895, 0.455477], [0.163330, 0.701744, -0.522894, 0.455478]],
+        ),
+        (
+            "torus mesh",
+            [[-1.228043, 0.189165, -1.026798], [-0.914833, 0.048711, -0.310566]],
+            [[-0.100859, 0.391266, -0.367872, 0.837502], [-0.100858, 0.391266, -0.367873, 0.837501]],
+        ),
+        (
+            "angle mesh",
+            [[0.770772, -0.107520, 0.649751], [0.513736, -0.151394, 0.396206]],
+            [[0.451321, -0.698951, -0.348473, 0.431675], [0.451321, -0.698951, -0.348473, 0.431675]],
+        ),
+        (
+            "angle mesh",
+            [[0.509573, -0.153377, 0.426377], [0.425219, 0.057479, 0.763103]],
+            [[-0.097690, -0.074462, 0.055474, 0.990876], [0.064195, 0.143219, -0.057104, 0.985955]],
+        ),
+        (
+            "angle mesh",
+            [[-0.863330, -0.156271, 0.176157], [-0.607976, 0.001861, 0.229596]],
+            [[-0.004868, 0.574681, 0.588635, 0.568530], [0.413257, 0.082117, -0.211399, 0.881922]],
+        ),
+        (
+            "angle mesh",
+            [[-0.046533, -0.232898, 0.075136], [-0.360064, -0.009730, -0.148290]],
+            [[-0.866165, -0.274018, 0.364115, 0.205166], [-0.866165, -0.274018, 0.364115, 0.205166]],
+        ),
+        (
+            "angle mesh",
+            [[-0.555800, -0.207747, 0.388133], [-0.504408, 0.269380, 0.449995]],
+            [[-0.414239, 0.180793, -0.049364, 0.890664], [0.772153, 0.271749, 0.557257, 0.139270]],
+        ),
+        (
+            "angle mesh",
+            [[0.618216, 0.686805, 0.657109], [0.591231, 0.774465, 0.499814]],
+            [[-0.628802, -0.712965, -0.163461, 0.263760], [0.533409, -0.221392, 0.017156, 0.816190]],
+        ),
+        (
+            "angle mesh",
+            [[-0.760961, -0.159687, -0.118438], [-0.687526, -0.409506, 0.167532]],
+            [[0.001760, -0.010856, 0.002593, 0.999936], [0.364258, 0.301244, 0.655407, 0.589075]],
+        ),
+        (
+            "angle mesh",
+            [[1.125047, 0.338918, -0.095205], [0.620716, 0.623823, -0.252852]],
+            [[0.452880, -0.572517, -0.528984, 0.432782], [0.014275, 0.119509, -0.201321, 0.972103]],
+        ),
+        (
+            "angle mesh",
+            [[0.782751, -0.149907, -0.934455], [0.839333, -0.442477, -0.753305]],
+            [[-0.014107, -0.012232, 0.001579, 0.999824], [0.303881, -0.059794, 0.818177, 0.484426]],
+        ),
+        (
+            "spool mesh",
+            [[-0.377597, 0.139051, 1.792620], [-0.479076, 0.510218, 0.889283]],
+            [[0.575012, -0.811313, -0.005839, 0.105345], [0.575012, -0.811313, -0.005839, 0.105345]],
+        ),
+        (
+            "spool mesh",
+            [[0.393353, 0.314538, -1.422205], [0.579802, 0.152572, -0.783746]],
+            [[-0.090996, -0.051443, -0.040164, 0.993710], [-0.812752, -0.424733, 0.227028, 0.327862]],
+        ),
+        (
+            "spool mesh",
+            [[-0.655406, 0.511349, -0.197746], [-0.287741, 0.683523, 0.425797]],
+            [[-0.009446, -0.031171, 0.033192, 0.998918], [-0.009446, -0.031171, 0.033192, 0.998918]],
+        ),
+        (
+            "spool mesh",
+            [[-0.818884, -0.361507, 0.303836], [-0.662874, -0.636171, 0.562405]],
+            [[0.957136, 0.273360, -0.069364, 0.065973], [0.957137, 0.273360, -0.069365, 0.065973]],
+        ),
+    ];
+    for case in cases {
+        let ([(a, pa), (b, pb)], found) = contacts_of("needle", case);
+        assert!(!found.is_empty(), "{case:?}");
+        for c in &found {
+            is_plausible(c, (&a, &pa), (&b, &pb), 0.01).unwrap_or_else(|why| panic!("{case:?}: {why}"));
+            for (shape, pose) in [(&a, &pa), (&b, &pb)] {
+                let off = shape.closest_point(pose, &c.point).distance.abs();
+                assert!(off <= 0.5 * c.gap.abs() + 1e-6, "{off} m from a surface: {c:?}, {case:?}");
+            }
+        }
+    }
+}
+
+/// An edge of a mesh deep in a hull, below two faces that do not meet above it: its depth was that of
+/// the place where the planes of these faces meet, beyond the hull, up to 2 % deeper than the hull.
+#[test]
+fn an_edge_in_a_hull_is_no_deeper_than_the_hull() {
+    let cases: [Case; 3] = [
+        (
+            "torus mesh",
+            [[-0.668242, -0.340307, 0.314336], [-0.359526, -0.354793, -0.302160]],
+            [[-0.737565, 0.311419, -0.026727, 0.598583], [-0.737565, 0.311419, -0.026727, 0.598583]],
+        ),
+        (
+            "angle mesh",
+            [[-0.218399, 0.375542, -0.786176], [0.187199, 0.455022, -0.485488]],
+            [[0.495219, 0.459637, 0.711093, 0.194523], [0.495219, 0.459637, 0.711093, 0.194523]],
+        ),
+        (
+            "angle mesh",
+            [[-0.264652, 0.051296, -0.990676], [-0.066495, -0.446411, -0.849514]],
+            [[-0.274320, 0.607948, -0.594605, 0.448991], [-0.274320, 0.607948, -0.594605, 0.448991]],
+        ),
+    ];
+    for case in cases {
+        let ([(a, pa), (b, pb)], found) = contacts_of("hull", case);
+        assert!(!found.is_empty(), "{case:?}");
+        for c in &found {
+            is_plausible(c, (&a, &pa), (&b, &pb), 0.01).unwrap_or_else(|why| panic!("{case:?}: {why}, {c:?}"));
+        }
+    }
 }

@@ -113,7 +113,7 @@ pub(super) fn separate(a: &Body, b: &Body, a_in_b: &Pose, size: f64, sampled: &S
         return;
     }
     if depth > SAME_DEPTH * size {
-        pair.touching_contacts(direction, depth, found);
+        pair.touching_contacts(direction, depth, None, found);
     }
 }
 
@@ -273,28 +273,40 @@ impl BodyPair<'_> {
     /// Separates two bodies of which one is not convex: by the deepest point, or by their hulls.
     fn separate_nonconvex(&self, found: &mut Collector) {
         if found.min_gap() > -DEEP_OVERLAP * self.size {
-            let inverse = self.pose.inverse();
-            let caches = [NearestCache::new(), NearestCache::new()];
-            let first = Query::new([self.a, self.b], self.pose, self.size, None, &caches[0]);
-            let second = Query::new([self.b, self.a], &inverse, self.size, Some(self.pose), &caches[1]);
-            faces([&first, &second], [self.a, self.b], found);
+            self.add_faces(self.pose, found);
         }
         let deepest = found.deepest().copied().filter(|c| c.gap < -SAME_DEPTH * self.size);
         if let Some(c) = deepest.filter(|c| self.is_free_after(c.normal * (TOUCH_GAP * self.size - c.gap))) {
-            self.touching_contacts(c.normal, -c.gap, found);
+            self.touching_contacts(c.normal, -c.gap, Some(c), found);
         } else if self.inside_fraction() > MIN_INSIDE_FRACTION {
             let (direction, depth) = self.min_overlap();
-            self.touching_contacts(direction, depth, found);
+            self.touching_contacts(direction, depth, None, found);
         }
     }
 
-    /// Returns whether the bodies do not overlap after A is moved by `shift`.
+    /// Adds the deepest points of the faces of both, with A at `pose`.
+    fn add_faces(&self, pose: &Pose, found: &mut Collector) {
+        let inverse = pose.inverse();
+        let caches = [NearestCache::new(), NearestCache::new()];
+        let first = Query::new([self.a, self.b], pose, self.size, None, &caches[0]);
+        let second = Query::new([self.b, self.a], &inverse, self.size, Some(pose), &caches[1]);
+        faces([&first, &second], [self.a, self.b], found);
+    }
+
+    /// Returns whether the bodies do not overlap after A is moved by `shift`. A thin body with curved sides
+    /// can go through the middle of a face, where neither has an element.
     fn is_free_after(&self, shift: Vec3) -> bool {
         let (mut out, mut moved) = (Vec::new(), *self.pose);
         moved.translation.vector += shift;
         let mut there = Collector::new(TOUCH_GAP * self.size, self.size, &mut out);
         let sampled = elements(self.a, self.b, &moved, self.size, &mut there);
-        sampled.min > -SAME_DEPTH * self.size && there.min_gap() > -SAME_DEPTH * self.size
+        if sampled.min <= -SAME_DEPTH * self.size || there.min_gap() <= -SAME_DEPTH * self.size {
+            return false;
+        }
+        if self.a.field.is_curved() || self.b.field.is_curved() {
+            self.add_faces(&moved, &mut there);
+        }
+        there.min_gap() > -MIN_DEPTH * self.size
     }
 
     /// Returns the fraction of points inside or on the other body, for the body with the larger
@@ -327,8 +339,9 @@ impl BodyPair<'_> {
     }
 
     /// Replaces the contacts by those at which A, moved by `depth` along `direction`, touches B,
-    /// with their depths at the original pose.
-    fn touching_contacts(&self, direction: Vec3, depth: f64, found: &mut Collector) {
+    /// with their depths at the original pose. If none has the whole depth, one is added: `deepest`, of
+    /// which the translation is that of a contact, else that of the support points, where the hulls touch.
+    fn touching_contacts(&self, direction: Vec3, depth: f64, deepest: Option<Contact>, found: &mut Collector) {
         let shift = depth + TOUCH_GAP * self.size;
         let mut moved = *self.pose;
         moved.translation.vector += direction * shift;
@@ -344,24 +357,28 @@ impl BodyPair<'_> {
         let convex = self.a.field.is_convex() && self.b.field.is_convex();
         let excessive = |c: &Contact| convex && self.overlap_along(&c.normal) > MAX_EXCESS * depth;
         if found.min_gap() > -(1.0 - TOUCH_MARGIN) * depth || found.deepest().is_some_and(excessive) {
-            // no flat parts touch across the direction, so the support points do
-            let lowest = self.pose.translation.vector
-                + self.rotation * self.a.elements.support_point(&-self.rotation.tr_mul(&direction));
-            let highest = self.b.elements.support_point(&direction);
-            // midway from the one that is deeper in the other body
-            let of_a = self.b.field.bound(&lowest);
-            let of_b = self.a.field.bound(&self.pose.inverse_transform_point(&highest.into()).coords);
-            let half = 0.5 * depth * direction;
-            let point = if of_a <= of_b { lowest + half } else { highest - half };
-            found.push(Contact {
-                point,
-                normal: direction,
-                gap: -depth,
-                feature: SEPARATION_FEATURE,
-                core_a: 0.0,
-                core_b: 0.0,
-                normal_from: NormalFrom::Edges,
-            });
+            found.push(deepest.unwrap_or_else(|| self.support_contact(direction, depth)));
+        }
+    }
+
+    /// Returns the contact of the support points across a direction: no flat parts touch there.
+    fn support_contact(&self, direction: Vec3, depth: f64) -> Contact {
+        let lowest = self.pose.translation.vector
+            + self.rotation * self.a.elements.support_point(&-self.rotation.tr_mul(&direction));
+        let highest = self.b.elements.support_point(&direction);
+        // midway from the one that is deeper in the other body
+        let of_a = self.b.field.bound(&lowest);
+        let of_b = self.a.field.bound(&self.pose.inverse_transform_point(&highest.into()).coords);
+        let half = 0.5 * depth * direction;
+        let point = if of_a <= of_b { lowest + half } else { highest - half };
+        Contact {
+            point,
+            normal: direction,
+            gap: -depth,
+            feature: SEPARATION_FEATURE,
+            core_a: 0.0,
+            core_b: 0.0,
+            normal_from: NormalFrom::Edges,
         }
     }
 }

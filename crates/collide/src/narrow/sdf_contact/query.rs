@@ -29,6 +29,8 @@ const SAME_POINT: f64 = 1e-3;
 /// Distance from the surface at which two extended faces still meet in an edge of it, as a fraction
 /// of the smaller body's radius.
 const RIDGE_TOLERANCE: f64 = 1e-4;
+/// The same for the distance from a mesh, of which the bound can be far below it.
+const MESH_RIDGE_TOLERANCE: f64 = 2e-4;
 
 /// The elements of one body against the field of the other.
 pub(super) struct Query<'a> {
@@ -406,7 +408,9 @@ impl<'a> Query<'a> {
     /// Returns whether a place to which two faces were extended, at a hit of a point inside, is no
     /// more than rounding outside the surface: the faces end where they meet.
     pub(super) fn is_surface(&self, at: &Vec3, hit: &Hit) -> bool {
-        self.field.bound(&(at - hit.normal * hit.distance)) <= RIDGE_TOLERANCE * self.size
+        let place = at - hit.normal * hit.distance;
+        self.field.bound(&place) <= RIDGE_TOLERANCE * self.size
+            && self.mesh.is_none_or(|mesh| mesh.nearest(&place).distance <= MESH_RIDGE_TOLERANCE * self.size)
     }
 
     /// Returns whether there is a contact of the same depth at nearly the same place.
