@@ -266,13 +266,28 @@ fn marbles_roll_in_a_groove_as_they_should_and_most_end_in_the_tray() {
     let rolled = (place(&world, marbles[9]) - start[9]).norm();
     println!("rolled {rolled} m, by hand {by_hand} m");
     assert!((rolled / by_hand - 1.0).abs() < 1e-5, "{rolled} m, by hand {by_hand} m");
-    run(&mut world, 12.0);
-    let tray = world.find("tray").unwrap();
-    let places = marbles.iter().map(|&id| place(&world, id) - place(&world, tray));
+    let mut arrived = 0;
+    for run in 0..5 {
+        arrived += marbles_in_the_tray(&scene, 1.0 + f64::from(run) * 1e-12);
+    }
+    println!("{arrived} of 50 in the tray");
+    assert!(arrived >= 30, "{arrived} of 50");
+}
+
+/// Returns how many of the ten marbles are in the tray at the end; the others lie on the floor. Some meet another one at
+/// the top of the helix and jump off. How many do depends on rounding: 4 to 10 arrive, 7.7 in the mean of 80 runs.
+fn marbles_in_the_tray(scene: &SceneFile, gravity: f64) -> usize {
+    let mut world = build(scene);
+    let mut settings = world.settings().clone();
+    settings.gravity *= gravity;
+    world.set_settings(settings).unwrap();
+    run(&mut world, 12.4);
+    let tray = place(&world, world.find("tray").unwrap());
+    let places = bodies(scene, &world, "marble").into_iter().map(|id| place(&world, id) - tray);
     let (inside, outside): (Vec<Vec3>, Vec<Vec3>) =
         places.partition(|x| x.x.abs() < 0.15 && x.y.abs() < 0.15 && x.z < 0.06);
-    // some meet another one at the top of the helix and jump off
-    assert!(inside.len() >= 8 && outside.iter().all(|x| x.z < 0.01), "{inside:?} in the tray, {outside:?} are not");
+    assert!(outside.iter().all(|x| x.z < 0.01), "{inside:?} in the tray, {outside:?} are not");
+    inside.len()
 }
 
 #[test]

@@ -29,8 +29,6 @@ const SAME_POINT: f64 = 1e-3;
 /// Distance from the surface at which two extended faces still meet in an edge of it, as a fraction
 /// of the smaller body's radius.
 const RIDGE_TOLERANCE: f64 = 1e-4;
-/// The same for the distance from a mesh, of which the bound can be far below it.
-const MESH_RIDGE_TOLERANCE: f64 = 2e-4;
 
 /// The elements of one body against the field of the other.
 pub(super) struct Query<'a> {
@@ -409,8 +407,9 @@ impl<'a> Query<'a> {
     /// more than rounding outside the surface: the faces end where they meet.
     pub(super) fn is_surface(&self, at: &Vec3, hit: &Hit) -> bool {
         let place = at - hit.normal * hit.distance;
-        self.field.bound(&place) <= RIDGE_TOLERANCE * self.size
-            && self.mesh.is_none_or(|mesh| mesh.nearest(&place).distance <= MESH_RIDGE_TOLERANCE * self.size)
+        let most = RIDGE_TOLERANCE * self.size;
+        // the bound of a mesh may be far below its distance
+        self.field.bound(&place) <= most && self.mesh.is_none_or(|mesh| mesh.nearest(&place).distance <= most)
     }
 
     /// Returns whether there is a contact of the same depth at nearly the same place.
