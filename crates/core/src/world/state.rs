@@ -115,7 +115,7 @@ impl WorldState {
     pub(crate) fn copy_walked(&mut self, from: &WorldState, table: &Table) {
         let WorldState { time, frame, next_serial, warm, held_division, inner_step, touching, .. } = from;
         (self.time, self.frame, self.next_serial, self.inner_step) = (*time, *frame, *next_serial, *inner_step);
-        self.held_division = held_division.clone();
+        self.held_division = *held_division;
         self.warm.clone_from(warm);
         self.touching.clone_from(touching);
         let walk = &table.walk;

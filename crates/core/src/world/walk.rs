@@ -152,7 +152,8 @@ impl Walk {
             return;
         }
         self.spans_of = self.changes + 1;
-        (self.x.0.clear(), self.parts.0.clear());
+        self.x.0.clear();
+        self.parts.0.clear();
         for &place in &self.places {
             let [x, parts] = ranges(place as usize);
             self.x.push(x);

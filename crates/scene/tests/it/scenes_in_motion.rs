@@ -278,7 +278,7 @@ fn marbles_roll_in_a_groove_as_they_should_and_most_end_in_the_tray() {
 /// the top of the helix and jump off. How many do depends on rounding: 4 to 10 arrive, 7.7 in the mean of 80 runs.
 fn marbles_in_the_tray(scene: &SceneFile, gravity: f64) -> usize {
     let mut world = build(scene);
-    let mut settings = world.settings().clone();
+    let mut settings = *world.settings();
     settings.gravity *= gravity;
     world.set_settings(settings).unwrap();
     run(&mut world, 12.4);
