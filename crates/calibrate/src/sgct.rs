@@ -154,6 +154,8 @@ fn facet(name: &str, window: &At<'_>, viewport: &At<'_>, users: &[User<'_>], out
         "side_by_side" => ("side_by_side", [2.0, 1.0]),
         "top_bottom" => ("top_bottom", [1.0, 2.0]),
         "anaglyph_red_cyan" => ("anaglyph", [1.0, 1.0]),
+        "checkerboard" | "checkerboard_inverted" => ("checkerboard", [1.0, 1.0]),
+        "vertical_interlaced" | "vertical_interlaced_inverted" => ("rows", [1.0, 1.0]),
         other => {
             out.notes.push(format!("{}: stereo \"{other}\" is read as mono", window.place));
             ("mono", [1.0, 1.0])
@@ -163,6 +165,15 @@ fn facet(name: &str, window: &At<'_>, viewport: &At<'_>, users: &[User<'_>], out
     if px.iter().any(|side| !(1.0..=16384.0).contains(side)) {
         return Err(viewport.fail(format!("is {} x {} pixels, expected 1 to 16384", px[0], px[1])));
     }
+    // its pixels are counted from the lower left corner of the window, and the first one is the left eye's
+    let [x, y] = [0, 1].map(|k| (size[k] * at[k]).round() as i64);
+    let lower_row = y + px[1] as i64 - 1;
+    let inverted = window.text("stereo").is_some_and(|word| word.ends_with("_inverted"));
+    let swap_eyes = match stereo {
+        "rows" => (lower_row % 2 != 0) != inverted,
+        "checkerboard" => ((x + lower_row) % 2 != 0) != inverted,
+        _ => false,
+    };
     let corner = window.pair("pos", [0.0; 2])?;
     let position = [corner[0] + size[0] * at[0], corner[1] + size[1] * (1.0 - at[1] - share[1])].map(f64::round);
     let mirrored = |key| window.value.get(key).and_then(Value::as_bool).unwrap_or(false);
@@ -180,7 +191,7 @@ fn facet(name: &str, window: &At<'_>, viewport: &At<'_>, users: &[User<'_>], out
     let _ = writeln!(out.cave, "[[screen]]\nname = \"{name}\"\n{screen}");
     let _ = writeln!(
         out.cave,
-        "[[facet]]\nname = \"{name}\"\nscreen = \"{name}\"\nuser = \"{user}\"\nsize_px = [{}, {}]\nposition_px = [{}, {}]\nstereo = \"{stereo}\"\nflip = \"{flip}\"\n",
+        "[[facet]]\nname = \"{name}\"\nscreen = \"{name}\"\nuser = \"{user}\"\nsize_px = [{}, {}]\nposition_px = [{}, {}]\nstereo = \"{stereo}\"\nswap_eyes = {swap_eyes}\nflip = \"{flip}\"\n",
         px[0], px[1], position[0], position[1]
     );
     Ok(())

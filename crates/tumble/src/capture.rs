@@ -86,6 +86,7 @@ impl Capture {
         match &self.source {
             Source::Camera([w, h]) => renderer.render(&list, *w, *h),
             Source::Facet(view, facet) => {
+                view.set_frame(self.frames.as_ref().map_or(0, |frames| frames.taken));
                 list.settings.shadow_map_size = (CAVE_SHADOWS * list.settings.shadow_map_size).min(8192);
                 view.draw(renderer, &list, facet)
             }

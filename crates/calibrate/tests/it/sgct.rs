@@ -32,6 +32,29 @@ fn a_plane_has_its_corners_and_its_part_of_the_window() {
     assert_eq!(facet.output, Output::Window { position_px: [100 + 960, 50 + 270] });
 }
 
+/// The viewport begins at x = 960, y = 270 from the lower left corner of the window and is 540 high. Shaders of
+/// SGCT give the left eye pixels with even `x + y`, or rows with even `y`, counted from that corner.
+#[test]
+fn interlaced_pictures_begin_with_the_same_eye() {
+    let facet = |stereo: &str| cave(&config(&format!(", \"stereo\": \"{stereo}\""), PLANE)).facets[0].clone();
+    let left_at_top = |stereo: &str, [x, y]: [i64; 2]| {
+        let facet = facet(stereo);
+        let ours = match facet.stereo {
+            Stereo::Rows => y % 2 == 0,
+            Stereo::Checkerboard => (x + y) % 2 == 0,
+            other => panic!("{other:?}"),
+        };
+        ours != facet.swap_eyes
+    };
+    for [x, y] in [[0, 0], [1, 0], [0, 1], [1, 1], [7, 4]] {
+        let (i, j) = (960 + x, 270 + 539 - y);
+        assert_eq!(left_at_top("checkerboard", [x, y]), (i + j) % 2 == 0);
+        assert_eq!(left_at_top("checkerboard_inverted", [x, y]), (i + j) % 2 != 0);
+        assert_eq!(left_at_top("vertical_interlaced", [x, y]), j % 2 == 0);
+        assert_eq!(left_at_top("vertical_interlaced_inverted", [x, y]), j % 2 != 0);
+    }
+}
+
 /// A picture of 90 x 60 degrees, turned to the right by 90: 10 m to the right of the eye.
 #[test]
 fn angles_cut_a_rectangle_ahead_of_the_user() {
@@ -50,9 +73,9 @@ fn angles_cut_a_rectangle_ahead_of_the_user() {
 
 #[test]
 fn what_is_left_out_is_noted_and_what_is_wrong_has_its_place() {
-    let files = sgct_to_cave(&config(", \"stereo\": \"checkerboard\"", PLANE)).unwrap();
+    let files = sgct_to_cave(&config(", \"stereo\": \"active\"", PLANE)).unwrap();
     assert!(files.notes.iter().any(|note| note.contains("10.0.0.2")), "{:?}", files.notes);
-    assert!(files.notes.iter().any(|note| note.contains("stereo \"checkerboard\" is read as mono")));
+    assert!(files.notes.iter().any(|note| note.contains("stereo \"active\" is read as mono")));
     let said = |text: &str| sgct_to_cave(text).unwrap_err().to_string();
     assert!(said("{\n\"nodes\": [,]").starts_with("line 2, column "), "{}", said("{\n\"nodes\": [,]"));
     assert_eq!(said("{}"), "the configuration: has no users");

@@ -73,28 +73,33 @@ const BLUE: [u8; 4] = [80, 144, 255, 255];
 const YELLOW: [u8; 4] = [255, 220, 64, 255];
 
 /// Draws the pattern of a facet: in stereo one per eye, labeled, mirrored as the facet is, not
-/// warped and not blended.
+/// warped and not blended. `frame_sequential` has the first eye.
 pub fn calibration_picture(cave: &Cave, facet: &Facet, pattern: CalibrationPattern) -> Image {
-    drawn(cave, facet, pattern, &|eye| eye)
+    drawn(cave, facet, pattern, facet.eyes(0), &|eye| eye)
 }
 
 /// Draws the pattern of a facet as its projector gets pictures: warped, blended and colored too.
 pub fn finished_calibration_picture(view: &CaveView, facet: &Facet, pattern: CalibrationPattern) -> Image {
-    drawn(view.cave(), facet, pattern, &|eye| view.finished(eye, facet))
+    drawn(view.cave(), facet, pattern, view.eyes(facet), &|eye| view.finished(eye, facet))
 }
 
 /// Returns a picture as the facet's projector gets it: in stereo for both eyes, mirrored as the facet is, not
 /// warped and not blended.
 pub fn as_projected(eye: &Image, facet: &Facet) -> Image {
-    let eyes = facet.stereo.sides().iter().map(|_| flipped(eye.clone(), facet.flip)).collect();
+    let eyes = facet.eyes(0).iter().map(|_| flipped(eye.clone(), facet.flip)).collect();
     combined(eyes, facet.stereo)
 }
 
-fn drawn(cave: &Cave, facet: &Facet, pattern: CalibrationPattern, finish: &dyn Fn(Image) -> Image) -> Image {
+fn drawn(
+    cave: &Cave,
+    facet: &Facet,
+    pattern: CalibrationPattern,
+    sides: &[f64],
+    finish: &dyn Fn(Image) -> Image,
+) -> Image {
     let screen = &cave.screens[facet.screen];
-    let sides = facet.stereo.sides().iter();
-    let eyes = sides.map(|side| flipped(finish(one_eye(cave, facet, screen, pattern, *side)), facet.flip)).collect();
-    combined(eyes, facet.stereo)
+    let eye = |side: &f64| flipped(finish(one_eye(cave, facet, screen, pattern, *side)), facet.flip);
+    combined(sides.iter().map(eye).collect(), facet.stereo)
 }
 
 fn one_eye(cave: &Cave, facet: &Facet, screen: &Screen, pattern: CalibrationPattern, side: f64) -> Image {

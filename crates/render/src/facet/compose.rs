@@ -3,6 +3,57 @@
 use crate::Image;
 use tumble_scene::cave::{Flip, Stereo};
 
+/// The place of one eye's picture in the whole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct EyePlace {
+    /// Top left corner, pixels.
+    pub at_px: [u32; 2],
+    /// Which of red, green and blue are written.
+    pub channels: [bool; 3],
+    pub parity: Parity,
+}
+
+/// The pixels of a picture that belong to one eye: those with `(across·x + down·y) mod 2 = phase`, `x` to
+/// the right and `y` down from its top left corner. The default has all pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Parity {
+    pub across: u32,
+    pub down: u32,
+    pub phase: u32,
+}
+
+impl Parity {
+    fn has(self, x: u32, y: u32) -> bool {
+        (self.across * x + self.down * y) % 2 == self.phase
+    }
+}
+
+impl EyePlace {
+    /// Returns the place of the eye with this index, the first or the second in the picture, from the
+    /// size of one eye's picture.
+    pub fn new(stereo: Stereo, index: usize, [width, height]: [u32; 2]) -> EyePlace {
+        let second = index > 0;
+        let parity = |across, down| Parity { across, down, phase: u32::from(second) };
+        EyePlace {
+            at_px: match stereo {
+                Stereo::SideBySide if second => [width, 0],
+                Stereo::TopBottom if second => [0, height],
+                _ => [0, 0],
+            },
+            channels: match stereo {
+                Stereo::Anaglyph => [!second, second, second],
+                _ => [true; 3],
+            },
+            parity: match stereo {
+                Stereo::Rows => parity(0, 1),
+                Stereo::Columns => parity(1, 0),
+                Stereo::Checkerboard => parity(1, 1),
+                _ => Parity::default(),
+            },
+        }
+    }
+}
+
 /// A picture of one color.
 pub(crate) fn blank(width: u32, height: u32, color: [u8; 4]) -> Image {
     let rgba = color.into_iter().cycle().take(4 * width as usize * height as usize).collect();
@@ -22,32 +73,26 @@ pub(crate) fn paste(into: &mut Image, from: &Image, x: u32, y: u32) {
     }
 }
 
-/// Combines the pictures of the eyes (one, or left and right of one size) as the stereo mode shows
-/// them.
+/// Combines the pictures of the eyes, one or two of one size in the order of their places, as the stereo
+/// mode shows them.
 pub(crate) fn combined(mut eyes: Vec<Image>, stereo: Stereo) -> Image {
-    if eyes.len() < 2 || stereo == Stereo::Mono {
+    if eyes.len() < 2 {
         return eyes.swap_remove(0);
     }
-    let (left, right) = (&eyes[0], &eyes[1]);
-    match stereo {
-        Stereo::Mono | Stereo::SideBySide => {
-            let mut whole = blank(left.width + right.width, left.height, [0, 0, 0, 255]);
-            paste(&mut whole, left, 0, 0);
-            paste(&mut whole, right, left.width, 0);
-            whole
-        }
-        Stereo::TopBottom => {
-            let mut whole = blank(left.width, left.height + right.height, [0, 0, 0, 255]);
-            paste(&mut whole, left, 0, 0);
-            paste(&mut whole, right, 0, left.height);
-            whole
-        }
-        Stereo::Anaglyph => {
-            let pixels = left.rgba.chunks_exact(4).zip(right.rgba.chunks_exact(4));
-            let rgba = pixels.flat_map(|(l, r)| [l[0], r[1], r[2], 255]).collect();
-            Image { width: left.width, height: left.height, rgba }
+    let size = [eyes[0].width, eyes[0].height];
+    let [width, height] = stereo.whole_px(size);
+    let mut whole = blank(width, height, [0, 0, 0, 255]);
+    for (i, eye) in eyes.iter().enumerate() {
+        let EyePlace { at_px, channels, parity } = EyePlace::new(stereo, i, size);
+        for (k, pixel) in eye.rgba.chunks_exact(4).enumerate() {
+            let (x, y) = (k as u32 % eye.width, k as u32 / eye.width);
+            if parity.has(x, y) {
+                let at = 4 * ((at_px[1] + y) as usize * width as usize + (at_px[0] + x) as usize);
+                (0..3).filter(|&c| channels[c]).for_each(|c| whole.rgba[at + c] = pixel[c]);
+            }
         }
     }
+    whole
 }
 
 /// Mirrors a picture.

@@ -28,7 +28,7 @@ pub(crate) use blend::encoded;
 pub use calibration::{CalibrationPattern, as_projected, calibration_picture, finished_calibration_picture};
 pub(crate) use canvas::fill_rect;
 pub use color::ProjectorColor;
-pub(crate) use compose::blank;
+pub(crate) use compose::{Parity, blank};
 pub use lut::ColorTable;
 pub use perspective::FacetView;
 pub use pfm::Pfm;

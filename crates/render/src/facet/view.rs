@@ -1,6 +1,6 @@
 //! A cave at its place in a scene.
 
-use super::compose::{combined, flipped};
+use super::compose::{EyePlace, Parity, combined, flipped};
 use super::curved::{Curved, EyeInCave};
 use super::perspective::FacetView;
 use super::surface::{ScreenMesh, shown};
@@ -11,7 +11,7 @@ use crate::{DrawList, Image, RenderError, Renderer, Stage};
 use nalgebra::{Point3, Vector3};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
-use tumble_scene::cave::{Cave, Facet, Flip, Screen, Stereo, Surface, User};
+use tumble_scene::cave::{Cave, Facet, Flip, Screen, Surface, User};
 use tumble_scene::{CavePlace, SceneFile};
 
 /// Pixels drawn beyond the edges of a facet and cut off again; occlusion reaches this far across an
@@ -25,6 +25,8 @@ const BACKGROUND: [u8; 4] = [24, 24, 26, 255];
 pub struct CaveView {
     cave: Cave,
     place: CavePlace,
+    /// Number of the frame that is drawn.
+    frame: u64,
     /// By facet.
     warps: Vec<Option<Warp>>,
     /// Shares of light and of lift, by facet.
@@ -68,7 +70,7 @@ impl CaveView {
         let masks = cave.facets.iter().map(masks).collect::<Result<_, _>>()?;
         let colors = cave.facets.iter().map(ProjectorColor::load).collect::<Result<_, _>>()?;
         let (finishes, curved, unfolded) = (Vec::new(), Vec::new(), Mutex::default());
-        let mut view = CaveView { cave, place, warps, masks, colors, meshes, finishes, curved, unfolded };
+        let mut view = CaveView { cave, place, frame: 0, warps, masks, colors, meshes, finishes, curved, unfolded };
         view.finishes = (0..view.cave.facets.len()).map(|i| view.finish(i)).collect();
         view.curved = (0..view.cave.facets.len()).map(|i| view.on_curve(i)).collect();
         Ok(view)
@@ -87,6 +89,17 @@ impl CaveView {
     /// Moves it to another place in the scene.
     pub fn set_place(&mut self, place: CavePlace) {
         self.place = place;
+    }
+
+    /// The number of the frame that is drawn next; 0 at first. It decides which eye `frame_sequential`
+    /// shows.
+    pub fn set_frame(&mut self, frame: u64) {
+        self.frame = frame;
+    }
+
+    /// Returns the sides of the eyes in a facet's next picture, in the order of their places.
+    pub(super) fn eyes(&self, facet: &Facet) -> &'static [f64] {
+        facet.eyes(self.frame)
     }
 
     /// The users; the next picture is drawn from the eyes that are set here.
@@ -181,18 +194,12 @@ impl CaveView {
         let finish = index.and_then(|i| self.finishes[i].clone());
         let curved = index.and_then(|i| self.curved[i].as_ref());
         let [w, h] = facet.size_px;
-        for (i, side) in facet.stereo.sides().iter().enumerate() {
-            let (at_px, channels) = match (facet.stereo, i) {
-                (Stereo::Anaglyph, 0) => ([0, 0], [true, false, false]),
-                (Stereo::Anaglyph, _) => ([0, 0], [false, true, true]),
-                (Stereo::SideBySide, 1) => ([w, 0], [true; 3]),
-                (Stereo::TopBottom, 1) => ([0, h], [true; 3]),
-                _ => ([0, 0], [true; 3]),
-            };
+        for (i, side) in self.eyes(facet).iter().enumerate() {
+            let EyePlace { at_px, channels, parity } = EyePlace::new(facet.stereo, i, [w, h]);
             let begin = (i == 0).then_some([0, 0, 0, 255]);
             // each eye is mirrored by itself; mirroring the whole would swap the eyes
-            let placed =
-                Placed { whole_px: facet.whole_px(), at_px, begin, flip: facet.flip, channels, finish: finish.clone() };
+            let (whole_px, flip, finish) = (facet.whole_px(), facet.flip, finish.clone());
+            let placed = Placed { whole_px, at_px, begin, flip, channels, parity, finish };
             match curved {
                 Some(curved) => curved.draw(renderer, stage, &self.around(facet, *side), placed)?,
                 None => {
@@ -234,7 +241,7 @@ impl CaveView {
             Some(_) => self.colored(eye, index),
             None => self.finished(eye, facet),
         };
-        let eyes = facet.stereo.sides().iter().map(|side| Ok(flipped(finished(one(side)?), facet.flip)));
+        let eyes = self.eyes(facet).iter().map(|side| Ok(flipped(finished(one(side)?), facet.flip)));
         Ok(combined(eyes.collect::<Result<_, RenderError>>()?, facet.stereo))
     }
 
@@ -284,8 +291,8 @@ impl CaveView {
             let begin = (i == 0).then_some(BACKGROUND);
             let Tile { facet: index, position_px, size_px: [w, h] } = tile;
             let facet = &self.cave.facets[index];
-            let placed =
-                Placed { whole_px, at_px: position_px, begin, flip: Flip::None, channels: [true; 3], finish: None };
+            let (flip, channels, parity) = (Flip::None, [true; 3], Parity::default());
+            let placed = Placed { whole_px, at_px: position_px, begin, flip, channels, parity, finish: None };
             match self.unfolded(tile) {
                 Some(curved) => curved.draw(renderer, stage, &self.around(facet, 0.0), placed)?,
                 None => renderer.draw_placed(stage, &self.eye(facet, 0.0)?.part(w, h, RIM_PX), [w, h], &placed)?,

@@ -12,7 +12,7 @@ use super::meshes::uniform_buffer;
 use super::pipelines::COLOR;
 use super::targets::{Targets, finished_texture};
 use crate::RenderError;
-use crate::facet::ProjectorColor;
+use crate::facet::{Parity, ProjectorColor};
 use std::sync::Arc;
 use tumble_scene::cave::Flip;
 use wgpu::util::{DeviceExt, TextureDataOrder};
@@ -73,7 +73,17 @@ pub(crate) struct Placed {
     pub flip: Flip,
     /// Which of red, green and blue are written.
     pub channels: [bool; 3],
+    /// Which pixels are written.
+    pub parity: Parity,
     pub finish: Option<Arc<Finish>>,
+}
+
+impl Placed {
+    /// Returns whether the picture only changes its place.
+    fn is_plain(&self) -> bool {
+        let everything = self.channels == [true; 3] && self.parity == Parity::default();
+        self.finish.is_none() && self.flip == Flip::None && everything
+    }
 }
 
 /// The pass, its pictures and its textures.
@@ -149,7 +159,7 @@ impl Finisher {
         placed: &Placed,
     ) -> Result<Texture, RenderError> {
         let whole = self.whole(gpu, placed.whole_px);
-        let plain = placed.finish.is_none() && placed.flip == Flip::None && placed.channels == [true; 3];
+        let plain = placed.is_plain();
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("finish") });
         if placed.begin.is_some() || !plain {
             self.pass(gpu, &mut encoder, (&from.picture, &whole), (rim, size, placed), None)?;
@@ -200,8 +210,7 @@ impl Finisher {
         around: Option<Around>,
     ) -> Result<(), RenderError> {
         let target = whole.create_view(&TextureViewDescriptor::default());
-        let plain =
-            around.is_none() && placed.finish.is_none() && placed.flip == Flip::None && placed.channels == [true; 3];
+        let plain = around.is_none() && placed.is_plain();
         let load = placed.begin.map_or(wgpu::LoadOp::Load, |color| wgpu::LoadOp::Clear(linear_color(color)));
         let uniform = uniform_buffer(gpu, &place_floats(rim, size, placed, around), "place")?;
         let views = self.views(gpu, placed.finish.as_ref());
@@ -290,7 +299,7 @@ fn place_floats(rim: u32, [w, h]: [u32; 2], placed: &Placed, around: Option<Arou
     let flag = |on: bool| f32::from(u8::from(on));
     let across = flag(matches!(placed.flip, Flip::Horizontal | Flip::Both));
     let upward = flag(matches!(placed.flip, Flip::Vertical | Flip::Both));
-    let finish = placed.finish.as_deref();
+    let (finish, parity) = (placed.finish.as_deref(), placed.parity);
     let warped = flag(finish.is_some_and(|f| matches!(f.bend, Bend::Warp(_))));
     let ([x, y, z], side, border) = around.map_or(([0.0; 3], 0, 0), |a| (a.eye, a.side_px, a.border_px));
     let color = finish.and_then(|f| f.color.as_ref());
@@ -302,7 +311,7 @@ fn place_floats(rim: u32, [w, h]: [u32; 2], placed: &Placed, around: Option<Arou
         placed.at_px[0] as f32, placed.at_px[1] as f32, across, upward,
         w as f32, h as f32, rim as f32, warped,
         x, y, z, side as f32,
-        border as f32, 0.0, 0.0, 0.0,
+        border as f32, parity.across as f32, parity.down as f32, parity.phase as f32,
         r, g, b, inverse_gamma,
         lr, lg, lb, nodes as f32,
     ];

@@ -4,7 +4,7 @@ struct Place {
     at: vec4f,    // left and top edge in the whole; 1 if left and right, top and bottom are swapped
     size: vec4f,  // width and height; pixels of rim around the source; 1 if there is a warp
     eye: vec4f,   // the eye in the cave; pixels of 90 degrees of a cube of pictures
-    cube: vec4f,  // pixels beyond each edge of a face of the cube
+    cube: vec4f,  // pixels beyond each edge of a face of the cube; written pixels: (y x + z y) mod 2 = w
     gain: vec4f,  // factors of light after the blend; 1 / gamma of the projector, 0 for sRGB
     lift: vec4f,  // light that is added where the mask allows it; nodes along an edge of the table of colors, 0 for none
 };
@@ -25,6 +25,12 @@ fn pixel(at: vec4f) -> vec2i {
     if (place.at.z > 0.5) { p.x = last.x - p.x; }
     if (place.at.w > 0.5) { p.y = last.y - p.y; }
     return p;
+}
+
+// Whether a pixel of the whole belongs to this eye.
+fn is_mine(at: vec4f) -> bool {
+    let p = vec2i(at.xy) - vec2i(place.at.xy);
+    return ((i32(place.cube.y) * p.x + i32(place.cube.z) * p.y) & 1) == i32(place.cube.w);
 }
 
 fn texel(p: vec2i) -> vec3f {
@@ -108,6 +114,7 @@ fn finished(color: vec3f, p: vec2i) -> vec4f {
 }
 
 @fragment fn fs_place(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    if (!is_mine(at)) { discard; }
     let p = pixel(at);
     var color = vec3f(0.0);
     if (place.size.w > 0.5) {
@@ -120,6 +127,7 @@ fn finished(color: vec3f, p: vec2i) -> vec4f {
 }
 
 @fragment fn fs_surface(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    if (!is_mine(at)) { discard; }
     let p = pixel(at);
     let shown = textureLoad(warp, p, 0);
     var color = vec3f(0.0);

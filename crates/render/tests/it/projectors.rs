@@ -4,7 +4,7 @@ use crate::support::renderer;
 use nalgebra::{Point3, Vector3};
 use tumble_render::{Blend, CalibrationPattern, CaveView, DrawList, Image, Light, Material, Warp, calibration_picture};
 use tumble_scene::SceneFile;
-use tumble_scene::cave::{Cave, shipped_caves};
+use tumble_scene::cave::{Cave, Stereo, resolve_cave, shipped_caves};
 
 /// A picture whose every pixel is different.
 fn colorful(width: u32, height: u32) -> Image {
@@ -192,6 +192,65 @@ fn eyes_see_the_ball_apart_by_what_similar_triangles_say() {
     assert!((middle(&red_cyan, 0, 0, 100) - left).abs() < 1e-9 && (middle(&red_cyan, 2, 0, 100) - right).abs() < 1e-9);
     let mono = draw("");
     assert!((middle(&mono, 0, 0, 100) - 50.0).abs() < 0.1);
+}
+
+/// Interlaced pictures have whole pixels of the eyes' own pictures, each where the display shows it to that
+/// eye; mirroring happens before. On the device and in memory.
+#[test]
+fn interlaced_eyes_have_their_own_pixels() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut list = ball();
+    let color = Material::unlit([0.2, 0.9, 0.4]);
+    list.add_sphere(Point3::new(0.8, 4.0, 1.6), 0.3, nalgebra::UnitQuaternion::identity(), color);
+    for flip in ["", "flip = \"both\""] {
+        let mut draw = |keys: &str, frame: u64| {
+            let mut view = CaveView::new(cave(&format!("{flip}\n{keys}")), &empty_scene()).unwrap();
+            view.set_frame(frame);
+            let facet = view.cave().facets[0].clone();
+            let picture = view.draw(&mut renderer, &list, &facet).unwrap();
+            assert_eq!(picture, view.draw_in_memory(&mut renderer, &list, &facet).unwrap(), "{keys}");
+            picture
+        };
+        let (left, right) = (draw("stereo = \"left\"", 0), draw("stereo = \"right\"", 0));
+        assert_ne!(left, right);
+        type IsFirst = fn(u32, u32) -> bool;
+        let modes: [(&str, IsFirst); 3] =
+            [("rows", |_, y| y % 2 == 0), ("columns", |x, _| x % 2 == 0), ("checkerboard", |x, y| (x + y) % 2 == 0)];
+        for (name, is_first) in modes {
+            let plain = draw(&format!("stereo = \"{name}\""), 0);
+            let swapped = draw(&format!("stereo = \"{name}\"\nswap_eyes = true"), 0);
+            for (x, y) in (0..100).flat_map(|y| (0..100).map(move |x| (x, y))) {
+                let [first, second] = [&left, &right].map(|eye| eye.pixel(x, y));
+                let [first, second] = if is_first(x, y) { [first, second] } else { [second, first] };
+                assert_eq!((plain.pixel(x, y), swapped.pixel(x, y)), (first, second), "{name} {x} {y}");
+            }
+        }
+        let frames = [4, 5].map(|frame| draw("stereo = \"frame_sequential\"", frame));
+        assert_eq!(frames, [left.clone(), right.clone()]);
+        let side = draw("stereo = \"side_by_side\"\nswap_eyes = true", 0);
+        assert!((0..100).all(|x| side.pixel(x, 50) == right.pixel(x, 50)));
+        assert!((0..100).all(|x| side.pixel(100 + x, 50) == left.pixel(x, 50)));
+    }
+}
+
+/// The eyes of curved screens are interlaced in the same pass that puts their pictures together.
+#[test]
+fn interlaced_eyes_have_their_own_pixels_on_a_curved_screen() {
+    let Some(mut renderer) = renderer() else { return };
+    let (list, mut dome) = (ball(), resolve_cave("dome").unwrap().load().unwrap());
+    dome.facets[0].size_px = [96, 96];
+    let mut draw = |stereo: Stereo| {
+        let mut cave = dome.clone();
+        cave.facets[0].stereo = stereo;
+        let view = CaveView::new(cave, &empty_scene()).unwrap();
+        view.draw(&mut renderer, &list, &view.cave().facets[0]).unwrap()
+    };
+    let (left, right, mixed) = (draw(Stereo::Left), draw(Stereo::Right), draw(Stereo::Checkerboard));
+    assert_ne!(left, right);
+    for (x, y) in (0..96).flat_map(|y| (0..96).map(move |x| (x, y))) {
+        let eye = if (x + y) % 2 == 0 { &left } else { &right };
+        assert_eq!(mixed.pixel(x, y), eye.pixel(x, y), "{x} {y}");
+    }
 }
 
 #[test]

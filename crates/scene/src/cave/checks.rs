@@ -87,6 +87,15 @@ pub(crate) fn target(size_px: [u32; 2], stereo: Stereo, f: &mut Fields<'_>) {
     );
 }
 
+/// Checks that eyes change places in images of both alone.
+pub(crate) fn swapped(facet: &Facet, f: &mut Fields<'_>) {
+    if facet.swap_eyes && facet.stereo.sides().len() < 2 {
+        let place = f.value("swap_eyes").map_or(f.span.clone(), |value| value.span());
+        let message = format!("`swap_eyes` of {}: its image has one eye", f.what);
+        f.log.report(place, message, "expected `stereo` with both eyes, such as \"rows\"");
+    }
+}
+
 /// Checks that near is less than far and that every eye is in front of the screen.
 pub(crate) fn facet(facet: &Facet, screen: &Screen, user: &User, f: &mut Fields<'_>) {
     if facet.near_m >= facet.far_m {

@@ -7,17 +7,30 @@ use super::parts::{Node, Screen, User, read_name};
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names};
 
-/// How one image shows both eyes.
+/// How one image shows both eyes, or one of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stereo {
     /// One image from the point between the eyes.
     Mono,
+    /// The left eye's image alone: one of two projectors or machines for a screen.
+    Left,
+    /// The right eye's image alone.
+    Right,
     /// The left eye's image to the left of the right eye's: twice the width.
     SideBySide,
     /// The left eye's image above the right eye's: twice the height.
     TopBottom,
     /// Red from the left eye, green and blue from the right, for red and cyan glasses.
     Anaglyph,
+    /// Rows of pixels in turn, the first from the left eye: row-interlaced displays.
+    Rows,
+    /// Columns of pixels in turn, the first from the left eye: column-interlaced displays.
+    Columns,
+    /// Pixels in turn along rows and columns, the upper left one from the left eye: checkerboard
+    /// displays.
+    Checkerboard,
+    /// Frames with even numbers from the left eye, with odd ones from the right: shutter glasses.
+    FrameSequential,
 }
 
 /// Mirroring of the final image, for mirrors and rear projection.
@@ -48,22 +61,33 @@ pub enum Output {
 impl Stereo {
     pub(crate) const NAMES: Names<Self> = &[
         ("mono", Stereo::Mono),
+        ("left", Stereo::Left),
+        ("right", Stereo::Right),
         ("side_by_side", Stereo::SideBySide),
         ("top_bottom", Stereo::TopBottom),
         ("anaglyph", Stereo::Anaglyph),
+        ("rows", Stereo::Rows),
+        ("columns", Stereo::Columns),
+        ("checkerboard", Stereo::Checkerboard),
+        ("frame_sequential", Stereo::FrameSequential),
     ];
 
     /// Returns the sides of the eyes that are drawn: −1 left, 0 between, +1 right.
     pub fn sides(self) -> &'static [f64] {
-        if self == Stereo::Mono { &[0.0] } else { &[-1.0, 1.0] }
+        match self {
+            Stereo::Mono => &[0.0],
+            Stereo::Left => &[-1.0],
+            Stereo::Right => &[1.0],
+            _ => &[-1.0, 1.0],
+        }
     }
 
     /// Returns the size of the whole image from that of one eye's, pixels.
     pub fn whole_px(self, [width, height]: [u32; 2]) -> [u32; 2] {
         match self {
-            Stereo::Mono | Stereo::Anaglyph => [width, height],
             Stereo::SideBySide => [2 * width, height],
             Stereo::TopBottom => [width, 2 * height],
+            _ => [width, height],
         }
     }
 }
@@ -106,6 +130,9 @@ pub struct Facet {
     pub far_m: f64,
     /// Default mono.
     pub stereo: Stereo,
+    /// Whether the eyes change places in the image: for displays that begin with the right eye. Default
+    /// false.
+    pub swap_eyes: bool,
     /// Default none.
     pub flip: Flip,
     /// Whether the other facets wait for it (`lockstep`). Default true.
@@ -195,6 +222,7 @@ impl Facet {
             near_m: f.number_or("near_m", NEAR, 0.05),
             far_m: f.number_or("far_m", Bound::POSITIVE, 500.0),
             stereo: f.choice_or("stereo", Stereo::NAMES, Stereo::Mono),
+            swap_eyes: f.flag_or("swap_eyes", false),
             flip: f.choice_or("flip", Flip::NAMES, Flip::None),
             critical: f.flag_or("critical", true),
             warp_file: file(&mut f, "warp_file", folder, &["obj", "pfm"]),
@@ -208,9 +236,21 @@ impl Facet {
         }
         if f.log.count() == problems {
             checks::target(facet.size_px, facet.stereo, &mut f);
+            checks::swapped(&facet, &mut f);
         }
         f.finish();
         Some(facet)
+    }
+
+    /// Returns the sides of the eyes in the image of a frame, in the order of their places in it: −1 left, 0
+    /// between, +1 right.
+    pub fn eyes(&self, frame: u64) -> &'static [f64] {
+        match (self.stereo.sides(), self.stereo) {
+            (_, Stereo::FrameSequential) if (frame % 2 == 0) != self.swap_eyes => &[-1.0],
+            (_, Stereo::FrameSequential) => &[1.0],
+            ([_, _], _) if self.swap_eyes => &[1.0, -1.0],
+            (sides, _) => sides,
+        }
     }
 
     /// Returns the size of the target with both eyes in it, pixels.

@@ -62,6 +62,13 @@ fn what_is_wrong_is_reported_with_its_place_and_the_expected_value() {
             14,
             "did you mean `side_by_side`?",
         ),
+        (
+            "eyes of one eye",
+            "size_px = [800, 600]\nstereo = \"left\"\nswap_eyes = true",
+            "size_px = [800, 600]",
+            15,
+            "`swap_eyes` of facet \"f\": its image has one eye",
+        ),
         ("no pixels", "size_px = [0, 600]", "size_px = [800, 600]", 13, "an integer from 1 to 16384"),
         (
             "more pixels than can be drawn",
@@ -192,6 +199,28 @@ fn gaps_are_what_a_tape_measure_says() {
     );
     let wide = Cave::parse(&SMALL.replace("[800, 600]", "[1000, 600]"), "my.toml").unwrap().notes().join("\n");
     assert!(wide.contains("1.250 times denser horizontally than vertically; 1000 x 750 would be square"), "{wide}");
+}
+
+#[test]
+fn eyes_have_their_order_in_each_stereo_mode() {
+    let facet = |keys: &str| {
+        let text = SMALL.replace("[800, 600]", &format!("[800, 600]\n{keys}"));
+        Cave::parse(&text, "my.toml").unwrap().facets[0].clone()
+    };
+    for (keys, even, odd, whole) in [
+        ("", &[0.0][..], &[0.0][..], [800, 600]),
+        ("stereo = \"left\"", &[-1.0], &[-1.0], [800, 600]),
+        ("stereo = \"right\"", &[1.0], &[1.0], [800, 600]),
+        ("stereo = \"side_by_side\"", &[-1.0, 1.0], &[-1.0, 1.0], [1600, 600]),
+        ("stereo = \"top_bottom\"\nswap_eyes = true", &[1.0, -1.0], &[1.0, -1.0], [800, 1200]),
+        ("stereo = \"rows\"", &[-1.0, 1.0], &[-1.0, 1.0], [800, 600]),
+        ("stereo = \"columns\"\nswap_eyes = true", &[1.0, -1.0], &[1.0, -1.0], [800, 600]),
+        ("stereo = \"frame_sequential\"", &[-1.0], &[1.0], [800, 600]),
+        ("stereo = \"frame_sequential\"\nswap_eyes = true", &[1.0], &[-1.0], [800, 600]),
+    ] {
+        let facet = facet(keys);
+        assert_eq!((facet.eyes(4), facet.eyes(7), facet.whole_px()), (even, odd, whole), "{keys}");
+    }
 }
 
 /// 2^25 pixels, rows padded to multiples of 64, and a margin of 48: 16288 + 96 = 16384 = 2^14

@@ -112,8 +112,8 @@ fn hash_for_joining(scene: &[u8; 32], cave: &Cave, world: &World) -> [u8; 32] {
         let mut color = f.color.clone();
         let table = color.as_mut().and_then(|color| color.lut_file.take());
         put(format!(
-            "{:?} {} {} {:?} {} {} {:?} {:?} {color:?}",
-            f.name, f.screen, f.user, f.size_px, f.near_m, f.far_m, f.stereo, f.flip
+            "{:?} {} {} {:?} {} {} {:?} {} {:?} {color:?}",
+            f.name, f.screen, f.user, f.size_px, f.near_m, f.far_m, f.stereo, f.swap_eyes, f.flip
         )
         .as_bytes());
         [&f.warp_file, &f.blend_file, &f.black_file, &table]
@@ -133,8 +133,10 @@ fn hash_for_joining(scene: &[u8; 32], cave: &Cave, world: &World) -> [u8; 32] {
     *hasher.finalize().as_bytes()
 }
 
-/// Applies the viewer of a frame to the view: the cave's place and the users' heads.
-pub fn apply_viewer(view: &mut CaveView, viewer: &Viewer) {
+/// Applies a frame and its viewer to the view: the cave's place, the users' heads, the eye of
+/// `frame_sequential`.
+pub fn apply_viewer(view: &mut CaveView, viewer: &Viewer, frame: u64) {
+    view.set_frame(frame);
     view.set_place(place_of(&viewer.cave, viewer.scale));
     for (user, seen) in view.users_mut().iter_mut().zip(&viewer.users) {
         user.eye_m = seen.head.translation.vector.into();

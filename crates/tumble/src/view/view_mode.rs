@@ -147,16 +147,15 @@ impl ViewMode {
 fn eyes<'a>(view: &'a CaveView, facet: &'a Facet) -> Result<Vec<Tile<'a>>, RenderError> {
     let [w, h] = facet.size_px;
     let flip = [matches!(facet.flip, Flip::Horizontal | Flip::Both), matches!(facet.flip, Flip::Vertical | Flip::Both)];
-    let eye = |side: &f64| -> Result<Tile<'a>, RenderError> {
-        let right = *side > 0.0;
+    let eye = |(i, side): (usize, &f64)| -> Result<Tile<'a>, RenderError> {
         let position_px = match facet.stereo {
-            Stereo::SideBySide if right => [w, 0],
-            Stereo::TopBottom if right => [0, h],
+            Stereo::SideBySide if i > 0 => [w, 0],
+            Stereo::TopBottom if i > 0 => [0, h],
             _ => [0, 0],
         };
         Ok(Tile { from: from(view, facet, *side, [w, h])?, position_px, size_px: [w, h], flip })
     };
-    facet.stereo.sides().iter().map(eye).collect()
+    facet.eyes(0).iter().enumerate().map(eye).collect()
 }
 
 /// Returns the eye on a side of a facet's user, for a picture of this size.

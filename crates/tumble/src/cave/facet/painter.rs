@@ -36,7 +36,7 @@ impl Painter {
         pattern: Option<CalibrationPattern>,
     ) -> Result<(), Failure> {
         match self {
-            Painter::Memory(thread) => thread.begin(world, viewer, burn_in.then_some(frame), pattern),
+            Painter::Memory(thread) => thread.begin(world, viewer, frame, burn_in, pattern),
             Painter::Browsers(screen) => screen.begin(world, viewer, frame),
         }
     }

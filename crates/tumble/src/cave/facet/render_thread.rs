@@ -23,7 +23,8 @@ pub const PREVIEW_PX: [u32; 2] = [1280, 960];
 struct RenderRequest {
     list: DrawList,
     viewer: Viewer,
-    burn_in: Option<u64>,
+    frame: u64,
+    burn_in: bool,
     pattern: Option<CalibrationPattern>,
 }
 
@@ -70,7 +71,7 @@ impl RenderThread {
         let mut render_thread =
             RenderThread { drawing: Drawing::new(&setup.scene), quality, overlays, requests, pictures, software };
         // the first picture takes seconds to compile pipelines, and nothing waits for it yet
-        render_thread.begin(&setup.world, &setup.viewer()?, None, None)?;
+        render_thread.begin(&setup.world, &setup.viewer()?, 0, false, None)?;
         while render_thread.finished(Duration::from_secs(1))?.is_none() {}
         Ok(render_thread)
     }
@@ -80,18 +81,19 @@ impl RenderThread {
         self.software
     }
 
-    /// Starts a picture of the world, or of a calibration pattern, with the frame number in it if
-    /// `burn_in` is given.
+    /// Starts a picture of the world, or of a calibration pattern, with the frame number in it for
+    /// `burn_in`.
     pub fn begin(
         &mut self,
         world: &World,
         viewer: &Viewer,
-        burn_in: Option<u64>,
+        frame: u64,
+        burn_in: bool,
         pattern: Option<CalibrationPattern>,
     ) -> Result<(), Failure> {
         let list = draw_list(&mut self.drawing, world, self.quality.as_ref(), &self.overlays)?;
         self.requests
-            .send(RenderRequest { list, viewer: viewer.clone(), burn_in, pattern })
+            .send(RenderRequest { list, viewer: viewer.clone(), frame, burn_in, pattern })
             .map_err(|_| Failure::run("drawing", "the render thread has ended"))
     }
 
@@ -130,14 +132,14 @@ fn render_all(
     done: &SyncSender<Result<Image, RenderError>>,
 ) {
     while let Ok(request) = incoming.recv() {
-        apply_viewer(&mut view, &request.viewer);
+        apply_viewer(&mut view, &request.viewer, request.frame);
         let mut image = match (&facet, request.pattern) {
             (Some(facet), Some(pattern)) => Ok(finished_calibration_picture(&view, facet, pattern)),
             (Some(facet), None) => view.draw(renderer, &request.list, facet),
             (None, _) => view.draw_unfolded(renderer, &request.list, PREVIEW_PX),
         };
-        if let (Ok(image), Some(frame)) = (&mut image, request.burn_in) {
-            burn_in(image, frame);
+        if let (Ok(image), true) = (&mut image, request.burn_in) {
+            burn_in(image, request.frame);
         }
         if done.send(image).is_err() {
             return;

@@ -117,7 +117,7 @@ impl Window<'_> {
         let (ViewMode::Facet(view, _) | ViewMode::Unfolded(view)) = &mut self.window_setup.view_mode else {
             return Ok(());
         };
-        apply_viewer(view, viewer);
+        apply_viewer(view, viewer, frame);
         self.window_setup.view_mode.draw(screen, &self.list)?;
         self.pattern = match (&self.window_setup.view_mode, self.runner.pattern()) {
             (ViewMode::Facet(view, facet), Some(pattern)) => Some(finished_calibration_picture(view, facet, pattern)),

@@ -95,7 +95,7 @@ impl WebScreen {
         if !self.shared.crowd().is_idle() {
             return Ok(());
         }
-        apply_viewer(&mut self.view, viewer);
+        apply_viewer(&mut self.view, viewer, frame);
         let list = draw_list(&mut self.drawing, world, Some(&self.quality), &self.overlays)?;
         let failed = |e| Failure::run("drawing", e);
         let [width, height] = self.facet.size_px;
