@@ -2,10 +2,11 @@
 """Trials of `tumble cave`: the same frames on all facets, kills and freezes at random times, a long run, a recording shown again and cut, nodes with a
 launch command in a network namespace.
 
-usage: scripts/cave_trial.py [--long] [--seed 1] [--quality default] [--frames N] [--kills N] [--soak N] [--everywhere N] [--bodies N] [--minute N] [TRIAL ...]
+usage: scripts/cave_trial.py [--long] [--load N] [--seed 1] [--quality default] [--frames N] [--kills N] [--soak N] [--everywhere N] [--bodies N] [--minute N] [TRIAL ...]
 
 Without names the short ones run that need no root and no other build: frames, kills, freezes, launchers, servers, everywhere, minute, cuts. --long has the full numbers,
 and all but `namespace` (root) and `viewers` (a build with --features foxglove).
+--load N keeps N processes per core busy meanwhile: what was shown must be whole and the same, however long it takes.
 Ends with 1 if a trial does not show what it must. Nothing is left behind but out/cave_trial.
 """
 
@@ -139,6 +140,23 @@ def spread(values, unit=1e3):
     return f"{values[len(values) // 2] * unit:.0f} ms (half), {values[-1] * unit:.0f} ms (all)"
 
 
+class Load:
+    """Busy processes, some for each core, that end with this one."""
+
+    BUSY = "import os, sys\nwhile os.getppid() == int(sys.argv[1]):\n    for _ in range(1000000): pass"
+
+    def __init__(self, per_core):
+        count = per_core * (os.cpu_count() or 1)
+        self.processes = [subprocess.Popen([sys.executable, "-c", Load.BUSY, str(os.getpid())]) for _ in range(count)]
+        if count:
+            print(f"load: {count} busy processes on {os.cpu_count()} cores, beside the load of {os.getloadavg()[0]:.1f} before", flush=True)
+
+    def end(self):
+        for process in self.processes:
+            process.kill()
+            process.wait()
+
+
 # The trials.
 
 
@@ -173,20 +191,23 @@ def cube_cave(facets, size):
 
 
 def rates(options):
-    """Frames per second of real caves: one process per facet, in lockstep, as fast as they can."""
+    """Frames per second of real caves: one process per facet, in lockstep, as fast as they can. Prints the table of docs/running_a_cave.md."""
     print("rates: frames per second of billiards, one process per facet; in brackets the load before the run")
-    whole = True
+    whole, drivers, qualities = True, set(), ["fastest", "fast", "default"]
+    print("| facets | size | " + " | ".join(f"`{quality}`" for quality in qualities) + " |\n|---|---|" + "---|" * len(qualities), flush=True)
     for size in [(640, 480), (1024, 768)]:
         for facets in [1, 4, 6]:
             line = []
-            for quality in ["fastest", "fast", "default"]:
+            for quality in qualities:
                 load, file = os.getloadavg()[0], OUT / "rates.json"
                 tumble("cave", "billiards", "--cave", cube_cave(facets, size), "--duration", options.rates / 60, "--no-realtime", "--offscreen", "--quality", quality, "--quiet",
                        "--summary", file)
                 summary = json.loads(file.read_text())
                 whole &= all(facet["presented"] == options.rates + 1 for facet in summary["facets"])
-                line.append(f"{quality} {(summary['frames'] - 1) / summary['wall_s']:.1f} ({load:.1f})")
-            print(f"rates: {size[0]} x {size[1]}, {facets} facets: {', '.join(line)}", flush=True)
+                drivers.update(facet["adapter"] for facet in summary["facets"])
+                line.append(f"{(summary['frames'] - 1) / summary['wall_s']:.1f} ({load:.1f})")
+            print(f"| {facets} | {size[0]} x {size[1]} | {' | '.join(line)} |", flush=True)
+    print(f"rates: {options.rates} frames of each run {'on all facets' if whole else 'NOT ON ALL FACETS'}, drawn by {', '.join(sorted(drivers))}")
     return whole
 
 
@@ -612,6 +633,7 @@ def main():
     parser.add_argument("--scene", default="pendulum", help="scene of `soak`")
     parser.add_argument("--quality", default="fastest")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--load", type=int, default=0, help="busy processes per core beside the trials (0)")
     parser.add_argument("trials", nargs="*", help=", ".join(trial.__name__ for trial in TRIALS))
     options = parser.parse_args()
     usual = {"frames": (30, 600), "rates": (20, 60), "kills": (2, 20), "soak": (6000, 108000), "everywhere": (300, 108000), "bodies": (125, 10000), "minute": (120, 3600), "cuts": (100, 1 << 30)}
@@ -625,7 +647,12 @@ def main():
     trials = [named[name] for name in options.trials] or ([t for t in TRIALS if t not in (namespace, viewers)] if options.long else SHORT)
     shutil.rmtree(OUT, ignore_errors=True)
     OUT.mkdir(parents=True)
-    sys.exit(0 if all([trial(options) for trial in trials]) else 1)
+    load = Load(options.load)
+    try:
+        shown = [trial(options) for trial in trials]
+    finally:
+        load.end()
+    sys.exit(0 if all(shown) else 1)
 
 
 main()

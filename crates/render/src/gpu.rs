@@ -22,7 +22,7 @@ mod window;
 use crate::list::bounds::Bounds;
 use crate::{DrawList, Image, Lens, MAX_PIXELS, MAX_SIDE, Part, RenderError, Viewpoint};
 use finish::Finisher;
-pub(crate) use finish::{Around, Bend, Finish, Placed};
+pub(crate) use finish::{Around, Bend, Finish, Placed, place_floats};
 use frame::Frame;
 use meshes::MeshCache;
 use nalgebra::Matrix4;
@@ -30,8 +30,8 @@ pub use particles::{
     FreeParticle, FreeParticles, GpuParticles, MAX_OBSTACLES, MAX_PARTICLES, Obstacle, ObstacleShape, Precision,
 };
 use pipelines::Pipelines;
-pub use portable::{PortableDraw, PortableItems, PortableKey, PortablePicture};
-pub use recipe::{GlslProgram, GlslTranslator, Recipe, portable_wgsl};
+pub use portable::{PortableDraw, PortableItems, PortableKey, PortablePicture, PortableView};
+pub use recipe::{GlslProgram, GlslTranslator, Recipe, portable_pass_wgsl, portable_wgsl};
 pub use stage::Stage;
 use stage::Textures;
 use std::sync::{Arc, Mutex, PoisonError};

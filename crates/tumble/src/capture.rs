@@ -83,7 +83,7 @@ impl Capture {
         let failed = |e: RenderError| Failure::run("the picture", e);
         let mut list = self.list(world).map_err(|e| Failure::run("the picture", e))?;
         let renderer = &mut self.renderer;
-        match &self.source {
+        match &mut self.source {
             Source::Camera([w, h]) => renderer.render(&list, *w, *h),
             Source::Facet(view, facet) => {
                 view.set_frame(self.frames.as_ref().map_or(0, |frames| frames.taken));

@@ -46,12 +46,38 @@ impl Curved {
         let (cube, size) = (&self.cube, self.finish.size);
         for face in self.faces(from) {
             let at = [cube.atlas_px(), cube.corner_px(face)];
-            renderer.draw_face(stage, &self.view(face, from)?, cube.tile_px(), at)?;
+            renderer.draw_face(stage, &self.view(face, from, RIM_PX)?, cube.tile_px(), at)?;
         }
-        placed.finish = Some(self.finish.clone());
+        placed.finish = Some(self.finish());
+        renderer.place_surface(self.source(from), size, &placed)
+    }
+
+    /// Returns what each pixel shows, its blend and its color.
+    pub fn finish(&self) -> Arc<Finish> {
+        self.finish.clone()
+    }
+
+    /// Returns the cube of pictures around an eye as the source of a pass.
+    pub fn source(&self, from: &EyeInCave) -> Around {
         let eye = from.eye.coords.map(|x| x as f32).into();
-        let around = Around { eye, side_px: cube.side_px, border_px: cube.border_px() };
-        renderer.place_surface(around, size, &placed)
+        Around { eye, side_px: self.cube.side_px, border_px: self.cube.border_px() }
+    }
+
+    /// Returns the size of the picture with all faces, pixels.
+    pub fn source_px(&self) -> [u32; 2] {
+        self.cube.atlas_px()
+    }
+
+    /// Returns the size of a face, pixels.
+    pub fn view_px(&self) -> [u32; 2] {
+        [self.cube.tile_px(); 2]
+    }
+
+    /// Returns the views of the faces that the eye needs, without a rim, each with its top left corner
+    /// in the picture of all.
+    pub fn views(&self, from: &EyeInCave) -> Result<Vec<(FacetView, [u32; 2])>, RenderError> {
+        let view = |&face: &usize| Ok((self.view(face, from, 0)?, self.cube.corner_px(face)));
+        self.faces(from).iter().map(view).collect()
     }
 
     /// Draws the picture in memory, without blend and color: the reference for the device.
@@ -65,7 +91,7 @@ impl Curved {
         let ([w, h], side) = (self.cube.atlas_px(), self.cube.tile_px());
         let mut faces = blank(w, h, black);
         for face in self.faces(from) {
-            let picture = renderer.render_from(&self.view(face, from)?, list, side, side)?;
+            let picture = renderer.render_from(&self.view(face, from, RIM_PX)?, list, side, side)?;
             let [x, y] = self.cube.corner_px(face);
             paste(&mut faces, &picture, x, y);
         }
@@ -104,12 +130,12 @@ impl Curved {
         if faces.is_empty() { vec![0] } else { faces }
     }
 
-    fn view(&self, face: usize, from: &EyeInCave) -> Result<FacetView, RenderError> {
+    fn view(&self, face: usize, from: &EyeInCave, rim_px: u32) -> Result<FacetView, RenderError> {
         let at = |p: Point3<f64>| Point3::from(from.place.to_scene(p.into()));
         let corners = self.cube.corners(face, &from.eye).map(at);
         let (near, far) = (from.near_m * from.place.scale, from.far_m * from.place.scale);
         let side = self.cube.tile_px();
-        Ok(FacetView::new(at(from.eye), corners, near, far)?.part(side, side, RIM_PX))
+        Ok(FacetView::new(at(from.eye), corners, near, far)?.part(side, side, rim_px))
     }
 }
 

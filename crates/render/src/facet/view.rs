@@ -210,8 +210,18 @@ impl CaveView {
         Ok(())
     }
 
+    /// Returns what the pixels of a facet on a curved screen show.
+    pub(super) fn curved(&self, facet: &Facet) -> Option<&Curved> {
+        self.curved[self.index(facet)?].as_ref()
+    }
+
+    /// Returns warp, blend and color of a facet on a flat screen.
+    pub(super) fn flat_finish(&self, facet: &Facet) -> Option<Arc<Finish>> {
+        self.finishes[self.index(facet)?].clone()
+    }
+
     /// Returns the eye, the place and the depths of the views around it.
-    fn around(&self, facet: &Facet, side: f64) -> EyeInCave {
+    pub(super) fn around(&self, facet: &Facet, side: f64) -> EyeInCave {
         let eye = self.cave.users[facet.user].eye(side);
         EyeInCave { eye, place: self.place, near_m: facet.near_m, far_m: facet.far_m }
     }

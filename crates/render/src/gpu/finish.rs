@@ -12,7 +12,7 @@ use super::meshes::uniform_buffer;
 use super::pipelines::COLOR;
 use super::targets::{Targets, finished_texture};
 use crate::RenderError;
-use crate::facet::{Parity, ProjectorColor};
+use crate::facet::{Parity, PortableNumbers, ProjectorColor};
 use std::sync::Arc;
 use tumble_scene::cave::Flip;
 use wgpu::util::{DeviceExt, TextureDataOrder};
@@ -21,7 +21,7 @@ use wgpu::{
     TextureViewDescriptor,
 };
 
-const FINISH_WGSL: &str = include_str!("../shaders/finish.wgsl");
+pub(super) const FINISH_WGSL: &str = include_str!("../shaders/finish.wgsl");
 /// Largest number of finishes whose textures are kept.
 const MAX_KEPT: usize = 64;
 /// Marks a pixel without a source in the texture of a warp.
@@ -37,6 +37,43 @@ pub(crate) struct Finish {
     /// For each pixel the fraction of light that it keeps, per color, and that of the lift; 0 to 1.
     pub shares: Option<Vec<[f32; 4]>>,
     pub color: Option<ProjectorColor>,
+}
+
+impl Finish {
+    /// Returns which of the textures have an effect.
+    pub fn used(&self) -> [bool; TEXTURES] {
+        let has_table = self.color.as_ref().is_some_and(|color| color.table.is_some());
+        [self.bend != Bend::None, self.shares.is_some(), has_table]
+    }
+
+    /// Returns the textures of the shader: warp or surface, shares, table of colors; `None` for those
+    /// without effect.
+    pub fn textures(&self) -> [Option<PortableNumbers>; TEXTURES] {
+        let floats = |format, size_px, floats: &[f32]| PortableNumbers {
+            size_px,
+            format,
+            bytes: floats.iter().flat_map(|x| x.to_le_bytes()).collect(),
+        };
+        let bend = match &self.bend {
+            Bend::None => None,
+            Bend::Warp(warp) => {
+                let places: Vec<f32> = warp.iter().flat_map(|from| from.unwrap_or([NOWHERE; 2])).collect();
+                Some(floats("rg32float", self.size, &places))
+            }
+            Bend::Surface(shown) => Some(floats("rgba32float", self.size, shown.as_flattened())),
+        };
+        let shares = self.shares.as_ref().map(|shares| PortableNumbers {
+            size_px: self.size,
+            format: "rgba16float",
+            bytes: shares.iter().flatten().flat_map(|share| half(*share).to_le_bytes()).collect(),
+        });
+        let table = self.color.as_ref().and_then(|color| color.table.as_ref()).map(|table| {
+            let (n, colors) = table.nodes();
+            let nodes: Vec<f32> = colors.iter().flat_map(|[r, g, b]| [*r, *g, *b, 1.0]).collect();
+            floats("rgba32float", [n, n * n], &nodes)
+        });
+        [bend, shares, table]
+    }
 }
 
 /// The content of each pixel.
@@ -257,23 +294,14 @@ impl Finisher {
             return views.clone();
         }
         let mut views = self.nothing.clone();
-        match &finish.bend {
-            Bend::None => {}
-            Bend::Warp(warp) => {
-                let floats: Vec<f32> = warp.iter().flat_map(|from| from.unwrap_or([NOWHERE; 2])).collect();
-                views[0] = upload(gpu, finish.size, TextureFormat::Rg32Float, bytemuck::cast_slice(&floats));
-            }
-            Bend::Surface(shown) => {
-                views[0] = upload(gpu, finish.size, TextureFormat::Rgba32Float, bytemuck::cast_slice(shown));
-            }
-        }
-        if let Some(shares) = &finish.shares {
-            let halves: Vec<u16> = shares.iter().flatten().map(|share| half(*share)).collect();
-            views[1] = upload(gpu, finish.size, TextureFormat::Rgba16Float, bytemuck::cast_slice(&halves));
-        }
-        if let Some((n, colors)) = finish.color.as_ref().and_then(|c| c.table.as_ref()).map(|table| table.nodes()) {
-            let floats: Vec<f32> = colors.iter().flat_map(|[r, g, b]| [*r, *g, *b, 1.0]).collect();
-            views[2] = upload(gpu, [n, n * n], TextureFormat::Rgba32Float, bytemuck::cast_slice(&floats));
+        for (view, numbers) in views.iter_mut().zip(finish.textures()) {
+            let Some(PortableNumbers { size_px, format, bytes }) = numbers else { continue };
+            let format = match format {
+                "rg32float" => TextureFormat::Rg32Float,
+                "rgba16float" => TextureFormat::Rgba16Float,
+                _ => TextureFormat::Rgba32Float,
+            };
+            *view = upload(gpu, size_px, format, &bytes);
         }
         if self.known.len() >= MAX_KEPT {
             self.known.remove(0);
@@ -295,7 +323,7 @@ fn half(x: f32) -> u16 {
 }
 
 /// The uniform of the shader.
-fn place_floats(rim: u32, [w, h]: [u32; 2], placed: &Placed, around: Option<Around>) -> [f32; 24] {
+pub(crate) fn place_floats(rim: u32, [w, h]: [u32; 2], placed: &Placed, around: Option<Around>) -> [f32; 24] {
     let flag = |on: bool| f32::from(u8::from(on));
     let across = flag(matches!(placed.flip, Flip::Horizontal | Flip::Both));
     let upward = flag(matches!(placed.flip, Flip::Vertical | Flip::Both));

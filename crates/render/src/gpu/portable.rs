@@ -16,7 +16,8 @@ use super::scene;
 use super::stage::{Same, cloud_groups, group_items, placed_meshes};
 use crate::list::debug::strokes;
 use crate::{
-    DrawList, Image, Instance, MeshData, MeshId, Part, RenderError, Shadows, SphereCloud, SphereStyle, Viewpoint,
+    DebugSphere, DrawList, Image, Instance, MeshData, MeshId, Part, RenderError, Shadows, SphereCloud, SphereStyle,
+    Viewpoint,
 };
 use std::sync::{Arc, OnceLock};
 
@@ -45,6 +46,41 @@ pub struct PortablePicture {
     pub casters: Vec<PortableDraw>,
     /// See `casters`.
     pub draws: Vec<PortableDraw>,
+}
+
+/// The parts of a picture that depend on the view.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PortableView {
+    /// `struct View` of the shaders.
+    pub floats: Vec<f32>,
+    /// [`PortableItems::Soft`], the farthest first.
+    pub soft: Vec<f32>,
+    /// [`PortableItems::Shells`], the farthest first.
+    pub shells: Vec<f32>,
+}
+
+impl PortableView {
+    /// Makes the numbers of one view for a picture of this size.
+    ///
+    /// # Errors
+    /// An invalid viewpoint.
+    pub fn new(list: &DrawList, from: &dyn Viewpoint, [width, height]: [u32; 2]) -> Result<PortableView, RenderError> {
+        let lens = from.lens(width as f32 / height as f32)?;
+        let alone = Eye::new(&lens.view, &lens.projection, width, height);
+        let eye = lens.part.iter().fold(alone, |eye, part| eye.numbered(&Part { rim_px: 0, ..*part }));
+        let view = lens.view.cast();
+        let mut spheres: Vec<_> =
+            list.debug_spheres.iter().filter(|s| s.kind == SphereStyle::Shell && s.radius > 0.0).collect();
+        spheres.sort_by(|a, b| depth(&view, a).total_cmp(&depth(&view, b)));
+        let mut shells = Vec::new();
+        spheres.iter().for_each(|s| data::shell(s, &mut shells));
+        Ok(PortableView { floats: eye.floats(), soft: super::soft::far_to_near(&list.soft_spheres, &eye), shells })
+    }
+}
+
+/// Returns the coordinate of a sphere along the view, which grows towards the eye.
+fn depth(view: &nalgebra::Matrix4<f32>, sphere: &DebugSphere) -> f32 {
+    view.transform_point(&sphere.center).z
 }
 
 /// Kinds of instances, each in an array of its own.
@@ -151,21 +187,18 @@ impl PortablePicture {
     pub fn new(list: &DrawList, from: &dyn Viewpoint, size_px: [u32; 2]) -> Result<PortablePicture, RenderError> {
         list.validate()?;
         list.meshes.iter().try_for_each(|mesh| mesh.validate())?;
-        let [width, height] = size_px;
-        let lens = from.lens(width as f32 / height as f32)?;
+        let PortableView { floats: view, soft, shells } = PortableView::new(list, from, size_px)?;
         let seen = list.whole_box();
         let settings = &list.settings;
         let shadows = match settings.shadows {
             Shadows::Off => Vec::new(),
             _ => scene::shadow_eyes(list, seen.as_ref()),
         };
-        let alone = Eye::new(&lens.view, &lens.projection, width, height);
-        let eye = lens.part.iter().fold(alone, |eye, part| eye.numbered(&Part { rim_px: 0, ..*part }));
         let variant = Variant::new(list, if shadows.is_empty() { Shadows::Off } else { settings.shadows }, false);
         let mut picture = PortablePicture {
             size_px,
             samples: settings.samples,
-            view: eye.floats(),
+            view,
             scene: scene::floats(list, seen.as_ref(), &shadows),
             shadow_views: shadows.iter().map(|(_, eye)| eye.floats()).collect(),
             shadow_map_size: settings.shadow_map_size,
@@ -183,8 +216,10 @@ impl PortablePicture {
         picture.add_meshes(list, variant);
         picture.add_ground(list, scene::floor(list, seen.as_ref()), variant);
         picture.draw(Pass::Sky, 0, variant, PortableItems::Nothing, None, &one());
-        picture.add_soft(list, &eye, variant);
-        picture.add_overlays(list, &lens.view.cast(), variant);
+        picture.items[PortableItems::Soft as usize] = soft;
+        picture.items[PortableItems::Shells as usize] = shells;
+        picture.add_soft(list, variant);
+        picture.add_overlays(list, variant);
         Ok(picture)
     }
 
@@ -264,9 +299,8 @@ impl PortablePicture {
     }
 
     /// Adds soft spheres, the farthest first.
-    fn add_soft(&mut self, list: &DrawList, eye: &Eye, variant: Variant) {
+    fn add_soft(&mut self, list: &DrawList, variant: Variant) {
         let all = 0..list.soft_spheres.len() as u32;
-        self.items[PortableItems::Soft as usize] = super::soft::far_to_near(&list.soft_spheres, eye);
         if !all.is_empty() {
             let same = Same { surface: 0, texture: None, casters: 0..0, all };
             self.draw(Pass::Soft, 0, variant, PortableItems::Soft, None, &same);
@@ -274,18 +308,15 @@ impl PortablePicture {
     }
 
     /// Adds lines, translucent spheres from back to front, and lines on top.
-    fn add_overlays(&mut self, list: &DrawList, view: &nalgebra::Matrix4<f32>, variant: Variant) {
-        let mut shells: Vec<_> =
-            list.debug_spheres.iter().filter(|s| s.kind == SphereStyle::Shell && s.radius > 0.0).collect();
-        shells.sort_by(|a, b| view.transform_point(&a.center).z.total_cmp(&view.transform_point(&b.center).z));
-        shells.iter().for_each(|s| data::shell(s, &mut self.items[PortableItems::Shells as usize]));
+    fn add_overlays(&mut self, list: &DrawList, variant: Variant) {
+        let shells = self.items[PortableItems::Shells as usize].len() / data::SPHERE_FLOATS as usize;
         let (on_top, behind): (Vec<_>, Vec<_>) = strokes(list).into_iter().partition(|s| s.style.on_top);
         let floats = &mut self.items[PortableItems::Strokes as usize];
         behind.iter().chain(&on_top).for_each(|s| data::stroke(s, floats));
         let (lines, all) = (behind.len() as u32, (behind.len() + on_top.len()) as u32);
         for (pass, items, range) in [
             (Pass::Line, PortableItems::Strokes, 0..lines),
-            (Pass::Shell, PortableItems::Shells, 0..shells.len() as u32),
+            (Pass::Shell, PortableItems::Shells, 0..shells as u32),
             (Pass::LineOnTop, PortableItems::Strokes, lines..all),
         ] {
             if !range.is_empty() {

@@ -1,6 +1,7 @@
 //! Programs of [`PortablePicture`](super::portable::PortablePicture) for other renderers: the WGSL as it
 //! is with its state, and its translation to GLSL ES 3.00 for WebGL 2.
 
+use super::finish::FINISH_WGSL;
 use super::pipeline_plan::{Input, Plan};
 use super::pipelines::{EDGE_PIXELS_WGSL, EDGE_SAMPLES_WGSL, PICTURE_WGSL};
 use super::portable::PortableKey;
@@ -46,13 +47,14 @@ pub struct Recipe {
 }
 
 /// The two stages of a program as GLSL ES 3.00.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct GlslProgram {
     /// Vertex stage.
     pub vertex: String,
     /// Fragment stage.
     pub fragment: String,
-    /// Names of uniform blocks, and the variable of the WGSL behind each: `view` or `scene`.
+    /// Names of uniform blocks, and the variable of the WGSL behind each: `view` or `scene`; `place` of a
+    /// pass.
     pub blocks: BTreeMap<String, String>,
     /// Names of samplers, and the texture of the WGSL behind each.
     pub textures: BTreeMap<String, String>,
@@ -131,10 +133,31 @@ pub fn portable_wgsl(samples: u32) -> String {
     [PICTURE_WGSL, if samples > 1 { EDGE_SAMPLES_WGSL } else { EDGE_PIXELS_WGSL }].concat()
 }
 
+/// The shader of the passes of a [`PortableFacet`](crate::PortableFacet) for WebGPU: the entry points
+/// `vs_place`, `fs_place` and `fs_surface`.
+pub fn portable_pass_wgsl() -> &'static str {
+    FINISH_WGSL
+}
+
 /// Translates programs to GLSL ES 3.00.
 pub struct GlslTranslator {
+    pictures: Shaders,
+    passes: Shaders,
+}
+
+/// Shaders that have been read.
+struct Shaders {
     module: naga::Module,
     info: valid::ModuleInfo,
+}
+
+impl Shaders {
+    fn read(source: &str) -> Result<Shaders, RenderError> {
+        let module = front::wgsl::parse_str(source).map_err(|e| failed(&e))?;
+        let mut validator = valid::Validator::new(valid::ValidationFlags::all(), valid::Capabilities::default());
+        let info = validator.validate(&module).map_err(|e| failed(&e.into_inner()))?;
+        Ok(Shaders { module, info })
+    }
 }
 
 impl GlslTranslator {
@@ -145,10 +168,19 @@ impl GlslTranslator {
     pub fn new() -> Result<GlslTranslator, RenderError> {
         // without interpolation that WebGL lacks: w is 1 where it is used, so the result is the same
         let source = portable_wgsl(1).replace("@interpolate(linear)", "@interpolate(perspective)");
-        let module = front::wgsl::parse_str(&source).map_err(|e| failed(&e))?;
-        let mut validator = valid::Validator::new(valid::ValidationFlags::all(), valid::Capabilities::default());
-        let info = validator.validate(&module).map_err(|e| failed(&e.into_inner()))?;
-        Ok(GlslTranslator { module, info })
+        Ok(GlslTranslator { pictures: Shaders::read(&source)?, passes: Shaders::read(FINISH_WGSL)? })
+    }
+
+    /// Translates the pass of a facet's picture; see [`PortablePass::is_surface`](crate::PortablePass).
+    ///
+    /// # Errors
+    /// The pass uses what GLSL ES 3.00 lacks.
+    pub fn pass(&self, is_surface: bool) -> Result<GlslProgram, RenderError> {
+        let mut program = GlslProgram::default();
+        let fs = if is_surface { "fs_surface" } else { "fs_place" };
+        program.vertex = self.passes.stage(ShaderStage::Vertex, "vs_place", &[], &mut program)?;
+        program.fragment = self.passes.stage(ShaderStage::Fragment, fs, &[], &mut program)?;
+        Ok(program)
     }
 
     /// Translates a program.
@@ -157,19 +189,16 @@ impl GlslTranslator {
     /// The program uses what GLSL ES 3.00 lacks.
     pub fn program(&self, key: PortableKey) -> Result<GlslProgram, RenderError> {
         let recipe = key.recipe();
-        let mut program = GlslProgram {
-            vertex: String::new(),
-            fragment: NOTHING.into(),
-            blocks: BTreeMap::new(),
-            textures: BTreeMap::new(),
-        };
-        program.vertex = self.stage(ShaderStage::Vertex, recipe.vs, &[], &mut program)?;
+        let mut program = GlslProgram { fragment: NOTHING.into(), ..GlslProgram::default() };
+        program.vertex = self.pictures.stage(ShaderStage::Vertex, recipe.vs, &[], &mut program)?;
         if let Some(fs) = recipe.fs {
-            program.fragment = self.stage(ShaderStage::Fragment, fs, &recipe.constants, &mut program)?;
+            program.fragment = self.pictures.stage(ShaderStage::Fragment, fs, &recipe.constants, &mut program)?;
         }
         Ok(program)
     }
+}
 
+impl Shaders {
     fn stage(
         &self,
         shader_stage: ShaderStage,

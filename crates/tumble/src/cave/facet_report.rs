@@ -55,6 +55,9 @@ pub struct FacetReport {
     /// First 16 bytes of the BLAKE3 hash of the last picture, hexadecimal.
     #[serde(default)]
     pub image: String,
+    /// Graphics adapter that draws: its name, kind and interface; empty for none in this process.
+    #[serde(default)]
+    pub adapter: String,
     /// Web browsers that show the facet.
     #[serde(default)]
     pub browsers: Option<BrowserReport>,

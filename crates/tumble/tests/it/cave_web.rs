@@ -212,10 +212,89 @@ fn a_page_follows_the_run_to_the_next_scene() {
     assert_eq!(run.end().0, Some(0));
 }
 
+/// A dome around the cave, in stereo: two pictures of up to six faces each, put together pixel by pixel.
+const DOME: &str =
+    "shape = \"fisheye\"\nradius_m = 4\ncenter_m = [0, 0, 1.7]\nforward = [0, 0.7, 0.7]\nup = [0, -0.7, 0.7]";
+/// A wall with a projector that bends, blends, mirrors and corrects colors.
+const WALL: &str = "lower_left_m = [-2, 2, 0.3]\nlower_right_m = [2, 2, 0.3]\nupper_left_m = [-2, 2, 3.3]";
+const PROJECTOR: &str = "warp_file = \"warp.obj\"\nblend_file = \"blend.png\"\nflip = \"horizontal\"\ncolor = { gamma = 2.2, white = [1, 0.9, 0.8], black = [0.01, 0.01, 0.02], floor = [0.02, 0.02, 0.04] }";
+
+/// Returns a cave with the facets `l` and `w` on one screen with these keys.
+fn twins_on(screen: &str, facet: &str) -> String {
+    let facet = |name: &str| format!("[[facet]]\nname = \"{name}\"\nscreen = \"s\"\n{facet}\n");
+    format!(
+        "[[user]]\nname = \"u\"\neye_m = [0, 0, 1.5]\n[[screen]]\nname = \"s\"\n{screen}\n{}{}[sync]\n\
+         ready_timeout_ms = 5000\ndrop_timeout_ms = 5000\nconnect_timeout_ms = 90000\n",
+        facet("l"),
+        facet("w")
+    )
+}
+
+/// A browser finishes pictures by the passes of the renderer, in the same shaders.
+#[test]
+fn chromium_shows_domes_warps_and_stereo_by_webgl() {
+    let more = ["--use-angle=swiftshader"];
+    let dome = twins_on(DOME, "size_px = [200, 200]\nstereo = \"checkerboard\"");
+    compare_in("dome", &dome, [200, 200], "webgl2", "billiards", "fast", &more);
+    let wall = twins_on(WALL, &format!("size_px = [240, 180]\nstereo = \"top_bottom\"\n{PROJECTOR}"));
+    compare_in("wall", &wall, [240, 360], "webgl2", "billiards", "fast", &more);
+}
+
+#[test]
+fn chromium_shows_domes_warps_and_stereo_by_webgpu() {
+    let more = ["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"];
+    let dome = twins_on(DOME, "size_px = [160, 160]\nstereo = \"anaglyph\"");
+    compare_in("dome", &dome, [160, 160], "webgpu-read", "billiards", "fast", &more);
+    let wall = twins_on(WALL, &format!("size_px = [200, 150]\nstereo = \"rows\"\nswap_eyes = true\n{PROJECTOR}"));
+    compare_in("wall", &wall, [200, 150], "webgpu-read", "campfire", "fast", &more);
+}
+
+#[test]
+fn a_facet_that_alternates_eyes_is_not_served() {
+    let place = Place::new("web-alternating", &twins_on(WALL, "size_px = [64, 48]\nstereo = \"frame_sequential\""));
+    let args = ["--offscreen", "--web", "127.0.0.1:0", "--duration", "1"];
+    let (code, _, wrong) = place.start("cave", &args).end();
+    assert!(code != Some(0) && wrong.contains("facet l: is frame_sequential, and a browser does not"), "{wrong}");
+}
+
+/// The facet's process steps the world by itself, and the browser draws what it has computed.
+#[test]
+fn a_browser_shows_a_facet_that_computes_by_itself() {
+    let place = Place::new("web-everywhere", &twins("[64, 48]"));
+    let summary = place.path("summary.json");
+    let (run, at) = start(&place, &["--compute", "everywhere", "--fps", "50", "--summary", &summary]);
+    let mut socket = connect(at, KEY, &format!("http://{at}")).unwrap();
+    say(&mut socket, "hello webgl2");
+    let mut frame = records(&mut socket).last().unwrap().1;
+    let (mut arrays, first) = (0, frame);
+    for _ in 0..30 {
+        say(&mut socket, &format!("drawn {frame}"));
+        assert_eq!(records(&mut socket), [(SHOW, frame)]);
+        say(&mut socket, &format!("shown {frame}"));
+        let next = records(&mut socket);
+        arrays += usize::from(next.iter().any(|(kind, _)| *kind == 6));
+        frame = next.last().unwrap().1;
+    }
+    // bodies fall, so nearly every frame has other numbers
+    assert!(arrays > 20 && frame >= first + 30, "{arrays} {first} {frame}");
+    signal(run.pid(), rustix::process::Signal::INT);
+    let (code, _, wrong) = run.end();
+    assert_eq!(code, Some(0), "{wrong}");
+    let facets = json(&place.folder.path("summary.json"))["facets"].clone();
+    assert!(facets[1]["browsers"]["shown"].as_u64() >= Some(25), "{facets}");
+    assert!(facets.as_array().unwrap().iter().all(|facet| facet["first_difference"].is_null()), "{facets}");
+}
+
 fn compare(backend: &str, scene: &str, quality: &str, more: &[&str]) {
-    let mut place = Place::new(&format!("web-{backend}-{scene}"), &twins("[480, 360]"));
+    compare_in("flat", &twins("[480, 360]"), [480, 360], backend, scene, quality, more);
+}
+
+/// Compares the pictures of the facets `l` and `w` of a cave, which are `size_px` with both eyes in them.
+fn compare_in(kind: &str, cave: &str, size_px: [u32; 2], backend: &str, scene: &str, quality: &str, more: &[&str]) {
+    let mut place = Place::new(&format!("web-{kind}-{backend}-{scene}"), cave);
     place.scene = scene.into();
-    let Some(mut page) = Chromium::start(&format!("{backend}-{scene}"), [480, 360], more) else { return };
+    write_projector(&place, cave);
+    let Some(mut page) = Chromium::start(&format!("{kind}-{backend}-{scene}"), size_px, more) else { return };
     let (out, console) = (place.path("out"), free_address().to_string());
     let (run, at) = start(
         &place,
@@ -246,18 +325,32 @@ fn compare(backend: &str, scene: &str, quality: &str, more: &[&str]) {
     let shown = page.run("tumble.shown").as_u64().unwrap();
     page.wait_for(&format!("tumble.shown > {}", shown + 5));
     page.run("document.getElementById('full').style.display = 'none'");
-    let seen = page.screenshot(&format!("web_{backend}_{scene}"));
+    let seen = page.screenshot(&format!("web_{kind}_{backend}_{scene}"));
     let frame = page.run("tumble.shown").as_u64().unwrap();
     place.wait_for("out", "l", frame);
     let file = place.folder.path("out").join("l").join(format!("frame_{frame:06}.png"));
     let drawn = Image::read_png(&file).unwrap();
-    keep(&file, &format!("web_{backend}_{scene}_native"));
+    keep(&file, &format!("web_{kind}_{backend}_{scene}_native"));
     assert_eq!(page.errors, Vec::<String>::new());
     signal(run.pid(), rustix::process::Signal::INT);
     assert_eq!(run.end().0, Some(0));
     let difference = Difference::of(&seen, &drawn);
-    println!("{backend} {scene} {quality}: {difference:?}");
+    println!("{kind} {backend} {scene} {quality}: {difference:?}");
     assert!(difference.within(), "{difference:?}");
+}
+
+/// Writes the files of [`PROJECTOR`] beside the cave: a keystone, and a ramp to the right.
+fn write_projector(place: &Place, cave: &str) {
+    let size = cave.split("size_px = [").nth(1).unwrap().split(']').next().unwrap();
+    let [width, height] = size.split(", ").map(|side| side.parse::<u32>().unwrap()).collect::<Vec<_>>()[..] else {
+        panic!("{size}")
+    };
+    place.folder.write(
+        "warp.obj",
+        "v 0.1 0.05\nv 0.95 0\nv 0.9 0.9\nv 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n",
+    );
+    let shares: Vec<[f32; 3]> = (0..height).flat_map(|_| 0..width).map(|x| [x as f32 / width as f32; 3]).collect();
+    place.folder.write("blend.png", tumble::render::Blend::png(&shares, [width, height]).unwrap());
 }
 
 /// How far two pictures are apart, in levels of 8 bits.

@@ -1,12 +1,12 @@
 //! Chromium without a window, directed by its DevTools protocol: pages, scripts, clicks, screenshots.
 
-use crate::common::Folder;
-use crate::desktop::{Running, skip};
+use crate::common::{Folder, tied};
+use crate::desktop::{Running, is_installed, skip};
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};
 use std::net::TcpStream;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 use tumble::render::Image;
 use tungstenite::{Message, WebSocket};
@@ -30,16 +30,16 @@ impl Chromium {
     /// printed.
     pub fn start(test: &str, size_px: [u32; 2], more: &[&str]) -> Option<Chromium> {
         let folder = Folder::new(&format!("chromium-{test}"));
-        let mut command = Command::new("chromium");
+        if !is_installed("chromium") {
+            skip("no page is tested: there is no chromium; on Debian: apt-get install chromium");
+            return None;
+        }
+        let mut command = tied("chromium");
         command.args(["--headless=new", "--no-sandbox", "--no-first-run", "--remote-debugging-port=0"]);
         command.args(["--enable-unsafe-swiftshader", "--disable-background-timer-throttling"]);
         command.arg(format!("--user-data-dir={}", folder.path("profile").display())).args(more).arg("about:blank");
         command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env("HOME", folder.path(""));
-        let started = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn();
-        let Ok(child) = started else {
-            skip("no page is tested: there is no chromium; on Debian: apt-get install chromium");
-            return None;
-        };
+        let child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         let mut process = Running(child);
         let mut lines = BufReader::new(process.0.stderr.take().unwrap()).lines().map_while(Result::ok);
         let link = lines.find_map(|line| line.strip_prefix("DevTools listening on ").map(str::to_owned));

@@ -2,7 +2,8 @@
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
+use std::sync::LazyLock;
 
 /// The shipped scenes.
 pub const SCENES: [&str; 25] = [
@@ -65,9 +66,24 @@ pub fn text(path: &Path) -> String {
     path.to_str().unwrap().to_string()
 }
 
+/// Returns the command of a program that is killed when the test that starts it ends in any way, also
+/// when the process of the test is killed.
+pub fn tied(program: &str) -> Command {
+    static CAN: LazyLock<bool> = LazyLock::new(|| {
+        let asked = Command::new("setpriv").args(["--pdeathsig", "KILL", "true"]).stderr(Stdio::null()).status();
+        asked.is_ok_and(|status| status.success())
+    });
+    if !*CAN {
+        return Command::new(program);
+    }
+    let mut command = Command::new("setpriv");
+    command.args(["--pdeathsig", "KILL", "--", program]);
+    command
+}
+
 /// The command, outside the repository: shipped scenes are inside it.
 pub fn command(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tumble"));
+    let mut command = tied(env!("CARGO_BIN_EXE_tumble"));
     command.args(args).current_dir(std::env::temp_dir());
     command
 }

@@ -26,6 +26,11 @@ pub struct Desktop {
     pub display: String,
 }
 
+/// Returns whether there is a program of this name.
+pub fn is_installed(program: &str) -> bool {
+    std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).any(|folder| folder.join(program).is_file())
+}
+
 pub fn skip(why: &str) {
     // directly to the terminal: the harness hides the output of passing tests
     let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("\nSKIPPED: {why}\n"));
@@ -45,17 +50,13 @@ impl Desktop {
     }
 
     fn start(more: &[&str]) -> Option<Desktop> {
-        let has = |program: &str| {
-            std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default())
-                .any(|folder| folder.join(program).is_file())
-        };
-        if let Some(missing) = ["Xvfb", "xdotool", "import"].into_iter().find(|p| !has(p)) {
+        if let Some(missing) = ["Xvfb", "xdotool", "import"].into_iter().find(|p| !is_installed(p)) {
             skip(&format!(
                 "windows are not tested: there is no {missing}; on Debian: apt-get install xvfb xdotool imagemagick"
             ));
             return None;
         }
-        let mut command = Command::new("Xvfb");
+        let mut command = tied("Xvfb");
         command
             .args(["-displayfd", "1", "-screen", "0", "1000x700x24", "-nolisten", "tcp"])
             .args(more)

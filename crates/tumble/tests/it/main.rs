@@ -33,6 +33,7 @@ mod desktop;
 mod determinism;
 mod machines;
 mod opening;
+mod orphans;
 mod outputs;
 mod page;
 mod picture;

@@ -2,8 +2,8 @@
 //! the driver.
 
 use crate::common::*;
-use crate::desktop::{Desktop, PATIENCE, Running, Session, skip};
-use std::process::{Command, Stdio};
+use crate::desktop::{Desktop, PATIENCE, Running, Session, is_installed, skip};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 /// A machine without Vulkan.
@@ -62,7 +62,11 @@ fn a_machine_without_vulkan_shows_the_same() {
 
 /// A Wayland desktop without a screen; its sockets are in a folder of its own.
 fn compositor(folder: &Folder) -> Option<Running> {
-    let mut command = Command::new("weston");
+    if !is_installed("weston") {
+        skip("Wayland is not tested: there is no weston; on Debian: apt-get install weston");
+        return None;
+    }
+    let mut command = tied("weston");
     command.args([
         "--backend=headless-backend.so",
         "--use-pixman",
@@ -77,11 +81,7 @@ fn compositor(folder: &Folder) -> Option<Running> {
         .env_remove("DISPLAY")
         .stdout(Stdio::null())
         .stderr(Stdio::null());
-    let Ok(child) = command.spawn() else {
-        skip("Wayland is not tested: there is no weston; on Debian: apt-get install weston");
-        return None;
-    };
-    let mut weston = Running(child);
+    let mut weston = Running(command.spawn().unwrap());
     let start = Instant::now();
     while !folder.path("wayland-test").exists() {
         assert!(weston.0.try_wait().unwrap().is_none() && start.elapsed() < PATIENCE, "weston did not start");

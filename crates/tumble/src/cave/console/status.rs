@@ -61,6 +61,8 @@ pub struct FacetStatus {
     pub image: String,
     /// The web browsers that show it, if it is served to browsers.
     pub browsers: Option<BrowserReport>,
+    /// The graphics adapter that draws it; empty if it draws nothing.
+    pub adapter: String,
     /// The first frame in which a facet that steps the world by itself had another state.
     pub first_difference: Option<Difference>,
 }

@@ -25,6 +25,14 @@ impl Painter {
         }
     }
 
+    /// Returns the graphics adapter of this process; empty if browsers draw.
+    pub fn adapter(&self) -> &str {
+        match self {
+            Painter::Memory(thread) => thread.adapter(),
+            Painter::Browsers(_) => "",
+        }
+    }
+
     /// Starts a picture of the world, or of a calibration pattern, with the frame number in it for
     /// `burn_in`. Browsers go on with the scene: patterns are for projectors.
     pub fn begin(

@@ -36,6 +36,7 @@ pub struct RenderThread {
     requests: SyncSender<RenderRequest>,
     pictures: Receiver<Result<Image, RenderError>>,
     software: bool,
+    adapter: String,
 }
 
 impl RenderThread {
@@ -60,16 +61,23 @@ impl RenderThread {
                         return;
                     }
                 };
-                let _ = ready.send(Ok(renderer.is_software()));
+                let _ = ready.send(Ok((renderer.is_software(), renderer.adapter().to_owned())));
                 render_all(view, facet, &mut renderer, &incoming, &done);
             })
             .map_err(|e| Failure::run("drawing", e))?;
-        let software =
+        let (software, adapter) =
             started.recv().map_err(|e| Failure::run("drawing", e))?.map_err(|e| Failure::run("drawing", e))?;
         // as in windows: a software driver is slow
         let quality = quality.or(software.then(Quality::fast));
-        let mut render_thread =
-            RenderThread { drawing: Drawing::new(&setup.scene), quality, overlays, requests, pictures, software };
+        let mut render_thread = RenderThread {
+            drawing: Drawing::new(&setup.scene),
+            quality,
+            overlays,
+            requests,
+            pictures,
+            software,
+            adapter,
+        };
         // the first picture takes seconds to compile pipelines, and nothing waits for it yet
         render_thread.begin(&setup.world, &setup.viewer()?, 0, false, None)?;
         while render_thread.finished(Duration::from_secs(1))?.is_none() {}
@@ -79,6 +87,11 @@ impl RenderThread {
     /// Returns whether a software driver draws.
     pub fn is_software(&self) -> bool {
         self.software
+    }
+
+    /// Returns the graphics adapter: its name, kind and interface.
+    pub fn adapter(&self) -> &str {
+        &self.adapter
     }
 
     /// Starts a picture of the world, or of a calibration pattern, with the frame number in it for

@@ -70,13 +70,13 @@ impl FacetRunner {
         }
     }
 
-    /// Reports that the facet is ready to join. With a software driver it has begun to draw by now,
-    /// and the driver's threads exist.
-    pub fn prepared(&self, software: bool) {
+    /// Reports that the facet is ready to join, and what draws it. With a software driver it has begun to draw
+    /// by now, and the driver's threads exist.
+    pub fn prepared(&self, software: bool, adapter: &str) {
         if software && let Err(why) = priority::lower_drawing_threads() {
             self.control.say(&format!("draws with real-time priority, which delays the sessions: {why}"));
         }
-        self.reporter.update(|report| report.preparing = false);
+        self.reporter.update(|report| (report.preparing, report.adapter) = (false, adapter.to_owned()));
         self.reporter.flush();
     }
 
@@ -122,7 +122,8 @@ impl FacetRunner {
 
     /// Draws into memory, or nothing, until the end.
     pub fn run_offscreen(&mut self) -> Result<(), Failure> {
-        self.prepared(self.painter.as_ref().is_some_and(Painter::is_software));
+        let painter = self.painter.as_ref();
+        self.prepared(painter.is_some_and(Painter::is_software), painter.map_or("", Painter::adapter));
         while let Some(task) = self.next(if self.drawing.is_some() { Duration::ZERO } else { POLL_INTERVAL })? {
             match task {
                 // a started picture is finished first, even if no frame waits for it any more

@@ -215,7 +215,7 @@ impl WindowApp for Window<'_> {
         self.window_setup.view_mode.draw(screen, &self.list)?;
         screen.renderer().wait()?;
         self.probe = None;
-        self.runner.prepared(screen.is_software());
+        self.runner.prepared(screen.is_software(), screen.adapter());
         Ok(())
     }
 

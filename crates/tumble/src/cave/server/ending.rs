@@ -74,7 +74,10 @@ impl RunLoop<'_> {
     /// Returns the summary, if there was a frame.
     fn summary(&self, wall_s: f64, processes: &FacetProcesses) -> Option<Summary> {
         let mut facets = self.metrics.facets(&self.server, &self.slots, self.frames, &self.written(processes));
-        (0..).zip(&mut facets).for_each(|(k, facet)| facet.browsers = processes.report_of(k).browsers);
+        for (k, facet) in (0..).zip(&mut facets) {
+            let report = processes.report_of(k);
+            (facet.browsers, facet.adapter) = (report.browsers, report.adapter);
+        }
         (self.frames > 0).then(|| Summary {
             scene: self.scene.clone(),
             cave: self.cave.file.clone(),

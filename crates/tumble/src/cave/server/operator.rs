@@ -175,6 +175,7 @@ impl RunLoop<'_> {
                 black_now: report.black_now,
                 image: report.image,
                 browsers: report.browsers,
+                adapter: report.adapter,
                 first_difference: self.metrics.difference(k),
             }
         };

@@ -113,6 +113,8 @@ pub struct FacetSummary {
     pub first_difference: Option<Difference>,
     /// The web browsers that showed it, if it was served to browsers.
     pub browsers: Option<BrowserReport>,
+    /// The graphics adapter that drew it; empty if it drew nothing, or was not started by this process.
+    pub adapter: String,
     pub draw: Quantiles,
     pub bytes_out: u64,
     pub bytes_in: u64,
@@ -203,6 +205,7 @@ impl Metrics {
                 counts,
                 first_difference: self.differences[k].clone(),
                 browsers: None,
+                adapter: String::new(),
                 draw: self.draw[k].quantiles(),
                 bytes_out: link.bytes_out,
                 bytes_in: link.bytes_in,

@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use tumble::net::browser::Backend;
 use tumble::render::{
-    GlslTranslator, Image, MeshData, PortableDraw, PortableKey, PortablePicture, Recipe, portable_wgsl,
+    GlslProgram, GlslTranslator, Image, MeshData, PortableDraw, PortableFacet, PortableFinish, PortableItems,
+    PortableKey, PortablePicture, Recipe, portable_pass_wgsl, portable_wgsl,
 };
 
 /// Maximum length of a message, bytes: what a browser can be expected to hold.
@@ -28,11 +29,20 @@ const FORGET_MESH: u32 = 8;
 const FORGET_TEXTURE: u32 = 9;
 const FRAME: u32 = 10;
 const SHOW: u32 = 11;
+const PASSES: u32 = 12;
+const NUMBERS: u32 = 13;
+const EYES: u32 = 14;
 
 /// Numbers of the arrays after those of the instances: uniform blocks.
 const VIEW: u32 = 8;
 const SCENE: u32 = 9;
 const SHADOW_VIEW: u32 = 10;
+/// Numbers of the first array of a view after the first one, and of the first uniform block of a pass.
+const FIRST_OF_VIEWS: u32 = 256;
+const FIRST_OF_PASSES: u32 = 1024;
+
+/// Formats of textures of numbers, by the number that is sent.
+const FORMATS: [&str; 3] = ["rg32float", "rgba32float", "rgba16float"];
 
 /// Data that a browser has, so that only changes are sent.
 pub struct Encoder {
@@ -45,6 +55,12 @@ pub struct Encoder {
     textures: Shared<Image>,
     arrays: BTreeMap<u32, Vec<u32>>,
     draws: Vec<u32>,
+    /// What the eyes' passes are made of, as it was sent; empty for none.
+    eyes: String,
+    /// Whether the shaders of passes were sent.
+    has_passes: bool,
+    /// Warps, blends and colors that were sent; the textures of one have its index, times three.
+    finishes: Vec<PortableFinish>,
 }
 
 impl Encoder {
@@ -59,6 +75,9 @@ impl Encoder {
             textures: Shared::default(),
             arrays: BTreeMap::new(),
             draws: Vec::new(),
+            eyes: String::new(),
+            has_passes: false,
+            finishes: Vec::new(),
         }
     }
 
@@ -66,9 +85,10 @@ impl Encoder {
     ///
     /// # Errors
     /// A shader without a translation, or a message that no browser could hold.
-    pub fn frame(&mut self, frame: u64, picture: &PortablePicture, glsl: &GlslTranslator) -> Result<Vec<u8>, Failure> {
-        let mut out = Records::default();
+    pub fn frame(&mut self, frame: u64, facet: &PortableFacet, glsl: &GlslTranslator) -> Result<Vec<u8>, Failure> {
+        let (picture, mut out) = (&facet.picture, Records::default());
         self.encode_size(picture, &mut out);
+        self.encode_eyes(facet, glsl, &mut out)?;
         self.encode_meshes(picture, &mut out);
         self.encode_textures(picture, &mut out);
         let arrays = picture.items.iter().zip(0..).chain([(&picture.view, VIEW), (&picture.scene, SCENE)]);
@@ -103,6 +123,77 @@ impl Encoder {
             out.push(SIZE, size.iter().copied());
             self.size = size;
         }
+    }
+
+    /// Sends what the passes of a facet need and have not got.
+    fn encode_eyes(&mut self, facet: &PortableFacet, glsl: &GlslTranslator, out: &mut Records) -> Result<(), Failure> {
+        if facet.eyes.is_empty() {
+            return Ok(());
+        }
+        if !std::mem::replace(&mut self.has_passes, true) {
+            let passes = match self.backend {
+                Backend::Webgpu => json!({ "wgsl": portable_pass_wgsl() }),
+                Backend::Webgl2 => {
+                    let pass = |is_surface| glsl.pass(is_surface).map(|glsl| program_words(&glsl));
+                    let failed = |e| Failure::run("a browser", e);
+                    json!({ "place": pass(false).map_err(failed)?, "surface": pass(true).map_err(failed)? })
+                }
+            };
+            out.text(PASSES, &[], &passes.to_string());
+        }
+        let mut eyes = Vec::new();
+        // arrays of views that were sent in this frame, by their content
+        let mut sent: Vec<(&[f32], u32)> = vec![
+            (&facet.picture.view, VIEW),
+            (&facet.picture.items[PortableItems::Soft as usize], PortableItems::Soft as u32),
+            (&facet.picture.items[PortableItems::Shells as usize], PortableItems::Shells as u32),
+        ];
+        for (eye, id) in facet.eyes.iter().zip(FIRST_OF_PASSES..) {
+            let mut views = Vec::new();
+            for (view, [x, y]) in &eye.views {
+                let ids = [&view.floats, &view.soft, &view.shells].map(|array| {
+                    if let Some((_, id)) = sent.iter().find(|(known, _)| known == array) {
+                        return *id;
+                    }
+                    let id = FIRST_OF_VIEWS + sent.len() as u32;
+                    sent.push((array, id));
+                    self.encode_array(id, array, out);
+                    id
+                });
+                views.push(json!({ "at": [x, y], "view": ids[0], "soft": ids[1], "shells": ids[2] }));
+            }
+            let pass = &eye.pass;
+            self.encode_array(id, &pass.place, out);
+            let numbers = pass.finish.as_ref().map_or([None; 3], |finish| self.numbers(finish, out));
+            eyes.push(json!({
+                "views": views, "place": id, "surface": pass.is_surface, "numbers": numbers,
+                "at": pass.at_px, "size": pass.size_px, "channels": pass.channels, "source": eye.source_px,
+            }));
+        }
+        let eyes = json!({ "whole": facet.whole_px, "exact": facet.is_interlaced, "eyes": eyes }).to_string();
+        if eyes != self.eyes {
+            out.text(EYES, &[], &eyes);
+            self.eyes = eyes;
+        }
+        Ok(())
+    }
+
+    /// Returns the numbers of the textures of a finish, which are sent if they are new.
+    fn numbers(&mut self, finish: &PortableFinish, out: &mut Records) -> [Option<u32>; 3] {
+        let known = self.finishes.iter().position(|known| known.is_same(finish));
+        let first = 3 * known.unwrap_or(self.finishes.len()) as u32;
+        if known.is_none() {
+            self.finishes.push(finish.clone());
+            for (texture, id) in finish.textures().iter().zip(first..) {
+                let Some(texture) = texture else { continue };
+                let format = FORMATS.iter().position(|format| *format == texture.format).unwrap_or(0) as u32;
+                let words = texture.bytes.as_chunks::<4>().0.iter().map(|&word| u32::from_le_bytes(word));
+                let [width, height] = texture.size_px;
+                out.push(NUMBERS, [id, format, width, height].into_iter().chain(words));
+            }
+        }
+        let used = finish.used();
+        [0, 1, 2].map(|i| used[i as usize].then_some(first + i))
     }
 
     fn encode_meshes(&mut self, picture: &PortablePicture, out: &mut Records) {
@@ -153,10 +244,9 @@ impl Encoder {
             Backend::Webgpu => json!({ "recipe": recipe }),
             Backend::Webgl2 => {
                 let glsl = glsl.program(key).map_err(|e| Failure::run("a browser", e))?;
-                json!({
-                    "recipe": recipe, "vertex": glsl.vertex, "fragment": glsl.fragment,
-                    "blocks": glsl.blocks, "textures": glsl.textures,
-                })
+                let mut program = program_words(&glsl);
+                program["recipe"] = recipe;
+                program
             }
         };
         let id = self.programs.len() as u32;
@@ -177,6 +267,11 @@ pub fn show(frame: u64) -> Vec<u8> {
     let mut out = Records::default();
     out.push(SHOW, [frame as u32, (frame >> 32) as u32]);
     out.bytes()
+}
+
+fn program_words(glsl: &GlslProgram) -> serde_json::Value {
+    let GlslProgram { vertex, fragment, blocks, textures } = glsl;
+    json!({ "vertex": vertex, "fragment": fragment, "blocks": blocks, "textures": textures })
 }
 
 fn recipe(recipe: &Recipe) -> serde_json::Value {
@@ -305,7 +400,8 @@ mod tests {
             let mut list = list(height);
             list.meshes[0] = mesh.clone();
             let picture = PortablePicture::new(&list, &list.camera, [64, 48]).unwrap();
-            let message = encoder.frame(frame as u64, &picture, &glsl).unwrap_or_else(|e| panic!("{}", e.report()));
+            let facet = PortableFacet { picture, whole_px: [64, 48], is_interlaced: false, eyes: Vec::new() };
+            let message = encoder.frame(frame as u64, &facet, &glsl).unwrap_or_else(|e| panic!("{}", e.report()));
             let records = read(&message);
             let kinds: Vec<u32> = records.iter().map(|(kind, _)| *kind).collect();
             match frame {
@@ -327,6 +423,7 @@ mod tests {
                     assert_eq!(words.len(), 2 + 1 + 4);
                 }
             }
+            let picture = &facet.picture;
             let bits = |floats: &Vec<f32>| floats.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
             assert_eq!(known[&1], bits(&picture.items[1]));
             assert_eq!((&known[&VIEW], &known[&SCENE]), (&bits(&picture.view), &bits(&picture.scene)));

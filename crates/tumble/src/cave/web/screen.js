@@ -4,9 +4,9 @@
 // with its number and is drawn at once; `show` follows when all screens have drawn it.
 "use strict";
 
-const KIND = { SIZE: 1, MODULE: 2, PROGRAM: 3, MESH: 4, TEXTURE: 5, ARRAY: 6, DRAWS: 7, FORGET_MESH: 8, FORGET_TEXTURE: 9, FRAME: 10, SHOW: 11 };
+const KIND = { SIZE: 1, MODULE: 2, PROGRAM: 3, MESH: 4, TEXTURE: 5, ARRAY: 6, DRAWS: 7, FORGET_MESH: 8, FORGET_TEXTURE: 9, FRAME: 10, SHOW: 11, PASSES: 12, NUMBERS: 13, EYES: 14 };
 // numbers of the arrays: instances by kind, then the uniform blocks
-const VIEW = 8, SCENE = 9, SHADOW_VIEW = 10;
+const SHELLS = 5, SOFT = 7, VIEW = 8, SCENE = 9, SHADOW_VIEW = 10;
 const at = (id) => document.getElementById(id);
 const canvas = at("screen");
 const note = (text) => { at("note").textContent = text; };
@@ -16,7 +16,11 @@ const state = { backend: "", drawn: -1, shown: -1, frames: 0, error: "" };
 window.tumble = state;
 
 // The picture as it was last received.
-const picture = { size: null, arrays: new Map(), changed: new Set(), draws: [], casters: [] };
+const picture = { size: null, eyes: null, arrays: new Map(), changed: new Set(), draws: [], casters: [] };
+// The only view of a picture without eyes.
+const ONE_VIEW = { view: VIEW, soft: SOFT, shells: SHELLS };
+// The array of instances in a view: translucent ones have an order for each.
+const inView = (view, items) => items === SOFT ? view.soft : items === SHELLS ? view.shells : items;
 
 // Reads records; calls `take(kind, words)` for each.
 function read(buffer, take) {
@@ -62,13 +66,27 @@ function draws(words) {
   [picture.casters, picture.draws] = [list(1, words[0]), list(1 + 6 * words[0], (words.length - 1) / 6 - words[0])];
 }
 
+// Makes the targets for the picture: of a view, of the source of an eye's pass, and of the whole.
+let size = "";
+function resize(backend) {
+  const { width, height } = picture.size;
+  const [whole, source] = picture.eyes ? [picture.eyes.whole, picture.eyes.eyes[0].source] : [[width, height], null];
+  const now = JSON.stringify([picture.size, whole, source]);
+  if (now === size) return;
+  size = now;
+  [canvas.width, canvas.height] = whole;
+  // interlaced eyes need the pixels of the display
+  const exact = picture.eyes && picture.eyes.exact;
+  [canvas.style.width, canvas.style.height] = exact ? whole.map((side) => side / devicePixelRatio + "px") : ["", ""];
+  backend.resize({ ...picture.size, whole, source });
+}
+
 function take(backend, socket, kind, words) {
   switch (kind) {
     case KIND.SIZE: {
       const [width, height, samples, mapSize, layers] = words;
       picture.size = { width, height, samples, mapSize, layers };
-      [canvas.width, canvas.height] = [width, height];
-      backend.resize(picture.size);
+      resize(backend);
       break;
     }
     case KIND.MODULE: backend.module(text(words)); break;
@@ -77,6 +95,17 @@ function take(backend, socket, kind, words) {
     case KIND.TEXTURE: backend.texture(words[0], words[1], words[2], new Uint8Array(words.buffer, words.byteOffset + 12, 4 * words[1] * words[2])); break;
     case KIND.ARRAY: update(words); break;
     case KIND.DRAWS: draws(words); break;
+    case KIND.PASSES: backend.passes(JSON.parse(text(words))); break;
+    case KIND.NUMBERS: {
+      const [id, format, width, height] = words;
+      backend.numbers(id, ["rg32float", "rgba32float", "rgba16float"][format], width, height, words.subarray(4));
+      break;
+    }
+    case KIND.EYES: {
+      picture.eyes = JSON.parse(text(words));
+      resize(backend);
+      break;
+    }
     case KIND.FORGET_MESH: backend.forgetMesh(words[0]); break;
     case KIND.FORGET_TEXTURE: backend.forgetTexture(words[0]); break;
     case KIND.FRAME: {
@@ -142,6 +171,7 @@ async function open() {
     if (state.error) return;
     note("The cave is not there; trying again…");
     picture.arrays.clear();
+    [picture.eyes, size] = [null, ""];
     setTimeout(open, 2000);
   };
 }

@@ -18,8 +18,8 @@ use tumble::dynamics::World;
 use tumble::net::browser::MIN_KEY_BYTES;
 use tumble::net::sync::Viewer;
 use tumble::net::sync::udp::Entropy;
-use tumble::render::{CaveView, DebugDraw, Drawing, GlslTranslator, PortablePicture, Quality};
-use tumble::scene::cave::{Facet, Flip, Stereo};
+use tumble::render::{CaveView, DebugDraw, Drawing, GlslTranslator, Quality};
+use tumble::scene::cave::{Facet, Stereo};
 
 /// Environment variable with the key of a run, by which a launcher keeps links when it starts a facet
 /// again. Other users of the machine cannot read it, as they can arguments.
@@ -97,10 +97,7 @@ impl WebScreen {
         }
         apply_viewer(&mut self.view, viewer, frame);
         let list = draw_list(&mut self.drawing, world, Some(&self.quality), &self.overlays)?;
-        let failed = |e| Failure::run("drawing", e);
-        let [width, height] = self.facet.size_px;
-        let from = self.view.eye(&self.facet, 0.0).map_err(failed)?.part(width, height, 0);
-        let picture = PortablePicture::new(&list, &from, [width, height]).map_err(failed)?;
+        let picture = self.view.portable(&list, &self.facet).map_err(|e| Failure::run("drawing", e))?;
         let glsl = &self.glsl;
         let refused = self.shared.crowd().begin(frame, Instant::now(), |encoder| encoder.frame(frame, &picture, glsl));
         if let Some(why) = refused {
@@ -141,23 +138,14 @@ impl WebScreen {
     }
 }
 
-/// Checks that a browser can show a facet: one flat picture as it is.
+/// Checks that a browser can show a facet.
 fn check(setup: &RunSetup, facet: &Facet) -> Result<(), Failure> {
-    let has = [
-        (!setup.cave.screens[facet.screen].is_flat(), "a curved screen"),
-        (facet.stereo != Stereo::Mono, "stereo"),
-        (facet.flip != Flip::None, "flip"),
-        (facet.warp_file.is_some(), "a warp"),
-        (facet.blend_file.is_some() || facet.black_file.is_some(), "a blend"),
-        (facet.color.is_some(), "a color correction"),
-    ];
-    match has.iter().find(|(has, _)| *has) {
-        None => Ok(()),
-        Some((_, what)) => {
-            let why = format!("has {what}, which browsers do not show; --web-facets names the facets that have none");
-            Err(Failure::input(format!("{}: facet {}: {why}", setup.cave.file, facet.name)))
-        }
+    if facet.stereo != Stereo::FrameSequential {
+        return Ok(());
     }
+    let why = "is frame_sequential, and a browser does not show each frame for one refresh of its display; --web-facets \
+               names the facets to serve";
+    Err(Failure::input(format!("{}: facet {}: {why}", setup.cave.file, facet.name)))
 }
 
 /// Returns the key of the link: of a file, of the launcher, or a new one.

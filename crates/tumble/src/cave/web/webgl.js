@@ -22,9 +22,9 @@ function makeWebgl(canvas) {
   const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: true });
   if (!gl) throw new Error("there is no WebGL 2");
   canvas.addEventListener("webglcontextlost", lost);
-  const unit = { shadow_maps: 0, shadow_depths: 1, occlusion: 2, albedo: 3 };
-  const programs = new Map(), meshes = new Map(), textures = new Map(), arrays = new Map();
-  let targets = null, copy = null;
+  const unit = { shadow_maps: 0, shadow_depths: 1, occlusion: 2, albedo: 3, source: 4, warp: 5, shares: 6, table: 7 };
+  const programs = new Map(), meshes = new Map(), textures = new Map(), arrays = new Map(), tables = new Map();
+  let targets = null, copy = null, placing = null;
 
   function compile(vertex, fragment) {
     const program = gl.createProgram();
@@ -83,7 +83,30 @@ function makeWebgl(canvas) {
   const white = image(1, 1, new Uint8Array(4).fill(255));
   const samplers = { shadow_maps: sampler(gl.LINEAR, true), shadow_depths: sampler(gl.NEAREST, false) };
 
-  function makeTargets({ width, height, samples, mapSize, layers }) {
+  // A texture of numbers, which is read without a filter.
+  function numbers(format, width, height, words) {
+    const made = texture(gl.TEXTURE_2D, gl.NEAREST, false);
+    const [internal, channels, type, array] = {
+      rg32float: [gl.RG32F, gl.RG, gl.FLOAT, Float32Array],
+      rgba32float: [gl.RGBA32F, gl.RGBA, gl.FLOAT, Float32Array],
+      rgba16float: [gl.RGBA16F, gl.RGBA, gl.HALF_FLOAT, Uint16Array],
+    }[format];
+    const values = new array(words.buffer, words.byteOffset, words.byteLength / array.BYTES_PER_ELEMENT);
+    gl.texImage2D(gl.TEXTURE_2D, 0, internal, width, height, 0, channels, type, values);
+    return made;
+  }
+
+  // A color target alone.
+  function plainTarget([width, height]) {
+    const made = { texture: texture(gl.TEXTURE_2D, gl.NEAREST, false), framebuffer: gl.createFramebuffer(), width, height };
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.SRGB8_ALPHA8, width, height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, made.framebuffer);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, made.texture, 0);
+    return made;
+  }
+
+  function makeTargets({ width, height, samples, mapSize, layers, whole: whole_px, source: source_px }) {
+    const [finished, source] = source_px ? [plainTarget(whole_px), plainTarget(source_px)] : [null, null];
     const picture = texture(gl.TEXTURE_2D, gl.NEAREST, false);
     gl.texStorage2D(gl.TEXTURE_2D, 1, gl.SRGB8_ALPHA8, width, height);
     const framebuffer = (color, depth) => {
@@ -116,7 +139,7 @@ function makeWebgl(canvas) {
     const maps = texture(gl.TEXTURE_2D_ARRAY, gl.NEAREST, false);
     gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, gl.DEPTH_COMPONENT32F, side, side, Math.max(layers, 1));
     const layer = gl.createFramebuffer();
-    return { picture, buffers, whole, resolved, maps, layer, width, height, side, layers };
+    return { picture, buffers, whole, resolved, maps, layer, width, height, side, layers, finished, source };
   }
 
   function freeTargets() {
@@ -124,6 +147,11 @@ function makeWebgl(canvas) {
     [targets.picture, targets.maps].forEach((t) => gl.deleteTexture(t));
     targets.buffers.forEach((b) => gl.deleteRenderbuffer(b));
     [targets.whole, targets.resolved, targets.layer].forEach((f) => f && gl.deleteFramebuffer(f));
+    for (const plain of [targets.finished, targets.source]) {
+      if (!plain) continue;
+      gl.deleteTexture(plain.texture);
+      gl.deleteFramebuffer(plain.framebuffer);
+    }
     targets = null;
   }
 
@@ -167,14 +195,69 @@ function makeWebgl(canvas) {
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, mesh.indices);
   }
 
-  function drawItems(list) {
+  // Draws one view into the picture.
+  function drawView(view, draws) {
+    gl.bindFramebuffer(gl.FRAMEBUFFER, targets.whole);
+    gl.viewport(0, 0, targets.width, targets.height);
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthMask(true);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, arrays.get(view.view));
+    gl.bindBufferBase(gl.UNIFORM_BUFFER, 1, arrays.get(SCENE));
+    drawItems(draws, view);
+    if (targets.resolved) {
+      gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, targets.resolved);
+      const box = [0, 0, targets.width, targets.height];
+      gl.blitFramebuffer(...box, ...box, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+      gl.bindFramebuffer(gl.READ_FRAMEBUFFER, targets.resolved);
+    }
+  }
+
+  // Draws the views of an eye into its source, and puts that into the whole.
+  function drawEye(eye, draws, first) {
+    for (const view of eye.views) {
+      drawView(view, draws);
+      gl.bindFramebuffer(gl.READ_FRAMEBUFFER, targets.resolved ?? targets.whole);
+      gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, targets.source.framebuffer);
+      const [x, y] = view.at;
+      const into = [x, y, x + targets.width, y + targets.height];
+      gl.blitFramebuffer(0, 0, targets.width, targets.height, ...into, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+    }
+    gl.bindFramebuffer(gl.FRAMEBUFFER, targets.finished.framebuffer);
+    gl.viewport(0, 0, targets.finished.width, targets.finished.height);
+    [gl.DEPTH_TEST, gl.BLEND, gl.CULL_FACE, gl.POLYGON_OFFSET_FILL].forEach((what) => gl.disable(what));
+    if (first) {
+      gl.clearColor(0, 0, 0, 1);
+      gl.clear(gl.COLOR_BUFFER_BIT);
+      gl.clearColor(0, 0, 0, 0);
+    }
+    gl.useProgram(eye.surface ? placing.surface : placing.place);
+    gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, arrays.get(eye.place));
+    const [warp, shares, table] = eye.numbers.map((id) => id === null ? white : tables.get(id));
+    for (const [name, image] of Object.entries({ source: targets.source.texture, warp, shares, table })) {
+      gl.activeTexture(gl.TEXTURE0 + unit[name]);
+      gl.bindTexture(gl.TEXTURE_2D, image);
+    }
+    gl.colorMask(...eye.channels, true);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(...eye.at, ...eye.size);
+    gl.bindVertexArray(null);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.disable(gl.SCISSOR_TEST);
+    gl.colorMask(true, true, true, true);
+    // the source is drawn again for the next eye
+    gl.activeTexture(gl.TEXTURE0 + unit.source);
+    gl.bindTexture(gl.TEXTURE_2D, null);
+  }
+
+  function drawItems(list, view) {
     for (const { program, items, mesh, texture: image, first, count } of list) {
       const { made, recipe } = programs.get(program);
       gl.useProgram(made);
       setState(recipe);
       const vao = gl.createVertexArray();
       gl.bindVertexArray(vao);
-      if (recipe.floats) setInstances(recipe, arrays.get(items), first);
+      if (recipe.floats) setInstances(recipe, arrays.get(inView(view, items)), first);
       gl.activeTexture(gl.TEXTURE0 + unit.albedo);
       gl.bindTexture(gl.TEXTURE_2D, textures.get(image) ?? white);
       if (recipe.mesh) {
@@ -194,6 +277,19 @@ function makeWebgl(canvas) {
       freeTargets();
       targets = makeTargets(size);
     },
+    passes(programs) {
+      placing = {};
+      for (const [name, { vertex, fragment, blocks, textures: names }] of Object.entries(programs)) {
+        const made = placing[name] = compile(vertex, fragment);
+        gl.useProgram(made);
+        for (const block of Object.keys(blocks)) {
+          const index = gl.getUniformBlockIndex(made, block);
+          if (index !== gl.INVALID_INDEX) gl.uniformBlockBinding(made, index, 0);
+        }
+        for (const [sampler, variable] of Object.entries(names)) gl.uniform1i(gl.getUniformLocation(made, sampler), unit[variable]);
+      }
+    },
+    numbers(id, ...data) { tables.set(id, numbers(...data)); },
     program(id, { recipe, vertex, fragment, blocks, textures: names }) {
       const made = compile(vertex, fragment);
       gl.useProgram(made);
@@ -223,7 +319,7 @@ function makeWebgl(canvas) {
       gl.bindBuffer(gl.ARRAY_BUFFER, arrays.get(id));
       gl.bufferData(gl.ARRAY_BUFFER, words, gl.DYNAMIC_DRAW);
     },
-    async draw({ size, casters, draws }) {
+    async draw({ size, eyes, casters, draws }) {
       gl.enable(gl.DEPTH_TEST);
       gl.cullFace(gl.FRONT);
       gl.frontFace(gl.CW); // the picture is upside down for WebGL
@@ -243,22 +339,11 @@ function makeWebgl(canvas) {
         gl.depthMask(true);
         gl.clear(gl.DEPTH_BUFFER_BIT);
         gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, arrays.get(SHADOW_VIEW + k));
-        drawItems(casters);
+        drawItems(casters, ONE_VIEW);
       }
       bindTextures();
-      gl.bindFramebuffer(gl.FRAMEBUFFER, targets.whole);
-      gl.viewport(0, 0, targets.width, targets.height);
-      gl.depthMask(true);
-      gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-      gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, arrays.get(VIEW));
-      gl.bindBufferBase(gl.UNIFORM_BUFFER, 1, arrays.get(SCENE));
-      drawItems(draws);
-      if (targets.resolved) {
-        gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, targets.resolved);
-        const box = [0, 0, targets.width, targets.height];
-        gl.blitFramebuffer(...box, ...box, gl.COLOR_BUFFER_BIT, gl.NEAREST);
-        gl.bindFramebuffer(gl.READ_FRAMEBUFFER, targets.resolved);
-      }
+      if (eyes) eyes.eyes.forEach((eye, k) => drawEye(eye, draws, k === 0));
+      else drawView(ONE_VIEW, draws);
       // waits until the picture is drawn
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
       const error = gl.getError();
@@ -267,14 +352,14 @@ function makeWebgl(canvas) {
     show() {
       copy ??= compile(...COPY);
       gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-      gl.viewport(0, 0, targets.width, targets.height);
+      gl.viewport(0, 0, canvas.width, canvas.height);
       gl.disable(gl.DEPTH_TEST);
       gl.disable(gl.BLEND);
       gl.disable(gl.CULL_FACE);
       gl.useProgram(copy);
       gl.bindVertexArray(null);
       gl.activeTexture(gl.TEXTURE0 + unit.albedo);
-      gl.bindTexture(gl.TEXTURE_2D, targets.picture);
+      gl.bindTexture(gl.TEXTURE_2D, targets.finished ? targets.finished.texture : targets.picture);
       gl.uniform1i(gl.getUniformLocation(copy, "picture"), unit.albedo);
       gl.drawArrays(gl.TRIANGLES, 0, 3);
     },
@@ -284,7 +369,10 @@ function makeWebgl(canvas) {
       [...textures.keys()].forEach(this.forgetTexture);
       arrays.forEach((items) => gl.deleteBuffer(items));
       programs.forEach(({ made }) => gl.deleteProgram(made));
-      [arrays, programs].forEach((list) => list.clear());
+      Object.values(placing ?? {}).forEach((made) => gl.deleteProgram(made));
+      tables.forEach((table) => gl.deleteTexture(table));
+      placing = null;
+      [arrays, programs, tables].forEach((list) => list.clear());
     },
   };
 }

@@ -21,8 +21,8 @@ async function makeWebgpu(canvas, adapter, reads) {
   if (!reads) context.configure({ device, format, alphaMode: "opaque" });
   device.addEventListener("uncapturederror", (event) => fail(event.error));
   device.lost.then(lost);
-  const programs = new Map(), meshes = new Map(), textures = new Map(), arrays = new Map();
-  let targets = null, shaders = null;
+  const programs = new Map(), meshes = new Map(), textures = new Map(), arrays = new Map(), tables = new Map();
+  let targets = null, shaders = null, placing = null;
 
   const both = GPUShaderStage.VERTEX | GPUShaderStage.FRAGMENT;
   const layout = (...entries) => device.createBindGroupLayout({ entries: entries.map((entry, binding) => ({ binding, visibility: both, ...entry })) });
@@ -34,12 +34,14 @@ async function makeWebgpu(canvas, adapter, reads) {
   const textureLayout = layout({ texture: {} }, { sampler: {} });
   const depthOnly = device.createPipelineLayout({ bindGroupLayouts: [viewLayout] });
   const whole = device.createPipelineLayout({ bindGroupLayouts: [viewLayout, sceneLayout, textureLayout] });
+  const placeLayout = layout(uniform, ...Array(4).fill(numbers("2d")));
   const bind = (groupLayout, ...resources) => device.createBindGroup({ layout: groupLayout, entries: resources.map((resource, binding) => ({ binding, resource })) });
 
   const compares = device.createSampler({ magFilter: "linear", minFilter: "linear", compare: "greater-equal" });
   const repeats = device.createSampler({ addressModeU: "repeat", addressModeV: "repeat", magFilter: "linear", minFilter: "linear", mipmapFilter: "linear" });
   const blank = (imageFormat) => device.createTexture({ size: [1, 1], format: imageFormat, usage: GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.COPY_DST });
-  const [one, none] = [blank("r8unorm"), blank("r32uint")];
+  const [one, none, every] = [blank("r8unorm"), blank("r32uint"), blank("rgba8unorm")];
+  device.queue.writeTexture({ texture: every }, new Uint8Array(4).fill(255), {}, [1, 1]);
   device.queue.writeTexture({ texture: one }, new Uint8Array([255]), {}, [1, 1]);
   const white = image(1, 1, new Uint8Array(4).fill(255));
 
@@ -100,17 +102,31 @@ async function makeWebgpu(canvas, adapter, reads) {
     });
   }
 
+  // The pass that puts an eye's picture into the whole; programs are made for the channels that they write.
+  function placePipeline(eye) {
+    const key = eye.surface + " " + eye.channels;
+    if (!placing.made.has(key)) {
+      const writeMask = eye.channels.reduce((mask, on, k) => mask | (on ? 1 << k : 0), GPUColorWrite.ALPHA);
+      placing.made.set(key, device.createRenderPipeline({
+        layout: device.createPipelineLayout({ bindGroupLayouts: [placeLayout] }),
+        vertex: { module: placing.module, entryPoint: "vs_place" },
+        fragment: { module: placing.module, entryPoint: eye.surface ? "fs_surface" : "fs_place", targets: [{ format: "rgba8unorm-srgb", writeMask }] },
+      }));
+    }
+    return placing.made.get(key);
+  }
+
   function freeTargets() {
-    if (targets) [targets.picture, targets.depth, targets.maps, targets.multiple].forEach((t) => t && t.destroy());
+    if (targets) [targets.picture, targets.depth, targets.maps, targets.multiple, targets.finished, targets.source].forEach((t) => t && t.destroy());
     targets = null;
   }
 
-  function drawItems(pass, list, color) {
+  function drawItems(pass, list, color, of) {
     for (const { program, items, mesh, texture: picture, first, count } of list) {
       const { made, recipe } = programs.get(program);
       pass.setPipeline(made);
       if (color) pass.setBindGroup(2, textures.get(picture) ?? white);
-      if (recipe.floats) pass.setVertexBuffer(recipe.mesh ? 1 : 0, arrays.get(items));
+      if (recipe.floats) pass.setVertexBuffer(recipe.mesh ? 1 : 0, arrays.get(inView(of, items)));
       if (recipe.mesh) {
         const { vertices, indices, count: corners } = meshes.get(mesh);
         pass.setVertexBuffer(0, vertices);
@@ -123,11 +139,11 @@ async function makeWebgpu(canvas, adapter, reads) {
   }
 
   // Returns the picture in memory, drawn before. Rows in buffers have multiples of 256 bytes.
-  async function readBack({ width, height }) {
+  async function readBack([width, height]) {
     const bytesPerRow = 256 * Math.ceil(width / 64);
     const into = device.createBuffer({ size: bytesPerRow * height, usage: GPUBufferUsage.COPY_DST | GPUBufferUsage.MAP_READ });
     const encoder = device.createCommandEncoder();
-    encoder.copyTextureToBuffer({ texture: targets.picture }, { buffer: into, bytesPerRow }, [width, height]);
+    encoder.copyTextureToBuffer({ texture: targets.finished ?? targets.picture }, { buffer: into, bytesPerRow }, [width, height]);
     device.queue.submit([encoder.finish()]);
     await into.mapAsync(GPUMapMode.READ);
     const [bytes, pixels] = [new Uint8Array(into.getMappedRange()), new ImageData(width, height)];
@@ -141,7 +157,7 @@ async function makeWebgpu(canvas, adapter, reads) {
   return {
     name: "webgpu",
     module(code) { shaders = device.createShaderModule({ code }); },
-    resize({ width, height, samples, mapSize, layers }) {
+    resize({ width, height, samples, mapSize, layers, whole: whole_px, source: source_px }) {
       freeTargets();
       const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.TEXTURE_BINDING;
       const read = GPUTextureUsage.COPY_SRC;
@@ -152,9 +168,19 @@ async function makeWebgpu(canvas, adapter, reads) {
         depth: make("depth32float", samples),
         multiple: samples > 1 ? make("rgba8unorm-srgb", samples) : null,
         maps: make("depth32float", 1, [side, side, Math.max(layers, 1)]),
+        finished: source_px ? make("rgba8unorm-srgb", 1, whole_px, read) : null,
+        source: source_px ? make("rgba8unorm-srgb", 1, source_px, GPUTextureUsage.COPY_DST) : null,
+        size: [width, height],
       };
       targets.all = targets.maps.createView({ dimension: "2d-array" });
-      targets.copy = bind(copy.getBindGroupLayout(0), targets.picture.createView());
+      targets.copy = bind(copy.getBindGroupLayout(0), (targets.finished ?? targets.picture).createView());
+    },
+    passes({ wgsl }) { placing = { module: device.createShaderModule({ code: wgsl }), made: new Map() }; },
+    numbers(id, numberFormat, width, height, data) {
+      const usage = GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.COPY_DST;
+      const texture = device.createTexture({ size: [width, height], format: numberFormat, usage });
+      device.queue.writeTexture({ texture }, data, { bytesPerRow: data.byteLength / height }, [width, height]);
+      tables.set(id, texture);
     },
     program(id, { recipe }) { programs.set(id, { made: pipeline(recipe), recipe }); },
     mesh(id, vertices, indices) {
@@ -173,29 +199,48 @@ async function makeWebgpu(canvas, adapter, reads) {
         device.queue.writeBuffer(old, 0, data);
       } else {
         if (old) old.destroy();
-        arrays.set(id, buffer(id < VIEW ? GPUBufferUsage.VERTEX : GPUBufferUsage.UNIFORM, data));
+        arrays.set(id, buffer(GPUBufferUsage.VERTEX | GPUBufferUsage.UNIFORM, data));
       }
     },
-    async draw({ size, casters, draws }) {
+    async draw({ size, eyes, casters, draws }) {
       const encoder = device.createCommandEncoder();
       const view = (id) => bind(viewLayout, { buffer: arrays.get(id) });
       for (let k = 0; k < size.layers; k++) {
         const layer = targets.maps.createView({ dimension: "2d", baseArrayLayer: k, arrayLayerCount: 1 });
         const pass = encoder.beginRenderPass({ colorAttachments: [], depthStencilAttachment: cleared(layer) });
         pass.setBindGroup(0, view(SHADOW_VIEW + k));
-        drawItems(pass, casters, false);
+        drawItems(pass, casters, false, ONE_VIEW);
         pass.end();
       }
       const [picture, multiple] = [targets.picture.createView(), targets.multiple && targets.multiple.createView()];
       const color = { view: multiple ?? picture, resolveTarget: multiple ? picture : undefined, loadOp: "clear", storeOp: multiple ? "discard" : "store" };
-      const pass = encoder.beginRenderPass({ colorAttachments: [color], depthStencilAttachment: cleared(targets.depth.createView()) });
-      pass.setBindGroup(0, view(VIEW));
-      pass.setBindGroup(1, bind(sceneLayout, { buffer: arrays.get(SCENE) }, targets.all, compares, one.createView(), targets.all, none.createView(), none.createView()));
-      drawItems(pass, draws, true);
-      pass.end();
+      const scene = bind(sceneLayout, { buffer: arrays.get(SCENE) }, targets.all, compares, one.createView(), targets.all, none.createView(), none.createView());
+      const drawView = (of) => {
+        const pass = encoder.beginRenderPass({ colorAttachments: [color], depthStencilAttachment: cleared(targets.depth.createView()) });
+        pass.setBindGroup(0, view(of.view));
+        pass.setBindGroup(1, scene);
+        drawItems(pass, draws, true, of);
+        pass.end();
+      };
+      const drawEye = (eye, first) => {
+        for (const of of eye.views) {
+          drawView(of);
+          encoder.copyTextureToTexture({ texture: targets.picture }, { texture: targets.source, origin: of.at }, targets.size);
+        }
+        const into = { view: targets.finished.createView(), loadOp: first ? "clear" : "load", clearValue: [0, 0, 0, 1], storeOp: "store" };
+        const pass = encoder.beginRenderPass({ colorAttachments: [into] });
+        const given = eye.numbers.map((id) => (id === null ? every : tables.get(id)).createView());
+        pass.setPipeline(placePipeline(eye));
+        pass.setBindGroup(0, bind(placeLayout, { buffer: arrays.get(eye.place) }, targets.source.createView(), ...given));
+        pass.setScissorRect(...eye.at, ...eye.size);
+        pass.draw(3);
+        pass.end();
+      };
+      if (eyes) eyes.eyes.forEach((eye, k) => drawEye(eye, k === 0));
+      else drawView(ONE_VIEW);
       device.queue.submit([encoder.finish()]);
       await device.queue.onSubmittedWorkDone();
-      if (reads) targets.pixels = await readBack(size);
+      if (reads) targets.pixels = await readBack(eyes ? eyes.whole : [size.width, size.height]);
     },
     show() {
       if (reads) return context.putImageData(targets.pixels, 0, 0);
@@ -210,8 +255,9 @@ async function makeWebgpu(canvas, adapter, reads) {
     end() {
       freeTargets();
       [...meshes.keys()].forEach(this.forgetMesh);
-      arrays.forEach((items) => items.destroy());
-      [textures, arrays, programs].forEach((list) => list.clear());
+      [arrays, tables].forEach((list) => list.forEach((items) => items.destroy()));
+      placing = null;
+      [textures, arrays, tables, programs].forEach((list) => list.clear());
     },
   };
 }
