@@ -44,7 +44,10 @@ fn drawing_by_a_software_driver_has_no_real_time_priority() {
         let threads = threads(facet);
         let drawing = |name: &str| name.starts_with("llvmpipe") || name == "painter";
         assert!(threads.iter().filter(|(name, _)| drawing(name)).count() > 1, "{threads:?}");
-        assert!(threads.iter().all(|(name, policy)| !drawing(name) || *policy == 0), "{threads:?}");
+        // Mesa gives its threads that write caches the policy for batches (3), and on a busy machine they still
+        // have the name of the thread that started them
+        let is_real_time = |policy: u32| [1, 2].contains(&policy);
+        assert!(threads.iter().all(|(name, policy)| !drawing(name) || !is_real_time(*policy)), "{threads:?}");
         // the session is in the main thread
         assert!(threads.iter().any(|(name, policy)| name == "tumble" && *policy == 1), "{threads:?}");
     }

@@ -298,7 +298,7 @@ fn compare_in(kind: &str, cave: &str, size_px: [u32; 2], backend: &str, scene: &
     let (out, console) = (place.path("out"), free_address().to_string());
     let (run, at) = start(
         &place,
-        &["--frames-dir", &out, "--quality", quality, "--console", &console, "--web-timeout", "2000", "--fps", "10"],
+        &["--frames-dir", &out, "--quality", quality, "--console", &console, "--web-timeout", "4500", "--fps", "10"],
     );
     page.open(&format!("http://{at}/{KEY}/#draw={backend}"));
     page.wait_for("tumble.frames > 8 || tumble.error !== ''");
@@ -307,17 +307,21 @@ fn compare_in(kind: &str, cave: &str, size_px: [u32; 2], backend: &str, scene: &
     }
     let name = backend.trim_end_matches("-read");
     assert_eq!((page.run("tumble.error"), page.run("tumble.backend")), ("".into(), name.into()));
-    // frames within one: asked for between two questions to the other facet's log
-    let last = |facet: &str| place.log("out", facet).last().map_or(0, |line| line["frame"].as_u64().unwrap());
-    let mut apart = Vec::new();
+    // frames within one: while the page shows frame n, the other facet has shown n - 1 and not yet n + 2
+    let now_us = || std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_micros() as u64;
+    let mut asked = Vec::new();
     for _ in 0..20 {
-        let before = last("l");
+        let before = now_us();
         let shown = page.run("tumble.shown").as_u64().unwrap();
-        let after = last("l");
-        // written after they are shown, so the log may be one behind
-        apart.push((before, shown, after));
-        assert!(before <= shown + 1 && shown <= after + 2, "{apart:?}");
+        asked.push((before, shown, now_us()));
         std::thread::sleep(Duration::from_millis(37));
+    }
+    // written after they are shown, and on a busy machine much later
+    place.wait_for("out", "l", asked.last().unwrap().1 + 2);
+    let log = place.log("out", "l");
+    let shown_at = |frame: u64| log.iter().find(|line| line["frame"] == frame).unwrap()["shown_unix_us"].as_u64().unwrap();
+    for &(before, shown, after) in &asked {
+        assert!(shown_at(shown - 1) <= after && before <= shown_at(shown + 2), "{shown} of {asked:?}");
     }
     // time stands, so that the newest frames are the same picture
     let paused = in_place(&place.folder, &["console", &console, "pause"]).output().unwrap();
@@ -336,7 +340,9 @@ fn compare_in(kind: &str, cave: &str, size_px: [u32; 2], backend: &str, scene: &
     assert_eq!(run.end().0, Some(0));
     let difference = Difference::of(&seen, &drawn);
     println!("{kind} {backend} {scene} {quality}: {difference:?}");
-    assert!(difference.within(), "{difference:?}");
+    // pictures that are finished are rounded twice, and a level of the first is more in dark colors of a gamma
+    let mean = if kind == "flat" { 0.25 } else { 0.5 };
+    assert!(difference.is_within(mean), "{difference:?}");
 }
 
 /// Writes the files of [`PROJECTOR`] beside the cave: a keystone, and a ramp to the right.
@@ -378,7 +384,7 @@ impl Difference {
     }
 
     /// A light or a shadow that is missing would be several levels in the mean.
-    fn within(&self) -> bool {
-        self.mean < 0.25 && self.off < 0.01 && self.max < 255
+    fn is_within(&self, mean: f64) -> bool {
+        self.mean < mean && self.off < 0.01 && self.max < 255
     }
 }

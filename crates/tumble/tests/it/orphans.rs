@@ -10,7 +10,7 @@ use std::process::Stdio;
 
 const READY: &str = "everything runs";
 
-/// What the other test kills.
+/// The process that the other test kills.
 #[test]
 #[ignore = "runs until it is killed, by a_killed_test_leaves_no_process"]
 fn runs_until_it_is_killed() {

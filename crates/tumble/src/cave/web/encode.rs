@@ -55,7 +55,7 @@ pub struct Encoder {
     textures: Shared<Image>,
     arrays: BTreeMap<u32, Vec<u32>>,
     draws: Vec<u32>,
-    /// What the eyes' passes are made of, as it was sent; empty for none.
+    /// Description of the eyes' passes as it was sent; empty for none.
     eyes: String,
     /// Whether the shaders of passes were sent.
     has_passes: bool,
