@@ -14,6 +14,14 @@ pub enum RenderError {
         /// The message of the graphics library.
         reason: String,
     },
+    /// No graphics adapter has the wanted name.
+    #[error("no graphics adapter has \"{wanted}\" in its name; there are: {present}")]
+    NoSuchAdapter {
+        /// The wanted part of the name.
+        wanted: String,
+        /// The names of all adapters.
+        present: String,
+    },
     /// An adapter exists but fails: too old, out of memory, lost.
     #[error("the graphics device {adapter} failed: {reason}")]
     Device {
@@ -37,6 +45,9 @@ pub enum RenderError {
         /// The message of the window system.
         reason: String,
     },
+    /// A monitor is missing, or is not what a full-screen picture needs.
+    #[error("{0}")]
+    Monitor(String),
     /// The picture is empty, or larger than the limits or the device allow.
     #[error(
         "cannot render a picture of {width} x {height} pixels: each side must be 1 to {max_side} and their product at most {max_pixels}"

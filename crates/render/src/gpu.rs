@@ -87,6 +87,25 @@ impl Renderer {
         Renderer::on(pollster::block_on(first_adapter())?)
     }
 
+    /// Prepares the first adapter whose name, kind or interface contains a text, in any case: of Vulkan,
+    /// otherwise of OpenGL. `None` takes any.
+    ///
+    /// # Errors
+    /// [`RenderError::NoSuchAdapter`] with the names of all, and as [`Renderer::new`].
+    pub fn with_adapter(name: Option<&str>) -> Result<Self, RenderError> {
+        let Some(name) = name else { return Renderer::new() };
+        let mut present = Vec::new();
+        for backends in [wgpu::Backends::VULKAN, wgpu::Backends::GL] {
+            let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+            descriptor.backends = backends;
+            let all = pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends));
+            if let Some(adapter) = choose(all, name, &mut present) {
+                return Renderer::on(adapter);
+            }
+        }
+        Err(no_such_adapter(name, present))
+    }
+
     /// Prepares an adapter.
     fn on(adapter: wgpu::Adapter) -> Result<Self, RenderError> {
         let gpu = pollster::block_on(Gpu::open(adapter))?;
@@ -355,7 +374,7 @@ impl Gpu {
     /// Opens an adapter with features beyond those that every device has.
     async fn open_with(adapter: wgpu::Adapter, features: wgpu::Features) -> Result<Gpu, RenderError> {
         let info = adapter.get_info();
-        let name = format!("{} ({:?}, {:?})", info.name, info.device_type, info.backend);
+        let name = full_name(&info);
         let mut limits = wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits());
         limits.max_buffer_size = adapter.limits().max_buffer_size;
         let lacking = features - adapter.features();
@@ -412,6 +431,28 @@ impl Gpu {
     pub(crate) fn failed(&self, reason: String) -> RenderError {
         RenderError::Device { adapter: self.adapter.clone(), reason }
     }
+}
+
+/// Returns name, kind and interface of an adapter.
+fn full_name(info: &wgpu::AdapterInfo) -> String {
+    format!("{} ({:?}, {:?})", info.name, info.device_type, info.backend)
+}
+
+/// Returns the first adapter with a text in its full name, in any case. Names of the others are added to
+/// `present`.
+fn choose(all: Vec<wgpu::Adapter>, text: &str, present: &mut Vec<String>) -> Option<wgpu::Adapter> {
+    let text = text.to_lowercase();
+    all.into_iter().find(|adapter| {
+        let name = full_name(&adapter.get_info());
+        let is_wanted = name.to_lowercase().contains(&text);
+        present.push(name);
+        is_wanted
+    })
+}
+
+fn no_such_adapter(wanted: &str, present: Vec<String>) -> RenderError {
+    let present = if present.is_empty() { "none".to_owned() } else { present.join(", ") };
+    RenderError::NoSuchAdapter { wanted: wanted.to_owned(), present }
 }
 
 /// Joins a message of several lines into one.

@@ -6,7 +6,7 @@
 
 use super::meshes::uniform_buffer;
 use super::pipelines::COLOR;
-use super::{Gpu, Renderer};
+use super::{Gpu, Renderer, choose, no_such_adapter};
 use crate::{Image, RenderError};
 use std::sync::Arc;
 use wgpu::util::DeviceExt;
@@ -42,12 +42,17 @@ pub struct Screen {
 
 impl Screen {
     /// Opens a surface on an open window, on the first adapter that can present there: of Vulkan,
-    /// otherwise of OpenGL.
+    /// otherwise of OpenGL. With a `name`, on the first one whose name, kind or interface contains it.
     ///
     /// # Errors
-    /// [`RenderError::NoAdapter`] if none can, [`RenderError::Device`] if one fails.
-    pub(crate) fn new(event_loop: &ActiveEventLoop, window: Arc<Window>) -> Result<Screen, RenderError> {
-        let mut reasons = Vec::new();
+    /// [`RenderError::NoAdapter`] if none can, [`RenderError::NoSuchAdapter`] if none has the name,
+    /// [`RenderError::Device`] if one fails.
+    pub(crate) fn new(
+        event_loop: &ActiveEventLoop,
+        window: Arc<Window>,
+        wanted_name: Option<&str>,
+    ) -> Result<Screen, RenderError> {
+        let (mut reasons, mut present) = (Vec::new(), Vec::new());
         for (name, backends) in [("Vulkan", wgpu::Backends::VULKAN), ("OpenGL", wgpu::Backends::GL)] {
             let mut descriptor =
                 wgpu::InstanceDescriptor::new_with_display_handle(Box::new(event_loop.owned_display_handle()));
@@ -60,6 +65,14 @@ impl Screen {
                     continue;
                 }
             };
+            if let Some(wanted_name) = wanted_name {
+                let mut all = pollster::block_on(instance.enumerate_adapters(backends));
+                all.retain(|adapter| adapter.is_surface_supported(&surface));
+                match choose(all, wanted_name, &mut present) {
+                    Some(adapter) => return Screen::on(adapter, instance, surface, window),
+                    None => continue,
+                }
+            }
             let wanted = wgpu::RequestAdapterOptions { compatible_surface: Some(&surface), ..Default::default() };
             match pollster::block_on(instance.request_adapter(&wanted)) {
                 Ok(adapter) => return Screen::on(adapter, instance, surface, window),
@@ -69,7 +82,10 @@ impl Screen {
                 Err(e) => reasons.push(e.to_string()),
             }
         }
-        Err(RenderError::NoAdapter { reason: reasons.join(", ") })
+        match wanted_name {
+            Some(wanted) => Err(no_such_adapter(wanted, present)),
+            None => Err(RenderError::NoAdapter { reason: reasons.join(", ") }),
+        }
     }
 
     fn on(

@@ -3,7 +3,9 @@
 use crate::support::{area, bare, exact_edges, from_above, linear, moments, picture, renderer};
 use nalgebra::{Isometry3, Matrix4, Point3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
-use tumble_render::{Camera, DebugStyle, DrawList, Image, Instance, Material, MeshData, RenderError, SphereCloud};
+use tumble_render::{
+    Camera, DebugStyle, DrawList, Image, Instance, Material, MeshData, RenderError, Renderer, SphereCloud,
+};
 
 const WHITE: [f32; 3] = [1.0; 3];
 
@@ -320,6 +322,17 @@ fn a_body_that_fell_away_changes_nothing_for_the_rest() {
     let Some(before) = picture(&list, 300, 200) else { return };
     ball(&mut list, [300.0, 20.0, -9000.0], 0.5, WHITE);
     assert_eq!(picture(&list, 300, 200).expect("an adapter"), before);
+}
+
+#[test]
+fn an_adapter_is_chosen_by_a_part_of_its_name() {
+    let Some(any) = renderer() else { return };
+    let word = any.adapter().split(' ').next().unwrap().to_uppercase();
+    let chosen = Renderer::with_adapter(Some(&word)).unwrap();
+    assert!(chosen.adapter().to_uppercase().contains(&word));
+    let refused = Renderer::with_adapter(Some("no such card")).err().unwrap().to_string();
+    assert!(refused.starts_with("no graphics adapter has \"no such card\" in its name; there are: "), "{refused}");
+    assert!(refused.to_uppercase().contains(&word), "{refused}");
 }
 
 #[test]

@@ -1,13 +1,13 @@
-//! Devices of a VRPN server and what they move: words of `[tracker]` and of `--vrpn-map`.
+//! Devices of a VRPN server or of DTrack, and what they move: words of `[tracker]`, `--vrpn-map` and `--dtrack-map`.
 
 use std::str::FromStr;
 
 const PARTS: [&str; 5] = ["head", "wand", "hand/left", "hand/right", "buttons"];
 
-/// The part that a device of the server moves: `DEVICE:SENSOR=USER/PART`.
+/// The part that a device moves: `DEVICE:SENSOR=USER/PART`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DeviceMap {
-    /// Name of the device.
+    /// Name of the device; `body` or `flystick` of DTrack.
     pub device: String,
     /// Number of the sensor; of buttons not used.
     pub sensor: i32,
@@ -15,6 +15,27 @@ pub struct DeviceMap {
     pub user: String,
     /// `head`, `wand`, `hand/left`, `hand/right` or `buttons`.
     pub part: String,
+}
+
+impl DeviceMap {
+    /// Checks that it is a device of DTrack that moves one of these users.
+    ///
+    /// # Errors
+    /// The expected value.
+    pub fn check_dtrack(&self, users: &[String]) -> Result<(), String> {
+        let is_known = match self.device.as_str() {
+            "body" => self.part != "buttons",
+            "flystick" => true,
+            _ => false,
+        };
+        if !is_known || self.sensor < 0 {
+            return Err("body:NUMBER or flystick:NUMBER, and buttons of a flystick alone".into());
+        }
+        if !users.contains(&self.user) {
+            return Err(format!("a user of this tracker: {}", users.join(", ")));
+        }
+        Ok(())
+    }
 }
 
 impl FromStr for DeviceMap {

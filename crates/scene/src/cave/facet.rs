@@ -58,6 +58,36 @@ pub enum Output {
     Offscreen,
 }
 
+/// The graphics card and the monitor of a facet, on its machine.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Display {
+    /// Text that the name of the graphics adapter contains, in any case. Default any adapter.
+    pub gpu: Option<String>,
+    /// Name of a monitor of the desktop; the position of the window counts from its upper left corner.
+    /// Default the whole desktop.
+    pub monitor: Option<String>,
+    /// Whether the image covers the monitor, whose size it has. Default false.
+    pub full_screen: bool,
+    /// Refresh rate that the monitor must have, Hz. Default any rate.
+    pub refresh_hz: Option<f64>,
+}
+
+impl Display {
+    fn read(f: &mut Fields<'_>, output: Output) -> Display {
+        let mut text = |key| f.optional_text(key).map(|(text, _)| text.to_owned());
+        let (gpu, monitor) = (text("gpu"), text("monitor"));
+        let full_screen = f.flag_or("full_screen", false);
+        let refresh_hz = f.optional_number("refresh_hz", REFRESH);
+        if output == Output::Offscreen && (monitor.is_some() || full_screen || refresh_hz.is_some()) {
+            let message = format!("{} is offscreen, and has a monitor", f.what);
+            f.log.report(f.span.clone(), message, "expected `monitor`, `full_screen` and `refresh_hz` of a window");
+        }
+        Display { gpu, monitor, full_screen, refresh_hz }
+    }
+}
+
+const REFRESH: Bound = Bound::new(1.0, 1000.0, "a rate from 1 to 1000 Hz");
+
 impl Stereo {
     pub(crate) const NAMES: Names<Self> = &[
         ("mono", Stereo::Mono),
@@ -117,6 +147,8 @@ pub struct Facet {
     pub node: Option<usize>,
     /// The place where the image is shown. Default a window at 0, 0.
     pub output: Output,
+    /// Its graphics card and its monitor.
+    pub display: Display,
     /// Whether the file says that it is a window (`output = "window"`). A facet without a window is
     /// then a failure; otherwise it may draw into memory.
     pub window_required: bool,
@@ -210,6 +242,7 @@ impl Facet {
             Target::Window => Output::Window { position_px: position(&mut f) },
             Target::Offscreen => Output::Offscreen,
         };
+        let display = Display::read(&mut f, output);
         let size_px = size(&mut f);
         let facet = Facet {
             name,
@@ -217,6 +250,7 @@ impl Facet {
             user: user.unwrap_or(usize::MAX),
             node: node.flatten(),
             output,
+            display,
             window_required,
             size_px,
             near_m: f.number_or("near_m", NEAR, 0.05),

@@ -30,7 +30,7 @@ mod tracker;
 pub use checks::{Gap, MAX_PIXELS, MAX_SIDE_PX, RIM_PX, SQUARE_TOLERANCE, gaps};
 pub use devices::DeviceMap;
 pub use error::CaveError;
-pub use facet::{Facet, FacetColor, Flip, Output, Stereo};
+pub use facet::{Display, Facet, FacetColor, Flip, Output, Stereo};
 pub use parts::{LAUNCH_PLACEHOLDERS, Node, Screen, User};
 pub use settings::{Compute, Mode, Recording, Security, Sync, Transport};
 pub use shipped::{CaveSource, ShippedCave, resolve_cave, shipped_caves};

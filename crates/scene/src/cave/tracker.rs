@@ -49,6 +49,9 @@ pub struct Tracker {
     pub vrpn: Option<String>,
     /// Devices of that server with the parts that they move; at least one.
     pub vrpn_map: Vec<DeviceMap>,
+    /// Bodies of DTrack with the parts that they move: datagrams are its output instead of OSC. Default:
+    /// none.
+    pub dtrack_map: Vec<DeviceMap>,
 }
 
 impl Tracker {
@@ -64,6 +67,7 @@ impl Tracker {
             origin_m: [0.0; 3],
             vrpn: None,
             vrpn_map: Vec::new(),
+            dtrack_map: Vec::new(),
         }
     }
 
@@ -84,9 +88,11 @@ impl Tracker {
         let users = read_users(&mut f, users).unwrap_or(default.users);
         let vrpn = read_vrpn(&mut f);
         let vrpn_map = read_vrpn_map(&mut f, &users, vrpn.is_some());
+        let dtrack_map = read_dtrack_map(&mut f, &users, vrpn.is_some());
         let tracker = Tracker {
             vrpn,
             vrpn_map,
+            dtrack_map,
             address,
             port: f.integer_or("port", 1..=65535, port) as u16,
             users,
@@ -167,6 +173,24 @@ fn read_vrpn_map(f: &mut Fields<'_>, users: &[String], has_server: bool) -> Vec<
     };
     if let Some((what, expected)) = missing {
         f.log.report(f.span.clone(), format!("{} has {what}", f.what), expected);
+    }
+    maps
+}
+
+fn read_dtrack_map(f: &mut Fields<'_>, users: &[String], has_vrpn: bool) -> Vec<DeviceMap> {
+    let items = f.list("dtrack_map", MAX_DEVICES, "a list of bodies, such as \"body:0=user/head\"");
+    let mut maps = Vec::new();
+    for value in &items {
+        let Some(text) = f.as_text("dtrack_map", value) else { continue };
+        let map = text.parse::<DeviceMap>().and_then(|map| map.check_dtrack(users).map(|()| map));
+        match map {
+            Ok(map) => maps.push(map),
+            Err(expected) => f.wrong("dtrack_map", value, expected.trim_start_matches("expected ")),
+        }
+    }
+    if has_vrpn && !items.is_empty() {
+        let message = format!("{} has `vrpn` and `dtrack_map`", f.what);
+        f.log.report(f.span.clone(), message, "expected one tracker");
     }
     maps
 }

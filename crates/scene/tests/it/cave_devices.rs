@@ -29,7 +29,16 @@ fn a_tracker_is_heard_on_this_machine_and_elsewhere_by_name() {
     let vrpn = of("[tracker]\nusers = [\"eva\"]\nvrpn = \"wall:3883\"\nvrpn_map = [\"Glasses 1:2=eva/hand/left\"]\n");
     let map = DeviceMap { device: "Glasses 1".into(), sensor: 2, user: "eva".into(), part: "hand/left".into() };
     assert_eq!((vrpn.vrpn.as_deref(), vrpn.vrpn_map), (Some("wall:3883"), vec![map]));
+    let dtrack = of("[tracker]\ndtrack_map = [\"body:0=u/head\", \"flystick:1=u/buttons\"]\n").dtrack_map;
+    assert_eq!((dtrack[0].device.as_str(), dtrack[1].sensor, dtrack.len()), ("body", 1, 2));
     let cases = [
+        ("[tracker]\ndtrack_map = [\"glove:0=u/hand/left\"]\n", "body:NUMBER or flystick:NUMBER"),
+        ("[tracker]\ndtrack_map = [\"body:0=u/buttons\"]\n", "buttons of a flystick alone"),
+        ("[tracker]\ndtrack_map = [\"body:0=other/head\"]\n", "a user of this tracker: u"),
+        (
+            "[tracker]\nvrpn = \"here:3883\"\nvrpn_map = [\"G=u/head\"]\ndtrack_map = [\"body:0=u/head\"]\n",
+            "expected one tracker",
+        ),
         ("[tracker]\naddress = \"0.0.0.0\"\n", "without `senders`"),
         ("[tracker]\naddress = \"here\"\n", "expected an IP address"),
         ("[tracker]\nsealed = true\n", "expected a [security] with a key_file"),

@@ -1,6 +1,6 @@
 //! Cave files: values that are read, errors with their places, notes; the shipped caves.
 
-use tumble_scene::cave::{Cave, Flip, Output, Stereo, Transport, gaps, is_cave, resolve_cave, shipped_caves};
+use tumble_scene::cave::{Cave, Display, Flip, Output, Stereo, Transport, gaps, is_cave, resolve_cave, shipped_caves};
 
 /// A cave of one screen.
 pub const SMALL: &str = "
@@ -61,6 +61,20 @@ fn what_is_wrong_is_reported_with_its_place_and_the_expected_value() {
             "size_px = [800, 600]",
             14,
             "did you mean `side_by_side`?",
+        ),
+        (
+            "a monitor of no window",
+            "size_px = [800, 600]\noutput = \"offscreen\"\nmonitor = \"DP-1\"",
+            "size_px = [800, 600]",
+            10,
+            "facet \"f\" is offscreen, and has a monitor",
+        ),
+        (
+            "a rate of no display",
+            "size_px = [800, 600]\nrefresh_hz = 0",
+            "size_px = [800, 600]",
+            14,
+            "a rate from 1 to 1000 Hz",
         ),
         (
             "eyes of one eye",
@@ -199,6 +213,18 @@ fn gaps_are_what_a_tape_measure_says() {
     );
     let wide = Cave::parse(&SMALL.replace("[800, 600]", "[1000, 600]"), "my.toml").unwrap().notes().join("\n");
     assert!(wide.contains("1.250 times denser horizontally than vertically; 1000 x 750 would be square"), "{wide}");
+}
+
+#[test]
+fn a_facet_has_a_card_and_a_monitor() {
+    let keys = "gpu = \"RTX\"\nmonitor = \"DP-2\"\nfull_screen = true\nrefresh_hz = 120";
+    let cave = Cave::parse(&SMALL.replace("[800, 600]", &format!("[800, 600]\n{keys}")), "my.toml").unwrap();
+    let Display { gpu, monitor, full_screen, refresh_hz } = cave.facets[0].display.clone();
+    assert_eq!(
+        (gpu.as_deref(), monitor.as_deref(), full_screen, refresh_hz),
+        (Some("RTX"), Some("DP-2"), true, Some(120.0))
+    );
+    assert_eq!(Cave::parse(SMALL, "my.toml").unwrap().facets[0].display, Display::default());
 }
 
 #[test]

@@ -108,6 +108,11 @@ pub struct ServeOptions {
     /// commas. A part is head, wand, hand/left, hand/right or buttons.
     #[arg(long, value_name = "MAP,…", value_delimiter = ',', requires = "vrpn")]
     pub vrpn_map: Vec<DeviceMap>,
+    /// Read the tracker's datagrams as output of DTrack, and take the users' positions from its bodies:
+    /// body:NUMBER=USER/PART or flystick:NUMBER=USER/PART, separated by commas. A part is head, wand, hand/left,
+    /// hand/right, or buttons of a flystick.
+    #[arg(long, value_name = "MAP,…", value_delimiter = ',', conflicts_with = "vrpn")]
+    pub dtrack_map: Vec<DeviceMap>,
     /// Take the first gamepad of this machine for this user: sticks walk and turn, buttons are digits.
     #[arg(long, value_name = "USER")]
     pub gamepad: Option<String>,

@@ -224,6 +224,39 @@ fn the_picture_follows_the_tracked_eye() {
     assert!(seen, "the picture from the tracked eye did not come");
 }
 
+/// The output of DTrack as its manual shows it: a body is the head, another one a hand.
+#[test]
+fn bodies_of_dtrack_move_heads_and_hands() {
+    let (folder, scene, cave) = place("cave-dtrack");
+    let (sender, summary) = (Sender::new(), folder.path("summary.json"));
+    let (to, map) = (sender.to.to_string(), "body:2=u/head,body:0=u/hand/left");
+    let args = ["--user-colliders", "--tracker", &to, "--dtrack-map", map, "--summary", &text(&summary)];
+    let mut server = Server::start(&folder, &scene, &cave, &args);
+    server.show_until(5, |_| {});
+    // millimeters; the columns of a quarter turn to the left about z
+    let quarter = "[0.000000 1.000000 0.000000 -1.000000 0.000000 0.000000 0.000000 0.000000 1.000000]";
+    let unit = "[1.000000 0.000000 0.000000 0.000000 1.000000 0.000000 0.000000 0.000000 1.000000]";
+    let text = format!(
+        "fr 7\r\nts 39596.024831\r\n6dcal 3\r\n6d 2 [0 1.000][-250.000 1500.000 1000.000 0.0000 0.0000 0.0000]{unit} \
+         [2 1.000][500.000 250.000 1750.000 0.0000 0.0000 90.0000]{quarter} \r\n"
+    );
+    let hand = |server: &Server| {
+        let world = server.facet.world();
+        world.part_state(world.find("user 0 left hand").unwrap(), 0).unwrap().position()
+    };
+    server.show_while(
+        "the hand",
+        || sender.send(text.as_bytes()),
+        |s| (hand(s) - Vec3::new(-0.25, 1.5, 1.0)).norm() < 1e-4,
+    );
+    let head = server.facet.viewer().users[0].head;
+    assert_eq!(head.translation.vector, Vec3::new(0.5, 0.25, 1.75));
+    assert!((head.rotation * Vec3::y() + Vec3::x()).norm() < 1e-6);
+    // other text is counted
+    sender.send(b"/tumble/user/u/head\0,\0\0\0");
+    server.show_until(5, |_| {});
+}
+
 #[test]
 fn what_users_did_is_done_again_bit_by_bit() {
     let (folder, scene, cave) = place("cave-again");

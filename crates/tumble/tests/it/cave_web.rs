@@ -319,7 +319,8 @@ fn compare_in(kind: &str, cave: &str, size_px: [u32; 2], backend: &str, scene: &
     // written after they are shown, and on a busy machine much later
     place.wait_for("out", "l", asked.last().unwrap().1 + 2);
     let log = place.log("out", "l");
-    let shown_at = |frame: u64| log.iter().find(|line| line["frame"] == frame).unwrap()["shown_unix_us"].as_u64().unwrap();
+    let shown_at =
+        |frame: u64| log.iter().find(|line| line["frame"] == frame).unwrap()["shown_unix_us"].as_u64().unwrap();
     for &(before, shown, after) in &asked {
         assert!(shown_at(shown - 1) <= after && before <= shown_at(shown + 2), "{shown} of {asked:?}");
     }

@@ -69,14 +69,16 @@ pub fn text(path: &Path) -> String {
 /// Returns the command of a program that is killed when the test that starts it ends in any way, also
 /// when the process of the test is killed.
 pub fn tied(program: &str) -> Command {
-    static CAN: LazyLock<bool> = LazyLock::new(|| {
-        let asked = Command::new("setpriv").args(["--pdeathsig", "KILL", "true"]).stderr(Stdio::null()).status();
-        asked.is_ok_and(|status| status.success())
+    // by its whole path, because some tests change PATH
+    static SETPRIV: LazyLock<Option<PathBuf>> = LazyLock::new(|| {
+        let folders = std::env::var_os("PATH").unwrap_or_default();
+        let setpriv =
+            std::env::split_paths(&folders).map(|folder| folder.join("setpriv")).find(|path| path.is_file())?;
+        let asked = Command::new(&setpriv).args(["--pdeathsig", "KILL", "true"]).stderr(Stdio::null()).status();
+        asked.is_ok_and(|status| status.success()).then_some(setpriv)
     });
-    if !*CAN {
-        return Command::new(program);
-    }
-    let mut command = Command::new("setpriv");
+    let Some(setpriv) = &*SETPRIV else { return Command::new(program) };
+    let mut command = Command::new(setpriv);
     command.args(["--pdeathsig", "KILL", "--", program]);
     command
 }

@@ -6,6 +6,7 @@ mod bad_input;
 mod calibrate;
 mod cave_compute;
 mod cave_console;
+mod cave_displays;
 mod cave_faults;
 mod cave_figures;
 mod cave_formats;

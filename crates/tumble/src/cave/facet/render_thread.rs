@@ -54,7 +54,8 @@ impl RenderThread {
         std::thread::Builder::new()
             .name("painter".into())
             .spawn(move || {
-                let mut renderer = match Renderer::new() {
+                let gpu = facet.as_ref().and_then(|facet| facet.display.gpu.as_deref());
+                let mut renderer = match Renderer::with_adapter(gpu) {
                     Ok(renderer) => renderer,
                     Err(error) => {
                         let _ = ready.send(Err(error));

@@ -20,7 +20,7 @@ use tumble::render::{
     DebugDraw, DrawList, Drawing, Image, Next, Quality, Screen, WindowApp, WindowOptions, caption,
     finished_calibration_picture, run_window,
 };
-use tumble::scene::cave::{Facet, Output};
+use tumble::scene::cave::{Display, Facet, Output};
 
 /// Wait for a message between two polls of the window's input.
 const POLL_INTERVAL: Duration = Duration::from_millis(8);
@@ -48,6 +48,14 @@ impl WindowSetup {
         let view = Box::new(setup.view()?);
         let title = format!("tumble: {} on {}", setup.scene.file, slot_name(facet));
         let plain = WindowOptions::new(title, view.size_px(facet, PREVIEW_PX));
+        let display = facet.map_or_else(Display::default, |facet| facet.display.clone());
+        let plain = WindowOptions {
+            monitor: display.monitor,
+            full_screen: display.full_screen,
+            refresh_hz: display.refresh_hz,
+            adapter: display.gpu,
+            ..plain
+        };
         let options = match facet.map(|f| f.output) {
             Some(Output::Window { position_px }) => {
                 WindowOptions { position_px: Some(position_px), decorated: false, resizable: false, ..plain }

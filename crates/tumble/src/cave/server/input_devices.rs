@@ -47,7 +47,8 @@ impl InputDevices {
         };
         let gamepad = options.gamepad.as_ref().map(|name| user_of(name, &cave.users)).transpose()?;
         let gamepad = gamepad.filter(|_| live).map(|user| Gamepad::new(user, options.quiet));
-        let wanted = configured(cave, options.tracker, &options.tracker_from)?.filter(|_| live && vrpn.is_none());
+        let wanted = configured(cave, options.tracker, &options.tracker_from, &options.dtrack_map)?
+            .filter(|_| live && vrpn.is_none());
         let open = |tracker| TrackerSocket::open(tracker, key.as_ref(), options.smoothing());
         let tracker = wanted.as_ref().map(open).transpose()?;
         let connect = |(server, maps): (&String, &Vec<_>)| {

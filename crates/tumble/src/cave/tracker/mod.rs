@@ -1,6 +1,7 @@
-//! Input of a tracker: OSC messages over UDP, or the stream of a VRPN server.
+//! Input of a tracker: OSC messages or the output of DTrack over UDP, or the stream of a VRPN server.
 
 pub mod budget;
+mod dtrack;
 pub mod one_euro;
 pub mod osc;
 pub mod relay;

@@ -11,12 +11,13 @@
 //! Numbers may be float, double or int. A message can only move a user. Invalid messages are
 //! counted by reason and have no effect.
 
+use super::dtrack;
 use rosc::{OscMessage, OscPacket, OscType};
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 use tumble::collide::{Pose, Quat, Vec3};
 use tumble::net::sync::{Input, MAX_KEYS};
-use tumble::scene::cave::{Axes, Tracker};
+use tumble::scene::cave::{Axes, DeviceMap, Tracker};
 
 /// Maximum length of a datagram, bytes.
 pub const MAX_DATAGRAM_BYTES: usize = 1536;
@@ -36,7 +37,7 @@ pub enum Dropped {
     TooMany,
     /// A datagram longer than [`MAX_DATAGRAM_BYTES`].
     TooLong,
-    /// Not OSC.
+    /// Not OSC, or not the output of DTrack.
     Malformed,
     /// An address with another prefix or suffix.
     UnknownAddress,
@@ -97,6 +98,8 @@ pub struct OscDecoder {
     /// Tracker to cave: `x_cave = rotation · x + origin`; orientations `rotation · q · rotation⁻¹`.
     rotation: Quat,
     origin: Vec3,
+    /// Bodies of DTrack that move users; empty for a tracker that sends OSC.
+    dtrack_map: Vec<DeviceMap>,
     users: Vec<TrackedUser>,
     pub counts: Counts,
 }
@@ -115,6 +118,7 @@ impl OscDecoder {
             senders: tracker.senders.clone(),
             rotation,
             origin: tracker.origin_m.into(),
+            dtrack_map: tracker.dtrack_map.clone(),
             users,
             counts: Counts::default(),
         }
@@ -146,6 +150,12 @@ impl OscDecoder {
         }
         if bytes.len() > MAX_DATAGRAM_BYTES {
             return self.drop(Dropped::TooLong);
+        }
+        if !self.dtrack_map.is_empty() {
+            return match dtrack::messages(bytes, &self.dtrack_map) {
+                Ok(messages) => messages.iter().for_each(|message| self.apply_one(message)),
+                Err(why) => self.drop(why),
+            };
         }
         let packet = match rosc::decoder::decode_udp(bytes) {
             Ok(([], packet)) => packet,

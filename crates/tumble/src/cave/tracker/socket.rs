@@ -15,7 +15,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tumble::net::sync::Input;
 use tumble::net::sync::udp::SharedKey;
-use tumble::scene::cave::{Cave, Tracker};
+use tumble::scene::cave::{Cave, DeviceMap, Tracker};
 
 /// Maximum number of datagrams of all senders that are read in each [`WINDOW`]; the rest waits in
 /// the system's buffer or is dropped there. It bounds the time that a flood costs, and is far above
@@ -38,13 +38,20 @@ pub struct TrackerSocket {
 ///
 /// # Errors
 /// The address is reachable from other machines and there are no senders.
-pub fn configured(cave: &Cave, address: Option<SocketAddr>, senders: &[IpAddr]) -> Result<Option<Tracker>, Failure> {
+pub fn configured(
+    cave: &Cave,
+    address: Option<SocketAddr>,
+    senders: &[IpAddr],
+    dtrack_map: &[DeviceMap],
+) -> Result<Option<Tracker>, Failure> {
     let configured = cave.tracker.clone();
     if configured.is_none() && address.is_none() {
-        return if senders.is_empty() {
-            Ok(None)
-        } else {
-            Err(Failure::input("--tracker-from: there is no tracker; give its address with --tracker"))
+        let stray = [("--tracker-from", senders.is_empty()), ("--dtrack-map", dtrack_map.is_empty())];
+        return match stray.into_iter().find(|(_, is_empty)| !is_empty) {
+            None => Ok(None),
+            Some((option, _)) => {
+                Err(Failure::input(format!("{option}: there is no tracker; give its address with --tracker")))
+            }
         };
     }
     let mut tracker = configured.unwrap_or_else(|| Tracker::of(&cave.users));
@@ -53,6 +60,11 @@ pub fn configured(cave: &Cave, address: Option<SocketAddr>, senders: &[IpAddr]) 
     }
     if !senders.is_empty() {
         tracker.senders = senders.to_vec();
+    }
+    if !dtrack_map.is_empty() {
+        let stray = dtrack_map.iter().find_map(|map| map.check_dtrack(&tracker.users).err());
+        stray.map_or(Ok(()), |expected| Err(Failure::input(format!("--dtrack-map: expected {expected}"))))?;
+        tracker.dtrack_map = dtrack_map.to_vec();
     }
     if tracker.sealed {
         return Ok(Some(tracker));
@@ -98,7 +110,8 @@ impl TrackerSocket {
             [] => "this machine".to_owned(),
             senders => senders.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "),
         };
-        format!("tracker: OSC at {}, from {senders}; users {}", self.at, tracker.users.join(", "))
+        let what = if tracker.dtrack_map.is_empty() { "OSC" } else { "DTrack" };
+        format!("tracker: {what} at {}, from {senders}; users {}", self.at, tracker.users.join(", "))
     }
 
     /// Returns the users' input that changed since the last call.
