@@ -4,10 +4,11 @@
 //! [`record`] writes and reads MCAP files: Foxglove's published schemas for the picture and one
 //! channel of our own for the exact state. [`sync`] keeps the processes of a cave showing the same
 //! frame. [`control`] reads what an operator's console asks for, and [`browser`] what a
-//! web browser sends that shows a facet. Nothing in this crate steps a world.
+//! web browser sends that shows a facet, and [`vrpn`] the stream of a tracker's server. Nothing in this crate steps a world.
 
 pub mod browser;
 pub mod control;
 pub mod record;
 pub mod sync;
+pub mod vrpn;
 pub mod world;

@@ -8,5 +8,4 @@ pub mod relay;
 pub mod sealed;
 mod smoothed;
 pub mod socket;
-mod vrpn;
 pub mod vrpn_client;

@@ -7,7 +7,6 @@ use super::one_euro::Smoothing;
 use super::osc::{Counts, OscDecoder};
 use super::smoothed::SmoothedHeads;
 use super::socket::{POLL_INTERVAL, lock};
-use super::vrpn::{GREETING, Report, VrpnStream};
 use crate::failure::Failure;
 use rosc::{OscMessage, OscType};
 use std::io::{ErrorKind, Read, Write};
@@ -17,6 +16,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tumble::net::sync::Input;
+use tumble::net::vrpn::{GREETING, Report, VrpnStream};
 use tumble::scene::cave::{DeviceMap, Tracker};
 
 /// Time to connect and to be greeted.
@@ -169,9 +169,27 @@ impl Session {
 
 #[cfg(test)]
 mod tests {
-    use super::super::vrpn::tests::{message, named, pose};
     use super::*;
     use std::net::TcpListener;
+
+    /// A message by the description of the protocol.
+    fn message(sender: i32, kind: i32, contents: &[u8]) -> Vec<u8> {
+        let numbers = [24 + contents.len() as i32, 1_700_000_000, 250_000, sender, kind, 7];
+        let mut out: Vec<u8> = numbers.iter().flat_map(|n| n.to_be_bytes()).collect();
+        out.extend(contents);
+        out.resize(out.len().next_multiple_of(8), 0);
+        out
+    }
+
+    fn named(number: i32, kind: i32, name: &str) -> Vec<u8> {
+        message(number, kind, &[&(name.len() as i32 + 1).to_be_bytes(), name.as_bytes(), &[0]].concat())
+    }
+
+    fn pose(sender: i32, kind: i32, sensor: i32, numbers: [f64; 7]) -> Vec<u8> {
+        let mut contents = [sensor.to_be_bytes(), [0; 4]].concat();
+        contents.extend(numbers.iter().flat_map(|x| x.to_be_bytes()));
+        message(sender, kind, &contents)
+    }
 
     fn tracker() -> Tracker {
         Tracker { users: vec!["viewer".into()], origin_m: [0.0, 0.0, 0.5], ..Tracker::of(&[]) }

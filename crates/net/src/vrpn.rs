@@ -157,11 +157,11 @@ fn float(bytes: &[u8], at: usize) -> Option<f64> {
 }
 
 #[cfg(test)]
-pub mod tests {
+mod tests {
     use super::*;
 
     /// A message by the description of the protocol.
-    pub fn message(sender: i32, kind: i32, contents: &[u8]) -> Vec<u8> {
+    fn message(sender: i32, kind: i32, contents: &[u8]) -> Vec<u8> {
         let numbers = [24 + contents.len() as i32, 1_700_000_000, 250_000, sender, kind, 7];
         let mut out: Vec<u8> = numbers.iter().flat_map(|n| n.to_be_bytes()).collect();
         out.extend(contents);
@@ -169,18 +169,18 @@ pub mod tests {
         out
     }
 
-    pub fn named(number: i32, kind: i32, name: &str) -> Vec<u8> {
+    fn named(number: i32, kind: i32, name: &str) -> Vec<u8> {
         message(number, kind, &[&(name.len() as i32 + 1).to_be_bytes(), name.as_bytes(), &[0]].concat())
     }
 
-    pub fn pose(sender: i32, kind: i32, sensor: i32, numbers: [f64; 7]) -> Vec<u8> {
+    fn pose(sender: i32, kind: i32, sensor: i32, numbers: [f64; 7]) -> Vec<u8> {
         let mut contents = [sensor.to_be_bytes(), [0; 4]].concat();
         contents.extend(numbers.iter().flat_map(|x| x.to_be_bytes()));
         message(sender, kind, &contents)
     }
 
     /// A server's stream: names, a pose, a message of a kind that is not used, a button.
-    pub fn stream() -> Vec<u8> {
+    fn stream() -> Vec<u8> {
         [
             b"vrpn: ver. 07.33  0\0\xed\0\0\0".to_vec(),
             named(0, -1, "VRPN Control"),
