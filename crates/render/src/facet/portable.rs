@@ -94,12 +94,11 @@ impl CaveView {
     pub fn portable(&self, list: &DrawList, facet: &Facet) -> Result<PortableFacet, RenderError> {
         let (size, whole_px) = (facet.size_px, facet.whole_px());
         let curved = self.curved(facet);
-        if curved.is_none() && self.flat_finish(facet).is_none() && facet.flip == Flip::None {
-            if let (Stereo::Mono | Stereo::Left | Stereo::Right, [side]) = (facet.stereo, self.eyes(facet)) {
-                let from = self.eye(facet, *side)?.part(size[0], size[1], 0);
-                let picture = PortablePicture::new(list, &from, size)?;
-                return Ok(PortableFacet { picture, whole_px, is_interlaced: false, eyes: Vec::new() });
-            }
+        let is_whole = curved.is_none() && self.flat_finish(facet).is_none() && facet.flip == Flip::None;
+        if is_whole && let (Stereo::Mono | Stereo::Left | Stereo::Right, [side]) = (facet.stereo, self.eyes(facet)) {
+            let from = self.eye(facet, *side)?.part(size[0], size[1], 0);
+            let picture = PortablePicture::new(list, &from, size)?;
+            return Ok(PortableFacet { picture, whole_px, is_interlaced: false, eyes: Vec::new() });
         }
         let (mut picture, mut eyes) = (None, Vec::new());
         for (i, side) in self.eyes(facet).iter().enumerate() {

@@ -280,7 +280,7 @@ impl Facet {
     /// between, +1 right.
     pub fn eyes(&self, frame: u64) -> &'static [f64] {
         match (self.stereo.sides(), self.stereo) {
-            (_, Stereo::FrameSequential) if (frame % 2 == 0) != self.swap_eyes => &[-1.0],
+            (_, Stereo::FrameSequential) if frame.is_multiple_of(2) != self.swap_eyes => &[-1.0],
             (_, Stereo::FrameSequential) => &[1.0],
             ([_, _], _) if self.swap_eyes => &[1.0, -1.0],
             (sides, _) => sides,
