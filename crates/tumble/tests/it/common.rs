@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// The shipped scenes.
-pub const SCENES: [&str; 25] = [
+pub const SCENES: [&str; 26] = [
     "arch",
     "ball_machine",
     "billiards",
@@ -21,6 +21,7 @@ pub const SCENES: [&str; 25] = [
     "incline",
     "jelly",
     "marble_run",
+    "mechanism",
     "newtons_cradle",
     "pendulum",
     "piston",
