@@ -372,7 +372,10 @@ fn the_mechanism_keeps_its_ratios() {
         lags.iter_mut().zip(now).for_each(|(lag, now)| *lag = [lag[0].min(now), lag[1].max(now)]);
     }
     let ranges = lags.map(|[least, most]| most - least);
-    println!("{:.3} turns, lags {lags:?}, overlap {overlap:.1e} m, {unconverged} unconverged", most / std::f64::consts::TAU);
+    println!(
+        "{:.3} turns, lags {lags:?}, overlap {overlap:.1e} m, {unconverged} unconverged",
+        most / std::f64::consts::TAU
+    );
     // all plays of the way from the motor to the part, as on its page
     let gears = 2.0 * 0.0003 / 0.06;
     let plays = [0.0004 + 0.0001, gears, 0.0004 + 0.04 * gears, 0.0004 / 0.06 + 0.002 + gears * 2.0 / 3.0];
