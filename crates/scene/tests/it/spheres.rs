@@ -330,7 +330,8 @@ fn a_cylinder_between_two_spheres_is_covered_as_a_capsule() {
     };
     let worst = |end: f64, most: usize| {
         let folder = Folder::new("capsule", &robot(end));
-        let link = folder.spherize(&options(most)).unwrap().links.remove(0);
+        let fine = SphereOptions { error: 1e-5, ..options(most) };
+        let link = folder.spherize(&fine).unwrap().links.remove(0);
         assert!(link.spheres.len() <= most);
         for p in points(&TriMesh::cylinder(radius, length, 360), at([0.0, 0.0, 0.1], [0.0; 3])) {
             let gap = link.spheres.iter().map(|(c, r)| (p - c).norm() - r).fold(f64::INFINITY, f64::min);

@@ -8,8 +8,8 @@
 //! `r_i` radius of a contact with the inner race, `v` velocity of a ball: the mean of those of its two contacts, which are
 //! opposite to each other if the ball rolls; `ω_c` its velocity about the axis.
 //!
-//! Bodies are rigid. More than three balls would be statically indeterminate: facets take the load off some of them, which then
-//! slip.
+//! Bodies are rigid. With more than three balls the load on each is statically indeterminate: facets take it off some of them,
+//! which then slip.
 
 use super::thread::Parts;
 use super::*;
@@ -107,10 +107,10 @@ fn ratio(count: usize, facets: usize, dt: f64) -> (f64, f64) {
     (mean, spread)
 }
 
-/// The balls go around by the velocity of rolling. In each step they move along their tangents, which takes them along the
-/// cones by a way that falls with the step.
+/// The balls go around at the velocity of rolling. In each step they move along their tangents, which takes them along the
+/// cones by a way that falls with the step. More than three balls slip: their velocities differ by up to 0.7 %.
 #[test]
-fn balls_of_a_bearing_go_around_at_the_velocity_of_rolling() {
+fn balls_of_a_bearing_go_around_at_the_velocity_of_rolling_full_length() {
     let exact = 0.5 * (1.0 - BALL / PITCH * ALPHA.cos());
     let errors = [1.0, 2.0, 4.0, 8.0].map(|parts| {
         let (mean, spread) = ratio(3, 192, DT / parts);
@@ -118,6 +118,9 @@ fn balls_of_a_bearing_go_around_at_the_velocity_of_rolling() {
         (mean / exact - 1.0).abs()
     });
     println!("errors of the velocity {errors:?}, by theory {exact:.5}");
-    ratio(8, 192, DT / 4.0);
-    assert!(errors.windows(2).all(|pair| pair[1] < 0.7 * pair[0]) && errors[3] < 5e-4, "{errors:?}");
+    if slow() {
+        ratio(8, 192, DT / 4.0);
+    }
+    assert!(errors[0] < 2e-3 && errors[3] < 3e-4, "{errors:?}");
+    assert!(errors[1..].windows(2).all(|pair| pair[1] < 0.7 * pair[0]), "{errors:?}");
 }
