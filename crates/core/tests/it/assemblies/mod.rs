@@ -4,6 +4,8 @@ mod bearing;
 mod gear;
 mod grid;
 mod lock;
+#[path = "../../../examples/mechanism_meshes.rs"]
+mod mechanism_meshes;
 mod thread;
 mod worm;
 mod zipper;
@@ -252,4 +254,17 @@ fn contacts_of_turning_gears_have_the_gaps_of_their_outlines() {
     }
     println!("worst {worst:e}");
     assert!(worst < 1e-6);
+}
+
+/// The meshes of the scene `mechanism` are those of its program: equal triangles, and points within the rounding of the files.
+#[test]
+fn the_meshes_of_the_mechanism_are_those_of_its_program() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/mechanism");
+    for (name, mesh) in mechanism_meshes::meshes() {
+        let text = std::fs::read_to_string(folder.join(format!("{name}.obj"))).unwrap();
+        let file = TriMesh::from_obj(&text).unwrap().scaled(0.001);
+        let off = file.vertices.iter().zip(&mesh.vertices).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max);
+        assert_eq!((file.vertices.len(), &file.triangles), (mesh.vertices.len(), &mesh.triangles), "{name}");
+        assert!(off < 1e-7, "{name}: {off} m");
+    }
 }
