@@ -8,9 +8,9 @@
 #![allow(clippy::disallowed_methods, dead_code)] // the generators are those of the tests
 
 #[path = "../tests/it/assemblies/gear.rs"]
-mod gear;
+pub(crate) mod gear;
 #[path = "../tests/it/assemblies/thread.rs"]
-mod thread;
+pub(crate) mod thread;
 
 use gear::Gear;
 use std::error::Error;

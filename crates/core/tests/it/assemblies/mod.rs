@@ -1,20 +1,18 @@
 //! Assemblies from raw meshes: the contacts alone guide the parts, as they do real ones.
 
 mod bearing;
-mod gear;
 mod grid;
 mod lock;
 #[path = "../../../examples/mechanism_meshes.rs"]
 mod mechanism_meshes;
-mod thread;
 mod worm;
 mod zipper;
 
 use crate::common::*;
-use gear::Gear;
+use mechanism_meshes::gear::{self, Gear};
+use mechanism_meshes::thread::{self, Thread};
 use std::f64::consts::TAU;
 use std::time::Instant;
-use thread::Thread;
 use tumble_core::articulated::Drive;
 use tumble_core::collide::{Pose, Shape, TreeSettings, TriMesh, Vec3, contacts};
 use tumble_core::*;
