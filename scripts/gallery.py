@@ -53,6 +53,7 @@ SCENES = {
     "jelly": (0, 1.2),
     "ball_machine": (0.5, 6.0),
     "bird": (3.0, 1.0),
+    "mechanism": (1.0, 3.0),
 }
 
 # Figures 27 to 31 of the thesis: scenes in the cave `cube4`, and the time that is shown, whole seconds of the scene.

@@ -58,6 +58,15 @@ const SHIPPED: &[Shipped] = shipped_scenes![
     "flock",
     "ball_machine",
     "bird",
+    "mechanism"[
+        "worm.obj",
+        "worm_wheel.obj",
+        "pinion.obj",
+        "wheel.obj",
+        "rack.obj",
+        "screw.obj",
+        "nut.obj"
+    ],
 ];
 
 /// Returns the scenes that come with tumble.

@@ -192,8 +192,8 @@ impl ArticulatedSpec {
         let options =
             UrdfOptions { velocity_limits: f.flag_or("velocity_limits", false), ..read_options(f, from, place) };
         let file = place.folder.join(path);
-        let robot = match place.files.iter().find(|(name, _)| *name == path) {
-            Some((_, text)) => crate::urdf::read_text(text, &file, &options, crate::urdf::Content::Body),
+        let robot = match place.text(path) {
+            Some(text) => crate::urdf::read_text(text, &file, &options, crate::urdf::Content::Body),
             None => crate::urdf::read_file(&file, &options, crate::urdf::Content::Body),
         };
         match robot {

@@ -136,7 +136,7 @@ impl SceneFile {
         let saved = SavedWorld::read(&mut f, folder);
         let world = read_table(&mut f, "world", WorldSettings::read).unwrap_or_default();
         let materials = read_named(&mut f, "materials", |name, table| Some(MaterialSpec::read(name, table)));
-        let meshes = read_named(&mut f, "meshes", |name, table| MeshSpec::read(name, table, folder));
+        let meshes = read_named(&mut f, "meshes", |name, table| MeshSpec::read(name, table, &place));
         let materials: Vec<MaterialSpec> = materials.into_iter().filter_map(|(_, material)| material).collect();
         let library = library(&meshes, &materials, world.contacts);
         let mut names = BTreeMap::new();

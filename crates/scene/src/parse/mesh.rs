@@ -7,6 +7,7 @@ use tumble_core::collide::TriMesh;
 
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names};
+use crate::parse::place::Place;
 use crate::parse::profile;
 use crate::parse::terrain::{self, Heights, HullPoints};
 
@@ -88,7 +89,8 @@ pub enum MeshSource {
         /// Full edge lengths along x, y and z, meters.
         size_m: [f64; 3],
     },
-    /// A closed mesh of a model that was read; scene files have none.
+    /// A closed mesh that was read with the description: of another format's model, or of an OBJ file that is built in with
+    /// its scene.
     Triangles {
         /// Closed and wound outwards, meters.
         mesh: Arc<TriMesh>,
@@ -166,8 +168,8 @@ impl MeshSpec {
         }
     }
 
-    /// Reads a mesh; paths are relative to `folder`.
-    pub(crate) fn read(name: &str, mut f: Fields<'_>, folder: &Path) -> Option<Self> {
+    /// Reads a mesh; paths are relative to the folder of the scene.
+    pub(crate) fn read(name: &str, mut f: Fields<'_>, place: &Place<'_>) -> Option<Self> {
         let Some(kind) = f.choice("type", KINDS) else {
             f.give_up();
             return None;
@@ -175,7 +177,7 @@ impl MeshSpec {
         let repair = f.flag_or("repair", false);
         let sphere_tree_depth = f.value("sphere_tree_depth").map(|v| f.as_integer("sphere_tree_depth", v, 1..=9));
         let sphere_tree_max_error = f.optional_number("sphere_tree_max_error", TREE_ERROR);
-        let source = MeshSource::read(&mut f, kind, folder);
+        let source = MeshSource::read(&mut f, kind, place);
         f.finish();
         Some(MeshSpec { name: name.to_owned(), source: source?, repair, sphere_tree_depth, sphere_tree_max_error })
     }
@@ -194,11 +196,15 @@ impl MeshSource {
         }
     }
 
-    fn read(f: &mut Fields<'_>, kind: Kind, folder: &Path) -> Option<Self> {
+    fn read(f: &mut Fields<'_>, kind: Kind, place: &Place<'_>) -> Option<Self> {
+        let folder = place.folder;
         Some(match kind {
             Kind::File => {
                 let scale = f.number_or("scale", Bound::POSITIVE, 1.0);
-                MeshSource::File { path: read_path(f, folder)?, scale }
+                match read_built_in(f, place, scale) {
+                    Some(mesh) => MeshSource::Triangles { mesh },
+                    None => MeshSource::File { path: read_path(f, folder)?, scale },
+                }
             }
             Kind::Lathe => {
                 let segments = read_segments(f, "segments", 48);
@@ -246,6 +252,13 @@ fn read_torus(f: &mut Fields<'_>) -> MeshSource {
     }
     let (segments, tube_segments) = (read_segments(f, "segments", 48), read_segments(f, "tube_segments", 24));
     MeshSource::Torus { radius_m, tube_radius_m, segments, tube_segments }
+}
+
+/// Returns the mesh of an OBJ file whose text is given with that of the scene.
+fn read_built_in(f: &mut Fields<'_>, place: &Place<'_>, scale: f64) -> Option<Arc<TriMesh>> {
+    let name = f.value("file")?.get_ref().as_str()?;
+    let text = place.text(name)?;
+    Some(Arc::new(TriMesh::from_obj(text).ok()?.scaled(scale)))
 }
 
 /// Reads the path of a mesh file: an existing OBJ, STL, PLY or COLLADA file.

@@ -18,6 +18,7 @@ const FIRST_TREE: usize = 4;
 pub(super) enum Share<'s> {
     Sphere(f64),
     Capsule { radius: f64, length: f64, count: usize },
+    Barrel { radius: f64, length: f64, count: usize },
     Mesh(Box<MeshShare<'s>>),
 }
 
@@ -60,6 +61,7 @@ impl<'s> Share<'s> {
         match surface {
             Surface::Sphere(radius) => Share::Sphere(*radius),
             Surface::Capsule(radius, length) => Share::Capsule { radius: *radius, length: *length, count: 1 },
+            Surface::Barrel(radius, length) => Share::Barrel { radius: *radius, length: *length, count: 1 },
             Surface::Mesh { given, solid, slack } => {
                 let covering = Covering::new(given, solid);
                 Share::Mesh(Box::new(MeshShare {
@@ -77,7 +79,7 @@ impl<'s> Share<'s> {
     fn count(&self) -> usize {
         match self {
             Share::Sphere(_) => 1,
-            Share::Capsule { count, .. } => *count,
+            Share::Capsule { count, .. } | Share::Barrel { count, .. } => *count,
             Share::Mesh(mesh) => mesh.covering.count(),
         }
     }
@@ -87,6 +89,7 @@ impl<'s> Share<'s> {
         match self {
             Share::Sphere(_) => 0.0,
             Share::Capsule { radius, length, count } => reach(*radius, *length, *count) - radius,
+            Share::Barrel { radius, length, count } => barrel_reach(*radius, *length, *count) - radius,
             Share::Mesh(mesh) => mesh.covering.worst() + mesh.slack,
         }
     }
@@ -96,7 +99,9 @@ impl<'s> Share<'s> {
     fn wants_more(&self, error: f64) -> bool {
         match self {
             Share::Sphere(_) => false,
-            Share::Capsule { radius, length, .. } => self.worst() > error * (length + 2.0 * radius),
+            Share::Capsule { radius, length, .. } | Share::Barrel { radius, length, .. } => {
+                self.worst() > error * (length + 2.0 * radius)
+            }
             Share::Mesh(mesh) => !mesh.stuck && mesh.covering.worst() > error * mesh.solid.diagonal(),
         }
     }
@@ -104,7 +109,7 @@ impl<'s> Share<'s> {
     fn add(&mut self, options: &SphereOptions) -> Result<(), String> {
         match self {
             Share::Sphere(_) => Ok(()),
-            Share::Capsule { count, .. } => {
+            Share::Capsule { count, .. } | Share::Barrel { count, .. } => {
                 *count += 1;
                 Ok(())
             }
@@ -119,6 +124,11 @@ impl<'s> Share<'s> {
             Share::Capsule { radius, length, count } => {
                 let at = |n: usize| if *count == 1 { 0.0 } else { length * (n as f64 / (count - 1) as f64 - 0.5) };
                 let reach = reach(*radius, *length, *count);
+                (0..*count).map(|n| (Vec3::z() * at(n), reach, reach - radius)).collect()
+            }
+            Share::Barrel { radius, length, count } => {
+                let at = |n: usize| length * ((n as f64 + 0.5) / *count as f64 - 0.5);
+                let reach = barrel_reach(*radius, *length, *count);
                 (0..*count).map(|n| (Vec3::z() * at(n), reach, reach - radius)).collect()
             }
             Share::Mesh(mesh) => mesh
@@ -138,6 +148,11 @@ fn reach(radius: f64, length: f64, count: usize) -> f64 {
     } else {
         (radius * radius + 0.25 * (length / (count - 1) as f64).powi(2)).sqrt()
     }
+}
+
+/// Returns the radius of each of `count` spheres on a cylinder's axis that cover its side.
+fn barrel_reach(radius: f64, length: f64, count: usize) -> f64 {
+    (radius * radius + 0.25 * (length / count as f64).powi(2)).sqrt()
 }
 
 impl MeshShare<'_> {

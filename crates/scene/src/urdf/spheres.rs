@@ -9,7 +9,8 @@
 //! | shape | spheres |
 //! |---|---|
 //! | capsule | on its axis at equal distances `d`, of radius `√(R² + d²/4)`: they cover it and reach `√(R² + d²/4) − R` outside |
-//! | box, cylinder, mesh | spheres that contain all pieces of its surface, the worst divided in two each time ([`Covering`](tumble_core::collide::Covering)); at 4, 8, 16, … spheres those of a tree are tried, and used if they reach less far |
+//! | cylinder between two spheres that contain its rounded ends | on its axis in the middle of `n` equal pieces of length `d`, of the same radius: with the ends it is a capsule, outside of which they reach as far |
+//! | box, other cylinder, mesh | spheres that contain all pieces of its surface, the worst divided in two each time ([`Covering`](tumble_core::collide::Covering)); at 4, 8, 16, … spheres those of a tree are tried, and used if they reach less far |
 //! | open mesh | as for the mesh with its holes closed, else for its convex hull; the given surface is covered |
 
 use std::ops::Range;
@@ -35,6 +36,9 @@ const SIDES: usize = 48;
 /// Relative enlargement of written spheres, so that they still cover the shape after the rounding
 /// of any reader.
 const ROUNDING: f64 = 1e-9;
+
+/// Share of a cylinder's radius by which a sphere at its end may be too small.
+const ROUND: f64 = 1e-9;
 
 /// Options of the covering by spheres.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,6 +94,8 @@ pub(super) enum Surface {
     Sphere(f64),
     /// Radius, and length of the straight part.
     Capsule(f64, f64),
+    /// Radius and length of a cylinder whose ends, with half balls on them, are in other spheres of the link.
+    Barrel(f64, f64),
     /// The surface to cover, a closed surface around at least the same solid, and how far that is
     /// outside the shape it replaces.
     Mesh {
@@ -150,7 +156,29 @@ fn parts<'a, 'd>(link: &Element<'a, 'd>, context: &mut Context<'_>) -> Result<Ve
         let surface = surface(&shape.geometry, context)?;
         parts.push(Part { node: element.node(), shape, surface });
     }
+    let barrels: Vec<Option<Surface>> = parts.iter().map(|part| barrel(part, &parts)).collect();
+    for (part, barrel) in parts.iter_mut().zip(barrels) {
+        if let Some(surface) = barrel {
+            part.surface = surface;
+        }
+    }
     Ok(parts)
+}
+
+/// Returns the surface of a cylinder that is a capsule together with spheres of its link at both ends.
+fn barrel(part: &Part<'_, '_>, parts: &[Part<'_, '_>]) -> Option<Surface> {
+    let Geometry::Shape(ShapeSpec::Cylinder { radius_m, length_m }) = part.shape.geometry else { return None };
+    let in_a_sphere = |end: f64| {
+        let end = (part.shape.pose * nalgebra::Point3::new(0.0, 0.0, end)).coords;
+        parts.iter().any(|other| match other.surface {
+            Surface::Sphere(radius) => {
+                (other.shape.pose.translation.vector - end).norm() + radius_m <= radius + ROUND * radius_m
+            }
+            _ => false,
+        })
+    };
+    let ends = [-0.5 * length_m, 0.5 * length_m];
+    ends.into_iter().all(in_a_sphere).then_some(Surface::Barrel(radius_m, length_m))
 }
 
 fn surface(geometry: &Geometry, context: &mut Context<'_>) -> Result<Surface, String> {

@@ -54,7 +54,7 @@ fn what_is_not_there() {
     let error = resolve_scene("biliards", &[]).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "no scene `biliards`: did you mean `billiards`? There are `falling`, `stack`, `billiards`, `bowling`, `incline`, `pendulum`, `chain`, `piston`, `skeleton`, `robot`, `dominoes`, `newtons_cradle`, `arch`, `card_house`, `wrecking_ball`, `marble_run`, `steam_engine`, `walker`, `cloth`, `jelly`, `sparks`, `campfire`, `flock`, `ball_machine` and `bird`"
+        "no scene `biliards`: did you mean `billiards`? There are `falling`, `stack`, `billiards`, `bowling`, `incline`, `pendulum`, `chain`, `piston`, `skeleton`, `robot`, `dominoes`, `newtons_cradle`, `arch`, `card_house`, `wrecking_ball`, `marble_run`, `steam_engine`, `walker`, `cloth`, `jelly`, `sparks`, `campfire`, `flock`, `ball_machine`, `bird` and `mechanism`"
     );
     let error = resolve_scene("no/such.toml", &[]).unwrap_err();
     assert!(error.to_string().starts_with("no/such.toml: cannot read it: "), "{error}");

@@ -156,7 +156,8 @@ shipped_scenes!(
     walker,
     arch,
     card_house,
-    wrecking_ball
+    wrecking_ball,
+    mechanism
 );
 
 #[test]

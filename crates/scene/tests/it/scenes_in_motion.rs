@@ -344,3 +344,42 @@ fn the_walker_plants_its_feet_and_shoves_what_is_in_its_way() {
     assert!((4.0..5.0).contains(&way) && gone >= 8, "{way} m, {gone} blocks");
     assert!((place(&world, bystander) - aside).norm() < 1e-6);
 }
+
+/// Every part of the mechanism follows the motor by its own ratio within its play, for as long as the motor turns, and
+/// comes back with it.
+#[test]
+fn the_mechanism_keeps_its_ratios() {
+    let scene = load("mechanism");
+    let mut world = build(&scene);
+    let [nut, rack] = ["nut", "rack"].map(|name| world.find(name).unwrap());
+    let start = [nut, rack].map(|id| place(&world, id));
+    let mut lags = [[f64::INFINITY, f64::NEG_INFINITY]; 4];
+    let (mut most, mut overlap, mut unconverged) = (0.0f64, 0.0f64, 0);
+    while world.time() < seconds(1.5, 10.0) - 1e-9 {
+        let report = world.step().unwrap();
+        (overlap, unconverged) = (overlap.max(report.max_penetration), unconverged + report.unconverged);
+        let motor = -coordinate(&world, "motor", "shaft").0;
+        let gears = -coordinate(&world, "first_axle", "gears").0;
+        let wheel = coordinate(&world, "second_axle", "wheel").0;
+        most = most.max(motor);
+        let turns = motor / std::f64::consts::TAU;
+        let now = [
+            place(&world, nut).x - start[0].x - 0.008 * turns,
+            gears - motor / 30.0,
+            place(&world, rack).z - start[1].z - 0.04 * motor / 30.0,
+            wheel - motor / 45.0,
+        ];
+        lags.iter_mut().zip(now).for_each(|(lag, now)| *lag = [lag[0].min(now), lag[1].max(now)]);
+    }
+    let ranges = lags.map(|[least, most]| most - least);
+    println!(
+        "{:.3} turns, lags {lags:?}, overlap {overlap:.1e} m, {unconverged} unconverged",
+        most / std::f64::consts::TAU
+    );
+    // all plays of the way from the motor to the part, as on its page; parts may overlap
+    let gears = 2.0 * 0.0003 / 0.06;
+    let plays = [0.0004 + 0.0001 + overlap, gears, 0.0004 + 0.04 * gears, 0.0004 / 0.06 + 0.002 + gears * 2.0 / 3.0];
+    ranges.iter().zip(plays).for_each(|(range, play)| assert!(*range < play, "{ranges:?}, {plays:?}"));
+    assert!(most > 2.1 * std::f64::consts::TAU, "the motor turned by {most} rad");
+    assert!(overlap < 5e-4 && unconverged == 0, "overlap {overlap} m, {unconverged} unconverged");
+}

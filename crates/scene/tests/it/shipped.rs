@@ -46,7 +46,7 @@ fn frusta(profile: &[[f64; 2]]) -> (f64, f64) {
 
 #[test]
 fn all_read_and_describe_themselves() {
-    assert_eq!(shipped().len(), 25);
+    assert_eq!(shipped().len(), 26);
     for one in shipped() {
         let scene = scene(one.name);
         assert_eq!(scene.description, one.description());

@@ -310,3 +310,48 @@ fn a_robot_without_masses_is_covered() {
     assert_eq!(covered.links.len(), 2);
     covered.links.iter().for_each(assert_covered);
 }
+
+/// A cylinder between two spheres, the usual capsule of a link, is covered along its axis: as tightly as by a chain of
+/// as many spheres as are left for it.
+#[test]
+fn a_cylinder_between_two_spheres_is_covered_as_a_capsule() {
+    let (radius, length) = (0.06, 0.27);
+    let element = |z: f64, shape: &str| {
+        format!("<collision><origin xyz=\"0 0 {z}\"/><geometry><{shape}/></geometry></collision>")
+    };
+    let robot = |end: f64| {
+        let ball = format!("sphere radius=\"{end}\"");
+        let elements = [
+            element(0.1, &format!("cylinder radius=\"{radius}\" length=\"{length}\"")),
+            element(0.1 - 0.5 * length, &ball),
+            element(0.1 + 0.5 * length, &ball),
+        ];
+        format!("<robot name=\"r\"><link name=\"capsule\">{}</link></robot>", elements.concat())
+    };
+    let worst = |end: f64, most: usize| {
+        let folder = Folder::new("capsule", &robot(end));
+        let fine = SphereOptions { error: 1e-5, ..options(most) };
+        let link = folder.spherize(&fine).unwrap().links.remove(0);
+        assert!(link.spheres.len() <= most);
+        for p in points(&TriMesh::cylinder(radius, length, 360), at([0.0, 0.0, 0.1], [0.0; 3])) {
+            let gap = link.spheres.iter().map(|(c, r)| (p - c).norm() - r).fold(f64::INFINITY, f64::min);
+            assert!(gap <= 0.0, "{p:?} is {gap:e} m outside all {} spheres", link.spheres.len());
+        }
+        // how far each sphere reaches outside the capsule of that radius: its distance from the axis, and its radius
+        let half = 0.5 * length;
+        let reach = |(c, r): &(Vec3, f64)| {
+            let z = (c.z - 0.1).abs() - half;
+            c.x.hypot(c.y).hypot(z.max(0.0)) + r - end.max(radius)
+        };
+        link.spheres.iter().map(reach).fold(0.0, f64::max)
+    };
+    for most in [8, 32] {
+        let left = (most - 2) as f64;
+        let chain = radius.hypot(0.5 * length / left) - radius;
+        let (found, smaller) = (worst(radius, most), worst(0.9 * radius, most));
+        println!("{most} spheres: {:.2} mm outside; {:.2} mm if the ends are smaller", 1e3 * found, 1e3 * smaller);
+        assert!((found - chain).abs() < 1e-6, "{most}: {found}, {chain}");
+        // ends that do not contain those of the cylinder are no capsule
+        assert!(smaller > 2.0 * chain);
+    }
+}

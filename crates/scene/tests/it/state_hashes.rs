@@ -94,6 +94,7 @@ table! {
     arch_time_stepping: "arch", TimeStepping, "e7090b6cbe5ad156", "4c2e00f4dc0a531c";
     walker_time_stepping: "walker", TimeStepping, "4f3cf3f418140f88", "3516c95fdc90d58f";
     wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "999f55b2fdaf7618", "9e57e55efc92bfa2";
+    mechanism_time_stepping: "mechanism", TimeStepping, "781ddb3ba323cb6c", "0294bf65469db807";
     dominoes_time_stepping: "dominoes", TimeStepping, "fe44a6680e801f5a", "c798dcaf8ca85ed0";
 }
 
@@ -105,5 +106,6 @@ table! {
     arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "43819e958609f0f5";
     dominoes_backtracking: "dominoes", Backtracking, "94511c9695cd65a8", "4e9f28f0d690f8d4";
     walker_backtracking: "walker", Backtracking, "ca535adb9b9b96d3", "093bfa105a94cd32";
+    mechanism_backtracking: "mechanism", Backtracking, "d95e4646ca906fd2", "509fb9fd60f8aca4";
     wrecking_ball_backtracking: "wrecking_ball", Backtracking, "1d7fafc6ac54b274", "9f5c6d9320b43b95";
 }

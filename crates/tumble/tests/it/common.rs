@@ -6,7 +6,7 @@ use std::process::{Command, Output, Stdio};
 use std::sync::LazyLock;
 
 /// The shipped scenes.
-pub const SCENES: [&str; 25] = [
+pub const SCENES: [&str; 26] = [
     "arch",
     "ball_machine",
     "billiards",
@@ -22,6 +22,7 @@ pub const SCENES: [&str; 25] = [
     "incline",
     "jelly",
     "marble_run",
+    "mechanism",
     "newtons_cradle",
     "pendulum",
     "piston",

@@ -23,6 +23,7 @@ fn seconds(scene: &str) -> f64 {
         // `backtracking` takes seconds for a frame of what follows
         "dominoes" => 0.3,
         "arch" | "wrecking_ball" => 0.4,
+        "mechanism" => 0.2,
         _ if std::env::var_os("TUMBLE_SLOW").is_some_and(|v| v == "1") => 60.0,
         "bowling" => 3.2, // the ball meets the pins after 2.55 s
         "stack" => 0.5,

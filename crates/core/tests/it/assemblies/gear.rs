@@ -64,17 +64,28 @@ impl Gear {
 
     /// Returns the gear with a tooth on the x axis, centered at height 0.
     pub fn mesh(&self) -> TriMesh {
+        self.twisted(0.0, 2)
+    }
+
+    /// Returns the gear as sections along z that are turned against each other by `twist` per length, rad/m.
+    pub fn twisted(&self, twist: f64, sections: usize) -> TriMesh {
         let outline = self.outline();
         let mut out = Parts::default();
-        let n = outline.len();
-        let rings = [-0.5 * self.width, 0.5 * self.width].map(|z| {
-            let first = out.vertices.len() as u32;
-            out.vertices.extend(outline.iter().map(|&(r, angle)| Vec3::new(r * angle.cos(), r * angle.sin(), z)));
-            first
-        });
-        out.band(rings[0], rings[1], n);
-        out.cap(rings[0], n, -0.5 * self.width, false);
-        out.cap(rings[1], n, 0.5 * self.width, true);
+        let at = |k: usize| self.width * (k as f64 / (sections - 1) as f64 - 0.5);
+        let rings: Vec<u32> = (0..sections)
+            .map(|k| {
+                let first = out.vertices.len() as u32;
+                let place = |&(r, angle): &(f64, f64)| {
+                    let (sin, cos) = (angle + twist * at(k)).sin_cos();
+                    Vec3::new(r * cos, r * sin, at(k))
+                };
+                out.vertices.extend(outline.iter().map(place));
+                first
+            })
+            .collect();
+        rings.windows(2).for_each(|w| out.band(w[0], w[1], outline.len()));
+        out.cap(rings[0], outline.len(), at(0), false);
+        out.cap(rings[sections - 1], outline.len(), at(sections - 1), true);
         out.mesh()
     }
 }

@@ -145,7 +145,7 @@ fn turn(cuts: [f64; 5]) -> (f64, f64) {
         overlap[1] = overlap[1].max(world.report().max_penetration);
     });
     println!(
-        "lock, {triangles} triangles in housing and plug: key and pins {worst:.1e} m from their places, the plug turns by {:.4} rad, overlap {:.1e} m while the key goes in and {:.1e} m while it turns, {in_time:.2} and {turning:.2} of real time",
+        "lock, {triangles} triangles in housing and plug: key and pins {worst:.1e} m from their places, the plug turns by {:.4} rad, overlap {:.1e} m while the key goes in and {:.1e} m while it turns, real-time factor {in_time:.2} and {turning:.2}",
         turns.total, overlap[0], overlap[1]
     );
     assert!(overlap[0].max(overlap[1]) < 2e-4, "{overlap:?}");

@@ -8,7 +8,7 @@
 //! teeth of the wheel, `α` = 20°.
 
 use super::gear::Gear;
-use super::thread::{Parts, Thread};
+use super::thread::Thread;
 use super::*;
 use std::f64::consts::PI;
 use tumble_core::collide::Mat3;
@@ -23,27 +23,9 @@ fn thread() -> Thread {
     Thread { pitch: PI * MODULE, root: RADIUS - 0.5 * depth, crest: RADIUS + 0.5 * depth, facets: 48, turns: 5 }
 }
 
-/// Returns the wheel about z with its teeth along the thread, as sections that are turned against each other.
+/// Returns the wheel about z with its teeth along the thread.
 fn wheel() -> TriMesh {
-    const SECTIONS: usize = 5;
-    let (outline, twist) = (WHEEL.outline(), MODULE / (2.0 * RADIUS) / WHEEL.pitch_radius());
-    let mut out = Parts::default();
-    let at = |k: usize| WHEEL.width * (k as f64 / (SECTIONS - 1) as f64 - 0.5);
-    let rings: Vec<u32> = (0..SECTIONS)
-        .map(|k| {
-            let first = out.vertices.len() as u32;
-            let place = |&(r, angle): &(f64, f64)| {
-                let (sin, cos) = (angle + twist * at(k)).sin_cos();
-                Vec3::new(r * cos, r * sin, at(k))
-            };
-            out.vertices.extend(outline.iter().map(place));
-            first
-        })
-        .collect();
-    rings.windows(2).for_each(|w| out.band(w[0], w[1], outline.len()));
-    out.cap(rings[0], outline.len(), at(0), false);
-    out.cap(rings[SECTIONS - 1], outline.len(), at(SECTIONS - 1), true);
-    out.mesh()
+    WHEEL.twisted(MODULE / (2.0 * RADIUS) / WHEEL.pitch_radius(), 5)
 }
 
 /// Worm and wheel on hinges. Returns both bodies and the number of triangles.
@@ -105,7 +87,7 @@ fn a_worm_turns_its_wheel_by_a_tooth_in_a_turn_full_length() {
     });
     let play = 2.0 * WHEEL.play / WHEEL.pitch_radius();
     println!(
-        "worm, {triangles} triangles, {:.2} turns, wheel {:.5} turns: lag {least:.1e} to {most:.1e} rad, play {play:.1e}, overlap {overlap:.1e} m, {unconverged} unconverged, {speed:.2} of real time",
+        "worm, {triangles} triangles, {:.2} turns, wheel {:.5} turns: lag {least:.1e} to {most:.1e} rad, play {play:.1e}, overlap {overlap:.1e} m, {unconverged} unconverged, real-time factor {speed:.2}",
         turns.total / TAU,
         total / TAU
     );

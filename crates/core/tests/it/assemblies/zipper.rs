@@ -230,7 +230,7 @@ impl Zipper {
 fn a_slider_closes_and_opens_a_zipper_full_length() {
     let (tooth, cycles) = (Tooth { head: 0.0055 }, if slow() { 3 } else { 1 });
     let mut zipper = Zipper::open(tooth, 0.03);
-    let began = Instant::now();
+    let began = Stopwatch::start();
     let (mut closing, mut opening, mut play) = (0.0f64, 0.0f64, 0.0f64);
     for _ in 0..cycles {
         closing = closing.max(zipper.pull(0.2, 1.25));
@@ -241,11 +241,11 @@ fn a_slider_closes_and_opens_a_zipper_full_length() {
         opening = opening.max(zipper.pull(0.03, 1.25));
     }
     let seconds = zipper.world.time();
-    let speed = seconds / began.elapsed().as_secs_f64();
+    let speed = seconds / began.seconds();
     zipper.part(5.0, 0.25);
     let parted = zipper.gaps();
     println!(
-        "zipper, {} triangles, {seconds} s: slider pulled by {closing:.0} and {opening:.0} N, closed tapes pulled by 50 N are apart by {play:.2e} m of {:.2e} m, open ones by {:.2} m, overlap {:.1e} m, {} unconverged, {speed:.2} of real time",
+        "zipper, {} triangles, {seconds} s: slider pulled by {closing:.0} and {opening:.0} N, closed tapes pulled by 50 N are apart by {play:.2e} m of {:.2e} m, open ones by {:.2} m, overlap {:.1e} m, {} unconverged, real-time factor {speed:.2}",
         zipper.triangles,
         tooth.play(),
         parted[9],
